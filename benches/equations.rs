@@ -1,0 +1,2 @@
+//! Cost of one evaluation of the equations.
+fn main() {}

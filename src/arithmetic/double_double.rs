@@ -1,0 +1,279 @@
+//! Double-double arithmetic: an unevaluated sum `hi + lo`, about 32 decimal digits.
+//!
+//! Source: Y. Hida, X. S. Li, D. H. Bailey, *Library for Double-Double and Quad-Double Arithmetic* (2007), sections 3.2-3.4; the
+//! bounds are those of M. Joldes, J.-M. Muller, V. Popescu, *Tight and rigorous error bounds for basic building blocks of double-word
+//! arithmetic*, ACM TOMS 44 (2017): sums to 3 u², products to 5 u², quotients to 10 u² with u = 2⁻⁵³.
+
+use super::sum::{fast_two_sum, two_product, two_sum};
+use super::{Real, Scalar};
+use std::cmp::Ordering;
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+/// `hi + lo` with `|lo|` at most half a unit in the last place of `hi`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DoubleDouble {
+    /// The nearest double.
+    pub hi: f64,
+    /// What is left.
+    pub lo: f64,
+}
+
+impl DoubleDouble {
+    /// π.
+    pub const PI: Self = Self { hi: std::f64::consts::PI, lo: 1.224_646_799_147_353_2e-16 };
+    /// 2π.
+    pub const TAU: Self = Self { hi: std::f64::consts::TAU, lo: 2.449_293_598_294_706_4e-16 };
+    /// π/2.
+    pub const FRAC_PI_2: Self = Self { hi: std::f64::consts::FRAC_PI_2, lo: 6.123_233_995_736_766e-17 };
+
+    /// The exact sum of two doubles.
+    #[inline(always)]
+    pub fn sum(a: f64, b: f64) -> Self {
+        let (hi, lo) = two_sum(a, b);
+        Self { hi, lo }
+    }
+
+    /// The exact product of two doubles.
+    #[inline(always)]
+    pub fn product(a: f64, b: f64) -> Self {
+        let (hi, lo) = two_product(a, b);
+        Self { hi, lo }
+    }
+
+    /// Exact product with a power of two.
+    #[inline(always)]
+    pub fn ldexp(self, power_of_two: f64) -> Self {
+        Self { hi: self.hi * power_of_two, lo: self.lo * power_of_two }
+    }
+
+    /// True where both parts are finite.
+    pub fn is_finite(self) -> bool {
+        self.hi.is_finite() && self.lo.is_finite()
+    }
+
+    /// The angle less whole turns, in [-π, π], and the turns taken off; exact to the last place of the pair for up to 2⁵³ turns.
+    pub fn reduced(self) -> (Self, f64) {
+        let turns = (self.hi / Self::TAU.hi).round();
+        if turns == 0.0 {
+            return (self, 0.0);
+        }
+        (self - Self::TAU * Self::of(turns), turns)
+    }
+
+    /// sin and cos of an angle in [-π/4, π/4] by their Taylor series; the first term left out is below 1e-33.
+    fn sin_cos_small(self) -> (Self, Self) {
+        const LAST: i32 = 27;
+        let square = self * self;
+        let (mut sin, mut cos) = (Self::ONE, Self::ONE);
+        // Horner from the highest factorial down: 1 - x²/(k(k-1)) (1 - ...)
+        let mut k = LAST;
+        while k >= 3 {
+            sin = Self::ONE - square * sin / Self::of(f64::from(k * (k - 1)));
+            cos = Self::ONE - square * cos / Self::of(f64::from((k - 1) * (k - 2)));
+            k -= 2;
+        }
+        (self * sin, cos)
+    }
+}
+
+impl From<f64> for DoubleDouble {
+    fn from(value: f64) -> Self {
+        Self { hi: value, lo: 0.0 }
+    }
+}
+
+impl Add for DoubleDouble {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        let (s, e) = two_sum(self.hi, other.hi);
+        let (t, f) = two_sum(self.lo, other.lo);
+        let (s, e) = fast_two_sum(s, e + t);
+        let (hi, lo) = fast_two_sum(s, e + f);
+        Self { hi, lo }
+    }
+}
+
+impl Add<f64> for DoubleDouble {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: f64) -> Self {
+        let (s, e) = two_sum(self.hi, other);
+        let (hi, lo) = fast_two_sum(s, e + self.lo);
+        Self { hi, lo }
+    }
+}
+
+impl Sub for DoubleDouble {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self + -other
+    }
+}
+
+impl Mul for DoubleDouble {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        let (p, e) = two_product(self.hi, other.hi);
+        let (hi, lo) = fast_two_sum(p, e + (self.hi * other.lo + self.lo * other.hi));
+        Self { hi, lo }
+    }
+}
+
+impl Div for DoubleDouble {
+    type Output = Self;
+    /// Three quotient digits, each from the exact remainder of the last.
+    #[inline]
+    fn div(self, other: Self) -> Self {
+        let first = self.hi / other.hi;
+        let rest = self - other.scale(first);
+        let second = rest.hi / other.hi;
+        let rest = rest - other.scale(second);
+        let third = rest.hi / other.hi;
+        let (hi, lo) = fast_two_sum(first, second);
+        Self { hi, lo } + third
+    }
+}
+
+impl Neg for DoubleDouble {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self { hi: -self.hi, lo: -self.lo }
+    }
+}
+
+impl AddAssign for DoubleDouble {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl SubAssign for DoubleDouble {
+    #[inline(always)]
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
+    }
+}
+
+impl PartialOrd for DoubleDouble {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        match self.hi.partial_cmp(&other.hi) {
+            Some(Ordering::Equal) => self.lo.partial_cmp(&other.lo),
+            order => order,
+        }
+    }
+}
+
+impl Scalar for DoubleDouble {
+    const ZERO: Self = Self { hi: 0.0, lo: 0.0 };
+    const ONE: Self = Self { hi: 1.0, lo: 0.0 };
+
+    #[inline(always)]
+    fn of(value: f64) -> Self {
+        Self { hi: value, lo: 0.0 }
+    }
+
+    #[inline(always)]
+    fn scale(self, factor: f64) -> Self {
+        let (p, e) = two_product(self.hi, factor);
+        let (hi, lo) = fast_two_sum(p, e + self.lo * factor);
+        Self { hi, lo }
+    }
+
+    /// One Newton step from the double's own root.
+    fn sqrt(self) -> Self {
+        if self.hi <= 0.0 {
+            return Self::of(self.hi.sqrt());
+        }
+        let root = self.hi.sqrt();
+        let rest = self - Self::product(root, root);
+        let (hi, lo) = fast_two_sum(root, rest.hi / (2.0 * root));
+        let root = Self { hi, lo };
+        // A second step in full: the first leaves about 1e-31 of the root.
+        root + (self - root * root) / root.ldexp(2.0)
+    }
+
+    fn sin_cos(self) -> (Self, Self) {
+        let (angle, _) = self.reduced();
+        let quarter = (angle.hi / Self::FRAC_PI_2.hi).round();
+        let (sin, cos) = (angle - Self::FRAC_PI_2 * Self::of(quarter)).sin_cos_small();
+        match quarter as i64 {
+            0 => (sin, cos),
+            1 => (cos, -sin),
+            -1 => (-cos, sin),
+            2 | -2 => (-sin, -cos),
+            _ => (Self::of(f64::NAN), Self::of(f64::NAN)),
+        }
+    }
+}
+
+impl Real for DoubleDouble {
+    #[inline(always)]
+    fn value(self) -> f64 {
+        self.hi
+    }
+
+    #[inline(always)]
+    fn from_double_double(value: DoubleDouble) -> Self {
+        value
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const TINY: f64 = 1e-30;
+
+    fn pair() -> impl Strategy<Value = DoubleDouble> {
+        (-1e3..1e3f64, -1.0..1.0f64).prop_map(|(hi, part)| DoubleDouble::sum(hi, part * hi.abs() * 1e-16))
+    }
+
+    proptest! {
+        #[test]
+        fn quotient_and_product_undo_each_other(a in pair(), b in pair()) {
+            prop_assume!(b.hi.abs() > 1e-6);
+            prop_assert!(((a / b * b - a).hi / a.hi).abs() < TINY);
+        }
+
+        #[test]
+        fn root_squared_is_the_number(a in pair()) {
+            let a = a.abs();
+            prop_assume!(a.hi > 0.0);
+            let root = a.sqrt();
+            prop_assert!(((root * root - a).hi / a.hi).abs() < TINY);
+        }
+
+        #[test]
+        fn sine_and_cosine_lie_on_the_circle_and_add(a in pair(), b in pair()) {
+            let ((sa, ca), (sb, cb), (ss, cs)) = (a.sin_cos(), b.sin_cos(), (a + b).sin_cos());
+            prop_assert!((sa * sa + ca * ca - DoubleDouble::ONE).hi.abs() < TINY);
+            // The sum of angles is itself rounded: 1e3 rad carry 1e-29.
+            prop_assert!((sa * cb + ca * sb - ss).hi.abs() < 1e-28);
+            prop_assert!((ca * cb - sa * sb - cs).hi.abs() < 1e-28);
+            prop_assert!((sa.hi - libm::sin(a.hi)).abs() < 3e-13);
+        }
+    }
+
+    #[test]
+    fn sine_of_one_has_thirty_two_digits() {
+        // OEIS A049469 and A049470.
+        let (sin, cos) = DoubleDouble::ONE.sin_cos();
+        let tenth = DoubleDouble::ONE / DoubleDouble::of(10.0);
+        let digits = |text: &str| text.bytes().rev().fold(DoubleDouble::ZERO, |acc, digit| (acc + f64::from(digit - b'0')) * tenth);
+        assert!((sin - digits("84147098480789650665250232163029900")).hi.abs() < 1e-31);
+        assert!((cos - digits("54030230586813971740093660744297661")).hi.abs() < 1e-31);
+    }
+
+    #[test]
+    fn reduction_counts_turns() {
+        let (angle, turns) = (DoubleDouble::TAU * DoubleDouble::of(1e9) + DoubleDouble::ONE).reduced();
+        assert_eq!(turns, 1e9);
+        assert!((angle - DoubleDouble::ONE).hi.abs() < 1e-21);
+    }
+}

@@ -1,0 +1,104 @@
+//! Numbers: the scalar trait the physics is written over, and the exact building blocks of long sums.
+//!
+//! Every formula of [`dynamics`](crate::dynamics) is written once over [`Scalar`] and evaluated on `f64` (inner loops) and on
+//! [`DoubleDouble`] (monitors, references).  Lanes and dual numbers can join by implementing the same dozen operations.
+//!
+//! Two rules keep the bits the same on every machine: trigonometry comes from pure Rust (the `libm` crate, or our own series
+//! in double-double), and a fused multiply-add is used in [`sum::two_product`] only, where it is exact by definition, so it makes no difference
+//! whether the processor has the instruction.
+
+pub mod angle;
+pub mod complex;
+pub mod double_double;
+pub mod sum;
+
+pub use complex::Complex;
+pub use double_double::DoubleDouble;
+
+use std::fmt::Debug;
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+/// A number the equations of motion can be evaluated on.
+///
+/// No comparison is asked for, so that vectors of lanes can be scalars; what needs an order asks for [`Real`].
+pub trait Scalar:
+    Copy
+    + Debug
+    + Default
+    + 'static
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+    + SubAssign
+{
+    /// Zero.
+    const ZERO: Self;
+    /// One.
+    const ONE: Self;
+
+    /// The number itself, exactly.
+    fn of(value: f64) -> Self;
+
+    /// Product with a plain number (cheaper than a full product in double-double).
+    fn scale(self, factor: f64) -> Self;
+
+    /// Square root; not a number below zero.
+    fn sqrt(self) -> Self;
+
+    /// Sine and cosine of an angle \[rad\], in this order.
+    fn sin_cos(self) -> (Self, Self);
+}
+
+/// A scalar with an order and a nearest `f64`.
+pub trait Real: Scalar + PartialOrd {
+    /// The nearest `f64`.
+    fn value(self) -> f64;
+
+    /// The leading part and what is left: a double-double time or angle seen in this type.
+    fn from_double_double(value: DoubleDouble) -> Self;
+
+    /// Magnitude.
+    fn abs(self) -> Self {
+        if self < Self::ZERO { -self } else { self }
+    }
+}
+
+impl Scalar for f64 {
+    const ZERO: Self = 0.0;
+    const ONE: Self = 1.0;
+
+    #[inline(always)]
+    fn of(value: f64) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn scale(self, factor: f64) -> Self {
+        self * factor
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f64::sqrt(self)
+    }
+
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        libm::sincos(self)
+    }
+}
+
+impl Real for f64 {
+    #[inline(always)]
+    fn value(self) -> f64 {
+        self
+    }
+
+    #[inline(always)]
+    fn from_double_double(value: DoubleDouble) -> Self {
+        value.hi
+    }
+}

@@ -1,0 +1,8 @@
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+//! Long-horizon integration of planar mechanisms with constraint stabilization.
+
+pub mod arithmetic;
+#[cfg(feature = "charts")]
+pub mod chart;
+pub mod scene;

@@ -1,0 +1,1 @@
+//! Where in a JSON text a value stands.
