@@ -5,4 +5,6 @@
 pub mod arithmetic;
 #[cfg(feature = "charts")]
 pub mod chart;
+pub mod dynamics;
 pub mod scene;
+pub mod stepping;

@@ -26,7 +26,7 @@ fn wrap_far(hi: &mut f64, lo: &mut f64) -> i64 {
 pub fn difference<T: Real>(a: T, b: T) -> T {
     let raw = a - b;
     let turns = (raw.value() / std::f64::consts::TAU).round();
-    if turns == 0.0 { raw } else { raw - T::from_double_double(DoubleDouble::TAU).scale(turns) }
+    if turns == 0.0 { raw } else { raw - T::split(DoubleDouble::TAU.scale(turns)).0 }
 }
 
 /// The winding angle \[rad\]: the wrapped one and its turns.

@@ -218,8 +218,13 @@ impl Real for DoubleDouble {
     }
 
     #[inline(always)]
-    fn from_double_double(value: DoubleDouble) -> Self {
-        value
+    fn split(value: DoubleDouble) -> (Self, Self) {
+        (value, Self::ZERO)
+    }
+
+    #[inline(always)]
+    fn double_double(self) -> DoubleDouble {
+        self
     }
 }
 

@@ -57,8 +57,11 @@ pub trait Real: Scalar + PartialOrd {
     /// The nearest `f64`.
     fn value(self) -> f64;
 
-    /// The leading part and what is left: a double-double time or angle seen in this type.
-    fn from_double_double(value: DoubleDouble) -> Self;
+    /// A double-double in this type: the nearest value, and what that leaves over.
+    fn split(value: DoubleDouble) -> (Self, Self);
+
+    /// The number as a double-double, exactly.
+    fn double_double(self) -> DoubleDouble;
 
     /// Magnitude.
     fn abs(self) -> Self {
@@ -98,7 +101,12 @@ impl Real for f64 {
     }
 
     #[inline(always)]
-    fn from_double_double(value: DoubleDouble) -> Self {
-        value.hi
+    fn split(value: DoubleDouble) -> (Self, Self) {
+        (value.hi, value.lo)
+    }
+
+    #[inline(always)]
+    fn double_double(self) -> DoubleDouble {
+        DoubleDouble::of(self)
     }
 }

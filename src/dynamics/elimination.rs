@@ -1,0 +1,138 @@
+//! The mechanism with its driven angles eliminated: coordinates u with q = S u + s(t).
+//!
+//! ```text
+//! Sᵀ M S u'' = Sᵀ (b - M s''),      (Gᵀ lambda)_i = b_i - Σ M_ij a_j,      power of all motors = -(b - M a)·s'
+//! ```
+//!
+//! Unknowns: u (f), u' (f), work of motors and dampers \[J\].  The rows hold exactly, whatever the method.
+
+use super::kernel::Kernel;
+use super::tree::{self, size};
+use super::{Field, Form, Mechanism, Motion, State, Time};
+use crate::arithmetic::DoubleDouble;
+use std::sync::Arc;
+
+/// Equations in the independent coordinates, for `N` bodies (any number where `N` is 0).
+#[derive(Clone, Debug)]
+pub struct Elimination<const N: usize> {
+    mechanism: Arc<Mechanism>,
+    kernel: Kernel<f64>,
+    phi: Vec<f64>,
+    omega: Vec<f64>,
+    drive_acceleration: Vec<f64>,
+    drive_rate: Vec<f64>,
+    given: Vec<f64>,
+    reduced: Vec<f64>,
+    pivot: Vec<f64>,
+    coordinate_acceleration: Vec<f64>,
+}
+
+impl<const N: usize> Elimination<N> {
+    /// The form of a mechanism; `N` must be its number of bodies or 0.
+    pub fn new(mechanism: Arc<Mechanism>) -> Self {
+        debug_assert!(N == 0 || N == mechanism.bodies.len());
+        let (n, f) = (mechanism.bodies.len(), mechanism.ties.count());
+        let zeros = || vec![0.0; n];
+        Self {
+            kernel: Kernel::new(n, 0),
+            phi: zeros(),
+            omega: zeros(),
+            drive_acceleration: zeros(),
+            drive_rate: zeros(),
+            given: zeros(),
+            reduced: vec![0.0; f * f],
+            pivot: vec![0.0; f],
+            coordinate_acceleration: vec![0.0; f],
+            mechanism,
+        }
+    }
+}
+
+impl<const N: usize> Field for Elimination<N> {
+    fn dimension(&self) -> usize {
+        2 * self.mechanism.ties.count() + 1
+    }
+
+    fn angles(&self) -> usize {
+        self.mechanism.ties.count()
+    }
+
+    fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
+        let mechanism = &*self.mechanism;
+        let (n, f) = (size::<N>(mechanism.bodies.len()), mechanism.ties.count());
+        let (u, u_rate) = (&y[..f], &y[f..2 * f]);
+        let kernel = &mut self.kernel;
+        mechanism.ties.expand(t, u, &mut self.phi, &mut kernel.z, &mut self.drive_rate, &mut self.drive_acceleration);
+        self.omega.copy_from_slice(&self.drive_rate);
+        mechanism.ties.spread(u_rate, &mut self.omega);
+        kernel.assemble::<N>(mechanism, &self.omega);
+        // b - M s''; what of it the coordinates do not feel is the motors' share.
+        tree::multiply::<f64, N>(n, &kernel.mass, &self.drive_acceleration, &mut self.given);
+        for k in 0..n {
+            kernel.load[k] -= self.given[k];
+        }
+        let acceleration = &mut self.coordinate_acceleration;
+        mechanism.ties.gather(&kernel.load, acceleration);
+        mechanism.ties.reduce(&kernel.mass, &mut self.reduced);
+        tree::factor::<f64, 0>(f, &mut self.reduced, &mut self.pivot);
+        tree::solve::<f64, 0>(f, &self.reduced, &self.pivot, acceleration);
+        self.phi.fill(0.0);
+        mechanism.ties.spread(acceleration, &mut self.phi);
+        tree::multiply::<f64, N>(n, &kernel.mass, &self.phi, &mut self.given);
+        let mut power = 0.0;
+        for k in 0..n {
+            power -= (kernel.load[k] - self.given[k]) * self.drive_rate[k];
+        }
+        for spring in mechanism.springs.iter().filter(|spring| spring.damping != 0.0) {
+            power += spring.drag_power(&kernel.z, &self.omega);
+        }
+        rate[..f].copy_from_slice(u_rate);
+        rate[f..2 * f].copy_from_slice(acceleration);
+        rate[2 * f] = power;
+    }
+
+    fn label(&self, i: usize) -> String {
+        let ties = &self.mechanism.ties;
+        let f = ties.count();
+        match i {
+            i if i < f => format!("phi of {}", self.mechanism.bodies[ties.independent[i]].name),
+            i if i < 2 * f => format!("omega of {}", self.mechanism.bodies[ties.independent[i - f]].name),
+            _ => "work of motors and dampers".into(),
+        }
+    }
+
+    fn events(&self) -> usize {
+        self.mechanism.contacts.len()
+    }
+
+    fn gaps(&mut self, t: Time, y: &[f64], gaps: &mut [f64]) {
+        let ties = &self.mechanism.ties;
+        let kernel = &mut self.kernel;
+        ties.expand(t, &y[..ties.count()], &mut self.phi, &mut kernel.z, &mut self.drive_rate, &mut self.drive_acceleration);
+        for (gap, contact) in gaps.iter_mut().zip(&self.mechanism.contacts) {
+            *gap = contact.row.gap(&kernel.z);
+        }
+    }
+}
+
+impl<const N: usize> Form for Elimination<N> {
+    fn mechanism(&self) -> &Mechanism {
+        &self.mechanism
+    }
+
+    fn state(&self, motion: &Motion) -> State {
+        let ties = &self.mechanism.ties;
+        let mut unknowns: Vec<DoubleDouble> = ties.independent.iter().map(|&body| motion.phi[body]).collect();
+        unknowns.extend(ties.coordinate_rates(motion));
+        unknowns.push(motion.work);
+        ties.state(motion, &unknowns)
+    }
+
+    fn read(&mut self, state: &State, motion: &mut Motion) {
+        let f = self.mechanism.ties.count();
+        self.mechanism.ties.read_angles(state, motion);
+        let rates: Vec<DoubleDouble> = (0..f).map(|i| state.unknown(f + i)).collect();
+        self.mechanism.ties.spread(&rates, &mut motion.omega);
+        motion.work = state.unknown(2 * f);
+    }
+}

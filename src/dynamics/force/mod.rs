@@ -1,0 +1,5 @@
+//! Applied forces, one file a kind.
+
+pub mod spring;
+
+pub use spring::Spring;

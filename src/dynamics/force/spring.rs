@@ -1,0 +1,99 @@
+//! A linear spring with a damper beside it, between any two points.
+//!
+//! ```text
+//! D = P_a - P_b, L = |D|:   F on a = -(k (L - L0) + c L') D / L,   V = k (L - L0)² / 2
+//! ```
+//!
+//! A spring of free length zero without damper needs no length: F = -k D.  A length of zero with L0 > 0 has no direction; its force comes out as not
+//! a number and the method stops with the time.
+
+use crate::arithmetic::{Complex, Scalar};
+use crate::dynamics::point::Point;
+
+/// A spring of the compiled mechanism.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spring {
+    /// Name in the scene.
+    pub name: String,
+    /// The bodies its ends are on; `None` for the ground.
+    pub bodies: [Option<usize>; 2],
+    /// The span D = P_a - P_b.
+    pub span: Point,
+    /// k \[N/m\].
+    pub stiffness: f64,
+    /// L0 \[m\].
+    pub free_length: f64,
+    /// c \[N·s/m\].
+    pub damping: f64,
+}
+
+impl Spring {
+    /// Force \[N\] on the first end.
+    #[inline]
+    pub fn force<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
+        let elastic = self.elastic(z);
+        if self.damping == 0.0 { elastic } else { elastic + self.drag(z, omega) }
+    }
+
+    /// Force \[N\] of the spring alone on the first end.
+    #[inline]
+    pub fn elastic<T: Scalar>(&self, z: &[Complex<T>]) -> Complex<T> {
+        let span = self.span.position(z);
+        if self.free_length == 0.0 {
+            return -span.times(T::of(self.stiffness));
+        }
+        let length = span.norm_squared().sqrt();
+        span.times(((T::of(self.free_length) - length) / length).scale(self.stiffness))
+    }
+
+    /// Force \[N\] of the damper alone on the first end.
+    #[inline]
+    pub fn drag<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
+        let span = self.span.position(z);
+        let rate = span.dot(self.span.velocity(z, omega));
+        -span.times((rate / span.norm_squared()).scale(self.damping))
+    }
+
+    /// Stored energy \[J\].
+    pub fn energy<T: Scalar>(&self, z: &[Complex<T>]) -> T {
+        let square = self.span.position(z).norm_squared();
+        let stretch = if self.free_length == 0.0 { square.sqrt() } else { square.sqrt() - T::of(self.free_length) };
+        (stretch * stretch).scale(0.5 * self.stiffness)
+    }
+
+    /// Power \[W\] of the damper on the bodies, never positive.
+    #[inline]
+    pub fn drag_power<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> T {
+        self.drag(z, omega).dot(self.span.velocity(z, omega))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn spring(free_length: f64, damping: f64) -> Spring {
+        let span = Point::ground([0.3, 0.0]).along(0, Complex::new(0.4, 0.0));
+        Spring { name: "s".into(), bodies: [None, Some(0)], span, stiffness: 7.0, free_length, damping }
+    }
+
+    #[test]
+    fn the_force_is_minus_the_gradient_of_the_energy() {
+        for spring in [spring(0.4, 0.0), spring(0.0, 0.0)] {
+            let (phi, h) = (0.9, 1e-5);
+            let energy = |phi: f64| spring.energy(&[Complex::unit(phi)]);
+            let mut load = [0.0];
+            spring.span.pull(spring.force(&[Complex::unit(phi)], &[0.0]), &[Complex::unit(phi)], &mut load);
+            assert!((load[0] + (energy(phi + h) - energy(phi - h)) / (2.0 * h)).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_damper_takes_energy_out() {
+        let (spring, z, omega) = (spring(0.4, 2.0), [Complex::unit(0.9)], [1.3]);
+        let mut load = [0.0];
+        spring.span.pull(spring.force(&z, &omega) - spring.elastic(&z), &z, &mut load);
+        assert!(spring.drag_power(&z, &omega) < 0.0);
+        assert!((load[0] * omega[0] - spring.drag_power(&z, &omega)).abs() < 1e-15);
+    }
+}

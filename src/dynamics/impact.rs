@@ -1,0 +1,99 @@
+//! The jump of the rates when a point meets a wall.
+//!
+//! ```text
+//! M (w⁺ - w⁻) + Jᵀ rho + Gᵀ sigma = 0,    J w⁺ = -e J w⁻,    G w⁺ + C_t = 0
+//! ```
+//!
+//! The impulse on the point along the wall's normal is -rho, never negative.  Without motors the energy changes by `-rho (1-e) J w⁻ / 2`.
+//! Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996), section 8.2 (Newton's law of impact).
+
+use super::kernel::{Kernel, dot};
+use super::row::{LineRow, Posture};
+use super::{Mechanism, Time, tree};
+use nalgebra::{DMatrix, DVector};
+
+/// A wall as the mechanism meets it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contact {
+    /// The gap and its Jacobian.
+    pub row: LineRow,
+    /// Restitution e.
+    pub restitution: f64,
+}
+
+/// What an impact did.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Impact {
+    /// Rates of all bodies after it \[rad/s\].
+    pub omega: Vec<f64>,
+    /// Normal velocity of the point before it \[m/s\], negative.
+    pub approach: f64,
+    /// Impulse on the point along the wall's normal \[N·s\].
+    pub impulse: f64,
+    /// Energy after less energy before \[J\].
+    pub energy_change: f64,
+    /// Impulsive work of the motors, which hold their rates \[J\].
+    pub motor_work: f64,
+}
+
+impl Mechanism {
+    /// The jump at contact `contact`, or `None` where the motors leave the point no freedom to rebound.
+    ///
+    /// Angles \[rad\] and rates \[rad/s\] of all bodies at the moment of impact; a point that is not approaching keeps its rates.
+    pub fn strike(&self, contact: usize, t: Time, phi: &[f64], omega: &[f64]) -> Option<Impact> {
+        let Contact { row, restitution } = &self.contacts[contact];
+        let n = self.bodies.len();
+        let mut kernel = Kernel::<f64>::new(n, 0);
+        kernel.face::<0>(phi);
+        self.tree.couple::<f64, 0>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
+        let mut jacobian = vec![0.0; n];
+        row.jacobian(&kernel.z, &mut jacobian);
+        let approach = dot(&jacobian, omega);
+        if approach >= 0.0 {
+            return Some(Impact { omega: omega.to_vec(), approach, impulse: 0.0, energy_change: 0.0, motor_work: 0.0 });
+        }
+        let mut momentum = vec![0.0; n];
+        tree::multiply::<f64, 0>(n, &kernel.mass, omega, &mut momentum);
+        let size = n + 1 + self.rows.len();
+        let (mut matrix, mut right) = (DMatrix::<f64>::zeros(size, size), DVector::<f64>::zeros(size));
+        for i in 0..n {
+            for j in i..n {
+                matrix[(i, j)] = kernel.mass[i * n + j];
+                matrix[(j, i)] = kernel.mass[i * n + j];
+            }
+            right[i] = momentum[i];
+        }
+        let mut drives = Vec::new();
+        let mut border = |at: usize, jacobian: &[f64]| {
+            for k in 0..n {
+                matrix[(at, k)] = jacobian[k];
+                matrix[(k, at)] = jacobian[k];
+            }
+        };
+        border(n, &jacobian);
+        right[n] = -restitution * approach;
+        for (r, row) in self.rows.iter().enumerate() {
+            let mut given = vec![0.0; n];
+            let drive = row.linearise(t, Posture { phi, z: &kernel.z, omega }, &mut given).drive;
+            border(n + 1 + r, &given);
+            right[n + 1 + r] = -drive;
+            drives.push(drive);
+        }
+        // Rows scaled by the masses would be nicer to the pivots; full pivoting does as well at this size.
+        let solution = matrix.full_piv_lu().solve(&right).filter(|x| x.iter().all(|x| x.is_finite()))?;
+        let after: Vec<f64> = solution.iter().take(n).copied().collect();
+        if (dot(&jacobian, &after) + restitution * approach).abs() > 1e-9 * approach.abs() {
+            return None;
+        }
+        let mut momentum_after = vec![0.0; n];
+        tree::multiply::<f64, 0>(n, &kernel.mass, &after, &mut momentum_after);
+        let motor_work = drives.iter().enumerate().map(|(r, drive)| solution[n + 1 + r] * drive).sum();
+        Some(Impact {
+            approach,
+            impulse: -solution[n],
+            energy_change: 0.5 * (dot(&momentum_after, &after) - dot(&momentum, omega)),
+            motor_work,
+            omega: after,
+        })
+    }
+}

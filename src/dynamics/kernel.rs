@@ -1,0 +1,165 @@
+//! One evaluation of the equations at one moment: unit vectors, mass matrix, load, accelerations and multipliers.
+//!
+//! ```text
+//! a0 = M⁻¹ b;      rows:  X = M⁻¹ Gᵀ,  S = G X,  S lambda = G a0 + gamma,  a = a0 - X lambda
+//! ```
+//!
+//! A scene without rows never enters the second line.
+
+use super::row::{Linearised, Posture};
+use super::tree::{self, size};
+use super::{Mechanism, Time};
+use crate::arithmetic::{Complex, Real, Scalar};
+
+/// What a stabilizer adds to the convective term of every row: `rate · C' + position · C`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bias {
+    /// 2 alpha \[1/s\].
+    pub rate: f64,
+    /// beta² \[1/s²\].
+    pub position: f64,
+}
+
+/// Scratch space of an evaluation for a mechanism of n bodies and r rows; nothing is allocated after [`Kernel::new`].
+#[derive(Clone, Debug)]
+pub struct Kernel<T> {
+    /// Unit vectors (n).
+    pub z: Vec<Complex<T>>,
+    /// M above and on the diagonal, then its factors (n × n) \[kg·m²\].
+    pub mass: Vec<T>,
+    /// Im p above the diagonal (n × n) \[kg·m²\].
+    pub twist: Vec<T>,
+    /// Reciprocal pivots (n).
+    pub pivot: Vec<T>,
+    /// Right side b, then accelerations (n) \[N·m, rad/s²\].
+    pub load: Vec<T>,
+    /// G (r × n).
+    pub jacobian: Vec<T>,
+    /// X = M⁻¹ Gᵀ, row by row (r × n).
+    pub lifted: Vec<T>,
+    /// S = G M⁻¹ Gᵀ above and on the diagonal, then its factors (r × r).
+    pub schur: Vec<T>,
+    /// Reciprocal pivots of S (r).
+    pub schur_pivot: Vec<T>,
+    /// The rows at this moment (r).
+    pub rows: Vec<Linearised<T>>,
+    /// Multipliers (r) \[N·m or N\].
+    pub multiplier: Vec<T>,
+    /// The part of each multiplier that the bias called for (r).
+    pub correction: Vec<T>,
+}
+
+impl<T: Scalar> Kernel<T> {
+    /// Scratch space for `bodies` bodies and `rows` rows.
+    pub fn new(bodies: usize, rows: usize) -> Self {
+        let idle = Linearised { position: T::ZERO, drive: T::ZERO, convective: T::ZERO };
+        Self {
+            z: vec![Complex::ZERO; bodies],
+            mass: vec![T::ZERO; bodies * bodies],
+            twist: vec![T::ZERO; bodies * bodies],
+            pivot: vec![T::ZERO; bodies],
+            load: vec![T::ZERO; bodies],
+            jacobian: vec![T::ZERO; rows * bodies],
+            lifted: vec![T::ZERO; rows * bodies],
+            schur: vec![T::ZERO; rows * rows],
+            schur_pivot: vec![T::ZERO; rows],
+            rows: vec![idle; rows],
+            multiplier: vec![T::ZERO; rows],
+            correction: vec![T::ZERO; rows],
+        }
+    }
+}
+
+impl<T: Real> Kernel<T> {
+    /// Unit vectors of these angles.
+    #[inline(always)]
+    pub fn face<const N: usize>(&mut self, phi: &[T]) {
+        let n = size::<N>(phi.len());
+        let (z, phi) = (&mut self.z[..n], &phi[..n]);
+        for k in 0..n {
+            z[k] = Complex::unit(phi[k]);
+        }
+    }
+
+    /// M, its twist and the whole load b (velocity terms, gravity, springs, dampers) at the unit vectors in `z`.
+    #[inline(always)]
+    pub fn assemble<const N: usize>(&mut self, mechanism: &Mechanism, omega: &[T]) {
+        mechanism.tree.couple::<T, N>(&self.z, &mut self.mass, &mut self.twist);
+        mechanism.tree.load::<T, N>(&self.z, omega, &self.twist, &mut self.load);
+        for spring in &mechanism.springs {
+            spring.span.pull(spring.force(&self.z, omega), &self.z, &mut self.load);
+        }
+    }
+
+    /// Accelerations \[rad/s²\] without any row, into `load`.
+    #[inline(always)]
+    pub fn accelerate_free<const N: usize>(&mut self, mechanism: &Mechanism, phi: &[T], omega: &[T]) {
+        let n = size::<N>(mechanism.tree.bodies);
+        self.face::<N>(phi);
+        self.assemble::<N>(mechanism, omega);
+        tree::factor::<T, N>(n, &mut self.mass, &mut self.pivot);
+        tree::solve::<T, N>(n, &self.mass, &self.pivot, &mut self.load);
+    }
+
+    /// Accelerations \[rad/s²\] into `load`, multipliers into `multiplier`.
+    #[inline(always)]
+    pub fn accelerate<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T], bias: Bias) {
+        self.accelerate_free::<N>(mechanism, phi, omega);
+        self.constrain::<N>(mechanism, t, phi, omega, bias);
+    }
+
+    /// The rows' share: expects free accelerations in `load` and the factors of M.
+    fn constrain<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T], bias: Bias) {
+        let n = size::<N>(mechanism.tree.bodies);
+        let rows = mechanism.rows.len();
+        self.linearise::<N>(mechanism, t, phi, omega);
+        for r in 0..rows {
+            let jacobian = &self.jacobian[r * n..(r + 1) * n];
+            let (rate, free) = (dot(jacobian, omega), dot(jacobian, &self.load));
+            let row = self.rows[r];
+            let wanted = (rate + row.drive).scale(bias.rate) + row.position.scale(bias.position);
+            self.correction[r] = wanted;
+            self.multiplier[r] = free + row.convective + wanted;
+        }
+        tree::solve::<T, 0>(rows, &self.schur, &self.schur_pivot, &mut self.multiplier);
+        tree::solve::<T, 0>(rows, &self.schur, &self.schur_pivot, &mut self.correction);
+        for r in 0..rows {
+            for k in 0..n {
+                self.load[k] -= self.lifted[r * n + k] * self.multiplier[r];
+            }
+        }
+    }
+
+    /// C, G, C_t, gamma of every row, and the factors of S = G M⁻¹ Gᵀ; expects the factors of M.
+    pub fn linearise<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
+        let n = size::<N>(mechanism.tree.bodies);
+        let rows = mechanism.rows.len();
+        self.jacobian.fill(T::ZERO);
+        let posture = Posture { phi, z: &self.z, omega };
+        for (r, row) in mechanism.rows.iter().enumerate() {
+            let jacobian = &mut self.jacobian[r * n..(r + 1) * n];
+            self.rows[r] = row.linearise(t, posture, jacobian);
+            let lifted = &mut self.lifted[r * n..(r + 1) * n];
+            lifted.copy_from_slice(jacobian);
+            tree::solve::<T, N>(n, &self.mass, &self.pivot, lifted);
+        }
+        for r in 0..rows {
+            for s in r..rows {
+                self.schur[r * rows + s] = dot(&self.jacobian[r * n..(r + 1) * n], &self.lifted[s * n..(s + 1) * n]);
+            }
+        }
+        tree::factor::<T, 0>(rows, &mut self.schur, &mut self.schur_pivot);
+    }
+
+    /// C' of row `r` \[rad/s or m/s\], after [`Kernel::linearise`].
+    pub fn row_rate(&self, r: usize, omega: &[T]) -> T {
+        let n = self.z.len();
+        dot(&self.jacobian[r * n..(r + 1) * n], omega) + self.rows[r].drive
+    }
+}
+
+/// Σ a_k b_k in rising order.
+#[inline(always)]
+pub fn dot<T: Scalar>(a: &[T], b: &[T]) -> T {
+    a.iter().zip(b).fold(T::ZERO, |sum, (&a, &b)| sum + a * b)
+}

@@ -1,0 +1,158 @@
+//! The equation of motion.
+//!
+//! ```text
+//! M(q) a + G(q,t)ᵀ lambda = b(t,q,w)        [N m]      n equations of motion, one per body
+//! G(q,t) a                = -gamma(t,q,w)   [rad/s²]   one row per constraint C(q,t) = 0, differentiated twice
+//! Baumgarte replaces gamma by gamma + 2 alpha C' + beta² C
+//! ```
+//!
+//! | letter | name in code | meaning | unit | shape | file |
+//! | --- | --- | --- | --- | --- | --- |
+//! | q | `phi` | absolute angles of the bodies, from +x, counter-clockwise | rad | n | here |
+//! | w | `omega` | their rates q' | rad/s | n | here |
+//! | z | `z` | unit vectors exp(i q) | 1 | n | here |
+//! | M | `mass` | mass matrix, `M_ij = Re(conj(z_i) H_ij z_j)` | kg m² | n × n | [`tree`] |
+//! | b | `load` | velocity terms, gravity, springs and dampers | N m | n | [`tree`], [`force`] |
+//! | C | `position` | a constraint's violation | rad, m | rows | [`row`] |
+//! | G | `jacobian` | dC/dq | 1, m | rows × n | [`row`] |
+//! | C_t | `drive` | dC/dt at fixed q; C' = G w + C_t | rad/s, m/s | rows | [`row`] |
+//! | gamma | `convective` | what is left of C'' at a = 0 | rad/s², m/s² | rows | [`row`] |
+//! | lambda | `multiplier` | generalized force of a row is `-G_kᵀ lambda_k`; a motor's torque is `-lambda` | N m, N | rows | [`multiplier`] |
+//!
+//! **Everything planar is a sum of unit vectors.**  In a tree of hinged bodies every point is `P = p0 + Σ gamma_k z_k` with complex constants
+//! ([`point`]), so the constant Hermitian matrix `H_ij = Σ_m m_m conj(gamma_mi) gamma_mj` (`A = Re H`, `B = Im H`) is formed once per scene,
+//! and one sine and cosine per body is all the trigonometry there is.
+//!
+//! The same mechanism is marched in three forms, chosen before the first step:
+//! [`multiplier`] in (q, w) with one multiplier per row, [`elimination`] with the driven angles as known functions of time, [`canonical`] in (q, p),
+//! the form in which Gauss methods are symplectic.
+
+pub mod canonical;
+pub mod compile;
+pub mod elimination;
+pub mod energy;
+pub mod force;
+pub mod impact;
+pub mod kernel;
+pub mod law;
+pub mod multiplier;
+pub mod point;
+pub mod reaction;
+pub mod row;
+pub mod ties;
+pub mod tree;
+
+pub use compile::{CompileError, Mechanism};
+
+use crate::arithmetic::{DoubleDouble, Scalar, angle};
+
+/// Time \[s\], as a pair: at 1e6 s a plain double resolves no better than 1e-10 s, and a motor's phase with it.
+pub type Time = DoubleDouble;
+
+/// What a method marches: the numbers, and everything else a restart needs to go on bit for bit.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct State {
+    /// Time.
+    pub time: Time,
+    /// The leading parts of the unknowns; the first [`Field::angles`] are angles in [-π, π].
+    pub y: Vec<f64>,
+    /// What the leading parts leave out; zero for methods without compensation.
+    pub low: Vec<f64>,
+    /// Whole turns taken off each angle.
+    pub turns: Vec<i64>,
+    /// What a method carries from step to step (controller, predictor); empty before the first step.
+    pub memory: Vec<f64>,
+}
+
+impl State {
+    /// A state at time zero from double-double unknowns, of which the first `angles` are angles of any number of turns.
+    pub fn new(unknowns: &[DoubleDouble], angles: usize) -> Self {
+        let mut state = Self {
+            time: Time::default(),
+            y: unknowns.iter().map(|x| x.hi).collect(),
+            low: unknowns.iter().map(|x| x.lo).collect(),
+            turns: vec![0; angles],
+            memory: Vec::new(),
+        };
+        state.wrap();
+        state
+    }
+
+    /// Brings every angle back into [-π, π] and counts the turns.
+    pub fn wrap(&mut self) {
+        for (i, turns) in self.turns.iter_mut().enumerate() {
+            *turns += angle::wrap(&mut self.y[i], &mut self.low[i]);
+        }
+    }
+
+    /// Unknown `i` in full.
+    pub fn unknown(&self, i: usize) -> DoubleDouble {
+        DoubleDouble::sum(self.y[i], self.low[i])
+    }
+}
+
+/// A first-order system `y' = f(t, y)` as the methods see it.
+pub trait Field {
+    /// Number of unknowns.
+    fn dimension(&self) -> usize;
+
+    /// How many of the unknowns, counted from the first, are angles that may be wrapped.
+    fn angles(&self) -> usize;
+
+    /// Writes y' at (t, y).  Never fails: what cannot be computed comes out non-finite, and the method stops with [`Field::label`].
+    fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]);
+
+    /// What unknown `i` is, for messages: `omega of bar2`.
+    fn label(&self, i: usize) -> String;
+
+    /// Number of event functions; none by default.
+    fn events(&self) -> usize {
+        0
+    }
+
+    /// Writes the event functions \[m\] at (t, y): an event is a passage from positive to negative.
+    fn gaps(&mut self, _t: Time, _y: &[f64], _gaps: &mut [f64]) {}
+}
+
+/// A form of a mechanism: how a state of its unknowns reads as a motion, and back.
+pub trait Form {
+    /// The mechanism.
+    fn mechanism(&self) -> &Mechanism;
+
+    /// The state in which this motion is held.
+    fn state(&self, motion: &Motion) -> State;
+
+    /// Writes the motion a state stands for.
+    fn read(&mut self, state: &State, motion: &mut Motion);
+}
+
+/// What every form can tell of a moment: angles and rates of all bodies, and the work done on them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Motion {
+    /// Time.
+    pub time: Time,
+    /// Absolute angles in [-π, π] \[rad\], in the order of the scene's bars.
+    pub phi: Vec<DoubleDouble>,
+    /// Whole turns to be added to each angle.
+    pub turns: Vec<i64>,
+    /// Rates \[rad/s\].
+    pub omega: Vec<DoubleDouble>,
+    /// Work of motors and dampers on the bodies since t = 0 \[J\].
+    pub work: DoubleDouble,
+    /// Energy a stabilizer has put in since t = 0 \[J\], negative where it took some out.
+    pub stabilizer: f64,
+}
+
+impl Motion {
+    /// Room for `bodies` bodies.
+    pub fn resize(&mut self, bodies: usize) {
+        self.phi.resize(bodies, DoubleDouble::ZERO);
+        self.omega.resize(bodies, DoubleDouble::ZERO);
+        self.turns.resize(bodies, 0);
+    }
+
+    /// The winding angle of a body \[rad\].
+    pub fn unwrapped(&self, body: usize) -> f64 {
+        angle::unwrapped(self.phi[body], self.turns[body])
+    }
+}

@@ -1,0 +1,111 @@
+//! A point of the mechanism as a linear functional of the unit vectors: `P = p0 + Σ gamma_k z_k`.
+//!
+//! Everything that acts at a point (hinge, spring, wall, motor) is built from this list alone:
+//!
+//! ```text
+//! P'  = Σ i gamma_k z_k w_k
+//! P'' = Σ i gamma_k z_k a_k + Pi,     Pi = -Σ gamma_k z_k w_k²
+//! a force F at P has the generalized force Im(conj(z_k) conj(gamma_k) F) on body k
+//! ```
+
+use crate::arithmetic::{Complex, Scalar};
+
+/// A point, or the difference of two points.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Point {
+    /// The constant part p0 \[m\].
+    pub root: Complex<f64>,
+    /// Body and gamma_k \[m\], in rising order of the bodies.
+    pub terms: Vec<(usize, Complex<f64>)>,
+}
+
+impl Point {
+    /// A point of the ground.
+    pub fn ground(at: [f64; 2]) -> Self {
+        Self { root: Complex::new(at[0], at[1]), terms: Vec::new() }
+    }
+
+    /// The point `offset` \[m, in the body's directions\] away on body `body`.
+    pub fn along(&self, body: usize, offset: Complex<f64>) -> Self {
+        let mut point = self.clone();
+        match point.terms.binary_search_by_key(&body, |term| term.0) {
+            Ok(i) => point.terms[i].1 += offset,
+            Err(i) => point.terms.insert(i, (body, offset)),
+        }
+        point.terms.retain(|term| term.1 != Complex::ZERO);
+        point
+    }
+
+    /// The vector from `other` to this point.
+    pub fn minus(&self, other: &Self) -> Self {
+        let mut difference = Self { root: self.root - other.root, terms: self.terms.clone() };
+        for &(body, gamma) in &other.terms {
+            difference = difference.along(body, -gamma);
+        }
+        difference
+    }
+
+    /// gamma of a body, zero where the point does not depend on it.
+    pub fn gamma(&self, body: usize) -> Complex<f64> {
+        self.terms.binary_search_by_key(&body, |term| term.0).map_or(Complex::ZERO, |i| self.terms[i].1)
+    }
+
+    /// P \[m\].
+    #[inline]
+    pub fn position<T: Scalar>(&self, z: &[Complex<T>]) -> Complex<T> {
+        self.terms.iter().fold(Complex::of(self.root), |sum, &(k, gamma)| sum + z[k].turn(gamma))
+    }
+
+    /// P' \[m/s\].
+    #[inline]
+    pub fn velocity<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
+        self.terms.iter().fold(Complex::ZERO, |sum, &(k, gamma)| sum + z[k].turn(gamma).left().times(omega[k]))
+    }
+
+    /// P'' at zero angular acceleration \[m/s²\].
+    #[inline]
+    pub fn convective<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
+        self.terms.iter().fold(Complex::ZERO, |sum, &(k, gamma)| sum - z[k].turn(gamma).times(omega[k] * omega[k]))
+    }
+
+    /// P'' \[m/s²\].
+    pub fn acceleration<T: Scalar>(&self, z: &[Complex<T>], omega: &[T], alpha: &[T]) -> Complex<T> {
+        self.velocity(z, alpha) + self.convective(z, omega)
+    }
+
+    /// Adds the generalized forces \[N m\] of a force \[N\] that acts here.
+    #[inline]
+    pub fn pull<T: Scalar>(&self, force: Complex<T>, z: &[Complex<T>], load: &mut [T]) {
+        for &(k, gamma) in &self.terms {
+            load[k] += z[k].turn(gamma).cross(force);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_are_the_derivatives_of_the_position() {
+        let point = Point::ground([0.3, -0.2]).along(0, Complex::new(0.6, 0.1)).along(2, Complex::new(0.2, -0.4));
+        let (phi, omega, alpha) = ([0.4, 9.0, -1.1], [1.5, 9.0, -0.7], [0.3, 9.0, 2.0]);
+        let at = |t: f64| -> Vec<Complex<f64>> { (0..3).map(|k| Complex::unit(phi[k] + omega[k] * t + alpha[k] * t * t / 2.0)).collect() };
+        let h = 1e-4;
+        let (before, now, after) = (point.position(&at(-h)), point.position(&at(0.0)), point.position(&at(h)));
+        let first = (after - before).times(0.5 / h) - point.velocity(&at(0.0), &omega);
+        let second = (after + before - now - now).times(1.0 / (h * h)) - point.acceleration(&at(0.0), &omega, &alpha);
+        assert!(first.norm_squared().sqrt() < 1e-7 && second.norm_squared().sqrt() < 1e-6);
+    }
+
+    #[test]
+    fn a_force_does_the_work_its_generalized_force_does() {
+        let point = Point::ground([0.0, 0.0]).along(0, Complex::new(0.6, 0.1)).along(1, Complex::new(0.2, -0.4));
+        let (z, omega) = ([Complex::unit(0.4), Complex::unit(-1.0)], [1.5, -0.7]);
+        let force = Complex::new(2.0, -3.0);
+        let mut load = [0.0; 2];
+        point.pull(force, &z, &mut load);
+        let power = load[0] * omega[0] + load[1] * omega[1];
+        assert!((power - force.dot(point.velocity(&z, &omega))).abs() < 1e-15);
+    }
+}

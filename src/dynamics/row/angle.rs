@@ -1,0 +1,40 @@
+//! A given angle, absolute or relative: a motor, or a lock where the law is a constant.
+//!
+//! ```text
+//! C = q_a - q_b - theta(t),   G_a = 1, G_b = -1,   C_t = -theta',   gamma = -theta''
+//! ```
+//!
+//! The multiplier is minus the torque on body a; the motor's power is torque · theta'.
+
+use super::{Linearised, Posture};
+use crate::arithmetic::{Real, angle};
+use crate::dynamics::Time;
+use crate::dynamics::law::Law;
+
+/// A row that gives an angle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AngleRow {
+    /// Name of the motor.
+    pub name: String,
+    /// The driven body a.
+    pub body: usize,
+    /// The body b its angle is measured from; `None`: from +x.
+    pub base: Option<usize>,
+    /// theta(t).
+    pub law: Law,
+}
+
+impl AngleRow {
+    /// See [`Row::linearise`](super::Row::linearise); C is taken modulo whole turns.
+    #[inline]
+    pub fn linearise<T: Real>(&self, t: Time, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
+        let phase = self.law.at::<T>(t);
+        let mut given = at.phi[self.body];
+        jacobian[self.body] += T::ONE;
+        if let Some(base) = self.base {
+            given = angle::difference(given, at.phi[base]);
+            jacobian[base] -= T::ONE;
+        }
+        Linearised { position: angle::difference(given, phase.angle), drive: -phase.rate, convective: -phase.acceleration }
+    }
+}

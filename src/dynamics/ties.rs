@@ -1,0 +1,175 @@
+//! Driven angles solved for: every body's angle is an independent coordinate, or known, or both.
+//!
+//! ```text
+//! q = S u + s(t):   q_i = u_base(i) + Σ ± theta(t)
+//! ```
+//!
+//! Motors connect angles like hinges connect points: within a group of bodies tied to one another one angle is free, or none
+//! where the group is tied to the ground.
+
+use super::compile::CompileError;
+use super::law::Law;
+use super::{Motion, State, Time};
+use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar, angle};
+use crate::scene::Scene;
+
+/// How one body's angle follows from the coordinates.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tie {
+    /// The coordinate it moves with; `None`: driven from the ground.
+    pub base: Option<usize>,
+    /// Laws to be added, with their sign.
+    pub laws: Vec<(f64, Law)>,
+}
+
+/// All ties of a mechanism.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Ties {
+    /// One a body.
+    pub bodies: Vec<Tie>,
+    /// The body whose angle each independent coordinate is.
+    pub independent: Vec<usize>,
+}
+
+impl Ties {
+    /// Walks the motors outwards from the ground and from the first body of every group left.
+    pub(super) fn new(scene: &Scene) -> Result<Self, CompileError> {
+        let n = scene.bars.len();
+        let mut ties: Vec<Option<Tie>> = vec![None; n];
+        let mut used = vec![false; scene.motors.len()];
+        let mut independent = Vec::new();
+        for root in std::iter::once(None).chain((0..n).map(Some)) {
+            if let Some(body) = root {
+                if ties[body].is_some() {
+                    continue;
+                }
+                ties[body] = Some(Tie { base: Some(independent.len()), laws: Vec::new() });
+                independent.push(body);
+            }
+            let mut front = vec![root];
+            while let Some(near) = front.pop() {
+                for (m, motor) in scene.motors.iter().enumerate() {
+                    let (far, sign) = if motor.relative_to == near {
+                        (Some(motor.bar), 1.0)
+                    } else if Some(motor.bar) == near {
+                        (motor.relative_to, -1.0)
+                    } else {
+                        continue;
+                    };
+                    if std::mem::replace(&mut used[m], true) {
+                        continue;
+                    }
+                    let Some(body) = far.filter(|&body| ties[body].is_none()) else {
+                        return Err(CompileError::Redundant(motor.name.clone()));
+                    };
+                    let mut tie = near.and_then(|near| ties[near].clone()).unwrap_or_default();
+                    tie.laws.push((sign, motor.law.clone()));
+                    ties[body] = Some(tie);
+                    front.push(far);
+                }
+            }
+        }
+        Ok(Self { bodies: ties.into_iter().map(Option::unwrap_or_default).collect(), independent })
+    }
+
+    /// Number of independent coordinates.
+    pub fn count(&self) -> usize {
+        self.independent.len()
+    }
+
+    /// True where some angle is driven.
+    pub fn driven(&self) -> bool {
+        self.bodies.iter().any(|tie| !tie.laws.is_empty())
+    }
+
+    /// Angles \[rad\], unit vectors, s' \[rad/s\] and s'' \[rad/s²\] of all bodies at coordinates `u` \[rad\].
+    #[inline]
+    pub fn expand<T: Real>(&self, t: Time, u: &[T], phi: &mut [T], z: &mut [Complex<T>], rate: &mut [T], acceleration: &mut [T]) {
+        for (i, tie) in self.bodies.iter().enumerate() {
+            (phi[i], z[i]) = tie.base.map_or((T::ZERO, Complex::new(T::ONE, T::ZERO)), |base| (u[base], Complex::unit(u[base])));
+            (rate[i], acceleration[i]) = (T::ZERO, T::ZERO);
+            for (sign, law) in &tie.laws {
+                let phase = law.at::<T>(t);
+                let unit = if *sign > 0.0 { phase.unit } else { phase.unit.conj() };
+                if tie.base.is_none() && tie.laws.len() == 1 {
+                    // Exactly the law's own numbers: such a row is kept to the last bit.
+                    (phi[i], z[i]) = (phase.angle.scale(*sign), unit);
+                } else {
+                    (phi[i], z[i]) = (angle::difference(phi[i], -phase.angle.scale(*sign)), z[i] * unit);
+                }
+                rate[i] += phase.rate.scale(*sign);
+                acceleration[i] += phase.acceleration.scale(*sign);
+            }
+        }
+    }
+
+    /// Adds S u' to `rate`: the rates \[rad/s\] of all bodies.
+    #[inline]
+    pub fn spread<T: Scalar>(&self, u_rate: &[T], rate: &mut [T]) {
+        for (rate, tie) in rate.iter_mut().zip(&self.bodies) {
+            if let Some(base) = tie.base {
+                *rate += u_rate[base];
+            }
+        }
+    }
+
+    /// Writes Sᵀ x.
+    #[inline]
+    pub fn gather<T: Scalar>(&self, x: &[T], gathered: &mut [T]) {
+        gathered.fill(T::ZERO);
+        for (&x, tie) in x.iter().zip(&self.bodies) {
+            if let Some(base) = tie.base {
+                gathered[base] += x;
+            }
+        }
+    }
+
+    /// Writes Sᵀ M S on and above the diagonal from M on and above its own.
+    #[inline]
+    pub fn reduce<T: Scalar>(&self, mass: &[T], reduced: &mut [T]) {
+        let (n, f) = (self.bodies.len(), self.count());
+        reduced.fill(T::ZERO);
+        for i in 0..n {
+            let Some(a) = self.bodies[i].base else { continue };
+            reduced[a * f + a] += mass[i * n + i];
+            for j in i + 1..n {
+                let Some(b) = self.bodies[j].base else { continue };
+                let entry = &mut reduced[a.min(b) * f + a.max(b)];
+                *entry += mass[i * n + j];
+                if a == b {
+                    *entry += mass[i * n + j];
+                }
+            }
+        }
+    }
+
+    /// Rates u' \[rad/s\] of the coordinates in a motion.
+    pub(super) fn coordinate_rates(&self, motion: &Motion) -> Vec<DoubleDouble> {
+        self.independent.iter().map(|&body| motion.omega[body]).collect()
+    }
+
+    /// A state whose first unknowns are the coordinates of a motion.
+    pub(super) fn state(&self, motion: &Motion, unknowns: &[DoubleDouble]) -> State {
+        let mut state = State::new(unknowns, self.count());
+        state.time = motion.time;
+        for (turns, &body) in state.turns.iter_mut().zip(&self.independent) {
+            *turns += motion.turns[body];
+        }
+        state
+    }
+
+    /// Angles and turns of all bodies, and the driven share of their rates, in double-double.
+    pub(super) fn read_angles(&self, state: &State, motion: &mut Motion) {
+        let n = self.bodies.len();
+        motion.resize(n);
+        motion.time = state.time;
+        let u: Vec<DoubleDouble> = (0..self.count()).map(|i| state.unknown(i)).collect();
+        let (mut z, mut acceleration) = (vec![Default::default(); n], vec![DoubleDouble::ZERO; n]);
+        self.expand(state.time, &u, &mut motion.phi, &mut z, &mut motion.omega, &mut acceleration);
+        for (k, tie) in self.bodies.iter().enumerate() {
+            let (base, turns) = tie.base.map_or((DoubleDouble::ZERO, 0), |base| (u[base], state.turns[base]));
+            let winding = tie.laws.iter().fold(base, |sum, (sign, law)| sum + law.angle(state.time).scale(*sign));
+            motion.turns[k] = turns + ((winding.hi - angle::unwrapped(motion.phi[k], 0)) / std::f64::consts::TAU).round() as i64;
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! The hinge tree in absolute angles: mass matrix, velocity terms, gravity.
+//!
+//! ```text
+//! p_ij = conj(z_i) H_ij z_j = A cos(q_j-q_i) - B sin(q_j-q_i) + i (A sin(q_j-q_i) + B cos(q_j-q_i))
+//! M_ij = Re p_ij, M_ii = d_i;        b_i += w_j² Im p_ij,  b_j -= w_i² Im p_ij   for i < j
+//! ```
+//!
+//! Loops run over `N` bodies where `N > 0`, so that small sizes are unrolled, and over the number at hand where `N = 0`.
+
+use crate::arithmetic::{Complex, Scalar};
+
+/// `N`, or the number at hand where `N` is 0.
+#[inline(always)]
+pub fn size<const N: usize>(n: usize) -> usize {
+    if N == 0 { n } else { N }
+}
+
+/// Constants of the tree, formed once per scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tree {
+    /// Number of bodies n.
+    pub bodies: usize,
+    /// H above the diagonal, row by row (n × n) \[kg·m²\].
+    pub coupling: Vec<Complex<f64>>,
+    /// Diagonal d_i = H_ii + I_i \[kg·m²\].
+    pub diagonal: Vec<f64>,
+    /// Force of gravity on z_i: conj(Σ_m m_m gamma_mi) g \[N·m\].
+    pub weight: Vec<Complex<f64>>,
+    /// False where every hinge and centre of mass lies on its body's axis: B = 0, and its products are left out.
+    pub off_axis: bool,
+}
+
+impl Tree {
+    /// Writes M above and on the diagonal and Im p above it, both row by row (n × n) \[kg·m²\].
+    #[inline(always)]
+    pub fn couple<T: Scalar, const N: usize>(&self, z: &[Complex<T>], mass: &mut [T], twist: &mut [T]) {
+        let n = size::<N>(self.bodies);
+        let (z, coupling, diagonal) = (&z[..n], &self.coupling[..n * n], &self.diagonal[..n]);
+        let (mass, twist) = (&mut mass[..n * n], &mut twist[..n * n]);
+        for i in 0..n {
+            mass[i * n + i] = T::of(diagonal[i]);
+            for j in i + 1..n {
+                let h = coupling[i * n + j];
+                let (cos, sin) = (z[i].dot(z[j]), z[i].cross(z[j]));
+                mass[i * n + j] = cos.scale(h.re);
+                twist[i * n + j] = sin.scale(h.re);
+                if self.off_axis {
+                    mass[i * n + j] -= sin.scale(h.im);
+                    twist[i * n + j] += cos.scale(h.im);
+                }
+            }
+        }
+    }
+
+    /// Writes the velocity terms and gravity \[N·m\].
+    #[inline(always)]
+    pub fn load<T: Scalar, const N: usize>(&self, z: &[Complex<T>], omega: &[T], twist: &[T], load: &mut [T]) {
+        let n = size::<N>(self.bodies);
+        let (z, omega, twist, weight) = (&z[..n], &omega[..n], &twist[..n * n], &self.weight[..n]);
+        let load = &mut load[..n];
+        for i in 0..n {
+            load[i] = z[i].cross(Complex::of(weight[i]));
+        }
+        for i in 0..n {
+            for j in i + 1..n {
+                load[i] += twist[i * n + j] * (omega[j] * omega[j]);
+                load[j] -= twist[i * n + j] * (omega[i] * omega[i]);
+            }
+        }
+    }
+
+    /// Writes d(T - V)/dq \[N·m\] without springs, at fixed rates: the force of the canonical form.
+    #[inline(always)]
+    pub fn pull<T: Scalar, const N: usize>(&self, z: &[Complex<T>], omega: &[T], twist: &[T], force: &mut [T]) {
+        let n = size::<N>(self.bodies);
+        let (z, omega, twist, weight) = (&z[..n], &omega[..n], &twist[..n * n], &self.weight[..n]);
+        let force = &mut force[..n];
+        for i in 0..n {
+            force[i] = z[i].cross(Complex::of(weight[i]));
+        }
+        for i in 0..n {
+            for j in i + 1..n {
+                let swing = twist[i * n + j] * (omega[i] * omega[j]);
+                force[i] += swing;
+                force[j] -= swing;
+            }
+        }
+    }
+
+    /// Potential energy of gravity \[J\], less the constant of the ground points.
+    pub fn gravity_energy<T: Scalar>(&self, z: &[Complex<T>]) -> T {
+        z.iter().zip(&self.weight).fold(T::ZERO, |sum, (z, &weight)| sum - z.dot(Complex::of(weight)))
+    }
+}
+
+/// M = L D Lᵀ with unit upper L, eliminated from the last body (the leaves) to the first, in place above the diagonal.
+///
+/// Writes the reciprocal pivots; they come out non-finite or negative where M is not positive definite.
+#[inline(always)]
+pub fn factor<T: Scalar, const N: usize>(bodies: usize, mass: &mut [T], pivot: &mut [T]) {
+    let n = size::<N>(bodies);
+    let (mass, pivot) = (&mut mass[..n * n], &mut pivot[..n]);
+    for k in (0..n).rev() {
+        pivot[k] = T::ONE / mass[k * n + k];
+        for i in 0..k {
+            let l = mass[i * n + k] * pivot[k];
+            for j in 0..=i {
+                let full = mass[j * n + k];
+                mass[j * n + i] -= l * full;
+            }
+        }
+    }
+}
+
+/// Solves M x = load in place with the factors of [`factor`].
+#[inline(always)]
+pub fn solve<T: Scalar, const N: usize>(bodies: usize, mass: &[T], pivot: &[T], load: &mut [T]) {
+    let n = size::<N>(bodies);
+    let (mass, pivot, load) = (&mass[..n * n], &pivot[..n], &mut load[..n]);
+    for k in (1..n).rev() {
+        let part = load[k] * pivot[k];
+        for i in 0..k {
+            load[i] -= mass[i * n + k] * part;
+        }
+    }
+    for k in 0..n {
+        let mut sum = load[k];
+        for i in 0..k {
+            sum -= mass[i * n + k] * load[i];
+        }
+        load[k] = sum * pivot[k];
+    }
+}
+
+/// Writes M v from the part of M on and above the diagonal (before [`factor`]).
+#[inline(always)]
+pub fn multiply<T: Scalar, const N: usize>(bodies: usize, mass: &[T], v: &[T], product: &mut [T]) {
+    let n = size::<N>(bodies);
+    let (mass, v, product) = (&mass[..n * n], &v[..n], &mut product[..n]);
+    for i in 0..n {
+        product[i] = mass[i * n + i] * v[i];
+    }
+    for i in 0..n {
+        for j in i + 1..n {
+            product[i] += mass[i * n + j] * v[j];
+            product[j] += mass[i * n + j] * v[i];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_factors_solve_what_the_product_makes() {
+        let mass = [4.0, 1.0, -0.5, 0.0, 3.0, 0.25, 0.0, 0.0, 2.0];
+        let x = [1.0, -2.0, 0.5];
+        let mut load = [0.0; 3];
+        multiply::<f64, 3>(3, &mass, &x, &mut load);
+        let (mut factors, mut pivot) = (mass, [0.0; 3]);
+        factor::<f64, 3>(3, &mut factors, &mut pivot);
+        let mut again = load;
+        solve::<f64, 3>(3, &factors, &pivot, &mut again);
+        for k in 0..3 {
+            assert!((again[k] - x[k]).abs() < 1e-15);
+        }
+        // The size known at run time gives the same bits.
+        let (mut factors, mut pivot) = (mass, [0.0; 3]);
+        factor::<f64, 0>(3, &mut factors, &mut pivot);
+        solve::<f64, 0>(3, &factors, &pivot, &mut load);
+        assert_eq!(load, again);
+    }
+}

@@ -1,0 +1,102 @@
+//! Methods: how a state is marched from one time to another.
+//!
+//! A method is configuration and scratch space; the [`State`] belongs to the caller and holds everything a restart needs.  The
+//! problem is a type parameter: Dormand–Prince and Gauss are `Method<F: Field>`, RATTLE is `Method<Natural>`, so a wrong pairing does
+//! not compile.
+
+use crate::dynamics::{State, Time};
+
+/// Counts of one run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Tally {
+    /// Accepted steps.
+    pub steps: u64,
+    /// Evaluations of the equations.
+    pub evaluations: u64,
+    /// Rejected steps.
+    pub rejected: u64,
+}
+
+/// Where [`Method::advance`] stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reached {
+    /// At the time asked for.
+    Until,
+    /// At event number i, located; the state is the one just before it takes effect.
+    Event(usize),
+}
+
+/// What a watcher did to the state it was shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Seen {
+    /// Nothing.
+    Kept,
+    /// It changed the unknowns (projection): what the method knows of the rate there is stale.
+    Changed,
+}
+
+/// Shown the state after every accepted step; may change it, or stop the run.
+pub type Watch<'a, P> = dyn FnMut(&mut P, &mut State) -> Result<Seen, StepError> + 'a;
+
+/// Marches a problem `P`.
+pub trait Method<P: ?Sized> {
+    /// Name in reports: which code made a result.
+    fn name(&self) -> &'static str;
+
+    /// Order of the error of one run in the step.
+    fn order(&self) -> u32;
+
+    /// Marches `state` to `until` \[s\], or to the first event before it.
+    ///
+    /// Adaptive methods land on `until`; fixed-step methods take the whole number of steps nearest to it.
+    /// The same call from the same state gives the same bits.
+    ///
+    /// # Errors
+    /// A typed stop with time, step, culprit and suggestion; the state is then the last accepted one.
+    fn advance(
+        &mut self,
+        problem: &mut P,
+        state: &mut State,
+        until: Time,
+        tally: &mut Tally,
+        watch: &mut Watch<P>,
+    ) -> Result<Reached, StepError>;
+}
+
+/// Why a method stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Cause {
+    /// The rate, a stage or an error estimate came out not finite.
+    NotFinite,
+    /// The step fell below the resolution of time.
+    StepTooSmall,
+    /// The number of steps allowed was used up.
+    TooManySteps,
+    /// An implicit step did not converge.
+    NotConverged,
+    /// The projection onto the constraints did not converge.
+    ProjectionFailed,
+    /// A point came to rest on a wall, or the motors hold it there.
+    RestingContact,
+    /// A stated drift limit was exceeded.
+    DriftLimit,
+}
+
+/// A typed stop.
+#[derive(Clone, Debug, PartialEq, thiserror::Error, serde::Serialize)]
+#[error("{method} stopped at t = {t} s (step {step:.3e} s): {what}; {hint}")]
+pub struct StepError {
+    /// Why.
+    pub cause: Cause,
+    /// The method's name.
+    pub method: String,
+    /// Time of the last accepted state \[s\].
+    pub t: f64,
+    /// The step tried \[s\].
+    pub step: f64,
+    /// What happened, naming the component at fault.
+    pub what: String,
+    /// One suggestion.
+    pub hint: String,
+}
