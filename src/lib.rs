@@ -7,4 +7,5 @@ pub mod arithmetic;
 pub mod chart;
 pub mod dynamics;
 pub mod scene;
+pub mod stabilization;
 pub mod stepping;

@@ -1,0 +1,10 @@
+//! Keeping the constraints: one door each.
+//!
+//! [`baumgarte`] wraps the equations, [`projection`] wraps the method, and elimination is a form of the mechanism
+//! ([`Elimination`](crate::dynamics::elimination::Elimination)).  No stepper knows of any of them.
+
+pub mod baumgarte;
+pub mod projection;
+
+pub use baumgarte::Baumgarte;
+pub use projection::Projected;

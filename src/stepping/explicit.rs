@@ -1,0 +1,432 @@
+//! The adaptive driver shared by our own Dormand–Prince pairs: stages, step control, events.
+//!
+//! ```text
+//! k_i = f(t + c_i h, y + h Σ_j a_ij k_j),    y⁺ = y + h Σ b_i k_i,    err = |h Σ e_i k_i| / (atol + rtol |y|)
+//! h⁺ = h · clamp(0.9 err^(-1/p), 1/3, 6)
+//! ```
+//!
+//! Steps end on the times asked for; the step proposed before the last one was cut short is kept for the next.  The update is
+//! compensated: what rounding drops from y is carried in the state's low part.  Events are bracketed on the interpolated solution and
+//! the step is then repeated to end on the event, so the state there has the accuracy of a step.
+//!
+//! Source: E. Hairer, S. P. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sections II.4-II.6.
+
+use super::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
+use crate::arithmetic::sum::{fast_two_sum, two_sum};
+use crate::arithmetic::{DoubleDouble, Scalar};
+use crate::dynamics::{Field, State, Time};
+use std::marker::PhantomData;
+
+/// The nonzero entries of a row of coefficients: index and value.
+pub type Row = &'static [(usize, f64)];
+
+/// The coefficients of an embedded pair with interpolation.
+pub trait Pair {
+    /// Name in reports.
+    const NAME: &'static str;
+    /// Order p of the solution that is carried on.
+    const ORDER: u32;
+    /// Stages of a step, the rate at the new state not counted.
+    const STAGES: usize;
+    /// Further stages of the interpolation.
+    const EXTRA: usize;
+    /// a_ij of stages 2…
+    const A: &'static [Row];
+    /// c_i.
+    const C: &'static [f64];
+    /// b_i.
+    const B: Row;
+
+    /// Squared error over squared tolerance, averaged over the components; `k` holds the stages row by row and the rate at the new state last.
+    fn error(h: f64, k: &[f64], scale: &[f64]) -> f64;
+
+    /// Writes the extra stages by calling `rate(c, a)`, where the stage is `y + h Σ a k` at `t + c h`; the rate at the new state is
+    /// stage number `STAGES`, the extra ones follow.
+    fn extra_stages(rate: &mut dyn FnMut(usize, f64, Row));
+
+    /// The unknown `i` at `t + theta h`, as a change from y.
+    fn interpolate(theta: f64, h: f64, change: f64, k: &dyn Fn(usize) -> f64) -> f64;
+}
+
+/// Relative and absolute tolerance of one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tolerance {
+    /// Relative to the size of each unknown.
+    pub relative: f64,
+    /// Absolute, in the unknown's own unit.
+    pub absolute: f64,
+}
+
+impl Default for Tolerance {
+    fn default() -> Self {
+        Self { relative: 1e-9, absolute: 1e-9 }
+    }
+}
+
+/// An embedded pair with step control.
+#[derive(Clone, Debug)]
+pub struct Explicit<P> {
+    /// Tolerance of a step.
+    pub tolerance: Tolerance,
+    /// Most steps, rejected ones counted, in one call of [`Method::advance`].
+    pub max_steps: u64,
+    k: Vec<f64>,
+    stage: Vec<f64>,
+    scale: Vec<f64>,
+    next: Vec<f64>,
+    next_low: Vec<f64>,
+    gaps: Vec<f64>,
+    samples: Vec<f64>,
+    pair: PhantomData<P>,
+}
+
+/// Interior samples a step is searched for events with.
+const SAMPLES: usize = 8;
+
+impl<P: Pair> Explicit<P> {
+    /// The method at a tolerance.
+    pub fn new(tolerance: Tolerance) -> Self {
+        Self {
+            tolerance,
+            max_steps: 10_000_000,
+            k: Vec::new(),
+            stage: Vec::new(),
+            scale: Vec::new(),
+            next: Vec::new(),
+            next_low: Vec::new(),
+            gaps: Vec::new(),
+            samples: Vec::new(),
+            pair: PhantomData,
+        }
+    }
+
+    fn resize(&mut self, n: usize, events: usize) {
+        self.k.resize((P::STAGES + 1 + P::EXTRA) * n, 0.0);
+        for vector in [&mut self.stage, &mut self.scale, &mut self.next, &mut self.next_low] {
+            vector.resize(n, 0.0);
+        }
+        self.gaps.resize(events, 0.0);
+        self.samples.resize(events, 0.0);
+    }
+
+    /// Stages 2… and the new state of a step of `h` from `state`; stage 1 is in place.
+    fn step<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) {
+        let n = state.y.len();
+        for (i, row) in P::A.iter().enumerate() {
+            combine(&state.y, h, row, &self.k, &mut self.stage);
+            let (_, rest) = self.k.split_at_mut((i + 1) * n);
+            field.rate(state.time + P::C[i + 1] * h, &self.stage, &mut rest[..n]);
+        }
+        tally.evaluations += P::A.len() as u64;
+        for i in 0..n {
+            let change = P::B.iter().fold(0.0, |sum, &(j, b)| sum + b * self.k[j * n + i]) * h;
+            let (sum, rest) = two_sum(state.y[i], change);
+            (self.next[i], self.next_low[i]) = fast_two_sum(sum, rest + state.low[i]);
+            self.scale[i] = self.tolerance.absolute + self.tolerance.relative * state.y[i].abs().max(self.next[i].abs());
+        }
+        let (_, rest) = self.k.split_at_mut(P::STAGES * n);
+        field.rate(state.time + h, &self.next, &mut rest[..n]);
+        tally.evaluations += 1;
+    }
+
+    /// A first step from the size of the rate and its change (Hairer, Nørsett, Wanner, page 169).
+    fn first_step<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, span: f64, tally: &mut Tally) -> f64 {
+        let n = state.y.len();
+        for i in 0..n {
+            self.scale[i] = self.tolerance.absolute + self.tolerance.relative * state.y[i].abs();
+        }
+        let norm = |x: &dyn Fn(usize) -> f64, scale: &[f64]| ((0..n).map(|i| (x(i) / scale[i]).powi(2)).sum::<f64>() / n as f64).sqrt();
+        let (d0, d1) = (norm(&|i| state.y[i], &self.scale), norm(&|i| self.k[i], &self.scale));
+        let guess = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 };
+        let guess = guess.min(span);
+        for i in 0..n {
+            self.stage[i] = state.y[i] + guess * self.k[i];
+        }
+        let (first, rest) = self.k.split_at_mut(n);
+        field.rate(state.time + guess, &self.stage, &mut rest[..n]);
+        tally.evaluations += 1;
+        let d2 = norm(&|i| rest[i] - first[i], &self.scale) / guess;
+        let steepest = d1.max(d2);
+        let second = if steepest <= 1e-15 { (1e-3 * guess).max(1e-6) } else { (0.01 / steepest).powf(1.0 / f64::from(P::ORDER)) };
+        let first = (100.0 * guess).min(second).min(span);
+        if first.is_finite() { first } else { span.min(1e-6) }
+    }
+
+    /// The first event inside the step just made, as a share of it, or what forbids the step.
+    fn find_event<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) -> Found {
+        let n = state.y.len();
+        field.gaps(state.time, &state.y, &mut self.gaps);
+        let (k, stage) = (&mut self.k, &mut self.stage);
+        P::extra_stages(&mut |number, c, row| {
+            combine(&state.y, h, row, k, stage);
+            field.rate(state.time + c * h, stage, &mut k[number * n..(number + 1) * n]);
+            tally.evaluations += 1;
+        });
+        for sample in 1..=SAMPLES {
+            let theta = sample as f64 / SAMPLES as f64;
+            self.gaps_at(field, state, h, theta);
+            for event in 0..self.gaps.len() {
+                let (before, after) = (self.gaps[event], self.samples[event]);
+                if after > 0.0 || after.is_nan() {
+                    continue;
+                }
+                // Leaving a wall the gap starts at zero within rounding; it must open before it can close.
+                if before <= 1e-12 {
+                    if after < -1e-12 {
+                        return Found::Inside;
+                    }
+                    continue;
+                }
+                let theta = self.root(field, state, h, event, theta - 1.0 / SAMPLES as f64, theta);
+                return Found::At(event, theta);
+            }
+            std::mem::swap(&mut self.gaps, &mut self.samples);
+        }
+        Found::Nothing
+    }
+
+    /// Event functions of the interpolated solution at a share of the step, into `samples`.
+    fn gaps_at<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, theta: f64) {
+        let n = state.y.len();
+        for i in 0..n {
+            let change = (self.next[i] - state.y[i]) + (self.next_low[i] - state.low[i]);
+            self.stage[i] = state.y[i] + P::interpolate(theta, h, change, &|stage| self.k[stage * n + i]);
+        }
+        field.gaps(state.time + theta * h, &self.stage, &mut self.samples);
+    }
+
+    /// The zero of an event function on the interpolated solution between two shares of the step (bisection, then the last bits).
+    fn root<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, event: usize, low: f64, high: f64) -> f64 {
+        let (mut low, mut high) = (low, high);
+        while high - low > 4.0 * f64::EPSILON {
+            let middle = 0.5 * (low + high);
+            self.gaps_at(field, state, h, middle);
+            if self.samples[event] > 0.0 { low = middle } else { high = middle }
+        }
+        high
+    }
+
+    /// Repeats the step so that it ends where the event function is zero to rounding; returns its length.
+    fn land<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, event: usize, tally: &mut Tally) -> f64 {
+        let mut best = h;
+        let (mut before, mut gap_before) = (0.0, f64::NAN);
+        for _ in 0..6 {
+            self.step(field, state, best, tally);
+            field.gaps(state.time + best, &self.next, &mut self.samples);
+            let gap = self.samples[event];
+            if gap.abs() <= 1e-15 {
+                break;
+            }
+            // A secant once there are two points; the closing speed from the first step until then.
+            let slope =
+                if gap_before.is_nan() { self.closing_speed(field, state, best, event) } else { (gap - gap_before) / (best - before) };
+            (before, gap_before) = (best, gap);
+            let moved = best - gap / slope;
+            if !(moved.is_finite() && (moved - h).abs() < 0.1 * h) || moved == best {
+                break;
+            }
+            best = moved;
+        }
+        best
+    }
+
+    /// Rate of an event function \[m/s\] at the end of the step just made.
+    fn closing_speed<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, event: usize) -> f64 {
+        let n = state.y.len();
+        let at_end = self.samples[event];
+        let dt = 1e-7 * h;
+        for i in 0..n {
+            self.stage[i] = self.next[i] - dt * self.k[P::STAGES * n + i];
+        }
+        field.gaps(state.time + (h - dt), &self.stage, &mut self.gaps);
+        (at_end - self.gaps[event]) / dt
+    }
+
+    /// The component that asks most of the step, or the first that is not finite.
+    fn culprit<F: Field + ?Sized>(&self, field: &F, n: usize) -> String {
+        let last = &self.k[P::STAGES * n..(P::STAGES + 1) * n];
+        let worst = (0..n)
+            .find(|&i| !(self.next[i].is_finite() && last[i].is_finite()))
+            .or_else(|| (0..n).max_by(|&a, &b| (last[a] / self.scale[a]).abs().total_cmp(&(last[b] / self.scale[b]).abs())));
+        worst.map_or_else(String::new, |i| field.label(i))
+    }
+
+    fn stop(cause: Cause, state: &State, step: f64, what: String, hint: &str) -> StepError {
+        StepError { cause, method: P::NAME.into(), t: state.time.hi, step, what, hint: hint.into() }
+    }
+}
+
+/// What a step holds.
+enum Found {
+    Nothing,
+    /// Event number and share of the step.
+    At(usize, f64),
+    /// The point does not leave the wall at all.
+    Inside,
+}
+
+/// `out = y + h Σ a_j k_j`.
+#[inline]
+fn combine(y: &[f64], h: f64, row: Row, k: &[f64], out: &mut [f64]) {
+    let n = y.len();
+    for i in 0..n {
+        out[i] = y[i] + h * row.iter().fold(0.0, |sum, &(j, a)| sum + a * k[j * n + i]);
+    }
+}
+
+impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
+    fn name(&self) -> &'static str {
+        P::NAME
+    }
+
+    fn order(&self) -> u32 {
+        P::ORDER
+    }
+
+    fn advance(
+        &mut self,
+        field: &mut F,
+        state: &mut State,
+        until: Time,
+        tally: &mut Tally,
+        watch: &mut Watch<F>,
+    ) -> Result<Reached, StepError> {
+        let (n, events) = (state.y.len(), field.events());
+        self.resize(n, events);
+        field.rate(state.time, &state.y, &mut self.k[..n]);
+        tally.evaluations += 1;
+        let mut left = (until - state.time).hi;
+        let mut wanted = match state.memory.first() {
+            Some(&h) => h,
+            None => self.first_step(field, state, left, tally),
+        };
+        let (mut cuts, mut taken) = (0, 0);
+        let mut rejected_before = false;
+        while left > 0.0 {
+            let whole = wanted >= left * (1.0 - 1e-12);
+            let h = if whole {
+                left
+            } else if wanted > 0.5 * left {
+                0.5 * left
+            } else {
+                wanted
+            };
+            taken += 1;
+            if taken > self.max_steps {
+                let what = format!("more than {} steps before t = {} s", self.max_steps, until.hi);
+                return Err(Self::stop(Cause::TooManySteps, state, h, what, "loosen the tolerance or use a stiff method"));
+            }
+            self.step(field, state, h, tally);
+            let error = P::error(h, &self.k, &self.scale).sqrt();
+            if !error.is_finite() {
+                cuts += 1;
+                tally.rejected += 1;
+                if cuts > 10 || h < 1e-14 * state.time.hi.abs().max(1e-3) {
+                    let what = format!("{} is not finite", self.culprit(field, n));
+                    return Err(Self::stop(
+                        Cause::NotFinite,
+                        state,
+                        h,
+                        what,
+                        "look for a spring of length zero or a position without inertia",
+                    ));
+                }
+                wanted = 0.1 * h;
+                rejected_before = true;
+                continue;
+            }
+            cuts = 0;
+            let exponent = 1.0 / f64::from(P::ORDER);
+            let factor = (0.9 * libm::pow(error, -exponent)).clamp(1.0 / 3.0, 6.0);
+            if error > 1.0 {
+                tally.rejected += 1;
+                rejected_before = true;
+                wanted = h * factor.min(0.9);
+                if wanted < 1e-14 * state.time.hi.abs().max(1e-3) {
+                    let what = format!("{} asks for ever smaller steps", self.culprit(field, n));
+                    return Err(Self::stop(Cause::StepTooSmall, state, h, what, "loosen the tolerance or use a stiff method"));
+                }
+                continue;
+            }
+            let mut h = h;
+            let mut reached = if whole { Some(Reached::Until) } else { None };
+            if events > 0 {
+                match self.find_event(field, state, h, tally) {
+                    Found::Nothing => {}
+                    Found::At(event, theta) => {
+                        h = self.land(field, state, theta * h, event, tally);
+                        reached = Some(Reached::Event(event));
+                    }
+                    Found::Inside if h > 1e-9 => {
+                        tally.rejected += 1;
+                        rejected_before = true;
+                        wanted = h / SAMPLES as f64;
+                        continue;
+                    }
+                    Found::Inside => {
+                        let what = "a point has come to rest on a wall".into();
+                        let hint = "sustained contact is not modelled: raise the restitution or end the run before";
+                        return Err(Self::stop(Cause::RestingContact, state, h, what, hint));
+                    }
+                }
+            }
+            let grown = h * if rejected_before { factor.min(1.0) } else { factor };
+            rejected_before = false;
+            // A step cut short says nothing against the longer one proposed before it.
+            wanted = if h < wanted { grown.max(wanted) } else { grown };
+            state.y.copy_from_slice(&self.next);
+            state.low.copy_from_slice(&self.next_low);
+            state.time = if reached == Some(Reached::Until) { until } else { state.time + DoubleDouble::of(h) };
+            state.wrap();
+            state.memory.resize(1, 0.0);
+            state.memory[0] = wanted;
+            tally.steps += 1;
+            self.k.copy_within(P::STAGES * n..(P::STAGES + 1) * n, 0);
+            if watch(field, state)? == Seen::Changed {
+                field.rate(state.time, &state.y, &mut self.k[..n]);
+                tally.evaluations += 1;
+            }
+            if let Some(reached) = reached {
+                return Ok(reached);
+            }
+            left = (until - state.time).hi;
+        }
+        Ok(Reached::Until)
+    }
+}
+
+/// What every tableau must fulfil.
+#[cfg(test)]
+pub(super) mod checks {
+    use super::{Pair, Row};
+
+    pub fn rows_sum_to_nodes<P: Pair>(tolerance: f64) {
+        for (row, c) in P::A.iter().zip(&P::C[1..]) {
+            assert!((row.iter().map(|entry| entry.1).sum::<f64>() - c).abs() < tolerance);
+        }
+    }
+
+    /// Σ b c^(k-1) = 1/k.
+    pub fn quadrature<P: Pair>(order: i32, tolerance: f64) {
+        for k in 1..=order {
+            let sum: f64 = P::B.iter().map(|&(i, b)| b * P::C[i].powi(k - 1)).sum();
+            assert!((sum - 1.0 / f64::from(k)).abs() < tolerance, "order {k}: {sum}");
+        }
+    }
+
+    /// y' = t^(m-1) is interpolated exactly up to m = order.
+    pub fn interpolation<P: Pair>(order: i32, tolerance: f64) {
+        for m in 1..=order {
+            let (t, h) = (0.3f64, 0.7);
+            let rate = |t: f64| t.powi(m - 1);
+            let exact = |at: f64| (at.powi(m) - t.powi(m)) / f64::from(m);
+            let mut k: Vec<f64> = P::C.iter().map(|c| rate(t + c * h)).collect();
+            k.push(rate(t + h));
+            P::extra_stages(&mut |_, c, _: Row| k.push(rate(t + c * h)));
+            for theta in [0.1, 0.5, 0.8, 1.0] {
+                let found = P::interpolate(theta, h, exact(t + h), &|stage| k[stage]);
+                assert!((found - exact(t + theta * h)).abs() < tolerance, "power {m} at {theta}: {found}");
+            }
+        }
+    }
+}

@@ -1,0 +1,235 @@
+//! `dopri5` and `dop853`: the Dormand–Prince methods of the crate `ode_solvers`, marched in windows.
+//!
+//! The only file that knows the crate.  It owns its loop and keeps every row, so a call of [`Method::advance`] is one window: a
+//! fresh integration from one time asked for to the next, which makes memory flat and restart exact.  Its ways, and what is done about them:
+//!
+//! - Dense output hands out times and states that do not belong together: `Sparse` rows are used, and only the last one counts.
+//! - The twelfth stage of `Dop853` is given the time of the step's start instead of its end (0.6.2), which spoils the order where the
+//!   equations depend on time: time rides along as an unknown, and the crate's own is ignored.
+//! - 100 000 steps by default: the budget is ours.  A rate that is not finite comes back as a step-size underflow: it is looked for first.
+//! - Fixed-size vectors are 3 to 4 times faster than dynamic ones: chosen here by length.
+//! - The watcher sees the state at the end of a window only, since rows come back when it is over: no projection, no events.  `dp5` and `dp8` are for those.
+//!
+//! The step the crate found is passed on to the next window through the state's memory.
+
+use super::{Cause, Method, Reached, StepError, Tally, Tolerance, Watch};
+use crate::arithmetic::{DoubleDouble, Scalar};
+use crate::dynamics::{Field, State, Time};
+use nalgebra::{DVector, SVector};
+use ode_solvers::dop_shared::{IntegrationError, OutputType, Stats, System};
+use std::cell::RefCell;
+
+/// Dormand–Prince 5(4) of `ode_solvers`: everyday runs at 1e-3…1e-6.
+#[derive(Clone, Debug)]
+pub struct Dopri5 {
+    /// Tolerance of a step.
+    pub tolerance: Tolerance,
+    /// Most steps in one window.
+    pub max_steps: u32,
+}
+
+/// Dormand–Prince 8(5,3) of `ode_solvers`: everyday runs at 1e-6…1e-12.
+#[derive(Clone, Debug)]
+pub struct Dop853 {
+    /// Tolerance of a step.
+    pub tolerance: Tolerance,
+    /// Most steps in one window.
+    pub max_steps: u32,
+}
+
+/// Most steps in one window unless said otherwise.
+const MAX_STEPS: u32 = 10_000_000;
+
+impl Dopri5 {
+    /// The method at a tolerance.
+    pub fn new(tolerance: Tolerance) -> Self {
+        Self { tolerance, max_steps: MAX_STEPS }
+    }
+}
+
+impl Dop853 {
+    /// The method at a tolerance.
+    pub fn new(tolerance: Tolerance) -> Self {
+        Self { tolerance, max_steps: MAX_STEPS }
+    }
+}
+
+/// The field as the crate calls it: unknowns of the field, then the time since the window's start.
+struct Window<'a, F: ?Sized> {
+    field: RefCell<&'a mut F>,
+    start: Time,
+    n: usize,
+}
+
+impl<F: Field + ?Sized> Window<'_, F> {
+    fn rate(&self, y: &[f64], rate: &mut [f64]) {
+        self.field.borrow_mut().rate(self.start + DoubleDouble::of(y[self.n]), &y[..self.n], &mut rate[..self.n]);
+        rate[self.n] = 1.0;
+    }
+}
+
+impl<F: Field + ?Sized, const D: usize> System<f64, SVector<f64, D>> for Window<'_, F> {
+    fn system(&self, _: f64, y: &SVector<f64, D>, rate: &mut SVector<f64, D>) {
+        self.rate(y.as_slice(), rate.as_mut_slice());
+    }
+}
+
+impl<F: Field + ?Sized> System<f64, DVector<f64>> for Window<'_, F> {
+    fn system(&self, _: f64, y: &DVector<f64>, rate: &mut DVector<f64>) {
+        self.rate(y.as_slice(), rate.as_mut_slice());
+    }
+}
+
+/// A window's outcome in plain numbers: the rows' times, the last row, counts.
+type Outcome = (Vec<f64>, Vec<f64>, Result<Stats, IntegrationError>);
+
+/// `march!(Stepper, vector)` integrates one window.
+macro_rules! march {
+    ($stepper:path, $window:expr, $vector:expr, $span:expr, $settings:expr) => {{
+        let (tolerance, controller, first, max_steps) = $settings;
+        let (beta, fac_min, fac_max): (f64, f64, f64) = controller;
+        let mut stepper = <$stepper>::from_param(
+            $window,
+            0.0,
+            $span,
+            $span,
+            $vector,
+            tolerance.relative,
+            tolerance.absolute,
+            0.9,
+            beta,
+            fac_min,
+            fac_max,
+            $span,
+            first,
+            max_steps,
+            u32::MAX,
+            OutputType::Sparse,
+        );
+        let outcome = stepper.integrate();
+        let last = stepper.y_out().last().map(|y| y.as_slice().to_vec()).unwrap_or_default();
+        (stepper.x_out().clone(), last, outcome)
+    }};
+}
+
+/// Picks a fixed-size vector by length.
+macro_rules! by_length {
+    ($stepper:path, $window:expr, $y:expr, $span:expr, $settings:expr; $($d:literal)*) => {
+        match $y.len() {
+            $($d => march!($stepper, $window, SVector::<f64, $d>::from_column_slice($y), $span, $settings),)*
+            _ => march!($stepper, $window, DVector::from_column_slice($y), $span, $settings),
+        }
+    };
+}
+
+/// One window of either method.
+fn window<F: Field + ?Sized>(
+    name: &'static str,
+    integrate: impl FnOnce(Window<F>, &[f64], f64, f64) -> Outcome,
+    field: &mut F,
+    state: &mut State,
+    until: Time,
+    tally: &mut Tally,
+    watch: &mut Watch<F>,
+) -> Result<Reached, StepError> {
+    let n = state.y.len();
+    let span = (until - state.time).hi;
+    if span <= 0.0 {
+        return Ok(Reached::Until);
+    }
+    let stop = |cause, t: f64, step, what: String, hint: &str| StepError { cause, method: name.into(), t, step, what, hint: hint.into() };
+    let mut rate = vec![0.0; n];
+    field.rate(state.time, &state.y, &mut rate);
+    tally.evaluations += 1;
+    if let Some(i) = rate.iter().position(|rate| !rate.is_finite()) {
+        let hint = "look for a spring of length zero or a position without inertia";
+        return Err(stop(Cause::NotFinite, state.time.hi, 0.0, format!("the rate of {} is not finite", field.label(i)), hint));
+    }
+    let mut y = state.y.clone();
+    y.push(0.0);
+    let first = state.memory.first().map_or(0.0, |&h| h.min(span));
+    let (times, last, outcome) = integrate(Window { field: RefCell::new(field), start: state.time, n }, &y, span, first);
+    let reached_time = |x: f64| state.time.hi + x;
+    match outcome {
+        Ok(stats) => {
+            tally.steps += u64::from(stats.accepted_steps);
+            tally.evaluations += u64::from(stats.num_eval);
+            tally.rejected += u64::from(stats.rejected_steps);
+        }
+        Err(IntegrationError::MaxNumStepReached { x, n_step }) => {
+            let what = format!("more than {n_step} steps before t = {} s", until.hi);
+            return Err(stop(Cause::TooManySteps, reached_time(x), 0.0, what, "loosen the tolerance or use a stiff method"));
+        }
+        Err(IntegrationError::StepSizeUnderflow { x } | IntegrationError::StiffnessDetected { x }) => {
+            let what = "the step fell below the resolution of time, or a rate became not finite".into();
+            return Err(stop(Cause::StepTooSmall, reached_time(x), 0.0, what, "loosen the tolerance or use a stiff method"));
+        }
+    }
+    if let Some(i) = last.iter().take(n).position(|y| !y.is_finite()) {
+        let what = format!("{} is not finite", field.label(i));
+        return Err(stop(Cause::NotFinite, state.time.hi, span, what, "tighten the tolerance"));
+    }
+    // The longest step but the last, which was cut to fit, is the one to begin the next window with.
+    let steps = times.windows(2).map(|pair| pair[1] - pair[0]);
+    let longest = if times.len() > 2 { steps.take(times.len() - 2).fold(0.0, f64::max) } else { span.max(first) };
+    state.memory.resize(1, 0.0);
+    state.memory[0] = longest;
+    state.y.copy_from_slice(&last[..n]);
+    state.low.fill(0.0);
+    state.time = until;
+    state.wrap();
+    watch(field, state)?;
+    Ok(Reached::Until)
+}
+
+impl<F: Field + ?Sized> Method<F> for Dopri5 {
+    fn name(&self) -> &'static str {
+        "dopri5"
+    }
+
+    fn order(&self) -> u32 {
+        5
+    }
+
+    fn advance(
+        &mut self,
+        field: &mut F,
+        state: &mut State,
+        until: Time,
+        tally: &mut Tally,
+        watch: &mut Watch<F>,
+    ) -> Result<Reached, StepError> {
+        let (tolerance, max_steps) = (self.tolerance, self.max_steps);
+        let integrate = |window: Window<F>, y: &[f64], span: f64, first: f64| -> Outcome {
+            let settings = (tolerance, (0.04, 0.2, 10.0), first, max_steps);
+            by_length!(ode_solvers::Dopri5<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
+        };
+        window("dopri5", integrate, field, state, until, tally, watch)
+    }
+}
+
+impl<F: Field + ?Sized> Method<F> for Dop853 {
+    fn name(&self) -> &'static str {
+        "dop853"
+    }
+
+    fn order(&self) -> u32 {
+        8
+    }
+
+    fn advance(
+        &mut self,
+        field: &mut F,
+        state: &mut State,
+        until: Time,
+        tally: &mut Tally,
+        watch: &mut Watch<F>,
+    ) -> Result<Reached, StepError> {
+        let (tolerance, max_steps) = (self.tolerance, self.max_steps);
+        let integrate = |window: Window<F>, y: &[f64], span: f64, first: f64| -> Outcome {
+            let settings = (tolerance, (0.0, 1.0 / 3.0, 6.0), first, max_steps);
+            by_length!(ode_solvers::Dop853<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
+        };
+        window("dop853", integrate, field, state, until, tally, watch)
+    }
+}
