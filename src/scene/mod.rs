@@ -3,10 +3,19 @@
 //! [`read`] turns JSON into a [`Scene`] or refuses it with one precise error.  What stands here is already *resolved*: a uniform bar
 //! has become mass, centre and inertia; names have become indices.  Angles are absolute, from +x, counter-clockwise, in radians.
 
+mod assemble;
+mod error;
+mod format;
 mod locate;
 pub mod read;
+mod schema;
+mod set;
+mod write;
 
-pub use read::{SceneError, read_scene};
+pub use error::{Refusal, SceneError};
+pub use read::{parse_scene, read_scene};
+pub use schema::schema;
+pub use set::{Override, OverrideError};
 
 use serde::Serialize;
 

@@ -1,0 +1,159 @@
+//! Values set from outside: `--set walls.wall.restitution=0.5`.
+
+use super::error::SceneError;
+use super::locate::{Member, Node, Source, Text, Value, push_index, push_key};
+use super::read::nearest;
+use std::str::FromStr;
+
+/// One value of a scene set from outside, as `PATH=VALUE`.
+///
+/// A path is made of keys (`until`), indices (`gravity[0]`, `bars[1].length`) and, in a list, names (`bars.bar2.length`,
+/// `motors.motor.law.rate`).  What holds the value must exist already; a key may be new (`springs.spring.damping`).
+///
+/// ```
+/// let set: driftless::scene::Override = "walls.wall.restitution=0.5".parse().expect("a path and a value");
+/// assert_eq!(set.path, "walls.wall.restitution");
+/// assert_eq!(set.value, 0.5);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Override {
+    /// Where: keys, names and indices.
+    pub path: String,
+    /// What.
+    pub value: serde_json::Value,
+}
+
+/// Why a text is no [`Override`].
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("`{given}` is not PATH=VALUE, as in walls.wall.restitution=0.5 or gravity[0]=1.62")]
+pub struct OverrideError {
+    /// The text.
+    pub given: String,
+}
+
+impl FromStr for Override {
+    type Err = OverrideError;
+
+    /// The value is read as JSON, or else taken as text.
+    fn from_str(given: &str) -> Result<Self, OverrideError> {
+        let fail = || OverrideError { given: given.to_owned() };
+        let (path, value) = given.split_once('=').ok_or_else(fail)?;
+        let path = path.trim().to_owned();
+        steps(&path).ok_or_else(fail)?;
+        let value = serde_json::from_str(value).unwrap_or_else(|_| serde_json::Value::String(value.to_owned()));
+        Ok(Self { path, value })
+    }
+}
+
+impl Override {
+    /// This option as a text of its own.
+    pub(super) fn text(&self) -> Text {
+        let json = self.value.to_string();
+        Text { set: Some(format!("--set {}={json}", self.path)), json }
+    }
+}
+
+/// One step of a path.
+enum Step<'a> {
+    Key(&'a str),
+    Index(usize),
+}
+
+/// `bars[1].length` to its steps; `None` where it is no path.
+fn steps(path: &str) -> Option<Vec<Step<'_>>> {
+    let mut steps = Vec::new();
+    for part in path.split('.') {
+        let (key, indices) = part.split_once('[').map_or((part, ""), |(key, _)| (key, &part[key.len()..]));
+        if key.is_empty() {
+            return None;
+        }
+        steps.push(Step::Key(key));
+        let mut rest = indices;
+        while !rest.is_empty() {
+            let (index, after) = rest.strip_prefix('[')?.split_once(']')?;
+            if !index.bytes().all(|digit| digit.is_ascii_digit()) {
+                return None;
+            }
+            steps.push(Step::Index(index.parse().ok()?));
+            rest = after;
+        }
+    }
+    Some(steps)
+}
+
+/// Puts `value` into `tree` at the path of `set`.
+pub(super) fn put(source: &Source, tree: &mut Node, set: &Override, value: Node) -> Result<(), SceneError> {
+    let span = value.span;
+    let refused = |path: &str, problem: &str, allowed: &str, hint: &str| source.refusal(span, path, problem, allowed, hint);
+    let Some(steps) = steps(&set.path) else {
+        let hint = "for example walls.wall.restitution, bars[1].length, gravity[0]";
+        return Err(refused(&set.path, "is not a path", "must be keys, names and [indices] joined by dots", hint));
+    };
+    let mut at = tree;
+    let mut path = String::new();
+    let last = steps.len() - 1;
+    for (number, step) in steps.iter().enumerate() {
+        let holder = path.clone();
+        match (step, &mut at.value) {
+            (Step::Key(key), Value::Object(members)) => {
+                push_key(&mut path, key);
+                let found = members.iter().position(|member| member.key == *key);
+                match found {
+                    Some(index) => at = &mut members[index].node,
+                    None if number == last => {
+                        members.push(Member { key: (*key).to_owned(), span, node: value });
+                        return Ok(());
+                    }
+                    None => {
+                        let known: Vec<&str> = members.iter().map(|member| member.key.as_str()).collect();
+                        let hint = hint(key, &known);
+                        return Err(refused(&path, "does not exist", "what holds the value must be in the scene", &hint));
+                    }
+                }
+            }
+            (Step::Key(key), Value::List(nodes)) => {
+                let known: Vec<&str> = nodes.iter().filter_map(name).collect();
+                let Some(index) = nodes.iter().position(|node| name(node) == Some(key)) else {
+                    push_key(&mut path, key);
+                    let hint = if known.is_empty() { "use an index, as in gravity[0]".to_owned() } else { hint(key, &known) };
+                    return Err(refused(&path, "does not exist", &format!("{holder} must have an element of that name"), &hint));
+                };
+                push_index(&mut path, index);
+                at = &mut nodes[index];
+            }
+            (Step::Index(index), Value::List(nodes)) => {
+                push_index(&mut path, *index);
+                let count = nodes.len();
+                let Some(node) = nodes.get_mut(*index) else {
+                    let hint = "indices count from 0; an element cannot be added";
+                    return Err(refused(&path, "does not exist", &format!("{holder} has {count} elements"), hint));
+                };
+                at = node;
+            }
+            (Step::Index(_), _) => {
+                return Err(refused(&path, "is not a list", "only lists have indices", "use a key, as in start.bar1.phi"));
+            }
+            (Step::Key(key), _) => {
+                let allowed = format!("it has no `{key}` to set");
+                return Err(refused(&path, "is a single value", &allowed, "set the value itself"));
+            }
+        }
+    }
+    *at = value;
+    Ok(())
+}
+
+fn name(node: &Node) -> Option<&str> {
+    let Value::Object(members) = &node.value else { return None };
+    members.iter().find(|member| member.key == "name").and_then(|member| match &member.node.value {
+        Value::Text(name) => Some(name.as_str()),
+        _ => None,
+    })
+}
+
+fn hint(wanted: &str, known: &[&str]) -> String {
+    match nearest(wanted, known.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("there are: {}", super::read::listed(known)),
+    }
+}
