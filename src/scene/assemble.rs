@@ -2,7 +2,7 @@
 //! agrees with their laws, and nothing begins where its force or its side is undefined.
 
 use super::error::SceneError;
-use super::format::ANGLE;
+use super::format::{ANGLE, RATE, about};
 use super::read::{At, GivenStart};
 use super::{Bar, Hinge, Law, Motor, Place, Spring, Start, Wall};
 
@@ -117,6 +117,61 @@ impl Groups {
     }
 }
 
+/// Which motors tie which bodies.
+struct Ties<'a> {
+    motors: &'a [Motor],
+    /// The motors at each body.
+    at_body: Vec<Vec<usize>>,
+    /// The bars of each group of tied bodies, but not of the ground's; a bar without a motor is a group of one.
+    groups: Vec<Vec<usize>>,
+}
+
+impl<'a> Ties<'a> {
+    /// Fails with the number of the first motor that drives an angle the others give already.
+    fn of(bars: usize, motors: &'a [Motor]) -> Result<Self, usize> {
+        let mut groups = Groups::of(bars + 1);
+        let mut at_body = vec![Vec::new(); bars + 1];
+        for (number, motor) in motors.iter().enumerate() {
+            let (from, to) = (body(motor.relative_to), body(Some(motor.bar)));
+            if !groups.join(from, to) {
+                return Err(number);
+            }
+            at_body[from].push(number);
+            at_body[to].push(number);
+        }
+        let mut members = vec![Vec::new(); bars + 1];
+        for bar in 0..bars {
+            members[groups.find(body(Some(bar)))].push(bar);
+        }
+        members[groups.find(body(None))].clear();
+        members.retain(|group| !group.is_empty());
+        members.sort_by_key(|group| group[0]);
+        Ok(Self { motors, at_body, groups: members })
+    }
+
+    /// Carries the start of `from` along the motors to all bodies that have none yet.
+    fn spread(&self, from: usize, start: &mut [Option<Start>]) {
+        let mut open = vec![from];
+        while let Some(here) = open.pop() {
+            let Some(known) = start[here] else { continue };
+            for &number in &self.at_body[here] {
+                let motor = &self.motors[number];
+                let (base, bar) = (body(motor.relative_to), body(Some(motor.bar)));
+                let law = motor.law.at_start();
+                let (to, there) = if here == base {
+                    (bar, Start { phi: known.phi + law.phi, omega: known.omega + law.omega })
+                } else {
+                    (base, Start { phi: known.phi - law.phi, omega: known.omega - law.omega })
+                };
+                if start[to].is_none() {
+                    start[to] = Some(there);
+                    open.push(to);
+                }
+            }
+        }
+    }
+}
+
 /// Angle and rate of each bar at t = 0: as given, or by the law of its motor.
 pub(super) fn starts(
     root: &At,
@@ -125,59 +180,34 @@ pub(super) fn starts(
     motor_places: &[At],
     given: &[Option<GivenStart>],
 ) -> Result<Vec<Start>, SceneError> {
-    let mut groups = Groups::of(bars.len() + 1);
-    let mut at_body: Vec<Vec<usize>> = vec![Vec::new(); bars.len() + 1];
-    let mut driven = vec![false; bars.len() + 1];
-    for (number, motor) in motors.iter().enumerate() {
-        let (from, to) = (body(motor.relative_to), body(Some(motor.bar)));
-        if !groups.join(from, to) {
-            let problem = format!("(motor `{}`) drives an angle that is given already", motor.name);
-            let hint = "leave out one of the motors that share these bars";
-            return Err(motor_places[number].refuse(&problem, "the other motors must leave it free", hint));
-        }
-        at_body[from].push(number);
-        at_body[to].push(number);
-        driven[to] = true;
-    }
-    let laws: Vec<Start> = motors.iter().map(|motor| motor.law.at_start()).collect();
+    let ties = Ties::of(bars.len(), motors).map_err(|number| {
+        let problem = format!("(motor `{}`) drives an angle that is given already", motors[number].name);
+        let hint = "leave out one of the motors that share these bars";
+        motor_places[number].refuse(&problem, "the other motors must leave it free", hint)
+    })?;
     let mut start: Vec<Option<Start>> = vec![None; bars.len() + 1];
-
-    // The ground first, then of each group of bars tied by motors the bar that no motor drives, whatever bar of the group was given:
-    // so a scene written out with all its starts reads back to the same bits.
     start[0] = Some(Start { phi: 0.0, omega: 0.0 });
-    let mut by_law = vec![false; bars.len() + 1];
-    spread(0, &mut start, &mut by_law, motors, &at_body, &laws);
-    for bar in 0..bars.len() {
-        let root_of_group = body(Some(bar));
-        if start[root_of_group].is_some() || driven[root_of_group] {
-            continue;
-        }
-        if let Some(GivenStart { phi, omega, .. }) = given[bar] {
-            start[root_of_group] = Some(Start { phi, omega });
-        } else {
-            let group = groups.find(root_of_group);
-            let members: Vec<usize> = (0..bars.len()).filter(|&other| groups.find(body(Some(other))) == group).collect();
-            let Some((member, GivenStart { phi, omega, .. })) = members.iter().find_map(|&other| given[other].as_ref().map(|g| (other, g)))
-            else {
-                return Err(missing_start(root, &bars[bar].name, members.len() > 1));
-            };
-            let mut trial = vec![None; bars.len() + 1];
-            trial[body(Some(member))] = Some(Start { phi: *phi, omega: *omega });
-            spread(body(Some(member)), &mut trial, &mut by_law.clone(), motors, &at_body, &laws);
-            start[root_of_group] = trial[root_of_group];
-            by_law[root_of_group] = true;
-        }
-        spread(root_of_group, &mut start, &mut by_law, motors, &at_body, &laws);
+    ties.spread(0, &mut start);
+    for group in &ties.groups {
+        // The others follow from one: a bar that no motor drives if it is given, else the first that is.
+        let driven = |bar: usize| motors.iter().any(|motor| motor.bar == bar);
+        let one = group.iter().copied().filter(|&bar| given[bar].is_some()).min_by_key(|&bar| group.len() > 1 && driven(bar));
+        let Some((bar, GivenStart { phi, omega, .. })) = one.and_then(|bar| Some((bar, given[bar].as_ref()?))) else {
+            let free = group.iter().copied().min_by_key(|&bar| driven(bar)).unwrap_or(group[0]);
+            return Err(missing_start(root, &bars[free].name, group.len() > 1));
+        };
+        start[body(Some(bar))] = Some(Start { phi: *phi, omega: *omega });
+        ties.spread(body(Some(bar)), &mut start);
     }
-
     let mut resolved = Vec::with_capacity(bars.len());
     for (bar, Bar { name, .. }) in bars.iter().enumerate() {
         let Some(exact) = start[body(Some(bar))] else { return Err(missing_start(root, name, true)) };
-        if by_law[body(Some(bar))] {
-            let by = at_body[body(Some(bar))].first().copied().unwrap_or(0);
-            if !ANGLE.holds(exact.phi) || !exact.omega.is_finite() {
-                let problem = format!("(motor `{}`) starts bar `{name}` at {:e} rad", motors[by].name, exact.phi);
-                return Err(motor_places[by].refuse(&problem, &format!("a start angle must be {ANGLE}"), "take off whole turns"));
+        if let Some(&by) = ties.at_body[body(Some(bar))].first() {
+            if !ANGLE.holds(exact.phi) || !RATE.holds(exact.omega) {
+                let problem =
+                    format!("(motor `{}`) starts bar `{name}` at {} rad, {} rad/s", motors[by].name, about(exact.phi), about(exact.omega));
+                let allowed = format!("a start must be {ANGLE} and {RATE}");
+                return Err(motor_places[by].refuse(&problem, &allowed, "take off whole turns, and check the rates"));
             }
             if let Some(given) = &given[bar] {
                 agrees(&given.phi_at, given.phi, exact.phi, "rad", &motors[by].name)?;
@@ -189,26 +219,23 @@ pub(super) fn starts(
     Ok(resolved)
 }
 
-/// Carries the start of `from` along the motors to all bodies that have none yet.
-fn spread(from: usize, start: &mut [Option<Start>], by_law: &mut [bool], motors: &[Motor], at_body: &[Vec<usize>], laws: &[Start]) {
-    let mut open = vec![from];
-    while let Some(here) = open.pop() {
-        let Some(known) = start[here] else { continue };
-        for &number in &at_body[here] {
-            let (base, bar) = (body(motors[number].relative_to), body(Some(motors[number].bar)));
-            let law = laws[number];
-            let (to, there) = if here == base {
-                (bar, Start { phi: known.phi + law.phi, omega: known.omega + law.omega })
-            } else {
-                (base, Start { phi: known.phi - law.phi, omega: known.omega - law.omega })
-            };
-            if start[to].is_none() {
-                start[to] = Some(there);
-                by_law[to] = true;
-                open.push(to);
-            }
+/// True for each bar whose start must be written so that all starts read back to the same bits: of bars that motors tie to each other
+/// only the one that the others were computed from.
+pub(super) fn written_starts(motors: &[Motor], start: &[Start]) -> Vec<bool> {
+    let mut written = vec![true; start.len()];
+    let Ok(ties) = Ties::of(start.len(), motors) else { return written };
+    for group in ties.groups.iter().filter(|group| group.len() > 1) {
+        let gives_all = |&bar: &usize| {
+            let mut trial = vec![None; start.len() + 1];
+            trial[body(Some(bar))] = Some(start[bar]);
+            ties.spread(body(Some(bar)), &mut trial);
+            group.iter().all(|&other| trial[body(Some(other))] == Some(start[other]))
+        };
+        if let Some(one) = group.iter().copied().find(gives_all) {
+            group.iter().for_each(|&bar| written[bar] = bar == one);
         }
     }
+    written
 }
 
 fn missing_start(root: &At, bar: &str, tied: bool) -> SceneError {
@@ -298,7 +325,7 @@ pub(super) fn walls(posture: &Posture, walls: &[Wall], places: &[At]) -> Result<
         let (position, way) = posture.at(Place { bar: Some(*bar), point: *point });
         let gap = (position[0] - through[0]) * normal[0] + (position[1] - through[1]) * normal[1];
         if gap < -SAME * (way + through[0].abs() + through[1].abs()) {
-            let problem = format!("(wall `{name}`) has its point {:e} m behind it at the start", -gap);
+            let problem = format!("(wall `{name}`) has its point {} m behind it at the start", about(-gap));
             let hint = format!("start elsewhere, move the wall, or turn its normal to [{}, {}]", -normal[0], -normal[1]);
             return Err(at.refuse(&problem, "the point must start on the side the normal shows, or on the wall", &hint));
         }

@@ -137,7 +137,7 @@ impl Excerpt {
         let marked = text.get(start..end).unwrap_or("").lines().next().unwrap_or("").chars().count();
         let characters: Vec<char> = whole.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
         let at = (column - 1).min(characters.len());
-        let from = if characters.len() <= WIDEST { 0 } else { at.saturating_sub(WIDEST / 3) };
+        let from = at.saturating_sub(WIDEST / 3).min(characters.len().saturating_sub(WIDEST));
         let to = characters.len().min(from + WIDEST);
         let (before, after) = (if from > 0 { "…" } else { "" }, if to < characters.len() { "…" } else { "" });
         let shown = format!("{before}{}{after}", characters[from..to].iter().collect::<String>());

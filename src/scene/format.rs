@@ -92,6 +92,8 @@ const fn signed(unit: &'static str) -> Quantity {
 
 /// An absolute angle \[rad\].
 pub(super) const ANGLE: Quantity = Quantity { least: -WIDEST_ANGLE, most: WIDEST_ANGLE, unit: "rad" };
+/// A rate \[rad/s\].
+pub(super) const RATE: Quantity = signed("rad/s");
 /// A mass \[kg\].
 pub(super) const MASS: Quantity = positive("kg");
 /// A moment of inertia \[kg·m²\].
@@ -232,7 +234,7 @@ pub(super) static LAW: Table = Table {
     about: "start + rate·t + acceleration·t²/2 + the sum of amplitude·sin(frequency·t + phase).",
     fields: &[
         required("start", Shape::Number(ANGLE), "1.5707963267948966", "Angle at t = 0 without the sines."),
-        optional("rate", Shape::Number(signed("rad/s")), "3", "Rate; 0 if absent."),
+        optional("rate", Shape::Number(RATE), "3", "Rate; 0 if absent."),
         optional("acceleration", Shape::Number(signed("rad/s²")), "0.5", "Acceleration; 0 if absent."),
         optional("sines", Shape::List { of: &[&SINE], least: 0, most: usize::MAX }, "[…]", "Sines on top; none if absent."),
     ],
@@ -244,7 +246,7 @@ pub(super) static SINE: Table = Table {
     about: "amplitude·sin(frequency·t + phase).",
     fields: &[
         required("amplitude", Shape::Number(ANGLE), "0.2", "Amplitude."),
-        required("frequency", Shape::Number(signed("rad/s")), "5", "Angular frequency."),
+        required("frequency", Shape::Number(RATE), "5", "Angular frequency."),
         optional("phase", Shape::Number(ANGLE), "0", "Phase at t = 0; 0 if absent."),
     ],
 };
@@ -283,7 +285,7 @@ pub(super) static START: Table = Table {
     about: "Angle and rate of a bar at t = 0.",
     fields: &[
         required("phi", Shape::Number(ANGLE), "0", "Absolute angle; may be many turns."),
-        required("omega", Shape::Number(signed("rad/s")), "0", "Rate."),
+        required("omega", Shape::Number(RATE), "0", "Rate."),
     ],
 };
 
@@ -340,6 +342,11 @@ impl Quantity {
     pub fn holds(&self, number: f64) -> bool {
         (self.least..=self.most).contains(&number)
     }
+}
+
+/// A number to four digits, for what is measured rather than given.
+pub(super) fn about(number: f64) -> String {
+    plain(format!("{number:.3e}").parse().unwrap_or(number))
 }
 
 /// A number as people write it.

@@ -148,6 +148,12 @@ impl Source {
         while !json.is_char_boundary(at) {
             at -= 1;
         }
+        if error.is_eof() {
+            at = json.trim_end().len();
+        } else {
+            // It stops inside a word such as `nan`; the fault is the word.
+            at -= json[..at].bytes().rev().take_while(u8::is_ascii_alphabetic).count();
+        }
         let width = if error.is_eof() { 0 } else { json[at..].chars().next().map_or(0, char::len_utf8) };
         let message = error.to_string();
         let said = message.split(" at line ").next().unwrap_or("");

@@ -5,7 +5,7 @@
 
 use super::assemble;
 use super::error::SceneError;
-use super::format::{self, Field, GROUND, INERTIA, LONGEST_FILE, LONGEST_NAME, LONGEST_TEXT, MASS, Quantity, Shape, Table};
+use super::format::{self, Field, GROUND, INERTIA, LONGEST_FILE, LONGEST_NAME, LONGEST_TEXT, MASS, Quantity, Shape, Table, about};
 use super::locate::{Member, Node, Source, Span, Text, Value, clipped, push_index, push_key};
 use super::set::{Override, put};
 use super::{Bar, Hinge, Law, Motor, Place, Scene, Sine, Spring, Wall};
@@ -422,6 +422,9 @@ impl<'a> At<'a> {
     fn object(&self, table: &'static Table) -> Result<Fields<'a>, SceneError> {
         let Value::Object(members) = &self.node.value else {
             let allowed = format!("must be an object, {}, with the keys {}", table.title, table.keys());
+            if self.path.is_empty() {
+                return Err(self.refuse("the file is not a JSON object", &allowed, "compare with a file in examples/scenes/"));
+            }
             return Err(self.refuse_value(&allowed, table.about));
         };
         for member in members {
@@ -471,7 +474,7 @@ impl<'a> At<'a> {
         if quantity.holds(number) {
             return Ok(());
         }
-        let problem = format!("comes to {what} of {number:e} {}", quantity.unit);
+        let problem = format!("comes to {what} of {} {}", about(number), quantity.unit);
         Err(self.refuse(&problem, &Shape::Number(*quantity).allowed(), "check the units: metres, kg/m³"))
     }
 }

@@ -1,11 +1,12 @@
 //! A resolved scene as an input scene.
 
+use super::assemble::written_starts;
 use super::format::GROUND;
 use super::{Place, Scene};
 use serde_json::{Map, Value, json};
 
 impl Scene {
-    /// The scene in the input format, every bar by its mass and every default written out; reads back to the same scene, bit for bit.
+    /// The scene in the input format, every bar by its mass and every default written out; it reads back to the same scene, bit for bit.
     pub fn to_input(&self) -> Value {
         let body = |bar: Option<usize>| bar.map_or(GROUND, |bar| self.bars[bar].name.as_str());
         let place = |place: &Place| json!({"body": body(place.bar), "point": place.point});
@@ -39,7 +40,11 @@ impl Scene {
                 })
             })
             .collect();
-        let start: Map<String, Value> = self.bars.iter().zip(&self.start).map(|(bar, start)| (bar.name.clone(), json!(start))).collect();
+        let start: Map<String, Value> = (self.bars.iter().zip(&self.start))
+            .zip(written_starts(&self.motors, &self.start))
+            .filter(|(_, written)| *written)
+            .map(|((bar, start), _)| (bar.name.clone(), json!(start)))
+            .collect();
         json!({
             "name": self.name,
             "description": self.description,
