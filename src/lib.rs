@@ -6,6 +6,7 @@ pub mod arithmetic;
 #[cfg(feature = "charts")]
 pub mod chart;
 pub mod dynamics;
+pub mod run;
 pub mod scene;
 pub mod stabilization;
 pub mod stepping;

@@ -4,9 +4,12 @@
 //! problem is a type parameter: Dormand–Prince and Gauss are `Method<F: Field>`, RATTLE is `Method<Natural>`, so a wrong pairing does
 //! not compile.
 
+pub mod composition;
 pub mod dp5;
 pub mod dp8;
 pub mod explicit;
+pub mod gauss;
+pub mod rattle;
 pub mod windows;
 
 pub use dp5::Dp5;
@@ -89,6 +92,8 @@ pub enum Cause {
     ProjectionFailed,
     /// A point came to rest on a wall, or the motors hold it there.
     RestingContact,
+    /// The method does not fit the mechanism.
+    Unsuited,
     /// A stated drift limit was exceeded.
     DriftLimit,
 }

@@ -80,3 +80,10 @@ pub const ONE_TURN: f64 = TAU;
 pub fn compile(scene: &Scene) -> Arc<Mechanism> {
     Arc::new(Mechanism::new(scene).expect("a valid scene"))
 }
+
+/// A scene of `examples/scenes/`, with `PATH=VALUE` overrides.
+pub fn shipped(name: &str, overrides: &[&str]) -> Scene {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("examples/scenes/{name}.json"));
+    let overrides: Vec<_> = overrides.iter().map(|text| text.parse().expect("an override")).collect();
+    driftless::scene::read_scene(&path, &overrides).expect("a shipped scene")
+}

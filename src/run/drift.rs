@@ -1,0 +1,185 @@
+//! Drift as two numbers: the largest excursion, and the slope of the per-interval maximum.  A bound alone hides a climb.
+//!
+//! Memory does not grow with the run: the horizon is divided into a fixed number of intervals, and the record for charts
+//! is kept at times that grow by a constant factor.
+
+use super::sample::Sample;
+use crate::dynamics::Mechanism;
+
+/// Intervals the horizon is divided into.
+const INTERVALS: usize = 64;
+/// Growth of the times at which the running maximum is recorded: forty a decade.
+const GROWTH: f64 = 1.059_253_725_177_289;
+
+/// The excursions of one quantity that ought to stay zero.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Excursion {
+    /// Largest magnitude so far; not a number once the quantity was not.
+    pub max: f64,
+    /// Largest magnitude in each interval; negative where none was seen.
+    intervals: Vec<f64>,
+    until: f64,
+    /// Times \[s\] and running maxima, at growing distances.
+    pub record: Vec<[f64; 2]>,
+    next_record: f64,
+    /// Sums for the signed trend: count, t, t², x, x t, x² with t in units of the horizon.
+    sums: [f64; 6],
+}
+
+impl Excursion {
+    /// A monitor over a horizon \[s\].
+    pub fn new(until: f64) -> Self {
+        Self { max: 0.0, intervals: vec![-1.0; INTERVALS], until, record: Vec::new(), next_record: 0.0, sums: [0.0; 6] }
+    }
+
+    /// Takes the quantity at time `t` \[s\].
+    pub fn see(&mut self, t: f64, value: f64) {
+        let size = value.abs();
+        if size > self.max || size.is_nan() {
+            self.max = size;
+        }
+        let share = t / self.until;
+        let slot = ((share * INTERVALS as f64) as usize).min(INTERVALS - 1);
+        self.intervals[slot] = self.intervals[slot].max(size);
+        if t >= self.next_record {
+            if t > 0.0 {
+                self.record.push([t, self.max]);
+            }
+            self.next_record = if t > 0.0 { t * GROWTH } else { 0.0 };
+        } else if let Some(last) = self.record.last_mut().filter(|_| share >= 1.0) {
+            *last = [t, self.max];
+        }
+        for (sum, term) in self.sums.iter_mut().zip([1.0, share, share * share, value, value * share, value * value]) {
+            *sum += term;
+        }
+    }
+
+    /// Least-squares slope of the per-interval maximum \[1/s times the quantity's unit\]; zero with fewer than three intervals.
+    pub fn slope(&self) -> f64 {
+        let seen: Vec<(f64, f64)> = self
+            .intervals
+            .iter()
+            .enumerate()
+            .filter(|(_, max)| **max >= 0.0)
+            .map(|(i, &max)| ((i as f64 + 0.5) / INTERVALS as f64, max))
+            .collect();
+        if seen.len() < 3 {
+            return 0.0;
+        }
+        let count = seen.len() as f64;
+        let (t_mean, x_mean) = (seen.iter().map(|p| p.0).sum::<f64>() / count, seen.iter().map(|p| p.1).sum::<f64>() / count);
+        let (above, below) =
+            seen.iter().fold((0.0, 0.0), |(a, b), (t, x)| (a + (t - t_mean) * (x - x_mean), b + (t - t_mean) * (t - t_mean)));
+        above / below / self.until
+    }
+
+    /// Signed least-squares trend and its standard error \[1/s times the quantity's unit\], samples taken as independent.
+    pub fn trend(&self) -> (f64, f64) {
+        let [count, t, tt, x, xt, xx] = self.sums;
+        let spread = tt - t * t / count;
+        if count < 3.0 || spread <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let slope = (xt - t * x / count) / spread;
+        let rest = (xx - x * x / count - slope * slope * spread).max(0.0) / (count - 2.0);
+        (slope / self.until, (rest / spread).sqrt() / self.until)
+    }
+}
+
+/// Stated limits; a run that exceeds one stops.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Limits {
+    /// On the energy imbalance over the energy scale.
+    pub energy: Option<f64>,
+    /// On every constraint, at position \[rad or m\] and velocity level \[rad/s or m/s\].
+    pub constraint: Option<f64>,
+}
+
+/// The drift of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drift {
+    /// Energy, or energy minus work, over the energy scale.
+    pub energy: Excursion,
+    /// `energy`, or `energy minus work` where motors, dampers or impacts change it.
+    pub kind: &'static str,
+    /// Each row by name, at position and velocity level.
+    pub constraints: Vec<(String, [Excursion; 2])>,
+    /// Energy the stabilizer has put in by now \[J\].
+    pub stabilizer: f64,
+    /// Largest magnitude of that at any time \[J\].
+    pub stabilizer_max: f64,
+}
+
+impl Drift {
+    /// Monitors of a mechanism over a horizon \[s\].
+    pub fn new(mechanism: &Mechanism, until: f64) -> Self {
+        let works = !mechanism.rows.is_empty() || mechanism.is_damped() || !mechanism.contacts.is_empty();
+        let pair = || [Excursion::new(until), Excursion::new(until)];
+        Self {
+            energy: Excursion::new(until),
+            kind: if works { "energy minus work" } else { "energy" },
+            constraints: mechanism.rows.iter().map(|row| (row.name().to_owned(), pair())).collect(),
+            stabilizer: 0.0,
+            stabilizer_max: 0.0,
+        }
+    }
+
+    /// Takes a sample; names the first limit it exceeds.
+    pub fn see(&mut self, sample: &Sample, limits: &Limits) -> Result<(), String> {
+        self.energy.see(sample.t, sample.imbalance);
+        self.stabilizer = sample.stabilizer;
+        self.stabilizer_max = self.stabilizer_max.max(sample.stabilizer.abs());
+        for ((_, monitors), values) in self.constraints.iter_mut().zip(&sample.constraints) {
+            for (monitor, &value) in monitors.iter_mut().zip(values) {
+                monitor.see(sample.t, value);
+            }
+        }
+        let beyond = |value: f64, limit: Option<f64>| limit.is_some_and(|limit| value.is_nan() || value > limit);
+        if beyond(self.energy.max, limits.energy) {
+            return Err(format!(
+                "{} is off by {:.2e} of the scale, the limit is {:e}",
+                self.kind,
+                self.energy.max,
+                limits.energy.unwrap_or(0.0)
+            ));
+        }
+        for (name, monitors) in &self.constraints {
+            for (monitor, level) in monitors.iter().zip(["position", "velocity"]) {
+                if beyond(monitor.max, limits.constraint) {
+                    let limit = limits.constraint.unwrap_or(0.0);
+                    return Err(format!("constraint {name} is violated by {:.2e} at {level} level, the limit is {limit:e}", monitor.max));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_climb_shows_in_the_slope_and_a_swing_does_not() {
+        let (mut climb, mut swing) = (Excursion::new(100.0), Excursion::new(100.0));
+        for i in 0..=10_000 {
+            let t = f64::from(i) * 0.01;
+            climb.see(t, 1e-3 * t);
+            swing.see(t, (t * 37.0).sin());
+        }
+        assert!((climb.slope() - 1e-3).abs() < 2e-5, "{}", climb.slope());
+        assert!((climb.trend().0 - 1e-3).abs() < 1e-9);
+        assert!(swing.slope().abs() < 1e-5, "{}", swing.slope());
+        assert!(swing.trend().0.abs() < 3.0 * swing.trend().1 + 1e-5);
+        assert_eq!(climb.max, 0.1);
+        assert!(climb.record.len() < 500 && climb.record.last() == Some(&[100.0, 0.1]));
+    }
+
+    #[test]
+    fn what_is_not_a_number_is_never_within_a_limit() {
+        let mut excursion = Excursion::new(1.0);
+        excursion.see(0.5, f64::NAN);
+        excursion.see(0.6, 0.0);
+        assert!(excursion.max.is_nan());
+    }
+}

@@ -1,0 +1,19 @@
+//! A run: the loop around a method, and what watches it.
+//!
+//! [`plan`] decides, [`march`] builds the marcher and goes from one output time to the next, [`sample`] reads off what there is to
+//! know at each, [`drift`] and [`trace`] keep bounded records of it, [`table`] writes it down.
+
+pub mod drift;
+pub mod march;
+pub mod methods;
+pub mod plan;
+pub mod sample;
+pub mod table;
+pub mod trace;
+
+pub use drift::{Drift, Limits};
+pub use march::{Outcome, Run, RunError, march};
+pub use methods::{METHODS, MethodId, MethodInfo, Stabilization};
+pub use plan::{Plan, Refusal, Request};
+pub use sample::{Sample, Sampler};
+pub use trace::Trace;

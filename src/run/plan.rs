@@ -1,0 +1,332 @@
+//! From a scene and what was asked for to a plan: method, step, stabilization, output times, and why.
+//!
+//! A pairing that makes no sense is refused here, before anything is computed, with the reason and an alternative.
+
+use super::methods::{MethodId, Stabilization};
+use crate::arithmetic::DoubleDouble;
+use crate::dynamics::kernel::Kernel;
+use crate::dynamics::{Mechanism, Time, tree};
+use crate::scene::Scene;
+use crate::stepping::Tolerance;
+
+/// What the user asked for; `None` leaves it to the plan.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Request {
+    /// Method.
+    pub method: Option<MethodId>,
+    /// Fixed step \[s\].
+    pub step: Option<f64>,
+    /// Relative tolerance.
+    pub rtol: Option<f64>,
+    /// Absolute tolerance.
+    pub atol: Option<f64>,
+    /// Horizon \[s\].
+    pub until: Option<f64>,
+    /// Output interval \[s\].
+    pub every: Option<f64>,
+    /// Stabilization.
+    pub stabilize: Option<Stabilization>,
+    /// Time constant of Baumgarte's term \[s\].
+    pub time_constant: Option<f64>,
+}
+
+/// Everything a run needs to know beside the mechanism.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// Method.
+    pub method: MethodId,
+    /// The step of a fixed-step method \[s\].
+    pub step: Option<f64>,
+    /// The tolerance of an adaptive method.
+    pub tolerance: Option<Tolerance>,
+    /// How the rows are kept.
+    pub stabilization: Stabilization,
+    /// Baumgarte's time constant \[s\]; `None`: five mean steps, measured by a pilot run.
+    pub time_constant: Option<f64>,
+    /// Horizon \[s\].
+    pub until: f64,
+    /// Output interval \[s\].
+    pub every: f64,
+    /// Rows after the first; the last may come early.
+    pub rows: u64,
+    /// Why this method, in one line, where it was not asked for.
+    pub why: Option<String>,
+    /// What was adjusted or left out, one line each.
+    pub notes: Vec<String>,
+}
+
+/// Why a request was refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{what}: {reason}\nhint: {alternative}")]
+pub struct Refusal {
+    /// True where the options contradict one another whatever the scene.
+    pub is_usage: bool,
+    /// The pairing or option.
+    pub what: String,
+    /// Why it makes no sense.
+    pub reason: String,
+    /// What to ask for instead.
+    pub alternative: String,
+}
+
+/// Most rows a run may write.
+pub const MAX_ROWS: f64 = 1e9;
+/// Runs of at least so many seconds are marched symplectically where that is possible.
+const LONG: f64 = 60.0;
+/// Steps beyond which a fixed step is not chosen unasked.
+const MANY_STEPS: f64 = 2e7;
+
+impl Plan {
+    /// Decides; see [`Plan::notes`] and [`Plan::why`] for what it decided by itself.
+    ///
+    /// # Errors
+    /// Options out of range, or a pairing of scene, method and stabilization that makes no sense.
+    pub fn new(scene: &Scene, mechanism: &Mechanism, request: &Request) -> Result<Self, Refusal> {
+        check_numbers(request)?;
+        let until = request.until.unwrap_or(scene.until);
+        let mut every = request.every.unwrap_or(scene.every).min(until);
+        let mut notes = Vec::new();
+        if request.every.is_some_and(|asked| asked > until) {
+            notes.push(format!("the output interval is cut to the horizon, {until} s"));
+        }
+        let rate = fastest_rate(scene, mechanism);
+        let (method, why) = match request.method {
+            Some(method) => (method, None),
+            None => {
+                let (method, why) = choose(mechanism, request, until, rate);
+                (method, Some(why))
+            }
+        };
+        let stabilization = pair(mechanism, method, request, &mut notes)?;
+        let (mut step, mut tolerance) = (None, None);
+        if method.is_adaptive() {
+            let relative = request.rtol.unwrap_or(1e-9);
+            tolerance = Some(Tolerance { relative, absolute: request.atol.unwrap_or(relative) });
+        } else {
+            step = Some(fixed_step(method, request, rate, until, &mut every, &mut notes)?);
+        }
+        let rows = (until / every * (1.0 - 1e-12)).ceil().max(1.0);
+        if rows > MAX_ROWS {
+            return Err(usage("--every", format!("{rows:.1e} rows would be written; at most {MAX_ROWS:.0e}"), "a longer output interval"));
+        }
+        Ok(Self {
+            method,
+            step,
+            tolerance,
+            stabilization,
+            time_constant: request.time_constant,
+            until,
+            every,
+            rows: rows as u64,
+            why,
+            notes,
+        })
+    }
+
+    /// Time of output row `row`: a product, never a repeated sum.
+    pub fn time(&self, row: u64) -> Time {
+        if row >= self.rows {
+            return Time::from(self.until);
+        }
+        match self.step {
+            // Rows of a fixed-step run lie on its steps, whose lengths are the double `step` itself.
+            Some(step) => DoubleDouble::product(step, (self.every / step).round() * row as f64),
+            None => DoubleDouble::product(self.every, row as f64),
+        }
+    }
+
+    /// The folder of its results: method, setting and stabilization.
+    pub fn folder(&self, mechanism: &Mechanism) -> String {
+        let setting = match (self.step, self.tolerance) {
+            (Some(step), _) => format!("{step}s"),
+            (None, Some(tolerance)) if tolerance.absolute != tolerance.relative => {
+                format!("{:e}-{:e}", tolerance.relative, tolerance.absolute)
+            }
+            (None, tolerance) => format!("{:e}", tolerance.unwrap_or_default().relative),
+        };
+        let keeps_rows = !mechanism.rows.is_empty() && !matches!(self.method, MethodId::Rattle(_));
+        if keeps_rows { format!("{}-{setting}-{}", self.method, self.stabilization) } else { format!("{}-{setting}", self.method) }
+    }
+}
+
+/// Every number asked for must be positive and finite; steps and tolerances must suit one another.
+fn check_numbers(request: &Request) -> Result<(), Refusal> {
+    let positive = [
+        ("--step", request.step, 1e12),
+        ("--until", request.until, 1e12),
+        ("--every", request.every, 1e12),
+        ("--time-constant", request.time_constant, 1e12),
+    ];
+    for (option, value, most) in positive {
+        if let Some(value) = value.filter(|&value| !(value > 0.0 && value <= most)) {
+            return Err(usage(
+                option,
+                format!("{value} is not a number of seconds above 0 and up to {most:e}"),
+                "give a positive number of seconds",
+            ));
+        }
+    }
+    for (option, value) in [("--rtol", request.rtol), ("--atol", request.atol)] {
+        if let Some(value) = value.filter(|&value| !(1e-15..=0.1).contains(&value)) {
+            return Err(usage(option, format!("{value:e} is not within 1e-15 to 0.1"), "1e-9 is a good beginning"));
+        }
+    }
+    if let (Some(method), true) = (request.method, request.rtol.is_some() || request.atol.is_some())
+        && !method.is_adaptive()
+    {
+        let reason = "a fixed-step symplectic method takes no tolerance: adapting the step destroys what it is for";
+        return Err(usage(&format!("{method} with a tolerance"), reason.into(), "give --step, or --method dop853 with the tolerance"));
+    }
+    if let (Some(method), Some(_)) = (request.method, request.step)
+        && method.is_adaptive()
+    {
+        let reason = "an adaptive method finds its own step";
+        return Err(usage(&format!("{method} with --step"), reason.into(), "give --rtol, or --method gauss16 with the step"));
+    }
+    if request.step.is_some() && (request.rtol.is_some() || request.atol.is_some()) {
+        return Err(usage("--step with a tolerance", "a method takes one or the other".into(), "leave one of them out"));
+    }
+    Ok(())
+}
+
+fn usage(what: &str, reason: String, alternative: &str) -> Refusal {
+    Refusal { is_usage: true, what: what.into(), reason, alternative: alternative.into() }
+}
+
+fn mismatch(what: String, reason: &str, alternative: &str) -> Refusal {
+    Refusal { is_usage: false, what, reason: reason.into(), alternative: alternative.into() }
+}
+
+/// The method for a scene nobody named one for.
+fn choose(mechanism: &Mechanism, request: &Request, until: f64, rate: f64) -> (MethodId, String) {
+    let tolerance = request.rtol.is_some() || request.atol.is_some();
+    let kept = request.stabilize.unwrap_or(Stabilization::Elimination);
+    let steps_back = !mechanism.rows.is_empty() && kept == Stabilization::Projection;
+    let fixed_possible = mechanism.contacts.is_empty() && !tolerance && (mechanism.rows.is_empty() || kept == Stabilization::Elimination);
+    if !mechanism.contacts.is_empty() {
+        (MethodId::Dp8, "dp8: the scene has walls, and impacts are located inside its steps".into())
+    } else if steps_back {
+        (MethodId::Dp8, "dp8: projection acts after every step, which ode_solvers does not let us do".into())
+    } else if fixed_possible && request.step.is_some() {
+        (MethodId::Gauss(8), "gauss16: a fixed step was given, and it is the most accurate fixed-step method".into())
+    } else if fixed_possible && !mechanism.is_damped() && until >= LONG && until * rate / 0.12 <= MANY_STEPS {
+        (MethodId::Gauss(8), format!("gauss16: over {until} s a symplectic method keeps the energy best"))
+    } else {
+        let why = if mechanism.is_damped() { "the scene is damped" } else { "the horizon is short" };
+        let why = if tolerance { "a tolerance was given" } else { why };
+        (MethodId::Dop853, format!("dop853: {why}, and it is the everyday choice"))
+    }
+}
+
+/// The stabilization of a pairing, or why there is none.
+fn pair(mechanism: &Mechanism, method: MethodId, request: &Request, notes: &mut Vec<String>) -> Result<Stabilization, Refusal> {
+    if !mechanism.contacts.is_empty() && !matches!(method, MethodId::Dp5 | MethodId::Dp8) {
+        let reason = match method {
+            MethodId::Dopri5 | MethodId::Dop853 => "ode_solvers does not let an impact be located inside its steps",
+            _ => "an impact inside a fixed step cannot be located without changing the step",
+        };
+        return Err(mismatch(format!("{method} on a scene with walls"), reason, "--method dp8, or dp5 at loose tolerances"));
+    }
+    if matches!(method, MethodId::Rattle(_)) && mechanism.is_damped() {
+        let reason = "RATTLE takes forces that depend on positions only, and a damper's does not";
+        return Err(mismatch(format!("{method} on a scene with dampers"), reason, "--method dop853, or gauss16 for a fixed step"));
+    }
+    if mechanism.rows.is_empty() {
+        if request.stabilize.is_some_and(|kind| kind != Stabilization::None) {
+            notes.push("the scene has no constraint: nothing to stabilize".into());
+        }
+        return Ok(Stabilization::None);
+    }
+    let Some(asked) = request.stabilize else {
+        return Ok(if matches!(method, MethodId::Rattle(_)) { Stabilization::Projection } else { Stabilization::Elimination });
+    };
+    match (method, asked) {
+        (MethodId::Rattle(_), Stabilization::Projection) => Ok(asked),
+        (MethodId::Rattle(_), _) => {
+            let reason = "RATTLE keeps every row at both levels by its own projection";
+            Err(mismatch(format!("{method} with --stabilize {asked}"), reason, "leave --stabilize out, or --method dp8"))
+        }
+        (MethodId::Gauss(_), Stabilization::None | Stabilization::Baumgarte | Stabilization::Projection) => {
+            let reason = "Gauss methods are symplectic in coordinates and momenta, where a motor's angle is eliminated";
+            Err(mismatch(format!("{method} with --stabilize {asked}"), reason, "--stabilize elimination, or --method dp8"))
+        }
+        (MethodId::Dopri5 | MethodId::Dop853, Stabilization::Projection) => {
+            let own = if method == MethodId::Dopri5 { "dp5" } else { "dp8" };
+            let reason = "projection acts after every accepted step, and ode_solvers owns its loop";
+            Err(mismatch(
+                format!("{method} with --stabilize projection"),
+                reason,
+                &format!("--method {own}, the same tableau in our own stepper"),
+            ))
+        }
+        _ => Ok(asked),
+    }
+}
+
+/// The step, and the output interval brought onto the steps.
+fn fixed_step(
+    method: MethodId,
+    request: &Request,
+    rate: f64,
+    until: f64,
+    every: &mut f64,
+    notes: &mut Vec<String>,
+) -> Result<f64, Refusal> {
+    let Some(asked) = request.step else {
+        let share = match method {
+            MethodId::Gauss(stages) => 0.015 * stages as f64,
+            MethodId::Rattle(composition) => 0.01 * f64::from(composition.order()),
+            _ => 0.01,
+        };
+        let intervals = (until / *every).round().max(1.0);
+        let whole = (until / *every - intervals).abs() <= 1e-9 * intervals;
+        if !whole {
+            *every = until / (until / *every).ceil();
+            notes.push(format!("the output interval is {every} s, so that the fixed steps end on the horizon"));
+        }
+        return Ok(*every / (*every * rate / share).ceil().max(1.0));
+    };
+    let steps = (until / asked).round();
+    if steps < 1.0 {
+        return Err(usage("--step", format!("{asked} s is longer than the horizon, {until} s"), "a shorter step"));
+    }
+    let step = if (until / asked - steps).abs() <= 1e-9 * steps { asked } else { until / (until / asked).ceil() };
+    if step != asked {
+        notes.push(format!("the step is {step} s instead of {asked} s, so that whole steps end on the horizon"));
+    }
+    let stride = (*every / step).round().max(1.0);
+    if (stride * step - *every).abs() > 1e-9 * *every {
+        notes.push(format!("the output interval is {} s instead of {every} s: whole steps", stride * step));
+    }
+    *every = stride * step;
+    Ok(step)
+}
+
+/// An upper estimate of the fastest rate of the scene \[rad/s\]: what the energy at the start allows the lightest part, gravity, springs and motors.
+fn fastest_rate(scene: &Scene, mechanism: &Mechanism) -> f64 {
+    let n = mechanism.bodies.len();
+    let start = mechanism.start(scene);
+    let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
+    let omega: Vec<f64> = start.omega.iter().map(|omega| omega.hi).collect();
+    let mut kernel = Kernel::<f64>::new(n, 0);
+    let energy = mechanism.energy(&mut kernel, &phi, &omega);
+    tree::factor::<f64, 0>(n, &mut kernel.mass, &mut kernel.pivot);
+    let lightest = kernel.pivot.iter().fold(0.0, |most: f64, &pivot| most.max(pivot));
+    let gravity: f64 = mechanism.tree.weight.iter().map(|weight| weight.norm_squared().sqrt()).sum();
+    let ground: f64 = mechanism.bodies.iter().map(|body| -body.mass * mechanism.gravity.dot(body.centre.root)).sum();
+    let available = (energy.total() - ground + gravity).max(0.0);
+    let springs: f64 = mechanism
+        .springs
+        .iter()
+        .map(|spring| spring.stiffness * spring.span.terms.iter().map(|term| term.1.norm_squared()).sum::<f64>())
+        .sum();
+    let drives: f64 = scene
+        .motors
+        .iter()
+        .map(|motor| {
+            motor.law.rate.abs() + motor.law.sines.iter().map(|sine| sine.frequency.abs() * (1.0 + sine.amplitude.abs())).sum::<f64>()
+        })
+        .sum();
+    let spinning = omega.iter().fold(0.0, |most: f64, omega| most.max(omega.abs()));
+    (((2.0 * available + gravity + springs) * lightest).sqrt()).max(spinning).max(1e-3) + drives
+}

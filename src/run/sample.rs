@@ -1,0 +1,130 @@
+//! What there is to know of a moment: positions, energies, constraints, motors.
+//!
+//! Energies and constraints are evaluated in double-double, so that what is reported is the run's drift and not the
+//! rounding of its measurement.
+
+use crate::arithmetic::{Complex, DoubleDouble, Scalar};
+use crate::dynamics::energy::Energy;
+use crate::dynamics::kernel::{Bias, Kernel};
+use crate::dynamics::row::{Posture, Row};
+use crate::dynamics::{Mechanism, Motion};
+use std::sync::Arc;
+
+/// One moment of a run.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sample {
+    /// Time \[s\].
+    pub t: f64,
+    /// Winding angles \[rad\].
+    pub phi: Vec<f64>,
+    /// Rates \[rad/s\].
+    pub omega: Vec<f64>,
+    /// Centres of mass (x, y) \[m\].
+    pub centre: Vec<[f64; 2]>,
+    /// Their velocities \[m/s\].
+    pub velocity: Vec<[f64; 2]>,
+    /// Kinetic and potential energy \[J\].
+    pub kinetic: f64,
+    /// Potential energy \[J\].
+    pub potential: f64,
+    /// Work of motors and dampers since the start \[J\].
+    pub work: f64,
+    /// Energy the stabilizer has put in \[J\].
+    pub stabilizer: f64,
+    /// (Energy - energy at the start - work - energy of impacts) / energy scale.
+    pub imbalance: f64,
+    /// Violation of each row, C and C'.
+    pub constraints: Vec<[f64; 2]>,
+    /// Torque \[N·m\] and power \[W\] of each motor.
+    pub motors: Vec<[f64; 2]>,
+}
+
+/// Takes samples.
+#[derive(Clone, Debug)]
+pub struct Sampler {
+    mechanism: Arc<Mechanism>,
+    plain: Kernel<f64>,
+    exact: Kernel<DoubleDouble>,
+    jacobian: Vec<DoubleDouble>,
+    phi: Vec<f64>,
+    omega: Vec<f64>,
+    /// Energy less work at the start, in full; impacts shift it.
+    reference: Option<DoubleDouble>,
+    sample: Sample,
+}
+
+impl Sampler {
+    /// A sampler; the first sample it takes is the reference of the energy balance.
+    pub fn new(mechanism: Arc<Mechanism>) -> Self {
+        let (n, rows) = (mechanism.bodies.len(), mechanism.rows.len());
+        Self {
+            plain: Kernel::new(n, rows),
+            exact: Kernel::new(n, 0),
+            jacobian: vec![DoubleDouble::ZERO; n],
+            phi: vec![0.0; n],
+            omega: vec![0.0; n],
+            reference: None,
+            sample: Sample {
+                phi: vec![0.0; n],
+                omega: vec![0.0; n],
+                centre: vec![[0.0; 2]; n],
+                velocity: vec![[0.0; 2]; n],
+                constraints: vec![[0.0; 2]; rows],
+                motors: vec![[0.0; 2]; rows],
+                ..Sample::default()
+            },
+            mechanism,
+        }
+    }
+
+    /// Shifts the reference by the energy an impact changed \[J\].
+    pub fn shift(&mut self, energy: DoubleDouble) {
+        if let Some(reference) = &mut self.reference {
+            *reference += energy;
+        }
+    }
+
+    /// Energy less work of a motion \[J\], in full.
+    pub fn balance(&mut self, motion: &Motion) -> DoubleDouble {
+        self.mechanism.energy(&mut self.exact, &motion.phi, &motion.omega).total() - motion.work
+    }
+
+    /// Samples a motion.
+    pub fn take(&mut self, motion: &Motion) -> &Sample {
+        let mechanism = &*self.mechanism;
+        let Energy { kinetic, potential } = mechanism.energy(&mut self.exact, &motion.phi, &motion.omega);
+        let balance = kinetic + potential - motion.work;
+        let reference = *self.reference.get_or_insert(balance);
+        for k in 0..mechanism.bodies.len() {
+            (self.phi[k], self.omega[k]) = (motion.phi[k].hi, motion.omega[k].hi);
+        }
+        self.plain.accelerate::<0>(mechanism, motion.time, &self.phi, &self.omega, Bias::default());
+        let sample = &mut self.sample;
+        sample.t = motion.time.hi;
+        sample.kinetic = kinetic.hi;
+        sample.potential = potential.hi;
+        sample.work = motion.work.hi;
+        sample.stabilizer = motion.stabilizer;
+        sample.imbalance = (balance - reference).hi / mechanism.energy_scale;
+        let both = |vector: Complex<f64>| [vector.re, vector.im];
+        for (k, body) in mechanism.bodies.iter().enumerate() {
+            sample.phi[k] = motion.unwrapped(k);
+            sample.omega[k] = self.omega[k];
+            sample.centre[k] = both(body.centre.position(&self.plain.z));
+            sample.velocity[k] = both(body.centre.velocity(&self.plain.z, &self.omega));
+        }
+        for (r, row) in mechanism.rows.iter().enumerate() {
+            self.jacobian.fill(DoubleDouble::ZERO);
+            let posture = Posture { phi: &motion.phi, z: &self.exact.z, omega: &motion.omega };
+            let here = row.linearise(motion.time, posture, &mut self.jacobian);
+            let rate = self.jacobian.iter().zip(&motion.omega).fold(here.drive, |sum, (&g, &w)| sum + g * w);
+            sample.constraints[r] = [here.position.hi, rate.hi];
+            let torque = -self.plain.multiplier[r];
+            sample.motors[r] = match row {
+                Row::Angle(_) => [torque, -torque * here.drive.hi],
+                Row::Line(_) => [0.0, 0.0],
+            };
+        }
+        sample
+    }
+}

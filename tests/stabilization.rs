@@ -1,0 +1,42 @@
+//! The same scene under every stabilization, by every method that takes it.
+
+mod common;
+
+use common::shipped;
+use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Stabilization, march};
+use std::sync::Arc;
+
+fn run(scene: &str, request: &Request) -> Outcome {
+    let scene = shipped(scene, &[]);
+    let mechanism = common::compile(&scene);
+    let plan = Plan::new(&scene, &mechanism, request).expect("a sensible pairing");
+    let start = mechanism.start(&scene);
+    let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).expect("a beginning");
+    let outcome = march(run, &mut |_| Ok(())).expect("no observer fails");
+    assert_eq!(outcome.stop, None);
+    outcome
+}
+
+fn request(method: MethodId, stabilize: Stabilization) -> Request {
+    Request { method: Some(method), stabilize: Some(stabilize), until: Some(3.0), every: Some(0.1), ..Request::default() }
+}
+
+#[test]
+fn the_same_scene_run_all_four_ways_agrees() {
+    for scene in ["motor", "motor_sine"] {
+        let reference = run(scene, &Request { rtol: Some(1e-13), ..request(MethodId::Dp8, Stabilization::Elimination) }).last;
+        for method in [MethodId::Dp8, MethodId::Dp5, MethodId::Dop853, MethodId::Dopri5] {
+            for stabilize in Stabilization::ALL {
+                if stabilize == Stabilization::Projection && matches!(method, MethodId::Dop853 | MethodId::Dopri5) {
+                    continue;
+                }
+                let outcome = run(scene, &Request { rtol: Some(1e-9), ..request(method, stabilize) });
+                for k in 0..2 {
+                    let error = (outcome.last.phi[k] - reference.phi[k]).abs();
+
+                    assert!(error < 1e-6, "{scene} {method} {stabilize}: {error:e}");
+                }
+            }
+        }
+    }
+}
