@@ -8,6 +8,7 @@ pub mod march;
 pub mod methods;
 pub mod plan;
 pub mod sample;
+#[cfg(feature = "files")]
 pub mod table;
 pub mod trace;
 
