@@ -1,0 +1,196 @@
+//! Coefficients of Gauss collocation, computed once in double-double.
+//!
+//! ```text
+//! c_i   = (1 + x_i)/2 with P_s(x_i) = 0,      b_i = 1/((1 - x_i²) P_s'(x_i)²)
+//! a_ij  = ∫_0^c_i l_j,    l_j(c_k) = delta_jk     (by the method's own quadrature, exact for degree 2s - 1)
+//! mu_ij = a_ij/b_j = 1/2 + sigma_ij,      nu_ij = (1/b_j) ∫_1^(1+c_i) l_j
+//! ```
+//!
+//! Symplectic is `mu_ij + mu_ji = 1`, symmetric in time is `mu_ij = mu_(s+1-j)(s+1-i)`.  Both hold to the last bit for the stored `sigma`:
+//! each is rounded once, from the entry on whose images under the two rules it is copied with its sign.
+//!
+//! Source: E. Hairer, C. Lubich, G. Wanner, *Geometric Numerical Integration*, 2nd ed. (2006), sections II.1.3 (Gauss), IV.2 (theorem 2.2),
+//! V.2 (symmetry); nodes and weights: M. Abramowitz, I. Stegun, *Handbook of Mathematical Functions* (1964), 25.4.29.
+
+use crate::arithmetic::{DoubleDouble, Scalar};
+
+/// Nodes, weights and matrices of one Gauss method of s stages.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Tableau {
+    /// c (s), rising, in (0, 1).
+    pub nodes: Vec<DoubleDouble>,
+    /// b (s), positive.
+    pub weights: Vec<DoubleDouble>,
+    /// sigma (s × s), antisymmetric, and symmetric about the other diagonal.
+    pub skew: Vec<f64>,
+    /// nu (s × s): the collocation polynomial of one step carried on over the next.
+    pub forecast: Vec<f64>,
+}
+
+impl Tableau {
+    /// The method of `stages` stages.
+    pub fn new(stages: usize) -> Self {
+        let (nodes, weights) = quadrature(stages);
+        let mut skew = vec![0.0; stages * stages];
+        let mut forecast = vec![0.0; stages * stages];
+        for i in 0..stages {
+            for j in 0..stages {
+                forecast[i * stages + j] = (integral(&nodes, &weights, j, DoubleDouble::ONE, nodes[i]) / weights[j]).hi;
+                // One of each set of four images is rounded, the other three are copies.
+                let (mirror_i, mirror_j) = (stages - 1 - i, stages - 1 - j);
+                if i > j && i + j < stages {
+                    let mu = integral(&nodes, &weights, j, DoubleDouble::ZERO, nodes[i]) / weights[j];
+                    let sigma = (mu - DoubleDouble::of(0.5)).hi;
+                    skew[i * stages + j] = sigma;
+                    skew[j * stages + i] = -sigma;
+                    skew[mirror_j * stages + mirror_i] = sigma;
+                    skew[mirror_i * stages + mirror_j] = -sigma;
+                }
+            }
+        }
+        Self { nodes, weights, skew, forecast }
+    }
+}
+
+/// Nodes and weights on [0, 1].
+fn quadrature(stages: usize) -> (Vec<DoubleDouble>, Vec<DoubleDouble>) {
+    let (mut nodes, mut weights) = (vec![DoubleDouble::of(0.5); stages], vec![DoubleDouble::ZERO; stages]);
+    let s = stages as f64;
+    for i in 0..stages.div_ceil(2) {
+        // Tricomi's estimate of the root, then Newton; each iteration doubles the digits.
+        let mut x = DoubleDouble::of(libm::cos(std::f64::consts::PI * (i as f64 + 0.75) / (s + 0.5)));
+        if 2 * i + 1 == stages {
+            x = DoubleDouble::ZERO;
+        }
+        for _ in 0..8 {
+            let (p, slope) = legendre(stages, x);
+            x -= p / slope;
+        }
+        let (_, slope) = legendre(stages, x);
+        let weight = DoubleDouble::ONE / ((DoubleDouble::ONE - x * x) * slope * slope);
+        (nodes[i], nodes[stages - 1 - i]) = ((DoubleDouble::ONE - x).ldexp(0.5), (DoubleDouble::ONE + x).ldexp(0.5));
+        (weights[i], weights[stages - 1 - i]) = (weight, weight);
+    }
+    (nodes, weights)
+}
+
+/// P_s and P_s' at `x`, by Bonnet's recurrence.
+fn legendre(s: usize, x: DoubleDouble) -> (DoubleDouble, DoubleDouble) {
+    let (mut before, mut p) = (DoubleDouble::ONE, x);
+    for k in 2..=s {
+        let k = k as f64;
+        (before, p) = (p, ((x * p).scale(2.0 * k - 1.0) - before.scale(k - 1.0)) / DoubleDouble::of(k));
+    }
+    (p, (before - x * p).scale(s as f64) / (DoubleDouble::ONE - x * x))
+}
+
+/// The integral of l_j from `from` to `from + length`.
+fn integral(nodes: &[DoubleDouble], weights: &[DoubleDouble], j: usize, from: DoubleDouble, length: DoubleDouble) -> DoubleDouble {
+    let lagrange = |x: DoubleDouble| {
+        let others = (0..nodes.len()).filter(|&k| k != j);
+        others.fold(DoubleDouble::ONE, |product, k| product * ((x - nodes[k]) / (nodes[j] - nodes[k])))
+    };
+    length * nodes.iter().zip(weights).fold(DoubleDouble::ZERO, |sum, (&c, &b)| sum + b * lagrange(from + length * c))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Bound on every identity below; the pair carries 1.2e-32.
+    const TINY: f64 = 1e-30;
+
+    fn power(x: DoubleDouble, k: usize) -> DoubleDouble {
+        (0..k).fold(DoubleDouble::ONE, |product, _| product * x)
+    }
+
+    fn reciprocal(k: usize) -> DoubleDouble {
+        DoubleDouble::ONE / DoubleDouble::of(k as f64)
+    }
+
+    fn a(tableau: &Tableau, i: usize, j: usize) -> DoubleDouble {
+        integral(&tableau.nodes, &tableau.weights, j, DoubleDouble::ZERO, tableau.nodes[i])
+    }
+
+    #[test]
+    fn weights_integrate_every_power_up_to_twice_the_stages() {
+        for s in 2..=8 {
+            let tableau = Tableau::new(s);
+            let quadrature =
+                |k: usize| tableau.nodes.iter().zip(&tableau.weights).fold(DoubleDouble::ZERO, |sum, (&c, &b)| sum + b * power(c, k - 1));
+            for k in 1..=2 * s {
+                assert!((quadrature(k) - reciprocal(k)).hi.abs() < TINY, "B({k}) of s = {s}");
+            }
+            let short = (quadrature(2 * s + 1) - reciprocal(2 * s + 1)).hi.abs();
+            assert!(short > 1e-12, "s = {s} must not reach order 2s + 1: {short:e}");
+        }
+    }
+
+    #[test]
+    fn stages_integrate_every_power_up_to_the_stages() {
+        for s in 2..=8 {
+            let tableau = Tableau::new(s);
+            for i in 0..s {
+                for k in 1..=s {
+                    let sum = (0..s).fold(DoubleDouble::ZERO, |sum, j| sum + a(&tableau, i, j) * power(tableau.nodes[j], k - 1));
+                    let exact = power(tableau.nodes[i], k) * reciprocal(k);
+                    assert!((sum - exact).hi.abs() < TINY, "C({k}), row {i} of s = {s} (k = 1: row sum)");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_exact_coefficients_are_symplectic() {
+        for s in 2..=8 {
+            let tableau = Tableau::new(s);
+            let b = &tableau.weights;
+            for i in 0..s {
+                for j in 0..s {
+                    let defect = b[i] * a(&tableau, i, j) + b[j] * a(&tableau, j, i) - b[i] * b[j];
+                    assert!(defect.hi.abs() < TINY, "b_i a_ij + b_j a_ji = b_i b_j at {i}, {j} of s = {s}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_stored_coefficients_are_symplectic_and_symmetric_to_the_last_bit() {
+        for s in 2..=8 {
+            let tableau = Tableau::new(s);
+            for i in 0..s {
+                assert_eq!(tableau.skew[i * s + i], 0.0, "mu_ii = 1/2");
+                for j in 0..s {
+                    let (sigma, mirror) = (tableau.skew[i * s + j], tableau.skew[(s - 1 - j) * s + s - 1 - i]);
+                    assert_eq!(sigma, -tableau.skew[j * s + i]);
+                    assert_eq!(sigma, mirror);
+                    let mu = a(&tableau, i, j) / tableau.weights[j];
+                    assert!((DoubleDouble::of(0.5) + sigma - mu).hi.abs() < 1.2e-16, "mu at {i}, {j} of s = {s}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_forecast_carries_polynomials_on() {
+        for s in 2..=8 {
+            let tableau = Tableau::new(s);
+            for i in 0..s {
+                for k in 1..=s {
+                    let sum = (0..s)
+                        .fold(0.0, |sum, j| sum + tableau.forecast[i * s + j] * (tableau.weights[j] * power(tableau.nodes[j], k - 1)).hi);
+                    let exact = ((power(DoubleDouble::ONE + tableau.nodes[i], k) - DoubleDouble::ONE) * reciprocal(k)).hi;
+                    assert!((sum - exact).abs() < 1e-10 * exact, "degree {k}, row {i} of s = {s}: {sum} for {exact}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn two_stages_are_the_textbook_ones() {
+        // Hammer and Hollingsworth (1955): c = 1/2 ∓ √3/6, a_12 = 1/4 - √3/6.
+        let (tableau, root) = (Tableau::new(2), DoubleDouble::of(3.0).sqrt() / DoubleDouble::of(6.0));
+        assert!((tableau.nodes[0] - (DoubleDouble::of(0.5) - root)).hi.abs() < TINY);
+        assert!((a(&tableau, 0, 1) - (DoubleDouble::of(0.25) - root)).hi.abs() < TINY);
+    }
+}
