@@ -36,6 +36,7 @@ pub mod impact;
 pub mod kernel;
 pub mod law;
 pub mod multiplier;
+pub mod natural;
 pub mod point;
 pub mod reaction;
 pub mod row;

@@ -4,6 +4,9 @@
 //! problem is a type parameter: Dormand–Prince and Gauss are `Method<F: Field>`, RATTLE is `Method<Natural>`, so a wrong pairing does
 //! not compile.
 
+pub mod composition;
+pub mod rattle;
+
 use crate::dynamics::{State, Time};
 
 /// Counts of one run.
