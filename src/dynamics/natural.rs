@@ -20,7 +20,7 @@
 use super::law::Law;
 use super::row::Row;
 use super::{Form, Mechanism, Motion, State, Time, tree};
-use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
+use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use std::sync::Arc;
 
 /// The largest number of bodies; every step costs a factorization of a full matrix with a row per body and motor.

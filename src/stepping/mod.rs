@@ -4,7 +4,18 @@
 //! problem is a type parameter: Dormand–Prince and Gauss are `Method<F: Field>`, RATTLE is `Method<Natural>`, so a wrong pairing does
 //! not compile.
 
+pub mod composition;
+pub mod dp5;
+pub mod dp8;
+pub mod explicit;
 pub mod gauss;
+pub mod rattle;
+pub mod windows;
+
+pub use dp5::Dp5;
+pub use dp8::Dp8;
+pub use explicit::Tolerance;
+pub use windows::{Dop853, Dopri5};
 
 use crate::dynamics::{State, Time};
 
