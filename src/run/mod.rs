@@ -13,7 +13,7 @@ pub mod table;
 pub mod trace;
 
 pub use drift::{Drift, Limits};
-pub use march::{Outcome, Run, RunError, march};
+pub use march::{Outcome, Run, RunError, march, simulate};
 pub use methods::{METHODS, MethodId, MethodInfo, Stabilization};
 pub use plan::{Plan, Refusal, Request};
 pub use sample::{Sample, Sampler};
