@@ -93,6 +93,5 @@ pub fn constraint_drift(chart: &ConstraintDrift, px_per_pt: f64) -> Result<Pictu
             [240.0, 160.0],
         )?;
     }
-    drop(panels);
     Ok(sheet.picture(&chart.title, &caption))
 }

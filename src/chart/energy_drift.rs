@@ -88,7 +88,6 @@ pub fn energy_drift(chart: &EnergyDrift, px_per_pt: f64) -> Result<Picture, Char
         panel.empty("no data")?;
     }
     panel.end_labels(&ends, false)?;
-    drop(panels);
     Ok(sheet.picture(&chart.title, &chart.caption))
 }
 

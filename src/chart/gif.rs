@@ -96,6 +96,6 @@ impl Encoder {
 
     /// The file.
     pub(crate) fn finish(self) -> Result<Vec<u8>, ChartError> {
-        self.gif.into_inner().map_err(|source| ChartError::Gif(source.into()))
+        self.gif.into_inner().map_err(ChartError::Gif)
     }
 }

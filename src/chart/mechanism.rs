@@ -65,7 +65,5 @@ pub fn mechanism(chart: &MechanismChart, px_per_pt: f64) -> Result<Picture, Char
     } else {
         panel.empty("no data")?;
     }
-    drop(pencil);
-    drop(panel);
     Ok(sheet.picture(&chart.title, &chart.caption))
 }
