@@ -56,7 +56,7 @@ pub fn energy_drift(chart: &EnergyDrift, px_per_pt: f64) -> Result<Picture, Char
 
     let times = || lines.iter().flatten().map(|p| p[0]);
     let x = if chart.log_time { Axis::log_tight("time [s]", times()) } else { Axis::tight("time [s]", times()) };
-    let y = Axis::decades(&format!("largest relative {} error", chart.quantity), lines.iter().flatten().map(|p| p[1]));
+    let y = Axis::decades(&format!("largest relative error of {}", chart.quantity), lines.iter().flatten().map(|p| p[1]));
     let y = with_rounding_unit(y);
     let right = label_room(&sheet, labels.iter().map(String::as_str), false);
     let panels = stacked(&sheet, under, &x, vec![y], right)?;

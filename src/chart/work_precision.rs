@@ -76,6 +76,9 @@ pub fn work_precision(chart: &WorkPrecision, px_per_pt: f64) -> Result<Picture, 
     let mut occupied = Occupied::default();
     let band: Vec<Point> = front(all()).iter().map(at).collect();
     sheet.line(&band, &Pen::new(mix(ORANGE, WHITE, 0.72), FRONT))?;
+    for side in [-4.0, 0.0, 4.0] {
+        occupied.line(&band.iter().map(|p| [p[0] + side, p[1] + side]).collect::<Vec<_>>());
+    }
     if let [only] = band[..] {
         sheet.disc(only, 0.5 * FRONT, mix(ORANGE, WHITE, 0.72))?;
     }
@@ -156,7 +159,7 @@ fn curve(sheet: &Sheet, panel: &Panel, points: &[Point], mark: &Mark, occupied: 
 fn beside(sheet: &Sheet, panel: &Panel, at: Point, words: &str, colour: Colour, occupied: &mut Occupied) -> Result<(), ChartError> {
     let size = [sheet.width(words, NOTE, false), 0.8 * NOTE];
     let [left, top, right, bottom] = panel.bounds;
-    let (bounds, _) = place(at, 6.0, size, [left, top, right + 20.0, bottom], &[], occupied);
+    let (bounds, _) = place(at, 6.5, size, [left, top, right + 20.0, bottom], &[], occupied);
     occupied.block(bounds);
     let lettering = Lettering { halo: true, ..note(colour, Align::Left, Level::Middle) };
     sheet.words(words, lettering, [bounds[0], 0.5 * (bounds[1] + bounds[3])])
