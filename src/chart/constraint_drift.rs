@@ -1,7 +1,7 @@
 //! Constraint drift: how far each constraint is off, at the level of positions and of velocities, side by side.
 
 use super::axis::Axis;
-use super::energy_drift::{DriftSeries, draw, drift_axis, label};
+use super::energy_drift::{DriftSeries, draw, drift_axis, is_zero, label};
 use super::file::Picture;
 use super::grid::{beside, label_room};
 use super::lines::{Point, running_maximum};
@@ -53,7 +53,7 @@ pub fn constraint_drift(chart: &ConstraintDrift, px_per_pt: f64) -> Result<Pictu
         let highest = lines.iter().flatten().map(|p| p[1]).filter(|v| v.is_finite()).fold(0.0, f64::max);
         let starts = lines.iter().filter_map(|line| line.iter().map(|p| p[1]).find(|&v| v > 0.0)).fold(highest, f64::min);
         let samples = panel.series.iter().flat_map(|s| &s.error).map(|e| e.abs()).filter(|&e| e > 0.03 * starts && e <= highest);
-        (x, drift_axis(&panel.name, samples.chain([starts])))
+        (x, drift_axis(&panel.name, samples.chain([starts]), lines.iter().any(|line| is_zero(line))))
     });
     let words: Vec<Vec<String>> = (chart.panels.iter().zip(&all))
         .map(|(panel, lines)| panel.series.iter().zip(lines).map(|(series, line)| label(&sheet, &series.name, line)).collect())
@@ -95,8 +95,8 @@ pub fn constraint_drift(chart: &ConstraintDrift, px_per_pt: f64) -> Result<Pictu
 
 /// Says above the lower edge of a panel without end labels whose markers lie on it.
 fn zeros(sheet: &Sheet, panel: &Panel, data: &DefectPanel, lines: &[Vec<Point>]) -> Result<(), ChartError> {
-    let zero = |line: &Vec<Point>| !line.is_empty() && line.iter().all(|p| p[1] == 0.0);
-    let names: Vec<&str> = data.series.iter().zip(lines).filter(|(_, line)| zero(line)).map(|(series, _)| series.name.as_str()).collect();
+    let names: Vec<&str> =
+        data.series.iter().zip(lines).filter(|(_, line)| is_zero(line)).map(|(series, _)| series.name.as_str()).collect();
     if names.is_empty() {
         return Ok(());
     }

@@ -102,8 +102,8 @@ pub(crate) fn running_maximum(time: &[f64], values: &[f64]) -> Vec<Point> {
             continue;
         }
         largest = largest.max(value.abs());
-        // Within a level only its ends are needed.
-        let level = out.len() >= 2 && out[out.len() - 1][1] == largest && out[out.len() - 2][1] == largest;
+        // Within a level only its ends are needed, and its first positive time, where a logarithmic axis begins.
+        let level = out.len() >= 2 && out[out.len() - 1][1] == largest && out[out.len() - 2][1] == largest && out[out.len() - 2][0] > 0.0;
         match out.last_mut() {
             Some(end) if level => end[0] = t,
             _ => out.push([t, largest]),
@@ -176,6 +176,8 @@ mod tests {
     fn a_running_maximum_never_falls_and_skips_gaps() {
         let line = running_maximum(&[0.0, 1.0, 2.0, 3.0, 4.0], &[0.0, -2.0, f64::NAN, 1.0, 3.0]);
         assert_eq!(line, [[0.0, 0.0], [1.0, 2.0], [3.0, 2.0], [4.0, 3.0]]);
+        let level = running_maximum(&[0.0, 1.0, 2.0, 3.0, 4.0], &[5.0; 5]);
+        assert_eq!(level, [[0.0, 5.0], [1.0, 5.0], [4.0, 5.0]], "a level keeps its first positive time");
     }
 
     #[test]
