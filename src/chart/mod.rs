@@ -1,1 +1,93 @@
-//! Charts.
+//! Charts: plain data in, pictures out, drawn off-screen.
+//!
+//! Each chart is a struct of plain rows and a function that turns it into a [`Picture`] (or an [`Animation`]).  Nothing is run or
+//! read here.  The pictures are drawn with plotters on a canvas of our own ([`canvas`] says why); fonts are part of the program.
+//!
+//! Sizes are points of 1/72 inch; one number, pixels per point, sets the resolution.  Every string may carry a small markup,
+//! `*italic*`, `_{below}`, `^{above}`; [`plain`] protects names that come from outside.
+//!
+//! | chart | data | shows |
+//! | --- | --- | --- |
+//! | [`mechanism()`] | [`MechanismChart`] | a pose, earlier poses, paths of points |
+//! | [`angles()`] | [`Angles`] | angles of bars against time |
+//! | [`energy_drift()`] | [`EnergyDrift`] | largest relative energy error so far |
+//! | [`constraint_drift()`] | [`ConstraintDrift`] | defects of constraints, positions beside velocities |
+//! | [`torque_power()`] | [`TorquePower`] | torque above power of motors |
+//! | [`motion_gif()`] | [`MotionGif`] | the mechanism in motion |
+
+mod angles;
+mod axis;
+mod canvas;
+mod constraint_drift;
+mod energy_drift;
+mod file;
+mod gif;
+mod grid;
+mod labels;
+mod lines;
+mod mechanism;
+mod motion;
+mod palette;
+mod panel;
+mod sheet;
+mod sketch;
+mod text;
+mod ticks;
+mod torque_power;
+mod view;
+
+pub use angles::{AngleSeries, Angles, angles};
+pub use constraint_drift::{ConstraintDrift, DefectPanel, constraint_drift};
+pub use energy_drift::{DriftSeries, EnergyDrift, energy_drift};
+pub use file::Picture;
+pub use mechanism::{MechanismChart, mechanism};
+pub use motion::{Animation, MotionGif, motion_gif};
+pub use sketch::{HingeSketch, MotorPose, Pose, Sketch, SpringSketch, WallSketch};
+pub use text::{TextBox, plain, unmarked};
+pub use torque_power::{MotorSeries, TorquePower, torque_power};
+
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Pixels per point of charts in files: pages 480 pt wide become 1920 px.
+pub const FILE_RESOLUTION: f64 = 4.0;
+
+/// Width and height of a usual chart \[pt\].
+const PAGE: [f64; 2] = [480.0, 300.0];
+
+/// Why there is no chart.
+#[derive(Debug, Error)]
+pub enum ChartError {
+    /// The resolution makes no picture.
+    #[error("no chart has {px_per_pt} pixels per point; use 0.1 to 20, or 4 for files")]
+    Resolution {
+        /// What was asked for.
+        px_per_pt: f64,
+    },
+    /// A font inside the program cannot be read.
+    #[error("a font inside the program is damaged")]
+    Font,
+    /// The drawing library gave up.
+    #[error("drawing a chart failed: {0}")]
+    Drawing(String),
+    /// The PNG encoder gave up.
+    #[error("encoding a PNG picture failed: {0}")]
+    Png(#[from] png::EncodingError),
+    /// The GIF encoder gave up.
+    #[error("encoding a GIF animation failed: {0}")]
+    Gif(#[from] ::gif::EncodingError),
+    /// The file cannot be written.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}
+
+impl<E: std::error::Error + Send + Sync> From<plotters::drawing::DrawingAreaErrorKind<E>> for ChartError {
+    fn from(error: plotters::drawing::DrawingAreaErrorKind<E>) -> Self {
+        ChartError::Drawing(error.to_string())
+    }
+}

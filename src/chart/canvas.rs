@@ -1,0 +1,329 @@
+//! A drawing backend for plotters with smooth edges.
+//!
+//! The bitmap backend of plotters fills thick lines as one polygon by the even-odd rule (holes where a line crosses itself), rounds
+//! widths and circles to whole pixels and needs fonts of the system.  This one draws with tiny-skia instead.  Plotters speaks in whole
+//! numbers; one of its units is 1/100 pt here, so widths and curves stay fine.
+
+use super::ChartError;
+use super::palette::{Colour, WHITE};
+use super::text::{Align, CAP_HEIGHT, Fonts, Lettering, Level, TextBox};
+use plotters::style::FontTransform;
+use plotters::style::text_anchor::{HPos, VPos};
+use plotters_backend::{BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingBackend, DrawingErrorKind};
+use std::convert::Infallible;
+use tiny_skia::{Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Rect, Stroke, Transform};
+
+/// Units of the backend in a point of 1/72 inch.
+pub(crate) const UNITS: f64 = 100.0;
+
+/// White rim of words that lie on lines \[pt\].
+const HALO: f64 = 1.2;
+
+/// A page of pixels.
+pub(crate) struct Canvas {
+    pixels: Pixmap,
+    /// Width and height \[pt\].
+    size: [f64; 2],
+    /// Pixels per point.
+    scale: f64,
+    fonts: Fonts,
+    texts: Vec<TextBox>,
+}
+
+impl Canvas {
+    /// A white page of `size` \[pt\].
+    pub(crate) fn new(size: [f64; 2], px_per_pt: f64) -> Result<Self, ChartError> {
+        if !(0.1..=20.0).contains(&px_per_pt) {
+            return Err(ChartError::Resolution { px_per_pt });
+        }
+        let side = |points: f64| (points * px_per_pt).round().max(1.0) as u32;
+        let mut pixels = Pixmap::new(side(size[0]), side(size[1])).ok_or(ChartError::Resolution { px_per_pt })?;
+        pixels.fill(Color::WHITE);
+        Ok(Canvas { pixels, size, scale: px_per_pt, fonts: Fonts::new()?, texts: Vec::new() })
+    }
+
+    /// Width and height \[px\].
+    pub(crate) fn dimensions(&self) -> (u32, u32) {
+        (self.pixels.width(), self.pixels.height())
+    }
+
+    /// Red, green and blue of each pixel, row by row.
+    pub(crate) fn rgb(&self) -> Vec<u8> {
+        self.pixels.data().as_chunks::<4>().0.iter().flat_map(|&[red, green, blue, _]| [red, green, blue]).collect()
+    }
+
+    /// Copies a picture drawn before; sizes must agree.
+    pub(crate) fn restore(&mut self, rgb: &[u8]) {
+        for (to, from) in self.pixels.data_mut().as_chunks_mut::<4>().0.iter_mut().zip(rgb.as_chunks::<3>().0) {
+            to[..3].copy_from_slice(from);
+        }
+    }
+
+    /// The words drawn so far.
+    pub(crate) fn texts(&self) -> &[TextBox] {
+        &self.texts
+    }
+
+    pub(crate) fn fonts(&self) -> &Fonts {
+        &self.fonts
+    }
+
+    /// Draws words with their anchor at `at` \[pt\].
+    pub(crate) fn words(&mut self, text: &str, style: &Lettering, at: [f64; 2]) {
+        let (outline, width) = self.fonts.outline(text, style.size, style.bold);
+        let left = match style.align {
+            Align::Left => 0.0,
+            Align::Centre => -0.5 * width,
+            Align::Right => -width,
+        };
+        let cap = CAP_HEIGHT * style.size;
+        let down = match style.level {
+            Level::Baseline => 0.0,
+            Level::Middle => 0.5 * cap,
+            Level::Top => cap,
+        };
+        let (sin, cos) = (-style.angle).sin_cos();
+        let turn = |x: f64, y: f64| [at[0] + cos * x - sin * y, at[1] + sin * x + cos * y];
+        let corners = [turn(left, down), turn(left + width, down), turn(left + width, down - cap), turn(left, down - cap)];
+        self.texts.push(TextBox { text: text.to_owned(), corners, colour: [style.colour.0, style.colour.1, style.colour.2] });
+        let Some(outline) = outline else { return };
+        let origin = turn(left, down);
+        let k = self.scale;
+        let place = Transform::from_row(
+            (k * cos) as f32,
+            (k * sin) as f32,
+            (-k * sin) as f32,
+            (k * cos) as f32,
+            (k * origin[0]) as f32,
+            (k * origin[1]) as f32,
+        );
+        if style.halo {
+            let rim = Stroke { width: 2.0 * HALO as f32, line_join: LineJoin::Round, ..Stroke::default() };
+            self.pixels.stroke_path(&outline, &paint(WHITE, 1.0), &rim, place, None);
+        }
+        self.pixels.fill_path(&outline, &paint(style.colour, 1.0), FillRule::Winding, place, None);
+    }
+
+    /// Pixels from backend units.
+    fn px(&self, units: f64) -> f32 {
+        (units / UNITS * self.scale) as f32
+    }
+
+    fn place(&self, (x, y): BackendCoord) -> (f32, f32) {
+        (self.px(f64::from(x)), self.px(f64::from(y)))
+    }
+
+    fn fill(&mut self, path: Option<Path>, colour: BackendColor) {
+        if let Some(path) = path {
+            self.pixels.fill_path(&path, &backend_paint(colour), FillRule::Winding, Transform::identity(), None);
+        }
+    }
+
+    fn stroke(&mut self, path: Option<Path>, colour: BackendColor, width: u32, cap: LineCap) {
+        if let Some(path) = path {
+            let stroke = Stroke { width: self.px(f64::from(width)), line_cap: cap, line_join: LineJoin::Round, ..Stroke::default() };
+            self.pixels.stroke_path(&path, &backend_paint(colour), &stroke, Transform::identity(), None);
+        }
+    }
+
+    /// A horizontal or vertical line: whole pixels and flat ends keep grids crisp.
+    fn rule(&mut self, (from, to): (BackendCoord, BackendCoord), colour: BackendColor, width: u32) {
+        let ((x0, y0), (x1, y1)) = (self.place(from), self.place(to));
+        let width = self.px(f64::from(width)).round().max(1.0);
+        let odd = width % 2.0 == 1.0;
+        let snap = |middle: f32| if odd { middle.floor() - 0.5 * (width - 1.0) } else { middle.round() - 0.5 * width };
+        let rect = if from.1 == to.1 {
+            Rect::from_xywh(x0.min(x1), snap(y0), (x1 - x0).abs(), width)
+        } else {
+            Rect::from_xywh(snap(x0), y0.min(y1), width, (y1 - y0).abs())
+        };
+        self.fill(rect.map(PathBuilder::from_rect), colour);
+    }
+
+    fn outline(&self, points: impl IntoIterator<Item = BackendCoord>, closed: bool) -> Option<Path> {
+        let mut path = PathBuilder::new();
+        let mut last: Option<(f32, f32)> = None;
+        let mut skipped = None;
+        for point in points {
+            let (x, y) = self.place(point);
+            match last {
+                None => path.move_to(x, y),
+                // Points nearer than a quarter of a pixel add joints, not shape.
+                Some((a, b)) if (x - a).hypot(y - b) < 0.25 => {
+                    skipped = Some((x, y));
+                    continue;
+                }
+                Some(_) => path.line_to(x, y),
+            }
+            skipped = None;
+            last = Some((x, y));
+        }
+        if let Some((x, y)) = skipped {
+            path.line_to(x, y);
+        }
+        if closed {
+            path.close();
+        }
+        path.finish()
+    }
+}
+
+fn paint(colour: Colour, alpha: f64) -> Paint<'static> {
+    let mut paint = Paint::default();
+    paint.set_color_rgba8(colour.0, colour.1, colour.2, (alpha.clamp(0.0, 1.0) * 255.0).round() as u8);
+    paint
+}
+
+fn backend_paint(colour: BackendColor) -> Paint<'static> {
+    paint(plotters::style::RGBColor(colour.rgb.0, colour.rgb.1, colour.rgb.2), colour.alpha)
+}
+
+type Drawn = Result<(), DrawingErrorKind<Infallible>>;
+
+impl DrawingBackend for Canvas {
+    type ErrorType = Infallible;
+
+    fn get_size(&self) -> (u32, u32) {
+        ((self.size[0] * UNITS).round() as u32, (self.size[1] * UNITS).round() as u32)
+    }
+
+    fn ensure_prepared(&mut self) -> Drawn {
+        Ok(())
+    }
+
+    fn present(&mut self) -> Drawn {
+        Ok(())
+    }
+
+    fn draw_pixel(&mut self, point: BackendCoord, color: BackendColor) -> Drawn {
+        let (x, y) = self.place(point);
+        self.fill(Rect::from_xywh(x.floor(), y.floor(), 1.0, 1.0).map(PathBuilder::from_rect), color);
+        Ok(())
+    }
+
+    fn draw_line<S: BackendStyle>(&mut self, from: BackendCoord, to: BackendCoord, style: &S) -> Drawn {
+        self.draw_path([from, to], style)
+    }
+
+    fn draw_path<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(&mut self, path: I, style: &S) -> Drawn {
+        let points: Vec<BackendCoord> = path.into_iter().collect();
+        match points[..] {
+            [] | [_] => {}
+            [from, to] if from != to && (from.0 == to.0 || from.1 == to.1) => self.rule((from, to), style.color(), style.stroke_width()),
+            _ => self.stroke(self.outline(points, false), style.color(), style.stroke_width(), LineCap::Round),
+        }
+        Ok(())
+    }
+
+    fn draw_rect<S: BackendStyle>(&mut self, upper_left: BackendCoord, bottom_right: BackendCoord, style: &S, fill: bool) -> Drawn {
+        let ((left, top), (right, bottom)) = (upper_left, bottom_right);
+        let corners = [(left, top), (right, top), (right, bottom), (left, bottom)];
+        if fill {
+            self.fill(self.outline(corners, true), style.color());
+        } else {
+            self.stroke(self.outline(corners, true), style.color(), style.stroke_width(), LineCap::Butt);
+        }
+        Ok(())
+    }
+
+    fn draw_circle<S: BackendStyle>(&mut self, center: BackendCoord, radius: u32, style: &S, fill: bool) -> Drawn {
+        let (x, y) = self.place(center);
+        let circle = PathBuilder::from_circle(x, y, self.px(f64::from(radius)));
+        if fill {
+            self.fill(circle, style.color());
+        } else {
+            self.stroke(circle, style.color(), style.stroke_width(), LineCap::Butt);
+        }
+        Ok(())
+    }
+
+    fn fill_polygon<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(&mut self, vert: I, style: &S) -> Drawn {
+        let outline = self.outline(vert, true);
+        self.fill(outline, style.color());
+        Ok(())
+    }
+
+    fn draw_text<T: BackendTextStyle>(&mut self, text: &str, style: &T, pos: BackendCoord) -> Drawn {
+        let align = match style.anchor().h_pos {
+            HPos::Left => Align::Left,
+            HPos::Center => Align::Centre,
+            HPos::Right => Align::Right,
+        };
+        let level = match style.anchor().v_pos {
+            VPos::Top => Level::Top,
+            VPos::Center => Level::Middle,
+            VPos::Bottom => Level::Baseline,
+        };
+        let quarters = match style.transform() {
+            FontTransform::None => 0.0,
+            FontTransform::Rotate90 => -1.0,
+            FontTransform::Rotate180 => 2.0,
+            FontTransform::Rotate270 => 1.0,
+        };
+        let (r, g, b) = style.color().rgb;
+        let words = Lettering {
+            angle: quarters * std::f64::consts::FRAC_PI_2,
+            ..Lettering::new(style.size() / UNITS, plotters::style::RGBColor(r, g, b)).at(align, level)
+        };
+        self.words(text, &words, [f64::from(pos.0) / UNITS, f64::from(pos.1) / UNITS]);
+        Ok(())
+    }
+
+    /// The height is that of a line: with the height of the capitals plotters sets its captions too tight.
+    fn estimate_text_size<T: BackendTextStyle>(&self, text: &str, style: &T) -> Result<(u32, u32), DrawingErrorKind<Self::ErrorType>> {
+        Ok((self.fonts.width(text, style.size(), false).ceil() as u32, (1.25 * style.size()).ceil() as u32))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use plotters::prelude::*;
+
+    fn drawn(size: [f64; 2], paint: impl FnOnce(&DrawingArea<Canvas, plotters::coord::Shift>)) -> Canvas {
+        let cell = std::rc::Rc::new(std::cell::RefCell::new(Canvas::new(size, 4.0).unwrap()));
+        paint(&DrawingArea::from(&cell));
+        std::rc::Rc::try_unwrap(cell).ok().unwrap().into_inner()
+    }
+
+    fn dark(canvas: &Canvas, x: u32, y: u32) -> bool {
+        canvas.pixels.pixel(x, y).is_some_and(|p| p.red() < 40)
+    }
+
+    #[test]
+    fn a_thick_line_covers_its_own_crossing() {
+        let canvas = drawn([20.0, 20.0], |area| {
+            let twice = vec![(200, 200), (1800, 1800), (1800, 200), (200, 1800), (200, 200), (1800, 1800)];
+            area.draw(&PathElement::new(twice, ShapeStyle { color: BLACK.into(), filled: false, stroke_width: 200 })).unwrap();
+        });
+        assert!(dark(&canvas, 40, 40), "the crossing is covered");
+        assert!(dark(&canvas, 20, 20), "a line traced twice does not vanish");
+        assert!(!dark(&canvas, 40, 10));
+    }
+
+    #[test]
+    fn rules_fill_whole_pixels() {
+        let canvas = drawn([20.0, 20.0], |area| {
+            area.draw(&PathElement::new(
+                vec![(100, 1003), (1900, 1003)],
+                ShapeStyle { color: BLACK.into(), filled: false, stroke_width: 75 },
+            ))
+            .unwrap();
+        });
+        let column: Vec<u8> = (0..80).map(|y| canvas.pixels.pixel(40, y).unwrap().red()).collect();
+        assert_eq!(column.iter().filter(|&&red| red == 0).count(), 3, "0.75 pt are three pixels");
+        assert_eq!(column.iter().filter(|&&red| red == 255).count(), 77);
+    }
+
+    #[test]
+    fn plotters_draws_its_own_mesh_and_words_on_it() {
+        let canvas = drawn([200.0, 150.0], |area| {
+            let mut builder = ChartBuilder::on(area);
+            builder.margin(500).x_label_area_size(3000).y_label_area_size(4000);
+            let mut chart = builder.build_cartesian_2d(0.0..1.0, 0.0..1.0).unwrap();
+            chart.configure_mesh().label_style(("sans", 850.0)).x_desc("time").draw().unwrap();
+        });
+        assert!(canvas.texts().iter().any(|text| text.text == "time"));
+        assert!(canvas.rgb().iter().any(|&part| part < 40));
+    }
+}

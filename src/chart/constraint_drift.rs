@@ -1,0 +1,98 @@
+//! Constraint drift: how far each constraint is off, at the level of positions and of velocities, side by side.
+
+use super::axis::Axis;
+use super::energy_drift::{DriftSeries, draw, label};
+use super::file::Picture;
+use super::grid::{beside, label_room};
+use super::lines::{Point, running_maximum};
+use super::palette::{WHITE, marks, mix};
+use super::sheet::Sheet;
+use super::{ChartError, PAGE};
+
+/// One level of the constraints, with its unit.
+#[derive(Clone, Debug, Default)]
+pub struct DefectPanel {
+    /// Name of the y axis with its unit in brackets, with markup: `|*C*| [rad]`.
+    pub name: String,
+    /// A line for each stabilization or each constraint; the same names in the same order in every panel.
+    pub series: Vec<DriftSeries>,
+}
+
+/// Defects of constraints against time.
+#[derive(Clone, Debug, Default)]
+pub struct ConstraintDrift {
+    /// Title, with markup.
+    pub title: String,
+    /// Parts of the caption, with markup; what is drawn is added.
+    pub caption: Vec<String>,
+    /// Panels from left to right: position level, velocity level.
+    pub panels: Vec<DefectPanel>,
+    /// Logarithmic time.
+    pub log_time: bool,
+}
+
+/// Draws the samples as light dots and their running maximum as a line.
+///
+/// A series without any defect is drawn as markers on the lower edge and labelled as exactly 0.
+///
+/// # Errors
+/// [`ChartError`] if the resolution is out of range or drawing fails.
+pub fn constraint_drift(chart: &ConstraintDrift, px_per_pt: f64) -> Result<Picture, ChartError> {
+    let sheet = Sheet::new(PAGE, px_per_pt)?;
+    let mut caption = chart.caption.clone();
+    caption.push("dots: samples, lines: largest so far".to_owned());
+    let under = sheet.heading(&chart.title, &caption)?;
+    let lines = |panel: &DefectPanel| -> Vec<Vec<Point>> { panel.series.iter().map(|s| running_maximum(&s.time, &s.error)).collect() };
+    let all: Vec<Vec<Vec<Point>>> = chart.panels.iter().map(lines).collect();
+    let axes = chart.panels.iter().zip(&all).map(|(panel, lines)| {
+        let times = || lines.iter().flatten().map(|p| p[0]);
+        let x = if chart.log_time { Axis::log_tight("time [s]", times()) } else { Axis::tight("time [s]", times()) };
+        // The lowest samples decide how far down the axis goes, but a few near zero do not stretch it over the page.
+        let highest = lines.iter().flatten().map(|p| p[1]).filter(|v| v.is_finite()).fold(0.0, f64::max);
+        let starts = lines.iter().filter_map(|line| line.iter().map(|p| p[1]).find(|&v| v > 0.0)).fold(highest, f64::min);
+        let samples = panel.series.iter().flat_map(|s| &s.error).map(|e| e.abs()).filter(|&e| e > 0.03 * starts && e <= highest);
+        (x, Axis::decades(&panel.name, samples.chain([starts])))
+    });
+    let words: Vec<Vec<String>> = (chart.panels.iter().zip(&all))
+        .map(|(panel, lines)| panel.series.iter().zip(lines).map(|(series, line)| label(&sheet, &series.name, line)).collect())
+        .collect();
+    let right = label_room(&sheet, words.iter().flatten().map(String::as_str), true);
+    let panels = beside(&sheet, under, axes.collect(), right)?;
+    let mut named = false;
+    for (k, (panel, (data, lines))) in panels.iter().zip(chart.panels.iter().zip(&all)).enumerate() {
+        let marks = marks(data.series.iter().map(|series| series.method.as_str()));
+        for (series, mark) in data.series.iter().zip(&marks) {
+            let samples: Vec<Point> = series.time.iter().zip(&series.error).map(|(&t, &e)| [t, e.abs()]).collect();
+            // More dots than can be told apart would only fill the panel.
+            let step = samples.len().div_ceil(400).max(1);
+            let light: Vec<Point> = samples.into_iter().step_by(step).filter(|p| p[1] > 0.0).collect();
+            panel.dots(&light, mix(mark.colour, WHITE, 0.66))?;
+        }
+        let mut ends = Vec::new();
+        for ((line, mark), words) in lines.iter().zip(&marks).zip(&words[k]) {
+            if let Some(end) = draw(&sheet, panel, line, mark)? {
+                let at = [panel.bounds[2], end];
+                if end < panel.bounds[3] {
+                    sheet.marker(at, mark.shape, mark.colour)?;
+                }
+                ends.push((end, words.clone(), *mark));
+            }
+        }
+        named |= !ends.is_empty();
+        if ends.is_empty() {
+            panel.empty("no data")?;
+        }
+        if k + 1 == panels.len() {
+            panel.end_labels(&ends, true)?;
+        }
+    }
+    if !named && panels.is_empty() {
+        sheet.words(
+            "no data",
+            super::sheet::note(super::palette::GREY, super::text::Align::Centre, super::text::Level::Middle),
+            [240.0, 160.0],
+        )?;
+    }
+    drop(panels);
+    Ok(sheet.picture(&chart.title, &caption))
+}

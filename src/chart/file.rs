@@ -1,0 +1,77 @@
+//! A finished picture, and how it becomes a file: whole or not at all.
+
+use super::ChartError;
+use super::text::TextBox;
+use std::io::Write;
+use std::path::Path;
+
+/// A drawn chart.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    /// Width \[px\].
+    pub width: u32,
+    /// Height \[px\].
+    pub height: u32,
+    /// Red, green and blue of each pixel, row by row from the top: `3·width·height` bytes.
+    pub rgb: Vec<u8>,
+    /// Pixels per point of 1/72 inch.
+    pub px_per_pt: f64,
+    /// Title, also written into the file.
+    pub title: String,
+    /// What is drawn, also written into the file.
+    pub description: String,
+    /// The words in the picture and where they stand.
+    pub texts: Vec<TextBox>,
+    /// Data areas `[left, top, right, bottom]` \[pt\].
+    pub panels: Vec<[f64; 4]>,
+}
+
+impl Picture {
+    /// The picture as a PNG file in memory: 8-bit RGB, size on paper, sRGB, text chunks `Title`, `Description` and `Software`.
+    ///
+    /// # Errors
+    /// [`ChartError::Png`] if the encoder refuses, for instance a picture without pixels.
+    pub fn png_bytes(&self) -> Result<Vec<u8>, ChartError> {
+        // A debug build spends seconds on a good compression; its pictures are looked at once.
+        let compression = if cfg!(debug_assertions) { png::Compression::Fast } else { png::Compression::Balanced };
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_compression(compression);
+        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+        let per_metre = (self.px_per_pt * 72.0 / 0.0254).round() as u32;
+        encoder.set_pixel_dims(Some(png::PixelDimensions { xppu: per_metre, yppu: per_metre, unit: png::Unit::Meter }));
+        encoder.add_itxt_chunk("Title".to_owned(), self.title.clone())?;
+        encoder.add_itxt_chunk("Description".to_owned(), self.description.clone())?;
+        encoder.add_itxt_chunk("Software".to_owned(), concat!("driftless ", env!("CARGO_PKG_VERSION")).to_owned())?;
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&self.rgb)?;
+        writer.finish()?;
+        Ok(bytes)
+    }
+
+    /// Writes the PNG file, replacing an older one at once.
+    ///
+    /// # Errors
+    /// [`ChartError::Png`], or [`ChartError::Write`] if the folder does not exist or cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), ChartError> {
+        write_whole(path, &self.png_bytes()?)
+    }
+}
+
+/// Writes next to the target first, so that a reader never meets half a file.
+pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), ChartError> {
+    let failed = |source: std::io::Error| ChartError::Write { path: path.to_owned(), source };
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut file = tempfile::Builder::new().prefix(".chart-").tempfile_in(folder).map_err(failed)?;
+    file.write_all(bytes).map_err(failed)?;
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // Temporary files are private; a chart is as readable as any other result.
+        file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644)).map_err(failed)?;
+    }
+    file.persist(path).map_err(|e| failed(e.error))?;
+    Ok(())
+}

@@ -1,0 +1,75 @@
+//! Panels on a page: one, stacked, or side by side.
+
+use super::ChartError;
+use super::axis::Axis;
+use super::panel::{LEADER, Panel, Written, left_room, right_room};
+use super::sheet::{EDGE, NOTE, Sheet};
+
+/// Below the lowest panel: tick labels and the name of the axis \[pt\].
+const BOTTOM: f64 = 44.0;
+/// Between the caption and the panels \[pt\].
+pub(crate) const AIR: f64 = 14.0;
+/// Between two stacked panels \[pt\].
+const BETWEEN: f64 = 16.0;
+/// Usual distance of a panel from the left edge \[pt\].
+const LEFT: f64 = 58.0;
+
+/// Room for labels at the ends of lines, at most a third of the page \[pt\].
+pub(crate) fn label_room<'a>(sheet: &Sheet, labels: impl Iterator<Item = &'a str>, markers: bool) -> f64 {
+    let widest = labels.map(|label| sheet.width(label, NOTE, false)).fold(0.0, f64::max);
+    if widest == 0.0 { 20.0 } else { (widest + LEADER + if markers { 8.0 } else { 0.0 } + 8.0).clamp(20.0, sheet.size[0] / 3.0) }
+}
+
+/// The words, cut to what [`label_room`] can give them at most.
+pub(crate) fn shortened(sheet: &Sheet, label: &str) -> String {
+    let room = sheet.size[0] / 3.0 - LEADER - 18.0;
+    if sheet.width(label, NOTE, false) <= room {
+        return label.to_owned();
+    }
+    let mut cut = super::text::unmarked(label);
+    while !cut.is_empty() && sheet.width(&format!("{}…", super::text::plain(&cut)), NOTE, false) > room {
+        cut.pop();
+    }
+    format!("{}…", super::text::plain(&cut))
+}
+
+/// Panels above each other with one time axis, frames drawn; `under` is the lowest line of the heading, `right` the room beside them.
+pub(crate) fn stacked<'a>(sheet: &'a Sheet, under: f64, x: &Axis, ys: Vec<Axis>, right: f64) -> Result<Vec<Panel<'a>>, ChartError> {
+    let (top, bottom) = (under + AIR, sheet.size[1] - BOTTOM);
+    let count = ys.len().max(1) as f64;
+    let height = (bottom - top - (count - 1.0) * BETWEEN) / count;
+    let left = ys.iter().map(|y| left_room(sheet, y, height) + EDGE).fold(LEFT, f64::max);
+    let right = right.max(right_room(sheet, x, sheet.size[0] - left - right) + 6.0);
+    let panels: Vec<Panel> = ys
+        .into_iter()
+        .enumerate()
+        .map(|(k, y)| {
+            let top = top + k as f64 * (height + BETWEEN);
+            Panel::new(sheet, [left, top, sheet.size[0] - right, top + height], x.clone(), y)
+        })
+        .collect();
+    let y_name_at = panels.iter().map(Panel::name_place).fold(f64::INFINITY, f64::min);
+    for (k, panel) in panels.iter().enumerate() {
+        panel.frame(Written { x: k + 1 == panels.len(), y_name_at })?;
+    }
+    Ok(panels)
+}
+
+/// Panels side by side, each with its own axes, frames drawn.
+pub(crate) fn beside<'a>(sheet: &'a Sheet, under: f64, axes: Vec<(Axis, Axis)>, right: f64) -> Result<Vec<Panel<'a>>, ChartError> {
+    let (top, bottom) = (under + AIR, sheet.size[1] - BOTTOM);
+    let lefts: Vec<f64> = axes.iter().map(|(_, y)| left_room(sheet, y, bottom - top)).collect();
+    let count = axes.len().max(1) as f64;
+    let between = 16.0;
+    let width = (sheet.size[0] - EDGE - right - lefts.iter().sum::<f64>() - (count - 1.0) * between) / count;
+    let mut left = EDGE;
+    let mut panels = Vec::new();
+    for ((x, y), room) in axes.into_iter().zip(lefts) {
+        left += room;
+        let panel = Panel::new(sheet, [left, top, left + width.max(20.0), bottom], x, y);
+        panel.frame(Written { x: true, y_name_at: panel.name_place() })?;
+        left += width + between;
+        panels.push(panel);
+    }
+    Ok(panels)
+}

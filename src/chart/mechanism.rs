@@ -1,0 +1,71 @@
+//! A mechanism in its pose, with the paths of chosen points.
+
+use super::file::Picture;
+use super::grid::AIR;
+use super::labels::Occupied;
+use super::panel::{Panel, Written};
+use super::sheet::Sheet;
+use super::sketch::{Pencil, Pose, Sketch, symbol_size, trail_colour};
+use super::view::View;
+use super::{ChartError, PAGE};
+
+/// Most earlier poses drawn.
+const GHOSTS: usize = 8;
+
+/// A mechanism and where it has been.
+#[derive(Clone, Debug, Default)]
+pub struct MechanismChart {
+    /// Title, with markup.
+    pub title: String,
+    /// Parts of the caption, with markup.
+    pub caption: Vec<String>,
+    /// The mechanism.
+    pub sketch: Sketch,
+    /// Poses: the last is drawn in full, up to eight before it as pale ghosts, oldest first.
+    pub poses: Vec<Pose>,
+    /// Paths of the sketch's points (x, y) \[m\], oldest place first; points that are not numbers break a path.
+    pub trails: Vec<Vec<[f64; 2]>>,
+}
+
+/// Draws the mechanism with gravity pointing down the page and equal scales.
+///
+/// # Errors
+/// [`ChartError`] if the resolution is out of range or drawing fails.
+pub fn mechanism(chart: &MechanismChart, px_per_pt: f64) -> Result<Picture, ChartError> {
+    let ghosts = chart.poses.len().saturating_sub(GHOSTS + 1);
+    let poses = &chart.poses[ghosts..];
+    let under = Sheet::new(PAGE, 0.5)?.heading(&chart.title, &chart.caption)?;
+    let view = View::around(&chart.sketch, poses, &chart.trails);
+    let (left, right) = (62.0, 20.0);
+    let width = PAGE[0] - left - right;
+    let height = (width * view.aspect()).clamp(200.0, 330.0);
+    let view = view.fitted(width, height);
+
+    let sheet = Sheet::new([PAGE[0], under + AIR + height + 44.0], px_per_pt)?;
+    sheet.heading(&chart.title, &chart.caption)?;
+    let (x, y) = view.axes();
+    let top = under + AIR;
+    let panel = Panel::new(&sheet, [left, top, left + width, top + height], x, y).equal_steps();
+    panel.frame(Written { x: true, y_name_at: panel.name_place() })?;
+
+    let mut occupied = Occupied::default();
+    let size = poses.last().map_or(1.0, |pose| symbol_size(pose, view.scale(width)));
+    let pencil = Pencil { sheet: &sheet, panel: &panel, view, size };
+    pencil.walls(&chart.sketch.walls, &mut occupied)?;
+    if let Some((last, before)) = poses.split_last() {
+        for (k, pose) in before.iter().enumerate() {
+            pencil.ghost(pose, 1.0 - k as f64 / before.len() as f64)?;
+        }
+        for (k, trail) in chart.trails.iter().enumerate() {
+            pencil.trail(trail, trail_colour(k), 160, &mut occupied)?;
+        }
+        pencil.pose(&chart.sketch, last, &mut occupied)?;
+        pencil.compass(&mut occupied)?;
+        pencil.names(&chart.sketch, last, &mut occupied)?;
+    } else {
+        panel.empty("no data")?;
+    }
+    drop(pencil);
+    drop(panel);
+    Ok(sheet.picture(&chart.title, &chart.caption))
+}

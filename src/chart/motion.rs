@@ -1,0 +1,115 @@
+//! The mechanism in motion, as an animated GIF.
+
+use super::ChartError;
+use super::file::write_whole;
+use super::gif::Encoder;
+use super::labels::Occupied;
+use super::palette::{GREY, GRID};
+use super::panel::Panel;
+use super::sheet::{CAPTION, EDGE, Pen, Sheet};
+use super::sketch::{Pencil, Pose, Sketch, symbol_size, trail_colour};
+use super::text::{Align, Lettering, Level};
+use super::ticks::decimal;
+use super::view::View;
+use std::path::Path;
+
+/// 420 × 432 px at two pixels a point.
+const SIZE: [f64; 2] = [210.0, 216.0];
+const PX_PER_PT: f64 = 2.0;
+/// Length of the fading trail \[frames\].
+const TAIL: usize = 50;
+/// Few colours keep the file small.
+const SHADES: usize = 20;
+
+/// A mechanism frame by frame.
+#[derive(Clone, Debug, Default)]
+pub struct MotionGif {
+    /// Title, with markup.
+    pub title: String,
+    /// The mechanism.
+    pub sketch: Sketch,
+    /// One pose a frame, at equal intervals.
+    pub poses: Vec<Pose>,
+    /// Time of each frame \[s\], written into it; may be empty.
+    pub time: Vec<f64>,
+    /// Paths of the sketch's points (x, y) \[m\], at equal intervals from the first frame to the last and finer than the frames.
+    pub trails: Vec<Vec<[f64; 2]>>,
+    /// Time a frame stays \[1/100 s\]; 4 gives 25 frames a second.
+    pub delay: u16,
+}
+
+/// A finished animation.
+#[derive(Clone, Debug)]
+pub struct Animation {
+    /// Width \[px\].
+    pub width: u32,
+    /// Height \[px\].
+    pub height: u32,
+    /// Number of frames.
+    pub frames: usize,
+    /// The GIF file.
+    pub bytes: Vec<u8>,
+}
+
+impl Animation {
+    /// Writes the GIF file, replacing an older one at once.
+    ///
+    /// # Errors
+    /// [`ChartError::Write`] if the folder does not exist or cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), ChartError> {
+        write_whole(path, &self.bytes)
+    }
+}
+
+/// Draws 420 × 432 px frames into an endless animation.
+///
+/// # Errors
+/// [`ChartError`] if drawing or encoding fails.  An animation without poses has one empty frame.
+pub fn motion_gif(chart: &MotionGif) -> Result<Animation, ChartError> {
+    let sheet = Sheet::new(SIZE, PX_PER_PT)?;
+    let under = sheet.heading(&chart.title, &[])?;
+    let bounds = [EDGE, under + 8.0, SIZE[0] - EDGE, SIZE[1] - EDGE];
+    let (width, height) = (bounds[2] - bounds[0], bounds[3] - bounds[1]);
+    let view = View::around(&chart.sketch, &chart.poses, &chart.trails).fitted(width, height);
+    let (x, y) = view.axes();
+    let panel = Panel::new(&sheet, bounds, x, y);
+    let [left, top, right, bottom] = bounds;
+    sheet.line(&[[left, top], [right, top], [right, bottom], [left, bottom], [left, top]], &Pen::new(GRID, 0.75))?;
+    let size = 0.8 * chart.poses.first().map_or(1.0, |pose| symbol_size(pose, view.scale(width)));
+    let pencil = Pencil { sheet: &sheet, panel: &panel, view, size };
+    let mut occupied = Occupied::default();
+    pencil.walls(&chart.sketch.walls, &mut occupied)?;
+    pencil.compass(&mut occupied)?;
+    let background = sheet.pixels();
+
+    let frames = chart.poses.len().max(1);
+    let draw = |k: usize| -> Result<Vec<u8>, ChartError> {
+        sheet.restore(&background);
+        let Some(pose) = chart.poses.get(k) else { return Ok(sheet.pixels()) };
+        let mut occupied = Occupied::default();
+        for (number, trail) in chart.trails.iter().enumerate() {
+            pencil.trail(tail(trail, k, frames), trail_colour(number), SHADES, &mut occupied)?;
+        }
+        pencil.pose(&chart.sketch, pose, &mut occupied)?;
+        if let Some(&time) = chart.time.get(k) {
+            let words = Lettering::new(CAPTION, GREY).at(Align::Right, Level::Baseline);
+            sheet.words(&format!("*t* = {} s", decimal(time, 2)), words, [right - 5.0, bottom - 5.0])?;
+        }
+        Ok(sheet.pixels())
+    };
+    let (pixels_wide, pixels_high) = sheet.dimensions();
+    // Colours are chosen from a part of the frames, so that all of them never lie in memory together.
+    let samples = (0..frames).step_by(frames.div_ceil(24)).map(draw).collect::<Result<Vec<_>, _>>()?;
+    let mut encoder = Encoder::new(pixels_wide, pixels_high, chart.delay.max(2), &samples)?;
+    for k in 0..frames {
+        encoder.frame(&draw(k)?)?;
+    }
+    Ok(Animation { width: pixels_wide, height: pixels_high, frames, bytes: encoder.finish()? })
+}
+
+/// The part of a trail seen in frame `k`.
+fn tail(trail: &[[f64; 2]], k: usize, frames: usize) -> &[[f64; 2]] {
+    let place = |frame: usize| (frame as f64 / (frames.max(2) - 1) as f64 * trail.len().saturating_sub(1) as f64).round() as usize;
+    let end = (place(k) + 1).min(trail.len());
+    &trail[place(k.saturating_sub(TAIL)).min(end)..end]
+}

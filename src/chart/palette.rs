@@ -1,0 +1,138 @@
+//! Colours, and the colour and shape every method and stabilization keeps in every chart.
+//!
+//! The series colours are those of Okabe and Ito, "Color Universal Design" (2008).  They stay apart for colour-blind readers, but not
+//! far enough to stand alone: a series also has a shape or a direct label.  Words need more contrast than lines; see [`readable`].
+
+use plotters::style::RGBColor;
+
+/// A colour of a chart.
+pub(crate) type Colour = RGBColor;
+
+pub(crate) const WHITE: Colour = RGBColor(0xFF, 0xFF, 0xFF);
+/// Text and bars.
+pub(crate) const INK: Colour = RGBColor(0x1F, 0x23, 0x28);
+/// Captions and notes.
+pub(crate) const GREY: Colour = RGBColor(0x57, 0x60, 0x6A);
+/// Axes and ticks.
+pub(crate) const SPINE: Colour = RGBColor(0x6E, 0x77, 0x81);
+pub(crate) const GRID: Colour = RGBColor(0xE4, 0xE7, 0xEB);
+/// Guides and levels.
+pub(crate) const GUIDE: Colour = RGBColor(0x93, 0x98, 0xA1);
+
+pub(crate) const SKY: Colour = RGBColor(0x56, 0xB4, 0xE9);
+pub(crate) const BLUE: Colour = RGBColor(0x00, 0x72, 0xB2);
+pub(crate) const GREEN: Colour = RGBColor(0x00, 0x9E, 0x73);
+pub(crate) const PURPLE: Colour = RGBColor(0xCC, 0x79, 0xA7);
+pub(crate) const ORANGE: Colour = RGBColor(0xE6, 0x9F, 0x00);
+pub(crate) const VERMILLION: Colour = RGBColor(0xD5, 0x5E, 0x00);
+
+/// Shape of a marker.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Shape {
+    Disc,
+    Ring,
+    Square,
+    Diamond,
+    Up,
+    Down,
+}
+
+/// How a series is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Mark {
+    pub colour: Colour,
+    pub shape: Shape,
+    /// 0 for the first series of this colour, 1 for the second, …; chooses the dashes.
+    pub turn: usize,
+}
+
+/// Seven series without a name of their own, in the order in which they are easiest to tell apart.
+const FREE: [(Colour, Shape); 7] = [
+    (BLUE, Shape::Disc),
+    (VERMILLION, Shape::Up),
+    (GREEN, Shape::Square),
+    (ORANGE, Shape::Ring),
+    (PURPLE, Shape::Diamond),
+    (SKY, Shape::Down),
+    (INK, Shape::Disc),
+];
+
+/// The fixed colour and shape of a method or stabilization, found by the beginning of its name.
+fn fixed(name: &str) -> Option<(Colour, Shape)> {
+    const FIXED: [(&str, Colour, Shape); 12] = [
+        ("dopri5", SKY, Shape::Down),
+        ("dp5", SKY, Shape::Down),
+        ("dop853", BLUE, Shape::Disc),
+        ("dp8", BLUE, Shape::Disc),
+        ("gauss", GREEN, Shape::Square),
+        ("rattle", PURPLE, Shape::Diamond),
+        ("radau", ORANGE, Shape::Ring),
+        ("taylor", VERMILLION, Shape::Up),
+        ("none", VERMILLION, Shape::Down),
+        ("baumgarte", ORANGE, Shape::Ring),
+        ("projection", BLUE, Shape::Disc),
+        ("elimination", GREEN, Shape::Square),
+    ];
+    FIXED.iter().find(|(word, ..)| name.starts_with(word)).map(|&(_, colour, shape)| (colour, shape))
+}
+
+/// A mark for each name: known methods and stabilizations keep theirs, other names take what is left.
+pub(crate) fn marks<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<Mark> {
+    let names: Vec<&str> = names.into_iter().collect();
+    let known: Vec<_> = names.iter().map(|name| fixed(name)).collect();
+    let mut free = FREE.iter().filter(|(colour, _)| !known.iter().flatten().any(|(taken, _)| taken == colour)).cycle();
+    let mut marks: Vec<Mark> = Vec::new();
+    for known in &known {
+        let (colour, shape) = known.or_else(|| free.next().copied()).unwrap_or(FREE[6]);
+        let turn = marks.iter().filter(|mark| mark.colour == colour).count();
+        marks.push(Mark { colour, shape, turn });
+    }
+    marks
+}
+
+/// `share` of the way from one colour to another.
+pub(crate) fn mix(from: Colour, to: Colour, share: f64) -> Colour {
+    let blend = |a: u8, b: u8| (f64::from(a) + share.clamp(0.0, 1.0) * (f64::from(b) - f64::from(a))).round() as u8;
+    RGBColor(blend(from.0, to.0), blend(from.1, to.1), blend(from.2, to.2))
+}
+
+/// Contrast of two colours, 1 to 21 (Web Content Accessibility Guidelines 2.2, section 1.4.3).
+pub(crate) fn contrast(a: Colour, b: Colour) -> f64 {
+    let (bright, dark) = (luminance(a).max(luminance(b)), luminance(a).min(luminance(b)));
+    (bright + 0.05) / (dark + 0.05)
+}
+
+fn luminance(colour: Colour) -> f64 {
+    let linear = |part: u8| {
+        let part = f64::from(part) / 255.0;
+        if part <= 0.04045 { part / 12.92 } else { ((part + 0.055) / 1.055).powf(2.4) }
+    };
+    0.2126 * linear(colour.0) + 0.7152 * linear(colour.1) + 0.0722 * linear(colour.2)
+}
+
+/// The colour, darkened until words in it have a contrast of 4.5 on white.
+pub(crate) fn readable(colour: Colour) -> Colour {
+    (0..=20).map(|step| mix(colour, INK, 0.05 * f64::from(step))).find(|&word| contrast(word, WHITE) >= 4.5).unwrap_or(INK)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_in_every_series_colour_can_be_read() {
+        for (colour, _) in FREE {
+            assert!(contrast(readable(colour), WHITE) >= 4.5);
+        }
+        assert_eq!(readable(BLUE), BLUE, "blue is dark enough as it is");
+        assert!((contrast(RGBColor(0, 0, 0), WHITE) - 21.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn methods_keep_their_colour_and_others_never_take_it() {
+        let marks = marks(["taylor", "shoulder", "taylor, extended", "elbow"]);
+        assert_eq!((marks[0].colour, marks[0].turn), (VERMILLION, 0));
+        assert_eq!((marks[2].colour, marks[2].turn), (VERMILLION, 1));
+        assert_eq!((marks[1].colour, marks[3].colour), (BLUE, GREEN));
+    }
+}

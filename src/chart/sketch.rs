@@ -1,0 +1,348 @@
+//! The drawing of a mechanism in a pose: bars, hinges, ground, springs, motors, walls, trails.
+
+use super::ChartError;
+use super::labels::{Occupied, place};
+use super::lines::{Point, clip};
+use super::palette::{BLUE, Colour, GREEN, GREY, INK, ORANGE, PURPLE, SKY, SPINE, VERMILLION, WHITE, mix, readable};
+use super::panel::Panel;
+use super::sheet::{NAME, Pen, Sheet};
+use super::text::{Align, Lettering, Level};
+use super::view::View;
+
+/// What does not change while a mechanism moves.
+#[derive(Clone, Debug, Default)]
+pub struct Sketch {
+    /// Gravitational acceleration (x, y) \[m/s²\]; it points down the page.
+    pub gravity: [f64; 2],
+    /// Hinges.
+    pub hinges: Vec<HingeSketch>,
+    /// Springs.
+    pub springs: Vec<SpringSketch>,
+    /// Walls.
+    pub walls: Vec<WallSketch>,
+    /// Names of the points whose paths are of interest, with markup; may be empty words.
+    pub points: Vec<String>,
+}
+
+/// A hinge.
+#[derive(Clone, Debug, Default)]
+pub struct HingeSketch {
+    /// Name, with markup; written while a mechanism has few of them.
+    pub name: String,
+    /// Whether it is fixed to the ground.
+    pub ground: bool,
+}
+
+/// A spring.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SpringSketch {
+    /// Which of its two ends is fixed to the ground.
+    pub ground: [bool; 2],
+}
+
+/// A wall.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct WallSketch {
+    /// A point of the line (x, y) \[m\].
+    pub through: [f64; 2],
+    /// Normal (x, y) of any length, towards the free side.
+    pub normal: [f64; 2],
+}
+
+/// Where everything is at one time.  Lists agree with those of the [`Sketch`]; what is missing is left out.
+#[derive(Clone, Debug, Default)]
+pub struct Pose {
+    /// Both ends of each bar (x, y) \[m\].
+    pub bars: Vec<[[f64; 2]; 2]>,
+    /// The hinges (x, y) \[m\].
+    pub hinges: Vec<[f64; 2]>,
+    /// Both ends of each spring (x, y) \[m\].
+    pub springs: Vec<[[f64; 2]; 2]>,
+    /// The motors.
+    pub motors: Vec<MotorPose>,
+    /// The points of interest (x, y) \[m\].
+    pub points: Vec<[f64; 2]>,
+}
+
+/// A motor.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct MotorPose {
+    /// Its hinge (x, y) \[m\].
+    pub at: [f64; 2],
+    /// Absolute angle of the driven bar, counter-clockwise from +x \[rad\].
+    pub angle: f64,
+    /// Rate of that angle \[rad/s\]; its sign gives the arrow's sense, zero leaves out the arrow head.
+    pub rate: f64,
+}
+
+/// From this many names on none is written.
+const NAMES: usize = 7;
+
+/// Draws in a panel through a view of the world.
+pub(crate) struct Pencil<'a> {
+    pub sheet: &'a Sheet,
+    pub panel: &'a Panel<'a>,
+    pub view: View,
+    /// Size of symbols, 1 for bars of usual length on the page.
+    pub size: f64,
+}
+
+pub(crate) fn trail_colour(k: usize) -> Colour {
+    [VERMILLION, BLUE, PURPLE, GREEN][k % 4]
+}
+
+fn finite(points: &[[f64; 2]]) -> bool {
+    points.iter().flatten().all(|c| c.abs() <= 1e300)
+}
+
+impl Pencil<'_> {
+    fn at(&self, point: [f64; 2]) -> Point {
+        self.panel.page(self.view.fractions(point))
+    }
+
+    /// Bars of an earlier pose in pale grey; `age` 1 for the oldest, 0 for the present.
+    pub(crate) fn ghost(&self, pose: &Pose, age: f64) -> Result<(), ChartError> {
+        let pen = Pen::new(mix(SPINE, WHITE, 0.74 + 0.18 * age), 4.0 * self.size);
+        for bar in pose.bars.iter().filter(|bar| finite(&bar[..])) {
+            self.sheet.line(&bar.map(|end| self.at(end)), &pen)?;
+        }
+        Ok(())
+    }
+
+    /// The path of a point, oldest part palest, in `shades` shades; opaque, because translucent pieces would show their joints.
+    pub(crate) fn trail(&self, points: &[[f64; 2]], colour: Colour, shades: usize, occupied: &mut Occupied) -> Result<(), ChartError> {
+        let chunk = points.len().div_ceil(shades).max(1);
+        for start in (0..points.len()).step_by(chunk) {
+            let part = &points[start..(start + chunk + 1).min(points.len())];
+            let youth = (start + part.len()) as f64 / points.len() as f64;
+            let pen = Pen::new(mix(WHITE, colour, 0.12 + 0.88 * youth), 0.8 + 1.4 * youth);
+            for piece in clip(part.iter().map(|&p| if finite(&[p]) { self.view.fractions(p) } else { [f64::NAN; 2] })) {
+                let piece: Vec<Point> = piece.into_iter().map(|p| self.panel.page(p)).collect();
+                occupied.line(&piece);
+                self.sheet.line(&piece, &pen)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A line with hatching on the side `towards` (unit vector on the page).
+    fn hatched(&self, from: Point, to: Point, towards: Point, every: f64, length: f64) -> Result<(), ChartError> {
+        let pen = Pen::new(INK, 0.9 * self.size.max(0.7));
+        let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
+        let whole = dx.hypot(dy);
+        let count = (whole / every).floor().clamp(0.0, 1000.0) as usize;
+        for k in 0..=count {
+            let share = (0.5 * (whole - count as f64 * every) + k as f64 * every) / whole.max(1e-9);
+            let foot = [from[0] + share * dx, from[1] + share * dy];
+            // All strokes lean the same way, as on a technical drawing.
+            let along = [-towards[1], towards[0]];
+            let tip = [foot[0] + length * (towards[0] + 0.8 * along[0]), foot[1] + length * (towards[1] + 0.8 * along[1])];
+            self.sheet.line(&[foot, tip], &Pen { width: 0.75 * pen.width, ..pen })?;
+        }
+        self.sheet.line(&[from, to], &Pen { width: 1.3 * self.size.max(0.7), ..pen })
+    }
+
+    /// Walls, from frame to frame.
+    pub(crate) fn walls(&self, walls: &[WallSketch], occupied: &mut Occupied) -> Result<(), ChartError> {
+        for wall in walls.iter().filter(|wall| finite(&[wall.through, wall.normal])) {
+            let length = wall.normal[0].hypot(wall.normal[1]);
+            if length == 0.0 {
+                continue;
+            }
+            let (nx, ny) = (wall.normal[0] / length, wall.normal[1] / length);
+            let reach = self.view.reach() + wall.through[0].hypot(wall.through[1]);
+            let ends = [-reach, reach].map(|s| self.view.fractions([wall.through[0] - s * ny, wall.through[1] + s * nx]));
+            for piece in clip(ends) {
+                let (from, to) = (self.panel.page(piece[0]), self.panel.page(piece[1]));
+                let normal = self.view.direction([nx, ny]);
+                occupied.line(&[from, to]);
+                self.hatched(from, to, [-normal[0], -normal[1]], 7.0, 4.5)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The mechanism in a pose, without names.
+    pub(crate) fn pose(&self, sketch: &Sketch, pose: &Pose, occupied: &mut Occupied) -> Result<(), ChartError> {
+        let size = self.size;
+        for (_, &at) in sketch.hinges.iter().zip(&pose.hinges).filter(|(hinge, at)| hinge.ground && finite(&[**at])) {
+            let [x, y] = self.at(at);
+            let (half, height) = (6.5 * size, 10.0 * size);
+            self.sheet.polygon(&[[x, y], [x - half, y - height], [x + half, y - height]], mix(SPINE, WHITE, 0.7))?;
+            self.sheet.line(&[[x - half, y - height], [x, y], [x + half, y - height]], &Pen::new(INK, 0.9 * size))?;
+            self.hatched([x - 1.8 * half, y - height], [x + 1.8 * half, y - height], [0.0, -1.0], 3.6 * size, 4.4 * size)?;
+            occupied.block([x - 1.8 * half, y - height - 5.0 * size, x + 1.8 * half + 3.0, y - 2.0]);
+        }
+        for (k, bar) in pose.bars.iter().enumerate().filter(|(_, bar)| finite(&bar[..])) {
+            let ends = bar.map(|end| self.at(end));
+            let colour = if k % 2 == 0 { ORANGE } else { SKY };
+            self.sheet.line(&ends, &Pen::new(mix(colour, INK, 0.3), 5.6 * size))?;
+            self.sheet.line(&ends, &Pen::new(mix(colour, WHITE, 0.55), 3.6 * size))?;
+            occupied.line(&ends);
+        }
+        for (spring, ends) in sketch.springs.iter().zip(&pose.springs).filter(|(_, ends)| finite(&ends[..])) {
+            self.spring(spring, ends.map(|end| self.at(end)), occupied)?;
+        }
+        for motor in pose.motors.iter().filter(|motor| finite(&[motor.at, [motor.angle, motor.rate]])) {
+            self.motor(motor, sketch.hinges.len() < NAMES, occupied)?;
+        }
+        for &at in pose.hinges.iter().filter(|at| finite(&[**at])) {
+            self.sheet.ring(self.at(at), 3.1 * size, INK, 1.1 * size)?;
+        }
+        for (k, &at) in pose.points.iter().enumerate().filter(|(_, at)| finite(&[**at])) {
+            self.sheet.disc(self.at(at), 3.3 * size, mix(trail_colour(k), INK, 0.1))?;
+        }
+        Ok(())
+    }
+
+    fn spring(&self, spring: &SpringSketch, [from, to]: [Point; 2], occupied: &mut Occupied) -> Result<(), ChartError> {
+        let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
+        let length = dx.hypot(dy);
+        for (k, at) in [from, to].into_iter().enumerate().filter(|(k, _)| spring.ground[*k]) {
+            let away = if k == 0 { dy } else { -dy };
+            // The hatching lies on the side the spring does not leave to.
+            let up = if away >= 0.0 { -1.0 } else { 1.0 };
+            let half = 7.5 * self.size;
+            self.hatched([at[0] - half, at[1]], [at[0] + half, at[1]], [0.0, up], 3.6 * self.size, 4.4 * self.size)?;
+            occupied.block([at[0] - half, at[1] - 5.0, at[0] + half, at[1] + 5.0]);
+        }
+        let (along, across) = if length > 0.0 { ([dx / length, dy / length], [-dy / length, dx / length]) } else { ([0.0; 2], [0.0; 2]) };
+        let lead = (0.15 * length).min(8.0 * self.size);
+        let waves = 11;
+        let mut line = vec![from];
+        for k in 0..=waves {
+            let s = lead + (length - 2.0 * lead) * f64::from(k) / f64::from(waves);
+            let swing = if k == 0 || k == waves { 0.0 } else { 4.6 * self.size * f64::from(1 - 2 * (k % 2)) };
+            line.push([from[0] + s * along[0] + swing * across[0], from[1] + s * along[1] + swing * across[1]]);
+        }
+        line.push(to);
+        self.sheet.line(&line, &Pen::new(WHITE, 3.2 * self.size))?;
+        self.sheet.line(&line, &Pen::new(mix(GREEN, INK, 0.15), 1.6 * self.size))?;
+        occupied.line(&line);
+        for at in [from, to] {
+            self.sheet.disc(at, 2.1 * self.size, INK)?;
+        }
+        Ok(())
+    }
+
+    /// An arc ahead of the driven bar, arrow head in the sense of rotation.
+    fn motor(&self, motor: &MotorPose, named: bool, occupied: &mut Occupied) -> Result<(), ChartError> {
+        let centre = self.at(motor.at);
+        let bar = self.view.direction([libm::cos(motor.angle), libm::sin(motor.angle)]);
+        // Counter-clockwise on the page, where y points down.
+        let start = (-bar[1]).atan2(bar[0]);
+        let sense = if motor.rate < 0.0 { -1.0 } else { 1.0 };
+        let radius = 21.0 * self.size.max(0.75);
+        let on = |angle: f64, radius: f64| [centre[0] + radius * angle.cos(), centre[1] - radius * angle.sin()];
+        let arc: Vec<Point> = (0..=40).map(|k| on(start + sense * (0.3 + 2.1 * f64::from(k) / 40.0), radius)).collect();
+        let colour = readable(PURPLE);
+        self.sheet.line(&arc, &Pen::new(colour, 1.7 * self.size.max(0.75)))?;
+        occupied.line(&arc);
+        if motor.rate != 0.0 {
+            let tip = on(start + sense * 2.72, radius);
+            let foot = start + sense * 2.36;
+            self.sheet.polygon(&[tip, on(foot, radius + 3.6), on(foot + sense * 0.06, radius), on(foot, radius - 3.6)], colour)?;
+        }
+        if named {
+            let best =
+                (0..9).map(|k| on(start + sense * (0.4 + 0.25 * f64::from(k)), radius + 9.0)).map(|p| (p, occupied.cost(around(p, 5.0))));
+            let Some((at, _)) = best.min_by(|a, b| a.1.total_cmp(&b.1)) else { return Ok(()) };
+            occupied.block(around(at, 5.0));
+            let lettering = Lettering { halo: true, ..Lettering::new(NAME, colour).at(Align::Centre, Level::Middle) };
+            self.sheet.words("*ω*", lettering, at)?;
+        }
+        Ok(())
+    }
+
+    /// Names of hinges and points beside them, away from the bars that meet there.
+    pub(crate) fn names(&self, sketch: &Sketch, pose: &Pose, occupied: &mut Occupied) -> Result<(), ChartError> {
+        let hinges = sketch.hinges.iter().map(|hinge| &hinge.name).zip(&pose.hinges);
+        let all: Vec<(&String, &[f64; 2])> =
+            hinges.chain(sketch.points.iter().zip(&pose.points)).filter(|(name, at)| !name.is_empty() && finite(&[**at])).collect();
+        if all.len() >= NAMES {
+            return Ok(());
+        }
+        for &(_, &at) in &all {
+            occupied.block(around(self.at(at), 3.5));
+        }
+        for (name, &at) in all {
+            let here = self.at(at);
+            let mut avoid = Vec::new();
+            for bar in &pose.bars {
+                let ends = bar.map(|end| self.at(end));
+                for (near, far) in [(ends[0], ends[1]), (ends[1], ends[0])] {
+                    let length = (far[0] - near[0]).hypot(far[1] - near[1]);
+                    if (near[0] - here[0]).hypot(near[1] - here[1]) < 1.0 && length > 0.0 {
+                        avoid.push([(far[0] - near[0]) / length, (far[1] - near[1]) / length]);
+                    }
+                }
+            }
+            let size = [self.sheet.width(name, NAME, false), 0.75 * NAME];
+            let (bounds, cost) = place(here, 5.5, size, self.panel.bounds, &avoid, occupied);
+            // A name that would lie on another one is worse than none.
+            if cost > 49.0 {
+                continue;
+            }
+            occupied.block(bounds);
+            let lettering = Lettering { halo: true, ..Lettering::new(NAME, INK).at(Align::Left, Level::Middle) };
+            self.sheet.words(name, lettering, [bounds[0], 0.5 * (bounds[1] + bounds[3])])?;
+        }
+        Ok(())
+    }
+
+    /// Arrow of gravity in the emptiest corner, and the directions of x and y where they lie oblique to the page.
+    pub(crate) fn compass(&self, occupied: &mut Occupied) -> Result<(), ChartError> {
+        let [left, top, right, bottom] = self.panel.bounds;
+        let corner = |occupied: &Occupied, half: f64| {
+            let inset = half + 6.0;
+            let corners = [
+                [right - inset, top + inset],
+                [left + inset, top + inset],
+                [right - inset, bottom - inset],
+                [left + inset, bottom - inset],
+            ];
+            let costs = corners.map(|at| occupied.cost(around(at, half)));
+            let best = (0..4).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(0);
+            corners[best]
+        };
+        if self.view.falls() {
+            let [x, y] = corner(occupied, 16.0);
+            occupied.block(around([x, y], 16.0));
+            self.arrow([x + 6.0, y - 13.0], [x + 6.0, y + 14.0], GREY)?;
+            let lettering = Lettering::new(NAME + 1.0, GREY).at(Align::Centre, Level::Middle);
+            self.sheet.words("*g*", lettering, [x - 5.0, y - 2.0])?;
+        }
+        if self.view.oblique() {
+            let centre = corner(occupied, 20.0);
+            occupied.block(around(centre, 20.0));
+            for (axis, name) in [([1.0, 0.0], "*x*"), ([0.0, 1.0], "*y*")] {
+                let d = self.view.direction(axis);
+                self.arrow(centre, [centre[0] + 15.0 * d[0], centre[1] + 15.0 * d[1]], GREY)?;
+                let lettering = Lettering::new(NAME - 1.0, GREY).at(Align::Centre, Level::Middle);
+                self.sheet.words(name, lettering, [centre[0] + 21.0 * d[0], centre[1] + 21.0 * d[1]])?;
+            }
+        }
+        Ok(())
+    }
+
+    fn arrow(&self, from: Point, to: Point, colour: Colour) -> Result<(), ChartError> {
+        let length = (to[0] - from[0]).hypot(to[1] - from[1]).max(1e-9);
+        let (along, across) =
+            ([(to[0] - from[0]) / length, (to[1] - from[1]) / length], [-(to[1] - from[1]) / length, (to[0] - from[0]) / length]);
+        let back = |s: f64, w: f64| [to[0] - s * along[0] + w * across[0], to[1] - s * along[1] + w * across[1]];
+        self.sheet.line(&[from, back(4.0, 0.0)], &Pen::new(colour, 1.3))?;
+        self.sheet.polygon(&[to, back(6.5, 3.0), back(5.0, 0.0), back(6.5, -3.0)], colour)
+    }
+}
+
+fn around([x, y]: Point, half: f64) -> [f64; 4] {
+    [x - half, y - half, x + half, y + half]
+}
+
+/// Symbols shrink with the bars: 1 while the median bar is longer than 24 pt.
+pub(crate) fn symbol_size(pose: &Pose, pt_per_metre: f64) -> f64 {
+    let mut lengths: Vec<f64> =
+        pose.bars.iter().map(|[a, b]| (b[0] - a[0]).hypot(b[1] - a[1]) * pt_per_metre).filter(|l| l.is_finite()).collect();
+    lengths.sort_by(f64::total_cmp);
+    lengths.get(lengths.len() / 2).map_or(1.0, |median| (median / 24.0).clamp(0.5, 1.0))
+}

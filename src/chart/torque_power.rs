@@ -1,0 +1,112 @@
+//! Torque and power of motors against time, above each other, the largest magnitudes marked.
+
+use super::axis::Axis;
+use super::file::Picture;
+use super::grid::{label_room, shortened, stacked};
+use super::labels::Occupied;
+use super::lines::Point;
+use super::palette::{BLUE, Colour, Mark, SPINE, Shape, VERMILLION, marks, readable};
+use super::panel::Panel;
+use super::sheet::{Pen, Sheet};
+use super::ticks::{decimal, figure};
+use super::{ChartError, PAGE};
+
+/// One motor.
+#[derive(Clone, Debug, Default)]
+pub struct MotorSeries {
+    /// Name, with markup.
+    pub name: String,
+    /// Times \[s\], ascending.
+    pub time: Vec<f64>,
+    /// Torque on the driven bar at these times \[N·m\].
+    pub torque: Vec<f64>,
+    /// Power fed in at these times \[W\].
+    pub power: Vec<f64>,
+}
+
+/// Torque and power of one or several motors.
+#[derive(Clone, Debug, Default)]
+pub struct TorquePower {
+    /// Title, with markup.
+    pub title: String,
+    /// Parts of the caption, with markup; what is drawn is added.
+    pub caption: Vec<String>,
+    /// The motors.
+    pub motors: Vec<MotorSeries>,
+}
+
+/// Draws both curves of each motor with a ring and a figure at each largest magnitude.
+///
+/// # Errors
+/// [`ChartError`] if the resolution is out of range or drawing fails.
+pub fn torque_power(chart: &TorquePower, px_per_pt: f64) -> Result<Picture, ChartError> {
+    let sheet = Sheet::new(PAGE, px_per_pt)?;
+    let data = |values: fn(&MotorSeries) -> &Vec<f64>| -> Vec<Vec<Point>> {
+        let line = |motor: &MotorSeries| motor.time.iter().zip(values(motor)).map(|(&t, &v)| [t, v]).collect();
+        chart.motors.iter().map(line).collect()
+    };
+    let rows = [(data(|m| &m.torque), "torque [N·m]", "N·m"), (data(|m| &m.power), "power [W]", "W")];
+    let marks = marks(chart.motors.iter().map(|motor| motor.name.as_str()));
+    let several = chart.motors.len() > 1;
+    let labels: Vec<String> = chart.motors.iter().map(|motor| shortened(&sheet, &motor.name)).collect();
+
+    let x = Axis::tight("time [s]", rows[0].0.iter().flatten().filter(|p| p[1].is_finite()).map(|p| p[0]));
+    // Zero belongs to both: its line parts driving from braking.
+    let y = |row: &(Vec<Vec<Point>>, &str, &str)| Axis::fit(row.1, row.0.iter().flatten().map(|p| p[1]).chain(zero(&row.0)));
+    let mut caption = chart.caption.clone();
+    let crowded = {
+        // Tried on a page of its own: the caption has to be known before the panels have their places.
+        let trial = Sheet::new(PAGE, 0.5)?;
+        let panels = stacked(&trial, 40.0, &x, rows.iter().map(y).collect(), 20.0)?;
+        panels.iter().zip(&rows).any(|(panel, row)| row.0.iter().any(|line| panel.crowded(line)))
+    };
+    caption.push(if crowded { "bands between the extremes, largest magnitudes marked" } else { "largest magnitudes marked" }.to_owned());
+    let under = sheet.heading(&chart.title, &caption)?;
+    let right = if several { label_room(&sheet, labels.iter().map(String::as_str), false) } else { 20.0 };
+    let panels = stacked(&sheet, under, &x, rows.iter().map(y).collect(), right)?;
+    for (k, (panel, (lines, _, unit))) in panels.iter().zip(&rows).enumerate() {
+        panel.series(&[[panel.x.from, 0.0], [panel.x.to, 0.0]], &Pen::new(SPINE, 0.75))?;
+        let own = [Mark { colour: BLUE, shape: Shape::Disc, turn: 0 }, Mark { colour: VERMILLION, shape: Shape::Disc, turn: 0 }];
+        let mark = |motor: usize| if several { marks[motor] } else { own[k] };
+        let (mut occupied, mut ends) = (Occupied::default(), Vec::new());
+        for (motor, line) in lines.iter().enumerate() {
+            let pieces = panel.trace(line, mark(motor).colour, 1.8)?;
+            pieces.iter().for_each(|piece| occupied.line(piece));
+            if let Some(end) = pieces.last().and_then(|piece| piece.last()) {
+                ends.push((end[1], labels[motor].clone(), mark(motor)));
+            }
+        }
+        // Rings of many motors would say less than none.
+        for (motor, line) in lines.iter().enumerate().filter(|_| lines.len() <= 3) {
+            peak(&sheet, panel, line, unit, mark(motor).colour, &mut occupied)?;
+        }
+        if lines.iter().flatten().all(|p| !p[1].is_finite()) {
+            panel.empty("no data")?;
+        }
+        if several {
+            panel.end_labels(&ends, false)?;
+        }
+    }
+    drop(panels);
+    Ok(sheet.picture(&chart.title, &caption))
+}
+
+fn zero(lines: &[Vec<Point>]) -> Option<f64> {
+    (!lines.is_empty()).then_some(0.0)
+}
+
+/// A ring and words at the largest magnitude.
+fn peak(sheet: &Sheet, panel: &Panel, line: &[Point], unit: &str, colour: Colour, occupied: &mut Occupied) -> Result<(), ChartError> {
+    let usable = line.iter().filter(|p| p[1].abs() <= 1e300 && p[0].is_finite());
+    let Some(&top) = usable.max_by(|a, b| a[1].abs().total_cmp(&b[1].abs())) else { return Ok(()) };
+    if top[1] == 0.0 {
+        return Ok(());
+    }
+    let at = panel.at(top);
+    sheet.disc(at, 4.0, super::palette::WHITE)?;
+    sheet.ring(at, 2.9, colour, 1.3)?;
+    occupied.block([at[0] - 4.0, at[1] - 4.0, at[0] + 4.0, at[1] + 4.0]);
+    let span = panel.x.to - panel.x.from;
+    let time = if span > 1e3 || !(0.1..1e5).contains(&top[0].abs()) { figure(top[0]) } else { decimal(top[0], 2) };
+    panel.note_beside(at, &format!("{} {unit} at {time} s", figure(top[1])), readable(colour), occupied)
+}
