@@ -49,7 +49,10 @@
 pub mod arithmetic;
 #[cfg(feature = "charts")]
 pub mod chart;
+#[cfg(feature = "cli")]
+pub mod cli;
 pub mod dynamics;
+pub mod report;
 pub mod run;
 pub mod scene;
 pub mod stabilization;

@@ -277,10 +277,16 @@ pub fn march(run: Run, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>)
         let stopped = resting.take().map_or_else(|| go(&mechanism, &mut *marcher, row, &mut sampler, &mut outcome), Err);
         marcher.read(&mut motion);
         let sample = sampler.take(&motion);
-        observer(sample)?;
-        outcome.trace.see(sample);
+        // A stop before any progress leaves the state of the row before.
+        if row == 0 || sample.t > outcome.last.t {
+            observer(sample)?;
+            outcome.trace.see(sample);
+        }
         let exceeded = outcome.drift.see(sample, &limits);
-        outcome.stop = stopped.err().or_else(|| exceeded.err().map(|what| drift_stop(&outcome.plan, sample.t, what)));
+        outcome.stop = stopped
+            .err()
+            .or_else(|| exceeded.err().map(|what| drift_stop(&outcome.plan, sample.t, what)))
+            .or_else(|| (!sample.is_finite()).then(|| not_finite(&outcome.plan, sample.t)));
         outcome.last.clone_from(sample);
         if outcome.stop.is_some() {
             break;
@@ -369,6 +375,12 @@ fn strike_at_start(mechanism: &Mechanism, marcher: &mut dyn March, sampler: &mut
 fn resting(plan: &Plan, t: f64, what: String) -> StepError {
     let hint = "sustained contact is not modelled: raise the restitution or end the run before".into();
     StepError { cause: Cause::RestingContact, method: plan.method.to_string(), t, step: 0.0, what, hint }
+}
+
+fn not_finite(plan: &Plan, t: f64) -> StepError {
+    let what = "energies, torques or velocities are beyond the numbers a double holds".into();
+    let hint = "look for masses, rates or stiffnesses far out of proportion".into();
+    StepError { cause: Cause::NotFinite, method: plan.method.to_string(), t, step: plan.step.unwrap_or(0.0), what, hint }
 }
 
 fn drift_stop(plan: &Plan, t: f64, what: String) -> StepError {

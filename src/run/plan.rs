@@ -186,6 +186,10 @@ fn check_numbers(request: &Request) -> Result<(), Refusal> {
     if request.step.is_some() && (request.rtol.is_some() || request.atol.is_some()) {
         return Err(usage("--step with a tolerance", "a method takes one or the other".into(), "leave one of them out"));
     }
+    if request.time_constant.is_some() && request.stabilize != Some(Stabilization::Baumgarte) {
+        let reason = "it is the time constant of Baumgarte's term, and of nothing else";
+        return Err(usage("--time-constant", reason.into(), "--stabilize baumgarte, or leave it out"));
+    }
     Ok(())
 }
 

@@ -39,6 +39,15 @@ pub struct Sample {
     pub motors: Vec<[f64; 2]>,
 }
 
+impl Sample {
+    /// False where any number of it is not finite; nothing after that means anything.
+    pub fn is_finite(&self) -> bool {
+        let scalars = [self.t, self.kinetic, self.potential, self.work, self.stabilizer, self.imbalance];
+        let vectors = [&self.centre, &self.velocity, &self.constraints, &self.motors];
+        scalars.iter().chain(&self.phi).chain(&self.omega).chain(vectors.into_iter().flatten().flatten()).all(|x| x.is_finite())
+    }
+}
+
 /// Takes samples.
 #[derive(Clone, Debug)]
 pub struct Sampler {

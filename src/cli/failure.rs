@@ -1,0 +1,139 @@
+//! What went wrong, for people on stderr, for scripts as exit code and, with `--json`, as `{"error": …}` on stdout.
+
+use super::output::print_object;
+use crate::dynamics::CompileError;
+use crate::run::{FileError, Refusal, RunError};
+use crate::scene::SceneError;
+use crate::stepping::{Cause, StepError};
+use serde_json::{Value, json};
+use std::process::ExitCode;
+
+/// Exit codes; 0 is success, and 130 is kept for a run interrupted after a checkpoint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Exit {
+    /// None of the below.
+    Other = 1,
+    /// The command line makes no sense, whatever the scene.
+    Usage = 2,
+    /// The scene is invalid, or does not go with what was asked of it.
+    Scene = 3,
+    /// The integration stopped before its horizon.
+    Stopped = 4,
+    /// A stated drift limit was exceeded.
+    Drift = 5,
+    /// A file could not be read or written.
+    Io = 6,
+}
+
+impl Exit {
+    /// One word, in the JSON object of an error.
+    pub fn kind(self) -> &'static str {
+        match self {
+            Self::Other => "other",
+            Self::Usage => "usage",
+            Self::Scene => "scene",
+            Self::Stopped => "stopped",
+            Self::Drift => "drift",
+            Self::Io => "io",
+        }
+    }
+}
+
+/// Why a command was not done.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Failure {
+    /// The exit code.
+    pub exit: Exit,
+    /// What to say.
+    pub message: String,
+    /// What else scripts may want to know.
+    details: Value,
+    /// True where stdout has its object already, or cannot take one.
+    told: bool,
+}
+
+impl Failure {
+    /// A failure with nothing but a message.
+    pub fn new(exit: Exit, message: impl Into<String>) -> Self {
+        Self { exit, message: message.into(), details: Value::Null, told: false }
+    }
+
+    /// The same, where stdout needs no object of it.
+    pub(super) fn told(mut self) -> Self {
+        self.told = true;
+        self
+    }
+
+    /// `{"kind", "exit_code", "message", "details"}`.
+    pub fn object(&self) -> Value {
+        json!({"kind": self.exit.kind(), "exit_code": self.exit as u8, "message": self.message, "details": self.details})
+    }
+
+    /// Says it and chooses the exit code.
+    pub fn tell(&self, json: bool) -> ExitCode {
+        if json && !self.told {
+            // The failure that is being told weighs more than one in telling it.
+            let _ = print_object(&json!({ "error": self.object() }));
+        }
+        super::output::message(&format!("error: {}", self.message));
+        ExitCode::from(self.exit as u8)
+    }
+}
+
+impl From<SceneError> for Failure {
+    fn from(error: SceneError) -> Self {
+        let exit = if error.is_io() { Exit::Io } else { Exit::Scene };
+        Self { details: json!(error.refusal()), ..Self::new(exit, error.to_string()) }
+    }
+}
+
+impl From<CompileError> for Failure {
+    fn from(error: CompileError) -> Self {
+        Self::new(Exit::Scene, error.to_string())
+    }
+}
+
+impl From<Refusal> for Failure {
+    fn from(refusal: Refusal) -> Self {
+        let exit = if refusal.is_usage { Exit::Usage } else { Exit::Scene };
+        let details = json!({"what": refusal.what, "reason": refusal.reason, "alternative": refusal.alternative});
+        Self { details, ..Self::new(exit, refusal.to_string()) }
+    }
+}
+
+impl From<StepError> for Failure {
+    fn from(error: StepError) -> Self {
+        let exit = match error.cause {
+            Cause::DriftLimit => Exit::Drift,
+            Cause::Unsuited => Exit::Scene,
+            _ => Exit::Stopped,
+        };
+        Self { details: json!(error), ..Self::new(exit, error.to_string()) }
+    }
+}
+
+impl From<FileError> for Failure {
+    fn from(error: FileError) -> Self {
+        Self::new(Exit::Io, error.to_string())
+    }
+}
+
+impl From<RunError> for Failure {
+    fn from(error: RunError) -> Self {
+        match error {
+            RunError::Compile(error) => error.into(),
+            RunError::Refused(refusal) => refusal.into(),
+            RunError::Step(error) => error.into(),
+            RunError::Observer(error) => Self::new(Exit::Io, error.to_string()),
+        }
+    }
+}
+
+#[cfg(feature = "charts")]
+impl From<crate::chart::ChartError> for Failure {
+    fn from(error: crate::chart::ChartError) -> Self {
+        let exit = if matches!(error, crate::chart::ChartError::Write { .. }) { Exit::Io } else { Exit::Other };
+        Self::new(exit, error.to_string())
+    }
+}

@@ -1,0 +1,255 @@
+//! The command line: one table that is parser, help and completions.
+
+use super::failure::{Exit, Failure};
+use super::output::{message, print};
+use crate::run::{Limits, METHODS, MethodId, Request, Stabilization};
+use crate::scene::Override;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::error::ErrorKind;
+use clap::{Args, Parser, Subcommand};
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+const EXIT_CODES: &str = "\
+Exit codes: 0 done, 1 other failure, 2 usage, 3 scene refused, 4 integration stopped,
+            5 a stated drift limit exceeded, 6 files";
+
+/// Simulates planar mechanisms over long horizons, and tells how far they drift.
+#[derive(Debug, Parser)]
+#[command(name = "driftless", version, max_term_width = 100, after_help = EXIT_CODES, disable_help_subcommand = true)]
+pub struct Flags {
+    #[allow(missing_docs)]
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Validate a scene and say what is active, what is left out, and which method would run it
+    Check(CheckFlags),
+    /// Show accelerations, multipliers, motors, hinge forces and energy at the start
+    Inspect(InspectFlags),
+    /// Run a scene and write its trajectory, record and charts
+    Run(Box<RunFlags>),
+    /// List the methods
+    Methods {
+        /// Print one JSON object
+        #[arg(long)]
+        json: bool,
+    },
+    /// Print the JSON Schema of scenes
+    Schema,
+    /// Print a script that completes commands and options in a shell
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+}
+
+/// Which scene, and how to talk about it.
+#[derive(Debug, Args)]
+pub struct SceneFlags {
+    /// Scene file (JSON); `driftless schema` describes it
+    #[arg(value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// Set a value of the scene, as in walls.wall.restitution=0.5; repeatable
+    #[arg(long, value_name = "PATH=VALUE")]
+    pub set: Vec<Override>,
+    /// Print exactly one JSON object on stdout
+    #[arg(long)]
+    pub json: bool,
+    /// Print errors only: no progress, no messages, no summary
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Say on stderr what is being done
+    #[arg(short, long, conflicts_with = "quiet")]
+    pub verbose: bool,
+}
+
+/// How to run it.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Integration")]
+pub struct PlanFlags {
+    /// Method; left out, one that suits the scene
+    #[arg(long, value_parser = methods())]
+    pub method: Option<MethodId>,
+    /// Step of a fixed-step method [s], as 0.01 or 1/64
+    #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
+    pub step: Option<f64>,
+    /// Relative tolerance of an adaptive method [default: 1e-9]
+    #[arg(long, value_name = "TOL", value_parser = number, allow_hyphen_values = true)]
+    pub rtol: Option<f64>,
+    /// Absolute tolerance of an adaptive method [default: as --rtol]
+    #[arg(long, value_name = "TOL", value_parser = number, allow_hyphen_values = true)]
+    pub atol: Option<f64>,
+    /// Horizon [s] [default: the scene's]
+    #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
+    pub until: Option<f64>,
+    /// Output interval [s] [default: the scene's]
+    #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
+    pub every: Option<f64>,
+    /// How motors' angles are kept [default: elimination, or projection with rattle]
+    #[arg(long, value_name = "HOW", value_parser = stabilizations())]
+    pub stabilize: Option<Stabilization>,
+    /// Time constant of Baumgarte's term [s] [default: five mean steps]
+    #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
+    pub time_constant: Option<f64>,
+}
+
+/// `driftless check`.
+#[derive(Debug, Args)]
+pub struct CheckFlags {
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub scene: SceneFlags,
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub plan: PlanFlags,
+}
+
+/// `driftless inspect`.
+#[derive(Debug, Args)]
+pub struct InspectFlags {
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub scene: SceneFlags,
+}
+
+/// `driftless run`.
+#[derive(Debug, Args)]
+pub struct RunFlags {
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub scene: SceneFlags,
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub plan: PlanFlags,
+    /// Stop with exit code 5 where the energy is off by more than this share of its scale
+    #[arg(long, value_name = "SHARE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
+    pub max_energy_drift: Option<f64>,
+    /// Stop with exit code 5 where a constraint is off by more [rad, rad/s]
+    #[arg(long, value_name = "SIZE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
+    pub max_constraint_drift: Option<f64>,
+    /// Folder under which <scene>/<method>-<setting>/ is made
+    #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
+    pub out: PathBuf,
+    /// Overwrite the run that is in the folder
+    #[arg(long, help_heading = "Files")]
+    pub force: bool,
+    /// Draw no PNG charts
+    #[cfg(feature = "charts")]
+    #[arg(long, help_heading = "Files")]
+    pub no_charts: bool,
+    /// Draw an animated GIF of the mechanism
+    #[cfg(feature = "charts")]
+    #[arg(long, help_heading = "Files")]
+    pub gif: bool,
+}
+
+impl Flags {
+    /// True where stdout is to hold one JSON object.
+    pub fn is_json(&self) -> bool {
+        match &self.command {
+            Command::Check(flags) => flags.scene.json,
+            Command::Inspect(flags) => flags.scene.json,
+            Command::Run(flags) => flags.scene.json,
+            Command::Methods { json } => *json,
+            Command::Schema | Command::Completions { .. } => false,
+        }
+    }
+}
+
+impl SceneFlags {
+    /// Says something on stderr where that is wanted.
+    pub(super) fn remark(&self, text: &str) {
+        if self.verbose {
+            message(text);
+        }
+    }
+}
+
+impl PlanFlags {
+    /// What is asked of the plan.
+    pub fn request(&self) -> Request {
+        Request {
+            method: self.method,
+            step: self.step,
+            rtol: self.rtol,
+            atol: self.atol,
+            until: self.until,
+            every: self.every,
+            stabilize: self.stabilize,
+            time_constant: self.time_constant,
+        }
+    }
+}
+
+impl RunFlags {
+    /// The stated limits.
+    pub fn limits(&self) -> Limits {
+        Limits { energy: self.max_energy_drift, constraint: self.max_constraint_drift }
+    }
+}
+
+/// Parses the command line, of which the first argument is the program's name.
+///
+/// # Errors
+/// The exit code, where help was asked for (0) or the line makes no sense (2); what there is to say has been said.
+pub fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Flags, ExitCode> {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    Flags::try_parse_from(&arguments).map_err(|error| {
+        if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
+            return match print(&error.render().to_string()) {
+                Ok(()) => ExitCode::SUCCESS,
+                Err(failure) => failure.tell(false),
+            };
+        }
+        let text = error.render().to_string();
+        let text = text.trim_end();
+        let failure = Failure::new(Exit::Usage, text.strip_prefix("error: ").unwrap_or(text));
+        failure.tell(arguments.iter().any(|argument| argument == "--json"))
+    })
+}
+
+fn methods() -> impl TypedValueParser<Value = MethodId> {
+    PossibleValuesParser::new(METHODS.iter().map(|info| info.name)).try_map(|name| name.parse::<MethodId>())
+}
+
+fn stabilizations() -> impl TypedValueParser<Value = Stabilization> {
+    PossibleValuesParser::new(Stabilization::ALL.map(Stabilization::name)).try_map(|name| name.parse::<Stabilization>())
+}
+
+/// A number, or a fraction of two.
+fn number(text: &str) -> Result<f64, String> {
+    let read = |part: &str| part.trim().parse::<f64>().map_err(|_| "not a number; write 0.01, 1e-9 or 1/64".to_owned());
+    match text.split_once('/') {
+        Some((above, below)) => Ok(read(above)? / read(below)?),
+        None => read(text),
+    }
+}
+
+/// A limit: any number that is not negative.
+fn limit(text: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    if value >= 0.0 { Ok(value) } else { Err("a limit is a number from 0 up".to_owned()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_table_is_sound() {
+        Flags::command().debug_assert();
+    }
+
+    #[test]
+    fn fractions_are_numbers() {
+        assert_eq!(number("1/64"), Ok(0.015625));
+        assert_eq!(number("-1e-3"), Ok(-0.001));
+        assert!(number("1/").is_err() && number("ten").is_err() && limit("nan").is_err() && limit("-1").is_err());
+    }
+}

@@ -1,0 +1,73 @@
+//! The program: its commands, each a few lines around the rooms that do the work.
+//!
+//! Data go to stdout or into files, progress and messages to stderr.  Exit codes are in [`failure::Exit`].
+
+pub mod failure;
+pub mod flags;
+mod output;
+mod progress;
+mod simulate;
+
+pub use failure::Failure;
+pub use flags::{Flags, parse};
+
+use crate::dynamics::Mechanism;
+use crate::report;
+use crate::run::{Plan, Run};
+use crate::scene::{self, Scene};
+use clap::CommandFactory;
+use flags::{CheckFlags, Command, InspectFlags, SceneFlags};
+use output::{print, print_object};
+use std::sync::Arc;
+
+/// Does what the flags ask for.
+///
+/// # Errors
+/// Anything that keeps it from being done, with its exit code.
+pub fn run(flags: &Flags) -> Result<(), Failure> {
+    match &flags.command {
+        Command::Check(flags) => check(flags),
+        Command::Inspect(flags) => inspect(flags),
+        Command::Run(flags) => simulate::run(flags),
+        Command::Methods { json: true } => print_object(&report::methods::object()),
+        Command::Methods { json: false } => print(&report::methods::text()),
+        Command::Schema => print_object(&scene::schema()),
+        Command::Completions { shell } => {
+            let mut script = Vec::new();
+            clap_complete::generate(*shell, &mut Flags::command(), "driftless", &mut script);
+            print(&String::from_utf8_lossy(&script))
+        }
+    }
+}
+
+fn check(flags: &CheckFlags) -> Result<(), Failure> {
+    let (scene, mechanism) = load(&flags.scene)?;
+    let plan = Plan::new(&scene, &mechanism, &flags.plan.request())?;
+    // That the method can begin is part of the check; measuring Baumgarte's time constant is not.
+    let trial = Plan { time_constant: plan.time_constant.or(Some(1.0)), ..plan.clone() };
+    Run::new(Arc::clone(&mechanism), trial, Default::default(), &mechanism.start(&scene))?;
+    if flags.scene.json {
+        print_object(&report::check::object(&scene, &mechanism, &plan))
+    } else if flags.scene.quiet {
+        Ok(())
+    } else {
+        print(&report::check::text(&scene, &mechanism, &plan))
+    }
+}
+
+fn inspect(flags: &InspectFlags) -> Result<(), Failure> {
+    let (scene, mechanism) = load(&flags.scene)?;
+    let inspection = report::inspect::inspect(&scene, &mechanism);
+    if flags.scene.json { print_object(&inspection.object(&scene)) } else { print(&inspection.text(&scene)) }
+}
+
+/// Reads and compiles the scene.
+fn load(flags: &SceneFlags) -> Result<(Scene, Arc<Mechanism>), Failure> {
+    let scene = scene::read_scene(&flags.scene, &flags.set)?;
+    flags.remark(&format!("read {}: scene {}, {} bodies", flags.scene.display(), scene.name, scene.bars.len()));
+    for set in &flags.set {
+        flags.remark(&format!("set {} to {}", set.path, set.value));
+    }
+    let mechanism = Arc::new(Mechanism::new(&scene)?);
+    Ok((scene, mechanism))
+}

@@ -1,0 +1,32 @@
+//! Writing to stdout and stderr, where a reader that went away is no failure.
+
+use super::failure::{Exit, Failure};
+use serde_json::Value;
+use std::io::{ErrorKind, Write};
+
+/// Prints data.
+///
+/// # Errors
+/// Stdout cannot take it; a closed pipe is not an error, for whoever closed it has seen enough.
+pub fn print(text: &str) -> Result<(), Failure> {
+    let mut stdout = std::io::stdout().lock();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(Failure::new(Exit::Io, format!("cannot write to stdout: {error}")).told())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Prints one JSON object.
+///
+/// # Errors
+/// As [`print`].
+pub fn print_object(object: &Value) -> Result<(), Failure> {
+    print(&format!("{object:#}\n"))
+}
+
+/// Prints a message on stderr; nobody can be told where that fails.
+pub fn message(text: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
+}

@@ -1,0 +1,111 @@
+//! `driftless run`: march, and keep what came of it.
+
+use super::failure::Failure;
+use super::flags::RunFlags;
+use super::output::{print, print_object};
+use super::progress::Progress;
+use crate::dynamics::Mechanism;
+use crate::report;
+use crate::run::files::{RECORD, TRAJECTORY};
+use crate::run::table::Table;
+use crate::run::{Folder, Outcome, Plan, Run, RunError, Sample, march};
+use crate::scene::Scene;
+use serde_json::json;
+use std::sync::Arc;
+
+/// Every file a run may leave; those of an earlier run in the same folder go with it.
+const FILES: &[&str] =
+    &[TRAJECTORY, RECORD, "mechanism.png", "angles.png", "energy_drift.png", "constraint_drift.png", "torque_power.png", "mechanism.gif"];
+
+/// Runs a scene.
+///
+/// # Errors
+/// The scene, the plan, the folder, the method or a limit; files of what was reached are kept.
+pub fn run(flags: &RunFlags) -> Result<(), Failure> {
+    let (scene, mechanism) = super::load(&flags.scene)?;
+    let plan = Plan::new(&scene, &mechanism, &flags.plan.request())?;
+    let run = Run::new(Arc::clone(&mechanism), plan, flags.limits(), &mechanism.start(&scene))?;
+    let plan = run.plan();
+    flags.scene.remark(&format!("{}; {}", report::setting(plan), plan.why.as_deref().unwrap_or("as asked for")));
+    for note in &plan.notes {
+        flags.scene.remark(note);
+    }
+    let path = flags.out.join(&scene.name).join(plan.folder(&mechanism));
+    let mut folder = Folder::open(&path, flags.force)?;
+    let (outcome, trajectory_sha256) = record(run, &scene, &mechanism, &mut folder, flags)?;
+    draw(&scene, &mechanism, &outcome, &mut folder, flags)?;
+    let text = format!("{:#}\n", report::result::record(&scene, &mechanism, &outcome, &trajectory_sha256));
+    folder.write(RECORD, text.as_bytes())?;
+    let failure = outcome.stop.clone().map(Failure::from);
+    tell(&scene, &mechanism, &outcome, &folder, flags, failure.as_ref())?;
+    failure.map_or(Ok(()), |failure| Err(failure.told()))
+}
+
+/// Marches and writes the trajectory as it comes.
+fn record(run: Run, scene: &Scene, mechanism: &Mechanism, folder: &mut Folder, flags: &RunFlags) -> Result<(Outcome, String), Failure> {
+    let unwritten = |error: csv::Error| Failure::from(folder.failed(TRAJECTORY, error.into()));
+    let mut table = Table::new(mechanism, folder.begin(TRAJECTORY)?).map_err(unwritten)?;
+    let mut progress = Progress::new(&scene.name, run.plan().until, flags.scene.quiet);
+    let outcome = march(run, &mut |sample: &Sample| {
+        table.write(sample)?;
+        progress.see(sample.t);
+        Ok(())
+    });
+    progress.finish();
+    let outcome = outcome.map_err(|error| match error {
+        RunError::Observer(error) => Failure::from(folder.failed(TRAJECTORY, error)),
+        error => error.into(),
+    })?;
+    let stream = table.finish().map_err(|error| folder.failed(TRAJECTORY, error))?;
+    if flags.force {
+        // Nothing of an older run may stand beside the new trajectory.
+        folder.clear(&FILES[1..])?;
+    }
+    let hash = folder.keep(stream)?;
+    flags.scene.remark(&format!("wrote {}", folder.path().join(TRAJECTORY).display()));
+    Ok((outcome, hash))
+}
+
+#[cfg(feature = "charts")]
+fn draw(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome, folder: &mut Folder, flags: &RunFlags) -> Result<(), Failure> {
+    for chart in report::charts::wanted(mechanism, !flags.no_charts, flags.gif) {
+        let content = report::charts::draw(chart, scene, mechanism, outcome)?;
+        folder.write(chart.file(), &content)?;
+        flags.scene.remark(&format!("drew {}", folder.path().join(chart.file()).display()));
+    }
+    Ok(())
+}
+
+#[cfg(not(feature = "charts"))]
+fn draw(_: &Scene, _: &Mechanism, _: &Outcome, _: &mut Folder, _: &RunFlags) -> Result<(), Failure> {
+    Ok(())
+}
+
+/// Prints the result.
+fn tell(
+    scene: &Scene,
+    mechanism: &Mechanism,
+    outcome: &Outcome,
+    folder: &Folder,
+    flags: &RunFlags,
+    failure: Option<&Failure>,
+) -> Result<(), Failure> {
+    let files: Vec<String> = folder.files().iter().map(|file| file.display().to_string()).collect();
+    if flags.scene.json {
+        let mut object = report::result::object(scene, mechanism, outcome);
+        object["folder"] = json!(folder.path().display().to_string());
+        object["files"] = json!(files);
+        if let Some(failure) = failure {
+            object["error"] = failure.object();
+        }
+        return print_object(&object);
+    }
+    if flags.scene.quiet {
+        return Ok(());
+    }
+    let mut text = report::result::text(scene, mechanism, outcome);
+    for (number, file) in files.iter().enumerate() {
+        text.push_str(&format!("{:15}{file}\n", if number == 0 { "files" } else { "" }));
+    }
+    print(&text)
+}

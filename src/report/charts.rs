@@ -1,0 +1,372 @@
+//! A run in pictures: which charts it has, and what they show.
+
+use crate::arithmetic::Complex;
+use crate::chart::{
+    self, AngleSeries, Angles, ChartError, ConstraintDrift, DefectPanel, DriftSeries, EnergyDrift, FILE_RESOLUTION, HingeSketch,
+    MechanismChart, MotionGif, MotorPose, MotorSeries, Pose, Sketch, SpringSketch, TorquePower, WallSketch, plain,
+};
+use crate::dynamics::Mechanism;
+use crate::dynamics::row::Row;
+use crate::report::page::{figure, magnitude};
+use crate::run::drift::Excursion;
+use crate::run::{Outcome, Sample};
+use crate::scene::{Place, Scene};
+use std::f64::consts::TAU;
+
+/// A chart of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Chart {
+    /// The mechanism at the end, and the way there.
+    Mechanism,
+    /// Angles against time.
+    Angles,
+    /// Energy drift against time.
+    EnergyDrift,
+    /// Constraint drift against time.
+    ConstraintDrift,
+    /// Torque and power of the motors against time.
+    TorquePower,
+    /// The mechanism in motion.
+    Motion,
+}
+
+impl Chart {
+    /// All of them.
+    pub const ALL: [Self; 6] = [Self::Mechanism, Self::Angles, Self::EnergyDrift, Self::ConstraintDrift, Self::TorquePower, Self::Motion];
+
+    /// Name of its file.
+    pub fn file(self) -> &'static str {
+        match self {
+            Self::Mechanism => "mechanism.png",
+            Self::Angles => "angles.png",
+            Self::EnergyDrift => "energy_drift.png",
+            Self::ConstraintDrift => "constraint_drift.png",
+            Self::TorquePower => "torque_power.png",
+            Self::Motion => "mechanism.gif",
+        }
+    }
+}
+
+/// The charts a scene has something to show in: none of constraints without constraints, none of torques without motors.
+pub fn wanted(mechanism: &Mechanism, pictures: bool, motion: bool) -> Vec<Chart> {
+    let driven = mechanism.rows.iter().any(|row| matches!(row, Row::Angle(_)));
+    let has = |chart: &Chart| match chart {
+        Chart::Mechanism | Chart::Angles | Chart::EnergyDrift => pictures,
+        Chart::ConstraintDrift => pictures && !mechanism.rows.is_empty(),
+        Chart::TorquePower => pictures && driven,
+        Chart::Motion => motion,
+    };
+    Chart::ALL.into_iter().filter(has).collect()
+}
+
+/// Draws one chart; returns the content of its file.
+///
+/// # Errors
+/// Drawing or encoding fails.
+pub fn draw(chart: Chart, scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Result<Vec<u8>, ChartError> {
+    let run = Finished { scene, mechanism, outcome };
+    let picture = match chart {
+        Chart::Mechanism => chart::mechanism(&run.mechanism_chart(), FILE_RESOLUTION),
+        Chart::Angles => chart::angles(&run.angles(), FILE_RESOLUTION),
+        Chart::EnergyDrift => chart::energy_drift(&run.energy_drift(), FILE_RESOLUTION),
+        Chart::ConstraintDrift => chart::constraint_drift(&run.constraint_drift(), FILE_RESOLUTION),
+        Chart::TorquePower => chart::torque_power(&run.torque_power(), FILE_RESOLUTION),
+        Chart::Motion => return Ok(chart::motion_gif(&run.motion())?.bytes),
+    };
+    picture?.png_bytes()
+}
+
+/// A turn of the fastest body between samples beyond which lines between them would mislead \[rad\].
+const COARSE: f64 = 0.6;
+/// How far the fastest body turns along the path shown \[rad\].
+const PATH: f64 = 4.0 * TAU;
+/// How far it turns between ghosts \[rad\].
+const GHOST: f64 = 0.4;
+/// Ghosts shown.
+const GHOSTS: usize = 5;
+/// Frames of an animation and their delay \[1/100 s\].
+const FRAMES: usize = 250;
+const DELAY: u16 = 4;
+/// How far the fastest body may turn in an animation that is neither slowed down nor sped up \[rad\].
+const LIVELY: [f64; 2] = [0.5, 20.0 * TAU];
+/// A record over so many decades of time is shown on a logarithmic axis.
+const DECADES: f64 = 1.5;
+
+/// A run and all that belongs to it.
+struct Finished<'a> {
+    scene: &'a Scene,
+    mechanism: &'a Mechanism,
+    outcome: &'a Outcome,
+}
+
+impl Finished<'_> {
+    fn caption(&self, more: Option<String>) -> Vec<String> {
+        let plan = &self.outcome.plan;
+        let mut caption = vec![format!("scene {}", plain(&self.scene.name)), plain(&super::setting(plan))];
+        if !self.mechanism.rows.is_empty() {
+            caption.push(plain(&super::check::stabilization(self.mechanism, plan)));
+        }
+        caption.extend(more);
+        caption
+    }
+
+    /// Samples close enough to be joined by lines: of the whole run, or else of its end; and what to say about it.
+    fn window(&self) -> (Vec<&Sample>, Option<String>) {
+        let trace = &self.outcome.trace;
+        let whole: Vec<&Sample> = trace.whole.iter().collect();
+        if !is_coarse(&whole) {
+            return (whole, None);
+        }
+        let tail: Vec<&Sample> = trace.tail.iter().collect();
+        let span = span(&tail);
+        (tail, Some(format!("last {} s of {} s", figure(span), figure(self.outcome.last.t))))
+    }
+
+    /// The last samples, as far back as the fastest body turns by `PATH`.
+    fn path(&self) -> Vec<&Sample> {
+        let mut turned = 0.0;
+        let mut path: Vec<&Sample> = Vec::new();
+        for sample in self.outcome.trace.tail.iter().rev() {
+            if let Some(after) = path.last() {
+                turned += furthest(sample, after);
+            }
+            if turned > PATH {
+                break;
+            }
+            path.push(sample);
+        }
+        path.reverse();
+        path
+    }
+
+    fn mechanism_chart(&self) -> MechanismChart {
+        let path = self.path();
+        let coarse = is_coarse(&path);
+        let leaves = self.leaves();
+        let place = |body: usize, phi: &[f64]| {
+            let end = self.mechanism.bodies[body].ends[1].position(&units(phi));
+            [end.re, end.im]
+        };
+        let trails = if coarse {
+            Vec::new()
+        } else {
+            leaves.iter().map(|&body| path.iter().map(|sample| place(body, &sample.phi)).collect()).collect()
+        };
+        let mut poses: Vec<Pose> = Vec::new();
+        let (mut turned, mut after) = (0.0, None);
+        for sample in path.iter().rev() {
+            turned += after.map_or(GHOST, |after| furthest(sample, after));
+            after = Some(*sample);
+            if turned >= GHOST && poses.len() <= GHOSTS {
+                poses.push(self.pose(&sample.phi, &sample.omega));
+                turned = 0.0;
+            }
+        }
+        poses.reverse();
+        if coarse {
+            poses.drain(..poses.len().saturating_sub(1));
+        }
+        let names: Vec<String> = leaves.iter().map(|&body| plain(&self.mechanism.bodies[body].name)).collect();
+        let title = if coarse || names.is_empty() {
+            format!("The mechanism at {} s", figure(self.outcome.last.t))
+        } else {
+            format!("Path of the end of {}", names.join(", "))
+        };
+        let more = (!coarse).then(|| format!("last {} s of {} s", figure(span(&path)), figure(self.outcome.last.t)));
+        MechanismChart { title, caption: self.caption(more), sketch: self.sketch(), poses, trails }
+    }
+
+    fn angles(&self) -> Angles {
+        let (window, more) = self.window();
+        let series = self
+            .mechanism
+            .bodies
+            .iter()
+            .enumerate()
+            .map(|(k, body)| AngleSeries { name: plain(&body.name), angle: window.iter().map(|sample| sample.phi[k]).collect() });
+        Angles {
+            title: format!("Angles of {}", plain(&self.scene.name)),
+            caption: self.caption(more),
+            time: window.iter().map(|sample| sample.t).collect(),
+            series: series.collect(),
+        }
+    }
+
+    fn energy_drift(&self) -> EnergyDrift {
+        let Outcome { plan, drift, last, .. } = self.outcome;
+        let size = magnitude(drift.energy.max).replace('e', "·10^{") + if drift.energy.max > 0.0 { "}" } else { "" };
+        let kind = if drift.kind == "energy" { "Energy" } else { "Energy minus work" };
+        EnergyDrift {
+            title: format!("{kind} keeps to {size} of its scale over {} s", figure(last.t)),
+            caption: self.caption(Some(format!("scale {} J", figure(self.mechanism.energy_scale)))),
+            quantity: drift.kind.to_owned(),
+            series: vec![DriftSeries {
+                method: plan.method.to_string(),
+                name: plan.method.to_string(),
+                time: drift.energy.record.iter().map(|point| point[0]).collect(),
+                error: drift.energy.record.iter().map(|point| point[1]).collect(),
+            }],
+            log_time: is_long(&drift.energy),
+        }
+    }
+
+    fn constraint_drift(&self) -> ConstraintDrift {
+        let Outcome { plan, drift, trace, .. } = self.outcome;
+        let unit = self.mechanism.rows.first().map_or("rad", Row::unit);
+        let panel = |level: usize, name: String| DefectPanel {
+            name,
+            series: (drift.constraints.iter().enumerate())
+                .map(|(r, (constraint, monitors))| {
+                    // Thinned samples may have missed the largest ones; the record has not.
+                    let mut points: Vec<[f64; 2]> = monitors[level].record.clone();
+                    points.extend(trace.whole.iter().map(|sample| [sample.t, sample.constraints[r][level]]));
+                    points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+                    let method = if drift.constraints.len() == 1 { plan.stabilization.to_string() } else { constraint.clone() };
+                    DriftSeries {
+                        method,
+                        name: plain(constraint),
+                        time: points.iter().map(|point| point[0]).collect(),
+                        error: points.iter().map(|point| point[1]).collect(),
+                    }
+                })
+                .collect(),
+        };
+        let most = drift.constraints.iter().map(|(_, [position, _])| position.max).fold(0.0, f64::max);
+        let size = if most == 0.0 { "0".to_owned() } else { magnitude(most).replace('e', "·10^{") + "}" };
+        ConstraintDrift {
+            title: format!("Constraints keep to {size} {unit} over {} s", figure(self.outcome.last.t)),
+            caption: self.caption(None),
+            panels: vec![panel(0, format!("|*C*| [{unit}]")), panel(1, format!("|*C′*| [{unit}/s]"))],
+            log_time: is_long(&drift.energy),
+        }
+    }
+
+    fn torque_power(&self) -> TorquePower {
+        let (window, more) = self.window();
+        let motors = (self.mechanism.rows.iter().enumerate()).filter(|(_, row)| matches!(row, Row::Angle(_))).map(|(r, row)| MotorSeries {
+            name: plain(row.name()),
+            time: window.iter().map(|sample| sample.t).collect(),
+            torque: window.iter().map(|sample| sample.motors[r][0]).collect(),
+            power: window.iter().map(|sample| sample.motors[r][1]).collect(),
+        });
+        let motors: Vec<MotorSeries> = motors.collect();
+        let names: Vec<&str> = motors.iter().map(|motor| motor.name.as_str()).collect();
+        TorquePower { title: format!("Torque and power of {}", names.join(", ")), caption: self.caption(more), motors }
+    }
+
+    /// The first seconds in their own time; faster or slower where too much or nothing would be seen.
+    fn motion(&self) -> MotionGif {
+        let head = &self.outcome.trace.head;
+        let shown = FRAMES as f64 * f64::from(DELAY) / 100.0;
+        let all = head.last().map_or(0.0, |last| last.t);
+        let turned_by = |until: f64| {
+            let pairs = head.windows(2).take_while(|pair| pair[1].t <= until * (1.0 + 1e-12));
+            pairs.map(|pair| furthest(&pair[0], &pair[1])).sum::<f64>()
+        };
+        let mut until = all.min(shown);
+        let turned = turned_by(until);
+        if turned > LIVELY[1] {
+            until *= LIVELY[1] / turned;
+        } else if turned < LIVELY[0] {
+            until = all;
+        }
+        let frames = if until < shown && turned <= LIVELY[1] { (until / shown * FRAMES as f64).ceil() as usize } else { FRAMES };
+        let frames = frames.max(1);
+        let time: Vec<f64> = (0..=frames).map(|k| until * k as f64 / frames as f64).collect();
+        let leaves = self.leaves();
+        let trails = leaves.iter().map(|&body| {
+            let place = |k: usize| {
+                let (phi, _) = between(head, until * k as f64 / (4 * frames) as f64);
+                let end = self.mechanism.bodies[body].ends[1].position(&units(&phi));
+                [end.re, end.im]
+            };
+            (0..=4 * frames).map(place).collect()
+        });
+        MotionGif {
+            title: plain(&self.scene.name),
+            sketch: self.sketch(),
+            poses: (time.iter())
+                .map(|&t| {
+                    let (phi, omega) = between(head, t);
+                    self.pose(&phi, &omega)
+                })
+                .collect(),
+            trails: trails.collect(),
+            time,
+            delay: DELAY,
+        }
+    }
+
+    /// Up to four bodies that no other hangs on.
+    fn leaves(&self) -> Vec<usize> {
+        let bodies = &self.mechanism.bodies;
+        (0..bodies.len()).filter(|&k| bodies.iter().all(|body| body.parent != Some(k))).take(4).collect()
+    }
+
+    fn sketch(&self) -> Sketch {
+        let hinges = self
+            .mechanism
+            .joints
+            .iter()
+            .map(|joint| HingeSketch { name: plain(&joint.name), ground: self.mechanism.bodies[joint.outer].parent.is_none() });
+        Sketch {
+            gravity: self.scene.gravity,
+            hinges: hinges.collect(),
+            springs: self.scene.springs.iter().map(|spring| SpringSketch { ground: spring.between.map(|end| end.bar.is_none()) }).collect(),
+            walls: self.scene.walls.iter().map(|wall| WallSketch { through: wall.through, normal: wall.normal }).collect(),
+            points: Vec::new(),
+        }
+    }
+
+    fn pose(&self, phi: &[f64], omega: &[f64]) -> Pose {
+        let z = units(phi);
+        let both = |point: Complex<f64>| [point.re, point.im];
+        let bodies = &self.mechanism.bodies;
+        let place = |place: &Place| match place.bar {
+            None => place.point,
+            Some(bar) => both(bodies[bar].ends[0].position(&z) + Complex::new(place.point[0], place.point[1]) * z[bar]),
+        };
+        let motors = self.scene.motors.iter().filter_map(|motor| {
+            let joint = self.mechanism.joints.iter().find(|joint| joint.outer == motor.bar)?;
+            Some(MotorPose { at: both(joint.point.position(&z)), angle: phi[motor.bar], rate: omega[motor.bar] })
+        });
+        Pose {
+            bars: bodies.iter().map(|body| body.ends.each_ref().map(|end| both(end.position(&z)))).collect(),
+            hinges: self.mechanism.joints.iter().map(|joint| both(joint.point.position(&z))).collect(),
+            springs: self.scene.springs.iter().map(|spring| spring.between.each_ref().map(place)).collect(),
+            motors: motors.collect(),
+            points: Vec::new(),
+        }
+    }
+}
+
+fn units(phi: &[f64]) -> Vec<Complex<f64>> {
+    phi.iter().map(|&phi| Complex::unit(phi)).collect()
+}
+
+/// How far the body that turns furthest turns from one sample to the next \[rad\].
+fn furthest(a: &Sample, b: &Sample) -> f64 {
+    a.phi.iter().zip(&b.phi).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max)
+}
+
+fn is_coarse(samples: &[&Sample]) -> bool {
+    samples.windows(2).any(|pair| furthest(pair[0], pair[1]) > COARSE)
+}
+
+fn span(samples: &[&Sample]) -> f64 {
+    samples.first().zip(samples.last()).map_or(0.0, |(first, last)| last.t - first.t)
+}
+
+fn is_long(record: &Excursion) -> bool {
+    record.record.first().zip(record.record.last()).is_some_and(|(first, last)| (last[0] / first[0]).log10() >= DECADES)
+}
+
+/// Angles and rates at time `t` \[s\], straight between samples.
+fn between(samples: &[Sample], t: f64) -> (Vec<f64>, Vec<f64>) {
+    let after = samples.partition_point(|sample| sample.t < t).min(samples.len().saturating_sub(1));
+    let before = after.saturating_sub(1);
+    let (Some(a), Some(b)) = (samples.get(before), samples.get(after)) else { return Default::default() };
+    let share = if b.t > a.t { ((t - a.t) / (b.t - a.t)).clamp(0.0, 1.0) } else { 0.0 };
+    let mix = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect();
+    (mix(&a.phi, &b.phi), mix(&a.omega, &b.omega))
+}

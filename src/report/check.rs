@@ -1,0 +1,130 @@
+//! What a scene and a plan amount to: what is active, what was left out, which method and why.
+
+use super::page::{Page, figure};
+use crate::dynamics::Mechanism;
+use crate::run::{MethodId, Plan, Stabilization};
+use crate::scene::Scene;
+use serde_json::{Value, json};
+
+/// The form of the equations that a plan marches in.
+pub fn form(mechanism: &Mechanism, plan: &Plan) -> &'static str {
+    match (plan.method, plan.stabilization) {
+        (MethodId::Rattle(_), _) => "unit vectors and their rates, with a constant mass matrix",
+        (MethodId::Gauss(_), _) if mechanism.rows.is_empty() => "angles and momenta",
+        (MethodId::Gauss(_), _) => "angles and momenta, driven angles as functions of time",
+        (_, Stabilization::Elimination) => "angles and rates, driven angles as functions of time",
+        _ if mechanism.rows.is_empty() => "angles and rates",
+        _ => "angles and rates, one multiplier a constraint",
+    }
+}
+
+/// What the scene does not need and the equations do not contain.
+fn left_out(mechanism: &Mechanism, plan: &Plan) -> Vec<&'static str> {
+    let multipliers = !mechanism.rows.is_empty()
+        && (matches!(plan.method, MethodId::Rattle(_)) || !matches!(plan.stabilization, Stabilization::Elimination));
+    let mut left_out = Vec::new();
+    for (needed, what) in [
+        (!mechanism.rows.is_empty(), "motors"),
+        (multipliers, "the solve for multipliers"),
+        (plan.stabilization == Stabilization::Projection, "projection"),
+        (!mechanism.springs.is_empty(), "springs"),
+        (mechanism.is_damped(), "dampers"),
+        (!mechanism.contacts.is_empty(), "impacts"),
+        (mechanism.tree.off_axis, "off-axis couplings"),
+        (mechanism.gravity != crate::arithmetic::Complex::ZERO, "gravity"),
+    ] {
+        if !needed {
+            left_out.push(what);
+        }
+    }
+    left_out
+}
+
+/// The report as one JSON object.
+pub fn object(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Value {
+    let names = |names: Vec<&str>| json!(names);
+    json!({
+        "scene": scene.name,
+        "description": scene.description,
+        "bodies": names(scene.bars.iter().map(|bar| bar.name.as_str()).collect()),
+        "degrees_of_freedom": mechanism.ties.independent.len(),
+        "hinges": names(scene.hinges.iter().map(|hinge| hinge.name.as_str()).collect()),
+        "motors": names(scene.motors.iter().map(|motor| motor.name.as_str()).collect()),
+        "springs": names(scene.springs.iter().map(|spring| spring.name.as_str()).collect()),
+        "dampers": names(scene.springs.iter().filter(|spring| spring.damping != 0.0).map(|spring| spring.name.as_str()).collect()),
+        "walls": names(scene.walls.iter().map(|wall| wall.name.as_str()).collect()),
+        "off_axis": mechanism.tree.off_axis,
+        "left_out": left_out(mechanism, plan),
+        "energy_scale": mechanism.energy_scale,
+        "form": form(mechanism, plan),
+        "method": plan.method.info().name,
+        "why": plan.why,
+        "settings": super::settings(plan),
+        "until": plan.until,
+        "rows": plan.rows,
+        "notes": plan.notes,
+    })
+}
+
+/// The report as a page.
+pub fn text(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> String {
+    let mut page = Page::new(&scene.name, &scene.description);
+    let free = mechanism.ties.independent.len();
+    page.entry("bodies", &format!("{}, {free} independent coordinate{}", list(&scene.bars, |bar| &bar.name), plural(free)));
+    page.entry("hinges", &list(&scene.hinges, |hinge| &hinge.name));
+    if !scene.motors.is_empty() {
+        page.entry("motors", &list(&scene.motors, |motor| &motor.name));
+    }
+    if !scene.springs.is_empty() {
+        let damped = |damping: f64| if damping == 0.0 { "" } else { " with a damper" };
+        let each: Vec<String> = scene.springs.iter().map(|spring| format!("{}{}", spring.name, damped(spring.damping))).collect();
+        page.entry("springs", &each.join(", "));
+    }
+    if !scene.walls.is_empty() {
+        let each: Vec<String> = scene.walls.iter().map(|wall| format!("{} (restitution {})", wall.name, wall.restitution)).collect();
+        page.entry("walls", &each.join(", "));
+    }
+    if mechanism.tree.off_axis {
+        page.entry("couplings", "off the bars' axes");
+    }
+    let left_out = left_out(mechanism, plan);
+    page.entry("left out", if left_out.is_empty() { "nothing".to_owned() } else { left_out.join(", ") }.as_str());
+    page.entry("energy scale", &format!("{} J", figure(mechanism.energy_scale)));
+    page.entry("form", form(mechanism, plan));
+    describe(&mut page, mechanism, plan);
+    page.into_text()
+}
+
+/// Method, stabilization, horizon and notes of a plan.
+pub(super) fn describe(page: &mut Page, mechanism: &Mechanism, plan: &Plan) {
+    page.entry("method", &super::setting(plan));
+    if let Some(why) = &plan.why {
+        page.entry("", why);
+    }
+    page.entry("stabilization", &stabilization(mechanism, plan));
+    page.entry("horizon", &format!("{} s, a row every {} s", plan.until, plan.every));
+    for (number, note) in plan.notes.iter().enumerate() {
+        page.entry(if number == 0 { "note" } else { "" }, note);
+    }
+}
+
+/// The stabilization in words.
+pub(super) fn stabilization(mechanism: &Mechanism, plan: &Plan) -> String {
+    match (plan.stabilization, plan.time_constant) {
+        _ if mechanism.rows.is_empty() => "none needed: the scene has no constraint".into(),
+        _ if matches!(plan.method, MethodId::Rattle(_)) => "by the method itself, positions and velocities".into(),
+        (Stabilization::Baumgarte, Some(constant)) => format!("baumgarte, time constant {} s", figure(constant)),
+        (Stabilization::Baumgarte, None) => "baumgarte, time constant five mean steps".into(),
+        (other, _) => other.to_string(),
+    }
+}
+
+fn plural(count: usize) -> &'static str {
+    if count == 1 { "" } else { "s" }
+}
+
+/// `2 (bar1, bar2)`; names are left out where there are many.
+fn list<T>(items: &[T], name: impl Fn(&T) -> &String) -> String {
+    let names: Vec<&str> = items.iter().map(|item| name(item).as_str()).collect();
+    if names.len() > 20 { names.len().to_string() } else { format!("{} ({})", names.len(), names.join(", ")) }
+}

@@ -1,0 +1,46 @@
+//! Reports: what a scene is, what its start amounts to, how a run went, as one JSON object and as a page of 80 columns.
+//!
+//! Reports read results, they never run anything.  The keys of the JSON objects are what scripts rely on; a number that is not
+//! finite is written as `null`, and a run that met one says so in `stop`.
+//!
+//! | report | of | file |
+//! | --- | --- | --- |
+//! | [`check`] | scene and plan | `check.rs` |
+//! | [`inspect`] | the scene's start | `inspect.rs` |
+//! | [`result`] | a run | `result.rs` |
+//! | [`methods`] | the table of methods | `methods.rs` |
+//! | `charts` | a run, in pictures | `charts.rs`, with the feature `charts` |
+
+#[cfg(feature = "charts")]
+pub mod charts;
+pub mod check;
+pub mod inspect;
+pub mod methods;
+pub mod page;
+pub mod result;
+
+use crate::run::Plan;
+use serde_json::{Value, json};
+
+/// The settings of a plan: `step` \[s\] or `rtol` and `atol`, `stabilize`, `time_constant` \[s\], `every` \[s\]; `null` where one does not apply.
+pub fn settings(plan: &Plan) -> Value {
+    json!({
+        "step": plan.step,
+        "rtol": plan.tolerance.map(|tolerance| tolerance.relative),
+        "atol": plan.tolerance.map(|tolerance| tolerance.absolute),
+        "stabilize": plan.stabilization,
+        "time_constant": plan.time_constant,
+        "every": plan.every,
+    })
+}
+
+/// Method and setting in words: `gauss16, step 0.005 s`.
+pub fn setting(plan: &Plan) -> String {
+    match (plan.step, plan.tolerance) {
+        (Some(step), _) => format!("{}, step {step} s", plan.method),
+        (None, Some(tolerance)) if tolerance.relative != tolerance.absolute => {
+            format!("{}, relative tolerance {:e}, absolute {:e}", plan.method, tolerance.relative, tolerance.absolute)
+        }
+        (None, tolerance) => format!("{}, tolerance {:e}", plan.method, tolerance.unwrap_or_default().relative),
+    }
+}

@@ -1,0 +1,150 @@
+//! A page of text for people: labelled entries and small tables, 80 columns wide.
+
+/// Columns of a page.
+const WIDTH: usize = 80;
+/// Columns of the labels.
+const LABELS: usize = 15;
+
+/// A page under way.
+#[derive(Clone, Debug, Default)]
+pub struct Page {
+    text: String,
+}
+
+impl Page {
+    /// A page with a heading.
+    pub fn new(name: &str, description: &str) -> Self {
+        let mut page = Self::default();
+        page.entry(name, description);
+        page.text.push('\n');
+        page
+    }
+
+    /// A labelled entry, wrapped; an empty label continues the entry above.
+    pub fn entry(&mut self, label: &str, value: &str) {
+        let mut label = label.to_owned();
+        if label.chars().count() >= LABELS {
+            self.text.push_str(&label);
+            self.text.push('\n');
+            label.clear();
+        }
+        for line in wrapped(value, WIDTH - LABELS) {
+            let line = format!("{label:LABELS$}{line}");
+            self.text.push_str(line.trim_end());
+            self.text.push('\n');
+            label.clear();
+        }
+    }
+
+    /// A table under a labelled entry: names left, numbers right; cut into several where it is too wide.
+    pub fn table(&mut self, head: &[&str], rows: &[Vec<String>]) {
+        let widths: Vec<usize> = (0..head.len())
+            .map(|k| rows.iter().filter_map(|row| row.get(k)).map(|cell| cell.chars().count()).fold(head[k].chars().count(), usize::max))
+            .collect();
+        let mut from = 1;
+        while from < head.len() {
+            let mut to = from;
+            let mut width = 2 + widths[0];
+            while to < head.len() && (to == from || width + 2 + widths[to] <= WIDTH) {
+                width += 2 + widths[to];
+                to += 1;
+            }
+            let mut line = |cells: &dyn Fn(usize) -> String| {
+                let mut line = format!("  {:1$}", cells(0), widths[0]);
+                for k in from..to {
+                    line.push_str(&format!("  {:>1$}", cells(k), widths[k]));
+                }
+                self.text.push_str(line.trim_end());
+                self.text.push('\n');
+            };
+            line(&|k| head[k].to_owned());
+            for row in rows {
+                line(&|k| row.get(k).cloned().unwrap_or_default());
+            }
+            from = to;
+        }
+    }
+
+    /// The text, ending with a line break.
+    pub fn into_text(self) -> String {
+        self.text
+    }
+}
+
+/// Lines of at most `width` characters where words allow it; at least one line.
+fn wrapped(text: &str, width: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let last = lines.len() - 1;
+        let used = lines[last].chars().count();
+        if used > 0 && used + 1 + word.chars().count() > width {
+            lines.push(word.to_owned());
+        } else {
+            if used > 0 {
+                lines[last].push(' ');
+            }
+            lines[last].push_str(word);
+        }
+    }
+    lines
+}
+
+/// A number to six digits, plain where it is of everyday size.
+pub fn figure(x: f64) -> String {
+    let size = x.abs();
+    if x == 0.0 {
+        return "0".into();
+    }
+    if !x.is_finite() {
+        return "not a number".into();
+    }
+    if !(1e-4..1e6).contains(&size) {
+        return format!("{x:.5e}");
+    }
+    let decimals = (5 - size.log10().floor() as i32).clamp(0, 9) as usize;
+    let plain = format!("{x:.decimals$}");
+    if plain.contains('.') { plain.trim_end_matches('0').trim_end_matches('.').to_owned() } else { plain }
+}
+
+/// A size that matters by its magnitude only: `2.1e-13`.
+pub fn magnitude(x: f64) -> String {
+    match x {
+        0.0 => "0".into(),
+        x if x.is_finite() => format!("{x:.1e}"),
+        _ => "not a number".into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short_and_keep_their_size() {
+        for (x, shown) in [
+            (0.0, "0"),
+            (-20.990_323, "-20.9903"),
+            (100.0, "100"),
+            (0.005, "0.005"),
+            (1.234_567_8e-5, "1.23457e-5"),
+            (123_456.7, "123457"),
+            (1e6, "1.00000e6"),
+            (f64::NAN, "not a number"),
+        ] {
+            assert_eq!(figure(x), shown);
+        }
+        assert_eq!(magnitude(2.14e-13), "2.1e-13");
+    }
+
+    #[test]
+    fn no_line_is_wider_than_the_page() {
+        let mut page = Page::new("name", &"several words ".repeat(20));
+        page.entry("a label longer than its column", "value");
+        let head: Vec<String> = (0..12).map(|k| format!("column {k}")).collect();
+        let head: Vec<&str> = head.iter().map(String::as_str).collect();
+        page.table(&head, &[vec!["1.2345678".into(); 12], vec!["2".into(); 12]]);
+        let text = page.into_text();
+        assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
+        assert!(text.contains("column 11") && text.contains("\na label longer"));
+    }
+}

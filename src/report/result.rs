@@ -1,0 +1,147 @@
+//! How a run went.
+
+use super::check::describe;
+use super::page::{Page, figure, magnitude};
+use crate::dynamics::Mechanism;
+use crate::run::files::sha256;
+use crate::run::{Outcome, Sample};
+use crate::scene::Scene;
+use serde_json::{Map, Value, json};
+
+/// The report as one JSON object; `wall_s` \[s\] is the time from the first output row to the last.
+pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value {
+    let Outcome { plan, tally, drift, .. } = outcome;
+    let constraints: Map<String, Value> = (drift.constraints.iter().zip(&mechanism.rows))
+        .map(|((name, [position, velocity]), row)| {
+            let levels = json!({
+                "position_max": position.max,
+                "velocity_max": velocity.max,
+                "position_slope": position.slope(),
+                "velocity_slope": velocity.slope(),
+                "unit": row.unit(),
+            });
+            (name.clone(), levels)
+        })
+        .collect();
+    let stabilizer = (!mechanism.rows.is_empty()).then(|| json!({"energy_j": drift.stabilizer, "max_j": drift.stabilizer_max}));
+    let impacts = (!mechanism.contacts.is_empty())
+        .then(|| json!({"count": outcome.strike_count, "energy_lost_j": outcome.strike_loss, "first": outcome.strikes}));
+    let (trend, trend_error) = drift.energy.trend();
+    json!({
+        "scene": scene.name,
+        "method": plan.method.info().name,
+        "why": plan.why,
+        "settings": super::settings(plan),
+        "until": plan.until,
+        "steps": tally.steps,
+        "evaluations": tally.evaluations,
+        "rejected": tally.rejected,
+        "wall_s": outcome.wall.as_secs_f64(),
+        "final": moment(mechanism, &outcome.last),
+        "energy": {
+            "kind": drift.kind,
+            "max_relative": drift.energy.max,
+            "scale": mechanism.energy_scale,
+            "slope": drift.energy.slope(),
+            "trend": trend,
+            "trend_error": trend_error,
+        },
+        "constraints": constraints,
+        "stabilizer": stabilizer,
+        "impacts": impacts,
+        "trust": {"error_estimate": null, "horizon_s": null, "how": "none"},
+        "notes": plan.notes,
+        "stop": outcome.stop,
+    })
+}
+
+/// Angles, rates, centres of mass of all bodies at one moment.
+fn moment(mechanism: &Mechanism, sample: &Sample) -> Value {
+    let bodies: Map<String, Value> = (mechanism.bodies.iter().enumerate())
+        .map(|(k, body)| {
+            let ([x, y], [vx, vy]) = (sample.centre[k], sample.velocity[k]);
+            (body.name.clone(), json!({"phi": sample.phi[k], "omega": sample.omega[k], "x": x, "y": y, "vx": vx, "vy": vy}))
+        })
+        .collect();
+    json!({"t": sample.t, "bodies": bodies})
+}
+
+/// What `run.json` holds: the report, the resolved scene, versions, hashes; what differs from run to run stands in `timings` alone.
+pub fn record(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome, trajectory_sha256: &str) -> Value {
+    let mut report = object(scene, mechanism, outcome);
+    let wall = report.as_object_mut().and_then(|members| members.shift_remove("wall_s"));
+    let input = scene.to_input();
+    json!({
+        "format": 1,
+        "versions": {"driftless": env!("CARGO_PKG_VERSION"), "target": target()},
+        "hashes": {"scene_sha256": sha256(&input.to_string()), "trajectory_sha256": trajectory_sha256},
+        "result": report,
+        "resolved_scene": input,
+        "timings": {"wall_s": wall},
+    })
+}
+
+/// The platform the program was compiled for: `x86_64-linux-gnu`.
+fn target() -> String {
+    let environment = match () {
+        () if cfg!(target_env = "gnu") => "-gnu",
+        () if cfg!(target_env = "musl") => "-musl",
+        () if cfg!(target_env = "msvc") => "-msvc",
+        () => "",
+    };
+    format!("{}-{}{environment}", std::env::consts::ARCH, std::env::consts::OS)
+}
+
+/// The report as a page.
+pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
+    let Outcome { plan, tally, drift, last, .. } = outcome;
+    let mut page = Page::new(&scene.name, &scene.description);
+    describe(&mut page, mechanism, plan);
+    page.entry(
+        "cost",
+        &format!(
+            "{} steps, {} evaluations, {} rejected, {} s",
+            tally.steps,
+            tally.evaluations,
+            tally.rejected,
+            figure(outcome.wall.as_secs_f64())
+        ),
+    );
+    if let Some(stop) = &outcome.stop {
+        page.entry("stopped", &format!("at t = {} s: {}", stop.t, stop.what));
+    }
+    page.entry("final state", &format!("t = {} s", last.t));
+    let rows: Vec<Vec<String>> = (mechanism.bodies.iter().enumerate())
+        .map(|(k, body)| {
+            let ([x, y], [vx, vy]) = (last.centre[k], last.velocity[k]);
+            let numbers = [last.phi[k], last.omega[k], x, y, vx, vy];
+            std::iter::once(body.name.clone()).chain(numbers.into_iter().map(figure)).collect()
+        })
+        .collect();
+    page.table(&["body", "phi [rad]", "omega [rad/s]", "x [m]", "y [m]", "vx [m/s]", "vy [m/s]"], &rows);
+    page.entry(
+        "energy drift",
+        &format!(
+            "{} of {} J at most, slope {} /s",
+            magnitude(drift.energy.max),
+            figure(mechanism.energy_scale),
+            magnitude(drift.energy.slope())
+        ),
+    );
+    if drift.kind != "energy" {
+        page.entry("", &format!("measured on {}", drift.kind));
+    }
+    for ((name, [position, velocity]), row) in drift.constraints.iter().zip(&mechanism.rows) {
+        let unit = row.unit();
+        page.entry("constraint", &format!("{name}: {} {unit} and {} {unit}/s at most", magnitude(position.max), magnitude(velocity.max)));
+    }
+    if drift.stabilizer_max > 0.0 {
+        let (now, most) = (magnitude(drift.stabilizer), magnitude(drift.stabilizer_max));
+        page.entry("stabilizer", &format!("put in {now} J, {most} J at most"));
+    }
+    if !mechanism.contacts.is_empty() {
+        page.entry("impacts", &format!("{}, {} J lost in them", outcome.strike_count, figure(outcome.strike_loss)));
+    }
+    page.entry("trust", "no estimate of the solution's error yet");
+    page.into_text()
+}
