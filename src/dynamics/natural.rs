@@ -219,13 +219,10 @@ impl Natural {
         let (z, rate) = self.vectors(state);
         let mut defect = Defect::default();
         let mut see = |position: DoubleDouble, velocity: DoubleDouble| {
-            // A comparison the other way round would let not-a-number pass.
-            if !(position.hi.abs() <= defect.position) {
-                defect.position = position.hi.abs();
-            }
-            if !(velocity.hi.abs() <= defect.velocity) {
-                defect.velocity = velocity.hi.abs();
-            }
+            // Unlike `max`, this does not lose a not-a-number.
+            let larger = |a: f64, b: f64| if a > b || a.is_nan() { a } else { b };
+            defect.position = larger(position.hi.abs(), defect.position);
+            defect.velocity = larger(velocity.hi.abs(), defect.velocity);
         };
         for (z, rate) in z.iter().zip(&rate) {
             see(z.norm_squared() + -1.0, z.dot(*rate).ldexp(2.0));
@@ -325,7 +322,7 @@ fn invert(mechanism: &Mechanism) -> Result<Vec<Complex<f64>>, usize> {
             }
             if i == j {
                 pivot[j] = entry.re;
-                if !(pivot[j].hi > 1e-13 * mechanism.tree.diagonal[j]) {
+                if pivot[j].hi <= 1e-13 * mechanism.tree.diagonal[j] {
                     return Err(j);
                 }
                 lower[at(j, j)] = Complex::new(DoubleDouble::ONE, DoubleDouble::ZERO);

@@ -15,8 +15,8 @@
 //! *Geometric Numerical Integration*, 2nd ed. (2006), section VII.1.4.  p_t makes time a coordinate, so that a driven scene is one without drive.
 //! Compositions: [`composition`](super::composition).
 //!
-//! Rounding: positions, velocities, p_t and time are pairs; C(z0 + h v0), and the velocity defect before the second solve, are formed from pairs,
-//! because both are small differences of large terms.  What is left is the rounding of h W F, 1e-16 of a *kick*, not of the state.
+//! Rounding: positions, velocities, p_t and time are pairs, and the last Newton sweep forms C(z1, t1) from them.  What is left is the
+//! rounding of h W F, 1e-16 of a *kick*, not of the state.
 
 use super::composition::Composition;
 use super::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
@@ -24,7 +24,7 @@ use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
 use crate::dynamics::law::Phase;
 use crate::dynamics::natural::{Natural, upper};
 use crate::dynamics::tree::{self, size};
-use crate::dynamics::{State, Time};
+use crate::dynamics::{Form, State, Time};
 
 /// Newton sweeps before a step is given up; an ordinary step takes three or four.
 const SWEEPS: usize = 30;
@@ -213,7 +213,10 @@ struct Work {
     offset: Vec<f64>,
     /// Right side, then solution (R).
     change: Vec<f64>,
-    /// Largest force (n), what rounding is measured against \[N·m\].
+    /// Largest force, and largest inertia \[N·m, kg·m²\].
+    strength: f64,
+    inertia: f64,
+    /// What changes of the multipliers are measured against: the force, or what moves a vector by an ulp in one substep \[N·m\].
     scale: f64,
 }
 
@@ -229,6 +232,7 @@ impl Work {
             plain.resize(n, Complex::ZERO);
         }
         self.turns.resize(n, 0);
+        self.inertia = natural.mechanism().tree.diagonal.iter().copied().fold(0.0, f64::max);
         self.lifted.resize(rows * n, Complex::ZERO);
         self.gradient.resize(motors, [Complex::ZERO; 2]);
         self.phase.resize(motors, idle);
@@ -290,25 +294,25 @@ impl Work {
         Ok(())
     }
 
-    /// z0 + h v0, and by how much it violates the constraints at time `end`.
+    /// z0 + h v0, and by how much it violates the constraints at time `end`: in plain doubles, since the last sweep takes the rest.
     #[inline(always)]
     fn predict<const N: usize, const DRIVEN: bool>(&mut self, natural: &Natural, h: f64, end: Time) {
         let n = size::<N>(self.z.len());
         let (z, v, predicted, ahead) = (&self.z[..n], &self.v[..n], &mut self.predicted[..n], &mut self.ahead[..n]);
-        let per_push = 2.0 / (h * h);
         let offset = &mut self.offset;
         for k in 0..n {
-            let reach = Complex::new(z[k].re + v[k].re.scale(h), z[k].im + v[k].im.scale(h));
-            offset[k] = 0.5 * (reach.norm_squared() + -1.0).hi * per_push;
-            ahead[k] = plain(reach);
-            predicted[k] = reach;
+            predicted[k] = Complex::new(z[k].re + v[k].re.scale(h), z[k].im + v[k].im.scale(h));
+            ahead[k] = plain(predicted[k]);
+            // (|z + h v|² - 1) / h², without the difference.
+            offset[k] = plain(v[k]).norm_squared() + plain(z[k]).dot(plain(v[k])) * (2.0 / h);
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
                 self.phase[r] = drive.law.at::<DoubleDouble>(end);
-                offset[n + r] = drive.mismatch(self.phase[r].unit, predicted).im.hi * per_push;
+                offset[n + r] = drive.mismatch(plain(self.phase[r].unit), ahead).im * (2.0 / (h * h));
             }
         }
+        self.scale = self.strength.max(f64::EPSILON * self.inertia * (2.0 / (h * h)));
     }
 
     /// Finds mu such that z0 + h v0 + h²/2 a(mu) keeps the constraints, by Newton sweeps with the matrix of the first.
@@ -330,7 +334,7 @@ impl Work {
             for p in 0..rows {
                 multiplier[p] += change[p];
                 scale = multiplier[p].abs().max(scale);
-                if !(change[p].abs() <= largest) {
+                if change[p].abs() > largest || change[p].is_nan() {
                     (largest, culprit) = (change[p].abs(), p);
                 }
             }
@@ -490,7 +494,7 @@ impl Work {
             let (before, after) = (z[k], predicted[k]);
             (z[k], here[k]) = (after, plain(after));
             let old = plain(before);
-            if !(old.dot(here[k]) > 0.0) {
+            if old.dot(here[k]) <= 0.0 {
                 return Err(Failure::TooFar(k));
             }
             if upper(before) != upper(after) {
@@ -503,7 +507,7 @@ impl Work {
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
-                if !(drive.mismatch(plain(self.phase[r].unit), here).re > 0.0) {
+                if drive.mismatch(plain(self.phase[r].unit), here).re <= 0.0 {
                     return Err(Failure::TooFar(n + r));
                 }
             }
@@ -522,9 +526,9 @@ impl Work {
         natural.force(&self.here[..n], &mut self.force[..n]);
         let (here, force, free) = (&self.here[..n], &self.force[..n], &mut self.free[..n]);
         let (w, lifted) = (&natural.inverse()[..n * n], &mut self.lifted[..rows * n]);
-        self.scale = 0.0;
+        self.strength = 0.0;
         for i in 0..n {
-            self.scale = self.scale.max(force[i].re.abs()).max(force[i].im.abs());
+            self.strength = self.strength.max(force[i].re.abs()).max(force[i].im.abs());
             let mut sum = Complex::ZERO;
             for j in 0..n {
                 lifted[j * n + i] = w[i * n + j] * here[j];
@@ -557,7 +561,8 @@ impl Work {
             if !(free[k].re.is_finite() && free[k].im.is_finite()) {
                 return Err(Failure::NotFinite(k));
             }
-            self.multiplier[k] = here[k].dot(free[k]) + z[k].dot(v[k]).hi * (2.0 / h);
+            // z1·v½ = h/2 |v½|², because both ends of the step lie on the circle.
+            self.multiplier[k] = here[k].dot(free[k]) + plain(v[k]).norm_squared();
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
