@@ -147,9 +147,9 @@ fn runge_kutta(scene: &Scene, until: f64, steps: u32) -> Motion {
             }
             field.rate(t + Time::from(part * h), &y, &mut k[i]);
         }
-        for j in 0..n {
-            let sum = DoubleDouble::sum(state.y[j], state.low[j]) + h / 6.0 * (k[0][j] + 2.0 * (k[1][j] + k[2][j]) + k[3][j]);
-            (state.y[j], state.low[j]) = (sum.hi, sum.lo);
+        for (j, (hi, lo)) in state.y.iter_mut().zip(&mut state.low).enumerate() {
+            let sum = DoubleDouble::sum(*hi, *lo) + h / 6.0 * (k[0][j] + 2.0 * (k[1][j] + k[2][j]) + k[3][j]);
+            (*hi, *lo) = (sum.hi, sum.lo);
         }
         state.wrap();
     }

@@ -20,6 +20,7 @@
 use super::law::Law;
 use super::row::Row;
 use super::{Form, Mechanism, Motion, State, Time, tree};
+use crate::arithmetic::circle::Circle;
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use std::sync::Arc;
 
@@ -89,6 +90,15 @@ impl Drive {
     }
 }
 
+/// What a motor asks for at one time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Demand {
+    /// u = exp(i theta), to 1e-24.
+    pub unit: Complex<DoubleDouble>,
+    /// theta' \[rad/s\].
+    pub rate: DoubleDouble,
+}
+
 /// How far a state is from its constraints.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Defect {
@@ -105,6 +115,7 @@ pub struct Natural {
     /// W (n × n), Hermitian to the last bit \[1/(kg·m²)\].
     inverse: Vec<Complex<f64>>,
     drives: Vec<Drive>,
+    circle: Circle,
 }
 
 impl Natural {
@@ -133,7 +144,7 @@ impl Natural {
             }
         }
         let inverse = invert(&mechanism).map_err(|body| NaturalError::Singular(mechanism.bodies[body].name.clone()))?;
-        Ok(Self { mechanism, inverse, drives })
+        Ok(Self { mechanism, inverse, drives, circle: Circle::default() })
     }
 
     /// W row by row (n × n) \[1/(kg·m²)\]: the inverse of the mass matrix, formed in double-double and rounded once, Hermitian to the last
@@ -145,6 +156,24 @@ impl Natural {
     /// The motors.
     pub fn drives(&self) -> &[Drive] {
         &self.drives
+    }
+
+    /// What a motor asks for at time `t`.
+    #[inline]
+    pub fn demand(&self, drive: &Drive, t: Time) -> Demand {
+        let law = &drive.law;
+        let mut angle = DoubleDouble::of(law.start) + t.scale(law.rate);
+        let mut rate = DoubleDouble::of(law.rate);
+        if law.acceleration != 0.0 {
+            angle += (t * t).scale(0.5 * law.acceleration);
+            rate += t.scale(law.acceleration);
+        }
+        for sine in &law.sines {
+            let swing = self.circle.unit(t.scale(sine.frequency) + sine.phase);
+            angle += swing.im.scale(sine.amplitude);
+            rate += swing.re.scale(sine.amplitude).scale(sine.frequency);
+        }
+        Demand { unit: self.circle.unit(angle), rate }
     }
 
     /// Number of rows: one a body, then one a motor.
