@@ -364,8 +364,8 @@ fn tenths(scene: &Scene, composition: Composition, step: f64, until: f64) -> ([f
     (largest, mean)
 }
 
-/// Bound on the excursion, and no climb: the balance oscillates about the same value in both halves, with excursions of one size within what
-/// the whirls of a chaotic scene make of it.
+/// Bound on the excursion, and no climb: the balance oscillates about the same value in both halves, with excursions of one size within
+/// what the whirls of a chaotic scene make of it.
 fn assert_no_drift(name: &str, scene: &Scene, composition: Composition, step: f64, until: f64, bound: f64) {
     let (largest, mean) = tenths(scene, composition, step, until);
     assert!(largest.iter().all(|&largest| largest < bound), "{name} {composition:?}: {largest:?}");
@@ -385,8 +385,8 @@ fn energy_of_the_gentle_scene_does_not_drift() {
     assert_no_drift("gentle", &gentle(), Composition::KahanLi17, 1.0 / 128.0, 400.0, 5e-16);
 }
 
-/// A constant part of 1e-16 in anything a step does shows here as a slope: 6e-19 a second was seen while position and velocity were moved by
-/// changes rounded separately.
+/// A constant part of 1e-16 in anything a step does shows here as a slope: 6e-19 a second was seen while position and velocity were moved
+/// by changes rounded separately.
 #[test]
 fn energy_of_the_gentle_scene_has_no_slope_far_below_rounding() {
     let (_, mean) = tenths(&gentle(), Composition::KahanLi17, 1.0 / 128.0, 1000.0);

@@ -8,12 +8,13 @@
 //! W = D⁻¹,   S_pq = Re(conj(g_p) W g_q),   S mu = Re(conj(g) W F) + convective terms,   z'' = W (F - g mu)
 //! ```
 //!
-//! No sine, no cosine and no velocity term but those of the rows; gravity is a constant force, a force f at a point `Σ gamma_k z_k` acts on z_k as
-//! `conj(gamma_k) f`.  On the constraints a motor's row has the slope of the angle row `q_a - q_b - theta`, so its multiplier is the same: minus the torque.
+//! No sine, no cosine and no velocity term but those of the rows; gravity is a constant force, a force f at a point `Σ gamma_k z_k` acts on
+//! z_k as `conj(gamma_k) f`.  On the constraints a motor's row has the slope of the angle row `q_a - q_b - theta`, so its multiplier is the
+//! same: minus the torque.
 //!
-//! Unknowns: z (2n numbers), z' (2n) \[1/s\] and, where there are motors, p_t \[J\], the momentum conjugate to time: p_t' = -Σ lambda C_t.  Energy plus p_t
-//! is a first integral, so p_t starts at zero and the work done by the motors is -p_t, without a quadrature.  None of the unknowns is an angle:
-//! whole turns are counted by the method as a vector passes the negative x axis.
+//! Unknowns: z (2n numbers), z' (2n) \[1/s\] and, where there are motors, p_t \[J\], the momentum conjugate to time: p_t' = -Σ lambda C_t.
+//! Energy plus p_t is a first integral, so p_t starts at zero and the work done by the motors is -p_t, without a quadrature.  None of the
+//! unknowns is an angle: whole turns are counted by the method as a vector passes the negative x axis.
 //!
 //! Source: J. García de Jalón, E. Bayo, *Kinematic and Dynamic Simulation of Multibody Systems* (1994), chapter 2, for natural coordinates.
 

@@ -6,9 +6,10 @@
 //! ```
 //!
 //! What is symplectic and time-symmetric stays so.  Source of the idea: H. Yoshida, *Construction of higher order symplectic integrators*,
-//! Phys. Lett. A 150 (1990).  Coefficients: M. Suzuki, *Fractal decomposition of exponential operators*, Phys. Lett. A 146 (1990), his fivefold
-//! rule; W. Kahan, R.-C. Li, *Composition constants for raising the orders of unconventional schemes for ordinary differential equations*,
-//! Math. Comp. 66 (1997), `s9odr6a` and `s17odr8a`.  Their 26 digits fulfil the conditions of the test below to 3e-26; here they are as doubles.
+//! Phys. Lett. A 150 (1990).  Coefficients: M. Suzuki, *Fractal decomposition of exponential operators*, Phys. Lett. A 146 (1990), his
+//! fivefold rule; W. Kahan, R.-C. Li, *Composition constants for raising the orders of unconventional schemes for ordinary differential
+//! equations*, Math. Comp. 66 (1997), `s9odr6a` and `s17odr8a`.  Their 26 digits fulfil the conditions of the test below to 3e-26; here
+//! they are as doubles.
 
 use crate::arithmetic::DoubleDouble;
 
@@ -73,8 +74,8 @@ impl Composition {
 
     /// The substeps of a step `step` \[s\].
     ///
-    /// Rounded to half units in the last place of `step`, so that they add up to it exactly: if they did not, a driven scene would be pushed
-    /// by the difference in every step, always in the same direction.
+    /// Rounded to half units in the last place of `step`, so that they add up to it exactly: if they did not, a driven scene would be
+    /// pushed by the difference in every step, always in the same direction.
     pub fn substeps(self, step: f64) -> Vec<f64> {
         let grain = 0.5 * (step.abs().next_up() - step.abs());
         let mut substeps: Vec<f64> = self.half().iter().map(|g| (g * step / grain).round() * grain).collect();
@@ -114,8 +115,8 @@ mod tests {
         (1..=n).map(|k| k as f64).product()
     }
 
-    /// A symmetric method of order 2 is the flow of h Y1 + h³ Y3 + h⁵ Y5 + ... with generators that do not commute.  Returns by how much the
-    /// composition of these exponentials misses exp(h Y1), grade by grade.
+    /// A symmetric method of order 2 is the flow of h Y1 + h³ Y3 + h⁵ Y5 + ... with generators that do not commute.  Returns by how much
+    /// the composition of these exponentials misses exp(h Y1), grade by grade.
     fn defects(composition: Composition, highest: usize) -> Vec<f64> {
         let words = words(highest);
         let mut product: Series = words.iter().map(|word| (word.clone(), f64::from(u8::from(word.is_empty())))).collect();

@@ -1,8 +1,9 @@
 //! RATTLE, order 2, and its symmetric compositions of order 4, 6 and 8; fixed step.
 //!
 //! Keeps: every constraint at position and velocity level to rounding; symplectic and time-symmetric, so energy (with motors: energy less
-//! work) oscillates with an amplitude of the method's order and has no drift.  Choose it for long horizons of constrained or driven scenes where a
-//! cheap step counts; for few bodies and the last digits Gauss and Taylor are better.  Asks for the [`Natural`] form: forces that depend on positions only.
+//! work) oscillates with an amplitude of the method's order and has no drift.  Choose it for long horizons of constrained or driven scenes
+//! where a cheap step counts; for few bodies and the last digits Gauss and Taylor are better.  Asks for the [`Natural`] form: forces that
+//! depend on positions only.
 //!
 //! ```text
 //! v½ = v0 + h/2 W (F(z0) - g(z0,t0) mu),     z1 = z0 + h v½,     C(z1, t1) = 0             gives mu
@@ -10,10 +11,10 @@
 //! p_t -= h/2 (mu·C_t(z0,t0) + mu'·C_t(z1,t1))                                              driven scenes
 //! ```
 //!
-//! Source: H. C. Andersen, *Rattle: a "velocity" version of the Shake algorithm*, J. Comput. Phys. 52 (1983); B. Leimkuhler, R. D. Skeel, *Symplectic
-//! numerical integrators in constrained Hamiltonian systems*, J. Comput. Phys. 112 (1994), for its symplecticity; E. Hairer, C. Lubich, G. Wanner,
-//! *Geometric Numerical Integration*, 2nd ed. (2006), section VII.1.4.  p_t makes time a coordinate, so that a driven scene is one without drive.
-//! Compositions: [`composition`](super::composition).
+//! Source: H. C. Andersen, *Rattle: a "velocity" version of the Shake algorithm*, J. Comput. Phys. 52 (1983); B. Leimkuhler, R. D. Skeel,
+//! *Symplectic numerical integrators in constrained Hamiltonian systems*, J. Comput. Phys. 112 (1994), for its symplecticity; E. Hairer, C.
+//! Lubich, G. Wanner, *Geometric Numerical Integration*, 2nd ed. (2006), section VII.1.4.  p_t makes time a coordinate, so that a driven
+//! scene is one without drive. Compositions: [`composition`](super::composition).
 //!
 //! Rounding: positions, velocities, p_t and time are pairs, and the last Newton sweep forms C(z1, t1) from them.  What is left is the
 //! rounding of h W F, 1e-16 of a *kick*, not of the state.
@@ -429,8 +430,8 @@ impl Work {
         }
     }
 
-    /// v += h/2 a and, where `DRIFT`, the predicted end with it by h times the very same change: with h²/2 instead, rounded on its own, the two would
-    /// disagree by a constant part of 1e-16, and the energy drift.
+    /// v += h/2 a and, where `DRIFT`, the predicted end with it by h times the very same change: with h²/2 instead, rounded on its own, the
+    /// two would disagree by a constant part of 1e-16, and the energy drift.
     #[inline(always)]
     fn kick<const N: usize, const DRIFT: bool>(&mut self, h: f64) {
         let n = size::<N>(self.z.len());
@@ -455,8 +456,8 @@ impl Work {
         }
     }
 
-    /// One more sweep, with the constraints formed from pairs.  Sweeps in plain doubles leave lengths wrong by some 1e-22 with a preferred sign, and
-    /// a length that is always too short is a steady loss of energy.
+    /// One more sweep, with the constraints formed from pairs.  Sweeps in plain doubles leave lengths wrong by some 1e-22 with a preferred
+    /// sign, and a length that is always too short is a steady loss of energy.
     #[inline(always)]
     fn settle<const N: usize, const DRIVEN: bool>(&mut self, natural: &Natural, h: f64) {
         let n = size::<N>(self.z.len());
