@@ -1,8 +1,9 @@
 //! RATTLE, order 2, and its symmetric compositions of order 4, 6 and 8; fixed step.
 //!
 //! Keeps: every constraint at position and velocity level to rounding; symplectic and time-symmetric, so energy (with motors: energy less
-//! work) oscillates with an amplitude of the method's order and has no drift.  Choose it for long horizons of constrained or driven scenes where a
-//! cheap step counts; for few bodies and the last digits Gauss and Taylor are better.  Asks for the [`Natural`] form: forces that depend on positions only.
+//! work) oscillates with an amplitude of the method's order and has no drift.  Choose it for long horizons of constrained or driven scenes
+//! where a cheap step counts; for few bodies and the last digits Gauss and Taylor are better.  Asks for the [`Natural`] form: forces that
+//! depend on positions only.
 //!
 //! ```text
 //! v½ = v0 + h/2 W (F(z0) - g(z0,t0) mu),     z1 = z0 + h v½,     C(z1, t1) = 0             gives mu
@@ -10,21 +11,20 @@
 //! p_t -= h/2 (mu·C_t(z0,t0) + mu'·C_t(z1,t1))                                              driven scenes
 //! ```
 //!
-//! Source: H. C. Andersen, *Rattle: a "velocity" version of the Shake algorithm*, J. Comput. Phys. 52 (1983); B. Leimkuhler, R. D. Skeel, *Symplectic
-//! numerical integrators in constrained Hamiltonian systems*, J. Comput. Phys. 112 (1994), for its symplecticity; E. Hairer, C. Lubich, G. Wanner,
-//! *Geometric Numerical Integration*, 2nd ed. (2006), section VII.1.4.  p_t makes time a coordinate, so that a driven scene is one without drive.
-//! Compositions: [`composition`](super::composition).
+//! Source: H. C. Andersen, *Rattle: a "velocity" version of the Shake algorithm*, J. Comput. Phys. 52 (1983); B. Leimkuhler, R. D. Skeel,
+//! *Symplectic numerical integrators in constrained Hamiltonian systems*, J. Comput. Phys. 112 (1994), for its symplecticity; E. Hairer, C.
+//! Lubich, G. Wanner, *Geometric Numerical Integration*, 2nd ed. (2006), section VII.1.4.  p_t makes time a coordinate, so that a driven
+//! scene is one without drive. Compositions: [`composition`](super::composition).
 //!
-//! Rounding: positions, velocities, p_t and time are pairs; C(z0 + h v0), and the velocity defect before the second solve, are formed from pairs,
-//! because both are small differences of large terms.  What is left is the rounding of h W F, 1e-16 of a *kick*, not of the state.
+//! Rounding: positions, velocities, p_t and time are pairs, and the last Newton sweep forms C(z1, t1) from them.  What is left is the
+//! rounding of h W F, 1e-16 of a *kick*, not of the state.
 
 use super::composition::Composition;
 use super::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
-use crate::dynamics::law::Phase;
-use crate::dynamics::natural::{Natural, upper};
+use crate::dynamics::natural::{Demand, Natural, upper};
 use crate::dynamics::tree::{self, size};
-use crate::dynamics::{State, Time};
+use crate::dynamics::{Form, State, Time};
 
 /// Newton sweeps before a step is given up; an ordinary step takes three or four.
 const SWEEPS: usize = 30;
@@ -200,8 +200,8 @@ struct Work {
     lifted: Vec<Complex<f64>>,
     /// Gradients of the motors' rows at `here`.
     gradient: Vec<[Complex<f64>; 2]>,
-    /// Laws at the time of `here`, and at the end of the substep.
-    phase: Vec<Phase<DoubleDouble>>,
+    /// What the motors ask for at the end of the substep.
+    demand: Vec<Demand>,
     /// C_t of the motors' rows at `here`.
     drive: Vec<f64>,
     /// mu (R).
@@ -213,7 +213,10 @@ struct Work {
     offset: Vec<f64>,
     /// Right side, then solution (R).
     change: Vec<f64>,
-    /// Largest force (n), what rounding is measured against \[N·m\].
+    /// Largest force, and largest inertia \[N·m, kg·m²\].
+    strength: f64,
+    inertia: f64,
+    /// What changes of the multipliers are measured against: the force, or what moves a vector by an ulp in one substep \[N·m\].
     scale: f64,
 }
 
@@ -221,7 +224,6 @@ impl Work {
     fn resize(&mut self, natural: &Natural) {
         let (rows, motors) = (natural.rows(), natural.drives().len());
         let n = rows - motors;
-        let idle = Phase { angle: DoubleDouble::ZERO, unit: Complex::ZERO, rate: DoubleDouble::ZERO, acceleration: DoubleDouble::ZERO };
         for pairs in [&mut self.z, &mut self.v, &mut self.predicted] {
             pairs.resize(n, Complex::ZERO);
         }
@@ -229,9 +231,10 @@ impl Work {
             plain.resize(n, Complex::ZERO);
         }
         self.turns.resize(n, 0);
+        self.inertia = natural.mechanism().tree.diagonal.iter().copied().fold(0.0, f64::max);
         self.lifted.resize(rows * n, Complex::ZERO);
         self.gradient.resize(motors, [Complex::ZERO; 2]);
-        self.phase.resize(motors, idle);
+        self.demand.resize(motors, Demand::default());
         self.drive.resize(motors, 0.0);
         self.matrix.resize(rows * rows, 0.0);
         for column in [&mut self.multiplier, &mut self.pivot, &mut self.offset, &mut self.change] {
@@ -250,8 +253,8 @@ impl Work {
         if DRIVEN {
             self.account = state.unknown(4 * n);
         }
-        for (phase, drive) in self.phase.iter_mut().zip(natural.drives()) {
-            *phase = drive.law.at(state.time);
+        for (demand, drive) in self.demand.iter_mut().zip(natural.drives()) {
+            *demand = natural.demand(drive, state.time);
         }
         self.face::<N, DRIVEN>(natural);
         if state.memory.len() == self.multiplier.len() {
@@ -290,25 +293,25 @@ impl Work {
         Ok(())
     }
 
-    /// z0 + h v0, and by how much it violates the constraints at time `end`.
+    /// z0 + h v0, and by how much it violates the constraints at time `end`: in plain doubles, since the last sweep takes the rest.
     #[inline(always)]
     fn predict<const N: usize, const DRIVEN: bool>(&mut self, natural: &Natural, h: f64, end: Time) {
         let n = size::<N>(self.z.len());
         let (z, v, predicted, ahead) = (&self.z[..n], &self.v[..n], &mut self.predicted[..n], &mut self.ahead[..n]);
-        let per_push = 2.0 / (h * h);
         let offset = &mut self.offset;
         for k in 0..n {
-            let reach = Complex::new(z[k].re + v[k].re.scale(h), z[k].im + v[k].im.scale(h));
-            offset[k] = 0.5 * (reach.norm_squared() + -1.0).hi * per_push;
-            ahead[k] = plain(reach);
-            predicted[k] = reach;
+            predicted[k] = Complex::new(z[k].re + v[k].re.scale(h), z[k].im + v[k].im.scale(h));
+            ahead[k] = plain(predicted[k]);
+            // (|z + h v|² - 1) / h², without the difference.
+            offset[k] = plain(v[k]).norm_squared() + plain(z[k]).dot(plain(v[k])) * (2.0 / h);
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
-                self.phase[r] = drive.law.at::<DoubleDouble>(end);
-                offset[n + r] = drive.mismatch(self.phase[r].unit, predicted).im.hi * per_push;
+                self.demand[r] = natural.demand(drive, end);
+                offset[n + r] = drive.mismatch(plain(self.demand[r].unit), ahead).im * (2.0 / (h * h));
             }
         }
+        self.scale = self.strength.max(f64::EPSILON * self.inertia * (2.0 / (h * h)));
     }
 
     /// Finds mu such that z0 + h v0 + h²/2 a(mu) keeps the constraints, by Newton sweeps with the matrix of the first.
@@ -330,7 +333,7 @@ impl Work {
             for p in 0..rows {
                 multiplier[p] += change[p];
                 scale = multiplier[p].abs().max(scale);
-                if !(change[p].abs() <= largest) {
+                if change[p].abs() > largest || change[p].is_nan() {
                     (largest, culprit) = (change[p].abs(), p);
                 }
             }
@@ -382,7 +385,7 @@ impl Work {
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
-                let unit = plain(self.phase[r].unit);
+                let unit = plain(self.demand[r].unit);
                 let linear = drive.slip(unit, ahead, acceleration).im;
                 let square = drive.base.map_or(0.0, |b| (unit.conj() * acceleration[drive.body] * acceleration[b].conj()).im);
                 change[n + r] = offset[n + r] + (linear + push * square);
@@ -400,7 +403,7 @@ impl Work {
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
-                self.gradient[r] = drive.gradient(plain(self.phase[r].unit), here);
+                self.gradient[r] = drive.gradient(plain(self.demand[r].unit), here);
             }
         }
         self.project::<N, DRIVEN>(natural);
@@ -427,8 +430,8 @@ impl Work {
         }
     }
 
-    /// v += h/2 a and, where `DRIFT`, the predicted end with it by h times the very same change: with h²/2 instead, rounded on its own, the two would
-    /// disagree by a constant part of 1e-16, and the energy drift.
+    /// v += h/2 a and, where `DRIFT`, the predicted end with it by h times the very same change: with h²/2 instead, rounded on its own, the
+    /// two would disagree by a constant part of 1e-16, and the energy drift.
     #[inline(always)]
     fn kick<const N: usize, const DRIFT: bool>(&mut self, h: f64) {
         let n = size::<N>(self.z.len());
@@ -453,8 +456,8 @@ impl Work {
         }
     }
 
-    /// One more sweep, with the constraints formed from pairs.  Sweeps in plain doubles leave lengths wrong by some 1e-22 with a preferred sign, and
-    /// a length that is always too short is a steady loss of energy.
+    /// One more sweep, with the constraints formed from pairs.  Sweeps in plain doubles leave lengths wrong by some 1e-22 with a preferred
+    /// sign, and a length that is always too short is a steady loss of energy.
     #[inline(always)]
     fn settle<const N: usize, const DRIVEN: bool>(&mut self, natural: &Natural, h: f64) {
         let n = size::<N>(self.z.len());
@@ -466,7 +469,7 @@ impl Work {
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
-                change[n + r] = drive.mismatch(self.phase[r].unit, predicted).im.hi * per_push;
+                change[n + r] = drive.mismatch(self.demand[r].unit, predicted).im.hi * per_push;
             }
         }
         solve::<N, DRIVEN>(&self.matrix, &self.pivot, change);
@@ -490,7 +493,7 @@ impl Work {
             let (before, after) = (z[k], predicted[k]);
             (z[k], here[k]) = (after, plain(after));
             let old = plain(before);
-            if !(old.dot(here[k]) > 0.0) {
+            if old.dot(here[k]) <= 0.0 {
                 return Err(Failure::TooFar(k));
             }
             if upper(before) != upper(after) {
@@ -503,7 +506,7 @@ impl Work {
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
-                if !(drive.mismatch(plain(self.phase[r].unit), here).re > 0.0) {
+                if drive.mismatch(plain(self.demand[r].unit), here).re <= 0.0 {
                     return Err(Failure::TooFar(n + r));
                 }
             }
@@ -511,7 +514,7 @@ impl Work {
         Ok(())
     }
 
-    /// Forces, gradients and columns W g at z and the time of `phase`.
+    /// Forces, gradients and columns W g at z and the time of `demand`.
     #[inline(always)]
     fn face<const N: usize, const DRIVEN: bool>(&mut self, natural: &Natural) {
         let n = size::<N>(self.z.len());
@@ -522,9 +525,9 @@ impl Work {
         natural.force(&self.here[..n], &mut self.force[..n]);
         let (here, force, free) = (&self.here[..n], &self.force[..n], &mut self.free[..n]);
         let (w, lifted) = (&natural.inverse()[..n * n], &mut self.lifted[..rows * n]);
-        self.scale = 0.0;
+        self.strength = 0.0;
         for i in 0..n {
-            self.scale = self.scale.max(force[i].re.abs()).max(force[i].im.abs());
+            self.strength = self.strength.max(force[i].re.abs()).max(force[i].im.abs());
             let mut sum = Complex::ZERO;
             for j in 0..n {
                 lifted[j * n + i] = w[i * n + j] * here[j];
@@ -534,9 +537,9 @@ impl Work {
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
-                let phase = self.phase[r];
-                let unit = plain(phase.unit);
-                self.drive[r] = -phase.rate.hi * drive.mismatch(unit, here).re;
+                let demand = self.demand[r];
+                let unit = plain(demand.unit);
+                self.drive[r] = -demand.rate.hi * drive.mismatch(unit, here).re;
                 self.gradient[r] = drive.gradient(unit, here);
                 let ([a, b], [on_a, on_b]) = (drive.bodies(), self.gradient[r]);
                 for i in 0..n {
@@ -557,12 +560,13 @@ impl Work {
             if !(free[k].re.is_finite() && free[k].im.is_finite()) {
                 return Err(Failure::NotFinite(k));
             }
-            self.multiplier[k] = here[k].dot(free[k]) + z[k].dot(v[k]).hi * (2.0 / h);
+            // z1·v½ = h/2 |v½|², because both ends of the step lie on the circle.
+            self.multiplier[k] = here[k].dot(free[k]) + plain(v[k]).norm_squared();
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
-                let phase = self.phase[r];
-                let slip = drive.slip(phase.unit, z, v).im - phase.rate * drive.mismatch(phase.unit, z).re;
+                let demand = self.demand[r];
+                let slip = drive.slip(demand.unit, z, v).im - demand.rate * drive.mismatch(demand.unit, z).re;
                 let ([a, b], [on_a, on_b]) = (drive.bodies(), self.gradient[r]);
                 self.multiplier[n + r] = on_a.dot(free[a]) + on_b.dot(free[b]) + slip.value() * (2.0 / h);
             }
