@@ -288,7 +288,9 @@ fn fixed_step(
             *every = until / (until / *every).ceil();
             notes.push(format!("the output interval is {every} s, so that the fixed steps end on the horizon"));
         }
-        return Ok(*every / (*every * rate / share).ceil().max(1.0));
+        // Halves of the output interval are exact, so that its multiples are met to the last bit.
+        let halvings = libm::log2(*every * rate / share).round().max(0.0);
+        return Ok(*every / libm::exp2(halvings));
     };
     let steps = (until / asked).round();
     if steps < 1.0 {
