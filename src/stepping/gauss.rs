@@ -50,7 +50,7 @@ pub struct Gauss {
     scratch: Scratch,
 }
 
-/// Scratch space for s stages of d unknowns; stages lie one after another.
+/// Scratch space for s stages of d unknowns.  The stages of one unknown lie side by side: loops run over stages, s of them at a time.
 #[derive(Clone, Debug, Default)]
 struct Scratch {
     /// The step the next two were formed for \[s\].
@@ -59,17 +59,17 @@ struct Scratch {
     span: Vec<f64>,
     /// c_j h (s) \[s\].
     offset: Vec<Time>,
-    /// Y (s × d).
+    /// t + c_j h (s) \[s\].
+    time: Vec<Time>,
+    /// Y (d × s).
     stage: Vec<f64>,
-    /// f(Y) (s × d).
+    /// f(Y) (d × s).
     rate: Vec<f64>,
-    /// L (s × d).
+    /// L (d × s).
     increment: Vec<f64>,
-    /// Newest stage (d).
-    fresh: Vec<f64>,
-    /// Midpoint y + Σ L / 2 as a pair (d, d).
-    middle: Vec<f64>,
-    middle_low: Vec<f64>,
+    /// One stage and its rate, as the field takes them (d, d).
+    point: Vec<f64>,
+    slope: Vec<f64>,
     /// Largest change of each unknown in the last sweep, and the least so far (d, d).
     change: Vec<f64>,
     least: Vec<f64>,
@@ -131,19 +131,17 @@ impl<F: Field + ?Sized> Method<F> for Gauss {
             let steps = (span / self.step).abs().floor();
             (steps, (span.abs() - steps * self.step).copysign(span))
         };
-        self.scratch.fit(self.tableau.nodes.len(), problem.dimension());
-        self.scale(self.step.copysign(span));
-        for _ in 0..steps as u64 {
-            self.step_once(problem, state, tally)?;
-            if watch(problem, state)? == Seen::Changed {
-                state.memory.clear();
-            }
-        }
-        if last != 0.0 {
-            self.scale(last);
-            self.step_once(problem, state, tally)?;
-            if watch(problem, state)? == Seen::Changed {
-                state.memory.clear();
+        self.scratch.fit(self.stages(), problem.dimension());
+        for (step, count) in [(self.step.copysign(span), steps as u64), (last, u64::from(last != 0.0))] {
+            self.scale(step);
+            match self.stages() {
+                2 => self.march::<2, F>(problem, state, count, tally, watch)?,
+                3 => self.march::<3, F>(problem, state, count, tally, watch)?,
+                4 => self.march::<4, F>(problem, state, count, tally, watch)?,
+                5 => self.march::<5, F>(problem, state, count, tally, watch)?,
+                6 => self.march::<6, F>(problem, state, count, tally, watch)?,
+                7 => self.march::<7, F>(problem, state, count, tally, watch)?,
+                _ => self.march::<8, F>(problem, state, count, tally, watch)?,
             }
         }
         Ok(Reached::Until)
@@ -162,31 +160,46 @@ impl Gauss {
         }
     }
 
-    /// One step of `scratch.step`; the state is untouched where it fails.
-    fn step_once<F: Field + ?Sized>(&mut self, problem: &mut F, state: &mut State, tally: &mut Tally) -> Result<(), StepError> {
-        self.predict(state);
-        self.sweep(problem, state, tally);
-        self.sum_exactly();
-        self.check(problem, state)?;
-        self.commit(state);
-        tally.steps += 1;
+    /// `count` steps of `scratch.step` with S stages.
+    fn march<const S: usize, F: Field + ?Sized>(
+        &mut self,
+        problem: &mut F,
+        state: &mut State,
+        count: u64,
+        tally: &mut Tally,
+        watch: &mut Watch<F>,
+    ) -> Result<(), StepError> {
+        for _ in 0..count {
+            self.predict::<S>(state);
+            self.sweep::<S, F>(problem, state, tally);
+            self.sum_exactly::<S>();
+            self.check(problem, state)?;
+            self.commit(state);
+            tally.steps += 1;
+            if watch(problem, state)? == Seen::Changed {
+                state.memory.clear();
+            }
+        }
         Ok(())
     }
 
     /// Stages from the last step's collocation polynomial, or all at y where there is none.
-    fn predict(&mut self, state: &State) {
+    fn predict<const S: usize>(&mut self, state: &State) {
         let scratch = &mut self.scratch;
-        let (s, d) = (scratch.span.len(), state.y.len());
-        for stage in scratch.stage.chunks_exact_mut(d) {
-            stage.copy_from_slice(&state.y);
+        for (time, &offset) in scratch.time.iter_mut().zip(&scratch.offset) {
+            *time = state.time + offset;
         }
-        let Some((tag, last)) = state.memory.split_first() else { return };
-        if *tag != scratch.step || last.len() != s * d {
+        let stages = scratch.stage.as_chunks_mut::<S>().0;
+        for (stage, &y) in stages.iter_mut().zip(&state.y) {
+            *stage = [y; S];
+        }
+        let Some((&step, last)) = state.memory.split_first() else { return };
+        if step != scratch.step || last.len() != S * state.y.len() {
             return;
         }
-        for (stage, row) in scratch.stage.chunks_exact_mut(d).zip(self.tableau.forecast.chunks_exact(s)) {
-            for (increment, &nu) in last.chunks_exact(d).zip(row) {
-                for (y, &l) in stage.iter_mut().zip(increment) {
+        for (stage, increment) in stages.iter_mut().zip(last.as_chunks::<S>().0) {
+            for (column, &l) in self.tableau.forecast.as_chunks::<S>().0.iter().zip(increment) {
+                for (y, &nu) in stage.iter_mut().zip(column) {
                     *y += nu * l;
                 }
             }
@@ -194,19 +207,13 @@ impl Gauss {
     }
 
     /// Sweeps the stages until no unknown's change falls any further.
-    fn sweep<F: Field + ?Sized>(&mut self, problem: &mut F, state: &State, tally: &mut Tally) {
+    fn sweep<const S: usize, F: Field + ?Sized>(&mut self, problem: &mut F, state: &State, tally: &mut Tally) {
         self.scratch.least.fill(f64::INFINITY);
         let mut idle = 0;
         for _ in 0..MOST_SWEEPS {
-            for j in 0..self.scratch.span.len() {
-                self.evaluate(problem, state.time, j);
-            }
-            tally.evaluations += self.scratch.span.len() as u64;
-            self.find_middle(state);
-            self.scratch.change.fill(0.0);
-            for i in 0..self.scratch.span.len() {
-                self.restage(i);
-            }
+            self.evaluate::<S, F>(problem);
+            tally.evaluations += S as u64;
+            self.restage::<S>(state);
             idle = if self.scratch.falls() { 0 } else { idle + 1 };
             if idle == IDLE_SWEEPS || self.scratch.change.iter().all(|&change| change == 0.0) {
                 return;
@@ -214,72 +221,56 @@ impl Gauss {
         }
     }
 
-    /// L_j at stage j.
-    fn evaluate<F: Field + ?Sized>(&mut self, problem: &mut F, t: Time, j: usize) {
+    /// L from the stages.
+    fn evaluate<const S: usize, F: Field + ?Sized>(&mut self, problem: &mut F) {
         let scratch = &mut self.scratch;
-        let d = scratch.fresh.len();
-        let at = j * d..(j + 1) * d;
-        problem.rate(t + scratch.offset[j], &scratch.stage[at.clone()], &mut scratch.rate[at.clone()]);
-        for (l, &f) in scratch.increment[at.clone()].iter_mut().zip(&scratch.rate[at]) {
-            *l = scratch.span[j] * f;
+        let (rates, increments) = (scratch.rate.as_chunks_mut::<S>().0, scratch.increment.as_chunks_mut::<S>().0);
+        for j in 0..S {
+            for (point, stage) in scratch.point.iter_mut().zip(scratch.stage.as_chunks::<S>().0) {
+                *point = stage[j];
+            }
+            problem.rate(scratch.time[j], &scratch.point, &mut scratch.slope);
+            for ((rate, increment), &f) in rates.iter_mut().zip(increments.iter_mut()).zip(&scratch.slope) {
+                rate[j] = f;
+                increment[j] = scratch.span[j] * f;
+            }
         }
     }
 
-    /// y + Σ L / 2 as a pair.
-    fn find_middle(&mut self, state: &State) {
+    /// The stages from L, and how far they moved.
+    fn restage<const S: usize>(&mut self, state: &State) {
         let scratch = &mut self.scratch;
-        let (s, d) = (scratch.span.len(), state.y.len());
-        scratch.middle_low.fill(0.0);
-        for j in 0..s / 2 {
-            let (a, b) = (j * d, (s - 1 - j) * d);
-            for k in 0..d {
-                scratch.middle_low[k] += scratch.increment[a + k] + scratch.increment[b + k];
+        let columns = self.tableau.skew.as_chunks::<S>().0;
+        let unknowns = scratch.stage.as_chunks_mut::<S>().0.iter_mut().zip(scratch.increment.as_chunks::<S>().0).zip(&mut scratch.change);
+        for (k, ((stage, l), change)) in unknowns.enumerate() {
+            let centre = if S % 2 == 1 { l[S / 2] } else { 0.0 };
+            let total = (0..S / 2).fold(centre, |sum, j| sum + (l[j] + l[S - 1 - j]));
+            let middle = DoubleDouble::sum(state.y[k], state.low[k] + 0.5 * total);
+            let mut offset = [middle.lo; S];
+            for j in 0..S / 2 {
+                for i in 0..S {
+                    offset[i] += columns[j][i] * l[j] + columns[S - 1 - j][i] * l[S - 1 - j];
+                }
             }
-        }
-        if s % 2 == 1 {
-            for k in 0..d {
-                scratch.middle_low[k] += scratch.increment[s / 2 * d + k];
+            if S % 2 == 1 {
+                for i in 0..S {
+                    offset[i] += columns[S / 2][i] * centre;
+                }
             }
-        }
-        for k in 0..d {
-            let middle = DoubleDouble::sum(state.y[k], state.low[k] + 0.5 * scratch.middle_low[k]);
-            (scratch.middle[k], scratch.middle_low[k]) = (middle.hi, middle.lo);
-        }
-    }
-
-    /// Y_i from the increments, and how far it moved.
-    fn restage(&mut self, i: usize) {
-        let scratch = &mut self.scratch;
-        let (s, d) = (scratch.span.len(), scratch.fresh.len());
-        let row = &self.tableau.skew[i * s..(i + 1) * s];
-        scratch.fresh.copy_from_slice(&scratch.middle_low);
-        for j in 0..s / 2 {
-            let (a, b) = (j * d, (s - 1 - j) * d);
-            for k in 0..d {
-                scratch.fresh[k] += row[j] * scratch.increment[a + k] + row[s - 1 - j] * scratch.increment[b + k];
+            *change = 0.0;
+            for (y, offset) in stage.iter_mut().zip(offset) {
+                let moved = middle.hi + offset;
+                *change = change.max((moved - *y).abs());
+                *y = moved;
             }
-        }
-        if s % 2 == 1 {
-            for k in 0..d {
-                scratch.fresh[k] += row[s / 2] * scratch.increment[s / 2 * d + k];
-            }
-        }
-        for k in 0..d {
-            let y = scratch.middle[k] + scratch.fresh[k];
-            scratch.change[k] = scratch.change[k].max((y - scratch.stage[i * d + k]).abs());
-            scratch.stage[i * d + k] = y;
         }
     }
 
     /// Σ h b_j f_j with exact products.
-    fn sum_exactly(&mut self) {
+    fn sum_exactly<const S: usize>(&mut self) {
         let scratch = &mut self.scratch;
-        let d = scratch.fresh.len();
-        scratch.total.fill(DoubleDouble::ZERO);
-        for (rate, &span) in scratch.rate.chunks_exact(d).zip(&scratch.span) {
-            for (total, &f) in scratch.total.iter_mut().zip(rate) {
-                *total += DoubleDouble::product(span, f);
-            }
+        for (total, rate) in scratch.total.iter_mut().zip(scratch.rate.as_chunks::<S>().0) {
+            *total = (0..S).fold(DoubleDouble::ZERO, |sum, j| sum + DoubleDouble::product(scratch.span[j], rate[j]));
         }
     }
 
@@ -289,7 +280,7 @@ impl Gauss {
     /// A momentum at rest under forces that cancel is all rounding and has no scale of its own.
     fn check<F: Field + ?Sized>(&self, problem: &mut F, state: &State) -> Result<(), StepError> {
         let scratch = &self.scratch;
-        let (d, angles) = (state.y.len(), problem.angles());
+        let (s, d, angles) = (self.stages(), state.y.len(), problem.angles());
         let stop = |cause, what| StepError {
             cause,
             method: NAMES[self.stages() - 2].into(),
@@ -304,7 +295,7 @@ impl Gauss {
         let judged = if angles > 0 { angles } else { d };
         for k in 0..judged {
             let floor = if k < angles { LEAST_ANGLE } else { 0.0 };
-            let scale = scratch.stage.iter().skip(k).step_by(d).fold(floor, |scale, y| scale.max(y.abs()));
+            let scale = scratch.stage[k * s..(k + 1) * s].iter().fold(floor, |scale, y| scale.max(y.abs()));
             if scratch.change[k] > LARGEST_REST * scale {
                 let what =
                     format!("the sweeps left a change of {:.1e} in {} and did not bring it down", scratch.change[k], problem.label(k));
@@ -334,10 +325,11 @@ impl Scratch {
     fn fit(&mut self, s: usize, d: usize) {
         self.span.resize(s, 0.0);
         self.offset.resize(s, Time::ZERO);
+        self.time.resize(s, Time::ZERO);
         for matrix in [&mut self.stage, &mut self.rate, &mut self.increment] {
             matrix.resize(s * d, 0.0);
         }
-        for vector in [&mut self.fresh, &mut self.middle, &mut self.middle_low, &mut self.change, &mut self.least] {
+        for vector in [&mut self.point, &mut self.slope, &mut self.change, &mut self.least] {
             vector.resize(d, 0.0);
         }
         self.total.resize(d, DoubleDouble::ZERO);
