@@ -12,16 +12,17 @@
 //!
 //! What keeps the drift away:
 //! * `h b_j` is one double, the same in stages and update; sigma is antisymmetric to the last bit.  So the method as computed is
-//!   symplectic, for weights a rounding away from Gauss's.  A defect in sigma is a linear drift: 2.4e-4 J a step of the test below for each unit.
+//!   symplectic, for weights a rounding away from Gauss's.  A defect in sigma is a linear drift, in the test below 2.4e-4 J a step
+//!   for each unit of it.
 //! * sigma and `h b_j` are also the same read backwards, so the method as computed is symmetric in time.
 //! * Sweeps go on until no unknown's change falls any further, and one sweep more.  A tolerance would leave the same rest in every step.
 //! * State and time are pairs; the update sums exact products in double-double.
 //! * Stages are summed outwards from the step's midpoint `y + Σ L_j / 2` in mirror pairs, so that a step and its reverse round alike.
 //!
 //! Source: M. Antoñana, J. Makazaga, A. Murua, *Reducing and monitoring round-off error propagation for symplectic implicit Runge–Kutta
-//! schemes*, Numer. Algorithms 76 (2017) 861–880, sections 3 and 4; E. Hairer, R. I. McLachlan, A. Razakarivony, *Achieving Brouwer's law with implicit
-//! Runge–Kutta methods*, BIT 48 (2008) 231–243; E. Hairer, C. Lubich, G. Wanner, *Geometric Numerical Integration*, 2nd ed. (2006), sections
-//! VIII.6 (starting values, sweeps).  Summing outwards from the midpoint is ours.
+//! schemes*, Numer. Algorithms 76 (2017) 861–880, sections 3 and 4; E. Hairer, R. I. McLachlan, A. Razakarivony, *Achieving Brouwer's law
+//! with implicit Runge–Kutta methods*, BIT 48 (2008) 231–243; E. Hairer, C. Lubich, G. Wanner, *Geometric Numerical Integration*,
+//! 2nd ed. (2006), sections VIII.6 (starting values, sweeps).  Summing outwards from the midpoint is ours.
 
 mod tableau;
 
@@ -115,8 +116,9 @@ impl<F: Field + ?Sized> Method<F> for Gauss {
         2 * self.stages() as u32
     }
 
-    /// Takes whole steps, forwards or backwards.  Where `until` is not a whole number of steps away (to 1e-9 of a step and the resolution of `until`), one
-    /// shorter step ends the march there; done often, that costs the long-time behaviour, so ask for multiples of the step.
+    /// Takes whole steps, forwards or backwards.  Where `until` is not a whole number of steps away (to 1e-9 of a step and the resolution
+    /// of `until`), one shorter step ends the march there; done often, that costs the long-time behaviour: ask for multiples of the step.
+    /// Events are not looked for: the canonical form has none.
     fn advance(
         &mut self,
         problem: &mut F,
