@@ -76,8 +76,12 @@ pub fn draw(chart: Chart, scene: &Scene, mechanism: &Mechanism, outcome: &Outcom
     picture?.png_bytes()
 }
 
-/// A turn of the fastest body between samples beyond which lines between them would mislead \[rad\].
-const COARSE: f64 = 0.6;
+/// A turn of the fastest body between samples beyond which curves through them would mislead \[rad\].
+const COARSE: f64 = 1.0;
+/// Points of a path between two samples.
+const FINE: usize = 6;
+/// Most it may turn in a window of time that shows single swings \[rad\], and how much is shown instead.
+const CROWDED: [f64; 2] = [40.0 * TAU, 12.0 * TAU];
 /// How far the fastest body turns along the path shown \[rad\].
 const PATH: f64 = 4.0 * TAU;
 /// How far it turns between ghosts \[rad\].
@@ -110,16 +114,24 @@ impl Finished<'_> {
         caption
     }
 
-    /// Samples close enough to be joined by lines: of the whole run, or else of its end; and what to say about it.
+    /// Samples in which single swings can be told apart: of the whole run, or else of its beginning; and what to say about it.
     fn window(&self) -> (Vec<&Sample>, Option<String>) {
         let trace = &self.outcome.trace;
         let whole: Vec<&Sample> = trace.whole.iter().collect();
-        if !is_coarse(&whole) {
+        if !is_coarse(&whole) && whole.windows(2).map(|pair| furthest(pair[0], pair[1])).sum::<f64>() <= CROWDED[0] {
             return (whole, None);
         }
-        let tail: Vec<&Sample> = trace.tail.iter().collect();
-        let span = span(&tail);
-        (tail, Some(format!("last {} s of {} s", figure(span), figure(self.outcome.last.t))))
+        let mut turned = 0.0;
+        let mut window: Vec<&Sample> = Vec::new();
+        for sample in &trace.head {
+            turned += window.last().map_or(0.0, |before| furthest(before, sample));
+            if turned > CROWDED[1] && window.len() > 1 {
+                break;
+            }
+            window.push(sample);
+        }
+        let span = span(&window);
+        (window, Some(format!("first {} s of {} s", figure(span), figure(self.outcome.last.t))))
     }
 
     /// The last samples, as far back as the fastest body turns by `PATH`.
@@ -150,7 +162,8 @@ impl Finished<'_> {
         let trails = if coarse {
             Vec::new()
         } else {
-            leaves.iter().map(|&body| path.iter().map(|sample| place(body, &sample.phi)).collect()).collect()
+            let smooth = smoothed(&path);
+            leaves.iter().map(|&body| smooth.iter().map(|phi| place(body, phi)).collect()).collect()
         };
         let mut poses: Vec<Pose> = Vec::new();
         let (mut turned, mut after) = (0.0, None);
@@ -185,7 +198,7 @@ impl Finished<'_> {
             .enumerate()
             .map(|(k, body)| AngleSeries { name: plain(&body.name), angle: window.iter().map(|sample| sample.phi[k]).collect() });
         Angles {
-            title: format!("Angles of {}", plain(&self.scene.name)),
+            title: "Angles of the bars".to_owned(),
             caption: self.caption(more),
             time: window.iter().map(|sample| sample.t).collect(),
             series: series.collect(),
@@ -194,10 +207,9 @@ impl Finished<'_> {
 
     fn energy_drift(&self) -> EnergyDrift {
         let Outcome { plan, drift, last, .. } = self.outcome;
-        let size = magnitude(drift.energy.max).replace('e', "·10^{") + if drift.energy.max > 0.0 { "}" } else { "" };
         let kind = if drift.kind == "energy" { "Energy" } else { "Energy minus work" };
         EnergyDrift {
-            title: format!("{kind} keeps to {size} of its scale over {} s", figure(last.t)),
+            title: format!("{kind} keeps to {} of its scale over {} s", power(drift.energy.max), figure(last.t)),
             caption: self.caption(Some(format!("scale {} J", figure(self.mechanism.energy_scale)))),
             quantity: drift.kind.to_owned(),
             series: vec![DriftSeries {
@@ -219,7 +231,8 @@ impl Finished<'_> {
                 .map(|(r, (constraint, monitors))| {
                     // Thinned samples may have missed the largest ones; the record has not.
                     let mut points: Vec<[f64; 2]> = monitors[level].record.clone();
-                    points.extend(trace.whole.iter().map(|sample| [sample.t, sample.constraints[r][level]]));
+                    let later = trace.whole.iter().filter(|sample| sample.t > 0.0);
+                    points.extend(later.map(|sample| [sample.t, sample.constraints[r][level]]));
                     points.sort_by(|a, b| a[0].total_cmp(&b[0]));
                     let method = if drift.constraints.len() == 1 { plan.stabilization.to_string() } else { constraint.clone() };
                     DriftSeries {
@@ -232,9 +245,9 @@ impl Finished<'_> {
                 .collect(),
         };
         let most = drift.constraints.iter().map(|(_, [position, _])| position.max).fold(0.0, f64::max);
-        let size = if most == 0.0 { "0".to_owned() } else { magnitude(most).replace('e', "·10^{") + "}" };
+        let kept = if most == 0.0 { "are kept exactly".to_owned() } else { format!("keep to {} {unit}", power(most)) };
         ConstraintDrift {
-            title: format!("Constraints keep to {size} {unit} over {} s", figure(self.outcome.last.t)),
+            title: format!("Constraints {kept} over {} s", figure(self.outcome.last.t)),
             caption: self.caption(None),
             panels: vec![panel(0, format!("|*C*| [{unit}]")), panel(1, format!("|*C′*| [{unit}/s]"))],
             log_time: is_long(&drift.energy),
@@ -361,12 +374,58 @@ fn is_long(record: &Excursion) -> bool {
     record.record.first().zip(record.record.last()).is_some_and(|(first, last)| (last[0] / first[0]).log10() >= DECADES)
 }
 
-/// Angles and rates at time `t` \[s\], straight between samples.
+/// `1.5·10^{−16}`.
+fn power(size: f64) -> String {
+    match magnitude(size).split_once('e') {
+        Some((digits, exponent)) => format!("{digits}·10^{{{}}}", exponent.replace('-', "−")),
+        None => magnitude(size),
+    }
+}
+
+/// The angles along a path, with points between the samples.
+fn smoothed(path: &[&Sample]) -> Vec<Vec<f64>> {
+    let inner = |pair: &[&Sample]| -> Vec<Vec<f64>> { (0..FINE).map(|k| cubic(pair[0], pair[1], k as f64 / FINE as f64)).collect() };
+    let mut smooth: Vec<Vec<f64>> = path.windows(2).flat_map(inner).collect();
+    smooth.extend(path.last().map(|last| last.phi.clone()));
+    smooth
+}
+
+/// Angles at a share of the way between two samples, from angles and rates at both (Hermite's cubic).
+fn cubic(a: &Sample, b: &Sample, share: f64) -> Vec<f64> {
+    let (s, rest, span) = (share, 1.0 - share, b.t - a.t);
+    let blend = [rest * rest * (1.0 + 2.0 * s), s * s * (3.0 - 2.0 * s), s * rest * rest * span, -s * s * rest * span];
+    (0..a.phi.len()).map(|k| blend[0] * a.phi[k] + blend[1] * b.phi[k] + blend[2] * a.omega[k] + blend[3] * b.omega[k]).collect()
+}
+
+/// Angles and rates at time `t` \[s\], between samples.
 fn between(samples: &[Sample], t: f64) -> (Vec<f64>, Vec<f64>) {
     let after = samples.partition_point(|sample| sample.t < t).min(samples.len().saturating_sub(1));
-    let before = after.saturating_sub(1);
-    let (Some(a), Some(b)) = (samples.get(before), samples.get(after)) else { return Default::default() };
+    let (Some(a), Some(b)) = (samples.get(after.saturating_sub(1)), samples.get(after)) else { return Default::default() };
     let share = if b.t > a.t { ((t - a.t) / (b.t - a.t)).clamp(0.0, 1.0) } else { 0.0 };
-    let mix = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect();
-    (mix(&a.phi, &b.phi), mix(&a.omega, &b.omega))
+    (cubic(a, b, share), a.omega.iter().zip(&b.omega).map(|(a, b)| a + share * (b - a)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(t: f64, phi: f64, omega: f64) -> Sample {
+        Sample { t, phi: vec![phi], omega: vec![omega], ..Sample::default() }
+    }
+
+    #[test]
+    fn a_cubic_motion_is_met_between_its_samples() {
+        let motion = |t: f64| sample(t, t * t * t - t, 3.0 * t * t - 1.0);
+        let samples = [motion(1.0), motion(1.5), motion(2.0)];
+        for t in [1.0, 1.1, 1.5, 1.9, 2.0] {
+            assert!((between(&samples, t).0[0] - motion(t).phi[0]).abs() < 1e-14);
+        }
+        assert!(between(&[], 1.0).0.is_empty());
+    }
+
+    #[test]
+    fn sizes_become_powers_of_ten() {
+        assert_eq!(power(1.52e-16), "1.5·10^{−16}");
+        assert_eq!(power(0.0), "0");
+    }
 }
