@@ -7,7 +7,8 @@ use crate::chart::{
 };
 use crate::dynamics::Mechanism;
 use crate::dynamics::row::Row;
-use crate::report::page::{figure, magnitude};
+use crate::report::curves::{between, furthest, is_coarse, smoothed, span};
+use crate::report::page::{figure, magnitude, rough};
 use crate::run::drift::Excursion;
 use crate::run::{Outcome, Sample};
 use crate::scene::{Place, Scene};
@@ -76,10 +77,6 @@ pub fn draw(chart: Chart, scene: &Scene, mechanism: &Mechanism, outcome: &Outcom
     picture?.png_bytes()
 }
 
-/// A turn of the fastest body between samples beyond which curves through them would mislead \[rad\].
-const COARSE: f64 = 1.0;
-/// Points of a path between two samples.
-const FINE: usize = 6;
 /// Most it may turn in a window of time that shows single swings \[rad\], and how much is shown instead.
 const CROWDED: [f64; 2] = [40.0 * TAU, 12.0 * TAU];
 /// How far the fastest body turns along the path shown \[rad\].
@@ -131,7 +128,7 @@ impl Finished<'_> {
             window.push(sample);
         }
         let span = span(&window);
-        (window, Some(format!("first {} s of {} s", figure(span), figure(self.outcome.last.t))))
+        (window, Some(format!("first {} s of {} s", rough(span), figure(self.outcome.last.t))))
     }
 
     /// The last samples, as far back as the fastest body turns by `PATH`.
@@ -163,7 +160,7 @@ impl Finished<'_> {
             Vec::new()
         } else {
             let smooth = smoothed(&path);
-            leaves.iter().map(|&body| smooth.iter().map(|phi| place(body, phi)).collect()).collect()
+            leaves.iter().map(|&body| smooth.iter().map(|(_, phi)| place(body, phi)).collect()).collect()
         };
         let mut poses: Vec<Pose> = Vec::new();
         let (mut turned, mut after) = (0.0, None);
@@ -183,24 +180,26 @@ impl Finished<'_> {
         let title = if coarse || names.is_empty() {
             format!("The mechanism at {} s", figure(self.outcome.last.t))
         } else {
-            format!("Path of the end of {}", names.join(", "))
+            let (path, end) = if names.len() == 1 { ("Path", "end") } else { ("Paths", "ends") };
+            format!("{path} of the {end} of {}", names.join(", "))
         };
-        let more = (!coarse).then(|| format!("last {} s of {} s", figure(span(&path)), figure(self.outcome.last.t)));
+        let more = (!coarse).then(|| format!("last {} s of {} s", rough(span(&path)), figure(self.outcome.last.t)));
         MechanismChart { title, caption: self.caption(more), sketch: self.sketch(), poses, trails }
     }
 
     fn angles(&self) -> Angles {
         let (window, more) = self.window();
+        let smooth = smoothed(&window);
         let series = self
             .mechanism
             .bodies
             .iter()
             .enumerate()
-            .map(|(k, body)| AngleSeries { name: plain(&body.name), angle: window.iter().map(|sample| sample.phi[k]).collect() });
+            .map(|(k, body)| AngleSeries { name: plain(&body.name), angle: smooth.iter().map(|(_, phi)| phi[k]).collect() });
         Angles {
             title: "Angles of the bars".to_owned(),
             caption: self.caption(more),
-            time: window.iter().map(|sample| sample.t).collect(),
+            time: smooth.iter().map(|(t, _)| *t).collect(),
             series: series.collect(),
         }
     }
@@ -357,19 +356,6 @@ fn units(phi: &[f64]) -> Vec<Complex<f64>> {
     phi.iter().map(|&phi| Complex::unit(phi)).collect()
 }
 
-/// How far the body that turns furthest turns from one sample to the next \[rad\].
-fn furthest(a: &Sample, b: &Sample) -> f64 {
-    a.phi.iter().zip(&b.phi).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max)
-}
-
-fn is_coarse(samples: &[&Sample]) -> bool {
-    samples.windows(2).any(|pair| furthest(pair[0], pair[1]) > COARSE)
-}
-
-fn span(samples: &[&Sample]) -> f64 {
-    samples.first().zip(samples.last()).map_or(0.0, |(first, last)| last.t - first.t)
-}
-
 fn is_long(record: &Excursion) -> bool {
     record.record.first().zip(record.record.last()).is_some_and(|(first, last)| (last[0] / first[0]).log10() >= DECADES)
 }
@@ -382,46 +368,9 @@ fn power(size: f64) -> String {
     }
 }
 
-/// The angles along a path, with points between the samples.
-fn smoothed(path: &[&Sample]) -> Vec<Vec<f64>> {
-    let inner = |pair: &[&Sample]| -> Vec<Vec<f64>> { (0..FINE).map(|k| cubic(pair[0], pair[1], k as f64 / FINE as f64)).collect() };
-    let mut smooth: Vec<Vec<f64>> = path.windows(2).flat_map(inner).collect();
-    smooth.extend(path.last().map(|last| last.phi.clone()));
-    smooth
-}
-
-/// Angles at a share of the way between two samples, from angles and rates at both (Hermite's cubic).
-fn cubic(a: &Sample, b: &Sample, share: f64) -> Vec<f64> {
-    let (s, rest, span) = (share, 1.0 - share, b.t - a.t);
-    let blend = [rest * rest * (1.0 + 2.0 * s), s * s * (3.0 - 2.0 * s), s * rest * rest * span, -s * s * rest * span];
-    (0..a.phi.len()).map(|k| blend[0] * a.phi[k] + blend[1] * b.phi[k] + blend[2] * a.omega[k] + blend[3] * b.omega[k]).collect()
-}
-
-/// Angles and rates at time `t` \[s\], between samples.
-fn between(samples: &[Sample], t: f64) -> (Vec<f64>, Vec<f64>) {
-    let after = samples.partition_point(|sample| sample.t < t).min(samples.len().saturating_sub(1));
-    let (Some(a), Some(b)) = (samples.get(after.saturating_sub(1)), samples.get(after)) else { return Default::default() };
-    let share = if b.t > a.t { ((t - a.t) / (b.t - a.t)).clamp(0.0, 1.0) } else { 0.0 };
-    (cubic(a, b, share), a.omega.iter().zip(&b.omega).map(|(a, b)| a + share * (b - a)).collect())
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
-
-    fn sample(t: f64, phi: f64, omega: f64) -> Sample {
-        Sample { t, phi: vec![phi], omega: vec![omega], ..Sample::default() }
-    }
-
-    #[test]
-    fn a_cubic_motion_is_met_between_its_samples() {
-        let motion = |t: f64| sample(t, t * t * t - t, 3.0 * t * t - 1.0);
-        let samples = [motion(1.0), motion(1.5), motion(2.0)];
-        for t in [1.0, 1.1, 1.5, 1.9, 2.0] {
-            assert!((between(&samples, t).0[0] - motion(t).phi[0]).abs() < 1e-14);
-        }
-        assert!(between(&[], 1.0).0.is_empty());
-    }
+    use super::power;
 
     #[test]
     fn sizes_become_powers_of_ten() {

@@ -14,6 +14,8 @@
 #[cfg(feature = "charts")]
 pub mod charts;
 pub mod check;
+#[cfg(feature = "charts")]
+mod curves;
 pub mod inspect;
 pub mod methods;
 pub mod page;

@@ -291,7 +291,7 @@ fn fixed_step(
         return Ok(*every / (*every * rate / share).ceil().max(1.0));
     };
     let steps = (until / asked).round();
-    if steps < 1.0 {
+    if asked > until * (1.0 + 1e-9) {
         return Err(usage("--step", format!("{asked} s is longer than the horizon, {until} s"), "a shorter step"));
     }
     let step = if (until / asked - steps).abs() <= 1e-9 * steps { asked } else { until / (until / asked).ceil() };

@@ -111,7 +111,7 @@ impl Ran {
     }
 
     #[track_caller]
-    pub fn is_silent(self) -> Self {
+    pub fn stays_silent(self) -> Self {
         assert!(self.stdout.is_empty() && self.stderr.is_empty(), "{self:#?}");
         self
     }
