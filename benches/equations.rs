@@ -1,2 +1,117 @@
-//! Cost of one evaluation of the equations.
-fn main() {}
+//! Cost of one evaluation of the equations, beside a right-hand side written by hand for exactly the two bars at hand.
+//!
+//! `cargo bench --bench equations`: alternating blocks in one process; the figures are nanoseconds (minimum and median over the blocks) and
+//! the ratio to the hand-written code block by block.
+
+use driftless::dynamics::canonical::Canonical;
+use driftless::dynamics::elimination::Elimination;
+use driftless::dynamics::multiplier::Multiplier;
+use driftless::dynamics::{Field, Form, Mechanism, Time};
+use driftless::scene::read_scene;
+use std::hint::black_box;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Evaluations a block.
+const BLOCK: usize = 20_000;
+/// Blocks of each candidate.
+const BLOCKS: usize = 60;
+
+/// The source problem's two bars, nothing else: the smallest code we could write, with the same sine and cosine.
+struct ByHand {
+    inner: f64,
+    coupling: f64,
+    outer: f64,
+    weight: [f64; 2],
+}
+
+impl Field for ByHand {
+    fn dimension(&self) -> usize {
+        4
+    }
+
+    fn angles(&self) -> usize {
+        2
+    }
+
+    fn rate(&mut self, _t: Time, y: &[f64], rate: &mut [f64]) {
+        let &[phi1, phi2, w1, w2] = y else { return };
+        let ((s1, c1), (s2, c2)) = (libm::sincos(phi1), libm::sincos(phi2));
+        let (cos, sin) = (c1 * c2 + s1 * s2, s1 * c2 - c1 * s2);
+        let m12 = self.coupling * cos;
+        let b1 = -self.coupling * sin * w2 * w2 - self.weight[0] * s1;
+        let b2 = self.coupling * sin * w1 * w1 - self.weight[1] * s2;
+        let det = self.inner * self.outer - m12 * m12;
+        rate.copy_from_slice(&[w1, w2, (self.outer * b1 - m12 * b2) / det, (self.inner * b2 - m12 * b1) / det]);
+    }
+
+    fn label(&self, i: usize) -> String {
+        i.to_string()
+    }
+}
+
+/// Nanoseconds an evaluation over one block; the state moves a little each time, so that nothing can be hoisted out.
+fn block(field: &mut dyn Field, y: &mut [f64], rate: &mut [f64]) -> f64 {
+    let begin = Instant::now();
+    for _ in 0..BLOCK {
+        field.rate(Time::default(), black_box(y), rate);
+        y[0] += 1e-9 * rate[2];
+    }
+    begin.elapsed().as_secs_f64() * 1e9 / BLOCK as f64
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+fn main() {
+    let scene = |name: &str| {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("examples/scenes/{name}.json"));
+        let scene = read_scene(&path, &[]).expect("a shipped scene");
+        let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
+        let start = mechanism.start(&scene);
+        (mechanism, start)
+    };
+    let (free, start) = scene("free");
+    let (motor, motor_start) = scene("motor");
+    let tree = &free.tree;
+    let hand = ByHand {
+        inner: tree.diagonal[0],
+        coupling: tree.coupling[1].re,
+        outer: tree.diagonal[1],
+        weight: [tree.weight[0].re, tree.weight[1].re],
+    };
+    let multiplier = Multiplier::<2, false>::new(Arc::clone(&free));
+    let any_size = Multiplier::<0, false>::new(Arc::clone(&free));
+    let canonical = Canonical::<2, false>::new(Arc::clone(&free));
+    let rows = Multiplier::<2, true>::new(Arc::clone(&motor));
+    let eliminated = Elimination::<2>::new(Arc::clone(&motor));
+    let y = multiplier.state(&start).y;
+    let momenta = canonical.state(&start).y;
+    let (with_rows, without) = (rows.state(&motor_start).y, eliminated.state(&motor_start).y);
+    let mut candidates: Vec<(&str, Box<dyn Field>, Vec<f64>)> = vec![
+        ("written by hand (free)", Box::new(hand), y.clone()),
+        ("driftless, free", Box::new(multiplier), y.clone()),
+        ("driftless, free, size at run time", Box::new(any_size), y),
+        ("driftless, free, canonical form", Box::new(canonical), momenta),
+        ("driftless, motor, multiplier", Box::new(rows), with_rows),
+        ("driftless, motor, eliminated", Box::new(eliminated), without),
+    ];
+    let mut times = vec![Vec::new(); candidates.len()];
+    for _ in 0..BLOCKS {
+        for ((_, field, y), times) in candidates.iter_mut().zip(&mut times) {
+            let mut rate = vec![0.0; y.len()];
+            times.push(block(&mut **field, &mut y.clone(), &mut rate));
+        }
+    }
+    println!("{:36} {:>8} {:>8} {:>8}", "one evaluation", "min ns", "median", "ratio");
+    let hand = times[0].clone();
+    for ((name, ..), times) in candidates.iter().zip(&times) {
+        let mut ratios: Vec<f64> = times.iter().zip(&hand).map(|(time, hand)| time / hand).collect();
+        let mut sorted = times.clone();
+        let middle = median(&mut sorted);
+        println!("{name:36} {:8.1} {middle:8.1} {:8.2}", sorted[0], median(&mut ratios));
+    }
+}

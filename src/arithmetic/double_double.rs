@@ -60,21 +60,49 @@ impl DoubleDouble {
         (self - Self::TAU * Self::of(turns), turns)
     }
 
-    /// sin and cos of an angle in [-π/4, π/4] by their Taylor series; the first term left out is below 1e-33.
+    /// sin and cos of an angle in [-π/4, π/4] by their Taylor series; the first term left out is below 1e-32.
     fn sin_cos_small(self) -> (Self, Self) {
-        const LAST: i32 = 27;
         let square = self * self;
-        let (mut sin, mut cos) = (Self::ONE, Self::ONE);
-        // Horner from the highest factorial down: 1 - x²/(k(k-1)) (1 - ...)
-        let mut k = LAST;
-        while k >= 3 {
-            sin = Self::ONE - square * sin / Self::of(f64::from(k * (k - 1)));
-            cos = Self::ONE - square * cos / Self::of(f64::from((k - 1) * (k - 2)));
-            k -= 2;
+        let (mut sin, mut cos) = (Self::ZERO, Self::ZERO);
+        // Horner from the highest power: 1/3!, 1/5!, … with alternating signs, and 1/4!, 1/6!, … likewise.
+        for pair in INVERSE_FACTORIAL.chunks_exact(2).rev() {
+            sin = pair[0] - square * sin;
+            cos = pair[1] - square * cos;
         }
-        (self * sin, cos)
+        let half = square.ldexp(0.5);
+        (self - self * square * sin, Self::ONE - half + square * square * cos)
     }
 }
+
+/// 1/k! for k = 3…28.
+const INVERSE_FACTORIAL: [DoubleDouble; 26] = [
+    DoubleDouble { hi: 0.16666666666666666, lo: 9.25185853854297e-18 },
+    DoubleDouble { hi: 0.041666666666666664, lo: 2.3129646346357427e-18 },
+    DoubleDouble { hi: 0.008333333333333333, lo: 1.1564823173178714e-19 },
+    DoubleDouble { hi: 0.001388888888888889, lo: -5.300543954373577e-20 },
+    DoubleDouble { hi: 0.0001984126984126984, lo: 1.7209558293420705e-22 },
+    DoubleDouble { hi: 2.48015873015873e-05, lo: 2.1511947866775882e-23 },
+    DoubleDouble { hi: 2.7557319223985893e-06, lo: -1.858393274046472e-22 },
+    DoubleDouble { hi: 2.755731922398589e-07, lo: 2.3767714622250297e-23 },
+    DoubleDouble { hi: 2.505210838544172e-08, lo: -1.448814070935912e-24 },
+    DoubleDouble { hi: 2.08767569878681e-09, lo: -1.20734505911326e-25 },
+    DoubleDouble { hi: 1.6059043836821613e-10, lo: 1.2585294588752098e-26 },
+    DoubleDouble { hi: 1.1470745597729725e-11, lo: 2.0655512752830745e-28 },
+    DoubleDouble { hi: 7.647163731819816e-13, lo: 7.03872877733453e-30 },
+    DoubleDouble { hi: 4.779477332387385e-14, lo: 4.399205485834081e-31 },
+    DoubleDouble { hi: 2.8114572543455206e-15, lo: 1.6508842730861433e-31 },
+    DoubleDouble { hi: 1.5619206968586225e-16, lo: 1.1910679660273754e-32 },
+    DoubleDouble { hi: 8.22063524662433e-18, lo: 2.2141894119604265e-34 },
+    DoubleDouble { hi: 4.110317623312165e-19, lo: 1.4412973378659527e-36 },
+    DoubleDouble { hi: 1.9572941063391263e-20, lo: -1.3643503830087908e-36 },
+    DoubleDouble { hi: 8.896791392450574e-22, lo: -7.911402614872376e-38 },
+    DoubleDouble { hi: 3.868170170630684e-23, lo: -8.843177655482344e-40 },
+    DoubleDouble { hi: 1.6117375710961184e-24, lo: -3.6846573564509766e-41 },
+    DoubleDouble { hi: 6.446950284384474e-26, lo: -1.9330404233703465e-42 },
+    DoubleDouble { hi: 2.4795962632247976e-27, lo: -1.2953730964765229e-43 },
+    DoubleDouble { hi: 9.183689863795546e-29, lo: 1.4303150396787322e-45 },
+    DoubleDouble { hi: 3.279889237069838e-30, lo: 1.5117542744029879e-46 },
+];
 
 impl From<f64> for DoubleDouble {
     fn from(value: f64) -> Self {

@@ -99,6 +99,5 @@ pub fn angles(chart: &Angles, px_per_pt: f64) -> Result<Picture, ChartError> {
         }
         panel.end_labels(&ends, false)?;
     }
-    drop(panels);
     Ok(sheet.picture(&chart.title, &caption))
 }

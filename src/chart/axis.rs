@@ -85,7 +85,8 @@ impl Axis {
     /// A logarithmic axis over whole decades around the positive data, at least one.
     pub(crate) fn decades(name: &str, values: impl Iterator<Item = f64>) -> Self {
         let (low, high) = extremes(values.filter(|&v| v > 0.0 && usable(v)).map(f64::log10)).unwrap_or((0.0, 1.0));
-        let (low, high) = ((low - 0.08).floor().max(-320.0), (high + 0.08).ceil());
+        // A line on the very edge could be taken for the axis.
+        let (low, high) = ((low - 1e-3).floor().max(-320.0), (high + 0.04).ceil());
         Axis { name: name.to_owned(), scale: Scale::Log, from: ticks::ten(low as i32), to: ticks::ten(high.max(low + 1.0) as i32) }
     }
 

@@ -1,12 +1,14 @@
 //! Constraint drift: how far each constraint is off, at the level of positions and of velocities, side by side.
 
 use super::axis::Axis;
-use super::energy_drift::{DriftSeries, draw, label};
+use super::energy_drift::{DriftSeries, draw, drift_axis, is_zero, label};
 use super::file::Picture;
 use super::grid::{beside, label_room};
 use super::lines::{Point, running_maximum};
-use super::palette::{WHITE, marks, mix};
-use super::sheet::Sheet;
+use super::palette::{GREY, WHITE, marks, mix};
+use super::panel::Panel;
+use super::sheet::{NOTE, Sheet, note};
+use super::text::{Align, Lettering, Level};
 use super::{ChartError, PAGE};
 
 /// One level of the constraints, with its unit.
@@ -51,14 +53,13 @@ pub fn constraint_drift(chart: &ConstraintDrift, px_per_pt: f64) -> Result<Pictu
         let highest = lines.iter().flatten().map(|p| p[1]).filter(|v| v.is_finite()).fold(0.0, f64::max);
         let starts = lines.iter().filter_map(|line| line.iter().map(|p| p[1]).find(|&v| v > 0.0)).fold(highest, f64::min);
         let samples = panel.series.iter().flat_map(|s| &s.error).map(|e| e.abs()).filter(|&e| e > 0.03 * starts && e <= highest);
-        (x, Axis::decades(&panel.name, samples.chain([starts])))
+        (x, drift_axis(&panel.name, samples.chain([starts]), lines.iter().any(|line| is_zero(line))))
     });
     let words: Vec<Vec<String>> = (chart.panels.iter().zip(&all))
         .map(|(panel, lines)| panel.series.iter().zip(lines).map(|(series, line)| label(&sheet, &series.name, line)).collect())
         .collect();
     let right = label_room(&sheet, words.iter().flatten().map(String::as_str), true);
     let panels = beside(&sheet, under, axes.collect(), right)?;
-    let mut named = false;
     for (k, (panel, (data, lines))) in panels.iter().zip(chart.panels.iter().zip(&all)).enumerate() {
         let marks = marks(data.series.iter().map(|series| series.method.as_str()));
         for (series, mark) in data.series.iter().zip(&marks) {
@@ -71,28 +72,37 @@ pub fn constraint_drift(chart: &ConstraintDrift, px_per_pt: f64) -> Result<Pictu
         let mut ends = Vec::new();
         for ((line, mark), words) in lines.iter().zip(&marks).zip(&words[k]) {
             if let Some(end) = draw(&sheet, panel, line, mark)? {
-                let at = [panel.bounds[2], end];
                 if end < panel.bounds[3] {
-                    sheet.marker(at, mark.shape, mark.colour)?;
+                    sheet.marker([panel.bounds[2], end], mark.shape, mark.colour)?;
                 }
                 ends.push((end, words.clone(), *mark));
             }
         }
-        named |= !ends.is_empty();
         if ends.is_empty() {
             panel.empty("no data")?;
         }
         if k + 1 == panels.len() {
             panel.end_labels(&ends, true)?;
+        } else {
+            zeros(&sheet, panel, data, lines)?;
         }
     }
-    if !named && panels.is_empty() {
-        sheet.words(
-            "no data",
-            super::sheet::note(super::palette::GREY, super::text::Align::Centre, super::text::Level::Middle),
-            [240.0, 160.0],
-        )?;
+    if panels.is_empty() {
+        sheet.words("no data", note(GREY, Align::Centre, Level::Middle), [0.5 * PAGE[0], 0.5 * PAGE[1]])?;
     }
-    drop(panels);
     Ok(sheet.picture(&chart.title, &caption))
+}
+
+/// Says above the lower edge of a panel without end labels whose markers lie on it.
+fn zeros(sheet: &Sheet, panel: &Panel, data: &DefectPanel, lines: &[Vec<Point>]) -> Result<(), ChartError> {
+    let names: Vec<&str> =
+        data.series.iter().zip(lines).filter(|(_, line)| is_zero(line)).map(|(series, _)| series.name.as_str()).collect();
+    if names.is_empty() {
+        return Ok(());
+    }
+    let [left, _, right, bottom] = panel.bounds;
+    let full = format!("{}: exactly 0", names.join(", "));
+    let words = if sheet.width(&full, NOTE, false) < right - left - 6.0 { full.as_str() } else { "markers: exactly 0" };
+    let lettering = Lettering { halo: true, ..note(GREY, Align::Right, Level::Baseline) };
+    sheet.words(words, lettering, [right - 3.0, bottom - 6.0])
 }

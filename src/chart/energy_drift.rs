@@ -56,8 +56,8 @@ pub fn energy_drift(chart: &EnergyDrift, px_per_pt: f64) -> Result<Picture, Char
 
     let times = || lines.iter().flatten().map(|p| p[0]);
     let x = if chart.log_time { Axis::log_tight("time [s]", times()) } else { Axis::tight("time [s]", times()) };
-    let y = Axis::decades(&format!("largest relative {} error", chart.quantity), lines.iter().flatten().map(|p| p[1]));
-    let y = with_rounding_unit(y);
+    let name = format!("largest relative error of {}", chart.quantity);
+    let y = with_rounding_unit(drift_axis(&name, lines.iter().flatten().map(|p| p[1]), lines.iter().any(|line| is_zero(line))));
     let right = label_room(&sheet, labels.iter().map(String::as_str), false);
     let panels = stacked(&sheet, under, &x, vec![y], right)?;
     let panel = &panels[0];
@@ -88,13 +88,17 @@ pub fn energy_drift(chart: &EnergyDrift, px_per_pt: f64) -> Result<Picture, Char
         panel.empty("no data")?;
     }
     panel.end_labels(&ends, false)?;
-    drop(panels);
     Ok(sheet.picture(&chart.title, &chart.caption))
+}
+
+/// Whether there are samples and all of them are exactly zero.
+pub(crate) fn is_zero(line: &[Point]) -> bool {
+    !line.is_empty() && line.iter().all(|p| p[1] == 0.0)
 }
 
 /// The name, and what a logarithmic axis cannot show.
 pub(crate) fn label(sheet: &Sheet, name: &str, line: &[Point]) -> String {
-    let zero = !line.is_empty() && line.iter().all(|p| p[1] == 0.0);
+    let zero = is_zero(line);
     let infinite = line.last().is_some_and(|p| p[1].is_infinite());
     let remark = if zero {
         ": exactly 0"
@@ -109,7 +113,8 @@ pub(crate) fn label(sheet: &Sheet, name: &str, line: &[Point]) -> String {
 /// Draws a running maximum; exact zeros become dots on the lower edge.  Returns the height of its end \[pt\], if it has any point.
 pub(crate) fn draw(sheet: &Sheet, panel: &Panel, line: &[Point], mark: &Mark) -> Result<Option<f64>, ChartError> {
     let Some(last) = line.last() else { return Ok(None) };
-    if line.iter().all(|p| p[1] == 0.0) {
+    let infinite = last[1].is_infinite();
+    if is_zero(line) {
         let edge = panel.bounds[3];
         for k in 0..=8 {
             sheet.marker([panel.page([f64::from(k) / 8.0, 0.0])[0], edge], mark.shape, mark.colour)?;
@@ -127,7 +132,20 @@ pub(crate) fn draw(sheet: &Sheet, panel: &Panel, line: &[Point], mark: &Mark) ->
         }
     }
     let end = pieces.last().and_then(|piece| piece.last()).map_or_else(|| panel.at(*last)[1], |p| p[1]);
-    Ok(Some(if end.is_finite() { end.clamp(panel.bounds[1], panel.bounds[3]) } else { panel.bounds[1] }))
+    Ok(Some(if end.is_finite() && !infinite { end.clamp(panel.bounds[1], panel.bounds[3]) } else { panel.bounds[1] }))
+}
+
+/// Decades around the drifts; without any, those around the rounding unit.
+///
+/// Where a series among them is exactly zero, the lower edge is kept free for its markers.
+pub(crate) fn drift_axis(name: &str, values: impl Iterator<Item = f64>, zeros: bool) -> Axis {
+    let values: Vec<f64> = values.filter(|&v| v > 0.0 && v.is_finite()).collect();
+    if values.is_empty() {
+        return Axis::decades(name, [1e-17, 3e-15].into_iter());
+    }
+    let axis = Axis::decades(name, values.into_iter());
+    let below = if zeros { (0.12 * (axis.to / axis.from).log10()).ceil() } else { 0.0 };
+    Axis { from: (axis.from * 10_f64.powf(-below)).max(1e-320), ..axis }
 }
 
 /// The axis, widened to the rounding unit if the data come near it.

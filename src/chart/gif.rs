@@ -67,7 +67,15 @@ impl Encoder {
 
     /// Adds a frame (red, green, blue of each pixel): the rectangle that changed, unchanged pixels in it transparent.
     pub(crate) fn frame(&mut self, rgb: &[u8]) -> Result<(), ChartError> {
-        let now: Vec<u8> = rgb.as_chunks::<3>().0.iter().map(|&colour| self.index(colour)).collect();
+        let mut last = ([0; 3], self.index([0; 3]));
+        let index = |&colour: &[u8; 3]| {
+            // Most pixels look like their neighbour.
+            if colour != last.0 {
+                last = (colour, self.index(colour));
+            }
+            last.1
+        };
+        let now: Vec<u8> = rgb.as_chunks::<3>().0.iter().map(index).collect();
         let changed = |k: usize| self.shown.get(k) != Some(&now[k]);
         let mut area: Option<[usize; 4]> = None;
         for k in (0..now.len()).filter(|&k| changed(k)) {
@@ -96,6 +104,6 @@ impl Encoder {
 
     /// The file.
     pub(crate) fn finish(self) -> Result<Vec<u8>, ChartError> {
-        self.gif.into_inner().map_err(|source| ChartError::Gif(source.into()))
+        self.gif.into_inner().map_err(ChartError::Gif)
     }
 }

@@ -102,8 +102,8 @@ pub(crate) fn running_maximum(time: &[f64], values: &[f64]) -> Vec<Point> {
             continue;
         }
         largest = largest.max(value.abs());
-        // Within a level only its ends are needed.
-        let level = out.len() >= 2 && out[out.len() - 1][1] == largest && out[out.len() - 2][1] == largest;
+        // Within a level only its ends are needed, and its first positive time, where a logarithmic axis begins.
+        let level = out.len() >= 2 && out[out.len() - 1][1] == largest && out[out.len() - 2][1] == largest && out[out.len() - 2][0] > 0.0;
         match out.last_mut() {
             Some(end) if level => end[0] = t,
             _ => out.push([t, largest]),
@@ -112,7 +112,7 @@ pub(crate) fn running_maximum(time: &[f64], values: &[f64]) -> Vec<Point> {
     out
 }
 
-/// Smallest and largest y in each of `columns` equal parts of 0…1: `(x, low, high)` of those that hold points.
+/// Smallest and largest y in and beside each of `columns` equal parts of 0…1: `(x, low, high)` of those that hold points.
 pub(crate) fn envelope(points: &[Point], columns: usize) -> Vec<(f64, f64, f64)> {
     let mut range: Vec<Option<(f64, f64)>> = vec![None; columns];
     for [x, y] in points.iter().copied().filter(|[x, y]| (0.0..=1.0).contains(x) && y.is_finite()) {
@@ -120,7 +120,12 @@ pub(crate) fn envelope(points: &[Point], columns: usize) -> Vec<(f64, f64, f64)>
         *column = Some(column.map_or((y, y), |(low, high)| (y.min(low), y.max(high))));
     }
     let middle = |k: usize| (k as f64 + 0.5) / columns as f64;
-    range.iter().enumerate().filter_map(|(k, range)| range.map(|(low, high)| (middle(k), low, high))).collect()
+    // Neighbours are taken in, or a column that happens to miss a peak would notch the band.
+    let wide = |k: usize| {
+        let near = range[k.saturating_sub(1)..(k + 2).min(columns)].iter().flatten();
+        near.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), r| (low.min(r.0), high.max(r.1)))
+    };
+    (0..columns).filter(|&k| range[k].is_some()).map(|k| (middle(k), wide(k).0, wide(k).1)).collect()
 }
 
 /// How often a line turns up or down by more than a hundredth of the panel, less than which cannot be seen.
@@ -171,6 +176,8 @@ mod tests {
     fn a_running_maximum_never_falls_and_skips_gaps() {
         let line = running_maximum(&[0.0, 1.0, 2.0, 3.0, 4.0], &[0.0, -2.0, f64::NAN, 1.0, 3.0]);
         assert_eq!(line, [[0.0, 0.0], [1.0, 2.0], [3.0, 2.0], [4.0, 3.0]]);
+        let level = running_maximum(&[0.0, 1.0, 2.0, 3.0, 4.0], &[5.0; 5]);
+        assert_eq!(level, [[0.0, 5.0], [1.0, 5.0], [4.0, 5.0]], "a level keeps its first positive time");
     }
 
     #[test]

@@ -3,8 +3,8 @@
 use super::file::Picture;
 use super::grid::AIR;
 use super::labels::Occupied;
-use super::panel::{Panel, Written};
-use super::sheet::Sheet;
+use super::panel::{Panel, Written, left_room};
+use super::sheet::{EDGE, Sheet};
 use super::sketch::{Pencil, Pose, Sketch, symbol_size, trail_colour};
 use super::view::View;
 use super::{ChartError, PAGE};
@@ -36,10 +36,16 @@ pub fn mechanism(chart: &MechanismChart, px_per_pt: f64) -> Result<Picture, Char
     let poses = &chart.poses[ghosts..];
     let under = Sheet::new(PAGE, 0.5)?.heading(&chart.title, &chart.caption)?;
     let view = View::around(&chart.sketch, poses, &chart.trails);
-    let (left, right) = (62.0, 20.0);
-    let width = PAGE[0] - left - right;
-    let height = (width * view.aspect()).clamp(200.0, 330.0);
-    let view = view.fitted(width, height);
+    let right = 20.0;
+    let fitted = |left: f64| {
+        let width = PAGE[0] - left - right;
+        let height = (width * view.aspect()).clamp(200.0, 330.0);
+        (width, height, view.clone().fitted(width, height))
+    };
+    // Wide labels of the upright axis push the panel to the right.
+    let (_, height, first) = fitted(62.0);
+    let left = (EDGE + left_room(&Sheet::new(PAGE, 0.5)?, &first.axes().1, height)).max(62.0);
+    let (width, height, view) = fitted(left);
 
     let sheet = Sheet::new([PAGE[0], under + AIR + height + 44.0], px_per_pt)?;
     sheet.heading(&chart.title, &chart.caption)?;
@@ -65,7 +71,5 @@ pub fn mechanism(chart: &MechanismChart, px_per_pt: f64) -> Result<Picture, Char
     } else {
         panel.empty("no data")?;
     }
-    drop(pencil);
-    drop(panel);
     Ok(sheet.picture(&chart.title, &chart.caption))
 }

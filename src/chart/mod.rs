@@ -1,7 +1,7 @@
 //! Charts: plain data in, pictures out, drawn off-screen.
 //!
 //! Each chart is a struct of plain rows and a function that turns it into a [`Picture`] (or an [`Animation`]).  Nothing is run or
-//! read here.  The pictures are drawn with plotters on a canvas of our own ([`canvas`] says why); fonts are part of the program.
+//! read here.  The pictures are drawn with plotters on a canvas of our own, because its bitmap backend cannot draw smooth lines; fonts are part of the program.
 //!
 //! Sizes are points of 1/72 inch; one number, pixels per point, sets the resolution.  Every string may carry a small markup,
 //! `*italic*`, `_{below}`, `^{above}`; [`plain`] protects names that come from outside.
@@ -13,6 +13,7 @@
 //! | [`energy_drift()`] | [`EnergyDrift`] | largest relative energy error so far |
 //! | [`constraint_drift()`] | [`ConstraintDrift`] | defects of constraints, positions beside velocities |
 //! | [`torque_power()`] | [`TorquePower`] | torque above power of motors |
+//! | [`work_precision()`] | [`WorkPrecision`] | error against run time |
 //! | [`motion_gif()`] | [`MotionGif`] | the mechanism in motion |
 
 mod angles;
@@ -35,6 +36,7 @@ mod text;
 mod ticks;
 mod torque_power;
 mod view;
+mod work_precision;
 
 pub use angles::{AngleSeries, Angles, angles};
 pub use constraint_drift::{ConstraintDrift, DefectPanel, constraint_drift};
@@ -45,6 +47,7 @@ pub use motion::{Animation, MotionGif, motion_gif};
 pub use sketch::{HingeSketch, MotorPose, Pose, Sketch, SpringSketch, WallSketch};
 pub use text::{TextBox, plain, unmarked};
 pub use torque_power::{MotorSeries, TorquePower, torque_power};
+pub use work_precision::{WorkPrecision, WorkSeries, work_precision};
 
 use std::path::PathBuf;
 use thiserror::Error;

@@ -1,7 +1,7 @@
 //! A rectangle with two axes: frame, ticks, names, and data drawn inside it.
 
 use super::ChartError;
-use super::axis::{Axis, Scale};
+use super::axis::Axis;
 use super::labels::{Occupied, spread};
 use super::lines::{Point, clip, envelope, is_dense, turns};
 use super::palette::{Colour, GREY, GRID, GUIDE, INK, Mark, SPINE, WHITE, mix, readable};
@@ -41,9 +41,8 @@ pub(crate) struct Panel<'a> {
     y_most: usize,
 }
 
-fn most_up(axis: &Axis, height: f64) -> usize {
-    let apart = if axis.scale == Scale::Log { 19.0 } else { 21.0 };
-    ((height / apart) as usize).clamp(2, 9)
+fn most_up(height: f64) -> usize {
+    ((height / 19.0) as usize).clamp(2, 9)
 }
 
 /// The most ticks whose labels keep apart along `width`.
@@ -69,7 +68,7 @@ fn most_along(sheet: &Sheet, axis: &Axis, width: f64) -> usize {
 
 /// Room left of a panel for the labels and the name of its y axis \[pt\].
 pub(crate) fn left_room(sheet: &Sheet, axis: &Axis, height: f64) -> f64 {
-    widest(sheet, &axis.ticks(most_up(axis, height))) + MAJOR + GAP + 8.0 + NAME
+    widest(sheet, &axis.ticks(most_up(height))) + MAJOR + GAP + 8.0 + NAME
 }
 
 fn widest(sheet: &Sheet, ticks: &Ticks) -> f64 {
@@ -85,7 +84,7 @@ pub(crate) fn right_room(sheet: &Sheet, axis: &Axis, width: f64) -> f64 {
 
 impl<'a> Panel<'a> {
     pub(crate) fn new(sheet: &'a Sheet, bounds: [f64; 4], x: Axis, y: Axis) -> Self {
-        let (x_most, y_most) = (most_along(sheet, &x, bounds[2] - bounds[0]), most_up(&y, bounds[3] - bounds[1]));
+        let (x_most, y_most) = (most_along(sheet, &x, bounds[2] - bounds[0]), most_up(bounds[3] - bounds[1]));
         sheet.note_panel(bounds);
         Panel { sheet, bounds, x, y, x_most, y_most }
     }

@@ -206,7 +206,7 @@ impl Sheet {
     }
 
     /// The finished picture.
-    pub(crate) fn picture(self, title: &str, caption: &[String]) -> Picture {
+    pub(crate) fn picture(&self, title: &str, caption: &[String]) -> Picture {
         let canvas = self.canvas.borrow();
         let (width, height) = canvas.dimensions();
         Picture {

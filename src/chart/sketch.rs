@@ -178,7 +178,12 @@ impl Pencil<'_> {
             let colour = if k % 2 == 0 { ORANGE } else { SKY };
             self.sheet.line(&ends, &Pen::new(mix(colour, INK, 0.3), 5.6 * size))?;
             self.sheet.line(&ends, &Pen::new(mix(colour, WHITE, 0.55), 3.6 * size))?;
-            occupied.line(&ends);
+            let [from, to] = ends;
+            let length = (to[0] - from[0]).hypot(to[1] - from[1]).max(1e-9);
+            let edge = [-2.5 * size * (to[1] - from[1]) / length, 2.5 * size * (to[0] - from[0]) / length];
+            for side in [-1.0, 0.0, 1.0] {
+                occupied.line(&ends.map(|end| [end[0] + side * edge[0], end[1] + side * edge[1]]));
+            }
         }
         for (spring, ends) in sketch.springs.iter().zip(&pose.springs).filter(|(_, ends)| finite(&ends[..])) {
             self.spring(spring, ends.map(|end| self.at(end)), occupied)?;
@@ -246,7 +251,7 @@ impl Pencil<'_> {
         if named {
             let best =
                 (0..9).map(|k| on(start + sense * (0.4 + 0.25 * f64::from(k)), radius + 9.0)).map(|p| (p, occupied.cost(around(p, 5.0))));
-            let Some((at, _)) = best.min_by(|a, b| a.1.total_cmp(&b.1)) else { return Ok(()) };
+            let Some((at, _)) = best.filter(|(_, cost)| *cost < 49.0).min_by(|a, b| a.1.total_cmp(&b.1)) else { return Ok(()) };
             occupied.block(around(at, 5.0));
             let lettering = Lettering { halo: true, ..Lettering::new(NAME, colour).at(Align::Centre, Level::Middle) };
             self.sheet.words("*ω*", lettering, at)?;

@@ -193,7 +193,7 @@ pub(crate) fn log(low: f64, high: f64, most: usize) -> Ticks {
     let (first, last) = ((from - 1e-9).ceil() as i32, (to + 1e-9).floor() as i32);
     let inside = |value: &f64| *value >= low * (1.0 - 1e-9) && *value <= high * (1.0 + 1e-9);
     let between = |factors: &'static [f64]| (first - 1..=last).flat_map(move |k| factors.iter().map(move |factor| factor * ten(k)));
-    let short = to - from < 2.6;
+    let short = to - from < 3.05;
     let mut majors: Vec<(f64, f64, i32)> = Vec::new();
     let mut step = 1;
     if short {

@@ -87,7 +87,6 @@ pub fn torque_power(chart: &TorquePower, px_per_pt: f64) -> Result<Picture, Char
             panel.end_labels(&ends, false)?;
         }
     }
-    drop(panels);
     Ok(sheet.picture(&chart.title, &caption))
 }
 

@@ -125,6 +125,8 @@ impl From<FileError> for Failure {
 impl From<RunError> for Failure {
     fn from(error: RunError) -> Self {
         match error {
+            RunError::Compile(error) => error.into(),
+            RunError::Refused(refusal) => refusal.into(),
             RunError::Step(error) => error.into(),
             RunError::Observer(error) => Self::new(Exit::Io, error.to_string()),
         }

@@ -40,6 +40,7 @@ pub mod natural;
 pub mod point;
 pub mod reaction;
 pub mod row;
+pub mod series;
 pub mod ties;
 pub mod tree;
 

@@ -8,19 +8,21 @@
 //! W = D⁻¹,   S_pq = Re(conj(g_p) W g_q),   S mu = Re(conj(g) W F) + convective terms,   z'' = W (F - g mu)
 //! ```
 //!
-//! No sine, no cosine and no velocity term but those of the rows; gravity is a constant force, a force f at a point `Σ gamma_k z_k` acts on z_k as
-//! `conj(gamma_k) f`.  On the constraints a motor's row has the slope of the angle row `q_a - q_b - theta`, so its multiplier is the same: minus the torque.
+//! No sine, no cosine and no velocity term but those of the rows; gravity is a constant force, a force f at a point `Σ gamma_k z_k` acts on
+//! z_k as `conj(gamma_k) f`.  On the constraints a motor's row has the slope of the angle row `q_a - q_b - theta`, so its multiplier is the
+//! same: minus the torque.
 //!
-//! Unknowns: z (2n numbers), z' (2n) \[1/s\] and, where there are motors, p_t \[J\], the momentum conjugate to time: p_t' = -Σ lambda C_t.  Energy plus p_t
-//! is a first integral, so p_t starts at zero and the work done by the motors is -p_t, without a quadrature.  None of the unknowns is an angle:
-//! whole turns are counted by the method as a vector passes the negative x axis.
+//! Unknowns: z (2n numbers), z' (2n) \[1/s\] and, where there are motors, p_t \[J\], the momentum conjugate to time: p_t' = -Σ lambda C_t.
+//! Energy plus p_t is a first integral, so p_t starts at zero and the work done by the motors is -p_t, without a quadrature.  None of the
+//! unknowns is an angle: whole turns are counted by the method as a vector passes the negative x axis.
 //!
 //! Source: J. García de Jalón, E. Bayo, *Kinematic and Dynamic Simulation of Multibody Systems* (1994), chapter 2, for natural coordinates.
 
 use super::law::Law;
 use super::row::Row;
 use super::{Form, Mechanism, Motion, State, Time, tree};
-use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
+use crate::arithmetic::circle::Circle;
+use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use std::sync::Arc;
 
 /// The largest number of bodies; every step costs a factorization of a full matrix with a row per body and motor.
@@ -89,6 +91,15 @@ impl Drive {
     }
 }
 
+/// What a motor asks for at one time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Demand {
+    /// u = exp(i theta), to 1e-24.
+    pub unit: Complex<DoubleDouble>,
+    /// theta' \[rad/s\].
+    pub rate: DoubleDouble,
+}
+
 /// How far a state is from its constraints.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Defect {
@@ -105,6 +116,7 @@ pub struct Natural {
     /// W (n × n), Hermitian to the last bit \[1/(kg·m²)\].
     inverse: Vec<Complex<f64>>,
     drives: Vec<Drive>,
+    circle: Circle,
 }
 
 impl Natural {
@@ -133,7 +145,7 @@ impl Natural {
             }
         }
         let inverse = invert(&mechanism).map_err(|body| NaturalError::Singular(mechanism.bodies[body].name.clone()))?;
-        Ok(Self { mechanism, inverse, drives })
+        Ok(Self { mechanism, inverse, drives, circle: Circle::default() })
     }
 
     /// W row by row (n × n) \[1/(kg·m²)\]: the inverse of the mass matrix, formed in double-double and rounded once, Hermitian to the last
@@ -145,6 +157,24 @@ impl Natural {
     /// The motors.
     pub fn drives(&self) -> &[Drive] {
         &self.drives
+    }
+
+    /// What a motor asks for at time `t`.
+    #[inline]
+    pub fn demand(&self, drive: &Drive, t: Time) -> Demand {
+        let law = &drive.law;
+        let mut angle = DoubleDouble::of(law.start) + t.scale(law.rate);
+        let mut rate = DoubleDouble::of(law.rate);
+        if law.acceleration != 0.0 {
+            angle += (t * t).scale(0.5 * law.acceleration);
+            rate += t.scale(law.acceleration);
+        }
+        for sine in &law.sines {
+            let swing = self.circle.unit(t.scale(sine.frequency) + sine.phase);
+            angle += swing.im.scale(sine.amplitude);
+            rate += swing.re.scale(sine.amplitude).scale(sine.frequency);
+        }
+        Demand { unit: self.circle.unit(angle), rate }
     }
 
     /// Number of rows: one a body, then one a motor.
@@ -219,13 +249,10 @@ impl Natural {
         let (z, rate) = self.vectors(state);
         let mut defect = Defect::default();
         let mut see = |position: DoubleDouble, velocity: DoubleDouble| {
-            // A comparison the other way round would let not-a-number pass.
-            if !(position.hi.abs() <= defect.position) {
-                defect.position = position.hi.abs();
-            }
-            if !(velocity.hi.abs() <= defect.velocity) {
-                defect.velocity = velocity.hi.abs();
-            }
+            // Unlike `max`, this does not lose a not-a-number.
+            let larger = |a: f64, b: f64| if a > b || a.is_nan() { a } else { b };
+            defect.position = larger(position.hi.abs(), defect.position);
+            defect.velocity = larger(velocity.hi.abs(), defect.velocity);
         };
         for (z, rate) in z.iter().zip(&rate) {
             see(z.norm_squared() + -1.0, z.dot(*rate).ldexp(2.0));
@@ -325,7 +352,7 @@ fn invert(mechanism: &Mechanism) -> Result<Vec<Complex<f64>>, usize> {
             }
             if i == j {
                 pivot[j] = entry.re;
-                if !(pivot[j].hi > 1e-13 * mechanism.tree.diagonal[j]) {
+                if pivot[j].hi <= 1e-13 * mechanism.tree.diagonal[j] {
                     return Err(j);
                 }
                 lower[at(j, j)] = Complex::new(DoubleDouble::ONE, DoubleDouble::ZERO);

@@ -3,6 +3,7 @@
 use super::check::describe;
 use super::page::{Page, figure, magnitude};
 use crate::dynamics::Mechanism;
+#[cfg(feature = "files")]
 use crate::run::files::sha256;
 use crate::run::{Folder, Outcome, Sample};
 use crate::scene::Scene;
@@ -67,6 +68,7 @@ fn moment(mechanism: &Mechanism, sample: &Sample) -> Value {
 }
 
 /// What `run.json` holds: the report, the resolved scene, versions, hashes; what differs from run to run stands in `timings` alone.
+#[cfg(feature = "files")]
 pub fn record(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome, trajectory_sha256: &str) -> Value {
     let mut report = object(scene, mechanism, outcome);
     let wall = report.as_object_mut().and_then(|members| members.shift_remove("wall_s"));
@@ -82,6 +84,7 @@ pub fn record(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome, trajector
 }
 
 /// The platform the program was compiled for: `x86_64-linux-gnu`.
+#[cfg(feature = "files")]
 fn target() -> String {
     let environment = match () {
         () if cfg!(target_env = "gnu") => "-gnu",

@@ -2,7 +2,7 @@
 
 use super::drift::{Drift, Limits};
 use super::methods::{MethodId, Stabilization};
-use super::plan::Plan;
+use super::plan::{Plan, Refusal, Request};
 use super::sample::{Sample, Sampler};
 use super::trace::Trace;
 use crate::arithmetic::DoubleDouble;
@@ -10,7 +10,8 @@ use crate::dynamics::canonical::Canonical;
 use crate::dynamics::elimination::Elimination;
 use crate::dynamics::multiplier::Multiplier;
 use crate::dynamics::natural::Natural;
-use crate::dynamics::{Field, Form, Mechanism, Motion, State, Time};
+use crate::dynamics::{CompileError, Field, Form, Mechanism, Motion, State, Time};
+use crate::scene::Scene;
 use crate::stabilization::{Baumgarte, Projected};
 use crate::stepping::gauss::Gauss;
 use crate::stepping::rattle::Rattle;
@@ -207,6 +208,12 @@ pub struct Outcome {
 /// What ends a run without an outcome.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
+    /// The scene has no equations.
+    #[error("{0}")]
+    Compile(#[from] CompileError),
+    /// The request makes no sense for the scene.
+    #[error("{0}")]
+    Refused(#[from] Refusal),
     /// The method could not begin.
     #[error("{0}")]
     Step(#[from] StepError),
@@ -229,6 +236,17 @@ impl Run {
     pub fn plan(&self) -> &Plan {
         &self.plan
     }
+}
+
+/// A scene from its start to its horizon in one call: compiles, plans, marches.
+///
+/// # Errors
+/// Whatever keeps it from beginning, and what the observer failed with; a stop on the way is part of the [`Outcome`].
+pub fn simulate(scene: &Scene, request: &Request, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>) -> Result<Outcome, RunError> {
+    let mechanism = Arc::new(Mechanism::new(scene)?);
+    let plan = Plan::new(scene, &mechanism, request)?;
+    let start = mechanism.start(scene);
+    march(Run::new(mechanism, plan, Limits::default(), &start)?, observer)
 }
 
 /// Marches a run to its horizon, shows every sample to `observer`, and tells how it ended.

@@ -5,17 +5,20 @@
 //! [`files`] keeps whole files only.
 
 pub mod drift;
+#[cfg(feature = "files")]
 pub mod files;
 pub mod march;
 pub mod methods;
 pub mod plan;
 pub mod sample;
+#[cfg(feature = "files")]
 pub mod table;
 pub mod trace;
 
 pub use drift::{Drift, Limits};
+#[cfg(feature = "files")]
 pub use files::{FileError, Folder, Stream};
-pub use march::{Outcome, Run, RunError, march};
+pub use march::{Outcome, Run, RunError, march, simulate};
 pub use methods::{METHODS, MethodId, MethodInfo, Stabilization};
 pub use plan::{Plan, Refusal, Request};
 pub use sample::{Sample, Sampler};

@@ -6,9 +6,10 @@
 //! ```
 //!
 //! What is symplectic and time-symmetric stays so.  Source of the idea: H. Yoshida, *Construction of higher order symplectic integrators*,
-//! Phys. Lett. A 150 (1990).  Coefficients: M. Suzuki, *Fractal decomposition of exponential operators*, Phys. Lett. A 146 (1990), his fivefold
-//! rule; W. Kahan, R.-C. Li, *Composition constants for raising the orders of unconventional schemes for ordinary differential equations*,
-//! Math. Comp. 66 (1997), `s9odr6a` and `s17odr8a`.  Their 26 digits fulfil the conditions of the test below to 3e-26; here they are as doubles.
+//! Phys. Lett. A 150 (1990).  Coefficients: M. Suzuki, *Fractal decomposition of exponential operators*, Phys. Lett. A 146 (1990), his
+//! fivefold rule; W. Kahan, R.-C. Li, *Composition constants for raising the orders of unconventional schemes for ordinary differential
+//! equations*, Math. Comp. 66 (1997), `s9odr6a` and `s17odr8a`.  Their 26 digits fulfil the conditions of the test below to 3e-26; here
+//! they are as doubles.
 
 use crate::arithmetic::DoubleDouble;
 
@@ -29,7 +30,7 @@ pub enum Composition {
 /// 1/(4 - 4^(1/3)), twice.
 const SUZUKI_5: [f64; 2] = [0.414_490_771_794_375_74, 0.414_490_771_794_375_74];
 
-const KAHAN_LI_9: [f64; 4] = [0.392_161_444_007_314_14, 0.332_599_136_789_359_44, -0.706_246_172_557_639_36, 0.082_213_596_293_550_8];
+const KAHAN_LI_9: [f64; 4] = [0.392_161_444_007_314_1, 0.332_599_136_789_359_44, -0.706_246_172_557_639_3, 0.082_213_596_293_550_8];
 
 const KAHAN_LI_17: [f64; 8] = [
     0.130_202_483_088_890_08,
@@ -37,7 +38,7 @@ const KAHAN_LI_17: [f64; 8] = [
     -0.389_474_962_644_847_29,
     0.158_841_906_555_155_6,
     -0.395_903_894_133_237_57,
-    0.184_539_640_978_315_71,
+    0.184_539_640_978_315_7,
     0.258_374_387_686_322_04,
     0.295_011_723_609_310_3,
 ];
@@ -73,8 +74,8 @@ impl Composition {
 
     /// The substeps of a step `step` \[s\].
     ///
-    /// Rounded to half units in the last place of `step`, so that they add up to it exactly: if they did not, a driven scene would be pushed
-    /// by the difference in every step, always in the same direction.
+    /// Rounded to half units in the last place of `step`, so that they add up to it exactly: if they did not, a driven scene would be
+    /// pushed by the difference in every step, always in the same direction.
     pub fn substeps(self, step: f64) -> Vec<f64> {
         let grain = 0.5 * (step.abs().next_up() - step.abs());
         let mut substeps: Vec<f64> = self.half().iter().map(|g| (g * step / grain).round() * grain).collect();
@@ -114,8 +115,8 @@ mod tests {
         (1..=n).map(|k| k as f64).product()
     }
 
-    /// A symmetric method of order 2 is the flow of h Y1 + h³ Y3 + h⁵ Y5 + ... with generators that do not commute.  Returns by how much the
-    /// composition of these exponentials misses exp(h Y1), grade by grade.
+    /// A symmetric method of order 2 is the flow of h Y1 + h³ Y3 + h⁵ Y5 + ... with generators that do not commute.  Returns by how much
+    /// the composition of these exponentials misses exp(h Y1), grade by grade.
     fn defects(composition: Composition, highest: usize) -> Vec<f64> {
         let words = words(highest);
         let mut product: Series = words.iter().map(|word| (word.clone(), f64::from(u8::from(word.is_empty())))).collect();

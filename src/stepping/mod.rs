@@ -10,11 +10,13 @@ pub mod dp8;
 pub mod explicit;
 pub mod gauss;
 pub mod rattle;
+pub mod taylor;
 pub mod windows;
 
 pub use dp5::Dp5;
 pub use dp8::Dp8;
 pub use explicit::Tolerance;
+pub use taylor::Taylor;
 pub use windows::{Dop853, Dopri5};
 
 use crate::dynamics::{State, Time};

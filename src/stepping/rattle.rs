@@ -1,8 +1,9 @@
 //! RATTLE, order 2, and its symmetric compositions of order 4, 6 and 8; fixed step.
 //!
 //! Keeps: every constraint at position and velocity level to rounding; symplectic and time-symmetric, so energy (with motors: energy less
-//! work) oscillates with an amplitude of the method's order and has no drift.  Choose it for long horizons of constrained or driven scenes where a
-//! cheap step counts; for few bodies and the last digits Gauss and Taylor are better.  Asks for the [`Natural`] form: forces that depend on positions only.
+//! work) oscillates with an amplitude of the method's order and has no drift.  Choose it for long horizons of constrained or driven scenes
+//! where a cheap step counts; for few bodies and the last digits Gauss and Taylor are better.  Asks for the [`Natural`] form: forces that
+//! depend on positions only.
 //!
 //! ```text
 //! v½ = v0 + h/2 W (F(z0) - g(z0,t0) mu),     z1 = z0 + h v½,     C(z1, t1) = 0             gives mu
@@ -10,27 +11,26 @@
 //! p_t -= h/2 (mu·C_t(z0,t0) + mu'·C_t(z1,t1))                                              driven scenes
 //! ```
 //!
-//! Source: H. C. Andersen, *Rattle: a "velocity" version of the Shake algorithm*, J. Comput. Phys. 52 (1983); B. Leimkuhler, R. D. Skeel, *Symplectic
-//! numerical integrators in constrained Hamiltonian systems*, J. Comput. Phys. 112 (1994), for its symplecticity; E. Hairer, C. Lubich, G. Wanner,
-//! *Geometric Numerical Integration*, 2nd ed. (2006), section VII.1.4.  p_t makes time a coordinate, so that a driven scene is one without drive.
-//! Compositions: [`composition`](super::composition).
+//! Source: H. C. Andersen, *Rattle: a "velocity" version of the Shake algorithm*, J. Comput. Phys. 52 (1983); B. Leimkuhler, R. D. Skeel,
+//! *Symplectic numerical integrators in constrained Hamiltonian systems*, J. Comput. Phys. 112 (1994), for its symplecticity; E. Hairer, C.
+//! Lubich, G. Wanner, *Geometric Numerical Integration*, 2nd ed. (2006), section VII.1.4.  p_t makes time a coordinate, so that a driven
+//! scene is one without drive. Compositions: [`composition`](super::composition).
 //!
-//! Rounding: positions, velocities, p_t and time are pairs; C(z0 + h v0), and the velocity defect before the second solve, are formed from pairs,
-//! because both are small differences of large terms.  What is left is the rounding of h W F, 1e-16 of a *kick*, not of the state.
+//! Rounding: positions, velocities, p_t and time are pairs, and the last Newton sweep forms C(z1, t1) from them.  What is left is the
+//! rounding of h W F, 1e-16 of a *kick*, not of the state.
 
 use super::composition::Composition;
 use super::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
-use crate::dynamics::law::Phase;
-use crate::dynamics::natural::{Natural, upper};
+use crate::dynamics::natural::{Demand, Natural, upper};
 use crate::dynamics::tree::{self, size};
-use crate::dynamics::{State, Time};
+use crate::dynamics::{Form, State, Time};
 
 /// Newton sweeps before a step is given up; an ordinary step takes three or four.
 const SWEEPS: usize = 30;
 
-/// A change of the multipliers this small, against the forces, is rounding.
-const ROUNDING: f64 = 5e-17;
+/// What plain sweeps may leave of the multipliers, against the forces: the last sweep is made with pairs and takes the rest.
+const LEFT_OVER: f64 = 1e-13;
 
 /// Largest change, against the forces, at which a solve that has stopped improving counts as solved.
 const STALLED: f64 = 1e-11;
@@ -113,6 +113,9 @@ impl Rattle {
         tally: &mut Tally,
         watch: &mut Watch<Natural>,
     ) -> Result<Reached, StepError> {
+        if self.step == 0.0 || !self.step.is_finite() {
+            return Err(self.refuse(state.time.hi));
+        }
         let count = ((until - state.time).hi / self.step).round();
         self.work.resize(natural);
         self.work.load::<N, DRIVEN>(natural, state);
@@ -134,6 +137,17 @@ impl Rattle {
             }
         }
         Ok(Reached::Until)
+    }
+
+    fn refuse(&self, t: f64) -> StepError {
+        StepError {
+            cause: Cause::StepTooSmall,
+            method: self.name().into(),
+            t,
+            step: self.step,
+            what: "the step is zero or not finite".into(),
+            hint: "give a step in seconds, such as 0.01".into(),
+        }
     }
 
     fn explain(&self, natural: &Natural, t: f64, failure: Failure) -> StepError {
@@ -186,8 +200,8 @@ struct Work {
     lifted: Vec<Complex<f64>>,
     /// Gradients of the motors' rows at `here`.
     gradient: Vec<[Complex<f64>; 2]>,
-    /// Laws at the time of `here`, and at the end of the substep.
-    phase: Vec<Phase<DoubleDouble>>,
+    /// What the motors ask for at the end of the substep.
+    demand: Vec<Demand>,
     /// C_t of the motors' rows at `here`.
     drive: Vec<f64>,
     /// mu (R).
@@ -199,7 +213,10 @@ struct Work {
     offset: Vec<f64>,
     /// Right side, then solution (R).
     change: Vec<f64>,
-    /// Largest force (n), what rounding is measured against \[N·m\].
+    /// Largest force, and largest inertia \[N·m, kg·m²\].
+    strength: f64,
+    inertia: f64,
+    /// What changes of the multipliers are measured against: the force, or what moves a vector by an ulp in one substep \[N·m\].
     scale: f64,
 }
 
@@ -207,7 +224,6 @@ impl Work {
     fn resize(&mut self, natural: &Natural) {
         let (rows, motors) = (natural.rows(), natural.drives().len());
         let n = rows - motors;
-        let idle = Phase { angle: DoubleDouble::ZERO, unit: Complex::ZERO, rate: DoubleDouble::ZERO, acceleration: DoubleDouble::ZERO };
         for pairs in [&mut self.z, &mut self.v, &mut self.predicted] {
             pairs.resize(n, Complex::ZERO);
         }
@@ -215,9 +231,10 @@ impl Work {
             plain.resize(n, Complex::ZERO);
         }
         self.turns.resize(n, 0);
+        self.inertia = natural.mechanism().tree.diagonal.iter().copied().fold(0.0, f64::max);
         self.lifted.resize(rows * n, Complex::ZERO);
         self.gradient.resize(motors, [Complex::ZERO; 2]);
-        self.phase.resize(motors, idle);
+        self.demand.resize(motors, Demand::default());
         self.drive.resize(motors, 0.0);
         self.matrix.resize(rows * rows, 0.0);
         for column in [&mut self.multiplier, &mut self.pivot, &mut self.offset, &mut self.change] {
@@ -236,7 +253,10 @@ impl Work {
         if DRIVEN {
             self.account = state.unknown(4 * n);
         }
-        self.face::<N, DRIVEN>(natural, state.time);
+        for (demand, drive) in self.demand.iter_mut().zip(natural.drives()) {
+            *demand = natural.demand(drive, state.time);
+        }
+        self.face::<N, DRIVEN>(natural);
         if state.memory.len() == self.multiplier.len() {
             self.multiplier.copy_from_slice(&state.memory);
         } else {
@@ -262,33 +282,36 @@ impl Work {
     fn substep<const N: usize, const DRIVEN: bool>(&mut self, natural: &Natural, h: f64, end: Time) -> Result<(), Failure> {
         self.predict::<N, DRIVEN>(natural, h, end);
         self.solve_position::<N, DRIVEN>(natural, h)?;
-        self.kick::<N, DRIVEN>(h);
-        self.drift::<N, DRIVEN>(natural, h)?;
-        self.face::<N, DRIVEN>(natural, end);
+        self.kick::<N, true>(h);
+        self.settle::<N, DRIVEN>(natural, h);
+        self.account::<DRIVEN>(h);
+        self.turn::<N, DRIVEN>(natural)?;
+        self.face::<N, DRIVEN>(natural);
         self.solve_velocity::<N, DRIVEN>(natural, h)?;
-        self.kick::<N, DRIVEN>(h);
+        self.kick::<N, false>(h);
+        self.account::<DRIVEN>(h);
         Ok(())
     }
 
-    /// z0 + h v0, and by how much it violates the constraints at time `end`.
+    /// z0 + h v0, and by how much it violates the constraints at time `end`: in plain doubles, since the last sweep takes the rest.
     #[inline(always)]
     fn predict<const N: usize, const DRIVEN: bool>(&mut self, natural: &Natural, h: f64, end: Time) {
         let n = size::<N>(self.z.len());
         let (z, v, predicted, ahead) = (&self.z[..n], &self.v[..n], &mut self.predicted[..n], &mut self.ahead[..n]);
-        let per_push = 2.0 / (h * h);
         let offset = &mut self.offset;
         for k in 0..n {
-            let reach = Complex::new(z[k].re + v[k].re.scale(h), z[k].im + v[k].im.scale(h));
-            offset[k] = 0.5 * (reach.norm_squared() + -1.0).hi * per_push;
-            ahead[k] = plain(reach);
-            predicted[k] = reach;
+            predicted[k] = Complex::new(z[k].re + v[k].re.scale(h), z[k].im + v[k].im.scale(h));
+            ahead[k] = plain(predicted[k]);
+            // (|z + h v|² - 1) / h², without the difference.
+            offset[k] = plain(v[k]).norm_squared() + plain(z[k]).dot(plain(v[k])) * (2.0 / h);
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
-                self.phase[r] = drive.law.at::<DoubleDouble>(end);
-                offset[n + r] = drive.mismatch(self.phase[r].unit, predicted).im.hi * per_push;
+                self.demand[r] = natural.demand(drive, end);
+                offset[n + r] = drive.mismatch(plain(self.demand[r].unit), ahead).im * (2.0 / (h * h));
             }
         }
+        self.scale = self.strength.max(f64::EPSILON * self.inertia * (2.0 / (h * h)));
     }
 
     /// Finds mu such that z0 + h v0 + h²/2 a(mu) keeps the constraints, by Newton sweeps with the matrix of the first.
@@ -310,15 +333,16 @@ impl Work {
             for p in 0..rows {
                 multiplier[p] += change[p];
                 scale = multiplier[p].abs().max(scale);
-                if !(change[p].abs() <= largest) {
+                if change[p].abs() > largest || change[p].is_nan() {
                     (largest, culprit) = (change[p].abs(), p);
                 }
             }
             if !largest.is_finite() {
-                return Err(Failure::NotConverged(culprit));
+                let lost = self.free.iter().position(|free| !(free.re.is_finite() && free.im.is_finite()));
+                return Err(lost.map_or(Failure::NotConverged(culprit), Failure::NotFinite));
             }
             // Sweeps contract by about largest/last, so this is what the next one would still change.
-            if largest == 0.0 || (sweep > 0 && largest * largest <= ROUNDING * scale * last) {
+            if largest == 0.0 || (sweep > 0 && largest * largest <= LEFT_OVER * scale * last) {
                 self.accelerate::<N, DRIVEN>();
                 return Ok(());
             }
@@ -361,7 +385,7 @@ impl Work {
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
-                let unit = plain(self.phase[r].unit);
+                let unit = plain(self.demand[r].unit);
                 let linear = drive.slip(unit, ahead, acceleration).im;
                 let square = drive.base.map_or(0.0, |b| (unit.conj() * acceleration[drive.body] * acceleration[b].conj()).im);
                 change[n + r] = offset[n + r] + (linear + push * square);
@@ -379,7 +403,7 @@ impl Work {
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
-                self.gradient[r] = drive.gradient(plain(self.phase[r].unit), here);
+                self.gradient[r] = drive.gradient(plain(self.demand[r].unit), here);
             }
         }
         self.project::<N, DRIVEN>(natural);
@@ -406,39 +430,74 @@ impl Work {
         }
     }
 
-    /// v += h/2 a, and p_t with it.
+    /// v += h/2 a and, where `DRIFT`, the predicted end with it by h times the very same change: with h²/2 instead, rounded on its own, the
+    /// two would disagree by a constant part of 1e-16, and the energy drift.
     #[inline(always)]
-    fn kick<const N: usize, const DRIVEN: bool>(&mut self, h: f64) {
+    fn kick<const N: usize, const DRIFT: bool>(&mut self, h: f64) {
         let n = size::<N>(self.z.len());
-        let (v, acceleration) = (&mut self.v[..n], &self.acceleration[..n]);
+        let (v, predicted, acceleration) = (&mut self.v[..n], &mut self.predicted[..n], &self.acceleration[..n]);
         for k in 0..n {
-            v[k].re = v[k].re + 0.5 * h * acceleration[k].re;
-            v[k].im = v[k].im + 0.5 * h * acceleration[k].im;
+            let change = acceleration[k].times(0.5 * h);
+            v[k] = Complex::new(v[k].re + change.re, v[k].im + change.im);
+            if DRIFT {
+                predicted[k] = Complex::new(predicted[k].re + h * change.re, predicted[k].im + h * change.im);
+            }
         }
+    }
+
+    /// p_t -= h/2 lambda·C_t.
+    #[inline(always)]
+    fn account<const DRIVEN: bool>(&mut self, h: f64) {
         if DRIVEN {
+            let n = self.z.len();
             for (lambda, drive) in self.multiplier[n..].iter().zip(&self.drive) {
                 self.account = self.account + -0.5 * h * lambda * drive;
             }
         }
     }
 
-    /// z1 = z0 + h v0 + h²/2 a, with the turns it makes; refuses the root on the far side of the circle.
+    /// One more sweep, with the constraints formed from pairs.  Sweeps in plain doubles leave lengths wrong by some 1e-22 with a preferred
+    /// sign, and a length that is always too short is a steady loss of energy.
     #[inline(always)]
-    fn drift<const N: usize, const DRIVEN: bool>(&mut self, natural: &Natural, h: f64) -> Result<(), Failure> {
+    fn settle<const N: usize, const DRIVEN: bool>(&mut self, natural: &Natural, h: f64) {
         let n = size::<N>(self.z.len());
-        let push = 0.5 * h * h;
-        let (z, predicted, acceleration) = (&mut self.z[..n], &self.predicted[..n], &self.acceleration[..n]);
-        let (here, turns) = (&mut self.here[..n], &mut self.turns[..n]);
+        let rows = rows::<N, DRIVEN>(self.change.len());
+        let (predicted, change) = (&self.predicted[..n], &mut self.change[..rows]);
+        let per_push = 2.0 / (h * h);
         for k in 0..n {
-            let (before, push) = (z[k], acceleration[k].times(push));
-            z[k] = Complex::new(predicted[k].re + push.re, predicted[k].im + push.im);
-            here[k] = plain(z[k]);
+            change[k] = 0.5 * (predicted[k].norm_squared() + -1.0).hi * per_push;
+        }
+        if DRIVEN {
+            for (r, drive) in natural.drives().iter().enumerate() {
+                change[n + r] = drive.mismatch(self.demand[r].unit, predicted).im.hi * per_push;
+            }
+        }
+        solve::<N, DRIVEN>(&self.matrix, &self.pivot, change);
+        let (acceleration, lifted) = (&mut self.acceleration[..n], &self.lifted[..rows * n]);
+        acceleration.fill(Complex::ZERO);
+        for p in 0..rows {
+            self.multiplier[p] += change[p];
+            for k in 0..n {
+                acceleration[k] -= lifted[p * n + k].times(change[p]);
+            }
+        }
+        self.kick::<N, true>(h);
+    }
+
+    /// Arrives at `predicted` and counts turns; refuses the root on the far side of the circle.
+    #[inline(always)]
+    fn turn<const N: usize, const DRIVEN: bool>(&mut self, natural: &Natural) -> Result<(), Failure> {
+        let n = size::<N>(self.z.len());
+        let (z, predicted, here, turns) = (&mut self.z[..n], &self.predicted[..n], &mut self.here[..n], &mut self.turns[..n]);
+        for k in 0..n {
+            let (before, after) = (z[k], predicted[k]);
+            (z[k], here[k]) = (after, plain(after));
             let old = plain(before);
-            if !(old.dot(here[k]) > 0.0) {
+            if old.dot(here[k]) <= 0.0 {
                 return Err(Failure::TooFar(k));
             }
-            if upper(before) != upper(z[k]) {
-                turns[k] += match (upper(z[k]), old.cross(here[k]) > 0.0) {
+            if upper(before) != upper(after) {
+                turns[k] += match (upper(after), old.cross(here[k]) > 0.0) {
                     (false, true) => 1,
                     (true, false) => -1,
                     _ => 0,
@@ -447,7 +506,7 @@ impl Work {
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
-                if !(drive.mismatch(plain(self.phase[r].unit), here).re > 0.0) {
+                if drive.mismatch(plain(self.demand[r].unit), here).re <= 0.0 {
                     return Err(Failure::TooFar(n + r));
                 }
             }
@@ -455,9 +514,9 @@ impl Work {
         Ok(())
     }
 
-    /// Forces, gradients and columns W g at z and time `t`, and the factors of S.
+    /// Forces, gradients and columns W g at z and the time of `demand`.
     #[inline(always)]
-    fn face<const N: usize, const DRIVEN: bool>(&mut self, natural: &Natural, t: Time) {
+    fn face<const N: usize, const DRIVEN: bool>(&mut self, natural: &Natural) {
         let n = size::<N>(self.z.len());
         let rows = rows::<N, DRIVEN>(self.change.len());
         for k in 0..n {
@@ -466,9 +525,9 @@ impl Work {
         natural.force(&self.here[..n], &mut self.force[..n]);
         let (here, force, free) = (&self.here[..n], &self.force[..n], &mut self.free[..n]);
         let (w, lifted) = (&natural.inverse()[..n * n], &mut self.lifted[..rows * n]);
-        self.scale = 0.0;
+        self.strength = 0.0;
         for i in 0..n {
-            self.scale = self.scale.max(force[i].re.abs()).max(force[i].im.abs());
+            self.strength = self.strength.max(force[i].re.abs()).max(force[i].im.abs());
             let mut sum = Complex::ZERO;
             for j in 0..n {
                 lifted[j * n + i] = w[i * n + j] * here[j];
@@ -478,10 +537,9 @@ impl Work {
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
-                let phase = drive.law.at::<DoubleDouble>(t);
-                self.phase[r] = phase;
-                let unit = plain(phase.unit);
-                self.drive[r] = -phase.rate.hi * drive.mismatch(unit, here).re;
+                let demand = self.demand[r];
+                let unit = plain(demand.unit);
+                self.drive[r] = -demand.rate.hi * drive.mismatch(unit, here).re;
                 self.gradient[r] = drive.gradient(unit, here);
                 let ([a, b], [on_a, on_b]) = (drive.bodies(), self.gradient[r]);
                 for i in 0..n {
@@ -502,12 +560,13 @@ impl Work {
             if !(free[k].re.is_finite() && free[k].im.is_finite()) {
                 return Err(Failure::NotFinite(k));
             }
-            self.multiplier[k] = here[k].dot(free[k]) + z[k].dot(v[k]).hi * (2.0 / h);
+            // z1·v½ = h/2 |v½|², because both ends of the step lie on the circle.
+            self.multiplier[k] = here[k].dot(free[k]) + plain(v[k]).norm_squared();
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
-                let phase = self.phase[r];
-                let slip = drive.slip(phase.unit, z, v).im - phase.rate * drive.mismatch(phase.unit, z).re;
+                let demand = self.demand[r];
+                let slip = drive.slip(demand.unit, z, v).im - demand.rate * drive.mismatch(demand.unit, z).re;
                 let ([a, b], [on_a, on_b]) = (drive.bodies(), self.gradient[r]);
                 self.multiplier[n + r] = on_a.dot(free[a]) + on_b.dot(free[b]) + slip.value() * (2.0 / h);
             }

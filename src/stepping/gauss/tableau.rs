@@ -96,6 +96,8 @@ fn integral(nodes: &[DoubleDouble], weights: &[DoubleDouble], j: usize, from: Do
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::arithmetic::Complex;
+    use crate::dynamics::tree::{self, Tree};
 
     /// Bound on every identity below; the pair carries 1.2e-32.
     const TINY: f64 = 1e-30;
@@ -192,5 +194,54 @@ mod tests {
         let (tableau, root) = (Tableau::new(2), DoubleDouble::of(3.0).sqrt() / DoubleDouble::of(6.0));
         assert!((tableau.nodes[0] - (DoubleDouble::of(0.5) - root)).hi.abs() < TINY);
         assert!((a(&tableau, 0, 1) - (DoubleDouble::of(0.25) - root)).hi.abs() < TINY);
+    }
+
+    /// (q, p)' of two equal slender bars in units of their mass, length and g, in double-double.
+    fn rate(tree: &Tree, y: &[DoubleDouble; 4]) -> [DoubleDouble; 4] {
+        let z = [Complex::unit(y[0]), Complex::unit(y[1])];
+        let (mut mass, mut twist, mut pivot) = ([DoubleDouble::ZERO; 4], [DoubleDouble::ZERO; 4], [DoubleDouble::ZERO; 2]);
+        let (mut omega, mut force) = ([y[2], y[3]], [DoubleDouble::ZERO; 2]);
+        tree.couple::<DoubleDouble, 2>(&z, &mut mass, &mut twist);
+        tree::factor::<DoubleDouble, 2>(2, &mut mass, &mut pivot);
+        tree::solve::<DoubleDouble, 2>(2, &mass, &pivot, &mut omega);
+        tree.pull::<DoubleDouble, 2>(&z, &omega, &twist, &mut force);
+        [omega[0], omega[1], force[0], force[1]]
+    }
+
+    /// The state at time 1 after `steps` steps, all in double-double.
+    fn swing(tree: &Tree, stages: usize, steps: usize) -> [DoubleDouble; 4] {
+        let tableau = Tableau::new(stages);
+        let h = reciprocal(steps);
+        let matrix: Vec<DoubleDouble> = (0..stages * stages).map(|k| h * a(&tableau, k / stages, k % stages)).collect();
+        let mut y = [1.0, 0.4, 0.5, -0.3].map(DoubleDouble::of);
+        for _ in 0..steps {
+            let mut rates = vec![rate(tree, &y); stages];
+            let add = |rates: &[[DoubleDouble; 4]], row: &dyn Fn(usize) -> DoubleDouble| {
+                std::array::from_fn(|k| (0..stages).fold(y[k], |sum, j| sum + row(j) * rates[j][k]))
+            };
+            for _ in 0..40 {
+                rates = (0..stages).map(|i| rate(tree, &add(&rates, &|j| matrix[i * stages + j]))).collect();
+            }
+            y = add(&rates, &|j| h * tableau.weights[j]);
+        }
+        y
+    }
+
+    #[test]
+    fn the_order_shows_below_the_rounding_of_doubles() {
+        let weight = vec![Complex::new(1.5, 0.0), Complex::new(0.5, 0.0)];
+        let coupling = vec![Complex::ZERO, Complex::new(0.5, 0.0), Complex::ZERO, Complex::ZERO];
+        let tree = Tree { bodies: 2, coupling, diagonal: vec![4.0 / 3.0, 1.0 / 3.0], weight, off_axis: false };
+        let exact = swing(&tree, 8, 112);
+        for stages in 2..=8 {
+            let error = |steps: usize| {
+                let y = swing(&tree, stages, steps);
+                (0..4).map(|k| (y[k] - exact[k]).hi.powi(2)).sum::<f64>().sqrt()
+            };
+            let (coarse, fine) = (error(32), error(64));
+            let order = (coarse / fine).log2();
+            println!("s = {stages}: {order:.2} from {coarse:.1e} to {fine:.1e}");
+            assert!((order - 2.0 * stages as f64).abs() < 0.35, "s = {stages}: order {order:.2} from {coarse:e} to {fine:e}");
+        }
     }
 }
