@@ -109,7 +109,10 @@ impl From<StepError> for Failure {
             Cause::Unsuited => Exit::Scene,
             _ => Exit::Stopped,
         };
-        Self { details: json!(error), ..Self::new(exit, error.to_string()) }
+        let StepError { method, t, step, what, hint, .. } = &error;
+        let step = if *step > 0.0 { format!(" (step {step:.3e} s)") } else { String::new() };
+        let message = format!("{method} stopped at t = {t} s{step}: {what}\nhint: {hint}");
+        Self { details: json!(error), ..Self::new(exit, message) }
     }
 }
 

@@ -90,11 +90,10 @@ fn tell(
     flags: &RunFlags,
     failure: Option<&Failure>,
 ) -> Result<(), Failure> {
-    let files: Vec<String> = folder.files().iter().map(|file| file.display().to_string()).collect();
     if flags.scene.json {
         let mut object = report::result::object(scene, mechanism, outcome);
         object["folder"] = json!(folder.path().display().to_string());
-        object["files"] = json!(files);
+        object["files"] = json!(folder.files().iter().map(|file| file.display().to_string()).collect::<Vec<_>>());
         if let Some(failure) = failure {
             object["error"] = failure.object();
         }
@@ -103,9 +102,5 @@ fn tell(
     if flags.scene.quiet {
         return Ok(());
     }
-    let mut text = report::result::text(scene, mechanism, outcome);
-    for (number, file) in files.iter().enumerate() {
-        text.push_str(&format!("{:15}{file}\n", if number == 0 { "files" } else { "" }));
-    }
-    print(&text)
+    print(&report::result::text(scene, mechanism, outcome, folder))
 }

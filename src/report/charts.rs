@@ -7,7 +7,8 @@ use crate::chart::{
 };
 use crate::dynamics::Mechanism;
 use crate::dynamics::row::Row;
-use crate::report::page::{figure, magnitude};
+use crate::report::curves::{between, furthest, is_coarse, smoothed, span};
+use crate::report::page::{figure, magnitude, rough};
 use crate::run::drift::Excursion;
 use crate::run::{Outcome, Sample};
 use crate::scene::{Place, Scene};
@@ -76,8 +77,8 @@ pub fn draw(chart: Chart, scene: &Scene, mechanism: &Mechanism, outcome: &Outcom
     picture?.png_bytes()
 }
 
-/// A turn of the fastest body between samples beyond which lines between them would mislead \[rad\].
-const COARSE: f64 = 0.6;
+/// Most it may turn in a window of time that shows single swings \[rad\], and how much is shown instead.
+const CROWDED: [f64; 2] = [40.0 * TAU, 12.0 * TAU];
 /// How far the fastest body turns along the path shown \[rad\].
 const PATH: f64 = 4.0 * TAU;
 /// How far it turns between ghosts \[rad\].
@@ -110,16 +111,24 @@ impl Finished<'_> {
         caption
     }
 
-    /// Samples close enough to be joined by lines: of the whole run, or else of its end; and what to say about it.
+    /// Samples in which single swings can be told apart: of the whole run, or else of its beginning; and what to say about it.
     fn window(&self) -> (Vec<&Sample>, Option<String>) {
         let trace = &self.outcome.trace;
         let whole: Vec<&Sample> = trace.whole.iter().collect();
-        if !is_coarse(&whole) {
+        if !is_coarse(&whole) && whole.windows(2).map(|pair| furthest(pair[0], pair[1])).sum::<f64>() <= CROWDED[0] {
             return (whole, None);
         }
-        let tail: Vec<&Sample> = trace.tail.iter().collect();
-        let span = span(&tail);
-        (tail, Some(format!("last {} s of {} s", figure(span), figure(self.outcome.last.t))))
+        let mut turned = 0.0;
+        let mut window: Vec<&Sample> = Vec::new();
+        for sample in &trace.head {
+            turned += window.last().map_or(0.0, |before| furthest(before, sample));
+            if turned > CROWDED[1] && window.len() > 1 {
+                break;
+            }
+            window.push(sample);
+        }
+        let span = span(&window);
+        (window, Some(format!("first {} s of {} s", rough(span), figure(self.outcome.last.t))))
     }
 
     /// The last samples, as far back as the fastest body turns by `PATH`.
@@ -150,7 +159,8 @@ impl Finished<'_> {
         let trails = if coarse {
             Vec::new()
         } else {
-            leaves.iter().map(|&body| path.iter().map(|sample| place(body, &sample.phi)).collect()).collect()
+            let smooth = smoothed(&path);
+            leaves.iter().map(|&body| smooth.iter().map(|(_, phi)| place(body, phi)).collect()).collect()
         };
         let mut poses: Vec<Pose> = Vec::new();
         let (mut turned, mut after) = (0.0, None);
@@ -170,34 +180,35 @@ impl Finished<'_> {
         let title = if coarse || names.is_empty() {
             format!("The mechanism at {} s", figure(self.outcome.last.t))
         } else {
-            format!("Path of the end of {}", names.join(", "))
+            let (path, end) = if names.len() == 1 { ("Path", "end") } else { ("Paths", "ends") };
+            format!("{path} of the {end} of {}", names.join(", "))
         };
-        let more = (!coarse).then(|| format!("last {} s of {} s", figure(span(&path)), figure(self.outcome.last.t)));
+        let more = (!coarse).then(|| format!("last {} s of {} s", rough(span(&path)), figure(self.outcome.last.t)));
         MechanismChart { title, caption: self.caption(more), sketch: self.sketch(), poses, trails }
     }
 
     fn angles(&self) -> Angles {
         let (window, more) = self.window();
+        let smooth = smoothed(&window);
         let series = self
             .mechanism
             .bodies
             .iter()
             .enumerate()
-            .map(|(k, body)| AngleSeries { name: plain(&body.name), angle: window.iter().map(|sample| sample.phi[k]).collect() });
+            .map(|(k, body)| AngleSeries { name: plain(&body.name), angle: smooth.iter().map(|(_, phi)| phi[k]).collect() });
         Angles {
-            title: format!("Angles of {}", plain(&self.scene.name)),
+            title: "Angles of the bars".to_owned(),
             caption: self.caption(more),
-            time: window.iter().map(|sample| sample.t).collect(),
+            time: smooth.iter().map(|(t, _)| *t).collect(),
             series: series.collect(),
         }
     }
 
     fn energy_drift(&self) -> EnergyDrift {
         let Outcome { plan, drift, last, .. } = self.outcome;
-        let size = magnitude(drift.energy.max).replace('e', "·10^{") + if drift.energy.max > 0.0 { "}" } else { "" };
         let kind = if drift.kind == "energy" { "Energy" } else { "Energy minus work" };
         EnergyDrift {
-            title: format!("{kind} keeps to {size} of its scale over {} s", figure(last.t)),
+            title: format!("{kind} keeps to {} of its scale over {} s", power(drift.energy.max), figure(last.t)),
             caption: self.caption(Some(format!("scale {} J", figure(self.mechanism.energy_scale)))),
             quantity: drift.kind.to_owned(),
             series: vec![DriftSeries {
@@ -219,7 +230,8 @@ impl Finished<'_> {
                 .map(|(r, (constraint, monitors))| {
                     // Thinned samples may have missed the largest ones; the record has not.
                     let mut points: Vec<[f64; 2]> = monitors[level].record.clone();
-                    points.extend(trace.whole.iter().map(|sample| [sample.t, sample.constraints[r][level]]));
+                    let later = trace.whole.iter().filter(|sample| sample.t > 0.0);
+                    points.extend(later.map(|sample| [sample.t, sample.constraints[r][level]]));
                     points.sort_by(|a, b| a[0].total_cmp(&b[0]));
                     let method = if drift.constraints.len() == 1 { plan.stabilization.to_string() } else { constraint.clone() };
                     DriftSeries {
@@ -232,9 +244,9 @@ impl Finished<'_> {
                 .collect(),
         };
         let most = drift.constraints.iter().map(|(_, [position, _])| position.max).fold(0.0, f64::max);
-        let size = if most == 0.0 { "0".to_owned() } else { magnitude(most).replace('e', "·10^{") + "}" };
+        let kept = if most == 0.0 { "are kept exactly".to_owned() } else { format!("keep to {} {unit}", power(most)) };
         ConstraintDrift {
-            title: format!("Constraints keep to {size} {unit} over {} s", figure(self.outcome.last.t)),
+            title: format!("Constraints {kept} over {} s", figure(self.outcome.last.t)),
             caption: self.caption(None),
             panels: vec![panel(0, format!("|*C*| [{unit}]")), panel(1, format!("|*C′*| [{unit}/s]"))],
             log_time: is_long(&drift.energy),
@@ -344,29 +356,25 @@ fn units(phi: &[f64]) -> Vec<Complex<f64>> {
     phi.iter().map(|&phi| Complex::unit(phi)).collect()
 }
 
-/// How far the body that turns furthest turns from one sample to the next \[rad\].
-fn furthest(a: &Sample, b: &Sample) -> f64 {
-    a.phi.iter().zip(&b.phi).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max)
-}
-
-fn is_coarse(samples: &[&Sample]) -> bool {
-    samples.windows(2).any(|pair| furthest(pair[0], pair[1]) > COARSE)
-}
-
-fn span(samples: &[&Sample]) -> f64 {
-    samples.first().zip(samples.last()).map_or(0.0, |(first, last)| last.t - first.t)
-}
-
 fn is_long(record: &Excursion) -> bool {
     record.record.first().zip(record.record.last()).is_some_and(|(first, last)| (last[0] / first[0]).log10() >= DECADES)
 }
 
-/// Angles and rates at time `t` \[s\], straight between samples.
-fn between(samples: &[Sample], t: f64) -> (Vec<f64>, Vec<f64>) {
-    let after = samples.partition_point(|sample| sample.t < t).min(samples.len().saturating_sub(1));
-    let before = after.saturating_sub(1);
-    let (Some(a), Some(b)) = (samples.get(before), samples.get(after)) else { return Default::default() };
-    let share = if b.t > a.t { ((t - a.t) / (b.t - a.t)).clamp(0.0, 1.0) } else { 0.0 };
-    let mix = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect();
-    (mix(&a.phi, &b.phi), mix(&a.omega, &b.omega))
+/// `1.5·10^{−16}`.
+fn power(size: f64) -> String {
+    match magnitude(size).split_once('e') {
+        Some((digits, exponent)) => format!("{digits}·10^{{{}}}", exponent.replace('-', "−")),
+        None => magnitude(size),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::power;
+
+    #[test]
+    fn sizes_become_powers_of_ten() {
+        assert_eq!(power(1.52e-16), "1.5·10^{−16}");
+        assert_eq!(power(0.0), "0");
+    }
 }

@@ -102,7 +102,7 @@ pub(super) fn describe(page: &mut Page, mechanism: &Mechanism, plan: &Plan) {
         page.entry("", why);
     }
     page.entry("stabilization", &stabilization(mechanism, plan));
-    page.entry("horizon", &format!("{} s, a row every {} s", plan.until, plan.every));
+    page.entry("horizon", &format!("{} s, a row every {} s", figure(plan.until), figure(plan.every)));
     for (number, note) in plan.notes.iter().enumerate() {
         page.entry(if number == 0 { "note" } else { "" }, note);
     }

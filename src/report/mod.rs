@@ -14,6 +14,8 @@
 #[cfg(feature = "charts")]
 pub mod charts;
 pub mod check;
+#[cfg(feature = "charts")]
+mod curves;
 pub mod inspect;
 pub mod methods;
 pub mod page;
@@ -37,7 +39,7 @@ pub fn settings(plan: &Plan) -> Value {
 /// Method and setting in words: `gauss16, step 0.005 s`.
 pub fn setting(plan: &Plan) -> String {
     match (plan.step, plan.tolerance) {
-        (Some(step), _) => format!("{}, step {step} s", plan.method),
+        (Some(step), _) => format!("{}, step {} s", plan.method, page::figure(step)),
         (None, Some(tolerance)) if tolerance.relative != tolerance.absolute => {
             format!("{}, relative tolerance {:e}, absolute {:e}", plan.method, tolerance.relative, tolerance.absolute)
         }

@@ -51,8 +51,8 @@ impl Page {
             }
             let mut line = |cells: &dyn Fn(usize) -> String| {
                 let mut line = format!("  {:1$}", cells(0), widths[0]);
-                for k in from..to {
-                    line.push_str(&format!("  {:>1$}", cells(k), widths[k]));
+                for (k, width) in widths.iter().enumerate().take(to).skip(from) {
+                    line.push_str(&format!("  {:>width$}", cells(k)));
                 }
                 self.text.push_str(line.trim_end());
                 self.text.push('\n');
@@ -91,6 +91,15 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
 
 /// A number to six digits, plain where it is of everyday size.
 pub fn figure(x: f64) -> String {
+    digits(x, 6)
+}
+
+/// A number to three digits, for what need not be exact.
+pub fn rough(x: f64) -> String {
+    digits(x, 3)
+}
+
+fn digits(x: f64, digits: i32) -> String {
     let size = x.abs();
     if x == 0.0 {
         return "0".into();
@@ -99,9 +108,9 @@ pub fn figure(x: f64) -> String {
         return "not a number".into();
     }
     if !(1e-4..1e6).contains(&size) {
-        return format!("{x:.5e}");
+        return format!("{x:.0$e}", digits as usize - 1);
     }
-    let decimals = (5 - size.log10().floor() as i32).clamp(0, 9) as usize;
+    let decimals = (digits - 1 - size.log10().floor() as i32).clamp(0, 9) as usize;
     let plain = format!("{x:.decimals$}");
     if plain.contains('.') { plain.trim_end_matches('0').trim_end_matches('.').to_owned() } else { plain }
 }
@@ -133,7 +142,7 @@ mod tests {
         ] {
             assert_eq!(figure(x), shown);
         }
-        assert_eq!(magnitude(2.14e-13), "2.1e-13");
+        assert_eq!((magnitude(2.14e-13), rough(10.4609), rough(10_000.0)), ("2.1e-13".into(), "10.5".into(), "10000".into()));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::page::{Page, figure, magnitude};
 use crate::dynamics::Mechanism;
 #[cfg(feature = "files")]
 use crate::run::files::sha256;
-use crate::run::{Outcome, Sample};
+use crate::run::{Folder, Outcome, Sample};
 use crate::scene::Scene;
 use serde_json::{Map, Value, json};
 
@@ -95,25 +95,25 @@ fn target() -> String {
     format!("{}-{}{environment}", std::env::consts::ARCH, std::env::consts::OS)
 }
 
-/// The report as a page.
-pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
+/// The report as a page, with the files written.
+pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome, folder: &Folder) -> String {
     let Outcome { plan, tally, drift, last, .. } = outcome;
     let mut page = Page::new(&scene.name, &scene.description);
     describe(&mut page, mechanism, plan);
     page.entry(
         "cost",
         &format!(
-            "{} steps, {} evaluations, {} rejected, {} s",
+            "{} steps, {} evaluations, {} rejected, {:.3} s",
             tally.steps,
             tally.evaluations,
             tally.rejected,
-            figure(outcome.wall.as_secs_f64())
+            outcome.wall.as_secs_f64()
         ),
     );
     if let Some(stop) = &outcome.stop {
-        page.entry("stopped", &format!("at t = {} s: {}", stop.t, stop.what));
+        page.entry("stopped", &format!("at t = {} s: {}", figure(stop.t), stop.what));
     }
-    page.entry("final state", &format!("t = {} s", last.t));
+    page.entry("final state", &format!("t = {} s", figure(last.t)));
     let rows: Vec<Vec<String>> = (mechanism.bodies.iter().enumerate())
         .map(|(k, body)| {
             let ([x, y], [vx, vy]) = (last.centre[k], last.velocity[k]);
@@ -146,5 +146,7 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
         page.entry("impacts", &format!("{}, {} J lost in them", outcome.strike_count, figure(outcome.strike_loss)));
     }
     page.entry("trust", "no estimate of the solution's error yet");
+    page.entry("files", &format!("{}:", folder.path().display()));
+    page.entry("", &folder.names().join(", "));
     page.into_text()
 }

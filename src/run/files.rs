@@ -82,7 +82,12 @@ impl Folder {
         &self.path
     }
 
-    /// The files written, in the order of their completion.
+    /// Names of the files written, in the order of their completion.
+    pub fn names(&self) -> &[&'static str] {
+        &self.written
+    }
+
+    /// Their paths.
     pub fn files(&self) -> Vec<PathBuf> {
         self.written.iter().map(|name| self.path.join(name)).collect()
     }

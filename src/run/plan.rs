@@ -293,7 +293,7 @@ fn fixed_step(
         return Ok(*every / libm::exp2(halvings));
     };
     let steps = (until / asked).round();
-    if steps < 1.0 {
+    if asked > until * (1.0 + 1e-9) {
         return Err(usage("--step", format!("{asked} s is longer than the horizon, {until} s"), "a shorter step"));
     }
     let step = if (until / asked - steps).abs() <= 1e-9 * steps { asked } else { until / (until / asked).ceil() };

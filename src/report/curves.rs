@@ -1,0 +1,71 @@
+//! Samples as curves: how far apart they are, and what lies between them.
+
+use crate::run::Sample;
+
+/// A turn of the fastest body between samples beyond which curves through them would mislead \[rad\].
+const COARSE: f64 = 2.0;
+/// Points of a curve between two samples, and from how many samples on it needs none.
+const FINE: usize = 6;
+const DENSE: usize = 1500;
+
+/// How far the body that turns furthest turns from one sample to the next \[rad\].
+pub(super) fn furthest(a: &Sample, b: &Sample) -> f64 {
+    a.phi.iter().zip(&b.phi).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max)
+}
+
+pub(super) fn is_coarse(samples: &[&Sample]) -> bool {
+    samples.windows(2).any(|pair| furthest(pair[0], pair[1]) > COARSE)
+}
+
+pub(super) fn span(samples: &[&Sample]) -> f64 {
+    samples.first().zip(samples.last()).map_or(0.0, |(first, last)| last.t - first.t)
+}
+
+/// Times and angles of samples, with points between them where they are few.
+pub(super) fn smoothed(samples: &[&Sample]) -> Vec<(f64, Vec<f64>)> {
+    let fine = if samples.len() < DENSE { FINE } else { 1 };
+    let mut smooth = Vec::new();
+    for pair in samples.windows(2) {
+        let shares = (0..fine).map(|k| k as f64 / fine as f64);
+        smooth.extend(shares.map(|share| (pair[0].t + share * (pair[1].t - pair[0].t), cubic(pair[0], pair[1], share))));
+    }
+    smooth.extend(samples.last().map(|last| (last.t, last.phi.clone())));
+    smooth
+}
+
+/// Angles at a share of the way between two samples, from angles and rates at both (Hermite's cubic).
+pub(super) fn cubic(a: &Sample, b: &Sample, share: f64) -> Vec<f64> {
+    let (s, rest, span) = (share, 1.0 - share, b.t - a.t);
+    let blend = [rest * rest * (1.0 + 2.0 * s), s * s * (3.0 - 2.0 * s), s * rest * rest * span, -s * s * rest * span];
+    (0..a.phi.len()).map(|k| blend[0] * a.phi[k] + blend[1] * b.phi[k] + blend[2] * a.omega[k] + blend[3] * b.omega[k]).collect()
+}
+
+/// Angles and rates at time `t` \[s\], between samples.
+pub(super) fn between(samples: &[Sample], t: f64) -> (Vec<f64>, Vec<f64>) {
+    let after = samples.partition_point(|sample| sample.t < t).min(samples.len().saturating_sub(1));
+    let (Some(a), Some(b)) = (samples.get(after.saturating_sub(1)), samples.get(after)) else { return Default::default() };
+    let share = if b.t > a.t { ((t - a.t) / (b.t - a.t)).clamp(0.0, 1.0) } else { 0.0 };
+    (cubic(a, b, share), a.omega.iter().zip(&b.omega).map(|(a, b)| a + share * (b - a)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(t: f64, phi: f64, omega: f64) -> Sample {
+        Sample { t, phi: vec![phi], omega: vec![omega], ..Sample::default() }
+    }
+
+    #[test]
+    fn a_cubic_motion_is_met_between_its_samples() {
+        let motion = |t: f64| sample(t, t * t * t - t, 3.0 * t * t - 1.0);
+        let samples = [motion(1.0), motion(1.5), motion(2.0)];
+        for t in [1.0, 1.1, 1.5, 1.9, 2.0] {
+            assert!((between(&samples, t).0[0] - motion(t).phi[0]).abs() < 1e-14);
+        }
+        assert!(between(&[], 1.0).0.is_empty());
+        for (t, phi) in smoothed(&samples.iter().collect::<Vec<_>>()) {
+            assert!((phi[0] - motion(t).phi[0]).abs() < 1e-14);
+        }
+    }
+}
