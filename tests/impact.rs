@@ -37,7 +37,7 @@ fn energy_drift(outcome: &Outcome) -> f64 {
 #[test]
 fn the_first_impact_at_the_very_start_is_case_f() {
     for e in [0.0, 0.5, 1.0] {
-        let outcome = run(&shipped("wall", &[&format!("walls.wall.restitution={e}")]), &dp8(0.05, 0.001, 1e-12));
+        let outcome = run(&shipped("wall", &[&format!("walls.wall.restitution={e}")]), &dp8(0.005, 0.001, 1e-12));
         assert_eq!(outcome.stop, None, "e = {e}");
         let first = &outcome.strikes[0];
         // Rates from the hand-written solution of tests/published.rs.
@@ -83,7 +83,7 @@ fn at_half_restitution_every_swing_has_a_quarter_of_the_height() {
 
 #[test]
 fn the_state_at_a_strike_lies_on_the_wall_to_rounding() {
-    for (angle, start) in [(0.0, 1.0), (0.5, 2.0), (-0.7, 0.3)] {
+    for (angle, start) in [(0.0, 1.0), (0.5, 2.0), (-0.7, 1.2)] {
         let scene = bouncing(angle, start, 1.0);
         let mechanism = compile(&scene);
         let mut form = Multiplier::<1, false>::new(Arc::clone(&mechanism));
@@ -94,6 +94,36 @@ fn the_state_at_a_strike_lies_on_the_wall_to_rounding() {
         let gap = mechanism.contacts[0].row.gap(&[driftless::arithmetic::Complex::unit(state.y[0])]);
         assert!(gap.abs() < 1e-14, "{gap:e} m");
     }
+}
+
+/// Without restitution the end slides along the wall, is lifted off by its own weight and thrown back a hundredth of a second later, now pressed.
+/// With c = cos and s = sin of the difference of the angles growing at 6 pi /s, gap = 4.2 t² - 430 t³ …: back after about 0.0098 s.
+#[test]
+fn case_f_without_restitution_ends_on_the_wall() {
+    let outcome = run(&shipped("wall", &["walls.wall.restitution=0"]), &dp8(1.0, 0.001, 1e-12));
+    let stop = outcome.stop.expect("a stop");
+    assert_eq!((stop.cause, outcome.strike_count), (Cause::RestingContact, 2));
+    assert!((stop.t - 0.0098).abs() < 1e-3, "{stop}");
+}
+
+/// Two points that reach their walls at the same moment are both struck.
+#[test]
+fn points_that_touch_at_the_same_moment_are_both_struck() {
+    // Two equal bars on hinges of their own, mirror images of one another: each must do what one does alone.
+    let mut scene = bouncing(0.0, 1.0, 0.5);
+    let mut twin = scene.bars[0].clone();
+    twin.name = "twin".into();
+    scene.bars.push(twin);
+    let mut hinge = scene.hinges[0].clone();
+    (hinge.name, hinge.between[1].bar) = ("B".into(), Some(1));
+    scene.hinges.push(hinge);
+    scene.start.push(driftless::scene::Start { phi: -1.0, omega: 0.0 });
+    scene.walls.push(Wall { name: "other".into(), bar: 1, normal: [0.0, -1.0], ..scene.walls[0].clone() });
+    let outcome = run(&scene, &dp8(3.0, 0.1, 1e-10));
+    let alone = run(&bouncing(0.0, 1.0, 0.5), &dp8(3.0, 0.1, 1e-10));
+    assert_eq!(outcome.stop, None);
+    assert_eq!(outcome.strike_count, 2 * alone.strike_count);
+    assert!((outcome.last.phi[0] - alone.last.phi[0]).abs() < 1e-8 && (outcome.last.phi[0] + outcome.last.phi[1]).abs() < 1e-12);
 }
 
 /// The nearer of two walls is struck, in whichever order the scene names them.
@@ -123,7 +153,8 @@ fn a_point_pressed_against_its_wall_ends_in_a_typed_stop() {
     // Under the nearly constant angular acceleration 15 sin 0.5 a rebound at w takes 2 w / (15 sin 0.5), and halves every time.
     let last = lively.strikes.iter().rev().find(|strike| strike.approach < -1e-4).expect("a small bounce");
     let rest = last.t + 2.0 * -last.approach / (PENDULUM_SQUARED * 0.5f64.sin());
-    assert!((stop.t - rest).abs() < 1e-6, "{stop}, not {rest} s");
+    // Bounces of less than 1e-12 m are no longer told from rest: sqrt(8e-12 / 7.2) s before the end of all of them.
+    assert!((stop.t - rest).abs() < 1e-5, "{stop}, not {rest} s");
 }
 
 #[test]
