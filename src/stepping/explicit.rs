@@ -303,6 +303,7 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
         watch: &mut Watch<F>,
     ) -> Result<Reached, StepError> {
         let (n, events) = (state.y.len(), field.events());
+        super::refuse_the_past(P::NAME, state, until)?;
         self.resize(n, events);
         field.rate(state.time, &state.y, &mut self.k[..n]);
         tally.evaluations += 1;
