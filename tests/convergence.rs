@@ -26,6 +26,12 @@ const CEILING: f64 = 1e-2;
 /// How far a measured order may be from the declared one.
 const MARGIN: f64 = 0.35;
 
+/// Long enough for errors to stand clear of round-off, short enough for chaos not to bend the slope \[s\].
+const HORIZON: f64 = 1.5;
+/// Numbers of steps at which order 5 is asymptotic and order 8 not yet at round-off.
+const FIFTH: &[u64] = &[256, 320, 384, 512, 640, 768];
+const EIGHTH: &[u64] = &[40, 48, 56, 64, 80, 96];
+
 /// The largest error of angles and rates at the horizon.
 fn error(mechanism: &Mechanism, found: &Motion, reference: &Motion) -> f64 {
     (0..mechanism.bodies.len()).fold(0.0, |most: f64, k| {
@@ -34,61 +40,67 @@ fn error(mechanism: &Mechanism, found: &Motion, reference: &Motion) -> f64 {
     })
 }
 
-/// Marches one step a window and returns the motion at the horizon.
-fn steps<F: Field + Form>(method: &mut impl Method<F>, form: &mut F, start: &Motion, horizon: f64, count: u64) -> Motion {
-    let h = horizon / count as f64;
+/// Moments of the horizon at which the error is looked at: its largest counts, so that no chance cancellation at one moment is taken for order.
+const LOOKS: u64 = 8;
+
+/// Marches one step a window and returns the motion at every look.
+fn steps<F: Field + Form>(method: &mut impl Method<F>, form: &mut F, start: &Motion, count: u64) -> Vec<Motion> {
+    let h = HORIZON / count as f64;
     let mut state = form.state(start);
     state.memory = vec![h];
-    let tally = go(method, form, &mut state, h, 1..=count);
-    assert_eq!((tally.steps, tally.rejected), (count, 0), "one step a window");
-    let mut motion = Motion::default();
-    form.read(&state, &mut motion);
-    motion
+    let between = count / LOOKS;
+    assert_eq!(between * LOOKS, count, "whole steps to every look");
+    (0..LOOKS)
+        .map(|look| {
+            let tally = go(method, form, &mut state, h, look * between + 1..=(look + 1) * between);
+            assert_eq!((tally.steps, tally.rejected), (between, 0), "one step a window");
+            let mut motion = Motion::default();
+            form.read(&state, &mut motion);
+            motion
+        })
+        .collect()
 }
 
-/// A scene's end by `gauss16`.
-fn reference<const ACCOUNT: bool>(mechanism: &Arc<Mechanism>, start: &Motion, horizon: f64) -> Motion {
+/// A scene's motion at every look by `gauss16`.
+fn reference<const ACCOUNT: bool>(mechanism: &Arc<Mechanism>, start: &Motion) -> Vec<Motion> {
     let mut form = Canonical::<2, ACCOUNT>::new(Arc::clone(mechanism));
     let mut state = form.state(start);
-    let mut gauss = Gauss::new(8, horizon / 256.0).expect("a method");
-    go(&mut gauss, &mut form, &mut state, horizon, 1..=1);
-    let mut motion = Motion::default();
-    form.read(&state, &mut motion);
-    motion
+    let mut gauss = Gauss::new(8, HORIZON / 256.0).expect("a method");
+    (1..=LOOKS)
+        .map(|look| {
+            go(&mut gauss, &mut form, &mut state, HORIZON / LOOKS as f64, look..=look);
+            let mut motion = Motion::default();
+            form.read(&state, &mut motion);
+            motion
+        })
+        .collect()
 }
 
 /// The slope of the error for these numbers of steps.
-fn measured<F: Field + Form>(
-    method: &mut impl Method<F>,
-    form: &mut F,
-    (start, reference, horizon): (&Motion, &Motion, f64),
-    counts: &[u64],
-) -> f64 {
+fn measured<F: Field + Form>(method: &mut impl Method<F>, form: &mut F, start: &Motion, reference: &[Motion], counts: &[u64]) -> f64 {
     let points: Vec<(f64, f64)> = counts
         .iter()
         .map(|&count| {
-            let found = steps(method, form, start, horizon, count);
-            (horizon / count as f64, error(form.mechanism(), &found, reference))
+            let found = steps(method, form, start, count);
+            let worst = found.iter().zip(reference).map(|(found, reference)| error(form.mechanism(), found, reference));
+            (HORIZON / count as f64, worst.fold(0.0, f64::max))
         })
         .collect();
     let slope = order(&points, FLOOR, CEILING);
-    println!("{} {slope:.3} {points:.2e?}", method.name());
+    let local: Vec<f64> = points.windows(2).map(|pair| (pair[0].1 / pair[1].1).ln() / (pair[0].0 / pair[1].0).ln()).collect();
+    println!("{} {slope:.3}, local {local:.2?}, errors {:.1e} to {:.1e}", method.name(), points[0].1, points[points.len() - 1].1);
     slope
 }
 
 /// All four methods on one form.
-fn check<F: Field + Form>(form: &mut F, start: &Motion, reference: &Motion, horizon: f64) {
-    let at = (start, reference, horizon);
-    let fifth = [48, 64, 96, 128, 192, 256, 384];
-    let eighth = [20, 24, 28, 32, 40, 48, 56, 64, 80];
-    for (slope, nominal) in [
-        (measured(&mut Dp5::new(LOOSE), form, at, &fifth), 5.0),
-        (measured(&mut Dopri5::new(LOOSE), form, at, &fifth), 5.0),
-        (measured(&mut Dp8::new(LOOSE), form, at, &eighth), 8.0),
-        (measured(&mut Dop853::new(LOOSE), form, at, &eighth), 8.0),
-    ] {
-        assert!((slope - nominal).abs() < MARGIN, "{slope} is not {nominal}");
-    }
+fn check<F: Field + Form>(form: &mut F, start: &Motion, reference: &[Motion]) {
+    let slopes = [
+        (measured(&mut Dp5::new(LOOSE), form, start, reference, FIFTH), 5.0),
+        (measured(&mut Dopri5::new(LOOSE), form, start, reference, FIFTH), 5.0),
+        (measured(&mut Dp8::new(LOOSE), form, start, reference, EIGHTH), 8.0),
+        (measured(&mut Dop853::new(LOOSE), form, start, reference, EIGHTH), 8.0),
+    ];
+    assert!(slopes.iter().all(|(slope, nominal): &(f64, f64)| (slope - nominal).abs() < MARGIN), "{slopes:?}");
 }
 
 #[test]
@@ -96,8 +108,8 @@ fn orders_on_the_spring_pendulum() {
     let scene = shipped("spring", &[]);
     let mechanism = common::compile(&scene);
     let start = mechanism.start(&scene);
-    let reference = reference::<false>(&mechanism, &start, 1.0);
-    check(&mut Multiplier::<2, false>::new(Arc::clone(&mechanism)), &start, &reference, 1.0);
+    let reference = reference::<false>(&mechanism, &start);
+    check(&mut Multiplier::<2, false>::new(Arc::clone(&mechanism)), &start, &reference);
 }
 
 /// Rheonomic: here a stage at a wrong time costs the order.
@@ -106,9 +118,9 @@ fn orders_on_the_motor_with_a_sine() {
     let scene = shipped("motor_sine", &[]);
     let mechanism = common::compile(&scene);
     let start = mechanism.start(&scene);
-    let reference = reference::<true>(&mechanism, &start, 1.0);
-    check(&mut Elimination::<2>::new(Arc::clone(&mechanism)), &start, &reference, 1.0);
-    check(&mut Multiplier::<2, true>::new(Arc::clone(&mechanism)), &start, &reference, 1.0);
+    let reference = reference::<true>(&mechanism, &start);
+    check(&mut Elimination::<2>::new(Arc::clone(&mechanism)), &start, &reference);
+    check(&mut Multiplier::<2, true>::new(Arc::clone(&mechanism)), &start, &reference);
 }
 
 /// y' = y² cos t, y = 1 / (2 - sin t); the event is y falling to its value at `level` \[s\].
@@ -180,13 +192,13 @@ fn raw_step(t: f64, y: f64, h: f64) -> f64 {
 /// eighth order is lost where the equations depend on time.  This test fails the day that is mended.
 #[test]
 fn the_crates_own_dop853_loses_its_order_where_time_matters_and_ours_does_not() {
-    const HORIZON: f64 = 2.0;
+    const END: f64 = 2.0;
     let (mut raw, mut adapted, mut own) = (Vec::new(), Vec::new(), Vec::new());
     for count in [4, 5, 6, 8, 10, 12, 16] {
-        let h = HORIZON / count as f64;
+        let h = END / count as f64;
         let y = (0..count).fold(exact(0.0), |y, k| raw_step(k as f64 * h, y, h));
-        raw.push((h, (y - exact(HORIZON)).abs()));
-        let mut march = |method: &mut dyn Method<Bernoulli>| {
+        raw.push((h, (y - exact(END)).abs()));
+        let march = |method: &mut dyn Method<Bernoulli>| {
             let mut state = State::new(&[DoubleDouble::from(exact(0.0))], 0);
             state.memory = vec![h];
             let mut tally = Tally::default();
@@ -196,7 +208,7 @@ fn the_crates_own_dop853_loses_its_order_where_time_matters_and_ours_does_not() 
                 assert_eq!(method.advance(&mut Bernoulli { level: None }, &mut state, until, &mut tally, watch), Ok(Reached::Until));
             }
             assert_eq!(tally.steps, count);
-            (h, (state.y[0] - exact(HORIZON)).abs())
+            (h, (state.y[0] - exact(END)).abs())
         };
         adapted.push(march(&mut Dop853::new(LOOSE)));
         own.push(march(&mut Dp8::new(LOOSE)));
@@ -207,29 +219,30 @@ fn the_crates_own_dop853_loses_its_order_where_time_matters_and_ours_does_not() 
     assert!((adapted - 8.0).abs() < 1.0 && (own - 8.0).abs() < 1.0, "{adapted} {own}");
 }
 
-/// An event is located to the accuracy of a step, order p + 1 for one step, whatever the interpolation leaves.
+/// An event is located to the accuracy of a step, order p + 1 for one step: the interpolation, an order lower, only finds the place to land on.
 #[test]
 fn the_time_of_an_event_has_the_order_of_a_step() {
-    // y falls from pi/2 to 3 pi/2; the event lies at three fifths of the step.
-    const EVENT: f64 = 2.3;
-    let locate = |method: &mut dyn Method<Bernoulli>, h: f64| {
-        let start = EVENT - 0.6 * h;
+    // y falls from pi/2 to 3 pi/2.  The worst of several events at three fifths of a step, against chance cancellation.
+    const EVENTS: [f64; 4] = [2.4, 2.6, 2.8, 3.0];
+    let locate = |method: &mut dyn Method<Bernoulli>, h: f64, event: f64| {
+        let start = event - 0.6 * h;
         let mut state = State::new(&[DoubleDouble::from(exact(start))], 0);
         (state.time, state.memory) = (Time::from(start), vec![h]);
         let watch = &mut |_: &mut Bernoulli, _: &mut State| Ok(Seen::Kept);
         let reached =
-            method.advance(&mut Bernoulli { level: Some(EVENT) }, &mut state, Time::from(start + h), &mut Tally::default(), watch);
+            method.advance(&mut Bernoulli { level: Some(event) }, &mut state, Time::from(start + h), &mut Tally::default(), watch);
         assert_eq!(reached, Ok(Reached::Event(0)));
-        assert!((state.y[0] - exact(EVENT)).abs() < 1e-15, "the state lies on the event");
-        (h, (state.time.hi - EVENT).abs())
+        assert!((state.y[0] - exact(event)).abs() < 1e-15, "the state lies on the event");
+        (state.time.hi - event).abs()
     };
     let sweep = |method: &mut dyn Method<Bernoulli>, steps: &[f64]| -> f64 {
-        let points: Vec<(f64, f64)> = steps.iter().map(|&h| locate(method, h)).collect();
-        println!("{} {points:.2e?}", method.name());
+        let points: Vec<(f64, f64)> =
+            steps.iter().map(|&h| (h, EVENTS.iter().map(|&event| locate(method, h, event)).fold(0.0, f64::max))).collect();
+        println!("{} {points:?}", method.name());
         order(&points, 1e-14, 1e-1)
     };
     let fifth = sweep(&mut Dp5::new(LOOSE), &[0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2]);
     let eighth = sweep(&mut Dp8::new(LOOSE), &[1.2, 1.1, 1.0, 0.9, 0.8, 0.7, 0.6, 0.5]);
     println!("{fifth:.2} {eighth:.2}");
-    assert!(fifth > 6.0 - MARGIN && eighth > 9.0 - 2.0 * MARGIN, "{fifth} {eighth}");
+    assert!((fifth - 6.0).abs() < 2.0 * MARGIN && (eighth - 9.0).abs() < 2.0 * MARGIN, "{fifth} {eighth}");
 }
