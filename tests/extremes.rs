@@ -90,7 +90,9 @@ fn bars_of_very_unequal_mass_and_length() {
     let mut scene = shipped("free", &[]);
     (scene.bars[1].mass, scene.bars[1].inertia) = (scene.bars[1].mass * 1e-12, scene.bars[1].inertia * 1e-12);
     let mut single = scene.clone();
-    (single.bars.pop(), single.hinges.pop(), single.start.pop());
+    single.bars.pop();
+    single.hinges.pop();
+    single.start.pop();
     let both = run(&scene, &request(MethodId::Dp8, 1e-12, 1.0)).last;
     let one = run(&single, &request(MethodId::Dp8, 1e-12, 1.0)).last;
     assert!((both.phi[0] - one.phi[0]).abs() < 1e-9);

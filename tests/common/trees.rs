@@ -79,13 +79,13 @@ pub fn tree(n: usize, motors: bool, dice: &mut Dice) -> Scene {
         .collect();
     let mut driven = Vec::new();
     if motors {
-        for bar in 0..n {
+        for (bar, &parent) in parents.iter().enumerate() {
             // At most one motor a body, measured from the ground or from what carries it: never a contradiction; at least one.
             if dice.pick(3) == 0 || (bar + 1 == n && driven.is_empty()) {
                 let sine = Sine { amplitude: dice.within(0.1, 0.5), frequency: dice.within(1.0, 5.0), phase: dice.within(-3.0, 3.0) };
                 let sines = if dice.flip() { vec![sine] } else { vec![] };
                 let law = Law { start: dice.within(-3.0, 3.0), rate: dice.within(-4.0, 4.0), acceleration: dice.within(-1.0, 1.0), sines };
-                let relative_to = if dice.flip() { parents[bar] } else { None };
+                let relative_to = if dice.flip() { parent } else { None };
                 driven.push(Motor { name: format!("motor{bar}"), bar, relative_to, law });
             }
         }
