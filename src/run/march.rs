@@ -5,7 +5,7 @@ use super::methods::{MethodId, Stabilization};
 use super::plan::{Plan, Refusal, Request};
 use super::sample::{Sample, Sampler};
 use super::trace::Trace;
-use crate::arithmetic::DoubleDouble;
+use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::elimination::Elimination;
 use crate::dynamics::multiplier::Multiplier;
@@ -277,7 +277,8 @@ pub fn march(run: Run, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>)
         plan,
     };
     let mut motion = Motion::default();
-    let mut resting = strike_at_start(&mechanism, &mut *marcher, &mut sampler, &mut outcome);
+    // The reference of the energy is what impacts at the start leave.
+    let mut resting = strike_touching(&mechanism, &mut *marcher, None, &mut sampler, &mut outcome).err();
     let begin = Instant::now();
     for row in 0..=outcome.plan.rows {
         let stopped = resting.take().map_or_else(|| go(&mechanism, &mut *marcher, row, &mut sampler, &mut outcome), Err);
@@ -312,7 +313,10 @@ fn go(mechanism: &Mechanism, marcher: &mut dyn March, row: u64, sampler: &mut Sa
     for _ in 0..STRIKES_MOST {
         match marcher.advance(until)? {
             Reached::Until => return Ok(()),
-            Reached::Event(contact) => strike(mechanism, marcher, contact, sampler, outcome)?,
+            Reached::Event(contact) => {
+                strike(mechanism, marcher, contact, sampler, outcome)?;
+                strike_touching(mechanism, marcher, Some(contact), sampler, outcome)?;
+            }
         }
     }
     let mut motion = Motion::default();
@@ -356,26 +360,27 @@ fn strike(
     Ok(())
 }
 
-/// A scene may begin with a point on its wall, moving into it; the reference of the energy is what is left after that.
-fn strike_at_start(mechanism: &Mechanism, marcher: &mut dyn March, sampler: &mut Sampler, outcome: &mut Outcome) -> Option<StepError> {
-    for contact in 0..mechanism.contacts.len() {
+/// Lets the impacts of all points take effect that touch a wall and move into it: others than the one just struck, or, as a scene may begin
+/// with a point on its wall, any of them.
+fn strike_touching(
+    mechanism: &Mechanism,
+    marcher: &mut dyn March,
+    struck: Option<usize>,
+    sampler: &mut Sampler,
+    outcome: &mut Outcome,
+) -> Result<(), StepError> {
+    for contact in (0..mechanism.contacts.len()).filter(|&contact| Some(contact) != struck) {
         let mut motion = Motion::default();
         marcher.read(&mut motion);
-        let z: Vec<_> = motion.phi.iter().map(|phi| crate::arithmetic::Complex::unit(phi.hi)).collect();
-        if mechanism.contacts[contact].row.gap(&z) > 1e-12 {
-            continue;
-        }
-        let already = outcome.strike_count;
-        if let Err(stop) = strike(mechanism, marcher, contact, sampler, outcome) {
-            return Some(stop);
-        }
-        if outcome.strikes.last().is_some_and(|strike| strike.approach >= 0.0) {
-            // Leaving already: no impact.
-            outcome.strikes.pop();
-            outcome.strike_count = already;
+        let row = &mechanism.contacts[contact].row;
+        let z: Vec<_> = motion.phi.iter().map(|phi| Complex::unit(phi.hi)).collect();
+        let omega: Vec<f64> = motion.omega.iter().map(|omega| omega.hi).collect();
+        let approach = row.normal.dot(row.point.velocity(&z, &omega));
+        if row.gap(&z) <= 1e-12 && approach < 0.0 {
+            strike(mechanism, marcher, contact, sampler, outcome)?;
         }
     }
-    None
+    Ok(())
 }
 
 fn resting(plan: &Plan, t: f64, what: String) -> StepError {

@@ -24,7 +24,13 @@ pub struct Trace {
 impl Trace {
     /// Takes a sample.
     pub fn see(&mut self, sample: &Sample) {
-        self.stride = self.stride.max(1);
+        if self.seen == 0 {
+            // All of it at once, and no more: a long run shall not ask for more than a short one.
+            self.whole.reserve_exact(WHOLE);
+            self.head.reserve_exact(PART);
+            self.tail.reserve_exact(PART);
+            self.stride = 1;
+        }
         if self.seen.is_multiple_of(self.stride) {
             if self.whole.len() == WHOLE {
                 let mut keep = false;

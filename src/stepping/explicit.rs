@@ -82,6 +82,8 @@ pub struct Explicit<P> {
 
 /// Interior samples a step is searched for events with.
 const SAMPLES: usize = 8;
+/// Steps an event is landed on with, at most.
+const LANDINGS: usize = 6;
 
 impl<P: Pair> Explicit<P> {
     /// The method at a tolerance.
@@ -163,8 +165,9 @@ impl<P: Pair> Explicit<P> {
             tally.evaluations += 1;
         });
         for sample in 1..=SAMPLES {
-            let theta = sample as f64 / SAMPLES as f64;
-            self.gaps_at(field, state, h, theta);
+            let (low, high) = ((sample - 1) as f64 / SAMPLES as f64, sample as f64 / SAMPLES as f64);
+            self.gaps_at(field, state, h, high);
+            let mut first: Option<(usize, f64)> = None;
             for event in 0..self.gaps.len() {
                 let (before, after) = (self.gaps[event], self.samples[event]);
                 if after > 0.0 || after.is_nan() {
@@ -177,7 +180,14 @@ impl<P: Pair> Explicit<P> {
                     }
                     continue;
                 }
-                let theta = self.root(field, state, h, event, theta - 1.0 / SAMPLES as f64, theta);
+                let theta = self.root(field, state, h, event, low, high);
+                if first.is_none_or(|(_, earliest)| theta < earliest) {
+                    first = Some((event, theta));
+                }
+                // The search wrote over the samples.
+                self.gaps_at(field, state, h, high);
+            }
+            if let Some((event, theta)) = first {
                 return Found::At(event, theta);
             }
             std::mem::swap(&mut self.gaps, &mut self.samples);
@@ -210,11 +220,12 @@ impl<P: Pair> Explicit<P> {
     fn land<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, event: usize, tally: &mut Tally) -> f64 {
         let mut best = h;
         let (mut before, mut gap_before) = (0.0, f64::NAN);
-        for _ in 0..6 {
+        for attempt in 1..=LANDINGS {
             self.step(field, state, best, tally);
             field.gaps(state.time + best, &self.next, &mut self.samples);
             let gap = self.samples[event];
-            if gap.abs() <= 1e-15 {
+            // The last attempt stands: the step must be the one that was made.
+            if gap.abs() <= 1e-15 || attempt == LANDINGS {
                 break;
             }
             // A secant once there are two points; the closing speed from the first step until then.
@@ -292,6 +303,7 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
         watch: &mut Watch<F>,
     ) -> Result<Reached, StepError> {
         let (n, events) = (state.y.len(), field.events());
+        super::refuse_the_past(P::NAME, state, until)?;
         self.resize(n, events);
         field.rate(state.time, &state.y, &mut self.k[..n]);
         tally.evaluations += 1;

@@ -63,7 +63,7 @@ pub trait Method<P: ?Sized> {
 
     /// Marches `state` to `until` \[s\], or to the first event before it.
     ///
-    /// Adaptive methods land on `until`; fixed-step methods take the whole number of steps nearest to it.
+    /// Adaptive methods land on `until`, which must not lie behind; fixed-step methods take the whole number of steps nearest to it.
     /// The same call from the same state gives the same bits.
     ///
     /// # Errors
@@ -116,4 +116,20 @@ pub struct StepError {
     pub what: String,
     /// One suggestion.
     pub hint: String,
+}
+
+/// The adaptive methods march forwards only; a time behind by no more than rounding has been reached.
+fn refuse_the_past(method: &str, state: &State, until: Time) -> Result<(), StepError> {
+    let left = (until - state.time).hi;
+    if left >= -1e-9 * state.time.hi.abs().max(1e-3) {
+        return Ok(());
+    }
+    Err(StepError {
+        cause: Cause::Unsuited,
+        method: method.into(),
+        t: state.time.hi,
+        step: left,
+        what: format!("t = {} s lies behind", until.hi),
+        hint: "turn the rates round and march forwards, or use a Gauss method".into(),
+    })
 }

@@ -133,6 +133,7 @@ fn window<F: Field + ?Sized>(
     watch: &mut Watch<F>,
 ) -> Result<Reached, StepError> {
     let n = state.y.len();
+    super::refuse_the_past(name, state, until)?;
     let span = (until - state.time).hi;
     if span <= 0.0 {
         return Ok(Reached::Until);

@@ -1,0 +1,90 @@
+//! The double pendulum's instants: accelerations, joint forces, motor and guide multipliers at given positions, to twelve digits.
+//!
+//! Numbers and their public source: `data/tudelft_double_pendulum_instants.json`.  Its sign rule: the force on bar 1 is minus the multiplier
+//! at A and minus the multiplier at B.
+
+mod common;
+
+use common::{Inertia, double_pendulum, spring};
+use driftless::arithmetic::Complex;
+use driftless::dynamics::Mechanism;
+use driftless::dynamics::kernel::{Bias, Kernel};
+use driftless::dynamics::row::{LineRow, Row};
+use driftless::scene::{Law, Motor};
+use serde_json::Value;
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().expect("a list").iter().map(|x| x.as_f64().expect("a number")).collect()
+}
+
+/// Every number of a case against the equations.
+fn check(case: &Value) {
+    let name = case["case"].as_str().expect("a name");
+    let start: Vec<Vec<f64>> = case["start"].as_array().expect("a list").iter().map(numbers).collect();
+    let mut scene = double_pendulum(Inertia::Slender, [(start[0][0], start[0][1]), (start[1][0], start[1][1])]);
+    for bar in &mut scene.bars {
+        bar.inertia = case["inertia"].as_f64().expect("a number");
+    }
+    if case["spring"] == true {
+        scene.springs.push(spring(0.0));
+    }
+    if let Some(rate) = case["motor"].as_f64() {
+        let law = Law { start: start[0][0], rate, acceleration: 0.0, sines: vec![] };
+        scene.motors.push(Motor { name: "motor".into(), bar: 0, relative_to: None, law });
+    }
+    let mut mechanism = Mechanism::new(&scene).expect("a valid scene");
+    let mut guide = Complex::ZERO;
+    if let Some(line) = case["guide"].as_object() {
+        let normal = numbers(&line["normal"]);
+        guide = Complex::new(normal[0], normal[1]);
+        // The guided point of every such case is the end of bar 2.
+        assert_eq!(numbers(&line["point"]), [scene.bars[1].length, 0.0]);
+        let (point, offset) = (mechanism.bodies[1].ends[1].clone(), line["offset"].as_f64().expect("a number"));
+        mechanism.rows.push(Row::Line(LineRow { name: "guide".into(), point, normal: guide, offset }));
+    }
+    let (phi, omega) = ([start[0][0], start[1][0]], [start[0][1], start[1][1]]);
+    let mut kernel = Kernel::<f64>::new(2, mechanism.rows.len());
+    kernel.accelerate::<0>(&mechanism, Default::default(), &phi, &omega, Bias::default());
+    let mut accelerations = Vec::new();
+    for (k, body) in mechanism.bodies.iter().enumerate() {
+        let centre = body.centre.acceleration(&kernel.z, &omega, &kernel.load);
+        accelerations.extend([centre.re, centre.im, kernel.load[k]]);
+    }
+    let mut forces = mechanism.hinge_forces(&kernel.z, &omega, &kernel.load);
+    if guide != Complex::ZERO {
+        // The guide pushes the end of bar 2 with minus its multiplier; both hinges are spared that.
+        forces.iter_mut().for_each(|force| *force += guide.times(kernel.multiplier[0]));
+    }
+    // Hinge A: of the ground on bar 1; hinge B: of bar 1 on bar 2.
+    let mut multipliers = vec![-forces[0].re, -forces[0].im, forces[1].re, forces[1].im];
+    multipliers.extend(&kernel.multiplier);
+    for (what, found, expected) in
+        [("acceleration", accelerations, numbers(&case["accelerations"])), ("multiplier", multipliers, numbers(&case["multipliers"]))]
+    {
+        assert_eq!(found.len(), expected.len(), "{name}");
+        for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
+            assert!((found - expected).abs() <= 1e-12 * expected.abs().max(1.0), "{name}: {what} {i}: {found} is not {expected}");
+        }
+    }
+}
+
+fn cases(guided: bool) -> Vec<Value> {
+    let file: Value = serde_json::from_str(include_str!("data/tudelft_double_pendulum_instants.json")).expect("valid JSON");
+    let all = file["cases"].as_array().expect("a list").clone();
+    all.into_iter().filter(|case| case["guide"].is_object() == guided).collect()
+}
+
+#[test]
+fn six_instants_with_hinges_spring_and_motor() {
+    let cases = cases(false);
+    assert_eq!(cases.len(), 6);
+    cases.iter().for_each(check);
+}
+
+/// HW2e and HW2f; a guide is a row of the mechanism, not yet an element of a scene.
+#[test]
+fn two_instants_with_a_guided_end() {
+    let cases = cases(true);
+    assert_eq!(cases.len(), 2);
+    cases.iter().for_each(check);
+}

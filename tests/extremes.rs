@@ -1,0 +1,302 @@
+//! Extremes: each ends in a right answer or in a typed stop with a time in it; nothing hangs.
+
+mod common;
+
+use common::{compile, pendulum, quarter_period, run, run_limited, shipped};
+use driftless::run::{Limits, MethodId, Outcome, Request, Stabilization};
+use driftless::scene::{Place, Scene, Spring};
+use driftless::stepping::Cause;
+use std::f64::consts::{FRAC_PI_2, PI};
+
+const EXPLICIT: [MethodId; 4] = [MethodId::Dopri5, MethodId::Dop853, MethodId::Dp5, MethodId::Dp8];
+
+fn request(method: MethodId, rtol: f64, until: f64) -> Request {
+    Request { method: Some(method), rtol: Some(rtol), until: Some(until), every: Some(until / 10.0), ..Request::default() }
+}
+
+/// Runs to the end with the energy within `bound`.
+fn assert_sound(scene: &Scene, request: &Request, bound: f64) -> Outcome {
+    let outcome = run(scene, request);
+    assert_eq!(outcome.stop, None, "{} by {}", scene.name, outcome.plan.method);
+    let drift = outcome.drift.energy.max;
+    assert!(drift < bound, "{} by {}: {drift:e}", scene.name, outcome.plan.method);
+    outcome
+}
+
+#[test]
+fn a_spring_a_million_times_stiffer() {
+    // Frequency about 5e3 rad/s: steps of 1e-4 s, and the everyday methods go through.
+    let mut scene = shipped("spring", &[]);
+    scene.springs[0].stiffness *= 1e6;
+    // At rest at its free length, so that the stiffness is felt and not its energy.
+    scene.springs[0].free_length = 0.5;
+    for method in [MethodId::Dop853, MethodId::Dp8] {
+        assert_sound(&scene, &request(method, 1e-8, 0.5), 1e-4);
+    }
+}
+
+#[test]
+fn a_motor_at_rest_told_to_run_at_speed_is_refused() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes/motor.json");
+    let at_rest = ["start.bar1={\"phi\": 1.5707963267948966, \"omega\": 0}".parse().expect("an override")];
+    let refusal = driftless::scene::read_scene(&path, &at_rest).expect_err("a contradiction").to_string();
+    assert!(refusal.contains("bar1") && refusal.contains("omega") && refusal.contains("motor"), "{refusal}");
+}
+
+#[test]
+fn without_gravity_a_bar_turns_steadily() {
+    let mut scene = pendulum(1.0, 3.0);
+    scene.gravity = [0.0, 0.0];
+    for method in EXPLICIT {
+        let outcome = assert_sound(&scene, &request(method, 1e-10, 100.0), 1e-12);
+        assert!((outcome.last.phi[0] - 301.0).abs() < 1e-10, "{method}: {}", outcome.last.phi[0]);
+    }
+    let fixed = Request { method: Some(MethodId::Gauss(8)), step: Some(0.125), until: Some(100.0), every: Some(1.0), ..Request::default() };
+    assert!((assert_sound(&scene, &fixed, 1e-15).last.phi[0] - 301.0).abs() < 1e-13);
+    // At rest without gravity nothing has a scale, and nothing moves.
+    scene.start[0].omega = 0.0;
+    for method in EXPLICIT {
+        assert_eq!(assert_sound(&scene, &request(method, 1e-10, 10.0), 1e-300).last.phi, [1.0]);
+    }
+}
+
+/// Gravity 1e6 times larger makes the same motion 1e3 times faster.
+#[test]
+fn gravity_sets_the_clock() {
+    let slow = shipped("free", &[]);
+    let mut fast = slow.clone();
+    fast.gravity[0] *= 1e6;
+    for method in [MethodId::Dop853, MethodId::Dp8] {
+        let (slow, fast) = (run(&slow, &request(method, 1e-12, 3.0)), run(&fast, &request(method, 1e-12, 3e-3)));
+        for k in 0..2 {
+            assert!((slow.last.phi[k] - fast.last.phi[k]).abs() < 1e-7, "{method}");
+            assert!((slow.last.omega[k] - fast.last.omega[k] / 1e3).abs() < 1e-6, "{method}");
+        }
+    }
+}
+
+#[test]
+fn bars_of_very_unequal_mass_and_length() {
+    for (mass, length) in [(1e6, 1.0), (1e-6, 1.0), (1.0, 1e3), (1.0, 1e-3), (1e6, 1e-3), (1e-6, 1e3)] {
+        let mut scene = shipped("free", &[]);
+        scene.name = format!("ratio-{mass}-{length}");
+        let bar = &mut scene.bars[1];
+        (bar.mass, bar.length, bar.centre[0]) = (bar.mass * mass, bar.length * length, bar.centre[0] * length);
+        bar.inertia *= mass * length * length;
+        assert_sound(&scene, &request(MethodId::Dp8, 1e-11, 1.0), 1e-7);
+        assert_sound(&scene, &request(MethodId::Dop853, 1e-11, 1.0), 1e-7);
+    }
+    // A second bar of no weight leaves the first to swing as a pendulum.
+    let mut scene = shipped("free", &[]);
+    (scene.bars[1].mass, scene.bars[1].inertia) = (scene.bars[1].mass * 1e-12, scene.bars[1].inertia * 1e-12);
+    let mut single = scene.clone();
+    single.bars.pop();
+    single.hinges.pop();
+    single.start.pop();
+    let both = run(&scene, &request(MethodId::Dp8, 1e-12, 1.0)).last;
+    let one = run(&single, &request(MethodId::Dp8, 1e-12, 1.0)).last;
+    assert!((both.phi[0] - one.phi[0]).abs() < 1e-9);
+}
+
+#[test]
+fn both_bars_in_line_turning_together() {
+    // Aligned and at one rate under no gravity: the pair turns as one rigid bar for ever.
+    let mut scene = shipped("spinning", &[]);
+    scene.gravity = [0.0, 0.0];
+    let outcome = assert_sound(&scene, &request(MethodId::Dp8, 1e-12, 5.0), 1e-11);
+    assert!(outcome.last.phi.iter().all(|phi| (phi - 5.0 * PI).abs() < 1e-8), "{:?}", outcome.last.phi);
+    // And with it, folded back onto one another.
+    let mut scene = shipped("free", &[]);
+    scene.start[1].phi = -FRAC_PI_2;
+    assert_sound(&scene, &request(MethodId::Dp8, 1e-11, 5.0), 1e-8);
+}
+
+#[test]
+fn hanging_at_rest_stays_exactly_there() {
+    let scene = shipped("hanging", &[]);
+    for method in EXPLICIT {
+        let last = assert_sound(&scene, &request(method, 1e-9, 50.0), 1e-300).last;
+        assert_eq!((last.phi, last.omega), (vec![0.0; 2], vec![0.0; 2]));
+    }
+    for stages in [2, 5, 8] {
+        let fixed =
+            Request { method: Some(MethodId::Gauss(stages)), step: Some(0.1), until: Some(50.0), every: Some(5.0), ..Request::default() };
+        let last = assert_sound(&scene, &fixed, 1e-300).last;
+        assert_eq!((last.phi, last.omega), (vec![0.0; 2], vec![0.0; 2]));
+    }
+}
+
+/// Balanced upside down to the last bit of pi: sin(pi) is 1.2e-16, not 0, and the fall begins from there:
+/// delta grows as 1.2e-16 cosh(sqrt(15) t), give or take what rounding the angle in the first steps adds.
+#[test]
+fn upside_down_it_falls_as_slowly_as_its_last_bit_says() {
+    let outcome = run(&pendulum(PI, 0.0), &request(MethodId::Dp8, 1e-12, 8.0));
+    assert_eq!(outcome.stop, None);
+    let early = &outcome.trace.head[5];
+    let expected = 1.224_646_799_147_353_2e-16 * (15f64.sqrt() * early.t).cosh();
+    println!("{:?} {expected:e}", outcome.trace.head.iter().map(|sample| PI - sample.phi[0]).collect::<Vec<_>>());
+    assert!(early.phi[0] <= PI && (PI - early.phi[0] - expected).abs() < 0.5 * expected + 1e-15, "{:e}", PI - early.phi[0]);
+    assert!(outcome.drift.energy.max < 1e-10);
+}
+
+#[test]
+fn a_million_turns_at_the_start_change_nothing() {
+    let mut wound = shipped("free", &[]);
+    wound.start[0].phi += 1e6 * 2.0 * PI;
+    wound.start[1].phi -= 1e6 * 2.0 * PI;
+    let start = compile(&wound).start(&wound);
+    assert_eq!(start.turns, [1_000_000, -1_000_000]);
+    let mut plain = wound.clone();
+    for k in 0..2 {
+        plain.start[k].phi = start.phi[k].hi;
+    }
+    for method in EXPLICIT {
+        let (wound, plain) = (run(&wound, &request(method, 1e-9, 2.0)).last, run(&plain, &request(method, 1e-9, 2.0)).last);
+        for k in 0..2 {
+            let turns = [1e6, -1e6][k] * 2.0 * PI;
+            // The winding angle is a double near 6e6 rad: its last place is 1e-9.
+            assert!((wound.phi[k] - turns - plain.phi[k]).abs() < 3e-9, "{method}");
+            assert!((wound.omega[k] - plain.omega[k]).abs() < 1e-12, "{method}");
+        }
+    }
+}
+
+/// A bar's point on the very anchor of its spring: there the force has no direction.
+#[test]
+fn a_spring_of_no_length_is_a_typed_stop() {
+    let mut scene = pendulum(0.0, 0.0);
+    scene.springs.push(Spring {
+        name: "spring".into(),
+        between: [Place { bar: None, point: [0.5, 0.0] }, Place { bar: Some(0), point: [0.5, 0.0] }],
+        stiffness: 10.0,
+        free_length: 0.2,
+        damping: 0.0,
+    });
+    for method in EXPLICIT {
+        let stop = run(&scene, &request(method, 1e-9, 1.0)).stop.expect("a stop");
+        assert_eq!((stop.cause, stop.t), (Cause::NotFinite, 0.0), "{stop}");
+        assert!(stop.what.contains("bar") && stop.hint.contains("spring"), "{stop}");
+    }
+    let fixed = Request { method: Some(MethodId::Gauss(4)), step: Some(0.01), until: Some(1.0), every: Some(0.1), ..Request::default() };
+    let stop = run(&scene, &fixed).stop.expect("a stop");
+    assert_eq!((stop.cause, stop.t), (Cause::NotFinite, 0.0), "{stop}");
+    // Passing through the anchor at speed the force flips in no time: through with the energy kept, or a typed stop before it.
+    scene.start[0] = driftless::scene::Start { phi: 1.0, omega: -8.0 };
+    for method in EXPLICIT {
+        let outcome = run(&scene, &request(method, 1e-9, 1.0));
+        match &outcome.stop {
+            None => assert!(outcome.drift.energy.max < 1e-5, "{method}: {:e}", outcome.drift.energy.max),
+            Some(stop) => {
+                assert!(matches!(stop.cause, Cause::NotFinite | Cause::StepTooSmall), "{stop}");
+                assert!(stop.t > 0.1 && stop.t < 0.2, "{stop}");
+            }
+        }
+    }
+}
+
+/// Steps without end are cut off with the time they got to.
+#[test]
+fn a_step_budget_that_runs_out_is_a_typed_stop() {
+    use driftless::dynamics::multiplier::Multiplier;
+    use driftless::dynamics::{Form, Time};
+    use driftless::stepping::{Dop853, Dopri5, Dp5, Dp8, Method, Seen, Tally, Tolerance};
+    type Free = Multiplier<2, false>;
+    let scene = shipped("free", &[]);
+    let mechanism = compile(&scene);
+    let tight = Tolerance { relative: 1e-12, absolute: 1e-12 };
+    let (mut dp5, mut dp8) = (Dp5::new(tight), Dp8::new(tight));
+    (dp5.max_steps, dp8.max_steps) = (50, 50);
+    let methods: [Box<dyn Method<Free>>; 4] = [
+        Box::new(dp5),
+        Box::new(dp8),
+        Box::new(Dopri5 { max_steps: 50, ..Dopri5::new(tight) }),
+        Box::new(Dop853 { max_steps: 50, ..Dop853::new(tight) }),
+    ];
+    for mut method in methods {
+        let mut form = Free::new(mechanism.clone());
+        let mut state = form.state(&mechanism.start(&scene));
+        let stop = method.advance(&mut form, &mut state, Time::from(100.0), &mut Tally::default(), &mut |_, _| Ok(Seen::Kept));
+        let stop = stop.expect_err("a stop");
+        assert_eq!(stop.cause, Cause::TooManySteps, "{stop}");
+        assert!(stop.t > 0.0 && stop.t < 100.0, "{stop}");
+    }
+}
+
+#[test]
+fn a_step_far_too_long_is_a_typed_stop() {
+    for stages in [2, 8] {
+        let fixed =
+            Request { method: Some(MethodId::Gauss(stages)), step: Some(5.0), until: Some(100.0), every: Some(5.0), ..Request::default() };
+        let stop = run(&shipped("spinning", &[]), &fixed).stop.expect("a stop");
+        assert!(matches!(stop.cause, Cause::NotConverged | Cause::NotFinite), "{stop}");
+        assert!(stop.t < 100.0 && stop.hint.contains("step"), "{stop}");
+    }
+}
+
+/// Output far denser, or far sparser, than the steps gives the same motion.
+#[test]
+fn the_output_interval_does_not_matter() {
+    let scene = shipped("gentle", &[]);
+    for method in EXPLICIT {
+        let at = |every: f64| {
+            let outcome = run(&scene, &Request { every: Some(every), ..request(method, 1e-10, 1.0) });
+            assert_eq!((outcome.stop, outcome.last.t), (None, 1.0));
+            outcome.last.phi[1]
+        };
+        let (dense, usual, sparse) = (at(1e-4), at(0.01), at(1.0));
+        assert!((dense - usual).abs() < 1e-8 && (sparse - usual).abs() < 1e-8, "{method}: {dense} {usual} {sparse}");
+    }
+    // Windows as short as time can tell apart near the start.
+    let short = Request { every: Some(1e-9), ..request(MethodId::Dop853, 1e-9, 1e-6) };
+    assert_sound(&scene, &short, 1e-12);
+}
+
+#[test]
+fn chaos_keeps_its_energy() {
+    let scene = shipped("free", &["start.bar1.phi=3", "start.bar2.phi=-3"]);
+    assert_sound(&scene, &request(MethodId::Dp8, 1e-12, 100.0), 1e-8);
+    assert_sound(&shipped("chain8", &[]), &request(MethodId::Dp8, 1e-10, 5.0), 1e-6);
+    assert_sound(&shipped("branch", &[]), &request(MethodId::Dop853, 1e-10, 10.0), 1e-6);
+}
+
+/// A thousand periods of a pendulum arrive on time.
+#[test]
+fn a_thousand_periods_end_where_they_began() {
+    let until = 4000.0 * quarter_period(1.0);
+    let fixed = Request {
+        method: Some(MethodId::Gauss(8)),
+        step: Some(until / 32000.0),
+        until: Some(until),
+        every: Some(until),
+        ..Request::default()
+    };
+    let outcome = assert_sound(&pendulum(1.0, 0.0), &fixed, 1e-14);
+    assert!((outcome.last.phi[0] - 1.0).abs() < 1e-11 && outcome.last.omega[0].abs() < 1e-10, "{:?}", outcome.last);
+}
+
+#[test]
+fn every_body_driven_leaves_nothing_to_solve() {
+    let mut scene = shipped("motor_sine", &[]);
+    let mut second = scene.motors[0].clone();
+    (second.name, second.bar, second.law.rate) = ("second".into(), 1, -3.0);
+    scene.motors.push(second);
+    (scene.start[1].phi, scene.start[1].omega) = (scene.motors[1].law.start, -2.0);
+    for stabilize in Stabilization::ALL {
+        for method in [MethodId::Dp8, MethodId::Dp5] {
+            let outcome = assert_sound(&scene, &Request { stabilize: Some(stabilize), ..request(method, 1e-10, 3.0) }, 1e-6);
+            let expected = scene.motors[1].law.angle(3.0.into()).hi;
+            assert!((outcome.last.phi[1] - expected).abs() < 1e-8, "{method} {stabilize}");
+        }
+    }
+    let fixed =
+        Request { method: Some(MethodId::Gauss(8)), step: Some(1.0 / 128.0), until: Some(3.0), every: Some(0.25), ..Request::default() };
+    assert_sound(&scene, &fixed, 1e-13);
+}
+
+#[test]
+fn a_stated_drift_limit_stops_the_run_with_its_time() {
+    let limits = Limits { energy: Some(1e-9), constraint: None };
+    let stop = run_limited(&shipped("free", &[]), &request(MethodId::Dp5, 1e-4, 10.0), limits).stop.expect("a stop");
+    assert_eq!(stop.cause, Cause::DriftLimit);
+    assert!(stop.t > 0.0 && stop.t <= 10.0 && stop.what.contains("limit"), "{stop}");
+}
