@@ -396,3 +396,58 @@ fn a_boxed_field_gives_the_same_bits() {
     march(&mut gauss(8, 1.0 / 128.0), &mut *field, &mut boxed, 1.0).expect("a march");
     assert_eq!(plain, boxed);
 }
+
+/// Two point masses of 1 kg on rods of 1 m, g = 9.8 m/s²: the double pendulum of Hairer, McLachlan, Razakarivony (2008).
+fn point_masses() -> Scene {
+    let mut scene = double_pendulum(Inertia::Slender, [(1.1, 0.0), (0.0, 0.0)]);
+    scene.gravity = [9.8, 0.0];
+    for bar in &mut scene.bars {
+        (bar.length, bar.mass, bar.centre, bar.inertia) = (1.0, 1.0, [1.0, 0.0], 0.0);
+    }
+    scene.hinges[1].between[0].point = [1.0, 0.0];
+    scene
+}
+
+/// Prints rms, mean and its standard error over perturbed starts of the energy error over `scale` at doubling times.
+fn ensemble(title: &str, scene: &Scene, scale: f64, step: f64, until: f64, runs: u32, prepare: &dyn Fn(&mut State, f64)) {
+    let mut form = Free2::new(compile(scene));
+    let marks: Vec<f64> = (0..7).rev().map(|k| until / 2f64.powi(k)).collect();
+    let mut errors = vec![Vec::new(); marks.len()];
+    let (mut tally, clock) = (Tally::default(), std::time::Instant::now());
+    for run in 0..runs {
+        let mut state = start_of(&form, scene);
+        prepare(&mut state, f64::from(run));
+        let mut balance = Balance::new(form.mechanism());
+        let start = balance.at(&mut form, &state);
+        let mut method = gauss(8, step);
+        for (mark, errors) in marks.iter().zip(&mut errors) {
+            let part = march(&mut method, &mut form, &mut state, *mark).expect("a march");
+            (tally.steps, tally.evaluations) = (tally.steps + part.steps, tally.evaluations + part.evaluations);
+            errors.push((balance.at(&mut form, &state) - start).hi / scale);
+        }
+    }
+    let n = f64::from(runs);
+    let mut points = Vec::new();
+    for (mark, errors) in marks.iter().zip(&errors) {
+        let mean = errors.iter().sum::<f64>() / n;
+        let rms = (errors.iter().map(|e| e * e).sum::<f64>() / n).sqrt();
+        println!("{title} {mark:7} s: rms {rms:.2e}, mean {mean:+.1e} ± {:.1e}", ((rms * rms - mean * mean) / (n - 1.0)).sqrt());
+        points.push((mark.ln(), rms.ln()));
+    }
+    let (evaluations, time) = (tally.evaluations as f64 / tally.steps as f64, clock.elapsed().as_secs_f64() * 1e6 / tally.steps as f64);
+    println!("{title}: rms grows as t^{:.2}; {evaluations:.1} evaluations and {time:.2} µs a step", slope(&points));
+}
+
+#[test]
+#[ignore = "minutes; prints figures"]
+fn ensembles_follow_the_square_root_law() {
+    let scale = compile(&free()).energy_scale;
+    ensemble("free", &free(), scale, 1.0 / 128.0, 8192.0, 16, &|state, k| {
+        state.y[0] += 1e-3 * k;
+        state.y[1] -= 7e-4 * k;
+    });
+    // Energy at the start, about -14.4 J, as in the papers.
+    ensemble("point masses", &point_masses(), 14.4, 1.0 / 64.0, 4096.0, 100, &|state, k| {
+        (state.y[0], state.y[2], state.y[3]) = (1.1 + 1e-6 * k, 0.0, 2.7746);
+    });
+}

@@ -188,8 +188,9 @@ impl Mechanism {
         self.tree.couple::<f64, 0>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
         tree::factor::<f64, 0>(n, &mut kernel.mass, &mut kernel.pivot);
         let singular = |&k: &usize| {
-            let relative = 1.0 / (kernel.pivot[k] * self.tree.diagonal[k]);
-            !(relative > 1e-13)
+            // Not a number counts as singular.
+            let sound = 1.0 / (kernel.pivot[k] * self.tree.diagonal[k]) > 1e-13;
+            !sound
         };
         match (0..n).find(singular) {
             Some(k) => Err(CompileError::Massless(self.bodies[k].name.clone())),

@@ -15,7 +15,7 @@ use crate::scene::Scene;
 use crate::stabilization::{Baumgarte, Projected};
 use crate::stepping::gauss::Gauss;
 use crate::stepping::rattle::Rattle;
-use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Method, Reached, Seen, StepError, Tally};
+use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Method, Reached, Seen, StepError, Tally, Taylor};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -69,11 +69,16 @@ fn form<const N: usize>(mechanism: &Arc<Mechanism>, stabilization: Stabilization
     let mechanism = Arc::clone(mechanism);
     let accounts = !mechanism.rows.is_empty() || mechanism.is_damped();
     match stabilization {
-        Stabilization::Elimination => Box::new(Elimination::<N>::new(mechanism)),
+        Stabilization::Elimination => eliminated::<N>(&mechanism),
         Stabilization::Baumgarte => Box::new(Baumgarte::new(Multiplier::<N, true>::new(mechanism), time_constant)),
         Stabilization::None | Stabilization::Projection if accounts => Box::new(Multiplier::<N, true>::new(mechanism)),
         Stabilization::None | Stabilization::Projection => Box::new(Multiplier::<N, false>::new(mechanism)),
     }
+}
+
+/// The form of the independent coordinates for `N` bodies, whether angles are driven or not.
+fn eliminated<const N: usize>(mechanism: &Arc<Mechanism>) -> Box<dyn Problem> {
+    Box::new(Elimination::<N>::new(Arc::clone(mechanism)))
 }
 
 /// The canonical form for `N` bodies.
@@ -120,6 +125,7 @@ fn build(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<
         MethodId::Dp8 if projected => marcher(problem(), Projected::new(Dp8::new(tolerance)), start),
         MethodId::Dp5 => marcher(problem(), Dp5::new(tolerance), start),
         MethodId::Dp8 => marcher(problem(), Dp8::new(tolerance), start),
+        MethodId::Taylor => marcher(sized!(n, eliminated(mechanism)), Taylor::new(tolerance), start),
         MethodId::Gauss(stages) => {
             let gauss = Gauss::new(stages, step)
                 .ok_or_else(|| cannot_begin(plan, format!("no Gauss method has {stages} stages and step {step} s")))?;

@@ -15,6 +15,8 @@ pub enum MethodId {
     Dp5,
     /// Our Dormand–Prince 8(5,3).
     Dp8,
+    /// The power series of the motion.
+    Taylor,
     /// Gauss collocation with so many stages, 2 to 8; order twice that.
     Gauss(usize),
     /// RATTLE and its compositions.
@@ -57,6 +59,13 @@ pub const METHODS: &[MethodInfo] = &[
     adaptive(MethodId::Dop853, "dop853", 8, "everyday runs at 1e-6 to 1e-12 (crate ode_solvers)", "no walls, no projection"),
     adaptive(MethodId::Dp5, "dp5", 5, "as dopri5, with impacts and projection after every step", "anything"),
     adaptive(MethodId::Dp8, "dp8", 8, "as dop853, with impacts and projection after every step", "anything"),
+    adaptive(
+        MethodId::Taylor,
+        "taylor",
+        24,
+        "the most accurate path, below 1e-8 (power series, order 16 to 24)",
+        "no walls; motors eliminated",
+    ),
     gauss(2, "gauss4"),
     gauss(3, "gauss6"),
     gauss(4, "gauss8"),

@@ -227,6 +227,7 @@ fn pair(mechanism: &Mechanism, method: MethodId, request: &Request, notes: &mut 
     if !mechanism.contacts.is_empty() && !matches!(method, MethodId::Dp5 | MethodId::Dp8) {
         let reason = match method {
             MethodId::Dopri5 | MethodId::Dop853 => "ode_solvers does not let an impact be located inside its steps",
+            MethodId::Taylor => "a series does not see the wall its step runs through",
             _ => "an impact inside a fixed step cannot be located without changing the step",
         };
         return Err(mismatch(format!("{method} on a scene with walls"), reason, "--method dp8, or dp5 at loose tolerances"));
@@ -252,6 +253,10 @@ fn pair(mechanism: &Mechanism, method: MethodId, request: &Request, notes: &mut 
         }
         (MethodId::Gauss(_), Stabilization::None | Stabilization::Baumgarte | Stabilization::Projection) => {
             let reason = "Gauss methods are symplectic in coordinates and momenta, where a motor's angle is eliminated";
+            Err(mismatch(format!("{method} with --stabilize {asked}"), reason, "--stabilize elimination, or --method dp8"))
+        }
+        (MethodId::Taylor, Stabilization::None | Stabilization::Baumgarte | Stabilization::Projection) => {
+            let reason = "the series is expanded in coordinates from which a motor's angle is eliminated";
             Err(mismatch(format!("{method} with --stabilize {asked}"), reason, "--stabilize elimination, or --method dp8"))
         }
         (MethodId::Dopri5 | MethodId::Dop853, Stabilization::Projection) => {
@@ -288,7 +293,9 @@ fn fixed_step(
             *every = until / (until / *every).ceil();
             notes.push(format!("the output interval is {every} s, so that the fixed steps end on the horizon"));
         }
-        return Ok(*every / (*every * rate / share).ceil().max(1.0));
+        // Halves of the output interval are exact, so that its multiples are met to the last bit.
+        let halvings = libm::log2(*every * rate / share).round().max(0.0);
+        return Ok(*every / libm::exp2(halvings));
     };
     let steps = (until / asked).round();
     if asked > until * (1.0 + 1e-9) {

@@ -4,11 +4,11 @@ use super::sample::Sample;
 use std::collections::VecDeque;
 
 /// Samples kept of the whole run.
-const WHOLE: usize = 4096;
+const WHOLE: usize = 2048;
 /// Samples kept of the beginning and of the end.
-const PART: usize = 3000;
+const PART: usize = 1500;
 
-/// The memory.
+/// The memory: samples without positions, which follow from the angles.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
     /// Samples at equal distances over the whole run, and the last.
@@ -35,21 +35,30 @@ impl Trace {
                 self.stride *= 2;
             }
             if self.seen.is_multiple_of(self.stride) {
-                self.whole.push(sample.clone());
+                self.whole.push(thin(sample));
             }
         }
         if self.head.len() < PART {
-            self.head.push(sample.clone());
+            self.head.push(thin(sample));
         }
-        if self.tail.len() == PART
-            && let Some(mut oldest) = self.tail.pop_front()
-        {
-            oldest.clone_from(sample);
-            self.tail.push_back(oldest);
-        } else {
-            self.tail.push_back(sample.clone());
+        if self.tail.len() == PART {
+            self.tail.pop_front();
         }
+        self.tail.push_back(thin(sample));
         self.seen += 1;
+    }
+}
+
+/// A sample without positions and velocities.
+fn thin(sample: &Sample) -> Sample {
+    Sample {
+        phi: sample.phi.clone(),
+        omega: sample.omega.clone(),
+        constraints: sample.constraints.clone(),
+        motors: sample.motors.clone(),
+        centre: Vec::new(),
+        velocity: Vec::new(),
+        ..*sample
     }
 }
 

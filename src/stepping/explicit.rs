@@ -147,7 +147,7 @@ impl<P: Pair> Explicit<P> {
         tally.evaluations += 1;
         let d2 = norm(&|i| rest[i] - first[i], &self.scale) / guess;
         let steepest = d1.max(d2);
-        let second = if steepest <= 1e-15 { (1e-3 * guess).max(1e-6) } else { (0.01 / steepest).powf(1.0 / f64::from(P::ORDER)) };
+        let second = if steepest <= 1e-15 { (1e-3 * guess).max(1e-6) } else { libm::pow(0.01 / steepest, 1.0 / f64::from(P::ORDER)) };
         let first = (100.0 * guess).min(second).min(span);
         if first.is_finite() { first } else { span.min(1e-6) }
     }
