@@ -102,5 +102,6 @@ fn tell(
     if flags.scene.quiet {
         return Ok(());
     }
-    print(&report::result::text(scene, mechanism, outcome, folder))
+    let page = report::result::text(scene, mechanism, outcome);
+    print(&(page + &report::result::files(folder.path(), folder.names())))
 }

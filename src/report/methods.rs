@@ -20,7 +20,7 @@ pub fn text() -> String {
         };
         let symplectic = if info.symplectic { ", symplectic" } else { "" };
         page.entry(info.name, &format!("order {}, {step}{symplectic}", info.order));
-        page.entry("", &format!("{}; takes {}", info.purpose, info.needs));
+        page.entry("", &format!("{}; scene: {}", info.purpose, info.needs));
     }
     page.into_text()
 }

@@ -5,9 +5,10 @@ use super::page::{Page, figure, magnitude};
 use crate::dynamics::Mechanism;
 #[cfg(feature = "files")]
 use crate::run::files::sha256;
-use crate::run::{Folder, Outcome, Sample};
+use crate::run::{Outcome, Sample};
 use crate::scene::Scene;
 use serde_json::{Map, Value, json};
+use std::path::Path;
 
 /// The report as one JSON object; `wall_s` \[s\] is the time from the first output row to the last.
 pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value {
@@ -95,8 +96,16 @@ fn target() -> String {
     format!("{}-{}{environment}", std::env::consts::ARCH, std::env::consts::OS)
 }
 
-/// The report as a page, with the files written.
-pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome, folder: &Folder) -> String {
+/// The files written, as the last entry of the page.
+pub fn files(folder: &Path, names: &[&str]) -> String {
+    let mut page = Page::default();
+    page.entry("files", &format!("{}:", folder.display()));
+    page.entry("", &names.join(", "));
+    page.into_text()
+}
+
+/// The report as a page.
+pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
     let Outcome { plan, tally, drift, last, .. } = outcome;
     let mut page = Page::new(&scene.name, &scene.description);
     describe(&mut page, mechanism, plan);
@@ -146,7 +155,5 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome, folder: &Fo
         page.entry("impacts", &format!("{}, {} J lost in them", outcome.strike_count, figure(outcome.strike_loss)));
     }
     page.entry("trust", "no estimate of the solution's error yet");
-    page.entry("files", &format!("{}:", folder.path().display()));
-    page.entry("", &folder.names().join(", "));
     page.into_text()
 }
