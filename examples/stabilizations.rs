@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mechanism = Arc::new(Mechanism::new(&scene)?);
     // From a consistent start even the plain run keeps so simple a row to rounding, and would prove nothing.
     let mut start = mechanism.start(&scene);
-    start.omega[0] = start.omega[0] + DoubleDouble::from(1e-6);
+    start.omega[0] += DoubleDouble::from(1e-6);
     let mut outcomes = Vec::new();
     println!("{:12} {:>10} {:>10} {:>14}", "", "|C| rad", "|C'| rad/s", "stabilizer J");
     for stabilize in Stabilization::ALL {

@@ -35,8 +35,8 @@
 //! | [`stepping`] | the methods, one a file |
 //! | [`stabilization`] | Baumgarte and projection |
 //! | [`run`] | from a scene to a result: plan, loop, samples, drift |
-//! | [`report`] | results as text and JSON |
-//! | `chart` | pictures (feature `charts`) |
+//! | `chart` | pictures of plain data (feature `charts`) |
+//! | [`report`] | results as text, JSON and pictures |
 //! | `cli` | the program's commands (feature `cli`) |
 //!
 //! # Features
