@@ -75,7 +75,7 @@ pub struct PlanFlags {
     /// Method; left out, one that suits the scene
     #[arg(long, value_parser = methods())]
     pub method: Option<MethodId>,
-    /// Step of a fixed-step method [s], as 0.01 or 1/64
+    /// Step of a fixed-step method in seconds, as 0.01 or 1/64
     #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
     pub step: Option<f64>,
     /// Relative tolerance of an adaptive method [default: 1e-9]
@@ -84,16 +84,16 @@ pub struct PlanFlags {
     /// Absolute tolerance of an adaptive method [default: as --rtol]
     #[arg(long, value_name = "TOL", value_parser = number, allow_hyphen_values = true)]
     pub atol: Option<f64>,
-    /// Horizon [s] [default: the scene's]
+    /// Horizon in seconds [default: the scene's]
     #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
     pub until: Option<f64>,
-    /// Output interval [s] [default: the scene's]
+    /// Output interval in seconds [default: the scene's]
     #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
     pub every: Option<f64>,
     /// How motors' angles are kept [default: elimination, or projection with rattle]
     #[arg(long, value_name = "HOW", value_parser = stabilizations())]
     pub stabilize: Option<Stabilization>,
-    /// Time constant of Baumgarte's term [s] [default: five mean steps]
+    /// Time constant of Baumgarte's term in seconds [default: five mean steps]
     #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
     pub time_constant: Option<f64>,
 }
@@ -129,10 +129,10 @@ pub struct RunFlags {
     /// Stop with exit code 5 where the energy is off by more than this share of its scale
     #[arg(long, value_name = "SHARE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
     pub max_energy_drift: Option<f64>,
-    /// Stop with exit code 5 where a constraint is off by more [rad, rad/s]
+    /// Stop with exit code 5 where a constraint is off by more, in rad or rad/s
     #[arg(long, value_name = "SIZE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
     pub max_constraint_drift: Option<f64>,
-    /// Folder under which <scene>/<method>-<setting>/ is made
+    /// Folder under which `SCENE/METHOD-SETTING` is made
     #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
     pub out: PathBuf,
     /// Overwrite the run that is in the folder

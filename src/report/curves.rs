@@ -4,6 +4,8 @@ use crate::run::Sample;
 
 /// A turn of the fastest body between samples beyond which curves through them would mislead \[rad\].
 const COARSE: f64 = 2.0;
+/// Share of the motion that mean rates may miss; a swing sampled seven times a period misses that much.
+const MISSED: f64 = 0.07;
 /// Points of a curve between two samples, and from how many samples on it needs none.
 const FINE: usize = 6;
 const DENSE: usize = 1500;
@@ -13,8 +15,18 @@ pub(super) fn furthest(a: &Sample, b: &Sample) -> f64 {
     a.phi.iter().zip(&b.phi).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max)
 }
 
+/// True where curves through the samples would mislead: a body turns too far from one to the next, or its rates there do not tell how far.
 pub(super) fn is_coarse(samples: &[&Sample]) -> bool {
-    samples.windows(2).any(|pair| furthest(pair[0], pair[1]) > COARSE)
+    let (mut missed, mut told) = (0.0, 0.0);
+    for pair in samples.windows(2) {
+        let (a, b) = (pair[0], pair[1]);
+        for k in 0..a.phi.len() {
+            let half = 0.5 * (b.t - a.t);
+            missed += (b.phi[k] - a.phi[k] - half * (a.omega[k] + b.omega[k])).powi(2);
+            told += (half * (a.omega[k].abs() + b.omega[k].abs())).powi(2);
+        }
+    }
+    missed > MISSED * MISSED * told || samples.windows(2).any(|pair| furthest(pair[0], pair[1]) > COARSE)
 }
 
 pub(super) fn span(samples: &[&Sample]) -> f64 {
@@ -54,6 +66,17 @@ mod tests {
 
     fn sample(t: f64, phi: f64, omega: f64) -> Sample {
         Sample { t, phi: vec![phi], omega: vec![omega], ..Sample::default() }
+    }
+
+    #[test]
+    fn small_swings_sampled_too_seldom_are_coarse() {
+        let coarse = |per_period: f64| {
+            let time = |k: u32| f64::from(k) * std::f64::consts::TAU / per_period;
+            let samples: Vec<Sample> = (0..100).map(|k| sample(time(k), 0.2 * time(k).sin(), 0.2 * time(k).cos())).collect();
+            is_coarse(&samples.iter().collect::<Vec<_>>())
+        };
+        assert!(coarse(3.3) && coarse(5.0) && !coarse(10.0) && !coarse(100.0));
+        assert!(!is_coarse(&[&sample(0.0, 0.0, 0.0), &sample(1.0, 0.0, 0.0)]), "at rest");
     }
 
     #[test]

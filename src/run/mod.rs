@@ -1,6 +1,6 @@
 //! A run: the loop around a method, and what watches it.
 //!
-//! [`plan`] decides, [`march`] builds the marcher and goes from one output time to the next, [`sample`] reads off what there is to
+//! [`plan`] decides, [`mod@march`] builds the marcher and goes from one output time to the next, [`sample`] reads off what there is to
 //! know at each, [`drift`] and [`trace`] keep bounded records of it, [`table`] writes it down,
 //! [`files`] keeps whole files only.
 
