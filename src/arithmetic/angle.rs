@@ -3,6 +3,7 @@
 //! A winding angle loses its last digits as it grows, and with them the run its energy: the motor scene drifts 1900 times more without
 //! this.  2π is taken off as a double-double, so wrapping costs no accuracy in a (hi, lo) state and half an ulp in a plain one.
 
+use super::sum::nearest;
 use super::{DoubleDouble, Real, Scalar};
 
 /// Wraps one angle \[rad\] kept as `hi + lo`; returns the turns taken off.
@@ -25,7 +26,7 @@ fn wrap_far(hi: &mut f64, lo: &mut f64) -> i64 {
 #[inline]
 pub fn difference<T: Real>(a: T, b: T) -> T {
     let raw = a - b;
-    let turns = (raw.value() / std::f64::consts::TAU).round();
+    let turns = nearest(raw.value() / std::f64::consts::TAU);
     if turns == 0.0 { raw } else { raw - T::split(DoubleDouble::TAU.scale(turns)).0 }
 }
 

@@ -4,10 +4,11 @@
 //! bounds are those of M. Joldes, J.-M. Muller, V. Popescu, *Tight and rigorous error bounds for basic building blocks of double-word
 //! arithmetic*, ACM TOMS 44 (2017): sums to 3 u², products to 5 u², quotients to 10 u² with u = 2⁻⁵³.
 
-use super::sum::{fast_two_sum, two_product, two_sum};
+use super::sum::{fast_two_sum, nearest, two_product, two_sum};
 use super::{Real, Scalar};
 use std::cmp::Ordering;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+use std::sync::LazyLock;
 
 /// `hi + lo` with `|lo|` at most half a unit in the last place of `hi`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -23,8 +24,6 @@ impl DoubleDouble {
     pub const PI: Self = Self { hi: std::f64::consts::PI, lo: 1.224_646_799_147_353_2e-16 };
     /// 2π.
     pub const TAU: Self = Self { hi: std::f64::consts::TAU, lo: 2.449_293_598_294_706_4e-16 };
-    /// π/2.
-    pub const FRAC_PI_2: Self = Self { hi: std::f64::consts::FRAC_PI_2, lo: 6.123_233_995_736_766e-17 };
 
     /// The exact sum of two doubles.
     #[inline(always)]
@@ -53,7 +52,7 @@ impl DoubleDouble {
 
     /// The angle less whole turns, in [-π, π], and the turns taken off; exact to the last place of the pair for up to 2⁵³ turns.
     pub fn reduced(self) -> (Self, f64) {
-        let turns = (self.hi / Self::TAU.hi).round();
+        let turns = nearest(self.hi / Self::TAU.hi);
         if turns == 0.0 {
             return (self, 0.0);
         }
@@ -61,7 +60,7 @@ impl DoubleDouble {
     }
 
     /// sin and cos of an angle in [-π/4, π/4] by their Taylor series; the first term left out is below 1e-32.
-    fn sin_cos_small(self) -> (Self, Self) {
+    fn sin_cos_series(self) -> (Self, Self) {
         let square = self * self;
         let (mut sin, mut cos) = (Self::ZERO, Self::ZERO);
         // Horner from the highest power: 1/3!, 1/5!, … with alternating signs, and 1/4!, 1/6!, … likewise.
@@ -69,10 +68,41 @@ impl DoubleDouble {
             sin = pair[0] - square * sin;
             cos = pair[1] - square * cos;
         }
-        let half = square.ldexp(0.5);
-        (self - self * square * sin, Self::ONE - half + square * square * cos)
+        (self - self * square * sin, Self::ONE - square.ldexp(0.5) + square * square * cos)
+    }
+
+    /// The same for an angle in [-π/256, π/256]: powers from the seventh on weigh less than 1e-17 and are summed in plain doubles.
+    #[inline]
+    fn sin_cos_tiny(self) -> (Self, Self) {
+        let square = self * self;
+        let q = square.hi;
+        let [third, fourth, fifth, sixth, ..] = INVERSE_FACTORIAL;
+        let sin_rest = q * q * (1.0 / 5_040.0 - q * (1.0 / 362_880.0 - q / 39_916_800.0));
+        let cos_rest = q * (1.0 / 40_320.0 - q * (1.0 / 3_628_800.0 - q / 479_001_600.0));
+        let sin = third - square * fifth + sin_rest;
+        let cos = fourth - square * (sixth + -cos_rest);
+        (self - self * square * sin, Self::ONE - square.ldexp(0.5) + square * square * cos)
     }
 }
+
+/// Parts of the circle whose sine and cosine are tabulated.
+const PARTS: i64 = 256;
+
+/// sin and cos at the 256th parts of a turn, formed once by the series.
+static CIRCLE: LazyLock<Vec<(DoubleDouble, DoubleDouble)>> = LazyLock::new(|| {
+    let part = |k: i64| {
+        let quarter = (k + PARTS / 8) / (PARTS / 4);
+        let rest = DoubleDouble::TAU.ldexp(1.0 / PARTS as f64).scale((k - quarter * PARTS / 4) as f64);
+        let (sin, cos) = rest.sin_cos_series();
+        match quarter % 4 {
+            0 => (sin, cos),
+            1 => (cos, -sin),
+            2 => (-sin, -cos),
+            _ => (-cos, sin),
+        }
+    };
+    (0..PARTS).map(part).collect()
+});
 
 /// 1/k! for k = 3…28.
 const INVERSE_FACTORIAL: [DoubleDouble; 26] = [
@@ -226,16 +256,12 @@ impl Scalar for DoubleDouble {
     }
 
     fn sin_cos(self) -> (Self, Self) {
-        let (angle, _) = self.reduced();
-        let quarter = (angle.hi / Self::FRAC_PI_2.hi).round();
-        let (sin, cos) = (angle - Self::FRAC_PI_2 * Self::of(quarter)).sin_cos_small();
-        match quarter as i64 {
-            0 => (sin, cos),
-            1 => (cos, -sin),
-            -1 => (-cos, sin),
-            2 | -2 => (-sin, -cos),
-            _ => (Self::of(f64::NAN), Self::of(f64::NAN)),
-        }
+        let part = Self::TAU.ldexp(1.0 / PARTS as f64);
+        let k = nearest(self.hi / part.hi);
+        let (sin, cos) = (self - part * Self::of(k)).sin_cos_tiny();
+        // Not a number lands in the first entry and stays what it is.
+        let (sin_k, cos_k) = CIRCLE[(k as i64).rem_euclid(PARTS) as usize];
+        (sin_k * cos + cos_k * sin, cos_k * cos - sin_k * sin)
     }
 }
 

@@ -8,7 +8,6 @@
 //! whether the processor has the instruction.
 
 pub mod angle;
-pub mod circle;
 pub mod complex;
 pub mod double_double;
 pub mod sum;

@@ -28,6 +28,14 @@ pub fn two_product(a: f64, b: f64) -> (f64, f64) {
     (product, a.mul_add(b, -product))
 }
 
+/// The nearest whole number, ties to even; two additions where the size allows it, since the baseline processor has no instruction for it.
+#[inline(always)]
+pub fn nearest(value: f64) -> f64 {
+    /// 1.5 · 2⁵²: a sum near it has no bits for a fraction.
+    const WHOLE: f64 = 6_755_399_441_055_744.0;
+    if value.abs() < 1e15 { (value + WHOLE) - WHOLE } else { value.round_ties_even() }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -43,5 +51,13 @@ mod tests {
     fn the_error_of_a_product_is_what_rounding_dropped() {
         let a = 1.0 + f64::EPSILON;
         assert_eq!(two_product(a, a), (1.0 + 2.0 * f64::EPSILON, f64::EPSILON * f64::EPSILON));
+    }
+
+    #[test]
+    fn the_nearest_whole_number_is_found_at_every_size() {
+        for value in [0.0, 0.49, 0.51, -0.51, 1.5, 2.5, -1e14 - 0.4, 1e15 + 0.75, -3e300] {
+            assert_eq!(nearest(value), value.round_ties_even(), "{value}");
+        }
+        assert!(nearest(f64::NAN).is_nan() && nearest(f64::INFINITY).is_infinite());
     }
 }

@@ -21,7 +21,6 @@
 use super::law::Law;
 use super::row::Row;
 use super::{Form, Mechanism, Motion, State, Time, tree};
-use crate::arithmetic::circle::Circle;
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use std::sync::Arc;
 
@@ -116,7 +115,6 @@ pub struct Natural {
     /// W (n × n), Hermitian to the last bit \[1/(kg·m²)\].
     inverse: Vec<Complex<f64>>,
     drives: Vec<Drive>,
-    circle: Circle,
 }
 
 impl Natural {
@@ -145,7 +143,7 @@ impl Natural {
             }
         }
         let inverse = invert(&mechanism).map_err(|body| NaturalError::Singular(mechanism.bodies[body].name.clone()))?;
-        Ok(Self { mechanism, inverse, drives, circle: Circle::default() })
+        Ok(Self { mechanism, inverse, drives })
     }
 
     /// W row by row (n × n) \[1/(kg·m²)\]: the inverse of the mass matrix, formed in double-double and rounded once, Hermitian to the last
@@ -162,19 +160,8 @@ impl Natural {
     /// What a motor asks for at time `t`.
     #[inline]
     pub fn demand(&self, drive: &Drive, t: Time) -> Demand {
-        let law = &drive.law;
-        let mut angle = DoubleDouble::of(law.start) + t.scale(law.rate);
-        let mut rate = DoubleDouble::of(law.rate);
-        if law.acceleration != 0.0 {
-            angle += (t * t).scale(0.5 * law.acceleration);
-            rate += t.scale(law.acceleration);
-        }
-        for sine in &law.sines {
-            let swing = self.circle.unit(t.scale(sine.frequency) + sine.phase);
-            angle += swing.im.scale(sine.amplitude);
-            rate += swing.re.scale(sine.amplitude).scale(sine.frequency);
-        }
-        Demand { unit: self.circle.unit(angle), rate }
+        let phase = drive.law.at::<DoubleDouble>(t);
+        Demand { unit: phase.unit, rate: phase.rate }
     }
 
     /// Number of rows: one a body, then one a motor.

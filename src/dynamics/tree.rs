@@ -56,11 +56,8 @@ impl Tree {
     #[inline(always)]
     pub fn load<T: Scalar, const N: usize>(&self, z: &[Complex<T>], omega: &[T], twist: &[T], load: &mut [T]) {
         let n = size::<N>(self.bodies);
-        let (z, omega, twist, weight) = (&z[..n], &omega[..n], &twist[..n * n], &self.weight[..n]);
-        let load = &mut load[..n];
-        for i in 0..n {
-            load[i] = z[i].cross(Complex::of(weight[i]));
-        }
+        self.weigh::<T, N>(z, load);
+        let (omega, twist, load) = (&omega[..n], &twist[..n * n], &mut load[..n]);
         for i in 0..n {
             for j in i + 1..n {
                 load[i] += twist[i * n + j] * (omega[j] * omega[j]);
@@ -73,17 +70,24 @@ impl Tree {
     #[inline(always)]
     pub fn pull<T: Scalar, const N: usize>(&self, z: &[Complex<T>], omega: &[T], twist: &[T], force: &mut [T]) {
         let n = size::<N>(self.bodies);
-        let (z, omega, twist, weight) = (&z[..n], &omega[..n], &twist[..n * n], &self.weight[..n]);
-        let force = &mut force[..n];
-        for i in 0..n {
-            force[i] = z[i].cross(Complex::of(weight[i]));
-        }
+        self.weigh::<T, N>(z, force);
+        let (omega, twist, force) = (&omega[..n], &twist[..n * n], &mut force[..n]);
         for i in 0..n {
             for j in i + 1..n {
                 let swing = twist[i * n + j] * (omega[i] * omega[j]);
                 force[i] += swing;
                 force[j] -= swing;
             }
+        }
+    }
+
+    /// Writes the generalized forces of gravity \[N·m\].
+    #[inline(always)]
+    fn weigh<T: Scalar, const N: usize>(&self, z: &[Complex<T>], force: &mut [T]) {
+        let n = size::<N>(self.bodies);
+        let (z, weight, force) = (&z[..n], &self.weight[..n], &mut force[..n]);
+        for i in 0..n {
+            force[i] = z[i].cross(Complex::of(weight[i]));
         }
     }
 

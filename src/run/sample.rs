@@ -107,7 +107,11 @@ impl Sampler {
         for k in 0..mechanism.bodies.len() {
             (self.phi[k], self.omega[k]) = (motion.phi[k].hi, motion.omega[k].hi);
         }
-        self.plain.accelerate::<0>(mechanism, motion.time, &self.phi, &self.omega, Bias::default());
+        if mechanism.rows.is_empty() {
+            self.plain.face::<0>(&self.phi);
+        } else {
+            self.plain.accelerate::<0>(mechanism, motion.time, &self.phi, &self.omega, Bias::default());
+        }
         let sample = &mut self.sample;
         sample.t = motion.time.hi;
         sample.kinetic = kinetic.hi;
