@@ -1,6 +1,6 @@
 //! One motor scene, its start 1e-6 rad/s off, under four stabilizations: what each leaves of the constraint, and what it does to the energy.
 //!
-//! `cargo run --example stabilizations` writes `output/constraint_drift.png`.
+//! `cargo run --release --example stabilizations` marches 100 s (give another horizon as the first argument) and writes `output/constraint_drift.png`.
 
 use driftless::arithmetic::DoubleDouble;
 use driftless::chart::{ConstraintDrift, DefectPanel, DriftSeries, FILE_RESOLUTION, constraint_drift};
@@ -10,19 +10,21 @@ use driftless::scene::read_scene;
 use std::sync::Arc;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let until = std::env::args().nth(1).map_or(Ok(100.0), |until| until.parse::<f64>())?;
     let scene = read_scene("examples/scenes/motor_sine.json".as_ref(), &[])?;
     let mechanism = Arc::new(Mechanism::new(&scene)?);
     // From a consistent start even the plain run keeps so simple a row to rounding, and would prove nothing.
     let mut start = mechanism.start(&scene);
     start.omega[0] += DoubleDouble::from(1e-6);
     let mut outcomes = Vec::new();
-    println!("{:12} {:>10} {:>10} {:>14}", "", "|C| rad", "|C'| rad/s", "stabilizer J");
+    println!("{:12} {:>10} {:>10} {:>10} {:>14}", "", "|C| rad", "slope /s", "|C'| rad/s", "stabilizer J");
     for stabilize in Stabilization::ALL {
-        let request = Request { method: Some(MethodId::Dp8), stabilize: Some(stabilize), until: Some(100.0), ..Request::default() };
+        let request = Request { method: Some(MethodId::Dp8), stabilize: Some(stabilize), until: Some(until), ..Request::default() };
         let plan = Plan::new(&scene, &mechanism, &request)?;
         let outcome = march(Run::new(mechanism.clone(), plan, Limits::default(), &start)?, &mut |_| Ok(()))?;
         let [position, velocity] = &outcome.drift.constraints[0].1;
-        println!("{stabilize:12} {:10.1e} {:10.1e} {:14.1e}", position.max, velocity.max, outcome.drift.stabilizer);
+        let figures = [position.max, position.slope(), velocity.max];
+        println!("{stabilize:12} {:10.1e} {:10.1e} {:10.1e} {:14.1e}", figures[0], figures[1], figures[2], outcome.drift.stabilizer);
         outcomes.push(outcome);
     }
     let chart = ConstraintDrift {
