@@ -122,9 +122,16 @@ macro_rules! by_length {
     };
 }
 
+/// What the crate evaluates in every attempt at a step, and again in every accepted one; it does not count a rejection before the first acceptance.
+struct Effort {
+    attempt: u64,
+    accepted: u64,
+}
+
 /// One window of either method.
 fn window<F: Field + ?Sized>(
     name: &'static str,
+    effort: &Effort,
     integrate: impl FnOnce(Window<F>, &[f64], f64, f64) -> Outcome,
     field: &mut F,
     state: &mut State,
@@ -155,7 +162,9 @@ fn window<F: Field + ?Sized>(
         Ok(stats) => {
             tally.steps += u64::from(stats.accepted_steps);
             tally.evaluations += u64::from(stats.num_eval);
-            tally.rejected += u64::from(stats.rejected_steps);
+            let begun = if first == 0.0 { 3 } else { 1 };
+            let attempts = (u64::from(stats.num_eval) - begun - effort.accepted * u64::from(stats.accepted_steps)) / effort.attempt;
+            tally.rejected += attempts - u64::from(stats.accepted_steps);
         }
         Err(IntegrationError::MaxNumStepReached { x, n_step }) => {
             let what = format!("more than {n_step} steps before t = {} s", until.hi);
@@ -170,11 +179,15 @@ fn window<F: Field + ?Sized>(
         let what = format!("{} is not finite", field.label(i));
         return Err(stop(Cause::NotFinite, state.time.hi, span, what, "tighten the tolerance"));
     }
-    // The longest step but the last, which was cut to fit, is the one to begin the next window with.
-    let steps = times.windows(2).map(|pair| pair[1] - pair[0]);
-    let longest = if times.len() > 2 { steps.take(times.len() - 2).fold(0.0, f64::max) } else { span.max(first) };
+    let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let next = match steps[..] {
+        // One step was enough, or would have been: the second, cut to fit, was still the longer.
+        [_] => span.max(first),
+        [one, two] if two > one => span,
+        _ => steps.iter().copied().fold(0.0, f64::max),
+    };
     state.memory.resize(1, 0.0);
-    state.memory[0] = longest;
+    state.memory[0] = next;
     state.y.copy_from_slice(&last[..n]);
     state.low.fill(0.0);
     state.time = until;
@@ -205,7 +218,7 @@ impl<F: Field + ?Sized> Method<F> for Dopri5 {
             let settings = (tolerance, (0.04, 0.2, 10.0), first, max_steps);
             by_length!(ode_solvers::Dopri5<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
         };
-        window("dopri5", integrate, field, state, until, tally, watch)
+        window("dopri5", &Effort { attempt: 6, accepted: 0 }, integrate, field, state, until, tally, watch)
     }
 }
 
@@ -231,6 +244,6 @@ impl<F: Field + ?Sized> Method<F> for Dop853 {
             let settings = (tolerance, (0.0, 1.0 / 3.0, 6.0), first, max_steps);
             by_length!(ode_solvers::Dop853<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
         };
-        window("dop853", integrate, field, state, until, tally, watch)
+        window("dop853", &Effort { attempt: 11, accepted: 1 }, integrate, field, state, until, tally, watch)
     }
 }
