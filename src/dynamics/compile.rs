@@ -24,10 +24,12 @@ pub struct Mechanism {
     pub tree: Tree,
     /// Springs and dampers.
     pub springs: Vec<Spring>,
-    /// Constraint rows: one per motor.
+    /// Constraint rows: one per motor, then one per contact that is held.
     pub rows: Vec<Row>,
     /// Walls.
     pub contacts: Vec<Contact>,
+    /// The contacts held, by number, in the order of their rows; none as compiled: see [`Mechanism::holding`].
+    pub held: Vec<usize>,
     /// The driven angles solved for: coordinates left when the rows are eliminated.
     pub ties: Ties,
     /// Gravity \[m/s²\].
@@ -165,6 +167,7 @@ impl Mechanism {
             springs,
             rows,
             contacts,
+            held: Vec::new(),
             ties: Ties::new(scene)?,
             gravity,
             energy_scale: 1.0,

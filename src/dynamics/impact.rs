@@ -30,6 +30,8 @@ pub struct Impact {
     pub approach: f64,
     /// Impulse on the point along the wall's normal \[N·s\].
     pub impulse: f64,
+    /// Impulses of the rows \[N·m·s or N·s\]: of a contact that is held, positive where it would have to pull.
+    pub row_impulses: Vec<f64>,
     /// Energy after less energy before \[J\].
     pub energy_change: f64,
     /// Impulsive work of the motors, which hold their rates \[J\].
@@ -50,7 +52,8 @@ impl Mechanism {
         row.jacobian(&kernel.z, &mut jacobian);
         let approach = dot(&jacobian, omega);
         if approach >= 0.0 {
-            return Some(Impact { omega: omega.to_vec(), approach, impulse: 0.0, energy_change: 0.0, motor_work: 0.0 });
+            let row_impulses = vec![0.0; self.rows.len()];
+            return Some(Impact { omega: omega.to_vec(), approach, impulse: 0.0, row_impulses, energy_change: 0.0, motor_work: 0.0 });
         }
         let mut momentum = vec![0.0; n];
         tree::multiply::<f64, 0>(n, &kernel.mass, omega, &mut momentum);
@@ -91,6 +94,7 @@ impl Mechanism {
         Some(Impact {
             approach,
             impulse: -solution[n],
+            row_impulses: solution.iter().skip(n + 1).copied().collect(),
             energy_change: 0.5 * (dot(&momentum_after, &after) - dot(&momentum, omega)),
             motor_work,
             omega: after,

@@ -29,6 +29,7 @@
 
 pub mod canonical;
 pub mod compile;
+pub mod contact;
 pub mod elimination;
 pub mod energy;
 pub mod force;
@@ -112,7 +113,7 @@ pub trait Field {
         0
     }
 
-    /// Writes the event functions \[m\] at (t, y): an event is a passage from positive to negative.
+    /// Writes the event functions (gaps \[m\], or forces over the energy scale \[1/m\]) at (t, y): an event is a passage from positive to negative.
     fn gaps(&mut self, _t: Time, _y: &[f64], _gaps: &mut [f64]) {}
 }
 

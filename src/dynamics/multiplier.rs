@@ -4,6 +4,7 @@
 //! the stabilizer puts in \[J\].  With `ACCOUNT = false` neither rows nor accounts exist in the code.
 
 use super::kernel::{Bias, Kernel, dot};
+use super::row::Row;
 use super::tree::size;
 use super::{Field, Form, Mechanism, Motion, State, Time};
 use crate::arithmetic::DoubleDouble;
@@ -46,7 +47,11 @@ impl<const N: usize, const ACCOUNT: bool> Multiplier<N, ACCOUNT> {
     fn powers(&self, omega: &[f64]) -> (f64, f64) {
         let n = omega.len();
         let (mut work, mut stabilizer) = (0.0, 0.0);
-        for r in 0..self.mechanism.rows.len() {
+        for (r, row) in self.mechanism.rows.iter().enumerate() {
+            // A wall stands still and does no work.
+            if let Row::Line(_) = row {
+                continue;
+            }
             let speed = dot(&self.kernel.jacobian[r * n..(r + 1) * n], omega);
             work -= (self.kernel.multiplier[r] - self.kernel.correction[r]) * speed;
             stabilizer -= self.kernel.correction[r] * speed;
@@ -86,10 +91,19 @@ impl<const N: usize, const ACCOUNT: bool> Field for Multiplier<N, ACCOUNT> {
         self.mechanism.contacts.len()
     }
 
-    fn gaps(&mut self, _t: Time, y: &[f64], gaps: &mut [f64]) {
-        self.kernel.face::<N>(&y[..size::<N>(self.mechanism.bodies.len())]);
-        for (gap, contact) in gaps.iter_mut().zip(&self.mechanism.contacts) {
+    fn gaps(&mut self, t: Time, y: &[f64], gaps: &mut [f64]) {
+        let mechanism = &*self.mechanism;
+        let n = size::<N>(mechanism.bodies.len());
+        self.kernel.face::<N>(&y[..n]);
+        for (gap, contact) in gaps.iter_mut().zip(&mechanism.contacts) {
             *gap = contact.row.gap(&self.kernel.z);
+        }
+        if !mechanism.held.is_empty() {
+            self.kernel.accelerate::<N>(mechanism, t, &y[..n], &y[n..2 * n], Bias::default());
+        }
+        // What is held ends where the wall would have to pull.
+        for (&contact, multiplier) in mechanism.held.iter().zip(&self.kernel.multiplier[mechanism.motor_rows()..]) {
+            gaps[contact] = -multiplier / mechanism.energy_scale;
         }
     }
 }

@@ -28,6 +28,8 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value 
     let stabilizer = (!mechanism.rows.is_empty()).then(|| json!({"energy_j": drift.stabilizer, "max_j": drift.stabilizer_max}));
     let impacts = (!mechanism.contacts.is_empty())
         .then(|| json!({"count": outcome.strike_count, "energy_lost_j": outcome.strike_loss, "first": outcome.strikes}));
+    let holds = (!mechanism.contacts.is_empty())
+        .then(|| json!({"count": outcome.hold_count, "time_s": outcome.hold_time, "first": outcome.holds}));
     let (trend, trend_error) = drift.energy.trend();
     json!({
         "scene": scene.name,
@@ -51,6 +53,7 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value 
         "constraints": constraints,
         "stabilizer": stabilizer,
         "impacts": impacts,
+        "holds": holds,
         "trust": {"error_estimate": null, "horizon_s": null, "how": "none"},
         "notes": plan.notes,
         "stop": outcome.stop,
@@ -153,6 +156,11 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
     }
     if !mechanism.contacts.is_empty() {
         page.entry("impacts", &format!("{}, {} J lost in them", outcome.strike_count, figure(outcome.strike_loss)));
+        if outcome.hold_count > 0 {
+            let still = outcome.holds.iter().filter(|hold| hold.until.is_none()).map(|hold| hold.wall.as_str()).collect::<Vec<_>>();
+            let still = if still.is_empty() { String::new() } else { format!(", to the end on {}", still.join(", ")) };
+            page.entry("stays on walls", &format!("{}, {} s in all{still}", outcome.hold_count, figure(outcome.hold_time)));
+        }
     }
     page.entry("trust", "no estimate of the solution's error yet");
     page.into_text()

@@ -1,11 +1,11 @@
-//! The loop: from output time to output time, through impacts, with limits watched.
+//! The loop: from output time to output time, with limits watched; [`contact`](super::contact) takes it through impacts.
 
+use super::contact::{Course, Hold, Strike};
 use super::drift::{Drift, Limits};
 use super::methods::{MethodId, Stabilization};
 use super::plan::{Plan, Refusal, Request};
-use super::sample::{Sample, Sampler};
+use super::sample::Sample;
 use super::trace::Trace;
-use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::elimination::Elimination;
 use crate::dynamics::multiplier::Multiplier;
@@ -24,12 +24,16 @@ pub trait Problem: Field + Form {}
 impl<P: Field + Form> Problem for P {}
 
 /// A problem, its method and its state.
-trait March {
+pub(super) trait March {
     fn advance(&mut self, until: Time) -> Result<Reached, StepError>;
     fn read(&mut self, motion: &mut Motion);
     /// Goes on from another motion, with what the method remembers.
     fn jump(&mut self, motion: &Motion);
     fn tally(&self) -> Tally;
+    /// What the method carries from step to step.
+    fn memory(&self) -> &[f64];
+    /// Goes on counting, and with the steps, where another left off.
+    fn follow(&mut self, other: &dyn March);
 }
 
 struct Marcher<P: ?Sized, M> {
@@ -56,6 +60,15 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
 
     fn tally(&self) -> Tally {
         self.tally
+    }
+
+    fn memory(&self) -> &[f64] {
+        &self.state.memory
+    }
+
+    fn follow(&mut self, other: &dyn March) {
+        self.tally = other.tally();
+        self.state.memory = other.memory().to_vec();
     }
 }
 
@@ -107,7 +120,7 @@ macro_rules! sized {
 }
 
 /// Builds what a plan asks for; Baumgarte's time constant is measured first where none was given.
-fn build(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<Box<dyn March>, StepError> {
+pub(super) fn build(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<Box<dyn March>, StepError> {
     let n = mechanism.bodies.len();
     let tolerance = plan.tolerance.unwrap_or_default();
     let step = plan.step.unwrap_or(0.0);
@@ -149,8 +162,11 @@ fn pilot(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion) -> Result<f64,
     let mut marcher = build(mechanism, &mut plain, start)?;
     let rows = plan.rows.min(20);
     for row in 1..=rows {
-        if let Reached::Event(_) = marcher.advance(plan.time(row))? {
-            break;
+        match marcher.advance(plan.time(row)) {
+            Ok(Reached::Until) => {}
+            Ok(Reached::Event(_)) => break,
+            Err(stop) if stop.cause == Cause::RestingContact => break,
+            Err(stop) => return Err(stop),
         }
     }
     let mut motion = Motion::default();
@@ -165,26 +181,6 @@ pub struct Run {
     limits: Limits,
     marcher: Box<dyn March>,
 }
-
-/// One impact of a run.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct Strike {
-    /// Time \[s\].
-    pub t: f64,
-    /// Name of the wall.
-    pub wall: String,
-    /// Impulse on the point along the wall's normal \[N·s\].
-    pub impulse: f64,
-    /// Normal velocity before it \[m/s\].
-    pub approach: f64,
-    /// Energy lost \[J\].
-    pub energy_lost: f64,
-}
-
-/// Impacts kept by name; the rest are counted.
-const STRIKES_KEPT: usize = 1000;
-/// Impacts between two output times beyond which a point counts as resting.
-const STRIKES_MOST: usize = 10_000;
 
 /// How a run ended.
 #[derive(Clone, Debug)]
@@ -203,8 +199,14 @@ pub struct Outcome {
     pub strikes: Vec<Strike>,
     /// Number of impacts.
     pub strike_count: u64,
-    /// Energy lost in them \[J\].
+    /// Energy lost in them and where points came to rest \[J\].
     pub strike_loss: f64,
+    /// The first times a point stayed on its wall.
+    pub holds: Vec<Hold>,
+    /// Number of such times.
+    pub hold_count: u64,
+    /// Time spent so, summed over the points \[s\].
+    pub hold_time: f64,
     /// Time spent between the first output time and the last.
     pub wall: Duration,
     /// Why it ended before its horizon.
@@ -262,8 +264,7 @@ pub fn simulate(scene: &Scene, request: &Request, observer: &mut dyn FnMut(&Samp
 /// # Errors
 /// What the observer failed with.
 pub fn march(run: Run, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>) -> Result<Outcome, RunError> {
-    let Run { mechanism, plan, limits, mut marcher } = run;
-    let mut sampler = Sampler::new(Arc::clone(&mechanism));
+    let Run { mechanism, plan, limits, marcher } = run;
     let mut outcome = Outcome {
         last: Sample::default(),
         tally: Tally::default(),
@@ -272,18 +273,24 @@ pub fn march(run: Run, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>)
         strikes: Vec::new(),
         strike_count: 0,
         strike_loss: 0.0,
+        holds: Vec::new(),
+        hold_count: 0,
+        hold_time: 0.0,
         wall: Duration::ZERO,
         stop: None,
         plan,
     };
-    let mut motion = Motion::default();
+    let mut course = Course::new(mechanism, marcher);
     // The reference of the energy is what impacts at the start leave.
-    let mut resting = strike_touching(&mechanism, &mut *marcher, None, &mut sampler, &mut outcome).err();
+    let mut resting = course.meet(&mut outcome).err();
     let begin = Instant::now();
     for row in 0..=outcome.plan.rows {
-        let stopped = resting.take().map_or_else(|| go(&mechanism, &mut *marcher, row, &mut sampler, &mut outcome), Err);
-        marcher.read(&mut motion);
-        let sample = sampler.take(&motion);
+        let stopped = match resting.take() {
+            Some(stop) => Err(stop),
+            None if row == 0 => Ok(()),
+            None => course.go(outcome.plan.time(row), &mut outcome),
+        };
+        let sample = course.sample();
         // A stop before any progress leaves the state of the row before.
         if row == 0 || sample.t > outcome.last.t {
             observer(sample)?;
@@ -299,93 +306,10 @@ pub fn march(run: Run, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>)
             break;
         }
     }
+    course.end(outcome.last.t, &mut outcome);
     outcome.wall = begin.elapsed();
-    outcome.tally = marcher.tally();
+    outcome.tally = course.tally();
     Ok(outcome)
-}
-
-/// Advances to an output row, through impacts.
-fn go(mechanism: &Mechanism, marcher: &mut dyn March, row: u64, sampler: &mut Sampler, outcome: &mut Outcome) -> Result<(), StepError> {
-    if row == 0 {
-        return Ok(());
-    }
-    let until = outcome.plan.time(row);
-    for _ in 0..STRIKES_MOST {
-        match marcher.advance(until)? {
-            Reached::Until => return Ok(()),
-            Reached::Event(contact) => {
-                strike(mechanism, marcher, contact, sampler, outcome)?;
-                strike_touching(mechanism, marcher, Some(contact), sampler, outcome)?;
-            }
-        }
-    }
-    let mut motion = Motion::default();
-    marcher.read(&mut motion);
-    Err(resting(&outcome.plan, motion.time.hi, format!("more than {STRIKES_MOST} impacts before the next output time")))
-}
-
-/// Lets the impact at a wall take effect.
-fn strike(
-    mechanism: &Mechanism,
-    marcher: &mut dyn March,
-    contact: usize,
-    sampler: &mut Sampler,
-    outcome: &mut Outcome,
-) -> Result<(), StepError> {
-    let mut motion = Motion::default();
-    marcher.read(&mut motion);
-    let before = sampler.balance(&motion);
-    let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
-    let omega: Vec<f64> = motion.omega.iter().map(|omega| omega.hi).collect();
-    let wall = &mechanism.contacts[contact].row.name;
-    let Some(impact) = mechanism.strike(contact, motion.time, &phi, &omega) else {
-        return Err(resting(&outcome.plan, motion.time.hi, format!("the motors drive a point into wall {wall}")));
-    };
-    motion.omega = impact.omega.iter().map(|&omega| DoubleDouble::from(omega)).collect();
-    motion.work = motion.work + impact.motor_work;
-    marcher.jump(&motion);
-    let change = sampler.balance(&motion) - before;
-    sampler.shift(change);
-    outcome.strike_count += 1;
-    outcome.strike_loss -= change.hi;
-    if outcome.strikes.len() < STRIKES_KEPT {
-        outcome.strikes.push(Strike {
-            t: motion.time.hi,
-            wall: wall.clone(),
-            impulse: impact.impulse,
-            approach: impact.approach,
-            energy_lost: -change.hi,
-        });
-    }
-    Ok(())
-}
-
-/// Lets the impacts of all points take effect that touch a wall and move into it: others than the one just struck, or, as a scene may begin
-/// with a point on its wall, any of them.
-fn strike_touching(
-    mechanism: &Mechanism,
-    marcher: &mut dyn March,
-    struck: Option<usize>,
-    sampler: &mut Sampler,
-    outcome: &mut Outcome,
-) -> Result<(), StepError> {
-    for contact in (0..mechanism.contacts.len()).filter(|&contact| Some(contact) != struck) {
-        let mut motion = Motion::default();
-        marcher.read(&mut motion);
-        let row = &mechanism.contacts[contact].row;
-        let z: Vec<_> = motion.phi.iter().map(|phi| Complex::unit(phi.hi)).collect();
-        let omega: Vec<f64> = motion.omega.iter().map(|omega| omega.hi).collect();
-        let approach = row.normal.dot(row.point.velocity(&z, &omega));
-        if row.gap(&z) <= 1e-12 && approach < 0.0 {
-            strike(mechanism, marcher, contact, sampler, outcome)?;
-        }
-    }
-    Ok(())
-}
-
-fn resting(plan: &Plan, t: f64, what: String) -> StepError {
-    let hint = "sustained contact is not modelled: raise the restitution or end the run before".into();
-    StepError { cause: Cause::RestingContact, method: plan.method.to_string(), t, step: 0.0, what, hint }
 }
 
 fn not_finite(plan: &Plan, t: f64) -> StepError {

@@ -1,9 +1,11 @@
 //! A run: the loop around a method, and what watches it.
 //!
-//! [`plan`] decides, [`mod@march`] builds the marcher and goes from one output time to the next, [`sample`] reads off what there is to
+//! [`plan`] decides, [`mod@march`] builds the marcher and goes from one output time to the next, [`contact`] through impacts and contacts that
+//! last, [`sample`] reads off what there is to
 //! know at each, [`drift`] and [`trace`] keep bounded records of it, [`table`] writes it down,
 //! [`files`] keeps whole files only.
 
+pub mod contact;
 pub mod drift;
 #[cfg(feature = "files")]
 pub mod files;
@@ -15,6 +17,7 @@ pub mod sample;
 pub mod table;
 pub mod trace;
 
+pub use contact::{Hold, Strike};
 pub use drift::{Drift, Limits};
 #[cfg(feature = "files")]
 pub use files::{FileError, Folder, Stream};

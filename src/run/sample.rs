@@ -52,6 +52,8 @@ impl Sample {
 #[derive(Clone, Debug)]
 pub struct Sampler {
     mechanism: Arc<Mechanism>,
+    /// The mechanism with the contacts held at the moment: forces are those of its rows.
+    holding: Arc<Mechanism>,
     plain: Kernel<f64>,
     exact: Kernel<DoubleDouble>,
     jacobian: Vec<DoubleDouble>,
@@ -82,8 +84,15 @@ impl Sampler {
                 motors: vec![[0.0; 2]; rows],
                 ..Sample::default()
             },
+            holding: Arc::clone(&mechanism),
             mechanism,
         }
+    }
+
+    /// From here on the forces are those of `mechanism`, the sampler's own one with other contacts held.
+    pub fn hold(&mut self, mechanism: Arc<Mechanism>) {
+        self.plain = Kernel::new(mechanism.bodies.len(), mechanism.rows.len());
+        self.holding = mechanism;
     }
 
     /// Shifts the reference by the energy an impact changed \[J\].
@@ -107,10 +116,10 @@ impl Sampler {
         for k in 0..mechanism.bodies.len() {
             (self.phi[k], self.omega[k]) = (motion.phi[k].hi, motion.omega[k].hi);
         }
-        if mechanism.rows.is_empty() {
+        if self.holding.rows.is_empty() {
             self.plain.face::<0>(&self.phi);
         } else {
-            self.plain.accelerate::<0>(mechanism, motion.time, &self.phi, &self.omega, Bias::default());
+            self.plain.accelerate::<0>(&self.holding, motion.time, &self.phi, &self.omega, Bias::default());
         }
         let sample = &mut self.sample;
         sample.t = motion.time.hi;

@@ -19,7 +19,8 @@ use crate::stepping::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
 pub struct Projected<M> {
     inner: M,
     kernel: Option<Kernel<f64>>,
-    /// Largest violation left that counts as converged, at both levels \[rad, rad/s or m, m/s\], relative to the drive where that is larger.
+    /// Largest violation left that counts as converged, at both levels \[rad, rad/s or m, m/s\], relative to levers and
+    /// speeds where these are larger.
     pub tolerance: f64,
 }
 
@@ -95,18 +96,24 @@ pub fn project(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &mut Stat
         shift(kernel, state, 0, n);
         moved = true;
     }
-    check(mechanism, kernel, tolerance, |kernel, r| (kernel.rows[r].position, 1.0))?;
+    let lever = |kernel: &Kernel<f64>, r: usize| kernel.jacobian[r * n..(r + 1) * n].iter().fold(1.0, |sum: f64, g| sum.max(g.abs()));
+    check(mechanism, kernel, tolerance, |kernel, r| (kernel.rows[r].position, lever(kernel, r)))?;
     let rate = |kernel: &Kernel<f64>, state: &State, r: usize| kernel.row_rate(r, &state.y[n..2 * n]);
+    // A row's rate is a sum of G_k w_k, and no smaller than their rounding.
+    let pace = |kernel: &Kernel<f64>, state: &State, r: usize| {
+        let terms = kernel.jacobian[r * n..(r + 1) * n].iter().zip(&state.y[n..2 * n]);
+        terms.fold(kernel.rows[r].drive.abs().max(1.0), |most, (g, w)| most.max((g * w).abs()))
+    };
     let mut fast = 0.0;
     for r in 0..rows {
         kernel.multiplier[r] = rate(kernel, state, r);
-        fast = largest(fast, kernel.multiplier[r].abs() / kernel.rows[r].drive.abs().max(1.0));
+        fast = largest(fast, kernel.multiplier[r].abs() / pace(kernel, state, r));
     }
     if fast > 2.0 * f64::EPSILON || fast.is_nan() {
         tree::solve::<f64, 0>(rows, &kernel.schur, &kernel.schur_pivot, &mut kernel.multiplier);
         shift(kernel, state, n, n);
         moved = true;
-        check(mechanism, kernel, tolerance, |kernel, r| (rate(kernel, state, r), kernel.rows[r].drive.abs().max(1.0)))?;
+        check(mechanism, kernel, tolerance, |kernel, r| (rate(kernel, state, r), pace(kernel, state, r)))?;
     }
     if moved {
         state.wrap();

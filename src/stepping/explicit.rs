@@ -377,7 +377,7 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
                     }
                     Found::Inside => {
                         let what = "a point has come to rest on a wall".into();
-                        let hint = "sustained contact is not modelled: raise the restitution or end the run before";
+                        let hint = "go on with the contact held (`Mechanism::holding`), or raise the restitution";
                         return Err(Self::stop(Cause::RestingContact, state, h, what, hint));
                     }
                 }

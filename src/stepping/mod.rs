@@ -92,7 +92,7 @@ pub enum Cause {
     NotConverged,
     /// The projection onto the constraints did not converge.
     ProjectionFailed,
-    /// A point came to rest on a wall, or the motors hold it there.
+    /// A point came to rest on a wall, and it could not be held there or the motors leave it no freedom.
     RestingContact,
     /// The method does not fit the mechanism.
     Unsuited,

@@ -1,0 +1,314 @@
+//! A run at its walls: impacts, points that come to rest there and stay, and their release.
+//!
+//! A point stays where its wall presses it and it does not move along the normal, or would rebound to less than
+//! [`REST_HEIGHT`](crate::dynamics::contact::REST_HEIGHT): bounces that accumulate end so.  What is left of its normal velocity is taken off it and
+//! booked as lost in impacts.  From then on the wall is a row kept by projection, until its force would have to pull.
+
+use super::march::{March, Outcome, build};
+use super::methods::Stabilization;
+use super::plan::Plan;
+use super::sample::{Sample, Sampler};
+use crate::arithmetic::{Complex, DoubleDouble};
+use crate::dynamics::kernel::Kernel;
+use crate::dynamics::multiplier::Multiplier;
+use crate::dynamics::{Form, Mechanism, Motion, Time};
+use crate::stabilization::projection::project;
+use crate::stepping::{Cause, Reached, StepError, Tally};
+use std::sync::Arc;
+
+/// One impact of a run.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Strike {
+    /// Time \[s\].
+    pub t: f64,
+    /// Name of the wall.
+    pub wall: String,
+    /// Impulse on the point along the wall's normal \[N·s\].
+    pub impulse: f64,
+    /// Normal velocity before it \[m/s\].
+    pub approach: f64,
+    /// Energy lost \[J\].
+    pub energy_lost: f64,
+}
+
+/// A time a point stayed on its wall.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Hold {
+    /// Beginning \[s\].
+    pub t: f64,
+    /// Name of the wall.
+    pub wall: String,
+    /// End \[s\]; `None`: held to the end of the run.
+    pub until: Option<f64>,
+}
+
+/// Impacts, and holds, kept by name; the rest are counted.
+const KEPT: usize = 1000;
+/// Impacts and releases between two output times beyond which a run goes nowhere.
+const EVENTS_MOST: usize = 10_000;
+/// Holds between two output times beyond which a point chatters.
+const HOLDS_MOST: usize = 1000;
+/// Rounds of impacts at one moment after which what is left of the approach is left to the holds.
+const ROUNDS: usize = 100;
+/// A gap that counts as touching \[m\], with what the search for impacts leaves of it.
+const TOUCH: f64 = 2e-12;
+
+/// A contact that is held.
+struct Held {
+    contact: usize,
+    since: f64,
+    /// Where it stands among the holds kept by name.
+    kept: Option<usize>,
+}
+
+/// A marcher on its way through impacts and holds.
+pub(super) struct Course {
+    /// The mechanism without holds.
+    free: Arc<Mechanism>,
+    /// The mechanism with the contacts held at the moment.
+    mechanism: Arc<Mechanism>,
+    marcher: Box<dyn March>,
+    sampler: Sampler,
+    held: Vec<Held>,
+    holds_in_row: usize,
+    /// Energy stabilizers put in before the present marcher \[J\].
+    stabilizer: f64,
+}
+
+impl Course {
+    /// A run's beginning: whatever touches and moves into its wall is struck, and what is pressed is held.
+    pub(super) fn new(mechanism: Arc<Mechanism>, marcher: Box<dyn March>) -> Self {
+        Self {
+            sampler: Sampler::new(Arc::clone(&mechanism)),
+            free: Arc::clone(&mechanism),
+            mechanism,
+            marcher,
+            held: Vec::new(),
+            holds_in_row: 0,
+            stabilizer: 0.0,
+        }
+    }
+
+    /// The sample of the present moment.
+    pub(super) fn sample(&mut self) -> &Sample {
+        let mut motion = self.motion();
+        motion.stabilizer += self.stabilizer;
+        self.sampler.take(&motion)
+    }
+
+    /// Counts of all marchers so far.
+    pub(super) fn tally(&self) -> Tally {
+        self.marcher.tally()
+    }
+
+    /// Advances to an output time, through impacts and holds.
+    pub(super) fn go(&mut self, until: Time, outcome: &mut Outcome) -> Result<(), StepError> {
+        self.holds_in_row = 0;
+        for _ in 0..EVENTS_MOST {
+            match self.marcher.advance(until) {
+                Ok(Reached::Until) => return Ok(()),
+                Ok(Reached::Event(contact)) if self.mechanism.held.contains(&contact) => self.settle(Some(contact), outcome)?,
+                Ok(Reached::Event(contact)) => {
+                    self.strike(contact, outcome)?;
+                    self.meet(outcome)?;
+                }
+                Err(stop) if stop.cause == Cause::RestingContact => {
+                    let before = (outcome.strike_count, self.mechanism.held.clone());
+                    self.meet(outcome)?;
+                    if before == (outcome.strike_count, self.mechanism.held.clone()) {
+                        return Err(stop);
+                    }
+                }
+                Err(stop) => return Err(stop),
+            }
+        }
+        let what = format!("more than {EVENTS_MOST} impacts and releases before the next output time");
+        Err(self.stopped(&outcome.plan, what, "shorten the output interval, or lower the restitution"))
+    }
+
+    /// Strikes every point that touches a wall and moves into it, then holds those that stay.
+    pub(super) fn meet(&mut self, outcome: &mut Outcome) -> Result<(), StepError> {
+        for _ in 0..ROUNDS {
+            let mut quiet = true;
+            for contact in 0..self.free.contacts.len() {
+                let motion = self.motion();
+                let row = &self.free.contacts[contact].row;
+                let (z, _, omega) = posture(&motion);
+                let fastest = row.point.terms.iter().fold(0.0, |most: f64, &(k, gamma)| most.max(gamma.norm_squared().sqrt() * omega[k].abs()));
+                let approach = row.normal.dot(row.point.velocity(&z, &omega));
+                let held = self.mechanism.held.contains(&contact);
+                // Rounding leaves this much of a velocity that an impact took off.
+                if !held && row.gap(&z) <= TOUCH && approach < -1e-13 * fastest {
+                    self.strike(contact, outcome)?;
+                    quiet = false;
+                }
+            }
+            if quiet {
+                break;
+            }
+        }
+        self.settle(None, outcome)
+    }
+
+    /// Lets the impact at a wall take effect; points that the others would have to pull are let go.
+    fn strike(&mut self, contact: usize, outcome: &mut Outcome) -> Result<(), StepError> {
+        let mut motion = self.motion();
+        let before = self.sampler.balance(&motion);
+        let (_, phi, omega) = posture(&motion);
+        let impact = loop {
+            let Some(impact) = self.mechanism.strike(contact, motion.time, &phi, &omega) else {
+                let what = format!("the motors drive a point into wall {}", self.name(contact));
+                return Err(self.stopped(&outcome.plan, what, "change the motors' laws, or end the run before"));
+            };
+            let pulled = (self.mechanism.held.iter().zip(&impact.row_impulses[self.mechanism.motor_rows()..]))
+                .filter(|(_, pull)| **pull > 1e-12 * impact.impulse)
+                .max_by(|a, b| a.1.total_cmp(b.1));
+            match pulled.map(|(&held, _)| held) {
+                Some(pulled) => {
+                    let rest = self.mechanism.held.iter().copied().filter(|&held| held != pulled).collect();
+                    self.switch(rest, outcome)?;
+                }
+                None => break impact,
+            }
+        };
+        motion = self.motion();
+        motion.omega = impact.omega.iter().map(|&omega| DoubleDouble::from(omega)).collect();
+        motion.work = motion.work + impact.motor_work;
+        self.marcher.jump(&motion);
+        let change = self.sampler.balance(&motion) - before;
+        self.sampler.shift(change);
+        outcome.strike_count += 1;
+        outcome.strike_loss -= change.hi;
+        if outcome.strikes.len() < KEPT {
+            outcome.strikes.push(Strike {
+                t: motion.time.hi,
+                wall: self.name(contact).into(),
+                impulse: impact.impulse,
+                approach: impact.approach,
+                energy_lost: -change.hi,
+            });
+        }
+        Ok(())
+    }
+
+    /// Holds the points that touch and stay, and lets the others go; `released` goes in any case.
+    fn settle(&mut self, released: Option<usize>, outcome: &mut Outcome) -> Result<(), StepError> {
+        let motion = self.motion();
+        let (z, phi, omega) = posture(&motion);
+        let touching: Vec<usize> = (0..self.free.contacts.len())
+            .filter(|&contact| Some(contact) != released && self.free.contacts[contact].row.gap(&z) <= TOUCH)
+            .collect();
+        if touching.is_empty() && self.mechanism.held.is_empty() {
+            return Ok(());
+        }
+        let Some(staying) = self.free.staying(&touching, motion.time, &phi, &omega) else {
+            let what = format!("a point rests on wall {} and the motors leave it no freedom", self.names(&touching));
+            return Err(self.stopped(&outcome.plan, what, "change the motors' laws, or end the run before"));
+        };
+        if staying == self.mechanism.held { Ok(()) } else { self.switch(staying, outcome) }
+    }
+
+    /// Goes on with these contacts held.
+    fn switch(&mut self, contacts: Vec<usize>, outcome: &mut Outcome) -> Result<(), StepError> {
+        let mut motion = self.motion();
+        self.stabilizer += std::mem::take(&mut motion.stabilizer);
+        self.record(&contacts, motion.time.hi, outcome);
+        let mut plan = outcome.plan.clone();
+        if contacts.is_empty() {
+            self.mechanism = Arc::clone(&self.free);
+        } else {
+            self.mechanism = Arc::new(self.free.holding(&contacts));
+            plan.stabilization = Stabilization::Projection;
+            self.put_on(&mut motion, outcome)?;
+        }
+        let next = build(&self.mechanism, &mut plan, &motion)?;
+        let last = std::mem::replace(&mut self.marcher, next);
+        self.marcher.follow(&*last);
+        self.sampler.hold(Arc::clone(&self.mechanism));
+        if self.holds_in_row > HOLDS_MOST {
+            let what = format!("more than {HOLDS_MOST} holds before the next output time at wall {}", self.names(&contacts));
+            return Err(self.stopped(&outcome.plan, what, "shorten the output interval, or loosen the tolerance"));
+        }
+        Ok(())
+    }
+
+    /// Takes off a motion what keeps it from its walls: gaps of rounding, and normal velocities too small to rebound with.
+    fn put_on(&mut self, motion: &mut Motion, outcome: &mut Outcome) -> Result<(), StepError> {
+        let before = self.sampler.balance(motion);
+        let mut form = Multiplier::<0, true>::new(Arc::clone(&self.mechanism));
+        let mut state = form.state(motion);
+        let mut kernel = Kernel::new(self.mechanism.bodies.len(), self.mechanism.rows.len());
+        if let Err((row, left)) = project(&self.mechanism, &mut kernel, &mut state, 1e-13) {
+            let what = format!("{left:.1e} of constraint {row} is left where a point comes to rest on its wall");
+            return Err(self.stopped(&outcome.plan, what, "raise the restitution, or end the run before"));
+        }
+        form.read(&state, motion);
+        motion.stabilizer = 0.0;
+        let change = self.sampler.balance(motion) - before;
+        self.sampler.shift(change);
+        outcome.strike_loss -= change.hi;
+        Ok(())
+    }
+
+    /// Books the holds that end and those that begin.
+    fn record(&mut self, contacts: &[usize], t: f64, outcome: &mut Outcome) {
+        self.held.retain(|held| {
+            let stays = contacts.contains(&held.contact);
+            if !stays {
+                outcome.hold_time += t - held.since;
+                if let Some(kept) = held.kept {
+                    outcome.holds[kept].until = Some(t);
+                }
+            }
+            stays
+        });
+        for &contact in contacts {
+            if self.held.iter().any(|held| held.contact == contact) {
+                continue;
+            }
+            self.holds_in_row += 1;
+            outcome.hold_count += 1;
+            let kept = (outcome.holds.len() < KEPT).then_some(outcome.holds.len());
+            if kept.is_some() {
+                outcome.holds.push(Hold { t, wall: self.name(contact).into(), until: None });
+            }
+            self.held.push(Held { contact, since: t, kept });
+        }
+        if !contacts.is_empty() && self.free.motor_rows() > 0 && outcome.plan.stabilization != Stabilization::Projection {
+            let note = "while a point stays on its wall, the motors' rows are kept by projection";
+            if !outcome.plan.notes.iter().any(|before| before == note) {
+                outcome.plan.notes.push(note.into());
+            }
+        }
+    }
+
+    /// Books the time of the holds that last to the end of the run, `t` \[s\].
+    pub(super) fn end(&mut self, t: f64, outcome: &mut Outcome) {
+        outcome.hold_time += self.held.iter().map(|held| t - held.since).sum::<f64>();
+    }
+
+    fn motion(&mut self) -> Motion {
+        let mut motion = Motion::default();
+        self.marcher.read(&mut motion);
+        motion
+    }
+
+    fn name(&self, contact: usize) -> &str {
+        &self.free.contacts[contact].row.name
+    }
+
+    fn names(&self, contacts: &[usize]) -> String {
+        contacts.iter().map(|&contact| self.name(contact)).collect::<Vec<_>>().join(", ")
+    }
+
+    fn stopped(&mut self, plan: &Plan, what: String, hint: &str) -> StepError {
+        let t = self.motion().time.hi;
+        StepError { cause: Cause::RestingContact, method: plan.method.to_string(), t, step: 0.0, what, hint: hint.into() }
+    }
+}
+
+/// Unit vectors, angles \[rad\] and rates \[rad/s\] as doubles.
+fn posture(motion: &Motion) -> (Vec<Complex<f64>>, Vec<f64>, Vec<f64>) {
+    let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
+    (phi.iter().map(|&phi| Complex::unit(phi)).collect(), phi, motion.omega.iter().map(|omega| omega.hi).collect())
+}
