@@ -197,7 +197,10 @@ fn main() {
         ("chain of 3", chain(3), &[1e-7]),
         ("chain of 6", chain(6), &[1e-8]),
     ];
-    println!("{:12} {:>6}  {:22} {:>8} {:>8} {:>6} {:>9} {:>9}", "scene", "target", "method", "setting", "error", "steps", "min us/s", "median");
+    println!(
+        "{:12} {:>6}  {:22} {:>8} {:>8} {:>6} {:>9} {:>9}",
+        "scene", "target", "method", "setting", "error", "steps", "min us/s", "median"
+    );
     for (name, scene, targets) in cases {
         if !wanted.is_empty() && !wanted.iter().any(|word| name.contains(word.as_str())) {
             continue;

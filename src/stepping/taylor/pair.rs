@@ -1,0 +1,286 @@
+//! Two bodies without springs and motors, in four lanes: `[c1, s1, c2, s2]` and `[v1, v1, v2, v2]`.
+//!
+//! With v = phi', e = (cos phi, sin phi) and f = v e, the equation of body i reads, with A = A12, d_i the diagonal and W_i the weights,
+//!
+//! ```text
+//! e' = left(f),    d_i v_i' + A e_i·f_j' = e_i × W_i
+//! (k+1) e_{k+1} = left(f_k),   f_k = Σ v_j e_{k-j},   (k+1) M_0 v_{k+1} = e_k × W - A Σ_{m=1..k+1} m e_{k+1-m}·f_{j,m} without v_{k+1}
+//! ```
+//!
+//! No second derivatives of sines and no angle differences; two Cauchy products share one operand.  M_0⁻¹ is formed once a step.  What the newest coefficient
+//! v_k adds to each order is kept apart (*look-ahead*), so that two orders overlap:
+//!
+//! ```text
+//! f_k = g_k + v_k e_0,    B = Σ_{j=1..k-1} v_j e_{k+1-j},    g_{k+1} = B + v_k e_1 + v_0 e_{k+1}
+//! X = Σ_{m=1..k-1} m e_{k+1-m}·f_{j,m} + (k+1) e_0·B_j - (k v_0 - v_{j,0}) (s, -c)_0·g_{j,k}
+//! (k+1) v_{k+1} = M_0⁻¹ (e_k × W - A X) + M_0⁻¹ T_k (v_2, v_1)_k,    T_k = ± A sin(phi_1 - phi_2) (k v_0 - (k+2) v_{j,0})
+//! ```
+//!
+//! **A constant rounded once and used in every step is a drift**, since its error has the same sign for ever.  So the determinant takes its constant part in two
+//! terms, the fractions of low orders are in two terms, and the first order's solution is refined.
+
+use super::direction;
+use super::pace::{self, Pace, RECIPROCAL_REST};
+use crate::arithmetic::lanes::Lanes;
+use crate::arithmetic::sum::two_product;
+use crate::dynamics::Mechanism;
+
+/// Largest order there is room for.
+pub const MOST: usize = 28;
+
+/// Constants of the mechanism.
+#[derive(Clone, Debug)]
+pub struct Pair {
+    /// e × W as a product with `[c, s, c, s]` \[N·m\].
+    weight: [f64; 4],
+    /// A \[kg·m²\].
+    coupling: f64,
+    /// d \[kg·m²\].
+    diagonal: [f64; 2],
+    /// d_1 d_2, and what the double leaves out of it.
+    product: (f64, f64),
+    /// Fastest rate of small oscillations, or a bound of it \[rad/s\].
+    rate: f64,
+}
+
+/// Angles, rates and what they leave out, as `[phi1, v1, phi2, v2]`.
+#[derive(Clone, Copy, Debug)]
+pub struct Flow {
+    /// Leading parts.
+    pub high: [f64; 4],
+    /// What they leave out.
+    pub low: [f64; 4],
+}
+
+/// Coefficients of one step.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+pub struct Scratch {
+    e: [[f64; 4]; MOST + 1],
+    v: [[f64; 4]; MOST + 1],
+    /// m (f_2, f_1)_m.
+    g: [[f64; 4]; MOST + 1],
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        let zeros = [[0.0; 4]; MOST + 1];
+        Self { e: zeros, v: zeros, g: zeros }
+    }
+}
+
+impl Pair {
+    /// The constants, where this form fits: two bodies, all hinges and centres of mass on the bars' axes, neither springs nor rows nor walls.
+    pub fn new(mechanism: &Mechanism) -> Option<Self> {
+        let tree = &mechanism.tree;
+        if tree.bodies != 2 || tree.off_axis || !mechanism.springs.is_empty() || !mechanism.rows.is_empty() {
+            return None;
+        }
+        let (d, a) = ([tree.diagonal[0], tree.diagonal[1]], tree.coupling[1].re);
+        let [w1, w2] = [tree.weight[0], tree.weight[1]];
+        let product = two_product(d[0], d[1]);
+        let stiffness = d[1] * w1.norm_squared().sqrt() + d[0] * w2.norm_squared().sqrt();
+        let rate = (stiffness / (product.0 - a * a)).sqrt();
+        Some(Self { weight: [w1.im, -w1.re, w2.im, -w2.re], coupling: a, diagonal: d, product, rate })
+    }
+
+    /// The longest step in which the terms left out still fall: a third of the order in the time of the fastest oscillation \[s\].
+    pub fn longest(&self, order: usize) -> f64 {
+        order as f64 / 3.0 / self.rate
+    }
+}
+
+/// What every order needs of the step's start.
+#[derive(Clone, Copy)]
+struct Start<L> {
+    weight: L,
+    coupling: L,
+    e0: L,
+    e1: L,
+    v0: L,
+    /// left(e_0).
+    left: L,
+    /// v_0 (s, -c)_0 and the same with the other body's rate.
+    own: L,
+    other: L,
+    /// M_0⁻¹ on and off its diagonal.
+    inverse: [L; 2],
+    /// M_0⁻¹ T_k/(k+1) = `near + steep/(k+1)`, on and off the diagonal.
+    near: [L; 2],
+    steep: [L; 2],
+}
+
+/// Sums within pairs, in both lanes of each.
+#[inline(always)]
+fn pair_sum<L: Lanes>(x: L) -> L {
+    x.add(x.swap_pairs())
+}
+
+const LEFT: [f64; 4] = [-1.0, 1.0, -1.0, 1.0];
+
+/// Order K: from v_K and g_K to v_{K+1} and g_{K+1}; writes e_{K+1}, v_{K+1} and K f_K.
+#[inline(always)]
+fn order<L: Lanes, const K: usize>(s: &Start<L>, scratch: &mut Scratch, v: L, g: L) -> (L, L) {
+    // The newest coefficients come last in both sums: from the middle outwards, in two chains.
+    let zero = L::splat(0.0);
+    let (mut b, mut x) = ([zero; 2], [zero; 2]);
+    let middle = K / 2;
+    for step in 0..middle {
+        let j = middle - step;
+        if j < K {
+            let e = L::of(scratch.e[K + 1 - j]);
+            b[0] = L::of(scratch.v[j]).mul_add(e, b[0]);
+            x[0] = L::of(scratch.g[j]).mul_add(e, x[0]);
+        }
+        let j = middle + 1 + step;
+        if j < K {
+            let e = L::of(scratch.e[K + 1 - j]);
+            b[1] = L::of(scratch.v[j]).mul_add(e, b[1]);
+            x[1] = L::of(scratch.g[j]).mul_add(e, x[1]);
+        }
+    }
+    let b = b[0].add(b[1]);
+    let newest = s.own.mul_add(L::splat(K as f64), zero.sub(s.other)).mul(g.swap_halves());
+    let x = s.e0.mul(L::splat((K + 1) as f64)).mul_add(b.swap_halves(), x[0].add(x[1]).sub(newest));
+    let d = pair_sum(s.coupling.neg_mul_add(x, L::of(scratch.e[K]).mul(s.weight)));
+    let solved = s.inverse[1].mul_add(d.swap_halves(), s.inverse[0].mul(d));
+    let r = 1.0 / (K + 1) as f64;
+    let (mut on, mut off) = (s.steep[0].mul_add(L::splat(r), s.near[0]), s.steep[1].mul_add(L::splat(r), s.near[1]));
+    let mut base = solved.mul(L::splat(r));
+    let mut turn = s.left.mul(L::splat(r));
+    if K + 1 < RECIPROCAL_REST.len() && RECIPROCAL_REST[K + 1] != 0.0 {
+        let rest = L::splat(RECIPROCAL_REST[K + 1]);
+        on = s.steep[0].mul_add(rest, on);
+        off = s.steep[1].mul_add(rest, off);
+        base = solved.mul_add(rest, base);
+        turn = s.left.mul_add(rest, turn);
+    }
+    // From here on everything waits for v_K.
+    let next = on.mul_add(v.swap_halves(), off.mul_add(v, base));
+    let e = turn.mul_add(v, left_over(g, K + 1));
+    let f = v.mul_add(s.e0, g);
+    scratch.g[K] = f.swap_halves().mul(L::splat(K as f64)).array();
+    scratch.e[K + 1] = e.array();
+    scratch.v[K + 1] = next.array();
+    (next, s.v0.mul_add(e, v.mul_add(s.e1, b)))
+}
+
+/// left(x)/k for a constant k known after inlining.
+#[inline(always)]
+fn left_over<L: Lanes>(x: L, k: usize) -> L {
+    let swapped = x.swap_pairs();
+    let r = 1.0 / k as f64;
+    let quotient = swapped.mul(L::of([-r, r, -r, r]));
+    if k < RECIPROCAL_REST.len() && RECIPROCAL_REST[k] != 0.0 {
+        let r = RECIPROCAL_REST[k];
+        swapped.mul_add(L::of([-r, r, -r, r]), quotient)
+    } else {
+        quotient
+    }
+}
+
+/// Orders 1 to P-1, one after another.
+macro_rules! orders {
+    ($p:ident, $start:expr, $scratch:expr, $v:ident, $g:ident; $($k:literal)*) => {
+        $(if $k < $p {
+            ($v, $g) = order::<L, $k>($start, $scratch, $v, $g);
+        })*
+    };
+}
+
+/// Expands to order P and takes one step of at most `left` \[s\]; returns the step wanted, and leaves `flow` alone where it is useless.
+#[inline(always)]
+pub fn step<L: Lanes, const P: usize>(pair: &Pair, pace: &Pace, scratch: &mut Scratch, flow: &mut Flow, left: f64) -> (f64, f64) {
+    let [phi1, v1, phi2, v2] = flow.high;
+    let e0 = direction::unit(L::of([phi1, phi1, phi2, phi2]), L::of([flow.low[0], flow.low[0], flow.low[2], flow.low[2]]));
+    let v0 = L::of([v1, v1, v2, v2]);
+    let coupling = L::splat(pair.coupling);
+    let across = v0.swap_halves();
+    let leftward = e0.swap_pairs().mul(L::of(LEFT));
+    // M_0: cos(phi1 - phi2) in all lanes; sin(phi_i - phi_j) with each body's sign.
+    let far = e0.swap_halves();
+    let cosine = pair_sum(e0.mul(far));
+    let sine = pair_sum(e0.mul(far.swap_pairs().mul(L::of(LEFT))));
+    let m = cosine.mul(coupling);
+    let [d1, d2] = pair.diagonal;
+    let determinant = L::splat(pair.product.0).sub(m.mul_add(m, L::splat(-pair.product.1)));
+    let reciprocal = L::of([1.0 / determinant.array()[0]; 4]);
+    let inverse = [L::of([d2, d2, d1, d1]).mul(reciprocal), L::splat(0.0).sub(m).mul(reciprocal)];
+    let twist = coupling.mul(sine);
+    let (slope, offset) = (twist.mul(v0.sub(across)), twist.mul(across).mul(L::splat(-2.0)));
+    let near = [inverse[0].mul(slope), inverse[1].mul(slope.swap_halves())];
+    let at_zero = [inverse[0].mul(offset), inverse[1].mul(offset.swap_halves())];
+    // T_k/(k+1) = slope + (offset - slope)/(k+1).
+    let steep = [at_zero[0].sub(near[0]), at_zero[1].sub(near[1])];
+    let sideways = L::splat(0.0).sub(leftward);
+    let f0 = v0.mul(e0);
+    let e1 = f0.swap_pairs().mul(L::of(LEFT));
+    let g1 = v0.mul(e1);
+    let weight = L::of(pair.weight);
+    let load = pair_sum(coupling.neg_mul_add(e0.mul(g1.swap_halves()), weight.mul(e0)));
+    let mut first = inverse[1].mul_add(load.swap_halves(), inverse[0].mul(load));
+    let residual = m.neg_mul_add(first.swap_halves(), L::of([d1, d1, d2, d2]).neg_mul_add(first, load));
+    first = first.add(inverse[1].mul_add(residual.swap_halves(), inverse[0].mul(residual)));
+    let start =
+        Start { weight, coupling, e0, e1, v0, left: leftward, own: v0.mul(sideways), other: across.mul(sideways), inverse, near, steep };
+    scratch.e[0] = e0.array();
+    scratch.e[1] = e1.array();
+    scratch.v[0] = v0.array();
+    scratch.v[1] = first.array();
+    let (mut v, mut g) = (first, g1);
+    orders!(P, &start, scratch, v, g; 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27);
+    let _ = g;
+    // Not a number in any order reaches the last one.
+    if !v.abs().add(v.swap_halves().abs()).array()[0].is_finite() {
+        return (f64::NAN, 0.0);
+    }
+    let mut largest = [0.0; super::JUDGES];
+    for (i, largest) in largest.iter_mut().enumerate() {
+        let size = L::of(scratch.v[P - i]).abs();
+        *largest = size.max(size.swap_halves()).array()[0];
+    }
+    let wanted = pace.step::<P>(&largest);
+    let h = pace::taken(wanted, left);
+    if h > 0.0 {
+        let (high, low) = (L::of(flow.high), L::of(flow.low));
+        let rates = L::of([v1, 0.0, v2, 0.0]);
+        let (increment, rest) = increment::<L, P>(scratch, rates, low, h);
+        // Two-sum, then the low parts, then a quick two-sum.
+        let sum = high.add(increment);
+        let second = sum.sub(high);
+        let error = high.sub(sum.sub(second)).add(increment.sub(second)).add(low.add(rest));
+        let total = sum.add(error);
+        flow.high = total.array();
+        flow.low = error.sub(total.sub(sum)).array();
+    }
+    (wanted, h)
+}
+
+/// Increments `[phi1, v1, phi2, v2]` over `h` \[s\]: even and odd powers in two Horner chains; and what the rates' low parts move the angles by.
+#[inline(always)]
+fn increment<L: Lanes, const P: usize>(scratch: &Scratch, rates: L, low: L, h: f64) -> (L, L) {
+    let square = L::splat(h * h);
+    let mut chains = [L::splat(0.0); 2];
+    let mut k = P;
+    while k > 0 {
+        chains[k % 2] = chains[k % 2].mul_add(square, weighed(L::of(scratch.v[k]), k));
+        k -= 1;
+    }
+    // Powers 1, 3, … are in chain 1 with h⁰ before them, 2, 4, … in chain 0 with h.
+    let sum = chains[0].mul_add(L::splat(h), chains[1]);
+    let moved = L::of([h, 1.0, h, 1.0]).mul_add(sum, rates);
+    (moved.mul(L::splat(h)), low.swap_pairs().mul(L::of([h, 0.0, h, 0.0])))
+}
+
+/// `[v/(k+1), v, …]`, the fraction in two terms for low orders.
+#[inline(always)]
+fn weighed<L: Lanes>(v: L, k: usize) -> L {
+    let r = 1.0 / (k + 1) as f64;
+    let term = v.mul(L::of([r, 1.0, r, 1.0]));
+    if k + 1 < RECIPROCAL_REST.len() && RECIPROCAL_REST[k + 1] != 0.0 {
+        let r = RECIPROCAL_REST[k + 1];
+        v.mul_add(L::of([r, 0.0, r, 0.0]), term)
+    } else {
+        term
+    }
+}
