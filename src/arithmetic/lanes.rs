@@ -1,11 +1,11 @@
 //! Four doubles at once, with the same bits on every machine.
 //!
 //! Plain arrays left to the compiler are not good enough for short dependent chains (1.5 to 3 times slower), so there is an explicit
-//! vector type for AVX2 with FMA, and a portable one for everything else.  Each operation is exactly rounded and
+//! vector type for AVX with FMA, and a portable one for everything else.  Each operation is exactly rounded and
 //! [`Lanes::mul_add`] is *always* fused: where the processor has no such instruction it is computed in software, slowly but to the same bits.
 //!
 //! A kernel is written once over [`Lanes`], every function of it `#[inline(always)]`, and compiled twice: the outermost function of the fast
-//! build carries `#[target_feature(enable = "avx2,fma")]` and is entered only after [`available`] has said yes.
+//! build carries `#[target_feature(enable = "avx,fma")]` and is entered only after [`available`] has said yes.
 
 /// Four doubles; lanes 0-1 and 2-3 are pairs, which are halves of the vector.
 pub trait Lanes: Copy {
@@ -110,9 +110,9 @@ impl Lanes for Portable {
 }
 
 #[cfg(target_arch = "x86_64")]
-pub use hardware::{Avx2, available};
+pub use hardware::{Avx, available};
 
-/// True where [`Avx2`] may be used; never, on this architecture.
+/// True where [`Avx`] may be used; never, on this architecture.
 #[cfg(not(target_arch = "x86_64"))]
 pub fn available() -> bool {
     false
@@ -123,13 +123,13 @@ mod hardware {
     use super::Lanes;
     use std::arch::x86_64::*;
 
-    /// Four doubles in one register of AVX2; values exist only below functions entered after [`available`] has said yes.
+    /// Four doubles in one register of AVX; values exist only below functions entered after [`available`] has said yes.
     #[derive(Clone, Copy, Debug)]
-    pub struct Avx2(__m256d);
+    pub struct Avx(__m256d);
 
-    /// True where the processor has AVX2 and FMA.
+    /// True where the processor has AVX and FMA.
     pub fn available() -> bool {
-        is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
+        is_x86_feature_detected!("avx") && is_x86_feature_detected!("fma")
     }
 
     /// The instruction itself.
@@ -137,7 +137,7 @@ mod hardware {
     /// A trait's methods cannot carry `#[target_feature]`, so each is entered here.
     macro_rules! instruction {
         ($call:expr) => {{
-            // SAFETY: kernels over `Avx2` are entered only through functions with `#[target_feature(enable = "avx2,fma")]`, after `available`.
+            // SAFETY: kernels over `Avx` are entered only through functions with `#[target_feature(enable = "avx,fma")]`, after `available`.
             #[allow(unsafe_code)]
             unsafe {
                 $call
@@ -145,7 +145,7 @@ mod hardware {
         }};
     }
 
-    impl Lanes for Avx2 {
+    impl Lanes for Avx {
         #[inline(always)]
         fn of(lanes: [f64; 4]) -> Self {
             instruction!(Self(_mm256_loadu_pd(lanes.as_ptr())))
@@ -236,9 +236,9 @@ mod tests {
         .collect()
     }
 
-    #[target_feature(enable = "avx2,fma")]
+    #[target_feature(enable = "avx,fma")]
     fn in_hardware(a: [f64; 4], b: [f64; 4], c: [f64; 4]) -> Vec<[u64; 4]> {
-        everything::<Avx2>(a, b, c)
+        everything::<Avx>(a, b, c)
     }
 
     proptest! {

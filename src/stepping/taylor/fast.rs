@@ -18,9 +18,9 @@ pub struct Fast {
 type Step = unsafe fn(&Pair, &Pace, &mut pair::Scratch, &mut pair::Flow, f64) -> (f64, f64);
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
+#[target_feature(enable = "avx,fma")]
 fn hardware<const P: usize>(pair: &Pair, pace: &Pace, scratch: &mut pair::Scratch, flow: &mut pair::Flow, left: f64) -> (f64, f64) {
-    pair::step::<lanes::Avx2, P>(pair, pace, scratch, flow, left)
+    pair::step::<lanes::Avx, P>(pair, pace, scratch, flow, left)
 }
 
 fn portable<const P: usize>(pair: &Pair, pace: &Pace, scratch: &mut pair::Scratch, flow: &mut pair::Flow, left: f64) -> (f64, f64) {
@@ -43,9 +43,7 @@ impl Fast {
         let step = match order {
             16 => of_order::<16>(is_portable),
             20 => of_order::<20>(is_portable),
-            22 => of_order::<22>(is_portable),
             24 => of_order::<24>(is_portable),
-            26 => of_order::<26>(is_portable),
             _ => return None,
         };
         let pace = Pace::new(tolerance, order, pair.longest(order));
@@ -59,7 +57,7 @@ impl Fast {
             return (f64::NAN, 0.0);
         };
         let mut flow = pair::Flow { high: [*phi1, *v1, *phi2, *v2], low: [*phi1_low, *v1_low, *phi2_low, *v2_low] };
-        // SAFETY: `of_order` hands out code for AVX2 and FMA only after the processor was asked for them; all else in it is safe code.
+        // SAFETY: `of_order` hands out code for AVX and FMA only after the processor was asked for them; all else in it is safe code.
         #[allow(unsafe_code)]
         let (wanted, taken) = unsafe { (self.step)(&self.pair, &self.pace, &mut self.scratch, &mut flow, left) };
         [*phi1, *v1, *phi2, *v2] = flow.high;

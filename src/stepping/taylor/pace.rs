@@ -1,11 +1,11 @@
 //! The step from the last coefficients, without a logarithm or a power function.
 //!
 //! ```text
-//! h = tolerance^(1/(P+2)) min_k ((k+1)/|v_k|)^(1/(k+1)),   k = P-4…P
+//! h = tolerance^(1/(P+1)) min_k |v_k|^(-1/k),   k = P-4…P
 //! ```
 //!
-//! which puts the first term left out of an angle at the tolerance.  The logarithm taken straight from the bits of a double is piecewise linear, its error
-//! at most 0.09, and that is divided by k+1.
+//! which puts the first term left out of a rate at the tolerance.  The logarithm taken straight from the bits of a double is piecewise linear, its error
+//! at most 0.09, and that is divided by k.
 
 use super::JUDGES;
 
@@ -29,16 +29,16 @@ pub const RECIPROCAL_REST: [f64; 13] = [
 /// How long steps may be.
 #[derive(Clone, Debug)]
 pub struct Pace {
-    /// log2 tolerance / (P+2).
+    /// log2 tolerance / (P+1).
     exponent: f64,
     /// The longest step \[s\].
     longest: f64,
 }
 
 impl Pace {
-    /// For a tolerance \[rad\] and an order, with a longest step \[s\].
+    /// For a tolerance \[rad/s\] and an order, with a longest step \[s\].
     pub fn new(tolerance: f64, order: usize, longest: f64) -> Self {
-        Self { exponent: libm::log2(tolerance) / (order + 2) as f64, longest }
+        Self { exponent: libm::log2(tolerance) / (order + 1) as f64, longest }
     }
 
     /// The step from the largest coefficients of orders P, P-1, … \[s\]; the longest one where they vanish.
@@ -46,10 +46,8 @@ impl Pace {
     pub fn step<const P: usize>(&self, largest: &[f64; JUDGES]) -> f64 {
         let mut least = f64::INFINITY;
         for (i, &size) in largest.iter().enumerate() {
-            let power = (P - i + 1) as f64;
-            // log2(k+1) from its bits too: within the same error.
-            let log = (power.to_bits() as i64 - size.to_bits() as i64) as f64;
-            let root = log * (1.0 / ((1_u64 << 52) as f64 * power));
+            let log = (1f64.to_bits() as i64 - size.to_bits() as i64) as f64;
+            let root = log * (1.0 / ((1_u64 << 52) as f64 * (P - i) as f64));
             least = if root < least { root } else { least };
         }
         let x = least + self.exponent;

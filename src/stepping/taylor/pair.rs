@@ -26,7 +26,7 @@ use crate::arithmetic::sum::two_product;
 use crate::dynamics::Mechanism;
 
 /// Largest order there is room for.
-pub const MOST: usize = 28;
+pub const MOST: usize = 24;
 
 /// Constants of the mechanism.
 #[derive(Clone, Debug)]
@@ -58,7 +58,7 @@ pub struct Flow {
 pub struct Scratch {
     e: [[f64; 4]; MOST + 1],
     v: [[f64; 4]; MOST + 1],
-    /// m (f_2, f_1)_m.
+    /// -A m (f_2, f_1)_m.
     g: [[f64; 4]; MOST + 1],
 }
 
@@ -94,8 +94,11 @@ impl Pair {
 #[derive(Clone, Copy)]
 struct Start<L> {
     weight: L,
+    /// -A.
     coupling: L,
+    /// -A e_0 and -A (e_2, e_1)_0.
     e0: L,
+    far: L,
     e1: L,
     v0: L,
     /// left(e_0).
@@ -110,6 +113,21 @@ struct Start<L> {
     steep: [L; 2],
 }
 
+/// The newest coefficients: v_k, and e_k, g_k.
+#[derive(Clone, Copy)]
+struct Newest<L> {
+    v: L,
+    e: L,
+    g: L,
+}
+
+/// B and X so far.
+#[derive(Clone, Copy)]
+struct Sums<L> {
+    b: L,
+    x: L,
+}
+
 /// Sums within pairs, in both lanes of each.
 #[inline(always)]
 fn pair_sum<L: Lanes>(x: L) -> L {
@@ -118,51 +136,73 @@ fn pair_sum<L: Lanes>(x: L) -> L {
 
 const LEFT: [f64; 4] = [-1.0, 1.0, -1.0, 1.0];
 
-/// Order K: from v_K and g_K to v_{K+1} and g_{K+1}; writes e_{K+1}, v_{K+1} and K f_K.
+/// What orders K and K+1 need of the coefficients before v_K: both at once, so that each is loaded for two products.
+///
+/// The terms with j = 1 and the last j are left out: they come last, since they are the newest.
 #[inline(always)]
-fn order<L: Lanes, const K: usize>(s: &Start<L>, scratch: &mut Scratch, v: L, g: L) -> (L, L) {
-    // The newest coefficients come last in both sums: from the middle outwards, in two chains.
-    let zero = L::splat(0.0);
-    let (mut b, mut x) = ([zero; 2], [zero; 2]);
+fn older<L: Lanes, const K: usize>(scratch: &Scratch) -> [Sums<L>; 2] {
+    let zero = Sums { b: L::splat(0.0), x: L::splat(0.0) };
+    // From the middle outwards in two chains.
+    let mut sums = [[zero; 2]; 2];
     let middle = K / 2;
     for step in 0..middle {
-        let j = middle - step;
-        if j < K {
-            let e = L::of(scratch.e[K + 1 - j]);
-            b[0] = L::of(scratch.v[j]).mul_add(e, b[0]);
-            x[0] = L::of(scratch.g[j]).mul_add(e, x[0]);
-        }
-        let j = middle + 1 + step;
-        if j < K {
-            let e = L::of(scratch.e[K + 1 - j]);
-            b[1] = L::of(scratch.v[j]).mul_add(e, b[1]);
-            x[1] = L::of(scratch.g[j]).mul_add(e, x[1]);
+        for (chain, j) in [middle - step, middle + 1 + step].into_iter().enumerate() {
+            let (v, g) = (L::of(scratch.v[j]), L::of(scratch.g[j]));
+            for (ahead, sums) in sums.iter_mut().enumerate() {
+                if j >= 2 && j + 2 <= K + ahead {
+                    let e = L::of(scratch.e[K + 1 + ahead - j]);
+                    sums[chain] = Sums { b: v.mul_add(e, sums[chain].b), x: g.mul_add(e, sums[chain].x) };
+                }
+            }
         }
     }
-    let b = b[0].add(b[1]);
-    let newest = s.own.mul_add(L::splat(K as f64), zero.sub(s.other)).mul(g.swap_halves());
-    let x = s.e0.mul(L::splat((K + 1) as f64)).mul_add(b.swap_halves(), x[0].add(x[1]).sub(newest));
-    let d = pair_sum(s.coupling.neg_mul_add(x, L::of(scratch.e[K]).mul(s.weight)));
-    let solved = s.inverse[1].mul_add(d.swap_halves(), s.inverse[0].mul(d));
-    let r = 1.0 / (K + 1) as f64;
-    let (mut on, mut off) = (s.steep[0].mul_add(L::splat(r), s.near[0]), s.steep[1].mul_add(L::splat(r), s.near[1]));
-    let mut base = solved.mul(L::splat(r));
-    let mut turn = s.left.mul(L::splat(r));
+    [total(sums[0]), total(sums[1])]
+}
+
+#[inline(always)]
+fn total<L: Lanes>(chains: [Sums<L>; 2]) -> Sums<L> {
+    Sums { b: chains[0].b.add(chains[1].b), x: chains[0].x.add(chains[1].x) }
+}
+
+/// Order K: from v_K, e_K, g_K to the next ones; writes e_{K+1}, v_{K+1} and -A K (f_2, f_1)_K.
+#[inline(always)]
+fn order<L: Lanes, const K: usize>(s: &Start<L>, scratch: &mut Scratch, older: Sums<L>, newest: Newest<L>) -> Newest<L> {
+    let Sums { mut b, mut x } = older;
+    let Newest { v, e, g } = newest;
+    if K >= 3 {
+        let second = L::of(scratch.e[2]);
+        b = L::of(scratch.v[K - 1]).mul_add(second, b);
+        x = L::of(scratch.g[K - 1]).mul_add(second, x);
+    }
+    x = e.mul_add(s.weight, x);
+    if K >= 2 {
+        b = e.mul_add(L::of(scratch.v[1]), b);
+        x = e.mul_add(L::of(scratch.g[1]), x);
+    }
+    let far = g.swap_halves().mul(s.coupling);
+    x = s.own.mul_add(L::splat(K as f64), L::splat(0.0).sub(s.other)).neg_mul_add(far, x);
+    if K >= 2 {
+        x = s.e0.mul(L::splat((K + 1) as f64)).mul_add(b.swap_halves(), x);
+    }
+    let d = pair_sum(x);
+    let r = L::splat(1.0 / (K + 1) as f64);
+    let (mut on, mut off) = (s.steep[0].mul_add(r, s.near[0]), s.steep[1].mul_add(r, s.near[1]));
+    let (mut direct, mut crossed, mut turn) = (s.inverse[0].mul(r), s.inverse[1].mul(r), s.left.mul(r));
     if K + 1 < RECIPROCAL_REST.len() && RECIPROCAL_REST[K + 1] != 0.0 {
         let rest = L::splat(RECIPROCAL_REST[K + 1]);
-        on = s.steep[0].mul_add(rest, on);
-        off = s.steep[1].mul_add(rest, off);
-        base = solved.mul_add(rest, base);
+        (on, off) = (s.steep[0].mul_add(rest, on), s.steep[1].mul_add(rest, off));
+        (direct, crossed) = (s.inverse[0].mul_add(rest, direct), s.inverse[1].mul_add(rest, crossed));
         turn = s.left.mul_add(rest, turn);
     }
+    let solved = crossed.mul_add(d.swap_halves(), direct.mul(d));
     // From here on everything waits for v_K.
-    let next = on.mul_add(v.swap_halves(), off.mul_add(v, base));
-    let e = turn.mul_add(v, left_over(g, K + 1));
-    let f = v.mul_add(s.e0, g);
-    scratch.g[K] = f.swap_halves().mul(L::splat(K as f64)).array();
-    scratch.e[K + 1] = e.array();
+    let swapped = v.swap_halves();
+    let next = on.mul_add(swapped, off.mul_add(v, solved));
+    let e_next = turn.mul_add(v, left_over(g, K + 1));
+    scratch.g[K] = swapped.mul_add(s.far, far).mul(L::splat(K as f64)).array();
+    scratch.e[K + 1] = e_next.array();
     scratch.v[K + 1] = next.array();
-    (next, s.v0.mul_add(e, v.mul_add(s.e1, b)))
+    Newest { v: next, e: e_next, g: s.v0.mul_add(e_next, v.mul_add(s.e1, b)) }
 }
 
 /// left(x)/k for a constant k known after inlining.
@@ -179,11 +219,13 @@ fn left_over<L: Lanes>(x: L, k: usize) -> L {
     }
 }
 
-/// Orders 1 to P-1, one after another.
+/// Orders 2 to P-1 in pairs, for even P.
 macro_rules! orders {
-    ($p:ident, $start:expr, $scratch:expr, $v:ident, $g:ident; $($k:literal)*) => {
+    ($p:ident, $start:expr, $scratch:expr, $newest:ident; $($k:literal $next:literal),*) => {
         $(if $k < $p {
-            ($v, $g) = order::<L, $k>($start, $scratch, $v, $g);
+            let [first, second] = older::<L, $k>($scratch);
+            $newest = order::<L, $k>($start, $scratch, first, $newest);
+            $newest = order::<L, $next>($start, $scratch, second, $newest);
         })*
     };
 }
@@ -221,15 +263,29 @@ pub fn step<L: Lanes, const P: usize>(pair: &Pair, pace: &Pace, scratch: &mut Sc
     let mut first = inverse[1].mul_add(load.swap_halves(), inverse[0].mul(load));
     let residual = m.neg_mul_add(first.swap_halves(), L::of([d1, d1, d2, d2]).neg_mul_add(first, load));
     first = first.add(inverse[1].mul_add(residual.swap_halves(), inverse[0].mul(residual)));
-    let start =
-        Start { weight, coupling, e0, e1, v0, left: leftward, own: v0.mul(sideways), other: across.mul(sideways), inverse, near, steep };
+    let minus = L::splat(-pair.coupling);
+    let start = Start {
+        weight,
+        coupling: minus,
+        e0: minus.mul(e0),
+        far: minus.mul(far),
+        e1,
+        v0,
+        left: leftward,
+        own: v0.mul(sideways),
+        other: across.mul(sideways),
+        inverse,
+        near,
+        steep,
+    };
     scratch.e[0] = e0.array();
     scratch.e[1] = e1.array();
     scratch.v[0] = v0.array();
     scratch.v[1] = first.array();
-    let (mut v, mut g) = (first, g1);
-    orders!(P, &start, scratch, v, g; 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27);
-    let _ = g;
+    let zero = L::splat(0.0);
+    let mut newest = order::<L, 1>(&start, scratch, Sums { b: zero, x: zero }, Newest { v: first, e: e1, g: g1 });
+    orders!(P, &start, scratch, newest; 2 3, 4 5, 6 7, 8 9, 10 11, 12 13, 14 15, 16 17, 18 19, 20 21, 22 23);
+    let v = newest.v;
     // Not a number in any order reaches the last one.
     if !v.abs().add(v.swap_halves().abs()).array()[0].is_finite() {
         return (f64::NAN, 0.0);
