@@ -16,6 +16,7 @@
 //! for steps from the last powers; their two are five here.
 
 mod direction;
+mod driven;
 mod fast;
 mod pace;
 mod pair;

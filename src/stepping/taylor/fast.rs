@@ -1,33 +1,42 @@
 //! Which fast kernel fits a mechanism, an order and the processor; the one place where compiled-for-the-processor code is entered.
 
+use super::driven::{self, Driven};
 use super::pace::Pace;
 use super::pair::{self, Pair};
-use crate::arithmetic::lanes::{self, Portable};
+#[cfg(target_arch = "x86_64")]
+use crate::arithmetic::lanes::Avx;
+use crate::arithmetic::lanes::{self, Lanes, Portable};
 use crate::dynamics::{Mechanism, State};
 
 /// A kernel ready to run.
 #[derive(Clone, Debug)]
 pub struct Fast {
-    pair: Pair,
+    form: Form,
     pace: Pace,
-    scratch: Box<pair::Scratch>,
     step: Step,
 }
 
-/// One step of at most so many seconds: the step wanted and the step taken.
-type Step = unsafe fn(&Pair, &Pace, &mut pair::Scratch, &mut pair::Flow, f64) -> (f64, f64);
+/// What it runs on.
+#[derive(Clone, Debug)]
+enum Form {
+    Pair(Pair, Box<pair::Scratch>),
+    Driven(Box<Driven>, Box<driven::Scratch>),
+}
+
+/// One step of a state by at most so many seconds: the step wanted and the step taken.
+type Step = unsafe fn(&mut Form, &Pace, &mut State, f64) -> (f64, f64);
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx,fma")]
-fn hardware<const P: usize>(pair: &Pair, pace: &Pace, scratch: &mut pair::Scratch, flow: &mut pair::Flow, left: f64) -> (f64, f64) {
-    pair::step::<lanes::Avx, P>(pair, pace, scratch, flow, left)
+fn hardware<const P: usize>(form: &mut Form, pace: &Pace, state: &mut State, left: f64) -> (f64, f64) {
+    step::<Avx, P>(form, pace, state, left)
 }
 
-fn portable<const P: usize>(pair: &Pair, pace: &Pace, scratch: &mut pair::Scratch, flow: &mut pair::Flow, left: f64) -> (f64, f64) {
-    pair::step::<Portable, P>(pair, pace, scratch, flow, left)
+fn portable<const P: usize>(form: &mut Form, pace: &Pace, state: &mut State, left: f64) -> (f64, f64) {
+    step::<Portable, P>(form, pace, state, left)
 }
 
-/// The kernel of one order for this processor.
+/// The code of one order for this processor.
 fn of_order<const P: usize>(is_portable: bool) -> Step {
     #[cfg(target_arch = "x86_64")]
     if !is_portable && lanes::available() {
@@ -36,32 +45,54 @@ fn of_order<const P: usize>(is_portable: bool) -> Step {
     portable::<P>
 }
 
+#[inline(always)]
+fn step<L: Lanes, const P: usize>(form: &mut Form, pace: &Pace, state: &mut State, left: f64) -> (f64, f64) {
+    match (form, &mut state.y[..], &mut state.low[..]) {
+        (Form::Pair(pair, scratch), [phi1, phi2, v1, v2, ..], [phi1_low, phi2_low, v1_low, v2_low, ..]) => {
+            let mut flow = pair::Flow { high: [*phi1, *v1, *phi2, *v2], low: [*phi1_low, *v1_low, *phi2_low, *v2_low] };
+            let steps = pair::step::<L, P>(pair, pace, scratch, &mut flow, left);
+            [*phi1, *v1, *phi2, *v2] = flow.high;
+            [*phi1_low, *v1_low, *phi2_low, *v2_low] = flow.low;
+            steps
+        }
+        (Form::Driven(driven, scratch), [phi, v, work, ..], [phi_low, v_low, work_low, ..]) => {
+            let mut flow = driven::Flow { high: [*phi, *v, *work], low: [*phi_low, *v_low, *work_low] };
+            let steps = driven::step::<L, P>(driven, pace, scratch, &mut flow, state.time, left);
+            [*phi, *v, *work] = flow.high;
+            [*phi_low, *v_low, *work_low] = flow.low;
+            steps
+        }
+        _ => (f64::NAN, 0.0),
+    }
+}
+
 impl Fast {
     /// The kernel, where there is one.
     pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize, is_portable: bool) -> Option<Self> {
-        let pair = Pair::new(mechanism)?;
         let step = match order {
             16 => of_order::<16>(is_portable),
             20 => of_order::<20>(is_portable),
             24 => of_order::<24>(is_portable),
             _ => return None,
         };
-        let pace = Pace::new(tolerance, order, pair.longest(order));
-        Some(Self { pair, pace, scratch: Box::default(), step })
+        let (form, longest) = if let Some(pair) = Pair::new(mechanism) {
+            let longest = pair.longest(order);
+            (Form::Pair(pair, Box::default()), longest)
+        } else {
+            let driven = Driven::new(mechanism)?;
+            let longest = driven.longest(order);
+            (Form::Driven(Box::new(driven), Box::default()), longest)
+        };
+        Some(Self { form, pace: Pace::new(tolerance, order, longest), step })
     }
 
     /// One step of at most `left` \[s\] from the state's unknowns, which are then the new ones; returns the step wanted and the step taken.
     #[inline]
     pub fn step(&mut self, state: &mut State, left: f64) -> (f64, f64) {
-        let ([phi1, phi2, v1, v2, ..], [phi1_low, phi2_low, v1_low, v2_low, ..]) = (&mut state.y[..], &mut state.low[..]) else {
-            return (f64::NAN, 0.0);
-        };
-        let mut flow = pair::Flow { high: [*phi1, *v1, *phi2, *v2], low: [*phi1_low, *v1_low, *phi2_low, *v2_low] };
         // SAFETY: `of_order` hands out code for AVX and FMA only after the processor was asked for them; all else in it is safe code.
         #[allow(unsafe_code)]
-        let (wanted, taken) = unsafe { (self.step)(&self.pair, &self.pace, &mut self.scratch, &mut flow, left) };
-        [*phi1, *v1, *phi2, *v2] = flow.high;
-        [*phi1_low, *v1_low, *phi2_low, *v2_low] = flow.low;
-        (wanted, taken)
+        unsafe {
+            (self.step)(&mut self.form, &self.pace, state, left)
+        }
     }
 }
