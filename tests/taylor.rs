@@ -79,9 +79,16 @@ fn fast_scenes() -> Vec<(&'static str, Scene)> {
     backwards.motors[0].law.rate = -4.0;
     backwards.start[0].omega = -4.0;
     backwards.gravity = [3.0, -9.0];
-    let names = ["free", "gentle", "spinning", "motor"];
-    let shipped = names.map(|name| (name, shipped(name, &[])));
-    shipped.into_iter().chain([("sideways", sideways), ("second", second), ("backwards", backwards)]).collect()
+    let mut three = shipped("chain8", &[]);
+    let mut six = three.clone();
+    for (scene, count) in [(&mut three, 3), (&mut six, 6)] {
+        scene.bars.truncate(count);
+        scene.hinges.truncate(count);
+        scene.start.truncate(count);
+    }
+    let names = ["free", "gentle", "spinning", "motor", "chain8"];
+    let others = [("sideways", sideways), ("second", second), ("backwards", backwards), ("three", three), ("six", six)];
+    names.map(|name| (name, shipped(name, &[]))).into_iter().chain(others).collect()
 }
 
 #[test]

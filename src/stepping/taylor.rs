@@ -15,6 +15,7 @@
 //! Source: À. Jorba, M. Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor methods*, Experimental Mathematics 14 (2005), section 3.2,
 //! for steps from the last powers; their two are five here.
 
+mod bodies;
 mod direction;
 mod driven;
 mod fast;

@@ -1,5 +1,6 @@
 //! Which fast kernel fits a mechanism, an order and the processor; the one place where compiled-for-the-processor code is entered.
 
+use super::bodies::{self, Bodies};
 use super::driven::{self, Driven};
 use super::pace::Pace;
 use super::pair::{self, Pair};
@@ -21,6 +22,8 @@ pub struct Fast {
 enum Form {
     Pair(Pair, Box<pair::Scratch>),
     Driven(Box<Driven>, Box<driven::Scratch>),
+    Few(Box<Bodies<1>>),
+    Several(Box<Bodies<2>>),
 }
 
 /// One step of a state by at most so many seconds: the step wanted and the step taken.
@@ -62,6 +65,8 @@ fn step<L: Lanes, const P: usize>(form: &mut Form, pace: &Pace, state: &mut Stat
             [*phi_low, *v_low, *work_low] = flow.low;
             steps
         }
+        (Form::Few(bodies), ..) => bodies::step::<L, P, 1>(bodies, pace, state, left),
+        (Form::Several(bodies), ..) => bodies::step::<L, P, 2>(bodies, pace, state, left),
         _ => (f64::NAN, 0.0),
     }
 }
@@ -78,10 +83,16 @@ impl Fast {
         let (form, longest) = if let Some(pair) = Pair::new(mechanism) {
             let longest = pair.longest(order);
             (Form::Pair(pair, Box::default()), longest)
-        } else {
-            let driven = Driven::new(mechanism)?;
+        } else if let Some(driven) = Driven::new(mechanism) {
             let longest = driven.longest(order);
             (Form::Driven(Box::new(driven), Box::default()), longest)
+        } else if let Some(bodies) = Bodies::<1>::new(mechanism) {
+            let longest = bodies.longest(order);
+            (Form::Few(Box::new(bodies)), longest)
+        } else {
+            let bodies = Bodies::<2>::new(mechanism)?;
+            let longest = bodies.longest(order);
+            (Form::Several(Box::new(bodies)), longest)
         };
         Some(Self { form, pace: Pace::new(tolerance, order, longest), step })
     }
