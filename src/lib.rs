@@ -1,4 +1,4 @@
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 #![warn(missing_docs)]
 //! Long-horizon integration of planar mechanisms with constraint stabilization.
 //!

@@ -266,6 +266,8 @@ impl Scalar for DoubleDouble {
 }
 
 impl Real for DoubleDouble {
+    const IS_PLAIN: bool = false;
+
     #[inline(always)]
     fn value(self) -> f64 {
         self.hi

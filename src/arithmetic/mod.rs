@@ -4,12 +4,13 @@
 //! [`DoubleDouble`] (monitors, references).  Lanes and dual numbers can join by implementing the same dozen operations.
 //!
 //! Two rules keep the bits the same on every machine: trigonometry comes from pure Rust (the `libm` crate, or our own series
-//! in double-double), and a fused multiply-add is used in [`sum::two_product`] only, where it is exact by definition, so it makes no difference
-//! whether the processor has the instruction.
+//! in double-double), and a fused multiply-add is written as one wherever it is used ([`sum::two_product`], [`lanes`]), never left to the compiler:
+//! it is rounded once by definition, so it makes no difference to the bits whether the processor has the instruction.
 
 pub mod angle;
 pub mod complex;
 pub mod double_double;
+pub mod lanes;
 pub mod sum;
 
 pub use complex::Complex;
@@ -54,6 +55,9 @@ pub trait Scalar:
 
 /// A scalar with an order and a nearest `f64`.
 pub trait Real: Scalar + PartialOrd {
+    /// True for `f64` itself, for which there are kernels of lanes.
+    const IS_PLAIN: bool;
+
     /// The nearest `f64`.
     fn value(self) -> f64;
 
@@ -95,6 +99,8 @@ impl Scalar for f64 {
 }
 
 impl Real for f64 {
+    const IS_PLAIN: bool = true;
+
     #[inline(always)]
     fn value(self) -> f64 {
         self

@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! u(t+h) = u + Σ w_m h^(m+1)/(m+1),    w(t+h) = Σ w_m h^m,    m = 0…P
-//! h = min over the last five powers k of (tolerance / |w_k/(k+1)|)^(1/(k+1))
+//! h = tolerance^(1/(P+1)) min over the last five powers k of |w_k|^(-1/k)
 //! ```
 //!
 //! **Trap**: released from rest a symmetric scene has only every fourth power, and a step from the last one or two is far too long; five powers
@@ -15,6 +15,14 @@
 //! Source: À. Jorba, M. Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor methods*, Experimental Mathematics 14 (2005), section 3.2,
 //! for steps from the last powers; their two are five here.
 
+mod bodies;
+mod direction;
+mod driven;
+mod fast;
+mod pace;
+mod pair;
+
+use self::fast::Fast;
 use super::{Cause, Method, Reached, Seen, StepError, Tally, Tolerance, Watch};
 use crate::arithmetic::{DoubleDouble, Real};
 use crate::dynamics::series::{Series, integral, tail};
@@ -23,15 +31,29 @@ use crate::dynamics::{Field, Form, State, Time};
 /// Powers the step is taken from.
 const JUDGES: usize = 5;
 
+/// Which code expands the motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Kernel {
+    /// Lanes where they fit the mechanism and the order, the series for everything else.
+    #[default]
+    Fastest,
+    /// As `Fastest`, but without instructions special to the processor: slowly to the same bits.
+    Portable,
+    /// [`Series`], which takes every mechanism and every number.
+    Series,
+}
+
 /// The method on numbers of type `T`: `f64`, or `DoubleDouble` for references.
 #[derive(Clone, Debug)]
 pub struct Taylor<T> {
-    /// Largest term left out of an angle \[rad\] in a step; rates follow.
+    /// First term left out of a rate \[rad/s\] in a step; those of the angles are smaller by the step over the order.
     pub tolerance: f64,
     /// Highest power of the rates.
     pub order: usize,
     /// Most steps in one call of [`Method::advance`].
     pub max_steps: u64,
+    /// Which code expands the motion.
+    pub kernel: Kernel,
     series: Option<Series<T>>,
     u: Vec<T>,
     rest: Vec<T>,
@@ -39,20 +61,29 @@ pub struct Taylor<T> {
 }
 
 impl<T: Real> Taylor<T> {
-    /// The method with this tolerance \[rad\] and order, at least 8.
+    /// The method with this tolerance \[rad/s\] and order, at least 8.
     pub fn with_order(tolerance: f64, order: usize) -> Self {
         let order = order.max(2 * JUDGES);
-        Self { tolerance, order, max_steps: 10_000_000, series: None, u: Vec::new(), rest: Vec::new(), rate: Vec::new() }
+        Self {
+            tolerance,
+            order,
+            max_steps: 10_000_000,
+            kernel: Kernel::default(),
+            series: None,
+            u: Vec::new(),
+            rest: Vec::new(),
+            rate: Vec::new(),
+        }
     }
 }
 
 impl Taylor<f64> {
-    /// The method at a tolerance, with the order that serves it: 16 from 1e-6 up, 20 from 1e-9 up, 24 below.
+    /// The method at a tolerance, with the order that serves it: 16 from 1e-8 up, 20 from 1e-15 up, 24 below.
     pub fn new(tolerance: Tolerance) -> Self {
         let tolerance = tolerance.relative.min(tolerance.absolute);
         let order = match tolerance {
-            t if t >= 1e-6 => 16,
-            t if t >= 1e-9 => 20,
+            t if t >= 1e-8 => 16,
+            t if t >= 1e-15 => 20,
             _ => 24,
         };
         Self::with_order(tolerance, order)
@@ -83,72 +114,85 @@ impl<T: Real, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
         tally: &mut Tally,
         watch: &mut Watch<P>,
     ) -> Result<Reached, StepError> {
-        let f = problem.angles();
-        for vector in [&mut self.u, &mut self.rest, &mut self.rate] {
-            vector.resize(f, T::ZERO);
-        }
+        let fast = T::IS_PLAIN && self.kernel != Kernel::Series;
+        let is_portable = self.kernel == Kernel::Portable;
+        let mut fast = if fast { Fast::new(problem.mechanism(), self.tolerance, self.order, is_portable) } else { None };
         let mut taken = 0;
         loop {
-            let left = (until - state.time).hi;
-            if left <= 0.0 {
+            let left = until - state.time;
+            if left.hi <= 0.0 {
                 return Ok(Reached::Until);
             }
-            let stop = |cause, step, what: String, hint: &str| StepError {
-                cause,
-                method: "taylor".into(),
-                t: state.time.hi,
-                step,
-                what,
-                hint: hint.into(),
-            };
             taken += 1;
             if taken > self.max_steps {
                 let what = format!("more than {} steps before t = {} s", self.max_steps, until.hi);
-                return Err(stop(Cause::TooManySteps, 0.0, what, "loosen the tolerance"));
+                return Err(stop(Cause::TooManySteps, state, 0.0, what, "loosen the tolerance"));
             }
-            let series = self.series.get_or_insert_with(|| Series::new(problem.mechanism(), self.order));
-            for i in 0..f {
-                (self.u[i], self.rest[i]) = T::split(state.unknown(i));
-                self.rate[i] = T::split(state.unknown(f + i)).0;
-            }
-            series.expand(problem.mechanism(), state.time, &self.u, &self.rest, &self.rate);
             tally.evaluations += 1;
-            let wanted = step(series, f, self.tolerance);
+            let (wanted, h) = match &mut fast {
+                Some(fast) => fast.step(state, left.hi),
+                None => self.series_step(problem, state, left),
+            };
+            let hint = "look for a spring of length zero or a position without inertia";
             if wanted.is_nan() {
-                let lost = series.rate.iter().position(|rate| !rate.value().is_finite()).map_or(0, |at| at % f.max(1));
-                let what = format!("the series of {} is not finite", problem.label(f + lost));
-                return Err(stop(Cause::NotFinite, 0.0, what, "look for a spring of length zero or a position without inertia"));
+                let lost = self.lost(problem);
+                return Err(stop(Cause::NotFinite, state, 0.0, format!("the series of {lost} is not finite"), hint));
             }
             if wanted < 1e-14 * state.time.hi.abs().max(1e-3) {
-                let what = "the series converges in ever smaller circles".into();
-                return Err(stop(Cause::StepTooSmall, wanted, what, "look for a spring of length zero or a position without inertia"));
+                return Err(stop(Cause::StepTooSmall, state, wanted, "the series converges in ever smaller circles".into(), hint));
             }
-            let whole = wanted >= left;
-            let h = if whole {
-                left
-            } else if wanted > 0.5 * left {
-                0.5 * left
-            } else {
-                wanted
-            };
-            let exact = if whole { until - state.time } else { DoubleDouble::from(h) };
-            let step = T::split(exact).0;
-            let mut add = |i: usize, increment: T| {
-                let sum = state.unknown(i) + increment.double_double();
-                (state.y[i], state.low[i]) = (sum.hi, sum.lo);
-            };
-            for i in 0..f {
-                add(i, integral(&series.rate, i, f, step));
-                add(f + i, tail(&series.rate, i, f, 1, step));
-            }
-            add(2 * f, integral(&series.power, 0, 1, step));
-            state.time = if whole { until } else { state.time + exact };
+            state.time = if h == left.hi { until } else { state.time + h };
             state.wrap();
             tally.steps += 1;
             if watch(problem, state)? == Seen::Changed {
                 state.memory.clear();
             }
         }
+    }
+}
+
+fn stop(cause: Cause, state: &State, step: f64, what: String, hint: &str) -> StepError {
+    StepError { cause, method: "taylor".into(), t: state.time.hi, step, what, hint: hint.into() }
+}
+
+impl<T: Real> Taylor<T> {
+    /// One step by the series of any mechanism, of at most `left` \[s\]: the step wanted and the step taken.
+    fn series_step<P: Field + Form + ?Sized>(&mut self, problem: &P, state: &mut State, left: Time) -> (f64, f64) {
+        let f = problem.angles();
+        for vector in [&mut self.u, &mut self.rest, &mut self.rate] {
+            vector.resize(f, T::ZERO);
+        }
+        let series = self.series.get_or_insert_with(|| Series::new(problem.mechanism(), self.order));
+        for i in 0..f {
+            (self.u[i], self.rest[i]) = T::split(state.unknown(i));
+            self.rate[i] = T::split(state.unknown(f + i)).0;
+        }
+        series.expand(problem.mechanism(), state.time, &self.u, &self.rest, &self.rate);
+        let wanted = step(series, f, self.tolerance);
+        if wanted.is_nan() {
+            return (wanted, 0.0);
+        }
+        let h = pace::taken(wanted, left.hi);
+        let exact = if h == left.hi { left } else { DoubleDouble::from(h) };
+        let step = T::split(exact).0;
+        let mut add = |i: usize, increment: T| {
+            let sum = state.unknown(i) + increment.double_double();
+            (state.y[i], state.low[i]) = (sum.hi, sum.lo);
+        };
+        for i in 0..f {
+            add(i, integral(&series.rate, i, f, step));
+            add(f + i, tail(&series.rate, i, f, 1, step));
+        }
+        add(2 * f, integral(&series.power, 0, 1, step));
+        (wanted, h)
+    }
+
+    /// The unknown whose series is not finite, as far as it is known.
+    fn lost<P: Field + ?Sized>(&self, problem: &P) -> String {
+        let f = problem.angles();
+        let rates = self.series.as_ref().map_or(&[][..], |series| &series.rate);
+        let lost = rates.iter().position(|rate| !rate.value().is_finite()).map_or(0, |at| at % f.max(1));
+        problem.label(f + lost)
     }
 }
 
@@ -164,10 +208,9 @@ fn step<T: Real>(series: &Series<T>, coordinates: usize, tolerance: f64) -> f64 
         if largest.is_nan() {
             return f64::NAN;
         }
-        let power = (k + 1) as f64;
         if largest > 0.0 {
-            step = step.min(libm::pow(tolerance * power / largest, 1.0 / power));
+            step = step.min(libm::pow(largest, -1.0 / k as f64));
         }
     }
-    step
+    step * libm::pow(tolerance, 1.0 / (series.order() + 1) as f64)
 }

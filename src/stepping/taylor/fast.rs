@@ -1,0 +1,109 @@
+//! Which fast kernel fits a mechanism, an order and the processor; the one place where compiled-for-the-processor code is entered.
+
+use super::bodies::{self, Bodies};
+use super::driven::{self, Driven};
+use super::pace::Pace;
+use super::pair::{self, Pair};
+#[cfg(target_arch = "x86_64")]
+use crate::arithmetic::lanes::Avx;
+use crate::arithmetic::lanes::{self, Lanes, Portable};
+use crate::dynamics::{Mechanism, State};
+
+/// A kernel ready to run.
+#[derive(Clone, Debug)]
+pub struct Fast {
+    form: Form,
+    pace: Pace,
+    step: Step,
+}
+
+/// What it runs on.
+#[derive(Clone, Debug)]
+enum Form {
+    Pair(Pair, Box<pair::Scratch>),
+    Driven(Box<Driven>, Box<driven::Scratch>),
+    Few(Box<Bodies<1>>),
+    Several(Box<Bodies<2>>),
+}
+
+/// One step of a state by at most so many seconds: the step wanted and the step taken.
+type Step = unsafe fn(&mut Form, &Pace, &mut State, f64) -> (f64, f64);
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx,fma")]
+fn hardware<const P: usize>(form: &mut Form, pace: &Pace, state: &mut State, left: f64) -> (f64, f64) {
+    step::<Avx, P>(form, pace, state, left)
+}
+
+fn portable<const P: usize>(form: &mut Form, pace: &Pace, state: &mut State, left: f64) -> (f64, f64) {
+    step::<Portable, P>(form, pace, state, left)
+}
+
+/// The code of one order for this processor.
+fn of_order<const P: usize>(is_portable: bool) -> Step {
+    #[cfg(target_arch = "x86_64")]
+    if !is_portable && lanes::available() {
+        return hardware::<P>;
+    }
+    portable::<P>
+}
+
+#[inline(always)]
+fn step<L: Lanes, const P: usize>(form: &mut Form, pace: &Pace, state: &mut State, left: f64) -> (f64, f64) {
+    match (form, &mut state.y[..], &mut state.low[..]) {
+        (Form::Pair(pair, scratch), [phi1, phi2, v1, v2, ..], [phi1_low, phi2_low, v1_low, v2_low, ..]) => {
+            let mut flow = pair::Flow { high: [*phi1, *v1, *phi2, *v2], low: [*phi1_low, *v1_low, *phi2_low, *v2_low] };
+            let steps = pair::step::<L, P>(pair, pace, scratch, &mut flow, left);
+            [*phi1, *v1, *phi2, *v2] = flow.high;
+            [*phi1_low, *v1_low, *phi2_low, *v2_low] = flow.low;
+            steps
+        }
+        (Form::Driven(driven, scratch), [phi, v, work, ..], [phi_low, v_low, work_low, ..]) => {
+            let mut flow = driven::Flow { high: [*phi, *v, *work], low: [*phi_low, *v_low, *work_low] };
+            let steps = driven::step::<L, P>(driven, pace, scratch, &mut flow, state.time, left);
+            [*phi, *v, *work] = flow.high;
+            [*phi_low, *v_low, *work_low] = flow.low;
+            steps
+        }
+        (Form::Few(bodies), ..) => bodies::step::<L, P, 1>(bodies, pace, state, left),
+        (Form::Several(bodies), ..) => bodies::step::<L, P, 2>(bodies, pace, state, left),
+        _ => (f64::NAN, 0.0),
+    }
+}
+
+impl Fast {
+    /// The kernel, where there is one.
+    pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize, is_portable: bool) -> Option<Self> {
+        let step = match order {
+            16 => of_order::<16>(is_portable),
+            20 => of_order::<20>(is_portable),
+            24 => of_order::<24>(is_portable),
+            _ => return None,
+        };
+        let (form, longest) = if let Some(pair) = Pair::new(mechanism) {
+            let longest = pair.longest(order);
+            (Form::Pair(pair, Box::default()), longest)
+        } else if let Some(driven) = Driven::new(mechanism) {
+            let longest = driven.longest(order);
+            (Form::Driven(Box::new(driven), Box::default()), longest)
+        } else if let Some(bodies) = Bodies::<1>::new(mechanism) {
+            let longest = bodies.longest(order);
+            (Form::Few(Box::new(bodies)), longest)
+        } else {
+            let bodies = Bodies::<2>::new(mechanism)?;
+            let longest = bodies.longest(order);
+            (Form::Several(Box::new(bodies)), longest)
+        };
+        Some(Self { form, pace: Pace::new(tolerance, order, longest), step })
+    }
+
+    /// One step of at most `left` \[s\] from the state's unknowns, which are then the new ones; returns the step wanted and the step taken.
+    #[inline]
+    pub fn step(&mut self, state: &mut State, left: f64) -> (f64, f64) {
+        // SAFETY: `of_order` hands out code for AVX and FMA only after the processor was asked for them; all else in it is safe code.
+        #[allow(unsafe_code)]
+        unsafe {
+            (self.step)(&mut self.form, &self.pace, state, left)
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! The step from the last coefficients, without a logarithm or a power function.
+//!
+//! ```text
+//! h = tolerance^(1/(P+1)) min_k |v_k|^(-1/k),   k = P-4…P
+//! ```
+//!
+//! which puts the first term left out of a rate at the tolerance.  The logarithm taken straight from the bits of a double is piecewise linear, its error
+//! at most 0.09, and that is divided by k.
+
+use super::JUDGES;
+
+/// What the double 1/k leaves out, for k below 13: further up the terms are too small for it to matter.
+pub const RECIPROCAL_REST: [f64; 13] = [
+    0.0,
+    0.0,
+    0.0,
+    1.850_371_707_708_594e-17,
+    0.0,
+    -1.110_223_024_625_156_6e-17,
+    9.251_858_538_542_97e-18,
+    7.930_164_461_608_26e-18,
+    0.0,
+    6.167_905_692_361_98e-18,
+    -5.551_115_123_125_783e-18,
+    -2.523_234_146_875_356e-18,
+    4.625_929_269_271_485e-18,
+];
+
+/// How long steps may be.
+#[derive(Clone, Debug)]
+pub struct Pace {
+    /// log2 tolerance / (P+1).
+    exponent: f64,
+    /// The longest step \[s\].
+    longest: f64,
+}
+
+impl Pace {
+    /// For a tolerance \[rad/s\] and an order, with a longest step \[s\].
+    pub fn new(tolerance: f64, order: usize, longest: f64) -> Self {
+        Self { exponent: libm::log2(tolerance) / (order + 1) as f64, longest }
+    }
+
+    /// The step from the largest coefficients of orders P, P-1, … \[s\]; the longest one where they vanish.
+    #[inline(always)]
+    pub fn step<const P: usize>(&self, largest: &[f64; JUDGES]) -> f64 {
+        let mut least = f64::INFINITY;
+        for (i, &size) in largest.iter().enumerate() {
+            let log = (1f64.to_bits() as i64 - size.to_bits() as i64) as f64;
+            let root = log * (1.0 / ((1_u64 << 52) as f64 * (P - i) as f64));
+            least = if root < least { root } else { least };
+        }
+        let x = least + self.exponent;
+        if x > 60.0 {
+            return self.longest;
+        }
+        // 2^x: whole part into the exponent, a cubic for the fraction.
+        let whole = x.floor();
+        let part = x - whole;
+        let power = 1.0 + part * (0.695_5 + part * (0.226_2 + part * 0.078_3));
+        let h = power * f64::from_bits((1023 + whole.max(-1000.0) as i64 as u64) << 52);
+        if h < self.longest { h } else { self.longest }
+    }
+}
+
+/// The step taken of the one wanted where `left` \[s\] are left: no sliver is left over.
+#[inline(always)]
+pub fn taken(wanted: f64, left: f64) -> f64 {
+    if wanted >= left {
+        left
+    } else if wanted > 0.5 * left {
+        0.5 * left
+    } else {
+        wanted
+    }
+}
