@@ -156,7 +156,10 @@ fn a_bar_that_falls_on_a_wall_comes_to_rest_there_for_good() {
             let rebound = -small.approach * restitution;
             let rest = small.t + 2.0 * rebound / (PENDULUM_SQUARED * 0.5f64.sin()) / (1.0 - restitution);
             let from = outcome.holds[0].t;
-            assert!((from - rest).abs() < 1e-5 && from < rest + 1e-9, "held from {from} s, at rest at {rest} s");
+            // The point is held where it would rebound to less than 1e-11 m; what is left of the series is no longer waited for.
+            let acceleration = PENDULUM_SQUARED * 0.5f64.sin();
+            let left = 2.0 * (2e-11 / acceleration).sqrt() / (1.0 - restitution);
+            assert!((from - rest).abs() < 1.1 * left && from < rest + 1e-7, "held from {from} s, at rest at {rest} s");
         }
     }
 }
@@ -233,12 +236,7 @@ fn a_motor_drags_an_end_along_a_floor() {
     let (phi, omega, _) = at(0.0);
     let mut scene = on_a_floor(depth, phi, omega);
     let sines = vec![Sine { amplitude, frequency, phase: 0.0 }];
-    scene.motors.push(Motor {
-        name: "motor".into(),
-        bar: 0,
-        relative_to: None,
-        law: Law { start, rate: 0.0, acceleration: 0.0, sines },
-    });
+    scene.motors.push(Motor { name: "motor".into(), bar: 0, relative_to: None, law: Law { start, rate: 0.0, acceleration: 0.0, sines } });
     for stabilize in [Stabilization::Elimination, Stabilization::Projection, Stabilization::Baumgarte, Stabilization::None] {
         let request = Request { stabilize: Some(stabilize), ..dp8(10.0, 0.01, 1e-11) };
         let (outcome, samples) = watched(&scene, &request);
@@ -261,13 +259,14 @@ fn a_motor_drags_an_end_along_a_floor() {
     }
 }
 
-/// The motor lifts the end off its floor and sets it down again; its account of work goes through both.
+/// The motor throws the end off its floor, and it falls back on it; the motor's account of work goes through hold, release and impacts.
 #[test]
 fn the_account_of_work_goes_through_holds_and_releases() {
-    let angle = 0.75f64.acos();
-    let mut scene = on_a_floor(1.5 * LENGTH, [-angle, angle], [0.0, 0.0]);
-    let sines = vec![Sine { amplitude: 0.5, frequency: 8.0, phase: std::f64::consts::FRAC_PI_2 }];
-    let law = Law { start: -angle - 0.5, rate: 0.0, acceleration: 0.0, sines };
+    let other = (1.5 - 0.4f64.cos()).acos();
+    let rate = 0.4 * 14.0;
+    let mut scene = on_a_floor(1.5 * LENGTH, [0.4, other], [rate, -0.4f64.sin() * rate / other.sin()]);
+    let sines = vec![Sine { amplitude: 0.4, frequency: 14.0, phase: 0.0 }];
+    let law = Law { start: 0.4, rate: 0.0, acceleration: 0.0, sines };
     scene.motors.push(Motor { name: "motor".into(), bar: 0, relative_to: None, law });
     scene.walls[0].restitution = 0.3;
     let mut finals = Vec::new();
@@ -275,7 +274,7 @@ fn the_account_of_work_goes_through_holds_and_releases() {
         let request = Request { stabilize: Some(stabilize), ..dp8(1.5, 0.01, 1e-11) };
         let (outcome, samples) = watched(&scene, &request);
         assert_eq!(outcome.stop, None, "{stabilize}");
-        assert!(outcome.holds.iter().filter(|hold| hold.until.is_some()).count() > 1, "{:?}", outcome.holds);
+        assert!(outcome.holds[0].until.is_some() && outcome.strike_count > 1, "{:?} {:?}", outcome.holds, outcome.strike_count);
         assert!(outcome.drift.energy.max < 1e-9, "{stabilize}: {:e}", outcome.drift.energy.max);
         assert!(worst_gap(&scene, &outcome, &samples) < 1e-12);
         finals.push((outcome.last.phi[1], outcome.last.work, outcome.hold_count));

@@ -18,6 +18,8 @@ use nalgebra::{DMatrix, DVector};
 pub const REST_HEIGHT: f64 = 1e-11;
 /// Contact force over the energy scale \[1/m\] below which a point is not pressed; rounding makes forces of this size.
 const LEAST_FORCE: f64 = 4e-12;
+/// |G| over the levers of the point below which it stands at a dead centre: there its wall has no hold on it, and a row would be singular.
+const DEAD_CENTRE: f64 = 1e-5;
 
 impl Mechanism {
     /// The mechanism with these of its contacts kept by a row each, after the rows of the motors.
@@ -64,9 +66,13 @@ impl Mechanism {
             let acceleration = &free - &schur * &multiplier;
             let mut hardest: Option<(usize, f64)> = None;
             for r in (motors..size).filter(|r| !set.contains(r)) {
+                let terms = &self.contacts[touching[r - motors]].row.point.terms;
+                let levers: f64 = terms.iter().map(|term| term.1.norm_squared()).sum();
+                let jacobian = part(&kernel.jacobian, r, n);
                 let inward = -acceleration[r];
                 let speed = kernel.row_rate(r, omega);
-                if inward <= 0.0 || speed * speed > 2.0 * REST_HEIGHT * inward {
+                let dead = dot(jacobian, jacobian) < DEAD_CENTRE * DEAD_CENTRE * levers;
+                if dead || inward <= 0.0 || speed * speed > 2.0 * REST_HEIGHT * inward {
                     continue;
                 }
                 // What the rows in force leave of the point's freedom to give way.

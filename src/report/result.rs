@@ -28,8 +28,8 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value 
     let stabilizer = (!mechanism.rows.is_empty()).then(|| json!({"energy_j": drift.stabilizer, "max_j": drift.stabilizer_max}));
     let impacts = (!mechanism.contacts.is_empty())
         .then(|| json!({"count": outcome.strike_count, "energy_lost_j": outcome.strike_loss, "first": outcome.strikes}));
-    let holds = (!mechanism.contacts.is_empty())
-        .then(|| json!({"count": outcome.hold_count, "time_s": outcome.hold_time, "first": outcome.holds}));
+    let holds =
+        (!mechanism.contacts.is_empty()).then(|| json!({"count": outcome.hold_count, "time_s": outcome.hold_time, "first": outcome.holds}));
     let (trend, trend_error) = drift.energy.trend();
     json!({
         "scene": scene.name,

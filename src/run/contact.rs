@@ -118,6 +118,8 @@ impl Course {
                     if before == (outcome.strike_count, self.mechanism.held.clone()) {
                         return Err(stop);
                     }
+                    // The steps that closed in on the wall are too short to see the point leave it.
+                    self.marcher.forget();
                 }
                 Err(stop) => return Err(stop),
             }
@@ -134,7 +136,8 @@ impl Course {
                 let motion = self.motion();
                 let row = &self.free.contacts[contact].row;
                 let (z, _, omega) = posture(&motion);
-                let fastest = row.point.terms.iter().fold(0.0, |most: f64, &(k, gamma)| most.max(gamma.norm_squared().sqrt() * omega[k].abs()));
+                let fastest =
+                    row.point.terms.iter().fold(0.0, |most: f64, &(k, gamma)| most.max(gamma.norm_squared().sqrt() * omega[k].abs()));
                 let approach = row.normal.dot(row.point.velocity(&z, &omega));
                 let held = self.mechanism.held.contains(&contact);
                 // Rounding leaves this much of a velocity that an impact took off.

@@ -32,6 +32,8 @@ pub(super) trait March {
     fn tally(&self) -> Tally;
     /// What the method carries from step to step.
     fn memory(&self) -> &[f64];
+    /// Makes the method choose its step anew.
+    fn forget(&mut self);
     /// Goes on counting, and with the steps, where another left off.
     fn follow(&mut self, other: &dyn March);
 }
@@ -64,6 +66,10 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
 
     fn memory(&self) -> &[f64] {
         &self.state.memory
+    }
+
+    fn forget(&mut self) {
+        self.state.memory.clear();
     }
 
     fn follow(&mut self, other: &dyn March) {

@@ -175,7 +175,8 @@ impl<P: Pair> Explicit<P> {
                 }
                 // Leaving a wall the gap starts at zero within rounding; it must open before it can close.
                 if before <= 1e-12 {
-                    if after < -1e-12 {
+                    // A point at the bound that is on its way out is not going through.
+                    if after < -1e-12 && after < before {
                         return Found::Inside;
                     }
                     continue;
