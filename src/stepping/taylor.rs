@@ -26,7 +26,7 @@ use self::fast::Fast;
 use super::{Cause, Method, Reached, Seen, StepError, Tally, Tolerance, Watch};
 use crate::arithmetic::{DoubleDouble, Real};
 use crate::dynamics::series::{Series, integral, tail};
-use crate::dynamics::{Field, Form, State, Time};
+use crate::dynamics::{Field, Form, Mechanism, State, Time};
 
 /// Powers the step is taken from.
 const JUDGES: usize = 5;
@@ -54,6 +54,7 @@ pub struct Taylor<T> {
     pub max_steps: u64,
     /// Which code expands the motion.
     pub kernel: Kernel,
+    fast: Option<Fast>,
     series: Option<Series<T>>,
     u: Vec<T>,
     rest: Vec<T>,
@@ -69,6 +70,7 @@ impl<T: Real> Taylor<T> {
             order,
             max_steps: 10_000_000,
             kernel: Kernel::default(),
+            fast: None,
             series: None,
             u: Vec::new(),
             rest: Vec::new(),
@@ -114,9 +116,7 @@ impl<T: Real, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
         tally: &mut Tally,
         watch: &mut Watch<P>,
     ) -> Result<Reached, StepError> {
-        let fast = T::IS_PLAIN && self.kernel != Kernel::Series;
-        let is_portable = self.kernel == Kernel::Portable;
-        let mut fast = if fast { Fast::new(problem.mechanism(), self.tolerance, self.order, is_portable) } else { None };
+        self.choose(problem.mechanism());
         let mut taken = 0;
         loop {
             let left = until - state.time;
@@ -129,7 +129,7 @@ impl<T: Real, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
                 return Err(stop(Cause::TooManySteps, state, 0.0, what, "loosen the tolerance"));
             }
             tally.evaluations += 1;
-            let (wanted, h) = match &mut fast {
+            let (wanted, h) = match &mut self.fast {
                 Some(fast) => fast.step(state, left.hi),
                 None => self.series_step(problem, state, left),
             };
@@ -156,13 +156,26 @@ fn stop(cause: Cause, state: &State, step: f64, what: String, hint: &str) -> Ste
 }
 
 impl<T: Real> Taylor<T> {
+    /// Keeps the fast kernel at hand, makes the one that fits, or leaves it to the series.
+    fn choose(&mut self, mechanism: &Mechanism) {
+        let is_portable = self.kernel == Kernel::Portable;
+        let (tolerance, order) = (self.tolerance, self.order);
+        if !T::IS_PLAIN || self.kernel == Kernel::Series {
+            self.fast = None;
+        } else if !self.fast.as_ref().is_some_and(|fast| fast.is_for(mechanism, tolerance, order, is_portable)) {
+            self.fast = Fast::new(mechanism, tolerance, order, is_portable);
+        }
+    }
+
     /// One step by the series of any mechanism, of at most `left` \[s\]: the step wanted and the step taken.
     fn series_step<P: Field + Form + ?Sized>(&mut self, problem: &P, state: &mut State, left: Time) -> (f64, f64) {
         let f = problem.angles();
         for vector in [&mut self.u, &mut self.rest, &mut self.rate] {
             vector.resize(f, T::ZERO);
         }
-        let series = self.series.get_or_insert_with(|| Series::new(problem.mechanism(), self.order));
+        let order = self.order;
+        self.series.take_if(|series| series.order() != order);
+        let series = self.series.get_or_insert_with(|| Series::new(problem.mechanism(), order));
         for i in 0..f {
             (self.u[i], self.rest[i]) = T::split(state.unknown(i));
             self.rate[i] = T::split(state.unknown(f + i)).0;

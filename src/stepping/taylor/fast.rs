@@ -7,14 +7,27 @@ use super::pair::{self, Pair};
 #[cfg(target_arch = "x86_64")]
 use crate::arithmetic::lanes::Avx;
 use crate::arithmetic::lanes::{self, Lanes, Portable};
+use crate::dynamics::row::Row;
+use crate::dynamics::tree::Tree;
 use crate::dynamics::{Mechanism, State};
 
 /// A kernel ready to run.
 #[derive(Clone, Debug)]
 pub struct Fast {
+    settings: Settings,
     form: Form,
     pace: Pace,
     step: Step,
+}
+
+/// What it was made for.
+#[derive(Clone, Debug, PartialEq)]
+struct Settings {
+    tree: Tree,
+    rows: Vec<Row>,
+    tolerance: f64,
+    order: usize,
+    is_portable: bool,
 }
 
 /// What it runs on.
@@ -94,7 +107,17 @@ impl Fast {
             let longest = bodies.longest(order);
             (Form::Several(Box::new(bodies)), longest)
         };
-        Some(Self { form, pace: Pace::new(tolerance, order, longest), step })
+        let settings = Settings { tree: mechanism.tree.clone(), rows: mechanism.rows.clone(), tolerance, order, is_portable };
+        Some(Self { settings, form, pace: Pace::new(tolerance, order, longest), step })
+    }
+
+    /// True where it was made for all these.
+    pub fn is_for(&self, mechanism: &Mechanism, tolerance: f64, order: usize, is_portable: bool) -> bool {
+        let made = &self.settings;
+        (made.tolerance, made.order, made.is_portable) == (tolerance, order, is_portable)
+            && made.tree == mechanism.tree
+            && made.rows == mechanism.rows
+            && mechanism.springs.is_empty()
     }
 
     /// One step of at most `left` \[s\] from the state's unknowns, which are then the new ones; returns the step wanted and the step taken.

@@ -261,7 +261,14 @@ pub fn step<L: Lanes, const P: usize>(pair: &Pair, pace: &Pace, scratch: &mut Sc
     let weight = L::of(pair.weight);
     let load = pair_sum(coupling.neg_mul_add(e0.mul(g1.swap_halves()), weight.mul(e0)));
     let mut first = inverse[1].mul_add(load.swap_halves(), inverse[0].mul(load));
-    let residual = m.neg_mul_add(first.swap_halves(), L::of([d1, d1, d2, d2]).neg_mul_add(first, load));
+    // The first order's solution is rounded, not merely computed: one step with the residual, whose sums and products are exact up to the last.
+    let (diagonal, crossed) = (L::of([d1, d1, d2, d2]), first.swap_halves());
+    let (on, off) = (diagonal.mul(first), m.mul(crossed));
+    let dropped = diagonal.mul_add(first, L::splat(0.0).sub(on)).add(m.mul_add(crossed, L::splat(0.0).sub(off)));
+    let rest = load.sub(on);
+    let back = rest.sub(load);
+    let lost = load.sub(rest.sub(back)).sub(on.add(back));
+    let residual = rest.sub(off).add(lost.sub(dropped));
     first = first.add(inverse[1].mul_add(residual.swap_halves(), inverse[0].mul(residual)));
     let minus = L::splat(-pair.coupling);
     let start = Start {
