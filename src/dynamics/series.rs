@@ -199,8 +199,8 @@ impl<T: Real> Series<T> {
             self.bend[i] += self.z[i].left().times(given);
         }
         let rest = &mut self.rest[m * n..(m + 1) * n];
-        for i in 0..n {
-            rest[i] = if m == 0 { -Complex::of(mechanism.tree.weight[i]) } else { Complex::ZERO };
+        for (rest, &weight) in rest.iter_mut().zip(&mechanism.tree.weight) {
+            *rest = if m == 0 { -Complex::of(weight) } else { Complex::ZERO };
         }
         for i in 0..n {
             for j in i + 1..n {

@@ -249,9 +249,9 @@ fn begin<L: Lanes, const B: usize>(bodies: &mut Bodies<B>, state: &State) {
         pairs[first] = [ca, sa];
         pairs[second] = [cb, sb];
     }
-    for i in 0..n {
-        scratch.c[0][i / 4][i % 4] = pairs[i][0];
-        scratch.s[0][i / 4][i % 4] = pairs[i][1];
+    for (i, [c, s]) in pairs.into_iter().enumerate().take(n) {
+        scratch.c[0][i / 4][i % 4] = c;
+        scratch.s[0][i / 4][i % 4] = s;
         scratch.v[0][i / 4][i % 4] = state.y[n + i];
     }
     let mass = &mut bodies.mass;
@@ -271,8 +271,8 @@ fn begin<L: Lanes, const B: usize>(bodies: &mut Bodies<B>, state: &State) {
         unit.fill(0.0);
         unit[j] = 1.0;
         tree::solve::<f64, 0>(n, mass, &bodies.pivot, &mut unit[..n]);
-        for i in 0..n {
-            bodies.inverse[j][i / 4][i % 4] = unit[i];
+        for (i, &entry) in unit.iter().enumerate().take(n) {
+            bodies.inverse[j][i / 4][i % 4] = entry;
         }
     }
 }
@@ -286,10 +286,8 @@ fn finish<L: Lanes, const P: usize, const B: usize>(scratch: &Scratch<B>, state:
         let mut k = P;
         while k > 0 {
             let v = L::of(scratch.v[k][b]);
-            let mut term = v.mul(L::splat(1.0 / (k + 1) as f64));
-            if let Some(&rest) = RECIPROCAL_REST.get(k + 1) {
-                term = v.mul_add(L::splat(rest), term);
-            }
+            let r = L::splat(1.0 / (k + 1) as f64);
+            let term = if k + 1 < RECIPROCAL_REST.len() { v.mul_add(r, v.mul(L::splat(RECIPROCAL_REST[k + 1]))) } else { v.mul(r) };
             angles[k % 2] = angles[k % 2].mul_add(square, term);
             rates[k % 2] = rates[k % 2].mul_add(square, v);
             k -= 1;

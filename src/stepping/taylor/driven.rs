@@ -129,21 +129,25 @@ fn order<L: Lanes, const K: usize>(driven: &Driven, directions: &[L; 4], scratch
     let sum = sums[0].add(sums[1]);
     let crossed = sum.first_half().swap_pairs();
     let r = 1.0 / (K + 1) as f64;
-    let mut e = crossed.mul(L::of([-r, r, -r, r]));
-    if K + 1 < RECIPROCAL_REST.len() && RECIPROCAL_REST[K + 1] != 0.0 {
+    let factor = L::of([-r, r, -r, r]);
+    let e = if K + 1 < RECIPROCAL_REST.len() && RECIPROCAL_REST[K + 1] != 0.0 {
         let r = RECIPROCAL_REST[K + 1];
-        e = crossed.mul_add(L::of([-r, r, -r, r]), e);
-    }
+        crossed.mul_add(factor, crossed.mul(L::of([-r, r, -r, r])))
+    } else {
+        crossed.mul(factor)
+    };
     scratch.e[K + 1] = e.array();
     let load = sum.add(sum.swap_pairs()).swap_halves();
     let [drive, drive_rest] = driven.drive[K + 1];
     let direction = directions[(K + 1) % 4];
-    let mut known = direction.mul(L::of(drive));
     let [inverse, inverse_rest] = driven.inverse[K + 1];
-    if K < 12 {
-        known = direction.mul_add(L::of(drive_rest), known);
-        known = load.mul_add(L::of(inverse_rest), known);
-    }
+    // The lanes of both are apart, so that each low part joins before its own rounding.
+    let known = if K < 12 {
+        let low = load.mul_add(L::of(inverse_rest), direction.mul(L::of(drive_rest)));
+        direction.mul_add(L::of(drive), low)
+    } else {
+        direction.mul(L::of(drive))
+    };
     scratch.m[K + 1] = load.mul_add(L::of(inverse), known).array();
 }
 
@@ -168,7 +172,7 @@ pub fn step<L: Lanes, const P: usize>(
     let [drive, drive_rest] = driven.drive[0];
     let [_, free] = driven.weight;
     let first = L::of([v, v, free.im, -free.re]);
-    let first = directions[0].mul_add(L::of(drive), directions[0].mul_add(L::of(drive_rest), first));
+    let first = directions[0].mul_add(L::of(drive), directions[0].mul(L::of(drive_rest))).add(first);
     scratch.e[0] = halves.first_half().array();
     scratch.m[0] = first.array();
     orders!(P, driven, &directions, scratch; 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23);
@@ -182,7 +186,7 @@ pub fn step<L: Lanes, const P: usize>(
     let wanted = pace.step::<P>(&largest);
     let h = pace::taken(wanted, left);
     if h > 0.0 {
-        let [angle, rate] = rates::<L, P>(scratch, h);
+        let [angle, rate] = rates::<P>(scratch, h);
         let (turned, swept) = directions_moved::<L, P>(scratch, h);
         // What the driven body has turned.
         let [c_turn, s_turn, ..] = direction::unit(L::splat(w * h), L::splat(w.mul_add(h, -(w * h)))).array();
@@ -203,16 +207,14 @@ pub fn step<L: Lanes, const P: usize>(
 
 /// Increments of the angle and of the rate.
 #[inline(always)]
-fn rates<L: Lanes, const P: usize>(scratch: &Scratch, h: f64) -> [f64; 2] {
+fn rates<const P: usize>(scratch: &Scratch, h: f64) -> [f64; 2] {
     let square = h * h;
     let mut chains = [[0_f64; 2]; 2];
     let mut k = P;
     while k > 0 {
         let v = scratch.m[k][0];
-        let mut term = v * (1.0 / (k + 1) as f64);
-        if k + 1 < RECIPROCAL_REST.len() && RECIPROCAL_REST[k + 1] != 0.0 {
-            term = v.mul_add(RECIPROCAL_REST[k + 1], term);
-        }
+        let r = 1.0 / (k + 1) as f64;
+        let term = if k + 1 < RECIPROCAL_REST.len() { v.mul_add(r, v * RECIPROCAL_REST[k + 1]) } else { v * r };
         let chain = &mut chains[k % 2];
         *chain = [chain[0].mul_add(square, term), chain[1].mul_add(square, v)];
         k -= 1;

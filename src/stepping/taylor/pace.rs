@@ -74,3 +74,34 @@ pub fn taken(wanted: f64, left: f64) -> f64 {
         wanted
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arithmetic::DoubleDouble;
+
+    #[test]
+    fn fractions_are_whole_in_two_terms() {
+        for (k, &rest) in RECIPROCAL_REST.iter().enumerate().skip(1) {
+            let whole = (DoubleDouble::from(1.0 / k as f64) + rest) * DoubleDouble::from(k as f64);
+            assert!((whole + -1.0).hi.abs() < 1e-30, "{k}");
+        }
+    }
+
+    #[test]
+    fn the_step_is_that_of_the_formula_within_two_percent() {
+        for (scale, growth) in [(1.0, 20.0), (1e-12, 3.0), (1e6, 0.5)] {
+            let size = |k: i32| scale * f64::powi(growth, k);
+            let exact = (16..=20).map(|k| size(k).powf(-1.0 / f64::from(k))).fold(f64::INFINITY, f64::min) * 1e-13_f64.powf(1.0 / 21.0);
+            let found = Pace::new(1e-13, 20, 1e9).step::<20>(&[size(20), size(19), size(18), size(17), size(16)]);
+            assert!((found / exact - 1.0).abs() < 0.02, "{found} {exact}");
+        }
+    }
+
+    #[test]
+    fn vanishing_coefficients_give_the_longest_step() {
+        assert_eq!(Pace::new(1e-13, 20, 7.0).step::<20>(&[0.0; JUDGES]), 7.0);
+        // One of them is enough for a step that is right.
+        assert!(Pace::new(1e-13, 20, 7.0).step::<20>(&[0.0, 0.0, 0.0, 1e20, 0.0]) < 0.1);
+    }
+}

@@ -108,8 +108,8 @@ struct Start<L> {
     other: L,
     /// M_0⁻¹ on and off its diagonal.
     inverse: [L; 2],
-    /// M_0⁻¹ T_k/(k+1) = `near + steep/(k+1)`, on and off the diagonal.
-    near: [L; 2],
+    /// M_0⁻¹ T_k = `still + steep k`, on and off the diagonal.
+    still: [L; 2],
     steep: [L; 2],
 }
 
@@ -185,15 +185,9 @@ fn order<L: Lanes, const K: usize>(s: &Start<L>, scratch: &mut Scratch, older: S
         x = s.e0.mul(L::splat((K + 1) as f64)).mul_add(b.swap_halves(), x);
     }
     let d = pair_sum(x);
-    let r = L::splat(1.0 / (K + 1) as f64);
-    let (mut on, mut off) = (s.steep[0].mul_add(r, s.near[0]), s.steep[1].mul_add(r, s.near[1]));
-    let (mut direct, mut crossed, mut turn) = (s.inverse[0].mul(r), s.inverse[1].mul(r), s.left.mul(r));
-    if K + 1 < RECIPROCAL_REST.len() && RECIPROCAL_REST[K + 1] != 0.0 {
-        let rest = L::splat(RECIPROCAL_REST[K + 1]);
-        (on, off) = (s.steep[0].mul_add(rest, on), s.steep[1].mul_add(rest, off));
-        (direct, crossed) = (s.inverse[0].mul_add(rest, direct), s.inverse[1].mul_add(rest, crossed));
-        turn = s.left.mul_add(rest, turn);
-    }
+    let k = L::splat(K as f64);
+    let (on, off) = (over(s.steep[0].mul_add(k, s.still[0]), K + 1), over(s.steep[1].mul_add(k, s.still[1]), K + 1));
+    let (direct, crossed, turn) = (over(s.inverse[0], K + 1), over(s.inverse[1], K + 1), over(s.left, K + 1));
     let solved = crossed.mul_add(d.swap_halves(), direct.mul(d));
     // From here on everything waits for v_K.
     let swapped = v.swap_halves();
@@ -205,17 +199,24 @@ fn order<L: Lanes, const K: usize>(s: &Start<L>, scratch: &mut Scratch, older: S
     Newest { v: next, e: e_next, g: s.v0.mul_add(e_next, v.mul_add(s.e1, b)) }
 }
 
-/// left(x)/k for a constant k known after inlining.
+/// x/k for a constant k known after inlining, rounded once: what the double 1/k leaves out joins *before* the rounding, since afterwards it is below
+/// half a unit in the last place and changes nothing.
+#[inline(always)]
+fn over<L: Lanes>(x: L, k: usize) -> L {
+    let r = L::splat(1.0 / k as f64);
+    if k < RECIPROCAL_REST.len() && RECIPROCAL_REST[k] != 0.0 { x.mul_add(r, x.mul(L::splat(RECIPROCAL_REST[k]))) } else { x.mul(r) }
+}
+
+/// left(x)/k likewise.
 #[inline(always)]
 fn left_over<L: Lanes>(x: L, k: usize) -> L {
-    let swapped = x.swap_pairs();
     let r = 1.0 / k as f64;
-    let quotient = swapped.mul(L::of([-r, r, -r, r]));
+    let (swapped, r) = (x.swap_pairs(), L::of([-r, r, -r, r]));
     if k < RECIPROCAL_REST.len() && RECIPROCAL_REST[k] != 0.0 {
-        let r = RECIPROCAL_REST[k];
-        swapped.mul_add(L::of([-r, r, -r, r]), quotient)
+        let rest = RECIPROCAL_REST[k];
+        swapped.mul_add(r, swapped.mul(L::of([-rest, rest, -rest, rest])))
     } else {
-        quotient
+        swapped.mul(r)
     }
 }
 
@@ -250,10 +251,8 @@ pub fn step<L: Lanes, const P: usize>(pair: &Pair, pace: &Pace, scratch: &mut Sc
     let inverse = [L::of([d2, d2, d1, d1]).mul(reciprocal), L::splat(0.0).sub(m).mul(reciprocal)];
     let twist = coupling.mul(sine);
     let (slope, offset) = (twist.mul(v0.sub(across)), twist.mul(across).mul(L::splat(-2.0)));
-    let near = [inverse[0].mul(slope), inverse[1].mul(slope.swap_halves())];
-    let at_zero = [inverse[0].mul(offset), inverse[1].mul(offset.swap_halves())];
-    // T_k/(k+1) = slope + (offset - slope)/(k+1).
-    let steep = [at_zero[0].sub(near[0]), at_zero[1].sub(near[1])];
+    let steep = [inverse[0].mul(slope), inverse[1].mul(slope.swap_halves())];
+    let still = [inverse[0].mul(offset), inverse[1].mul(offset.swap_halves())];
     let sideways = L::splat(0.0).sub(leftward);
     let f0 = v0.mul(e0);
     let e1 = f0.swap_pairs().mul(L::of(LEFT));
@@ -282,7 +281,7 @@ pub fn step<L: Lanes, const P: usize>(pair: &Pair, pace: &Pace, scratch: &mut Sc
         own: v0.mul(sideways),
         other: across.mul(sideways),
         inverse,
-        near,
+        still,
         steep,
     };
     scratch.e[0] = e0.array();
@@ -339,11 +338,11 @@ fn increment<L: Lanes, const P: usize>(scratch: &Scratch, rates: L, low: L, h: f
 #[inline(always)]
 fn weighed<L: Lanes>(v: L, k: usize) -> L {
     let r = 1.0 / (k + 1) as f64;
-    let term = v.mul(L::of([r, 1.0, r, 1.0]));
+    let factor = L::of([r, 1.0, r, 1.0]);
     if k + 1 < RECIPROCAL_REST.len() && RECIPROCAL_REST[k + 1] != 0.0 {
         let r = RECIPROCAL_REST[k + 1];
-        v.mul_add(L::of([r, 0.0, r, 0.0]), term)
+        v.mul_add(factor, v.mul(L::of([r, 0.0, r, 0.0])))
     } else {
-        term
+        v.mul(factor)
     }
 }
