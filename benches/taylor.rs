@@ -46,7 +46,7 @@ fn chain(n: usize) -> Scene {
             hinge.between[0].bar = Some(i - 1);
             hinge.between[1].bar = Some(i);
             scene.hinges.push(hinge);
-            scene.start.push(scene.start[1].clone());
+            scene.start.push(scene.start[1]);
         }
         scene.start[i].phi = std::f64::consts::FRAC_PI_2 - 0.1 * i as f64;
     }

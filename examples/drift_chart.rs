@@ -23,6 +23,7 @@ enum Setting {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    std::fs::create_dir_all("output")?;
     let until = std::env::args().nth(1).map_or(Ok(1000.0), |until| until.parse::<f64>())?;
     let scene = read_scene("examples/scenes/free.json".as_ref(), &[])?;
     let mut series = Vec::new();

@@ -9,6 +9,7 @@ use driftless::scene::read_scene;
 use std::fmt::Write;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    std::fs::create_dir_all("output")?;
     let scene = read_scene("examples/scenes/motor.json".as_ref(), &[])?;
     let mechanism = Mechanism::new(&scene)?;
     let mut kernel = Kernel::<f64>::new(mechanism.bodies.len(), mechanism.rows.len());

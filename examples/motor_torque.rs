@@ -8,6 +8,7 @@ use driftless::run::{Request, simulate};
 use driftless::scene::read_scene;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    std::fs::create_dir_all("output")?;
     let scene = read_scene("examples/scenes/motor.json".as_ref(), &[])?;
     let request = Request { until: Some(6.0), every: Some(0.01), ..Request::default() };
     let mut peak = [0.0, 0.0];

@@ -8,6 +8,7 @@ use driftless::run::{MethodId, Request, simulate};
 use driftless::scene::read_scene;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    std::fs::create_dir_all("output")?;
     let overrides = ["start.bar1.phi=2.6".parse()?, "start.bar2.phi=3.0".parse()?];
     let scene = read_scene("examples/scenes/spring.json".as_ref(), &overrides)?;
     let request = Request { method: Some(MethodId::Gauss(8)), every: Some(0.01), ..Request::default() };

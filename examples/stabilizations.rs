@@ -10,6 +10,7 @@ use driftless::scene::read_scene;
 use std::sync::Arc;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    std::fs::create_dir_all("output")?;
     let until = std::env::args().nth(1).map_or(Ok(100.0), |until| until.parse::<f64>())?;
     let scene = read_scene("examples/scenes/motor_sine.json".as_ref(), &[])?;
     let mechanism = Arc::new(Mechanism::new(&scene)?);

@@ -8,6 +8,7 @@ use driftless::run::{MethodId, Request, simulate};
 use driftless::scene::read_scene;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    std::fs::create_dir_all("output")?;
     let scene = read_scene("examples/scenes/free.json".as_ref(), &[])?;
     let request = Request { method: Some(MethodId::Dop853), rtol: Some(1e-10), ..Request::default() };
     let outcome = simulate(&scene, &request, &mut |_| Ok(()))?;

@@ -8,6 +8,7 @@ use driftless::run::{Request, simulate};
 use driftless::scene::read_scene;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    std::fs::create_dir_all("output")?;
     for restitution in [0.0, 0.5, 1.0] {
         let set = format!("walls.wall.restitution={restitution}").parse()?;
         let scene = read_scene("examples/scenes/wall.json".as_ref(), &[set])?;

@@ -122,16 +122,16 @@ macro_rules! by_length {
     };
 }
 
-/// What the crate evaluates in every attempt at a step, and again in every accepted one; it does not count a rejection before the first acceptance.
-struct Effort {
+/// A stepper of the crate, and what it evaluates in every attempt at a step, and again in every accepted one; it does not count a rejection before the first acceptance.
+struct Stepper {
+    name: &'static str,
     attempt: u64,
     accepted: u64,
 }
 
 /// One window of either method.
 fn window<F: Field + ?Sized>(
-    name: &'static str,
-    effort: &Effort,
+    stepper: &Stepper,
     integrate: impl FnOnce(Window<F>, &[f64], f64, f64) -> Outcome,
     field: &mut F,
     state: &mut State,
@@ -139,7 +139,7 @@ fn window<F: Field + ?Sized>(
     tally: &mut Tally,
     watch: &mut Watch<F>,
 ) -> Result<Reached, StepError> {
-    let n = state.y.len();
+    let (n, name) = (state.y.len(), stepper.name);
     super::refuse_the_past(name, state, until)?;
     let span = (until - state.time).hi;
     if span <= 0.0 {
@@ -163,7 +163,7 @@ fn window<F: Field + ?Sized>(
             tally.steps += u64::from(stats.accepted_steps);
             tally.evaluations += u64::from(stats.num_eval);
             let begun = if first == 0.0 { 3 } else { 1 };
-            let attempts = (u64::from(stats.num_eval) - begun - effort.accepted * u64::from(stats.accepted_steps)) / effort.attempt;
+            let attempts = (u64::from(stats.num_eval) - begun - stepper.accepted * u64::from(stats.accepted_steps)) / stepper.attempt;
             tally.rejected += attempts - u64::from(stats.accepted_steps);
         }
         Err(IntegrationError::MaxNumStepReached { x, n_step }) => {
@@ -218,7 +218,7 @@ impl<F: Field + ?Sized> Method<F> for Dopri5 {
             let settings = (tolerance, (0.04, 0.2, 10.0), first, max_steps);
             by_length!(ode_solvers::Dopri5<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
         };
-        window("dopri5", &Effort { attempt: 6, accepted: 0 }, integrate, field, state, until, tally, watch)
+        window(&Stepper { name: "dopri5", attempt: 6, accepted: 0 }, integrate, field, state, until, tally, watch)
     }
 }
 
@@ -244,6 +244,6 @@ impl<F: Field + ?Sized> Method<F> for Dop853 {
             let settings = (tolerance, (0.0, 1.0 / 3.0, 6.0), first, max_steps);
             by_length!(ode_solvers::Dop853<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
         };
-        window("dop853", &Effort { attempt: 11, accepted: 1 }, integrate, field, state, until, tally, watch)
+        window(&Stepper { name: "dop853", attempt: 11, accepted: 1 }, integrate, field, state, until, tally, watch)
     }
 }
