@@ -95,7 +95,7 @@ impl Taylor<f64> {
 impl Taylor<DoubleDouble> {
     /// References: order 30, so far below rounding in double-double that only this is left.
     pub fn reference() -> Self {
-        Self::with_order(1e-32, 30)
+        Self::with_order(1e-36, 30)
     }
 }
 
