@@ -12,7 +12,6 @@ use std::sync::Arc;
 use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    std::fs::create_dir_all("output")?;
     let numbers: Vec<f64> = std::env::args().skip(1).map(|word| word.parse()).collect::<Result<_, _>>()?;
     let until = numbers.first().copied().unwrap_or(1e4);
     let starts = numbers.get(1).map_or(16, |&count| count as usize);
