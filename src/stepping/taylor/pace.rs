@@ -58,7 +58,7 @@ impl Pace {
         let whole = x.floor();
         let part = x - whole;
         let power = 1.0 + part * (0.695_5 + part * (0.226_2 + part * 0.078_3));
-        let h = power * f64::from_bits((1023 + whole.max(-1000.0) as i64 as u64) << 52);
+        let h = power * f64::from_bits(((1023 + whole.max(-1000.0) as i64) as u64) << 52);
         if h < self.longest { h } else { self.longest }
     }
 }
