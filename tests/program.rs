@@ -450,3 +450,22 @@ fn charts_are_drawn_for_what_the_scene_has() {
     assert!(width >= 1600, "{width} px wide");
     assert!(read("mechanism.gif").starts_with(b"GIF89a"));
 }
+
+#[test]
+fn several_stabilizations_are_run_one_after_another_and_overlaid() {
+    let program = Program::with_scenes(&["motor_sine"]);
+    let ran = program.run("run motor_sine.json --method dp8 --until 1 --stabilize none,projection,elimination --json --out a");
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let object: serde_json::Value = serde_json::from_str(&ran.stdout).expect("one object");
+    let kinds: Vec<&str> =
+        (object["runs"].as_array().expect("runs").iter()).filter_map(|run| run["settings"]["stabilize"].as_str()).collect();
+    assert_eq!(kinds, ["none", "projection", "elimination"]);
+    let files = program.files();
+    assert!(files.iter().any(|file| file == "a/motor_sine/constraint_drift.png"), "{files:?}");
+    for kind in kinds {
+        assert!(files.iter().any(|file| file == &format!("a/motor_sine/dp8-1e-9-{kind}/run.json")), "{kind}: {files:?}");
+    }
+    // One pairing that makes no sense, and nothing is run.
+    program.run("run motor_sine.json --method gauss16 --stabilize elimination,projection --out b").exits(3);
+    assert!(!program.path("b").exists());
+}

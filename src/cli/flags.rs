@@ -90,9 +90,9 @@ pub struct PlanFlags {
     /// Output interval in seconds [default: the scene's]
     #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
     pub every: Option<f64>,
-    /// How motors' angles are kept [default: elimination, or projection with rattle]
-    #[arg(long, value_name = "HOW", value_parser = stabilizations())]
-    pub stabilize: Option<Stabilization>,
+    /// How motors' angles are kept; several, joined by commas, are run one after another [default: elimination, or projection with rattle]
+    #[arg(long, value_name = "HOW", value_parser = stabilizations(), value_delimiter = ',')]
+    pub stabilize: Vec<Stabilization>,
     /// Time constant of Baumgarte's term in seconds [default: five mean steps]
     #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
     pub time_constant: Option<f64>,
@@ -171,8 +171,16 @@ impl SceneFlags {
 }
 
 impl PlanFlags {
-    /// What is asked of the plan.
-    pub fn request(&self) -> Request {
+    /// What is asked of the plans: one for each stabilization given, or a single one.
+    pub fn requests(&self) -> Vec<Request> {
+        if self.stabilize.is_empty() {
+            return vec![self.request(None)];
+        }
+        let given = self.stabilize.iter().enumerate().filter(|(i, kind)| !self.stabilize[..*i].contains(kind));
+        given.map(|(_, &kind)| self.request(Some(kind))).collect()
+    }
+
+    fn request(&self, stabilize: Option<Stabilization>) -> Request {
         Request {
             method: self.method,
             step: self.step,
@@ -180,7 +188,7 @@ impl PlanFlags {
             atol: self.atol,
             until: self.until,
             every: self.every,
-            stabilize: self.stabilize,
+            stabilize,
             time_constant: self.time_constant,
         }
     }

@@ -42,17 +42,19 @@ pub fn run(flags: &Flags) -> Result<(), Failure> {
 
 fn check(flags: &CheckFlags) -> Result<(), Failure> {
     let (scene, mechanism) = load(&flags.scene)?;
-    let plan = Plan::new(&scene, &mechanism, &flags.plan.request())?;
-    // That the method can begin is part of the check; measuring Baumgarte's time constant is not.
-    let trial = Plan { time_constant: plan.time_constant.or(Some(1.0)), ..plan.clone() };
-    Run::new(Arc::clone(&mechanism), trial, Default::default(), &mechanism.start(&scene))?;
-    if flags.scene.json {
-        print_object(&report::check::object(&scene, &mechanism, &plan))
-    } else if flags.scene.quiet {
-        Ok(())
-    } else {
-        print(&report::check::text(&scene, &mechanism, &plan))
+    let mut plans = Vec::new();
+    for request in flags.plan.requests() {
+        let plan = Plan::new(&scene, &mechanism, &request)?;
+        // That the method can begin is part of the check; measuring Baumgarte's time constant is not.
+        let trial = Plan { time_constant: plan.time_constant.or(Some(1.0)), ..plan.clone() };
+        Run::new(Arc::clone(&mechanism), trial, Default::default(), &mechanism.start(&scene))?;
+        plans.push(plan);
     }
+    if flags.scene.json {
+        return output::print_objects(plans.iter().map(|plan| report::check::object(&scene, &mechanism, plan)).collect());
+    }
+    let pages: Vec<String> = plans.iter().map(|plan| report::check::text(&scene, &mechanism, plan)).collect();
+    if flags.scene.quiet { Ok(()) } else { print(&pages.join("\n")) }
 }
 
 fn inspect(flags: &InspectFlags) -> Result<(), Failure> {

@@ -30,3 +30,14 @@ pub fn print_object(object: &Value) -> Result<(), Failure> {
 pub fn message(text: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
+
+/// Prints one object as it is, several as the `runs` of one.
+pub fn print_objects(mut objects: Vec<Value>) -> Result<(), Failure> {
+    match objects.pop() {
+        Some(only) if objects.is_empty() => print_object(&only),
+        last => {
+            objects.extend(last);
+            print_object(&serde_json::json!({ "runs": objects }))
+        }
+    }
+}

@@ -2,7 +2,7 @@
 
 use super::failure::Failure;
 use super::flags::RunFlags;
-use super::output::{print, print_object};
+use super::output::{print, print_objects};
 use super::progress::Progress;
 use crate::dynamics::Mechanism;
 use crate::report;
@@ -17,28 +17,46 @@ use std::sync::Arc;
 const FILES: &[&str] =
     &[TRAJECTORY, RECORD, "mechanism.png", "angles.png", "energy_drift.png", "constraint_drift.png", "torque_power.png", "mechanism.gif"];
 
-/// Runs a scene.
+/// A run that has ended.
+struct Done {
+    outcome: Outcome,
+    folder: Folder,
+    failure: Option<Failure>,
+}
+
+/// Runs a scene, once for each stabilization given.
 ///
 /// # Errors
-/// The scene, the plan, the folder, the method or a limit; files of what was reached are kept.
+/// The scene, a plan, a folder, the method or a limit; files of what was reached are kept.
 pub fn run(flags: &RunFlags) -> Result<(), Failure> {
     let (scene, mechanism) = super::load(&flags.scene)?;
-    let plan = Plan::new(&scene, &mechanism, &flags.plan.request())?;
-    let run = Run::new(Arc::clone(&mechanism), plan, flags.limits(), &mechanism.start(&scene))?;
+    // All plans stand before the first run: a pairing that is refused costs nothing.
+    let plans: Vec<Plan> = flags.plan.requests().iter().map(|request| Plan::new(&scene, &mechanism, request)).collect::<Result<_, _>>()?;
+    let mut done = Vec::new();
+    for plan in plans {
+        done.push(run_plan(plan, &scene, &mechanism, flags)?);
+    }
+    overlay(&scene, &mechanism, &done, flags)?;
+    tell(&scene, &mechanism, &done, flags)?;
+    done.into_iter().find_map(|done| done.failure).map_or(Ok(()), |failure| Err(failure.told()))
+}
+
+/// Runs one plan in a folder of its own.
+fn run_plan(plan: Plan, scene: &Scene, mechanism: &Arc<Mechanism>, flags: &RunFlags) -> Result<Done, Failure> {
+    let run = Run::new(Arc::clone(mechanism), plan, flags.limits(), &mechanism.start(scene))?;
     let plan = run.plan();
     flags.scene.remark(&format!("{}; {}", report::setting(plan), plan.why.as_deref().unwrap_or("as asked for")));
     for note in &plan.notes {
         flags.scene.remark(note);
     }
-    let path = flags.out.join(&scene.name).join(plan.folder(&mechanism));
+    let path = flags.out.join(&scene.name).join(plan.folder(mechanism));
     let mut folder = Folder::open(&path, flags.force)?;
-    let (outcome, trajectory_sha256) = record(run, &scene, &mechanism, &mut folder, flags)?;
-    draw(&scene, &mechanism, &outcome, &mut folder, flags)?;
-    let text = format!("{:#}\n", report::result::record(&scene, &mechanism, &outcome, &trajectory_sha256));
+    let (outcome, trajectory_sha256) = record(run, scene, mechanism, &mut folder, flags)?;
+    draw(scene, mechanism, &outcome, &mut folder, flags)?;
+    let text = format!("{:#}\n", report::result::record(scene, mechanism, &outcome, &trajectory_sha256));
     folder.write(RECORD, text.as_bytes())?;
     let failure = outcome.stop.clone().map(Failure::from);
-    tell(&scene, &mechanism, &outcome, &folder, flags, failure.as_ref())?;
-    failure.map_or(Ok(()), |failure| Err(failure.told()))
+    Ok(Done { outcome, folder, failure })
 }
 
 /// Marches and writes the trajectory as it comes.
@@ -76,32 +94,49 @@ fn draw(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome, folder: &mut Fo
     Ok(())
 }
 
+/// Constraint drift of several runs in one chart, beside their folders.
+#[cfg(feature = "charts")]
+fn overlay(scene: &Scene, mechanism: &Mechanism, done: &[Done], flags: &RunFlags) -> Result<(), Failure> {
+    if done.len() < 2 || mechanism.rows.is_empty() || flags.no_charts {
+        return Ok(());
+    }
+    let outcomes: Vec<&Outcome> = done.iter().map(|done| &done.outcome).collect();
+    let content = report::charts::overlay(scene, mechanism, &outcomes)?;
+    let mut folder = Folder::open(&flags.out.join(&scene.name), true)?;
+    folder.write("constraint_drift.png", &content)?;
+    flags.scene.remark(&format!("drew {}", folder.path().join("constraint_drift.png").display()));
+    Ok(())
+}
+
+#[cfg(not(feature = "charts"))]
+fn overlay(_: &Scene, _: &Mechanism, _: &[Done], _: &RunFlags) -> Result<(), Failure> {
+    Ok(())
+}
+
 #[cfg(not(feature = "charts"))]
 fn draw(_: &Scene, _: &Mechanism, _: &Outcome, _: &mut Folder, _: &RunFlags) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Prints the result.
-fn tell(
-    scene: &Scene,
-    mechanism: &Mechanism,
-    outcome: &Outcome,
-    folder: &Folder,
-    flags: &RunFlags,
-    failure: Option<&Failure>,
-) -> Result<(), Failure> {
+/// Prints the results.
+fn tell(scene: &Scene, mechanism: &Mechanism, done: &[Done], flags: &RunFlags) -> Result<(), Failure> {
     if flags.scene.json {
-        let mut object = report::result::object(scene, mechanism, outcome);
-        object["folder"] = json!(folder.path().display().to_string());
-        object["files"] = json!(folder.files().iter().map(|file| file.display().to_string()).collect::<Vec<_>>());
-        if let Some(failure) = failure {
-            object["error"] = failure.object();
-        }
-        return print_object(&object);
+        let object = |Done { outcome, folder, failure }: &Done| {
+            let mut object = report::result::object(scene, mechanism, outcome);
+            object["folder"] = json!(folder.path().display().to_string());
+            object["files"] = json!(folder.files().iter().map(|file| file.display().to_string()).collect::<Vec<_>>());
+            if let Some(failure) = failure {
+                object["error"] = failure.object();
+            }
+            object
+        };
+        return print_objects(done.iter().map(object).collect());
     }
     if flags.scene.quiet {
         return Ok(());
     }
-    let page = report::result::text(scene, mechanism, outcome);
-    print(&(page + &report::result::files(folder.path(), folder.names())))
+    let page = |Done { outcome, folder, .. }: &Done| {
+        report::result::text(scene, mechanism, outcome) + &report::result::files(folder.path(), folder.names())
+    };
+    print(&done.iter().map(page).collect::<Vec<_>>().join("\n"))
 }

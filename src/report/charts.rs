@@ -77,6 +77,41 @@ pub fn draw(chart: Chart, scene: &Scene, mechanism: &Mechanism, outcome: &Outcom
     picture?.png_bytes()
 }
 
+/// Draws the constraint drift of several runs of one scene in one chart, a line for each stabilization and constraint; returns the content of its file.
+///
+/// # Errors
+/// Drawing or encoding fails.
+pub fn overlay(scene: &Scene, mechanism: &Mechanism, outcomes: &[&Outcome]) -> Result<Vec<u8>, ChartError> {
+    let unit = mechanism.rows.first().map_or("rad", Row::unit);
+    let panel = |level: usize| DefectPanel {
+        name: defect_name(level, unit),
+        series: (outcomes.iter())
+            .flat_map(|outcome| {
+                let kind = outcome.plan.stabilization.to_string();
+                (outcome.drift.constraints.iter().enumerate()).map(move |(r, (constraint, _))| {
+                    let several = outcome.drift.constraints.len() > 1;
+                    let name = if several { format!("{kind}, {}", plain(constraint)) } else { kind.clone() };
+                    Finished { scene, mechanism, outcome }.defects(r, level, kind.clone(), name)
+                })
+            })
+            .collect(),
+    };
+    let mut settings: Vec<String> = outcomes.iter().map(|outcome| plain(&super::setting(&outcome.plan))).collect();
+    settings.dedup();
+    let chart = ConstraintDrift {
+        title: format!("Constraint drift under {} stabilizations", outcomes.len()),
+        caption: std::iter::once(format!("scene {}", plain(&scene.name))).chain(settings).collect(),
+        panels: vec![panel(0), panel(1)],
+        log_time: outcomes.iter().any(|outcome| is_long(&outcome.drift.energy)),
+    };
+    chart::constraint_drift(&chart, FILE_RESOLUTION)?.png_bytes()
+}
+
+/// Name of the axis of violations at one level.
+fn defect_name(level: usize, unit: &str) -> String {
+    if level == 0 { format!("|*C*| [{unit}]") } else { format!("|*C′*| [{unit}/s]") }
+}
+
 /// Most it may turn in a window of time that shows single swings \[rad\], and how much is shown instead.
 const CROWDED: [f64; 2] = [40.0 * TAU, 12.0 * TAU];
 /// How far the fastest body turns along the path shown \[rad\].
@@ -222,24 +257,14 @@ impl Finished<'_> {
     }
 
     fn constraint_drift(&self) -> ConstraintDrift {
-        let Outcome { plan, drift, trace, .. } = self.outcome;
+        let Outcome { plan, drift, .. } = self.outcome;
         let unit = self.mechanism.rows.first().map_or("rad", Row::unit);
-        let panel = |level: usize, name: String| DefectPanel {
-            name,
+        let panel = |level: usize| DefectPanel {
+            name: defect_name(level, unit),
             series: (drift.constraints.iter().enumerate())
-                .map(|(r, (constraint, monitors))| {
-                    // Thinned samples may have missed the largest ones; the record has not.
-                    let mut points: Vec<[f64; 2]> = monitors[level].record.clone();
-                    let later = trace.whole.iter().filter(|sample| sample.t > 0.0);
-                    points.extend(later.map(|sample| [sample.t, sample.constraints[r][level]]));
-                    points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+                .map(|(r, (constraint, _))| {
                     let method = if drift.constraints.len() == 1 { plan.stabilization.to_string() } else { constraint.clone() };
-                    DriftSeries {
-                        method,
-                        name: plain(constraint),
-                        time: points.iter().map(|point| point[0]).collect(),
-                        error: points.iter().map(|point| point[1]).collect(),
-                    }
+                    self.defects(r, level, method, plain(constraint))
                 })
                 .collect(),
         };
@@ -248,9 +273,20 @@ impl Finished<'_> {
         ConstraintDrift {
             title: format!("Constraints {kept} over {} s", figure(self.outcome.last.t)),
             caption: self.caption(None),
-            panels: vec![panel(0, format!("|*C*| [{unit}]")), panel(1, format!("|*C′*| [{unit}/s]"))],
+            panels: vec![panel(0), panel(1)],
             log_time: is_long(&drift.energy),
         }
+    }
+
+    /// Violation of constraint `r` at one level (0 position, 1 velocity) against time.
+    fn defects(&self, r: usize, level: usize, method: String, name: String) -> DriftSeries {
+        // Thinned samples may have missed the largest ones; the record has not.
+        let mut points: Vec<[f64; 2]> = self.outcome.drift.constraints[r].1[level].record.clone();
+        let later = self.outcome.trace.whole.iter().filter(|sample| sample.t > 0.0);
+        points.extend(later.map(|sample| [sample.t, sample.constraints[r][level]]));
+        points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let (time, error) = points.into_iter().map(|[t, error]| (t, error)).unzip();
+        DriftSeries { method, name, time, error }
     }
 
     fn torque_power(&self) -> TorquePower {
