@@ -10,7 +10,7 @@ use driftless::dynamics::canonical::Canonical;
 use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::natural::Natural;
-use driftless::dynamics::{Form, Mechanism, Motion, Time};
+use driftless::dynamics::{Form, Motion, Time};
 use driftless::run::{MethodId, Request};
 use driftless::stabilization::{Baumgarte, Projected};
 use driftless::stepping::composition::Composition;
@@ -91,16 +91,9 @@ fn check<P: Form + ?Sized>(method: &mut dyn Method<P>, form: &mut P, start: &Mot
     assert_eq!(short, 0, "{}", method.name());
 }
 
-fn scene(name: &str) -> (Arc<Mechanism>, Motion) {
-    let scene = shipped(name, &[]);
-    let mechanism = common::compile(&scene);
-    let start = mechanism.start(&scene);
-    (mechanism, start)
-}
-
 #[test]
 fn steps_of_a_free_scene_allocate_nothing() {
-    let (mechanism, start) = scene("free");
+    let (mechanism, start) = common::started("free");
     let mut form = Multiplier::<2, false>::new(Arc::clone(&mechanism));
     check(&mut Dp5::new(TOLERANCE), &mut form, &start);
     check(&mut Dp8::new(TOLERANCE), &mut form, &start);
@@ -110,7 +103,7 @@ fn steps_of_a_free_scene_allocate_nothing() {
 
 #[test]
 fn steps_of_a_driven_scene_allocate_nothing() {
-    let (mechanism, mut start) = scene("motor_sine");
+    let (mechanism, mut start) = common::started("motor_sine");
     start.omega[0] = start.omega[0] + 1e-6;
     let plain = || Multiplier::<2, true>::new(Arc::clone(&mechanism));
     check(&mut Dp8::new(TOLERANCE), &mut plain(), &start);
@@ -123,7 +116,7 @@ fn steps_of_a_driven_scene_allocate_nothing() {
 #[test]
 fn steps_of_rattle_allocate_nothing() {
     for name in ["free", "motor_sine"] {
-        let (mechanism, start) = scene(name);
+        let (mechanism, start) = common::started(name);
         let mut natural = Natural::new(Arc::clone(&mechanism)).expect("a natural form");
         let mut rattle = Rattle::new(Composition::Suzuki5, 1.0 / 128.0);
         check(&mut rattle, &mut natural, &start);
@@ -133,7 +126,7 @@ fn steps_of_rattle_allocate_nothing() {
 /// A window of `ode_solvers` allocates its own rows; the number of windows is ours, and each costs the same.
 #[test]
 fn windows_cost_the_same_each() {
-    let (mechanism, start) = scene("gentle");
+    let (mechanism, start) = common::started("gentle");
     let methods: [Box<dyn Method<Multiplier<2, false>>>; 2] = [Box::new(Dopri5::new(TOLERANCE)), Box::new(Dop853::new(TOLERANCE))];
     for mut method in methods {
         let mut form = Multiplier::<2, false>::new(Arc::clone(&mechanism));

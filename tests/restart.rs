@@ -7,7 +7,7 @@ use driftless::arithmetic::DoubleDouble;
 use driftless::dynamics::canonical::Canonical;
 use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::multiplier::Multiplier;
-use driftless::dynamics::{Field, Form, Mechanism, Motion, State, Time};
+use driftless::dynamics::{Field, Form, Motion, State, Time};
 use driftless::run::{MethodId, Request, Stabilization};
 use driftless::stabilization::{Baumgarte, Projected};
 use driftless::stepping::gauss::Gauss;
@@ -34,16 +34,9 @@ fn check<F: Field + Form, M: Method<F>>(form: &dyn Fn() -> F, method: &dyn Fn() 
     }
 }
 
-fn scene(name: &str) -> (Arc<Mechanism>, Motion) {
-    let scene = shipped(name, &[]);
-    let mechanism = common::compile(&scene);
-    let start = mechanism.start(&scene);
-    (mechanism, start)
-}
-
 #[test]
 fn a_free_scene_goes_on_bit_for_bit() {
-    let (mechanism, start) = scene("free");
+    let (mechanism, start) = common::started("free");
     let form = || Multiplier::<2, false>::new(Arc::clone(&mechanism));
     check(&form, &|| Dopri5::new(TOLERANCE), &start);
     check(&form, &|| Dop853::new(TOLERANCE), &start);
@@ -54,7 +47,7 @@ fn a_free_scene_goes_on_bit_for_bit() {
 
 #[test]
 fn a_driven_scene_goes_on_bit_for_bit_under_every_stabilization() {
-    let (mechanism, mut start) = scene("motor_sine");
+    let (mechanism, mut start) = common::started("motor_sine");
     start.omega[0] = start.omega[0] + 1e-6;
     let plain = || Multiplier::<2, true>::new(Arc::clone(&mechanism));
     check(&plain, &|| Dop853::new(TOLERANCE), &start);
@@ -87,7 +80,7 @@ fn the_same_run_twice_gives_the_same_bits() {
 /// (Lyapunov exponent 1.55 per s: a factor of 500, twice).
 #[test]
 fn a_run_with_its_rates_turned_round_comes_back() {
-    let (mechanism, start) = scene("free");
+    let (mechanism, start) = common::started("free");
     let mut form = Multiplier::<2, false>::new(Arc::clone(&mechanism));
     let mut method = Dp8::new(Tolerance { relative: 1e-13, absolute: 1e-13 });
     let mut state = form.state(&start);
@@ -108,7 +101,7 @@ fn a_run_with_its_rates_turned_round_comes_back() {
 /// Our Dormand–Prince methods march forwards; a time that lies behind is refused, never passed over in silence.
 #[test]
 fn a_time_that_lies_behind_is_refused() {
-    let (mechanism, start) = scene("free");
+    let (mechanism, start) = common::started("free");
     let mut form = Multiplier::<2, false>::new(Arc::clone(&mechanism));
     let methods: [Box<dyn Method<Multiplier<2, false>>>; 4] =
         [Box::new(Dp5::new(TOLERANCE)), Box::new(Dp8::new(TOLERANCE)), Box::new(Dopri5::new(TOLERANCE)), Box::new(Dop853::new(TOLERANCE))];

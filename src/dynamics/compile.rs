@@ -182,6 +182,11 @@ impl Mechanism {
         self.springs.iter().any(|spring| spring.damping != 0.0)
     }
 
+    /// True where motors or dampers do work, so that a form must keep account of it.
+    pub fn keeps_account(&self) -> bool {
+        !self.rows.is_empty() || self.is_damped()
+    }
+
     /// The mass matrix at the start must be positive definite.
     fn check_mass(&self, scene: &Scene) -> Result<(), CompileError> {
         let n = self.bodies.len();

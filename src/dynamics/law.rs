@@ -8,7 +8,7 @@ use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
 pub use crate::scene::{Law, Sine};
 
 /// A law at one time.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Phase<T> {
     /// The angle less whole turns, about [-π, π] \[rad\].
     pub angle: T,

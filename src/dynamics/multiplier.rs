@@ -21,7 +21,7 @@ impl<const N: usize, const ACCOUNT: bool> Multiplier<N, ACCOUNT> {
     /// The form of a mechanism; `N` must be its number of bodies or 0, `ACCOUNT` true where it has rows or dampers.
     pub fn new(mechanism: Arc<Mechanism>) -> Self {
         debug_assert!(N == 0 || N == mechanism.bodies.len());
-        debug_assert!(ACCOUNT || (mechanism.rows.is_empty() && !mechanism.is_damped()));
+        debug_assert!(ACCOUNT || !mechanism.keeps_account());
         let kernel = Kernel::new(mechanism.bodies.len(), mechanism.rows.len());
         Self { mechanism, kernel }
     }

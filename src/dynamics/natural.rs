@@ -18,8 +18,7 @@
 //!
 //! Source: J. García de Jalón, E. Bayo, *Kinematic and Dynamic Simulation of Multibody Systems* (1994), chapter 2, for natural coordinates.
 
-use super::law::Law;
-use super::row::Row;
+use super::row::{AngleRow, Row};
 use super::{Form, Mechanism, Motion, State, Time, tree};
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use std::sync::Arc;
@@ -45,19 +44,7 @@ pub enum NaturalError {
 }
 
 /// A motor as a row of the unit vectors.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Drive {
-    /// Name of the motor.
-    pub name: String,
-    /// The driven body a.
-    pub body: usize,
-    /// The body b its angle is measured from; `None`: from +x.
-    pub base: Option<usize>,
-    /// theta(t).
-    pub law: Law,
-}
-
-impl Drive {
+impl AngleRow {
     /// `conj(u) z_a conj(z_b)`: 1 where the row is kept; C is its imaginary part.
     #[inline(always)]
     pub fn mismatch<T: Scalar>(&self, unit: Complex<T>, z: &[Complex<T>]) -> Complex<T> {
@@ -65,7 +52,7 @@ impl Drive {
         self.base.map_or(direct, |base| direct * z[base].conj())
     }
 
-    /// Derivative of [`Drive::mismatch`] along `rate` at fixed u.
+    /// Derivative of [`AngleRow::mismatch`] along `rate` at fixed u.
     #[inline(always)]
     pub fn slip<T: Scalar>(&self, unit: Complex<T>, z: &[Complex<T>], rate: &[Complex<T>]) -> Complex<T> {
         match self.base {
@@ -90,15 +77,6 @@ impl Drive {
     }
 }
 
-/// What a motor asks for at one time.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Demand {
-    /// u = exp(i theta), to 1e-24.
-    pub unit: Complex<DoubleDouble>,
-    /// theta' \[rad/s\].
-    pub rate: DoubleDouble,
-}
-
 /// How far a state is from its constraints.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Defect {
@@ -114,7 +92,7 @@ pub struct Natural {
     mechanism: Arc<Mechanism>,
     /// W (n × n), Hermitian to the last bit \[1/(kg·m²)\].
     inverse: Vec<Complex<f64>>,
-    drives: Vec<Drive>,
+    drives: Vec<AngleRow>,
 }
 
 impl Natural {
@@ -136,9 +114,7 @@ impl Natural {
         let mut drives = Vec::new();
         for row in &mechanism.rows {
             match row {
-                Row::Angle(row) => {
-                    drives.push(Drive { name: row.name.clone(), body: row.body, base: row.base, law: row.law.clone() });
-                }
+                Row::Angle(row) => drives.push(row.clone()),
                 Row::Line(row) => return Err(NaturalError::Wall(row.name.clone())),
             }
         }
@@ -153,15 +129,8 @@ impl Natural {
     }
 
     /// The motors.
-    pub fn drives(&self) -> &[Drive] {
+    pub fn drives(&self) -> &[AngleRow] {
         &self.drives
-    }
-
-    /// What a motor asks for at time `t`.
-    #[inline]
-    pub fn demand(&self, drive: &Drive, t: Time) -> Demand {
-        let phase = drive.law.at::<DoubleDouble>(t);
-        Demand { unit: phase.unit, rate: phase.rate }
     }
 
     /// Number of rows: one a body, then one a motor.

@@ -113,7 +113,7 @@ pub struct Drift {
 impl Drift {
     /// Monitors of a mechanism over a horizon \[s\].
     pub fn new(mechanism: &Mechanism, until: f64) -> Self {
-        let works = !mechanism.rows.is_empty() || mechanism.is_damped() || !mechanism.contacts.is_empty();
+        let works = mechanism.keeps_account() || !mechanism.contacts.is_empty();
         let pair = || [Excursion::new(until), Excursion::new(until)];
         Self {
             energy: Excursion::new(until),

@@ -86,11 +86,10 @@ fn marcher<P: Form + ?Sized + 'static, M: Method<P> + 'static>(problem: Box<P>, 
 /// The form a stabilization marches in, for `N` bodies.
 fn form<const N: usize>(mechanism: &Arc<Mechanism>, stabilization: Stabilization, time_constant: f64) -> Box<dyn Problem> {
     let mechanism = Arc::clone(mechanism);
-    let accounts = !mechanism.rows.is_empty() || mechanism.is_damped();
     match stabilization {
         Stabilization::Elimination => eliminated::<N>(&mechanism),
         Stabilization::Baumgarte => Box::new(Baumgarte::new(Multiplier::<N, true>::new(mechanism), time_constant)),
-        Stabilization::None | Stabilization::Projection if accounts => Box::new(Multiplier::<N, true>::new(mechanism)),
+        Stabilization::None | Stabilization::Projection if mechanism.keeps_account() => Box::new(Multiplier::<N, true>::new(mechanism)),
         Stabilization::None | Stabilization::Projection => Box::new(Multiplier::<N, false>::new(mechanism)),
     }
 }
@@ -103,11 +102,7 @@ fn eliminated<const N: usize>(mechanism: &Arc<Mechanism>) -> Box<dyn Problem> {
 /// The canonical form for `N` bodies.
 fn canonical<const N: usize>(mechanism: &Arc<Mechanism>) -> Box<dyn Problem> {
     let mechanism = Arc::clone(mechanism);
-    if mechanism.rows.is_empty() && !mechanism.is_damped() {
-        Box::new(Canonical::<N, false>::new(mechanism))
-    } else {
-        Box::new(Canonical::<N, true>::new(mechanism))
-    }
+    if mechanism.keeps_account() { Box::new(Canonical::<N, true>::new(mechanism)) } else { Box::new(Canonical::<N, false>::new(mechanism)) }
 }
 
 /// `sized!(n, f(args))` calls `f::<n>` for the sizes compiled in, and `f::<0>` for any other.

@@ -22,7 +22,8 @@
 use super::composition::Composition;
 use super::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
-use crate::dynamics::natural::{Demand, Natural, upper};
+use crate::dynamics::law::Phase;
+use crate::dynamics::natural::{Natural, upper};
 use crate::dynamics::tree::{self, size};
 use crate::dynamics::{Form, State, Time};
 
@@ -201,7 +202,7 @@ struct Work {
     /// Gradients of the motors' rows at `here`.
     gradient: Vec<[Complex<f64>; 2]>,
     /// What the motors ask for at the end of the substep.
-    demand: Vec<Demand>,
+    phase: Vec<Phase<DoubleDouble>>,
     /// C_t of the motors' rows at `here`.
     drive: Vec<f64>,
     /// mu (R).
@@ -234,7 +235,7 @@ impl Work {
         self.inertia = natural.mechanism().tree.diagonal.iter().copied().fold(0.0, f64::max);
         self.lifted.resize(rows * n, Complex::ZERO);
         self.gradient.resize(motors, [Complex::ZERO; 2]);
-        self.demand.resize(motors, Demand::default());
+        self.phase.resize(motors, Phase::default());
         self.drive.resize(motors, 0.0);
         self.matrix.resize(rows * rows, 0.0);
         for column in [&mut self.multiplier, &mut self.pivot, &mut self.offset, &mut self.change] {
@@ -253,8 +254,8 @@ impl Work {
         if DRIVEN {
             self.account = state.unknown(4 * n);
         }
-        for (demand, drive) in self.demand.iter_mut().zip(natural.drives()) {
-            *demand = natural.demand(drive, state.time);
+        for (phase, drive) in self.phase.iter_mut().zip(natural.drives()) {
+            *phase = drive.law.at(state.time);
         }
         self.face::<N, DRIVEN>(natural);
         if state.memory.len() == self.multiplier.len() {
@@ -307,8 +308,8 @@ impl Work {
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
-                self.demand[r] = natural.demand(drive, end);
-                offset[n + r] = drive.mismatch(plain(self.demand[r].unit), ahead).im * (2.0 / (h * h));
+                self.phase[r] = drive.law.at(end);
+                offset[n + r] = drive.mismatch(plain(self.phase[r].unit), ahead).im * (2.0 / (h * h));
             }
         }
         self.scale = self.strength.max(f64::EPSILON * self.inertia * (2.0 / (h * h)));
@@ -385,7 +386,7 @@ impl Work {
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
-                let unit = plain(self.demand[r].unit);
+                let unit = plain(self.phase[r].unit);
                 let linear = drive.slip(unit, ahead, acceleration).im;
                 let square = drive.base.map_or(0.0, |b| (unit.conj() * acceleration[drive.body] * acceleration[b].conj()).im);
                 change[n + r] = offset[n + r] + (linear + push * square);
@@ -403,7 +404,7 @@ impl Work {
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
-                self.gradient[r] = drive.gradient(plain(self.demand[r].unit), here);
+                self.gradient[r] = drive.gradient(plain(self.phase[r].unit), here);
             }
         }
         self.project::<N, DRIVEN>(natural);
@@ -469,7 +470,7 @@ impl Work {
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
-                change[n + r] = drive.mismatch(self.demand[r].unit, predicted).im.hi * per_push;
+                change[n + r] = drive.mismatch(self.phase[r].unit, predicted).im.hi * per_push;
             }
         }
         solve::<N, DRIVEN>(&self.matrix, &self.pivot, change);
@@ -506,7 +507,7 @@ impl Work {
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
-                if drive.mismatch(plain(self.demand[r].unit), here).re <= 0.0 {
+                if drive.mismatch(plain(self.phase[r].unit), here).re <= 0.0 {
                     return Err(Failure::TooFar(n + r));
                 }
             }
@@ -537,9 +538,9 @@ impl Work {
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
-                let demand = self.demand[r];
-                let unit = plain(demand.unit);
-                self.drive[r] = -demand.rate.hi * drive.mismatch(unit, here).re;
+                let phase = self.phase[r];
+                let unit = plain(phase.unit);
+                self.drive[r] = -phase.rate.hi * drive.mismatch(unit, here).re;
                 self.gradient[r] = drive.gradient(unit, here);
                 let ([a, b], [on_a, on_b]) = (drive.bodies(), self.gradient[r]);
                 for i in 0..n {
@@ -565,8 +566,8 @@ impl Work {
         }
         if DRIVEN {
             for (r, drive) in natural.drives().iter().enumerate() {
-                let demand = self.demand[r];
-                let slip = drive.slip(demand.unit, z, v).im - demand.rate * drive.mismatch(demand.unit, z).re;
+                let phase = self.phase[r];
+                let slip = drive.slip(phase.unit, z, v).im - phase.rate * drive.mismatch(phase.unit, z).re;
                 let ([a, b], [on_a, on_b]) = (drive.bodies(), self.gradient[r]);
                 self.multiplier[n + r] = on_a.dot(free[a]) + on_b.dot(free[b]) + slip.value() * (2.0 / h);
             }

@@ -170,3 +170,11 @@ pub fn go<P: ?Sized>(
     }
     tally
 }
+
+/// A shipped scene's equations and its start.
+pub fn started(name: &str) -> (Arc<Mechanism>, Motion) {
+    let scene = shipped(name, &[]);
+    let mechanism = compile(&scene);
+    let start = mechanism.start(&scene);
+    (mechanism, start)
+}
