@@ -134,10 +134,26 @@ pub trait Field {
     fn gaps(&mut self, _t: Time, _y: &[f64], _gaps: &mut [f64]) {}
 }
 
+/// What the first unknowns of a form are; their rates follow, then the work of motors and dampers where there are any.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coordinates {
+    /// The angles of all bodies: rows are kept by multipliers.
+    All,
+    /// The angles left by the [`ties`], with the motors' rows eliminated.
+    Independent,
+    /// Something else.
+    Other,
+}
+
 /// A form of a mechanism: how a state of its unknowns reads as a motion, and back.
 pub trait Form {
     /// The mechanism.
     fn mechanism(&self) -> &Mechanism;
+
+    /// What its first unknowns are, for methods that expand the mechanism itself.
+    fn coordinates(&self) -> Coordinates {
+        Coordinates::Other
+    }
 
     /// The state in which this motion is held.
     fn state(&self, motion: &Motion) -> State;
