@@ -7,9 +7,10 @@ mod common;
 
 use common::{Inertia, double_pendulum, spring};
 use driftless::arithmetic::Complex;
-use driftless::dynamics::Mechanism;
 use driftless::dynamics::kernel::{Bias, Kernel};
 use driftless::dynamics::row::{LineRow, Row};
+use driftless::dynamics::series::Series;
+use driftless::dynamics::{Coordinates, Mechanism};
 use driftless::scene::{Law, Motor};
 use serde_json::Value;
 
@@ -58,6 +59,12 @@ fn check(case: &Value) {
     // Hinge A: of the ground on bar 1; hinge B: of bar 1 on bar 2.
     let mut multipliers = vec![-forces[0].re, -forces[0].im, forces[1].re, forces[1].im];
     multipliers.extend(&kernel.multiplier);
+    // The first orders of the series are the same instants.
+    let mut series = Series::<f64>::new(&mechanism, Coordinates::All, 8);
+    series.expand(&mechanism, Default::default(), &phi, &[0.0; 2], &omega);
+    for (found, expected) in series.rate[2..4].iter().zip(&kernel.load).chain(series.multipliers(0).iter().zip(&kernel.multiplier)) {
+        assert!((found - expected).abs() <= 1e-12 * expected.abs().max(1.0), "{name}: {found} is not {expected} in the series");
+    }
     for (what, found, expected) in
         [("acceleration", accelerations, numbers(&case["accelerations"])), ("multiplier", multipliers, numbers(&case["multipliers"]))]
     {

@@ -11,7 +11,7 @@ use driftless::dynamics::{Field, Form, Motion, State, Time};
 use driftless::run::{MethodId, Request, Stabilization};
 use driftless::stabilization::{Baumgarte, Projected};
 use driftless::stepping::gauss::Gauss;
-use driftless::stepping::{Dop853, Dopri5, Dp5, Dp8, Method, Seen, Tally, Tolerance};
+use driftless::stepping::{Dop853, Dopri5, Dp5, Dp8, Method, Seen, Tally, Taylor, Tolerance};
 use std::sync::Arc;
 
 const TOLERANCE: Tolerance = Tolerance { relative: 1e-9, absolute: 1e-9 };
@@ -42,6 +42,7 @@ fn a_free_scene_goes_on_bit_for_bit() {
     check(&form, &|| Dop853::new(TOLERANCE), &start);
     check(&form, &|| Dp5::new(TOLERANCE), &start);
     check(&form, &|| Dp8::new(TOLERANCE), &start);
+    check(&form, &|| Taylor::new(TOLERANCE), &start);
     check(&|| Canonical::<2, false>::new(Arc::clone(&mechanism)), &|| Gauss::new(8, 1.0 / 128.0).expect("a method"), &start);
 }
 
@@ -53,6 +54,8 @@ fn a_driven_scene_goes_on_bit_for_bit_under_every_stabilization() {
     check(&plain, &|| Dop853::new(TOLERANCE), &start);
     check(&plain, &|| Projected::new(Dp8::new(TOLERANCE)), &start);
     check(&plain, &|| Projected::new(Dp5::new(TOLERANCE)), &start);
+    check(&plain, &|| Projected::new(Taylor::new(TOLERANCE)), &start);
+    check(&plain, &|| Taylor::new(TOLERANCE), &start);
     check(&|| Baumgarte::new(plain(), 0.1), &|| Dp8::new(TOLERANCE), &start);
     check(&|| Baumgarte::new(plain(), 0.1), &|| Dopri5::new(TOLERANCE), &start);
     check(&|| Elimination::<2>::new(Arc::clone(&mechanism)), &|| Dp8::new(TOLERANCE), &start);
@@ -67,6 +70,8 @@ fn the_same_run_twice_gives_the_same_bits() {
         ("motor_sine", MethodId::Dp8, Stabilization::Projection),
         ("motor", MethodId::Dopri5, Stabilization::Baumgarte),
         ("wall", MethodId::Dp8, Stabilization::None),
+        ("wall", MethodId::Taylor, Stabilization::None),
+        ("motor_sine", MethodId::Taylor, Stabilization::Projection),
     ] {
         let request =
             Request { method: Some(method), stabilize: Some(stabilize), until: Some(0.5), every: Some(0.0625), ..Request::default() };

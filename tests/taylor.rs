@@ -13,7 +13,7 @@ use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Sample, marc
 use driftless::scene::{Bar, Hinge, Place, Scene, Start};
 use driftless::stabilization::Projected;
 use driftless::stepping::taylor::Kernel;
-use driftless::stepping::{Dp8, Method, Seen, Tally, Taylor, Tolerance};
+use driftless::stepping::{Dp8, Method, Reached, Seen, Tally, Taylor, Tolerance};
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
@@ -240,7 +240,7 @@ fn rows_inside_a_step_are_as_exact_as_its_end() {
     for (name, scene) in scenes {
         let (outcome, samples) = rows(&scene, 0.01, 1.0);
         assert!(outcome.tally.steps < 90, "{name}: steps are cut at the rows");
-        for sample in samples.iter().skip(1).step_by(13) {
+        for sample in samples.iter().skip(1).step_by(31) {
             let exact = end(&scene, Taylor::reference(), sample.t);
             for k in 0..sample.phi.len() {
                 let apart = (exact.unwrapped(k) - sample.phi[k]).abs().max((exact.omega[k].hi - sample.omega[k]).abs());
@@ -489,4 +489,60 @@ fn symmetric_releases_and_equilibria_take_finite_steps() {
             }
         }
     }
+}
+
+#[test]
+fn a_march_goes_on_bit_for_bit_from_where_its_last_step_began() {
+    let mut scenes = fast_scenes();
+    scenes.extend(["spring", "motor_sine"].map(|name| (name, shipped(name, &[]))));
+    for (name, scene) in scenes {
+        let mechanism = compile(&scene);
+        let (row, horizon) = (Time::from(1.0), Time::from(3.0));
+        // To the first step that passes the row, and the row.
+        let pass = |form: &mut Elimination<0>, method: &mut Taylor<f64>, state: &mut State| {
+            let mut from = state.clone();
+            let mut watch = |_: &mut Elimination<0>, state: &mut State| {
+                if state.time >= row {
+                    return Ok(Seen::Enough);
+                }
+                from.clone_from(state);
+                Ok(Seen::Kept)
+            };
+            let reached = method.advance(form, state, horizon, &mut Tally::default(), &mut watch);
+            assert_eq!(reached, Ok(Reached::Pause), "{name}");
+            let mut inside = State::default();
+            method.within(form, &from, row, &mut inside);
+            (from, inside)
+        };
+        let finish = |form: &mut Elimination<0>, method: &mut Taylor<f64>, state: &mut State| {
+            method.advance(form, state, horizon, &mut Tally::default(), &mut |_, _| Ok(Seen::Kept)).expect("an end");
+        };
+        let mut form = Elimination::<0>::new(mechanism.clone());
+        let mut method = on(Kernel::Fastest, 1e-15, 20);
+        let mut whole = form.state(&mechanism.start(&scene));
+        let (from, inside) = pass(&mut form, &mut method, &mut whole);
+        assert!(from.time < row && inside.time == row && whole.time > row);
+        finish(&mut form, &mut method, &mut whole);
+        let (mut form, mut method, mut again) = (Elimination::<0>::new(mechanism.clone()), on(Kernel::Fastest, 1e-15, 20), from);
+        assert_eq!(pass(&mut form, &mut method, &mut again).1, inside, "{name}");
+        finish(&mut form, &mut method, &mut again);
+        assert_eq!(again, whole, "{name}");
+    }
+}
+
+#[test]
+fn extended_orders_are_asked_for_by_name_and_of_taylor_only() {
+    let scene = shipped("gentle", &[]);
+    let mechanism = compile(&scene);
+    let request = Request { extended: true, until: Some(20.0), ..Request::default() };
+    let plan = Plan::new(&scene, &mechanism, &request).expect("a sensible request");
+    assert_eq!((plan.method, plan.extended, plan.tolerance.map(|t| t.relative)), (MethodId::Taylor, true, Some(1e-20)));
+    assert_eq!(plan.folder(&mechanism), "taylor-1e-20-extended");
+    let outcome = common::run(&scene, &request);
+    assert!(outcome.stop.is_none() && outcome.drift.energy.max < 1e-17, "{:e}", outcome.drift.energy.max);
+    for (method, rtol, what) in [(MethodId::Dp8, None, "--extended"), (MethodId::Taylor, Some(1e-26), "--rtol")] {
+        let refusal = Plan::new(&scene, &mechanism, &Request { method: Some(method), rtol, ..request.clone() }).expect_err("a refusal");
+        assert!(refusal.is_usage && refusal.what == what, "{refusal}");
+    }
+    assert!(Plan::new(&scene, &mechanism, &Request { rtol: Some(1e-20), extended: false, ..request }).is_err());
 }

@@ -11,7 +11,7 @@
 //!
 //! Nothing but Cauchy products: four real ones a body, no sine beyond the first.  Driven angles enter with the known series of their laws: the coordinates are those of
 //! [`elimination`](super::elimination), q = S u + s(t), and the solve is with Sᵀ M_0 S.  What the rows of driven bodies lack of balance is the motors'
-//! torque, whose power is integrated with the rest.  Rows that are not eliminated border M_0 with their Jacobian ([`rows`]).
+//! torque, whose power is integrated with the rest.  Rows that are not eliminated border M_0 with their Jacobian (module `rows`).
 //!
 //! Loops run over `N` bodies where `N > 0`, so that small sizes are unrolled, to the same bits as `N = 0` for any number.
 //!
@@ -32,7 +32,7 @@ use super::tree::{self, size};
 use super::{Coordinates, Mechanism, Time};
 use crate::arithmetic::{Complex, DoubleDouble, Real};
 
-/// Power series of a motion about one time; nothing is allocated after [`Series::new`] but for laws with sines.
+/// Power series of a motion about one time; nothing is allocated after [`Series::new`].
 #[derive(Clone, Debug)]
 pub struct Series<T> {
     /// Highest power P of the rates.
@@ -66,21 +66,6 @@ pub struct Series<T> {
     reduced: Vec<T>,
     pivot: Vec<T>,
     solution: Vec<T>,
-}
-
-/// `sized!(n, self.method(args))` calls `method::<n>` for the sizes compiled in, and `method::<0>` for any other.
-macro_rules! sized {
-    ($n:expr, $of:ident.$method:ident($($argument:expr),*)) => {
-        match $n {
-            1 => $of.$method::<1>($($argument),*),
-            2 => $of.$method::<2>($($argument),*),
-            3 => $of.$method::<3>($($argument),*),
-            4 => $of.$method::<4>($($argument),*),
-            5 => $of.$method::<5>($($argument),*),
-            6 => $of.$method::<6>($($argument),*),
-            _ => $of.$method::<0>($($argument),*),
-        }
-    };
 }
 
 impl<T: Real> Series<T> {
@@ -128,7 +113,7 @@ impl<T: Real> Series<T> {
     /// Expands the motion through coordinates `u` \[rad\] (leading part and rest) and rates `u_rate` \[rad/s\] at time `t`.
     pub fn expand(&mut self, mechanism: &Mechanism, t: Time, u: &[T], u_rest: &[T], u_rate: &[T]) {
         self.begin(t, u, u_rest, u_rate);
-        sized!(self.bodies, self.orders(mechanism, 0));
+        self.sized_orders(mechanism, 0);
     }
 
     /// Expands a motion whose first powers were found in more digits; they are rounded, and the later ones follow from them.
@@ -144,7 +129,7 @@ impl<T: Real> Series<T> {
             spring.take(first);
         }
         self.rows.take(&first.rows);
-        sized!(self.bodies, self.orders(mechanism, first.order.min(self.order)));
+        self.sized_orders(mechanism, first.order.min(self.order));
     }
 
     /// Powers 0, 1, … of the gap of a wall \[m/s^m\], to that of the unit vectors.
@@ -160,10 +145,9 @@ impl<T: Real> Series<T> {
         }
     }
 
-    /// Powers 0, 1, … of the force of the `held`-th contact that is held \[N/s^m\], of `count` held ones.
-    pub fn contact_force(&self, held: usize, count: usize, powers: &mut Vec<f64>) {
-        powers.clear();
-        powers.extend((0..self.order).map(|m| -self.rows.multiplier_from_last(count - 1 - held, m).value()));
+    /// Power `m`, below the order, of the multipliers of the rows in force \[N, N·m over s^m\]: all rows, or all but the motors' where these are eliminated.
+    pub fn multipliers(&self, m: usize) -> &[T] {
+        self.rows.multipliers(m)
     }
 
     /// Power zero, and the laws' series.
@@ -185,12 +169,28 @@ impl<T: Real> Series<T> {
             for (sign, law) in &tie.laws {
                 let phase = law.at::<T>(t);
                 z = z * if *sign > 0.0 { phase.unit } else { phase.unit.conj() };
-                drive::add(law, *sign, t, self.drive.iter_mut().skip(i).step_by(n));
+                drive::add(law, *sign, t, &mut self.drive, i, n);
             }
             self.omega[i] += self.drive[i];
             self.z[i] = z;
         }
         self.rows.begin(t);
+    }
+
+    /// The powers from `first` on, by the code for this number of bodies where there is one: in double-double the arithmetic outweighs the loops.
+    fn sized_orders(&mut self, mechanism: &Mechanism, first: usize) {
+        if !T::IS_PLAIN {
+            return self.orders::<0>(mechanism, first);
+        }
+        match self.bodies {
+            1 => self.orders::<1>(mechanism, first),
+            2 => self.orders::<2>(mechanism, first),
+            3 => self.orders::<3>(mechanism, first),
+            4 => self.orders::<4>(mechanism, first),
+            5 => self.orders::<5>(mechanism, first),
+            6 => self.orders::<6>(mechanism, first),
+            _ => self.orders::<0>(mechanism, first),
+        }
     }
 
     /// The factors of M_0, and the powers from `first` on.
@@ -326,12 +326,12 @@ impl<T: Real> Series<T> {
         if self.is_tied {
             for (i, _) in self.ties.bodies.iter().enumerate().filter(|(_, tie)| !tie.laws.is_empty()) {
                 let mut torque = (self.omega[(m + 1) * n + i] * T::of((m + 1) as f64)).scale(mechanism.tree.diagonal[i]);
-                for l in 0..=m {
-                    torque += self.z[l * n + i].cross(self.rest[(m - l) * n + i]);
+                for (z, &rest) in self.z[i..].iter().step_by(n).zip(self.rest[..=m * n + i].iter().rev().step_by(n)) {
+                    torque += z.cross(rest);
                 }
                 self.torque[m * n + i] = torque;
-                for l in 0..=m {
-                    power += self.torque[l * n + i] * self.drive[(m - l) * n + i];
+                for (&torque, &drive) in self.torque[i..].iter().step_by(n).zip(self.drive[..=m * n + i].iter().rev().step_by(n)) {
+                    power += torque * drive;
                 }
             }
         }
@@ -360,6 +360,56 @@ fn couple<T: Real, const N: usize>(mechanism: &Mechanism, x: &[Complex<T>], rest
                 rest[i] += Complex::new(x[j].re.scale(h.re), x[j].im.scale(h.re));
                 rest[j] += Complex::new(x[i].re.scale(h.re), x[i].im.scale(h.re));
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::read_scene;
+
+    fn mechanism(name: &str) -> (Mechanism, Vec<f64>, Vec<f64>) {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("examples/scenes/{name}.json"));
+        let scene = read_scene(&path, &[]).expect("a shipped scene");
+        let (phi, omega) = scene.start.iter().map(|start| (start.phi, start.omega)).unzip();
+        (Mechanism::new(&scene).expect("a valid scene"), phi, omega)
+    }
+
+    #[test]
+    fn sizes_known_to_the_compiler_give_the_same_bits() {
+        for name in ["spring", "motor_sine", "wall"] {
+            let (mechanism, phi, omega) = mechanism(name);
+            for coordinates in [Coordinates::All, Coordinates::Independent] {
+                let mut series = Series::<f64>::new(&mechanism, coordinates, 20);
+                let f = series.coordinates();
+                let from = 2 - f;
+                series.begin(Time::default(), &phi[from..], &[0.0; 2][from..], &omega[from..]);
+                let mut other = series.clone();
+                series.orders::<2>(&mechanism, 0);
+                other.orders::<0>(&mechanism, 0);
+                assert!(series.z == other.z && series.omega == other.omega && series.power == other.power, "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn powers_after_exact_ones_are_those_of_a_plain_expansion() {
+        for name in ["spring", "motor_sine", "branch"] {
+            let (mechanism, phi, omega) = mechanism(name);
+            let exact = |x: &[f64]| x.iter().map(|&x| DoubleDouble::from(x)).collect::<Vec<_>>();
+            let none = vec![0.0; phi.len()];
+            let mut plain = Series::<f64>::new(&mechanism, Coordinates::All, 16);
+            plain.expand(&mechanism, Time::default(), &phi, &none, &omega);
+            let mut first = Series::<DoubleDouble>::new(&mechanism, Coordinates::All, 6);
+            first.expand(&mechanism, Time::default(), &exact(&phi), &exact(&none), &exact(&omega));
+            let mut extended = plain.clone();
+            extended.carry_on(&mechanism, Time::default(), &phi, &none, &omega, &first);
+            for (found, expected) in [(&extended.omega, &plain.omega), (&extended.power, &plain.power)] {
+                let largest = expected.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+                assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9 * largest.max(1e-9)), "{name}");
+            }
+            assert_ne!(extended.omega, plain.omega);
         }
     }
 }

@@ -1,8 +1,8 @@
 //! `taylor`: the power series of the motion, with adaptive step.
 //!
-//! Order 20 to 30, adaptive, explicit; keeps nothing by itself, but errs so little that energy stays near rounding.  To choose for the most accurate path, and for
-//! speed below about 1e-8.  It asks for a mechanism in the coordinates of [`Elimination`](crate::dynamics::elimination::Elimination), without walls; in double-double
-//! it makes references of 1e-25 and better.
+//! Order 16 to 30, adaptive, explicit; keeps nothing by itself, but errs so little that energy stays near rounding.  To choose for the most accurate path, and for
+//! speed below about 1e-8.  It asks for a form in angles and rates: [`Elimination`](crate::dynamics::elimination::Elimination), or
+//! [`Multiplier`](crate::dynamics::multiplier::Multiplier), whose rows are solved for with every order.  In double-double it makes references of 1e-25 and better.
 //!
 //! ```text
 //! u(t+h) = u + Σ w_m h^(m+1)/(m+1),    w(t+h) = Σ w_m h^m,    m = 0…P
@@ -11,6 +11,10 @@
 //!
 //! **Trap**: released from rest a symmetric scene has only every fourth power, and a step from the last one or two is far too long; five powers
 //! in a row cannot all vanish by symmetry.  Only the increments are rounded: they are added to a (high, low) state, whose low part turns the unit vectors at the next start.
+//!
+//! The series is the dense output: [`Method::within`] sums it at any time in the step, so that steps need not end on output times.  It is the event finder,
+//! too: gaps of walls are polynomials of the step (module `event`), and the state is brought onto their first zero.  With
+//! [`Taylor::extended`] the first powers are found in double-double, and the later ones go on from them.
 //!
 //! Source: À. Jorba, M. Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor methods*, Experimental Mathematics 14 (2005), section 3.2,
 //! for steps from the last powers; their two are five here.
@@ -283,8 +287,11 @@ fn trace<T: Real, P: Form + ?Sized>(problem: &P, expansion: &Expansion<T>, conta
     match mechanism.held.iter().position(|&held| held == contact) {
         None => series.gap(&mechanism.contacts[contact].row, powers),
         Some(place) => {
-            series.contact_force(place, mechanism.held.len(), powers);
-            powers.iter_mut().for_each(|power| *power /= mechanism.energy_scale);
+            // The rows of the contacts that are held are the last ones.
+            let from_end = mechanism.held.len() - place;
+            let force = |m| series.multipliers(m).iter().nth_back(from_end - 1).map_or(f64::NAN, |multiplier| -multiplier.value());
+            powers.clear();
+            powers.extend((0..series.order()).map(|m| force(m) / mechanism.energy_scale));
         }
     }
 }

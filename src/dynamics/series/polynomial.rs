@@ -20,7 +20,7 @@ pub fn convolve<const N: usize, A, B, S>(n: usize, first: usize, a: &[A], b: &[B
 where
     A: Copy,
     B: Copy,
-    S: Copy + Default + std::ops::AddAssign + std::ops::Add<Output = S>,
+    S: Copy + Default + std::ops::AddAssign,
 {
     let n = size::<N>(n);
     let middle = a.len() / n / 2 * n;
@@ -38,7 +38,7 @@ where
         }
     }
     for i in 0..width::<N>() {
-        inner[i] = inner[i] + outer[i];
+        inner[i] += outer[i];
     }
     inner
 }
@@ -49,7 +49,7 @@ pub fn product<A, B, S>(a: &[A], b: &[B], term: impl Fn(A, B) -> S) -> S
 where
     A: Copy,
     B: Copy,
-    S: Copy + Default + std::ops::AddAssign + std::ops::Add<Output = S>,
+    S: Copy + Default + std::ops::AddAssign,
 {
     convolve::<1, A, B, S>(1, 0, a, b, term)[0]
 }

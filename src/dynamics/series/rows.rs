@@ -74,10 +74,10 @@ impl<T: Real> RowSeries<T> {
         self.kinds.is_empty()
     }
 
-    /// Power `m` of the multiplier of the `r`-th row in force, counted from the last \[N, N·m over s^m\].
-    pub fn multiplier_from_last(&self, r: usize, m: usize) -> T {
+    /// Power `m` of the multipliers of the rows in force \[N, N·m over s^m\].
+    pub fn multipliers(&self, m: usize) -> &[T] {
         let rows = self.kinds.len();
-        self.multiplier[m * rows + rows - 1 - r]
+        &self.multiplier[m * rows..(m + 1) * rows]
     }
 
     /// The laws' series at time `t`.
@@ -85,7 +85,7 @@ impl<T: Real> RowSeries<T> {
         for kind in &mut self.kinds {
             if let Kind::Angle { law, drive, .. } = kind {
                 drive.fill(T::ZERO);
-                drive::add(law, 1.0, t, drive.iter_mut());
+                drive::add(law, 1.0, t, drive, 0, 1);
             }
         }
     }

@@ -44,9 +44,13 @@ pub fn crossing(powers: &[f64], h: f64) -> Crossing {
 
 /// The first change of sign of `polynomial - level` in (from, to].
 fn root(powers: &[f64], level: f64, from: f64, to: f64) -> Option<f64> {
-    let mut parts = vec![(from, to)];
+    // Later halves wait; thirty halvings come down to what counts as close.
+    let mut parts = [(from, to); 40];
+    let mut count = 1;
     let least = CLOSE * (to - from);
-    while let Some((low, high)) = parts.pop() {
+    while count > 0 {
+        count -= 1;
+        let (low, high) = parts[count];
         let (centre, radius) = (0.5 * (low + high), 0.5 * (high - low));
         let (value, slope) = value(powers, centre);
         let value = value - level;
@@ -63,8 +67,8 @@ fn root(powers: &[f64], level: f64, from: f64, to: f64) -> Option<f64> {
             }
             continue;
         }
-        parts.push((centre, high));
-        parts.push((low, centre));
+        (parts[count], parts[count + 1]) = ((centre, high), (low, centre));
+        count += 2;
     }
     None
 }
