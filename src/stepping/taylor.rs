@@ -16,12 +16,14 @@
 //! for steps from the last powers; their two are five here.
 
 mod bodies;
+pub mod crowd;
 mod direction;
 mod driven;
 mod fast;
 mod pace;
 mod pair;
 
+pub use self::crowd::Crowd;
 use self::fast::Fast;
 use super::{Cause, Method, Reached, Seen, StepError, Tally, Tolerance, Watch};
 use crate::arithmetic::{DoubleDouble, Real};
