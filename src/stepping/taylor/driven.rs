@@ -61,11 +61,13 @@ pub struct Scratch {
     e: [[f64; 4]; MOST + 2],
     /// `[v, v, R_x, R_y]`.
     m: [[f64; 4]; MOST + 1],
+    /// e_1 at the step's start.
+    given: [f64; 2],
 }
 
 impl Default for Scratch {
     fn default() -> Self {
-        Self { e: [[0.0; 4]; MOST + 2], m: [[0.0; 4]; MOST + 1] }
+        Self { e: [[0.0; 4]; MOST + 2], m: [[0.0; 4]; MOST + 1], given: [0.0; 2] }
     }
 }
 
@@ -166,7 +168,8 @@ pub fn step<L: Lanes, const P: usize>(
     let [phi, v, _] = flow.high;
     let both = direction::unit(L::of([phase.hi, phase.hi, phi, phi]), L::of([phase.lo, phase.lo, flow.low[0], flow.low[0]]));
     let halves = both.swap_halves();
-    let [c1, s1, c, s] = both.array();
+    let [c1, s1, ..] = both.array();
+    scratch.given = [c1, s1];
     // i^j left(e_1) in lanes 2 and 3.
     let directions = [[-s1, c1], [-c1, -s1], [s1, -c1], [c1, s1]].map(|[x, y]| L::of([0.0, 0.0, x, y]));
     let [drive, drive_rest] = driven.drive[0];
@@ -186,23 +189,31 @@ pub fn step<L: Lanes, const P: usize>(
     let wanted = pace.step::<P>(&largest);
     let h = pace::taken(wanted, left);
     if h > 0.0 {
-        let [angle, rate] = rates::<P>(scratch, h);
-        let (turned, swept) = directions_moved::<L, P>(scratch, h);
-        // What the driven body has turned.
-        let [c_turn, s_turn, ..] = direction::unit(L::splat(w * h), L::splat(w.mul_add(h, -(w * h)))).array();
-        let moved = [c1 * (c_turn - 1.0) - s1 * s_turn, s1 * (c_turn - 1.0) + c1 * s_turn];
-        let across = c1 * c + s1 * s;
-        let change = (c1 * turned[0] + s1 * turned[1]) + (moved[0] * (c + turned[0]) + moved[1] * (s + turned[1]));
-        let momentum = driven.diagonal * rate + driven.coupling * (change * (w + v + rate) + across * rate);
-        let [own, free] = driven.weight;
-        let gravity = moved[0] * own.re + moved[1] * own.im + w * (swept[0] * free.im - swept[1] * free.re);
-        let increments = [angle + h * flow.low[1], rate, w * momentum - gravity];
-        for (i, increment) in increments.into_iter().enumerate() {
-            let sum = DoubleDouble::sum(flow.high[i], flow.low[i]) + increment;
-            (flow.high[i], flow.low[i]) = (sum.hi, sum.lo);
-        }
+        go::<L, P>(driven, scratch, flow, h);
     }
     (wanted, h)
+}
+
+/// Takes `flow` from the step's start on by `h` \[s\].
+#[inline(always)]
+pub fn go<L: Lanes, const P: usize>(driven: &Driven, scratch: &Scratch, flow: &mut Flow, h: f64) {
+    let (w, v) = (driven.law.rate, flow.high[1]);
+    let ([c, s, ..], [c1, s1]) = (scratch.e[0], scratch.given);
+    let [angle, rate] = rates::<P>(scratch, h);
+    let (turned, swept) = directions_moved::<L, P>(scratch, h);
+    // What the driven body has turned.
+    let [c_turn, s_turn, ..] = direction::unit(L::splat(w * h), L::splat(w.mul_add(h, -(w * h)))).array();
+    let moved = [c1 * (c_turn - 1.0) - s1 * s_turn, s1 * (c_turn - 1.0) + c1 * s_turn];
+    let across = c1 * c + s1 * s;
+    let change = (c1 * turned[0] + s1 * turned[1]) + (moved[0] * (c + turned[0]) + moved[1] * (s + turned[1]));
+    let momentum = driven.diagonal * rate + driven.coupling * (change * (w + v + rate) + across * rate);
+    let [own, free] = driven.weight;
+    let gravity = moved[0] * own.re + moved[1] * own.im + w * (swept[0] * free.im - swept[1] * free.re);
+    let increments = [angle + h * flow.low[1], rate, w * momentum - gravity];
+    for (i, increment) in increments.into_iter().enumerate() {
+        let sum = DoubleDouble::sum(flow.high[i], flow.low[i]) + increment;
+        (flow.high[i], flow.low[i]) = (sum.hi, sum.lo);
+    }
 }
 
 /// Increments of the angle and of the rate.
