@@ -21,6 +21,7 @@ mod driven;
 mod fast;
 mod pace;
 mod pair;
+mod terms;
 
 use self::fast::Fast;
 use super::{Cause, Method, Reached, Seen, StepError, Tally, Tolerance, Watch};
