@@ -53,7 +53,7 @@ use crate::arithmetic::{DoubleDouble, Scalar, angle};
 pub type Time = DoubleDouble;
 
 /// What a method marches: the numbers, and everything else a restart needs to go on bit for bit.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub struct State {
     /// Time.
     pub time: Time,
@@ -91,6 +91,23 @@ impl State {
     /// Unknown `i` in full.
     pub fn unknown(&self, i: usize) -> DoubleDouble {
         DoubleDouble::sum(self.y[i], self.low[i])
+    }
+}
+
+impl Clone for State {
+    fn clone(&self) -> Self {
+        let mut state = Self::default();
+        state.clone_from(self);
+        state
+    }
+
+    /// Allocates nothing where there is room: copies are made every step.
+    fn clone_from(&mut self, other: &Self) {
+        self.time = other.time;
+        self.y.clone_from(&other.y);
+        self.low.clone_from(&other.low);
+        self.turns.clone_from(&other.turns);
+        self.memory.clone_from(&other.memory);
     }
 }
 

@@ -145,10 +145,25 @@ impl<T: Real, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
             state.time = if h == left.hi { until } else { state.time + h };
             state.wrap();
             tally.steps += 1;
-            if watch(problem, state)? == Seen::Changed {
-                state.memory.clear();
+            if watch(problem, state)? == Seen::Enough {
+                return Ok(Reached::Pause);
             }
         }
+    }
+
+    fn is_dense(&self) -> bool {
+        true
+    }
+
+    fn within(&mut self, problem: &mut P, from: &State, time: Time, inside: &mut State) {
+        inside.clone_from(from);
+        let h = time - from.time;
+        match &self.fast {
+            Some(fast) => fast.go(inside, h.hi),
+            None => self.go(problem.angles(), inside, h),
+        }
+        inside.time = time;
+        inside.wrap();
     }
 }
 
@@ -187,8 +202,14 @@ impl<T: Real> Taylor<T> {
             return (wanted, 0.0);
         }
         let h = pace::taken(wanted, left.hi);
-        let exact = if h == left.hi { left } else { DoubleDouble::from(h) };
-        let step = T::split(exact).0;
+        self.go(f, state, if h == left.hi { left } else { DoubleDouble::from(h) });
+        (wanted, h)
+    }
+
+    /// Takes a state of `f` coordinates from where the series was expanded on by `h` \[s\].
+    fn go(&self, f: usize, state: &mut State, h: Time) {
+        let Some(series) = &self.series else { return };
+        let step = T::split(h).0;
         let mut add = |i: usize, increment: T| {
             let sum = state.unknown(i) + increment.double_double();
             (state.y[i], state.low[i]) = (sum.hi, sum.lo);
@@ -198,7 +219,6 @@ impl<T: Real> Taylor<T> {
             add(f + i, tail(&series.rate, i, f, 1, step));
         }
         add(2 * f, integral(&series.power, 0, 1, step));
-        (wanted, h)
     }
 
     /// The unknown whose series is not finite, as far as it is known.

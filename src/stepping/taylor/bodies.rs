@@ -278,6 +278,12 @@ fn begin<L: Lanes, const B: usize>(bodies: &mut Bodies<B>, state: &State) {
     }
 }
 
+/// Takes the state from the step's start on by `h` \[s\].
+#[inline(always)]
+pub fn go<L: Lanes, const P: usize, const B: usize>(bodies: &Bodies<B>, state: &mut State, h: f64) {
+    finish::<L, P, B>(&bodies.scratch, state, bodies.count, h);
+}
+
 /// The new state.
 #[inline(always)]
 fn finish<L: Lanes, const P: usize, const B: usize>(scratch: &Scratch<B>, state: &mut State, n: usize, h: f64) {

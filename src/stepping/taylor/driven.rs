@@ -180,24 +180,31 @@ pub fn step<L: Lanes, const P: usize>(
     let wanted = pace.step::<P>(&largest);
     let h = pace::taken(wanted, left);
     if h > 0.0 {
-        let [c, s, x, y] = scratch.e[0];
-        let ([c_moved, s_moved, x_moved, y_moved], [angle, rate, _, swept]) = increments::<L, P>(scratch, h);
-        let (angle, swept) = (h * (v + angle), h * (y + swept));
-        // What the driven body has turned: e_1 = e conj(u).
-        let (c_new, s_new) = (c + c_moved, s + s_moved);
-        let turned = [
-            (c_moved * x + s_moved * y) + (c_new * x_moved + s_new * y_moved),
-            (s_moved * x - c_moved * y) + (s_new * x_moved - c_new * y_moved),
-        ];
-        // Every factor here is exact or differs from step to step, so that no rounding acts for ever with one sign.
-        let pull = x_moved * (w + v + rate) + x * rate - w * (w * swept);
-        let work = w * (driven.coupling * pull) - (turned[0] * driven.weight.re + turned[1] * driven.weight.im);
-        for (i, increment) in [angle + h * flow.low[1], rate, work].into_iter().enumerate() {
-            let sum = DoubleDouble::sum(flow.high[i], flow.low[i]) + increment;
-            (flow.high[i], flow.low[i]) = (sum.hi, sum.lo);
-        }
+        go::<L, P>(driven, scratch, flow, h);
     }
     (wanted, h)
+}
+
+/// Takes `flow` from the step's start on by `h` \[s\].
+#[inline(always)]
+pub fn go<L: Lanes, const P: usize>(driven: &Driven, scratch: &Scratch, flow: &mut Flow, h: f64) {
+    let (w, v) = (driven.law.rate, flow.high[1]);
+    let [c, s, x, y] = scratch.e[0];
+    let ([c_moved, s_moved, x_moved, y_moved], [angle, rate, _, swept]) = increments::<L, P>(scratch, h);
+    let (angle, swept) = (h * (v + angle), h * (y + swept));
+    // What the driven body has turned: e_1 = e conj(u).
+    let (c_new, s_new) = (c + c_moved, s + s_moved);
+    let turned = [
+        (c_moved * x + s_moved * y) + (c_new * x_moved + s_new * y_moved),
+        (s_moved * x - c_moved * y) + (s_new * x_moved - c_new * y_moved),
+    ];
+    // Every factor here is exact or differs from step to step, so that no rounding acts for ever with one sign.
+    let pull = x_moved * (w + v + rate) + x * rate - w * (w * swept);
+    let work = w * (driven.coupling * pull) - (turned[0] * driven.weight.re + turned[1] * driven.weight.im);
+    for (i, increment) in [angle + h * flow.low[1], rate, work].into_iter().enumerate() {
+        let sum = DoubleDouble::sum(flow.high[i], flow.low[i]) + increment;
+        (flow.high[i], flow.low[i]) = (sum.hi, sum.lo);
+    }
 }
 
 /// Increments over `h` \[s\]: of E; and `[mean of v less v_0, increment of v, –, mean of E's last lane less its start]`.

@@ -276,18 +276,24 @@ pub fn step<L: Lanes, const P: usize>(pair: &Pair, pace: &Pace, scratch: &mut Sc
     let wanted = pace.step::<P>(&largest);
     let h = pace::taken(wanted, left);
     if h > 0.0 {
-        let (high, low) = (L::of(flow.high), L::of(flow.low));
-        let rates = L::of([v1, 0.0, v2, 0.0]);
-        let (increment, rest) = increment::<L, P>(scratch, rates, low, h);
-        // Two-sum, then the low parts, then a quick two-sum.
-        let sum = high.add(increment);
-        let second = sum.sub(high);
-        let error = high.sub(sum.sub(second)).add(increment.sub(second)).add(low.add(rest));
-        let total = sum.add(error);
-        flow.high = total.array();
-        flow.low = error.sub(total.sub(sum)).array();
+        go::<L, P>(scratch, flow, h);
     }
     (wanted, h)
+}
+
+/// Takes `flow` from the step's start on by `h` \[s\].
+#[inline(always)]
+pub fn go<L: Lanes, const P: usize>(scratch: &Scratch, flow: &mut Flow, h: f64) {
+    let (high, low) = (L::of(flow.high), L::of(flow.low));
+    let rates = L::of([flow.high[1], 0.0, flow.high[3], 0.0]);
+    let (increment, rest) = increment::<L, P>(scratch, rates, low, h);
+    // Two-sum, then the low parts, then a quick two-sum.
+    let sum = high.add(increment);
+    let second = sum.sub(high);
+    let error = high.sub(sum.sub(second)).add(increment.sub(second)).add(low.add(rest));
+    let total = sum.add(error);
+    flow.high = total.array();
+    flow.low = error.sub(total.sub(sum)).array();
 }
 
 /// Increments `[phi1, v1, phi2, v2]` over `h` \[s\]: even and odd powers in two Horner chains; and what the rates' low parts move the angles by.
