@@ -16,6 +16,7 @@
 //! for steps from the last powers; their two are five here.
 
 mod bodies;
+pub mod crowd;
 mod direction;
 mod driven;
 mod fast;
@@ -23,6 +24,7 @@ mod pace;
 mod pair;
 mod terms;
 
+pub use self::crowd::Crowd;
 use self::fast::Fast;
 use super::{Cause, Method, Reached, Seen, StepError, Tally, Tolerance, Watch};
 use crate::arithmetic::{DoubleDouble, Real};
