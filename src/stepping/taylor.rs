@@ -24,6 +24,7 @@ mod expansion;
 mod fast;
 mod pace;
 mod pair;
+mod terms;
 
 pub use self::crowd::Crowd;
 use self::event::Crossing;
