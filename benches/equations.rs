@@ -14,9 +14,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 /// Evaluations a block.
-const BLOCK: usize = 20_000;
+const BLOCK: usize = 2_000;
 /// Blocks of each candidate.
-const BLOCKS: usize = 60;
+const BLOCKS: usize = 600;
 
 /// The source problem's two bars, nothing else: the smallest code we could write, with the same sine and cosine.
 struct ByHand {

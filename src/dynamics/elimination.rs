@@ -17,11 +17,13 @@ use std::sync::Arc;
 pub struct Elimination<const N: usize> {
     mechanism: Arc<Mechanism>,
     kernel: Kernel<f64>,
-    phi: Vec<f64>,
+    /// True where no driven angle accelerates.
+    is_steady: bool,
     omega: Vec<f64>,
     drive_acceleration: Vec<f64>,
     drive_rate: Vec<f64>,
     given: Vec<f64>,
+    share: Vec<f64>,
     reduced: Vec<f64>,
     pivot: Vec<f64>,
     coordinate_acceleration: Vec<f64>,
@@ -35,7 +37,7 @@ impl<const N: usize> Elimination<N> {
         let zeros = || vec![0.0; n];
         Self {
             kernel: Kernel::new(n, 0),
-            phi: zeros(),
+            share: zeros(),
             omega: zeros(),
             drive_acceleration: zeros(),
             drive_rate: zeros(),
@@ -43,6 +45,7 @@ impl<const N: usize> Elimination<N> {
             reduced: vec![0.0; f * f],
             pivot: vec![0.0; f],
             coordinate_acceleration: vec![0.0; f],
+            is_steady: mechanism.ties.is_steady(),
             mechanism,
         }
     }
@@ -62,32 +65,49 @@ impl<const N: usize> Field for Elimination<N> {
         let (n, f) = (size::<N>(mechanism.bodies.len()), mechanism.ties.count());
         let (u, u_rate) = (&y[..f], &y[f..2 * f]);
         let kernel = &mut self.kernel;
-        mechanism.ties.expand(t, u, &mut self.phi, &mut kernel.z, &mut self.drive_rate, &mut self.drive_acceleration);
-        self.omega.copy_from_slice(&self.drive_rate);
-        mechanism.ties.spread(u_rate, &mut self.omega);
-        kernel.assemble::<N>(mechanism, &self.omega);
+        let (drive_rate, drive_acceleration) = (&mut self.drive_rate[..n], &mut self.drive_acceleration[..n]);
+        mechanism.ties.face(t, u, &mut kernel.z[..n], drive_rate, drive_acceleration);
+        let omega = &mut self.omega[..n];
+        omega.copy_from_slice(drive_rate);
+        mechanism.ties.spread(u_rate, omega);
+        kernel.assemble::<N>(mechanism, omega);
+        let (load, given) = (&mut kernel.load[..n], &mut self.given[..n]);
         // b - M s''; what of it the coordinates do not feel is the motors' share.
-        tree::multiply::<f64, N>(n, &kernel.mass, &self.drive_acceleration, &mut self.given);
-        for k in 0..n {
-            kernel.load[k] -= self.given[k];
+        if !self.is_steady {
+            tree::multiply::<f64, N>(n, &kernel.mass, drive_acceleration, given);
+            for k in 0..n {
+                load[k] -= given[k];
+            }
         }
-        let acceleration = &mut self.coordinate_acceleration;
-        mechanism.ties.gather(&kernel.load, acceleration);
+        let acceleration = &mut self.coordinate_acceleration[..f];
+        mechanism.ties.gather(load, acceleration);
         mechanism.ties.reduce(&kernel.mass, &mut self.reduced);
-        tree::factor::<f64, 0>(f, &mut self.reduced, &mut self.pivot);
-        tree::solve::<f64, 0>(f, &self.reduced, &self.pivot, acceleration);
-        self.phi.fill(0.0);
-        mechanism.ties.spread(acceleration, &mut self.phi);
-        tree::multiply::<f64, N>(n, &kernel.mass, &self.phi, &mut self.given);
+        match f {
+            1 => {
+                tree::factor::<f64, 1>(f, &mut self.reduced, &mut self.pivot);
+                tree::solve::<f64, 1>(f, &self.reduced, &self.pivot, acceleration);
+            }
+            _ => {
+                tree::factor::<f64, 0>(f, &mut self.reduced, &mut self.pivot);
+                tree::solve::<f64, 0>(f, &self.reduced, &self.pivot, acceleration);
+            }
+        }
+        let share = &mut self.share[..n];
+        for k in 0..n {
+            share[k] = 0.0;
+        }
+        mechanism.ties.spread(acceleration, share);
+        tree::multiply::<f64, N>(n, &kernel.mass, share, given);
         let mut power = 0.0;
         for k in 0..n {
-            power -= (kernel.load[k] - self.given[k]) * self.drive_rate[k];
+            power -= (load[k] - given[k]) * drive_rate[k];
         }
         for spring in mechanism.springs.iter().filter(|spring| spring.damping != 0.0) {
-            power += spring.drag_power(&kernel.z, &self.omega);
+            power += spring.drag_power(&kernel.z, omega);
         }
-        rate[..f].copy_from_slice(u_rate);
-        rate[f..2 * f].copy_from_slice(acceleration);
+        for k in 0..f {
+            (rate[k], rate[f + k]) = (u_rate[k], acceleration[k]);
+        }
         rate[2 * f] = power;
     }
 
@@ -108,7 +128,7 @@ impl<const N: usize> Field for Elimination<N> {
     fn gaps(&mut self, t: Time, y: &[f64], gaps: &mut [f64]) {
         let ties = &self.mechanism.ties;
         let kernel = &mut self.kernel;
-        ties.expand(t, &y[..ties.count()], &mut self.phi, &mut kernel.z, &mut self.drive_rate, &mut self.drive_acceleration);
+        ties.face(t, &y[..ties.count()], &mut kernel.z, &mut self.drive_rate, &mut self.drive_acceleration);
         for (gap, contact) in gaps.iter_mut().zip(&self.mechanism.contacts) {
             *gap = contact.row.gap(&kernel.z);
         }

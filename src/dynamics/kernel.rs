@@ -109,38 +109,63 @@ impl<T: Real> Kernel<T> {
     }
 
     /// The rows' share: expects free accelerations in `load` and the factors of M.
+    #[inline(always)]
     fn constrain<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T], bias: Bias) {
         let n = size::<N>(mechanism.tree.bodies);
         let rows = mechanism.rows.len();
-        self.linearise::<N>(mechanism, t, phi, omega);
-        for r in 0..rows {
-            let jacobian = &self.jacobian[r * n..(r + 1) * n];
-            let (rate, free) = (dot(jacobian, omega), dot(jacobian, &self.load));
-            let row = self.rows[r];
-            let wanted = (rate + row.drive).scale(bias.rate) + row.position.scale(bias.position);
-            self.correction[r] = wanted;
-            self.multiplier[r] = free + row.convective + wanted;
+        let is_biased = bias != Bias::default();
+        let posture = Posture { phi, z: &self.z, omega };
+        self.jacobian.fill(T::ZERO);
+        for (r, row) in mechanism.rows.iter().enumerate() {
+            let jacobian = &mut self.jacobian[r * n..(r + 1) * n];
+            // Only a bias asks for C.
+            self.rows[r] = if is_biased { row.linearise(t, posture, jacobian) } else { row.differentiate(t, posture, jacobian) };
         }
-        tree::solve::<T, 0>(rows, &self.schur, &self.schur_pivot, &mut self.multiplier);
-        tree::solve::<T, 0>(rows, &self.schur, &self.schur_pivot, &mut self.correction);
+        self.couple_rows::<N>(n, rows);
         for r in 0..rows {
+            let row = self.rows[r];
+            self.multiplier[r] = dot(&self.jacobian[r * n..(r + 1) * n], &self.load[..n]) + row.convective;
+            self.correction[r] = T::ZERO;
+            if is_biased {
+                let wanted = self.row_rate(r, omega).scale(bias.rate) + row.position.scale(bias.position);
+                self.correction[r] = wanted;
+                self.multiplier[r] += wanted;
+            }
+        }
+        solve_rows(rows, &self.schur, &self.schur_pivot, &mut self.multiplier);
+        if is_biased {
+            solve_rows(rows, &self.schur, &self.schur_pivot, &mut self.correction);
+        }
+        for r in 0..rows {
+            let (lifted, load) = (&self.lifted[r * n..(r + 1) * n], &mut self.load[..n]);
             for k in 0..n {
-                self.load[k] -= self.lifted[r * n + k] * self.multiplier[r];
+                load[k] -= lifted[k] * self.multiplier[r];
             }
         }
     }
 
     /// C, G, C_t, gamma of every row, and the factors of S = G M⁻¹ Gᵀ; expects the factors of M.
     pub fn linearise<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
-        let n = size::<N>(mechanism.tree.bodies);
-        let rows = mechanism.rows.len();
-        self.jacobian.fill(T::ZERO);
+        self.rows_at(mechanism, t, phi, omega);
+        self.couple_rows::<N>(size::<N>(mechanism.tree.bodies), mechanism.rows.len());
+    }
+
+    /// C, G, C_t, gamma of every row, and nothing else.
+    pub fn rows_at(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
+        let n = mechanism.tree.bodies;
         let posture = Posture { phi, z: &self.z, omega };
+        self.jacobian.fill(T::ZERO);
         for (r, row) in mechanism.rows.iter().enumerate() {
-            let jacobian = &mut self.jacobian[r * n..(r + 1) * n];
-            self.rows[r] = row.linearise(t, posture, jacobian);
+            self.rows[r] = row.linearise(t, posture, &mut self.jacobian[r * n..(r + 1) * n]);
+        }
+    }
+
+    /// X = M⁻¹ Gᵀ and the factors of S = G X.
+    #[inline(always)]
+    fn couple_rows<const N: usize>(&mut self, n: usize, rows: usize) {
+        for r in 0..rows {
             let lifted = &mut self.lifted[r * n..(r + 1) * n];
-            lifted.copy_from_slice(jacobian);
+            lifted.copy_from_slice(&self.jacobian[r * n..(r + 1) * n]);
             tree::solve::<T, N>(n, &self.mass, &self.pivot, lifted);
         }
         for r in 0..rows {
@@ -148,13 +173,25 @@ impl<T: Real> Kernel<T> {
                 self.schur[r * rows + s] = dot(&self.jacobian[r * n..(r + 1) * n], &self.lifted[s * n..(s + 1) * n]);
             }
         }
-        tree::factor::<T, 0>(rows, &mut self.schur, &mut self.schur_pivot);
+        match rows {
+            1 => tree::factor::<T, 1>(1, &mut self.schur, &mut self.schur_pivot),
+            _ => tree::factor::<T, 0>(rows, &mut self.schur, &mut self.schur_pivot),
+        }
     }
 
     /// C' of row `r` \[rad/s or m/s\], after [`Kernel::linearise`].
     pub fn row_rate(&self, r: usize, omega: &[T]) -> T {
         let n = self.z.len();
         dot(&self.jacobian[r * n..(r + 1) * n], omega) + self.rows[r].drive
+    }
+}
+
+/// Solves S x = right in place with the factors of S.
+#[inline(always)]
+pub fn solve_rows<T: Scalar>(rows: usize, schur: &[T], schur_pivot: &[T], right: &mut [T]) {
+    match rows {
+        1 => tree::solve::<T, 1>(1, schur, schur_pivot, right),
+        _ => tree::solve::<T, 0>(rows, schur, schur_pivot, right),
     }
 }
 

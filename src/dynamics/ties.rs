@@ -87,29 +87,62 @@ impl Ties {
         self.bodies.iter().any(|tie| !tie.laws.is_empty())
     }
 
+    /// True where no driven angle accelerates.
+    pub fn is_steady(&self) -> bool {
+        self.bodies.iter().flat_map(|tie| &tie.laws).all(|(_, law)| law.is_steady())
+    }
+
     /// Angles \[rad\], unit vectors, s' \[rad/s\] and s'' \[rad/s²\] of all bodies at coordinates `u` \[rad\].
     #[inline]
     pub fn expand<T: Real>(&self, t: Time, u: &[T], phi: &mut [T], z: &mut [Complex<T>], rate: &mut [T], acceleration: &mut [T]) {
-        for (i, tie) in self.bodies.iter().enumerate() {
-            (phi[i], z[i]) = tie.base.map_or((T::ZERO, Complex::new(T::ONE, T::ZERO)), |base| (u[base], Complex::unit(u[base])));
-            (rate[i], acceleration[i]) = (T::ZERO, T::ZERO);
+        self.place(t, u, z, rate, acceleration, |body, angle| phi[body] = angle);
+    }
+
+    /// The same without the angles.
+    #[inline(always)]
+    pub fn face<T: Real>(&self, t: Time, u: &[T], z: &mut [Complex<T>], rate: &mut [T], acceleration: &mut [T]) {
+        self.place(t, u, z, rate, acceleration, |_, _| {});
+    }
+
+    #[inline(always)]
+    fn place<T: Real>(
+        &self,
+        t: Time,
+        u: &[T],
+        z: &mut [Complex<T>],
+        rate: &mut [T],
+        acceleration: &mut [T],
+        mut phi: impl FnMut(usize, T),
+    ) {
+        let bodies = self.bodies.iter().zip(z).zip(rate.iter_mut().zip(acceleration));
+        for (body, ((tie, z), (rate, acceleration))) in bodies.enumerate() {
+            if let (None, [(sign, law)]) = (tie.base, &tie.laws[..]) {
+                // Exactly the law's own numbers: such a row is kept to the last bit.
+                let phase = law.at::<T>(t);
+                phi(body, phase.angle.scale(*sign));
+                *z = if *sign > 0.0 { phase.unit } else { phase.unit.conj() };
+                (*rate, *acceleration) = (phase.rate.scale(*sign), phase.acceleration.scale(*sign));
+                continue;
+            }
+            let (mut angle, mut unit) = (T::ZERO, Complex::new(T::ONE, T::ZERO));
+            if let Some(base) = tie.base {
+                (angle, unit) = (u[base], Complex::unit(u[base]));
+            }
+            (*rate, *acceleration) = (T::ZERO, T::ZERO);
             for (sign, law) in &tie.laws {
                 let phase = law.at::<T>(t);
-                let unit = if *sign > 0.0 { phase.unit } else { phase.unit.conj() };
-                if tie.base.is_none() && tie.laws.len() == 1 {
-                    // Exactly the law's own numbers: such a row is kept to the last bit.
-                    (phi[i], z[i]) = (phase.angle.scale(*sign), unit);
-                } else {
-                    (phi[i], z[i]) = (angle::difference(phi[i], -phase.angle.scale(*sign)), z[i] * unit);
-                }
-                rate[i] += phase.rate.scale(*sign);
-                acceleration[i] += phase.acceleration.scale(*sign);
+                angle = angle::difference(angle, -phase.angle.scale(*sign));
+                unit = unit * if *sign > 0.0 { phase.unit } else { phase.unit.conj() };
+                *rate += phase.rate.scale(*sign);
+                *acceleration += phase.acceleration.scale(*sign);
             }
+            phi(body, angle);
+            *z = unit;
         }
     }
 
     /// Adds S u' to `rate`: the rates \[rad/s\] of all bodies.
-    #[inline]
+    #[inline(always)]
     pub fn spread<T: Scalar>(&self, u_rate: &[T], rate: &mut [T]) {
         for (rate, tie) in rate.iter_mut().zip(&self.bodies) {
             if let Some(base) = tie.base {
@@ -119,9 +152,11 @@ impl Ties {
     }
 
     /// Writes Sᵀ x.
-    #[inline]
+    #[inline(always)]
     pub fn gather<T: Scalar>(&self, x: &[T], gathered: &mut [T]) {
-        gathered.fill(T::ZERO);
+        for entry in gathered.iter_mut() {
+            *entry = T::ZERO;
+        }
         for (&x, tie) in x.iter().zip(&self.bodies) {
             if let Some(base) = tie.base {
                 gathered[base] += x;
@@ -130,7 +165,7 @@ impl Ties {
     }
 
     /// Writes Sᵀ M S on and above the diagonal from M on and above its own.
-    #[inline]
+    #[inline(always)]
     pub fn reduce<T: Scalar>(&self, mass: &[T], reduced: &mut [T]) {
         let (n, f) = (self.bodies.len(), self.count());
         reduced.fill(T::ZERO);
