@@ -81,6 +81,7 @@ impl Row {
         match self {
             Row::Angle(row) => row.differentiate(t, jacobian),
             Row::Line(row) => row.differentiate(at, jacobian),
+            Row::Pin(row) => row.differentiate(at, jacobian),
         }
     }
 }

@@ -38,7 +38,7 @@ where
         }
     }
     for i in 0..width::<N>() {
-        inner[i] = inner[i] + outer[i];
+        inner[i] += outer[i];
     }
     inner
 }

@@ -4,7 +4,8 @@
 //! a trajectory has the same bits whoever its neighbours are; every lane has its own step, its own time, its own
 //! constants of the mechanism, and takes in the next trajectory as soon as its last one has ended.
 
-use super::pace::{self, Pace, RECIPROCAL_REST};
+use super::pace::{self, Pace};
+use super::terms::RECIPROCAL_REST;
 use super::{JUDGES, Kernel, direction, stop};
 use crate::arithmetic::angle;
 #[cfg(target_arch = "x86_64")]
@@ -21,6 +22,17 @@ const WIDTH: usize = 4;
 const TEAMS: usize = 2;
 /// Largest number of bodies.
 const BODIES: usize = 4;
+
+/// 1/k in two terms: whatever is divided in a loop is divided by a table.
+const RECIPROCAL: [(f64, f64); MOST + 2] = {
+    let mut table = [(0.0, 0.0); MOST + 2];
+    let mut k = 1;
+    while k < table.len() {
+        table[k] = (1.0 / k as f64, if k < RECIPROCAL_REST.len() { RECIPROCAL_REST[k] } else { 0.0 });
+        k += 1;
+    }
+    table
+};
 
 /// One number a trajectory.
 type Quad = [f64; WIDTH];
@@ -460,11 +472,10 @@ fn expand<L: Lanes, const P: usize, const N: usize>(teams: &mut [Team<N>; TEAMS]
 fn raise<L: Lanes, const N: usize>(team: &mut Team<N>, f: &mut [[L; N]; 2], k: usize) {
     let zero = L::splat(0.0);
     let order = L::splat((k + 1) as f64);
-    let (r, rest) = (L::splat(1.0 / (k + 1) as f64), L::splat(if k + 1 < RECIPROCAL_REST.len() { RECIPROCAL_REST[k + 1] } else { 0.0 }));
     let (mut gx, mut gy, mut torque) = ([zero; N], [zero; N], [zero; N]);
     for i in 0..N {
-        let s = over(f[0][i], r, rest, k + 1);
-        let c = zero.sub(over(f[1][i], r, rest, k + 1));
+        let s = over(f[0][i], k + 1);
+        let c = zero.sub(over(f[1][i], k + 1));
         (team.powers[k + 1].c[i], team.powers[k + 1].s[i]) = (c.array(), s.array());
     }
     // Two bodies at a time keep the multipliers busy; the newest coefficients come last.
@@ -517,7 +528,7 @@ fn raise<L: Lanes, const N: usize>(team: &mut Team<N>, f: &mut [[L; N]; 2], k: u
         }
     }
     for i in 0..N {
-        let v = over(x[i], r, rest, k + 1);
+        let v = over(x[i], k + 1);
         team.powers[k + 1].v[i] = v.array();
         (f[0][i], f[1][i]) = (v.mul_add(L::of(team.powers[0].c[i]), gx[i]), v.mul_add(L::of(team.powers[0].s[i]), gy[i]));
     }
@@ -527,10 +538,11 @@ fn raise<L: Lanes, const N: usize>(team: &mut Team<N>, f: &mut [[L; N]; 2], k: u
     }
 }
 
-/// x/k rounded once, with the reciprocal in two terms for low k.
+/// x/k, rounded once.
 #[inline(always)]
-fn over<L: Lanes>(x: L, r: L, rest: L, k: usize) -> L {
-    if k < RECIPROCAL_REST.len() { x.mul_add(r, x.mul(rest)) } else { x.mul(r) }
+fn over<L: Lanes>(x: L, k: usize) -> L {
+    let (r, rest) = RECIPROCAL[k];
+    x.mul_add(L::splat(r), x.mul(L::splat(rest)))
 }
 
 /// cos and sin of four angles and what they leave out.
@@ -623,8 +635,7 @@ fn finish<L: Lanes, const P: usize, const N: usize>(team: &mut Team<N>, taken: Q
         let mut k = P;
         while k > 0 {
             let v = L::of(team.powers[k].v[i]);
-            let (r, rest) = (1.0 / (k + 1) as f64, if k + 1 < RECIPROCAL_REST.len() { RECIPROCAL_REST[k + 1] } else { 0.0 });
-            angles[k % 2] = angles[k % 2].mul_add(square, over(v, L::splat(r), L::splat(rest), k + 1));
+            angles[k % 2] = angles[k % 2].mul_add(square, over(v, k + 1));
             rates[k % 2] = rates[k % 2].mul_add(square, v);
             k -= 1;
         }
