@@ -19,10 +19,12 @@ mod bodies;
 pub mod crowd;
 mod direction;
 mod driven;
+mod extended;
 mod fast;
 mod pace;
 mod pair;
 mod terms;
+mod wide;
 
 pub use self::crowd::Crowd;
 use self::fast::Fast;
@@ -57,6 +59,9 @@ pub struct Taylor<T> {
     pub max_steps: u64,
     /// Which code expands the motion.
     pub kernel: Kernel,
+    /// Carries the first powers in double-double: what is rounded are later ones only, which weigh less than a thousandth.  Of use with tolerances
+    /// below 1e-18; no effect on double-double itself.
+    pub extended: bool,
     fast: Option<Fast>,
     series: Option<Series<T>>,
     u: Vec<T>,
@@ -73,6 +78,7 @@ impl<T: Real> Taylor<T> {
             order,
             max_steps: 10_000_000,
             kernel: Kernel::default(),
+            extended: false,
             fast: None,
             series: None,
             u: Vec::new(),
@@ -177,11 +183,11 @@ impl<T: Real> Taylor<T> {
     /// Keeps the fast kernel at hand, makes the one that fits, or leaves it to the series.
     fn choose(&mut self, mechanism: &Mechanism) {
         let is_portable = self.kernel == Kernel::Portable;
-        let (tolerance, order) = (self.tolerance, self.order);
+        let (tolerance, order, extended) = (self.tolerance, self.order, self.extended);
         if !T::IS_PLAIN || self.kernel == Kernel::Series {
             self.fast = None;
-        } else if !self.fast.as_ref().is_some_and(|fast| fast.is_for(mechanism, tolerance, order, is_portable)) {
-            self.fast = Fast::new(mechanism, tolerance, order, is_portable);
+        } else if !self.fast.as_ref().is_some_and(|fast| fast.is_for(mechanism, tolerance, order, is_portable, extended)) {
+            self.fast = Fast::new(mechanism, tolerance, order, is_portable, extended);
         }
     }
 
