@@ -8,7 +8,7 @@
 //! where the group is tied to the ground.
 
 use super::compile::CompileError;
-use super::law::Law;
+use super::law::{Law, Phase};
 use super::{Motion, State, Time};
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar, angle};
 use crate::scene::Scene;
@@ -20,6 +20,39 @@ pub struct Tie {
     pub base: Option<usize>,
     /// Laws to be added, with their sign.
     pub laws: Vec<(f64, Law)>,
+}
+
+impl Tie {
+    /// The known part s(t) of the angle: the sum of the laws, of which a single one keeps its own numbers to the last bit.
+    #[inline]
+    pub fn drive<T: Real>(&self, t: Time) -> Phase<T> {
+        let signed = |(sign, law): &(f64, Law)| {
+            let phase = law.at::<T>(t);
+            Phase {
+                angle: phase.angle.scale(*sign),
+                unit: if *sign > 0.0 { phase.unit } else { phase.unit.conj() },
+                rate: phase.rate.scale(*sign),
+                acceleration: phase.acceleration.scale(*sign),
+            }
+        };
+        let sum = self.laws.iter().map(signed).reduce(|sum, phase| Phase {
+            angle: angle::difference(sum.angle, -phase.angle),
+            unit: sum.unit * phase.unit,
+            rate: sum.rate + phase.rate,
+            acceleration: sum.acceleration + phase.acceleration,
+        });
+        sum.unwrap_or(Phase { unit: Complex::new(T::ONE, T::ZERO), ..Phase::default() })
+    }
+
+    /// The unit vector of the body at coordinates `u` \[rad\].
+    #[inline(always)]
+    pub fn face<T: Scalar>(&self, u: &[T], drive: &Phase<T>) -> Complex<T> {
+        match self.base {
+            Some(base) if self.laws.is_empty() => Complex::unit(u[base]),
+            Some(base) => Complex::unit(u[base]) * drive.unit,
+            None => drive.unit,
+        }
+    }
 }
 
 /// All ties of a mechanism.
@@ -86,25 +119,19 @@ impl Ties {
     #[inline]
     pub fn expand<T: Real>(&self, t: Time, u: &[T], phi: &mut [T], z: &mut [Complex<T>], rate: &mut [T], acceleration: &mut [T]) {
         for (i, tie) in self.bodies.iter().enumerate() {
-            (phi[i], z[i]) = tie.base.map_or((T::ZERO, Complex::new(T::ONE, T::ZERO)), |base| (u[base], Complex::unit(u[base])));
-            (rate[i], acceleration[i]) = (T::ZERO, T::ZERO);
-            for (sign, law) in &tie.laws {
-                let phase = law.at::<T>(t);
-                let unit = if *sign > 0.0 { phase.unit } else { phase.unit.conj() };
-                if tie.base.is_none() && tie.laws.len() == 1 {
-                    // Exactly the law's own numbers: such a row is kept to the last bit.
-                    (phi[i], z[i]) = (phase.angle.scale(*sign), unit);
-                } else {
-                    (phi[i], z[i]) = (angle::difference(phi[i], -phase.angle.scale(*sign)), z[i] * unit);
-                }
-                rate[i] += phase.rate.scale(*sign);
-                acceleration[i] += phase.acceleration.scale(*sign);
-            }
+            let drive = tie.drive::<T>(t);
+            z[i] = tie.face(u, &drive);
+            phi[i] = match tie.base {
+                Some(base) if tie.laws.is_empty() => u[base],
+                Some(base) => angle::difference(u[base], -drive.angle),
+                None => drive.angle,
+            };
+            (rate[i], acceleration[i]) = (drive.rate, drive.acceleration);
         }
     }
 
     /// Adds S u' to `rate`: the rates \[rad/s\] of all bodies.
-    #[inline]
+    #[inline(always)]
     pub fn spread<T: Scalar>(&self, u_rate: &[T], rate: &mut [T]) {
         for (rate, tie) in rate.iter_mut().zip(&self.bodies) {
             if let Some(base) = tie.base {
@@ -114,7 +141,7 @@ impl Ties {
     }
 
     /// Writes Sᵀ x.
-    #[inline]
+    #[inline(always)]
     pub fn gather<T: Scalar>(&self, x: &[T], gathered: &mut [T]) {
         gathered.fill(T::ZERO);
         for (&x, tie) in x.iter().zip(&self.bodies) {
@@ -125,7 +152,7 @@ impl Ties {
     }
 
     /// Writes Sᵀ M S on and above the diagonal from M on and above its own.
-    #[inline]
+    #[inline(always)]
     pub fn reduce<T: Scalar>(&self, mass: &[T], reduced: &mut [T]) {
         let (n, f) = (self.bodies.len(), self.count());
         reduced.fill(T::ZERO);
