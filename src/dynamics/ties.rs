@@ -8,7 +8,7 @@
 //! where the group is tied to the ground.
 
 use super::compile::CompileError;
-use super::law::Law;
+use super::law::{Law, Phase};
 use super::{Motion, State, Time};
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar, angle};
 use crate::scene::Scene;
@@ -20,6 +20,39 @@ pub struct Tie {
     pub base: Option<usize>,
     /// Laws to be added, with their sign.
     pub laws: Vec<(f64, Law)>,
+}
+
+impl Tie {
+    /// The known part s(t) of the angle: the sum of the laws, of which a single one keeps its own numbers to the last bit.
+    #[inline]
+    pub fn drive<T: Real>(&self, t: Time) -> Phase<T> {
+        let signed = |(sign, law): &(f64, Law)| {
+            let phase = law.at::<T>(t);
+            Phase {
+                angle: phase.angle.scale(*sign),
+                unit: if *sign > 0.0 { phase.unit } else { phase.unit.conj() },
+                rate: phase.rate.scale(*sign),
+                acceleration: phase.acceleration.scale(*sign),
+            }
+        };
+        let sum = self.laws.iter().map(signed).reduce(|sum, phase| Phase {
+            angle: angle::difference(sum.angle, -phase.angle),
+            unit: sum.unit * phase.unit,
+            rate: sum.rate + phase.rate,
+            acceleration: sum.acceleration + phase.acceleration,
+        });
+        sum.unwrap_or(Phase { unit: Complex::new(T::ONE, T::ZERO), ..Phase::default() })
+    }
+
+    /// The unit vector of the body at coordinates `u` \[rad\].
+    #[inline(always)]
+    pub fn face<T: Scalar>(&self, u: &[T], drive: &Phase<T>) -> Complex<T> {
+        match self.base {
+            Some(base) if self.laws.is_empty() => Complex::unit(u[base]),
+            Some(base) => Complex::unit(u[base]) * drive.unit,
+            None => drive.unit,
+        }
+    }
 }
 
 /// All ties of a mechanism.
@@ -116,28 +149,17 @@ impl Ties {
     ) {
         let bodies = self.bodies.iter().zip(z).zip(rate.iter_mut().zip(acceleration));
         for (body, ((tie, z), (rate, acceleration))) in bodies.enumerate() {
-            if let (None, [(sign, law)]) = (tie.base, &tie.laws[..]) {
-                // Exactly the law's own numbers: such a row is kept to the last bit.
-                let phase = law.at::<T>(t);
-                phi(body, phase.angle.scale(*sign));
-                *z = if *sign > 0.0 { phase.unit } else { phase.unit.conj() };
-                (*rate, *acceleration) = (phase.rate.scale(*sign), phase.acceleration.scale(*sign));
-                continue;
-            }
-            let (mut angle, mut unit) = (T::ZERO, Complex::new(T::ONE, T::ZERO));
-            if let Some(base) = tie.base {
-                (angle, unit) = (u[base], Complex::unit(u[base]));
-            }
-            (*rate, *acceleration) = (T::ZERO, T::ZERO);
-            for (sign, law) in &tie.laws {
-                let phase = law.at::<T>(t);
-                angle = angle::difference(angle, -phase.angle.scale(*sign));
-                unit = unit * if *sign > 0.0 { phase.unit } else { phase.unit.conj() };
-                *rate += phase.rate.scale(*sign);
-                *acceleration += phase.acceleration.scale(*sign);
-            }
-            phi(body, angle);
-            *z = unit;
+            let drive = tie.drive::<T>(t);
+            *z = tie.face(u, &drive);
+            phi(
+                body,
+                match tie.base {
+                    Some(base) if tie.laws.is_empty() => u[base],
+                    Some(base) => angle::difference(u[base], -drive.angle),
+                    None => drive.angle,
+                },
+            );
+            (*rate, *acceleration) = (drive.rate, drive.acceleration);
         }
     }
 
