@@ -8,7 +8,7 @@
 //! where the group is tied to the ground.
 
 use super::compile::CompileError;
-use super::law::Law;
+use super::law::{Law, Phase};
 use super::{Motion, State, Time};
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar, angle};
 use crate::scene::Scene;
@@ -20,6 +20,34 @@ pub struct Tie {
     pub base: Option<usize>,
     /// Laws to be added, with their sign.
     pub laws: Vec<(f64, Law)>,
+}
+
+impl Tie {
+    /// The body's angle and unit vector at coordinates `u` \[rad\], s' and s''.
+    #[inline(always)]
+    pub fn place<T: Real>(&self, t: Time, u: &[T]) -> Phase<T> {
+        match (self.base, &self.laws[..]) {
+            (Some(base), []) => Phase { angle: u[base], unit: Complex::unit(u[base]), rate: T::ZERO, acceleration: T::ZERO },
+            // Exactly the law's own numbers: such a row is kept to the last bit.
+            (None, [(sign, law)]) => law.at::<T>(t).times(*sign),
+            _ => self.compose(t, u),
+        }
+    }
+
+    /// Several angles, one upon another.
+    fn compose<T: Real>(&self, t: Time, u: &[T]) -> Phase<T> {
+        let start = Phase { unit: Complex::new(T::ONE, T::ZERO), ..Phase::default() };
+        let base = self.base.map_or(start, |base| Phase { angle: u[base], unit: Complex::unit(u[base]), ..start });
+        self.laws.iter().fold(base, |sum, (sign, law)| {
+            let phase = law.at::<T>(t).times(*sign);
+            Phase {
+                angle: angle::difference(sum.angle, -phase.angle),
+                unit: sum.unit * phase.unit,
+                rate: sum.rate + phase.rate,
+                acceleration: sum.acceleration + phase.acceleration,
+            }
+        })
+    }
 }
 
 /// All ties of a mechanism.
@@ -90,49 +118,9 @@ impl Ties {
     /// Angles \[rad\], unit vectors, s' \[rad/s\] and s'' \[rad/s²\] of all bodies at coordinates `u` \[rad\].
     #[inline]
     pub fn expand<T: Real>(&self, t: Time, u: &[T], phi: &mut [T], z: &mut [Complex<T>], rate: &mut [T], acceleration: &mut [T]) {
-        self.place(t, u, z, rate, acceleration, |body, angle| phi[body] = angle);
-    }
-
-    /// The same without the angles.
-    #[inline(always)]
-    pub fn face<T: Real>(&self, t: Time, u: &[T], z: &mut [Complex<T>], rate: &mut [T], acceleration: &mut [T]) {
-        self.place(t, u, z, rate, acceleration, |_, _| {});
-    }
-
-    #[inline(always)]
-    fn place<T: Real>(
-        &self,
-        t: Time,
-        u: &[T],
-        z: &mut [Complex<T>],
-        rate: &mut [T],
-        acceleration: &mut [T],
-        mut phi: impl FnMut(usize, T),
-    ) {
-        let bodies = self.bodies.iter().zip(z).zip(rate.iter_mut().zip(acceleration));
-        for (body, ((tie, z), (rate, acceleration))) in bodies.enumerate() {
-            if let (None, [(sign, law)]) = (tie.base, &tie.laws[..]) {
-                // Exactly the law's own numbers: such a row is kept to the last bit.
-                let phase = law.at::<T>(t);
-                phi(body, phase.angle.scale(*sign));
-                *z = if *sign > 0.0 { phase.unit } else { phase.unit.conj() };
-                (*rate, *acceleration) = (phase.rate.scale(*sign), phase.acceleration.scale(*sign));
-                continue;
-            }
-            let (mut angle, mut unit) = (T::ZERO, Complex::new(T::ONE, T::ZERO));
-            if let Some(base) = tie.base {
-                (angle, unit) = (u[base], Complex::unit(u[base]));
-            }
-            (*rate, *acceleration) = (T::ZERO, T::ZERO);
-            for (sign, law) in &tie.laws {
-                let phase = law.at::<T>(t);
-                angle = angle::difference(angle, -phase.angle.scale(*sign));
-                unit = unit * if *sign > 0.0 { phase.unit } else { phase.unit.conj() };
-                *rate += phase.rate.scale(*sign);
-                *acceleration += phase.acceleration.scale(*sign);
-            }
-            phi(body, angle);
-            *z = unit;
+        for (i, tie) in self.bodies.iter().enumerate() {
+            let placed = tie.place(t, u);
+            (phi[i], z[i], rate[i], acceleration[i]) = (placed.angle, placed.unit, placed.rate, placed.acceleration);
         }
     }
 
