@@ -8,7 +8,7 @@
 
 use super::kernel::Kernel;
 use super::tree::{self, size};
-use super::{Field, Form, Mechanism, Motion, State, Time};
+use super::{Coordinates, Field, Form, Mechanism, Motion, State, Time};
 use crate::arithmetic::DoubleDouble;
 use std::sync::Arc;
 
@@ -158,6 +158,10 @@ impl<const N: usize> Field for Elimination<N> {
 impl<const N: usize> Form for Elimination<N> {
     fn mechanism(&self) -> &Mechanism {
         &self.mechanism
+    }
+
+    fn coordinates(&self) -> Coordinates {
+        Coordinates::Independent
     }
 
     fn state(&self, motion: &Motion) -> State {

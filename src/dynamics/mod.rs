@@ -53,7 +53,7 @@ use crate::arithmetic::{DoubleDouble, Scalar, angle};
 pub type Time = DoubleDouble;
 
 /// What a method marches: the numbers, and everything else a restart needs to go on bit for bit.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub struct State {
     /// Time.
     pub time: Time,
@@ -94,6 +94,23 @@ impl State {
     }
 }
 
+impl Clone for State {
+    fn clone(&self) -> Self {
+        let mut state = Self::default();
+        state.clone_from(self);
+        state
+    }
+
+    /// Allocates nothing where there is room: copies are made every step.
+    fn clone_from(&mut self, other: &Self) {
+        self.time = other.time;
+        self.y.clone_from(&other.y);
+        self.low.clone_from(&other.low);
+        self.turns.clone_from(&other.turns);
+        self.memory.clone_from(&other.memory);
+    }
+}
+
 /// A first-order system `y' = f(t, y)` as the methods see it.
 pub trait Field {
     /// Number of unknowns.
@@ -117,10 +134,26 @@ pub trait Field {
     fn gaps(&mut self, _t: Time, _y: &[f64], _gaps: &mut [f64]) {}
 }
 
+/// What the first unknowns of a form are; their rates follow, then the work of motors and dampers where there are any.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coordinates {
+    /// The angles of all bodies: rows are kept by multipliers.
+    All,
+    /// The angles left by the [`ties`], with the motors' rows eliminated.
+    Independent,
+    /// Something else.
+    Other,
+}
+
 /// A form of a mechanism: how a state of its unknowns reads as a motion, and back.
 pub trait Form {
     /// The mechanism.
     fn mechanism(&self) -> &Mechanism;
+
+    /// What its first unknowns are, for methods that expand the mechanism itself.
+    fn coordinates(&self) -> Coordinates {
+        Coordinates::Other
+    }
 
     /// The state in which this motion is held.
     fn state(&self, motion: &Motion) -> State;

@@ -6,7 +6,7 @@
 use super::kernel::{Bias, Kernel, dot};
 use super::row::Row;
 use super::tree::size;
-use super::{Field, Form, Mechanism, Motion, State, Time};
+use super::{Coordinates, Field, Form, Mechanism, Motion, State, Time};
 use crate::arithmetic::DoubleDouble;
 use std::sync::Arc;
 
@@ -50,8 +50,8 @@ impl<const N: usize, const ACCOUNT: bool> Multiplier<N, ACCOUNT> {
     fn powers(&self, n: usize, omega: &[f64]) -> (f64, f64) {
         let (mut work, mut stabilizer) = (0.0, 0.0);
         for (r, row) in self.mechanism.rows.iter().enumerate() {
-            // A wall stands still and does no work.
-            if let Row::Line(_) = row {
+            // A wall stands still, a pin moves both its points alike: they do no work.
+            if !matches!(row, Row::Angle(_)) {
                 continue;
             }
             let speed = dot(&self.kernel.jacobian[r * n..(r + 1) * n], omega);
@@ -113,6 +113,10 @@ impl<const N: usize, const ACCOUNT: bool> Field for Multiplier<N, ACCOUNT> {
 impl<const N: usize, const ACCOUNT: bool> Form for Multiplier<N, ACCOUNT> {
     fn mechanism(&self) -> &Mechanism {
         &self.mechanism
+    }
+
+    fn coordinates(&self) -> Coordinates {
+        Coordinates::All
     }
 
     fn state(&self, motion: &Motion) -> State {

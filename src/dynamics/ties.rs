@@ -100,6 +100,11 @@ impl Ties {
         Ok(Self { bodies: ties.into_iter().map(Option::unwrap_or_default).collect(), independent })
     }
 
+    /// Every angle a coordinate of its own.
+    pub fn free(bodies: usize) -> Self {
+        Self { bodies: (0..bodies).map(|i| Tie { base: Some(i), laws: Vec::new() }).collect(), independent: (0..bodies).collect() }
+    }
+
     /// Number of independent coordinates.
     pub fn count(&self) -> usize {
         self.independent.len()

@@ -105,8 +105,8 @@ impl Course {
     pub(super) fn go(&mut self, until: Time, outcome: &mut Outcome) -> Result<(), StepError> {
         self.holds_in_row = 0;
         for _ in 0..EVENTS_MOST {
-            match self.marcher.advance(until) {
-                Ok(Reached::Until) => return Ok(()),
+            match self.marcher.advance(until, outcome.plan.time(outcome.plan.rows)) {
+                Ok(Reached::Until | Reached::Pause) => return Ok(()),
                 Ok(Reached::Event(contact)) if self.mechanism.held.contains(&contact) => self.settle(Some(contact), outcome)?,
                 Ok(Reached::Event(contact)) => {
                     self.strike(contact, outcome)?;

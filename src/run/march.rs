@@ -25,7 +25,8 @@ impl<P: Field + Form> Problem for P {}
 
 /// A problem, its method and its state.
 pub(super) trait March {
-    fn advance(&mut self, until: Time) -> Result<Reached, StepError>;
+    /// To the output time `until`, on the way to `horizon`; what is read then is the motion there.
+    fn advance(&mut self, until: Time, horizon: Time) -> Result<Reached, StepError>;
     fn read(&mut self, motion: &mut Motion);
     /// Goes on from another motion, with what the method remembers.
     fn jump(&mut self, motion: &Motion);
@@ -43,15 +44,51 @@ struct Marcher<P: ?Sized, M> {
     method: M,
     state: State,
     tally: Tally,
+    /// Where a dense method began its last step.
+    from: State,
+    /// The motion at an output time inside that step, while it is the one to be read.
+    inside: State,
+    is_inside: bool,
+    /// The event the last step ended with, where output times came first.
+    ahead: Option<usize>,
 }
 
 impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
-    fn advance(&mut self, until: Time) -> Result<Reached, StepError> {
-        self.method.advance(&mut self.problem, &mut self.state, until, &mut self.tally, &mut |_, _| Ok(Seen::Kept))
+    fn advance(&mut self, until: Time, horizon: Time) -> Result<Reached, StepError> {
+        let Self { problem, method, state, tally, from, inside, is_inside, ahead } = self;
+        if !method.is_dense() {
+            return method.advance(problem, state, until, tally, &mut |_, _| Ok(Seen::Kept));
+        }
+        // Steps are as long as the method likes; output times are read off them.
+        *is_inside = false;
+        while state.time < until {
+            if let Some(event) = ahead.take() {
+                return Ok(Reached::Event(event));
+            }
+            from.clone_from(state);
+            let reached = method.advance(problem, state, horizon, tally, &mut |_, state| {
+                let passed = state.time >= until;
+                if !passed {
+                    from.clone_from(state);
+                }
+                Ok(if passed { Seen::Enough } else { Seen::Kept })
+            })?;
+            if let Reached::Event(event) = reached {
+                if state.time <= until {
+                    return Ok(reached);
+                }
+                *ahead = Some(event);
+            }
+        }
+        if state.time > until {
+            method.within(problem, from, until, inside);
+            *is_inside = true;
+        }
+        Ok(Reached::Until)
     }
 
     fn read(&mut self, motion: &mut Motion) {
-        self.problem.read(&self.state, motion);
+        self.problem.read(if self.is_inside { &self.inside } else { &self.state }, motion);
     }
 
     fn jump(&mut self, motion: &Motion) {
@@ -80,7 +117,8 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
 
 fn marcher<P: Form + ?Sized + 'static, M: Method<P> + 'static>(problem: Box<P>, method: M, start: &Motion) -> Box<dyn March> {
     let state = problem.state(start);
-    Box::new(Marcher { problem, method, state, tally: Tally::default() })
+    let idle = State::default;
+    Box::new(Marcher { problem, method, state, tally: Tally::default(), from: idle(), inside: idle(), is_inside: false, ahead: None })
 }
 
 /// The form a stabilization marches in, for `N` bodies.
@@ -139,7 +177,15 @@ pub(super) fn build(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion)
         MethodId::Dp8 if projected => marcher(problem(), Projected::new(Dp8::new(tolerance)), start),
         MethodId::Dp5 => marcher(problem(), Dp5::new(tolerance), start),
         MethodId::Dp8 => marcher(problem(), Dp8::new(tolerance), start),
-        MethodId::Taylor => marcher(sized!(n, eliminated(mechanism)), Taylor::new(tolerance), start),
+        MethodId::Taylor => {
+            let mut taylor = Taylor::new(tolerance);
+            taylor.extended = plan.extended;
+            match plan.stabilization {
+                Stabilization::None if mechanism.rows.is_empty() => marcher(sized!(n, eliminated(mechanism)), taylor, start),
+                Stabilization::Projection => marcher(problem(), Projected::new(taylor), start),
+                _ => marcher(problem(), taylor, start),
+            }
+        }
         MethodId::Gauss(stages) => {
             let gauss = Gauss::new(stages, step)
                 .ok_or_else(|| cannot_begin(plan, format!("no Gauss method has {stages} stages and step {step} s")))?;
@@ -163,8 +209,8 @@ fn pilot(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion) -> Result<f64,
     let mut marcher = build(mechanism, &mut plain, start)?;
     let rows = plan.rows.min(20);
     for row in 1..=rows {
-        match marcher.advance(plan.time(row)) {
-            Ok(Reached::Until) => {}
+        match marcher.advance(plan.time(row), plan.time(plan.rows)) {
+            Ok(Reached::Until | Reached::Pause) => {}
             Ok(Reached::Event(_)) => break,
             Err(stop) if stop.cause == Cause::RestingContact => break,
             Err(stop) => return Err(stop),

@@ -65,10 +65,24 @@ where
                 hint: "tighten the tolerance, or check that no motors work against each other".into(),
             })?;
             Ok(match (watch(problem, state)?, moved) {
+                (Seen::Enough, _) => Seen::Enough,
                 (Seen::Kept, false) => Seen::Kept,
                 _ => Seen::Changed,
             })
         })
+    }
+
+    fn is_dense(&self) -> bool {
+        self.inner.is_dense()
+    }
+
+    /// Inside a step the constraints are kept as well as at its end; where they cannot be, the state is the step's own.
+    fn within(&mut self, problem: &mut P, from: &State, time: Time, inside: &mut State) {
+        self.inner.within(problem, from, time, inside);
+        if let Some(kernel) = &mut self.kernel {
+            // The violation left is on record in the constraints' drift.
+            let _ = project(problem.mechanism(), kernel, inside, self.tolerance);
+        }
     }
 }
 

@@ -39,6 +39,8 @@ pub enum Reached {
     Until,
     /// At event number i, located; the state is the one just before it takes effect.
     Event(usize),
+    /// At the end of a step after which the watcher had [`Seen::Enough`].
+    Pause,
 }
 
 /// What a watcher did to the state it was shown.
@@ -48,6 +50,8 @@ pub enum Seen {
     Kept,
     /// It changed the unknowns (projection): what the method knows of the rate there is stale.
     Changed,
+    /// Enough for now: a dense method stops here.  The others march on.
+    Enough,
 }
 
 /// Shown the state after every accepted step; may change it, or stop the run.
@@ -76,6 +80,16 @@ pub trait Method<P: ?Sized> {
         tally: &mut Tally,
         watch: &mut Watch<P>,
     ) -> Result<Reached, StepError>;
+
+    /// True where the method knows the motion inside its steps: [`Method::within`] answers, and [`Seen::Enough`] is heeded.
+    fn is_dense(&self) -> bool {
+        false
+    }
+
+    /// Writes the state at `time` \[s\] inside the last step, which began at `from`, to the accuracy of the step.
+    ///
+    /// Nothing of the method or of the march changes by it; methods that are not dense write nothing.
+    fn within(&mut self, _problem: &mut P, _from: &State, _time: Time, _inside: &mut State) {}
 }
 
 /// Why a method stopped.

@@ -12,7 +12,8 @@
 //! Scene constants enter as in `pair`: fractions of low orders in two terms, and the solutions of the first orders refined.
 
 use super::direction;
-use super::pace::{self, Pace, RECIPROCAL_REST};
+use super::pace::{self, Pace};
+use super::terms::RECIPROCAL_REST;
 use crate::arithmetic::DoubleDouble;
 use crate::arithmetic::lanes::Lanes;
 use crate::dynamics::{Mechanism, State, tree};
@@ -275,6 +276,12 @@ fn begin<L: Lanes, const B: usize>(bodies: &mut Bodies<B>, state: &State) {
             bodies.inverse[j][i / 4][i % 4] = entry;
         }
     }
+}
+
+/// Takes the state from the step's start on by `h` \[s\].
+#[inline(always)]
+pub fn go<L: Lanes, const P: usize, const B: usize>(bodies: &Bodies<B>, state: &mut State, h: f64) {
+    finish::<L, P, B>(&bodies.scratch, state, bodies.count, h);
 }
 
 /// The new state.

@@ -18,6 +18,7 @@ pub struct Fast {
     form: Form,
     pace: Pace,
     step: Step,
+    go: Go,
 }
 
 /// What it was made for.
@@ -42,6 +43,19 @@ enum Form {
 /// One step of a state by at most so many seconds: the step wanted and the step taken.
 type Step = unsafe fn(&mut Form, &Pace, &mut State, f64) -> (f64, f64);
 
+/// From the last step's start on by so many seconds.
+type Go = unsafe fn(&Form, &mut State, f64);
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx,fma")]
+fn hardware_go<const P: usize>(form: &Form, state: &mut State, h: f64) {
+    go::<Avx, P>(form, state, h);
+}
+
+fn portable_go<const P: usize>(form: &Form, state: &mut State, h: f64) {
+    go::<Portable, P>(form, state, h);
+}
+
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx,fma")]
 fn hardware<const P: usize>(form: &mut Form, pace: &Pace, state: &mut State, left: f64) -> (f64, f64) {
@@ -53,12 +67,12 @@ fn portable<const P: usize>(form: &mut Form, pace: &Pace, state: &mut State, lef
 }
 
 /// The code of one order for this processor.
-fn of_order<const P: usize>(is_portable: bool) -> Step {
+fn of_order<const P: usize>(is_portable: bool) -> (Step, Go) {
     #[cfg(target_arch = "x86_64")]
     if !is_portable && lanes::available() {
-        return hardware::<P>;
+        return (hardware::<P>, hardware_go::<P>);
     }
-    portable::<P>
+    (portable::<P>, portable_go::<P>)
 }
 
 #[inline(always)]
@@ -84,10 +98,32 @@ fn step<L: Lanes, const P: usize>(form: &mut Form, pace: &Pace, state: &mut Stat
     }
 }
 
+/// Takes a state from the last step's start on by `h` \[s\].
+#[inline(always)]
+fn go<L: Lanes, const P: usize>(form: &Form, state: &mut State, h: f64) {
+    match (form, &mut state.y[..], &mut state.low[..]) {
+        (Form::Pair(_, scratch), [phi1, phi2, v1, v2, ..], [phi1_low, phi2_low, v1_low, v2_low, ..]) => {
+            let mut flow = pair::Flow { high: [*phi1, *v1, *phi2, *v2], low: [*phi1_low, *v1_low, *phi2_low, *v2_low] };
+            pair::go::<L, P>(scratch, &mut flow, h);
+            [*phi1, *v1, *phi2, *v2] = flow.high;
+            [*phi1_low, *v1_low, *phi2_low, *v2_low] = flow.low;
+        }
+        (Form::Driven(driven, scratch), [phi, v, work, ..], [phi_low, v_low, work_low, ..]) => {
+            let mut flow = driven::Flow { high: [*phi, *v, *work], low: [*phi_low, *v_low, *work_low] };
+            driven::go::<L, P>(driven, scratch, &mut flow, h);
+            [*phi, *v, *work] = flow.high;
+            [*phi_low, *v_low, *work_low] = flow.low;
+        }
+        (Form::Few(bodies), ..) => bodies::go::<L, P, 1>(bodies, state, h),
+        (Form::Several(bodies), ..) => bodies::go::<L, P, 2>(bodies, state, h),
+        _ => {}
+    }
+}
+
 impl Fast {
     /// The kernel, where there is one.
     pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize, is_portable: bool) -> Option<Self> {
-        let step = match order {
+        let (step, go) = match order {
             16 => of_order::<16>(is_portable),
             20 => of_order::<20>(is_portable),
             24 => of_order::<24>(is_portable),
@@ -108,7 +144,7 @@ impl Fast {
             (Form::Several(Box::new(bodies)), longest)
         };
         let settings = Settings { tree: mechanism.tree.clone(), rows: mechanism.rows.clone(), tolerance, order, is_portable };
-        Some(Self { settings, form, pace: Pace::new(tolerance, order, longest), step })
+        Some(Self { settings, form, pace: Pace::new(tolerance, order, longest), step, go })
     }
 
     /// True where it was made for all these.
@@ -127,6 +163,15 @@ impl Fast {
         #[allow(unsafe_code)]
         unsafe {
             (self.step)(&mut self.form, &self.pace, state, left)
+        }
+    }
+
+    /// Takes a state that stands where the last step began on by `h` \[s\], as the step would have.
+    pub fn go(&self, state: &mut State, h: f64) {
+        // SAFETY: as in `step`.
+        #[allow(unsafe_code)]
+        unsafe {
+            (self.go)(&self.form, state, h);
         }
     }
 }

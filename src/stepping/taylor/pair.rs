@@ -20,7 +20,8 @@
 //! terms, the fractions of low orders are in two terms, and the first order's solution is refined.
 
 use super::direction;
-use super::pace::{self, Pace, RECIPROCAL_REST};
+use super::pace::{self, Pace};
+use super::terms::{LEFT, left_over, over, over_first, pair_sum};
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::sum::two_product;
 use crate::dynamics::Mechanism;
@@ -128,21 +129,13 @@ struct Sums<L> {
     x: L,
 }
 
-/// Sums within pairs, in both lanes of each.
-#[inline(always)]
-fn pair_sum<L: Lanes>(x: L) -> L {
-    x.add(x.swap_pairs())
-}
-
-const LEFT: [f64; 4] = [-1.0, 1.0, -1.0, 1.0];
-
 /// What orders K and K+1 need of the coefficients before v_K: both at once, so that each is loaded for two products.
 ///
 /// The terms with j = 1 and the last j are left out: they come last, since they are the newest.
 #[inline(always)]
 fn older<L: Lanes, const K: usize>(scratch: &Scratch) -> [Sums<L>; 2] {
-    let zero = Sums { b: L::splat(0.0), x: L::splat(0.0) };
     // From the middle outwards in two chains.
+    let zero = Sums { b: L::splat(0.0), x: L::splat(0.0) };
     let mut sums = [[zero; 2]; 2];
     let middle = K / 2;
     for step in 0..middle {
@@ -197,27 +190,6 @@ fn order<L: Lanes, const K: usize>(s: &Start<L>, scratch: &mut Scratch, older: S
     scratch.e[K + 1] = e_next.array();
     scratch.v[K + 1] = next.array();
     Newest { v: next, e: e_next, g: s.v0.mul_add(e_next, v.mul_add(s.e1, b)) }
-}
-
-/// x/k for a constant k known after inlining, rounded once: what the double 1/k leaves out joins *before* the rounding, since afterwards it is below
-/// half a unit in the last place and changes nothing.
-#[inline(always)]
-fn over<L: Lanes>(x: L, k: usize) -> L {
-    let r = L::splat(1.0 / k as f64);
-    if k < RECIPROCAL_REST.len() && RECIPROCAL_REST[k] != 0.0 { x.mul_add(r, x.mul(L::splat(RECIPROCAL_REST[k]))) } else { x.mul(r) }
-}
-
-/// left(x)/k likewise.
-#[inline(always)]
-fn left_over<L: Lanes>(x: L, k: usize) -> L {
-    let r = 1.0 / k as f64;
-    let (swapped, r) = (x.swap_pairs(), L::of([-r, r, -r, r]));
-    if k < RECIPROCAL_REST.len() && RECIPROCAL_REST[k] != 0.0 {
-        let rest = RECIPROCAL_REST[k];
-        swapped.mul_add(r, swapped.mul(L::of([-rest, rest, -rest, rest])))
-    } else {
-        swapped.mul(r)
-    }
 }
 
 /// Orders 2 to P-1 in pairs, for even P.
@@ -304,18 +276,24 @@ pub fn step<L: Lanes, const P: usize>(pair: &Pair, pace: &Pace, scratch: &mut Sc
     let wanted = pace.step::<P>(&largest);
     let h = pace::taken(wanted, left);
     if h > 0.0 {
-        let (high, low) = (L::of(flow.high), L::of(flow.low));
-        let rates = L::of([v1, 0.0, v2, 0.0]);
-        let (increment, rest) = increment::<L, P>(scratch, rates, low, h);
-        // Two-sum, then the low parts, then a quick two-sum.
-        let sum = high.add(increment);
-        let second = sum.sub(high);
-        let error = high.sub(sum.sub(second)).add(increment.sub(second)).add(low.add(rest));
-        let total = sum.add(error);
-        flow.high = total.array();
-        flow.low = error.sub(total.sub(sum)).array();
+        go::<L, P>(scratch, flow, h);
     }
     (wanted, h)
+}
+
+/// Takes `flow` from the step's start on by `h` \[s\].
+#[inline(always)]
+pub fn go<L: Lanes, const P: usize>(scratch: &Scratch, flow: &mut Flow, h: f64) {
+    let (high, low) = (L::of(flow.high), L::of(flow.low));
+    let rates = L::of([flow.high[1], 0.0, flow.high[3], 0.0]);
+    let (increment, rest) = increment::<L, P>(scratch, rates, low, h);
+    // Two-sum, then the low parts, then a quick two-sum.
+    let sum = high.add(increment);
+    let second = sum.sub(high);
+    let error = high.sub(sum.sub(second)).add(increment.sub(second)).add(low.add(rest));
+    let total = sum.add(error);
+    flow.high = total.array();
+    flow.low = error.sub(total.sub(sum)).array();
 }
 
 /// Increments `[phi1, v1, phi2, v2]` over `h` \[s\]: even and odd powers in two Horner chains; and what the rates' low parts move the angles by.
@@ -325,24 +303,11 @@ fn increment<L: Lanes, const P: usize>(scratch: &Scratch, rates: L, low: L, h: f
     let mut chains = [L::splat(0.0); 2];
     let mut k = P;
     while k > 0 {
-        chains[k % 2] = chains[k % 2].mul_add(square, weighed(L::of(scratch.v[k]), k));
+        chains[k % 2] = chains[k % 2].mul_add(square, over_first(L::of(scratch.v[k]), k + 1));
         k -= 1;
     }
     // Powers 1, 3, … are in chain 1 with h⁰ before them, 2, 4, … in chain 0 with h.
     let sum = chains[0].mul_add(L::splat(h), chains[1]);
     let moved = L::of([h, 1.0, h, 1.0]).mul_add(sum, rates);
     (moved.mul(L::splat(h)), low.swap_pairs().mul(L::of([h, 0.0, h, 0.0])))
-}
-
-/// `[v/(k+1), v, …]`, the fraction in two terms for low orders.
-#[inline(always)]
-fn weighed<L: Lanes>(v: L, k: usize) -> L {
-    let r = 1.0 / (k + 1) as f64;
-    let factor = L::of([r, 1.0, r, 1.0]);
-    if k + 1 < RECIPROCAL_REST.len() && RECIPROCAL_REST[k + 1] != 0.0 {
-        let r = RECIPROCAL_REST[k + 1];
-        v.mul_add(factor, v.mul(L::of([r, 0.0, r, 0.0])))
-    } else {
-        v.mul(factor)
-    }
 }
