@@ -49,6 +49,67 @@ impl<const N: usize> Elimination<N> {
             mechanism,
         }
     }
+
+    /// [`Field::rate`] for `F` coordinates (any number where `F` is 0).
+    #[inline(always)]
+    fn rate_sized<const F: usize>(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
+        let mechanism = &*self.mechanism;
+        let (n, f) = (size::<N>(mechanism.bodies.len()), size::<F>(mechanism.ties.count()));
+        let (u, u_rate, rate) = (&y[..f], &y[f..2 * f], &mut rate[..2 * f + 1]);
+        let ties = &mechanism.ties.bodies[..n];
+        let kernel = &mut self.kernel;
+        let (drive_rate, drive_acceleration, omega) = (&mut self.drive_rate[..n], &mut self.drive_acceleration[..n], &mut self.omega[..n]);
+        for k in 0..n {
+            let placed = ties[k].place(t, u);
+            (kernel.z[k], drive_rate[k], drive_acceleration[k]) = (placed.unit, placed.rate, placed.acceleration);
+            omega[k] = drive_rate[k] + ties[k].base.map_or(0.0, |base| u_rate[base]);
+        }
+        kernel.assemble::<N>(mechanism, omega);
+        let (mass, load, given) = (&kernel.mass[..n * n], &mut kernel.load[..n], &mut self.given[..n]);
+        // b - M s''; what of it the coordinates do not feel is the motors' share.
+        if !self.is_steady {
+            tree::multiply::<f64, N>(n, mass, drive_acceleration, given);
+            for k in 0..n {
+                load[k] -= given[k];
+            }
+        }
+        let (reduced, acceleration) = (&mut self.reduced[..f * f], &mut self.coordinate_acceleration[..f]);
+        for a in 0..f {
+            acceleration[a] = 0.0;
+            for b in a..f {
+                reduced[a * f + b] = 0.0;
+            }
+        }
+        for i in 0..n {
+            let Some(a) = ties[i].base else { continue };
+            acceleration[a] += load[i];
+            reduced[a * f + a] += mass[i * n + i];
+            for j in i + 1..n {
+                let Some(b) = ties[j].base else { continue };
+                let twice = if a == b { 2.0 } else { 1.0 };
+                reduced[a.min(b) * f + a.max(b)] += twice * mass[i * n + j];
+            }
+        }
+        tree::factor::<f64, F>(f, reduced, &mut self.pivot);
+        tree::solve::<f64, F>(f, reduced, &self.pivot, acceleration);
+        let share = &mut self.share[..n];
+        for k in 0..n {
+            share[k] = ties[k].base.map_or(0.0, |base| acceleration[base]);
+        }
+        tree::multiply::<f64, N>(n, mass, share, given);
+        let mut power = 0.0;
+        for k in 0..n {
+            power -= (load[k] - given[k]) * drive_rate[k];
+        }
+        for spring in mechanism.springs.iter().filter(|spring| spring.damping != 0.0) {
+            power += spring.drag_power(&kernel.z, omega);
+        }
+        for k in 0..f {
+            rate[k] = u_rate[k];
+            rate[f + k] = acceleration[k];
+        }
+        rate[2 * f] = power;
+    }
 }
 
 impl<const N: usize> Field for Elimination<N> {
@@ -61,54 +122,11 @@ impl<const N: usize> Field for Elimination<N> {
     }
 
     fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
-        let mechanism = &*self.mechanism;
-        let (n, f) = (size::<N>(mechanism.bodies.len()), mechanism.ties.count());
-        let (u, u_rate) = (&y[..f], &y[f..2 * f]);
-        let kernel = &mut self.kernel;
-        let (drive_rate, drive_acceleration) = (&mut self.drive_rate[..n], &mut self.drive_acceleration[..n]);
-        mechanism.ties.face(t, u, &mut kernel.z[..n], drive_rate, drive_acceleration);
-        let omega = &mut self.omega[..n];
-        omega.copy_from_slice(drive_rate);
-        mechanism.ties.spread(u_rate, omega);
-        kernel.assemble::<N>(mechanism, omega);
-        let (load, given) = (&mut kernel.load[..n], &mut self.given[..n]);
-        // b - M s''; what of it the coordinates do not feel is the motors' share.
-        if !self.is_steady {
-            tree::multiply::<f64, N>(n, &kernel.mass, drive_acceleration, given);
-            for k in 0..n {
-                load[k] -= given[k];
-            }
+        match self.mechanism.ties.count() {
+            1 => self.rate_sized::<1>(t, y, rate),
+            2 => self.rate_sized::<2>(t, y, rate),
+            _ => self.rate_sized::<0>(t, y, rate),
         }
-        let acceleration = &mut self.coordinate_acceleration[..f];
-        mechanism.ties.gather(load, acceleration);
-        mechanism.ties.reduce(&kernel.mass, &mut self.reduced);
-        match f {
-            1 => {
-                tree::factor::<f64, 1>(f, &mut self.reduced, &mut self.pivot);
-                tree::solve::<f64, 1>(f, &self.reduced, &self.pivot, acceleration);
-            }
-            _ => {
-                tree::factor::<f64, 0>(f, &mut self.reduced, &mut self.pivot);
-                tree::solve::<f64, 0>(f, &self.reduced, &self.pivot, acceleration);
-            }
-        }
-        let share = &mut self.share[..n];
-        for k in 0..n {
-            share[k] = 0.0;
-        }
-        mechanism.ties.spread(acceleration, share);
-        tree::multiply::<f64, N>(n, &kernel.mass, share, given);
-        let mut power = 0.0;
-        for k in 0..n {
-            power -= (load[k] - given[k]) * drive_rate[k];
-        }
-        for spring in mechanism.springs.iter().filter(|spring| spring.damping != 0.0) {
-            power += spring.drag_power(&kernel.z, omega);
-        }
-        for k in 0..f {
-            (rate[k], rate[f + k]) = (u_rate[k], acceleration[k]);
-        }
-        rate[2 * f] = power;
     }
 
     fn label(&self, i: usize) -> String {
@@ -128,7 +146,9 @@ impl<const N: usize> Field for Elimination<N> {
     fn gaps(&mut self, t: Time, y: &[f64], gaps: &mut [f64]) {
         let ties = &self.mechanism.ties;
         let kernel = &mut self.kernel;
-        ties.face(t, &y[..ties.count()], &mut kernel.z, &mut self.drive_rate, &mut self.drive_acceleration);
+        for (z, tie) in kernel.z.iter_mut().zip(&ties.bodies) {
+            *z = tie.place(t, &y[..ties.count()]).unit;
+        }
         for (gap, contact) in gaps.iter_mut().zip(&self.mechanism.contacts) {
             *gap = contact.row.gap(&kernel.z);
         }

@@ -28,6 +28,17 @@ pub struct Phase<T> {
     pub acceleration: T,
 }
 
+impl<T: Real> Phase<T> {
+    /// The same turned the other way where `sign` is -1.
+    #[inline(always)]
+    pub fn times(self, sign: f64) -> Self {
+        if sign > 0.0 {
+            return self;
+        }
+        Self { angle: -self.angle, unit: self.unit.conj(), rate: -self.rate, acceleration: -self.acceleration }
+    }
+}
+
 impl Law {
     /// The angle \[rad\] in full, turns included.
     pub fn angle(&self, t: Time) -> DoubleDouble {

@@ -26,16 +26,7 @@ impl Tie {
     /// The known part s(t) of the angle: the sum of the laws, of which a single one keeps its own numbers to the last bit.
     #[inline]
     pub fn drive<T: Real>(&self, t: Time) -> Phase<T> {
-        let signed = |(sign, law): &(f64, Law)| {
-            let phase = law.at::<T>(t);
-            Phase {
-                angle: phase.angle.scale(*sign),
-                unit: if *sign > 0.0 { phase.unit } else { phase.unit.conj() },
-                rate: phase.rate.scale(*sign),
-                acceleration: phase.acceleration.scale(*sign),
-            }
-        };
-        let sum = self.laws.iter().map(signed).reduce(|sum, phase| Phase {
+        let sum = self.laws.iter().map(|(sign, law)| law.at::<T>(t).times(*sign)).reduce(|sum, phase| Phase {
             angle: angle::difference(sum.angle, -phase.angle),
             unit: sum.unit * phase.unit,
             rate: sum.rate + phase.rate,
@@ -52,6 +43,23 @@ impl Tie {
             Some(base) => Complex::unit(u[base]) * drive.unit,
             None => drive.unit,
         }
+    }
+
+    /// The body's angle and unit vector at coordinates `u` \[rad\], s' and s''.
+    #[inline(always)]
+    pub fn place<T: Real>(&self, t: Time, u: &[T]) -> Phase<T> {
+        match (self.base, &self.laws[..]) {
+            (Some(base), []) => Phase { angle: u[base], unit: Complex::unit(u[base]), rate: T::ZERO, acceleration: T::ZERO },
+            (None, [(sign, law)]) => law.at::<T>(t).times(*sign),
+            _ => self.compose(t, u),
+        }
+    }
+
+    /// Several angles, one upon another.
+    fn compose<T: Real>(&self, t: Time, u: &[T]) -> Phase<T> {
+        let drive = self.drive::<T>(t);
+        let angle = self.base.map_or(drive.angle, |base| angle::difference(u[base], -drive.angle));
+        Phase { angle, unit: self.face(u, &drive), ..drive }
     }
 }
 
@@ -128,38 +136,9 @@ impl Ties {
     /// Angles \[rad\], unit vectors, s' \[rad/s\] and s'' \[rad/s²\] of all bodies at coordinates `u` \[rad\].
     #[inline]
     pub fn expand<T: Real>(&self, t: Time, u: &[T], phi: &mut [T], z: &mut [Complex<T>], rate: &mut [T], acceleration: &mut [T]) {
-        self.place(t, u, z, rate, acceleration, |body, angle| phi[body] = angle);
-    }
-
-    /// The same without the angles.
-    #[inline(always)]
-    pub fn face<T: Real>(&self, t: Time, u: &[T], z: &mut [Complex<T>], rate: &mut [T], acceleration: &mut [T]) {
-        self.place(t, u, z, rate, acceleration, |_, _| {});
-    }
-
-    #[inline(always)]
-    fn place<T: Real>(
-        &self,
-        t: Time,
-        u: &[T],
-        z: &mut [Complex<T>],
-        rate: &mut [T],
-        acceleration: &mut [T],
-        mut phi: impl FnMut(usize, T),
-    ) {
-        let bodies = self.bodies.iter().zip(z).zip(rate.iter_mut().zip(acceleration));
-        for (body, ((tie, z), (rate, acceleration))) in bodies.enumerate() {
-            let drive = tie.drive::<T>(t);
-            *z = tie.face(u, &drive);
-            phi(
-                body,
-                match tie.base {
-                    Some(base) if tie.laws.is_empty() => u[base],
-                    Some(base) => angle::difference(u[base], -drive.angle),
-                    None => drive.angle,
-                },
-            );
-            (*rate, *acceleration) = (drive.rate, drive.acceleration);
+        for (i, tie) in self.bodies.iter().enumerate() {
+            let placed = tie.place(t, u);
+            (phi[i], z[i], rate[i], acceleration[i]) = (placed.angle, placed.unit, placed.rate, placed.acceleration);
         }
     }
 

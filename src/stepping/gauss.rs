@@ -66,7 +66,14 @@ impl Gauss {
     /// `None` unless 2 ≤ `stages` ≤ 8 and the step is finite and not zero.
     pub fn new(stages: usize, step: f64) -> Option<Self> {
         let sound = (2..=8).contains(&stages) && step.is_finite() && step != 0.0;
-        sound.then(|| Self { step: step.abs(), tableau: Tableau::new(stages), scratch: Scratch::default(), portable: false, exact: 1, idle: 2 })
+        sound.then(|| Self {
+            step: step.abs(),
+            tableau: Tableau::new(stages),
+            scratch: Scratch::default(),
+            portable: false,
+            exact: 1,
+            idle: 2,
+        })
     }
 
     /// The method of this name, `gauss4` to `gauss16`; `None` for any other, or where [`Gauss::new`] says so.

@@ -2,9 +2,9 @@
 
 use super::tableau::{Tableau, lane};
 use super::{Gauss, MOST_SWEEPS};
+use crate::arithmetic::eight::{LANES, Octet};
 #[cfg(target_arch = "x86_64")]
 use crate::arithmetic::lanes::{Avx, available};
-use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::{Lanes, Portable};
 use crate::arithmetic::sum::two_sum;
 use crate::arithmetic::{DoubleDouble, Scalar};
