@@ -202,7 +202,7 @@ proptest! {
         // A motor's power is its torque, minus the multiplier, times the rate its law asks for.
         let motors: f64 = mechanism.rows.iter().zip(&exact.multiplier).map(|(row, multiplier)| match row {
             Row::Angle(row) => -multiplier.hi * row.law.at::<f64>(t).rate,
-            Row::Line(_) => 0.0,
+            Row::Line(_) | Row::Pin(_) => 0.0,
         }).sum();
         let dampers: f64 = mechanism.springs.iter().map(|spring| spring.drag_power(&exact.z, &motion.omega).hi).sum();
         prop_assert!(dampers <= 0.0);

@@ -36,16 +36,18 @@ impl<const N: usize, const ACCOUNT: bool> Multiplier<N, ACCOUNT> {
         } else {
             self.kernel.accelerate_free::<N>(&self.mechanism, phi, omega);
         }
-        rate[..n].copy_from_slice(omega);
-        rate[n..2 * n].copy_from_slice(&self.kernel.load[..n]);
+        let (load, rates) = (&self.kernel.load[..n], &mut rate[..2 * n]);
+        for k in 0..n {
+            (rates[k], rates[n + k]) = (omega[k], load[k]);
+        }
         if ACCOUNT {
-            (rate[2 * n], rate[2 * n + 1]) = self.powers(omega);
+            (rate[2 * n], rate[2 * n + 1]) = self.powers(n, omega);
         }
     }
 
     /// Power of motors and dampers, and power of the stabilizer's share of the multipliers \[W\].
-    fn powers(&self, omega: &[f64]) -> (f64, f64) {
-        let n = omega.len();
+    #[inline(always)]
+    fn powers(&self, n: usize, omega: &[f64]) -> (f64, f64) {
         let (mut work, mut stabilizer) = (0.0, 0.0);
         for (r, row) in self.mechanism.rows.iter().enumerate() {
             // A wall stands still, a pin moves both its points alike: they do no work.

@@ -74,6 +74,16 @@ impl Row {
             Row::Pin(row) => row.linearise(at, jacobian),
         }
     }
+
+    /// The same without C, which is written as zero: accelerations do not ask for it.
+    #[inline]
+    pub fn differentiate<T: Real>(&self, t: Time, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
+        match self {
+            Row::Angle(row) => row.differentiate(t, jacobian),
+            Row::Line(row) => row.differentiate(at, jacobian),
+            Row::Pin(row) => row.differentiate(at, jacobian),
+        }
+    }
 }
 
 #[cfg(test)]

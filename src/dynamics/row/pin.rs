@@ -34,14 +34,17 @@ impl PinRow {
     /// See [`Row::linearise`](super::Row::linearise).
     #[inline]
     pub fn linearise<T: Real>(&self, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
+        let position = Complex::<T>::of(self.axis).dot(self.span.position(at.z));
+        Linearised { position, ..self.differentiate(at, jacobian) }
+    }
+
+    /// See [`Row::differentiate`](super::Row::differentiate).
+    #[inline]
+    pub fn differentiate<T: Real>(&self, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
         let axis = Complex::<T>::of(self.axis);
         for &(k, gamma) in &self.span.terms {
             jacobian[k] += axis.dot(at.z[k].turn(gamma).left());
         }
-        Linearised {
-            position: axis.dot(self.span.position(at.z)),
-            drive: T::ZERO,
-            convective: axis.dot(self.span.convective(at.z, at.omega)),
-        }
+        Linearised { position: T::ZERO, drive: T::ZERO, convective: axis.dot(self.span.convective(at.z, at.omega)) }
     }
 }

@@ -1,0 +1,636 @@
+//! Many trajectories at once, one a lane: ensembles of up to four free bodies.
+//!
+//! The equation of [`bodies`](super::bodies) with the lanes over trajectories instead of bodies.  Nothing ever crosses from lane to lane, so that
+//! a trajectory has the same bits whoever its neighbours are; every lane has its own step, its own time, its own
+//! constants of the mechanism, and takes in the next trajectory as soon as its last one has ended.
+
+use super::pace::{self, Pace};
+use super::terms::rest;
+use super::{JUDGES, Kernel, direction, stop};
+use crate::arithmetic::angle;
+#[cfg(target_arch = "x86_64")]
+use crate::arithmetic::lanes::Avx;
+use crate::arithmetic::lanes::{self, Lanes, Portable};
+use crate::dynamics::{Mechanism, State, Time, tree};
+use crate::stepping::{Cause, StepError, Tally, Tolerance};
+
+/// Largest order there is room for.
+const MOST: usize = 24;
+/// Lanes of a vector.
+const WIDTH: usize = 4;
+/// Vectors marched in step with each other: while one waits for its newest coefficients, the other keeps the multipliers busy.
+const TEAMS: usize = 2;
+/// Largest number of bodies.
+const BODIES: usize = 4;
+
+/// 1/k in two terms: whatever is divided in a loop is divided by a table.
+const RECIPROCAL: [(f64, f64); MOST + 2] = {
+    let mut table = [(0.0, 0.0); MOST + 2];
+    let mut k = 1;
+    while k < table.len() {
+        table[k] = (1.0 / k as f64, rest(k));
+        k += 1;
+    }
+    table
+};
+
+/// One number a trajectory.
+type Quad = [f64; WIDTH];
+
+/// One trajectory: its mechanism, its state in the form of [`Elimination`](crate::dynamics::elimination::Elimination), and how it went.
+#[derive(Clone, Debug)]
+pub struct Entrant<'a> {
+    /// What is marched.
+    pub mechanism: &'a Mechanism,
+    /// The start, and in the end the last state reached.
+    pub state: State,
+    /// Steps taken.
+    pub tally: Tally,
+    /// Why it stopped, if it did.
+    pub stopped: Option<StepError>,
+}
+
+impl<'a> Entrant<'a> {
+    /// A trajectory about to start.
+    pub fn new(mechanism: &'a Mechanism, state: State) -> Self {
+        Self { mechanism, state, tally: Tally::default(), stopped: None }
+    }
+}
+
+/// Whether a trajectory goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Going {
+    /// To the end.
+    On,
+    /// Enough was seen.
+    Enough,
+}
+
+/// A step just taken, which can be looked at anywhere.
+pub struct Passage<'a> {
+    /// Time at its start.
+    pub from: Time,
+    /// Its length \[s\].
+    pub step: f64,
+    /// Whole turns of each body's angle at its end less those at its start: how often it passed ±π, counter-clockwise counted positive.
+    pub turned: [i64; BODIES],
+    series: &'a dyn Fn(usize, f64) -> (f64, f64),
+}
+
+impl Passage<'_> {
+    /// Angle \[rad\] and rate \[rad/s\] of a body `after` \[s\] from the step's start, the angle continued from that at the start in [-π, π].
+    pub fn at(&self, body: usize, after: f64) -> (f64, f64) {
+        (self.series)(body, after)
+    }
+
+    /// When within the step a body's angle passes `target` \[rad\], in seconds from the step's start; `None` where both ends lie on one side of it.
+    ///
+    /// Newton's method, kept inside a shrinking bracket.
+    pub fn passes(&self, body: usize, target: f64) -> Option<f64> {
+        let (mut left, mut right) = (0.0, self.step);
+        let ahead = self.at(body, right).0 > target;
+        if ahead == (self.at(body, left).0 > target) {
+            return None;
+        }
+        let mut t = 0.5 * right;
+        for _ in 0..60 {
+            let (angle, rate) = self.at(body, t);
+            if (angle > target) == ahead {
+                right = t;
+            } else {
+                left = t;
+            }
+            let newton = t - (angle - target) / rate;
+            let next = if newton > left && newton < right { newton } else { 0.5 * (left + right) };
+            if (next - t).abs() <= 1e-15 * self.step {
+                return Some(next);
+            }
+            t = next;
+        }
+        Some(t)
+    }
+}
+
+/// Marches many trajectories of free mechanisms.
+///
+/// Source of the method: see [`Taylor`](super::Taylor), whose tolerance and orders these are.
+#[derive(Clone, Debug)]
+pub struct Crowd {
+    tolerance: f64,
+    order: usize,
+    is_portable: bool,
+    max_steps: u64,
+}
+
+impl Crowd {
+    /// The method at a tolerance, of order 20, or 24 below 1e-15.
+    pub fn new(tolerance: Tolerance) -> Self {
+        let tolerance = tolerance.relative.min(tolerance.absolute);
+        Self { tolerance, order: if tolerance >= 1e-15 { 20 } else { 24 }, is_portable: false, max_steps: 10_000_000 }
+    }
+
+    /// The same with another order, from 10 to 24.
+    pub fn with_order(self, order: usize) -> Self {
+        Self { order: order.clamp(2 * JUDGES, MOST), ..self }
+    }
+
+    /// The same by another kernel: `Portable` does without the processor's lanes.
+    pub fn with_kernel(self, kernel: Kernel) -> Self {
+        Self { is_portable: kernel != Kernel::Fastest, ..self }
+    }
+
+    /// Highest power of the rates.
+    pub fn order(&self) -> usize {
+        self.order
+    }
+
+    /// True for what it can march: one to four bodies with hinges and centres of mass on their axes, neither springs nor motors nor walls.
+    pub fn takes(mechanism: &Mechanism) -> bool {
+        let tree = &mechanism.tree;
+        (1..=BODIES).contains(&tree.bodies)
+            && !tree.off_axis
+            && mechanism.springs.is_empty()
+            && mechanism.rows.is_empty()
+            && mechanism.contacts.is_empty()
+    }
+
+    /// Why a step cannot be taken: cause, what happened, and a hint.
+    fn failure(&self, seat: &Seat) -> Option<(Cause, String, &'static str)> {
+        let hint = "look for a position without inertia";
+        if seat.wanted.is_nan() {
+            Some((Cause::NotFinite, "the series is not finite".into(), hint))
+        } else if seat.wanted < 1e-14 * seat.time.hi.abs().max(1e-3) {
+            Some((Cause::StepTooSmall, "the series converges in ever smaller circles".into(), hint))
+        } else if seat.steps >= self.max_steps {
+            Some((Cause::TooManySteps, format!("more than {} steps", self.max_steps), "loosen the tolerance"))
+        } else {
+            None
+        }
+    }
+
+    /// Marches all trajectories to `until`; `watch` is shown every step with the trajectory's index and may end that one.
+    ///
+    /// All mechanisms must be such as [`Crowd::takes`], of the same number of bodies; any other is stopped as unsuited.  The result of each does not depend on the others.
+    pub fn march(&self, entrants: &mut [Entrant], until: Time, watch: &mut dyn FnMut(usize, &Passage) -> Going) {
+        let Some(bodies) = entrants.first().map(|first| first.mechanism.tree.bodies) else { return };
+        let march = match bodies {
+            1 => dispatch::<1>(self.is_portable),
+            2 => dispatch::<2>(self.is_portable),
+            3 => dispatch::<3>(self.is_portable),
+            _ => dispatch::<4>(self.is_portable),
+        };
+        // SAFETY: `dispatch` hands out code for AVX and FMA only after the processor was asked for them; all else in it is safe code.
+        #[allow(unsafe_code)]
+        unsafe {
+            march(self, entrants, until, watch)
+        }
+    }
+}
+
+type March = unsafe fn(&Crowd, &mut [Entrant], Time, &mut dyn FnMut(usize, &Passage) -> Going);
+
+fn dispatch<const N: usize>(is_portable: bool) -> March {
+    #[cfg(target_arch = "x86_64")]
+    if !is_portable && lanes::available() {
+        return hardware::<N>;
+    }
+    portable::<N>
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx,fma")]
+fn hardware<const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], until: Time, watch: &mut dyn FnMut(usize, &Passage) -> Going) {
+    march::<Avx, N>(crowd, entrants, until, watch);
+}
+
+fn portable<const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], until: Time, watch: &mut dyn FnMut(usize, &Passage) -> Going) {
+    march::<Portable, N>(crowd, entrants, until, watch);
+}
+
+/// Constants, states and coefficients of the trajectories in the lanes.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+struct Team<const N: usize> {
+    /// A \[kg·m²\], zero on the diagonal.
+    coupling: [[Quad; N]; N],
+    diagonal: [Quad; N],
+    /// W \[N·m\].
+    weight: [[Quad; 2]; N],
+    /// M_0⁻¹.
+    inverse: [[Quad; N]; N],
+    /// Leading parts of angles and rates, and what they leave out.
+    high: [[Quad; N]; 2],
+    low: [[Quad; N]; 2],
+    powers: [Power<N>; MOST + 1],
+}
+
+/// Coefficients of one power: cos, sin, v, and the two components of P.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
+struct Power<const N: usize> {
+    c: [Quad; N],
+    s: [Quad; N],
+    v: [Quad; N],
+    px: [Quad; N],
+    py: [Quad; N],
+}
+
+/// What a lane is doing.
+#[derive(Clone, Debug)]
+struct Seat {
+    /// Index of its trajectory.
+    entrant: Option<usize>,
+    pace: Pace,
+    time: Time,
+    steps: u64,
+    /// The last step wanted and the one taken \[s\].
+    wanted: f64,
+    taken: f64,
+}
+
+impl<const N: usize> Team<N> {
+    /// Sits a trajectory down.
+    fn seat(&mut self, lane: usize, entrant: &Entrant) {
+        let tree = &entrant.mechanism.tree;
+        for i in 0..N {
+            self.diagonal[i][lane] = tree.diagonal[i];
+            self.weight[i][0][lane] = tree.weight[i].re;
+            self.weight[i][1][lane] = tree.weight[i].im;
+            for j in i + 1..N {
+                self.coupling[i][j][lane] = tree.coupling[i * N + j].re;
+                self.coupling[j][i][lane] = tree.coupling[i * N + j].re;
+            }
+            for part in 0..2 {
+                self.high[part][i][lane] = entrant.state.y[part * N + i];
+                self.low[part][i][lane] = entrant.state.low[part * N + i];
+            }
+        }
+    }
+
+    /// Keeps an empty lane busy with something harmless: bodies hanging at rest.
+    fn park(&mut self, lane: usize) {
+        for part in [&mut self.high, &mut self.low] {
+            for numbers in part.iter_mut().flatten() {
+                numbers[lane] = 0.0;
+            }
+        }
+    }
+
+    /// Writes a lane's unknowns into a state.
+    fn leave(&self, lane: usize, state: &mut State) {
+        for part in 0..2 {
+            for i in 0..N {
+                state.y[part * N + i] = self.high[part][i][lane];
+                state.low[part * N + i] = self.low[part][i][lane];
+            }
+        }
+    }
+
+    /// Angle and rate of a body `after` \[s\] from the start of the step last expanded, where it was at `start`.
+    fn at(&self, order: usize, lane: usize, body: usize, start: f64, after: f64) -> (f64, f64) {
+        let (mut angle, mut rate) = (0.0, 0.0);
+        for k in (0..=order).rev() {
+            let v = self.powers[k].v[body][lane];
+            rate = rate * after + v;
+            angle = angle * after + v / (k + 1) as f64;
+        }
+        (start + angle * after, rate)
+    }
+}
+
+#[inline(always)]
+fn march<L: Lanes, const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], until: Time, watch: &mut dyn FnMut(usize, &Passage) -> Going) {
+    let (order, zero) = (crowd.order, [[0.0; WIDTH]; N]);
+    let power = Power { c: zero, s: zero, v: zero, px: zero, py: zero };
+    let team = Team {
+        coupling: [zero; N],
+        diagonal: [[1.0; WIDTH]; N],
+        weight: [[[0.0; WIDTH]; 2]; N],
+        inverse: [zero; N],
+        high: [zero; 2],
+        low: [zero; 2],
+        powers: [power; MOST + 1],
+    };
+    let mut teams = Box::new([team.clone(), team]);
+    let empty = Seat { entrant: None, pace: Pace::new(1.0, order, 0.0), time: until, steps: 0, wanted: 0.0, taken: 0.0 };
+    let mut seats: [Seat; WIDTH * TEAMS] = std::array::from_fn(|_| empty.clone());
+    let mut waiting = 0;
+    loop {
+        let mut left = [0.0; WIDTH * TEAMS];
+        for (place, seat) in seats.iter_mut().enumerate() {
+            let (team, lane) = (&mut teams[place / WIDTH], place % WIDTH);
+            if seat.entrant.is_none() {
+                seat.entrant = next::<N>(entrants, &mut waiting, until);
+                match seat.entrant {
+                    Some(index) => {
+                        let entrant = &entrants[index];
+                        team.seat(lane, entrant);
+                        let longest = order as f64 / 3.0 / fastest::<N>(entrant.mechanism);
+                        (seat.pace, seat.time) = (Pace::new(crowd.tolerance, order, longest), entrant.state.time);
+                        seat.steps = 0;
+                    }
+                    None => team.park(lane),
+                }
+            }
+            left[place] = if seat.entrant.is_some() { (until - seat.time).hi } else { 0.0 };
+        }
+        if seats.iter().all(|seat| seat.entrant.is_none()) {
+            return;
+        }
+        let before = [teams[0].high[0], teams[1].high[0]];
+        expand::<L, N>(&mut teams, order);
+        for (seat, (place, &left)) in seats.iter_mut().zip(left.iter().enumerate()) {
+            let (team, lane) = (&teams[place / WIDTH], place % WIDTH);
+            let coefficient = |k: usize, i: usize| team.powers[k].v[i][lane];
+            let mut sizes = [0.0; JUDGES];
+            for (back, size) in sizes.iter_mut().enumerate() {
+                *size = (0..N).fold(0.0, |largest: f64, i| largest.max(coefficient(order - back, i).abs()));
+            }
+            let finite = (0..N).all(|i| coefficient(order, i).is_finite());
+            seat.wanted = if finite { seat.pace.step_of(order, &sizes) } else { f64::NAN };
+            seat.taken = if finite { pace::taken(seat.wanted, left) } else { 0.0 };
+        }
+        for (team, seats) in teams.iter_mut().zip(seats.chunks_exact(WIDTH)) {
+            finish::<L, N>(team, order, [seats[0].taken, seats[1].taken, seats[2].taken, seats[3].taken]);
+        }
+        for (place, seat) in seats.iter_mut().enumerate() {
+            let Some(index) = seat.entrant else { continue };
+            let (team, lane) = (&mut teams[place / WIDTH], place % WIDTH);
+            let entrant = &mut entrants[index];
+            let (from, step) = (seat.time, seat.taken);
+            match crowd.failure(seat) {
+                Some((cause, what, hint)) => {
+                    entrant.stopped = Some(stop(cause, &State { time: from, ..State::default() }, step, what, hint))
+                }
+                None => {
+                    seat.time = if step == left[place] { until } else { from + step };
+                    seat.steps += 1;
+                }
+            }
+            let mut turned = [0; BODIES];
+            for i in 0..N {
+                turned[i] = angle::wrap(&mut team.high[0][i][lane], &mut team.low[0][i][lane]);
+                entrant.state.turns[i] += turned[i];
+            }
+            let (view, start) = (&*team, &before[place / WIDTH]);
+            let series = |body: usize, after: f64| view.at(order, lane, body, start[body][lane], after);
+            let passage = Passage { from, step, turned, series: &series };
+            if entrant.stopped.is_some() || watch(index, &passage) == Going::Enough || seat.time >= until {
+                team.leave(lane, &mut entrant.state);
+                entrant.state.time = seat.time;
+                entrant.tally.steps += seat.steps;
+                entrant.tally.evaluations += seat.steps;
+                seat.entrant = None;
+            }
+        }
+    }
+}
+
+/// About the fastest rate of small oscillations \[rad/s\]: stretched, the chain has the least inertia against bending, and the trace of M⁻¹ W there is
+/// about the square of its fastest rate.
+fn fastest<const N: usize>(mechanism: &Mechanism) -> f64 {
+    let tree = &mechanism.tree;
+    let (mut mass, mut pivot) = ([0.0; BODIES * BODIES], [0.0; BODIES]);
+    for i in 0..N {
+        mass[i * N + i] = tree.diagonal[i];
+        for j in i + 1..N {
+            mass[i * N + j] = tree.coupling[i * N + j].re;
+        }
+    }
+    tree::factor::<f64, N>(N, &mut mass, &mut pivot);
+    let mut square = 0.0;
+    for i in 0..N {
+        let mut unit = [0.0; N];
+        unit[i] = tree.weight[i].norm_squared().sqrt();
+        tree::solve::<f64, N>(N, &mass, &pivot, &mut unit);
+        square += unit[i];
+    }
+    square.sqrt()
+}
+
+/// The next trajectory that has a way to go; those that do not fit are stopped.
+fn next<const N: usize>(entrants: &mut [Entrant], waiting: &mut usize, until: Time) -> Option<usize> {
+    while *waiting < entrants.len() {
+        let index = *waiting;
+        *waiting += 1;
+        let entrant = &mut entrants[index];
+        if !Crowd::takes(entrant.mechanism) || entrant.mechanism.tree.bodies != N {
+            let what = "the crowd takes free mechanisms of one size".into();
+            entrant.stopped = Some(stop(Cause::Unsuited, &entrant.state, 0.0, what, "march it by `taylor`"));
+        } else if entrant.state.time < until {
+            return Some(index);
+        }
+    }
+    None
+}
+
+/// Expands all lanes to an order.
+#[inline(always)]
+fn expand<L: Lanes, const N: usize>(teams: &mut [Team<N>; TEAMS], order: usize) {
+    let mut products = [[[L::splat(0.0); N]; 2]; TEAMS];
+    for (team, f) in teams.iter_mut().zip(&mut products) {
+        for i in 0..N {
+            let (c, s) = units::<L>(team.high[0][i], team.low[0][i]);
+            (team.powers[0].c[i], team.powers[0].s[i], team.powers[0].v[i]) = (c.array(), s.array(), team.high[1][i]);
+            let v = L::of(team.high[1][i]);
+            (f[0][i], f[1][i]) = (v.mul(c), v.mul(s));
+        }
+        invert::<L, N>(team);
+    }
+    for k in 0..order {
+        for (team, f) in teams.iter_mut().zip(&mut products) {
+            raise::<L, N>(team, f, k);
+        }
+    }
+}
+
+/// Order k: from e_k, v_k and f_k = v e to those of the next one.
+#[inline(always)]
+fn raise<L: Lanes, const N: usize>(team: &mut Team<N>, f: &mut [[L; N]; 2], k: usize) {
+    let zero = L::splat(0.0);
+    let order = L::splat((k + 1) as f64);
+    let (mut gx, mut gy, mut torque) = ([zero; N], [zero; N], [zero; N]);
+    for i in 0..N {
+        let s = over(f[0][i], k + 1);
+        let c = zero.sub(over(f[1][i], k + 1));
+        (team.powers[k + 1].c[i], team.powers[k + 1].s[i]) = (c.array(), s.array());
+    }
+    // Two bodies at a time keep the multipliers busy; the newest coefficients come last.
+    for first in (0..N).step_by(2) {
+        let count = if first + 1 < N { 2 } else { 1 };
+        let mut sums = [[zero; 4]; 2];
+        let past = &team.powers[1..=k];
+        for (early, late) in past.iter().zip(past.iter().rev()) {
+            for b in 0..count {
+                let (c, s, v) = (L::of(late.c[first + b]), L::of(late.s[first + b]), L::of(early.v[first + b]));
+                let [x, y, load_x, load_y] = &mut sums[b];
+                (*x, *y) = (v.mul_add(c, *x), v.mul_add(s, *y));
+                *load_x = c.mul_add(L::of(early.px[first + b]), *load_x);
+                *load_y = s.mul_add(L::of(early.py[first + b]), *load_y);
+            }
+        }
+        for b in 0..count {
+            let i = first + b;
+            let [x, y, load_x, load_y] = sums[b];
+            let (start, next, this) = (&team.powers[0], &team.powers[k + 1], &team.powers[k]);
+            let v0 = L::of(start.v[i]);
+            (gx[i], gy[i]) = (v0.mul_add(L::of(next.c[i]), x), v0.mul_add(L::of(next.s[i]), y));
+            let weights = L::of(this.s[i]).neg_mul_add(L::of(team.weight[i][0]), L::of(this.c[i]).mul(L::of(team.weight[i][1])));
+            torque[i] = weights.sub(load_x.add(load_y));
+        }
+    }
+    for i in 0..N {
+        let (ax, ay) = (couple::<L, N>(&team.coupling[i], &gx, i), couple::<L, N>(&team.coupling[i], &gy, i));
+        let inner = L::of(team.powers[0].c[i]).mul_add(ax, L::of(team.powers[0].s[i]).mul(ay));
+        torque[i] = order.neg_mul_add(inner, torque[i]);
+    }
+    let mut x = solve::<L, N>(team, &torque);
+    if k < 2 {
+        // x is rounded, not merely computed: one step of the residual.
+        let mut residual = torque;
+        for i in 0..N {
+            residual[i] = L::of(team.diagonal[i]).neg_mul_add(x[i], residual[i]);
+            for j in 0..N {
+                if j != i {
+                    let (ci, si, cj, sj) =
+                        (L::of(team.powers[0].c[i]), L::of(team.powers[0].s[i]), L::of(team.powers[0].c[j]), L::of(team.powers[0].s[j]));
+                    let mass = L::of(team.coupling[i][j]).mul(ci.mul_add(cj, si.mul(sj)));
+                    residual[i] = mass.neg_mul_add(x[j], residual[i]);
+                }
+            }
+        }
+        let correction = solve::<L, N>(team, &residual);
+        for i in 0..N {
+            x[i] = x[i].add(correction[i]);
+        }
+    }
+    for i in 0..N {
+        let v = over(x[i], k + 1);
+        team.powers[k + 1].v[i] = v.array();
+        (f[0][i], f[1][i]) = (v.mul_add(L::of(team.powers[0].c[i]), gx[i]), v.mul_add(L::of(team.powers[0].s[i]), gy[i]));
+    }
+    for i in 0..N {
+        let (ax, ay) = (couple::<L, N>(&team.coupling[i], &f[0], i), couple::<L, N>(&team.coupling[i], &f[1], i));
+        (team.powers[k + 1].px[i], team.powers[k + 1].py[i]) = (ax.mul(order).array(), ay.mul(order).array());
+    }
+}
+
+/// x/k, rounded once.
+#[inline(always)]
+fn over<L: Lanes>(x: L, k: usize) -> L {
+    let (r, rest) = RECIPROCAL[k];
+    x.mul_add(L::splat(r), x.mul(L::splat(rest)))
+}
+
+/// cos and sin of four angles and what they leave out.
+#[inline(always)]
+fn units<L: Lanes>(angle: Quad, rest: Quad) -> (L, L) {
+    let [c0, s0, c1, s1] =
+        direction::unit(L::of([angle[0], angle[0], angle[1], angle[1]]), L::of([rest[0], rest[0], rest[1], rest[1]])).array();
+    let [c2, s2, c3, s3] =
+        direction::unit(L::of([angle[2], angle[2], angle[3], angle[3]]), L::of([rest[2], rest[2], rest[3], rest[3]])).array();
+    (L::of([c0, c1, c2, c3]), L::of([s0, s1, s2, s3]))
+}
+
+/// Σ_{j≠i} A_ij x_j.
+#[inline(always)]
+fn couple<L: Lanes, const N: usize>(row: &[Quad; N], x: &[L; N], i: usize) -> L {
+    let mut sum = L::splat(0.0);
+    for j in 0..N {
+        if j != i {
+            sum = L::of(row[j]).mul_add(x[j], sum);
+        }
+    }
+    sum
+}
+
+/// M_0⁻¹ x.
+#[inline(always)]
+fn solve<L: Lanes, const N: usize>(team: &Team<N>, x: &[L; N]) -> [L; N] {
+    let mut solution = [L::splat(0.0); N];
+    for i in 0..N {
+        let mut sum = L::of(team.inverse[i][0]).mul(x[0]);
+        for j in 1..N {
+            sum = L::of(team.inverse[i][j]).mul_add(x[j], sum);
+        }
+        solution[i] = sum;
+    }
+    solution
+}
+
+/// M_0⁻¹ by elimination without interchanges, M_0 being positive definite.
+#[inline(always)]
+fn invert<L: Lanes, const N: usize>(team: &mut Team<N>) {
+    let (zero, one) = (L::splat(0.0), L::splat(1.0));
+    let mut mass = [[zero; N]; N];
+    for i in 0..N {
+        mass[i][i] = L::of(team.diagonal[i]);
+        for j in 0..N {
+            if j != i {
+                let (ci, si, cj, sj) =
+                    (L::of(team.powers[0].c[i]), L::of(team.powers[0].s[i]), L::of(team.powers[0].c[j]), L::of(team.powers[0].s[j]));
+                mass[i][j] = L::of(team.coupling[i][j]).mul(ci.mul_add(cj, si.mul(sj)));
+            }
+        }
+    }
+    for p in 0..N {
+        let pivot = reciprocal(mass[p][p]);
+        mass[p][p] = one;
+        for j in 0..N {
+            mass[p][j] = mass[p][j].mul(pivot);
+        }
+        for i in 0..N {
+            if i != p {
+                let factor = mass[i][p];
+                mass[i][p] = zero;
+                for j in 0..N {
+                    mass[i][j] = factor.neg_mul_add(mass[p][j], mass[i][j]);
+                }
+            }
+        }
+    }
+    for i in 0..N {
+        for j in 0..N {
+            team.inverse[i][j] = mass[i][j].array();
+        }
+    }
+}
+
+#[inline(always)]
+fn reciprocal<L: Lanes>(x: L) -> L {
+    let [a, b, c, d] = x.array();
+    L::of([1.0 / a, 1.0 / b, 1.0 / c, 1.0 / d])
+}
+
+/// Every lane's state at the end of its step.
+#[inline(always)]
+fn finish<L: Lanes, const N: usize>(team: &mut Team<N>, order: usize, taken: Quad) {
+    let h = L::of(taken);
+    let square = h.mul(h);
+    for i in 0..N {
+        let (mut angles, mut rates) = ([L::splat(0.0); 2], [L::splat(0.0); 2]);
+        let mut k = order;
+        while k > 0 {
+            let v = L::of(team.powers[k].v[i]);
+            angles[k % 2] = angles[k % 2].mul_add(square, over(v, k + 1));
+            rates[k % 2] = rates[k % 2].mul_add(square, v);
+            k -= 1;
+        }
+        let angle = angles[0].mul_add(h, angles[1]).mul_add(h, L::of(team.powers[0].v[i])).mul(h);
+        let rate = rates[0].mul_add(h, rates[1]).mul(h);
+        let moved = L::of(team.low[1][i]).mul(h);
+        add::<L>(&mut team.high[0][i], &mut team.low[0][i], angle, moved);
+        add::<L>(&mut team.high[1][i], &mut team.low[1][i], rate, L::splat(0.0));
+    }
+}
+
+/// (high, low) + increment + rest: two-sum, then the low parts, then a quick two-sum.
+#[inline(always)]
+fn add<L: Lanes>(high: &mut Quad, low: &mut Quad, increment: L, rest: L) {
+    let (old, under) = (L::of(*high), L::of(*low));
+    let sum = old.add(increment);
+    let second = sum.sub(old);
+    let error = old.sub(sum.sub(second)).add(increment.sub(second)).add(under.add(rest));
+    let total = sum.add(error);
+    (*high, *low) = (total.array(), error.sub(total.sub(sum)).array());
+}

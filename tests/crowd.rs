@@ -1,0 +1,162 @@
+//! Many trajectories in lanes: against double-double one by one, and independent of who marches beside whom.
+
+mod common;
+
+use common::{compile, shipped};
+use driftless::dynamics::elimination::Elimination;
+use driftless::dynamics::{Form, Mechanism, State, Time};
+use driftless::scene::{Scene, parse_scene};
+use driftless::stepping::taylor::Kernel;
+use driftless::stepping::taylor::crowd::{Crowd, Entrant, Going};
+use driftless::stepping::{Cause, Method, Seen, Taylor, Tolerance};
+use std::sync::Arc;
+
+/// A chain of unequal bars, the first one's angle at the start moved by `shift` \[rad\].
+fn chain(bars: usize, shift: f64) -> Scene {
+    let list = |item: &dyn Fn(usize) -> String| (0..bars).map(item).collect::<Vec<_>>().join(",");
+    let bar = |i: usize| format!(r#"{{"name":"b{i}","length":{},"width":0.05,"thickness":0.003,"density":670}}"#, 0.4 + 0.1 * i as f64);
+    let hinge = |i: usize| {
+        let near = if i == 0 {
+            r#"{"body":"ground","point":[0,0]}"#.to_string()
+        } else {
+            format!(r#"{{"body":"b{}","point":[{},0]}}"#, i - 1, 0.3 + 0.1 * i as f64)
+        };
+        format!(r#"{{"name":"h{i}","between":[{near},{{"body":"b{i}","point":[0,0]}}]}}"#)
+    };
+    let start =
+        |i: usize| format!(r#""b{i}":{{"phi":{},"omega":{}}}"#, 1.5 - 0.3 * i as f64 + if i == 0 { shift } else { 0.0 }, 0.2 * i as f64);
+    let text = format!(
+        r#"{{"name":"chain","gravity":[9.81,0],"bars":[{}],"hinges":[{}],"start":{{{}}},"until":1,"every":0.1}}"#,
+        list(&bar),
+        list(&hinge),
+        list(&start)
+    );
+    parse_scene(&text, "chain", &[]).expect("a scene")
+}
+
+fn start(mechanism: &Arc<Mechanism>, scene: &Scene) -> State {
+    Elimination::<0>::new(Arc::clone(mechanism)).state(&mechanism.start(scene))
+}
+
+fn tight() -> Tolerance {
+    Tolerance { relative: 1e-17, absolute: 1e-17 }
+}
+
+#[test]
+fn one_to_four_bodies_agree_with_double_double() {
+    for bars in 1..=4 {
+        let scenes: Vec<Scene> = (0..9).map(|i| chain(bars, 0.05 * i as f64)).collect();
+        let mechanisms: Vec<_> = scenes.iter().map(compile).collect();
+        let starts: Vec<State> = mechanisms.iter().zip(&scenes).map(|(mechanism, scene)| start(mechanism, scene)).collect();
+        for order in [16, 20, 24] {
+            let mut entrants: Vec<Entrant> = mechanisms.iter().zip(&starts).map(|(m, state)| Entrant::new(m, state.clone())).collect();
+            Crowd::new(tight()).with_order(order).march(&mut entrants, Time::from(1.0), &mut |_, _| Going::On);
+            for (entrant, (mechanism, start)) in entrants.iter().zip(mechanisms.iter().zip(&starts)) {
+                let mut exact = start.clone();
+                let mut problem = Elimination::<0>::new(Arc::clone(mechanism));
+                let mut tally = Default::default();
+                Taylor::reference()
+                    .advance(&mut problem, &mut exact, Time::from(1.0), &mut tally, &mut |_, _| Ok(Seen::Kept))
+                    .expect("an end");
+                assert!(entrant.stopped.is_none() && entrant.tally.steps > 3);
+                assert_eq!((entrant.state.time, &entrant.state.turns), (exact.time, &exact.turns));
+                for i in 0..2 * bars {
+                    let error = (entrant.state.unknown(i) - exact.unknown(i)).hi.abs();
+                    assert!(error < 3e-13, "{bars} bars, order {order}, unknown {i}: {error:e}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn neighbours_and_the_processor_make_no_difference_to_the_bits() {
+    let scene = shipped("free", &[]);
+    let heavy = shipped("free", &["bars.bar2.density=900"]);
+    let (light, heavy) = (compile(&scene), compile(&heavy));
+    let entrant = |i: usize| {
+        let mechanism = if i % 3 == 0 { &heavy } else { &light };
+        let mut motion = mechanism.start(&scene);
+        motion.phi[0] = motion.phi[0] + 0.01 * i as f64;
+        Entrant::new(mechanism, Elimination::<0>::new(Arc::clone(mechanism)).state(&motion))
+    };
+    let crowd = Crowd::new(Tolerance { relative: 1e-12, absolute: 1e-12 });
+    let march = |crowd: &Crowd, mut entrants: Vec<Entrant>| -> Vec<State> {
+        crowd.march(&mut entrants, Time::from(5.0), &mut |_, _| Going::On);
+        entrants.into_iter().map(|entrant| entrant.state).collect()
+    };
+    let together = march(&crowd, (0..13).map(entrant).collect());
+    let backwards = march(&crowd, (0..13).rev().map(entrant).collect());
+    let portable = march(&crowd.clone().with_kernel(Kernel::Portable), (0..13).map(entrant).collect());
+    for i in 0..13 {
+        assert_eq!(march(&crowd, vec![entrant(i)])[0], together[i], "{i}");
+        assert_eq!(backwards[12 - i], together[i], "{i}");
+        assert_eq!(portable[i], together[i], "{i}");
+    }
+}
+
+#[test]
+fn a_flip_is_found_within_its_step_and_ends_the_trajectory() {
+    let scene = shipped("free", &["start.bar1.phi=3", "start.bar2.phi=2.9"]);
+    let mechanism = compile(&scene);
+    let mut entrants = [Entrant::new(&mechanism, start(&mechanism, &scene))];
+    let mut found = None;
+    Crowd::new(tight()).march(&mut entrants, Time::from(20.0), &mut |_, passage| {
+        let Some(body) = (0..2).find(|&body| passage.turned[body] != 0) else { return Going::On };
+        let target = std::f64::consts::PI * passage.turned[body].signum() as f64;
+        found = passage.passes(body, target).map(|after| (body, (passage.from + after).hi, target));
+        Going::Enough
+    });
+    let (body, time, target) = found.expect("a flip");
+    let end = entrants[0].state.time.hi;
+    assert!(time < end && end < time + 0.5 && end < 20.0);
+    // The same moment by the scalar method.
+    let mut problem = Elimination::<0>::new(Arc::clone(&mechanism));
+    let mut state = start(&mechanism, &scene);
+    let mut tally = Default::default();
+    Taylor::reference().advance(&mut problem, &mut state, Time::from(time), &mut tally, &mut |_, _| Ok(Seen::Kept)).expect("an end");
+    let apart = (state.y[body].abs() - target.abs()).abs();
+    assert!(apart < 1e-10, "{apart:e}");
+}
+
+#[test]
+fn one_bad_trajectory_leaves_the_others_alone() {
+    let (scene, driven) = (shipped("free", &[]), shipped("motor", &[]));
+    let (mechanism, motor) = (compile(&scene), compile(&driven));
+    let good = start(&mechanism, &scene);
+    let (mut lost, mut past) = (good.clone(), good.clone());
+    lost.y[2] = f64::NAN;
+    past.time = Time::from(3.0);
+    let mut entrants = [
+        Entrant::new(&mechanism, lost),
+        Entrant::new(&motor, start(&motor, &driven)),
+        Entrant::new(&mechanism, past.clone()),
+        Entrant::new(&mechanism, good),
+    ];
+    Crowd::new(tight()).march(&mut entrants, Time::from(2.0), &mut |_, _| Going::On);
+    let causes: Vec<_> = entrants.iter().map(|entrant| entrant.stopped.as_ref().map(|stop| stop.cause)).collect();
+    assert_eq!(causes, [Some(Cause::NotFinite), Some(Cause::Unsuited), None, None]);
+    assert_eq!(entrants[2].state, past);
+    assert_eq!(entrants[3].state.time, Time::from(2.0));
+    assert!(!Crowd::takes(&motor) && Crowd::takes(&mechanism));
+}
+
+/// Released from rest both bars horizontal only every fourth power is there; hanging, none; both upright, they stay.
+#[test]
+fn symmetric_releases_and_equilibria_are_no_trap() {
+    let angles = [("1.5707963267948966", "1.5707963267948966"), ("0", "0"), ("3.141592653589793", "3.141592653589793")];
+    for (phi1, phi2) in angles {
+        let scene = shipped("free", &[&format!("start.bar1.phi={phi1}"), &format!("start.bar2.phi={phi2}")]);
+        let mechanism = compile(&scene);
+        let mut entrants = [Entrant::new(&mechanism, start(&mechanism, &scene))];
+        Crowd::new(tight()).march(&mut entrants, Time::from(1.0), &mut |_, _| Going::On);
+        let mut exact = start(&mechanism, &scene);
+        let mut problem = Elimination::<0>::new(Arc::clone(&mechanism));
+        let mut tally = Default::default();
+        Taylor::reference().advance(&mut problem, &mut exact, Time::from(1.0), &mut tally, &mut |_, _| Ok(Seen::Kept)).expect("an end");
+        for i in 0..4 {
+            let error = (entrants[0].state.unknown(i) - exact.unknown(i)).hi.abs();
+            assert!(error < 1e-14 * f64::exp(8.0), "{phi1}, unknown {i}: {error:e}");
+        }
+    }
+}
