@@ -1,22 +1,25 @@
-//! Cost of one evaluation of the equations, beside a right-hand side written by hand for exactly the two bars at hand.
+//! What the equations cost: one evaluation beside a right-hand side written by hand for exactly the two bars at hand, and one step of `dp8` with
+//! the motor's row kept in every way beside the free scene.
 //!
 //! `cargo bench --bench equations`: alternating blocks in one process; the figures are nanoseconds (minimum and median over the blocks) and
-//! the ratio to the hand-written code block by block.
+//! the ratio of the minima and of the medians to the first line.
 
 use driftless::dynamics::canonical::Canonical;
 use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::multiplier::Multiplier;
-use driftless::dynamics::{Field, Form, Mechanism, Time};
+use driftless::dynamics::{Field, Form, Mechanism, Motion, Time};
 use driftless::scene::read_scene;
+use driftless::stabilization::{Baumgarte, Projected};
+use driftless::stepping::{Dp8, Method, Reached, Seen, Tally, Tolerance};
 use std::hint::black_box;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
 /// Evaluations a block.
-const BLOCK: usize = 20_000;
+const BLOCK: usize = 2_000;
 /// Blocks of each candidate.
-const BLOCKS: usize = 60;
+const BLOCKS: usize = 600;
 
 /// The source problem's two bars, nothing else: the smallest code we could write, with the same sine and cosine.
 struct ByHand {
@@ -106,12 +109,67 @@ fn main() {
             times.push(block(&mut **field, &mut y.clone(), &mut rate));
         }
     }
-    println!("{:36} {:>8} {:>8} {:>8}", "one evaluation", "min ns", "median", "ratio");
-    let hand = times[0].clone();
-    for ((name, ..), times) in candidates.iter().zip(&times) {
-        let mut ratios: Vec<f64> = times.iter().zip(&hand).map(|(time, hand)| time / hand).collect();
-        let mut sorted = times.clone();
-        let middle = median(&mut sorted);
-        println!("{name:36} {:8.1} {middle:8.1} {:8.2}", sorted[0], median(&mut ratios));
+    println!("{:36} {:>8} {:>8} {:>8} {:>8}", "one evaluation", "min ns", "ratio", "median", "ratio");
+    let names = candidates.iter().map(|(name, ..)| *name);
+    table(names.zip(&mut times));
+    println!();
+    steps((&free, &start), (&motor, &motor_start));
+}
+
+/// Minimum, median and their ratios to the first line.
+fn table<'a>(lines: impl Iterator<Item = (&'a str, &'a mut Vec<f64>)>) {
+    let mut first = None;
+    for (name, times) in lines {
+        let middle = median(times);
+        let (least, usual) = *first.get_or_insert((times[0], middle));
+        println!("{name:36} {:8.1} {:8.2} {middle:8.1} {:8.2}", times[0], times[0] / least, middle / usual);
     }
+}
+
+/// A scene on its way, marched block by block.
+struct Traveller {
+    name: &'static str,
+    advance: Box<dyn FnMut(f64) -> u64>,
+    per_step: Vec<f64>,
+    per_second: Vec<f64>,
+}
+
+impl Traveller {
+    fn new<P: Form + 'static, M: Method<P> + 'static>(name: &'static str, mut problem: P, mut method: M, start: &Motion) -> Self {
+        let mut state = problem.state(start);
+        let advance = move |span: f64| {
+            let (mut tally, until) = (Tally::default(), state.time + span);
+            let reached = method.advance(&mut problem, &mut state, until, &mut tally, &mut |_, _| Ok(Seen::Kept));
+            assert_eq!(reached, Ok(Reached::Until));
+            tally.steps
+        };
+        Self { name, advance: Box::new(advance), per_step: Vec::new(), per_second: Vec::new() }
+    }
+}
+
+/// One step of `dp8`, and one simulated second, at equal tolerance.
+fn steps((free, start): (&Arc<Mechanism>, &Motion), (motor, motor_start): (&Arc<Mechanism>, &Motion)) {
+    const SPAN: f64 = 1.0;
+    let dp8 = || Dp8::new(Tolerance { relative: 1e-9, absolute: 1e-9 });
+    let rows = || Multiplier::<2, true>::new(Arc::clone(motor));
+    let mut travellers = [
+        Traveller::new("free", Multiplier::<2, false>::new(Arc::clone(free)), dp8(), start),
+        Traveller::new("motor, eliminated", Elimination::<2>::new(Arc::clone(motor)), dp8(), motor_start),
+        Traveller::new("motor, multiplier", rows(), dp8(), motor_start),
+        Traveller::new("motor, multiplier and Baumgarte", Baumgarte::new(rows(), 0.1), dp8(), motor_start),
+        Traveller::new("motor, multiplier and projection", rows(), Projected::new(dp8()), motor_start),
+    ];
+    for _ in 0..BLOCKS {
+        for traveller in &mut travellers {
+            let begin = Instant::now();
+            let steps = (traveller.advance)(SPAN);
+            let spent = begin.elapsed().as_secs_f64() * 1e9;
+            traveller.per_step.push(spent / steps as f64);
+            traveller.per_second.push(spent * 1e-3 / SPAN);
+        }
+    }
+    println!("{:36} {:>8} {:>8} {:>8} {:>8}", "one step of dp8 at 1e-9", "min ns", "ratio", "median", "ratio");
+    table(travellers.iter_mut().map(|traveller| (traveller.name, &mut traveller.per_step)));
+    println!("\n{:36} {:>8} {:>8} {:>8} {:>8}", "one simulated second", "min us", "ratio", "median", "ratio");
+    table(travellers.iter_mut().map(|traveller| (traveller.name, &mut traveller.per_second)));
 }

@@ -16,8 +16,11 @@ use std::sync::Arc;
 
 const G: f64 = 9.81;
 
-fn dp8(until: f64, every: f64, rtol: f64) -> Request {
-    Request { method: Some(MethodId::Dp8), until: Some(until), every: Some(every), rtol: Some(rtol), ..Request::default() }
+/// The methods that locate impacts to all digits.
+const LOCATED: [MethodId; 2] = [MethodId::Dp8, MethodId::Taylor];
+
+fn by(method: MethodId, until: f64, every: f64, rtol: f64) -> Request {
+    Request { method: Some(method), until: Some(until), every: Some(every), rtol: Some(rtol), ..Request::default() }
 }
 
 /// A run, and all its samples.
@@ -112,54 +115,60 @@ fn pressure(scene: &Scene, sample: &Sample) -> f64 {
 
 #[test]
 fn case_f_without_restitution_goes_on_to_its_horizon() {
-    let scene = shipped("wall", &["walls.wall.restitution=0"]);
-    let (outcome, samples) = watched(&scene, &dp8(10.0, 1e-3, 1e-10));
-    assert_eq!(outcome.stop, None);
-    assert!(outcome.hold_count > 0 && outcome.hold_count as usize == outcome.holds.len());
-    let total: f64 = outcome.holds.iter().map(|hold| hold.until.unwrap_or(10.0) - hold.t).sum();
-    assert!((outcome.hold_time - total).abs() < 1e-12);
-    assert!(outcome.drift.energy.max < 2e-9, "{:e}", outcome.drift.energy.max);
-    let worst = worst_gap(&scene, &outcome, &samples);
-    assert!(worst < 1e-12, "{worst:e} m");
-    let through = samples.iter().map(|sample| gap(&compile(&scene), 0, &sample.phi)).fold(f64::MAX, f64::min);
-    assert!(through > -1e-11, "{through:e} m");
+    for method in LOCATED {
+        let scene = shipped("wall", &["walls.wall.restitution=0"]);
+        let (outcome, samples) = watched(&scene, &by(method, 10.0, 1e-3, 1e-10));
+        assert_eq!(outcome.stop, None);
+        assert!(outcome.hold_count > 0 && outcome.hold_count as usize == outcome.holds.len());
+        let total: f64 = outcome.holds.iter().map(|hold| hold.until.unwrap_or(10.0) - hold.t).sum();
+        assert!((outcome.hold_time - total).abs() < 1e-12);
+        assert!(outcome.drift.energy.max < 2e-9, "{:e}", outcome.drift.energy.max);
+        let worst = worst_gap(&scene, &outcome, &samples);
+        assert!(worst < 1e-12, "{worst:e} m");
+        let through = samples.iter().map(|sample| gap(&compile(&scene), 0, &sample.phi)).fold(f64::MAX, f64::min);
+        assert!(through > -1e-11, "{through:e} m");
+    }
 }
 
 #[test]
 fn every_release_of_case_f_is_where_the_force_is_zero() {
-    let scene = shipped("wall", &["walls.wall.restitution=0"]);
-    let whole = run(&scene, &dp8(3.0, 0.01, 1e-10));
-    for until in whole.holds.iter().filter_map(|hold| hold.until) {
-        // The same run cut at the release: its last moment is the release.
-        let outcome = run(&scene, &dp8(until, 0.01, 1e-10));
-        let force = pressure(&scene, &outcome.last);
-        assert!(force.abs() < 1e-9, "{force:e} /m at {until} s");
+    for method in LOCATED {
+        let scene = shipped("wall", &["walls.wall.restitution=0"]);
+        let whole = run(&scene, &by(method, 3.0, 0.01, 1e-10));
+        for until in whole.holds.iter().filter_map(|hold| hold.until) {
+            // The same run cut at the release: its last moment is the release.
+            let outcome = run(&scene, &by(method, until, 0.01, 1e-10));
+            let force = pressure(&scene, &outcome.last);
+            assert!(force.abs() < 1e-9, "{force:e} /m at {until} s");
+        }
     }
 }
 
 #[test]
 fn a_bar_that_falls_on_a_wall_comes_to_rest_there_for_good() {
-    for restitution in [0.0, 0.3, 0.5, 0.8] {
-        let scene = against(0.5, 1.0, restitution);
-        let (outcome, samples) = watched(&scene, &dp8(20.0, 0.01, 1e-10));
-        assert_eq!(outcome.stop, None, "e = {restitution}");
-        assert_eq!((outcome.holds.len(), outcome.holds[0].until), (1, None));
-        assert!((outcome.last.phi[0] - 0.5).abs() < 1e-14 && outcome.last.omega[0].abs() < 1e-14, "{:?}", outcome.last);
-        // All the height it had is lost: m g l / 2 (cos 0.5 - cos 1).
-        let lost = 5.0 * (0.5f64.cos() - 1f64.cos());
-        assert!((outcome.strike_loss - lost).abs() < 1e-9, "{} J instead of {lost} J", outcome.strike_loss);
-        assert!(outcome.drift.energy.max < 1e-9, "{:e}", outcome.drift.energy.max);
-        assert!(worst_gap(&scene, &outcome, &samples) < 1e-15);
-        // Small bounces are a geometric series under the angular acceleration 15 sin 0.5.
-        if restitution > 0.0 {
-            let small = outcome.strikes.iter().find(|strike| strike.approach.abs() < 1e-3).expect("small bounces");
-            let rebound = -small.approach * restitution;
-            let rest = small.t + 2.0 * rebound / (PENDULUM_SQUARED * 0.5f64.sin()) / (1.0 - restitution);
-            let from = outcome.holds[0].t;
-            // The point is held where it would rebound to less than 1e-11 m; what is left of the series is no longer waited for.
-            let acceleration = PENDULUM_SQUARED * 0.5f64.sin();
-            let left = 2.0 * (2e-11 / acceleration).sqrt() / (1.0 - restitution);
-            assert!((from - rest).abs() < 1.1 * left && from < rest + 1e-7, "held from {from} s, at rest at {rest} s");
+    for method in LOCATED {
+        for restitution in [0.0, 0.3, 0.5, 0.8] {
+            let scene = against(0.5, 1.0, restitution);
+            let (outcome, samples) = watched(&scene, &by(method, 20.0, 0.01, 1e-10));
+            assert_eq!(outcome.stop, None, "e = {restitution}");
+            assert_eq!((outcome.holds.len(), outcome.holds[0].until), (1, None));
+            assert!((outcome.last.phi[0] - 0.5).abs() < 1e-14 && outcome.last.omega[0].abs() < 1e-14, "{:?}", outcome.last);
+            // All the height it had is lost: m g l / 2 (cos 0.5 - cos 1).
+            let lost = 5.0 * (0.5f64.cos() - 1f64.cos());
+            assert!((outcome.strike_loss - lost).abs() < 1e-9, "{} J instead of {lost} J", outcome.strike_loss);
+            assert!(outcome.drift.energy.max < 1e-9, "{:e}", outcome.drift.energy.max);
+            assert!(worst_gap(&scene, &outcome, &samples) < 1e-15);
+            // Small bounces are a geometric series under the angular acceleration 15 sin 0.5.
+            if restitution > 0.0 {
+                let small = outcome.strikes.iter().find(|strike| strike.approach.abs() < 1e-3).expect("small bounces");
+                let rebound = -small.approach * restitution;
+                let rest = small.t + 2.0 * rebound / (PENDULUM_SQUARED * 0.5f64.sin()) / (1.0 - restitution);
+                let from = outcome.holds[0].t;
+                // The point is held where it would rebound to less than 1e-11 m; what is left of the series is no longer waited for.
+                let acceleration = PENDULUM_SQUARED * 0.5f64.sin();
+                let left = 2.0 * (2e-11 / acceleration).sqrt() / (1.0 - restitution);
+                assert!((from - rest).abs() < 1.1 * left && from < rest + 1e-7, "held from {from} s, at rest at {rest} s");
+            }
         }
     }
 }
@@ -187,8 +196,8 @@ fn an_end_that_slides_along_a_floor_leaves_it_when_the_force_is_zero() {
     }
     let release = t + high;
     let scene = on_a_floor(2.0 * LENGTH * 0.6, phi, omega);
-    for method in [MethodId::Dp8, MethodId::Dp5] {
-        let (outcome, samples) = watched(&scene, &Request { method: Some(method), ..dp8(1.0, 1e-2, 1e-11) });
+    for method in [MethodId::Dp8, MethodId::Dp5, MethodId::Taylor] {
+        let (outcome, samples) = watched(&scene, &by(method, 1.0, 1e-2, 1e-11));
         assert_eq!(outcome.stop, None);
         let first = &outcome.holds[0];
         assert_eq!((first.t, first.wall.as_str()), (0.0, "floor"));
@@ -208,139 +217,167 @@ fn an_end_that_slides_along_a_floor_leaves_it_when_the_force_is_zero() {
 
 #[test]
 fn the_sliding_motion_is_that_of_the_constrained_equation() {
-    let angle = 0.6f64.acos();
-    let scene = on_a_floor(2.0 * LENGTH * 0.6, [-angle, angle], [2.0, 2.0]);
-    let (h, steps) = (1e-4, 5000);
-    let y = (0..steps).fold([-angle, angle, 2.0, 2.0], |y, _| slide(y, h));
-    let outcome = run(&scene, &dp8(h * f64::from(steps), 0.1, 1e-12));
-    for k in 0..2 {
-        assert!((outcome.last.phi[k] - y[k]).abs() < 1e-9, "{} {}", outcome.last.phi[k], y[k]);
-        assert!((outcome.last.omega[k] - y[2 + k]).abs() < 1e-9, "{} {}", outcome.last.omega[k], y[2 + k]);
+    for method in LOCATED {
+        let angle = 0.6f64.acos();
+        let scene = on_a_floor(2.0 * LENGTH * 0.6, [-angle, angle], [2.0, 2.0]);
+        let (h, steps) = (1e-4, 5000);
+        let y = (0..steps).fold([-angle, angle, 2.0, 2.0], |y, _| slide(y, h));
+        let outcome = run(&scene, &by(method, h * f64::from(steps), 0.1, 1e-12));
+        for k in 0..2 {
+            assert!((outcome.last.phi[k] - y[k]).abs() < 1e-9, "{} {}", outcome.last.phi[k], y[k]);
+            assert!((outcome.last.omega[k] - y[2 + k]).abs() < 1e-9, "{} {}", outcome.last.omega[k], y[2 + k]);
+        }
     }
 }
 
 /// The first bar driven to and fro, the end of the second dragged along the floor: everything follows from the law, the motor's torque included.
 #[test]
 fn a_motor_drags_an_end_along_a_floor() {
-    let (depth, start, amplitude, frequency) = (1.5 * LENGTH, 0.4, 0.2, 3.0);
-    let at = |t: f64| {
-        let phase = frequency * t;
-        let (q, w) = (start + amplitude * phase.sin(), amplitude * frequency * phase.cos());
-        let a = -amplitude * frequency * frequency * phase.sin();
-        let other = (depth / LENGTH - q.cos()).acos();
-        let w_other = -q.sin() * w / other.sin();
-        let turning = -q.cos() * w * w - other.cos() * w_other * w_other;
-        let a_other = (turning - q.sin() * a) / other.sin();
-        ([q, other], [w, w_other], [a, a_other])
-    };
-    let (phi, omega, _) = at(0.0);
-    let mut scene = on_a_floor(depth, phi, omega);
-    let sines = vec![Sine { amplitude, frequency, phase: 0.0 }];
-    scene.motors.push(Motor { name: "motor".into(), bar: 0, relative_to: None, law: Law { start, rate: 0.0, acceleration: 0.0, sines } });
-    for stabilize in [Stabilization::Elimination, Stabilization::Projection, Stabilization::Baumgarte, Stabilization::None] {
-        let request = Request { stabilize: Some(stabilize), ..dp8(10.0, 0.01, 1e-11) };
-        let (outcome, samples) = watched(&scene, &request);
-        assert_eq!(outcome.stop, None, "{stabilize}");
-        assert_eq!((outcome.holds.len(), outcome.holds[0].t, outcome.holds[0].until), (1, 0.0, None), "{stabilize}");
-        for sample in &samples {
-            let (phi, omega, alpha) = at(sample.t);
-            assert!((sample.phi[1] - phi[1]).abs() < 1e-11 && (sample.omega[1] - omega[1]).abs() < 1e-10, "{stabilize} at {} s", sample.t);
-            let [first, second] = needed(phi, omega, alpha);
-            let force = second / phi[1].sin();
-            let torque = MASS * LENGTH * LENGTH * (first - force * phi[0].sin());
-            let [found, power] = sample.motors[0];
-            assert!((found - torque).abs() < 1e-9 && (power - torque * omega[0]).abs() < 1e-9, "{found} N m, not {torque} N m");
-            assert!(force > 0.0);
+    for method in LOCATED {
+        let (depth, start, amplitude, frequency) = (1.5 * LENGTH, 0.4, 0.2, 3.0);
+        let at = |t: f64| {
+            let phase = frequency * t;
+            let (q, w) = (start + amplitude * phase.sin(), amplitude * frequency * phase.cos());
+            let a = -amplitude * frequency * frequency * phase.sin();
+            let other = (depth / LENGTH - q.cos()).acos();
+            let w_other = -q.sin() * w / other.sin();
+            let turning = -q.cos() * w * w - other.cos() * w_other * w_other;
+            let a_other = (turning - q.sin() * a) / other.sin();
+            ([q, other], [w, w_other], [a, a_other])
+        };
+        let (phi, omega, _) = at(0.0);
+        let mut scene = on_a_floor(depth, phi, omega);
+        let sines = vec![Sine { amplitude, frequency, phase: 0.0 }];
+        scene.motors.push(Motor {
+            name: "motor".into(),
+            bar: 0,
+            relative_to: None,
+            law: Law { start, rate: 0.0, acceleration: 0.0, sines },
+        });
+        for stabilize in [Stabilization::Elimination, Stabilization::Projection, Stabilization::Baumgarte, Stabilization::None] {
+            if (method, stabilize) == (MethodId::Taylor, Stabilization::Baumgarte) {
+                continue;
+            }
+            let request = Request { stabilize: Some(stabilize), ..by(method, 10.0, 0.01, 1e-11) };
+            let (outcome, samples) = watched(&scene, &request);
+            assert_eq!(outcome.stop, None, "{stabilize}");
+            assert_eq!((outcome.holds.len(), outcome.holds[0].t, outcome.holds[0].until), (1, 0.0, None), "{stabilize}");
+            for sample in &samples {
+                let (phi, omega, alpha) = at(sample.t);
+                assert!(
+                    (sample.phi[1] - phi[1]).abs() < 1e-11 && (sample.omega[1] - omega[1]).abs() < 1e-10,
+                    "{stabilize} at {} s",
+                    sample.t
+                );
+                let [first, second] = needed(phi, omega, alpha);
+                let force = second / phi[1].sin();
+                let torque = MASS * LENGTH * LENGTH * (first - force * phi[0].sin());
+                let [found, power] = sample.motors[0];
+                assert!((found - torque).abs() < 1e-9 && (power - torque * omega[0]).abs() < 1e-9, "{found} N m, not {torque} N m");
+                assert!(force > 0.0);
+            }
+            assert_eq!(samples[0].constraints.len(), 1);
+            assert!(outcome.drift.energy.max < 1e-9, "{stabilize}: {:e}", outcome.drift.energy.max);
+            let noted = outcome.plan.notes.iter().any(|note| note.contains("kept by projection"));
+            assert_eq!(noted, stabilize != Stabilization::Projection);
         }
-        assert_eq!(samples[0].constraints.len(), 1);
-        assert!(outcome.drift.energy.max < 1e-9, "{stabilize}: {:e}", outcome.drift.energy.max);
-        let noted = outcome.plan.notes.iter().any(|note| note.contains("kept by projection"));
-        assert_eq!(noted, stabilize != Stabilization::Projection);
     }
 }
 
 /// The motor throws the end off its floor, and it falls back on it; the motor's account of work goes through hold, release and impacts.
 #[test]
 fn the_account_of_work_goes_through_holds_and_releases() {
-    let other = (1.5 - 0.4f64.cos()).acos();
-    let rate = 0.4 * 14.0;
-    let mut scene = on_a_floor(1.5 * LENGTH, [0.4, other], [rate, -0.4f64.sin() * rate / other.sin()]);
-    let sines = vec![Sine { amplitude: 0.4, frequency: 14.0, phase: 0.0 }];
-    let law = Law { start: 0.4, rate: 0.0, acceleration: 0.0, sines };
-    scene.motors.push(Motor { name: "motor".into(), bar: 0, relative_to: None, law });
-    scene.walls[0].restitution = 0.3;
-    let mut finals = Vec::new();
-    for stabilize in [Stabilization::Elimination, Stabilization::Projection] {
-        let request = Request { stabilize: Some(stabilize), ..dp8(1.5, 0.01, 1e-11) };
-        let (outcome, samples) = watched(&scene, &request);
-        assert_eq!(outcome.stop, None, "{stabilize}");
-        assert!(outcome.holds[0].until.is_some() && outcome.strike_count > 1, "{:?} {:?}", outcome.holds, outcome.strike_count);
-        assert!(outcome.drift.energy.max < 1e-9, "{stabilize}: {:e}", outcome.drift.energy.max);
-        assert!(worst_gap(&scene, &outcome, &samples) < 1e-12);
-        finals.push((outcome.last.phi[1], outcome.last.work, outcome.hold_count));
+    for method in LOCATED {
+        let other = (1.5 - 0.4f64.cos()).acos();
+        let rate = 0.4 * 14.0;
+        let mut scene = on_a_floor(1.5 * LENGTH, [0.4, other], [rate, -0.4f64.sin() * rate / other.sin()]);
+        let sines = vec![Sine { amplitude: 0.4, frequency: 14.0, phase: 0.0 }];
+        let law = Law { start: 0.4, rate: 0.0, acceleration: 0.0, sines };
+        scene.motors.push(Motor { name: "motor".into(), bar: 0, relative_to: None, law });
+        scene.walls[0].restitution = 0.3;
+        let mut finals = Vec::new();
+        for stabilize in [Stabilization::Elimination, Stabilization::Projection] {
+            let request = Request { stabilize: Some(stabilize), ..by(method, 1.5, 0.01, 1e-11) };
+            let (outcome, samples) = watched(&scene, &request);
+            assert_eq!(outcome.stop, None, "{stabilize}");
+            assert!(outcome.holds[0].until.is_some() && outcome.strike_count > 1, "{:?} {:?}", outcome.holds, outcome.strike_count);
+            assert!(outcome.drift.energy.max < 1e-9, "{stabilize}: {:e}", outcome.drift.energy.max);
+            assert!(worst_gap(&scene, &outcome, &samples) < 1e-12);
+            finals.push((outcome.last.phi[1], outcome.last.work, outcome.hold_count));
+        }
+        assert_eq!(finals[0].2, finals[1].2);
+        assert!((finals[0].0 - finals[1].0).abs() < 1e-6 && (finals[0].1 - finals[1].1).abs() < 1e-6, "{finals:?}");
     }
-    assert_eq!(finals[0].2, finals[1].2);
-    assert!((finals[0].0 - finals[1].0).abs() < 1e-6 && (finals[0].1 - finals[1].1).abs() < 1e-6, "{finals:?}");
 }
 
 #[test]
 fn two_points_are_held_at_once() {
-    // Two bars on hinges of their own, each against a wall of its own: one falls a little further than the other.
-    let mut scene = against(0.5, 1.0, 0.4);
-    let mut twin = scene.bars[0].clone();
-    twin.name = "twin".into();
-    scene.bars.push(twin);
-    let mut hinge = scene.hinges[0].clone();
-    (hinge.name, hinge.between[1].bar) = ("B".into(), Some(1));
-    scene.hinges.push(hinge);
-    scene.start.push(Start { phi: 1.3, omega: 0.0 });
-    scene.walls.push(Wall { name: "other".into(), bar: 1, ..scene.walls[0].clone() });
-    let outcome = run(&scene, &dp8(10.0, 0.1, 1e-10));
-    assert_eq!((outcome.stop.as_ref(), outcome.hold_count), (None, 2));
-    assert!(outcome.holds.iter().all(|hold| hold.until.is_none()) && outcome.holds[0].t < outcome.holds[1].t);
-    assert!(outcome.last.phi.iter().all(|phi| (phi - 0.5).abs() < 1e-14) && outcome.last.omega.iter().all(|omega| omega.abs() < 1e-14));
-    let lost = 5.0 * (2.0 * 0.5f64.cos() - 1f64.cos() - 1.3f64.cos());
-    assert!((outcome.strike_loss - lost).abs() < 1e-9);
+    for method in LOCATED {
+        // Two bars on hinges of their own, each against a wall of its own: one falls a little further than the other.
+        let mut scene = against(0.5, 1.0, 0.4);
+        let mut twin = scene.bars[0].clone();
+        twin.name = "twin".into();
+        scene.bars.push(twin);
+        let mut hinge = scene.hinges[0].clone();
+        (hinge.name, hinge.between[1].bar) = ("B".into(), Some(1));
+        scene.hinges.push(hinge);
+        scene.start.push(Start { phi: 1.3, omega: 0.0 });
+        scene.walls.push(Wall { name: "other".into(), bar: 1, ..scene.walls[0].clone() });
+        let outcome = run(&scene, &by(method, 10.0, 0.1, 1e-10));
+        assert_eq!((outcome.stop.as_ref(), outcome.hold_count), (None, 2));
+        assert!(outcome.holds.iter().all(|hold| hold.until.is_none()) && outcome.holds[0].t < outcome.holds[1].t);
+        assert!(outcome.last.phi.iter().all(|phi| (phi - 0.5).abs() < 1e-14) && outcome.last.omega.iter().all(|omega| omega.abs() < 1e-14));
+        let lost = 5.0 * (2.0 * 0.5f64.cos() - 1f64.cos() - 1.3f64.cos());
+        assert!((outcome.strike_loss - lost).abs() < 1e-9);
+    }
 }
 
 /// Two walls of which one alone keeps a bar: its end touches both, and only as many rows as it has freedom are in force.
 #[test]
 fn points_that_touch_without_being_needed_are_not_held() {
-    let mut scene = against(0.5, 0.5, 0.5);
-    scene.walls.push(Wall { name: "same".into(), point: [0.5, 0.0], ..scene.walls[0].clone() });
-    let outcome = run(&scene, &dp8(5.0, 0.1, 1e-10));
-    assert_eq!((outcome.stop.as_ref(), outcome.strike_count, outcome.hold_count), (None, 0, 1));
-    assert!((outcome.last.phi[0] - 0.5).abs() < 1e-14 && outcome.last.omega[0] == 0.0);
+    for method in LOCATED {
+        let mut scene = against(0.5, 0.5, 0.5);
+        scene.walls.push(Wall { name: "same".into(), point: [0.5, 0.0], ..scene.walls[0].clone() });
+        let outcome = run(&scene, &by(method, 5.0, 0.1, 1e-10));
+        assert_eq!((outcome.stop.as_ref(), outcome.strike_count, outcome.hold_count), (None, 0, 1));
+        assert!((outcome.last.phi[0] - 0.5).abs() < 1e-14 && outcome.last.omega[0] == 0.0);
+    }
 }
 
 #[test]
 fn a_motor_that_leaves_no_freedom_is_a_typed_stop() {
-    // At rest on the wall, driven into it with growing speed.
-    let mut scene = against(0.5, 0.5, 0.5);
-    let law = Law { start: 0.5, rate: 0.0, acceleration: -1.0, sines: vec![] };
-    scene.motors.push(Motor { name: "motor".into(), bar: 0, relative_to: None, law });
-    let stop = run(&scene, &dp8(5.0, 0.1, 1e-10)).stop.expect("a stop");
-    assert_eq!((stop.cause, stop.t), (Cause::RestingContact, 0.0));
-    assert!(stop.what.contains("wall") && stop.hint.contains("motors"), "{stop}");
+    for method in LOCATED {
+        // At rest on the wall, driven into it with growing speed.
+        let mut scene = against(0.5, 0.5, 0.5);
+        let law = Law { start: 0.5, rate: 0.0, acceleration: -1.0, sines: vec![] };
+        scene.motors.push(Motor { name: "motor".into(), bar: 0, relative_to: None, law });
+        let stop = run(&scene, &by(method, 5.0, 0.1, 1e-10)).stop.expect("a stop");
+        assert_eq!((stop.cause, stop.t), (Cause::RestingContact, 0.0));
+        assert!(stop.what.contains("wall") && stop.hint.contains("motors"), "{stop}");
+    }
 }
 
 #[test]
 fn the_same_run_gives_the_same_bits() {
-    for restitution in [0.0, 0.5] {
-        let scene = shipped("wall", &[&format!("walls.wall.restitution={restitution}")]);
-        let [first, second] = std::array::from_fn(|_| watched(&scene, &dp8(4.0, 0.01, 1e-9)));
-        assert_eq!(first.1, second.1);
-        assert_eq!((&first.0.strikes, &first.0.holds, first.0.tally), (&second.0.strikes, &second.0.holds, second.0.tally));
-        assert_eq!(first.0.hold_time.to_bits(), second.0.hold_time.to_bits());
+    for method in LOCATED {
+        for restitution in [0.0, 0.5] {
+            let scene = shipped("wall", &[&format!("walls.wall.restitution={restitution}")]);
+            let [first, second] = std::array::from_fn(|_| watched(&scene, &by(method, 4.0, 0.01, 1e-9)));
+            assert_eq!(first.1, second.1);
+            assert_eq!((&first.0.strikes, &first.0.holds, first.0.tally), (&second.0.strikes, &second.0.holds, second.0.tally));
+            assert_eq!(first.0.hold_time.to_bits(), second.0.hold_time.to_bits());
+        }
     }
 }
 
 #[test]
 fn a_run_that_begins_at_rest_on_a_wall_stays_there() {
-    let mechanism: Arc<Mechanism> = compile(&against(0.5, 0.5, 1.0));
-    assert_eq!(mechanism.staying(&[0], Default::default(), &[0.5], &[0.0]), Some(vec![0]));
-    assert_eq!(mechanism.staying(&[0], Default::default(), &[0.5], &[1e-3]), Some(vec![]));
-    let outcome = run(&against(0.5, 0.5, 1.0), &dp8(5.0, 0.1, 1e-10));
-    assert_eq!((outcome.stop, outcome.strike_count, outcome.hold_time), (None, 0, 5.0));
-    assert_eq!(outcome.last.imbalance, 0.0);
+    for method in LOCATED {
+        let mechanism: Arc<Mechanism> = compile(&against(0.5, 0.5, 1.0));
+        assert_eq!(mechanism.staying(&[0], Default::default(), &[0.5], &[0.0]), Some(vec![0]));
+        assert_eq!(mechanism.staying(&[0], Default::default(), &[0.5], &[1e-3]), Some(vec![]));
+        let outcome = run(&against(0.5, 0.5, 1.0), &by(method, 5.0, 0.1, 1e-10));
+        assert_eq!((outcome.stop, outcome.strike_count, outcome.hold_time), (None, 0, 5.0));
+        assert_eq!(outcome.last.imbalance, 0.0);
+    }
 }

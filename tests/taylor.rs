@@ -2,15 +2,20 @@
 
 mod common;
 
-use common::{compile, shipped};
-use driftless::arithmetic::DoubleDouble;
-use driftless::dynamics::State;
+use common::{ONE_TURN, compile, shipped};
+use driftless::arithmetic::{Complex, DoubleDouble};
 use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::kernel::Kernel as Energies;
-use driftless::dynamics::{Form, Motion, Time};
-use driftless::scene::Scene;
+use driftless::dynamics::multiplier::Multiplier;
+use driftless::dynamics::row::Posture;
+use driftless::dynamics::{Form, Mechanism, Motion, State, Time};
+use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Sample, march};
+use driftless::scene::{Bar, Hinge, Place, Scene, Start};
+use driftless::stabilization::Projected;
 use driftless::stepping::taylor::Kernel;
 use driftless::stepping::{Dp8, Method, Seen, Tally, Taylor, Tolerance};
+use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::Arc;
 
 fn end<M: Method<Elimination<0>>>(scene: &Scene, mut method: M, until: f64) -> Motion {
     let mechanism = compile(scene);
@@ -234,4 +239,290 @@ fn numbers_out_of_range_are_a_typed_stop() {
     let stop = on(Kernel::Fastest, 1e-12, 20)
         .advance(&mut problem, &mut state, Time::from(1.0), &mut Tally::default(), &mut |_, _| Ok(Seen::Kept));
     assert!(stop.is_err());
+}
+
+/// A run by the program's own loop with rows every `every` \[s\], and its samples.
+fn rows(scene: &Scene, every: f64, until: f64) -> (Outcome, Vec<Sample>) {
+    let mechanism = compile(scene);
+    let request =
+        Request { method: Some(MethodId::Taylor), rtol: Some(1e-15), until: Some(until), every: Some(every), ..Request::default() };
+    let plan = Plan::new(scene, &mechanism, &request).expect("a sensible pairing");
+    let start = mechanism.start(scene);
+    let mut samples = Vec::new();
+    let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a beginning");
+    let outcome = march(run, &mut |sample| {
+        samples.push(sample.clone());
+        Ok(())
+    });
+    (outcome.expect("no observer fails"), samples)
+}
+
+#[test]
+fn the_end_has_the_same_bits_whatever_the_output_interval() {
+    let mut scenes = fast_scenes();
+    scenes.extend(["spring", "motor_sine", "branch"].map(|name| (name, shipped(name, &[]))));
+    for (name, scene) in scenes {
+        let [fine, odd, coarse] = [0.001, 0.037, 2.0].map(|every| rows(&scene, every, 2.0).0);
+        for other in [odd, coarse] {
+            assert_eq!((&fine.last, fine.tally), (&other.last, other.tally), "{name}");
+        }
+    }
+}
+
+#[test]
+fn rows_inside_a_step_are_as_exact_as_its_end() {
+    let mut scenes = fast_scenes();
+    scenes.extend(["spring", "motor_sine"].map(|name| (name, shipped(name, &[]))));
+    for (name, scene) in scenes {
+        let (outcome, samples) = rows(&scene, 0.01, 1.0);
+        assert!(outcome.tally.steps < 90, "{name}: steps are cut at the rows");
+        for sample in samples.iter().skip(1).step_by(13) {
+            let exact = end(&scene, Taylor::reference(), sample.t);
+            for k in 0..sample.phi.len() {
+                let apart = (exact.unwrapped(k) - sample.phi[k]).abs().max((exact.omega[k].hi - sample.omega[k]).abs());
+                assert!(apart < 1e-12, "{name} at {} s: {apart:e}", sample.t);
+            }
+            assert!((exact.work.hi - sample.work).abs() < 1e-12, "{name}");
+        }
+        // Between the steps' ends the balance is that of the polynomial, not of a rounded state.
+        assert!(outcome.drift.energy.max < 5e-15, "{name}: {:e}", outcome.drift.energy.max);
+    }
+}
+
+/// A four-bar of uniform slender bars under gravity along +x: crank and coupler from the origin, rocker from (0, 0.9), not yet pinned to the coupler.
+struct FourBar {
+    length: [f64; 3],
+    mass: [f64; 3],
+}
+
+impl FourBar {
+    const GROUND: [f64; 2] = [0.0, 0.9];
+
+    /// Angles of all bars at a crank angle, and their rates at crank rate one, from the triangle of coupler and rocker.
+    fn posture(&self, q: f64) -> ([f64; 3], [f64; 3]) {
+        let [a, b, c] = self.length;
+        let elbow = [a * q.cos(), a * q.sin()];
+        let gap = [Self::GROUND[0] - elbow[0], Self::GROUND[1] - elbow[1]];
+        let distance = gap[0].hypot(gap[1]);
+        let coupler = gap[1].atan2(gap[0]) - ((b * b + distance * distance - c * c) / (2.0 * b * distance)).acos();
+        let tip = [elbow[0] + b * coupler.cos(), elbow[1] + b * coupler.sin()];
+        let rocker = (tip[1] - Self::GROUND[1]).atan2(tip[0] - Self::GROUND[0]);
+        let across = (rocker - coupler).sin();
+        ([q, coupler, rocker], [1.0, -a * (rocker - q).sin() / (b * across), -a * (coupler - q).sin() / (c * across)])
+    }
+
+    /// Energy at crank rate one, half the effective inertia, and potential energy.
+    fn energies(&self, q: f64) -> (f64, f64) {
+        let (phi, rate) = self.posture(q);
+        let arm = |k: usize, share: f64| [share * self.length[k] * phi[k].cos(), share * self.length[k] * phi[k].sin()];
+        let turned = |[x, y]: [f64; 2], w: f64| [-y * w, x * w];
+        let add = |[x, y]: [f64; 2], [u, v]: [f64; 2]| [x + u, y + v];
+        let centre = [arm(0, 0.5), add(arm(0, 1.0), arm(1, 0.5)), add(Self::GROUND, arm(2, 0.5))];
+        let speed =
+            [turned(arm(0, 0.5), rate[0]), add(turned(arm(0, 1.0), rate[0]), turned(arm(1, 0.5), rate[1])), turned(arm(2, 0.5), rate[2])];
+        let mut sums = (0.0, 0.0);
+        for k in 0..3 {
+            let inertia = self.mass[k] * self.length[k] * self.length[k] / 12.0;
+            sums.0 += 0.5 * self.mass[k] * (speed[k][0].powi(2) + speed[k][1].powi(2)) + 0.5 * inertia * rate[k] * rate[k];
+            sums.1 -= self.mass[k] * 9.81 * centre[k][0];
+        }
+        sums
+    }
+
+    /// Time from one crank angle to another: the integral of sqrt(T_1/(E - V)) by Gauss's rule of three points on many pieces.
+    fn time(&self, from: f64, to: f64, energy: f64) -> f64 {
+        let pieces = 4000;
+        let width = (to - from) / f64::from(pieces);
+        let slowness = |q: f64| {
+            let (kinetic, potential) = self.energies(q);
+            (kinetic / (energy - potential)).sqrt()
+        };
+        let offset = 0.5 * 0.6_f64.sqrt() * width;
+        let piece = |i: i32| {
+            let middle = from + (f64::from(i) + 0.5) * width;
+            width * (5.0 * slowness(middle - offset) + 8.0 * slowness(middle) + 5.0 * slowness(middle + offset)) / 18.0
+        };
+        (0..pieces).map(piece).sum()
+    }
+
+    /// The mechanism with its loop closed, and its motion at a crank angle and rate.
+    fn mechanism(&self, q: f64, rate: f64) -> (Arc<Mechanism>, Motion) {
+        let mut scene = common::pendulum(0.0, 0.0);
+        scene.gravity = [9.81, 0.0];
+        let (phi, rates) = self.posture(q);
+        let (bar, hinge) = (scene.bars[0].clone(), scene.hinges[0].clone());
+        scene.bars.clear();
+        scene.hinges.clear();
+        scene.start.clear();
+        let foot = [(None, [0.0, 0.0]), (Some(0), [self.length[0], 0.0]), (None, Self::GROUND)];
+        for k in 0..3 {
+            let (length, mass) = (self.length[k], self.mass[k]);
+            let inertia = mass * length * length / 12.0;
+            scene.bars.push(Bar { name: format!("bar{k}"), length, mass, centre: [0.5 * length, 0.0], inertia, ..bar.clone() });
+            let between = [Place { bar: foot[k].0, point: foot[k].1 }, Place { bar: Some(k), point: [0.0, 0.0] }];
+            scene.hinges.push(Hinge { name: format!("hinge{k}"), between, ..hinge.clone() });
+            scene.start.push(Start { phi: phi[k], omega: rate * rates[k] });
+        }
+        let tree = Mechanism::new(&scene).expect("a valid scene");
+        let [coupler, rocker] = [1, 2].map(|k: usize| tree.bodies[k].ends[1].clone());
+        let start = tree.start(&scene);
+        (Arc::new(tree.pinned("loop", &coupler, &rocker)), start)
+    }
+}
+
+const FOUR_BAR: FourBar = FourBar { length: [0.3, 1.0, 0.8], mass: [0.5, 1.2, 0.9] };
+
+/// Marches a mechanism by multipliers.
+fn bordered<M: Method<Multiplier<0, true>>>(mechanism: &Arc<Mechanism>, start: &Motion, mut method: M, until: f64) -> Motion {
+    let mut form = Multiplier::<0, true>::new(Arc::clone(mechanism));
+    let mut state = form.state(start);
+    method.advance(&mut form, &mut state, Time::from(until), &mut Tally::default(), &mut |_, _| Ok(Seen::Kept)).expect("an end");
+    let mut motion = Motion::default();
+    form.read(&state, &mut motion);
+    motion
+}
+
+/// Largest distance of the pinned points \[m\], and of their velocities \[m/s\].
+fn opening(mechanism: &Mechanism, motion: &Motion) -> [f64; 2] {
+    let z: Vec<_> = motion.phi.iter().map(|&phi| Complex::unit(phi)).collect();
+    let mut worst = [0.0_f64; 2];
+    for row in &mechanism.rows {
+        let mut jacobian = vec![DoubleDouble::default(); z.len()];
+        let here = row.linearise(motion.time, Posture { phi: &motion.phi, z: &z, omega: &motion.omega }, &mut jacobian);
+        let rate = jacobian.iter().zip(&motion.omega).fold(here.drive, |sum, (&g, &w)| sum + g * w);
+        worst = [worst[0].max(here.position.hi.abs()), worst[1].max(rate.hi.abs())];
+    }
+    worst
+}
+
+#[test]
+fn a_closed_loop_keeps_time_with_its_one_degree_of_freedom() {
+    let rate = 12.0;
+    let (mechanism, start) = FOUR_BAR.mechanism(0.4, rate);
+    let (kinetic, potential) = FOUR_BAR.energies(0.4);
+    let energy = kinetic * rate * rate + potential;
+    let until = 2.0;
+    for tolerance in [1e-13, 1e-16] {
+        let mut method = Projected::new(Taylor::<f64>::with_order(tolerance, 24));
+        method.tolerance = 1e-13;
+        let last = bordered(&mechanism, &start, method, until);
+        // About two turns of the crank, by quadrature.
+        let crank = last.unwrapped(0);
+        assert!(crank > 9.0, "{crank}");
+        let time = FOUR_BAR.time(0.4, crank, energy);
+        assert!((time - until).abs() < 2e-12, "{:e} s off", time - until);
+        let (phi, rates) = FOUR_BAR.posture(crank);
+        for k in 0..3 {
+            assert!((Complex::unit(phi[k]) - Complex::unit(last.phi[k].hi)).norm_squared().sqrt() < 1e-13, "bar {k}");
+            assert!((rates[k] * last.omega[0].hi - last.omega[k].hi).abs() < 1e-12, "bar {k}");
+        }
+        let [position, velocity] = opening(&mechanism, &last);
+        assert!(position < 1e-15 && velocity < 1e-14, "{position:e} m, {velocity:e} m/s");
+    }
+}
+
+#[test]
+fn a_closed_loop_in_double_double_is_the_limit_of_plain_ones() {
+    let (mechanism, start) = FOUR_BAR.mechanism(0.4, 12.0);
+    let reference = bordered(&mechanism, &start, Taylor::reference(), 0.5);
+    let other = bordered(&mechanism, &start, Taylor::<DoubleDouble>::with_order(1e-33, 36), 0.5);
+    assert!(distance(&reference, &other) < 1e-26, "{:e}", distance(&reference, &other));
+    let error = |tolerance| distance(&reference, &bordered(&mechanism, &start, Taylor::<f64>::with_order(tolerance, 20), 0.5));
+    let errors = [error(1e-6), error(1e-9), error(1e-12), error(1e-17)];
+    assert!(errors[0] > 1e-9 && errors[0] < 1e-3 && errors[1] < 1e-6 && errors[2] < 1e-9 && errors[3] < 1e-13, "{errors:?}");
+}
+
+#[test]
+fn motors_by_multipliers_move_as_eliminated_ones() {
+    let mut relative = shipped("motor_sine", &[]);
+    relative.motors[0].relative_to = Some(0);
+    relative.motors[0].bar = 1;
+    relative.start[1] = Start { phi: relative.start[0].phi + FRAC_PI_2, omega: relative.start[0].omega + ONE_TURN + 1.0 };
+    for (name, scene) in [("motor", shipped("motor", &[])), ("motor_sine", shipped("motor_sine", &[])), ("relative", relative)] {
+        let mechanism = compile(&scene);
+        let start = mechanism.start(&scene);
+        let eliminated = end(&scene, on(Kernel::Series, 1e-17, 24), 1.0);
+        let held = bordered(&mechanism, &start, on(Kernel::Fastest, 1e-17, 24), 1.0);
+        let projected = bordered(&mechanism, &start, Projected::new(on(Kernel::Fastest, 1e-17, 24)), 1.0);
+        assert!(distance(&eliminated, &held) < 1e-12, "{name}: {:e}", distance(&eliminated, &held));
+        assert!(distance(&eliminated, &projected) < 1e-12, "{name}: {:e}", distance(&eliminated, &projected));
+        let exact = bordered(&mechanism, &start, Taylor::reference(), 1.0);
+        assert!(distance(&end(&scene, Taylor::reference(), 1.0), &exact) < 1e-26, "{name}");
+    }
+}
+
+/// The method at a tolerance with its first orders in double-double.
+fn extended(tolerance: f64) -> Taylor<f64> {
+    let mut method = Taylor::with_order(tolerance, 24);
+    method.extended = true;
+    method
+}
+
+#[test]
+fn extended_orders_leave_less_than_a_plain_double() {
+    let damped = ["springs.spring.damping=0.3"];
+    let cases: [(&str, &[&str]); 6] =
+        [("free", &[]), ("gentle", &[]), ("spring", &[]), ("spring", &damped), ("motor_sine", &[]), ("branch", &[])];
+    for (name, overrides) in cases {
+        let scene = shipped(name, overrides);
+        let exact = end(&scene, Taylor::reference(), 1.0);
+        let error = distance(&exact, &end(&scene, extended(1e-22), 1.0));
+        assert!(error < 1e-17, "{name}: {error:e}");
+    }
+    let (mechanism, start) = FOUR_BAR.mechanism(0.4, 12.0);
+    let exact = bordered(&mechanism, &start, Taylor::reference(), 0.5);
+    let error = distance(&exact, &bordered(&mechanism, &start, extended(1e-22), 0.5));
+    assert!(error < 1e-17, "{error:e}");
+}
+
+#[test]
+fn extended_energy_stays_far_below_a_plain_run() {
+    let scene = shipped("free", &[]);
+    let mechanism = compile(&scene);
+    let mut kernel = Energies::<DoubleDouble>::new(2, 0);
+    let mut energy = |motion: &Motion| mechanism.energy(&mut kernel, &motion.phi, &motion.omega).total();
+    let before = energy(&mechanism.start(&scene));
+    let after = energy(&end(&scene, extended(1e-21), 100.0));
+    let drift = (after - before).hi.abs() / mechanism.energy_scale;
+    assert!(drift < 1e-17, "{drift:e}");
+}
+
+#[test]
+fn symmetric_releases_and_equilibria_take_finite_steps() {
+    let at = |phi: f64, omega: f64| {
+        let mut scene = shipped("free", &[]);
+        scene.start.iter_mut().for_each(|start| (start.phi, start.omega) = (phi, omega));
+        scene
+    };
+    let mut weightless = at(0.3, 0.0);
+    weightless.gravity = [0.0; 2];
+    let mut spring = shipped("hanging", &[]);
+    spring.start.iter_mut().for_each(|start| start.omega = 1e-200);
+    let cases = [
+        ("horizontal", at(FRAC_PI_2, 0.0)),
+        ("upright", at(PI, 0.0)),
+        ("hanging", at(0.0, 0.0)),
+        ("nearly hanging", at(0.0, 1e-300)),
+        ("nearly upright", at(PI, 1e-100)),
+        ("weightless", weightless),
+        ("on its spring", spring),
+    ];
+    for (name, scene) in cases {
+        let mechanism = compile(&scene);
+        let start = mechanism.start(&scene);
+        for kernel in [Kernel::Fastest, Kernel::Series] {
+            for order in [16, 20, 24] {
+                let last = end(&scene, on(kernel, 1e-13, order), 3.0);
+                let exact = end(&scene, Taylor::<DoubleDouble>::with_order(1e-30, 30), 3.0);
+                // Upright, what a double leaves out of π grows a thousandfold a second.
+                let apart = distance(&last, &exact);
+                assert!(apart < 1e-8, "{name}, {kernel:?} of order {order}: {apart:e}");
+                if name == "hanging" || name == "weightless" {
+                    assert_eq!((&last.phi, &last.omega), (&start.phi, &start.omega), "{name}");
+                }
+                let fastest = last.omega.iter().fold(0.0, |most: f64, omega| most.max(omega.hi.abs()));
+                assert!(!name.starts_with("nearly hanging") || fastest < 1e-299, "{name}, {kernel:?} of order {order}: {fastest:e}");
+            }
+        }
+    }
 }

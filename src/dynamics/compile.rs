@@ -4,7 +4,7 @@ use super::force::Spring;
 use super::impact::Contact;
 use super::kernel::Kernel;
 use super::point::Point;
-use super::row::{AngleRow, LineRow, Row};
+use super::row::{AngleRow, LineRow, PinRow, Row};
 use super::ties::Ties;
 use super::tree::{self, Tree};
 use crate::arithmetic::Complex;
@@ -175,6 +175,16 @@ impl Mechanism {
         mechanism.check_mass(scene)?;
         mechanism.energy_scale = mechanism.scale_of_energy(&mechanism.start(scene));
         Ok(mechanism)
+    }
+
+    /// The mechanism with two of its points pinned to one another by two more rows: a closed loop.
+    ///
+    /// The loop must be closed at the start, and not be one that the rows there are close already.
+    pub fn pinned(&self, name: &str, a: &Point, b: &Point) -> Self {
+        let mut mechanism = self.clone();
+        let before_contacts = mechanism.motor_rows();
+        mechanism.rows.splice(before_contacts..before_contacts, PinRow::pair(name, a, b).map(Row::Pin));
+        mechanism
     }
 
     /// True where the scene has a damper.

@@ -8,7 +8,7 @@
 
 use super::kernel::Kernel;
 use super::tree::{self, size};
-use super::{Field, Form, Mechanism, Motion, State, Time};
+use super::{Coordinates, Field, Form, Mechanism, Motion, State, Time};
 use crate::arithmetic::DoubleDouble;
 use std::sync::Arc;
 
@@ -17,11 +17,13 @@ use std::sync::Arc;
 pub struct Elimination<const N: usize> {
     mechanism: Arc<Mechanism>,
     kernel: Kernel<f64>,
-    phi: Vec<f64>,
+    /// True where no driven angle accelerates.
+    is_steady: bool,
     omega: Vec<f64>,
     drive_acceleration: Vec<f64>,
     drive_rate: Vec<f64>,
     given: Vec<f64>,
+    share: Vec<f64>,
     reduced: Vec<f64>,
     pivot: Vec<f64>,
     coordinate_acceleration: Vec<f64>,
@@ -35,7 +37,7 @@ impl<const N: usize> Elimination<N> {
         let zeros = || vec![0.0; n];
         Self {
             kernel: Kernel::new(n, 0),
-            phi: zeros(),
+            share: zeros(),
             omega: zeros(),
             drive_acceleration: zeros(),
             drive_rate: zeros(),
@@ -43,8 +45,70 @@ impl<const N: usize> Elimination<N> {
             reduced: vec![0.0; f * f],
             pivot: vec![0.0; f],
             coordinate_acceleration: vec![0.0; f],
+            is_steady: mechanism.ties.is_steady(),
             mechanism,
         }
+    }
+
+    /// [`Field::rate`] for `F` coordinates (any number where `F` is 0).
+    #[inline(always)]
+    fn rate_sized<const F: usize>(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
+        let mechanism = &*self.mechanism;
+        let (n, f) = (size::<N>(mechanism.bodies.len()), size::<F>(mechanism.ties.count()));
+        let (u, u_rate, rate) = (&y[..f], &y[f..2 * f], &mut rate[..2 * f + 1]);
+        let ties = &mechanism.ties.bodies[..n];
+        let kernel = &mut self.kernel;
+        let (drive_rate, drive_acceleration, omega) = (&mut self.drive_rate[..n], &mut self.drive_acceleration[..n], &mut self.omega[..n]);
+        for k in 0..n {
+            let placed = ties[k].place(t, u);
+            (kernel.z[k], drive_rate[k], drive_acceleration[k]) = (placed.unit, placed.rate, placed.acceleration);
+            omega[k] = drive_rate[k] + ties[k].base.map_or(0.0, |base| u_rate[base]);
+        }
+        kernel.assemble::<N>(mechanism, omega);
+        let (mass, load, given) = (&kernel.mass[..n * n], &mut kernel.load[..n], &mut self.given[..n]);
+        // b - M s''; what of it the coordinates do not feel is the motors' share.
+        if !self.is_steady {
+            tree::multiply::<f64, N>(n, mass, drive_acceleration, given);
+            for k in 0..n {
+                load[k] -= given[k];
+            }
+        }
+        let (reduced, acceleration) = (&mut self.reduced[..f * f], &mut self.coordinate_acceleration[..f]);
+        for a in 0..f {
+            acceleration[a] = 0.0;
+            for b in a..f {
+                reduced[a * f + b] = 0.0;
+            }
+        }
+        for i in 0..n {
+            let Some(a) = ties[i].base else { continue };
+            acceleration[a] += load[i];
+            reduced[a * f + a] += mass[i * n + i];
+            for j in i + 1..n {
+                let Some(b) = ties[j].base else { continue };
+                let twice = if a == b { 2.0 } else { 1.0 };
+                reduced[a.min(b) * f + a.max(b)] += twice * mass[i * n + j];
+            }
+        }
+        tree::factor::<f64, F>(f, reduced, &mut self.pivot);
+        tree::solve::<f64, F>(f, reduced, &self.pivot, acceleration);
+        let share = &mut self.share[..n];
+        for k in 0..n {
+            share[k] = ties[k].base.map_or(0.0, |base| acceleration[base]);
+        }
+        tree::multiply::<f64, N>(n, mass, share, given);
+        let mut power = 0.0;
+        for k in 0..n {
+            power -= (load[k] - given[k]) * drive_rate[k];
+        }
+        for spring in mechanism.springs.iter().filter(|spring| spring.damping != 0.0) {
+            power += spring.drag_power(&kernel.z, omega);
+        }
+        for k in 0..f {
+            rate[k] = u_rate[k];
+            rate[f + k] = acceleration[k];
+        }
+        rate[2 * f] = power;
     }
 }
 
@@ -58,37 +122,11 @@ impl<const N: usize> Field for Elimination<N> {
     }
 
     fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
-        let mechanism = &*self.mechanism;
-        let (n, f) = (size::<N>(mechanism.bodies.len()), mechanism.ties.count());
-        let (u, u_rate) = (&y[..f], &y[f..2 * f]);
-        let kernel = &mut self.kernel;
-        mechanism.ties.expand(t, u, &mut self.phi, &mut kernel.z, &mut self.drive_rate, &mut self.drive_acceleration);
-        self.omega.copy_from_slice(&self.drive_rate);
-        mechanism.ties.spread(u_rate, &mut self.omega);
-        kernel.assemble::<N>(mechanism, &self.omega);
-        // b - M s''; what of it the coordinates do not feel is the motors' share.
-        tree::multiply::<f64, N>(n, &kernel.mass, &self.drive_acceleration, &mut self.given);
-        for k in 0..n {
-            kernel.load[k] -= self.given[k];
+        match self.mechanism.ties.count() {
+            1 => self.rate_sized::<1>(t, y, rate),
+            2 => self.rate_sized::<2>(t, y, rate),
+            _ => self.rate_sized::<0>(t, y, rate),
         }
-        let acceleration = &mut self.coordinate_acceleration;
-        mechanism.ties.gather(&kernel.load, acceleration);
-        mechanism.ties.reduce(&kernel.mass, &mut self.reduced);
-        tree::factor::<f64, 0>(f, &mut self.reduced, &mut self.pivot);
-        tree::solve::<f64, 0>(f, &self.reduced, &self.pivot, acceleration);
-        self.phi.fill(0.0);
-        mechanism.ties.spread(acceleration, &mut self.phi);
-        tree::multiply::<f64, N>(n, &kernel.mass, &self.phi, &mut self.given);
-        let mut power = 0.0;
-        for k in 0..n {
-            power -= (kernel.load[k] - self.given[k]) * self.drive_rate[k];
-        }
-        for spring in mechanism.springs.iter().filter(|spring| spring.damping != 0.0) {
-            power += spring.drag_power(&kernel.z, &self.omega);
-        }
-        rate[..f].copy_from_slice(u_rate);
-        rate[f..2 * f].copy_from_slice(acceleration);
-        rate[2 * f] = power;
     }
 
     fn label(&self, i: usize) -> String {
@@ -108,7 +146,9 @@ impl<const N: usize> Field for Elimination<N> {
     fn gaps(&mut self, t: Time, y: &[f64], gaps: &mut [f64]) {
         let ties = &self.mechanism.ties;
         let kernel = &mut self.kernel;
-        ties.expand(t, &y[..ties.count()], &mut self.phi, &mut kernel.z, &mut self.drive_rate, &mut self.drive_acceleration);
+        for (z, tie) in kernel.z.iter_mut().zip(&ties.bodies) {
+            *z = tie.place(t, &y[..ties.count()]).unit;
+        }
         for (gap, contact) in gaps.iter_mut().zip(&self.mechanism.contacts) {
             *gap = contact.row.gap(&kernel.z);
         }
@@ -118,6 +158,10 @@ impl<const N: usize> Field for Elimination<N> {
 impl<const N: usize> Form for Elimination<N> {
     fn mechanism(&self) -> &Mechanism {
         &self.mechanism
+    }
+
+    fn coordinates(&self) -> Coordinates {
+        Coordinates::Independent
     }
 
     fn state(&self, motion: &Motion) -> State {

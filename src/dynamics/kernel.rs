@@ -68,9 +68,7 @@ impl<T: Scalar> Kernel<T> {
             correction: vec![T::ZERO; rows],
         }
     }
-}
 
-impl<T: Real> Kernel<T> {
     /// Unit vectors of these angles.
     #[inline(always)]
     pub fn face<const N: usize>(&mut self, phi: &[T]) {
@@ -80,7 +78,9 @@ impl<T: Real> Kernel<T> {
             z[k] = Complex::unit(phi[k]);
         }
     }
+}
 
+impl<T: Real> Kernel<T> {
     /// M, its twist and the whole load b (velocity terms, gravity, springs, dampers) at the unit vectors in `z`.
     #[inline(always)]
     pub fn assemble<const N: usize>(&mut self, mechanism: &Mechanism, omega: &[T]) {
@@ -105,50 +105,82 @@ impl<T: Real> Kernel<T> {
     #[inline(always)]
     pub fn accelerate<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T], bias: Bias) {
         self.accelerate_free::<N>(mechanism, phi, omega);
-        self.constrain::<N>(mechanism, t, phi, omega, bias);
+        match mechanism.rows.len() {
+            1 => self.constrain::<N, 1>(mechanism, t, phi, omega, bias),
+            2 => self.constrain::<N, 2>(mechanism, t, phi, omega, bias),
+            _ => self.constrain::<N, 0>(mechanism, t, phi, omega, bias),
+        }
     }
 
-    /// The rows' share: expects free accelerations in `load` and the factors of M.
-    fn constrain<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T], bias: Bias) {
-        let n = size::<N>(mechanism.tree.bodies);
-        let rows = mechanism.rows.len();
-        self.linearise::<N>(mechanism, t, phi, omega);
+    /// The share of `R` rows (any number where `R` is 0): expects free accelerations in `load` and the factors of M.
+    #[inline(always)]
+    fn constrain<const N: usize, const R: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T], bias: Bias) {
+        let (n, rows) = (size::<N>(mechanism.tree.bodies), size::<R>(mechanism.rows.len()));
+        let is_biased = bias != Bias::default();
+        let posture = Posture { phi, z: &self.z[..n], omega };
+        let (all, multiplier, correction) = (&mut self.jacobian[..rows * n], &mut self.multiplier[..rows], &mut self.correction[..rows]);
+        let load = &mut self.load[..n];
         for r in 0..rows {
-            let jacobian = &self.jacobian[r * n..(r + 1) * n];
-            let (rate, free) = (dot(jacobian, omega), dot(jacobian, &self.load));
-            let row = self.rows[r];
-            let wanted = (rate + row.drive).scale(bias.rate) + row.position.scale(bias.position);
-            self.correction[r] = wanted;
-            self.multiplier[r] = free + row.convective + wanted;
+            let (row, jacobian) = (&mechanism.rows[r], &mut all[r * n..(r + 1) * n]);
+            for k in 0..n {
+                jacobian[k] = T::ZERO;
+            }
+            // Only a bias asks for C.
+            let here = if is_biased { row.linearise(t, posture, jacobian) } else { row.differentiate(t, posture, jacobian) };
+            multiplier[r] = dot(jacobian, load) + here.convective;
+            correction[r] = T::ZERO;
+            if is_biased {
+                correction[r] = (dot(jacobian, omega) + here.drive).scale(bias.rate) + here.position.scale(bias.position);
+                multiplier[r] += correction[r];
+            }
+            self.rows[r] = here;
         }
-        tree::solve::<T, 0>(rows, &self.schur, &self.schur_pivot, &mut self.multiplier);
-        tree::solve::<T, 0>(rows, &self.schur, &self.schur_pivot, &mut self.correction);
+        self.couple_rows::<N, R>(n, rows);
+        tree::solve::<T, R>(rows, &self.schur, &self.schur_pivot, &mut self.multiplier);
+        if is_biased {
+            tree::solve::<T, R>(rows, &self.schur, &self.schur_pivot, &mut self.correction);
+        }
+        let (lifted, load) = (&self.lifted[..rows * n], &mut self.load[..n]);
         for r in 0..rows {
             for k in 0..n {
-                self.load[k] -= self.lifted[r * n + k] * self.multiplier[r];
+                load[k] -= lifted[r * n + k] * self.multiplier[r];
             }
         }
     }
 
     /// C, G, C_t, gamma of every row, and the factors of S = G M⁻¹ Gᵀ; expects the factors of M.
     pub fn linearise<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
-        let n = size::<N>(mechanism.tree.bodies);
-        let rows = mechanism.rows.len();
-        self.jacobian.fill(T::ZERO);
+        self.rows_at(mechanism, t, phi, omega);
+        self.couple_rows::<N, 0>(size::<N>(mechanism.tree.bodies), mechanism.rows.len());
+    }
+
+    /// C, G, C_t, gamma of every row, and nothing else.
+    pub fn rows_at(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
+        let n = mechanism.tree.bodies;
         let posture = Posture { phi, z: &self.z, omega };
+        self.jacobian.fill(T::ZERO);
         for (r, row) in mechanism.rows.iter().enumerate() {
-            let jacobian = &mut self.jacobian[r * n..(r + 1) * n];
-            self.rows[r] = row.linearise(t, posture, jacobian);
-            let lifted = &mut self.lifted[r * n..(r + 1) * n];
-            lifted.copy_from_slice(jacobian);
-            tree::solve::<T, N>(n, &self.mass, &self.pivot, lifted);
+            self.rows[r] = row.linearise(t, posture, &mut self.jacobian[r * n..(r + 1) * n]);
+        }
+    }
+
+    /// X = M⁻¹ Gᵀ and the factors of S = G X.
+    #[inline(always)]
+    fn couple_rows<const N: usize, const R: usize>(&mut self, n: usize, rows: usize) {
+        let (jacobian, lifted, schur) = (&self.jacobian[..rows * n], &mut self.lifted[..rows * n], &mut self.schur[..rows * rows]);
+        for r in 0..rows {
+            let row = &mut lifted[r * n..(r + 1) * n];
+            for k in 0..n {
+                row[k] = jacobian[r * n + k];
+            }
+            tree::solve::<T, N>(n, &self.mass, &self.pivot, row);
         }
         for r in 0..rows {
             for s in r..rows {
-                self.schur[r * rows + s] = dot(&self.jacobian[r * n..(r + 1) * n], &self.lifted[s * n..(s + 1) * n]);
+                schur[r * rows + s] = dot(&jacobian[r * n..(r + 1) * n], &lifted[s * n..(s + 1) * n]);
             }
         }
-        tree::factor::<T, 0>(rows, &mut self.schur, &mut self.schur_pivot);
+        tree::factor::<T, R>(rows, schur, &mut self.schur_pivot);
     }
 
     /// C' of row `r` \[rad/s or m/s\], after [`Kernel::linearise`].

@@ -6,7 +6,7 @@
 use super::kernel::{Bias, Kernel, dot};
 use super::row::Row;
 use super::tree::size;
-use super::{Field, Form, Mechanism, Motion, State, Time};
+use super::{Coordinates, Field, Form, Mechanism, Motion, State, Time};
 use crate::arithmetic::DoubleDouble;
 use std::sync::Arc;
 
@@ -36,20 +36,22 @@ impl<const N: usize, const ACCOUNT: bool> Multiplier<N, ACCOUNT> {
         } else {
             self.kernel.accelerate_free::<N>(&self.mechanism, phi, omega);
         }
-        rate[..n].copy_from_slice(omega);
-        rate[n..2 * n].copy_from_slice(&self.kernel.load[..n]);
+        let (load, rates) = (&self.kernel.load[..n], &mut rate[..2 * n]);
+        for k in 0..n {
+            (rates[k], rates[n + k]) = (omega[k], load[k]);
+        }
         if ACCOUNT {
-            (rate[2 * n], rate[2 * n + 1]) = self.powers(omega);
+            (rate[2 * n], rate[2 * n + 1]) = self.powers(n, omega);
         }
     }
 
     /// Power of motors and dampers, and power of the stabilizer's share of the multipliers \[W\].
-    fn powers(&self, omega: &[f64]) -> (f64, f64) {
-        let n = omega.len();
+    #[inline(always)]
+    fn powers(&self, n: usize, omega: &[f64]) -> (f64, f64) {
         let (mut work, mut stabilizer) = (0.0, 0.0);
         for (r, row) in self.mechanism.rows.iter().enumerate() {
-            // A wall stands still and does no work.
-            if let Row::Line(_) = row {
+            // A wall stands still, a pin moves both its points alike: they do no work.
+            if !matches!(row, Row::Angle(_)) {
                 continue;
             }
             let speed = dot(&self.kernel.jacobian[r * n..(r + 1) * n], omega);
@@ -111,6 +113,10 @@ impl<const N: usize, const ACCOUNT: bool> Field for Multiplier<N, ACCOUNT> {
 impl<const N: usize, const ACCOUNT: bool> Form for Multiplier<N, ACCOUNT> {
     fn mechanism(&self) -> &Mechanism {
         &self.mechanism
+    }
+
+    fn coordinates(&self) -> Coordinates {
+        Coordinates::All
     }
 
     fn state(&self, motion: &Motion) -> State {

@@ -115,7 +115,7 @@ impl Natural {
         for row in &mechanism.rows {
             match row {
                 Row::Angle(row) => drives.push(row.clone()),
-                Row::Line(row) => return Err(NaturalError::Wall(row.name.clone())),
+                Row::Line(_) | Row::Pin(_) => return Err(NaturalError::Wall(row.name().to_owned())),
             }
         }
         let inverse = invert(&mechanism).map_err(|body| NaturalError::Singular(mechanism.bodies[body].name.clone()))?;

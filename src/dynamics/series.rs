@@ -3,31 +3,45 @@
 //! ```text
 //! z_k(t) = Σ z_k,m t^m, w_k(t) = Σ w_k,m t^m (not wrapped, t from the step's start), with z' = i w z:
 //! known z_0…z_{m+1}, w_0…w_m:
-//!   u_m  = (m+1) i Σ_{j=0..m} w_j z_{m+1-j}                    z'' without its newest term i a_m z_0
-//!   R_m  = Σ_j H_kj u_j,m - F_k,m                              forces F: gravity (m = 0 only), springs, dampers
-//!   M_0 a_m = -Σ_{l=0..m} Im(conj(z_l) R_{m-l})                one factorization of M_0 for all orders
-//!   w_{m+1} = a_m/(m+1),  z_{m+2} = (u_m + i a_m z_0)/((m+1)(m+2)),  R_m += H i a_m z_0
+//!   f_m+1 = Σ_{j=0..m} w_j z_{m+1-j},  u_m = (m+1) i f_m+1      z'' without its newest term i a_m z_0
+//!   R_m  = Σ_j H_kj u_j,m - F_k,m                               forces F: gravity (m = 0 only), springs, dampers, rows
+//!   M_0 a_m = -Σ_{l=0..m} Im(conj(z_l) R_{m-l})                 one factorization of M_0 for all orders
+//!   w_{m+1} = a_m/(m+1),  z_{m+2} = i (f_m+1 + w_{m+1} z_0)/(m+2),  R_m += H i a_m z_0
 //! ```
 //!
 //! Nothing but Cauchy products: four real ones a body, no sine beyond the first.  Driven angles enter with the known series of their laws: the coordinates are those of
 //! [`elimination`](super::elimination), q = S u + s(t), and the solve is with Sᵀ M_0 S.  What the rows of driven bodies lack of balance is the motors'
-//! torque, whose power is integrated with the rest.
+//! torque, whose power is integrated with the rest.  Rows that are not eliminated border M_0 with their Jacobian ([`rows`]).
+//!
+//! Loops run over `N` bodies where `N > 0`, so that small sizes are unrolled, to the same bits as `N = 0` for any number.
 //!
 //! Source: Jorba & Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor methods*, Experimental Mathematics 14 (2005), for the
 //! products; the in-series solve with constant couplings is ours.
 
-use super::force::Spring;
-use super::ties::Tie;
-use super::tree;
-use super::{Mechanism, Time};
-use crate::arithmetic::{Complex, Real, Scalar};
+mod drive;
+pub mod polynomial;
+mod rows;
+mod spring;
 
-/// Power series of a motion about one time; nothing is allocated after [`Series::new`].
+use self::polynomial::{Fractions, UNROLLED, convolve, copy, copy_vectors, width, zeros};
+use self::rows::RowSeries;
+use self::spring::SpringSeries;
+use super::row::LineRow;
+use super::ties::Ties;
+use super::tree::{self, size};
+use super::{Coordinates, Mechanism, Time};
+use crate::arithmetic::{Complex, DoubleDouble, Real};
+
+/// Power series of a motion about one time; nothing is allocated after [`Series::new`] but for laws with sines.
 #[derive(Clone, Debug)]
 pub struct Series<T> {
     /// Highest power P of the rates.
     order: usize,
     bodies: usize,
+    ties: Ties,
+    /// False where the coordinates are the bodies' angles themselves.
+    is_tied: bool,
+    fractions: Fractions<T>,
     /// z: powers 0…P+1, body by body ((P+2) × n).
     pub z: Vec<Complex<T>>,
     /// w: powers 0…P ((P+1) × n) \[rad/s^(m+1)\].
@@ -43,6 +57,8 @@ pub struct Series<T> {
     /// Torque on each driven body (P × n).
     torque: Vec<T>,
     springs: Vec<SpringSeries<T>>,
+    rows: RowSeries<T>,
+    turned: Vec<Complex<T>>,
     bend: Vec<Complex<T>>,
     load: Vec<T>,
     mass: Vec<T>,
@@ -52,37 +68,32 @@ pub struct Series<T> {
     solution: Vec<T>,
 }
 
-/// Series of one spring.
-#[derive(Clone, Debug)]
-struct SpringSeries<T> {
-    /// D = P_a - P_b (powers 0…P).
-    span: Vec<Complex<T>>,
-    /// |D|².
-    square: Vec<T>,
-    /// 1/|D|, where the free length asks for it.
-    inverse_length: Vec<T>,
-    /// 1/|D|², D·D' and their product, where there is a damper.
-    inverse_square: Vec<T>,
-    closing: Vec<T>,
-    strain_rate: Vec<T>,
+/// `sized!(n, self.method(args))` calls `method::<n>` for the sizes compiled in, and `method::<0>` for any other.
+macro_rules! sized {
+    ($n:expr, $of:ident.$method:ident($($argument:expr),*)) => {
+        match $n {
+            1 => $of.$method::<1>($($argument),*),
+            2 => $of.$method::<2>($($argument),*),
+            3 => $of.$method::<3>($($argument),*),
+            4 => $of.$method::<4>($($argument),*),
+            5 => $of.$method::<5>($($argument),*),
+            6 => $of.$method::<6>($($argument),*),
+            _ => $of.$method::<0>($($argument),*),
+        }
+    };
 }
 
 impl<T: Real> Series<T> {
-    /// Room for series of a mechanism up to this power of the rates, at least 2.
-    pub fn new(mechanism: &Mechanism, order: usize) -> Self {
-        let (n, f) = (mechanism.bodies.len(), mechanism.ties.count());
-        let zeros = |count: usize| vec![T::ZERO; count];
-        let spring = |spring: &Spring| SpringSeries {
-            span: vec![Complex::ZERO; order + 1],
-            square: zeros(order + 1),
-            inverse_length: zeros(if spring.free_length == 0.0 { 0 } else { order + 1 }),
-            inverse_square: zeros(if spring.damping == 0.0 { 0 } else { order + 1 }),
-            closing: zeros(if spring.damping == 0.0 { 0 } else { order + 1 }),
-            strain_rate: zeros(if spring.damping == 0.0 { 0 } else { order + 1 }),
-        };
+    /// Room for series of a mechanism in some coordinates up to this power of the rates, at least 2.
+    pub fn new(mechanism: &Mechanism, coordinates: Coordinates, order: usize) -> Self {
+        let n = mechanism.bodies.len();
+        let ties = if coordinates == Coordinates::Independent { mechanism.ties.clone() } else { Ties::free(n) };
+        let f = ties.count();
         Self {
             order,
             bodies: n,
+            is_tied: ties.driven(),
+            fractions: Fractions::new(order + 2),
             z: vec![Complex::ZERO; (order + 2) * n],
             omega: zeros((order + 1) * n),
             rate: zeros((order + 1) * f),
@@ -90,7 +101,9 @@ impl<T: Real> Series<T> {
             rest: vec![Complex::ZERO; order * n],
             drive: zeros((order + 1) * n),
             torque: zeros(order * n),
-            springs: mechanism.springs.iter().map(spring).collect(),
+            springs: mechanism.springs.iter().map(|spring| SpringSeries::new(spring, order)).collect(),
+            rows: RowSeries::new(mechanism, &ties, order),
+            turned: vec![Complex::ZERO; n],
             bend: vec![Complex::ZERO; n],
             load: zeros(n),
             mass: zeros(n * n),
@@ -98,6 +111,7 @@ impl<T: Real> Series<T> {
             reduced: zeros(f * f),
             pivot: zeros(f.max(n)),
             solution: zeros(f),
+            ties,
         }
     }
 
@@ -106,29 +120,60 @@ impl<T: Real> Series<T> {
         self.order
     }
 
+    /// Number of coordinates f.
+    pub fn coordinates(&self) -> usize {
+        self.ties.count()
+    }
+
     /// Expands the motion through coordinates `u` \[rad\] (leading part and rest) and rates `u_rate` \[rad/s\] at time `t`.
     pub fn expand(&mut self, mechanism: &Mechanism, t: Time, u: &[T], u_rest: &[T], u_rate: &[T]) {
-        let n = self.bodies;
-        let f = u.len();
-        self.begin(mechanism, t, u, u_rest, u_rate);
-        mechanism.tree.couple::<T, 0>(&self.z[..n], &mut self.mass, &mut self.twist);
-        mechanism.ties.reduce(&self.mass, &mut self.reduced);
-        tree::factor::<T, 0>(f, &mut self.reduced, &mut self.pivot);
-        // The first power of z needs only rates.
-        for i in 0..n {
-            self.z[n + i] = self.z[i].left().times(self.omega[i]);
+        self.begin(t, u, u_rest, u_rate);
+        sized!(self.bodies, self.orders(mechanism, 0));
+    }
+
+    /// Expands a motion whose first powers were found in more digits; they are rounded, and the later ones follow from them.
+    pub fn carry_on(&mut self, mechanism: &Mechanism, t: Time, u: &[T], u_rest: &[T], u_rate: &[T], first: &Series<DoubleDouble>) {
+        self.begin(t, u, u_rest, u_rate);
+        copy_vectors(&mut self.z, &first.z);
+        copy(&mut self.omega, &first.omega);
+        copy(&mut self.rate, &first.rate);
+        copy(&mut self.power, &first.power);
+        copy_vectors(&mut self.rest, &first.rest);
+        copy(&mut self.torque, &first.torque);
+        for (spring, first) in self.springs.iter_mut().zip(&first.springs) {
+            spring.take(first);
         }
-        for m in 0..self.order {
-            self.bend(m);
-            self.balance(mechanism, m);
-            self.solve(mechanism, m);
+        self.rows.take(&first.rows);
+        sized!(self.bodies, self.orders(mechanism, first.order.min(self.order)));
+    }
+
+    /// Powers 0, 1, … of the gap of a wall \[m/s^m\], to that of the unit vectors.
+    pub fn gap(&self, row: &LineRow, powers: &mut Vec<f64>) {
+        powers.clear();
+        let vectors = self.z.chunks_exact(self.bodies.max(1));
+        powers.extend(vectors.map(|z| {
+            let point = row.point.terms.iter().fold(Complex::ZERO, |sum, &(k, gamma)| sum + z[k].turn(gamma));
+            Complex::of(row.normal).dot(point).value()
+        }));
+        if let Some(first) = powers.first_mut() {
+            *first += row.normal.dot(row.point.root) - row.offset;
         }
     }
 
+    /// Powers 0, 1, … of the force of the `held`-th contact that is held \[N/s^m\], of `count` held ones.
+    pub fn contact_force(&self, held: usize, count: usize, powers: &mut Vec<f64>) {
+        powers.clear();
+        powers.extend((0..self.order).map(|m| -self.rows.multiplier_from_last(count - 1 - held, m).value()));
+    }
+
     /// Power zero, and the laws' series.
-    fn begin(&mut self, mechanism: &Mechanism, t: Time, u: &[T], u_rest: &[T], u_rate: &[T]) {
+    fn begin(&mut self, t: Time, u: &[T], u_rest: &[T], u_rate: &[T]) {
+        let n = self.bodies;
         self.rate[..u.len()].copy_from_slice(u_rate);
-        for (i, tie) in mechanism.ties.bodies.iter().enumerate() {
+        if self.is_tied {
+            self.drive.fill(T::ZERO);
+        }
+        for (i, tie) in self.ties.bodies.iter().enumerate() {
             let mut z = Complex::new(T::ONE, T::ZERO);
             self.omega[i] = T::ZERO;
             if let Some(base) = tie.base {
@@ -137,127 +182,149 @@ impl<T: Real> Series<T> {
                 z = unit + unit.left().times(u_rest[base]);
                 self.omega[i] = u_rate[base];
             }
-            if !tie.laws.is_empty() {
-                z = z * self.drive_series(tie, i, t);
-                self.omega[i] += self.drive[i];
+            for (sign, law) in &tie.laws {
+                let phase = law.at::<T>(t);
+                z = z * if *sign > 0.0 { phase.unit } else { phase.unit.conj() };
+                drive::add(law, *sign, t, self.drive.iter_mut().skip(i).step_by(n));
             }
+            self.omega[i] += self.drive[i];
             self.z[i] = z;
         }
+        self.rows.begin(t);
     }
 
-    /// Series of a tie's s' into `drive`; returns its unit vector at the start.
-    fn drive_series(&mut self, tie: &Tie, body: usize, t: Time) -> Complex<T> {
-        let n = self.bodies;
-        for m in 0..=self.order {
-            self.drive[m * n + body] = T::ZERO;
+    /// The factors of M_0, and the powers from `first` on.
+    #[inline(never)]
+    fn orders<const N: usize>(&mut self, mechanism: &Mechanism, first: usize) {
+        let (n, f) = (size::<N>(self.bodies), self.ties.count());
+        mechanism.tree.couple::<T, N>(&self.z[..n], &mut self.mass, &mut self.twist);
+        if self.is_tied {
+            self.ties.reduce(&self.mass, &mut self.reduced);
+            tree::factor::<T, 0>(f, &mut self.reduced, &mut self.pivot);
+        } else {
+            self.reduced.copy_from_slice(&self.mass);
+            tree::factor::<T, N>(n, &mut self.reduced, &mut self.pivot);
         }
-        let mut unit = Complex::new(T::ONE, T::ZERO);
-        for (sign, law) in &tie.laws {
-            let phase = law.at::<T>(t);
-            unit = unit * if *sign > 0.0 { phase.unit } else { phase.unit.conj() };
-            self.drive[body] += phase.rate.scale(*sign);
-            self.drive[n + body] += T::of(law.acceleration).scale(*sign);
-            for sine in &law.sines {
-                let argument = t.scale(sine.frequency) + sine.phase;
-                let (sin, cos) = T::split(argument.reduced().0).0.sin_cos();
-                // The m-th derivative of A f cos is A f^(m+1) cos, -sin, -cos, sin; power 0 is in the phase's rate already.
-                let mut factor = T::of(sine.amplitude).scale(*sign * sine.frequency);
-                for m in 1..=self.order {
-                    factor = factor.scale(sine.frequency) / T::of(m as f64);
-                    let turned = match m % 4 {
-                        0 => cos,
-                        1 => -sin,
-                        2 => -cos,
-                        _ => sin,
-                    };
-                    self.drive[m * n + body] += turned * factor;
-                }
+        if !self.rows.is_empty() {
+            self.rows.prepare(&self.ties, &self.z[..n], &self.reduced, &self.pivot);
+        }
+        if first == 0 {
+            // The first power of z needs only rates.
+            for i in 0..n {
+                self.z[n + i] = self.z[i].left().times(self.omega[i]);
             }
         }
-        unit
+        for m in first..self.order {
+            self.bend::<N>(m);
+            self.balance::<N>(mechanism, m);
+            self.solve::<N>(mechanism, m);
+            self.account(mechanism, m);
+        }
     }
 
-    /// u_m into `bend`; the driven part of a_m, where there is one, is in it.
-    fn bend(&mut self, m: usize) {
-        let n = self.bodies;
-        for i in 0..n {
-            let mut sum = Complex::ZERO;
-            for j in 0..=m {
-                sum += self.z[(m + 1 - j) * n + i].times(self.omega[j * n + i]);
+    /// f_{m+1} into `turned` and u_m into `bend`; the driven part of a_m, where there is one, is in it.
+    #[inline(always)]
+    fn bend<const N: usize>(&mut self, m: usize) {
+        let n = size::<N>(self.bodies);
+        let (omega, z) = (&self.omega[..(m + 1) * n], &self.z[n..(m + 2) * n]);
+        let (turned, bend) = (&mut self.turned[..n], &mut self.bend[..n]);
+        let factor = T::of((m + 1) as f64);
+        let mut first = 0;
+        while first < n {
+            let sums = convolve::<N, _, _, _>(n, first, omega, z, |w, z| z.times(w));
+            for i in 0..width::<N>() {
+                turned[first + i] = sums[i];
+                bend[first + i] = sums[i].left().times(factor);
             }
-            self.bend[i] = sum.left().times(T::of((m + 1) as f64));
+            first += width::<N>();
         }
     }
 
     /// R_m, and the load -Σ Im(conj(z) R) of this order into `load`.
-    fn balance(&mut self, mechanism: &Mechanism, m: usize) {
-        let n = self.bodies;
-        // The known part of a_m: s'' of this order.
-        for i in 0..n {
-            let given = self.drive[(m + 1) * n + i] * T::of((m + 1) as f64);
-            self.load[i] = -given.scale(mechanism.tree.diagonal[i]);
-            self.bend[i] += self.z[i].left().times(given);
+    #[inline(always)]
+    fn balance<const N: usize>(&mut self, mechanism: &Mechanism, m: usize) {
+        let n = size::<N>(self.bodies);
+        self.load[..n].fill(T::ZERO);
+        if self.is_tied {
+            // The known part of a_m: s'' of this order.
+            for i in 0..n {
+                let given = self.drive[(m + 1) * n + i] * T::of((m + 1) as f64);
+                self.load[i] = -given.scale(mechanism.tree.diagonal[i]);
+                self.bend[i] += self.z[i].left().times(given);
+            }
         }
-        let rest = &mut self.rest[m * n..(m + 1) * n];
+        let (before, rest) = self.rest.split_at_mut(m * n);
+        let rest = &mut rest[..n];
         for (rest, &weight) in rest.iter_mut().zip(&mechanism.tree.weight) {
             *rest = if m == 0 { -Complex::of(weight) } else { Complex::ZERO };
         }
-        for i in 0..n {
-            for j in i + 1..n {
-                let h = mechanism.tree.coupling[i * n + j];
-                rest[i] += self.bend[j].turn(h);
-                rest[j] += self.bend[i].turn(h.conj());
-            }
-        }
+        couple::<T, N>(mechanism, &self.bend, rest);
         for (spring, series) in mechanism.springs.iter().zip(&mut self.springs) {
             let force = series.force(spring, m, &self.z, n);
             for &(k, gamma) in &spring.span.terms {
                 rest[k] -= force.turn(gamma.conj());
             }
         }
-        for i in 0..n {
-            let mut sum = T::ZERO;
-            for l in 0..=m {
-                sum += self.z[l * n + i].cross(self.rest[(m - l) * n + i]);
+        let (z, load) = (&self.z[..(m + 1) * n], &mut self.load[..n]);
+        let mut first = 0;
+        while first < n {
+            // Of l = 0 only, R is not complete yet.
+            let sums: [T; UNROLLED] = convolve::<N, _, _, _>(n, first, &z[n..], before, |z, rest| z.cross(rest));
+            for i in 0..width::<N>() {
+                let k = first + i;
+                load[k] -= sums[i] + z[k].cross(rest[k]);
             }
-            self.load[i] -= sum;
+            first += width::<N>();
         }
     }
 
     /// a_m from the loads, the newest powers of w and z, and R_m completed.
-    fn solve(&mut self, mechanism: &Mechanism, m: usize) {
-        let (n, f) = (self.bodies, self.solution.len());
-        mechanism.ties.gather(&self.load, &mut self.solution);
-        tree::solve::<T, 0>(f, &self.reduced, &self.pivot, &mut self.solution);
-        let next = T::ONE / T::of((m + 1) as f64);
-        let after = T::ONE / T::of(((m + 1) * (m + 2)) as f64);
-        for c in 0..f {
-            self.rate[(m + 1) * f + c] = self.solution[c] * next;
-        }
-        for (i, tie) in mechanism.ties.bodies.iter().enumerate() {
-            let solved = tie.base.map_or(T::ZERO, |base| self.solution[base]);
-            let turned = self.z[i].left().times(solved);
-            self.omega[(m + 1) * n + i] = solved * next + self.drive[(m + 1) * n + i];
-            self.z[(m + 2) * n + i] = (self.bend[i] + turned).times(after);
-            self.bend[i] = turned;
-        }
+    #[inline(always)]
+    fn solve<const N: usize>(&mut self, mechanism: &Mechanism, m: usize) {
+        let (n, f) = (size::<N>(self.bodies), self.ties.count());
         let rest = &mut self.rest[m * n..(m + 1) * n];
-        for i in 0..n {
-            for j in i + 1..n {
-                let h = mechanism.tree.coupling[i * n + j];
-                rest[i] += self.bend[j].turn(h);
-                rest[j] += self.bend[i].turn(h.conj());
+        if self.is_tied {
+            self.ties.gather(&self.load, &mut self.solution);
+            tree::solve::<T, 0>(f, &self.reduced, &self.pivot, &mut self.solution);
+        } else {
+            self.solution[..n].copy_from_slice(&self.load[..n]);
+            tree::solve::<T, N>(n, &self.reduced, &self.pivot, &mut self.solution);
+        }
+        if !self.rows.is_empty() {
+            self.rows.solve(m, &self.bend, &mut self.solution);
+            self.rows.push(m, rest);
+        }
+        for c in 0..f {
+            self.rate[(m + 1) * f + c] = self.fractions.over(self.solution[c], m + 1);
+        }
+        let (known, newest) = self.z.split_at_mut((m + 2) * n);
+        let (z, newest) = (&known[..n], &mut newest[..n]);
+        let omega = &mut self.omega[(m + 1) * n..(m + 2) * n];
+        if self.is_tied {
+            for (i, tie) in self.ties.bodies.iter().enumerate() {
+                let (solved, rate) = tie.base.map_or((T::ZERO, T::ZERO), |base| (self.solution[base], self.rate[(m + 1) * f + base]));
+                omega[i] = rate + self.drive[(m + 1) * n + i];
+                self.bend[i] = z[i].left().times(solved);
+            }
+        } else {
+            omega.copy_from_slice(&self.rate[(m + 1) * n..(m + 2) * n]);
+            for i in 0..n {
+                self.bend[i] = z[i].left().times(self.solution[i]);
             }
         }
-        self.account(mechanism, m);
+        for i in 0..n {
+            newest[i] = self.fractions.vector_over((self.turned[i] + z[i].times(omega[i])).left(), m + 2);
+        }
+        couple::<T, N>(mechanism, &self.bend, rest);
     }
 
     /// Torques of the driven bodies and the power of motors and dampers at this order.
+    #[inline(always)]
     fn account(&mut self, mechanism: &Mechanism, m: usize) {
         let n = self.bodies;
         let mut power = T::ZERO;
-        if mechanism.ties.driven() {
-            for (i, _) in mechanism.ties.bodies.iter().enumerate().filter(|(_, tie)| !tie.laws.is_empty()) {
+        if self.is_tied {
+            for (i, _) in self.ties.bodies.iter().enumerate().filter(|(_, tie)| !tie.laws.is_empty()) {
                 let mut torque = (self.omega[(m + 1) * n + i] * T::of((m + 1) as f64)).scale(mechanism.tree.diagonal[i]);
                 for l in 0..=m {
                     torque += self.z[l * n + i].cross(self.rest[(m - l) * n + i]);
@@ -268,83 +335,31 @@ impl<T: Real> Series<T> {
                 }
             }
         }
+        if !self.rows.is_empty() {
+            power += self.rows.power(m, &self.omega[m * n..(m + 1) * n]);
+        }
         for (spring, series) in mechanism.springs.iter().zip(&self.springs).filter(|(spring, _)| spring.damping != 0.0) {
-            let mut lost = T::ZERO;
-            for l in 0..=m {
-                lost += series.strain_rate[l] * series.closing[m - l];
-            }
-            power -= lost.scale(spring.damping);
+            power += series.loss(spring, m);
         }
         self.power[m] = power;
     }
 }
 
-impl<T: Real> SpringSeries<T> {
-    /// Force on the spring's first end at power m, from powers up to m+1 of z.
-    fn force(&mut self, spring: &Spring, m: usize, z: &[Complex<T>], n: usize) -> Complex<T> {
-        let root = if m == 0 { Complex::of(spring.span.root) } else { Complex::ZERO };
-        self.span[m] = spring.span.terms.iter().fold(root, |sum, &(k, gamma)| sum + z[m * n + k].turn(gamma));
-        if spring.free_length == 0.0 && spring.damping == 0.0 {
-            return -self.span[m].times(T::of(spring.stiffness));
-        }
-        self.square[m] = product(m, |l| self.span[l].dot(self.span[m - l]));
-        let mut force = -self.span[m].times(T::of(spring.stiffness));
-        if spring.free_length != 0.0 {
-            // s = q^(-1/2):  m q_0 s_m = Σ_{j=1..m} (-j/2 - (m-j)) q_j s_{m-j}.
-            self.inverse_length[m] = if m == 0 {
-                T::ONE / self.square[0].sqrt()
+/// Adds H x to `rest`, without the diagonal.
+#[inline(always)]
+fn couple<T: Real, const N: usize>(mechanism: &Mechanism, x: &[Complex<T>], rest: &mut [Complex<T>]) {
+    let n = size::<N>(mechanism.tree.bodies);
+    let (coupling, x, rest) = (&mechanism.tree.coupling[..n * n], &x[..n], &mut rest[..n]);
+    for i in 0..n {
+        for j in i + 1..n {
+            let h = coupling[i * n + j];
+            if mechanism.tree.off_axis {
+                rest[i] += x[j].turn(h);
+                rest[j] += x[i].turn(h.conj());
             } else {
-                let sum =
-                    (1..=m).fold(T::ZERO, |sum, j| sum + (self.square[j] * self.inverse_length[m - j]).scale(0.5 * j as f64 - m as f64));
-                sum / self.square[0].scale(m as f64)
-            };
-            let scale = spring.stiffness * spring.free_length;
-            for l in 0..=m {
-                force += self.span[l].times(self.inverse_length[m - l].scale(scale));
+                rest[i] += Complex::new(x[j].re.scale(h.re), x[j].im.scale(h.re));
+                rest[j] += Complex::new(x[i].re.scale(h.re), x[i].im.scale(h.re));
             }
         }
-        if spring.damping != 0.0 {
-            self.inverse_square[m] = if m == 0 {
-                T::ONE / self.square[0]
-            } else {
-                -(1..=m).fold(T::ZERO, |sum, j| sum + self.square[j] * self.inverse_square[m - j]) / self.square[0]
-            };
-            // D·D' = q'/2, and D' at power m is (m+1) D_{m+1}.
-            let ahead = spring.span.terms.iter().fold(Complex::ZERO, |sum, &(k, gamma)| sum + z[(m + 1) * n + k].turn(gamma));
-            self.closing[m] = product(m, |l| {
-                let rate = if m - l == m { ahead } else { self.span[m - l + 1] };
-                self.span[l].dot(rate).scale((m - l + 1) as f64)
-            });
-            self.strain_rate[m] = product(m, |l| self.closing[l] * self.inverse_square[m - l]);
-            for l in 0..=m {
-                force -= self.span[l].times(self.strain_rate[m - l].scale(spring.damping));
-            }
-        }
-        force
     }
-}
-
-/// Σ_{l=0..m} term(l).
-fn product<T: Scalar>(m: usize, term: impl Fn(usize) -> T) -> T {
-    (0..=m).fold(T::ZERO, |sum, l| sum + term(l))
-}
-
-/// A series `a_0 + a_1 h + …` of stride `stride` from `first`, without its first `skip` powers: Σ_{m>=skip} a_m h^m.
-pub fn tail<T: Real>(series: &[T], first: usize, stride: usize, skip: usize, h: T) -> T {
-    let count = (series.len() - first).div_ceil(stride);
-    let mut sum = T::ZERO;
-    for m in (skip..count).rev() {
-        sum = sum * h + series[first + m * stride];
-    }
-    (0..skip).fold(sum, |sum, _| sum * h)
-}
-
-/// Σ a_m h^(m+1)/(m+1): the integral of a series.
-pub fn integral<T: Real>(series: &[T], first: usize, stride: usize, h: T) -> T {
-    let count = (series.len() - first).div_ceil(stride);
-    let mut sum = T::ZERO;
-    for m in (0..count).rev() {
-        sum = sum * h + series[first + m * stride] / T::of((m + 1) as f64);
-    }
-    sum * h
 }

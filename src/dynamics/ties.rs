@@ -8,7 +8,7 @@
 //! where the group is tied to the ground.
 
 use super::compile::CompileError;
-use super::law::Law;
+use super::law::{Law, Phase};
 use super::{Motion, State, Time};
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar, angle};
 use crate::scene::Scene;
@@ -20,6 +20,47 @@ pub struct Tie {
     pub base: Option<usize>,
     /// Laws to be added, with their sign.
     pub laws: Vec<(f64, Law)>,
+}
+
+impl Tie {
+    /// The known part s(t) of the angle: the sum of the laws, of which a single one keeps its own numbers to the last bit.
+    #[inline]
+    pub fn drive<T: Real>(&self, t: Time) -> Phase<T> {
+        let sum = self.laws.iter().map(|(sign, law)| law.at::<T>(t).times(*sign)).reduce(|sum, phase| Phase {
+            angle: angle::difference(sum.angle, -phase.angle),
+            unit: sum.unit * phase.unit,
+            rate: sum.rate + phase.rate,
+            acceleration: sum.acceleration + phase.acceleration,
+        });
+        sum.unwrap_or(Phase { unit: Complex::new(T::ONE, T::ZERO), ..Phase::default() })
+    }
+
+    /// The unit vector of the body at coordinates `u` \[rad\].
+    #[inline(always)]
+    pub fn face<T: Scalar>(&self, u: &[T], drive: &Phase<T>) -> Complex<T> {
+        match self.base {
+            Some(base) if self.laws.is_empty() => Complex::unit(u[base]),
+            Some(base) => Complex::unit(u[base]) * drive.unit,
+            None => drive.unit,
+        }
+    }
+
+    /// The body's angle and unit vector at coordinates `u` \[rad\], s' and s''.
+    #[inline(always)]
+    pub fn place<T: Real>(&self, t: Time, u: &[T]) -> Phase<T> {
+        match (self.base, &self.laws[..]) {
+            (Some(base), []) => Phase { angle: u[base], unit: Complex::unit(u[base]), rate: T::ZERO, acceleration: T::ZERO },
+            (None, [(sign, law)]) => law.at::<T>(t).times(*sign),
+            _ => self.compose(t, u),
+        }
+    }
+
+    /// Several angles, one upon another.
+    fn compose<T: Real>(&self, t: Time, u: &[T]) -> Phase<T> {
+        let drive = self.drive::<T>(t);
+        let angle = self.base.map_or(drive.angle, |base| angle::difference(u[base], -drive.angle));
+        Phase { angle, unit: self.face(u, &drive), ..drive }
+    }
 }
 
 /// All ties of a mechanism.
@@ -72,6 +113,11 @@ impl Ties {
         Ok(Self { bodies: ties.into_iter().map(Option::unwrap_or_default).collect(), independent })
     }
 
+    /// Every angle a coordinate of its own.
+    pub fn free(bodies: usize) -> Self {
+        Self { bodies: (0..bodies).map(|i| Tie { base: Some(i), laws: Vec::new() }).collect(), independent: (0..bodies).collect() }
+    }
+
     /// Number of independent coordinates.
     pub fn count(&self) -> usize {
         self.independent.len()
@@ -82,29 +128,22 @@ impl Ties {
         self.bodies.iter().any(|tie| !tie.laws.is_empty())
     }
 
+    /// True where no driven angle accelerates.
+    pub fn is_steady(&self) -> bool {
+        self.bodies.iter().flat_map(|tie| &tie.laws).all(|(_, law)| law.is_steady())
+    }
+
     /// Angles \[rad\], unit vectors, s' \[rad/s\] and s'' \[rad/s²\] of all bodies at coordinates `u` \[rad\].
     #[inline]
     pub fn expand<T: Real>(&self, t: Time, u: &[T], phi: &mut [T], z: &mut [Complex<T>], rate: &mut [T], acceleration: &mut [T]) {
         for (i, tie) in self.bodies.iter().enumerate() {
-            (phi[i], z[i]) = tie.base.map_or((T::ZERO, Complex::new(T::ONE, T::ZERO)), |base| (u[base], Complex::unit(u[base])));
-            (rate[i], acceleration[i]) = (T::ZERO, T::ZERO);
-            for (sign, law) in &tie.laws {
-                let phase = law.at::<T>(t);
-                let unit = if *sign > 0.0 { phase.unit } else { phase.unit.conj() };
-                if tie.base.is_none() && tie.laws.len() == 1 {
-                    // Exactly the law's own numbers: such a row is kept to the last bit.
-                    (phi[i], z[i]) = (phase.angle.scale(*sign), unit);
-                } else {
-                    (phi[i], z[i]) = (angle::difference(phi[i], -phase.angle.scale(*sign)), z[i] * unit);
-                }
-                rate[i] += phase.rate.scale(*sign);
-                acceleration[i] += phase.acceleration.scale(*sign);
-            }
+            let placed = tie.place(t, u);
+            (phi[i], z[i], rate[i], acceleration[i]) = (placed.angle, placed.unit, placed.rate, placed.acceleration);
         }
     }
 
     /// Adds S u' to `rate`: the rates \[rad/s\] of all bodies.
-    #[inline]
+    #[inline(always)]
     pub fn spread<T: Scalar>(&self, u_rate: &[T], rate: &mut [T]) {
         for (rate, tie) in rate.iter_mut().zip(&self.bodies) {
             if let Some(base) = tie.base {
@@ -114,9 +153,11 @@ impl Ties {
     }
 
     /// Writes Sᵀ x.
-    #[inline]
+    #[inline(always)]
     pub fn gather<T: Scalar>(&self, x: &[T], gathered: &mut [T]) {
-        gathered.fill(T::ZERO);
+        for entry in gathered.iter_mut() {
+            *entry = T::ZERO;
+        }
         for (&x, tie) in x.iter().zip(&self.bodies) {
             if let Some(base) = tie.base {
                 gathered[base] += x;
@@ -125,7 +166,7 @@ impl Ties {
     }
 
     /// Writes Sᵀ M S on and above the diagonal from M on and above its own.
-    #[inline]
+    #[inline(always)]
     pub fn reduce<T: Scalar>(&self, mass: &[T], reduced: &mut [T]) {
         let (n, f) = (self.bodies.len(), self.count());
         reduced.fill(T::ZERO);

@@ -24,7 +24,7 @@ pub mod result;
 use crate::run::Plan;
 use serde_json::{Value, json};
 
-/// The settings of a plan: `step` \[s\] or `rtol` and `atol`, `stabilize`, `time_constant` \[s\], `every` \[s\]; `null` where one does not apply.
+/// The settings of a plan: `step` \[s\] or `rtol` and `atol`, `stabilize`, `time_constant` \[s\], `extended`, `every` \[s\]; `null` where one does not apply.
 pub fn settings(plan: &Plan) -> Value {
     json!({
         "step": plan.step,
@@ -32,6 +32,7 @@ pub fn settings(plan: &Plan) -> Value {
         "atol": plan.tolerance.map(|tolerance| tolerance.absolute),
         "stabilize": plan.stabilization,
         "time_constant": plan.time_constant,
+        "extended": plan.extended,
         "every": plan.every,
     })
 }

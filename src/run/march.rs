@@ -177,7 +177,15 @@ pub(super) fn build(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion)
         MethodId::Dp8 if projected => marcher(problem(), Projected::new(Dp8::new(tolerance)), start),
         MethodId::Dp5 => marcher(problem(), Dp5::new(tolerance), start),
         MethodId::Dp8 => marcher(problem(), Dp8::new(tolerance), start),
-        MethodId::Taylor => marcher(sized!(n, eliminated(mechanism)), Taylor::new(tolerance), start),
+        MethodId::Taylor => {
+            let mut taylor = Taylor::new(tolerance);
+            taylor.extended = plan.extended;
+            match plan.stabilization {
+                Stabilization::None if mechanism.rows.is_empty() => marcher(sized!(n, eliminated(mechanism)), taylor, start),
+                Stabilization::Projection => marcher(problem(), Projected::new(taylor), start),
+                _ => marcher(problem(), taylor, start),
+            }
+        }
         MethodId::Gauss(stages) => {
             let gauss = Gauss::new(stages, step)
                 .ok_or_else(|| cannot_begin(plan, format!("no Gauss method has {stages} stages and step {step} s")))?;

@@ -64,7 +64,7 @@ pub const METHODS: &[MethodInfo] = &[
         "taylor",
         24,
         "the most accurate path, below 1e-8 (power series, order 16 to 24)",
-        "no walls; motors eliminated",
+        "anything but Baumgarte's term",
     ),
     gauss(2, "gauss4"),
     gauss(3, "gauss6"),

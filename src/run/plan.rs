@@ -28,6 +28,8 @@ pub struct Request {
     pub stabilize: Option<Stabilization>,
     /// Time constant of Baumgarte's term \[s\].
     pub time_constant: Option<f64>,
+    /// First orders in double-double, of the method that has such a setting.
+    pub extended: bool,
 }
 
 /// Everything a run needs to know beside the mechanism.
@@ -43,6 +45,8 @@ pub struct Plan {
     pub stabilization: Stabilization,
     /// Baumgarte's time constant \[s\]; `None`: five mean steps, measured by a pilot run.
     pub time_constant: Option<f64>,
+    /// The first orders of the series in double-double.
+    pub extended: bool,
     /// Horizon \[s\].
     pub until: f64,
     /// Output interval \[s\].
@@ -71,6 +75,8 @@ pub struct Refusal {
 
 /// Most rows a run may write.
 pub const MAX_ROWS: f64 = 1e9;
+/// Least tolerance where the first orders are in double-double: far below what the others are rounded to.
+const LEAST_EXTENDED: f64 = 1e-25;
 /// Runs of at least so many seconds are marched symplectically where that is possible.
 const LONG: f64 = 60.0;
 /// Steps beyond which a fixed step is not chosen unasked.
@@ -100,7 +106,7 @@ impl Plan {
         let stabilization = pair(mechanism, method, request, &mut notes)?;
         let (mut step, mut tolerance) = (None, None);
         if method.is_adaptive() {
-            let relative = request.rtol.unwrap_or(1e-9);
+            let relative = request.rtol.unwrap_or(if request.extended { 1e-20 } else { 1e-9 });
             tolerance = Some(Tolerance { relative, absolute: request.atol.unwrap_or(relative) });
         } else {
             step = Some(fixed_step(method, request, rate, until, &mut every, &mut notes)?);
@@ -115,6 +121,7 @@ impl Plan {
             tolerance,
             stabilization,
             time_constant: request.time_constant,
+            extended: request.extended,
             until,
             every,
             rows: rows as u64,
@@ -144,6 +151,7 @@ impl Plan {
             }
             (None, tolerance) => format!("{:e}", tolerance.unwrap_or_default().relative),
         };
+        let setting = if self.extended { setting + "-extended" } else { setting };
         let keeps_rows = !mechanism.rows.is_empty() && !matches!(self.method, MethodId::Rattle(_));
         if keeps_rows { format!("{}-{setting}-{}", self.method, self.stabilization) } else { format!("{}-{setting}", self.method) }
     }
@@ -167,9 +175,14 @@ fn check_numbers(request: &Request) -> Result<(), Refusal> {
         }
     }
     for (option, value) in [("--rtol", request.rtol), ("--atol", request.atol)] {
-        if let Some(value) = value.filter(|&value| !(1e-15..=0.1).contains(&value)) {
-            return Err(usage(option, format!("{value:e} is not within 1e-15 to 0.1"), "1e-9 is a good beginning"));
+        let least = if request.extended { LEAST_EXTENDED } else { 1e-15 };
+        if let Some(value) = value.filter(|&value| !(least..=0.1).contains(&value)) {
+            return Err(usage(option, format!("{value:e} is not within {least:e} to 0.1"), "1e-9 is a good beginning"));
         }
+    }
+    if request.extended && request.method.is_some_and(|method| method != MethodId::Taylor) {
+        let reason = "it carries the first orders of a series in double-double, and only taylor has one";
+        return Err(usage("--extended", reason.into(), "--method taylor, or leave it out"));
     }
     if let (Some(method), true) = (request.method, request.rtol.is_some() || request.atol.is_some())
         && !method.is_adaptive()
@@ -203,6 +216,9 @@ fn mismatch(what: String, reason: &str, alternative: &str) -> Refusal {
 
 /// The method for a scene nobody named one for.
 fn choose(mechanism: &Mechanism, request: &Request, until: f64, rate: f64) -> (MethodId, String) {
+    if request.extended {
+        return (MethodId::Taylor, "taylor: extended orders are those of its series".into());
+    }
     let tolerance = request.rtol.is_some() || request.atol.is_some();
     let kept = request.stabilize.unwrap_or(Stabilization::Elimination);
     let steps_back = !mechanism.rows.is_empty() && kept == Stabilization::Projection;
@@ -224,13 +240,16 @@ fn choose(mechanism: &Mechanism, request: &Request, until: f64, rate: f64) -> (M
 
 /// The stabilization of a pairing, or why there is none.
 fn pair(mechanism: &Mechanism, method: MethodId, request: &Request, notes: &mut Vec<String>) -> Result<Stabilization, Refusal> {
-    if !mechanism.contacts.is_empty() && !matches!(method, MethodId::Dp5 | MethodId::Dp8) {
+    if !mechanism.contacts.is_empty() && !matches!(method, MethodId::Dp5 | MethodId::Dp8 | MethodId::Taylor) {
         let reason = match method {
             MethodId::Dopri5 | MethodId::Dop853 => "ode_solvers does not let an impact be located inside its steps",
-            MethodId::Taylor => "a series does not see the wall its step runs through",
             _ => "an impact inside a fixed step cannot be located without changing the step",
         };
-        return Err(mismatch(format!("{method} on a scene with walls"), reason, "--method dp8, or dp5 at loose tolerances"));
+        return Err(mismatch(
+            format!("{method} on a scene with walls"),
+            reason,
+            "--method dp8, taylor for more digits, or dp5 at loose tolerances",
+        ));
     }
     if matches!(method, MethodId::Rattle(_)) && mechanism.is_damped() {
         let reason = "RATTLE takes forces that depend on positions only, and a damper's does not";
@@ -255,9 +274,9 @@ fn pair(mechanism: &Mechanism, method: MethodId, request: &Request, notes: &mut 
             let reason = "Gauss methods are symplectic in coordinates and momenta, where a motor's angle is eliminated";
             Err(mismatch(format!("{method} with --stabilize {asked}"), reason, "--stabilize elimination, or --method dp8"))
         }
-        (MethodId::Taylor, Stabilization::None | Stabilization::Baumgarte | Stabilization::Projection) => {
-            let reason = "the series is expanded in coordinates from which a motor's angle is eliminated";
-            Err(mismatch(format!("{method} with --stabilize {asked}"), reason, "--stabilize elimination, or --method dp8"))
+        (MethodId::Taylor, Stabilization::Baumgarte) => {
+            let reason = "the series is that of the constrained motion, which has nothing to be pulled back from";
+            Err(mismatch(format!("{method} with --stabilize {asked}"), reason, "--stabilize projection or elimination, or --method dp8"))
         }
         (MethodId::Dopri5 | MethodId::Dop853, Stabilization::Projection) => {
             let own = if method == MethodId::Dopri5 { "dp5" } else { "dp8" };

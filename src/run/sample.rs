@@ -144,7 +144,7 @@ impl Sampler {
             let torque = -self.plain.multiplier[r];
             sample.motors[r] = match row {
                 Row::Angle(_) => [torque, -torque * here.drive.hi],
-                Row::Line(_) => [0.0, 0.0],
+                Row::Line(_) | Row::Pin(_) => [0.0, 0.0],
             };
         }
         sample

@@ -19,6 +19,8 @@ mod bodies;
 pub mod crowd;
 mod direction;
 mod driven;
+mod event;
+mod expansion;
 mod extended;
 mod fast;
 mod pace;
@@ -27,14 +29,21 @@ mod terms;
 mod wide;
 
 pub use self::crowd::Crowd;
+use self::event::Crossing;
+use self::expansion::Expansion;
 use self::fast::Fast;
 use super::{Cause, Method, Reached, Seen, StepError, Tally, Tolerance, Watch};
 use crate::arithmetic::{DoubleDouble, Real};
-use crate::dynamics::series::{Series, integral, tail};
-use crate::dynamics::{Field, Form, Mechanism, State, Time};
+use crate::dynamics::{Coordinates, Field, Form, State, Time};
 
 /// Powers the step is taken from.
 const JUDGES: usize = 5;
+/// Powers of the rates beyond the first that `extended` carries in double-double.
+const LEADING: usize = 6;
+/// A step \[s\] too short to tell a point that rests on a wall from one that goes through.
+const RESTING: f64 = 1e-9;
+/// States an event is landed on with, at most.
+const LANDINGS: usize = 6;
 
 /// Which code expands the motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -44,7 +53,7 @@ pub enum Kernel {
     Fastest,
     /// As `Fastest`, but without instructions special to the processor: slowly to the same bits.
     Portable,
-    /// [`Series`], which takes every mechanism and every number.
+    /// [`Series`](crate::dynamics::series::Series), which takes every mechanism and every number.
     Series,
 }
 
@@ -63,14 +72,14 @@ pub struct Taylor<T> {
     /// below 1e-18; no effect on double-double itself.
     pub extended: bool,
     fast: Option<Fast>,
-    series: Option<Series<T>>,
-    u: Vec<T>,
-    rest: Vec<T>,
-    rate: Vec<T>,
+    expansion: Option<Expansion<T>>,
+    powers: Vec<f64>,
+    gaps: Vec<f64>,
+    inside: State,
 }
 
 impl<T: Real> Taylor<T> {
-    /// The method with this tolerance \[rad/s\] and order, at least 8.
+    /// The method with this tolerance \[rad/s\] and order, at least 10.
     pub fn with_order(tolerance: f64, order: usize) -> Self {
         let order = order.max(2 * JUDGES);
         Self {
@@ -80,10 +89,10 @@ impl<T: Real> Taylor<T> {
             kernel: Kernel::default(),
             extended: false,
             fast: None,
-            series: None,
-            u: Vec::new(),
-            rest: Vec::new(),
-            rate: Vec::new(),
+            expansion: None,
+            powers: Vec::new(),
+            gaps: Vec::new(),
+            inside: State::default(),
         }
     }
 }
@@ -125,7 +134,8 @@ impl<T: Real, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
         tally: &mut Tally,
         watch: &mut Watch<P>,
     ) -> Result<Reached, StepError> {
-        self.choose(problem.mechanism());
+        super::refuse_the_past("taylor", state, until)?;
+        self.choose(problem, state)?;
         let mut taken = 0;
         loop {
             let left = until - state.time;
@@ -138,22 +148,35 @@ impl<T: Real, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
                 return Err(stop(Cause::TooManySteps, state, 0.0, what, "loosen the tolerance"));
             }
             tally.evaluations += 1;
-            let (wanted, h) = match &mut self.fast {
+            let (wanted, mut h) = match &mut self.fast {
                 Some(fast) => fast.step(state, left.hi),
-                None => self.series_step(problem, state, left),
+                None => self.expand(problem, state, left.hi),
             };
             let hint = "look for a spring of length zero or a position without inertia";
             if wanted.is_nan() {
-                let lost = self.lost(problem);
+                let lost = problem.label(problem.angles() + self.expansion.as_ref().map_or(0, Expansion::lost));
                 return Err(stop(Cause::NotFinite, state, 0.0, format!("the series of {lost} is not finite"), hint));
             }
             if wanted < 1e-14 * state.time.hi.abs().max(1e-3) {
                 return Err(stop(Cause::StepTooSmall, state, wanted, "the series converges in ever smaller circles".into(), hint));
             }
+            let mut event = None;
+            if self.fast.is_none() {
+                if problem.events() > 0 {
+                    (h, event) = self.meet(problem, state, h)?;
+                }
+                if let Some(expansion) = &self.expansion {
+                    expansion.go(state, if h == left.hi { left } else { DoubleDouble::from(h) });
+                }
+            }
             state.time = if h == left.hi { until } else { state.time + h };
             state.wrap();
             tally.steps += 1;
-            if watch(problem, state)? == Seen::Enough {
+            let seen = watch(problem, state)?;
+            if let Some(event) = event {
+                return Ok(Reached::Event(event));
+            }
+            if seen == Seen::Enough {
                 return Ok(Reached::Pause);
             }
         }
@@ -163,12 +186,13 @@ impl<T: Real, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
         true
     }
 
-    fn within(&mut self, problem: &mut P, from: &State, time: Time, inside: &mut State) {
+    fn within(&mut self, _: &mut P, from: &State, time: Time, inside: &mut State) {
         inside.clone_from(from);
         let h = time - from.time;
-        match &self.fast {
-            Some(fast) => fast.go(inside, h.hi),
-            None => self.go(problem.angles(), inside, h),
+        match (&self.fast, &self.expansion) {
+            (Some(fast), _) => fast.go(inside, h.hi),
+            (None, Some(expansion)) => expansion.go(inside, h),
+            (None, None) => {}
         }
         inside.time = time;
         inside.wrap();
@@ -180,79 +204,92 @@ fn stop(cause: Cause, state: &State, step: f64, what: String, hint: &str) -> Ste
 }
 
 impl<T: Real> Taylor<T> {
-    /// Keeps the fast kernel at hand, makes the one that fits, or leaves it to the series.
-    fn choose(&mut self, mechanism: &Mechanism) {
+    /// Keeps the code at hand that fits, makes it, or leaves it to the series.
+    fn choose<P: Field + Form + ?Sized>(&mut self, problem: &P, state: &State) -> Result<(), StepError> {
+        let (mechanism, coordinates) = (problem.mechanism(), problem.coordinates());
+        if coordinates == Coordinates::Other {
+            let hint = "march the mechanism in angles and rates, by multipliers or with the motors eliminated";
+            return Err(stop(Cause::Unsuited, state, 0.0, "the unknowns are not those a series is expanded in".into(), hint));
+        }
         let is_portable = self.kernel == Kernel::Portable;
         let (tolerance, order, extended) = (self.tolerance, self.order, self.extended);
-        if !T::IS_PLAIN || self.kernel == Kernel::Series {
+        let is_plain = T::IS_PLAIN && self.kernel != Kernel::Series;
+        // The lanes know neither walls nor rows that are not eliminated.
+        let is_simple = mechanism.contacts.is_empty() && (mechanism.rows.is_empty() || coordinates == Coordinates::Independent);
+        if !is_plain || !is_simple {
             self.fast = None;
         } else if !self.fast.as_ref().is_some_and(|fast| fast.is_for(mechanism, tolerance, order, is_portable, extended)) {
             self.fast = Fast::new(mechanism, tolerance, order, is_portable, extended);
         }
+        if self.fast.is_some() {
+            self.expansion = None;
+        } else if !self.expansion.as_ref().is_some_and(|expansion| expansion.is_for(mechanism, coordinates, order, extended)) {
+            self.expansion = Some(Expansion::new(mechanism, coordinates, order, extended));
+        }
+        Ok(())
     }
 
-    /// One step by the series of any mechanism, of at most `left` \[s\]: the step wanted and the step taken.
-    fn series_step<P: Field + Form + ?Sized>(&mut self, problem: &P, state: &mut State, left: Time) -> (f64, f64) {
-        let f = problem.angles();
-        for vector in [&mut self.u, &mut self.rest, &mut self.rate] {
-            vector.resize(f, T::ZERO);
-        }
-        let order = self.order;
-        self.series.take_if(|series| series.order() != order);
-        let series = self.series.get_or_insert_with(|| Series::new(problem.mechanism(), order));
-        for i in 0..f {
-            (self.u[i], self.rest[i]) = T::split(state.unknown(i));
-            self.rate[i] = T::split(state.unknown(f + i)).0;
-        }
-        series.expand(problem.mechanism(), state.time, &self.u, &self.rest, &self.rate);
-        let wanted = step(series, f, self.tolerance);
-        if wanted.is_nan() {
-            return (wanted, 0.0);
-        }
-        let h = pace::taken(wanted, left.hi);
-        self.go(f, state, if h == left.hi { left } else { DoubleDouble::from(h) });
-        (wanted, h)
+    /// Expands the motion by the series of any mechanism: the step wanted, and of it what `left` \[s\] leave.
+    fn expand<P: Field + Form + ?Sized>(&mut self, problem: &P, state: &State, left: f64) -> (f64, f64) {
+        let Some(expansion) = &mut self.expansion else { return (f64::NAN, 0.0) };
+        expansion.expand(problem.mechanism(), state);
+        // What a wall sees of the motion are the unit vectors.
+        let wanted = expansion.wanted(self.tolerance, problem.events() > 0);
+        (wanted, if wanted.is_nan() { 0.0 } else { pace::taken(wanted, left) })
     }
 
-    /// Takes a state of `f` coordinates from where the series was expanded on by `h` \[s\].
-    fn go(&self, f: usize, state: &mut State, h: Time) {
-        let Some(series) = &self.series else { return };
-        let step = T::split(h).0;
-        let mut add = |i: usize, increment: T| {
-            let sum = state.unknown(i) + increment.double_double();
-            (state.y[i], state.low[i]) = (sum.hi, sum.lo);
-        };
-        for i in 0..f {
-            add(i, integral(&series.rate, i, f, step));
-            add(f + i, tail(&series.rate, i, f, 1, step));
+    /// Of the step `h` \[s\] what comes before its first event, and which event that is.
+    fn meet<P: Field + Form + ?Sized>(&mut self, problem: &mut P, state: &State, h: f64) -> Result<(f64, Option<usize>), StepError> {
+        let Self { expansion: Some(expansion), powers, .. } = self else { return Ok((h, None)) };
+        let (mut first, mut event) = (h, None);
+        for contact in 0..problem.events() {
+            trace(problem, expansion, contact, powers);
+            match event::crossing(powers, first) {
+                Crossing::Nothing => {}
+                Crossing::At(t) => (first, event) = (t, Some(contact)),
+                Crossing::Inside(t) if t > RESTING => (first, event) = (t, None),
+                Crossing::Inside(_) => {
+                    let hint = "go on with the contact held (`Mechanism::holding`), or raise the restitution";
+                    return Err(stop(Cause::RestingContact, state, h, "a point has come to rest on a wall".into(), hint));
+                }
+            }
         }
-        add(2 * f, integral(&series.power, 0, 1, step));
+        if let Some(event) = event {
+            first = self.land(problem, state, event, first, h);
+        }
+        Ok((first, event))
     }
 
-    /// The unknown whose series is not finite, as far as it is known.
-    fn lost<P: Field + ?Sized>(&self, problem: &P) -> String {
-        let f = problem.angles();
-        let rates = self.series.as_ref().map_or(&[][..], |series| &series.rate);
-        let lost = rates.iter().position(|rate| !rate.value().is_finite()).map_or(0, |at| at % f.max(1));
-        problem.label(f + lost)
+    /// The moment of an event near `t` \[s\], at which the event function of the *state* is zero to rounding.
+    fn land<P: Field + Form + ?Sized>(&mut self, problem: &mut P, state: &State, event: usize, t: f64, h: f64) -> f64 {
+        let Self { expansion: Some(expansion), powers, gaps, inside, .. } = self else { return t };
+        trace(problem, expansion, event, powers);
+        gaps.resize(problem.events(), 0.0);
+        let mut best = t;
+        for _ in 0..LANDINGS {
+            inside.clone_from(state);
+            expansion.go(inside, DoubleDouble::from(best));
+            problem.gaps(state.time + best, &inside.y, gaps);
+            let (gap, (_, slope)) = (gaps[event], event::value(powers, best));
+            let moved = best - gap / slope;
+            if gap.abs() <= 1e-15 || !((moved - t).abs() < 0.1 * h && moved > 0.0 && moved <= h) {
+                break;
+            }
+            best = moved;
+        }
+        best
     }
 }
 
-/// The step at which the last powers fall below the tolerance \[s\]; infinite where they all vanish, not a number where one is.
-fn step<T: Real>(series: &Series<T>, coordinates: usize, tolerance: f64) -> f64 {
-    let mut step = f64::INFINITY;
-    for k in series.order() + 1 - JUDGES..=series.order() {
-        let rates = &series.rate[k * coordinates..(k + 1) * coordinates];
-        let largest = rates.iter().fold(0.0, |largest: f64, rate| {
-            let size = rate.value().abs();
-            if size.is_nan() || largest.is_nan() { f64::NAN } else { largest.max(size) }
-        });
-        if largest.is_nan() {
-            return f64::NAN;
-        }
-        if largest > 0.0 {
-            step = step.min(libm::pow(largest, -1.0 / k as f64));
+/// Powers of an event function along the series: the gap of a wall \[m\], or the force on a point held there over the energy scale \[1/m\].
+fn trace<T: Real, P: Form + ?Sized>(problem: &P, expansion: &Expansion<T>, contact: usize, powers: &mut Vec<f64>) {
+    let mechanism = problem.mechanism();
+    let series = expansion.series();
+    match mechanism.held.iter().position(|&held| held == contact) {
+        None => series.gap(&mechanism.contacts[contact].row, powers),
+        Some(place) => {
+            series.contact_force(place, mechanism.held.len(), powers);
+            powers.iter_mut().for_each(|power| *power /= mechanism.energy_scale);
         }
     }
-    step * libm::pow(tolerance, 1.0 / (series.order() + 1) as f64)
 }

@@ -28,13 +28,29 @@ impl AngleRow {
     /// See [`Row::linearise`](super::Row::linearise); C is taken modulo whole turns.
     #[inline]
     pub fn linearise<T: Real>(&self, t: Time, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
+        self.jacobian(jacobian);
         let phase = self.law.at::<T>(t);
         let mut given = at.phi[self.body];
-        jacobian[self.body] += T::ONE;
         if let Some(base) = self.base {
             given = angle::difference(given, at.phi[base]);
-            jacobian[base] -= T::ONE;
         }
         Linearised { position: angle::difference(given, phase.angle), drive: -phase.rate, convective: -phase.acceleration }
+    }
+
+    /// Adds G to `jacobian`.
+    #[inline]
+    fn jacobian<T: Real>(&self, jacobian: &mut [T]) {
+        jacobian[self.body] += T::ONE;
+        if let Some(base) = self.base {
+            jacobian[base] -= T::ONE;
+        }
+    }
+
+    /// See [`Row::differentiate`](super::Row::differentiate).
+    #[inline]
+    pub fn differentiate<T: Real>(&self, t: Time, jacobian: &mut [T]) -> Linearised<T> {
+        self.jacobian(jacobian);
+        let (rate, acceleration) = self.law.rates::<T>(t);
+        Linearised { position: T::ZERO, drive: -rate, convective: -acceleration }
     }
 }

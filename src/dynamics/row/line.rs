@@ -39,8 +39,14 @@ impl LineRow {
     /// See [`Row::linearise`](super::Row::linearise).
     #[inline]
     pub fn linearise<T: Real>(&self, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
+        Linearised { position: self.gap(at.z), ..self.differentiate(at, jacobian) }
+    }
+
+    /// See [`Row::differentiate`](super::Row::differentiate).
+    #[inline]
+    pub fn differentiate<T: Real>(&self, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
         self.jacobian(at.z, jacobian);
         let convective = Complex::of(self.normal).dot(self.point.convective(at.z, at.omega));
-        Linearised { position: self.gap(at.z), drive: T::ZERO, convective }
+        Linearised { position: T::ZERO, drive: T::ZERO, convective }
     }
 }

@@ -5,9 +5,11 @@
 
 pub mod angle;
 pub mod line;
+pub mod pin;
 
 pub use angle::AngleRow;
 pub use line::LineRow;
+pub use pin::PinRow;
 
 use super::Time;
 use crate::arithmetic::{Complex, Real};
@@ -41,6 +43,8 @@ pub enum Row {
     Angle(AngleRow),
     /// A point on a line of the ground: walls while they hold or push.
     Line(LineRow),
+    /// Two points that coincide, along one axis: closed loops.
+    Pin(PinRow),
 }
 
 impl Row {
@@ -49,6 +53,7 @@ impl Row {
         match self {
             Row::Angle(row) => &row.name,
             Row::Line(row) => &row.name,
+            Row::Pin(row) => &row.name,
         }
     }
 
@@ -56,7 +61,7 @@ impl Row {
     pub fn unit(&self) -> &'static str {
         match self {
             Row::Angle(_) => "rad",
-            Row::Line(_) => "m",
+            Row::Line(_) | Row::Pin(_) => "m",
         }
     }
 
@@ -66,6 +71,17 @@ impl Row {
         match self {
             Row::Angle(row) => row.linearise(t, at, jacobian),
             Row::Line(row) => row.linearise(at, jacobian),
+            Row::Pin(row) => row.linearise(at, jacobian),
+        }
+    }
+
+    /// The same without C, which is written as zero: accelerations do not ask for it.
+    #[inline]
+    pub fn differentiate<T: Real>(&self, t: Time, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
+        match self {
+            Row::Angle(row) => row.differentiate(t, jacobian),
+            Row::Line(row) => row.differentiate(at, jacobian),
+            Row::Pin(row) => row.differentiate(at, jacobian),
         }
     }
 }
@@ -91,9 +107,12 @@ mod tests {
                 offset: 0.3,
             }),
         ];
+        let (a, b) =
+            (Point::ground([0.1, 0.0]).along(0, Complex::new(0.6, 0.0)), Point::ground([0.2, 0.3]).along(1, Complex::new(0.5, 0.2)));
+        let pins = PinRow::pair("pin", &a, &b).map(Row::Pin);
         let of = DoubleDouble::of;
         let (start, rate, acceleration) = ([of(0.4), of(-0.9)], [of(1.5), of(-0.7)], [of(0.3), of(2.0)]);
-        for row in rows {
+        for row in rows.into_iter().chain(pins) {
             let at = |t: DoubleDouble, jacobian: &mut [DoubleDouble]| {
                 let phi: Vec<_> = (0..2).map(|k| start[k] + rate[k] * t + (acceleration[k] * t * t).scale(0.5)).collect();
                 let omega: Vec<_> = (0..2).map(|k| rate[k] + acceleration[k] * t).collect();

@@ -4,7 +4,8 @@
 //! a trajectory has the same bits whoever its neighbours are; every lane has its own step, its own time, its own
 //! constants of the mechanism, and takes in the next trajectory as soon as its last one has ended.
 
-use super::pace::{self, Pace, RECIPROCAL_REST};
+use super::pace::{self, Pace};
+use super::terms::rest;
 use super::{JUDGES, Kernel, direction, stop};
 use crate::arithmetic::angle;
 #[cfg(target_arch = "x86_64")]
@@ -21,6 +22,17 @@ const WIDTH: usize = 4;
 const TEAMS: usize = 2;
 /// Largest number of bodies.
 const BODIES: usize = 4;
+
+/// 1/k in two terms: whatever is divided in a loop is divided by a table.
+const RECIPROCAL: [(f64, f64); MOST + 2] = {
+    let mut table = [(0.0, 0.0); MOST + 2];
+    let mut k = 1;
+    while k < table.len() {
+        table[k] = (1.0 / k as f64, rest(k));
+        k += 1;
+    }
+    table
+};
 
 /// One number a trajectory.
 type Quad = [f64; WIDTH];
@@ -111,15 +123,15 @@ pub struct Crowd {
 }
 
 impl Crowd {
-    /// The method at a tolerance, of order 16, or 24 below 1e-15.
+    /// The method at a tolerance, of order 20, or 24 below 1e-15.
     pub fn new(tolerance: Tolerance) -> Self {
         let tolerance = tolerance.relative.min(tolerance.absolute);
-        Self { tolerance, order: if tolerance >= 1e-15 { 16 } else { 24 }, is_portable: false, max_steps: 10_000_000 }
+        Self { tolerance, order: if tolerance >= 1e-15 { 20 } else { 24 }, is_portable: false, max_steps: 10_000_000 }
     }
 
-    /// The same with another order (16, 20 or 24; the next one of these is taken).
+    /// The same with another order, from 10 to 24.
     pub fn with_order(self, order: usize) -> Self {
-        Self { order: order.next_multiple_of(4).clamp(16, MOST), ..self }
+        Self { order: order.clamp(2 * JUDGES, MOST), ..self }
     }
 
     /// The same by another kernel: `Portable` does without the processor's lanes.
@@ -162,10 +174,10 @@ impl Crowd {
     pub fn march(&self, entrants: &mut [Entrant], until: Time, watch: &mut dyn FnMut(usize, &Passage) -> Going) {
         let Some(bodies) = entrants.first().map(|first| first.mechanism.tree.bodies) else { return };
         let march = match bodies {
-            1 => dispatch::<1>(self.order, self.is_portable),
-            2 => dispatch::<2>(self.order, self.is_portable),
-            3 => dispatch::<3>(self.order, self.is_portable),
-            _ => dispatch::<4>(self.order, self.is_portable),
+            1 => dispatch::<1>(self.is_portable),
+            2 => dispatch::<2>(self.is_portable),
+            3 => dispatch::<3>(self.is_portable),
+            _ => dispatch::<4>(self.is_portable),
         };
         // SAFETY: `dispatch` hands out code for AVX and FMA only after the processor was asked for them; all else in it is safe code.
         #[allow(unsafe_code)]
@@ -177,40 +189,22 @@ impl Crowd {
 
 type March = unsafe fn(&Crowd, &mut [Entrant], Time, &mut dyn FnMut(usize, &Passage) -> Going);
 
-fn dispatch<const N: usize>(order: usize, is_portable: bool) -> March {
-    match order {
-        16 => of_order::<16, N>(is_portable),
-        20 => of_order::<20, N>(is_portable),
-        _ => of_order::<24, N>(is_portable),
-    }
-}
-
-fn of_order<const P: usize, const N: usize>(is_portable: bool) -> March {
+fn dispatch<const N: usize>(is_portable: bool) -> March {
     #[cfg(target_arch = "x86_64")]
     if !is_portable && lanes::available() {
-        return hardware::<P, N>;
+        return hardware::<N>;
     }
-    portable::<P, N>
+    portable::<N>
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx,fma")]
-fn hardware<const P: usize, const N: usize>(
-    crowd: &Crowd,
-    entrants: &mut [Entrant],
-    until: Time,
-    watch: &mut dyn FnMut(usize, &Passage) -> Going,
-) {
-    march::<Avx, P, N>(crowd, entrants, until, watch);
+fn hardware<const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], until: Time, watch: &mut dyn FnMut(usize, &Passage) -> Going) {
+    march::<Avx, N>(crowd, entrants, until, watch);
 }
 
-fn portable<const P: usize, const N: usize>(
-    crowd: &Crowd,
-    entrants: &mut [Entrant],
-    until: Time,
-    watch: &mut dyn FnMut(usize, &Passage) -> Going,
-) {
-    march::<Portable, P, N>(crowd, entrants, until, watch);
+fn portable<const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], until: Time, watch: &mut dyn FnMut(usize, &Passage) -> Going) {
+    march::<Portable, N>(crowd, entrants, until, watch);
 }
 
 /// Constants, states and coefficients of the trajectories in the lanes.
@@ -305,13 +299,8 @@ impl<const N: usize> Team<N> {
 }
 
 #[inline(always)]
-fn march<L: Lanes, const P: usize, const N: usize>(
-    crowd: &Crowd,
-    entrants: &mut [Entrant],
-    until: Time,
-    watch: &mut dyn FnMut(usize, &Passage) -> Going,
-) {
-    let zero = [[0.0; WIDTH]; N];
+fn march<L: Lanes, const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], until: Time, watch: &mut dyn FnMut(usize, &Passage) -> Going) {
+    let (order, zero) = (crowd.order, [[0.0; WIDTH]; N]);
     let power = Power { c: zero, s: zero, v: zero, px: zero, py: zero };
     let team = Team {
         coupling: [zero; N],
@@ -323,7 +312,7 @@ fn march<L: Lanes, const P: usize, const N: usize>(
         powers: [power; MOST + 1],
     };
     let mut teams = Box::new([team.clone(), team]);
-    let empty = Seat { entrant: None, pace: Pace::new(1.0, P, 0.0), time: until, steps: 0, wanted: 0.0, taken: 0.0 };
+    let empty = Seat { entrant: None, pace: Pace::new(1.0, order, 0.0), time: until, steps: 0, wanted: 0.0, taken: 0.0 };
     let mut seats: [Seat; WIDTH * TEAMS] = std::array::from_fn(|_| empty.clone());
     let mut waiting = 0;
     loop {
@@ -336,8 +325,8 @@ fn march<L: Lanes, const P: usize, const N: usize>(
                     Some(index) => {
                         let entrant = &entrants[index];
                         team.seat(lane, entrant);
-                        let longest = P as f64 / 3.0 / fastest::<N>(entrant.mechanism);
-                        (seat.pace, seat.time) = (Pace::new(crowd.tolerance, P, longest), entrant.state.time);
+                        let longest = order as f64 / 3.0 / fastest::<N>(entrant.mechanism);
+                        (seat.pace, seat.time) = (Pace::new(crowd.tolerance, order, longest), entrant.state.time);
                         seat.steps = 0;
                     }
                     None => team.park(lane),
@@ -349,20 +338,20 @@ fn march<L: Lanes, const P: usize, const N: usize>(
             return;
         }
         let before = [teams[0].high[0], teams[1].high[0]];
-        expand::<L, P, N>(&mut teams);
+        expand::<L, N>(&mut teams, order);
         for (seat, (place, &left)) in seats.iter_mut().zip(left.iter().enumerate()) {
             let (team, lane) = (&teams[place / WIDTH], place % WIDTH);
             let coefficient = |k: usize, i: usize| team.powers[k].v[i][lane];
             let mut sizes = [0.0; JUDGES];
             for (back, size) in sizes.iter_mut().enumerate() {
-                *size = (0..N).fold(0.0, |largest: f64, i| largest.max(coefficient(P - back, i).abs()));
+                *size = (0..N).fold(0.0, |largest: f64, i| largest.max(coefficient(order - back, i).abs()));
             }
-            let finite = (0..N).all(|i| coefficient(P, i).is_finite());
-            seat.wanted = if finite { seat.pace.step::<P>(&sizes) } else { f64::NAN };
+            let finite = (0..N).all(|i| coefficient(order, i).is_finite());
+            seat.wanted = if finite { seat.pace.step_of(order, &sizes) } else { f64::NAN };
             seat.taken = if finite { pace::taken(seat.wanted, left) } else { 0.0 };
         }
         for (team, seats) in teams.iter_mut().zip(seats.chunks_exact(WIDTH)) {
-            finish::<L, P, N>(team, [seats[0].taken, seats[1].taken, seats[2].taken, seats[3].taken]);
+            finish::<L, N>(team, order, [seats[0].taken, seats[1].taken, seats[2].taken, seats[3].taken]);
         }
         for (place, seat) in seats.iter_mut().enumerate() {
             let Some(index) = seat.entrant else { continue };
@@ -384,7 +373,7 @@ fn march<L: Lanes, const P: usize, const N: usize>(
                 entrant.state.turns[i] += turned[i];
             }
             let (view, start) = (&*team, &before[place / WIDTH]);
-            let series = |body: usize, after: f64| view.at(P, lane, body, start[body][lane], after);
+            let series = |body: usize, after: f64| view.at(order, lane, body, start[body][lane], after);
             let passage = Passage { from, step, turned, series: &series };
             if entrant.stopped.is_some() || watch(index, &passage) == Going::Enough || seat.time >= until {
                 team.leave(lane, &mut entrant.state);
@@ -435,9 +424,9 @@ fn next<const N: usize>(entrants: &mut [Entrant], waiting: &mut usize, until: Ti
     None
 }
 
-/// Expands all lanes to order P.
+/// Expands all lanes to an order.
 #[inline(always)]
-fn expand<L: Lanes, const P: usize, const N: usize>(teams: &mut [Team<N>; TEAMS]) {
+fn expand<L: Lanes, const N: usize>(teams: &mut [Team<N>; TEAMS], order: usize) {
     let mut products = [[[L::splat(0.0); N]; 2]; TEAMS];
     for (team, f) in teams.iter_mut().zip(&mut products) {
         for i in 0..N {
@@ -448,7 +437,7 @@ fn expand<L: Lanes, const P: usize, const N: usize>(teams: &mut [Team<N>; TEAMS]
         }
         invert::<L, N>(team);
     }
-    for k in 0..P {
+    for k in 0..order {
         for (team, f) in teams.iter_mut().zip(&mut products) {
             raise::<L, N>(team, f, k);
         }
@@ -460,11 +449,10 @@ fn expand<L: Lanes, const P: usize, const N: usize>(teams: &mut [Team<N>; TEAMS]
 fn raise<L: Lanes, const N: usize>(team: &mut Team<N>, f: &mut [[L; N]; 2], k: usize) {
     let zero = L::splat(0.0);
     let order = L::splat((k + 1) as f64);
-    let (r, rest) = (L::splat(1.0 / (k + 1) as f64), L::splat(if k + 1 < RECIPROCAL_REST.len() { RECIPROCAL_REST[k + 1] } else { 0.0 }));
     let (mut gx, mut gy, mut torque) = ([zero; N], [zero; N], [zero; N]);
     for i in 0..N {
-        let s = over(f[0][i], r, rest, k + 1);
-        let c = zero.sub(over(f[1][i], r, rest, k + 1));
+        let s = over(f[0][i], k + 1);
+        let c = zero.sub(over(f[1][i], k + 1));
         (team.powers[k + 1].c[i], team.powers[k + 1].s[i]) = (c.array(), s.array());
     }
     // Two bodies at a time keep the multipliers busy; the newest coefficients come last.
@@ -517,7 +505,7 @@ fn raise<L: Lanes, const N: usize>(team: &mut Team<N>, f: &mut [[L; N]; 2], k: u
         }
     }
     for i in 0..N {
-        let v = over(x[i], r, rest, k + 1);
+        let v = over(x[i], k + 1);
         team.powers[k + 1].v[i] = v.array();
         (f[0][i], f[1][i]) = (v.mul_add(L::of(team.powers[0].c[i]), gx[i]), v.mul_add(L::of(team.powers[0].s[i]), gy[i]));
     }
@@ -527,10 +515,11 @@ fn raise<L: Lanes, const N: usize>(team: &mut Team<N>, f: &mut [[L; N]; 2], k: u
     }
 }
 
-/// x/k rounded once, with the reciprocal in two terms for low k.
+/// x/k, rounded once.
 #[inline(always)]
-fn over<L: Lanes>(x: L, r: L, rest: L, k: usize) -> L {
-    if k < RECIPROCAL_REST.len() { x.mul_add(r, x.mul(rest)) } else { x.mul(r) }
+fn over<L: Lanes>(x: L, k: usize) -> L {
+    let (r, rest) = RECIPROCAL[k];
+    x.mul_add(L::splat(r), x.mul(L::splat(rest)))
 }
 
 /// cos and sin of four angles and what they leave out.
@@ -615,16 +604,15 @@ fn reciprocal<L: Lanes>(x: L) -> L {
 
 /// Every lane's state at the end of its step.
 #[inline(always)]
-fn finish<L: Lanes, const P: usize, const N: usize>(team: &mut Team<N>, taken: Quad) {
+fn finish<L: Lanes, const N: usize>(team: &mut Team<N>, order: usize, taken: Quad) {
     let h = L::of(taken);
     let square = h.mul(h);
     for i in 0..N {
         let (mut angles, mut rates) = ([L::splat(0.0); 2], [L::splat(0.0); 2]);
-        let mut k = P;
+        let mut k = order;
         while k > 0 {
             let v = L::of(team.powers[k].v[i]);
-            let (r, rest) = (1.0 / (k + 1) as f64, if k + 1 < RECIPROCAL_REST.len() { RECIPROCAL_REST[k + 1] } else { 0.0 });
-            angles[k % 2] = angles[k % 2].mul_add(square, over(v, L::splat(r), L::splat(rest), k + 1));
+            angles[k % 2] = angles[k % 2].mul_add(square, over(v, k + 1));
             rates[k % 2] = rates[k % 2].mul_add(square, v);
             k -= 1;
         }

@@ -1,0 +1,171 @@
+#!/usr/bin/env python3
+"""Time at equal true error beside heyoka, in alternating runs.
+
+Run by hand from the root of the repository: `python3 benches/peers/beside_heyoka.py [SCENE...]`.  Makes a virtual environment in
+`target/peers`, installs heyoka from PyPI there, builds `cargo bench --bench rivals` and talks to it line by line.  Both codes get the same
+constants, the same sixteen starts and the same judge: the geometric mean over the starts of the largest error in an angle or a rate at the end, against a
+double-double run.  Each code's cheapest setting below the target is timed, the two in turn; times are microseconds per simulated second and trajectory.
+
+heyoka: F. Biscani, D. Izzo, MNRAS 504 (2021) 2614.  It chooses its order from the tolerance.  Released from rest exactly at the horizontal, `free` has only
+every fourth coefficient, and heyoka 7.13 takes a first step of 0.74 s there, far outside the circle of convergence; the starts compared are turned by up to half a milliradian.
+"""
+
+import json
+import math
+import os
+import subprocess
+import sys
+import time
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+PLACE = os.path.join(ROOT, "target", "peers")
+PYTHON = os.path.join(PLACE, "bin", "python")
+BLOCKS = 15
+CASES = [("free", 1e-6), ("free", 1e-9), ("gentle", 1e-12), ("motor", 1e-9)]
+
+
+def prepare():
+    """Goes on inside the virtual environment."""
+    if os.path.abspath(sys.prefix) == PLACE:
+        return
+    if not os.path.exists(PYTHON):
+        subprocess.run([sys.executable, "-m", "venv", PLACE], check=True)
+        subprocess.run([PYTHON, "-m", "pip", "install", "--quiet", "heyoka", "numpy"], check=True)
+    os.execv(PYTHON, [PYTHON, os.path.abspath(__file__), *sys.argv[1:]])
+
+
+class Driftless:
+    """The bench, answering."""
+
+    def __init__(self):
+        bench = ["cargo", "bench", "--quiet", "--no-default-features", "--bench", "rivals"]
+        subprocess.run([*bench, "--no-run"], cwd=ROOT, check=True)
+        self.child = subprocess.Popen([*bench, "--", "--serve"], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+    def ask(self, *words):
+        self.child.stdin.write(" ".join(map(str, words)) + "\n")
+        self.child.stdin.flush()
+        answer = json.loads(self.child.stdout.readline())
+        if "error" in answer:
+            raise RuntimeError(answer["error"])
+        return answer
+
+
+class Ours:
+    """One of our codes on the problem at hand."""
+
+    def __init__(self, driftless, code, order):
+        self.name = f"driftless, {'one by one' if code == 'taylor' else 'in lanes'}, order {order}"
+        self.ask = lambda tolerance: driftless.ask("time", code, order, repr(tolerance))
+
+    def run(self, tolerance):
+        answer = self.ask(tolerance)
+        return answer["mean_error"], answer["us"]
+
+
+class Heyoka:
+    """heyoka on the problem at hand, one by one or a batch at a time."""
+
+    def __init__(self, problem, batch):
+        import heyoka
+
+        self.heyoka, self.problem, self.batch = heyoka, problem, batch
+        self.name = "heyoka, one by one" if batch == 1 else f"heyoka, batches of {batch}"
+        self.made = {}
+
+    def equations(self):
+        hy, problem = self.heyoka, self.problem
+        d1, d2 = problem["diagonal"]
+        a, (w1, w2) = problem["coupling"][1], problem["weight"]
+        if problem["motor"] is not None:
+            # Body 1 turns at a constant rate: one equation is left.
+            p, v = hy.make_vars("p", "v")
+            driven = problem["motor"] * hy.time
+            return [(p, v), (v, (a * problem["motor"] ** 2 * hy.sin(driven - p) - w2 * hy.sin(p)) / d2)]
+        p1, p2, v1, v2 = hy.make_vars("p1", "p2", "v1", "v2")
+        cos, sin = hy.cos(p1 - p2), hy.sin(p1 - p2)
+        b1 = -a * sin * v2 * v2 - w1 * hy.sin(p1)
+        b2 = a * sin * v1 * v1 - w2 * hy.sin(p2)
+        det = d1 * d2 - (a * cos) ** 2
+        return [(p1, v1), (p2, v2), (v1, (d2 * b1 - a * cos * b2) / det), (v2, (d1 * b2 - a * cos * b1) / det)]
+
+    def integrator(self, tolerance, width):
+        import numpy
+
+        if tolerance not in self.made:
+            if self.batch == 1:
+                self.made[tolerance] = self.heyoka.taylor_adaptive(self.equations(), [0.0] * width, tol=tolerance)
+            else:
+                zeros = numpy.zeros((width, self.batch))
+                self.made[tolerance] = self.heyoka.taylor_adaptive_batch(self.equations(), zeros, tol=tolerance)
+        return self.made[tolerance]
+
+    def run(self, tolerance):
+        """Geometric mean of the errors, and microseconds per simulated second and trajectory."""
+        import numpy
+
+        problem = self.problem
+        # Of a motor's scene only the free body is marched.
+        pick = [1, 3] if problem["motor"] is not None else [0, 1, 2, 3]
+        starts = numpy.array([[start[i] for i in pick] for start in problem["starts"]])
+        ends, spent = [], 0.0
+        integrator = self.integrator(tolerance, len(pick))
+        for first in range(0, len(starts), self.batch):
+            if self.batch == 1:
+                integrator.time = 0.0
+                integrator.state[:] = starts[first]
+            else:
+                integrator.set_time(0.0)
+                integrator.state[:] = starts[first : first + self.batch].T
+            clock = time.perf_counter()
+            integrator.propagate_until(problem["until"])
+            spent += time.perf_counter() - clock
+            ends.extend(integrator.state.T.copy() if self.batch > 1 else [integrator.state.copy()])
+        logs = 0.0
+        for end, exact in zip(ends, problem["ends"]):
+            off = [abs(found - exact[i]) for found, i in zip(end, pick)]
+            angles = len(pick) // 2
+            off = [min(x % math.tau, math.tau - x % math.tau) if k < angles else x for k, x in enumerate(off)]
+            logs += math.log(max(max(off), 1e-18))
+        return math.exp(logs / len(ends)), spent * 1e6 / (problem["until"] * len(ends))
+
+
+def setting(code, target):
+    """The loosest tolerance that reaches the target."""
+    for rung in range(20, 77):
+        tolerance = 10.0 ** (-rung / 4)
+        error, _ = code.run(tolerance)
+        if error <= target:
+            return tolerance, error
+    return None
+
+
+def main():
+    prepare()
+    driftless = Driftless()
+    print(f"{'scene':8} {'target':>6}  {'code':34} {'setting':>8} {'error':>8} {'min us/s':>9} {'median':>9}")
+    for scene, target in CASES:
+        if sys.argv[1:] and scene not in sys.argv[1:]:
+            continue
+        problem = driftless.ask("problem", scene)
+        codes = [Ours(driftless, "taylor", order) for order in (16, 20, 24)]
+        if scene != "motor":
+            codes += [Ours(driftless, "crowd", order) for order in (16, 20, 24)]
+        codes += [Heyoka(problem, batch) for batch in (1, 4, 8)]
+        settings = [setting(code, target) for code in codes]
+        times = [[] for _ in codes]
+        for _ in range(BLOCKS):
+            for code, found, spent in zip(codes, settings, times):
+                if found:
+                    spent.append(code.run(found[0])[1])
+        for code, found, spent in zip(codes, settings, times):
+            if found:
+                spent.sort()
+                row = f"{found[0]:8.1e} {found[1]:8.1e} {spent[0]:9.2f} {spent[len(spent) // 2]:9.2f}"
+            else:
+                row = "does not reach it"
+            print(f"{scene:8} {target:6.0e}  {code.name:34} {row}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

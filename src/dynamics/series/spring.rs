@@ -1,0 +1,104 @@
+//! The series of a spring with its damper.
+//!
+//! ```text
+//! D = P_a - P_b,  q = |D|²,  s = q^(-1/2):   m q_0 s_m = Σ_{j=1..m} (-j/2 - (m-j)) q_j s_{m-j}
+//! F on a = -k (D - L0 s D) - c (D·D'/q) D
+//! ```
+
+use super::polynomial::{copy, copy_vectors, product, zeros};
+use crate::arithmetic::{Complex, Real};
+use crate::dynamics::force::Spring;
+
+/// Series of one spring, powers 0 to P.
+#[derive(Clone, Debug)]
+pub struct SpringSeries<T> {
+    /// D.
+    span: Vec<Complex<T>>,
+    /// q, where there is a free length or a damper.
+    square: Vec<T>,
+    /// s, where the free length asks for it.
+    inverse_length: Vec<T>,
+    /// 1/q, D·D' and their product, where there is a damper.
+    inverse_square: Vec<T>,
+    closing: Vec<T>,
+    strain_rate: Vec<T>,
+}
+
+impl<T: Real> SpringSeries<T> {
+    /// Room for the series of a spring up to power `order`.
+    pub fn new(spring: &Spring, order: usize) -> Self {
+        let room = |is_wanted: bool| zeros(if is_wanted { order + 1 } else { 0 });
+        let (is_long, is_damped) = (spring.free_length != 0.0, spring.damping != 0.0);
+        Self {
+            span: vec![Complex::ZERO; order + 1],
+            square: room(is_long || is_damped),
+            inverse_length: room(is_long),
+            inverse_square: room(is_damped),
+            closing: room(is_damped),
+            strain_rate: room(is_damped),
+        }
+    }
+
+    /// The first powers from another series.
+    pub fn take<U: Real>(&mut self, other: &SpringSeries<U>) {
+        copy_vectors(&mut self.span, &other.span);
+        copy(&mut self.square, &other.square);
+        copy(&mut self.inverse_length, &other.inverse_length);
+        copy(&mut self.inverse_square, &other.inverse_square);
+        copy(&mut self.closing, &other.closing);
+        copy(&mut self.strain_rate, &other.strain_rate);
+    }
+
+    /// Force on the spring's first end at power m, from powers up to m+1 of z.
+    #[inline(always)]
+    pub fn force(&mut self, spring: &Spring, m: usize, z: &[Complex<T>], n: usize) -> Complex<T> {
+        let at = |m: usize, start: Complex<T>| {
+            let z = &z[m * n..(m + 1) * n];
+            spring.span.terms.iter().fold(start, |sum, &(k, gamma)| sum + z[k].turn(gamma))
+        };
+        self.span[m] = at(m, if m == 0 { Complex::of(spring.span.root) } else { Complex::ZERO });
+        let span = &self.span[..=m];
+        let mut force = -span[m].times(T::of(spring.stiffness));
+        if spring.free_length == 0.0 && spring.damping == 0.0 {
+            return force;
+        }
+        self.square[m] = product(span, span, |a, b| a.dot(b));
+        let square = &self.square[..=m];
+        if spring.free_length != 0.0 {
+            self.inverse_length[m] = if m == 0 {
+                T::ONE / square[0].sqrt()
+            } else {
+                let known = &self.inverse_length[..m];
+                let falling = known.iter().rev().zip(&square[1..]).enumerate();
+                let sum = falling.fold(T::ZERO, |sum, (j, (&s, &q))| sum + (q * s).scale(0.5 * (j + 1) as f64 - m as f64));
+                sum / square[0].scale(m as f64)
+            };
+            let stretched = product(span, &self.inverse_length[..=m], |span, s| span.times(s));
+            force += stretched.times(T::of(spring.stiffness * spring.free_length));
+        }
+        if spring.damping != 0.0 {
+            self.inverse_square[m] = if m == 0 {
+                T::ONE / square[0]
+            } else {
+                let known = &self.inverse_square[..m];
+                -known.iter().rev().zip(&square[1..]).fold(T::ZERO, |sum, (&i, &q)| sum + q * i) / square[0]
+            };
+            // D' at power m is (m+1) D_{m+1}.
+            let ahead = at(m + 1, Complex::ZERO);
+            let mut closing = span[0].dot(ahead).scale((m + 1) as f64);
+            for l in 1..=m {
+                closing += span[l].dot(span[m - l + 1]).scale((m - l + 1) as f64);
+            }
+            self.closing[m] = closing;
+            self.strain_rate[m] = product(&self.closing[..=m], &self.inverse_square[..=m], |a, b| a * b);
+            force += product(span, &self.strain_rate[..=m], |span, rate| span.times(rate)).times(T::of(-spring.damping));
+        }
+        force
+    }
+
+    /// Power of the damper at power m \[W/s^m\].
+    #[inline(always)]
+    pub fn loss(&self, spring: &Spring, m: usize) -> T {
+        product(&self.strain_rate[..=m], &self.closing[..=m], |a, b| a * b).scale(-spring.damping)
+    }
+}

@@ -1,0 +1,171 @@
+//! The series of any mechanism about a step's start, and how far it carries.
+
+use super::{JUDGES, LEADING};
+use crate::arithmetic::{DoubleDouble, Real};
+use crate::dynamics::series::Series;
+use crate::dynamics::series::polynomial::{integral, tail};
+use crate::dynamics::{Coordinates, Mechanism, State, Time};
+
+/// Largest share of a motion that its last powers may have, however small it is: beyond, the powers left out are the larger ones.
+const SHARE: f64 = 1e-3;
+/// The step where every power but the first vanishes \[s\].
+const LONGEST: f64 = 1e9;
+
+/// Series and what goes into them.
+#[derive(Clone, Debug)]
+pub struct Expansion<T> {
+    mechanism: Mechanism,
+    coordinates: Coordinates,
+    series: Series<T>,
+    /// The first powers in double-double, where the rest goes on from these.
+    first: Option<Box<Series<DoubleDouble>>>,
+    u: [Vec<T>; 3],
+    exact: [Vec<DoubleDouble>; 3],
+}
+
+impl<T: Real> Expansion<T> {
+    /// Series of a mechanism up to a power of the rates; `extended`: the first ones in double-double.
+    pub fn new(mechanism: &Mechanism, coordinates: Coordinates, order: usize, extended: bool) -> Self {
+        let series = Series::new(mechanism, coordinates, order);
+        let f = series.coordinates();
+        Self {
+            mechanism: mechanism.clone(),
+            coordinates,
+            first: (extended && T::IS_PLAIN).then(|| Box::new(Series::new(mechanism, coordinates, LEADING))),
+            u: std::array::from_fn(|_| vec![T::ZERO; f]),
+            exact: std::array::from_fn(|_| vec![DoubleDouble::default(); f]),
+            series,
+        }
+    }
+
+    /// True where it was made for all these.
+    pub fn is_for(&self, mechanism: &Mechanism, coordinates: Coordinates, order: usize, extended: bool) -> bool {
+        (self.series.order(), self.coordinates, self.first.is_some()) == (order, coordinates, extended && T::IS_PLAIN)
+            && self.mechanism == *mechanism
+    }
+
+    /// The series themselves.
+    pub fn series(&self) -> &Series<T> {
+        &self.series
+    }
+
+    /// Expands the motion about a state.
+    pub fn expand(&mut self, mechanism: &Mechanism, state: &State) {
+        let f = self.series.coordinates();
+        let [u, rest, rate] = &mut self.u;
+        for i in 0..f {
+            (u[i], rest[i]) = T::split(state.unknown(i));
+            rate[i] = T::split(state.unknown(f + i)).0;
+        }
+        let Some(first) = &mut self.first else {
+            self.series.expand(mechanism, state.time, u, rest, rate);
+            return;
+        };
+        let [exact, none, exact_rate] = &mut self.exact;
+        for i in 0..f {
+            (exact[i], exact_rate[i]) = (state.unknown(i), state.unknown(f + i));
+        }
+        first.expand(mechanism, state.time, exact, none, exact_rate);
+        self.series.carry_on(mechanism, state.time, u, rest, rate, first);
+    }
+
+    /// The step at which the last powers fall below the tolerance \[s\], those of the unit vectors too where `with_vectors`; not a number where one
+    /// of them is.
+    pub fn wanted(&self, tolerance: f64, with_vectors: bool) -> f64 {
+        let (order, f) = (self.series.order(), self.series.coordinates());
+        let largest = |k: usize| self.series.rate[k * f..(k + 1) * f].iter().fold(0.0, |most, rate| larger(most, rate.value()));
+        let last: [f64; JUDGES] = std::array::from_fn(|i| largest(order - i));
+        if last[0].is_nan() {
+            return f64::NAN;
+        }
+        let mut least = f64::INFINITY;
+        for (i, &size) in last.iter().enumerate() {
+            least = least.min(minus_log2(size) / (order - i) as f64);
+        }
+        if with_vectors {
+            let n = self.mechanism.bodies.len();
+            for k in order + 2 - JUDGES..=order + 1 {
+                let vectors = &self.series.z[k * n..(k + 1) * n];
+                let size = vectors.iter().fold(0.0, |most, z| larger(larger(most, z.re.value()), z.im.value()));
+                least = least.min(minus_log2(size) / k as f64);
+            }
+        }
+        let step = libm::exp2(least + libm::log2(tolerance) / (order + 1) as f64).min(LONGEST);
+        let beginning = largest(0).max(largest(1) * step);
+        if tolerance < 0.1 * SHARE * beginning || last == [0.0; JUDGES] { step } else { self.shortened(&last, largest, step) }
+    }
+
+    /// The step of a motion that is smaller than the tolerance, whose terms must fall nevertheless.
+    #[cold]
+    fn shortened(&self, last: &[f64; JUDGES], largest: impl Fn(usize) -> f64, mut step: f64) -> f64 {
+        let order = self.series.order();
+        // Every round takes the surplus down by a fifth or more.
+        for _ in 0..100 {
+            let (mut size, mut power) = (0.0_f64, 1.0);
+            for k in 0..=order - JUDGES {
+                size = size.max(largest(k) * power);
+                power *= step;
+            }
+            let most = |(i, &last): (usize, &f64)| libm::exp2((minus_log2(last) - minus_log2(SHARE * size)) / (order - i) as f64);
+            let least = last.iter().enumerate().map(most).fold(f64::INFINITY, f64::min);
+            if size == 0.0 || least >= 0.95 * step {
+                break;
+            }
+            step = least;
+        }
+        step
+    }
+
+    /// Takes a state from where the series was expanded on by `h` \[s\].
+    pub fn go(&self, state: &mut State, h: Time) {
+        let (f, series) = (self.series.coordinates(), &self.series);
+        let step = T::split(h).0;
+        // Powers of the rates that are in `first` already, and powers of the work.
+        let known = if self.first.is_some() { LEADING + 1 } else { 0 };
+        let start = known.max(1);
+        for i in 0..f {
+            let mut angle = integral(&series.rate, i, f, known, step).double_double();
+            let mut rate = tail(&series.rate, i, f, start, step).double_double();
+            match &self.first {
+                Some(first) => {
+                    angle += integral(&first.rate, i, f, 0, h);
+                    rate += tail(&first.rate, i, f, 1, h);
+                }
+                None if T::IS_PLAIN => angle = angle + state.low[f + i] * h.hi,
+                None => {}
+            }
+            for (at, increment) in [(i, angle), (f + i, rate)] {
+                add(state, at, increment);
+            }
+        }
+        if state.y.len() > 2 * f {
+            let mut work = integral(&series.power, 0, 1, known.saturating_sub(1), step).double_double();
+            if let Some(first) = &self.first {
+                work += integral(&first.power, 0, 1, 0, h);
+            }
+            add(state, 2 * f, work);
+        }
+    }
+
+    /// The first coordinate whose series is not finite, as far as there is one.
+    pub fn lost(&self) -> usize {
+        let f = self.series.coordinates();
+        self.series.rate.iter().position(|rate| !rate.value().is_finite()).map_or(0, |at| at % f.max(1))
+    }
+}
+
+fn add(state: &mut State, i: usize, increment: DoubleDouble) {
+    let sum = state.unknown(i) + increment;
+    (state.y[i], state.low[i]) = (sum.hi, sum.lo);
+}
+
+/// The larger magnitude, and not a number if either is.
+fn larger(most: f64, value: f64) -> f64 {
+    let size = value.abs();
+    if size.is_nan() || most.is_nan() { f64::NAN } else { most.max(size) }
+}
+
+/// -log2 from the bits of a positive double, within 0.09; so large for zero that it never counts.
+fn minus_log2(size: f64) -> f64 {
+    if size == 0.0 { 1e9 } else { (1_f64.to_bits() as i64 - size.to_bits() as i64) as f64 / (1_u64 << 52) as f64 }
+}
