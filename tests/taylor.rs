@@ -74,6 +74,18 @@ fn on(kernel: Kernel, tolerance: f64, order: usize) -> Taylor<f64> {
     method
 }
 
+/// The method with its first orders in double-double.
+fn extended(kernel: Kernel, tolerance: f64) -> Taylor<f64> {
+    let mut method = on(kernel, tolerance, 24);
+    method.extended = true;
+    method
+}
+
+/// Scenes whose first orders have a kernel in double-double.
+fn extended_scenes() -> Vec<(&'static str, Scene)> {
+    fast_scenes().into_iter().filter(|(name, _)| ["free", "gentle", "spinning", "sideways", "single"].contains(name)).collect()
+}
+
 /// Scenes the fast kernels take.
 fn fast_scenes() -> Vec<(&'static str, Scene)> {
     let mut sideways = shipped("free", &[]);
@@ -85,14 +97,14 @@ fn fast_scenes() -> Vec<(&'static str, Scene)> {
     backwards.start[0].omega = -4.0;
     backwards.gravity = [3.0, -9.0];
     let mut three = shipped("chain8", &[]);
-    let mut six = three.clone();
-    for (scene, count) in [(&mut three, 3), (&mut six, 6)] {
+    let (mut single, mut six) = (three.clone(), three.clone());
+    for (scene, count) in [(&mut single, 1), (&mut three, 3), (&mut six, 6)] {
         scene.bars.truncate(count);
         scene.hinges.truncate(count);
         scene.start.truncate(count);
     }
     let names = ["free", "gentle", "spinning", "motor", "chain8"];
-    let others = [("sideways", sideways), ("second", second), ("backwards", backwards), ("three", three), ("six", six)];
+    let others = [("sideways", sideways), ("second", second), ("backwards", backwards), ("single", single), ("three", three), ("six", six)];
     names.map(|name| (name, shipped(name, &[]))).into_iter().chain(others).collect()
 }
 
@@ -129,6 +141,30 @@ fn portable_lanes_and_hardware_have_the_same_bits() {
             assert_eq!(fast, portable, "{name}, order {order}");
         }
     }
+}
+
+#[test]
+fn orders_in_double_double_leave_only_what_later_ones_round() {
+    for (name, scene) in extended_scenes() {
+        let exact = end(&scene, Taylor::reference(), 2.0);
+        let plain = distance(&exact, &end(&scene, on(Kernel::Fastest, 1e-22, 24), 2.0));
+        let found = end(&scene, extended(Kernel::Fastest, 1e-22), 2.0);
+        let error = distance(&exact, &found);
+        assert!(error < 1e-17 && error < plain / 30.0, "{name}: {error:e}, plain {plain:e}");
+        assert_eq!(found, end(&scene, extended(Kernel::Portable, 1e-22), 2.0), "{name}: lanes");
+    }
+}
+
+#[test]
+fn orders_in_double_double_keep_energy_a_thousand_times_closer() {
+    let scene = shipped("free", &[]);
+    let mechanism = compile(&scene);
+    let mut kernel = Energies::<DoubleDouble>::new(2, 0);
+    let mut energy = |motion: &Motion| mechanism.energy(&mut kernel, &motion.phi, &motion.omega).total();
+    let before = energy(&mechanism.start(&scene));
+    let after = energy(&end(&scene, extended(Kernel::Fastest, 1e-20), 1000.0));
+    let drift = (after - before).hi.abs() / mechanism.energy_scale;
+    assert!(drift < 1e-17, "{drift:e}");
 }
 
 #[test]

@@ -1,12 +1,12 @@
 //! A few bodies without springs and motors, one lane a body.
 //!
-//! The equation of [`pair`](super::pair) for n bodies, with P_i = Σ_{j≠i} A_ij f_j' and dense A: per order four Cauchy products a body,
-//! and M_0⁻¹ formed once a step.
+//! The equation of [`pair`](super::pair) for n bodies, with dense A: per order four Cauchy products a body, two orders in one pass.  M_0⁻¹ and its products with A
+//! are formed once a step, so that an order waits for two sums over the bodies, one after the other:
 //!
 //! ```text
 //! e_{k+1} = left(f_k)/(k+1),    g = Σ_{j=0..k} v_j e_{k+1-j}                   f_{k+1} without its newest term
-//! r = e_k × W - Σ_{m=1..k} e_{k+1-m}·P_m - (k+1) e_0·(A g),    P_m = A m f_m
-//! v_{k+1} = M_0⁻¹ r/(k+1),    f_{k+1} = g + v_{k+1} e_0
+//! r = (e_k × W - Σ_{m=1..k} e_{k+1-m}·P_m)/(k+1),    P_m = A m f_m
+//! v_{k+1} = M_0⁻¹ r - C g_x - S g_y,    C = M_0⁻¹ c_0 A,  S = M_0⁻¹ s_0 A,    f_{k+1} = g + v_{k+1} e_0
 //! ```
 //!
 //! Scene constants enter as in `pair`: fractions of low orders in two terms, and the solutions of the first orders refined.
@@ -31,30 +31,53 @@ type Row<const B: usize> = [[f64; 4]; B];
 #[derive(Clone, Debug)]
 pub struct Bodies<const B: usize> {
     count: usize,
-    /// Column j of A: A_ij over i \[kg·m²\].
+    /// Column j of A: A_ij over i, zero on the diagonal \[kg·m²\].
     coupling: Vec<Row<B>>,
     diagonal: Row<B>,
     /// W \[N·m\].
     weight: [Row<B>; 2],
     /// About the fastest rate of small oscillations \[rad/s\].
     rate: f64,
-    /// M and its inverse at the step's start.
-    mass: Vec<f64>,
-    pivot: Vec<f64>,
-    inverse: Vec<Row<B>>,
-    columns: Vec<Row<B>>,
+    /// Of the step's start, over the columns.
+    columns: Vec<Column<B>>,
     scratch: Box<Scratch<B>>,
 }
 
-/// Coefficients of one step: cos, sin, v, and the two components of P; f of the order at hand.
+/// One column of each matrix at the step's start.
+#[derive(Clone, Debug)]
+struct Column<const B: usize> {
+    /// M_0 beside its diagonal.
+    mass: Row<B>,
+    /// M_0⁻¹, -C, -S.
+    inverse: Row<B>,
+    cos: Row<B>,
+    sin: Row<B>,
+}
+
+/// Coefficients of one step.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 struct Scratch<const B: usize> {
-    c: [Row<B>; MOST + 1],
-    s: [Row<B>; MOST + 1],
-    v: [Row<B>; MOST + 1],
-    px: [Row<B>; MOST + 1],
-    py: [Row<B>; MOST + 1],
+    /// c and s.
+    e: [[Row<B>; 2]; MOST + 2],
+    /// v and the two components of P.
+    v: [[Row<B>; 3]; MOST + 1],
+}
+
+/// What the newest coefficients are made from.
+#[derive(Clone, Copy)]
+struct Start<L, const B: usize> {
+    e: [[L; B]; 2],
+    v: [L; B],
+    weight: [[L; B]; 2],
+    diagonal: [L; B],
+}
+
+/// g without v_0 e_{k+1}, and the products with P.
+#[derive(Clone, Copy)]
+struct Sums<L, const B: usize> {
+    g: [[L; B]; 2],
+    load: [L; B],
 }
 
 impl<const B: usize> Bodies<B> {
@@ -65,8 +88,9 @@ impl<const B: usize> Bodies<B> {
         if n == 0 || n > room(B) || tree.off_axis || !mechanism.springs.is_empty() || !mechanism.rows.is_empty() {
             return None;
         }
-        let mut coupling = vec![[[0.0; 4]; B]; n];
-        let (mut diagonal, mut weight) = ([[0.0; 4]; B], [[[0.0; 4]; B]; 2]);
+        let zero = [[0.0; 4]; B];
+        let mut coupling = vec![zero; n];
+        let (mut diagonal, mut weight) = (zero, [zero; 2]);
         for i in 0..n {
             diagonal[i / 4][i % 4] = tree.diagonal[i];
             weight[0][i / 4][i % 4] = tree.weight[i].re;
@@ -88,18 +112,14 @@ impl<const B: usize> Bodies<B> {
             tree::solve::<f64, 0>(n, &mass, &pivot, &mut unit);
             square += unit[i];
         }
-        let zeros = [[[0.0; 4]; B]; MOST + 1];
         Some(Self {
             count: n,
             coupling,
             diagonal,
             weight,
             rate: square.sqrt(),
-            mass,
-            pivot,
-            inverse: vec![[[0.0; 4]; B]; n],
-            columns: vec![[[0.0; 4]; B]; n],
-            scratch: Box::new(Scratch { c: zeros, s: zeros, v: zeros, px: zeros, py: zeros }),
+            columns: vec![Column { mass: zero, inverse: zero, cos: zero, sin: zero }; n],
+            scratch: Box::new(Scratch { e: [[zero; 2]; MOST + 2], v: [[zero; 3]; MOST + 1] }),
         })
     }
 
@@ -119,127 +139,215 @@ fn load<L: Lanes, const B: usize>(row: &Row<B>) -> [L; B] {
 }
 
 #[inline(always)]
-fn store<L: Lanes, const B: usize>(row: &mut Row<B>, lanes: [L; B]) {
+fn store<L: Lanes, const B: usize>(lanes: [L; B]) -> Row<B> {
+    let mut row = [[0.0; 4]; B];
     for b in 0..B {
         row[b] = lanes[b].array();
     }
+    row
 }
 
-/// Σ_j columns_j x_j + start.
+/// Σ_j columns_j x_j.
 #[inline(always)]
-fn apply<L: Lanes, const B: usize>(columns: &[Row<B>], x: &Row<B>, start: [L; B]) -> [L; B] {
-    let (mut even, mut odd) = (start, [L::splat(0.0); B]);
-    for (j, column) in columns.iter().enumerate() {
-        let factor = L::splat(x[j / 4][j % 4]);
-        let sums = if j % 2 == 0 { &mut even } else { &mut odd };
+fn apply<'a, L: Lanes, const B: usize>(columns: impl Iterator<Item = &'a Row<B>>, x: &Row<B>) -> [L; B] {
+    let mut sum = [L::splat(0.0); B];
+    for (column, &factor) in columns.zip(x.as_flattened()) {
+        let factor = L::splat(factor);
         for b in 0..B {
-            sums[b] = L::of(column[b]).mul_add(factor, sums[b]);
+            sum[b] = L::of(column[b]).mul_add(factor, sum[b]);
+        }
+    }
+    sum
+}
+
+/// The sums of order k, k even, and those of order k+1 as far as they are known before it: without the term of v_{k+1} and e_1.
+#[inline(always)]
+fn sums<L: Lanes, const B: usize>(scratch: &Scratch<B>, k: usize) -> [Sums<L, B>; 2] {
+    let zero = [L::splat(0.0); B];
+    let mut sums = [Sums { g: [zero; 2], load: zero }; 2];
+    for b in 0..B {
+        let nothing = L::splat(0.0);
+        let mut chains = [[nothing; 4]; 2];
+        // Each e serves order k+1, and order k one term later.
+        let (mut c, mut s) = (L::of(scratch.e[k + 1][0][b]), L::of(scratch.e[k + 1][1][b]));
+        // The newest e first, the newest v last.
+        for (newer, older) in scratch.v[1..=k].iter().zip(scratch.e[1..=k].iter().rev()) {
+            let (v, px, py) = (L::of(newer[0][b]), L::of(newer[1][b]), L::of(newer[2][b]));
+            let [gx, gy, x, y] = chains[1];
+            chains[1] = [v.mul_add(c, gx), v.mul_add(s, gy), px.mul_add(c, x), py.mul_add(s, y)];
+            (c, s) = (L::of(older[0][b]), L::of(older[1][b]));
+            let [gx, gy, x, y] = chains[0];
+            chains[0] = [v.mul_add(c, gx), v.mul_add(s, gy), px.mul_add(c, x), py.mul_add(s, y)];
+        }
+        for (sums, [gx, gy, x, y]) in sums.iter_mut().zip(chains) {
+            (sums.g[0][b], sums.g[1][b], sums.load[b]) = (gx, gy, x.add(y));
+        }
+    }
+    sums
+}
+
+/// x/(k+1), rounded once in low orders.
+#[inline(always)]
+fn over<L: Lanes>(x: L, k: usize) -> L {
+    let r = L::splat(1.0 / k as f64);
+    match RECIPROCAL_REST.get(k) {
+        Some(&rest) => x.mul_add(r, x.mul(L::splat(rest))),
+        None => x.mul(r),
+    }
+}
+
+/// e_{k+1} from f_k.
+#[inline(always)]
+fn turn<L: Lanes, const B: usize>(scratch: &mut Scratch<B>, k: usize, f: [[L; B]; 2]) -> [[L; B]; 2] {
+    let mut e = f;
+    for b in 0..B {
+        (e[0][b], e[1][b]) = (L::splat(0.0).sub(over(f[1][b], k + 1)), over(f[0][b], k + 1));
+    }
+    scratch.e[k + 1] = [store(e[0]), store(e[1])];
+    e
+}
+
+/// Order k: v_{k+1}, P_{k+1} and f_{k+1} from the sums and e_{k+1}.
+#[inline(always)]
+fn order<L: Lanes, const B: usize>(
+    (coupling, columns): (&[Row<B>], &[Column<B>]),
+    start: &Start<L, B>,
+    scratch: &mut Scratch<B>,
+    k: usize,
+    sums: Sums<L, B>,
+    e: [[L; B]; 2],
+) -> [[L; B]; 2] {
+    let Sums { mut g, load: mut r } = sums;
+    let [c, s]: [[L; B]; 2] = [load(&scratch.e[k][0]), load(&scratch.e[k][1])];
+    for b in 0..B {
+        (g[0][b], g[1][b]) = (start.v[b].mul_add(e[0][b], g[0][b]), start.v[b].mul_add(e[1][b], g[1][b]));
+        r[b] = s[b].neg_mul_add(start.weight[0][b], c[b].mul_add(start.weight[1][b], L::splat(0.0).sub(r[b])));
+    }
+    let v = if k < 2 { refined((coupling, columns), start, k, r, g) } else { solved(columns, k, r, g) };
+    let mut f = g;
+    for b in 0..B {
+        (f[0][b], f[1][b]) = (v[b].mul_add(start.e[0][b], g[0][b]), v[b].mul_add(start.e[1][b], g[1][b]));
+    }
+    let rate = L::splat((k + 1) as f64);
+    let mut scaled = f;
+    for b in 0..B {
+        (scaled[0][b], scaled[1][b]) = (f[0][b].mul(rate), f[1][b].mul(rate));
+    }
+    let (fx, fy) = (store(scaled[0]), store(scaled[1]));
+    let (mut px, mut py) = ([L::splat(0.0); B], [L::splat(0.0); B]);
+    for ((column, &x), &y) in coupling.iter().zip(fx.as_flattened()).zip(fy.as_flattened()) {
+        let (x, y) = (L::splat(x), L::splat(y));
+        for b in 0..B {
+            let column = L::of(column[b]);
+            (px[b], py[b]) = (column.mul_add(x, px[b]), column.mul_add(y, py[b]));
+        }
+    }
+    scratch.v[k + 1] = [store(v), store(px), store(py)];
+    f
+}
+
+/// M_0⁻¹ r/(k+1) - C g_x - S g_y.
+#[inline(always)]
+fn solved<L: Lanes, const B: usize>(columns: &[Column<B>], k: usize, mut r: [L; B], g: [[L; B]; 2]) -> [L; B] {
+    for b in 0..B {
+        r[b] = over(r[b], k + 1);
+    }
+    let (r, gx, gy) = (store(r), store(g[0]), store(g[1]));
+    let zero = [L::splat(0.0); B];
+    let (mut direct, mut swung) = (zero, [zero; 2]);
+    for (((column, &r), &x), &y) in columns.iter().zip(r.as_flattened()).zip(gx.as_flattened()).zip(gy.as_flattened()) {
+        let (r, x, y) = (L::splat(r), L::splat(x), L::splat(y));
+        for b in 0..B {
+            direct[b] = L::of(column.inverse[b]).mul_add(r, direct[b]);
+            swung[0][b] = L::of(column.cos[b]).mul_add(x, swung[0][b]);
+            swung[1][b] = L::of(column.sin[b]).mul_add(y, swung[1][b]);
         }
     }
     for b in 0..B {
-        even[b] = even[b].add(odd[b]);
+        direct[b] = direct[b].add(swung[0][b].add(swung[1][b]));
     }
-    even
+    direct
+}
+
+/// The same for the first orders, rounded, not merely computed: one step of the residual.
+#[inline(always)]
+fn refined<L: Lanes, const B: usize>(
+    (coupling, columns): (&[Row<B>], &[Column<B>]),
+    start: &Start<L, B>,
+    k: usize,
+    mut r: [L; B],
+    g: [[L; B]; 2],
+) -> [L; B] {
+    let (ax, ay): ([L; B], [L; B]) = (apply(coupling.iter(), &store(g[0])), apply(coupling.iter(), &store(g[1])));
+    for b in 0..B {
+        let inner = start.e[0][b].mul_add(ax[b], start.e[1][b].mul(ay[b]));
+        r[b] = L::splat((k + 1) as f64).neg_mul_add(inner, r[b]);
+    }
+    let mut x = apply::<L, B>(columns.iter().map(|column| &column.inverse), &store(r));
+    let product = apply::<L, B>(columns.iter().map(|column| &column.mass), &store(x));
+    for b in 0..B {
+        r[b] = start.diagonal[b].neg_mul_add(x[b], r[b]).sub(product[b]);
+    }
+    let rest = apply::<L, B>(columns.iter().map(|column| &column.inverse), &store(r));
+    for b in 0..B {
+        x[b] = over(x[b].add(rest[b]), k + 1);
+    }
+    x
 }
 
 /// One step of at most `left` \[s\]; returns the step wanted and the step taken.
 #[inline(always)]
 pub fn step<L: Lanes, const P: usize, const B: usize>(bodies: &mut Bodies<B>, pace: &Pace, state: &mut State, left: f64) -> (f64, f64) {
-    let n = bodies.count;
     begin::<L, B>(bodies, state);
-    let zero = [L::splat(0.0); B];
-    let Bodies { coupling, diagonal, weight, inverse, columns, scratch, .. } = bodies;
-    let (c0, s0, v0): ([L; B], [L; B], [L; B]) = (load(&scratch.c[0]), load(&scratch.s[0]), load(&scratch.v[0]));
-    let (wx, wy): ([L; B], [L; B]) = (load(&weight[0]), load(&weight[1]));
-    let (mut fx, mut fy) = (zero, zero);
+    let Bodies { coupling, diagonal, weight, columns, scratch, .. } = bodies;
+    let start: Start<L, B> = Start {
+        e: [load(&scratch.e[0][0]), load(&scratch.e[0][1])],
+        v: load(&scratch.v[0][0]),
+        weight: [load(&weight[0]), load(&weight[1])],
+        diagonal: load(diagonal),
+    };
+    let mut f = start.e;
     for b in 0..B {
-        (fx[b], fy[b]) = (v0[b].mul(c0[b]), v0[b].mul(s0[b]));
+        (f[0][b], f[1][b]) = (start.v[b].mul(start.e[0][b]), start.v[b].mul(start.e[1][b]));
     }
-    for k in 0..P {
-        let r = L::splat(1.0 / (k + 1) as f64);
-        let rest = L::splat(RECIPROCAL_REST.get(k + 1).copied().unwrap_or(0.0));
-        let (mut c, mut s) = (zero, zero);
+    for k in (0..P).step_by(2) {
+        let e = turn(scratch, k, f);
+        let [first, mut second] = sums::<L, B>(scratch, k);
+        f = order((coupling, columns), &start, scratch, k, first, e);
+        let e = turn(scratch, k + 1, f);
         for b in 0..B {
-            s[b] = fx[b].mul_add(r, fx[b].mul(rest));
-            c[b] = L::splat(0.0).sub(fy[b].mul_add(r, fy[b].mul(rest)));
+            let [v, px, py] = &scratch.v[k + 1];
+            let (v, px, py) = (L::of(v[b]), L::of(px[b]), L::of(py[b]));
+            let (c, s) = (L::of(scratch.e[1][0][b]), L::of(scratch.e[1][1][b]));
+            (second.g[0][b], second.g[1][b]) = (v.mul_add(c, second.g[0][b]), v.mul_add(s, second.g[1][b]));
+            second.load[b] = px.mul_add(c, py.mul_add(s, second.load[b]));
         }
-        store(&mut scratch.c[k + 1], c);
-        store(&mut scratch.s[k + 1], s);
-        // The newest coefficients last.
-        let (mut gx, mut gy, mut load_x, mut load_y) = (zero, zero, zero, zero);
-        for j in 1..=k {
-            for b in 0..B {
-                let (c, s) = (L::of(scratch.c[k + 1 - j][b]), L::of(scratch.s[k + 1 - j][b]));
-                let v = L::of(scratch.v[j][b]);
-                (gx[b], gy[b]) = (v.mul_add(c, gx[b]), v.mul_add(s, gy[b]));
-                load_x[b] = c.mul_add(L::of(scratch.px[j][b]), load_x[b]);
-                load_y[b] = s.mul_add(L::of(scratch.py[j][b]), load_y[b]);
-            }
-        }
-        let (mut ax, mut ay): (Row<B>, Row<B>) = ([[0.0; 4]; B], [[0.0; 4]; B]);
-        for b in 0..B {
-            (gx[b], gy[b]) = (v0[b].mul_add(c[b], gx[b]), v0[b].mul_add(s[b], gy[b]));
-            (ax[b], ay[b]) = (gx[b].array(), gy[b].array());
-        }
-        let (ax, ay) = (apply::<L, B>(coupling, &ax, zero), apply::<L, B>(coupling, &ay, zero));
-        let mut torque = zero;
-        let order = L::splat((k + 1) as f64);
-        for b in 0..B {
-            let (c, s) = (L::of(scratch.c[k][b]), L::of(scratch.s[k][b]));
-            let weights = s.neg_mul_add(wx[b], c.mul(wy[b]));
-            let inner = c0[b].mul_add(ax[b], s0[b].mul(ay[b]));
-            torque[b] = order.neg_mul_add(inner, weights.sub(load_x[b].add(load_y[b])));
-        }
-        let mut right: Row<B> = [[0.0; 4]; B];
-        store(&mut right, torque);
-        let mut x = apply::<L, B>(inverse, &right, zero);
-        if k < 2 {
-            // x is rounded, not merely computed: one step of the residual.
-            let mut found: Row<B> = [[0.0; 4]; B];
-            store(&mut found, x);
-            let product = apply::<L, B>(columns, &found, zero);
-            for b in 0..B {
-                torque[b] = L::of(diagonal[b]).neg_mul_add(x[b], torque[b]).sub(product[b]);
-            }
-            store(&mut right, torque);
-            x = apply::<L, B>(inverse, &right, x);
-        }
-        let mut newest: [Row<B>; 2] = [[[0.0; 4]; B]; 2];
-        for b in 0..B {
-            let v = x[b].mul_add(r, x[b].mul(rest));
-            scratch.v[k + 1][b] = v.array();
-            (fx[b], fy[b]) = (v.mul_add(c0[b], gx[b]), v.mul_add(s0[b], gy[b]));
-            newest[0][b] = fx[b].mul(order).array();
-            newest[1][b] = fy[b].mul(order).array();
-        }
-        store(&mut scratch.px[k + 1], apply::<L, B>(coupling, &newest[0], zero));
-        store(&mut scratch.py[k + 1], apply::<L, B>(coupling, &newest[1], zero));
+        f = order((coupling, columns), &start, scratch, k + 1, second, e);
     }
     let mut sizes = [0.0; super::JUDGES];
     for (i, size) in sizes.iter_mut().enumerate() {
-        let row = &scratch.v[P - i];
         let mut largest = L::splat(0.0);
-        for &lanes in row {
+        for &lanes in &scratch.v[P - i][0] {
             largest = L::of(lanes).abs().max(largest);
         }
         *size = largest.array().into_iter().fold(0.0, |a, b| if a > b { a } else { b });
     }
-    if !scratch.v[P].iter().flatten().all(|v| v.is_finite()) {
+    if !scratch.v[P][0].iter().flatten().all(|v| v.is_finite()) {
         return (f64::NAN, 0.0);
     }
     let wanted = pace.step::<P>(&sizes);
     let h = pace::taken(wanted, left);
     if h > 0.0 {
-        finish::<L, P, B>(scratch, state, n, h);
+        finish::<L, P, B>(scratch, state, bodies.count, h);
     }
     (wanted, h)
 }
 
-/// Power zero, and M_0⁻¹.
+/// Power zero, M_0 and what is formed from it.
 #[inline(always)]
 fn begin<L: Lanes, const B: usize>(bodies: &mut Bodies<B>, state: &State) {
     let n = bodies.count;
-    let scratch = &mut bodies.scratch;
+    let Bodies { coupling, diagonal, columns, scratch, .. } = bodies;
     let mut pairs = [[0.0; 2]; 8];
     for first in (0..n).step_by(2) {
         let second = (first + 1).min(n - 1);
@@ -250,29 +358,59 @@ fn begin<L: Lanes, const B: usize>(bodies: &mut Bodies<B>, state: &State) {
         pairs[second] = [cb, sb];
     }
     for (i, [c, s]) in pairs.into_iter().enumerate().take(n) {
-        scratch.c[0][i / 4][i % 4] = c;
-        scratch.s[0][i / 4][i % 4] = s;
-        scratch.v[0][i / 4][i % 4] = state.y[n + i];
+        scratch.e[0][0][i / 4][i % 4] = c;
+        scratch.e[0][1][i / 4][i % 4] = s;
+        scratch.v[0][0][i / 4][i % 4] = state.y[n + i];
     }
-    let mass = &mut bodies.mass;
-    for j in 0..n {
+    let [c, s]: [[L; B]; 2] = [load(&scratch.e[0][0]), load(&scratch.e[0][1])];
+    let pulls = diagonal.as_flattened();
+    for (j, (column, coupling)) in columns.iter_mut().zip(coupling.iter()).enumerate() {
+        let (cos, sin, pull) = (L::splat(pairs[j][0]), L::splat(pairs[j][1]), L::splat(pulls[j]));
+        let unit = unit::<L, B>(j);
         for b in 0..B {
-            let cosine = L::of(scratch.c[0][b]).mul_add(L::splat(pairs[j][0]), L::of(scratch.s[0][b]).mul(L::splat(pairs[j][1])));
-            bodies.columns[j][b] = L::of(bodies.coupling[j][b]).mul(cosine).array();
+            let mass = L::of(coupling[b]).mul(c[b].mul_add(cos, s[b].mul(sin)));
+            column.mass[b] = mass.array();
+            column.inverse[b] = unit[b].mul_add(pull, mass).array();
         }
-        for i in 0..j {
-            mass[i * n + j] = bodies.columns[j][i / 4][i % 4];
-        }
-        mass[j * n + j] = bodies.diagonal[j / 4][j % 4];
     }
-    tree::factor::<f64, 0>(n, mass, &mut bodies.pivot);
-    let mut unit = [0.0; 8];
+    invert::<L, B>(columns);
     for j in 0..n {
-        unit.fill(0.0);
-        unit[j] = 1.0;
-        tree::solve::<f64, 0>(n, mass, &bodies.pivot, &mut unit[..n]);
-        for (i, &entry) in unit.iter().enumerate().take(n) {
-            bodies.inverse[j][i / 4][i % 4] = entry;
+        let mut sides = [[[0.0; 4]; B]; 2];
+        for b in 0..B {
+            let coupling = L::splat(0.0).sub(L::of(coupling[j][b]));
+            (sides[0][b], sides[1][b]) = (coupling.mul(c[b]).array(), coupling.mul(s[b]).array());
+        }
+        let cos = apply::<L, B>(columns.iter().map(|column| &column.inverse), &sides[0]);
+        let sin = apply::<L, B>(columns.iter().map(|column| &column.inverse), &sides[1]);
+        (columns[j].cos, columns[j].sin) = (store(cos), store(sin));
+    }
+}
+
+/// One in lane j, nothing elsewhere.
+#[inline(always)]
+fn unit<L: Lanes, const B: usize>(j: usize) -> [L; B] {
+    let mut unit = [[0.0; 4]; B];
+    unit[j / 4][j % 4] = 1.0;
+    load(&unit)
+}
+
+/// The inverse of the positive definite matrix in its place, by Gauss–Jordan: column p turned into that of the unit matrix, p = 0, 1, ….
+#[inline(always)]
+fn invert<L: Lanes, const B: usize>(columns: &mut [Column<B>]) {
+    for p in 0..columns.len() {
+        let unit = unit::<L, B>(p);
+        let pivot = 1.0 / columns[p].inverse[p / 4][p % 4];
+        let (mut keep, mut full) = (unit, unit);
+        for b in 0..B {
+            keep[b] = L::splat(1.0).sub(unit[b]);
+            full[b] = keep[b].neg_mul_add(L::of(columns[p].inverse[b]), unit[b]);
+        }
+        for (j, column) in columns.iter_mut().enumerate() {
+            let factor = L::splat(if j == p { pivot } else { column.inverse[p / 4][p % 4] * pivot });
+            for b in 0..B {
+                let kept = if j == p { L::splat(0.0) } else { keep[b].mul(L::of(column.inverse[b])) };
+                column.inverse[b] = full[b].mul_add(factor, kept).array();
+            }
         }
     }
 }
@@ -291,14 +429,14 @@ fn finish<L: Lanes, const P: usize, const B: usize>(scratch: &Scratch<B>, state:
         let (mut angles, mut rates) = ([L::splat(0.0); 2], [L::splat(0.0); 2]);
         let mut k = P;
         while k > 0 {
-            let v = L::of(scratch.v[k][b]);
+            let v = L::of(scratch.v[k][0][b]);
             let r = L::splat(1.0 / (k + 1) as f64);
             let term = if k + 1 < RECIPROCAL_REST.len() { v.mul_add(r, v.mul(L::splat(RECIPROCAL_REST[k + 1]))) } else { v.mul(r) };
             angles[k % 2] = angles[k % 2].mul_add(square, term);
             rates[k % 2] = rates[k % 2].mul_add(square, v);
             k -= 1;
         }
-        let angle = angles[0].mul_add(step, angles[1]).mul_add(step, L::of(scratch.v[0][b])).mul(step).array();
+        let angle = angles[0].mul_add(step, angles[1]).mul_add(step, L::of(scratch.v[0][0][b])).mul(step).array();
         let rate = rates[0].mul_add(step, rates[1]).mul(step).array();
         for lane in 0..4 {
             let i = 4 * b + lane;

@@ -23,7 +23,7 @@ use super::terms::left_over;
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::dynamics::row::Row;
-use crate::dynamics::{Mechanism, Time};
+use crate::dynamics::{Mechanism, State, Time};
 use crate::scene::Law;
 
 /// Largest order there is room for.
@@ -50,6 +50,25 @@ pub struct Flow {
     pub high: [f64; 3],
     /// What they leave out.
     pub low: [f64; 3],
+}
+
+impl Flow {
+    /// From the unknowns `[phi, v, work]`.
+    #[inline(always)]
+    pub fn of(state: &State) -> Self {
+        let read = |unknowns: &[f64]| match *unknowns {
+            [phi, v, work, ..] => [phi, v, work],
+            _ => [f64::NAN; 3],
+        };
+        Self { high: read(&state.y), low: read(&state.low) }
+    }
+
+    /// Back into the state.
+    #[inline(always)]
+    pub fn write(&self, state: &mut State) {
+        state.y[..3].copy_from_slice(&self.high);
+        state.low[..3].copy_from_slice(&self.low);
+    }
 }
 
 /// Coefficients of one step.
@@ -112,7 +131,7 @@ fn older<L: Lanes, const K: usize>(scratch: &Scratch) -> [L; 2] {
             }
         }
     }
-    sums.map(|[below, above]| below.add(above))
+    [sums[0][0].add(sums[0][1]), sums[1][0].add(sums[1][1])]
 }
 
 /// E_K, and v_K in every lane (m_0 where K = 0).

@@ -75,7 +75,7 @@ pub fn step<L: Lanes, const P: usize>(pair: &Pair, pace: &Pace, scratch: &mut Sc
         (plain.e[k], plain.v[k], plain.g[k]) = (e[k].hi.array(), v[k].hi.array(), g[k].hi.array());
         scratch.low[k] = v[k].lo.array();
     }
-    let start = Start::new(pair, e[0].hi, v[0].hi, inverse.map(|entry| entry.hi));
+    let start = Start::new(pair, e[0].hi, v[0].hi, [inverse[0].hi, inverse[1].hi]);
     pair::expand::<L, P, LEADING>(&start, plain, Newest { v: v[LEADING].hi, e: e[LEADING].hi, g: rest.hi });
     let wanted = pair::wanted::<L, P>(pace, plain);
     if wanted.is_nan() {

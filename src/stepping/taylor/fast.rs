@@ -83,59 +83,52 @@ fn of_order<const P: usize>(is_portable: bool) -> (Step, Go) {
 
 #[inline(always)]
 fn step<L: Lanes, const P: usize>(form: &mut Form, pace: &Pace, state: &mut State, left: f64) -> (f64, f64) {
-    match (form, &mut state.y[..], &mut state.low[..]) {
-        (Form::Pair(pair, scratch), [phi1, phi2, v1, v2, ..], [phi1_low, phi2_low, v1_low, v2_low, ..]) => {
-            let mut flow = pair::Flow { high: [*phi1, *v1, *phi2, *v2], low: [*phi1_low, *v1_low, *phi2_low, *v2_low] };
+    match form {
+        Form::Pair(pair, scratch) => {
+            let mut flow = pair::Flow::of(pair, state);
             let steps = pair::step::<L, P>(pair, pace, scratch, &mut flow, left);
-            [*phi1, *v1, *phi2, *v2] = flow.high;
-            [*phi1_low, *v1_low, *phi2_low, *v2_low] = flow.low;
+            flow.write(pair, state);
             steps
         }
-        (Form::Extended(pair, scratch), [phi1, phi2, v1, v2, ..], [phi1_low, phi2_low, v1_low, v2_low, ..]) if P == EXTENDED => {
-            let mut flow = pair::Flow { high: [*phi1, *v1, *phi2, *v2], low: [*phi1_low, *v1_low, *phi2_low, *v2_low] };
+        Form::Extended(pair, scratch) if P == EXTENDED => {
+            let mut flow = pair::Flow::of(pair, state);
             let steps = extended::step::<L, P>(pair, pace, scratch, &mut flow, left);
-            [*phi1, *v1, *phi2, *v2] = flow.high;
-            [*phi1_low, *v1_low, *phi2_low, *v2_low] = flow.low;
+            flow.write(pair, state);
             steps
         }
-        (Form::Driven(driven, scratch), [phi, v, work, ..], [phi_low, v_low, work_low, ..]) => {
-            let mut flow = driven::Flow { high: [*phi, *v, *work], low: [*phi_low, *v_low, *work_low] };
+        Form::Driven(driven, scratch) => {
+            let mut flow = driven::Flow::of(state);
             let steps = driven::step::<L, P>(driven, pace, scratch, &mut flow, state.time, left);
-            [*phi, *v, *work] = flow.high;
-            [*phi_low, *v_low, *work_low] = flow.low;
+            flow.write(state);
             steps
         }
-        (Form::Few(bodies), ..) => bodies::step::<L, P, 1>(bodies, pace, state, left),
-        (Form::Several(bodies), ..) => bodies::step::<L, P, 2>(bodies, pace, state, left),
-        _ => (f64::NAN, 0.0),
+        Form::Few(bodies) => bodies::step::<L, P, 1>(bodies, pace, state, left),
+        Form::Several(bodies) => bodies::step::<L, P, 2>(bodies, pace, state, left),
+        Form::Extended(..) => (f64::NAN, 0.0),
     }
 }
 
 /// Takes a state from the last step's start on by `h` \[s\].
 #[inline(always)]
 fn go<L: Lanes, const P: usize>(form: &Form, state: &mut State, h: f64) {
-    match (form, &mut state.y[..], &mut state.low[..]) {
-        (Form::Pair(_, scratch), [phi1, phi2, v1, v2, ..], [phi1_low, phi2_low, v1_low, v2_low, ..]) => {
-            let mut flow = pair::Flow { high: [*phi1, *v1, *phi2, *v2], low: [*phi1_low, *v1_low, *phi2_low, *v2_low] };
+    match form {
+        Form::Pair(pair, scratch) => {
+            let mut flow = pair::Flow::of(pair, state);
             pair::go::<L, P>(scratch, &mut flow, h);
-            [*phi1, *v1, *phi2, *v2] = flow.high;
-            [*phi1_low, *v1_low, *phi2_low, *v2_low] = flow.low;
+            flow.write(pair, state);
         }
-        (Form::Extended(_, scratch), [phi1, phi2, v1, v2, ..], [phi1_low, phi2_low, v1_low, v2_low, ..]) if P == EXTENDED => {
-            let mut flow = pair::Flow { high: [*phi1, *v1, *phi2, *v2], low: [*phi1_low, *v1_low, *phi2_low, *v2_low] };
+        Form::Extended(pair, scratch) => {
+            let mut flow = pair::Flow::of(pair, state);
             extended::go::<L, P>(scratch, &mut flow, h);
-            [*phi1, *v1, *phi2, *v2] = flow.high;
-            [*phi1_low, *v1_low, *phi2_low, *v2_low] = flow.low;
+            flow.write(pair, state);
         }
-        (Form::Driven(driven, scratch), [phi, v, work, ..], [phi_low, v_low, work_low, ..]) => {
-            let mut flow = driven::Flow { high: [*phi, *v, *work], low: [*phi_low, *v_low, *work_low] };
+        Form::Driven(driven, scratch) => {
+            let mut flow = driven::Flow::of(state);
             driven::go::<L, P>(driven, scratch, &mut flow, h);
-            [*phi, *v, *work] = flow.high;
-            [*phi_low, *v_low, *work_low] = flow.low;
+            flow.write(state);
         }
-        (Form::Few(bodies), ..) => bodies::go::<L, P, 1>(bodies, state, h),
-        (Form::Several(bodies), ..) => bodies::go::<L, P, 2>(bodies, state, h),
-        _ => {}
+        Form::Few(bodies) => bodies::go::<L, P, 1>(bodies, state, h),
+        Form::Several(bodies) => bodies::go::<L, P, 2>(bodies, state, h),
     }
 }
 

@@ -1,4 +1,4 @@
-//! Two bodies without springs and motors, in four lanes: `[c1, s1, c2, s2]` and `[v1, v1, v2, v2]`.
+//! One or two bodies without springs and motors, in four lanes: `[c1, s1, c2, s2]` and `[v1, v1, v2, v2]`.
 //!
 //! With v = phi', e = (cos phi, sin phi) and f = v e, the equation of body i reads, with A = A12, d_i the diagonal and W_i the weights,
 //!
@@ -22,9 +22,10 @@
 use super::direction;
 use super::pace::{self, Pace};
 use super::terms::{LEFT, left_over, less_over, over, over_first, pair_sum};
+use crate::arithmetic::Complex;
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::sum::two_product;
-use crate::dynamics::Mechanism;
+use crate::dynamics::{Mechanism, State};
 
 /// Largest order there is room for.
 pub const MOST: usize = 24;
@@ -32,6 +33,7 @@ pub const MOST: usize = 24;
 /// Constants of the mechanism.
 #[derive(Clone, Debug)]
 pub struct Pair {
+    is_single: bool,
     /// e × W as a product with `[c, s, c, s]` \[N·m\].
     pub(super) weight: [f64; 4],
     /// A \[kg·m²\].
@@ -53,6 +55,31 @@ pub struct Flow {
     pub low: [f64; 4],
 }
 
+impl Flow {
+    /// From the unknowns `[phi1, phi2, v1, v2]`, or `[phi1, v1]`.
+    #[inline(always)]
+    pub fn of(pair: &Pair, state: &State) -> Self {
+        let read = |unknowns: &[f64]| match *unknowns {
+            [phi, v, ..] if pair.is_single => [phi, v, 0.0, 0.0],
+            [phi1, phi2, v1, v2, ..] => [phi1, v1, phi2, v2],
+            _ => [f64::NAN; 4],
+        };
+        Self { high: read(&state.y), low: read(&state.low) }
+    }
+
+    /// Back into the state.
+    #[inline(always)]
+    pub fn write(&self, pair: &Pair, state: &mut State) {
+        for (unknowns, [phi1, v1, phi2, v2]) in [(&mut state.y, self.high), (&mut state.low, self.low)] {
+            if pair.is_single {
+                unknowns[..2].copy_from_slice(&[phi1, v1]);
+            } else {
+                unknowns[..4].copy_from_slice(&[phi1, phi2, v1, v2]);
+            }
+        }
+    }
+}
+
 /// Coefficients of one step.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
@@ -71,18 +98,23 @@ impl Default for Scratch {
 }
 
 impl Pair {
-    /// The constants, where this form fits: two bodies, all hinges and centres of mass on the bars' axes, neither springs nor rows nor walls.
+    /// The constants, where this form fits: one or two bodies, all hinges and centres of mass on the bars' axes, neither springs nor rows nor walls.
+    ///
+    /// One body has a second one beside it that feels nothing and stays where it is.
     pub fn new(mechanism: &Mechanism) -> Option<Self> {
         let tree = &mechanism.tree;
-        if tree.bodies != 2 || tree.off_axis || !mechanism.springs.is_empty() || !mechanism.rows.is_empty() {
+        if !(1..=2).contains(&tree.bodies) || tree.off_axis || !mechanism.springs.is_empty() || !mechanism.rows.is_empty() {
             return None;
         }
-        let (d, a) = ([tree.diagonal[0], tree.diagonal[1]], tree.coupling[1].re);
-        let [w1, w2] = [tree.weight[0], tree.weight[1]];
+        let is_single = tree.bodies == 1;
+        let second = if is_single { (1.0, 0.0, Complex::ZERO) } else { (tree.diagonal[1], tree.coupling[1].re, tree.weight[1]) };
+        let (d, w) = ([tree.diagonal[0], second.0], [tree.weight[0], second.2]);
+        let a = second.1;
         let product = two_product(d[0], d[1]);
-        let stiffness = d[1] * w1.norm_squared().sqrt() + d[0] * w2.norm_squared().sqrt();
+        let stiffness = d[1] * w[0].norm_squared().sqrt() + d[0] * w[1].norm_squared().sqrt();
         let rate = (stiffness / (product.0 - a * a)).sqrt();
-        Some(Self { weight: [w1.im, -w1.re, w2.im, -w2.re], coupling: a, diagonal: d, product, rate })
+        let weight = [w[0].im, -w[0].re, w[1].im, -w[1].re];
+        Some(Self { is_single, weight, coupling: a, diagonal: d, product, rate })
     }
 
     /// The longest step in which the terms left out still fall: a third of the order in the time of the fastest oscillation \[s\].

@@ -86,10 +86,10 @@ impl<L: Lanes> Wide<L> {
         Self::quick(self.hi, self.lo)
     }
 
-    /// One over each number.
+    /// One over the first number, in every lane.
     #[inline(always)]
     pub fn reciprocal(self) -> Self {
-        let first = L::of(self.hi.array().map(|hi| 1.0 / hi));
+        let first = L::of([1.0 / self.hi.array()[0]; 4]);
         let rest = self.lo.neg_mul_add(first, self.hi.neg_mul_add(first, L::splat(1.0)));
         Self::quick(first, first.mul(rest))
     }
@@ -159,9 +159,9 @@ pub fn unit<L: Lanes>(angle: Wide<L>) -> Wide<L> {
     let z = r.mul(r);
     let base =
         Wide { hi: r.hi.mul_add(L::of([0.0, 1.0, 0.0, 1.0]), L::of([1.0, 0.0, 1.0, 0.0])), lo: r.lo.mul(L::of([0.0, 1.0, 0.0, 1.0])) };
-    let [first, second, third, fourth, fifth] = COEFFICIENTS.map(L::of);
-    let tail = fifth.mul_add(z.hi, fourth).mul_add(z.hi, third).mul_add(z.hi, second).mul(z.hi);
-    let q = Wide { hi: first, lo: L::of([0.0, SIXTH_REST, 0.0, SIXTH_REST]) }.add(Wide::of(tail));
+    let [first, second, third, fourth, fifth] = COEFFICIENTS;
+    let tail = L::of(fifth).mul_add(z.hi, L::of(fourth)).mul_add(z.hi, L::of(third)).mul_add(z.hi, L::of(second)).mul(z.hi);
+    let q = Wide::from(first, [0.0, SIXTH_REST, 0.0, SIXTH_REST]).add(Wide::of(tail));
     let turned = base.add(z.mul(base).mul(q));
     let (cosine, sine) = (
         Wide::from([ca, ca, cb, cb], [ca_low, ca_low, cb_low, cb_low]),
