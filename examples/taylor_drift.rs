@@ -1,6 +1,6 @@
 //! Energy drift of the Taylor method on `free`: mean, its standard error, and root mean square over starts a little apart.
 //!
-//! `cargo run --release --example taylor_drift -- [SECONDS [STARTS [TOLERANCE]]]`; energies in double-double, divided by the scene's energy scale.
+//! `cargo run --release --example taylor_drift -- [SECONDS [STARTS [TOLERANCE]]] [extended]`; energies in double-double, divided by the scene's energy scale.
 
 use driftless::arithmetic::DoubleDouble;
 use driftless::dynamics::elimination::Elimination;
@@ -12,10 +12,12 @@ use std::sync::Arc;
 use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let numbers: Vec<f64> = std::env::args().skip(1).map(|word| word.parse()).collect::<Result<_, _>>()?;
+    let (settings, numbers): (Vec<String>, Vec<String>) = std::env::args().skip(1).partition(|word| word == "extended");
+    let numbers: Vec<f64> = numbers.iter().map(|word| word.parse()).collect::<Result<_, _>>()?;
+    let extended = !settings.is_empty();
     let until = numbers.first().copied().unwrap_or(1e4);
     let starts = numbers.get(1).map_or(16, |&count| count as usize);
-    let tolerance = numbers.get(2).copied().unwrap_or(1e-19);
+    let tolerance = numbers.get(2).copied().unwrap_or(if extended { 1e-21 } else { 1e-19 });
     let times: Vec<f64> = (0..).map(|i| 10f64.powf(3.0 + 0.5 * f64::from(i))).take_while(|&t| t < 0.99 * until).chain([until]).collect();
     let mut errors = vec![Vec::new(); times.len()];
     let begin = Instant::now();
@@ -27,6 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut state = problem.state(&mechanism.start(&scene));
         let mut method = Taylor::<f64>::with_order(tolerance, 24);
         method.max_steps = u64::MAX;
+        method.extended = extended;
         let mut kernel = Kernel::<DoubleDouble>::new(2, 0);
         let mut energy = |problem: &mut Elimination<0>, state: &_| {
             let mut motion = Motion::default();

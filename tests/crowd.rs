@@ -140,3 +140,23 @@ fn one_bad_trajectory_leaves_the_others_alone() {
     assert_eq!(entrants[3].state.time, Time::from(2.0));
     assert!(!Crowd::takes(&motor) && Crowd::takes(&mechanism));
 }
+
+/// Released from rest both bars horizontal only every fourth power is there; hanging, none; both upright, they stay.
+#[test]
+fn symmetric_releases_and_equilibria_are_no_trap() {
+    let angles = [("1.5707963267948966", "1.5707963267948966"), ("0", "0"), ("3.141592653589793", "3.141592653589793")];
+    for (phi1, phi2) in angles {
+        let scene = shipped("free", &[&format!("start.bar1.phi={phi1}"), &format!("start.bar2.phi={phi2}")]);
+        let mechanism = compile(&scene);
+        let mut entrants = [Entrant::new(&mechanism, start(&mechanism, &scene))];
+        Crowd::new(tight()).march(&mut entrants, Time::from(1.0), &mut |_, _| Going::On);
+        let mut exact = start(&mechanism, &scene);
+        let mut problem = Elimination::<0>::new(Arc::clone(&mechanism));
+        let mut tally = Default::default();
+        Taylor::reference().advance(&mut problem, &mut exact, Time::from(1.0), &mut tally, &mut |_, _| Ok(Seen::Kept)).expect("an end");
+        for i in 0..4 {
+            let error = (entrants[0].state.unknown(i) - exact.unknown(i)).hi.abs();
+            assert!(error < 1e-14 * f64::exp(8.0), "{phi1}, unknown {i}: {error:e}");
+        }
+    }
+}

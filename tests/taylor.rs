@@ -485,7 +485,7 @@ fn symmetric_releases_and_equilibria_take_finite_steps() {
                     assert_eq!((&last.phi, &last.omega), (&start.phi, &start.omega), "{name}");
                 }
                 let fastest = last.omega.iter().fold(0.0, |most: f64, omega| most.max(omega.hi.abs()));
-                assert!(!name.starts_with("nearly hanging") || fastest < 1e-299, "{fastest:e}");
+                assert!(!name.starts_with("nearly hanging") || fastest < 1e-299, "{name}, {kernel:?} of order {order}: {fastest:e}");
             }
         }
     }

@@ -7,8 +7,15 @@
 //! A kernel is written once over [`Lanes`], every function of it `#[inline(always)]`, and compiled twice: the outermost function of the fast
 //! build carries `#[target_feature(enable = "avx,fma")]` and is entered only after [`available`] has said yes.
 
+use std::fmt::Debug;
+
 /// Four doubles; lanes 0-1 and 2-3 are pairs, which are halves of the vector.
-pub trait Lanes: Copy {
+pub trait Lanes: Copy + Debug + 'static {
+    /// 0 in every lane.
+    const ZERO: Self;
+    /// 1 in every lane.
+    const ONE: Self;
+
     /// From an array.
     fn of(lanes: [f64; 4]) -> Self;
     /// As an array.
@@ -21,6 +28,10 @@ pub trait Lanes: Copy {
     fn sub(self, other: Self) -> Self;
     /// Product.
     fn mul(self, other: Self) -> Self;
+    /// Quotient.
+    fn div(self, other: Self) -> Self;
+    /// Square roots.
+    fn sqrt(self) -> Self;
     /// `self · factor + addend`, rounded once.
     fn mul_add(self, factor: Self, addend: Self) -> Self;
     /// `addend - self · factor`, rounded once.
@@ -35,6 +46,10 @@ pub trait Lanes: Copy {
     fn abs(self) -> Self;
     /// The larger ones; `other` where one is not a number.
     fn max(self, other: Self) -> Self;
+    /// True where every lane is at most `bound` in magnitude; false where one is not a number.
+    fn are_within(self, bound: f64) -> bool;
+    /// The negatives, zeros included.
+    fn neg(self) -> Self;
 }
 
 /// Plain code, with a software fused multiply-add where the processor lacks one.
@@ -56,6 +71,9 @@ fn fused(a: [f64; 4], b: [f64; 4], c: [f64; 4]) -> [f64; 4] {
 }
 
 impl Lanes for Portable {
+    const ZERO: Self = Self([0.0; 4]);
+    const ONE: Self = Self([1.0; 4]);
+
     #[inline(always)]
     fn of(lanes: [f64; 4]) -> Self {
         Self(lanes)
@@ -87,13 +105,23 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self.zip(other, |a, b| a / b)
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.map(f64::sqrt))
+    }
+
+    #[inline(always)]
     fn mul_add(self, factor: Self, addend: Self) -> Self {
         Self(fused(self.0, factor.0, addend.0))
     }
 
     #[inline(always)]
     fn neg_mul_add(self, factor: Self, addend: Self) -> Self {
-        Self(self.0.map(|x| -x)).mul_add(factor, addend)
+        self.neg().mul_add(factor, addend)
     }
 
     #[inline(always)]
@@ -119,6 +147,16 @@ impl Lanes for Portable {
     #[inline(always)]
     fn max(self, other: Self) -> Self {
         self.zip(other, |a, b| if a > b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn are_within(self, bound: f64) -> bool {
+        self.0.iter().all(|x| x.abs() <= bound)
+    }
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(self.0.map(|x| -x))
     }
 }
 
@@ -158,7 +196,19 @@ mod hardware {
         }};
     }
 
+    /// The same double in every lane, as a constant.
+    const fn constant(value: f64) -> Avx {
+        // SAFETY: both types are four doubles without padding, and every pattern of bits is valid in each.
+        #[allow(unsafe_code)]
+        unsafe {
+            std::mem::transmute::<[f64; 4], Avx>([value; 4])
+        }
+    }
+
     impl Lanes for Avx {
+        const ZERO: Self = constant(0.0);
+        const ONE: Self = constant(1.0);
+
         #[inline(always)]
         fn of(lanes: [f64; 4]) -> Self {
             instruction!(Self(_mm256_loadu_pd(lanes.as_ptr())))
@@ -189,6 +239,16 @@ mod hardware {
         #[inline(always)]
         fn mul(self, other: Self) -> Self {
             instruction!(Self(_mm256_mul_pd(self.0, other.0)))
+        }
+
+        #[inline(always)]
+        fn div(self, other: Self) -> Self {
+            instruction!(Self(_mm256_div_pd(self.0, other.0)))
+        }
+
+        #[inline(always)]
+        fn sqrt(self) -> Self {
+            instruction!(Self(_mm256_sqrt_pd(self.0)))
         }
 
         #[inline(always)]
@@ -225,6 +285,16 @@ mod hardware {
         fn max(self, other: Self) -> Self {
             instruction!(Self(_mm256_max_pd(self.0, other.0)))
         }
+
+        #[inline(always)]
+        fn are_within(self, bound: f64) -> bool {
+            instruction!(_mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LE_OQ>(self.abs().0, _mm256_set1_pd(bound))) == 0b1111)
+        }
+
+        #[inline(always)]
+        fn neg(self) -> Self {
+            instruction!(Self(_mm256_xor_pd(_mm256_set1_pd(-0.0), self.0)))
+        }
     }
 }
 
@@ -241,6 +311,9 @@ mod tests {
             x.add(y),
             x.sub(y),
             x.mul(y),
+            x.div(y),
+            x.abs().sqrt(),
+            x.neg(),
             x.mul_add(y, z),
             x.neg_mul_add(y, z),
             x.swap_pairs(),
@@ -249,6 +322,9 @@ mod tests {
             x.abs(),
             x.max(y),
             L::splat(a[0]),
+            L::splat(f64::from(u8::from(x.are_within(500.0)))),
+            L::ZERO,
+            L::ONE,
         ]
         .iter()
         .map(|lanes| lanes.array().map(f64::to_bits))
@@ -282,6 +358,7 @@ mod tests {
         assert_eq!(x.swap_pairs().array(), [-2.0, 1.0, 4.0, 3.0]);
         assert_eq!(x.swap_halves().array(), [3.0, 4.0, 1.0, -2.0]);
         assert_eq!(x.abs().array(), [1.0, 2.0, 3.0, 4.0]);
+        assert!(x.are_within(4.0) && !x.are_within(3.0) && !Portable::splat(f64::NAN).are_within(1.0));
         assert_eq!(x.neg_mul_add(x, x).array(), [0.0, -6.0, -6.0, -12.0]);
         let nearly = 1.0 + f64::EPSILON;
         assert_eq!(

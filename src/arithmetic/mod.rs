@@ -10,7 +10,10 @@
 pub mod angle;
 pub mod complex;
 pub mod double_double;
+pub mod eight;
 pub mod lanes;
+pub mod pairs;
+pub mod sincos;
 pub mod sum;
 
 pub use complex::Complex;

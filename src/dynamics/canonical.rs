@@ -11,10 +11,14 @@
 //! Unknowns: u (f), p (f) \[kg·m²/s\] and, where angles are driven or dampers present, p_t \[J\], started at (M w)·s' so that the work done
 //! is (M w)·s' - p_t at any time, without a quadrature.  Dampers add their generalized force to p' and take their power out of p_t'.
 
+mod stages;
+
 use super::kernel::{Kernel, dot};
+use super::law::Phase;
 use super::tree::{self, size};
-use super::{Field, Form, Mechanism, Motion, State, Time};
+use super::{Field, Form, Mechanism, Motion, Points, State, Time};
 use crate::arithmetic::{DoubleDouble, Real, Scalar};
+use stages::Stages;
 use std::sync::Arc;
 
 /// Equations in coordinates and momenta, for `N` bodies (any number where `N` is 0); `ACCOUNT` carries p_t.
@@ -23,32 +27,34 @@ pub struct Canonical<const N: usize, const ACCOUNT: bool> {
     mechanism: Arc<Mechanism>,
     work: Scratch<f64>,
     exact: Scratch<DoubleDouble>,
+    stages: Stages,
 }
 
 /// Scratch space of one evaluation.
 #[derive(Clone, Debug)]
 struct Scratch<T> {
     kernel: Kernel<T>,
-    phi: Vec<T>,
-    omega: Vec<T>,
+    /// The known part of every angle at the time of the evaluation (n); not looked at without an account.
+    drive: Vec<Phase<T>>,
     drive_rate: Vec<T>,
     drive_acceleration: Vec<T>,
+    omega: Vec<T>,
     momentum: Vec<T>,
     reduced: Vec<T>,
     pivot: Vec<T>,
     u_rate: Vec<T>,
 }
 
-impl<T: Real> Scratch<T> {
+impl<T: Scalar> Scratch<T> {
     fn new(mechanism: &Mechanism) -> Self {
         let (n, f) = (mechanism.bodies.len(), mechanism.ties.count());
         let zeros = || vec![T::ZERO; n];
         Self {
             kernel: Kernel::new(n, 0),
-            phi: zeros(),
-            omega: zeros(),
+            drive: vec![Phase::default(); n],
             drive_rate: zeros(),
             drive_acceleration: zeros(),
+            omega: zeros(),
             momentum: zeros(),
             reduced: vec![T::ZERO; f * f],
             pivot: vec![T::ZERO; f],
@@ -56,9 +62,15 @@ impl<T: Real> Scratch<T> {
         }
     }
 
+    /// Takes the known part of body `k`'s angle.
+    #[inline(always)]
+    fn drive(&mut self, k: usize, phase: Phase<T>) {
+        (self.drive_rate[k], self.drive_acceleration[k], self.drive[k]) = (phase.rate, phase.acceleration, phase);
+    }
+
     /// From u and p to unit vectors, twist and all rates: `u_rate`, `omega`.
     #[inline(always)]
-    fn velocities<const N: usize, const ACCOUNT: bool>(&mut self, mechanism: &Mechanism, t: Time, u: &[T], p: &[T]) {
+    fn velocities<const N: usize, const ACCOUNT: bool>(&mut self, mechanism: &Mechanism, u: &[T], p: &[T]) {
         let n = size::<N>(mechanism.bodies.len());
         if !ACCOUNT {
             self.kernel.face::<N>(u);
@@ -69,7 +81,9 @@ impl<T: Real> Scratch<T> {
             return;
         }
         let f = u.len();
-        mechanism.ties.expand(t, u, &mut self.phi, &mut self.kernel.z, &mut self.drive_rate, &mut self.drive_acceleration);
+        for (k, tie) in mechanism.ties.bodies.iter().enumerate() {
+            self.kernel.z[k] = tie.face(u, &self.drive[k]);
+        }
         mechanism.tree.couple::<T, N>(&self.kernel.z, &mut self.kernel.mass, &mut self.kernel.twist);
         tree::multiply::<T, N>(n, &self.kernel.mass, &self.drive_rate, &mut self.momentum);
         mechanism.ties.gather(&self.momentum, &mut self.u_rate);
@@ -83,14 +97,63 @@ impl<T: Real> Scratch<T> {
         mechanism.ties.spread(&self.u_rate, &mut self.omega);
         tree::multiply::<T, N>(n, &self.kernel.mass, &self.omega, &mut self.momentum);
     }
+
+    /// y' at the drives taken last.
+    #[inline(always)]
+    fn rate<const N: usize, const ACCOUNT: bool>(&mut self, mechanism: &Mechanism, y: &[T], rate: &mut [T]) {
+        let n = size::<N>(mechanism.bodies.len());
+        let f = if ACCOUNT { mechanism.ties.count() } else { n };
+        self.velocities::<N, ACCOUNT>(mechanism, &y[..f], &y[f..2 * f]);
+        let kernel = &mut self.kernel;
+        mechanism.tree.pull::<T, N>(&kernel.z, &self.omega, &kernel.twist, &mut kernel.load);
+        for spring in &mechanism.springs {
+            spring.span.pull(spring.elastic(&kernel.z), &kernel.z, &mut kernel.load);
+        }
+        if !ACCOUNT {
+            rate[..n].copy_from_slice(&self.omega[..n]);
+            rate[n..2 * n].copy_from_slice(&kernel.load[..n]);
+            return;
+        }
+        rate[2 * f] = dot(&kernel.load, &self.drive_rate) + dot(&self.momentum, &self.drive_acceleration);
+        let (u_part, p_part) = rate[..2 * f].split_at_mut(f);
+        u_part.copy_from_slice(&self.u_rate);
+        mechanism.ties.gather(&kernel.load, p_part);
+        if mechanism.is_damped() {
+            kernel.load.fill(T::ZERO);
+            for spring in mechanism.springs.iter().filter(|spring| spring.damping != 0.0) {
+                spring.span.pull(spring.drag(&kernel.z, &self.omega), &kernel.z, &mut kernel.load);
+            }
+            mechanism.ties.gather(&kernel.load, &mut self.pivot);
+            for (p, &drag) in p_part.iter_mut().zip(&self.pivot) {
+                *p += drag;
+            }
+            rate[2 * f] -= dot(&self.pivot, &self.u_rate);
+        }
+    }
+}
+
+impl<T: Real> Scratch<T> {
+    /// Takes the known parts of all angles at one time.
+    #[inline]
+    fn drive_at(&mut self, mechanism: &Mechanism, t: Time) {
+        for (k, tie) in mechanism.ties.bodies.iter().enumerate() {
+            self.drive(k, tie.drive(t));
+        }
+    }
 }
 
 impl<const N: usize, const ACCOUNT: bool> Canonical<N, ACCOUNT> {
     /// The form of a mechanism; `N` must be its number of bodies or 0, `ACCOUNT` true where it has rows or dampers.
     pub fn new(mechanism: Arc<Mechanism>) -> Self {
+        Self::with_lanes(mechanism, false)
+    }
+
+    /// The same; with `portable`, without the processor's vector instructions, to the same bits.
+    pub fn with_lanes(mechanism: Arc<Mechanism>, portable: bool) -> Self {
         debug_assert!(N == 0 || N == mechanism.bodies.len());
         debug_assert!(ACCOUNT || !mechanism.keeps_account());
-        Self { work: Scratch::new(&mechanism), exact: Scratch::new(&mechanism), mechanism }
+        let (work, exact) = (Scratch::new(&mechanism), Scratch::new(&mechanism));
+        Self { work, exact, stages: Stages::new(&mechanism, portable), mechanism }
     }
 }
 
@@ -105,36 +168,19 @@ impl<const N: usize, const ACCOUNT: bool> Field for Canonical<N, ACCOUNT> {
 
     #[inline]
     fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
-        let mechanism = &*self.mechanism;
-        let n = size::<N>(mechanism.bodies.len());
-        let f = if ACCOUNT { mechanism.ties.count() } else { n };
-        let scratch = &mut self.work;
-        scratch.velocities::<N, ACCOUNT>(mechanism, t, &y[..f], &y[f..2 * f]);
-        let kernel = &mut scratch.kernel;
-        mechanism.tree.pull::<f64, N>(&kernel.z, &scratch.omega, &kernel.twist, &mut kernel.load);
-        for spring in &mechanism.springs {
-            spring.span.pull(spring.elastic(&kernel.z), &kernel.z, &mut kernel.load);
+        if ACCOUNT {
+            self.work.drive_at(&self.mechanism, t);
         }
-        if !ACCOUNT {
-            rate[..n].copy_from_slice(&scratch.omega[..n]);
-            rate[n..2 * n].copy_from_slice(&kernel.load[..n]);
-            return;
-        }
-        rate[2 * f] = dot(&kernel.load, &scratch.drive_rate) + dot(&scratch.momentum, &scratch.drive_acceleration);
-        let (u_part, p_part) = rate[..2 * f].split_at_mut(f);
-        u_part.copy_from_slice(&scratch.u_rate);
-        mechanism.ties.gather(&kernel.load, p_part);
-        if mechanism.is_damped() {
-            kernel.load.fill(0.0);
-            for spring in mechanism.springs.iter().filter(|spring| spring.damping != 0.0) {
-                spring.span.pull(spring.drag(&kernel.z, &scratch.omega), &kernel.z, &mut kernel.load);
-            }
-            mechanism.ties.gather(&kernel.load, &mut scratch.pivot);
-            for (p, &drag) in p_part.iter_mut().zip(&scratch.pivot) {
-                *p += drag;
-            }
-            rate[2 * f] -= dot(&scratch.pivot, &scratch.u_rate);
-        }
+        self.work.rate::<N, ACCOUNT>(&self.mechanism, y, rate);
+    }
+
+    fn rates(&mut self, points: &mut Points) {
+        self.stages.rates::<N, ACCOUNT, false>(&self.mechanism, points);
+    }
+
+    fn exact_rates(&mut self, points: &mut Points) -> bool {
+        self.stages.rates::<N, ACCOUNT, true>(&self.mechanism, points);
+        true
     }
 
     fn label(&self, i: usize) -> String {
@@ -165,8 +211,7 @@ impl<const N: usize, const ACCOUNT: bool> Form for Canonical<N, ACCOUNT> {
         ties.gather(&scratch.momentum, &mut p);
         unknowns.extend(p);
         if ACCOUNT {
-            let u: Vec<DoubleDouble> = unknowns[..ties.count()].to_vec();
-            ties.expand(motion.time, &u, &mut scratch.phi, &mut scratch.kernel.z, &mut scratch.drive_rate, &mut scratch.drive_acceleration);
+            scratch.drive_at(&self.mechanism, motion.time);
             unknowns.push(dot(&scratch.momentum, &scratch.drive_rate) - motion.work);
         }
         ties.state(motion, &unknowns)
@@ -178,7 +223,10 @@ impl<const N: usize, const ACCOUNT: bool> Form for Canonical<N, ACCOUNT> {
         ties.read_angles(state, motion);
         let unknowns: Vec<DoubleDouble> = (0..state.y.len()).map(|i| state.unknown(i)).collect();
         let scratch = &mut self.exact;
-        scratch.velocities::<0, ACCOUNT>(&self.mechanism, state.time, &unknowns[..f], &unknowns[f..2 * f]);
+        if ACCOUNT {
+            scratch.drive_at(&self.mechanism, state.time);
+        }
+        scratch.velocities::<0, ACCOUNT>(&self.mechanism, &unknowns[..f], &unknowns[f..2 * f]);
         motion.omega.copy_from_slice(&scratch.omega);
         if ACCOUNT {
             motion.work = dot(&scratch.momentum, &scratch.drive_rate) - unknowns[2 * f];

@@ -68,9 +68,7 @@ impl<T: Scalar> Kernel<T> {
             correction: vec![T::ZERO; rows],
         }
     }
-}
 
-impl<T: Real> Kernel<T> {
     /// Unit vectors of these angles.
     #[inline(always)]
     pub fn face<const N: usize>(&mut self, phi: &[T]) {
@@ -80,7 +78,9 @@ impl<T: Real> Kernel<T> {
             z[k] = Complex::unit(phi[k]);
         }
     }
+}
 
+impl<T: Real> Kernel<T> {
     /// M, its twist and the whole load b (velocity terms, gravity, springs, dampers) at the unit vectors in `z`.
     #[inline(always)]
     pub fn assemble<const N: usize>(&mut self, mechanism: &Mechanism, omega: &[T]) {

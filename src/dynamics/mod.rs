@@ -39,6 +39,7 @@ pub mod law;
 pub mod multiplier;
 pub mod natural;
 pub mod point;
+pub mod points;
 pub mod reaction;
 pub mod row;
 pub mod series;
@@ -46,6 +47,7 @@ pub mod ties;
 pub mod tree;
 
 pub use compile::{CompileError, Mechanism};
+pub use points::Points;
 
 use crate::arithmetic::{DoubleDouble, Scalar, angle};
 
@@ -121,6 +123,16 @@ pub trait Field {
 
     /// Writes y' at (t, y).  Never fails: what cannot be computed comes out non-finite, and the method stops with [`Field::label`].
     fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]);
+
+    /// Writes y' at several points; a field that can evaluates them as lanes of one scalar.
+    fn rates(&mut self, points: &mut Points) {
+        points.each(|t, y, rate| self.rate(t, y, rate));
+    }
+
+    /// Writes y' and what it leaves out at points given with what *they* leave out; false, and nothing written, where the field cannot.
+    fn exact_rates(&mut self, _points: &mut Points) -> bool {
+        false
+    }
 
     /// What unknown `i` is, for messages: `omega of bar2`.
     fn label(&self, i: usize) -> String;

@@ -51,19 +51,19 @@ impl Point {
     }
 
     /// P \[m\].
-    #[inline]
+    #[inline(always)]
     pub fn position<T: Scalar>(&self, z: &[Complex<T>]) -> Complex<T> {
         self.terms.iter().fold(Complex::of(self.root), |sum, &(k, gamma)| sum + z[k].turn(gamma))
     }
 
     /// P' \[m/s\].
-    #[inline]
+    #[inline(always)]
     pub fn velocity<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
         self.terms.iter().fold(Complex::ZERO, |sum, &(k, gamma)| sum + z[k].turn(gamma).left().times(omega[k]))
     }
 
     /// P'' at zero angular acceleration \[m/s²\].
-    #[inline]
+    #[inline(always)]
     pub fn convective<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
         self.terms.iter().fold(Complex::ZERO, |sum, &(k, gamma)| sum - z[k].turn(gamma).times(omega[k] * omega[k]))
     }
@@ -74,7 +74,7 @@ impl Point {
     }
 
     /// Adds the generalized forces \[N m\] of a force \[N\] that acts here.
-    #[inline]
+    #[inline(always)]
     pub fn pull<T: Scalar>(&self, force: Complex<T>, z: &[Complex<T>], load: &mut [T]) {
         for &(k, gamma) in &self.terms {
             load[k] += z[k].turn(gamma).cross(force);

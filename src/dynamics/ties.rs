@@ -23,12 +23,33 @@ pub struct Tie {
 }
 
 impl Tie {
+    /// The known part s(t) of the angle: the sum of the laws, of which a single one keeps its own numbers to the last bit.
+    #[inline]
+    pub fn drive<T: Real>(&self, t: Time) -> Phase<T> {
+        let sum = self.laws.iter().map(|(sign, law)| law.at::<T>(t).times(*sign)).reduce(|sum, phase| Phase {
+            angle: angle::difference(sum.angle, -phase.angle),
+            unit: sum.unit * phase.unit,
+            rate: sum.rate + phase.rate,
+            acceleration: sum.acceleration + phase.acceleration,
+        });
+        sum.unwrap_or(Phase { unit: Complex::new(T::ONE, T::ZERO), ..Phase::default() })
+    }
+
+    /// The unit vector of the body at coordinates `u` \[rad\].
+    #[inline(always)]
+    pub fn face<T: Scalar>(&self, u: &[T], drive: &Phase<T>) -> Complex<T> {
+        match self.base {
+            Some(base) if self.laws.is_empty() => Complex::unit(u[base]),
+            Some(base) => Complex::unit(u[base]) * drive.unit,
+            None => drive.unit,
+        }
+    }
+
     /// The body's angle and unit vector at coordinates `u` \[rad\], s' and s''.
     #[inline(always)]
     pub fn place<T: Real>(&self, t: Time, u: &[T]) -> Phase<T> {
         match (self.base, &self.laws[..]) {
             (Some(base), []) => Phase { angle: u[base], unit: Complex::unit(u[base]), rate: T::ZERO, acceleration: T::ZERO },
-            // Exactly the law's own numbers: such a row is kept to the last bit.
             (None, [(sign, law)]) => law.at::<T>(t).times(*sign),
             _ => self.compose(t, u),
         }
@@ -36,17 +57,9 @@ impl Tie {
 
     /// Several angles, one upon another.
     fn compose<T: Real>(&self, t: Time, u: &[T]) -> Phase<T> {
-        let start = Phase { unit: Complex::new(T::ONE, T::ZERO), ..Phase::default() };
-        let base = self.base.map_or(start, |base| Phase { angle: u[base], unit: Complex::unit(u[base]), ..start });
-        self.laws.iter().fold(base, |sum, (sign, law)| {
-            let phase = law.at::<T>(t).times(*sign);
-            Phase {
-                angle: angle::difference(sum.angle, -phase.angle),
-                unit: sum.unit * phase.unit,
-                rate: sum.rate + phase.rate,
-                acceleration: sum.acceleration + phase.acceleration,
-            }
-        })
+        let drive = self.drive::<T>(t);
+        let angle = self.base.map_or(drive.angle, |base| angle::difference(u[base], -drive.angle));
+        Phase { angle, unit: self.face(u, &drive), ..drive }
     }
 }
 

@@ -24,11 +24,13 @@
 //! with implicit Runge–Kutta methods*, BIT 48 (2008) 231–243; E. Hairer, C. Lubich, G. Wanner, *Geometric Numerical Integration*,
 //! 2nd ed. (2006), sections VIII.6 (starting values, sweeps).  Summing outwards from the midpoint is ours.
 
+mod lanes;
 mod tableau;
 
 use super::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Field, State, Time};
+use lanes::Scratch;
 use tableau::Tableau;
 
 const NAMES: [&str; 7] = ["gauss4", "gauss6", "gauss8", "gauss10", "gauss12", "gauss14", "gauss16"];
@@ -50,35 +52,12 @@ pub struct Gauss {
     step: f64,
     tableau: Tableau,
     scratch: Scratch,
-}
-
-/// Scratch space for s stages of d unknowns.  The stages of one unknown lie side by side: loops run over stages, s of them at a time.
-#[derive(Clone, Debug, Default)]
-struct Scratch {
-    /// The step the next two were formed for \[s\].
-    step: f64,
-    /// h b_j, each rounded once (s) \[s\].
-    span: Vec<f64>,
-    /// c_j h (s) \[s\].
-    offset: Vec<Time>,
-    /// t + c_j h (s) \[s\].
-    time: Vec<Time>,
-    /// Y (d × s).
-    stage: Vec<f64>,
-    /// f(Y) (d × s).
-    rate: Vec<f64>,
-    /// L (d × s).
-    increment: Vec<f64>,
-    /// One stage and its rate, as the field takes them (d, d).
-    point: Vec<f64>,
-    slope: Vec<f64>,
-    /// Largest change of each unknown in the last sweep, and the least so far (d, d).
-    change: Vec<f64>,
-    least: Vec<f64>,
-    /// Stages the last sweep moved: the others' rates stand, to the bit (s).
-    moved: Vec<bool>,
-    /// The sum of all increments (d).
-    total: Vec<DoubleDouble>,
+    /// Without the processor's vector instructions, to the same bits.
+    pub portable: bool,
+    /// Evaluations a step that carry what doubles leave out, where the field can: none to three.
+    pub exact: u32,
+    /// EXPERIMENT
+    pub idle: u32,
 }
 
 impl Gauss {
@@ -87,7 +66,14 @@ impl Gauss {
     /// `None` unless 2 ≤ `stages` ≤ 8 and the step is finite and not zero.
     pub fn new(stages: usize, step: f64) -> Option<Self> {
         let sound = (2..=8).contains(&stages) && step.is_finite() && step != 0.0;
-        sound.then(|| Self { step: step.abs(), tableau: Tableau::new(stages), scratch: Scratch::default() })
+        sound.then(|| Self {
+            step: step.abs(),
+            tableau: Tableau::new(stages),
+            scratch: Scratch::default(),
+            portable: false,
+            exact: 1,
+            idle: 2,
+        })
     }
 
     /// The method of this name, `gauss4` to `gauss16`; `None` for any other, or where [`Gauss::new`] says so.
@@ -136,164 +122,23 @@ impl<F: Field + ?Sized> Method<F> for Gauss {
             let steps = (span / self.step).abs().floor();
             (steps, (span.abs() - steps * self.step).copysign(span))
         };
-        self.scratch.fit(self.stages(), problem.dimension());
+        self.scratch.points.resize(problem.dimension());
         for (step, count) in [(self.step.copysign(span), steps as u64), (last, u64::from(last != 0.0))] {
-            self.scale(step);
-            match self.stages() {
-                2 => self.march::<2, F>(problem, state, count, tally, watch)?,
-                3 => self.march::<3, F>(problem, state, count, tally, watch)?,
-                4 => self.march::<4, F>(problem, state, count, tally, watch)?,
-                5 => self.march::<5, F>(problem, state, count, tally, watch)?,
-                6 => self.march::<6, F>(problem, state, count, tally, watch)?,
-                7 => self.march::<7, F>(problem, state, count, tally, watch)?,
-                _ => self.march::<8, F>(problem, state, count, tally, watch)?,
-            }
+            self.scratch.scale(&self.tableau, step);
+            lanes::march(self, problem, state, count, tally, watch)?;
         }
         Ok(Reached::Until)
     }
 }
 
 impl Gauss {
-    /// Forms what depends on the step alone.
-    fn scale(&mut self, step: f64) {
-        self.scratch.step = step;
-        for (span, weight) in self.scratch.span.iter_mut().zip(&self.tableau.weights) {
-            *span = weight.scale(step).hi;
-        }
-        for (offset, node) in self.scratch.offset.iter_mut().zip(&self.tableau.nodes) {
-            *offset = node.scale(step);
-        }
-    }
-
-    /// `count` steps of `scratch.step` with S stages.
-    fn march<const S: usize, F: Field + ?Sized>(
-        &mut self,
-        problem: &mut F,
-        state: &mut State,
-        count: u64,
-        tally: &mut Tally,
-        watch: &mut Watch<F>,
-    ) -> Result<(), StepError> {
-        for _ in 0..count {
-            self.predict::<S>(state);
-            self.sweep::<S, F>(problem, state, tally);
-            self.sum_exactly::<S>();
-            self.check(problem, state)?;
-            self.commit(state);
-            tally.steps += 1;
-            if watch(problem, state)? == Seen::Changed {
-                state.memory.clear();
-            }
-        }
-        Ok(())
-    }
-
-    /// Stages from the last step's collocation polynomial, or all at y where there is none.
-    fn predict<const S: usize>(&mut self, state: &State) {
-        let scratch = &mut self.scratch;
-        for (time, &offset) in scratch.time.iter_mut().zip(&scratch.offset) {
-            *time = state.time + offset;
-        }
-        let stages = scratch.stage.as_chunks_mut::<S>().0;
-        for (stage, &y) in stages.iter_mut().zip(&state.y) {
-            *stage = [y; S];
-        }
-        let Some((&step, last)) = state.memory.split_first() else { return };
-        if step != scratch.step || last.len() != S * state.y.len() {
-            return;
-        }
-        for (stage, increment) in stages.iter_mut().zip(last.as_chunks::<S>().0) {
-            for (column, &l) in self.tableau.forecast.as_chunks::<S>().0.iter().zip(increment) {
-                for (y, &nu) in stage.iter_mut().zip(column) {
-                    *y += nu * l;
-                }
-            }
-        }
-    }
-
-    /// Sweeps the stages until no unknown's change falls any further.
-    fn sweep<const S: usize, F: Field + ?Sized>(&mut self, problem: &mut F, state: &State, tally: &mut Tally) {
-        self.scratch.least.fill(f64::INFINITY);
-        let mut idle = 0;
-        self.scratch.moved.fill(true);
-        for _ in 0..MOST_SWEEPS {
-            tally.evaluations += self.evaluate::<S, F>(problem);
-            self.restage::<S>(state);
-            idle = if self.scratch.falls() { 0 } else { idle + 1 };
-            if idle == IDLE_SWEEPS || !self.scratch.moved.contains(&true) {
-                return;
-            }
-        }
-    }
-
-    /// L from the stages that moved; returns their number.
-    fn evaluate<const S: usize, F: Field + ?Sized>(&mut self, problem: &mut F) -> u64 {
-        let mut count = 0;
-        let scratch = &mut self.scratch;
-        let (rates, increments) = (scratch.rate.as_chunks_mut::<S>().0, scratch.increment.as_chunks_mut::<S>().0);
-        for j in 0..S {
-            if !scratch.moved[j] {
-                continue;
-            }
-            count += 1;
-            for (point, stage) in scratch.point.iter_mut().zip(scratch.stage.as_chunks::<S>().0) {
-                *point = stage[j];
-            }
-            problem.rate(scratch.time[j], &scratch.point, &mut scratch.slope);
-            for ((rate, increment), &f) in rates.iter_mut().zip(increments.iter_mut()).zip(&scratch.slope) {
-                rate[j] = f;
-                increment[j] = scratch.span[j] * f;
-            }
-        }
-        count
-    }
-
-    /// The stages from L, and how far they moved.
-    fn restage<const S: usize>(&mut self, state: &State) {
-        let scratch = &mut self.scratch;
-        let columns = self.tableau.skew.as_chunks::<S>().0;
-        let unknowns = scratch.stage.as_chunks_mut::<S>().0.iter_mut().zip(scratch.increment.as_chunks::<S>().0).zip(&mut scratch.change);
-        scratch.moved.fill(false);
-        for (k, ((stage, l), change)) in unknowns.enumerate() {
-            let centre = if S % 2 == 1 { l[S / 2] } else { 0.0 };
-            let total = (0..S / 2).fold(centre, |sum, j| sum + (l[j] + l[S - 1 - j]));
-            let middle = DoubleDouble::sum(state.y[k], state.low[k] + 0.5 * total);
-            let mut offset = [middle.lo; S];
-            for j in 0..S / 2 {
-                for i in 0..S {
-                    offset[i] += columns[j][i] * l[j] + columns[S - 1 - j][i] * l[S - 1 - j];
-                }
-            }
-            if S % 2 == 1 {
-                for i in 0..S {
-                    offset[i] += columns[S / 2][i] * centre;
-                }
-            }
-            *change = 0.0;
-            for (i, (y, offset)) in stage.iter_mut().zip(offset).enumerate() {
-                let moved = middle.hi + offset;
-                scratch.moved[i] |= moved != *y;
-                *change = change.max((moved - *y).abs());
-                *y = moved;
-            }
-        }
-    }
-
-    /// Σ h b_j f_j with exact products.
-    fn sum_exactly<const S: usize>(&mut self) {
-        let scratch = &mut self.scratch;
-        for (total, rate) in scratch.total.iter_mut().zip(scratch.rate.as_chunks::<S>().0) {
-            *total = (0..S).fold(DoubleDouble::ZERO, |sum, j| sum + DoubleDouble::product(scratch.span[j], rate[j]));
-        }
-    }
-
     /// Refuses a step whose stages are not finite or have not converged.
     ///
     /// Convergence is judged by the angles where the field has any: their scale is known, and whatever else moves does so through them.
     /// A momentum at rest under forces that cancel is all rounding and has no scale of its own.
     fn check<F: Field + ?Sized>(&self, problem: &mut F, state: &State) -> Result<(), StepError> {
         let scratch = &self.scratch;
-        let (s, d, angles) = (self.stages(), state.y.len(), problem.angles());
+        let (d, angles) = (state.y.len(), problem.angles());
         let stop = |cause, what| StepError {
             cause,
             method: NAMES[self.stages() - 2].into(),
@@ -308,7 +153,7 @@ impl Gauss {
         let judged = if angles > 0 { angles } else { d };
         for k in 0..judged {
             let floor = if k < angles { LEAST_ANGLE } else { 0.0 };
-            let scale = scratch.stage[k * s..(k + 1) * s].iter().fold(floor, |scale, y| scale.max(y.abs()));
+            let scale = scratch.points.y[k].0.iter().fold(floor, |scale, y| scale.max(y.abs()));
             if scratch.change[k] > LARGEST_REST * scale {
                 let what =
                     format!("the sweeps left a change of {:.1e} in {} and did not bring it down", scratch.change[k], problem.label(k));
@@ -316,49 +161,6 @@ impl Gauss {
             }
         }
         Ok(())
-    }
-
-    /// Writes the new state.
-    fn commit(&mut self, state: &mut State) {
-        let scratch = &self.scratch;
-        for (k, &total) in scratch.total.iter().enumerate() {
-            let y = DoubleDouble { hi: state.y[k], lo: state.low[k] } + total;
-            (state.y[k], state.low[k]) = (y.hi, y.lo);
-        }
-        state.time = state.time + scratch.step;
-        state.wrap();
-        state.memory.resize(1 + scratch.increment.len(), 0.0);
-        state.memory[0] = scratch.step;
-        state.memory[1..].copy_from_slice(&scratch.increment);
-    }
-}
-
-impl Scratch {
-    /// Takes the sizes of s stages and d unknowns; allocates at the first march only.
-    fn fit(&mut self, s: usize, d: usize) {
-        self.span.resize(s, 0.0);
-        self.offset.resize(s, Time::ZERO);
-        self.time.resize(s, Time::ZERO);
-        self.moved.resize(s, true);
-        for matrix in [&mut self.stage, &mut self.rate, &mut self.increment] {
-            matrix.resize(s * d, 0.0);
-        }
-        for vector in [&mut self.point, &mut self.slope, &mut self.change, &mut self.least] {
-            vector.resize(d, 0.0);
-        }
-        self.total.resize(d, DoubleDouble::ZERO);
-    }
-
-    /// True where some unknown changed less than ever before in this step; no change at all may be an accident and is not counted.
-    fn falls(&mut self) -> bool {
-        let mut falls = false;
-        for (&change, least) in self.change.iter().zip(&mut self.least) {
-            if change != 0.0 && change < *least {
-                *least = change;
-                falls = true;
-            }
-        }
-        falls
     }
 }
 
@@ -406,7 +208,7 @@ mod tests {
             mechanism.energy(&mut kernel, &motion.phi, &motion.omega).total()
         };
         let mut gauss = Gauss::new(8, 1.0 / 64.0).expect("sound settings");
-        gauss.tableau.skew[8] += defect;
+        gauss.tableau.even[1][0] += defect;
         let start = energy(&mut form, &state);
         let until = Time::of(f64::from(steps) / 64.0);
         gauss.advance(&mut form, &mut state, until, &mut Tally::default(), &mut |_, _| Ok(Seen::Kept)).expect("a march");

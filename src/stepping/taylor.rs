@@ -21,10 +21,12 @@ mod direction;
 mod driven;
 mod event;
 mod expansion;
+mod extended;
 mod fast;
 mod pace;
 mod pair;
 mod terms;
+mod wide;
 
 pub use self::crowd::Crowd;
 use self::event::Crossing;
@@ -66,7 +68,7 @@ pub struct Taylor<T> {
     pub max_steps: u64,
     /// Which code expands the motion.
     pub kernel: Kernel,
-    /// Carries the first powers in double-double: what is rounded are later ones only, which weigh less than a millionth.  Of use with tolerances
+    /// Carries the first powers in double-double: what is rounded are later ones only, which weigh less than a thousandth.  Of use with tolerances
     /// below 1e-18; no effect on double-double itself.
     pub extended: bool,
     fast: Option<Fast>,
@@ -211,13 +213,13 @@ impl<T: Real> Taylor<T> {
         }
         let is_portable = self.kernel == Kernel::Portable;
         let (tolerance, order, extended) = (self.tolerance, self.order, self.extended);
-        let is_plain = T::IS_PLAIN && self.kernel != Kernel::Series && !extended;
+        let is_plain = T::IS_PLAIN && self.kernel != Kernel::Series;
         // The lanes know neither walls nor rows that are not eliminated.
         let is_simple = mechanism.contacts.is_empty() && (mechanism.rows.is_empty() || coordinates == Coordinates::Independent);
         if !is_plain || !is_simple {
             self.fast = None;
-        } else if !self.fast.as_ref().is_some_and(|fast| fast.is_for(mechanism, tolerance, order, is_portable)) {
-            self.fast = Fast::new(mechanism, tolerance, order, is_portable);
+        } else if !self.fast.as_ref().is_some_and(|fast| fast.is_for(mechanism, tolerance, order, is_portable, extended)) {
+            self.fast = Fast::new(mechanism, tolerance, order, is_portable, extended);
         }
         if self.fast.is_some() {
             self.expansion = None;

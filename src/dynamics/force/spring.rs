@@ -29,14 +29,14 @@ pub struct Spring {
 
 impl Spring {
     /// Force \[N\] on the first end.
-    #[inline]
+    #[inline(always)]
     pub fn force<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
         let elastic = self.elastic(z);
         if self.damping == 0.0 { elastic } else { elastic + self.drag(z, omega) }
     }
 
     /// Force \[N\] of the spring alone on the first end.
-    #[inline]
+    #[inline(always)]
     pub fn elastic<T: Scalar>(&self, z: &[Complex<T>]) -> Complex<T> {
         let span = self.span.position(z);
         if self.free_length == 0.0 {
@@ -47,7 +47,7 @@ impl Spring {
     }
 
     /// Force \[N\] of the damper alone on the first end.
-    #[inline]
+    #[inline(always)]
     pub fn drag<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
         let span = self.span.position(z);
         let rate = span.dot(self.span.velocity(z, omega));
@@ -63,7 +63,7 @@ impl Spring {
     }
 
     /// Power \[W\] of the damper on the bodies, never positive.
-    #[inline]
+    #[inline(always)]
     pub fn drag_power<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> T {
         self.drag(z, omega).dot(self.span.velocity(z, omega))
     }

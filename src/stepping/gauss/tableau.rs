@@ -6,12 +6,21 @@
 //! mu_ij = a_ij/b_j = 1/2 + sigma_ij,      nu_ij = (1/b_j) ∫_1^(1+c_i) l_j
 //! ```
 //!
-//! Symplectic is `mu_ij + mu_ji = 1`, symmetric in time is `mu_ij = mu_(s+1-j)(s+1-i)`.  Both hold to the last bit for the stored `sigma`:
-//! each is rounded once, from the entry on whose images under the two rules it is copied with its sign.
+//! Symplectic is `mu_ij + mu_ji = 1`, symmetric in time is `mu_ij = mu_(s+1-j)(s+1-i)`.  With i' = s+1-i the mirror image of stage i, both together say that
+//! sigma splits into an even part, which acts on `L_j + L_j'` and is odd in i, and an odd part, which acts on `L_j - L_j'` and is even in i, and that one is
+//! minus the transpose of the other.  So one matrix of half the size is all there is to round, and both properties hold exactly, whatever its entries:
+//!
+//! ```text
+//! Σ_j sigma_ij L_j = ± Σ_j eta_ij (L_j + L_j') - Σ_j eta_ji (L_j - L_j')      (j <= s/2; + for i <= s/2, - for its mirror image)
+//! eta_ij = (sigma_ij + sigma_ij')/2,    eta_ij = sigma_ij where j = j'
+//! ```
+//!
+//! Stages lie in lanes: the first half in the first vector, their mirror images in the same order in the second.
 //!
 //! Source: E. Hairer, C. Lubich, G. Wanner, *Geometric Numerical Integration*, 2nd ed. (2006), sections II.1.3 (Gauss), IV.2 (theorem 2.2),
 //! V.2 (symmetry); nodes and weights: M. Abramowitz, I. Stegun, *Handbook of Mathematical Functions* (1964), 25.4.29.
 
+use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::{DoubleDouble, Scalar};
 
 /// Nodes, weights and matrices of one Gauss method of s stages.
@@ -21,34 +30,40 @@ pub(super) struct Tableau {
     pub nodes: Vec<DoubleDouble>,
     /// b (s), positive.
     pub weights: Vec<DoubleDouble>,
-    /// sigma (s × s), column by column; antisymmetric, and symmetric about the other diagonal.
-    pub skew: Vec<f64>,
-    /// nu (s × s), column by column: the collocation polynomial of one step carried on over the next.
-    pub forecast: Vec<f64>,
+    /// eta, column by column: factors of `L_j + L_j'`.
+    pub even: [[f64; 4]; 4],
+    /// -etaᵀ, column by column: factors of `L_j - L_j'`.
+    pub odd: [[f64; 4]; 4],
+    /// nu, one column a stage, its rows in lanes: the collocation polynomial of one step carried on over the next.
+    pub forecast: Vec<Octet>,
+}
+
+/// The lane of stage i of s.
+pub(super) fn lane(i: usize, s: usize) -> usize {
+    if 2 * i < s { i } else { LANES / 2 + s - 1 - i }
 }
 
 impl Tableau {
     /// The method of `stages` stages.
     pub fn new(stages: usize) -> Self {
         let (nodes, weights) = quadrature(stages);
-        let mut skew = vec![0.0; stages * stages];
-        let mut forecast = vec![0.0; stages * stages];
-        for i in 0..stages {
-            for j in 0..stages {
-                forecast[j * stages + i] = (integral(&nodes, &weights, j, DoubleDouble::ONE, nodes[i]) / weights[j]).hi;
-                // One of each set of four images is rounded, the other three are copies.
-                let (mirror_i, mirror_j) = (stages - 1 - i, stages - 1 - j);
-                if i > j && i + j < stages {
-                    let mu = integral(&nodes, &weights, j, DoubleDouble::ZERO, nodes[i]) / weights[j];
-                    let sigma = (mu - DoubleDouble::of(0.5)).hi;
-                    skew[j * stages + i] = sigma;
-                    skew[i * stages + j] = -sigma;
-                    skew[mirror_i * stages + mirror_j] = sigma;
-                    skew[mirror_j * stages + mirror_i] = -sigma;
-                }
+        let (mut even, mut odd) = ([[0.0; 4]; 4], [[0.0; 4]; 4]);
+        let mut forecast = vec![Octet::default(); stages];
+        for j in 0..stages {
+            for i in 0..stages {
+                forecast[j].0[lane(i, stages)] = (integral(&nodes, &weights, j, DoubleDouble::ONE, nodes[i]) / weights[j]).hi;
             }
         }
-        Self { nodes, weights, skew, forecast }
+        let sigma = |i: usize, j: usize| integral(&nodes, &weights, j, DoubleDouble::ZERO, nodes[i]) / weights[j] - DoubleDouble::of(0.5);
+        // The stage in the middle is its own image: nothing moves it but the odd part.
+        for i in 0..stages / 2 {
+            for j in 0..stages.div_ceil(2) {
+                let image = stages - 1 - j;
+                let eta = (sigma(i, j) + sigma(i, image)).ldexp(0.5).hi;
+                (even[j][i], odd[i][j]) = (eta, -eta);
+            }
+        }
+        Self { nodes, weights, even, odd, forecast }
     }
 }
 
@@ -156,19 +171,29 @@ mod tests {
         }
     }
 
+    /// sigma as the stored halves make it, exactly.
+    fn stored(tableau: &Tableau, s: usize, i: usize, j: usize) -> DoubleDouble {
+        let (row, column) = (lane(i, s) % 4, lane(j, s) % 4);
+        let sign = |mirrored: bool| if mirrored { -1.0 } else { 1.0 };
+        let (even, odd) = (tableau.even[column][row] * sign(lane(i, s) > 3), tableau.odd[column][row] * sign(lane(j, s) > 3));
+        DoubleDouble::sum(even, odd)
+    }
+
     #[test]
-    fn the_stored_coefficients_are_symplectic_and_symmetric_to_the_last_bit() {
+    fn the_stored_coefficients_are_symplectic_and_symmetric_exactly() {
         for s in 2..=8 {
             let tableau = Tableau::new(s);
             for i in 0..s {
-                assert_eq!(tableau.skew[i * s + i], 0.0, "mu_ii = 1/2");
                 for j in 0..s {
-                    let (sigma, mirror) = (tableau.skew[j * s + i], tableau.skew[(s - 1 - i) * s + s - 1 - j]);
-                    assert_eq!(sigma, -tableau.skew[i * s + j]);
-                    assert_eq!(sigma, mirror);
+                    let (sigma, mirror) = (stored(&tableau, s, i, j), stored(&tableau, s, s - 1 - j, s - 1 - i));
+                    if i != j {
+                        assert_eq!(sigma, -stored(&tableau, s, j, i), "mu_ij + mu_ji = 1 at {i}, {j} of s = {s}");
+                    }
+                    assert_eq!(sigma, mirror, "at {i}, {j} of s = {s}");
                     let mu = a(&tableau, i, j) / tableau.weights[j];
                     assert!((DoubleDouble::of(0.5) + sigma - mu).hi.abs() < 1.2e-16, "mu at {i}, {j} of s = {s}");
                 }
+                assert_eq!(stored(&tableau, s, i, i), DoubleDouble::ZERO, "mu_ii = 1/2");
             }
         }
     }
@@ -179,8 +204,9 @@ mod tests {
             let tableau = Tableau::new(s);
             for i in 0..s {
                 for k in 1..=s {
-                    let sum = (0..s)
-                        .fold(0.0, |sum, j| sum + tableau.forecast[j * s + i] * (tableau.weights[j] * power(tableau.nodes[j], k - 1)).hi);
+                    let sum = (0..s).fold(0.0, |sum, j| {
+                        sum + tableau.forecast[j].0[lane(i, s)] * (tableau.weights[j] * power(tableau.nodes[j], k - 1)).hi
+                    });
                     let exact = ((power(DoubleDouble::ONE + tableau.nodes[i], k) - DoubleDouble::ONE) * reciprocal(k)).hi;
                     assert!((sum - exact).abs() < 1e-10 * exact, "degree {k}, row {i} of s = {s}: {sum} for {exact}");
                 }

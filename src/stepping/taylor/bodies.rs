@@ -12,8 +12,7 @@
 //! Scene constants enter as in `pair`: fractions of low orders in two terms, and the solutions of the first orders refined.
 
 use super::direction;
-use super::pace::{self, Pace};
-use super::terms::RECIPROCAL_REST;
+use super::pace::{self, Pace, RECIPROCAL_REST};
 use crate::arithmetic::DoubleDouble;
 use crate::arithmetic::lanes::Lanes;
 use crate::dynamics::{Mechanism, State, tree};

@@ -5,7 +5,7 @@
 //! constants of the mechanism, and takes in the next trajectory as soon as its last one has ended.
 
 use super::pace::{self, Pace};
-use super::terms::RECIPROCAL_REST;
+use super::terms::rest;
 use super::{JUDGES, Kernel, direction, stop};
 use crate::arithmetic::angle;
 #[cfg(target_arch = "x86_64")]
@@ -28,7 +28,7 @@ const RECIPROCAL: [(f64, f64); MOST + 2] = {
     let mut table = [(0.0, 0.0); MOST + 2];
     let mut k = 1;
     while k < table.len() {
-        table[k] = (1.0 / k as f64, if k < RECIPROCAL_REST.len() { RECIPROCAL_REST[k] } else { 0.0 });
+        table[k] = (1.0 / k as f64, rest(k));
         k += 1;
     }
     table

@@ -18,8 +18,8 @@
 //! Scene constants enter in two terms, as in [`pair`](super::pair).
 
 use super::direction;
-use super::pace::{self, Pace};
-use super::terms::{RECIPROCAL_REST, left_over};
+use super::pace::{self, Pace, RECIPROCAL_REST};
+use super::terms::left_over;
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::dynamics::row::Row;

@@ -92,14 +92,15 @@ impl<T: Real> Expansion<T> {
         }
         let step = libm::exp2(least + libm::log2(tolerance) / (order + 1) as f64).min(LONGEST);
         let beginning = largest(0).max(largest(1) * step);
-        if tolerance < 0.1 * SHARE * beginning || step == LONGEST { step } else { self.shortened(&last, largest, step) }
+        if tolerance < 0.1 * SHARE * beginning || last == [0.0; JUDGES] { step } else { self.shortened(&last, largest, step) }
     }
 
     /// The step of a motion that is smaller than the tolerance, whose terms must fall nevertheless.
     #[cold]
     fn shortened(&self, last: &[f64; JUDGES], largest: impl Fn(usize) -> f64, mut step: f64) -> f64 {
         let order = self.series.order();
-        for _ in 0..4 {
+        // Every round takes the surplus down by a fifth or more.
+        for _ in 0..100 {
             let (mut size, mut power) = (0.0_f64, 1.0);
             for k in 0..=order - JUDGES {
                 size = size.max(largest(k) * power);
@@ -107,7 +108,7 @@ impl<T: Real> Expansion<T> {
             }
             let most = |(i, &last): (usize, &f64)| libm::exp2((minus_log2(last) - minus_log2(SHARE * size)) / (order - i) as f64);
             let least = last.iter().enumerate().map(most).fold(f64::INFINITY, f64::min);
-            if size == 0.0 || least >= step {
+            if size == 0.0 || least >= 0.95 * step {
                 break;
             }
             step = least;

@@ -2,6 +2,7 @@
 
 use super::bodies::{self, Bodies};
 use super::driven::{self, Driven};
+use super::extended;
 use super::pace::Pace;
 use super::pair::{self, Pair};
 #[cfg(target_arch = "x86_64")]
@@ -10,6 +11,9 @@ use crate::arithmetic::lanes::{self, Lanes, Portable};
 use crate::dynamics::row::Row;
 use crate::dynamics::tree::Tree;
 use crate::dynamics::{Mechanism, State};
+
+/// The order of the extended kernel.
+const EXTENDED: usize = 24;
 
 /// A kernel ready to run.
 #[derive(Clone, Debug)]
@@ -29,12 +33,14 @@ struct Settings {
     tolerance: f64,
     order: usize,
     is_portable: bool,
+    is_extended: bool,
 }
 
 /// What it runs on.
 #[derive(Clone, Debug)]
 enum Form {
     Pair(Pair, Box<pair::Scratch>),
+    Extended(Pair, Box<extended::Scratch>),
     Driven(Box<Driven>, Box<driven::Scratch>),
     Few(Box<Bodies<1>>),
     Several(Box<Bodies<2>>),
@@ -85,6 +91,13 @@ fn step<L: Lanes, const P: usize>(form: &mut Form, pace: &Pace, state: &mut Stat
             [*phi1_low, *v1_low, *phi2_low, *v2_low] = flow.low;
             steps
         }
+        (Form::Extended(pair, scratch), [phi1, phi2, v1, v2, ..], [phi1_low, phi2_low, v1_low, v2_low, ..]) if P == EXTENDED => {
+            let mut flow = pair::Flow { high: [*phi1, *v1, *phi2, *v2], low: [*phi1_low, *v1_low, *phi2_low, *v2_low] };
+            let steps = extended::step::<L, P>(pair, pace, scratch, &mut flow, left);
+            [*phi1, *v1, *phi2, *v2] = flow.high;
+            [*phi1_low, *v1_low, *phi2_low, *v2_low] = flow.low;
+            steps
+        }
         (Form::Driven(driven, scratch), [phi, v, work, ..], [phi_low, v_low, work_low, ..]) => {
             let mut flow = driven::Flow { high: [*phi, *v, *work], low: [*phi_low, *v_low, *work_low] };
             let steps = driven::step::<L, P>(driven, pace, scratch, &mut flow, state.time, left);
@@ -108,6 +121,12 @@ fn go<L: Lanes, const P: usize>(form: &Form, state: &mut State, h: f64) {
             [*phi1, *v1, *phi2, *v2] = flow.high;
             [*phi1_low, *v1_low, *phi2_low, *v2_low] = flow.low;
         }
+        (Form::Extended(_, scratch), [phi1, phi2, v1, v2, ..], [phi1_low, phi2_low, v1_low, v2_low, ..]) if P == EXTENDED => {
+            let mut flow = pair::Flow { high: [*phi1, *v1, *phi2, *v2], low: [*phi1_low, *v1_low, *phi2_low, *v2_low] };
+            extended::go::<L, P>(scratch, &mut flow, h);
+            [*phi1, *v1, *phi2, *v2] = flow.high;
+            [*phi1_low, *v1_low, *phi2_low, *v2_low] = flow.low;
+        }
         (Form::Driven(driven, scratch), [phi, v, work, ..], [phi_low, v_low, work_low, ..]) => {
             let mut flow = driven::Flow { high: [*phi, *v, *work], low: [*phi_low, *v_low, *work_low] };
             driven::go::<L, P>(driven, scratch, &mut flow, h);
@@ -121,15 +140,19 @@ fn go<L: Lanes, const P: usize>(form: &Form, state: &mut State, h: f64) {
 }
 
 impl Fast {
-    /// The kernel, where there is one.
-    pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize, is_portable: bool) -> Option<Self> {
+    /// The kernel, where there is one; `is_extended`: with the first orders in double-double.
+    pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize, is_portable: bool, is_extended: bool) -> Option<Self> {
         let (step, go) = match order {
             16 => of_order::<16>(is_portable),
             20 => of_order::<20>(is_portable),
             24 => of_order::<24>(is_portable),
             _ => return None,
         };
-        let (form, longest) = if let Some(pair) = Pair::new(mechanism) {
+        let (form, longest) = if is_extended {
+            let pair = Pair::new(mechanism).filter(|_| order == EXTENDED)?;
+            let longest = pair.longest(order);
+            (Form::Extended(pair, Box::default()), longest)
+        } else if let Some(pair) = Pair::new(mechanism) {
             let longest = pair.longest(order);
             (Form::Pair(pair, Box::default()), longest)
         } else if let Some(driven) = Driven::new(mechanism) {
@@ -143,14 +166,14 @@ impl Fast {
             let longest = bodies.longest(order);
             (Form::Several(Box::new(bodies)), longest)
         };
-        let settings = Settings { tree: mechanism.tree.clone(), rows: mechanism.rows.clone(), tolerance, order, is_portable };
+        let settings = Settings { tree: mechanism.tree.clone(), rows: mechanism.rows.clone(), tolerance, order, is_portable, is_extended };
         Some(Self { settings, form, pace: Pace::new(tolerance, order, longest), step, go })
     }
 
     /// True where it was made for all these.
-    pub fn is_for(&self, mechanism: &Mechanism, tolerance: f64, order: usize, is_portable: bool) -> bool {
+    pub fn is_for(&self, mechanism: &Mechanism, tolerance: f64, order: usize, is_portable: bool, is_extended: bool) -> bool {
         let made = &self.settings;
-        (made.tolerance, made.order, made.is_portable) == (tolerance, order, is_portable)
+        (made.tolerance, made.order, made.is_portable, made.is_extended) == (tolerance, order, is_portable, is_extended)
             && made.tree == mechanism.tree
             && made.rows == mechanism.rows
             && mechanism.springs.is_empty()

@@ -21,7 +21,7 @@
 
 use super::direction;
 use super::pace::{self, Pace};
-use super::terms::{LEFT, left_over, over, over_first, pair_sum};
+use super::terms::{LEFT, left_over, less_over, over, over_first, pair_sum};
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::sum::two_product;
 use crate::dynamics::Mechanism;
@@ -33,13 +33,13 @@ pub const MOST: usize = 24;
 #[derive(Clone, Debug)]
 pub struct Pair {
     /// e × W as a product with `[c, s, c, s]` \[N·m\].
-    weight: [f64; 4],
+    pub(super) weight: [f64; 4],
     /// A \[kg·m²\].
-    coupling: f64,
+    pub(super) coupling: f64,
     /// d \[kg·m²\].
-    diagonal: [f64; 2],
+    pub(super) diagonal: [f64; 2],
     /// d_1 d_2, and what the double leaves out of it.
-    product: (f64, f64),
+    pub(super) product: (f64, f64),
     /// Fastest rate of small oscillations, or a bound of it \[rad/s\].
     rate: f64,
 }
@@ -57,10 +57,10 @@ pub struct Flow {
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub struct Scratch {
-    e: [[f64; 4]; MOST + 1],
-    v: [[f64; 4]; MOST + 1],
+    pub(super) e: [[f64; 4]; MOST + 1],
+    pub(super) v: [[f64; 4]; MOST + 1],
     /// -A m (f_2, f_1)_m.
-    g: [[f64; 4]; MOST + 1],
+    pub(super) g: [[f64; 4]; MOST + 1],
 }
 
 impl Default for Scratch {
@@ -93,7 +93,7 @@ impl Pair {
 
 /// What every order needs of the step's start.
 #[derive(Clone, Copy)]
-struct Start<L> {
+pub struct Start<L> {
     weight: L,
     /// -A.
     coupling: L,
@@ -109,17 +109,49 @@ struct Start<L> {
     other: L,
     /// M_0⁻¹ on and off its diagonal.
     inverse: [L; 2],
-    /// M_0⁻¹ T_k = `still + steep k`, on and off the diagonal.
-    still: [L; 2],
-    steep: [L; 2],
+    /// M_0⁻¹ T_k/(k+1) = `even - odd/(k+1)`, on and off the diagonal.
+    even: [L; 2],
+    odd: [L; 2],
+}
+
+impl<L: Lanes> Start<L> {
+    /// From e_0, v_0 and M_0⁻¹ on and off its diagonal.
+    #[inline(always)]
+    pub fn new(pair: &Pair, e0: L, v0: L, inverse: [L; 2]) -> Self {
+        let left = e0.swap_pairs().mul(L::of(LEFT));
+        let (across, far) = (v0.swap_halves(), e0.swap_halves());
+        // sin(phi_i - phi_j) with each body's sign.
+        let sine = pair_sum(e0.mul(far.swap_pairs().mul(L::of(LEFT))));
+        let twist = L::splat(pair.coupling).mul(sine);
+        let (even, odd) = (twist.mul(v0.sub(across)), twist.mul(v0.add(across)));
+        let sideways = L::splat(0.0).sub(left);
+        let coupling = L::splat(-pair.coupling);
+        Self {
+            weight: L::of(pair.weight),
+            coupling,
+            e0: coupling.mul(e0),
+            far: coupling.mul(far),
+            e1: v0.mul(left),
+            v0,
+            left,
+            own: v0.mul(sideways),
+            other: across.mul(sideways),
+            inverse,
+            even: [inverse[0].mul(even), inverse[1].mul(even.swap_halves())],
+            odd: [inverse[0].mul(odd), inverse[1].mul(odd.swap_halves())],
+        }
+    }
 }
 
 /// The newest coefficients: v_k, and e_k, g_k.
 #[derive(Clone, Copy)]
-struct Newest<L> {
-    v: L,
-    e: L,
-    g: L,
+pub struct Newest<L> {
+    /// v_k.
+    pub v: L,
+    /// e_k.
+    pub e: L,
+    /// g_k.
+    pub g: L,
 }
 
 /// B and X so far.
@@ -177,30 +209,51 @@ fn order<L: Lanes, const K: usize>(s: &Start<L>, scratch: &mut Scratch, older: S
     if K >= 2 {
         x = s.e0.mul(L::splat((K + 1) as f64)).mul_add(b.swap_halves(), x);
     }
-    let d = pair_sum(x);
-    let k = L::splat(K as f64);
-    let (on, off) = (over(s.steep[0].mul_add(k, s.still[0]), K + 1), over(s.steep[1].mul_add(k, s.still[1]), K + 1));
-    let (direct, crossed, turn) = (over(s.inverse[0], K + 1), over(s.inverse[1], K + 1), over(s.left, K + 1));
-    let solved = crossed.mul_add(d.swap_halves(), direct.mul(d));
+    let d = over(pair_sum(x), K + 1);
+    let (on, off) = (less_over(s.even[0], s.odd[0], K + 1), less_over(s.even[1], s.odd[1], K + 1));
+    let solved = s.inverse[1].mul_add(d.swap_halves(), s.inverse[0].mul(d));
     // From here on everything waits for v_K.
     let swapped = v.swap_halves();
     let next = on.mul_add(swapped, off.mul_add(v, solved));
-    let e_next = turn.mul_add(v, left_over(g, K + 1));
+    let e_next = over(s.left, K + 1).mul_add(v, left_over(g, K + 1));
     scratch.g[K] = swapped.mul_add(s.far, far).mul(L::splat(K as f64)).array();
     scratch.e[K + 1] = e_next.array();
     scratch.v[K + 1] = next.array();
     Newest { v: next, e: e_next, g: s.v0.mul_add(e_next, v.mul_add(s.e1, b)) }
 }
 
-/// Orders 2 to P-1 in pairs, for even P.
+/// Orders FROM to P-1 in pairs, both even.
 macro_rules! orders {
-    ($p:ident, $start:expr, $scratch:expr, $newest:ident; $($k:literal $next:literal),*) => {
-        $(if $k < $p {
+    ($start:expr, $scratch:expr, $newest:ident; $($k:literal $next:literal),*) => {
+        $(if $k >= FROM && $k < P {
             let [first, second] = older::<L, $k>($scratch);
             $newest = order::<L, $k>($start, $scratch, first, $newest);
             $newest = order::<L, $next>($start, $scratch, second, $newest);
         })*
     };
+}
+
+/// Orders FROM to P-1 from the newest coefficients, those of order FROM.
+#[inline(always)]
+pub fn expand<L: Lanes, const P: usize, const FROM: usize>(start: &Start<L>, scratch: &mut Scratch, mut newest: Newest<L>) {
+    orders!(start, scratch, newest; 2 3, 4 5, 6 7, 8 9, 10 11, 12 13, 14 15, 16 17, 18 19, 20 21, 22 23);
+    let _ = newest;
+}
+
+/// The step the last coefficients want \[s\]; not a number where one of them is not.
+#[inline(always)]
+pub fn wanted<L: Lanes, const P: usize>(pace: &Pace, scratch: &Scratch) -> f64 {
+    let v = L::of(scratch.v[P]).abs();
+    // Not a number in any order reaches the last one.
+    if !v.add(v.swap_halves()).array()[0].is_finite() {
+        return f64::NAN;
+    }
+    let mut largest = [0.0; super::JUDGES];
+    for (i, largest) in largest.iter_mut().enumerate() {
+        let size = L::of(scratch.v[P - i]).abs();
+        *largest = size.max(size.swap_halves()).array()[0];
+    }
+    pace.step::<P>(&largest)
 }
 
 /// Expands to order P and takes one step of at most `left` \[s\]; returns the step wanted, and leaves `flow` alone where it is useless.
@@ -210,27 +263,16 @@ pub fn step<L: Lanes, const P: usize>(pair: &Pair, pace: &Pace, scratch: &mut Sc
     let e0 = direction::unit(L::of([phi1, phi1, phi2, phi2]), L::of([flow.low[0], flow.low[0], flow.low[2], flow.low[2]]));
     let v0 = L::of([v1, v1, v2, v2]);
     let coupling = L::splat(pair.coupling);
-    let across = v0.swap_halves();
-    let leftward = e0.swap_pairs().mul(L::of(LEFT));
-    // M_0: cos(phi1 - phi2) in all lanes; sin(phi_i - phi_j) with each body's sign.
-    let far = e0.swap_halves();
-    let cosine = pair_sum(e0.mul(far));
-    let sine = pair_sum(e0.mul(far.swap_pairs().mul(L::of(LEFT))));
-    let m = cosine.mul(coupling);
+    // M_0, whose cos(phi1 - phi2) is in all lanes.
+    let m = pair_sum(e0.mul(e0.swap_halves())).mul(coupling);
     let [d1, d2] = pair.diagonal;
     let determinant = L::splat(pair.product.0).sub(m.mul_add(m, L::splat(-pair.product.1)));
     let reciprocal = L::of([1.0 / determinant.array()[0]; 4]);
     let inverse = [L::of([d2, d2, d1, d1]).mul(reciprocal), L::splat(0.0).sub(m).mul(reciprocal)];
-    let twist = coupling.mul(sine);
-    let (slope, offset) = (twist.mul(v0.sub(across)), twist.mul(across).mul(L::splat(-2.0)));
-    let steep = [inverse[0].mul(slope), inverse[1].mul(slope.swap_halves())];
-    let still = [inverse[0].mul(offset), inverse[1].mul(offset.swap_halves())];
-    let sideways = L::splat(0.0).sub(leftward);
-    let f0 = v0.mul(e0);
-    let e1 = f0.swap_pairs().mul(L::of(LEFT));
+    let start = Start::new(pair, e0, v0, inverse);
+    let e1 = start.e1;
     let g1 = v0.mul(e1);
-    let weight = L::of(pair.weight);
-    let load = pair_sum(coupling.neg_mul_add(e0.mul(g1.swap_halves()), weight.mul(e0)));
+    let load = pair_sum(coupling.neg_mul_add(e0.mul(g1.swap_halves()), start.weight.mul(e0)));
     let mut first = inverse[1].mul_add(load.swap_halves(), inverse[0].mul(load));
     // The first order's solution is rounded, not merely computed: one step with the residual, whose sums and products are exact up to the last.
     let (diagonal, crossed) = (L::of([d1, d1, d2, d2]), first.swap_halves());
@@ -241,39 +283,17 @@ pub fn step<L: Lanes, const P: usize>(pair: &Pair, pace: &Pace, scratch: &mut Sc
     let lost = load.sub(rest.sub(back)).sub(on.add(back));
     let residual = rest.sub(off).add(lost.sub(dropped));
     first = first.add(inverse[1].mul_add(residual.swap_halves(), inverse[0].mul(residual)));
-    let minus = L::splat(-pair.coupling);
-    let start = Start {
-        weight,
-        coupling: minus,
-        e0: minus.mul(e0),
-        far: minus.mul(far),
-        e1,
-        v0,
-        left: leftward,
-        own: v0.mul(sideways),
-        other: across.mul(sideways),
-        inverse,
-        still,
-        steep,
-    };
     scratch.e[0] = e0.array();
     scratch.e[1] = e1.array();
     scratch.v[0] = v0.array();
     scratch.v[1] = first.array();
     let zero = L::splat(0.0);
-    let mut newest = order::<L, 1>(&start, scratch, Sums { b: zero, x: zero }, Newest { v: first, e: e1, g: g1 });
-    orders!(P, &start, scratch, newest; 2 3, 4 5, 6 7, 8 9, 10 11, 12 13, 14 15, 16 17, 18 19, 20 21, 22 23);
-    let v = newest.v;
-    // Not a number in any order reaches the last one.
-    if !v.abs().add(v.swap_halves().abs()).array()[0].is_finite() {
-        return (f64::NAN, 0.0);
+    let newest = order::<L, 1>(&start, scratch, Sums { b: zero, x: zero }, Newest { v: first, e: e1, g: g1 });
+    expand::<L, P, 2>(&start, scratch, newest);
+    let wanted = wanted::<L, P>(pace, scratch);
+    if wanted.is_nan() {
+        return (wanted, 0.0);
     }
-    let mut largest = [0.0; super::JUDGES];
-    for (i, largest) in largest.iter_mut().enumerate() {
-        let size = L::of(scratch.v[P - i]).abs();
-        *largest = size.max(size.swap_halves()).array()[0];
-    }
-    let wanted = pace.step::<P>(&largest);
     let h = pace::taken(wanted, left);
     if h > 0.0 {
         go::<L, P>(scratch, flow, h);

@@ -1,0 +1,257 @@
+//! The steps themselves, a stage a lane; the one place where code compiled for the processor is entered.
+
+use super::tableau::{Tableau, lane};
+use super::{Gauss, MOST_SWEEPS};
+use crate::arithmetic::eight::{LANES, Octet};
+#[cfg(target_arch = "x86_64")]
+use crate::arithmetic::lanes::{Avx, available};
+use crate::arithmetic::lanes::{Lanes, Portable};
+use crate::arithmetic::sum::two_sum;
+use crate::arithmetic::{DoubleDouble, Scalar};
+use crate::dynamics::{Field, Points, State, Time};
+use crate::stepping::{Seen, StepError, Tally, Watch};
+
+/// Scratch space of d unknowns.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Scratch {
+    /// The step the next two were formed for \[s\].
+    pub step: f64,
+    /// h b_j, each rounded once; zero in lanes without a stage \[s\].
+    span: Octet,
+    /// c_j h \[s\].
+    offset: [Time; LANES],
+    /// Stages and their rates.
+    pub points: Points,
+    /// L (d).
+    increment: Vec<Octet>,
+    /// Largest change of each unknown in the last sweep, and the least so far (d, d).
+    pub change: Vec<f64>,
+    least: Vec<f64>,
+    /// The sum of all increments (d).
+    pub total: Vec<DoubleDouble>,
+}
+
+/// What the sweeps of one march need beside the field.
+struct March<'a> {
+    tableau: &'a Tableau,
+    scratch: &'a mut Scratch,
+    exact: u32,
+    idle: u32,
+}
+
+/// `count` steps of `scratch.step`.
+pub(super) fn march<F: Field + ?Sized>(
+    gauss: &mut Gauss,
+    problem: &mut F,
+    state: &mut State,
+    count: u64,
+    tally: &mut Tally,
+    watch: &mut Watch<F>,
+) -> Result<(), StepError> {
+    for _ in 0..count {
+        let mut step = March { tableau: &gauss.tableau, scratch: &mut gauss.scratch, exact: gauss.exact, idle: gauss.idle };
+        #[cfg(target_arch = "x86_64")]
+        if !gauss.portable && available() {
+            // SAFETY: the processor has just been asked; all else in that code is safe.
+            #[allow(unsafe_code)]
+            unsafe {
+                hardware(&mut step, problem, state, tally);
+            }
+        } else {
+            step.take::<Portable, F>(problem, state, tally);
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        step.take::<Portable, F>(problem, state, tally);
+        gauss.check(problem, state)?;
+        gauss.scratch.commit(state, gauss.tableau.nodes.len());
+        tally.steps += 1;
+        if watch(problem, state)? == Seen::Changed {
+            state.memory.clear();
+        }
+    }
+    Ok(())
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx,fma")]
+fn hardware<F: Field + ?Sized>(step: &mut March, problem: &mut F, state: &State, tally: &mut Tally) {
+    step.take::<Avx, F>(problem, state, tally);
+}
+
+impl March<'_> {
+    /// All of one step but its acceptance.
+    #[inline(always)]
+    fn take<L: Lanes, F: Field + ?Sized>(&mut self, problem: &mut F, state: &State, tally: &mut Tally) {
+        self.predict::<L>(state);
+        self.sweep::<L, F>(problem, state, tally);
+        self.scratch.points.rate_low.fill(Octet::default());
+        for _ in 0..self.exact {
+            self.restage::<L, true>(state);
+            if !problem.exact_rates(&mut self.scratch.points) {
+                break;
+            }
+            self.multiply::<L>();
+            tally.evaluations += self.tableau.nodes.len() as u64;
+        }
+        self.scratch.sum_exactly::<L>();
+    }
+
+    /// Stages from the last step's collocation polynomial, or all at y where there is none.
+    #[inline(always)]
+    fn predict<L: Lanes>(&mut self, state: &State) {
+        let (scratch, s) = (&mut *self.scratch, self.tableau.nodes.len());
+        for (time, &offset) in scratch.points.time.iter_mut().zip(&scratch.offset) {
+            *time = state.time + offset;
+        }
+        let stages = &mut scratch.points.y;
+        let known = match state.memory.split_first() {
+            Some((&step, last)) if step == scratch.step && last.len() == s * state.y.len() => last,
+            _ => &[],
+        };
+        for (stage, &y) in stages.iter_mut().zip(&state.y) {
+            *stage = Octet::splat(y);
+        }
+        for ((stage, increment), &y) in stages.iter_mut().zip(known.chunks_exact(s)).zip(&state.y) {
+            let mut sum = [L::splat(y); 2];
+            for (column, &l) in self.tableau.forecast.iter().zip(increment) {
+                let (column, l) = (column.halves::<L>(), L::splat(l));
+                sum = [column[0].mul_add(l, sum[0]), column[1].mul_add(l, sum[1])];
+            }
+            *stage = Octet::of(sum);
+        }
+    }
+
+    /// Sweeps the stages until no unknown's change falls any further.
+    #[inline(always)]
+    fn sweep<L: Lanes, F: Field + ?Sized>(&mut self, problem: &mut F, state: &State, tally: &mut Tally) {
+        self.scratch.least.fill(f64::INFINITY);
+        let mut idle = 0;
+        for _ in 0..MOST_SWEEPS {
+            problem.rates(&mut self.scratch.points);
+            self.multiply::<L>();
+            tally.evaluations += self.tableau.nodes.len() as u64;
+            self.restage::<L, false>(state);
+            idle = if self.scratch.falls() { 0 } else { idle + 1 };
+            if idle >= self.idle || self.scratch.change.iter().all(|&change| change == 0.0) {
+                return;
+            }
+        }
+    }
+
+    /// L from the rates.
+    #[inline(always)]
+    fn multiply<L: Lanes>(&mut self) {
+        let scratch = &mut *self.scratch;
+        let span = scratch.span.halves::<L>();
+        for (increment, rate) in scratch.increment.iter_mut().zip(&scratch.points.rate) {
+            let rate = rate.halves::<L>();
+            *increment = Octet::of([span[0].mul(rate[0]), span[1].mul(rate[1])]);
+        }
+    }
+
+    /// The stages from L and how far they moved, or, with `LOW`, the stages and what they leave out.
+    #[inline(always)]
+    fn restage<L: Lanes, const LOW: bool>(&mut self, state: &State) {
+        let scratch = &mut *self.scratch;
+        let (even, odd) = (self.tableau.even.map(L::of), self.tableau.odd.map(L::of));
+        for k in 0..state.y.len() {
+            let [first, second] = scratch.increment[k].halves::<L>();
+            let (sums, differences) = (first.add(second).array(), first.sub(second).array());
+            let total = (sums[0] + sums[2]) + (sums[1] + sums[3]);
+            let (middle, rest) = two_sum(state.y[k], state.low[k] + 0.5 * total);
+            let (mut up, mut across) = (even[0].mul(L::splat(sums[0])), odd[0].mul(L::splat(differences[0])));
+            for j in 1..4 {
+                up = even[j].mul_add(L::splat(sums[j]), up);
+                across = odd[j].mul_add(L::splat(differences[j]), across);
+            }
+            let (middle, rest) = (L::splat(middle), L::splat(rest));
+            let offset = [across.add(up).add(rest), across.sub(up).add(rest)];
+            let moved = offset.map(|offset| middle.add(offset));
+            if LOW {
+                let low = |half: usize| {
+                    let part = moved[half].sub(middle);
+                    middle.sub(moved[half].sub(part)).add(offset[half].sub(part))
+                };
+                scratch.points.low[k] = Octet::of([low(0), low(1)]);
+            } else {
+                let before = scratch.points.y[k].halves::<L>();
+                let change = moved[0].sub(before[0]).abs().max(moved[1].sub(before[1]).abs());
+                let change = change.max(change.swap_halves());
+                scratch.change[k] = change.max(change.swap_pairs()).array()[0];
+            }
+            scratch.points.y[k] = Octet::of(moved);
+        }
+    }
+}
+
+impl Scratch {
+    /// Forms what depends on the step alone.
+    pub fn scale(&mut self, tableau: &Tableau, step: f64) {
+        let (s, d) = (tableau.nodes.len(), self.points.y.len());
+        self.step = step;
+        self.span = Octet::default();
+        self.offset = [Time::of(0.5 * step); LANES];
+        self.points.used = [false; LANES];
+        for i in 0..s {
+            self.span.0[lane(i, s)] = tableau.weights[i].scale(step).hi;
+            self.offset[lane(i, s)] = tableau.nodes[i].scale(step);
+            self.points.used[lane(i, s)] = true;
+        }
+        self.increment.resize(d, Octet::default());
+        for vector in [&mut self.change, &mut self.least] {
+            vector.resize(d, 0.0);
+        }
+        self.total.resize(d, DoubleDouble::ZERO);
+    }
+
+    /// Σ h b_j f_j with exact products, mirror images first.
+    #[inline(always)]
+    fn sum_exactly<L: Lanes>(&mut self) {
+        let span = self.span.halves::<L>();
+        for ((total, rate), low) in self.total.iter_mut().zip(&self.points.rate).zip(&self.points.rate_low) {
+            let (rate, low) = (rate.halves::<L>(), low.halves::<L>());
+            let product = [span[0].mul(rate[0]), span[1].mul(rate[1])];
+            let rest = |half: usize| span[half].mul_add(low[half], span[half].mul_add(rate[half], product[half].neg()));
+            let (sum, error) = two_sums(product[0], product[1]);
+            let error = error.add(rest(0).add(rest(1)));
+            let (sum, more) = two_sums(sum, sum.swap_halves());
+            let error = error.add(error.swap_halves()).add(more);
+            let (sum, more) = two_sums(sum, sum.swap_pairs());
+            let error = error.add(error.swap_pairs()).add(more);
+            *total = DoubleDouble::sum(sum.array()[0], error.array()[0]);
+        }
+    }
+
+    /// Writes the new state of a method of s stages.
+    fn commit(&self, state: &mut State, s: usize) {
+        for (k, &total) in self.total.iter().enumerate() {
+            let y = DoubleDouble { hi: state.y[k], lo: state.low[k] } + total;
+            (state.y[k], state.low[k]) = (y.hi, y.lo);
+        }
+        state.time = state.time + self.step;
+        state.wrap();
+        state.memory.clear();
+        state.memory.push(self.step);
+        state.memory.extend(self.increment.iter().flat_map(|increment| (0..s).map(|i| increment.0[lane(i, s)])));
+    }
+
+    /// True where some unknown changed less than ever before in this step; no change at all may be an accident and is not counted.
+    fn falls(&mut self) -> bool {
+        let mut falls = false;
+        for (&change, least) in self.change.iter().zip(&mut self.least) {
+            if change != 0.0 && change < *least {
+                *least = change;
+                falls = true;
+            }
+        }
+        falls
+    }
+}
+
+/// a + b and its error, lane by lane.
+#[inline(always)]
+fn two_sums<L: Lanes>(a: L, b: L) -> (L, L) {
+    let sum = a.add(b);
+    let part = sum.sub(a);
+    (sum, a.sub(sum.sub(part)).add(b.sub(part)))
+}
