@@ -1,5 +1,5 @@
-//! What the equations cost: one evaluation beside a right-hand side written by hand for exactly the two bars at hand, and one step of `dp8` with
-//! the motor's row kept in every way beside the free scene.
+//! What the equations cost: one evaluation beside a right-hand side written by hand for exactly the two bars at hand, and what an evaluation costs
+//! inside a run by `dp8`, its steps included, with the motor's row kept in every way beside the free scene.
 //!
 //! `cargo bench --bench equations`: alternating blocks in one process; the figures are nanoseconds (minimum and median over the blocks) and
 //! the ratio of the minima and of the medians to the first line.
@@ -130,7 +130,7 @@ fn table<'a>(lines: impl Iterator<Item = (&'a str, &'a mut Vec<f64>)>) {
 struct Traveller {
     name: &'static str,
     advance: Box<dyn FnMut(f64) -> u64>,
-    per_step: Vec<f64>,
+    per_evaluation: Vec<f64>,
     per_second: Vec<f64>,
 }
 
@@ -141,13 +141,13 @@ impl Traveller {
             let (mut tally, until) = (Tally::default(), state.time + span);
             let reached = method.advance(&mut problem, &mut state, until, &mut tally, &mut |_, _| Ok(Seen::Kept));
             assert_eq!(reached, Ok(Reached::Until));
-            tally.steps
+            tally.evaluations
         };
-        Self { name, advance: Box::new(advance), per_step: Vec::new(), per_second: Vec::new() }
+        Self { name, advance: Box::new(advance), per_evaluation: Vec::new(), per_second: Vec::new() }
     }
 }
 
-/// One step of `dp8`, and one simulated second, at equal tolerance.
+/// One evaluation with its share of the steps of `dp8`, and one simulated second, at equal tolerance.
 fn steps((free, start): (&Arc<Mechanism>, &Motion), (motor, motor_start): (&Arc<Mechanism>, &Motion)) {
     const SPAN: f64 = 1.0;
     let dp8 = || Dp8::new(Tolerance { relative: 1e-9, absolute: 1e-9 });
@@ -162,14 +162,14 @@ fn steps((free, start): (&Arc<Mechanism>, &Motion), (motor, motor_start): (&Arc<
     for _ in 0..BLOCKS {
         for traveller in &mut travellers {
             let begin = Instant::now();
-            let steps = (traveller.advance)(SPAN);
+            let evaluations = (traveller.advance)(SPAN);
             let spent = begin.elapsed().as_secs_f64() * 1e9;
-            traveller.per_step.push(spent / steps as f64);
+            traveller.per_evaluation.push(spent / evaluations as f64);
             traveller.per_second.push(spent * 1e-3 / SPAN);
         }
     }
-    println!("{:36} {:>8} {:>8} {:>8} {:>8}", "one step of dp8 at 1e-9", "min ns", "ratio", "median", "ratio");
-    table(travellers.iter_mut().map(|traveller| (traveller.name, &mut traveller.per_step)));
+    println!("{:36} {:>8} {:>8} {:>8} {:>8}", "one evaluation, dp8 at 1e-9", "min ns", "ratio", "median", "ratio");
+    table(travellers.iter_mut().map(|traveller| (traveller.name, &mut traveller.per_evaluation)));
     println!("\n{:36} {:>8} {:>8} {:>8} {:>8}", "one simulated second", "min us", "ratio", "median", "ratio");
     table(travellers.iter_mut().map(|traveller| (traveller.name, &mut traveller.per_second)));
 }

@@ -9,6 +9,10 @@ use std::time::{Duration, Instant};
 const BAR: Duration = Duration::from_millis(100);
 /// Shortest time between two lines.
 const LINE: Duration = Duration::from_secs(5);
+/// Where rows come faster than this, the clock is looked at less often.
+const LOOK: Duration = Duration::from_millis(1);
+/// Most rows between two looks at the clock.
+const MOST_ROWS: u32 = 1024;
 /// Positions of the bar.
 const POSITIONS: f64 = 10_000.0;
 
@@ -18,6 +22,10 @@ pub struct Progress {
     until: f64,
     bar: Option<ProgressBar>,
     next: Instant,
+    /// Rows between two looks at the clock, and those left to the next.
+    stride: u32,
+    left: u32,
+    looked: Instant,
     quiet: bool,
 }
 
@@ -31,7 +39,8 @@ impl Progress {
             bar
         });
         let wait = if bar.is_some() { BAR } else { LINE };
-        Self { scene: scene.to_owned(), until, bar, next: Instant::now() + wait, quiet }
+        let now = Instant::now();
+        Self { scene: scene.to_owned(), until, bar, next: now + wait, stride: 1, left: 1, looked: now, quiet }
     }
 
     /// Takes the time reached \[s\].
@@ -39,7 +48,13 @@ impl Progress {
         if self.quiet {
             return;
         }
+        self.left -= 1;
+        if self.left > 0 {
+            return;
+        }
         let now = Instant::now();
+        self.stride = if now - self.looked < LOOK { (2 * self.stride).min(MOST_ROWS) } else { 1 };
+        (self.left, self.looked) = (self.stride, now);
         if now < self.next {
             return;
         }

@@ -175,8 +175,11 @@ impl<const N: usize> Form for Elimination<N> {
     fn read(&mut self, state: &State, motion: &mut Motion) {
         let f = self.mechanism.ties.count();
         self.mechanism.ties.read_angles(state, motion);
-        let rates: Vec<DoubleDouble> = (0..f).map(|i| state.unknown(f + i)).collect();
-        self.mechanism.ties.spread(&rates, &mut motion.omega);
+        for (omega, tie) in motion.omega.iter_mut().zip(&self.mechanism.ties.bodies) {
+            if let Some(base) = tie.base {
+                *omega += state.unknown(f + base);
+            }
+        }
         motion.work = state.unknown(2 * f);
     }
 }

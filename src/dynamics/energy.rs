@@ -5,6 +5,8 @@
 
 use super::kernel::{Kernel, dot};
 use super::{Mechanism, Motion, tree};
+#[cfg(target_arch = "x86_64")]
+use crate::arithmetic::lanes;
 use crate::arithmetic::{DoubleDouble, Real, Scalar};
 use crate::scene::Scene;
 
@@ -24,6 +26,13 @@ impl<T: Scalar> Energy<T> {
     }
 }
 
+/// The one place where the monitors' code for the processor at hand is entered.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx,fma")]
+fn fused_energy(mechanism: &Mechanism, kernel: &mut Kernel<DoubleDouble>, motion: &Motion) -> Energy<DoubleDouble> {
+    mechanism.energy(kernel, &motion.phi, &motion.omega)
+}
+
 impl Mechanism {
     /// The scene's start as a motion; angles are reduced from the very doubles given.
     pub fn start(&self, scene: &Scene) -> Motion {
@@ -37,12 +46,32 @@ impl Mechanism {
         motion
     }
 
+    /// Energies of a motion in double-double, by the processor's fused multiply-add where it has one; overwrites `kernel`.
+    ///
+    /// The bits are those of [`Mechanism::energy`]: a fused multiply-add is rounded once, whoever computes it.
+    pub fn exact_energy(&self, kernel: &mut Kernel<DoubleDouble>, motion: &Motion) -> Energy<DoubleDouble> {
+        #[cfg(target_arch = "x86_64")]
+        if lanes::available() {
+            // SAFETY: the processor has been asked.
+            #[allow(unsafe_code)]
+            return unsafe { fused_energy(self, kernel, motion) };
+        }
+        self.energy(kernel, &motion.phi, &motion.omega)
+    }
+
     /// Energies of a motion; overwrites `kernel`.
+    #[inline(always)]
     pub fn energy<T: Real>(&self, kernel: &mut Kernel<T>, phi: &[T], omega: &[T]) -> Energy<T> {
-        let n = self.bodies.len();
         kernel.face::<0>(phi);
-        self.tree.couple::<T, 0>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
-        tree::multiply::<T, 0>(n, &kernel.mass, omega, &mut kernel.load);
+        self.energy_facing::<T, 0>(kernel, omega)
+    }
+
+    /// Energies at the unit vectors in `kernel`, which holds M and its twist afterwards; for `N` bodies (any number where `N` is 0).
+    #[inline(always)]
+    pub fn energy_facing<T: Real, const N: usize>(&self, kernel: &mut Kernel<T>, omega: &[T]) -> Energy<T> {
+        let n = tree::size::<N>(self.bodies.len());
+        self.tree.couple::<T, N>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
+        tree::multiply::<T, N>(n, &kernel.mass, omega, &mut kernel.load);
         let ground = self.bodies.iter().fold(0.0, |sum, body| sum - body.mass * self.gravity.dot(body.centre.root));
         let gravity = self.tree.gravity_energy(&kernel.z) + T::of(ground);
         Energy {

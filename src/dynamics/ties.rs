@@ -201,16 +201,35 @@ impl Ties {
 
     /// Angles and turns of all bodies, and the driven share of their rates, in double-double.
     pub(super) fn read_angles(&self, state: &State, motion: &mut Motion) {
-        let n = self.bodies.len();
-        motion.resize(n);
+        motion.resize(self.bodies.len());
         motion.time = state.time;
-        let u: Vec<DoubleDouble> = (0..self.count()).map(|i| state.unknown(i)).collect();
-        let (mut z, mut acceleration) = (vec![Default::default(); n], vec![DoubleDouble::ZERO; n]);
-        self.expand(state.time, &u, &mut motion.phi, &mut z, &mut motion.omega, &mut acceleration);
         for (k, tie) in self.bodies.iter().enumerate() {
-            let (base, turns) = tie.base.map_or((DoubleDouble::ZERO, 0), |base| (u[base], state.turns[base]));
-            let winding = tie.laws.iter().fold(base, |sum, (sign, law)| sum + law.angle(state.time).scale(*sign));
-            motion.turns[k] = turns + ((winding.hi - angle::unwrapped(motion.phi[k], 0)) / std::f64::consts::TAU).round() as i64;
+            (motion.phi[k], motion.omega[k], motion.turns[k]) = tie.read(state);
+        }
+    }
+}
+
+impl Tie {
+    /// The body's angle, the driven share of its rate, and its turns.
+    fn read(&self, state: &State) -> (DoubleDouble, DoubleDouble, i64) {
+        let (base, turns) = self.base.map_or((DoubleDouble::ZERO, 0), |base| (state.unknown(base), state.turns[base]));
+        match (self.base, &self.laws[..]) {
+            (Some(_), []) => (base, DoubleDouble::ZERO, turns),
+            (None, [(sign, law)]) => {
+                let (angle, rate, turns) = law.winding(state.time);
+                (angle.scale(*sign), rate.scale(*sign), (turns * sign) as i64)
+            }
+            _ => {
+                let (mut angle, mut rate, mut winding) = (base, DoubleDouble::ZERO, base);
+                for (sign, law) in &self.laws {
+                    let (part, part_rate, _) = law.winding(state.time);
+                    angle = angle::difference(angle, -part.scale(*sign));
+                    rate += part_rate.scale(*sign);
+                    winding += law.angle(state.time).scale(*sign);
+                }
+                let whole = ((winding.hi - angle::unwrapped(angle, 0)) / std::f64::consts::TAU).round();
+                (angle, rate, turns + whole as i64)
+            }
         }
     }
 }

@@ -92,6 +92,7 @@ impl Tree {
     }
 
     /// Potential energy of gravity \[J\], less the constant of the ground points.
+    #[inline(always)]
     pub fn gravity_energy<T: Scalar>(&self, z: &[Complex<T>]) -> T {
         z.iter().zip(&self.weight).fold(T::ZERO, |sum, (z, &weight)| sum - z.dot(Complex::of(weight)))
     }

@@ -69,6 +69,8 @@ pub(super) struct Course {
     mechanism: Arc<Mechanism>,
     marcher: Box<dyn March>,
     sampler: Sampler,
+    /// The motion last sampled, kept for its room.
+    shown: Motion,
     held: Vec<Held>,
     holds_in_row: usize,
     /// Energy stabilizers put in before the present marcher \[J\].
@@ -83,6 +85,7 @@ impl Course {
             free: Arc::clone(&mechanism),
             mechanism,
             marcher,
+            shown: Motion::default(),
             held: Vec::new(),
             holds_in_row: 0,
             stabilizer: 0.0,
@@ -91,9 +94,11 @@ impl Course {
 
     /// The sample of the present moment.
     pub(super) fn sample(&mut self) -> &Sample {
-        let mut motion = self.motion();
-        motion.stabilizer += self.stabilizer;
-        self.sampler.take(&motion)
+        // A form writes only what it keeps.
+        (self.shown.work, self.shown.stabilizer) = (DoubleDouble::default(), 0.0);
+        self.marcher.read(&mut self.shown);
+        self.shown.stabilizer += self.stabilizer;
+        self.sampler.take(&self.shown)
     }
 
     /// Counts of all marchers so far.

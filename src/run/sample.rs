@@ -11,7 +11,7 @@ use crate::dynamics::{Mechanism, Motion};
 use std::sync::Arc;
 
 /// One moment of a run.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub struct Sample {
     /// Time \[s\].
     pub t: f64,
@@ -39,7 +39,33 @@ pub struct Sample {
     pub motors: Vec<[f64; 2]>,
 }
 
+impl Clone for Sample {
+    fn clone(&self) -> Self {
+        let mut sample = Self::default();
+        sample.clone_from(self);
+        sample
+    }
+
+    /// Allocates nothing where there is room: copies are made every row.
+    fn clone_from(&mut self, other: &Self) {
+        self.thin_from(other);
+        self.centre.clone_from(&other.centre);
+        self.velocity.clone_from(&other.velocity);
+    }
+}
+
 impl Sample {
+    /// Copies all but positions and velocities of the centres, which follow from the angles.
+    pub(super) fn thin_from(&mut self, other: &Self) {
+        let Self { t, kinetic, potential, work, stabilizer, imbalance, .. } = *other;
+        (self.t, self.kinetic, self.potential) = (t, kinetic, potential);
+        (self.work, self.stabilizer, self.imbalance) = (work, stabilizer, imbalance);
+        self.phi.clone_from(&other.phi);
+        self.omega.clone_from(&other.omega);
+        self.constraints.clone_from(&other.constraints);
+        self.motors.clone_from(&other.motors);
+    }
+
     /// False where any number of it is not finite; nothing after that means anything.
     pub fn is_finite(&self) -> bool {
         let scalars = [self.t, self.kinetic, self.potential, self.work, self.stabilizer, self.imbalance];
@@ -104,13 +130,13 @@ impl Sampler {
 
     /// Energy less work of a motion \[J\], in full.
     pub fn balance(&mut self, motion: &Motion) -> DoubleDouble {
-        self.mechanism.energy(&mut self.exact, &motion.phi, &motion.omega).total() - motion.work
+        self.mechanism.exact_energy(&mut self.exact, motion).total() - motion.work
     }
 
     /// Samples a motion.
     pub fn take(&mut self, motion: &Motion) -> &Sample {
         let mechanism = &*self.mechanism;
-        let Energy { kinetic, potential } = mechanism.energy(&mut self.exact, &motion.phi, &motion.omega);
+        let Energy { kinetic, potential } = mechanism.exact_energy(&mut self.exact, motion);
         let balance = kinetic + potential - motion.work;
         let reference = *self.reference.get_or_insert(balance);
         for k in 0..mechanism.bodies.len() {

@@ -2,12 +2,15 @@
 
 use super::sample::Sample;
 use crate::dynamics::Mechanism;
-use std::io::Write;
+use std::io::{self, Write};
+
+/// Bytes gathered before the writer sees them.
+const BUFFER: usize = 1 << 16;
 
 /// Writes the trajectory as CSV.
 pub struct Table<W: Write> {
-    writer: csv::Writer<W>,
-    fields: Vec<String>,
+    writer: W,
+    buffer: Vec<u8>,
 }
 
 impl<W: Write> Table<W> {
@@ -35,47 +38,108 @@ impl<W: Write> Table<W> {
                 format!("{name}.power [W]"),
             ]);
         }
-        let mut writer = csv::Writer::from_writer(writer);
-        writer.write_record(&header)?;
-        Ok(Self { writer, fields: vec![String::new(); header.len()] })
+        let mut titles = csv::Writer::from_writer(Vec::with_capacity(BUFFER + BUFFER / 4));
+        titles.write_record(&header)?;
+        let buffer = titles.into_inner().map_err(|error| error.into_error())?;
+        Ok(Self { writer, buffer })
     }
 
     /// Writes a row.
     ///
     /// # Errors
     /// What the writer says.
-    pub fn write(&mut self, sample: &Sample) -> csv::Result<()> {
-        let mut fields = self.fields.iter_mut();
-        let mut put = |value: f64| {
-            if let Some(field) = fields.next() {
-                field.clear();
-                let _ = std::fmt::Write::write_fmt(field, format_args!("{value:?}"));
-            }
-        };
-        put(sample.t);
+    pub fn write(&mut self, sample: &Sample) -> io::Result<()> {
+        let buffer = &mut self.buffer;
+        put(buffer, sample.t);
         for k in 0..sample.phi.len() {
             for value in
                 [sample.phi[k], sample.omega[k], sample.centre[k][0], sample.centre[k][1], sample.velocity[k][0], sample.velocity[k][1]]
             {
-                put(value);
+                put(buffer, value);
             }
         }
         for value in [sample.kinetic, sample.potential, sample.work, sample.imbalance] {
-            put(value);
+            put(buffer, value);
         }
         for (constraint, motor) in sample.constraints.iter().zip(&sample.motors) {
             for value in [constraint[0], constraint[1], motor[0], motor[1]] {
-                put(value);
+                put(buffer, value);
             }
         }
-        self.writer.write_record(&self.fields)
+        if let Some(last) = buffer.last_mut() {
+            *last = b'\n';
+        }
+        if buffer.len() >= BUFFER {
+            self.writer.write_all(buffer)?;
+            buffer.clear();
+        }
+        Ok(())
     }
 
     /// Writes out what is buffered and hands the writer back.
     ///
     /// # Errors
     /// What the writer says.
-    pub fn finish(self) -> std::io::Result<W> {
-        self.writer.into_inner().map_err(|error| error.into_error())
+    pub fn finish(mut self) -> io::Result<W> {
+        self.writer.write_all(&self.buffer)?;
+        self.writer.flush()?;
+        Ok(self.writer)
+    }
+}
+
+/// Appends a number and a comma: the shortest digits that read back to the same double, laid out as Rust's `{:?}` does.
+fn put(buffer: &mut Vec<u8>, value: f64) {
+    let mut digits = zmij::Buffer::new();
+    let text = digits.format(value).as_bytes();
+    let size = value.abs();
+    if size == 0.0 || (1e-4..1e16).contains(&size) || !size.is_finite() {
+        buffer.extend_from_slice(text);
+    } else if (1e-5..1e-4).contains(&size) {
+        // 0.0000123 is written 1.23e-5.
+        let (sign, digits) = if value < 0.0 { (&b"-"[..], &text[7..]) } else { (&b""[..], &text[6..]) };
+        buffer.extend_from_slice(sign);
+        buffer.push(digits[0]);
+        if digits.len() > 1 {
+            buffer.push(b'.');
+            buffer.extend_from_slice(&digits[1..]);
+        }
+        buffer.extend_from_slice(b"e-5");
+    } else {
+        buffer.extend(text.iter().filter(|&&letter| letter != b'+'));
+    }
+    buffer.push(b',');
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn written(value: f64) -> String {
+        let mut buffer = Vec::new();
+        put(&mut buffer, value);
+        assert_eq!(buffer.pop(), Some(b','));
+        String::from_utf8(buffer).expect("ASCII")
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20_000))]
+        #[test]
+        fn numbers_are_written_as_the_standard_library_does(bits in any::<u64>(), near in -20.0..20.0f64, digits in 1u32..1000) {
+            for value in [f64::from_bits(bits), near, 10f64.powf(near), -10f64.powf(near), f64::from(digits) * 1e-7, f64::from(digits) * 1e14] {
+                let (ours, theirs) = (written(value), format!("{value:?}"));
+                // Of two shortest numbers equally near, either is right: ours ends on an even digit.
+                let is_tie = ours.len() == theirs.len() && ours.parse() == Ok(value);
+                prop_assert!(ours == theirs || is_tie, "{ours} {theirs}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_bounds_of_the_layouts() {
+        let bounds = [0.0, -0.0, 1e-4, 1e-5, 9.999e-5, 1e15, 1e16, 1e17, 5e-324, f64::MAX, f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
+        for value in bounds.iter().flat_map(|&x: &f64| [x, -x, x.next_up(), x.next_down()]) {
+            assert_eq!(written(value), format!("{value:?}"));
+        }
     }
 }

@@ -47,25 +47,19 @@ impl Trace {
         if self.head.len() < PART {
             self.head.push(thin(sample));
         }
-        if self.tail.len() == PART {
-            self.tail.pop_front();
-        }
-        self.tail.push_back(thin(sample));
+        // The oldest one's room serves the newest.
+        let mut last = if self.tail.len() == PART { self.tail.pop_front() } else { None }.unwrap_or_default();
+        last.thin_from(sample);
+        self.tail.push_back(last);
         self.seen += 1;
     }
 }
 
 /// A sample without positions and velocities.
 fn thin(sample: &Sample) -> Sample {
-    Sample {
-        phi: sample.phi.clone(),
-        omega: sample.omega.clone(),
-        constraints: sample.constraints.clone(),
-        motors: sample.motors.clone(),
-        centre: Vec::new(),
-        velocity: Vec::new(),
-        ..*sample
-    }
+    let mut thinned = Sample::default();
+    thinned.thin_from(sample);
+    thinned
 }
 
 #[cfg(test)]

@@ -86,17 +86,39 @@ where
     }
 }
 
-/// Projects angles and rates of a state onto all rows; true where something moved.
+/// Turns up to this \[rad\] are made without new sines, and without new factors of M and S: these change by as little.
+const SMALL: f64 = 1e-8;
+/// Changes up to this, relative to the rates where they are above one, are rounding: what is known of the rates at the state stays true.
+const ROUNDING: f64 = 1e-14;
+
+/// Projects angles and rates of a state onto all rows; true where something moved by more than rounding.
 ///
 /// # Errors
 /// Name of the worst row and its violation where it cannot be brought below `tolerance`.
 pub fn project(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &mut State, tolerance: f64) -> Result<bool, (String, f64)> {
-    let n = mechanism.bodies.len();
+    match mechanism.bodies.len() {
+        1 => project_sized::<1>(mechanism, kernel, state, tolerance),
+        2 => project_sized::<2>(mechanism, kernel, state, tolerance),
+        3 => project_sized::<3>(mechanism, kernel, state, tolerance),
+        _ => project_sized::<0>(mechanism, kernel, state, tolerance),
+    }
+}
+
+/// [`project`] for `N` bodies (any number where `N` is 0).
+fn project_sized<const N: usize>(
+    mechanism: &Mechanism,
+    kernel: &mut Kernel<f64>,
+    state: &mut State,
+    tolerance: f64,
+) -> Result<bool, (String, f64)> {
+    let n = tree::size::<N>(mechanism.bodies.len());
     let rows = mechanism.rows.len();
-    let energy_before = energy(mechanism, kernel, state);
-    let (mut last, mut moved) = (f64::INFINITY, false);
+    kernel.face::<N>(&state.y[..n]);
+    let energy_before = mechanism.energy_facing::<f64, N>(kernel, &state.y[n..2 * n]).total();
+    tree::factor::<f64, N>(n, &mut kernel.mass, &mut kernel.pivot);
+    kernel.linearise::<N>(mechanism, state.time, &state.y[..n], &state.y[n..2 * n]);
+    let (mut last, mut moved, mut far) = (f64::INFINITY, false, 0.0);
     loop {
-        linearise(mechanism, kernel, state);
         let worst = (0..rows).map(|r| kernel.rows[r].position.abs()).fold(0.0, largest);
         // At rounding, or no longer falling: another sweep would only move it about.
         if worst <= 1e-16 || worst >= 0.5 * last || worst.is_nan() {
@@ -106,9 +128,20 @@ pub fn project(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &mut Stat
         for r in 0..rows {
             kernel.multiplier[r] = kernel.rows[r].position;
         }
-        tree::solve::<f64, 0>(rows, &kernel.schur, &kernel.schur_pivot, &mut kernel.multiplier);
-        shift(kernel, state, 0, n);
-        moved = true;
+        let turn = shift(kernel, state, 0, n);
+        (moved, far) = (true, largest(far, turn));
+        let (phi, omega) = (&state.y[..n], &state.y[n..2 * n]);
+        if turn <= SMALL {
+            for (z, &turn) in kernel.z.iter_mut().zip(&kernel.load) {
+                *z = *z - z.left().times(turn) - z.times(0.5 * turn * turn);
+            }
+            kernel.rows_at(mechanism, state.time, phi, omega);
+        } else {
+            kernel.face::<N>(phi);
+            mechanism.tree.couple::<f64, N>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
+            tree::factor::<f64, N>(n, &mut kernel.mass, &mut kernel.pivot);
+            kernel.linearise::<N>(mechanism, state.time, phi, omega);
+        }
     }
     let lever = |kernel: &Kernel<f64>, r: usize| kernel.jacobian[r * n..(r + 1) * n].iter().fold(1.0, |sum: f64, g| sum.max(g.abs()));
     check(mechanism, kernel, tolerance, |kernel, r| (kernel.rows[r].position, lever(kernel, r)))?;
@@ -124,36 +157,31 @@ pub fn project(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &mut Stat
         fast = largest(fast, kernel.multiplier[r].abs() / pace(kernel, state, r));
     }
     if fast > 2.0 * f64::EPSILON || fast.is_nan() {
-        tree::solve::<f64, 0>(rows, &kernel.schur, &kernel.schur_pivot, &mut kernel.multiplier);
-        shift(kernel, state, n, n);
-        moved = true;
+        let change = shift(kernel, state, n, n);
+        let most = state.y[n..2 * n].iter().fold(1.0, |most: f64, omega| most.max(omega.abs()));
+        (moved, far) = (true, largest(far, change / most));
         check(mechanism, kernel, tolerance, |kernel, r| (rate(kernel, state, r), pace(kernel, state, r)))?;
     }
     if moved {
         state.wrap();
-        state.y[2 * n + 1] += energy(mechanism, kernel, state) - energy_before;
+        let energy = mechanism.energy_facing::<f64, N>(kernel, &state.y[n..2 * n]).total();
+        state.y[2 * n + 1] += energy - energy_before;
     }
-    Ok(moved)
+    Ok(far > ROUNDING)
 }
 
-/// Rows and their factors at a state.
-fn linearise(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &State) {
-    let n = mechanism.bodies.len();
-    let (phi, omega) = (&state.y[..n], &state.y[n..2 * n]);
-    kernel.face::<0>(phi);
-    mechanism.tree.couple::<f64, 0>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
-    tree::factor::<f64, 0>(n, &mut kernel.mass, &mut kernel.pivot);
-    kernel.linearise::<0>(mechanism, state.time, phi, omega);
-}
-
-/// Subtracts M⁻¹ Gᵀ times the multipliers from the unknowns `from`….
-fn shift(kernel: &Kernel<f64>, state: &mut State, from: usize, n: usize) {
-    for (r, multiplier) in kernel.multiplier.iter().enumerate() {
-        for k in 0..n {
-            let change = state.low[from + k] - kernel.lifted[r * n + k] * multiplier;
-            (state.y[from + k], state.low[from + k]) = two_sum(state.y[from + k], change);
-        }
+/// Subtracts M⁻¹ Gᵀ S⁻¹ times what is in `multiplier` from the unknowns `from`…, and leaves it in `load`; returns its largest entry.
+fn shift(kernel: &mut Kernel<f64>, state: &mut State, from: usize, n: usize) -> f64 {
+    let rows = kernel.multiplier.len();
+    tree::solve::<f64, 0>(rows, &kernel.schur, &kernel.schur_pivot, &mut kernel.multiplier);
+    let mut largest_change = 0.0;
+    for k in 0..n {
+        let change = (0..rows).fold(0.0, |sum, r| sum + kernel.lifted[r * n + k] * kernel.multiplier[r]);
+        (state.y[from + k], state.low[from + k]) = two_sum(state.y[from + k], state.low[from + k] - change);
+        kernel.load[k] = change;
+        largest_change = largest(largest_change, change.abs());
     }
+    largest_change
 }
 
 /// The worst row must be below tolerance, each measured against its own size.
@@ -171,11 +199,6 @@ fn check(
         }
     }
     Ok(())
-}
-
-fn energy(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &State) -> f64 {
-    let n = mechanism.bodies.len();
-    mechanism.energy(kernel, &state.y[..n], &state.y[n..2 * n]).total()
 }
 
 /// The larger of two, and not a number if either is.

@@ -55,6 +55,7 @@ impl Spring {
     }
 
     /// Stored energy \[J\].
+    #[inline(always)]
     pub fn energy<T: Scalar>(&self, z: &[Complex<T>]) -> T {
         let square = self.span.position(z).norm_squared();
         let stretch = if self.free_length == 0.0 { square.sqrt() } else { square.sqrt() - T::of(self.free_length) };

@@ -29,12 +29,12 @@ impl AngleRow {
     #[inline]
     pub fn linearise<T: Real>(&self, t: Time, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
         self.jacobian(jacobian);
-        let phase = self.law.at::<T>(t);
+        let [theta, rate, acceleration] = self.law.angles::<T>(t);
         let mut given = at.phi[self.body];
         if let Some(base) = self.base {
             given = angle::difference(given, at.phi[base]);
         }
-        Linearised { position: angle::difference(given, phase.angle), drive: -phase.rate, convective: -phase.acceleration }
+        Linearised { position: angle::difference(given, theta), drive: -rate, convective: -acceleration }
     }
 
     /// Adds G to `jacobian`.
