@@ -202,7 +202,10 @@ mod tests {
     /// Sine and cosine in double-double; quarter turns are taken off in three parts first, which [`DoubleDouble`] does in two.
     fn exact(angle: f64, rest: f64) -> (DoubleDouble, DoubleDouble) {
         let q = (angle / FRAC_PI_2).round();
-        let r = DoubleDouble::of(angle) - DoubleDouble::product(q, FRAC_PI_2) - DoubleDouble::product(q, MIDDLE) - DoubleDouble::product(q, LEAST);
+        let r = DoubleDouble::of(angle)
+            - DoubleDouble::product(q, FRAC_PI_2)
+            - DoubleDouble::product(q, MIDDLE)
+            - DoubleDouble::product(q, LEAST);
         let (sin, cos) = (r + rest).sin_cos();
         match (q as i64).rem_euclid(4) {
             0 => (sin, cos),
@@ -270,7 +273,9 @@ mod tests {
     fn near_quarters(turns: i64) -> impl Iterator<Item = (f64, f64)> {
         (-turns..=turns).flat_map(|k| {
             let centre = (DoubleDouble::PI.ldexp(0.25) * DoubleDouble::of(k as f64)).hi;
-            (-3i64..=3).map(move |step| (f64::from_bits(centre.to_bits().saturating_add_signed(step)), 0.0)).filter(|(a, _)| a.abs() <= RANGE)
+            (-3i64..=3)
+                .map(move |step| (f64::from_bits(centre.to_bits().saturating_add_signed(step)), 0.0))
+                .filter(|(a, _)| a.abs() <= RANGE)
         })
     }
 
@@ -304,7 +309,9 @@ mod tests {
     #[test]
     fn angles_nearest_to_quarter_turns() {
         // Convergents p/q of π/2 and their multiples: p is the integer nearest to q π/2.
-        for p in [3.0, 11.0, 22.0, 344.0, 355.0, 710.0, 51_819.0, 52_174.0, 103_993.0, 104_348.0, 208_341.0, 312_689.0, 573_204.0, 833_719.0] {
+        for p in
+            [3.0, 11.0, 22.0, 344.0, 355.0, 710.0, 51_819.0, 52_174.0, 103_993.0, 104_348.0, 208_341.0, 312_689.0, 573_204.0, 833_719.0]
+        {
             for power in 0..30 {
                 let angle = p * 2f64.powi(-power);
                 check([(angle, 0.0), (-angle, 0.0)].into_iter());

@@ -1,10 +1,10 @@
 //! The steps themselves, a stage a lane; the one place where code compiled for the processor is entered.
 
 use super::tableau::{Tableau, lane};
-use super::{Gauss, MOST_SWEEPS};
+use super::{Gauss, IDLE_SWEEPS, MOST_SWEEPS};
+use crate::arithmetic::eight::{LANES, Octet};
 #[cfg(target_arch = "x86_64")]
 use crate::arithmetic::lanes::{Avx, available};
-use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::{Lanes, Portable};
 use crate::arithmetic::sum::two_sum;
 use crate::arithmetic::{DoubleDouble, Scalar};
@@ -31,12 +31,12 @@ pub(super) struct Scratch {
     pub total: Vec<DoubleDouble>,
 }
 
-/// What the sweeps of one march need beside the field.
-struct March<'a> {
+/// One step about to be taken.
+struct Step<'a> {
     tableau: &'a Tableau,
     scratch: &'a mut Scratch,
+    /// Evaluations after the last sweep that carry what doubles leave out.
     exact: u32,
-    idle: u32,
 }
 
 /// `count` steps of `scratch.step`.
@@ -49,7 +49,7 @@ pub(super) fn march<F: Field + ?Sized>(
     watch: &mut Watch<F>,
 ) -> Result<(), StepError> {
     for _ in 0..count {
-        let mut step = March { tableau: &gauss.tableau, scratch: &mut gauss.scratch, exact: gauss.exact, idle: gauss.idle };
+        let mut step = Step { tableau: &gauss.tableau, scratch: &mut gauss.scratch, exact: gauss.exact };
         #[cfg(target_arch = "x86_64")]
         if !gauss.portable && available() {
             // SAFETY: the processor has just been asked; all else in that code is safe.
@@ -74,11 +74,11 @@ pub(super) fn march<F: Field + ?Sized>(
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx,fma")]
-fn hardware<F: Field + ?Sized>(step: &mut March, problem: &mut F, state: &State, tally: &mut Tally) {
+fn hardware<F: Field + ?Sized>(step: &mut Step, problem: &mut F, state: &State, tally: &mut Tally) {
     step.take::<Avx, F>(problem, state, tally);
 }
 
-impl March<'_> {
+impl Step<'_> {
     /// All of one step but its acceptance.
     #[inline(always)]
     fn take<L: Lanes, F: Field + ?Sized>(&mut self, problem: &mut F, state: &State, tally: &mut Tally) {
@@ -132,7 +132,7 @@ impl March<'_> {
             tally.evaluations += self.tableau.nodes.len() as u64;
             self.restage::<L, false>(state);
             idle = if self.scratch.falls() { 0 } else { idle + 1 };
-            if idle >= self.idle || self.scratch.change.iter().all(|&change| change == 0.0) {
+            if idle == IDLE_SWEEPS || self.scratch.change.iter().all(|&change| change == 0.0) {
                 return;
             }
         }

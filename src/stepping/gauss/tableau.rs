@@ -204,8 +204,9 @@ mod tests {
             let tableau = Tableau::new(s);
             for i in 0..s {
                 for k in 1..=s {
-                    let sum = (0..s)
-                        .fold(0.0, |sum, j| sum + tableau.forecast[j].0[lane(i, s)] * (tableau.weights[j] * power(tableau.nodes[j], k - 1)).hi);
+                    let sum = (0..s).fold(0.0, |sum, j| {
+                        sum + tableau.forecast[j].0[lane(i, s)] * (tableau.weights[j] * power(tableau.nodes[j], k - 1)).hi
+                    });
                     let exact = ((power(DoubleDouble::ONE + tableau.nodes[i], k) - DoubleDouble::ONE) * reciprocal(k)).hi;
                     assert!((sum - exact).abs() < 1e-10 * exact, "degree {k}, row {i} of s = {s}: {sum} for {exact}");
                 }
