@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-const STEP: f64 = 1.0 / 16.0;
+const STEP: f64 = 1.0 / 32.0;
 /// Simulated time between samples of the energy \[s\].
 const SAMPLE: f64 = 128.0;
 const FOLDER: &str = "output/long_horizon";

@@ -17,10 +17,11 @@
 //! * Sweeps go on until no unknown's change falls any further, and one sweep more.  A tolerance would leave the same rest in every step.
 //! * State and time are pairs; the update sums exact products in double-double.
 //! * Stages are summed outwards from the step's midpoint `y + Σ L_j / 2` in mirror pairs, so that a step and its reverse round alike.
-//! * Two or more evaluations at the end in pairs of doubles, at stages that are pairs too ([`Field::exact_rates`]): what remains of the random walk is the
-//!   rounding of `L_j` in the stages.  They go on until the stages have settled: an update with exact rates at odds with stages made from plain ones drifts
-//!   linearly where the motion is regular.  On `gentle` with h = 2⁻⁶ s one evaluation leaves -2.6e-16 after 1024 s, two leave 2.4e-18, none 3.5e-17
-//!   (relative to the scale of the energy); with h = 2⁻⁴ s, where a sweep contracts less, two leave 1.6e-16.
+//! * Two or more evaluations at the end in pairs of doubles, at stages that are pairs too ([`Field::exact_rates`]): what remains of the
+//!   random walk is the rounding of `L_j` in the stages.  They go on until the stages have settled: an update with exact rates at odds
+//!   with stages made from plain ones drifts linearly where the motion is regular.  On `gentle` with h = 2⁻⁶ s one evaluation leaves
+//!   -2.6e-16 after 1024 s, two leave 2.4e-18, none 3.5e-17 (relative to the scale of the energy); with h = 2⁻⁴ s, where a sweep
+//!   contracts less, two leave 1.6e-16.
 //!
 //! The stages lie in lanes: a sweep is one evaluation of the field on vectors of eight ([`Field::rates`]).
 //!
@@ -46,7 +47,7 @@ const IDLE_SWEEPS: usize = 2;
 /// Most evaluations after the last sweep that carry what doubles leave out.
 const MOST_EXACT_SWEEPS: u32 = 12;
 /// Change of the stages, beside their change in the first of these, that ends them.
-const SETTLED: f64 = 0.1;
+const SETTLED: f64 = 0.02;
 /// Largest last change, relative to its scale, that can be rounding; anything above has not converged.
 const LARGEST_REST: f64 = 1e-10;
 /// Scale of an angle near zero \[rad\]: forces that cancel leave an angle a noise that is not relative to its size.
@@ -85,7 +86,7 @@ impl Gauss {
         Self::new(place + 2, step)
     }
 
-    /// The same without the evaluations that carry what doubles leave out: a third of the time less, twelve times the drift.
+    /// The same without the evaluations that carry what doubles leave out: less time, and about ten times the drift.
     pub fn plain(self) -> Self {
         Self { exact: 0, ..self }
     }
@@ -262,8 +263,8 @@ mod tests {
         assert!(spoiled[1].0 != 0.0 && spoiled[1].0.abs() < 1e-11, "{spoiled:?}");
     }
 
-    /// Weights the stages do not know drift linearly and in proportion: -1.8e-20 J/s for what doubles leave out of ours, 17 times more where the second half
-    /// of the stages does without.  At their true size that is below the random walk for 1e8 s, so they are enlarged a million times here.
+    /// Weights the stages do not know drift linearly and in proportion: -1.8e-20 J/s for what doubles leave out of ours, 17 times more where
+    /// the second half of the stages does without.  At their true size the random walk hides that for 1e8 s, so they are enlarged here.
     #[test]
     fn low_parts_of_the_weights_in_the_update_only_drift_linearly() {
         let marks = [1 << 11, 1 << 12, 1 << 13];

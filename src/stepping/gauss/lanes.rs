@@ -136,7 +136,7 @@ impl Step<'_> {
         }
     }
 
-    /// Evaluations that carry what doubles leave out, at stages that are pairs: until the stages' changes are small beside the first, or fall no further.
+    /// Evaluations that carry what doubles leave out, at stages that are pairs, until the stages' changes are small or fall no further.
     #[inline(always)]
     fn refine<L: Lanes, F: Field + ?Sized>(&mut self, problem: &mut F, state: &State, tally: &mut Tally) {
         self.restage::<L, true>(state);
