@@ -29,7 +29,7 @@
 //!
 //! | module | holds |
 //! | --- | --- |
-//! | [`arithmetic`] | the scalar trait, double-double, exact sums, wrapped angles |
+//! | [`arithmetic`] | the scalar trait, double-double, lanes, sine and cosine, exact sums, wrapped angles |
 //! | [`scene`] | scenes as plain data, read strictly from JSON |
 //! | [`dynamics`] | **the equation of motion**: begin here; its first page has the table of symbols |
 //! | [`stepping`] | the methods, one a file |

@@ -1,10 +1,10 @@
 //! Numbers: the scalar trait the physics is written over, and the exact building blocks of long sums.
 //!
-//! Every formula of [`dynamics`](crate::dynamics) is written once over [`Scalar`] and evaluated on `f64` (inner loops) and on
-//! [`DoubleDouble`] (monitors, references).  Lanes and dual numbers can join by implementing the same dozen operations.
+//! Every formula of [`dynamics`](crate::dynamics) is written once over [`Scalar`] and evaluated on `f64` (inner loops), on
+//! [`DoubleDouble`] (monitors, references), and on [`Eight`](eight::Eight) lanes and their [`Pairs`](pairs::Pairs) (stages of implicit methods).
 //!
 //! Two rules keep the bits the same on every machine: trigonometry comes from pure Rust (the `libm` crate, or our own series
-//! in double-double), and a fused multiply-add is written as one wherever it is used ([`sum::two_product`], [`lanes`]), never left to the compiler:
+//! in lanes and in double-double), and a fused multiply-add is written as one wherever it is used ([`sum::two_product`], [`lanes`]), never left to the compiler:
 //! it is rounded once by definition, so it makes no difference to the bits whether the processor has the instruction.
 
 pub mod angle;

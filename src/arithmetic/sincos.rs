@@ -1,15 +1,16 @@
-//! Sine and cosine of four independent angles in lanes, at most one unit in the last place off; and of pairs, to about 70 bits.
+//! Sine and cosine of four independent angles in lanes, at most one unit in the last place off; and of pairs, to about 66 bits.
 //!
 //! ```text
 //! phi = q π/2 + r + low, |r| <= π/4;   cos r = 1 - r²/2 + r⁴ C(r²),   sin r = r + r³ S(r²)
 //! m = q - 4 [q/4] = -2…2:   cos phi = (1 - |m|) cos r - m (2 - |m|) sin r,   sin phi = (1 - |m|) sin r + m (2 - |m|) cos r
 //! ```
 //!
-//! π/2 is taken off in three parts.  The first product loses nothing: its difference to phi is a multiple of 2⁻⁵² (2⁻⁵³ below 1) less than 1.  The
-//! second is exact as a pair, the third rounds at 2⁻¹⁵⁰.  That serves angles up to [`RANGE`]; a vector with an angle beyond is handed to `libm`, lane by lane.
+//! π/2 is taken off in three parts.  The first product loses nothing: its difference to phi is a multiple of 2⁻⁵² (2⁻⁵³ below 1) less
+//! than 1.  The second is exact as a pair, the third rounds at 2⁻¹⁵⁰.  That serves angles up to [`RANGE`]; a vector with an angle beyond
+//! is handed to `libm`, lane by lane.
 //!
-//! Both series are Taylor's to r¹⁸ and r¹⁷ (for pairs r²² and r²¹), whose next terms are below 3e-21 and 1e-19 (3e-26 and 2e-25): no fitted constants, no bias.
-//! Whatever is rounded on the way to the leading terms is kept and joins the correction.
+//! Both series are Taylor's to r¹⁸ and r¹⁷ (for pairs r²² and r²¹), whose next terms are below 4e-21 and 1e-19 (5e-24 and 2e-25): no
+//! fitted constants, no bias.  Whatever is rounded on the way to the leading terms is kept and joins the correction.
 //!
 //! Source of the reduction: W. J. Cody, W. Waite, *Software Manual for the Elementary Functions* (1980), section 8, with a fused multiply-add.
 

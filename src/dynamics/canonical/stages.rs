@@ -127,14 +127,19 @@ impl Stages {
                 Room::Hardware(both) => both.drive(mechanism, &self.time),
             }
         }
+        // The sizes worth unrolling; any other count of the same operations has the same bits.
         match &mut self.room {
-            Room::Portable(both) => both.rates::<N, ACCOUNT, EXACT>(mechanism, points),
+            Room::Portable(both) => both.rates::<0, ACCOUNT, EXACT>(mechanism, points),
             #[cfg(target_arch = "x86_64")]
             Room::Hardware(both) => {
                 // SAFETY: this room is made only where the processor was found to have AVX and FMA; all else in that code is safe.
                 #[allow(unsafe_code)]
                 unsafe {
-                    hardware::<N, ACCOUNT, EXACT>(both, mechanism, points);
+                    match N {
+                        1 | 2 => hardware::<N, ACCOUNT, EXACT>(both, mechanism, points),
+                        _ if EXACT || ACCOUNT => hardware::<0, ACCOUNT, EXACT>(both, mechanism, points),
+                        _ => hardware::<N, ACCOUNT, EXACT>(both, mechanism, points),
+                    }
                 }
             }
         }

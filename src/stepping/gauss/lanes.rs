@@ -1,7 +1,7 @@
 //! The steps themselves, a stage a lane; the one place where code compiled for the processor is entered.
 
 use super::tableau::{Tableau, lane};
-use super::{Gauss, MOST_SWEEPS};
+use super::{Gauss, IDLE_SWEEPS, MOST_SWEEPS, SETTLED};
 use crate::arithmetic::eight::{LANES, Octet};
 #[cfg(target_arch = "x86_64")]
 use crate::arithmetic::lanes::{Avx, available};
@@ -25,18 +25,22 @@ pub(super) struct Scratch {
     /// L (d).
     increment: Vec<Octet>,
     /// Largest change of each unknown in the last sweep, and the least so far (d, d).
-    pub change: Vec<f64>,
+    change: Vec<f64>,
     least: Vec<f64>,
+    /// Largest change of each unknown in the first exact sweep (d).
+    first: Vec<f64>,
+    /// The largest change of the last sweep in plain doubles (d), by which convergence is judged.
+    pub rest: Vec<f64>,
     /// The sum of all increments (d).
     pub total: Vec<DoubleDouble>,
 }
 
-/// What the sweeps of one march need beside the field.
-struct March<'a> {
+/// One step about to be taken.
+struct Step<'a> {
     tableau: &'a Tableau,
     scratch: &'a mut Scratch,
+    /// Evaluations after the last sweep that carry what doubles leave out.
     exact: u32,
-    idle: u32,
 }
 
 /// `count` steps of `scratch.step`.
@@ -49,7 +53,7 @@ pub(super) fn march<F: Field + ?Sized>(
     watch: &mut Watch<F>,
 ) -> Result<(), StepError> {
     for _ in 0..count {
-        let mut step = March { tableau: &gauss.tableau, scratch: &mut gauss.scratch, exact: gauss.exact, idle: gauss.idle };
+        let mut step = Step { tableau: &gauss.tableau, scratch: &mut gauss.scratch, exact: gauss.exact };
         #[cfg(target_arch = "x86_64")]
         if !gauss.portable && available() {
             // SAFETY: the processor has just been asked; all else in that code is safe.
@@ -74,25 +78,19 @@ pub(super) fn march<F: Field + ?Sized>(
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx,fma")]
-fn hardware<F: Field + ?Sized>(step: &mut March, problem: &mut F, state: &State, tally: &mut Tally) {
+fn hardware<F: Field + ?Sized>(step: &mut Step, problem: &mut F, state: &State, tally: &mut Tally) {
     step.take::<Avx, F>(problem, state, tally);
 }
 
-impl March<'_> {
+impl Step<'_> {
     /// All of one step but its acceptance.
     #[inline(always)]
     fn take<L: Lanes, F: Field + ?Sized>(&mut self, problem: &mut F, state: &State, tally: &mut Tally) {
         self.predict::<L>(state);
         self.sweep::<L, F>(problem, state, tally);
+        self.scratch.rest.copy_from_slice(&self.scratch.change);
         self.scratch.points.rate_low.fill(Octet::default());
-        for _ in 0..self.exact {
-            self.restage::<L, true>(state);
-            if !problem.exact_rates(&mut self.scratch.points) {
-                break;
-            }
-            self.multiply::<L>();
-            tally.evaluations += self.tableau.nodes.len() as u64;
-        }
+        self.refine::<L, F>(problem, state, tally);
         self.scratch.sum_exactly::<L>();
     }
 
@@ -132,7 +130,30 @@ impl March<'_> {
             tally.evaluations += self.tableau.nodes.len() as u64;
             self.restage::<L, false>(state);
             idle = if self.scratch.falls() { 0 } else { idle + 1 };
-            if idle >= self.idle || self.scratch.change.iter().all(|&change| change == 0.0) {
+            if idle == IDLE_SWEEPS || self.scratch.change.iter().all(|&change| change == 0.0) {
+                return;
+            }
+        }
+    }
+
+    /// Evaluations that carry what doubles leave out, at stages that are pairs, until the stages' changes are small or fall no further.
+    #[inline(always)]
+    fn refine<L: Lanes, F: Field + ?Sized>(&mut self, problem: &mut F, state: &State, tally: &mut Tally) {
+        self.restage::<L, true>(state);
+        for sweep in 0..self.exact {
+            if !problem.exact_rates(&mut self.scratch.points) {
+                return;
+            }
+            self.multiply::<L>();
+            tally.evaluations += self.tableau.nodes.len() as u64;
+            if sweep + 1 == self.exact {
+                return;
+            }
+            self.restage::<L, true>(state);
+            if sweep == 0 {
+                self.scratch.least.copy_from_slice(&self.scratch.change);
+                self.scratch.first.copy_from_slice(&self.scratch.change);
+            } else if self.scratch.is_settled() {
                 return;
             }
         }
@@ -149,7 +170,7 @@ impl March<'_> {
         }
     }
 
-    /// The stages from L and how far they moved, or, with `LOW`, the stages and what they leave out.
+    /// The stages from L, with `LOW` what they leave out too, and how far they moved.
     #[inline(always)]
     fn restage<L: Lanes, const LOW: bool>(&mut self, state: &State) {
         let scratch = &mut *self.scratch;
@@ -167,18 +188,21 @@ impl March<'_> {
             let (middle, rest) = (L::splat(middle), L::splat(rest));
             let offset = [across.add(up).add(rest), across.sub(up).add(rest)];
             let moved = offset.map(|offset| middle.add(offset));
+            let before = scratch.points.y[k].halves::<L>();
+            let mut change = [moved[0].sub(before[0]), moved[1].sub(before[1])];
             if LOW {
+                let low_before = scratch.points.low[k].halves::<L>();
                 let low = |half: usize| {
                     let part = moved[half].sub(middle);
                     middle.sub(moved[half].sub(part)).add(offset[half].sub(part))
                 };
-                scratch.points.low[k] = Octet::of([low(0), low(1)]);
-            } else {
-                let before = scratch.points.y[k].halves::<L>();
-                let change = moved[0].sub(before[0]).abs().max(moved[1].sub(before[1]).abs());
-                let change = change.max(change.swap_halves());
-                scratch.change[k] = change.max(change.swap_pairs()).array()[0];
+                let low = [low(0), low(1)];
+                change = [change[0].add(low[0].sub(low_before[0])), change[1].add(low[1].sub(low_before[1]))];
+                scratch.points.low[k] = Octet::of(low);
             }
+            let change = change[0].abs().max(change[1].abs());
+            let change = change.max(change.swap_halves());
+            scratch.change[k] = change.max(change.swap_pairs()).array()[0];
             scratch.points.y[k] = Octet::of(moved);
         }
     }
@@ -198,7 +222,7 @@ impl Scratch {
             self.points.used[lane(i, s)] = true;
         }
         self.increment.resize(d, Octet::default());
-        for vector in [&mut self.change, &mut self.least] {
+        for vector in [&mut self.change, &mut self.least, &mut self.first, &mut self.rest] {
             vector.resize(d, 0.0);
         }
         self.total.resize(d, DoubleDouble::ZERO);
@@ -245,6 +269,16 @@ impl Scratch {
             }
         }
         falls
+    }
+
+    /// True where every unknown's change has become small beside its first, or falls no further; lowers the least.
+    fn is_settled(&mut self) -> bool {
+        let mut settled = true;
+        for ((&change, least), &first) in self.change.iter().zip(&mut self.least).zip(&self.first) {
+            settled &= change <= SETTLED * first || change >= *least;
+            *least = change;
+        }
+        settled
     }
 }
 

@@ -6,9 +6,10 @@
 //! mu_ij = a_ij/b_j = 1/2 + sigma_ij,      nu_ij = (1/b_j) ∫_1^(1+c_i) l_j
 //! ```
 //!
-//! Symplectic is `mu_ij + mu_ji = 1`, symmetric in time is `mu_ij = mu_(s+1-j)(s+1-i)`.  With i' = s+1-i the mirror image of stage i, both together say that
-//! sigma splits into an even part, which acts on `L_j + L_j'` and is odd in i, and an odd part, which acts on `L_j - L_j'` and is even in i, and that one is
-//! minus the transpose of the other.  So one matrix of half the size is all there is to round, and both properties hold exactly, whatever its entries:
+//! Symplectic is `mu_ij + mu_ji = 1`, symmetric in time is `mu_ij = mu_(s+1-j)(s+1-i)`.  With i' = s+1-i the mirror image of stage i, both
+//! together say that sigma splits into a part that acts on `L_j + L_j'` and is odd in i, and one that acts on `L_j - L_j'` and is even in
+//! i, and that one is minus the transpose of the other.  So one matrix of half the size is all there is to round, and both properties
+//! hold exactly, whatever its entries:
 //!
 //! ```text
 //! Σ_j sigma_ij L_j = ± Σ_j eta_ij (L_j + L_j') - Σ_j eta_ji (L_j - L_j')      (j <= s/2; + for i <= s/2, - for its mirror image)
