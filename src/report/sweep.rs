@@ -64,8 +64,8 @@ pub fn record(sweep: &Sweep, totals: &Totals, table_sha256: &str) -> Value {
 pub fn text(sweep: &Sweep, totals: &Totals) -> String {
     let scene = sweep.scene();
     let mut page = Page::new(&scene.name, &scene.description);
-    let why = sweep.plan().why.as_deref().unwrap_or("as asked for");
-    page.entry("method", &format!("{}; {why}", super::setting(sweep.plan())));
+    page.entry("method", &super::setting(sweep.plan()));
+    page.entry("", sweep.plan().why.as_deref().unwrap_or("as asked for"));
     for (number, (axis, variable)) in sweep.grid().axes().iter().zip(sweep.variables()).enumerate() {
         let unit = if variable.unit.is_empty() { String::new() } else { format!(" {}", variable.unit) };
         let range = format!("{}: {} to {}{unit}, {} values", variable.path, figure(axis.from), figure(axis.to), axis.count);
