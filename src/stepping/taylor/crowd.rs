@@ -123,15 +123,15 @@ pub struct Crowd {
 }
 
 impl Crowd {
-    /// The method at a tolerance, of order 16, or 24 below 1e-15.
+    /// The method at a tolerance, of order 20, or 24 below 1e-15.
     pub fn new(tolerance: Tolerance) -> Self {
         let tolerance = tolerance.relative.min(tolerance.absolute);
-        Self { tolerance, order: if tolerance >= 1e-15 { 16 } else { 24 }, is_portable: false, max_steps: 10_000_000 }
+        Self { tolerance, order: if tolerance >= 1e-15 { 20 } else { 24 }, is_portable: false, max_steps: 10_000_000 }
     }
 
-    /// The same with another order (16, 20 or 24; the next one of these is taken).
+    /// The same with another order, from 10 to 24.
     pub fn with_order(self, order: usize) -> Self {
-        Self { order: order.next_multiple_of(4).clamp(16, MOST), ..self }
+        Self { order: order.clamp(2 * JUDGES, MOST), ..self }
     }
 
     /// The same by another kernel: `Portable` does without the processor's lanes.
@@ -174,10 +174,10 @@ impl Crowd {
     pub fn march(&self, entrants: &mut [Entrant], until: Time, watch: &mut dyn FnMut(usize, &Passage) -> Going) {
         let Some(bodies) = entrants.first().map(|first| first.mechanism.tree.bodies) else { return };
         let march = match bodies {
-            1 => dispatch::<1>(self.order, self.is_portable),
-            2 => dispatch::<2>(self.order, self.is_portable),
-            3 => dispatch::<3>(self.order, self.is_portable),
-            _ => dispatch::<4>(self.order, self.is_portable),
+            1 => dispatch::<1>(self.is_portable),
+            2 => dispatch::<2>(self.is_portable),
+            3 => dispatch::<3>(self.is_portable),
+            _ => dispatch::<4>(self.is_portable),
         };
         // SAFETY: `dispatch` hands out code for AVX and FMA only after the processor was asked for them; all else in it is safe code.
         #[allow(unsafe_code)]
@@ -189,40 +189,22 @@ impl Crowd {
 
 type March = unsafe fn(&Crowd, &mut [Entrant], Time, &mut dyn FnMut(usize, &Passage) -> Going);
 
-fn dispatch<const N: usize>(order: usize, is_portable: bool) -> March {
-    match order {
-        16 => of_order::<16, N>(is_portable),
-        20 => of_order::<20, N>(is_portable),
-        _ => of_order::<24, N>(is_portable),
-    }
-}
-
-fn of_order<const P: usize, const N: usize>(is_portable: bool) -> March {
+fn dispatch<const N: usize>(is_portable: bool) -> March {
     #[cfg(target_arch = "x86_64")]
     if !is_portable && lanes::available() {
-        return hardware::<P, N>;
+        return hardware::<N>;
     }
-    portable::<P, N>
+    portable::<N>
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx,fma")]
-fn hardware<const P: usize, const N: usize>(
-    crowd: &Crowd,
-    entrants: &mut [Entrant],
-    until: Time,
-    watch: &mut dyn FnMut(usize, &Passage) -> Going,
-) {
-    march::<Avx, P, N>(crowd, entrants, until, watch);
+fn hardware<const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], until: Time, watch: &mut dyn FnMut(usize, &Passage) -> Going) {
+    march::<Avx, N>(crowd, entrants, until, watch);
 }
 
-fn portable<const P: usize, const N: usize>(
-    crowd: &Crowd,
-    entrants: &mut [Entrant],
-    until: Time,
-    watch: &mut dyn FnMut(usize, &Passage) -> Going,
-) {
-    march::<Portable, P, N>(crowd, entrants, until, watch);
+fn portable<const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], until: Time, watch: &mut dyn FnMut(usize, &Passage) -> Going) {
+    march::<Portable, N>(crowd, entrants, until, watch);
 }
 
 /// Constants, states and coefficients of the trajectories in the lanes.
@@ -320,13 +302,8 @@ impl<const N: usize> Team<N> {
 }
 
 #[inline(always)]
-fn march<L: Lanes, const P: usize, const N: usize>(
-    crowd: &Crowd,
-    entrants: &mut [Entrant],
-    until: Time,
-    watch: &mut dyn FnMut(usize, &Passage) -> Going,
-) {
-    let zero = [[0.0; WIDTH]; N];
+fn march<L: Lanes, const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], until: Time, watch: &mut dyn FnMut(usize, &Passage) -> Going) {
+    let (order, zero) = (crowd.order, [[0.0; WIDTH]; N]);
     let power = Power { c: zero, s: zero, v: zero, px: zero, py: zero };
     let team = Team {
         coupling: [zero; N],
@@ -338,7 +315,7 @@ fn march<L: Lanes, const P: usize, const N: usize>(
         powers: [power; MOST + 1],
     };
     let mut teams = Box::new([team.clone(), team]);
-    let empty = Seat { entrant: None, pace: Pace::new(1.0, P, 0.0), time: until, steps: 0, wanted: 0.0, taken: 0.0 };
+    let empty = Seat { entrant: None, pace: Pace::new(1.0, order, 0.0), time: until, steps: 0, wanted: 0.0, taken: 0.0 };
     let mut seats: [Seat; WIDTH * TEAMS] = std::array::from_fn(|_| empty.clone());
     let mut waiting = 0;
     loop {
@@ -351,8 +328,8 @@ fn march<L: Lanes, const P: usize, const N: usize>(
                     Some(index) => {
                         let entrant = &entrants[index];
                         team.seat(lane, entrant);
-                        let longest = P as f64 / 3.0 / fastest::<N>(entrant.mechanism);
-                        (seat.pace, seat.time) = (Pace::new(crowd.tolerance, P, longest), entrant.state.time);
+                        let longest = order as f64 / 3.0 / fastest::<N>(entrant.mechanism);
+                        (seat.pace, seat.time) = (Pace::new(crowd.tolerance, order, longest), entrant.state.time);
                         seat.steps = 0;
                     }
                     None => team.park(lane),
@@ -364,20 +341,20 @@ fn march<L: Lanes, const P: usize, const N: usize>(
             return;
         }
         let before = [teams[0].high[0], teams[1].high[0]];
-        expand::<L, P, N>(&mut teams);
+        expand::<L, N>(&mut teams, order);
         for (seat, (place, &left)) in seats.iter_mut().zip(left.iter().enumerate()) {
             let (team, lane) = (&teams[place / WIDTH], place % WIDTH);
             let coefficient = |k: usize, i: usize| team.powers[k].v[i][lane];
             let mut sizes = [0.0; JUDGES];
             for (back, size) in sizes.iter_mut().enumerate() {
-                *size = (0..N).fold(0.0, |largest: f64, i| largest.max(coefficient(P - back, i).abs()));
+                *size = (0..N).fold(0.0, |largest: f64, i| largest.max(coefficient(order - back, i).abs()));
             }
-            let finite = (0..N).all(|i| coefficient(P, i).is_finite());
-            seat.wanted = if finite { seat.pace.step::<P>(&sizes) } else { f64::NAN };
+            let finite = (0..N).all(|i| coefficient(order, i).is_finite());
+            seat.wanted = if finite { seat.pace.step_of(order, &sizes) } else { f64::NAN };
             seat.taken = if finite { pace::taken(seat.wanted, left) } else { 0.0 };
         }
         for (team, seats) in teams.iter_mut().zip(seats.chunks_exact(WIDTH)) {
-            finish::<L, P, N>(team, [seats[0].taken, seats[1].taken, seats[2].taken, seats[3].taken]);
+            finish::<L, N>(team, order, [seats[0].taken, seats[1].taken, seats[2].taken, seats[3].taken]);
         }
         for (place, seat) in seats.iter_mut().enumerate() {
             let Some(index) = seat.entrant else { continue };
@@ -399,7 +376,7 @@ fn march<L: Lanes, const P: usize, const N: usize>(
                 entrant.state.turns[i] += turned[i];
             }
             let (view, start) = (&*team, &before[place / WIDTH]);
-            let series = |body: usize, after: f64| view.at(P, lane, body, start[body][lane], after);
+            let series = |body: usize, after: f64| view.at(order, lane, body, start[body][lane], after);
             let passage = Passage { from, step, turned, series: &series };
             if entrant.stopped.is_some() || watch(index, &passage) == Going::Enough || seat.time >= until {
                 team.leave(lane, &mut entrant.state);
@@ -450,9 +427,9 @@ fn next<const N: usize>(entrants: &mut [Entrant], waiting: &mut usize, until: Ti
     None
 }
 
-/// Expands all lanes to order P.
+/// Expands all lanes to an order.
 #[inline(always)]
-fn expand<L: Lanes, const P: usize, const N: usize>(teams: &mut [Team<N>; TEAMS]) {
+fn expand<L: Lanes, const N: usize>(teams: &mut [Team<N>; TEAMS], order: usize) {
     let mut products = [[[L::splat(0.0); N]; 2]; TEAMS];
     for (team, f) in teams.iter_mut().zip(&mut products) {
         for i in 0..N {
@@ -463,7 +440,7 @@ fn expand<L: Lanes, const P: usize, const N: usize>(teams: &mut [Team<N>; TEAMS]
         }
         invert::<L, N>(team);
     }
-    for k in 0..P {
+    for k in 0..order {
         for (team, f) in teams.iter_mut().zip(&mut products) {
             raise::<L, N>(team, f, k);
         }
@@ -630,12 +607,12 @@ fn reciprocal<L: Lanes>(x: L) -> L {
 
 /// Every lane's state at the end of its step.
 #[inline(always)]
-fn finish<L: Lanes, const P: usize, const N: usize>(team: &mut Team<N>, taken: Quad) {
+fn finish<L: Lanes, const N: usize>(team: &mut Team<N>, order: usize, taken: Quad) {
     let h = L::of(taken);
     let square = h.mul(h);
     for i in 0..N {
         let (mut angles, mut rates) = ([L::splat(0.0); 2], [L::splat(0.0); 2]);
-        let mut k = P;
+        let mut k = order;
         while k > 0 {
             let v = L::of(team.powers[k].v[i]);
             angles[k % 2] = angles[k % 2].mul_add(square, over(v, k + 1));

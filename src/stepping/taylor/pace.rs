@@ -44,10 +44,16 @@ impl Pace {
     /// The step from the largest coefficients of orders P, P-1, … \[s\]; the longest one where they vanish.
     #[inline(always)]
     pub fn step<const P: usize>(&self, largest: &[f64; JUDGES]) -> f64 {
+        self.step_of(P, largest)
+    }
+
+    /// The same for an order known at run time.
+    #[inline(always)]
+    pub fn step_of(&self, order: usize, largest: &[f64; JUDGES]) -> f64 {
         let mut least = f64::INFINITY;
         for (i, &size) in largest.iter().enumerate() {
             let log = (1f64.to_bits() as i64 - size.to_bits() as i64) as f64;
-            let root = log * (1.0 / ((1_u64 << 52) as f64 * (P - i) as f64));
+            let root = log * (1.0 / ((1_u64 << 52) as f64 * (order - i) as f64));
             least = if root < least { root } else { least };
         }
         let x = least + self.exponent;
