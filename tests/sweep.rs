@@ -169,6 +169,20 @@ fn a_flip_is_as_accurate_as_its_run() {
 }
 
 #[test]
+fn a_bar_that_starts_upright_turns_over_where_it_falls_outwards() {
+    let times = |method: &str| -> Vec<Option<f64>> {
+        let plan = prepared("free", &["bar1.phi=-pi..pi:2", "bar2.phi=-2..2:2"], &request(method, 0.2));
+        points(&plan, 1).iter().map(|point| point.flip.map(|flip| flip.t)).collect()
+    };
+    let found = times("taylor");
+    assert_eq!(found.iter().flatten().count(), 2, "two fall outwards and two back: {found:?}");
+    for (lane, single) in found.iter().zip(times("dp8")) {
+        assert_eq!(lane.is_some(), single.is_some(), "{found:?}");
+        assert!(lane.is_none_or(|t| t < 1e-6) && single.is_none_or(|t| t < 1e-6), "{lane:?} {single:?}");
+    }
+}
+
+#[test]
 fn points_end_at_flips_and_are_left_out_where_asked() {
     for method in ["taylor", "dp8"] {
         let request = Request { every: Some(0.1), ..request(method, 5.0) };

@@ -260,7 +260,8 @@ impl Lane {
             glance.omega.clear();
             for bar in 0..bodies {
                 let (winding, omega) = passage.at(bar, after);
-                let turns = (winding / (2.0 * PI)).round();
+                // As states are wrapped: an angle of exactly π has not passed it.
+                let turns = if winding.abs() <= PI { 0.0 } else { (winding / (2.0 * PI)).round() };
                 glance.phi.push(winding - 2.0 * PI * turns);
                 glance.turns.push(turns as i64);
                 glance.omega.push(omega);
