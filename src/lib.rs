@@ -41,7 +41,7 @@
 //!
 //! # Features
 //!
-//! `cli` and `charts` are on by default; `default-features = false` leaves the core.  [`source_problem`] has the problem everything began with, its
+//! `cli`, `charts` and `threads` (sweeps on several of them) are on by default; `default-features = false` leaves the core.  [`source_problem`] has the problem everything began with, its
 //! published numbers and its errata.
 //!
 //! Units are SI throughout, angles in radians, absolute, from +x, counter-clockwise.

@@ -59,6 +59,19 @@ impl Canvas {
         }
     }
 
+    /// Paints a rectangle of pixels, its upper left corner at `at` \[pt\]: `colour` of column and row.
+    pub(crate) fn raster(&mut self, at: [f64; 2], size: (usize, usize), colour: impl Fn(usize, usize) -> Colour) {
+        let (width, height) = (self.pixels.width() as usize, self.pixels.height() as usize);
+        let [left, top] = at.map(|points| (points * self.scale).round().max(0.0) as usize);
+        let pixels = self.pixels.data_mut().as_chunks_mut::<4>().0;
+        for row in 0..size.1.min(height.saturating_sub(top)) {
+            for column in 0..size.0.min(width.saturating_sub(left)) {
+                let Colour { 0: red, 1: green, 2: blue } = colour(column, row);
+                pixels[(top + row) * width + left + column] = [red, green, blue, 255];
+            }
+        }
+    }
+
     /// The words drawn so far.
     pub(crate) fn texts(&self) -> &[TextBox] {
         &self.texts

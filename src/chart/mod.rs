@@ -14,6 +14,8 @@
 //! | [`constraint_drift()`] | [`ConstraintDrift`] | defects of constraints, positions beside velocities |
 //! | [`torque_power()`] | [`TorquePower`] | torque above power of motors |
 //! | [`work_precision()`] | [`WorkPrecision`] | error against run time |
+//! | [`map()`] | [`Map`] | a value over two others, as colours |
+//! | [`profile()`] | [`Profile`] | a value over one other |
 //! | [`motion_gif()`] | [`MotionGif`] | the mechanism in motion |
 
 mod angles;
@@ -26,10 +28,12 @@ mod gif;
 mod grid;
 mod labels;
 mod lines;
+mod map;
 mod mechanism;
 mod motion;
 mod palette;
 mod panel;
+mod profile;
 mod sheet;
 mod sketch;
 mod text;
@@ -42,8 +46,10 @@ pub use angles::{AngleSeries, Angles, angles};
 pub use constraint_drift::{ConstraintDrift, DefectPanel, constraint_drift};
 pub use energy_drift::{DriftSeries, EnergyDrift, energy_drift};
 pub use file::Picture;
+pub use map::{Cell, Map, MapAxis, map};
 pub use mechanism::{MechanismChart, mechanism};
 pub use motion::{Animation, MotionGif, motion_gif};
+pub use profile::{Profile, profile};
 pub use sketch::{HingeSketch, MotorPose, Pose, Sketch, SpringSketch, WallSketch};
 pub use text::{TextBox, plain, unmarked};
 pub use torque_power::{MotorSeries, TorquePower, torque_power};

@@ -26,6 +26,29 @@ pub(crate) const PURPLE: Colour = RGBColor(0xCC, 0x79, 0xA7);
 pub(crate) const ORANGE: Colour = RGBColor(0xE6, 0x9F, 0x00);
 pub(crate) const VERMILLION: Colour = RGBColor(0xD5, 0x5E, 0x00);
 
+/// Places of a map that were left out, and those where something failed.
+pub(crate) const EXCLUDED: Colour = RGBColor(0xD3, 0xD7, 0xDC);
+pub(crate) const FAILED: Colour = RGBColor(0xF0, 0xAE, 0x7C);
+
+/// Colours from dark (0) to light (1) in even steps of lightness, also to the colour-blind: viridis, by S. van der Walt and N. Smith (2015).
+pub(crate) fn even(share: f64) -> Colour {
+    const STOPS: [Colour; 10] = [
+        RGBColor(0x44, 0x01, 0x54),
+        RGBColor(0x48, 0x28, 0x78),
+        RGBColor(0x3E, 0x49, 0x89),
+        RGBColor(0x31, 0x68, 0x8E),
+        RGBColor(0x26, 0x82, 0x8E),
+        RGBColor(0x1F, 0x9E, 0x89),
+        RGBColor(0x35, 0xB7, 0x79),
+        RGBColor(0x6D, 0xCD, 0x59),
+        RGBColor(0xB4, 0xDE, 0x2C),
+        RGBColor(0xFD, 0xE7, 0x25),
+    ];
+    let place = share.clamp(0.0, 1.0) * (STOPS.len() - 1) as f64;
+    let stop = (place as usize).min(STOPS.len() - 2);
+    mix(STOPS[stop], STOPS[stop + 1], place - stop as f64)
+}
+
 /// Shape of a marker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Shape {
@@ -126,6 +149,12 @@ mod tests {
         }
         assert_eq!(readable(BLUE), BLUE, "blue is dark enough as it is");
         assert!((contrast(RGBColor(0, 0, 0), WHITE) - 21.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn colours_of_a_map_grow_lighter_all_the_way() {
+        let steps: Vec<f64> = (0..=48).map(|k| luminance(even(f64::from(k) / 48.0))).collect();
+        assert!(steps.windows(2).all(|pair| pair[1] > pair[0]), "{steps:?}");
     }
 
     #[test]

@@ -41,7 +41,8 @@ pub(crate) struct Panel<'a> {
     y_most: usize,
 }
 
-fn most_up(height: f64) -> usize {
+/// The most ticks whose labels keep apart along `height` \[pt\].
+pub(crate) fn most_up(height: f64) -> usize {
     ((height / 19.0) as usize).clamp(2, 9)
 }
 
@@ -118,8 +119,13 @@ impl<'a> Panel<'a> {
 
     /// Grid, spines, ticks and names.
     pub(crate) fn frame(&self, written: Written) -> Result<(), ChartError> {
-        let [left, top, right, bottom] = self.bounds;
         self.grid()?;
+        self.scales(written)
+    }
+
+    /// Spines, ticks and names.
+    pub(crate) fn scales(&self, written: Written) -> Result<(), ChartError> {
+        let [left, top, right, bottom] = self.bounds;
         let spine = Pen::new(SPINE, 0.75);
         let small = Pen::new(SPINE, 0.6);
         let (x_ticks, y_ticks) = (self.x.ticks(self.x_most), self.y.ticks(self.y_most));

@@ -96,6 +96,36 @@ impl Drawable<Canvas> for Words<'_> {
     }
 }
 
+/// A rectangle of pixels as an element of plotters, whose own one needs its bitmap backend.
+struct Raster<F> {
+    at: BackendCoord,
+    size: (usize, usize),
+    colour: F,
+}
+
+impl<'a, F> PointCollection<'a, BackendCoord> for &'a Raster<F> {
+    type Point = &'a BackendCoord;
+    type IntoIter = std::iter::Once<&'a BackendCoord>;
+
+    fn point_iter(self) -> Self::IntoIter {
+        std::iter::once(&self.at)
+    }
+}
+
+impl<F: Fn(usize, usize) -> Colour> Drawable<Canvas> for Raster<F> {
+    fn draw<I: Iterator<Item = BackendCoord>>(
+        &self,
+        pos: I,
+        backend: &mut Canvas,
+        _: (u32, u32),
+    ) -> Result<(), DrawingErrorKind<Infallible>> {
+        for (x, y) in pos {
+            backend.raster([f64::from(x) / UNITS, f64::from(y) / UNITS], self.size, &self.colour);
+        }
+        Ok(())
+    }
+}
+
 impl Sheet {
     /// A white page of `size` \[pt\].
     pub(crate) fn new(size: [f64; 2], px_per_pt: f64) -> Result<Self, ChartError> {
@@ -154,6 +184,11 @@ impl Sheet {
         };
         self.polygon(&polygon(corners, rim), WHITE)?;
         self.polygon(&polygon(corners, 1.0), colour)
+    }
+
+    /// A rectangle of so many pixels, given its upper left corner and the colour of each column and row.
+    pub(crate) fn raster(&self, at: Point, size: (usize, usize), colour: impl Fn(usize, usize) -> Colour) -> Result<(), ChartError> {
+        Ok(self.area.draw(&Raster { at: units(at), size, colour })?)
     }
 
     /// Words anchored at a place.

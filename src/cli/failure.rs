@@ -2,7 +2,7 @@
 
 use super::output::print_object;
 use crate::dynamics::CompileError;
-use crate::run::{FileError, Refusal, RunError};
+use crate::run::{FileError, Refusal, RunError, SweepError};
 use crate::scene::SceneError;
 use crate::stepping::{Cause, StepError};
 use serde_json::{Value, json};
@@ -129,6 +129,18 @@ impl From<RunError> for Failure {
             RunError::Refused(refusal) => refusal.into(),
             RunError::Step(error) => error.into(),
             RunError::Observer(error) => Self::new(Exit::Io, error.to_string()),
+        }
+    }
+}
+
+impl From<SweepError> for Failure {
+    fn from(error: SweepError) -> Self {
+        match error {
+            SweepError::Scene(error) => error.into(),
+            SweepError::Compile(error) => error.into(),
+            SweepError::Refused(refusal) => refusal.into(),
+            SweepError::Threads(error) => Self::new(Exit::Other, format!("cannot start the threads: {error}\nhint: --threads 1")),
+            SweepError::Observer(error) => Self::new(Exit::Io, error.to_string()),
         }
     }
 }

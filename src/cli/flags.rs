@@ -2,7 +2,7 @@
 
 use super::failure::{Exit, Failure};
 use super::output::{message, print};
-use crate::run::{Limits, METHODS, MethodId, Request, Stabilization};
+use crate::run::{Limits, METHODS, MethodId, Request, Stabilization, Vary};
 use crate::scene::Override;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::error::ErrorKind;
@@ -33,6 +33,8 @@ pub enum Command {
     Inspect(InspectFlags),
     /// Run a scene and write its trajectory, record and charts
     Run(Box<RunFlags>),
+    /// Run a scene over a grid of starts and parameters, one row of a table a point
+    Sweep(Box<SweepFlags>),
     /// List the methods
     Methods {
         /// Print one JSON object
@@ -151,6 +153,46 @@ pub struct RunFlags {
     pub gif: bool,
 }
 
+/// `driftless sweep`.
+#[derive(Debug, Args)]
+pub struct SweepFlags {
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub scene: SceneFlags,
+    /// Vary a value, as in bar1.phi=-pi..pi:64 or springs.spring.stiffness=1..10:4; several make a grid, of which the first varies slowest
+    #[arg(long, value_name = "NAME=FROM..TO:COUNT", required = true, allow_hyphen_values = true, help_heading = "Points")]
+    pub vary: Vec<Vary>,
+    /// End each point when a bar first turns over (its angle passes an odd multiple of pi)
+    #[arg(long, help_heading = "Points")]
+    pub to_flip: bool,
+    /// Threads [default: all processors]; the table is the same whatever their number
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Points")]
+    pub threads: Option<u16>,
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub plan: PlanFlags,
+    /// Stop a point where its energy is off by more than this share of its scale
+    #[arg(long, value_name = "SHARE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
+    pub max_energy_drift: Option<f64>,
+    /// Stop a point where a constraint is off by more, in rad or rad/s
+    #[arg(long, value_name = "SIZE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
+    pub max_constraint_drift: Option<f64>,
+    /// Folder under which `SCENE/sweep-NAMES-METHOD-SETTING` is made
+    #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
+    pub out: PathBuf,
+    /// Overwrite the sweep that is in the folder
+    #[arg(long, help_heading = "Files")]
+    pub force: bool,
+    /// Draw no PNG chart
+    #[cfg(feature = "charts")]
+    #[arg(long, help_heading = "Files")]
+    pub no_charts: bool,
+    /// Column of the table to draw over one or two varied values [default: flip_time]
+    #[cfg(feature = "charts")]
+    #[arg(long, value_name = "COLUMN", conflicts_with = "no_charts", help_heading = "Files")]
+    pub map: Option<String>,
+}
+
 impl Flags {
     /// True where stdout is to hold one JSON object.
     pub fn is_json(&self) -> bool {
@@ -158,6 +200,7 @@ impl Flags {
             Command::Check(flags) => flags.scene.json,
             Command::Inspect(flags) => flags.scene.json,
             Command::Run(flags) => flags.scene.json,
+            Command::Sweep(flags) => flags.scene.json,
             Command::Methods { json } => *json,
             Command::Schema | Command::Completions { .. } => false,
         }

@@ -7,6 +7,7 @@ pub mod flags;
 mod output;
 mod progress;
 mod simulate;
+mod sweep;
 
 pub use failure::Failure;
 pub use flags::{Flags, parse};
@@ -29,6 +30,7 @@ pub fn run(flags: &Flags) -> Result<(), Failure> {
         Command::Check(flags) => check(flags),
         Command::Inspect(flags) => inspect(flags),
         Command::Run(flags) => simulate::run(flags),
+        Command::Sweep(flags) => sweep::run(flags),
         Command::Methods { json: true } => print_object(&report::methods::object()),
         Command::Methods { json: false } => print(&report::methods::text()),
         Command::Schema => print_object(&scene::schema()),

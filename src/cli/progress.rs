@@ -29,6 +29,73 @@ pub struct Progress {
     quiet: bool,
 }
 
+/// Shows the progress of a sweep: its rate so far, and the time the rest takes at that rate.
+pub struct Points {
+    scene: String,
+    count: u64,
+    begin: Instant,
+    bar: Option<ProgressBar>,
+    next: Instant,
+    quiet: bool,
+}
+
+impl Points {
+    /// Begins; `count` is the number of points.
+    pub fn new(scene: &str, count: u64, quiet: bool) -> Self {
+        let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
+            let bar = ProgressBar::new(count).with_prefix(scene.chars().take(20).collect::<String>());
+            let style = ProgressStyle::with_template("{prefix} [{bar:24}] {percent:>3} %  {msg}");
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
+            bar
+        });
+        let begin = Instant::now();
+        Self { scene: scene.to_owned(), count, begin, next: begin + if bar.is_some() { BAR } else { LINE }, bar, quiet }
+    }
+
+    /// Takes the number of points finished.
+    pub fn see(&mut self, finished: u64) {
+        let now = Instant::now();
+        if self.quiet || now < self.next {
+            return;
+        }
+        let words = told(finished, self.count, now - self.begin);
+        match &self.bar {
+            Some(bar) => {
+                bar.set_message(words);
+                bar.set_position(finished);
+                self.next = now + BAR;
+            }
+            None => {
+                message(&format!("{}: {:.0} %, {words}", self.scene, 100.0 * finished as f64 / self.count as f64));
+                self.next = now + LINE;
+            }
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// `1200 of 4096 points, 85.3 a second, 34 s left`.
+fn told(finished: u64, count: u64, spent: Duration) -> String {
+    let rate = finished as f64 / spent.as_secs_f64().max(1e-9);
+    if finished == 0 {
+        return format!("0 of {count} points");
+    }
+    let left = count.saturating_sub(finished) as f64 / rate;
+    let left = match left {
+        left if left < 100.0 => format!("{left:.0} s"),
+        left if left < 6000.0 => format!("{:.0} min", left / 60.0),
+        left => format!("{:.1} h", left / 3600.0),
+    };
+    let rate = if rate < 10.0 { format!("{rate:.2}") } else { format!("{rate:.0}") };
+    format!("{finished} of {count} points, {rate} a second, {left} left")
+}
+
 impl Progress {
     /// Begins; `until` is the horizon \[s\].
     pub fn new(scene: &str, until: f64, quiet: bool) -> Self {
@@ -77,5 +144,19 @@ impl Progress {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_left_follows_from_the_rate_so_far() {
+        let spent = Duration::from_secs(10);
+        assert_eq!(told(0, 100, spent), "0 of 100 points");
+        assert_eq!(told(25, 100, spent), "25 of 100 points, 2.50 a second, 30 s left");
+        assert_eq!(told(1000, 61_000, spent), "1000 of 61000 points, 100 a second, 10 min left");
+        assert_eq!(told(1, 3601, spent), "1 of 3601 points, 0.10 a second, 10.0 h left");
     }
 }

@@ -8,7 +8,7 @@
 
 use super::kernel::Kernel;
 use super::tree::{self, size};
-use super::{Coordinates, Field, Form, Mechanism, Motion, State, Time};
+use super::{Coordinates, Field, Form, Glance, Mechanism, Motion, State, Time};
 use crate::arithmetic::DoubleDouble;
 use std::sync::Arc;
 
@@ -181,5 +181,16 @@ impl<const N: usize> Form for Elimination<N> {
             }
         }
         motion.work = state.unknown(2 * f);
+    }
+
+    fn glance(&mut self, state: &State, glance: &mut Glance) {
+        let n = self.mechanism.bodies.len();
+        // Where nothing is driven the coordinates are the angles, in the same order.
+        if self.mechanism.ties.count() == n {
+            return glance.take_leading(state, n);
+        }
+        let mut motion = Motion::default();
+        self.read(state, &mut motion);
+        glance.take(&motion);
     }
 }

@@ -81,7 +81,7 @@ impl Mechanism {
     }
 
     /// Work of gravity from hanging to horizontal, Σ |weight_k|, plus kinetic and spring energy at the start \[J\]; 1 J where all of these are zero.
-    pub(super) fn scale_of_energy(&self, start: &Motion) -> f64 {
+    pub fn scale_of_energy(&self, start: &Motion) -> f64 {
         let mut kernel = Kernel::<DoubleDouble>::new(self.bodies.len(), 0);
         let kinetic = self.energy(&mut kernel, &start.phi, &start.omega).kinetic.hi;
         let springs: f64 = self.springs.iter().map(|spring| spring.energy(&kernel.z).hi).sum();

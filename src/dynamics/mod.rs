@@ -172,6 +172,44 @@ pub trait Form {
 
     /// Writes the motion a state stands for.
     fn read(&mut self, state: &State, motion: &mut Motion);
+
+    /// Writes what there is to see of a state in plain doubles; cheap enough for every step where a form has its own.
+    fn glance(&mut self, state: &State, glance: &mut Glance) {
+        let mut motion = Motion::default();
+        self.read(state, &mut motion);
+        glance.take(&motion);
+    }
+}
+
+/// Angles and rates of all bodies at a moment, in plain doubles.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Glance {
+    /// Absolute angles in [-π, π] \[rad\].
+    pub phi: Vec<f64>,
+    /// Whole turns to be added to each.
+    pub turns: Vec<i64>,
+    /// Rates \[rad/s\].
+    pub omega: Vec<f64>,
+}
+
+impl Glance {
+    /// Takes it from a motion.
+    pub fn take(&mut self, motion: &Motion) {
+        self.phi.clear();
+        self.phi.extend(motion.phi.iter().map(|phi| phi.hi));
+        self.turns.clone_from(&motion.turns);
+        self.omega.clear();
+        self.omega.extend(motion.omega.iter().map(|omega| omega.hi));
+    }
+
+    /// Takes it from a state whose unknowns begin with the angles and rates of all bodies.
+    pub fn take_leading(&mut self, state: &State, bodies: usize) {
+        self.phi.clear();
+        self.phi.extend_from_slice(&state.y[..bodies]);
+        self.turns.clone_from(&state.turns);
+        self.omega.clear();
+        self.omega.extend_from_slice(&state.y[bodies..2 * bodies]);
+    }
 }
 
 /// What every form can tell of a moment: angles and rates of all bodies, and the work done on them.

@@ -6,7 +6,7 @@
 use super::kernel::{Bias, Kernel, dot};
 use super::row::Row;
 use super::tree::size;
-use super::{Coordinates, Field, Form, Mechanism, Motion, State, Time};
+use super::{Coordinates, Field, Form, Glance, Mechanism, Motion, State, Time};
 use crate::arithmetic::DoubleDouble;
 use std::sync::Arc;
 
@@ -146,5 +146,9 @@ impl<const N: usize, const ACCOUNT: bool> Form for Multiplier<N, ACCOUNT> {
             motion.work = state.unknown(2 * n);
             motion.stabilizer = state.y[2 * n + 1];
         }
+    }
+
+    fn glance(&mut self, state: &State, glance: &mut Glance) {
+        glance.take_leading(state, self.mechanism.bodies.len());
     }
 }

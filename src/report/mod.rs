@@ -8,6 +8,7 @@
 //! | [`check`] | scene and plan | `check.rs` |
 //! | [`inspect`] | the scene's start | `inspect.rs` |
 //! | [`result`] | a run | `result.rs` |
+//! | `sweep` | a sweep, with its chart | `sweep.rs`, with the feature `files` |
 //! | [`methods`] | the table of methods | `methods.rs` |
 //! | `charts` | a run, in pictures | `charts.rs`, with the feature `charts` |
 
@@ -20,6 +21,8 @@ pub mod inspect;
 pub mod methods;
 pub mod page;
 pub mod result;
+#[cfg(feature = "files")]
+pub mod sweep;
 
 use crate::run::Plan;
 use serde_json::{Value, json};

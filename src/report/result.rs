@@ -89,7 +89,7 @@ pub fn record(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome, trajector
 
 /// The platform the program was compiled for: `x86_64-linux-gnu`.
 #[cfg(feature = "files")]
-fn target() -> String {
+pub(super) fn target() -> String {
     let environment = match () {
         () if cfg!(target_env = "gnu") => "-gnu",
         () if cfg!(target_env = "musl") => "-musl",

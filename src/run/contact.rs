@@ -4,6 +4,7 @@
 //! [`REST_HEIGHT`](crate::dynamics::contact::REST_HEIGHT): bounces that accumulate end so.  What is left of its normal velocity is taken off it and
 //! booked as lost in impacts.  From then on the wall is a row kept by projection, until its force would have to pull.
 
+use super::flip::Lookout;
 use super::march::{March, Outcome, build};
 use super::methods::Stabilization;
 use super::plan::Plan;
@@ -73,6 +74,8 @@ pub(super) struct Course {
     shown: Motion,
     held: Vec<Held>,
     holds_in_row: usize,
+    /// Looks for bars that turn over, where somebody asked.
+    pub(super) lookout: Option<Lookout>,
     /// Energy stabilizers put in before the present marcher \[J\].
     stabilizer: f64,
 }
@@ -88,6 +91,7 @@ impl Course {
             shown: Motion::default(),
             held: Vec::new(),
             holds_in_row: 0,
+            lookout: None,
             stabilizer: 0.0,
         }
     }
@@ -110,7 +114,7 @@ impl Course {
     pub(super) fn go(&mut self, until: Time, outcome: &mut Outcome) -> Result<(), StepError> {
         self.holds_in_row = 0;
         for _ in 0..EVENTS_MOST {
-            match self.marcher.advance(until, outcome.plan.time(outcome.plan.rows)) {
+            match self.marcher.advance(until, outcome.plan.time(outcome.plan.rows), self.lookout.as_mut()) {
                 Ok(Reached::Until | Reached::Pause) => return Ok(()),
                 Ok(Reached::Event(contact)) if self.mechanism.held.contains(&contact) => self.settle(Some(contact), outcome)?,
                 Ok(Reached::Event(contact)) => {

@@ -13,6 +13,10 @@ use tempfile::NamedTempFile;
 pub const TRAJECTORY: &str = "trajectory.csv";
 /// Settings and results.
 pub const RECORD: &str = "run.json";
+/// The points of a sweep.
+pub const SWEEP: &str = "sweep.csv";
+/// Settings and totals of a sweep.
+pub const SWEEP_RECORD: &str = "sweep.json";
 /// How names of unfinished files begin.
 const UNFINISHED: &str = ".unfinished-";
 
@@ -64,7 +68,7 @@ impl Folder {
     /// # Errors
     /// A run is in it and `overwrite` is false, or it cannot be made.
     pub fn open(path: &Path, overwrite: bool) -> Result<Self, FileError> {
-        if !overwrite && [TRAJECTORY, RECORD].iter().any(|name| path.join(name).exists()) {
+        if !overwrite && [TRAJECTORY, RECORD, SWEEP, SWEEP_RECORD].iter().any(|name| path.join(name).exists()) {
             return Err(FileError::Occupied { folder: path.to_owned() });
         }
         fs::create_dir_all(path).map_err(|source| FileError::Folder { folder: path.to_owned(), source })?;

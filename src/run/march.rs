@@ -2,6 +2,7 @@
 
 use super::contact::{Course, Hold, Strike};
 use super::drift::{Drift, Limits};
+use super::flip::{self, Flip, Lookout, Suspect};
 use super::methods::{MethodId, Stabilization};
 use super::plan::{Plan, Refusal, Request};
 use super::sample::Sample;
@@ -10,12 +11,12 @@ use crate::dynamics::canonical::Canonical;
 use crate::dynamics::elimination::Elimination;
 use crate::dynamics::multiplier::Multiplier;
 use crate::dynamics::natural::Natural;
-use crate::dynamics::{CompileError, Field, Form, Mechanism, Motion, State, Time};
+use crate::dynamics::{CompileError, Field, Form, Glance, Mechanism, Motion, State, Time};
 use crate::scene::Scene;
 use crate::stabilization::{Baumgarte, Projected};
 use crate::stepping::gauss::Gauss;
 use crate::stepping::rattle::Rattle;
-use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Method, Reached, Seen, StepError, Tally, Taylor};
+use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Method, Reached, Seen, StepError, Tally, Taylor, Tolerance};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -23,10 +24,25 @@ use std::time::{Duration, Instant};
 pub trait Problem: Field + Form {}
 impl<P: Field + Form> Problem for P {}
 
+/// `sized!(n, f(args))` calls `f::<n>` for the sizes compiled in, and `f::<0>` for any other.
+macro_rules! sized {
+    ($n:expr, $function:ident($($argument:expr),*)) => {
+        match $n {
+            1 => $function::<1>($($argument),*),
+            2 => $function::<2>($($argument),*),
+            3 => $function::<3>($($argument),*),
+            4 => $function::<4>($($argument),*),
+            5 => $function::<5>($($argument),*),
+            6 => $function::<6>($($argument),*),
+            _ => $function::<0>($($argument),*),
+        }
+    };
+}
+
 /// A problem, its method and its state.
 pub(super) trait March {
-    /// To the output time `until`, on the way to `horizon`; what is read then is the motion there.
-    fn advance(&mut self, until: Time, horizon: Time) -> Result<Reached, StepError>;
+    /// To the output time `until`, on the way to `horizon`; what is read then is the motion there.  Looks for bars that turn over, where asked to.
+    fn advance(&mut self, until: Time, horizon: Time, lookout: Option<&mut Lookout>) -> Result<Reached, StepError>;
     fn read(&mut self, motion: &mut Motion);
     /// Goes on from another motion, with what the method remembers.
     fn jump(&mut self, motion: &Motion);
@@ -37,6 +53,17 @@ pub(super) trait March {
     fn forget(&mut self);
     /// Goes on counting, and with the steps, where another left off.
     fn follow(&mut self, other: &dyn March);
+}
+
+/// What can be seen of the steps of a method that is not dense.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Steps {
+    /// Each of them; the method can also march a part of one.
+    Own,
+    /// Each of them, all of one length.
+    Fixed,
+    /// Nothing but the time asked for.
+    Unseen,
 }
 
 struct Marcher<P: ?Sized, M> {
@@ -51,14 +78,18 @@ struct Marcher<P: ?Sized, M> {
     is_inside: bool,
     /// The event the last step ended with, where output times came first.
     ahead: Option<usize>,
+    steps: Steps,
+    /// What marches parts of steps where the method cannot, once one is needed.
+    tracer: Option<Box<dyn March>>,
 }
 
 impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
-    fn advance(&mut self, until: Time, horizon: Time) -> Result<Reached, StepError> {
-        let Self { problem, method, state, tally, from, inside, is_inside, ahead } = self;
-        if !method.is_dense() {
-            return method.advance(problem, state, until, tally, &mut |_, _| Ok(Seen::Kept));
+    fn advance(&mut self, until: Time, horizon: Time, lookout: Option<&mut Lookout>) -> Result<Reached, StepError> {
+        let mut lookout = lookout.filter(|lookout| lookout.flip.is_none());
+        if !self.method.is_dense() {
+            return self.land(until, lookout);
         }
+        let Self { problem, method, state, tally, from, inside, is_inside, ahead, .. } = self;
         // Steps are as long as the method likes; output times are read off them.
         *is_inside = false;
         while state.time < until {
@@ -66,13 +97,28 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
                 return Ok(Reached::Event(event));
             }
             from.clone_from(state);
-            let reached = method.advance(problem, state, horizon, tally, &mut |_, state| {
-                let passed = state.time >= until;
-                if !passed {
+            if let Some(lookout) = &mut lookout {
+                lookout.begin(&mut **problem, state);
+            }
+            let reached = method.advance(problem, state, horizon, tally, &mut |problem, state| {
+                // A step in which a bar may have turned over is searched before the next one.
+                let enough = lookout.as_mut().is_some_and(|lookout| lookout.step(problem, state, false)) || state.time >= until;
+                if !enough {
                     from.clone_from(state);
                 }
-                Ok(if passed { Seen::Enough } else { Seen::Kept })
+                Ok(if enough { Seen::Enough } else { Seen::Kept })
             })?;
+            if let Some(lookout) = &mut lookout {
+                lookout.search(&mut |suspect| {
+                    let Suspect { from, span, ends } = suspect;
+                    flip::search(from.time.hi, *span, ends, &mut |seconds| {
+                        method.within(problem, from, from.time + seconds, inside);
+                        let mut glance = Glance::default();
+                        problem.glance(inside, &mut glance);
+                        Some(glance)
+                    })
+                });
+            }
             if let Reached::Event(event) = reached {
                 if state.time <= until {
                     return Ok(reached);
@@ -115,10 +161,69 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
     }
 }
 
-fn marcher<P: Form + ?Sized + 'static, M: Method<P> + 'static>(problem: Box<P>, method: M, start: &Motion) -> Box<dyn March> {
+impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
+    /// Marches a method that is not dense to `until` itself.
+    fn land(&mut self, until: Time, mut lookout: Option<&mut Lookout>) -> Result<Reached, StepError> {
+        let Self { problem, method, state, tally, .. } = self;
+        let Some(lookout) = &mut lookout else {
+            return method.advance(problem, state, until, tally, &mut |_, _| Ok(Seen::Kept));
+        };
+        let all = self.steps == Steps::Unseen;
+        lookout.begin(&mut **problem, state);
+        let reached = method.advance(problem, state, until, tally, &mut |problem, state| {
+            lookout.step(problem, state, all);
+            Ok(Seen::Kept)
+        });
+        lookout.search(&mut |suspect| if self.steps == Steps::Own { self.again(suspect) } else { self.traced(suspect) });
+        reached
+    }
+
+    /// The first bar that turns over in a step, parts of which are marched again; the run itself does not notice.
+    fn again(&mut self, Suspect { from, span, ends }: &Suspect) -> Option<Flip> {
+        flip::search(from.time.hi, *span, ends, &mut |seconds| {
+            let mut state = from.clone();
+            let until = state.time + seconds;
+            self.method.advance(&mut self.problem, &mut state, until, &mut Tally::default(), &mut |_, _| Ok(Seen::Kept)).ok()?;
+            let mut glance = Glance::default();
+            self.problem.glance(&state, &mut glance);
+            Some(glance)
+        })
+    }
+
+    /// The first bar that turns over in a step, which another method marches again.
+    fn traced(&mut self, Suspect { from, span, .. }: &Suspect) -> Option<Flip> {
+        let mut motion = Motion::default();
+        self.problem.read(from, &mut motion);
+        let tracer = self.tracer.get_or_insert_with(|| {
+            let mechanism = Arc::new(self.problem.mechanism().clone());
+            let tolerance = Tolerance { relative: 1e-13, absolute: 1e-13 };
+            marcher(sized!(mechanism.bodies.len(), eliminated(&mechanism)), Dp8::new(tolerance), &motion, Steps::Own)
+        });
+        tracer.jump(&motion);
+        tracer.forget();
+        let mut lookout = Lookout::default();
+        let until = from.time + *span;
+        // Where that stops, what was seen up to there counts.
+        let _ = tracer.advance(until, until, Some(&mut lookout));
+        lookout.flip
+    }
+}
+
+fn marcher<P: Form + ?Sized + 'static, M: Method<P> + 'static>(problem: Box<P>, method: M, start: &Motion, steps: Steps) -> Box<dyn March> {
     let state = problem.state(start);
     let idle = State::default;
-    Box::new(Marcher { problem, method, state, tally: Tally::default(), from: idle(), inside: idle(), is_inside: false, ahead: None })
+    Box::new(Marcher {
+        problem,
+        method,
+        state,
+        tally: Tally::default(),
+        from: idle(),
+        inside: idle(),
+        is_inside: false,
+        ahead: None,
+        steps,
+        tracer: None,
+    })
 }
 
 /// The form a stabilization marches in, for `N` bodies.
@@ -143,21 +248,6 @@ fn canonical<const N: usize>(mechanism: &Arc<Mechanism>) -> Box<dyn Problem> {
     if mechanism.keeps_account() { Box::new(Canonical::<N, true>::new(mechanism)) } else { Box::new(Canonical::<N, false>::new(mechanism)) }
 }
 
-/// `sized!(n, f(args))` calls `f::<n>` for the sizes compiled in, and `f::<0>` for any other.
-macro_rules! sized {
-    ($n:expr, $function:ident($($argument:expr),*)) => {
-        match $n {
-            1 => $function::<1>($($argument),*),
-            2 => $function::<2>($($argument),*),
-            3 => $function::<3>($($argument),*),
-            4 => $function::<4>($($argument),*),
-            5 => $function::<5>($($argument),*),
-            6 => $function::<6>($($argument),*),
-            _ => $function::<0>($($argument),*),
-        }
-    };
-}
-
 /// Builds what a plan asks for; Baumgarte's time constant is measured first where none was given.
 pub(super) fn build(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<Box<dyn March>, StepError> {
     let n = mechanism.bodies.len();
@@ -171,29 +261,29 @@ pub(super) fn build(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion)
     let projected = plan.stabilization == Stabilization::Projection;
     let problem = || sized!(n, form(mechanism, plan.stabilization, plan.time_constant.unwrap_or(1.0)));
     Ok(match plan.method {
-        MethodId::Dopri5 => marcher(problem(), Dopri5::new(tolerance), start),
-        MethodId::Dop853 => marcher(problem(), Dop853::new(tolerance), start),
-        MethodId::Dp5 if projected => marcher(problem(), Projected::new(Dp5::new(tolerance)), start),
-        MethodId::Dp8 if projected => marcher(problem(), Projected::new(Dp8::new(tolerance)), start),
-        MethodId::Dp5 => marcher(problem(), Dp5::new(tolerance), start),
-        MethodId::Dp8 => marcher(problem(), Dp8::new(tolerance), start),
+        MethodId::Dopri5 => marcher(problem(), Dopri5::new(tolerance), start, Steps::Unseen),
+        MethodId::Dop853 => marcher(problem(), Dop853::new(tolerance), start, Steps::Unseen),
+        MethodId::Dp5 if projected => marcher(problem(), Projected::new(Dp5::new(tolerance)), start, Steps::Own),
+        MethodId::Dp8 if projected => marcher(problem(), Projected::new(Dp8::new(tolerance)), start, Steps::Own),
+        MethodId::Dp5 => marcher(problem(), Dp5::new(tolerance), start, Steps::Own),
+        MethodId::Dp8 => marcher(problem(), Dp8::new(tolerance), start, Steps::Own),
         MethodId::Taylor => {
             let mut taylor = Taylor::new(tolerance);
             taylor.extended = plan.extended;
             match plan.stabilization {
-                Stabilization::None if mechanism.rows.is_empty() => marcher(sized!(n, eliminated(mechanism)), taylor, start),
-                Stabilization::Projection => marcher(problem(), Projected::new(taylor), start),
-                _ => marcher(problem(), taylor, start),
+                Stabilization::None if mechanism.rows.is_empty() => marcher(sized!(n, eliminated(mechanism)), taylor, start, Steps::Own),
+                Stabilization::Projection => marcher(problem(), Projected::new(taylor), start, Steps::Own),
+                _ => marcher(problem(), taylor, start, Steps::Own),
             }
         }
         MethodId::Gauss(stages) => {
             let gauss = Gauss::new(stages, step)
                 .ok_or_else(|| cannot_begin(plan, format!("no Gauss method has {stages} stages and step {step} s")))?;
-            marcher(sized!(n, canonical(mechanism)), gauss, start)
+            marcher(sized!(n, canonical(mechanism)), gauss, start, Steps::Fixed)
         }
         MethodId::Rattle(composition) => {
             let natural = Natural::new(Arc::clone(mechanism)).map_err(|error| cannot_begin(plan, error.to_string()))?;
-            marcher(Box::new(natural), Rattle::new(composition, step), start)
+            marcher(Box::new(natural), Rattle::new(composition, step), start, Steps::Fixed)
         }
     })
 }
@@ -209,7 +299,7 @@ fn pilot(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion) -> Result<f64,
     let mut marcher = build(mechanism, &mut plain, start)?;
     let rows = plan.rows.min(20);
     for row in 1..=rows {
-        match marcher.advance(plan.time(row), plan.time(plan.rows)) {
+        match marcher.advance(plan.time(row), plan.time(plan.rows), None) {
             Ok(Reached::Until | Reached::Pause) => {}
             Ok(Reached::Event(_)) => break,
             Err(stop) if stop.cause == Cause::RestingContact => break,
@@ -227,6 +317,8 @@ pub struct Run {
     plan: Plan,
     limits: Limits,
     marcher: Box<dyn March>,
+    /// For runs of an ensemble, which look for bars that turn over and keep no samples: whether they end with the first.
+    ensemble: Option<bool>,
 }
 
 /// How a run ended.
@@ -256,6 +348,8 @@ pub struct Outcome {
     pub hold_time: f64,
     /// Time spent between the first output time and the last.
     pub wall: Duration,
+    /// The first time a bar turned over, where the run is one of an ensemble.
+    pub flip: Option<Flip>,
     /// Why it ended before its horizon.
     pub stop: Option<StepError>,
 }
@@ -284,7 +378,12 @@ impl Run {
     /// A method that cannot begin there.
     pub fn new(mechanism: Arc<Mechanism>, mut plan: Plan, limits: Limits, start: &Motion) -> Result<Self, StepError> {
         let marcher = build(&mechanism, &mut plan, start)?;
-        Ok(Self { mechanism, plan, limits, marcher })
+        Ok(Self { mechanism, plan, limits, marcher, ensemble: None })
+    }
+
+    /// The same as one of many: on the lookout for the first bar that turns over, and without samples for charts.
+    pub(super) fn of_ensemble(self, ends_at_flip: bool) -> Self {
+        Self { ensemble: Some(ends_at_flip), ..self }
     }
 
     /// The plan as it will be carried out.
@@ -311,7 +410,7 @@ pub fn simulate(scene: &Scene, request: &Request, observer: &mut dyn FnMut(&Samp
 /// # Errors
 /// What the observer failed with.
 pub fn march(run: Run, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>) -> Result<Outcome, RunError> {
-    let Run { mechanism, plan, limits, marcher } = run;
+    let Run { mechanism, plan, limits, marcher, ensemble } = run;
     let mut outcome = Outcome {
         last: Sample::default(),
         tally: Tally::default(),
@@ -324,10 +423,12 @@ pub fn march(run: Run, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>)
         hold_count: 0,
         hold_time: 0.0,
         wall: Duration::ZERO,
+        flip: None,
         stop: None,
         plan,
     };
     let mut course = Course::new(mechanism, marcher);
+    course.lookout = ensemble.map(|_| Lookout::default());
     // The reference of the energy is what impacts at the start leave.
     let mut resting = course.meet(&mut outcome).err();
     let begin = Instant::now();
@@ -341,7 +442,9 @@ pub fn march(run: Run, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>)
         // A stop before any progress leaves the state of the row before.
         if row == 0 || sample.t > outcome.last.t {
             observer(sample)?;
-            outcome.trace.see(sample);
+            if ensemble.is_none() {
+                outcome.trace.see(sample);
+            }
         }
         let exceeded = outcome.drift.see(sample, &limits);
         outcome.stop = stopped
@@ -349,7 +452,10 @@ pub fn march(run: Run, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>)
             .or_else(|| exceeded.err().map(|what| drift_stop(&outcome.plan, sample.t, what)))
             .or_else(|| (!sample.is_finite()).then(|| not_finite(&outcome.plan, sample.t)));
         outcome.last.clone_from(sample);
-        if outcome.stop.is_some() {
+        // A dense method is ahead of what it shows.
+        let reached = outcome.last.t;
+        outcome.flip = course.lookout.as_ref().and_then(|lookout| lookout.flip).filter(|flip| flip.t <= reached);
+        if outcome.stop.is_some() || (ensemble == Some(true) && outcome.flip.is_some()) {
             break;
         }
     }

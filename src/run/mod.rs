@@ -3,16 +3,18 @@
 //! [`plan`] decides, [`mod@march`] builds the marcher and goes from one output time to the next, [`contact`] through impacts and contacts that
 //! last, [`sample`] reads off what there is to
 //! know at each, [`drift`] and [`trace`] keep bounded records of it, [`table`] writes it down,
-//! [`files`] keeps whole files only.
+//! [`files`] keeps whole files only.  [`mod@sweep`] runs a grid of starts and parameters, on the lookout for bars that turn over ([`flip`]).
 
 pub mod contact;
 pub mod drift;
 #[cfg(feature = "files")]
 pub mod files;
+pub mod flip;
 pub mod march;
 pub mod methods;
 pub mod plan;
 pub mod sample;
+pub mod sweep;
 #[cfg(feature = "files")]
 pub mod table;
 pub mod trace;
@@ -21,8 +23,12 @@ pub use contact::{Hold, Strike};
 pub use drift::{Drift, Limits};
 #[cfg(feature = "files")]
 pub use files::{FileError, Folder, Stream};
+pub use flip::Flip;
 pub use march::{Outcome, Run, RunError, march, simulate};
 pub use methods::{METHODS, MethodId, MethodInfo, Stabilization};
 pub use plan::{Plan, Refusal, Request};
 pub use sample::{Sample, Sampler};
+#[cfg(feature = "files")]
+pub use sweep::table::SweepTable;
+pub use sweep::{Grid, Observer, Point, Status, Sweep, SweepError, Totals, Vary, VaryError, sweep};
 pub use trace::Trace;

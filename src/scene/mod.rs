@@ -10,14 +10,26 @@ mod locate;
 pub mod read;
 mod schema;
 mod set;
+mod template;
 mod write;
 
 pub use error::{Refusal, SceneError};
-pub use read::{parse_scene, read_scene};
+pub use read::{parse_scene, read_scene, read_text};
 pub use schema::schema;
 pub use set::{Override, OverrideError};
+pub use template::{StartValue, Template, Variable};
 
 use serde::Serialize;
+
+/// True for an angle a bar may start at \[rad\].
+pub fn is_start_angle(phi: f64) -> bool {
+    format::ANGLE.holds(phi)
+}
+
+/// True for a rate a bar may start with \[rad/s\].
+pub fn is_start_rate(omega: f64) -> bool {
+    format::RATE.holds(omega)
+}
 
 /// A checked scene.
 #[derive(Clone, Debug, PartialEq, Serialize)]

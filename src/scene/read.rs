@@ -19,6 +19,14 @@ use std::path::Path;
 /// The file cannot be read ([`SceneError::is_io`]), or what it says is no scene: the error names line, column, field, value, what is
 /// allowed, and a hint.
 pub fn read_scene(path: &Path, overrides: &[Override]) -> Result<Scene, SceneError> {
+    parse_scene(&read_text(path)?, &path.display().to_string(), overrides)
+}
+
+/// Reads the text of the scene file `path`.
+///
+/// # Errors
+/// The file cannot be read ([`SceneError::is_io`]), is too long, or is not UTF-8.
+pub fn read_text(path: &Path) -> Result<String, SceneError> {
     let file = path.display().to_string();
     let mut bytes = Vec::new();
     std::fs::File::open(path)
@@ -28,18 +36,15 @@ pub fn read_scene(path: &Path, overrides: &[Override]) -> Result<Scene, SceneErr
         let hint = "a scene of 10 000 bars fits well into this; is this the right file?";
         return Err(SceneError::whole_file(&file, "is too long", "must be at most 16 MiB", hint));
     }
-    match String::from_utf8(bytes) {
-        Ok(text) => parse_scene(&text, &file, overrides),
-        Err(error) => {
-            let good = error.utf8_error().valid_up_to();
-            let json = String::from_utf8_lossy(error.as_bytes()).into_owned();
-            let source = Source { file, texts: vec![Text { set: None, json: without_mark(&json).to_owned() }] };
-            let good = good.saturating_sub(json.len() - source.texts[0].json.len());
-            let span = source.span(0, good, good + char::REPLACEMENT_CHARACTER.len_utf8());
-            let hint = "save the file as UTF-8; names of bars and hinges are plain ASCII anyway";
-            Err(source.refusal(span, "", "not UTF-8", "must be text in UTF-8", hint))
-        }
-    }
+    String::from_utf8(bytes).map_err(|error| {
+        let good = error.utf8_error().valid_up_to();
+        let json = String::from_utf8_lossy(error.as_bytes()).into_owned();
+        let source = Source { file, texts: vec![Text { set: None, json: without_mark(&json).to_owned() }] };
+        let good = good.saturating_sub(json.len() - source.texts[0].json.len());
+        let span = source.span(0, good, good + char::REPLACEMENT_CHARACTER.len_utf8());
+        let hint = "save the file as UTF-8; names of bars and hinges are plain ASCII anyway";
+        source.refusal(span, "", "not UTF-8", "must be text in UTF-8", hint)
+    })
 }
 
 /// Reads the scene in `text`; `source` is the name of its file in messages.
@@ -51,6 +56,12 @@ pub fn parse_scene(text: &str, source: &str, overrides: &[Override]) -> Result<S
         let hint = "a scene of 10 000 bars fits well into this; is this the right file?";
         return Err(SceneError::whole_file(source, "is too long", "must be at most 16 MiB", hint));
     }
+    let (source, tree) = put_together(text, source, overrides)?;
+    scene(&At { source: &source, node: &tree, path: String::new() })
+}
+
+/// The tree of a scene's text with overrides put in, not judged yet.
+pub(super) fn put_together(text: &str, source: &str, overrides: &[Override]) -> Result<(Source, Node), SceneError> {
     let mut texts = vec![Text { set: None, json: without_mark(text).to_owned() }];
     texts.extend(overrides.iter().map(Override::text));
     let source = Source { file: source.to_owned(), texts };
@@ -58,7 +69,7 @@ pub fn parse_scene(text: &str, source: &str, overrides: &[Override]) -> Result<S
     for (number, set) in overrides.iter().enumerate() {
         put(&source, &mut tree, set, source.tree(number + 1)?)?;
     }
-    scene(&At { source: &source, node: &tree, path: String::new() })
+    Ok((source, tree))
 }
 
 /// Editors on some systems put a byte order mark first; it says nothing about the scene.

@@ -54,13 +54,13 @@ impl Override {
 }
 
 /// One step of a path.
-enum Step<'a> {
+pub(super) enum Step<'a> {
     Key(&'a str),
     Index(usize),
 }
 
 /// `bars[1].length` to its steps; `None` where it is no path.
-fn steps(path: &str) -> Option<Vec<Step<'_>>> {
+pub(super) fn steps(path: &str) -> Option<Vec<Step<'_>>> {
     let mut steps = Vec::new();
     for part in path.split('.') {
         let (key, indices) = part.split_once('[').map_or((part, ""), |(key, _)| (key, &part[key.len()..]));
@@ -143,7 +143,7 @@ pub(super) fn put(source: &Source, tree: &mut Node, set: &Override, value: Node)
     Ok(())
 }
 
-fn name(node: &Node) -> Option<&str> {
+pub(super) fn name(node: &Node) -> Option<&str> {
     let Value::Object(members) = &node.value else { return None };
     members.iter().find(|member| member.key == "name").and_then(|member| match &member.node.value {
         Value::Text(name) => Some(name.as_str()),
@@ -151,7 +151,7 @@ fn name(node: &Node) -> Option<&str> {
     })
 }
 
-fn hint(wanted: &str, known: &[&str]) -> String {
+pub(super) fn hint(wanted: &str, known: &[&str]) -> String {
     match nearest(wanted, known.iter().copied()) {
         Some(near) => format!("did you mean `{near}`?"),
         None => format!("there are: {}", super::read::listed(known)),

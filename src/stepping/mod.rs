@@ -114,6 +114,22 @@ pub enum Cause {
     DriftLimit,
 }
 
+impl Cause {
+    /// One word for tables, as in JSON: `not_finite`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::NotFinite => "not_finite",
+            Self::StepTooSmall => "step_too_small",
+            Self::TooManySteps => "too_many_steps",
+            Self::NotConverged => "not_converged",
+            Self::ProjectionFailed => "projection_failed",
+            Self::RestingContact => "resting_contact",
+            Self::Unsuited => "unsuited",
+            Self::DriftLimit => "drift_limit",
+        }
+    }
+}
+
 /// A typed stop.
 #[derive(Clone, Debug, PartialEq, thiserror::Error, serde::Serialize)]
 #[error("{method} stopped at t = {t} s (step {step:.3e} s): {what}; {hint}")]

@@ -288,6 +288,9 @@ impl<const N: usize> Team<N> {
 
     /// Angle and rate of a body `after` \[s\] from the start of the step last expanded, where it was at `start`.
     fn at(&self, order: usize, lane: usize, body: usize, start: f64, after: f64) -> (f64, f64) {
+        if after == 0.0 {
+            return (start, self.powers[0].v[body][lane]);
+        }
         let (mut angle, mut rate) = (0.0, 0.0);
         for k in (0..=order).rev() {
             let v = self.powers[k].v[body][lane];

@@ -1,0 +1,252 @@
+//! What a sweep amounted to, and its chart.
+
+use super::page::{Page, figure, magnitude};
+#[cfg(feature = "charts")]
+use crate::chart::{self, Cell, ChartError, FILE_RESOLUTION, Map, MapAxis, Profile, plain};
+use crate::run::files::sha256;
+use crate::run::sweep::table::columns;
+#[cfg(feature = "charts")]
+use crate::run::sweep::table::numbers;
+#[cfg(feature = "charts")]
+use crate::run::{Point, Status};
+use crate::run::{Sweep, Totals};
+use serde_json::{Value, json};
+
+/// The report as one JSON object; `wall_s` \[s\] and `threads` are what differs from run to run.
+pub fn object(sweep: &Sweep, totals: &Totals) -> Value {
+    let axes = sweep.grid().axes().iter().zip(sweep.variables());
+    let vary: Vec<Value> = axes
+        .map(
+            |(axis, variable)| json!({"path": variable.path, "unit": variable.unit, "from": axis.from, "to": axis.to, "count": axis.count}),
+        )
+        .collect();
+    let plan = sweep.plan();
+    json!({
+        "scene": sweep.scene().name,
+        "method": plan.method.info().name,
+        "why": plan.why,
+        "settings": super::settings(plan),
+        "until": plan.until,
+        "vary": vary,
+        "columns": columns(sweep),
+        "points": sweep.grid().count(),
+        "done": totals.done,
+        "stopped": totals.stopped,
+        "refused": totals.refused,
+        "skipped": totals.skipped,
+        "flipped": totals.flipped,
+        "steps": totals.steps,
+        "energy": {"max_relative": totals.energy.0, "point": totals.energy.1},
+        "constraints": {"position_max": totals.constraint[0], "velocity_max": totals.constraint[1]},
+        "notes": plan.notes,
+        "threads": totals.threads,
+        "wall_s": totals.wall.as_secs_f64(),
+    })
+}
+
+/// What `sweep.json` holds: the report, the resolved scene, versions, hashes; what differs from run to run stands in `timings` alone.
+pub fn record(sweep: &Sweep, totals: &Totals, table_sha256: &str) -> Value {
+    let mut report = object(sweep, totals);
+    let mut taken = |key: &str| report.as_object_mut().and_then(|members| members.shift_remove(key));
+    let timings = json!({"wall_s": taken("wall_s"), "threads": taken("threads")});
+    let input = sweep.scene().to_input();
+    json!({
+        "format": 1,
+        "versions": {"driftless": env!("CARGO_PKG_VERSION"), "target": super::result::target()},
+        "hashes": {"scene_sha256": sha256(&input.to_string()), "table_sha256": table_sha256},
+        "result": report,
+        "resolved_scene": input,
+        "timings": timings,
+    })
+}
+
+/// The report as a page.
+pub fn text(sweep: &Sweep, totals: &Totals) -> String {
+    let scene = sweep.scene();
+    let mut page = Page::new(&scene.name, &scene.description);
+    page.entry("method", &super::setting(sweep.plan()));
+    page.entry("", sweep.plan().why.as_deref().unwrap_or("as asked for"));
+    for (number, (axis, variable)) in sweep.grid().axes().iter().zip(sweep.variables()).enumerate() {
+        let unit = if variable.unit.is_empty() { String::new() } else { format!(" {}", variable.unit) };
+        let range = format!("{}: {} to {}{unit}, {} values", variable.path, figure(axis.from), figure(axis.to), axis.count);
+        page.entry(if number == 0 { "varied" } else { "" }, &range);
+    }
+    let seconds = totals.wall.as_secs_f64();
+    let rate = figure((sweep.grid().count() as f64 / seconds.max(1e-9)).round());
+    let threads = if totals.threads == 1 { "1 thread".to_owned() } else { format!("{} threads", totals.threads) };
+    page.entry(
+        "cost",
+        &format!("{} points, {} steps, {seconds:.3} s on {threads}, {rate} points a second", sweep.grid().count(), totals.steps),
+    );
+    page.entry("points", &counted(totals));
+    page.entry("turned over", &format!("{} of them, by t = {} s", totals.flipped, figure(sweep.plan().until)));
+    page.entry("energy drift", &format!("{} of its scale at most, in row {}", magnitude(totals.energy.0), totals.energy.1 + 1));
+    if let Some(row) = sweep.mechanism().rows.first() {
+        let unit = row.unit();
+        let [position, velocity] = totals.constraint.map(magnitude);
+        page.entry("constraints", &format!("{position} {unit} and {velocity} {unit}/s at most"));
+    }
+    page.into_text()
+}
+
+/// `12 done, 3 stopped, 1 refused`.
+fn counted(totals: &Totals) -> String {
+    let kinds = [(totals.done, "done"), (totals.stopped, "stopped"), (totals.refused, "refused"), (totals.skipped, "skipped")];
+    kinds
+        .iter()
+        .filter(|(count, word)| *count > 0 || *word == "done")
+        .map(|(count, word)| format!("{count} {word}"))
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+/// Most points a chart remembers; more could not be told apart in it.
+#[cfg(feature = "charts")]
+const MOST: u64 = 1 << 22;
+
+/// The chart of a sweep over one or two values, as its points come in.
+#[cfg(feature = "charts")]
+#[derive(Clone, Debug)]
+pub struct Curve {
+    /// Which of the numbers of a row.
+    column: Option<usize>,
+    bars: usize,
+    /// The numbers of all points so far; not a number where there is none.
+    seen: Vec<f64>,
+    failed: Vec<bool>,
+}
+
+/// Why there is no chart of a column.
+#[cfg(feature = "charts")]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NoChart {
+    /// The table has no such column, or it holds words.
+    #[error("the table has no column of numbers `{0}`; there are: {1}")]
+    Column(String, String),
+    /// A chart shows one or two varied values.
+    #[error("{0} values are varied; a chart shows one or two")]
+    Dimensions(usize),
+    /// More points than a chart can show.
+    #[error("{0} points are more than a chart can show ({MOST})")]
+    Points(u64),
+    /// Nothing to show.
+    #[error("no bar turned over; --map COLUMN draws another column: {0}")]
+    Nothing(String),
+}
+
+#[cfg(feature = "charts")]
+impl Curve {
+    /// A chart of this column of the table, its unit left out or not, or of the flip times.
+    ///
+    /// # Errors
+    /// There can be no such chart.
+    pub fn new(sweep: &Sweep, column: Option<&str>) -> Result<Self, NoChart> {
+        let axes = sweep.grid().axes().len();
+        if axes > 2 {
+            return Err(NoChart::Dimensions(axes));
+        }
+        if sweep.grid().count() > MOST {
+            return Err(NoChart::Points(sweep.grid().count()));
+        }
+        let names = results(sweep);
+        let short = |name: &str| name.split(" [").next().unwrap_or_default().to_owned();
+        let column = match column {
+            None => None,
+            Some(wanted) => Some(
+                names
+                    .iter()
+                    .position(|name| name == wanted || short(name) == wanted)
+                    .ok_or_else(|| NoChart::Column(wanted.to_owned(), listed(sweep)))?,
+            ),
+        };
+        Ok(Self { column, bars: sweep.mechanism().bodies.len(), seen: Vec::new(), failed: Vec::new() })
+    }
+
+    /// Takes a point.
+    pub fn see(&mut self, point: &Point) {
+        let numbers = numbers(point, self.bars);
+        let column = self.column.map_or(numbers.len() - 1, |column| column + point.values.len());
+        self.seen.push(numbers[column]);
+        self.failed.push(matches!(point.status, Status::Stopped(_) | Status::Refused(_)));
+    }
+
+    /// Draws what was seen; returns the content of its file.
+    ///
+    /// # Errors
+    /// Drawing or encoding fails; `Ok` with the reason where there is nothing to show.
+    pub fn draw(&self, sweep: &Sweep) -> Result<Result<Vec<u8>, NoChart>, ChartError> {
+        let names = results(sweep);
+        let is_flip = self.column.is_none_or(|column| column + 1 == names.len());
+        if is_flip && self.seen.iter().all(|time| time.is_nan()) {
+            return Ok(Err(NoChart::Nothing(listed(sweep))));
+        }
+        let name = if is_flip { "flip time [s]".to_owned() } else { spaced(&names[self.column.unwrap_or_default()]) };
+        let bare = name.split(" [").next().unwrap_or_default().to_owned();
+        let axes: Vec<MapAxis> = (sweep.grid().axes().iter().zip(sweep.variables()))
+            .map(|(axis, variable)| {
+                let unit = if variable.unit.is_empty() { String::new() } else { format!(" [{}]", variable.unit) };
+                MapAxis { name: format!("{}{unit}", plain(&variable.path)), from: axis.from, to: axis.to, count: axis.count as usize }
+            })
+            .collect();
+        let title = if is_flip { "Time until a bar first turns over".to_owned() } else { format!("{} over the sweep", capital(&bare)) };
+        let plan = sweep.plan();
+        let mut caption = vec![format!("scene {}", plain(&sweep.scene().name)), plain(&super::setting(plan))];
+        caption.push(format!(
+            "{} points, {} s each",
+            axes.iter().map(|axis| axis.count.to_string()).collect::<Vec<_>>().join(" × "),
+            figure(plan.until)
+        ));
+        let log = is_flip || names[self.column.unwrap_or_default()].contains("drift") || name == "steps";
+        let picture = match &axes[..] {
+            [x, y] => {
+                let cells = self.seen.iter().zip(&self.failed).map(|(&value, &failed)| match (value.is_nan(), failed) {
+                    (false, _) => Cell::Value(value),
+                    (true, true) => Cell::Failed,
+                    (true, false) => Cell::Never,
+                });
+                let never = if is_flip { format!("not within {} s", figure(plan.until)) } else { "no value".to_owned() };
+                let words = [never, "left out".to_owned(), "stopped or refused".to_owned()];
+                let (x, y, cells) = (x.clone(), y.clone(), cells.collect());
+                chart::map(&Map { title, caption, x, y, cells, value: name, log, dark_high: is_flip, range: None, words }, FILE_RESOLUTION)
+            }
+            _ => {
+                if self.seen.iter().any(|value| value.is_nan()) {
+                    let without = if is_flip { format!("not within {} s", figure(plan.until)) } else { "no value".to_owned() };
+                    caption.push(format!("dots on the upper edge: {without}"));
+                }
+                let values = (0..sweep.grid().count()).map(|index| sweep.grid().values(index)[0]).collect();
+                let x_name = axes.first().map(|axis| axis.name.clone()).unwrap_or_default();
+                chart::profile(&Profile { title, caption, x_name, y_name: name, x: values, y: self.seen.clone(), log }, FILE_RESOLUTION)
+            }
+        };
+        Ok(Ok(picture?.png_bytes()?))
+    }
+}
+
+/// The columns of numbers that came out.
+#[cfg(feature = "charts")]
+fn results(sweep: &Sweep) -> Vec<String> {
+    let mut names = columns(sweep).split_off(sweep.variables().len());
+    names.truncate(names.len() - 3);
+    names
+}
+
+#[cfg(feature = "charts")]
+fn listed(sweep: &Sweep) -> String {
+    results(sweep).iter().map(|name| name.split(" [").next().unwrap_or_default().to_owned()).collect::<Vec<_>>().join(", ")
+}
+
+/// A column's name as the name of an axis.
+#[cfg(feature = "charts")]
+fn spaced(name: &str) -> String {
+    if name.contains("drift") { name.replace('_', " ").replace(" [1]", "") } else { plain(name) }
+}
+
+#[cfg(feature = "charts")]
+fn capital(name: &str) -> String {
+    if name.contains('.') {
+        return name.to_owned();
+    }
+    let mut letters = name.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+}

@@ -1,0 +1,322 @@
+//! Sweeps: many runs of one scene over a grid of starts and parameters.
+//!
+//! Every point is a run of its own, with the same result whichever thread marches it and whoever its neighbours are, so that what comes out does not
+//! depend on the number of threads.  Points are handed out in chunks, of which a bounded number is under way; results are shown in the order of the
+//! grid, and memory does not grow with it.  A point that cannot be run, or stops, says so in its own result and ends nothing else.
+//!
+//! ```
+//! use driftless::run::{Request, Sweep, Vary, sweep};
+//! use driftless::scene::Template;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let template = Template::read("examples/scenes/free.json".as_ref(), &[])?;
+//! let vary: Vec<Vary> = vec!["bar1.phi=1..3:5".parse()?, "bar2.phi=-pi..pi:4".parse()?];
+//! let plan = Sweep::new(&template, vary, &Request { until: Some(2.0), ..Request::default() })?;
+//! let mut flips = Vec::new();
+//! let totals = sweep(&plan, 2, &mut |point: &driftless::run::Point| {
+//!     flips.extend(point.flip);
+//!     Ok(())
+//! })?;
+//! assert_eq!((totals.done, totals.flipped), (20, flips.len() as u64));
+//! # Ok(())
+//! # }
+//! ```
+
+mod grid;
+mod point;
+#[cfg(feature = "files")]
+pub mod table;
+#[cfg(feature = "threads")]
+mod threads;
+
+pub use grid::{Grid, Vary, VaryError};
+pub use point::{Point, Status};
+
+use super::drift::Limits;
+use super::methods::MethodId;
+use super::plan::{MAX_ROWS, Plan, Refusal, Request};
+use crate::dynamics::{CompileError, Mechanism};
+use crate::scene::{Scene, SceneError, Template, Variable};
+use crate::stepping::taylor::crowd::Crowd;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// Times at which drift is looked at where no output interval was asked for.
+const LOOKS: f64 = 8.0;
+/// Most points of a chunk.
+const CHUNK: u64 = 64;
+
+/// Judges the values of a point.
+type Judge = dyn Fn(&[f64]) -> bool + Send + Sync;
+
+/// A sweep about to begin.
+pub struct Sweep {
+    template: Template,
+    scene: Scene,
+    mechanism: Arc<Mechanism>,
+    request: Request,
+    plan: Plan,
+    grid: Grid,
+    variables: Vec<Variable>,
+    limits: Limits,
+    skips: Option<Box<Judge>>,
+    ends_at_flips: bool,
+    /// True where only starts are varied in which nothing else has a say: all points share one mechanism.
+    shares: bool,
+}
+
+/// Why a sweep cannot begin, or did not come to its end.
+#[derive(Debug, thiserror::Error)]
+pub enum SweepError {
+    /// The scene as it stands is none, or has no such value.
+    #[error("{0}")]
+    Scene(#[from] SceneError),
+    /// The scene has no equations.
+    #[error("{0}")]
+    Compile(#[from] CompileError),
+    /// The request makes no sense, whatever the point.
+    #[error("{0}")]
+    Refused(#[from] Refusal),
+    /// The threads could not be started.
+    #[error("{0}")]
+    Threads(String),
+    /// An observer failed to write, or wanted no more.
+    #[error("{0}")]
+    Observer(#[from] std::io::Error),
+}
+
+/// Sees the points of a sweep, in the order of the grid.
+pub trait Observer {
+    /// Takes a point.
+    ///
+    /// # Errors
+    /// Whatever shall end the sweep.
+    fn see(&mut self, point: &Point) -> std::io::Result<()>;
+
+    /// Told now and then how many points are finished, seen or not yet.
+    ///
+    /// # Errors
+    /// Whatever shall end the sweep.
+    fn finished(&mut self, _points: u64) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+impl<F: FnMut(&Point) -> std::io::Result<()>> Observer for F {
+    fn see(&mut self, point: &Point) -> std::io::Result<()> {
+        self(point)
+    }
+}
+
+/// What a sweep amounted to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Totals {
+    /// Points that reached the horizon, or the flip they were to end with.
+    pub done: u64,
+    /// Points that stopped before.
+    pub stopped: u64,
+    /// Points that could not begin.
+    pub refused: u64,
+    /// Points left out.
+    pub skipped: u64,
+    /// Points in which a bar turned over.
+    pub flipped: u64,
+    /// Steps of all of them.
+    pub steps: u64,
+    /// Largest energy drift among those done, over the energy scale, and the point's number.
+    pub energy: (f64, u64),
+    /// Largest violation of a constraint among those done, at position \[rad or m\] and velocity level, whichever point.
+    pub constraint: [f64; 2],
+    /// Threads used.
+    pub threads: usize,
+    /// Time spent.
+    pub wall: Duration,
+}
+
+impl Sweep {
+    /// Prepares a sweep over the grid of `vary`, the first of which varies slowest.
+    ///
+    /// Without a method of its own a request gets `taylor` where points can be marched several at a time, else the one a single run would get; without an
+    /// output interval, drift is looked at eight times on the way.
+    ///
+    /// # Errors
+    /// A scene that is none as it stands, a value it does not have, a request that makes no sense for it, or more than 1e9 points.
+    pub fn new(template: &Template, vary: Vec<Vary>, request: &Request) -> Result<Self, SweepError> {
+        let scene = template.scene()?;
+        let mechanism = Arc::new(Mechanism::new(&scene)?);
+        let variables = vary.iter().map(|vary| template.variable(&vary.name)).collect::<Result<Vec<_>, _>>()?;
+        let grid = grid(vary, &variables)?;
+        let mut request = request.clone();
+        let in_lanes = request.method.is_none() && request.step.is_none() && !request.extended && Crowd::takes(&mechanism);
+        if in_lanes {
+            request.method = Some(MethodId::Taylor);
+        }
+        let mut plan = Plan::new(&scene, &mechanism, &timed(&request, &scene))?;
+        if in_lanes {
+            plan.why = Some("taylor: free bodies are marched several at a time".into());
+        }
+        // What one point gets unasked, all get.
+        request.method = Some(plan.method);
+        let shares = variables.iter().all(|variable| variable.start.is_some());
+        let template = template.clone();
+        let limits = Limits::default();
+        Ok(Self { template, scene, mechanism, request, plan, grid, variables, limits, skips: None, ends_at_flips: false, shares })
+    }
+
+    /// The same with limits; a point that exceeds one stops.
+    pub fn with_limits(self, limits: Limits) -> Self {
+        Self { limits, ..self }
+    }
+
+    /// The same without the points whose values `skips` is true of.
+    pub fn without(self, skips: impl Fn(&[f64]) -> bool + Send + Sync + 'static) -> Self {
+        Self { skips: Some(Box::new(skips)), ..self }
+    }
+
+    /// The same with points that end when a bar turns over, at the end of that step or at the next output time.
+    pub fn ending_at_flips(self) -> Self {
+        Self { ends_at_flips: true, ..self }
+    }
+
+    /// The scene whose values are varied.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Its equations, as the scene stands.
+    pub fn mechanism(&self) -> &Arc<Mechanism> {
+        &self.mechanism
+    }
+
+    /// The plan of the scene as it stands; points differ from it only where what is varied decides.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The points.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// What is varied, slowest first.
+    pub fn variables(&self) -> &[Variable] {
+        &self.variables
+    }
+
+    /// Points marched as one task: enough to fill lanes, few enough to spread over the threads.
+    fn chunk(&self, threads: usize) -> u64 {
+        (self.grid.count() / (16 * threads as u64)).clamp(1, CHUNK)
+    }
+}
+
+fn grid(vary: Vec<Vary>, variables: &[Variable]) -> Result<Grid, Refusal> {
+    let refused =
+        |what: String, reason: String, alternative: &str| Refusal { is_usage: true, what, reason, alternative: alternative.into() };
+    if vary.is_empty() {
+        return Err(refused("a sweep".into(), "nothing is varied".into(), "--vary bar1.phi=-pi..pi:64"));
+    }
+    for (k, variable) in variables.iter().enumerate() {
+        if variables[..k].iter().any(|before| before.path == variable.path) {
+            return Err(refused(format!("--vary {}", variable.path), "it is varied twice".into(), "leave one of the two out"));
+        }
+    }
+    let counts = vary.iter().map(|vary| vary.count.to_string()).collect::<Vec<_>>().join(" × ");
+    Grid::new(vary).filter(|grid| grid.count() as f64 <= MAX_ROWS).ok_or_else(|| {
+        refused(
+            "--vary".into(),
+            format!("{counts} points are more than the {MAX_ROWS:.0e} a sweep may have"),
+            "smaller counts, or several sweeps",
+        )
+    })
+}
+
+/// The request with an output interval.
+fn timed(request: &Request, scene: &Scene) -> Request {
+    let every = request.every.unwrap_or(request.until.unwrap_or(scene.until) / LOOKS);
+    Request { every: Some(every), ..request.clone() }
+}
+
+/// What the threads of a sweep share.
+struct Shared<'a> {
+    sweep: &'a Sweep,
+    chunk: u64,
+    finished: AtomicU64,
+    /// Set where nobody wants the rest.
+    is_over: AtomicBool,
+}
+
+impl Shared<'_> {
+    fn chunks(&self) -> u64 {
+        self.sweep.grid.count().div_ceil(self.chunk)
+    }
+
+    /// The points of a chunk; fewer where nobody wants them any more.
+    fn march(&self, chunk: u64) -> Vec<Point> {
+        let first = chunk * self.chunk;
+        let last = (first + self.chunk).min(self.sweep.grid.count());
+        self.sweep.march(first..last, &|| {
+            self.finished.fetch_add(1, Ordering::Relaxed);
+            !self.is_over.load(Ordering::Relaxed)
+        })
+    }
+}
+
+/// Runs all points of a sweep on so many threads (0: as many as there are processors) and shows them to `observer` in the order of the grid.
+///
+/// Without the feature `threads` there is one.
+///
+/// # Errors
+/// What the observer failed with; a point that fails is part of what it is shown.
+pub fn sweep(sweep: &Sweep, threads: usize, observer: &mut dyn Observer) -> Result<Totals, SweepError> {
+    let begin = Instant::now();
+    let available = || std::thread::available_parallelism().map_or(1, usize::from);
+    let threads = if cfg!(not(feature = "threads")) {
+        1
+    } else if threads == 0 {
+        available()
+    } else {
+        threads
+    };
+    let shared = Shared { sweep, chunk: sweep.chunk(threads), finished: AtomicU64::new(0), is_over: AtomicBool::new(false) };
+    let mut totals = Totals { threads, ..Totals::default() };
+    let mut see = |point: &Point, observer: &mut dyn Observer| {
+        totals.take(point);
+        observer.see(point)
+    };
+    #[cfg(feature = "threads")]
+    if threads > 1 {
+        threads::march(&shared, threads, observer, &mut see)?;
+        totals.wall = begin.elapsed();
+        return Ok(totals);
+    }
+    for chunk in 0..shared.chunks() {
+        for point in shared.march(chunk) {
+            see(&point, observer)?;
+        }
+        observer.finished(shared.finished.load(Ordering::Relaxed))?;
+    }
+    totals.wall = begin.elapsed();
+    Ok(totals)
+}
+
+impl Totals {
+    fn take(&mut self, point: &Point) {
+        match point.status {
+            Status::Done => self.done += 1,
+            Status::Stopped(_) => self.stopped += 1,
+            Status::Refused(_) => self.refused += 1,
+            Status::Skipped => self.skipped += 1,
+        }
+        self.flipped += u64::from(point.flip.is_some());
+        self.steps += point.steps;
+        if point.status == Status::Done {
+            if point.energy > self.energy.0 {
+                self.energy = (point.energy, point.index);
+            }
+            for (most, level) in self.constraint.iter_mut().zip(point.constraint.unwrap_or_default()) {
+                *most = most.max(level);
+            }
+        }
+    }
+}

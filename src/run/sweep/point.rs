@@ -1,0 +1,332 @@
+//! One point of a sweep, or several marched in lanes.
+
+use super::{Sweep, timed};
+use crate::arithmetic::DoubleDouble;
+use crate::dynamics::elimination::Elimination;
+use crate::dynamics::kernel::Kernel;
+use crate::dynamics::{Form, Glance, Mechanism, Motion};
+use crate::run::flip::{self, Flip};
+use crate::run::march::{Run, march};
+use crate::run::methods::MethodId;
+use crate::run::plan::Plan;
+use crate::scene::StartValue;
+use crate::stepping::taylor::crowd::{Crowd, Entrant, Going, Passage};
+use crate::stepping::{Cause, StepError};
+use std::f64::consts::PI;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// What became of a point.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Status {
+    /// It came to its end.
+    Done,
+    /// The method stopped on the way, or a limit was exceeded.
+    Stopped(StepError),
+    /// With these values there is no scene, or no plan; the reason in one line.
+    Refused(String),
+    /// It was to be left out.
+    Skipped,
+}
+
+/// One point of a sweep.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Point {
+    /// Its number in the grid.
+    pub index: u64,
+    /// What was varied, in the units of the scene, slowest first.
+    pub values: Vec<f64>,
+    /// What became of it.
+    pub status: Status,
+    /// The time reached \[s\].
+    pub t: f64,
+    /// Winding angles then \[rad\]; none where it never began.
+    pub phi: Vec<f64>,
+    /// Rates then \[rad/s\].
+    pub omega: Vec<f64>,
+    /// Largest drift of energy, or energy minus work, over the energy scale.
+    pub energy: f64,
+    /// Largest violation of any constraint, at position \[rad or m\] and velocity level \[rad/s or m/s\], where there are any.
+    pub constraint: Option<[f64; 2]>,
+    /// Steps taken.
+    pub steps: u64,
+    /// The first time the angle of any bar, driven ones included, passed an odd multiple of π.
+    pub flip: Option<Flip>,
+}
+
+/// A point ready to run.
+struct Ready {
+    point: Point,
+    mechanism: Arc<Mechanism>,
+    plan: Plan,
+    start: Motion,
+    /// What its energies are divided by \[J\].
+    scale: f64,
+}
+
+impl Sweep {
+    /// Runs one point; the same as in a whole sweep.
+    pub fn point(&self, index: u64) -> Option<Point> {
+        if index < self.grid.count() { self.march(index..index + 1, &|| true).pop() } else { None }
+    }
+
+    /// Runs points; `goes_on` is told of each that is finished and may end it all.
+    pub(super) fn march(&self, points: Range<u64>, goes_on: &dyn Fn() -> bool) -> Vec<Point> {
+        let mut finished = Vec::with_capacity((points.end - points.start) as usize);
+        let mut in_lanes = Vec::new();
+        for index in points {
+            match self.prepare(index) {
+                Ok(ready) if self.takes(&ready) => in_lanes.push(ready),
+                other => {
+                    finished.push(other.map_or_else(|point| point, |ready| self.single(ready)));
+                    if !goes_on() {
+                        return finished;
+                    }
+                }
+            }
+        }
+        finished.extend(self.crowd(in_lanes, goes_on));
+        finished.sort_by_key(|point| point.index);
+        finished
+    }
+
+    /// True for a point that can be marched beside others.
+    fn takes(&self, ready: &Ready) -> bool {
+        let alike = (ready.plan.until, ready.plan.rows) == (self.plan.until, self.plan.rows);
+        alike && ready.plan.method == MethodId::Taylor && !ready.plan.extended && Crowd::takes(&ready.mechanism)
+    }
+
+    /// Puts the values in; a point that cannot run is finished.
+    fn prepare(&self, index: u64) -> Result<Ready, Point> {
+        let values = self.grid.values(index);
+        let mut point = Point {
+            index,
+            values,
+            status: Status::Done,
+            t: 0.0,
+            phi: Vec::new(),
+            omega: Vec::new(),
+            energy: 0.0,
+            constraint: None,
+            steps: 0,
+            flip: None,
+        };
+        if self.skips.as_ref().is_some_and(|skips| skips(&point.values)) {
+            point.status = Status::Skipped;
+            return Err(point);
+        }
+        match self.filled(&point.values) {
+            Ok((mechanism, plan, start, scale)) => Ok(Ready { point, mechanism, plan, start, scale }),
+            Err(reason) => {
+                point.status = Status::Refused(reason.lines().next().unwrap_or_default().to_owned());
+                Err(point)
+            }
+        }
+    }
+
+    /// Mechanism, plan, start and energy scale at these values; else why not.
+    fn filled(&self, values: &[f64]) -> Result<(Arc<Mechanism>, Plan, Motion, f64), String> {
+        let in_range = |(value, variable): (&f64, &crate::scene::Variable)| match variable.start {
+            Some((_, StartValue::Phi)) => crate::scene::is_start_angle(*value),
+            Some((_, StartValue::Omega)) => crate::scene::is_start_rate(*value),
+            None => false,
+        };
+        // What is out of range is left to the reader, which can say why.
+        if self.shares && values.iter().zip(&self.variables).all(in_range) {
+            let mut scene = self.scene.clone();
+            for (variable, &value) in self.variables.iter().zip(values) {
+                match variable.start {
+                    Some((bar, StartValue::Phi)) => scene.start[bar].phi = value,
+                    Some((bar, StartValue::Omega)) => scene.start[bar].omega = value,
+                    None => {}
+                }
+            }
+            let start = self.mechanism.start(&scene);
+            let scale = self.mechanism.scale_of_energy(&start);
+            // An adaptive plan does not look at the start.
+            let plan = if self.plan.method.is_adaptive() {
+                self.plan.clone()
+            } else {
+                Plan::new(&scene, &self.mechanism, &timed(&self.request, &scene)).map_err(|refusal| refusal.to_string())?
+            };
+            return Ok((Arc::clone(&self.mechanism), plan, start, scale));
+        }
+        let scene = self.template.filled(&self.variables, values).map_err(|error| error.to_string())?;
+        let mechanism = Arc::new(Mechanism::new(&scene).map_err(|error| error.to_string())?);
+        let plan = Plan::new(&scene, &mechanism, &timed(&self.request, &scene)).map_err(|refusal| refusal.to_string())?;
+        let (start, scale) = (mechanism.start(&scene), mechanism.energy_scale);
+        Ok((mechanism, plan, start, scale))
+    }
+
+    /// Runs a point as a single run would.
+    fn single(&self, ready: Ready) -> Point {
+        let Ready { mut point, mechanism, plan, start, scale } = ready;
+        let mechanism =
+            if scale == mechanism.energy_scale { mechanism } else { Arc::new(Mechanism { energy_scale: scale, ..(*mechanism).clone() }) };
+        let outcome = match Run::new(mechanism, plan, self.limits, &start) {
+            Ok(run) => march(run.of_ensemble(self.ends_at_flips), &mut |_| Ok(())),
+            Err(stop) => {
+                point.status = Status::Stopped(stop);
+                return point;
+            }
+        };
+        match outcome {
+            Ok(outcome) => {
+                let levels = outcome.drift.constraints.iter().map(|(_, [position, velocity])| [position.max, velocity.max]);
+                point.t = outcome.last.t;
+                point.phi = outcome.last.phi;
+                point.omega = outcome.last.omega;
+                point.energy = outcome.drift.energy.max;
+                point.constraint = levels.reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])]);
+                point.steps = outcome.tally.steps;
+                point.flip = outcome.flip;
+                point.status = outcome.stop.map_or(Status::Done, Status::Stopped);
+            }
+            Err(error) => point.status = Status::Refused(error.to_string()),
+        }
+        point
+    }
+
+    /// Runs points beside each other, a lane each.
+    fn crowd(&self, ready: Vec<Ready>, goes_on: &dyn Fn() -> bool) -> Vec<Point> {
+        let Some(first) = ready.first() else { return Vec::new() };
+        let (plan, bodies) = (first.plan.clone(), first.mechanism.bodies.len());
+        let crowd = Crowd::new(plan.tolerance.unwrap_or_default());
+        let mut kernel = Kernel::<DoubleDouble>::new(bodies, 0);
+        let mut lanes: Vec<Lane> = Vec::with_capacity(ready.len());
+        let mut entrants: Vec<Entrant> = Vec::with_capacity(ready.len());
+        for ready in &ready {
+            let state = Elimination::<0>::new(Arc::clone(&ready.mechanism)).state(&ready.start);
+            entrants.push(Entrant::new(&ready.mechanism, state));
+            let reference = ready.mechanism.energy(&mut kernel, &ready.start.phi, &ready.start.omega).total();
+            lanes.push(Lane { point: ready.point.clone(), reference, scale: ready.scale, seen: [Glance::default(), Glance::default()] });
+        }
+        let mut finished = Vec::with_capacity(ready.len());
+        let mut motion = Motion::default();
+        for row in 1..=plan.rows {
+            crowd.march(&mut entrants, plan.time(row), &mut |lane, passage| {
+                let lane = &mut lanes[lane];
+                if lane.point.flip.is_none() {
+                    lane.look(bodies, passage);
+                }
+                if self.ends_at_flips && lane.point.flip.is_some() { Going::Enough } else { Going::On }
+            });
+            let mut number = 0;
+            while number < lanes.len() {
+                let (lane, entrant) = (&mut lanes[number], &entrants[number]);
+                let over = row == plan.rows || (self.ends_at_flips && lane.point.flip.is_some());
+                if lane.measure(entrant, &mut motion, &mut kernel, self.limits.energy, &plan) && !over {
+                    number += 1;
+                    continue;
+                }
+                finished.push(lanes.swap_remove(number).point);
+                entrants.swap_remove(number);
+                if !goes_on() {
+                    return finished;
+                }
+            }
+            if lanes.is_empty() {
+                break;
+            }
+        }
+        finished
+    }
+}
+
+/// A point marched in a lane.
+struct Lane {
+    point: Point,
+    /// Energy at the start \[J\].
+    reference: DoubleDouble,
+    scale: f64,
+    /// Both ends of a step.
+    seen: [Glance; 2],
+}
+
+impl Lane {
+    /// Looks for a bar that turns over in a step.
+    fn look(&mut self, bodies: usize, passage: &Passage) {
+        let turned = passage.turned[..bodies].iter().any(|&turned| turned != 0);
+        let heads_out = |bar: usize| {
+            let (phi, omega) = passage.at(bar, 0.0);
+            flip::heads_out(phi, omega)
+        };
+        if !turned && !(0..bodies).any(heads_out) {
+            return;
+        }
+        let glance = |after: f64, glance: &mut Glance| {
+            glance.phi.clear();
+            glance.turns.clear();
+            glance.omega.clear();
+            for bar in 0..bodies {
+                let (winding, omega) = passage.at(bar, after);
+                // As states are wrapped: an angle of exactly π has not passed it.
+                let turns = if winding.abs() <= PI { 0.0 } else { (winding / (2.0 * PI)).round() };
+                glance.phi.push(winding - 2.0 * PI * turns);
+                glance.turns.push(turns as i64);
+                glance.omega.push(omega);
+            }
+        };
+        glance(0.0, &mut self.seen[0]);
+        glance(passage.step, &mut self.seen[1]);
+        let [a, b] = &self.seen;
+        if turned || (0..bodies).any(|bar| flip::may_pass(bar, a, b, passage.step)) {
+            self.point.flip = flip::search(passage.from.hi, passage.step, &self.seen, &mut |after| {
+                let mut there = Glance::default();
+                glance(after, &mut there);
+                Some(there)
+            });
+        }
+    }
+
+    /// Takes what an entrant has come to; false where the point goes no further.
+    fn measure(
+        &mut self,
+        entrant: &Entrant,
+        motion: &mut Motion,
+        kernel: &mut Kernel<DoubleDouble>,
+        limit: Option<f64>,
+        plan: &Plan,
+    ) -> bool {
+        let n = entrant.mechanism.bodies.len();
+        let state = &entrant.state;
+        motion.resize(n);
+        motion.turns.copy_from_slice(&state.turns);
+        for k in 0..n {
+            (motion.phi[k], motion.omega[k]) = (state.unknown(k), state.unknown(n + k));
+        }
+        let point = &mut self.point;
+        let energy = entrant.mechanism.energy(kernel, &motion.phi, &motion.omega).total();
+        let imbalance = ((energy - self.reference).hi / self.scale).abs();
+        point.energy = if imbalance.is_nan() { imbalance } else { point.energy.max(imbalance) };
+        point.t = state.time.hi;
+        point.phi = (0..n).map(|k| motion.unwrapped(k)).collect();
+        point.omega = motion.omega.iter().map(|omega| omega.hi).collect();
+        point.steps = entrant.tally.steps;
+        let exceeded = limit.is_some_and(|limit| point.energy.is_nan() || point.energy > limit);
+        let stop = |cause, what: String, hint: &str| StepError {
+            cause,
+            method: plan.method.to_string(),
+            t: point.t,
+            step: 0.0,
+            what,
+            hint: hint.into(),
+        };
+        let stopped = match &entrant.stopped {
+            Some(stopped) => Some(stopped.clone()),
+            None if exceeded => {
+                let what = format!("energy is off by {:.2e} of the scale, the limit is {:e}", point.energy, limit.unwrap_or(0.0));
+                Some(stop(Cause::DriftLimit, what, "tighten the tolerance"))
+            }
+            None if point.energy.is_nan() => {
+                Some(stop(Cause::NotFinite, "the energy is not finite".into(), "look for rates far out of proportion"))
+            }
+            None => None,
+        };
+        if let Some(stopped) = stopped {
+            point.status = Status::Stopped(stopped);
+            return false;
+        }
+        true
+    }
+}

@@ -1,0 +1,99 @@
+//! The points of a sweep as a table: one row a point, units in the header, digits that read back to the same doubles.
+
+use super::{Point, Status, Sweep};
+use crate::dynamics::row::Row;
+use std::io::Write;
+
+/// Writes a sweep as CSV.
+pub struct SweepTable<W: Write> {
+    writer: csv::Writer<W>,
+    bars: Vec<String>,
+    fields: Vec<String>,
+}
+
+/// The columns of a sweep's table: what is varied, then what came of it.
+pub fn columns(sweep: &Sweep) -> Vec<String> {
+    let with_unit = |name: &str, unit: &str| if unit.is_empty() { name.to_owned() } else { format!("{name} [{unit}]") };
+    let mut columns: Vec<String> = sweep.variables().iter().map(|variable| with_unit(&variable.path, variable.unit)).collect();
+    columns.push("t [s]".to_owned());
+    for body in &sweep.mechanism().bodies {
+        columns.extend([format!("{}.phi [rad]", body.name), format!("{}.omega [rad/s]", body.name)]);
+    }
+    let unit = sweep.mechanism().rows.first().map_or("rad", Row::unit);
+    columns.push("energy_drift [1]".to_owned());
+    columns.extend([format!("constraint_drift [{unit}]"), format!("constraint_rate_drift [{unit}/s]")]);
+    columns.extend(["steps", "flip_time [s]", "flip_bar", "status", "cause"].map(str::to_owned));
+    columns
+}
+
+/// The numbers of a point's row, in the order of [`columns`] up to the flip time; not a number where there is none.
+pub fn numbers(point: &Point, bars: usize) -> Vec<f64> {
+    let mut numbers = point.values.clone();
+    if point.phi.is_empty() {
+        numbers.resize(numbers.len() + 2 * bars + 5, f64::NAN);
+        return numbers;
+    }
+    numbers.push(point.t);
+    for (&phi, &omega) in point.phi.iter().zip(&point.omega) {
+        numbers.extend([phi, omega]);
+    }
+    numbers.push(point.energy);
+    numbers.extend(point.constraint.unwrap_or([f64::NAN; 2]));
+    numbers.extend([point.steps as f64, point.flip.map_or(f64::NAN, |flip| flip.t)]);
+    numbers
+}
+
+impl<W: Write> SweepTable<W> {
+    /// Writes the header.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn new(sweep: &Sweep, writer: W) -> csv::Result<Self> {
+        let columns = columns(sweep);
+        let mut writer = csv::Writer::from_writer(writer);
+        writer.write_record(&columns)?;
+        let bars = sweep.mechanism().bodies.iter().map(|body| body.name.clone()).collect();
+        Ok(Self { writer, bars, fields: vec![String::new(); columns.len()] })
+    }
+
+    /// Writes a point.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn write(&mut self, point: &Point) -> csv::Result<()> {
+        let numbers = numbers(point, self.bars.len());
+        let steps = numbers.len() - 2;
+        self.fields.iter_mut().for_each(String::clear);
+        for (column, (field, number)) in self.fields.iter_mut().zip(&numbers).enumerate() {
+            let _ = match number {
+                number if number.is_nan() => Ok(()),
+                number if column == steps => std::fmt::Write::write_fmt(field, format_args!("{number}")),
+                number => std::fmt::Write::write_fmt(field, format_args!("{number:?}")),
+            };
+        }
+        let (status, cause) = words(&point.status);
+        let bar = point.flip.and_then(|flip| self.bars.get(flip.bar)).cloned().unwrap_or_default();
+        for (field, word) in self.fields[numbers.len()..].iter_mut().zip([bar, status.to_owned(), cause]) {
+            *field = word;
+        }
+        self.writer.write_record(&self.fields)
+    }
+
+    /// Writes out what is buffered and hands the writer back.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn finish(self) -> std::io::Result<W> {
+        self.writer.into_inner().map_err(|error| error.into_error())
+    }
+}
+
+/// A status in one word, and its cause in one line.
+fn words(status: &Status) -> (&'static str, String) {
+    match status {
+        Status::Done => ("done", String::new()),
+        Status::Stopped(stop) => ("stopped", format!("{}: {}", stop.cause.word(), stop.what)),
+        Status::Refused(reason) => ("refused", reason.clone()),
+        Status::Skipped => ("skipped", String::new()),
+    }
+}

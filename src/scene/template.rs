@@ -1,0 +1,307 @@
+//! A scene some of whose numbers are left open, to be filled in again and again.
+//!
+//! A number is named by its path as in `--set`, or in short by the name of the bar, spring, motor, wall or hinge it belongs to: `bar1.phi` is
+//! `start.bar1.phi`, `motor.rate` is `motors.motor.law.rate`, `spring.stiffness` is `springs.spring.stiffness`.  A path is judged against the tables of `format.rs` and the scene's own text
+//! once; values are judged when they are filled in.
+
+use super::Scene;
+use super::error::SceneError;
+use super::format::{Field, LAW, SCENE, START, Shape, Table, UNIFORM_BAR};
+use super::locate::{Node, Value, push_index, push_key};
+use super::read::{listed, nearest, parse_scene, put_together, read_text};
+use super::set::{Override, Step, hint, name, steps};
+use std::path::Path;
+
+/// The text of a scene, and the overrides it is always read with.
+#[derive(Clone, Debug)]
+pub struct Template {
+    text: String,
+    source: String,
+    overrides: Vec<Override>,
+}
+
+/// A number of a scene that can be varied.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variable {
+    /// Its whole path: `start.bar1.phi`.
+    pub path: String,
+    /// Its unit: `rad`; empty for a pure number.
+    pub unit: &'static str,
+    /// Where a start is varied that no motor, spring or wall has a say in: the number of the bar.  Such a value can be put into a scene that was read before.
+    pub start: Option<(usize, StartValue)>,
+}
+
+/// Which number of a bar's start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StartValue {
+    /// The angle \[rad\].
+    Phi,
+    /// The rate \[rad/s\].
+    Omega,
+}
+
+/// The lists whose elements can be meant by their name alone, and what their paths begin with.
+const LISTS: [&str; 5] = ["bars", "springs", "motors", "walls", "hinges"];
+
+impl Template {
+    /// Reads the text of the scene file `path`.
+    ///
+    /// # Errors
+    /// As [`read_text`].
+    pub fn read(path: &Path, overrides: &[Override]) -> Result<Self, SceneError> {
+        Ok(Self::new(read_text(path)?, path.display().to_string(), overrides))
+    }
+
+    /// Takes the text of a scene; `source` is the name of its file in messages.
+    pub fn new(text: String, source: String, overrides: &[Override]) -> Self {
+        Self { text, source, overrides: overrides.to_vec() }
+    }
+
+    /// The scene as it stands.
+    ///
+    /// # Errors
+    /// As [`parse_scene`].
+    pub fn scene(&self) -> Result<Scene, SceneError> {
+        parse_scene(&self.text, &self.source, &self.overrides)
+    }
+
+    /// The scene with these values of these variables.
+    ///
+    /// # Errors
+    /// As [`parse_scene`]: a value out of its range, or one that does not go with the rest of the scene.
+    pub fn filled(&self, variables: &[Variable], values: &[f64]) -> Result<Scene, SceneError> {
+        let filled = variables.iter().zip(values).map(|(variable, &value)| Override { path: variable.path.clone(), value: value.into() });
+        let overrides: Vec<Override> = self.overrides.iter().cloned().chain(filled).collect();
+        parse_scene(&self.text, &self.source, &overrides)
+    }
+
+    /// The number called `name`: a path, or the short form of one.
+    ///
+    /// # Errors
+    /// There is no such number in the scene; the error names the nearest.
+    pub fn variable(&self, name: &str) -> Result<Variable, SceneError> {
+        let (_, tree) = put_together(&self.text, &self.source, &self.overrides)?;
+        let refused = |problem: String, allowed: &str, hint: String| {
+            SceneError::whole_file(&self.source, &format!("has no number {name} to vary: {problem}"), allowed, &hint)
+        };
+        let allowed = "must be a path to a number, as start.bar1.phi or springs.spring.stiffness";
+        let path = whole(name, &tree).map_err(|hint| refused("nothing has that name".into(), allowed, hint))?;
+        let unit = Walk { tree: &tree }.unit(&path).map_err(|(problem, hint)| refused(problem, allowed, hint))?;
+        let start = self.start_of(&path)?;
+        Ok(Variable { path, unit, start })
+    }
+
+    /// The bar and the number of its start that a path means, where nothing else has a say in it.
+    fn start_of(&self, path: &str) -> Result<Option<(usize, StartValue)>, SceneError> {
+        let scene = self.scene()?;
+        let mut parts = path.split('.');
+        let (Some("start"), Some(bar), Some(value), None) = (parts.next(), parts.next(), parts.next(), parts.next()) else {
+            return Ok(None);
+        };
+        let value = if value == "phi" { StartValue::Phi } else { StartValue::Omega };
+        let alone = scene.motors.is_empty() && scene.springs.is_empty() && scene.walls.is_empty();
+        Ok(scene.bars.iter().position(|known| known.name == bar).filter(|_| alone).map(|bar| (bar, value)))
+    }
+}
+
+/// A short name written out; else a hint at what is near.
+fn whole(short: &str, tree: &Node) -> Result<String, String> {
+    let first = short.split(['.', '[']).next().unwrap_or("");
+    if SCENE.field(first).is_some() {
+        return Ok(short.to_owned());
+    }
+    let rest = short[first.len()..].trim_start_matches('.');
+    let mut found = Vec::new();
+    let mut known: Vec<&str> = SCENE.fields.iter().map(|field| field.name).collect();
+    for list in LISTS {
+        let Some(Value::List(nodes)) = member(tree, list).map(|node| &node.value) else { continue };
+        known.extend(nodes.iter().filter_map(name));
+        if nodes.iter().any(|node| name(node) == Some(first)) {
+            found.push(match list {
+                "bars" if START.field(rest).is_some() => format!("start.{first}.{rest}"),
+                "motors" if LAW.field(rest).is_some() => format!("motors.{first}.law.{rest}"),
+                _ => format!("{list}.{first}.{rest}"),
+            });
+        }
+    }
+    match &found[..] {
+        [only] => Ok(only.clone()),
+        [] => Err(hint(first, &known)),
+        several => Err(format!("several things are called {first}; write {}", several.join(" or "))),
+    }
+}
+
+fn member<'a>(node: &'a Node, key: &str) -> Option<&'a Node> {
+    let Value::Object(members) = &node.value else { return None };
+    members.iter().find(|member| member.key == key).map(|member| &member.node)
+}
+
+/// Follows a path through the format's tables and the scene's tree side by side.
+struct Walk<'a> {
+    tree: &'a Node,
+}
+
+impl Walk<'_> {
+    /// The unit of the number at the end of a path; else what is wrong and a hint.
+    fn unit(&self, path: &str) -> Result<&'static str, (String, String)> {
+        let steps = steps(path).ok_or_else(|| ("it is not a path".to_owned(), "keys, names and [indices] joined by dots".to_owned()))?;
+        let mut steps = steps.into_iter().peekable();
+        let (mut table, mut node, mut walked): (&'static Table, Option<&Node>, String) = (&SCENE, Some(self.tree), String::new());
+        loop {
+            let Some(Step::Key(key)) = steps.next() else { return Err(no_number(&walked, table)) };
+            let Some(field) = table.field(key) else {
+                let keys: Vec<&str> = table.fields.iter().map(|field| field.name).collect();
+                return Err((format!("{} has no `{key}`", table.title), hint(key, &keys)));
+            };
+            push_key(&mut walked, key);
+            node = node.and_then(|node| member(node, key));
+            // What holds a number must be in the scene, as for an override; the number itself may be left to its default.
+            if node.is_none() && steps.peek().is_some() {
+                return Err((
+                    format!("{walked} is not in the scene"),
+                    "a bar's start may be left to its motor; else add it to the file".into(),
+                ));
+            }
+            match (&field.shape, steps.peek()) {
+                (Shape::Number(quantity) | Shape::Inertia(quantity), None) => return Ok(quantity.unit),
+                (Shape::Pair(quantity), Some(Step::Index(0 | 1))) => {
+                    steps.next();
+                    return if steps.next().is_none() { Ok(quantity.unit) } else { Err(no_number(&walked, table)) };
+                }
+                (Shape::Object(inner), Some(_)) => table = inner,
+                (Shape::ByBar(inner), Some(Step::Key(bar))) => {
+                    node = element_by_key(node, bar, &mut walked)?;
+                    steps.next();
+                    table = inner;
+                }
+                (Shape::List { of, .. }, Some(step)) => {
+                    node = element(node, step, &mut walked)?;
+                    steps.next();
+                    let outright = node.is_some_and(|node| member(node, "mass").is_some() || member(node, "centre").is_some());
+                    table = if of.len() > 1 && outright { of[1] } else { of[0] };
+                }
+                (Shape::Between, Some(step)) => {
+                    node = element(node, step, &mut walked)?;
+                    steps.next();
+                    table = &super::format::PLACE;
+                }
+                _ => return Err(example(&walked, field)),
+            }
+        }
+    }
+}
+
+fn no_number(walked: &str, table: &Table) -> (String, String) {
+    (format!("{walked} is {}, not a number", table.title), format!("go on with one of {}", table.keys()))
+}
+
+/// What is wrong with a path that ends too early or too late at a field.
+fn example(walked: &str, field: &Field) -> (String, String) {
+    let hint = match &field.shape {
+        Shape::Pair(_) => format!("{walked}[0] or {walked}[1]"),
+        Shape::Object(table) | Shape::ByBar(table) => format!("go on, in the end with one of {}", table.keys()),
+        Shape::List { of, .. } => format!("go on with the name of one, then one of {}", of.first().unwrap_or(&&UNIFORM_BAR).keys()),
+        shape => format!("it {}", shape.allowed()),
+    };
+    (format!("{walked} is not a single number"), hint)
+}
+
+/// An element of a list by name or index.
+fn element<'a>(node: Option<&'a Node>, step: &Step, walked: &mut String) -> Result<Option<&'a Node>, (String, String)> {
+    let Some(Value::List(nodes)) = node.map(|node| &node.value) else { return Ok(None) };
+    let names: Vec<&str> = nodes.iter().filter_map(name).collect();
+    let found = match step {
+        Step::Index(index) => nodes.get(*index),
+        Step::Key(key) => nodes.iter().find(|node| name(node) == Some(key)),
+    };
+    if found.is_none() {
+        let (what, hint) = match step {
+            Step::Index(index) => (format!("[{index}]"), format!("indices count from 0; there are {}", nodes.len())),
+            Step::Key(key) => (format!(" `{key}`"), hint(key, &names)),
+        };
+        return Err((format!("{walked} has no{what}"), hint));
+    }
+    match step {
+        Step::Index(index) => push_index(walked, *index),
+        Step::Key(key) => push_key(walked, key),
+    }
+    Ok(found)
+}
+
+/// The start of a bar.
+fn element_by_key<'a>(node: Option<&'a Node>, bar: &str, walked: &mut String) -> Result<Option<&'a Node>, (String, String)> {
+    let Some(Value::Object(members)) = node.map(|node| &node.value) else { return Ok(None) };
+    let Some(found) = members.iter().find(|member| member.key == bar) else {
+        let known: Vec<&str> = members.iter().map(|member| member.key.as_str()).collect();
+        let hint = match nearest(bar, known.iter().copied()) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => format!("there are: {}; a bar that a motor drives starts as its law says", listed(&known)),
+        };
+        return Err((format!("{walked} has no `{bar}`"), hint));
+    };
+    push_key(walked, bar);
+    Ok(Some(&found.node))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn template(name: &str) -> Template {
+        Template::read(format!("examples/scenes/{name}.json").as_ref(), &[]).expect("a shipped scene")
+    }
+
+    #[test]
+    fn paths_and_short_names_are_found_with_their_units() {
+        for (scene, name, path, unit) in [
+            ("free", "start.bar1.phi", "start.bar1.phi", "rad"),
+            ("free", "bar2.omega", "start.bar2.omega", "rad/s"),
+            ("free", "bar2.length", "bars.bar2.length", "m"),
+            ("free", "bars[1].density", "bars[1].density", "kg/m³"),
+            ("free", "gravity[1]", "gravity[1]", "m/s²"),
+            ("free", "until", "until", "s"),
+            ("free", "B.between[0].point[0]", "hinges.B.between[0].point[0]", "m"),
+            ("spring", "spring.damping", "springs.spring.damping", "N·s/m"),
+            ("motor_sine", "motors.motor.law.sines[0].frequency", "motors.motor.law.sines[0].frequency", "rad/s"),
+            ("motor", "motor.rate", "motors.motor.law.rate", "rad/s"),
+            ("wall", "walls.wall.restitution", "walls.wall.restitution", ""),
+        ] {
+            let variable = template(scene).variable(name).expect(name);
+            assert_eq!((variable.path.as_str(), variable.unit), (path, unit));
+        }
+    }
+
+    #[test]
+    fn what_is_not_there_is_told_with_what_is_near() {
+        for (scene, name, near) in [
+            ("free", "strat.bar1.phi", "start"),
+            ("free", "start.bar3.phi", "bar"),
+            ("free", "start.bar1.phy", "`phi`"),
+            ("free", "start.bar1", "phi, omega"),
+            ("free", "bra1.phi", "`bar1`"),
+            ("free", "bars.bar1.desity", "`density`"),
+            ("free", "bars[2].length", "there are 2"),
+            ("free", "gravity", "gravity[0]"),
+            ("free", "name", "must be a name"),
+            ("free", "springs.spring.stiffness", "add it"),
+            ("motor", "start.bar1.phi", "start"),
+            ("free", "a..b", ""),
+        ] {
+            let error = template(scene).variable(name).expect_err(name);
+            assert!(error.to_string().contains(near) && error.to_string().contains(name), "{error}");
+        }
+    }
+
+    #[test]
+    fn values_filled_in_are_those_of_an_override() {
+        let template = template("free");
+        let variables = [template.variable("bar1.phi").expect("there"), template.variable("bar2.density").expect("there")];
+        let scene = template.filled(&variables, &[0.1, 700.0]).expect("a scene");
+        assert_eq!(scene.start[0].phi, 0.1);
+        assert_eq!(scene.bars[1].mass, 700.0 * 0.6 * 0.05 * 0.003);
+        assert_eq!(variables[0].start, Some((0, StartValue::Phi)));
+        assert_eq!(variables[1].start, None);
+        let error = template.filled(&variables, &[0.1, -700.0]).expect_err("a negative density");
+        assert!(error.to_string().contains("--set bars.bar2.density=-700"), "{error}");
+    }
+}

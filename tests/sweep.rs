@@ -1,0 +1,343 @@
+//! Sweeps: each point is the run it stands for, the table does not depend on the threads, bad points end nothing, flips are where they are.
+
+#[cfg(feature = "cli")]
+#[path = "common/program.rs"]
+#[allow(dead_code)]
+mod program;
+
+use driftless::run::{Flip, MethodId, Observer, Point, Request, Stabilization, Status, Sweep, SweepError, Vary, simulate, sweep};
+use driftless::scene::Template;
+use driftless::stepping::Cause;
+use std::f64::consts::PI;
+
+fn template(name: &str) -> Template {
+    Template::read(format!("examples/scenes/{name}.json").as_ref(), &[]).expect("a shipped scene")
+}
+
+fn prepared(scene: &str, vary: &[&str], request: &Request) -> Sweep {
+    let vary: Vec<Vary> = vary.iter().map(|vary| vary.parse().expect("a range")).collect();
+    Sweep::new(&template(scene), vary, request).expect("a sweep")
+}
+
+fn points(plan: &Sweep, threads: usize) -> Vec<Point> {
+    let mut points = Vec::new();
+    sweep(plan, threads, &mut |point: &Point| {
+        points.push(point.clone());
+        Ok(())
+    })
+    .expect("all points");
+    points
+}
+
+fn request(method: &str, until: f64) -> Request {
+    Request { method: Some(method.parse().expect("a method")), until: Some(until), ..Request::default() }
+}
+
+#[test]
+fn every_point_is_the_run_it_stands_for() {
+    for (scene, method, vary, stabilize) in [
+        ("free", "dop853", ["bar1.phi=0.5..2:2", "bar2.omega=-1..1:2"], None),
+        ("free", "gauss8", ["bar1.phi=0.5..2:2", "bars.bar2.density=500..900:2"], None),
+        ("free", "rattle4", ["bar1.phi=0.5..2:2", "gravity[0]=1..9.81:2"], None),
+        ("spring", "dp8", ["bar1.phi=0.5..2:2", "spring.stiffness=5..10:2"], None),
+        ("spring", "taylor", ["bar1.phi=0.5..2:2", "spring.free_length=0.3..0.4:2"], None),
+        ("motor", "dp8", ["bar2.phi=0.5..2:2", "bar2.omega=0..3:2"], Some(Stabilization::Projection)),
+        ("motor", "dop853", ["bar2.phi=0.5..2:2", "bar2.omega=0..3:2"], Some(Stabilization::Baumgarte)),
+        ("wall", "dp8", ["wall.restitution=0.2..0.8:2", "gravity[0]=5..9:2"], None),
+    ] {
+        let request = Request { stabilize, every: Some(0.25), ..request(method, 2.0) };
+        let plan = prepared(scene, &vary, &request);
+        for point in points(&plan, 1) {
+            let alone = template(scene).filled(plan.variables(), &point.values).expect("a scene");
+            let outcome = simulate(&alone, &request, &mut |_| Ok(())).expect("a run");
+            assert_eq!(point.status, outcome.stop.clone().map_or(Status::Done, Status::Stopped));
+            assert_eq!((point.t, &point.phi, &point.omega), (outcome.last.t, &outcome.last.phi, &outcome.last.omega), "{scene} {method}");
+            assert_eq!((point.energy, point.steps), (outcome.drift.energy.max, outcome.tally.steps), "{scene} {method}");
+            let defects = outcome.drift.constraints.first().map(|(_, levels)| [levels[0].max, levels[1].max]);
+            assert_eq!(point.constraint, defects);
+        }
+    }
+}
+
+#[test]
+fn points_in_lanes_agree_with_single_runs() {
+    let request = Request { rtol: Some(1e-12), ..request("taylor", 1.0) };
+    let plan = prepared("free", &["bar1.phi=-3..3:5", "bar2.density=300..900:3"], &request);
+    for point in points(&plan, 1) {
+        let alone = template("free").filled(plan.variables(), &point.values).expect("a scene");
+        let outcome = simulate(&alone, &request, &mut |_| Ok(())).expect("a run");
+        assert_eq!((&point.status, point.t), (&Status::Done, 1.0));
+        for (found, exact) in point.phi.iter().chain(&point.omega).zip(outcome.last.phi.iter().chain(&outcome.last.omega)) {
+            assert!((found - exact).abs() < 1e-9, "{point:?}");
+        }
+        assert!(point.energy < 1e-12, "{point:?}");
+    }
+}
+
+#[test]
+fn the_number_of_threads_and_the_chunks_change_nothing() {
+    for (scene, method) in [("free", "taylor"), ("free", "dp5"), ("motor", "taylor")] {
+        let vary = if scene == "free" { "bar1.phi=-pi..pi:23" } else { "motor.rate=-8..8:23" };
+        let plan = prepared(scene, &[vary, "bar2.phi=-pi..pi:9"], &Request { every: Some(0.5), ..request(method, 1.5) });
+        let one = points(&plan, 1);
+        assert_eq!(one.len(), 207);
+        assert!(one.iter().enumerate().all(|(number, point)| point.index == number as u64));
+        assert!(one.iter().any(|point| point.flip.is_some()), "{scene}: none of them flips");
+        for threads in [2, 3, 5] {
+            assert_eq!(points(&plan, threads), one, "{scene}, {method}, {threads} threads");
+        }
+        assert_eq!(plan.point(100).as_ref(), Some(&one[100]), "by itself");
+        assert_eq!(plan.point(207), None);
+    }
+}
+
+#[test]
+fn bad_points_say_so_and_end_nothing() {
+    // A spring of no length, negative stiffness, and a good one between.
+    let plan = prepared("spring", &["spring.stiffness=-1..9:3"], &request("dp8", 0.5));
+    let found = points(&plan, 2);
+    assert!(matches!(&found[0].status, Status::Refused(reason) if reason.contains("--set springs.spring.stiffness=-1")), "{found:?}");
+    assert_eq!((&found[1].status, &found[2].status), (&Status::Done, &Status::Done));
+    assert!(found[0].phi.is_empty() && found[1].phi.len() == 2);
+    // A rate beyond what a step can follow stops, its neighbours go on; one out of range is refused although starts need no reading.
+    for method in ["taylor", "dp8"] {
+        let found = points(&prepared("free", &["bar1.omega=0..2e30:3"], &request(method, 0.5)), 1);
+        assert_eq!(found[0].status, Status::Done);
+        assert!(matches!(&found[1].status, Status::Stopped(_)), "{method}: {:?}", found[1]);
+        assert!(matches!(&found[2].status, Status::Refused(reason) if reason.contains("rad/s")), "{:?}", found[2]);
+    }
+    let limits = driftless::run::Limits { energy: Some(1e-9), constraint: None };
+    for method in ["dp5", "taylor"] {
+        let request = Request { rtol: Some(1e-2), ..request(method, 5.0) };
+        let found = points(&prepared("free", &["bar1.phi=0..2:2"], &request).with_limits(limits), 1);
+        let stopped = |point: &Point| matches!(&point.status, Status::Stopped(stop) if stop.cause == Cause::DriftLimit);
+        assert!(stopped(&found[1]), "{method}: {found:?}");
+    }
+}
+
+/// The first flip among samples a short time apart.
+fn sampled(plan: &Sweep, values: &[f64], request: &Request) -> Option<(f64, usize)> {
+    let alone = template("free").filled(plan.variables(), values).expect("a scene");
+    let turn = |phi: f64| ((phi + PI) / (2.0 * PI)).floor();
+    let mut first = None;
+    let mut last: Option<Vec<f64>> = None;
+    simulate(&alone, &Request { every: Some(1e-3), ..request.clone() }, &mut |sample| {
+        if let (None, Some(last)) = (first, &last) {
+            first = (0..2).find(|&bar| turn(last[bar]) != turn(sample.phi[bar])).map(|bar| (sample.t, bar));
+        }
+        last = Some(sample.phi.clone());
+        Ok(())
+    })
+    .expect("a run");
+    first
+}
+
+#[test]
+fn flips_are_those_of_finely_sampled_runs() {
+    for method in ["taylor", "dop853", "dp8", "gauss8", "rattle6"] {
+        let request = Request { step: method.starts_with(['g', 'r']).then_some(1e-3), ..request(method, 3.0) };
+        let plan = prepared("free", &["bar1.phi=0.2..3.1:5", "bar2.phi=-3..3:5"], &request);
+        let found = points(&plan, 2);
+        let mut flips = 0;
+        for point in &found {
+            let fine = sampled(&plan, &point.values, &request);
+            assert_eq!(point.flip.is_some(), fine.is_some(), "{method}: {point:?} {fine:?}");
+            if let (Some(Flip { t, bar }), Some((after, which))) = (point.flip, fine) {
+                assert!(bar == which && t <= after + 1e-9 && t > after - 1.001e-3, "{method}: {point:?} {fine:?}");
+                flips += 1;
+            }
+        }
+        assert!(flips > 8, "{method}: {flips} flips");
+    }
+}
+
+#[test]
+fn a_flip_is_as_accurate_as_its_run() {
+    let times = |method: &str, rtol: Option<f64>, step: Option<f64>| -> Vec<f64> {
+        let plan = prepared("free", &["bar1.phi=2..3:4"], &Request { rtol, step, ..request(method, 2.0) });
+        points(&plan, 1).iter().map(|point| point.flip.map_or(f64::NAN, |flip| flip.t)).collect()
+    };
+    let exact = times("taylor", Some(1e-14), None);
+    assert!(exact.iter().any(|t| t.is_finite()), "{exact:?}");
+    for (method, rtol, step) in
+        [("taylor", Some(1e-11), None), ("dp8", Some(1e-11), None), ("dop853", Some(1e-11), None), ("gauss16", None, Some(0.01))]
+    {
+        for (found, exact) in times(method, rtol, step).iter().zip(&exact) {
+            assert!((found - exact).abs() < 1e-9 || (found.is_nan() && exact.is_nan()), "{method}: {found} {exact}");
+        }
+    }
+}
+
+#[test]
+fn a_bar_that_starts_upright_turns_over_where_it_falls_outwards() {
+    let times = |method: &str| -> Vec<Option<f64>> {
+        let plan = prepared("free", &["bar1.phi=-pi..pi:2", "bar2.phi=-2..2:2"], &request(method, 0.2));
+        points(&plan, 1).iter().map(|point| point.flip.map(|flip| flip.t)).collect()
+    };
+    let found = times("taylor");
+    assert_eq!(found.iter().flatten().count(), 2, "two fall outwards and two back: {found:?}");
+    for (lane, single) in found.iter().zip(times("dp8")) {
+        assert_eq!(lane.is_some(), single.is_some(), "{found:?}");
+        assert!(lane.is_none_or(|t| t < 1e-6) && single.is_none_or(|t| t < 1e-6), "{lane:?} {single:?}");
+    }
+}
+
+#[test]
+fn points_end_at_flips_and_are_left_out_where_asked() {
+    for method in ["taylor", "dp8"] {
+        let request = Request { every: Some(0.1), ..request(method, 5.0) };
+        let whole = points(&prepared("free", &["bar1.phi=0.1..3.1:7"], &request), 1);
+        let plan = prepared("free", &["bar1.phi=0.1..3.1:7"], &request).ending_at_flips().without(|values| values[0] > 3.0);
+        let ended = points(&plan, 2);
+        assert_eq!(ended[6].status, Status::Skipped);
+        assert!(ended.iter().any(|point| point.flip.is_some()));
+        for (point, whole) in ended.iter().zip(&whole).take(6) {
+            assert_eq!((point.flip, &point.status), (whole.flip, &Status::Done), "{method}");
+            match point.flip {
+                Some(flip) => assert!(flip.t <= point.t && point.t < flip.t + 0.1 + 1e-9, "{method}: {point:?}"),
+                None => assert_eq!(point.t, 5.0),
+            }
+        }
+    }
+}
+
+/// Fails at its fifth point.
+#[derive(Default)]
+struct Fussy {
+    seen: u64,
+}
+
+impl Observer for Fussy {
+    fn see(&mut self, _: &Point) -> std::io::Result<()> {
+        self.seen += 1;
+        if self.seen == 5 { Err(std::io::Error::other("enough")) } else { Ok(()) }
+    }
+}
+
+#[test]
+fn an_observer_can_end_a_huge_sweep() {
+    // A thousand million points: nothing of it may be computed or allocated in advance.
+    let plan = prepared("free", &["bar1.phi=0..1:31622", "bar2.phi=0..1:31622"], &request("dp5", 0.01));
+    for threads in [1, 3] {
+        let mut fussy = Fussy::default();
+        let error = sweep(&plan, threads, &mut fussy).expect_err("the observer's");
+        assert!(matches!(error, SweepError::Observer(_)) && fussy.seen == 5, "{error}");
+    }
+}
+
+#[test]
+fn what_makes_no_sense_is_refused_before_the_first_point() {
+    let refusal = |scene: &str, vary: &[&str], request: &Request| -> String {
+        let vary: Vec<Vary> = vary.iter().map(|vary| vary.parse().expect("a range")).collect();
+        Sweep::new(&template(scene), vary, request).err().map(|error| error.to_string()).unwrap_or_default()
+    };
+    for (scene, vary, method, words) in [
+        ("free", vec!["start.bar3.phi=0..1:2"], None, "did you mean `bar1`"),
+        ("free", vec!["bar1.phi=0..1:2", "start.bar1.phi=0..1:2"], None, "varied twice"),
+        ("free", vec![], None, "nothing is varied"),
+        ("free", vec!["bar1.phi=0..1:1000000", "bar2.phi=0..1:1000000"], None, "1000000 × 1000000 points"),
+        ("wall", vec!["wall.restitution=0..1:2"], Some(MethodId::Taylor), "a scene with walls"),
+    ] {
+        let said = refusal(scene, &vary, &Request { method, ..Request::default() });
+        assert!(said.contains(words), "{vary:?}: {said}");
+    }
+}
+
+#[cfg(feature = "cli")]
+mod command {
+    use super::program::Program;
+
+    const GRID: &str = "--vary bar1.phi=-pi..pi:9 --vary bar2.phi=-2..2:4 --until 2";
+
+    fn rows(table: &str) -> Vec<Vec<String>> {
+        table.lines().map(|line| line.split(',').map(str::to_owned).collect()).collect()
+    }
+
+    #[test]
+    fn a_table_is_written_and_is_the_same_on_one_two_and_three_threads() {
+        let program = Program::with_scenes(&["free"]);
+        let mut tables = Vec::new();
+        for threads in [1, 2, 3] {
+            program.run(&format!("sweep free.json {GRID} --threads {threads} -q --force --no-charts")).exits(0).stays_silent();
+            tables.push(program.read("output/free/sweep-start.bar1.phi-start.bar2.phi-taylor-1e-9/sweep.csv"));
+        }
+        assert!(tables[0] == tables[1] && tables[0] == tables[2]);
+        let rows = rows(&tables[0]);
+        assert_eq!(rows.len(), 37);
+        assert_eq!(
+            rows[0].join(","),
+            "start.bar1.phi [rad],start.bar2.phi [rad],t [s],bar1.phi [rad],bar1.omega [rad/s],bar2.phi [rad],bar2.omega [rad/s],\
+             energy_drift [1],constraint_drift [rad],constraint_rate_drift [rad/s],steps,flip_time [s],flip_bar,status,cause"
+        );
+        assert_eq!((rows[1][0].as_str(), rows[1][1].as_str(), rows[4][0].as_str()), ("-3.141592653589793", "-2.0", "-3.141592653589793"));
+        assert!(rows[1..].iter().all(|row| row.len() == rows[0].len() && row[13] == "done" && row[8].is_empty()));
+        let energies: Vec<f64> = rows[1..].iter().map(|row| row[7].parse().expect("a number")).collect();
+        assert!(energies.iter().all(|&energy| energy < 1e-8), "{energies:?}");
+    }
+
+    #[test]
+    fn one_object_names_the_files_and_two_values_make_a_map() {
+        let program = Program::with_scenes(&["free"]);
+        let object = program.run(&format!("sweep free.json {GRID} --json --threads 2")).exits(0).object();
+        for key in [
+            "scene", "method", "settings", "until", "vary", "points", "done", "stopped", "refused", "flipped", "steps", "energy", "wall_s",
+            "files",
+        ] {
+            assert!(object.get(key).is_some(), "no `{key}` in {object}");
+        }
+        assert_eq!((&object["points"], &object["done"], &object["method"]), (&36.into(), &36.into(), &"taylor".into()));
+        assert_eq!(object["vary"][1]["path"], "start.bar2.phi");
+        let folder = "output/free/sweep-start.bar1.phi-start.bar2.phi-taylor-1e-9";
+        let expected: Vec<String> = ["map.png", "sweep.csv", "sweep.json"].iter().map(|name| format!("{folder}/{name}")).collect();
+        assert_eq!(program.files()[1..], expected);
+        let picture = std::fs::read(program.path(&expected[0])).expect("a picture");
+        assert!(picture.starts_with(b"\x89PNG") && picture.len() > 5000);
+        // A second time only by force, and then without what the first left.
+        program.run(&format!("sweep free.json {GRID}")).exits(6).says(&["--force"]);
+        program.run(&format!("sweep free.json {GRID} --no-charts --force")).exits(0).shows(&["36 done", "points a second"]);
+        assert_eq!(program.files()[1..], expected[1..]);
+    }
+
+    #[test]
+    fn one_value_makes_a_profile_and_other_columns_can_be_drawn() {
+        let program = Program::with_scenes(&["motor"]);
+        let sweep = "sweep motor.json --vary motor.rate=1..5:4 --until 1";
+        program.run(&format!("{sweep} --vary x=1..2:2")).exits(3).says(&["x"]);
+        program.run(&format!("{sweep} --map bar2.phy")).exits(2).says(&["bar2.phi"]);
+        assert_eq!(program.files(), ["motor.json"], "nothing was written");
+        program.run(&format!("{sweep} --map bar2.phi -q")).exits(0).stays_silent();
+        assert!(program.files().iter().any(|file| file.ends_with("/profile.png")), "{:?}", program.files());
+        let table = program.read(program.files().iter().find(|file| file.ends_with("sweep.csv")).expect("a table"));
+        assert!(rows(&table)[1..].iter().all(|row| row[7] == "0.0" && row[12] == "done"), "{table}");
+    }
+
+    #[test]
+    fn bad_points_are_rows_of_the_table() {
+        let program = Program::with_scenes(&["spring"]);
+        let ran = program.run("sweep spring.json --vary spring.stiffness=-1..9:3 --until 0.5 --json --no-charts --out there").exits(0);
+        let object = ran.object();
+        assert_eq!((&object["done"], &object["refused"]), (&2.into(), &1.into()));
+        let table = program.read(program.files().iter().find(|file| file.ends_with("sweep.csv")).expect("a table"));
+        assert!(table.lines().nth(1).is_some_and(|row| row.starts_with("-1.0,,,,,,,,,,,refused,") || row.contains(",refused,")), "{table}");
+    }
+
+    #[test]
+    fn mistakes_are_told_with_what_is_near_and_leave_nothing() {
+        let program = Program::with_scenes(&["free", "wall"]);
+        for (arguments, code, words) in [
+            ("free.json", 2, vec!["--vary"]),
+            ("free.json --vary bar1.phi=0..1", 2, vec!["COUNT"]),
+            ("free.json --vary bar1.phi=0..1:0", 2, vec!["COUNT"]),
+            ("free.json --vary bar1.phi=0..1:4 --threads 0", 2, vec!["--threads"]),
+            ("free.json --vary bar1.phi=0..1:4 --stabilize none,projection", 2, vec!["--stabilize"]),
+            ("free.json --vary bar1.phi=0..1:100000 --vary bar2.phi=0..1:100000", 2, vec!["points"]),
+            ("free.json --vary start.bra1.phi=0..1:4", 3, vec!["start.bra1.phi", "`bar1`", "hint: "]),
+            ("free.json --vary bar1.phy=0..1:4", 3, vec!["bar1.phy", "hint: "]),
+            ("wall.json --vary wall.restitution=0..1:4 --method taylor", 3, vec!["walls", "--method dp8"]),
+            ("nowhere.json --vary bar1.phi=0..1:4", 6, vec!["nowhere.json"]),
+        ] {
+            program.run(&format!("sweep {arguments}")).exits(code).says(&words);
+        }
+        assert_eq!(program.files(), ["free.json", "wall.json"]);
+    }
+}
