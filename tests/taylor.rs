@@ -451,13 +451,6 @@ fn motors_by_multipliers_move_as_eliminated_ones() {
     }
 }
 
-/// The method at a tolerance with its first orders in double-double.
-fn extended(tolerance: f64) -> Taylor<f64> {
-    let mut method = Taylor::with_order(tolerance, 24);
-    method.extended = true;
-    method
-}
-
 #[test]
 fn extended_orders_leave_less_than_a_plain_double() {
     let damped = ["springs.spring.damping=0.3"];
@@ -466,12 +459,12 @@ fn extended_orders_leave_less_than_a_plain_double() {
     for (name, overrides) in cases {
         let scene = shipped(name, overrides);
         let exact = end(&scene, Taylor::reference(), 1.0);
-        let error = distance(&exact, &end(&scene, extended(1e-22), 1.0));
+        let error = distance(&exact, &end(&scene, extended(Kernel::Series, 1e-22), 1.0));
         assert!(error < 1e-17, "{name}: {error:e}");
     }
     let (mechanism, start) = FOUR_BAR.mechanism(0.4, 12.0);
     let exact = bordered(&mechanism, &start, Taylor::reference(), 0.5);
-    let error = distance(&exact, &bordered(&mechanism, &start, extended(1e-22), 0.5));
+    let error = distance(&exact, &bordered(&mechanism, &start, extended(Kernel::Series, 1e-22), 0.5));
     assert!(error < 1e-17, "{error:e}");
 }
 
@@ -482,7 +475,7 @@ fn extended_energy_stays_far_below_a_plain_run() {
     let mut kernel = Energies::<DoubleDouble>::new(2, 0);
     let mut energy = |motion: &Motion| mechanism.energy(&mut kernel, &motion.phi, &motion.omega).total();
     let before = energy(&mechanism.start(&scene));
-    let after = energy(&end(&scene, extended(1e-21), 100.0));
+    let after = energy(&end(&scene, extended(Kernel::Series, 1e-21), 100.0));
     let drift = (after - before).hi.abs() / mechanism.energy_scale;
     assert!(drift < 1e-17, "{drift:e}");
 }
