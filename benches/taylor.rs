@@ -3,6 +3,8 @@
 //! `cargo bench --bench taylor`: every candidate walks down a ladder of tolerances until its error at the end (10 s; 3 s for the chain of six, which parts neighbours a millionfold in that time), measured against a double-double
 //! run from the same constants and the same start, is below each target; the settings found are then timed in alternating blocks.  Errors
 //! are the largest difference in an angle \[rad\] or a rate \[rad/s\]; times are microseconds per simulated second, minimum and median.
+//!
+//! First of all, what the first orders in double-double cost on `free` at the settings for long runs (`cargo bench --bench taylor extended` for this alone).
 
 use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::multiplier::Multiplier;
@@ -186,6 +188,34 @@ fn setting(candidate: &mut Candidate, exact: &Motion, target: f64) -> Option<(f6
     })
 }
 
+/// Plain and extended runs of 10 s in alternating blocks.
+fn cost_of_extended() {
+    let scene = shipped("free");
+    let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
+    let mut problem = Elimination::<0>::new(Arc::clone(&mechanism));
+    let start = problem.state(&mechanism.start(&scene));
+    let mut methods = [(1e-19, false), (1e-20, true)].map(|(tolerance, extended)| {
+        let mut method = Taylor::<f64>::with_order(tolerance, 24);
+        method.extended = extended;
+        method
+    });
+    let mut times = [const { Vec::new() }; 2];
+    for _ in 0..4 * BLOCKS {
+        for (method, times) in methods.iter_mut().zip(&mut times) {
+            let mut state = start.clone();
+            let begin = Instant::now();
+            method
+                .advance(&mut problem, &mut state, Time::from(10.0), &mut Default::default(), &mut |_, _| Ok(Seen::Kept))
+                .expect("an end");
+            times.push(begin.elapsed().as_secs_f64() * 1e5);
+        }
+    }
+    for (name, times) in ["plain, 1e-19", "extended, 1e-20"].into_iter().zip(&mut times) {
+        times.sort_by(f64::total_cmp);
+        println!("free, {name:16} {:9.2} {:9.2} us/s, minimum and median", times[0], times[times.len() / 2]);
+    }
+}
+
 fn main() {
     let wanted: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
     let cases: [(&str, Scene, f64, &[f64]); 5] = [
@@ -195,6 +225,9 @@ fn main() {
         ("chain of 3", chain(3), 10.0, &[1e-7]),
         ("chain of 6", chain(6), 3.0, &[1e-8]),
     ];
+    if wanted.is_empty() || wanted.iter().any(|word| word == "extended") {
+        cost_of_extended();
+    }
     println!(
         "{:12} {:>6}  {:22} {:>8} {:>8} {:>6} {:>9} {:>9}",
         "scene", "target", "method", "setting", "error", "steps", "min us/s", "median"

@@ -104,10 +104,8 @@ impl<const N: usize> Elimination<N> {
         for spring in mechanism.springs.iter().filter(|spring| spring.damping != 0.0) {
             power += spring.drag_power(&kernel.z, omega);
         }
-        for k in 0..f {
-            rate[k] = u_rate[k];
-            rate[f + k] = acceleration[k];
-        }
+        rate[..f].copy_from_slice(&u_rate[..f]);
+        rate[f..2 * f].copy_from_slice(&acceleration[..f]);
         rate[2 * f] = power;
     }
 }
