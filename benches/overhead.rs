@@ -96,6 +96,9 @@ fn alone(case: &Case, scene: &Scene, mechanism: &Arc<Mechanism>, plan: &Plan) {
     }
 }
 
+/// A name, and one run.
+type Candidate<'a> = (&'a str, Box<dyn Fn() + 'a>);
+
 fn main() {
     let place = std::env::temp_dir().join(format!("driftless-overhead-{}", std::process::id()));
     println!("{:44} {:>8} {:>6} {:>8} {:>6}", "one output row", "min us", "ratio", "median", "ratio");
@@ -121,7 +124,7 @@ fn main() {
             command.args(["--until", &case.until.to_string(), "--every", &case.every.to_string()]);
             assert!(command.stdout(Stdio::null()).status().expect("the program").success());
         };
-        let candidates: [(&str, Box<dyn Fn() + '_>); 4] = [
+        let candidates: [Candidate; 4] = [
             ("method alone", Box::new(|| alone(case, &scene, &mechanism, &plan))),
             ("library loop with monitors", Box::new(|| drop(march(run(), &mut |_| Ok(())).expect("a run")))),
             ("the same, trajectory written", Box::new(with_files)),

@@ -116,17 +116,17 @@ impl Driven {
     }
 }
 
-/// What orders K and K+1 need of the coefficients up to E_K and v_K: both at once, so that each v is loaded for two products.
+/// What orders k and k+1 need of the coefficients up to E_k and v_k: both at once, so that each v is loaded for two products.
 #[inline(always)]
-fn older<L: Lanes, const K: usize>(scratch: &Scratch) -> [L; 2] {
+fn older<L: Lanes>(scratch: &Scratch, k: usize) -> [L; 2] {
     // From the middle outwards in two chains, the newest coefficients last.
     let mut sums = [[L::splat(0.0); 2]; 2];
-    let middle = K / 2;
+    let middle = k / 2;
     for step in 0..=middle {
         for (chain, j) in [middle - step, middle + 1 + step].into_iter().enumerate() {
             for (ahead, sums) in sums.iter_mut().enumerate() {
-                if j > 0 && j < K + ahead {
-                    sums[chain] = L::of(scratch.v[j]).mul_add(L::of(scratch.e[K + ahead - j]), sums[chain]);
+                if j > 0 && j < k + ahead {
+                    sums[chain] = L::of(scratch.v[j]).mul_add(L::of(scratch.e[k + ahead - j]), sums[chain]);
                 }
             }
         }
@@ -134,42 +134,56 @@ fn older<L: Lanes, const K: usize>(scratch: &Scratch) -> [L; 2] {
     [sums[0][0].add(sums[0][1]), sums[1][0].add(sums[1][1])]
 }
 
-/// E_K, and v_K in every lane (m_0 where K = 0).
+/// E_k, and v_k in every lane (m_0 where k = 0).
 #[derive(Clone, Copy)]
 struct Newest<L> {
     e: L,
     v: L,
 }
 
-/// Order K: from the newest coefficients to the next ones, which are also written.
+/// Order k: from the newest coefficients to the next ones, which are also written.
 #[inline(always)]
-fn order<L: Lanes, const K: usize>(driven: &Driven, start: Newest<L>, scratch: &mut Scratch, older: L, newest: Newest<L>) -> Newest<L> {
-    let [load, load_rest] = driven.load[K + 1];
+fn order<L: Lanes>(driven: &Driven, start: Newest<L>, scratch: &mut Scratch, older: L, newest: Newest<L>, k: usize) -> Newest<L> {
+    let [load, load_rest] = driven.load[k + 1];
     // Low parts join before the rounding; in high orders they are too small to matter.
-    let loads = if K < 12 { newest.e.mul_add(L::of(load), newest.e.mul(L::of(load_rest))) } else { newest.e.mul(L::of(load)) };
+    let loads = if k < 12 { newest.e.mul_add(L::of(load), newest.e.mul(L::of(load_rest))) } else { newest.e.mul(L::of(load)) };
     let pairs = loads.add(loads.swap_pairs());
     let v = pairs.add(pairs.swap_halves());
     let sum = start.v.mul_add(newest.e, older);
-    let sum = if K > 0 { newest.v.mul_add(start.e, sum) } else { sum };
-    let e = left_over(sum, K + 1);
-    scratch.e[K + 1] = e.array();
-    scratch.v[K + 1] = v.array();
+    let sum = if k > 0 { newest.v.mul_add(start.e, sum) } else { sum };
+    let e = left_over(sum, k + 1);
+    scratch.e[k + 1] = e.array();
+    scratch.v[k + 1] = v.array();
     Newest { e, v }
 }
 
-/// Orders 0 to P-1 in pairs, for even P; all coefficients are in the scratch then.
-macro_rules! orders {
-    ($p:ident, $driven:expr, $start:expr, $scratch:expr; $($k:literal $next:literal),*) => {
-        let newest = $start;
-        $(let newest = if $k < $p {
-            let [first, second] = older::<L, $k>($scratch);
-            let newest = order::<L, $k>($driven, $start, $scratch, first, newest);
-            order::<L, $next>($driven, $start, $scratch, second, newest)
-        } else {
-            newest
-        };)*
-        let _ = newest;
-    };
+/// Two orders, the first of them even.
+#[inline(always)]
+fn two_orders<L: Lanes>(driven: &Driven, start: Newest<L>, scratch: &mut Scratch, newest: Newest<L>, k: usize) -> Newest<L> {
+    let [first, second] = older(scratch, k);
+    let newest = order(driven, start, scratch, first, newest, k);
+    order(driven, start, scratch, second, newest, k + 1)
+}
+
+/// Orders 0 to P-1, for even P; all coefficients are in the scratch then.
+#[inline(always)]
+fn expand<L: Lanes, const P: usize>(driven: &Driven, start: Newest<L>, scratch: &mut Scratch) {
+    let mut newest = start;
+    if !L::UNROLLED {
+        for k in (0..P).step_by(2) {
+            newest = two_orders(driven, start, scratch, newest, k);
+        }
+        return;
+    }
+    macro_rules! unrolled {
+        ($($k:literal),*) => {
+            $(if $k < P {
+                newest = two_orders(driven, start, scratch, newest, $k);
+            })*
+        };
+    }
+    unrolled!(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22);
+    let _ = newest;
 }
 
 /// Expands to order P and takes one step of at most `left` \[s\] from time `t`; returns the step wanted, and leaves `flow` alone where it is useless.
@@ -188,7 +202,7 @@ pub fn step<L: Lanes, const P: usize>(
     let e = direction::unit(L::of([phi, phi, psi.hi, psi.hi]), L::of([flow.low[0], flow.low[0], psi.lo, psi.lo]));
     let start = Newest { e, v: L::of([v, v, v - w, v - w]) };
     scratch.e[0] = e.array();
-    orders!(P, driven, start, scratch; 0 1, 2 3, 4 5, 6 7, 8 9, 10 11, 12 13, 14 15, 16 17, 18 19, 20 21, 22 23);
+    expand::<L, P>(driven, start, scratch);
     if !scratch.v[P][0].is_finite() {
         return (f64::NAN, 0.0);
     }

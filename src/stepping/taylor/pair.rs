@@ -193,21 +193,21 @@ struct Sums<L> {
     x: L,
 }
 
-/// What orders K and K+1 need of the coefficients before v_K: both at once, so that each is loaded for two products.
+/// What orders k and k+1 need of the coefficients before v_k: both at once, so that each is loaded for two products.
 ///
 /// The terms with j = 1 and the last j are left out: they come last, since they are the newest.
 #[inline(always)]
-fn older<L: Lanes, const K: usize>(scratch: &Scratch) -> [Sums<L>; 2] {
+fn older<L: Lanes>(scratch: &Scratch, k: usize) -> [Sums<L>; 2] {
     // From the middle outwards in two chains.
     let zero = Sums { b: L::splat(0.0), x: L::splat(0.0) };
     let mut sums = [[zero; 2]; 2];
-    let middle = K / 2;
+    let middle = k / 2;
     for step in 0..middle {
         for (chain, j) in [middle - step, middle + 1 + step].into_iter().enumerate() {
             let (v, g) = (L::of(scratch.v[j]), L::of(scratch.g[j]));
             for (ahead, sums) in sums.iter_mut().enumerate() {
-                if j >= 2 && j + 2 <= K + ahead {
-                    let e = L::of(scratch.e[K + 1 + ahead - j]);
+                if j >= 2 && j + 2 <= k + ahead {
+                    let e = L::of(scratch.e[k + 1 + ahead - j]);
                     sums[chain] = Sums { b: v.mul_add(e, sums[chain].b), x: g.mul_add(e, sums[chain].x) };
                 }
             }
@@ -221,54 +221,64 @@ fn total<L: Lanes>(chains: [Sums<L>; 2]) -> Sums<L> {
     Sums { b: chains[0].b.add(chains[1].b), x: chains[0].x.add(chains[1].x) }
 }
 
-/// Order K: from v_K, e_K, g_K to the next ones; writes e_{K+1}, v_{K+1} and -A K (f_2, f_1)_K.
+/// Order k: from v_k, e_k, g_k to the next ones; writes e_{k+1}, v_{k+1} and -A k (f_2, f_1)_k.
 #[inline(always)]
-fn order<L: Lanes, const K: usize>(s: &Start<L>, scratch: &mut Scratch, older: Sums<L>, newest: Newest<L>) -> Newest<L> {
+fn order<L: Lanes>(s: &Start<L>, scratch: &mut Scratch, older: Sums<L>, newest: Newest<L>, k: usize) -> Newest<L> {
     let Sums { mut b, mut x } = older;
     let Newest { v, e, g } = newest;
-    if K >= 3 {
+    if k >= 3 {
         let second = L::of(scratch.e[2]);
-        b = L::of(scratch.v[K - 1]).mul_add(second, b);
-        x = L::of(scratch.g[K - 1]).mul_add(second, x);
+        b = L::of(scratch.v[k - 1]).mul_add(second, b);
+        x = L::of(scratch.g[k - 1]).mul_add(second, x);
     }
     x = e.mul_add(s.weight, x);
-    if K >= 2 {
+    if k >= 2 {
         b = e.mul_add(L::of(scratch.v[1]), b);
         x = e.mul_add(L::of(scratch.g[1]), x);
     }
     let far = g.swap_halves().mul(s.coupling);
-    x = s.own.mul_add(L::splat(K as f64), L::splat(0.0).sub(s.other)).neg_mul_add(far, x);
-    if K >= 2 {
-        x = s.e0.mul(L::splat((K + 1) as f64)).mul_add(b.swap_halves(), x);
+    x = s.own.mul_add(L::splat(k as f64), L::splat(0.0).sub(s.other)).neg_mul_add(far, x);
+    if k >= 2 {
+        x = s.e0.mul(L::splat((k + 1) as f64)).mul_add(b.swap_halves(), x);
     }
-    let d = over(pair_sum(x), K + 1);
-    let (on, off) = (less_over(s.even[0], s.odd[0], K + 1), less_over(s.even[1], s.odd[1], K + 1));
+    let d = over(pair_sum(x), k + 1);
+    let (on, off) = (less_over(s.even[0], s.odd[0], k + 1), less_over(s.even[1], s.odd[1], k + 1));
     let solved = s.inverse[1].mul_add(d.swap_halves(), s.inverse[0].mul(d));
-    // From here on everything waits for v_K.
+    // From here on everything waits for v_k.
     let swapped = v.swap_halves();
     let next = on.mul_add(swapped, off.mul_add(v, solved));
-    let e_next = over(s.left, K + 1).mul_add(v, left_over(g, K + 1));
-    scratch.g[K] = swapped.mul_add(s.far, far).mul(L::splat(K as f64)).array();
-    scratch.e[K + 1] = e_next.array();
-    scratch.v[K + 1] = next.array();
+    let e_next = over(s.left, k + 1).mul_add(v, left_over(g, k + 1));
+    scratch.g[k] = swapped.mul_add(s.far, far).mul(L::splat(k as f64)).array();
+    scratch.e[k + 1] = e_next.array();
+    scratch.v[k + 1] = next.array();
     Newest { v: next, e: e_next, g: s.v0.mul_add(e_next, v.mul_add(s.e1, b)) }
 }
 
-/// Orders FROM to P-1 in pairs, both even.
-macro_rules! orders {
-    ($start:expr, $scratch:expr, $newest:ident; $($k:literal $next:literal),*) => {
-        $(if $k >= FROM && $k < P {
-            let [first, second] = older::<L, $k>($scratch);
-            $newest = order::<L, $k>($start, $scratch, first, $newest);
-            $newest = order::<L, $next>($start, $scratch, second, $newest);
-        })*
-    };
+/// Two orders, the first of them even.
+#[inline(always)]
+fn two_orders<L: Lanes>(start: &Start<L>, scratch: &mut Scratch, newest: Newest<L>, k: usize) -> Newest<L> {
+    let [first, second] = older(scratch, k);
+    let newest = order(start, scratch, first, newest, k);
+    order(start, scratch, second, newest, k + 1)
 }
 
-/// Orders FROM to P-1 from the newest coefficients, those of order FROM.
+/// Orders FROM to P-1 from the newest coefficients, those of order FROM; both even.
 #[inline(always)]
 pub fn expand<L: Lanes, const P: usize, const FROM: usize>(start: &Start<L>, scratch: &mut Scratch, mut newest: Newest<L>) {
-    orders!(start, scratch, newest; 2 3, 4 5, 6 7, 8 9, 10 11, 12 13, 14 15, 16 17, 18 19, 20 21, 22 23);
+    if !L::UNROLLED {
+        for k in (FROM..P).step_by(2) {
+            newest = two_orders(start, scratch, newest, k);
+        }
+        return;
+    }
+    macro_rules! unrolled {
+        ($($k:literal),*) => {
+            $(if $k >= FROM && $k < P {
+                newest = two_orders(start, scratch, newest, $k);
+            })*
+        };
+    }
+    unrolled!(2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22);
     let _ = newest;
 }
 
@@ -320,7 +330,7 @@ pub fn step<L: Lanes, const P: usize>(pair: &Pair, pace: &Pace, scratch: &mut Sc
     scratch.v[0] = v0.array();
     scratch.v[1] = first.array();
     let zero = L::splat(0.0);
-    let newest = order::<L, 1>(&start, scratch, Sums { b: zero, x: zero }, Newest { v: first, e: e1, g: g1 });
+    let newest = order(&start, scratch, Sums { b: zero, x: zero }, Newest { v: first, e: e1, g: g1 }, 1);
     expand::<L, P, 2>(&start, scratch, newest);
     let wanted = wanted::<L, P>(pace, scratch);
     if wanted.is_nan() {
