@@ -350,7 +350,6 @@ impl FourBar {
         let mut scene = common::pendulum(0.0, 0.0);
         scene.gravity = [9.81, 0.0];
         let (phi, rates) = self.posture(q);
-        let (bar, hinge) = (scene.bars[0].clone(), scene.hinges[0].clone());
         scene.bars.clear();
         scene.hinges.clear();
         scene.start.clear();
@@ -358,9 +357,9 @@ impl FourBar {
         for k in 0..3 {
             let (length, mass) = (self.length[k], self.mass[k]);
             let inertia = mass * length * length / 12.0;
-            scene.bars.push(Bar { name: format!("bar{k}"), length, mass, centre: [0.5 * length, 0.0], inertia, ..bar.clone() });
+            scene.bars.push(Bar { name: format!("bar{k}"), length, mass, centre: [0.5 * length, 0.0], inertia });
             let between = [Place { bar: foot[k].0, point: foot[k].1 }, Place { bar: Some(k), point: [0.0, 0.0] }];
-            scene.hinges.push(Hinge { name: format!("hinge{k}"), between, ..hinge.clone() });
+            scene.hinges.push(Hinge { name: format!("hinge{k}"), between });
             scene.start.push(Start { phi: phi[k], omega: rate * rates[k] });
         }
         let tree = Mechanism::new(&scene).expect("a valid scene");
