@@ -75,7 +75,7 @@ fn neighbours_and_the_processor_make_no_difference_to_the_bits() {
     let heavy = shipped("free", &["bars.bar2.density=900"]);
     let (light, heavy) = (compile(&scene), compile(&heavy));
     let entrant = |i: usize| {
-        let mechanism = if i % 3 == 0 { &heavy } else { &light };
+        let mechanism = if i.is_multiple_of(3) { &heavy } else { &light };
         let mut motion = mechanism.start(&scene);
         motion.phi[0] = motion.phi[0] + 0.01 * i as f64;
         Entrant::new(mechanism, Elimination::<0>::new(Arc::clone(mechanism)).state(&motion))
