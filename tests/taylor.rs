@@ -289,7 +289,8 @@ fn rows_inside_a_step_are_as_exact_as_its_end() {
     }
 }
 
-/// A four-bar of uniform slender bars under gravity along +x: crank and coupler from the origin, rocker from (0, 0.9), not yet pinned to the coupler.
+/// A four-bar of uniform slender bars under gravity along +x: crank and coupler from the origin, rocker from (0, 0.9), not yet pinned to
+/// the coupler.
 struct FourBar {
     length: [f64; 3],
     mass: [f64; 3],

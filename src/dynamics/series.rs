@@ -9,13 +9,16 @@
 //!   w_{m+1} = a_m/(m+1),  z_{m+2} = i (f_m+1 + w_{m+1} z_0)/(m+2),  R_m += H i a_m z_0
 //! ```
 //!
-//! Nothing but Cauchy products: four real ones a body, no sine beyond the first.  Driven angles enter with the known series of their laws: the coordinates are those of
-//! [`elimination`](super::elimination), q = S u + s(t), and the solve is with Sᵀ M_0 S.  What the rows of driven bodies lack of balance is the motors'
+//! Nothing but Cauchy products: four real ones a body, no sine beyond the first.  Driven angles enter with the known series of their laws:
+//! the coordinates are those of
+//! [`elimination`](super::elimination), q = S u + s(t), and the solve is with Sᵀ M_0 S.  What the rows of driven bodies lack of balance is
+//! the motors'
 //! torque, whose power is integrated with the rest.  Rows that are not eliminated border M_0 with their Jacobian (module `rows`).
 //!
 //! Loops run over `N` bodies where `N > 0`, so that small sizes are unrolled, to the same bits as `N = 0` for any number.
 //!
-//! Source: Jorba & Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor methods*, Experimental Mathematics 14 (2005), for the
+//! Source: Jorba & Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor methods*, Experimental
+//! Mathematics 14 (2005), for the
 //! products; the in-series solve with constant couplings is ours.
 
 mod drive;
@@ -145,7 +148,8 @@ impl<T: Real> Series<T> {
         }
     }
 
-    /// Power `m`, below the order, of the multipliers of the rows in force \[N, N·m over s^m\]: all rows, or all but the motors' where these are eliminated.
+    /// Power `m`, below the order, of the multipliers of the rows in force \[N, N·m over s^m\]: all rows, or all but the motors' where
+    /// these are eliminated.
     pub fn multipliers(&self, m: usize) -> &[T] {
         self.rows.multipliers(m)
     }
@@ -177,7 +181,8 @@ impl<T: Real> Series<T> {
         self.rows.begin(t);
     }
 
-    /// The powers from `first` on, by the code for this number of bodies where there is one: in double-double the arithmetic outweighs the loops.
+    /// The powers from `first` on, by the code for this number of bodies where there is one: in double-double the arithmetic outweighs the
+    /// loops.
     fn sized_orders(&mut self, mechanism: &Mechanism, first: usize) {
         if !T::IS_PLAIN {
             return self.orders::<0>(mechanism, first);

@@ -64,7 +64,8 @@ impl<T: Real> Fractions<T> {
         Self((0..=most).map(|k| T::ONE / T::of(k.max(1) as f64)).collect())
     }
 
-    /// x/k.  A fraction that is rounded once and used in every step is a drift: in plain doubles low orders, which carry the weight, are divided.
+    /// x/k.  A fraction that is rounded once and used in every step is a drift: in plain doubles low orders, which carry the weight, are
+    /// divided.
     #[inline(always)]
     pub fn over(&self, x: T, k: usize) -> T {
         if T::IS_PLAIN && k < 13 { x / T::of(k as f64) } else { x * self.0[k] }

@@ -69,7 +69,8 @@ impl<T: Real> Expansion<T> {
         self.series.carry_on(mechanism, state.time, u, rest, rate, first);
     }
 
-    /// The step at which the last powers fall below the tolerance \[s\], those of the unit vectors too where `with_vectors`; not a number where one
+    /// The step at which the last powers fall below the tolerance \[s\], those of the unit vectors too where `with_vectors`; not a number
+    /// where one
     /// of them is.
     pub fn wanted(&self, tolerance: f64, with_vectors: bool) -> f64 {
         let (order, f) = (self.series.order(), self.series.coordinates());
