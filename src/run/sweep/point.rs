@@ -78,7 +78,7 @@ impl Sweep {
             match self.prepare(index) {
                 Ok(ready) if self.takes(&ready) => in_lanes.push(ready),
                 other => {
-                    finished.push(other.map_or_else(|point| point, |ready| self.single(ready)));
+                    finished.push(other.map_or_else(|point| *point, |ready| self.single(ready)));
                     if !goes_on() {
                         return finished;
                     }
@@ -97,7 +97,7 @@ impl Sweep {
     }
 
     /// Puts the values in; a point that cannot run is finished.
-    fn prepare(&self, index: u64) -> Result<Ready, Point> {
+    fn prepare(&self, index: u64) -> Result<Ready, Box<Point>> {
         let values = self.grid.values(index);
         let mut point = Point {
             index,
@@ -113,13 +113,13 @@ impl Sweep {
         };
         if self.skips.as_ref().is_some_and(|skips| skips(&point.values)) {
             point.status = Status::Skipped;
-            return Err(point);
+            return Err(Box::new(point));
         }
         match self.filled(&point.values) {
             Ok((mechanism, plan, start, scale)) => Ok(Ready { point, mechanism, plan, start, scale }),
             Err(reason) => {
                 point.status = Status::Refused(reason.lines().next().unwrap_or_default().to_owned());
-                Err(point)
+                Err(Box::new(point))
             }
         }
     }
