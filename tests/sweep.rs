@@ -236,7 +236,7 @@ fn what_makes_no_sense_is_refused_before_the_first_point() {
         ("free", vec!["bar1.phi=0..1:2", "start.bar1.phi=0..1:2"], None, "varied twice"),
         ("free", vec![], None, "nothing is varied"),
         ("free", vec!["bar1.phi=0..1:1000000", "bar2.phi=0..1:1000000"], None, "1000000 × 1000000 points"),
-        ("wall", vec!["wall.restitution=0..1:2"], Some(MethodId::Taylor), "a scene with walls"),
+        ("wall", vec!["wall.restitution=0..1:2"], Some(MethodId::Gauss(4)), "a scene with walls"),
     ] {
         let said = refusal(scene, &vary, &Request { method, ..Request::default() });
         assert!(said.contains(words), "{vary:?}: {said}");
@@ -333,7 +333,7 @@ mod command {
             ("free.json --vary bar1.phi=0..1:100000 --vary bar2.phi=0..1:100000", 2, vec!["points"]),
             ("free.json --vary start.bra1.phi=0..1:4", 3, vec!["start.bra1.phi", "`bar1`", "hint: "]),
             ("free.json --vary bar1.phy=0..1:4", 3, vec!["bar1.phy", "hint: "]),
-            ("wall.json --vary wall.restitution=0..1:4 --method taylor", 3, vec!["walls", "--method dp8"]),
+            ("wall.json --vary wall.restitution=0..1:4 --method gauss8", 3, vec!["walls", "--method dp8"]),
             ("nowhere.json --vary bar1.phi=0..1:4", 6, vec!["nowhere.json"]),
         ] {
             program.run(&format!("sweep {arguments}")).exits(code).says(&words);

@@ -197,7 +197,7 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
         let tracer = self.tracer.get_or_insert_with(|| {
             let mechanism = Arc::new(self.problem.mechanism().clone());
             let tolerance = Tolerance { relative: 1e-13, absolute: 1e-13 };
-            marcher(sized!(mechanism.bodies.len(), eliminated(&mechanism)), Dp8::new(tolerance), &motion, Steps::Own)
+            marcher(sized!(mechanism.bodies.len(), form(&mechanism, Stabilization::None, 1.0)), Dp8::new(tolerance), &motion, Steps::Own)
         });
         tracer.jump(&motion);
         tracer.forget();
