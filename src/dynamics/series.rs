@@ -9,17 +9,15 @@
 //!   w_{m+1} = a_m/(m+1),  z_{m+2} = i (f_m+1 + w_{m+1} z_0)/(m+2),  R_m += H i a_m z_0
 //! ```
 //!
-//! Nothing but Cauchy products: four real ones a body, no sine beyond the first.  Driven angles enter with the known series of their laws:
-//! the coordinates are those of
-//! [`elimination`](super::elimination), q = S u + s(t), and the solve is with Sᵀ M_0 S.  What the rows of driven bodies lack of balance is
-//! the motors'
-//! torque, whose power is integrated with the rest.  Rows that are not eliminated border M_0 with their Jacobian (module `rows`).
+//! Nothing but Cauchy products: four real ones a body, no sine beyond the first.  Driven angles enter with the known series of their
+//! laws: the coordinates are those of [`elimination`](super::elimination), q = S u + s(t), and the solve is with Sᵀ M_0 S.  What the rows
+//! of driven bodies lack of balance is the motors' torque, whose power is integrated with the rest.  Rows that are not eliminated border
+//! M_0 with their Jacobian (module `rows`).
 //!
 //! Loops run over `N` bodies where `N > 0`, so that small sizes are unrolled, to the same bits as `N = 0` for any number.
 //!
 //! Source: Jorba & Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor methods*, Experimental
-//! Mathematics 14 (2005), for the
-//! products; the in-series solve with constant couplings is ours.
+//! Mathematics 14 (2005), for the products; the in-series solve with constant couplings is ours.
 
 mod drive;
 pub mod polynomial;

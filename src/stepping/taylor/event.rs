@@ -8,8 +8,8 @@
 //! ```
 //!
 //! No sampling: two zeros as close together as 1e-9 of the step are found.  Source: R. E. Moore, *Methods and Applications of Interval
-//! Analysis* (1979), chapter 5, for
-//! exclusion by bounds; Newton's method inside a bracket after W. Press et al., *Numerical Recipes*, 3rd ed. (2007), section 9.4.
+//! Analysis* (1979), chapter 5, for exclusion by bounds; Newton's method inside a bracket after W. Press et al., *Numerical Recipes*, 3rd
+//! ed. (2007), section 9.4.
 
 /// A gap \[m\], or force over energy \[1/m\], that counts as zero at the step's start: it must open before it can close.
 const TOUCH: f64 = 1e-12;
