@@ -13,9 +13,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 /// Steps a block.
-const BLOCK: u32 = 2_000;
+const BLOCK: u32 = 100;
 /// Blocks of each candidate.
-const BLOCKS: usize = 15;
+const BLOCKS: usize = 300;
 
 /// A field evaluated one point at a time, in plain doubles.
 struct OneByOne<F>(F);
