@@ -98,7 +98,7 @@ pub struct PlanFlags {
     /// Time constant of Baumgarte's term in seconds [default: five mean steps]
     #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
     pub time_constant: Option<f64>,
-    /// Carry the first orders of taylor's series in double-double: 1e-17 of energy over days, at tolerances down to 1e-25 [default: 1e-20]
+    /// Carry the first orders of taylor's series in double-double: rounding in energy a thousandth of a plain run's, at tolerances down to 1e-25 [default: 1e-20]
     #[arg(long)]
     pub extended: bool,
 }
