@@ -167,7 +167,7 @@ impl Gauss {
         let judged = if angles > 0 { angles } else { d };
         for k in 0..judged {
             let floor = if k < angles { LEAST_ANGLE } else { 0.0 };
-            let scale = scratch.points.y[k].0.iter().fold(floor, |scale, y| scale.max(y.abs()));
+            let scale = scratch.size[k].max(floor);
             if scratch.rest[k] > LARGEST_REST * scale {
                 let what = format!("the sweeps left a change of {:.1e} in {} and did not bring it down", scratch.rest[k], problem.label(k));
                 return Err(stop(Cause::NotConverged, what));

@@ -29,8 +29,9 @@ pub(super) struct Scratch {
     least: Vec<f64>,
     /// Largest change of each unknown in the first exact sweep (d).
     first: Vec<f64>,
-    /// The largest change of the last sweep in plain doubles (d), by which convergence is judged.
+    /// The largest change of the last sweep in plain doubles, and the largest magnitude among the stages then (d, d): what convergence is judged by.
     pub rest: Vec<f64>,
+    pub size: Vec<f64>,
     /// The sum of all increments (d).
     pub total: Vec<DoubleDouble>,
 }
@@ -88,7 +89,7 @@ impl Step<'_> {
     fn take<L: Lanes, F: Field + ?Sized>(&mut self, problem: &mut F, state: &State, tally: &mut Tally) {
         self.predict::<L>(state);
         self.sweep::<L, F>(problem, state, tally);
-        self.scratch.rest.copy_from_slice(&self.scratch.change);
+        self.scratch.judge();
         self.scratch.points.rate_low.fill(Octet::default());
         self.refine::<L, F>(problem, state, tally);
         self.scratch.sum_exactly::<L>();
@@ -222,7 +223,7 @@ impl Scratch {
             self.points.used[lane(i, s)] = true;
         }
         self.increment.resize(d, Octet::default());
-        for vector in [&mut self.change, &mut self.least, &mut self.first, &mut self.rest] {
+        for vector in [&mut self.change, &mut self.least, &mut self.first, &mut self.rest, &mut self.size] {
             vector.resize(d, 0.0);
         }
         self.total.resize(d, DoubleDouble::ZERO);
@@ -269,6 +270,14 @@ impl Scratch {
             }
         }
         falls
+    }
+
+    /// Keeps what convergence is judged by.
+    fn judge(&mut self) {
+        self.rest.copy_from_slice(&self.change);
+        for (size, stage) in self.size.iter_mut().zip(&self.points.y) {
+            *size = stage.0.iter().fold(0.0, |size, y| y.abs().max(size));
+        }
     }
 
     /// True where every unknown's change has become small beside its first, or falls no further; lowers the least.
