@@ -72,7 +72,7 @@ impl DoubleDouble {
     }
 
     /// The same for an angle in [-π/256, π/256]: powers from the seventh on weigh less than 1e-17 and are summed in plain doubles.
-    #[inline(always)]
+    #[inline]
     fn sin_cos_tiny(self) -> (Self, Self) {
         let square = self * self;
         let q = square.hi;
@@ -255,7 +255,7 @@ impl Scalar for DoubleDouble {
         root + (self - root * root) / root.ldexp(2.0)
     }
 
-    #[inline(always)]
+    #[inline]
     fn sin_cos(self) -> (Self, Self) {
         let part = Self::TAU.ldexp(1.0 / PARTS as f64);
         let k = nearest(self.hi / part.hi);

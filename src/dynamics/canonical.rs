@@ -175,11 +175,11 @@ impl<const N: usize, const ACCOUNT: bool> Field for Canonical<N, ACCOUNT> {
     }
 
     fn rates(&mut self, points: &mut Points) {
-        self.stages.rates::<N, ACCOUNT, false>(&self.mechanism, points);
+        self.stages.rates(ACCOUNT, false, &self.mechanism, points);
     }
 
     fn exact_rates(&mut self, points: &mut Points) -> bool {
-        self.stages.rates::<N, ACCOUNT, true>(&self.mechanism, points);
+        self.stages.rates(ACCOUNT, true, &self.mechanism, points);
         true
     }
 

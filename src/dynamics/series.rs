@@ -69,7 +69,33 @@ pub struct Series<T> {
     solution: Vec<T>,
 }
 
-impl<T: Real> Series<T> {
+/// A number whose series are compiled with this crate, once, and not anew wherever they are used.
+pub trait Coefficient: Real {
+    /// Power zero, and the laws' series.
+    fn begin(series: &mut Series<Self>, t: Time, u: &[Self], u_rest: &[Self], u_rate: &[Self]);
+
+    /// The powers from `first` on.
+    fn orders(series: &mut Series<Self>, mechanism: &Mechanism, first: usize);
+}
+
+macro_rules! coefficient {
+    ($number:ty) => {
+        impl Coefficient for $number {
+            fn begin(series: &mut Series<Self>, t: Time, u: &[Self], u_rest: &[Self], u_rate: &[Self]) {
+                series.begin(t, u, u_rest, u_rate);
+            }
+
+            fn orders(series: &mut Series<Self>, mechanism: &Mechanism, first: usize) {
+                series.sized_orders(mechanism, first);
+            }
+        }
+    };
+}
+
+coefficient!(f64);
+coefficient!(DoubleDouble);
+
+impl<T: Coefficient> Series<T> {
     /// Room for series of a mechanism in some coordinates up to this power of the rates, at least 2.
     pub fn new(mechanism: &Mechanism, coordinates: Coordinates, order: usize) -> Self {
         let n = mechanism.bodies.len();
@@ -113,13 +139,13 @@ impl<T: Real> Series<T> {
 
     /// Expands the motion through coordinates `u` \[rad\] (leading part and rest) and rates `u_rate` \[rad/s\] at time `t`.
     pub fn expand(&mut self, mechanism: &Mechanism, t: Time, u: &[T], u_rest: &[T], u_rate: &[T]) {
-        self.begin(t, u, u_rest, u_rate);
-        self.sized_orders(mechanism, 0);
+        T::begin(self, t, u, u_rest, u_rate);
+        T::orders(self, mechanism, 0);
     }
 
     /// Expands a motion whose first powers were found in more digits; they are rounded, and the later ones follow from them.
     pub fn carry_on(&mut self, mechanism: &Mechanism, t: Time, u: &[T], u_rest: &[T], u_rate: &[T], first: &Series<DoubleDouble>) {
-        self.begin(t, u, u_rest, u_rate);
+        T::begin(self, t, u, u_rest, u_rate);
         copy_vectors(&mut self.z, &first.z);
         copy(&mut self.omega, &first.omega);
         copy(&mut self.rate, &first.rate);
@@ -130,7 +156,7 @@ impl<T: Real> Series<T> {
             spring.take(first);
         }
         self.rows.take(&first.rows);
-        self.sized_orders(mechanism, first.order.min(self.order));
+        T::orders(self, mechanism, first.order.min(self.order));
     }
 
     /// Powers 0, 1, … of the gap of a wall \[m/s^m\], to that of the unit vectors.

@@ -46,8 +46,6 @@ const MOST_SWEEPS: usize = 200;
 const IDLE_SWEEPS: usize = 2;
 /// Most evaluations after the last sweep that carry what doubles leave out.
 const MOST_EXACT_SWEEPS: u32 = 12;
-/// Change of the stages, beside their change in the first of these, that ends them.
-const SETTLED: f64 = 0.02;
 /// Largest last change, relative to its scale, that can be rounding; anything above has not converged.
 const LARGEST_REST: f64 = 1e-10;
 /// Scale of an angle near zero \[rad\]: forces that cancel leave an angle a noise that is not relative to its size.

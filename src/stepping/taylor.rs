@@ -39,7 +39,8 @@ use self::event::Crossing;
 use self::expansion::Expansion;
 use self::fast::Fast;
 use super::{Cause, Method, Reached, Seen, StepError, Tally, Tolerance, Watch};
-use crate::arithmetic::{DoubleDouble, Real};
+use crate::arithmetic::DoubleDouble;
+use crate::dynamics::series::Coefficient;
 use crate::dynamics::{Coordinates, Field, Form, State, Time};
 
 /// Powers the step is taken from.
@@ -85,7 +86,7 @@ pub struct Taylor<T> {
     inside: State,
 }
 
-impl<T: Real> Taylor<T> {
+impl<T: Coefficient> Taylor<T> {
     /// The method with this tolerance \[rad/s\] and order, at least 10.
     pub fn with_order(tolerance: f64, order: usize) -> Self {
         let order = order.max(2 * JUDGES);
@@ -124,7 +125,7 @@ impl Taylor<DoubleDouble> {
     }
 }
 
-impl<T: Real, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
+impl<T: Coefficient, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
     fn name(&self) -> &'static str {
         "taylor"
     }
@@ -210,7 +211,7 @@ fn stop(cause: Cause, state: &State, step: f64, what: String, hint: &str) -> Ste
     StepError { cause, method: "taylor".into(), t: state.time.hi, step, what, hint: hint.into() }
 }
 
-impl<T: Real> Taylor<T> {
+impl<T: Coefficient> Taylor<T> {
     /// Keeps the code at hand that fits, makes it, or leaves it to the series.
     fn choose<P: Field + Form + ?Sized>(&mut self, problem: &P, state: &State) -> Result<(), StepError> {
         let (mechanism, coordinates) = (problem.mechanism(), problem.coordinates());
@@ -289,7 +290,7 @@ impl<T: Real> Taylor<T> {
 }
 
 /// Powers of an event function along the series: the gap of a wall \[m\], or the force on a point held there over the energy scale \[1/m\].
-fn trace<T: Real, P: Form + ?Sized>(problem: &P, expansion: &Expansion<T>, contact: usize, powers: &mut Vec<f64>) {
+fn trace<T: Coefficient, P: Form + ?Sized>(problem: &P, expansion: &Expansion<T>, contact: usize, powers: &mut Vec<f64>) {
     let mechanism = problem.mechanism();
     let series = expansion.series();
     match mechanism.held.iter().position(|&held| held == contact) {

@@ -116,10 +116,11 @@ impl Stages {
         Self { time, room: Room::Portable(Box::new(Both::new(mechanism))) }
     }
 
-    /// The rates at all points; with `EXACT`, what doubles leave out of points and rates too.
-    #[inline]
-    pub fn rates<const N: usize, const ACCOUNT: bool, const EXACT: bool>(&mut self, mechanism: &Mechanism, points: &mut Points) {
-        if ACCOUNT && self.time != points.time {
+    /// The rates at all points; with `exact`, what doubles leave out of points and rates too.  `account`: the form carries p_t.
+    ///
+    /// Not generic, so that it is compiled once and not with every program that marches a mechanism.
+    pub fn rates(&mut self, account: bool, exact: bool, mechanism: &Mechanism, points: &mut Points) {
+        if account && self.time != points.time {
             self.time = points.time;
             match &mut self.room {
                 Room::Portable(both) => both.drive(mechanism, &self.time),
@@ -129,17 +130,31 @@ impl Stages {
         }
         // The sizes worth unrolling; any other count of the same operations has the same bits.
         match &mut self.room {
-            Room::Portable(both) => both.rates::<0, ACCOUNT, EXACT>(mechanism, points),
+            Room::Portable(both) => match (account, exact) {
+                (false, false) => both.rates::<0, false, false>(mechanism, points),
+                (false, true) => both.rates::<0, false, true>(mechanism, points),
+                (true, false) => both.rates::<0, true, false>(mechanism, points),
+                (true, true) => both.rates::<0, true, true>(mechanism, points),
+            },
             #[cfg(target_arch = "x86_64")]
             Room::Hardware(both) => {
+                let code: unsafe fn(&mut Both<Avx>, &Mechanism, &mut Points) = match (mechanism.bodies.len(), account, exact) {
+                    (1, false, false) => hardware::<1, false, false>,
+                    (2, false, false) => hardware::<2, false, false>,
+                    (3, false, false) => hardware::<3, false, false>,
+                    (4, false, false) => hardware::<4, false, false>,
+                    (_, false, false) => hardware::<0, false, false>,
+                    (2, false, true) => hardware::<2, false, true>,
+                    (_, false, true) => hardware::<0, false, true>,
+                    (2, true, false) => hardware::<2, true, false>,
+                    (_, true, false) => hardware::<0, true, false>,
+                    (2, true, true) => hardware::<2, true, true>,
+                    (_, true, true) => hardware::<0, true, true>,
+                };
                 // SAFETY: this room is made only where the processor was found to have AVX and FMA; all else in that code is safe.
                 #[allow(unsafe_code)]
                 unsafe {
-                    match N {
-                        1 | 2 => hardware::<N, ACCOUNT, EXACT>(both, mechanism, points),
-                        _ if EXACT || ACCOUNT => hardware::<0, ACCOUNT, EXACT>(both, mechanism, points),
-                        _ => hardware::<N, ACCOUNT, EXACT>(both, mechanism, points),
-                    }
+                    code(both, mechanism, points);
                 }
             }
         }

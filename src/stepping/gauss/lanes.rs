@@ -1,7 +1,7 @@
 //! The steps themselves, a stage a lane; the one place where code compiled for the processor is entered.
 
 use super::tableau::{Tableau, lane};
-use super::{Gauss, IDLE_SWEEPS, MOST_SWEEPS, SETTLED};
+use super::{Gauss, IDLE_SWEEPS, MOST_SWEEPS};
 use crate::arithmetic::eight::{LANES, Octet};
 #[cfg(target_arch = "x86_64")]
 use crate::arithmetic::lanes::{Avx, available};
@@ -27,8 +27,6 @@ pub(super) struct Scratch {
     /// Largest change of each unknown in the last sweep, and the least so far (d, d).
     change: Vec<f64>,
     least: Vec<f64>,
-    /// Largest change of each unknown in the first exact sweep (d).
-    first: Vec<f64>,
     /// The largest change of the last sweep in plain doubles, and the largest magnitude among the stages then (d, d): what convergence is judged by.
     pub rest: Vec<f64>,
     pub size: Vec<f64>,
@@ -55,18 +53,7 @@ pub(super) fn march<F: Field + ?Sized>(
 ) -> Result<(), StepError> {
     for _ in 0..count {
         let mut step = Step { tableau: &gauss.tableau, scratch: &mut gauss.scratch, exact: gauss.exact };
-        #[cfg(target_arch = "x86_64")]
-        if !gauss.portable && available() {
-            // SAFETY: the processor has just been asked; all else in that code is safe.
-            #[allow(unsafe_code)]
-            unsafe {
-                hardware(&mut step, problem, state, tally);
-            }
-        } else {
-            step.take::<Portable, F>(problem, state, tally);
-        }
-        #[cfg(not(target_arch = "x86_64"))]
-        step.take::<Portable, F>(problem, state, tally);
+        take(gauss.portable, &mut step, &mut Of(problem), state, tally);
         gauss.check(problem, state)?;
         gauss.scratch.commit(state, gauss.tableau.nodes.len());
         tally.steps += 1;
@@ -77,21 +64,54 @@ pub(super) fn march<F: Field + ?Sized>(
     Ok(())
 }
 
+/// What a step asks of a field.
+trait Rates {
+    fn rates(&mut self, points: &mut Points);
+    fn exact_rates(&mut self, points: &mut Points) -> bool;
+}
+
+/// A field behind a table of functions, so that the steps are compiled once and not with every field.
+struct Of<'a, F: ?Sized>(&'a mut F);
+
+impl<F: Field + ?Sized> Rates for Of<'_, F> {
+    fn rates(&mut self, points: &mut Points) {
+        self.0.rates(points);
+    }
+
+    fn exact_rates(&mut self, points: &mut Points) -> bool {
+        self.0.exact_rates(points)
+    }
+}
+
+/// One step but its acceptance, by the processor's vectors where it has them and `is_portable` does not forbid it.
+fn take(is_portable: bool, step: &mut Step, problem: &mut dyn Rates, state: &State, tally: &mut Tally) {
+    #[cfg(target_arch = "x86_64")]
+    if !is_portable && available() {
+        // SAFETY: the processor has just been asked; all else in that code is safe.
+        #[allow(unsafe_code)]
+        unsafe {
+            hardware(step, problem, state, tally);
+        }
+        return;
+    }
+    step.take::<Portable>(problem, state, tally);
+}
+
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx,fma")]
-fn hardware<F: Field + ?Sized>(step: &mut Step, problem: &mut F, state: &State, tally: &mut Tally) {
-    step.take::<Avx, F>(problem, state, tally);
+fn hardware(step: &mut Step, problem: &mut dyn Rates, state: &State, tally: &mut Tally) {
+    step.take::<Avx>(problem, state, tally);
 }
 
 impl Step<'_> {
     /// All of one step but its acceptance.
     #[inline(always)]
-    fn take<L: Lanes, F: Field + ?Sized>(&mut self, problem: &mut F, state: &State, tally: &mut Tally) {
+    fn take<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, tally: &mut Tally) {
         self.predict::<L>(state);
-        self.sweep::<L, F>(problem, state, tally);
+        self.sweep::<L>(problem, state, tally);
         self.scratch.judge();
         self.scratch.points.rate_low.fill(Octet::default());
-        self.refine::<L, F>(problem, state, tally);
+        self.refine::<L>(problem, state, tally);
         self.scratch.sum_exactly::<L>();
     }
 
@@ -122,7 +142,7 @@ impl Step<'_> {
 
     /// Sweeps the stages until no unknown's change falls any further.
     #[inline(always)]
-    fn sweep<L: Lanes, F: Field + ?Sized>(&mut self, problem: &mut F, state: &State, tally: &mut Tally) {
+    fn sweep<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, tally: &mut Tally) {
         self.scratch.least.fill(f64::INFINITY);
         let mut idle = 0;
         for _ in 0..MOST_SWEEPS {
@@ -137,10 +157,13 @@ impl Step<'_> {
         }
     }
 
-    /// Evaluations that carry what doubles leave out, at stages that are pairs, until the stages' changes are small or fall no further.
+    /// Evaluations that carry what doubles leave out, at stages that are pairs, until the stages stay as they are to the last bit, or their changes fall no
+    /// further.  A rest of the iteration would have the direction of time in it, and drift.
     #[inline(always)]
-    fn refine<L: Lanes, F: Field + ?Sized>(&mut self, problem: &mut F, state: &State, tally: &mut Tally) {
+    fn refine<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, tally: &mut Tally) {
         self.restage::<L, true>(state);
+        self.scratch.least.fill(f64::INFINITY);
+        let mut idle = 0;
         for sweep in 0..self.exact {
             if !problem.exact_rates(&mut self.scratch.points) {
                 return;
@@ -151,10 +174,8 @@ impl Step<'_> {
                 return;
             }
             self.restage::<L, true>(state);
-            if sweep == 0 {
-                self.scratch.least.copy_from_slice(&self.scratch.change);
-                self.scratch.first.copy_from_slice(&self.scratch.change);
-            } else if self.scratch.is_settled() {
+            idle = if self.scratch.falls() { 0 } else { idle + 1 };
+            if idle == IDLE_SWEEPS || self.scratch.change.iter().all(|&change| change == 0.0) {
                 return;
             }
         }
@@ -223,7 +244,7 @@ impl Scratch {
             self.points.used[lane(i, s)] = true;
         }
         self.increment.resize(d, Octet::default());
-        for vector in [&mut self.change, &mut self.least, &mut self.first, &mut self.rest, &mut self.size] {
+        for vector in [&mut self.change, &mut self.least, &mut self.rest, &mut self.size] {
             vector.resize(d, 0.0);
         }
         self.total.resize(d, DoubleDouble::ZERO);
@@ -278,16 +299,6 @@ impl Scratch {
         for (size, stage) in self.size.iter_mut().zip(&self.points.y) {
             *size = stage.0.iter().fold(0.0, |size, y| y.abs().max(size));
         }
-    }
-
-    /// True where every unknown's change has become small beside its first, or falls no further; lowers the least.
-    fn is_settled(&mut self) -> bool {
-        let mut settled = true;
-        for ((&change, least), &first) in self.change.iter().zip(&mut self.least).zip(&self.first) {
-            settled &= change <= SETTLED * first || change >= *least;
-            *least = change;
-        }
-        settled
     }
 }
 

@@ -6,11 +6,11 @@
 
 use super::pace::{self, Pace};
 use super::terms::rest;
-use super::{JUDGES, Kernel, direction, stop};
-use crate::arithmetic::angle;
+use super::{JUDGES, Kernel, stop};
 #[cfg(target_arch = "x86_64")]
 use crate::arithmetic::lanes::Avx;
 use crate::arithmetic::lanes::{self, Lanes, Portable};
+use crate::arithmetic::{angle, sincos};
 use crate::dynamics::{Mechanism, State, Time, tree};
 use crate::stepping::{Cause, StepError, Tally, Tolerance};
 
@@ -433,7 +433,7 @@ fn expand<L: Lanes, const N: usize>(teams: &mut [Team<N>; TEAMS], order: usize) 
     let mut products = [[[L::splat(0.0); N]; 2]; TEAMS];
     for (team, f) in teams.iter_mut().zip(&mut products) {
         for i in 0..N {
-            let (c, s) = units::<L>(team.high[0][i], team.low[0][i]);
+            let (s, c) = sincos::sin_cos::<L>(L::of(team.high[0][i]), L::of(team.low[0][i]));
             (team.powers[0].c[i], team.powers[0].s[i], team.powers[0].v[i]) = (c.array(), s.array(), team.high[1][i]);
             let v = L::of(team.high[1][i]);
             (f[0][i], f[1][i]) = (v.mul(c), v.mul(s));
@@ -523,16 +523,6 @@ fn raise<L: Lanes, const N: usize>(team: &mut Team<N>, f: &mut [[L; N]; 2], k: u
 fn over<L: Lanes>(x: L, k: usize) -> L {
     let (r, rest) = RECIPROCAL[k];
     x.mul_add(L::splat(r), x.mul(L::splat(rest)))
-}
-
-/// cos and sin of four angles and what they leave out.
-#[inline(always)]
-fn units<L: Lanes>(angle: Quad, rest: Quad) -> (L, L) {
-    let [c0, s0, c1, s1] =
-        direction::unit(L::of([angle[0], angle[0], angle[1], angle[1]]), L::of([rest[0], rest[0], rest[1], rest[1]])).array();
-    let [c2, s2, c3, s3] =
-        direction::unit(L::of([angle[2], angle[2], angle[3], angle[3]]), L::of([rest[2], rest[2], rest[3], rest[3]])).array();
-    (L::of([c0, c1, c2, c3]), L::of([s0, s1, s2, s3]))
 }
 
 /// Σ_{j≠i} A_ij x_j.

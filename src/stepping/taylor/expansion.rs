@@ -1,9 +1,9 @@
 //! The series of any mechanism about a step's start, and how far it carries.
 
 use super::{JUDGES, LEADING};
-use crate::arithmetic::{DoubleDouble, Real};
-use crate::dynamics::series::Series;
+use crate::arithmetic::DoubleDouble;
 use crate::dynamics::series::polynomial::{integral, tail};
+use crate::dynamics::series::{Coefficient, Series};
 use crate::dynamics::{Coordinates, Mechanism, State, Time};
 
 /// Largest share of a motion that its last powers may have, however small it is: beyond, the powers left out are the larger ones.
@@ -23,7 +23,7 @@ pub struct Expansion<T> {
     exact: [Vec<DoubleDouble>; 3],
 }
 
-impl<T: Real> Expansion<T> {
+impl<T: Coefficient> Expansion<T> {
     /// Series of a mechanism up to a power of the rates; `extended`: the first ones in double-double.
     pub fn new(mechanism: &Mechanism, coordinates: Coordinates, order: usize, extended: bool) -> Self {
         let series = Series::new(mechanism, coordinates, order);
