@@ -1,6 +1,6 @@
 //! Many trajectories at once, one a lane: ensembles of up to four free bodies.
 //!
-//! The equation of [`bodies`](super::bodies) with the lanes over trajectories instead of bodies.  Nothing ever crosses from lane to lane, so that
+//! The equation of `bodies` with the lanes over trajectories instead of bodies.  Nothing ever crosses from lane to lane, so that
 //! a trajectory has the same bits whoever its neighbours are; every lane has its own step, its own time, its own
 //! constants of the mechanism, and takes in the next trajectory as soon as its last one has ended.
 
