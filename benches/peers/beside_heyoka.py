@@ -80,7 +80,7 @@ class Heyoka:
         if problem["motor"] is not None:
             # Body 1 turns at a constant rate: one equation is left.
             p, v = hy.make_vars("p", "v")
-            driven = problem["motor"] * hy.time
+            driven = problem["starts"][0][0] + problem["motor"] * hy.time
             return [(p, v), (v, (a * problem["motor"] ** 2 * hy.sin(driven - p) - w2 * hy.sin(p)) / d2)]
         p1, p2, v1, v2 = hy.make_vars("p1", "p2", "v1", "v2")
         cos, sin = hy.cos(p1 - p2), hy.sin(p1 - p2)
