@@ -49,7 +49,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scene = read_scene("examples/scenes/gentle.json".as_ref(), &[])?;
     let mechanism = Arc::new(Mechanism::new(&scene)?);
     let mut form = Canonical::<2, false>::new(Arc::clone(&mechanism));
-    let mut method = Gauss::new(8, STEP).ok_or("a sound step").plain()?;
+    let mut method = Gauss::new(8, STEP).ok_or("a sound step")?.plain();
     let mut kernel = Kernel::<DoubleDouble>::new(2, 0);
     let mut energy = |form: &mut Canonical<2, false>, state: &State| {
         let mut motion = Motion::default();
