@@ -104,7 +104,14 @@ fn a_flip_is_found_within_its_step_and_ends_the_trajectory() {
     Crowd::new(tight()).march(&mut entrants, Time::from(20.0), &mut |_, passage| {
         let Some(body) = (0..2).find(|&body| passage.turned[body] != 0) else { return Going::On };
         let target = std::f64::consts::PI * passage.turned[body].signum() as f64;
-        found = passage.passes(body, target).map(|after| (body, (passage.from + after).hi, target));
+        let beyond = |after: f64| (passage.at(body, after).0 - target) * target > 0.0;
+        let (mut before, mut after) = (0.0, passage.step);
+        assert!(!beyond(before) && beyond(after));
+        for _ in 0..60 {
+            let middle = 0.5 * (before + after);
+            if beyond(middle) { after = middle } else { before = middle }
+        }
+        found = Some((body, (passage.from + after).hi, target));
         Going::Enough
     });
     let (body, time, target) = found.expect("a flip");

@@ -43,8 +43,6 @@ pub trait Lanes: Copy + Debug + 'static {
     fn swap_pairs(self) -> Self;
     /// `[2, 3, 0, 1]`.
     fn swap_halves(self) -> Self;
-    /// `[0, 1, 0, 1]`.
-    fn first_half(self) -> Self;
     /// Magnitudes.
     fn abs(self) -> Self;
     /// The larger ones; `other` where one is not a number.
@@ -137,11 +135,6 @@ impl Lanes for Portable {
     #[inline(always)]
     fn swap_halves(self) -> Self {
         Self([self.0[2], self.0[3], self.0[0], self.0[1]])
-    }
-
-    #[inline(always)]
-    fn first_half(self) -> Self {
-        Self([self.0[0], self.0[1], self.0[0], self.0[1]])
     }
 
     #[inline(always)]
@@ -279,11 +272,6 @@ mod hardware {
         }
 
         #[inline(always)]
-        fn first_half(self) -> Self {
-            instruction!(Self(_mm256_permute2f128_pd::<0x00>(self.0, self.0)))
-        }
-
-        #[inline(always)]
         fn abs(self) -> Self {
             instruction!(Self(_mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0)))
         }
@@ -325,7 +313,6 @@ mod tests {
             x.neg_mul_add(y, z),
             x.swap_pairs(),
             x.swap_halves(),
-            x.first_half(),
             x.abs(),
             x.max(y),
             L::splat(a[0]),

@@ -31,6 +31,27 @@ pub struct Tree {
 }
 
 impl Tree {
+    /// About the fastest rate of small oscillations under gravity \[rad/s\], for hinges on the bodies' axes.
+    ///
+    /// Stretched, the chain has the least inertia against bending: the trace of M⁻¹ W there is about the square of its fastest rate.
+    pub fn fastest_rate(&self) -> f64 {
+        let n = self.bodies;
+        let mut mass: Vec<f64> = self.coupling.iter().map(|h| h.re).collect();
+        for i in 0..n {
+            mass[i * n + i] = self.diagonal[i];
+        }
+        let mut pivot = vec![0.0; n];
+        factor::<f64, 0>(n, &mut mass, &mut pivot);
+        let mut square = 0.0;
+        for i in 0..n {
+            let mut unit = vec![0.0; n];
+            unit[i] = self.weight[i].norm_squared().sqrt();
+            solve::<f64, 0>(n, &mass, &pivot, &mut unit);
+            square += unit[i];
+        }
+        square.sqrt()
+    }
+
     /// Writes M above and on the diagonal and Im p above it, both row by row (n × n) \[kg·m²\].
     #[inline(always)]
     pub fn couple<T: Scalar, const N: usize>(&self, z: &[Complex<T>], mass: &mut [T], twist: &mut [T]) {

@@ -12,10 +12,11 @@
 //! Scene constants enter as in `pair`: fractions of low orders in two terms, and the solutions of the first orders refined.
 
 use super::direction;
-use super::pace::{self, Pace, RECIPROCAL_REST};
+use super::pace::{self, Pace};
+use super::terms::over;
 use crate::arithmetic::DoubleDouble;
 use crate::arithmetic::lanes::Lanes;
-use crate::dynamics::{Mechanism, State, tree};
+use crate::dynamics::{Mechanism, State};
 
 /// Largest order there is room for.
 pub const MOST: usize = 24;
@@ -100,24 +101,12 @@ impl<const B: usize> Bodies<B> {
                 coupling[i][j / 4][j % 4] = tree.coupling[i * n + j].re;
             }
         }
-        // Stretched, the chain has the least inertia against bending: the trace of M⁻¹ W there is about the square of its fastest rate.
-        let mut mass: Vec<f64> =
-            (0..n * n).map(|at| if at / n == at % n { tree.diagonal[at / n] } else { coupling[at % n][at / n / 4][at / n % 4] }).collect();
-        let mut pivot = vec![0.0; n];
-        tree::factor::<f64, 0>(n, &mut mass, &mut pivot);
-        let mut square = 0.0;
-        for i in 0..n {
-            let mut unit = vec![0.0; n];
-            unit[i] = tree.weight[i].norm_squared().sqrt();
-            tree::solve::<f64, 0>(n, &mass, &pivot, &mut unit);
-            square += unit[i];
-        }
         Some(Self {
             count: n,
             coupling,
             diagonal,
             weight,
-            rate: square.sqrt(),
+            rate: tree.fastest_rate(),
             columns: vec![Column { mass: zero, inverse: zero, cos: zero, sin: zero }; n],
             scratch: Box::new(Scratch { e: [[zero; 2]; MOST + 2], v: [[zero; 3]; MOST + 1] }),
         })
@@ -184,16 +173,6 @@ fn sums<L: Lanes, const B: usize>(scratch: &Scratch<B>, k: usize) -> [Sums<L, B>
         }
     }
     sums
-}
-
-/// x/(k+1), rounded once in low orders.
-#[inline(always)]
-fn over<L: Lanes>(x: L, k: usize) -> L {
-    let r = L::splat(1.0 / k as f64);
-    match RECIPROCAL_REST.get(k) {
-        Some(&rest) => x.mul_add(r, x.mul(L::splat(rest))),
-        None => x.mul(r),
-    }
 }
 
 /// e_{k+1} from f_k.
@@ -430,9 +409,7 @@ fn finish<L: Lanes, const P: usize, const B: usize>(scratch: &Scratch<B>, state:
         let mut k = P;
         while k > 0 {
             let v = L::of(scratch.v[k][0][b]);
-            let r = L::splat(1.0 / (k + 1) as f64);
-            let term = if k + 1 < RECIPROCAL_REST.len() { v.mul_add(r, v.mul(L::splat(RECIPROCAL_REST[k + 1]))) } else { v.mul(r) };
-            angles[k % 2] = angles[k % 2].mul_add(square, term);
+            angles[k % 2] = angles[k % 2].mul_add(square, over(v, k + 1));
             rates[k % 2] = rates[k % 2].mul_add(square, v);
             k -= 1;
         }

@@ -5,13 +5,13 @@
 //! constants of the mechanism, and takes in the next trajectory as soon as its last one has ended.
 
 use super::pace::{self, Pace};
-use super::terms::rest;
+use super::terms::{add_to, over};
 use super::{JUDGES, Kernel, stop};
 #[cfg(target_arch = "x86_64")]
 use crate::arithmetic::lanes::Avx;
 use crate::arithmetic::lanes::{self, Lanes, Portable};
 use crate::arithmetic::{angle, sincos};
-use crate::dynamics::{Mechanism, State, Time, tree};
+use crate::dynamics::{Mechanism, State, Time};
 use crate::stepping::{Cause, StepError, Tally, Tolerance};
 
 /// Largest order there is room for.
@@ -22,17 +22,6 @@ const WIDTH: usize = 4;
 const TEAMS: usize = 2;
 /// Largest number of bodies.
 const BODIES: usize = 4;
-
-/// 1/k in two terms: whatever is divided in a loop is divided by a table.
-const RECIPROCAL: [(f64, f64); MOST + 2] = {
-    let mut table = [(0.0, 0.0); MOST + 2];
-    let mut k = 1;
-    while k < table.len() {
-        table[k] = (1.0 / k as f64, rest(k));
-        k += 1;
-    }
-    table
-};
 
 /// One number a trajectory.
 type Quad = [f64; WIDTH];
@@ -81,33 +70,6 @@ impl Passage<'_> {
     /// Angle \[rad\] and rate \[rad/s\] of a body `after` \[s\] from the step's start, the angle continued from that at the start in [-π, π].
     pub fn at(&self, body: usize, after: f64) -> (f64, f64) {
         (self.series)(body, after)
-    }
-
-    /// When within the step a body's angle passes `target` \[rad\], in seconds from the step's start; `None` where both ends lie on one side of it.
-    ///
-    /// Newton's method, kept inside a shrinking bracket.
-    pub fn passes(&self, body: usize, target: f64) -> Option<f64> {
-        let (mut left, mut right) = (0.0, self.step);
-        let ahead = self.at(body, right).0 > target;
-        if ahead == (self.at(body, left).0 > target) {
-            return None;
-        }
-        let mut t = 0.5 * right;
-        for _ in 0..60 {
-            let (angle, rate) = self.at(body, t);
-            if (angle > target) == ahead {
-                right = t;
-            } else {
-                left = t;
-            }
-            let newton = t - (angle - target) / rate;
-            let next = if newton > left && newton < right { newton } else { 0.5 * (left + right) };
-            if (next - t).abs() <= 1e-15 * self.step {
-                return Some(next);
-            }
-            t = next;
-        }
-        Some(t)
     }
 }
 
@@ -328,7 +290,7 @@ fn march<L: Lanes, const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], unti
                     Some(index) => {
                         let entrant = &entrants[index];
                         team.seat(lane, entrant);
-                        let longest = order as f64 / 3.0 / fastest::<N>(entrant.mechanism);
+                        let longest = order as f64 / 3.0 / entrant.mechanism.tree.fastest_rate();
                         (seat.pace, seat.time) = (Pace::new(crowd.tolerance, order, longest), entrant.state.time);
                         seat.steps = 0;
                     }
@@ -387,28 +349,6 @@ fn march<L: Lanes, const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], unti
             }
         }
     }
-}
-
-/// About the fastest rate of small oscillations \[rad/s\]: stretched, the chain has the least inertia against bending, and the trace of M⁻¹ W there is
-/// about the square of its fastest rate.
-fn fastest<const N: usize>(mechanism: &Mechanism) -> f64 {
-    let tree = &mechanism.tree;
-    let (mut mass, mut pivot) = ([0.0; BODIES * BODIES], [0.0; BODIES]);
-    for i in 0..N {
-        mass[i * N + i] = tree.diagonal[i];
-        for j in i + 1..N {
-            mass[i * N + j] = tree.coupling[i * N + j].re;
-        }
-    }
-    tree::factor::<f64, N>(N, &mut mass, &mut pivot);
-    let mut square = 0.0;
-    for i in 0..N {
-        let mut unit = [0.0; N];
-        unit[i] = tree.weight[i].norm_squared().sqrt();
-        tree::solve::<f64, N>(N, &mass, &pivot, &mut unit);
-        square += unit[i];
-    }
-    square.sqrt()
 }
 
 /// The next trajectory that has a way to go; those that do not fit are stopped.
@@ -518,13 +458,6 @@ fn raise<L: Lanes, const N: usize>(team: &mut Team<N>, f: &mut [[L; N]; 2], k: u
     }
 }
 
-/// x/k, rounded once.
-#[inline(always)]
-fn over<L: Lanes>(x: L, k: usize) -> L {
-    let (r, rest) = RECIPROCAL[k];
-    x.mul_add(L::splat(r), x.mul(L::splat(rest)))
-}
-
 /// Σ_{j≠i} A_ij x_j.
 #[inline(always)]
 fn couple<L: Lanes, const N: usize>(row: &[Quad; N], x: &[L; N], i: usize) -> L {
@@ -567,7 +500,7 @@ fn invert<L: Lanes, const N: usize>(team: &mut Team<N>) {
         }
     }
     for p in 0..N {
-        let pivot = reciprocal(mass[p][p]);
+        let pivot = L::ONE.div(mass[p][p]);
         mass[p][p] = one;
         for j in 0..N {
             mass[p][j] = mass[p][j].mul(pivot);
@@ -589,12 +522,6 @@ fn invert<L: Lanes, const N: usize>(team: &mut Team<N>) {
     }
 }
 
-#[inline(always)]
-fn reciprocal<L: Lanes>(x: L) -> L {
-    let [a, b, c, d] = x.array();
-    L::of([1.0 / a, 1.0 / b, 1.0 / c, 1.0 / d])
-}
-
 /// Every lane's state at the end of its step.
 #[inline(always)]
 fn finish<L: Lanes, const N: usize>(team: &mut Team<N>, order: usize, taken: Quad) {
@@ -611,19 +538,9 @@ fn finish<L: Lanes, const N: usize>(team: &mut Team<N>, order: usize, taken: Qua
         }
         let angle = angles[0].mul_add(h, angles[1]).mul_add(h, L::of(team.powers[0].v[i])).mul(h);
         let rate = rates[0].mul_add(h, rates[1]).mul(h);
-        let moved = L::of(team.low[1][i]).mul(h);
-        add::<L>(&mut team.high[0][i], &mut team.low[0][i], angle, moved);
-        add::<L>(&mut team.high[1][i], &mut team.low[1][i], rate, L::splat(0.0));
+        for (part, increment, rest) in [(0, angle, L::of(team.low[1][i]).mul(h)), (1, rate, L::ZERO)] {
+            let sum = add_to([L::of(team.high[part][i]), L::of(team.low[part][i])], increment, rest);
+            (team.high[part][i], team.low[part][i]) = (sum[0].array(), sum[1].array());
+        }
     }
-}
-
-/// (high, low) + increment + rest: two-sum, then the low parts, then a quick two-sum.
-#[inline(always)]
-fn add<L: Lanes>(high: &mut Quad, low: &mut Quad, increment: L, rest: L) {
-    let (old, under) = (L::of(*high), L::of(*low));
-    let sum = old.add(increment);
-    let second = sum.sub(old);
-    let error = old.sub(sum.sub(second)).add(increment.sub(second)).add(under.add(rest));
-    let total = sum.add(error);
-    (*high, *low) = (total.array(), error.sub(total.sub(sum)).array());
 }

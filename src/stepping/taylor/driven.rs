@@ -18,8 +18,8 @@
 //! Scene constants enter in two terms, as in [`pair`](super::pair).
 
 use super::direction;
-use super::pace::{self, Pace, RECIPROCAL_REST};
-use super::terms::left_over;
+use super::pace::{self, Pace};
+use super::terms::{left_over, reciprocal};
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::dynamics::row::Row;
@@ -248,10 +248,10 @@ fn increments<L: Lanes, const P: usize>(scratch: &Scratch, h: f64) -> ([f64; 4],
     let mut k = P;
     while k > 0 {
         let (e, v) = (L::of(scratch.e[k]), L::of(scratch.v[k]));
-        let r = 1.0 / (k + 1) as f64;
+        let (r, rest) = reciprocal(k + 1);
         let mut second = e.mul(L::of([0.0, 0.0, 0.0, r]));
-        if k + 1 < RECIPROCAL_REST.len() && RECIPROCAL_REST[k + 1] != 0.0 {
-            second = v.mul_add(L::of([RECIPROCAL_REST[k + 1], 0.0, 0.0, 0.0]), second);
+        if rest != 0.0 {
+            second = v.mul_add(L::of([rest, 0.0, 0.0, 0.0]), second);
         }
         let second = v.mul_add(L::of([r, 1.0, 0.0, 0.0]), second);
         let chain = &mut chains[k % 2];

@@ -9,9 +9,9 @@
 //! (k+1) v_{k+1} = M_0⁻¹ (e_k × W - A Σ_{m=1..k} m e_{k+1-m}·f_{j,m} - A (k+1) e_0·g_j),   f_{k+1} = g + v_{k+1} e_0
 //! ```
 
-use super::pace::{self, Pace, RECIPROCAL_REST};
+use super::pace::{self, Pace};
 use super::pair::{self, Flow, Newest, Pair, Start};
-use super::terms::{LEFT, over_first};
+use super::terms::{LEFT, over_first, reciprocal};
 use super::wide::{self, Wide};
 use crate::arithmetic::lanes::Lanes;
 
@@ -29,7 +29,8 @@ pub struct Scratch {
 /// 1/k as `[sign/k, …]` in two parts.
 #[inline(always)]
 fn part<L: Lanes>(signs: [f64; 4], k: usize) -> Wide<L> {
-    Wide::from(signs.map(|sign| sign / k as f64), signs.map(|sign| sign * RECIPROCAL_REST[k]))
+    let (r, rest) = reciprocal(k);
+    Wide::from(signs.map(|sign| sign * r), signs.map(|sign| sign * rest))
 }
 
 /// Expands to order P and takes one step of at most `left` \[s\]; returns the step wanted, and leaves `flow` alone where it is useless.
@@ -101,8 +102,8 @@ pub fn go<L: Lanes, const P: usize>(scratch: &Scratch, flow: &mut Flow, h: f64) 
     let step = L::splat(h);
     let mut sum = Wide::of(chains[0].mul_add(step, chains[1]));
     for k in (1..=LEADING).rev() {
-        let r = 1.0 / (k + 1) as f64;
-        let factor = Wide::from([r, 1.0, r, 1.0], [RECIPROCAL_REST[k + 1], 0.0, RECIPROCAL_REST[k + 1], 0.0]);
+        let (r, rest) = reciprocal(k + 1);
+        let factor = Wide::from([r, 1.0, r, 1.0], [rest, 0.0, rest, 0.0]);
         sum = Wide::from(v[k], scratch.low[k]).mul(factor).add(sum.scale(step));
     }
     let (high, low) = (flow.high, flow.low);

@@ -21,7 +21,7 @@
 
 use super::direction;
 use super::pace::{self, Pace};
-use super::terms::{LEFT, left_over, less_over, over, over_first, pair_sum};
+use super::terms::{LEFT, add_to, left_over, less_over, over, over_first, pair_sum};
 use crate::arithmetic::Complex;
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::sum::two_product;
@@ -349,13 +349,8 @@ pub fn go<L: Lanes, const P: usize>(scratch: &Scratch, flow: &mut Flow, h: f64) 
     let (high, low) = (L::of(flow.high), L::of(flow.low));
     let rates = L::of([flow.high[1], 0.0, flow.high[3], 0.0]);
     let (increment, rest) = increment::<L, P>(scratch, rates, low, h);
-    // Two-sum, then the low parts, then a quick two-sum.
-    let sum = high.add(increment);
-    let second = sum.sub(high);
-    let error = high.sub(sum.sub(second)).add(increment.sub(second)).add(low.add(rest));
-    let total = sum.add(error);
-    flow.high = total.array();
-    flow.low = error.sub(total.sub(sum)).array();
+    let [high, low] = add_to([high, low], increment, rest);
+    (flow.high, flow.low) = (high.array(), low.array());
 }
 
 /// Increments `[phi1, v1, phi2, v2]` over `h` \[s\]: even and odd powers in two Horner chains; and what the rates' low parts move the angles by.
