@@ -31,8 +31,8 @@ pub fn is_start_rate(omega: f64) -> bool {
     format::RATE.holds(omega)
 }
 
-/// A checked scene.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// A checked scene.  As [`Default`] makes it, it is empty.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Scene {
     /// Name, also of its output folder: letters, digits, `-`, `_`.
     pub name: String,
@@ -42,16 +42,32 @@ pub struct Scene {
     pub gravity: [f64; 2],
     /// Bodies, at least one.
     pub bars: Vec<Bar>,
-    /// Hinges; every bar hangs on the ground through a tree of them.
+    /// Hinges; those that close a loop and bars that hang on nothing are told apart when the scene is compiled.
     pub hinges: Vec<Hinge>,
+    /// Points that slide along lines.
+    pub sliders: Vec<Slider>,
+    /// Bodies that are one.
+    pub welds: Vec<Weld>,
+    /// Angles that stay as they are.
+    pub locks: Vec<Lock>,
     /// Springs with dampers.
     pub springs: Vec<Spring>,
+    /// Springs and dampers between angles.
+    pub torsion_springs: Vec<TorsionSpring>,
+    /// Forces that act at points.
+    pub forces: Vec<Force>,
+    /// Torques that act on bodies.
+    pub torques: Vec<Torque>,
     /// Motors: prescribed angles.
     pub motors: Vec<Motor>,
+    /// Motors on sliders: prescribed travels.
+    pub drives: Vec<Drive>,
     /// Walls a point cannot pass.
     pub walls: Vec<Wall>,
     /// Angle and rate of each bar at t = 0, in the order of `bars`; agrees with the motors.
     pub start: Vec<Start>,
+    /// What the scene says of it, the rest of which is found when the scene is compiled; of bars beyond the list's end, angle and rate.
+    pub given: Vec<Given>,
     /// Horizon \[s\], positive.
     pub until: f64,
     /// Output interval \[s\], positive, at most the horizon.
@@ -91,6 +107,50 @@ pub struct Hinge {
     pub between: [Place; 2],
 }
 
+/// A point that slides along a line of the ground or of another body.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Slider {
+    /// Name, unique among sliders; it also names the constraints.
+    pub name: String,
+    /// The point that slides; on another body than the rail.
+    pub point: Place,
+    /// The line.
+    pub rail: Rail,
+    /// True where the two bodies keep the angle between them that they have at the start.
+    pub locked: bool,
+}
+
+/// A line of a bar or of the ground; travel along it is counted from its point.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Rail {
+    /// A point of the line.
+    pub place: Place,
+    /// Unit vector along it, in the bar's frame, or in the world's for the ground.
+    pub direction: [f64; 2],
+}
+
+/// Two places that coincide, of bodies that keep the angle between them that they have at the start.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Weld {
+    /// Name, unique among welds; it also names the constraints.
+    pub name: String,
+    /// The two places; on different bodies.
+    pub between: [Place; 2],
+}
+
+/// An angle that stays as it is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Lock {
+    /// Name, unique among locks; it also names the constraint.
+    pub name: String,
+    /// The bar.
+    pub bar: usize,
+    /// The bar its angle is measured from; `None`: from +x.
+    pub relative_to: Option<usize>,
+    /// The angle \[rad\]; `None`: that of the start.
+    pub angle: Option<f64>,
+}
+
 /// A linear spring with a damper beside it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Spring {
@@ -104,6 +164,66 @@ pub struct Spring {
     pub free_length: f64,
     /// Damping along the spring \[N·s/m\], not negative.
     pub damping: f64,
+}
+
+/// A spring and a damper between the angles of two bodies; whole turns count.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TorsionSpring {
+    /// Name, unique among torsion springs.
+    pub name: String,
+    /// The bar.
+    pub bar: usize,
+    /// The bar its angle is measured from; `None`: from +x.
+    pub relative_to: Option<usize>,
+    /// Stiffness \[N·m/rad\], not negative.
+    pub stiffness: f64,
+    /// Angle without torque \[rad\].
+    pub free_angle: f64,
+    /// Damping \[N·m·s/rad\], not negative.
+    pub damping: f64,
+}
+
+/// A force that acts at a point of a bar.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Force {
+    /// Name, unique among forces.
+    pub name: String,
+    /// The bar.
+    pub bar: usize,
+    /// The point of the bar, in its frame \[m\].
+    pub point: [f64; 2],
+    /// The force \[N\].
+    pub force: [f64; 2],
+    /// True where it turns with the bar: `force` is in the bar's frame.
+    pub follows: bool,
+    /// What it is multiplied by \[1\]; `None`: it is constant.
+    pub law: Option<Law>,
+}
+
+/// A torque that acts on a bar, and its opposite on another where it is between two.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Torque {
+    /// Name, unique among torques.
+    pub name: String,
+    /// The bar.
+    pub bar: usize,
+    /// The bar that takes the opposite torque; `None`: the ground.
+    pub relative_to: Option<usize>,
+    /// The torque \[N·m\].
+    pub torque: f64,
+    /// What it is multiplied by \[1\]; `None`: it is constant.
+    pub law: Option<Law>,
+}
+
+/// A prescribed travel of a slider.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Drive {
+    /// Name, unique among motors; it also names the constraint.
+    pub name: String,
+    /// Index of the slider.
+    pub slider: usize,
+    /// The travel as a function of time \[m\].
+    pub law: Law,
 }
 
 /// A prescribed angle.
@@ -167,4 +287,22 @@ pub struct Start {
     pub phi: f64,
     /// Rate \[rad/s\].
     pub omega: f64,
+}
+
+/// What a scene says of a bar at t = 0.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Given {
+    /// True where the angle is given; else the one in [`Start`] is a guess.
+    pub phi: bool,
+    /// True where the rate is given.
+    pub omega: bool,
+    /// Position of the bar's origin \[m\]; only for a bar, or one of a group of bars, that hangs on nothing.
+    pub origin: Option<[f64; 2]>,
+    /// Velocity of the bar's origin \[m/s\]; likewise.
+    pub velocity: Option<[f64; 2]>,
+}
+
+impl Given {
+    /// Angle and rate are given, and nothing else.
+    pub const ANGLE_AND_RATE: Self = Self { phi: true, omega: true, origin: None, velocity: None };
 }

@@ -114,7 +114,7 @@ fn scene(root: &At) -> Result<Scene, SceneError> {
     let posture = tree.posture(&start);
     assemble::springs(&posture, &springs, &spring_places)?;
     assemble::walls(&posture, &walls, &wall_places)?;
-    Ok(Scene { name, description, gravity, bars, hinges, springs, motors, walls, start, until, every })
+    Ok(Scene { name, description, gravity, bars, hinges, springs, motors, walls, start, until, every, ..Scene::default() })
 }
 
 /// More outputs than this have no distinct times k·every in doubles.

@@ -199,12 +199,10 @@ mod tests {
             gravity: [9.8, 0.0],
             bars: vec![bar("bar1"), bar("bar2")],
             hinges: vec![hinge("A", Place { bar: None, point: [0.0, 0.0] }, 0), hinge("B", Place { bar: Some(0), point: [1.0, 0.0] }, 1)],
-            springs: vec![],
-            motors: vec![],
-            walls: vec![],
             start: vec![Start { phi: 1.1, omega: 0.0 }, Start { phi: 0.0, omega: 0.0 }],
             until: 1.0,
             every: 1.0,
+            ..Scene::default()
         }
     }
 

@@ -43,12 +43,10 @@ pub fn double_pendulum(inertia: Inertia, start: [(f64, f64); 2]) -> Scene {
             Hinge { name: "A".into(), between: [Place { bar: None, point: [0.0, 0.0] }, Place { bar: Some(0), point: [0.0, 0.0] }] },
             Hinge { name: "B".into(), between: [Place { bar: Some(0), point: [LENGTH, 0.0] }, Place { bar: Some(1), point: [0.0, 0.0] }] },
         ],
-        springs: vec![],
-        motors: vec![],
-        walls: vec![],
         start: start.iter().map(|&(phi, omega)| Start { phi, omega }).collect(),
         until: 10.0,
         every: 0.01,
+        ..Scene::default()
     }
 }
 
@@ -122,12 +120,10 @@ pub fn pendulum(phi: f64, omega: f64) -> Scene {
             name: "A".into(),
             between: [Place { bar: None, point: [0.0, 0.0] }, Place { bar: Some(0), point: [0.0, 0.0] }],
         }],
-        springs: vec![],
-        motors: vec![],
-        walls: vec![],
         start: vec![Start { phi, omega }],
         until: 10.0,
         every: 0.1,
+        ..Scene::default()
     }
 }
 

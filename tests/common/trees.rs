@@ -98,10 +98,10 @@ pub fn tree(n: usize, motors: bool, dice: &mut Dice) -> Scene {
         hinges,
         springs,
         motors: driven,
-        walls: vec![],
         start: (0..n).map(|_| Start { phi: dice.within(-3.0, 3.0), omega: dice.within(-3.0, 3.0) }).collect(),
         until: 1.0,
         every: 0.1,
+        ..Scene::default()
     }
 }
 
