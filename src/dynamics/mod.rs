@@ -45,6 +45,7 @@ pub mod points;
 pub mod quadratic;
 pub mod reaction;
 pub mod row;
+pub mod schur;
 pub mod series;
 pub mod ties;
 pub mod tree;
