@@ -41,6 +41,7 @@ pub mod natural;
 pub mod point;
 pub mod points;
 pub mod reaction;
+pub mod recursive;
 pub mod row;
 pub mod series;
 pub mod ties;
