@@ -32,6 +32,7 @@ pub mod compile;
 pub mod contact;
 pub mod elimination;
 pub mod energy;
+pub mod envelope;
 pub mod force;
 pub mod impact;
 pub mod kernel;

@@ -1,38 +1,50 @@
-//! The hinge tree body by body: accelerations in a number of operations proportional to the number of bodies.
+//! The hinge trees body by body: accelerations in a number of operations proportional to the number of bodies.
 //!
 //! What hangs on a hinge answers an acceleration `a` of the hinge with the force `R = A a + b` on it: a symmetric apparent mass A (2 × 2) and a
 //! force b, whatever the joints beyond are free to do.  Both are found from the outermost bodies inwards; then the accelerations follow outwards.
 //!
 //! ```text
-//! u_k = i z_p r_k     lever of hinge k about the hinge of its parent p: O_k' = O_p' + u_k w_p
-//! n_k = n_p + i u_k w_p²,  n_ground = -g           hinge acceleration where no angle accelerates, gravity taken along
-//! h_k = i m z_k c_k,   f_k = m n_k + i h_k w_k² - F_k,   t_k = T_k - h_k·n_k        of the body alone, with a force F and a torque T on it
+//! u_k = i z_p r_k                           lever of hinge k about the hinge of its parent p: O_k' = O_p' + u_k w_p
+//! n_k = n_p + i u_k w_p²,  n_ground = -g    hinge acceleration where no coordinate accelerates, less gravity
+//! h_k = i m z_k c_k,   f_k = m n_k + i h_k w_k²,   t_k = Q_k - h_k·n_k          of the body alone, with the generalized force Q on its angle
 //!
-//! inwards:   A = m + Σ A_j,   h = h_k + Σ A_j u_j,   d = I + m |c|² + Σ u_j·A_j u_j,   f = f_k + Σ b_j,   e = t_k - Σ u_j·b_j
-//!            A_k = A - h hᵀ/d,   b_k = f + h e/d
+//! inwards:   B = m + Σ A_j,   h = h_k + Σ A_j u_j,   d = I + m |c|² + Σ u_j·A_j u_j,   f = f_k + Σ b_j,   e = t_k - Σ u_j·b_j
+//!            A_k = B - h hᵀ/d,   b_k = f + h e/d
 //! outwards:  alpha_k = (e - h·a_k)/d,   a_j = a_k + u_j alpha_k,   a_ground = 0
 //! ```
 //!
 //! Sums run over the bodies j that hang on k; r is the hinge on the parent and c the centre of mass, both from the body's own hinge in the body's
-//! directions; a·b is the dot product of the plane, and `i x · y` the moment of y with the arm x.  The true acceleration of hinge k is n_k + a_k.
+//! directions; x·y is the dot product of the plane, and `i x · y` the moment of y with the arm x.  Hinge k accelerates with n_k + g + a_k.
+//! A foot that moves freely takes up no force: `A a = Q - b` there, solved as two more coordinates.
 //!
-//! Eliminated this way M is `(1 + K) D (1 + K)ᵀ` with D the diagonal of the d: the vectors e belong to the inner factor, and for generalized
-//! loads Q, P on the angles `Qᵀ M⁻¹ P = Σ e_Q e_P / d`.
+//! Eliminated this way M is L D Lᵀ with D the diagonal of the d and L the inward pass: the e are L⁻¹ of the load, and for two loads P and Q
+//! `Pᵀ M⁻¹ Q = Σ e_P e_Q / d`, of which [`rows`] makes use.
 //!
-//! Source: R. Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 7.3, the articulated-body algorithm; the factors are those of
-//! G. Rodriguez, *Kalman filtering, smoothing and recursive robot arm forward and inverse dynamics*, IEEE J. Robotics Autom. 3 (1987).  In the
-//! plane, in absolute angles and with forces taken at the hinges, a hinge passes on no moment, so that two by two numbers suffice; this reduction,
-//! and the products with u taken before the division is done (it is what the recursion waits for), are ours.
+//! Source: R. Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 7.3, the articulated-body algorithm; that its passes are triangular
+//! factors: G. Rodriguez, *Kalman filtering, smoothing, and recursive robot arm forward and inverse dynamics*, IEEE J. Robotics Autom. 3 (1987).
+//! Ours: in the plane, with absolute angles and forces taken at the hinges, a hinge passes on no moment, so that two numbers by two suffice; and the
+//! products with u are formed before the division by d is done, which is what the recursion waits for.
+
+pub mod rows;
 
 use crate::arithmetic::{Complex, Real, Scalar};
+
+/// What a body hangs on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Foot {
+    /// A point of the ground.
+    Ground,
+    /// A point of another body, from that body's own hinge in its directions \[m\].
+    On(usize, Complex<f64>),
+    /// A point that moves freely, with coordinates x and the one after it.
+    Free(usize),
+}
 
 /// A body as it hangs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hung {
-    /// The body it hangs on; `None`: the ground.
-    pub parent: Option<usize>,
-    /// Its hinge on the parent: from the parent's own hinge, in the parent's directions \[m\]; on the ground any place serves.
-    pub hinge: Complex<f64>,
+    /// What it hangs on.
+    pub foot: Foot,
     /// Centre of mass from the body's own hinge, in its directions \[m\].
     pub centre: Complex<f64>,
     /// Mass \[kg\].
@@ -41,13 +53,15 @@ pub struct Hung {
     pub inertia: f64,
 }
 
-/// A body in the order of the tree: every branch in one piece, inner bodies first, the ground before all.
+/// A body in the order of the trees: every branch in one piece, inner bodies first, the ground before all.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Link {
     /// Its number in the scene.
     body: usize,
-    /// Place of the parent; 0: the ground.
+    /// Place of the parent; 0: the ground, or a foot that moves freely.
     parent: usize,
+    /// Coordinate x of its foot where that moves freely; else 0, which is an angle.
+    foot: usize,
     /// r \[m\].
     hinge: Complex<f64>,
     /// i m c \[kg·m\].
@@ -62,62 +76,75 @@ struct Link {
     alone: bool,
 }
 
-/// The constants of a tree of n bodies in n numbers of a kind.
+/// The constants of hinge trees of n bodies: n numbers of a kind.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Links {
     /// The ground, then the bodies.
     links: Vec<Link>,
+    /// Place of each body.
+    place: Vec<usize>,
+    /// Number of coordinates: the bodies' angles, then two for every foot that moves freely.
+    coordinates: usize,
     /// Gravity \[m/s²\].
     gravity: Complex<f64>,
 }
 
 impl Links {
-    /// Puts bodies in the order of the tree; `None` where some do not hang on the ground.
-    pub fn new(bodies: &[Hung], gravity: Complex<f64>) -> Option<Self> {
+    /// Puts bodies in the order of the trees; bodies that hang on one another in a ring are left out.
+    pub fn new(bodies: &[Hung], gravity: Complex<f64>) -> Self {
         let n = bodies.len();
-        // Children of each place: a list from the last to the first.
+        let slot_of = |body: &Hung| if let Foot::On(parent, _) = body.foot { parent + 1 } else { 0 };
+        // What hangs on each slot, from the last body to the first; slot 0 is the ground.
         let (mut last, mut before) = (vec![0; n + 1], vec![0; n + 1]);
         for (k, body) in bodies.iter().enumerate() {
-            let parent = body.parent.map_or(0, |parent| parent + 1);
+            let parent = slot_of(body);
             (before[k + 1], last[parent]) = (last[parent], k + 1);
         }
-        let has_one = |slot: usize| last[slot] != 0 && before[last[slot]] == 0;
+        let carries_one = |slot: usize| last[slot] != 0 && before[last[slot]] == 0;
+        let origin = Complex::ZERO;
         let ground =
-            Link { body: 0, parent: 0, hinge: Complex::ZERO, moment: Complex::ZERO, mass: 0.0, inertia: 1.0, forks: true, alone: false };
-        let mut links = Vec::with_capacity(n + 1);
-        let mut place = vec![0; n + 1];
+            Link { body: 0, parent: 0, foot: 0, hinge: origin, moment: origin, mass: 0.0, inertia: 1.0, forks: true, alone: false };
+        let (mut links, mut place, mut coordinates) = (Vec::with_capacity(n + 1), vec![0; n], n);
         let mut front = vec![0];
         while let Some(slot) = front.pop() {
-            place[slot] = links.len();
-            links.push(match slot {
-                0 => ground,
-                _ => {
-                    let Hung { parent, hinge, centre, mass, inertia } = bodies[slot - 1];
-                    let parent = parent.map_or(0, |parent| parent + 1);
-                    Link {
-                        body: slot - 1,
-                        parent: place[parent],
-                        hinge,
-                        moment: centre.left().times(mass),
-                        mass,
-                        inertia: inertia + mass * centre.norm_squared(),
-                        forks: last[slot] != 0 && !has_one(slot),
-                        alone: parent != 0 && has_one(parent),
-                    }
+            let mut link = ground;
+            if slot > 0 {
+                let body = &bodies[slot - 1];
+                let parent = slot_of(body);
+                place[slot - 1] = links.len();
+                link = Link {
+                    body: slot - 1,
+                    moment: body.centre.left().times(body.mass),
+                    mass: body.mass,
+                    inertia: body.inertia + body.mass * body.centre.norm_squared(),
+                    forks: last[slot] != 0 && !carries_one(slot),
+                    alone: parent != 0 && carries_one(parent),
+                    ..ground
+                };
+                match body.foot {
+                    Foot::Ground => {}
+                    Foot::On(parent, hinge) => (link.parent, link.hinge) = (place[parent], hinge),
+                    Foot::Free(x) => (link.foot, coordinates) = (x, coordinates + 2),
                 }
-            });
+            }
+            links.push(link);
             let mut child = last[slot];
             while child != 0 {
                 front.push(child);
                 child = before[child];
             }
         }
-        (links.len() == n + 1).then_some(Self { links, gravity })
+        Self { links, place, coordinates, gravity }
     }
 
     /// Number of bodies.
     pub fn bodies(&self) -> usize {
-        self.links.len() - 1
+        self.place.len()
+    }
+
+    /// Number of coordinates.
+    pub fn coordinates(&self) -> usize {
+        self.coordinates
     }
 }
 
@@ -128,6 +155,8 @@ struct Place<T> {
     z: Complex<T>,
     /// u \[m\].
     lever: Complex<T>,
+    /// w² \[rad²/s²\].
+    square: T,
     /// n \[m/s²\].
     drift: Complex<T>,
     /// h of the body alone \[kg·m\].
@@ -138,14 +167,14 @@ struct Place<T> {
     torque: T,
 }
 
-/// A body after the inward pass.
+/// A coordinate after the inward pass.
 #[derive(Clone, Copy, Debug, Default)]
 struct Joint<T> {
-    /// h \[kg·m\].
+    /// h \[kg·m\]; of the x of a foot what its y takes along, as a number without unit in `re`.
     moment: Complex<T>,
-    /// 1/d \[1/(kg·m²)\].
+    /// 1/d \[1/(kg·m²); 1/kg for a foot\].
     pivot: T,
-    /// e \[N·m\].
+    /// e \[N·m; N for a foot\].
     excess: T,
 }
 
@@ -161,6 +190,14 @@ impl<T: Scalar> Symmetric<T> {
     #[inline(always)]
     fn times(self, v: Complex<T>) -> Complex<T> {
         Complex { re: self.xx * v.re + self.xy * v.im, im: self.xy * v.re + self.yy * v.im }
+    }
+
+    /// Its two pivots, and the ratio between them: a foot.
+    fn factors(self) -> [Joint<T>; 2] {
+        let pivot = T::ONE / self.xx;
+        let ratio = self.xy * pivot;
+        let x = Joint { moment: Complex::new(ratio, T::ZERO), pivot, excess: T::ZERO };
+        [x, Joint { moment: Complex::ZERO, pivot: T::ONE / (self.yy - self.xy * ratio), excess: T::ZERO }]
     }
 }
 
@@ -194,68 +231,57 @@ impl<T: Scalar> Outer<T> {
 
 /// Scratch space of an evaluation; nothing is allocated after [`Recursive::new`].
 ///
-/// An evaluation is [`face`](Self::face), [`convect`](Self::convect), any number of [`push`](Self::push) and [`twist`](Self::twist),
-/// [`fold`](Self::fold), [`unfold`](Self::unfold).
+/// An evaluation is [`face`](Self::face), [`convect`](Self::convect), where there are forces [`burden`](Self::burden), [`fold`](Self::fold), where
+/// there are rows [`Rows::constrain`](rows::Rows), and [`unfold`](Self::unfold).
 #[derive(Clone, Debug)]
 pub struct Recursive<T> {
-    /// Unit vectors in the scene's order (n).
+    /// Elements: unit vectors, and feet at the place of their x (n).
     pub z: Vec<Complex<T>>,
-    /// Place of each body (n).
-    place: Vec<usize>,
     /// The ground, then the bodies.
     places: Vec<Place<T>>,
+    /// Of each coordinate.
     joints: Vec<Joint<T>>,
     /// Sums over the bodies that hang on a fork; zero between evaluations.
     forks: Vec<Outer<T>>,
-    /// a \[m/s²\].
+    /// a \[m/s²\], the ground's and the bodies'.
     hinge: Vec<Complex<T>>,
-    /// alpha \[rad/s²\].
-    alpha: Vec<T>,
 }
 
 impl<T: Real> Recursive<T> {
     /// Scratch space for these bodies.
     pub fn new(links: &Links) -> Self {
-        let n = links.bodies();
-        let mut place = vec![0; n];
-        for (k, link) in links.links.iter().enumerate().skip(1) {
-            place[link.body] = k;
-        }
+        let (bodies, n) = (links.bodies(), links.coordinates);
         Self {
             z: vec![Complex::ZERO; n],
-            place,
-            places: vec![Place::default(); n + 1],
-            joints: vec![Joint::default(); n + 1],
-            forks: vec![Outer::default(); n + 1],
-            hinge: vec![Complex::ZERO; n + 1],
-            alpha: vec![T::ZERO; n + 1],
+            places: vec![Place::default(); bodies + 1],
+            joints: vec![Joint::default(); n],
+            forks: vec![Outer::default(); bodies + 1],
+            hinge: vec![Complex::ZERO; bodies + 1],
         }
     }
 
-    /// Unit vectors of these angles \[rad\], in the scene's order.
+    /// Elements at these coordinates \[rad, m\].
     #[inline]
-    pub fn face(&mut self, phi: &[T]) {
-        T::units(phi, &mut self.z);
+    pub fn face(&mut self, links: &Links, phi: &[T]) {
+        let angles = links.bodies();
+        T::units(&phi[..angles], &mut self.z[..angles]);
+        for x in (angles..links.coordinates).step_by(2) {
+            self.z[x] = Complex::new(phi[x], phi[x + 1]);
+        }
     }
 
-    /// The first outward pass, at the unit vectors in `z`: levers, velocity terms, gravity; forgets all forces.
+    /// The first outward pass, at the elements in `z`: levers, velocity terms, gravity; no other forces.
     #[inline]
     pub fn convect(&mut self, links: &Links, omega: &[T]) {
         let all = &links.links[..];
-        let n = all.len();
-        let places = &mut self.places[..n];
+        let places = &mut self.places[..all.len()];
         let (mut z, mut square) = (Complex::new(T::ONE, T::ZERO), T::ZERO);
         let mut drift = -Complex::of(links.gravity);
-        places[0] = Place { z, drift, ..Place::default() };
-        for k in 1..n {
+        places[0] = Place { z, square, drift, ..Place::default() };
+        for k in 1..all.len() {
             let link = &all[k];
             if link.parent + 1 != k {
-                let parent = &places[link.parent];
-                (z, drift) = (parent.z, parent.drift);
-                square = match link.parent {
-                    0 => T::ZERO,
-                    parent => omega[all[parent].body] * omega[all[parent].body],
-                };
+                Place { z, square, drift, .. } = places[link.parent];
             }
             let lever = z.turn(link.hinge).left();
             drift += lever.left().times(square);
@@ -263,30 +289,27 @@ impl<T: Real> Recursive<T> {
             (z, square) = (self.z[link.body], w * w);
             let moment = z.turn(link.moment);
             let force = drift.times(T::of(link.mass)) + moment.left().times(square);
-            places[k] = Place { z, lever, drift, moment, force, torque: -moment.dot(drift) };
+            places[k] = Place { z, square, lever, drift, moment, force, torque: -moment.dot(drift) };
         }
     }
 
-    /// A force \[N\] on a body, its point `arm` \[m\] away from the body's own hinge in the world's directions.
+    /// Generalized forces \[N·m, N\] on all coordinates, after [`convect`](Self::convect).
     #[inline]
-    pub fn push(&mut self, body: usize, arm: Complex<T>, force: Complex<T>) {
-        let place = &mut self.places[self.place[body]];
-        place.force = place.force - force;
-        place.torque += arm.cross(force);
+    pub fn burden(&mut self, links: &Links, load: &[T]) {
+        for (place, link) in self.places.iter_mut().zip(&links.links).skip(1) {
+            place.torque += load[link.body];
+            if link.foot != 0 {
+                place.force = place.force - Complex::new(load[link.foot], load[link.foot + 1]);
+            }
+        }
     }
 
-    /// A torque \[N·m\] on a body.
-    #[inline]
-    pub fn twist(&mut self, body: usize, torque: T) {
-        self.places[self.place[body]].torque += torque;
-    }
-
-    /// The inward pass: factors of M, and what is left of the torques.
+    /// The inward pass: the factors of M, and what is left of the load.
     #[inline]
     pub fn fold(&mut self, links: &Links) {
         let all = &links.links[..];
         let n = all.len();
-        let (places, joints, forks) = (&self.places[..n], &mut self.joints[..n], &mut self.forks[..n]);
+        let (places, joints, forks) = (&self.places[..n], &mut self.joints, &mut self.forks[..n]);
         forks[0] = Outer::default();
         let mut outer = Outer::default();
         for k in (1..n).rev() {
@@ -300,57 +323,72 @@ impl<T: Real> Recursive<T> {
             let pivot = T::ONE / (outer.inertia + T::of(link.inertia));
             let force = outer.force + here.force;
             let excess = here.torque - outer.torque;
-            // With the lever, before the hinge has given way.
+            // With the lever, as if the hinge did not give way; then what it takes off.
             let rigid = mass.times(u);
             let (inertia, across, torque) = (u.dot(rigid), moment.dot(u), u.dot(force));
             let share = moment.times(pivot);
-            joints[k] = Joint { moment, pivot, excess };
+            joints[link.body] = Joint { moment, pivot, excess };
             let felt = Outer {
                 mass: Symmetric {
                     xx: mass.xx - share.re * moment.re,
                     xy: mass.xy - share.re * moment.im,
                     yy: mass.yy - share.im * moment.im,
                 },
-                moment: rigid - moment.times(across * pivot),
+                moment: rigid - share.times(across),
                 inertia: inertia - across * across * pivot,
                 force: force + share.times(excess),
                 torque: torque + across * pivot * excess,
             };
             if link.alone {
                 outer = felt;
-            } else {
-                forks[link.parent].join(felt);
-                outer = Outer::default();
+                continue;
+            }
+            forks[link.parent].join(felt);
+            outer = Outer::default();
+            if link.foot != 0 {
+                let ([x, y], excess) = (felt.mass.factors(), -felt.force);
+                joints[link.foot] = Joint { excess: excess.re, ..x };
+                joints[link.foot + 1] = Joint { excess: excess.im - x.moment.re * excess.re, ..y };
             }
         }
     }
 
-    /// The second outward pass: accelerations \[rad/s²\], in the scene's order.
+    /// The second outward pass: the accelerations \[rad/s², m/s²\] of all coordinates, or M⁻¹ of the load whose e are in place.
     #[inline]
     pub fn unfold(&mut self, links: &Links, alpha: &mut [T]) {
         let all = &links.links[..];
         let n = all.len();
-        let (places, joints) = (&self.places[..n], &self.joints[..n]);
-        let (hinges, alphas) = (&mut self.hinge[..n], &mut self.alpha[..n]);
+        let (places, joints, hinges) = (&self.places[..n], &self.joints[..], &mut self.hinge[..n]);
         let (mut a, mut turn) = (Complex::ZERO, T::ZERO);
         for k in 1..n {
-            let (link, here, joint) = (&all[k], &places[k], &joints[k]);
+            let (link, here, joint) = (&all[k], &places[k], &joints[all[k].body]);
             if link.parent + 1 != k {
-                (a, turn) = (hinges[link.parent], alphas[link.parent]);
+                (a, turn) = match link.parent {
+                    0 => (Complex::ZERO, T::ZERO),
+                    parent => (hinges[parent], alpha[all[parent].body]),
+                };
+            }
+            if link.foot != 0 {
+                let [x, y] = [&joints[link.foot], &joints[link.foot + 1]];
+                let up = y.excess * y.pivot;
+                a = Complex::new(x.excess * x.pivot - x.moment.re * up, up);
+                (alpha[link.foot], alpha[link.foot + 1]) = (a.re, a.im);
             }
             a += here.lever.times(turn);
             turn = (joint.excess - joint.moment.dot(a)) * joint.pivot;
             hinges[k] = a;
-            alphas[k] = turn;
             alpha[link.body] = turn;
         }
     }
 
-    /// Accelerations \[rad/s²\] under gravity alone, in the scene's order.
+    /// Accelerations \[rad/s², m/s²\] of all coordinates under gravity and generalized forces \[N·m, N\], if any.
     #[inline]
-    pub fn accelerate(&mut self, links: &Links, phi: &[T], omega: &[T], alpha: &mut [T]) {
-        self.face(phi);
+    pub fn accelerate(&mut self, links: &Links, phi: &[T], omega: &[T], load: Option<&[T]>, alpha: &mut [T]) {
+        self.face(links, phi);
         self.convect(links, omega);
+        if let Some(load) = load {
+            self.burden(links, load);
+        }
         self.fold(links);
         self.unfold(links, alpha);
     }
