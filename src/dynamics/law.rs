@@ -46,6 +46,16 @@ impl Law {
         self.sines.iter().fold(polynomial, |sum, sine| sum + sine.argument(t).sin_cos().0.scale(sine.amplitude))
     }
 
+    /// The same angle for ever \[rad\].
+    pub fn constant(start: f64) -> Self {
+        Self { start, rate: 0.0, acceleration: 0.0, sines: Vec::new() }
+    }
+
+    /// True where nothing moves.
+    pub fn is_constant(&self) -> bool {
+        self.rate == 0.0 && self.is_steady()
+    }
+
     /// True where the rate never changes.
     pub fn is_steady(&self) -> bool {
         self.acceleration == 0.0 && self.sines.is_empty()

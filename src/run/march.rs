@@ -197,7 +197,7 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
         let tracer = self.tracer.get_or_insert_with(|| {
             let mechanism = Arc::new(self.problem.mechanism().clone());
             let tolerance = Tolerance { relative: 1e-13, absolute: 1e-13 };
-            marcher(sized!(mechanism.bodies.len(), form(&mechanism, Stabilization::None, 1.0)), Dp8::new(tolerance), &motion, Steps::Own)
+            marcher(sized!(mechanism.size(), form(&mechanism, Stabilization::None, 1.0)), Dp8::new(tolerance), &motion, Steps::Own)
         });
         tracer.jump(&motion);
         tracer.forget();
@@ -250,7 +250,7 @@ fn canonical<const N: usize>(mechanism: &Arc<Mechanism>) -> Box<dyn Problem> {
 
 /// Builds what a plan asks for; Baumgarte's time constant is measured first where none was given.
 pub(super) fn build(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<Box<dyn March>, StepError> {
-    let n = mechanism.bodies.len();
+    let n = mechanism.size();
     let tolerance = plan.tolerance.unwrap_or_default();
     let step = plan.step.unwrap_or(0.0);
     if plan.stabilization == Stabilization::Baumgarte && plan.time_constant.is_none() {

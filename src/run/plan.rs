@@ -334,17 +334,16 @@ fn fixed_step(
 
 /// An upper estimate of the fastest rate of the scene \[rad/s\]: what the energy at the start allows the lightest part, gravity, springs and motors.
 fn fastest_rate(scene: &Scene, mechanism: &Mechanism) -> f64 {
-    let n = mechanism.bodies.len();
+    let n = mechanism.coordinates();
     let start = mechanism.start(scene);
     let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
     let omega: Vec<f64> = start.omega.iter().map(|omega| omega.hi).collect();
-    let mut kernel = Kernel::<f64>::new(n, 0);
+    let mut kernel = Kernel::<f64>::without_rows(mechanism);
     let energy = mechanism.energy(&mut kernel, &phi, &omega);
     tree::factor::<f64, 0>(n, &mut kernel.mass, &mut kernel.pivot);
     let lightest = kernel.pivot.iter().fold(0.0, |most: f64, &pivot| most.max(pivot));
-    let gravity: f64 = mechanism.tree.weight.iter().map(|weight| weight.norm_squared().sqrt()).sum();
-    let ground: f64 = mechanism.bodies.iter().map(|body| -body.mass * mechanism.gravity.dot(body.centre.root)).sum();
-    let available = (energy.total() - ground + gravity).max(0.0);
+    let gravity: f64 = mechanism.tree.weight[..mechanism.bodies.len()].iter().map(|weight| weight.norm_squared().sqrt()).sum();
+    let available = (energy.total() - mechanism.ground_energy + gravity).max(0.0);
     let springs: f64 = mechanism
         .springs
         .iter()

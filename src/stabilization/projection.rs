@@ -8,6 +8,7 @@
 //! The shortest way in the metric of the mass matrix.  Source: E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), section VII.2
 //! (algorithm 2.1); E. Eich, SIAM J. Numer. Anal. 30 (1993).
 
+use crate::arithmetic::Complex;
 use crate::arithmetic::sum::two_sum;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::{Field, Form, Mechanism, State, Time, tree};
@@ -54,7 +55,7 @@ where
     ) -> Result<Reached, StepError> {
         let (name, tolerance) = (self.inner.name(), self.tolerance);
         let mechanism = problem.mechanism();
-        let kernel = self.kernel.get_or_insert_with(|| Kernel::new(mechanism.bodies.len(), mechanism.rows.len()));
+        let kernel = self.kernel.get_or_insert_with(|| Kernel::new(mechanism));
         self.inner.advance(problem, state, until, tally, &mut |problem, state| {
             let moved = project(problem.mechanism(), kernel, state, tolerance).map_err(|(row, left)| StepError {
                 cause: Cause::ProjectionFailed,
@@ -96,7 +97,7 @@ const ROUNDING: f64 = 1e-14;
 /// # Errors
 /// Name of the worst row and its violation where it cannot be brought below `tolerance`.
 pub fn project(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &mut State, tolerance: f64) -> Result<bool, (String, f64)> {
-    match mechanism.bodies.len() {
+    match mechanism.size() {
         1 => project_sized::<1>(mechanism, kernel, state, tolerance),
         2 => project_sized::<2>(mechanism, kernel, state, tolerance),
         3 => project_sized::<3>(mechanism, kernel, state, tolerance),
@@ -111,10 +112,10 @@ fn project_sized<const N: usize>(
     state: &mut State,
     tolerance: f64,
 ) -> Result<bool, (String, f64)> {
-    let n = tree::size::<N>(mechanism.bodies.len());
+    let n = tree::size::<N>(mechanism.coordinates());
     let rows = mechanism.rows.len();
-    kernel.face::<N>(&state.y[..n]);
-    let energy_before = mechanism.energy_facing::<f64, N>(kernel, &state.y[n..2 * n]).total();
+    kernel.face::<N>(mechanism, &state.y[..n]);
+    let energy_before = mechanism.energy_facing::<f64, N>(kernel, &state.y[..n], &state.y[n..2 * n]).total();
     tree::factor::<f64, N>(n, &mut kernel.mass, &mut kernel.pivot);
     kernel.linearise::<N>(mechanism, state.time, &state.y[..n], &state.y[n..2 * n]);
     let (mut last, mut moved, mut far) = (f64::INFINITY, false, 0.0);
@@ -132,12 +133,16 @@ fn project_sized<const N: usize>(
         (moved, far) = (true, largest(far, turn));
         let (phi, omega) = (&state.y[..n], &state.y[n..2 * n]);
         if turn <= SMALL {
-            for (z, &turn) in kernel.z.iter_mut().zip(&kernel.load) {
+            let angles = tree::size::<N>(mechanism.bodies.len());
+            for (z, &turn) in kernel.z[..angles].iter_mut().zip(&kernel.load) {
                 *z = *z - z.left().times(turn) - z.times(0.5 * turn * turn);
+            }
+            for x in (angles..n).step_by(2) {
+                kernel.z[x] = Complex::new(phi[x], phi[x + 1]);
             }
             kernel.rows_at(mechanism, state.time, phi, omega);
         } else {
-            kernel.face::<N>(phi);
+            kernel.face::<N>(mechanism, phi);
             mechanism.tree.couple::<f64, N>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
             tree::factor::<f64, N>(n, &mut kernel.mass, &mut kernel.pivot);
             kernel.linearise::<N>(mechanism, state.time, phi, omega);
@@ -164,7 +169,7 @@ fn project_sized<const N: usize>(
     }
     if moved {
         state.wrap();
-        let energy = mechanism.energy_facing::<f64, N>(kernel, &state.y[n..2 * n]).total();
+        let energy = mechanism.energy_facing::<f64, N>(kernel, &state.y[..n], &state.y[n..2 * n]).total();
         state.y[2 * n + 1] += energy - energy_before;
     }
     Ok(far > ROUNDING)
