@@ -25,33 +25,14 @@
 //! Ours: in the plane, with absolute angles and forces taken at the hinges, a hinge passes on no moment, so that two numbers by two suffice; and the
 //! products with u are formed before the division by d is done, which is what the recursion waits for.
 
+pub mod evaluation;
 pub mod rows;
 
+pub use evaluation::{Evaluation, Recursion};
+
+use super::compile::Body;
+use super::forest::{Foot, Forest};
 use crate::arithmetic::{Complex, Real, Scalar};
-
-/// What a body hangs on.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Foot {
-    /// A point of the ground.
-    Ground,
-    /// A point of another body, from that body's own hinge in its directions \[m\].
-    On(usize, Complex<f64>),
-    /// A point that moves freely, with coordinates x and the one after it.
-    Free(usize),
-}
-
-/// A body as it hangs.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hung {
-    /// What it hangs on.
-    pub foot: Foot,
-    /// Centre of mass from the body's own hinge, in its directions \[m\].
-    pub centre: Complex<f64>,
-    /// Mass \[kg\].
-    pub mass: f64,
-    /// Moment of inertia about the centre of mass \[kg·m²\].
-    pub inertia: f64,
-}
 
 /// A body in the order of the trees: every branch in one piece, inner bodies first, the ground before all.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,30 +71,29 @@ pub struct Links {
 }
 
 impl Links {
-    /// Puts bodies in the order of the trees; bodies that hang on one another in a ring are left out.
-    pub fn new(bodies: &[Hung], gravity: Complex<f64>) -> Self {
+    /// Puts bodies in the order of the trees.
+    pub fn new(bodies: &[Body], forest: &Forest, gravity: Complex<f64>) -> Self {
         let n = bodies.len();
-        let slot_of = |body: &Hung| if let Foot::On(parent, _) = body.foot { parent + 1 } else { 0 };
+        let slot_of = |body: usize| forest.hangs[body].foot.parent().map_or(0, |parent| parent + 1);
         // What hangs on each slot, from the last body to the first; slot 0 is the ground.
         let (mut last, mut before) = (vec![0; n + 1], vec![0; n + 1]);
-        for (k, body) in bodies.iter().enumerate() {
-            let parent = slot_of(body);
+        for k in 0..n {
+            let parent = slot_of(k);
             (before[k + 1], last[parent]) = (last[parent], k + 1);
         }
         let carries_one = |slot: usize| last[slot] != 0 && before[last[slot]] == 0;
         let origin = Complex::ZERO;
         let ground =
             Link { body: 0, parent: 0, foot: 0, hinge: origin, moment: origin, mass: 0.0, inertia: 1.0, forks: true, alone: false };
-        let (mut links, mut place, mut coordinates) = (Vec::with_capacity(n + 1), vec![0; n], n);
+        let (mut links, mut place) = (Vec::with_capacity(n + 1), vec![0; n]);
         let mut front = vec![0];
         while let Some(slot) = front.pop() {
             let mut link = ground;
-            if slot > 0 {
-                let body = &bodies[slot - 1];
-                let parent = slot_of(body);
-                place[slot - 1] = links.len();
+            if let Some(k) = slot.checked_sub(1) {
+                let (body, parent) = (&bodies[k], slot_of(k));
+                place[k] = links.len();
                 link = Link {
-                    body: slot - 1,
+                    body: k,
                     moment: body.centre.left().times(body.mass),
                     mass: body.mass,
                     inertia: body.inertia + body.mass * body.centre.norm_squared(),
@@ -121,10 +101,10 @@ impl Links {
                     alone: parent != 0 && carries_one(parent),
                     ..ground
                 };
-                match body.foot {
-                    Foot::Ground => {}
+                match forest.hangs[k].foot {
+                    Foot::Ground(_) => {}
                     Foot::On(parent, hinge) => (link.parent, link.hinge) = (place[parent], hinge),
-                    Foot::Free(x) => (link.foot, coordinates) = (x, coordinates + 2),
+                    Foot::Free(x) => link.foot = x,
                 }
             }
             links.push(link);
@@ -134,7 +114,7 @@ impl Links {
                 child = before[child];
             }
         }
-        Self { links, place, coordinates, gravity }
+        Self { links, place, coordinates: forest.coordinates, gravity }
     }
 
     /// Number of bodies.
@@ -231,12 +211,10 @@ impl<T: Scalar> Outer<T> {
 
 /// Scratch space of an evaluation; nothing is allocated after [`Recursive::new`].
 ///
-/// An evaluation is [`face`](Self::face), [`convect`](Self::convect), where there are forces [`burden`](Self::burden), [`fold`](Self::fold), where
-/// there are rows [`Rows::constrain`](rows::Rows), and [`unfold`](Self::unfold).
+/// An evaluation is [`convect`](Self::convect), where there are forces [`burden`](Self::burden), [`fold`](Self::fold), where there are rows what
+/// [`rows`] does, and [`unfold`](Self::unfold).
 #[derive(Clone, Debug)]
 pub struct Recursive<T> {
-    /// Elements: unit vectors, and feet at the place of their x (n).
-    pub z: Vec<Complex<T>>,
     /// The ground, then the bodies.
     places: Vec<Place<T>>,
     /// Of each coordinate.
@@ -252,7 +230,6 @@ impl<T: Real> Recursive<T> {
     pub fn new(links: &Links) -> Self {
         let (bodies, n) = (links.bodies(), links.coordinates);
         Self {
-            z: vec![Complex::ZERO; n],
             places: vec![Place::default(); bodies + 1],
             joints: vec![Joint::default(); n],
             forks: vec![Outer::default(); bodies + 1],
@@ -260,19 +237,9 @@ impl<T: Real> Recursive<T> {
         }
     }
 
-    /// Elements at these coordinates \[rad, m\].
+    /// The first outward pass, at the elements `z`: levers, velocity terms, gravity; no other forces.
     #[inline]
-    pub fn face(&mut self, links: &Links, phi: &[T]) {
-        let angles = links.bodies();
-        T::units(&phi[..angles], &mut self.z[..angles]);
-        for x in (angles..links.coordinates).step_by(2) {
-            self.z[x] = Complex::new(phi[x], phi[x + 1]);
-        }
-    }
-
-    /// The first outward pass, at the elements in `z`: levers, velocity terms, gravity; no other forces.
-    #[inline]
-    pub fn convect(&mut self, links: &Links, omega: &[T]) {
+    pub fn convect(&mut self, links: &Links, elements: &[Complex<T>], omega: &[T]) {
         let all = &links.links[..];
         let places = &mut self.places[..all.len()];
         let (mut z, mut square) = (Complex::new(T::ONE, T::ZERO), T::ZERO);
@@ -286,7 +253,7 @@ impl<T: Real> Recursive<T> {
             let lever = z.turn(link.hinge).left();
             drift += lever.left().times(square);
             let w = omega[link.body];
-            (z, square) = (self.z[link.body], w * w);
+            (z, square) = (elements[link.body], w * w);
             let moment = z.turn(link.moment);
             let force = drift.times(T::of(link.mass)) + moment.left().times(square);
             places[k] = Place { z, square, lever, drift, moment, force, torque: -moment.dot(drift) };
@@ -381,15 +348,17 @@ impl<T: Real> Recursive<T> {
         }
     }
 
-    /// Accelerations \[rad/s², m/s²\] of all coordinates under gravity and generalized forces \[N·m, N\], if any.
-    #[inline]
-    pub fn accelerate(&mut self, links: &Links, phi: &[T], omega: &[T], load: Option<&[T]>, alpha: &mut [T]) {
-        self.face(links, phi);
-        self.convect(links, omega);
-        if let Some(load) = load {
-            self.burden(links, load);
+    /// Forgets the load: what [`unfold`](Self::unfold) makes of it is zero then.
+    pub fn unburden(&mut self) {
+        for joint in &mut self.joints {
+            joint.excess = T::ZERO;
         }
-        self.fold(links);
-        self.unfold(links, alpha);
+    }
+
+    /// Writes the reciprocal pivots of M \[1/(kg·m²), 1/kg\].
+    pub fn pivots(&self, pivots: &mut [T]) {
+        for (pivot, joint) in pivots.iter_mut().zip(&self.joints) {
+            *pivot = joint.pivot;
+        }
     }
 }

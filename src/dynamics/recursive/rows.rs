@@ -183,10 +183,16 @@ impl<T: Real> Rows<T> {
         }
     }
 
+    /// The coordinates on a row's way and its Jacobian there.
+    #[inline]
+    pub fn gradient<'a>(&'a self, ways: &'a Ways, row: usize) -> impl Iterator<Item = (usize, T)> + 'a {
+        ways.range(row).map(|at| (ways.steps[at].coordinate, self.gradient[at]))
+    }
+
     /// G v of a row.
     #[inline]
     pub fn along(&self, ways: &Ways, row: usize, v: &[T]) -> T {
-        ways.range(row).fold(T::ZERO, |sum, at| sum + self.gradient[at] * v[ways.steps[at].coordinate])
+        self.gradient(ways, row).fold(T::ZERO, |sum, (k, g)| sum + g * v[k])
     }
 
     /// The inward passes of all rows and the factors of S, after [`take`](Self::take) for every row and [`Recursive::fold`].
@@ -242,11 +248,10 @@ impl<T: Real> Rows<T> {
         }
     }
 
-    /// Writes G a of every row, a the accelerations of the load whose e are in place.
+    /// Adds G a of every row, a the accelerations of the load whose e are in place.
     #[inline]
     pub fn project(&self, ways: &Ways, trees: &Recursive<T>, along: &mut [T]) {
         for (row, along) in along.iter_mut().enumerate().take(ways.rows()) {
-            *along = T::ZERO;
             for at in ways.range(row) {
                 let joint = &trees.joints[ways.steps[at].coordinate];
                 *along += self.excess[at] * (joint.pivot * joint.excess);
