@@ -47,14 +47,14 @@ fn largest(numbers: impl IntoIterator<Item = f64>) -> f64 {
 
 /// The f64 kernel after an evaluation at a motion.
 fn evaluate(mechanism: &Mechanism, motion: &Motion) -> Kernel<f64> {
-    let mut kernel = Kernel::new(&mechanism);
+    let mut kernel = Kernel::new(mechanism);
     kernel.accelerate::<0>(mechanism, motion.time, &plain(&motion.phi), &plain(&motion.omega), Bias::default());
     kernel
 }
 
 /// The same in double-double.
 fn evaluate_exactly(mechanism: &Mechanism, motion: &Motion) -> Kernel<DoubleDouble> {
-    let mut kernel = Kernel::new(&mechanism);
+    let mut kernel = Kernel::new(mechanism);
     kernel.accelerate::<0>(mechanism, motion.time, &motion.phi, &motion.omega, Bias::default());
     kernel
 }

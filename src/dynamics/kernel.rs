@@ -7,6 +7,7 @@
 //! A scene without rows never enters the second line.
 
 use super::row::{Linearised, Posture};
+use super::schur::{self, Weakest};
 use super::tree::{self, size};
 use super::{Mechanism, Time};
 use crate::arithmetic::{Complex, Real, Scalar};
@@ -39,8 +40,12 @@ pub struct Kernel<T> {
     pub lifted: Vec<T>,
     /// S = G M⁻¹ Gᵀ above and on the diagonal, then its factors (r × r).
     pub schur: Vec<T>,
-    /// Reciprocal pivots of S (r).
+    /// Reciprocal pivots of S (r); zero for rows left out.
     pub schur_pivot: Vec<T>,
+    /// What pivots of S are measured against (r).
+    pub scale: Vec<f64>,
+    /// The row nearest to being left out in the last evaluation.
+    pub weakest: Weakest,
     /// The rows at this moment (r).
     pub rows: Vec<Linearised<T>>,
     /// Multipliers (r) \[N·m or N\].
@@ -52,15 +57,16 @@ pub struct Kernel<T> {
 impl<T: Scalar> Kernel<T> {
     /// Scratch space for a mechanism and its rows.
     pub fn new(mechanism: &Mechanism) -> Self {
-        Self::sized(mechanism.coordinates(), mechanism.rows.len())
+        Self::sized(mechanism.coordinates(), mechanism.row_scales())
     }
 
     /// Scratch space for a mechanism whose rows nobody asks about.
     pub fn without_rows(mechanism: &Mechanism) -> Self {
-        Self::sized(mechanism.coordinates(), 0)
+        Self::sized(mechanism.coordinates(), Vec::new())
     }
 
-    fn sized(n: usize, rows: usize) -> Self {
+    fn sized(n: usize, scale: Vec<f64>) -> Self {
+        let rows = scale.len();
         let idle = Linearised { position: T::ZERO, drive: T::ZERO, convective: T::ZERO };
         Self {
             z: vec![Complex::ZERO; n],
@@ -72,6 +78,8 @@ impl<T: Scalar> Kernel<T> {
             lifted: vec![T::ZERO; rows * n],
             schur: vec![T::ZERO; rows * rows],
             schur_pivot: vec![T::ZERO; rows],
+            scale,
+            weakest: Weakest::NONE,
             rows: vec![idle; rows],
             multiplier: vec![T::ZERO; rows],
             correction: vec![T::ZERO; rows],
@@ -191,7 +199,7 @@ impl<T: Real> Kernel<T> {
                 schur[r * rows + s] = dot(&jacobian[r * n..(r + 1) * n], &lifted[s * n..(s + 1) * n]);
             }
         }
-        tree::factor::<T, R>(rows, schur, &mut self.schur_pivot);
+        self.weakest = schur::factor::<T, R>(rows, schur, &mut self.schur_pivot, &self.scale);
     }
 
     /// C' of row `r` \[rad/s or m/s\], after [`Kernel::linearise`].

@@ -315,7 +315,8 @@ mod tests {
             let exact = DoubleDouble::of(0.3) + t.scale(rate);
             let whole = DoubleDouble::PI.ldexp(0.5).scale(found.quarter as f64) + DoubleDouble::sum(found.high, found.low);
             let error = (exact - whole).reduced().0.hi.abs();
-            let bound = if exact.hi.abs() < 6e9 { 1e-18 } else { 2e-17 };
+            // Far away the reference itself has so many digits only: 1e-31 of 4e14 rad.
+            let bound = if exact.hi.abs() < 6e9 { 1e-18 } else { 1e-16 };
             prop_assert!(error < bound, "{error:e}");
         }
     }

@@ -46,6 +46,7 @@ pub mod quadratic;
 pub mod reaction;
 pub mod recursive;
 pub mod row;
+pub mod schur;
 pub mod series;
 pub mod ties;
 pub mod tree;

@@ -30,6 +30,7 @@ use self::polynomial::{Fractions, UNROLLED, convolve, copy, copy_vectors, width,
 use self::rows::RowSeries;
 use self::spring::SpringSeries;
 use super::row::{Measure, Row};
+use super::schur::Weakest;
 use super::ties::Ties;
 use super::tree::{self, size};
 use super::{Coordinates, Mechanism, Time};
@@ -188,6 +189,11 @@ impl<T: Coefficient> Series<T> {
         if let Some(first) = powers.first_mut() {
             *first += place.constant;
         }
+    }
+
+    /// The row in force nearest to being left out at the start.
+    pub fn weakest(&self) -> Weakest {
+        self.rows.weakest()
     }
 
     /// The series of what forces are multiplied by.

@@ -17,6 +17,7 @@ use crate::dynamics::law::Law;
 use crate::dynamics::quadratic::Quadratic;
 use crate::dynamics::row::{Measure, Row};
 use crate::dynamics::ties::Ties;
+use crate::dynamics::schur::{self, Weakest};
 use crate::dynamics::{Mechanism, Time, tree};
 
 /// Rows in force and their multipliers.
@@ -29,6 +30,10 @@ pub struct RowSeries<T> {
     lifted: Vec<T>,
     schur: Vec<T>,
     pivot: Vec<T>,
+    /// What pivots are measured against (r).
+    scale: Vec<f64>,
+    /// The row nearest to being left out at the start.
+    weakest: Weakest,
     /// lambda: powers 0…P-1 (P × r).
     multiplier: Vec<T>,
 }
@@ -55,6 +60,8 @@ impl<T: Real> RowSeries<T> {
                 Some(Kind::Place { place: place.clone(), law: law.clone(), drive: zeros(if law.is_some() { order + 1 } else { 0 }) })
             }
         };
+        let in_force = mechanism.rows.iter().filter(|row| !(row.is_angle() && ties.driven()));
+        let scale = in_force.map(|row| row.scale(&mechanism.tree)).collect();
         let kinds: Vec<Kind<T>> = mechanism.rows.iter().filter_map(kind).collect();
         let (r, f) = (kinds.len(), ties.count());
         Self {
@@ -64,6 +71,8 @@ impl<T: Real> RowSeries<T> {
             lifted: zeros(r * f),
             schur: zeros(r * r),
             pivot: zeros(r),
+            scale,
+            weakest: Weakest::NONE,
             multiplier: zeros(order * r),
         }
     }
@@ -72,6 +81,11 @@ impl<T: Real> RowSeries<T> {
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
         self.kinds.is_empty()
+    }
+
+    /// The row in force nearest to being left out at the start of the series.
+    pub fn weakest(&self) -> Weakest {
+        self.weakest
     }
 
     /// Power `m` of the multipliers of the rows in force \[N, N·m over s^m\].
@@ -124,7 +138,7 @@ impl<T: Real> RowSeries<T> {
                 self.schur[i * r + j] = dot(&self.jacobian[i * f..(i + 1) * f], &self.lifted[j * f..(j + 1) * f]);
             }
         }
-        tree::factor::<T, 0>(r, &mut self.schur, &mut self.pivot);
+        self.weakest = schur::factor::<T, 0>(r, &mut self.schur, &mut self.pivot, &self.scale);
     }
 
     /// Multipliers of power m from the free accelerations of the coordinates, which become the constrained ones.
