@@ -7,14 +7,18 @@ use super::impact::Contact;
 use super::kernel::Kernel;
 use super::law::Law;
 use super::point::Point;
+use super::recursive::Recursion;
 use super::row::{self, Row, Site};
 use super::ties::Ties;
-use super::tree::{self, Tree};
+use super::tree::Tree;
 use crate::arithmetic::Complex;
 use crate::scene::{Place, Scene, Slider};
+use std::sync::Arc;
 
-/// The largest number of coordinates the dense form takes; its matrices hold n² numbers.
+/// The largest number of coordinates for which the matrices of the tree are made; they hold n² numbers.
 pub const DENSE_LIMIT: usize = 2000;
+/// So many coordinates have code made for their number.
+const UNROLLED: usize = 3;
 
 /// A scene's equations: constants only, shared by every form and method.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,6 +51,8 @@ pub struct Mechanism {
     pub ground_energy: f64,
     /// What energies are divided by in reports \[J\]: see [`Mechanism::energy_scale`](super::energy).
     pub energy_scale: f64,
+    /// The constants of the recursive form, where that is the one evaluated.
+    pub recursion: Option<Arc<Recursion>>,
 }
 
 /// A body of the mechanism.
@@ -85,8 +91,8 @@ pub enum CompileError {
     /// Motors and locks give the same angle twice.
     #[error("`{0}` gives an angle that the other motors and locks give already")]
     Redundant(String),
-    /// Too many bodies for the dense form.
-    #[error("{0} coordinates; the dense form takes at most {DENSE_LIMIT}")]
+    /// Too many rows that act on one another.
+    #[error("{0} constraint rows that act on one another through the bodies they hang on; at most about {DENSE_LIMIT} are taken")]
     TooMany(usize),
     /// The mass matrix is singular: some body has no inertia about its hinge.
     #[error("the mass matrix is singular at the start: bar `{0}` and what hangs on it have no inertia about its hinge")]
@@ -97,13 +103,10 @@ impl Mechanism {
     /// Compiles a scene.
     ///
     /// # Errors
-    /// What the reader of scenes refuses too (doubled motors), a singular mass matrix, or too many bodies.
+    /// What the reader of scenes refuses too (doubled motors), a singular mass matrix, or too many rows that act on one another.
     pub fn new(scene: &Scene) -> Result<Self, CompileError> {
         let forest = Forest::new(scene);
         let n = forest.coordinates;
-        if n > DENSE_LIMIT {
-            return Err(CompileError::TooMany(n));
-        }
         let bodies: Vec<Body> = (scene.bars.iter().zip(&forest.hangs))
             .map(|(bar, hang)| Body {
                 name: bar.name.clone(),
@@ -150,8 +153,8 @@ impl Mechanism {
                 Contact { row, point: site.point, normal, restitution: wall.restitution }
             })
             .collect();
-        let root = |k: usize, body: &Body| body.mass * gravity.dot(forest.walk(k, body.centre).root);
-        let ground_energy = bodies.iter().enumerate().fold(0.0, |sum, (k, body)| sum - root(k, body));
+        let roots = forest.roots();
+        let ground_energy = bodies.iter().zip(&roots).fold(0.0, |sum, (body, &root)| sum - body.mass * gravity.dot(root));
         let mut mechanism = Self {
             ground_energy,
             tree: constants(&bodies, &forest, gravity),
@@ -167,10 +170,24 @@ impl Mechanism {
             ties,
             gravity,
             energy_scale: 1.0,
+            recursion: None,
         };
+        mechanism.choose_form();
+        if let Some(recursion) = mechanism.recursion.as_ref().filter(|recursion| recursion.ways.entries() > DENSE_LIMIT * DENSE_LIMIT) {
+            return Err(CompileError::TooMany(recursion.ways.rows()));
+        }
         mechanism.check_mass(scene)?;
         mechanism.energy_scale = mechanism.scale_of_energy(&mechanism.start(scene));
         Ok(mechanism)
+    }
+
+    /// Decides in which form the equations are evaluated, body by body or by the matrices of the tree, by what they cost with these rows.
+    pub(super) fn choose_form(&mut self) {
+        let is_dense = self.tree.is_dense();
+        let recursion = (!is_dense || self.coordinates() > UNROLLED)
+            .then(|| Recursion::new(&self.bodies, &self.forest, &self.rows, self.gravity))
+            .filter(|recursion| !is_dense || recursion.pays());
+        self.recursion = recursion.map(Arc::new);
     }
 
     /// Number of coordinates: the bodies' angles, and two for every foot that moves freely.
@@ -222,12 +239,18 @@ impl Mechanism {
         let mut mechanism = self.clone();
         let before_contacts = mechanism.standing_rows();
         mechanism.rows.splice(before_contacts..before_contacts, row::pin_rows(name, a, b, self.bodies.len()));
+        mechanism.choose_form();
         mechanism
     }
 
     /// True where the scene has a damper.
     pub fn is_damped(&self) -> bool {
         self.springs.iter().any(|spring| spring.damping != 0.0) || self.torsions.iter().any(|torsion| torsion.damping != 0.0)
+    }
+
+    /// True where anything but gravity and rows acts.
+    pub fn is_forced(&self) -> bool {
+        !(self.springs.is_empty() && self.torsions.is_empty() && self.actions.is_empty())
     }
 
     /// True where forces do work that no energy stands for: dampers, applied forces and torques.
@@ -242,7 +265,7 @@ impl Mechanism {
 
     /// True where only gravity and rows act on bodies that hang on the ground.
     pub fn is_plain(&self) -> bool {
-        self.size() > 0 && self.springs.is_empty() && self.torsions.is_empty() && self.actions.is_empty()
+        self.size() > 0 && !self.is_forced()
     }
 
     /// True where whole turns matter, so that angles are not wrapped.
@@ -257,13 +280,12 @@ impl Mechanism {
 
     /// The mass matrix at the start must be positive definite.
     fn check_mass(&self, scene: &Scene) -> Result<(), CompileError> {
-        let n = self.coordinates();
         let start = self.start(scene);
         let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
-        let mut kernel = Kernel::<f64>::without_rows(self);
+        let mut kernel = Kernel::<f64>::new(self);
         kernel.face::<0>(self, &phi);
-        self.tree.couple::<f64, 0>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
-        tree::factor::<f64, 0>(n, &mut kernel.mass, &mut kernel.pivot);
+        kernel.couple::<0>(self);
+        kernel.factor::<0>(self, &vec![0.0; phi.len()]);
         let singular = |&k: &usize| {
             // Not a number counts as singular.
             let sound = 1.0 / (kernel.pivot[k] * self.tree.diagonal[k]) > 1e-13;
@@ -360,6 +382,9 @@ fn actions(scene: &Scene, forest: &Forest) -> Vec<Action> {
 /// H, d and the weights.
 fn constants(bodies: &[Body], forest: &Forest, gravity: Complex<f64>) -> Tree {
     let n = forest.coordinates;
+    if n > DENSE_LIMIT {
+        return long_constants(bodies, forest, gravity);
+    }
     let mut coupling = vec![Complex::ZERO; n * n];
     let mut diagonal: Vec<f64> = bodies.iter().map(|body| body.inertia).collect();
     diagonal.resize(n, 0.0);
@@ -378,4 +403,30 @@ fn constants(bodies: &[Body], forest: &Forest, gravity: Complex<f64>) -> Tree {
     }
     let off_axis = coupling.iter().any(|h| h.im != 0.0);
     Tree { coordinates: n, angles: bodies.len(), coupling, diagonal, weight, off_axis }
+}
+
+/// d and the weights, from what hangs on each body; no H.
+fn long_constants(bodies: &[Body], forest: &Forest, gravity: Complex<f64>) -> Tree {
+    let n = forest.coordinates;
+    let (mut diagonal, mut weight) = (vec![0.0; n], vec![Complex::ZERO; n]);
+    // Mass of each body and of all that hangs on it.
+    let mut carried: Vec<f64> = bodies.iter().map(|body| body.mass).collect();
+    let mut off_axis = false;
+    for &k in forest.order.iter().rev() {
+        let Body { mass, inertia, centre, .. } = bodies[k];
+        diagonal[k] += inertia + mass * centre.norm_squared();
+        weight[k] += (centre.conj() * gravity).times(mass);
+        off_axis |= centre.im != 0.0;
+        match forest.hangs[k].foot {
+            Foot::Ground(_) => {}
+            Foot::On(parent, hinge) => {
+                diagonal[parent] += carried[k] * hinge.norm_squared();
+                weight[parent] += (hinge.conj() * gravity).times(carried[k]);
+                carried[parent] += carried[k];
+                off_axis |= hinge.im != 0.0;
+            }
+            Foot::Free(x) => (diagonal[x], weight[x]) = (carried[k], gravity.times(carried[k])),
+        }
+    }
+    Tree { coordinates: n, angles: bodies.len(), coupling: Vec::new(), diagonal, weight, off_axis }
 }

@@ -7,7 +7,8 @@
 //! Source: A. Jennings, *A compact storage scheme for the solution of symmetric linear simultaneous equations*, Comput. J. 9 (1966); the order of
 //! the rows: E. Cuthill, J. McKee, *Reducing the bandwidth of sparse symmetric matrices*, Proc. 24th ACM Conf. (1969), reversed after A. George.
 
-use crate::arithmetic::Scalar;
+use super::schur::{DROPPED, Weakest};
+use crate::arithmetic::{Real, Scalar};
 
 /// The shape of a symmetric matrix below and on its diagonal.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -53,9 +54,11 @@ impl Envelope {
         matrix[at + j - first] += value;
     }
 
-    /// Replaces a matrix by its factors, and writes the reciprocal pivots.
+    /// Replaces a matrix by its factors, and writes the reciprocal pivots: zero for rows left out, whose pivot is less than a share
+    /// [`DROPPED`] of their scale.  Tells the row whose pivot is the smallest share.
     #[inline]
-    pub fn factor<T: Scalar>(&self, matrix: &mut [T], pivot: &mut [T]) {
+    pub fn factor<T: Real>(&self, matrix: &mut [T], pivot: &mut [T], scale: &[f64]) -> Weakest {
+        let mut weakest = Weakest::NONE;
         for i in 0..self.rows.len() {
             let (first, here) = self.row(i);
             let (done, row) = matrix.split_at_mut(here.start);
@@ -75,8 +78,13 @@ impl Envelope {
                 diagonal -= g * l;
                 row[j - first] = l;
             }
-            pivot[i] = T::ONE / diagonal;
+            let share = diagonal.value() / scale[i];
+            if share < weakest.share {
+                weakest = Weakest { share, row: i };
+            }
+            pivot[i] = if share < DROPPED { T::ZERO } else { T::ONE / diagonal };
         }
+        weakest
     }
 
     /// Solves in place with the factors.
@@ -166,12 +174,26 @@ mod tests {
         let x = [1.0, -2.0, 0.5, 3.0, -0.25];
         let mut right: Vec<f64> = (0..5).map(|i| (0..5).map(|j| entry(i, j) * x[j]).sum()).collect();
         let mut pivot = [0.0; 5];
-        envelope.factor(&mut matrix, &mut pivot);
+        envelope.factor(&mut matrix, &mut pivot, &[1.0; 5]);
         envelope.solve(&matrix, &pivot, &mut right);
         for i in 0..5 {
             assert!((right[i] - x[i]).abs() < 1e-15, "{right:?}");
         }
         assert_eq!(envelope.entries(), 1 + 2 + 1 + 3 + 5);
+    }
+
+    #[test]
+    fn a_row_that_depends_on_others_gets_no_multiplier() {
+        // The third row is the sum of the first two.
+        let envelope = Envelope::new(&[0; 3]);
+        let (full, mut pivot) = ([2.0, 0.5, 3.0, 2.5, 3.5, 6.0], [0.0; 3]);
+        let mut factors = full;
+        let weakest = envelope.factor(&mut factors, &mut pivot, &[2.0, 3.0, 6.0]);
+        assert!(weakest.share.abs() < 1e-15 && weakest.row == 2);
+        // S times (1, -2, 0).
+        let mut found = [1.0, -5.5, -4.5];
+        envelope.solve(&factors, &pivot, &mut found);
+        assert!((found[0] - 1.0).abs() + (found[1] + 2.0).abs() < 1e-14 && found[2] == 0.0, "{found:?}");
     }
 
     /// Rows along a line, two a joint, given out of order.

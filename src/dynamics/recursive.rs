@@ -86,7 +86,7 @@ impl Links {
         let ground =
             Link { body: 0, parent: 0, foot: 0, hinge: origin, moment: origin, mass: 0.0, inertia: 1.0, forks: true, alone: false };
         let (mut links, mut place) = (Vec::with_capacity(n + 1), vec![0; n]);
-        let mut front = vec![0];
+        let mut front = vec![0usize];
         while let Some(slot) = front.pop() {
             let mut link = ground;
             if let Some(k) = slot.checked_sub(1) {

@@ -5,7 +5,7 @@
 use super::methods::{MethodId, Stabilization};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::Kernel;
-use crate::dynamics::{Mechanism, Time, tree};
+use crate::dynamics::{Mechanism, Time};
 use crate::scene::Scene;
 use crate::stepping::Tolerance;
 
@@ -334,13 +334,12 @@ fn fixed_step(
 
 /// An upper estimate of the fastest rate of the scene \[rad/s\]: what the energy at the start allows the lightest part, gravity, springs and motors.
 fn fastest_rate(scene: &Scene, mechanism: &Mechanism) -> f64 {
-    let n = mechanism.coordinates();
     let start = mechanism.start(scene);
     let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
     let omega: Vec<f64> = start.omega.iter().map(|omega| omega.hi).collect();
-    let mut kernel = Kernel::<f64>::without_rows(mechanism);
+    let mut kernel = Kernel::<f64>::new(mechanism);
     let energy = mechanism.energy(&mut kernel, &phi, &omega);
-    tree::factor::<f64, 0>(n, &mut kernel.mass, &mut kernel.pivot);
+    kernel.factor::<0>(mechanism, &omega);
     let lightest = kernel.pivot.iter().fold(0.0, |most: f64, &pivot| most.max(pivot));
     let gravity: f64 = mechanism.tree.weight[..mechanism.bodies.len()].iter().map(|weight| weight.norm_squared().sqrt()).sum();
     let available = (energy.total() - mechanism.ground_energy + gravity).max(0.0);

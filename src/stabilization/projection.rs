@@ -116,7 +116,7 @@ fn project_sized<const N: usize>(
     let rows = mechanism.rows.len();
     kernel.face::<N>(mechanism, &state.y[..n]);
     let energy_before = mechanism.energy_facing::<f64, N>(kernel, &state.y[..n], &state.y[n..2 * n]).total();
-    tree::factor::<f64, N>(n, &mut kernel.mass, &mut kernel.pivot);
+    kernel.factor::<N>(mechanism, &state.y[n..2 * n]);
     kernel.linearise::<N>(mechanism, state.time, &state.y[..n], &state.y[n..2 * n]);
     let (mut last, mut moved, mut far) = (f64::INFINITY, false, 0.0);
     loop {
@@ -143,18 +143,18 @@ fn project_sized<const N: usize>(
             kernel.rows_at(mechanism, state.time, phi, omega);
         } else {
             kernel.face::<N>(mechanism, phi);
-            mechanism.tree.couple::<f64, N>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
-            tree::factor::<f64, N>(n, &mut kernel.mass, &mut kernel.pivot);
+            kernel.couple::<N>(mechanism);
+            kernel.factor::<N>(mechanism, omega);
             kernel.linearise::<N>(mechanism, state.time, phi, omega);
         }
     }
-    let lever = |kernel: &Kernel<f64>, r: usize| kernel.jacobian[r * n..(r + 1) * n].iter().fold(1.0, |sum: f64, g| sum.max(g.abs()));
+    let lever = |kernel: &Kernel<f64>, r: usize| kernel.fold_gradient(r, 1.0, |most: f64, _, g| most.max(g.abs()));
     check(mechanism, kernel, tolerance, |kernel, r| (kernel.rows[r].position, lever(kernel, r)))?;
     let rate = |kernel: &Kernel<f64>, state: &State, r: usize| kernel.row_rate(r, &state.y[n..2 * n]);
     // A row's rate is a sum of G_k w_k, and no smaller than their rounding.
     let pace = |kernel: &Kernel<f64>, state: &State, r: usize| {
-        let terms = kernel.jacobian[r * n..(r + 1) * n].iter().zip(&state.y[n..2 * n]);
-        terms.fold(kernel.rows[r].drive.abs().max(1.0), |most, (g, w)| most.max((g * w).abs()))
+        let least = kernel.rows[r].drive.abs().max(1.0);
+        kernel.fold_gradient(r, least, |most, k, g| most.max((g * state.y[n + k]).abs()))
     };
     let mut fast = 0.0;
     for r in 0..rows {
@@ -177,13 +177,11 @@ fn project_sized<const N: usize>(
 
 /// Subtracts M⁻¹ Gᵀ S⁻¹ times what is in `multiplier` from the unknowns `from`…, and leaves it in `load`; returns its largest entry.
 fn shift(kernel: &mut Kernel<f64>, state: &mut State, from: usize, n: usize) -> f64 {
-    let rows = kernel.multiplier.len();
-    tree::solve::<f64, 0>(rows, &kernel.schur, &kernel.schur_pivot, &mut kernel.multiplier);
+    kernel.correct();
     let mut largest_change = 0.0;
     for k in 0..n {
-        let change = (0..rows).fold(0.0, |sum, r| sum + kernel.lifted[r * n + k] * kernel.multiplier[r]);
+        let change = kernel.load[k];
         (state.y[from + k], state.low[from + k]) = two_sum(state.y[from + k], state.low[from + k] - change);
-        kernel.load[k] = change;
         largest_change = largest(largest_change, change.abs());
     }
     largest_change

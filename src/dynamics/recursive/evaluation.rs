@@ -7,6 +7,7 @@ use crate::dynamics::compile::Body;
 use crate::dynamics::forest::Forest;
 use crate::dynamics::kernel::Bias;
 use crate::dynamics::row::{Linearised, Posture, Row};
+use crate::dynamics::schur::Weakest;
 use crate::dynamics::{Mechanism, Time};
 use std::sync::Arc;
 
@@ -50,11 +51,11 @@ pub struct Evaluation<T> {
 }
 
 impl<T: Real> Evaluation<T> {
-    /// Scratch space for these constants.
-    pub fn new(recursion: &Arc<Recursion>) -> Self {
+    /// Scratch space for these constants and the [scales](Row::scale) of their rows.
+    pub fn new(recursion: &Arc<Recursion>, scales: &[f64]) -> Self {
         Self {
             trees: Recursive::new(&recursion.links),
-            rows: Rows::new(&recursion.ways),
+            rows: Rows::new(&recursion.ways, scales),
             jacobian: vec![T::ZERO; recursion.links.coordinates()],
             recursion: Arc::clone(recursion),
         }
@@ -70,7 +71,7 @@ impl<T: Real> Evaluation<T> {
         }
     }
 
-    /// The factors of M at the elements `z`, and what is left of velocity terms and gravity; `pivots` where asked for.
+    /// The factors of M at the elements `z`, and what is left of velocity terms and gravity.
     pub fn factor(&mut self, z: &[Complex<T>], omega: &[T]) {
         self.trees.convect(&self.recursion.links, z, omega);
         self.trees.fold(&self.recursion.links);
@@ -99,7 +100,7 @@ impl<T: Real> Evaluation<T> {
         self.trees.unfold(&self.recursion.links, alpha);
     }
 
-    /// The multipliers and the bias's share of them after [`fold`](Self::fold), the rows as they are, and what they leave of all forces.
+    /// The multipliers and the bias's share of them after [`fold`](Self::fold), the rows as they are, and what they leave of all forces; the weakest row.
     #[inline]
     pub fn constrain(
         &mut self,
@@ -108,7 +109,7 @@ impl<T: Real> Evaluation<T> {
         at: Posture<T>,
         bias: Bias,
         found: (&mut [Linearised<T>], &mut [T], &mut [T]),
-    ) {
+    ) -> Weakest {
         let (rows, multiplier, correction) = found;
         let (ways, is_biased) = (&self.recursion.ways, bias != Bias::default());
         for (r, row) in mechanism.rows.iter().enumerate() {
@@ -123,13 +124,14 @@ impl<T: Real> Evaluation<T> {
             }
             rows[r] = here;
         }
-        self.rows.couple(ways, &self.trees);
+        let weakest = self.rows.couple(ways, &self.trees);
         self.rows.project(ways, &self.trees, multiplier);
         self.rows.solve(ways, multiplier);
         if is_biased {
             self.rows.solve(ways, correction);
         }
         self.rows.resist(ways, &mut self.trees, multiplier);
+        weakest
     }
 
     /// C, G, C_t, gamma of every row, and nothing else.
@@ -141,8 +143,8 @@ impl<T: Real> Evaluation<T> {
     }
 
     /// The factors of S, after [`rows_at`](Self::rows_at) and the factors of M.
-    pub fn couple(&mut self) {
-        self.rows.couple(&self.recursion.ways, &self.trees);
+    pub fn couple(&mut self) -> Weakest {
+        self.rows.couple(&self.recursion.ways, &self.trees)
     }
 
     /// Replaces x by S⁻¹ x, and writes M⁻¹ Gᵀ S⁻¹ x.

@@ -11,6 +11,7 @@
 use super::{Links, Recursive};
 use crate::arithmetic::{Complex, Real};
 use crate::dynamics::envelope::{Envelope, compact_order};
+use crate::dynamics::schur::Weakest;
 
 /// One coordinate on a row's way to the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +33,8 @@ pub struct Ways {
     first: Vec<usize>,
     /// Place of each row in S.
     place: Vec<usize>,
+    /// The row at each place.
+    order: Vec<usize>,
     /// The shape of S.
     envelope: Envelope,
     /// Rows that cross at a coordinate: their places in S, rising, and their steps.
@@ -49,6 +52,10 @@ impl Ways {
             branches.push(ways.push(links, coordinates));
         }
         ways.place = compact_order(&branches);
+        ways.order = vec![0; rows.len()];
+        for (row, &place) in ways.place.iter().enumerate() {
+            ways.order[place] = row;
+        }
         let mut first: Vec<usize> = (0..rows.len()).collect();
         let mut earliest = std::collections::BTreeMap::new();
         for (&place, branches) in ways.place.iter().zip(&branches) {
@@ -156,13 +163,19 @@ pub struct Rows<T> {
     schur: Vec<T>,
     /// Reciprocal pivots of S.
     pivot: Vec<T>,
+    /// What pivots are measured against.
+    scale: Vec<f64>,
     /// A vector in the order of S.
     right: Vec<T>,
 }
 
 impl<T: Real> Rows<T> {
-    /// Scratch space for the rows of these ways.
-    pub fn new(ways: &Ways) -> Self {
+    /// Scratch space for the rows of these ways, with their [scales](crate::dynamics::row::Row::scale).
+    pub fn new(ways: &Ways, scales: &[f64]) -> Self {
+        let mut scale = vec![0.0; ways.rows()];
+        for (&place, &of_row) in ways.place.iter().zip(scales) {
+            scale[place] = of_row;
+        }
         let longest = (0..ways.rows()).map(|row| ways.range(row).len()).max().unwrap_or(0);
         Self {
             gradient: vec![T::ZERO; ways.steps.len()],
@@ -170,6 +183,7 @@ impl<T: Real> Rows<T> {
             passed: vec![(Complex::ZERO, T::ZERO); longest],
             schur: vec![T::ZERO; ways.entries()],
             pivot: vec![T::ZERO; ways.rows()],
+            scale,
             right: vec![T::ZERO; ways.rows()],
         }
     }
@@ -195,9 +209,9 @@ impl<T: Real> Rows<T> {
         self.gradient(ways, row).fold(T::ZERO, |sum, (k, g)| sum + g * v[k])
     }
 
-    /// The inward passes of all rows and the factors of S, after [`take`](Self::take) for every row and [`Recursive::fold`].
+    /// The inward passes of all rows and the factors of S, after [`take`](Self::take) for every row and [`Recursive::fold`]; the weakest row.
     #[inline]
-    pub fn couple(&mut self, ways: &Ways, trees: &Recursive<T>) {
+    pub fn couple(&mut self, ways: &Ways, trees: &Recursive<T>) -> Weakest {
         for row in 0..ways.rows() {
             self.reach(ways, trees, row);
         }
@@ -214,7 +228,8 @@ impl<T: Real> Rows<T> {
             }
             begin = end;
         }
-        ways.envelope.factor(&mut self.schur, &mut self.pivot);
+        let Weakest { share, row: place } = ways.envelope.factor(&mut self.schur, &mut self.pivot, &self.scale);
+        Weakest { share, row: ways.order.get(place).copied().unwrap_or(0) }
     }
 
     /// The inward pass of one row.
