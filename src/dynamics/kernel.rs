@@ -274,15 +274,30 @@ impl<T: Real> Kernel<T> {
         self.weakest = schur::factor::<T, R>(rows, schur, &mut self.schur_pivot, &self.scale);
     }
 
-    /// Replaces what is in `multiplier` by S⁻¹ of it, and writes M⁻¹ Gᵀ of that to `load`; after [`Kernel::linearise`].
-    pub fn correct(&mut self) {
+    /// Replaces what is in `multiplier` by S⁻¹ of it; after [`Kernel::linearise`].
+    pub fn solve_rows(&mut self) {
+        match &mut self.bodywise {
+            Some(bodywise) => bodywise.solve_rows(&mut self.multiplier),
+            None => tree::solve::<T, 0>(self.multiplier.len(), &self.schur, &self.schur_pivot, &mut self.multiplier),
+        }
+    }
+
+    /// Writes M⁻¹ Gᵀ of what is in `multiplier` to `load`; after [`Kernel::linearise`].
+    pub fn lift(&mut self) {
         if let Some(bodywise) = &mut self.bodywise {
-            return bodywise.correct(&mut self.multiplier, &mut self.load);
+            return bodywise.lift(&self.multiplier, &mut self.load);
         }
         let (n, rows) = (self.z.len(), self.multiplier.len());
-        tree::solve::<T, 0>(rows, &self.schur, &self.schur_pivot, &mut self.multiplier);
         for k in 0..n {
             self.load[k] = (0..rows).fold(T::ZERO, |sum, r| sum + self.lifted[r * n + k] * self.multiplier[r]);
+        }
+    }
+
+    /// True where row `r` was left out, its pivot lost; after [`Kernel::linearise`].
+    pub fn is_left_out(&self, r: usize) -> bool {
+        match &self.bodywise {
+            Some(bodywise) => bodywise.is_left_out(r),
+            None => self.schur_pivot[r] == T::ZERO,
         }
     }
 

@@ -42,7 +42,8 @@ impl Row {
                 let linear: f64 = place.linear.iter().map(|&(k, g)| g.norm_squared() / tree.diagonal[k]).sum();
                 // Of the two elements of a product one is a unit vector, and a foot is not bounded: its vector counts with the row's body.
                 let both = |&(j, k, h): &(usize, usize, crate::arithmetic::Complex<f64>)| {
-                    h.norm_squared() * if k < place.angles { 1.0 / tree.diagonal[j] + 1.0 / tree.diagonal[k] } else { 1.0 / tree.diagonal[k] }
+                    h.norm_squared()
+                        * if k < place.angles { 1.0 / tree.diagonal[j] + 1.0 / tree.diagonal[k] } else { 1.0 / tree.diagonal[k] }
                 };
                 linear + place.bilinear.iter().map(both).sum::<f64>()
             }

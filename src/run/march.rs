@@ -13,7 +13,7 @@ use crate::dynamics::multiplier::Multiplier;
 use crate::dynamics::natural::Natural;
 use crate::dynamics::{CompileError, Field, Form, Glance, Mechanism, Motion, State, Time};
 use crate::scene::Scene;
-use crate::stabilization::{Baumgarte, Projected};
+use crate::stabilization::{Baumgarte, Projected, SymmetricGauss};
 use crate::stepping::gauss::Gauss;
 use crate::stepping::rattle::Rattle;
 use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Method, Reached, Seen, StepError, Tally, Taylor, Tolerance};
@@ -279,6 +279,9 @@ pub(super) fn build(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion)
         MethodId::Gauss(stages) => {
             let gauss = Gauss::new(stages, step)
                 .ok_or_else(|| cannot_begin(plan, format!("no Gauss method has {stages} stages and step {step} s")))?;
+            if projected {
+                return Ok(marcher(problem(), SymmetricGauss::new(gauss), start, Steps::Fixed));
+            }
             marcher(sized!(n, canonical(mechanism)), gauss, start, Steps::Fixed)
         }
         MethodId::Rattle(composition) => {

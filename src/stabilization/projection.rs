@@ -89,6 +89,8 @@ where
 
 /// Turns up to this \[rad\] are made without new sines, and without new factors of M and S: these change by as little.
 const SMALL: f64 = 1e-8;
+/// Violation, relative to levers and speeds, that a row left out may have.
+const LEFT_OUT: f64 = 1e-6;
 /// Changes up to this, relative to the rates where they are above one, are rounding: what is known of the rates at the state stays true.
 const ROUNDING: f64 = 1e-14;
 
@@ -148,24 +150,19 @@ fn project_sized<const N: usize>(
             kernel.linearise::<N>(mechanism, state.time, phi, omega);
         }
     }
-    let lever = |kernel: &Kernel<f64>, r: usize| kernel.fold_gradient(r, 1.0, |most: f64, _, g| most.max(g.abs()));
-    check(mechanism, kernel, tolerance, |kernel, r| (kernel.rows[r].position, lever(kernel, r)))?;
-    let rate = |kernel: &Kernel<f64>, state: &State, r: usize| kernel.row_rate(r, &state.y[n..2 * n]);
-    // A row's rate is a sum of G_k w_k, and no smaller than their rounding.
-    let pace = |kernel: &Kernel<f64>, state: &State, r: usize| {
-        let least = kernel.rows[r].drive.abs().max(1.0);
-        kernel.fold_gradient(r, least, |most, k, g| most.max((g * state.y[n + k]).abs()))
-    };
+    check(mechanism, kernel, tolerance, |r| (kernel.rows[r].position, lever(kernel, r)))?;
     let mut fast = 0.0;
     for r in 0..rows {
-        kernel.multiplier[r] = rate(kernel, state, r);
-        fast = largest(fast, kernel.multiplier[r].abs() / pace(kernel, state, r));
+        let omega = &state.y[n..2 * n];
+        kernel.multiplier[r] = kernel.row_rate(r, omega);
+        fast = largest(fast, kernel.multiplier[r].abs() / pace(kernel, omega, r));
     }
     if fast > 2.0 * f64::EPSILON || fast.is_nan() {
         let change = shift(kernel, state, n, n);
         let most = state.y[n..2 * n].iter().fold(1.0, |most: f64, omega| most.max(omega.abs()));
         (moved, far) = (true, largest(far, change / most));
-        check(mechanism, kernel, tolerance, |kernel, r| (rate(kernel, state, r), pace(kernel, state, r)))?;
+        let omega = &state.y[n..2 * n];
+        check(mechanism, kernel, tolerance, |r| (kernel.row_rate(r, omega), pace(kernel, omega, r)))?;
     }
     if moved {
         state.wrap();
@@ -177,7 +174,8 @@ fn project_sized<const N: usize>(
 
 /// Subtracts M⁻¹ Gᵀ S⁻¹ times what is in `multiplier` from the unknowns `from`…, and leaves it in `load`; returns its largest entry.
 fn shift(kernel: &mut Kernel<f64>, state: &mut State, from: usize, n: usize) -> f64 {
-    kernel.correct();
+    kernel.solve_rows();
+    kernel.lift();
     let mut largest_change = 0.0;
     for k in 0..n {
         let change = kernel.load[k];
@@ -187,15 +185,37 @@ fn shift(kernel: &mut Kernel<f64>, state: &mut State, from: usize, n: usize) -> 
     largest_change
 }
 
-/// The worst row must be below tolerance, each measured against its own size.
+/// The longest lever of row `r`, or one \[m\].
+fn lever(kernel: &Kernel<f64>, r: usize) -> f64 {
+    kernel.fold_gradient(r, 1.0, |most: f64, _, g| most.max(g.abs()))
+}
+
+/// The largest part of the rate of row `r`, or one: a row's rate is a sum of G_k w_k, and no smaller than their rounding.
+fn pace(kernel: &Kernel<f64>, omega: &[f64], r: usize) -> f64 {
+    let least = kernel.rows[r].drive.abs().max(1.0);
+    kernel.fold_gradient(r, least, |most, k, g| most.max((g * omega[k]).abs()))
+}
+
+/// Every row must be kept at both levels, as [`Kernel::linearise`] found them.
+///
+/// # Errors
+/// Name of the first row that is not, and its violation.
+pub(super) fn is_kept(mechanism: &Mechanism, kernel: &Kernel<f64>, omega: &[f64], tolerance: f64) -> Result<(), (String, f64)> {
+    check(mechanism, kernel, tolerance, |r| (kernel.rows[r].position, lever(kernel, r)))?;
+    check(mechanism, kernel, tolerance, |r| (kernel.row_rate(r, omega), pace(kernel, omega, r)))
+}
+
+/// The worst row must be below tolerance, each measured against its own size.  Rows that are left out near a singular position are not projected; they
+/// come back once it is past.
 fn check(
     mechanism: &Mechanism,
     kernel: &Kernel<f64>,
     tolerance: f64,
-    violation: impl Fn(&Kernel<f64>, usize) -> (f64, f64),
+    violation: impl Fn(usize) -> (f64, f64),
 ) -> Result<(), (String, f64)> {
     for (r, row) in mechanism.rows.iter().enumerate() {
-        let (violation, size) = violation(kernel, r);
+        let (violation, size) = violation(r);
+        let tolerance = if kernel.is_left_out(r) { tolerance.max(LEFT_OUT) } else { tolerance };
         let small = violation.abs() <= tolerance * size;
         if !small {
             return Err((row.name().into(), violation.abs()));

@@ -147,16 +147,25 @@ impl<T: Real> Evaluation<T> {
         self.rows.couple(&self.recursion.ways, &self.trees)
     }
 
-    /// Replaces x by S⁻¹ x, and writes M⁻¹ Gᵀ S⁻¹ x.
-    pub fn correct(&mut self, x: &mut [T], correction: &mut [T]) {
+    /// Replaces x by S⁻¹ x.
+    pub fn solve_rows(&mut self, x: &mut [T]) {
+        self.rows.solve(&self.recursion.ways, x);
+    }
+
+    /// Writes M⁻¹ Gᵀ x; forgets the load.
+    pub fn lift(&mut self, x: &[T], lifted: &mut [T]) {
         let Recursion { links, ways } = &*self.recursion;
-        self.rows.solve(ways, x);
         self.trees.unburden();
         self.rows.resist(ways, &mut self.trees, x);
-        self.trees.unfold(links, correction);
-        for entry in correction {
+        self.trees.unfold(links, lifted);
+        for entry in lifted {
             *entry = -*entry;
         }
+    }
+
+    /// True where a row was left out.
+    pub fn is_left_out(&self, row: usize) -> bool {
+        self.rows.is_left_out(&self.recursion.ways, row)
     }
 
     /// The coordinates a row depends on, and its Jacobian there.

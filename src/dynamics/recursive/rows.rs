@@ -286,6 +286,11 @@ impl<T: Real> Rows<T> {
         }
     }
 
+    /// True where a row was left out.
+    pub fn is_left_out(&self, ways: &Ways, row: usize) -> bool {
+        self.pivot[ways.place[row]] == T::ZERO
+    }
+
     /// Takes Gᵀ lambda off the load whose e are in place.
     #[inline]
     pub fn resist(&self, ways: &Ways, trees: &mut Recursive<T>, multiplier: &[T]) {

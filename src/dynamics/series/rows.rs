@@ -16,8 +16,8 @@ use crate::dynamics::kernel::dot;
 use crate::dynamics::law::Law;
 use crate::dynamics::quadratic::Quadratic;
 use crate::dynamics::row::{Measure, Row};
-use crate::dynamics::ties::Ties;
 use crate::dynamics::schur::{self, Weakest};
+use crate::dynamics::ties::Ties;
 use crate::dynamics::{Mechanism, Time, tree};
 
 /// Rows in force and their multipliers.
