@@ -190,14 +190,25 @@ impl Mechanism {
         self.recursion = recursion.map(Arc::new);
     }
 
+    /// The mechanism with its equations evaluated body by body, whatever that costs.
+    pub fn body_by_body(&self) -> Self {
+        let recursion = Recursion::new(&self.bodies, &self.forest, &self.rows, self.gravity);
+        Self { recursion: Some(Arc::new(recursion)), ..self.clone() }
+    }
+
+    /// The mechanism with its equations evaluated in matrices; `None` where it is too large.
+    pub fn by_matrices(&self) -> Option<Self> {
+        self.tree.is_dense().then(|| Self { recursion: None, ..self.clone() })
+    }
+
     /// Number of coordinates: the bodies' angles, and two for every foot that moves freely.
     pub fn coordinates(&self) -> usize {
         self.tree.coordinates
     }
 
-    /// The number of bodies where angles are all there is, as code made for a size asks for; else 0, any number.
+    /// The number of bodies where angles are all there is and matrices are used, as code made for a size asks for; else 0, any number.
     pub fn size(&self) -> usize {
-        if self.coordinates() == self.bodies.len() { self.bodies.len() } else { 0 }
+        if self.coordinates() == self.bodies.len() && self.recursion.is_none() { self.bodies.len() } else { 0 }
     }
 
     /// Centre of mass of a body as a point.
@@ -265,7 +276,7 @@ impl Mechanism {
 
     /// True where only gravity and rows act on bodies that hang on the ground.
     pub fn is_plain(&self) -> bool {
-        self.size() > 0 && !self.is_forced()
+        self.coordinates() == self.bodies.len() && !self.is_forced()
     }
 
     /// True where whole turns matter, so that angles are not wrapped.
