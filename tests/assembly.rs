@@ -3,7 +3,7 @@
 mod common;
 
 use common::shipped as scene;
-use driftless::dynamics::{CompileError, Mechanism};
+use driftless::dynamics::Mechanism;
 use driftless::scene::Scene;
 
 fn compiled(scene: &Scene) -> Mechanism {

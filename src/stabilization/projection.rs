@@ -159,12 +159,12 @@ fn project_sized<const N: usize>(
     let rows = mechanism.rows.len();
     kernel.face::<N>(mechanism, &state.y[..n]);
     let energy_before = mechanism.energy_facing::<f64, N>(kernel, &state.y[..n], &state.y[n..2 * n]).total();
-    tree::factor::<f64, N>(n, &mut kernel.mass, &mut kernel.pivot);
+    kernel.factor::<N>(mechanism, &state.y[n..2 * n]);
     kernel.linearise::<N>(mechanism, state.time, &state.y[..n], &state.y[n..2 * n]);
     let (mut last, mut moved, mut far) = (f64::INFINITY, false, 0.0);
     loop {
         // Rows left out have their say once they are back.
-        let in_force = (0..rows).filter(|&r| kernel.schur_pivot[r] != 0.0);
+        let in_force = (0..rows).filter(|&r| !kernel.is_left_out(r));
         let worst = in_force.map(|r| kernel.rows[r].position.abs()).fold(0.0, largest);
         // At rounding, or no longer falling: another sweep would only move it about.
         if worst <= 1e-16 || worst >= 0.5 * last || worst.is_nan() {
@@ -188,8 +188,8 @@ fn project_sized<const N: usize>(
             kernel.rows_at(mechanism, state.time, phi, omega);
         } else {
             kernel.face::<N>(mechanism, phi);
-            mechanism.tree.couple::<f64, N>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
-            tree::factor::<f64, N>(n, &mut kernel.mass, &mut kernel.pivot);
+            kernel.couple::<N>(mechanism);
+            kernel.factor::<N>(mechanism, omega);
             kernel.linearise::<N>(mechanism, state.time, phi, omega);
         }
     }
@@ -198,7 +198,7 @@ fn project_sized<const N: usize>(
     for r in 0..rows {
         let omega = &state.y[n..2 * n];
         kernel.multiplier[r] = kernel.row_rate(r, omega);
-        if kernel.schur_pivot[r] != 0.0 {
+        if !kernel.is_left_out(r) {
             fast = largest(fast, kernel.multiplier[r].abs() / pace(kernel, omega, r));
         }
     }
@@ -221,13 +221,12 @@ fn project_sized<const N: usize>(
 
 /// Subtracts M⁻¹ Gᵀ S⁻¹ times what is in `multiplier` from the unknowns `from`…, and leaves it in `load`; returns its largest entry.
 fn shift(kernel: &mut Kernel<f64>, state: &mut State, from: usize, n: usize) -> f64 {
-    let rows = kernel.multiplier.len();
-    tree::solve::<f64, 0>(rows, &kernel.schur, &kernel.schur_pivot, &mut kernel.multiplier);
+    kernel.solve_rows();
+    kernel.lift();
     let mut largest_change = 0.0;
     for k in 0..n {
-        let change = (0..rows).fold(0.0, |sum, r| sum + kernel.lifted[r * n + k] * kernel.multiplier[r]);
+        let change = kernel.load[k];
         (state.y[from + k], state.low[from + k]) = two_sum(state.y[from + k], state.low[from + k] - change);
-        kernel.load[k] = change;
         largest_change = largest(largest_change, change.abs());
     }
     largest_change
@@ -235,15 +234,13 @@ fn shift(kernel: &mut Kernel<f64>, state: &mut State, from: usize, n: usize) -> 
 
 /// The longest lever of row `r`, or one \[m\].
 fn lever(kernel: &Kernel<f64>, r: usize) -> f64 {
-    let n = kernel.z.len();
-    kernel.jacobian[r * n..(r + 1) * n].iter().fold(1.0, |most: f64, g| most.max(g.abs()))
+    kernel.fold_gradient(r, 1.0, |most: f64, _, g| most.max(g.abs()))
 }
 
 /// The largest part of the rate of row `r`, or one: a row's rate is a sum of G_k w_k, and no smaller than their rounding.
 fn pace(kernel: &Kernel<f64>, omega: &[f64], r: usize) -> f64 {
-    let n = kernel.z.len();
-    let terms = kernel.jacobian[r * n..(r + 1) * n].iter().zip(omega);
-    terms.fold(kernel.rows[r].drive.abs().max(1.0), |most, (g, w)| most.max((g * w).abs()))
+    let least = kernel.rows[r].drive.abs().max(1.0);
+    kernel.fold_gradient(r, least, |most, k, g| most.max((g * omega[k]).abs()))
 }
 
 /// Every row must be kept at both levels, as [`Kernel::linearise`] found them.
@@ -265,7 +262,7 @@ fn check(
 ) -> Result<(), (String, f64)> {
     let near = kernel.weakest.share.clamp(DROPPED, 1.0);
     for (r, row) in mechanism.rows.iter().enumerate() {
-        let tolerance = if kernel.schur_pivot[r] == 0.0 { tolerance.max(LEFT_OUT) } else { tolerance / near.sqrt() };
+        let tolerance = if kernel.is_left_out(r) { tolerance.max(LEFT_OUT) } else { tolerance / near.sqrt() };
         let (violation, size) = violation(r);
         let small = violation.abs() <= tolerance * size;
         if !small {
