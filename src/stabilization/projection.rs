@@ -64,10 +64,10 @@ where
                 what: format!("projection leaves {left:.1e} of constraint {row}"),
                 hint: "tighten the tolerance, or check that no motors work against each other".into(),
             })?;
-            Ok(match (watch(problem, state)?, moved) {
-                (Seen::Enough, _) => Seen::Enough,
-                (Seen::Kept, false) => Seen::Kept,
-                _ => Seen::Changed,
+            Ok(match watch(problem, state)? {
+                Seen::Kept if moved => Seen::Changed,
+                Seen::Enough if moved => Seen::ChangedEnough,
+                seen => seen,
             })
         })
     }
