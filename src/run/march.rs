@@ -36,7 +36,7 @@ macro_rules! sized {
 
 /// A problem, its method and its state.
 pub(super) trait March {
-    /// To the output time `until`, on the way to `horizon`; what is read then is the motion there.  Looks for bars that turn over, where asked to, and else
+    /// To the output time `until`, on the way to `horizon`; what is read then is the motion there.  Looks for bars that turn over, where asked to, and
     /// pauses after a step where `pause` is true.
     fn advance(&mut self, until: Time, horizon: Time, lookout: Option<&mut Lookout>, pause: &mut Pause) -> Result<Reached, StepError>;
     fn read(&mut self, motion: &mut Motion);
@@ -116,7 +116,7 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
             }
             let reached = method.advance(problem, state, horizon, tally, &mut |problem, state| {
                 // A step in which a bar may have turned over is searched before the next one.
-                paused = lookout.is_none() && pause();
+                paused = pause();
                 let enough = lookout.as_mut().is_some_and(|lookout| lookout.step(problem, state, false)) || state.time >= until || paused;
                 if !enough {
                     from.clone_from(state);
@@ -213,7 +213,7 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
         lookout.begin(&mut **problem, state);
         let reached = method.advance(problem, state, until, tally, &mut |problem, state| {
             lookout.step(problem, state, all);
-            Ok(Seen::Kept)
+            Ok(if pause() { Seen::Enough } else { Seen::Kept })
         });
         lookout.search(&mut |suspect| if self.steps == Steps::Own { self.again(suspect) } else { self.traced(suspect) });
         reached

@@ -3,8 +3,10 @@
 //! [`plan`] decides, [`mod@march`] builds the marcher, [`running`] goes with it from one output time to the next and can pause, [`contact`] through impacts and
 //! contacts that last, [`sample`] reads off what there is to
 //! know at each, [`drift`] and [`trace`] keep bounded records of it, [`table`] writes it down,
-//! [`files`] keeps whole files only.  [`mod@sweep`] runs a grid of starts and parameters, on the lookout for bars that turn over ([`flip`]).
+//! [`files`] keeps whole files only, and [`checkpoint`] what a run needs to go on after whatever ended it.  [`mod@sweep`] runs a grid of starts and parameters, on the lookout for bars that turn over ([`flip`]).
 
+#[cfg(feature = "files")]
+pub mod checkpoint;
 pub mod contact;
 pub mod drift;
 #[cfg(feature = "files")]
@@ -20,10 +22,12 @@ pub mod sweep;
 pub mod table;
 pub mod trace;
 
+#[cfg(feature = "files")]
+pub use checkpoint::{CheckpointError, Checkpoints, Loaded};
 pub use contact::{Hold, Strike};
 pub use drift::{Drift, Limits};
 #[cfg(feature = "files")]
-pub use files::{FileError, Folder, Stream};
+pub use files::{Cursor, FileError, Folder, Stream};
 pub use flip::Flip;
 pub use march::Pause;
 pub use methods::{METHODS, MethodId, MethodInfo, Stabilization};
@@ -32,5 +36,5 @@ pub use running::{Outcome, ResumeError, Run, RunError, Running, Snapshot, march,
 pub use sample::{Sample, Sampler};
 #[cfg(feature = "files")]
 pub use sweep::table::SweepTable;
-pub use sweep::{Grid, Observer, Point, Status, Sweep, SweepError, Totals, Vary, VaryError, sweep};
+pub use sweep::{Grid, Observer, Point, Status, Sweep, SweepError, Totals, Vary, VaryError, sweep, sweep_on};
 pub use trace::Trace;
