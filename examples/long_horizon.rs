@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mechanism = Arc::new(Mechanism::new(&scene)?);
     let mut form = Canonical::<2, false>::new(Arc::clone(&mechanism));
     let mut method = Gauss::new(8, STEP).ok_or("a sound step")?.plain();
-    let mut kernel = Kernel::<DoubleDouble>::new(2, 0);
+    let mut kernel = Kernel::<DoubleDouble>::without_rows(&mechanism);
     let mut energy = |form: &mut Canonical<2, false>, state: &State| {
         let mut motion = Motion::default();
         form.read(state, &mut motion);
@@ -62,7 +62,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if let Ok(text) = std::fs::read_to_string(&file) {
         checkpoint = serde_json::from_str(&text)?;
         let Checkpoint { time: [hi, lo], y, low, turns, memory, .. } = checkpoint.clone();
-        state = State { time: Time { hi, lo }, y, low, turns, memory };
+        state = State { time: Time { hi, lo }, y, low, turns, memory, ..State::default() };
     }
     std::fs::create_dir_all(FOLDER)?;
     let (begin, before) = (Instant::now(), checkpoint.spent);
@@ -76,7 +76,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         if is_last || saved.elapsed() > Duration::from_secs(20) {
             saved = Instant::now();
             checkpoint.spent = before + begin.elapsed().as_secs_f64();
-            let State { time: Time { hi, lo }, y, low, turns, memory } = state.clone();
+            let State { time: Time { hi, lo }, y, low, turns, memory, .. } = state.clone();
             checkpoint = Checkpoint { time: [hi, lo], y, low, turns, memory, ..checkpoint };
             // Written beside, then renamed: a reader or a crash finds the old one or the new one.
             std::fs::write(&part, serde_json::to_string(&checkpoint)?)?;

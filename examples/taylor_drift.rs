@@ -30,7 +30,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut method = Taylor::<f64>::with_order(tolerance, 24);
         method.max_steps = u64::MAX;
         method.extended = extended;
-        let mut kernel = Kernel::<DoubleDouble>::new(2, 0);
+        let mut kernel = Kernel::<DoubleDouble>::without_rows(&mechanism);
         let mut energy = |problem: &mut Elimination<0>, state: &_| {
             let mut motion = Motion::default();
             problem.read(state, &mut motion);

@@ -8,7 +8,7 @@ mod common;
 use common::{Inertia, double_pendulum, spring};
 use driftless::arithmetic::Complex;
 use driftless::dynamics::kernel::{Bias, Kernel};
-use driftless::dynamics::row::{LineRow, Row};
+use driftless::dynamics::row::line_row;
 use driftless::dynamics::series::Series;
 use driftless::dynamics::{Coordinates, Mechanism};
 use driftless::scene::{Law, Motor};
@@ -34,28 +34,23 @@ fn check(case: &Value) {
         scene.motors.push(Motor { name: "motor".into(), bar: 0, relative_to: None, law });
     }
     let mut mechanism = Mechanism::new(&scene).expect("a valid scene");
-    let mut guide = Complex::ZERO;
     if let Some(line) = case["guide"].as_object() {
         let normal = numbers(&line["normal"]);
-        guide = Complex::new(normal[0], normal[1]);
+        let guide = Complex::new(normal[0], normal[1]);
         // The guided point of every such case is the end of bar 2.
         assert_eq!(numbers(&line["point"]), [scene.bars[1].length, 0.0]);
-        let (point, offset) = (mechanism.bodies[1].ends[1].clone(), line["offset"].as_f64().expect("a number"));
-        mechanism.rows.push(Row::Line(LineRow { name: "guide".into(), point, normal: guide, offset }));
+        let offset = line["offset"].as_f64().expect("a number");
+        mechanism.rows.push(line_row("guide", &mechanism.end(1, 1), guide, offset, None, 2));
     }
     let (phi, omega) = ([start[0][0], start[1][0]], [start[0][1], start[1][1]]);
-    let mut kernel = Kernel::<f64>::new(2, mechanism.rows.len());
+    let mut kernel = Kernel::<f64>::new(&mechanism);
     kernel.accelerate::<0>(&mechanism, Default::default(), &phi, &omega, Bias::default());
     let mut accelerations = Vec::new();
-    for (k, body) in mechanism.bodies.iter().enumerate() {
-        let centre = body.centre.acceleration(&kernel.z, &omega, &kernel.load);
+    for k in 0..mechanism.bodies.len() {
+        let centre = mechanism.centre(k).acceleration(&kernel.z, &omega, &kernel.load);
         accelerations.extend([centre.re, centre.im, kernel.load[k]]);
     }
-    let mut forces = mechanism.hinge_forces(&kernel.z, &omega, &kernel.load);
-    if guide != Complex::ZERO {
-        // The guide pushes the end of bar 2 with minus its multiplier; both hinges are spared that.
-        forces.iter_mut().for_each(|force| *force += guide.times(kernel.multiplier[0]));
-    }
+    let forces = mechanism.hinge_forces(Default::default(), &kernel, &omega);
     // Hinge A: of the ground on bar 1; hinge B: of bar 1 on bar 2.
     let mut multipliers = vec![-forces[0].re, -forces[0].im, forces[1].re, forces[1].im];
     multipliers.extend(&kernel.multiplier);

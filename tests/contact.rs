@@ -108,9 +108,9 @@ fn slide(y: [f64; 4], h: f64) -> [f64; 4] {
 /// Force of the wall on a held point over the energy scale \[1/m\].
 fn pressure(scene: &Scene, sample: &Sample) -> f64 {
     let mechanism = compile(scene).holding(&[0]);
-    let mut kernel = Kernel::<f64>::new(sample.phi.len(), mechanism.rows.len());
+    let mut kernel = Kernel::<f64>::new(&mechanism);
     kernel.accelerate::<0>(&mechanism, sample.t.into(), &sample.phi, &sample.omega, Bias::default());
-    -kernel.multiplier[mechanism.motor_rows()] / mechanism.energy_scale
+    -kernel.multiplier[mechanism.standing_rows()] / mechanism.energy_scale
 }
 
 #[test]

@@ -8,7 +8,7 @@ mod common;
 use common::{run, run_from, shipped};
 use driftless::dynamics::kernel::Kernel;
 use driftless::dynamics::multiplier::Multiplier;
-use driftless::dynamics::row::{AngleRow, Row};
+use driftless::dynamics::row::angle_row;
 use driftless::dynamics::{Form, Mechanism, Motion, State, Time};
 use driftless::run::{Limits, MethodId, Outcome, Request, Stabilization};
 use driftless::scene::{Law, Scene};
@@ -130,7 +130,7 @@ fn the_stabilizers_energy_is_the_jump_it_makes() {
         assert_eq!((reached, tally.steps), (Ok(Reached::Until), 1));
         let mut motion = Motion::default();
         form.read(&state, &mut motion);
-        let mut kernel = Kernel::new(2, 0);
+        let mut kernel = Kernel::without_rows(&mechanism);
         (mechanism.energy(&mut kernel, &motion.phi, &motion.omega).total(), motion.stabilizer)
     };
     let loose = Tolerance { relative: 1e-6, absolute: 1e-6 };
@@ -195,9 +195,8 @@ fn a_failed_projection_is_a_typed_stop() {
 
     // Two rows that contradict one another have no solution at all.
     let mut contradictory: Mechanism = (*mechanism).clone();
-    let law = Law { start: 0.5, rate: 0.0, acceleration: 0.0, sines: vec![] };
-    contradictory.rows.push(Row::Angle(AngleRow { name: "lock".into(), body: 0, base: None, law }));
-    let mut kernel = Kernel::new(2, 2);
+    contradictory.rows.push(angle_row("lock", 0, None, Law::constant(0.5)));
+    let mut kernel = Kernel::new(&contradictory);
     let mut state: State = form.state(&start);
     let (row, _) = projection::project(&contradictory, &mut kernel, &mut state, 1e-13).expect_err("a failure");
     assert!(row == "motor" || row == "lock");

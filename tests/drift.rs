@@ -71,9 +71,9 @@ fn gauss16_keeps_energy_minus_work_of_driven_scenes() {
         // The project's bound is 1e-13; measured 4.2e-16 and 2.3e-16.
         assert_no_climb(&outcome, 1e-14);
         // The winding angle is whole turns and a small rest: 300 turns lose nothing.
-        let law = common::compile(&shipped(name, &[])).rows.clone();
-        let driftless::dynamics::row::Row::Angle(row) = &law[0] else { panic!("a motor") };
-        assert_eq!(outcome.last.phi[0], row.law.angle(300.0.into()).hi);
+        let mechanism = common::compile(&shipped(name, &[]));
+        let law = mechanism.rows[0].law.as_ref().expect("a motor");
+        assert_eq!(outcome.last.phi[0], law.angle(300.0.into()).hi);
     }
 }
 

@@ -9,7 +9,6 @@ use driftless::dynamics::canonical::Canonical;
 use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::kernel::{Bias, Kernel};
 use driftless::dynamics::multiplier::Multiplier;
-use driftless::dynamics::row::Row;
 use driftless::dynamics::{Field, Form, Mechanism, Motion, State, Time, tree};
 use driftless::run::{Plan, Request};
 use driftless::scene::Scene;
@@ -48,14 +47,14 @@ fn largest(numbers: impl IntoIterator<Item = f64>) -> f64 {
 
 /// The f64 kernel after an evaluation at a motion.
 fn evaluate(mechanism: &Mechanism, motion: &Motion) -> Kernel<f64> {
-    let mut kernel = Kernel::new(mechanism.bodies.len(), mechanism.rows.len());
+    let mut kernel = Kernel::new(mechanism);
     kernel.accelerate::<0>(mechanism, motion.time, &plain(&motion.phi), &plain(&motion.omega), Bias::default());
     kernel
 }
 
 /// The same in double-double.
 fn evaluate_exactly(mechanism: &Mechanism, motion: &Motion) -> Kernel<DoubleDouble> {
-    let mut kernel = Kernel::new(mechanism.bodies.len(), mechanism.rows.len());
+    let mut kernel = Kernel::new(mechanism);
     kernel.accelerate::<0>(mechanism, motion.time, &motion.phi, &motion.omega, Bias::default());
     kernel
 }
@@ -139,21 +138,21 @@ proptest! {
         let n = mechanism.bodies.len();
         let motion = mechanism.start(&scene);
         let (phi, omega) = (plain(&motion.phi), plain(&motion.omega));
-        let mut kernel = Kernel::<f64>::new(n, 0);
+        let mut kernel = Kernel::<f64>::without_rows(&mechanism);
         let energy = mechanism.energy(&mut kernel, &phi, &omega);
         let other = redundant(&scene, 0.0, &phi, &omega);
         prop_assert!((energy.kinetic - other.kinetic).abs() < ROUNDING * largest([other.kinetic]));
         prop_assert!((energy.potential - other.potential).abs() < ROUNDING * largest([other.potential]));
         let bodywise: f64 = mechanism.bodies.iter().enumerate().map(|(k, body)| {
-            0.5 * body.mass * body.centre.velocity(&kernel.z, &omega).norm_squared() + 0.5 * body.inertia * omega[k] * omega[k]
+            0.5 * body.mass * mechanism.centre(k).velocity(&kernel.z, &omega).norm_squared() + 0.5 * body.inertia * omega[k] * omega[k]
         }).sum();
         prop_assert!((energy.kinetic - bodywise).abs() < ROUNDING * largest([bodywise]));
         // Entry by entry from the velocities that unit rates make; the other triangle is the mirror image by construction.
         for i in 0..n {
             for j in i..n {
                 let unit = |k: usize| { let mut rates = vec![0.0; n]; rates[k] = 1.0; rates };
-                let entry: f64 = mechanism.bodies.iter().map(|body| {
-                    body.mass * body.centre.velocity(&kernel.z, &unit(i)).dot(body.centre.velocity(&kernel.z, &unit(j)))
+                let entry: f64 = mechanism.bodies.iter().enumerate().map(|(k, body)| {
+                    body.mass * mechanism.centre(k).velocity(&kernel.z, &unit(i)).dot(mechanism.centre(k).velocity(&kernel.z, &unit(j)))
                 }).sum();
                 let expected = entry + if i == j { mechanism.bodies[i].inertia } else { 0.0 };
                 prop_assert!((kernel.mass[i * n + j] - expected).abs() < ROUNDING);
@@ -171,12 +170,12 @@ proptest! {
         let (phi, omega) = (plain(&motion.phi), plain(&motion.omega));
         let kernel = evaluate(&mechanism, &motion);
         let other = redundant(&scene, t.hi, &phi, &omega);
-        let forces = mechanism.hinge_forces(&kernel.z, &omega, &kernel.load);
+        let forces = mechanism.hinge_forces(motion.time, &kernel, &omega);
         let scale = largest(other.alpha.iter().chain(&other.motors).copied().chain(other.hinges.iter().flat_map(|f| [f.re, f.im])));
         let close = |a: f64, b: f64| (a - b).abs() < 1e-10 * scale;
-        for (k, body) in mechanism.bodies.iter().enumerate() {
+        for k in 0..mechanism.bodies.len() {
             prop_assert!(close(kernel.load[k], other.alpha[k]), "seed {seed}: alpha {k}: {} is not {}", kernel.load[k], other.alpha[k]);
-            let apart: Complex<f64> = body.centre.acceleration(&kernel.z, &omega, &kernel.load) - other.centre[k];
+            let apart: Complex<f64> = mechanism.centre(k).acceleration(&kernel.z, &omega, &kernel.load) - other.centre[k];
             prop_assert!(close(apart.re, 0.0) && close(apart.im, 0.0), "seed {seed}: centre {k}");
         }
         for (found, expected) in kernel.multiplier.iter().zip(&other.motors) {
@@ -193,16 +192,15 @@ proptest! {
         let (mechanism, t) = at_a_time(&scene);
         let motion = consistent(&scene, &mechanism, t);
         let exact = evaluate_exactly(&mechanism, &motion);
-        let mut scratch = Kernel::<DoubleDouble>::new(mechanism.bodies.len(), 0);
+        let mut scratch = Kernel::<DoubleDouble>::without_rows(&mechanism);
         let mut energy = |dt: f64| {
             let motion = moved(&motion, &exact.load, 0.0, dt);
             mechanism.energy(&mut scratch, &motion.phi, &motion.omega).total()
         };
         let change = ((energy(DT) - energy(-DT)) / DoubleDouble::from(2.0 * DT)).hi;
         // A motor's power is its torque, minus the multiplier, times the rate its law asks for.
-        let motors: f64 = mechanism.rows.iter().zip(&exact.multiplier).map(|(row, multiplier)| match row {
-            Row::Angle(row) => -multiplier.hi * row.law.at::<f64>(t).rate,
-            Row::Line(_) | Row::Pin(_) => 0.0,
+        let motors: f64 = mechanism.rows.iter().zip(&exact.multiplier).map(|(row, multiplier)| {
+            row.law.as_ref().map_or(0.0, |law| -multiplier.hi * law.at::<f64>(t).rate)
         }).sum();
         let dampers: f64 = mechanism.springs.iter().map(|spring| spring.drag_power(&exact.z, &motion.omega).hi).sum();
         prop_assert!(dampers <= 0.0);
@@ -288,8 +286,8 @@ proptest! {
         prop_assert_eq!(form.dimension(), 2 * n);
         prop_assert!(mechanism.rows.is_empty() && !mechanism.ties.driven() && mechanism.ties.count() == n);
         let rate = rate_of(&mut form, &motion);
-        let mut kernel = Kernel::<f64>::new(n, 0);
-        kernel.accelerate_free::<0>(&mechanism, &plain(&motion.phi), &plain(&motion.omega));
+        let mut kernel = Kernel::<f64>::without_rows(&mechanism);
+        kernel.accelerate_free::<0>(&mechanism, motion.time, &plain(&motion.phi), &plain(&motion.omega));
         prop_assert_eq!(&rate[n..], &kernel.load[..]);
         prop_assert_eq!(kernel.jacobian.len() + kernel.schur.len() + kernel.multiplier.len(), 0);
         let plan = Plan::new(&scene, &mechanism, &Request::default()).expect("a plan");

@@ -14,14 +14,14 @@ fn solve(scene: &Scene) -> ([f64; 6], Vec<f64>, Vec<Complex<f64>>) {
     let mechanism: &Mechanism = &compile(scene);
     let phi: Vec<f64> = scene.start.iter().map(|start| start.phi).collect();
     let omega: Vec<f64> = scene.start.iter().map(|start| start.omega).collect();
-    let mut kernel = Kernel::<f64>::new(2, mechanism.rows.len());
+    let mut kernel = Kernel::<f64>::new(mechanism);
     kernel.accelerate::<0>(mechanism, Default::default(), &phi, &omega, Bias::default());
     let mut found = [0.0; 6];
-    for (k, body) in mechanism.bodies.iter().enumerate() {
-        let centre = body.centre.acceleration(&kernel.z, &omega, &kernel.load);
+    for k in 0..mechanism.bodies.len() {
+        let centre = mechanism.centre(k).acceleration(&kernel.z, &omega, &kernel.load);
         found[3 * k..3 * k + 3].copy_from_slice(&[centre.re, centre.im, kernel.load[k]]);
     }
-    (found, kernel.multiplier.clone(), mechanism.hinge_forces(&kernel.z, &omega, &kernel.load))
+    (found, kernel.multiplier.clone(), mechanism.hinge_forces(Default::default(), &kernel, &omega))
 }
 
 /// Every digit printed in the source.

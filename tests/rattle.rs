@@ -100,7 +100,7 @@ impl Run {
         let mechanism = compile(scene);
         let natural = Natural::new(mechanism.clone()).expect("a scene with a natural form");
         let state = natural.state(&mechanism.start(scene));
-        let kernel = Kernel::new(mechanism.bodies.len(), 0);
+        let kernel = Kernel::without_rows(&mechanism);
         Self { natural, method: Rattle::new(composition, step), state, tally: Tally::default(), kernel }
     }
 
@@ -219,7 +219,7 @@ proptest! {
         let mechanism = compile(&scene);
         let phi: Vec<f64> = scene.start.iter().map(|start| start.phi).collect();
         let omega: Vec<f64> = scene.start.iter().map(|start| start.omega).collect();
-        let mut kernel = Kernel::<f64>::new(n, mechanism.rows.len());
+        let mut kernel = Kernel::<f64>::new(&mechanism);
         kernel.accelerate::<0>(&mechanism, time, &phi, &omega, Bias::default());
         let natural = Natural::new(mechanism.clone()).unwrap();
         let z: Vec<Complex<f64>> = phi.iter().map(|&phi| Complex::unit(phi)).collect();

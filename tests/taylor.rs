@@ -159,7 +159,7 @@ fn orders_in_double_double_leave_only_what_later_ones_round() {
 fn orders_in_double_double_keep_energy_a_thousand_times_closer() {
     let scene = shipped("free", &[]);
     let mechanism = compile(&scene);
-    let mut kernel = Energies::<DoubleDouble>::new(2, 0);
+    let mut kernel = Energies::<DoubleDouble>::without_rows(&mechanism);
     let mut energy = |motion: &Motion| mechanism.energy(&mut kernel, &motion.phi, &motion.omega).total();
     let before = energy(&mechanism.start(&scene));
     let after = energy(&end(&scene, extended(Kernel::Fastest, 1e-20), 1000.0));
@@ -221,7 +221,7 @@ fn energy_stays_at_rounding_for_a_thousand_seconds() {
     for name in ["free", "gentle", "motor"] {
         let scene = shipped(name, &[]);
         let mechanism = compile(&scene);
-        let mut kernel = Energies::<DoubleDouble>::new(2, 0);
+        let mut kernel = Energies::<DoubleDouble>::without_rows(&mechanism);
         let mut balance = |motion: &Motion| (mechanism.energy(&mut kernel, &motion.phi, &motion.omega).total() - motion.work).hi;
         let before = balance(&mechanism.start(&scene));
         let after = balance(&end(&scene, on(Kernel::Fastest, 1e-19, 24), 1000.0));
@@ -364,7 +364,7 @@ impl FourBar {
             scene.start.push(Start { phi: phi[k], omega: rate * rates[k] });
         }
         let tree = Mechanism::new(&scene).expect("a valid scene");
-        let [coupler, rocker] = [1, 2].map(|k: usize| tree.bodies[k].ends[1].clone());
+        let [coupler, rocker] = [1, 2].map(|k| tree.end(k, 1));
         let start = tree.start(&scene);
         (Arc::new(tree.pinned("loop", &coupler, &rocker)), start)
     }
@@ -472,7 +472,7 @@ fn extended_orders_leave_less_than_a_plain_double() {
 fn extended_energy_stays_far_below_a_plain_run() {
     let scene = shipped("free", &[]);
     let mechanism = compile(&scene);
-    let mut kernel = Energies::<DoubleDouble>::new(2, 0);
+    let mut kernel = Energies::<DoubleDouble>::without_rows(&mechanism);
     let mut energy = |motion: &Motion| mechanism.energy(&mut kernel, &motion.phi, &motion.omega).total();
     let before = energy(&mechanism.start(&scene));
     let after = energy(&end(&scene, extended(Kernel::Series, 1e-21), 100.0));

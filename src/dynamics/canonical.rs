@@ -38,6 +38,8 @@ struct Scratch<T> {
     drive: Vec<Phase<T>>,
     drive_rate: Vec<T>,
     drive_acceleration: Vec<T>,
+    /// What applied forces are multiplied by at that time.
+    factor: Vec<T>,
     omega: Vec<T>,
     momentum: Vec<T>,
     reduced: Vec<T>,
@@ -47,10 +49,11 @@ struct Scratch<T> {
 
 impl<T: Scalar> Scratch<T> {
     fn new(mechanism: &Mechanism) -> Self {
-        let (n, f) = (mechanism.bodies.len(), mechanism.ties.count());
+        let (n, f) = (mechanism.coordinates(), mechanism.ties.count());
         let zeros = || vec![T::ZERO; n];
         Self {
-            kernel: Kernel::new(n, 0),
+            kernel: Kernel::without_rows(mechanism),
+            factor: vec![T::ONE; mechanism.actions.len()],
             drive: vec![Phase::default(); n],
             drive_rate: zeros(),
             drive_acceleration: zeros(),
@@ -71,9 +74,9 @@ impl<T: Scalar> Scratch<T> {
     /// From u and p to unit vectors, twist and all rates: `u_rate`, `omega`.
     #[inline(always)]
     fn velocities<const N: usize, const ACCOUNT: bool>(&mut self, mechanism: &Mechanism, u: &[T], p: &[T]) {
-        let n = size::<N>(mechanism.bodies.len());
+        let n = size::<N>(mechanism.coordinates());
         if !ACCOUNT {
-            self.kernel.face::<N>(u);
+            self.kernel.face::<N>(mechanism, u);
             mechanism.tree.couple::<T, N>(&self.kernel.z, &mut self.kernel.mass, &mut self.kernel.twist);
             tree::factor::<T, N>(n, &mut self.kernel.mass, &mut self.kernel.pivot);
             self.omega[..n].copy_from_slice(&p[..n]);
@@ -81,9 +84,10 @@ impl<T: Scalar> Scratch<T> {
             return;
         }
         let f = u.len();
-        for (k, tie) in mechanism.ties.bodies.iter().enumerate() {
+        for (k, tie) in mechanism.ties.bodies[..mechanism.ties.angles].iter().enumerate() {
             self.kernel.z[k] = tie.face(u, &self.drive[k]);
         }
+        mechanism.ties.feet(u, &mut self.kernel.z);
         mechanism.tree.couple::<T, N>(&self.kernel.z, &mut self.kernel.mass, &mut self.kernel.twist);
         tree::multiply::<T, N>(n, &self.kernel.mass, &self.drive_rate, &mut self.momentum);
         mechanism.ties.gather(&self.momentum, &mut self.u_rate);
@@ -101,13 +105,16 @@ impl<T: Scalar> Scratch<T> {
     /// y' at the drives taken last.
     #[inline(always)]
     fn rate<const N: usize, const ACCOUNT: bool>(&mut self, mechanism: &Mechanism, y: &[T], rate: &mut [T]) {
-        let n = size::<N>(mechanism.bodies.len());
+        let n = size::<N>(mechanism.coordinates());
         let f = if ACCOUNT { mechanism.ties.count() } else { n };
         self.velocities::<N, ACCOUNT>(mechanism, &y[..f], &y[f..2 * f]);
         let kernel = &mut self.kernel;
         mechanism.tree.pull::<T, N>(&kernel.z, &self.omega, &kernel.twist, &mut kernel.load);
         for spring in &mechanism.springs {
             spring.span.pull(spring.elastic(&kernel.z), &kernel.z, &mut kernel.load);
+        }
+        for torsion in &mechanism.torsions {
+            torsion.pull(torsion.elastic(y), &mut kernel.load);
         }
         if !ACCOUNT {
             rate[..n].copy_from_slice(&self.omega[..n]);
@@ -118,14 +125,20 @@ impl<T: Scalar> Scratch<T> {
         let (u_part, p_part) = rate[..2 * f].split_at_mut(f);
         u_part.copy_from_slice(&self.u_rate);
         mechanism.ties.gather(&kernel.load, p_part);
-        if mechanism.is_damped() {
+        if mechanism.is_worked_on() {
             kernel.load.fill(T::ZERO);
             for spring in mechanism.springs.iter().filter(|spring| spring.damping != 0.0) {
                 spring.span.pull(spring.drag(&kernel.z, &self.omega), &kernel.z, &mut kernel.load);
             }
+            for torsion in mechanism.torsions.iter().filter(|torsion| torsion.damping != 0.0) {
+                torsion.pull(torsion.drag(&self.omega), &mut kernel.load);
+            }
+            for (action, &factor) in mechanism.actions.iter().zip(&self.factor) {
+                action.pull(factor, &kernel.z, &mut kernel.load);
+            }
             mechanism.ties.gather(&kernel.load, &mut self.pivot);
-            for (p, &drag) in p_part.iter_mut().zip(&self.pivot) {
-                *p += drag;
+            for (p, &force) in p_part.iter_mut().zip(&self.pivot) {
+                *p += force;
             }
             rate[2 * f] -= dot(&self.pivot, &self.u_rate);
         }
@@ -139,6 +152,9 @@ impl<T: Real> Scratch<T> {
         for (k, tie) in mechanism.ties.bodies.iter().enumerate() {
             self.drive(k, tie.drive(t));
         }
+        for (factor, action) in self.factor.iter_mut().zip(&mechanism.actions) {
+            *factor = action.factor(t);
+        }
     }
 }
 
@@ -150,7 +166,7 @@ impl<const N: usize, const ACCOUNT: bool> Canonical<N, ACCOUNT> {
 
     /// The same; with `portable`, without the processor's vector instructions, to the same bits.
     pub fn with_lanes(mechanism: Arc<Mechanism>, portable: bool) -> Self {
-        debug_assert!(N == 0 || N == mechanism.bodies.len());
+        debug_assert!(N == 0 || N == mechanism.size());
         debug_assert!(ACCOUNT || !mechanism.keeps_account());
         let (work, exact) = (Scratch::new(&mechanism), Scratch::new(&mechanism));
         Self { work, exact, stages: Stages::new(&mechanism, portable), mechanism }
@@ -163,7 +179,7 @@ impl<const N: usize, const ACCOUNT: bool> Field for Canonical<N, ACCOUNT> {
     }
 
     fn angles(&self) -> usize {
-        self.mechanism.ties.count()
+        self.mechanism.ties.turning()
     }
 
     #[inline]
@@ -187,8 +203,8 @@ impl<const N: usize, const ACCOUNT: bool> Field for Canonical<N, ACCOUNT> {
         let ties = &self.mechanism.ties;
         let f = ties.count();
         match i {
-            i if i < f => format!("phi of {}", self.mechanism.bodies[ties.independent[i]].name),
-            i if i < 2 * f => format!("momentum of {}", self.mechanism.bodies[ties.independent[i - f]].name),
+            i if i < f => self.mechanism.coordinate_name(ties.independent[i]),
+            i if i < 2 * f => format!("momentum along {}", self.mechanism.coordinate_name(ties.independent[i - f])),
             _ => "momentum conjugate to time".into(),
         }
     }
@@ -200,9 +216,9 @@ impl<const N: usize, const ACCOUNT: bool> Form for Canonical<N, ACCOUNT> {
     }
 
     fn state(&self, motion: &Motion) -> State {
-        let (n, ties) = (self.mechanism.bodies.len(), &self.mechanism.ties);
+        let (n, ties) = (self.mechanism.coordinates(), &self.mechanism.ties);
         let mut scratch = self.exact.clone();
-        scratch.kernel.face::<0>(&motion.phi);
+        scratch.kernel.face::<0>(&self.mechanism, &motion.phi);
         let kernel = &mut scratch.kernel;
         self.mechanism.tree.couple::<DoubleDouble, 0>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
         tree::multiply::<DoubleDouble, 0>(n, &kernel.mass, &motion.omega, &mut scratch.momentum);
@@ -214,7 +230,11 @@ impl<const N: usize, const ACCOUNT: bool> Form for Canonical<N, ACCOUNT> {
             scratch.drive_at(&self.mechanism, motion.time);
             unknowns.push(dot(&scratch.momentum, &scratch.drive_rate) - motion.work);
         }
-        ties.state(motion, &unknowns)
+        let mut state = ties.state(motion, &unknowns);
+        if self.mechanism.is_winding() {
+            state.unwind();
+        }
+        state
     }
 
     fn read(&mut self, state: &State, motion: &mut Motion) {

@@ -1,16 +1,19 @@
-//! Scene to mechanism: the hinge tree, its constant matrices, and what the scene does not need left out.
+//! Scene to mechanism: the hinge trees, their constant matrices, the rows, and what the scene does not need left out.
 
-use super::force::Spring;
+use super::force::action::Kind;
+use super::force::{Action, Spring, Torsion};
+use super::forest::{Foot, Forest};
 use super::impact::Contact;
 use super::kernel::Kernel;
+use super::law::Law;
 use super::point::Point;
-use super::row::{AngleRow, LineRow, PinRow, Row};
+use super::row::{self, Row, Site};
 use super::ties::Ties;
 use super::tree::{self, Tree};
 use crate::arithmetic::Complex;
-use crate::scene::{Place, Scene};
+use crate::scene::{Place, Scene, Slider};
 
-/// The largest number of bodies the dense form takes; its matrices hold n² numbers.
+/// The largest number of coordinates the dense form takes; its matrices hold n² numbers.
 pub const DENSE_LIMIT: usize = 2000;
 
 /// A scene's equations: constants only, shared by every form and method.
@@ -18,13 +21,19 @@ pub const DENSE_LIMIT: usize = 2000;
 pub struct Mechanism {
     /// Bodies in the order of the scene's bars.
     pub bodies: Vec<Body>,
-    /// Hinges in the order of the scene.
+    /// How they hang.
+    pub forest: Forest,
+    /// Hinges and welds in the order of the scene.
     pub joints: Vec<Joint>,
-    /// The hinge tree's matrices.
+    /// The hinge trees' matrices.
     pub tree: Tree,
     /// Springs and dampers.
     pub springs: Vec<Spring>,
-    /// Constraint rows: one per motor, then one per contact that is held.
+    /// Torsion springs and dampers.
+    pub torsions: Vec<Torsion>,
+    /// Applied forces and torques.
+    pub actions: Vec<Action>,
+    /// Constraint rows: given angles, then points that coincide or stay on lines, then one per contact that is held.
     pub rows: Vec<Row>,
     /// Walls.
     pub contacts: Vec<Contact>,
@@ -34,6 +43,8 @@ pub struct Mechanism {
     pub ties: Ties,
     /// Gravity \[m/s²\].
     pub gravity: Complex<f64>,
+    /// Energy of gravity of the masses if they were at the ground points they hang from \[J\].
+    pub ground_energy: f64,
     /// What energies are divided by in reports \[J\]: see [`Mechanism::energy_scale`](super::energy).
     pub energy_scale: f64,
 }
@@ -47,23 +58,23 @@ pub struct Body {
     pub mass: f64,
     /// Moment of inertia about the centre of mass \[kg·m²\].
     pub inertia: f64,
-    /// Centre of mass.
-    pub centre: Point,
-    /// Both ends of the bar, for drawings.
-    pub ends: [Point; 2],
-    /// The body it hangs on; `None`: the ground.
-    pub parent: Option<usize>,
+    /// Centre of mass, counted from the body's foot, in its frame \[m\].
+    pub centre: Complex<f64>,
+    /// Both ends of the bar, likewise, for drawings \[m\].
+    pub ends: [Complex<f64>; 2],
 }
 
-/// A hinge of the tree.
+/// A hinge or weld.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
     /// Name in the scene.
     pub name: String,
-    /// Where it is.
-    pub point: Point,
-    /// The body that hangs on it.
-    pub outer: usize,
+    /// Where it is: a body and a point counted from its foot, in its frame, or a point of the ground \[m\].
+    pub at: (Option<usize>, Complex<f64>),
+    /// The body that hangs on it; `None` where it closes a loop.
+    pub outer: Option<usize>,
+    /// The first of the two rows that close the loop.
+    pub row: Option<usize>,
     /// The scene's first and second body at this hinge; `None` for the ground.
     pub between: [Option<usize>; 2],
 }
@@ -71,17 +82,11 @@ pub struct Joint {
 /// Why a scene has no equations.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CompileError {
-    /// A bar is not connected to the ground by hinges.
-    #[error("bar `{0}` does not hang on the ground through hinges")]
-    Loose(String),
-    /// A hinge closes a loop.
-    #[error("hinge `{0}` closes a loop of bodies; only trees of hinged bodies are supported")]
-    Loop(String),
-    /// Motors give the same angle twice.
-    #[error("motor `{0}` gives an angle that the other motors give already")]
+    /// Motors and locks give the same angle twice.
+    #[error("`{0}` gives an angle that the other motors and locks give already")]
     Redundant(String),
     /// Too many bodies for the dense form.
-    #[error("{0} bodies; the dense form takes at most {DENSE_LIMIT}")]
+    #[error("{0} coordinates; the dense form takes at most {DENSE_LIMIT}")]
     TooMany(usize),
     /// The mass matrix is singular: some body has no inertia about its hinge.
     #[error("the mass matrix is singular at the start: bar `{0}` and what hangs on it have no inertia about its hinge")]
@@ -92,83 +97,74 @@ impl Mechanism {
     /// Compiles a scene.
     ///
     /// # Errors
-    /// What the reader of scenes refuses too (loops, loose bars, doubled motors), a singular mass matrix, or too many bodies.
+    /// What the reader of scenes refuses too (doubled motors), a singular mass matrix, or too many bodies.
     pub fn new(scene: &Scene) -> Result<Self, CompileError> {
-        let n = scene.bars.len();
+        let forest = Forest::new(scene);
+        let n = forest.coordinates;
         if n > DENSE_LIMIT {
             return Err(CompileError::TooMany(n));
         }
-        let hung = hang(scene)?;
-        let place = |place: &Place| match place.bar {
-            None => Point::ground(place.point),
-            Some(bar) => hung[bar].place(bar, place.point),
-        };
-        let bodies: Vec<Body> = scene
-            .bars
-            .iter()
-            .enumerate()
-            .map(|(k, bar)| Body {
+        let bodies: Vec<Body> = (scene.bars.iter().zip(&forest.hangs))
+            .map(|(bar, hang)| Body {
                 name: bar.name.clone(),
                 mass: bar.mass,
                 inertia: bar.inertia,
-                centre: hung[k].place(k, bar.centre),
-                ends: [hung[k].place(k, [0.0, 0.0]), hung[k].place(k, [bar.length, 0.0])],
-                parent: hung[k].parent,
+                centre: Complex::new(bar.centre[0], bar.centre[1]) - hang.own,
+                ends: [-hang.own, Complex::new(bar.length, 0.0) - hang.own],
             })
             .collect();
         let gravity = Complex::new(scene.gravity[0], scene.gravity[1]);
-        let joints = scene
-            .hinges
-            .iter()
-            .enumerate()
-            .map(|(h, hinge)| {
-                let outer = hung.iter().position(|hung| hung.hinge == h).unwrap_or(0);
-                Joint {
-                    name: hinge.name.clone(),
-                    point: hung[outer].hinge_point.clone(),
-                    outer,
-                    between: [hinge.between[0].bar, hinge.between[1].bar],
-                }
-            })
-            .collect();
-        let springs = scene
-            .springs
-            .iter()
+        let mut rows = given_angles(scene);
+        let ties = Ties::new(bodies.len(), n, &rows)?;
+        let joints = joints(scene, &forest, &mut rows);
+        scene.sliders.iter().for_each(|slider| rows.push(slide(&forest, slider)));
+        for drive in &scene.drives {
+            rows.push(travel(&forest, &drive.name, &scene.sliders[drive.slider], drive.law.clone()));
+        }
+        let springs = (scene.springs.iter())
             .map(|spring| Spring {
                 name: spring.name.clone(),
                 bodies: [spring.between[0].bar, spring.between[1].bar],
-                span: place(&spring.between[0]).minus(&place(&spring.between[1])),
+                span: forest.point(&spring.between[0]).minus(&forest.point(&spring.between[1])),
                 stiffness: spring.stiffness,
                 free_length: spring.free_length,
                 damping: spring.damping,
             })
             .collect();
-        let rows = scene
-            .motors
-            .iter()
-            .map(|motor| {
-                Row::Angle(AngleRow { name: motor.name.clone(), body: motor.bar, base: motor.relative_to, law: motor.law.clone() })
+        let torsions = (scene.torsion_springs.iter())
+            .map(|torsion| Torsion {
+                name: torsion.name.clone(),
+                body: torsion.bar,
+                base: torsion.relative_to,
+                stiffness: torsion.stiffness,
+                free_angle: torsion.free_angle,
+                damping: torsion.damping,
             })
             .collect();
-        let contacts = scene
-            .walls
-            .iter()
+        let contacts = (scene.walls.iter())
             .map(|wall| {
                 let normal = Complex::new(wall.normal[0], wall.normal[1]);
                 let offset = normal.dot(Complex::new(wall.through[0], wall.through[1]));
-                let point = hung[wall.bar].place(wall.bar, wall.point);
-                Contact { row: LineRow { name: wall.name.clone(), point, normal, offset }, restitution: wall.restitution }
+                let site = forest.site(&Place { bar: Some(wall.bar), point: wall.point });
+                let row = row::line_row(&wall.name, &site, normal, offset, None, bodies.len());
+                Contact { row, point: site.point, normal, restitution: wall.restitution }
             })
             .collect();
+        let root = |k: usize, body: &Body| body.mass * gravity.dot(forest.walk(k, body.centre).root);
+        let ground_energy = bodies.iter().enumerate().fold(0.0, |sum, (k, body)| sum - root(k, body));
         let mut mechanism = Self {
-            tree: constants(&bodies, gravity),
+            ground_energy,
+            tree: constants(&bodies, &forest, gravity),
+            actions: actions(scene, &forest),
             bodies,
+            forest,
             joints,
             springs,
+            torsions,
             rows,
             contacts,
             held: Vec::new(),
-            ties: Ties::new(scene)?,
+            ties,
             gravity,
             energy_scale: 1.0,
         };
@@ -177,32 +173,95 @@ impl Mechanism {
         Ok(mechanism)
     }
 
+    /// Number of coordinates: the bodies' angles, and two for every foot that moves freely.
+    pub fn coordinates(&self) -> usize {
+        self.tree.coordinates
+    }
+
+    /// The number of bodies where angles are all there is, as code made for a size asks for; else 0, any number.
+    pub fn size(&self) -> usize {
+        if self.coordinates() == self.bodies.len() { self.bodies.len() } else { 0 }
+    }
+
+    /// Centre of mass of a body as a point.
+    pub fn centre(&self, body: usize) -> Point {
+        self.forest.walk(body, self.bodies[body].centre)
+    }
+
+    /// The first or second end of a bar.
+    pub fn end(&self, body: usize, end: usize) -> Site {
+        Site { body: Some(body), point: self.forest.walk(body, self.bodies[body].ends[end]) }
+    }
+
+    /// What coordinate `k` is: `phi of bar1`, `x of cart`.
+    pub fn coordinate_name(&self, k: usize) -> String {
+        let name = |body: usize| &self.bodies[body].name;
+        match k.checked_sub(self.bodies.len()) {
+            None => format!("phi of {}", name(k)),
+            Some(rest) => {
+                let foot = |hang: &super::forest::Hang| hang.foot == Foot::Free(k - rest % 2);
+                let body = self.forest.hangs.iter().position(foot).unwrap_or(0);
+                format!("{} of {}", if rest % 2 == 0 { "x" } else { "y" }, name(body))
+            }
+        }
+    }
+
+    /// The same for its rate.
+    pub fn rate_name(&self, k: usize) -> String {
+        let name = self.coordinate_name(k);
+        match name.strip_prefix("phi") {
+            Some(rest) => format!("omega{rest}"),
+            None => format!("v{name}"),
+        }
+    }
+
     /// The mechanism with two of its points pinned to one another by two more rows: a closed loop.
     ///
     /// The loop must be closed at the start, and not be one that the rows there are close already.
-    pub fn pinned(&self, name: &str, a: &Point, b: &Point) -> Self {
+    pub fn pinned(&self, name: &str, a: &Site, b: &Site) -> Self {
         let mut mechanism = self.clone();
-        let before_contacts = mechanism.motor_rows();
-        mechanism.rows.splice(before_contacts..before_contacts, PinRow::pair(name, a, b).map(Row::Pin));
+        let before_contacts = mechanism.standing_rows();
+        mechanism.rows.splice(before_contacts..before_contacts, row::pin_rows(name, a, b, self.bodies.len()));
         mechanism
     }
 
     /// True where the scene has a damper.
     pub fn is_damped(&self) -> bool {
-        self.springs.iter().any(|spring| spring.damping != 0.0)
+        self.springs.iter().any(|spring| spring.damping != 0.0) || self.torsions.iter().any(|torsion| torsion.damping != 0.0)
     }
 
-    /// True where motors or dampers do work, so that a form must keep account of it.
+    /// True where forces do work that no energy stands for: dampers, applied forces and torques.
+    pub fn is_worked_on(&self) -> bool {
+        self.is_damped() || !self.actions.is_empty()
+    }
+
+    /// True where motors, dampers or applied forces do work, so that a form must keep account of it.
     pub fn keeps_account(&self) -> bool {
-        !self.rows.is_empty() || self.is_damped()
+        !self.rows.is_empty() || self.is_worked_on()
+    }
+
+    /// True where only gravity and rows act on bodies that hang on the ground.
+    pub fn is_plain(&self) -> bool {
+        self.size() > 0 && self.springs.is_empty() && self.torsions.is_empty() && self.actions.is_empty()
+    }
+
+    /// True where whole turns matter, so that angles are not wrapped.
+    pub fn is_winding(&self) -> bool {
+        !self.torsions.is_empty()
+    }
+
+    /// True where a row is left when the given angles are eliminated: loops, sliders, contacts that are held.
+    pub fn is_tied_up(&self) -> bool {
+        self.rows.iter().any(|row| !row.is_angle())
     }
 
     /// The mass matrix at the start must be positive definite.
     fn check_mass(&self, scene: &Scene) -> Result<(), CompileError> {
-        let n = self.bodies.len();
-        let phi: Vec<f64> = scene.start.iter().map(|start| start.phi).collect();
-        let mut kernel = Kernel::<f64>::new(n, 0);
-        kernel.face::<0>(&phi);
+        let n = self.coordinates();
+        let start = self.start(scene);
+        let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
+        let mut kernel = Kernel::<f64>::without_rows(self);
+        kernel.face::<0>(self, &phi);
         self.tree.couple::<f64, 0>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
         tree::factor::<f64, 0>(n, &mut kernel.mass, &mut kernel.pivot);
         let singular = |&k: &usize| {
@@ -210,84 +269,113 @@ impl Mechanism {
             let sound = 1.0 / (kernel.pivot[k] * self.tree.diagonal[k]) > 1e-13;
             !sound
         };
-        match (0..n).find(singular) {
+        match (0..self.bodies.len()).find(singular) {
             Some(k) => Err(CompileError::Massless(self.bodies[k].name.clone())),
             None => Ok(()),
         }
     }
 }
 
-/// How a body hangs in the tree.
-struct Hung {
-    /// The parent; `None`: the ground.
-    parent: Option<usize>,
-    /// Index of its hinge.
-    hinge: usize,
-    /// The hinge as a point of the parent.
-    hinge_point: Point,
-    /// The hinge in the body's own frame \[m\].
-    own: [f64; 2],
+/// Motors, locks, and the angles that welds and locked sliders keep; those not given are what they are at the start.
+fn given_angles(scene: &Scene) -> Vec<Row> {
+    let motors = scene.motors.iter().map(|motor| row::angle_row(&motor.name, motor.bar, motor.relative_to, motor.law.clone()));
+    let phi = |bar: Option<usize>| bar.map_or(0.0, |bar| scene.start[bar].phi);
+    let keep = |name: &str, a: Option<usize>, b: Option<usize>, angle: Option<f64>| {
+        let (body, base) = if let Some(a) = a { (a, b) } else { (b?, None) };
+        let angle = angle.unwrap_or_else(|| phi(Some(body)) - phi(base));
+        Some(row::angle_row(name, body, base, Law::constant(angle)))
+    };
+    let locks = scene.locks.iter().filter_map(|lock| keep(&lock.name, Some(lock.bar), lock.relative_to, lock.angle));
+    let welds =
+        (scene.welds.iter()).filter_map(|weld| keep(&format!("{}.angle", weld.name), weld.between[1].bar, weld.between[0].bar, None));
+    let sliders = (scene.sliders.iter().filter(|slider| slider.locked))
+        .filter_map(|slider| keep(&format!("{}.angle", slider.name), slider.point.bar, slider.rail.place.bar, None));
+    motors.chain(locks).chain(welds).chain(sliders).collect()
 }
 
-impl Hung {
-    /// A point of body `body`, given in its frame \[m\].
-    fn place(&self, body: usize, point: [f64; 2]) -> Point {
-        self.hinge_point.along(body, Complex::new(point[0] - self.own[0], point[1] - self.own[1]))
+/// Hinges and welds; those that close a loop add their rows.
+fn joints(scene: &Scene, forest: &Forest, rows: &mut Vec<Row>) -> Vec<Joint> {
+    let named = scene.hinges.iter().map(|hinge| (&hinge.name, &hinge.between));
+    let welded = scene.welds.iter().map(|weld| (&weld.name, &weld.between));
+    let mut joints = Vec::with_capacity(forest.outer.len());
+    for ((name, between), &outer) in named.chain(welded).zip(&forest.outer) {
+        let inner = match outer {
+            Some(outer) if between[0].bar == Some(outer) => &between[1],
+            _ => &between[0],
+        };
+        let point = Complex::new(inner.point[0], inner.point[1]);
+        let at = (inner.bar, inner.bar.map_or(point, |bar| point - forest.hangs[bar].own));
+        let row = outer.is_none().then_some(rows.len());
+        if outer.is_none() {
+            rows.extend(row::pin_rows(name, &forest.site(&between[0]), &forest.site(&between[1]), scene.bars.len()));
+        }
+        joints.push(Joint { name: name.clone(), at, outer, row, between: [between[0].bar, between[1].bar] });
+    }
+    joints
+}
+
+/// The row that keeps a slider on its rail.
+fn slide(forest: &Forest, slider: &Slider) -> Row {
+    on_rail(forest, &slider.name, slider, rail(slider).left(), None)
+}
+
+/// The row that gives a slider's travel.
+fn travel(forest: &Forest, name: &str, slider: &Slider, law: Law) -> Row {
+    on_rail(forest, name, slider, rail(slider), Some(law))
+}
+
+fn rail(slider: &Slider) -> Complex<f64> {
+    Complex::new(slider.rail.direction[0], slider.rail.direction[1])
+}
+
+fn on_rail(forest: &Forest, name: &str, slider: &Slider, direction: Complex<f64>, law: Option<Law>) -> Row {
+    let (site, foot, angles) = (forest.site(&slider.point), forest.site(&slider.rail.place), forest.hangs.len());
+    match slider.rail.place.bar {
+        Some(body) => row::slot_row(name, &site, body, &foot, direction, law, angles),
+        None => row::line_row(name, &site, direction, direction.dot(foot.point.root), law, angles),
     }
 }
 
-/// The hinge tree, breadth first from the ground: least depth.
-fn hang(scene: &Scene) -> Result<Vec<Hung>, CompileError> {
-    let mut hung: Vec<Option<Hung>> = scene.bars.iter().map(|_| None).collect();
-    let mut used = vec![false; scene.hinges.len()];
-    let mut at: Vec<Vec<usize>> = vec![Vec::new(); scene.bars.len() + 1];
-    let slot = |bar: Option<usize>| bar.map_or(0, |bar| bar + 1);
-    for (h, hinge) in scene.hinges.iter().enumerate() {
-        for place in &hinge.between {
-            at[slot(place.bar)].push(h);
-        }
-    }
-    let mut queue = std::collections::VecDeque::from([None]);
-    while let Some(inner) = queue.pop_front() {
-        for &h in &at[slot(inner)] {
-            if used[h] {
-                continue;
-            }
-            used[h] = true;
-            let [a, b] = &scene.hinges[h].between;
-            let (near, far) = if a.bar == inner { (a, b) } else { (b, a) };
-            let Some(outer) = far.bar.filter(|&bar| hung[bar].is_none() && far.bar != inner) else {
-                return Err(CompileError::Loop(scene.hinges[h].name.clone()));
-            };
-            let hinge_point = match inner {
-                None => Point::ground(near.point),
-                Some(parent) => match &hung[parent] {
-                    Some(body) => body.place(parent, near.point),
-                    None => return Err(CompileError::Loose(scene.bars[parent].name.clone())),
-                },
-            };
-            hung[outer] = Some(Hung { parent: inner, hinge: h, hinge_point, own: far.point });
-            queue.push_back(Some(outer));
-        }
-    }
-    hung.into_iter().zip(&scene.bars).map(|(hung, bar)| hung.ok_or_else(|| CompileError::Loose(bar.name.clone()))).collect()
+/// Applied forces and torques.
+fn actions(scene: &Scene, forest: &Forest) -> Vec<Action> {
+    let forces = scene.forces.iter().map(|force| Action {
+        name: force.name.clone(),
+        body: force.bar,
+        kind: Kind::Force {
+            point: forest.point(&Place { bar: Some(force.bar), point: force.point }),
+            force: Complex::new(force.force[0], force.force[1]),
+            follows: force.follows,
+        },
+        law: force.law.clone(),
+    });
+    let torques = scene.torques.iter().map(|torque| Action {
+        name: torque.name.clone(),
+        body: torque.bar,
+        kind: Kind::Torque { torque: torque.torque, base: torque.relative_to },
+        law: torque.law.clone(),
+    });
+    forces.chain(torques).collect()
 }
 
 /// H, d and the weights.
-fn constants(bodies: &[Body], gravity: Complex<f64>) -> Tree {
-    let n = bodies.len();
+fn constants(bodies: &[Body], forest: &Forest, gravity: Complex<f64>) -> Tree {
+    let n = forest.coordinates;
     let mut coupling = vec![Complex::ZERO; n * n];
     let mut diagonal: Vec<f64> = bodies.iter().map(|body| body.inertia).collect();
+    diagonal.resize(n, 0.0);
     let mut weight = vec![Complex::ZERO; n];
-    for body in bodies {
-        for (place, &(i, gamma)) in body.centre.terms.iter().enumerate() {
+    for (k, body) in bodies.iter().enumerate() {
+        let centre = forest.walk(k, body.centre);
+        let carried = centre.shifts.iter().map(|&(x, share)| (x, Complex::new(share, 0.0)));
+        let terms: Vec<_> = centre.terms.iter().copied().chain(carried).collect();
+        for (place, &(i, gamma)) in terms.iter().enumerate() {
             diagonal[i] += body.mass * gamma.norm_squared();
             weight[i] += (gamma.conj() * gravity).times(body.mass);
-            for &(j, other) in &body.centre.terms[place + 1..] {
+            for &(j, other) in &terms[place + 1..] {
                 coupling[i * n + j] += (gamma.conj() * other).times(body.mass);
             }
         }
     }
     let off_axis = coupling.iter().any(|h| h.im != 0.0);
-    Tree { bodies: n, coupling, diagonal, weight, off_axis }
+    Tree { coordinates: n, angles: bodies.len(), coupling, diagonal, weight, off_axis }
 }

@@ -10,7 +10,6 @@
 //! pressed hardest and dropping those that would be pulled (C. Lawson, R. Hanson, *Solving Least Squares Problems* (1974), chapter 23).
 
 use super::kernel::{Kernel, dot};
-use super::row::Row;
 use super::{Mechanism, Time};
 use nalgebra::{DMatrix, DVector};
 
@@ -22,19 +21,19 @@ const LEAST_FORCE: f64 = 4e-12;
 const DEAD_CENTRE: f64 = 1e-5;
 
 impl Mechanism {
-    /// The mechanism with these of its contacts kept by a row each, after the rows of the motors.
+    /// The mechanism with these of its contacts kept by a row each, after all other rows.
     ///
     /// Nothing is renumbered: the event function of a contact that is held is its force instead of its gap.
     pub fn holding(&self, contacts: &[usize]) -> Self {
         let mut mechanism = self.clone();
-        mechanism.rows.truncate(self.motor_rows());
-        mechanism.rows.extend(contacts.iter().map(|&contact| Row::Line(self.contacts[contact].row.clone())));
+        mechanism.rows.truncate(self.standing_rows());
+        mechanism.rows.extend(contacts.iter().map(|&contact| self.contacts[contact].row.clone()));
         mechanism.held = contacts.to_vec();
         mechanism
     }
 
     /// Rows that are in force whatever touches.
-    pub fn motor_rows(&self) -> usize {
+    pub fn standing_rows(&self) -> usize {
         self.rows.len() - self.held.len()
     }
 
@@ -43,9 +42,9 @@ impl Mechanism {
     /// Angles \[rad\] and rates \[rad/s\] of all bodies.  A point stays where it would rebound to less than [`REST_HEIGHT`] and be pressed.
     pub fn staying(&self, touching: &[usize], t: Time, phi: &[f64], omega: &[f64]) -> Option<Vec<usize>> {
         let all = self.holding(touching);
-        let (n, size, motors) = (self.bodies.len(), all.rows.len(), self.motor_rows());
-        let mut kernel = Kernel::<f64>::new(n, size);
-        kernel.accelerate_free::<0>(&all, phi, omega);
+        let (n, size, motors) = (self.coordinates(), all.rows.len(), self.standing_rows());
+        let mut kernel = Kernel::<f64>::new(&all);
+        kernel.accelerate_free::<0>(&all, t, phi, omega);
         kernel.linearise::<0>(&all, t, phi, omega);
         fn part(rows: &[f64], r: usize, n: usize) -> &[f64] {
             &rows[r * n..(r + 1) * n]
@@ -66,7 +65,7 @@ impl Mechanism {
             let acceleration = &free - &schur * &multiplier;
             let mut hardest: Option<(usize, f64)> = None;
             for r in (motors..size).filter(|r| !set.contains(r)) {
-                let terms = &self.contacts[touching[r - motors]].row.point.terms;
+                let terms = &self.contacts[touching[r - motors]].point.terms;
                 let levers: f64 = terms.iter().map(|term| term.1.norm_squared()).sum();
                 let jacobian = part(&kernel.jacobian, r, n);
                 let inward = -acceleration[r];

@@ -4,7 +4,7 @@
 //! Sᵀ M S u'' = Sᵀ (b - M s''),      (Gᵀ lambda)_i = b_i - Σ M_ij a_j,      power of all motors = -(b - M a)·s'
 //! ```
 //!
-//! Unknowns: u (f), u' (f), work of motors and dampers \[J\].  The rows hold exactly, whatever the method.
+//! Unknowns: u (f), u' (f), work of motors, dampers and applied forces \[J\].  The rows hold exactly, whatever the method.
 
 use super::kernel::Kernel;
 use super::tree::{self, size};
@@ -19,6 +19,7 @@ pub struct Elimination<const N: usize> {
     kernel: Kernel<f64>,
     /// True where no driven angle accelerates.
     is_steady: bool,
+    phi: Vec<f64>,
     omega: Vec<f64>,
     drive_acceleration: Vec<f64>,
     drive_rate: Vec<f64>,
@@ -32,11 +33,12 @@ pub struct Elimination<const N: usize> {
 impl<const N: usize> Elimination<N> {
     /// The form of a mechanism; `N` must be its number of bodies or 0.
     pub fn new(mechanism: Arc<Mechanism>) -> Self {
-        debug_assert!(N == 0 || N == mechanism.bodies.len());
-        let (n, f) = (mechanism.bodies.len(), mechanism.ties.count());
+        debug_assert!(N == 0 || N == mechanism.size());
+        let (n, f) = (mechanism.coordinates(), mechanism.ties.count());
         let zeros = || vec![0.0; n];
         Self {
-            kernel: Kernel::new(n, 0),
+            kernel: Kernel::without_rows(&mechanism),
+            phi: zeros(),
             share: zeros(),
             omega: zeros(),
             drive_acceleration: zeros(),
@@ -54,17 +56,23 @@ impl<const N: usize> Elimination<N> {
     #[inline(always)]
     fn rate_sized<const F: usize>(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
         let mechanism = &*self.mechanism;
-        let (n, f) = (size::<N>(mechanism.bodies.len()), size::<F>(mechanism.ties.count()));
+        let (n, f) = (size::<N>(mechanism.coordinates()), size::<F>(mechanism.ties.count()));
+        let angles = size::<N>(mechanism.ties.angles);
         let (u, u_rate, rate) = (&y[..f], &y[f..2 * f], &mut rate[..2 * f + 1]);
         let ties = &mechanism.ties.bodies[..n];
         let kernel = &mut self.kernel;
         let (drive_rate, drive_acceleration, omega) = (&mut self.drive_rate[..n], &mut self.drive_acceleration[..n], &mut self.omega[..n]);
-        for k in 0..n {
+        for k in 0..angles {
             let placed = ties[k].place(t, u);
             (kernel.z[k], drive_rate[k], drive_acceleration[k]) = (placed.unit, placed.rate, placed.acceleration);
             omega[k] = drive_rate[k] + ties[k].base.map_or(0.0, |base| u_rate[base]);
+            self.phi[k] = placed.angle;
         }
-        kernel.assemble::<N>(mechanism, omega);
+        mechanism.ties.feet(u, &mut kernel.z);
+        for k in angles..n {
+            omega[k] = ties[k].base.map_or(0.0, |base| u_rate[base]);
+        }
+        kernel.assemble::<N>(mechanism, t, &self.phi, omega);
         let (mass, load, given) = (&kernel.mass[..n * n], &mut kernel.load[..n], &mut self.given[..n]);
         // b - M s''; what of it the coordinates do not feel is the motors' share.
         if !self.is_steady {
@@ -101,9 +109,7 @@ impl<const N: usize> Elimination<N> {
         for k in 0..n {
             power -= (load[k] - given[k]) * drive_rate[k];
         }
-        for spring in mechanism.springs.iter().filter(|spring| spring.damping != 0.0) {
-            power += spring.drag_power(&kernel.z, omega);
-        }
+        power += mechanism.force_power(t, &kernel.z, omega);
         rate[..f].copy_from_slice(&u_rate[..f]);
         rate[f..2 * f].copy_from_slice(&acceleration[..f]);
         rate[2 * f] = power;
@@ -116,7 +122,7 @@ impl<const N: usize> Field for Elimination<N> {
     }
 
     fn angles(&self) -> usize {
-        self.mechanism.ties.count()
+        self.mechanism.ties.turning()
     }
 
     fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
@@ -131,9 +137,9 @@ impl<const N: usize> Field for Elimination<N> {
         let ties = &self.mechanism.ties;
         let f = ties.count();
         match i {
-            i if i < f => format!("phi of {}", self.mechanism.bodies[ties.independent[i]].name),
-            i if i < 2 * f => format!("omega of {}", self.mechanism.bodies[ties.independent[i - f]].name),
-            _ => "work of motors and dampers".into(),
+            i if i < f => self.mechanism.coordinate_name(ties.independent[i]),
+            i if i < 2 * f => self.mechanism.rate_name(ties.independent[i - f]),
+            _ => "work of motors and forces".into(),
         }
     }
 
@@ -144,9 +150,10 @@ impl<const N: usize> Field for Elimination<N> {
     fn gaps(&mut self, t: Time, y: &[f64], gaps: &mut [f64]) {
         let ties = &self.mechanism.ties;
         let kernel = &mut self.kernel;
-        for (z, tie) in kernel.z.iter_mut().zip(&ties.bodies) {
+        for (z, tie) in kernel.z.iter_mut().zip(&ties.bodies[..ties.angles]) {
             *z = tie.place(t, &y[..ties.count()]).unit;
         }
+        ties.feet(y, &mut kernel.z);
         for (gap, contact) in gaps.iter_mut().zip(&self.mechanism.contacts) {
             *gap = contact.row.gap(&kernel.z);
         }
@@ -167,7 +174,11 @@ impl<const N: usize> Form for Elimination<N> {
         let mut unknowns: Vec<DoubleDouble> = ties.independent.iter().map(|&body| motion.phi[body]).collect();
         unknowns.extend(ties.coordinate_rates(motion));
         unknowns.push(motion.work);
-        ties.state(motion, &unknowns)
+        let mut state = ties.state(motion, &unknowns);
+        if self.mechanism.is_winding() {
+            state.unwind();
+        }
+        state
     }
 
     fn read(&mut self, state: &State, motion: &mut Motion) {
@@ -182,7 +193,7 @@ impl<const N: usize> Form for Elimination<N> {
     }
 
     fn glance(&mut self, state: &State, glance: &mut Glance) {
-        let n = self.mechanism.bodies.len();
+        let n = self.mechanism.coordinates();
         // Where nothing is driven the coordinates are the angles, in the same order.
         if self.mechanism.ties.count() == n {
             return glance.take_leading(state, n);

@@ -4,10 +4,10 @@
 //! its own rounding.
 
 use super::kernel::{Kernel, dot};
-use super::{Mechanism, Motion, tree};
+use super::{Mechanism, Motion, Time, tree};
 #[cfg(target_arch = "x86_64")]
 use crate::arithmetic::lanes;
-use crate::arithmetic::{DoubleDouble, Real, Scalar};
+use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
 use crate::scene::Scene;
 
 /// Energies at one moment \[J\].
@@ -38,12 +38,37 @@ impl Mechanism {
     pub fn start(&self, scene: &Scene) -> Motion {
         let mut motion = Motion::default();
         for start in &scene.start {
-            let (phi, turns) = DoubleDouble::of(start.phi).reduced();
+            let full = DoubleDouble::of(start.phi);
+            let (phi, turns) = if self.is_winding() { (full, 0.0) } else { full.reduced() };
             motion.phi.push(phi);
             motion.turns.push(turns as i64);
             motion.omega.push(DoubleDouble::of(start.omega));
         }
+        self.put_feet(scene, &mut motion);
         motion
+    }
+
+    /// Positions and velocities of free feet, from those given for the origin of some bar of each group.
+    fn put_feet(&self, scene: &Scene, motion: &mut Motion) {
+        let bars = self.bodies.len();
+        motion.resize(self.coordinates());
+        let mut kernel = Kernel::<DoubleDouble>::without_rows(self);
+        kernel.face::<0>(self, &motion.phi);
+        for x in (bars..self.coordinates()).step_by(2) {
+            let is_carried = |&k: &usize| self.end(k, 0).point.shifts.first().is_some_and(|shift| shift.0 == x);
+            let group: Vec<usize> = (0..bars).filter(is_carried).collect();
+            let given = |k: &usize| scene.given.get(*k);
+            let origin = group.iter().find_map(|k| Some((*k, given(k)?.origin?)));
+            if let Some((k, [at_x, at_y])) = origin {
+                let reach = self.end(k, 0).point.position(&kernel.z);
+                (motion.phi[x], motion.phi[x + 1]) = (DoubleDouble::of(at_x) - reach.re, DoubleDouble::of(at_y) - reach.im);
+            }
+            let velocity = group.iter().find_map(|k| Some((*k, given(k)?.velocity?)));
+            if let Some((k, [v_x, v_y])) = velocity {
+                let swing = self.end(k, 0).point.velocity(&kernel.z, &motion.omega);
+                (motion.omega[x], motion.omega[x + 1]) = (DoubleDouble::of(v_x) - swing.re, DoubleDouble::of(v_y) - swing.im);
+            }
+        }
     }
 
     /// Energies of a motion in double-double, by the processor's fused multiply-add where it has one; overwrites `kernel`.
@@ -62,31 +87,48 @@ impl Mechanism {
     /// Energies of a motion; overwrites `kernel`.
     #[inline(always)]
     pub fn energy<T: Real>(&self, kernel: &mut Kernel<T>, phi: &[T], omega: &[T]) -> Energy<T> {
-        kernel.face::<0>(phi);
-        self.energy_facing::<T, 0>(kernel, omega)
+        kernel.face::<0>(self, phi);
+        self.energy_facing::<T, 0>(kernel, phi, omega)
     }
 
-    /// Energies at the unit vectors in `kernel`, which holds M and its twist afterwards; for `N` bodies (any number where `N` is 0).
+    /// Energies at the elements in `kernel` and the coordinates they stand for; it holds M and its twist afterwards; for `N` bodies (any number where `N` is 0).
     #[inline(always)]
-    pub fn energy_facing<T: Real, const N: usize>(&self, kernel: &mut Kernel<T>, omega: &[T]) -> Energy<T> {
-        let n = tree::size::<N>(self.bodies.len());
+    pub fn energy_facing<T: Real, const N: usize>(&self, kernel: &mut Kernel<T>, phi: &[T], omega: &[T]) -> Energy<T> {
+        let n = tree::size::<N>(self.coordinates());
         self.tree.couple::<T, N>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
         tree::multiply::<T, N>(n, &kernel.mass, omega, &mut kernel.load);
-        let ground = self.bodies.iter().fold(0.0, |sum, body| sum - body.mass * self.gravity.dot(body.centre.root));
-        let gravity = self.tree.gravity_energy(&kernel.z) + T::of(ground);
+        let gravity = self.tree.gravity_energy(&kernel.z) + T::of(self.ground_energy);
+        let springs = self.springs.iter().fold(gravity, |sum, spring| sum + spring.energy(&kernel.z));
         Energy {
             kinetic: dot(omega, &kernel.load).scale(0.5),
-            potential: self.springs.iter().fold(gravity, |sum, spring| sum + spring.energy(&kernel.z)),
+            potential: self.torsions.iter().fold(springs, |sum, torsion| sum + torsion.energy(phi)),
         }
+    }
+
+    /// Power of dampers and applied forces on the bodies \[W\].
+    #[inline(always)]
+    pub fn force_power<T: Real>(&self, t: Time, z: &[Complex<T>], omega: &[T]) -> T {
+        let mut power = T::ZERO;
+        for spring in self.springs.iter().filter(|spring| spring.damping != 0.0) {
+            power += spring.drag_power(z, omega);
+        }
+        for torsion in self.torsions.iter().filter(|torsion| torsion.damping != 0.0) {
+            power += torsion.drag(omega) * torsion.between(omega);
+        }
+        for action in &self.actions {
+            power += action.power(action.factor(t), z, omega);
+        }
+        power
     }
 
     /// Work of gravity from hanging to horizontal, Σ |weight_k|, plus kinetic and spring energy at the start \[J\]; 1 J where all of these are zero.
     pub fn scale_of_energy(&self, start: &Motion) -> f64 {
-        let mut kernel = Kernel::<DoubleDouble>::new(self.bodies.len(), 0);
+        let mut kernel = Kernel::<DoubleDouble>::without_rows(self);
         let kinetic = self.energy(&mut kernel, &start.phi, &start.omega).kinetic.hi;
         let springs: f64 = self.springs.iter().map(|spring| spring.energy(&kernel.z).hi).sum();
-        let gravity: f64 = self.tree.weight.iter().map(|weight| weight.norm_squared().sqrt()).sum();
-        let scale = gravity + kinetic + springs;
+        let torsions: f64 = self.torsions.iter().map(|torsion| torsion.energy(&start.phi).hi).sum();
+        let gravity: f64 = self.tree.weight[..self.bodies.len()].iter().map(|weight| weight.norm_squared().sqrt()).sum();
+        let scale = gravity + kinetic + springs + torsions;
         if scale > 0.0 { scale } else { 1.0 }
     }
 }

@@ -8,15 +8,21 @@
 //! Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996), section 8.2 (Newton's law of impact).
 
 use super::kernel::{Kernel, dot};
-use super::row::{LineRow, Posture};
+use super::point::Point;
+use super::row::{Posture, Row};
 use super::{Mechanism, Time, tree};
+use crate::arithmetic::Complex;
 use nalgebra::{DMatrix, DVector};
 
 /// A wall as the mechanism meets it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contact {
     /// The gap and its Jacobian.
-    pub row: LineRow,
+    pub row: Row,
+    /// The point.
+    pub point: Point,
+    /// Unit normal of the wall.
+    pub normal: Complex<f64>,
     /// Restitution e.
     pub restitution: f64,
 }
@@ -43,13 +49,13 @@ impl Mechanism {
     ///
     /// Angles \[rad\] and rates \[rad/s\] of all bodies at the moment of impact; a point that is not approaching keeps its rates.
     pub fn strike(&self, contact: usize, t: Time, phi: &[f64], omega: &[f64]) -> Option<Impact> {
-        let Contact { row, restitution } = &self.contacts[contact];
-        let n = self.bodies.len();
-        let mut kernel = Kernel::<f64>::new(n, 0);
-        kernel.face::<0>(phi);
+        let Contact { row, restitution, .. } = &self.contacts[contact];
+        let n = self.coordinates();
+        let mut kernel = Kernel::<f64>::without_rows(self);
+        kernel.face::<0>(self, phi);
         self.tree.couple::<f64, 0>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
         let mut jacobian = vec![0.0; n];
-        row.jacobian(&kernel.z, &mut jacobian);
+        row.differentiate(t, Posture { phi, z: &kernel.z, omega }, &mut jacobian);
         let approach = dot(&jacobian, omega);
         if approach >= 0.0 {
             let row_impulses = vec![0.0; self.rows.len()];

@@ -7,6 +7,7 @@
 //! A scene without rows never enters the second line.
 
 use super::row::{Linearised, Posture};
+use super::schur::{self, Weakest};
 use super::tree::{self, size};
 use super::{Mechanism, Time};
 use crate::arithmetic::{Complex, Real, Scalar};
@@ -20,10 +21,10 @@ pub struct Bias {
     pub position: f64,
 }
 
-/// Scratch space of an evaluation for a mechanism of n bodies and r rows; nothing is allocated after [`Kernel::new`].
+/// Scratch space of an evaluation for a mechanism of n coordinates and r rows; nothing is allocated after [`Kernel::new`].
 #[derive(Clone, Debug)]
 pub struct Kernel<T> {
-    /// Unit vectors (n).
+    /// Elements: unit vectors, and feet at the place of their x (n).
     pub z: Vec<Complex<T>>,
     /// M above and on the diagonal, then its factors (n × n) \[kg·m²\].
     pub mass: Vec<T>,
@@ -39,8 +40,12 @@ pub struct Kernel<T> {
     pub lifted: Vec<T>,
     /// S = G M⁻¹ Gᵀ above and on the diagonal, then its factors (r × r).
     pub schur: Vec<T>,
-    /// Reciprocal pivots of S (r).
+    /// Reciprocal pivots of S (r); zero for rows left out.
     pub schur_pivot: Vec<T>,
+    /// What pivots of S are measured against (r).
+    pub scale: Vec<f64>,
+    /// The row nearest to being left out in the last evaluation.
+    pub weakest: Weakest,
     /// The rows at this moment (r).
     pub rows: Vec<Linearised<T>>,
     /// Multipliers (r) \[N·m or N\].
@@ -50,53 +55,67 @@ pub struct Kernel<T> {
 }
 
 impl<T: Scalar> Kernel<T> {
-    /// Scratch space for `bodies` bodies and `rows` rows.
-    pub fn new(bodies: usize, rows: usize) -> Self {
+    /// Scratch space for a mechanism and its rows.
+    pub fn new(mechanism: &Mechanism) -> Self {
+        Self::sized(mechanism.coordinates(), mechanism.row_scales())
+    }
+
+    /// Scratch space for a mechanism whose rows nobody asks about.
+    pub fn without_rows(mechanism: &Mechanism) -> Self {
+        Self::sized(mechanism.coordinates(), Vec::new())
+    }
+
+    fn sized(n: usize, scale: Vec<f64>) -> Self {
+        let rows = scale.len();
         let idle = Linearised { position: T::ZERO, drive: T::ZERO, convective: T::ZERO };
         Self {
-            z: vec![Complex::ZERO; bodies],
-            mass: vec![T::ZERO; bodies * bodies],
-            twist: vec![T::ZERO; bodies * bodies],
-            pivot: vec![T::ZERO; bodies],
-            load: vec![T::ZERO; bodies],
-            jacobian: vec![T::ZERO; rows * bodies],
-            lifted: vec![T::ZERO; rows * bodies],
+            z: vec![Complex::ZERO; n],
+            mass: vec![T::ZERO; n * n],
+            twist: vec![T::ZERO; n * n],
+            pivot: vec![T::ZERO; n],
+            load: vec![T::ZERO; n],
+            jacobian: vec![T::ZERO; rows * n],
+            lifted: vec![T::ZERO; rows * n],
             schur: vec![T::ZERO; rows * rows],
             schur_pivot: vec![T::ZERO; rows],
+            scale,
+            weakest: Weakest::NONE,
             rows: vec![idle; rows],
             multiplier: vec![T::ZERO; rows],
             correction: vec![T::ZERO; rows],
         }
     }
 
-    /// Unit vectors of these angles.
+    /// Unit vectors of these angles, and feet.
     #[inline(always)]
-    pub fn face<const N: usize>(&mut self, phi: &[T]) {
-        let n = size::<N>(phi.len());
-        let (z, phi) = (&mut self.z[..n], &phi[..n]);
-        for k in 0..n {
-            z[k] = Complex::unit(phi[k]);
-        }
+    pub fn face<const N: usize>(&mut self, mechanism: &Mechanism, phi: &[T]) {
+        mechanism.tree.face::<T, N>(phi, &mut self.z);
     }
 }
 
 impl<T: Real> Kernel<T> {
-    /// M, its twist and the whole load b (velocity terms, gravity, springs, dampers) at the unit vectors in `z`.
+    /// M, its twist and the whole load b (velocity terms, gravity, springs, dampers, applied forces) at the elements in `z`.
     #[inline(always)]
-    pub fn assemble<const N: usize>(&mut self, mechanism: &Mechanism, omega: &[T]) {
+    pub fn assemble<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
         mechanism.tree.couple::<T, N>(&self.z, &mut self.mass, &mut self.twist);
         mechanism.tree.load::<T, N>(&self.z, omega, &self.twist, &mut self.load);
         for spring in &mechanism.springs {
             spring.span.pull(spring.force(&self.z, omega), &self.z, &mut self.load);
         }
+        for torsion in &mechanism.torsions {
+            torsion.pull(torsion.torque(phi, omega), &mut self.load);
+        }
+        for action in &mechanism.actions {
+            action.pull(action.factor(t), &self.z, &mut self.load);
+        }
     }
 
     /// Accelerations \[rad/s²\] without any row, into `load`.
     #[inline(always)]
-    pub fn accelerate_free<const N: usize>(&mut self, mechanism: &Mechanism, phi: &[T], omega: &[T]) {
-        let n = size::<N>(mechanism.tree.bodies);
-        self.face::<N>(phi);
-        self.assemble::<N>(mechanism, omega);
+    pub fn accelerate_free<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
+        let n = size::<N>(mechanism.tree.coordinates);
+        self.face::<N>(mechanism, phi);
+        self.assemble::<N>(mechanism, t, phi, omega);
         tree::factor::<T, N>(n, &mut self.mass, &mut self.pivot);
         tree::solve::<T, N>(n, &self.mass, &self.pivot, &mut self.load);
     }
@@ -104,7 +123,7 @@ impl<T: Real> Kernel<T> {
     /// Accelerations \[rad/s²\] into `load`, multipliers into `multiplier`.
     #[inline(always)]
     pub fn accelerate<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T], bias: Bias) {
-        self.accelerate_free::<N>(mechanism, phi, omega);
+        self.accelerate_free::<N>(mechanism, t, phi, omega);
         match mechanism.rows.len() {
             1 => self.constrain::<N, 1>(mechanism, t, phi, omega, bias),
             2 => self.constrain::<N, 2>(mechanism, t, phi, omega, bias),
@@ -115,7 +134,7 @@ impl<T: Real> Kernel<T> {
     /// The share of `R` rows (any number where `R` is 0): expects free accelerations in `load` and the factors of M.
     #[inline(always)]
     fn constrain<const N: usize, const R: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T], bias: Bias) {
-        let (n, rows) = (size::<N>(mechanism.tree.bodies), size::<R>(mechanism.rows.len()));
+        let (n, rows) = (size::<N>(mechanism.tree.coordinates), size::<R>(mechanism.rows.len()));
         let is_biased = bias != Bias::default();
         let posture = Posture { phi, z: &self.z[..n], omega };
         let (all, multiplier, correction) = (&mut self.jacobian[..rows * n], &mut self.multiplier[..rows], &mut self.correction[..rows]);
@@ -151,12 +170,12 @@ impl<T: Real> Kernel<T> {
     /// C, G, C_t, gamma of every row, and the factors of S = G M⁻¹ Gᵀ; expects the factors of M.
     pub fn linearise<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
         self.rows_at(mechanism, t, phi, omega);
-        self.couple_rows::<N, 0>(size::<N>(mechanism.tree.bodies), mechanism.rows.len());
+        self.couple_rows::<N, 0>(size::<N>(mechanism.tree.coordinates), mechanism.rows.len());
     }
 
     /// C, G, C_t, gamma of every row, and nothing else.
     pub fn rows_at(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
-        let n = mechanism.tree.bodies;
+        let n = mechanism.tree.coordinates;
         let posture = Posture { phi, z: &self.z, omega };
         self.jacobian.fill(T::ZERO);
         for (r, row) in mechanism.rows.iter().enumerate() {
@@ -180,7 +199,7 @@ impl<T: Real> Kernel<T> {
                 schur[r * rows + s] = dot(&jacobian[r * n..(r + 1) * n], &lifted[s * n..(s + 1) * n]);
             }
         }
-        tree::factor::<T, R>(rows, schur, &mut self.schur_pivot);
+        self.weakest = schur::factor::<T, R>(rows, schur, &mut self.schur_pivot, &self.scale);
     }
 
     /// C' of row `r` \[rad/s or m/s\], after [`Kernel::linearise`].

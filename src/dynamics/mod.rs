@@ -33,6 +33,7 @@ pub mod contact;
 pub mod elimination;
 pub mod energy;
 pub mod force;
+pub mod forest;
 pub mod impact;
 pub mod kernel;
 pub mod law;
@@ -40,8 +41,10 @@ pub mod multiplier;
 pub mod natural;
 pub mod point;
 pub mod points;
+pub mod quadratic;
 pub mod reaction;
 pub mod row;
+pub mod schur;
 pub mod series;
 pub mod ties;
 pub mod tree;
@@ -65,6 +68,8 @@ pub struct State {
     pub low: Vec<f64>,
     /// Whole turns taken off each angle.
     pub turns: Vec<i64>,
+    /// True where none are taken off: see [`Mechanism::is_winding`].
+    pub is_winding: bool,
     /// What a method carries from step to step (controller, predictor); empty before the first step.
     pub memory: Vec<f64>,
 }
@@ -77,14 +82,27 @@ impl State {
             y: unknowns.iter().map(|x| x.hi).collect(),
             low: unknowns.iter().map(|x| x.lo).collect(),
             turns: vec![0; angles],
+            is_winding: false,
             memory: Vec::new(),
         };
         state.wrap();
         state
     }
 
+    /// Puts whole turns back into the angles, and leaves them there from now on.
+    pub fn unwind(&mut self) {
+        for (i, turns) in self.turns.iter_mut().enumerate() {
+            let angle = DoubleDouble::sum(self.y[i], self.low[i]) + DoubleDouble::TAU.scale(std::mem::take(turns) as f64);
+            (self.y[i], self.low[i]) = (angle.hi, angle.lo);
+        }
+        self.is_winding = true;
+    }
+
     /// Brings every angle back into [-π, π] and counts the turns.
     pub fn wrap(&mut self) {
+        if self.is_winding {
+            return;
+        }
         for (i, turns) in self.turns.iter_mut().enumerate() {
             *turns += angle::wrap(&mut self.y[i], &mut self.low[i]);
         }
@@ -109,6 +127,7 @@ impl Clone for State {
         self.y.clone_from(&other.y);
         self.low.clone_from(&other.low);
         self.turns.clone_from(&other.turns);
+        self.is_winding = other.is_winding;
         self.memory.clone_from(&other.memory);
     }
 }
@@ -149,7 +168,7 @@ pub trait Field {
 /// What the first unknowns of a form are; their rates follow, then the work of motors and dampers where there are any.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coordinates {
-    /// The angles of all bodies: rows are kept by multipliers.
+    /// All of them: rows are kept by multipliers.
     All,
     /// The angles left by the [`ties`], with the motors' rows eliminated.
     Independent,
@@ -202,13 +221,14 @@ impl Glance {
         self.omega.extend(motion.omega.iter().map(|omega| omega.hi));
     }
 
-    /// Takes it from a state whose unknowns begin with the angles and rates of all bodies.
-    pub fn take_leading(&mut self, state: &State, bodies: usize) {
+    /// Takes it from a state whose unknowns begin with so many coordinates and their rates.
+    pub fn take_leading(&mut self, state: &State, coordinates: usize) {
         self.phi.clear();
-        self.phi.extend_from_slice(&state.y[..bodies]);
+        self.phi.extend_from_slice(&state.y[..coordinates]);
         self.turns.clone_from(&state.turns);
+        self.turns.resize(coordinates, 0);
         self.omega.clear();
-        self.omega.extend_from_slice(&state.y[bodies..2 * bodies]);
+        self.omega.extend_from_slice(&state.y[coordinates..2 * coordinates]);
     }
 }
 
@@ -217,24 +237,24 @@ impl Glance {
 pub struct Motion {
     /// Time.
     pub time: Time,
-    /// Absolute angles in [-π, π] \[rad\], in the order of the scene's bars.
+    /// Absolute angles \[rad\], in the order of the scene's bars and in [-π, π] but where turns matter; then positions of free feet \[m\].
     pub phi: Vec<DoubleDouble>,
     /// Whole turns to be added to each angle.
     pub turns: Vec<i64>,
-    /// Rates \[rad/s\].
+    /// Rates \[rad/s, m/s\].
     pub omega: Vec<DoubleDouble>,
-    /// Work of motors and dampers on the bodies since t = 0 \[J\].
+    /// Work of motors, dampers and applied forces on the bodies since t = 0 \[J\].
     pub work: DoubleDouble,
     /// Energy a stabilizer has put in since t = 0 \[J\], negative where it took some out.
     pub stabilizer: f64,
 }
 
 impl Motion {
-    /// Room for `bodies` bodies.
-    pub fn resize(&mut self, bodies: usize) {
-        self.phi.resize(bodies, DoubleDouble::ZERO);
-        self.omega.resize(bodies, DoubleDouble::ZERO);
-        self.turns.resize(bodies, 0);
+    /// Room for so many coordinates.
+    pub fn resize(&mut self, coordinates: usize) {
+        self.phi.resize(coordinates, DoubleDouble::ZERO);
+        self.omega.resize(coordinates, DoubleDouble::ZERO);
+        self.turns.resize(coordinates, 0);
     }
 
     /// The winding angle of a body \[rad\].

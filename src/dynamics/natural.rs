@@ -18,7 +18,8 @@
 //!
 //! Source: J. García de Jalón, E. Bayo, *Kinematic and Dynamic Simulation of Multibody Systems* (1994), chapter 2, for natural coordinates.
 
-use super::row::{AngleRow, Row};
+use super::law::Law;
+use super::row::Measure;
 use super::{Form, Mechanism, Motion, State, Time, tree};
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use std::sync::Arc;
@@ -43,8 +44,20 @@ pub enum NaturalError {
     TooMany(usize),
 }
 
-/// A motor as a row of the unit vectors.
-impl AngleRow {
+/// A motor or lock as a row of the unit vectors.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drive {
+    /// Name of the row.
+    pub name: String,
+    /// The driven body a.
+    pub body: usize,
+    /// The body b its angle is measured from; `None`: from +x.
+    pub base: Option<usize>,
+    /// theta(t).
+    pub law: Law,
+}
+
+impl Drive {
     /// `conj(u) z_a conj(z_b)`: 1 where the row is kept; C is its imaginary part.
     #[inline(always)]
     pub fn mismatch<T: Scalar>(&self, unit: Complex<T>, z: &[Complex<T>]) -> Complex<T> {
@@ -52,7 +65,7 @@ impl AngleRow {
         self.base.map_or(direct, |base| direct * z[base].conj())
     }
 
-    /// Derivative of [`AngleRow::mismatch`] along `rate` at fixed u.
+    /// Derivative of [`Drive::mismatch`] along `rate` at fixed u.
     #[inline(always)]
     pub fn slip<T: Scalar>(&self, unit: Complex<T>, z: &[Complex<T>], rate: &[Complex<T>]) -> Complex<T> {
         match self.base {
@@ -92,7 +105,7 @@ pub struct Natural {
     mechanism: Arc<Mechanism>,
     /// W (n × n), Hermitian to the last bit \[1/(kg·m²)\].
     inverse: Vec<Complex<f64>>,
-    drives: Vec<AngleRow>,
+    drives: Vec<Drive>,
 }
 
 impl Natural {
@@ -113,9 +126,11 @@ impl Natural {
         }
         let mut drives = Vec::new();
         for row in &mechanism.rows {
-            match row {
-                Row::Angle(row) => drives.push(row.clone()),
-                Row::Line(_) | Row::Pin(_) => return Err(NaturalError::Wall(row.name().to_owned())),
+            match (&row.measure, &row.law) {
+                (&Measure::Angle { body, base }, Some(law)) => {
+                    drives.push(Drive { name: row.name.clone(), body, base, law: law.clone() });
+                }
+                _ => return Err(NaturalError::Wall(row.name.clone())),
             }
         }
         let inverse = invert(&mechanism).map_err(|body| NaturalError::Singular(mechanism.bodies[body].name.clone()))?;
@@ -129,7 +144,7 @@ impl Natural {
     }
 
     /// The motors.
-    pub fn drives(&self) -> &[AngleRow] {
+    pub fn drives(&self) -> &[Drive] {
         &self.drives
     }
 
@@ -152,9 +167,7 @@ impl Natural {
         }
         for spring in &self.mechanism.springs {
             let pull = spring.elastic(z);
-            for &(k, gamma) in &spring.span.terms {
-                force[k] += pull.turn(gamma.conj());
-            }
+            spring.span.spread(pull, |k, pull| force[k] += pull);
         }
     }
 

@@ -1,11 +1,12 @@
-//! A point of the mechanism as a linear functional of the unit vectors: `P = p0 + Σ gamma_k z_k`.
+//! A point of the mechanism as a linear functional of its elements: `P = p0 + Σ gamma_k z_k + Σ ± zeta_f`.
 //!
-//! Everything that acts at a point (hinge, spring, wall, motor) is built from this list alone:
+//! Elements are the bodies' unit vectors z_k and, of bodies that hang on nothing, the positions zeta = x + iy of their feet.  Everything that
+//! acts at a point (hinge, spring, wall, motor) is built from this list alone:
 //!
 //! ```text
-//! P'  = Σ i gamma_k z_k w_k
-//! P'' = Σ i gamma_k z_k a_k + Pi,     Pi = -Σ gamma_k z_k w_k²
-//! a force F at P has the generalized force Im(conj(z_k) conj(gamma_k) F) on body k
+//! P'  = Σ i gamma_k z_k w_k + Σ ± zeta_f'
+//! P'' = Σ i gamma_k z_k a_k + Σ ± zeta_f'' + Pi,     Pi = -Σ gamma_k z_k w_k²
+//! a force F at P has the generalized force Im(conj(z_k) conj(gamma_k) F) on body k, and ± F on zeta_f
 //! ```
 
 use crate::arithmetic::{Complex, Scalar};
@@ -17,12 +18,19 @@ pub struct Point {
     pub root: Complex<f64>,
     /// Body and gamma_k \[m\], in rising order of the bodies.
     pub terms: Vec<(usize, Complex<f64>)>,
+    /// First coordinate of a foot that moves freely, and how often it counts: 1, or -1.
+    pub shifts: Vec<(usize, f64)>,
 }
 
 impl Point {
     /// A point of the ground.
     pub fn ground(at: [f64; 2]) -> Self {
-        Self { root: Complex::new(at[0], at[1]), terms: Vec::new() }
+        Self { root: Complex::new(at[0], at[1]), ..Self::default() }
+    }
+
+    /// The foot whose coordinates are `x` and the one after it.
+    pub fn floating(x: usize) -> Self {
+        Self { shifts: vec![(x, 1.0)], ..Self::default() }
     }
 
     /// The point `offset` \[m, in the body's directions\] away on body `body`.
@@ -38,10 +46,17 @@ impl Point {
 
     /// The vector from `other` to this point.
     pub fn minus(&self, other: &Self) -> Self {
-        let mut difference = Self { root: self.root - other.root, terms: self.terms.clone() };
+        let mut difference = Self { root: self.root - other.root, ..self.clone() };
         for &(body, gamma) in &other.terms {
             difference = difference.along(body, -gamma);
         }
+        for &(x, share) in &other.shifts {
+            match difference.shifts.iter().position(|shift| shift.0 == x) {
+                Some(same) => difference.shifts[same].1 -= share,
+                None => difference.shifts.push((x, -share)),
+            }
+        }
+        difference.shifts.retain(|shift| shift.1 != 0.0);
         difference
     }
 
@@ -50,16 +65,18 @@ impl Point {
         self.terms.binary_search_by_key(&body, |term| term.0).map_or(Complex::ZERO, |i| self.terms[i].1)
     }
 
-    /// P \[m\].
+    /// P \[m\] at the elements `z`.
     #[inline(always)]
     pub fn position<T: Scalar>(&self, z: &[Complex<T>]) -> Complex<T> {
-        self.terms.iter().fold(Complex::of(self.root), |sum, &(k, gamma)| sum + z[k].turn(gamma))
+        let turned = self.terms.iter().fold(Complex::of(self.root), |sum, &(k, gamma)| sum + z[k].turn(gamma));
+        self.shifts.iter().fold(turned, |sum, &(x, share)| sum + z[x].times(T::of(share)))
     }
 
     /// P' \[m/s\].
     #[inline(always)]
     pub fn velocity<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
-        self.terms.iter().fold(Complex::ZERO, |sum, &(k, gamma)| sum + z[k].turn(gamma).left().times(omega[k]))
+        let turned = self.terms.iter().fold(Complex::ZERO, |sum, &(k, gamma)| sum + z[k].turn(gamma).left().times(omega[k]));
+        self.shifts.iter().fold(turned, |sum, &(x, share)| sum + Complex::new(omega[x], omega[x + 1]).times(T::of(share)))
     }
 
     /// P'' at zero angular acceleration \[m/s²\].
@@ -73,11 +90,33 @@ impl Point {
         self.velocity(z, alpha) + self.convective(z, omega)
     }
 
+    /// The force \[N·m, N\] on each element, of a force \[N\] that acts here.
+    #[inline(always)]
+    pub fn spread<T: Scalar>(&self, force: Complex<T>, mut each: impl FnMut(usize, Complex<T>)) {
+        for &(k, gamma) in &self.terms {
+            each(k, force.turn(gamma.conj()));
+        }
+        for &(x, share) in &self.shifts {
+            each(x, force.times(T::of(share)));
+        }
+    }
+
+    /// P without its constant part, of one power of a series of the elements.
+    #[inline(always)]
+    pub fn turned<T: Scalar>(&self, z: &[Complex<T>]) -> Complex<T> {
+        let turned = self.terms.iter().fold(Complex::ZERO, |sum, &(k, gamma)| sum + z[k].turn(gamma));
+        self.shifts.iter().fold(turned, |sum, &(x, share)| sum + z[x].times(T::of(share)))
+    }
+
     /// Adds the generalized forces \[N m\] of a force \[N\] that acts here.
     #[inline(always)]
     pub fn pull<T: Scalar>(&self, force: Complex<T>, z: &[Complex<T>], load: &mut [T]) {
         for &(k, gamma) in &self.terms {
             load[k] += z[k].turn(gamma).cross(force);
+        }
+        for &(x, share) in &self.shifts {
+            load[x] += force.re.scale(share);
+            load[x + 1] += force.im.scale(share);
         }
     }
 }

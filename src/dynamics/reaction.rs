@@ -1,19 +1,24 @@
 //! Hinge forces by Newton–Euler: what a hinge carries is what everything beyond it needs.
 //!
 //! ```text
-//! F = Σ over the subtree  m (a_c - g) - applied forces
+//! F = Σ over the subtree  m (a_c - g) - applied forces - forces of rows
 //! ```
 //!
-//! No unknowns are added for it; it equals the multipliers of the pinned form.
+//! No unknowns are added for it; it equals the multipliers of the pinned form.  A hinge that closes a loop carries the force of its own rows.
 
-use super::Mechanism;
+use super::compile::Joint;
+use super::kernel::Kernel;
+use super::{Mechanism, Time};
 use crate::arithmetic::Complex;
 
 impl Mechanism {
-    /// Force \[N\] of the first body of each hinge on the second (in the scene's order), given rates \[rad/s\] and accelerations \[rad/s²\].
-    pub fn hinge_forces(&self, z: &[Complex<f64>], omega: &[f64], alpha: &[f64]) -> Vec<Complex<f64>> {
-        let mut needed: Vec<Complex<f64>> =
-            self.bodies.iter().map(|body| (body.centre.acceleration(z, omega, alpha) - self.gravity).times(body.mass)).collect();
+    /// Force \[N\] of the first body of each hinge on the second (in the scene's order), from an evaluation of the equations at these rates
+    /// \[rad/s\]: its `load` must hold the accelerations, its `multiplier` those of all rows.
+    pub fn hinge_forces(&self, t: Time, kernel: &Kernel<f64>, omega: &[f64]) -> Vec<Complex<f64>> {
+        let (z, alpha) = (&kernel.z, &kernel.load);
+        let mut needed: Vec<Complex<f64>> = (0..self.bodies.len())
+            .map(|k| (self.centre(k).acceleration(z, omega, alpha) - self.gravity).times(self.bodies[k].mass))
+            .collect();
         for spring in &self.springs {
             let force = spring.force(z, omega);
             for (end, force) in spring.bodies.iter().zip([force, -force]) {
@@ -22,17 +27,32 @@ impl Mechanism {
                 }
             }
         }
-        let mut carried = vec![Complex::ZERO; self.bodies.len()];
-        for (body, &force) in needed.iter().enumerate() {
-            let mut on = Some(body);
-            while let Some(outer) = on {
-                carried[outer] += force;
-                on = self.bodies[outer].parent;
+        for action in &self.actions {
+            needed[action.body] -= action.force(action.factor(t), z);
+        }
+        for (row, &multiplier) in self.rows.iter().zip(&kernel.multiplier) {
+            let Some(push) = row.push else { continue };
+            let direction = push.frame.map_or(push.direction, |body| z[body].turn(push.direction));
+            for (body, sign) in [(push.on, 1.0), (push.from, -1.0)] {
+                if let Some(body) = body {
+                    needed[body] += direction.times(sign * multiplier);
+                }
             }
         }
-        self.joints
-            .iter()
-            .map(|joint| if joint.between[1] == Some(joint.outer) { carried[joint.outer] } else { -carried[joint.outer] })
-            .collect()
+        let mut carried = needed;
+        for &body in self.forest.order.iter().rev() {
+            if let Some(parent) = self.forest.hangs[body].foot.parent() {
+                let force = carried[body];
+                carried[parent] += force;
+            }
+        }
+        let force = |joint: &Joint| match (joint.outer, joint.row) {
+            (Some(outer), _) if joint.between[1] == Some(outer) => carried[outer],
+            (Some(outer), _) => -carried[outer],
+            // The rows push the first body by -lambda, and the second by lambda.
+            (None, Some(row)) => Complex::new(kernel.multiplier[row], kernel.multiplier[row + 1]),
+            (None, None) => Complex::ZERO,
+        };
+        self.joints.iter().map(force).collect()
     }
 }

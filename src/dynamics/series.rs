@@ -19,15 +19,18 @@
 //! Source: Jorba & Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor methods*, Experimental
 //! Mathematics 14 (2005), for the products; the in-series solve with constant couplings is ours.
 
+mod action;
 mod drive;
 pub mod polynomial;
 mod rows;
 mod spring;
 
+use self::action::ActionSeries;
 use self::polynomial::{Fractions, UNROLLED, convolve, copy, copy_vectors, width, zeros};
 use self::rows::RowSeries;
 use self::spring::SpringSeries;
-use super::row::LineRow;
+use super::row::{Measure, Row};
+use super::schur::Weakest;
 use super::ties::Ties;
 use super::tree::{self, size};
 use super::{Coordinates, Mechanism, Time};
@@ -38,12 +41,14 @@ use crate::arithmetic::{Complex, DoubleDouble, Real};
 pub struct Series<T> {
     /// Highest power P of the rates.
     order: usize,
-    bodies: usize,
+    /// Number of elements n, of which so many are unit vectors; the others are feet, at the places of their x.
+    elements: usize,
+    angles: usize,
     ties: Ties,
     /// False where the coordinates are the bodies' angles themselves.
     is_tied: bool,
     fractions: Fractions<T>,
-    /// z: powers 0…P+1, body by body ((P+2) × n).
+    /// z: powers 0…P+1, element by element ((P+2) × n).
     pub z: Vec<Complex<T>>,
     /// w: powers 0…P ((P+1) × n) \[rad/s^(m+1)\].
     pub omega: Vec<T>,
@@ -57,7 +62,12 @@ pub struct Series<T> {
     drive: Vec<T>,
     /// Torque on each driven body (P × n).
     torque: Vec<T>,
+    /// Torques applied to the bodies (P × n).
+    applied: Vec<T>,
+    /// Angles at the start (n), where torsion springs ask for them.
+    phi: Vec<T>,
     springs: Vec<SpringSeries<T>>,
+    actions: Vec<ActionSeries<T>>,
     rows: RowSeries<T>,
     turned: Vec<Complex<T>>,
     bend: Vec<Complex<T>>,
@@ -98,12 +108,13 @@ coefficient!(DoubleDouble);
 impl<T: Coefficient> Series<T> {
     /// Room for series of a mechanism in some coordinates up to this power of the rates, at least 2.
     pub fn new(mechanism: &Mechanism, coordinates: Coordinates, order: usize) -> Self {
-        let n = mechanism.bodies.len();
-        let ties = if coordinates == Coordinates::Independent { mechanism.ties.clone() } else { Ties::free(n) };
+        let n = mechanism.coordinates();
+        let ties = if coordinates == Coordinates::Independent { mechanism.ties.clone() } else { Ties::free(mechanism) };
         let f = ties.count();
         Self {
             order,
-            bodies: n,
+            elements: n,
+            angles: mechanism.bodies.len(),
             is_tied: ties.driven(),
             fractions: Fractions::new(order + 2),
             z: vec![Complex::ZERO; (order + 2) * n],
@@ -113,6 +124,9 @@ impl<T: Coefficient> Series<T> {
             rest: vec![Complex::ZERO; order * n],
             drive: zeros((order + 1) * n),
             torque: zeros(order * n),
+            applied: zeros(order * n),
+            phi: zeros(n),
+            actions: mechanism.actions.iter().map(|action| ActionSeries::new(action, order)).collect(),
             springs: mechanism.springs.iter().map(|spring| SpringSeries::new(spring, order)).collect(),
             rows: RowSeries::new(mechanism, &ties, order),
             turned: vec![Complex::ZERO; n],
@@ -139,12 +153,14 @@ impl<T: Coefficient> Series<T> {
 
     /// Expands the motion through coordinates `u` \[rad\] (leading part and rest) and rates `u_rate` \[rad/s\] at time `t`.
     pub fn expand(&mut self, mechanism: &Mechanism, t: Time, u: &[T], u_rest: &[T], u_rate: &[T]) {
+        self.law_series(mechanism, t);
         T::begin(self, t, u, u_rest, u_rate);
         T::orders(self, mechanism, 0);
     }
 
     /// Expands a motion whose first powers were found in more digits; they are rounded, and the later ones follow from them.
     pub fn carry_on(&mut self, mechanism: &Mechanism, t: Time, u: &[T], u_rest: &[T], u_rate: &[T], first: &Series<DoubleDouble>) {
+        self.law_series(mechanism, t);
         T::begin(self, t, u, u_rest, u_rate);
         copy_vectors(&mut self.z, &first.z);
         copy(&mut self.omega, &first.omega);
@@ -152,6 +168,10 @@ impl<T: Coefficient> Series<T> {
         copy(&mut self.power, &first.power);
         copy_vectors(&mut self.rest, &first.rest);
         copy(&mut self.torque, &first.torque);
+        copy(&mut self.applied, &first.applied);
+        for (action, first) in self.actions.iter_mut().zip(&first.actions) {
+            action.take(first);
+        }
         for (spring, first) in self.springs.iter_mut().zip(&first.springs) {
             spring.take(first);
         }
@@ -160,15 +180,26 @@ impl<T: Coefficient> Series<T> {
     }
 
     /// Powers 0, 1, … of the gap of a wall \[m/s^m\], to that of the unit vectors.
-    pub fn gap(&self, row: &LineRow, powers: &mut Vec<f64>) {
+    pub fn gap(&self, row: &Row, powers: &mut Vec<f64>) {
         powers.clear();
-        let vectors = self.z.chunks_exact(self.bodies.max(1));
-        powers.extend(vectors.map(|z| {
-            let point = row.point.terms.iter().fold(Complex::ZERO, |sum, &(k, gamma)| sum + z[k].turn(gamma));
-            Complex::of(row.normal).dot(point).value()
-        }));
+        // Walls are of the ground, so that the gap is linear.
+        let Measure::Place(place) = &row.measure else { return };
+        let elements = self.z.chunks_exact(self.elements.max(1));
+        powers.extend(elements.map(|z| place.linear.iter().fold(T::ZERO, |sum, &(k, g)| sum + Complex::of(g).dot(z[k])).value()));
         if let Some(first) = powers.first_mut() {
-            *first += row.normal.dot(row.point.root) - row.offset;
+            *first += place.constant;
+        }
+    }
+
+    /// The row in force nearest to being left out at the start.
+    pub fn weakest(&self) -> Weakest {
+        self.rows.weakest()
+    }
+
+    /// The series of what forces are multiplied by.
+    fn law_series(&mut self, mechanism: &Mechanism, t: Time) {
+        for (series, action) in self.actions.iter_mut().zip(&mechanism.actions) {
+            series.begin(action, t);
         }
     }
 
@@ -180,15 +211,16 @@ impl<T: Coefficient> Series<T> {
 
     /// Power zero, and the laws' series.
     fn begin(&mut self, t: Time, u: &[T], u_rest: &[T], u_rate: &[T]) {
-        let n = self.bodies;
+        let (n, angles) = (self.elements, self.angles);
         self.rate[..u.len()].copy_from_slice(u_rate);
         if self.is_tied {
             self.drive.fill(T::ZERO);
         }
-        for (i, tie) in self.ties.bodies.iter().enumerate() {
+        for (i, tie) in self.ties.bodies[..angles].iter().enumerate() {
             let mut z = Complex::new(T::ONE, T::ZERO);
             self.omega[i] = T::ZERO;
             if let Some(base) = tie.base {
+                self.phi[i] = u[base];
                 let unit = Complex::unit(u[base]);
                 // What the leading part leaves out of the angle turns the vector by a first-order rotation.
                 z = unit + unit.left().times(u_rest[base]);
@@ -202,6 +234,10 @@ impl<T: Coefficient> Series<T> {
             self.omega[i] += self.drive[i];
             self.z[i] = z;
         }
+        self.ties.feet(u, &mut self.z);
+        for (i, tie) in self.ties.bodies.iter().enumerate().skip(angles) {
+            self.omega[i] = tie.base.map_or(T::ZERO, |base| u_rate[base]);
+        }
         self.rows.begin(t);
     }
 
@@ -211,7 +247,7 @@ impl<T: Coefficient> Series<T> {
         if !T::IS_PLAIN {
             return self.orders::<0>(mechanism, first);
         }
-        match self.bodies {
+        match if self.angles == self.elements { self.angles } else { 0 } {
             1 => self.orders::<1>(mechanism, first),
             2 => self.orders::<2>(mechanism, first),
             3 => self.orders::<3>(mechanism, first),
@@ -225,7 +261,8 @@ impl<T: Coefficient> Series<T> {
     /// The factors of M_0, and the powers from `first` on.
     #[inline(never)]
     fn orders<const N: usize>(&mut self, mechanism: &Mechanism, first: usize) {
-        let (n, f) = (size::<N>(self.bodies), self.ties.count());
+        let (n, f) = (size::<N>(self.elements), self.ties.count());
+        let angles = size::<N>(self.angles);
         mechanism.tree.couple::<T, N>(&self.z[..n], &mut self.mass, &mut self.twist);
         if self.is_tied {
             self.ties.reduce(&self.mass, &mut self.reduced);
@@ -239,8 +276,11 @@ impl<T: Coefficient> Series<T> {
         }
         if first == 0 {
             // The first power of z needs only rates.
-            for i in 0..n {
+            for i in 0..angles {
                 self.z[n + i] = self.z[i].left().times(self.omega[i]);
+            }
+            for x in (angles..n).step_by(2) {
+                self.z[n + x] = Complex::new(self.omega[x], self.omega[x + 1]);
             }
         }
         for m in first..self.order {
@@ -254,12 +294,13 @@ impl<T: Coefficient> Series<T> {
     /// f_{m+1} into `turned` and u_m into `bend`; the driven part of a_m, where there is one, is in it.
     #[inline(always)]
     fn bend<const N: usize>(&mut self, m: usize) {
-        let n = size::<N>(self.bodies);
+        let (n, angles) = (size::<N>(self.elements), size::<N>(self.angles));
         let (omega, z) = (&self.omega[..(m + 1) * n], &self.z[n..(m + 2) * n]);
         let (turned, bend) = (&mut self.turned[..n], &mut self.bend[..n]);
         let factor = T::of((m + 1) as f64);
+        bend[angles..].fill(Complex::ZERO);
         let mut first = 0;
-        while first < n {
+        while first < angles {
             let sums = convolve::<N, _, _, _>(n, first, omega, z, |w, z| z.times(w));
             for i in 0..width::<N>() {
                 turned[first + i] = sums[i];
@@ -272,11 +313,11 @@ impl<T: Coefficient> Series<T> {
     /// R_m, and the load -Σ Im(conj(z) R) of this order into `load`.
     #[inline(always)]
     fn balance<const N: usize>(&mut self, mechanism: &Mechanism, m: usize) {
-        let n = size::<N>(self.bodies);
+        let (n, angles) = (size::<N>(self.elements), size::<N>(self.angles));
         self.load[..n].fill(T::ZERO);
         if self.is_tied {
             // The known part of a_m: s'' of this order.
-            for i in 0..n {
+            for i in 0..angles {
                 let given = self.drive[(m + 1) * n + i] * T::of((m + 1) as f64);
                 self.load[i] = -given.scale(mechanism.tree.diagonal[i]);
                 self.bend[i] += self.z[i].left().times(given);
@@ -290,13 +331,29 @@ impl<T: Coefficient> Series<T> {
         couple::<T, N>(mechanism, &self.bend, rest);
         for (spring, series) in mechanism.springs.iter().zip(&mut self.springs) {
             let force = series.force(spring, m, &self.z, n);
-            for &(k, gamma) in &spring.span.terms {
-                rest[k] -= force.turn(gamma.conj());
+            spring.span.spread(force, |k, force| rest[k] -= force);
+        }
+        if !mechanism.torsions.is_empty() || !self.actions.is_empty() {
+            let applied = &mut self.applied[m * n..(m + 1) * n];
+            applied.fill(T::ZERO);
+            for torsion in &mechanism.torsions {
+                torsion.pull(action::twist(torsion, m, &self.phi, &self.omega, n), applied);
+            }
+            for (action, series) in mechanism.actions.iter().zip(&mut self.actions) {
+                series.act(action, m, &self.z, n, rest, applied);
+            }
+            for (load, &applied) in self.load.iter_mut().zip(applied.iter()) {
+                *load += applied;
             }
         }
+        self.rows.swing(m, &self.z, n, rest);
         let (z, load) = (&self.z[..(m + 1) * n], &mut self.load[..n]);
+        for x in (angles..n).step_by(2) {
+            load[x] -= rest[x].re;
+            load[x + 1] -= rest[x].im;
+        }
         let mut first = 0;
-        while first < n {
+        while first < angles {
             // Of l = 0 only, R is not complete yet.
             let sums: [T; UNROLLED] = convolve::<N, _, _, _>(n, first, &z[n..], before, |z, rest| z.cross(rest));
             for i in 0..width::<N>() {
@@ -310,7 +367,8 @@ impl<T: Coefficient> Series<T> {
     /// a_m from the loads, the newest powers of w and z, and R_m completed.
     #[inline(always)]
     fn solve<const N: usize>(&mut self, mechanism: &Mechanism, m: usize) {
-        let (n, f) = (size::<N>(self.bodies), self.ties.count());
+        let (n, f) = (size::<N>(self.elements), self.ties.count());
+        let angles = size::<N>(self.angles);
         let rest = &mut self.rest[m * n..(m + 1) * n];
         if self.is_tied {
             self.ties.gather(&self.load, &mut self.solution);
@@ -320,8 +378,8 @@ impl<T: Coefficient> Series<T> {
             tree::solve::<T, N>(n, &self.reduced, &self.pivot, &mut self.solution);
         }
         if !self.rows.is_empty() {
-            self.rows.solve(m, &self.bend, &mut self.solution);
-            self.rows.push(m, rest);
+            self.rows.solve(m, &self.z, &self.bend, &mut self.solution);
+            self.rows.push(m, &self.z[..n], rest);
         }
         for c in 0..f {
             self.rate[(m + 1) * f + c] = self.fractions.over(self.solution[c], m + 1);
@@ -333,15 +391,24 @@ impl<T: Coefficient> Series<T> {
             for (i, tie) in self.ties.bodies.iter().enumerate() {
                 let (solved, rate) = tie.base.map_or((T::ZERO, T::ZERO), |base| (self.solution[base], self.rate[(m + 1) * f + base]));
                 omega[i] = rate + self.drive[(m + 1) * n + i];
-                self.bend[i] = z[i].left().times(solved);
+                self.bend[i] = if i < angles { z[i].left().times(solved) } else { Complex::new(solved, T::ZERO) };
+            }
+            for x in (angles..n).step_by(2) {
+                self.bend[x].im = self.bend[x + 1].re;
             }
         } else {
             omega.copy_from_slice(&self.rate[(m + 1) * n..(m + 2) * n]);
-            for i in 0..n {
+            for i in 0..angles {
                 self.bend[i] = z[i].left().times(self.solution[i]);
             }
+            for x in (angles..n).step_by(2) {
+                self.bend[x] = Complex::new(self.solution[x], self.solution[x + 1]);
+            }
         }
-        for i in 0..n {
+        for x in (angles..n).step_by(2) {
+            newest[x] = self.fractions.vector_over(Complex::new(omega[x], omega[x + 1]), m + 2);
+        }
+        for i in 0..angles {
             newest[i] = self.fractions.vector_over((self.turned[i] + z[i].times(omega[i])).left(), m + 2);
         }
         couple::<T, N>(mechanism, &self.bend, rest);
@@ -350,7 +417,7 @@ impl<T: Coefficient> Series<T> {
     /// Torques of the driven bodies and the power of motors and dampers at this order.
     #[inline(always)]
     fn account(&mut self, mechanism: &Mechanism, m: usize) {
-        let n = self.bodies;
+        let n = self.elements;
         let mut power = T::ZERO;
         if self.is_tied {
             for (i, _) in self.ties.bodies.iter().enumerate().filter(|(_, tie)| !tie.laws.is_empty()) {
@@ -358,6 +425,7 @@ impl<T: Coefficient> Series<T> {
                 for (z, &rest) in self.z[i..].iter().step_by(n).zip(self.rest[..=m * n + i].iter().rev().step_by(n)) {
                     torque += z.cross(rest);
                 }
+                torque -= self.applied[m * n + i];
                 self.torque[m * n + i] = torque;
                 for (&torque, &drive) in self.torque[i..].iter().step_by(n).zip(self.drive[..=m * n + i].iter().rev().step_by(n)) {
                     power += torque * drive;
@@ -370,6 +438,12 @@ impl<T: Coefficient> Series<T> {
         for (spring, series) in mechanism.springs.iter().zip(&self.springs).filter(|(spring, _)| spring.damping != 0.0) {
             power += series.loss(spring, m);
         }
+        for torsion in mechanism.torsions.iter().filter(|torsion| torsion.damping != 0.0) {
+            power += action::loss(torsion, m, &self.omega, n);
+        }
+        for (action, series) in mechanism.actions.iter().zip(&mut self.actions) {
+            power += series.power(action, m, &self.omega[m * n..(m + 1) * n]);
+        }
         self.power[m] = power;
     }
 }
@@ -377,7 +451,7 @@ impl<T: Coefficient> Series<T> {
 /// Adds H x to `rest`, without the diagonal.
 #[inline(always)]
 fn couple<T: Real, const N: usize>(mechanism: &Mechanism, x: &[Complex<T>], rest: &mut [Complex<T>]) {
-    let n = size::<N>(mechanism.tree.bodies);
+    let n = size::<N>(mechanism.tree.coordinates);
     let (coupling, x, rest) = (&mechanism.tree.coupling[..n * n], &x[..n], &mut rest[..n]);
     for i in 0..n {
         for j in i + 1..n {

@@ -9,9 +9,9 @@
 
 use super::compile::CompileError;
 use super::law::{Law, Phase};
-use super::{Motion, State, Time};
+use super::row::{Measure, Row};
+use super::{Mechanism, Motion, State, Time};
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar, angle};
-use crate::scene::Scene;
 
 /// How one body's angle follows from the coordinates.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -66,20 +66,33 @@ impl Tie {
 /// All ties of a mechanism.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Ties {
-    /// One a body.
+    /// Number of angles.
+    pub angles: usize,
+    /// One a body, then one a coordinate of a foot.
     pub bodies: Vec<Tie>,
-    /// The body whose angle each independent coordinate is.
+    /// The body whose angle each independent coordinate is, or the coordinate of a foot.
     pub independent: Vec<usize>,
 }
 
 impl Ties {
-    /// Walks the motors outwards from the ground and from the first body of every group left.
-    pub(super) fn new(scene: &Scene) -> Result<Self, CompileError> {
-        let n = scene.bars.len();
-        let mut ties: Vec<Option<Tie>> = vec![None; n];
-        let mut used = vec![false; scene.motors.len()];
+    /// Walks the given angles outwards from the ground and from the first body of every group left; feet are coordinates of their own.
+    pub(super) fn new(bodies: usize, coordinates: usize, rows: &[Row]) -> Result<Self, CompileError> {
+        let given: Vec<_> = (rows.iter())
+            .filter_map(|row| match (&row.measure, &row.law) {
+                (&Measure::Angle { body, base }, Some(law)) => Some((row, body, base, law)),
+                _ => None,
+            })
+            .collect();
+        let mut at: Vec<Vec<usize>> = vec![Vec::new(); bodies + 1];
+        let slot = |body: Option<usize>| body.map_or(0, |body| body + 1);
+        for (g, &(_, body, base, _)) in given.iter().enumerate() {
+            at[slot(base)].push(g);
+            at[slot(Some(body))].push(g);
+        }
+        let mut ties: Vec<Option<Tie>> = vec![None; bodies];
+        let mut used = vec![false; given.len()];
         let mut independent = Vec::new();
-        for root in std::iter::once(None).chain((0..n).map(Some)) {
+        for root in std::iter::once(None).chain((0..bodies).map(Some)) {
             if let Some(body) = root {
                 if ties[body].is_some() {
                     continue;
@@ -89,33 +102,50 @@ impl Ties {
             }
             let mut front = vec![root];
             while let Some(near) = front.pop() {
-                for (m, motor) in scene.motors.iter().enumerate() {
-                    let (far, sign) = if motor.relative_to == near {
-                        (Some(motor.bar), 1.0)
-                    } else if Some(motor.bar) == near {
-                        (motor.relative_to, -1.0)
-                    } else {
-                        continue;
-                    };
-                    if std::mem::replace(&mut used[m], true) {
+                for &g in &at[slot(near)] {
+                    let (row, body, base, law) = given[g];
+                    if std::mem::replace(&mut used[g], true) {
                         continue;
                     }
+                    let (far, sign) = if base == near { (Some(body), 1.0) } else { (base, -1.0) };
                     let Some(body) = far.filter(|&body| ties[body].is_none()) else {
-                        return Err(CompileError::Redundant(motor.name.clone()));
+                        return Err(CompileError::Redundant(row.name.clone()));
                     };
                     let mut tie = near.and_then(|near| ties[near].clone()).unwrap_or_default();
-                    tie.laws.push((sign, motor.law.clone()));
+                    tie.laws.push((sign, law.clone()));
                     ties[body] = Some(tie);
                     front.push(far);
                 }
             }
         }
-        Ok(Self { bodies: ties.into_iter().map(Option::unwrap_or_default).collect(), independent })
+        let mut ties: Vec<Tie> = ties.into_iter().map(Option::unwrap_or_default).collect();
+        for foot in bodies..coordinates {
+            ties.push(Tie { base: Some(independent.len()), laws: Vec::new() });
+            independent.push(foot);
+        }
+        Ok(Self { angles: bodies, bodies: ties, independent })
     }
 
-    /// Every angle a coordinate of its own.
-    pub fn free(bodies: usize) -> Self {
-        Self { bodies: (0..bodies).map(|i| Tie { base: Some(i), laws: Vec::new() }).collect(), independent: (0..bodies).collect() }
+    /// Every angle and foot a coordinate of its own.
+    pub fn free(mechanism: &Mechanism) -> Self {
+        let n = mechanism.coordinates();
+        let bodies = (0..n).map(|i| Tie { base: Some(i), laws: Vec::new() }).collect();
+        Self { angles: mechanism.bodies.len(), bodies, independent: (0..n).collect() }
+    }
+
+    /// How many of the independent coordinates are angles; they come first.
+    pub fn turning(&self) -> usize {
+        self.count() + self.angles - self.bodies.len()
+    }
+
+    /// Writes the feet, elements that follow from their coordinates alone.
+    #[inline(always)]
+    pub fn feet<T: Scalar>(&self, u: &[T], z: &mut [Complex<T>]) {
+        for x in (self.angles..self.bodies.len()).step_by(2) {
+            if let Some(base) = self.bodies[x].base {
+                z[x] = Complex::new(u[base], u[base + 1]);
+            }
+        }
     }
 
     /// Number of independent coordinates.
@@ -131,15 +161,6 @@ impl Ties {
     /// True where no driven angle accelerates.
     pub fn is_steady(&self) -> bool {
         self.bodies.iter().flat_map(|tie| &tie.laws).all(|(_, law)| law.is_steady())
-    }
-
-    /// Angles \[rad\], unit vectors, s' \[rad/s\] and s'' \[rad/s²\] of all bodies at coordinates `u` \[rad\].
-    #[inline]
-    pub fn expand<T: Real>(&self, t: Time, u: &[T], phi: &mut [T], z: &mut [Complex<T>], rate: &mut [T], acceleration: &mut [T]) {
-        for (i, tie) in self.bodies.iter().enumerate() {
-            let placed = tie.place(t, u);
-            (phi[i], z[i], rate[i], acceleration[i]) = (placed.angle, placed.unit, placed.rate, placed.acceleration);
-        }
     }
 
     /// Adds S u' to `rate`: the rates \[rad/s\] of all bodies.
@@ -191,7 +212,7 @@ impl Ties {
 
     /// A state whose first unknowns are the coordinates of a motion.
     pub(super) fn state(&self, motion: &Motion, unknowns: &[DoubleDouble]) -> State {
-        let mut state = State::new(unknowns, self.count());
+        let mut state = State::new(unknowns, self.turning());
         state.time = motion.time;
         for (turns, &body) in state.turns.iter_mut().zip(&self.independent) {
             *turns += motion.turns[body];
@@ -204,15 +225,16 @@ impl Ties {
         motion.resize(self.bodies.len());
         motion.time = state.time;
         for (k, tie) in self.bodies.iter().enumerate() {
-            (motion.phi[k], motion.omega[k], motion.turns[k]) = tie.read(state);
+            (motion.phi[k], motion.omega[k], motion.turns[k]) = tie.read(state, k < self.angles);
         }
     }
 }
 
 impl Tie {
     /// The body's angle, the driven share of its rate, and its turns.
-    fn read(&self, state: &State) -> (DoubleDouble, DoubleDouble, i64) {
-        let (base, turns) = self.base.map_or((DoubleDouble::ZERO, 0), |base| (state.unknown(base), state.turns[base]));
+    fn read(&self, state: &State, is_angle: bool) -> (DoubleDouble, DoubleDouble, i64) {
+        let turns = |base: usize| if is_angle { state.turns[base] } else { 0 };
+        let (base, turns) = self.base.map_or((DoubleDouble::ZERO, 0), |base| (state.unknown(base), turns(base)));
         match (self.base, &self.laws[..]) {
             (Some(_), []) => (base, DoubleDouble::ZERO, turns),
             (None, [(sign, law)]) => {

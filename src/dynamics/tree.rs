@@ -1,8 +1,9 @@
-//! The hinge tree in absolute angles: mass matrix, velocity terms, gravity.
+//! The hinge trees in absolute angles and, of those that hang on nothing, the positions of their feet: mass matrix, velocity terms, gravity.
 //!
 //! ```text
 //! p_ij = conj(z_i) H_ij z_j = A cos(q_j-q_i) - B sin(q_j-q_i) + i (A sin(q_j-q_i) + B cos(q_j-q_i))
 //! M_ij = Re p_ij, M_ii = d_i;        b_i += w_j² Im p_ij,  b_j -= w_i² Im p_ij   for i < j
+//! foot f, coordinates x and y:  p_if = conj(z_i) H_if,  M_ix = Im p_if, M_iy = Re p_if, M_xx = M_yy = d_f;   b_x + i b_y += w_i² conj(p_if)
 //! ```
 //!
 //! Loops run over `N` bodies where `N > 0`, so that small sizes are unrolled, and over the number at hand where `N = 0`.
@@ -18,13 +19,15 @@ pub fn size<const N: usize>(n: usize) -> usize {
 /// Constants of the tree, formed once per scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tree {
-    /// Number of bodies n.
-    pub bodies: usize,
-    /// H above the diagonal, row by row (n × n) \[kg·m²\].
+    /// Number of coordinates n: the bodies' angles, then two for every foot that moves freely.
+    pub coordinates: usize,
+    /// Number of bodies.
+    pub angles: usize,
+    /// H above the diagonal, row by row (n × n) \[kg·m²; kg·m for a foot, in the column of its x\].
     pub coupling: Vec<Complex<f64>>,
-    /// Diagonal d_i = H_ii + I_i \[kg·m²\].
+    /// Diagonal d_i = H_ii + I_i \[kg·m²; kg for a foot\].
     pub diagonal: Vec<f64>,
-    /// Force of gravity on z_i: conj(Σ_m m_m gamma_mi) g \[N·m\].
+    /// Force of gravity on z_i: conj(Σ_m m_m gamma_mi) g \[N·m; N for a foot, at its x\].
     pub weight: Vec<Complex<f64>>,
     /// False where every hinge and centre of mass lies on its body's axis: B = 0, and its products are left out.
     pub off_axis: bool,
@@ -35,7 +38,7 @@ impl Tree {
     ///
     /// Stretched, the chain has the least inertia against bending: the trace of M⁻¹ W there is about the square of its fastest rate.
     pub fn fastest_rate(&self) -> f64 {
-        let n = self.bodies;
+        let n = self.coordinates;
         let mut mass: Vec<f64> = self.coupling.iter().map(|h| h.re).collect();
         for i in 0..n {
             mass[i * n + i] = self.diagonal[i];
@@ -55,12 +58,12 @@ impl Tree {
     /// Writes M above and on the diagonal and Im p above it, both row by row (n × n) \[kg·m²\].
     #[inline(always)]
     pub fn couple<T: Scalar, const N: usize>(&self, z: &[Complex<T>], mass: &mut [T], twist: &mut [T]) {
-        let n = size::<N>(self.bodies);
+        let (n, angles) = (size::<N>(self.coordinates), size::<N>(self.angles));
         let (z, coupling, diagonal) = (&z[..n], &self.coupling[..n * n], &self.diagonal[..n]);
         let (mass, twist) = (&mut mass[..n * n], &mut twist[..n * n]);
-        for i in 0..n {
+        for i in 0..angles {
             mass[i * n + i] = T::of(diagonal[i]);
-            for j in i + 1..n {
+            for j in i + 1..angles {
                 let h = coupling[i * n + j];
                 let (cos, sin) = (z[i].dot(z[j]), z[i].cross(z[j]));
                 mass[i * n + j] = cos.scale(h.re);
@@ -71,18 +74,40 @@ impl Tree {
                 }
             }
         }
+        if N == 0 {
+            self.couple_feet(z, mass, twist);
+        }
+    }
+
+    /// The entries of feet; the twist holds conj(p) in the columns of x and y.
+    fn couple_feet<T: Scalar>(&self, z: &[Complex<T>], mass: &mut [T], twist: &mut [T]) {
+        let (n, angles) = (self.coordinates, self.angles);
+        for x in (angles..n).step_by(2) {
+            for i in 0..angles {
+                let p = z[i].conj().turn(self.coupling[i * n + x]);
+                (mass[i * n + x], mass[i * n + x + 1]) = (p.im, p.re);
+                (twist[i * n + x], twist[i * n + x + 1]) = (p.re, -p.im);
+            }
+            for i in angles..n {
+                (mass[i * n + x], mass[i * n + x + 1]) = (T::ZERO, T::ZERO);
+            }
+            (mass[x * n + x], mass[(x + 1) * n + x + 1]) = (T::of(self.diagonal[x]), T::of(self.diagonal[x]));
+        }
     }
 
     /// Writes the velocity terms and gravity \[N·m\].
     #[inline(always)]
     pub fn load<T: Scalar, const N: usize>(&self, z: &[Complex<T>], omega: &[T], twist: &[T], load: &mut [T]) {
-        let n = size::<N>(self.bodies);
+        let (n, angles) = (size::<N>(self.coordinates), size::<N>(self.angles));
         self.weigh::<T, N>(z, load);
         let (omega, twist, load) = (&omega[..n], &twist[..n * n], &mut load[..n]);
-        for i in 0..n {
-            for j in i + 1..n {
+        for i in 0..angles {
+            for j in i + 1..angles {
                 load[i] += twist[i * n + j] * (omega[j] * omega[j]);
                 load[j] -= twist[i * n + j] * (omega[i] * omega[i]);
+            }
+            for x in angles..n {
+                load[x] += twist[i * n + x] * (omega[i] * omega[i]);
             }
         }
     }
@@ -90,14 +115,17 @@ impl Tree {
     /// Writes d(T - V)/dq \[N·m\] without springs, at fixed rates: the force of the canonical form.
     #[inline(always)]
     pub fn pull<T: Scalar, const N: usize>(&self, z: &[Complex<T>], omega: &[T], twist: &[T], force: &mut [T]) {
-        let n = size::<N>(self.bodies);
+        let (n, angles) = (size::<N>(self.coordinates), size::<N>(self.angles));
         self.weigh::<T, N>(z, force);
         let (omega, twist, force) = (&omega[..n], &twist[..n * n], &mut force[..n]);
-        for i in 0..n {
-            for j in i + 1..n {
+        for i in 0..angles {
+            for j in i + 1..angles {
                 let swing = twist[i * n + j] * (omega[i] * omega[j]);
                 force[i] += swing;
                 force[j] -= swing;
+            }
+            for x in angles..n {
+                force[i] -= twist[i * n + x] * (omega[i] * omega[x]);
             }
         }
     }
@@ -105,10 +133,26 @@ impl Tree {
     /// Writes the generalized forces of gravity \[N·m\].
     #[inline(always)]
     fn weigh<T: Scalar, const N: usize>(&self, z: &[Complex<T>], force: &mut [T]) {
-        let n = size::<N>(self.bodies);
+        let (n, angles) = (size::<N>(self.coordinates), size::<N>(self.angles));
         let (z, weight, force) = (&z[..n], &self.weight[..n], &mut force[..n]);
-        for i in 0..n {
+        for i in 0..angles {
             force[i] = z[i].cross(Complex::of(weight[i]));
+        }
+        for x in (angles..n).step_by(2) {
+            (force[x], force[x + 1]) = (T::of(weight[x].re), T::of(weight[x].im));
+        }
+    }
+
+    /// Elements at these coordinates: unit vectors, and feet at the place of their x.
+    #[inline(always)]
+    pub fn face<T: Scalar, const N: usize>(&self, phi: &[T], z: &mut [Complex<T>]) {
+        let (n, angles) = (size::<N>(self.coordinates), size::<N>(self.angles));
+        let (z, phi) = (&mut z[..n], &phi[..n]);
+        for k in 0..angles {
+            z[k] = Complex::unit(phi[k]);
+        }
+        for x in (angles..n).step_by(2) {
+            (z[x], z[x + 1]) = (Complex::new(phi[x], phi[x + 1]), Complex::ZERO);
         }
     }
 

@@ -6,6 +6,7 @@ use crate::chart::{
     MechanismChart, MotionGif, MotorPose, MotorSeries, Pose, Sketch, SpringSketch, TorquePower, WallSketch, plain,
 };
 use crate::dynamics::Mechanism;
+use crate::dynamics::compile::Joint;
 use crate::dynamics::row::Row;
 use crate::report::curves::{between, furthest, is_coarse, smoothed, span};
 use crate::report::page::{figure, magnitude, rough};
@@ -50,7 +51,7 @@ impl Chart {
 
 /// The charts a scene has something to show in: none of constraints without constraints, none of torques without motors.
 pub fn wanted(mechanism: &Mechanism, pictures: bool, motion: bool) -> Vec<Chart> {
-    let driven = mechanism.rows.iter().any(|row| matches!(row, Row::Angle(_)));
+    let driven = mechanism.rows.iter().any(Row::is_motor);
     let has = |chart: &Chart| match chart {
         Chart::Mechanism | Chart::Angles | Chart::EnergyDrift => pictures,
         Chart::ConstraintDrift => pictures && !mechanism.rows.is_empty(),
@@ -187,10 +188,7 @@ impl Finished<'_> {
         let path = self.path();
         let coarse = is_coarse(&path);
         let leaves = self.leaves();
-        let place = |body: usize, phi: &[f64]| {
-            let end = self.mechanism.bodies[body].ends[1].position(&units(phi));
-            [end.re, end.im]
-        };
+        let place = |body: usize, phi: &[f64]| self.tip(body, phi);
         let trails = if coarse {
             Vec::new()
         } else {
@@ -291,7 +289,7 @@ impl Finished<'_> {
 
     fn torque_power(&self) -> TorquePower {
         let (window, more) = self.window();
-        let motors = (self.mechanism.rows.iter().enumerate()).filter(|(_, row)| matches!(row, Row::Angle(_))).map(|(r, row)| MotorSeries {
+        let motors = (self.mechanism.rows.iter().enumerate()).filter(|(_, row)| row.is_motor()).map(|(r, row)| MotorSeries {
             name: plain(row.name()),
             time: window.iter().map(|sample| sample.t).collect(),
             torque: window.iter().map(|sample| sample.motors[r][0]).collect(),
@@ -325,8 +323,7 @@ impl Finished<'_> {
         let trails = leaves.iter().map(|&body| {
             let place = |k: usize| {
                 let (phi, _) = between(head, until * k as f64 / (4 * frames) as f64);
-                let end = self.mechanism.bodies[body].ends[1].position(&units(&phi));
-                [end.re, end.im]
+                self.tip(body, &phi)
             };
             (0..=4 * frames).map(place).collect()
         });
@@ -347,16 +344,28 @@ impl Finished<'_> {
 
     /// Up to four bodies that no other hangs on.
     fn leaves(&self) -> Vec<usize> {
-        let bodies = &self.mechanism.bodies;
-        (0..bodies.len()).filter(|&k| bodies.iter().all(|body| body.parent != Some(k))).take(4).collect()
+        let hangs = &self.mechanism.forest.hangs;
+        (0..hangs.len()).filter(|&k| hangs.iter().all(|hang| hang.foot.parent() != Some(k))).take(4).collect()
+    }
+
+    /// Elements and feet at these coordinates.
+    fn elements(&self, phi: &[f64]) -> (Vec<Complex<f64>>, Vec<Complex<f64>>) {
+        let (mut z, mut feet) = (vec![Complex::ZERO; phi.len()], vec![Complex::ZERO; self.mechanism.bodies.len()]);
+        self.mechanism.tree.face::<f64, 0>(phi, &mut z);
+        self.mechanism.forest.feet(&z, &mut feet);
+        (z, feet)
+    }
+
+    /// The far end of a bar (x, y) \[m\].
+    fn tip(&self, body: usize, phi: &[f64]) -> [f64; 2] {
+        let (z, feet) = self.elements(phi);
+        let tip = feet[body] + self.mechanism.bodies[body].ends[1] * z[body];
+        [tip.re, tip.im]
     }
 
     fn sketch(&self) -> Sketch {
-        let hinges = self
-            .mechanism
-            .joints
-            .iter()
-            .map(|joint| HingeSketch { name: plain(&joint.name), ground: self.mechanism.bodies[joint.outer].parent.is_none() });
+        let hinges =
+            self.mechanism.joints.iter().map(|joint| HingeSketch { name: plain(&joint.name), ground: joint.between.contains(&None) });
         Sketch {
             gravity: self.scene.gravity,
             hinges: hinges.collect(),
@@ -367,29 +376,27 @@ impl Finished<'_> {
     }
 
     fn pose(&self, phi: &[f64], omega: &[f64]) -> Pose {
-        let z = units(phi);
+        let (z, feet) = self.elements(phi);
         let both = |point: Complex<f64>| [point.re, point.im];
         let bodies = &self.mechanism.bodies;
+        let on = |body: usize, offset: Complex<f64>| both(feet[body] + offset * z[body]);
         let place = |place: &Place| match place.bar {
             None => place.point,
-            Some(bar) => both(bodies[bar].ends[0].position(&z) + Complex::new(place.point[0], place.point[1]) * z[bar]),
+            Some(bar) => on(bar, bodies[bar].ends[0] + Complex::new(place.point[0], place.point[1])),
         };
+        let at = |joint: &Joint| joint.at.0.map_or(both(joint.at.1), |body| on(body, joint.at.1));
         let motors = self.scene.motors.iter().filter_map(|motor| {
-            let joint = self.mechanism.joints.iter().find(|joint| joint.outer == motor.bar)?;
-            Some(MotorPose { at: both(joint.point.position(&z)), angle: phi[motor.bar], rate: omega[motor.bar] })
+            let joint = self.mechanism.joints.iter().find(|joint| joint.outer == Some(motor.bar))?;
+            Some(MotorPose { at: at(joint), angle: phi[motor.bar], rate: omega[motor.bar] })
         });
         Pose {
-            bars: bodies.iter().map(|body| body.ends.each_ref().map(|end| both(end.position(&z)))).collect(),
-            hinges: self.mechanism.joints.iter().map(|joint| both(joint.point.position(&z))).collect(),
+            bars: (bodies.iter().enumerate()).map(|(k, body)| body.ends.map(|end| on(k, end))).collect(),
+            hinges: self.mechanism.joints.iter().map(at).collect(),
             springs: self.scene.springs.iter().map(|spring| spring.between.each_ref().map(place)).collect(),
             motors: motors.collect(),
             points: Vec::new(),
         }
     }
-}
-
-fn units(phi: &[f64]) -> Vec<Complex<f64>> {
-    phi.iter().map(|&phi| Complex::unit(phi)).collect()
 }
 
 fn is_long(record: &Excursion) -> bool {

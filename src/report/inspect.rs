@@ -6,7 +6,7 @@
 use super::page::{Page, figure};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::{Bias, Kernel};
-use crate::dynamics::row::Row;
+use crate::dynamics::row::Posture;
 use crate::dynamics::{Mechanism, Motion};
 use crate::scene::Scene;
 use serde_json::{Map, Value, json};
@@ -77,27 +77,27 @@ pub fn inspect(scene: &Scene, mechanism: &Mechanism) -> Inspection {
     let start = mechanism.start(scene);
     let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
     let omega: Vec<f64> = start.omega.iter().map(|omega| omega.hi).collect();
-    let mut kernel = Kernel::<f64>::new(phi.len(), mechanism.rows.len());
+    let mut kernel = Kernel::<f64>::new(mechanism);
     kernel.accelerate::<0>(mechanism, start.time, &phi, &omega, Bias::default());
     let mut found = Inspection { energy_scale: mechanism.energy_scale, ..Inspection::default() };
     for (k, body) in mechanism.bodies.iter().enumerate() {
-        let centre = body.centre.acceleration(&kernel.z, &omega, &kernel.load);
+        let centre = mechanism.centre(k).acceleration(&kernel.z, &omega, &kernel.load);
         found.bodies.push((body.name.clone(), [centre.re, centre.im, kernel.load[k]]));
     }
     for (r, row) in mechanism.rows.iter().enumerate() {
         let here = kernel.rows[r];
         found.constraints.push((row.name().to_owned(), [kernel.multiplier[r], here.position, kernel.row_rate(r, &omega)]));
-        if let Row::Angle(_) = row {
+        if row.law.is_some() {
             let torque = -kernel.multiplier[r];
             found.motors.push((row.name().to_owned(), [torque, -torque * here.drive]));
         }
     }
-    let forces = mechanism.hinge_forces(&kernel.z, &omega, &kernel.load);
+    let forces = mechanism.hinge_forces(start.time, &kernel, &omega);
     for (joint, force) in mechanism.joints.iter().zip(forces) {
         let [from, on] = joint.between.map(|body| body.map_or("ground", |body| mechanism.bodies[body].name.as_str()).to_owned());
         found.hinges.push(HingeForce { name: joint.name.clone(), force: [force.re, force.im], on, from });
     }
-    let energy = mechanism.energy(&mut Kernel::<DoubleDouble>::new(phi.len(), 0), &start.phi, &start.omega);
+    let energy = mechanism.energy(&mut Kernel::<DoubleDouble>::without_rows(mechanism), &start.phi, &start.omega);
     found.energy = [energy.kinetic.hi, energy.potential.hi];
     found.walls = contacts(mechanism, &start, &phi, omega, &kernel);
     found
@@ -109,7 +109,7 @@ fn contacts(mechanism: &Mechanism, start: &Motion, phi: &[f64], mut omega: Vec<f
     for (number, contact) in mechanism.contacts.iter().enumerate() {
         let gap = contact.row.gap(&kernel.z);
         let mut jacobian = vec![0.0; phi.len()];
-        contact.row.jacobian(&kernel.z, &mut jacobian);
+        contact.row.differentiate(start.time, Posture { phi, z: &kernel.z, omega: &omega }, &mut jacobian);
         let approach = crate::dynamics::kernel::dot(&jacobian, &omega);
         let jump = if gap <= TOUCHING && approach < 0.0 { mechanism.strike(number, start.time, phi, &omega) } else { None };
         let impact = jump.map(|jump| {

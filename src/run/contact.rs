@@ -11,6 +11,7 @@ use super::plan::Plan;
 use super::running::Outcome;
 use super::sample::{Sample, Sampler};
 use crate::arithmetic::{Complex, DoubleDouble};
+use crate::dynamics::impact::Contact;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::multiplier::Multiplier;
 use crate::dynamics::{Form, Mechanism, Motion, Time};
@@ -224,11 +225,10 @@ impl Course {
             let mut quiet = true;
             for contact in 0..self.free.contacts.len() {
                 let motion = self.motion();
-                let row = &self.free.contacts[contact].row;
+                let Contact { row, point, normal, .. } = &self.free.contacts[contact];
                 let (z, _, omega) = posture(&motion);
-                let fastest =
-                    row.point.terms.iter().fold(0.0, |most: f64, &(k, gamma)| most.max(gamma.norm_squared().sqrt() * omega[k].abs()));
-                let approach = row.normal.dot(row.point.velocity(&z, &omega));
+                let fastest = point.terms.iter().fold(0.0, |most: f64, &(k, gamma)| most.max(gamma.norm_squared().sqrt() * omega[k].abs()));
+                let approach = normal.dot(point.velocity(&z, &omega));
                 let held = self.mechanism.held.contains(&contact);
                 // Rounding leaves this much of a velocity that an impact took off.
                 if !held && row.gap(&z) <= TOUCH && approach < -1e-13 * fastest {
@@ -253,7 +253,7 @@ impl Course {
                 let what = format!("the motors drive a point into wall {}", self.name(contact));
                 return Err(self.stopped(&outcome.plan, what, "change the motors' laws, or end the run before"));
             };
-            let pulled = (self.mechanism.held.iter().zip(&impact.row_impulses[self.mechanism.motor_rows()..]))
+            let pulled = (self.mechanism.held.iter().zip(&impact.row_impulses[self.mechanism.standing_rows()..]))
                 .filter(|(_, pull)| **pull > 1e-12 * impact.impulse)
                 .max_by(|a, b| a.1.total_cmp(b.1));
             match pulled.map(|(&held, _)| held) {
@@ -330,7 +330,7 @@ impl Course {
         let before = self.sampler.balance(motion);
         let mut form = Multiplier::<0, true>::new(Arc::clone(&self.mechanism));
         let mut state = form.state(motion);
-        let mut kernel = Kernel::new(self.mechanism.bodies.len(), self.mechanism.rows.len());
+        let mut kernel = Kernel::new(&self.mechanism);
         if let Err((row, left)) = project(&self.mechanism, &mut kernel, &mut state, 1e-13) {
             let what = format!("{left:.1e} of constraint {row} is left where a point comes to rest on its wall");
             return Err(self.stopped(&outcome.plan, what, "raise the restitution, or end the run before"));
@@ -367,7 +367,7 @@ impl Course {
             }
             self.held.push(Held { contact, since: t, kept });
         }
-        if !contacts.is_empty() && self.free.motor_rows() > 0 && outcome.plan.stabilization != Stabilization::Projection {
+        if !contacts.is_empty() && self.free.standing_rows() > 0 && outcome.plan.stabilization != Stabilization::Projection {
             let note = "while a point stays on its wall, the motors' rows are kept by projection";
             if !outcome.plan.notes.iter().any(|before| before == note) {
                 outcome.plan.notes.push(note.into());

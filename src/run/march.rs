@@ -9,7 +9,7 @@ use crate::dynamics::elimination::Elimination;
 use crate::dynamics::multiplier::Multiplier;
 use crate::dynamics::natural::Natural;
 use crate::dynamics::{Field, Form, Glance, Mechanism, Motion, State, Time};
-use crate::stabilization::{Baumgarte, Projected};
+use crate::stabilization::{Baumgarte, Projected, SymmetricGauss};
 use crate::stepping::gauss::Gauss;
 use crate::stepping::rattle::Rattle;
 use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Method, Reached, Seen, StepError, Tally, Taylor, Tolerance};
@@ -185,9 +185,8 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
     }
 
     fn resume(&mut self, place: Place, horizon: Time) -> Result<bool, StepError> {
-        let alike = |state: &State| {
-            (state.y.len(), state.low.len(), state.turns.len()) == (self.state.y.len(), self.state.low.len(), self.state.turns.len())
-        };
+        let shape = |state: &State| (state.y.len(), state.low.len(), state.turns.len(), state.is_winding);
+        let alike = |state: &State| shape(state) == shape(&self.state);
         let steps_back = self.method.is_dense() && !place.from.y.is_empty() && place.from.time < place.state.time;
         if !alike(&place.state) || (steps_back && !alike(&place.from)) {
             return Ok(false);
@@ -238,7 +237,7 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
         let tracer = self.tracer.get_or_insert_with(|| {
             let mechanism = Arc::new(self.problem.mechanism().clone());
             let tolerance = Tolerance { relative: 1e-13, absolute: 1e-13 };
-            marcher(sized!(mechanism.bodies.len(), form(&mechanism, Stabilization::None, 1.0)), Dp8::new(tolerance), &motion, Steps::Own)
+            marcher(sized!(mechanism.size(), form(&mechanism, Stabilization::None, 1.0)), Dp8::new(tolerance), &motion, Steps::Own)
         });
         tracer.jump(&motion);
         tracer.forget();
@@ -291,7 +290,7 @@ fn canonical<const N: usize>(mechanism: &Arc<Mechanism>) -> Box<dyn Problem> {
 
 /// Builds what a plan asks for; Baumgarte's time constant is measured first where none was given.
 pub(super) fn build(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<Box<dyn March>, StepError> {
-    let n = mechanism.bodies.len();
+    let n = mechanism.size();
     let tolerance = plan.tolerance.unwrap_or_default();
     let step = plan.step.unwrap_or(0.0);
     if plan.stabilization == Stabilization::Baumgarte && plan.time_constant.is_none() {
@@ -320,6 +319,9 @@ pub(super) fn build(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion)
         MethodId::Gauss(stages) => {
             let gauss = Gauss::new(stages, step)
                 .ok_or_else(|| cannot_begin(plan, format!("no Gauss method has {stages} stages and step {step} s")))?;
+            if projected {
+                return Ok(marcher(problem(), SymmetricGauss::new(gauss), start, Steps::Fixed));
+            }
             marcher(sized!(n, canonical(mechanism)), gauss, start, Steps::Fixed)
         }
         MethodId::Rattle(composition) => {

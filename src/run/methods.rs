@@ -91,7 +91,7 @@ const fn gauss(stages: usize, name: &'static str) -> MethodInfo {
         stepping: Stepping::Fixed,
         symplectic: true,
         purpose: "long horizons: energy stays at rounding",
-        needs: "no walls; motors eliminated",
+        needs: "no walls",
     }
 }
 

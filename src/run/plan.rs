@@ -5,6 +5,7 @@
 use super::methods::{MethodId, Stabilization};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::Kernel;
+use crate::dynamics::natural::Natural;
 use crate::dynamics::{Mechanism, Time, tree};
 use crate::scene::Scene;
 use crate::stepping::Tolerance;
@@ -245,10 +246,16 @@ fn choose(mechanism: &Mechanism, request: &Request, until: f64, rate: f64) -> (M
         return (MethodId::Taylor, "taylor: extended orders are those of its series".into());
     }
     let tolerance = request.rtol.is_some() || request.atol.is_some();
-    let kept = request.stabilize.unwrap_or(Stabilization::Elimination);
+    let kept = request.stabilize.unwrap_or(usual(mechanism));
     let steps_back = !mechanism.rows.is_empty() && kept == Stabilization::Projection;
     let fixed_possible = mechanism.contacts.is_empty() && !tolerance && (mechanism.rows.is_empty() || kept == Stabilization::Elimination);
-    if !mechanism.contacts.is_empty() {
+    if mechanism.is_tied_up() && mechanism.contacts.is_empty() && kept == Stabilization::Projection {
+        if request.step.is_some() {
+            (MethodId::Gauss(8), "gauss16: a fixed step was given; closed loops and sliders are kept by symmetric projection".into())
+        } else {
+            (MethodId::Taylor, "taylor: closed loops and sliders are kept by projection, and its steps pass singular positions".into())
+        }
+    } else if !mechanism.contacts.is_empty() {
         (MethodId::Dp8, "dp8: the scene has walls, and impacts are located inside its steps".into())
     } else if steps_back {
         (MethodId::Dp8, "dp8: projection acts after every step, which ode_solvers does not let us do".into())
@@ -261,6 +268,12 @@ fn choose(mechanism: &Mechanism, request: &Request, until: f64, rate: f64) -> (M
         let why = if tolerance { "a tolerance was given" } else { why };
         (MethodId::Dop853, format!("dop853: {why}, and it is the everyday choice"))
     }
+}
+
+/// How the rows of a mechanism are kept where nobody says: given angles are eliminated where they are all there is to keep.
+fn usual(mechanism: &Mechanism) -> Stabilization {
+    let counts_turns = mechanism.is_winding() && mechanism.ties.driven();
+    if mechanism.is_tied_up() || counts_turns { Stabilization::Projection } else { Stabilization::Elimination }
 }
 
 /// The stabilization of a pairing, or why there is none.
@@ -280,20 +293,45 @@ fn pair(mechanism: &Mechanism, method: MethodId, request: &Request, notes: &mut 
         let reason = "RATTLE takes forces that depend on positions only, and a damper's does not";
         return Err(mismatch(format!("{method} on a scene with dampers"), reason, "--method dop853, or gauss16 for a fixed step"));
     }
+    if matches!(method, MethodId::Rattle(_))
+        && let Err(error) = Natural::new(std::sync::Arc::new(mechanism.clone()))
+    {
+        return Err(mismatch(format!("{method} on this scene"), &error.to_string(), "--method dp8, or gauss16 for a fixed step"));
+    }
     if mechanism.rows.is_empty() {
         if request.stabilize.is_some_and(|kind| kind != Stabilization::None) {
             notes.push("the scene has no constraint: nothing to stabilize".into());
         }
         return Ok(Stabilization::None);
     }
+    let windowed = matches!(method, MethodId::Dopri5 | MethodId::Dop853);
     let Some(asked) = request.stabilize else {
-        return Ok(if matches!(method, MethodId::Rattle(_)) { Stabilization::Projection } else { Stabilization::Elimination });
+        let usual = if matches!(method, MethodId::Rattle(_)) { Stabilization::Projection } else { usual(mechanism) };
+        if windowed && usual == Stabilization::Projection {
+            let own = if method == MethodId::Dopri5 { "dp5" } else { "dp8" };
+            notes.push(format!("{method} takes no projection: constraints drift with its tolerance; {own} keeps them"));
+            return Ok(Stabilization::None);
+        }
+        return Ok(usual);
     };
+    if asked == Stabilization::Elimination && usual(mechanism) != Stabilization::Elimination {
+        let reason = if mechanism.is_tied_up() {
+            "closed loops and sliders have no independent coordinates to be left with"
+        } else {
+            "a torsion spring counts the turns of an angle, which elimination takes modulo whole ones"
+        };
+        return Err(mismatch(format!("{method} with --stabilize {asked}"), reason, "--stabilize projection"));
+    }
     match (method, asked) {
         (MethodId::Rattle(_), Stabilization::Projection) => Ok(asked),
         (MethodId::Rattle(_), _) => {
             let reason = "RATTLE keeps every row at both levels by its own projection";
             Err(mismatch(format!("{method} with --stabilize {asked}"), reason, "leave --stabilize out, or --method dp8"))
+        }
+        (MethodId::Gauss(_), Stabilization::Projection) if usual(mechanism) == Stabilization::Projection => Ok(asked),
+        (MethodId::Gauss(_), Stabilization::None | Stabilization::Baumgarte) if usual(mechanism) == Stabilization::Projection => {
+            let reason = "a Gauss method keeps loops and sliders by symmetric projection, and nothing else keeps its energy";
+            Err(mismatch(format!("{method} with --stabilize {asked}"), reason, "--stabilize projection, or --method dp8"))
         }
         (MethodId::Gauss(_), Stabilization::None | Stabilization::Baumgarte | Stabilization::Projection) => {
             let reason = "Gauss methods are symplectic in coordinates and momenta, where a motor's angle is eliminated";
@@ -359,17 +397,16 @@ fn fixed_step(
 
 /// An upper estimate of the fastest rate of the scene \[rad/s\]: what the energy at the start allows the lightest part, gravity, springs and motors.
 fn fastest_rate(scene: &Scene, mechanism: &Mechanism) -> f64 {
-    let n = mechanism.bodies.len();
+    let n = mechanism.coordinates();
     let start = mechanism.start(scene);
     let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
     let omega: Vec<f64> = start.omega.iter().map(|omega| omega.hi).collect();
-    let mut kernel = Kernel::<f64>::new(n, 0);
+    let mut kernel = Kernel::<f64>::without_rows(mechanism);
     let energy = mechanism.energy(&mut kernel, &phi, &omega);
     tree::factor::<f64, 0>(n, &mut kernel.mass, &mut kernel.pivot);
     let lightest = kernel.pivot.iter().fold(0.0, |most: f64, &pivot| most.max(pivot));
-    let gravity: f64 = mechanism.tree.weight.iter().map(|weight| weight.norm_squared().sqrt()).sum();
-    let ground: f64 = mechanism.bodies.iter().map(|body| -body.mass * mechanism.gravity.dot(body.centre.root)).sum();
-    let available = (energy.total() - ground + gravity).max(0.0);
+    let gravity: f64 = mechanism.tree.weight[..mechanism.bodies.len()].iter().map(|weight| weight.norm_squared().sqrt()).sum();
+    let available = (energy.total() - mechanism.ground_energy + gravity).max(0.0);
     let springs: f64 = mechanism
         .springs
         .iter()

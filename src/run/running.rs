@@ -206,10 +206,10 @@ impl Snapshot {
     /// Whether its parts go together, and with a mechanism.
     fn fits(&self, mechanism: &Mechanism) -> bool {
         let Outcome { plan, last, drift, trace, holds, .. } = &self.outcome;
-        let (n, rows) = (mechanism.bodies.len(), mechanism.rows.len());
+        let (n, bars, rows) = (mechanism.coordinates(), mechanism.bodies.len(), mechanism.rows.len());
         let sizes =
             |sample: &Sample| (sample.phi.len(), sample.omega.len(), sample.constraints.len(), sample.motors.len()) == (n, n, rows, rows);
-        let whole = |sample: &Sample| sizes(sample) && (sample.centre.len(), sample.velocity.len()) == (n, n);
+        let whole = |sample: &Sample| sizes(sample) && (sample.centre.len(), sample.velocity.len()) == (bars, bars);
         plan.is_sound()
             && self.row <= plan.rows
             && self.horizon <= plan.until

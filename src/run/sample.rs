@@ -6,7 +6,7 @@
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::dynamics::energy::Energy;
 use crate::dynamics::kernel::{Bias, Kernel};
-use crate::dynamics::row::{Posture, Row};
+use crate::dynamics::row::Posture;
 use crate::dynamics::{Mechanism, Motion};
 use std::sync::Arc;
 
@@ -15,9 +15,9 @@ use std::sync::Arc;
 pub struct Sample {
     /// Time \[s\].
     pub t: f64,
-    /// Winding angles \[rad\].
+    /// Winding angles of all bodies \[rad\], then positions of free feet \[m\].
     pub phi: Vec<f64>,
-    /// Rates \[rad/s\].
+    /// Rates \[rad/s, m/s\].
     pub omega: Vec<f64>,
     /// Centres of mass (x, y) \[m\].
     pub centre: Vec<[f64; 2]>,
@@ -35,7 +35,7 @@ pub struct Sample {
     pub imbalance: f64,
     /// Violation of each row, C and C'.
     pub constraints: Vec<[f64; 2]>,
-    /// Torque \[N·m\] and power \[W\] of each motor.
+    /// Torque \[N·m\], or force \[N\] along a slider, and power \[W\] of each motor.
     pub motors: Vec<[f64; 2]>,
 }
 
@@ -85,6 +85,8 @@ pub struct Sampler {
     jacobian: Vec<DoubleDouble>,
     phi: Vec<f64>,
     omega: Vec<f64>,
+    /// Feet of all bodies, and their velocities.
+    feet: [Vec<Complex<f64>>; 2],
     /// Energy less work at the start, in full; impacts shift it.
     reference: Option<DoubleDouble>,
     sample: Sample,
@@ -93,10 +95,11 @@ pub struct Sampler {
 impl Sampler {
     /// A sampler; the first sample it takes is the reference of the energy balance.
     pub fn new(mechanism: Arc<Mechanism>) -> Self {
-        let (n, rows) = (mechanism.bodies.len(), mechanism.rows.len());
+        let (n, bars, rows) = (mechanism.coordinates(), mechanism.bodies.len(), mechanism.rows.len());
         Self {
-            plain: Kernel::new(n, rows),
-            exact: Kernel::new(n, 0),
+            plain: Kernel::new(&mechanism),
+            exact: Kernel::without_rows(&mechanism),
+            feet: [vec![Complex::ZERO; bars], vec![Complex::ZERO; bars]],
             jacobian: vec![DoubleDouble::ZERO; n],
             phi: vec![0.0; n],
             omega: vec![0.0; n],
@@ -104,8 +107,8 @@ impl Sampler {
             sample: Sample {
                 phi: vec![0.0; n],
                 omega: vec![0.0; n],
-                centre: vec![[0.0; 2]; n],
-                velocity: vec![[0.0; 2]; n],
+                centre: vec![[0.0; 2]; bars],
+                velocity: vec![[0.0; 2]; bars],
                 constraints: vec![[0.0; 2]; rows],
                 motors: vec![[0.0; 2]; rows],
                 ..Sample::default()
@@ -117,7 +120,7 @@ impl Sampler {
 
     /// From here on the forces are those of `mechanism`, the sampler's own one with other contacts held.
     pub fn hold(&mut self, mechanism: Arc<Mechanism>) {
-        self.plain = Kernel::new(mechanism.bodies.len(), mechanism.rows.len());
+        self.plain = Kernel::new(&mechanism);
         self.holding = mechanism;
     }
 
@@ -149,11 +152,11 @@ impl Sampler {
         let Energy { kinetic, potential } = mechanism.exact_energy(&mut self.exact, motion);
         let balance = kinetic + potential - motion.work;
         let reference = *self.reference.get_or_insert(balance);
-        for k in 0..mechanism.bodies.len() {
+        for k in 0..mechanism.coordinates() {
             (self.phi[k], self.omega[k]) = (motion.phi[k].hi, motion.omega[k].hi);
         }
         if self.holding.rows.is_empty() {
-            self.plain.face::<0>(&self.phi);
+            self.plain.face::<0>(mechanism, &self.phi);
         } else {
             self.plain.accelerate::<0>(&self.holding, motion.time, &self.phi, &self.omega, Bias::default());
         }
@@ -165,11 +168,17 @@ impl Sampler {
         sample.stabilizer = motion.stabilizer;
         sample.imbalance = (balance - reference).hi / mechanism.energy_scale;
         let both = |vector: Complex<f64>| [vector.re, vector.im];
-        for (k, body) in mechanism.bodies.iter().enumerate() {
+        for k in 0..mechanism.coordinates() {
             sample.phi[k] = motion.unwrapped(k);
-            sample.omega[k] = self.omega[k];
-            sample.centre[k] = both(body.centre.position(&self.plain.z));
-            sample.velocity[k] = both(body.centre.velocity(&self.plain.z, &self.omega));
+        }
+        sample.omega.copy_from_slice(&self.omega);
+        let (z, [feet, velocities]) = (&self.plain.z, &mut self.feet);
+        mechanism.forest.feet(z, feet);
+        mechanism.forest.foot_velocities(z, &self.omega, velocities);
+        for (k, body) in mechanism.bodies.iter().enumerate() {
+            let arm = z[k].turn(body.centre);
+            sample.centre[k] = both(feet[k] + arm);
+            sample.velocity[k] = both(velocities[k] + arm.left().times(self.omega[k]));
         }
         for (r, row) in mechanism.rows.iter().enumerate() {
             self.jacobian.fill(DoubleDouble::ZERO);
@@ -177,11 +186,8 @@ impl Sampler {
             let here = row.linearise(motion.time, posture, &mut self.jacobian);
             let rate = self.jacobian.iter().zip(&motion.omega).fold(here.drive, |sum, (&g, &w)| sum + g * w);
             sample.constraints[r] = [here.position.hi, rate.hi];
-            let torque = -self.plain.multiplier[r];
-            sample.motors[r] = match row {
-                Row::Angle(_) => [torque, -torque * here.drive.hi],
-                Row::Line(_) | Row::Pin(_) => [0.0, 0.0],
-            };
+            let force = -self.plain.multiplier[r];
+            sample.motors[r] = if row.law.is_some() { [force, -force * here.drive.hi] } else { [0.0, 0.0] };
         }
         sample
     }

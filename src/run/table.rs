@@ -67,7 +67,7 @@ impl<W: Write> Table<W> {
     pub fn write(&mut self, sample: &Sample) -> io::Result<()> {
         let buffer = &mut self.buffer;
         put(buffer, sample.t);
-        for k in 0..sample.phi.len() {
+        for k in 0..sample.centre.len() {
             for value in
                 [sample.phi[k], sample.omega[k], sample.centre[k][0], sample.centre[k][1], sample.velocity[k][0], sample.velocity[k][1]]
             {

@@ -1,10 +1,10 @@
-//! A scene: bars, hinges, springs, motors and walls as plain data in SI units, checked and resolved.
+//! A scene: bars, joints, springs, forces, motors and walls as plain data in SI units, checked and resolved.
 //!
 //! [`read`] turns JSON into a [`Scene`] or refuses it with one precise error.  What stands here is already *resolved*: a uniform bar
 //! has become mass, centre and inertia; names have become indices.  Angles are absolute, from +x, counter-clockwise, in radians.
 
-mod assemble;
 mod error;
+mod fit;
 mod format;
 mod locate;
 pub mod read;
@@ -239,14 +239,15 @@ pub struct Motor {
     pub law: Law,
 }
 
-/// `start + rate·t + acceleration·t²/2 + Σ amplitude·sin(frequency·t + phase)` \[rad\].
+/// `start + rate·t + acceleration·t²/2 + Σ amplitude·sin(frequency·t + phase)` in the unit u of what it gives: \[rad\] of a motor on an angle,
+/// \[m\] of one on a slider, \[1\] of a force or a torque.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Law {
-    /// Angle at t = 0 without the sines \[rad\].
+    /// Value at t = 0 without the sines \[u\].
     pub start: f64,
-    /// Rate \[rad/s\].
+    /// Rate \[u/s\].
     pub rate: f64,
-    /// Acceleration \[rad/s²\].
+    /// Acceleration \[u/s²\].
     pub acceleration: f64,
     /// Sines on top.
     pub sines: Vec<Sine>,
@@ -255,7 +256,7 @@ pub struct Law {
 /// One sine of a [`Law`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sine {
-    /// Amplitude \[rad\].
+    /// Amplitude \[u\].
     pub amplitude: f64,
     /// Angular frequency \[rad/s\].
     pub frequency: f64,

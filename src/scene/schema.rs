@@ -55,6 +55,8 @@ fn shape(of: &Shape) -> Value {
         Shape::Name => json!({"type": "string", "pattern": format!("^[A-Za-z0-9_-]{{1,{LONGEST_NAME}}}$")}),
         Shape::FolderName => json!({"type": "string", "pattern": format!("^[A-Za-z0-9_][A-Za-z0-9_-]{{0,{}}}$", LONGEST_NAME - 1)}),
         Shape::Text => json!({"type": "string", "maxLength": LONGEST_TEXT}),
+        Shape::Word(words) => json!({"enum": words}),
+        Shape::SliderName => shape(&Shape::Name),
         Shape::Body { .. } => json!({"type": "string", "maxLength": LONGEST_NAME}),
         Shape::Inertia(quantity) => json!({"anyOf": [{"enum": ["full", "slender"]}, number(quantity)]}),
         Shape::Between => json!({"type": "array", "items": object(&PLACE), "minItems": 2, "maxItems": 2}),

@@ -1,12 +1,12 @@
 //! A scene some of whose numbers are left open, to be filled in again and again.
 //!
-//! A number is named by its path as in `--set`, or in short by the name of the bar, spring, motor, wall or hinge it belongs to: `bar1.phi` is
+//! A number is named by its path as in `--set`, or in short by the name of the bar, joint, spring, force, motor or wall it belongs to: `bar1.phi` is
 //! `start.bar1.phi`, `motor.rate` is `motors.motor.law.rate`, `spring.stiffness` is `springs.spring.stiffness`.  A path is judged against the tables of `format.rs` and the scene's own text
 //! once; values are judged when they are filled in.
 
 use super::Scene;
 use super::error::SceneError;
-use super::format::{Field, LAW, SCENE, START, Shape, Table, UNIFORM_BAR};
+use super::format::{Field, LAW, SCENE, START, Shape, Table, UNIFORM_BAR, kind};
 use super::locate::{Node, Value, push_index, push_key};
 use super::read::{listed, nearest, parse_scene, put_together, read_text};
 use super::set::{Override, Step, hint, name, steps};
@@ -27,7 +27,7 @@ pub struct Variable {
     pub path: String,
     /// Its unit: `rad`; empty for a pure number.
     pub unit: &'static str,
-    /// Where a start is varied that no motor, spring or wall has a say in: the number of the bar.  Such a value can be put into a scene that was read before.
+    /// Where a start is varied that nothing else in the scene has a say in: the number of the bar.  Such a value can be put into a scene that was read before.
     pub start: Option<(usize, StartValue)>,
 }
 
@@ -41,7 +41,8 @@ pub enum StartValue {
 }
 
 /// The lists whose elements can be meant by their name alone, and what their paths begin with.
-const LISTS: [&str; 5] = ["bars", "springs", "motors", "walls", "hinges"];
+const LISTS: [&str; 11] =
+    ["bars", "hinges", "sliders", "welds", "locks", "springs", "torsion_springs", "forces", "torques", "motors", "walls"];
 
 impl Template {
     /// Reads the text of the scene file `path`.
@@ -98,8 +99,13 @@ impl Template {
         let (Some("start"), Some(bar), Some(value), None) = (parts.next(), parts.next(), parts.next(), parts.next()) else {
             return Ok(None);
         };
-        let value = if value == "phi" { StartValue::Phi } else { StartValue::Omega };
-        let alone = scene.motors.is_empty() && scene.springs.is_empty() && scene.walls.is_empty();
+        let value = match value {
+            "phi" => StartValue::Phi,
+            "omega" => StartValue::Omega,
+            _ => return Ok(None),
+        };
+        let alone = scene.motors.is_empty() && scene.locks.is_empty() && scene.springs.is_empty() && scene.walls.is_empty();
+        let alone = alone && scene.has_whole_start();
         Ok(scene.bars.iter().position(|known| known.name == bar).filter(|_| alone).map(|bar| (bar, value)))
     }
 }
@@ -118,7 +124,7 @@ fn whole(short: &str, tree: &Node) -> Result<String, String> {
         known.extend(nodes.iter().filter_map(name));
         if nodes.iter().any(|node| name(node) == Some(first)) {
             found.push(match list {
-                "bars" if START.field(rest).is_some() => format!("start.{first}.{rest}"),
+                "bars" if START.field(rest.split('[').next().unwrap_or("")).is_some() => format!("start.{first}.{rest}"),
                 "motors" if LAW.field(rest).is_some() => format!("motors.{first}.law.{rest}"),
                 _ => format!("{list}.{first}.{rest}"),
             });
@@ -159,7 +165,7 @@ impl Walk<'_> {
             if node.is_none() && steps.peek().is_some() {
                 return Err((
                     format!("{walked} is not in the scene"),
-                    "a bar's start may be left to its motor; else add it to the file".into(),
+                    "a part of the start that is found or that a motor gives cannot be varied; else add it to the file".into(),
                 ));
             }
             match (&field.shape, steps.peek()) {
@@ -177,8 +183,7 @@ impl Walk<'_> {
                 (Shape::List { of, .. }, Some(step)) => {
                     node = element(node, step, &mut walked)?;
                     steps.next();
-                    let outright = node.is_some_and(|node| member(node, "mass").is_some() || member(node, "centre").is_some());
-                    table = if of.len() > 1 && outright { of[1] } else { of[0] };
+                    table = kind(of, |key| node.is_some_and(|node| member(node, key).is_some())).unwrap_or(table);
                 }
                 (Shape::Between, Some(step)) => {
                     node = element(node, step, &mut walked)?;

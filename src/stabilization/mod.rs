@@ -1,10 +1,12 @@
 //! Keeping the constraints: one door each.
 //!
-//! [`baumgarte`] wraps the equations, [`projection`] wraps the method, and elimination is a form of the mechanism
+//! [`baumgarte`] wraps the equations, [`projection`] and, for Gauss methods, [`symmetric`] wrap the method, and elimination is a form of the mechanism
 //! ([`Elimination`](crate::dynamics::elimination::Elimination)).  No stepper knows of any of them.
 
 pub mod baumgarte;
 pub mod projection;
+pub mod symmetric;
 
 pub use baumgarte::Baumgarte;
 pub use projection::Projected;
+pub use symmetric::SymmetricGauss;

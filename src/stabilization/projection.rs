@@ -8,6 +8,7 @@
 //! The shortest way in the metric of the mass matrix.  Source: E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), section VII.2
 //! (algorithm 2.1); E. Eich, SIAM J. Numer. Anal. 30 (1993).
 
+use crate::arithmetic::Complex;
 use crate::arithmetic::sum::two_sum;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::{Field, Form, Mechanism, State, Time, tree};
@@ -54,7 +55,7 @@ where
     ) -> Result<Reached, StepError> {
         let (name, tolerance) = (self.inner.name(), self.tolerance);
         let mechanism = problem.mechanism();
-        let kernel = self.kernel.get_or_insert_with(|| Kernel::new(mechanism.bodies.len(), mechanism.rows.len()));
+        let kernel = self.kernel.get_or_insert_with(|| Kernel::new(mechanism));
         self.inner.advance(problem, state, until, tally, &mut |problem, state| {
             let moved = project(problem.mechanism(), kernel, state, tolerance).map_err(|(row, left)| StepError {
                 cause: Cause::ProjectionFailed,
@@ -88,6 +89,8 @@ where
 
 /// Turns up to this \[rad\] are made without new sines, and without new factors of M and S: these change by as little.
 const SMALL: f64 = 1e-8;
+/// Violation, relative to levers and speeds, that a row left out may have.
+const LEFT_OUT: f64 = 1e-6;
 /// Changes up to this, relative to the rates where they are above one, are rounding: what is known of the rates at the state stays true.
 const ROUNDING: f64 = 1e-14;
 
@@ -96,7 +99,7 @@ const ROUNDING: f64 = 1e-14;
 /// # Errors
 /// Name of the worst row and its violation where it cannot be brought below `tolerance`.
 pub fn project(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &mut State, tolerance: f64) -> Result<bool, (String, f64)> {
-    match mechanism.bodies.len() {
+    match mechanism.size() {
         1 => project_sized::<1>(mechanism, kernel, state, tolerance),
         2 => project_sized::<2>(mechanism, kernel, state, tolerance),
         3 => project_sized::<3>(mechanism, kernel, state, tolerance),
@@ -111,10 +114,10 @@ fn project_sized<const N: usize>(
     state: &mut State,
     tolerance: f64,
 ) -> Result<bool, (String, f64)> {
-    let n = tree::size::<N>(mechanism.bodies.len());
+    let n = tree::size::<N>(mechanism.coordinates());
     let rows = mechanism.rows.len();
-    kernel.face::<N>(&state.y[..n]);
-    let energy_before = mechanism.energy_facing::<f64, N>(kernel, &state.y[n..2 * n]).total();
+    kernel.face::<N>(mechanism, &state.y[..n]);
+    let energy_before = mechanism.energy_facing::<f64, N>(kernel, &state.y[..n], &state.y[n..2 * n]).total();
     tree::factor::<f64, N>(n, &mut kernel.mass, &mut kernel.pivot);
     kernel.linearise::<N>(mechanism, state.time, &state.y[..n], &state.y[n..2 * n]);
     let (mut last, mut moved, mut far) = (f64::INFINITY, false, 0.0);
@@ -132,39 +135,38 @@ fn project_sized<const N: usize>(
         (moved, far) = (true, largest(far, turn));
         let (phi, omega) = (&state.y[..n], &state.y[n..2 * n]);
         if turn <= SMALL {
-            for (z, &turn) in kernel.z.iter_mut().zip(&kernel.load) {
+            let angles = tree::size::<N>(mechanism.bodies.len());
+            for (z, &turn) in kernel.z[..angles].iter_mut().zip(&kernel.load) {
                 *z = *z - z.left().times(turn) - z.times(0.5 * turn * turn);
+            }
+            for x in (angles..n).step_by(2) {
+                kernel.z[x] = Complex::new(phi[x], phi[x + 1]);
             }
             kernel.rows_at(mechanism, state.time, phi, omega);
         } else {
-            kernel.face::<N>(phi);
+            kernel.face::<N>(mechanism, phi);
             mechanism.tree.couple::<f64, N>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
             tree::factor::<f64, N>(n, &mut kernel.mass, &mut kernel.pivot);
             kernel.linearise::<N>(mechanism, state.time, phi, omega);
         }
     }
-    let lever = |kernel: &Kernel<f64>, r: usize| kernel.jacobian[r * n..(r + 1) * n].iter().fold(1.0, |sum: f64, g| sum.max(g.abs()));
-    check(mechanism, kernel, tolerance, |kernel, r| (kernel.rows[r].position, lever(kernel, r)))?;
-    let rate = |kernel: &Kernel<f64>, state: &State, r: usize| kernel.row_rate(r, &state.y[n..2 * n]);
-    // A row's rate is a sum of G_k w_k, and no smaller than their rounding.
-    let pace = |kernel: &Kernel<f64>, state: &State, r: usize| {
-        let terms = kernel.jacobian[r * n..(r + 1) * n].iter().zip(&state.y[n..2 * n]);
-        terms.fold(kernel.rows[r].drive.abs().max(1.0), |most, (g, w)| most.max((g * w).abs()))
-    };
+    check(mechanism, kernel, tolerance, |r| (kernel.rows[r].position, lever(kernel, r)))?;
     let mut fast = 0.0;
     for r in 0..rows {
-        kernel.multiplier[r] = rate(kernel, state, r);
-        fast = largest(fast, kernel.multiplier[r].abs() / pace(kernel, state, r));
+        let omega = &state.y[n..2 * n];
+        kernel.multiplier[r] = kernel.row_rate(r, omega);
+        fast = largest(fast, kernel.multiplier[r].abs() / pace(kernel, omega, r));
     }
     if fast > 2.0 * f64::EPSILON || fast.is_nan() {
         let change = shift(kernel, state, n, n);
         let most = state.y[n..2 * n].iter().fold(1.0, |most: f64, omega| most.max(omega.abs()));
         (moved, far) = (true, largest(far, change / most));
-        check(mechanism, kernel, tolerance, |kernel, r| (rate(kernel, state, r), pace(kernel, state, r)))?;
+        let omega = &state.y[n..2 * n];
+        check(mechanism, kernel, tolerance, |r| (kernel.row_rate(r, omega), pace(kernel, omega, r)))?;
     }
     if moved {
         state.wrap();
-        let energy = mechanism.energy_facing::<f64, N>(kernel, &state.y[n..2 * n]).total();
+        let energy = mechanism.energy_facing::<f64, N>(kernel, &state.y[..n], &state.y[n..2 * n]).total();
         state.y[2 * n + 1] += energy - energy_before;
     }
     Ok(far > ROUNDING)
@@ -184,15 +186,39 @@ fn shift(kernel: &mut Kernel<f64>, state: &mut State, from: usize, n: usize) -> 
     largest_change
 }
 
-/// The worst row must be below tolerance, each measured against its own size.
+/// The longest lever of row `r`, or one \[m\].
+fn lever(kernel: &Kernel<f64>, r: usize) -> f64 {
+    let n = kernel.z.len();
+    kernel.jacobian[r * n..(r + 1) * n].iter().fold(1.0, |most: f64, g| most.max(g.abs()))
+}
+
+/// The largest part of the rate of row `r`, or one: a row's rate is a sum of G_k w_k, and no smaller than their rounding.
+fn pace(kernel: &Kernel<f64>, omega: &[f64], r: usize) -> f64 {
+    let n = kernel.z.len();
+    let terms = kernel.jacobian[r * n..(r + 1) * n].iter().zip(omega);
+    terms.fold(kernel.rows[r].drive.abs().max(1.0), |most, (g, w)| most.max((g * w).abs()))
+}
+
+/// Every row must be kept at both levels, as [`Kernel::linearise`] found them.
+///
+/// # Errors
+/// Name of the first row that is not, and its violation.
+pub(super) fn is_kept(mechanism: &Mechanism, kernel: &Kernel<f64>, omega: &[f64], tolerance: f64) -> Result<(), (String, f64)> {
+    check(mechanism, kernel, tolerance, |r| (kernel.rows[r].position, lever(kernel, r)))?;
+    check(mechanism, kernel, tolerance, |r| (kernel.row_rate(r, omega), pace(kernel, omega, r)))
+}
+
+/// The worst row must be below tolerance, each measured against its own size.  Rows that are left out near a singular position are not projected; they
+/// come back once it is past.
 fn check(
     mechanism: &Mechanism,
     kernel: &Kernel<f64>,
     tolerance: f64,
-    violation: impl Fn(&Kernel<f64>, usize) -> (f64, f64),
+    violation: impl Fn(usize) -> (f64, f64),
 ) -> Result<(), (String, f64)> {
     for (r, row) in mechanism.rows.iter().enumerate() {
-        let (violation, size) = violation(kernel, r);
+        let (violation, size) = violation(r);
+        let tolerance = if kernel.schur_pivot[r] == 0.0 { tolerance.max(LEFT_OUT) } else { tolerance };
         let small = violation.abs() <= tolerance * size;
         if !small {
             return Err((row.name().into(), violation.abs()));

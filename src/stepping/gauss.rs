@@ -214,7 +214,7 @@ mod tests {
     fn energy_errors(marks: &[u32], starts: u32, spoil: fn(&mut Gauss), part: fn(usize) -> f64) -> Vec<(f64, f64)> {
         let mechanism = Arc::new(Mechanism::new(&point_masses()).expect("a valid scene"));
         let mut form = Canonical::<2, false>::new(mechanism.clone());
-        let (mut kernel, mut motion) = (Kernel::<DoubleDouble>::new(2, 0), Motion::default());
+        let (mut kernel, mut motion) = (Kernel::<DoubleDouble>::without_rows(&mechanism), Motion::default());
         let mut energy = |form: &mut Canonical<2, false>, state: &State| {
             form.read(state, &mut motion);
             mechanism.energy(&mut kernel, &motion.phi, &motion.omega).total()

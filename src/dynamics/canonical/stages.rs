@@ -72,6 +72,11 @@ impl<T: Lanewise> Bench<T> {
         let phase = Phase { angle: T::ZERO, unit, rate: lanes(|phase| phase.rate), acceleration: lanes(|phase| phase.acceleration) };
         self.scratch.drive(k, phase);
     }
+
+    /// Takes what applied force `a` is multiplied by at all points.
+    fn multiply(&mut self, a: usize, factors: &[DoubleDouble; LANES]) {
+        self.scratch.factor[a] = T::load(&Octet(factors.map(|factor| factor.hi)), &Octet(factors.map(|factor| factor.lo)));
+    }
 }
 
 impl<L: Lanes> Both<L> {
@@ -93,6 +98,11 @@ impl<L: Lanes> Both<L> {
             let phases = time.map(|time| tie.drive::<DoubleDouble>(time));
             self.plain.drive(k, &phases);
             self.exact.drive(k, &phases);
+        }
+        for (a, action) in mechanism.actions.iter().enumerate() {
+            let factors = time.map(|time| action.factor(time));
+            self.plain.multiply(a, &factors);
+            self.exact.multiply(a, &factors);
         }
     }
 }
@@ -138,7 +148,7 @@ impl Stages {
             },
             #[cfg(target_arch = "x86_64")]
             Room::Hardware(both) => {
-                let code: unsafe fn(&mut Both<Avx>, &Mechanism, &mut Points) = match (mechanism.bodies.len(), account, exact) {
+                let code: unsafe fn(&mut Both<Avx>, &Mechanism, &mut Points) = match (mechanism.size(), account, exact) {
                     (1, false, false) => hardware::<1, false, false>,
                     (2, false, false) => hardware::<2, false, false>,
                     (3, false, false) => hardware::<3, false, false>,

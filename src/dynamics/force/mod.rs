@@ -1,5 +1,9 @@
 //! Applied forces, one file a kind.
 
+pub mod action;
 pub mod spring;
+pub mod torsion;
 
+pub use action::Action;
 pub use spring::Spring;
+pub use torsion::Torsion;

@@ -1,52 +1,37 @@
-//! A point on a line of the ground with unit normal n: the contact row of a wall.
+//! A point on a line of the ground with unit normal n: a wall while it holds or pushes, a slider, its travel where n lies along the line.
 //!
 //! ```text
-//! C = Re(conj(n) P) - s,   G_k = Re(conj(n) i gamma_k z_k),   C_t = 0,   gamma = Re(conj(n) Pi)
+//! C = Re(conj(n) P) - s(t),   G_k = Re(conj(n) i gamma_k z_k),   C_t = -s',   gamma = Re(conj(n) Pi) - s''
 //! ```
 //!
-//! C is the gap: positive on the side the normal points to.  The force on the point is -lambda n.
+//! C is positive on the side the normal points to.  The force on the point is -lambda n.
 
-use super::{Linearised, Posture};
-use crate::arithmetic::{Complex, Real, Scalar};
-use crate::dynamics::point::Point;
+use super::{Measure, Push, Row, Site};
+use crate::arithmetic::Complex;
+use crate::dynamics::law::Law;
+use crate::dynamics::quadratic::Quadratic;
 
-/// A row that keeps a point on a line of the ground.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LineRow {
-    /// Name of the wall.
-    pub name: String,
-    /// The point.
-    pub point: Point,
-    /// Unit normal n.
-    pub normal: Complex<f64>,
-    /// s: distance of the line from the origin along n \[m\].
-    pub offset: f64,
+/// Keeps a point at the distance `offset` \[m\] from the origin along the unit vector `normal`, and the law's travel \[m\] further.
+pub fn line_row(name: &str, site: &Site, normal: Complex<f64>, offset: f64, law: Option<Law>, angles: usize) -> Row {
+    let mut place = Quadratic::along(&site.point, normal, angles);
+    place.constant -= offset;
+    Row {
+        name: name.into(),
+        measure: Measure::Place(place),
+        law,
+        push: Some(Push { on: site.body, from: None, direction: normal, frame: None }),
+    }
 }
 
-impl LineRow {
-    /// The gap C \[m\].
-    pub fn gap<T: Scalar>(&self, z: &[Complex<T>]) -> T {
-        Complex::of(self.normal).dot(self.point.position(z)) - T::of(self.offset)
-    }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::row::tests::{assert_derivatives, free, law, rod};
 
-    /// Adds G \[m\] to `jacobian`.
-    pub fn jacobian<T: Scalar>(&self, z: &[Complex<T>], jacobian: &mut [T]) {
-        for &(k, gamma) in &self.point.terms {
-            jacobian[k] += Complex::of(self.normal).dot(z[k].turn(gamma).left());
-        }
-    }
-
-    /// See [`Row::linearise`](super::Row::linearise).
-    #[inline]
-    pub fn linearise<T: Real>(&self, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
-        Linearised { position: self.gap(at.z), ..self.differentiate(at, jacobian) }
-    }
-
-    /// See [`Row::differentiate`](super::Row::differentiate).
-    #[inline]
-    pub fn differentiate<T: Real>(&self, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
-        self.jacobian(at.z, jacobian);
-        let convective = Complex::of(self.normal).dot(self.point.convective(at.z, at.omega));
-        Linearised { position: T::ZERO, drive: T::ZERO, convective }
+    #[test]
+    fn its_derivatives_are_those_of_its_position() {
+        let normal = Complex::new(0.6, 0.8);
+        assert_derivatives(&line_row("wall", &rod(), normal, 0.3, None, 2));
+        assert_derivatives(&line_row("travel", &free(), normal, 0.3, Some(law()), 2));
     }
 }

@@ -2,26 +2,35 @@
 //!
 //! A row knows its violation C, its Jacobian G, its drive C_t and what is left of C'' at zero acceleration.  Sign rule everywhere:
 //! `M a + Gᵀ lambda = b`, `G a = -gamma`, `C' = G w + C_t`.
+//!
+//! Whatever its kind, a row measures either an angle or a [`Quadratic`] function of unit vectors and feet, and keeps it at zero or at a law of
+//! time.  All that evaluates, projects or expands rows does so for these two measures, so that a new kind is a new function that makes one.
 
 pub mod angle;
 pub mod line;
 pub mod pin;
+pub mod slot;
 
-pub use angle::AngleRow;
-pub use line::LineRow;
-pub use pin::PinRow;
+pub use angle::angle_row;
+pub use line::line_row;
+pub use pin::pin_rows;
+pub use slot::slot_row;
 
 use super::Time;
+use super::law::Law;
+use super::point::Point;
+use super::quadratic::Quadratic;
+use crate::arithmetic::angle::difference;
 use crate::arithmetic::{Complex, Real};
 
-/// Angles, their unit vectors and rates at one moment.
+/// Coordinates, elements and rates at one moment.
 #[derive(Clone, Copy, Debug)]
 pub struct Posture<'a, T> {
-    /// Angles in [-π, π] \[rad\].
+    /// Angles in [-π, π] \[rad\], then the coordinates of feet \[m\].
     pub phi: &'a [T],
-    /// Unit vectors.
+    /// Unit vectors, then feet.
     pub z: &'a [Complex<T>],
-    /// Rates \[rad/s\].
+    /// Rates \[rad/s, m/s\].
     pub omega: &'a [T],
 }
 
@@ -36,103 +45,213 @@ pub struct Linearised<T> {
     pub convective: T,
 }
 
-/// A row of the mechanism.
+/// A point and the body it is on.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Site {
+    /// The body; `None` for the ground.
+    pub body: Option<usize>,
+    /// The point.
+    pub point: Point,
+}
+
+impl Site {
+    /// A point of the ground.
+    pub fn ground(at: [f64; 2]) -> Self {
+        Self { body: None, point: Point::ground(at) }
+    }
+}
+
+/// What a row measures.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Row {
-    /// A given angle: motors.
-    Angle(AngleRow),
-    /// A point on a line of the ground: walls while they hold or push.
-    Line(LineRow),
-    /// Two points that coincide, along one axis: closed loops.
-    Pin(PinRow),
+pub enum Measure {
+    /// The angle of a body, from +x where it has no base \[rad\].
+    Angle {
+        /// The body.
+        body: usize,
+        /// The body it is measured from.
+        base: Option<usize>,
+    },
+    /// Where a point is \[m\].
+    Place(Quadratic),
+}
+
+/// The force a row exerts: -lambda direction on one body, the opposite on another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Push {
+    /// The body that takes -lambda direction.
+    pub on: Option<usize>,
+    /// The body that takes the opposite.
+    pub from: Option<usize>,
+    /// Unit vector.
+    pub direction: Complex<f64>,
+    /// The body in whose frame the direction is; `None`: in that of the ground.
+    pub frame: Option<usize>,
+}
+
+/// A row of the mechanism: its measure less a law of time is to be zero.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// Name in reports: that of the joint or motor, with an axis where there are two.
+    pub name: String,
+    /// What it measures.
+    pub measure: Measure,
+    /// What it is to be; `None`: zero.
+    pub law: Option<Law>,
+    /// The force it exerts, where it is one.
+    pub push: Option<Push>,
 }
 
 impl Row {
     /// Name in the scene.
     pub fn name(&self) -> &str {
-        match self {
-            Row::Angle(row) => &row.name,
-            Row::Line(row) => &row.name,
-            Row::Pin(row) => &row.name,
-        }
+        &self.name
     }
 
     /// Unit of C: `rad` or `m`.
     pub fn unit(&self) -> &'static str {
-        match self {
-            Row::Angle(_) => "rad",
-            Row::Line(_) | Row::Pin(_) => "m",
+        if self.is_angle() { "rad" } else { "m" }
+    }
+
+    /// True for rows that give an angle.
+    pub fn is_angle(&self) -> bool {
+        matches!(self.measure, Measure::Angle { .. })
+    }
+
+    /// True for rows that do work: motors, not locks.
+    pub fn is_motor(&self) -> bool {
+        self.law.as_ref().is_some_and(|law| !law.is_constant())
+    }
+
+    /// C, for a row without a law \[m\]: the gap of a wall.
+    pub fn gap<T: Real>(&self, z: &[Complex<T>]) -> T {
+        match &self.measure {
+            Measure::Angle { .. } => T::ZERO,
+            Measure::Place(place) => place.value(z),
         }
     }
 
     /// Adds the row's Jacobian to `jacobian` (n, zero on entry) and returns the rest.
     #[inline]
     pub fn linearise<T: Real>(&self, t: Time, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
-        match self {
-            Row::Angle(row) => row.linearise(t, at, jacobian),
-            Row::Line(row) => row.linearise(at, jacobian),
-            Row::Pin(row) => row.linearise(at, jacobian),
+        match &self.measure {
+            Measure::Angle { body, base } => {
+                let given = base.map_or(at.phi[*body], |base| difference(at.phi[*body], at.phi[base]));
+                turn(*body, *base, jacobian);
+                let [theta, rate, acceleration] = self.law.as_ref().map_or([T::ZERO; 3], |law| law.angles::<T>(t));
+                Linearised { position: difference(given, theta), drive: -rate, convective: -acceleration }
+            }
+            Measure::Place(place) => {
+                let mut here = place.linearise(at, jacobian);
+                if let Some(law) = &self.law {
+                    here.position -= T::split(law.angle(t)).0;
+                    drive(law, t, &mut here);
+                }
+                here
+            }
         }
     }
 
     /// The same without C, which is written as zero: accelerations do not ask for it.
     #[inline]
     pub fn differentiate<T: Real>(&self, t: Time, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
-        match self {
-            Row::Angle(row) => row.differentiate(t, jacobian),
-            Row::Line(row) => row.differentiate(at, jacobian),
-            Row::Pin(row) => row.differentiate(at, jacobian),
+        match &self.measure {
+            Measure::Angle { body, base } => {
+                turn(*body, *base, jacobian);
+                let mut here = Linearised { position: T::ZERO, drive: T::ZERO, convective: T::ZERO };
+                if let Some(law) = &self.law {
+                    drive(law, t, &mut here);
+                }
+                here
+            }
+            Measure::Place(place) => {
+                let mut here = place.differentiate(at, jacobian);
+                if let Some(law) = &self.law {
+                    drive(law, t, &mut here);
+                }
+                here
+            }
         }
     }
 }
 
+/// The Jacobian of an angle.
+#[inline]
+fn turn<T: Real>(body: usize, base: Option<usize>, jacobian: &mut [T]) {
+    jacobian[body] += T::ONE;
+    if let Some(base) = base {
+        jacobian[base] -= T::ONE;
+    }
+}
+
+/// Takes the law's rate and acceleration off.
+#[inline]
+fn drive<T: Real>(law: &Law, t: Time, here: &mut Linearised<T>) {
+    let (rate, acceleration) = law.rates::<T>(t);
+    here.drive -= rate;
+    here.convective -= acceleration;
+}
+
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::arithmetic::{DoubleDouble, Scalar};
-    use crate::dynamics::point::Point;
-    use crate::scene::{Law, Sine};
+    use crate::scene::Sine;
 
-    /// Every kind of row against differences of its own C along a motion.
-    #[test]
-    fn jacobian_drive_and_convective_term_are_derivatives_of_the_position() {
-        let law = Law { start: 0.1, rate: 2.0, acceleration: 0.3, sines: vec![Sine { amplitude: 0.2, frequency: 3.0, phase: 0.5 }] };
-        let rows = [
-            Row::Angle(AngleRow { name: "absolute".into(), body: 0, base: None, law: law.clone() }),
-            Row::Angle(AngleRow { name: "relative".into(), body: 1, base: Some(0), law }),
-            Row::Line(LineRow {
-                name: "wall".into(),
-                point: Point::ground([0.1, 0.0]).along(0, Complex::new(0.6, 0.0)).along(1, Complex::new(0.5, 0.2)),
-                normal: Complex::new(0.6, 0.8),
-                offset: 0.3,
-            }),
-        ];
-        let (a, b) =
-            (Point::ground([0.1, 0.0]).along(0, Complex::new(0.6, 0.0)), Point::ground([0.2, 0.3]).along(1, Complex::new(0.5, 0.2)));
-        let pins = PinRow::pair("pin", &a, &b).map(Row::Pin);
-        let of = DoubleDouble::of;
-        let (start, rate, acceleration) = ([of(0.4), of(-0.9)], [of(1.5), of(-0.7)], [of(0.3), of(2.0)]);
-        for row in rows.into_iter().chain(pins) {
-            let at = |t: DoubleDouble, jacobian: &mut [DoubleDouble]| {
-                let phi: Vec<_> = (0..2).map(|k| start[k] + rate[k] * t + (acceleration[k] * t * t).scale(0.5)).collect();
-                let omega: Vec<_> = (0..2).map(|k| rate[k] + acceleration[k] * t).collect();
-                let z: Vec<_> = phi.iter().map(|&phi| Complex::unit(phi)).collect();
-                jacobian.fill(DoubleDouble::ZERO);
-                row.linearise(t, Posture { phi: &phi, z: &z, omega: &omega }, jacobian)
-            };
-            let (mut g, mut other) = ([DoubleDouble::ZERO; 2], [DoubleDouble::ZERO; 2]);
-            let (t, h) = (of(0.2), of(1e-8));
-            let (before, now, after) = (at(t - h, &mut other), at(t, &mut g), at(t + h, &mut other));
-            let omega: Vec<_> = (0..2).map(|k| rate[k] + acceleration[k] * t).collect();
-            let first = ((after.position - before.position) / h).scale(0.5);
-            let second = (after.position + before.position - now.position - now.position) / (h * h);
-            let (mut c_rate, mut c_rate_rate) = (now.drive, now.convective);
-            for k in 0..2 {
-                c_rate += g[k] * omega[k];
-                c_rate_rate += g[k] * acceleration[k];
-            }
-            assert!((first - c_rate).hi.abs() < 1e-12, "{} rate {first:?} {c_rate:?}", row.name());
-            assert!((second - c_rate_rate).hi.abs() < 1e-12, "{} second {second:?} {c_rate_rate:?}", row.name());
+    /// A law with everything in it.
+    pub fn law() -> Law {
+        Law { start: 0.1, rate: 2.0, acceleration: 0.3, sines: vec![Sine { amplitude: 0.2, frequency: 3.0, phase: 0.5 }] }
+    }
+
+    /// A point of body 0, one of body 1 which hangs on it, and a foot that moves freely, carried with body 1.
+    pub fn crank() -> Site {
+        Site { body: Some(0), point: Point::ground([0.1, 0.0]).along(0, Complex::new(0.6, 0.0)) }
+    }
+
+    /// See [`crank`].
+    pub fn rod() -> Site {
+        Site { body: Some(1), point: crank().point.along(1, Complex::new(0.5, 0.2)) }
+    }
+
+    /// See [`crank`].
+    pub fn free() -> Site {
+        Site { body: Some(1), point: Point::floating(2).along(1, Complex::new(-0.3, 0.7)) }
+    }
+
+    const START: [f64; 4] = [0.4, -0.9, 0.7, -0.2];
+    const RATE: [f64; 4] = [1.5, -0.7, 0.4, 0.9];
+    const ACCELERATION: [f64; 4] = [0.3, 2.0, -0.6, 1.1];
+
+    /// Coordinates, elements and rates of two bodies and a foot in uniformly accelerated motion.
+    pub fn posture(t: f64) -> (Vec<DoubleDouble>, Vec<Complex<DoubleDouble>>, Vec<DoubleDouble>) {
+        let (of, t) = (DoubleDouble::of, DoubleDouble::of(t));
+        let phi: Vec<_> = (0..4).map(|k| of(START[k]) + t.scale(RATE[k]) + (t * t).scale(0.5 * ACCELERATION[k])).collect();
+        let omega = (0..4).map(|k| of(RATE[k]) + t.scale(ACCELERATION[k])).collect();
+        let z = vec![Complex::unit(phi[0]), Complex::unit(phi[1]), Complex::new(phi[2], phi[3]), Complex::ZERO];
+        (phi, z, omega)
+    }
+
+    /// Jacobian, drive and convective term against differences of the row's own C along a motion.
+    pub fn assert_derivatives(row: &Row) {
+        let at = |t: f64| {
+            let (phi, z, omega) = posture(t);
+            let mut jacobian = [DoubleDouble::ZERO; 4];
+            let here = row.linearise(DoubleDouble::of(t), Posture { phi: &phi, z: &z, omega: &omega }, &mut jacobian);
+            let mut again = [DoubleDouble::ZERO; 4];
+            let rest = row.differentiate(DoubleDouble::of(t), Posture { phi: &phi, z: &z, omega: &omega }, &mut again);
+            assert_eq!((jacobian, here.drive, here.convective), (again, rest.drive, rest.convective));
+            (here, jacobian, omega)
+        };
+        // A power of two, so that the times are exact.
+        let h = libm::exp2(-27.0);
+        let (before, (now, g, omega), after) = (at(0.25 - h).0, at(0.25), at(0.25 + h).0);
+        let first = (after.position - before.position).scale(0.5 / h);
+        let second = (after.position + before.position - now.position - now.position).scale(1.0 / (h * h));
+        let (mut c_rate, mut c_rate_rate) = (now.drive, now.convective);
+        for k in 0..4 {
+            c_rate += g[k] * omega[k];
+            c_rate_rate += g[k].scale(ACCELERATION[k]);
         }
+        assert!((first - c_rate).hi.abs() < 1e-12, "{} rate {first:?} {c_rate:?}", row.name);
+        assert!((second - c_rate_rate).hi.abs() < 1e-12, "{} second {second:?} {c_rate_rate:?}", row.name);
     }
 }

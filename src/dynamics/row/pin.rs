@@ -6,45 +6,30 @@
 //!
 //! The force on the first point is -lambda n, on the second lambda n.
 
-use super::{Linearised, Posture};
-use crate::arithmetic::{Complex, Real};
-use crate::dynamics::point::Point;
+use super::{Measure, Push, Row, Site};
+use crate::arithmetic::Complex;
+use crate::dynamics::quadratic::Quadratic;
 
-/// One of the two rows of a pin.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PinRow {
-    /// Name of the pin and its axis.
-    pub name: String,
-    /// D.
-    pub span: Point,
-    /// Unit vector n of the axis.
-    pub axis: Complex<f64>,
+/// Both rows that keep `a` on `b`, in a mechanism of so many angles.
+pub fn pin_rows(name: &str, a: &Site, b: &Site, angles: usize) -> [Row; 2] {
+    let span = a.point.minus(&b.point);
+    [("x", Complex::new(1.0, 0.0)), ("y", Complex::new(0.0, 1.0))].map(|(letter, axis)| Row {
+        name: format!("{name}.{letter}"),
+        measure: Measure::Place(Quadratic::along(&span, axis, angles)),
+        law: None,
+        push: Some(Push { on: a.body, from: b.body, direction: axis, frame: None }),
+    })
 }
 
-impl PinRow {
-    /// Both rows that keep `a` on `b`.
-    pub fn pair(name: &str, a: &Point, b: &Point) -> [Self; 2] {
-        [("x", Complex::new(1.0, 0.0)), ("y", Complex::new(0.0, 1.0))].map(|(letter, axis)| Self {
-            name: format!("{name}.{letter}"),
-            span: a.minus(b),
-            axis,
-        })
-    }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::row::tests::{assert_derivatives, crank, free, rod};
 
-    /// See [`Row::linearise`](super::Row::linearise).
-    #[inline]
-    pub fn linearise<T: Real>(&self, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
-        let position = Complex::<T>::of(self.axis).dot(self.span.position(at.z));
-        Linearised { position, ..self.differentiate(at, jacobian) }
-    }
-
-    /// See [`Row::differentiate`](super::Row::differentiate).
-    #[inline]
-    pub fn differentiate<T: Real>(&self, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
-        let axis = Complex::<T>::of(self.axis);
-        for &(k, gamma) in &self.span.terms {
-            jacobian[k] += axis.dot(at.z[k].turn(gamma).left());
+    #[test]
+    fn its_derivatives_are_those_of_its_position() {
+        for (a, b) in [(crank(), rod()), (rod(), free()), (free(), Site::ground([0.1, 0.2]))] {
+            pin_rows("pin", &a, &b, 2).iter().for_each(assert_derivatives);
         }
-        Linearised { position: T::ZERO, drive: T::ZERO, convective: axis.dot(self.span.convective(at.z, at.omega)) }
     }
 }

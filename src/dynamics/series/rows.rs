@@ -1,8 +1,9 @@
 //! Constraint rows in the series: the multipliers are solved for with every order.
 //!
 //! ```text
-//! linear in unit vectors:  C = c + Σ g_k·z_k,      J_k = g_k·(i z_k,0),   J a_m = -Σ g_k·u_k,m        force lambda g_k on z_k
-//! a given angle:           C = q_a - q_b - theta,  J = (1, -1),           J a_m = theta''_m           torque lambda
+//! linear in elements:   C = c + Σ g_k·e_k - s,      J_k = g_k·(i z_k,0),   J a_m = s''_m - Σ g_k·u_k,m     force lambda g_k on e_k
+//! bilinear in them:     C = Re(conj(e_j) h e_k),    products of the powers of e_j and e_k,            force lambda conj(h) e_j on e_k
+//! a given angle:        C = q_a - q_b - theta,      J = (1, -1),           J a_m = theta''_m          torque lambda
 //! M_0 a_m + Jᵀ lambda_m = load_m:   S = J M_0⁻¹ Jᵀ,   S lambda_m = J M_0⁻¹ load_m - (J a)_m
 //! ```
 //!
@@ -13,8 +14,9 @@ use super::polynomial::{copy, zeros};
 use crate::arithmetic::{Complex, Real};
 use crate::dynamics::kernel::dot;
 use crate::dynamics::law::Law;
-use crate::dynamics::point::Point;
-use crate::dynamics::row::Row;
+use crate::dynamics::quadratic::Quadratic;
+use crate::dynamics::row::{Measure, Row};
+use crate::dynamics::schur::{self, Weakest};
 use crate::dynamics::ties::Ties;
 use crate::dynamics::{Mechanism, Time, tree};
 
@@ -28,6 +30,10 @@ pub struct RowSeries<T> {
     lifted: Vec<T>,
     schur: Vec<T>,
     pivot: Vec<T>,
+    /// What pivots are measured against (r).
+    scale: Vec<f64>,
+    /// The row nearest to being left out at the start.
+    weakest: Weakest,
     /// lambda: powers 0…P-1 (P × r).
     multiplier: Vec<T>,
 }
@@ -35,8 +41,8 @@ pub struct RowSeries<T> {
 /// A row as the series sees it.
 #[derive(Clone, Debug)]
 enum Kind<T> {
-    /// The g_k.
-    Linear(Vec<(usize, Complex<f64>)>),
+    /// The function, and the powers of s'.
+    Place { place: Quadratic, law: Option<Law>, drive: Vec<T> },
     /// The bodies a and b, and the powers of theta' and of its own rate w_a - w_b.
     Angle { body: usize, base: Option<usize>, law: Law, drive: Vec<T>, speed: Vec<T> },
 }
@@ -44,17 +50,18 @@ enum Kind<T> {
 impl<T: Real> RowSeries<T> {
     /// Room for the rows that `ties` do not fulfil already: all but the motors' where these are eliminated.
     pub fn new(mechanism: &Mechanism, ties: &Ties, order: usize) -> Self {
-        let linear = |point: &Point, direction: Complex<f64>| {
-            Kind::Linear(point.terms.iter().map(|&(k, gamma)| (k, gamma.conj() * direction)).collect())
-        };
-        let kind = |row: &Row| match row {
-            Row::Angle(_) if ties.driven() => None,
-            Row::Angle(row) => {
-                Some(Kind::Angle { body: row.body, base: row.base, law: row.law.clone(), drive: zeros(order + 1), speed: zeros(order + 1) })
+        let kind = |row: &Row| match (&row.measure, &row.law) {
+            (Measure::Angle { .. }, _) if ties.driven() => None,
+            (&Measure::Angle { body, base }, law) => {
+                let law = law.clone().unwrap_or_else(|| Law::constant(0.0));
+                Some(Kind::Angle { body, base, law, drive: zeros(order + 1), speed: zeros(order + 1) })
             }
-            Row::Line(row) => Some(linear(&row.point, row.normal)),
-            Row::Pin(row) => Some(linear(&row.span, row.axis)),
+            (Measure::Place(place), law) => {
+                Some(Kind::Place { place: place.clone(), law: law.clone(), drive: zeros(if law.is_some() { order + 1 } else { 0 }) })
+            }
         };
+        let in_force = mechanism.rows.iter().filter(|row| !(row.is_angle() && ties.driven()));
+        let scale = in_force.map(|row| row.scale(&mechanism.tree)).collect();
         let kinds: Vec<Kind<T>> = mechanism.rows.iter().filter_map(kind).collect();
         let (r, f) = (kinds.len(), ties.count());
         Self {
@@ -64,6 +71,8 @@ impl<T: Real> RowSeries<T> {
             lifted: zeros(r * f),
             schur: zeros(r * r),
             pivot: zeros(r),
+            scale,
+            weakest: Weakest::NONE,
             multiplier: zeros(order * r),
         }
     }
@@ -72,6 +81,11 @@ impl<T: Real> RowSeries<T> {
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
         self.kinds.is_empty()
+    }
+
+    /// The row in force nearest to being left out at the start of the series.
+    pub fn weakest(&self) -> Weakest {
+        self.weakest
     }
 
     /// Power `m` of the multipliers of the rows in force \[N, N·m over s^m\].
@@ -83,7 +97,7 @@ impl<T: Real> RowSeries<T> {
     /// The laws' series at time `t`.
     pub fn begin(&mut self, t: Time) {
         for kind in &mut self.kinds {
-            if let Kind::Angle { law, drive, .. } = kind {
+            if let Kind::Angle { law, drive, .. } | Kind::Place { law: Some(law), drive, .. } = kind {
                 drive.fill(T::ZERO);
                 drive::add(law, 1.0, t, drive, 0, 1);
             }
@@ -101,7 +115,14 @@ impl<T: Real> RowSeries<T> {
                 }
             };
             match kind {
-                Kind::Linear(terms) => terms.iter().for_each(|&(k, g)| add(k, Complex::of(g).dot(z[k].left()))),
+                Kind::Place { place, .. } => place.gradients(z, |k, gradient| {
+                    if k < place.angles {
+                        add(k, gradient.dot(z[k].left()));
+                    } else {
+                        add(k, gradient.re);
+                        add(k + 1, gradient.im);
+                    }
+                }),
                 Kind::Angle { body, base, .. } => {
                     add(*body, T::ONE);
                     base.iter().for_each(|&base| add(base, -T::ONE));
@@ -117,17 +138,20 @@ impl<T: Real> RowSeries<T> {
                 self.schur[i * r + j] = dot(&self.jacobian[i * f..(i + 1) * f], &self.lifted[j * f..(j + 1) * f]);
             }
         }
-        tree::factor::<T, 0>(r, &mut self.schur, &mut self.pivot);
+        self.weakest = schur::factor::<T, 0>(r, &mut self.schur, &mut self.pivot, &self.scale);
     }
 
     /// Multipliers of power m from the free accelerations of the coordinates, which become the constrained ones.
-    pub fn solve(&mut self, m: usize, bend: &[Complex<T>], solution: &mut [T]) {
+    pub fn solve(&mut self, m: usize, z: &[Complex<T>], bend: &[Complex<T>], solution: &mut [T]) {
         let (r, f) = (self.kinds.len(), self.coordinates);
         let multiplier = &mut self.multiplier[m * r..(m + 1) * r];
         for (i, kind) in self.kinds.iter().enumerate() {
             let free = dot(&self.jacobian[i * f..(i + 1) * f], solution);
             multiplier[i] = match kind {
-                Kind::Linear(terms) => terms.iter().fold(free, |sum, &(k, g)| sum + Complex::of(g).dot(bend[k])),
+                Kind::Place { place, drive, .. } => {
+                    let known = free + bent(place, m, z, bend);
+                    drive.get(m + 1).map_or(known, |&drive| known - drive.scale((m + 1) as f64))
+                }
                 Kind::Angle { drive, .. } => free - drive[m + 1].scale((m + 1) as f64),
             };
         }
@@ -140,12 +164,25 @@ impl<T: Real> RowSeries<T> {
     }
 
     /// Adds what the multipliers of power m put on the unit vectors to `rest`.
-    pub fn push(&self, m: usize, rest: &mut [Complex<T>]) {
+    pub fn push(&self, m: usize, z: &[Complex<T>], rest: &mut [Complex<T>]) {
         let r = self.kinds.len();
         for (kind, &multiplier) in self.kinds.iter().zip(&self.multiplier[m * r..]) {
-            if let Kind::Linear(terms) = kind {
-                for &(k, g) in terms {
-                    rest[k] += Complex::of(g).times(multiplier);
+            if let Kind::Place { place, .. } = kind {
+                place.gradients(z, |k, gradient| rest[k] += gradient.times(multiplier));
+            }
+        }
+    }
+
+    /// Adds what the multipliers below power m put on the elements as these turn to `rest`: only gradients that are not constant.
+    pub fn swing(&self, m: usize, z: &[Complex<T>], n: usize, rest: &mut [Complex<T>]) {
+        let r = self.kinds.len();
+        for (i, kind) in self.kinds.iter().enumerate() {
+            let Kind::Place { place, .. } = kind else { continue };
+            for &(j, k, h) in &place.bilinear {
+                for l in 0..m {
+                    let (multiplier, z) = (self.multiplier[l * r + i], &z[(m - l) * n..(m - l + 1) * n]);
+                    rest[k] += z[j].turn(h.conj()).times(multiplier);
+                    rest[j] += z[k].turn(h).times(multiplier);
                 }
             }
         }
@@ -159,6 +196,8 @@ impl<T: Real> RowSeries<T> {
                 speed[m] = base.map_or(omega[*body], |base| omega[*body] - omega[base]);
                 let sum = (0..=m).fold(T::ZERO, |sum, l| sum + self.multiplier[l * r + i] * speed[m - l]);
                 power -= sum;
+            } else if let Kind::Place { drive, law: Some(_), .. } = kind {
+                power -= (0..=m).fold(T::ZERO, |sum, l| sum + self.multiplier[l * r + i] * drive[m - l]);
             }
         }
         power
@@ -173,4 +212,18 @@ impl<T: Real> RowSeries<T> {
             }
         }
     }
+}
+
+/// Power m of a row's second derivative without the accelerations of power m: `bend` is what e'' has without them.
+fn bent<T: Real>(place: &Quadratic, m: usize, z: &[Complex<T>], bend: &[Complex<T>]) -> T {
+    let n = bend.len();
+    let mut sum = T::ZERO;
+    place.gradients(&z[..n], |k, gradient| sum += gradient.dot(bend[k]));
+    let mut products = T::ZERO;
+    for &(j, k, h) in &place.bilinear {
+        for l in 1..=m + 1 {
+            products += z[l * n + j].dot(z[(m + 2 - l) * n + k].turn(h));
+        }
+    }
+    sum + products.scale(((m + 1) * (m + 2)) as f64)
 }

@@ -52,11 +52,8 @@ impl<T: Real> SpringSeries<T> {
     /// Force on the spring's first end at power m, from powers up to m+1 of z.
     #[inline(always)]
     pub fn force(&mut self, spring: &Spring, m: usize, z: &[Complex<T>], n: usize) -> Complex<T> {
-        let at = |m: usize, start: Complex<T>| {
-            let z = &z[m * n..(m + 1) * n];
-            spring.span.terms.iter().fold(start, |sum, &(k, gamma)| sum + z[k].turn(gamma))
-        };
-        self.span[m] = at(m, if m == 0 { Complex::of(spring.span.root) } else { Complex::ZERO });
+        let at = |m: usize| spring.span.turned(&z[m * n..(m + 1) * n]);
+        self.span[m] = if m == 0 { spring.span.position(z) } else { at(m) };
         let span = &self.span[..=m];
         let mut force = -span[m].times(T::of(spring.stiffness));
         if spring.free_length == 0.0 && spring.damping == 0.0 {
@@ -84,7 +81,7 @@ impl<T: Real> SpringSeries<T> {
                 -known.iter().rev().zip(&square[1..]).fold(T::ZERO, |sum, (&i, &q)| sum + q * i) / square[0]
             };
             // D' at power m is (m+1) D_{m+1}.
-            let ahead = at(m + 1, Complex::ZERO);
+            let ahead = at(m + 1);
             let mut closing = span[0].dot(ahead).scale((m + 1) as f64);
             for l in 1..=m {
                 closing += span[l].dot(span[m - l + 1]).scale((m - l + 1) as f64);

@@ -194,7 +194,7 @@ impl Sweep {
         let Some(first) = ready.first() else { return Vec::new() };
         let (plan, bodies) = (first.plan.clone(), first.mechanism.bodies.len());
         let crowd = Crowd::new(plan.tolerance.unwrap_or_default());
-        let mut kernel = Kernel::<DoubleDouble>::new(bodies, 0);
+        let mut kernel = Kernel::<DoubleDouble>::without_rows(&first.mechanism);
         let mut lanes: Vec<Lane> = Vec::with_capacity(ready.len());
         let mut entrants: Vec<Entrant> = Vec::with_capacity(ready.len());
         for ready in &ready {

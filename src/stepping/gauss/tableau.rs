@@ -258,7 +258,7 @@ mod tests {
     fn the_order_shows_below_the_rounding_of_doubles() {
         let weight = vec![Complex::new(1.5, 0.0), Complex::new(0.5, 0.0)];
         let coupling = vec![Complex::ZERO, Complex::new(0.5, 0.0), Complex::ZERO, Complex::ZERO];
-        let tree = Tree { bodies: 2, coupling, diagonal: vec![4.0 / 3.0, 1.0 / 3.0], weight, off_axis: false };
+        let tree = Tree { coordinates: 2, angles: 2, coupling, diagonal: vec![4.0 / 3.0, 1.0 / 3.0], weight, off_axis: false };
         let exact = swing(&tree, 8, 100);
         for stages in 2..=8 {
             let error = |steps: usize| {

@@ -85,8 +85,8 @@ impl<const B: usize> Bodies<B> {
     /// The constants, where this form fits: up to 4 B bodies on their axes, neither springs nor rows.
     pub fn new(mechanism: &Mechanism) -> Option<Self> {
         let tree = &mechanism.tree;
-        let n = tree.bodies;
-        if n == 0 || n > room(B) || tree.off_axis || !mechanism.springs.is_empty() || !mechanism.rows.is_empty() {
+        let n = tree.coordinates;
+        if n == 0 || n > room(B) || tree.off_axis || !mechanism.is_plain() || !mechanism.rows.is_empty() {
             return None;
         }
         let zero = [[0.0; 4]; B];

@@ -109,9 +109,9 @@ impl Crowd {
     /// True for what it can march: one to four bodies with hinges and centres of mass on their axes, neither springs nor motors nor walls.
     pub fn takes(mechanism: &Mechanism) -> bool {
         let tree = &mechanism.tree;
-        (1..=BODIES).contains(&tree.bodies)
+        (1..=BODIES).contains(&tree.coordinates)
             && !tree.off_axis
-            && mechanism.springs.is_empty()
+            && mechanism.is_plain()
             && mechanism.rows.is_empty()
             && mechanism.contacts.is_empty()
     }
@@ -134,7 +134,7 @@ impl Crowd {
     ///
     /// All mechanisms must be such as [`Crowd::takes`], of the same number of bodies; any other is stopped as unsuited.  The result of each does not depend on the others.
     pub fn march(&self, entrants: &mut [Entrant], until: Time, watch: &mut dyn FnMut(usize, &Passage) -> Going) {
-        let Some(bodies) = entrants.first().map(|first| first.mechanism.tree.bodies) else { return };
+        let Some(bodies) = entrants.first().map(|first| first.mechanism.tree.coordinates) else { return };
         let march = match bodies {
             1 => dispatch::<1>(self.is_portable),
             2 => dispatch::<2>(self.is_portable),
@@ -357,7 +357,7 @@ fn next<const N: usize>(entrants: &mut [Entrant], waiting: &mut usize, until: Ti
         let index = *waiting;
         *waiting += 1;
         let entrant = &mut entrants[index];
-        if !Crowd::takes(entrant.mechanism) || entrant.mechanism.tree.bodies != N {
+        if !Crowd::takes(entrant.mechanism) || entrant.mechanism.tree.coordinates != N {
             let what = "the crowd takes free mechanisms of one size".into();
             entrant.stopped = Some(stop(Cause::Unsuited, &entrant.state, 0.0, what, "march it by `taylor`"));
         } else if entrant.state.time < until {

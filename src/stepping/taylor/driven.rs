@@ -22,7 +22,7 @@ use super::pace::{self, Pace};
 use super::terms::{left_over, reciprocal};
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
-use crate::dynamics::row::Row;
+use crate::dynamics::row::{Measure, Row};
 use crate::dynamics::{Mechanism, State, Time};
 use crate::scene::Law;
 
@@ -91,13 +91,13 @@ impl Driven {
     /// The constants, where this form fits: two bodies on their axes, one driven from the ground by a law without acceleration and sines, no springs.
     pub fn new(mechanism: &Mechanism) -> Option<Self> {
         let tree = &mechanism.tree;
-        let [Row::Angle(row)] = &mechanism.rows[..] else { return None };
-        let is_steady = row.law.acceleration == 0.0 && row.law.sines.is_empty();
-        if tree.bodies != 2 || tree.off_axis || !mechanism.springs.is_empty() || row.base.is_some() || !is_steady {
+        let [Row { measure: Measure::Angle { body, base }, law: Some(law), .. }] = &mechanism.rows[..] else { return None };
+        let is_steady = law.acceleration == 0.0 && law.sines.is_empty();
+        if tree.coordinates != 2 || tree.off_axis || !mechanism.is_plain() || base.is_some() || !is_steady {
             return None;
         }
-        let (driven, free) = (row.body, 1 - row.body);
-        let (a, d, w) = (tree.coupling[1].re, tree.diagonal[free], row.law.rate);
+        let (driven, free) = (*body, 1 - *body);
+        let (a, d, w) = (tree.coupling[1].re, tree.diagonal[free], law.rate);
         let pull = tree.weight[free];
         let lanes = [DoubleDouble::of(pull.im), DoubleDouble::of(-pull.re), DoubleDouble::ZERO, DoubleDouble::product(w, w).scale(-a)];
         let mut load = [[[0.0; 4]; 2]; MOST + 1];
@@ -107,7 +107,7 @@ impl Driven {
         }
         let stiffness = pull.norm_squared().sqrt() + a.abs() * w * w;
         let rate = (stiffness / d).sqrt().max(w.abs());
-        Some(Self { law: row.law.clone(), coupling: a, weight: tree.weight[driven], load, rate })
+        Some(Self { law: law.clone(), coupling: a, weight: tree.weight[driven], load, rate })
     }
 
     /// The longest step in which the terms left out still fall \[s\].

@@ -84,7 +84,7 @@ impl<T: Coefficient> Expansion<T> {
             least = least.min(minus_log2(size) / (order - i) as f64);
         }
         if with_vectors {
-            let n = self.mechanism.bodies.len();
+            let n = self.mechanism.coordinates();
             for k in order + 2 - JUDGES..=order + 1 {
                 let vectors = &self.series.z[k * n..(k + 1) * n];
                 let size = vectors.iter().fold(0.0, |most, z| larger(larger(most, z.re.value()), z.im.value()));

@@ -169,7 +169,7 @@ impl Fast {
         (made.tolerance, made.order, made.is_portable, made.is_extended) == (tolerance, order, is_portable, is_extended)
             && made.tree == mechanism.tree
             && made.rows == mechanism.rows
-            && mechanism.springs.is_empty()
+            && mechanism.is_plain()
     }
 
     /// One step of at most `left` \[s\] from the state's unknowns, which are then the new ones; returns the step wanted and the step taken.

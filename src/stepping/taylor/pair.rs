@@ -103,10 +103,10 @@ impl Pair {
     /// One body has a second one beside it that feels nothing and stays where it is.
     pub fn new(mechanism: &Mechanism) -> Option<Self> {
         let tree = &mechanism.tree;
-        if !(1..=2).contains(&tree.bodies) || tree.off_axis || !mechanism.springs.is_empty() || !mechanism.rows.is_empty() {
+        if !(1..=2).contains(&tree.coordinates) || tree.off_axis || !mechanism.is_plain() || !mechanism.rows.is_empty() {
             return None;
         }
-        let is_single = tree.bodies == 1;
+        let is_single = tree.coordinates == 1;
         let second = if is_single { (1.0, 0.0, Complex::ZERO) } else { (tree.diagonal[1], tree.coupling[1].re, tree.weight[1]) };
         let (d, w) = ([tree.diagonal[0], second.0], [tree.weight[0], second.2]);
         let a = second.1;

@@ -1,0 +1,114 @@
+//! Applied forces and torques: constant, or times a law.
+//!
+//! ```text
+//! force f at P, fixed in the ground:   F = f s(t)          torque m on a, the opposite on b:   m s(t)
+//! force f at P, turning with body a:   F = f z_a s(t)
+//! ```
+//!
+//! They are accounted for as work, constant ones as well.
+
+use crate::arithmetic::{Complex, Real, Scalar};
+use crate::dynamics::Time;
+use crate::dynamics::law::Law;
+use crate::dynamics::point::Point;
+
+/// An applied force or torque of the compiled mechanism.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Action {
+    /// Name in the scene.
+    pub name: String,
+    /// The body it acts on.
+    pub body: usize,
+    /// Force or torque.
+    pub kind: Kind,
+    /// What it is multiplied by; `None`: one.
+    pub law: Option<Law>,
+}
+
+/// What acts.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Kind {
+    /// A force \[N\] at a point, in the frame of the body where it `follows`.
+    Force {
+        /// Where it acts.
+        point: Point,
+        /// The force \[N\].
+        force: Complex<f64>,
+        /// True where it turns with the body.
+        follows: bool,
+    },
+    /// A torque \[N·m\], the opposite of which acts on the base.
+    Torque {
+        /// The torque \[N·m\].
+        torque: f64,
+        /// The body that takes the opposite; `None` for the ground.
+        base: Option<usize>,
+    },
+}
+
+impl Action {
+    /// What it is multiplied by at a time.
+    #[inline(always)]
+    pub fn factor<T: Real>(&self, t: Time) -> T {
+        self.law.as_ref().map_or(T::ONE, |law| T::split(law.angle(t)).0)
+    }
+
+    /// The force \[N\]; zero for a torque.
+    #[inline(always)]
+    pub fn force<T: Scalar>(&self, factor: T, z: &[Complex<T>]) -> Complex<T> {
+        match &self.kind {
+            Kind::Force { force, follows: true, .. } => z[self.body].turn(*force).times(factor),
+            Kind::Force { force, .. } => Complex::of(*force).times(factor),
+            Kind::Torque { .. } => Complex::ZERO,
+        }
+    }
+
+    /// Adds its generalized forces \[N·m, N\].
+    #[inline(always)]
+    pub fn pull<T: Scalar>(&self, factor: T, z: &[Complex<T>], load: &mut [T]) {
+        match &self.kind {
+            Kind::Force { point, .. } => point.pull(self.force(factor, z), z, load),
+            Kind::Torque { torque, base } => {
+                load[self.body] += factor.scale(*torque);
+                if let Some(base) = base {
+                    load[*base] -= factor.scale(*torque);
+                }
+            }
+        }
+    }
+
+    /// Its power \[W\].
+    #[inline(always)]
+    pub fn power<T: Scalar>(&self, factor: T, z: &[Complex<T>], omega: &[T]) -> T {
+        match &self.kind {
+            Kind::Force { point, .. } => self.force(factor, z).dot(point.velocity(z, omega)),
+            Kind::Torque { torque, base } => {
+                let rate = base.map_or(omega[self.body], |base| omega[self.body] - omega[base]);
+                (rate * factor).scale(*torque)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_power_is_that_of_the_generalized_forces() {
+        let point = Point::ground([0.1, 0.2]).along(0, Complex::new(0.6, 0.0)).along(1, Complex::new(0.2, -0.4));
+        let (z, omega) = ([Complex::unit(0.4), Complex::unit(-1.0)], [1.5, -0.7]);
+        let force = Complex::new(2.0, -3.0);
+        for kind in [
+            Kind::Force { point: point.clone(), force, follows: false },
+            Kind::Force { point, force, follows: true },
+            Kind::Torque { torque: 0.7, base: Some(0) },
+        ] {
+            let action = Action { name: "a".into(), body: 1, kind, law: None };
+            let mut load = [0.0; 2];
+            action.pull(1.3, &z, &mut load);
+            let power = load[0] * omega[0] + load[1] * omega[1];
+            assert!((power - action.power(1.3, &z, &omega)).abs() < 1e-14 && power != 0.0);
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! A quadratic function of the mechanism's elements, with everything a constraint row asks of it.
+//!
+//! ```text
+//! Q = c + Σ g_k·e_k + Σ Re(conj(e_j) h_jk e_k)                              e: unit vectors z_k, and feet zeta that move freely
+//! gradient on e_k:  g_k + Σ_j conj(h_jk) e_j + Σ_j h_kj e_j                 dQ = Σ gradient_k·de_k
+//! Q' = Σ gradient_k·e_k',   Q'' = Σ gradient_k·e_k'' + 2 Σ Re(conj(e_j') h_jk e_k')
+//! e' = i z w, e'' = i z a - z w² of a unit vector;  e' = zeta', e'' = zeta'' of a foot
+//! ```
+//!
+//! Points on lines of the ground are linear, points on lines of other bodies bilinear; nothing planar needs more.
+
+use super::point::Point;
+use super::row::{Linearised, Posture};
+use crate::arithmetic::{Complex, Real, Scalar};
+
+/// A quadratic function of unit vectors and feet \[m\].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Quadratic {
+    /// Number of angles: elements from this one on are feet.
+    pub angles: usize,
+    /// c \[m\].
+    pub constant: f64,
+    /// Element and g_k \[m; 1 for a foot\].
+    pub linear: Vec<(usize, Complex<f64>)>,
+    /// Elements j and k, and h_jk.
+    pub bilinear: Vec<(usize, usize, Complex<f64>)>,
+}
+
+impl Quadratic {
+    /// Re(conj(n) P): how far a point is along a direction of the ground.
+    pub fn along(point: &Point, direction: Complex<f64>, angles: usize) -> Self {
+        let turning = point.terms.iter().map(|&(k, gamma)| (k, gamma.conj() * direction));
+        let carried = point.shifts.iter().map(|&(x, share)| (x, direction.times(share)));
+        Self { angles, constant: direction.dot(point.root), linear: turning.chain(carried).collect(), bilinear: Vec::new() }
+    }
+
+    /// Re(conj(d z_b) D): how far a vector reaches along a direction d of body b.
+    pub fn along_body(span: &Point, body: usize, direction: Complex<f64>, angles: usize) -> Self {
+        let turned = direction.conj();
+        let mut found = Self { angles, linear: vec![(body, turned * span.root)], ..Self::default() };
+        for &(k, gamma) in &span.terms {
+            // |z_b| = 1.
+            match k == body {
+                true => found.constant += (turned * gamma).re,
+                false => found.bilinear.push((body, k, turned * gamma)),
+            }
+        }
+        found.bilinear.extend(span.shifts.iter().map(|&(x, share)| (body, x, turned.times(share))));
+        found.linear.retain(|term| term.1 != Complex::ZERO);
+        found
+    }
+
+    /// Q at the elements `z`.
+    #[inline]
+    pub fn value<T: Scalar>(&self, z: &[Complex<T>]) -> T {
+        let linear = self.linear.iter().fold(T::of(self.constant), |sum, &(k, g)| sum + Complex::of(g).dot(z[k]));
+        self.bilinear.iter().fold(linear, |sum, &(j, k, h)| sum + z[j].dot(z[k].turn(h)))
+    }
+
+    /// Gradients, element by element; an element may come up more than once.
+    #[inline]
+    pub fn gradients<T: Scalar>(&self, z: &[Complex<T>], mut each: impl FnMut(usize, Complex<T>)) {
+        for &(k, g) in &self.linear {
+            each(k, Complex::of(g));
+        }
+        for &(j, k, h) in &self.bilinear {
+            each(k, z[j].turn(h.conj()));
+            each(j, z[k].turn(h));
+        }
+    }
+
+    /// Adds dQ/dq to `jacobian`.
+    #[inline]
+    pub fn jacobian<T: Scalar>(&self, z: &[Complex<T>], jacobian: &mut [T]) {
+        self.gradients(z, |k, gradient| {
+            if k < self.angles {
+                jacobian[k] += gradient.dot(z[k].left());
+            } else {
+                jacobian[k] += gradient.re;
+                jacobian[k + 1] += gradient.im;
+            }
+        });
+    }
+
+    /// Q'' at zero acceleration.
+    #[inline]
+    pub fn convective<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> T {
+        let mut sum = T::ZERO;
+        self.gradients(z, |k, gradient| {
+            if k < self.angles {
+                sum -= gradient.dot(z[k]) * (omega[k] * omega[k]);
+            }
+        });
+        let rate = |k: usize| if k < self.angles { z[k].left().times(omega[k]) } else { Complex::new(omega[k], omega[k + 1]) };
+        self.bilinear.iter().fold(sum, |sum, &(j, k, h)| sum + rate(j).dot(rate(k).turn(h)).scale(2.0))
+    }
+
+    /// What a row with C = Q - s(t) is at this posture, without s; adds its Jacobian to `jacobian`.
+    #[inline]
+    pub fn linearise<T: Real>(&self, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
+        Linearised { position: self.value(at.z), ..self.differentiate(at, jacobian) }
+    }
+
+    /// The same without Q itself.
+    #[inline]
+    pub fn differentiate<T: Real>(&self, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
+        self.jacobian(at.z, jacobian);
+        Linearised { position: T::ZERO, drive: T::ZERO, convective: self.convective(at.z, at.omega) }
+    }
+
+    /// The largest |dQ/de_k| there can be: what violations and pivots are measured against \[m\].
+    pub fn scale(&self) -> f64 {
+        let linear = self.linear.iter().map(|term| term.1.norm_squared());
+        linear.chain(self.bilinear.iter().map(|term| term.2.norm_squared())).fold(0.0, f64::max).sqrt()
+    }
+}

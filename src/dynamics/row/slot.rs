@@ -1,0 +1,52 @@
+//! A point on a line of a moving body b, with unit normal nu = n z_b, n in the body's frame: a slot, or the travel along it where n lies along the line.
+//!
+//! ```text
+//! C = Re(conj(nu) D) - s(t),  D = P - P_b on the line
+//! G_k = Re(conj(nu) i gamma_k z_k),  plus Re(conj(i nu) D) at k = b
+//! C_t = -s',   gamma = Re(conj(nu) Pi_D) + 2 w_b Re(conj(i nu) D') - w_b² Re(conj(nu) D) - s''
+//! ```
+//!
+//! As a function of the elements it is bilinear.  The force on the point is -lambda nu, on the body lambda nu at the same place.
+
+use super::{Measure, Push, Row, Site};
+use crate::arithmetic::Complex;
+use crate::dynamics::law::Law;
+use crate::dynamics::quadratic::Quadratic;
+
+/// Keeps a point at a distance, the law's or none, from the point `foot` of body `rail` along the unit vector `normal` of that body's frame.
+pub fn slot_row(name: &str, site: &Site, rail: usize, foot: &Site, normal: Complex<f64>, law: Option<Law>, angles: usize) -> Row {
+    Row {
+        name: name.into(),
+        measure: Measure::Place(Quadratic::along_body(&site.point.minus(&foot.point), rail, normal, angles)),
+        law,
+        push: Some(Push { on: site.body, from: Some(rail), direction: normal, frame: Some(rail) }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arithmetic::Scalar;
+    use crate::dynamics::row::Posture;
+    use crate::dynamics::row::tests::{assert_derivatives, crank, free, law, posture, rod};
+
+    #[test]
+    fn its_derivatives_are_those_of_its_position() {
+        let normal = Complex::new(-0.6, 0.8);
+        assert_derivatives(&slot_row("slot", &rod(), 0, &crank(), normal, None, 2));
+        assert_derivatives(&slot_row("travel", &free(), 1, &rod(), normal, Some(law()), 2));
+    }
+
+    #[test]
+    fn its_convective_term_is_that_of_the_turning_line() {
+        let (normal, point, foot) = (Complex::new(-0.6, 0.8), rod(), crank());
+        let row = slot_row("slot", &point, 0, &foot, normal, None, 2);
+        let (phi, z, omega) = posture(0.3);
+        let mut jacobian = vec![Default::default(); 4];
+        let here = row.linearise(Default::default(), Posture { phi: &phi, z: &z, omega: &omega }, &mut jacobian);
+        let (nu, span) = (z[0].turn(normal), point.point.minus(&foot.point));
+        let turned = omega[0] * nu.left().dot(span.velocity(&z, &omega));
+        let expected = nu.dot(span.convective(&z, &omega)) + turned.scale(2.0) - omega[0] * omega[0] * nu.dot(span.position(&z));
+        assert!((here.convective - expected).hi.abs() < 1e-15);
+    }
+}

@@ -1,0 +1,117 @@
+//! Factors of S = G M⁻¹ Gᵀ that survive singular positions and redundant rows.
+//!
+//! ```text
+//! S = L D Lᵀ,   share of row r:  D_r / Σ_k |g_rk|²/d_k         about the square of how far the mechanism is from a singular position
+//! ```
+//!
+//! Where a mechanism has all its links in line, rows lose their independence: pivots fall with the square of the distance, and the multipliers of what is
+//! left are rounding divided by it.  A row whose share is below [`DROPPED`] is left out, in accelerations and projections alike, and its
+//! multiplier is zero.  Against the row's constant scale, because whole rows vanish together: a pivot over the present diagonal would not see it.
+//! Rows that depend on others for ever are left out in the same way.
+
+use super::Mechanism;
+use super::row::{Measure, Row};
+use super::tree::{Tree, size};
+use crate::arithmetic::Real;
+
+/// Share below which a row is left out.
+pub const DROPPED: f64 = 1e-8;
+/// Share below which a position counts as near a singular one.
+pub const NEAR: f64 = 1e-2;
+
+/// The row whose pivot is the smallest share of its scale.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weakest {
+    /// The share, about 1 or less; rounding may make it negative.
+    pub share: f64,
+    /// The row.
+    pub row: usize,
+}
+
+impl Weakest {
+    /// Before any row has been looked at.
+    pub const NONE: Self = Self { share: f64::INFINITY, row: 0 };
+}
+
+impl Row {
+    /// Σ |g_k|²/d_k: what S has at most on this row's place without other rows, up to a factor of the number of bodies \[1/kg, 1/(kg·m²)\].
+    pub fn scale(&self, tree: &Tree) -> f64 {
+        match &self.measure {
+            Measure::Angle { body, base } => 1.0 / tree.diagonal[*body] + base.map_or(0.0, |base| 1.0 / tree.diagonal[base]),
+            Measure::Place(place) => {
+                let linear: f64 = place.linear.iter().map(|&(k, g)| g.norm_squared() / tree.diagonal[k]).sum();
+                // Of the two elements of a product one is a unit vector, and a foot is not bounded: its vector counts with the row's body.
+                let both = |&(j, k, h): &(usize, usize, crate::arithmetic::Complex<f64>)| {
+                    h.norm_squared()
+                        * if k < place.angles { 1.0 / tree.diagonal[j] + 1.0 / tree.diagonal[k] } else { 1.0 / tree.diagonal[k] }
+                };
+                linear + place.bilinear.iter().map(both).sum::<f64>()
+            }
+        }
+    }
+}
+
+impl Mechanism {
+    /// The scale of every row, see [`Row::scale`].
+    pub fn row_scales(&self) -> Vec<f64> {
+        self.rows.iter().map(|row| row.scale(&self.tree)).collect()
+    }
+}
+
+/// S = L D Lᵀ in place above the diagonal, from the last row to the first, and the reciprocal pivots: zero for rows left out.
+///
+/// Solved with [`tree::solve`](super::tree::solve), which then gives these rows no multiplier.
+#[inline(always)]
+pub fn factor<T: Real, const R: usize>(rows: usize, schur: &mut [T], pivot: &mut [T], scale: &[f64]) -> Weakest {
+    let r = size::<R>(rows);
+    let (schur, pivot, scale) = (&mut schur[..r * r], &mut pivot[..r], &scale[..r]);
+    let mut weakest = Weakest::NONE;
+    for k in (0..r).rev() {
+        let share = schur[k * r + k].value() / scale[k];
+        if share < weakest.share {
+            weakest = Weakest { share, row: k };
+        }
+        pivot[k] = if share < DROPPED { T::ZERO } else { T::ONE / schur[k * r + k] };
+        for i in 0..k {
+            let l = schur[i * r + k] * pivot[k];
+            for j in 0..=i {
+                let full = schur[j * r + k];
+                schur[j * r + i] -= l * full;
+            }
+        }
+    }
+    weakest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::tree;
+
+    #[test]
+    fn a_row_that_depends_on_others_gets_no_multiplier_and_changes_nothing() {
+        // The third row is the sum of the first two.
+        let full = [2.0, 0.5, 2.5, 0.0, 3.0, 3.5, 0.0, 0.0, 6.0];
+        let (mut schur, mut pivot) = (full, [0.0; 3]);
+        let weakest = factor::<f64, 0>(3, &mut schur, &mut pivot, &[2.0, 3.0, 6.0]);
+        assert!(weakest.share.abs() < 1e-15 && weakest.row == 0);
+        // A right side in the range of S: S times (1, -2, 0).
+        let mut found = [1.0, -5.5, -4.5];
+        tree::solve::<f64, 0>(3, &schur, &pivot, &mut found);
+        assert_eq!(found[0], 0.0);
+        for (i, expected) in [1.0, -5.5, -4.5].into_iter().enumerate() {
+            let sum: f64 = (0..3).map(|j| full[i.min(j) * 3 + i.max(j)] * found[j]).sum();
+            assert!((sum - expected).abs() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn independent_rows_are_factored_as_any_matrix() {
+        let full = [2.0, 0.5, 0.25, 0.0, 3.0, -1.0, 0.0, 0.0, 6.0];
+        let (mut schur, mut pivot) = (full, [0.0; 3]);
+        let (mut other, mut other_pivot) = (full, [0.0; 3]);
+        factor::<f64, 3>(3, &mut schur, &mut pivot, &[1.0; 3]);
+        tree::factor::<f64, 3>(3, &mut other, &mut other_pivot);
+        assert_eq!((schur, pivot), (other, other_pivot));
+    }
+}

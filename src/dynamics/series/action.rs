@@ -1,0 +1,102 @@
+//! The series of applied forces and torques, and of torsion springs.
+//!
+//! ```text
+//! s(t) = Σ s_m t^m:   F_m = f s_m,  or  Σ_j f z_j s_{m-j} where it turns with its body;   power_m = Σ_j F_j · P'_{m-j},  P'_m = (m+1) P_{m+1}
+//! theta_0 = q_a - q_b,  theta_m = w_{m-1}/m:   torque_m = -k theta_m - c w_m
+//! ```
+
+use super::drive;
+use super::polynomial::{copy, copy_vectors, product, zeros};
+use crate::arithmetic::{Complex, Real};
+use crate::dynamics::Time;
+use crate::dynamics::force::action::Kind;
+use crate::dynamics::force::{Action, Torsion};
+
+/// Series of one applied force or torque, powers 0 to P.
+#[derive(Clone, Debug)]
+pub struct ActionSeries<T> {
+    /// s.
+    factor: Vec<T>,
+    /// F and P' of a force.
+    force: Vec<Complex<T>>,
+    velocity: Vec<Complex<T>>,
+    /// Rate of the body a torque acts on, less that of its base.
+    rate: Vec<T>,
+}
+
+impl<T: Real> ActionSeries<T> {
+    /// Room for powers up to `order`.
+    pub fn new(action: &Action, order: usize) -> Self {
+        let is_force = matches!(action.kind, Kind::Force { .. });
+        let vectors = || vec![Complex::ZERO; if is_force { order + 1 } else { 0 }];
+        Self { factor: zeros(order + 1), force: vectors(), velocity: vectors(), rate: zeros(if is_force { 0 } else { order + 1 }) }
+    }
+
+    /// The law's series about time `t`.
+    pub fn begin(&mut self, action: &Action, t: Time) {
+        self.factor.fill(T::ZERO);
+        if let Some(law) = &action.law {
+            drive::add(law, 1.0, t, &mut self.factor, 0, 1);
+            for m in (1..self.factor.len()).rev() {
+                self.factor[m] = self.factor[m - 1] / T::of(m as f64);
+            }
+        }
+        self.factor[0] = action.factor(t);
+    }
+
+    /// Takes power m of the force off the elements' balance, and adds that of a torque to `load`.
+    #[inline(always)]
+    pub fn act(&mut self, action: &Action, m: usize, z: &[Complex<T>], n: usize, rest: &mut [Complex<T>], load: &mut [T]) {
+        match &action.kind {
+            Kind::Force { point, force, follows } => {
+                self.force[m] = if *follows {
+                    let turned = z[action.body..].iter().step_by(n).zip(self.factor[..=m].iter().rev());
+                    turned.fold(Complex::ZERO, |sum, (z, &factor)| sum + z.turn(*force).times(factor))
+                } else {
+                    Complex::of(*force).times(self.factor[m])
+                };
+                self.velocity[m] = point.turned(&z[(m + 1) * n..(m + 2) * n]).times(T::of((m + 1) as f64));
+                point.spread(self.force[m], |k, force| rest[k] -= force);
+            }
+            Kind::Torque { torque, base } => {
+                let torque = self.factor[m].scale(*torque);
+                load[action.body] += torque;
+                if let Some(base) = base {
+                    load[*base] -= torque;
+                }
+            }
+        }
+    }
+
+    /// Power m of its power \[W/s^m\], from power m of all rates.
+    pub fn power(&mut self, action: &Action, m: usize, omega: &[T]) -> T {
+        match &action.kind {
+            Kind::Force { .. } => product(&self.force[..=m], &self.velocity[..=m], |force, velocity| force.dot(velocity)),
+            Kind::Torque { torque, base } => {
+                self.rate[m] = base.map_or(omega[action.body], |base| omega[action.body] - omega[base]);
+                product(&self.factor[..=m], &self.rate[..=m], |factor, rate| factor * rate).scale(*torque)
+            }
+        }
+    }
+
+    /// The first powers from another series.
+    pub fn take<U: Real>(&mut self, other: &ActionSeries<U>) {
+        copy_vectors(&mut self.force, &other.force);
+        copy_vectors(&mut self.velocity, &other.velocity);
+        copy(&mut self.rate, &other.rate);
+    }
+}
+
+/// Power m of the torque of a torsion spring on its body \[N·m/s^m\], from the angles at the start and the series of the rates.
+#[inline(always)]
+pub fn twist<T: Real>(torsion: &Torsion, m: usize, phi: &[T], omega: &[T], n: usize) -> T {
+    let rate = |m: usize| torsion.between(&omega[m * n..(m + 1) * n]);
+    let elastic = if m == 0 { torsion.elastic(phi) } else { -(rate(m - 1) / T::of(m as f64)).scale(torsion.stiffness) };
+    elastic - rate(m).scale(torsion.damping)
+}
+
+/// Power m of the power of its damper \[W/s^m\].
+pub fn loss<T: Real>(torsion: &Torsion, m: usize, omega: &[T], n: usize) -> T {
+    let rate = |m: usize| torsion.between(&omega[m * n..(m + 1) * n]);
+    (0..=m).fold(T::ZERO, |sum, j| sum - (rate(j) * rate(m - j)).scale(torsion.damping))
+}

@@ -1,0 +1,67 @@
+//! Where everything is at the start, where that can be told from angles alone, and what must not begin there.
+
+use super::{Hang, Hanging, SAME};
+use crate::scene::error::SceneError;
+use crate::scene::format::about;
+use crate::scene::read::At;
+use crate::scene::{Place, Spring, Start, Wall};
+
+/// Where everything is at t = 0.
+pub(super) struct Posture {
+    /// Origin \[m\], cos and sin of the angle, and the sum of the lengths that lead there \[m\], of each bar.
+    bars: Vec<([f64; 2], [f64; 2], f64)>,
+}
+
+impl Hanging {
+    /// Where everything is at `start`.
+    pub fn posture(&self, start: &[Start]) -> Posture {
+        let bars = start.iter().map(|start| ([0.0; 2], [libm::cos(start.phi), libm::sin(start.phi)], 0.0)).collect();
+        let mut posture = Posture { bars };
+        for Hang { bar, from, own } in &self.order {
+            let (hinge, way) = posture.at(*from);
+            let [c, s] = posture.bars[*bar].1;
+            let origin = [hinge[0] - (c * own[0] - s * own[1]), hinge[1] - (s * own[0] + c * own[1])];
+            posture.bars[*bar] = (origin, [c, s], way + own[0].abs() + own[1].abs());
+        }
+        posture
+    }
+}
+
+impl Posture {
+    /// Position \[m\] of a place, and the sum of the lengths that lead there \[m\], which scales its rounding error.
+    fn at(&self, place: Place) -> ([f64; 2], f64) {
+        let [x, y] = place.point;
+        let size = x.abs() + y.abs();
+        let Some(bar) = place.bar else { return (place.point, size) };
+        let ([x0, y0], [c, s], way) = self.bars[bar];
+        ([x0 + c * x - s * y, y0 + s * x + c * y], way + size)
+    }
+}
+
+/// Refuses a spring without a direction.
+pub(super) fn springs(posture: &Posture, springs: &[Spring], places: &[At]) -> Result<(), SceneError> {
+    for (Spring { name, between: [a, b], free_length, .. }, at) in springs.iter().zip(places) {
+        let ((from, way_from), (to, way_to)) = (posture.at(*a), posture.at(*b));
+        let length = libm::hypot(to[0] - from[0], to[1] - from[1]);
+        if *free_length > 0.0 && length <= SAME * (way_from + way_to) {
+            let problem = format!("(spring `{name}`) starts with length 0 and has the free length {free_length} m");
+            let hint = "its force has no direction there; start elsewhere, move an end, or set free_length to 0";
+            return Err(at.refuse(&problem, "such a spring must start with a positive length", hint));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a wall whose point starts behind it.
+pub(super) fn walls(posture: &Posture, walls: &[Wall], places: &[At]) -> Result<(), SceneError> {
+    for (Wall { name, bar, point, through, normal, .. }, at) in walls.iter().zip(places) {
+        let (position, way) = posture.at(Place { bar: Some(*bar), point: *point });
+        let gap = (position[0] - through[0]) * normal[0] + (position[1] - through[1]) * normal[1];
+        if gap < -SAME * (way + through[0].abs() + through[1].abs()) {
+            let problem = format!("(wall `{name}`) has its point {} m behind it at the start", about(-gap));
+            let hint = format!("start elsewhere, move the wall, or turn its normal to [{}, {}]", -normal[0], -normal[1]);
+            return Err(at.refuse(&problem, "the point must start on the side the normal shows, or on the wall", &hint));
+        }
+    }
+    Ok(())
+}

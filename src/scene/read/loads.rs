@@ -1,0 +1,106 @@
+//! What acts on bodies: springs, torsion springs, forces, torques and motors, with their laws.
+
+use super::at::{At, Fields, listed, nearest};
+use super::names::Bars;
+use crate::scene::error::SceneError;
+use crate::scene::format::{DRIVE, Field, Shape};
+use crate::scene::locate::Value;
+use crate::scene::{Drive, Force, Law, Motor, Sine, Slider, Spring, Torque, TorsionSpring};
+
+/// A spring.
+pub(super) fn spring(fields: &Fields, name: String, known: &Bars) -> Result<Spring, SceneError> {
+    Ok(Spring {
+        name,
+        between: known.between(fields, "spring")?,
+        stiffness: fields.number("stiffness")?,
+        free_length: fields.number("free_length")?,
+        damping: fields.number_or("damping", 0.0)?,
+    })
+}
+
+/// A torsion spring.
+pub(super) fn torsion_spring(fields: &Fields, name: String, known: &Bars) -> Result<TorsionSpring, SceneError> {
+    let bar = known.bar(fields, "a torsion spring turns a bar; name the ground, if anything, in `relative_to`")?;
+    Ok(TorsionSpring {
+        name,
+        bar,
+        relative_to: known.relative_to(fields, bar, "leave it out for an angle from +x")?,
+        stiffness: fields.number("stiffness")?,
+        free_angle: fields.number("free_angle")?,
+        damping: fields.number_or("damping", 0.0)?,
+    })
+}
+
+/// A force.
+pub(super) fn force(fields: &Fields, name: String, known: &Bars) -> Result<Force, SceneError> {
+    Ok(Force {
+        name,
+        bar: known.bar(fields, "a force on the ground moves nothing")?,
+        point: fields.pair("point")?,
+        force: fields.pair("force")?,
+        follows: fields.word_or_first("frame")? == 1,
+        law: fields.optional("law").map(|_| law(fields)).transpose()?,
+    })
+}
+
+/// A torque.
+pub(super) fn torque(fields: &Fields, name: String, known: &Bars) -> Result<Torque, SceneError> {
+    let bar = known.bar(fields, "a torque on the ground moves nothing; name the ground, if anything, in `relative_to`")?;
+    Ok(Torque {
+        name,
+        bar,
+        relative_to: known.relative_to(fields, bar, "leave it out where the ground takes the opposite torque")?,
+        torque: fields.number("torque")?,
+        law: fields.optional("law").map(|_| law(fields)).transpose()?,
+    })
+}
+
+/// One of the list of motors.
+pub(super) enum AnyMotor<'a> {
+    Angle(Motor, At<'a>),
+    Travel(Drive),
+}
+
+/// A motor, or a motor on a slider.
+pub(super) fn motor<'a>(fields: &Fields<'a>, name: String, known: &Bars, sliders: &[Slider]) -> Result<AnyMotor<'a>, SceneError> {
+    if std::ptr::eq(fields.table, &DRIVE) {
+        return Ok(AnyMotor::Travel(Drive { name, slider: slider(&fields.required("slider")?, sliders)?, law: law(fields)? }));
+    }
+    let bar = known.bar(fields, "a motor turns a bar; to hold a bar still give its law a start and no rate")?;
+    let relative_to = known.relative_to(fields, bar, "leave it out for an angle from +x")?;
+    Ok(AnyMotor::Angle(Motor { name, bar, relative_to, law: law(fields)? }, fields.at.clone()))
+}
+
+/// The slider named at `at`.
+fn slider(at: &At, sliders: &[Slider]) -> Result<usize, SceneError> {
+    let wanted = if let Value::Text(name) = &at.node.value { name } else { "" };
+    sliders.iter().position(|slider| slider.name == wanted).ok_or_else(|| {
+        let names: Vec<&str> = sliders.iter().map(|slider| slider.name.as_str()).collect();
+        let hint = match nearest(wanted, names.iter().copied()) {
+            Some(near) => format!("did you mean \"{near}\"? known sliders: {}", listed(&names)),
+            None if names.is_empty() => "the scene has no sliders; a motor on an angle has a `body`".to_owned(),
+            None => format!("known sliders: {}", listed(&names)),
+        };
+        at.refuse_value(&Shape::SliderName.allowed(), &hint)
+    })
+}
+
+/// The field `law`, in the units that its table says.
+fn law(fields: &Fields) -> Result<Law, SceneError> {
+    let Some(Field { shape: Shape::Object(table), .. }) = fields.table.field("law") else {
+        return Err(fields.at.refuse("has no law", "must be of a kind that has one", fields.table.about));
+    };
+    let law = fields.required("law")?.object(table)?;
+    let mut sines = Vec::new();
+    if let (Some(list), Some(Field { shape: Shape::List { of: [sine], .. }, .. })) = (law.optional("sines"), table.field("sines")) {
+        for at in list.items("sines", table)? {
+            let sine = at.object(sine)?;
+            sines.push(Sine {
+                amplitude: sine.number("amplitude")?,
+                frequency: sine.number("frequency")?,
+                phase: sine.number_or("phase", 0.0)?,
+            });
+        }
+    }
+    Ok(Law { start: law.number("start")?, rate: law.number_or("rate", 0.0)?, acceleration: law.number_or("acceleration", 0.0)?, sines })
+}

@@ -1,0 +1,167 @@
+//! JSON to [`Scene`], or one precise refusal.
+//!
+//! Every value is judged where it stands, against the tables of `format`; then the parts against each other in `fit`.
+//! The first fault found is the one reported.
+
+mod at;
+mod bars;
+mod joints;
+mod loads;
+mod names;
+mod start;
+
+pub(super) use at::{At, Fields, listed, nearest};
+pub(super) use start::GivenStart;
+
+use super::error::SceneError;
+use super::fit;
+use super::format::{LONGEST_FILE, SCENE};
+use super::locate::{Node, Source, Text};
+use super::set::{Override, put};
+use super::{Drive, Motor, Scene};
+use loads::AnyMotor;
+use names::{Bars, named};
+use std::io::Read;
+use std::path::Path;
+
+/// Reads the scene in the file `path`, with `overrides` put in from left to right before anything is judged.
+///
+/// # Errors
+/// The file cannot be read ([`SceneError::is_io`]), or what it says is no scene: the error names line, column, field, value, what is
+/// allowed, and a hint.
+pub fn read_scene(path: &Path, overrides: &[Override]) -> Result<Scene, SceneError> {
+    parse_scene(&read_text(path)?, &path.display().to_string(), overrides)
+}
+
+/// Reads the text of the scene file `path`.
+///
+/// # Errors
+/// The file cannot be read ([`SceneError::is_io`]), is too long, or is not UTF-8.
+pub fn read_text(path: &Path) -> Result<String, SceneError> {
+    let file = path.display().to_string();
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)
+        .and_then(|opened| opened.take(LONGEST_FILE + 1).read_to_end(&mut bytes))
+        .map_err(|error| SceneError::unreadable(&file, &error))?;
+    if bytes.len() as u64 > LONGEST_FILE {
+        let hint = "a scene of 10 000 bars fits well into this; is this the right file?";
+        return Err(SceneError::whole_file(&file, "is too long", "must be at most 16 MiB", hint));
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        let good = error.utf8_error().valid_up_to();
+        let json = String::from_utf8_lossy(error.as_bytes()).into_owned();
+        let source = Source { file, texts: vec![Text { set: None, json: without_mark(&json).to_owned() }] };
+        let good = good.saturating_sub(json.len() - source.texts[0].json.len());
+        let span = source.span(0, good, good + char::REPLACEMENT_CHARACTER.len_utf8());
+        let hint = "save the file as UTF-8; names of bars and hinges are plain ASCII anyway";
+        source.refusal(span, "", "not UTF-8", "must be text in UTF-8", hint)
+    })
+}
+
+/// Reads the scene in `text`; `source` is the name of its file in messages.
+///
+/// # Errors
+/// As [`read_scene`], never an I/O error.
+pub fn parse_scene(text: &str, source: &str, overrides: &[Override]) -> Result<Scene, SceneError> {
+    if text.len() as u64 > LONGEST_FILE {
+        let hint = "a scene of 10 000 bars fits well into this; is this the right file?";
+        return Err(SceneError::whole_file(source, "is too long", "must be at most 16 MiB", hint));
+    }
+    let (source, tree) = put_together(text, source, overrides)?;
+    scene(&At { source: &source, node: &tree, path: String::new() })
+}
+
+/// The tree of a scene's text with overrides put in, not judged yet.
+pub(super) fn put_together(text: &str, source: &str, overrides: &[Override]) -> Result<(Source, Node), SceneError> {
+    let mut texts = vec![Text { set: None, json: without_mark(text).to_owned() }];
+    texts.extend(overrides.iter().map(Override::text));
+    let source = Source { file: source.to_owned(), texts };
+    let mut tree = source.tree(0)?;
+    for (number, set) in overrides.iter().enumerate() {
+        put(&source, &mut tree, set, source.tree(number + 1)?)?;
+    }
+    Ok((source, tree))
+}
+
+/// Editors on some systems put a byte order mark first; it says nothing about the scene.
+fn without_mark(text: &str) -> &str {
+    text.strip_prefix('\u{feff}').unwrap_or(text)
+}
+
+fn scene(root: &At) -> Result<Scene, SceneError> {
+    let fields = root.object(&SCENE)?;
+    let name = fields.name("name")?;
+    let description = fields.text_or_empty("description")?;
+    let gravity = fields.pair("gravity")?;
+    let (bars, bar_places) = named(&fields, "bars", bars::bar)?;
+    let known = Bars::of(&bars);
+    let (hinges, _) = named(&fields, "hinges", |fields, name| joints::hinge(fields, name, &known))?;
+    let (sliders, _) = named(&fields, "sliders", |fields, name| joints::slider(fields, name, &known))?;
+    let (welds, _) = named(&fields, "welds", |fields, name| joints::weld(fields, name, &known))?;
+    let (locks, lock_places) = named(&fields, "locks", |fields, name| joints::lock(fields, name, &known))?;
+    let (springs, spring_places) = named(&fields, "springs", |fields, name| loads::spring(fields, name, &known))?;
+    let (torsion_springs, _) = named(&fields, "torsion_springs", |fields, name| loads::torsion_spring(fields, name, &known))?;
+    let (forces, _) = named(&fields, "forces", |fields, name| loads::force(fields, name, &known))?;
+    let (torques, _) = named(&fields, "torques", |fields, name| loads::torque(fields, name, &known))?;
+    let (any, _) = named(&fields, "motors", |fields, name| loads::motor(fields, name, &known, &sliders))?;
+    let (motors, motor_places, drives) = sorted(any);
+    let (walls, wall_places) = named(&fields, "walls", |fields, name| joints::wall(fields, name, &known))?;
+    let given = start::starts(&fields, &known)?;
+    let [until, every] = times(&fields)?;
+    let scene = Scene {
+        name,
+        description,
+        gravity,
+        hinges,
+        sliders,
+        welds,
+        locks,
+        springs,
+        torsion_springs,
+        forces,
+        torques,
+        motors,
+        drives,
+        walls,
+        until,
+        every,
+        ..Scene::default()
+    };
+    let places =
+        fit::Places { root, bars: &bar_places, locks: &lock_places, springs: &spring_places, motors: &motor_places, walls: &wall_places };
+    fit::fitted(Scene { bars, ..scene }, &places, &given)
+}
+
+/// The motors on angles with their places, and those on sliders.
+fn sorted(any: Vec<AnyMotor>) -> (Vec<Motor>, Vec<At>, Vec<Drive>) {
+    let (mut motors, mut places, mut drives) = (Vec::new(), Vec::new(), Vec::new());
+    for one in any {
+        match one {
+            AnyMotor::Angle(motor, at) => {
+                motors.push(motor);
+                places.push(at);
+            }
+            AnyMotor::Travel(drive) => drives.push(drive),
+        }
+    }
+    (motors, places, drives)
+}
+
+/// More outputs than this have no distinct times k·every in doubles.
+const MOST_OUTPUTS: f64 = 9_007_199_254_740_992.0;
+
+/// Horizon and output interval.
+fn times(scene: &Fields) -> Result<[f64; 2], SceneError> {
+    let until = scene.number("until")?;
+    let every = scene.number("every")?;
+    let every_at = scene.required("every")?;
+    if every > until {
+        let allowed = format!("must be at most the horizon `until`, {until} s");
+        return Err(every_at.refuse_value(&allowed, "shorten the output interval or lengthen the horizon"));
+    }
+    if until / every > MOST_OUTPUTS {
+        let allowed = format!("must be at least {:e} s: 2⁵³ outputs up to the horizon", until / MOST_OUTPUTS);
+        return Err(every_at.refuse_value(&allowed, "beyond that the output times are no longer distinct"));
+    }
+    Ok([until, every])
+}

@@ -1,0 +1,190 @@
+//! Symmetric projection: Gauss methods on scenes with closed loops, sliders and other rows that cannot be eliminated.
+//!
+//! ```text
+//! start = y0 + D(y0) mu,     end = Gauss(start),     y1 = end + D(y1) mu,     C(y1) = 0, C'(y1) = 0
+//! D mu: q += M⁻¹ Gᵀ mu_q,  w += M⁻¹ Gᵀ mu_w
+//! ```
+//!
+//! The same mu at both ends, so that the step run backwards is its own inverse: a reversible mechanism keeps its energy over long times, which one
+//! projection at the end of each step would spoil.  What starts off the constraints by mu arrives off them by mu, so that a step that is
+//! off by nu beyond it wants mu + (nu - mu)/2; the last step's mu is the first guess.
+//!
+//! Source: E. Hairer, *Symmetric projection methods for differential equations on manifolds*, BIT 40 (2000); E. Hairer, C. Lubich, G. Wanner,
+//! *Geometric Numerical Integration*, 2nd ed. (2006), section V.4.1.
+
+use super::projection::is_kept;
+use crate::arithmetic::sum::two_sum;
+use crate::dynamics::kernel::Kernel;
+use crate::dynamics::{Field, Form, Mechanism, State, Time, tree};
+use crate::stepping::gauss::Gauss;
+use crate::stepping::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
+
+/// Gauss steps per step before it is given up; an ordinary one takes three or four.
+const ROUNDS: usize = 20;
+/// Sweeps onto the constraints.
+const SWEEPS: usize = 20;
+/// Largest violation and largest mismatch of the multipliers that count as converged, relative to levers and speeds.
+const TOLERANCE: f64 = 1e-12;
+
+/// A Gauss method with symmetric projection; its problem must be in coordinates and rates, as
+/// [`Multiplier`](crate::dynamics::multiplier::Multiplier) is.
+#[derive(Clone, Debug)]
+pub struct SymmetricGauss {
+    inner: Gauss,
+    kernel: Option<Kernel<f64>>,
+    /// The step's start and end before they are shifted.
+    trial: State,
+    best: State,
+    /// mu_q and mu_w (2 r).
+    mu: Vec<f64>,
+    /// What the end asks for (2 r).
+    nu: Vec<f64>,
+}
+
+impl SymmetricGauss {
+    /// Projects the steps of a Gauss method.
+    pub fn new(inner: Gauss) -> Self {
+        Self { inner, kernel: None, trial: State::default(), best: State::default(), mu: Vec::new(), nu: Vec::new() }
+    }
+
+    /// One step of `h` \[s\].
+    fn step<P: Field + Form + ?Sized>(&mut self, problem: &mut P, state: &mut State, h: f64, tally: &mut Tally) -> Result<(), StepError> {
+        let Self { inner, kernel: Some(kernel), trial, best, mu, nu } = self else { return Ok(()) };
+        let (r, until) = (problem.mechanism().rows.len(), state.time + h);
+        let own = state.memory.len().saturating_sub(2 * r);
+        mu.clear();
+        mu.extend_from_slice(&state.memory[own..]);
+        mu.resize(2 * r, 0.0);
+        let (name, t) = (Method::<P>::name(inner), state.time.hi);
+        let stop = |what: String| StepError {
+            cause: Cause::ProjectionFailed,
+            method: name.into(),
+            t,
+            step: h,
+            what,
+            hint: "halve the step".into(),
+        };
+        let mut last = f64::INFINITY;
+        let mut one = Tally::default();
+        for _ in 0..ROUNDS {
+            trial.clone_from(state);
+            trial.memory.truncate(own);
+            face(problem.mechanism(), kernel, trial);
+            shift(kernel, trial, mu);
+            inner.advance(problem, trial, until, &mut one, &mut |_, _| Ok(Seen::Kept))?;
+            tally.evaluations += std::mem::take(&mut one.evaluations);
+            nu.clone_from(mu);
+            land(problem.mechanism(), kernel, trial, best, nu)
+                .map_err(|(row, left)| stop(format!("projection leaves {left:.1e} of constraint {row}")))?;
+            let mismatch = mu.iter().zip(nu.iter()).fold(0.0, |most: f64, (mu, nu)| most.max((mu - nu).abs()));
+            for (mu, nu) in mu.iter_mut().zip(nu.iter()) {
+                *mu += 0.5 * (nu - *mu);
+            }
+            // Rounds contract by about the step: what no longer falls is rounding.
+            if mismatch == 0.0 || mismatch >= 0.5 * last {
+                let size = mu.iter().fold(0.0, |most: f64, mu| most.max(mu.abs()));
+                if mismatch > TOLERANCE * size.max(1.0) {
+                    return Err(stop(format!("the multipliers of both ends differ by {mismatch:.1e} and do not come closer")));
+                }
+                break;
+            }
+            last = mismatch;
+        }
+        state.clone_from(best);
+        state.wrap();
+        state.memory.extend_from_slice(mu);
+        tally.steps += 1;
+        Ok(())
+    }
+}
+
+/// Rows and directions at a state.
+fn face(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &State) {
+    let n = mechanism.coordinates();
+    let (phi, omega) = (&state.y[..n], &state.y[n..2 * n]);
+    kernel.face::<0>(mechanism, phi);
+    mechanism.tree.couple::<f64, 0>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
+    tree::factor::<f64, 0>(n, &mut kernel.mass, &mut kernel.pivot);
+    kernel.linearise::<0>(mechanism, state.time, phi, omega);
+}
+
+/// y + D mu, with the directions of the state faced last.
+fn shift(kernel: &Kernel<f64>, state: &mut State, mu: &[f64]) {
+    let (n, r) = (kernel.z.len(), kernel.rows.len());
+    for (from, mu) in [(0, &mu[..r]), (n, &mu[r..])] {
+        for k in 0..n {
+            let change = mu.iter().enumerate().fold(0.0, |sum, (row, mu)| sum + kernel.lifted[row * n + k] * mu);
+            (state.y[from + k], state.low[from + k]) = two_sum(state.y[from + k], state.low[from + k] + change);
+        }
+    }
+}
+
+/// Finds nu such that `end` + D nu, written to `landed`, keeps all rows, with D taken there; starts from the nu given.
+fn land(mechanism: &Mechanism, kernel: &mut Kernel<f64>, end: &State, landed: &mut State, nu: &mut [f64]) -> Result<(), (String, f64)> {
+    let (n, r) = (mechanism.coordinates(), mechanism.rows.len());
+    landed.clone_from(end);
+    face(mechanism, kernel, landed);
+    let mut last = f64::INFINITY;
+    for _ in 0..SWEEPS {
+        landed.clone_from(end);
+        shift(kernel, landed, nu);
+        face(mechanism, kernel, landed);
+        let mut worst = 0.0_f64;
+        for level in [0, r] {
+            for row in 0..r {
+                let left = if level == 0 { kernel.rows[row].position } else { kernel.row_rate(row, &landed.y[n..2 * n]) };
+                kernel.multiplier[row] = left;
+                worst = if left.is_nan() { f64::NAN } else { worst.max(left.abs()) };
+            }
+            tree::solve::<f64, 0>(r, &kernel.schur, &kernel.schur_pivot, &mut kernel.multiplier);
+            if worst > 1e-16 && worst < 0.5 * last {
+                for row in 0..r {
+                    nu[level + row] -= kernel.multiplier[row];
+                }
+            }
+        }
+        if worst <= 1e-16 || worst >= 0.5 * last || worst.is_nan() {
+            break;
+        }
+        last = worst;
+    }
+    is_kept(mechanism, kernel, &landed.y[n..2 * n], TOLERANCE)
+}
+
+impl<P: Field + Form + ?Sized> Method<P> for SymmetricGauss {
+    fn name(&self) -> &'static str {
+        Method::<P>::name(&self.inner)
+    }
+
+    fn order(&self) -> u32 {
+        Method::<P>::order(&self.inner)
+    }
+
+    /// Takes whole steps; see [`Gauss`].  The state's memory is that of the Gauss method, then mu.
+    fn advance(
+        &mut self,
+        problem: &mut P,
+        state: &mut State,
+        until: Time,
+        tally: &mut Tally,
+        watch: &mut Watch<P>,
+    ) -> Result<Reached, StepError> {
+        if self.kernel.is_none() {
+            self.kernel = Some(Kernel::new(problem.mechanism()));
+        }
+        let span = (until - state.time).hi;
+        let count = (span / self.inner.step()).abs().round();
+        let h = self.inner.step().copysign(span);
+        for _ in 0..count as u64 {
+            self.step(problem, state, h, tally)?;
+            let seen = watch(problem, state)?;
+            if seen.is_changed() {
+                state.memory.clear();
+            }
+            if seen.is_enough() {
+                return Ok(Reached::Pause);
+            }
+        }
+        Ok(Reached::Until)
+    }
+}
