@@ -20,7 +20,7 @@
 //! rounding of h W F, 1e-16 of a *kick*, not of the state.
 
 use super::composition::Composition;
-use super::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
+use super::{Cause, Method, Reached, StepError, Tally, Watch};
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
 use crate::dynamics::law::Phase;
 use crate::dynamics::natural::{Natural, upper};
@@ -55,7 +55,11 @@ impl Rattle {
             *sum += Time::of(*substep);
             Some(*sum)
         };
-        let ends = substeps.iter().scan(Time::default(), end).collect();
+        let mut ends: Vec<Time> = substeps.iter().scan(Time::default(), end).collect();
+        // Where a step ends the next begins, to the last bit.
+        if let Some(last) = ends.last_mut() {
+            *last = Time::of(step);
+        }
         Self { composition, step, substeps, ends, work: Work::default() }
     }
 
@@ -132,8 +136,14 @@ impl Rattle {
             self.work.store(state);
             tally.steps += 1;
             done += 1.0;
-            if watch(natural, state)? == Seen::Changed {
+            let seen = watch(natural, state)?;
+            if seen.is_changed() {
                 state.memory.clear();
+            }
+            if seen.is_enough() {
+                return Ok(Reached::Pause);
+            }
+            if seen.is_changed() {
                 self.work.load::<N, DRIVEN>(natural, state);
             }
         }
