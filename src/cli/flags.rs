@@ -209,14 +209,14 @@ pub struct SweepFlags {
 pub struct CheckpointFlags {
     /// Seconds of computing between two checkpoints, from which `driftless resume` goes on; 0: none but at Ctrl-C and SIGTERM
     #[arg(
-        long = "checkpoint-every",
+        long,
         value_name = "S",
         value_parser = wait,
         default_value = "60",
         allow_hyphen_values = true,
         help_heading = "Files"
     )]
-    pub every: f64,
+    pub checkpoint_every: f64,
 }
 
 /// `driftless resume`.

@@ -67,7 +67,8 @@ pub fn resume(flags: &RunFlags, saved: Saved, until: Option<f64>, folder: Folder
     if let Some(until) = until
         && !snapshot.extend(until)
     {
-        let text = format!("--until: {until} s is not beyond {} s, the horizon there is, or too far", snapshot.plan().until);
+        let step = snapshot.plan().step.map_or(String::new(), |step| format!(", by a whole number of steps of {step} s"));
+        let text = format!("--until: {until} s cannot be the horizon of this run\nhint: one beyond {} s{step}", snapshot.plan().until);
         return Err(Failure::new(Exit::Usage, text));
     }
     flags.scene.remark(&format!("{}; from t = {} s on", report::setting(snapshot.plan()), snapshot.time()));
@@ -127,7 +128,7 @@ impl Task<'_> {
         folder: &Folder,
         checkpoints: &mut Checkpoints,
     ) -> Result<(), Failure> {
-        let mut watchman = Watchman::new(self.flags.checkpoints.every);
+        let mut watchman = Watchman::new(self.flags.checkpoints.checkpoint_every);
         let mut progress = Progress::new(&self.scene.name, running.plan().until, self.flags.scene.quiet);
         loop {
             let mut observer = |sample: &Sample| {

@@ -41,7 +41,7 @@ pub fn run(flags: &SweepFlags, arguments: &[String]) -> Result<(), Failure> {
     let writer = Writer {
         table,
         progress: Points::new(&plan.scene().name, 0, plan.grid().count(), flags.scene.quiet),
-        watchman: Watchman::new(flags.checkpoints.every),
+        watchman: Watchman::new(flags.checkpoints.checkpoint_every),
         checkpoints: Checkpoints::none(&path),
         text: &text,
         arguments,
@@ -77,7 +77,7 @@ pub fn resume(flags: &SweepFlags, saved: Saved, folder: Folder, checkpoints: Che
     let writer = Writer {
         table: SweepTable::going_on(&plan, folder.take_up(SWEEP, &cursor)?),
         progress: Points::new(&plan.scene().name, seen.points(), plan.grid().count(), flags.scene.quiet),
-        watchman: Watchman::new(flags.checkpoints.every),
+        watchman: Watchman::new(flags.checkpoints.checkpoint_every),
         checkpoints,
         text: &text,
         arguments: &arguments,

@@ -134,10 +134,12 @@ impl Plan {
         })
     }
 
-    /// The same to a later horizon \[s\], with the same output times up to the former one; false, and nothing changed, where they would be too many.
+    /// The same to a later horizon \[s\], with the same output times up to the former one; false, and nothing changed, where they would be too many, or fixed
+    /// steps would not end there.
     pub(super) fn extend(&mut self, until: f64) -> bool {
         let rows = rows(until, self.every);
-        let is_possible = until.is_finite() && rows <= MAX_ROWS;
+        let is_whole = self.step.is_none_or(|step| is_whole(until, step));
+        let is_possible = until.is_finite() && rows <= MAX_ROWS && is_whole;
         if is_possible {
             (self.until, self.rows) = (until, rows as u64);
         }
@@ -179,6 +181,12 @@ impl Plan {
         let keeps_rows = !mechanism.rows.is_empty() && !matches!(self.method, MethodId::Rattle(_));
         if keeps_rows { format!("{}-{setting}-{}", self.method, self.stabilization) } else { format!("{}-{setting}", self.method) }
     }
+}
+
+/// True where so many steps end on the horizon.
+fn is_whole(until: f64, step: f64) -> bool {
+    let steps = (until / step).round();
+    (until / step - steps).abs() <= 1e-9 * steps
 }
 
 /// Output rows after the first; the last may come early.
@@ -410,11 +418,10 @@ fn fixed_step(
         let halvings = libm::log2(*every * rate / share).round().max(0.0);
         return Ok(*every / libm::exp2(halvings));
     };
-    let steps = (until / asked).round();
     if asked > until * (1.0 + 1e-9) {
         return Err(usage("--step", format!("{asked} s is longer than the horizon, {until} s"), "a shorter step"));
     }
-    let step = if (until / asked - steps).abs() <= 1e-9 * steps { asked } else { until / (until / asked).ceil() };
+    let step = if is_whole(until, asked) { asked } else { until / (until / asked).ceil() };
     if step != asked {
         notes.push(format!("the step is {step} s instead of {asked} s, so that whole steps end on the horizon"));
     }
