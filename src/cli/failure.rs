@@ -2,6 +2,7 @@
 
 use super::output::print_object;
 use crate::dynamics::CompileError;
+use crate::dynamics::assembly::Change;
 use crate::run::{FileError, Refusal, RunError, SweepError};
 use crate::scene::SceneError;
 use crate::stepping::{Cause, StepError};
@@ -57,6 +58,13 @@ impl Failure {
     /// A failure with nothing but a message.
     pub fn new(exit: Exit, message: impl Into<String>) -> Self {
         Self { exit, message: message.into(), details: Value::Null, told: false }
+    }
+
+    /// A start that is not as given, where `--strict` asks for that.
+    pub(super) fn changed(changes: &[Change]) -> Self {
+        let list: Vec<String> = changes.iter().map(Change::to_string).collect();
+        let message = format!("--strict: {}\nhint: give the values used, or leave out what the constraints tell", list.join("; "));
+        Self { details: json!({ "changes": changes }), ..Self::new(Exit::Scene, message) }
     }
 
     /// The same, where stdout needs no object of it.

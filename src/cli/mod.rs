@@ -73,5 +73,18 @@ fn load(flags: &SceneFlags) -> Result<(Scene, Arc<Mechanism>), Failure> {
         flags.remark(&format!("set {} to {}", set.path, set.value));
     }
     let mechanism = Arc::new(Mechanism::new(&scene)?);
+    settle(flags, &mechanism)?;
     Ok((scene, mechanism))
+}
+
+/// Tells how the start differs from what the scene gives, or refuses it.
+fn settle(flags: &SceneFlags, mechanism: &Mechanism) -> Result<(), Failure> {
+    let changes = &mechanism.assembly.changes;
+    if flags.strict && !changes.is_empty() {
+        return Err(Failure::changed(changes));
+    }
+    if !flags.quiet {
+        changes.iter().for_each(|change| output::message(&format!("note: {change}")));
+    }
+    Ok(())
 }
