@@ -1,5 +1,6 @@
 //! Scene to mechanism: the hinge trees, their constant matrices, the rows, and what the scene does not need left out.
 
+use super::assembly::Assembly;
 use super::force::action::Kind;
 use super::force::{Action, Spring, Torsion};
 use super::forest::{Foot, Forest};
@@ -53,6 +54,8 @@ pub struct Mechanism {
     pub energy_scale: f64,
     /// The constants of the recursive form, where that is the one evaluated.
     pub recursion: Option<Arc<Recursion>>,
+    /// How the start was found.
+    pub assembly: Assembly,
 }
 
 /// A body of the mechanism.
@@ -97,6 +100,58 @@ pub enum CompileError {
     /// The mass matrix is singular: some body has no inertia about its hinge.
     #[error("the mass matrix is singular at the start: bar `{0}` and what hangs on it have no inertia about its hinge")]
     Massless(String),
+    /// No start closes the rows, or none near what is given.
+    #[error(
+        "no start fits: constraint `{row}` is off by {left:.3e} {unit} at the nearest\nhint: check lengths and places, and whether what `start` gives can be reached"
+    )]
+    Impossible {
+        /// The row that is off most.
+        row: String,
+        /// By how much.
+        left: f64,
+        /// `rad` or `m`.
+        unit: &'static str,
+    },
+    /// No rates keep the rows at the start.
+    #[error(
+        "no rates fit the start: constraint `{row}` slips by {left:.3e} {unit}\nhint: check motors against locks, and whether the start is a dead centre for the motor"
+    )]
+    ImpossibleRates {
+        /// The row that slips most.
+        row: String,
+        /// By how much.
+        left: f64,
+        /// `rad/s` or `m/s`.
+        unit: &'static str,
+    },
+    /// A coordinate that neither the rows nor the scene give.
+    #[error("the start leaves `{0}` open: no constraint gives it\nhint: add it to the scene")]
+    Undetermined(String),
+    /// More than one start fits what is given.
+    #[error("the start is ambiguous: `{what}` may be {one:.6} or {other:.6} {unit}\nhint: add it to the scene; roughly is enough")]
+    Ambiguous {
+        /// Where the scene could say which.
+        what: String,
+        /// One value.
+        one: f64,
+        /// Another.
+        other: f64,
+        /// `rad` or `m`.
+        unit: &'static str,
+    },
+    /// A spring with a free length starts without a direction.
+    #[error(
+        "spring `{0}` starts with length 0 and has a free length\nhint: its force has no direction there; start elsewhere, move an end, or set free_length to 0"
+    )]
+    SpringWithoutLength(String),
+    /// A point starts behind its wall.
+    #[error("wall `{wall}` has its point {gap:.3e} m behind it at the start\nhint: start elsewhere, move the wall, or turn its normal")]
+    BehindWall {
+        /// The wall.
+        wall: String,
+        /// How far \[m\].
+        gap: f64,
+    },
 }
 
 impl Mechanism {
@@ -171,11 +226,13 @@ impl Mechanism {
             gravity,
             energy_scale: 1.0,
             recursion: None,
+            assembly: Assembly::default(),
         };
         mechanism.choose_form();
         if let Some(recursion) = mechanism.recursion.as_ref().filter(|recursion| recursion.ways.entries() > DENSE_LIMIT * DENSE_LIMIT) {
             return Err(CompileError::TooMany(recursion.ways.rows()));
         }
+        let mut mechanism = mechanism.assembled(scene, &kept_angles(scene))?;
         mechanism.check_mass(scene)?;
         mechanism.energy_scale = mechanism.scale_of_energy(&mechanism.start(scene));
         Ok(mechanism)
@@ -324,6 +381,14 @@ fn given_angles(scene: &Scene) -> Vec<Row> {
     let sliders = (scene.sliders.iter().filter(|slider| slider.locked))
         .filter_map(|slider| keep(&format!("{}.angle", slider.name), slider.point.bar, slider.rail.place.bar, None));
     motors.chain(locks).chain(welds).chain(sliders).collect()
+}
+
+/// The rows of [`given_angles`] whose angle is that of the start.
+fn kept_angles(scene: &Scene) -> Vec<usize> {
+    let locks = scene.locks.iter().map(|lock| lock.angle.is_none());
+    let others = scene.welds.len() + scene.sliders.iter().filter(|slider| slider.locked).count();
+    let kept = locks.chain(std::iter::repeat_n(true, others));
+    (scene.motors.len()..).zip(kept).filter(|(_, kept)| *kept).map(|(row, _)| row).collect()
 }
 
 /// Hinges and welds; those that close a loop add their rows.

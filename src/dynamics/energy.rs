@@ -35,8 +35,13 @@ fn fused_energy(mechanism: &Mechanism, kernel: &mut Kernel<DoubleDouble>, motion
 }
 
 impl Mechanism {
-    /// The scene's start as a motion; angles are reduced from the very doubles given.
+    /// The scene's start as a motion: found from the rows where a part of it can be, else as given.
     pub fn start(&self, scene: &Scene) -> Motion {
+        self.assembly.start.clone().unwrap_or_else(|| self.start_as_given(scene))
+    }
+
+    /// The start as given, with guesses; angles are reduced from the very doubles given.
+    pub(super) fn start_as_given(&self, scene: &Scene) -> Motion {
         let mut motion = Motion::default();
         for start in &scene.start {
             let full = DoubleDouble::of(start.phi);

@@ -241,6 +241,15 @@ impl<T: Real> Kernel<T> {
         self.couple_rows::<N, 0>(size::<N>(mechanism.tree.coordinates), mechanism.rows.len());
     }
 
+    /// The smallest share of a row ([`schur`]) at these coordinates.
+    pub fn share_at(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) -> f64 {
+        self.face::<0>(mechanism, phi);
+        self.couple::<0>(mechanism);
+        self.factor::<0>(mechanism, omega);
+        self.linearise::<0>(mechanism, t, phi, omega);
+        self.weakest.share
+    }
+
     /// C, G, C_t, gamma of every row, and nothing else.
     pub fn rows_at(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
         let n = mechanism.tree.coordinates;

@@ -27,6 +27,7 @@
 //! [`multiplier`] in (q, w) with one multiplier per row, [`elimination`] with the driven angles as known functions of time, [`canonical`] in (q, p),
 //! the form in which Gauss methods are symplectic.
 
+pub mod assembly;
 pub mod canonical;
 pub mod compile;
 pub mod contact;
