@@ -53,8 +53,7 @@ fn chain(links: usize, angle: Option<f64>) -> Scene {
 fn ladder(n: usize) -> Scene {
     let bar = |k: usize| Bar { name: format!("bar{k}"), length: 1.0, mass: 1.0, centre: [0.5, 0.0], inertia: 1.0 / 12.0 };
     let coupler = |i: usize| n + 1 + i;
-    let feet =
-        (0..=n).map(|i| Hinge { name: format!("A{i}"), between: [Place { bar: None, point: [i as f64, 0.0] }, root(Some(i), 0.0)] });
+    let feet = (0..=n).map(|i| Hinge { name: format!("A{i}"), between: [Place { bar: None, point: [i as f64, 0.0] }, root(Some(i), 0.0)] });
     let tops = (0..n).flat_map(|i| {
         let left = Hinge { name: format!("B{i}"), between: [root(Some(i), 1.0), root(Some(coupler(i)), 0.0)] };
         [left, Hinge { name: format!("D{i}"), between: [root(Some(coupler(i)), 1.0), root(Some(i + 1), 1.0)] }]
@@ -156,7 +155,10 @@ fn march(name: &str, scene: &Scene, request: &Request) {
 }
 
 fn main() {
-    println!("{:>10} {:>6} {:>9} {:>9} {:>8} {:>20} {:>8} {:>9}", "one", "bodies", "min us", "median", "ns/body", "matrices", "ratio", "chosen");
+    println!(
+        "{:>10} {:>6} {:>9} {:>9} {:>8} {:>20} {:>8} {:>9}",
+        "one", "bodies", "min us", "median", "ns/body", "matrices", "ratio", "chosen"
+    );
     for links in [2, 4, 5, 6, 7, 8, 10, 12, 16, 32, 64, 128, 512, 2000, 10_000] {
         compare("chain", &chain(links, None));
     }

@@ -4,7 +4,8 @@
 //! a0 = M⁻¹ b;      rows:  X = M⁻¹ Gᵀ,  S = G X,  S lambda = G a0 + gamma,  a = a0 - X lambda
 //! ```
 //!
-//! A scene without rows never enters the second line.
+//! A scene without rows never enters the second line.  Mechanisms of many bodies are evaluated without these matrices, by the passes of
+//! [`recursive`](super::recursive); what is found is the same.
 
 use super::recursive::Evaluation;
 use super::row::{Linearised, Posture};

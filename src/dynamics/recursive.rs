@@ -266,7 +266,7 @@ impl<T: Real> Recursive<T> {
         for (place, link) in self.places.iter_mut().zip(&links.links).skip(1) {
             place.torque += load[link.body];
             if link.foot != 0 {
-                place.force = place.force - Complex::new(load[link.foot], load[link.foot + 1]);
+                place.force -= Complex::new(load[link.foot], load[link.foot + 1]);
             }
         }
     }
