@@ -52,10 +52,10 @@ pub struct Mechanism {
     pub ground_energy: f64,
     /// What energies are divided by in reports \[J\]: see [`Mechanism::energy_scale`](super::energy).
     pub energy_scale: f64,
-    /// The constants of the recursive form, where that is the one evaluated.
-    pub recursion: Option<Arc<Recursion>>,
     /// How the start was found.
     pub assembly: Assembly,
+    /// The constants of the recursive form, where that is the one evaluated.
+    pub recursion: Option<Arc<Recursion>>,
 }
 
 /// A body of the mechanism.
@@ -225,14 +225,14 @@ impl Mechanism {
             ties,
             gravity,
             energy_scale: 1.0,
-            recursion: None,
             assembly: Assembly::default(),
-        };
+            recursion: None,
+        }
+        .assembled(scene, &kept_angles(scene))?;
         mechanism.choose_form();
         if let Some(recursion) = mechanism.recursion.as_ref().filter(|recursion| recursion.ways.entries() > DENSE_LIMIT * DENSE_LIMIT) {
             return Err(CompileError::TooMany(recursion.ways.rows()));
         }
-        let mut mechanism = mechanism.assembled(scene, &kept_angles(scene))?;
         mechanism.check_mass(scene)?;
         mechanism.energy_scale = mechanism.scale_of_energy(&mechanism.start(scene));
         Ok(mechanism)

@@ -73,7 +73,7 @@ impl<T: Scalar> Kernel<T> {
 
     /// Scratch space for energies.
     pub fn without_rows(mechanism: &Mechanism) -> Self {
-        let is_dense = mechanism.recursion.is_none();
+        let is_dense = mechanism.recursion.is_none() && mechanism.tree.is_dense();
         let mut kernel = Self::sized(mechanism.coordinates(), Vec::new(), is_dense);
         if !is_dense {
             kernel.feet = std::array::from_fn(|_| vec![Complex::ZERO; mechanism.bodies.len()]);
