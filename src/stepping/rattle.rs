@@ -173,4 +173,3 @@ impl Rattle {
         StepError { cause, method: self.name().into(), t, step: self.step, what, hint }
     }
 }
-
