@@ -34,8 +34,10 @@ const DISTINCT: f64 = 1e-4;
 const DEPENDENT: f64 = 1e-9;
 /// The same near a singular position, where rows that are met to [`KEPT`] leave angles open by its square root.
 const NEARLY: f64 = 1e-5;
-/// More coordinates than this are not taken apart: what is said of rank and doubles stands for the start alone.
-const DENSE: usize = 300;
+/// Up to so many coordinates redundant rows are told from singular ones, and rounding is spread over all that is given.
+const DENSE: usize = 100;
+/// Rows squared times coordinates up to which the rows' rank is formed; beyond, they are taken to be independent.
+const LARGEST: usize = 1 << 31;
 
 /// How the start was found, and the degrees of freedom that are left.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -305,7 +307,7 @@ impl<'a> Problem<'a> {
     }
 
     fn add_aims(&self, matrix: &mut Matrix, aims: &[Aim], q: &[DoubleDouble]) {
-        let z = self.linearise::<f64>(q, &vec![0.0; q.len()]).z;
+        let z = self.face::<f64>(q).1;
         for aim in aims {
             matrix.entries.extend(self.aim(aim, q, &z).1);
             matrix.rows += 1;
@@ -314,7 +316,7 @@ impl<'a> Problem<'a> {
 
     /// The value of every aim \[rad or m\].
     fn measured(&self, q: &[DoubleDouble]) -> impl Iterator<Item = f64> {
-        let z = self.linearise::<DoubleDouble>(q, &vec![DoubleDouble::ZERO; q.len()]).z;
+        let z = self.face::<DoubleDouble>(q).1;
         self.aims.iter().map(|aim| self.aim(aim, q, &z).0.hi).collect::<Vec<f64>>().into_iter()
     }
 
@@ -427,7 +429,7 @@ impl<'a> Problem<'a> {
             // Rows of lost rank would take any rates for these.
             self.check_open(q, &every, &aims, &missing, "omega")?;
         }
-        let z = self.linearise::<DoubleDouble>(q, &omega).z;
+        let z = self.face::<DoubleDouble>(q).1;
         for aim in &aims {
             let used = self.aim_rate(aim, &z, &omega).hi;
             changes.extend(self.change(aim, used, ["omega", "velocity"], ["rad/s", "m/s"]));
@@ -439,6 +441,9 @@ impl<'a> Problem<'a> {
     fn rank(&self, q: &[DoubleDouble]) -> Assembly {
         let rows = self.mechanism.rows.len();
         let every = vec![true; rows];
+        if (rows * rows).saturating_mul(q.len()) > LARGEST {
+            return Assembly { degrees_of_freedom: q.len() - rows, conditioning: f64::NAN, ..Assembly::default() };
+        }
         let here = self.jacobian(q, &every);
         let conditioning = if rows == 0 {
             1.0
