@@ -4,7 +4,6 @@ mod common;
 #[path = "common/trees.rs"]
 mod trees;
 
-use trees::{Dice, tree};
 use driftless::arithmetic::{Complex, DoubleDouble};
 use driftless::dynamics::kernel::{Bias, Kernel};
 use driftless::dynamics::natural::{Natural, NaturalError};
@@ -14,6 +13,7 @@ use driftless::scene::{Drive, Force, Given, Hinge, Law, Lock, Place, Rail, Scene
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 use std::sync::Arc;
+use trees::{Dice, tree};
 
 type C = Complex<f64>;
 
