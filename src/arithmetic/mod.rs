@@ -74,6 +74,13 @@ pub trait Real: Scalar + PartialOrd {
     fn abs(self) -> Self {
         if self < Self::ZERO { -self } else { self }
     }
+
+    /// Writes the unit vectors at many angles \[rad\]; plain doubles are taken four at a time.
+    fn units(angles: &[Self], units: &mut [Complex<Self>]) {
+        for (unit, &angle) in units.iter_mut().zip(angles) {
+            *unit = Complex::unit(angle);
+        }
+    }
 }
 
 impl Scalar for f64 {
@@ -117,5 +124,9 @@ impl Real for f64 {
     #[inline(always)]
     fn double_double(self) -> DoubleDouble {
         DoubleDouble::of(self)
+    }
+
+    fn units(angles: &[Self], units: &mut [Complex<Self>]) {
+        sincos::units(angles, units);
     }
 }

@@ -14,9 +14,10 @@
 //!
 //! Source of the reduction: W. J. Cody, W. Waite, *Software Manual for the Elementary Functions* (1980), section 8, with a fused multiply-add.
 
-use super::DoubleDouble;
-use super::Scalar;
-use super::lanes::Lanes;
+#[cfg(target_arch = "x86_64")]
+use super::lanes::{self, Avx};
+use super::lanes::{Lanes, Portable};
+use super::{Complex, DoubleDouble, Scalar};
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
 /// Largest magnitude of an angle that is reduced in lanes \[rad\].
@@ -128,6 +129,41 @@ pub fn sin_cos<L: Lanes>(angle: L, rest: L) -> (L, L) {
     reduced.turn(sin, cos)
 }
 
+/// Writes the unit vectors at these angles \[rad\], four at a time.
+pub fn units(angles: &[f64], units: &mut [Complex<f64>]) {
+    #[cfg(target_arch = "x86_64")]
+    if lanes::available() {
+        // SAFETY: the processor has been asked.
+        #[allow(unsafe_code)]
+        unsafe {
+            units_fused(angles, units)
+        };
+        return;
+    }
+    units_in::<Portable>(angles, units);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx,fma")]
+fn units_fused(angles: &[f64], units: &mut [Complex<f64>]) {
+    units_in::<Avx>(angles, units);
+}
+
+#[inline(always)]
+fn units_in<L: Lanes>(angles: &[f64], units: &mut [Complex<f64>]) {
+    let n = angles.len().min(units.len());
+    for at in (0..n).step_by(4) {
+        let count = 4.min(n - at);
+        let mut four = [0.0; 4];
+        four[..count].copy_from_slice(&angles[at..at + count]);
+        let (sin, cos) = sin_cos(L::of(four), L::ZERO);
+        let (sin, cos) = (sin.array(), cos.array());
+        for k in 0..count {
+            units[at + k] = Complex { re: cos[k], im: sin[k] };
+        }
+    }
+}
+
 /// A number and what it leaves out, in lanes.
 type Pair<L> = [L; 2];
 
@@ -197,7 +233,6 @@ fn far_pair<L: Lanes>(angles: [f64; 4], rests: [f64; 4]) -> (Pair<L>, Pair<L>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arithmetic::lanes::Portable;
     use std::f64::consts::{PI, TAU};
 
     /// Sine and cosine in double-double; quarter turns are taken off in three parts first, which [`DoubleDouble`] does in two.
@@ -316,6 +351,19 @@ mod tests {
             for power in 0..30 {
                 let angle = p * 2f64.powi(-power);
                 check([(angle, 0.0), (-angle, 0.0)].into_iter());
+            }
+        }
+    }
+
+    #[test]
+    fn many_unit_vectors_are_those_of_each() {
+        let angles: Vec<f64> = (0..11).map(|k| 0.7 * f64::from(k) - 3.0).chain([RANGE.next_up()]).collect();
+        for n in [0, 1, 3, 4, 12] {
+            let mut several = vec![Complex::ZERO; n];
+            units(&angles[..n], &mut several);
+            for (unit, &angle) in several.iter().zip(&angles) {
+                let (sin, cos) = sin_cos(Portable::splat(angle), Portable::ZERO);
+                assert_eq!((unit.re, unit.im), (cos.array()[0], sin.array()[0]));
             }
         }
     }

@@ -52,7 +52,7 @@ impl<T: Scalar> Scratch<T> {
         let (n, f) = (mechanism.coordinates(), mechanism.ties.count());
         let zeros = || vec![T::ZERO; n];
         Self {
-            kernel: Kernel::without_rows(mechanism),
+            kernel: Kernel::dense_without_rows(mechanism),
             factor: vec![T::ONE; mechanism.actions.len()],
             drive: vec![Phase::default(); n],
             drive_rate: zeros(),

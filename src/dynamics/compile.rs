@@ -1,5 +1,6 @@
 //! Scene to mechanism: the hinge trees, their constant matrices, the rows, and what the scene does not need left out.
 
+use super::assembly::Assembly;
 use super::force::action::Kind;
 use super::force::{Action, Spring, Torsion};
 use super::forest::{Foot, Forest};
@@ -7,14 +8,18 @@ use super::impact::Contact;
 use super::kernel::Kernel;
 use super::law::Law;
 use super::point::Point;
+use super::recursive::Recursion;
 use super::row::{self, Row, Site};
 use super::ties::Ties;
-use super::tree::{self, Tree};
+use super::tree::Tree;
 use crate::arithmetic::Complex;
 use crate::scene::{Place, Scene, Slider};
+use std::sync::Arc;
 
-/// The largest number of coordinates the dense form takes; its matrices hold n² numbers.
+/// The largest number of coordinates for which the matrices of the tree are made; they hold n² numbers.
 pub const DENSE_LIMIT: usize = 2000;
+/// So many coordinates have code made for their number.
+const UNROLLED: usize = 3;
 
 /// A scene's equations: constants only, shared by every form and method.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,6 +52,10 @@ pub struct Mechanism {
     pub ground_energy: f64,
     /// What energies are divided by in reports \[J\]: see [`Mechanism::energy_scale`](super::energy).
     pub energy_scale: f64,
+    /// How the start was found.
+    pub assembly: Assembly,
+    /// The constants of the recursive form, where that is the one evaluated.
+    pub recursion: Option<Arc<Recursion>>,
 }
 
 /// A body of the mechanism.
@@ -85,25 +94,74 @@ pub enum CompileError {
     /// Motors and locks give the same angle twice.
     #[error("`{0}` gives an angle that the other motors and locks give already")]
     Redundant(String),
-    /// Too many bodies for the dense form.
-    #[error("{0} coordinates; the dense form takes at most {DENSE_LIMIT}")]
+    /// Too many rows that act on one another.
+    #[error("{0} constraint rows that act on one another through the bodies they hang on; at most about {DENSE_LIMIT} are taken")]
     TooMany(usize),
     /// The mass matrix is singular: some body has no inertia about its hinge.
     #[error("the mass matrix is singular at the start: bar `{0}` and what hangs on it have no inertia about its hinge")]
     Massless(String),
+    /// No start closes the rows, or none near what is given.
+    #[error(
+        "no start fits: constraint `{row}` is off by {left:.3e} {unit} at the nearest\nhint: check lengths and places, and whether what `start` gives can be reached"
+    )]
+    Impossible {
+        /// The row that is off most.
+        row: String,
+        /// By how much.
+        left: f64,
+        /// `rad` or `m`.
+        unit: &'static str,
+    },
+    /// No rates keep the rows at the start.
+    #[error(
+        "no rates fit the start: constraint `{row}` slips by {left:.3e} {unit}\nhint: check motors against locks, and whether the start is a dead centre for the motor"
+    )]
+    ImpossibleRates {
+        /// The row that slips most.
+        row: String,
+        /// By how much.
+        left: f64,
+        /// `rad/s` or `m/s`.
+        unit: &'static str,
+    },
+    /// A coordinate that neither the rows nor the scene give.
+    #[error("the start leaves `{0}` open: no constraint gives it\nhint: add it to the scene")]
+    Undetermined(String),
+    /// More than one start fits what is given.
+    #[error("the start is ambiguous: `{what}` may be {one:.6} or {other:.6} {unit}\nhint: add it to the scene; roughly is enough")]
+    Ambiguous {
+        /// Where the scene could say which.
+        what: String,
+        /// One value.
+        one: f64,
+        /// Another.
+        other: f64,
+        /// `rad` or `m`.
+        unit: &'static str,
+    },
+    /// A spring with a free length starts without a direction.
+    #[error(
+        "spring `{0}` starts with length 0 and has a free length\nhint: its force has no direction there; start elsewhere, move an end, or set free_length to 0"
+    )]
+    SpringWithoutLength(String),
+    /// A point starts behind its wall.
+    #[error("wall `{wall}` has its point {gap:.3e} m behind it at the start\nhint: start elsewhere, move the wall, or turn its normal")]
+    BehindWall {
+        /// The wall.
+        wall: String,
+        /// How far \[m\].
+        gap: f64,
+    },
 }
 
 impl Mechanism {
     /// Compiles a scene.
     ///
     /// # Errors
-    /// What the reader of scenes refuses too (doubled motors), a singular mass matrix, or too many bodies.
+    /// What the reader of scenes refuses too (doubled motors), a singular mass matrix, or too many rows that act on one another.
     pub fn new(scene: &Scene) -> Result<Self, CompileError> {
         let forest = Forest::new(scene);
         let n = forest.coordinates;
-        if n > DENSE_LIMIT {
-            return Err(CompileError::TooMany(n));
-        }
         let bodies: Vec<Body> = (scene.bars.iter().zip(&forest.hangs))
             .map(|(bar, hang)| Body {
                 name: bar.name.clone(),
@@ -150,8 +208,8 @@ impl Mechanism {
                 Contact { row, point: site.point, normal, restitution: wall.restitution }
             })
             .collect();
-        let root = |k: usize, body: &Body| body.mass * gravity.dot(forest.walk(k, body.centre).root);
-        let ground_energy = bodies.iter().enumerate().fold(0.0, |sum, (k, body)| sum - root(k, body));
+        let roots = forest.roots();
+        let ground_energy = bodies.iter().zip(&roots).fold(0.0, |sum, (body, &root)| sum - body.mass * gravity.dot(root));
         let mut mechanism = Self {
             ground_energy,
             tree: constants(&bodies, &forest, gravity),
@@ -167,10 +225,37 @@ impl Mechanism {
             ties,
             gravity,
             energy_scale: 1.0,
-        };
+            assembly: Assembly::default(),
+            recursion: None,
+        }
+        .assembled(scene, &kept_angles(scene))?;
+        mechanism.choose_form();
+        if let Some(recursion) = mechanism.recursion.as_ref().filter(|recursion| recursion.ways.entries() > DENSE_LIMIT * DENSE_LIMIT) {
+            return Err(CompileError::TooMany(recursion.ways.rows()));
+        }
         mechanism.check_mass(scene)?;
         mechanism.energy_scale = mechanism.scale_of_energy(&mechanism.start(scene));
         Ok(mechanism)
+    }
+
+    /// Decides in which form the equations are evaluated, body by body or by the matrices of the tree, by what they cost with these rows.
+    pub(super) fn choose_form(&mut self) {
+        let is_dense = self.tree.is_dense();
+        let recursion = (!is_dense || self.coordinates() > UNROLLED)
+            .then(|| Recursion::new(&self.bodies, &self.forest, &self.rows, self.gravity))
+            .filter(|recursion| !is_dense || recursion.pays());
+        self.recursion = recursion.map(Arc::new);
+    }
+
+    /// The mechanism with its equations evaluated body by body, whatever that costs.
+    pub fn body_by_body(&self) -> Self {
+        let recursion = Recursion::new(&self.bodies, &self.forest, &self.rows, self.gravity);
+        Self { recursion: Some(Arc::new(recursion)), ..self.clone() }
+    }
+
+    /// The mechanism with its equations evaluated in matrices; `None` where it is too large.
+    pub fn by_matrices(&self) -> Option<Self> {
+        self.tree.is_dense().then(|| Self { recursion: None, ..self.clone() })
     }
 
     /// Number of coordinates: the bodies' angles, and two for every foot that moves freely.
@@ -178,9 +263,9 @@ impl Mechanism {
         self.tree.coordinates
     }
 
-    /// The number of bodies where angles are all there is, as code made for a size asks for; else 0, any number.
+    /// The number of bodies where angles are all there is and matrices are used, as code made for a size asks for; else 0, any number.
     pub fn size(&self) -> usize {
-        if self.coordinates() == self.bodies.len() { self.bodies.len() } else { 0 }
+        if self.coordinates() == self.bodies.len() && self.recursion.is_none() { self.bodies.len() } else { 0 }
     }
 
     /// Centre of mass of a body as a point.
@@ -222,12 +307,18 @@ impl Mechanism {
         let mut mechanism = self.clone();
         let before_contacts = mechanism.standing_rows();
         mechanism.rows.splice(before_contacts..before_contacts, row::pin_rows(name, a, b, self.bodies.len()));
+        mechanism.choose_form();
         mechanism
     }
 
     /// True where the scene has a damper.
     pub fn is_damped(&self) -> bool {
         self.springs.iter().any(|spring| spring.damping != 0.0) || self.torsions.iter().any(|torsion| torsion.damping != 0.0)
+    }
+
+    /// True where anything but gravity and rows acts.
+    pub fn is_forced(&self) -> bool {
+        !(self.springs.is_empty() && self.torsions.is_empty() && self.actions.is_empty())
     }
 
     /// True where forces do work that no energy stands for: dampers, applied forces and torques.
@@ -242,7 +333,7 @@ impl Mechanism {
 
     /// True where only gravity and rows act on bodies that hang on the ground.
     pub fn is_plain(&self) -> bool {
-        self.size() > 0 && self.springs.is_empty() && self.torsions.is_empty() && self.actions.is_empty()
+        self.coordinates() == self.bodies.len() && !self.is_forced()
     }
 
     /// True where whole turns matter, so that angles are not wrapped.
@@ -257,13 +348,12 @@ impl Mechanism {
 
     /// The mass matrix at the start must be positive definite.
     fn check_mass(&self, scene: &Scene) -> Result<(), CompileError> {
-        let n = self.coordinates();
         let start = self.start(scene);
         let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
-        let mut kernel = Kernel::<f64>::without_rows(self);
+        let mut kernel = Kernel::<f64>::new(self);
         kernel.face::<0>(self, &phi);
-        self.tree.couple::<f64, 0>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
-        tree::factor::<f64, 0>(n, &mut kernel.mass, &mut kernel.pivot);
+        kernel.couple::<0>(self);
+        kernel.factor::<0>(self, &vec![0.0; phi.len()]);
         let singular = |&k: &usize| {
             // Not a number counts as singular.
             let sound = 1.0 / (kernel.pivot[k] * self.tree.diagonal[k]) > 1e-13;
@@ -291,6 +381,14 @@ fn given_angles(scene: &Scene) -> Vec<Row> {
     let sliders = (scene.sliders.iter().filter(|slider| slider.locked))
         .filter_map(|slider| keep(&format!("{}.angle", slider.name), slider.point.bar, slider.rail.place.bar, None));
     motors.chain(locks).chain(welds).chain(sliders).collect()
+}
+
+/// The rows of [`given_angles`] whose angle is that of the start.
+fn kept_angles(scene: &Scene) -> Vec<usize> {
+    let locks = scene.locks.iter().map(|lock| lock.angle.is_none());
+    let others = scene.welds.len() + scene.sliders.iter().filter(|slider| slider.locked).count();
+    let kept = locks.chain(std::iter::repeat_n(true, others));
+    (scene.motors.len()..).zip(kept).filter(|(_, kept)| *kept).map(|(row, _)| row).collect()
 }
 
 /// Hinges and welds; those that close a loop add their rows.
@@ -360,6 +458,9 @@ fn actions(scene: &Scene, forest: &Forest) -> Vec<Action> {
 /// H, d and the weights.
 fn constants(bodies: &[Body], forest: &Forest, gravity: Complex<f64>) -> Tree {
     let n = forest.coordinates;
+    if n > DENSE_LIMIT {
+        return long_constants(bodies, forest, gravity);
+    }
     let mut coupling = vec![Complex::ZERO; n * n];
     let mut diagonal: Vec<f64> = bodies.iter().map(|body| body.inertia).collect();
     diagonal.resize(n, 0.0);
@@ -378,4 +479,30 @@ fn constants(bodies: &[Body], forest: &Forest, gravity: Complex<f64>) -> Tree {
     }
     let off_axis = coupling.iter().any(|h| h.im != 0.0);
     Tree { coordinates: n, angles: bodies.len(), coupling, diagonal, weight, off_axis }
+}
+
+/// d and the weights, from what hangs on each body; no H.
+fn long_constants(bodies: &[Body], forest: &Forest, gravity: Complex<f64>) -> Tree {
+    let n = forest.coordinates;
+    let (mut diagonal, mut weight) = (vec![0.0; n], vec![Complex::ZERO; n]);
+    // Mass of each body and of all that hangs on it.
+    let mut carried: Vec<f64> = bodies.iter().map(|body| body.mass).collect();
+    let mut off_axis = false;
+    for &k in forest.order.iter().rev() {
+        let Body { mass, inertia, centre, .. } = bodies[k];
+        diagonal[k] += inertia + mass * centre.norm_squared();
+        weight[k] += (centre.conj() * gravity).times(mass);
+        off_axis |= centre.im != 0.0;
+        match forest.hangs[k].foot {
+            Foot::Ground(_) => {}
+            Foot::On(parent, hinge) => {
+                diagonal[parent] += carried[k] * hinge.norm_squared();
+                weight[parent] += (hinge.conj() * gravity).times(carried[k]);
+                carried[parent] += carried[k];
+                off_axis |= hinge.im != 0.0;
+            }
+            Foot::Free(x) => (diagonal[x], weight[x]) = (carried[k], gravity.times(carried[k])),
+        }
+    }
+    Tree { coordinates: n, angles: bodies.len(), coupling: Vec::new(), diagonal, weight, off_axis }
 }

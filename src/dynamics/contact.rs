@@ -29,6 +29,7 @@ impl Mechanism {
         mechanism.rows.truncate(self.standing_rows());
         mechanism.rows.extend(contacts.iter().map(|&contact| self.contacts[contact].row.clone()));
         mechanism.held = contacts.to_vec();
+        mechanism.choose_form();
         mechanism
     }
 
@@ -43,7 +44,7 @@ impl Mechanism {
     pub fn staying(&self, touching: &[usize], t: Time, phi: &[f64], omega: &[f64]) -> Option<Vec<usize>> {
         let all = self.holding(touching);
         let (n, size, motors) = (self.coordinates(), all.rows.len(), self.standing_rows());
-        let mut kernel = Kernel::<f64>::new(&all);
+        let mut kernel = Kernel::<f64>::dense(&all);
         kernel.accelerate_free::<0>(&all, t, phi, omega);
         kernel.linearise::<0>(&all, t, phi, omega);
         fn part(rows: &[f64], r: usize, n: usize) -> &[f64] {

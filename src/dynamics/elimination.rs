@@ -37,7 +37,7 @@ impl<const N: usize> Elimination<N> {
         let (n, f) = (mechanism.coordinates(), mechanism.ties.count());
         let zeros = || vec![0.0; n];
         Self {
-            kernel: Kernel::without_rows(&mechanism),
+            kernel: Kernel::dense_without_rows(&mechanism),
             phi: zeros(),
             share: zeros(),
             omega: zeros(),

@@ -4,6 +4,7 @@
 //! its own rounding.
 
 use super::kernel::{Kernel, dot};
+use super::row::Posture;
 use super::{Mechanism, Motion, Time, tree};
 #[cfg(target_arch = "x86_64")]
 use crate::arithmetic::lanes;
@@ -34,8 +35,13 @@ fn fused_energy(mechanism: &Mechanism, kernel: &mut Kernel<DoubleDouble>, motion
 }
 
 impl Mechanism {
-    /// The scene's start as a motion; angles are reduced from the very doubles given.
+    /// The scene's start as a motion: found from the rows where a part of it can be, else as given.
     pub fn start(&self, scene: &Scene) -> Motion {
+        self.assembly.start.clone().unwrap_or_else(|| self.start_as_given(scene))
+    }
+
+    /// The start as given, with guesses; angles are reduced from the very doubles given.
+    pub(super) fn start_as_given(&self, scene: &Scene) -> Motion {
         let mut motion = Motion::default();
         for start in &scene.start {
             let full = DoubleDouble::of(start.phi);
@@ -94,6 +100,9 @@ impl Mechanism {
     /// Energies at the elements in `kernel` and the coordinates they stand for; it holds M and its twist afterwards; for `N` bodies (any number where `N` is 0).
     #[inline(always)]
     pub fn energy_facing<T: Real, const N: usize>(&self, kernel: &mut Kernel<T>, phi: &[T], omega: &[T]) -> Energy<T> {
+        if N == 0 && !kernel.feet[0].is_empty() {
+            return self.energy_bodywise(kernel, phi, omega);
+        }
         let n = tree::size::<N>(self.coordinates());
         self.tree.couple::<T, N>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
         tree::multiply::<T, N>(n, &kernel.mass, omega, &mut kernel.load);
@@ -102,6 +111,44 @@ impl Mechanism {
         Energy {
             kinetic: dot(omega, &kernel.load).scale(0.5),
             potential: self.torsions.iter().fold(springs, |sum, torsion| sum + torsion.energy(phi)),
+        }
+    }
+
+    /// The same body by body, from the motion of every centre of mass.
+    #[inline(always)]
+    fn energy_bodywise<T: Real>(&self, kernel: &mut Kernel<T>, phi: &[T], omega: &[T]) -> Energy<T> {
+        let (z, [feet, velocities]) = (&kernel.z, &mut kernel.feet);
+        self.forest.feet(z, feet);
+        self.forest.foot_velocities(z, omega, velocities);
+        let gravity = Complex::of(self.gravity);
+        let (mut kinetic, mut potential) = (T::ZERO, T::ZERO);
+        for (k, body) in self.bodies.iter().enumerate() {
+            let arm = z[k].turn(body.centre);
+            let velocity = velocities[k] + arm.left().times(omega[k]);
+            kinetic += velocity.norm_squared().scale(0.5 * body.mass) + (omega[k] * omega[k]).scale(0.5 * body.inertia);
+            potential -= gravity.dot(feet[k] + arm).scale(body.mass);
+        }
+        Energy { kinetic, potential: potential + self.elastic_energy(z, phi) }
+    }
+
+    /// Energy of springs and torsion springs \[J\].
+    #[inline(always)]
+    fn elastic_energy<T: Real>(&self, z: &[Complex<T>], phi: &[T]) -> T {
+        let springs = self.springs.iter().fold(T::ZERO, |sum, spring| sum + spring.energy(z));
+        self.torsions.iter().fold(springs, |sum, torsion| sum + torsion.energy(phi))
+    }
+
+    /// Adds the generalized forces \[N·m, N\] of springs, dampers and applied forces.
+    #[inline(always)]
+    pub fn push<T: Real>(&self, t: Time, at: Posture<T>, load: &mut [T]) {
+        for spring in &self.springs {
+            spring.span.pull(spring.force(at.z, at.omega), at.z, load);
+        }
+        for torsion in &self.torsions {
+            torsion.pull(torsion.torque(at.phi, at.omega), load);
+        }
+        for action in &self.actions {
+            action.pull(action.factor(t), at.z, load);
         }
     }
 

@@ -126,7 +126,21 @@ impl Forest {
         Site { body: place.bar, point: self.point(place) }
     }
 
+    /// The ground point that each body hangs from, one body on another; the origin where a foot moves freely \[m\].
+    pub fn roots(&self) -> Vec<Complex<f64>> {
+        let mut roots = vec![Complex::ZERO; self.hangs.len()];
+        for &body in &self.order {
+            roots[body] = match self.hangs[body].foot {
+                Foot::Ground(at) => at,
+                Foot::On(parent, _) => roots[parent],
+                Foot::Free(_) => Complex::ZERO,
+            };
+        }
+        roots
+    }
+
     /// Writes the feet of all bodies at the elements `z`, outwards \[m\].
+    #[inline(always)]
     pub fn feet<T: Scalar>(&self, z: &[Complex<T>], feet: &mut [Complex<T>]) {
         for &body in &self.order {
             feet[body] = match self.hangs[body].foot {
@@ -138,6 +152,7 @@ impl Forest {
     }
 
     /// Writes the velocities of the feet \[m/s\].
+    #[inline(always)]
     pub fn foot_velocities<T: Scalar>(&self, z: &[Complex<T>], omega: &[T], feet: &mut [Complex<T>]) {
         for &body in &self.order {
             feet[body] = match self.hangs[body].foot {
@@ -147,4 +162,20 @@ impl Forest {
             };
         }
     }
+
+    /// Writes the accelerations of the feet \[m/s²\].
+    pub fn foot_accelerations<T: Scalar>(&self, z: &[Complex<T>], omega: &[T], alpha: &[T], feet: &mut [Complex<T>]) {
+        for &body in &self.order {
+            feet[body] = match self.hangs[body].foot {
+                Foot::Ground(_) => Complex::ZERO,
+                Foot::On(parent, offset) => feet[parent] + swing(z[parent].turn(offset), omega[parent], alpha[parent]),
+                Foot::Free(x) => Complex::new(alpha[x], alpha[x + 1]),
+            };
+        }
+    }
+}
+
+/// Acceleration \[m/s²\] of the end of an arm that turns.
+pub fn swing<T: Scalar>(arm: Complex<T>, omega: T, alpha: T) -> Complex<T> {
+    arm.left().times(alpha) - arm.times(omega * omega)
 }

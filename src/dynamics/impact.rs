@@ -51,7 +51,7 @@ impl Mechanism {
     pub fn strike(&self, contact: usize, t: Time, phi: &[f64], omega: &[f64]) -> Option<Impact> {
         let Contact { row, restitution, .. } = &self.contacts[contact];
         let n = self.coordinates();
-        let mut kernel = Kernel::<f64>::without_rows(self);
+        let mut kernel = Kernel::<f64>::dense_without_rows(self);
         kernel.face::<0>(self, phi);
         self.tree.couple::<f64, 0>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
         let mut jacobian = vec![0.0; n];

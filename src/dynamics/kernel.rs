@@ -6,6 +6,7 @@
 //!
 //! A scene without rows never enters the second line.
 
+use super::recursive::Evaluation;
 use super::row::{Linearised, Posture};
 use super::schur::{self, Weakest};
 use super::tree::{self, size};
@@ -52,37 +53,54 @@ pub struct Kernel<T> {
     pub multiplier: Vec<T>,
     /// The part of each multiplier that the bias called for (r).
     pub correction: Vec<T>,
+    /// What stands in place of the matrices where the mechanism is evaluated body by body; they are empty then.
+    pub bodywise: Option<Box<Evaluation<T>>>,
+    /// Feet of the bodies and their velocities, where energies are formed body by body.
+    pub feet: [Vec<Complex<T>>; 2],
 }
 
 impl<T: Scalar> Kernel<T> {
-    /// Scratch space for a mechanism and its rows.
-    pub fn new(mechanism: &Mechanism) -> Self {
-        Self::sized(mechanism.coordinates(), mechanism.row_scales())
+    /// Scratch space with all matrices, whatever the mechanism's own form is; it must have [couplings](tree::Tree::is_dense).
+    pub fn dense(mechanism: &Mechanism) -> Self {
+        Self::sized(mechanism.coordinates(), mechanism.row_scales(), true)
     }
 
-    /// Scratch space for a mechanism whose rows nobody asks about.
+    /// The same for a mechanism whose rows nobody asks about.
+    pub fn dense_without_rows(mechanism: &Mechanism) -> Self {
+        Self::sized(mechanism.coordinates(), Vec::new(), true)
+    }
+
+    /// Scratch space for energies.
     pub fn without_rows(mechanism: &Mechanism) -> Self {
-        Self::sized(mechanism.coordinates(), Vec::new())
+        let is_dense = mechanism.recursion.is_none();
+        let mut kernel = Self::sized(mechanism.coordinates(), Vec::new(), is_dense);
+        if !is_dense {
+            kernel.feet = std::array::from_fn(|_| vec![Complex::ZERO; mechanism.bodies.len()]);
+        }
+        kernel
     }
 
-    fn sized(n: usize, scale: Vec<f64>) -> Self {
+    fn sized(n: usize, scale: Vec<f64>, is_dense: bool) -> Self {
         let rows = scale.len();
+        let matrix = |size: usize| vec![T::ZERO; if is_dense { size } else { 0 }];
         let idle = Linearised { position: T::ZERO, drive: T::ZERO, convective: T::ZERO };
         Self {
             z: vec![Complex::ZERO; n],
-            mass: vec![T::ZERO; n * n],
-            twist: vec![T::ZERO; n * n],
+            mass: matrix(n * n),
+            twist: matrix(n * n),
             pivot: vec![T::ZERO; n],
             load: vec![T::ZERO; n],
-            jacobian: vec![T::ZERO; rows * n],
-            lifted: vec![T::ZERO; rows * n],
-            schur: vec![T::ZERO; rows * rows],
-            schur_pivot: vec![T::ZERO; rows],
+            jacobian: matrix(rows * n),
+            lifted: matrix(rows * n),
+            schur: matrix(rows * rows),
+            schur_pivot: matrix(rows),
             scale,
             weakest: Weakest::NONE,
             rows: vec![idle; rows],
             multiplier: vec![T::ZERO; rows],
             correction: vec![T::ZERO; rows],
+            bodywise: None,
+            feet: Default::default(),
         }
     }
 
@@ -94,26 +112,56 @@ impl<T: Scalar> Kernel<T> {
 }
 
 impl<T: Real> Kernel<T> {
+    /// Scratch space for a mechanism and its rows, in the form the mechanism is evaluated in.
+    pub fn new(mechanism: &Mechanism) -> Self {
+        let Some(recursion) = &mechanism.recursion else { return Self::dense(mechanism) };
+        let mut kernel = Self::sized(mechanism.coordinates(), mechanism.row_scales(), false);
+        kernel.bodywise = Some(Box::new(Evaluation::new(recursion, &kernel.scale)));
+        kernel.feet = std::array::from_fn(|_| vec![Complex::ZERO; mechanism.bodies.len()]);
+        kernel
+    }
+
     /// M, its twist and the whole load b (velocity terms, gravity, springs, dampers, applied forces) at the elements in `z`.
     #[inline(always)]
     pub fn assemble<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
         mechanism.tree.couple::<T, N>(&self.z, &mut self.mass, &mut self.twist);
         mechanism.tree.load::<T, N>(&self.z, omega, &self.twist, &mut self.load);
-        for spring in &mechanism.springs {
-            spring.span.pull(spring.force(&self.z, omega), &self.z, &mut self.load);
+        mechanism.push(t, Posture { phi, z: &self.z, omega }, &mut self.load);
+    }
+
+    /// M and its twist at the elements in `z`, where there are such matrices.
+    #[inline(always)]
+    pub fn couple<const N: usize>(&mut self, mechanism: &Mechanism) {
+        if N > 0 || self.bodywise.is_none() {
+            mechanism.tree.couple::<T, N>(&self.z, &mut self.mass, &mut self.twist);
         }
-        for torsion in &mechanism.torsions {
-            torsion.pull(torsion.torque(phi, omega), &mut self.load);
+    }
+
+    /// The factors of M at the elements in `z`, after [`Kernel::couple`].
+    #[inline(always)]
+    pub fn factor<const N: usize>(&mut self, mechanism: &Mechanism, omega: &[T]) {
+        if N == 0
+            && let Some(bodywise) = &mut self.bodywise
+        {
+            bodywise.factor(&self.z, omega);
+            bodywise.pivots(&mut self.pivot);
+            return;
         }
-        for action in &mechanism.actions {
-            action.pull(action.factor(t), &self.z, &mut self.load);
-        }
+        tree::factor::<T, N>(size::<N>(mechanism.tree.coordinates), &mut self.mass, &mut self.pivot);
     }
 
     /// Accelerations \[rad/s²\] without any row, into `load`.
     #[inline(always)]
     pub fn accelerate_free<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
         let n = size::<N>(mechanism.tree.coordinates);
+        if N == 0
+            && let Some(bodywise) = &mut self.bodywise
+        {
+            bodywise.face(phi, &mut self.z);
+            bodywise.fold(mechanism, t, Posture { phi, z: &self.z, omega }, &mut self.load);
+            bodywise.unfold(&mut self.load);
+            return;
+        }
         self.face::<N>(mechanism, phi);
         self.assemble::<N>(mechanism, t, phi, omega);
         tree::factor::<T, N>(n, &mut self.mass, &mut self.pivot);
@@ -123,12 +171,28 @@ impl<T: Real> Kernel<T> {
     /// Accelerations \[rad/s²\] into `load`, multipliers into `multiplier`.
     #[inline(always)]
     pub fn accelerate<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T], bias: Bias) {
+        if N == 0 && self.bodywise.is_some() {
+            return self.accelerate_bodywise(mechanism, t, phi, omega, bias);
+        }
         self.accelerate_free::<N>(mechanism, t, phi, omega);
         match mechanism.rows.len() {
             1 => self.constrain::<N, 1>(mechanism, t, phi, omega, bias),
             2 => self.constrain::<N, 2>(mechanism, t, phi, omega, bias),
             _ => self.constrain::<N, 0>(mechanism, t, phi, omega, bias),
         }
+    }
+
+    /// [`Kernel::accelerate`] where there are no matrices.
+    fn accelerate_bodywise(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T], bias: Bias) {
+        let Some(bodywise) = &mut self.bodywise else { return };
+        bodywise.face(phi, &mut self.z);
+        let at = Posture { phi, z: &self.z, omega };
+        bodywise.fold(mechanism, t, at, &mut self.load);
+        if !mechanism.rows.is_empty() {
+            let found = (&mut self.rows[..], &mut self.multiplier[..], &mut self.correction[..]);
+            self.weakest = bodywise.constrain(mechanism, t, at, bias, found);
+        }
+        bodywise.unfold(&mut self.load);
     }
 
     /// The share of `R` rows (any number where `R` is 0): expects free accelerations in `load` and the factors of M.
@@ -170,13 +234,30 @@ impl<T: Real> Kernel<T> {
     /// C, G, C_t, gamma of every row, and the factors of S = G M⁻¹ Gᵀ; expects the factors of M.
     pub fn linearise<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
         self.rows_at(mechanism, t, phi, omega);
+        if let Some(bodywise) = &mut self.bodywise {
+            self.weakest = bodywise.couple();
+            return;
+        }
         self.couple_rows::<N, 0>(size::<N>(mechanism.tree.coordinates), mechanism.rows.len());
+    }
+
+    /// The smallest share of a row ([`schur`]) at these coordinates.
+    pub fn share_at(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) -> f64 {
+        self.face::<0>(mechanism, phi);
+        self.couple::<0>(mechanism);
+        self.factor::<0>(mechanism, omega);
+        self.linearise::<0>(mechanism, t, phi, omega);
+        self.weakest.share
     }
 
     /// C, G, C_t, gamma of every row, and nothing else.
     pub fn rows_at(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
         let n = mechanism.tree.coordinates;
         let posture = Posture { phi, z: &self.z, omega };
+        if let Some(bodywise) = &mut self.bodywise {
+            bodywise.rows_at(mechanism, t, posture, &mut self.rows);
+            return;
+        }
         self.jacobian.fill(T::ZERO);
         for (r, row) in mechanism.rows.iter().enumerate() {
             self.rows[r] = row.linearise(t, posture, &mut self.jacobian[r * n..(r + 1) * n]);
@@ -202,10 +283,52 @@ impl<T: Real> Kernel<T> {
         self.weakest = schur::factor::<T, R>(rows, schur, &mut self.schur_pivot, &self.scale);
     }
 
+    /// Replaces what is in `multiplier` by S⁻¹ of it; after [`Kernel::linearise`].
+    pub fn solve_rows(&mut self) {
+        match &mut self.bodywise {
+            Some(bodywise) => bodywise.solve_rows(&mut self.multiplier),
+            None => tree::solve::<T, 0>(self.multiplier.len(), &self.schur, &self.schur_pivot, &mut self.multiplier),
+        }
+    }
+
+    /// Writes M⁻¹ Gᵀ of what is in `multiplier` to `load`; after [`Kernel::linearise`].
+    pub fn lift(&mut self) {
+        if let Some(bodywise) = &mut self.bodywise {
+            return bodywise.lift(&self.multiplier, &mut self.load);
+        }
+        let (n, rows) = (self.z.len(), self.multiplier.len());
+        for k in 0..n {
+            self.load[k] = (0..rows).fold(T::ZERO, |sum, r| sum + self.lifted[r * n + k] * self.multiplier[r]);
+        }
+    }
+
+    /// True where row `r` was left out, its pivot lost; after [`Kernel::linearise`].
+    pub fn is_left_out(&self, r: usize) -> bool {
+        match &self.bodywise {
+            Some(bodywise) => bodywise.is_left_out(r),
+            None => self.schur_pivot[r] == T::ZERO,
+        }
+    }
+
+    /// Folds the entries of G in row `r` that may not be zero, with their coordinates.
+    #[inline(always)]
+    pub fn fold_gradient<S>(&self, r: usize, start: S, mut fold: impl FnMut(S, usize, T) -> S) -> S {
+        if let Some(bodywise) = &self.bodywise {
+            return bodywise.gradient(r).fold(start, |sum, (k, g)| fold(sum, k, g));
+        }
+        let n = self.z.len();
+        self.jacobian[r * n..(r + 1) * n].iter().enumerate().fold(start, |sum, (k, &g)| fold(sum, k, g))
+    }
+
+    /// G w of row `r` \[rad/s or m/s\], after an evaluation.
+    #[inline(always)]
+    pub fn row_speed(&self, r: usize, omega: &[T]) -> T {
+        self.fold_gradient(r, T::ZERO, |sum, k, g| sum + g * omega[k])
+    }
+
     /// C' of row `r` \[rad/s or m/s\], after [`Kernel::linearise`].
     pub fn row_rate(&self, r: usize, omega: &[T]) -> T {
-        let n = self.z.len();
-        dot(&self.jacobian[r * n..(r + 1) * n], omega) + self.rows[r].drive
+        self.row_speed(r, omega) + self.rows[r].drive
     }
 }
 

@@ -27,11 +27,13 @@
 //! [`multiplier`] in (q, w) with one multiplier per row, [`elimination`] with the driven angles as known functions of time, [`canonical`] in (q, p),
 //! the form in which Gauss methods are symplectic.
 
+pub mod assembly;
 pub mod canonical;
 pub mod compile;
 pub mod contact;
 pub mod elimination;
 pub mod energy;
+pub mod envelope;
 pub mod force;
 pub mod forest;
 pub mod impact;
@@ -43,6 +45,7 @@ pub mod point;
 pub mod points;
 pub mod quadratic;
 pub mod reaction;
+pub mod recursive;
 pub mod row;
 pub mod schur;
 pub mod series;

@@ -3,7 +3,7 @@
 //! Unknowns: coordinates (n), rates (n) and, where the scene has rows or forces that do work, the work of motors, dampers and applied forces and
 //! the energy the stabilizer puts in \[J\].  With `ACCOUNT = false` neither rows nor accounts exist in the code.
 
-use super::kernel::{Bias, Kernel, dot};
+use super::kernel::{Bias, Kernel};
 use super::tree::size;
 use super::{Coordinates, Field, Form, Glance, Mechanism, Motion, State, Time};
 use crate::arithmetic::DoubleDouble;
@@ -53,7 +53,7 @@ impl<const N: usize, const ACCOUNT: bool> Multiplier<N, ACCOUNT> {
             if !row.is_motor() {
                 continue;
             }
-            let speed = dot(&self.kernel.jacobian[r * n..(r + 1) * n], omega);
+            let speed = self.kernel.row_speed(r, &omega[..n]);
             work -= (self.kernel.multiplier[r] - self.kernel.correction[r]) * speed;
             stabilizer -= self.kernel.correction[r] * speed;
         }

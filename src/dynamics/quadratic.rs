@@ -50,6 +50,12 @@ impl Quadratic {
         found
     }
 
+    /// The coordinates it depends on; some may come up more than once.
+    pub fn coordinates(&self) -> Vec<usize> {
+        let elements = self.linear.iter().map(|term| term.0).chain(self.bilinear.iter().flat_map(|&(j, k, _)| [j, k]));
+        elements.flat_map(|k| std::iter::once(k).chain((k >= self.angles).then_some(k + 1))).collect()
+    }
+
     /// Q at the elements `z`.
     #[inline]
     pub fn value<T: Scalar>(&self, z: &[Complex<T>]) -> T {

@@ -7,18 +7,30 @@
 //! No unknowns are added for it; it equals the multipliers of the pinned form.  A hinge that closes a loop carries the force of its own rows.
 
 use super::compile::Joint;
+use super::forest::swing;
 use super::kernel::Kernel;
 use super::{Mechanism, Time};
 use crate::arithmetic::Complex;
 
 impl Mechanism {
+    /// Accelerations \[m/s²\] of the centres of mass.
+    pub fn centre_accelerations(&self, z: &[Complex<f64>], omega: &[f64], alpha: &[f64]) -> Vec<Complex<f64>> {
+        let mut found = vec![Complex::ZERO; self.bodies.len()];
+        self.forest.foot_accelerations(z, omega, alpha, &mut found);
+        for (k, (found, body)) in found.iter_mut().zip(&self.bodies).enumerate() {
+            *found += swing(z[k].turn(body.centre), omega[k], alpha[k]);
+        }
+        found
+    }
+
     /// Force \[N\] of the first body of each hinge on the second (in the scene's order), from an evaluation of the equations at these rates
     /// \[rad/s\]: its `load` must hold the accelerations, its `multiplier` those of all rows.
     pub fn hinge_forces(&self, t: Time, kernel: &Kernel<f64>, omega: &[f64]) -> Vec<Complex<f64>> {
         let (z, alpha) = (&kernel.z, &kernel.load);
-        let mut needed: Vec<Complex<f64>> = (0..self.bodies.len())
-            .map(|k| (self.centre(k).acceleration(z, omega, alpha) - self.gravity).times(self.bodies[k].mass))
-            .collect();
+        let mut needed = self.centre_accelerations(z, omega, alpha);
+        for (needed, body) in needed.iter_mut().zip(&self.bodies) {
+            *needed = (*needed - self.gravity).times(body.mass);
+        }
         for spring in &self.springs {
             let force = spring.force(z, omega);
             for (end, force) in spring.bodies.iter().zip([force, -force]) {

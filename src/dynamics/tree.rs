@@ -23,7 +23,7 @@ pub struct Tree {
     pub coordinates: usize,
     /// Number of bodies.
     pub angles: usize,
-    /// H above the diagonal, row by row (n × n) \[kg·m²; kg·m for a foot, in the column of its x\].
+    /// H above the diagonal, row by row (n × n) \[kg·m²; kg·m for a foot, in the column of its x\]; empty for very large trees.
     pub coupling: Vec<Complex<f64>>,
     /// Diagonal d_i = H_ii + I_i \[kg·m²; kg for a foot\].
     pub diagonal: Vec<f64>,
@@ -34,6 +34,11 @@ pub struct Tree {
 }
 
 impl Tree {
+    /// True where H is there; very large trees go without it.
+    pub fn is_dense(&self) -> bool {
+        self.coupling.len() == self.coordinates * self.coordinates
+    }
+
     /// About the fastest rate of small oscillations under gravity \[rad/s\], for hinges on the bodies' axes.
     ///
     /// Stretched, the chain has the least inertia against bending: the trace of M⁻¹ W there is about the square of its fastest rate.

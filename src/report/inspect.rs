@@ -80,8 +80,8 @@ pub fn inspect(scene: &Scene, mechanism: &Mechanism) -> Inspection {
     let mut kernel = Kernel::<f64>::new(mechanism);
     kernel.accelerate::<0>(mechanism, start.time, &phi, &omega, Bias::default());
     let mut found = Inspection { energy_scale: mechanism.energy_scale, ..Inspection::default() };
-    for (k, body) in mechanism.bodies.iter().enumerate() {
-        let centre = mechanism.centre(k).acceleration(&kernel.z, &omega, &kernel.load);
+    let centres = mechanism.centre_accelerations(&kernel.z, &omega, &kernel.load);
+    for (k, (body, centre)) in mechanism.bodies.iter().zip(centres).enumerate() {
         found.bodies.push((body.name.clone(), [centre.re, centre.im, kernel.load[k]]));
     }
     for (r, row) in mechanism.rows.iter().enumerate() {

@@ -125,7 +125,7 @@ impl Checkpoints {
         let mut file = tempfile::Builder::new().prefix(UNFINISHED).suffix(CHECKPOINT).tempfile_in(&self.folder).map_err(failed)?;
         file.write_all(&bytes).and_then(|()| file.as_file().sync_all()).map_err(failed)?;
         if self.has_last {
-            fs::rename(&path, &self.folder.join(PREVIOUS)).map_err(failed)?;
+            fs::rename(&path, self.folder.join(PREVIOUS)).map_err(failed)?;
         }
         file.persist(&path).map_err(|error| failed(error.error))?;
         (self.has_last, self.has_any) = (true, true);

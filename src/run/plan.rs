@@ -4,9 +4,10 @@
 
 use super::methods::{MethodId, Stabilization};
 use crate::arithmetic::DoubleDouble;
+use crate::dynamics::compile::DENSE_LIMIT;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::natural::Natural;
-use crate::dynamics::{Mechanism, Time, tree};
+use crate::dynamics::{Mechanism, Time};
 use crate::scene::Scene;
 use crate::stepping::Tolerance;
 
@@ -80,6 +81,8 @@ pub const MAX_ROWS: f64 = 1e9;
 const LEAST_EXTENDED: f64 = 1e-25;
 /// Runs of at least so many seconds are marched symplectically where that is possible.
 const LONG: f64 = 60.0;
+/// So many coordinates are cheaper body by body, with multipliers, than in the matrices that eliminated coordinates and momenta ask for.
+const MANY_COORDINATES: usize = 48;
 /// Steps beyond which a fixed step is not chosen unasked.
 const MANY_STEPS: f64 = 2e7;
 
@@ -257,6 +260,11 @@ fn choose(mechanism: &Mechanism, request: &Request, until: f64, rate: f64) -> (M
     let kept = request.stabilize.unwrap_or(usual(mechanism));
     let steps_back = !mechanism.rows.is_empty() && kept == Stabilization::Projection;
     let fixed_possible = mechanism.contacts.is_empty() && !tolerance && (mechanism.rows.is_empty() || kept == Stabilization::Elimination);
+    if mechanism.coordinates() > MANY_COORDINATES && mechanism.contacts.is_empty() && request.step.is_none() {
+        let why = format!("{} coordinates are taken body by body", mechanism.coordinates());
+        let method = if mechanism.rows.is_empty() { MethodId::Dop853 } else { MethodId::Dp8 };
+        return (method, format!("{method}: {why}"));
+    }
     if mechanism.is_tied_up() && mechanism.contacts.is_empty() && kept == Stabilization::Projection {
         if request.step.is_some() {
             (MethodId::Gauss(8), "gauss16: a fixed step was given; closed loops and sliders are kept by symmetric projection".into())
@@ -281,11 +289,33 @@ fn choose(mechanism: &Mechanism, request: &Request, until: f64, rate: f64) -> (M
 /// How the rows of a mechanism are kept where nobody says: given angles are eliminated where they are all there is to keep.
 fn usual(mechanism: &Mechanism) -> Stabilization {
     let counts_turns = mechanism.is_winding() && mechanism.ties.driven();
-    if mechanism.is_tied_up() || counts_turns { Stabilization::Projection } else { Stabilization::Elimination }
+    let is_large = mechanism.coordinates() > MANY_COORDINATES;
+    if mechanism.is_tied_up() || counts_turns || is_large { Stabilization::Projection } else { Stabilization::Elimination }
+}
+
+/// Very many coordinates are taken body by body or not at all.
+fn check_size(mechanism: &Mechanism, method: MethodId, request: &Request) -> Result<(), Refusal> {
+    if mechanism.tree.is_dense() {
+        return Ok(());
+    }
+    let n = mechanism.coordinates();
+    let reason = format!("its matrices would hold {n} x {n} numbers, and at most {DENSE_LIMIT} coordinates have them");
+    let alternative = "--method dop853, or dp8 where constraints are to be kept";
+    if !matches!(method, MethodId::Dopri5 | MethodId::Dop853 | MethodId::Dp5 | MethodId::Dp8) {
+        return Err(mismatch(format!("{method} on {n} coordinates"), &reason, alternative));
+    }
+    if !mechanism.contacts.is_empty() {
+        return Err(mismatch(format!("walls on {n} coordinates"), &reason.replace("its", "an impact's"), "fewer bodies"));
+    }
+    if !mechanism.rows.is_empty() && request.stabilize == Some(Stabilization::Elimination) {
+        return Err(mismatch(format!("elimination on {n} coordinates"), &reason, "--stabilize projection"));
+    }
+    Ok(())
 }
 
 /// The stabilization of a pairing, or why there is none.
 fn pair(mechanism: &Mechanism, method: MethodId, request: &Request, notes: &mut Vec<String>) -> Result<Stabilization, Refusal> {
+    check_size(mechanism, method, request)?;
     if !mechanism.contacts.is_empty() && !matches!(method, MethodId::Dp5 | MethodId::Dp8 | MethodId::Taylor) {
         let reason = match method {
             MethodId::Dopri5 | MethodId::Dop853 => "ode_solvers does not let an impact be located inside its steps",
@@ -322,7 +352,8 @@ fn pair(mechanism: &Mechanism, method: MethodId, request: &Request, notes: &mut 
         }
         return Ok(usual);
     };
-    if asked == Stabilization::Elimination && usual(mechanism) != Stabilization::Elimination {
+    let counts_turns = mechanism.is_winding() && mechanism.ties.driven();
+    if asked == Stabilization::Elimination && (mechanism.is_tied_up() || counts_turns) {
         let reason = if mechanism.is_tied_up() {
             "closed loops and sliders have no independent coordinates to be left with"
         } else {
@@ -404,13 +435,12 @@ fn fixed_step(
 
 /// An upper estimate of the fastest rate of the scene \[rad/s\]: what the energy at the start allows the lightest part, gravity, springs and motors.
 fn fastest_rate(scene: &Scene, mechanism: &Mechanism) -> f64 {
-    let n = mechanism.coordinates();
     let start = mechanism.start(scene);
     let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
     let omega: Vec<f64> = start.omega.iter().map(|omega| omega.hi).collect();
-    let mut kernel = Kernel::<f64>::without_rows(mechanism);
+    let mut kernel = Kernel::<f64>::new(mechanism);
     let energy = mechanism.energy(&mut kernel, &phi, &omega);
-    tree::factor::<f64, 0>(n, &mut kernel.mass, &mut kernel.pivot);
+    kernel.factor::<0>(mechanism, &omega);
     let lightest = kernel.pivot.iter().fold(0.0, |most: f64, &pivot| most.max(pivot));
     let gravity: f64 = mechanism.tree.weight[..mechanism.bodies.len()].iter().map(|weight| weight.norm_squared().sqrt()).sum();
     let available = (energy.total() - mechanism.ground_energy + gravity).max(0.0);

@@ -11,6 +11,7 @@
 use crate::arithmetic::Complex;
 use crate::arithmetic::sum::two_sum;
 use crate::dynamics::kernel::Kernel;
+use crate::dynamics::schur::{DROPPED, NEAR};
 use crate::dynamics::{Field, Form, Mechanism, State, Time, tree};
 use crate::stepping::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
 
@@ -20,6 +21,9 @@ use crate::stepping::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
 pub struct Projected<M> {
     inner: M,
     kernel: Option<Kernel<f64>>,
+    /// Energy less work after the last step, and whether that ended near a singular position.
+    balance: Option<f64>,
+    near: bool,
     /// Largest violation left that counts as converged, at both levels \[rad, rad/s or m, m/s\], relative to levers and
     /// speeds where these are larger.
     pub tolerance: f64,
@@ -28,7 +32,7 @@ pub struct Projected<M> {
 impl<M> Projected<M> {
     /// Projects after the steps of `inner`.
     pub fn new(inner: M) -> Self {
-        Self { inner, kernel: None, tolerance: 1e-13 }
+        Self { inner, kernel: None, balance: None, near: false, tolerance: 1e-13 }
     }
 }
 
@@ -55,9 +59,14 @@ where
     ) -> Result<Reached, StepError> {
         let (name, tolerance) = (self.inner.name(), self.tolerance);
         let mechanism = problem.mechanism();
+        if !mechanism.contacts.is_empty() {
+            // What impacts change is not a step's.
+            self.balance = None;
+        }
         let kernel = self.kernel.get_or_insert_with(|| Kernel::new(mechanism));
-        self.inner.advance(problem, state, until, tally, &mut |problem, state| {
-            let moved = project(problem.mechanism(), kernel, state, tolerance).map_err(|(row, left)| StepError {
+        let Self { inner, balance, near, .. } = self;
+        inner.advance(problem, state, until, tally, &mut |problem, state| {
+            let landing = project(problem.mechanism(), kernel, state, tolerance).map_err(|(row, left)| StepError {
                 cause: Cause::ProjectionFailed,
                 method: name.into(),
                 t: state.time.hi,
@@ -65,9 +74,27 @@ where
                 what: format!("projection leaves {left:.1e} of constraint {row}"),
                 hint: "tighten the tolerance, or check that no motors work against each other".into(),
             })?;
+            let was_near = std::mem::replace(near, kernel.weakest.share < NEAR);
+            let last = balance.replace(landing.balance);
+            let lost = last.map_or(0.0, |last| (landing.balance - last).abs()) + landing.energy_change.abs();
+            let mechanism = problem.mechanism();
+            let lost = lost / mechanism.energy_scale;
+            if (was_near || *near) && (lost > LOST || lost.is_nan()) {
+                let row = mechanism.rows[kernel.weakest.row].name();
+                return Err(StepError {
+                    cause: Cause::BranchLost,
+                    method: name.into(),
+                    t: state.time.hi,
+                    step: 0.0,
+                    what: format!(
+                        "energy changed by {lost:.1e} of its scale where constraint {row} loses its hold: the motion left its branch"
+                    ),
+                    hint: "try --method taylor, or another tolerance".into(),
+                });
+            }
             Ok(match watch(problem, state)? {
-                Seen::Kept if moved => Seen::Changed,
-                Seen::Enough if moved => Seen::ChangedEnough,
+                Seen::Kept if landing.has_moved => Seen::Changed,
+                Seen::Enough if landing.has_moved => Seen::ChangedEnough,
                 seen => seen,
             })
         })
@@ -94,11 +121,25 @@ const LEFT_OUT: f64 = 1e-6;
 /// Changes up to this, relative to the rates where they are above one, are rounding: what is known of the rates at the state stays true.
 const ROUNDING: f64 = 1e-14;
 
-/// Projects angles and rates of a state onto all rows; true where something moved by more than rounding.
+/// Change of energy less work, or of energy by projection, in a step near a singular position, over the energy scale: more is another branch.
+const LOST: f64 = 1e-3;
+
+/// What a projection found and did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Landing {
+    /// True where something moved by more than rounding.
+    pub has_moved: bool,
+    /// Energy less work and less what stabilizers put in \[J\]; the projection leaves it as it is.
+    pub balance: f64,
+    /// Energy the projection put in \[J\].
+    pub energy_change: f64,
+}
+
+/// Projects coordinates and rates of a state onto all rows.
 ///
 /// # Errors
 /// Name of the worst row and its violation where it cannot be brought below `tolerance`.
-pub fn project(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &mut State, tolerance: f64) -> Result<bool, (String, f64)> {
+pub fn project(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &mut State, tolerance: f64) -> Result<Landing, (String, f64)> {
     match mechanism.size() {
         1 => project_sized::<1>(mechanism, kernel, state, tolerance),
         2 => project_sized::<2>(mechanism, kernel, state, tolerance),
@@ -113,16 +154,18 @@ fn project_sized<const N: usize>(
     kernel: &mut Kernel<f64>,
     state: &mut State,
     tolerance: f64,
-) -> Result<bool, (String, f64)> {
+) -> Result<Landing, (String, f64)> {
     let n = tree::size::<N>(mechanism.coordinates());
     let rows = mechanism.rows.len();
     kernel.face::<N>(mechanism, &state.y[..n]);
     let energy_before = mechanism.energy_facing::<f64, N>(kernel, &state.y[..n], &state.y[n..2 * n]).total();
-    tree::factor::<f64, N>(n, &mut kernel.mass, &mut kernel.pivot);
+    kernel.factor::<N>(mechanism, &state.y[n..2 * n]);
     kernel.linearise::<N>(mechanism, state.time, &state.y[..n], &state.y[n..2 * n]);
     let (mut last, mut moved, mut far) = (f64::INFINITY, false, 0.0);
     loop {
-        let worst = (0..rows).map(|r| kernel.rows[r].position.abs()).fold(0.0, largest);
+        // Rows left out have their say once they are back.
+        let in_force = (0..rows).filter(|&r| !kernel.is_left_out(r));
+        let worst = in_force.map(|r| kernel.rows[r].position.abs()).fold(0.0, largest);
         // At rounding, or no longer falling: another sweep would only move it about.
         if worst <= 1e-16 || worst >= 0.5 * last || worst.is_nan() {
             break;
@@ -145,8 +188,8 @@ fn project_sized<const N: usize>(
             kernel.rows_at(mechanism, state.time, phi, omega);
         } else {
             kernel.face::<N>(mechanism, phi);
-            mechanism.tree.couple::<f64, N>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
-            tree::factor::<f64, N>(n, &mut kernel.mass, &mut kernel.pivot);
+            kernel.couple::<N>(mechanism);
+            kernel.factor::<N>(mechanism, omega);
             kernel.linearise::<N>(mechanism, state.time, phi, omega);
         }
     }
@@ -155,7 +198,9 @@ fn project_sized<const N: usize>(
     for r in 0..rows {
         let omega = &state.y[n..2 * n];
         kernel.multiplier[r] = kernel.row_rate(r, omega);
-        fast = largest(fast, kernel.multiplier[r].abs() / pace(kernel, omega, r));
+        if !kernel.is_left_out(r) {
+            fast = largest(fast, kernel.multiplier[r].abs() / pace(kernel, omega, r));
+        }
     }
     if fast > 2.0 * f64::EPSILON || fast.is_nan() {
         let change = shift(kernel, state, n, n);
@@ -164,23 +209,24 @@ fn project_sized<const N: usize>(
         let omega = &state.y[n..2 * n];
         check(mechanism, kernel, tolerance, |r| (kernel.row_rate(r, omega), pace(kernel, omega, r)))?;
     }
+    let balance = energy_before - state.y[2 * n] - state.y[2 * n + 1];
+    let mut energy_change = 0.0;
     if moved {
         state.wrap();
-        let energy = mechanism.energy_facing::<f64, N>(kernel, &state.y[..n], &state.y[n..2 * n]).total();
-        state.y[2 * n + 1] += energy - energy_before;
+        energy_change = mechanism.energy_facing::<f64, N>(kernel, &state.y[..n], &state.y[n..2 * n]).total() - energy_before;
+        state.y[2 * n + 1] += energy_change;
     }
-    Ok(far > ROUNDING)
+    Ok(Landing { has_moved: far > ROUNDING, balance, energy_change })
 }
 
 /// Subtracts M⁻¹ Gᵀ S⁻¹ times what is in `multiplier` from the unknowns `from`…, and leaves it in `load`; returns its largest entry.
 fn shift(kernel: &mut Kernel<f64>, state: &mut State, from: usize, n: usize) -> f64 {
-    let rows = kernel.multiplier.len();
-    tree::solve::<f64, 0>(rows, &kernel.schur, &kernel.schur_pivot, &mut kernel.multiplier);
+    kernel.solve_rows();
+    kernel.lift();
     let mut largest_change = 0.0;
     for k in 0..n {
-        let change = (0..rows).fold(0.0, |sum, r| sum + kernel.lifted[r * n + k] * kernel.multiplier[r]);
+        let change = kernel.load[k];
         (state.y[from + k], state.low[from + k]) = two_sum(state.y[from + k], state.low[from + k] - change);
-        kernel.load[k] = change;
         largest_change = largest(largest_change, change.abs());
     }
     largest_change
@@ -188,15 +234,13 @@ fn shift(kernel: &mut Kernel<f64>, state: &mut State, from: usize, n: usize) -> 
 
 /// The longest lever of row `r`, or one \[m\].
 fn lever(kernel: &Kernel<f64>, r: usize) -> f64 {
-    let n = kernel.z.len();
-    kernel.jacobian[r * n..(r + 1) * n].iter().fold(1.0, |most: f64, g| most.max(g.abs()))
+    kernel.fold_gradient(r, 1.0, |most: f64, _, g| most.max(g.abs()))
 }
 
 /// The largest part of the rate of row `r`, or one: a row's rate is a sum of G_k w_k, and no smaller than their rounding.
 fn pace(kernel: &Kernel<f64>, omega: &[f64], r: usize) -> f64 {
-    let n = kernel.z.len();
-    let terms = kernel.jacobian[r * n..(r + 1) * n].iter().zip(omega);
-    terms.fold(kernel.rows[r].drive.abs().max(1.0), |most, (g, w)| most.max((g * w).abs()))
+    let least = kernel.rows[r].drive.abs().max(1.0);
+    kernel.fold_gradient(r, least, |most, k, g| most.max((g * omega[k]).abs()))
 }
 
 /// Every row must be kept at both levels, as [`Kernel::linearise`] found them.
@@ -208,17 +252,18 @@ pub(super) fn is_kept(mechanism: &Mechanism, kernel: &Kernel<f64>, omega: &[f64]
     check(mechanism, kernel, tolerance, |r| (kernel.row_rate(r, omega), pace(kernel, omega, r)))
 }
 
-/// The worst row must be below tolerance, each measured against its own size.  Rows that are left out near a singular position are not projected; they
-/// come back once it is past.
+/// The worst row must be below tolerance, each measured against its own size.  Near a singular position rounding grows with the inverse of the distance, of
+/// which the share of the weakest row is about the square; rows left out there are not projected, and come back once it is past.
 fn check(
     mechanism: &Mechanism,
     kernel: &Kernel<f64>,
     tolerance: f64,
     violation: impl Fn(usize) -> (f64, f64),
 ) -> Result<(), (String, f64)> {
+    let near = kernel.weakest.share.clamp(DROPPED, 1.0);
     for (r, row) in mechanism.rows.iter().enumerate() {
+        let tolerance = if kernel.is_left_out(r) { tolerance.max(LEFT_OUT) } else { tolerance / near.sqrt() };
         let (violation, size) = violation(r);
-        let tolerance = if kernel.schur_pivot[r] == 0.0 { tolerance.max(LEFT_OUT) } else { tolerance };
         let small = violation.abs() <= tolerance * size;
         if !small {
             return Err((row.name().into(), violation.abs()));

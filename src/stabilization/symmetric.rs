@@ -15,7 +15,7 @@
 use super::projection::is_kept;
 use crate::arithmetic::sum::two_sum;
 use crate::dynamics::kernel::Kernel;
-use crate::dynamics::{Field, Form, Mechanism, State, Time, tree};
+use crate::dynamics::{Field, Form, Mechanism, State, Time};
 use crate::stepping::gauss::Gauss;
 use crate::stepping::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
 
@@ -103,17 +103,19 @@ fn face(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &State) {
     let n = mechanism.coordinates();
     let (phi, omega) = (&state.y[..n], &state.y[n..2 * n]);
     kernel.face::<0>(mechanism, phi);
-    mechanism.tree.couple::<f64, 0>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
-    tree::factor::<f64, 0>(n, &mut kernel.mass, &mut kernel.pivot);
+    kernel.couple::<0>(mechanism);
+    kernel.factor::<0>(mechanism, omega);
     kernel.linearise::<0>(mechanism, state.time, phi, omega);
 }
 
 /// y + D mu, with the directions of the state faced last.
-fn shift(kernel: &Kernel<f64>, state: &mut State, mu: &[f64]) {
+fn shift(kernel: &mut Kernel<f64>, state: &mut State, mu: &[f64]) {
     let (n, r) = (kernel.z.len(), kernel.rows.len());
     for (from, mu) in [(0, &mu[..r]), (n, &mu[r..])] {
+        kernel.multiplier.copy_from_slice(mu);
+        kernel.lift();
         for k in 0..n {
-            let change = mu.iter().enumerate().fold(0.0, |sum, (row, mu)| sum + kernel.lifted[row * n + k] * mu);
+            let change = kernel.load[k];
             (state.y[from + k], state.low[from + k]) = two_sum(state.y[from + k], state.low[from + k] + change);
         }
     }
@@ -136,7 +138,7 @@ fn land(mechanism: &Mechanism, kernel: &mut Kernel<f64>, end: &State, landed: &m
                 kernel.multiplier[row] = left;
                 worst = if left.is_nan() { f64::NAN } else { worst.max(left.abs()) };
             }
-            tree::solve::<f64, 0>(r, &kernel.schur, &kernel.schur_pivot, &mut kernel.multiplier);
+            kernel.solve_rows();
             if worst > 1e-16 && worst < 0.5 * last {
                 for row in 0..r {
                     nu[level + row] -= kernel.multiplier[row];

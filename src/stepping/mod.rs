@@ -121,6 +121,8 @@ pub enum Cause {
     NotConverged,
     /// The projection onto the constraints did not converge.
     ProjectionFailed,
+    /// Energy jumped at a singular position: the motion left on another branch.
+    BranchLost,
     /// A point came to rest on a wall, and it could not be held there or the motors leave it no freedom.
     RestingContact,
     /// The method does not fit the mechanism.
@@ -138,6 +140,7 @@ impl Cause {
             Self::TooManySteps => "too_many_steps",
             Self::NotConverged => "not_converged",
             Self::ProjectionFailed => "projection_failed",
+            Self::BranchLost => "branch_lost",
             Self::RestingContact => "resting_contact",
             Self::Unsuited => "unsuited",
             Self::DriftLimit => "drift_limit",

@@ -29,6 +29,7 @@ mod event;
 mod expansion;
 mod extended;
 mod fast;
+mod jump;
 mod pace;
 mod pair;
 mod terms;
@@ -40,6 +41,7 @@ use self::expansion::Expansion;
 use self::fast::Fast;
 use super::{Cause, Method, Reached, StepError, Tally, Tolerance, Watch};
 use crate::arithmetic::DoubleDouble;
+use crate::dynamics;
 use crate::dynamics::series::Coefficient;
 use crate::dynamics::{Coordinates, Field, Form, State, Time};
 
@@ -81,6 +83,8 @@ pub struct Taylor<T> {
     pub extended: bool,
     fast: Option<Fast>,
     expansion: Option<Expansion<T>>,
+    /// Where singular positions are looked for.
+    ahead: Option<dynamics::kernel::Kernel<f64>>,
     powers: Vec<f64>,
     gaps: Vec<f64>,
     inside: State,
@@ -98,6 +102,7 @@ impl<T: Coefficient> Taylor<T> {
             extended: false,
             fast: None,
             expansion: None,
+            ahead: None,
             powers: Vec::new(),
             gaps: Vec::new(),
             inside: State::default(),
@@ -245,7 +250,13 @@ impl<T: Coefficient> Taylor<T> {
         let Some(expansion) = &mut self.expansion else { return (f64::NAN, 0.0) };
         expansion.expand(problem.mechanism(), state);
         // What a wall sees of the motion are the unit vectors.
-        let wanted = expansion.wanted(self.tolerance, problem.events() > 0);
+        let mut wanted = expansion.wanted(self.tolerance, problem.events() > 0);
+        if !problem.mechanism().rows.is_empty()
+            && let Some(through) = jump::length(problem, expansion, &mut self.ahead, state, wanted)
+        {
+            wanted = through;
+            expansion.sum_to_smallest(through.min(left));
+        }
         (wanted, if wanted.is_nan() { 0.0 } else { pace::taken(wanted, left) })
     }
 

@@ -122,6 +122,14 @@ impl Row {
         self.law.as_ref().is_some_and(|law| !law.is_constant())
     }
 
+    /// The coordinates it depends on; some may come up more than once.
+    pub fn coordinates(&self) -> Vec<usize> {
+        match &self.measure {
+            Measure::Angle { body, base } => std::iter::once(*body).chain(*base).collect(),
+            Measure::Place(place) => place.coordinates(),
+        }
+    }
+
     /// C, for a row without a law \[m\]: the gap of a wall.
     pub fn gap<T: Real>(&self, z: &[Complex<T>]) -> T {
         match &self.measure {

@@ -8,7 +8,7 @@ pub(super) use start::written_starts;
 
 use super::error::SceneError;
 use super::read::{At, GivenStart};
-use super::{Bar, Hinge, Place, Scene};
+use super::{Bar, Place, Scene};
 
 /// A start and a law that differ by less than this, relative to 1 or the value, are the same.
 const SAME: f64 = 1e-12;
@@ -25,7 +25,7 @@ pub(super) struct Places<'a> {
 
 /// The scene with its start, where its parts fit together.
 pub(super) fn fitted(scene: Scene, places: &Places, given: &[Option<GivenStart>]) -> Result<Scene, SceneError> {
-    let hanging = Hanging::of(scene.bars.len(), &scene.hinges);
+    let hanging = Hanging::of(&scene);
     let whole = hanging.has_whole_start(&scene);
     if let Some(bar) = if whole { hanging.turns_nothing(&scene.bars) } else { turns_alone(&scene) } {
         let problem = format!("(bar `{}`) is a point mass on its own hinge", scene.bars[bar].name);
@@ -36,7 +36,7 @@ pub(super) fn fitted(scene: Scene, places: &Places, given: &[Option<GivenStart>]
         for key in ["origin", "velocity"] {
             if let Some(at) = entry.as_ref().and_then(|entry| entry.fields.optional(key)) {
                 let problem = format!("is given, but bar `{}` hangs on the ground", scene.bars[bar].name);
-                let allowed = "only a bar that no hinge ties to the ground, by itself or through others, has it to give";
+                let allowed = "only a bar that no hinge or weld ties to the ground, by itself or through others, has it to give";
                 return Err(at.refuse(&problem, allowed, "leave it out; it follows from the angles"));
             }
         }
@@ -54,17 +54,17 @@ impl Scene {
     /// True where the start is known from angles and rates alone, all of which must be given or follow from motors and locks: trees of hinges on
     /// the ground whose only constraints are angles.  In every other scene a part of the start can be found from the rest.
     pub fn has_whole_start(&self) -> bool {
-        Hanging::of(self.bars.len(), &self.hinges).has_whole_start(self)
+        Hanging::of(self).has_whole_start(self)
     }
 }
 
 /// How the bars hang on the ground.
 struct Hanging {
-    /// The bars that hang there, each after the one it hangs on, by the fewest hinges.
+    /// The bars that hang there, each after the one it hangs on, by the fewest hinges and welds.
     order: Vec<Hang>,
     /// The bodies that hang there, the ground first.
     hung: Vec<bool>,
-    /// True where some hinge closes a loop.
+    /// True where a hinge or a weld closes a loop.
     looped: bool,
 }
 
@@ -78,12 +78,15 @@ struct Hang {
 }
 
 impl Hanging {
-    fn of(bars: usize, hinges: &[Hinge]) -> Self {
+    fn of(scene: &Scene) -> Self {
+        let bars = scene.bars.len();
+        let joints: Vec<&[Place; 2]> =
+            scene.hinges.iter().map(|hinge| &hinge.between).chain(scene.welds.iter().map(|weld| &weld.between)).collect();
         let mut groups = Groups::of(bars + 1);
         let mut looped = false;
         let mut at_body: Vec<Vec<usize>> = vec![Vec::new(); bars + 1];
-        for (number, hinge) in hinges.iter().enumerate() {
-            let [a, b] = hinge.between.map(|place| body(place.bar));
+        for (number, between) in joints.iter().enumerate() {
+            let [a, b] = between.map(|place| body(place.bar));
             looped |= !groups.join(a, b);
             at_body[a].push(number);
             at_body[b].push(number);
@@ -96,7 +99,7 @@ impl Hanging {
         while let Some(&here) = reached.get(next) {
             next += 1;
             for &number in &at_body[body(here)] {
-                let [a, b] = hinges[number].between;
+                let [a, b] = *joints[number];
                 let (from, to) = if a.bar == here { (a, b) } else { (b, a) };
                 let Some(bar) = to.bar else { continue };
                 if !hung[body(to.bar)] {

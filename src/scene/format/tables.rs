@@ -344,7 +344,7 @@ pub(in crate::scene) static LINE: Table = Table {
 /// The start of a bar.
 pub(in crate::scene) static START: Table = Table {
     title: "a start",
-    about: "What is known of a bar at t = 0; its origin and velocity only where no hinge ties it, or the bars it hangs together with, to the ground.",
+    about: "What is known of a bar at t = 0; its origin and velocity only where no hinge or weld ties it, or the bars it hangs together with, to the ground.",
     fields: &[
         optional("phi", Shape::Number(ANGLE), "0", "Absolute angle; may be many turns."),
         optional("omega", Shape::Number(RATE), "0", "Rate."),

@@ -19,6 +19,8 @@ pub struct Expansion<T> {
     series: Series<T>,
     /// The first powers in double-double, where the rest goes on from these.
     first: Option<Box<Series<DoubleDouble>>>,
+    /// Powers of the rates that are summed: all, or those before noise takes over in a step through a singular position.
+    summed: usize,
     u: [Vec<T>; 3],
     exact: [Vec<DoubleDouble>; 3],
 }
@@ -31,6 +33,7 @@ impl<T: Coefficient> Expansion<T> {
         Self {
             mechanism: mechanism.clone(),
             coordinates,
+            summed: order + 1,
             first: (extended && T::IS_PLAIN).then(|| Box::new(Series::new(mechanism, coordinates, LEADING))),
             u: std::array::from_fn(|_| vec![T::ZERO; f]),
             exact: std::array::from_fn(|_| vec![DoubleDouble::default(); f]),
@@ -52,6 +55,7 @@ impl<T: Coefficient> Expansion<T> {
     /// Expands the motion about a state.
     pub fn expand(&mut self, mechanism: &Mechanism, state: &State) {
         let f = self.series.coordinates();
+        self.summed = self.series.order() + 1;
         let [u, rest, rate] = &mut self.u;
         for i in 0..f {
             (u[i], rest[i]) = T::split(state.unknown(i));
@@ -117,16 +121,28 @@ impl<T: Coefficient> Expansion<T> {
         step
     }
 
+    /// Sums no further than to the power that is the smallest at `h` \[s\].
+    pub fn sum_to_smallest(&mut self, h: f64) {
+        let f = self.series.coordinates();
+        let size = |m: usize| {
+            let largest = self.series.rate[m * f..(m + 1) * f].iter().fold(0.0, |most, rate| larger(most, rate.value()));
+            largest * libm::pow(h, m as f64)
+        };
+        let smallest = (1..=self.series.order()).min_by(|&a, &b| size(a).total_cmp(&size(b)));
+        self.summed = smallest.unwrap_or(self.series.order()) + 1;
+    }
+
     /// Takes a state from where the series was expanded on by `h` \[s\].
     pub fn go(&self, state: &mut State, h: Time) {
         let (f, series) = (self.series.coordinates(), &self.series);
+        let (rates, powers) = (&series.rate[..self.summed * f], &series.power[..self.summed.min(series.power.len())]);
         let step = T::split(h).0;
         // Powers of the rates that are in `first` already, and powers of the work.
         let known = if self.first.is_some() { LEADING + 1 } else { 0 };
         let start = known.max(1);
         for i in 0..f {
-            let mut angle = integral(&series.rate, i, f, known, step).double_double();
-            let mut rate = tail(&series.rate, i, f, start, step).double_double();
+            let mut angle = integral(rates, i, f, known, step).double_double();
+            let mut rate = tail(rates, i, f, start, step).double_double();
             match &self.first {
                 Some(first) => {
                     angle += integral(&first.rate, i, f, 0, h);
@@ -140,7 +156,7 @@ impl<T: Coefficient> Expansion<T> {
             }
         }
         if state.y.len() > 2 * f {
-            let mut work = integral(&series.power, 0, 1, known.saturating_sub(1), step).double_double();
+            let mut work = integral(powers, 0, 1, known.saturating_sub(1), step).double_double();
             if let Some(first) = &self.first {
                 work += integral(&first.power, 0, 1, 0, h);
             }

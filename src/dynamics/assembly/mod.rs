@@ -1,0 +1,482 @@
+//! The start of a mechanism that is more than a tree of hinges on the ground: what the scene gives of it is kept, the rest is found from the rows.
+//!
+//! ```text
+//! all that is given fits:      it stays to the last bit, and the shortest way from the guesses closes the rows
+//! some of it does not fit:     of what is given, in the order of the bars, as much stays as the rows leave free; the rest is taken as a rough guess
+//! everything is given:         all of it changes as little as may be
+//! ```
+//!
+//! Positions first, then rates.  Nothing is guessed twice: what the rows leave open must be given, and where other guesses lead to another start the
+//! scene has to say which.
+
+mod newton;
+mod svd;
+
+use super::compile::CompileError;
+use super::forest::Foot;
+use super::law::Law;
+use super::row::Measure;
+use super::ties::Ties;
+use super::{Mechanism, Motion};
+use crate::arithmetic::{Complex, DoubleDouble, Scalar};
+use crate::scene::{Given, Scene};
+use newton::{Aim, Goal, KEPT, Problem};
+use serde::Serialize;
+use svd::{Matrix, independent};
+
+/// What counts as no change, relative to 1 rad (and rad/s), the size of the mechanism, or the value where that is larger.
+const SAME: f64 = 1e-12;
+/// What is given may be off by this and still be taken as a rough guess \[rad, or sizes of the mechanism\].
+const REACH: f64 = 0.5;
+/// Two starts that differ by less are the same \[rad, or sizes of the mechanism\].
+const DISTINCT: f64 = 1e-4;
+/// What is left of a measured row, once those before it are taken off, counts as zero below this.
+const DEPENDENT: f64 = 1e-9;
+/// More coordinates than this are not taken apart: what is said of rank and doubles stands for the start alone.
+const DENSE: usize = 300;
+
+/// How the start was found, and the degrees of freedom that are left.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Assembly {
+    /// The start; `None` where the scene's own is taken as it is.
+    pub start: Option<Motion>,
+    /// What differs from what the scene gives.
+    pub changes: Vec<Change>,
+    /// Coordinates less the rank of the rows.
+    pub degrees_of_freedom: usize,
+    /// Rows that follow from those before them, at the start and near it.
+    pub redundant: Vec<String>,
+    /// Rows that follow from those before them at the start alone: a singular position.
+    pub singular: Vec<String>,
+    /// The least singular value of the rows' Jacobian at the start that is not zero over the largest, angles in rad and lengths in sizes of the mechanism;
+    /// 1 without rows, and not a number where it was not formed.
+    pub conditioning: f64,
+}
+
+/// A number of the start that is not what the scene gives.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Change {
+    /// The bar.
+    pub body: String,
+    /// `phi`, `omega`, `origin.x`, …
+    pub quantity: String,
+    /// As given.
+    pub given: f64,
+    /// As used.
+    pub used: f64,
+    /// Its unit.
+    pub unit: &'static str,
+}
+
+impl std::fmt::Display for Change {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { body, quantity, given, used, unit } = self;
+        write!(f, "{quantity} of {body} is {used:?} {unit} at the start instead of {given:?} {unit}")
+    }
+}
+
+/// A start that closes the rows.
+struct Found {
+    q: Vec<DoubleDouble>,
+    /// The largest change of what is given, measured.
+    change: f64,
+    /// The aims kept as given.
+    held: Vec<bool>,
+}
+
+impl Mechanism {
+    /// The mechanism with its start; `kept` are the rows whose angles are those of the start.
+    pub(super) fn assembled(mut self, scene: &Scene, kept: &[usize]) -> Result<Self, CompileError> {
+        if scene.has_whole_start() {
+            self.assembly = Assembly {
+                degrees_of_freedom: self.ties.count(),
+                conditioning: if self.rows.is_empty() { 1.0 } else { f64::NAN },
+                ..Assembly::default()
+            };
+            return Ok(self);
+        }
+        let given = |bar: usize| scene.given.get(bar).copied().unwrap_or(Given::ANGLE_AND_RATE);
+        let problem = Problem::new(&self, scene, kept, &given);
+        let (found, aims) = (problem.find(scene)?, &problem.aims);
+        let mut changes = problem.changes(&found.q, aims);
+        let mut angles = Vec::new();
+        for &row in kept {
+            if let Measure::Angle { body, base } = self.rows[row].measure.clone() {
+                let between = found.q[body] - base.map_or(DoubleDouble::ZERO, |base| found.q[base]);
+                angles.push((row, between.hi));
+            }
+        }
+        let omega = problem.find_rates(scene, &given, &found.q, &mut changes)?;
+        let mut assembly = problem.rank(&found.q);
+        let mut start = Motion::default();
+        for (k, &q) in found.q.iter().enumerate() {
+            let (phi, turns) = if self.is_winding() || k >= self.bodies.len() { (q, 0.0) } else { q.reduced() };
+            start.phi.push(phi);
+            start.turns.push(turns as i64);
+        }
+        start.omega = omega;
+        assembly.start = Some(start);
+        assembly.changes = changes;
+        for (row, angle) in angles {
+            self.rows[row].law = Some(Law::constant(angle));
+        }
+        self.ties = Ties::new(self.bodies.len(), self.coordinates(), &self.rows)?;
+        self.assembly = assembly;
+        self.check_start(scene)?;
+        Ok(self)
+    }
+
+    /// Springs need a direction, and points must be before their walls; the reader of scenes sees to it where it knows the start.
+    fn check_start(&self, scene: &Scene) -> Result<(), CompileError> {
+        let (start, size) = (self.start(scene), self.size_of_parts());
+        let mut z = vec![Complex::ZERO; self.coordinates()];
+        self.tree.face::<DoubleDouble, 0>(&start.phi, &mut z);
+        for spring in self.springs.iter().filter(|spring| spring.free_length > 0.0) {
+            let span = spring.span.position(&z);
+            if span.norm_squared().hi.sqrt() <= SAME * size {
+                return Err(CompileError::SpringWithoutLength(spring.name.clone()));
+            }
+        }
+        for contact in &self.contacts {
+            let gap = contact.row.gap(&z).hi;
+            if gap < -SAME * size {
+                return Err(CompileError::BehindWall { wall: contact.row.name.clone(), gap: -gap });
+            }
+        }
+        Ok(())
+    }
+
+    /// The size of the mechanism \[m\]: its longest body or lever; 1 m where it has none.
+    fn size_of_parts(&self) -> f64 {
+        let length = |x: &Complex<f64>| x.norm_squared().sqrt();
+        let bodies = self.bodies.iter().flat_map(|body| body.ends.iter().chain([&body.centre]).map(length));
+        let levers = self.rows.iter().map(|row| if row.is_angle() { 0.0 } else { newton::lever(&row.measure, 0.0) });
+        let size = bodies.chain(levers).fold(0.0, f64::max);
+        if size > 0.0 { size } else { 1.0 }
+    }
+}
+
+impl<'a> Problem<'a> {
+    fn new(mechanism: &'a Mechanism, scene: &Scene, kept: &[usize], given: &dyn Fn(usize) -> Given) -> Self {
+        let (size, angles) = (mechanism.size_of_parts(), mechanism.bodies.len());
+        let unit = (0..mechanism.coordinates()).map(|k| if k < angles { 1.0 } else { size }).collect();
+        let lever = mechanism.rows.iter().map(|row| newton::lever(&row.measure, size)).collect();
+        let mut aims = Vec::new();
+        for (bar, start) in scene.start.iter().enumerate() {
+            if given(bar).phi {
+                aims.push(Aim { bar, goal: Goal::Coordinate(bar), given: start.phi });
+            }
+            if let Some(origin) = given(bar).origin {
+                aims.extend(of_origin(mechanism, bar, origin));
+            }
+        }
+        let is_known = |measure: &Measure| match measure {
+            Measure::Angle { body, base } => given(*body).phi && base.is_none_or(|base| given(base).phi),
+            Measure::Place(_) => true,
+        };
+        let active = mechanism.rows.iter().enumerate().map(|(i, row)| !kept.contains(&i) || is_known(&row.measure)).collect();
+        Problem { mechanism, active, size, unit, lever, aims }
+    }
+
+    /// Coordinates that nothing gives.
+    fn missing(&self) -> Vec<usize> {
+        self.columns(&vec![true; self.aims.len()])
+    }
+
+    /// Positions that close the rows.
+    fn find(&self, scene: &Scene) -> Result<Found, CompileError> {
+        let guess = self.guess(scene);
+        let missing = self.missing();
+        let first = self.attempt(&guess, &missing);
+        if let (Ok(found), false) = (&first, missing.is_empty()) {
+            self.check_open(found, &missing)?;
+        }
+        let others = match missing.len() {
+            0 => 0,
+            _ if guess.len() <= 20 => 24,
+            _ if guess.len() <= 60 => 8,
+            _ => 2,
+        };
+        let others: Vec<Found> = (1..=others).filter_map(|k| self.attempt(&self.other_guess(&guess, &missing, k), &missing).ok()).collect();
+        let impossible = |(row, left): (usize, f64)| {
+            let row = &self.mechanism.rows[row];
+            CompileError::Impossible { row: row.name.clone(), left, unit: row.unit() }
+        };
+        let (best, others) = match first {
+            Ok(found) => (found, others),
+            Err(worst) => {
+                let mut others = others.into_iter();
+                (others.next().ok_or(impossible(worst))?, others.collect())
+            }
+        };
+        let mut all = vec![best];
+        all.extend(others);
+        let nearest = (1..all.len()).fold(0, |best, k| if all[k].change < all[best].change * (1.0 - 1e-6) - SAME { k } else { best });
+        let mut best = all.swap_remove(nearest);
+        if best.change > REACH {
+            let mut held = guess.clone();
+            self.position(&mut held, &self.active, &vec![true; self.aims.len()]);
+            return Err(impossible(self.worst(&held)));
+        }
+        if !missing.is_empty() {
+            self.check_open(&best, &missing)?;
+        }
+        for other in all.iter().filter(|other| other.change <= (2.0 * best.change).max(DISTINCT)) {
+            self.check_same(&best, other)?;
+        }
+        for &k in missing.iter().filter(|&&k| k < self.mechanism.bodies.len()) {
+            // The turn next to the guess.
+            let turns = ((best.q[k] - guess[k]).hi / std::f64::consts::TAU).round();
+            best.q[k] -= DoubleDouble::TAU.scale(turns);
+        }
+        Ok(best)
+    }
+
+    /// The start as the scene has it, with guesses where it has none.
+    fn guess(&self, scene: &Scene) -> Vec<DoubleDouble> {
+        let mut q = self.mechanism.start_as_given(scene).phi;
+        for (q, start) in q.iter_mut().zip(&scene.start) {
+            *q = DoubleDouble::of(start.phi);
+        }
+        q
+    }
+
+    /// The same with other guesses: the k-th of a fixed set.
+    fn other_guess(&self, guess: &[DoubleDouble], missing: &[usize], k: usize) -> Vec<DoubleDouble> {
+        let mut other = guess.to_vec();
+        for &j in missing {
+            let spread = if j < self.mechanism.bodies.len() { std::f64::consts::PI } else { 2.0 * self.size };
+            other[j] += DoubleDouble::of(spread * shuffled(k, j));
+        }
+        other
+    }
+
+    /// From a guess to a start that closes the rows; else the worst row and what is left of it.
+    fn attempt(&self, guess: &[DoubleDouble], missing: &[usize]) -> Result<Found, (usize, f64)> {
+        let (all, none) = (vec![true; self.aims.len()], vec![false; self.aims.len()]);
+        let mut q = guess.to_vec();
+        if self.closes(&mut q, &all) {
+            // Where more is given than needed and fits to rounding, rounding is spread over all of it.
+            if self.finish(&mut q, &self.active, &all) > 1e-20 && q.len() <= DENSE {
+                self.finish(&mut q, &self.active, &none);
+            }
+            return Ok(Found { q, change: 0.0, held: all });
+        }
+        if !self.closes(&mut q, &none) {
+            return Err(self.worst(&q));
+        }
+        let mut held = none;
+        if !missing.is_empty() {
+            let kept = self.kept(&self.aims, &q, &self.active);
+            let mut trial = q.clone();
+            for (aim, _) in self.aims.iter().zip(&kept).filter(|(_, kept)| **kept) {
+                if let Goal::Coordinate(k) = aim.goal {
+                    trial[k] = DoubleDouble::of(aim.given);
+                }
+            }
+            if self.closes(&mut trial, &kept) {
+                (q, held) = (trial, kept);
+            }
+        }
+        let change = self.measured(&q).zip(&self.aims).map(|(used, aim)| self.share(aim, used - aim.given).abs()).fold(0.0, f64::max);
+        Ok(Found { q, change, held })
+    }
+
+    /// Closes the rows as far as double-double goes, with these aims held.
+    fn closes(&self, q: &mut Vec<DoubleDouble>, held: &[bool]) -> bool {
+        let left = self.position(q, &self.active, held);
+        left < KEPT.sqrt() && (q.len() > DENSE && left < KEPT || self.finish(q, &self.active, held) < KEPT)
+    }
+
+    /// Of the aims as many as the rows leave free, from the first on.
+    fn kept(&self, aims: &[Aim], q: &[DoubleDouble], rows: &[bool]) -> Vec<bool> {
+        let mut matrix = self.jacobian(q, rows);
+        self.add_aims(&mut matrix, aims, q);
+        independent(&matrix, DEPENDENT).split_off(self.mechanism.rows.len())
+    }
+
+    fn add_aims(&self, matrix: &mut Matrix, aims: &[Aim], q: &[DoubleDouble]) {
+        let z = self.linearise::<f64>(q, &vec![0.0; q.len()]).z;
+        for aim in aims {
+            matrix.entries.extend(self.aim(aim, q, &z).1);
+            matrix.rows += 1;
+        }
+    }
+
+    /// The value of every aim \[rad or m\].
+    fn measured(&self, q: &[DoubleDouble]) -> impl Iterator<Item = f64> {
+        let z = self.linearise::<DoubleDouble>(q, &vec![DoubleDouble::ZERO; q.len()]).z;
+        self.aims.iter().map(|aim| self.aim(aim, q, &z).0.hi).collect::<Vec<f64>>().into_iter()
+    }
+
+    /// A change of an aim, measured.
+    fn share(&self, aim: &Aim, change: f64) -> f64 {
+        change / if aim.goal == Goal::Coordinate(aim.bar) { 1.0 } else { self.size }
+    }
+
+    /// Refuses a start of which neither rows nor what is given fix a coordinate.
+    fn check_open(&self, found: &Found, missing: &[usize]) -> Result<(), CompileError> {
+        let mut matrix = self.jacobian(&found.q, &self.active);
+        let held: Vec<Aim> = self.aims.iter().zip(&found.held).filter(|(_, held)| **held).map(|(aim, _)| *aim).collect();
+        self.add_aims(&mut matrix, &held, &found.q);
+        let open = matrix.svd().open(found.q.len(), DEPENDENT);
+        match missing.iter().copied().max_by(|&a, &b| open[a].total_cmp(&open[b])).filter(|&k| open[k] > 1e-6) {
+            Some(k) => Err(CompileError::Undetermined(self.place(k))),
+            None => Ok(()),
+        }
+    }
+
+    /// Refuses a second start as near to what is given as the first.
+    fn check_same(&self, best: &Found, other: &Found) -> Result<(), CompileError> {
+        let bodies = self.mechanism.bodies.len();
+        let apart = |&k: &usize| {
+            let apart = other.q[k] - best.q[k];
+            if k < bodies { apart.reduced().0.hi.abs() } else { apart.hi.abs() / self.size }
+        };
+        let Some(k) = (0..best.q.len()).max_by(|a, b| apart(a).total_cmp(&apart(b))).filter(|k| apart(k) > DISTINCT) else { return Ok(()) };
+        let shown = |q: &DoubleDouble| if k < bodies { q.reduced().0.hi } else { q.hi };
+        let unit = if k < bodies { "rad" } else { "m" };
+        Err(CompileError::Ambiguous { what: self.place(k), one: shown(&best.q[k]), other: shown(&other.q[k]), unit })
+    }
+
+    /// Where a scene gives a coordinate: `start.bar1.phi`.
+    fn place(&self, k: usize) -> String {
+        let (bodies, hangs) = (&self.mechanism.bodies, &self.mechanism.forest.hangs);
+        if let Some(body) = bodies.get(k) {
+            return format!("start.{}.phi", body.name);
+        }
+        let x = k - (k - bodies.len()) % 2;
+        let root = hangs.iter().position(|hang| hang.foot == Foot::Free(x)).unwrap_or(0);
+        format!("start.{}.origin", bodies[root].name)
+    }
+
+    /// What of the positions is not as given.
+    fn changes(&self, q: &[DoubleDouble], aims: &[Aim]) -> Vec<Change> {
+        aims.iter().zip(self.measured(q)).filter_map(|(aim, used)| self.change(aim, used, ["phi", "origin"], ["rad", "m"])).collect()
+    }
+
+    fn change(&self, aim: &Aim, used: f64, [turn, shift]: [&str; 2], [of_turn, of_shift]: [&'static str; 2]) -> Option<Change> {
+        let is_angle = aim.goal == Goal::Coordinate(aim.bar);
+        let scale = if is_angle { 1.0 } else { self.size };
+        if (used - aim.given).abs() <= SAME * scale.max(aim.given.abs()) {
+            return None;
+        }
+        let is_x = match aim.goal {
+            Goal::Coordinate(k) => self.mechanism.forest.hangs[aim.bar].foot == Foot::Free(k),
+            Goal::Origin(axis) => axis.re == 1.0,
+        };
+        let quantity = if is_angle { turn.to_owned() } else { format!("{shift}.{}", if is_x { "x" } else { "y" }) };
+        let body = self.mechanism.bodies[aim.bar].name.clone();
+        Some(Change { body, quantity, given: aim.given, used, unit: if is_angle { of_turn } else { of_shift } })
+    }
+
+    /// Rates that keep the rows; adds what is not as given to `changes`.
+    fn find_rates(
+        &self,
+        scene: &Scene,
+        given: &dyn Fn(usize) -> Given,
+        q: &[DoubleDouble],
+        changes: &mut Vec<Change>,
+    ) -> Result<Vec<DoubleDouble>, CompileError> {
+        let mut aims = Vec::new();
+        for (bar, start) in scene.start.iter().enumerate() {
+            if given(bar).omega {
+                aims.push(Aim { bar, goal: Goal::Coordinate(bar), given: start.omega });
+            }
+            if let Some(velocity) = given(bar).velocity {
+                aims.extend(of_origin(self.mechanism, bar, velocity));
+            }
+        }
+        let mut guess = vec![DoubleDouble::ZERO; q.len()];
+        for aim in &aims {
+            if let Goal::Coordinate(k) = aim.goal {
+                guess[k] = DoubleDouble::of(aim.given);
+            }
+        }
+        let every = vec![true; self.mechanism.rows.len()];
+        let (all, none) = (vec![true; aims.len()], vec![false; aims.len()]);
+        let is_whole = Problem { aims: aims.clone(), ..self.clone() }.columns(&all).is_empty();
+        let mut ways = vec![all];
+        if !is_whole {
+            ways.push(self.kept(&aims, q, &every));
+        }
+        ways.push(none);
+        let mut omega = guess.clone();
+        let keeps = ways.iter().any(|held| {
+            omega.clone_from(&guess);
+            self.rates(q, &mut omega, &aims, held) < 10.0 * KEPT
+        });
+        if !keeps {
+            let slips = self.slips(q, &omega);
+            let measured = |i: &usize| slips[*i].abs() / self.lever[*i];
+            let worst = (0..slips.len()).max_by(|a, b| measured(a).total_cmp(&measured(b))).unwrap_or(0);
+            let row = &self.mechanism.rows[worst];
+            let unit = if row.is_angle() { "rad/s" } else { "m/s" };
+            return Err(CompileError::ImpossibleRates { row: row.name.clone(), left: slips[worst].abs(), unit });
+        }
+        let z = self.linearise::<DoubleDouble>(q, &omega).z;
+        for aim in &aims {
+            let used = self.aim_rate(aim, &z, &omega).hi;
+            changes.extend(self.change(aim, used, ["omega", "velocity"], ["rad/s", "m/s"]));
+        }
+        Ok(omega)
+    }
+
+    /// Degrees of freedom, redundant rows and singular ones.
+    fn rank(&self, q: &[DoubleDouble]) -> Assembly {
+        let rows = self.mechanism.rows.len();
+        let every = vec![true; rows];
+        let here = self.jacobian(q, &every);
+        let conditioning = if rows == 0 {
+            1.0
+        } else if q.len() <= DENSE {
+            here.svd().conditioning(DEPENDENT)
+        } else {
+            f64::NAN
+        };
+        let dependent: Vec<bool> = independent(&here, DEPENDENT).iter().map(|new| !new).collect();
+        let mut redundant = dependent.clone();
+        if dependent.contains(&true) && q.len() <= DENSE {
+            let steady: Vec<bool> = self.mechanism.rows.iter().zip(&self.active).map(|(row, &active)| active && !row.is_motor()).collect();
+            let none = vec![false; self.aims.len()];
+            let nearby = (1..=6).filter_map(|k| {
+                let mut near: Vec<DoubleDouble> =
+                    q.iter().enumerate().map(|(j, &q)| q + DoubleDouble::of(0.1 * self.unit[j] * shuffled(k, j))).collect();
+                (self.position(&mut near, &steady, &none) < 1e-9).then_some(near)
+            });
+            for near in nearby.take(3) {
+                let new = independent(&self.jacobian(&near, &every), DEPENDENT);
+                redundant.iter_mut().zip(new).for_each(|(redundant, new)| *redundant &= !new);
+            }
+        }
+        let names =
+            |is: &dyn Fn(usize) -> bool| (0..rows).filter(|&i| is(i)).map(|i| self.mechanism.rows[i].name.clone()).collect::<Vec<_>>();
+        let redundant_names = names(&|i| redundant[i]);
+        Assembly {
+            degrees_of_freedom: q.len() - (rows - redundant_names.len()),
+            singular: names(&|i| dependent[i] && !redundant[i]),
+            redundant: redundant_names,
+            conditioning,
+            ..Assembly::default()
+        }
+    }
+}
+
+/// The aims at the origin of a bar, or at its velocity.
+fn of_origin(mechanism: &Mechanism, bar: usize, [x, y]: [f64; 2]) -> [Aim; 2] {
+    match mechanism.forest.hangs[bar].foot {
+        Foot::Free(k) => [(k, x), (k + 1, y)].map(|(k, given)| Aim { bar, goal: Goal::Coordinate(k), given }),
+        _ => [(Complex::new(1.0, 0.0), x), (Complex::new(0.0, 1.0), y)].map(|(axis, given)| Aim { bar, goal: Goal::Origin(axis), given }),
+    }
+}
+
+/// Numbers in [-1, 1] without a pattern, the same ones always.
+fn shuffled(k: usize, j: usize) -> f64 {
+    let mut bits = (k as u64) << 32 | j as u64;
+    // SplitMix64 (G. L. Steele, D. Lea, C. H. Flood, OOPSLA 2014).
+    bits = bits.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    bits ^= bits >> 31;
+    (bits >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+}

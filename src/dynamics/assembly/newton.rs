@@ -1,0 +1,295 @@
+//! Positions and rates that satisfy the rows: damped Gauss–Newton steps, each the shortest there is, finished in double-double.
+//!
+//! ```text
+//! position:  G dq = -C,             q += dq, halved until C shrinks
+//! rates:     G dw = -(G w + C_t),   once
+//! ```
+//!
+//! Coordinates that are held are left out of dq.  Angles are measured in radians and lengths in the size of the mechanism, rows in their largest lever.
+//! Source: P. Deuflhard, *Newton Methods for Nonlinear Problems* (2004), section 4.4.
+
+use super::svd::Matrix;
+use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
+use crate::dynamics::row::{Linearised, Measure, Posture};
+use crate::dynamics::{Mechanism, Time};
+
+/// Singular values below this share of the largest move nothing.
+const NOISE: f64 = 1e-9;
+/// The longest step \[rad, or sizes of the mechanism\].
+const LONGEST: f64 = 0.5;
+/// A row that is left by this is kept \[rad, or levers\].
+pub const KEPT: f64 = 1e-13;
+
+/// What the start is to be found from.
+#[derive(Clone, Debug)]
+pub struct Problem<'a> {
+    pub mechanism: &'a Mechanism,
+    /// False for rows that keep an angle the start itself is to give.
+    pub active: Vec<bool>,
+    /// Size of the mechanism \[m\].
+    pub size: f64,
+    /// What each coordinate is measured in: 1 rad, or the size.
+    pub unit: Vec<f64>,
+    /// What each row is measured in: 1 rad, or its largest lever \[m\].
+    pub lever: Vec<f64>,
+    /// What is given.
+    pub aims: Vec<Aim>,
+}
+
+/// A number that the scene gives of the start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aim {
+    /// The bar.
+    pub bar: usize,
+    pub goal: Goal,
+    /// The value \[rad or m\], or its rate.
+    pub given: f64,
+}
+
+/// What an [`Aim`] is of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Goal {
+    /// A coordinate.
+    Coordinate(usize),
+    /// The origin of a bar that hangs on another of a free group, along x or y.
+    Origin(Complex<f64>),
+}
+
+/// Rows at one moment, and their Jacobian row by row.
+pub struct Linear<T> {
+    pub rows: Vec<Linearised<T>>,
+    pub jacobian: Vec<T>,
+    pub z: Vec<Complex<T>>,
+}
+
+impl Problem<'_> {
+    /// Number of coordinates.
+    pub fn coordinates(&self) -> usize {
+        self.unit.len()
+    }
+
+    /// The rows at t = 0.
+    pub fn linearise<T: Real>(&self, q: &[DoubleDouble], omega: &[T]) -> Linear<T> {
+        let (mechanism, n) = (self.mechanism, self.coordinates());
+        let angles = mechanism.bodies.len();
+        let phi: Vec<T> = q.iter().enumerate().map(|(k, &q)| T::split(if k < angles { q.reduced().0 } else { q }).0).collect();
+        let mut z = vec![Complex::ZERO; n];
+        mechanism.tree.face::<T, 0>(&phi, &mut z);
+        let mut jacobian = vec![T::ZERO; mechanism.rows.len() * n];
+        let at = Posture { phi: &phi, z: &z, omega };
+        let rows = (mechanism.rows.iter().zip(jacobian.chunks_exact_mut(n)))
+            .map(|(row, jacobian)| row.linearise(Time::default(), at, jacobian))
+            .collect();
+        Linear { rows, jacobian, z }
+    }
+
+    /// Coordinates that no held aim takes.
+    pub fn columns(&self, held: &[bool]) -> Vec<usize> {
+        let taken = |k: usize| self.aims.iter().zip(held).any(|(aim, &held)| held && aim.goal == Goal::Coordinate(k));
+        (0..self.coordinates()).filter(|&k| !taken(k)).collect()
+    }
+
+    /// Every row's Jacobian in all coordinates, measured; rows that are not among `rows` come out zero.
+    pub fn jacobian(&self, q: &[DoubleDouble], rows: &[bool]) -> Matrix {
+        let n = self.coordinates();
+        let linear = self.linearise::<f64>(q, &vec![0.0; n]);
+        let mut matrix = Matrix::zero(self.mechanism.rows.len(), n);
+        for (i, gradient) in linear.jacobian.chunks_exact(n).enumerate().filter(|(i, _)| rows[*i]) {
+            self.measure(gradient, self.lever[i], matrix.row_mut(i));
+        }
+        matrix
+    }
+
+    fn measure(&self, gradient: &[f64], lever: f64, row: &mut [f64]) {
+        for ((entry, g), unit) in row.iter_mut().zip(gradient).zip(&self.unit) {
+            *entry = g * unit / lever;
+        }
+    }
+
+    /// Value of an aim \[rad or m\], and its gradient, measured.
+    pub fn aim<T: Real>(&self, aim: &Aim, q: &[DoubleDouble], z: &[Complex<T>]) -> (T, Vec<f64>) {
+        let n = self.coordinates();
+        let mut row = vec![0.0; n];
+        match aim.goal {
+            Goal::Coordinate(k) => {
+                row[k] = 1.0;
+                (T::split(q[k]).0, row)
+            }
+            Goal::Origin(axis) => {
+                let point = self.mechanism.end(aim.bar, 0).point;
+                let mut gradient = vec![0.0; n];
+                for &(k, gamma) in &point.terms {
+                    let lever = z[k].turn(gamma).left();
+                    gradient[k] = lever.re.value() * axis.re + lever.im.value() * axis.im;
+                }
+                for &(x, share) in &point.shifts {
+                    (gradient[x], gradient[x + 1]) = (share * axis.re, share * axis.im);
+                }
+                self.measure(&gradient, self.size, &mut row);
+                (Complex::of(axis).dot(point.position(z)), row)
+            }
+        }
+    }
+
+    /// Rate of an aim \[rad/s or m/s\].
+    pub fn aim_rate(&self, aim: &Aim, z: &[Complex<DoubleDouble>], omega: &[DoubleDouble]) -> DoubleDouble {
+        match aim.goal {
+            Goal::Coordinate(k) => omega[k],
+            Goal::Origin(axis) => Complex::of(axis).dot(self.mechanism.end(aim.bar, 0).point.velocity(z, omega)),
+        }
+    }
+
+    /// Measured violations of the rows that count and of held origins, and their Jacobian in the free columns.
+    fn equations<T: Real>(&self, q: &[DoubleDouble], rows: &[bool], held: &[bool], columns: &[usize]) -> (Vec<f64>, Matrix) {
+        let n = self.coordinates();
+        let linear = self.linearise::<T>(q, &vec![T::ZERO; n]);
+        let plain: Vec<f64> = linear.jacobian.iter().map(|g| g.value()).collect();
+        let (mut left, mut matrix) = (Vec::new(), Matrix { rows: 0, columns: columns.len(), entries: Vec::new() });
+        let mut full = vec![0.0; n];
+        for (i, (row, gradient)) in linear.rows.iter().zip(plain.chunks_exact(n)).enumerate().filter(|(i, _)| rows[*i]) {
+            self.measure(gradient, self.lever[i], &mut full);
+            left.push(row.position.value() / self.lever[i]);
+            matrix.push(&full, columns);
+        }
+        for (aim, _) in self.aims.iter().zip(held).filter(|(aim, held)| **held && matches!(aim.goal, Goal::Origin(_))) {
+            let (value, gradient) = self.aim(aim, q, &linear.z);
+            left.push((value - T::of(aim.given)).value() / self.size);
+            matrix.push(&gradient, columns);
+        }
+        (left, matrix)
+    }
+
+    /// Brings the rows to zero as far as it goes, and returns what is left, measured.
+    pub fn position(&self, q: &mut Vec<DoubleDouble>, rows: &[bool], held: &[bool]) -> f64 {
+        let columns = self.columns(held);
+        let (mut left, mut matrix) = self.equations::<f64>(q, rows, held, &columns);
+        for _ in 0..100 {
+            if largest(&left) < 1e-15 || columns.is_empty() {
+                break;
+            }
+            let mut step = matrix.svd().solve(&left, columns.len(), NOISE);
+            let longest = largest(&step);
+            let mut share = if longest > LONGEST { LONGEST / longest } else { 1.0 };
+            step.iter_mut().zip(&columns).for_each(|(step, &k)| *step *= self.unit[k]);
+            let mut better = None;
+            for _ in 0..12 {
+                let trial = moved(q, &step, &columns, share);
+                let there = self.equations::<f64>(&trial, rows, held, &columns);
+                if squares(&there.0) < squares(&left) * (1.0 - 1e-4 * share) {
+                    better = Some((trial, there));
+                    break;
+                }
+                share *= 0.5;
+            }
+            let Some((trial, there)) = better else { break };
+            *q = trial;
+            (left, matrix) = there;
+        }
+        largest(&left)
+    }
+
+    /// Closes what a plain double leaves; returns what is left then, measured.
+    pub fn finish(&self, q: &mut Vec<DoubleDouble>, rows: &[bool], held: &[bool]) -> f64 {
+        let columns = self.columns(held);
+        let (mut left, mut matrix) = self.equations::<DoubleDouble>(q, rows, held, &columns);
+        for _ in 0..6 {
+            if largest(&left) < 1e-30 || columns.is_empty() {
+                break;
+            }
+            let mut step = matrix.svd().solve(&left, columns.len(), NOISE);
+            step.iter_mut().zip(&columns).for_each(|(step, &k)| *step *= self.unit[k]);
+            let trial = moved(q, &step, &columns, 1.0);
+            let there = self.equations::<DoubleDouble>(&trial, rows, held, &columns);
+            if squares(&there.0) >= squares(&left) {
+                break;
+            }
+            *q = trial;
+            (left, matrix) = there;
+        }
+        largest(&left)
+    }
+
+    /// The row that is off most: its number and by how much \[rad or m\].
+    pub fn worst(&self, q: &[DoubleDouble]) -> (usize, f64) {
+        let linear = self.linearise::<f64>(q, &vec![0.0; self.coordinates()]);
+        let off = |i: usize| linear.rows[i].position.abs();
+        let measured = |i: &usize| if self.active[*i] { off(*i) / self.lever[*i] } else { -1.0 };
+        let worst = (0..linear.rows.len()).max_by(|a, b| measured(a).total_cmp(&measured(b))).unwrap_or(0);
+        (worst, off(worst))
+    }
+
+    /// Changes the rates that are not held, as little as may be, so that all rows keep; returns what is left, measured, relative to the rates.
+    pub fn rates(&self, q: &[DoubleDouble], omega: &mut [DoubleDouble], aims: &[Aim], held: &[bool]) -> f64 {
+        let columns = Problem { aims: aims.to_vec(), ..self.clone() }.columns(held);
+        let mut matrix = Matrix { rows: 0, columns: columns.len(), entries: Vec::new() };
+        let full = self.jacobian(q, &vec![true; self.mechanism.rows.len()]);
+        (0..full.rows).for_each(|i| matrix.push(full.row(i), &columns));
+        let z = self.linearise::<f64>(q, &vec![0.0; self.coordinates()]).z;
+        let origins = || aims.iter().zip(held).filter(|(aim, held)| **held && matches!(aim.goal, Goal::Origin(_))).map(|(aim, _)| aim);
+        origins().for_each(|aim| matrix.push(&self.aim(aim, q, &z).1, &columns));
+        let svd = matrix.svd();
+        let left = |omega: &[DoubleDouble]| {
+            let mut left: Vec<f64> = self.slips(q, omega).iter().zip(&self.lever).map(|(slip, lever)| slip / lever).collect();
+            let z = self.linearise::<DoubleDouble>(q, omega).z;
+            left.extend(origins().map(|aim| (self.aim_rate(aim, &z, omega) - DoubleDouble::of(aim.given)).hi / self.size));
+            left
+        };
+        let mut now = left(omega);
+        for _ in 0..6 {
+            let step = svd.solve(&now, columns.len(), NOISE);
+            let mut trial = omega.to_vec();
+            for (step, &k) in step.iter().zip(&columns) {
+                trial[k] -= DoubleDouble::of(step * self.unit[k]);
+            }
+            let there = left(&trial);
+            if squares(&there) >= squares(&now) {
+                break;
+            }
+            omega.copy_from_slice(&trial);
+            now = there;
+        }
+        let fastest = omega.iter().zip(&self.unit).fold(1.0, |most: f64, (omega, unit)| most.max((omega.hi / unit).abs()));
+        largest(&now) / fastest
+    }
+
+    /// C' = G w + C_t of every row \[rad/s or m/s\].
+    pub fn slips(&self, q: &[DoubleDouble], omega: &[DoubleDouble]) -> Vec<f64> {
+        let linear = self.linearise::<DoubleDouble>(q, omega);
+        (linear.rows.iter().zip(linear.jacobian.chunks_exact(omega.len())))
+            .map(|(row, gradient)| gradient.iter().zip(omega).fold(row.drive, |sum, (&g, &w)| sum + g * w).hi)
+            .collect()
+    }
+}
+
+/// The largest lever of a row \[m\], feet counted with the size of the mechanism; 1 rad for an angle.
+pub fn lever(measure: &Measure, size: f64) -> f64 {
+    let Measure::Place(place) = measure else { return 1.0 };
+    let length = |k: usize, g: &Complex<f64>| g.norm_squared().sqrt() * if k < place.angles { 1.0 } else { size };
+    let linear = place.linear.iter().map(|(k, g)| length(*k, g));
+    let bilinear = place.bilinear.iter().map(|(_, k, h)| length(*k, h));
+    let most = linear.chain(bilinear).fold(0.0, f64::max);
+    if most > 0.0 { most } else { size }
+}
+
+impl Matrix {
+    fn push(&mut self, full: &[f64], columns: &[usize]) {
+        self.entries.extend(columns.iter().map(|&k| full[k]));
+        self.rows += 1;
+    }
+}
+
+fn moved(q: &[DoubleDouble], step: &[f64], columns: &[usize], share: f64) -> Vec<DoubleDouble> {
+    let mut moved = q.to_vec();
+    for (step, &k) in step.iter().zip(columns) {
+        moved[k] -= DoubleDouble::of(step * share);
+    }
+    moved
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |most: f64, value| most.max(value.abs()))
+}
+
+fn squares(values: &[f64]) -> f64 {
+    values.iter().map(|value| value * value).sum()
+}

@@ -1,0 +1,197 @@
+//! Singular values of small dense matrices, by rotating pairs of columns until all are orthogonal.
+//!
+//! Square roots are the only functions it asks for, so that its bits are the same on every machine.  Source: M. R. Hestenes, J. SIAM 6 (1958); J. Demmel,
+//! K. Veselić, SIAM J. Matrix Anal. Appl. 13 (1992), on its accuracy.
+
+/// A matrix row by row.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Matrix {
+    pub rows: usize,
+    pub columns: usize,
+    /// rows × columns.
+    pub entries: Vec<f64>,
+}
+
+/// A = Σ σ u vᵀ, without the zero ones.
+#[derive(Clone, Debug)]
+pub struct Svd {
+    /// σ, u (one a row of A), v (one a column of A).
+    triples: Vec<(f64, Vec<f64>, Vec<f64>)>,
+}
+
+/// Sweeps over all pairs; eight are enough in practice.
+const SWEEPS: usize = 40;
+
+impl Matrix {
+    /// All zero.
+    pub fn zero(rows: usize, columns: usize) -> Self {
+        Self { rows, columns, entries: vec![0.0; rows * columns] }
+    }
+
+    /// A row.
+    pub fn row(&self, row: usize) -> &[f64] {
+        &self.entries[row * self.columns..][..self.columns]
+    }
+
+    /// A row, to write.
+    pub fn row_mut(&mut self, row: usize) -> &mut [f64] {
+        &mut self.entries[row * self.columns..][..self.columns]
+    }
+
+    /// Its singular values and vectors.
+    pub fn svd(&self) -> Svd {
+        // The shorter side is rotated: vectors along the longer one become orthogonal.
+        let upright = self.columns <= self.rows;
+        let (few, many) = if upright { (self.columns, self.rows) } else { (self.rows, self.columns) };
+        let entry = |i: usize, k: usize| self.entries[if upright { k * self.columns + i } else { i * self.columns + k }];
+        let mut long: Vec<Vec<f64>> = (0..few).map(|i| (0..many).map(|k| entry(i, k)).collect()).collect();
+        let mut short: Vec<Vec<f64>> = (0..few).map(|i| (0..few).map(|k| if i == k { 1.0 } else { 0.0 }).collect()).collect();
+        for _ in 0..SWEEPS {
+            let mut rotated = false;
+            for i in 0..few {
+                for j in i + 1..few {
+                    let (a, b, c) = (dot(&long[i], &long[i]), dot(&long[j], &long[j]), dot(&long[i], &long[j]));
+                    if c == 0.0 || c.abs() <= 1e-16 * (a * b).sqrt() {
+                        continue;
+                    }
+                    rotated = true;
+                    let zeta = (b - a) / (2.0 * c);
+                    let t = zeta.signum() / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
+                    let cos = 1.0 / (1.0 + t * t).sqrt();
+                    rotate(&mut long, i, j, cos, cos * t);
+                    rotate(&mut short, i, j, cos, cos * t);
+                }
+            }
+            if !rotated {
+                break;
+            }
+        }
+        let triples = (long.into_iter().zip(short))
+            .filter_map(|(mut long, short)| {
+                let sigma = dot(&long, &long).sqrt();
+                if sigma == 0.0 {
+                    return None;
+                }
+                long.iter_mut().for_each(|x| *x /= sigma);
+                Some(if upright { (sigma, long, short) } else { (sigma, short, long) })
+            })
+            .collect();
+        Svd { triples }
+    }
+}
+
+impl Svd {
+    /// The largest singular value.
+    fn largest(&self) -> f64 {
+        self.triples.iter().fold(0.0, |most, triple| triple.0.max(most))
+    }
+
+    /// The least singular value above `least` over the largest; 1 without any.
+    pub fn conditioning(&self, least: f64) -> f64 {
+        let smallest = self.triples.iter().map(|triple| triple.0).filter(|&sigma| sigma > least).fold(f64::INFINITY, f64::min);
+        if smallest.is_finite() { smallest / self.largest() } else { 1.0 }
+    }
+
+    /// The shortest x for which A x is nearest to `b`; singular values below `share` of the largest count as zero.
+    pub fn solve(&self, b: &[f64], columns: usize, share: f64) -> Vec<f64> {
+        let least = share * self.largest();
+        let mut x = vec![0.0; columns];
+        for (sigma, u, v) in self.triples.iter().filter(|triple| triple.0 > least) {
+            let part = dot(u, b) / sigma;
+            x.iter_mut().zip(v).for_each(|(x, v)| *x += part * v);
+        }
+        x
+    }
+
+    /// How much of each column's direction the rows leave open: 0 where they fix it, 1 where they do not touch it; singular values below `least` count as zero.
+    pub fn open(&self, columns: usize, least: f64) -> Vec<f64> {
+        let mut open = vec![1.0; columns];
+        for (_, _, v) in self.triples.iter().filter(|triple| triple.0 > least) {
+            open.iter_mut().zip(v).for_each(|(open, v)| *open -= v * v);
+        }
+        open
+    }
+}
+
+/// Which of the rows, from the first on, are no combination of those before; what is left of a row counts as zero below `least`.
+pub fn independent(matrix: &Matrix, least: f64) -> Vec<bool> {
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    (0..matrix.rows)
+        .map(|row| {
+            let mut rest = matrix.row(row).to_vec();
+            // Twice is enough.
+            for _ in 0..2 {
+                for unit in &basis {
+                    let share = dot(unit, &rest);
+                    rest.iter_mut().zip(unit).for_each(|(x, unit)| *x -= share * unit);
+                }
+            }
+            let length = dot(&rest, &rest).sqrt();
+            let is_new = length > least;
+            if is_new {
+                rest.iter_mut().for_each(|x| *x /= length);
+                basis.push(rest);
+            }
+            is_new
+        })
+        .collect()
+}
+
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn rotate(vectors: &mut [Vec<f64>], i: usize, j: usize, cos: f64, sin: f64) {
+    let (head, tail) = vectors.split_at_mut(j);
+    for (a, b) in head[i].iter_mut().zip(&mut tail[0]) {
+        (*a, *b) = (cos * *a - sin * *b, sin * *a + cos * *b);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Entries without a pattern.
+    fn matrix(rows: usize, columns: usize) -> Matrix {
+        let entries = (0..rows * columns).map(|k| libm::sin(1.0 + 12.9898 * k as f64)).collect();
+        Matrix { rows, columns, entries }
+    }
+
+    #[test]
+    fn the_product_is_the_matrix_and_the_solution_is_the_shortest() {
+        for (rows, columns) in [(4, 4), (3, 7), (7, 3), (1, 5), (5, 1)] {
+            let a = matrix(rows, columns);
+            let svd = a.svd();
+            for i in 0..rows {
+                for k in 0..columns {
+                    let product: f64 = svd.triples.iter().map(|(sigma, u, v)| sigma * u[i] * v[k]).sum();
+                    assert!((product - a.row(i)[k]).abs() < 1e-14);
+                }
+            }
+            let b: Vec<f64> = (0..rows).map(|i| i as f64 + 0.5).collect();
+            let x = svd.solve(&b, columns, 1e-12);
+            let left: Vec<f64> = (0..rows).map(|i| dot(a.row(i), &x) - b[i]).collect();
+            for k in 0..columns {
+                let normal: f64 = (0..rows).map(|i| a.row(i)[k] * left[i]).sum();
+                assert!(normal.abs() < 1e-12, "what is left is orthogonal to every column");
+            }
+            // The shortest has no part that the rows do not see.
+            let along: f64 = svd.triples.iter().map(|(_, _, v)| dot(v, &x).powi(2)).sum();
+            assert!((along - dot(&x, &x)).abs() < 1e-12 * dot(&x, &x));
+        }
+    }
+
+    #[test]
+    fn dependent_rows_and_open_columns_are_found() {
+        let mut a = matrix(3, 5);
+        for k in 0..4 {
+            a.row_mut(2)[k] = 2.0 * a.row(0)[k] - a.row(1)[k];
+        }
+        (0..3).for_each(|row| a.row_mut(row)[4] = 0.0);
+        assert_eq!(independent(&a, 1e-9), [true, true, false]);
+        let open = a.svd().open(5, 1e-9);
+        assert_eq!(open[4], 1.0);
+        assert!((open.iter().sum::<f64>() - 3.0).abs() < 1e-14, "5 columns less rank 2: {open:?}");
+    }
+}

@@ -1,0 +1,176 @@
+//! One evaluation of the equations body by body, in place of the dense matrices of [`Kernel`](crate::dynamics::kernel::Kernel).
+
+use super::rows::{Rows, Ways};
+use super::{Links, Recursive};
+use crate::arithmetic::{Complex, Real};
+use crate::dynamics::compile::Body;
+use crate::dynamics::forest::Forest;
+use crate::dynamics::kernel::Bias;
+use crate::dynamics::row::{Linearised, Posture, Row};
+use crate::dynamics::schur::Weakest;
+use crate::dynamics::{Mechanism, Time};
+use std::sync::Arc;
+
+/// Operations of the dense form that take as long as one of the recursive form, whose steps wait for one another.
+const PACE: usize = 4;
+
+/// The constants of the recursive form.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recursion {
+    /// The hinge trees.
+    pub links: Links,
+    /// The rows on them.
+    pub ways: Ways,
+}
+
+impl Recursion {
+    /// The trees and rows of a mechanism.
+    pub fn new(bodies: &[Body], forest: &Forest, rows: &[Row], gravity: Complex<f64>) -> Self {
+        let links = Links::new(bodies, forest, gravity);
+        let touched: Vec<_> = rows.iter().map(Row::coordinates).collect();
+        let ways = Ways::new(&links, &touched);
+        Self { links, ways }
+    }
+
+    /// True where this form takes less time than the dense one, by their multiplications.
+    pub fn pays(&self) -> bool {
+        let (n, rows) = (self.links.coordinates(), self.ways.rows());
+        let dense = n * n * (n + 24) / 6 + rows * n * n + rows * rows * (3 * n + rows) / 6;
+        PACE * (60 * n + self.ways.cost()) < dense
+    }
+}
+
+/// Scratch space of the recursive form; nothing is allocated after [`Evaluation::new`].
+#[derive(Clone, Debug)]
+pub struct Evaluation<T> {
+    recursion: Arc<Recursion>,
+    trees: Recursive<T>,
+    rows: Rows<T>,
+    /// One row's Jacobian on its way (n), zero in between.
+    jacobian: Vec<T>,
+}
+
+impl<T: Real> Evaluation<T> {
+    /// Scratch space for these constants and the [scales](Row::scale) of their rows.
+    pub fn new(recursion: &Arc<Recursion>, scales: &[f64]) -> Self {
+        Self {
+            trees: Recursive::new(&recursion.links),
+            rows: Rows::new(&recursion.ways, scales),
+            jacobian: vec![T::ZERO; recursion.links.coordinates()],
+            recursion: Arc::clone(recursion),
+        }
+    }
+
+    /// Elements at these coordinates \[rad, m\].
+    #[inline]
+    pub fn face(&self, phi: &[T], z: &mut [Complex<T>]) {
+        let angles = self.recursion.links.bodies();
+        T::units(&phi[..angles], &mut z[..angles]);
+        for x in (angles..phi.len()).step_by(2) {
+            z[x] = Complex::new(phi[x], phi[x + 1]);
+        }
+    }
+
+    /// The factors of M at the elements `z`, and what is left of velocity terms and gravity.
+    pub fn factor(&mut self, z: &[Complex<T>], omega: &[T]) {
+        self.trees.convect(&self.recursion.links, z, omega);
+        self.trees.fold(&self.recursion.links);
+    }
+
+    /// Writes the reciprocal pivots of M.
+    pub fn pivots(&self, pivots: &mut [T]) {
+        self.trees.pivots(pivots);
+    }
+
+    /// The factors of M, and what is left of all forces; overwrites `load`.
+    #[inline]
+    pub fn fold(&mut self, mechanism: &Mechanism, t: Time, at: Posture<T>, load: &mut [T]) {
+        self.trees.convect(&self.recursion.links, at.z, at.omega);
+        if mechanism.is_forced() {
+            load.fill(T::ZERO);
+            mechanism.push(t, at, load);
+            self.trees.burden(&self.recursion.links, load);
+        }
+        self.trees.fold(&self.recursion.links);
+    }
+
+    /// Writes the accelerations \[rad/s², m/s²\].
+    #[inline]
+    pub fn unfold(&mut self, alpha: &mut [T]) {
+        self.trees.unfold(&self.recursion.links, alpha);
+    }
+
+    /// The multipliers and the bias's share of them after [`fold`](Self::fold), the rows as they are, and what they leave of all forces; the weakest row.
+    #[inline]
+    pub fn constrain(
+        &mut self,
+        mechanism: &Mechanism,
+        t: Time,
+        at: Posture<T>,
+        bias: Bias,
+        found: (&mut [Linearised<T>], &mut [T], &mut [T]),
+    ) -> Weakest {
+        let (rows, multiplier, correction) = found;
+        let (ways, is_biased) = (&self.recursion.ways, bias != Bias::default());
+        for (r, row) in mechanism.rows.iter().enumerate() {
+            let jacobian = &mut self.jacobian[..];
+            // Only a bias asks for C.
+            let here = if is_biased { row.linearise(t, at, jacobian) } else { row.differentiate(t, at, jacobian) };
+            self.rows.take(ways, r, jacobian);
+            (multiplier[r], correction[r]) = (here.convective, T::ZERO);
+            if is_biased {
+                correction[r] = (self.rows.along(ways, r, at.omega) + here.drive).scale(bias.rate) + here.position.scale(bias.position);
+                multiplier[r] += correction[r];
+            }
+            rows[r] = here;
+        }
+        let weakest = self.rows.couple(ways, &self.trees);
+        self.rows.project(ways, &self.trees, multiplier);
+        self.rows.solve(ways, multiplier);
+        if is_biased {
+            self.rows.solve(ways, correction);
+        }
+        self.rows.resist(ways, &mut self.trees, multiplier);
+        weakest
+    }
+
+    /// C, G, C_t, gamma of every row, and nothing else.
+    pub fn rows_at(&mut self, mechanism: &Mechanism, t: Time, at: Posture<T>, rows: &mut [Linearised<T>]) {
+        for (r, row) in mechanism.rows.iter().enumerate() {
+            rows[r] = row.linearise(t, at, &mut self.jacobian);
+            self.rows.take(&self.recursion.ways, r, &mut self.jacobian);
+        }
+    }
+
+    /// The factors of S, after [`rows_at`](Self::rows_at) and the factors of M.
+    pub fn couple(&mut self) -> Weakest {
+        self.rows.couple(&self.recursion.ways, &self.trees)
+    }
+
+    /// Replaces x by S⁻¹ x.
+    pub fn solve_rows(&mut self, x: &mut [T]) {
+        self.rows.solve(&self.recursion.ways, x);
+    }
+
+    /// Writes M⁻¹ Gᵀ x; forgets the load.
+    pub fn lift(&mut self, x: &[T], lifted: &mut [T]) {
+        let Recursion { links, ways } = &*self.recursion;
+        self.trees.unburden();
+        self.rows.resist(ways, &mut self.trees, x);
+        self.trees.unfold(links, lifted);
+        for entry in lifted {
+            *entry = -*entry;
+        }
+    }
+
+    /// True where a row was left out.
+    pub fn is_left_out(&self, row: usize) -> bool {
+        self.rows.is_left_out(&self.recursion.ways, row)
+    }
+
+    /// The coordinates a row depends on, and its Jacobian there.
+    #[inline]
+    pub fn gradient(&self, row: usize) -> impl Iterator<Item = (usize, T)> + '_ {
+        self.rows.gradient(&self.recursion.ways, row)
+    }
+}

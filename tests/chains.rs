@@ -1,0 +1,292 @@
+//! The equations body by body: against the matrices on random mechanisms, and on chains too long for matrices.
+
+mod common;
+#[path = "common/trees.rs"]
+#[allow(dead_code)]
+mod trees;
+
+use driftless::arithmetic::{Complex, DoubleDouble, Real, Scalar};
+use driftless::dynamics::kernel::{Bias, Kernel};
+use driftless::dynamics::multiplier::Multiplier;
+use driftless::dynamics::{Field, Form, Mechanism, Time};
+use driftless::run::{MethodId, Plan, Request, Stabilization, simulate};
+use driftless::scene::{Bar, Force, Given, Hinge, Place, Rail, Scene, Slider, Start, Torque, TorsionSpring};
+use driftless::stabilization::projection::project;
+use proptest::prelude::*;
+use std::sync::Arc;
+use trees::{Dice, tree};
+
+/// Whole multiples of 1/256, so that masses times squares of lengths are exact and both forms have the same constants.
+fn shorten(scene: &mut Scene) {
+    let short = |x: &mut f64| *x = (*x * 256.0).round() / 256.0;
+    scene.gravity.iter_mut().for_each(short);
+    for bar in &mut scene.bars {
+        bar.centre.iter_mut().for_each(short);
+        short(&mut bar.mass);
+        short(&mut bar.inertia);
+    }
+    let hinges = scene.hinges.iter_mut().flat_map(|hinge| &mut hinge.between);
+    let springs = scene.springs.iter_mut().flat_map(|spring| &mut spring.between);
+    let sliders = scene.sliders.iter_mut().flat_map(|slider| [&mut slider.point, &mut slider.rail.place]);
+    hinges.chain(springs).chain(sliders).for_each(|place| place.point.iter_mut().for_each(short));
+}
+
+/// A tree, or several of which some hang on nothing, with motors, loops, sliders and loads where the dice say so.
+fn mechanism(n: usize, seed: u64) -> Scene {
+    let mut dice = Dice::new(seed);
+    let motors = dice.pick(2) == 1;
+    let mut scene = tree(n, motors, &mut dice);
+    if dice.pick(2) == 1 {
+        scene.hinges.remove(dice.pick(n));
+    }
+    let point = |dice: &mut Dice| [dice.within(-0.5, 0.5), dice.within(-0.5, 0.5)];
+    let body = |dice: &mut Dice| Some(dice.pick(n + 1)).filter(|&bar| bar < n);
+    for k in 0..dice.pick(3) {
+        let (bar, rail) = (dice.pick(n), body(&mut dice));
+        let (at, on) = (point(&mut dice), point(&mut dice));
+        if rail != Some(bar) {
+            let rail = Rail { place: Place { bar: rail, point: on }, direction: [0.6, 0.8] };
+            scene.sliders.push(Slider { name: format!("slider{k}"), point: Place { bar: Some(bar), point: at }, rail, locked: false });
+        }
+    }
+    for k in 0..dice.pick(3) {
+        let (a, b) = (dice.pick(n), body(&mut dice));
+        let between = [Place { bar: Some(a), point: point(&mut dice) }, Place { bar: b, point: point(&mut dice) }];
+        // Between bodies that are connected already it closes a loop, else it joins them.
+        if b != Some(a) && 2 * k + 2 + scene.sliders.len() + scene.motors.len() < n {
+            scene.hinges.push(Hinge { name: format!("loop{k}"), between });
+        }
+    }
+    if dice.pick(2) == 1 {
+        let relative_to = body(&mut dice).filter(|&bar| bar != 0);
+        scene.torsion_springs.push(TorsionSpring {
+            name: "coil".into(),
+            bar: 0,
+            relative_to,
+            stiffness: 2.0,
+            free_angle: 0.5,
+            damping: 0.25,
+        });
+        scene.forces.push(Force { name: "f".into(), bar: n - 1, point: point(&mut dice), force: [1.0, -2.0], follows: true, law: None });
+        scene.torques.push(Torque { name: "m".into(), bar: 0, relative_to, torque: 0.75, law: None });
+    }
+    scene.given = vec![Given { phi: true, omega: true, origin: Some([0.5, -0.25]), velocity: Some([0.75, 1.0]) }; n];
+    shorten(&mut scene);
+    scene
+}
+
+/// The kernel after an evaluation.
+fn evaluate<T: Real>(mechanism: &Mechanism, phi: &[T], omega: &[T], bias: Bias) -> Kernel<T> {
+    let mut kernel = Kernel::new(mechanism);
+    kernel.accelerate::<0>(mechanism, Time::from(0.375), phi, omega, bias);
+    kernel
+}
+
+/// The largest difference, over the largest number or one.
+fn difference<T: Real>(found: &[T], expected: &[T]) -> f64 {
+    let largest = expected.iter().fold(1.0, |most: f64, x| most.max(x.value().abs()));
+    found.iter().zip(expected).fold(0.0, |most: f64, (&a, &b)| most.max((a - b).value().abs() / largest))
+}
+
+/// Both forms in double-double and the recursive one in double: differences of accelerations and multipliers, and the pivots' smallest share.
+fn compare(scene: &Scene) -> Option<([f64; 4], usize)> {
+    let mechanism = Mechanism::new(scene).ok()?;
+    let (dense, bodywise) = (mechanism.by_matrices()?, mechanism.body_by_body());
+    let start = mechanism.start(scene);
+    let bias = Bias { rate: 3.0, position: 5.0 };
+    let exact = evaluate(&dense, &start.phi, &start.omega, bias);
+    // Rows that depend on one another, or nearly so, are a question of their own.
+    if exact.weakest.share < 1e-4 {
+        return None;
+    }
+    let fine = evaluate(&bodywise, &start.phi, &start.omega, bias);
+    let plain = |x: &[DoubleDouble]| x.iter().map(|x| x.hi).collect::<Vec<_>>();
+    let coarse = evaluate(&bodywise, &plain(&start.phi), &plain(&start.omega), bias);
+    let corrections = difference(&fine.correction, &exact.correction);
+    Some((
+        [
+            difference(&fine.load, &exact.load),
+            difference(&fine.multiplier, &exact.multiplier).max(corrections),
+            difference(&coarse.load, &plain(&exact.load)),
+            difference(&coarse.multiplier, &plain(&exact.multiplier)),
+        ],
+        mechanism.rows.len(),
+    ))
+}
+
+proptest! {
+    /// Trees of all shapes, bodies that hang on nothing, loops, sliders and slots, motors and every load.
+    #[test]
+    fn accelerations_and_multipliers_are_those_of_the_matrices(n in 1..=9usize, seed in any::<u64>()) {
+        let scene = mechanism(n, seed);
+        if let Some(([fine, fine_rows, coarse, coarse_rows], _)) = compare(&scene) {
+            prop_assert!(fine < 1e-25 && fine_rows < 1e-25, "{fine:e} {fine_rows:e}");
+            prop_assert!(coarse < 1e-8 && coarse_rows < 1e-8, "{coarse:e} {coarse_rows:e}");
+        }
+    }
+}
+
+#[test]
+fn the_random_mechanisms_have_rows_and_differ_by_rounding() {
+    let (mut rows, mut compared, mut worst) = (0, 0, [0.0_f64; 4]);
+    for seed in 0..300 {
+        let Some((found, r)) = compare(&mechanism(3 + seed as usize % 12, seed)) else { continue };
+        rows += r;
+        compared += 1;
+        for (worst, found) in worst.iter_mut().zip(found) {
+            *worst = worst.max(found);
+        }
+    }
+    assert!(compared > 200 && rows > 300, "{compared} {rows}");
+    assert!(worst[0] < 1e-26 && worst[1] < 1e-26 && worst[2] < 1e-9 && worst[3] < 1e-9, "{worst:?}");
+}
+
+/// A chain of `n` links, one metre and one kilogram in all, bent and in motion.
+fn chain(n: usize) -> Scene {
+    let length = 1.0 / n as f64;
+    let bar =
+        |k: usize| Bar { name: format!("link{k}"), length, mass: length, centre: [length / 2.0, 0.0], inertia: length.powi(3) / 12.0 };
+    let hinge = |k: usize| Hinge {
+        name: format!("hinge{k}"),
+        between: [
+            Place { bar: k.checked_sub(1), point: [if k == 0 { 0.0 } else { length }, 0.0] },
+            Place { bar: Some(k), point: [0.0; 2] },
+        ],
+    };
+    Scene {
+        name: "chain".into(),
+        gravity: [9.81, 0.0],
+        bars: (0..n).map(bar).collect(),
+        hinges: (0..n).map(hinge).collect(),
+        start: (0..n).map(|k| Start { phi: (0.03 * k as f64).sin(), omega: 2.0 * (0.07 * k as f64).cos() }).collect(),
+        until: 0.01,
+        every: 0.01,
+        ..Scene::default()
+    }
+}
+
+/// Moments about every centre of mass and forces on it, from the hinge forces and accelerations found.
+#[test]
+fn every_link_of_a_very_long_chain_is_in_balance() {
+    let n = 10_000;
+    let scene = chain(n);
+    let mechanism = Mechanism::new(&scene).expect("equations");
+    assert!(mechanism.by_matrices().is_none());
+    let start = mechanism.start(&scene);
+    let plain = |x: &[DoubleDouble]| x.iter().map(|x| x.hi).collect::<Vec<_>>();
+    let (phi, omega) = (plain(&start.phi), plain(&start.omega));
+    let kernel = evaluate(&mechanism, &phi, &omega, Bias::default());
+    assert!(kernel.load.iter().all(|alpha| alpha.is_finite()));
+    let forces = mechanism.hinge_forces(start.time, &kernel, &omega);
+    let largest = forces.iter().fold(0.0, |most: f64, force| most.max(force.norm_squared().sqrt()));
+    let mut worst = 0.0_f64;
+    for (k, body) in mechanism.bodies.iter().enumerate() {
+        let half = kernel.z[k].times(body.centre.re);
+        let beyond = forces.get(k + 1).copied().unwrap_or(Complex::ZERO);
+        let moment = (-half).cross(forces[k]) - half.cross(beyond);
+        worst = worst.max((body.inertia * kernel.load[k] - moment).abs() / (largest * body.centre.re));
+    }
+    // Each force is a sum over what hangs below.
+    assert!(worst < 1e-11, "{worst:e}");
+}
+
+/// What a hinge carries is what the two rows of a pin in its place do.
+#[test]
+fn hinge_forces_are_the_multipliers_of_pins() {
+    let mut scene = chain(12);
+    let hung = Mechanism::new(&scene).expect("equations").body_by_body();
+    // The lower half hangs on nothing but a loop's rows: its first link comes before the hinge that would carry it.
+    let cut = 6;
+    let between = scene.hinges[cut].between;
+    scene.hinges.remove(cut);
+    scene.given = vec![Given { phi: true, omega: true, origin: None, velocity: None }; 12];
+    let start = hung.start(&scene);
+    let plain = |x: &[DoubleDouble]| x.iter().map(|x| x.hi).collect::<Vec<_>>();
+    let kernel = evaluate(&hung, &plain(&start.phi), &plain(&start.omega), Bias::default());
+    let carried = hung.hinge_forces(start.time, &kernel, &plain(&start.omega))[cut];
+    let loose = Mechanism::new(&scene).expect("equations");
+    let sites = between.map(|place| loose.forest.site(&place));
+    let pinned = loose.pinned("cut", &sites[0], &sites[1]).body_by_body();
+    let (n, x) = (pinned.coordinates(), pinned.bodies.len());
+    assert_eq!((n, pinned.rows.len()), (14, 2));
+    let (mut phi, mut omega) = (plain(&start.phi), plain(&start.omega));
+    // The foot is where the link above ends, and moves with it.
+    let above = &sites[0].point;
+    (phi.resize(n, 0.0), omega.resize(n, 0.0));
+    let (at, speed) = (above.position(&kernel.z), above.velocity(&kernel.z, &omega));
+    (phi[x], phi[x + 1], omega[x], omega[x + 1]) = (at.re, at.im, speed.re, speed.im);
+    let again = evaluate(&pinned, &phi, &omega, Bias::default());
+    assert!(difference(&again.load[..12], &kernel.load) < 1e-12);
+    assert!((carried - Complex::new(again.multiplier[0], again.multiplier[1])).norm_squared().sqrt() < 1e-12);
+}
+
+/// dE/dt is the power of nothing at all, and E - W stands still where motors work.
+#[test]
+fn the_power_of_a_form_is_the_rate_of_its_energy() {
+    for seed in 0..40 {
+        let scene = mechanism(4 + seed as usize % 5, seed);
+        let Ok(mechanism) = Mechanism::new(&scene) else { continue };
+        let mechanism = Arc::new(mechanism.body_by_body());
+        let start = mechanism.start(&scene);
+        if evaluate(&mechanism, &start.phi, &start.omega, Bias::default()).weakest.share < 1e-3 || mechanism.is_tied_up() {
+            continue;
+        }
+        let mut form = Multiplier::<0, true>::new(Arc::clone(&mechanism));
+        let state = form.state(&start);
+        let mut rate = vec![0.0; form.dimension()];
+        form.rate(Time::default(), &state.y, &mut rate);
+        let n = mechanism.coordinates();
+        let mut kernel = Kernel::<DoubleDouble>::without_rows(&mechanism);
+        let h = DoubleDouble::of(1e-9);
+        let mut at = |sign: f64| {
+            let moved: Vec<DoubleDouble> = (0..2 * n).map(|i| state.unknown(i) + h.scale(sign * rate[i])).collect();
+            mechanism.energy(&mut kernel, &moved[..n], &moved[n..]).total()
+        };
+        let power = ((at(1.0) - at(-1.0)) / h).scale(0.5).hi;
+        // A motor off its law does work by its row's own rate; the account takes it as it is.
+        assert!((power - rate[2 * n]).abs() < 1e-9 * power.abs().max(1.0), "{seed}: {power} {}", rate[2 * n]);
+    }
+}
+
+#[test]
+fn projection_lands_where_the_matrices_put_it() {
+    let mut seen = 0;
+    for seed in 0..300 {
+        let scene = mechanism(5 + seed as usize % 5, seed);
+        let Ok(mechanism) = Mechanism::new(&scene) else { continue };
+        let (Some(dense), bodywise) = (mechanism.by_matrices(), mechanism.body_by_body()) else { continue };
+        let start = mechanism.start(&scene);
+        if evaluate(&bodywise, &start.phi, &start.omega, Bias::default()).weakest.share < 1e-2 {
+            continue;
+        }
+        let mut ends = [dense, bodywise].map(|mechanism| {
+            let mechanism = Arc::new(mechanism);
+            let mut state = Multiplier::<0, true>::new(Arc::clone(&mechanism)).state(&start);
+            let ended = project(&mechanism, &mut Kernel::new(&mechanism), &mut state, 1e-12);
+            ended.is_ok().then_some(state.y)
+        });
+        let [Some(dense), Some(bodywise)] = &mut ends else { continue };
+        seen += usize::from(!mechanism.rows.is_empty());
+        // Energies put in by the stabilizer are sums of large numbers.
+        dense.pop();
+        bodywise.pop();
+
+        assert!(difference(bodywise, dense) < 1e-8, "{seed}: {:e}", difference(bodywise, dense));
+    }
+    assert!(seen > 10, "{seen}");
+}
+
+#[test]
+fn a_very_long_chain_runs_and_says_what_it_does_not_take() {
+    let scene = Scene { until: 1e-5, every: 1e-5, ..chain(3_000) };
+    let request = Request { method: Some(MethodId::Dop853), rtol: Some(1e-6), ..Request::default() };
+    let outcome = simulate(&scene, &request, &mut |_| Ok(())).expect("a run");
+    assert!(outcome.drift.energy.max < 1e-9, "{:e}", outcome.drift.energy.max);
+    let mechanism = Mechanism::new(&scene).expect("equations");
+    for method in [MethodId::Taylor, MethodId::Gauss(4)] {
+        let refusal = Plan::new(&scene, &mechanism, &Request { method: Some(method), ..Request::default() }).expect_err("too large");
+        assert!(refusal.to_string().contains("3000 coordinates") && refusal.alternative.contains("dop853"), "{refusal}");
+    }
+    let plan = Plan::new(&scene, &mechanism, &Request::default()).expect("a plan");
+    assert_eq!((plan.method, plan.stabilization), (MethodId::Dop853, Stabilization::None));
+}
