@@ -122,6 +122,17 @@ fn so_do_loops_and_sliders() {
     assert!(pairs >= 4 * 12, "{pairs} pairs");
 }
 
+/// With whatever is watched near them, and where the motion leaves its branch.
+#[test]
+fn so_do_singular_positions() {
+    for method in [MethodId::Taylor, MethodId::Dp8] {
+        for name in ["four_bars", "kite", "slider_crank_equal"] {
+            let request = Request { until: Some(4.0), every: Some(1.0), ..request(method, None) };
+            assert!(check(&shipped(name, &[]), &request), "{method} {name}");
+        }
+    }
+}
+
 #[test]
 fn so_do_impacts_and_points_that_stay_on_their_walls() {
     for method in [MethodId::Dp5, MethodId::Dp8, MethodId::Taylor] {

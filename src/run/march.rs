@@ -66,6 +66,8 @@ pub(super) struct Place {
     /// Where a dense method began its last step; without unknowns where it made none.
     from: State,
     ahead: Option<usize>,
+    /// What the method knows beside.
+    known: Vec<f64>,
 }
 
 /// What can be seen of the steps of a method that is not dense.
@@ -181,7 +183,7 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
     }
 
     fn place(&self) -> Place {
-        Place { state: self.state.clone(), tally: self.tally, from: self.from.clone(), ahead: self.ahead }
+        Place { state: self.state.clone(), tally: self.tally, from: self.from.clone(), ahead: self.ahead, known: self.method.knows() }
     }
 
     fn resume(&mut self, place: Place, horizon: Time) -> Result<bool, StepError> {
@@ -196,8 +198,8 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
             let mut state = place.from.clone();
             self.method.advance(&mut self.problem, &mut state, horizon, &mut Tally::default(), &mut |_, _| Ok(Seen::Enough))?;
         }
-        Place { state: self.state, tally: self.tally, from: self.from, ahead: self.ahead } = place;
-        Ok(true)
+        (self.state, self.tally, self.from, self.ahead) = (place.state, place.tally, place.from, place.ahead);
+        Ok(self.method.learn(&place.known))
     }
 }
 
