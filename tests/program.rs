@@ -182,7 +182,7 @@ fn check_says_what_is_active_and_what_is_left_out() {
     assert!(!multiplier["left_out"].to_string().contains("multipliers") && multiplier["why"].is_null());
     assert_eq!(check("wall.json")["method"], "dp8");
     assert_eq!(check("branch.json")["off_axis"], true);
-    program.run("check motor.json").exits(0).shows(&["gauss16", "independent coordinate", "left out", "elimination"]);
+    program.run("check motor.json").exits(0).shows(&["gauss16", "1 degree: 2 coordinates less 1 constraint", "left out", "elimination"]);
     program.run("check motor.json -q").exits(0).stays_silent();
     program.run("check motor.json --stabilize baumgarte").exits(0).shows(&["five mean steps"]);
 }

@@ -11,7 +11,7 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 use std::sync::LazyLock;
 
 /// `hi + lo` with `|lo|` at most half a unit in the last place of `hi`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct DoubleDouble {
     /// The nearest double.
     pub hi: f64,

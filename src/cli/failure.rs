@@ -2,13 +2,16 @@
 
 use super::output::print_object;
 use crate::dynamics::CompileError;
-use crate::run::{FileError, Refusal, RunError, SweepError};
+use crate::dynamics::assembly::Change;
+use crate::run::files::quoted;
+use crate::run::{CheckpointError, FileError, Refusal, ResumeError, RunError, SweepError};
 use crate::scene::SceneError;
 use crate::stepping::{Cause, StepError};
 use serde_json::{Value, json};
+use std::path::Path;
 use std::process::ExitCode;
 
-/// Exit codes; 0 is success, and 130 is kept for a run interrupted after a checkpoint.
+/// Exit codes; 0 is success.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Exit {
@@ -24,6 +27,8 @@ pub enum Exit {
     Drift = 5,
     /// A file could not be read or written.
     Io = 6,
+    /// Ctrl-C or SIGTERM came; a checkpoint has been written.
+    Interrupted = 130,
 }
 
 impl Exit {
@@ -36,6 +41,7 @@ impl Exit {
             Self::Stopped => "stopped",
             Self::Drift => "drift",
             Self::Io => "io",
+            Self::Interrupted => "interrupted",
         }
     }
 }
@@ -59,6 +65,27 @@ impl Failure {
         Self { exit, message: message.into(), details: Value::Null, told: false }
     }
 
+    /// A run or sweep that was asked to end, at a place it calls `reached`; its checkpoint is in `folder`.
+    pub(super) fn interrupted(reached: &str, folder: &Path) -> Self {
+        let resume = format!("driftless resume {}", quoted(folder));
+        let message = format!("interrupted at {reached}; everything up to there is kept\nhint: `{resume}` goes on");
+        let details = json!({"folder": folder.display().to_string(), "resume": resume});
+        Self { details, ..Self::new(Exit::Interrupted, message) }
+    }
+
+    /// The same with a hint at the checkpoint that is left.
+    pub(super) fn with_checkpoint(mut self, folder: &Path) -> Self {
+        self.message += &format!("\nhint: `driftless resume {}` goes on from the last checkpoint", quoted(folder));
+        self
+    }
+
+    /// A start that is not as given, where `--strict` asks for that.
+    pub(super) fn changed(changes: &[Change]) -> Self {
+        let list: Vec<String> = changes.iter().map(Change::to_string).collect();
+        let message = format!("--strict: {}\nhint: give the values used, or leave out what the constraints tell", list.join("; "));
+        Self { details: json!({ "changes": changes }), ..Self::new(Exit::Scene, message) }
+    }
+
     /// The same, where stdout needs no object of it.
     pub(super) fn told(mut self) -> Self {
         self.told = true;
@@ -76,7 +103,8 @@ impl Failure {
             // The failure that is being told weighs more than one in telling it.
             let _ = print_object(&json!({ "error": self.object() }));
         }
-        super::output::message(&format!("error: {}", self.message));
+        let word = if self.exit == Exit::Interrupted { "" } else { "error: " };
+        super::output::message(&format!("{word}{}", self.message));
         ExitCode::from(self.exit as u8)
     }
 }
@@ -119,6 +147,22 @@ impl From<StepError> for Failure {
 impl From<FileError> for Failure {
     fn from(error: FileError) -> Self {
         Self::new(Exit::Io, error.to_string())
+    }
+}
+
+impl From<CheckpointError> for Failure {
+    fn from(error: CheckpointError) -> Self {
+        let exit = if matches!(error, CheckpointError::Format { .. }) { Exit::Scene } else { Exit::Io };
+        Self::new(exit, error.to_string())
+    }
+}
+
+impl From<ResumeError> for Failure {
+    fn from(error: ResumeError) -> Self {
+        match error {
+            ResumeError::Misfit => Self::new(Exit::Scene, error.to_string()),
+            ResumeError::Step(stop) => stop.into(),
+        }
     }
 }
 

@@ -13,7 +13,7 @@ use std::process::ExitCode;
 
 const EXIT_CODES: &str = "\
 Exit codes: 0 done, 1 other failure, 2 usage, 3 scene refused, 4 integration stopped,
-            5 a stated drift limit exceeded, 6 files";
+            5 a stated drift limit exceeded, 6 files, 130 interrupted after a checkpoint";
 
 /// Simulates planar mechanisms over long horizons, and tells how far they drift.
 #[derive(Debug, Parser)]
@@ -22,6 +22,9 @@ pub struct Flags {
     #[allow(missing_docs)]
     #[command(subcommand)]
     pub command: Command,
+    /// The command line they were read from.
+    #[arg(skip)]
+    pub arguments: Vec<String>,
 }
 
 /// What to do.
@@ -35,6 +38,8 @@ pub enum Command {
     Run(Box<RunFlags>),
     /// Run a scene over a grid of starts and parameters, one row of a table a point
     Sweep(Box<SweepFlags>),
+    /// Go on with an interrupted run or sweep: it ends as if nothing had been, byte for byte
+    Resume(ResumeFlags),
     /// List the methods
     Methods {
         /// Print one JSON object
@@ -59,6 +64,9 @@ pub struct SceneFlags {
     /// Set a value of the scene, as in walls.wall.restitution=0.5; repeatable
     #[arg(long, value_name = "PATH=VALUE")]
     pub set: Vec<Override>,
+    /// Refuse a scene of which something given for the start must change to fit its constraints
+    #[arg(long)]
+    pub strict: bool,
     /// Print exactly one JSON object on stdout
     #[arg(long)]
     pub json: bool,
@@ -143,6 +151,9 @@ pub struct RunFlags {
     /// Overwrite the run that is in the folder
     #[arg(long, help_heading = "Files")]
     pub force: bool,
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub checkpoints: CheckpointFlags,
     /// Draw no PNG charts
     #[cfg(feature = "charts")]
     #[arg(long, help_heading = "Files")]
@@ -183,6 +194,9 @@ pub struct SweepFlags {
     /// Overwrite the sweep that is in the folder
     #[arg(long, help_heading = "Files")]
     pub force: bool,
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub checkpoints: CheckpointFlags,
     /// Draw no PNG chart
     #[cfg(feature = "charts")]
     #[arg(long, help_heading = "Files")]
@@ -193,6 +207,44 @@ pub struct SweepFlags {
     pub map: Option<String>,
 }
 
+/// How often checkpoints are written.
+#[derive(Clone, Debug, Args)]
+pub struct CheckpointFlags {
+    /// Seconds of computing between two checkpoints, from which `driftless resume` goes on; 0: none but at Ctrl-C and SIGTERM
+    #[arg(
+        long,
+        value_name = "S",
+        value_parser = wait,
+        default_value = "60",
+        allow_hyphen_values = true,
+        help_heading = "Files"
+    )]
+    pub checkpoint_every: f64,
+}
+
+/// `driftless resume`.
+#[derive(Debug, Args)]
+pub struct ResumeFlags {
+    /// The folder of the run or sweep
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// A later horizon in seconds, for a run
+    #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
+    pub until: Option<f64>,
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub checkpoints: CheckpointFlags,
+    /// Print exactly one JSON object on stdout
+    #[arg(long)]
+    pub json: bool,
+    /// Print errors only: no progress, no messages, no summary
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Say on stderr what is being done
+    #[arg(short, long, conflicts_with = "quiet")]
+    pub verbose: bool,
+}
+
 impl Flags {
     /// True where stdout is to hold one JSON object.
     pub fn is_json(&self) -> bool {
@@ -201,6 +253,7 @@ impl Flags {
             Command::Inspect(flags) => flags.scene.json,
             Command::Run(flags) => flags.scene.json,
             Command::Sweep(flags) => flags.scene.json,
+            Command::Resume(flags) => flags.json,
             Command::Methods { json } => *json,
             Command::Schema | Command::Completions { .. } => false,
         }
@@ -254,7 +307,8 @@ impl RunFlags {
 /// The exit code, where help was asked for (0) or the line makes no sense (2); what there is to say has been said.
 pub fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Flags, ExitCode> {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
-    Flags::try_parse_from(&arguments).map_err(|error| {
+    let words = arguments.iter().map(|argument| argument.to_string_lossy().into_owned()).collect();
+    Flags::try_parse_from(&arguments).map(|flags| Flags { arguments: words, ..flags }).map_err(|error| {
         if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
             return match print(&error.render().to_string()) {
                 Ok(()) => ExitCode::SUCCESS,
@@ -283,6 +337,12 @@ fn number(text: &str) -> Result<f64, String> {
         Some((above, below)) => Ok(read(above)? / read(below)?),
         None => read(text),
     }
+}
+
+/// A time to wait \[s\]: any number that is not negative.
+fn wait(text: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    if (0.0..=1e9).contains(&value) { Ok(value) } else { Err("a number of seconds from 0 to 1e9".to_owned()) }
 }
 
 /// A limit: any number that is not negative.

@@ -4,8 +4,10 @@
 
 pub mod failure;
 pub mod flags;
+mod interrupt;
 mod output;
 mod progress;
+mod resume;
 mod simulate;
 mod sweep;
 
@@ -29,8 +31,9 @@ pub fn run(flags: &Flags) -> Result<(), Failure> {
     match &flags.command {
         Command::Check(flags) => check(flags),
         Command::Inspect(flags) => inspect(flags),
-        Command::Run(flags) => simulate::run(flags),
-        Command::Sweep(flags) => sweep::run(flags),
+        Command::Run(given) => simulate::run(given, &flags.arguments),
+        Command::Sweep(given) => sweep::run(given, &flags.arguments),
+        Command::Resume(flags) => resume::run(flags),
         Command::Methods { json: true } => print_object(&report::methods::object()),
         Command::Methods { json: false } => print(&report::methods::text()),
         Command::Schema => print_object(&scene::schema()),
@@ -67,11 +70,29 @@ fn inspect(flags: &InspectFlags) -> Result<(), Failure> {
 
 /// Reads and compiles the scene.
 fn load(flags: &SceneFlags) -> Result<(Scene, Arc<Mechanism>), Failure> {
-    let scene = scene::read_scene(&flags.scene, &flags.set)?;
+    compile(flags, &scene::read_text(&flags.scene)?)
+}
+
+/// Compiles the scene of this text.
+fn compile(flags: &SceneFlags, text: &str) -> Result<(Scene, Arc<Mechanism>), Failure> {
+    let scene = scene::parse_scene(text, &flags.scene.display().to_string(), &flags.set)?;
     flags.remark(&format!("read {}: scene {}, {} bodies", flags.scene.display(), scene.name, scene.bars.len()));
     for set in &flags.set {
         flags.remark(&format!("set {} to {}", set.path, set.value));
     }
     let mechanism = Arc::new(Mechanism::new(&scene)?);
+    settle(flags, &mechanism)?;
     Ok((scene, mechanism))
+}
+
+/// Tells how the start differs from what the scene gives, or refuses it.
+fn settle(flags: &SceneFlags, mechanism: &Mechanism) -> Result<(), Failure> {
+    let changes = &mechanism.assembly.changes;
+    if flags.strict && !changes.is_empty() {
+        return Err(Failure::changed(changes));
+    }
+    if !flags.quiet {
+        changes.iter().for_each(|change| output::message(&format!("note: {change}")));
+    }
+    Ok(())
 }

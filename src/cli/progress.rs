@@ -9,10 +9,10 @@ use std::time::{Duration, Instant};
 const BAR: Duration = Duration::from_millis(100);
 /// Shortest time between two lines.
 const LINE: Duration = Duration::from_secs(5);
-/// Where rows come faster than this, the clock is looked at less often.
+/// Where calls come faster than this, the clock is looked at less often.
 const LOOK: Duration = Duration::from_millis(1);
-/// Most rows between two looks at the clock.
-const MOST_ROWS: u32 = 1024;
+/// Most calls between two looks at the clock.
+const MOST_CALLS: u32 = 1024;
 /// Positions of the bar.
 const POSITIONS: f64 = 10_000.0;
 
@@ -22,16 +22,42 @@ pub struct Progress {
     until: f64,
     bar: Option<ProgressBar>,
     next: Instant,
-    /// Rows between two looks at the clock, and those left to the next.
+    looks: Looks,
+    quiet: bool,
+}
+
+/// Looks at the clock now and then: the less often, the faster it is asked.
+pub struct Looks {
+    /// Calls between two looks, and those left to the next.
     stride: u32,
     left: u32,
     looked: Instant,
-    quiet: bool,
+}
+
+impl Looks {
+    /// Looks at the first call.
+    pub fn new() -> Self {
+        Self { stride: 1, left: 1, looked: Instant::now() }
+    }
+
+    /// The time, where this call is one to look at.
+    pub fn now(&mut self) -> Option<Instant> {
+        self.left -= 1;
+        if self.left > 0 {
+            return None;
+        }
+        let now = Instant::now();
+        self.stride = if now.saturating_duration_since(self.looked) < LOOK { (2 * self.stride).min(MOST_CALLS) } else { 1 };
+        (self.left, self.looked) = (self.stride, now);
+        Some(now)
+    }
 }
 
 /// Shows the progress of a sweep: its rate so far, and the time the rest takes at that rate.
 pub struct Points {
     scene: String,
+    /// Points of an earlier part of it, and all there are.
+    before: u64,
     count: u64,
     begin: Instant,
     bar: Option<ProgressBar>,
@@ -40,8 +66,8 @@ pub struct Points {
 }
 
 impl Points {
-    /// Begins; `count` is the number of points.
-    pub fn new(scene: &str, count: u64, quiet: bool) -> Self {
+    /// Begins; `count` is the number of points, of which `before` were finished earlier.
+    pub fn new(scene: &str, before: u64, count: u64, quiet: bool) -> Self {
         let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
             let bar = ProgressBar::new(count).with_prefix(scene.chars().take(20).collect::<String>());
             let style = ProgressStyle::with_template("{prefix} [{bar:24}] {percent:>3} %  {msg}");
@@ -49,7 +75,7 @@ impl Points {
             bar
         });
         let begin = Instant::now();
-        Self { scene: scene.to_owned(), count, begin, next: begin + if bar.is_some() { BAR } else { LINE }, bar, quiet }
+        Self { scene: scene.to_owned(), before, count, begin, next: begin + if bar.is_some() { BAR } else { LINE }, bar, quiet }
     }
 
     /// Takes the number of points finished.
@@ -58,7 +84,7 @@ impl Points {
         if self.quiet || now < self.next {
             return;
         }
-        let words = told(finished, self.count, now - self.begin);
+        let words = told(self.before, finished, self.count, now - self.begin);
         match &self.bar {
             Some(bar) => {
                 bar.set_message(words);
@@ -81,10 +107,10 @@ impl Points {
 }
 
 /// `1200 of 4096 points, 85.3 a second, 34 s left`.
-fn told(finished: u64, count: u64, spent: Duration) -> String {
-    let rate = finished as f64 / spent.as_secs_f64().max(1e-9);
-    if finished == 0 {
-        return format!("0 of {count} points");
+fn told(before: u64, finished: u64, count: u64, spent: Duration) -> String {
+    let rate = finished.saturating_sub(before) as f64 / spent.as_secs_f64().max(1e-9);
+    if finished <= before {
+        return format!("{finished} of {count} points");
     }
     let left = count.saturating_sub(finished) as f64 / rate;
     let left = match left {
@@ -107,7 +133,7 @@ impl Progress {
         });
         let wait = if bar.is_some() { BAR } else { LINE };
         let now = Instant::now();
-        Self { scene: scene.to_owned(), until, bar, next: now + wait, stride: 1, left: 1, looked: now, quiet }
+        Self { scene: scene.to_owned(), until, bar, next: now + wait, looks: Looks::new(), quiet }
     }
 
     /// Takes the time reached \[s\].
@@ -115,16 +141,7 @@ impl Progress {
         if self.quiet {
             return;
         }
-        self.left -= 1;
-        if self.left > 0 {
-            return;
-        }
-        let now = Instant::now();
-        self.stride = if now - self.looked < LOOK { (2 * self.stride).min(MOST_ROWS) } else { 1 };
-        (self.left, self.looked) = (self.stride, now);
-        if now < self.next {
-            return;
-        }
+        let Some(now) = self.looks.now().filter(|&now| now >= self.next) else { return };
         let share = (t / self.until).clamp(0.0, 1.0);
         match &self.bar {
             Some(bar) => {
@@ -154,9 +171,9 @@ mod tests {
     #[test]
     fn the_time_left_follows_from_the_rate_so_far() {
         let spent = Duration::from_secs(10);
-        assert_eq!(told(0, 100, spent), "0 of 100 points");
-        assert_eq!(told(25, 100, spent), "25 of 100 points, 2.50 a second, 30 s left");
-        assert_eq!(told(1000, 61_000, spent), "1000 of 61000 points, 100 a second, 10 min left");
-        assert_eq!(told(1, 3601, spent), "1 of 3601 points, 0.10 a second, 10.0 h left");
+        assert_eq!(told(0, 0, 100, spent), "0 of 100 points");
+        assert_eq!(told(0, 25, 100, spent), "25 of 100 points, 2.50 a second, 30 s left");
+        assert_eq!(told(0, 1000, 61_000, spent), "1000 of 61000 points, 100 a second, 10 min left");
+        assert_eq!(told(0, 1, 3601, spent), "1 of 3601 points, 0.10 a second, 10.0 h left");
     }
 }

@@ -1,15 +1,17 @@
 //! `driftless run`: march, and keep what came of it.
 
-use super::failure::Failure;
+use super::failure::{Exit, Failure};
 use super::flags::RunFlags;
+use super::interrupt::{self, Watchman};
 use super::output::{print, print_objects};
 use super::progress::Progress;
+use super::resume::{Saved, Work};
 use crate::dynamics::Mechanism;
 use crate::report;
 use crate::run::files::{RECORD, TRAJECTORY};
 use crate::run::table::Table;
-use crate::run::{Folder, Outcome, Plan, Run, RunError, Sample, march};
-use crate::scene::Scene;
+use crate::run::{Checkpoints, Folder, Outcome, Plan, ResumeError, Run, RunError, Running, Sample, Stream};
+use crate::scene::{Scene, read_text};
 use serde_json::json;
 use std::sync::Arc;
 
@@ -24,64 +26,166 @@ struct Done {
     failure: Option<Failure>,
 }
 
+/// What is run, and what was said on the command line.
+struct Task<'a> {
+    scene: &'a Scene,
+    mechanism: &'a Arc<Mechanism>,
+    flags: &'a RunFlags,
+    /// The scene's text and the command line, for checkpoints.
+    text: &'a str,
+    arguments: &'a [String],
+}
+
 /// Runs a scene, once for each stabilization given.
 ///
 /// # Errors
 /// The scene, a plan, a folder, the method or a limit; files of what was reached are kept.
-pub fn run(flags: &RunFlags) -> Result<(), Failure> {
-    let (scene, mechanism) = super::load(&flags.scene)?;
+pub fn run(flags: &RunFlags, arguments: &[String]) -> Result<(), Failure> {
+    interrupt::listen()?;
+    let text = read_text(&flags.scene.scene)?;
+    let (scene, mechanism) = super::compile(&flags.scene, &text)?;
     // All plans stand before the first run: a pairing that is refused costs nothing.
     let plans: Vec<Plan> = flags.plan.requests().iter().map(|request| Plan::new(&scene, &mechanism, request)).collect::<Result<_, _>>()?;
+    let task = Task { scene: &scene, mechanism: &mechanism, flags, text: &text, arguments };
     let mut done = Vec::new();
     for plan in plans {
-        done.push(run_plan(plan, &scene, &mechanism, flags)?);
+        done.push(task.run(plan)?);
     }
     overlay(&scene, &mechanism, &done, flags)?;
-    tell(&scene, &mechanism, &done, flags)?;
+    conclude(&scene, &mechanism, done, flags)
+}
+
+/// Goes on with a run, to a later horizon where one is given \[s\].
+///
+/// # Errors
+/// As [`run`], or a checkpoint that does not fit.
+pub fn resume(flags: &RunFlags, saved: Saved, until: Option<f64>, folder: Folder, checkpoints: Checkpoints) -> Result<(), Failure> {
+    interrupt::listen()?;
+    let Saved { arguments, scene: text, cursor, work, .. } = saved;
+    let Work::Run(mut snapshot) = work else { return Err(ResumeError::Misfit.into()) };
+    let (scene, mechanism) = super::compile(&flags.scene, &text)?;
+    if let Some(until) = until
+        && !snapshot.extend(until)
+    {
+        let step = snapshot.plan().step.map_or(String::new(), |step| format!(", by a whole number of steps of {step} s"));
+        let text = format!("--until: {until} s cannot be the horizon of this run\nhint: one beyond {} s{step}", snapshot.plan().until);
+        return Err(Failure::new(Exit::Usage, text));
+    }
+    flags.scene.remark(&format!("{}; from t = {} s on", report::setting(snapshot.plan()), snapshot.time()));
+    let running = Running::resume(Arc::clone(&mechanism), &mechanism.start(&scene), *snapshot)?;
+    let table = Table::going_on(folder.take_up(TRAJECTORY, &cursor)?);
+    let task = Task { scene: &scene, mechanism: &mechanism, flags, text: &text, arguments: &arguments };
+    let done = vec![task.finish(running, table, folder, checkpoints)?];
+    conclude(&scene, &mechanism, done, flags)
+}
+
+/// Says what came of it all.
+fn conclude(scene: &Scene, mechanism: &Mechanism, done: Vec<Done>, flags: &RunFlags) -> Result<(), Failure> {
+    tell(scene, mechanism, &done, flags)?;
     done.into_iter().find_map(|done| done.failure).map_or(Ok(()), |failure| Err(failure.told()))
 }
 
-/// Runs one plan in a folder of its own.
-fn run_plan(plan: Plan, scene: &Scene, mechanism: &Arc<Mechanism>, flags: &RunFlags) -> Result<Done, Failure> {
-    let run = Run::new(Arc::clone(mechanism), plan, flags.limits(), &mechanism.start(scene))?;
-    let plan = run.plan();
-    flags.scene.remark(&format!("{}; {}", report::setting(plan), plan.why.as_deref().unwrap_or("as asked for")));
-    for note in &plan.notes {
-        flags.scene.remark(note);
+impl Task<'_> {
+    /// Runs one plan in a folder of its own.
+    fn run(&self, plan: Plan) -> Result<Done, Failure> {
+        let Self { scene, mechanism, flags, .. } = *self;
+        let run = Run::new(Arc::clone(mechanism), plan, flags.limits(), &mechanism.start(scene))?;
+        let plan = run.plan();
+        flags.scene.remark(&format!("{}; {}", report::setting(plan), plan.why.as_deref().unwrap_or("as asked for")));
+        for note in &plan.notes {
+            flags.scene.remark(note);
+        }
+        let path = flags.out.join(&scene.name).join(plan.folder(mechanism));
+        let folder = Folder::open(&path, flags.force)?;
+        let table = Table::new(mechanism, folder.begin(TRAJECTORY)?).map_err(|error| folder.failed(TRAJECTORY, error.into()))?;
+        self.finish(Running::new(run), table, folder, Checkpoints::none(&path))
     }
-    let path = flags.out.join(&scene.name).join(plan.folder(mechanism));
-    let mut folder = Folder::open(&path, flags.force)?;
-    let (outcome, trajectory_sha256) = record(run, scene, mechanism, &mut folder, flags)?;
-    draw(scene, mechanism, &outcome, &mut folder, flags)?;
-    let text = format!("{:#}\n", report::result::record(scene, mechanism, &outcome, &trajectory_sha256));
-    folder.write(RECORD, text.as_bytes())?;
-    let failure = outcome.stop.clone().map(Failure::from);
-    Ok(Done { outcome, folder, failure })
-}
 
-/// Marches and writes the trajectory as it comes.
-fn record(run: Run, scene: &Scene, mechanism: &Mechanism, folder: &mut Folder, flags: &RunFlags) -> Result<(Outcome, String), Failure> {
-    let unwritten = |error: csv::Error| Failure::from(folder.failed(TRAJECTORY, error.into()));
-    let mut table = Table::new(mechanism, folder.begin(TRAJECTORY)?).map_err(unwritten)?;
-    let mut progress = Progress::new(&scene.name, run.plan().until, flags.scene.quiet);
-    let outcome = march(run, &mut |sample: &Sample| {
-        table.write(sample)?;
-        progress.see(sample.t);
-        Ok(())
-    });
-    progress.finish();
-    let outcome = outcome.map_err(|error| match error {
-        RunError::Observer(error) => Failure::from(folder.failed(TRAJECTORY, error)),
-        error => error.into(),
-    })?;
-    let stream = table.finish().map_err(|error| folder.failed(TRAJECTORY, error))?;
-    if flags.force {
-        // Nothing of an older run may stand beside the new trajectory.
-        folder.clear(&FILES[1..])?;
+    /// Takes a run to its end.
+    fn finish(
+        &self,
+        mut running: Running,
+        mut table: Table<Stream>,
+        mut folder: Folder,
+        mut checkpoints: Checkpoints,
+    ) -> Result<Done, Failure> {
+        let marched = self.march(&mut running, &mut table, &folder, &mut checkpoints);
+        let done = marched.and_then(|()| self.publish(running.finish(), table, &mut folder));
+        let outcome = done.map_err(|failure| {
+            let is_left = checkpoints.has_any() && failure.exit != Exit::Interrupted;
+            if is_left { failure.with_checkpoint(folder.path()) } else { failure }
+        })?;
+        checkpoints.remove()?;
+        let failure = outcome.stop.clone().map(Failure::from);
+        Ok(Done { outcome, folder, failure })
     }
-    let hash = folder.keep(stream)?;
-    flags.scene.remark(&format!("wrote {}", folder.path().join(TRAJECTORY).display()));
-    Ok((outcome, hash))
+
+    /// Marches, writes the trajectory as it comes, and a checkpoint now and then.
+    fn march(
+        &self,
+        running: &mut Running,
+        table: &mut Table<Stream>,
+        folder: &Folder,
+        checkpoints: &mut Checkpoints,
+    ) -> Result<(), Failure> {
+        let mut watchman = Watchman::new(self.flags.checkpoints.checkpoint_every);
+        let mut progress = Progress::new(&self.scene.name, running.plan().until, self.flags.scene.quiet);
+        loop {
+            let mut observer = |sample: &Sample| {
+                table.write(sample)?;
+                progress.see(sample.t);
+                Ok(())
+            };
+            let is_over = running.go(&mut observer, &mut || watchman.wants());
+            let is_over = is_over.map_err(|error| match error {
+                RunError::Observer(error) => Failure::from(folder.failed(TRAJECTORY, error)),
+                error => error.into(),
+            });
+            match is_over {
+                Ok(false) => {}
+                ended => {
+                    progress.finish();
+                    return ended.map(drop);
+                }
+            }
+            self.save(running, table, folder, checkpoints).inspect_err(|_| progress.finish())?;
+            watchman.written();
+            if interrupt::is_asked() {
+                progress.finish();
+                return Err(Failure::interrupted(&format!("t = {} s of {} s", running.time(), running.plan().until), folder.path()));
+            }
+        }
+    }
+
+    fn save(&self, running: &Running, table: &mut Table<Stream>, folder: &Folder, checkpoints: &mut Checkpoints) -> Result<(), Failure> {
+        let failed = |error| folder.failed(TRAJECTORY, error);
+        let stream = table.written().map_err(failed)?;
+        checkpoints.save(&Saved {
+            version: env!("CARGO_PKG_VERSION").into(),
+            arguments: self.arguments.to_vec(),
+            scene: self.text.to_owned(),
+            cursor: stream.cursor().map_err(failed)?,
+            work: Work::Run(Box::new(running.snapshot())),
+        })?;
+        stream.outlive();
+        Ok(())
+    }
+
+    /// Gives the trajectory its name, draws, and writes the record.
+    fn publish(&self, outcome: Outcome, table: Table<Stream>, folder: &mut Folder) -> Result<Outcome, Failure> {
+        let Self { scene, mechanism, flags, .. } = *self;
+        let stream = table.finish().map_err(|error| folder.failed(TRAJECTORY, error))?;
+        if flags.force {
+            // Nothing of an older run may stand beside the new trajectory.
+            folder.clear(&FILES[1..])?;
+        }
+        let hash = folder.keep(stream)?;
+        flags.scene.remark(&format!("wrote {}", folder.path().join(TRAJECTORY).display()));
+        draw(scene, mechanism, &outcome, folder, flags)?;
+        let text = format!("{:#}\n", report::result::record(scene, mechanism, &outcome, &hash));
+        folder.write(RECORD, text.as_bytes())?;
+        Ok(outcome)
+    }
 }
 
 #[cfg(feature = "charts")]
@@ -102,7 +206,7 @@ fn overlay(scene: &Scene, mechanism: &Mechanism, done: &[Done], flags: &RunFlags
     }
     let outcomes: Vec<&Outcome> = done.iter().map(|done| &done.outcome).collect();
     let content = report::charts::overlay(scene, mechanism, &outcomes)?;
-    let mut folder = Folder::open(&flags.out.join(&scene.name), true)?;
+    let mut folder = Folder::shared(&flags.out.join(&scene.name))?;
     folder.write("constraint_drift.png", &content)?;
     flags.scene.remark(&format!("drew {}", folder.path().join("constraint_drift.png").display()));
     Ok(())

@@ -2,14 +2,18 @@
 
 use super::failure::{Exit, Failure};
 use super::flags::SweepFlags;
+use super::interrupt::{self, Watchman};
 use super::output::{print, print_object};
 use super::progress::Points;
+use super::resume::{Saved, Work};
 use crate::report;
 #[cfg(feature = "charts")]
 use crate::report::sweep::{Curve, NoChart};
 use crate::run::files::{SWEEP, SWEEP_RECORD};
-use crate::run::{Folder, Limits, Observer, Point, Request, Stream, Sweep, SweepError, SweepTable, Totals, sweep};
-use crate::scene::Template;
+use crate::run::{
+    Checkpoints, Folder, Limits, Observer, Point, Request, ResumeError, Stream, Sweep, SweepError, SweepTable, Totals, sweep_on,
+};
+use crate::scene::{Template, read_text};
 use serde_json::json;
 
 /// Every file a sweep may leave; those of an earlier one in the same folder go with it.
@@ -21,28 +25,90 @@ const LONGEST: usize = 120;
 ///
 /// # Errors
 /// The scene, what is varied, the plan or the folder; points that fail are rows of the table.
-pub fn run(flags: &SweepFlags) -> Result<(), Failure> {
-    let plan = prepared(flags)?;
+pub fn run(flags: &SweepFlags, arguments: &[String]) -> Result<(), Failure> {
+    interrupt::listen()?;
+    let text = read_text(&flags.scene.scene)?;
+    let plan = prepared(flags, &text)?;
     for (axis, variable) in plan.grid().axes().iter().zip(plan.variables()) {
         flags.scene.remark(&format!("vary {} from {} to {} {}, {} values", variable.path, axis.from, axis.to, variable.unit, axis.count));
     }
     flags.scene.remark(&format!("{}; {}", report::setting(plan.plan()), plan.plan().why.as_deref().unwrap_or("as asked for")));
     #[cfg(feature = "charts")]
     let curve = curve(&plan, flags)?;
-    let mut folder = Folder::open(&flags.out.join(&plan.scene().name).join(folder_name(&plan)), flags.force)?;
-    let mut writer = Writer {
-        table: SweepTable::new(&plan, folder.begin(SWEEP)?).map_err(|error| folder.failed(SWEEP, error.into()))?,
-        progress: Points::new(&plan.scene().name, plan.grid().count(), flags.scene.quiet),
+    let path = flags.out.join(&plan.scene().name).join(folder_name(&plan));
+    let folder = Folder::open(&path, flags.force)?;
+    let table = SweepTable::new(&plan, folder.begin(SWEEP)?).map_err(|error| folder.failed(SWEEP, error.into()))?;
+    let writer = Writer {
+        table,
+        progress: Points::new(&plan.scene().name, 0, plan.grid().count(), flags.scene.quiet),
+        watchman: Watchman::new(flags.checkpoints.checkpoint_every),
+        checkpoints: Checkpoints::none(&path),
+        text: &text,
+        arguments,
+        trouble: None,
+        folder,
         #[cfg(feature = "charts")]
         curve,
     };
-    let totals = sweep(&plan, flags.threads.map_or(0, usize::from), &mut writer);
+    finish(&plan, writer, Totals::default(), flags)
+}
+
+/// Goes on with a sweep.
+///
+/// # Errors
+/// As [`run`], or a checkpoint that does not fit.
+pub fn resume(flags: &SweepFlags, saved: Saved, folder: Folder, checkpoints: Checkpoints) -> Result<(), Failure> {
+    interrupt::listen()?;
+    let Saved { arguments, scene: text, cursor, work, .. } = saved;
+    let Work::Sweep(seen, drawn) = work else { return Err(ResumeError::Misfit.into()) };
+    let plan = prepared(flags, &text)?;
+    if seen.points() > plan.grid().count() {
+        return Err(ResumeError::Misfit.into());
+    }
+    flags.scene.remark(&format!("{}; from point {} on", report::setting(plan.plan()), seen.points()));
+    #[cfg(feature = "charts")]
+    let curve = match drawn.map(|bytes| postcard::from_bytes::<Curve>(&bytes)) {
+        Some(Ok(curve)) if curve.fits(&plan, seen.points()) => Some(curve),
+        None => None,
+        Some(_) => return Err(ResumeError::Misfit.into()),
+    };
+    #[cfg(not(feature = "charts"))]
+    drop(drawn);
+    let writer = Writer {
+        table: SweepTable::going_on(&plan, folder.take_up(SWEEP, &cursor)?),
+        progress: Points::new(&plan.scene().name, seen.points(), plan.grid().count(), flags.scene.quiet),
+        watchman: Watchman::new(flags.checkpoints.checkpoint_every),
+        checkpoints,
+        text: &text,
+        arguments: &arguments,
+        trouble: None,
+        folder,
+        #[cfg(feature = "charts")]
+        curve,
+    };
+    finish(&plan, writer, seen, flags)
+}
+
+/// Takes a sweep to its end.
+fn finish(plan: &Sweep, mut writer: Writer, seen: Totals, flags: &SweepFlags) -> Result<(), Failure> {
+    let totals = sweep_on(plan, flags.threads.map_or(0, usize::from), seen, &mut writer);
     writer.progress.finish();
-    let totals = totals.map_err(|error| match error {
-        SweepError::Observer(error) => Failure::from(folder.failed(SWEEP, error)),
-        error => error.into(),
-    })?;
-    let stream = writer.table.finish().map_err(|error| folder.failed(SWEEP, error))?;
+    let totals = totals.map_err(|error| match (writer.trouble.take(), error) {
+        (Some(trouble), _) => trouble,
+        (None, SweepError::Observer(error)) => Failure::from(writer.folder.failed(SWEEP, error)),
+        (None, error) => error.into(),
+    });
+    let (has_checkpoint, path) = (writer.checkpoints.has_any(), writer.folder.path().to_owned());
+    totals.and_then(|totals| publish(plan, writer, &totals, flags)).map_err(|failure| {
+        let is_left = has_checkpoint && failure.exit != Exit::Interrupted;
+        if is_left { failure.with_checkpoint(&path) } else { failure }
+    })
+}
+
+/// Gives the table its name, draws, writes the record, and says what came of it.
+fn publish(plan: &Sweep, writer: Writer, totals: &Totals, flags: &SweepFlags) -> Result<(), Failure> {
+    let Writer { table, mut folder, mut checkpoints, .. } = writer;
+    let stream = table.finish().map_err(|error| folder.failed(SWEEP, error))?;
     if flags.force {
         // Nothing of an older sweep may stand beside the new table.
         folder.clear(&FILES[1..])?;
@@ -50,22 +116,25 @@ pub fn run(flags: &SweepFlags) -> Result<(), Failure> {
     let hash = folder.keep(stream)?;
     #[cfg(feature = "charts")]
     if let Some(curve) = &writer.curve {
-        draw(&plan, curve, &mut folder, flags)?;
+        draw(plan, curve, &mut folder, flags)?;
     }
-    let text = format!("{:#}\n", report::sweep::record(&plan, &totals, &hash));
+    let text = format!("{:#}\n", report::sweep::record(plan, totals, &hash));
     folder.write(SWEEP_RECORD, text.as_bytes())?;
-    tell(&plan, &totals, &folder, flags)
+    checkpoints.remove()?;
+    tell(plan, totals, &folder, flags)
 }
 
 /// The sweep asked for.
-fn prepared(flags: &SweepFlags) -> Result<Sweep, Failure> {
+fn prepared(flags: &SweepFlags, text: &str) -> Result<Sweep, Failure> {
     let requests = flags.plan.requests();
     let [request]: &[Request; 1] = requests.as_slice().try_into().map_err(|_| {
         Failure::new(Exit::Usage, "--stabilize: a sweep keeps its constraints in one way\nhint: name one, or sweep several times")
     })?;
-    let template = Template::read(&flags.scene.scene, &flags.scene.set)?;
+    let template = Template::new(text.to_owned(), flags.scene.scene.display().to_string(), &flags.scene.set);
     let limits = Limits { energy: flags.max_energy_drift, constraint: flags.max_constraint_drift };
     let plan = Sweep::new(&template, flags.vary.clone(), request)?.with_limits(limits);
+    super::settle(&flags.scene, plan.mechanism())?;
+    let plan = if flags.scene.strict { plan.strictly() } else { plan };
     Ok(if flags.to_flip { plan.ending_at_flips() } else { plan })
 }
 
@@ -77,15 +146,43 @@ fn folder_name(plan: &Sweep) -> String {
     format!("sweep-{names}-{}", plan.plan().folder(plan.mechanism()))
 }
 
-/// Writes points as they come.
-struct Writer {
+/// Writes points as they come, and a checkpoint now and then.
+struct Writer<'a> {
     table: SweepTable<Stream>,
     progress: Points,
+    watchman: Watchman,
+    checkpoints: Checkpoints,
+    folder: Folder,
+    /// The scene's text and the command line, for checkpoints.
+    text: &'a str,
+    arguments: &'a [String],
+    /// What ended the sweep, where it was no point.
+    trouble: Option<Failure>,
     #[cfg(feature = "charts")]
     curve: Option<Curve>,
 }
 
-impl Observer for Writer {
+impl Writer<'_> {
+    fn save(&mut self, seen: &Totals) -> Result<(), Failure> {
+        let failed = |error| self.folder.failed(SWEEP, error);
+        #[cfg(feature = "charts")]
+        let drawn = self.curve.as_ref().map(postcard::to_stdvec).transpose().map_err(|error| failed(std::io::Error::other(error)))?;
+        #[cfg(not(feature = "charts"))]
+        let drawn = None;
+        let stream = self.table.written().map_err(failed)?;
+        self.checkpoints.save(&Saved {
+            version: env!("CARGO_PKG_VERSION").into(),
+            arguments: self.arguments.to_vec(),
+            scene: self.text.to_owned(),
+            cursor: stream.cursor().map_err(failed)?,
+            work: Work::Sweep(seen.clone(), drawn),
+        })?;
+        stream.outlive();
+        Ok(())
+    }
+}
+
+impl Observer for Writer<'_> {
     fn see(&mut self, point: &Point) -> std::io::Result<()> {
         #[cfg(feature = "charts")]
         if let Some(curve) = &mut self.curve {
@@ -94,9 +191,17 @@ impl Observer for Writer {
         Ok(self.table.write(point)?)
     }
 
-    fn finished(&mut self, points: u64) -> std::io::Result<()> {
+    fn finished(&mut self, points: u64, seen: &Totals) -> std::io::Result<()> {
         self.progress.see(points);
-        Ok(())
+        if self.watchman.wants() {
+            let saved = self.save(seen);
+            self.watchman.written();
+            self.trouble = saved.err();
+            if self.trouble.is_none() && interrupt::is_asked() {
+                self.trouble = Some(Failure::interrupted(&format!("point {} of the grid", seen.points()), self.folder.path()));
+            }
+        }
+        if self.trouble.is_some() { Err(std::io::ErrorKind::Interrupted.into()) } else { Ok(()) }
     }
 }
 

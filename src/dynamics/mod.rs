@@ -62,7 +62,7 @@ use crate::arithmetic::{DoubleDouble, Scalar, angle};
 pub type Time = DoubleDouble;
 
 /// What a method marches: the numbers, and everything else a restart needs to go on bit for bit.
-#[derive(Debug, Default, PartialEq)]
+#[derive(Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct State {
     /// Time.
     pub time: Time,

@@ -106,7 +106,7 @@ const MOST: u64 = 1 << 22;
 
 /// The chart of a sweep over one or two values, as its points come in.
 #[cfg(feature = "charts")]
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Curve {
     /// Which of the numbers of a row.
     column: Option<usize>,
@@ -160,6 +160,13 @@ impl Curve {
             ),
         };
         Ok(Self { column, bars: sweep.mechanism().bodies.len(), seen: Vec::new(), failed: Vec::new() })
+    }
+
+    /// Whether it can be the chart of so many points of a sweep.
+    pub fn fits(&self, sweep: &Sweep, points: u64) -> bool {
+        let sizes = [self.seen.len(), self.failed.len()];
+        let is_known = self.column.is_none_or(|column| column < results(sweep).len());
+        is_known && self.bars == sweep.mechanism().bodies.len() && sizes.iter().all(|&size| size as u64 == points)
     }
 
     /// Takes a point.

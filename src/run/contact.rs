@@ -5,9 +5,10 @@
 //! booked as lost in impacts.  From then on the wall is a row kept by projection, until its force would have to pull.
 
 use super::flip::Lookout;
-use super::march::{March, Outcome, build};
+use super::march::{March, Pause, Place, build};
 use super::methods::Stabilization;
 use super::plan::Plan;
+use super::running::Outcome;
 use super::sample::{Sample, Sampler};
 use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::impact::Contact;
@@ -19,7 +20,7 @@ use crate::stepping::{Cause, Reached, StepError, Tally};
 use std::sync::Arc;
 
 /// One impact of a run.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Strike {
     /// Time \[s\].
     pub t: f64,
@@ -34,7 +35,7 @@ pub struct Strike {
 }
 
 /// A time a point stayed on its wall.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Hold {
     /// Beginning \[s\].
     pub t: f64,
@@ -56,11 +57,27 @@ const ROUNDS: usize = 100;
 const TOUCH: f64 = 2e-12;
 
 /// A contact that is held.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 struct Held {
     contact: usize,
     since: f64,
     /// Where it stands among the holds kept by name.
     kept: Option<usize>,
+}
+
+/// Where a course is: all that what follows depends on.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(super) struct Station {
+    place: Place,
+    /// Energy less work at the start, shifted by impacts \[J\].
+    reference: Option<DoubleDouble>,
+    /// Contacts held, in the order of their rows.
+    contacts: Vec<usize>,
+    held: Vec<Held>,
+    holds_in_row: usize,
+    events_in_row: usize,
+    is_between: bool,
+    stabilizer: f64,
 }
 
 /// A marcher on its way through impacts and holds.
@@ -74,7 +91,11 @@ pub(super) struct Course {
     /// The motion last sampled, kept for its room.
     shown: Motion,
     held: Vec<Held>,
+    /// Holds, and impacts and releases, since the last output time.
     holds_in_row: usize,
+    events_in_row: usize,
+    /// True where it paused on the way to an output time.
+    is_between: bool,
     /// Looks for bars that turn over, where somebody asked.
     pub(super) lookout: Option<Lookout>,
     /// Energy stabilizers put in before the present marcher \[J\].
@@ -92,6 +113,8 @@ impl Course {
             shown: Motion::default(),
             held: Vec::new(),
             holds_in_row: 0,
+            events_in_row: 0,
+            is_between: false,
             lookout: None,
             stabilizer: 0.0,
         }
@@ -111,12 +134,69 @@ impl Course {
         self.marcher.tally()
     }
 
-    /// Advances to an output time, through impacts and holds.
-    pub(super) fn go(&mut self, until: Time, outcome: &mut Outcome) -> Result<(), StepError> {
-        self.holds_in_row = 0;
-        for _ in 0..EVENTS_MOST {
-            match self.marcher.advance(until, outcome.plan.time(outcome.plan.rows), self.lookout.as_mut()) {
-                Ok(Reached::Until | Reached::Pause) => return Ok(()),
+    /// Where it is, to go on from.
+    pub(super) fn station(&self) -> Station {
+        Station {
+            place: self.marcher.place(),
+            reference: self.sampler.reference(),
+            contacts: self.mechanism.held.clone(),
+            held: self.held.clone(),
+            holds_in_row: self.holds_in_row,
+            events_in_row: self.events_in_row,
+            is_between: self.is_between,
+            stabilizer: self.stabilizer,
+        }
+    }
+
+    /// How many holds must be kept by name for a station to be consistent.
+    pub(super) fn names_holds(station: &Station) -> usize {
+        station.held.iter().filter_map(|held| held.kept).map(|kept| kept + 1).max().unwrap_or(0)
+    }
+
+    /// A course that goes on from a station, which was reached on the way to `horizon`; `None` where it cannot be one of this mechanism and plan.
+    pub(super) fn resume(
+        mechanism: Arc<Mechanism>,
+        plan: &Plan,
+        start: &Motion,
+        station: Station,
+        horizon: Time,
+    ) -> Result<Option<Self>, StepError> {
+        let Station { place, reference, contacts, held, holds_in_row, events_in_row, is_between, stabilizer } = station;
+        let known = |contact: usize| contact < mechanism.contacts.len();
+        let once = contacts.iter().enumerate().all(|(i, contact)| !contacts[..i].contains(contact));
+        if !once || !contacts.iter().copied().chain(held.iter().map(|held| held.contact)).all(known) {
+            return Ok(None);
+        }
+        let mut plan = plan.clone();
+        let mut holding = Arc::clone(&mechanism);
+        if !contacts.is_empty() {
+            holding = Arc::new(mechanism.holding(&contacts));
+            plan.stabilization = Stabilization::Projection;
+        }
+        let mut course = Self::new(Arc::clone(&mechanism), build(&holding, &mut plan, start)?);
+        if !course.marcher.resume(place, horizon)? {
+            return Ok(None);
+        }
+        if !contacts.is_empty() {
+            course.sampler.hold(Arc::clone(&holding));
+            course.mechanism = holding;
+        }
+        course.sampler.refer(reference);
+        Ok(Some(Self { held, holds_in_row, events_in_row, is_between, stabilizer, ..course }))
+    }
+
+    /// Advances to an output time, through impacts and holds; false where it paused on the way.
+    pub(super) fn go(&mut self, until: Time, outcome: &mut Outcome, pause: &mut Pause) -> Result<bool, StepError> {
+        if !std::mem::take(&mut self.is_between) {
+            (self.holds_in_row, self.events_in_row) = (0, 0);
+        }
+        while self.events_in_row < EVENTS_MOST {
+            match self.marcher.advance(until, outcome.plan.time(outcome.plan.rows), self.lookout.as_mut(), pause) {
+                Ok(Reached::Until) => return Ok(true),
+                Ok(Reached::Pause) => {
+                    self.is_between = true;
+                    return Ok(false);
+                }
                 Ok(Reached::Event(contact)) if self.mechanism.held.contains(&contact) => self.settle(Some(contact), outcome)?,
                 Ok(Reached::Event(contact)) => {
                     self.strike(contact, outcome)?;
@@ -133,6 +213,7 @@ impl Course {
                 }
                 Err(stop) => return Err(stop),
             }
+            self.events_in_row += 1;
         }
         let what = format!("more than {EVENTS_MOST} impacts and releases before the next output time");
         Err(self.stopped(&outcome.plan, what, "shorten the output interval, or lower the restitution"))

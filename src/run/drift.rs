@@ -12,7 +12,7 @@ const INTERVALS: usize = 64;
 const GROWTH: f64 = 1.059_253_725_177_289;
 
 /// The excursions of one quantity that ought to stay zero.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Excursion {
     /// Largest magnitude so far; not a number once the quantity was not.
     pub max: f64,
@@ -54,6 +54,19 @@ impl Excursion {
         }
     }
 
+    /// Goes on towards a later horizon \[s\]; what was seen of its intervals stays at its times.
+    fn extend(&mut self, until: f64) {
+        let ratio = self.until / until;
+        let mut intervals = vec![-1.0; INTERVALS];
+        for (i, &max) in self.intervals.iter().enumerate() {
+            let slot = (((i as f64 + 0.5) * ratio) as usize).min(INTERVALS - 1);
+            intervals[slot] = f64::max(intervals[slot], max);
+        }
+        let [_, t, tt, _, xt, _] = &mut self.sums;
+        (*t, *tt, *xt) = (*t * ratio, *tt * (ratio * ratio), *xt * ratio);
+        (self.intervals, self.until) = (intervals, until);
+    }
+
     /// Least-squares slope of the per-interval maximum \[1/s times the quantity's unit\]; zero with fewer than three intervals.
     pub fn slope(&self) -> f64 {
         let seen: Vec<(f64, f64)> = self
@@ -87,7 +100,7 @@ impl Excursion {
 }
 
 /// Stated limits; a run that exceeds one stops.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Limits {
     /// On the energy imbalance over the energy scale.
     pub energy: Option<f64>,
@@ -96,11 +109,12 @@ pub struct Limits {
 }
 
 /// The drift of a run.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Drift {
     /// Energy, or energy minus work, over the energy scale.
     pub energy: Excursion,
     /// `energy`, or `energy minus work` where motors, dampers or impacts change it.
+    #[serde(skip)]
     pub kind: &'static str,
     /// Each row by name, at position and velocity level.
     pub constraints: Vec<(String, [Excursion; 2])>,
@@ -122,6 +136,20 @@ impl Drift {
             stabilizer: 0.0,
             stabilizer_max: 0.0,
         }
+    }
+
+    /// Goes on towards a later horizon \[s\].
+    pub(super) fn extend(&mut self, until: f64) {
+        let levels = self.constraints.iter_mut().flat_map(|(_, levels)| levels);
+        levels.chain([&mut self.energy]).for_each(|excursion| excursion.extend(until));
+    }
+
+    /// Whether it can be one of this mechanism.
+    pub(super) fn fits(&self, mechanism: &Mechanism) -> bool {
+        let rows = mechanism.rows.iter().map(|row| row.name());
+        let mut excursions = self.constraints.iter().flat_map(|(_, levels)| levels).chain([&self.energy]);
+        self.constraints.iter().map(|(name, _)| name.as_str()).eq(rows)
+            && excursions.all(|excursion| excursion.intervals.len() == INTERVALS && excursion.until > 0.0)
     }
 
     /// Takes a sample; names the first limit it exceeds.

@@ -2,10 +2,16 @@
 //!
 //! A file is written beside its place under a hidden name and renamed when it is complete; whoever looks into the folder, at any
 //! moment, finds whole files.  `run.json` is written last: where it stands, the run beside it is complete.
+//!
+//! A folder is locked as long as somebody writes into it.  Its table, `.unfinished-trajectory.csv`, outlives its writer where a checkpoint says how
+//! much of it counts ([`checkpoint`](super::checkpoint)).
 
+use super::checkpoint;
+use sha2::digest::common::hazmat::{SerializableState, SerializedState};
 use sha2::{Digest, Sha256};
-use std::fs;
-use std::io::{self, Write};
+use std::cell::Cell;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
@@ -18,7 +24,7 @@ pub const SWEEP: &str = "sweep.csv";
 /// Settings and totals of a sweep.
 pub const SWEEP_RECORD: &str = "sweep.json";
 /// How names of unfinished files begin.
-const UNFINISHED: &str = ".unfinished-";
+pub(super) const UNFINISHED: &str = ".unfinished-";
 
 /// Why a file of a run is not there.
 #[derive(Debug, thiserror::Error)]
@@ -28,6 +34,26 @@ pub enum FileError {
     Occupied {
         /// The folder.
         folder: PathBuf,
+    },
+    /// The folder holds a run that can go on.
+    #[error("{} holds an interrupted run\nhint: `driftless resume {}` goes on with it, --force begins anew", folder.display(), quoted(folder))]
+    Interrupted {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// Somebody else is writing into the folder.
+    #[error("another run is writing into {}\nhint: wait for it, or name another folder with --out", folder.display())]
+    Busy {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// A table is not the one a checkpoint speaks of.
+    #[error("{} is not what the checkpoint beside it speaks of: {why}", file.display())]
+    Altered {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong.
+        why: &'static str,
     },
     /// The folder cannot be made.
     #[error("cannot make the folder {}: {source}\nhint: --out names another folder", folder.display())]
@@ -52,33 +78,71 @@ pub enum FileError {
 pub struct Folder {
     path: PathBuf,
     written: Vec<&'static str>,
+    /// Holds the lock; `None` where the file system knows no locks.
+    _lock: Option<File>,
 }
 
-/// A file being written; dropped unfinished it leaves nothing behind.
+/// A table being written; dropped unfinished it leaves nothing behind, unless a checkpoint refers to it.
 #[derive(Debug)]
 pub struct Stream {
-    file: NamedTempFile,
+    file: File,
+    path: PathBuf,
     name: &'static str,
     hash: Sha256,
+    bytes: u64,
+    lasts: Cell<bool>,
 }
 
+/// How far a table was written: so much of it counts.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Cursor {
+    bytes: u64,
+    /// The state of its SHA-256 there.
+    hash: Vec<u8>,
+}
+
+/// Tables up to this length \[bytes\] are read again where they are taken up; it takes less than a second.
+const READ_AGAIN: u64 = 1 << 28;
+
 impl Folder {
-    /// Opens the folder, made where it does not exist; overwriting sweeps out what an interrupted run left unfinished.
+    /// Opens the folder for a new run, made where it does not exist, and locks it; what a run that can no longer go on left unfinished is swept out.
     ///
     /// # Errors
-    /// A run is in it and `overwrite` is false, or it cannot be made.
+    /// A run is in it, finished or interrupted, and `overwrite` is false; somebody is writing into it; or it cannot be made.
     pub fn open(path: &Path, overwrite: bool) -> Result<Self, FileError> {
+        let folder = || path.to_owned();
+        fs::create_dir_all(path).map_err(|source| FileError::Folder { folder: folder(), source })?;
+        let lock = lock(path)?;
+        if !overwrite && checkpoint::is_in(path) {
+            return Err(FileError::Interrupted { folder: folder() });
+        }
         if !overwrite && [TRAJECTORY, RECORD, SWEEP, SWEEP_RECORD].iter().any(|name| path.join(name).exists()) {
-            return Err(FileError::Occupied { folder: path.to_owned() });
+            return Err(FileError::Occupied { folder: folder() });
         }
+        // Without their table the checkpoints are of no use.
+        checkpoint::Checkpoints::none(path).remove()?;
+        let entries = fs::read_dir(path).map_err(|source| FileError::Folder { folder: folder(), source })?;
+        for entry in entries.flatten().filter(|entry| entry.file_name().to_string_lossy().starts_with(UNFINISHED)) {
+            remove(entry.path())?;
+        }
+        Ok(Self { path: folder(), written: Vec::new(), _lock: lock })
+    }
+
+    /// Opens the folder of an interrupted run, and locks it.
+    ///
+    /// # Errors
+    /// Somebody is writing into it.
+    pub fn reopen(path: &Path) -> Result<Self, FileError> {
+        Ok(Self { path: path.to_owned(), written: Vec::new(), _lock: lock(path)? })
+    }
+
+    /// Opens a folder to put whole files into, beside whatever is there and whoever else does.
+    ///
+    /// # Errors
+    /// It cannot be made.
+    pub fn shared(path: &Path) -> Result<Self, FileError> {
         fs::create_dir_all(path).map_err(|source| FileError::Folder { folder: path.to_owned(), source })?;
-        if overwrite {
-            let entries = fs::read_dir(path).map_err(|source| FileError::Folder { folder: path.to_owned(), source })?;
-            for entry in entries.flatten().filter(|entry| entry.file_name().to_string_lossy().starts_with(UNFINISHED)) {
-                remove(entry.path())?;
-            }
-        }
-        Ok(Self { path: path.to_owned(), written: Vec::new() })
+        Ok(Self { path: path.to_owned(), written: Vec::new(), _lock: None })
     }
 
     /// Where it is.
@@ -96,11 +160,70 @@ impl Folder {
         self.written.iter().map(|name| self.path.join(name)).collect()
     }
 
-    /// Begins a file.
+    /// Begins a table.
     ///
     /// # Errors
     /// The folder cannot be written.
     pub fn begin(&self, name: &'static str) -> Result<Stream, FileError> {
+        let path = self.unfinished(name);
+        let file = File::create(&path).map_err(|source| self.failed(name, source))?;
+        Ok(Stream { file, path, name, hash: Sha256::new(), bytes: 0, lasts: Cell::new(false) })
+    }
+
+    /// Takes up a table at a cursor; what was written beyond it is cut off.
+    ///
+    /// # Errors
+    /// It cannot be opened, or is not the one the cursor was in.
+    pub fn take_up(&self, name: &'static str, cursor: &Cursor) -> Result<Stream, FileError> {
+        let path = self.unfinished(name);
+        // A run that was over may have fallen between giving the table its name and writing its record.
+        let place = if path.exists() { path.clone() } else { self.path.join(name) };
+        let failed = |source| FileError::File { file: place.clone(), source };
+        let altered = |why| FileError::Altered { file: place.clone(), why };
+        let mut file = match OpenOptions::new().read(true).write(true).open(&place) {
+            Ok(file) => file,
+            Err(source) if source.kind() == io::ErrorKind::NotFound => return Err(altered("it is gone")),
+            Err(source) => return Err(failed(source)),
+        };
+        if file.metadata().map_err(failed)?.len() < cursor.bytes {
+            return Err(altered("it is shorter"));
+        }
+        let hash = cursor.hash().ok_or_else(|| altered("the hash kept of it is none"))?;
+        if cursor.bytes <= READ_AGAIN && hashed(&mut file, cursor.bytes).map_err(failed)? != hash.clone().finalize() {
+            return Err(altered("its content has changed"));
+        }
+        if place != path {
+            fs::rename(&place, &path).map_err(failed)?;
+        }
+        file.set_len(cursor.bytes).and_then(|()| file.seek(SeekFrom::Start(cursor.bytes))).map_err(failed)?;
+        Ok(Stream { file, path, name, hash, bytes: cursor.bytes, lasts: Cell::new(true) })
+    }
+
+    fn unfinished(&self, name: &str) -> PathBuf {
+        self.path.join(format!("{UNFINISHED}{name}"))
+    }
+
+    /// Gives a finished table its name, in place of an older one; returns the SHA-256 of its content.
+    ///
+    /// # Errors
+    /// The folder cannot be written.
+    pub fn keep(&mut self, mut stream: Stream) -> Result<String, FileError> {
+        let name = stream.name;
+        let failed = |source| self.failed(name, source);
+        if stream.lasts.get() {
+            // Its checkpoints are removed soon.
+            stream.file.sync_all().map_err(failed)?;
+        }
+        fs::rename(&stream.path, self.path.join(name)).map_err(failed)?;
+        self.written.push(name);
+        Ok(hexadecimal(std::mem::take(&mut stream.hash)))
+    }
+
+    /// Writes a file at once.
+    ///
+    /// # Errors
+    /// The folder cannot be written.
+    pub fn write(&mut self, name: &'static str, content: &[u8]) -> Result<(), FileError> {
         let mut builder = tempfile::Builder::new();
         builder.prefix(UNFINISHED).suffix(name);
         #[cfg(unix)]
@@ -109,29 +232,12 @@ impl Folder {
             // Temporary files are private; a result is as readable as the user's other files.
             builder.permissions(fs::Permissions::from_mode(0o666));
         }
-        let file = builder.tempfile_in(&self.path).map_err(|source| self.failed(name, source))?;
-        Ok(Stream { file, name, hash: Sha256::new() })
-    }
-
-    /// Gives a finished file its name, in place of an older one; returns the SHA-256 of its content.
-    ///
-    /// # Errors
-    /// The folder cannot be written.
-    pub fn keep(&mut self, stream: Stream) -> Result<String, FileError> {
-        let Stream { file, name, hash } = stream;
-        file.persist(self.path.join(name)).map_err(|error| self.failed(name, error.error))?;
+        let failed = |source| self.failed(name, source);
+        let mut file: NamedTempFile = builder.tempfile_in(&self.path).map_err(failed)?;
+        file.write_all(content).map_err(failed)?;
+        file.persist(self.path.join(name)).map_err(|error| failed(error.error))?;
         self.written.push(name);
-        Ok(hexadecimal(hash))
-    }
-
-    /// Writes a file at once.
-    ///
-    /// # Errors
-    /// The folder cannot be written.
-    pub fn write(&mut self, name: &'static str, content: &[u8]) -> Result<(), FileError> {
-        let mut stream = self.begin(name)?;
-        stream.file.write_all(content).map_err(|source| self.failed(name, source))?;
-        self.keep(stream).map(drop)
+        Ok(())
     }
 
     /// Removes what an earlier run left under these names.
@@ -148,10 +254,43 @@ impl Folder {
     }
 }
 
+impl Stream {
+    /// How far it is, once that much has reached the disk.
+    ///
+    /// # Errors
+    /// The disk does not take it.
+    pub fn cursor(&self) -> io::Result<Cursor> {
+        self.file.sync_data()?;
+        Ok(Cursor { bytes: self.bytes, hash: self.hash.serialize().to_vec() })
+    }
+
+    /// Outlives its writer from now on: a checkpoint refers to it.
+    pub fn outlive(&self) {
+        self.lasts.set(true);
+    }
+}
+
+impl Cursor {
+    fn hash(&self) -> Option<Sha256> {
+        let state = SerializedState::<Sha256>::try_from(self.hash.as_slice()).ok()?;
+        Sha256::deserialize(&state).ok()
+    }
+}
+
+impl Drop for Stream {
+    fn drop(&mut self) {
+        if !self.lasts.get() {
+            // Where that fails, the next run sweeps it out.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
 impl Write for Stream {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let count = self.file.write(bytes)?;
         self.hash.update(&bytes[..count]);
+        self.bytes += count as u64;
         Ok(count)
     }
 
@@ -160,8 +299,43 @@ impl Write for Stream {
     }
 }
 
+/// The lock of a folder, released when the file is closed, whatever ends its holder.
+fn lock(folder: &Path) -> Result<Option<File>, FileError> {
+    // Elsewhere than on Unix a folder cannot be opened; a file in it is locked instead.
+    let file = if cfg!(unix) { File::open(folder) } else { File::create(folder.join(".lock")) };
+    let Ok(file) = file else { return Ok(None) };
+    match file.try_lock() {
+        Ok(()) => Ok(Some(file)),
+        Err(TryLockError::WouldBlock) => Err(FileError::Busy { folder: folder.to_owned() }),
+        Err(TryLockError::Error(_)) => Ok(None),
+    }
+}
+
+/// SHA-256 of the first bytes of a file.
+fn hashed(file: &mut File, bytes: u64) -> io::Result<sha2::digest::Output<Sha256>> {
+    file.rewind()?;
+    let (mut hash, mut left, mut buffer) = (Sha256::new(), bytes, vec![0; 1 << 16]);
+    while left > 0 {
+        let most = left.min(buffer.len() as u64) as usize;
+        let count = file.read(&mut buffer[..most])?;
+        if count == 0 {
+            return Err(io::ErrorKind::UnexpectedEof.into());
+        }
+        hash.update(&buffer[..count]);
+        left -= count as u64;
+    }
+    Ok(hash.finalize())
+}
+
+/// A path as a shell takes it.
+pub fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "/._-+=:,@%".contains(letter);
+    if !text.is_empty() && text.chars().all(is_plain) { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
+}
+
 /// Removes a file that may not be there.
-fn remove(path: PathBuf) -> Result<(), FileError> {
+pub(super) fn remove(path: PathBuf) -> Result<(), FileError> {
     match fs::remove_file(&path) {
         Err(source) if source.kind() != io::ErrorKind::NotFound => Err(FileError::File { file: path, source }),
         _ => Ok(()),
@@ -201,7 +375,57 @@ mod tests {
         // FIPS 180-2, appendix B.1.
         assert_eq!(hash, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
         assert_eq!(names(folder.path()), [TRAJECTORY]);
-        assert!(matches!(Folder::open(folder.path(), false), Err(FileError::Occupied { .. })));
+        let path = folder.path().to_owned();
+        assert!(matches!(Folder::open(&path, false), Err(FileError::Busy { .. })));
+        drop(folder);
+        assert!(matches!(Folder::open(&path, false), Err(FileError::Occupied { .. })));
+    }
+
+    #[test]
+    fn a_table_is_taken_up_where_it_was_and_nowhere_else() {
+        let place = tempfile::tempdir().expect("a folder");
+        let mut folder = Folder::open(place.path(), false).expect("made");
+        let mut stream = folder.begin(TRAJECTORY).expect("begun");
+        stream.write_all(b"one").expect("written");
+        let cursor = stream.cursor().expect("synchronized");
+        stream.outlive();
+        stream.write_all(b"too much").expect("written");
+        drop(stream);
+        let path = place.path().join(".unfinished-trajectory.csv");
+        for (bad, why) in [(&b"on"[..], "shorter"), (b"two too much", "changed")] {
+            let good = fs::read(&path).expect("there");
+            fs::write(&path, bad).expect("written");
+            let error = folder.take_up(TRAJECTORY, &cursor).expect_err("refused").to_string();
+            assert!(error.contains(why), "{error}");
+            assert_eq!(fs::read(&path).expect("there"), bad);
+            fs::write(&path, good).expect("written");
+        }
+        let mut stream = folder.take_up(TRAJECTORY, &cursor).expect("the same");
+        stream.write_all(b", two").expect("written");
+        assert_eq!(folder.keep(stream).expect("kept"), sha256("one, two"));
+        // From under its name too; and what is not it stays where it is.
+        drop(folder.take_up(TRAJECTORY, &cursor).expect("the same"));
+        assert_eq!(fs::read(&path).expect("there"), b"one");
+        fs::rename(&path, place.path().join(TRAJECTORY)).expect("renamed");
+        fs::write(place.path().join(TRAJECTORY), "another").expect("written");
+        assert!(folder.take_up(TRAJECTORY, &cursor).is_err() && place.path().join(TRAJECTORY).exists());
+        fs::remove_file(place.path().join(TRAJECTORY)).expect("removed");
+        assert!(folder.take_up(TRAJECTORY, &cursor).expect_err("gone").to_string().contains("gone"));
+    }
+
+    #[test]
+    fn an_interrupted_run_is_not_overwritten_unasked() {
+        let place = tempfile::tempdir().expect("a folder");
+        fs::write(place.path().join("checkpoint.previous"), "x").expect("written");
+        let error = Folder::open(place.path(), false).expect_err("refused").to_string();
+        assert!(error.contains("driftless resume") && error.contains("--force"), "{error}");
+        assert!(Folder::open(place.path(), true).is_ok() && names(place.path()).is_empty());
+    }
+
+    #[test]
+    fn paths_are_quoted_for_a_shell_where_they_need_it() {
+        assert_eq!(quoted(Path::new("output/free/gauss16-0.01s")), "output/free/gauss16-0.01s");
+        assert_eq!(quoted(Path::new("my runs/bob's")), r"'my runs/bob'\''s'");
     }
 
     #[test]

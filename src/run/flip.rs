@@ -9,7 +9,7 @@ use crate::dynamics::{Form, Glance, State};
 use std::f64::consts::PI;
 
 /// The first passage of a bar.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Flip {
     /// Time \[s\].
     pub t: f64,

@@ -1,25 +1,20 @@
-//! The loop: from output time to output time, with limits watched; [`contact`](super::contact) takes it through impacts.
+//! A problem, its method and its state under one roof, from one output time to the next; [`contact`](super::contact) takes it through impacts,
+//! [`running`](super::running) is the loop around it.
 
-use super::contact::{Course, Hold, Strike};
-use super::drift::{Drift, Limits};
 use super::flip::{self, Flip, Lookout, Suspect};
 use super::methods::{MethodId, Stabilization};
-use super::plan::{Plan, Refusal, Request};
-use super::sample::Sample;
-use super::trace::Trace;
+use super::plan::Plan;
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::elimination::Elimination;
 use crate::dynamics::looped::Looped;
 use crate::dynamics::multiplier::Multiplier;
 use crate::dynamics::natural::Natural;
-use crate::dynamics::{CompileError, Field, Form, Glance, Mechanism, Motion, State, Time};
-use crate::scene::Scene;
+use crate::dynamics::{Field, Form, Glance, Mechanism, Motion, State, Time};
 use crate::stabilization::{Baumgarte, Projected, SymmetricGauss};
 use crate::stepping::gauss::Gauss;
 use crate::stepping::rattle::Rattle;
 use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Method, Reached, Seen, StepError, Tally, Taylor, Tolerance};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
 /// A mechanism in some form, as a first-order system.
 pub trait Problem: Field + Form {}
@@ -42,8 +37,9 @@ macro_rules! sized {
 
 /// A problem, its method and its state.
 pub(super) trait March {
-    /// To the output time `until`, on the way to `horizon`; what is read then is the motion there.  Looks for bars that turn over, where asked to.
-    fn advance(&mut self, until: Time, horizon: Time, lookout: Option<&mut Lookout>) -> Result<Reached, StepError>;
+    /// To the output time `until`, on the way to `horizon`; what is read then is the motion there.  Looks for bars that turn over, where asked to, and
+    /// pauses after a step where `pause` is true.
+    fn advance(&mut self, until: Time, horizon: Time, lookout: Option<&mut Lookout>, pause: &mut Pause) -> Result<Reached, StepError>;
     fn read(&mut self, motion: &mut Motion);
     /// Goes on from another motion, with what the method remembers.
     fn jump(&mut self, motion: &Motion);
@@ -54,6 +50,23 @@ pub(super) trait March {
     fn forget(&mut self);
     /// Goes on counting, and with the steps, where another left off.
     fn follow(&mut self, other: &dyn March);
+    /// Everything it needs to go on.
+    fn place(&self) -> Place;
+    /// Goes on from a place, which was reached on the way to `horizon`; false where it cannot be one of this problem and method.
+    fn resume(&mut self, place: Place, horizon: Time) -> Result<bool, StepError>;
+}
+
+/// Asked after every step and every row whether the run shall pause.
+pub type Pause<'a> = dyn FnMut() -> bool + 'a;
+
+/// Where a marcher is, with all that its next step depends on.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(super) struct Place {
+    state: State,
+    tally: Tally,
+    /// Where a dense method began its last step; without unknowns where it made none.
+    from: State,
+    ahead: Option<usize>,
 }
 
 /// What can be seen of the steps of a method that is not dense.
@@ -85,10 +98,10 @@ struct Marcher<P: ?Sized, M> {
 }
 
 impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
-    fn advance(&mut self, until: Time, horizon: Time, lookout: Option<&mut Lookout>) -> Result<Reached, StepError> {
+    fn advance(&mut self, until: Time, horizon: Time, lookout: Option<&mut Lookout>, pause: &mut Pause) -> Result<Reached, StepError> {
         let mut lookout = lookout.filter(|lookout| lookout.flip.is_none());
         if !self.method.is_dense() {
-            return self.land(until, lookout);
+            return self.land(until, lookout, pause);
         }
         let Self { problem, method, state, tally, from, inside, is_inside, ahead, .. } = self;
         // Steps are as long as the method likes; output times are read off them.
@@ -98,12 +111,14 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
                 return Ok(Reached::Event(event));
             }
             from.clone_from(state);
+            let mut paused = false;
             if let Some(lookout) = &mut lookout {
                 lookout.begin(&mut **problem, state);
             }
             let reached = method.advance(problem, state, horizon, tally, &mut |problem, state| {
                 // A step in which a bar may have turned over is searched before the next one.
-                let enough = lookout.as_mut().is_some_and(|lookout| lookout.step(problem, state, false)) || state.time >= until;
+                paused = pause();
+                let enough = lookout.as_mut().is_some_and(|lookout| lookout.step(problem, state, false)) || state.time >= until || paused;
                 if !enough {
                     from.clone_from(state);
                 }
@@ -126,7 +141,12 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
                 }
                 *ahead = Some(event);
             }
+            if paused && state.time < until {
+                return Ok(Reached::Pause);
+            }
         }
+        // What a method carries from one call to the next is the number of steps since the last output time.
+        state.memory.clear();
         if state.time > until {
             method.within(problem, from, until, inside);
             *is_inside = true;
@@ -160,20 +180,40 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
         self.tally = other.tally();
         self.state.memory = other.memory().to_vec();
     }
+
+    fn place(&self) -> Place {
+        Place { state: self.state.clone(), tally: self.tally, from: self.from.clone(), ahead: self.ahead }
+    }
+
+    fn resume(&mut self, place: Place, horizon: Time) -> Result<bool, StepError> {
+        let shape = |state: &State| (state.y.len(), state.low.len(), state.turns.len(), state.is_winding);
+        let alike = |state: &State| shape(state) == shape(&self.state);
+        let steps_back = self.method.is_dense() && !place.from.y.is_empty() && place.from.time < place.state.time;
+        if !alike(&place.state) || (steps_back && !alike(&place.from)) {
+            return Ok(false);
+        }
+        if steps_back {
+            // What the method knows of the inside of its last step it finds again by repeating it.
+            let mut state = place.from.clone();
+            self.method.advance(&mut self.problem, &mut state, horizon, &mut Tally::default(), &mut |_, _| Ok(Seen::Enough))?;
+        }
+        Place { state: self.state, tally: self.tally, from: self.from, ahead: self.ahead } = place;
+        Ok(true)
+    }
 }
 
 impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
     /// Marches a method that is not dense to `until` itself.
-    fn land(&mut self, until: Time, mut lookout: Option<&mut Lookout>) -> Result<Reached, StepError> {
+    fn land(&mut self, until: Time, mut lookout: Option<&mut Lookout>, pause: &mut Pause) -> Result<Reached, StepError> {
         let Self { problem, method, state, tally, .. } = self;
         let Some(lookout) = &mut lookout else {
-            return method.advance(problem, state, until, tally, &mut |_, _| Ok(Seen::Kept));
+            return method.advance(problem, state, until, tally, &mut |_, _| Ok(if pause() { Seen::Enough } else { Seen::Kept }));
         };
         let all = self.steps == Steps::Unseen;
         lookout.begin(&mut **problem, state);
         let reached = method.advance(problem, state, until, tally, &mut |problem, state| {
             lookout.step(problem, state, all);
-            Ok(Seen::Kept)
+            Ok(if pause() { Seen::Enough } else { Seen::Kept })
         });
         lookout.search(&mut |suspect| if self.steps == Steps::Own { self.again(suspect) } else { self.traced(suspect) });
         reached
@@ -205,7 +245,7 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
         let mut lookout = Lookout::default();
         let until = from.time + *span;
         // Where that stops, what was seen up to there counts.
-        let _ = tracer.advance(until, until, Some(&mut lookout));
+        let _ = tracer.advance(until, until, Some(&mut lookout), &mut || false);
         lookout.flip
     }
 }
@@ -308,7 +348,7 @@ fn pilot(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion) -> Result<f64,
     let mut marcher = build(mechanism, &mut plain, start)?;
     let rows = plan.rows.min(20);
     for row in 1..=rows {
-        match marcher.advance(plan.time(row), plan.time(plan.rows), None) {
+        match marcher.advance(plan.time(row), plan.time(plan.rows), None, &mut || false) {
             Ok(Reached::Until | Reached::Pause) => {}
             Ok(Reached::Event(_)) => break,
             Err(stop) if stop.cause == Cause::RestingContact => break,
@@ -318,169 +358,4 @@ fn pilot(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion) -> Result<f64,
     let mut motion = Motion::default();
     marcher.read(&mut motion);
     Ok(5.0 * motion.time.hi.max(f64::MIN_POSITIVE) / marcher.tally().steps.max(1) as f64)
-}
-
-/// A run about to begin.
-pub struct Run {
-    mechanism: Arc<Mechanism>,
-    plan: Plan,
-    limits: Limits,
-    marcher: Box<dyn March>,
-    /// For runs of an ensemble, which look for bars that turn over and keep no samples: whether they end with the first.
-    ensemble: Option<bool>,
-}
-
-/// How a run ended.
-#[derive(Clone, Debug)]
-pub struct Outcome {
-    /// The plan as carried out.
-    pub plan: Plan,
-    /// The last sample.
-    pub last: Sample,
-    /// Counts.
-    pub tally: Tally,
-    /// Drift.
-    pub drift: Drift,
-    /// Samples for charts.
-    pub trace: Trace,
-    /// The first impacts.
-    pub strikes: Vec<Strike>,
-    /// Number of impacts.
-    pub strike_count: u64,
-    /// Energy lost in them and where points came to rest \[J\].
-    pub strike_loss: f64,
-    /// The first times a point stayed on its wall.
-    pub holds: Vec<Hold>,
-    /// Number of such times.
-    pub hold_count: u64,
-    /// Time spent so, summed over the points \[s\].
-    pub hold_time: f64,
-    /// Time spent between the first output time and the last.
-    pub wall: Duration,
-    /// The first time a bar turned over, where the run is one of an ensemble.
-    pub flip: Option<Flip>,
-    /// Why it ended before its horizon.
-    pub stop: Option<StepError>,
-}
-
-/// What ends a run without an outcome.
-#[derive(Debug, thiserror::Error)]
-pub enum RunError {
-    /// The scene has no equations.
-    #[error("{0}")]
-    Compile(#[from] CompileError),
-    /// The request makes no sense for the scene.
-    #[error("{0}")]
-    Refused(#[from] Refusal),
-    /// The method could not begin.
-    #[error("{0}")]
-    Step(#[from] StepError),
-    /// An observer failed to write.
-    #[error("{0}")]
-    Observer(#[from] std::io::Error),
-}
-
-impl Run {
-    /// Prepares a run from a motion.
-    ///
-    /// # Errors
-    /// A method that cannot begin there.
-    pub fn new(mechanism: Arc<Mechanism>, mut plan: Plan, limits: Limits, start: &Motion) -> Result<Self, StepError> {
-        let marcher = build(&mechanism, &mut plan, start)?;
-        Ok(Self { mechanism, plan, limits, marcher, ensemble: None })
-    }
-
-    /// The same as one of many: on the lookout for the first bar that turns over, and without samples for charts.
-    pub(super) fn of_ensemble(self, ends_at_flip: bool) -> Self {
-        Self { ensemble: Some(ends_at_flip), ..self }
-    }
-
-    /// The plan as it will be carried out.
-    pub fn plan(&self) -> &Plan {
-        &self.plan
-    }
-}
-
-/// A scene from its start to its horizon in one call: compiles, plans, marches.
-///
-/// # Errors
-/// Whatever keeps it from beginning, and what the observer failed with; a stop on the way is part of the [`Outcome`].
-pub fn simulate(scene: &Scene, request: &Request, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>) -> Result<Outcome, RunError> {
-    let mechanism = Arc::new(Mechanism::new(scene)?);
-    let plan = Plan::new(scene, &mechanism, request)?;
-    let start = mechanism.start(scene);
-    march(Run::new(mechanism, plan, Limits::default(), &start)?, observer)
-}
-
-/// Marches a run to its horizon, shows every sample to `observer`, and tells how it ended.
-///
-/// A stop of the method is part of the [`Outcome`]; everything up to it has been shown.
-///
-/// # Errors
-/// What the observer failed with.
-pub fn march(run: Run, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>) -> Result<Outcome, RunError> {
-    let Run { mechanism, plan, limits, marcher, ensemble } = run;
-    let mut outcome = Outcome {
-        last: Sample::default(),
-        tally: Tally::default(),
-        drift: Drift::new(&mechanism, plan.until),
-        trace: Trace::default(),
-        strikes: Vec::new(),
-        strike_count: 0,
-        strike_loss: 0.0,
-        holds: Vec::new(),
-        hold_count: 0,
-        hold_time: 0.0,
-        wall: Duration::ZERO,
-        flip: None,
-        stop: None,
-        plan,
-    };
-    let mut course = Course::new(mechanism, marcher);
-    course.lookout = ensemble.map(|_| Lookout::default());
-    // The reference of the energy is what impacts at the start leave.
-    let mut resting = course.meet(&mut outcome).err();
-    let begin = Instant::now();
-    for row in 0..=outcome.plan.rows {
-        let stopped = match resting.take() {
-            Some(stop) => Err(stop),
-            None if row == 0 => Ok(()),
-            None => course.go(outcome.plan.time(row), &mut outcome),
-        };
-        let sample = course.sample();
-        // A stop before any progress leaves the state of the row before.
-        if row == 0 || sample.t > outcome.last.t {
-            observer(sample)?;
-            if ensemble.is_none() {
-                outcome.trace.see(sample);
-            }
-        }
-        let exceeded = outcome.drift.see(sample, &limits);
-        outcome.stop = stopped
-            .err()
-            .or_else(|| exceeded.err().map(|what| drift_stop(&outcome.plan, sample.t, what)))
-            .or_else(|| (!sample.is_finite()).then(|| not_finite(&outcome.plan, sample.t)));
-        outcome.last.clone_from(sample);
-        // A dense method is ahead of what it shows.
-        let reached = outcome.last.t;
-        outcome.flip = course.lookout.as_ref().and_then(|lookout| lookout.flip).filter(|flip| flip.t <= reached);
-        if outcome.stop.is_some() || (ensemble == Some(true) && outcome.flip.is_some()) {
-            break;
-        }
-    }
-    course.end(outcome.last.t, &mut outcome);
-    outcome.wall = begin.elapsed();
-    outcome.tally = course.tally();
-    Ok(outcome)
-}
-
-fn not_finite(plan: &Plan, t: f64) -> StepError {
-    let what = "energies, torques or velocities are beyond the numbers a double holds".into();
-    let hint = "look for masses, rates or stiffnesses far out of proportion".into();
-    StepError { cause: Cause::NotFinite, method: plan.method.to_string(), t, step: plan.step.unwrap_or(0.0), what, hint }
-}
-
-fn drift_stop(plan: &Plan, t: f64, what: String) -> StepError {
-    let hint = if plan.step.is_some() { "shorten the step" } else { "tighten the tolerance" };
-    StepError { cause: Cause::DriftLimit, method: plan.method.to_string(), t, step: plan.step.unwrap_or(0.0), what, hint: hint.into() }
 }

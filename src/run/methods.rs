@@ -5,7 +5,7 @@ use std::fmt;
 use std::str::FromStr;
 
 /// A method by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum MethodId {
     /// Dormand–Prince 5(4) of `ode_solvers`.
     Dopri5,
@@ -139,7 +139,7 @@ impl FromStr for MethodId {
 }
 
 /// How constraints are kept.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stabilization {
     /// Not at all: the multipliers hold the accelerations, drift is watched.

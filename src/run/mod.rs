@@ -1,10 +1,12 @@
 //! A run: the loop around a method, and what watches it.
 //!
-//! [`plan`] decides, [`mod@march`] builds the marcher and goes from one output time to the next, [`contact`] through impacts and contacts that
-//! last, [`sample`] reads off what there is to
+//! [`plan`] decides, [`mod@march`] builds the marcher, [`running`] goes with it from one output time to the next and can pause, [`contact`] through impacts and
+//! contacts that last, [`sample`] reads off what there is to
 //! know at each, [`drift`] and [`trace`] keep bounded records of it, [`table`] writes it down,
-//! [`files`] keeps whole files only.  [`mod@sweep`] runs a grid of starts and parameters, on the lookout for bars that turn over ([`flip`]).
+//! [`files`] keeps whole files only, and [`checkpoint`] what a run needs to go on after whatever ended it.  [`mod@sweep`] runs a grid of starts and parameters, on the lookout for bars that turn over ([`flip`]).
 
+#[cfg(feature = "files")]
+pub mod checkpoint;
 pub mod contact;
 pub mod drift;
 #[cfg(feature = "files")]
@@ -13,22 +15,26 @@ pub mod flip;
 pub mod march;
 pub mod methods;
 pub mod plan;
+pub mod running;
 pub mod sample;
 pub mod sweep;
 #[cfg(feature = "files")]
 pub mod table;
 pub mod trace;
 
+#[cfg(feature = "files")]
+pub use checkpoint::{CheckpointError, Checkpoints, Loaded};
 pub use contact::{Hold, Strike};
 pub use drift::{Drift, Limits};
 #[cfg(feature = "files")]
-pub use files::{FileError, Folder, Stream};
+pub use files::{Cursor, FileError, Folder, Stream};
 pub use flip::Flip;
-pub use march::{Outcome, Run, RunError, march, simulate};
+pub use march::Pause;
 pub use methods::{METHODS, MethodId, MethodInfo, Stabilization};
 pub use plan::{Plan, Refusal, Request};
+pub use running::{Outcome, ResumeError, Run, RunError, Running, Snapshot, march, simulate};
 pub use sample::{Sample, Sampler};
 #[cfg(feature = "files")]
 pub use sweep::table::SweepTable;
-pub use sweep::{Grid, Observer, Point, Status, Sweep, SweepError, Totals, Vary, VaryError, sweep};
+pub use sweep::{Grid, Observer, Point, Status, Sweep, SweepError, Totals, Vary, VaryError, sweep, sweep_on};
 pub use trace::Trace;

@@ -35,7 +35,7 @@ pub struct Request {
 }
 
 /// Everything a run needs to know beside the mechanism.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Plan {
     /// Method.
     pub method: MethodId,
@@ -115,7 +115,7 @@ impl Plan {
         } else {
             step = Some(fixed_step(method, request, rate, until, &mut every, &mut notes)?);
         }
-        let rows = (until / every * (1.0 - 1e-12)).ceil().max(1.0);
+        let rows = rows(until, every);
         if rows > MAX_ROWS {
             return Err(usage("--every", format!("{rows:.1e} rows would be written; at most {MAX_ROWS:.0e}"), "a longer output interval"));
         }
@@ -132,6 +132,28 @@ impl Plan {
             why,
             notes,
         })
+    }
+
+    /// The same to a later horizon \[s\], with the same output times up to the former one; false, and nothing changed, where they would be too many, or fixed
+    /// steps would not end there.
+    pub(super) fn extend(&mut self, until: f64) -> bool {
+        let rows = rows(until, self.every);
+        let is_whole = self.step.is_none_or(|step| is_whole(until, step));
+        let is_possible = until.is_finite() && rows <= MAX_ROWS && is_whole;
+        if is_possible {
+            (self.until, self.rows) = (until, rows as u64);
+        }
+        is_possible
+    }
+
+    /// Whether its numbers are such as [`Plan::new`] gives; a plan that was read from a file may hold any.
+    pub(super) fn is_sound(&self) -> bool {
+        let positive = |value: Option<f64>| value.is_none_or(|value| value > 0.0 && value.is_finite());
+        let tolerances = self.tolerance.is_none_or(|tolerance| positive(Some(tolerance.relative)) && positive(Some(tolerance.absolute)));
+        let numbers = [Some(self.until), Some(self.every), self.step, self.time_constant];
+        let given = if self.method.is_adaptive() { self.tolerance.is_some() } else { self.step.is_some() };
+        let is_known = super::methods::METHODS.iter().any(|info| info.id == self.method);
+        numbers.into_iter().all(positive) && tolerances && given && is_known && rows(self.until, self.every) == self.rows as f64
     }
 
     /// Time of output row `row`: a product, never a repeated sum.
@@ -159,6 +181,17 @@ impl Plan {
         let keeps_rows = !mechanism.rows.is_empty() && !matches!(self.method, MethodId::Rattle(_));
         if keeps_rows { format!("{}-{setting}-{}", self.method, self.stabilization) } else { format!("{}-{setting}", self.method) }
     }
+}
+
+/// True where so many steps end on the horizon.
+fn is_whole(until: f64, step: f64) -> bool {
+    let steps = (until / step).round();
+    (until / step - steps).abs() <= 1e-9 * steps
+}
+
+/// Output rows after the first; the last may come early.
+fn rows(until: f64, every: f64) -> f64 {
+    (until / every * (1.0 - 1e-12)).ceil().max(1.0)
 }
 
 /// Every number asked for must be positive and finite; steps and tolerances must suit one another.
@@ -385,11 +418,10 @@ fn fixed_step(
         let halvings = libm::log2(*every * rate / share).round().max(0.0);
         return Ok(*every / libm::exp2(halvings));
     };
-    let steps = (until / asked).round();
     if asked > until * (1.0 + 1e-9) {
         return Err(usage("--step", format!("{asked} s is longer than the horizon, {until} s"), "a shorter step"));
     }
-    let step = if (until / asked - steps).abs() <= 1e-9 * steps { asked } else { until / (until / asked).ceil() };
+    let step = if is_whole(until, asked) { asked } else { until / (until / asked).ceil() };
     if step != asked {
         notes.push(format!("the step is {step} s instead of {asked} s, so that whole steps end on the horizon"));
     }

@@ -11,7 +11,7 @@ use crate::dynamics::{Mechanism, Motion};
 use std::sync::Arc;
 
 /// One moment of a run.
-#[derive(Debug, Default, PartialEq)]
+#[derive(Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Sample {
     /// Time \[s\].
     pub t: f64,
@@ -122,6 +122,16 @@ impl Sampler {
     pub fn hold(&mut self, mechanism: Arc<Mechanism>) {
         self.plain = Kernel::new(&mechanism);
         self.holding = mechanism;
+    }
+
+    /// Energy less work at the start, shifted by impacts \[J\]; `None` before the first sample.
+    pub fn reference(&self) -> Option<DoubleDouble> {
+        self.reference
+    }
+
+    /// Takes another sampler's reference.
+    pub fn refer(&mut self, reference: Option<DoubleDouble>) {
+        self.reference = reference;
     }
 
     /// Shifts the reference by the energy an impact changed \[J\].

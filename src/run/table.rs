@@ -44,6 +44,22 @@ impl<W: Write> Table<W> {
         Ok(Self { writer, buffer })
     }
 
+    /// Goes on with a table whose header and first rows were written before.
+    pub fn going_on(writer: W) -> Self {
+        Self { writer, buffer: Vec::with_capacity(BUFFER + BUFFER / 4) }
+    }
+
+    /// The writer, once it has every row.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn written(&mut self) -> io::Result<&mut W> {
+        self.writer.write_all(&self.buffer)?;
+        self.buffer.clear();
+        self.writer.flush()?;
+        Ok(&mut self.writer)
+    }
+
     /// Writes a row.
     ///
     /// # Errors
@@ -81,8 +97,7 @@ impl<W: Write> Table<W> {
     /// # Errors
     /// What the writer says.
     pub fn finish(mut self) -> io::Result<W> {
-        self.writer.write_all(&self.buffer)?;
-        self.writer.flush()?;
+        self.written()?;
         Ok(self.writer)
     }
 }

@@ -9,7 +9,7 @@ const WHOLE: usize = 2048;
 const PART: usize = 1500;
 
 /// The memory: samples without positions, which follow from the angles.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Trace {
     /// Samples at equal distances over the whole run, and the last.
     pub whole: Vec<Sample>,
@@ -22,6 +22,11 @@ pub struct Trace {
 }
 
 impl Trace {
+    /// All samples kept.
+    pub(super) fn samples(&self) -> impl Iterator<Item = &Sample> {
+        self.whole.iter().chain(&self.head).chain(&self.tail)
+    }
+
     /// Takes a sample.
     pub fn see(&mut self, sample: &Sample) {
         if self.seen == 0 {

@@ -92,10 +92,10 @@ where
                     hint: "try --method taylor, or another tolerance".into(),
                 });
             }
-            Ok(match (watch(problem, state)?, landing.has_moved) {
-                (Seen::Enough, _) => Seen::Enough,
-                (Seen::Kept, false) => Seen::Kept,
-                _ => Seen::Changed,
+            Ok(match watch(problem, state)? {
+                Seen::Kept if landing.has_moved => Seen::Changed,
+                Seen::Enough if landing.has_moved => Seen::ChangedEnough,
+                seen => seen,
             })
         })
     }

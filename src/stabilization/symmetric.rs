@@ -179,8 +179,12 @@ impl<P: Field + Form + ?Sized> Method<P> for SymmetricGauss {
         let h = self.inner.step().copysign(span);
         for _ in 0..count as u64 {
             self.step(problem, state, h, tally)?;
-            if watch(problem, state)? == Seen::Changed {
+            let seen = watch(problem, state)?;
+            if seen.is_changed() {
                 state.memory.clear();
+            }
+            if seen.is_enough() {
+                return Ok(Reached::Pause);
             }
         }
         Ok(Reached::Until)

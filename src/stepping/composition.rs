@@ -14,7 +14,7 @@
 use crate::arithmetic::DoubleDouble;
 
 /// Which composition.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Composition {
     /// The method itself, order 2.

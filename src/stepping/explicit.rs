@@ -11,7 +11,7 @@
 //!
 //! Source: E. Hairer, S. P. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sections II.4-II.6.
 
-use super::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
+use super::{Cause, Method, Reached, StepError, Tally, Watch};
 use crate::arithmetic::sum::{fast_two_sum, two_sum};
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Field, State, Time};
@@ -49,7 +49,7 @@ pub trait Pair {
 }
 
 /// Relative and absolute tolerance of one step.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Tolerance {
     /// Relative to the size of each unknown.
     pub relative: f64,
@@ -337,14 +337,22 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
         let (n, events) = (state.y.len(), field.events());
         super::refuse_the_past(P::NAME, state, until)?;
         self.resize(n, events);
-        field.rate(state.time, &state.y, &mut self.k[..n]);
-        tally.evaluations += 1;
+        // The step proposed last; where the last call was cut short also its number of steps, and the rate where it is known.
+        let proposed = state.memory.first().copied();
+        let mut taken = state.memory.get(1).map_or(0, |&taken| taken as u64);
+        if state.memory.len() == 2 + n {
+            self.k[..n].copy_from_slice(&state.memory[2..]);
+        } else {
+            field.rate(state.time, &state.y, &mut self.k[..n]);
+            tally.evaluations += 1;
+        }
+        state.memory.truncate(1);
         let mut left = (until - state.time).hi;
-        let mut wanted = match state.memory.first() {
-            Some(&h) => h,
+        let mut wanted = match proposed {
+            Some(h) => h,
             None => self.first_step(field, state, left, tally),
         };
-        let (mut cuts, mut taken) = (0, 0);
+        let mut cuts = 0;
         let mut rejected_before = false;
         while left > 0.0 {
             let whole = wanted >= left * (1.0 - 1e-12);
@@ -426,7 +434,15 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
             state.memory[0] = wanted;
             tally.steps += 1;
             self.k.copy_within(P::STAGES * n..(P::STAGES + 1) * n, 0);
-            if watch(field, state)? == Seen::Changed {
+            let seen = watch(field, state)?;
+            if seen.is_enough() && reached.is_none() {
+                state.memory.push(taken as f64);
+                if !seen.is_changed() {
+                    state.memory.extend_from_slice(&self.k[..n]);
+                }
+                return Ok(Reached::Pause);
+            }
+            if seen.is_changed() {
                 field.rate(state.time, &state.y, &mut self.k[..n]);
                 tally.evaluations += 1;
             }

@@ -137,7 +137,9 @@ impl<F: Field + ?Sized> Method<F> for Gauss {
         self.scratch.points.resize(problem.dimension());
         for (step, count) in [(self.step.copysign(span), steps as u64), (last, u64::from(last != 0.0))] {
             self.scratch.scale(&self.tableau, step);
-            lanes::march(self, problem, state, count, tally, watch)?;
+            if lanes::march(self, problem, state, count, tally, watch)? == Reached::Pause {
+                return Ok(Reached::Pause);
+            }
         }
         Ok(Reached::Until)
     }

@@ -22,7 +22,7 @@ pub use windows::{Dop853, Dopri5};
 use crate::dynamics::{State, Time};
 
 /// Counts of one run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Tally {
     /// Accepted steps.
     pub steps: u64,
@@ -50,8 +50,23 @@ pub enum Seen {
     Kept,
     /// It changed the unknowns (projection): what the method knows of the rate there is stale.
     Changed,
-    /// Enough for now: a dense method stops here.  The others march on.
+    /// Nothing, and it is enough for now: the method stops here, with all it needs to go on in the state's memory.  `dopri5` and `dop853`, which show the
+    /// ends of their windows only, stop there in any case.
     Enough,
+    /// It changed the unknowns, and that is enough for now.
+    ChangedEnough,
+}
+
+impl Seen {
+    /// True where the unknowns are no longer the method's own.
+    pub fn is_changed(self) -> bool {
+        matches!(self, Self::Changed | Self::ChangedEnough)
+    }
+
+    /// True where the method is to stop.
+    pub fn is_enough(self) -> bool {
+        matches!(self, Self::Enough | Self::ChangedEnough)
+    }
 }
 
 /// Shown the state after every accepted step; may change it, or stop the run.
@@ -68,7 +83,7 @@ pub trait Method<P: ?Sized> {
     /// Marches `state` to `until` \[s\], or to the first event before it.
     ///
     /// Adaptive methods land on `until`, which must not lie behind; fixed-step methods take the whole number of steps nearest to it.
-    /// The same call from the same state gives the same bits.
+    /// The same call from the same state gives the same bits, and where a watcher had enough on the way, so does calling again from there.
     ///
     /// # Errors
     /// A typed stop with time, step, culprit and suggestion; the state is then the last accepted one.
@@ -81,7 +96,7 @@ pub trait Method<P: ?Sized> {
         watch: &mut Watch<P>,
     ) -> Result<Reached, StepError>;
 
-    /// True where the method knows the motion inside its steps: [`Method::within`] answers, and [`Seen::Enough`] is heeded.
+    /// True where the method knows the motion inside its steps: [`Method::within`] answers.
     fn is_dense(&self) -> bool {
         false
     }
@@ -93,7 +108,7 @@ pub trait Method<P: ?Sized> {
 }
 
 /// Why a method stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Cause {
     /// The rate, a stage or an error estimate came out not finite.
@@ -134,7 +149,7 @@ impl Cause {
 }
 
 /// A typed stop.
-#[derive(Clone, Debug, PartialEq, thiserror::Error, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error, serde::Serialize, serde::Deserialize)]
 #[error("{method} stopped at t = {t} s (step {step:.3e} s): {what}; {hint}")]
 pub struct StepError {
     /// Why.

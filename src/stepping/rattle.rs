@@ -28,7 +28,7 @@ mod substep;
 
 use self::substep::{Failure, Work};
 use super::composition::Composition;
-use super::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
+use super::{Cause, Method, Reached, StepError, Tally, Watch};
 use crate::arithmetic::Scalar;
 use crate::dynamics::natural::Natural;
 use crate::dynamics::{State, Time};
@@ -52,7 +52,11 @@ impl Rattle {
             *sum += Time::of(*substep);
             Some(*sum)
         };
-        let ends = substeps.iter().scan(Time::default(), end).collect();
+        let mut ends: Vec<Time> = substeps.iter().scan(Time::default(), end).collect();
+        // Where a step ends the next begins, to the last bit.
+        if let Some(last) = ends.last_mut() {
+            *last = Time::of(step);
+        }
         Self { composition, step, substeps, ends, work: Work::default() }
     }
 
@@ -130,9 +134,13 @@ impl Rattle {
             self.work.store(state);
             tally.steps += 1;
             done += 1.0;
-            if watch(natural, state)? == Seen::Changed {
+            let seen = watch(natural, state)?;
+            if seen.is_changed() {
                 state.memory.clear();
                 self.work.load::<N, GUIDED>(natural, state);
+            }
+            if seen.is_enough() {
+                return Ok(Reached::Pause);
             }
         }
         Ok(Reached::Until)

@@ -40,7 +40,7 @@ pub use self::crowd::Crowd;
 use self::event::Crossing;
 use self::expansion::Expansion;
 use self::fast::Fast;
-use super::{Cause, Method, Reached, Seen, StepError, Tally, Tolerance, Watch};
+use super::{Cause, Method, Reached, StepError, Tally, Tolerance, Watch};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics;
 use crate::dynamics::series::Coefficient;
@@ -153,7 +153,9 @@ impl<T: Coefficient, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
     ) -> Result<Reached, StepError> {
         super::refuse_the_past("taylor", state, until)?;
         self.choose(problem, state)?;
-        let mut taken = 0;
+        // Where the last call was cut short its steps count on.
+        let mut taken = state.memory.pop().unwrap_or_default() as u64;
+        state.memory.clear();
         loop {
             let left = until - state.time;
             if left.hi <= 0.0 {
@@ -192,7 +194,8 @@ impl<T: Coefficient, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
             if let Some(event) = event {
                 return Ok(Reached::Event(event));
             }
-            if seen == Seen::Enough {
+            if seen.is_enough() {
+                state.memory.push(taken as f64);
                 return Ok(Reached::Pause);
             }
         }

@@ -32,6 +32,8 @@ const REACH: f64 = 0.5;
 const DISTINCT: f64 = 1e-4;
 /// What is left of a measured row, once those before it are taken off, counts as zero below this.
 const DEPENDENT: f64 = 1e-9;
+/// The same near a singular position, where rows that are met to [`KEPT`] leave angles open by its square root.
+const NEARLY: f64 = 1e-5;
 /// More coordinates than this are not taken apart: what is said of rank and doubles stands for the start alone.
 const DENSE: usize = 300;
 
@@ -106,8 +108,8 @@ impl Mechanism {
                 angles.push((row, between.hi));
             }
         }
-        let omega = problem.find_rates(scene, &given, &found.q, &mut changes)?;
         let mut assembly = problem.rank(&found.q);
+        let omega = problem.find_rates(scene, &given, &found.q, !assembly.singular.is_empty(), &mut changes)?;
         let mut start = Motion::default();
         for (k, &q) in found.q.iter().enumerate() {
             let (phi, turns) = if self.is_winding() || k >= self.bodies.len() { (q, 0.0) } else { q.reduced() };
@@ -189,7 +191,7 @@ impl<'a> Problem<'a> {
         let missing = self.missing();
         let first = self.attempt(&guess, &missing);
         if let (Ok(found), false) = (&first, missing.is_empty()) {
-            self.check_open(found, &missing)?;
+            self.check_open(&found.q, &self.active, &self.held(found), &missing, "phi")?;
         }
         let others = match missing.len() {
             0 => 0,
@@ -219,7 +221,7 @@ impl<'a> Problem<'a> {
             return Err(impossible(self.worst(&held)));
         }
         if !missing.is_empty() {
-            self.check_open(&best, &missing)?;
+            self.check_open(&best.q, &self.active, &self.held(&best), &missing, "phi")?;
         }
         for other in all.iter().filter(|other| other.change <= (2.0 * best.change).max(DISTINCT)) {
             self.check_same(&best, other)?;
@@ -230,6 +232,11 @@ impl<'a> Problem<'a> {
             best.q[k] -= DoubleDouble::TAU.scale(turns);
         }
         Ok(best)
+    }
+
+    /// The aims kept as given.
+    fn held(&self, found: &Found) -> Vec<Aim> {
+        self.aims.iter().zip(&found.held).filter(|(_, held)| **held).map(|(aim, _)| *aim).collect()
     }
 
     /// The start as the scene has it, with guesses where it has none.
@@ -266,7 +273,9 @@ impl<'a> Problem<'a> {
             return Err(self.worst(&q));
         }
         let mut held = none;
-        if !missing.is_empty() {
+        if missing.is_empty() {
+            self.nearest(&mut q, guess);
+        } else {
             let kept = self.kept(&self.aims, &q, &self.active);
             let mut trial = q.clone();
             for (aim, _) in self.aims.iter().zip(&kept).filter(|(_, kept)| **kept) {
@@ -314,14 +323,13 @@ impl<'a> Problem<'a> {
         change / if aim.goal == Goal::Coordinate(aim.bar) { 1.0 } else { self.size }
     }
 
-    /// Refuses a start of which neither rows nor what is given fix a coordinate.
-    fn check_open(&self, found: &Found, missing: &[usize]) -> Result<(), CompileError> {
-        let mut matrix = self.jacobian(&found.q, &self.active);
-        let held: Vec<Aim> = self.aims.iter().zip(&found.held).filter(|(_, held)| **held).map(|(aim, _)| *aim).collect();
-        self.add_aims(&mut matrix, &held, &found.q);
-        let open = matrix.svd().open(found.q.len(), DEPENDENT);
+    /// Refuses a start of which neither rows nor what is given fix a coordinate, or its rate.
+    fn check_open(&self, q: &[DoubleDouble], rows: &[bool], aims: &[Aim], missing: &[usize], what: &str) -> Result<(), CompileError> {
+        let mut matrix = self.jacobian(q, rows);
+        self.add_aims(&mut matrix, aims, q);
+        let open = matrix.svd().open(q.len(), DEPENDENT);
         match missing.iter().copied().max_by(|&a, &b| open[a].total_cmp(&open[b])).filter(|&k| open[k] > 1e-6) {
-            Some(k) => Err(CompileError::Undetermined(self.place(k))),
+            Some(k) => Err(CompileError::Undetermined(self.place(k, what))),
             None => Ok(()),
         }
     }
@@ -336,18 +344,18 @@ impl<'a> Problem<'a> {
         let Some(k) = (0..best.q.len()).max_by(|a, b| apart(a).total_cmp(&apart(b))).filter(|k| apart(k) > DISTINCT) else { return Ok(()) };
         let shown = |q: &DoubleDouble| if k < bodies { q.reduced().0.hi } else { q.hi };
         let unit = if k < bodies { "rad" } else { "m" };
-        Err(CompileError::Ambiguous { what: self.place(k), one: shown(&best.q[k]), other: shown(&other.q[k]), unit })
+        Err(CompileError::Ambiguous { what: self.place(k, "phi"), one: shown(&best.q[k]), other: shown(&other.q[k]), unit })
     }
 
-    /// Where a scene gives a coordinate: `start.bar1.phi`.
-    fn place(&self, k: usize) -> String {
+    /// Where a scene gives a coordinate or, where `what` is `omega`, its rate: `start.bar1.phi`.
+    fn place(&self, k: usize, what: &str) -> String {
         let (bodies, hangs) = (&self.mechanism.bodies, &self.mechanism.forest.hangs);
         if let Some(body) = bodies.get(k) {
-            return format!("start.{}.phi", body.name);
+            return format!("start.{}.{what}", body.name);
         }
         let x = k - (k - bodies.len()) % 2;
         let root = hangs.iter().position(|hang| hang.foot == Foot::Free(x)).unwrap_or(0);
-        format!("start.{}.origin", bodies[root].name)
+        format!("start.{}.{}", bodies[root].name, if what == "phi" { "origin" } else { "velocity" })
     }
 
     /// What of the positions is not as given.
@@ -376,6 +384,7 @@ impl<'a> Problem<'a> {
         scene: &Scene,
         given: &dyn Fn(usize) -> Given,
         q: &[DoubleDouble],
+        is_singular: bool,
         changes: &mut Vec<Change>,
     ) -> Result<Vec<DoubleDouble>, CompileError> {
         let mut aims = Vec::new();
@@ -395,9 +404,9 @@ impl<'a> Problem<'a> {
         }
         let every = vec![true; self.mechanism.rows.len()];
         let (all, none) = (vec![true; aims.len()], vec![false; aims.len()]);
-        let is_whole = Problem { aims: aims.clone(), ..self.clone() }.columns(&all).is_empty();
+        let missing = Problem { aims: aims.clone(), ..self.clone() }.columns(&all);
         let mut ways = vec![all];
-        if !is_whole {
+        if !missing.is_empty() {
             ways.push(self.kept(&aims, q, &every));
         }
         ways.push(none);
@@ -413,6 +422,10 @@ impl<'a> Problem<'a> {
             let row = &self.mechanism.rows[worst];
             let unit = if row.is_angle() { "rad/s" } else { "m/s" };
             return Err(CompileError::ImpossibleRates { row: row.name.clone(), left: slips[worst].abs(), unit });
+        }
+        if is_singular && !missing.is_empty() && omega.iter().any(|omega| omega.hi != 0.0) {
+            // Rows of lost rank would take any rates for these.
+            self.check_open(q, &every, &aims, &missing, "omega")?;
         }
         let z = self.linearise::<DoubleDouble>(q, &omega).z;
         for aim in &aims {
@@ -434,32 +447,43 @@ impl<'a> Problem<'a> {
         } else {
             f64::NAN
         };
-        let dependent: Vec<bool> = independent(&here, DEPENDENT).iter().map(|new| !new).collect();
+        let dependent = dependent(&here, DEPENDENT);
+        let count = |rows: &[bool]| rows.iter().filter(|&&row| row).count();
         let mut redundant = dependent.clone();
-        if dependent.contains(&true) && q.len() <= DENSE {
+        if count(&dependent) > 0 && q.len() <= DENSE {
+            // Motors may be anywhere.
             let steady: Vec<bool> = self.mechanism.rows.iter().zip(&self.active).map(|(row, &active)| active && !row.is_motor()).collect();
             let none = vec![false; self.aims.len()];
-            let nearby = (1..=6).filter_map(|k| {
+            for k in 1..=12 {
+                // Farther and farther: close to a singular position the nearest start may be that position.
+                let spread = 0.08 * k as f64;
                 let mut near: Vec<DoubleDouble> =
-                    q.iter().enumerate().map(|(j, &q)| q + DoubleDouble::of(0.1 * self.unit[j] * shuffled(k, j))).collect();
-                (self.position(&mut near, &steady, &none) < 1e-9).then_some(near)
-            });
-            for near in nearby.take(3) {
-                let new = independent(&self.jacobian(&near, &every), DEPENDENT);
-                redundant.iter_mut().zip(new).for_each(|(redundant, new)| *redundant &= !new);
+                    q.iter().enumerate().map(|(j, &q)| q + DoubleDouble::of(spread * self.unit[j] * shuffled(k, j))).collect();
+                if self.position(&mut near, &steady, &none) < KEPT {
+                    let there = self::dependent(&self.jacobian(&near, &every), NEARLY);
+                    if count(&there) < count(&redundant) {
+                        redundant = there;
+                    }
+                }
             }
         }
-        let names =
-            |is: &dyn Fn(usize) -> bool| (0..rows).filter(|&i| is(i)).map(|i| self.mechanism.rows[i].name.clone()).collect::<Vec<_>>();
-        let redundant_names = names(&|i| redundant[i]);
+        let extra = count(&dependent) - count(&redundant);
+        let mut singular: Vec<usize> = (0..rows).filter(|&i| dependent[i] && !redundant[i]).collect();
+        singular.drain(..singular.len().saturating_sub(extra));
+        let name = |i: usize| self.mechanism.rows[i].name.clone();
         Assembly {
-            degrees_of_freedom: q.len() - (rows - redundant_names.len()),
-            singular: names(&|i| dependent[i] && !redundant[i]),
-            redundant: redundant_names,
+            degrees_of_freedom: q.len() - (rows - count(&redundant)),
+            singular: singular.into_iter().map(name).collect(),
+            redundant: (0..rows).filter(|&i| redundant[i]).map(name).collect(),
             conditioning,
             ..Assembly::default()
         }
     }
+}
+
+/// Which rows are combinations of those before.
+fn dependent(jacobian: &Matrix, least: f64) -> Vec<bool> {
+    independent(jacobian, least).iter().map(|new| !new).collect()
 }
 
 /// The aims at the origin of a bar, or at its velocity.

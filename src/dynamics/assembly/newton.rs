@@ -8,7 +8,7 @@
 //! Coordinates that are held are left out of dq.  Angles are measured in radians and lengths in the size of the mechanism, rows in their largest lever.
 //! Source: P. Deuflhard, *Newton Methods for Nonlinear Problems* (2004), section 4.4.
 
-use super::svd::Matrix;
+use super::svd::{Matrix, dot};
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
 use crate::dynamics::row::{Linearised, Measure, Posture};
 use crate::dynamics::{Mechanism, Time};
@@ -186,6 +186,34 @@ impl Problem<'_> {
             (left, matrix) = there;
         }
         largest(&left)
+    }
+
+    /// Slides along the rows to the start that is nearest to `target`, `q - target = -Gᵀ mu`: the steps to the rows are short, but not their sum.
+    pub fn nearest(&self, q: &mut Vec<DoubleDouble>, target: &[DoubleDouble]) {
+        let none = vec![false; self.aims.len()];
+        let columns = self.columns(&none);
+        let mut trial = q.clone();
+        let mut before = f64::INFINITY;
+        for _ in 0..50 {
+            let (left, matrix) = self.equations::<f64>(&trial, &self.active, &none, &columns);
+            let away: Vec<f64> = (target.iter().zip(&trial)).zip(&self.unit).map(|((&target, &q), unit)| (target - q).hi / unit).collect();
+            let sum: Vec<f64> = left.iter().enumerate().map(|(i, left)| left + dot(matrix.row(i), &away)).collect();
+            let mut step = matrix.svd().solve(&sum, columns.len(), NOISE);
+            step.iter_mut().zip(&self.unit).for_each(|(step, unit)| *step *= unit);
+            let next = moved(target, &step, &columns, 1.0);
+            let moves: Vec<f64> = (next.iter().zip(&trial)).zip(&self.unit).map(|((&next, &q), unit)| (next - q).hi / unit).collect();
+            let change = largest(&moves);
+            if change.is_nan() || change > before {
+                break;
+            }
+            (trial, before) = (next, change);
+            if change < 1e-14 {
+                break;
+            }
+        }
+        if before < 1e-8 && self.finish(&mut trial, &self.active, &none) < KEPT {
+            *q = trial;
+        }
     }
 
     /// Closes what a plain double leaves; returns what is left then, measured.

@@ -62,6 +62,7 @@ pub struct Sweep {
     limits: Limits,
     skips: Option<Box<Judge>>,
     ends_at_flips: bool,
+    is_strict: bool,
     /// True where only starts are varied in which nothing else has a say: all points share one mechanism.
     shares: bool,
 }
@@ -94,11 +95,11 @@ pub trait Observer {
     /// Whatever shall end the sweep.
     fn see(&mut self, point: &Point) -> std::io::Result<()>;
 
-    /// Told now and then how many points are finished, seen or not yet.
+    /// Told now and then how many points are finished, seen or not yet, and what those seen amount to.
     ///
     /// # Errors
-    /// Whatever shall end the sweep.
-    fn finished(&mut self, _points: u64) -> std::io::Result<()> {
+    /// Whatever shall end the sweep; points under way are given up.
+    fn finished(&mut self, _points: u64, _seen: &Totals) -> std::io::Result<()> {
         Ok(())
     }
 }
@@ -109,8 +110,8 @@ impl<F: FnMut(&Point) -> std::io::Result<()>> Observer for F {
     }
 }
 
-/// What a sweep amounted to.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// What a sweep amounted to, or the points of it seen so far.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Totals {
     /// Points that reached the horizon, or the flip they were to end with.
     pub done: u64,
@@ -130,7 +131,7 @@ pub struct Totals {
     pub constraint: [f64; 2],
     /// Threads used.
     pub threads: usize,
-    /// Time spent.
+    /// Time spent, interruptions left out.
     pub wall: Duration,
 }
 
@@ -161,7 +162,20 @@ impl Sweep {
         let shares = variables.iter().all(|variable| variable.start.is_some());
         let template = template.clone();
         let limits = Limits::default();
-        Ok(Self { template, scene, mechanism, request, plan, grid, variables, limits, skips: None, ends_at_flips: false, shares })
+        Ok(Self {
+            template,
+            scene,
+            mechanism,
+            request,
+            plan,
+            grid,
+            variables,
+            limits,
+            skips: None,
+            ends_at_flips: false,
+            is_strict: false,
+            shares,
+        })
     }
 
     /// The same with limits; a point that exceeds one stops.
@@ -172,6 +186,11 @@ impl Sweep {
     /// The same without the points whose values `skips` is true of.
     pub fn without(self, skips: impl Fn(&[f64]) -> bool + Send + Sync + 'static) -> Self {
         Self { skips: Some(Box::new(skips)), ..self }
+    }
+
+    /// The same, where a point is refused of which something given for the start must change to fit its constraints.
+    pub fn strictly(self) -> Self {
+        Self { is_strict: true, ..self }
     }
 
     /// The same with points that end when a bar turns over, at the end of that step or at the next output time.
@@ -241,6 +260,8 @@ fn timed(request: &Request, scene: &Scene) -> Request {
 struct Shared<'a> {
     sweep: &'a Sweep,
     chunk: u64,
+    /// The first point that was not seen before.
+    first: u64,
     finished: AtomicU64,
     /// Set where nobody wants the rest.
     is_over: AtomicBool,
@@ -248,17 +269,17 @@ struct Shared<'a> {
 
 impl Shared<'_> {
     fn chunks(&self) -> u64 {
-        self.sweep.grid.count().div_ceil(self.chunk)
+        (self.sweep.grid.count() - self.first).div_ceil(self.chunk)
     }
 
     /// The points of a chunk; fewer where nobody wants them any more.
     fn march(&self, chunk: u64) -> Vec<Point> {
-        let first = chunk * self.chunk;
+        let first = self.first + chunk * self.chunk;
         let last = (first + self.chunk).min(self.sweep.grid.count());
-        self.sweep.march(first..last, &|| {
+        let finished = || {
             self.finished.fetch_add(1, Ordering::Relaxed);
-            !self.is_over.load(Ordering::Relaxed)
-        })
+        };
+        self.sweep.march(first..last, &finished, &|| self.is_over.load(Ordering::Relaxed))
     }
 }
 
@@ -269,6 +290,14 @@ impl Shared<'_> {
 /// # Errors
 /// What the observer failed with; a point that fails is part of what it is shown.
 pub fn sweep(sweep: &Sweep, threads: usize, observer: &mut dyn Observer) -> Result<Totals, SweepError> {
+    sweep_on(sweep, threads, Totals::default(), observer)
+}
+
+/// The same for the points that follow those seen before, which amounted to `seen`.
+///
+/// # Errors
+/// As [`sweep`].
+pub fn sweep_on(sweep: &Sweep, threads: usize, seen: Totals, observer: &mut dyn Observer) -> Result<Totals, SweepError> {
     let begin = Instant::now();
     let available = || std::thread::available_parallelism().map_or(1, usize::from);
     let threads = if cfg!(not(feature = "threads")) {
@@ -278,29 +307,47 @@ pub fn sweep(sweep: &Sweep, threads: usize, observer: &mut dyn Observer) -> Resu
     } else {
         threads
     };
-    let shared = Shared { sweep, chunk: sweep.chunk(threads), finished: AtomicU64::new(0), is_over: AtomicBool::new(false) };
-    let mut totals = Totals { threads, ..Totals::default() };
-    let mut see = |point: &Point, observer: &mut dyn Observer| {
-        totals.take(point);
-        observer.see(point)
-    };
+    let first = seen.points().min(sweep.grid.count());
+    let shared = Shared { sweep, chunk: sweep.chunk(threads), first, finished: AtomicU64::new(first), is_over: AtomicBool::new(false) };
+    let mut audience = Audience { observer, begin, before: seen.wall, totals: Totals { threads, ..seen } };
     #[cfg(feature = "threads")]
-    if threads > 1 {
-        threads::march(&shared, threads, observer, &mut see)?;
-        totals.wall = begin.elapsed();
-        return Ok(totals);
-    }
+    threads::march(&shared, threads, &mut audience)?;
+    #[cfg(not(feature = "threads"))]
     for chunk in 0..shared.chunks() {
-        for point in shared.march(chunk) {
-            see(&point, observer)?;
-        }
-        observer.finished(shared.finished.load(Ordering::Relaxed))?;
+        shared.march(chunk).iter().try_for_each(|point| audience.see(point))?;
+        audience.finished(shared.finished.load(Ordering::Relaxed))?;
     }
-    totals.wall = begin.elapsed();
-    Ok(totals)
+    audience.totals.wall = audience.before + begin.elapsed();
+    Ok(audience.totals)
+}
+
+/// An observer, and what it has seen.
+struct Audience<'a> {
+    observer: &'a mut dyn Observer,
+    begin: Instant,
+    /// Time spent before this part of the sweep.
+    before: Duration,
+    totals: Totals,
+}
+
+impl Audience<'_> {
+    fn see(&mut self, point: &Point) -> std::io::Result<()> {
+        self.totals.take(point);
+        self.observer.see(point)
+    }
+
+    fn finished(&mut self, points: u64) -> std::io::Result<()> {
+        self.totals.wall = self.before + self.begin.elapsed();
+        self.observer.finished(points, &self.totals)
+    }
 }
 
 impl Totals {
+    /// Points seen.
+    pub fn points(&self) -> u64 {
+        [self.done, self.stopped, self.refused, self.skipped].into_iter().fold(0, u64::saturating_add)
+    }
+
     fn take(&mut self, point: &Point) {
         match point.status {
             Status::Done => self.done += 1,

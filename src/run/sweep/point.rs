@@ -6,9 +6,9 @@ use crate::dynamics::elimination::Elimination;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::{Form, Glance, Mechanism, Motion};
 use crate::run::flip::{self, Flip};
-use crate::run::march::{Run, march};
 use crate::run::methods::MethodId;
 use crate::run::plan::Plan;
+use crate::run::running::{Run, Running};
 use crate::scene::StartValue;
 use crate::stepping::taylor::crowd::{Crowd, Entrant, Going, Passage};
 use crate::stepping::{Cause, StepError};
@@ -67,27 +67,28 @@ struct Ready {
 impl Sweep {
     /// Runs one point; the same as in a whole sweep.
     pub fn point(&self, index: u64) -> Option<Point> {
-        if index < self.grid.count() { self.march(index..index + 1, &|| true).pop() } else { None }
+        if index < self.grid.count() { self.march(index..index + 1, &|| (), &|| false).pop() } else { None }
     }
 
-    /// Runs points; `goes_on` is told of each that is finished and may end it all.
-    pub(super) fn march(&self, points: Range<u64>, goes_on: &dyn Fn() -> bool) -> Vec<Point> {
-        let mut finished = Vec::with_capacity((points.end - points.start) as usize);
+    /// Runs points; tells of each that is `finished`, and gives up where all `is_over`.
+    pub(super) fn march(&self, points: Range<u64>, finished: &dyn Fn(), is_over: &dyn Fn() -> bool) -> Vec<Point> {
+        let mut found = Vec::with_capacity((points.end - points.start) as usize);
         let mut in_lanes = Vec::new();
         for index in points {
+            if is_over() {
+                return found;
+            }
             match self.prepare(index) {
                 Ok(ready) if self.takes(&ready) => in_lanes.push(ready),
                 other => {
-                    finished.push(other.map_or_else(|point| *point, |ready| self.single(ready)));
-                    if !goes_on() {
-                        return finished;
-                    }
+                    found.push(other.map_or_else(|point| *point, |ready| self.single(ready, is_over)));
+                    finished();
                 }
             }
         }
-        finished.extend(self.crowd(in_lanes, goes_on));
-        finished.sort_by_key(|point| point.index);
-        finished
+        found.extend(self.crowd(in_lanes, finished, is_over));
+        found.sort_by_key(|point| point.index);
+        found
     }
 
     /// True for a point that can be marched beside others.
@@ -153,23 +154,27 @@ impl Sweep {
         }
         let scene = self.template.filled(&self.variables, values).map_err(|error| error.to_string())?;
         let mechanism = Arc::new(Mechanism::new(&scene).map_err(|error| error.to_string())?);
+        if let (true, Some(change)) = (self.is_strict, mechanism.assembly.changes.first()) {
+            return Err(change.to_string());
+        }
         let plan = Plan::new(&scene, &mechanism, &timed(&self.request, &scene)).map_err(|refusal| refusal.to_string())?;
         let (start, scale) = (mechanism.start(&scene), mechanism.energy_scale);
         Ok((mechanism, plan, start, scale))
     }
 
-    /// Runs a point as a single run would.
-    fn single(&self, ready: Ready) -> Point {
+    /// Runs a point as a single run would; one that is given up is not worth a look.
+    fn single(&self, ready: Ready, is_over: &dyn Fn() -> bool) -> Point {
         let Ready { mut point, mechanism, plan, start, scale } = ready;
         let mechanism =
             if scale == mechanism.energy_scale { mechanism } else { Arc::new(Mechanism { energy_scale: scale, ..(*mechanism).clone() }) };
-        let outcome = match Run::new(mechanism, plan, self.limits, &start) {
-            Ok(run) => march(run.of_ensemble(self.ends_at_flips), &mut |_| Ok(())),
+        let mut running = match Run::new(mechanism, plan, self.limits, &start) {
+            Ok(run) => Running::new(run.of_ensemble(self.ends_at_flips)),
             Err(stop) => {
                 point.status = Status::Stopped(stop);
                 return point;
             }
         };
+        let outcome = running.go(&mut |_| Ok(()), &mut || is_over()).map(|_| running.finish());
         match outcome {
             Ok(outcome) => {
                 let levels = outcome.drift.constraints.iter().map(|(_, [position, velocity])| [position.max, velocity.max]);
@@ -188,7 +193,7 @@ impl Sweep {
     }
 
     /// Runs points beside each other, a lane each.
-    fn crowd(&self, ready: Vec<Ready>, goes_on: &dyn Fn() -> bool) -> Vec<Point> {
+    fn crowd(&self, ready: Vec<Ready>, finished: &dyn Fn(), is_over: &dyn Fn() -> bool) -> Vec<Point> {
         let Some(first) = ready.first() else { return Vec::new() };
         let (plan, bodies) = (first.plan.clone(), first.mechanism.bodies.len());
         let crowd = Crowd::new(plan.tolerance.unwrap_or_default());
@@ -201,7 +206,7 @@ impl Sweep {
             let reference = ready.mechanism.energy(&mut kernel, &ready.start.phi, &ready.start.omega).total();
             lanes.push(Lane { point: ready.point.clone(), reference, scale: ready.scale, seen: [Glance::default(), Glance::default()] });
         }
-        let mut finished = Vec::with_capacity(ready.len());
+        let mut found = Vec::with_capacity(ready.len());
         let mut motion = Motion::default();
         for row in 1..=plan.rows {
             crowd.march(&mut entrants, plan.time(row), &mut |lane, passage| {
@@ -209,8 +214,11 @@ impl Sweep {
                 if lane.point.flip.is_none() {
                     lane.look(bodies, passage);
                 }
-                if self.ends_at_flips && lane.point.flip.is_some() { Going::Enough } else { Going::On }
+                if (self.ends_at_flips && lane.point.flip.is_some()) || is_over() { Going::Enough } else { Going::On }
             });
+            if is_over() {
+                return found;
+            }
             let mut number = 0;
             while number < lanes.len() {
                 let (lane, entrant) = (&mut lanes[number], &entrants[number]);
@@ -219,17 +227,15 @@ impl Sweep {
                     number += 1;
                     continue;
                 }
-                finished.push(lanes.swap_remove(number).point);
+                found.push(lanes.swap_remove(number).point);
                 entrants.swap_remove(number);
-                if !goes_on() {
-                    return finished;
-                }
+                finished();
             }
             if lanes.is_empty() {
                 break;
             }
         }
-        finished
+        found
     }
 }
 

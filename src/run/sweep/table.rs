@@ -49,11 +49,24 @@ impl<W: Write> SweepTable<W> {
     /// # Errors
     /// What the writer says.
     pub fn new(sweep: &Sweep, writer: W) -> csv::Result<Self> {
-        let columns = columns(sweep);
-        let mut writer = csv::Writer::from_writer(writer);
-        writer.write_record(&columns)?;
+        let mut table = Self::going_on(sweep, writer);
+        table.writer.write_record(columns(sweep))?;
+        Ok(table)
+    }
+
+    /// Goes on with a table whose header and first rows were written before.
+    pub fn going_on(sweep: &Sweep, writer: W) -> Self {
         let bars = sweep.mechanism().bodies.iter().map(|body| body.name.clone()).collect();
-        Ok(Self { writer, bars, fields: vec![String::new(); columns.len()] })
+        Self { writer: csv::Writer::from_writer(writer), bars, fields: vec![String::new(); columns(sweep).len()] }
+    }
+
+    /// The writer, once it has every row.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn written(&mut self) -> std::io::Result<&W> {
+        self.writer.flush()?;
+        Ok(self.writer.get_ref())
     }
 
     /// Writes a point.

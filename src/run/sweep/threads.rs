@@ -1,6 +1,6 @@
 //! Chunks on several threads, seen in order.
 
-use super::{Observer, Point, Shared, SweepError};
+use super::{Audience, Point, Shared, SweepError};
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -28,13 +28,8 @@ impl Drop for Messenger {
     }
 }
 
-/// Marches all chunks and shows them to `see`, with the observer, in order.
-pub(super) fn march(
-    shared: &Shared,
-    threads: usize,
-    observer: &mut dyn Observer,
-    see: &mut dyn FnMut(&Point, &mut dyn Observer) -> std::io::Result<()>,
-) -> Result<(), SweepError> {
+/// Marches all chunks and shows them in order.
+pub(super) fn march(shared: &Shared, threads: usize, audience: &mut Audience) -> Result<(), SweepError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| SweepError::Threads(error.to_string()))?;
     let (send, receive) = channel::<Finished>();
     pool.in_place_scope(|scope| {
@@ -58,10 +53,10 @@ pub(super) fn march(
                     Err(RecvTimeoutError::Timeout) => {}
                 }
                 while let Some(points) = waiting.remove(&seen) {
-                    points.iter().try_for_each(|point| see(point, observer))?;
+                    points.iter().try_for_each(|point| audience.see(point))?;
                     seen += 1;
                 }
-                observer.finished(shared.finished.load(Ordering::Relaxed))?;
+                audience.finished(shared.finished.load(Ordering::Relaxed))?;
             }
             Ok(())
         };

@@ -9,7 +9,7 @@ use crate::arithmetic::lanes::{Lanes, Portable};
 use crate::arithmetic::sum::two_sum;
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Field, Points, State, Time};
-use crate::stepping::{Seen, StepError, Tally, Watch};
+use crate::stepping::{Reached, StepError, Tally, Watch};
 
 /// Scratch space of d unknowns.
 #[derive(Clone, Debug, Default)]
@@ -42,7 +42,7 @@ struct Step<'a> {
     exact: u32,
 }
 
-/// `count` steps of `scratch.step`.
+/// `count` steps of `scratch.step`, or as many as the watcher wants.
 pub(super) fn march<F: Field + ?Sized>(
     gauss: &mut Gauss,
     problem: &mut F,
@@ -50,18 +50,22 @@ pub(super) fn march<F: Field + ?Sized>(
     count: u64,
     tally: &mut Tally,
     watch: &mut Watch<F>,
-) -> Result<(), StepError> {
+) -> Result<Reached, StepError> {
     for _ in 0..count {
         let mut step = Step { tableau: &gauss.tableau, scratch: &mut gauss.scratch, exact: gauss.exact };
         take(gauss.portable, &mut step, &mut Of(problem), state, tally);
         gauss.check(problem, state)?;
         gauss.scratch.commit(state, gauss.tableau.nodes.len());
         tally.steps += 1;
-        if watch(problem, state)? == Seen::Changed {
+        let seen = watch(problem, state)?;
+        if seen.is_changed() {
             state.memory.clear();
         }
+        if seen.is_enough() {
+            return Ok(Reached::Pause);
+        }
     }
-    Ok(())
+    Ok(Reached::Until)
 }
 
 /// What a step asks of a field.

@@ -1,0 +1,354 @@
+//! The loop: from output time to output time, with limits watched; a run can pause in it, be taken down and go on elsewhere.
+
+use super::contact::{Course, Hold, Station, Strike};
+use super::drift::{Drift, Limits};
+use super::flip::{Flip, Lookout};
+use super::march::{March, Pause, build};
+use super::plan::{Plan, Refusal, Request};
+use super::sample::Sample;
+use super::trace::Trace;
+use crate::dynamics::{CompileError, Mechanism, Motion};
+use crate::scene::Scene;
+use crate::stepping::{Cause, StepError, Tally};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// A run about to begin.
+pub struct Run {
+    mechanism: Arc<Mechanism>,
+    plan: Plan,
+    limits: Limits,
+    marcher: Box<dyn March>,
+    /// For runs of an ensemble, which look for bars that turn over and keep no samples: whether they end with the first.
+    ensemble: Option<bool>,
+}
+
+/// How a run ended, or how it stands.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+pub struct Outcome {
+    /// The plan as carried out.
+    pub plan: Plan,
+    /// The last sample.
+    pub last: Sample,
+    /// Counts.
+    pub tally: Tally,
+    /// Drift.
+    pub drift: Drift,
+    /// Samples for charts.
+    pub trace: Trace,
+    /// The first impacts.
+    pub strikes: Vec<Strike>,
+    /// Number of impacts.
+    pub strike_count: u64,
+    /// Energy lost in them and where points came to rest \[J\].
+    pub strike_loss: f64,
+    /// The first times a point stayed on its wall.
+    pub holds: Vec<Hold>,
+    /// Number of such times.
+    pub hold_count: u64,
+    /// Time spent so, summed over the points \[s\].
+    pub hold_time: f64,
+    /// Time spent between the first output time and the last, pauses left out.
+    pub wall: Duration,
+    /// The first time a bar turned over, where the run is one of an ensemble.
+    pub flip: Option<Flip>,
+    /// Why it ended before its horizon.
+    pub stop: Option<StepError>,
+}
+
+/// What ends a run without an outcome.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The scene has no equations.
+    #[error("{0}")]
+    Compile(#[from] CompileError),
+    /// The request makes no sense for the scene.
+    #[error("{0}")]
+    Refused(#[from] Refusal),
+    /// The method could not begin.
+    #[error("{0}")]
+    Step(#[from] StepError),
+    /// An observer failed to write.
+    #[error("{0}")]
+    Observer(#[from] std::io::Error),
+}
+
+impl Run {
+    /// Prepares a run from a motion.
+    ///
+    /// # Errors
+    /// A method that cannot begin there.
+    pub fn new(mechanism: Arc<Mechanism>, mut plan: Plan, limits: Limits, start: &Motion) -> Result<Self, StepError> {
+        let marcher = build(&mechanism, &mut plan, start)?;
+        Ok(Self { mechanism, plan, limits, marcher, ensemble: None })
+    }
+
+    /// The same as one of many: on the lookout for the first bar that turns over, and without samples for charts.
+    pub(super) fn of_ensemble(self, ends_at_flip: bool) -> Self {
+        Self { ensemble: Some(ends_at_flip), ..self }
+    }
+
+    /// The plan as it will be carried out.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+}
+
+/// A scene from its start to its horizon in one call: compiles, plans, marches.
+///
+/// # Errors
+/// Whatever keeps it from beginning, and what the observer failed with; a stop on the way is part of the [`Outcome`].
+pub fn simulate(scene: &Scene, request: &Request, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>) -> Result<Outcome, RunError> {
+    let mechanism = Arc::new(Mechanism::new(scene)?);
+    let plan = Plan::new(scene, &mechanism, request)?;
+    let start = mechanism.start(scene);
+    march(Run::new(mechanism, plan, Limits::default(), &start)?, observer)
+}
+
+/// Marches a run to its horizon, shows every sample to `observer`, and tells how it ended.
+///
+/// A stop of the method is part of the [`Outcome`]; everything up to it has been shown.
+///
+/// # Errors
+/// What the observer failed with.
+pub fn march(run: Run, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>) -> Result<Outcome, RunError> {
+    let mut running = Running::new(run);
+    running.go(observer, &mut || false)?;
+    Ok(running.finish())
+}
+
+/// A run under way.
+///
+/// ```
+/// use driftless::dynamics::Mechanism;
+/// use driftless::run::{Limits, Plan, Request, Run, Running};
+/// use driftless::scene::read_scene;
+/// use std::sync::Arc;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let scene = read_scene("examples/scenes/free.json".as_ref(), &[])?;
+/// let mechanism = Arc::new(Mechanism::new(&scene)?);
+/// let start = mechanism.start(&scene);
+/// let plan = Plan::new(&scene, &mechanism, &Request { until: Some(2.0), ..Request::default() })?;
+/// let mut running = Running::new(Run::new(mechanism.clone(), plan, Limits::default(), &start)?);
+/// let mut steps = 0;
+/// let is_over = running.go(&mut |_| Ok(()), &mut || {
+///     steps += 1;
+///     steps == 100
+/// })?;
+/// assert!(!is_over);
+/// // As bytes, in another process, on another day: the rest of the run comes out the same, bit for bit.
+/// let mut rest = Running::resume(mechanism, &start, running.snapshot())?;
+/// assert!(rest.go(&mut |_| Ok(()), &mut || false)?);
+/// assert_eq!(rest.finish().last.t, 2.0);
+/// # Ok(())
+/// # }
+/// ```
+pub struct Running {
+    limits: Limits,
+    course: Course,
+    outcome: Outcome,
+    /// For runs of an ensemble: whether they end with the first flip.
+    ensemble: Option<bool>,
+    /// The output row it is on the way to.
+    row: u64,
+    /// What keeps it from leaving its start.
+    resting: Option<StepError>,
+    is_over: bool,
+}
+
+/// All that the rest of a run depends on, beside its mechanism: what a checkpoint holds.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+pub struct Snapshot {
+    limits: Limits,
+    station: Station,
+    outcome: Outcome,
+    row: u64,
+    resting: Option<StepError>,
+    /// The horizon on the way to which the station was reached \[s\].
+    horizon: f64,
+}
+
+/// Why a run cannot go on from a snapshot.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ResumeError {
+    /// It is one of another mechanism, or not sound.
+    #[error("the snapshot does not fit the scene")]
+    Misfit,
+    /// The method cannot begin there.
+    #[error("{0}")]
+    Step(#[from] StepError),
+}
+
+impl Snapshot {
+    /// The plan as it is carried out.
+    pub fn plan(&self) -> &Plan {
+        &self.outcome.plan
+    }
+
+    /// The last output time reached \[s\].
+    pub fn time(&self) -> f64 {
+        self.outcome.last.t
+    }
+
+    /// The same on the way to a later horizon \[s\]; false, and nothing changed, where that is not later or would write too many rows.
+    ///
+    /// What follows is what a run to that horizon would have come to, but for the slopes of its drift: monitors divide the horizon into intervals, and those
+    /// seen before are taken over as they are.  A dense method that had already cut a step to fit the former horizon keeps that step.
+    pub fn extend(&mut self, until: f64) -> bool {
+        let is_possible = until > self.outcome.plan.until && self.outcome.plan.extend(until);
+        if is_possible {
+            self.outcome.drift.extend(until);
+        }
+        is_possible
+    }
+
+    /// Whether its parts go together, and with a mechanism.
+    fn fits(&self, mechanism: &Mechanism) -> bool {
+        let Outcome { plan, last, drift, trace, holds, .. } = &self.outcome;
+        let (n, bars, rows) = (mechanism.coordinates(), mechanism.bodies.len(), mechanism.rows.len());
+        let sizes =
+            |sample: &Sample| (sample.phi.len(), sample.omega.len(), sample.constraints.len(), sample.motors.len()) == (n, n, rows, rows);
+        let whole = |sample: &Sample| sizes(sample) && (sample.centre.len(), sample.velocity.len()) == (bars, bars);
+        plan.is_sound()
+            && self.row <= plan.rows
+            && self.horizon <= plan.until
+            && (self.row == 0 || whole(last))
+            && trace.samples().all(sizes)
+            && drift.fits(mechanism)
+            && Course::names_holds(&self.station) <= holds.len()
+    }
+}
+
+impl Running {
+    /// Begins a run: whatever touches and moves into its wall at the start is struck.
+    pub fn new(run: Run) -> Self {
+        let Run { mechanism, plan, limits, marcher, ensemble } = run;
+        let mut outcome = Outcome {
+            last: Sample::default(),
+            tally: Tally::default(),
+            drift: Drift::new(&mechanism, plan.until),
+            trace: Trace::default(),
+            strikes: Vec::new(),
+            strike_count: 0,
+            strike_loss: 0.0,
+            holds: Vec::new(),
+            hold_count: 0,
+            hold_time: 0.0,
+            wall: Duration::ZERO,
+            flip: None,
+            stop: None,
+            plan,
+        };
+        let mut course = Course::new(mechanism, marcher);
+        course.lookout = ensemble.map(|_| Lookout::default());
+        // The reference of the energy is what impacts at the start leave.
+        let resting = course.meet(&mut outcome).err();
+        Self { limits, course, outcome, ensemble, row: 0, resting, is_over: false }
+    }
+
+    /// Goes on from a snapshot of a run of the same mechanism and start.
+    ///
+    /// # Errors
+    /// The snapshot is one of another mechanism, or of a program whose numbers differ.
+    pub fn resume(mechanism: Arc<Mechanism>, start: &Motion, snapshot: Snapshot) -> Result<Self, ResumeError> {
+        if !snapshot.fits(&mechanism) {
+            return Err(ResumeError::Misfit);
+        }
+        let Snapshot { limits, station, mut outcome, row, resting, horizon } = snapshot;
+        outcome.drift.kind = Drift::new(&mechanism, outcome.plan.until).kind;
+        let course = Course::resume(mechanism, &outcome.plan, start, station, horizon.into())?.ok_or(ResumeError::Misfit)?;
+        Ok(Self { limits, course, outcome, ensemble: None, row, resting, is_over: false })
+    }
+
+    /// All that the rest of the run depends on.
+    pub fn snapshot(&self) -> Snapshot {
+        Snapshot {
+            limits: self.limits,
+            station: self.course.station(),
+            outcome: self.outcome.clone(),
+            row: self.row,
+            resting: self.resting.clone(),
+            horizon: self.outcome.plan.until,
+        }
+    }
+
+    /// The plan as it is carried out.
+    pub fn plan(&self) -> &Plan {
+        &self.outcome.plan
+    }
+
+    /// The last output time reached \[s\].
+    pub fn time(&self) -> f64 {
+        self.outcome.last.t
+    }
+
+    /// Marches on until it is over (true), or `pause`, asked after every step and every row, wants it to pause (false).
+    ///
+    /// `dopri5` and `dop853` show no steps but the ends of their windows, which are the output times.  Where it paused changes nothing of what follows.
+    ///
+    /// # Errors
+    /// What the observer failed with; the run cannot go on then.
+    pub fn go(&mut self, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>, pause: &mut Pause) -> Result<bool, RunError> {
+        let begin = Instant::now();
+        let is_over = self.rows(observer, pause);
+        self.outcome.wall += begin.elapsed();
+        is_over
+    }
+
+    fn rows(&mut self, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>, pause: &mut Pause) -> Result<bool, RunError> {
+        let Self { limits, course, outcome, ensemble, .. } = self;
+        while !self.is_over {
+            let stopped = match self.resting.take() {
+                Some(stop) => Err(stop),
+                None if self.row == 0 => Ok(true),
+                None => course.go(outcome.plan.time(self.row), outcome, pause),
+            };
+            if stopped == Ok(false) {
+                return Ok(false);
+            }
+            let sample = course.sample();
+            // A stop before any progress leaves the state of the row before.
+            if self.row == 0 || sample.t > outcome.last.t {
+                observer(sample)?;
+                if ensemble.is_none() {
+                    outcome.trace.see(sample);
+                }
+            }
+            let exceeded = outcome.drift.see(sample, limits);
+            outcome.stop = stopped
+                .err()
+                .or_else(|| exceeded.err().map(|what| drift_stop(&outcome.plan, sample.t, what)))
+                .or_else(|| (!sample.is_finite()).then(|| not_finite(&outcome.plan, sample.t)));
+            outcome.last.clone_from(sample);
+            // A dense method is ahead of what it shows.
+            let reached = outcome.last.t;
+            outcome.flip = course.lookout.as_ref().and_then(|lookout| lookout.flip).filter(|flip| flip.t <= reached);
+            self.row += 1;
+            let has_flipped = *ensemble == Some(true) && outcome.flip.is_some();
+            self.is_over = outcome.stop.is_some() || has_flipped || self.row > outcome.plan.rows;
+            if !self.is_over && pause() {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// How it ended.
+    pub fn finish(mut self) -> Outcome {
+        self.course.end(self.outcome.last.t, &mut self.outcome);
+        self.outcome.tally = self.course.tally();
+        self.outcome
+    }
+}
+
+fn not_finite(plan: &Plan, t: f64) -> StepError {
+    let what = "energies, torques or velocities are beyond the numbers a double holds".into();
+    let hint = "look for masses, rates or stiffnesses far out of proportion".into();
+    StepError { cause: Cause::NotFinite, method: plan.method.to_string(), t, step: plan.step.unwrap_or(0.0), what, hint }
+}
+
+fn drift_stop(plan: &Plan, t: f64, what: String) -> StepError {
+    let hint = if plan.step.is_some() { "shorten the step" } else { "tighten the tolerance" };
+    StepError { cause: Cause::DriftLimit, method: plan.method.to_string(), t, step: plan.step.unwrap_or(0.0), what, hint: hint.into() }
+}

@@ -1,0 +1,426 @@
+//! A run that is taken down and goes on elsewhere comes out as if nothing had been: bit for bit, wherever it paused and how often.
+
+mod common;
+#[cfg(feature = "cli")]
+#[path = "common/program.rs"]
+#[allow(dead_code)]
+mod program;
+
+use common::shipped;
+use driftless::dynamics::multiplier::Multiplier;
+use driftless::dynamics::{Form, Mechanism};
+use driftless::run::{Limits, METHODS, MethodId, Outcome, Plan, Request, Run, Running, Sample, Snapshot, Stabilization};
+use driftless::scene::Scene;
+use driftless::stepping::{Cause, Dp8, Method, Reached, Seen, Tally, Taylor, Tolerance};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// A run of a scene, begun.
+fn begun(scene: &Scene, request: &Request) -> Result<Running, String> {
+    let mechanism = Arc::new(Mechanism::new(scene).map_err(|error| error.to_string())?);
+    let plan = Plan::new(scene, &mechanism, request).map_err(|refusal| refusal.to_string())?;
+    let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &mechanism.start(scene)).map_err(|stop| stop.to_string())?;
+    Ok(Running::new(run))
+}
+
+/// Everything a run shows and leaves, to the bit: `{:?}` of a double reads back to the same one.
+fn told(samples: &[Sample], mut outcome: Outcome) -> String {
+    outcome.wall = Duration::ZERO;
+    format!("{samples:?} {outcome:?}")
+}
+
+fn uninterrupted(scene: &Scene, request: &Request) -> Result<String, String> {
+    let mut running = begun(scene, request)?;
+    let mut samples = Vec::new();
+    let keep = &mut |sample: &Sample| {
+        samples.push(sample.clone());
+        Ok(())
+    };
+    assert!(running.go(keep, &mut || false).expect("samples are kept"));
+    Ok(told(&samples, running.finish()))
+}
+
+/// The same, paused where `pause` says so; at every pause all goes through bytes into a new run.
+fn interrupted(scene: &Scene, request: &Request, pause: &mut dyn FnMut() -> bool) -> (String, u32) {
+    let mut running = begun(scene, request).expect("it began before");
+    let (mut samples, mut pauses) = (Vec::new(), 0);
+    loop {
+        let keep = &mut |sample: &Sample| {
+            samples.push(sample.clone());
+            Ok(())
+        };
+        if running.go(keep, pause).expect("samples are kept") {
+            return (told(&samples, running.finish()), pauses);
+        }
+        pauses += 1;
+        let bytes = postcard::to_stdvec(&running.snapshot()).expect("bytes");
+        let snapshot: Snapshot = postcard::from_bytes(&bytes).expect("a snapshot");
+        let mechanism = Arc::new(Mechanism::new(scene).expect("equations"));
+        let start = mechanism.start(scene);
+        running = Running::resume(mechanism, &start, snapshot).expect("it fits");
+    }
+}
+
+/// True at about one of `every` calls.
+fn now_and_then(seed: u64, every: u64) -> impl FnMut() -> bool {
+    let mut random = seed;
+    move || {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (random >> 33).is_multiple_of(every)
+    }
+}
+
+#[track_caller]
+fn check(scene: &Scene, request: &Request) -> bool {
+    let Ok(whole) = uninterrupted(scene, request) else { return false };
+    for (seed, every) in [(1, 1), (2, 11)] {
+        let (pieces, pauses) = interrupted(scene, request, &mut now_and_then(seed, every));
+        assert!(pieces == whole, "{} {request:?}: differs after {pauses} pauses, one in {every}", scene.name);
+        assert!(pauses > 0, "{} {request:?}", scene.name);
+    }
+    true
+}
+
+fn request(method: MethodId, stabilize: Option<Stabilization>) -> Request {
+    let (until, every) = (Some(1.0), Some(0.25));
+    Request { method: Some(method), stabilize, until, every, rtol: method.is_adaptive().then_some(1e-8), ..Request::default() }
+}
+
+#[test]
+fn every_method_goes_on_bit_for_bit() {
+    for info in METHODS {
+        for (name, until) in [("free", 1.0), ("spring", 1.0), ("chain8", 0.3)] {
+            let request = Request { until: Some(until), ..request(info.id, None) };
+            assert!(check(&shipped(name, &[]), &request), "{} {name}", info.name);
+        }
+    }
+}
+
+#[test]
+fn so_does_every_stabilization() {
+    let mut pairs = 0;
+    for info in METHODS {
+        for stabilization in Stabilization::ALL {
+            let mut scene = shipped("motor_sine", &[]);
+            // Off its motor's row, so that there is something to stabilize.
+            scene.start[1].omega += 1.0;
+            pairs += u32::from(check(&scene, &request(info.id, Some(stabilization))));
+        }
+    }
+    assert!(pairs >= 4 * 5 + 7, "{pairs} pairs");
+}
+
+#[test]
+fn so_do_loops_and_sliders() {
+    let mut pairs = 0;
+    for info in METHODS {
+        for name in ["four_bars", "cart_pole", "slider_crank_torque", "four_bar_motor"] {
+            let request = Request { until: Some(0.25), every: Some(0.0625), ..request(info.id, None) };
+            pairs += u32::from(check(&shipped(name, &[]), &request));
+        }
+    }
+    assert!(pairs >= 4 * 12, "{pairs} pairs");
+}
+
+#[test]
+fn so_do_impacts_and_points_that_stay_on_their_walls() {
+    for method in [MethodId::Dp5, MethodId::Dp8, MethodId::Taylor] {
+        for sets in [&[][..], &["walls.wall.restitution=0.3"], &["walls.wall.restitution=0"]] {
+            let mut request = request(method, None);
+            (request.until, request.every) = (Some(4.0), Some(1.0));
+            assert!(check(&shipped("wall", sets), &request), "{method} {sets:?}");
+        }
+    }
+}
+
+#[test]
+fn so_do_the_first_orders_in_double_double() {
+    for name in ["free", "spring", "motor_sine"] {
+        for stabilize in [None, Some(Stabilization::Projection)] {
+            let request = Request { extended: true, rtol: Some(1e-20), ..request(MethodId::Taylor, stabilize) };
+            let has_rows = name == "motor_sine";
+            assert!(check(&shipped(name, &[]), &request) || (stabilize.is_some() && !has_rows), "{name}");
+        }
+    }
+}
+
+/// Steps far longer than the output interval: what is shown lies inside steps that began before the pause.
+#[test]
+fn so_do_rows_inside_one_step() {
+    for name in ["gentle", "hanging", "motor"] {
+        let mut request = request(MethodId::Taylor, None);
+        (request.until, request.every) = (Some(0.5), Some(0.001));
+        assert!(check(&shipped(name, &[]), &request), "{name}");
+    }
+}
+
+/// A method that stops after so many steps stops after as many where it was cut short on the way.
+#[test]
+fn a_budget_of_steps_is_not_given_anew() {
+    fn stops_at<M: Method<Multiplier<2, false>>>(mut method: M, seen: Seen) -> f64 {
+        let (mechanism, start) = common::started("free");
+        let mut form = Multiplier::<2, false>::new(mechanism);
+        let mut state = form.state(&start);
+        loop {
+            match method.advance(&mut form, &mut state, 1e3.into(), &mut Tally::default(), &mut |_, _| Ok(seen)) {
+                Ok(reached) => assert_eq!(reached, Reached::Pause),
+                Err(stop) => {
+                    assert_eq!(stop.cause, Cause::TooManySteps);
+                    return stop.t;
+                }
+            }
+        }
+    }
+    let tolerance = Tolerance { relative: 1e-6, absolute: 1e-6 };
+    let (mut explicit, mut series) = (Dp8::new(tolerance), Taylor::new(tolerance));
+    (explicit.max_steps, series.max_steps) = (40, 40);
+    assert_eq!(stops_at(explicit.clone(), Seen::Kept), stops_at(explicit, Seen::Enough));
+    assert_eq!(stops_at(series.clone(), Seen::Kept), stops_at(series, Seen::Enough));
+}
+
+#[test]
+fn the_horizon_can_be_put_off() {
+    let trajectory = |told: &str| told.split("] Outcome").next().unwrap_or_default().to_owned();
+    for method in [MethodId::Dp8, MethodId::Gauss(4), MethodId::Taylor, MethodId::Dop853] {
+        let scene = shipped("free", &[]);
+        // A step of its own: the one that is chosen unasked depends on the horizon.
+        let short = Request { step: (!method.is_adaptive()).then_some(1.0 / 64.0), ..request(method, None) };
+        let until = if method.is_adaptive() { 3.1 } else { 3.0 };
+        let long = Request { until: Some(until), ..short.clone() };
+        let whole = uninterrupted(&scene, &long).expect("a run");
+        let mut running = begun(&scene, &short).expect("a run");
+        let mut samples = Vec::new();
+        let mut calls = 0;
+        let mut keep = |sample: &Sample| {
+            samples.push(sample.clone());
+            Ok(())
+        };
+        let is_over = running.go(&mut keep, &mut || {
+            calls += 1;
+            calls == 3
+        });
+        assert!(!is_over.expect("kept"), "{method}");
+        let mut snapshot = running.snapshot();
+        assert!(!snapshot.clone().extend(0.5) && !snapshot.clone().extend(1e300) && snapshot.extend(until));
+        // Fixed steps are whole to the end.
+        assert_eq!(snapshot.clone().extend(3.1005), method.is_adaptive());
+        let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
+        let start = mechanism.start(&scene);
+        let mut running = Running::resume(mechanism, &start, snapshot).expect("it fits");
+        assert!(running.go(&mut keep, &mut || false).expect("kept"));
+        let outcome = running.finish();
+        assert_eq!(outcome.last.t, until);
+        assert!(trajectory(&told(&samples, outcome)) == trajectory(&whole), "{method}");
+    }
+}
+
+/// The program, whatever ends it.
+#[cfg(all(unix, feature = "cli"))]
+mod command {
+    use super::program::{Program, Ran};
+    use serde_json::Value;
+    use std::path::Path;
+    use std::process::{Child, Command, Stdio};
+    use std::time::Duration;
+
+    /// A run of about a second, a hundred thousand rows.
+    const RUN: &str = "run free.json --method taylor --until 1e5 --every 1 --no-charts --checkpoint-every 0.01";
+    const FOLDER: &str = "output/free/taylor-1e-9";
+
+    fn started(program: &Program, arguments: &str) -> Child {
+        program.command(arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("the program")
+    }
+
+    /// Waits for a checkpoint other than the one there was.
+    fn await_checkpoint(path: &Path, child: &mut Child) {
+        let file = path.join("checkpoint");
+        let before = std::fs::read(&file).ok();
+        while std::fs::read(&file).ok().is_none_or(|now| Some(now) == before) {
+            assert_eq!(child.try_wait().expect("a child"), None, "it ended before its checkpoint");
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    fn signal(child: &Child, signal: &str) {
+        assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().expect("kill").success());
+    }
+
+    fn ended(child: Child) -> Ran {
+        let output = child.wait_with_output().expect("it ends");
+        let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+        Ran { code: output.status.code().unwrap_or(-1), stdout: String::new(), stderr }
+    }
+
+    /// Table and record of a finished run, timings left out.
+    fn results(program: &Program, folder: &str, table: &str, record: &str) -> (String, Value) {
+        let mut record: Value = serde_json::from_str(&program.read(&format!("{folder}/{record}"))).expect("JSON");
+        record.as_object_mut().expect("an object").remove("timings");
+        (program.read(&format!("{folder}/{table}")), record)
+    }
+
+    fn run_results(program: &Program) -> (String, Value) {
+        results(program, FOLDER, "trajectory.csv", "run.json")
+    }
+
+    fn uninterrupted() -> (String, Value) {
+        let program = Program::with_scenes(&["free"]);
+        program.run(&format!("{RUN} -q")).exits(0);
+        assert_eq!(program.files(), ["free.json".to_owned(), format!("{FOLDER}/run.json"), format!("{FOLDER}/trajectory.csv")]);
+        run_results(&program)
+    }
+
+    /// An interrupted run, with two checkpoints, and its folder.
+    fn interrupted() -> Program {
+        let program = Program::with_scenes(&["free"]);
+        let mut child = started(&program, RUN);
+        for _ in 0..2 {
+            await_checkpoint(&program.path(FOLDER), &mut child);
+        }
+        signal(&child, "-TERM");
+        ended(child).exits(130).says(&["interrupted at t = ", &format!("driftless resume {FOLDER}")]);
+        program
+    }
+
+    #[test]
+    fn asked_to_end_it_writes_a_checkpoint_and_goes_on_when_resumed() {
+        let program = interrupted();
+        let files = ["checkpoint", "checkpoint.previous", ".unfinished-trajectory.csv"].map(|name| format!("{FOLDER}/{name}"));
+        assert!(files.iter().all(|file| program.path(file).exists()), "{:?}", program.files());
+        // Nothing but the folder is needed; a run into it is refused.
+        program.run(&format!("{RUN} -q")).exits(6).says(&["interrupted run", "--force"]);
+        std::fs::remove_file(program.path("free.json")).expect("removed");
+        let mut child = started(&program, &format!("resume {FOLDER} --checkpoint-every 0"));
+        std::thread::sleep(Duration::from_millis(100));
+        signal(&child, "-INT");
+        let ran = ended(child);
+        assert!(ran.code == 130 || ran.code == 0, "{ran:?}");
+        if ran.code == 130 {
+            let ran = program.run(&format!("resume {FOLDER} --json")).exits(0);
+            assert_eq!(ran.object()["final"]["t"], 1e5);
+        }
+        assert!(run_results(&program) == uninterrupted());
+        assert_eq!(program.files(), [format!("{FOLDER}/run.json"), format!("{FOLDER}/trajectory.csv")]);
+        program.run(&format!("resume {FOLDER}")).exits(6).says(&["finished"]);
+        program.run("resume output/none").exits(6).says(&["no folder"]);
+        child = started(&program, "resume output");
+        ended(child).exits(6).says(&["no interrupted run"]);
+    }
+
+    #[test]
+    fn killed_again_and_again_it_comes_out_the_same() {
+        let program = Program::with_scenes(&["free"]);
+        let mut child = started(&program, RUN);
+        for _ in 0..4 {
+            await_checkpoint(&program.path(FOLDER), &mut child);
+            child.kill().expect("killed");
+            child.wait().expect("it ends");
+            program.run("resume output").exits(6).says(&[&format!("driftless resume {FOLDER}")]);
+            child = started(&program, &format!("resume {FOLDER} --checkpoint-every 0.01"));
+        }
+        ended(child).exits(0);
+        assert!(run_results(&program) == uninterrupted());
+    }
+
+    #[test]
+    fn one_folder_takes_one_run_at_a_time() {
+        let program = Program::with_scenes(&["free"]);
+        let mut child = started(&program, RUN);
+        await_checkpoint(&program.path(FOLDER), &mut child);
+        for arguments in [RUN, &format!("{RUN} --force"), &format!("resume {FOLDER}")] {
+            program.run(arguments).exits(6).says(&["another run is writing into"]);
+        }
+        ended(child).exits(0);
+    }
+
+    #[test]
+    fn damaged_checkpoints_are_noticed_and_the_one_before_serves() {
+        let program = interrupted();
+        let path = |name: &str| program.path(&format!("{FOLDER}/{name}"));
+        let resume = format!("resume {FOLDER} -q");
+        let good = std::fs::read(path("checkpoint")).expect("there");
+        let with = |bytes: &[u8]| std::fs::write(path("checkpoint"), bytes).expect("written");
+        // Of another format, and whole: refused, though the one before it could be read.
+        let mut other = good[..good.len() - 32].to_vec();
+        other[21] = 99;
+        let digest = <sha2::Sha256 as sha2::Digest>::digest(&other);
+        other.extend_from_slice(&digest);
+        with(&other);
+        program.run(&resume).exits(3).says(&["format 99", "the version of driftless that wrote it"]);
+        // A table that is not the one.
+        with(&good);
+        let table = path(".unfinished-trajectory.csv");
+        let text = std::fs::read(&table).expect("there");
+        for (bad, why) in [(&text[..100], "shorter"), (&[b"x", &text[1..]].concat(), "changed")] {
+            std::fs::write(&table, bad).expect("written");
+            program.run(&resume).exits(6).says(&[why]);
+        }
+        std::fs::write(&table, &text).expect("written");
+        let previous = std::fs::read(path("checkpoint.previous")).expect("there");
+        std::fs::write(path("checkpoint.previous"), &previous[..99]).expect("written");
+        let mut flipped = good.clone();
+        flipped[good.len() / 2] ^= 4;
+        with(&flipped);
+        program.run(&resume).exits(6).says(&["damaged", "checksum"]);
+        std::fs::write(path("checkpoint.previous"), &previous).expect("written");
+        program.run(&resume).exits(0).says(&["damaged", "going on from the checkpoint before it"]);
+        assert!(run_results(&program) == uninterrupted());
+    }
+
+    #[test]
+    fn the_horizon_can_be_put_off_but_not_brought_forward() {
+        let program = interrupted();
+        program.run(&format!("resume {FOLDER} --until 9e4")).exits(2).says(&["one beyond 100000 s"]);
+        program.run(&format!("resume {FOLDER} --until 1.1e5 -q")).exits(0);
+        let longer = Program::with_scenes(&["free"]);
+        longer.run(&format!("{} -q", RUN.replace("1e5", "1.1e5"))).exits(0);
+        let [(table, record), (whole, of_whole)] = [&program, &longer].map(run_results);
+        assert!(table == whole && record["result"]["final"] == of_whole["result"]["final"]);
+        assert_eq!(record["result"]["energy"]["max_relative"], of_whole["result"]["energy"]["max_relative"]);
+    }
+
+    #[test]
+    fn a_full_disk_ends_it_and_room_lets_it_go_on() {
+        let program = Program::with_scenes(&["free"]);
+        // Files may have 4 MiB, which is less than the trajectory's.
+        let limited = format!("trap '' XFSZ; ulimit -f 4096; exec {} {RUN} -q", env!("CARGO_BIN_EXE_driftless"));
+        let folder = program.path("");
+        let output = Command::new("bash").args(["-c", &limited]).current_dir(&folder).output().expect("bash");
+        let text = String::from_utf8(output.stderr).expect("UTF-8");
+        let ran = Ran { code: output.status.code().unwrap_or(-1), stdout: String::new(), stderr: text };
+        ran.exits(6).says(&["cannot write", "is the disk full", &format!("driftless resume {FOLDER}")]);
+        program.run(&format!("resume {FOLDER} -q")).exits(0);
+        assert!(run_results(&program) == uninterrupted());
+    }
+
+    #[test]
+    fn a_folder_that_is_taken_away_ends_it() {
+        let program = Program::with_scenes(&["free"]);
+        let mut child = started(&program, RUN);
+        await_checkpoint(&program.path(FOLDER), &mut child);
+        // It may be writing there at this very moment.
+        while std::fs::remove_dir_all(program.path("output")).is_err() {}
+        ended(child).exits(6).says(&["cannot write"]);
+    }
+
+    #[test]
+    fn sweeps_go_on_too() {
+        const SWEEP: &str = "sweep free.json --vary bar1.phi=-pi..pi:80 --vary bar2.phi=-pi..pi:80 --until 200 --checkpoint-every 0.01";
+        const PLACE: &str = "output/free/sweep-start.bar1.phi-start.bar2.phi-taylor-1e-9";
+        let of_sweep = |program: &Program| {
+            (results(program, PLACE, "sweep.csv", "sweep.json"), std::fs::read(program.path(&format!("{PLACE}/map.png"))).ok())
+        };
+        let program = Program::with_scenes(&["free"]);
+        let mut child = started(&program, SWEEP);
+        for kill in ["-KILL", "-INT", "-KILL"] {
+            await_checkpoint(&program.path(PLACE), &mut child);
+            signal(&child, kill);
+            let ran = ended(child);
+            assert_eq!(ran.code, if kill == "-INT" { 130 } else { -1 }, "{ran:?}");
+            child = started(&program, &format!("resume {PLACE} --checkpoint-every 0.01"));
+        }
+        ended(child).exits(0);
+        let whole = Program::with_scenes(&["free"]);
+        whole.run(&format!("{SWEEP} --threads 1 -q")).exits(0);
+        assert!(of_sweep(&program) == of_sweep(&whole));
+    }
+}
