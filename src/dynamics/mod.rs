@@ -40,6 +40,7 @@ pub mod forest;
 pub mod impact;
 pub mod kernel;
 pub mod law;
+pub mod looped;
 pub mod multiplier;
 pub mod natural;
 pub mod point;

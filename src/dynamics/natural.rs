@@ -18,6 +18,7 @@
 //!
 //! Source: J. García de Jalón, E. Bayo, *Kinematic and Dynamic Simulation of Multibody Systems* (1994), chapter 2, for natural coordinates.
 
+pub mod columns;
 mod guide;
 mod reduced;
 
@@ -123,13 +124,7 @@ impl Natural {
                 _ => return Err(NaturalError::Applied(action.name.clone())),
             }
         }
-        let (mut linear, mut guides) = (Vec::new(), Vec::new());
-        for (number, row) in mechanism.rows.iter().enumerate() {
-            match linear_place(row, n) {
-                Some(place) => linear.push(Linear { row: number, place }),
-                None => guides.push(Guide::new(number, row)),
-            }
-        }
+        let (linear, guides) = sorted_rows(&mechanism);
         let name = |body: usize| mechanism.bodies.get(body).map_or(String::new(), |body| body.name.clone());
         let reduced = Reduced::new(&mechanism, linear).map_err(|body| NaturalError::Singular(name(body)))?;
         let weight = mechanism.tree.weight.iter().zip(&applied).map(|(&weight, &applied)| weight + applied).collect();
@@ -302,6 +297,18 @@ impl Natural {
             sum + angle.scale(torque)
         })
     }
+}
+
+/// The rows of a mechanism that are linear with constant coefficients, and all others.
+pub fn sorted_rows(mechanism: &Mechanism) -> (Vec<Linear>, Vec<Guide>) {
+    let (mut linear, mut guides) = (Vec::new(), Vec::new());
+    for (number, row) in mechanism.rows.iter().enumerate() {
+        match linear_place(row, mechanism.bodies.len()) {
+            Some(place) => linear.push(Linear { row: number, place }),
+            None => guides.push(Guide::new(number, row)),
+        }
+    }
+    (linear, guides)
 }
 
 /// A row as a linear one with constant coefficients, where it is one.

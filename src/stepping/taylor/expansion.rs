@@ -186,12 +186,12 @@ fn add(state: &mut State, i: usize, increment: DoubleDouble) {
 }
 
 /// The larger magnitude, and not a number if either is.
-fn larger(most: f64, value: f64) -> f64 {
+pub(super) fn larger(most: f64, value: f64) -> f64 {
     let size = value.abs();
     if size.is_nan() || most.is_nan() { f64::NAN } else { most.max(size) }
 }
 
 /// -log2 from the bits of a positive double, within 0.09; so large for zero that it never counts.
-fn minus_log2(size: f64) -> f64 {
+pub(super) fn minus_log2(size: f64) -> f64 {
     if size == 0.0 { 1e9 } else { (1_f64.to_bits() as i64 - size.to_bits() as i64) as f64 / (1_u64 << 52) as f64 }
 }
