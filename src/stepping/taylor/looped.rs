@@ -18,8 +18,8 @@ use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::{Complex, sincos};
 use crate::dynamics::force::action::Kind;
 use crate::dynamics::looped::reduced;
-use crate::dynamics::natural::columns::{self, Columns, Row, load, store};
 use crate::dynamics::natural::Reduced;
+use crate::dynamics::natural::columns::{self, Columns, Row, load, store};
 use crate::dynamics::point::Point;
 use crate::dynamics::{Mechanism, State};
 use std::f64::consts::TAU;
@@ -122,7 +122,8 @@ impl<const B: usize> Looped<B> {
     /// The constants, where this form fits: up to 4 B hinged bodies with loops, constant forces, springs without dampers.
     pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize) -> Option<Self> {
         let n = mechanism.size();
-        let is_plain = mechanism.torsions.is_empty() && !mechanism.is_damped() && mechanism.actions.iter().all(|action| action.law.is_none());
+        let is_plain =
+            mechanism.torsions.is_empty() && !mechanism.is_damped() && mechanism.actions.iter().all(|action| action.law.is_none());
         if n > columns::room(B) || !is_plain || order > MOST {
             return None;
         }
