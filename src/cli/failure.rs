@@ -2,6 +2,7 @@
 
 use super::output::print_object;
 use crate::dynamics::CompileError;
+use crate::dynamics::assembly::Change;
 use crate::run::files::quoted;
 use crate::run::{CheckpointError, FileError, Refusal, ResumeError, RunError, SweepError};
 use crate::scene::SceneError;
@@ -76,6 +77,13 @@ impl Failure {
     pub(super) fn with_checkpoint(mut self, folder: &Path) -> Self {
         self.message += &format!("\nhint: `driftless resume {}` goes on from the last checkpoint", quoted(folder));
         self
+    }
+
+    /// A start that is not as given, where `--strict` asks for that.
+    pub(super) fn changed(changes: &[Change]) -> Self {
+        let list: Vec<String> = changes.iter().map(Change::to_string).collect();
+        let message = format!("--strict: {}\nhint: give the values used, or leave out what the constraints tell", list.join("; "));
+        Self { details: json!({ "changes": changes }), ..Self::new(Exit::Scene, message) }
     }
 
     /// The same, where stdout needs no object of it.

@@ -64,6 +64,9 @@ pub struct SceneFlags {
     /// Set a value of the scene, as in walls.wall.restitution=0.5; repeatable
     #[arg(long, value_name = "PATH=VALUE")]
     pub set: Vec<Override>,
+    /// Refuse a scene of which something given for the start must change to fit its constraints
+    #[arg(long)]
+    pub strict: bool,
     /// Print exactly one JSON object on stdout
     #[arg(long)]
     pub json: bool,

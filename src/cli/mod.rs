@@ -81,5 +81,18 @@ fn compile(flags: &SceneFlags, text: &str) -> Result<(Scene, Arc<Mechanism>), Fa
         flags.remark(&format!("set {} to {}", set.path, set.value));
     }
     let mechanism = Arc::new(Mechanism::new(&scene)?);
+    settle(flags, &mechanism)?;
     Ok((scene, mechanism))
+}
+
+/// Tells how the start differs from what the scene gives, or refuses it.
+fn settle(flags: &SceneFlags, mechanism: &Mechanism) -> Result<(), Failure> {
+    let changes = &mechanism.assembly.changes;
+    if flags.strict && !changes.is_empty() {
+        return Err(Failure::changed(changes));
+    }
+    if !flags.quiet {
+        changes.iter().for_each(|change| output::message(&format!("note: {change}")));
+    }
+    Ok(())
 }

@@ -133,6 +133,8 @@ fn prepared(flags: &SweepFlags, text: &str) -> Result<Sweep, Failure> {
     let template = Template::new(text.to_owned(), flags.scene.scene.display().to_string(), &flags.scene.set);
     let limits = Limits { energy: flags.max_energy_drift, constraint: flags.max_constraint_drift };
     let plan = Sweep::new(&template, flags.vary.clone(), request)?.with_limits(limits);
+    super::settle(&flags.scene, plan.mechanism())?;
+    let plan = if flags.scene.strict { plan.strictly() } else { plan };
     Ok(if flags.to_flip { plan.ending_at_flips() } else { plan })
 }
 

@@ -1,30 +1,39 @@
-//! The mechanism in natural coordinates: the unit vectors themselves, with a *constant* mass matrix.
+//! The mechanism in natural coordinates: the unit vectors and free feet themselves, with a *constant* mass matrix.
 //!
 //! ```text
-//! D z'' + Σ_k mu_k z_k + Σ_r lambda_r g_r = F(z)            [N m]   D = H + diag(I), Hermitian, constant
-//! (|z_k|² - 1) / 2             = 0                          one row per body, gradient z_k
-//! Im(conj(u) z_a)              = 0,  u = exp(i theta(t))    a motor from the ground, gradient i u
-//! Im(conj(u) z_a conj(z_b))    = 0                          a motor between bodies, gradients i u z_b and -i conj(u) z_a
-//! W = D⁻¹,   S_pq = Re(conj(g_p) W g_q),   S mu = Re(conj(g) W F) + convective terms,   z'' = W (F - g mu)
+//! D z'' + Σ_k mu_k z_k + Σ_r lambda_r g_r = F(z)            [N m, N]   D = H + diag(I), Hermitian, constant
+//! (|z_k|² - 1) / 2             = 0                          one row per body, gradient z_k; none for a foot
+//! c + Σ g_k·z_k                = 0                          pins, lines of the ground, locked angles: linear
+//! C(z, t)                      = 0                          slots, travels, motors, locked relative angles: module `guide`
+//! W = D⁻¹ less the linear rows (module `reduced`),   S_pq = g_p·W g_q,   S mu = g·W F + convective terms,   z'' = W (F - g mu)
 //! ```
 //!
 //! No sine, no cosine and no velocity term but those of the rows; gravity is a constant force, a force f at a point `Σ gamma_k z_k` acts on
-//! z_k as `conj(gamma_k) f`.  On the constraints a motor's row has the slope of the angle row `q_a - q_b - theta`, so its multiplier is the
-//! same: minus the torque.
+//! z_k as `conj(gamma_k) f`, a torque tau as `tau i z_k`.  Linear rows are removed once per scene: a closed loop never enters the inner loop.  On the constraints
+//! every row has the slope of its [`Row`](super::row::Row) in angles, so its multiplier is the same.  Rows that depend on others get the multiplier zero.
 //!
-//! Unknowns: z (2n numbers), z' (2n) \[1/s\] and, where there are motors, p_t \[J\], the momentum conjugate to time: p_t' = -Σ lambda C_t.
-//! Energy plus p_t is a first integral, so p_t starts at zero and the work done by the motors is -p_t, without a quadrature.  None of the
-//! unknowns is an angle: whole turns are counted by the method as a vector passes the negative x axis.
+//! Unknowns: z (2n numbers), z' (2n) \[1/s\] and, where there are motors or applied forces, p_t \[J\], the momentum conjugate to time: p_t' = -Σ lambda C_t.
+//! Energy plus p_t, less what the constant forces have done, is a first integral: p_t starts at zero and the work is known without a quadrature.
+//! None of the unknowns is an angle: whole turns are counted by the method as a vector passes the negative x axis.
 //!
 //! Source: J. García de Jalón, E. Bayo, *Kinematic and Dynamic Simulation of Multibody Systems* (1994), chapter 2, for natural coordinates.
 
+pub mod columns;
+mod guide;
+mod reduced;
+
+pub use guide::{Demand, Guide};
+pub use reduced::{Block, Linear, Reduced, times};
+
+use super::force::action::Kind;
 use super::law::Law;
-use super::row::Measure;
-use super::{Form, Mechanism, Motion, State, Time, tree};
+use super::quadratic::Quadratic;
+use super::row::{Measure, Row};
+use super::{Form, Mechanism, Motion, State, Time, schur, tree};
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use std::sync::Arc;
 
-/// The largest number of bodies; every step costs a factorization of a full matrix with a row per body and motor.
+/// The largest number of bodies; every step costs a factorization of a full matrix with a row per body and guide.
 pub const NATURAL_LIMIT: usize = 256;
 
 /// Why a mechanism has no natural form.
@@ -33,6 +42,12 @@ pub enum NaturalError {
     /// Forces must not depend on velocities.
     #[error("spring `{0}` has a damper: the natural form is for forces that depend on positions only")]
     Damped(String),
+    /// Angles are not among the unknowns.
+    #[error("torsion spring `{0}`: the natural form has no angles to measure it by")]
+    Torsion(String),
+    /// Applied forces must be constant.
+    #[error("force or torque `{0}` follows a bar or a law of time: the natural form takes constant ones only")]
+    Applied(String),
     /// Impacts are not handled.
     #[error("wall `{0}`: the natural form has no impacts")]
     Wall(String),
@@ -44,75 +59,44 @@ pub enum NaturalError {
     TooMany(usize),
 }
 
-/// A motor or lock as a row of the unit vectors.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Drive {
-    /// Name of the row.
-    pub name: String,
-    /// The driven body a.
-    pub body: usize,
-    /// The body b its angle is measured from; `None`: from +x.
-    pub base: Option<usize>,
-    /// theta(t).
-    pub law: Law,
-}
-
-impl Drive {
-    /// `conj(u) z_a conj(z_b)`: 1 where the row is kept; C is its imaginary part.
-    #[inline(always)]
-    pub fn mismatch<T: Scalar>(&self, unit: Complex<T>, z: &[Complex<T>]) -> Complex<T> {
-        let direct = unit.conj() * z[self.body];
-        self.base.map_or(direct, |base| direct * z[base].conj())
-    }
-
-    /// Derivative of [`Drive::mismatch`] along `rate` at fixed u.
-    #[inline(always)]
-    pub fn slip<T: Scalar>(&self, unit: Complex<T>, z: &[Complex<T>], rate: &[Complex<T>]) -> Complex<T> {
-        match self.base {
-            None => unit.conj() * rate[self.body],
-            Some(base) => unit.conj() * (rate[self.body] * z[base].conj() + z[self.body] * rate[base].conj()),
-        }
-    }
-
-    /// Gradients of C on z_a and z_b; the second is zero where there is no b.
-    #[inline(always)]
-    pub fn gradient<T: Scalar>(&self, unit: Complex<T>, z: &[Complex<T>]) -> [Complex<T>; 2] {
-        match self.base {
-            None => [unit.left(), Complex::ZERO],
-            Some(base) => [(unit * z[base]).left(), -(unit.conj() * z[self.body]).left()],
-        }
-    }
-
-    /// Both bodies; a stands for the second where there is no b.
-    #[inline(always)]
-    pub fn bodies(&self) -> [usize; 2] {
-        [self.body, self.base.unwrap_or(self.body)]
-    }
-}
-
 /// How far a state is from its constraints.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Defect {
-    /// Largest of the |z_k|² - 1 and of the motors' C \[rad\].
+    /// Largest of the |z_k|² - 1 and of the C of all rows \[1, rad, m\].
     pub position: f64,
-    /// Largest rate of these \[1/s\].
+    /// Largest rate of these \[1/s, rad/s, m/s\].
     pub velocity: f64,
+}
+
+/// A constant torque.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Torque {
+    /// The body.
+    pub body: usize,
+    /// The body that takes the opposite.
+    pub base: Option<usize>,
+    /// \[N·m\].
+    pub torque: f64,
 }
 
 /// Constants of the natural form.
 #[derive(Clone, Debug)]
 pub struct Natural {
     mechanism: Arc<Mechanism>,
-    /// W (n × n), Hermitian to the last bit \[1/(kg·m²)\].
-    inverse: Vec<Complex<f64>>,
-    drives: Vec<Drive>,
+    reduced: Reduced,
+    guides: Vec<Guide>,
+    /// Gravity and constant forces on every element (n) \[N·m, N\].
+    weight: Vec<Complex<f64>>,
+    /// The share of the latter.
+    applied: Vec<Complex<f64>>,
+    torques: Vec<Torque>,
 }
 
 impl Natural {
     /// The natural form of a mechanism.
     ///
     /// # Errors
-    /// Dampers, walls, bodies without inertia, or too many bodies.
+    /// Dampers, torsion springs, applied forces that are not constant, walls, bodies without inertia, or too many bodies.
     pub fn new(mechanism: Arc<Mechanism>) -> Result<Self, NaturalError> {
         let n = mechanism.bodies.len();
         if n > NATURAL_LIMIT {
@@ -121,96 +105,157 @@ impl Natural {
         if let Some(spring) = mechanism.springs.iter().find(|spring| spring.damping != 0.0) {
             return Err(NaturalError::Damped(spring.name.clone()));
         }
+        if let Some(torsion) = mechanism.torsions.first() {
+            return Err(NaturalError::Torsion(torsion.name.clone()));
+        }
         if let Some(contact) = mechanism.contacts.first() {
             return Err(NaturalError::Wall(contact.row.name.clone()));
         }
-        let mut drives = Vec::new();
-        for row in &mechanism.rows {
-            match (&row.measure, &row.law) {
-                (&Measure::Angle { body, base }, Some(law)) => {
-                    drives.push(Drive { name: row.name.clone(), body, base, law: law.clone() });
+        let mut applied = vec![Complex::ZERO; mechanism.coordinates()];
+        let mut torques = Vec::new();
+        for action in &mechanism.actions {
+            match &action.kind {
+                Kind::Force { point, force, follows: false } if action.law.is_none() => {
+                    point.spread(*force, |k, force| applied[k] += force);
                 }
-                _ => return Err(NaturalError::Wall(row.name.clone())),
+                Kind::Torque { torque, base } if action.law.is_none() => {
+                    torques.push(Torque { body: action.body, base: *base, torque: *torque });
+                }
+                _ => return Err(NaturalError::Applied(action.name.clone())),
             }
         }
-        let inverse = invert(&mechanism).map_err(|body| NaturalError::Singular(mechanism.bodies[body].name.clone()))?;
-        Ok(Self { mechanism, inverse, drives })
+        let (linear, guides) = sorted_rows(&mechanism);
+        let name = |body: usize| mechanism.bodies.get(body).map_or(String::new(), |body| body.name.clone());
+        let reduced = Reduced::new(&mechanism, linear).map_err(|body| NaturalError::Singular(name(body)))?;
+        let weight = mechanism.tree.weight.iter().zip(&applied).map(|(&weight, &applied)| weight + applied).collect();
+        Ok(Self { mechanism, reduced, guides, weight, applied, torques })
     }
 
-    /// W row by row (n × n) \[1/(kg·m²)\]: the inverse of the mass matrix, formed in double-double and rounded once, Hermitian to the last
-    /// bit.  A rounded W is the exact inverse of some mass matrix 1e-16 away, so it shifts energies by 1e-16 of themselves but makes none.
-    pub fn inverse(&self) -> &[Complex<f64>] {
-        &self.inverse
+    /// W and what belongs to it.
+    #[inline(always)]
+    pub fn reduced(&self) -> &Reduced {
+        &self.reduced
     }
 
-    /// The motors.
-    pub fn drives(&self) -> &[Drive] {
-        &self.drives
+    /// The rows that stay in the loop, beside one a body.
+    #[inline(always)]
+    pub fn guides(&self) -> &[Guide] {
+        &self.guides
     }
 
-    /// Number of rows: one a body, then one a motor.
+    /// Gravity and constant forces on every element \[N·m, N\].
+    pub fn weight(&self) -> &[Complex<f64>] {
+        &self.weight
+    }
+
+    /// Constant torques.
+    pub fn torques(&self) -> &[Torque] {
+        &self.torques
+    }
+
+    /// Number of elements n: bodies, and two for every foot that moves freely, of which the second is not used.
+    pub fn elements(&self) -> usize {
+        self.mechanism.coordinates()
+    }
+
+    /// Number of rows in the loop: one a body, then one a guide.
     pub fn rows(&self) -> usize {
-        self.mechanism.bodies.len() + self.drives.len()
+        self.mechanism.bodies.len() + self.guides.len()
     }
 
-    /// What a row keeps, for messages.
+    /// What a row in the loop keeps, for messages.
     pub fn row_name(&self, row: usize) -> String {
         let n = self.mechanism.bodies.len();
-        if row < n { format!("unit length of {}", self.mechanism.bodies[row].name) } else { self.drives[row - n].name.clone() }
+        if row < n { format!("unit length of {}", self.mechanism.bodies[row].name) } else { self.guides[row - n].name.clone() }
     }
 
-    /// Writes the applied force \[N·m\] on every unit vector: gravity and springs.
+    /// What an element is, for messages.
+    pub fn element_name(&self, element: usize) -> String {
+        match self.mechanism.bodies.get(element) {
+            Some(body) => body.name.clone(),
+            None => self.mechanism.coordinate_name(element),
+        }
+    }
+
+    /// True where p_t is among the unknowns.
+    pub fn keeps_account(&self) -> bool {
+        !self.guides.is_empty() || !self.mechanism.actions.is_empty()
+    }
+
+    /// Writes the applied force \[N·m, N\] on every element: gravity, constant forces and torques, springs.
     #[inline(always)]
     pub fn force<T: Scalar>(&self, z: &[Complex<T>], force: &mut [Complex<T>]) {
-        for (force, &weight) in force.iter_mut().zip(&self.mechanism.tree.weight) {
+        for (force, &weight) in force.iter_mut().zip(&self.weight) {
             *force = Complex::of(weight);
         }
         for spring in &self.mechanism.springs {
             let pull = spring.elastic(z);
             spring.span.spread(pull, |k, pull| force[k] += pull);
         }
+        for &Torque { body, base, torque } in &self.torques {
+            force[body] += z[body].left().times(T::of(torque));
+            if let Some(base) = base {
+                force[base] -= z[base].left().times(T::of(torque));
+            }
+        }
     }
 
-    /// z'' \[1/s²\] and the multipliers \[N·m\] (one a body, then one a motor) at unit vectors `z` with rates `rate` \[1/s\].
+    /// z'' \[1/s², m/s²\] and the multipliers \[N·m, N\] of all rows, in the order of the mechanism's, at elements `z` with rates `rate` \[1/s, m/s\].
     pub fn accelerations(&self, t: Time, z: &[Complex<f64>], rate: &[Complex<f64>]) -> (Vec<Complex<f64>>, Vec<f64>) {
-        let (n, rows) = (z.len(), self.rows());
-        let mut acceleration = vec![Complex::ZERO; n];
-        self.force(z, &mut acceleration);
+        let (n, bodies, rows) = (z.len(), self.mechanism.bodies.len(), self.rows());
+        let mut force = vec![Complex::ZERO; n];
+        self.force(z, &mut force);
         let mut gradients = vec![vec![Complex::ZERO; n]; rows];
         let mut multiplier = vec![0.0; rows];
-        for k in 0..n {
+        for k in 0..bodies {
             gradients[k][k] = z[k];
             multiplier[k] = rate[k].norm_squared();
         }
-        for (r, drive) in self.drives.iter().enumerate() {
-            let phase = drive.law.at::<f64>(t);
-            let [on_body, on_base] = drive.gradient(phase.unit, z);
-            let [a, b] = drive.bodies();
-            gradients[n + r][a] += on_body;
-            gradients[n + r][b] += on_base;
-            // u' = i theta' u and u'' = (i theta'' - theta'²) u, conjugated.
-            let first = Complex::new(0.0, -phase.rate);
-            let second = Complex::new(-phase.rate * phase.rate, -phase.acceleration);
-            let cross = drive.base.map_or(Complex::ZERO, |base| phase.unit.conj() * rate[a] * rate[base].conj());
-            let moving = (first * drive.slip(phase.unit, z, rate) + cross).times(2.0);
-            multiplier[n + r] = (moving + second * drive.mismatch(phase.unit, z)).im;
+        for (r, guide) in self.guides.iter().enumerate() {
+            let demand = guide.demand::<f64>(t);
+            guide.gradient(&demand, z, &mut gradients[bodies + r]);
+            multiplier[bodies + r] = guide.convective(&demand, z, rate);
         }
-        let free = self.spread(&acceleration);
-        let lifted: Vec<Vec<Complex<f64>>> = gradients.iter().map(|gradient| self.spread(gradient)).collect();
-        let mut schur = vec![0.0; rows * rows];
+        let free = self.reduced.spread(&force);
+        let lifted: Vec<Vec<Complex<f64>>> = gradients.iter().map(|gradient| self.reduced.spread(gradient)).collect();
+        let mut matrix = vec![0.0; rows * rows];
         for p in 0..rows {
             for q in p..rows {
-                schur[p * rows + q] = dot(&gradients[p], &lifted[q]);
+                matrix[p * rows + q] = dot(&gradients[p], &lifted[q]);
             }
             multiplier[p] += dot(&gradients[p], &free);
         }
         let mut pivot = vec![0.0; rows];
-        tree::factor::<f64, 0>(rows, &mut schur, &mut pivot);
-        tree::solve::<f64, 0>(rows, &schur, &pivot, &mut multiplier);
-        for k in 0..n {
-            acceleration[k] = (0..rows).fold(free[k], |sum, p| sum - lifted[p][k].times(multiplier[p]));
+        schur::factor::<f64, 0>(rows, &mut matrix, &mut pivot, &self.scales());
+        tree::solve::<f64, 0>(rows, &matrix, &pivot, &mut multiplier);
+        let mut acceleration = free;
+        for p in 0..rows {
+            for k in 0..n {
+                acceleration[k] -= lifted[p][k].times(multiplier[p]);
+                force[k] -= gradients[p][k].times(multiplier[p]);
+            }
         }
-        (acceleration, multiplier)
+        let mut all = vec![0.0; self.mechanism.rows.len()];
+        for (guide, multiplier) in self.guides.iter().zip(&multiplier[bodies..]) {
+            all[guide.row] = *multiplier;
+        }
+        self.reduced.multipliers(&force, &mut all);
+        (acceleration, all)
+    }
+
+    /// What pivots of S are measured against, row by row in the loop: Σ |g_k|² (D⁻¹)_kk.
+    pub fn scales(&self) -> Vec<f64> {
+        let free = &self.reduced.free;
+        let guide = |guide: &Guide| match &guide.measure {
+            Measure::Angle { body, base } => free[*body] + base.map_or(0.0, |base| free[base]),
+            Measure::Place(place) => {
+                let linear: f64 = place.linear.iter().map(|&(k, g)| g.norm_squared() * free[k]).sum();
+                // Of the two elements of a product one is a unit vector; a foot is not bounded.
+                let other = |j: usize, k: usize| if k < place.angles { free[j] } else { 0.0 };
+                linear + place.bilinear.iter().map(|&(j, k, h)| h.norm_squared() * (free[k] + other(j, k))).sum::<f64>()
+            }
+        };
+        free[..self.mechanism.bodies.len()].iter().copied().chain(self.guides.iter().map(guide)).collect()
     }
 
     /// How far a state is from its constraints, in double-double.
@@ -223,27 +268,62 @@ impl Natural {
             defect.position = larger(position.hi.abs(), defect.position);
             defect.velocity = larger(velocity.hi.abs(), defect.velocity);
         };
-        for (z, rate) in z.iter().zip(&rate) {
+        for (z, rate) in z.iter().zip(&rate).take(self.mechanism.bodies.len()) {
             see(z.norm_squared() + -1.0, z.dot(*rate).ldexp(2.0));
         }
-        for drive in &self.drives {
-            let phase = drive.law.at::<DoubleDouble>(state.time);
-            let mismatch = drive.mismatch(phase.unit, &z);
-            see(mismatch.im, drive.slip(phase.unit, &z, &rate).im - phase.rate * mismatch.re);
+        for linear in &self.reduced.rows {
+            see(linear.place.value(&z), reduced::slip(&linear.place, &rate));
+        }
+        for guide in &self.guides {
+            let demand = guide.demand::<DoubleDouble>(state.time);
+            see(guide.value(&demand, &z), guide.slip(&demand, &z, &rate) + guide.drive(&demand, &z));
         }
         defect
     }
 
     /// z and z' of a state.
     fn vectors(&self, state: &State) -> (Vec<Complex<DoubleDouble>>, Vec<Complex<DoubleDouble>>) {
-        let n = self.mechanism.bodies.len();
+        let n = self.elements();
         let vector = |k: usize| Complex::new(state.unknown(2 * k), state.unknown(2 * k + 1));
         ((0..n).map(vector).collect(), (n..2 * n).map(vector).collect())
     }
 
-    /// W x.
-    fn spread(&self, x: &[Complex<f64>]) -> Vec<Complex<f64>> {
-        self.inverse.chunks(x.len()).map(|row| row.iter().zip(x).fold(Complex::ZERO, |sum, (&w, &x)| sum + w * x)).collect()
+    /// What constant forces and torques have done since all elements and angles were zero \[J\].
+    fn done(&self, z: &[Complex<DoubleDouble>], motion: &Motion) -> DoubleDouble {
+        let forces = self.applied.iter().zip(z).fold(DoubleDouble::ZERO, |sum, (&force, &z)| sum + Complex::of(force).dot(z));
+        let whole = |k: usize| motion.phi[k] + DoubleDouble::TAU.scale(motion.turns[k] as f64);
+        self.torques.iter().fold(forces, |sum, &Torque { body, base, torque }| {
+            let angle = base.map_or(whole(body), |base| whole(body) - whole(base));
+            sum + angle.scale(torque)
+        })
+    }
+}
+
+/// The rows of a mechanism that are linear with constant coefficients, and all others.
+pub fn sorted_rows(mechanism: &Mechanism) -> (Vec<Linear>, Vec<Guide>) {
+    let (mut linear, mut guides) = (Vec::new(), Vec::new());
+    for (number, row) in mechanism.rows.iter().enumerate() {
+        match linear_place(row, mechanism.bodies.len()) {
+            Some(place) => linear.push(Linear { row: number, place }),
+            None => guides.push(Guide::new(number, row)),
+        }
+    }
+    (linear, guides)
+}
+
+/// A row as a linear one with constant coefficients, where it is one.
+fn linear_place(row: &Row, angles: usize) -> Option<Quadratic> {
+    let is_constant = row.law.as_ref().is_none_or(Law::is_constant);
+    match (&row.measure, &row.law) {
+        (&Measure::Angle { body, base: None }, Some(law)) if is_constant => {
+            let unit = law.at::<f64>(Time::default()).unit;
+            Some(Quadratic { angles, linear: vec![(body, unit.left())], ..Quadratic::default() })
+        }
+        (Measure::Place(place), law) if is_constant && place.bilinear.is_empty() => {
+            let constant = place.constant - law.as_ref().map_or(0.0, |law| law.start);
+            Some(Quadratic { constant, ..place.clone() })
+        }
+        _ => None,
     }
 }
 
@@ -253,11 +333,20 @@ impl Form for Natural {
     }
 
     fn state(&self, motion: &Motion) -> State {
-        let z: Vec<Complex<DoubleDouble>> = motion.phi.iter().map(|&phi| Complex::unit(phi)).collect();
-        let rate = z.iter().zip(&motion.omega).map(|(z, &omega)| z.left().times(omega));
-        let mut unknowns: Vec<DoubleDouble> = z.iter().copied().chain(rate).flat_map(|x| [x.re, x.im]).collect();
-        if !self.drives.is_empty() {
-            unknowns.push(-motion.work);
+        let (n, bodies) = (self.elements(), self.mechanism.bodies.len());
+        let mut z = vec![Complex::<DoubleDouble>::ZERO; n];
+        let mut rate = z.clone();
+        for k in 0..bodies {
+            z[k] = Complex::unit(motion.phi[k]);
+            rate[k] = z[k].left().times(motion.omega[k]);
+        }
+        for x in (bodies..n).step_by(2) {
+            z[x] = Complex::new(motion.phi[x], motion.phi[x + 1]);
+            rate[x] = Complex::new(motion.omega[x], motion.omega[x + 1]);
+        }
+        let mut unknowns: Vec<DoubleDouble> = z.iter().chain(&rate).flat_map(|x| [x.re, x.im]).collect();
+        if self.keeps_account() {
+            unknowns.push(self.done(&z, motion) - motion.work);
         }
         let mut state = State::new(&unknowns, 0);
         state.time = motion.time;
@@ -265,22 +354,25 @@ impl Form for Natural {
         let turn = |(k, &z): (usize, &Complex<DoubleDouble>)| {
             motion.turns[k] + ((motion.phi[k] - angle(z)).hi / std::f64::consts::TAU).round() as i64
         };
-        state.turns = z.iter().enumerate().map(turn).collect();
+        state.turns = z.iter().take(bodies).enumerate().map(turn).collect();
         state
     }
 
     fn read(&mut self, state: &State, motion: &mut Motion) {
-        let n = self.mechanism.bodies.len();
+        let (n, bodies) = (self.elements(), self.mechanism.bodies.len());
         motion.resize(n);
         motion.time = state.time;
-        motion.turns.copy_from_slice(&state.turns);
-        for k in 0..n {
-            let vector = |k: usize| Complex::new(state.unknown(2 * k), state.unknown(2 * k + 1));
-            let (z, rate) = (vector(k), vector(n + k));
-            motion.phi[k] = angle(z);
-            motion.omega[k] = z.cross(rate);
+        motion.turns[..bodies].copy_from_slice(&state.turns);
+        let (z, rate) = self.vectors(state);
+        for k in 0..bodies {
+            motion.phi[k] = angle(z[k]);
+            motion.omega[k] = z[k].cross(rate[k]);
         }
-        motion.work = if self.drives.is_empty() { DoubleDouble::ZERO } else { -state.unknown(4 * n) };
+        for x in (bodies..n).step_by(2) {
+            (motion.phi[x], motion.phi[x + 1]) = (z[x].re, z[x].im);
+            (motion.omega[x], motion.omega[x + 1]) = (rate[x].re, rate[x].im);
+        }
+        motion.work = if self.keeps_account() { self.done(&z, motion) - state.unknown(4 * n) } else { DoubleDouble::ZERO };
     }
 }
 
@@ -301,58 +393,4 @@ fn angle(z: Complex<DoubleDouble>) -> DoubleDouble {
 /// Real part of Σ conj(a_k) b_k.
 fn dot(a: &[Complex<f64>], b: &[Complex<f64>]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
-}
-
-/// W = D⁻¹ from D = L P Lᴴ in double-double, rounded once; the error is the body whose pivot vanishes.
-fn invert(mechanism: &Mechanism) -> Result<Vec<Complex<f64>>, usize> {
-    let n = mechanism.bodies.len();
-    let at = |i: usize, j: usize| i * n + j;
-    // Below the diagonal D is the conjugate of what the tree stores above it.
-    let mut lower: Vec<Complex<DoubleDouble>> = vec![Complex::ZERO; n * n];
-    let mut pivot = vec![DoubleDouble::ZERO; n];
-    for j in 0..n {
-        for i in j..n {
-            let mut entry = match i == j {
-                true => Complex::of(Complex::new(mechanism.tree.diagonal[i], 0.0)),
-                false => Complex::of(mechanism.tree.coupling[at(j, i)].conj()),
-            };
-            for k in 0..j {
-                entry -= (lower[at(i, k)] * lower[at(j, k)].conj()).times(pivot[k]);
-            }
-            if i == j {
-                pivot[j] = entry.re;
-                if pivot[j].hi <= 1e-13 * mechanism.tree.diagonal[j] {
-                    return Err(j);
-                }
-                lower[at(j, j)] = Complex::new(DoubleDouble::ONE, DoubleDouble::ZERO);
-            } else {
-                lower[at(i, j)] = entry.times(DoubleDouble::ONE / pivot[j]);
-            }
-        }
-    }
-    let mut inverse = vec![Complex::ZERO; n * n];
-    let mut column = vec![Complex::<DoubleDouble>::ZERO; n];
-    for j in 0..n {
-        column.fill(Complex::ZERO);
-        column[j].re = DoubleDouble::ONE;
-        for i in j..n {
-            for k in j..i {
-                let part = lower[at(i, k)] * column[k];
-                column[i] -= part;
-            }
-        }
-        for i in (j..n).rev() {
-            column[i] = column[i].times(DoubleDouble::ONE / pivot[i]);
-            for k in i + 1..n {
-                let part = lower[at(k, i)].conj() * column[k];
-                column[i] -= part;
-            }
-        }
-        inverse[at(j, j)] = Complex::new(column[j].re.hi, 0.0);
-        for i in j + 1..n {
-            inverse[at(i, j)] = Complex::new(column[i].re.hi, column[i].im.hi);
-            inverse[at(j, i)] = inverse[at(i, j)].conj();
-        }
-    }
-    Ok(inverse)
 }

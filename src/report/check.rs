@@ -2,6 +2,7 @@
 
 use super::page::{Page, figure};
 use crate::dynamics::Mechanism;
+use crate::dynamics::assembly::Assembly;
 use crate::run::{MethodId, Plan, Stabilization};
 use crate::scene::Scene;
 use serde_json::{Value, json};
@@ -47,7 +48,9 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Value {
         "scene": scene.name,
         "description": scene.description,
         "bodies": names(scene.bars.iter().map(|bar| bar.name.as_str()).collect()),
-        "degrees_of_freedom": mechanism.ties.independent.len(),
+        "degrees_of_freedom": mechanism.assembly.degrees_of_freedom,
+        "constraints": names(mechanism.rows.iter().map(|row| row.name()).collect()),
+        "assembly": assembly(mechanism),
         "hinges": names(scene.hinges.iter().map(|hinge| hinge.name.as_str()).collect()),
         "motors": names(scene.motors.iter().map(|motor| motor.name.as_str()).collect()),
         "springs": names(scene.springs.iter().map(|spring| spring.name.as_str()).collect()),
@@ -66,11 +69,38 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Value {
     })
 }
 
+/// How the start was found, as one JSON object.
+pub(super) fn assembly(mechanism: &Mechanism) -> Value {
+    let Assembly { changes, redundant, singular, conditioning, .. } = &mechanism.assembly;
+    json!({"changes": changes, "redundant": redundant, "singular": singular, "conditioning": conditioning})
+}
+
+/// Degrees of freedom, rows that say nothing new, and what of the start is not as given.
+fn freedom(page: &mut Page, mechanism: &Mechanism) {
+    let Assembly { changes, redundant, singular, degrees_of_freedom: free, .. } = &mechanism.assembly;
+    let (coordinates, rows) = (mechanism.coordinates(), mechanism.rows.len());
+    let less = match (rows, redundant.len()) {
+        (0, _) => String::new(),
+        (rows, 0) => format!(": {coordinates} coordinate{} less {rows} constraint{}", plural(coordinates), plural(rows)),
+        (rows, doubled) => format!(": {coordinates} coordinates less {rows} constraints, {doubled} of them redundant"),
+    };
+    page.entry("freedom", &format!("{free} degree{}{less}", plural(*free)));
+    if !redundant.is_empty() {
+        page.entry("redundant", &redundant.join(", "));
+    }
+    if !singular.is_empty() {
+        page.entry("singular", &format!("{} at the start", singular.join(", ")));
+    }
+    for (number, change) in changes.iter().enumerate() {
+        page.entry(if number == 0 { "start" } else { "" }, &change.to_string());
+    }
+}
+
 /// The report as a page.
 pub fn text(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> String {
     let mut page = Page::new(&scene.name, &scene.description);
-    let free = mechanism.ties.independent.len();
-    page.entry("bodies", &format!("{}, {free} independent coordinate{}", list(&scene.bars, |bar| &bar.name), plural(free)));
+    page.entry("bodies", &list(&scene.bars, |bar| &bar.name));
+    freedom(&mut page, mechanism);
     page.entry("hinges", &list(&scene.hinges, |hinge| &hinge.name));
     if !scene.motors.is_empty() {
         page.entry("motors", &list(&scene.motors, |motor| &motor.name));

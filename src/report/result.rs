@@ -51,6 +51,7 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value 
             "trend_error": trend_error,
         },
         "constraints": constraints,
+        "assembly": super::check::assembly(mechanism),
         "stabilizer": stabilizer,
         "impacts": impacts,
         "holds": holds,

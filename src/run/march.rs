@@ -6,6 +6,7 @@ use super::methods::{MethodId, Stabilization};
 use super::plan::Plan;
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::elimination::Elimination;
+use crate::dynamics::looped::Looped;
 use crate::dynamics::multiplier::Multiplier;
 use crate::dynamics::natural::Natural;
 use crate::dynamics::{Field, Form, Glance, Mechanism, Motion, State, Time};
@@ -275,6 +276,11 @@ fn marcher<P: Form + ?Sized + 'static, M: Method<P> + 'static>(problem: Box<P>, 
 /// The form a stabilization marches in, for `N` bodies.
 fn form<const N: usize>(mechanism: &Arc<Mechanism>, stabilization: Stabilization, time_constant: f64) -> Box<dyn Problem> {
     let mechanism = Arc::clone(mechanism);
+    if matches!(stabilization, Stabilization::None | Stabilization::Projection)
+        && let Some(looped) = Looped::new(Arc::clone(&mechanism))
+    {
+        return Box::new(looped);
+    }
     match stabilization {
         Stabilization::Elimination => eliminated::<N>(&mechanism),
         Stabilization::Baumgarte => Box::new(Baumgarte::new(Multiplier::<N, true>::new(mechanism), time_constant)),

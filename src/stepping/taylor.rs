@@ -30,6 +30,7 @@ mod expansion;
 mod extended;
 mod fast;
 mod jump;
+mod looped;
 mod pace;
 mod pair;
 mod terms;
@@ -83,6 +84,8 @@ pub struct Taylor<T> {
     pub extended: bool,
     fast: Option<Fast>,
     expansion: Option<Expansion<T>>,
+    /// True where the last step was made by the expansion.
+    by_series: bool,
     /// Where singular positions are looked for.
     ahead: Option<dynamics::kernel::Kernel<f64>>,
     powers: Vec<f64>,
@@ -102,6 +105,7 @@ impl<T: Coefficient> Taylor<T> {
             extended: false,
             fast: None,
             expansion: None,
+            by_series: true,
             ahead: None,
             powers: Vec::new(),
             gaps: Vec::new(),
@@ -163,10 +167,9 @@ impl<T: Coefficient, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
                 return Err(stop(Cause::TooManySteps, state, 0.0, what, "loosen the tolerance"));
             }
             tally.evaluations += 1;
-            let (wanted, mut h) = match &mut self.fast {
-                Some(fast) => fast.step(state, left.hi),
-                None => self.expand(problem, state, left.hi),
-            };
+            let quick = self.fast.as_mut().and_then(|fast| fast.step(state, left.hi));
+            self.by_series = quick.is_none();
+            let (wanted, mut h) = quick.unwrap_or_else(|| self.expand(problem, state, left.hi));
             let hint = "look for a spring of length zero or a position without inertia";
             if wanted.is_nan() {
                 let lost = problem.label(problem.angles() + self.expansion.as_ref().map_or(0, Expansion::lost));
@@ -176,7 +179,7 @@ impl<T: Coefficient, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
                 return Err(stop(Cause::StepTooSmall, state, wanted, "the series converges in ever smaller circles".into(), hint));
             }
             let mut event = None;
-            if self.fast.is_none() {
+            if self.by_series {
                 if problem.events() > 0 {
                     (h, event) = self.meet(problem, state, h)?;
                 }
@@ -205,10 +208,10 @@ impl<T: Coefficient, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
     fn within(&mut self, _: &mut P, from: &State, time: Time, inside: &mut State) {
         inside.clone_from(from);
         let h = time - from.time;
-        match (&self.fast, &self.expansion) {
-            (Some(fast), _) => fast.go(inside, h.hi),
-            (None, Some(expansion)) => expansion.go(inside, h),
-            (None, None) => {}
+        match (&mut self.fast, &self.expansion) {
+            (Some(fast), _) if !self.by_series => fast.go(inside, h.hi),
+            (_, Some(expansion)) => expansion.go(inside, h),
+            _ => {}
         }
         inside.time = time;
         inside.wrap();
@@ -232,12 +235,16 @@ impl<T: Coefficient> Taylor<T> {
         let is_plain = T::IS_PLAIN && self.kernel != Kernel::Series;
         // The lanes know neither walls nor rows that are not eliminated.
         let is_simple = mechanism.contacts.is_empty() && (mechanism.rows.is_empty() || coordinates == Coordinates::Independent);
-        if !is_plain || !is_simple {
+        let is_looped = mechanism.is_tied_up() && coordinates == Coordinates::All && !extended;
+        if !is_plain || !(is_simple || is_looped) {
             self.fast = None;
         } else if !self.fast.as_ref().is_some_and(|fast| fast.is_for(mechanism, tolerance, order, is_portable, extended)) {
-            self.fast = Fast::new(mechanism, tolerance, order, is_portable, extended);
+            self.fast = match is_looped {
+                true => Fast::of_looped(mechanism, tolerance, order, is_portable),
+                false => Fast::new(mechanism, tolerance, order, is_portable, extended),
+            };
         }
-        if self.fast.is_some() {
+        if self.fast.is_some() && !is_looped {
             self.expansion = None;
         } else if !self.expansion.as_ref().is_some_and(|expansion| expansion.is_for(mechanism, coordinates, order, extended)) {
             self.expansion = Some(Expansion::new(mechanism, coordinates, order, extended));

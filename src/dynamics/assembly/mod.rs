@@ -10,6 +10,7 @@
 //! scene has to say which.
 
 mod newton;
+mod rank;
 mod svd;
 
 use super::compile::CompileError;
@@ -32,8 +33,8 @@ const REACH: f64 = 0.5;
 const DISTINCT: f64 = 1e-4;
 /// What is left of a measured row, once those before it are taken off, counts as zero below this.
 const DEPENDENT: f64 = 1e-9;
-/// More coordinates than this are not taken apart: what is said of rank and doubles stands for the start alone.
-const DENSE: usize = 300;
+/// Up to so many coordinates redundant rows are told from singular ones, and rounding is spread over all that is given.
+const DENSE: usize = 100;
 
 /// How the start was found, and the degrees of freedom that are left.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -106,8 +107,8 @@ impl Mechanism {
                 angles.push((row, between.hi));
             }
         }
-        let omega = problem.find_rates(scene, &given, &found.q, &mut changes)?;
         let mut assembly = problem.rank(&found.q);
+        let omega = problem.find_rates(scene, &given, &found.q, !assembly.singular.is_empty(), &mut changes)?;
         let mut start = Motion::default();
         for (k, &q) in found.q.iter().enumerate() {
             let (phi, turns) = if self.is_winding() || k >= self.bodies.len() { (q, 0.0) } else { q.reduced() };
@@ -189,7 +190,7 @@ impl<'a> Problem<'a> {
         let missing = self.missing();
         let first = self.attempt(&guess, &missing);
         if let (Ok(found), false) = (&first, missing.is_empty()) {
-            self.check_open(found, &missing)?;
+            self.check_open(&found.q, &self.active, &self.held(found), &missing, "phi")?;
         }
         let others = match missing.len() {
             0 => 0,
@@ -219,7 +220,7 @@ impl<'a> Problem<'a> {
             return Err(impossible(self.worst(&held)));
         }
         if !missing.is_empty() {
-            self.check_open(&best, &missing)?;
+            self.check_open(&best.q, &self.active, &self.held(&best), &missing, "phi")?;
         }
         for other in all.iter().filter(|other| other.change <= (2.0 * best.change).max(DISTINCT)) {
             self.check_same(&best, other)?;
@@ -230,6 +231,11 @@ impl<'a> Problem<'a> {
             best.q[k] -= DoubleDouble::TAU.scale(turns);
         }
         Ok(best)
+    }
+
+    /// The aims kept as given.
+    fn held(&self, found: &Found) -> Vec<Aim> {
+        self.aims.iter().zip(&found.held).filter(|(_, held)| **held).map(|(aim, _)| *aim).collect()
     }
 
     /// The start as the scene has it, with guesses where it has none.
@@ -266,7 +272,9 @@ impl<'a> Problem<'a> {
             return Err(self.worst(&q));
         }
         let mut held = none;
-        if !missing.is_empty() {
+        if missing.is_empty() {
+            self.nearest(&mut q, guess);
+        } else {
             let kept = self.kept(&self.aims, &q, &self.active);
             let mut trial = q.clone();
             for (aim, _) in self.aims.iter().zip(&kept).filter(|(_, kept)| **kept) {
@@ -296,7 +304,7 @@ impl<'a> Problem<'a> {
     }
 
     fn add_aims(&self, matrix: &mut Matrix, aims: &[Aim], q: &[DoubleDouble]) {
-        let z = self.linearise::<f64>(q, &vec![0.0; q.len()]).z;
+        let z = self.face::<f64>(q).1;
         for aim in aims {
             matrix.entries.extend(self.aim(aim, q, &z).1);
             matrix.rows += 1;
@@ -305,7 +313,7 @@ impl<'a> Problem<'a> {
 
     /// The value of every aim \[rad or m\].
     fn measured(&self, q: &[DoubleDouble]) -> impl Iterator<Item = f64> {
-        let z = self.linearise::<DoubleDouble>(q, &vec![DoubleDouble::ZERO; q.len()]).z;
+        let z = self.face::<DoubleDouble>(q).1;
         self.aims.iter().map(|aim| self.aim(aim, q, &z).0.hi).collect::<Vec<f64>>().into_iter()
     }
 
@@ -314,14 +322,13 @@ impl<'a> Problem<'a> {
         change / if aim.goal == Goal::Coordinate(aim.bar) { 1.0 } else { self.size }
     }
 
-    /// Refuses a start of which neither rows nor what is given fix a coordinate.
-    fn check_open(&self, found: &Found, missing: &[usize]) -> Result<(), CompileError> {
-        let mut matrix = self.jacobian(&found.q, &self.active);
-        let held: Vec<Aim> = self.aims.iter().zip(&found.held).filter(|(_, held)| **held).map(|(aim, _)| *aim).collect();
-        self.add_aims(&mut matrix, &held, &found.q);
-        let open = matrix.svd().open(found.q.len(), DEPENDENT);
+    /// Refuses a start of which neither rows nor what is given fix a coordinate, or its rate.
+    fn check_open(&self, q: &[DoubleDouble], rows: &[bool], aims: &[Aim], missing: &[usize], what: &str) -> Result<(), CompileError> {
+        let mut matrix = self.jacobian(q, rows);
+        self.add_aims(&mut matrix, aims, q);
+        let open = matrix.svd().open(q.len(), DEPENDENT);
         match missing.iter().copied().max_by(|&a, &b| open[a].total_cmp(&open[b])).filter(|&k| open[k] > 1e-6) {
-            Some(k) => Err(CompileError::Undetermined(self.place(k))),
+            Some(k) => Err(CompileError::Undetermined(self.place(k, what))),
             None => Ok(()),
         }
     }
@@ -336,18 +343,18 @@ impl<'a> Problem<'a> {
         let Some(k) = (0..best.q.len()).max_by(|a, b| apart(a).total_cmp(&apart(b))).filter(|k| apart(k) > DISTINCT) else { return Ok(()) };
         let shown = |q: &DoubleDouble| if k < bodies { q.reduced().0.hi } else { q.hi };
         let unit = if k < bodies { "rad" } else { "m" };
-        Err(CompileError::Ambiguous { what: self.place(k), one: shown(&best.q[k]), other: shown(&other.q[k]), unit })
+        Err(CompileError::Ambiguous { what: self.place(k, "phi"), one: shown(&best.q[k]), other: shown(&other.q[k]), unit })
     }
 
-    /// Where a scene gives a coordinate: `start.bar1.phi`.
-    fn place(&self, k: usize) -> String {
+    /// Where a scene gives a coordinate or, where `what` is `omega`, its rate: `start.bar1.phi`.
+    fn place(&self, k: usize, what: &str) -> String {
         let (bodies, hangs) = (&self.mechanism.bodies, &self.mechanism.forest.hangs);
         if let Some(body) = bodies.get(k) {
-            return format!("start.{}.phi", body.name);
+            return format!("start.{}.{what}", body.name);
         }
         let x = k - (k - bodies.len()) % 2;
         let root = hangs.iter().position(|hang| hang.foot == Foot::Free(x)).unwrap_or(0);
-        format!("start.{}.origin", bodies[root].name)
+        format!("start.{}.{}", bodies[root].name, if what == "phi" { "origin" } else { "velocity" })
     }
 
     /// What of the positions is not as given.
@@ -376,6 +383,7 @@ impl<'a> Problem<'a> {
         scene: &Scene,
         given: &dyn Fn(usize) -> Given,
         q: &[DoubleDouble],
+        is_singular: bool,
         changes: &mut Vec<Change>,
     ) -> Result<Vec<DoubleDouble>, CompileError> {
         let mut aims = Vec::new();
@@ -395,9 +403,9 @@ impl<'a> Problem<'a> {
         }
         let every = vec![true; self.mechanism.rows.len()];
         let (all, none) = (vec![true; aims.len()], vec![false; aims.len()]);
-        let is_whole = Problem { aims: aims.clone(), ..self.clone() }.columns(&all).is_empty();
+        let missing = Problem { aims: aims.clone(), ..self.clone() }.columns(&all);
         let mut ways = vec![all];
-        if !is_whole {
+        if !missing.is_empty() {
             ways.push(self.kept(&aims, q, &every));
         }
         ways.push(none);
@@ -414,51 +422,16 @@ impl<'a> Problem<'a> {
             let unit = if row.is_angle() { "rad/s" } else { "m/s" };
             return Err(CompileError::ImpossibleRates { row: row.name.clone(), left: slips[worst].abs(), unit });
         }
-        let z = self.linearise::<DoubleDouble>(q, &omega).z;
+        if is_singular && !missing.is_empty() && omega.iter().any(|omega| omega.hi != 0.0) {
+            // Rows of lost rank would take any rates for these.
+            self.check_open(q, &every, &aims, &missing, "omega")?;
+        }
+        let z = self.face::<DoubleDouble>(q).1;
         for aim in &aims {
             let used = self.aim_rate(aim, &z, &omega).hi;
             changes.extend(self.change(aim, used, ["omega", "velocity"], ["rad/s", "m/s"]));
         }
         Ok(omega)
-    }
-
-    /// Degrees of freedom, redundant rows and singular ones.
-    fn rank(&self, q: &[DoubleDouble]) -> Assembly {
-        let rows = self.mechanism.rows.len();
-        let every = vec![true; rows];
-        let here = self.jacobian(q, &every);
-        let conditioning = if rows == 0 {
-            1.0
-        } else if q.len() <= DENSE {
-            here.svd().conditioning(DEPENDENT)
-        } else {
-            f64::NAN
-        };
-        let dependent: Vec<bool> = independent(&here, DEPENDENT).iter().map(|new| !new).collect();
-        let mut redundant = dependent.clone();
-        if dependent.contains(&true) && q.len() <= DENSE {
-            let steady: Vec<bool> = self.mechanism.rows.iter().zip(&self.active).map(|(row, &active)| active && !row.is_motor()).collect();
-            let none = vec![false; self.aims.len()];
-            let nearby = (1..=6).filter_map(|k| {
-                let mut near: Vec<DoubleDouble> =
-                    q.iter().enumerate().map(|(j, &q)| q + DoubleDouble::of(0.1 * self.unit[j] * shuffled(k, j))).collect();
-                (self.position(&mut near, &steady, &none) < 1e-9).then_some(near)
-            });
-            for near in nearby.take(3) {
-                let new = independent(&self.jacobian(&near, &every), DEPENDENT);
-                redundant.iter_mut().zip(new).for_each(|(redundant, new)| *redundant &= !new);
-            }
-        }
-        let names =
-            |is: &dyn Fn(usize) -> bool| (0..rows).filter(|&i| is(i)).map(|i| self.mechanism.rows[i].name.clone()).collect::<Vec<_>>();
-        let redundant_names = names(&|i| redundant[i]);
-        Assembly {
-            degrees_of_freedom: q.len() - (rows - redundant_names.len()),
-            singular: names(&|i| dependent[i] && !redundant[i]),
-            redundant: redundant_names,
-            conditioning,
-            ..Assembly::default()
-        }
     }
 }
 

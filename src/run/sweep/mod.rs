@@ -62,6 +62,7 @@ pub struct Sweep {
     limits: Limits,
     skips: Option<Box<Judge>>,
     ends_at_flips: bool,
+    is_strict: bool,
     /// True where only starts are varied in which nothing else has a say: all points share one mechanism.
     shares: bool,
 }
@@ -161,7 +162,20 @@ impl Sweep {
         let shares = variables.iter().all(|variable| variable.start.is_some());
         let template = template.clone();
         let limits = Limits::default();
-        Ok(Self { template, scene, mechanism, request, plan, grid, variables, limits, skips: None, ends_at_flips: false, shares })
+        Ok(Self {
+            template,
+            scene,
+            mechanism,
+            request,
+            plan,
+            grid,
+            variables,
+            limits,
+            skips: None,
+            ends_at_flips: false,
+            is_strict: false,
+            shares,
+        })
     }
 
     /// The same with limits; a point that exceeds one stops.
@@ -172,6 +186,11 @@ impl Sweep {
     /// The same without the points whose values `skips` is true of.
     pub fn without(self, skips: impl Fn(&[f64]) -> bool + Send + Sync + 'static) -> Self {
         Self { skips: Some(Box::new(skips)), ..self }
+    }
+
+    /// The same, where a point is refused of which something given for the start must change to fit its constraints.
+    pub fn strictly(self) -> Self {
+        Self { is_strict: true, ..self }
     }
 
     /// The same with points that end when a bar turns over, at the end of that step or at the next output time.

@@ -154,6 +154,9 @@ impl Sweep {
         }
         let scene = self.template.filled(&self.variables, values).map_err(|error| error.to_string())?;
         let mechanism = Arc::new(Mechanism::new(&scene).map_err(|error| error.to_string())?);
+        if let (true, Some(change)) = (self.is_strict, mechanism.assembly.changes.first()) {
+            return Err(change.to_string());
+        }
         let plan = Plan::new(&scene, &mechanism, &timed(&self.request, &scene)).map_err(|refusal| refusal.to_string())?;
         let (start, scale) = (mechanism.start(&scene), mechanism.energy_scale);
         Ok((mechanism, plan, start, scale))

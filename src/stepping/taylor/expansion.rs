@@ -123,13 +123,22 @@ impl<T: Coefficient> Expansion<T> {
 
     /// Sums no further than to the power that is the smallest at `h` \[s\].
     pub fn sum_to_smallest(&mut self, h: f64) {
-        let f = self.series.coordinates();
-        let size = |m: usize| {
-            let largest = self.series.rate[m * f..(m + 1) * f].iter().fold(0.0, |most, rate| larger(most, rate.value()));
-            largest * libm::pow(h, m as f64)
-        };
-        let smallest = (1..=self.series.order()).min_by(|&a, &b| size(a).total_cmp(&size(b)));
+        let smallest = (1..=self.series.order()).min_by(|&a, &b| self.size(a, h).total_cmp(&self.size(b, h)));
         self.summed = smallest.unwrap_or(self.series.order()) + 1;
+    }
+
+    /// The smallest power at `h` \[s\] over the largest.
+    pub fn smallest(&self, h: f64) -> f64 {
+        let sizes = (0..=self.series.order()).map(|m| self.size(m, h));
+        let (least, most) = sizes.fold((f64::INFINITY, 0.0), |(least, most): (f64, f64), size| (least.min(size), larger(most, size)));
+        least / most
+    }
+
+    /// The largest share of power `m` in a rate at `h` \[s\].
+    fn size(&self, m: usize, h: f64) -> f64 {
+        let f = self.series.coordinates();
+        let largest = self.series.rate[m * f..(m + 1) * f].iter().fold(0.0, |most, rate| larger(most, rate.value()));
+        largest * libm::pow(h, m as f64)
     }
 
     /// Takes a state from where the series was expanded on by `h` \[s\].
@@ -177,12 +186,12 @@ fn add(state: &mut State, i: usize, increment: DoubleDouble) {
 }
 
 /// The larger magnitude, and not a number if either is.
-fn larger(most: f64, value: f64) -> f64 {
+pub(super) fn larger(most: f64, value: f64) -> f64 {
     let size = value.abs();
     if size.is_nan() || most.is_nan() { f64::NAN } else { most.max(size) }
 }
 
 /// -log2 from the bits of a positive double, within 0.09; so large for zero that it never counts.
-fn minus_log2(size: f64) -> f64 {
+pub(super) fn minus_log2(size: f64) -> f64 {
     if size == 0.0 { 1e9 } else { (1_f64.to_bits() as i64 - size.to_bits() as i64) as f64 / (1_u64 << 52) as f64 }
 }

@@ -3,13 +3,12 @@
 use super::bodies::{self, Bodies};
 use super::driven::{self, Driven};
 use super::extended;
+use super::looped::{self, Looped};
 use super::pace::Pace;
 use super::pair::{self, Pair};
 #[cfg(target_arch = "x86_64")]
 use crate::arithmetic::lanes::Avx;
 use crate::arithmetic::lanes::{self, Lanes, Portable};
-use crate::dynamics::row::Row;
-use crate::dynamics::tree::Tree;
 use crate::dynamics::{Mechanism, State};
 
 /// The order of the extended kernel.
@@ -28,8 +27,7 @@ pub struct Fast {
 /// What it was made for.
 #[derive(Clone, Debug, PartialEq)]
 struct Settings {
-    tree: Tree,
-    rows: Vec<Row>,
+    mechanism: Mechanism,
     tolerance: f64,
     order: usize,
     is_portable: bool,
@@ -44,31 +42,34 @@ enum Form {
     Driven(Box<Driven>, Box<driven::Scratch>),
     Few(Box<Bodies<1>>),
     Several(Box<Bodies<2>>),
+    FewLooped(Box<Looped<1>>),
+    SeveralLooped(Box<Looped<2>>),
+    ManyLooped(Box<Looped<4>>),
 }
 
-/// One step of a state by at most so many seconds: the step wanted and the step taken.
-type Step = unsafe fn(&mut Form, &Pace, &mut State, f64) -> (f64, f64);
+/// One step of a state by at most so many seconds: the step wanted and the step taken, or `None` where the series of any mechanism must take over.
+type Step = unsafe fn(&mut Form, &Pace, &mut State, f64) -> Option<(f64, f64)>;
 
 /// From the last step's start on by so many seconds.
-type Go = unsafe fn(&Form, &mut State, f64);
+type Go = unsafe fn(&mut Form, &mut State, f64);
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx,fma")]
-fn hardware_go<const P: usize>(form: &Form, state: &mut State, h: f64) {
+fn hardware_go<const P: usize>(form: &mut Form, state: &mut State, h: f64) {
     go::<Avx, P>(form, state, h);
 }
 
-fn portable_go<const P: usize>(form: &Form, state: &mut State, h: f64) {
+fn portable_go<const P: usize>(form: &mut Form, state: &mut State, h: f64) {
     go::<Portable, P>(form, state, h);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx,fma")]
-fn hardware<const P: usize>(form: &mut Form, pace: &Pace, state: &mut State, left: f64) -> (f64, f64) {
+fn hardware<const P: usize>(form: &mut Form, pace: &Pace, state: &mut State, left: f64) -> Option<(f64, f64)> {
     step::<Avx, P>(form, pace, state, left)
 }
 
-fn portable<const P: usize>(form: &mut Form, pace: &Pace, state: &mut State, left: f64) -> (f64, f64) {
+fn portable<const P: usize>(form: &mut Form, pace: &Pace, state: &mut State, left: f64) -> Option<(f64, f64)> {
     step::<Portable, P>(form, pace, state, left)
 }
 
@@ -82,8 +83,8 @@ fn of_order<const P: usize>(is_portable: bool) -> (Step, Go) {
 }
 
 #[inline(always)]
-fn step<L: Lanes, const P: usize>(form: &mut Form, pace: &Pace, state: &mut State, left: f64) -> (f64, f64) {
-    match form {
+fn step<L: Lanes, const P: usize>(form: &mut Form, pace: &Pace, state: &mut State, left: f64) -> Option<(f64, f64)> {
+    Some(match form {
         Form::Pair(pair, scratch) => {
             let mut flow = pair::Flow::of(pair, state);
             let steps = pair::step::<L, P>(pair, pace, scratch, &mut flow, left);
@@ -104,13 +105,13 @@ fn step<L: Lanes, const P: usize>(form: &mut Form, pace: &Pace, state: &mut Stat
         }
         Form::Few(bodies) => bodies::step::<L, P, 1>(bodies, pace, state, left),
         Form::Several(bodies) => bodies::step::<L, P, 2>(bodies, pace, state, left),
-        Form::Extended(..) => (f64::NAN, 0.0),
-    }
+        _ => (f64::NAN, 0.0),
+    })
 }
 
 /// Takes a state from the last step's start on by `h` \[s\].
 #[inline(always)]
-fn go<L: Lanes, const P: usize>(form: &Form, state: &mut State, h: f64) {
+fn go<L: Lanes, const P: usize>(form: &mut Form, state: &mut State, h: f64) {
     match form {
         Form::Pair(pair, scratch) => {
             let mut flow = pair::Flow::of(pair, state);
@@ -129,6 +130,57 @@ fn go<L: Lanes, const P: usize>(form: &Form, state: &mut State, h: f64) {
         }
         Form::Few(bodies) => bodies::go::<L, P, 1>(bodies, state, h),
         Form::Several(bodies) => bodies::go::<L, P, 2>(bodies, state, h),
+        _ => {}
+    }
+}
+
+/// The code of mechanisms with loops, which takes every order, for this processor.
+fn of_loops(is_portable: bool) -> (Step, Go) {
+    #[cfg(target_arch = "x86_64")]
+    if !is_portable && lanes::available() {
+        return (looped_hardware, looped_hardware_go);
+    }
+    let _ = is_portable;
+    (looped_portable, looped_portable_go)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx,fma")]
+fn looped_hardware(form: &mut Form, _: &Pace, state: &mut State, left: f64) -> Option<(f64, f64)> {
+    looped_step::<Avx>(form, state, left)
+}
+
+fn looped_portable(form: &mut Form, _: &Pace, state: &mut State, left: f64) -> Option<(f64, f64)> {
+    looped_step::<Portable>(form, state, left)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx,fma")]
+fn looped_hardware_go(form: &mut Form, state: &mut State, h: f64) {
+    looped_go::<Avx>(form, state, h);
+}
+
+fn looped_portable_go(form: &mut Form, state: &mut State, h: f64) {
+    looped_go::<Portable>(form, state, h);
+}
+
+#[inline(always)]
+fn looped_step<L: Lanes>(form: &mut Form, state: &mut State, left: f64) -> Option<(f64, f64)> {
+    match form {
+        Form::FewLooped(looped) => looped::step::<L, 1>(looped, state, left),
+        Form::SeveralLooped(looped) => looped::step::<L, 2>(looped, state, left),
+        Form::ManyLooped(looped) => looped::step::<L, 4>(looped, state, left),
+        _ => None,
+    }
+}
+
+#[inline(always)]
+fn looped_go<L: Lanes>(form: &mut Form, state: &mut State, h: f64) {
+    match form {
+        Form::FewLooped(looped) => looped::go::<L, 1>(looped, state, h),
+        Form::SeveralLooped(looped) => looped::go::<L, 2>(looped, state, h),
+        Form::ManyLooped(looped) => looped::go::<L, 4>(looped, state, h),
+        _ => {}
     }
 }
 
@@ -159,22 +211,32 @@ impl Fast {
             let longest = bodies.longest(order);
             (Form::Several(Box::new(bodies)), longest)
         };
-        let settings = Settings { tree: mechanism.tree.clone(), rows: mechanism.rows.clone(), tolerance, order, is_portable, is_extended };
+        let settings = Settings { mechanism: mechanism.clone(), tolerance, order, is_portable, is_extended };
         Some(Self { settings, form, pace: Pace::new(tolerance, order, longest), step, go })
+    }
+
+    /// The kernel of a mechanism with loops, where there is one.
+    pub fn of_looped(mechanism: &Mechanism, tolerance: f64, order: usize, is_portable: bool) -> Option<Self> {
+        let form = match mechanism.size() {
+            0..=4 => Form::FewLooped(Box::new(Looped::new(mechanism, tolerance, order)?)),
+            5..=8 => Form::SeveralLooped(Box::new(Looped::new(mechanism, tolerance, order)?)),
+            _ => Form::ManyLooped(Box::new(Looped::new(mechanism, tolerance, order)?)),
+        };
+        let (step, go) = of_loops(is_portable);
+        let settings = Settings { mechanism: mechanism.clone(), tolerance, order, is_portable, is_extended: false };
+        Some(Self { settings, form, pace: Pace::new(tolerance, order, f64::INFINITY), step, go })
     }
 
     /// True where it was made for all these.
     pub fn is_for(&self, mechanism: &Mechanism, tolerance: f64, order: usize, is_portable: bool, is_extended: bool) -> bool {
         let made = &self.settings;
         (made.tolerance, made.order, made.is_portable, made.is_extended) == (tolerance, order, is_portable, is_extended)
-            && made.tree == mechanism.tree
-            && made.rows == mechanism.rows
-            && mechanism.is_plain()
+            && made.mechanism == *mechanism
     }
 
     /// One step of at most `left` \[s\] from the state's unknowns, which are then the new ones; returns the step wanted and the step taken.
     #[inline]
-    pub fn step(&mut self, state: &mut State, left: f64) -> (f64, f64) {
+    pub fn step(&mut self, state: &mut State, left: f64) -> Option<(f64, f64)> {
         // SAFETY: `of_order` hands out code for AVX and FMA only after the processor was asked for them; all else in it is safe code.
         #[allow(unsafe_code)]
         unsafe {
@@ -183,11 +245,11 @@ impl Fast {
     }
 
     /// Takes a state that stands where the last step began on by `h` \[s\], as the step would have.
-    pub fn go(&self, state: &mut State, h: f64) {
+    pub fn go(&mut self, state: &mut State, h: f64) {
         // SAFETY: as in `step`.
         #[allow(unsafe_code)]
         unsafe {
-            (self.go)(&self.form, state, h);
+            (self.go)(&mut self.form, state, h);
         }
     }
 }

@@ -1,0 +1,243 @@
+//! Small mechanisms with closed loops in (q, w), their accelerations found in natural coordinates.
+//!
+//! ```text
+//! z = exp(i q),   S mu = z·W F + w²,   a_k = (i z_k)·(W F)_k - Σ_j T_kj mu_j        S, T: `natural::columns`
+//! ```
+//!
+//! Pins, lines of the ground and locked angles are linear in z and part of the constant W: what is left is one row a body, and no velocity term but w².
+//! Half the cost of [`Multiplier`] with its factors of M and of the rows' S, whose unknowns and account of work it shares.
+//!
+//! Written once over [`Lanes`] and compiled twice, to the same bits; this file is the one place where its code for the processor is entered.
+
+use super::force::action::Kind;
+use super::multiplier::Multiplier;
+use super::natural::columns::{self, Columns, Row, load, store};
+use super::natural::{Reduced, sorted_rows};
+use super::{Coordinates, Field, Form, Glance, Mechanism, Motion, State, Time};
+#[cfg(target_arch = "x86_64")]
+use crate::arithmetic::lanes::Avx;
+use crate::arithmetic::lanes::{self, Lanes, Portable};
+use crate::arithmetic::{Complex, sincos};
+use std::sync::Arc;
+
+/// Largest number of bodies; beyond, the form in angles is cheaper.
+pub const MOST: usize = 16;
+
+/// Equations in angles and rates, solved in natural coordinates.
+#[derive(Clone, Debug)]
+pub struct Looped {
+    mechanism: Arc<Mechanism>,
+    /// What all else is asked of.
+    angles: Multiplier<0, true>,
+    room: Room,
+    is_portable: bool,
+}
+
+/// Up to four, eight or sixteen bodies.
+#[derive(Clone, Debug)]
+enum Room {
+    Few(Box<Bench<1>>),
+    Several(Box<Bench<2>>),
+    Many(Box<Bench<4>>),
+}
+
+/// Constants and scratch space.
+#[derive(Clone, Debug)]
+struct Bench<const B: usize> {
+    columns: Columns<B>,
+    schur: Vec<Row<B>>,
+    across: Vec<Row<B>>,
+    z: Vec<Complex<f64>>,
+    force: Vec<Complex<f64>>,
+    alpha: Row<B>,
+}
+
+/// The matrices of a mechanism this form fits: hinged bodies only, with rows other than angles, all of them linear with constant coefficients.
+pub fn reduced(mechanism: &Mechanism) -> Option<Reduced> {
+    if mechanism.size() == 0 || mechanism.size() > MOST || !mechanism.is_tied_up() || !mechanism.contacts.is_empty() {
+        return None;
+    }
+    let (linear, guides) = sorted_rows(mechanism);
+    if guides.is_empty() { Reduced::new(mechanism, linear).ok() } else { None }
+}
+
+impl Looped {
+    /// The form of a mechanism, where it fits.
+    pub fn new(mechanism: Arc<Mechanism>) -> Option<Self> {
+        let reduced = reduced(&mechanism)?;
+        let room = match mechanism.bodies.len() {
+            0..=4 => Room::Few(Box::new(Bench::new(&reduced))),
+            5..=8 => Room::Several(Box::new(Bench::new(&reduced))),
+            _ => Room::Many(Box::new(Bench::new(&reduced))),
+        };
+        Some(Self { angles: Multiplier::new(Arc::clone(&mechanism)), mechanism, room, is_portable: false })
+    }
+
+    /// The same without instructions special to the processor: slowly to the same bits.
+    pub fn portable(mut self) -> Self {
+        self.is_portable = true;
+        self
+    }
+}
+
+impl<const B: usize> Bench<B> {
+    fn new(reduced: &Reduced) -> Self {
+        let n = reduced.free.len();
+        Self {
+            columns: Columns::new(reduced),
+            schur: vec![[[0.0; 4]; B]; n],
+            across: vec![[[0.0; 4]; B]; n],
+            z: vec![Complex::ZERO; n],
+            force: vec![Complex::ZERO; n],
+            alpha: [[0.0; 4]; B],
+        }
+    }
+
+    /// Accelerations and unit vectors, by the processor's vectors where it has them.
+    fn run(&mut self, mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64], is_portable: bool) -> (&[f64], &[Complex<f64>]) {
+        #[cfg(target_arch = "x86_64")]
+        if !is_portable && lanes::available() {
+            // SAFETY: the processor has been asked; all else in that code is safe.
+            #[allow(unsafe_code)]
+            unsafe {
+                hardware(self, mechanism, t, phi, omega);
+            }
+            return (&self.alpha.as_flattened()[..phi.len()], &self.z);
+        }
+        let _ = is_portable;
+        accelerate::<Portable, B>(self, mechanism, t, phi, omega);
+        (&self.alpha.as_flattened()[..phi.len()], &self.z)
+    }
+}
+
+/// The same code compiled for the processor.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx,fma")]
+fn hardware<const B: usize>(bench: &mut Bench<B>, mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64]) {
+    accelerate::<Avx, B>(bench, mechanism, t, phi, omega);
+}
+
+/// Accelerations \[rad/s²\] into `alpha`.
+#[inline(always)]
+fn accelerate<L: Lanes, const B: usize>(bench: &mut Bench<B>, mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64]) {
+    let n = phi.len();
+    let (mut angles, mut rates) = ([[0.0; 4]; B], [[0.0; 4]; B]);
+    angles.as_flattened_mut()[..n].copy_from_slice(phi);
+    rates.as_flattened_mut()[..n].copy_from_slice(&omega[..n]);
+    let (mut c, mut s) = ([L::ZERO; B], [L::ZERO; B]);
+    for b in 0..B {
+        (s[b], c[b]) = sincos::sin_cos(L::of(angles[b]), L::ZERO);
+    }
+    let (cos, sin) = (store(c), store(s));
+    let Bench { columns, schur, across, z, force, alpha } = bench;
+    for (z, (&c, &s)) in z.iter_mut().zip(cos.as_flattened().iter().zip(sin.as_flattened())) {
+        *z = Complex::new(c, s);
+    }
+    forces(mechanism, t, phi, omega, z, force);
+    let mut free = [[L::ZERO; B]; 2];
+    for j in 0..n {
+        let block = &columns.blocks[j];
+        let [x, y] = columns::turned::<L, B>(block, z[j].re, z[j].im);
+        let (fx, fy) = (L::splat(force[j].re), L::splat(force[j].im));
+        for b in 0..B {
+            schur[j][b] = c[b].mul_add(x[b], s[b].mul(y[b])).array();
+            across[j][b] = s[b].neg_mul_add(x[b], c[b].mul(y[b])).array();
+            free[0][b] = L::of(block[0][b]).mul_add(fx, L::of(block[1][b]).mul_add(fy, free[0][b]));
+            free[1][b] = L::of(block[2][b]).mul_add(fx, L::of(block[3][b]).mul_add(fy, free[1][b]));
+        }
+    }
+    let (mut right, mut turning) = ([[0.0; 4]; B], [L::ZERO; B]);
+    for b in 0..B {
+        let rate = L::of(rates[b]);
+        right[b] = c[b].mul_add(free[0][b], s[b].mul_add(free[1][b], rate.mul(rate))).array();
+        turning[b] = s[b].neg_mul_add(free[0][b], c[b].mul(free[1][b]));
+    }
+    columns::solve::<L, B>(&mut schur[..n], &columns.scale, &mut right);
+    for (across, &mu) in across.iter().zip(right.as_flattened()) {
+        let mu = L::splat(mu);
+        let across: [L; B] = load(across);
+        for b in 0..B {
+            turning[b] = across[b].neg_mul_add(mu, turning[b]);
+        }
+    }
+    *alpha = store(turning);
+}
+
+/// Writes the force \[N·m\] on every unit vector; torques act across it.
+#[inline(always)]
+fn forces(mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64], z: &[Complex<f64>], force: &mut [Complex<f64>]) {
+    force.copy_from_slice(&mechanism.tree.weight);
+    for spring in &mechanism.springs {
+        spring.span.spread(spring.force(z, omega), |k, pull| force[k] += pull);
+    }
+    for torsion in &mechanism.torsions {
+        let torque = torsion.torque(phi, omega);
+        force[torsion.body] += z[torsion.body].left().times(torque);
+        if let Some(base) = torsion.base {
+            force[base] -= z[base].left().times(torque);
+        }
+    }
+    for action in &mechanism.actions {
+        let factor = action.factor(t);
+        match &action.kind {
+            Kind::Force { point, .. } => point.spread(action.force(factor, z), |k, pull| force[k] += pull),
+            Kind::Torque { torque, base } => {
+                force[action.body] += z[action.body].left().times(torque * factor);
+                if let Some(base) = base {
+                    force[*base] -= z[*base].left().times(torque * factor);
+                }
+            }
+        }
+    }
+}
+
+impl Field for Looped {
+    fn dimension(&self) -> usize {
+        self.angles.dimension()
+    }
+
+    fn angles(&self) -> usize {
+        self.angles.angles()
+    }
+
+    fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
+        let mechanism = &*self.mechanism;
+        let n = mechanism.bodies.len();
+        let (phi, omega) = (&y[..n], &y[n..2 * n]);
+        let (alpha, z) = match &mut self.room {
+            Room::Few(bench) => bench.run(mechanism, t, phi, omega, self.is_portable),
+            Room::Several(bench) => bench.run(mechanism, t, phi, omega, self.is_portable),
+            Room::Many(bench) => bench.run(mechanism, t, phi, omega, self.is_portable),
+        };
+        rate[n..2 * n].copy_from_slice(alpha);
+        rate[..n].copy_from_slice(omega);
+        // Rows that never move do no work.
+        (rate[2 * n], rate[2 * n + 1]) = (mechanism.force_power(t, z, omega), 0.0);
+    }
+
+    fn label(&self, i: usize) -> String {
+        self.angles.label(i)
+    }
+}
+
+impl Form for Looped {
+    fn mechanism(&self) -> &Mechanism {
+        &self.mechanism
+    }
+
+    fn coordinates(&self) -> Coordinates {
+        Coordinates::All
+    }
+
+    fn state(&self, motion: &Motion) -> State {
+        self.angles.state(motion)
+    }
+
+    fn read(&mut self, state: &State, motion: &mut Motion) {
+        self.angles.read(state, motion);
+    }
+
+    fn glance(&mut self, state: &State, glance: &mut Glance) {
+        self.angles.glance(state, glance);
+    }
+}

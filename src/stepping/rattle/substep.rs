@@ -1,0 +1,539 @@
+//! One substep of RATTLE: its unknowns and how they are moved.
+
+use super::newton::Matrix;
+use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
+use crate::dynamics::natural::{Demand, Natural, times, upper};
+use crate::dynamics::tree::{self, size};
+use crate::dynamics::{Form, State, Time, schur};
+
+/// Newton sweeps before a step is given up; an ordinary step takes three or four.
+const SWEEPS: usize = 30;
+
+/// What plain sweeps may leave of the multipliers, against the forces: the last sweep is made with pairs and takes the rest.
+const LEFT_OVER: f64 = 1e-13;
+
+/// Largest change, against the forces, at which a solve that has stopped improving counts as solved.
+const STALLED: f64 = 1e-11;
+
+/// What may be left of a row before the last sweep, at a position where some row is lost.
+const KEPT: f64 = 1e-10;
+
+/// Why a substep failed, with the row or element at fault.
+#[derive(Clone, Copy, Debug)]
+pub enum Failure {
+    /// A force.
+    NotFinite(usize),
+    /// No multipliers found.
+    NotConverged(usize),
+    /// Converged, but on the far side of the circle.
+    TooFar(usize),
+}
+
+/// A step's unknowns and scratch space, for n elements and R rows (one a body, then one a guide).
+#[derive(Clone, Debug, Default)]
+pub struct Work {
+    /// z (n).
+    z: Vec<Complex<DoubleDouble>>,
+    /// z' (n).
+    v: Vec<Complex<DoubleDouble>>,
+    /// p_t.
+    account: DoubleDouble,
+    /// Whole turns, one a body.
+    turns: Vec<i64>,
+    /// z0 + h v0 (n), and its leading parts.
+    predicted: Vec<Complex<DoubleDouble>>,
+    ahead: Vec<Complex<f64>>,
+    /// z (n), leading parts.
+    here: Vec<Complex<f64>>,
+    /// F (n), then W F (n).
+    force: Vec<Complex<f64>>,
+    free: Vec<Complex<f64>>,
+    /// W (F - g mu) (n).
+    acceleration: Vec<Complex<f64>>,
+    /// Scratch (n).
+    change_back: Vec<Complex<f64>>,
+    /// Columns W g of the rows (R × n).
+    lifted: Vec<Complex<f64>>,
+    /// Gradients of the guides at `here` (guides × n).
+    gradient: Vec<Complex<f64>>,
+    /// What the guides ask for at the end of the substep.
+    demand: Vec<Demand<DoubleDouble>>,
+    plain_demand: Vec<Demand<f64>>,
+    /// C_t of the guides at `here`.
+    drive: Vec<f64>,
+    /// mu (R).
+    multiplier: Vec<f64>,
+    /// mu at the beginning of the sweeps (R).
+    guess: Vec<f64>,
+    /// Newton matrix, then its factors.
+    newton: Matrix,
+    /// S (R × R), then its factors, its reciprocal pivots, and what these are measured against.
+    schur: Vec<f64>,
+    pivot: Vec<f64>,
+    scales: Vec<f64>,
+    /// C(z0 + h v0)·2/h² (R).
+    offset: Vec<f64>,
+    /// Right side, then solution (R).
+    change: Vec<f64>,
+    /// Largest force, and largest inertia \[N·m, kg·m²\].
+    strength: f64,
+    inertia: f64,
+    /// What changes of the multipliers are measured against: the force, or what moves a vector by an ulp in one substep \[N·m\].
+    scale: f64,
+}
+
+impl Work {
+    /// Room for a mechanism.
+    pub fn resize(&mut self, natural: &Natural) {
+        let (n, rows, guides) = (natural.elements(), natural.rows(), natural.guides().len());
+        for pairs in [&mut self.z, &mut self.v, &mut self.predicted] {
+            pairs.resize(n, Complex::ZERO);
+        }
+        let plain = [&mut self.ahead, &mut self.here, &mut self.force, &mut self.free, &mut self.acceleration, &mut self.change_back];
+        for plain in plain {
+            plain.resize(n, Complex::ZERO);
+        }
+        self.turns.resize(rows - guides, 0);
+        self.inertia = natural.mechanism().tree.diagonal.iter().copied().fold(0.0, f64::max);
+        self.lifted.resize(rows * n, Complex::ZERO);
+        self.gradient.resize(guides * n, Complex::ZERO);
+        self.demand.resize(guides, Demand::default());
+        self.plain_demand.resize(guides, Demand::default());
+        self.drive.resize(guides, 0.0);
+        self.scales = natural.scales();
+        self.newton.resize(&self.scales);
+        self.schur.resize(rows * rows, 0.0);
+        for column in [&mut self.multiplier, &mut self.guess, &mut self.pivot, &mut self.offset, &mut self.change] {
+            column.resize(rows, 0.0);
+        }
+    }
+
+    /// Takes over a state.
+    pub fn load<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural, state: &State) {
+        let n = self.z.len();
+        for k in 0..n {
+            self.z[k] = Complex::new(state.unknown(2 * k), state.unknown(2 * k + 1));
+            self.v[k] = Complex::new(state.unknown(2 * (n + k)), state.unknown(2 * (n + k) + 1));
+        }
+        self.turns.copy_from_slice(&state.turns);
+        if state.y.len() > 4 * n {
+            self.account = state.unknown(4 * n);
+        }
+        self.ask(natural, state.time);
+        self.face::<N, GUIDED>(natural);
+        if state.memory.len() == self.multiplier.len() {
+            self.multiplier.copy_from_slice(&state.memory);
+        } else {
+            // The free accelerations are a poor first guess, but a safe one.
+            self.multiplier.fill(0.0);
+        }
+    }
+
+    /// Hands the state back; `memory` keeps the multipliers, from which the next step's Newton sweeps start.
+    pub fn store(&self, state: &mut State) {
+        let n = self.z.len();
+        let unknowns = self.z.iter().chain(&self.v).flat_map(|x| [x.re, x.im]).chain((state.y.len() > 4 * n).then_some(self.account));
+        for ((y, low), unknown) in state.y.iter_mut().zip(&mut state.low).zip(unknowns) {
+            (*y, *low) = (unknown.hi, unknown.lo);
+        }
+        state.turns.copy_from_slice(&self.turns);
+        state.memory.resize(self.multiplier.len(), 0.0);
+        state.memory.copy_from_slice(&self.multiplier);
+    }
+
+    /// One step of RATTLE from the state at hand to time `end`, `h` \[s\] later.
+    #[inline]
+    pub fn substep<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural, h: f64, end: Time) -> Result<(), Failure> {
+        self.predict::<N, GUIDED>(natural, h, end);
+        self.solve_position::<N, GUIDED>(natural, h)?;
+        self.kick::<N, true>(h);
+        self.settle::<N, GUIDED>(natural, h)?;
+        self.account::<GUIDED>(h);
+        self.turn::<N, GUIDED>(natural)?;
+        self.face::<N, GUIDED>(natural);
+        self.solve_velocity::<N, GUIDED>(natural, h)?;
+        self.kick::<N, false>(h);
+        self.account::<GUIDED>(h);
+        Ok(())
+    }
+
+    /// Number of bodies, whose rows are the first.
+    #[inline(always)]
+    fn bodies<const N: usize, const GUIDED: bool>(&self) -> usize {
+        if GUIDED { self.turns.len() } else { size::<N>(self.z.len()) }
+    }
+
+    /// What the guides ask for at time `t`.
+    #[inline(always)]
+    fn ask(&mut self, natural: &Natural, t: Time) {
+        for ((demand, plain), guide) in self.demand.iter_mut().zip(&mut self.plain_demand).zip(natural.guides()) {
+            *demand = guide.demand(t);
+            *plain = demand.plain();
+        }
+    }
+
+    /// z0 + h v0, and by how much it violates the constraints at time `end`: in plain doubles, since the last sweep takes the rest.
+    #[inline(always)]
+    fn predict<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural, h: f64, end: Time) {
+        let (n, bodies) = (size::<N>(self.z.len()), self.bodies::<N, GUIDED>());
+        natural.reduced().put_rates_back(&mut self.v, &mut self.change_back);
+        let (z, v, predicted, ahead) = (&self.z[..n], &self.v[..n], &mut self.predicted[..n], &mut self.ahead[..n]);
+        let offset = &mut self.offset;
+        for k in 0..n {
+            predicted[k] = Complex::new(z[k].re + v[k].re.scale(h), z[k].im + v[k].im.scale(h));
+        }
+        natural.reduced().put_back(predicted, &mut self.change_back);
+        for k in 0..n {
+            ahead[k] = plain(predicted[k]);
+        }
+        for k in 0..bodies {
+            // (|z + h v|² - 1) / h², without the difference.
+            offset[k] = plain(v[k]).norm_squared() + plain(z[k]).dot(plain(v[k])) * (2.0 / h);
+        }
+        if GUIDED {
+            self.ask(natural, end);
+            for (r, guide) in natural.guides().iter().enumerate() {
+                self.offset[bodies + r] = guide.value(&self.plain_demand[r], &self.ahead) * (2.0 / (h * h));
+            }
+        }
+        self.scale = self.strength.max(f64::EPSILON * self.inertia * (2.0 / (h * h)));
+    }
+
+    /// Finds mu such that z0 + h v0 + h²/2 a(mu) keeps the constraints: by sweeps with the matrix of the first and, where these do not converge, with that
+    /// of each.
+    #[inline(always)]
+    fn solve_position<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural, h: f64) -> Result<(), Failure> {
+        self.guess.copy_from_slice(&self.multiplier);
+        match self.sweep::<N, GUIDED, false>(natural, h) {
+            Ok(()) => Ok(()),
+            Err(failure @ Failure::NotFinite(_)) => Err(failure),
+            Err(_) => {
+                self.multiplier.copy_from_slice(&self.guess);
+                self.sweep::<N, GUIDED, true>(natural, h)
+            }
+        }
+    }
+
+    /// The sweeps, with exchanges where `EXCHANGED`.
+    #[inline(always)]
+    fn sweep<const N: usize, const GUIDED: bool, const EXCHANGED: bool>(&mut self, natural: &Natural, h: f64) -> Result<(), Failure> {
+        let push = 0.5 * h * h;
+        let mut last = f64::INFINITY;
+        for sweep in 0..SWEEPS {
+            self.accelerate::<N, GUIDED>();
+            self.residual::<N, GUIDED>(natural, push);
+            if EXCHANGED {
+                self.newton_matrix::<N, GUIDED>(natural, push);
+                self.newton.factor_exchanged();
+            } else if sweep == 0 {
+                self.newton_matrix::<N, GUIDED>(natural, push);
+                let is_sound = if GUIDED { self.newton.factor::<0>() } else { self.newton.factor::<N>() };
+                if !is_sound {
+                    return Err(self.lost().unwrap_or(Failure::NotConverged(0)));
+                }
+            }
+            let rows = rows::<N, GUIDED>(self.change.len());
+            let (change, multiplier) = (&mut self.change[..rows], &mut self.multiplier[..rows]);
+            if GUIDED {
+                self.newton.solve::<0>(change);
+            } else {
+                self.newton.solve::<N>(change);
+            }
+            let (mut largest, mut culprit, mut scale) = (0.0, 0, self.scale);
+            for p in 0..rows {
+                multiplier[p] += change[p];
+                scale = multiplier[p].abs().max(scale);
+                if change[p].abs() > largest || change[p].is_nan() {
+                    (largest, culprit) = (change[p].abs(), p);
+                }
+            }
+            if !largest.is_finite() {
+                return Err(self.lost().unwrap_or(Failure::NotConverged(culprit)));
+            }
+            // Sweeps contract by about largest/last, so this is what the next one would still change.
+            if largest == 0.0 || (sweep > 0 && largest * largest <= LEFT_OVER * scale * last) {
+                self.accelerate::<N, GUIDED>();
+                return Ok(());
+            }
+            if largest >= last {
+                if last > STALLED * scale {
+                    return Err(Failure::NotConverged(culprit));
+                }
+                self.accelerate::<N, GUIDED>();
+                return Ok(());
+            }
+            last = largest;
+        }
+        Err(Failure::NotConverged(0))
+    }
+
+    /// The element whose force is not finite.
+    fn lost(&self) -> Option<Failure> {
+        self.free.iter().position(|free| !(free.re.is_finite() && free.im.is_finite())).map(Failure::NotFinite)
+    }
+
+    /// W (F - g mu) from the columns W g at hand.
+    #[inline(always)]
+    fn accelerate<const N: usize, const GUIDED: bool>(&mut self) {
+        let n = size::<N>(self.z.len());
+        let rows = rows::<N, GUIDED>(self.multiplier.len());
+        let (acceleration, free) = (&mut self.acceleration[..n], &self.free[..n]);
+        let (lifted, multiplier) = (&self.lifted[..rows * n], &self.multiplier[..rows]);
+        acceleration.copy_from_slice(free);
+        for p in 0..rows {
+            for k in 0..n {
+                acceleration[k] -= lifted[p * n + k].times(multiplier[p]);
+            }
+        }
+    }
+
+    /// C(z0 + h v0 + push a) / push into `change`: the offset, and what the acceleration adds to it.
+    #[inline(always)]
+    fn residual<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural, push: f64) {
+        let (n, bodies) = (size::<N>(self.z.len()), self.bodies::<N, GUIDED>());
+        let (ahead, acceleration) = (&self.ahead[..n], &self.acceleration[..n]);
+        let rows = rows::<N, GUIDED>(self.change.len());
+        let (change, offset) = (&mut self.change[..rows], &self.offset[..rows]);
+        for k in 0..bodies {
+            change[k] = offset[k] + (ahead[k].dot(acceleration[k]) + 0.5 * push * acceleration[k].norm_squared());
+        }
+        if GUIDED {
+            for (r, guide) in natural.guides().iter().enumerate() {
+                let demand = &self.plain_demand[r];
+                let linear = guide.slip(demand, ahead, acceleration);
+                change[bodies + r] = offset[bodies + r] + (linear + push * guide.square(demand, acceleration));
+            }
+        }
+    }
+
+    /// Gradients at the predicted end against the columns at the start.
+    #[inline(always)]
+    fn newton_matrix<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural, push: f64) {
+        let n = size::<N>(self.z.len());
+        let (here, ahead, acceleration) = (&mut self.here[..n], &self.ahead[..n], &self.acceleration[..n]);
+        for k in 0..n {
+            here[k] = ahead[k] + acceleration[k].times(push);
+        }
+        if GUIDED {
+            self.guide_gradients(natural);
+        }
+        let (bodies, rows) = (self.bodies::<N, GUIDED>(), rows::<N, GUIDED>(self.change.len()));
+        let matrix = &mut self.newton.entries[..rows * rows];
+        project(n, bodies, rows, &self.here, &self.gradient, &self.lifted, matrix);
+    }
+
+    /// Gradients of the guides at `here`.
+    fn guide_gradients(&mut self, natural: &Natural) {
+        let n = self.here.len();
+        self.gradient.fill(Complex::ZERO);
+        for ((guide, demand), gradient) in natural.guides().iter().zip(&self.plain_demand).zip(self.gradient.chunks_mut(n)) {
+            guide.gradient(demand, &self.here, gradient);
+        }
+    }
+
+    /// v += h/2 a and, where `DRIFT`, the predicted end with it by h times the very same change: with h²/2 instead, rounded on its own, the
+    /// two would disagree by a constant part of 1e-16, and the energy drift.
+    #[inline(always)]
+    fn kick<const N: usize, const DRIFT: bool>(&mut self, h: f64) {
+        let n = size::<N>(self.z.len());
+        let (v, predicted, acceleration) = (&mut self.v[..n], &mut self.predicted[..n], &self.acceleration[..n]);
+        for k in 0..n {
+            let change = acceleration[k].times(0.5 * h);
+            v[k] = Complex::new(v[k].re + change.re, v[k].im + change.im);
+            if DRIFT {
+                predicted[k] = Complex::new(predicted[k].re + h * change.re, predicted[k].im + h * change.im);
+            }
+        }
+    }
+
+    /// p_t -= h/2 lambda·C_t.
+    #[inline(always)]
+    fn account<const GUIDED: bool>(&mut self, h: f64) {
+        if GUIDED {
+            let bodies = self.turns.len();
+            for (lambda, drive) in self.multiplier[bodies..].iter().zip(&self.drive) {
+                self.account = self.account + -0.5 * h * lambda * drive;
+            }
+        }
+    }
+
+    /// One more sweep, with the constraints formed from pairs.  Sweeps in plain doubles leave lengths wrong by some 1e-22 with a preferred
+    /// sign, and a length that is always too short is a steady loss of energy.
+    #[inline(always)]
+    fn settle<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural, h: f64) -> Result<(), Failure> {
+        let (n, bodies) = (size::<N>(self.z.len()), self.bodies::<N, GUIDED>());
+        let rows = rows::<N, GUIDED>(self.change.len());
+        let (predicted, change) = (&self.predicted[..n], &mut self.change[..rows]);
+        let per_push = 2.0 / (h * h);
+        for k in 0..bodies {
+            change[k] = 0.5 * (predicted[k].norm_squared() + -1.0).hi * per_push;
+        }
+        if GUIDED {
+            for (r, guide) in natural.guides().iter().enumerate() {
+                change[bodies + r] = guide.value(&self.demand[r], predicted).hi * per_push;
+            }
+        }
+        for (row, change) in change.iter().enumerate() {
+            let is_kept = change.abs() <= KEPT * per_push;
+            if !is_kept {
+                return Err(Failure::NotConverged(row));
+            }
+        }
+        if GUIDED {
+            self.newton.solve::<0>(change);
+        } else {
+            self.newton.solve::<N>(change);
+        }
+        let (acceleration, lifted) = (&mut self.acceleration[..n], &self.lifted[..rows * n]);
+        acceleration.fill(Complex::ZERO);
+        for p in 0..rows {
+            self.multiplier[p] += change[p];
+            for k in 0..n {
+                acceleration[k] -= lifted[p * n + k].times(change[p]);
+            }
+        }
+        self.kick::<N, true>(h);
+        Ok(())
+    }
+
+    /// Arrives at `predicted` and counts turns; refuses the root on the far side of the circle.
+    #[inline(always)]
+    fn turn<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural) -> Result<(), Failure> {
+        let (n, bodies) = (size::<N>(self.z.len()), self.bodies::<N, GUIDED>());
+        let (z, predicted, here, turns) = (&mut self.z[..n], &self.predicted[..n], &mut self.here[..n], &mut self.turns[..bodies]);
+        for k in 0..bodies {
+            let (before, after) = (z[k], predicted[k]);
+            (z[k], here[k]) = (after, plain(after));
+            let old = plain(before);
+            if old.dot(here[k]) <= 0.0 {
+                return Err(Failure::TooFar(k));
+            }
+            if upper(before) != upper(after) {
+                turns[k] += match (upper(after), old.cross(here[k]) > 0.0) {
+                    (false, true) => 1,
+                    (true, false) => -1,
+                    _ => 0,
+                };
+            }
+        }
+        for k in bodies..n {
+            (z[k], here[k]) = (predicted[k], plain(predicted[k]));
+        }
+        if GUIDED {
+            for (r, guide) in natural.guides().iter().enumerate() {
+                if guide.mismatch(&self.plain_demand[r], here).re <= 0.0 {
+                    return Err(Failure::TooFar(bodies + r));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Forces, gradients and columns W g at z and the time last asked about.
+    #[inline(always)]
+    fn face<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural) {
+        let (n, bodies) = (size::<N>(self.z.len()), self.bodies::<N, GUIDED>());
+        let rows = rows::<N, GUIDED>(self.change.len());
+        for k in 0..n {
+            self.here[k] = plain(self.z[k]);
+        }
+        natural.force(&self.here[..n], &mut self.force[..n]);
+        let (here, force, free) = (&self.here[..n], &self.force[..n], &mut self.free[..n]);
+        let (w, lifted) = (&natural.reduced().inverse[..n * n], &mut self.lifted[..rows * n]);
+        self.strength = 0.0;
+        for i in 0..n {
+            self.strength = self.strength.max(force[i].re.abs()).max(force[i].im.abs());
+            let mut sum = Complex::ZERO;
+            for j in 0..n {
+                sum += times(&w[i * n + j], force[j]);
+            }
+            for j in 0..bodies {
+                lifted[j * n + i] = times(&w[i * n + j], here[j]);
+            }
+            free[i] = sum;
+        }
+        if GUIDED {
+            self.guide_gradients(natural);
+            for (r, guide) in natural.guides().iter().enumerate() {
+                self.drive[r] = guide.drive(&self.plain_demand[r], &self.here);
+                let gradient = &self.gradient[r * n..(r + 1) * n];
+                for (lifted, w) in self.lifted[(bodies + r) * n..(bodies + r + 1) * n].iter_mut().zip(natural.reduced().inverse.chunks(n)) {
+                    *lifted = w.iter().zip(gradient).fold(Complex::ZERO, |sum, (w, &g)| sum + times(w, g));
+                }
+            }
+        }
+    }
+
+    /// Finds mu' such that v½ + h/2 a(mu') keeps the constraints' rates.
+    #[inline(always)]
+    fn solve_velocity<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural, h: f64) -> Result<(), Failure> {
+        let (n, bodies) = (size::<N>(self.z.len()), self.bodies::<N, GUIDED>());
+        let rows = rows::<N, GUIDED>(self.change.len());
+        project(n, bodies, rows, &self.here, &self.gradient, &self.lifted, &mut self.schur[..rows * rows]);
+        let (z, v, here, free) = (&self.z[..n], &self.v[..n], &self.here[..n], &self.free[..n]);
+        if let Some(failure) = self.lost() {
+            return Err(failure);
+        }
+        // z1·v½ = h/2 |v½|², because both ends of the step lie on the circle; but not to the last bit where linear rows were put back on the way.
+        let is_direct = natural.reduced().rows.is_empty();
+        for k in 0..bodies {
+            let swing = if is_direct { plain(v[k]).norm_squared() } else { z[k].dot(v[k]).value() * (2.0 / h) };
+            self.multiplier[k] = here[k].dot(free[k]) + swing;
+        }
+        if GUIDED {
+            for (r, guide) in natural.guides().iter().enumerate() {
+                let demand = &self.demand[r];
+                let slip = guide.slip(demand, z, v) + guide.drive(demand, z);
+                let gradient = &self.gradient[r * n..(r + 1) * n];
+                let direct: f64 = gradient.iter().zip(free).map(|(gradient, free)| gradient.dot(*free)).sum();
+                self.multiplier[bodies + r] = direct + slip.value() * (2.0 / h);
+            }
+        }
+        let (multiplier, schur, pivot) = (&mut self.multiplier[..rows], &mut self.schur, &mut self.pivot);
+        if GUIDED {
+            schur::factor::<f64, 0>(rows, schur, pivot, &self.scales);
+            tree::solve::<f64, 0>(rows, schur, pivot, multiplier);
+        } else {
+            schur::factor::<f64, N>(rows, schur, pivot, &self.scales);
+            tree::solve::<f64, N>(rows, schur, pivot, multiplier);
+        }
+        self.accelerate::<N, GUIDED>();
+        Ok(())
+    }
+}
+
+/// Gradients of the rows, the bodies' at `here`, against columns, into a matrix.
+#[inline(always)]
+fn project(
+    n: usize,
+    bodies: usize,
+    rows: usize,
+    here: &[Complex<f64>],
+    gradient: &[Complex<f64>],
+    lifted: &[Complex<f64>],
+    matrix: &mut [f64],
+) {
+    for p in 0..bodies {
+        for q in 0..rows {
+            matrix[p * rows + q] = here[p].dot(lifted[q * n + p]);
+        }
+    }
+    for p in bodies..rows {
+        let gradient = &gradient[(p - bodies) * n..(p - bodies + 1) * n];
+        for q in 0..rows {
+            matrix[p * rows + q] = gradient.iter().zip(&lifted[q * n..(q + 1) * n]).map(|(g, lifted)| g.dot(*lifted)).sum();
+        }
+    }
+}
+
+/// Number of rows: known when compiled where there are no guides.
+#[inline(always)]
+fn rows<const N: usize, const GUIDED: bool>(rows: usize) -> usize {
+    if GUIDED { rows } else { size::<N>(rows) }
+}
+
+/// Leading parts.
+#[inline(always)]
+fn plain(x: Complex<DoubleDouble>) -> Complex<f64> {
+    Complex::new(x.re.hi, x.im.hi)
+}
