@@ -16,6 +16,9 @@ use crate::stepping::rattle::Rattle;
 use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Method, Reached, Seen, StepError, Tally, Taylor, Tolerance};
 use std::sync::Arc;
 
+/// Turns that a state read from somewhere may have at most: all that doubles count.
+const MOST_TURNS: u64 = 1 << 53;
+
 /// A mechanism in some form, as a first-order system.
 pub trait Problem: Field + Form {}
 impl<P: Field + Form> Problem for P {}
@@ -189,9 +192,10 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
 
     fn resume(&mut self, place: Place, horizon: Time) -> Result<bool, StepError> {
         let shape = |state: &State| (state.y.len(), state.low.len(), state.turns.len(), state.is_winding);
-        let alike = |state: &State| shape(state) == shape(&self.state);
+        let alike = |state: &State| shape(state) == shape(&self.state) && state.turns.iter().all(|turns| turns.unsigned_abs() < MOST_TURNS);
         let steps_back = self.method.is_dense() && !place.from.y.is_empty() && place.from.time < place.state.time;
-        if !alike(&place.state) || (steps_back && !alike(&place.from)) {
+        let is_event = |event: usize| event < self.problem.events();
+        if !alike(&place.state) || (steps_back && !alike(&place.from)) || !place.ahead.is_none_or(is_event) {
             return Ok(false);
         }
         if steps_back {
