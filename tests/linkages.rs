@@ -1,6 +1,9 @@
 //! Published problems of linkages, and other mechanisms with a closed form, by every method that fits.
 
 mod common;
+#[allow(dead_code)]
+#[path = "../examples/four_bars.rs"]
+mod four_bars;
 
 use common::{run, shipped};
 use driftless::run::{MethodId, Outcome, Request, Stabilization};
@@ -132,11 +135,7 @@ fn iftomm_a02_four_bars_pass_singular_positions() {
 /// Forty four-bars side by side, parallel all the time.
 #[test]
 fn forty_four_bars() {
-    let text = std::process::Command::new(env!("CARGO")).args(["run", "-q", "--example", "four_bars", "--", "40"]).output();
-    let Ok(output) = text else { return };
-    assert!(output.status.success());
-    let scene = driftless::scene::parse_scene("four_bars", &String::from_utf8(output.stdout).expect("text"), &[]).expect("a scene");
-    let scene = Scene { until: 20.0, every: 20.0, ..scene };
+    let scene = Scene { until: 20.0, every: 20.0, ..four_bars::scene(40) };
     let outcome = finished(&scene, &by("taylor", 1e-8));
     // (N + (N+1)/3) theta'' = (N + (N+1)/2) g sin theta, from the vertical.
     let ratio = (40.0 + 41.0 / 2.0) / (40.0 + 41.0 / 3.0) * 9.81;
