@@ -34,6 +34,9 @@ const LEAST: usize = 8;
 const SHARE: f64 = 1e-2;
 /// Share of a pivot of S below which the series of any mechanism takes over, which looks for singular positions.
 const NEAR: f64 = 1e-3;
+/// Sweeps at the end of a step, at most, and what of the lengths one sweep is enough for.
+const SWEEPS: usize = 6;
+const CLOSE: f64 = 1e-9;
 /// Room for a scalar series, and for lanes that read beyond its end.
 const LENGTH: usize = MOST + 8;
 
@@ -121,7 +124,7 @@ fn convolve<L: Lanes>(a: &[f64; LENGTH], b: &Series, m: usize) -> f64 {
 impl<const B: usize> Looped<B> {
     /// The constants, where this form fits: up to 4 B hinged bodies with loops, constant forces, springs without dampers.
     pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize) -> Option<Self> {
-        let n = mechanism.size();
+        let n = mechanism.bodies.len();
         let is_plain = mechanism.torsions.is_empty() && !mechanism.is_damped() && mechanism.actions.iter().all(|action| action.law.is_none());
         if n > columns::room(B) || !is_plain || order > MOST {
             return None;
@@ -475,11 +478,10 @@ pub fn go<L: Lanes, const B: usize>(looped: &mut Looped<B>, state: &mut State, h
     (state.y[2 * n], state.low[2 * n]) = (work.hi, work.lo);
 }
 
-/// Elements and rates onto the linear rows, then onto the unit lengths, with the S of the new position: one sweep, as what is left is small.
+/// Elements and rates onto the linear rows, then onto the unit lengths, with the S of the position at hand: one sweep, unless the step was long.
 #[inline(always)]
 fn put_back<L: Lanes, const B: usize>(looped: &mut Looped<B>, z: &mut [Row<B>; 2], v: &mut [Row<B>; 2]) {
     let Looped { count, columns, rows, schur, lifted, .. } = looped;
-    let n = *count;
     let mut change = [[L::ZERO; B]; 4];
     for row in rows.iter() {
         let (mut place, mut rate) = (row.constant, 0.0);
@@ -487,47 +489,54 @@ fn put_back<L: Lanes, const B: usize>(looped: &mut Looped<B>, z: &mut [Row<B>; 2
             place += g.re * at(&z[0], k) + g.im * at(&z[1], k);
             rate += g.re * at(&v[0], k) + g.im * at(&v[1], k);
         }
-        let (place, rate) = (L::splat(place), L::splat(rate));
-        for b in 0..B {
-            let (x, y) = (L::of(row.back[0][b]), L::of(row.back[1][b]));
-            change[0][b] = x.mul_add(place, change[0][b]);
-            change[1][b] = y.mul_add(place, change[1][b]);
-            change[2][b] = x.mul_add(rate, change[2][b]);
-            change[3][b] = y.mul_add(rate, change[3][b]);
-        }
+        add::<L, B>(&mut change, &row.back, place, rate);
     }
     subtract::<L, B>(z, v, &change);
-    // V and S⁻¹ of the step's start have served: the next step makes its own.
-    face::<L, B>(columns, z, lifted, schur);
-    columns::invert::<L, B>(schur, &columns.scale);
-    let (mut far, mut fast) = ([L::ZERO; B], [L::ZERO; B]);
+    for _ in 0..SWEEPS {
+        // V and S⁻¹ of the step's start have served: the next step makes its own.
+        face::<L, B>(columns, z, lifted, schur);
+        columns::invert::<L, B>(schur, &columns.scale);
+        let (mut far, mut fast) = ([L::ZERO; B], [L::ZERO; B]);
+        for b in 0..B {
+            let (x, y) = (L::of(z[0][b]), L::of(z[1][b]));
+            far[b] = x.mul_add(x, y.mul(y));
+            fast[b] = x.mul_add(L::of(v[0][b]), y.mul(L::of(v[1][b])));
+        }
+        let (far, fast) = (store(far), store(fast));
+        let (mut place, mut rate, mut most) = ([L::ZERO; B], [L::ZERO; B], 0.0f64);
+        for j in 0..*count {
+            let far = 0.5 * (at(&far, j) - 1.0);
+            most = larger(most, far);
+            let (far, fast) = (L::splat(far), L::splat(at(&fast, j)));
+            for b in 0..B {
+                place[b] = L::of(schur[j][b]).mul_add(far, place[b]);
+                rate[b] = L::of(schur[j][b]).mul_add(fast, rate[b]);
+            }
+        }
+        let (place, rate) = (store(place), store(rate));
+        let mut change = [[L::ZERO; B]; 4];
+        for j in 0..*count {
+            add::<L, B>(&mut change, &lifted[j], at(&place, j), at(&rate, j));
+        }
+        subtract::<L, B>(z, v, &change);
+        // What a sweep leaves is about the square of what it found.
+        if most <= CLOSE {
+            break;
+        }
+    }
+}
+
+/// Adds a column times a change of places, and times one of rates.
+#[inline(always)]
+fn add<L: Lanes, const B: usize>(change: &mut [[L; B]; 4], column: &[Row<B>; 2], place: f64, rate: f64) {
+    let (place, rate) = (L::splat(place), L::splat(rate));
     for b in 0..B {
-        let (x, y) = (L::of(z[0][b]), L::of(z[1][b]));
-        far[b] = x.mul_add(x, y.mul(y));
-        fast[b] = x.mul_add(L::of(v[0][b]), y.mul(L::of(v[1][b])));
+        let (x, y) = (L::of(column[0][b]), L::of(column[1][b]));
+        change[0][b] = x.mul_add(place, change[0][b]);
+        change[1][b] = y.mul_add(place, change[1][b]);
+        change[2][b] = x.mul_add(rate, change[2][b]);
+        change[3][b] = y.mul_add(rate, change[3][b]);
     }
-    let (far, fast) = (store(far), store(fast));
-    let (mut place, mut rate) = ([L::ZERO; B], [L::ZERO; B]);
-    for j in 0..n {
-        let (far, fast) = (L::splat(0.5 * (at(&far, j) - 1.0)), L::splat(at(&fast, j)));
-        for b in 0..B {
-            place[b] = L::of(schur[j][b]).mul_add(far, place[b]);
-            rate[b] = L::of(schur[j][b]).mul_add(fast, rate[b]);
-        }
-    }
-    let (place, rate) = (store(place), store(rate));
-    let mut change = [[L::ZERO; B]; 4];
-    for j in 0..n {
-        let (place, rate) = (L::splat(at(&place, j)), L::splat(at(&rate, j)));
-        for b in 0..B {
-            let (x, y) = (L::of(lifted[j][0][b]), L::of(lifted[j][1][b]));
-            change[0][b] = x.mul_add(place, change[0][b]);
-            change[1][b] = y.mul_add(place, change[1][b]);
-            change[2][b] = x.mul_add(rate, change[2][b]);
-            change[3][b] = y.mul_add(rate, change[3][b]);
-        }
-    }
-    subtract::<L, B>(z, v, &change);
 }
 
 #[inline(always)]
