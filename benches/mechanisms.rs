@@ -28,7 +28,8 @@ const EVALUATIONS: usize = 2000;
 /// The angles of the bodies at the end \[rad\], whole turns left in.
 fn reference() -> [f64; 7] {
     let (beta, theta, gamma) = (15.810_771_195_153_707, -15.756_371_058_411_84, 0.040_822_240_119_645_805);
-    let (phi, delta, omega, epsilon) = (-0.534_730_116_342_079_6, 0.524_409_965_879_954_1, 0.534_730_116_342_079_6, 1.048_080_741_041_937_9);
+    let (phi, delta, omega, epsilon) =
+        (-0.534_730_116_342_079_6, 0.524_409_965_879_954_1, 0.534_730_116_342_079_6, 1.048_080_741_041_937_9);
     [beta, beta + theta + PI, gamma, phi + delta - FRAC_PI_2, delta, omega + epsilon, epsilon - FRAC_PI_2]
 }
 
@@ -115,10 +116,17 @@ fn main() {
     for tolerance in [1e-6, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13] {
         let name = |method: &str| format!("{method} {tolerance:.0e}");
         if tolerance > 1e-9 {
-            candidates.push((name("dp5, projected"), Box::new(move |w| march(&mut looped(), start, Projected::new(Dp5::new(both(tolerance))), w))));
+            candidates.push((
+                name("dp5, projected"),
+                Box::new(move |w| march(&mut looped(), start, Projected::new(Dp5::new(both(tolerance))), w)),
+            ));
         }
-        candidates.push((name("dp8, projected"), Box::new(move |w| march(&mut looped(), start, Projected::new(Dp8::new(both(tolerance))), w))));
-        candidates.push((name("dp8 in angles, projected"), Box::new(move |w| march(&mut multiplier(), start, Projected::new(Dp8::new(both(tolerance))), w))));
+        candidates
+            .push((name("dp8, projected"), Box::new(move |w| march(&mut looped(), start, Projected::new(Dp8::new(both(tolerance))), w))));
+        candidates.push((
+            name("dp8 in angles, projected"),
+            Box::new(move |w| march(&mut multiplier(), start, Projected::new(Dp8::new(both(tolerance))), w)),
+        ));
         candidates.push((name("dop853"), Box::new(move |w| march(&mut looped(), start, Dop853::new(both(tolerance)), w))));
     }
     for tolerance in [1e-3, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-12, 1e-15] {
@@ -131,10 +139,15 @@ fn main() {
             series.kernel = Expansion::Series;
             series
         };
-        candidates.push((name("taylor in angles, projected"), Box::new(move |w| march(&mut multiplier(), start, Projected::new(series()), w))));
+        candidates
+            .push((name("taylor in angles, projected"), Box::new(move |w| march(&mut multiplier(), start, Projected::new(series()), w))));
     }
-    let compositions =
-        [("rattle2", Composition::Single), ("rattle4", Composition::Suzuki5), ("rattle6", Composition::KahanLi9), ("rattle8", Composition::KahanLi17)];
+    let compositions = [
+        ("rattle2", Composition::Single),
+        ("rattle4", Composition::Suzuki5),
+        ("rattle6", Composition::KahanLi9),
+        ("rattle8", Composition::KahanLi17),
+    ];
     for (name, composition) in compositions {
         for steps in [200.0, 400.0, 800.0] {
             let rattle = move || Rattle::new(composition, 0.03 / steps);

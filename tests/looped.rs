@@ -24,7 +24,8 @@ use std::sync::Arc;
 /// Angles at 0.03 s \[rad\], whole turns left in, in the order of the scene's bars.
 fn reference() -> [f64; 7] {
     let (beta, theta, gamma) = (15.810_771_195_153_707, -15.756_371_058_411_84, 0.040_822_240_119_645_805);
-    let (phi, delta, omega, epsilon) = (-0.534_730_116_342_079_6, 0.524_409_965_879_954_1, 0.534_730_116_342_079_6, 1.048_080_741_041_937_9);
+    let (phi, delta, omega, epsilon) =
+        (-0.534_730_116_342_079_6, 0.524_409_965_879_954_1, 0.534_730_116_342_079_6, 1.048_080_741_041_937_9);
     [beta, beta + theta + PI, gamma, phi + delta - FRAC_PI_2, delta, omega + epsilon, epsilon - FRAC_PI_2]
 }
 
@@ -115,7 +116,7 @@ fn the_natural_solve_gives_the_accelerations_of_the_angle_form() {
 fn adaptive_methods_take_the_squeezing_mechanism_to_its_known_end() {
     let (mechanism, start) = started("andrews");
     for (tolerance, bound) in [(1e-9, 1e-8), (1e-13, 1e-11)] {
-        let (end, tally, residual) = run(&mut looped(&mechanism), &start, &mut Projected::new(Dp8::new(both(tolerance))), 0.03);
+        let (end, _, residual) = run(&mut looped(&mechanism), &start, &mut Projected::new(Dp8::new(both(tolerance))), 0.03);
         assert!(error(&end) < bound, "{tolerance:e}: {:e}", error(&end));
         assert!(residual < 1e-13, "{residual:e}");
         assert!((end.omega[0].hi - CRANK).abs() < 1e3 * bound);
@@ -125,17 +126,16 @@ fn adaptive_methods_take_the_squeezing_mechanism_to_its_known_end() {
 #[test]
 fn the_series_takes_the_squeezing_mechanism_to_its_known_end() {
     let (mechanism, start) = started("andrews");
-    for (tolerance, bound) in [(1e-3, 1e-3), (1e-6, 1e-8), (1e-9, 1e-10), (1e-12, 1e-11), (1e-15, 1e-11)] {
+    for (tolerance, bound) in [(1e-3, 1e-3), (1e-6, 1e-6), (1e-9, 1e-9), (1e-12, 1e-12), (1e-15, 1e-12)] {
         for projected in [false, true] {
             let mut method = taylor(tolerance, Kernel::Fastest);
-            let (end, tally, residual) = if projected {
+            let (end, _, residual) = if projected {
                 run(&mut looped(&mechanism), &start, &mut Projected::new(method), 0.03)
             } else {
                 run(&mut looped(&mechanism), &start, &mut method, 0.03)
             };
             let series = taylor(tolerance, Kernel::Series);
-            let (other, other_tally, _) = run(&mut looped(&mechanism), &start, &mut Projected::new(series), 0.03);
-            println!("taylor {tolerance:e}: {:e}, residual {residual:e}, {tally:?}; series {:e} {other_tally:?}", error(&end), error(&other));
+            let (other, ..) = run(&mut looped(&mechanism), &start, &mut Projected::new(series), 0.03);
             assert!(error(&end) < bound, "{tolerance:e}: {:e}", error(&end));
             assert!(residual < 1e-13, "{residual:e}");
             assert!((end.work - other.work).hi.abs() < 10.0 * bound, "{:?} {:?}", end.work, other.work);
@@ -177,12 +177,9 @@ fn the_series_is_its_own_dense_output() {
 fn rattle_has_its_order_on_a_mechanism_with_loops() {
     let (mechanism, start) = started("andrews");
     let natural = || Natural::new(Arc::clone(&mechanism)).expect("a natural form");
-    for (composition, coarsest) in [
-        (Composition::Single, 2000.0),
-        (Composition::Suzuki5, 500.0),
-        (Composition::KahanLi9, 300.0),
-        (Composition::KahanLi17, 150.0),
-    ] {
+    for (composition, coarsest) in
+        [(Composition::Single, 2000.0), (Composition::Suzuki5, 500.0), (Composition::KahanLi9, 300.0), (Composition::KahanLi17, 150.0)]
+    {
         let points: Vec<(f64, f64)> = [1.0, 1.5, 2.0, 3.0]
             .iter()
             .map(|finer| {
@@ -200,29 +197,44 @@ fn rattle_has_its_order_on_a_mechanism_with_loops() {
 /// Motors, slots and sliders: the work of the motor is known from p_t, and energy less work keeps.
 #[test]
 fn rattle_keeps_energy_less_work_of_driven_mechanisms() {
-    for (name, until, step) in [("quick_return", 4.0, 1.0 / 1024.0), ("slider_crank_driven", 2.0, 1.0 / 4096.0), ("four_bar_motor", 4.0, 1.0 / 1024.0)] {
+    for (name, until, step) in
+        [("quick_return", 4.0, 1.0 / 1024.0), ("slider_crank_driven", 2.0, 1.0 / 4096.0), ("four_bar_motor", 4.0, 1.0 / 1024.0)]
+    {
         let (mechanism, start) = started(name);
         let Ok(mut natural) = Natural::new(Arc::clone(&mechanism)) else { panic!("{name} has no natural form") };
         let mut kernel = Rows::without_rows(&mechanism);
-        let mut balance = |motion: &Motion| (mechanism.energy(&mut kernel, &motion.phi, &motion.omega).total() - motion.work).hi / mechanism.energy_scale;
+        let mut balance =
+            |motion: &Motion| (mechanism.energy(&mut kernel, &motion.phi, &motion.omega).total() - motion.work).hi / mechanism.energy_scale;
         let before = balance(&start);
         let mut state = natural.state(&start);
         let mut worst = 0.0f64;
         let mut method = Rattle::new(Composition::Suzuki5, step);
         let mut motion = Motion::default();
-        let reached = method.advance(&mut natural, &mut state, Time::from(until), &mut Tally::default(), &mut |natural: &mut Natural, state: &mut State| {
-            natural.read(state, &mut motion);
-            worst = worst.max((balance(&motion) - before).abs());
-            let defect = natural.defect(state);
-            assert!(defect.position < 1e-14 && defect.velocity < 1e-11, "{defect:?}");
-            Ok(Seen::Kept)
-        });
+        let reached = method.advance(
+            &mut natural,
+            &mut state,
+            Time::from(until),
+            &mut Tally::default(),
+            &mut |natural: &mut Natural, state: &mut State| {
+                natural.read(state, &mut motion);
+                worst = worst.max((balance(&motion) - before).abs());
+                let defect = natural.defect(state);
+                assert!(defect.position < 1e-14 && defect.velocity < 1e-11, "{defect:?}");
+                Ok(Seen::Kept)
+            },
+        );
         assert_eq!(reached, Ok(Reached::Until), "{name}");
         assert!(worst < 1e-6, "{name}: {worst:e}");
         let mut field = Multiplier::<0, true>::new(Arc::clone(&mechanism));
         let (other, ..) = {
             let mut state = field.state(&start);
-            let reached = Projected::new(Dp8::new(both(1e-11))).advance(&mut field, &mut state, Time::from(until), &mut Tally::default(), &mut |_, _| Ok(Seen::Kept));
+            let reached = Projected::new(Dp8::new(both(1e-11))).advance(
+                &mut field,
+                &mut state,
+                Time::from(until),
+                &mut Tally::default(),
+                &mut |_, _| Ok(Seen::Kept),
+            );
             assert_eq!(reached, Ok(Reached::Until), "{name}");
             let mut motion = Motion::default();
             field.read(&state, &mut motion);

@@ -4,7 +4,6 @@ mod common;
 #[path = "common/trees.rs"]
 mod trees;
 
-use trees::{Dice, tree};
 use driftless::arithmetic::Complex;
 use driftless::dynamics::kernel::{Bias, Kernel};
 use driftless::dynamics::natural::{Natural, NaturalError};
@@ -13,6 +12,7 @@ use driftless::dynamics::{Form, Mechanism, Motion, Time};
 use driftless::scene::{Drive, Force, Given, Hinge, Law, Lock, Place, Rail, Scene, Sine, Slider, Torque, TorsionSpring};
 use proptest::prelude::*;
 use std::sync::Arc;
+use trees::{Dice, tree};
 
 type C = Complex<f64>;
 

@@ -172,4 +172,3 @@ impl Rattle {
         StepError { cause, method: self.name().into(), t, step: self.step, what, hint }
     }
 }
-
