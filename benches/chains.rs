@@ -1,58 +1,189 @@
-use driftless::arithmetic::Complex;
-use driftless::dynamics::recursive::{Hung, Links, Recursive};
+//! What chains, ladders and long runs of them cost: one evaluation by matrices and body by body, and a hanging chain marched.
+//!
+//! `cargo bench --no-default-features --bench chains`: alternating blocks in one process, minimum and median.  Chains are 1 m and 1 kg in all,
+//! their links thin rods; ladders are the four-bars of `examples/four_bars.rs`.
+
+use driftless::dynamics::multiplier::Multiplier;
+use driftless::dynamics::{Field, Form, Mechanism, Time};
+use driftless::run::{MethodId, Request, Stabilization, simulate};
+use driftless::scene::{Bar, Hinge, Place, Scene, Start};
+use std::f64::consts::FRAC_PI_2;
 use std::hint::black_box;
+use std::sync::Arc;
 use std::time::Instant;
-fn main() {
-    for n in [2usize, 8, 32, 128, 512, 2000, 10_000] {
-        let l = 1.0 / n as f64;
-        let bodies: Vec<Hung> = (0..n)
-            .map(|k| Hung {
-                parent: k.checked_sub(1),
-                hinge: Complex::new(l, 0.0),
-                centre: Complex::new(l / 2.0, 0.0),
-                mass: l,
-                inertia: l * l * l / 12.0,
-            })
-            .collect();
-        let links = Links::new(&bodies, Complex::new(9.81, 0.0)).unwrap();
-        let mut r = Recursive::<f64>::new(&links);
-        let mut phi: Vec<f64> = (0..n).map(|k| (k as f64 * 0.37).sin()).collect();
-        let omega: Vec<f64> = (0..n).map(|k| (k as f64 * 0.71).cos()).collect();
-        let mut alpha = vec![0.0; n];
-        let reps = 200_000 / n + 5;
-        let mut best = [f64::MAX; 5];
-        for _ in 0..100 {
-            let mut t = [0.0; 5];
-            let b = Instant::now();
-            for _ in 0..reps {
-                r.face(black_box(&phi));
-            }
-            t[0] = b.elapsed().as_secs_f64();
-            let b = Instant::now();
-            for _ in 0..reps {
-                r.convect(&links, black_box(&omega));
-            }
-            t[1] = b.elapsed().as_secs_f64();
-            let b = Instant::now();
-            for _ in 0..reps {
-                black_box(&mut r).fold(&links);
-            }
-            t[2] = b.elapsed().as_secs_f64();
-            let b = Instant::now();
-            for _ in 0..reps {
-                black_box(&mut r).unfold(&links, &mut alpha);
-            }
-            t[3] = b.elapsed().as_secs_f64();
-            let b = Instant::now();
-            for _ in 0..reps {
-                r.accelerate(&links, black_box(&phi), &omega, &mut alpha);
-                phi[0] += 1e-12 * alpha[0];
-            }
-            t[4] = b.elapsed().as_secs_f64();
-            for i in 0..5 {
-                best[i] = best[i].min(t[i] * 1e9 / (reps * n) as f64);
-            }
-        }
-        println!("{n:6} {best:.2?} ns/body, {:.3} us", best[4] * n as f64 * 1e-3);
+
+/// Blocks of each candidate, and seconds a block takes about.
+const BLOCKS: usize = 40;
+const BLOCK: f64 = 2e-3;
+/// Largest number of bodies for which matrices are tried.
+const MOST_DENSE: usize = 128;
+
+fn root(bar: Option<usize>, x: f64) -> Place {
+    Place { bar, point: [x, 0.0] }
+}
+
+/// A chain let go straight at an angle \[rad\] from the vertical, or bent and in motion.
+fn chain(links: usize, angle: Option<f64>) -> Scene {
+    let length = 1.0 / links as f64;
+    let bar = |k: usize| Bar {
+        name: format!("link{}", k + 1),
+        length,
+        mass: length,
+        centre: [length / 2.0, 0.0],
+        inertia: length * length * length / 12.0,
+    };
+    let on = |k: usize| if k == 0 { root(None, 0.0) } else { root(Some(k - 1), length) };
+    let start = |k: usize| match angle {
+        Some(phi) => Start { phi, omega: 0.0 },
+        None => Start { phi: (0.37 * k as f64).sin(), omega: (0.71 * k as f64).cos() },
+    };
+    Scene {
+        name: format!("chain{links}"),
+        gravity: [9.81, 0.0],
+        bars: (0..links).map(bar).collect(),
+        hinges: (0..links).map(|k| Hinge { name: format!("hinge{}", k + 1), between: [on(k), root(Some(k), 0.0)] }).collect(),
+        start: (0..links).map(start).collect(),
+        until: 1.0,
+        every: 0.1,
+        ..Scene::default()
     }
+}
+
+/// Four-bars side by side.
+fn ladder(n: usize) -> Scene {
+    let bar = |k: usize| Bar { name: format!("bar{k}"), length: 1.0, mass: 1.0, centre: [0.5, 0.0], inertia: 1.0 / 12.0 };
+    let coupler = |i: usize| n + 1 + i;
+    let feet = (0..=n).map(|i| Hinge { name: format!("A{i}"), between: [Place { bar: None, point: [i as f64, 0.0] }, root(Some(i), 0.0)] });
+    let tops = (0..n).flat_map(|i| {
+        let left = Hinge { name: format!("B{i}"), between: [root(Some(i), 1.0), root(Some(coupler(i)), 0.0)] };
+        [left, Hinge { name: format!("D{i}"), between: [root(Some(coupler(i)), 1.0), root(Some(i + 1), 1.0)] }]
+    });
+    let upright = |_| Start { phi: FRAC_PI_2 - 0.4, omega: -1.0 };
+    Scene {
+        name: format!("ladder{n}"),
+        gravity: [0.0, -9.81],
+        bars: (0..=2 * n).map(bar).collect(),
+        hinges: feet.chain(tops).collect(),
+        start: (0..=n).map(upright).chain((0..n).map(|_| Start { phi: 0.0, omega: 0.0 })).collect(),
+        until: 1.0,
+        every: 0.1,
+        ..Scene::default()
+    }
+}
+
+/// A form and its state, timed block by block.
+struct Candidate {
+    field: Box<dyn Field>,
+    y: Vec<f64>,
+    rate: Vec<f64>,
+    count: usize,
+    times: Vec<f64>,
+}
+
+impl Candidate {
+    fn new(mechanism: Mechanism, scene: &Scene) -> Self {
+        let mechanism = Arc::new(mechanism);
+        let start = mechanism.start(scene);
+        let mut made = if mechanism.keeps_account() {
+            let form = Multiplier::<0, true>::new(mechanism);
+            Self { y: form.state(&start).y, field: Box::new(form), rate: Vec::new(), count: 1, times: Vec::new() }
+        } else {
+            let form = Multiplier::<0, false>::new(mechanism);
+            Self { y: form.state(&start).y, field: Box::new(form), rate: Vec::new(), count: 1, times: Vec::new() }
+        };
+        made.rate = vec![0.0; made.y.len()];
+        made.block();
+        made.count = (BLOCK * 1e6 / made.times[0]).ceil() as usize;
+        made.times.clear();
+        made
+    }
+
+    fn block(&mut self) {
+        let begin = Instant::now();
+        for _ in 0..self.count {
+            self.field.rate(Time::default(), black_box(&self.y), &mut self.rate);
+            // A little further each time, so that nothing can be hoisted out.
+            self.y[0] += 1e-13 * self.rate[self.rate.len() / 2];
+        }
+        self.times.push(begin.elapsed().as_secs_f64() * 1e6 / self.count as f64);
+    }
+
+    /// Minimum and median \[us\].
+    fn result(&mut self) -> (f64, f64) {
+        self.times.sort_by(f64::total_cmp);
+        (self.times[0], self.times[self.times.len() / 2])
+    }
+}
+
+/// One line of the table of evaluations.
+fn compare(name: &str, scene: &Scene) {
+    let mechanism = Mechanism::new(scene).expect("equations");
+    let bodies = scene.bars.len();
+    let mut bodywise = Candidate::new(mechanism.body_by_body(), scene);
+    let mut dense = mechanism.by_matrices().filter(|_| bodies <= MOST_DENSE).map(|dense| Candidate::new(dense, scene));
+    for _ in 0..BLOCKS {
+        bodywise.block();
+        if let Some(dense) = &mut dense {
+            dense.block();
+        }
+    }
+    let (least, usual) = bodywise.result();
+    let per_body = least * 1e3 / bodies as f64;
+    let chosen = if mechanism.recursion.is_some() { "bodies" } else { "matrices" };
+    let (dense, ratio) = dense.map_or(("–".into(), "–".into()), |mut dense| {
+        let (dense_least, dense_usual) = dense.result();
+        (format!("{dense_least:.3} {dense_usual:.3}"), format!("{:.2}", dense_usual / usual))
+    });
+    println!("{name:>10} {bodies:>6} {least:>9.3} {usual:>9.3} {per_body:>8.1} {dense:>20} {ratio:>8} {chosen:>9}");
+}
+
+/// Seconds this thread has computed, where the system tells; elapsed ones elsewhere.
+fn computed(begin: Instant) -> f64 {
+    let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    let nanoseconds = told.and_then(|told| told.split(' ').next()?.parse::<f64>().ok());
+    nanoseconds.map_or(begin.elapsed().as_secs_f64(), |nanoseconds| nanoseconds * 1e-9)
+}
+
+/// CPU seconds per simulated second of a run by the program's own loop, samples and all.
+fn march(name: &str, scene: &Scene, request: &Request) {
+    let (mut times, mut tally) = (Vec::new(), None);
+    for _ in 0..5 {
+        let clock = Instant::now();
+        let begin = computed(clock);
+        let outcome = simulate(scene, request, &mut |_| Ok(()));
+        times.push((computed(clock) - begin) / request.until.unwrap_or(scene.until));
+        match outcome {
+            Ok(outcome) => tally = Some((outcome.tally.evaluations, outcome.drift.energy.max)),
+            Err(error) => return println!("{name:>24}: {error}"),
+        }
+    }
+    times.sort_by(f64::total_cmp);
+    let (evaluations, energy) = tally.unwrap_or_default();
+    println!("{name:>24} {:>9.4} {:>9.4} {evaluations:>9} {energy:>9.1e}", times[0], times[2]);
+}
+
+fn main() {
+    println!(
+        "{:>10} {:>6} {:>9} {:>9} {:>8} {:>20} {:>8} {:>9}",
+        "one", "bodies", "min us", "median", "ns/body", "matrices", "ratio", "chosen"
+    );
+    for links in [2, 4, 5, 6, 7, 8, 10, 12, 16, 32, 64, 128, 512, 2000, 10_000] {
+        compare("chain", &chain(links, None));
+    }
+    for n in [2, 3, 4, 6, 10, 20, 40] {
+        compare("ladder", &ladder(n));
+    }
+    println!("\n{:>24} {:>9} {:>9} {:>9} {:>9}", "one simulated second", "CPU s", "median s", "evaluat.", "energy");
+    for (name, angle) in [("128 links, 0.2 rad", 0.2), ("128 links, 0.5 rad", 0.5), ("128 links, horizontal", FRAC_PI_2)] {
+        let request = Request { method: Some(MethodId::Dop853), rtol: Some(1e-6), ..Request::default() };
+        march(name, &chain(128, Some(angle)), &request);
+    }
+    let kept = Request {
+        method: Some(MethodId::Dp8),
+        rtol: Some(1e-6),
+        stabilize: Some(Stabilization::Projection),
+        until: Some(0.25),
+        ..Request::default()
+    };
+    march("ladder of 40, dp8", &ladder(40), &kept);
 }

@@ -8,6 +8,12 @@ use std::f64::consts::FRAC_PI_2;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let n: usize = std::env::args().nth(1).map_or(Ok(2), |count| count.parse())?;
+    println!("{}", serde_json::to_string_pretty(&scene(n).to_input())?);
+    Ok(())
+}
+
+/// The scene of N four-bars.
+pub fn scene(n: usize) -> Scene {
     let bar = |name: String| Bar { name, length: 1.0, mass: 1.0, centre: [0.5, 0.0], inertia: 1.0 / 12.0 };
     let root = |bar| Place { bar: Some(bar), point: [0.0, 0.0] };
     let tip = |bar| Place { bar: Some(bar), point: [1.0, 0.0] };
@@ -22,7 +28,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let right = Hinge { name: format!("D{i}"), between: [tip(coupler(i)), tip(i + 1)] };
         [left, right]
     });
-    let scene = Scene {
+    Scene {
         name: format!("four_bars_{n}"),
         description: format!("{n} four-bars side by side pass through positions in which all links lie in line (IFToMM benchmark A02)."),
         gravity: [0.0, -9.81],
@@ -32,7 +38,5 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         until: 10.0,
         every: 0.01,
         ..Scene::default()
-    };
-    println!("{}", serde_json::to_string_pretty(&scene.to_input())?);
-    Ok(())
+    }
 }

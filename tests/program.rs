@@ -469,3 +469,30 @@ fn several_stabilizations_are_run_one_after_another_and_overlaid() {
     program.run("run motor_sine.json --method gauss16 --stabilize elimination,projection --out b").exits(3);
     assert!(!program.path("b").exists());
 }
+
+// Starts that are found.
+
+#[test]
+fn the_program_tells_changes_and_refuses_them_where_asked() {
+    let program = Program::with_scenes(&["four_bar_motor", "kite", "four_bars"]);
+    let words = ["phi of coupler is 0.43082", "instead of 0.43 rad"];
+    let shown = ["0 degrees: 3 coordinates less 3 constraints", "phi of coupler is 0.43082"];
+    program.run("check four_bar_motor.json").exits(0).says(&words).shows(&shown);
+    assert!(program.run("check four_bar_motor.json --quiet").exits(0).stderr.is_empty());
+    for command in ["check", "inspect", "run", "sweep --vary bars.crank.density=2700..2800:2"] {
+        let mut words_of = command.split_whitespace();
+        let (verb, rest) = (words_of.next().expect("a command"), words_of.collect::<Vec<_>>().join(" "));
+        program.run(&format!("{verb} four_bar_motor.json {rest} --strict")).exits(3).says(&words).says(&["--strict"]);
+    }
+    let error = program.run("check four_bar_motor.json --strict --json").exits(3).object();
+    assert_eq!(error["error"]["details"]["changes"][0]["body"], "coupler");
+    let object = program.run("check four_bar_motor.json --json").exits(0).object();
+    assert_eq!((object["degrees_of_freedom"].as_u64(), object["assembly"]["changes"][0]["quantity"].as_str()), (Some(0), Some("phi")));
+    program.run("run four_bar_motor.json --until 0.02 --no-charts --quiet").exits(0);
+    let record = program.files().into_iter().find(|file| file.ends_with("run.json")).expect("a record");
+    let record: Value = serde_json::from_str(&program.read(&record)).expect("JSON");
+    assert_eq!(record["result"]["assembly"]["changes"][0]["given"].as_f64(), Some(0.43));
+    program.run("check kite.json --strict").exits(0).shows(&["1 degree: 3 coordinates less 2 constraints"]);
+    program.run("check four_bar_motor.json --set start.coupler.phi=2.5 --set until=1").exits(3).says(&["error: no start fits", "hint: "]);
+    program.run("check four_bar_motor.json --set start={}").exits(3).says(&["error: the start is ambiguous: `start.", "roughly is enough"]);
+}

@@ -19,7 +19,7 @@ use std::sync::Arc;
 /// The largest number of coordinates for which the matrices of the tree are made; they hold n² numbers.
 pub const DENSE_LIMIT: usize = 2000;
 /// So many coordinates have code made for their number.
-const UNROLLED: usize = 3;
+const UNROLLED: usize = 6;
 
 /// A scene's equations: constants only, shared by every form and method.
 #[derive(Clone, Debug, PartialEq)]

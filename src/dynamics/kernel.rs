@@ -4,7 +4,8 @@
 //! a0 = M⁻¹ b;      rows:  X = M⁻¹ Gᵀ,  S = G X,  S lambda = G a0 + gamma,  a = a0 - X lambda
 //! ```
 //!
-//! A scene without rows never enters the second line.
+//! A scene without rows never enters the second line.  Mechanisms of many bodies are evaluated without these matrices, by the passes of
+//! [`recursive`](super::recursive); what is found is the same.
 
 use super::recursive::Evaluation;
 use super::row::{Linearised, Posture};
@@ -72,7 +73,7 @@ impl<T: Scalar> Kernel<T> {
 
     /// Scratch space for energies.
     pub fn without_rows(mechanism: &Mechanism) -> Self {
-        let is_dense = mechanism.recursion.is_none();
+        let is_dense = mechanism.recursion.is_none() && mechanism.tree.is_dense();
         let mut kernel = Self::sized(mechanism.coordinates(), Vec::new(), is_dense);
         if !is_dense {
             kernel.feet = std::array::from_fn(|_| vec![Complex::ZERO; mechanism.bodies.len()]);

@@ -21,7 +21,8 @@
 //!
 //! **Everything planar is a sum of unit vectors.**  In a tree of hinged bodies every point is `P = p0 + Σ gamma_k z_k` with complex constants
 //! ([`point`]), so the constant Hermitian matrix `H_ij = Σ_m m_m conj(gamma_mi) gamma_mj` (`A = Re H`, `B = Im H`) is formed once per scene,
-//! and one sine and cosine per body is all the trigonometry there is.
+//! and one sine and cosine per body is all the trigonometry there is.  Where many bodies make that matrix dear, the accelerations are found
+//! body by body ([`recursive`]), and those of rows from the factors left behind.
 //!
 //! The same mechanism is marched in three forms, chosen before the first step:
 //! [`multiplier`] in (q, w) with one multiplier per row, [`elimination`] with the driven angles as known functions of time, [`canonical`] in (q, p),

@@ -46,10 +46,16 @@ impl Point {
 
     /// The vector from `other` to this point.
     pub fn minus(&self, other: &Self) -> Self {
-        let mut difference = Self { root: self.root - other.root, ..self.clone() };
-        for &(body, gamma) in &other.terms {
-            difference = difference.along(body, -gamma);
+        let (mut mine, mut others) = (self.terms.iter().copied().peekable(), other.terms.iter().copied().peekable());
+        let mut terms = Vec::with_capacity(self.terms.len() + other.terms.len());
+        // Both lists rise; equal terms cancel exactly.
+        while let Some(first) = mine.peek().into_iter().chain(others.peek()).map(|term| term.0).min() {
+            let plus = mine.next_if(|term| term.0 == first).map_or(Complex::ZERO, |term| term.1);
+            let minus = others.next_if(|term| term.0 == first).map_or(Complex::ZERO, |term| term.1);
+            terms.push((first, plus - minus));
         }
+        terms.retain(|term| term.1 != Complex::ZERO);
+        let mut difference = Self { root: self.root - other.root, terms, shifts: self.shifts.clone() };
         for &(x, share) in &other.shifts {
             match difference.shifts.iter().position(|shift| shift.0 == x) {
                 Some(same) => difference.shifts[same].1 -= share,

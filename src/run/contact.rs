@@ -120,6 +120,11 @@ impl Course {
         }
     }
 
+    /// True where loops or sliders have to be kept.
+    pub(super) fn is_tied_up(&self) -> bool {
+        self.free.is_tied_up()
+    }
+
     /// The sample of the present moment.
     pub(super) fn sample(&mut self) -> &Sample {
         // A form writes only what it keeps.

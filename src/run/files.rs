@@ -121,19 +121,18 @@ impl Folder {
         }
         // Without their table the checkpoints are of no use.
         checkpoint::Checkpoints::none(path).remove()?;
-        let entries = fs::read_dir(path).map_err(|source| FileError::Folder { folder: folder(), source })?;
-        for entry in entries.flatten().filter(|entry| entry.file_name().to_string_lossy().starts_with(UNFINISHED)) {
-            remove(entry.path())?;
-        }
+        sweep_out(path, &[])?;
         Ok(Self { path: folder(), written: Vec::new(), _lock: lock })
     }
 
-    /// Opens the folder of an interrupted run, and locks it.
+    /// Opens the folder of an interrupted run, and locks it; its tables stay, whatever else it was writing is swept out.
     ///
     /// # Errors
-    /// Somebody is writing into it.
+    /// Somebody is writing into it, or it is closed.
     pub fn reopen(path: &Path) -> Result<Self, FileError> {
-        Ok(Self { path: path.to_owned(), written: Vec::new(), _lock: lock(path)? })
+        let lock = lock(path)?;
+        sweep_out(path, &[TRAJECTORY, SWEEP])?;
+        Ok(Self { path: path.to_owned(), written: Vec::new(), _lock: lock })
     }
 
     /// Opens a folder to put whole files into, beside whatever is there and whoever else does.
@@ -334,6 +333,18 @@ pub fn quoted(path: &Path) -> String {
     if !text.is_empty() && text.chars().all(is_plain) { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
 }
 
+/// Removes what was never finished, but the tables of these names.
+fn sweep_out(folder: &Path, but: &[&str]) -> Result<(), FileError> {
+    let entries = fs::read_dir(folder).map_err(|source| FileError::Folder { folder: folder.to_owned(), source })?;
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        if name.to_string_lossy().strip_prefix(UNFINISHED).is_some_and(|name| !but.contains(&name)) {
+            remove(entry.path())?;
+        }
+    }
+    Ok(())
+}
+
 /// Removes a file that may not be there.
 pub(super) fn remove(path: PathBuf) -> Result<(), FileError> {
     match fs::remove_file(&path) {
@@ -390,7 +401,10 @@ mod tests {
         let cursor = stream.cursor().expect("synchronized");
         stream.outlive();
         stream.write_all(b"too much").expect("written");
-        drop(stream);
+        drop((stream, folder));
+        fs::write(place.path().join(".unfinished-Xcheckpoint"), "half").expect("written");
+        let mut folder = Folder::reopen(place.path()).expect("there");
+        assert_eq!(names(place.path()), [".unfinished-trajectory.csv"]);
         let path = place.path().join(".unfinished-trajectory.csv");
         for (bad, why) in [(&b"on"[..], "shorter"), (b"two too much", "changed")] {
             let good = fs::read(&path).expect("there");

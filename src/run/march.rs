@@ -16,6 +16,9 @@ use crate::stepping::rattle::Rattle;
 use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Method, Reached, Seen, StepError, Tally, Taylor, Tolerance};
 use std::sync::Arc;
 
+/// Turns that a state read from somewhere may have at most: all that doubles count.
+const MOST_TURNS: u64 = 1 << 53;
+
 /// A mechanism in some form, as a first-order system.
 pub trait Problem: Field + Form {}
 impl<P: Field + Form> Problem for P {}
@@ -67,6 +70,8 @@ pub(super) struct Place {
     /// Where a dense method began its last step; without unknowns where it made none.
     from: State,
     ahead: Option<usize>,
+    /// What the method knows beside.
+    known: Vec<f64>,
 }
 
 /// What can be seen of the steps of a method that is not dense.
@@ -182,14 +187,15 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
     }
 
     fn place(&self) -> Place {
-        Place { state: self.state.clone(), tally: self.tally, from: self.from.clone(), ahead: self.ahead }
+        Place { state: self.state.clone(), tally: self.tally, from: self.from.clone(), ahead: self.ahead, known: self.method.knows() }
     }
 
     fn resume(&mut self, place: Place, horizon: Time) -> Result<bool, StepError> {
         let shape = |state: &State| (state.y.len(), state.low.len(), state.turns.len(), state.is_winding);
-        let alike = |state: &State| shape(state) == shape(&self.state);
+        let alike = |state: &State| shape(state) == shape(&self.state) && state.turns.iter().all(|turns| turns.unsigned_abs() < MOST_TURNS);
         let steps_back = self.method.is_dense() && !place.from.y.is_empty() && place.from.time < place.state.time;
-        if !alike(&place.state) || (steps_back && !alike(&place.from)) {
+        let is_event = |event: usize| event < self.problem.mechanism().contacts.len();
+        if !alike(&place.state) || (steps_back && !alike(&place.from)) || !place.ahead.is_none_or(is_event) {
             return Ok(false);
         }
         if steps_back {
@@ -197,8 +203,8 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
             let mut state = place.from.clone();
             self.method.advance(&mut self.problem, &mut state, horizon, &mut Tally::default(), &mut |_, _| Ok(Seen::Enough))?;
         }
-        Place { state: self.state, tally: self.tally, from: self.from, ahead: self.ahead } = place;
-        Ok(true)
+        (self.state, self.tally, self.from, self.ahead) = (place.state, place.tally, place.from, place.ahead);
+        Ok(self.method.learn(&place.known))
     }
 }
 

@@ -151,7 +151,8 @@ impl Plan {
         let positive = |value: Option<f64>| value.is_none_or(|value| value > 0.0 && value.is_finite());
         let tolerances = self.tolerance.is_none_or(|tolerance| positive(Some(tolerance.relative)) && positive(Some(tolerance.absolute)));
         let numbers = [Some(self.until), Some(self.every), self.step, self.time_constant];
-        let given = if self.method.is_adaptive() { self.tolerance.is_some() } else { self.step.is_some() };
+        let given = if self.method.is_adaptive() { self.tolerance.is_some() } else { self.step.is_some() }
+            && (self.stabilization != Stabilization::Baumgarte || self.time_constant.is_some());
         let is_known = super::methods::METHODS.iter().any(|info| info.id == self.method);
         numbers.into_iter().all(positive) && tolerances && given && is_known && rows(self.until, self.every) == self.rows as f64
     }

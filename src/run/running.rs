@@ -4,6 +4,7 @@ use super::contact::{Course, Hold, Station, Strike};
 use super::drift::{Drift, Limits};
 use super::flip::{Flip, Lookout};
 use super::march::{March, Pause, build};
+use super::methods::{MethodId, Stabilization};
 use super::plan::{Plan, Refusal, Request};
 use super::sample::Sample;
 use super::trace::Trace;
@@ -12,6 +13,9 @@ use crate::scene::Scene;
 use crate::stepping::{Cause, StepError, Tally};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+
+/// Energy balance over its scale beyond which loops and sliders that nothing projects count as torn.
+const APART: f64 = 1e-4;
 
 /// A run about to begin.
 pub struct Run {
@@ -307,6 +311,7 @@ impl Running {
             if stopped == Ok(false) {
                 return Ok(false);
             }
+            let is_tied_up = course.is_tied_up();
             let sample = course.sample();
             // A stop before any progress leaves the state of the row before.
             if self.row == 0 || sample.t > outcome.last.t {
@@ -319,7 +324,8 @@ impl Running {
             outcome.stop = stopped
                 .err()
                 .or_else(|| exceeded.err().map(|what| drift_stop(&outcome.plan, sample.t, what)))
-                .or_else(|| (!sample.is_finite()).then(|| not_finite(&outcome.plan, sample.t)));
+                .or_else(|| (!sample.is_finite()).then(|| not_finite(&outcome.plan, sample.t)))
+                .or_else(|| if is_tied_up { came_apart(&outcome.plan, sample) } else { None });
             outcome.last.clone_from(sample);
             // A dense method is ahead of what it shows.
             let reached = outcome.last.t;
@@ -340,6 +346,21 @@ impl Running {
         self.outcome.tally = self.course.tally();
         self.outcome
     }
+}
+
+/// Loops and sliders that nothing projects let go at singular positions, and the motion goes on smoothly on another branch: such a run is no success.
+fn came_apart(plan: &Plan, sample: &Sample) -> Option<StepError> {
+    let is_loose =
+        matches!(plan.stabilization, Stabilization::None | Stabilization::Baumgarte) && !matches!(plan.method, MethodId::Rattle(_));
+    let off = sample.imbalance.abs();
+    (is_loose && off > APART).then(|| StepError {
+        cause: Cause::BranchLost,
+        method: plan.method.to_string(),
+        t: sample.t,
+        step: plan.step.unwrap_or(0.0),
+        what: format!("the energy balance is off by {off:.1e} of its scale: loops or sliders have let go"),
+        hint: "--method dp8 or taylor with --stabilize projection, or a tighter tolerance".into(),
+    })
 }
 
 fn not_finite(plan: &Plan, t: f64) -> StepError {

@@ -24,6 +24,8 @@ pub struct Projected<M> {
     /// Energy less work after the last step, and whether that ended near a singular position.
     balance: Option<f64>,
     near: bool,
+    /// True where the last call ended with a pause: nothing has changed since.
+    has_paused: bool,
     /// Largest violation left that counts as converged, at both levels \[rad, rad/s or m, m/s\], relative to levers and
     /// speeds where these are larger.
     pub tolerance: f64,
@@ -32,7 +34,7 @@ pub struct Projected<M> {
 impl<M> Projected<M> {
     /// Projects after the steps of `inner`.
     pub fn new(inner: M) -> Self {
-        Self { inner, kernel: None, balance: None, near: false, tolerance: 1e-13 }
+        Self { inner, kernel: None, balance: None, near: false, has_paused: false, tolerance: 1e-13 }
     }
 }
 
@@ -59,13 +61,13 @@ where
     ) -> Result<Reached, StepError> {
         let (name, tolerance) = (self.inner.name(), self.tolerance);
         let mechanism = problem.mechanism();
-        if !mechanism.contacts.is_empty() {
+        if !mechanism.contacts.is_empty() && !self.has_paused {
             // What impacts change is not a step's.
             self.balance = None;
         }
         let kernel = self.kernel.get_or_insert_with(|| Kernel::new(mechanism));
         let Self { inner, balance, near, .. } = self;
-        inner.advance(problem, state, until, tally, &mut |problem, state| {
+        let reached = inner.advance(problem, state, until, tally, &mut |problem, state| {
             let landing = project(problem.mechanism(), kernel, state, tolerance).map_err(|(row, left)| StepError {
                 cause: Cause::ProjectionFailed,
                 method: name.into(),
@@ -97,11 +99,26 @@ where
                 Seen::Enough if landing.has_moved => Seen::ChangedEnough,
                 seen => seen,
             })
-        })
+        });
+        self.has_paused = reached == Ok(Reached::Pause);
+        reached
     }
 
     fn is_dense(&self) -> bool {
         self.inner.is_dense()
+    }
+
+    /// The balance after the last step, if any, and what there is to know of its end; then what the inner method knows.
+    fn knows(&self) -> Vec<f64> {
+        let own = [f64::from(self.balance.is_some()), self.balance.unwrap_or_default(), f64::from(self.near), f64::from(self.has_paused)];
+        own.into_iter().chain(self.inner.knows()).collect()
+    }
+
+    fn learn(&mut self, known: &[f64]) -> bool {
+        let Some((&[has_balance, balance, near, has_paused], rest)) = known.split_first_chunk() else { return false };
+        self.balance = (has_balance != 0.0).then_some(balance);
+        (self.near, self.has_paused) = (near != 0.0, has_paused != 0.0);
+        self.inner.learn(rest)
     }
 
     /// Inside a step the constraints are kept as well as at its end; where they cannot be, the state is the step's own.

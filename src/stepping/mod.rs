@@ -105,6 +105,16 @@ pub trait Method<P: ?Sized> {
     ///
     /// Nothing of the method or of the march changes by it; methods that are not dense write nothing.
     fn within(&mut self, _problem: &mut P, _from: &State, _time: Time, _inside: &mut State) {}
+
+    /// What a method knows beside the state that has a say in what follows; nothing unless said otherwise.
+    fn knows(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// Takes over what another one of its kind knew at the same state; false where it can be no such thing.
+    fn learn(&mut self, known: &[f64]) -> bool {
+        known.is_empty()
+    }
 }
 
 /// Why a method stopped.

@@ -94,7 +94,8 @@ impl Method<Natural> for Rattle {
         watch: &mut Watch<Natural>,
     ) -> Result<Reached, StepError> {
         let is_plain = problem.guides().is_empty() && problem.elements() == state.turns.len();
-        match (state.turns.len(), is_plain) {
+        let bodies = if problem.elements() == state.turns.len() { state.turns.len() } else { 0 };
+        match (bodies, is_plain) {
             (1, true) => self.march::<1, false>(problem, state, until, tally, watch),
             (2, true) => self.march::<2, false>(problem, state, until, tally, watch),
             (3, true) => self.march::<3, false>(problem, state, until, tally, watch),

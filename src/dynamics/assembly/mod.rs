@@ -10,6 +10,7 @@
 //! scene has to say which.
 
 mod newton;
+mod rank;
 mod svd;
 
 use super::compile::CompileError;
@@ -32,10 +33,8 @@ const REACH: f64 = 0.5;
 const DISTINCT: f64 = 1e-4;
 /// What is left of a measured row, once those before it are taken off, counts as zero below this.
 const DEPENDENT: f64 = 1e-9;
-/// The same near a singular position, where rows that are met to [`KEPT`] leave angles open by its square root.
-const NEARLY: f64 = 1e-5;
-/// More coordinates than this are not taken apart: what is said of rank and doubles stands for the start alone.
-const DENSE: usize = 300;
+/// Up to so many coordinates redundant rows are told from singular ones, and rounding is spread over all that is given.
+const DENSE: usize = 100;
 
 /// How the start was found, and the degrees of freedom that are left.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -305,7 +304,7 @@ impl<'a> Problem<'a> {
     }
 
     fn add_aims(&self, matrix: &mut Matrix, aims: &[Aim], q: &[DoubleDouble]) {
-        let z = self.linearise::<f64>(q, &vec![0.0; q.len()]).z;
+        let z = self.face::<f64>(q).1;
         for aim in aims {
             matrix.entries.extend(self.aim(aim, q, &z).1);
             matrix.rows += 1;
@@ -314,7 +313,7 @@ impl<'a> Problem<'a> {
 
     /// The value of every aim \[rad or m\].
     fn measured(&self, q: &[DoubleDouble]) -> impl Iterator<Item = f64> {
-        let z = self.linearise::<DoubleDouble>(q, &vec![DoubleDouble::ZERO; q.len()]).z;
+        let z = self.face::<DoubleDouble>(q).1;
         self.aims.iter().map(|aim| self.aim(aim, q, &z).0.hi).collect::<Vec<f64>>().into_iter()
     }
 
@@ -427,63 +426,13 @@ impl<'a> Problem<'a> {
             // Rows of lost rank would take any rates for these.
             self.check_open(q, &every, &aims, &missing, "omega")?;
         }
-        let z = self.linearise::<DoubleDouble>(q, &omega).z;
+        let z = self.face::<DoubleDouble>(q).1;
         for aim in &aims {
             let used = self.aim_rate(aim, &z, &omega).hi;
             changes.extend(self.change(aim, used, ["omega", "velocity"], ["rad/s", "m/s"]));
         }
         Ok(omega)
     }
-
-    /// Degrees of freedom, redundant rows and singular ones.
-    fn rank(&self, q: &[DoubleDouble]) -> Assembly {
-        let rows = self.mechanism.rows.len();
-        let every = vec![true; rows];
-        let here = self.jacobian(q, &every);
-        let conditioning = if rows == 0 {
-            1.0
-        } else if q.len() <= DENSE {
-            here.svd().conditioning(DEPENDENT)
-        } else {
-            f64::NAN
-        };
-        let dependent = dependent(&here, DEPENDENT);
-        let count = |rows: &[bool]| rows.iter().filter(|&&row| row).count();
-        let mut redundant = dependent.clone();
-        if count(&dependent) > 0 && q.len() <= DENSE {
-            // Motors may be anywhere.
-            let steady: Vec<bool> = self.mechanism.rows.iter().zip(&self.active).map(|(row, &active)| active && !row.is_motor()).collect();
-            let none = vec![false; self.aims.len()];
-            for k in 1..=12 {
-                // Farther and farther: close to a singular position the nearest start may be that position.
-                let spread = 0.08 * k as f64;
-                let mut near: Vec<DoubleDouble> =
-                    q.iter().enumerate().map(|(j, &q)| q + DoubleDouble::of(spread * self.unit[j] * shuffled(k, j))).collect();
-                if self.position(&mut near, &steady, &none) < KEPT {
-                    let there = self::dependent(&self.jacobian(&near, &every), NEARLY);
-                    if count(&there) < count(&redundant) {
-                        redundant = there;
-                    }
-                }
-            }
-        }
-        let extra = count(&dependent) - count(&redundant);
-        let mut singular: Vec<usize> = (0..rows).filter(|&i| dependent[i] && !redundant[i]).collect();
-        singular.drain(..singular.len().saturating_sub(extra));
-        let name = |i: usize| self.mechanism.rows[i].name.clone();
-        Assembly {
-            degrees_of_freedom: q.len() - (rows - count(&redundant)),
-            singular: singular.into_iter().map(name).collect(),
-            redundant: (0..rows).filter(|&i| redundant[i]).map(name).collect(),
-            conditioning,
-            ..Assembly::default()
-        }
-    }
-}
-
-/// Which rows are combinations of those before.
-fn dependent(jacobian: &Matrix, least: f64) -> Vec<bool> {
-    independent(jacobian, least).iter().map(|new| !new).collect()
 }
 
 /// The aims at the origin of a bar, or at its velocity.

@@ -55,32 +55,31 @@ pub enum Goal {
     Origin(Complex<f64>),
 }
 
-/// Rows at one moment, and their Jacobian row by row.
-pub struct Linear<T> {
-    pub rows: Vec<Linearised<T>>,
-    pub jacobian: Vec<T>,
-    pub z: Vec<Complex<T>>,
-}
-
 impl Problem<'_> {
     /// Number of coordinates.
     pub fn coordinates(&self) -> usize {
         self.unit.len()
     }
 
-    /// The rows at t = 0.
-    pub fn linearise<T: Real>(&self, q: &[DoubleDouble], omega: &[T]) -> Linear<T> {
-        let (mechanism, n) = (self.mechanism, self.coordinates());
-        let angles = mechanism.bodies.len();
+    /// Elements at these coordinates.
+    pub fn face<T: Real>(&self, q: &[DoubleDouble]) -> (Vec<T>, Vec<Complex<T>>) {
+        let angles = self.mechanism.bodies.len();
         let phi: Vec<T> = q.iter().enumerate().map(|(k, &q)| T::split(if k < angles { q.reduced().0 } else { q }).0).collect();
-        let mut z = vec![Complex::ZERO; n];
-        mechanism.tree.face::<T, 0>(&phi, &mut z);
-        let mut jacobian = vec![T::ZERO; mechanism.rows.len() * n];
-        let at = Posture { phi: &phi, z: &z, omega };
-        let rows = (mechanism.rows.iter().zip(jacobian.chunks_exact_mut(n)))
-            .map(|(row, jacobian)| row.linearise(Time::default(), at, jacobian))
-            .collect();
-        Linear { rows, jacobian, z }
+        let mut z = vec![Complex::ZERO; self.coordinates()];
+        self.mechanism.tree.face::<T, 0>(&phi, &mut z);
+        (phi, z)
+    }
+
+    /// Shows the rows at t = 0 with their gradients, one after another; returns the elements.
+    fn visit<T: Real>(&self, q: &[DoubleDouble], omega: &[T], mut see: impl FnMut(usize, Linearised<T>, &[T])) -> Vec<Complex<T>> {
+        let (phi, z) = self.face::<T>(q);
+        let mut gradient = vec![T::ZERO; self.coordinates()];
+        for (i, row) in self.mechanism.rows.iter().enumerate() {
+            gradient.fill(T::ZERO);
+            let here = row.linearise(Time::default(), Posture { phi: &phi, z: &z, omega }, &mut gradient);
+            see(i, here, &gradient);
+        }
+        z
     }
 
     /// Coordinates that no held aim takes.
@@ -92,11 +91,12 @@ impl Problem<'_> {
     /// Every row's Jacobian in all coordinates, measured; rows that are not among `rows` come out zero.
     pub fn jacobian(&self, q: &[DoubleDouble], rows: &[bool]) -> Matrix {
         let n = self.coordinates();
-        let linear = self.linearise::<f64>(q, &vec![0.0; n]);
         let mut matrix = Matrix::zero(self.mechanism.rows.len(), n);
-        for (i, gradient) in linear.jacobian.chunks_exact(n).enumerate().filter(|(i, _)| rows[*i]) {
-            self.measure(gradient, self.lever[i], matrix.row_mut(i));
-        }
+        self.visit::<f64>(q, &vec![0.0; n], |i, _, gradient| {
+            if rows[i] {
+                self.measure(gradient, self.lever[i], matrix.row_mut(i));
+            }
+        });
         matrix
     }
 
@@ -142,17 +142,18 @@ impl Problem<'_> {
     /// Measured violations of the rows that count and of held origins, and their Jacobian in the free columns.
     fn equations<T: Real>(&self, q: &[DoubleDouble], rows: &[bool], held: &[bool], columns: &[usize]) -> (Vec<f64>, Matrix) {
         let n = self.coordinates();
-        let linear = self.linearise::<T>(q, &vec![T::ZERO; n]);
-        let plain: Vec<f64> = linear.jacobian.iter().map(|g| g.value()).collect();
         let (mut left, mut matrix) = (Vec::new(), Matrix { rows: 0, columns: columns.len(), entries: Vec::new() });
-        let mut full = vec![0.0; n];
-        for (i, (row, gradient)) in linear.rows.iter().zip(plain.chunks_exact(n)).enumerate().filter(|(i, _)| rows[*i]) {
-            self.measure(gradient, self.lever[i], &mut full);
-            left.push(row.position.value() / self.lever[i]);
-            matrix.push(&full, columns);
-        }
+        let (mut plain, mut full) = (vec![0.0; n], vec![0.0; n]);
+        let z = self.visit::<T>(q, &vec![T::ZERO; n], |i, here, gradient| {
+            if rows[i] {
+                left.push(here.position.value() / self.lever[i]);
+                plain.iter_mut().zip(gradient).for_each(|(plain, g)| *plain = g.value());
+                self.measure(&plain, self.lever[i], &mut full);
+                matrix.push(&full, columns);
+            }
+        });
         for (aim, _) in self.aims.iter().zip(held).filter(|(aim, held)| **held && matches!(aim.goal, Goal::Origin(_))) {
-            let (value, gradient) = self.aim(aim, q, &linear.z);
+            let (value, gradient) = self.aim(aim, q, &z);
             left.push((value - T::of(aim.given)).value() / self.size);
             matrix.push(&gradient, columns);
         }
@@ -167,7 +168,7 @@ impl Problem<'_> {
             if largest(&left) < 1e-15 || columns.is_empty() {
                 break;
             }
-            let mut step = matrix.svd().solve(&left, columns.len(), NOISE);
+            let mut step = matrix.solver(NOISE).solve(&left);
             let longest = largest(&step);
             let mut share = if longest > LONGEST { LONGEST / longest } else { 1.0 };
             step.iter_mut().zip(&columns).for_each(|(step, &k)| *step *= self.unit[k]);
@@ -198,7 +199,7 @@ impl Problem<'_> {
             let (left, matrix) = self.equations::<f64>(&trial, &self.active, &none, &columns);
             let away: Vec<f64> = (target.iter().zip(&trial)).zip(&self.unit).map(|((&target, &q), unit)| (target - q).hi / unit).collect();
             let sum: Vec<f64> = left.iter().enumerate().map(|(i, left)| left + dot(matrix.row(i), &away)).collect();
-            let mut step = matrix.svd().solve(&sum, columns.len(), NOISE);
+            let mut step = matrix.solver(NOISE).solve(&sum);
             step.iter_mut().zip(&self.unit).for_each(|(step, unit)| *step *= unit);
             let next = moved(target, &step, &columns, 1.0);
             let moves: Vec<f64> = (next.iter().zip(&trial)).zip(&self.unit).map(|((&next, &q), unit)| (next - q).hi / unit).collect();
@@ -224,7 +225,7 @@ impl Problem<'_> {
             if largest(&left) < 1e-30 || columns.is_empty() {
                 break;
             }
-            let mut step = matrix.svd().solve(&left, columns.len(), NOISE);
+            let mut step = matrix.solver(NOISE).solve(&left);
             step.iter_mut().zip(&columns).for_each(|(step, &k)| *step *= self.unit[k]);
             let trial = moved(q, &step, &columns, 1.0);
             let there = self.equations::<DoubleDouble>(&trial, rows, held, &columns);
@@ -239,32 +240,37 @@ impl Problem<'_> {
 
     /// The row that is off most: its number and by how much \[rad or m\].
     pub fn worst(&self, q: &[DoubleDouble]) -> (usize, f64) {
-        let linear = self.linearise::<f64>(q, &vec![0.0; self.coordinates()]);
-        let off = |i: usize| linear.rows[i].position.abs();
-        let measured = |i: &usize| if self.active[*i] { off(*i) / self.lever[*i] } else { -1.0 };
-        let worst = (0..linear.rows.len()).max_by(|a, b| measured(a).total_cmp(&measured(b))).unwrap_or(0);
-        (worst, off(worst))
+        let mut worst = (0, 0.0, -1.0);
+        self.visit::<f64>(q, &vec![0.0; self.coordinates()], |i, here, _| {
+            let (off, measured) = (here.position.abs(), here.position.abs() / self.lever[i]);
+            if self.active[i] && measured > worst.2 {
+                worst = (i, off, measured);
+            }
+        });
+        (worst.0, worst.1)
     }
 
     /// Changes the rates that are not held, as little as may be, so that all rows keep; returns what is left, measured, relative to the rates.
     pub fn rates(&self, q: &[DoubleDouble], omega: &mut [DoubleDouble], aims: &[Aim], held: &[bool]) -> f64 {
         let columns = Problem { aims: aims.to_vec(), ..self.clone() }.columns(held);
         let mut matrix = Matrix { rows: 0, columns: columns.len(), entries: Vec::new() };
-        let full = self.jacobian(q, &vec![true; self.mechanism.rows.len()]);
-        (0..full.rows).for_each(|i| matrix.push(full.row(i), &columns));
-        let z = self.linearise::<f64>(q, &vec![0.0; self.coordinates()]).z;
+        let mut full = vec![0.0; self.coordinates()];
+        let z = self.visit::<f64>(q, &vec![0.0; self.coordinates()], |i, _, gradient| {
+            self.measure(gradient, self.lever[i], &mut full);
+            matrix.push(&full, &columns);
+        });
         let origins = || aims.iter().zip(held).filter(|(aim, held)| **held && matches!(aim.goal, Goal::Origin(_))).map(|(aim, _)| aim);
         origins().for_each(|aim| matrix.push(&self.aim(aim, q, &z).1, &columns));
-        let svd = matrix.svd();
+        let solver = matrix.solver(NOISE);
         let left = |omega: &[DoubleDouble]| {
             let mut left: Vec<f64> = self.slips(q, omega).iter().zip(&self.lever).map(|(slip, lever)| slip / lever).collect();
-            let z = self.linearise::<DoubleDouble>(q, omega).z;
+            let z = self.face::<DoubleDouble>(q).1;
             left.extend(origins().map(|aim| (self.aim_rate(aim, &z, omega) - DoubleDouble::of(aim.given)).hi / self.size));
             left
         };
         let mut now = left(omega);
         for _ in 0..6 {
-            let step = svd.solve(&now, columns.len(), NOISE);
+            let step = solver.solve(&now);
             let mut trial = omega.to_vec();
             for (step, &k) in step.iter().zip(&columns) {
                 trial[k] -= DoubleDouble::of(step * self.unit[k]);
@@ -282,10 +288,11 @@ impl Problem<'_> {
 
     /// C' = G w + C_t of every row \[rad/s or m/s\].
     pub fn slips(&self, q: &[DoubleDouble], omega: &[DoubleDouble]) -> Vec<f64> {
-        let linear = self.linearise::<DoubleDouble>(q, omega);
-        (linear.rows.iter().zip(linear.jacobian.chunks_exact(omega.len())))
-            .map(|(row, gradient)| gradient.iter().zip(omega).fold(row.drive, |sum, (&g, &w)| sum + g * w).hi)
-            .collect()
+        let mut slips = Vec::with_capacity(self.mechanism.rows.len());
+        self.visit::<DoubleDouble>(q, omega, |_, here, gradient| {
+            slips.push(gradient.iter().zip(omega).fold(here.drive, |sum, (&g, &w)| sum + g * w).hi);
+        });
+        slips
     }
 }
 

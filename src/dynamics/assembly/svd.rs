@@ -80,6 +80,83 @@ impl Matrix {
     }
 }
 
+/// The shortest x for which A x is nearest to b.
+#[derive(Clone, Debug)]
+pub enum Solver<'a> {
+    /// By singular values, those below a share of the largest counting as zero; and the number of columns.
+    Small(Svd, usize, f64),
+    /// By the factors of A Aᵀ or Aᵀ A with a little on the diagonal: steps that are repeated.
+    Large(&'a Matrix, Matrix),
+}
+
+/// The longest shorter side that is taken apart.
+const SMALL: usize = 100;
+
+impl Matrix {
+    /// Prepares solutions.
+    pub fn solver(&self, share: f64) -> Solver<'_> {
+        if self.rows.min(self.columns) <= SMALL { Solver::Small(self.svd(), self.columns, share) } else { self.squared() }
+    }
+
+    fn squared(&self) -> Solver<'_> {
+        let few = self.rows.min(self.columns);
+        let is_wide = self.rows <= self.columns;
+        let mut square = Matrix::zero(few, few);
+        if is_wide {
+            for i in 0..few {
+                for j in 0..=i {
+                    square.entries[i * few + j] = dot(self.row(i), self.row(j));
+                }
+            }
+        } else {
+            for row in self.entries.chunks_exact(self.columns) {
+                for (i, a) in row.iter().enumerate().filter(|(_, a)| **a != 0.0) {
+                    square.row_mut(i)[..=i].iter_mut().zip(row).for_each(|(sum, b)| *sum += a * b);
+                }
+            }
+        }
+        let most = (0..few).fold(0.0, |most: f64, i| most.max(square.entries[i * few + i]));
+        // Cholesky's factor, row by row.
+        for i in 0..few {
+            for j in 0..=i {
+                let sum = square.entries[i * few + j] - dot(&square.row(i)[..j], &square.row(j)[..j]);
+                square.entries[i * few + j] =
+                    if i == j { (sum + 1e-14 * most).max(1e-14 * most).sqrt() } else { sum / square.entries[j * few + j] };
+            }
+        }
+        Solver::Large(self, square)
+    }
+}
+
+impl Solver<'_> {
+    /// Solves.
+    pub fn solve(&self, b: &[f64]) -> Vec<f64> {
+        let (matrix, factor) = match self {
+            Self::Small(svd, columns, share) => return svd.solve(b, *columns, *share),
+            Self::Large(matrix, factor) => (matrix, factor),
+        };
+        let transposed = |b: &[f64]| {
+            let mut x = vec![0.0; matrix.columns];
+            for (i, b) in b.iter().enumerate() {
+                x.iter_mut().zip(matrix.row(i)).for_each(|(x, a)| *x += a * b);
+            }
+            x
+        };
+        let is_wide = matrix.rows <= matrix.columns;
+        let mut y = if is_wide { b.to_vec() } else { transposed(b) };
+        let few = factor.rows;
+        for i in 0..few {
+            y[i] = (y[i] - dot(&factor.row(i)[..i], &y[..i])) / factor.row(i)[i];
+        }
+        for i in (0..few).rev() {
+            y[i] /= factor.row(i)[i];
+            let (before, here) = y.split_at_mut(i);
+            before.iter_mut().zip(factor.row(i)).for_each(|(y, l)| *y -= l * here[0]);
+        }
+        if is_wide { transposed(&y) } else { y }
+    }
+}
+
 impl Svd {
     /// The largest singular value.
     fn largest(&self) -> f64 {
@@ -154,7 +231,7 @@ mod tests {
 
     /// Entries without a pattern.
     fn matrix(rows: usize, columns: usize) -> Matrix {
-        let entries = (0..rows * columns).map(|k| libm::sin(1.0 + 12.9898 * k as f64)).collect();
+        let entries = (0..rows * columns).map(|k| libm::sin(1.0 + (k * k) as f64)).collect();
         Matrix { rows, columns, entries }
     }
 
@@ -179,6 +256,19 @@ mod tests {
             // The shortest has no part that the rows do not see.
             let along: f64 = svd.triples.iter().map(|(_, _, v)| dot(v, &x).powi(2)).sum();
             assert!((along - dot(&x, &x)).abs() < 1e-12 * dot(&x, &x));
+        }
+    }
+
+    #[test]
+    fn many_rows_and_columns_are_solved_by_their_squares() {
+        for (rows, columns) in [(9, 14), (14, 9)] {
+            let a = matrix(rows, columns);
+            let b: Vec<f64> = (0..rows).map(|i| libm::cos(i as f64)).collect();
+            let (small, solver) = (a.svd().solve(&b, columns, 1e-12), a.squared());
+            let most = small.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+            for (large, small) in solver.solve(&b).iter().zip(&small) {
+                assert!((large - small).abs() < 1e-6 * most, "{large} {small}");
+            }
         }
     }
 

@@ -62,7 +62,8 @@ impl Reduced {
         };
         // Orthonormal rows q as D⁻¹ q, and how the rows are made of them: C = T Q.
         let mut rows = Vec::new();
-        let (mut basis, mut spreads) = (Vec::<Vec<Complex<DoubleDouble>>>::new(), Vec::<Vec<Complex<DoubleDouble>>>::new());
+        type Vectors = Vec<Vec<Complex<DoubleDouble>>>;
+        let (mut basis, mut spreads) = (Vectors::new(), Vectors::new());
         let mut shares: Vec<Vec<DoubleDouble>> = Vec::new();
         for row in linear {
             let mut rest = vec![Complex::<DoubleDouble>::ZERO; n];

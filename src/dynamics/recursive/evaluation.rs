@@ -11,8 +11,8 @@ use crate::dynamics::schur::Weakest;
 use crate::dynamics::{Mechanism, Time};
 use std::sync::Arc;
 
-/// Operations of the dense form that take as long as one of the recursive form, whose steps wait for one another.
-const PACE: usize = 4;
+/// How much sooner the recursive form must be done to be taken.
+const MARGIN: f64 = 1.3;
 
 /// The constants of the recursive form.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,11 +32,14 @@ impl Recursion {
         Self { links, ways }
     }
 
-    /// True where this form takes less time than the dense one, by their multiplications.
+    /// True where this form takes clearly less time than the matrices, by the operations of both.
+    ///
+    /// The weights are nanoseconds of `benches/chains.rs` on the machine of `benches/RESULTS.md`; of other machines they are wrong alike.
     pub fn pays(&self) -> bool {
-        let (n, rows) = (self.links.coordinates(), self.ways.rows());
-        let dense = n * n * (n + 24) / 6 + rows * n * n + rows * rows * (3 * n + rows) / 6;
-        PACE * (60 * n + self.ways.cost()) < dense
+        let (n, r) = (self.links.coordinates() as f64, self.ways.rows() as f64);
+        let matrices = n * (24.0 + n * (2.0 + 0.25 * n)) + 1.7 * r * (n * n + 0.5 * r * n + r * r / 6.0);
+        let bodies = 20.0 + 27.0 * n + 1.6 * self.ways.cost() as f64;
+        MARGIN * bodies < matrices
     }
 }
 

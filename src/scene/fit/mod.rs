@@ -51,8 +51,8 @@ pub(super) fn fitted(scene: Scene, places: &Places, given: &[Option<GivenStart>]
 }
 
 impl Scene {
-    /// True where the start is known from angles and rates alone, all of which must be given or follow from motors and locks: trees of hinges on
-    /// the ground whose only constraints are angles.  In every other scene a part of the start can be found from the rest.
+    /// True where the start is known from angles and rates alone, all of which must be given or follow from motors and locks: trees of
+    /// hinges on the ground whose only constraints are angles.  In every other scene a part of the start can be found from the rest.
     pub fn has_whole_start(&self) -> bool {
         Hanging::of(self).has_whole_start(self)
     }

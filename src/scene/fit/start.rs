@@ -95,7 +95,8 @@ impl<'a> Ties<'a> {
         }
     }
 
-    /// `part` of the start of every bar.  In a group of tied bars all follow from one: a bar that no tie turns if it is given, else the first that is.
+    /// `part` of the start of every bar.  In a group of tied bars all follow from one: a bar that no tie turns if it is given, else the first
+    /// that is.
     fn resolved(&self, bars: usize, part: Part, given: &dyn Fn(usize) -> Option<f64>) -> Vec<f64> {
         let mut start = vec![None; bars + 1];
         start[0] = Some(0.0);
@@ -134,8 +135,8 @@ impl GivenStart<'_> {
     }
 }
 
-/// Angle and rate of each bar at t = 0, and what of it the file gives: as given, or by the law of a motor or the angle of a lock, or 0 where the rest may be found later; an empty second
-/// list where it may not (`whole`).
+/// Angle and rate of each bar at t = 0, and what of it the file gives: as given, or by the law of a motor or the angle of a lock, or 0 where
+/// the rest may be found later; an empty second list where it may not (`whole`).
 pub(super) fn starts(
     scene: &Scene,
     places: &Places,
@@ -193,8 +194,8 @@ fn said(given: &Option<GivenStart>) -> Given {
     }
 }
 
-/// True for each bar whose start must be written so that all starts read back to the same bits, where all are known: of bars that motors and locks tie to each other
-/// only the one that the others were computed from.
+/// True for each bar whose start must be written so that all starts read back to the same bits, where all are known: of bars that motors
+/// and locks tie to each other only the one that the others were computed from.
 pub(in crate::scene) fn written_starts(scene: &Scene) -> Vec<bool> {
     let start = &scene.start;
     let mut written = vec![true; start.len()];

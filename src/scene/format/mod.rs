@@ -115,8 +115,8 @@ const fn optional(name: &'static str, shape: Shape, example: &'static str, about
     Field { name, about, shape, required: false, example }
 }
 
-/// Of the kinds of a list the one that an object with these keys is of: the last that has one of them as a key of its own that it must have,
-/// else the first.
+/// Of the kinds of a list the one that an object with these keys is of: the last that has one of them as a key of its own that it must
+/// have, else the first.
 pub(super) fn kind(of: &[&'static Table], has: impl Fn(&str) -> bool) -> Option<&'static Table> {
     let [first, others @ ..] = of else { return None };
     let own = |table: &Table| table.fields.iter().any(|field| field.required && first.field(field.name).is_none() && has(field.name));

@@ -123,13 +123,22 @@ impl<T: Coefficient> Expansion<T> {
 
     /// Sums no further than to the power that is the smallest at `h` \[s\].
     pub fn sum_to_smallest(&mut self, h: f64) {
-        let f = self.series.coordinates();
-        let size = |m: usize| {
-            let largest = self.series.rate[m * f..(m + 1) * f].iter().fold(0.0, |most, rate| larger(most, rate.value()));
-            largest * libm::pow(h, m as f64)
-        };
-        let smallest = (1..=self.series.order()).min_by(|&a, &b| size(a).total_cmp(&size(b)));
+        let smallest = (1..=self.series.order()).min_by(|&a, &b| self.size(a, h).total_cmp(&self.size(b, h)));
         self.summed = smallest.unwrap_or(self.series.order()) + 1;
+    }
+
+    /// The smallest power at `h` \[s\] over the largest.
+    pub fn smallest(&self, h: f64) -> f64 {
+        let sizes = (0..=self.series.order()).map(|m| self.size(m, h));
+        let (least, most) = sizes.fold((f64::INFINITY, 0.0), |(least, most): (f64, f64), size| (least.min(size), larger(most, size)));
+        least / most
+    }
+
+    /// The largest share of power `m` in a rate at `h` \[s\].
+    fn size(&self, m: usize, h: f64) -> f64 {
+        let f = self.series.coordinates();
+        let largest = self.series.rate[m * f..(m + 1) * f].iter().fold(0.0, |most, rate| larger(most, rate.value()));
+        largest * libm::pow(h, m as f64)
     }
 
     /// Takes a state from where the series was expanded on by `h` \[s\].

@@ -17,6 +17,10 @@ const LOW: usize = 8;
 /// Points it is looked for at, and the longest way over the step wanted.
 const POINTS: usize = 96;
 const LONGEST: f64 = 12.0;
+/// On a way through a singular position the share falls below this part of what it was; elsewhere it is small for other reasons, and the step is as any.
+const FALL: f64 = 0.1;
+/// Largest share of the motion that the smallest power in such a step may have.
+const NOISE: f64 = 1e-6;
 
 /// How long a step must be to go through a singular position and come out as far from it as it is now; `None` where there is none ahead.
 pub fn length<T: Coefficient, P: Form + ?Sized>(
@@ -52,7 +56,7 @@ pub fn length<T: Coefficient, P: Form + ?Sized>(
         if now < least {
             (least, fell) = (now, true);
         } else if fell && now >= here {
-            return (h > wanted).then_some(h);
+            return (h > wanted && least < FALL * here && expansion.smallest(h) < NOISE).then_some(h);
         } else if !fell && now > here {
             return None;
         }

@@ -1,0 +1,276 @@
+//! Published problems of linkages, and other mechanisms with a closed form, by every method that fits.
+
+mod common;
+#[allow(dead_code)]
+#[path = "../examples/four_bars.rs"]
+mod four_bars;
+
+use common::{run, shipped};
+use driftless::run::{MethodId, Outcome, Request, Stabilization};
+use driftless::scene::Scene;
+use driftless::stepping::Cause;
+use serde_json::Value;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+fn data(text: &str) -> Value {
+    serde_json::from_str(text).expect("valid JSON")
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().or_else(|| value.as_str()?.parse().ok()).expect("a number")
+}
+
+fn by(method: &str, rtol: f64) -> Request {
+    Request { method: Some(method.parse().expect("a method")), rtol: Some(rtol), ..Request::default() }
+}
+
+fn steps(method: &str, step: f64) -> Request {
+    Request { method: Some(method.parse().expect("a method")), step: Some(step), ..Request::default() }
+}
+
+fn finished(scene: &Scene, request: &Request) -> Outcome {
+    let outcome = run(scene, request);
+    assert_eq!(outcome.stop, None, "{}", scene.name);
+    outcome
+}
+
+/// Largest violation of any constraint of a run, at both levels.
+fn violations(outcome: &Outcome) -> [f64; 2] {
+    let of = |level: usize| outcome.drift.constraints.iter().map(|(_, monitors)| monitors[level].max).fold(0.0, f64::max);
+    [of(0), of(1)]
+}
+
+/// Andrews' squeezing mechanism against its quadruple-precision state.  The mechanism is 0.1 m across.
+#[test]
+fn andrews_squeezing_mechanism() {
+    let file = data(include_str!("data/andrews_squeezer.json"));
+    let angle = |name: &str| number(&file["reference_high_precision"]["angles"][name]);
+    let rate = |name: &str| number(&file["reference_high_precision"]["velocities"][name]);
+    // OF, FE, BED, GE, AG, HE, AH from the test set's relative angles.
+    let of = |get: &dyn Fn(&str) -> f64, quarter: f64| {
+        let (beta, theta, delta, epsilon) = (get("beta"), get("theta"), get("delta"), get("epsilon"));
+        let pi = 2.0 * quarter;
+        [beta, beta + theta + pi, get("gamma"), get("phi") + delta - quarter, delta, get("omega") + epsilon, epsilon - quarter]
+    };
+    let (angles, rates) = (of(&angle, FRAC_PI_2), of(&rate, 0.0));
+    let scene = Scene { every: 0.01, ..shipped("andrews", &[]) };
+    // Start angles are in doubles, which alone is 1e-12 at the end.
+    for (request, most) in [
+        (by("taylor", 1e-9), 1e-8),
+        (by("taylor", 1e-11), 1e-9),
+        (by("taylor", 1e-14), 1e-11),
+        (by("dp8", 1e-9), 1e-8),
+        (by("dp8", 1e-10), 1e-9),
+        (by("dp8", 1e-13), 1e-11),
+        (by("dp5", 1e-11), 1e-8),
+        (by("dop853", 1e-11), 1e-9),
+        (steps("gauss16", 2.5e-5), 1e-9),
+        (steps("rattle8", 1e-4 / 8.0), 1e-9),
+    ] {
+        let outcome = finished(&scene, &request);
+        let apart = |found: &[f64], expected: &[f64]| found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let (error, slip) = (apart(&outcome.last.phi, &angles), apart(&outcome.last.omega, &rates));
+        let method = outcome.plan.method;
+        assert!(error < most, "{method}: {error:.1e} rad");
+        assert!(slip < 1e5 * most, "{method}: {slip:.1e} rad/s");
+        let [position, velocity] = violations(&outcome);
+        let is_kept = outcome.plan.stabilization == Stabilization::Projection;
+        // Rates are of the order 1e3 rad/s.
+        assert!(!is_kept || (position < 1e-14 && velocity < 1e-14 * 1e3), "{method}: {position:.1e} m, {velocity:.1e} m/s");
+        assert!(outcome.drift.energy.max < 1e-8, "{method}: {:.1e}", outcome.drift.energy.max);
+    }
+}
+
+#[test]
+fn iftomm_a01_pendulum() {
+    let file = data(include_str!("data/iftomm_a01_pendulum.json"));
+    let scene = shipped("iftomm_pendulum", &[]);
+    for sample in file["reference"]["samples"].as_array().expect("a list") {
+        let until = number(&sample["t"]);
+        let outcome = finished(&Scene { until, every: until, ..scene.clone() }, &by("taylor", 1e-14));
+        let (phi, omega) = (outcome.last.phi[0], outcome.last.omega[0]);
+        let found = [phi.cos(), phi.sin(), -omega * phi.sin(), omega * phi.cos()];
+        for (found, key) in found.iter().zip(["x", "y", "vx", "vy"]) {
+            assert!((found - number(&sample[key])).abs() < 1e-12, "{until} s: {key} {found}");
+        }
+    }
+}
+
+/// Through twenty positions in which all links lie in line: every method is on the branch, or stops and says so.
+#[test]
+fn iftomm_a02_four_bars_pass_singular_positions() {
+    let file = data(include_str!("data/iftomm_a02_fourbar_n2.json"));
+    let last = file["reference"]["samples"].as_array().expect("a list").last().expect("a sample").clone();
+    let scene = Scene { every: 0.5, ..shipped("four_bars", &[]) };
+    let (mut arrived, mut lost) = (Vec::new(), Vec::new());
+    let adaptive = ["taylor", "dp8", "dp5", "dop853", "dopri5"].map(|method| (-14..=-6).map(move |p| by(method, 10_f64.powi(p))));
+    let fixed = ["gauss8", "gauss16", "rattle4", "rattle6"].map(|method| (5..=9).map(move |p| steps(method, 0.5_f64.powi(p))));
+    for request in adaptive.into_iter().flatten().chain(fixed.into_iter().flatten()) {
+        let outcome = run(&scene, &request);
+        let name = format!("{} {:?} {:?}", outcome.plan.method, outcome.plan.step, request.rtol);
+        if let Some(stop) = &outcome.stop {
+            let typed = [Cause::BranchLost, Cause::ProjectionFailed, Cause::NotConverged, Cause::StepTooSmall, Cause::TooManySteps];
+            assert!(typed.contains(&stop.cause), "{name}: {stop}");
+            lost.push(name);
+            continue;
+        }
+        let phi = outcome.last.phi[0];
+        let off = (phi.cos() - number(&last["x"])).hypot(phi.sin() - number(&last["y"]));
+        let apart = (1..3).map(|k| (outcome.last.phi[k] - phi).abs()).fold(0.0, f64::max);
+        // On the other branch of a four-bar nothing is parallel any more.
+        let order = outcome.plan.method.info().order;
+        let most = if order >= 8 && request.rtol.is_none_or(|rtol| rtol <= 1e-8) { 1e-6 } else { 0.1 };
+        assert!(off < most && apart < 1e-6, "{name}: {off:.1e} m from the closed form, links {apart:.1e} rad apart");
+        arrived.push((name, off));
+    }
+    for (method, most) in [("taylor", 1e-8), ("dp8", 3e-8), ("dp5", 3e-8)] {
+        let of_method: Vec<_> = arrived.iter().filter(|(name, _)| name.starts_with(&format!("{method} "))).collect();
+        assert_eq!(of_method.len(), 9, "{method}: {lost:?}");
+        let best = of_method.iter().map(|(_, off)| *off).fold(f64::INFINITY, f64::min);
+        assert!(best < most, "{method}: {best:.1e}");
+    }
+    assert!(arrived.iter().any(|(name, off)| name.starts_with("rattle") && *off < 1e-5), "{arrived:?}");
+}
+
+/// Forty four-bars side by side, parallel all the time.
+#[test]
+fn forty_four_bars() {
+    let scene = Scene { until: 20.0, every: 20.0, ..four_bars::scene(40) };
+    let outcome = finished(&scene, &by("taylor", 1e-8));
+    // (N + (N+1)/3) theta'' = (N + (N+1)/2) g sin theta, from the vertical.
+    let ratio = (40.0 + 41.0 / 2.0) / (40.0 + 41.0 / 3.0) * 9.81;
+    let (mut theta, mut rate, h) = (0.0_f64, 1.0_f64, 1e-4);
+    for _ in 0..200_000 {
+        // Fourth-order composition of the leapfrog.
+        for part in [1.351_207_191_959_657_8, -1.702_414_383_919_315_3, 1.351_207_191_959_657_8] {
+            theta += 0.5 * h * part * rate;
+            rate += h * part * ratio * theta.sin();
+            theta += 0.5 * h * part * rate;
+        }
+    }
+    let off = (outcome.last.phi[0] - (FRAC_PI_2 - theta)).abs();
+    assert!(off < 1e-5, "{off:.1e} rad");
+}
+
+#[test]
+fn driven_slider_crank() {
+    let scene = shipped("slider_crank_driven", &[]);
+    for request in [by("taylor", 1e-10), by("dp8", 1e-10), steps("gauss16", 5e-4), steps("rattle8", 1.25e-4)] {
+        let outcome = finished(&scene, &request);
+        let (last, name) = (&outcome.last, outcome.plan.method);
+        for (what, found, expected, most) in [
+            ("rod angle", last.phi[1], -0.331_163_913_464_838_2, 1e-10),
+            ("rod rate", last.omega[1], 60.250_322_145_936_65, 1e-7),
+            ("slider position", last.centre[2][0], 0.169_746_176_502_319_04, 1e-10),
+            ("slider velocity", last.velocity[2][0], -8.754_468_624_977_382, 1e-7),
+            ("torque", last.motors[0][0], -25.014_657_779_961_57, 1e-5),
+        ] {
+            assert!((found - expected).abs() < most, "{name}: {what} {found}");
+        }
+    }
+}
+
+#[test]
+fn slider_crank_under_torque() {
+    let file = data(include_str!("data/slider_crank_rigid_torque.json"));
+    let last = file["reference"]["samples"].as_array().expect("a list").last().expect("a sample").clone();
+    let scene = Scene { every: 0.25, ..shipped("slider_crank_torque", &[]) };
+    for (request, most) in [
+        (by("taylor", 1e-12), 1e-9),
+        (by("dp8", 1e-12), 1e-9),
+        (by("dop853", 1e-12), 1e-7),
+        (steps("gauss16", 1.0 / 512.0), 1e-9),
+        (steps("rattle8", 1.0 / 1024.0), 1e-6),
+    ] {
+        let outcome = finished(&scene, &request);
+        let found =
+            [outcome.last.phi[0], outcome.last.omega[0], outcome.last.phi[1], outcome.last.centre[2][0], outcome.last.velocity[2][0]];
+        for (found, key) in found.iter().zip(["crank_angle", "crank_rate", "rod_angle", "slider_x", "slider_velocity"]) {
+            let expected = number(&last[key]);
+            assert!((found - expected).abs() < most * expected.abs().max(1.0), "{}: {key} {found} is not {expected}", outcome.plan.method);
+        }
+    }
+}
+
+/// Nothing pushes a cart along its rail: the momentum along it and the energy stay what they are.
+#[test]
+fn cart_and_pole() {
+    let scene = shipped("cart_pole", &[]);
+    let momentum = |outcome: &Outcome| -> f64 { scene.bars.iter().zip(&outcome.last.velocity).map(|(bar, v)| bar.mass * v[0]).sum() };
+    for request in
+        [by("taylor", 1e-12), by("dp8", 1e-12), by("dop853", 1e-12), steps("gauss16", 1.0 / 128.0), steps("rattle6", 1.0 / 512.0)]
+    {
+        let begun = finished(&Scene { until: scene.every, ..scene.clone() }, &request);
+        let outcome = finished(&scene, &request);
+        let name = outcome.plan.method;
+        assert!((momentum(&outcome) - momentum(&begun)).abs() < 1e-11, "{name}: {} {}", momentum(&outcome), momentum(&begun));
+        assert!(outcome.drift.energy.max < 1e-9, "{name}: {:.1e}", outcome.drift.energy.max);
+        assert!((outcome.last.centre[0][1]).abs() < 1e-12 && outcome.last.phi[0].abs() < 1e-12, "{name}");
+    }
+}
+
+/// The rocker of a driven four-bar by the law of cosines.
+#[test]
+fn four_bar_with_a_motor() {
+    let scene = shipped("four_bar_motor", &[]);
+    let [a, b, c, d] = [0.3, 0.9, 0.7, 1.0_f64];
+    for until in [1.0 / 3.0, 7.3] {
+        let crank = FRAC_PI_2 + TAU * until;
+        let (x, y) = (d - a * crank.cos(), -a * crank.sin());
+        let span = x.hypot(y);
+        // Seen from the foot of the rocker, the crank pin is at this angle, and the rocker that much to its right.
+        let rocker = (-y).atan2(-x) - ((c * c + span * span - b * b) / (2.0 * c * span)).acos();
+        for request in [by("taylor", 1e-11), by("dp8", 1e-11), steps("gauss16", until / 1024.0), steps("rattle8", until / 8192.0)] {
+            let outcome = finished(&Scene { until, every: until, ..scene.clone() }, &request);
+            let off = (outcome.last.phi[2] - rocker + PI).rem_euclid(TAU) - PI;
+            assert!(off.abs() < 1e-9, "{}: {off:.1e} rad", outcome.plan.method);
+            assert!(outcome.drift.energy.max < 1e-8, "{}: {:.1e}", outcome.plan.method, outcome.drift.energy.max);
+        }
+    }
+}
+
+/// The rocker points at the crank pin, whatever moves it.
+#[test]
+fn quick_return_mechanism() {
+    let scene = shipped("quick_return", &[]);
+    for until in [0.4, 3.7] {
+        let crank = TAU * until;
+        let rocker = (0.1 * crank.sin() + 0.25).atan2(0.1 * crank.cos());
+        for request in
+            [by("taylor", 1e-11), by("dp8", 1e-11), by("dop853", 1e-11), steps("gauss16", until / 2048.0), steps("rattle8", until / 8192.0)]
+        {
+            let outcome = finished(&Scene { until, every: until, ..scene.clone() }, &request);
+            let off = (outcome.last.phi[1] - rocker).abs();
+            assert!(off < 1e-9, "{}: {off:.1e} rad", outcome.plan.method);
+            let ram = 0.5 * rocker.cos() - (0.2_f64.powi(2) - (0.5 * rocker.sin() - 0.45).powi(2)).sqrt();
+            assert!(
+                (outcome.last.centre[3][0] - ram).abs() < 1e-9 && (outcome.last.centre[3][1] - 0.2).abs() < 1e-12,
+                "{}",
+                outcome.plan.method
+            );
+            assert!(outcome.drift.energy.max < 1e-8, "{}: {:.1e}", outcome.plan.method, outcome.drift.energy.max);
+        }
+    }
+}
+
+/// A kite folds, and a slider-crank with equal arms turns over the point below its slider: two more singular positions.  Whoever arrives, arrives at the same place.
+#[test]
+fn singular_positions_that_are_no_ladders() {
+    for (name, until) in [("kite", 2.0), ("slider_crank_equal", 5.0)] {
+        let scene = Scene { until, every: 0.25, ..shipped(name, &[]) };
+        let reference = finished(&scene, &by("taylor", 1e-11));
+        let mut arrived = 0;
+        let adaptive = ["taylor", "dp8", "dp5", "dop853"].map(|method| (-13..=-8).map(move |p| by(method, 10_f64.powi(p))));
+        for request in adaptive.into_iter().flatten() {
+            let outcome = run(&scene, &request);
+            if outcome.stop.is_some() {
+                continue;
+            }
+            arrived += usize::from(outcome.plan.stabilization == Stabilization::Projection);
+            let off = outcome.last.phi.iter().zip(&reference.last.phi).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(off < 1e-3, "{name}, {} at {:?}: {off:.1e} rad", outcome.plan.method, request.rtol);
+        }
+        assert!(arrived >= 12, "{name}: {arrived} of 18 arrived");
+        assert!(matches!(reference.plan.method, MethodId::Taylor));
+    }
+}
