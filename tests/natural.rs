@@ -5,7 +5,7 @@ mod common;
 #[path = "common/trees.rs"]
 mod trees;
 
-use driftless::arithmetic::{Complex, DoubleDouble};
+use driftless::arithmetic::Complex;
 use driftless::dynamics::kernel::{Bias, Kernel};
 use driftless::dynamics::natural::{Natural, NaturalError};
 use driftless::dynamics::row::Site;
@@ -179,20 +179,19 @@ proptest! {
         kernel.accelerate::<0>(&mechanism, Time::default(), &phi, &omega, Bias::default());
         let forces = mechanism.hinge_forces(Time::default(), &kernel, &omega);
         // The same bodies in the same places, each by itself.
-        let loose = Scene { hinges: Vec::new(), ..scene.clone() };
+        let mut loose = Scene { hinges: Vec::new(), ..scene.clone() };
+        for k in 0..n {
+            let origin = mechanism.end(k, 0).point;
+            let (at, rate) = (origin.position(&kernel.z), origin.velocity(&kernel.z, &omega));
+            let (origin, velocity) = (Some([at.re, at.im]), Some([rate.re, rate.im]));
+            loose.given[k] = Given { origin, velocity, ..Given::ANGLE_AND_RATE };
+            loose.start[k] = driftless::scene::Start { phi: phi[k], omega: omega[k] };
+        }
         let Ok(mut apart) = Mechanism::new(&loose) else { return Err(TestCaseError::reject("no start apart")) };
+        let spread = apart.start(&loose);
         let site = |mechanism: &Mechanism, place: &Place| Site { body: place.bar, point: mechanism.forest.point(place) };
         for hinge in &scene.hinges {
             apart = apart.pinned(&hinge.name, &site(&apart, &hinge.between[0]), &site(&apart, &hinge.between[1]));
-        }
-        let mut spread = motion.clone();
-        spread.resize(apart.coordinates());
-        for k in 0..n {
-            let foot = mechanism.forest.walk(k, C::ZERO - mechanism.forest.hangs[k].own);
-            let x = n + 2 * k;
-            let (at, rate) = (foot.position(&kernel.z), foot.velocity(&kernel.z, &omega));
-            (spread.phi[x], spread.phi[x + 1]) = (DoubleDouble::from(at.re), DoubleDouble::from(at.im));
-            (spread.omega[x], spread.omega[x + 1]) = (DoubleDouble::from(rate.re), DoubleDouble::from(rate.im));
         }
         let (_, _, _, multiplier) = natural(&apart, &spread);
         let first = apart.rows.iter().position(|row| row.name == format!("{}.x", scene.hinges[0].name)).expect("the first pin");

@@ -54,7 +54,8 @@ struct Bench<const B: usize> {
 
 /// The matrices of a mechanism this form fits: hinged bodies only, with rows other than angles, all of them linear with constant coefficients.
 pub fn reduced(mechanism: &Mechanism) -> Option<Reduced> {
-    if mechanism.size() == 0 || mechanism.size() > MOST || !mechanism.is_tied_up() || !mechanism.contacts.is_empty() {
+    let n = mechanism.bodies.len();
+    if mechanism.coordinates() > n || n > MOST || !mechanism.is_tied_up() || !mechanism.contacts.is_empty() || !mechanism.tree.is_dense() {
         return None;
     }
     let (linear, guides) = sorted_rows(mechanism);

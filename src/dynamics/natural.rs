@@ -99,7 +99,7 @@ impl Natural {
     /// Dampers, torsion springs, applied forces that are not constant, walls, bodies without inertia, or too many bodies.
     pub fn new(mechanism: Arc<Mechanism>) -> Result<Self, NaturalError> {
         let n = mechanism.bodies.len();
-        if n > NATURAL_LIMIT {
+        if n > NATURAL_LIMIT || !mechanism.tree.is_dense() {
             return Err(NaturalError::TooMany(n));
         }
         if let Some(spring) = mechanism.springs.iter().find(|spring| spring.damping != 0.0) {

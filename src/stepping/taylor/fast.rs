@@ -217,7 +217,7 @@ impl Fast {
 
     /// The kernel of a mechanism with loops, where there is one.
     pub fn of_looped(mechanism: &Mechanism, tolerance: f64, order: usize, is_portable: bool) -> Option<Self> {
-        let form = match mechanism.size() {
+        let form = match mechanism.bodies.len() {
             0..=4 => Form::FewLooped(Box::new(Looped::new(mechanism, tolerance, order)?)),
             5..=8 => Form::SeveralLooped(Box::new(Looped::new(mechanism, tolerance, order)?)),
             _ => Form::ManyLooped(Box::new(Looped::new(mechanism, tolerance, order)?)),

@@ -30,10 +30,11 @@ pub const MOST: usize = 24;
 const JUDGES: usize = 4;
 /// The least order.
 const LEAST: usize = 8;
-/// Of the tolerance, what natural coordinates need for the same error.
-const SHARE: f64 = 1e-2;
 /// Share of a pivot of S below which the series of any mechanism takes over, which looks for singular positions.
 const NEAR: f64 = 1e-3;
+/// Sweeps at the end of a step, at most, and what of the lengths one sweep is enough for.
+const SWEEPS: usize = 6;
+const CLOSE: f64 = 1e-9;
 /// Room for a scalar series, and for lanes that read beyond its end.
 const LENGTH: usize = MOST + 8;
 
@@ -121,7 +122,7 @@ fn convolve<L: Lanes>(a: &[f64; LENGTH], b: &Series, m: usize) -> f64 {
 impl<const B: usize> Looped<B> {
     /// The constants, where this form fits: up to 4 B hinged bodies with loops, constant forces, springs without dampers.
     pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize) -> Option<Self> {
-        let n = mechanism.size();
+        let n = mechanism.bodies.len();
         let is_plain =
             mechanism.torsions.is_empty() && !mechanism.is_damped() && mechanism.actions.iter().all(|action| action.law.is_none());
         if n > columns::room(B) || !is_plain || order > MOST {
@@ -160,7 +161,7 @@ impl<const B: usize> Looped<B> {
         Some(Self {
             count: n,
             order,
-            log_tolerance: libm::log2(SHARE * tolerance),
+            log_tolerance: libm::log2(tolerance),
             columns: Columns::new(&reduced),
             weight,
             applied,
@@ -476,67 +477,78 @@ pub fn go<L: Lanes, const B: usize>(looped: &mut Looped<B>, state: &mut State, h
     (state.y[2 * n], state.low[2 * n]) = (work.hi, work.lo);
 }
 
-/// Elements and rates onto the linear rows, then onto the unit lengths, with the S of the new position: one sweep, as what is left is small.
+/// Elements and rates onto the linear rows, then onto the unit lengths, with the S of the position at hand: one sweep, unless the step was long.
 #[inline(always)]
 fn put_back<L: Lanes, const B: usize>(looped: &mut Looped<B>, z: &mut [Row<B>; 2], v: &mut [Row<B>; 2]) {
-    let Looped { count, columns, rows, schur, lifted, .. } = looped;
-    let n = *count;
-    let mut change = [[L::ZERO; B]; 4];
+    let Looped { columns, rows, schur, lifted, .. } = looped;
+    let (mut place, mut rate) = ([[L::ZERO; B]; 2], [[L::ZERO; B]; 2]);
     for row in rows.iter() {
-        let (mut place, mut rate) = (row.constant, 0.0);
+        let (mut far, mut fast) = (row.constant, 0.0);
         for &(k, g) in &row.terms {
-            place += g.re * at(&z[0], k) + g.im * at(&z[1], k);
-            rate += g.re * at(&v[0], k) + g.im * at(&v[1], k);
+            far += g.re * at(&z[0], k) + g.im * at(&z[1], k);
+            fast += g.re * at(&v[0], k) + g.im * at(&v[1], k);
         }
-        let (place, rate) = (L::splat(place), L::splat(rate));
+        add::<L, B>(&mut place, &row.back, far);
+        add::<L, B>(&mut rate, &row.back, fast);
+    }
+    subtract::<L, B>(z, &place);
+    subtract::<L, B>(v, &rate);
+    for _ in 0..SWEEPS {
+        // V and S⁻¹ of the step's start have served: the next step makes its own.
+        face::<L, B>(columns, z, lifted, schur);
+        columns::invert::<L, B>(schur, &columns.scale);
+        let mut far = [L::ZERO; B];
         for b in 0..B {
-            let (x, y) = (L::of(row.back[0][b]), L::of(row.back[1][b]));
-            change[0][b] = x.mul_add(place, change[0][b]);
-            change[1][b] = y.mul_add(place, change[1][b]);
-            change[2][b] = x.mul_add(rate, change[2][b]);
-            change[3][b] = y.mul_add(rate, change[3][b]);
+            let (x, y) = (L::of(z[0][b]), L::of(z[1][b]));
+            far[b] = x.mul_add(x, y.mul(y)).sub(L::ONE).mul(L::splat(0.5));
+        }
+        let far = store(far);
+        shift::<L, B>(schur, lifted, &far, z);
+        // What a sweep leaves is about the square of what it found.
+        let most = far.as_flattened().iter().take(schur.len()).fold(0.0, |most, &far| larger(most, far));
+        if most <= CLOSE {
+            break;
         }
     }
-    subtract::<L, B>(z, v, &change);
-    // V and S⁻¹ of the step's start have served: the next step makes its own.
-    face::<L, B>(columns, z, lifted, schur);
-    columns::invert::<L, B>(schur, &columns.scale);
-    let (mut far, mut fast) = ([L::ZERO; B], [L::ZERO; B]);
+    let mut fast = [L::ZERO; B];
     for b in 0..B {
-        let (x, y) = (L::of(z[0][b]), L::of(z[1][b]));
-        far[b] = x.mul_add(x, y.mul(y));
-        fast[b] = x.mul_add(L::of(v[0][b]), y.mul(L::of(v[1][b])));
+        fast[b] = L::of(z[0][b]).mul_add(L::of(v[0][b]), L::of(z[1][b]).mul(L::of(v[1][b])));
     }
-    let (far, fast) = (store(far), store(fast));
-    let (mut place, mut rate) = ([L::ZERO; B], [L::ZERO; B]);
-    for j in 0..n {
-        let (far, fast) = (L::splat(0.5 * (at(&far, j) - 1.0)), L::splat(at(&fast, j)));
+    shift::<L, B>(schur, lifted, &store(fast), v);
+}
+
+/// x -= V S⁻¹ violation.
+#[inline(always)]
+fn shift<L: Lanes, const B: usize>(inverse: &[Row<B>], lifted: &[[Row<B>; 2]], violation: &Row<B>, x: &mut [Row<B>; 2]) {
+    let mut factors = [L::ZERO; B];
+    for (j, column) in inverse.iter().enumerate() {
+        let violation = L::splat(at(violation, j));
         for b in 0..B {
-            place[b] = L::of(schur[j][b]).mul_add(far, place[b]);
-            rate[b] = L::of(schur[j][b]).mul_add(fast, rate[b]);
+            factors[b] = L::of(column[b]).mul_add(violation, factors[b]);
         }
     }
-    let (place, rate) = (store(place), store(rate));
-    let mut change = [[L::ZERO; B]; 4];
-    for j in 0..n {
-        let (place, rate) = (L::splat(at(&place, j)), L::splat(at(&rate, j)));
-        for b in 0..B {
-            let (x, y) = (L::of(lifted[j][0][b]), L::of(lifted[j][1][b]));
-            change[0][b] = x.mul_add(place, change[0][b]);
-            change[1][b] = y.mul_add(place, change[1][b]);
-            change[2][b] = x.mul_add(rate, change[2][b]);
-            change[3][b] = y.mul_add(rate, change[3][b]);
-        }
+    let factors = store(factors);
+    let mut change = [[L::ZERO; B]; 2];
+    for (j, column) in lifted.iter().enumerate() {
+        add::<L, B>(&mut change, column, at(&factors, j));
     }
-    subtract::<L, B>(z, v, &change);
+    subtract::<L, B>(x, &change);
+}
+
+/// Adds a column times a factor.
+#[inline(always)]
+fn add<L: Lanes, const B: usize>(change: &mut [[L; B]; 2], column: &[Row<B>; 2], factor: f64) {
+    let factor = L::splat(factor);
+    for b in 0..B {
+        change[0][b] = L::of(column[0][b]).mul_add(factor, change[0][b]);
+        change[1][b] = L::of(column[1][b]).mul_add(factor, change[1][b]);
+    }
 }
 
 #[inline(always)]
-fn subtract<L: Lanes, const B: usize>(z: &mut [Row<B>; 2], v: &mut [Row<B>; 2], change: &[[L; B]; 4]) {
+fn subtract<L: Lanes, const B: usize>(x: &mut [Row<B>; 2], change: &[[L; B]; 2]) {
     for b in 0..B {
-        for axis in 0..2 {
-            z[axis][b] = L::of(z[axis][b]).sub(change[axis][b]).array();
-            v[axis][b] = L::of(v[axis][b]).sub(change[2 + axis][b]).array();
-        }
+        x[0][b] = L::of(x[0][b]).sub(change[0][b]).array();
+        x[1][b] = L::of(x[1][b]).sub(change[1][b]).array();
     }
 }

@@ -1,0 +1,169 @@
+//! Andrews' squeezing mechanism over its 0.03 s: run time, error and evaluations of every method.
+//!
+//! `cargo bench --no-default-features --bench mechanisms`: alternating blocks in one process, minimum and median over the blocks; the error is the largest of
+//! any angle against a quadruple-precision state (`tests/looped.rs` says whose), the residual the largest violation of a row after any step, over 0.1 m, the size of
+//! the mechanism.
+
+use driftless::dynamics::kernel::{Bias, Kernel};
+use driftless::dynamics::looped::Looped;
+use driftless::dynamics::multiplier::Multiplier;
+use driftless::dynamics::natural::Natural;
+use driftless::dynamics::{Field, Form, Mechanism, Motion, State, Time};
+use driftless::scene::read_scene;
+use driftless::stabilization::Projected;
+use driftless::stepping::composition::Composition;
+use driftless::stepping::rattle::Rattle;
+use driftless::stepping::taylor::Kernel as Expansion;
+use driftless::stepping::{Dop853, Dp5, Dp8, Method, Seen, Tally, Taylor, Tolerance};
+use std::f64::consts::{FRAC_PI_2, PI};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Runs of each candidate.
+const BLOCKS: usize = 30;
+/// Evaluations a block.
+const EVALUATIONS: usize = 2000;
+
+/// The angles of the bodies at the end \[rad\], whole turns left in.
+fn reference() -> [f64; 7] {
+    let (beta, theta, gamma) = (15.810_771_195_153_707, -15.756_371_058_411_84, 0.040_822_240_119_645_805);
+    let (phi, delta, omega, epsilon) =
+        (-0.534_730_116_342_079_6, 0.524_409_965_879_954_1, 0.534_730_116_342_079_6, 1.048_080_741_041_937_9);
+    [beta, beta + theta + PI, gamma, phi + delta - FRAC_PI_2, delta, omega + epsilon, epsilon - FRAC_PI_2]
+}
+
+/// What a run comes to.
+struct Ran {
+    seconds: f64,
+    error: f64,
+    residual: f64,
+    tally: Tally,
+}
+
+fn march<P: Form + ?Sized>(problem: &mut P, start: &Motion, mut method: impl Method<P>, watched: bool) -> Ran {
+    let mut state = problem.state(start);
+    let mut tally = Tally::default();
+    let mechanism = problem.mechanism().clone();
+    let mut kernel = Kernel::<f64>::new(&mechanism);
+    let (mut motion, mut residual) = (Motion::default(), 0.0f64);
+    let begin = Instant::now();
+    let ended = method.advance(problem, &mut state, Time::from(0.03), &mut tally, &mut |problem: &mut P, state: &mut State| {
+        if watched {
+            problem.read(state, &mut motion);
+            let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
+            let omega: Vec<f64> = motion.omega.iter().map(|omega| omega.hi).collect();
+            kernel.face::<0>(&mechanism, &phi);
+            kernel.rows_at(&mechanism, state.time, &phi, &omega);
+            let fastest = omega.iter().fold(1.0f64, |most, omega| most.max(omega.abs()));
+            for r in 0..mechanism.rows.len() {
+                residual = residual.max(kernel.rows[r].position.abs() / 0.1).max(kernel.row_rate(r, &omega).abs() / (0.1 * fastest));
+            }
+        }
+        Ok(Seen::Kept)
+    });
+    let seconds = begin.elapsed().as_secs_f64();
+    if let Err(stop) = ended {
+        println!("stopped: {stop}");
+    }
+    let mut end = Motion::default();
+    problem.read(&state, &mut end);
+    let error = reference().iter().enumerate().map(|(k, exact)| (end.unwrapped(k) - exact).abs()).fold(0.0, f64::max);
+    Ran { seconds, error, residual, tally }
+}
+
+/// A name and what runs it.
+type Candidate<'a> = (String, Box<dyn Fn(bool) -> Ran + 'a>);
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// Nanoseconds of an evaluation, of each form in turn.
+fn evaluations(mechanism: &Arc<Mechanism>, start: &Motion) {
+    let mut looped = Looped::new(Arc::clone(mechanism)).expect("a mechanism with loops");
+    let mut angles = Multiplier::<0, true>::new(Arc::clone(mechanism));
+    let state = looped.state(start);
+    let mut rate = vec![0.0; state.y.len()];
+    let (mut first, mut second) = (Vec::new(), Vec::new());
+    for _ in 0..200 {
+        let begin = Instant::now();
+        (0..EVALUATIONS).for_each(|_| looped.rate(Time::default(), std::hint::black_box(&state.y), &mut rate));
+        first.push(begin.elapsed().as_secs_f64() * 1e9 / EVALUATIONS as f64);
+        let begin = Instant::now();
+        (0..EVALUATIONS).for_each(|_| angles.rate(Time::default(), std::hint::black_box(&state.y), &mut rate));
+        second.push(begin.elapsed().as_secs_f64() * 1e9 / EVALUATIONS as f64);
+    }
+    for (name, mut times) in [("natural solve", first), ("angles and multipliers", second)] {
+        let least = times.iter().copied().fold(f64::INFINITY, f64::min);
+        println!("one evaluation, {name:24} {least:7.1} ns, median {:7.1}", median(&mut times));
+    }
+}
+
+fn main() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes/andrews.json");
+    let scene = read_scene(&path, &[]).expect("a shipped scene");
+    let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
+    let start = mechanism.start(&scene);
+    evaluations(&mechanism, &start);
+    let looped = || Looped::new(Arc::clone(&mechanism)).expect("a mechanism with loops");
+    let multiplier = || Multiplier::<0, true>::new(Arc::clone(&mechanism));
+    let natural = || Natural::new(Arc::clone(&mechanism)).expect("a natural form");
+    let both = |relative| Tolerance { relative, absolute: relative };
+    let mut candidates: Vec<Candidate> = Vec::new();
+    let start = &start;
+    for tolerance in [1e-6, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13] {
+        let name = |method: &str| format!("{method} {tolerance:.0e}");
+        if tolerance > 1e-9 {
+            candidates.push((
+                name("dp5, projected"),
+                Box::new(move |w| march(&mut looped(), start, Projected::new(Dp5::new(both(tolerance))), w)),
+            ));
+        }
+        candidates
+            .push((name("dp8, projected"), Box::new(move |w| march(&mut looped(), start, Projected::new(Dp8::new(both(tolerance))), w))));
+        candidates.push((
+            name("dp8 in angles, projected"),
+            Box::new(move |w| march(&mut multiplier(), start, Projected::new(Dp8::new(both(tolerance))), w)),
+        ));
+        candidates.push((name("dop853"), Box::new(move |w| march(&mut looped(), start, Dop853::new(both(tolerance)), w))));
+    }
+    for tolerance in [1e-3, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-12, 1e-15] {
+        let name = |method: &str| format!("{method} {tolerance:.0e}");
+        let taylor = move || Taylor::<f64>::new(both(tolerance));
+        candidates.push((name("taylor"), Box::new(move |w| march(&mut looped(), start, taylor(), w))));
+        candidates.push((name("taylor, projected"), Box::new(move |w| march(&mut looped(), start, Projected::new(taylor()), w))));
+        let series = move || {
+            let mut series = taylor();
+            series.kernel = Expansion::Series;
+            series
+        };
+        candidates
+            .push((name("taylor in angles, projected"), Box::new(move |w| march(&mut multiplier(), start, Projected::new(series()), w))));
+    }
+    let compositions = [
+        ("rattle2", Composition::Single),
+        ("rattle4", Composition::Suzuki5),
+        ("rattle6", Composition::KahanLi9),
+        ("rattle8", Composition::KahanLi17),
+    ];
+    for (name, composition) in compositions {
+        for steps in [200.0, 400.0, 800.0] {
+            let rattle = move || Rattle::new(composition, 0.03 / steps);
+            candidates.push((format!("{name} 0.03/{steps}"), Box::new(move |w| march(&mut natural(), start, rattle(), w))));
+        }
+    }
+    let mut times = vec![Vec::new(); candidates.len()];
+    for _ in 0..BLOCKS {
+        for ((_, run), times) in candidates.iter().zip(&mut times) {
+            times.push(run(false).seconds * 1e3);
+        }
+    }
+    println!("{:34} {:>8} {:>8} {:>9} {:>9} {:>6} {:>6}", "", "min ms", "median", "error", "residual", "steps", "evals");
+    for ((name, run), times) in candidates.iter().zip(&mut times) {
+        let Ran { error, residual, tally, .. } = run(true);
+        let least = times.iter().copied().fold(f64::INFINITY, f64::min);
+        println!("{name:34} {least:8.3} {:8.3} {error:9.1e} {residual:9.1e} {:6} {:6}", median(times), tally.steps, tally.evaluations);
+    }
+}
