@@ -4,7 +4,7 @@
 //! any angle against a quadruple-precision state (`tests/looped.rs` says whose), the residual the largest violation of a row after any step, over 0.1 m, the size of
 //! the mechanism.
 
-use driftless::dynamics::kernel::{Bias, Kernel};
+use driftless::dynamics::kernel::Kernel;
 use driftless::dynamics::looped::Looped;
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::natural::Natural;
