@@ -48,7 +48,7 @@ fn sketch() -> Sketch {
     Sketch {
         gravity: [9.81, 0.0],
         hinges: vec![HingeSketch { name: "A".to_owned(), ground: true }, HingeSketch { name: "B".to_owned(), ground: false }],
-        springs: vec![SliderPose, SpringSketch { ground: [true, false] }],
+        springs: vec![SpringSketch { ground: [true, false] }],
         walls: vec![WallSketch { through: [1.3, 0.0], normal: [-1.0, 0.0] }],
         points: words(&["C"]),
     }
