@@ -4,7 +4,7 @@
 //! any angle against a quadruple-precision state (`tests/looped.rs` says whose), the residual the largest violation of a row after any step, over 0.1 m, the size of
 //! the mechanism.
 
-use driftless::dynamics::kernel::{Bias, Kernel};
+use driftless::dynamics::kernel::Kernel;
 use driftless::dynamics::looped::Looped;
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::natural::Natural;
@@ -113,7 +113,7 @@ fn main() {
     let both = |relative| Tolerance { relative, absolute: relative };
     let mut candidates: Vec<Candidate> = Vec::new();
     let start = &start;
-    for tolerance in [1e-6, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13] {
+    for tolerance in [1e-6, 1e-8, 1e-9, 1e-11, 1e-13] {
         let name = |method: &str| format!("{method} {tolerance:.0e}");
         if tolerance > 1e-9 {
             candidates.push((
@@ -127,9 +127,10 @@ fn main() {
             name("dp8 in angles, projected"),
             Box::new(move |w| march(&mut multiplier(), start, Projected::new(Dp8::new(both(tolerance))), w)),
         ));
+        candidates.push((name("dp8"), Box::new(move |w| march(&mut looped(), start, Dp8::new(both(tolerance)), w))));
         candidates.push((name("dop853"), Box::new(move |w| march(&mut looped(), start, Dop853::new(both(tolerance)), w))));
     }
-    for tolerance in [1e-3, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-12, 1e-15] {
+    for tolerance in [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-12] {
         let name = |method: &str| format!("{method} {tolerance:.0e}");
         let taylor = move || Taylor::<f64>::new(both(tolerance));
         candidates.push((name("taylor"), Box::new(move |w| march(&mut looped(), start, taylor(), w))));

@@ -17,7 +17,7 @@ use crate::arithmetic::DoubleDouble;
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::{Complex, sincos};
 use crate::dynamics::force::action::Kind;
-use crate::dynamics::looped::reduced;
+use crate::dynamics::looped::{NEAR, reduced};
 use crate::dynamics::natural::Reduced;
 use crate::dynamics::natural::columns::{self, Columns, Row, load, store};
 use crate::dynamics::point::Point;
@@ -30,8 +30,6 @@ pub const MOST: usize = 24;
 const JUDGES: usize = 4;
 /// The least order.
 const LEAST: usize = 8;
-/// Share of a pivot of S below which the series of any mechanism takes over, which looks for singular positions.
-const NEAR: f64 = 1e-3;
 /// Sweeps at the end of a step, at most, and what of the lengths one sweep is enough for.
 const SWEEPS: usize = 6;
 const CLOSE: f64 = 1e-9;
