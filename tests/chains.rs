@@ -233,7 +233,8 @@ fn hinge_forces_are_the_multipliers_of_pins() {
     let (mut phi, mut omega) = (plain(&start.phi), plain(&start.omega));
     // The foot is where the link above ends, and moves with it.
     let above = &sites[0].point;
-    (phi.resize(n, 0.0), omega.resize(n, 0.0));
+    phi.resize(n, 0.0);
+    omega.resize(n, 0.0);
     let (at, speed) = (above.position(&kernel.z), above.velocity(&kernel.z, &omega));
     (phi[x], phi[x + 1], omega[x], omega[x + 1]) = (at.re, at.im, speed.re, speed.im);
     let again = evaluate(&pinned, &phi, &omega, Bias::default());

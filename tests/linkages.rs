@@ -118,8 +118,7 @@ fn iftomm_a02_four_bars_pass_singular_positions() {
         let off = (phi.cos() - number(&last["x"])).hypot(phi.sin() - number(&last["y"]));
         let apart = (1..3).map(|k| (outcome.last.phi[k] - phi).abs()).fold(0.0, f64::max);
         // On the other branch of a four-bar nothing is parallel any more.
-        let order = outcome.plan.method.info().order;
-        let most = if order >= 8 && request.rtol.is_none_or(|rtol| rtol <= 1e-8) { 1e-6 } else { 0.1 };
+        let most = request.rtol.map_or(0.1, |rtol| (1e3 * rtol).max(1e-6));
         assert!(off < most && apart < 1e-6, "{name}: {off:.1e} m from the closed form, links {apart:.1e} rad apart");
         arrived.push((name, off));
     }
@@ -244,7 +243,7 @@ fn quick_return_mechanism() {
             assert!(off < 1e-9, "{}: {off:.1e} rad", outcome.plan.method);
             let ram = 0.5 * rocker.cos() - (0.2_f64.powi(2) - (0.5 * rocker.sin() - 0.45).powi(2)).sqrt();
             assert!(
-                (outcome.last.centre[3][0] - ram).abs() < 1e-9 && (outcome.last.centre[3][1] - 0.2).abs() < 1e-12,
+                (outcome.last.centre[3][0] - ram).abs() < 1e-9 && (outcome.last.centre[3][1] - 0.2).abs() < 1e-9,
                 "{}",
                 outcome.plan.method
             );

@@ -33,6 +33,9 @@ pub struct ConstraintDrift {
     pub log_time: bool,
 }
 
+/// Violations \[rad, m\] below which the axis does not go.
+const NOTHING: f64 = 1e-20;
+
 /// Draws the samples as light dots and their running maximum as a line.
 ///
 /// A series without any defect is drawn as markers on the lower edge and labelled as exactly 0.
@@ -52,6 +55,8 @@ pub fn constraint_drift(chart: &ConstraintDrift, px_per_pt: f64) -> Result<Pictu
         // The lowest samples decide how far down the axis goes, but a few near zero do not stretch it over the page.
         let highest = lines.iter().flatten().map(|p| p[1]).filter(|v| v.is_finite()).fold(0.0, f64::max);
         let starts = lines.iter().filter_map(|line| line.iter().map(|p| p[1]).find(|&v| v > 0.0)).fold(highest, f64::min);
+        // What is far below the rounding of a double is none of the run's doing.
+        let starts = starts.max(NOTHING.min(highest));
         let samples = panel.series.iter().flat_map(|s| &s.error).map(|e| e.abs()).filter(|&e| e > 0.03 * starts && e <= highest);
         (x, drift_axis(&panel.name, samples.chain([starts]), lines.iter().any(|line| is_zero(line))))
     });

@@ -50,7 +50,7 @@ pub use map::{Cell, Map, MapAxis, map};
 pub use mechanism::{MechanismChart, mechanism};
 pub use motion::{Animation, MotionGif, motion_gif};
 pub use profile::{Profile, profile};
-pub use sketch::{HingeSketch, MotorPose, Pose, Sketch, SpringSketch, WallSketch};
+pub use sketch::{HingeSketch, MotorPose, Pose, Sketch, SliderPose, SpringSketch, WallSketch};
 pub use text::{TextBox, plain, unmarked};
 pub use torque_power::{MotorSeries, TorquePower, torque_power};
 pub use work_precision::{WorkPrecision, WorkSeries, work_precision};

@@ -54,6 +54,10 @@ pub struct WallSketch {
 pub struct Pose {
     /// Both ends of each bar (x, y) \[m\].
     pub bars: Vec<[[f64; 2]; 2]>,
+    /// Number of the bar, and both ends, of what joins the places of a body that lie off its bar (x, y) \[m\].
+    pub arms: Vec<(usize, [[f64; 2]; 2])>,
+    /// The sliders.
+    pub sliders: Vec<SliderPose>,
     /// The hinges (x, y) \[m\].
     pub hinges: Vec<[f64; 2]>,
     /// Both ends of each spring (x, y) \[m\].
@@ -62,6 +66,17 @@ pub struct Pose {
     pub motors: Vec<MotorPose>,
     /// The points of interest (x, y) \[m\].
     pub points: Vec<[f64; 2]>,
+}
+
+/// A slider on its rail.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SliderPose {
+    /// The point that slides (x, y) \[m\].
+    pub at: [f64; 2],
+    /// Direction of the rail (x, y) of any length.
+    pub along: [f64; 2],
+    /// Whether the rail is fixed to the ground.
+    pub ground: bool,
 }
 
 /// A motor.
@@ -103,8 +118,38 @@ impl Pencil<'_> {
     /// Bars of an earlier pose in pale grey; `age` 1 for the oldest, 0 for the present.
     pub(crate) fn ghost(&self, pose: &Pose, age: f64) -> Result<(), ChartError> {
         let pen = Pen::new(mix(SPINE, WHITE, 0.74 + 0.18 * age), 4.0 * self.size);
-        for bar in pose.bars.iter().filter(|bar| finite(&bar[..])) {
+        let arms = pose.arms.iter().map(|(_, ends)| ends);
+        for bar in pose.bars.iter().chain(arms).filter(|bar| finite(&bar[..])) {
             self.sheet.line(&bar.map(|end| self.at(end)), &pen)?;
+        }
+        Ok(())
+    }
+
+    /// Rails of the ground from frame to frame, those of bodies a block's length to both sides; and the blocks.
+    fn sliders(&self, sliders: &[SliderPose], occupied: &mut Occupied) -> Result<(), ChartError> {
+        for slider in sliders.iter().filter(|slider| finite(&[slider.at, slider.along])) {
+            let length = slider.along[0].hypot(slider.along[1]);
+            if length == 0.0 {
+                continue;
+            }
+            let unit = slider.along.map(|x| x / length);
+            let ([dx, dy], [x, y]) = (self.view.direction(unit), self.at(slider.at));
+            let pen = Pen::new(mix(SPINE, WHITE, 0.25), 0.9 * self.size.max(0.7));
+            if slider.ground {
+                let reach = self.view.reach() + slider.at[0].hypot(slider.at[1]);
+                let ends = [-reach, reach].map(|s| self.view.fractions([slider.at[0] + s * unit[0], slider.at[1] + s * unit[1]]));
+                for piece in clip(ends) {
+                    let line = [self.panel.page(piece[0]), self.panel.page(piece[1])];
+                    occupied.line(&line);
+                    self.sheet.line(&line, &pen)?;
+                }
+            }
+            let corner = |along: f64, across: f64| [x + along * dx - across * dy, y + along * dy + across * dx];
+            let (half, wide) = (8.0 * self.size, 4.6 * self.size);
+            let block = [corner(-half, -wide), corner(half, -wide), corner(half, wide), corner(-half, wide)];
+            self.sheet.polygon(&block, mix(SPINE, WHITE, 0.7))?;
+            self.sheet.line(&[block[0], block[1], block[2], block[3], block[0]], &Pen::new(INK, 0.9 * self.size))?;
+            occupied.block(around([x, y], half));
         }
         Ok(())
     }
@@ -173,7 +218,9 @@ impl Pencil<'_> {
             self.hatched([x - 1.8 * half, y - height], [x + 1.8 * half, y - height], [0.0, -1.0], 3.6 * size, 4.4 * size)?;
             occupied.block([x - 1.8 * half, y - height - 5.0 * size, x + 1.8 * half + 3.0, y - 2.0]);
         }
-        for (k, bar) in pose.bars.iter().enumerate().filter(|(_, bar)| finite(&bar[..])) {
+        self.sliders(&pose.sliders, occupied)?;
+        let bars = pose.arms.iter().copied().chain(pose.bars.iter().copied().enumerate());
+        for (k, bar) in bars.filter(|(_, bar)| finite(&bar[..])) {
             let ends = bar.map(|end| self.at(end));
             let colour = if k % 2 == 0 { ORANGE } else { SKY };
             self.sheet.line(&ends, &Pen::new(mix(colour, INK, 0.3), 5.6 * size))?;

@@ -36,7 +36,8 @@ impl View {
         });
         let mut view = View { right: [-down[1], down[0]], down, falls, u: [-1.0, 1.0], h: [-1.0, 1.0] };
         let parts = |pose: &Pose| -> Vec<[f64; 2]> {
-            let pairs = pose.bars.iter().chain(&pose.springs).flatten();
+            let arms = pose.arms.iter().map(|(_, ends)| ends);
+            let pairs = pose.bars.iter().chain(&pose.springs).chain(arms).flatten();
             pairs.chain(&pose.hinges).chain(&pose.points).copied().collect()
         };
         let all = poses.iter().flat_map(parts).chain(trails.iter().flatten().copied()).filter(|p| p.iter().all(|c| c.abs() <= 1e300));

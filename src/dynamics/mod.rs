@@ -109,7 +109,8 @@ impl State {
             return;
         }
         for (i, turns) in self.turns.iter_mut().enumerate() {
-            *turns += angle::wrap(&mut self.y[i], &mut self.low[i]);
+            // An angle beyond all counting has no turns to lose.
+            *turns = turns.saturating_add(angle::wrap(&mut self.y[i], &mut self.low[i]));
         }
     }
 

@@ -3,7 +3,7 @@
 use crate::arithmetic::Complex;
 use crate::chart::{
     self, AngleSeries, Angles, ChartError, ConstraintDrift, DefectPanel, DriftSeries, EnergyDrift, FILE_RESOLUTION, HingeSketch,
-    MechanismChart, MotionGif, MotorPose, MotorSeries, Pose, Sketch, SpringSketch, TorquePower, WallSketch, plain,
+    MechanismChart, MotionGif, MotorPose, MotorSeries, Pose, Sketch, SliderPose, SpringSketch, TorquePower, WallSketch, plain,
 };
 use crate::dynamics::Mechanism;
 use crate::dynamics::compile::Joint;
@@ -394,8 +394,29 @@ impl Finished<'_> {
             hinges: self.mechanism.joints.iter().map(at).collect(),
             springs: self.scene.springs.iter().map(|spring| spring.between.each_ref().map(place)).collect(),
             motors: motors.collect(),
+            arms: self.arms().map(|(bar, [from, to])| (bar, [on(bar, from), on(bar, to)])).collect(),
+            sliders: (self.scene.sliders.iter())
+                .map(|slider| {
+                    let along = Complex::new(slider.rail.direction[0], slider.rail.direction[1]);
+                    let along = slider.rail.place.bar.map_or(along, |bar| along * z[bar]);
+                    SliderPose { at: place(&slider.point), along: both(along), ground: slider.rail.place.bar.is_none() }
+                })
+                .collect(),
             points: Vec::new(),
         }
+    }
+
+    /// What joins the origin of a bar with its hinges and spring ends that lie off it, counted from its foot \[m\].
+    fn arms(&self) -> impl Iterator<Item = (usize, [Complex<f64>; 2])> {
+        let hinges = self.scene.hinges.iter().flat_map(|hinge| hinge.between);
+        let springs = self.scene.springs.iter().flat_map(|spring| spring.between);
+        hinges.chain(springs).filter_map(|place| {
+            let bar = place.bar?;
+            let (length, [x, y]) = (self.scene.bars[bar].length, place.point);
+            let is_off = y.abs() > 1e-3 * length || x < -1e-3 * length || x > 1.001 * length;
+            let origin = self.mechanism.bodies[bar].ends[0];
+            is_off.then(|| (bar, [origin, origin + Complex::new(x, y)]))
+        })
     }
 }
 

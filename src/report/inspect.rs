@@ -79,6 +79,7 @@ pub fn inspect(scene: &Scene, mechanism: &Mechanism) -> Inspection {
     let omega: Vec<f64> = start.omega.iter().map(|omega| omega.hi).collect();
     let mut kernel = Kernel::<f64>::new(mechanism);
     kernel.accelerate::<0>(mechanism, start.time, &phi, &omega, Bias::default());
+    mechanism.spread_multipliers(&mut kernel);
     let mut found = Inspection { energy_scale: mechanism.energy_scale, ..Inspection::default() };
     let centres = mechanism.centre_accelerations(&kernel.z, &omega, &kernel.load);
     for (k, (body, centre)) in mechanism.bodies.iter().zip(centres).enumerate() {

@@ -52,6 +52,7 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value 
         },
         "constraints": constraints,
         "assembly": super::check::assembly(mechanism),
+        "singular": drift.singular,
         "stabilizer": stabilizer,
         "impacts": impacts,
         "holds": holds,
@@ -150,6 +151,10 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
     for ((name, [position, velocity]), row) in drift.constraints.iter().zip(&mechanism.rows) {
         let unit = row.unit();
         page.entry("constraint", &format!("{name}: {} {unit} and {} {unit}/s at most", magnitude(position.max), magnitude(velocity.max)));
+    }
+    if let Some(singular) = &drift.singular {
+        let (smallest, constraint) = (magnitude(singular.smallest), &singular.constraint);
+        page.entry("singular values", &format!("down to {smallest} of the largest at t = {} s, at {constraint}", figure(singular.t)));
     }
     if drift.stabilizer_max > 0.0 {
         let (now, most) = (magnitude(drift.stabilizer), magnitude(drift.stabilizer_max));

@@ -108,6 +108,17 @@ pub struct Limits {
     pub constraint: Option<f64>,
 }
 
+/// How near to a singular position a run came at its output times.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Singular {
+    /// The least singular value of the rows' Jacobian over the largest, angles in rad and lengths in sizes of the mechanism.
+    pub smallest: f64,
+    /// When \[s\].
+    pub t: f64,
+    /// The row that loses its hold there.
+    pub constraint: String,
+}
+
 /// The drift of a run.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Drift {
@@ -118,6 +129,8 @@ pub struct Drift {
     pub kind: &'static str,
     /// Each row by name, at position and velocity level.
     pub constraints: Vec<(String, [Excursion; 2])>,
+    /// The nearest to a singular position it came, where it came near one.
+    pub singular: Option<Singular>,
     /// Energy the stabilizer has put in by now \[J\].
     pub stabilizer: f64,
     /// Largest magnitude of that at any time \[J\].
@@ -133,6 +146,7 @@ impl Drift {
             energy: Excursion::new(until),
             kind: if works { "energy minus work" } else { "energy" },
             constraints: mechanism.rows.iter().map(|row| (row.name().to_owned(), pair())).collect(),
+            singular: None,
             stabilizer: 0.0,
             stabilizer_max: 0.0,
         }
@@ -161,6 +175,10 @@ impl Drift {
             for (monitor, &value) in monitors.iter_mut().zip(values) {
                 monitor.see(sample.t, value);
             }
+        }
+        if self.singular.as_ref().map_or(f64::INFINITY, |singular| singular.smallest) > sample.singular {
+            let constraint = self.constraints.get(sample.weakest).map_or_else(String::new, |(name, _)| name.clone());
+            self.singular = Some(Singular { smallest: sample.singular, t: sample.t, constraint });
         }
         let beyond = |value: f64, limit: Option<f64>| limit.is_some_and(|limit| value.is_nan() || value > limit);
         if beyond(self.energy.max, limits.energy) {

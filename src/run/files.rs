@@ -395,7 +395,7 @@ mod tests {
     #[test]
     fn a_table_is_taken_up_where_it_was_and_nowhere_else() {
         let place = tempfile::tempdir().expect("a folder");
-        let mut folder = Folder::open(place.path(), false).expect("made");
+        let folder = Folder::open(place.path(), false).expect("made");
         let mut stream = folder.begin(TRAJECTORY).expect("begun");
         stream.write_all(b"one").expect("written");
         let cursor = stream.cursor().expect("synchronized");

@@ -10,6 +10,9 @@ use crate::dynamics::row::Posture;
 use crate::dynamics::{Mechanism, Motion};
 use std::sync::Arc;
 
+/// Share of the weakest row below which singular values are formed.
+const WATCHED: f64 = 0.1;
+
 /// One moment of a run.
 #[derive(Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Sample {
@@ -35,6 +38,10 @@ pub struct Sample {
     pub imbalance: f64,
     /// Violation of each row, C and C'.
     pub constraints: Vec<[f64; 2]>,
+    /// The least singular value of the rows' Jacobian over the largest where it is small, else not a number; and the row that loses its hold there.
+    pub singular: f64,
+    /// See [`Sample::singular`].
+    pub weakest: usize,
     /// Torque \[N·m\], or force \[N\] along a slider, and power \[W\] of each motor.
     pub motors: Vec<[f64; 2]>,
 }
@@ -159,8 +166,12 @@ impl Sampler {
             self.plain.face::<0>(mechanism, &self.phi);
         } else {
             self.plain.accelerate::<0>(&self.holding, motion.time, &self.phi, &self.omega, Bias::default());
+            self.holding.spread_multipliers(&mut self.plain);
         }
+        let is_watched = self.plain.weakest.share < WATCHED && self.holding.is_tied_up();
         let sample = &mut self.sample;
+        sample.singular = if is_watched { self.holding.conditioning(&self.plain) } else { f64::NAN };
+        sample.weakest = self.plain.weakest.row;
         sample.t = motion.time.hi;
         sample.kinetic = kinetic.hi;
         sample.potential = potential.hi;

@@ -8,7 +8,7 @@ use crate::arithmetic::{DoubleDouble, Scalar};
 /// As [`DEPENDENT`], near a singular position, where rows that are met to [`KEPT`] leave angles open by its square root.
 const NEARLY: f64 = 1e-5;
 /// Rows squared times coordinates up to which the rows' rank is formed; beyond, they are taken to be independent.
-const LARGEST: usize = 1 << 31;
+const LARGEST: usize = 1 << 28;
 
 impl Problem<'_> {
     /// Degrees of freedom, redundant rows and singular ones.

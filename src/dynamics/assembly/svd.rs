@@ -163,6 +163,22 @@ impl Svd {
         self.triples.iter().fold(0.0, |most, triple| triple.0.max(most))
     }
 
+    /// The singular values that are not exactly zero, in no order.
+    pub fn values(&self) -> Vec<f64> {
+        self.triples.iter().map(|triple| triple.0).collect()
+    }
+
+    /// The part of `b` that A x can be, singular values below a share of the largest counting as zero.
+    pub fn in_range(&self, b: &[f64], share: f64) -> Vec<f64> {
+        let least = share * self.largest();
+        let mut sum = vec![0.0; b.len()];
+        for (_, u, _) in self.triples.iter().filter(|triple| triple.0 > least) {
+            let part = dot(u, b);
+            sum.iter_mut().zip(u).for_each(|(sum, u)| *sum += part * u);
+        }
+        sum
+    }
+
     /// The least singular value above `least` over the largest; 1 without any.
     pub fn conditioning(&self, least: f64) -> f64 {
         let smallest = self.triples.iter().map(|triple| triple.0).filter(|&sigma| sigma > least).fold(f64::INFINITY, f64::min);
