@@ -10,8 +10,9 @@ use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::natural::Natural;
 use driftless::dynamics::{Field, Form, Mechanism, Motion, State, Time};
 use driftless::scene::read_scene;
-use driftless::stabilization::Projected;
+use driftless::stabilization::{Projected, SymmetricGauss};
 use driftless::stepping::composition::Composition;
+use driftless::stepping::gauss::Gauss;
 use driftless::stepping::rattle::Rattle;
 use driftless::stepping::taylor::Kernel as Expansion;
 use driftless::stepping::{Dop853, Dp5, Dp8, Method, Seen, Tally, Taylor, Tolerance};
@@ -142,6 +143,10 @@ fn main() {
         };
         candidates
             .push((name("taylor in angles, projected"), Box::new(move |w| march(&mut multiplier(), start, Projected::new(series()), w))));
+    }
+    for steps in [50.0, 100.0, 200.0] {
+        let gauss = move || SymmetricGauss::new(Gauss::new(8, 0.03 / steps).expect("sound settings"));
+        candidates.push((format!("gauss16, projected 0.03/{steps}"), Box::new(move |w| march(&mut looped(), start, gauss(), w))));
     }
     let compositions = [
         ("rattle2", Composition::Single),

@@ -24,9 +24,10 @@
 //! and one sine and cosine per body is all the trigonometry there is.  Where many bodies make that matrix dear, the accelerations are found
 //! body by body ([`recursive`]), and those of rows from the factors left behind.
 //!
-//! The same mechanism is marched in three forms, chosen before the first step:
-//! [`multiplier`] in (q, w) with one multiplier per row, [`elimination`] with the driven angles as known functions of time, [`canonical`] in (q, p),
-//! the form in which Gauss methods are symplectic.
+//! The same mechanism is marched in several forms, chosen before the first step:
+//! [`multiplier`] in (q, w) with one multiplier per row, [`looped`] the same for small mechanisms with loops, solved in unit vectors, [`elimination`] with the
+//! driven angles as known functions of time, [`canonical`] in (q, p), the form in which Gauss methods are symplectic, and [`natural`] in the unit
+//! vectors themselves, the form of RATTLE.
 
 pub mod assembly;
 pub mod canonical;
