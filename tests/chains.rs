@@ -2,7 +2,6 @@
 
 mod common;
 #[path = "common/trees.rs"]
-#[allow(dead_code)]
 mod trees;
 
 use driftless::arithmetic::{Complex, DoubleDouble, Real, Scalar};

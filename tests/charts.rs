@@ -40,6 +40,7 @@ fn pose(phi: [f64; 2], rate: f64) -> Pose {
         springs: vec![[[-0.3, 0.0], [b[0] / 1.5, b[1] / 1.5]]],
         motors: vec![MotorPose { at: [0.0, 0.0], angle: phi[0], rate }],
         points: vec![c],
+        ..Pose::default()
     }
 }
 
@@ -391,6 +392,8 @@ fn odd_pictures(time: &[f64], values: &[f64]) -> Vec<Picture> {
         springs: bars.clone(),
         motors: points.iter().map(|&at| MotorPose { at, angle: at[1], rate: at[0] }).collect(),
         points: points.clone(),
+        arms: bars.iter().map(|&bar| (0, bar)).collect(),
+        sliders: points.iter().map(|&at| SliderPose { at, along: at, ground: at[0] > 0.0 }).collect(),
         bars,
     };
     let mut sketch = sketch();

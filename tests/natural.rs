@@ -1,7 +1,6 @@
 //! Natural coordinates of any mechanism against the angle form: accelerations, multipliers, hinge forces.
 
 mod common;
-#[allow(dead_code)]
 #[path = "common/trees.rs"]
 mod trees;
 

@@ -1,18 +1,18 @@
 //! The equation of motion.
 //!
 //! ```text
-//! M(q) a + G(q,t)ᵀ lambda = b(t,q,w)        [N m]      n equations of motion, one per body
+//! M(q) a + G(q,t)ᵀ lambda = b(t,q,w)        [N m]      n equations of motion, one a coordinate
 //! G(q,t) a                = -gamma(t,q,w)   [rad/s²]   one row per constraint C(q,t) = 0, differentiated twice
 //! Baumgarte replaces gamma by gamma + 2 alpha C' + beta² C
 //! ```
 //!
 //! | letter | name in code | meaning | unit | shape | file |
 //! | --- | --- | --- | --- | --- | --- |
-//! | q | `phi` | absolute angles of the bodies, from +x, counter-clockwise | rad | n | here |
-//! | w | `omega` | their rates q' | rad/s | n | here |
-//! | z | `z` | unit vectors exp(i q) | 1 | n | here |
+//! | q | `phi` | absolute angles of the bodies, from +x, counter-clockwise; then x and y of feet that move freely | rad, m | n | here, [`forest`] |
+//! | w | `omega` | their rates q' | rad/s, m/s | n | here |
+//! | z | `z` | elements: unit vectors exp(i q), and feet x + iy at the place of their x | 1, m | n | [`forest`] |
 //! | M | `mass` | mass matrix, `M_ij = Re(conj(z_i) H_ij z_j)` | kg m² | n × n | [`tree`] |
-//! | b | `load` | velocity terms, gravity, springs and dampers | N m | n | [`tree`], [`force`] |
+//! | b | `load` | velocity terms, gravity, springs, dampers, applied forces | N m | n | [`tree`], [`force`] |
 //! | C | `position` | a constraint's violation | rad, m | rows | [`row`] |
 //! | G | `jacobian` | dC/dq | 1, m | rows × n | [`row`] |
 //! | C_t | `drive` | dC/dt at fixed q; C' = G w + C_t | rad/s, m/s | rows | [`row`] |
@@ -24,10 +24,12 @@
 //! and one sine and cosine per body is all the trigonometry there is.  Where many bodies make that matrix dear, the accelerations are found
 //! body by body ([`recursive`]), and those of rows from the factors left behind.
 //!
+//! **Everything else is a row.**  The hinges make a [`forest`]; those that close a loop, sliders, slots, locks and motors are rows, each a measured angle or a quadratic
+//! function of the elements ([`row`]).  Where rows lose their independence they are left out ([`schur`]); the start is found from them ([`assembly`]).
+//!
 //! The same mechanism is marched in several forms, chosen before the first step:
-//! [`multiplier`] in (q, w) with one multiplier per row, [`looped`] the same for small mechanisms with loops, solved in unit vectors, [`elimination`] with the
-//! driven angles as known functions of time, [`canonical`] in (q, p), the form in which Gauss methods are symplectic, and [`natural`] in the unit
-//! vectors themselves, the form of RATTLE.
+//! [`multiplier`] in (q, w) with one multiplier per row, [`looped`] the same with the solve in natural coordinates, [`elimination`] with the driven angles as known functions of
+//! time, [`canonical`] in (q, p), the form in which Gauss methods are symplectic, and [`natural`] in the unit vectors themselves, for RATTLE.
 
 pub mod assembly;
 pub mod canonical;
