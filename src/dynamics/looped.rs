@@ -23,6 +23,9 @@ use std::sync::Arc;
 /// Largest number of bodies; beyond, the form in angles is cheaper.
 pub const MOST: usize = 16;
 
+/// Share of a pivot of S below which the angle form takes over.
+pub const NEAR: f64 = 1e-2;
+
 /// Equations in angles and rates, solved in natural coordinates.
 #[derive(Clone, Debug)]
 pub struct Looped {
@@ -50,6 +53,8 @@ struct Bench<const B: usize> {
     z: Vec<Complex<f64>>,
     force: Vec<Complex<f64>>,
     alpha: Row<B>,
+    /// The least share of a pivot.
+    least: f64,
 }
 
 /// The matrices of a mechanism this form fits: hinged bodies only, with rows other than angles, all of them linear with constant coefficients.
@@ -91,11 +96,17 @@ impl<const B: usize> Bench<B> {
             z: vec![Complex::ZERO; n],
             force: vec![Complex::ZERO; n],
             alpha: [[0.0; 4]; B],
+            least: f64::INFINITY,
         }
     }
 
-    /// Accelerations and unit vectors, by the processor's vectors where it has them.
-    fn run(&mut self, mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64], is_portable: bool) -> (&[f64], &[Complex<f64>]) {
+    /// Accelerations and unit vectors, by the processor's vectors where it has them; `None` near a singular position.
+    fn run(&mut self, mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64], is_portable: bool) -> Option<(&[f64], &[Complex<f64>])> {
+        self.accelerate(mechanism, t, phi, omega, is_portable);
+        (self.least >= NEAR).then(|| (&self.alpha.as_flattened()[..phi.len()], &self.z[..]))
+    }
+
+    fn accelerate(&mut self, mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64], is_portable: bool) {
         #[cfg(target_arch = "x86_64")]
         if !is_portable && lanes::available() {
             // SAFETY: the processor has been asked; all else in that code is safe.
@@ -103,11 +114,10 @@ impl<const B: usize> Bench<B> {
             unsafe {
                 hardware(self, mechanism, t, phi, omega);
             }
-            return (&self.alpha.as_flattened()[..phi.len()], &self.z);
+            return;
         }
         let _ = is_portable;
         accelerate::<Portable, B>(self, mechanism, t, phi, omega);
-        (&self.alpha.as_flattened()[..phi.len()], &self.z)
     }
 }
 
@@ -130,7 +140,7 @@ fn accelerate<L: Lanes, const B: usize>(bench: &mut Bench<B>, mechanism: &Mechan
         (s[b], c[b]) = sincos::sin_cos(L::of(angles[b]), L::ZERO);
     }
     let (cos, sin) = (store(c), store(s));
-    let Bench { columns, schur, across, z, force, alpha } = bench;
+    let Bench { columns, schur, across, z, force, alpha, least } = bench;
     for (z, (&c, &s)) in z.iter_mut().zip(cos.as_flattened().iter().zip(sin.as_flattened())) {
         *z = Complex::new(c, s);
     }
@@ -153,7 +163,7 @@ fn accelerate<L: Lanes, const B: usize>(bench: &mut Bench<B>, mechanism: &Mechan
         right[b] = c[b].mul_add(free[0][b], s[b].mul_add(free[1][b], rate.mul(rate))).array();
         turning[b] = s[b].neg_mul_add(free[0][b], c[b].mul(free[1][b]));
     }
-    columns::solve::<L, B>(&mut schur[..n], &columns.scale, &mut right);
+    *least = columns::solve::<L, B>(&mut schur[..n], &columns.scale, &mut right);
     for (across, &mu) in across.iter().zip(right.as_flattened()) {
         let mu = L::splat(mu);
         let across: [L; B] = load(across);
@@ -205,11 +215,13 @@ impl Field for Looped {
         let mechanism = &*self.mechanism;
         let n = mechanism.bodies.len();
         let (phi, omega) = (&y[..n], &y[n..2 * n]);
-        let (alpha, z) = match &mut self.room {
+        let found = match &mut self.room {
             Room::Few(bench) => bench.run(mechanism, t, phi, omega, self.is_portable),
             Room::Several(bench) => bench.run(mechanism, t, phi, omega, self.is_portable),
             Room::Many(bench) => bench.run(mechanism, t, phi, omega, self.is_portable),
         };
+        // Which rows to leave out near a singular position, and when, is the angle form's to say.
+        let Some((alpha, z)) = found else { return self.angles.rate(t, y, rate) };
         rate[n..2 * n].copy_from_slice(alpha);
         rate[..n].copy_from_slice(omega);
         // Rows that never move do no work.

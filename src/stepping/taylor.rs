@@ -14,6 +14,9 @@
 //! powers in a row cannot all vanish by symmetry.  Only the increments are rounded: they are added to a (high, low) state, whose low part
 //! turns the unit vectors at the next start.
 //!
+//! Small mechanisms with loops are expanded in unit vectors (module `looped`) and put back onto all rows at the end of every step; near singular
+//! positions the series of any mechanism takes over (module `jump`).
+//!
 //! The series is the dense output: [`Method::within`] sums it at any time in the step, so that steps need not end on output times.  It is
 //! the event finder, too: gaps of walls are polynomials of the step (module `event`), and the state is brought onto their first zero.
 //! With [`Taylor::extended`] the first powers are found in double-double, and the later ones go on from them.

@@ -11,6 +11,8 @@ use crate::arithmetic::lanes::Avx;
 use crate::arithmetic::lanes::{self, Lanes, Portable};
 use crate::dynamics::{Mechanism, State};
 
+/// The least order mechanisms with loops are expanded to: each costs little beside the matrices of the step.
+const LOOPED: usize = 20;
 /// The order of the extended kernel.
 const EXTENDED: usize = 24;
 
@@ -215,12 +217,13 @@ impl Fast {
         Some(Self { settings, form, pace: Pace::new(tolerance, order, longest), step, go })
     }
 
-    /// The kernel of a mechanism with loops, where there is one.
+    /// The kernel of a mechanism with loops, where there is one: it sums the best of all orders up to the one asked for, or to 20 where that is higher.
     pub fn of_looped(mechanism: &Mechanism, tolerance: f64, order: usize, is_portable: bool) -> Option<Self> {
+        let highest = order.max(LOOPED);
         let form = match mechanism.bodies.len() {
-            0..=4 => Form::FewLooped(Box::new(Looped::new(mechanism, tolerance, order)?)),
-            5..=8 => Form::SeveralLooped(Box::new(Looped::new(mechanism, tolerance, order)?)),
-            _ => Form::ManyLooped(Box::new(Looped::new(mechanism, tolerance, order)?)),
+            0..=4 => Form::FewLooped(Box::new(Looped::new(mechanism, tolerance, highest)?)),
+            5..=8 => Form::SeveralLooped(Box::new(Looped::new(mechanism, tolerance, highest)?)),
+            _ => Form::ManyLooped(Box::new(Looped::new(mechanism, tolerance, highest)?)),
         };
         let (step, go) = of_loops(is_portable);
         let settings = Settings { mechanism: mechanism.clone(), tolerance, order, is_portable, is_extended: false };

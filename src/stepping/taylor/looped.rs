@@ -12,15 +12,17 @@
 //!
 //! **Best order**: of the orders at hand that is summed which allows the longest step, each judged by its last four coefficients.
 
+mod spring;
+
+use self::spring::{Spring, pull};
 use super::expansion::{larger, minus_log2};
 use crate::arithmetic::DoubleDouble;
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::{Complex, sincos};
 use crate::dynamics::force::action::Kind;
-use crate::dynamics::looped::reduced;
+use crate::dynamics::looped::{NEAR, reduced};
 use crate::dynamics::natural::Reduced;
 use crate::dynamics::natural::columns::{self, Columns, Row, load, store};
-use crate::dynamics::point::Point;
 use crate::dynamics::{Mechanism, State};
 use std::f64::consts::TAU;
 
@@ -30,13 +32,9 @@ pub const MOST: usize = 24;
 const JUDGES: usize = 4;
 /// The least order.
 const LEAST: usize = 8;
-/// Share of a pivot of S below which the series of any mechanism takes over, which looks for singular positions.
-const NEAR: f64 = 1e-3;
 /// Sweeps at the end of a step, at most, and what of the lengths one sweep is enough for.
 const SWEEPS: usize = 6;
 const CLOSE: f64 = 1e-9;
-/// Room for a scalar series, and for lanes that read beyond its end.
-const LENGTH: usize = MOST + 8;
 
 /// Constants of the mechanism and coefficients of one step; lanes beyond the last body are zero.
 #[derive(Clone, Debug)]
@@ -75,50 +73,6 @@ struct Linear<const B: usize> {
     back: [Row<B>; 2],
 }
 
-/// A spring and its series: D, |D|² with its powers' numbers, 1/|D|; `backwards` ones run from the end, so that products are of neighbours.
-#[derive(Clone, Debug)]
-struct Spring {
-    span: Point,
-    stiffness: f64,
-    free_length: f64,
-    x: Series,
-    y: Series,
-    square: [f64; LENGTH],
-    weighted: [f64; LENGTH],
-    inverse: Series,
-}
-
-#[derive(Clone, Debug)]
-struct Series {
-    forwards: [f64; LENGTH],
-    backwards: [f64; LENGTH],
-}
-
-impl Series {
-    const ZERO: Self = Self { forwards: [0.0; LENGTH], backwards: [0.0; LENGTH] };
-
-    #[inline(always)]
-    fn push(&mut self, m: usize, value: f64) {
-        self.forwards[m] = value;
-        self.backwards[MOST - m] = value;
-    }
-}
-
-/// Σ_{j=0..m} a_j b_{m-j}.
-#[inline(always)]
-fn convolve<L: Lanes>(a: &[f64; LENGTH], b: &Series, m: usize) -> f64 {
-    let mut sum = L::ZERO;
-    let mut j = 0;
-    while j <= m {
-        let at = MOST - m + j;
-        let (a, b) = ([a[j], a[j + 1], a[j + 2], a[j + 3]], &b.backwards);
-        sum = L::of(a).mul_add(L::of([b[at], b[at + 1], b[at + 2], b[at + 3]]), sum);
-        j += 4;
-    }
-    let [a, b, c, d] = sum.array();
-    (a + c) + (b + d)
-}
-
 impl<const B: usize> Looped<B> {
     /// The constants, where this form fits: up to 4 B hinged bodies with loops, constant forces, springs without dampers.
     pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize) -> Option<Self> {
@@ -147,16 +101,6 @@ impl<const B: usize> Looped<B> {
         for (i, (&gravity, &applied)) in mechanism.tree.weight.iter().zip(&applied).enumerate() {
             (weight[0][i / 4][i % 4], weight[1][i / 4][i % 4]) = (gravity.re + applied.re, gravity.im + applied.im);
         }
-        let spring = |spring: &crate::dynamics::force::Spring| Spring {
-            span: spring.span.clone(),
-            stiffness: spring.stiffness,
-            free_length: spring.free_length,
-            x: Series::ZERO,
-            y: Series::ZERO,
-            square: [0.0; LENGTH],
-            weighted: [0.0; LENGTH],
-            inverse: Series::ZERO,
-        };
         let zero = [[0.0; 4]; B];
         Some(Self {
             count: n,
@@ -166,7 +110,7 @@ impl<const B: usize> Looped<B> {
             weight,
             applied,
             torque,
-            springs: mechanism.springs.iter().map(spring).collect(),
+            springs: mechanism.springs.iter().map(Spring::new).collect(),
             rows: linear_rows(&reduced),
             summed: 0,
             z: [[zero; 2]; MOST + 2],
@@ -298,30 +242,6 @@ fn forces<L: Lanes, const B: usize>(looped: &mut Looped<B>, m: usize) -> [[L; B]
         }
     }
     [load(&pulled[0]), load(&pulled[1])]
-}
-
-/// Power m of a spring's force on its first end, from that of its span.
-#[inline(always)]
-fn pull<L: Lanes>(spring: &mut Spring, m: usize, d: Complex<f64>) -> Complex<f64> {
-    if spring.free_length == 0.0 {
-        return d.times(-spring.stiffness);
-    }
-    let Spring { x, y, square, weighted, inverse, .. } = spring;
-    x.push(m, d.re);
-    y.push(m, d.im);
-    square[m] = convolve::<L>(&x.forwards, x, m) + convolve::<L>(&y.forwards, y, m);
-    weighted[m] = m as f64 * square[m];
-    if m == 0 {
-        inverse.push(0, 1.0 / square[0].sqrt());
-    } else {
-        // s = q^(-1/2):  m q_0 s_m = Σ_{j=1..m} (j/2 - m) q_j s_{m-j}.
-        inverse.push(m, 0.0);
-        let plain = convolve::<L>(square, inverse, m);
-        let sum = 0.5 * convolve::<L>(weighted, inverse, m) - m as f64 * plain;
-        inverse.push(m, sum / (m as f64 * square[0]));
-    }
-    let along = Complex::new(convolve::<L>(&inverse.forwards, x, m), convolve::<L>(&inverse.forwards, y, m));
-    (along.times(spring.free_length) - d).times(spring.stiffness)
 }
 
 /// mu_m and z_{m+2}.
