@@ -4,7 +4,7 @@
 //! moment, finds whole files.  `run.json` is written last: where it stands, the run beside it is complete.
 //!
 //! A folder is locked as long as somebody writes into it.  Its table, `.unfinished-trajectory.csv`, outlives its writer where a checkpoint says how
-//! much of it counts ([`checkpoint`](super::checkpoint)).
+//! much of it counts ([`checkpoint`]).
 
 use super::checkpoint;
 use sha2::digest::common::hazmat::{SerializableState, SerializedState};
