@@ -10,7 +10,7 @@
 //!
 //! No sine, no cosine and no velocity term but those of the rows; gravity is a constant force, a force f at a point `Σ gamma_k z_k` acts on
 //! z_k as `conj(gamma_k) f`, a torque tau as `tau i z_k`.  Linear rows are removed once per scene: a closed loop never enters the inner loop.  On the constraints
-//! every row has the slope of its [`Row`](super::row::Row) in angles, so its multiplier is the same.  Rows that depend on others get the multiplier zero.
+//! every row has the slope of its [`Row`] in angles, so its multiplier is the same.  Rows that depend on others get the multiplier zero.
 //!
 //! Unknowns: z (2n numbers), z' (2n) \[1/s\] and, where there are motors or applied forces, p_t \[J\], the momentum conjugate to time: p_t' = -Σ lambda C_t.
 //! Energy plus p_t, less what the constant forces have done, is a first integral: p_t starts at zero and the work is known without a quadrature.

@@ -1,4 +1,5 @@
 //! Random trees of bodies, and their equations of motion derived another way: three coordinates a body, every hinge a pin, one dense solve.
+#![allow(dead_code)]
 
 use driftless::arithmetic::Complex;
 use driftless::scene::{Bar, Hinge, Law, Motor, Place, Scene, Sine, Spring, Start};
