@@ -273,3 +273,129 @@ fn singular_positions_that_are_no_ladders() {
         assert!(matches!(reference.plan.method, MethodId::Taylor));
     }
 }
+
+fn parsed(text: &str) -> Scene {
+    driftless::scene::parse_scene("scene", text, &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A body that hangs on nothing: its centre flies a parabola, and it turns as it was thrown.
+#[test]
+fn a_free_body_flies_a_parabola() {
+    let scene = parsed(
+        r#"{"name": "thrown", "gravity": [0, -10], "until": 2, "every": 2,
+            "bars": [{"name": "stick", "mass": 2, "centre": [0.3, 0.1], "inertia": 0.05, "length": 0.6}],
+            "start": {"stick": {"phi": 0.5, "omega": 7, "origin": [1, 2], "velocity": [3, 4]}}}"#,
+    );
+    let (cos, sin) = (0.5_f64.cos(), 0.5_f64.sin());
+    let arm = [0.3 * cos - 0.1 * sin, 0.3 * sin + 0.1 * cos];
+    let expected = [1.0 + arm[0] + (3.0 - 7.0 * arm[1]) * 2.0, 2.0 + arm[1] + (4.0 + 7.0 * arm[0]) * 2.0 - 0.5 * 10.0 * 4.0];
+    for request in [by("taylor", 1e-12), by("dp8", 1e-12), by("dop853", 1e-12), steps("gauss16", 0.125), steps("rattle8", 1.0 / 256.0)] {
+        let outcome = finished(&scene, &request);
+        let (last, name) = (&outcome.last, outcome.plan.method);
+        assert!((last.phi[0] - 14.5).abs() < 1e-9, "{name}: {}", last.phi[0]);
+        for (found, expected) in last.centre[0].iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-9, "{name}: {found} is not {expected}");
+        }
+    }
+}
+
+/// A block on an inclined rail, driven along it: the motor's force is what Newton asks for, and its work is what the block gains.
+#[test]
+fn a_motor_on_a_slider_pushes_with_the_force_newton_asks_for() {
+    let scene = parsed(
+        r#"{"name": "driven_slider", "gravity": [0, -10], "until": 1.25, "every": 0.25,
+            "bars": [{"name": "block", "mass": 3, "centre": [0, 0], "inertia": 0.2, "length": 0.1}],
+            "sliders": [{"name": "rail", "point": {"body": "block", "point": [0, 0]},
+                         "rail": {"body": "ground", "point": [1, 2], "direction": [4, 3]}, "angle": "locked"}],
+            "motors": [{"name": "push", "slider": "rail", "law": {"start": 0.2, "rate": 0.5, "sines": [{"amplitude": 0.1, "frequency": 4}]}}],
+            "start": {"block": {"phi": 0}}}"#,
+    );
+    let t = 1.25_f64;
+    let travel = 0.2 + 0.5 * t + 0.1 * (4.0 * t).sin();
+    let force = 3.0 * (-1.6 * (4.0 * t).sin() + 10.0 * 0.6);
+    for request in [by("taylor", 1e-11), by("dp8", 1e-11), steps("gauss16", 1.0 / 64.0), steps("rattle8", 1.0 / 512.0)] {
+        let outcome = finished(&scene, &request);
+        let (last, name) = (&outcome.last, outcome.plan.method);
+        assert!((last.centre[0][0] - (1.0 + 0.8 * travel)).abs() < 1e-10, "{name}: {:?}", last.centre[0]);
+        let row = outcome.drift.constraints.iter().position(|(name, _)| name == "push").expect("the motor's row");
+        assert!((last.motors[row][0] - force).abs() < 1e-8, "{name}: {} N is not {force} N", last.motors[row][0]);
+        assert!(outcome.drift.energy.max < 1e-8, "{name}: {:.1e}", outcome.drift.energy.max);
+    }
+}
+
+/// A disc on a torsion spring swings harmonically, through more than a turn; damped, its energy goes where the damper's work says.
+#[test]
+fn a_torsion_pendulum_counts_its_turns() {
+    let scene = |damping: f64| {
+        parsed(&format!(
+            r#"{{"name": "torsion", "gravity": [0, 0], "until": 3, "every": 0.5,
+                "bars": [{{"name": "disc", "mass": 1, "centre": [0, 0], "inertia": 0.5, "length": 0.2}}],
+                "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "disc", "point": [0, 0]}}]}}],
+                "torsion_springs": [{{"name": "coil", "body": "disc", "stiffness": 2, "free_angle": 1, "damping": {damping}}}],
+                "start": {{"disc": {{"phi": 11, "omega": 0}}}}}}"#
+        ))
+    };
+    for request in [by("taylor", 1e-12), by("dp8", 1e-12), by("dop853", 1e-12), steps("gauss16", 1.0 / 32.0)] {
+        let (free, damped) = (finished(&scene(0.0), &request), finished(&scene(0.4), &request));
+        let name = free.plan.method;
+        assert!((free.last.phi[0] - (1.0 + 10.0 * 6.0_f64.cos())).abs() < 1e-9, "{name}: {}", free.last.phi[0]);
+        // exp(-0.4 t) with the frequency sqrt(4 - 0.16).
+        let w = 3.84_f64.sqrt();
+        let swing = 10.0 * (-1.2_f64).exp() * ((3.0 * w).cos() + 0.4 / w * (3.0 * w).sin());
+        assert!((damped.last.phi[0] - (1.0 + swing)).abs() < 1e-9, "{name}: {}", damped.last.phi[0]);
+        assert!(free.drift.energy.max < 1e-10 && damped.drift.energy.max < 1e-9, "{name}");
+    }
+}
+
+/// Forces of every kind on a bar about its centre, against the angular momentum they give it.
+#[test]
+fn forces_and_torques_turn_a_bar_as_their_moments_say() {
+    let scene = parsed(
+        r#"{"name": "forced", "gravity": [0, 0], "until": 2, "every": 1,
+            "bars": [{"name": "bar", "mass": 1, "centre": [0, 0], "inertia": 0.5, "length": 1}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+            "forces": [{"name": "jet", "body": "bar", "point": [0.5, 0], "force": [9, 2], "frame": "body", "law": {"start": 1, "rate": -0.5}},
+                       {"name": "wind", "body": "bar", "point": [0, 0], "force": [3, 4]}],
+            "torques": [{"name": "twist", "body": "bar", "torque": 0.25}],
+            "start": {"bar": {"phi": 0.3, "omega": 1}}}"#,
+    );
+    // 0.5 w' = 0.5·2 (1 - t/2) + 0.25.
+    let rate = 1.0 + 2.0 * (2.0 - 1.0) + 0.5 * 2.0;
+    let angle = 0.3 + 2.0 + (4.0 - 8.0 / 6.0) + 0.25 * 4.0;
+    for request in [by("taylor", 1e-12), by("dp8", 1e-12), by("dop853", 1e-12), steps("gauss16", 1.0 / 32.0)] {
+        let outcome = finished(&scene, &request);
+        let name = outcome.plan.method;
+        assert!((outcome.last.omega[0] - rate).abs() < 1e-10, "{name}: {}", outcome.last.omega[0]);
+        assert!((outcome.last.phi[0] - angle).abs() < 1e-10, "{name}: {}", outcome.last.phi[0]);
+        assert!(outcome.drift.energy.max < 1e-10, "{name}: {:.1e}", outcome.drift.energy.max);
+    }
+}
+
+/// Two halves welded together are one bar.
+#[test]
+fn welded_halves_swing_as_the_whole() {
+    let bars = |halves: bool| {
+        let (bars, welds) = if halves {
+            (
+                r#"{"name": "bar", "mass": 0.5, "centre": [0.25, 0], "inertia": 0.0104166666666666667, "length": 0.5},
+                   {"name": "rest", "mass": 0.5, "centre": [0.25, 0], "inertia": 0.0104166666666666667, "length": 0.5}"#,
+                r#""welds": [{"name": "joint", "between": [{"body": "bar", "point": [0.5, 0]}, {"body": "rest", "point": [0, 0]}]}],"#,
+            )
+        } else {
+            (r#"{"name": "bar", "mass": 1, "centre": [0.5, 0], "inertia": 0.0833333333333333333, "length": 1}"#, "")
+        };
+        let rest = if halves { r#", "rest": {"phi": 1.2, "omega": 0}"# } else { "" };
+        parsed(&format!(
+            r#"{{"name": "bar", "gravity": [9.81, 0], "until": 3, "every": 1, "bars": [{bars}], {welds}
+                "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "bar", "point": [0, 0]}}]}}],
+                "start": {{"bar": {{"phi": 1.2, "omega": 0}}{rest}}}}}"#
+        ))
+    };
+    let whole = finished(&bars(false), &by("taylor", 1e-13)).last.phi[0];
+    for request in [by("taylor", 1e-12), by("dp8", 1e-12), steps("gauss16", 1.0 / 32.0), steps("rattle8", 1.0 / 256.0)] {
+        let outcome = finished(&bars(true), &request);
+        for phi in &outcome.last.phi {
+            assert!((phi - whole).abs() < 1e-9, "{}: {phi} is not {whole}", outcome.plan.method);
+        }
+    }
+}
