@@ -6,12 +6,11 @@
 mod common;
 
 use common::{Inertia, double_pendulum, spring};
-use driftless::arithmetic::Complex;
+use driftless::arithmetic::DoubleDouble;
 use driftless::dynamics::kernel::{Bias, Kernel};
-use driftless::dynamics::row::line_row;
 use driftless::dynamics::series::Series;
 use driftless::dynamics::{Coordinates, Mechanism};
-use driftless::scene::{Law, Motor};
+use driftless::scene::{Law, Motor, Place, Rail, Slider};
 use serde_json::Value;
 
 fn numbers(value: &Value) -> Vec<f64> {
@@ -33,15 +32,15 @@ fn check(case: &Value) {
         let law = Law { start: start[0][0], rate, acceleration: 0.0, sines: vec![] };
         scene.motors.push(Motor { name: "motor".into(), bar: 0, relative_to: None, law });
     }
-    let mut mechanism = Mechanism::new(&scene).expect("a valid scene");
     if let Some(line) = case["guide"].as_object() {
-        let normal = numbers(&line["normal"]);
-        let guide = Complex::new(normal[0], normal[1]);
-        // The guided point of every such case is the end of bar 2.
-        assert_eq!(numbers(&line["point"]), [scene.bars[1].length, 0.0]);
-        let offset = line["offset"].as_f64().expect("a number");
-        mechanism.rows.push(line_row("guide", &mechanism.end(1, 1), guide, offset, None, 2));
+        let (normal, point) = (numbers(&line["normal"]), numbers(&line["point"]));
+        assert_eq!(line["offset"].as_f64(), Some(0.0));
+        // The normal lies to the left of the rail.
+        let rail = Rail { place: Place { bar: None, point: [0.0, 0.0] }, direction: [normal[1], -normal[0]] };
+        let point = Place { bar: Some(1), point: [point[0], point[1]] };
+        scene.sliders.push(Slider { name: "guide".into(), point, rail, locked: false });
     }
+    let mechanism = Mechanism::new(&scene).expect("a valid scene");
     let (phi, omega) = ([start[0][0], start[1][0]], [start[0][1], start[1][1]]);
     let mut kernel = Kernel::<f64>::new(&mechanism);
     kernel.accelerate::<0>(&mechanism, Default::default(), &phi, &omega, Bias::default());
@@ -83,10 +82,19 @@ fn six_instants_with_hinges_spring_and_motor() {
     cases.iter().for_each(check);
 }
 
-/// HW2e and HW2f; a guide is a row of the mechanism, not yet an element of a scene.
+/// HW2e and HW2f, and the shipped scene, which starts as the latter.
 #[test]
 fn two_instants_with_a_guided_end() {
     let cases = cases(true);
     assert_eq!(cases.len(), 2);
     cases.iter().for_each(check);
+    let scene = common::shipped("guided", &[]);
+    let mechanism = Mechanism::new(&scene).expect("a valid scene");
+    let start = mechanism.start(&scene);
+    let plain = |exact: &[DoubleDouble]| exact.iter().map(|x| x.hi).collect::<Vec<f64>>();
+    let mut kernel = Kernel::<f64>::new(&mechanism);
+    kernel.accelerate::<0>(&mechanism, start.time, &plain(&start.phi), &plain(&start.omega), Bias::default());
+    let expected = numbers(&cases[1]["accelerations"]);
+    assert!((kernel.load[0] - expected[2]).abs() < 1e-11 && (kernel.load[1] - expected[5]).abs() < 1e-11, "{:?}", kernel.load);
+    assert!((kernel.multiplier[0] - 0.14788575).abs() < 1e-13);
 }

@@ -325,7 +325,7 @@ impl Running {
                 .err()
                 .or_else(|| exceeded.err().map(|what| drift_stop(&outcome.plan, sample.t, what)))
                 .or_else(|| (!sample.is_finite()).then(|| not_finite(&outcome.plan, sample.t)))
-                .or_else(|| if is_tied_up { came_apart(&outcome.plan, sample) } else { None });
+                .or_else(|| if is_tied_up { came_apart(&outcome.plan, &outcome.drift, sample) } else { None });
             outcome.last.clone_from(sample);
             // A dense method is ahead of what it shows.
             let reached = outcome.last.t;
@@ -349,16 +349,17 @@ impl Running {
 }
 
 /// Loops and sliders that nothing projects let go at singular positions, and the motion goes on smoothly on another branch: such a run is no success.
-fn came_apart(plan: &Plan, sample: &Sample) -> Option<StepError> {
+fn came_apart(plan: &Plan, drift: &Drift, sample: &Sample) -> Option<StepError> {
     let is_loose =
         matches!(plan.stabilization, Stabilization::None | Stabilization::Baumgarte) && !matches!(plan.method, MethodId::Rattle(_));
     let off = sample.imbalance.abs();
+    let weakest = drift.constraints.get(sample.weakest).map_or("", |(name, _)| name);
     (is_loose && off > APART).then(|| StepError {
         cause: Cause::BranchLost,
         method: plan.method.to_string(),
         t: sample.t,
         step: plan.step.unwrap_or(0.0),
-        what: format!("the energy balance is off by {off:.1e} of its scale: loops or sliders have let go"),
+        what: format!("the energy balance is off by {off:.1e} of its scale: constraint {weakest} or its like has let go"),
         hint: "--method dp8 or taylor with --stabilize projection, or a tighter tolerance".into(),
     })
 }
