@@ -79,7 +79,7 @@ struct Balance {
 
 impl Balance {
     fn new(mechanism: &Mechanism) -> Self {
-        Self { kernel: Kernel::new(mechanism), motion: Motion::default() }
+        Self { kernel: Kernel::without_rows(mechanism), motion: Motion::default() }
     }
 
     fn at(&mut self, form: &mut impl Form, state: &State) -> DoubleDouble {

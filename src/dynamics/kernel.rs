@@ -23,6 +23,9 @@ pub struct Bias {
     pub position: f64,
 }
 
+/// Coordinates up to which energies are measured by the couplings.
+const COUPLED: usize = 48;
+
 /// Scratch space of an evaluation for a mechanism of n coordinates and r rows; nothing is allocated after [`Kernel::new`].
 #[derive(Clone, Debug)]
 pub struct Kernel<T> {
@@ -73,7 +76,8 @@ impl<T: Scalar> Kernel<T> {
 
     /// Scratch space for energies.
     pub fn without_rows(mechanism: &Mechanism) -> Self {
-        let is_dense = mechanism.recursion.is_none() && mechanism.tree.is_dense();
+        // They are rounded, and what Gauss methods keep is the energy with these very numbers.
+        let is_dense = mechanism.tree.is_dense() && (mechanism.recursion.is_none() || mechanism.coordinates() <= COUPLED);
         let mut kernel = Self::sized(mechanism.coordinates(), Vec::new(), is_dense);
         if !is_dense {
             kernel.feet = std::array::from_fn(|_| vec![Complex::ZERO; mechanism.bodies.len()]);

@@ -226,7 +226,9 @@ impl Natural {
             multiplier[p] += dot(&gradients[p], &free);
         }
         let mut pivot = vec![0.0; rows];
-        schur::factor::<f64, 0>(rows, &mut matrix, &mut pivot, &self.scales());
+        let mut scales = Vec::with_capacity(rows);
+        self.scales(&mut scales);
+        schur::factor::<f64, 0>(rows, &mut matrix, &mut pivot, &scales);
         tree::solve::<f64, 0>(rows, &matrix, &pivot, &mut multiplier);
         let mut acceleration = free;
         for p in 0..rows {
@@ -243,8 +245,8 @@ impl Natural {
         (acceleration, all)
     }
 
-    /// What pivots of S are measured against, row by row in the loop: Σ |g_k|² (D⁻¹)_kk.
-    pub fn scales(&self) -> Vec<f64> {
+    /// Writes what pivots of S are measured against, row by row in the loop: Σ |g_k|² (D⁻¹)_kk.
+    pub fn scales(&self, scales: &mut Vec<f64>) {
         let free = &self.reduced.free;
         let guide = |guide: &Guide| match &guide.measure {
             Measure::Angle { body, base } => free[*body] + base.map_or(0.0, |base| free[base]),
@@ -255,7 +257,9 @@ impl Natural {
                 linear + place.bilinear.iter().map(|&(j, k, h)| h.norm_squared() * (free[k] + other(j, k))).sum::<f64>()
             }
         };
-        free[..self.mechanism.bodies.len()].iter().copied().chain(self.guides.iter().map(guide)).collect()
+        scales.clear();
+        scales.extend_from_slice(&free[..self.mechanism.bodies.len()]);
+        scales.extend(self.guides.iter().map(guide));
     }
 
     /// How far a state is from its constraints, in double-double.

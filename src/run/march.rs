@@ -194,8 +194,13 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
         let shape = |state: &State| (state.y.len(), state.low.len(), state.turns.len(), state.is_winding);
         let alike = |state: &State| shape(state) == shape(&self.state) && state.turns.iter().all(|turns| turns.unsigned_abs() < MOST_TURNS);
         let steps_back = self.method.is_dense() && !place.from.y.is_empty() && place.from.time < place.state.time;
+        let counts = [place.tally.steps, place.tally.evaluations, place.tally.rejected];
         let is_event = |event: usize| event < self.problem.mechanism().contacts.len();
-        if !alike(&place.state) || (steps_back && !alike(&place.from)) || !place.ahead.is_none_or(is_event) {
+        if counts.iter().any(|&count| count >= MOST_TURNS)
+            || !alike(&place.state)
+            || (steps_back && !alike(&place.from))
+            || !place.ahead.is_none_or(is_event)
+        {
             return Ok(false);
         }
         if steps_back {

@@ -138,7 +138,7 @@ pub fn march(run: Run, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>)
 /// let mut steps = 0;
 /// let is_over = running.go(&mut |_| Ok(()), &mut || {
 ///     steps += 1;
-///     steps == 100
+///     steps >= 100
 /// })?;
 /// assert!(!is_over);
 /// // As bytes, in another process, on another day: the rest of the run comes out the same, bit for bit.

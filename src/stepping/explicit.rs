@@ -363,7 +363,7 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
             } else {
                 wanted
             };
-            taken += 1;
+            taken = taken.saturating_add(1);
             if taken > self.max_steps {
                 let what = format!("more than {} steps before t = {} s", self.max_steps, until.hi);
                 return Err(Self::stop(Cause::TooManySteps, state, h, what, "loosen the tolerance or use a stiff method"));

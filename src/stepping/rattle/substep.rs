@@ -100,7 +100,7 @@ impl Work {
         self.demand.resize(guides, Demand::default());
         self.plain_demand.resize(guides, Demand::default());
         self.drive.resize(guides, 0.0);
-        self.scales = natural.scales();
+        natural.scales(&mut self.scales);
         self.newton.resize(&self.scales);
         self.schur.resize(rows * rows, 0.0);
         for column in [&mut self.multiplier, &mut self.guess, &mut self.pivot, &mut self.offset, &mut self.change] {
