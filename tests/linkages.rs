@@ -275,7 +275,7 @@ fn singular_positions_that_are_no_ladders() {
 }
 
 fn parsed(text: &str) -> Scene {
-    driftless::scene::parse_scene("scene", text, &[]).unwrap_or_else(|error| panic!("{error}"))
+    driftless::scene::parse_scene(text, "scene", &[]).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// A body that hangs on nothing: its centre flies a parabola, and it turns as it was thrown.

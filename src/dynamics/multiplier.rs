@@ -123,7 +123,7 @@ impl<const N: usize, const ACCOUNT: bool> Form for Multiplier<N, ACCOUNT> {
         let mut state = State::new(&unknowns, self.mechanism.bodies.len());
         state.time = motion.time;
         for (turns, before) in state.turns.iter_mut().zip(&motion.turns) {
-            *turns += before;
+            *turns = turns.saturating_add(*before);
         }
         if self.mechanism.is_winding() {
             state.unwind();

@@ -215,7 +215,7 @@ impl Ties {
         let mut state = State::new(unknowns, self.turning());
         state.time = motion.time;
         for (turns, &body) in state.turns.iter_mut().zip(&self.independent) {
-            *turns += motion.turns[body];
+            *turns = turns.saturating_add(motion.turns[body]);
         }
         state
     }
