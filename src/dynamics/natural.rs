@@ -356,7 +356,7 @@ impl Form for Natural {
         state.time = motion.time;
         // An angle within rounding of ±π may come back with the other sign.
         let turn = |(k, &z): (usize, &Complex<DoubleDouble>)| {
-            motion.turns[k] + ((motion.phi[k] - angle(z)).hi / std::f64::consts::TAU).round() as i64
+            motion.turns[k].saturating_add(((motion.phi[k] - angle(z)).hi / std::f64::consts::TAU).round() as i64)
         };
         state.turns = z.iter().take(bodies).enumerate().map(turn).collect();
         state

@@ -250,7 +250,7 @@ impl Tie {
                     winding += law.angle(state.time).scale(*sign);
                 }
                 let whole = ((winding.hi - angle::unwrapped(angle, 0)) / std::f64::consts::TAU).round();
-                (angle, rate, turns + whole as i64)
+                (angle, rate, turns.saturating_add(whole as i64))
             }
         }
     }

@@ -409,11 +409,11 @@ impl Work {
                 return Err(Failure::TooFar(k));
             }
             if upper(before) != upper(after) {
-                turns[k] += match (upper(after), old.cross(here[k]) > 0.0) {
+                turns[k] = turns[k].saturating_add(match (upper(after), old.cross(here[k]) > 0.0) {
                     (false, true) => 1,
                     (true, false) => -1,
                     _ => 0,
-                };
+                });
             }
         }
         for k in bodies..n {
