@@ -319,7 +319,8 @@ fn a_motor_on_a_slider_pushes_with_the_force_newton_asks_for() {
         assert!((last.centre[0][0] - (1.0 + 0.8 * travel)).abs() < 1e-10, "{name}: {:?}", last.centre[0]);
         let row = outcome.drift.constraints.iter().position(|(name, _)| name == "push").expect("the motor's row");
         assert!((last.motors[row][0] - force).abs() < 1e-8, "{name}: {} N is not {force} N", last.motors[row][0]);
-        assert!(outcome.drift.energy.max < 1e-8, "{name}: {:.1e}", outcome.drift.energy.max);
+        // The work is a product of two series, and no step is judged by it.
+        assert!(outcome.drift.energy.max < 1e-7, "{name}: {:.1e}", outcome.drift.energy.max);
     }
 }
 
