@@ -91,7 +91,7 @@ fn read_shipped(name: &str) -> Scene {
 #[test]
 fn every_shipped_scene_reads() {
     let files = shipped();
-    assert_eq!(files.len(), 20);
+    assert_eq!(files.len(), 21);
     for file in files {
         match read_scene(&file, &[]) {
             Ok(scene) => {
