@@ -3,10 +3,17 @@
 //! `cargo bench --no-default-features --bench chains`: alternating blocks in one process, minimum and median.  Chains are 1 m and 1 kg in all,
 //! their links thin rods; ladders are the four-bars of `examples/four_bars.rs`.
 
+#[allow(dead_code)]
+#[path = "../examples/four_bars.rs"]
+mod four_bars;
+#[allow(dead_code)]
+#[path = "../examples/chain.rs"]
+mod hanging;
+
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::{Field, Form, Mechanism, Time};
 use driftless::run::{MethodId, Request, Stabilization, simulate};
-use driftless::scene::{Bar, Hinge, Place, Scene, Start};
+use driftless::scene::{Scene, Start};
 use std::f64::consts::FRAC_PI_2;
 use std::hint::black_box;
 use std::sync::Arc;
@@ -18,57 +25,20 @@ const BLOCK: f64 = 2e-3;
 /// Largest number of bodies for which matrices are tried.
 const MOST_DENSE: usize = 128;
 
-fn root(bar: Option<usize>, x: f64) -> Place {
-    Place { bar, point: [x, 0.0] }
-}
-
 /// A chain let go straight at an angle \[rad\] from the vertical, or bent and in motion.
 fn chain(links: usize, angle: Option<f64>) -> Scene {
-    let length = 1.0 / links as f64;
-    let bar = |k: usize| Bar {
-        name: format!("link{}", k + 1),
-        length,
-        mass: length,
-        centre: [length / 2.0, 0.0],
-        inertia: length * length * length / 12.0,
-    };
-    let on = |k: usize| if k == 0 { root(None, 0.0) } else { root(Some(k - 1), length) };
-    let start = |k: usize| match angle {
-        Some(phi) => Start { phi, omega: 0.0 },
-        None => Start { phi: (0.37 * k as f64).sin(), omega: (0.71 * k as f64).cos() },
-    };
-    Scene {
-        name: format!("chain{links}"),
-        gravity: [9.81, 0.0],
-        bars: (0..links).map(bar).collect(),
-        hinges: (0..links).map(|k| Hinge { name: format!("hinge{}", k + 1), between: [on(k), root(Some(k), 0.0)] }).collect(),
-        start: (0..links).map(start).collect(),
-        until: 1.0,
-        every: 0.1,
-        ..Scene::default()
+    let straight = hanging::chain(links, angle.unwrap_or(0.0));
+    if angle.is_some() {
+        return straight;
     }
+    Scene { start: (0..links).map(|k| Start { phi: (0.37 * k as f64).sin(), omega: (0.71 * k as f64).cos() }).collect(), ..straight }
 }
 
-/// Four-bars side by side.
+/// Four-bars side by side, a little past upright.
 fn ladder(n: usize) -> Scene {
-    let bar = |k: usize| Bar { name: format!("bar{k}"), length: 1.0, mass: 1.0, centre: [0.5, 0.0], inertia: 1.0 / 12.0 };
-    let coupler = |i: usize| n + 1 + i;
-    let feet = (0..=n).map(|i| Hinge { name: format!("A{i}"), between: [Place { bar: None, point: [i as f64, 0.0] }, root(Some(i), 0.0)] });
-    let tops = (0..n).flat_map(|i| {
-        let left = Hinge { name: format!("B{i}"), between: [root(Some(i), 1.0), root(Some(coupler(i)), 0.0)] };
-        [left, Hinge { name: format!("D{i}"), between: [root(Some(coupler(i)), 1.0), root(Some(i + 1), 1.0)] }]
-    });
-    let upright = |_| Start { phi: FRAC_PI_2 - 0.4, omega: -1.0 };
-    Scene {
-        name: format!("ladder{n}"),
-        gravity: [0.0, -9.81],
-        bars: (0..=2 * n).map(bar).collect(),
-        hinges: feet.chain(tops).collect(),
-        start: (0..=n).map(upright).chain((0..n).map(|_| Start { phi: 0.0, omega: 0.0 })).collect(),
-        until: 1.0,
-        every: 0.1,
-        ..Scene::default()
-    }
+    let mut scene = four_bars::scene(n);
+    scene.start[..=n].fill(Start { phi: FRAC_PI_2 - 0.4, omega: -1.0 });
+    scene
 }
 
 /// A form and its state, timed block by block.

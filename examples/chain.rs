@@ -5,7 +5,7 @@
 use driftless::scene::{Bar, Hinge, Place, Scene, Start};
 
 /// Every link a thin rod; angles from where the chain hangs straight down \[rad\].
-fn chain(links: usize, angle: f64) -> Scene {
+pub fn chain(links: usize, angle: f64) -> Scene {
     let length = 1.0 / links as f64;
     let link = |k: usize| Bar {
         name: format!("link{}", k + 1),

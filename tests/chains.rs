@@ -1,6 +1,9 @@
 //! The equations body by body: against the matrices on random mechanisms, and on chains too long for matrices.
 
 mod common;
+#[allow(dead_code)]
+#[path = "../examples/chain.rs"]
+mod hanging;
 #[path = "common/trees.rs"]
 mod trees;
 
@@ -11,7 +14,7 @@ use driftless::dynamics::row::{line_row, slot_row};
 use driftless::dynamics::{Field, Form, Mechanism, Time};
 use driftless::run::{MethodId, Plan, Request, Stabilization, simulate};
 
-use driftless::scene::{Bar, Force, Given, Hinge, Place, Scene, Start, Torque, TorsionSpring};
+use driftless::scene::{Force, Given, Place, Scene, Start, Torque, TorsionSpring};
 use driftless::stabilization::projection::project;
 use proptest::prelude::*;
 use std::sync::Arc;
@@ -160,28 +163,10 @@ fn the_random_mechanisms_have_rows_and_differ_by_rounding() {
     assert!(worst[0] < 1e-26 && worst[1] < 1e-26 && worst[2] < 1e-9 && worst[3] < 1e-9, "{worst:?}");
 }
 
-/// A chain of `n` links, one metre and one kilogram in all, bent and in motion.
+/// A chain of `n` links, bent and in motion.
 fn chain(n: usize) -> Scene {
-    let length = 1.0 / n as f64;
-    let bar =
-        |k: usize| Bar { name: format!("link{k}"), length, mass: length, centre: [length / 2.0, 0.0], inertia: length.powi(3) / 12.0 };
-    let hinge = |k: usize| Hinge {
-        name: format!("hinge{k}"),
-        between: [
-            Place { bar: k.checked_sub(1), point: [if k == 0 { 0.0 } else { length }, 0.0] },
-            Place { bar: Some(k), point: [0.0; 2] },
-        ],
-    };
-    Scene {
-        name: "chain".into(),
-        gravity: [9.81, 0.0],
-        bars: (0..n).map(bar).collect(),
-        hinges: (0..n).map(hinge).collect(),
-        start: (0..n).map(|k| Start { phi: (0.03 * k as f64).sin(), omega: 2.0 * (0.07 * k as f64).cos() }).collect(),
-        until: 0.01,
-        every: 0.01,
-        ..Scene::default()
-    }
+    let start = (0..n).map(|k| Start { phi: (0.03 * k as f64).sin(), omega: 2.0 * (0.07 * k as f64).cos() }).collect();
+    Scene { start, until: 0.01, every: 0.01, ..hanging::chain(n, 0.0) }
 }
 
 /// Moments about every centre of mass and forces on it, from the hinge forces and accelerations found.

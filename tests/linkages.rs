@@ -1,5 +1,7 @@
 //! Published problems of linkages, and other mechanisms with a closed form, by every method that fits.
 
+#[path = "common/andrews.rs"]
+mod andrews;
 mod common;
 #[allow(dead_code)]
 #[path = "../examples/four_bars.rs"]
@@ -43,16 +45,7 @@ fn violations(outcome: &Outcome) -> [f64; 2] {
 /// Andrews' squeezing mechanism against its quadruple-precision state.  The mechanism is 0.1 m across.
 #[test]
 fn andrews_squeezing_mechanism() {
-    let file = data(include_str!("data/andrews_squeezer.json"));
-    let angle = |name: &str| number(&file["reference_high_precision"]["angles"][name]);
-    let rate = |name: &str| number(&file["reference_high_precision"]["velocities"][name]);
-    // OF, FE, BED, GE, AG, HE, AH from the test set's relative angles.
-    let of = |get: &dyn Fn(&str) -> f64, quarter: f64| {
-        let (beta, theta, delta, epsilon) = (get("beta"), get("theta"), get("delta"), get("epsilon"));
-        let pi = 2.0 * quarter;
-        [beta, beta + theta + pi, get("gamma"), get("phi") + delta - quarter, delta, get("omega") + epsilon, epsilon - quarter]
-    };
-    let (angles, rates) = (of(&angle, FRAC_PI_2), of(&rate, 0.0));
+    let [angles, rates] = andrews::reference();
     let scene = Scene { every: 0.01, ..shipped("andrews", &[]) };
     // Start angles are in doubles, which alone is 1e-12 at the end.
     for (request, most) in [

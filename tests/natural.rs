@@ -137,19 +137,32 @@ fn largest(values: &[f64]) -> f64 {
     values.iter().fold(1.0, |largest, value| largest.max(value.abs()))
 }
 
+/// A random mechanism, its start, and one evaluation in angles there.
+struct Sound {
+    scene: Scene,
+    mechanism: Mechanism,
+    motion: Motion,
+    kernel: Kernel<f64>,
+}
+
+fn sound(n: usize, seed: u64) -> Result<Sound, TestCaseError> {
+    let scene = mechanism(n, seed).ok_or_else(|| TestCaseError::reject("no equations"))?;
+    let mechanism = Mechanism::new(&scene).map_err(|_| TestCaseError::reject("angles given twice"))?;
+    let motion = mechanism.start(&scene);
+    prop_assume!(is_sound(&mechanism, &motion));
+    let (phi, omega) = numbers(&motion);
+    let mut kernel = Kernel::<f64>::new(&mechanism);
+    kernel.accelerate::<0>(&mechanism, Time::default(), &phi, &omega, Bias::default());
+    Ok(Sound { scene, mechanism, motion, kernel })
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 600, max_global_rejects: 20_000, ..ProptestConfig::default() })]
 
     /// The two forms share nothing but the constants of the tree and the lists of the rows.
     #[test]
     fn both_forms_tell_the_same_accelerations_and_multipliers(n in 2..=6usize, seed in any::<u64>()) {
-        let Some(scene) = mechanism(n, seed) else { return Err(TestCaseError::reject("no equations")) };
-        let Ok(mechanism) = Mechanism::new(&scene) else { return Err(TestCaseError::reject("angles given twice")) };
-        let motion = mechanism.start(&scene);
-        prop_assume!(is_sound(&mechanism, &motion));
-        let (phi, omega) = numbers(&motion);
-        let mut kernel = Kernel::<f64>::new(&mechanism);
-        kernel.accelerate::<0>(&mechanism, Time::default(), &phi, &omega, Bias::default());
+        let Sound { mechanism, motion, kernel, .. } = sound(n, seed)?;
         let (z, _, acceleration, multiplier) = natural(&mechanism, &motion);
         let (fastest, strongest) = (largest(&kernel.load), largest(&kernel.multiplier));
         for k in 0..n {
@@ -169,13 +182,8 @@ proptest! {
     /// Newton and Euler against the multipliers of the same hinges where every body hangs on nothing and every hinge is a pin.
     #[test]
     fn hinge_forces_are_the_multipliers_of_the_hinges_as_pins(n in 2..=5usize, seed in any::<u64>()) {
-        let Some(scene) = mechanism(n, seed) else { return Err(TestCaseError::reject("no equations")) };
-        let Ok(mechanism) = Mechanism::new(&scene) else { return Err(TestCaseError::reject("angles given twice")) };
-        let motion = mechanism.start(&scene);
-        prop_assume!(is_sound(&mechanism, &motion));
+        let Sound { scene, mechanism, motion, kernel } = sound(n, seed)?;
         let (phi, omega) = numbers(&motion);
-        let mut kernel = Kernel::<f64>::new(&mechanism);
-        kernel.accelerate::<0>(&mechanism, Time::default(), &phi, &omega, Bias::default());
         let forces = mechanism.hinge_forces(Time::default(), &kernel, &omega);
         // The same bodies in the same places, each by itself.
         let mut loose = Scene { hinges: Vec::new(), ..scene.clone() };

@@ -67,15 +67,9 @@ pub struct SceneFlags {
     /// Refuse a scene of which something given for the start must change to fit its constraints
     #[arg(long)]
     pub strict: bool,
-    /// Print exactly one JSON object on stdout
-    #[arg(long)]
-    pub json: bool,
-    /// Print errors only: no progress, no messages, no summary
-    #[arg(short, long)]
-    pub quiet: bool,
-    /// Say on stderr what is being done
-    #[arg(short, long, conflicts_with = "quiet")]
-    pub verbose: bool,
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub tell: TellFlags,
 }
 
 /// How to run it.
@@ -222,6 +216,20 @@ pub struct CheckpointFlags {
     pub checkpoint_every: f64,
 }
 
+/// What is told, and how.
+#[derive(Clone, Debug, Args)]
+pub struct TellFlags {
+    /// Print exactly one JSON object on stdout
+    #[arg(long)]
+    pub json: bool,
+    /// Print errors only: no progress, no messages, no summary
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Say on stderr what is being done
+    #[arg(short, long, conflicts_with = "quiet")]
+    pub verbose: bool,
+}
+
 /// `driftless resume`.
 #[derive(Debug, Args)]
 pub struct ResumeFlags {
@@ -234,26 +242,20 @@ pub struct ResumeFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub checkpoints: CheckpointFlags,
-    /// Print exactly one JSON object on stdout
-    #[arg(long)]
-    pub json: bool,
-    /// Print errors only: no progress, no messages, no summary
-    #[arg(short, long)]
-    pub quiet: bool,
-    /// Say on stderr what is being done
-    #[arg(short, long, conflicts_with = "quiet")]
-    pub verbose: bool,
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub tell: TellFlags,
 }
 
 impl Flags {
     /// True where stdout is to hold one JSON object.
     pub fn is_json(&self) -> bool {
         match &self.command {
-            Command::Check(flags) => flags.scene.json,
-            Command::Inspect(flags) => flags.scene.json,
-            Command::Run(flags) => flags.scene.json,
-            Command::Sweep(flags) => flags.scene.json,
-            Command::Resume(flags) => flags.json,
+            Command::Check(flags) => flags.scene.tell.json,
+            Command::Inspect(flags) => flags.scene.tell.json,
+            Command::Run(flags) => flags.scene.tell.json,
+            Command::Sweep(flags) => flags.scene.tell.json,
+            Command::Resume(flags) => flags.tell.json,
             Command::Methods { json } => *json,
             Command::Schema | Command::Completions { .. } => false,
         }
@@ -263,7 +265,7 @@ impl Flags {
 impl SceneFlags {
     /// Says something on stderr where that is wanted.
     pub(super) fn remark(&self, text: &str) {
-        if self.verbose {
+        if self.tell.verbose {
             message(text);
         }
     }

@@ -55,17 +55,17 @@ fn check(flags: &CheckFlags) -> Result<(), Failure> {
         Run::new(Arc::clone(&mechanism), trial, Default::default(), &mechanism.start(&scene))?;
         plans.push(plan);
     }
-    if flags.scene.json {
+    if flags.scene.tell.json {
         return output::print_objects(plans.iter().map(|plan| report::check::object(&scene, &mechanism, plan)).collect());
     }
     let pages: Vec<String> = plans.iter().map(|plan| report::check::text(&scene, &mechanism, plan)).collect();
-    if flags.scene.quiet { Ok(()) } else { print(&pages.join("\n")) }
+    if flags.scene.tell.quiet { Ok(()) } else { print(&pages.join("\n")) }
 }
 
 fn inspect(flags: &InspectFlags) -> Result<(), Failure> {
     let (scene, mechanism) = load(&flags.scene)?;
     let inspection = report::inspect::inspect(&scene, &mechanism);
-    if flags.scene.json { print_object(&inspection.object(&scene)) } else { print(&inspection.text(&scene)) }
+    if flags.scene.tell.json { print_object(&inspection.object(&scene)) } else { print(&inspection.text(&scene)) }
 }
 
 /// Reads and compiles the scene.
@@ -91,7 +91,7 @@ fn settle(flags: &SceneFlags, mechanism: &Mechanism) -> Result<(), Failure> {
     if flags.strict && !changes.is_empty() {
         return Err(Failure::changed(changes));
     }
-    if !flags.quiet {
+    if !flags.tell.quiet {
         changes.iter().for_each(|change| output::message(&format!("note: {change}")));
     }
     Ok(())

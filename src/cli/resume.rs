@@ -61,7 +61,7 @@ pub fn run(flags: &ResumeFlags) -> Result<(), Failure> {
     let damaged = || Failure::new(Exit::Io, "the command line in the checkpoint cannot be read");
     match (Flags::try_parse_from(&saved.arguments).map_err(|_| damaged())?.command, &saved.work) {
         (Command::Run(mut run), Work::Run(_)) => {
-            (run.scene.json, run.scene.quiet, run.scene.verbose) = (flags.json, flags.quiet, flags.verbose);
+            run.scene.tell = flags.tell.clone();
             run.checkpoints = flags.checkpoints.clone();
             simulate::resume(&run, saved, flags.until, folder, checkpoints)
         }
@@ -69,7 +69,7 @@ pub fn run(flags: &ResumeFlags) -> Result<(), Failure> {
             Err(Failure::new(Exit::Usage, "--until: the points of a sweep have one horizon\nhint: a new sweep"))
         }
         (Command::Sweep(mut sweep), Work::Sweep(..)) => {
-            (sweep.scene.json, sweep.scene.quiet, sweep.scene.verbose) = (flags.json, flags.quiet, flags.verbose);
+            sweep.scene.tell = flags.tell.clone();
             sweep.checkpoints = flags.checkpoints.clone();
             sweep::resume(&sweep, saved, folder, checkpoints)
         }

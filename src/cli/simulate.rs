@@ -129,7 +129,7 @@ impl Task<'_> {
         checkpoints: &mut Checkpoints,
     ) -> Result<(), Failure> {
         let mut watchman = Watchman::new(self.flags.checkpoints.checkpoint_every);
-        let mut progress = Progress::new(&self.scene.name, running.plan().until, self.flags.scene.quiet);
+        let mut progress = Progress::new(&self.scene.name, running.plan().until, self.flags.scene.tell.quiet);
         loop {
             let mut observer = |sample: &Sample| {
                 table.write(sample)?;
@@ -224,7 +224,7 @@ fn draw(_: &Scene, _: &Mechanism, _: &Outcome, _: &mut Folder, _: &RunFlags) -> 
 
 /// Prints the results.
 fn tell(scene: &Scene, mechanism: &Mechanism, done: &[Done], flags: &RunFlags) -> Result<(), Failure> {
-    if flags.scene.json {
+    if flags.scene.tell.json {
         let object = |Done { outcome, folder, failure }: &Done| {
             let mut object = report::result::object(scene, mechanism, outcome);
             object["folder"] = json!(folder.path().display().to_string());
@@ -236,7 +236,7 @@ fn tell(scene: &Scene, mechanism: &Mechanism, done: &[Done], flags: &RunFlags) -
         };
         return print_objects(done.iter().map(object).collect());
     }
-    if flags.scene.quiet {
+    if flags.scene.tell.quiet {
         return Ok(());
     }
     let page = |Done { outcome, folder, .. }: &Done| {

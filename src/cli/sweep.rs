@@ -40,7 +40,7 @@ pub fn run(flags: &SweepFlags, arguments: &[String]) -> Result<(), Failure> {
     let table = SweepTable::new(&plan, folder.begin(SWEEP)?).map_err(|error| folder.failed(SWEEP, error.into()))?;
     let writer = Writer {
         table,
-        progress: Points::new(&plan.scene().name, 0, plan.grid().count(), flags.scene.quiet),
+        progress: Points::new(&plan.scene().name, 0, plan.grid().count(), flags.scene.tell.quiet),
         watchman: Watchman::new(flags.checkpoints.checkpoint_every),
         checkpoints: Checkpoints::none(&path),
         text: &text,
@@ -76,7 +76,7 @@ pub fn resume(flags: &SweepFlags, saved: Saved, folder: Folder, checkpoints: Che
     drop(drawn);
     let writer = Writer {
         table: SweepTable::going_on(&plan, folder.take_up(SWEEP, &cursor)?),
-        progress: Points::new(&plan.scene().name, seen.points(), plan.grid().count(), flags.scene.quiet),
+        progress: Points::new(&plan.scene().name, seen.points(), plan.grid().count(), flags.scene.tell.quiet),
         watchman: Watchman::new(flags.checkpoints.checkpoint_every),
         checkpoints,
         text: &text,
@@ -229,7 +229,7 @@ fn draw(plan: &Sweep, curve: &Curve, folder: &mut Folder, flags: &SweepFlags) ->
             folder.write(name, &content)?;
             flags.scene.remark(&format!("drew {}", folder.path().join(name).display()));
         }
-        Err(reason @ NoChart::Nothing(_)) if !flags.scene.quiet => super::output::message(&format!("no chart: {reason}")),
+        Err(reason @ NoChart::Nothing(_)) if !flags.scene.tell.quiet => super::output::message(&format!("no chart: {reason}")),
         Err(_) => {}
     }
     Ok(())
@@ -237,13 +237,13 @@ fn draw(plan: &Sweep, curve: &Curve, folder: &mut Folder, flags: &SweepFlags) ->
 
 /// Prints the totals.
 fn tell(plan: &Sweep, totals: &Totals, folder: &Folder, flags: &SweepFlags) -> Result<(), Failure> {
-    if flags.scene.json {
+    if flags.scene.tell.json {
         let mut object = report::sweep::object(plan, totals);
         object["folder"] = json!(folder.path().display().to_string());
         object["files"] = json!(folder.files().iter().map(|file| file.display().to_string()).collect::<Vec<_>>());
         return print_object(&object);
     }
-    if flags.scene.quiet {
+    if flags.scene.tell.quiet {
         return Ok(());
     }
     print(&(report::sweep::text(plan, totals) + &report::result::files(folder.path(), folder.names())))

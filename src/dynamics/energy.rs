@@ -57,6 +57,9 @@ impl Mechanism {
     /// Positions and velocities of free feet, from those given for the origin of some bar of each group.
     fn put_feet(&self, scene: &Scene, motion: &mut Motion) {
         let bars = self.bodies.len();
+        if bars == self.coordinates() {
+            return;
+        }
         motion.resize(self.coordinates());
         let mut kernel = Kernel::<DoubleDouble>::without_rows(self);
         kernel.face::<0>(self, &motion.phi);

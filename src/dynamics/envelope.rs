@@ -7,7 +7,7 @@
 //! Source: A. Jennings, *A compact storage scheme for the solution of symmetric linear simultaneous equations*, Comput. J. 9 (1966); the order of
 //! the rows: E. Cuthill, J. McKee, *Reducing the bandwidth of sparse symmetric matrices*, Proc. 24th ACM Conf. (1969), reversed after A. George.
 
-use super::schur::{DROPPED, Weakest};
+use super::schur::Weakest;
 use crate::arithmetic::{Real, Scalar};
 
 /// The shape of a symmetric matrix below and on its diagonal.
@@ -55,7 +55,7 @@ impl Envelope {
     }
 
     /// Replaces a matrix by its factors, and writes the reciprocal pivots: zero for rows left out, whose pivot is less than a share
-    /// [`DROPPED`] of their scale.  Tells the row whose pivot is the smallest share.
+    /// [`DROPPED`](super::schur::DROPPED) of their scale.  Tells the row whose pivot is the smallest share.
     #[inline]
     pub fn factor<T: Real>(&self, matrix: &mut [T], pivot: &mut [T], scale: &[f64]) -> Weakest {
         let mut weakest = Weakest::NONE;
@@ -78,11 +78,7 @@ impl Envelope {
                 diagonal -= g * l;
                 row[j - first] = l;
             }
-            let share = diagonal.value() / scale[i];
-            if share < weakest.share {
-                weakest = Weakest { share, row: i };
-            }
-            pivot[i] = if share < DROPPED { T::ZERO } else { T::ONE / diagonal };
+            pivot[i] = weakest.reciprocal(i, diagonal, scale[i]);
         }
         weakest
     }

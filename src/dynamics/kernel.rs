@@ -246,13 +246,12 @@ impl<T: Real> Kernel<T> {
         self.couple_rows::<N, 0>(size::<N>(mechanism.tree.coordinates), mechanism.rows.len());
     }
 
-    /// The smallest share of a row ([`schur`]) at these coordinates.
-    pub fn share_at(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) -> f64 {
-        self.face::<0>(mechanism, phi);
-        self.couple::<0>(mechanism);
-        self.factor::<0>(mechanism, omega);
-        self.linearise::<0>(mechanism, t, phi, omega);
-        self.weakest.share
+    /// The same at other coordinates than the last: elements, M and its factors first.
+    pub fn linearise_at<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
+        self.face::<N>(mechanism, phi);
+        self.couple::<N>(mechanism);
+        self.factor::<N>(mechanism, omega);
+        self.linearise::<N>(mechanism, t, phi, omega);
     }
 
     /// C, G, C_t, gamma of every row, and nothing else.

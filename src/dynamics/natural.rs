@@ -248,18 +248,9 @@ impl Natural {
     /// Writes what pivots of S are measured against, row by row in the loop: Σ |g_k|² (D⁻¹)_kk.
     pub fn scales(&self, scales: &mut Vec<f64>) {
         let free = &self.reduced.free;
-        let guide = |guide: &Guide| match &guide.measure {
-            Measure::Angle { body, base } => free[*body] + base.map_or(0.0, |base| free[base]),
-            Measure::Place(place) => {
-                let linear: f64 = place.linear.iter().map(|&(k, g)| g.norm_squared() * free[k]).sum();
-                // Of the two elements of a product one is a unit vector; a foot is not bounded.
-                let other = |j: usize, k: usize| if k < place.angles { free[j] } else { 0.0 };
-                linear + place.bilinear.iter().map(|&(j, k, h)| h.norm_squared() * (free[k] + other(j, k))).sum::<f64>()
-            }
-        };
         scales.clear();
         scales.extend_from_slice(&free[..self.mechanism.bodies.len()]);
-        scales.extend(self.guides.iter().map(guide));
+        scales.extend(self.guides.iter().map(|guide| guide.measure.scale(|k| free[k])));
     }
 
     /// How far a state is from its constraints, in double-double.

@@ -74,8 +74,7 @@ impl Point {
     /// P \[m\] at the elements `z`.
     #[inline(always)]
     pub fn position<T: Scalar>(&self, z: &[Complex<T>]) -> Complex<T> {
-        let turned = self.terms.iter().fold(Complex::of(self.root), |sum, &(k, gamma)| sum + z[k].turn(gamma));
-        self.shifts.iter().fold(turned, |sum, &(x, share)| sum + z[x].times(T::of(share)))
+        self.sum(Complex::of(self.root), z)
     }
 
     /// P' \[m/s\].
@@ -110,7 +109,12 @@ impl Point {
     /// P without its constant part, of one power of a series of the elements.
     #[inline(always)]
     pub fn turned<T: Scalar>(&self, z: &[Complex<T>]) -> Complex<T> {
-        let turned = self.terms.iter().fold(Complex::ZERO, |sum, &(k, gamma)| sum + z[k].turn(gamma));
+        self.sum(Complex::ZERO, z)
+    }
+
+    #[inline(always)]
+    fn sum<T: Scalar>(&self, start: Complex<T>, z: &[Complex<T>]) -> Complex<T> {
+        let turned = self.terms.iter().fold(start, |sum, &(k, gamma)| sum + z[k].turn(gamma));
         self.shifts.iter().fold(turned, |sum, &(x, share)| sum + z[x].times(T::of(share)))
     }
 

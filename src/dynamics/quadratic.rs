@@ -75,15 +75,15 @@ impl Quadratic {
         }
     }
 
-    /// Adds dQ/dq to `jacobian`.
+    /// Parts of dQ/dq, coordinate by coordinate; a coordinate may come up more than once.
     #[inline]
-    pub fn jacobian<T: Scalar>(&self, z: &[Complex<T>], jacobian: &mut [T]) {
+    pub fn slopes<T: Scalar>(&self, z: &[Complex<T>], mut each: impl FnMut(usize, T)) {
         self.gradients(z, |k, gradient| {
             if k < self.angles {
-                jacobian[k] += gradient.dot(z[k].left());
+                each(k, gradient.dot(z[k].left()));
             } else {
-                jacobian[k] += gradient.re;
-                jacobian[k + 1] += gradient.im;
+                each(k, gradient.re);
+                each(k + 1, gradient.im);
             }
         });
     }
@@ -110,7 +110,7 @@ impl Quadratic {
     /// The same without Q itself.
     #[inline]
     pub fn differentiate<T: Real>(&self, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
-        self.jacobian(at.z, jacobian);
+        self.slopes(at.z, |k, slope| jacobian[k] += slope);
         Linearised { position: T::ZERO, drive: T::ZERO, convective: self.convective(at.z, at.omega) }
     }
 

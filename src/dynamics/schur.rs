@@ -31,23 +31,38 @@ pub struct Weakest {
 impl Weakest {
     /// Before any row has been looked at.
     pub const NONE: Self = Self { share: f64::INFINITY, row: 0 };
+
+    /// Looks at the pivot of a row against its scale: its reciprocal, or zero where the row is left out.
+    #[inline(always)]
+    pub fn reciprocal<T: Real>(&mut self, row: usize, pivot: T, scale: f64) -> T {
+        let share = pivot.value() / scale;
+        if share < self.share {
+            *self = Self { share, row };
+        }
+        if share < DROPPED { T::ZERO } else { T::ONE / pivot }
+    }
+}
+
+impl Measure {
+    /// Σ |g_k|² `free`_k: what S has at most on a row's place without other rows, up to a factor of the number of bodies \[1/kg, 1/(kg·m²)\], where
+    /// element k alone would give way by `free`(k) to a force of one.
+    pub fn scale(&self, free: impl Fn(usize) -> f64) -> f64 {
+        match self {
+            Self::Angle { body, base } => free(*body) + base.map_or(0.0, free),
+            Self::Place(place) => {
+                let linear: f64 = place.linear.iter().map(|&(k, g)| g.norm_squared() * free(k)).sum();
+                // Of the two elements of a product one is a unit vector; a foot is not bounded, so that the other counts alone.
+                let other = |j: usize, k: usize| if k < place.angles { free(j) } else { 0.0 };
+                linear + place.bilinear.iter().map(|&(j, k, h)| h.norm_squared() * (free(k) + other(j, k))).sum::<f64>()
+            }
+        }
+    }
 }
 
 impl Row {
-    /// Σ |g_k|²/d_k: what S has at most on this row's place without other rows, up to a factor of the number of bodies \[1/kg, 1/(kg·m²)\].
+    /// What pivots of this row are measured against: its measure's scale with the diagonal of M \[1/kg, 1/(kg·m²)\].
     pub fn scale(&self, tree: &Tree) -> f64 {
-        match &self.measure {
-            Measure::Angle { body, base } => 1.0 / tree.diagonal[*body] + base.map_or(0.0, |base| 1.0 / tree.diagonal[base]),
-            Measure::Place(place) => {
-                let linear: f64 = place.linear.iter().map(|&(k, g)| g.norm_squared() / tree.diagonal[k]).sum();
-                // Of the two elements of a product one is a unit vector, and a foot is not bounded: its vector counts with the row's body.
-                let both = |&(j, k, h): &(usize, usize, crate::arithmetic::Complex<f64>)| {
-                    h.norm_squared()
-                        * if k < place.angles { 1.0 / tree.diagonal[j] + 1.0 / tree.diagonal[k] } else { 1.0 / tree.diagonal[k] }
-                };
-                linear + place.bilinear.iter().map(both).sum::<f64>()
-            }
-        }
+        self.measure.scale(|k| 1.0 / tree.diagonal[k])
     }
 }
 
@@ -67,11 +82,7 @@ pub fn factor<T: Real, const R: usize>(rows: usize, schur: &mut [T], pivot: &mut
     let (schur, pivot, scale) = (&mut schur[..r * r], &mut pivot[..r], &scale[..r]);
     let mut weakest = Weakest::NONE;
     for k in (0..r).rev() {
-        let share = schur[k * r + k].value() / scale[k];
-        if share < weakest.share {
-            weakest = Weakest { share, row: k };
-        }
-        pivot[k] = if share < DROPPED { T::ZERO } else { T::ONE / schur[k * r + k] };
+        pivot[k] = weakest.reciprocal(k, schur[k * r + k], scale[k]);
         for i in 0..k {
             let l = schur[i * r + k] * pivot[k];
             for j in 0..=i {

@@ -191,7 +191,8 @@ fn project_sized<const N: usize>(
         for r in 0..rows {
             kernel.multiplier[r] = kernel.rows[r].position;
         }
-        let turn = shift(kernel, state, 0, n);
+        kernel.solve_rows();
+        let turn = shift(kernel, state, 0, -1.0);
         (moved, far) = (true, largest(far, turn));
         let (phi, omega) = (&state.y[..n], &state.y[n..2 * n]);
         if turn <= SMALL {
@@ -204,10 +205,7 @@ fn project_sized<const N: usize>(
             }
             kernel.rows_at(mechanism, state.time, phi, omega);
         } else {
-            kernel.face::<N>(mechanism, phi);
-            kernel.couple::<N>(mechanism);
-            kernel.factor::<N>(mechanism, omega);
-            kernel.linearise::<N>(mechanism, state.time, phi, omega);
+            kernel.linearise_at::<N>(mechanism, state.time, phi, omega);
         }
     }
     check(mechanism, kernel, tolerance, |r| (kernel.rows[r].position, lever(kernel, r)))?;
@@ -220,7 +218,8 @@ fn project_sized<const N: usize>(
         }
     }
     if fast > 2.0 * f64::EPSILON || fast.is_nan() {
-        let change = shift(kernel, state, n, n);
+        kernel.solve_rows();
+        let change = shift(kernel, state, n, -1.0);
         let most = state.y[n..2 * n].iter().fold(1.0, |most: f64, omega| most.max(omega.abs()));
         (moved, far) = (true, largest(far, change / most));
         let omega = &state.y[n..2 * n];
@@ -236,14 +235,12 @@ fn project_sized<const N: usize>(
     Ok(Landing { has_moved: far > ROUNDING, balance, energy_change })
 }
 
-/// Subtracts M⁻¹ Gᵀ S⁻¹ times what is in `multiplier` from the unknowns `from`…, and leaves it in `load`; returns its largest entry.
-fn shift(kernel: &mut Kernel<f64>, state: &mut State, from: usize, n: usize) -> f64 {
-    kernel.solve_rows();
+/// Adds M⁻¹ Gᵀ times what is in `multiplier`, with a sign, to the unknowns `from`…, and leaves it in `load`; returns its largest entry.
+pub(super) fn shift(kernel: &mut Kernel<f64>, state: &mut State, from: usize, sign: f64) -> f64 {
     kernel.lift();
     let mut largest_change = 0.0;
-    for k in 0..n {
-        let change = kernel.load[k];
-        (state.y[from + k], state.low[from + k]) = two_sum(state.y[from + k], state.low[from + k] - change);
+    for (k, &change) in kernel.load.iter().enumerate() {
+        (state.y[from + k], state.low[from + k]) = two_sum(state.y[from + k], state.low[from + k] + sign * change);
         largest_change = largest(largest_change, change.abs());
     }
     largest_change

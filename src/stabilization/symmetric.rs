@@ -12,8 +12,7 @@
 //! Source: E. Hairer, *Symmetric projection methods for differential equations on manifolds*, BIT 40 (2000); E. Hairer, C. Lubich, G. Wanner,
 //! *Geometric Numerical Integration*, 2nd ed. (2006), section V.4.1.
 
-use super::projection::is_kept;
-use crate::arithmetic::sum::two_sum;
+use super::projection::{self, is_kept};
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::{Field, Form, Mechanism, State, Time};
 use crate::stepping::gauss::Gauss;
@@ -101,11 +100,7 @@ impl SymmetricGauss {
 /// Rows and directions at a state.
 fn face(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &State) {
     let n = mechanism.coordinates();
-    let (phi, omega) = (&state.y[..n], &state.y[n..2 * n]);
-    kernel.face::<0>(mechanism, phi);
-    kernel.couple::<0>(mechanism);
-    kernel.factor::<0>(mechanism, omega);
-    kernel.linearise::<0>(mechanism, state.time, phi, omega);
+    kernel.linearise_at::<0>(mechanism, state.time, &state.y[..n], &state.y[n..2 * n]);
 }
 
 /// y + D mu, with the directions of the state faced last.
@@ -113,11 +108,7 @@ fn shift(kernel: &mut Kernel<f64>, state: &mut State, mu: &[f64]) {
     let (n, r) = (kernel.z.len(), kernel.rows.len());
     for (from, mu) in [(0, &mu[..r]), (n, &mu[r..])] {
         kernel.multiplier.copy_from_slice(mu);
-        kernel.lift();
-        for k in 0..n {
-            let change = kernel.load[k];
-            (state.y[from + k], state.low[from + k]) = two_sum(state.y[from + k], state.low[from + k] + change);
-        }
+        projection::shift(kernel, state, from, 1.0);
     }
 }
 

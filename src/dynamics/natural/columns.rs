@@ -81,20 +81,18 @@ pub fn solve<L: Lanes, const B: usize>(schur: &mut [Row<B>], scale: &[f64], righ
     let mut least = f64::INFINITY;
     let mut kept = [[0.0; 4]; B];
     for p in 0..n {
-        let column: [L; B] = load(&schur[p]);
         let pivot = schur[p][p / 4][p % 4];
         let share = pivot / scale[p];
         least = if share < least { share } else { least };
         if share < DROPPED {
             continue;
         }
-        kept[p / 4][p % 4] = 1.0 / pivot;
         let factor = 1.0 / pivot;
+        kept[p / 4][p % 4] = factor;
         // Row p itself keeps its entries: it is divided by its pivot at the end.
-        let mut away = column;
-        let mut own = store(away);
-        own[p / 4][p % 4] = 0.0;
-        away = load(&own);
+        let mut away = schur[p];
+        away[p / 4][p % 4] = 0.0;
+        let away: [L; B] = load(&away);
         for q in p + 1..n {
             let part = L::splat(schur[q][p / 4][p % 4] * factor);
             for b in 0..B {

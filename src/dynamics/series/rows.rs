@@ -115,14 +115,7 @@ impl<T: Real> RowSeries<T> {
                 }
             };
             match kind {
-                Kind::Place { place, .. } => place.gradients(z, |k, gradient| {
-                    if k < place.angles {
-                        add(k, gradient.dot(z[k].left()));
-                    } else {
-                        add(k, gradient.re);
-                        add(k + 1, gradient.im);
-                    }
-                }),
+                Kind::Place { place, .. } => place.slopes(z, add),
                 Kind::Angle { body, base, .. } => {
                     add(*body, T::ONE);
                     base.iter().for_each(|&base| add(base, -T::ONE));

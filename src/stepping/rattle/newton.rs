@@ -110,41 +110,37 @@ impl Matrix {
             return self.solve_exchanged(load);
         }
         let rows = size::<R>(self.pivot.len());
-        let (matrix, pivot, load) = (&self.entries[..rows * rows], &self.pivot[..rows], &mut load[..rows]);
-        for i in 1..rows {
-            for k in 0..i {
-                load[i] -= matrix[i * rows + k] * load[k];
-            }
-        }
-        for i in (0..rows).rev() {
-            for k in i + 1..rows {
-                load[i] -= matrix[i * rows + k] * load[k];
-            }
-            load[i] *= pivot[i];
-        }
+        substitute(rows, &self.entries, &self.pivot, load);
     }
 
     #[cold]
     fn solve_exchanged(&mut self, load: &mut [f64]) {
         let rows = self.pivot.len();
-        let (matrix, x) = (&self.entries, &mut self.scratch);
+        let x = &mut self.scratch;
         for (x, &[row, _]) in x.iter_mut().zip(&self.order) {
             *x = load[row] * self.weight[row];
         }
-        for i in 1..rows {
-            for k in 0..i {
-                x[i] -= matrix[i * rows + k] * x[k];
-            }
-        }
-        for i in (0..rows).rev() {
-            for k in i + 1..rows {
-                x[i] -= matrix[i * rows + k] * x[k];
-            }
-            x[i] *= self.pivot[i];
-        }
+        substitute(rows, &self.entries, &self.pivot, x);
         for (&x, &[_, column]) in x.iter().zip(&self.order) {
             load[column] = x * self.weight[column];
         }
+    }
+}
+
+/// Solves L U x = load in place, with reciprocal pivots.
+#[inline(always)]
+fn substitute(rows: usize, factors: &[f64], pivot: &[f64], load: &mut [f64]) {
+    let (factors, pivot, load) = (&factors[..rows * rows], &pivot[..rows], &mut load[..rows]);
+    for i in 1..rows {
+        for k in 0..i {
+            load[i] -= factors[i * rows + k] * load[k];
+        }
+    }
+    for i in (0..rows).rev() {
+        for k in i + 1..rows {
+            load[i] -= factors[i * rows + k] * load[k];
+        }
+        load[i] *= pivot[i];
     }
 }
 

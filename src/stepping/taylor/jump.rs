@@ -43,7 +43,8 @@ pub fn length<T: Coefficient, P: Form + ?Sized>(
             let rates = (0..LOW.min(series.order())).rev().map(|m| series.rate[m * n + i].value() / (m + 1) as f64);
             *phi = state.y[i] + h * rates.fold(0.0, |sum, rate| sum * h + rate);
         }
-        kernel.share_at(mechanism, state.time, &phi, &state.y[n..2 * n])
+        kernel.linearise_at::<0>(mechanism, state.time, &phi, &state.y[n..2 * n]);
+        kernel.weakest.share
     };
     // From well inside the step on: what comes back sooner needs no jump.
     let (mut least, mut fell) = (here, false);
