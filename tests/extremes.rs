@@ -171,6 +171,7 @@ fn a_spring_of_no_length_is_a_typed_stop() {
         stiffness: 10.0,
         free_length: 0.2,
         damping: 0.0,
+        rigid: false,
     });
     for method in EXPLICIT {
         let stop = run(&scene, &request(method, 1e-9, 1.0)).stop.expect("a stop");

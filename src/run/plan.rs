@@ -5,6 +5,7 @@
 use super::methods::{MethodId, Stabilization};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::compile::DENSE_LIMIT;
+use crate::dynamics::force::Vibration;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::natural::Natural;
 use crate::dynamics::{Mechanism, Time};
@@ -79,6 +80,8 @@ pub struct Refusal {
 pub const MAX_ROWS: f64 = 1e9;
 /// Least tolerance where the first orders are in double-double: far below what the others are rounded to.
 const LEAST_EXTENDED: f64 = 1e-25;
+/// How much faster than all else a vibration must be to be taken for its mean force: a turn of it within a hundredth of theirs.
+const SEPARATE: f64 = 100.0;
 /// Runs of at least so many seconds are marched symplectically where that is possible.
 const LONG: f64 = 60.0;
 /// So many coordinates are cheaper body by body, with multipliers, than in the matrices that eliminated coordinates and momenta ask for.
@@ -108,6 +111,7 @@ impl Plan {
             }
         };
         let stabilization = pair(mechanism, method, request, &mut notes)?;
+        check_vibration(mechanism, method, rate, &mut notes)?;
         let (mut step, mut tolerance) = (None, None);
         if method.is_adaptive() {
             let relative = request.rtol.unwrap_or(if request.extended { 1e-20 } else { 1e-9 });
@@ -266,6 +270,10 @@ fn choose(mechanism: &Mechanism, request: &Request, until: f64, rate: f64) -> (M
         let method = if mechanism.rows.is_empty() { MethodId::Dop853 } else { MethodId::Dp8 };
         return (method, format!("{method}: {why}"));
     }
+    if let Some(vibration) = &mechanism.vibration {
+        let method = if kept == Stabilization::Projection { MethodId::Dp8 } else { MethodId::Dop853 };
+        return (method, format!("{method}: the vibration of rigid spring {} acts by its mean force", vibration.name));
+    }
     if mechanism.is_tied_up() && mechanism.contacts.is_empty() && kept == Stabilization::Projection {
         if request.step.is_some() {
             (MethodId::Gauss(8), "gauss16: a fixed step was given; closed loops and sliders are kept by symmetric projection".into())
@@ -311,6 +319,24 @@ fn check_size(mechanism: &Mechanism, method: MethodId, request: &Request) -> Res
     if !mechanism.rows.is_empty() && request.stabilize == Some(Stabilization::Elimination) {
         return Err(mismatch(format!("elimination on {n} coordinates"), &reason, "--stabilize projection"));
     }
+    Ok(())
+}
+
+/// The mean force of a vibration is known to the explicit methods, and right where the vibration is much faster than all else.
+fn check_vibration(mechanism: &Mechanism, method: MethodId, rate: f64, notes: &mut Vec<String>) -> Result<(), Refusal> {
+    let Some(Vibration { name, energy, frequency, .. }) = &mechanism.vibration else { return Ok(()) };
+    if !matches!(method, MethodId::Dopri5 | MethodId::Dop853 | MethodId::Dp5 | MethodId::Dp8) {
+        let reason = "the mean force of its vibration comes from the mass matrix, of which this method knows no derivative";
+        return Err(mismatch(format!("{method} with the rigid spring `{name}`"), reason, "--method dp8, or dop853"));
+    }
+    if *frequency < SEPARATE * rate {
+        let reason = format!("it vibrates at {frequency:.3e} rad/s, not {SEPARATE} times as fast as all else, up to {rate:.3e} rad/s");
+        return Err(mismatch(format!("the rigid spring `{name}`"), &reason, "leave its `model` out: it is soft enough to be resolved"));
+    }
+    let share = energy / mechanism.energy_scale;
+    notes.push(format!(
+        "rigid spring {name}: {energy:.3e} J of vibration ({share:.1e} of the scale) at {frequency:.3e} rad/s act on average; its force is a mean"
+    ));
     Ok(())
 }
 
