@@ -394,6 +394,11 @@ impl Mechanism {
         self.rows.iter().any(|row| !row.is_angle())
     }
 
+    /// True where rows cannot all be eliminated: those of loops and sliders, and given angles whose whole turns matter.
+    pub fn has_multipliers(&self) -> bool {
+        self.is_tied_up() || (self.is_winding() && self.ties.driven())
+    }
+
     /// The mass matrix at the start must be positive definite.
     fn check_mass(&self, scene: &Scene) -> Result<(), CompileError> {
         let start = self.start(scene);

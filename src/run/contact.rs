@@ -385,7 +385,8 @@ impl Course {
         outcome.hold_time += self.held.iter().map(|held| t - held.since).sum::<f64>();
     }
 
-    fn motion(&mut self) -> Motion {
+    /// The present motion.
+    pub(super) fn motion(&mut self) -> Motion {
         let mut motion = Motion::default();
         self.marcher.read(&mut motion);
         motion

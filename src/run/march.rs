@@ -4,6 +4,7 @@
 use super::flip::{self, Flip, Lookout, Suspect};
 use super::methods::{MethodId, Stabilization};
 use super::plan::Plan;
+use crate::arithmetic::DoubleDouble;
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::elimination::Elimination;
 use crate::dynamics::looped::Looped;
@@ -346,6 +347,15 @@ pub(super) fn build(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion)
             marcher(Box::new(natural), Rattle::new(composition, step), start, Steps::Fixed)
         }
     })
+}
+
+/// The series of a mechanism in double-double, from `start`, with its order and tolerance \[rad/s\].
+pub(super) fn exact(mechanism: &Arc<Mechanism>, start: &Motion, order: usize, tolerance: f64) -> Box<dyn March> {
+    let taylor = Taylor::<DoubleDouble>::with_order(tolerance, order);
+    match mechanism.has_multipliers() {
+        true => marcher(form::<0>(mechanism, Stabilization::None, 1.0), taylor, start, Steps::Own),
+        false => marcher(eliminated::<0>(mechanism), taylor, start, Steps::Own),
+    }
 }
 
 fn cannot_begin(plan: &Plan, what: String) -> StepError {

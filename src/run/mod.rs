@@ -15,12 +15,14 @@ pub mod flip;
 pub mod march;
 pub mod methods;
 pub mod plan;
+pub mod reference;
 pub mod running;
 pub mod sample;
 pub mod sweep;
 #[cfg(feature = "files")]
 pub mod table;
 pub mod trace;
+pub mod trust;
 
 #[cfg(feature = "files")]
 pub use checkpoint::{CheckpointError, Checkpoints, Loaded};
@@ -32,6 +34,7 @@ pub use flip::Flip;
 pub use march::Pause;
 pub use methods::{METHODS, MethodId, MethodInfo, Stabilization};
 pub use plan::{Plan, Refusal, Request};
+pub use reference::{Reference, reference};
 pub use running::{Outcome, ResumeError, Run, RunError, Running, Snapshot, march, simulate};
 pub use sample::{Sample, Sampler};
 #[cfg(feature = "files")]

@@ -138,6 +138,23 @@ impl Plan {
         })
     }
 
+    /// A plan nobody asked for: `taylor` at a tolerance to a horizon \[s\], its rows kept as usual.
+    pub(super) fn of_series(mechanism: &Mechanism, tolerance: Tolerance, until: f64) -> Self {
+        Self {
+            method: MethodId::Taylor,
+            step: None,
+            tolerance: Some(tolerance),
+            stabilization: if mechanism.rows.is_empty() { Stabilization::None } else { usual(mechanism) },
+            time_constant: None,
+            extended: false,
+            until,
+            every: until,
+            rows: 1,
+            why: None,
+            notes: Vec::new(),
+        }
+    }
+
     /// The same to a later horizon \[s\], with the same output times up to the former one; false, and nothing changed, where they would be too many, or fixed
     /// steps would not end there.
     pub(super) fn extend(&mut self, until: f64) -> bool {
@@ -297,9 +314,8 @@ fn choose(mechanism: &Mechanism, request: &Request, until: f64, rate: f64) -> (M
 
 /// How the rows of a mechanism are kept where nobody says: given angles are eliminated where they are all there is to keep.
 fn usual(mechanism: &Mechanism) -> Stabilization {
-    let counts_turns = mechanism.is_winding() && mechanism.ties.driven();
     let is_large = mechanism.coordinates() > MANY_COORDINATES;
-    if mechanism.is_tied_up() || counts_turns || is_large { Stabilization::Projection } else { Stabilization::Elimination }
+    if mechanism.has_multipliers() || is_large { Stabilization::Projection } else { Stabilization::Elimination }
 }
 
 /// Very many coordinates are taken body by body or not at all.
@@ -379,8 +395,7 @@ fn pair(mechanism: &Mechanism, method: MethodId, request: &Request, notes: &mut 
         }
         return Ok(usual);
     };
-    let counts_turns = mechanism.is_winding() && mechanism.ties.driven();
-    if asked == Stabilization::Elimination && (mechanism.is_tied_up() || counts_turns) {
+    if asked == Stabilization::Elimination && mechanism.has_multipliers() {
         let reason = if mechanism.is_tied_up() {
             "closed loops and sliders have no independent coordinates to be left with"
         } else {

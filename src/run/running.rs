@@ -60,6 +60,28 @@ pub struct Outcome {
     pub stop: Option<StepError>,
 }
 
+impl Outcome {
+    /// That of a run that has not gone anywhere yet.
+    pub(super) fn begun(mechanism: &Mechanism, plan: Plan) -> Self {
+        Self {
+            last: Sample::default(),
+            tally: Tally::default(),
+            drift: Drift::new(mechanism, plan.until),
+            trace: Trace::default(),
+            strikes: Vec::new(),
+            strike_count: 0,
+            strike_loss: 0.0,
+            holds: Vec::new(),
+            hold_count: 0,
+            hold_time: 0.0,
+            wall: Duration::ZERO,
+            flip: None,
+            stop: None,
+            plan,
+        }
+    }
+}
+
 /// What ends a run without an outcome.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
@@ -228,22 +250,7 @@ impl Running {
     /// Begins a run: whatever touches and moves into its wall at the start is struck.
     pub fn new(run: Run) -> Self {
         let Run { mechanism, plan, limits, marcher, ensemble } = run;
-        let mut outcome = Outcome {
-            last: Sample::default(),
-            tally: Tally::default(),
-            drift: Drift::new(&mechanism, plan.until),
-            trace: Trace::default(),
-            strikes: Vec::new(),
-            strike_count: 0,
-            strike_loss: 0.0,
-            holds: Vec::new(),
-            hold_count: 0,
-            hold_time: 0.0,
-            wall: Duration::ZERO,
-            flip: None,
-            stop: None,
-            plan,
-        };
+        let mut outcome = Outcome::begun(&mechanism, plan);
         let mut course = Course::new(mechanism, marcher);
         course.lookout = ensemble.map(|_| Lookout::default());
         // The reference of the energy is what impacts at the start leave.

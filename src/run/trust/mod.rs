@@ -1,0 +1,5 @@
+//! How far a run may be trusted.
+
+mod distance;
+
+pub use distance::Ruler;
