@@ -103,6 +103,9 @@ pub struct PlanFlags {
     /// Carry the first orders of taylor's series in double-double: rounding in energy a thousandth of a plain run's, at tolerances down to 1e-25 [default: 1e-20]
     #[arg(long)]
     pub extended: bool,
+    /// Evaluations of the equations allowed in a run; one that needs more stops with exit code 4 [default: 1e8, and 1e7 a simulated second]
+    #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true)]
+    pub effort: Option<u64>,
 }
 
 /// `driftless check`.
@@ -133,10 +136,10 @@ pub struct RunFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub plan: PlanFlags,
-    /// Stop with exit code 5 where the energy is off by more than this share of its scale
+    /// Stop with exit code 5 where the energy is off by more than this share of its scale [default: 0.01 of the largest energy there has been]
     #[arg(long, value_name = "SHARE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
     pub max_energy_drift: Option<f64>,
-    /// Stop with exit code 5 where a constraint is off by more, in rad or rad/s
+    /// Stop with exit code 5 where a constraint is off by more, in rad or m, or that per second [default: 0.01 rad, or sizes of the mechanism, in position]
     #[arg(long, value_name = "SIZE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
     pub max_constraint_drift: Option<f64>,
     /// Folder under which `SCENE/METHOD-SETTING` is made
@@ -176,10 +179,10 @@ pub struct SweepFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub plan: PlanFlags,
-    /// Stop a point where its energy is off by more than this share of its scale
+    /// Stop a point where its energy is off by more than this share of its scale [default: 0.01]
     #[arg(long, value_name = "SHARE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
     pub max_energy_drift: Option<f64>,
-    /// Stop a point where a constraint is off by more, in rad or rad/s
+    /// Stop a point where a constraint is off by more, in rad or m, or that per second [default: 0.01 rad, or sizes of the mechanism, in position]
     #[arg(long, value_name = "SIZE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
     pub max_constraint_drift: Option<f64>,
     /// Folder under which `SCENE/sweep-NAMES-METHOD-SETTING` is made
@@ -292,6 +295,7 @@ impl PlanFlags {
             stabilize,
             time_constant: self.time_constant,
             extended: self.extended,
+            effort: self.effort,
         }
     }
 }
@@ -341,6 +345,12 @@ fn number(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A whole number from 1 to 1e18, as 50000 or 5e4.
+fn count(text: &str) -> Result<u64, String> {
+    let value = number(text)?;
+    if (1.0..=1e18).contains(&value) && value.fract() == 0.0 { Ok(value as u64) } else { Err("a whole number from 1 to 1e18".to_owned()) }
+}
+
 /// A time to wait \[s\]: any number that is not negative.
 fn wait(text: &str) -> Result<f64, String> {
     let value = number(text)?;
@@ -367,6 +377,8 @@ mod tests {
     fn fractions_are_numbers() {
         assert_eq!(number("1/64"), Ok(0.015625));
         assert_eq!(number("-1e-3"), Ok(-0.001));
+        assert_eq!((count("5e4"), count("7")), (Ok(50_000), Ok(7)));
+        assert!(count("0").is_err() && count("1.5").is_err() && count("1e19").is_err() && count("-1").is_err());
         assert!(number("1/").is_err() && number("ten").is_err() && limit("nan").is_err() && limit("-1").is_err());
     }
 }

@@ -27,7 +27,7 @@ pub mod sweep;
 use crate::run::Plan;
 use serde_json::{Value, json};
 
-/// The settings of a plan: `step` \[s\] or `rtol` and `atol`, `stabilize`, `time_constant` \[s\], `extended`, `every` \[s\]; `null` where one does not apply.
+/// The settings of a plan: `step` \[s\] or `rtol` and `atol`, `stabilize`, `time_constant` \[s\], `extended`, `every` \[s\], `effort` (evaluations allowed); `null` where one does not apply.
 pub fn settings(plan: &Plan) -> Value {
     json!({
         "step": plan.step,
@@ -37,6 +37,7 @@ pub fn settings(plan: &Plan) -> Value {
         "time_constant": plan.time_constant,
         "extended": plan.extended,
         "every": plan.every,
+        "effort": plan.effort,
     })
 }
 

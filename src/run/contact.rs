@@ -182,6 +182,7 @@ impl Course {
         if !course.marcher.resume(place, horizon)? {
             return Ok(None);
         }
+        course.marcher.allow(plan.effort);
         if !contacts.is_empty() {
             course.sampler.hold(Arc::clone(&holding));
             course.mechanism = holding;

@@ -48,6 +48,8 @@ pub(super) trait March {
     /// Goes on from another motion, with what the method remembers.
     fn jump(&mut self, motion: &Motion);
     fn tally(&self) -> Tally;
+    /// Bounds the evaluations.
+    fn allow(&mut self, effort: u64);
     /// What the method carries from step to step.
     fn memory(&self) -> &[f64];
     /// Makes the method choose its step anew.
@@ -151,8 +153,6 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
                 return Ok(Reached::Pause);
             }
         }
-        // What a method carries from one call to the next is the number of steps since the last output time.
-        state.memory.clear();
         if state.time > until {
             method.within(problem, from, until, inside);
             *is_inside = true;
@@ -172,6 +172,10 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
 
     fn tally(&self) -> Tally {
         self.tally
+    }
+
+    fn allow(&mut self, effort: u64) {
+        self.tally.effort = effort;
     }
 
     fn memory(&self) -> &[f64] {
@@ -236,7 +240,8 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
         flip::search(from.time.hi, *span, ends, &mut |seconds| {
             let mut state = from.clone();
             let until = state.time + seconds;
-            self.method.advance(&mut self.problem, &mut state, until, &mut Tally::default(), &mut |_, _| Ok(Seen::Kept)).ok()?;
+            let mut tally = Tally { effort: self.tally.effort, ..Tally::default() };
+            self.method.advance(&mut self.problem, &mut state, until, &mut tally, &mut |_, _| Ok(Seen::Kept)).ok()?;
             let mut glance = Glance::default();
             self.problem.glance(&state, &mut glance);
             Some(glance)
@@ -254,6 +259,7 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
         });
         tracer.jump(&motion);
         tracer.forget();
+        tracer.allow(tracer.tally().evaluations.saturating_add(self.tally.effort));
         let mut lookout = Lookout::default();
         let until = from.time + *span;
         // Where that stops, what was seen up to there counts.
@@ -367,6 +373,7 @@ fn cannot_begin(plan: &Plan, what: String) -> StepError {
 fn pilot(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion) -> Result<f64, StepError> {
     let mut plain = Plan { stabilization: Stabilization::None, ..plan.clone() };
     let mut marcher = build(mechanism, &mut plain, start)?;
+    marcher.allow(plan.effort);
     let rows = plan.rows.min(20);
     for row in 1..=rows {
         match marcher.advance(plan.time(row), plan.time(plan.rows), None, &mut || false) {

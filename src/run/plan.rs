@@ -33,6 +33,8 @@ pub struct Request {
     pub time_constant: Option<f64>,
     /// First orders in double-double, of the method that has such a setting.
     pub extended: bool,
+    /// Evaluations allowed.
+    pub effort: Option<u64>,
 }
 
 /// Everything a run needs to know beside the mechanism.
@@ -50,6 +52,8 @@ pub struct Plan {
     pub time_constant: Option<f64>,
     /// The first orders of the series in double-double.
     pub extended: bool,
+    /// Evaluations allowed, expansions of a series counted alike: a run that needs more stops.
+    pub effort: u64,
     /// Horizon \[s\].
     pub until: f64,
     /// Output interval \[s\].
@@ -76,8 +80,12 @@ pub struct Refusal {
     pub alternative: String,
 }
 
+/// Evaluations allowed where nobody says: so many at once, and so many a simulated second.  A thousand times what everyday scenes take.
+const EFFORT: (f64, f64) = (1e8, 1e7);
 /// Most rows a run may write.
 pub const MAX_ROWS: f64 = 1e9;
+/// Most numbers of a trajectory that a scene asks for by itself: about a gigabyte.
+const MOST_NUMBERS: f64 = 5e7;
 /// Least tolerance where the first orders are in double-double: far below what the others are rounded to.
 const LEAST_EXTENDED: f64 = 1e-25;
 /// How much faster than all else a vibration must be to be taken for its mean force: a turn of it within a hundredth of theirs.
@@ -123,6 +131,12 @@ impl Plan {
         if rows > MAX_ROWS {
             return Err(usage("--every", format!("{rows:.1e} rows would be written; at most {MAX_ROWS:.0e}"), "a longer output interval"));
         }
+        let numbers = rows * (5 + 6 * mechanism.bodies.len() + 4 * mechanism.rows.len()) as f64;
+        if request.every.is_none() && numbers > MOST_NUMBERS {
+            let what = format!("an output interval of {every} s up to {until} s");
+            let reason = format!("the trajectory would hold {numbers:.1e} numbers, about {:.0} GB", (numbers * 2e-8).ceil());
+            return Err(mismatch(what, &reason, &format!("a longer --every, or --every {every} if that is meant")));
+        }
         Ok(Self {
             method,
             step,
@@ -130,6 +144,7 @@ impl Plan {
             stabilization,
             time_constant: request.time_constant,
             extended: request.extended,
+            effort: request.effort.unwrap_or(usual_effort(until)),
             until,
             every,
             rows: rows as u64,
@@ -162,6 +177,9 @@ impl Plan {
         let is_whole = self.step.is_none_or(|step| is_whole(until, step));
         let is_possible = until.is_finite() && rows <= MAX_ROWS && is_whole;
         if is_possible {
+            if self.effort == usual_effort(self.until) {
+                self.effort = usual_effort(until);
+            }
             (self.until, self.rows) = (until, rows as u64);
         }
         is_possible
@@ -203,6 +221,11 @@ impl Plan {
         let keeps_rows = !mechanism.rows.is_empty() && !matches!(self.method, MethodId::Rattle(_));
         if keeps_rows { format!("{}-{setting}-{}", self.method, self.stabilization) } else { format!("{}-{setting}", self.method) }
     }
+}
+
+/// Evaluations allowed up to a horizon \[s\] where nobody says how many.
+fn usual_effort(until: f64) -> u64 {
+    (EFFORT.0 + EFFORT.1 * until) as u64
 }
 
 /// True where so many steps end on the horizon.

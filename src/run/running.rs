@@ -105,7 +105,8 @@ impl Run {
     /// # Errors
     /// A method that cannot begin there.
     pub fn new(mechanism: Arc<Mechanism>, mut plan: Plan, limits: Limits, start: &Motion) -> Result<Self, StepError> {
-        let marcher = build(&mechanism, &mut plan, start)?;
+        let mut marcher = build(&mechanism, &mut plan, start)?;
+        marcher.allow(plan.effort);
         Ok(Self { mechanism, plan, limits, marcher, ensemble: None })
     }
 
@@ -215,6 +216,11 @@ impl Snapshot {
     /// The last output time reached \[s\].
     pub fn time(&self) -> f64 {
         self.outcome.last.t
+    }
+
+    /// Bounds the evaluations of the whole run anew, those made so far counted in.
+    pub fn allow(&mut self, effort: u64) {
+        self.outcome.plan.effort = effort;
     }
 
     /// The same on the way to a later horizon \[s\]; false, and nothing changed, where that is not later or would write too many rows.
@@ -330,9 +336,9 @@ impl Running {
             let exceeded = outcome.drift.see(sample, limits);
             outcome.stop = stopped
                 .err()
-                .or_else(|| exceeded.err().map(|what| drift_stop(&outcome.plan, sample.t, what)))
                 .or_else(|| (!sample.is_finite()).then(|| not_finite(&outcome.plan, sample.t)))
-                .or_else(|| if is_tied_up { came_apart(&outcome.plan, &outcome.drift, sample) } else { None });
+                .or_else(|| if is_tied_up { came_apart(&outcome.plan, &outcome.drift, sample) } else { None })
+                .or_else(|| exceeded.err().map(|what| drift_stop(&outcome.plan, sample.t, what)));
             outcome.last.clone_from(sample);
             // A dense method is ahead of what it shows.
             let reached = outcome.last.t;
@@ -351,6 +357,14 @@ impl Running {
     pub fn finish(mut self) -> Outcome {
         self.course.end(self.outcome.last.t, &mut self.outcome);
         self.outcome.tally = self.course.tally();
+        if self.outcome.drift.is_doubtful() {
+            let how = if self.outcome.plan.step.is_some() { "a shorter step" } else { "a tighter tolerance" };
+            let off = self.outcome.drift.energy_share;
+            self.outcome
+                .plan
+                .notes
+                .push(format!("the energy balance is off by {off:.1e} of its scale, and the motion may be off by more: try {how}"));
+        }
         self.outcome
     }
 }
@@ -378,6 +392,9 @@ fn not_finite(plan: &Plan, t: f64) -> StepError {
 }
 
 fn drift_stop(plan: &Plan, t: f64, what: String) -> StepError {
-    let hint = if plan.step.is_some() { "shorten the step" } else { "tighten the tolerance" };
+    let hint = match plan.step {
+        Some(_) => "shorten the step, or state another limit with --max-energy-drift or --max-constraint-drift",
+        None => "tighten the tolerance, or state another limit with --max-energy-drift or --max-constraint-drift",
+    };
     StepError { cause: Cause::DriftLimit, method: plan.method.to_string(), t, step: plan.step.unwrap_or(0.0), what, hint: hint.into() }
 }

@@ -145,6 +145,10 @@ impl<F: Field + ?Sized> Method<F> for Gauss {
 }
 
 impl Gauss {
+    fn label(&self) -> &'static str {
+        NAMES[self.stages() - 2]
+    }
+
     /// Refuses a step whose stages are not finite or have not converged.
     ///
     /// Convergence is judged by the angles where the field has any: their scale is known, and whatever else moves does so through them.
@@ -154,7 +158,7 @@ impl Gauss {
         let (d, angles) = (state.y.len(), problem.angles());
         let stop = |cause, what| StepError {
             cause,
-            method: NAMES[self.stages() - 2].into(),
+            method: self.label().into(),
             t: state.time.hi,
             step: scratch.step,
             what,

@@ -21,15 +21,47 @@ pub use windows::{Dop853, Dopri5};
 
 use crate::dynamics::{State, Time};
 
-/// Counts of one run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+/// Counts of one run, and the effort it is allowed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Tally {
     /// Accepted steps.
     pub steps: u64,
-    /// Evaluations of the equations.
+    /// Evaluations of the equations; a series is expanded at the price of one.
     pub evaluations: u64,
     /// Rejected steps.
     pub rejected: u64,
+    /// Evaluations allowed: no step begins after so many.
+    pub effort: u64,
+}
+
+impl Default for Tally {
+    /// Nothing done, and no bound on what may be.
+    fn default() -> Self {
+        Self { steps: 0, evaluations: 0, rejected: 0, effort: u64::MAX }
+    }
+}
+
+impl Tally {
+    /// Whether another step may be tried, from `t` on and of `step` \[s\].
+    ///
+    /// # Errors
+    /// The effort allowed is used up.
+    #[inline]
+    pub fn check(&self, method: &str, t: f64, step: f64) -> Result<(), StepError> {
+        if self.evaluations < self.effort { Ok(()) } else { Err(self.exhausted(method, t, step)) }
+    }
+
+    #[cold]
+    fn exhausted(&self, method: &str, t: f64, step: f64) -> StepError {
+        StepError {
+            cause: Cause::EffortExhausted,
+            method: method.into(),
+            t,
+            step,
+            what: format!("the effort allowed, {} evaluations, is used up", self.effort),
+            hint: "loosen the tolerance or lengthen the step, shorten the horizon, or allow more with --effort".into(),
+        }
+    }
 }
 
 /// Where [`Method::advance`] stopped.
@@ -125,8 +157,8 @@ pub enum Cause {
     NotFinite,
     /// The step fell below the resolution of time.
     StepTooSmall,
-    /// The number of steps allowed was used up.
-    TooManySteps,
+    /// The number of evaluations allowed was used up.
+    EffortExhausted,
     /// An implicit step did not converge.
     NotConverged,
     /// The projection onto the constraints did not converge.
@@ -147,7 +179,7 @@ impl Cause {
         match self {
             Self::NotFinite => "not_finite",
             Self::StepTooSmall => "step_too_small",
-            Self::TooManySteps => "too_many_steps",
+            Self::EffortExhausted => "effort_exhausted",
             Self::NotConverged => "not_converged",
             Self::ProjectionFailed => "projection_failed",
             Self::BranchLost => "branch_lost",

@@ -52,6 +52,7 @@ pub(super) fn march<F: Field + ?Sized>(
     watch: &mut Watch<F>,
 ) -> Result<Reached, StepError> {
     for _ in 0..count {
+        tally.check(gauss.label(), state.time.hi, gauss.scratch.step)?;
         let mut step = Step { tableau: &gauss.tableau, scratch: &mut gauss.scratch, exact: gauss.exact };
         take(gauss.portable, &mut step, &mut Of(problem), state, tally);
         gauss.check(problem, state)?;
