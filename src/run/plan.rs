@@ -162,6 +162,7 @@ impl Plan {
             stabilization: if mechanism.rows.is_empty() { Stabilization::None } else { usual(mechanism) },
             time_constant: None,
             extended: false,
+            effort: usual_effort(until),
             until,
             every: until,
             rows: 1,

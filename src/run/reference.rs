@@ -51,9 +51,12 @@ pub struct Reference {
 /// # Errors
 /// The stop of the series: a number that is not finite, a time before the start, a singular position it does not get through.
 pub fn reference(mechanism: &Arc<Mechanism>, start: &Motion, times: &[Time]) -> Result<Reference, StepError> {
-    if !mechanism.tree.is_dense() {
-        let (what, hint) =
-            ("a series takes the matrices of the tree, which are too large here", "compare with dop853 at a tighter tolerance");
+    if !mechanism.tree.is_dense() || mechanism.vibration.is_some() {
+        let what = match mechanism.vibration {
+            Some(_) => "the mean force of a rigid spring's vibration has no series",
+            None => "a series takes the matrices of the tree, which are too large here",
+        };
+        let hint = "compare with dop853 at a tighter tolerance";
         let cause = Cause::Unsuited;
         return Err(StepError { cause, method: "taylor".into(), t: start.time.hi, step: 0.0, what: what.into(), hint: hint.into() });
     }
