@@ -2,6 +2,7 @@
 
 use super::failure::{Exit, Failure};
 use super::output::{message, print};
+use crate::run::stress::EFFORT;
 use crate::run::{Limits, METHODS, MethodId, Request, Stabilization, Vary};
 use crate::scene::Override;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -40,6 +41,8 @@ pub enum Command {
     Sweep(Box<SweepFlags>),
     /// Go on with an interrupted run or sweep: it ends as if nothing had been, byte for byte
     Resume(ResumeFlags),
+    /// Run stiff and extreme scenes by every method: each ends right, refused or stopped, and none wrong
+    Stress(StressFlags),
     /// List the methods
     Methods {
         /// Print one JSON object
@@ -204,6 +207,39 @@ pub struct SweepFlags {
     pub map: Option<String>,
 }
 
+/// `driftless stress`.
+#[derive(Debug, Args)]
+pub struct StressFlags {
+    /// Scenes [default: the shipped set, whose ends are known]
+    #[arg(value_name = "SCENE")]
+    pub scenes: Vec<PathBuf>,
+    /// Methods, separated by commas [default: all]
+    #[arg(long, value_name = "NAMES", value_parser = methods(), value_delimiter = ',')]
+    pub methods: Vec<MethodId>,
+    /// Evaluations allowed for each scene and method
+    #[arg(long, value_name = "N", default_value_t = EFFORT, value_parser = clap::value_parser!(u64).range(1..))]
+    pub effort: u64,
+    /// What the end of a scene given may be off, in rad
+    #[arg(long, value_name = "RAD", default_value_t = 1e-4, value_parser = limit, allow_hyphen_values = true, requires = "scenes")]
+    pub tolerance: f64,
+    /// Threads [default: all processors]; the cells are the same whatever their number
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Folder under which `stress` is made
+    #[arg(long, value_name = "DIR", default_value = "output")]
+    pub out: PathBuf,
+    /// Overwrite what is in the folder
+    #[arg(long)]
+    pub force: bool,
+    /// Draw no PNG chart
+    #[cfg(feature = "charts")]
+    #[arg(long)]
+    pub no_charts: bool,
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub tell: TellFlags,
+}
+
 /// How often checkpoints are written.
 #[derive(Clone, Debug, Args)]
 pub struct CheckpointFlags {
@@ -259,6 +295,7 @@ impl Flags {
             Command::Run(flags) => flags.scene.tell.json,
             Command::Sweep(flags) => flags.scene.tell.json,
             Command::Resume(flags) => flags.tell.json,
+            Command::Stress(flags) => flags.tell.json,
             Command::Methods { json } => *json,
             Command::Schema | Command::Completions { .. } => false,
         }

@@ -9,6 +9,7 @@
 //! | [`inspect`] | the scene's start | `inspect.rs` |
 //! | [`result`] | a run | `result.rs` |
 //! | `sweep` | a sweep, with its chart | `sweep.rs`, with the feature `files` |
+//! | [`stress`] | stiff and extreme scenes by every method | `stress.rs` |
 //! | [`methods`] | the table of methods | `methods.rs` |
 //! | `charts` | a run, in pictures | `charts.rs`, with the feature `charts` |
 
@@ -21,6 +22,7 @@ pub mod inspect;
 pub mod methods;
 pub mod page;
 pub mod result;
+pub mod stress;
 #[cfg(feature = "files")]
 pub mod sweep;
 

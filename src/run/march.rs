@@ -4,6 +4,7 @@
 use super::flip::{self, Flip, Lookout, Suspect};
 use super::methods::{MethodId, Stabilization};
 use super::plan::Plan;
+use super::shrink::{Shrinking, shrinking};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::elimination::Elimination;
@@ -269,6 +270,14 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
 }
 
 fn marcher<P: Form + ?Sized + 'static, M: Method<P> + 'static>(problem: Box<P>, method: M, start: &Motion, steps: Steps) -> Box<dyn March> {
+    match shrinking(problem.mechanism()) {
+        // The ends of windows say nothing of what is between them.
+        springs if springs.is_empty() || steps == Steps::Unseen => boxed(problem, method, start, steps),
+        springs => boxed(problem, Shrinking::new(method, springs), start, steps),
+    }
+}
+
+fn boxed<P: Form + ?Sized + 'static, M: Method<P> + 'static>(problem: Box<P>, method: M, start: &Motion, steps: Steps) -> Box<dyn March> {
     let state = problem.state(start);
     let idle = State::default;
     Box::new(Marcher {

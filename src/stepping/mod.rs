@@ -165,6 +165,8 @@ pub enum Cause {
     ProjectionFailed,
     /// Energy jumped at a singular position: the motion left on another branch.
     BranchLost,
+    /// A spring with a free length lost its length, and its force its direction.
+    SpringWithoutLength,
     /// A point came to rest on a wall, and it could not be held there or the motors leave it no freedom.
     RestingContact,
     /// The method does not fit the mechanism.
@@ -183,6 +185,7 @@ impl Cause {
             Self::NotConverged => "not_converged",
             Self::ProjectionFailed => "projection_failed",
             Self::BranchLost => "branch_lost",
+            Self::SpringWithoutLength => "spring_without_length",
             Self::RestingContact => "resting_contact",
             Self::Unsuited => "unsuited",
             Self::DriftLimit => "drift_limit",
