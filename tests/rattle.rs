@@ -508,5 +508,5 @@ fn bars_at_rest_without_gravity_stay_and_count() {
     let start = run.motion();
     run.to(1.0).unwrap();
     assert!(distance(&run.motion(), &start) < 1e-30);
-    assert_eq!(run.tally, Tally { steps: 100, evaluations: 900, rejected: 0 });
+    assert_eq!(run.tally, Tally { steps: 100, evaluations: 900, ..Tally::default() });
 }
