@@ -1,7 +1,7 @@
 //! Numbers: the scalar trait the physics is written over, and the exact building blocks of long sums.
 //!
 //! Every formula of [`dynamics`](crate::dynamics) is written once over [`Scalar`] and evaluated on `f64` (inner loops), on
-//! [`DoubleDouble`] (monitors, references), and on [`Eight`](eight::Eight) lanes and their [`Pairs`](pairs::Pairs) (stages of implicit methods).
+//! [`DoubleDouble`] (monitors, references), on [`Dual`] numbers (Jacobians), and on [`Eight`](eight::Eight) lanes and their [`Pairs`](pairs::Pairs) (stages of implicit methods).
 //!
 //! Two rules keep the bits the same on every machine: trigonometry comes from pure Rust (the `libm` crate, or our own series
 //! in lanes and in double-double), and a fused multiply-add is written as one wherever it is used ([`sum::two_product`], [`lanes`]), never left to the compiler:
@@ -10,6 +10,7 @@
 pub mod angle;
 pub mod complex;
 pub mod double_double;
+pub mod dual;
 pub mod eight;
 pub mod lanes;
 pub mod pairs;
@@ -18,6 +19,7 @@ pub mod sum;
 
 pub use complex::Complex;
 pub use double_double::DoubleDouble;
+pub use dual::Dual;
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -69,6 +71,12 @@ pub trait Real: Scalar + PartialOrd {
 
     /// The number as a double-double, exactly.
     fn double_double(self) -> DoubleDouble;
+
+    /// A number known at one moment only, which changes at `rate` \[1/s\]: for scalars that carry a derivative in time; the others never ask for it.
+    #[inline(always)]
+    fn moving(self, _rate: impl FnOnce() -> f64) -> Self {
+        self
+    }
 
     /// Magnitude.
     fn abs(self) -> Self {

@@ -13,6 +13,7 @@
 
 mod stages;
 
+use super::jacobian::{LANES, Slopes};
 use super::kernel::{Kernel, dot};
 use super::law::Phase;
 use super::tree::{self, size};
@@ -28,6 +29,8 @@ pub struct Canonical<const N: usize, const ACCOUNT: bool> {
     work: Scratch<f64>,
     exact: Scratch<DoubleDouble>,
     stages: Stages,
+    /// For the Jacobian; made when first asked for.
+    slopes: Option<Box<Scratch<Slopes>>>,
 }
 
 /// Scratch space of one evaluation.
@@ -169,7 +172,7 @@ impl<const N: usize, const ACCOUNT: bool> Canonical<N, ACCOUNT> {
         debug_assert!(N == 0 || N == mechanism.size());
         debug_assert!(ACCOUNT || !mechanism.keeps_account());
         let (work, exact) = (Scratch::new(&mechanism), Scratch::new(&mechanism));
-        Self { work, exact, stages: Stages::new(&mechanism, portable), mechanism }
+        Self { work, exact, stages: Stages::new(&mechanism, portable), slopes: None, mechanism }
     }
 }
 
@@ -199,6 +202,12 @@ impl<const N: usize, const ACCOUNT: bool> Field for Canonical<N, ACCOUNT> {
         true
     }
 
+    fn jacobian(&mut self, t: Time, y: &[f64], y_by_y: &mut [f64]) -> bool {
+        let scratch = self.slopes.get_or_insert_with(|| Box::new(Scratch::new(&self.mechanism)));
+        slopes(scratch, ACCOUNT, &self.mechanism, t, y, y_by_y);
+        true
+    }
+
     fn label(&self, i: usize) -> String {
         let ties = &self.mechanism.ties;
         let f = ties.count();
@@ -206,6 +215,30 @@ impl<const N: usize, const ACCOUNT: bool> Field for Canonical<N, ACCOUNT> {
             i if i < f => self.mechanism.coordinate_name(ties.independent[i]),
             i if i < 2 * f => format!("momentum along {}", self.mechanism.coordinate_name(ties.independent[i - f])),
             _ => "momentum conjugate to time".into(),
+        }
+    }
+}
+
+/// dy'/dy row by row (d × d); not generic, so that it is compiled once.
+fn slopes(scratch: &mut Scratch<Slopes>, account: bool, mechanism: &Mechanism, t: Time, y: &[f64], y_by_y: &mut [f64]) {
+    let d = y.len();
+    let (mut point, mut rate) = (vec![Slopes::ZERO; d], vec![Slopes::ZERO; d]);
+    if account {
+        scratch.drive_at(mechanism, t);
+    }
+    for first in (0..d).step_by(LANES) {
+        for (k, (point, &y)) in point.iter_mut().zip(y).enumerate() {
+            *point = Slopes::unknown(y, k.wrapping_sub(first));
+        }
+        if account {
+            scratch.rate::<0, true>(mechanism, &point, &mut rate);
+        } else {
+            scratch.rate::<0, false>(mechanism, &point, &mut rate);
+        }
+        for (row, rate) in y_by_y.chunks_exact_mut(d).zip(&rate) {
+            for (entry, &slope) in row[first..].iter_mut().zip(&rate.slope) {
+                *entry = slope;
+            }
         }
     }
 }

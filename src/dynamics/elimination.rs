@@ -6,7 +6,8 @@
 //!
 //! Unknowns: u (f), u' (f), work of motors, dampers and applied forces \[J\].  The rows hold exactly, whatever the method.
 
-use super::kernel::Kernel;
+use super::jacobian::Jacobian;
+use super::kernel::{Bias, Kernel};
 use super::tree::{self, size};
 use super::{Coordinates, Field, Form, Glance, Mechanism, Motion, State, Time};
 use crate::arithmetic::DoubleDouble;
@@ -28,6 +29,8 @@ pub struct Elimination<const N: usize> {
     reduced: Vec<f64>,
     pivot: Vec<f64>,
     coordinate_acceleration: Vec<f64>,
+    /// Made when first asked for.
+    jacobian: Option<Box<Jacobian>>,
 }
 
 impl<const N: usize> Elimination<N> {
@@ -48,6 +51,7 @@ impl<const N: usize> Elimination<N> {
             pivot: vec![0.0; f],
             coordinate_acceleration: vec![0.0; f],
             is_steady: mechanism.ties.is_steady(),
+            jacobian: None,
             mechanism,
         }
     }
@@ -131,6 +135,21 @@ impl<const N: usize> Field for Elimination<N> {
             2 => self.rate_sized::<2>(t, y, rate),
             _ => self.rate_sized::<0>(t, y, rate),
         }
+    }
+
+    fn jacobian(&mut self, t: Time, y: &[f64], y_by_y: &mut [f64]) -> bool {
+        let mechanism = &*self.mechanism;
+        let ties = &mechanism.ties;
+        let f = ties.count();
+        for (k, tie) in ties.bodies.iter().enumerate() {
+            let placed = tie.place(t, &y[..f]);
+            self.phi[k] = placed.angle;
+            self.omega[k] = placed.rate + tie.base.map_or(0.0, |base| y[f + base]);
+        }
+        let jacobian = self.jacobian.get_or_insert_with(|| Box::new(Jacobian::new(mechanism)));
+        jacobian.evaluate(mechanism, t, &self.phi, &self.omega, Bias::default());
+        jacobian.fill_independent(ties, y_by_y);
+        true
     }
 
     fn label(&self, i: usize) -> String {

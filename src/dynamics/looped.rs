@@ -229,6 +229,10 @@ impl Field for Looped {
         (rate[2 * n], rate[2 * n + 1]) = (mechanism.force_power(t, z, omega), 0.0);
     }
 
+    fn jacobian(&mut self, t: Time, y: &[f64], jacobian: &mut [f64]) -> bool {
+        self.angles.jacobian(t, y, jacobian)
+    }
+
     fn label(&self, i: usize) -> String {
         self.angles.label(i)
     }

@@ -41,6 +41,7 @@ pub mod envelope;
 pub mod force;
 pub mod forest;
 pub mod impact;
+pub mod jacobian;
 pub mod kernel;
 pub mod law;
 pub mod looped;
@@ -54,11 +55,13 @@ pub mod recursive;
 pub mod row;
 pub mod schur;
 pub mod series;
+pub mod stiffness;
 pub mod ties;
 pub mod tree;
 
 pub use compile::{CompileError, Mechanism};
 pub use points::Points;
+pub use stiffness::Stiffness;
 
 use crate::arithmetic::{DoubleDouble, Scalar, angle};
 
@@ -159,6 +162,11 @@ pub trait Field {
 
     /// Writes y' and what it leaves out at points given with what *they* leave out; false, and nothing written, where the field cannot.
     fn exact_rates(&mut self, _points: &mut Points) -> bool {
+        false
+    }
+
+    /// Writes dy'/dy at (t, y), row by row (d × d); false, and nothing written, where the field has none.
+    fn jacobian(&mut self, _t: Time, _y: &[f64], _jacobian: &mut [f64]) -> bool {
         false
     }
 

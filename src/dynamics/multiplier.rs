@@ -3,6 +3,7 @@
 //! Unknowns: coordinates (n), rates (n) and, where the scene has rows or forces that do work, the work of motors, dampers and applied forces and
 //! the energy the stabilizer puts in \[J\].  With `ACCOUNT = false` neither rows nor accounts exist in the code.
 
+use super::jacobian::Jacobian;
 use super::kernel::{Bias, Kernel};
 use super::tree::size;
 use super::{Coordinates, Field, Form, Glance, Mechanism, Motion, State, Time};
@@ -14,6 +15,8 @@ use std::sync::Arc;
 pub struct Multiplier<const N: usize, const ACCOUNT: bool> {
     mechanism: Arc<Mechanism>,
     kernel: Kernel<f64>,
+    /// Made when first asked for.
+    jacobian: Option<Box<Jacobian>>,
 }
 
 impl<const N: usize, const ACCOUNT: bool> Multiplier<N, ACCOUNT> {
@@ -22,7 +25,7 @@ impl<const N: usize, const ACCOUNT: bool> Multiplier<N, ACCOUNT> {
         debug_assert!(N == 0 || N == mechanism.size());
         debug_assert!(ACCOUNT || !mechanism.keeps_account());
         let kernel = Kernel::new(&mechanism);
-        Self { mechanism, kernel }
+        Self { mechanism, kernel, jacobian: None }
     }
 
     /// y' with a stabilizer's bias in every row.
@@ -40,24 +43,16 @@ impl<const N: usize, const ACCOUNT: bool> Multiplier<N, ACCOUNT> {
             (rates[k], rates[n + k]) = (omega[k], load[k]);
         }
         if ACCOUNT {
-            (rate[2 * n], rate[2 * n + 1]) = self.powers(t, n, omega);
+            (rate[2 * n], rate[2 * n + 1]) = self.kernel.powers(&self.mechanism, t, omega);
         }
     }
 
-    /// Power of motors, dampers and applied forces, and power of the stabilizer's share of the multipliers \[W\].
-    #[inline(always)]
-    fn powers(&self, t: Time, n: usize, omega: &[f64]) -> (f64, f64) {
-        let (mut work, mut stabilizer) = (0.0, 0.0);
-        for (r, row) in self.mechanism.rows.iter().enumerate() {
-            // What stands still, and what moves both its points alike, does no work.
-            if !row.is_motor() {
-                continue;
-            }
-            let speed = self.kernel.row_speed(r, &omega[..n]);
-            work -= (self.kernel.multiplier[r] - self.kernel.correction[r]) * speed;
-            stabilizer -= self.kernel.correction[r] * speed;
-        }
-        (work + self.mechanism.force_power(t, &self.kernel.z, omega), stabilizer)
+    /// dy'/dy with a stabilizer's bias in every row.
+    pub fn biased_jacobian(&mut self, t: Time, y: &[f64], y_by_y: &mut [f64], bias: Bias) {
+        let (n, d) = (self.mechanism.coordinates(), self.dimension());
+        let jacobian = self.jacobian.get_or_insert_with(|| Box::new(Jacobian::new(&self.mechanism)));
+        jacobian.evaluate(&self.mechanism, t, &y[..n], &y[n..2 * n], bias);
+        jacobian.fill(d, y_by_y);
     }
 }
 
@@ -73,6 +68,11 @@ impl<const N: usize, const ACCOUNT: bool> Field for Multiplier<N, ACCOUNT> {
     #[inline]
     fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
         self.biased_rate(t, y, rate, Bias::default());
+    }
+
+    fn jacobian(&mut self, t: Time, y: &[f64], jacobian: &mut [f64]) -> bool {
+        self.biased_jacobian(t, y, jacobian, Bias::default());
+        true
     }
 
     fn label(&self, i: usize) -> String {

@@ -15,7 +15,7 @@ use crate::dynamics::{Field, Form, Glance, Mechanism, Motion, State, Time};
 use crate::stabilization::{Baumgarte, Projected, SymmetricGauss};
 use crate::stepping::gauss::Gauss;
 use crate::stepping::rattle::Rattle;
-use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Method, Reached, Seen, StepError, Tally, Taylor, Tolerance};
+use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Method, Radau, Reached, Seen, StepError, Tally, Taylor, Tolerance};
 use std::sync::Arc;
 
 /// Turns that a state read from somewhere may have at most: all that doubles count.
@@ -154,6 +154,7 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
                 return Ok(Reached::Pause);
             }
         }
+        Method::<P>::arrive(method, state);
         if state.time > until {
             method.within(problem, from, until, inside);
             *is_inside = true;
@@ -348,6 +349,13 @@ pub(super) fn build(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion)
                 Stabilization::Projection => marcher(problem(), Projected::new(taylor), start, Steps::Own),
                 _ => marcher(problem(), taylor, start, Steps::Own),
             }
+        }
+        MethodId::Radau(stages) => {
+            let radau = Radau::new(stages, tolerance).ok_or_else(|| cannot_begin(plan, format!("no Radau method has {stages} stages")))?;
+            if projected {
+                return Ok(marcher(problem(), Projected::new(radau), start, Steps::Own));
+            }
+            marcher(problem(), radau, start, Steps::Own)
         }
         MethodId::Gauss(stages) => {
             let gauss = Gauss::new(stages, step)

@@ -17,6 +17,8 @@ pub enum MethodId {
     Dp8,
     /// The power series of the motion.
     Taylor,
+    /// Radau IIA collocation with so many stages, 3 or 5; order twice that less one.
+    Radau(usize),
     /// Gauss collocation with so many stages, 2 to 8; order twice that.
     Gauss(usize),
     /// RATTLE and its compositions.
@@ -66,6 +68,8 @@ pub const METHODS: &[MethodInfo] = &[
         "the most accurate path, below 1e-8 (power series, order 16 to 24)",
         "anything but Baumgarte's term",
     ),
+    radau(3, "radau5"),
+    radau(5, "radau9"),
     gauss(2, "gauss4"),
     gauss(3, "gauss6"),
     gauss(4, "gauss8"),
@@ -81,6 +85,11 @@ pub const METHODS: &[MethodInfo] = &[
 
 const fn adaptive(id: MethodId, name: &'static str, order: u32, purpose: &'static str, needs: &'static str) -> MethodInfo {
     MethodInfo { id, name, order, stepping: Stepping::Adaptive, symplectic: false, purpose, needs }
+}
+
+const fn radau(stages: usize, name: &'static str) -> MethodInfo {
+    let purpose = "dampers and damped stiff springs; eats the energy of stiff springs that swing";
+    adaptive(MethodId::Radau(stages), name, 2 * stages as u32 - 1, purpose, "matrices: up to about a thousand coordinates")
 }
 
 const fn gauss(stages: usize, name: &'static str) -> MethodInfo {

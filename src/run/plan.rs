@@ -383,7 +383,7 @@ fn check_vibration(mechanism: &Mechanism, method: MethodId, rate: f64, notes: &m
 /// The stabilization of a pairing, or why there is none.
 fn pair(mechanism: &Mechanism, method: MethodId, request: &Request, notes: &mut Vec<String>) -> Result<Stabilization, Refusal> {
     check_size(mechanism, method, request)?;
-    if !mechanism.contacts.is_empty() && !matches!(method, MethodId::Dp5 | MethodId::Dp8 | MethodId::Taylor) {
+    if !mechanism.contacts.is_empty() && !matches!(method, MethodId::Dp5 | MethodId::Dp8 | MethodId::Taylor | MethodId::Radau(_)) {
         let reason = match method {
             MethodId::Dopri5 | MethodId::Dop853 => "ode_solvers does not let an impact be located inside its steps",
             _ => "an impact inside a fixed step cannot be located without changing the step",

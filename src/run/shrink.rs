@@ -208,6 +208,10 @@ impl<P: Form + ?Sized, M: Method<P>> Method<P> for Shrinking<M> {
         self.method.within(problem, from, time, inside);
     }
 
+    fn arrive(&self, state: &mut State) {
+        self.method.arrive(state);
+    }
+
     fn knows(&self) -> Vec<f64> {
         self.method.knows()
     }

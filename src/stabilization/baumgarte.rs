@@ -41,6 +41,11 @@ impl<const N: usize> Field for Baumgarte<N> {
         self.inner.biased_rate(t, y, rate, self.bias);
     }
 
+    fn jacobian(&mut self, t: Time, y: &[f64], jacobian: &mut [f64]) -> bool {
+        self.inner.biased_jacobian(t, y, jacobian, self.bias);
+        true
+    }
+
     fn label(&self, i: usize) -> String {
         self.inner.label(i)
     }

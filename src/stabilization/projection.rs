@@ -108,6 +108,10 @@ where
         self.inner.is_dense()
     }
 
+    fn arrive(&self, state: &mut State) {
+        self.inner.arrive(state);
+    }
+
     /// The balance after the last step, if any, and what there is to know of its end; then what the inner method knows.
     fn knows(&self) -> Vec<f64> {
         let own = [f64::from(self.balance.is_some()), self.balance.unwrap_or_default(), f64::from(self.near), f64::from(self.has_paused)];

@@ -11,6 +11,7 @@
 //!
 //! Source: E. Hairer, S. P. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sections II.4-II.6.
 
+use super::event::{Found, SAMPLES, Search, Stride};
 use super::{Cause, Method, Reached, StepError, Tally, Watch};
 use crate::arithmetic::sum::{fast_two_sum, two_sum};
 use crate::arithmetic::{DoubleDouble, Scalar};
@@ -73,15 +74,9 @@ pub struct Explicit<P> {
     scale: Vec<f64>,
     next: Vec<f64>,
     next_low: Vec<f64>,
-    gaps: Vec<f64>,
-    samples: Vec<f64>,
+    search: Search,
     pair: PhantomData<P>,
 }
-
-/// Interior samples a step is searched for events with.
-const SAMPLES: usize = 8;
-/// Steps an event is landed on with, at most.
-const LANDINGS: usize = 6;
 
 impl<P: Pair> Explicit<P> {
     /// The method at a tolerance.
@@ -93,8 +88,7 @@ impl<P: Pair> Explicit<P> {
             scale: Vec::new(),
             next: Vec::new(),
             next_low: Vec::new(),
-            gaps: Vec::new(),
-            samples: Vec::new(),
+            search: Search::default(),
             pair: PhantomData,
         }
     }
@@ -104,8 +98,7 @@ impl<P: Pair> Explicit<P> {
         for vector in [&mut self.stage, &mut self.scale, &mut self.next, &mut self.next_low] {
             vector.resize(n, 0.0);
         }
-        self.gaps.resize(events, 0.0);
-        self.samples.resize(events, 0.0);
+        self.search.resize(events, n);
     }
 
     /// Stages 2… and the new state of a step of `h` from `state`; stage 1 is in place.
@@ -152,104 +145,15 @@ impl<P: Pair> Explicit<P> {
         if first.is_finite() { first } else { span.min(1e-6) }
     }
 
-    /// The first event inside the step just made, as a share of it, or what forbids the step.
-    fn find_event<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) -> Found {
+    /// The stages an interpolation of the step just made asks for beside its own.
+    fn interpolate<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) {
         let n = state.y.len();
-        field.gaps(state.time, &state.y, &mut self.gaps);
         let (k, stage) = (&mut self.k, &mut self.stage);
         P::extra_stages(&mut |number, c, row| {
             combine(&state.y, h, row, k, stage);
             field.rate(state.time + c * h, stage, &mut k[number * n..(number + 1) * n]);
             tally.evaluations += 1;
         });
-        for sample in 1..=SAMPLES {
-            let (low, high) = ((sample - 1) as f64 / SAMPLES as f64, sample as f64 / SAMPLES as f64);
-            self.gaps_at(field, state, h, high);
-            let mut first: Option<(usize, f64)> = None;
-            for event in 0..self.gaps.len() {
-                let (before, after) = (self.gaps[event], self.samples[event]);
-                if after > 0.0 || after.is_nan() {
-                    continue;
-                }
-                // Leaving a wall the gap starts at zero within rounding; it must open before it can close.
-                if before <= 1e-12 {
-                    // A point at the bound that is on its way out is not going through.
-                    if after < -1e-12 && after < before {
-                        return Found::Inside;
-                    }
-                    continue;
-                }
-                let theta = self.root(field, state, h, event, low, high);
-                if first.is_none_or(|(_, earliest)| theta < earliest) {
-                    first = Some((event, theta));
-                }
-                // The search wrote over the samples.
-                self.gaps_at(field, state, h, high);
-            }
-            if let Some((event, theta)) = first {
-                return Found::At(event, theta);
-            }
-            std::mem::swap(&mut self.gaps, &mut self.samples);
-        }
-        Found::Nothing
-    }
-
-    /// Event functions of the interpolated solution at a share of the step, into `samples`.
-    fn gaps_at<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, theta: f64) {
-        let n = state.y.len();
-        for i in 0..n {
-            let change = (self.next[i] - state.y[i]) + (self.next_low[i] - state.low[i]);
-            self.stage[i] = state.y[i] + P::interpolate(theta, h, change, &|stage| self.k[stage * n + i]);
-        }
-        field.gaps(state.time + theta * h, &self.stage, &mut self.samples);
-    }
-
-    /// The zero of an event function on the interpolated solution between two shares of the step (bisection, then the last bits).
-    fn root<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, event: usize, low: f64, high: f64) -> f64 {
-        let (mut low, mut high) = (low, high);
-        while high - low > 4.0 * f64::EPSILON {
-            let middle = 0.5 * (low + high);
-            self.gaps_at(field, state, h, middle);
-            if self.samples[event] > 0.0 { low = middle } else { high = middle }
-        }
-        high
-    }
-
-    /// Repeats the step so that it ends where the event function is zero to rounding; returns its length.
-    fn land<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, event: usize, tally: &mut Tally) -> f64 {
-        let mut best = h;
-        let (mut before, mut gap_before) = (0.0, f64::NAN);
-        for attempt in 1..=LANDINGS {
-            self.step(field, state, best, tally);
-            field.gaps(state.time + best, &self.next, &mut self.samples);
-            let gap = self.samples[event];
-            // The last attempt stands: the step must be the one that was made.
-            if gap.abs() <= 1e-15 || attempt == LANDINGS {
-                break;
-            }
-            // A secant once there are two points; the closing speed from the first step until then.
-            let slope =
-                if gap_before.is_nan() { self.closing_speed(field, state, best, event) } else { (gap - gap_before) / (best - before) };
-            (before, gap_before) = (best, gap);
-            let moved = best - gap / slope;
-            if !(moved.is_finite() && (moved - h).abs() < 0.1 * h) || moved == best {
-                break;
-            }
-            best = moved;
-        }
-        best
-    }
-
-    /// Rate of an event function \[m/s\] at the end of the step just made.
-    fn closing_speed<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, event: usize) -> f64 {
-        let n = state.y.len();
-        let at_end = self.samples[event];
-        let dt = 1e-7 * h;
-        for i in 0..n {
-            self.stage[i] = self.next[i] - dt * self.k[P::STAGES * n + i];
-        }
-        field.gaps(state.time + (h - dt), &self.stage, &mut self.gaps);
-        (at_end - self.gaps[event]) / dt
     }
 
     /// The component that asks most of the step, or the first that is not finite.
@@ -264,15 +168,6 @@ impl<P: Pair> Explicit<P> {
     fn stop(cause: Cause, state: &State, step: f64, what: String, hint: &str) -> StepError {
         StepError { cause, method: P::NAME.into(), t: state.time.hi, step, what, hint: hint.into() }
     }
-}
-
-/// What a step holds.
-enum Found {
-    Nothing,
-    /// Event number and share of the step.
-    At(usize, f64),
-    /// The point does not leave the wall at all.
-    Inside,
 }
 
 /// `out = y + h Σ a_j k_j`.
@@ -312,6 +207,26 @@ fn sum_up_sized<const D: usize>(row: Row, k: &[f64], out: &mut [f64]) {
         }
     }
     out.copy_from_slice(&sums);
+}
+
+impl<P: Pair, F: Field + ?Sized> Stride<F> for Explicit<P> {
+    fn inside(&self, state: &State, h: f64, share: f64, y: &mut [f64]) {
+        let n = state.y.len();
+        for i in 0..n {
+            let change = (self.next[i] - state.y[i]) + (self.next_low[i] - state.low[i]);
+            y[i] = state.y[i] + P::interpolate(share, h, change, &|stage| self.k[stage * n + i]);
+        }
+    }
+
+    fn repeat(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) -> bool {
+        self.step(field, state, h, tally);
+        true
+    }
+
+    fn end(&self) -> (&[f64], &[f64]) {
+        let n = self.next.len();
+        (&self.next, &self.k[P::STAGES * n..(P::STAGES + 1) * n])
+    }
 }
 
 impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
@@ -395,12 +310,16 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
             let mut h = h;
             let mut reached = if whole { Some(Reached::Until) } else { None };
             if events > 0 {
-                match self.find_event(field, state, h, tally) {
-                    Found::Nothing => {}
-                    Found::At(event, theta) => {
-                        h = self.land(field, state, theta * h, event, tally);
-                        reached = Some(Reached::Event(event));
-                    }
+                self.interpolate(field, state, h, tally);
+                let mut search = std::mem::take(&mut self.search);
+                let found = search.first(field, self, state, h);
+                if let Found::At(event, theta) = found {
+                    h = search.land(field, self, state, theta * h, event, tally).unwrap_or(h);
+                    reached = Some(Reached::Event(event));
+                }
+                self.search = search;
+                match found {
+                    Found::Nothing | Found::At(..) => {}
                     Found::Inside if h > 1e-9 => {
                         tally.rejected += 1;
                         rejected_before = true;

@@ -7,8 +7,11 @@
 pub mod composition;
 pub mod dp5;
 pub mod dp8;
+mod event;
 pub mod explicit;
 pub mod gauss;
+mod linear;
+pub mod radau;
 pub mod rattle;
 pub mod taylor;
 pub mod windows;
@@ -16,6 +19,7 @@ pub mod windows;
 pub use dp5::Dp5;
 pub use dp8::Dp8;
 pub use explicit::Tolerance;
+pub use radau::Radau;
 pub use taylor::Taylor;
 pub use windows::{Dop853, Dopri5};
 
@@ -30,6 +34,10 @@ pub struct Tally {
     pub evaluations: u64,
     /// Rejected steps.
     pub rejected: u64,
+    /// Evaluations of the Jacobian, by the methods that ask for it.
+    pub jacobians: u64,
+    /// Steps whose stages were found by Newton's method, of the methods that usually sweep.
+    pub newton_steps: u64,
     /// Evaluations allowed: no step begins after so many.
     pub effort: u64,
 }
@@ -37,7 +45,7 @@ pub struct Tally {
 impl Default for Tally {
     /// Nothing done, and no bound on what may be.
     fn default() -> Self {
-        Self { steps: 0, evaluations: 0, rejected: 0, effort: u64::MAX }
+        Self { steps: 0, evaluations: 0, rejected: 0, jacobians: 0, newton_steps: 0, effort: u64::MAX }
     }
 }
 
@@ -138,6 +146,11 @@ pub trait Method<P: ?Sized> {
     /// Nothing of the method or of the march changes by it; methods that are not dense write nothing.
     fn within(&mut self, _problem: &mut P, _from: &State, _time: Time, _inside: &mut State) {}
 
+    /// Called where a dense march has come to an output time: forgets what was of concern on the way to it.
+    fn arrive(&self, state: &mut State) {
+        state.memory.clear();
+    }
+
     /// What a method knows beside the state that has a say in what follows; nothing unless said otherwise.
     fn knows(&self) -> Vec<f64> {
         Vec::new()
@@ -209,6 +222,13 @@ pub struct StepError {
     pub what: String,
     /// One suggestion.
     pub hint: String,
+}
+
+/// An unknown's size over its tolerance: what errors and changes of unknowns are divided by.
+fn scales(tolerance: Tolerance, y: &[f64], scale: &mut [f64]) {
+    for (scale, y) in scale.iter_mut().zip(y) {
+        *scale = tolerance.absolute + tolerance.relative * y.abs();
+    }
 }
 
 /// The adaptive methods march forwards only; a time behind by no more than rounding has been reached.

@@ -50,7 +50,7 @@ impl Action {
     /// What it is multiplied by at a time.
     #[inline(always)]
     pub fn factor<T: Real>(&self, t: Time) -> T {
-        self.law.as_ref().map_or(T::ONE, |law| T::split(law.angle(t)).0)
+        self.law.as_ref().map_or(T::ONE, |law| law.value(t))
     }
 
     /// The force \[N\]; zero for a torque.

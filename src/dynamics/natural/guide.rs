@@ -68,7 +68,7 @@ impl Guide {
             }
             Measure::Place(_) => {
                 let (rate, acceleration) = law.rates::<T>(t);
-                Demand { travel: T::split(law.angle(t)).0, rate, acceleration, ..still }
+                Demand { travel: law.value(t), rate, acceleration, ..still }
             }
         }
     }

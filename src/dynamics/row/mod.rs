@@ -173,7 +173,7 @@ impl Row {
             Measure::Place(place) => {
                 let mut here = place.linearise(at, jacobian);
                 if let Some(law) = &self.law {
-                    here.position -= T::split(law.angle(t)).0;
+                    here.position -= law.value(t);
                     drive(law, t, &mut here);
                 }
                 here

@@ -1,0 +1,286 @@
+//! How stiff a mechanism is at a moment: its fastest rate by the spectrum of the Jacobian, and which spring or damper makes it.
+//!
+//! ```text
+//! y = (r q, w), r² = |A_q|:      dy'/dy = [0 r; A_q/r A_w],      fastest = |lambda|, decay = -Re lambda of the largest lambda
+//! a spring along g:  gamma = g (M⁻¹ - X S⁻¹ Xᵀ) gᵀ,      lambda² + c gamma lambda + k gamma = 0,      E = k s²/2 + s'²/(2 gamma)
+//! ```
+//!
+//! gamma is how much a force along the spring accelerates it, with all rows in force; its mode alone decays and swings as the second line says, and E is the energy in it.
+//! Up to sixteen coordinates the eigenvalues are exact; beyond, power iteration finds the largest pair.
+
+use super::jacobian::Jacobian;
+use super::kernel::{Bias, Kernel, dot};
+use super::tree;
+use super::{Mechanism, Time};
+use crate::arithmetic::{Complex, Dual};
+use nalgebra::{DMatrix, linalg::Schur};
+
+/// Coordinates up to which all eigenvalues are computed.
+const EXACT: usize = 16;
+/// Rounds of the power iteration beyond.
+const ROUNDS: usize = 60;
+/// Coordinates up to which springs are told apart.
+const NAMED: usize = 200;
+/// Share of the fastest rate that a spring must reach by itself to be what makes it.
+const SHARE: f64 = 0.5;
+
+/// The fast mode of a mechanism at a moment, and how it compares with the rest.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Stiffness {
+    /// Magnitude of the largest eigenvalue of the linearised equations \[rad/s\]; not a number where the equations are not finite.
+    pub fastest: f64,
+    /// Minus its real part \[1/s\]: positive where the mode dies away.
+    pub decay: f64,
+    /// The rate of everything else \[rad/s\]: gravity on the bars, their own rates, and the laws of motors.
+    pub slow: f64,
+    /// The spring or damper whose mode it is; `None` where it is no spring's.
+    pub culprit: Option<String>,
+    /// Energy in that spring's own motion \[J\]: of its stretch and of its rate.
+    pub energy: f64,
+}
+
+impl Stiffness {
+    /// Measures it at a time, at angles and positions `phi` \[rad, m\] and rates `omega` \[rad/s, m/s\].
+    pub fn at(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Self {
+        let lambda = if phi.len() <= EXACT { spectrum(mechanism, time, phi, omega) } else { largest(mechanism, time, phi, omega) };
+        let fastest = lambda.norm_squared().sqrt();
+        let mut found = Self { fastest, decay: -lambda.re, slow: slow(mechanism, time, omega), culprit: None, energy: 0.0 };
+        if let Some(mode) = fastest_spring(mechanism, time, phi, omega).filter(|mode| mode.rate >= SHARE * fastest) {
+            (found.culprit, found.energy) = (Some(mode.name), mode.energy);
+        }
+        found
+    }
+
+    /// True where the mode dies away within a few periods, or does not swing at all.
+    pub fn is_damped(&self) -> bool {
+        self.decay > 0.1 * self.fastest
+    }
+
+    /// How many times faster the mode is than the rest.
+    pub fn ratio(&self) -> f64 {
+        self.fastest / self.slow
+    }
+
+    /// The phase the mode runs through in so many seconds \[rad\].
+    pub fn radians(&self, seconds: f64) -> f64 {
+        self.fastest * seconds
+    }
+
+    /// Its periods in so many seconds.
+    pub fn periods(&self, seconds: f64) -> f64 {
+        self.radians(seconds) / std::f64::consts::TAU
+    }
+}
+
+/// The largest eigenvalue, by the Schur form of the whole matrix.
+fn spectrum(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Complex<f64> {
+    let n = phi.len();
+    let mut jacobian = Jacobian::new(mechanism);
+    jacobian.evaluate(mechanism, time, phi, omega, Bias::default());
+    let by = |i: usize, k: usize| jacobian.acceleration[2 * n * i + k];
+    let squares = (0..n).flat_map(|i| (0..n).map(move |k| (i, k))).fold(0.0, |sum: f64, (i, k)| sum + by(i, k) * by(i, k));
+    let unknown = Complex::new(f64::NAN, 0.0);
+    if !jacobian.acceleration.iter().all(|entry| entry.is_finite()) {
+        return unknown;
+    }
+    // Rates over r weigh as much as coordinates: without it rounding in the Schur form grows with the stiffness.
+    let r = if squares > 0.0 { squares.sqrt().sqrt() } else { 1.0 };
+    let matrix = DMatrix::from_fn(2 * n, 2 * n, |i, k| match (i < n, k < n) {
+        (true, true) => 0.0,
+        (true, false) => f64::from(i + n == k) * r,
+        (false, true) => by(i - n, k) / r,
+        (false, false) => by(i - n, k),
+    });
+    let Some(schur) = Schur::try_new(matrix, f64::EPSILON, 10_000) else { return unknown };
+    let values = schur.complex_eigenvalues();
+    values
+        .iter()
+        .map(|value| Complex::new(value.re, value.im.abs()))
+        .fold(Complex::ZERO, |most, value| if value.norm_squared() > most.norm_squared() { value } else { most })
+}
+
+/// The largest eigenvalue or pair, by power iteration with products of the Jacobian and a vector: x'' = b x' + c x fitted to three iterates.
+fn largest(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Complex<f64> {
+    let n = phi.len();
+    let mut kernel = Kernel::<Dual<1, false>>::new(mechanism);
+    let mut product = |x: &[f64]| -> Vec<f64> {
+        let along = |values: &[f64], slopes: &[f64]| -> Vec<Dual<1, false>> {
+            values.iter().zip(slopes).map(|(&value, &slope)| Dual { value, slope: [slope] }).collect()
+        };
+        kernel.accelerate::<0>(mechanism, time, &along(phi, &x[..n]), &along(omega, &x[n..]), Bias::default());
+        x[n..].iter().copied().chain(kernel.load.iter().map(|load| load.slope[0])).collect()
+    };
+    // No direction is left out, and none is preferred.
+    let mut x: Vec<f64> = (0..2 * n).map(|k| 1.0 + 0.5 * libm::cos(1.0 + k as f64)).collect();
+    let mut lambda = Complex::ZERO;
+    for round in 0..ROUNDS {
+        let size = dot(&x, &x).sqrt();
+        x.iter_mut().for_each(|x| *x /= size);
+        let first = product(&x);
+        let second = product(&first);
+        if round + 1 == ROUNDS {
+            let (a, b, c) = (dot(&first, &first), dot(&first, &x), dot(&x, &x));
+            let (p, q) = (dot(&second, &first), dot(&second, &x));
+            let determinant = a * c - b * b;
+            let (trace, product) =
+                if determinant > 1e-12 * a * c { ((p * c - q * b) / determinant, -(q * a - p * b) / determinant) } else { (b / c, 0.0) };
+            lambda = root(trace, product);
+        }
+        x = second;
+    }
+    lambda
+}
+
+/// The larger root of lambda² - trace lambda + product.
+fn root(trace: f64, product: f64) -> Complex<f64> {
+    let discriminant = 0.25 * trace * trace - product;
+    if discriminant >= 0.0 {
+        Complex::new(0.5 * trace + discriminant.sqrt().copysign(trace), 0.0)
+    } else {
+        Complex::new(0.5 * trace, (-discriminant).sqrt())
+    }
+}
+
+/// The largest of the bars' own rates, their swinging alone under gravity, and the laws' rates \[rad/s\].
+fn slow(mechanism: &Mechanism, time: Time, omega: &[f64]) -> f64 {
+    let angles = mechanism.bodies.len();
+    let swings = (0..angles).map(|k| (mechanism.tree.weight[k].norm_squared().sqrt() / mechanism.tree.diagonal[k]).sqrt());
+    let spins = omega[..angles].iter().map(|omega| omega.abs());
+    let laws = (mechanism.rows.iter().filter_map(|row| row.law.as_ref())).flat_map(|law| {
+        let rate = law.rates::<f64>(time).0.abs();
+        law.sines.iter().map(|sine| sine.frequency.abs()).chain([rate])
+    });
+    swings.chain(spins).chain(laws).fold(0.0, f64::max).max(1e-3)
+}
+
+/// A spring's own motion.
+struct Mode {
+    name: String,
+    /// \[rad/s\]
+    rate: f64,
+    /// \[J\]
+    energy: f64,
+}
+
+/// The fastest of the springs, each by itself.
+fn fastest_spring(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Option<Mode> {
+    let n = phi.len();
+    if n > NAMED || !mechanism.tree.is_dense() || (mechanism.springs.is_empty() && mechanism.torsions.is_empty()) {
+        return None;
+    }
+    let mut kernel = Kernel::<f64>::dense(mechanism);
+    kernel.linearise_at::<0>(mechanism, time, phi, omega);
+    let z = kernel.z.clone();
+    let mut modes = Vec::new();
+    let mut see = |name: &str, along: &[f64], stiffness: f64, damping: f64, stretch: f64| {
+        let mobility = mobility(&mut kernel, along);
+        let (spring, damper) = (stiffness * mobility, damping * mobility);
+        let rate = root(-damper, spring).norm_squared().sqrt();
+        let speed = dot(along, omega);
+        let energy = 0.5 * stiffness * stretch * stretch + 0.5 * speed * speed / mobility;
+        modes.push(Mode { name: name.into(), rate, energy });
+    };
+    for spring in &mechanism.springs {
+        let span = spring.span.position(&z);
+        let length = span.norm_squared().sqrt();
+        // Without a free length it pulls in every direction alike.
+        let directions = match spring.free_length == 0.0 {
+            true => vec![(Complex::new(1.0, 0.0), span.re), (Complex::new(0.0, 1.0), span.im)],
+            false => vec![(span.times(1.0 / length), length - spring.free_length)],
+        };
+        for (direction, stretch) in directions {
+            let mut along = vec![0.0; n];
+            spring.span.pull(direction, &z, &mut along);
+            see(&spring.name, &along, spring.stiffness, spring.damping, stretch);
+        }
+    }
+    for torsion in &mechanism.torsions {
+        let mut along = vec![0.0; n];
+        torsion.pull(1.0, &mut along);
+        see(&torsion.name, &along, torsion.stiffness, torsion.damping, torsion.between(phi) - torsion.free_angle);
+    }
+    modes.into_iter().filter(|mode| mode.rate.is_finite()).max_by(|a, b| a.rate.total_cmp(&b.rate))
+}
+
+/// g (M⁻¹ - X S⁻¹ Xᵀ) gᵀ, after [`Kernel::linearise_at`].
+fn mobility(kernel: &mut Kernel<f64>, along: &[f64]) -> f64 {
+    let n = along.len();
+    let mut moved = along.to_vec();
+    tree::solve::<f64, 0>(n, &kernel.mass, &kernel.pivot, &mut moved);
+    for r in 0..kernel.rows.len() {
+        kernel.multiplier[r] = kernel.row_speed(r, &moved);
+    }
+    kernel.solve_rows();
+    kernel.lift();
+    moved.iter().zip(&kernel.load).zip(along).fold(0.0, |sum, ((moved, held), along)| sum + (moved - held) * along)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Scene, read_scene};
+
+    fn scene(name: &str, overrides: &[&str]) -> Scene {
+        let overrides: Vec<_> = overrides.iter().map(|text| text.parse().expect("an override")).collect();
+        read_scene(format!("examples/scenes/{name}.json").as_ref(), &overrides).expect("a valid scene")
+    }
+
+    fn measured(scene: &Scene) -> Stiffness {
+        let mechanism = Mechanism::new(scene).expect("equations");
+        let start = mechanism.start(scene);
+        let [phi, omega] = [&start.phi, &start.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<_>>());
+        Stiffness::at(&mechanism, start.time, &phi, &omega)
+    }
+
+    /// Bar 1 so that the spring has its free length, both at rest; at the source's stiffness the spring is no faster than gravity.
+    fn sprung(factor: f64, damping: f64) -> Scene {
+        let mut scene = scene("spring", &[]);
+        (scene.springs[0].stiffness, scene.springs[0].damping) = (7.394_287_5 * factor, damping);
+        (scene.start[0].phi, scene.start[1].phi) = (1.955_193_101_290_539_7, 1.570_796_326_794_896_6);
+        scene
+    }
+
+    #[test]
+    fn a_stiff_spring_is_found_with_its_rate_and_name() {
+        for factor in [1e4, 1e8, 1e12_f64] {
+            let found = measured(&sprung(factor, 0.0));
+            // 6.2 sqrt(factor) rad/s, measured by an independent program.
+            assert!((found.fastest / (6.2 * factor.sqrt()) - 1.0).abs() < 0.03, "{found:?}");
+            assert!(found.decay.abs() < 1e-3 * found.fastest && !found.is_damped(), "{found:?}");
+            assert_eq!(found.culprit.as_deref(), Some("spring"));
+            assert!(found.energy < 1e-12 && found.slow > 3.0 && found.slow < 10.0, "{found:?}");
+            assert!((found.periods(1.0) - found.fastest / std::f64::consts::TAU).abs() < 1e-9 * found.fastest);
+        }
+    }
+
+    #[test]
+    fn dampers_show_as_decay_and_stretch_as_energy() {
+        let found = measured(&sprung(1e8, 6675.0));
+        assert!(found.is_damped() && found.culprit.is_some(), "{found:?}");
+        let overdamped = measured(&sprung(1.0, 1e4));
+        assert!((overdamped.decay / overdamped.fastest - 1.0).abs() < 1e-6 && overdamped.fastest > 1e4, "{overdamped:?}");
+        assert_eq!(overdamped.culprit.as_deref(), Some("spring"));
+        let mut stretched = sprung(1e6, 0.0);
+        stretched.start[0].phi += 1e-3;
+        let mechanism = Mechanism::new(&stretched).expect("equations");
+        let z = Complex::unit(stretched.start[0].phi);
+        let expected = mechanism.springs[0].energy(&[z, Complex::ZERO]);
+        assert!((measured(&stretched).energy / expected - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn gravity_alone_is_nobodys_fault() {
+        let found = measured(&scene("free", &[]));
+        assert!(found.culprit.is_none() && found.ratio() < 3.0 && found.energy == 0.0, "{found:?}");
+    }
+
+    #[test]
+    fn power_iteration_finds_what_the_schur_form_does() {
+        for scene in [sprung(1e6, 0.0), sprung(1e6, 667.0), sprung(1.0, 1e4)] {
+            let mechanism = Mechanism::new(&scene).expect("equations");
+            let phi = [scene.start[0].phi, scene.start[1].phi];
+            let [exact, found] = [spectrum, largest].map(|method| method(&mechanism, Time::default(), &phi, &[0.0, 0.0]));
+            assert!((exact - found).norm_squared() < 1e-6 * exact.norm_squared(), "{exact:?} {found:?}");
+        }
+    }
+}

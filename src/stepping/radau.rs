@@ -1,0 +1,586 @@
+//! Radau IIA collocation: `radau5` with three stages and `radau9` with five, of order 2s - 1.
+//!
+//! Implicit, adaptive, stiffly accurate and L-stable: fast modes that are damped cost it nothing once they have died away, and its steps follow the slow motion.
+//! To choose for dampers and damped stiff springs.  *Not* for stiff springs that swing: it eats their energy wherever its steps are longer than their
+//! periods, and where they are not the explicit methods are cheaper.  It asks for a field with a [Jacobian](Field::jacobian).
+//!
+//! ```text
+//! z_i = h Σ_j a_ij f(t + c_j h, y + z_j),      y1 = y + z_s
+//! simplified Newton:   (1 - h mu_k J) dw_k = l_k (h A F - Z),      dz = Σ r_k dw_k            one real mode, (s-1)/2 complex ones
+//! err = h mu_0 (1 - h mu_0 J)^-1 (f(y) + Σ e_i z_i / h)            a formula of order s; filtered once more after a rejection
+//! ```
+//!
+//! Starting values are those of the last step's polynomial, which is also the solution inside a step.  The Jacobian is kept while the iteration contracts by a thousand,
+//! its factors while the step would grow by less than a fifth; the step follows from the last two errors (K. Gustafsson, ACM TOMS 20 (1994)).
+//! All of that is in the state's memory, the Jacobian by the point it was taken at.
+//!
+//! Source: E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), section IV.8; the same, *Stiff differential equations solved by
+//! Radau methods*, J. Comput. Appl. Math. 111 (1999).
+
+mod tableau;
+
+use super::event::{Found, SAMPLES, Search, Stride};
+use super::linear::Factors;
+use super::{Cause, Method, Reached, StepError, Tally, Tolerance, Watch, scales};
+use crate::arithmetic::sum::{fast_two_sum, two_sum};
+use crate::arithmetic::{Complex, DoubleDouble, Scalar};
+use crate::dynamics::{Field, State, Time};
+use tableau::Tableau;
+
+/// Safety factor of the step.
+const SAFE: f64 = 0.9;
+/// Bounds of the ratio of a step to the next one.
+const QUOTIENT: [f64; 2] = [1.0 / 8.0, 5.0];
+/// Contraction up to which the Jacobian is kept.
+const KEPT: f64 = 1e-3;
+/// Growth of the step up to which the factors are kept, and the step with them.
+const SAME: f64 = 1.2;
+/// Contraction from which the iteration counts as diverging.
+const DIVERGING: f64 = 0.99;
+/// Steps that came out not finite in a row after which it stops.
+const MOST_CUTS: u32 = 10;
+
+/// A Radau IIA method with its step control and scratch space.
+#[derive(Clone, Debug)]
+pub struct Radau {
+    /// Tolerance of a step.
+    pub tolerance: Tolerance,
+    tableau: Tableau,
+    work: Work,
+}
+
+/// Scratch space of d unknowns and s stages.
+#[derive(Clone, Debug, Default)]
+struct Work {
+    /// J (d × d), and where it was taken.
+    jacobian: Vec<f64>,
+    place: (Time, Vec<f64>),
+    /// Factors of 1 - h mu J, one a mode, for the step `factored`; zero where there are none.
+    real: Factors<f64>,
+    pairs: Vec<Factors<Complex<f64>>>,
+    factored: f64,
+    /// Stages less y, their changes, their rates (s × d).
+    z: Vec<f64>,
+    change: Vec<f64>,
+    rates: Vec<f64>,
+    /// Stages of the last accepted step less its start (s × d), and its length \[s\].
+    last: Vec<f64>,
+    length: f64,
+    /// f(y), for the state of the step (d).
+    start: Vec<f64>,
+    /// (d each)
+    scale: Vec<f64>,
+    stage: Vec<f64>,
+    mode: Vec<f64>,
+    wide: Vec<Complex<f64>>,
+    error: Vec<f64>,
+    next: Vec<f64>,
+    next_low: Vec<f64>,
+    next_rate: Vec<f64>,
+    /// Weights of the polynomial (s).
+    weights: Vec<f64>,
+    search: Search,
+}
+
+/// What the next step depends on beside the unknowns, the last polynomial and the Jacobian.
+#[derive(Clone, Copy, Debug)]
+struct Control {
+    /// Steps since the last output time.
+    taken: f64,
+    /// The step proposed \[s\].
+    wanted: f64,
+    /// The last accepted step \[s\], zero before the first, and its error.
+    accepted: f64,
+    error: f64,
+    /// theta/(1 - theta) of the last iteration.
+    contraction: f64,
+    /// One where the Jacobian may be kept.
+    keeps: f64,
+}
+
+/// Numbers of [`Control`] and of the time of the Jacobian.
+const CONTROLS: usize = 8;
+
+/// How an iteration ended.
+enum Solved {
+    /// Its contraction, and the iterations taken.
+    Converged(f64, usize),
+    /// It would take too long: a factor for the step.
+    Slow(f64),
+    NotFinite,
+}
+
+impl Radau {
+    /// The method of three or five stages; `None` for any other number.
+    pub fn new(stages: usize, tolerance: Tolerance) -> Option<Self> {
+        Some(Self { tolerance, tableau: Tableau::new(stages)?, work: Work::default() })
+    }
+
+    fn id(&self) -> &'static str {
+        if self.tableau.stages() == 3 { "radau5" } else { "radau9" }
+    }
+
+    fn stop(&self, cause: Cause, state: &State, step: f64, what: String, hint: &str) -> StepError {
+        StepError { cause, method: self.id().into(), t: state.time.hi, step, what, hint: hint.into() }
+    }
+
+    /// Takes back what the state carries; false where it carries nothing of the kind.
+    fn recall(&mut self, state: &State, control: &mut Control) -> bool {
+        let (d, s) = (state.y.len(), self.tableau.stages());
+        let (Some((numbers, rest)), true) = (state.memory.split_first_chunk::<CONTROLS>(), state.memory.len() == CONTROLS + (s + 1) * d)
+        else {
+            return false;
+        };
+        let &[taken, wanted, accepted, error, contraction, keeps, hi, lo] = numbers;
+        *control = Control { taken, wanted, accepted, error, contraction, keeps };
+        let (place, last) = rest.split_at(d);
+        self.work.last.copy_from_slice(last);
+        let time = Time { hi, lo };
+        if self.work.place != (time, place.to_vec()) {
+            self.work.place = (time, place.to_vec());
+            self.work.jacobian.clear();
+        }
+        true
+    }
+
+    fn remember(&self, state: &mut State, control: &Control) {
+        let &Control { taken, wanted, accepted, error, contraction, keeps } = control;
+        let (Time { hi, lo }, place) = &self.work.place;
+        state.memory.clear();
+        state.memory.extend([taken, wanted, accepted, error, contraction, keeps, *hi, *lo]);
+        state.memory.extend_from_slice(place);
+        state.memory.extend_from_slice(&self.work.last);
+    }
+
+    /// A first step from the sizes of unknowns and rates; the error estimate corrects it.
+    fn first_step(&self, state: &State, span: f64) -> f64 {
+        let norm = |x: &[f64]| x.iter().zip(&self.work.scale).map(|(x, scale)| (x / scale) * (x / scale)).sum::<f64>().sqrt();
+        let guess = 0.01 * norm(&state.y) / norm(&self.work.start);
+        if guess.is_finite() && guess > 0.0 { guess.min(span) } else { span.min(1e-6) }
+    }
+
+    /// The Jacobian at the state, or again where it was taken before.
+    fn differentiate<F: Field + ?Sized>(&mut self, field: &mut F, state: Option<&State>, tally: &mut Tally) -> bool {
+        let work = &mut self.work;
+        if let Some(state) = state {
+            work.place.0 = state.time;
+            work.place.1.clone_from(&state.y);
+            tally.jacobians += 1;
+        }
+        let d = work.place.1.len();
+        work.jacobian.resize(d * d, 0.0);
+        work.factored = 0.0;
+        field.jacobian(work.place.0, &work.place.1, &mut work.jacobian)
+    }
+
+    /// Factors for steps of `h`.
+    fn factor(&mut self, h: f64, dimension: usize) {
+        let Self { tableau, work, .. } = self;
+        work.real.of_shifted(h * tableau.real.value, &work.jacobian, dimension);
+        work.pairs.resize_with(tableau.pairs.len(), Factors::default);
+        for (factors, mode) in work.pairs.iter_mut().zip(tableau.pairs) {
+            factors.of_shifted(mode.value.times(h), &work.jacobian, dimension);
+        }
+        work.factored = h;
+    }
+
+    /// Starting values from the polynomial of the last step, of `length`, or from that of the step just made, `from_start`, which is to be repeated.
+    fn predict(&mut self, h: f64, length: f64, from_start: bool) {
+        let Self { tableau, work, .. } = self;
+        let (s, d) = (tableau.stages(), work.stage.len());
+        if length == 0.0 {
+            work.z.fill(0.0);
+            return;
+        }
+        // The changes are not needed before the first residual.
+        work.change.copy_from_slice(if from_start { &work.z } else { &work.last });
+        let polynomial = &work.change;
+        for i in 0..s {
+            let share = tableau.nodes[i].hi * h / length;
+            tableau.lagrange(if from_start { share } else { 1.0 + share }, &mut work.weights);
+            for k in 0..d {
+                let base = if from_start { 0.0 } else { polynomial[(s - 1) * d + k] };
+                work.z[i * d + k] = (0..s).fold(-base, |sum, j| sum + work.weights[j] * polynomial[j * d + k]);
+            }
+        }
+    }
+
+    /// Iterates the stages of a step of `h`; the factors for it are in place.
+    fn solve<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, contraction: &mut f64, tally: &mut Tally) -> Solved {
+        let (s, d) = (self.tableau.stages(), state.y.len());
+        let most = if s == 3 { 7 } else { 12 };
+        let relative = self.tolerance.relative;
+        let enough = (10.0 * f64::EPSILON / relative).max(relative.sqrt().min(0.03));
+        let (mut before, mut ratio_before, mut theta) = (f64::NAN, f64::NAN, KEPT);
+        *contraction = libm::pow(contraction.max(f64::EPSILON), 0.8);
+        for sweep in 1..=most {
+            self.residual(field, state, h, tally);
+            self.correct(d);
+            let work = &mut self.work;
+            let mut sum = 0.0;
+            for (i, (z, change)) in work.z.iter_mut().zip(&work.change).enumerate() {
+                sum += (change / work.scale[i % d]) * (change / work.scale[i % d]);
+                *z += change;
+            }
+            let size = (sum / (s * d) as f64).sqrt();
+            if !size.is_finite() {
+                return Solved::NotFinite;
+            }
+            if sweep > 1 {
+                let ratio = size / before;
+                theta = if sweep == 2 { ratio } else { (ratio * ratio_before).sqrt() };
+                ratio_before = ratio;
+                let converges = theta < DIVERGING;
+                if !converges {
+                    return if size <= enough * 1e-2 { Solved::Converged(theta, sweep) } else { Solved::Slow(0.5) };
+                }
+                *contraction = theta / (1.0 - theta);
+            }
+            if *contraction * size <= enough {
+                return Solved::Converged(theta, sweep);
+            }
+            if sweep > 1 {
+                let left = most as f64 - 1.0 - sweep as f64;
+                let forecast = *contraction * size * libm::pow(theta, left) / enough;
+                if forecast >= 1.0 {
+                    return Solved::Slow(0.8 * libm::pow(forecast.clamp(1e-4, 20.0), -1.0 / (4.0 + left)));
+                }
+            }
+            before = size.max(f64::EPSILON);
+        }
+        Solved::Slow(0.5)
+    }
+
+    /// h A F - Z into `change`.
+    fn residual<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) {
+        let Self { tableau, work, .. } = self;
+        let (s, d) = (tableau.stages(), state.y.len());
+        for (i, rates) in work.rates.chunks_exact_mut(d).enumerate() {
+            for (k, stage) in work.stage.iter_mut().enumerate() {
+                *stage = state.y[k] + (work.z[i * d + k] + state.low[k]);
+            }
+            field.rate(state.time + tableau.nodes[i].hi * h, &work.stage, rates);
+        }
+        tally.evaluations += s as u64;
+        for i in 0..s {
+            for k in 0..d {
+                let sum = (0..s).fold(0.0, |sum, j| sum + tableau.a[i * s + j] * work.rates[j * d + k]);
+                work.change[i * d + k] = h * sum - work.z[i * d + k];
+            }
+        }
+    }
+
+    /// The residual in `change` becomes the correction.
+    fn correct(&mut self, d: usize) {
+        let Self { tableau, work, .. } = self;
+        let Work { change, rates: corrections, mode, wide, real, pairs, .. } = work;
+        // The rates have served; their room takes the sum over the modes.
+        for k in 0..d {
+            mode[k] = tableau.real.left.iter().enumerate().fold(0.0, |sum, (i, l)| sum + l * change[i * d + k]);
+        }
+        real.solve(mode);
+        for (i, right) in tableau.real.right.iter().enumerate() {
+            for k in 0..d {
+                corrections[i * d + k] = right * mode[k];
+            }
+        }
+        for (factors, pair) in pairs.iter().zip(tableau.pairs) {
+            for k in 0..d {
+                wide[k] = pair.left.iter().enumerate().fold(Complex::ZERO, |sum, (i, &l)| sum + l.times(change[i * d + k]));
+            }
+            factors.solve(wide);
+            for (i, right) in pair.right.iter().enumerate() {
+                for k in 0..d {
+                    corrections[i * d + k] += 2.0 * (right.re * wide[k].re - right.im * wide[k].im);
+                }
+            }
+        }
+        std::mem::swap(change, corrections);
+    }
+
+    /// The new state, and the error over the tolerance; `twice` filters it once more.
+    fn estimate<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, is_hard: bool, tally: &mut Tally) -> f64 {
+        let Self { tableau, work, .. } = self;
+        let (s, d) = (tableau.stages(), state.y.len());
+        let fade = h * tableau.real.value;
+        for k in 0..d {
+            work.mode[k] = (0..s).fold(0.0, |sum, i| sum + tableau.estimate[i] * work.z[i * d + k]) / h;
+            work.error[k] = work.start[k] + work.mode[k];
+        }
+        let norm = |error: &mut [f64], work: &Work| {
+            work.real.solve(error);
+            let mut sum = 0.0;
+            for (error, scale) in error.iter_mut().zip(&work.scale) {
+                *error *= fade;
+                sum += (*error / scale) * (*error / scale);
+            }
+            (sum / d as f64).sqrt()
+        };
+        let mut error = std::mem::take(&mut work.error);
+        let mut size = norm(&mut error, work);
+        if is_hard && size >= 1.0 {
+            for k in 0..d {
+                work.stage[k] = state.y[k] + error[k];
+            }
+            field.rate(state.time, &work.stage, &mut error);
+            tally.evaluations += 1;
+            for k in 0..d {
+                error[k] += work.mode[k];
+            }
+            size = norm(&mut error, work);
+        }
+        work.error = error;
+        self.close(state);
+        size
+    }
+
+    /// Writes the new state.
+    fn close(&mut self, state: &State) {
+        let d = state.y.len();
+        let end = self.work.z.len() - d;
+        for k in 0..d {
+            let (sum, rest) = two_sum(state.y[k], self.work.z[end + k]);
+            (self.work.next[k], self.work.next_low[k]) = fast_two_sum(sum, rest + state.low[k]);
+        }
+    }
+
+    /// The component that asks most of the step.
+    fn culprit<F: Field + ?Sized>(&self, field: &F) -> String {
+        let share = |k: usize| {
+            let share = (self.work.error[k] / self.work.scale[k]).abs();
+            if share.is_nan() { f64::INFINITY } else { share }
+        };
+        (0..self.work.scale.len()).max_by(|&a, &b| share(a).total_cmp(&share(b))).map_or_else(String::new, |k| field.label(k))
+    }
+
+    fn resize(&mut self, d: usize, events: usize) {
+        let s = self.tableau.stages();
+        let work = &mut self.work;
+        for stages in [&mut work.z, &mut work.change, &mut work.rates, &mut work.last] {
+            stages.resize(s * d, 0.0);
+        }
+        for vector in [
+            &mut work.start,
+            &mut work.scale,
+            &mut work.stage,
+            &mut work.mode,
+            &mut work.error,
+            &mut work.next,
+            &mut work.next_low,
+            &mut work.next_rate,
+        ] {
+            vector.resize(d, 0.0);
+        }
+        work.wide.resize(d, Complex::ZERO);
+        work.weights.resize(s, 0.0);
+        work.search.resize(events, d);
+    }
+}
+
+impl<F: Field + ?Sized> Stride<F> for Radau {
+    fn inside(&self, state: &State, _h: f64, share: f64, y: &mut [f64]) {
+        let (s, d) = (self.tableau.stages(), state.y.len());
+        let mut weights = [0.0; 5];
+        self.tableau.lagrange(share, &mut weights[..s]);
+        for k in 0..d {
+            y[k] = state.y[k] + (0..s).fold(state.low[k], |sum, j| sum + weights[j] * self.work.z[j * d + k]);
+        }
+    }
+
+    fn repeat(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) -> bool {
+        let length = self.work.factored;
+        self.predict(h, length, true);
+        self.factor(h, state.y.len());
+        let mut contraction = 1.0;
+        let has_converged = matches!(self.solve(field, state, h, &mut contraction, tally), Solved::Converged(..));
+        self.close(state);
+        field.rate(state.time + h, &self.work.next, &mut self.work.next_rate);
+        tally.evaluations += 1;
+        has_converged
+    }
+
+    fn end(&self) -> (&[f64], &[f64]) {
+        (&self.work.next, &self.work.next_rate)
+    }
+}
+
+impl<F: Field + ?Sized> Method<F> for Radau {
+    fn name(&self) -> &'static str {
+        self.id()
+    }
+
+    fn order(&self) -> u32 {
+        2 * self.tableau.stages() as u32 - 1
+    }
+
+    fn advance(
+        &mut self,
+        field: &mut F,
+        state: &mut State,
+        until: Time,
+        tally: &mut Tally,
+        watch: &mut Watch<F>,
+    ) -> Result<Reached, StepError> {
+        let (d, events) = (state.y.len(), field.events());
+        super::refuse_the_past(self.id(), state, until)?;
+        self.resize(d, events);
+        let mut left = (until - state.time).hi;
+        let mut control = Control { taken: 0.0, wanted: 0.0, accepted: 0.0, error: 1.0, contraction: 1.0, keeps: 0.0 };
+        let knows = self.recall(state, &mut control);
+        let (mut has_start, mut is_hard, mut cuts) = (false, !knows, 0);
+        while left > 0.0 {
+            if !has_start {
+                field.rate(state.time, &state.y, &mut self.work.start);
+                tally.evaluations += 1;
+                scales(self.tolerance, &state.y, &mut self.work.scale);
+                has_start = true;
+            }
+            if control.wanted == 0.0 {
+                control.wanted = self.first_step(state, left);
+            }
+            let whole = control.wanted >= left * (1.0 - 1e-12);
+            let h = if whole {
+                left
+            } else if control.wanted > 0.5 * left {
+                0.5 * left
+            } else {
+                control.wanted
+            };
+            control.taken += 1.0;
+            tally.check(self.id(), state.time.hi, h)?;
+            if h < 1e-14 * state.time.hi.abs().max(1e-3) && !whole {
+                let what = format!("{} asks for ever smaller steps", self.culprit(field));
+                return Err(self.stop(
+                    Cause::StepTooSmall,
+                    state,
+                    h,
+                    what,
+                    "loosen the tolerance: forces of stiff springs have a rounding of their own",
+                ));
+            }
+            let is_fresh = control.keeps == 0.0 && !(self.work.place.0 == state.time && self.work.place.1 == state.y);
+            if (is_fresh || self.work.jacobian.is_empty()) && !self.differentiate(field, is_fresh.then_some(&*state), tally) {
+                let what = "this form of the equations has no Jacobian".into();
+                return Err(self.stop(Cause::Unsuited, state, h, what, "use dp8"));
+            }
+            if self.work.factored != h {
+                self.factor(h, d);
+            }
+            self.predict(h, control.accepted, false);
+            let solved = self.solve(field, state, h, &mut control.contraction, tally);
+            let (theta, sweeps) = match solved {
+                Solved::Converged(theta, sweeps) => (theta, sweeps),
+                Solved::Slow(factor) => {
+                    tally.rejected += 1;
+                    (is_hard, control.wanted, control.keeps) = (true, h * factor, 0.0);
+                    continue;
+                }
+                Solved::NotFinite => (f64::NAN, 0),
+            };
+            let error = if sweeps > 0 { self.estimate(field, state, h, is_hard, tally).max(1e-10) } else { f64::NAN };
+            if !error.is_finite() {
+                cuts += 1;
+                tally.rejected += 1;
+                if cuts > MOST_CUTS {
+                    let what = format!("{} is not finite", self.culprit(field));
+                    let hint = "look for a spring of length zero or a position without inertia";
+                    return Err(self.stop(Cause::NotFinite, state, h, what, hint));
+                }
+                (is_hard, control.wanted, control.keeps) = (true, 0.1 * h, 0.0);
+                continue;
+            }
+            cuts = 0;
+            let (exponent, most) = (1.0 / (self.tableau.stages() as f64 + 1.0), if self.tableau.stages() == 3 { 7.0 } else { 12.0 });
+            let factor = SAFE.min(SAFE * (1.0 + 2.0 * most) / (sweeps as f64 + 2.0 * most));
+            let mut quotient = (libm::pow(error, exponent) / factor).clamp(QUOTIENT[0], QUOTIENT[1]);
+            if error >= 1.0 {
+                tally.rejected += 1;
+                let is_first = control.accepted == 0.0;
+                (is_hard, control.wanted, control.keeps) = (true, if is_first { 0.1 * h } else { h / quotient }, 0.0);
+                continue;
+            }
+            let mut h = h;
+            let mut reached = if whole { Some(Reached::Until) } else { None };
+            if events > 0 {
+                let mut search = std::mem::take(&mut self.work.search);
+                let found = search.first(field, self, state, h);
+                let landed = match found {
+                    Found::At(event, theta) => search.land(field, self, state, theta * h, event, tally).map(|h| (h, event)),
+                    _ => None,
+                };
+                self.work.search = search;
+                match (found, landed) {
+                    (Found::Nothing, _) => {}
+                    (Found::At(..), Some((length, event))) => (h, reached) = (length, Some(Reached::Event(event))),
+                    (Found::At(..) | Found::Inside, None) if h > 1e-9 => {
+                        tally.rejected += 1;
+                        (is_hard, control.wanted) = (true, h / SAMPLES as f64);
+                        continue;
+                    }
+                    _ => {
+                        let what = "a point has come to rest on a wall".into();
+                        let hint = "go on with the contact held (`Mechanism::holding`), or raise the restitution";
+                        return Err(self.stop(Cause::RestingContact, state, h, what, hint));
+                    }
+                }
+            }
+            if control.accepted > 0.0 {
+                let predicted = (control.accepted / h) * libm::pow(error * error / control.error, exponent) / SAFE;
+                quotient = quotient.max(predicted.clamp(QUOTIENT[0], QUOTIENT[1]));
+            }
+            let grown = if is_hard && control.accepted > 0.0 { (h / quotient).min(h) } else { h / quotient };
+            (control.accepted, control.error) = (h, error.max(1e-2));
+            control.keeps = f64::from(theta <= KEPT);
+            let same = theta <= KEPT && (1.0..=SAME).contains(&(grown / h));
+            let proposed = if same { h } else { grown };
+            // A step cut short says nothing against the longer one proposed before it.
+            control.wanted = if h < control.wanted { proposed.max(control.wanted) } else { proposed };
+            is_hard = false;
+            self.work.last.copy_from_slice(&self.work.z);
+            self.work.length = h;
+            state.y.copy_from_slice(&self.work.next);
+            state.low.copy_from_slice(&self.work.next_low);
+            state.time = if reached == Some(Reached::Until) { until } else { state.time + DoubleDouble::of(h) };
+            state.wrap();
+            self.remember(state, &control);
+            tally.steps += 1;
+            has_start = false;
+            let seen = watch(field, state)?;
+            if let Some(reached) = reached {
+                return Ok(reached);
+            }
+            if seen.is_enough() {
+                return Ok(Reached::Pause);
+            }
+            left = (until - state.time).hi;
+        }
+        Ok(Reached::Until)
+    }
+
+    fn is_dense(&self) -> bool {
+        true
+    }
+
+    /// By the polynomial through the stages, to the order of the stages.
+    fn within(&mut self, _problem: &mut F, from: &State, time: Time, inside: &mut State) {
+        let (s, d) = (self.tableau.stages(), from.y.len());
+        inside.clone_from(from);
+        inside.memory.clear();
+        inside.time = time;
+        let share = (time - from.time).hi / self.work.length;
+        let mut weights = [0.0; 5];
+        self.tableau.lagrange(share, &mut weights[..s]);
+        for k in 0..d {
+            let change = (0..s).fold(0.0, |sum, j| sum + weights[j] * self.work.last[j * d + k]);
+            (inside.y[k], inside.low[k]) = two_sum(from.y[k], change + from.low[k]);
+        }
+        inside.wrap();
+    }
+
+    /// The step goes on as it was going.
+    fn arrive(&self, state: &mut State) {
+        if let Some(taken) = state.memory.first_mut() {
+            *taken = 0.0;
+        }
+    }
+}
