@@ -389,8 +389,18 @@ impl Course {
     /// The present motion.
     pub(super) fn motion(&mut self) -> Motion {
         let mut motion = Motion::default();
-        self.marcher.read(&mut motion);
+        self.look(&mut motion);
         motion
+    }
+
+    /// The same into a motion that is there already.
+    pub(super) fn look(&mut self, motion: &mut Motion) {
+        self.marcher.read(motion);
+    }
+
+    /// The motion last sampled.
+    pub(super) fn shown(&self) -> &Motion {
+        &self.shown
     }
 
     fn name(&self, contact: usize) -> &str {

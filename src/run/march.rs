@@ -381,6 +381,14 @@ pub(super) fn exact(mechanism: &Arc<Mechanism>, start: &Motion, order: usize, to
     }
 }
 
+/// The form whose unknowns small differences are followed in.
+pub(super) fn tangent_form(mechanism: &Arc<Mechanism>) -> Box<dyn Problem> {
+    if mechanism.has_multipliers() {
+        return sized!(mechanism.size(), form(mechanism, Stabilization::None, 1.0));
+    }
+    sized!(mechanism.size(), eliminated(mechanism))
+}
+
 fn cannot_begin(plan: &Plan, what: String) -> StepError {
     let hint = "use dp8".into();
     StepError { cause: Cause::Unsuited, method: plan.method.to_string(), t: 0.0, step: plan.step.unwrap_or(0.0), what, hint }

@@ -44,3 +44,4 @@ pub use sample::{Sample, Sampler};
 pub use sweep::table::SweepTable;
 pub use sweep::{Grid, Observer, Point, Status, Sweep, SweepError, Totals, Vary, VaryError, sweep, sweep_on};
 pub use trace::Trace;
+pub use trust::Trust;
