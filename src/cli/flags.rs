@@ -3,7 +3,7 @@
 use super::failure::{Exit, Failure};
 use super::output::{message, print};
 use crate::run::stress::EFFORT;
-use crate::run::{Limits, METHODS, MethodId, Request, Stabilization, Vary};
+use crate::run::{Limits, METHODS, MethodId, Prefer, Request, Stabilization, Vary};
 use crate::scene::Override;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::error::ErrorKind;
@@ -109,6 +109,9 @@ pub struct PlanFlags {
     /// Evaluations of the equations allowed in a run; one that needs more stops with exit code 4 [default: 1e8, and 1e7 a simulated second]
     #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true)]
     pub effort: Option<u64>,
+    /// What a method is chosen for where none is named [default: the path, and invariants over a minute or more]
+    #[arg(long, value_name = "WHAT", value_parser = preferences(), conflicts_with = "method")]
+    pub prefer: Option<Prefer>,
 }
 
 /// `driftless check`.
@@ -333,6 +336,7 @@ impl PlanFlags {
             time_constant: self.time_constant,
             extended: self.extended,
             effort: self.effort,
+            prefer: self.prefer,
         }
     }
 }
@@ -371,6 +375,10 @@ fn methods() -> impl TypedValueParser<Value = MethodId> {
 
 fn stabilizations() -> impl TypedValueParser<Value = Stabilization> {
     PossibleValuesParser::new(Stabilization::ALL.map(Stabilization::name)).try_map(|name| name.parse::<Stabilization>())
+}
+
+fn preferences() -> impl TypedValueParser<Value = Prefer> {
+    PossibleValuesParser::new(Prefer::ALL.map(Prefer::name)).try_map(|name| name.parse::<Prefer>())
 }
 
 /// A number, or a fraction of two.

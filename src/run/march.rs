@@ -341,6 +341,9 @@ pub(super) fn build(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion)
         MethodId::Dp8 if projected => marcher(problem(), Projected::new(Dp8::new(tolerance)), start, Steps::Own),
         MethodId::Dp5 => marcher(problem(), Dp5::new(tolerance), start, Steps::Own),
         MethodId::Dp8 => marcher(problem(), Dp8::new(tolerance), start, Steps::Own),
+        MethodId::Taylor if mechanism.vibration.is_some() => {
+            return Err(cannot_begin(plan, "the mean force of a rigid spring's vibration has no series".into()));
+        }
         MethodId::Taylor => {
             let mut taylor = Taylor::new(tolerance);
             taylor.extended = plan.extended;

@@ -1,6 +1,6 @@
 //! A run: the loop around a method, and what watches it.
 //!
-//! [`plan`] decides, [`mod@march`] builds the marcher, [`running`] goes with it from one output time to the next and can pause, [`contact`] through impacts and
+//! [`plan`] decides, with [`choice`] of the method, [`mod@march`] builds the marcher, [`running`] goes with it from one output time to the next and can pause, [`contact`] through impacts and
 //! contacts that last, [`sample`] reads off what there is to
 //! know at each, [`drift`] and [`trace`] keep bounded records of it, [`table`] writes it down,
 //! [`files`] keeps whole files only, and [`checkpoint`] what a run needs to go on after whatever ended it.  [`mod@sweep`] runs a grid of starts and parameters, on the lookout for bars that turn over ([`flip`]), and
@@ -8,6 +8,7 @@
 
 #[cfg(feature = "files")]
 pub mod checkpoint;
+pub mod choice;
 pub mod contact;
 pub mod drift;
 #[cfg(feature = "files")]
@@ -29,6 +30,7 @@ pub mod trust;
 
 #[cfg(feature = "files")]
 pub use checkpoint::{CheckpointError, Checkpoints, Loaded};
+pub use choice::Prefer;
 pub use contact::{Hold, Strike};
 pub use drift::{Drift, Limits};
 #[cfg(feature = "files")]

@@ -2,6 +2,7 @@
 //!
 //! A pairing that makes no sense is refused here, before anything is computed, with the reason and an alternative.
 
+use super::choice::{Prefer, choose};
 use super::methods::{MethodId, Stabilization};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::compile::DENSE_LIMIT;
@@ -35,6 +36,8 @@ pub struct Request {
     pub extended: bool,
     /// Evaluations allowed.
     pub effort: Option<u64>,
+    /// What the method is chosen for, where none is named.
+    pub prefer: Option<Prefer>,
 }
 
 /// Everything a run needs to know beside the mechanism.
@@ -90,12 +93,8 @@ const MOST_NUMBERS: f64 = 5e7;
 const LEAST_EXTENDED: f64 = 1e-25;
 /// How much faster than all else a vibration must be to be taken for its mean force: a turn of it within a hundredth of theirs.
 const SEPARATE: f64 = 100.0;
-/// Runs of at least so many seconds are marched symplectically where that is possible.
-const LONG: f64 = 60.0;
 /// So many coordinates are cheaper body by body, with multipliers, than in the matrices that eliminated coordinates and momenta ask for.
-const MANY_COORDINATES: usize = 48;
-/// Steps beyond which a fixed step is not chosen unasked.
-const MANY_STEPS: f64 = 2e7;
+pub(super) const MANY_COORDINATES: usize = 48;
 
 impl Plan {
     /// Decides; see [`Plan::notes`] and [`Plan::why`] for what it decided by itself.
@@ -114,7 +113,7 @@ impl Plan {
         let (method, why) = match request.method {
             Some(method) => (method, None),
             None => {
-                let (method, why) = choose(mechanism, request, until, rate);
+                let (method, why) = choose(mechanism, request, &mechanism.start(scene), until, rate);
                 (method, Some(why))
             }
         };
@@ -297,47 +296,8 @@ fn mismatch(what: String, reason: &str, alternative: &str) -> Refusal {
     Refusal { is_usage: false, what, reason: reason.into(), alternative: alternative.into() }
 }
 
-/// The method for a scene nobody named one for.
-fn choose(mechanism: &Mechanism, request: &Request, until: f64, rate: f64) -> (MethodId, String) {
-    if request.extended {
-        return (MethodId::Taylor, "taylor: extended orders are those of its series".into());
-    }
-    let tolerance = request.rtol.is_some() || request.atol.is_some();
-    let kept = request.stabilize.unwrap_or(usual(mechanism));
-    let steps_back = !mechanism.rows.is_empty() && kept == Stabilization::Projection;
-    let fixed_possible = mechanism.contacts.is_empty() && !tolerance && (mechanism.rows.is_empty() || kept == Stabilization::Elimination);
-    if mechanism.coordinates() > MANY_COORDINATES && mechanism.contacts.is_empty() && request.step.is_none() {
-        let why = format!("{} coordinates are taken body by body", mechanism.coordinates());
-        let method = if mechanism.rows.is_empty() { MethodId::Dop853 } else { MethodId::Dp8 };
-        return (method, format!("{method}: {why}"));
-    }
-    if let Some(vibration) = &mechanism.vibration {
-        let method = if kept == Stabilization::Projection { MethodId::Dp8 } else { MethodId::Dop853 };
-        return (method, format!("{method}: the vibration of rigid spring {} acts by its mean force", vibration.name));
-    }
-    if mechanism.is_tied_up() && mechanism.contacts.is_empty() && kept == Stabilization::Projection {
-        if request.step.is_some() {
-            (MethodId::Gauss(8), "gauss16: a fixed step was given; closed loops and sliders are kept by symmetric projection".into())
-        } else {
-            (MethodId::Taylor, "taylor: closed loops and sliders are kept by projection, and its steps pass singular positions".into())
-        }
-    } else if !mechanism.contacts.is_empty() {
-        (MethodId::Dp8, "dp8: the scene has walls, and impacts are located inside its steps".into())
-    } else if steps_back {
-        (MethodId::Dp8, "dp8: projection acts after every step, which ode_solvers does not let us do".into())
-    } else if fixed_possible && request.step.is_some() {
-        (MethodId::Gauss(8), "gauss16: a fixed step was given, and it is the most accurate fixed-step method".into())
-    } else if fixed_possible && !mechanism.is_damped() && until >= LONG && until * rate / 0.12 <= MANY_STEPS {
-        (MethodId::Gauss(8), format!("gauss16: over {until} s a symplectic method keeps the energy best"))
-    } else {
-        let why = if mechanism.is_damped() { "the scene is damped" } else { "the horizon is short" };
-        let why = if tolerance { "a tolerance was given" } else { why };
-        (MethodId::Dop853, format!("dop853: {why}, and it is the everyday choice"))
-    }
-}
-
 /// How the rows of a mechanism are kept where nobody says: given angles are eliminated where they are all there is to keep.
-fn usual(mechanism: &Mechanism) -> Stabilization {
+pub(super) fn usual(mechanism: &Mechanism) -> Stabilization {
     let is_large = mechanism.coordinates() > MANY_COORDINATES;
     if mechanism.has_multipliers() || is_large { Stabilization::Projection } else { Stabilization::Elimination }
 }

@@ -1,7 +1,7 @@
 //! Stress: stiff and extreme scenes by every method, and what becomes of them.
 //!
 //! A cell of the matrix is one scene by one method, asked for one thing: the end of the motion, to the scene's tolerance.  What a user would do is done: the
-//! method begins with its usual setting, and where its own estimate of the error, or a finer run, does not confirm the tolerance, the setting is refined a few
+//! method begins with its usual setting, and where the estimate of its error, or else a finer run, does not confirm the tolerance, the setting is refined a few
 //! times.  It ends in one of four ways.
 //!
 //! | verdict | what it means |
@@ -20,6 +20,7 @@ pub use steps::{Stability, StabilityMap, stability};
 use super::methods::{METHODS, MethodId};
 use super::plan::{Plan, Request};
 use super::running::{Outcome, Run, march};
+use super::trust::{How, Level};
 use super::{Limits, Sample, reference};
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::Mechanism;
@@ -301,7 +302,7 @@ impl Trial<'_> {
             let start = self.mechanism.start(self.scene);
             cell.runs += 1;
             let outcome = match Run::new(Arc::clone(self.mechanism), plan, Limits::default(), &start) {
-                Ok(run) => march(run, &mut |_| Ok(())).map_err(|error| error.to_string())?,
+                Ok(run) => march(run.trusted(Level::Auto, &start), &mut |_| Ok(())).map_err(|error| error.to_string())?,
                 Err(stop) => {
                     cell.stop = Some(stop);
                     return Ok(());
@@ -322,9 +323,9 @@ impl Trial<'_> {
             }
             let end = self.end(&outcome);
             self.score(&outcome, &end, cell);
-            if let Some(finer) = &before {
-                cell.estimate = Some(end.apart(finer));
-            }
+            // Where the run knows its own error up to the end, no other is needed.
+            let known = outcome.trust.as_ref().filter(|trust| trust.how == How::Companion && trust.at >= self.scene.until);
+            cell.estimate = known.and_then(|trust| trust.error_estimate).or(before.as_ref().map(|before| end.apart(before)));
             let is_no_matter_of_ends = matches!(self.case.expected, Expected::Energy | Expected::Stop(_));
             if is_no_matter_of_ends || cell.estimate.is_some_and(|estimate| estimate <= self.case.tolerance) {
                 return Ok(());

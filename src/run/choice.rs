@@ -1,0 +1,200 @@
+//! The method for a run nobody named one for, and why, in one line.
+//!
+//! | asked | what decides | method |
+//! | --- | --- | --- |
+//! | 1 | extended orders | `taylor` has them |
+//! | 2 | more coordinates than matrices pay for | `dop853`, `dp8` with rows, body by body |
+//! | 3 | a rigid spring that vibrates | `dp8`, `dop853`: its mean force is known to them |
+//! | 4 | walls | `dp8` locates impacts; `radau9` where a damped mode is stiff |
+//! | 5 | a fixed step | `gauss16`, the most accurate of those |
+//! | 6 | a mode much faster than the rest that dies away | `radau5`, `radau9` below 1e-7 |
+//! | 7 | invariants before the path: asked for, or a long horizon without dampers | `gauss16`, where its steps are not too many |
+//! | 8 | the path | `taylor`; `dop853` where Baumgarte's term is asked for or coordinates are many |
+//!
+//! Everywhere else the series is the faster one at every tolerance measured: a seventh of the time of the classic pairs at 1e-6, a sixteenth at 1e-9.
+
+use super::methods::{MethodId, Stabilization};
+use super::plan::{MANY_COORDINATES, Request, usual};
+use crate::dynamics::stiffness::Stiffness;
+use crate::dynamics::{Mechanism, Motion};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::str::FromStr;
+
+/// Runs of at least so many seconds are about invariants where nobody says otherwise.
+const LONG: f64 = 60.0;
+/// Steps beyond which a fixed step is not chosen unasked.
+const MANY_STEPS: f64 = 2e7;
+/// Radians of the fastest motion in a step of `gauss16`.
+const STEP: f64 = 0.12;
+/// How many times faster than the rest a mode that dies away must be for an implicit method to pay.
+const STIFF: f64 = 300.0;
+/// Tolerances below this are for the five-stage method.
+const TIGHT: f64 = 1e-7;
+/// Coordinates beyond which the products of a series cost more than the evaluations it saves.
+const FEW_COORDINATES: usize = 12;
+
+/// What matters more.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Prefer {
+    /// Where everything is at each time.
+    Path,
+    /// Energy and constraints, over long horizons.
+    Invariants,
+}
+
+impl Prefer {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Path, Self::Invariants];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Path => "path",
+            Self::Invariants => "invariants",
+        }
+    }
+}
+
+impl fmt::Display for Prefer {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Prefer {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        Self::ALL
+            .into_iter()
+            .find(|prefer| prefer.name() == name)
+            .ok_or_else(|| format!("no preference `{name}`; there are path, invariants"))
+    }
+}
+
+/// The method for a run to `until` \[s\] from `start`, where the scene's rates go up to `rate` \[rad/s\], and why.
+pub(super) fn choose(mechanism: &Mechanism, request: &Request, start: &Motion, until: f64, rate: f64) -> (MethodId, String) {
+    let (method, why) = chosen(mechanism, request, start, until, rate);
+    (method, format!("{method}: {why}"))
+}
+
+fn chosen(mechanism: &Mechanism, request: &Request, start: &Motion, until: f64, rate: f64) -> (MethodId, String) {
+    if request.extended {
+        return (MethodId::Taylor, "extended orders are those of its series".into());
+    }
+    let kept = request.stabilize.unwrap_or(usual(mechanism));
+    let (has_rows, is_free, n) = (!mechanism.rows.is_empty(), mechanism.contacts.is_empty(), mechanism.coordinates());
+    let classic = if has_rows && kept == Stabilization::Projection { MethodId::Dp8 } else { MethodId::Dop853 };
+    if n > MANY_COORDINATES && is_free && request.step.is_none() {
+        let method = if has_rows { MethodId::Dp8 } else { MethodId::Dop853 };
+        return (method, format!("{n} coordinates are taken body by body"));
+    }
+    if let Some(vibration) = &mechanism.vibration {
+        return (classic, format!("the vibration of rigid spring {} acts by its mean force", vibration.name));
+    }
+    if request.step.is_some() {
+        let why = if mechanism.is_tied_up() {
+            "closed loops and sliders are kept by symmetric projection"
+        } else {
+            "it is the most accurate such method"
+        };
+        return (MethodId::Gauss(8), format!("a fixed step was given; {why}"));
+    }
+    let tolerance = request.rtol.or(request.atol);
+    let stiffness = stiffness(mechanism, start);
+    if let Some(damped) = stiffness.as_ref().filter(|stiffness| stiffness.is_damped() && stiffness.ratio() > STIFF) {
+        let stages = if tolerance.unwrap_or_default() >= TIGHT { 3 } else { 5 };
+        let mode = damped.culprit.as_ref().map_or("the fastest mode".to_owned(), |name| format!("the mode of {name}"));
+        return (MethodId::Radau(stages), format!("{mode} dies away {:.0} times as fast as the rest moves", damped.ratio()));
+    }
+    if !is_free {
+        return (MethodId::Dp8, "the scene has walls, and impacts are located inside its steps".into());
+    }
+    let is_eliminated = !has_rows || kept == Stabilization::Elimination;
+    let fastest = stiffness.as_ref().map_or(rate, |stiffness| stiffness.fastest.max(rate));
+    let is_bearable = until * fastest / STEP <= MANY_STEPS;
+    let keeps = tolerance.is_none() && !mechanism.is_damped() && is_eliminated && is_bearable;
+    match request.prefer {
+        Some(Prefer::Invariants) if keeps => {
+            return (MethodId::Gauss(8), "invariants were asked for, and a symplectic method keeps them best".into());
+        }
+        None if keeps && until >= LONG => {
+            return (MethodId::Gauss(8), format!("over {until} s a symplectic method keeps the energy best"));
+        }
+        _ => {}
+    }
+    if kept == Stabilization::Baumgarte && has_rows {
+        return (MethodId::Dop853, "Baumgarte's term is a force, and the everyday choice takes any".into());
+    }
+    if n > FEW_COORDINATES {
+        return (classic, format!("{n} coordinates are cheaper to evaluate than to expand"));
+    }
+    let fast = stiffness.as_ref().filter(|stiffness| stiffness.ratio() > STIFF);
+    let why = if let Some(name) = fast.and_then(|fast| fast.culprit.as_ref()) {
+        format!("spring {name} vibrates undamped and is resolved, which its long steps do best")
+    } else if mechanism.is_tied_up() {
+        "closed loops and sliders are kept by projection, and its steps pass singular positions".into()
+    } else if request.prefer == Some(Prefer::Path) {
+        "the path was asked for, and its series is the most accurate for the time".into()
+    } else if tolerance.is_some() {
+        "a tolerance was given, and its series is the fastest to it".into()
+    } else if mechanism.is_damped() {
+        "the scene is damped, and its series is the most accurate for the time".into()
+    } else if until >= LONG {
+        "fixed steps would be too many, and its series drifts least".into()
+    } else {
+        "over a short horizon its series is the most accurate for the time".into()
+    };
+    (MethodId::Taylor, why)
+}
+
+/// How stiff the mechanism is at its start, where springs or dampers can make it so.
+fn stiffness(mechanism: &Mechanism, start: &Motion) -> Option<Stiffness> {
+    let has_any = !mechanism.springs.is_empty() || !mechanism.torsions.is_empty();
+    let [phi, omega] = [&start.phi, &start.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<f64>>());
+    has_any.then(|| Stiffness::at(mechanism, start.time, &phi, &omega))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::Plan;
+    use crate::scene::read_scene;
+
+    fn why(scene: &str, overrides: &[&str], request: Request) -> (String, String) {
+        let overrides: Vec<_> = overrides.iter().map(|text| text.parse().expect("an override")).collect();
+        let scene = read_scene(format!("examples/{scene}.json").as_ref(), &overrides).expect("a scene");
+        let mechanism = Mechanism::new(&scene).expect("a mechanism");
+        let plan = Plan::new(&scene, &mechanism, &request).expect("a plan");
+        (plan.method.to_string(), plan.why.expect("a reason"))
+    }
+
+    #[test]
+    fn the_scene_and_what_is_asked_for_decide() {
+        let usual = Request::default;
+        let chosen = |scene, request| why(scene, &[], request).0;
+        assert_eq!(chosen("scenes/free", usual()), "taylor");
+        assert_eq!(chosen("scenes/free", Request { until: Some(1000.0), ..usual() }), "gauss16");
+        assert_eq!(chosen("scenes/free", Request { until: Some(1000.0), prefer: Some(Prefer::Path), ..usual() }), "taylor");
+        assert_eq!(chosen("scenes/free", Request { prefer: Some(Prefer::Invariants), ..usual() }), "gauss16");
+        assert_eq!(chosen("scenes/free", Request { step: Some(0.01), ..usual() }), "gauss16");
+        assert_eq!(chosen("scenes/free", Request { extended: true, ..usual() }), "taylor");
+        assert_eq!(chosen("scenes/motor", usual()), "gauss16");
+        assert_eq!(chosen("scenes/motor", Request { stabilize: Some(Stabilization::Baumgarte), ..usual() }), "dop853");
+        assert_eq!(chosen("scenes/wall", usual()), "dp8");
+        assert_eq!(chosen("scenes/four_bars", usual()), "taylor");
+    }
+
+    #[test]
+    fn stiffness_is_measured_and_told() {
+        let (method, told) = why("stress/spring_damped_1e8", &[], Request::default());
+        assert!(method == "radau9" && told.contains("spring"), "{method}: {told}");
+        assert_eq!(why("stress/spring_damped_1e8", &[], Request { rtol: Some(1e-5), ..Request::default() }).0, "radau5");
+        // The same spring without its damper is resolved, and a soft one decides nothing.
+        let (method, told) = why("stress/spring_1e6", &[], Request::default());
+        assert!(method == "taylor" && told.contains("undamped"), "{method}: {told}");
+        assert_eq!(why("stress/spring_damped_1e2", &[], Request::default()).0, "taylor");
+    }
+}
