@@ -228,6 +228,10 @@ impl Field for Looped {
         (rate[2 * n], rate[2 * n + 1]) = (mechanism.force_power(t, z, omega), 0.0);
     }
 
+    fn fine_rate(&mut self, t: Time, y: &[f64], low: &[f64], rate: &mut [f64]) {
+        if self.mechanism.springs.is_empty() { self.rate(t, y, rate) } else { self.angles.fine_rate(t, y, low, rate) }
+    }
+
     fn jacobian(&mut self, t: Time, y: &[f64], jacobian: &mut [f64]) -> bool {
         self.angles.jacobian(t, y, jacobian)
     }

@@ -47,6 +47,13 @@ impl<const N: usize, const ACCOUNT: bool> Multiplier<N, ACCOUNT> {
         }
     }
 
+    /// [`Field::fine_rate`] with a stabilizer's bias in every row.
+    pub fn fine_biased_rate(&mut self, t: Time, y: &[f64], low: &[f64], rate: &mut [f64], bias: Bias) {
+        self.kernel.measure(&self.mechanism, y, low);
+        self.biased_rate(t, y, rate, bias);
+        self.kernel.stretch.clear();
+    }
+
     /// dy'/dy with a stabilizer's bias in every row.
     pub fn biased_jacobian(&mut self, t: Time, y: &[f64], y_by_y: &mut [f64], bias: Bias) {
         let (n, d) = (self.mechanism.coordinates(), self.dimension());
@@ -68,6 +75,10 @@ impl<const N: usize, const ACCOUNT: bool> Field for Multiplier<N, ACCOUNT> {
     #[inline]
     fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
         self.biased_rate(t, y, rate, Bias::default());
+    }
+
+    fn fine_rate(&mut self, t: Time, y: &[f64], low: &[f64], rate: &mut [f64]) {
+        self.fine_biased_rate(t, y, low, rate, Bias::default());
     }
 
     fn jacobian(&mut self, t: Time, y: &[f64], jacobian: &mut [f64]) -> bool {

@@ -73,6 +73,7 @@ struct Work {
     /// (d each)
     scale: Vec<f64>,
     stage: Vec<f64>,
+    low: Vec<f64>,
     mode: Vec<f64>,
     wide: Vec<Complex<f64>>,
     error: Vec<f64>,
@@ -259,9 +260,10 @@ impl Radau {
         let (s, d) = (tableau.stages(), state.y.len());
         for (i, rates) in work.rates.chunks_exact_mut(d).enumerate() {
             for (k, stage) in work.stage.iter_mut().enumerate() {
-                *stage = state.y[k] + (work.z[i * d + k] + state.low[k]);
+                let (sum, rest) = two_sum(state.y[k], work.z[i * d + k]);
+                (*stage, work.low[k]) = fast_two_sum(sum, rest + state.low[k]);
             }
-            field.rate(state.time + tableau.nodes[i].hi * h, &work.stage, rates);
+            field.fine_rate(state.time + tableau.nodes[i].hi * h, &work.stage, &work.low, rates);
         }
         tally.evaluations += s as u64;
         for i in 0..s {
@@ -322,9 +324,10 @@ impl Radau {
         let mut size = norm(&mut error, work);
         if is_hard && size >= 1.0 {
             for k in 0..d {
-                work.stage[k] = state.y[k] + error[k];
+                let (sum, rest) = two_sum(state.y[k], error[k]);
+                (work.stage[k], work.low[k]) = fast_two_sum(sum, rest + state.low[k]);
             }
-            field.rate(state.time, &work.stage, &mut error);
+            field.fine_rate(state.time, &work.stage, &work.low, &mut error);
             tally.evaluations += 1;
             for k in 0..d {
                 error[k] += work.mode[k];
@@ -365,6 +368,7 @@ impl Radau {
             &mut work.start,
             &mut work.scale,
             &mut work.stage,
+            &mut work.low,
             &mut work.mode,
             &mut work.error,
             &mut work.next,
@@ -432,7 +436,7 @@ impl<F: Field + ?Sized> Method<F> for Radau {
         let (mut has_start, mut is_hard, mut cuts) = (false, !knows, 0);
         while left > 0.0 {
             if !has_start {
-                field.rate(state.time, &state.y, &mut self.work.start);
+                field.fine_rate(state.time, &state.y, &state.low, &mut self.work.start);
                 tally.evaluations += 1;
                 scales(self.tolerance, &state.y, &mut self.work.scale);
                 has_start = true;
