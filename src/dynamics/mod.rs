@@ -175,6 +175,11 @@ pub trait Field {
         false
     }
 
+    /// How stiff the mechanism is at (t, y); `None` where the field stands for none.
+    fn stiffness(&mut self, _t: Time, _y: &[f64]) -> Option<Stiffness> {
+        None
+    }
+
     /// What unknown `i` is, for messages: `omega of bar2`.
     fn label(&self, i: usize) -> String;
 

@@ -5,6 +5,7 @@
 
 use super::jacobian::Jacobian;
 use super::kernel::{Bias, Kernel};
+use super::stiffness::Stiffness;
 use super::tree::size;
 use super::{Coordinates, Field, Form, Glance, Mechanism, Motion, State, Time};
 use crate::arithmetic::DoubleDouble;
@@ -84,6 +85,11 @@ impl<const N: usize, const ACCOUNT: bool> Field for Multiplier<N, ACCOUNT> {
     fn jacobian(&mut self, t: Time, y: &[f64], jacobian: &mut [f64]) -> bool {
         self.biased_jacobian(t, y, jacobian, Bias::default());
         true
+    }
+
+    fn stiffness(&mut self, t: Time, y: &[f64]) -> Option<Stiffness> {
+        let n = self.mechanism.coordinates();
+        Some(Stiffness::at(&self.mechanism, t, &y[..n], &y[n..2 * n]))
     }
 
     fn label(&self, i: usize) -> String {

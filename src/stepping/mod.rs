@@ -142,6 +142,8 @@ pub enum Cause {
     TooManySteps,
     /// An implicit step did not converge.
     NotConverged,
+    /// The step is too long for a fast mode that has a part in the motion.
+    Unresolved,
     /// The projection onto the constraints did not converge.
     ProjectionFailed,
     /// Energy jumped at a singular position: the motion left on another branch.
@@ -162,6 +164,7 @@ impl Cause {
             Self::StepTooSmall => "step_too_small",
             Self::TooManySteps => "too_many_steps",
             Self::NotConverged => "not_converged",
+            Self::Unresolved => "unresolved",
             Self::ProjectionFailed => "projection_failed",
             Self::BranchLost => "branch_lost",
             Self::RestingContact => "resting_contact",
