@@ -32,7 +32,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     })?;
     println!("{} starts: {} turn over within {until} s, {} have too little energy", plan.grid().count(), totals.flipped, totals.skipped);
     println!("{} steps in {:.1} s on {} threads", totals.steps, totals.wall.as_secs_f64(), totals.threads);
-    let axis = |name: &str| MapAxis { name: format!("{name} at the start [rad]"), from: -edge, to: edge, count: starts as usize };
+    let axis =
+        |name: &str| MapAxis { name: format!("{name} at the start [rad]"), from: -edge, to: edge, count: starts as usize, log: false };
     let chart = Map {
         title: "Time until a bar of the double pendulum first turns over".into(),
         caption: vec!["scene free, released at rest".into(), format!("{starts} × {starts} starts"), "taylor, tolerance 1e-9".into()],

@@ -28,7 +28,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut problem = Elimination::<0>::new(Arc::clone(&mechanism));
         let mut state = problem.state(&mechanism.start(&scene));
         let mut method = Taylor::<f64>::with_order(tolerance, 24);
-        method.max_steps = u64::MAX;
         method.extended = extended;
         let mut kernel = Kernel::<DoubleDouble>::without_rows(&mechanism);
         let mut energy = |problem: &mut Elimination<0>, state: &_| {

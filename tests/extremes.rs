@@ -171,6 +171,7 @@ fn a_spring_of_no_length_is_a_typed_stop() {
         stiffness: 10.0,
         free_length: 0.2,
         damping: 0.0,
+        rigid: false,
     });
     for method in EXPLICIT {
         let stop = run(&scene, &request(method, 1e-9, 1.0)).stop.expect("a stop");
@@ -194,32 +195,53 @@ fn a_spring_of_no_length_is_a_typed_stop() {
     }
 }
 
-/// Steps without end are cut off with the time they got to.
+/// Every method ends where the effort it is allowed does, and says when and how to go further.
 #[test]
-fn a_step_budget_that_runs_out_is_a_typed_stop() {
-    use driftless::dynamics::multiplier::Multiplier;
-    use driftless::dynamics::{Form, Time};
-    use driftless::stepping::{Dop853, Dopri5, Dp5, Dp8, Method, Seen, Tally, Tolerance};
-    type Free = Multiplier<2, false>;
-    let scene = shipped("free", &[]);
-    let mechanism = compile(&scene);
-    let tight = Tolerance { relative: 1e-12, absolute: 1e-12 };
-    let (mut dp5, mut dp8) = (Dp5::new(tight), Dp8::new(tight));
-    (dp5.max_steps, dp8.max_steps) = (50, 50);
-    let methods: [Box<dyn Method<Free>>; 4] = [
-        Box::new(dp5),
-        Box::new(dp8),
-        Box::new(Dopri5 { max_steps: 50, ..Dopri5::new(tight) }),
-        Box::new(Dop853 { max_steps: 50, ..Dop853::new(tight) }),
+fn effort_that_is_used_up_is_a_typed_stop() {
+    const EFFORT: u64 = 2000;
+    let named = |name: &str, method: &str, stabilize: Option<Stabilization>| {
+        let method: MethodId = method.parse().expect("a method");
+        let step = (!method.is_adaptive()).then_some(1.0 / 256.0);
+        let rtol = method.is_adaptive().then_some(1e-12);
+        let time_constant = (stabilize == Some(Stabilization::Baumgarte)).then_some(0.05);
+        let request = Request { method: Some(method), step, rtol, stabilize, time_constant, effort: Some(EFFORT), ..Request::default() };
+        (Scene { until: 1e4, every: 50.0, ..shipped(name, &[]) }, request)
+    };
+    let of_any =
+        ["dopri5", "dop853", "dp5", "dp8", "taylor", "gauss4", "gauss16", "rattle2", "rattle8"].map(|method| named("free", method, None));
+    let others = [
+        named("motor_sine", "dp8", Some(Stabilization::Projection)),
+        named("motor_sine", "dp5", Some(Stabilization::Baumgarte)),
+        named("chain8", "taylor", None),
+        named("four_bars", "taylor", None),
+        named("four_bars", "gauss8", None),
+        named("wall", "dp8", None),
+        named("wall", "taylor", None),
     ];
-    for mut method in methods {
-        let mut form = Free::new(mechanism.clone());
-        let mut state = form.state(&mechanism.start(&scene));
-        let stop = method.advance(&mut form, &mut state, Time::from(100.0), &mut Tally::default(), &mut |_, _| Ok(Seen::Kept));
-        let stop = stop.expect_err("a stop");
-        assert_eq!(stop.cause, Cause::TooManySteps, "{stop}");
-        assert!(stop.t > 0.0 && stop.t < 100.0, "{stop}");
+    for (scene, request) in of_any.into_iter().chain(others) {
+        let outcome = run(&scene, &request);
+        let stop = outcome.stop.unwrap_or_else(|| panic!("{}, {:?} ended", scene.name, request.method));
+        assert_eq!(stop.cause, Cause::EffortExhausted, "{stop}");
+        assert!(stop.t > 0.0 && stop.t < 1e4 && stop.hint.contains("--effort") && stop.what.contains("2000"), "{stop}");
+        // Steps that have begun are finished.
+        assert!((EFFORT..EFFORT + 1000).contains(&outcome.tally.evaluations), "{stop} {:?}", outcome.tally);
+        let more = run(&scene, &Request { effort: Some(2 * EFFORT), ..request }).stop.expect("a stop");
+        assert!(more.t > stop.t || outcome.plan.method == MethodId::Dop853 || outcome.plan.method == MethodId::Dopri5, "{more}");
     }
+}
+
+/// A wall that bounces faster and faster, and a horizon that is never reached: the effort bounds both.
+#[test]
+fn nothing_takes_for_ever() {
+    let bouncing = shipped("wall", &["walls.wall.restitution=1", "gravity=[9.81, 0]"]);
+    for method in [MethodId::Dp5, MethodId::Dp8, MethodId::Taylor] {
+        let request = Request { until: Some(1e9), every: Some(1e9), effort: Some(50_000), method: Some(method), ..Request::default() };
+        let stop = run(&bouncing, &request).stop.expect("a stop");
+        assert!(matches!(stop.cause, Cause::EffortExhausted | Cause::RestingContact), "{stop}");
+    }
+    // What nobody bounds is bounded all the same.
+    let plan = run(&shipped("free", &[]), &Request { until: Some(1.0), ..Request::default() }).plan;
+    assert_eq!(plan.effort, 110_000_000);
 }
 
 #[test]

@@ -102,7 +102,7 @@ fn iftomm_a02_four_bars_pass_singular_positions() {
         let outcome = run(&scene, &request);
         let name = format!("{} {:?} {:?}", outcome.plan.method, outcome.plan.step, request.rtol);
         if let Some(stop) = &outcome.stop {
-            let typed = [Cause::BranchLost, Cause::ProjectionFailed, Cause::NotConverged, Cause::StepTooSmall, Cause::TooManySteps];
+            let typed = [Cause::BranchLost, Cause::ProjectionFailed, Cause::NotConverged, Cause::StepTooSmall, Cause::EffortExhausted];
             assert!(typed.contains(&stop.cause), "{name}: {stop}");
             lost.push(name);
             continue;

@@ -166,26 +166,26 @@ fn so_do_rows_inside_one_step() {
     }
 }
 
-/// A method that stops after so many steps stops after as many where it was cut short on the way.
+/// A method whose effort is used up stops at the same place where it was cut short on the way.
 #[test]
-fn a_budget_of_steps_is_not_given_anew() {
+fn effort_is_not_allowed_anew() {
     fn stops_at<M: Method<Multiplier<2, false>>>(mut method: M, seen: Seen) -> f64 {
         let (mechanism, start) = common::started("free");
         let mut form = Multiplier::<2, false>::new(mechanism);
         let mut state = form.state(&start);
+        let mut tally = Tally { effort: 400, ..Tally::default() };
         loop {
-            match method.advance(&mut form, &mut state, 1e3.into(), &mut Tally::default(), &mut |_, _| Ok(seen)) {
+            match method.advance(&mut form, &mut state, 1e3.into(), &mut tally, &mut |_, _| Ok(seen)) {
                 Ok(reached) => assert_eq!(reached, Reached::Pause),
                 Err(stop) => {
-                    assert_eq!(stop.cause, Cause::TooManySteps);
+                    assert_eq!(stop.cause, Cause::EffortExhausted);
                     return stop.t;
                 }
             }
         }
     }
     let tolerance = Tolerance { relative: 1e-6, absolute: 1e-6 };
-    let (mut explicit, mut series) = (Dp8::new(tolerance), Taylor::new(tolerance));
-    (explicit.max_steps, series.max_steps) = (40, 40);
+    let (explicit, series) = (Dp8::new(tolerance), Taylor::new(tolerance));
     assert_eq!(stops_at(explicit.clone(), Seen::Kept), stops_at(explicit, Seen::Enough));
     assert_eq!(stops_at(series.clone(), Seen::Kept), stops_at(series, Seen::Enough));
 }
@@ -258,8 +258,11 @@ mod bytes {
                 let place = place.index(bytes.len());
                 bytes[place] = byte;
             }
-            if let Ok(snapshot) = postcard::from_bytes::<Snapshot>(&bytes)
-                && let Ok(mut running) = Running::resume(Arc::clone(mechanism), &mechanism.start(scene), snapshot)
+            if let Ok(mut snapshot) = postcard::from_bytes::<Snapshot>(&bytes)
+                && let Ok(mut running) = Running::resume(Arc::clone(mechanism), &mechanism.start(scene), {
+                    snapshot.allow(20_000);
+                    snapshot
+                })
             {
                 let mut calls = 0;
                 let mut pause = || {

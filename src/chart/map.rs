@@ -39,7 +39,7 @@ pub enum Cell {
     Failed,
 }
 
-/// An axis of a map: values at equal distances, each in the middle of its cells.
+/// An axis of a map: values at equal distances, or by equal factors, each in the middle of its cells.
 #[derive(Clone, Debug, Default)]
 pub struct MapAxis {
     /// Name with its unit in brackets, with markup.
@@ -50,6 +50,8 @@ pub struct MapAxis {
     pub to: f64,
     /// Number of values.
     pub count: usize,
+    /// By equal factors.
+    pub log: bool,
 }
 
 /// A map.
@@ -134,9 +136,13 @@ fn square(left: f64, top: f64, side: f64) -> [[f64; 2]; 4] {
 
 /// An axis that ends with the outermost cells.
 fn axis(axis: &MapAxis) -> Axis {
-    let MapAxis { ref name, from, to, count } = *axis;
+    let MapAxis { ref name, from, to, count, log } = *axis;
     if count < 2 || from == to {
         return Axis::linear(name, from, from);
+    }
+    if log && from > 0.0 && to > 0.0 {
+        let half = (to / from).powf(0.5 / (count - 1) as f64);
+        return Axis { scale: Scale::Log, from: from / half, to: to * half, name: name.clone() };
     }
     let half = 0.5 * (to - from) / (count - 1) as f64;
     let spread = (to - from).abs();
@@ -275,7 +281,7 @@ mod tests {
     use super::*;
 
     fn chart(cells: Vec<Cell>) -> Map {
-        let axis = MapAxis { name: "*a* [rad]".into(), from: -1.5 * PI / 2.0, to: 1.5 * PI / 2.0, count: 4 };
+        let axis = MapAxis { name: "*a* [rad]".into(), from: -1.5 * PI / 2.0, to: 1.5 * PI / 2.0, count: 4, log: false };
         let words = ["never".to_owned(), "left out".to_owned(), "failed".to_owned()];
         Map { title: "Title".into(), x: axis.clone(), y: axis, cells, value: "time [s]".into(), log: true, words, ..Map::default() }
     }
@@ -321,7 +327,7 @@ mod tests {
                 assert!(map(&Map { log, ..chart(cells.clone()) }, 0.5).is_ok(), "{log} {cells:?}");
             }
         }
-        let narrow = Map { x: MapAxis { count: 1, from: 2.0, to: 2.0, name: "x".into() }, ..chart(vec![Cell::Value(1.0); 4]) };
+        let narrow = Map { x: MapAxis { count: 1, from: 2.0, to: 2.0, name: "x".into(), log: false }, ..chart(vec![Cell::Value(1.0); 4]) };
         assert!(map(&narrow, 0.5).is_ok());
     }
 

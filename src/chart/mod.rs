@@ -15,6 +15,7 @@
 //! | [`torque_power()`] | [`TorquePower`] | torque above power of motors |
 //! | [`work_precision()`] | [`WorkPrecision`] | error against run time |
 //! | [`map()`] | [`Map`] | a value over two others, as colours |
+//! | [`matrix()`] | [`Matrix`] | outcomes by row and column, as colours and words |
 //! | [`profile()`] | [`Profile`] | a value over one other |
 //! | [`motion_gif()`] | [`MotionGif`] | the mechanism in motion |
 
@@ -29,6 +30,7 @@ mod grid;
 mod labels;
 mod lines;
 mod map;
+mod matrix;
 mod mechanism;
 mod motion;
 mod palette;
@@ -47,6 +49,7 @@ pub use constraint_drift::{ConstraintDrift, DefectPanel, constraint_drift};
 pub use energy_drift::{DriftSeries, EnergyDrift, energy_drift};
 pub use file::Picture;
 pub use map::{Cell, Map, MapAxis, map};
+pub use matrix::{Matrix, Outcome, matrix};
 pub use mechanism::{MechanismChart, mechanism};
 pub use motion::{Animation, MotionGif, motion_gif};
 pub use profile::{Profile, profile};

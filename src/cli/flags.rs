@@ -2,6 +2,7 @@
 
 use super::failure::{Exit, Failure};
 use super::output::{message, print};
+use crate::run::stress::EFFORT;
 use crate::run::{Limits, METHODS, MethodId, Request, Stabilization, Vary};
 use crate::scene::Override;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -40,6 +41,8 @@ pub enum Command {
     Sweep(Box<SweepFlags>),
     /// Go on with an interrupted run or sweep: it ends as if nothing had been, byte for byte
     Resume(ResumeFlags),
+    /// Run stiff and extreme scenes by every method: each ends right, refused or stopped, and none wrong
+    Stress(StressFlags),
     /// List the methods
     Methods {
         /// Print one JSON object
@@ -103,6 +106,9 @@ pub struct PlanFlags {
     /// Carry the first orders of taylor's series in double-double: rounding in energy a thousandth of a plain run's, at tolerances down to 1e-25 [default: 1e-20]
     #[arg(long)]
     pub extended: bool,
+    /// Evaluations of the equations allowed in a run; one that needs more stops with exit code 4 [default: 1e8, and 1e7 a simulated second]
+    #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true)]
+    pub effort: Option<u64>,
 }
 
 /// `driftless check`.
@@ -133,10 +139,10 @@ pub struct RunFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub plan: PlanFlags,
-    /// Stop with exit code 5 where the energy is off by more than this share of its scale
+    /// Stop with exit code 5 where the energy is off by more than this share of its scale [default: 0.01 of the largest energy there has been]
     #[arg(long, value_name = "SHARE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
     pub max_energy_drift: Option<f64>,
-    /// Stop with exit code 5 where a constraint is off by more, in rad or rad/s
+    /// Stop with exit code 5 where a constraint is off by more, in rad or m, or that per second [default: 0.01 rad, or sizes of the mechanism, in position]
     #[arg(long, value_name = "SIZE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
     pub max_constraint_drift: Option<f64>,
     /// Folder under which `SCENE/METHOD-SETTING` is made
@@ -176,10 +182,10 @@ pub struct SweepFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub plan: PlanFlags,
-    /// Stop a point where its energy is off by more than this share of its scale
+    /// Stop a point where its energy is off by more than this share of its scale [default: 0.01]
     #[arg(long, value_name = "SHARE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
     pub max_energy_drift: Option<f64>,
-    /// Stop a point where a constraint is off by more, in rad or rad/s
+    /// Stop a point where a constraint is off by more, in rad or m, or that per second [default: 0.01 rad, or sizes of the mechanism, in position]
     #[arg(long, value_name = "SIZE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
     pub max_constraint_drift: Option<f64>,
     /// Folder under which `SCENE/sweep-NAMES-METHOD-SETTING` is made
@@ -199,6 +205,39 @@ pub struct SweepFlags {
     #[cfg(feature = "charts")]
     #[arg(long, value_name = "COLUMN", conflicts_with = "no_charts", help_heading = "Files")]
     pub map: Option<String>,
+}
+
+/// `driftless stress`.
+#[derive(Debug, Args)]
+pub struct StressFlags {
+    /// Scenes [default: the shipped set, whose ends are known]
+    #[arg(value_name = "SCENE")]
+    pub scenes: Vec<PathBuf>,
+    /// Methods, separated by commas [default: all]
+    #[arg(long, value_name = "NAMES", value_parser = methods(), value_delimiter = ',')]
+    pub methods: Vec<MethodId>,
+    /// Evaluations allowed for each scene and method
+    #[arg(long, value_name = "N", default_value_t = EFFORT, value_parser = clap::value_parser!(u64).range(1..))]
+    pub effort: u64,
+    /// What the end of a scene given may be off, in rad
+    #[arg(long, value_name = "RAD", default_value_t = 1e-4, value_parser = limit, allow_hyphen_values = true, requires = "scenes")]
+    pub tolerance: f64,
+    /// Threads [default: all processors]; the cells are the same whatever their number
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Folder under which `stress` is made
+    #[arg(long, value_name = "DIR", default_value = "output")]
+    pub out: PathBuf,
+    /// Overwrite what is in the folder
+    #[arg(long)]
+    pub force: bool,
+    /// Draw no PNG chart
+    #[cfg(feature = "charts")]
+    #[arg(long)]
+    pub no_charts: bool,
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub tell: TellFlags,
 }
 
 /// How often checkpoints are written.
@@ -256,6 +295,7 @@ impl Flags {
             Command::Run(flags) => flags.scene.tell.json,
             Command::Sweep(flags) => flags.scene.tell.json,
             Command::Resume(flags) => flags.tell.json,
+            Command::Stress(flags) => flags.tell.json,
             Command::Methods { json } => *json,
             Command::Schema | Command::Completions { .. } => false,
         }
@@ -292,6 +332,7 @@ impl PlanFlags {
             stabilize,
             time_constant: self.time_constant,
             extended: self.extended,
+            effort: self.effort,
         }
     }
 }
@@ -341,6 +382,12 @@ fn number(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A whole number from 1 to 1e18, as 50000 or 5e4.
+fn count(text: &str) -> Result<u64, String> {
+    let value = number(text)?;
+    if (1.0..=1e18).contains(&value) && value.fract() == 0.0 { Ok(value as u64) } else { Err("a whole number from 1 to 1e18".to_owned()) }
+}
+
 /// A time to wait \[s\]: any number that is not negative.
 fn wait(text: &str) -> Result<f64, String> {
     let value = number(text)?;
@@ -367,6 +414,8 @@ mod tests {
     fn fractions_are_numbers() {
         assert_eq!(number("1/64"), Ok(0.015625));
         assert_eq!(number("-1e-3"), Ok(-0.001));
+        assert_eq!((count("5e4"), count("7")), (Ok(50_000), Ok(7)));
+        assert!(count("0").is_err() && count("1.5").is_err() && count("1e19").is_err() && count("-1").is_err());
         assert!(number("1/").is_err() && number("ten").is_err() && limit("nan").is_err() && limit("-1").is_err());
     }
 }

@@ -9,6 +9,7 @@ mod output;
 mod progress;
 mod resume;
 mod simulate;
+mod stress;
 mod sweep;
 
 pub use failure::Failure;
@@ -34,6 +35,7 @@ pub fn run(flags: &Flags) -> Result<(), Failure> {
         Command::Run(given) => simulate::run(given, &flags.arguments),
         Command::Sweep(given) => sweep::run(given, &flags.arguments),
         Command::Resume(flags) => resume::run(flags),
+        Command::Stress(flags) => stress::run(flags),
         Command::Methods { json: true } => print_object(&report::methods::object()),
         Command::Methods { json: false } => print(&report::methods::text()),
         Command::Schema => print_object(&scene::schema()),

@@ -2,7 +2,7 @@
 
 use super::assembly::Assembly;
 use super::force::action::Kind;
-use super::force::{Action, Spring, Torsion};
+use super::force::{Action, Spring, Torsion, Vibration};
 use super::forest::{Foot, Forest};
 use super::impact::Contact;
 use super::kernel::Kernel;
@@ -18,6 +18,8 @@ use std::sync::Arc;
 
 /// The largest number of coordinates for which the matrices of the tree are made; they hold n² numbers.
 pub const DENSE_LIMIT: usize = 2000;
+/// Energy of a rigid spring's vibration over the mechanism's scale below which it has none.
+const NO_ENERGY: f64 = 1e-12;
 /// So many coordinates have code made for their number.
 const UNROLLED: usize = 6;
 
@@ -36,6 +38,8 @@ pub struct Mechanism {
     pub springs: Vec<Spring>,
     /// Torsion springs and dampers.
     pub torsions: Vec<Torsion>,
+    /// The fast vibration of the rigid spring, where it carries energy.
+    pub vibration: Option<Vibration>,
     /// Applied forces and torques.
     pub actions: Vec<Action>,
     /// Constraint rows: given angles, then points that coincide or stay on lines, then one per contact that is held.
@@ -144,6 +148,16 @@ pub enum CompileError {
         "spring `{0}` starts with length 0 and has a free length\nhint: its force has no direction there; start elsewhere, move an end, or set free_length to 0"
     )]
     SpringWithoutLength(String),
+    /// A rigid spring that vibrates is not the only constraint.
+    #[error(
+        "rigid spring `{spring}` starts with {energy:.3e} J of vibration, and its mean force is known only where no other constraint or wall is\nhint: start it at its free length and without a rate along it, or leave its `model` out"
+    )]
+    NotAlone {
+        /// The spring.
+        spring: String,
+        /// Its energy \[J\].
+        energy: f64,
+    },
     /// A point starts behind its wall.
     #[error("wall `{wall}` has its point {gap:.3e} m behind it at the start\nhint: start elsewhere, move the wall, or turn its normal")]
     BehindWall {
@@ -179,7 +193,11 @@ impl Mechanism {
         for drive in &scene.drives {
             rows.push(travel(&forest, &drive.name, &scene.sliders[drive.slider], drive.law.clone()));
         }
-        let springs = (scene.springs.iter())
+        for spring in scene.springs.iter().filter(|spring| spring.rigid) {
+            let [a, b] = spring.between.each_ref().map(|place| forest.site(place));
+            rows.push(row::rod_row(&spring.name, &a, &b, spring.free_length, bodies.len()));
+        }
+        let springs = (scene.springs.iter().filter(|spring| !spring.rigid))
             .map(|spring| Spring {
                 name: spring.name.clone(),
                 bodies: [spring.between[0].bar, spring.between[1].bar],
@@ -219,6 +237,7 @@ impl Mechanism {
             joints,
             springs,
             torsions,
+            vibration: None,
             rows,
             contacts,
             held: Vec::new(),
@@ -229,6 +248,7 @@ impl Mechanism {
             recursion: None,
         }
         .assembled(scene, &kept_angles(scene))?;
+        mechanism.vibration = mechanism.vibrates(scene)?;
         mechanism.choose_form();
         if let Some(recursion) = mechanism.recursion.as_ref().filter(|recursion| recursion.ways.entries() > DENSE_LIMIT * DENSE_LIMIT) {
             return Err(CompileError::TooMany(recursion.ways.rows()));
@@ -238,12 +258,40 @@ impl Mechanism {
         Ok(mechanism)
     }
 
+    /// The vibration of a rigid spring that the start gives energy to.
+    fn vibrates(&self, scene: &Scene) -> Result<Option<Vibration>, CompileError> {
+        let rigid = || scene.springs.iter().filter(|spring| spring.rigid);
+        let is_whole = (0..scene.bars.len()).all(|bar| scene.given.get(bar).is_none_or(|given| given.phi && given.omega));
+        if rigid().next().is_none() || !self.tree.is_dense() || self.coordinates() > self.bodies.len() || !is_whole {
+            return Ok(None);
+        }
+        let given = self.start_as_given(scene);
+        let z: Vec<Complex<f64>> = given.phi.iter().map(|phi| Complex::unit(phi.hi)).collect();
+        let omega: Vec<f64> = given.omega.iter().map(|omega| omega.hi).collect();
+        let scale = self.scale_of_energy(&self.start(scene));
+        let started =
+            rigid().map(|spring| {
+                let span = self.forest.point(&spring.between[0]).minus(&self.forest.point(&spring.between[1]));
+                Vibration { name: spring.name.clone(), span, stiffness: spring.stiffness, action: 0.0, energy: 0.0, frequency: 0.0 }
+                    .started(self, spring.free_length, &z, &omega)
+            });
+        // What rounding puts into a spring is nothing; not a number counts as energy.
+        let Some(vibration) = started.reduce(|most, other| if other.energy > most.energy { other } else { most }) else { return Ok(None) };
+        if vibration.energy <= NO_ENERGY * scale {
+            return Ok(None);
+        }
+        if self.rows.len() > 1 || !self.contacts.is_empty() {
+            return Err(CompileError::NotAlone { spring: vibration.name, energy: vibration.energy });
+        }
+        Ok(Some(vibration))
+    }
+
     /// Decides in which form the equations are evaluated, body by body or by the matrices of the tree, by what they cost with these rows.
     pub(super) fn choose_form(&mut self) {
         let is_dense = self.tree.is_dense();
         let recursion = (!is_dense || self.coordinates() > UNROLLED)
             .then(|| Recursion::new(&self.bodies, &self.forest, &self.rows, self.gravity))
-            .filter(|recursion| !is_dense || recursion.pays());
+            .filter(|recursion| !is_dense || recursion.pays() && self.vibration.is_none());
         self.recursion = recursion.map(Arc::new);
     }
 
@@ -344,6 +392,11 @@ impl Mechanism {
     /// True where a row is left when the given angles are eliminated: loops, sliders, contacts that are held.
     pub fn is_tied_up(&self) -> bool {
         self.rows.iter().any(|row| !row.is_angle())
+    }
+
+    /// True where rows cannot all be eliminated: those of loops and sliders, and given angles whose whole turns matter.
+    pub fn has_multipliers(&self) -> bool {
+        self.is_tied_up() || (self.is_winding() && self.ties.driven())
     }
 
     /// The mass matrix at the start must be positive definite.

@@ -111,9 +111,11 @@ impl Mechanism {
         tree::multiply::<T, N>(n, &kernel.mass, omega, &mut kernel.load);
         let gravity = self.tree.gravity_energy(&kernel.z) + T::of(self.ground_energy);
         let springs = self.springs.iter().fold(gravity, |sum, spring| sum + spring.energy(&kernel.z));
+        let vibration = self.vibration.as_ref().map(|vibration| vibration.potential(&kernel.z, &kernel.mass));
+        let elastic = vibration.map_or(springs, |potential| springs + potential);
         Energy {
             kinetic: dot(omega, &kernel.load).scale(0.5),
-            potential: self.torsions.iter().fold(springs, |sum, torsion| sum + torsion.energy(phi)),
+            potential: self.torsions.iter().fold(elastic, |sum, torsion| sum + torsion.energy(phi)),
         }
     }
 
@@ -186,7 +188,8 @@ impl Mechanism {
         let springs: f64 = self.springs.iter().map(|spring| spring.energy(&kernel.z).hi).sum();
         let torsions: f64 = self.torsions.iter().map(|torsion| torsion.energy(&start.phi).hi).sum();
         let gravity: f64 = self.tree.weight[..self.bodies.len()].iter().map(|weight| weight.norm_squared().sqrt()).sum();
-        let scale = gravity + kinetic + springs + torsions;
+        let vibration = self.vibration.as_ref().map_or(0.0, |vibration| vibration.energy);
+        let scale = gravity + kinetic + springs + torsions + vibration;
         if scale > 0.0 { scale } else { 1.0 }
     }
 }

@@ -7,6 +7,7 @@
 //! A scene without rows never enters the second line.  Mechanisms of many bodies are evaluated without these matrices, by the passes of
 //! [`recursive`](super::recursive); what is found is the same.
 
+use super::force::Vibration;
 use super::recursive::Evaluation;
 use super::row::{Linearised, Posture};
 use super::schur::{self, Weakest};
@@ -61,6 +62,8 @@ pub struct Kernel<T> {
     pub bodywise: Option<Box<Evaluation<T>>>,
     /// Stretches of springs \[m\], then of torsion springs \[rad\], where [`Kernel::measure`] has found them; empty otherwise.
     pub stretch: Vec<T>,
+    /// Force and u of a vibration (n each), where there is one.
+    pub vibration: [Vec<T>; 2],
     /// Feet of the bodies and their velocities, where energies are formed body by body.
     pub feet: [Vec<Complex<T>>; 2],
 }
@@ -68,7 +71,9 @@ pub struct Kernel<T> {
 impl<T: Scalar> Kernel<T> {
     /// Scratch space with all matrices, whatever the mechanism's own form is; it must have [couplings](tree::Tree::is_dense).
     pub fn dense(mechanism: &Mechanism) -> Self {
-        Self::sized(mechanism.coordinates(), mechanism.row_scales(), true)
+        let size = if mechanism.vibration.is_some() { mechanism.coordinates() } else { 0 };
+        let vibration = std::array::from_fn(|_| vec![T::ZERO; size]);
+        Self { vibration, ..Self::sized(mechanism.coordinates(), mechanism.row_scales(), true) }
     }
 
     /// The same for a mechanism whose rows nobody asks about.
@@ -108,6 +113,7 @@ impl<T: Scalar> Kernel<T> {
             correction: vec![T::ZERO; rows],
             bodywise: None,
             stretch: Vec::new(),
+            vibration: Default::default(),
             feet: Default::default(),
         }
     }
@@ -207,6 +213,9 @@ impl<T: Real> Kernel<T> {
     #[inline(always)]
     fn constrain<const N: usize, const R: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T], bias: Bias) {
         let (n, rows) = (size::<N>(mechanism.tree.coordinates), size::<R>(mechanism.rows.len()));
+        if let Some(vibration) = &mechanism.vibration {
+            self.vibrate::<N>(mechanism, vibration);
+        }
         let is_biased = bias != Bias::default();
         let posture = Posture { phi, z: &self.z[..n], omega };
         let (all, multiplier, correction) = (&mut self.jacobian[..rows * n], &mut self.multiplier[..rows], &mut self.correction[..rows]);
@@ -236,6 +245,16 @@ impl<T: Real> Kernel<T> {
             for k in 0..n {
                 load[k] -= lifted[r * n + k] * self.multiplier[r];
             }
+        }
+    }
+
+    /// Adds what the mean force of a vibration does to the free accelerations.
+    fn vibrate<const N: usize>(&mut self, mechanism: &Mechanism, vibration: &Vibration) {
+        let [force, lifted] = &mut self.vibration;
+        vibration.push::<T, N>(&mechanism.tree, &self.z, (&self.mass, &self.pivot), &self.twist, [force, lifted]);
+        tree::solve::<T, N>(size::<N>(mechanism.tree.coordinates), &self.mass, &self.pivot, force);
+        for (load, &more) in self.load.iter_mut().zip(force.iter()) {
+            *load += more;
         }
     }
 

@@ -61,7 +61,8 @@ struct Bench<const B: usize> {
 /// The matrices of a mechanism this form fits: hinged bodies only, with rows other than angles, all of them linear with constant coefficients.
 pub fn reduced(mechanism: &Mechanism) -> Option<Reduced> {
     let n = mechanism.bodies.len();
-    if mechanism.coordinates() > n || n > MOST || !mechanism.is_tied_up() || !mechanism.contacts.is_empty() || !mechanism.tree.is_dense() {
+    let is_small = mechanism.coordinates() == n && n <= MOST && mechanism.tree.is_dense();
+    if !is_small || !mechanism.is_tied_up() || !mechanism.contacts.is_empty() || mechanism.vibration.is_some() {
         return None;
     }
     let (linear, guides) = sorted_rows(mechanism);

@@ -50,6 +50,25 @@ impl Quadratic {
         found
     }
 
+    /// share |D|² of a vector.
+    pub fn square(span: &Point, share: f64, angles: usize) -> Self {
+        let carried = span.shifts.iter().map(|&(x, times)| (x, Complex::new(times, 0.0)));
+        let terms: Vec<_> = span.terms.iter().copied().chain(carried).collect();
+        let mut found = Self { angles, constant: share * span.root.norm_squared(), ..Self::default() };
+        for (place, &(j, gamma)) in terms.iter().enumerate() {
+            found.linear.push((j, (gamma.conj() * span.root).times(2.0 * share)));
+            // |z_j| = 1.
+            match j < angles {
+                true => found.constant += share * gamma.norm_squared(),
+                false => found.bilinear.push((j, j, Complex::new(share * gamma.norm_squared(), 0.0))),
+            }
+            let others = terms[place + 1..].iter();
+            found.bilinear.extend(others.map(|&(k, other)| (j, k, (gamma.conj() * other).times(2.0 * share))));
+        }
+        found.linear.retain(|term| term.1 != Complex::ZERO);
+        found
+    }
+
     /// The coordinates it depends on; some may come up more than once.
     pub fn coordinates(&self) -> Vec<usize> {
         let elements = self.linear.iter().map(|term| term.0).chain(self.bilinear.iter().flat_map(|&(j, k, _)| [j, k]));

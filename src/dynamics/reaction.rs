@@ -43,8 +43,8 @@ impl Mechanism {
             needed[action.body] -= action.force(action.factor(t), z);
         }
         for (row, &multiplier) in self.rows.iter().zip(&kernel.multiplier) {
-            let Some(push) = row.push else { continue };
-            let direction = push.frame.map_or(push.direction, |body| z[body].turn(push.direction));
+            let Some(push) = &row.push else { continue };
+            let direction = push.direction(z);
             for (body, sign) in [(push.on, 1.0), (push.from, -1.0)] {
                 if let Some(body) = body {
                     needed[body] += direction.times(sign * multiplier);

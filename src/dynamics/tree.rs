@@ -120,8 +120,14 @@ impl Tree {
     /// Writes d(T - V)/dq \[N·m\] without springs, at fixed rates: the force of the canonical form.
     #[inline(always)]
     pub fn pull<T: Scalar, const N: usize>(&self, z: &[Complex<T>], omega: &[T], twist: &[T], force: &mut [T]) {
-        let (n, angles) = (size::<N>(self.coordinates), size::<N>(self.angles));
         self.weigh::<T, N>(z, force);
+        self.swing::<T, N>(omega, twist, force);
+    }
+
+    /// Adds dT/dq \[N·m\] at fixed rates.
+    #[inline(always)]
+    pub fn swing<T: Scalar, const N: usize>(&self, omega: &[T], twist: &[T], force: &mut [T]) {
+        let (n, angles) = (size::<N>(self.coordinates), size::<N>(self.angles));
         let (omega, twist, force) = (&omega[..n], &twist[..n * n], &mut force[..n]);
         for i in 0..angles {
             for j in i + 1..angles {

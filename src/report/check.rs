@@ -4,7 +4,7 @@ use super::page::{Page, figure};
 use crate::dynamics::Mechanism;
 use crate::dynamics::assembly::Assembly;
 use crate::run::{MethodId, Plan, Stabilization};
-use crate::scene::Scene;
+use crate::scene::{Scene, Spring};
 use serde_json::{Value, json};
 
 /// The form of the equations that a plan marches in.
@@ -106,8 +106,12 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> String {
         page.entry("motors", &list(&scene.motors, |motor| &motor.name));
     }
     if !scene.springs.is_empty() {
-        let damped = |damping: f64| if damping == 0.0 { "" } else { " with a damper" };
-        let each: Vec<String> = scene.springs.iter().map(|spring| format!("{}{}", spring.name, damped(spring.damping))).collect();
+        let kind = |spring: &Spring| match spring {
+            Spring { rigid: true, .. } => " as a rod",
+            Spring { damping, .. } if *damping != 0.0 => " with a damper",
+            _ => "",
+        };
+        let each: Vec<String> = scene.springs.iter().map(|spring| format!("{}{}", spring.name, kind(spring))).collect();
         page.entry("springs", &each.join(", "));
     }
     if !scene.walls.is_empty() {

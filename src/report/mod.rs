@@ -9,6 +9,7 @@
 //! | [`inspect`] | the scene's start | `inspect.rs` |
 //! | [`result`] | a run | `result.rs` |
 //! | `sweep` | a sweep, with its chart | `sweep.rs`, with the feature `files` |
+//! | [`stress`] | stiff and extreme scenes by every method | `stress.rs` |
 //! | [`methods`] | the table of methods | `methods.rs` |
 //! | `charts` | a run, in pictures | `charts.rs`, with the feature `charts` |
 
@@ -21,13 +22,14 @@ pub mod inspect;
 pub mod methods;
 pub mod page;
 pub mod result;
+pub mod stress;
 #[cfg(feature = "files")]
 pub mod sweep;
 
 use crate::run::Plan;
 use serde_json::{Value, json};
 
-/// The settings of a plan: `step` \[s\] or `rtol` and `atol`, `stabilize`, `time_constant` \[s\], `extended`, `every` \[s\]; `null` where one does not apply.
+/// The settings of a plan: `step` \[s\] or `rtol` and `atol`, `stabilize`, `time_constant` \[s\], `extended`, `every` \[s\], `effort` (evaluations allowed); `null` where one does not apply.
 pub fn settings(plan: &Plan) -> Value {
     json!({
         "step": plan.step,
@@ -37,6 +39,7 @@ pub fn settings(plan: &Plan) -> Value {
         "time_constant": plan.time_constant,
         "extended": plan.extended,
         "every": plan.every,
+        "effort": plan.effort,
     })
 }
 

@@ -192,7 +192,13 @@ impl Curve {
         let axes: Vec<MapAxis> = (sweep.grid().axes().iter().zip(sweep.variables()))
             .map(|(axis, variable)| {
                 let unit = if variable.unit.is_empty() { String::new() } else { format!(" [{}]", variable.unit) };
-                MapAxis { name: format!("{}{unit}", plain(&variable.path)), from: axis.from, to: axis.to, count: axis.count as usize }
+                MapAxis {
+                    name: format!("{}{unit}", plain(&variable.path)),
+                    from: axis.from,
+                    to: axis.to,
+                    count: axis.count as usize,
+                    log: false,
+                }
             })
             .collect();
         let title = if is_flip { "Time until a bar first turns over".to_owned() } else { format!("{} over the sweep", capital(&bare)) };

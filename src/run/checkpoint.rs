@@ -26,7 +26,7 @@ pub const PREVIOUS: &str = "checkpoint.previous";
 /// What the first bytes are.
 const MAGIC: &[u8] = b"driftless checkpoint\n";
 /// The layout of the content; a program reads its own only.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
 const HEAD: usize = MAGIC.len() + 4 + 8;
 const DIGEST: usize = 32;
 
@@ -160,7 +160,10 @@ fn read<T: DeserializeOwned>(file: &Path) -> Result<T, CheckpointError> {
 }
 
 /// The content in its envelope.
-fn sealed<T: Serialize>(content: &T) -> io::Result<Vec<u8>> {
+///
+/// # Errors
+/// It cannot be written as bytes.
+pub fn sealed<T: Serialize>(content: &T) -> io::Result<Vec<u8>> {
     let mut bytes = MAGIC.to_vec();
     bytes.extend(FORMAT.to_le_bytes());
     bytes.extend([0; 8]);
@@ -172,8 +175,11 @@ fn sealed<T: Serialize>(content: &T) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The content out of its envelope.
-fn opened<T: DeserializeOwned>(bytes: &[u8], file: &Path) -> Result<T, CheckpointError> {
+/// The content out of its envelope; `file` is what messages call it.
+///
+/// # Errors
+/// The bytes are not those of a whole checkpoint of this format.
+pub fn opened<T: DeserializeOwned>(bytes: &[u8], file: &Path) -> Result<T, CheckpointError> {
     let damaged = |why| CheckpointError::Damaged { file: file.to_owned(), why };
     let rest = bytes.strip_prefix(MAGIC).ok_or_else(|| damaged("it does not begin as a checkpoint does"))?;
     let (format, rest) = rest.split_first_chunk::<4>().ok_or_else(|| damaged("it is cut short"))?;

@@ -182,6 +182,7 @@ impl Course {
         if !course.marcher.resume(place, horizon)? {
             return Ok(None);
         }
+        course.marcher.allow(plan.effort);
         if !contacts.is_empty() {
             course.sampler.hold(Arc::clone(&holding));
             course.mechanism = holding;
@@ -385,10 +386,21 @@ impl Course {
         outcome.hold_time += self.held.iter().map(|held| t - held.since).sum::<f64>();
     }
 
-    fn motion(&mut self) -> Motion {
+    /// The present motion.
+    pub(super) fn motion(&mut self) -> Motion {
         let mut motion = Motion::default();
-        self.marcher.read(&mut motion);
+        self.look(&mut motion);
         motion
+    }
+
+    /// The same into a motion that is there already.
+    pub(super) fn look(&mut self, motion: &mut Motion) {
+        self.marcher.read(motion);
+    }
+
+    /// The motion last sampled.
+    pub(super) fn shown(&self) -> &Motion {
+        &self.shown
     }
 
     fn name(&self, contact: usize) -> &str {

@@ -35,9 +35,7 @@ impl Excursion {
     /// Takes the quantity at time `t` \[s\].
     pub fn see(&mut self, t: f64, value: f64) {
         let size = value.abs();
-        if size > self.max || size.is_nan() {
-            self.max = size;
-        }
+        self.max = larger(size, self.max);
         let share = t / self.until;
         let slot = ((share * INTERVALS as f64) as usize).min(INTERVALS - 1);
         self.intervals[slot] = self.intervals[slot].max(size);
@@ -99,13 +97,25 @@ impl Excursion {
     }
 }
 
+/// Where no limit on the energy is stated: the imbalance, over the largest energy or work there has been, beyond which a run is no success.
+pub const ENERGY_MOST: f64 = 1e-2;
+/// And beyond which its result says that it is in doubt.
+pub const ENERGY_DOUBT: f64 = 1e-4;
+/// Where no limit on the constraints is stated: the violation at position level, in rad or sizes of the mechanism, beyond which a run is no success.
+pub const POSITION_MOST: f64 = 1e-2;
+
 /// Stated limits; a run that exceeds one stops.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Limits {
-    /// On the energy imbalance over the energy scale.
+    /// On the energy imbalance over the energy scale; `None`: [`ENERGY_MOST`].
     pub energy: Option<f64>,
-    /// On every constraint, at position \[rad or m\] and velocity level \[rad/s or m/s\].
+    /// On every constraint, at position \[rad or m\] and velocity level \[rad/s or m/s\]; `None`: [`POSITION_MOST`].
     pub constraint: Option<f64>,
+}
+
+/// The larger of two magnitudes; not a number where either is not.
+pub(super) fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a > b { a } else { b }
 }
 
 /// How near to a singular position a run came at its output times.
@@ -135,6 +145,13 @@ pub struct Drift {
     pub stabilizer: f64,
     /// Largest magnitude of that at any time \[J\].
     pub stabilizer_max: f64,
+    /// Largest imbalance over the largest energy or work there had been by then.
+    pub energy_share: f64,
+    /// The largest energy or work by now \[J\], at least the energy scale.
+    largest: f64,
+    /// What the imbalance is given in \[J\], and violations of each row are measured in: 1 rad, or the size of the mechanism \[m\].
+    scale: f64,
+    units: Vec<f64>,
 }
 
 impl Drift {
@@ -149,7 +166,16 @@ impl Drift {
             singular: None,
             stabilizer: 0.0,
             stabilizer_max: 0.0,
+            energy_share: 0.0,
+            largest: mechanism.energy_scale,
+            scale: mechanism.energy_scale,
+            units: mechanism.rows.iter().map(|row| if row.is_angle() { 1.0 } else { mechanism.size_of_parts() }).collect(),
         }
+    }
+
+    /// Whether the energy balance leaves the result in doubt.
+    pub fn is_doubtful(&self) -> bool {
+        self.energy_share.is_nan() || self.energy_share > ENERGY_DOUBT
     }
 
     /// Goes on towards a later horizon \[s\].
@@ -163,6 +189,7 @@ impl Drift {
         let rows = mechanism.rows.iter().map(|row| row.name());
         let mut excursions = self.constraints.iter().flat_map(|(_, levels)| levels).chain([&self.energy]);
         self.constraints.iter().map(|(name, _)| name.as_str()).eq(rows)
+            && self.units.len() == self.constraints.len()
             && excursions.all(|excursion| excursion.intervals.len() == INTERVALS && excursion.until > 0.0)
     }
 
@@ -170,7 +197,9 @@ impl Drift {
     pub fn see(&mut self, sample: &Sample, limits: &Limits) -> Result<(), String> {
         self.energy.see(sample.t, sample.imbalance);
         self.stabilizer = sample.stabilizer;
-        self.stabilizer_max = self.stabilizer_max.max(sample.stabilizer.abs());
+        self.stabilizer_max = larger(sample.stabilizer.abs(), self.stabilizer_max);
+        self.largest = self.largest.max(sample.kinetic.abs()).max(sample.work.abs());
+        self.energy_share = larger(sample.imbalance.abs() * (self.scale / self.largest), self.energy_share);
         for ((_, monitors), values) in self.constraints.iter_mut().zip(&sample.constraints) {
             for (monitor, &value) in monitors.iter_mut().zip(values) {
                 monitor.see(sample.t, value);
@@ -180,20 +209,16 @@ impl Drift {
             let constraint = self.constraints.get(sample.weakest).map_or_else(String::new, |(name, _)| name.clone());
             self.singular = Some(Singular { smallest: sample.singular, t: sample.t, constraint });
         }
-        let beyond = |value: f64, limit: Option<f64>| limit.is_some_and(|limit| value.is_nan() || value > limit);
-        if beyond(self.energy.max, limits.energy) {
-            return Err(format!(
-                "{} is off by {:.2e} of the scale, the limit is {:e}",
-                self.kind,
-                self.energy.max,
-                limits.energy.unwrap_or(0.0)
-            ));
+        let beyond = |value: f64, limit: f64| value.is_nan() || value > limit;
+        let (off, limit) = limits.energy.map_or((self.energy_share, ENERGY_MOST), |limit| (self.energy.max, limit));
+        if beyond(off, limit) {
+            return Err(format!("{} is off by {off:.2e} of the scale, the limit is {limit:e}", self.kind));
         }
-        for (name, monitors) in &self.constraints {
-            for (monitor, level) in monitors.iter().zip(["position", "velocity"]) {
-                if beyond(monitor.max, limits.constraint) {
-                    let limit = limits.constraint.unwrap_or(0.0);
-                    return Err(format!("constraint {name} is violated by {:.2e} at {level} level, the limit is {limit:e}", monitor.max));
+        for ((name, [position, velocity]), unit) in self.constraints.iter().zip(&self.units) {
+            let (most, levels) = limits.constraint.map_or((POSITION_MOST * unit, 1), |limit| (limit, 2));
+            for (monitor, level) in [(position, "position"), (velocity, "velocity")].into_iter().take(levels) {
+                if beyond(monitor.max, most) {
+                    return Err(format!("constraint {name} is violated by {:.2e} at {level} level, the limit is {most:e}", monitor.max));
                 }
             }
         }

@@ -4,6 +4,8 @@
 use super::flip::{self, Flip, Lookout, Suspect};
 use super::methods::{MethodId, Stabilization};
 use super::plan::Plan;
+use super::shrink::{Shrinking, shrinking};
+use crate::arithmetic::DoubleDouble;
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::elimination::Elimination;
 use crate::dynamics::looped::Looped;
@@ -47,6 +49,8 @@ pub(super) trait March {
     /// Goes on from another motion, with what the method remembers.
     fn jump(&mut self, motion: &Motion);
     fn tally(&self) -> Tally;
+    /// Bounds the evaluations.
+    fn allow(&mut self, effort: u64);
     /// What the method carries from step to step.
     fn memory(&self) -> &[f64];
     /// Makes the method choose its step anew.
@@ -172,6 +176,10 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
         self.tally
     }
 
+    fn allow(&mut self, effort: u64) {
+        self.tally.effort = effort;
+    }
+
     fn memory(&self) -> &[f64] {
         &self.state.memory
     }
@@ -234,7 +242,8 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
         flip::search(from.time.hi, *span, ends, &mut |seconds| {
             let mut state = from.clone();
             let until = state.time + seconds;
-            self.method.advance(&mut self.problem, &mut state, until, &mut Tally::default(), &mut |_, _| Ok(Seen::Kept)).ok()?;
+            let mut tally = Tally { effort: self.tally.effort, ..Tally::default() };
+            self.method.advance(&mut self.problem, &mut state, until, &mut tally, &mut |_, _| Ok(Seen::Kept)).ok()?;
             let mut glance = Glance::default();
             self.problem.glance(&state, &mut glance);
             Some(glance)
@@ -252,6 +261,7 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
         });
         tracer.jump(&motion);
         tracer.forget();
+        tracer.allow(tracer.tally().evaluations.saturating_add(self.tally.effort));
         let mut lookout = Lookout::default();
         let until = from.time + *span;
         // Where that stops, what was seen up to there counts.
@@ -261,6 +271,14 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
 }
 
 fn marcher<P: Form + ?Sized + 'static, M: Method<P> + 'static>(problem: Box<P>, method: M, start: &Motion, steps: Steps) -> Box<dyn March> {
+    match shrinking(problem.mechanism()) {
+        // The ends of windows say nothing of what is between them.
+        springs if springs.is_empty() || steps == Steps::Unseen => boxed(problem, method, start, steps),
+        springs => boxed(problem, Shrinking::new(method, springs), start, steps),
+    }
+}
+
+fn boxed<P: Form + ?Sized + 'static, M: Method<P> + 'static>(problem: Box<P>, method: M, start: &Motion, steps: Steps) -> Box<dyn March> {
     let state = problem.state(start);
     let idle = State::default;
     Box::new(Marcher {
@@ -354,6 +372,23 @@ pub(super) fn build(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion)
     })
 }
 
+/// The series of a mechanism in double-double, from `start`, with its order and tolerance \[rad/s\].
+pub(super) fn exact(mechanism: &Arc<Mechanism>, start: &Motion, order: usize, tolerance: f64) -> Box<dyn March> {
+    let taylor = Taylor::<DoubleDouble>::with_order(tolerance, order);
+    match mechanism.has_multipliers() {
+        true => marcher(form::<0>(mechanism, Stabilization::None, 1.0), taylor, start, Steps::Own),
+        false => marcher(eliminated::<0>(mechanism), taylor, start, Steps::Own),
+    }
+}
+
+/// The form whose unknowns small differences are followed in.
+pub(super) fn tangent_form(mechanism: &Arc<Mechanism>) -> Box<dyn Problem> {
+    if mechanism.has_multipliers() {
+        return sized!(mechanism.size(), form(mechanism, Stabilization::None, 1.0));
+    }
+    sized!(mechanism.size(), eliminated(mechanism))
+}
+
 fn cannot_begin(plan: &Plan, what: String) -> StepError {
     let hint = "use dp8".into();
     StepError { cause: Cause::Unsuited, method: plan.method.to_string(), t: 0.0, step: plan.step.unwrap_or(0.0), what, hint }
@@ -363,6 +398,7 @@ fn cannot_begin(plan: &Plan, what: String) -> StepError {
 fn pilot(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion) -> Result<f64, StepError> {
     let mut plain = Plan { stabilization: Stabilization::None, ..plan.clone() };
     let mut marcher = build(mechanism, &mut plain, start)?;
+    marcher.allow(plan.effort);
     let rows = plan.rows.min(20);
     for row in 1..=rows {
         match marcher.advance(plan.time(row), plan.time(plan.rows), None, &mut || false) {

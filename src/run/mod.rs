@@ -3,7 +3,8 @@
 //! [`plan`] decides, [`mod@march`] builds the marcher, [`running`] goes with it from one output time to the next and can pause, [`contact`] through impacts and
 //! contacts that last, [`sample`] reads off what there is to
 //! know at each, [`drift`] and [`trace`] keep bounded records of it, [`table`] writes it down,
-//! [`files`] keeps whole files only, and [`checkpoint`] what a run needs to go on after whatever ended it.  [`mod@sweep`] runs a grid of starts and parameters, on the lookout for bars that turn over ([`flip`]).
+//! [`files`] keeps whole files only, and [`checkpoint`] what a run needs to go on after whatever ended it.  [`mod@sweep`] runs a grid of starts and parameters, on the lookout for bars that turn over ([`flip`]), and
+//! [`mod@stress`] stiff and extreme scenes by every method.
 
 #[cfg(feature = "files")]
 pub mod checkpoint;
@@ -15,12 +16,16 @@ pub mod flip;
 pub mod march;
 pub mod methods;
 pub mod plan;
+pub mod reference;
 pub mod running;
 pub mod sample;
+mod shrink;
+pub mod stress;
 pub mod sweep;
 #[cfg(feature = "files")]
 pub mod table;
 pub mod trace;
+pub mod trust;
 
 #[cfg(feature = "files")]
 pub use checkpoint::{CheckpointError, Checkpoints, Loaded};
@@ -32,9 +37,11 @@ pub use flip::Flip;
 pub use march::Pause;
 pub use methods::{METHODS, MethodId, MethodInfo, Stabilization};
 pub use plan::{Plan, Refusal, Request};
+pub use reference::{Reference, reference};
 pub use running::{Outcome, ResumeError, Run, RunError, Running, Snapshot, march, simulate};
 pub use sample::{Sample, Sampler};
 #[cfg(feature = "files")]
 pub use sweep::table::SweepTable;
 pub use sweep::{Grid, Observer, Point, Status, Sweep, SweepError, Totals, Vary, VaryError, sweep, sweep_on};
 pub use trace::Trace;
+pub use trust::Trust;

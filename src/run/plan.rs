@@ -5,6 +5,7 @@
 use super::methods::{MethodId, Stabilization};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::compile::DENSE_LIMIT;
+use crate::dynamics::force::Vibration;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::natural::Natural;
 use crate::dynamics::{Mechanism, Time};
@@ -32,6 +33,8 @@ pub struct Request {
     pub time_constant: Option<f64>,
     /// First orders in double-double, of the method that has such a setting.
     pub extended: bool,
+    /// Evaluations allowed.
+    pub effort: Option<u64>,
 }
 
 /// Everything a run needs to know beside the mechanism.
@@ -49,6 +52,8 @@ pub struct Plan {
     pub time_constant: Option<f64>,
     /// The first orders of the series in double-double.
     pub extended: bool,
+    /// Evaluations allowed, expansions of a series counted alike: a run that needs more stops.
+    pub effort: u64,
     /// Horizon \[s\].
     pub until: f64,
     /// Output interval \[s\].
@@ -75,10 +80,16 @@ pub struct Refusal {
     pub alternative: String,
 }
 
+/// Evaluations allowed where nobody says: so many at once, and so many a simulated second.  A thousand times what everyday scenes take.
+const EFFORT: (f64, f64) = (1e8, 1e7);
 /// Most rows a run may write.
 pub const MAX_ROWS: f64 = 1e9;
+/// Most numbers of a trajectory that a scene asks for by itself: about a gigabyte.
+const MOST_NUMBERS: f64 = 5e7;
 /// Least tolerance where the first orders are in double-double: far below what the others are rounded to.
 const LEAST_EXTENDED: f64 = 1e-25;
+/// How much faster than all else a vibration must be to be taken for its mean force: a turn of it within a hundredth of theirs.
+const SEPARATE: f64 = 100.0;
 /// Runs of at least so many seconds are marched symplectically where that is possible.
 const LONG: f64 = 60.0;
 /// So many coordinates are cheaper body by body, with multipliers, than in the matrices that eliminated coordinates and momenta ask for.
@@ -108,6 +119,7 @@ impl Plan {
             }
         };
         let stabilization = pair(mechanism, method, request, &mut notes)?;
+        check_vibration(mechanism, method, rate, &mut notes)?;
         let (mut step, mut tolerance) = (None, None);
         if method.is_adaptive() {
             let relative = request.rtol.unwrap_or(if request.extended { 1e-20 } else { 1e-9 });
@@ -119,6 +131,12 @@ impl Plan {
         if rows > MAX_ROWS {
             return Err(usage("--every", format!("{rows:.1e} rows would be written; at most {MAX_ROWS:.0e}"), "a longer output interval"));
         }
+        let numbers = rows * (5 + 6 * mechanism.bodies.len() + 4 * mechanism.rows.len()) as f64;
+        if request.every.is_none() && numbers > MOST_NUMBERS {
+            let what = format!("an output interval of {every} s up to {until} s");
+            let reason = format!("the trajectory would hold {numbers:.1e} numbers, about {:.0} GB", (numbers * 2e-8).ceil());
+            return Err(mismatch(what, &reason, &format!("a longer --every, or --every {every} if that is meant")));
+        }
         Ok(Self {
             method,
             step,
@@ -126,12 +144,31 @@ impl Plan {
             stabilization,
             time_constant: request.time_constant,
             extended: request.extended,
+            effort: request.effort.unwrap_or(usual_effort(until)),
             until,
             every,
             rows: rows as u64,
             why,
             notes,
         })
+    }
+
+    /// A plan nobody asked for: `taylor` at a tolerance to a horizon \[s\], its rows kept as usual.
+    pub(super) fn of_series(mechanism: &Mechanism, tolerance: Tolerance, until: f64) -> Self {
+        Self {
+            method: MethodId::Taylor,
+            step: None,
+            tolerance: Some(tolerance),
+            stabilization: if mechanism.rows.is_empty() { Stabilization::None } else { usual(mechanism) },
+            time_constant: None,
+            extended: false,
+            effort: usual_effort(until),
+            until,
+            every: until,
+            rows: 1,
+            why: None,
+            notes: Vec::new(),
+        }
     }
 
     /// The same to a later horizon \[s\], with the same output times up to the former one; false, and nothing changed, where they would be too many, or fixed
@@ -141,6 +178,9 @@ impl Plan {
         let is_whole = self.step.is_none_or(|step| is_whole(until, step));
         let is_possible = until.is_finite() && rows <= MAX_ROWS && is_whole;
         if is_possible {
+            if self.effort == usual_effort(self.until) {
+                self.effort = usual_effort(until);
+            }
             (self.until, self.rows) = (until, rows as u64);
         }
         is_possible
@@ -182,6 +222,11 @@ impl Plan {
         let keeps_rows = !mechanism.rows.is_empty() && !matches!(self.method, MethodId::Rattle(_));
         if keeps_rows { format!("{}-{setting}-{}", self.method, self.stabilization) } else { format!("{}-{setting}", self.method) }
     }
+}
+
+/// Evaluations allowed up to a horizon \[s\] where nobody says how many.
+fn usual_effort(until: f64) -> u64 {
+    (EFFORT.0 + EFFORT.1 * until) as u64
 }
 
 /// True where so many steps end on the horizon.
@@ -266,6 +311,10 @@ fn choose(mechanism: &Mechanism, request: &Request, until: f64, rate: f64) -> (M
         let method = if mechanism.rows.is_empty() { MethodId::Dop853 } else { MethodId::Dp8 };
         return (method, format!("{method}: {why}"));
     }
+    if let Some(vibration) = &mechanism.vibration {
+        let method = if kept == Stabilization::Projection { MethodId::Dp8 } else { MethodId::Dop853 };
+        return (method, format!("{method}: the vibration of rigid spring {} acts by its mean force", vibration.name));
+    }
     if mechanism.is_tied_up() && mechanism.contacts.is_empty() && kept == Stabilization::Projection {
         if request.step.is_some() {
             (MethodId::Gauss(8), "gauss16: a fixed step was given; closed loops and sliders are kept by symmetric projection".into())
@@ -289,9 +338,8 @@ fn choose(mechanism: &Mechanism, request: &Request, until: f64, rate: f64) -> (M
 
 /// How the rows of a mechanism are kept where nobody says: given angles are eliminated where they are all there is to keep.
 fn usual(mechanism: &Mechanism) -> Stabilization {
-    let counts_turns = mechanism.is_winding() && mechanism.ties.driven();
     let is_large = mechanism.coordinates() > MANY_COORDINATES;
-    if mechanism.is_tied_up() || counts_turns || is_large { Stabilization::Projection } else { Stabilization::Elimination }
+    if mechanism.has_multipliers() || is_large { Stabilization::Projection } else { Stabilization::Elimination }
 }
 
 /// Very many coordinates are taken body by body or not at all.
@@ -311,6 +359,24 @@ fn check_size(mechanism: &Mechanism, method: MethodId, request: &Request) -> Res
     if !mechanism.rows.is_empty() && request.stabilize == Some(Stabilization::Elimination) {
         return Err(mismatch(format!("elimination on {n} coordinates"), &reason, "--stabilize projection"));
     }
+    Ok(())
+}
+
+/// The mean force of a vibration is known to the explicit methods, and right where the vibration is much faster than all else.
+fn check_vibration(mechanism: &Mechanism, method: MethodId, rate: f64, notes: &mut Vec<String>) -> Result<(), Refusal> {
+    let Some(Vibration { name, energy, frequency, .. }) = &mechanism.vibration else { return Ok(()) };
+    if !matches!(method, MethodId::Dopri5 | MethodId::Dop853 | MethodId::Dp5 | MethodId::Dp8 | MethodId::Radau(_)) {
+        let reason = "the mean force of its vibration comes from the mass matrix, of which this method knows no derivative";
+        return Err(mismatch(format!("{method} with the rigid spring `{name}`"), reason, "--method dp8, or dop853"));
+    }
+    if *frequency < SEPARATE * rate {
+        let reason = format!("it vibrates at {frequency:.3e} rad/s, not {SEPARATE} times as fast as all else, up to {rate:.3e} rad/s");
+        return Err(mismatch(format!("the rigid spring `{name}`"), &reason, "leave its `model` out: it is soft enough to be resolved"));
+    }
+    let share = energy / mechanism.energy_scale;
+    notes.push(format!(
+        "rigid spring {name}: {energy:.3e} J of vibration ({share:.1e} of the scale) at {frequency:.3e} rad/s act on average; its force is a mean"
+    ));
     Ok(())
 }
 
@@ -353,8 +419,7 @@ fn pair(mechanism: &Mechanism, method: MethodId, request: &Request, notes: &mut 
         }
         return Ok(usual);
     };
-    let counts_turns = mechanism.is_winding() && mechanism.ties.driven();
-    if asked == Stabilization::Elimination && (mechanism.is_tied_up() || counts_turns) {
+    if asked == Stabilization::Elimination && mechanism.has_multipliers() {
         let reason = if mechanism.is_tied_up() {
             "closed loops and sliders have no independent coordinates to be left with"
         } else {

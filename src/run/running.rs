@@ -8,6 +8,7 @@ use super::methods::{MethodId, Stabilization};
 use super::plan::{Plan, Refusal, Request};
 use super::sample::Sample;
 use super::trace::Trace;
+use super::trust::{Companion, Kept, Level, Trust};
 use crate::dynamics::{CompileError, Mechanism, Motion};
 use crate::scene::Scene;
 use crate::stepping::{Cause, StepError, Tally};
@@ -25,6 +26,7 @@ pub struct Run {
     marcher: Box<dyn March>,
     /// For runs of an ensemble, which look for bars that turn over and keep no samples: whether they end with the first.
     ensemble: Option<bool>,
+    companion: Option<Companion>,
 }
 
 /// How a run ended, or how it stands.
@@ -52,12 +54,40 @@ pub struct Outcome {
     pub hold_count: u64,
     /// Time spent so, summed over the points \[s\].
     pub hold_time: f64,
-    /// Time spent between the first output time and the last, pauses left out.
+    /// Time spent between the first output time and the last, pauses and the companion left out.
     pub wall: Duration,
+    /// Time the companion took.
+    pub trust_wall: Duration,
+    /// How far it may be trusted, where that was asked for: see [`Run::trusted`].
+    pub trust: Option<Trust>,
     /// The first time a bar turned over, where the run is one of an ensemble.
     pub flip: Option<Flip>,
     /// Why it ended before its horizon.
     pub stop: Option<StepError>,
+}
+
+impl Outcome {
+    /// That of a run that has not gone anywhere yet.
+    pub(super) fn begun(mechanism: &Mechanism, plan: Plan) -> Self {
+        Self {
+            last: Sample::default(),
+            tally: Tally::default(),
+            drift: Drift::new(mechanism, plan.until),
+            trace: Trace::default(),
+            strikes: Vec::new(),
+            strike_count: 0,
+            strike_loss: 0.0,
+            holds: Vec::new(),
+            hold_count: 0,
+            hold_time: 0.0,
+            wall: Duration::ZERO,
+            trust_wall: Duration::ZERO,
+            trust: None,
+            flip: None,
+            stop: None,
+            plan,
+        }
+    }
 }
 
 /// What ends a run without an outcome.
@@ -83,8 +113,18 @@ impl Run {
     /// # Errors
     /// A method that cannot begin there.
     pub fn new(mechanism: Arc<Mechanism>, mut plan: Plan, limits: Limits, start: &Motion) -> Result<Self, StepError> {
-        let marcher = build(&mechanism, &mut plan, start)?;
-        Ok(Self { mechanism, plan, limits, marcher, ensemble: None })
+        let mut marcher = build(&mechanism, &mut plan, start)?;
+        marcher.allow(plan.effort);
+        Ok(Self { mechanism, plan, limits, marcher, ensemble: None, companion: None })
+    }
+
+    /// The same, accompanied by an estimate of its error; `start` is the motion it begins with.
+    ///
+    /// Nothing of the run itself changes by it, to the last bit.
+    #[must_use]
+    pub fn trusted(self, level: Level, start: &Motion) -> Self {
+        let companion = (level != Level::Off).then(|| Companion::new(&self.mechanism, &self.plan, start, level));
+        Self { companion, ..self }
     }
 
     /// The same as one of many: on the lookout for the first bar that turns over, and without samples for charts.
@@ -154,6 +194,7 @@ pub struct Running {
     outcome: Outcome,
     /// For runs of an ensemble: whether they end with the first flip.
     ensemble: Option<bool>,
+    companion: Option<Companion>,
     /// The output row it is on the way to.
     row: u64,
     /// What keeps it from leaving its start.
@@ -171,6 +212,7 @@ pub struct Snapshot {
     resting: Option<StepError>,
     /// The horizon on the way to which the station was reached \[s\].
     horizon: f64,
+    companion: Option<Kept>,
 }
 
 /// Why a run cannot go on from a snapshot.
@@ -195,6 +237,11 @@ impl Snapshot {
         self.outcome.last.t
     }
 
+    /// Bounds the evaluations of the whole run anew, those made so far counted in.
+    pub fn allow(&mut self, effort: u64) {
+        self.outcome.plan.effort = effort;
+    }
+
     /// The same on the way to a later horizon \[s\]; false, and nothing changed, where that is not later or would write too many rows.
     ///
     /// What follows is what a run to that horizon would have come to, but for the slopes of its drift: monitors divide the horizon into intervals, and those
@@ -203,6 +250,9 @@ impl Snapshot {
         let is_possible = until > self.outcome.plan.until && self.outcome.plan.extend(until);
         if is_possible {
             self.outcome.drift.extend(until);
+            if let Some(companion) = &mut self.companion {
+                companion.extend(until);
+            }
         }
         is_possible
     }
@@ -220,6 +270,7 @@ impl Snapshot {
             && (self.row == 0 || whole(last))
             && trace.samples().all(sizes)
             && drift.fits(mechanism)
+            && self.companion.as_ref().is_none_or(Kept::is_sound)
             && Course::names_holds(&self.station) <= holds.len()
     }
 }
@@ -227,28 +278,13 @@ impl Snapshot {
 impl Running {
     /// Begins a run: whatever touches and moves into its wall at the start is struck.
     pub fn new(run: Run) -> Self {
-        let Run { mechanism, plan, limits, marcher, ensemble } = run;
-        let mut outcome = Outcome {
-            last: Sample::default(),
-            tally: Tally::default(),
-            drift: Drift::new(&mechanism, plan.until),
-            trace: Trace::default(),
-            strikes: Vec::new(),
-            strike_count: 0,
-            strike_loss: 0.0,
-            holds: Vec::new(),
-            hold_count: 0,
-            hold_time: 0.0,
-            wall: Duration::ZERO,
-            flip: None,
-            stop: None,
-            plan,
-        };
+        let Run { mechanism, plan, limits, marcher, ensemble, companion } = run;
+        let mut outcome = Outcome::begun(&mechanism, plan);
         let mut course = Course::new(mechanism, marcher);
         course.lookout = ensemble.map(|_| Lookout::default());
         // The reference of the energy is what impacts at the start leave.
         let resting = course.meet(&mut outcome).err();
-        Self { limits, course, outcome, ensemble, row: 0, resting, is_over: false }
+        Self { limits, course, outcome, ensemble, companion, row: 0, resting, is_over: false }
     }
 
     /// Goes on from a snapshot of a run of the same mechanism and start.
@@ -259,10 +295,14 @@ impl Running {
         if !snapshot.fits(&mechanism) {
             return Err(ResumeError::Misfit);
         }
-        let Snapshot { limits, station, mut outcome, row, resting, horizon } = snapshot;
+        let Snapshot { limits, station, mut outcome, row, resting, horizon, companion } = snapshot;
         outcome.drift.kind = Drift::new(&mechanism, outcome.plan.until).kind;
+        let companion = match companion {
+            Some(kept) => Some(Companion::resume(&mechanism, start, kept, horizon.into())?.ok_or(ResumeError::Misfit)?),
+            None => None,
+        };
         let course = Course::resume(mechanism, &outcome.plan, start, station, horizon.into())?.ok_or(ResumeError::Misfit)?;
-        Ok(Self { limits, course, outcome, ensemble: None, row, resting, is_over: false })
+        Ok(Self { limits, course, outcome, ensemble: None, companion, row, resting, is_over: false })
     }
 
     /// All that the rest of the run depends on.
@@ -274,6 +314,7 @@ impl Running {
             row: self.row,
             resting: self.resting.clone(),
             horizon: self.outcome.plan.until,
+            companion: self.companion.as_ref().map(Companion::kept),
         }
     }
 
@@ -294,14 +335,14 @@ impl Running {
     /// # Errors
     /// What the observer failed with; the run cannot go on then.
     pub fn go(&mut self, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>, pause: &mut Pause) -> Result<bool, RunError> {
-        let begin = Instant::now();
+        let (begin, before) = (Instant::now(), self.outcome.trust_wall);
         let is_over = self.rows(observer, pause);
-        self.outcome.wall += begin.elapsed();
+        self.outcome.wall += begin.elapsed().saturating_sub(self.outcome.trust_wall - before);
         is_over
     }
 
     fn rows(&mut self, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>, pause: &mut Pause) -> Result<bool, RunError> {
-        let Self { limits, course, outcome, ensemble, .. } = self;
+        let Self { limits, course, outcome, ensemble, companion, .. } = self;
         while !self.is_over {
             let stopped = match self.resting.take() {
                 Some(stop) => Err(stop),
@@ -323,10 +364,15 @@ impl Running {
             let exceeded = outcome.drift.see(sample, limits);
             outcome.stop = stopped
                 .err()
-                .or_else(|| exceeded.err().map(|what| drift_stop(&outcome.plan, sample.t, what)))
                 .or_else(|| (!sample.is_finite()).then(|| not_finite(&outcome.plan, sample.t)))
-                .or_else(|| if is_tied_up { came_apart(&outcome.plan, &outcome.drift, sample) } else { None });
+                .or_else(|| if is_tied_up { came_apart(&outcome.plan, &outcome.drift, sample) } else { None })
+                .or_else(|| exceeded.err().map(|what| drift_stop(&outcome.plan, sample.t, what)));
             outcome.last.clone_from(sample);
+            if let Some(companion) = companion {
+                let begin = Instant::now();
+                companion.see(course.shown(), &outcome.plan, course.tally(), self.row + 1);
+                outcome.trust_wall += begin.elapsed();
+            }
             // A dense method is ahead of what it shows.
             let reached = outcome.last.t;
             outcome.flip = course.lookout.as_ref().and_then(|lookout| lookout.flip).filter(|flip| flip.t <= reached);
@@ -344,6 +390,15 @@ impl Running {
     pub fn finish(mut self) -> Outcome {
         self.course.end(self.outcome.last.t, &mut self.outcome);
         self.outcome.tally = self.course.tally();
+        if self.outcome.drift.is_doubtful() {
+            let how = if self.outcome.plan.step.is_some() { "a shorter step" } else { "a tighter tolerance" };
+            let off = self.outcome.drift.energy_share;
+            self.outcome
+                .plan
+                .notes
+                .push(format!("the energy balance is off by {off:.1e} of its scale, and the motion may be off by more: try {how}"));
+        }
+        self.outcome.trust = self.companion.take().map(|companion| companion.trust(self.outcome.last.t));
         self.outcome
     }
 }
@@ -371,6 +426,9 @@ fn not_finite(plan: &Plan, t: f64) -> StepError {
 }
 
 fn drift_stop(plan: &Plan, t: f64, what: String) -> StepError {
-    let hint = if plan.step.is_some() { "shorten the step" } else { "tighten the tolerance" };
+    let hint = match plan.step {
+        Some(_) => "shorten the step, or state another limit with --max-energy-drift or --max-constraint-drift",
+        None => "tighten the tolerance, or state another limit with --max-energy-drift or --max-constraint-drift",
+    };
     StepError { cause: Cause::DriftLimit, method: plan.method.to_string(), t, step: plan.step.unwrap_or(0.0), what, hint: hint.into() }
 }

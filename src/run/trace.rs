@@ -7,6 +7,10 @@ use std::collections::VecDeque;
 const WHOLE: usize = 2048;
 /// Samples kept of the beginning and of the end.
 const PART: usize = 1500;
+/// Numbers of a sample beyond which fewer are kept.
+const MANY: usize = 1024;
+/// Samples that are kept however large they are.
+const LEAST: usize = 64;
 
 /// The memory: samples without positions, which follow from the angles.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -29,15 +33,17 @@ impl Trace {
 
     /// Takes a sample.
     pub fn see(&mut self, sample: &Sample) {
+        let fewer = ((2 * sample.phi.len() + 4 * sample.constraints.len()) / MANY).max(1);
+        let [whole, part] = [WHOLE, PART].map(|count| (count / fewer).max(LEAST));
         if self.seen == 0 {
             // All of it at once, and no more: a long run shall not ask for more than a short one.
-            self.whole.reserve_exact(WHOLE);
-            self.head.reserve_exact(PART);
-            self.tail.reserve_exact(PART);
+            self.whole.reserve_exact(whole);
+            self.head.reserve_exact(part);
+            self.tail.reserve_exact(part);
             self.stride = 1;
         }
         if self.seen.is_multiple_of(self.stride) {
-            if self.whole.len() == WHOLE {
+            if self.whole.len() == whole {
                 let mut keep = false;
                 self.whole.retain(|_| {
                     keep = !keep;
@@ -49,11 +55,11 @@ impl Trace {
                 self.whole.push(thin(sample));
             }
         }
-        if self.head.len() < PART {
+        if self.head.len() < part {
             self.head.push(thin(sample));
         }
         // The oldest one's room serves the newest.
-        let mut last = if self.tail.len() == PART { self.tail.pop_front() } else { None }.unwrap_or_default();
+        let mut last = if self.tail.len() == part { self.tail.pop_front() } else { None }.unwrap_or_default();
         last.thin_from(sample);
         self.tail.push_back(last);
         self.seen += 1;

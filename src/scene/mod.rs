@@ -164,6 +164,8 @@ pub struct Spring {
     pub free_length: f64,
     /// Damping along the spring \[N·s/m\], not negative.
     pub damping: f64,
+    /// True where it is taken for a rod of its free length, with what its fast vibration does on average.
+    pub rigid: bool,
 }
 
 /// A spring and a damper between the angles of two bodies; whole turns count.

@@ -42,6 +42,7 @@ impl Scene {
                     "stiffness": spring.stiffness,
                     "free_length": spring.free_length,
                     "damping": spring.damping,
+                    "model": if spring.rigid { "rigid" } else { "elastic" },
                 })
             })
             .collect();

@@ -169,6 +169,7 @@ impl<P: Field + Form + ?Sized> Method<P> for SymmetricGauss {
         let count = (span / self.inner.step()).abs().round();
         let h = self.inner.step().copysign(span);
         for _ in 0..count as u64 {
+            tally.check(Method::<P>::name(self), state.time.hi, h)?;
             self.step(problem, state, h, tally)?;
             let seen = watch(problem, state)?;
             if seen.is_changed() {

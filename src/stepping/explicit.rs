@@ -69,8 +69,6 @@ impl Default for Tolerance {
 pub struct Explicit<P> {
     /// Tolerance of a step.
     pub tolerance: Tolerance,
-    /// Most steps, rejected ones counted, in one call of [`Method::advance`].
-    pub max_steps: u64,
     k: Vec<f64>,
     stage: Vec<f64>,
     scale: Vec<f64>,
@@ -85,7 +83,6 @@ impl<P: Pair> Explicit<P> {
     pub fn new(tolerance: Tolerance) -> Self {
         Self {
             tolerance,
-            max_steps: 10_000_000,
             k: Vec::new(),
             stage: Vec::new(),
             scale: Vec::new(),
@@ -252,11 +249,10 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
         let (n, events) = (state.y.len(), field.events());
         super::refuse_the_past(P::NAME, state, until)?;
         self.resize(n, events);
-        // The step proposed last; where the last call was cut short also its number of steps, and the rate where it is known.
+        // The step proposed last; where the last call was cut short also the rate where it is known.
         let proposed = state.memory.first().copied();
-        let mut taken = state.memory.get(1).map_or(0, |&taken| taken as u64);
-        if state.memory.len() == 2 + n {
-            self.k[..n].copy_from_slice(&state.memory[2..]);
+        if state.memory.len() == 1 + n {
+            self.k[..n].copy_from_slice(&state.memory[1..]);
         } else {
             field.rate(state.time, &state.y, &mut self.k[..n]);
             tally.evaluations += 1;
@@ -278,11 +274,7 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
             } else {
                 wanted
             };
-            taken = taken.saturating_add(1);
-            if taken > self.max_steps {
-                let what = format!("more than {} steps before t = {} s", self.max_steps, until.hi);
-                return Err(Self::stop(Cause::TooManySteps, state, h, what, "loosen the tolerance or use a stiff method"));
-            }
+            tally.check(P::NAME, state.time.hi, h)?;
             self.step(field, state, h, tally);
             let error = P::error(h, &self.k, &self.scale).sqrt();
             if !error.is_finite() {
@@ -355,7 +347,6 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
             self.k.copy_within(P::STAGES * n..(P::STAGES + 1) * n, 0);
             let seen = watch(field, state)?;
             if seen.is_enough() && reached.is_none() {
-                state.memory.push(taken as f64);
                 if !seen.is_changed() {
                     state.memory.extend_from_slice(&self.k[..n]);
                 }

@@ -175,7 +175,7 @@ impl Gauss {
         let whose = found.culprit.map_or_else(|| "a mode of the bars".into(), |name| format!("spring `{name}`"));
         Err(StepError {
             cause: Cause::Unresolved,
-            method: NAMES[self.stages() - 2].into(),
+            method: self.label().into(),
             t: state.time.hi,
             step: self.scratch.step,
             what: format!(
@@ -184,6 +184,10 @@ impl Gauss {
             ),
             hint: format!("a step of {:.1e} s follows it", 1.0 / found.fastest),
         })
+    }
+
+    fn label(&self) -> &'static str {
+        NAMES[self.stages() - 2]
     }
 
     /// Refuses a step whose stages are not finite or have not converged.
@@ -195,7 +199,7 @@ impl Gauss {
         let (d, angles) = (state.y.len(), problem.angles());
         let stop = |cause, what| StepError {
             cause,
-            method: NAMES[self.stages() - 2].into(),
+            method: self.label().into(),
             t: state.time.hi,
             step: scratch.step,
             what,

@@ -25,12 +25,12 @@ pub use windows::{Dop853, Dopri5};
 
 use crate::dynamics::{State, Time};
 
-/// Counts of one run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+/// Counts of one run, and the effort it is allowed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Tally {
     /// Accepted steps.
     pub steps: u64,
-    /// Evaluations of the equations.
+    /// Evaluations of the equations; a series is expanded at the price of one.
     pub evaluations: u64,
     /// Rejected steps.
     pub rejected: u64,
@@ -38,6 +38,38 @@ pub struct Tally {
     pub jacobians: u64,
     /// Steps whose stages were found by Newton's method, of the methods that usually sweep.
     pub newton_steps: u64,
+    /// Evaluations allowed: no step begins after so many.
+    pub effort: u64,
+}
+
+impl Default for Tally {
+    /// Nothing done, and no bound on what may be.
+    fn default() -> Self {
+        Self { steps: 0, evaluations: 0, rejected: 0, jacobians: 0, newton_steps: 0, effort: u64::MAX }
+    }
+}
+
+impl Tally {
+    /// Whether another step may be tried, from `t` on and of `step` \[s\].
+    ///
+    /// # Errors
+    /// The effort allowed is used up.
+    #[inline]
+    pub fn check(&self, method: &str, t: f64, step: f64) -> Result<(), StepError> {
+        if self.evaluations < self.effort { Ok(()) } else { Err(self.exhausted(method, t, step)) }
+    }
+
+    #[cold]
+    fn exhausted(&self, method: &str, t: f64, step: f64) -> StepError {
+        StepError {
+            cause: Cause::EffortExhausted,
+            method: method.into(),
+            t,
+            step,
+            what: format!("the effort allowed, {} evaluations, is used up", self.effort),
+            hint: "loosen the tolerance or lengthen the step, shorten the horizon, or allow more with --effort".into(),
+        }
+    }
 }
 
 /// Where [`Method::advance`] stopped.
@@ -138,8 +170,8 @@ pub enum Cause {
     NotFinite,
     /// The step fell below the resolution of time.
     StepTooSmall,
-    /// The number of steps allowed was used up.
-    TooManySteps,
+    /// The number of evaluations allowed was used up.
+    EffortExhausted,
     /// An implicit step did not converge.
     NotConverged,
     /// The step is too long for a fast mode that has a part in the motion.
@@ -148,6 +180,8 @@ pub enum Cause {
     ProjectionFailed,
     /// Energy jumped at a singular position: the motion left on another branch.
     BranchLost,
+    /// A spring with a free length lost its length, and its force its direction.
+    SpringWithoutLength,
     /// A point came to rest on a wall, and it could not be held there or the motors leave it no freedom.
     RestingContact,
     /// The method does not fit the mechanism.
@@ -162,11 +196,12 @@ impl Cause {
         match self {
             Self::NotFinite => "not_finite",
             Self::StepTooSmall => "step_too_small",
-            Self::TooManySteps => "too_many_steps",
+            Self::EffortExhausted => "effort_exhausted",
             Self::NotConverged => "not_converged",
             Self::Unresolved => "unresolved",
             Self::ProjectionFailed => "projection_failed",
             Self::BranchLost => "branch_lost",
+            Self::SpringWithoutLength => "spring_without_length",
             Self::RestingContact => "resting_contact",
             Self::Unsuited => "unsuited",
             Self::DriftLimit => "drift_limit",

@@ -45,8 +45,6 @@ const MOST_CUTS: u32 = 10;
 pub struct Radau {
     /// Tolerance of a step.
     pub tolerance: Tolerance,
-    /// Most steps, rejected ones counted, on the way to one output time.
-    pub max_steps: u64,
     tableau: Tableau,
     work: Work,
 }
@@ -88,8 +86,6 @@ struct Work {
 /// What the next step depends on beside the unknowns, the last polynomial and the Jacobian.
 #[derive(Clone, Copy, Debug)]
 struct Control {
-    /// Steps since the last output time.
-    taken: f64,
     /// The step proposed \[s\].
     wanted: f64,
     /// The last accepted step \[s\], zero before the first, and its error.
@@ -102,7 +98,7 @@ struct Control {
 }
 
 /// Numbers of [`Control`] and of the time of the Jacobian.
-const CONTROLS: usize = 8;
+const CONTROLS: usize = 7;
 
 /// How an iteration ended.
 enum Solved {
@@ -116,7 +112,7 @@ enum Solved {
 impl Radau {
     /// The method of three or five stages; `None` for any other number.
     pub fn new(stages: usize, tolerance: Tolerance) -> Option<Self> {
-        Some(Self { tolerance, max_steps: 10_000_000, tableau: Tableau::new(stages)?, work: Work::default() })
+        Some(Self { tolerance, tableau: Tableau::new(stages)?, work: Work::default() })
     }
 
     fn id(&self) -> &'static str {
@@ -134,8 +130,8 @@ impl Radau {
         else {
             return false;
         };
-        let &[taken, wanted, accepted, error, contraction, keeps, hi, lo] = numbers;
-        *control = Control { taken, wanted, accepted, error, contraction, keeps };
+        let &[wanted, accepted, error, contraction, keeps, hi, lo] = numbers;
+        *control = Control { wanted, accepted, error, contraction, keeps };
         let (place, last) = rest.split_at(d);
         self.work.last.copy_from_slice(last);
         let time = Time { hi, lo };
@@ -147,10 +143,10 @@ impl Radau {
     }
 
     fn remember(&self, state: &mut State, control: &Control) {
-        let &Control { taken, wanted, accepted, error, contraction, keeps } = control;
+        let &Control { wanted, accepted, error, contraction, keeps } = control;
         let (Time { hi, lo }, place) = &self.work.place;
         state.memory.clear();
-        state.memory.extend([taken, wanted, accepted, error, contraction, keeps, *hi, *lo]);
+        state.memory.extend([wanted, accepted, error, contraction, keeps, *hi, *lo]);
         state.memory.extend_from_slice(place);
         state.memory.extend_from_slice(&self.work.last);
     }
@@ -431,7 +427,7 @@ impl<F: Field + ?Sized> Method<F> for Radau {
         super::refuse_the_past(self.id(), state, until)?;
         self.resize(d, events);
         let mut left = (until - state.time).hi;
-        let mut control = Control { taken: 0.0, wanted: 0.0, accepted: 0.0, error: 1.0, contraction: 1.0, keeps: 0.0 };
+        let mut control = Control { wanted: 0.0, accepted: 0.0, error: 1.0, contraction: 1.0, keeps: 0.0 };
         let knows = self.recall(state, &mut control);
         let (mut has_start, mut is_hard, mut cuts) = (false, !knows, 0);
         while left > 0.0 {
@@ -452,11 +448,7 @@ impl<F: Field + ?Sized> Method<F> for Radau {
             } else {
                 control.wanted
             };
-            control.taken += 1.0;
-            if control.taken > self.max_steps as f64 {
-                let what = format!("more than {} steps before t = {} s", self.max_steps, until.hi);
-                return Err(self.stop(Cause::TooManySteps, state, h, what, "loosen the tolerance"));
-            }
+            tally.check(self.id(), state.time.hi, h)?;
             if h < 1e-14 * state.time.hi.abs().max(1e-3) && !whole {
                 let what = format!("{} asks for ever smaller steps", self.culprit(field));
                 return Err(self.stop(
@@ -586,10 +578,6 @@ impl<F: Field + ?Sized> Method<F> for Radau {
         inside.wrap();
     }
 
-    /// The step goes on as it was going.
-    fn arrive(&self, state: &mut State) {
-        if let Some(taken) = state.memory.first_mut() {
-            *taken = 0.0;
-        }
-    }
+    /// The next step goes on as this one.
+    fn arrive(&self, _state: &mut State) {}
 }

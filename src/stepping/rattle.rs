@@ -125,6 +125,7 @@ impl Rattle {
         self.work.load::<N, GUIDED>(natural, state);
         let mut done = 0.0;
         while done < count {
+            tally.check(Method::name(self), state.time.hi, self.step)?;
             for (&h, &end) in self.substeps.iter().zip(&self.ends) {
                 if let Err(failure) = self.work.substep::<N, GUIDED>(natural, h, state.time + end) {
                     return Err(self.explain(natural, state.time.hi, failure));

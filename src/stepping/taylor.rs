@@ -77,8 +77,6 @@ pub struct Taylor<T> {
     pub tolerance: f64,
     /// Highest power of the rates.
     pub order: usize,
-    /// Most steps in one call of [`Method::advance`].
-    pub max_steps: u64,
     /// Which code expands the motion.
     pub kernel: Kernel,
     /// Carries the first powers in double-double: what is rounded are later ones only, which weigh less than a thousandth.  Of use with
@@ -103,7 +101,6 @@ impl<T: Coefficient> Taylor<T> {
         Self {
             tolerance,
             order,
-            max_steps: 10_000_000,
             kernel: Kernel::default(),
             extended: false,
             fast: None,
@@ -156,19 +153,13 @@ impl<T: Coefficient, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
     ) -> Result<Reached, StepError> {
         super::refuse_the_past("taylor", state, until)?;
         self.choose(problem, state)?;
-        // Where the last call was cut short its steps count on.
-        let mut taken = state.memory.pop().unwrap_or_default() as u64;
         state.memory.clear();
         loop {
             let left = until - state.time;
             if left.hi <= 0.0 {
                 return Ok(Reached::Until);
             }
-            taken += 1;
-            if taken > self.max_steps {
-                let what = format!("more than {} steps before t = {} s", self.max_steps, until.hi);
-                return Err(stop(Cause::TooManySteps, state, 0.0, what, "loosen the tolerance"));
-            }
+            tally.check("taylor", state.time.hi, 0.0)?;
             tally.evaluations += 1;
             let quick = self.fast.as_mut().and_then(|fast| fast.step(state, left.hi));
             self.by_series = quick.is_none();
@@ -198,7 +189,6 @@ impl<T: Coefficient, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
                 return Ok(Reached::Event(event));
             }
             if seen.is_enough() {
-                state.memory.push(taken as f64);
                 return Ok(Reached::Pause);
             }
         }

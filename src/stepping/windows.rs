@@ -24,8 +24,6 @@ use std::cell::RefCell;
 pub struct Dopri5 {
     /// Tolerance of a step.
     pub tolerance: Tolerance,
-    /// Most steps in one window.
-    pub max_steps: u32,
 }
 
 /// Dormand–Prince 8(5,3) of `ode_solvers`: everyday runs at 1e-6…1e-12.
@@ -33,24 +31,24 @@ pub struct Dopri5 {
 pub struct Dop853 {
     /// Tolerance of a step.
     pub tolerance: Tolerance,
-    /// Most steps in one window.
-    pub max_steps: u32,
 }
 
-/// Most steps in one window unless said otherwise.
-const MAX_STEPS: u32 = 10_000_000;
+/// Most numbers among the rows of one call of the crate, which keeps them all: after so many a window is begun anew.
+const MOST_KEPT: usize = 1 << 22;
+/// And at least so many rows.
+const LEAST_KEPT: usize = 64;
 
 impl Dopri5 {
     /// The method at a tolerance.
     pub fn new(tolerance: Tolerance) -> Self {
-        Self { tolerance, max_steps: MAX_STEPS }
+        Self { tolerance }
     }
 }
 
 impl Dop853 {
     /// The method at a tolerance.
     pub fn new(tolerance: Tolerance) -> Self {
-        Self { tolerance, max_steps: MAX_STEPS }
+        Self { tolerance }
     }
 }
 
@@ -59,6 +57,8 @@ struct Window<'a, F: ?Sized> {
     field: RefCell<&'a mut F>,
     start: Time,
     n: usize,
+    /// Rows that may still be kept.
+    rows: usize,
 }
 
 impl<F: Field + ?Sized> Window<'_, F> {
@@ -66,17 +66,31 @@ impl<F: Field + ?Sized> Window<'_, F> {
         self.field.borrow_mut().rate(self.start + DoubleDouble::of(y[self.n]), &y[..self.n], &mut rate[..self.n]);
         rate[self.n] = 1.0;
     }
+
+    /// Counts a row; true where it was the last that may be kept.
+    fn is_full(&mut self) -> bool {
+        self.rows = self.rows.saturating_sub(1);
+        self.rows == 0
+    }
 }
 
 impl<F: Field + ?Sized, const D: usize> System<f64, SVector<f64, D>> for Window<'_, F> {
     fn system(&self, _: f64, y: &SVector<f64, D>, rate: &mut SVector<f64, D>) {
         self.rate(y.as_slice(), rate.as_mut_slice());
     }
+
+    fn solout(&mut self, _: f64, _: &SVector<f64, D>, _: &SVector<f64, D>) -> bool {
+        self.is_full()
+    }
 }
 
 impl<F: Field + ?Sized> System<f64, DVector<f64>> for Window<'_, F> {
     fn system(&self, _: f64, y: &DVector<f64>, rate: &mut DVector<f64>) {
         self.rate(y.as_slice(), rate.as_mut_slice());
+    }
+
+    fn solout(&mut self, _: f64, _: &DVector<f64>, _: &DVector<f64>) -> bool {
+        self.is_full()
     }
 }
 
@@ -129,22 +143,41 @@ struct Stepper {
     accepted: u64,
 }
 
-/// One window of either method.
+/// What integrates one window: it, the unknowns, its length \[s\], the first step \[s\], and most steps.
+type Integrate<'a, F> = dyn FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome + 'a;
+
+/// One window of either method, or as many as its rows fill.
 fn window<F: Field + ?Sized>(
     stepper: &Stepper,
-    integrate: impl FnOnce(Window<F>, &[f64], f64, f64) -> Outcome,
+    integrate: &mut Integrate<F>,
     field: &mut F,
     state: &mut State,
     until: Time,
     tally: &mut Tally,
     watch: &mut Watch<F>,
 ) -> Result<Reached, StepError> {
-    let (n, name) = (state.y.len(), stepper.name);
-    super::refuse_the_past(name, state, until)?;
-    let span = (until - state.time).hi;
-    if span <= 0.0 {
-        return Ok(Reached::Until);
+    super::refuse_the_past(stepper.name, state, until)?;
+    while (until - state.time).hi > 0.0 {
+        part(stepper, integrate, field, state, until, tally)?;
+        if watch(field, state)?.is_enough() && state.time < until {
+            return Ok(Reached::Pause);
+        }
     }
+    Ok(Reached::Until)
+}
+
+/// One call of the crate: to `until`, or to where its rows are as many as may be kept.
+fn part<F: Field + ?Sized>(
+    stepper: &Stepper,
+    integrate: &mut Integrate<F>,
+    field: &mut F,
+    state: &mut State,
+    until: Time,
+    tally: &mut Tally,
+) -> Result<(), StepError> {
+    let (n, name) = (state.y.len(), stepper.name);
+    let span = (until - state.time).hi;
+    tally.check(name, state.time.hi, state.memory.first().copied().unwrap_or(0.0))?;
     let stop = |cause, t: f64, step, what: String, hint: &str| StepError { cause, method: name.into(), t, step, what, hint: hint.into() };
     let mut rate = vec![0.0; n];
     field.rate(state.time, &state.y, &mut rate);
@@ -156,7 +189,9 @@ fn window<F: Field + ?Sized>(
     let mut y = state.y.clone();
     y.push(0.0);
     let first = state.memory.first().map_or(0.0, |&h| h.min(span));
-    let (times, last, outcome) = integrate(Window { field: RefCell::new(field), start: state.time, n }, &y, span, first);
+    let most = tally.effort.saturating_sub(tally.evaluations).div_ceil(stepper.attempt).min(u64::from(u32::MAX)) as u32;
+    let rows = (MOST_KEPT / (n + 2)).max(LEAST_KEPT);
+    let (times, last, outcome) = integrate(Window { field: RefCell::new(field), start: state.time, n, rows }, &y, span, first, most);
     let reached_time = |x: f64| state.time.hi + x;
     match outcome {
         Ok(stats) => {
@@ -166,9 +201,9 @@ fn window<F: Field + ?Sized>(
             let attempts = (u64::from(stats.num_eval) - begun - stepper.accepted * u64::from(stats.accepted_steps)) / stepper.attempt;
             tally.rejected += attempts - u64::from(stats.accepted_steps);
         }
-        Err(IntegrationError::MaxNumStepReached { x, n_step }) => {
-            let what = format!("more than {n_step} steps before t = {} s", until.hi);
-            return Err(stop(Cause::TooManySteps, reached_time(x), 0.0, what, "loosen the tolerance or use a stiff method"));
+        Err(IntegrationError::MaxNumStepReached { x, .. }) => {
+            tally.evaluations = tally.effort;
+            return Err(tally.exhausted(name, reached_time(x), 0.0));
         }
         Err(IntegrationError::StepSizeUnderflow { x } | IntegrationError::StiffnessDetected { x }) => {
             let what = "the step fell below the resolution of time, or a rate became not finite".into();
@@ -190,10 +225,10 @@ fn window<F: Field + ?Sized>(
     state.memory[0] = next;
     state.y.copy_from_slice(&last[..n]);
     state.low.fill(0.0);
-    state.time = until;
+    let reached = times.last().copied().unwrap_or(span);
+    state.time = if reached < span * (1.0 - 1e-12) { state.time + reached } else { until };
     state.wrap();
-    watch(field, state)?;
-    Ok(Reached::Until)
+    Ok(())
 }
 
 impl<F: Field + ?Sized> Method<F> for Dopri5 {
@@ -213,12 +248,12 @@ impl<F: Field + ?Sized> Method<F> for Dopri5 {
         tally: &mut Tally,
         watch: &mut Watch<F>,
     ) -> Result<Reached, StepError> {
-        let (tolerance, max_steps) = (self.tolerance, self.max_steps);
-        let integrate = |window: Window<F>, y: &[f64], span: f64, first: f64| -> Outcome {
-            let settings = (tolerance, (0.04, 0.2, 10.0), first, max_steps);
+        let tolerance = self.tolerance;
+        let mut integrate = |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| -> Outcome {
+            let settings = (tolerance, (0.04, 0.2, 10.0), first, most);
             by_length!(ode_solvers::Dopri5<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
         };
-        window(&Stepper { name: "dopri5", attempt: 6, accepted: 0 }, integrate, field, state, until, tally, watch)
+        window(&Stepper { name: "dopri5", attempt: 6, accepted: 0 }, &mut integrate, field, state, until, tally, watch)
     }
 }
 
@@ -239,11 +274,11 @@ impl<F: Field + ?Sized> Method<F> for Dop853 {
         tally: &mut Tally,
         watch: &mut Watch<F>,
     ) -> Result<Reached, StepError> {
-        let (tolerance, max_steps) = (self.tolerance, self.max_steps);
-        let integrate = |window: Window<F>, y: &[f64], span: f64, first: f64| -> Outcome {
-            let settings = (tolerance, (0.0, 1.0 / 3.0, 6.0), first, max_steps);
+        let tolerance = self.tolerance;
+        let mut integrate = |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| -> Outcome {
+            let settings = (tolerance, (0.0, 1.0 / 3.0, 6.0), first, most);
             by_length!(ode_solvers::Dop853<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
         };
-        window(&Stepper { name: "dop853", attempt: 11, accepted: 1 }, integrate, field, state, until, tally, watch)
+        window(&Stepper { name: "dop853", attempt: 11, accepted: 1 }, &mut integrate, field, state, until, tally, watch)
     }
 }

@@ -63,6 +63,7 @@ pub fn spring(damping: f64) -> Spring {
         stiffness: 7.394_287_5,
         free_length: 0.4,
         damping,
+        rigid: false,
     }
 }
 

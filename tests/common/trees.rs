@@ -75,6 +75,7 @@ pub fn tree(n: usize, motors: bool, dice: &mut Dice) -> Scene {
                 stiffness: dice.within(1.0, 20.0),
                 free_length: if dice.flip() { dice.within(0.1, 1.0) } else { 0.0 },
                 damping: if dice.flip() { dice.within(0.1, 1.0) } else { 0.0 },
+                rigid: false,
             }
         })
         .collect();

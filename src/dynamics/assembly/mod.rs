@@ -149,7 +149,7 @@ impl Mechanism {
     }
 
     /// The size of the mechanism \[m\]: its longest body or lever; 1 m where it has none.
-    pub(super) fn size_of_parts(&self) -> f64 {
+    pub(crate) fn size_of_parts(&self) -> f64 {
         let length = |x: &Complex<f64>| x.norm_squared().sqrt();
         let bodies = self.bodies.iter().flat_map(|body| body.ends.iter().chain([&body.centre]).map(length));
         let levers = self.rows.iter().map(|row| if row.is_angle() { 0.0 } else { newton::lever(&row.measure, 0.0) });

@@ -3,7 +3,9 @@
 pub mod action;
 pub mod spring;
 pub mod torsion;
+pub mod vibration;
 
 pub use action::Action;
 pub use spring::Spring;
 pub use torsion::Torsion;
+pub use vibration::Vibration;

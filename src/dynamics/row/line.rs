@@ -6,7 +6,7 @@
 //!
 //! C is positive on the side the normal points to.  The force on the point is -lambda n.
 
-use super::{Measure, Push, Row, Site};
+use super::{Measure, Push, Row, Site, Way};
 use crate::arithmetic::Complex;
 use crate::dynamics::law::Law;
 use crate::dynamics::quadratic::Quadratic;
@@ -15,12 +15,7 @@ use crate::dynamics::quadratic::Quadratic;
 pub fn line_row(name: &str, site: &Site, normal: Complex<f64>, offset: f64, law: Option<Law>, angles: usize) -> Row {
     let mut place = Quadratic::along(&site.point, normal, angles);
     place.constant -= offset;
-    Row {
-        name: name.into(),
-        measure: Measure::Place(place),
-        law,
-        push: Some(Push { on: site.body, from: None, direction: normal, frame: None }),
-    }
+    Row { name: name.into(), measure: Measure::Place(place), law, push: Some(Push { on: site.body, from: None, way: Way::Ground(normal) }) }
 }
 
 #[cfg(test)]

@@ -9,11 +9,13 @@
 pub mod angle;
 pub mod line;
 pub mod pin;
+pub mod rod;
 pub mod slot;
 
 pub use angle::angle_row;
 pub use line::line_row;
 pub use pin::pin_rows;
+pub use rod::rod_row;
 pub use slot::slot_row;
 
 use super::Time;
@@ -76,16 +78,36 @@ pub enum Measure {
 }
 
 /// The force a row exerts: -lambda direction on one body, the opposite on another.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Push {
     /// The body that takes -lambda direction.
     pub on: Option<usize>,
     /// The body that takes the opposite.
     pub from: Option<usize>,
-    /// Unit vector.
-    pub direction: Complex<f64>,
-    /// The body in whose frame the direction is; `None`: in that of the ground.
-    pub frame: Option<usize>,
+    /// Where to.
+    pub way: Way,
+}
+
+/// The direction of a force, a unit vector.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Way {
+    /// Fixed in the ground.
+    Ground(Complex<f64>),
+    /// Fixed in the frame of a body.
+    Body(usize, Complex<f64>),
+    /// Along a span of this length \[m\].
+    Span(Point, f64),
+}
+
+impl Push {
+    /// Its direction at the elements `z`.
+    pub fn direction(&self, z: &[Complex<f64>]) -> Complex<f64> {
+        match &self.way {
+            Way::Ground(direction) => *direction,
+            Way::Body(body, direction) => z[*body].turn(*direction),
+            Way::Span(span, length) => span.position(z).times(length.recip()),
+        }
+    }
 }
 
 /// A row of the mechanism: its measure less a law of time is to be zero.

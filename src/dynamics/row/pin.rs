@@ -6,7 +6,7 @@
 //!
 //! The force on the first point is -lambda n, on the second lambda n.
 
-use super::{Measure, Push, Row, Site};
+use super::{Measure, Push, Row, Site, Way};
 use crate::arithmetic::Complex;
 use crate::dynamics::quadratic::Quadratic;
 
@@ -17,7 +17,7 @@ pub fn pin_rows(name: &str, a: &Site, b: &Site, angles: usize) -> [Row; 2] {
         name: format!("{name}.{letter}"),
         measure: Measure::Place(Quadratic::along(&span, axis, angles)),
         law: None,
-        push: Some(Push { on: a.body, from: b.body, direction: axis, frame: None }),
+        push: Some(Push { on: a.body, from: b.body, way: Way::Ground(axis) }),
     })
 }
 

@@ -8,7 +8,7 @@
 //!
 //! As a function of the elements it is bilinear.  The force on the point is -lambda nu, on the body lambda nu at the same place.
 
-use super::{Measure, Push, Row, Site};
+use super::{Measure, Push, Row, Site, Way};
 use crate::arithmetic::Complex;
 use crate::dynamics::law::Law;
 use crate::dynamics::quadratic::Quadratic;
@@ -19,7 +19,7 @@ pub fn slot_row(name: &str, site: &Site, rail: usize, foot: &Site, normal: Compl
         name: name.into(),
         measure: Measure::Place(Quadratic::along_body(&site.point.minus(&foot.point), rail, normal, angles)),
         law,
-        push: Some(Push { on: site.body, from: Some(rail), direction: normal, frame: Some(rail) }),
+        push: Some(Push { on: site.body, from: Some(rail), way: Way::Body(rail, normal) }),
     }
 }
 

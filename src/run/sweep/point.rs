@@ -5,6 +5,7 @@ use crate::arithmetic::DoubleDouble;
 use crate::dynamics::elimination::Elimination;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::{Form, Glance, Mechanism, Motion};
+use crate::run::drift::{ENERGY_MOST, larger};
 use crate::run::flip::{self, Flip};
 use crate::run::methods::MethodId;
 use crate::run::plan::Plan;
@@ -182,7 +183,7 @@ impl Sweep {
                 point.phi = outcome.last.phi;
                 point.omega = outcome.last.omega;
                 point.energy = outcome.drift.energy.max;
-                point.constraint = levels.reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])]);
+                point.constraint = levels.reduce(|a, b| [larger(a[0], b[0]), larger(a[1], b[1])]);
                 point.steps = outcome.tally.steps;
                 point.flip = outcome.flip;
                 point.status = outcome.stop.map_or(Status::Done, Status::Stopped);
@@ -202,7 +203,9 @@ impl Sweep {
         let mut entrants: Vec<Entrant> = Vec::with_capacity(ready.len());
         for ready in &ready {
             let state = Elimination::<0>::new(Arc::clone(&ready.mechanism)).state(&ready.start);
-            entrants.push(Entrant::new(&ready.mechanism, state));
+            let mut entrant = Entrant::new(&ready.mechanism, state);
+            entrant.tally.effort = ready.plan.effort;
+            entrants.push(entrant);
             let reference = ready.mechanism.energy(&mut kernel, &ready.start.phi, &ready.start.omega).total();
             lanes.push(Lane { point: ready.point.clone(), reference, scale: ready.scale, seen: [Glance::default(), Glance::default()] });
         }
@@ -223,7 +226,7 @@ impl Sweep {
             while number < lanes.len() {
                 let (lane, entrant) = (&mut lanes[number], &entrants[number]);
                 let over = row == plan.rows || (self.ends_at_flips && lane.point.flip.is_some());
-                if lane.measure(entrant, &mut motion, &mut kernel, self.limits.energy, &plan) && !over {
+                if lane.measure(entrant, &mut motion, &mut kernel, self.limits.energy.unwrap_or(ENERGY_MOST), &plan) && !over {
                     number += 1;
                     continue;
                 }
@@ -286,14 +289,7 @@ impl Lane {
     }
 
     /// Takes what an entrant has come to; false where the point goes no further.
-    fn measure(
-        &mut self,
-        entrant: &Entrant,
-        motion: &mut Motion,
-        kernel: &mut Kernel<DoubleDouble>,
-        limit: Option<f64>,
-        plan: &Plan,
-    ) -> bool {
+    fn measure(&mut self, entrant: &Entrant, motion: &mut Motion, kernel: &mut Kernel<DoubleDouble>, limit: f64, plan: &Plan) -> bool {
         let n = entrant.mechanism.bodies.len();
         let state = &entrant.state;
         motion.resize(n);
@@ -304,12 +300,11 @@ impl Lane {
         let point = &mut self.point;
         let energy = entrant.mechanism.energy(kernel, &motion.phi, &motion.omega).total();
         let imbalance = ((energy - self.reference).hi / self.scale).abs();
-        point.energy = if imbalance.is_nan() { imbalance } else { point.energy.max(imbalance) };
+        point.energy = larger(imbalance, point.energy);
         point.t = state.time.hi;
         point.phi = (0..n).map(|k| motion.unwrapped(k)).collect();
         point.omega = motion.omega.iter().map(|omega| omega.hi).collect();
         point.steps = entrant.tally.steps;
-        let exceeded = limit.is_some_and(|limit| point.energy.is_nan() || point.energy > limit);
         let stop = |cause, what: String, hint: &str| StepError {
             cause,
             method: plan.method.to_string(),
@@ -320,12 +315,12 @@ impl Lane {
         };
         let stopped = match &entrant.stopped {
             Some(stopped) => Some(stopped.clone()),
-            None if exceeded => {
-                let what = format!("energy is off by {:.2e} of the scale, the limit is {:e}", point.energy, limit.unwrap_or(0.0));
-                Some(stop(Cause::DriftLimit, what, "tighten the tolerance"))
-            }
             None if point.energy.is_nan() => {
                 Some(stop(Cause::NotFinite, "the energy is not finite".into(), "look for rates far out of proportion"))
+            }
+            None if point.energy > limit => {
+                let what = format!("energy is off by {:.2e} of the scale, the limit is {limit:e}", point.energy);
+                Some(stop(Cause::DriftLimit, what, "tighten the tolerance"))
             }
             None => None,
         };

@@ -52,7 +52,7 @@ pub(super) fn fitted(scene: Scene, places: &Places, given: &[Option<GivenStart>]
 
 impl Scene {
     /// True where the start is known from angles and rates alone, all of which must be given or follow from motors and locks: trees of
-    /// hinges on the ground whose only constraints are angles.  In every other scene a part of the start can be found from the rest.
+    /// hinges on the ground whose only constraints are angles, no rigid spring among them.  In every other scene a part of the start can be found from the rest.
     pub fn has_whole_start(&self) -> bool {
         Hanging::of(self).has_whole_start(self)
     }
@@ -114,6 +114,7 @@ impl Hanging {
 
     fn has_whole_start(&self, scene: &Scene) -> bool {
         let only_angles = scene.sliders.is_empty() && scene.welds.is_empty() && scene.drives.is_empty();
+        let only_angles = only_angles && !scene.springs.iter().any(|spring| spring.rigid);
         let angles_known = scene.locks.iter().all(|lock| lock.angle.is_some());
         only_angles && angles_known && !self.looped && self.order.len() == scene.bars.len()
     }

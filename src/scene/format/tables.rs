@@ -186,6 +186,12 @@ pub(in crate::scene) static SPRING: Table = Table {
         required("stiffness", Shape::Number(not_negative("N/m")), "7.4", "Stiffness."),
         required("free_length", Shape::Number(not_negative("m")), "0.4", "Length without force."),
         optional("damping", Shape::Number(not_negative("N·s/m")), "0.1", "Damping along the spring; 0 if absent."),
+        optional(
+            "model",
+            Shape::Word(&["elastic", "rigid"]),
+            "\"rigid\"",
+            "\"rigid\" takes a very stiff spring for a rod of its free length, and its fast vibration for the force it exerts on average; \"elastic\" if absent.",
+        ),
     ],
 };
 

@@ -9,13 +9,22 @@ use crate::scene::{Drive, Force, Law, Motor, Sine, Slider, Spring, Torque, Torsi
 
 /// A spring.
 pub(super) fn spring(fields: &Fields, name: String, known: &Bars) -> Result<Spring, SceneError> {
-    Ok(Spring {
-        name,
-        between: known.between(fields, "spring")?,
-        stiffness: fields.number("stiffness")?,
-        free_length: fields.number("free_length")?,
-        damping: fields.number_or("damping", 0.0)?,
-    })
+    let (stiffness, free_length, damping) = (fields.number("stiffness")?, fields.number("free_length")?, fields.number_or("damping", 0.0)?);
+    let rigid = fields.word_or_first("model")? == 1;
+    let elastic = "leave `model` out, or write \"elastic\"";
+    if rigid && (stiffness == 0.0 || free_length == 0.0) {
+        let at = fields.required(if stiffness == 0.0 { "stiffness" } else { "free_length" })?;
+        return Err(at.refuse("is 0", "must be above 0 for a spring of model \"rigid\", a rod of its free length", elastic));
+    }
+    if rigid && damping != 0.0 {
+        let at = fields.required("damping")?;
+        return Err(at.refuse(
+            "is not 0",
+            "must be 0 for a spring of model \"rigid\": a damped vibration decays, and its mean force with it",
+            elastic,
+        ));
+    }
+    Ok(Spring { name, between: known.between(fields, "spring")?, stiffness, free_length, damping, rigid })
 }
 
 /// A torsion spring.

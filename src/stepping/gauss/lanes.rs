@@ -67,6 +67,7 @@ pub(super) fn march<F: Field + ?Sized>(
     watch: &mut Watch<F>,
 ) -> Result<Reached, StepError> {
     for _ in 0..count {
+        tally.check(gauss.label(), state.time.hi, gauss.scratch.step)?;
         let Gauss { tableau, scratch, exact, newton, slow, portable, .. } = &mut *gauss;
         let mut step = Step { tableau, scratch, exact: *exact, newton, slow: *slow };
         take(*portable, &mut step, &mut Of(problem), state, tally);

@@ -33,7 +33,7 @@ pub struct Entrant<'a> {
     pub mechanism: &'a Mechanism,
     /// The start, and in the end the last state reached.
     pub state: State,
-    /// Steps taken.
+    /// Steps taken, and series allowed.
     pub tally: Tally,
     /// Why it stopped, if it did.
     pub stopped: Option<StepError>,
@@ -81,14 +81,13 @@ pub struct Crowd {
     tolerance: f64,
     order: usize,
     is_portable: bool,
-    max_steps: u64,
 }
 
 impl Crowd {
     /// The method at a tolerance, of order 20, or 24 below 1e-15.
     pub fn new(tolerance: Tolerance) -> Self {
         let tolerance = tolerance.relative.min(tolerance.absolute);
-        Self { tolerance, order: if tolerance >= 1e-15 { 20 } else { 24 }, is_portable: false, max_steps: 10_000_000 }
+        Self { tolerance, order: if tolerance >= 1e-15 { 20 } else { 24 }, is_portable: false }
     }
 
     /// The same with another order, from 10 to 24.
@@ -114,20 +113,6 @@ impl Crowd {
             && mechanism.is_plain()
             && mechanism.rows.is_empty()
             && mechanism.contacts.is_empty()
-    }
-
-    /// Why a step cannot be taken: cause, what happened, and a hint.
-    fn failure(&self, seat: &Seat) -> Option<(Cause, String, &'static str)> {
-        let hint = "look for a position without inertia";
-        if seat.wanted.is_nan() {
-            Some((Cause::NotFinite, "the series is not finite".into(), hint))
-        } else if seat.wanted < 1e-14 * seat.time.hi.abs().max(1e-3) {
-            Some((Cause::StepTooSmall, "the series converges in ever smaller circles".into(), hint))
-        } else if seat.steps >= self.max_steps {
-            Some((Cause::TooManySteps, format!("more than {} steps", self.max_steps), "loosen the tolerance"))
-        } else {
-            None
-        }
     }
 
     /// Marches all trajectories to `until`; `watch` is shown every step with the trajectory's index and may end that one.
@@ -204,10 +189,24 @@ struct Seat {
     entrant: Option<usize>,
     pace: Pace,
     time: Time,
-    steps: u64,
     /// The last step wanted and the one taken \[s\].
     wanted: f64,
     taken: f64,
+}
+
+impl Seat {
+    /// Why the step just expanded cannot be taken, where it cannot.
+    fn failure(&self, tally: &Tally) -> Result<(), StepError> {
+        let hint = "look for a position without inertia";
+        let stop = |cause, what: &str| stop(cause, &State { time: self.time, ..State::default() }, self.taken, what.into(), hint);
+        if self.wanted.is_nan() {
+            Err(stop(Cause::NotFinite, "the series is not finite"))
+        } else if self.wanted < 1e-14 * self.time.hi.abs().max(1e-3) {
+            Err(stop(Cause::StepTooSmall, "the series converges in ever smaller circles"))
+        } else {
+            tally.check("taylor", self.time.hi, self.taken)
+        }
+    }
 }
 
 impl<const N: usize> Team<N> {
@@ -277,7 +276,7 @@ fn march<L: Lanes, const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], unti
         powers: [power; MOST + 1],
     };
     let mut teams = Box::new([team.clone(), team]);
-    let empty = Seat { entrant: None, pace: Pace::new(1.0, order, 0.0), time: until, steps: 0, wanted: 0.0, taken: 0.0 };
+    let empty = Seat { entrant: None, pace: Pace::new(1.0, order, 0.0), time: until, wanted: 0.0, taken: 0.0 };
     let mut seats: [Seat; WIDTH * TEAMS] = std::array::from_fn(|_| empty.clone());
     let mut waiting = 0;
     loop {
@@ -292,7 +291,6 @@ fn march<L: Lanes, const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], unti
                         team.seat(lane, entrant);
                         let longest = order as f64 / 3.0 / entrant.mechanism.tree.fastest_rate();
                         (seat.pace, seat.time) = (Pace::new(crowd.tolerance, order, longest), entrant.state.time);
-                        seat.steps = 0;
                     }
                     None => team.park(lane),
                 }
@@ -323,13 +321,12 @@ fn march<L: Lanes, const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], unti
             let (team, lane) = (&mut teams[place / WIDTH], place % WIDTH);
             let entrant = &mut entrants[index];
             let (from, step) = (seat.time, seat.taken);
-            match crowd.failure(seat) {
-                Some((cause, what, hint)) => {
-                    entrant.stopped = Some(stop(cause, &State { time: from, ..State::default() }, step, what, hint))
-                }
-                None => {
+            match seat.failure(&entrant.tally) {
+                Err(stop) => entrant.stopped = Some(stop),
+                Ok(()) => {
                     seat.time = if step == left[place] { until } else { from + step };
-                    seat.steps += 1;
+                    entrant.tally.steps += 1;
+                    entrant.tally.evaluations += 1;
                 }
             }
             let mut turned = [0; BODIES];
@@ -343,8 +340,6 @@ fn march<L: Lanes, const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], unti
             if entrant.stopped.is_some() || watch(index, &passage) == Going::Enough || seat.time >= until {
                 team.leave(lane, &mut entrant.state);
                 entrant.state.time = seat.time;
-                entrant.tally.steps += seat.steps;
-                entrant.tally.evaluations += seat.steps;
                 seat.entrant = None;
             }
         }

@@ -1,0 +1,152 @@
+//! A table of outcomes as colours, with a short word in each cell.
+
+use super::ChartError;
+use super::file::Picture;
+use super::grid::AIR;
+use super::palette::{Colour, EXCLUDED, FAILED, GREEN, GREY, GRID, INK, SPINE, VERMILLION, WHITE, mix};
+use super::sheet::{CAPTION, EDGE, NOTE, Pen, Sheet, note};
+use super::text::{Align, Lettering, Level};
+use std::f64::consts::FRAC_PI_2;
+
+/// Width and height of a cell, and the em of its word \[pt\].
+const CELL: [f64; 2] = [27.0, 11.5];
+const WORD: f64 = 7.0;
+/// Side of a square of the legend \[pt\].
+const SWATCH: f64 = 8.0;
+/// Words beside and above the cells begin so far away \[pt\].
+const GAP: f64 = 5.0;
+
+/// What a cell shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Outcome {
+    /// Right.
+    Right,
+    /// Refused.
+    #[default]
+    Refused,
+    /// Stopped.
+    Stopped,
+    /// Wrong.
+    Wrong,
+}
+
+/// A table of outcomes.
+#[derive(Clone, Debug, Default)]
+pub struct Matrix {
+    /// Title, with markup.
+    pub title: String,
+    /// Parts of the caption, with markup.
+    pub caption: Vec<String>,
+    /// Names of the rows from the top, and of the columns from the left, with markup.
+    pub rows: Vec<String>,
+    /// See `rows`.
+    pub columns: Vec<String>,
+    /// Row by row, the outcome and a short word.
+    pub cells: Vec<(Outcome, String)>,
+}
+
+impl Outcome {
+    const ALL: [Self; 4] = [Self::Right, Self::Refused, Self::Stopped, Self::Wrong];
+
+    fn colour(self) -> Colour {
+        match self {
+            Self::Right => mix(GREEN, WHITE, 0.62),
+            Self::Refused => EXCLUDED,
+            Self::Stopped => FAILED,
+            Self::Wrong => VERMILLION,
+        }
+    }
+
+    fn word(self) -> &'static str {
+        match self {
+            Self::Right => "right, with its error",
+            Self::Refused => "refused",
+            Self::Stopped => "stopped",
+            Self::Wrong => "wrong",
+        }
+    }
+}
+
+/// Draws the table, and how many of each outcome there are.
+///
+/// # Errors
+/// [`ChartError`] if the resolution is out of range or drawing fails.
+pub fn matrix(chart: &Matrix, px_per_pt: f64) -> Result<Picture, ChartError> {
+    let trial = Sheet::new([CELL[0], CELL[1]], px_per_pt)?;
+    let widest = |names: &[String]| names.iter().map(|name| trial.width(name, NOTE, false)).fold(0.0, f64::max);
+    let left = EDGE + widest(&chart.rows) + GAP;
+    let size = [chart.columns.len() as f64 * CELL[0], chart.rows.len() as f64 * CELL[1]];
+    let legend = legend(chart);
+    let told: f64 = legend.iter().map(|(_, words)| SWATCH + 18.0 + trial.width(words, NOTE, false)).sum();
+    let width = (left + size[0]).max(2.0 * EDGE + told).max(240.0) + EDGE;
+    let under = Sheet::new([width, width], px_per_pt)?.heading(&chart.title, &chart.caption)?;
+    let top = under + 16.0 + AIR + widest(&chart.columns) + GAP;
+    let sheet = Sheet::new([width, top + size[1] + EDGE], px_per_pt)?;
+    sheet.heading(&chart.title, &chart.caption)?;
+    let mut at = EDGE;
+    for (colour, words) in &legend {
+        sheet.polygon(&square([at, under + AIR - 4.0], [SWATCH; 2]), SPINE)?;
+        sheet.polygon(&square([at + 0.5, under + AIR - 3.5], [SWATCH - 1.0; 2]), *colour)?;
+        sheet.words(words, note(GREY, Align::Left, Level::Middle), [at + SWATCH + 4.0, under + AIR - 4.0 + 0.5 * SWATCH])?;
+        at += SWATCH + 18.0 + sheet.width(words, NOTE, false);
+    }
+    for (k, name) in chart.columns.iter().enumerate() {
+        let upright = Lettering { angle: FRAC_PI_2, ..note(INK, Align::Left, Level::Middle) };
+        sheet.words(name, upright, [left + (k as f64 + 0.5) * CELL[0], top - GAP])?;
+    }
+    for (i, name) in chart.rows.iter().enumerate() {
+        let y = top + i as f64 * CELL[1];
+        sheet.words(name, note(INK, Align::Right, Level::Middle), [left - GAP, y + 0.5 * CELL[1]])?;
+        for k in 0..chart.columns.len() {
+            let Some((outcome, word)) = chart.cells.get(i * chart.columns.len() + k) else { continue };
+            let x = left + k as f64 * CELL[0];
+            sheet.polygon(&square([x, y], CELL), outcome.colour())?;
+            let ink = if *outcome == Outcome::Wrong { WHITE } else { INK };
+            let lettering = Lettering::new(WORD, ink).at(Align::Centre, Level::Middle);
+            sheet.words(word, lettering, [x + 0.5 * CELL[0], y + 0.5 * CELL[1]])?;
+        }
+    }
+    let pen = Pen::new(GRID, 0.6);
+    for k in 0..=chart.columns.len() {
+        let x = left + k as f64 * CELL[0];
+        sheet.line(&[[x, top], [x, top + size[1]]], &pen)?;
+    }
+    for i in 0..=chart.rows.len() {
+        let y = top + i as f64 * CELL[1];
+        sheet.line(&[[left, y], [left + size[0], y]], &pen)?;
+    }
+    if chart.rows.is_empty() || chart.columns.is_empty() {
+        sheet.words("no data", Lettering::new(CAPTION, GREY), [left, top])?;
+    }
+    Ok(sheet.picture(&chart.title, &chart.caption))
+}
+
+/// The outcomes, in colours and words: `423 right, with its error`.
+fn legend(chart: &Matrix) -> Vec<(Colour, String)> {
+    let count = |outcome: Outcome| chart.cells.iter().filter(|cell| cell.0 == outcome).count();
+    Outcome::ALL.iter().map(|&outcome| (outcome.colour(), format!("{} {}", count(outcome), outcome.word()))).collect()
+}
+
+fn square([x, y]: [f64; 2], [width, height]: [f64; 2]) -> [[f64; 2]; 4] {
+    [[x, y], [x + width, y], [x + width, y + height], [x, y + height]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_cell_and_every_name_is_there() {
+        let cells = vec![(Outcome::Right, "1e-9".into()), (Outcome::Wrong, "2e-3".into()), (Outcome::Stopped, String::new())];
+        let chart = Matrix { rows: vec!["spring".into()], columns: ["a", "b", "c"].map(Into::into).into(), cells, ..Matrix::default() };
+        let picture = matrix(&chart, 2.0).expect("a picture");
+        for words in ["spring", "a", "b", "c", "1e-9", "2e-3", "1 wrong", "0 refused"] {
+            assert!(picture.texts.iter().any(|text| text.text == words), "{words}");
+        }
+    }
+
+    #[test]
+    fn an_empty_table_is_a_picture() {
+        assert!(matrix(&Matrix::default(), 1.0).is_ok());
+    }
+}

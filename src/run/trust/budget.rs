@@ -1,0 +1,52 @@
+//! What a companion may cost: a share of the run's work, counted and not clocked, so that the figures are the same on every machine.
+//!
+//! Work is measured in nanoseconds of the machine the constants were taken on.  They need to be right within a factor of two or so; what the companion
+//! really costs beside runs of the shipped scenes is what `cargo bench --bench trust` prints.
+
+use crate::dynamics::Mechanism;
+use crate::run::methods::MethodId;
+use crate::run::plan::Plan;
+use crate::stepping::Tally;
+
+/// Largest share of the run's work that its companion may take.
+pub const SHARE: f64 = 0.3;
+/// Work that is free: what nobody notices at the end of a run.
+pub const GRACE: f64 = 50e6;
+
+/// Prices of a mechanism's parts.
+#[derive(Clone, Copy, Debug)]
+pub struct Prices {
+    /// One evaluation of the equations.
+    pub evaluation: f64,
+    /// One step of a series.
+    pub series: f64,
+    /// A sample, its monitors and its line in the table.
+    pub row: f64,
+    /// The companion's motion at an output time, and how far it is from the run's.
+    pub look: f64,
+}
+
+impl Prices {
+    /// Those of a mechanism, with the order of its series.
+    pub fn new(mechanism: &Mechanism, order: usize, is_extended: bool) -> Self {
+        let (n, rows) = (mechanism.coordinates() as f64, mechanism.rows.len() as f64);
+        let forces = (mechanism.springs.len() + mechanism.torsions.len() + mechanism.actions.len()) as f64;
+        let evaluation = 15.0 + 20.0 * n + 4.0 * n * n.min(12.0) + 60.0 * rows + 20.0 * forces;
+        let has_lanes = mechanism.is_plain() && !mechanism.is_tied_up() && mechanism.contacts.is_empty();
+        let products = (order as f64 / 20.0).powi(2);
+        let plain = if has_lanes { 250.0 + 130.0 * n } else { 700.0 + 400.0 * n + 150.0 * n * n + 700.0 * rows + 700.0 * forces };
+        let wide = match (is_extended, has_lanes && n <= 2.0 && rows == 0.0) {
+            (false, _) => 1.0,
+            (true, true) => 3.0,
+            (true, false) => 10.0,
+        };
+        let row = 1200.0 + 600.0 * n + 1200.0 * rows;
+        Self { evaluation, series: plain * products * wide, row, look: 200.0 + 60.0 * n + if rows > 0.0 { evaluation } else { 0.0 } }
+    }
+
+    /// The work of a run so far.
+    pub fn run(&self, plan: &Plan, tally: Tally, rows: u64) -> f64 {
+        let each = if plan.method == MethodId::Taylor { self.series } else { self.evaluation };
+        tally.evaluations as f64 * each + rows as f64 * self.row
+    }
+}

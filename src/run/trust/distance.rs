@@ -1,0 +1,73 @@
+//! How far two motions of one mechanism are apart.
+
+use crate::arithmetic::{DoubleDouble, Scalar};
+use crate::dynamics::{Mechanism, Motion};
+
+/// Measures distances: angles as they are \[rad\], positions of free feet over the mechanism's size.
+#[derive(Clone, Copy, Debug)]
+pub struct Ruler {
+    /// How many coordinates are angles; the others are positions.
+    angles: usize,
+    /// The longest bar \[m\], or the farthest centre of mass where none has a length.
+    size: f64,
+}
+
+impl Ruler {
+    /// The ruler of a mechanism.
+    pub fn new(mechanism: &Mechanism) -> Self {
+        let bars = mechanism.bodies.iter().map(|body| (body.ends[1] - body.ends[0]).norm_squared().sqrt()).fold(0.0, f64::max);
+        let arms = mechanism.bodies.iter().map(|body| body.centre.norm_squared().sqrt()).fold(0.0, f64::max);
+        let size = if bars > 0.0 { bars } else { arms };
+        Self { angles: mechanism.bodies.len(), size: if size > 0.0 { size } else { 1.0 } }
+    }
+
+    /// What a difference in coordinate `k` weighs: 1, or one over the size \[1/m\].
+    pub fn weight(&self, k: usize) -> f64 {
+        if k < self.angles { 1.0 } else { 1.0 / self.size }
+    }
+
+    /// The largest difference of a coordinate, whole turns counted: an angle \[rad\], or a position over the size.  Not a number where one of them is not.
+    pub fn apart(&self, one: &Motion, other: &Motion) -> f64 {
+        let difference = |k: usize| {
+            let turns = one.turns[k].wrapping_sub(other.turns[k]) as f64;
+            (one.phi[k] - other.phi[k] + DoubleDouble::TAU.scale(turns)).hi
+        };
+        self.largest((0..one.phi.len().min(other.phi.len())).map(difference))
+    }
+
+    /// The largest difference of a rate \[rad/s\], or of a velocity over the size \[1/s\].
+    pub fn rates_apart(&self, one: &Motion, other: &Motion) -> f64 {
+        self.largest(one.omega.iter().zip(&other.omega).map(|(&a, &b)| (a - b).hi))
+    }
+
+    fn largest(&self, differences: impl Iterator<Item = f64>) -> f64 {
+        differences.enumerate().fold(0.0, |most: f64, (k, difference)| {
+            let size = difference.abs() * self.weight(k);
+            if size.is_nan() || most.is_nan() { f64::NAN } else { most.max(size) }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::read_scene;
+
+    #[test]
+    fn turns_count_and_positions_are_measured_against_the_longest_bar() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes/cart_pole.json");
+        let scene = read_scene(&path, &[]).expect("a shipped scene");
+        let mechanism = Mechanism::new(&scene).expect("equations");
+        let (ruler, one) = (Ruler::new(&mechanism), mechanism.start(&scene));
+        assert_eq!(ruler.apart(&one, &one), 0.0);
+        let mut other = one.clone();
+        other.turns[0] += 1;
+        assert_eq!(ruler.apart(&one, &other), std::f64::consts::TAU);
+        let last = one.phi.len() - 1;
+        assert!(last >= mechanism.bodies.len(), "a foot that moves freely");
+        other = one.clone();
+        other.phi[last] = other.phi[last] + 0.5;
+        let longest = scene.bars.iter().map(|bar| bar.length).fold(0.0, f64::max);
+        assert!((ruler.apart(&one, &other) - 0.5 / longest).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,161 @@
+//! How far a run may be trusted: its error estimated while it goes, and the time from which its path is no longer that of its start.
+//!
+//! Beside the run goes a *companion*: the same mechanism from the same bits by [`taylor`](crate::stepping::taylor) at a hundredth of the run's tolerance, or
+//! with its first orders in double-double where the run is near rounding itself.  Both are looked at at the output times:
+//!
+//! ```text
+//! E(t) = max over the output times up to t of sqrt(d² + R²)      d  largest difference of an angle [rad], or of a position over the longest bar
+//!                                                                 R  the companion's own rounding, carried along by the tangent flow
+//! ```
+//!
+//! d is exact whatever the motion does, R matters near rounding only.  The *error estimate* is 1.2 E, the *horizon* the first time E passes
+//! [`HORIZON`], and beyond [`LOST`] nothing is measured any more.  The tangent flow tells the largest Lyapunov exponent besides, and what the last digit
+//! of the inputs comes to.
+//!
+//! What the companion may cost is counted in work, not in seconds: the same run has the same figures on every machine ([`budget`]).  Where it is used
+//! up, a regular motion's error is carried on by the power law it followed so far, and said to be *extrapolated*.
+//!
+//! Source of the constants of R: fitted on random starts of double pendulums with springs and motors against references in double-double; the table of
+//! `tests/trust.rs` is their test.
+
+pub mod budget;
+mod companion;
+mod distance;
+pub mod tangent;
+
+pub(super) use companion::{Companion, Kept};
+pub use distance::Ruler;
+pub use tangent::Tangent;
+
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::str::FromStr;
+
+/// The error \[rad\] whose first time is the horizon.
+pub const HORIZON: f64 = 1e-3;
+/// The error \[rad\] beyond which the run and its companion are two motions.
+pub const LOST: f64 = 0.1;
+/// What is printed is so many times E, and at least the rounding of an angle \[rad\].
+const CAUTION: f64 = 1.2;
+const LEAST: f64 = 2e-15;
+
+/// How much may be spent on trust.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Level {
+    /// Nothing.
+    Off,
+    /// At most [`budget::SHARE`] of the run's work.
+    #[default]
+    Auto,
+    /// Whatever it takes, with the companion's first orders in double-double.
+    Full,
+}
+
+impl Level {
+    /// All three.
+    pub const ALL: [Self; 3] = [Self::Off, Self::Auto, Self::Full];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Off => "off",
+            Self::Auto => "auto",
+            Self::Full => "full",
+        }
+    }
+}
+
+impl fmt::Display for Level {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Level {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        Self::ALL.into_iter().find(|level| level.name() == name).ok_or_else(|| format!("no level `{name}`; there are off, auto, full"))
+    }
+}
+
+/// Where an error estimate comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum How {
+    /// From a companion up to its time.
+    Companion,
+    /// Carried on by a power law from the time the companion ended \[s\].
+    Extrapolated(f64),
+    /// There is none for this time.
+    None,
+}
+
+impl How {
+    /// One word, as in JSON.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Companion => "companion",
+            Self::Extrapolated(_) => "extrapolated",
+            Self::None => "none",
+        }
+    }
+}
+
+/// How fast neighbouring motions part.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Lyapunov {
+    /// Largest exponent, as a mean over the time looked at \[1/s\].
+    pub exponent: f64,
+    /// Its standard error, from blocks of that time \[1/s\].
+    pub uncertainty: f64,
+    /// The time looked at \[s\].
+    pub until: f64,
+}
+
+impl Lyapunov {
+    /// The time in which errors grow tenfold \[s\].
+    pub fn tenfold(&self) -> f64 {
+        std::f64::consts::LN_10 / self.exponent
+    }
+}
+
+/// How far a run may be trusted.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Trust {
+    /// Where the estimate comes from.
+    pub how: How,
+    /// The largest error of an angle \[rad\], or of a position over the longest bar, up to `at`, as estimated.
+    pub error_estimate: Option<f64>,
+    /// The end of the run, or the horizon where that comes first \[s\].
+    pub at: f64,
+    /// The first time the error passes [`HORIZON`] \[s\].
+    pub horizon: Option<f64>,
+    /// The first output time at which it is beyond [`LOST`] \[s\].
+    pub lost: Option<f64>,
+    /// For chaotic motions.
+    pub lyapunov: Option<Lyapunov>,
+    /// What a change in the last digit of the scene's numbers comes to at `at` \[rad\]; no error of the method.
+    pub input_error: Option<f64>,
+    /// The companion, in words.
+    pub companion: Option<String>,
+    /// How far it went beside the run \[s\].
+    pub covered: f64,
+    /// Why it went no further, where it did not.
+    pub why: Option<String>,
+    /// Times \[s\] and estimates \[rad\] up to there, thinned out.
+    pub record: Vec<[f64; 2]>,
+}
+
+impl Default for How {
+    fn default() -> Self {
+        Self::None
+    }
+}
+
+impl Trust {
+    /// True where the end of the run lies beyond its horizon: the angles there are those of a typical motion at most.
+    pub fn is_past(&self) -> bool {
+        self.horizon.is_some()
+    }
+}

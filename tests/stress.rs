@@ -1,0 +1,145 @@
+//! Stiff and extreme scenes: right, refused or stopped, and never wrong.
+
+mod common;
+
+use common::spring;
+use driftless::dynamics::Mechanism;
+use driftless::run::stress::{Case, Expected, Stress, Verdict, cell, shipped, stability, stress};
+use driftless::run::{METHODS, MethodId, Request, simulate};
+use driftless::scene::{Place, Start, parse_scene};
+use driftless::stepping::Cause;
+
+fn method(name: &str) -> MethodId {
+    name.parse().expect("a method")
+}
+
+fn case(name: &str) -> Case {
+    shipped().into_iter().find(|case| case.name == name).expect("a shipped case")
+}
+
+#[test]
+fn the_shipped_set_is_whole() {
+    let cases = shipped();
+    assert!(cases.len() >= 50);
+    for case in &cases {
+        let scene = parse_scene(&case.text, &case.origin, &[]).map_err(|error| error.to_string());
+        match (&case.expected, scene) {
+            (Expected::Refusal, scene) => {
+                let refusal = scene.and_then(|scene| Mechanism::new(&scene).map_err(|error| error.to_string())).expect_err(&case.name);
+                assert!(refusal.len() > 20, "{}: {refusal}", case.name);
+            }
+            (expected, scene) => {
+                let scene = scene.unwrap_or_else(|error| panic!("{error}"));
+                assert_eq!(scene.name, case.name);
+                assert!(Mechanism::new(&scene).is_ok(), "{}", case.name);
+                if let Expected::End { angles, rates } = expected {
+                    assert!(angles.len() <= scene.bars.len() && (rates.is_empty() || rates.len() == angles.len()), "{}", case.name);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn no_answer_is_wrong() {
+    // The whole set by one method of each kind; `driftless stress` has them all.
+    let methods: Vec<MethodId> = ["dp8", "taylor", "gauss16", "rattle4"].map(method).into();
+    let plan = Stress { methods, effort: 150_000, ..Stress::default() };
+    let lines = stress(&plan, &mut |_| true);
+    assert_eq!(lines.len(), plan.cases.len());
+    let cells = || lines.iter().flat_map(|line| line.cells.iter().map(move |cell| (line, cell)));
+    for (line, cell) in cells() {
+        assert_ne!(cell.verdict, Verdict::Wrong, "{} {cell:?}", line.scene);
+        assert!(cell.evaluations < 2 * plan.effort, "{} {cell:?}", line.scene);
+        if let Some(stop) = &cell.stop {
+            assert!(!stop.what.is_empty() && !stop.hint.is_empty() && stop.t.is_finite(), "{} {cell:?}", line.scene);
+        }
+    }
+    let right = |name: &str| cells().filter(|(_, cell)| cell.method == name && cell.verdict == Verdict::Right).count();
+    let found = ["dp8", "taylor", "gauss16", "rattle4"].map(right);
+    assert!(found[0] >= 52 && found[1] >= 52 && found[2] >= 38 && found[3] >= 35, "{found:?} of {}", lines.len());
+}
+
+#[test]
+fn a_wrong_answer_would_be_seen() {
+    let mut lying = case("spring_1");
+    if let Expected::End { angles, .. } = &mut lying.expected {
+        angles[0] += 1e-3;
+    }
+    let seen = cell(&lying, method("dp8"), 100_000);
+    assert_eq!(seen.verdict, Verdict::Wrong, "{seen:?}");
+    assert!((seen.error.expect("an error") - 1e-3).abs() < 1e-6);
+    // A success where there is no such motion is one, too.
+    let impossible = Case { expected: Expected::Refusal, ..case("spring_1") };
+    assert_eq!(cell(&impossible, method("dp8"), 100_000).verdict, Verdict::Wrong);
+}
+
+#[test]
+fn cells_do_not_depend_on_the_number_of_threads() {
+    let cases: Vec<Case> = ["spring_1", "spring_zero_length", "massless_bar", "motor_1"].map(case).into();
+    let methods = METHODS.iter().map(|info| info.id).collect::<Vec<_>>();
+    let plan = |threads| Stress { cases: cases.clone(), methods: methods.clone(), effort: 50_000, threads };
+    assert_eq!(stress(&plan(1), &mut |_| true), stress(&plan(3), &mut |_| true));
+}
+
+#[test]
+fn an_unconfirmed_end_is_a_stop() {
+    // A chaotic scene beyond what doubles can tell.
+    let mut unsure = case("aligned_horizontal");
+    unsure.text = unsure.text.replace("\"until\": 2", "\"until\": 200");
+    unsure.expected = Expected::Unknown;
+    let seen = cell(&unsure, method("dp8"), 2_000_000);
+    assert_eq!(seen.verdict, Verdict::Stopped, "{seen:?}");
+    assert!(seen.stop.expect("a stop").what.contains("was asked for"));
+}
+
+#[test]
+fn a_scene_without_a_known_end_gets_one() {
+    let unknown = Case { expected: Expected::Unknown, ..case("spring_1") };
+    let plan = Stress { cases: vec![unknown], methods: vec![method("dp8")], effort: 100_000, threads: 1 };
+    let lines = stress(&plan, &mut |_| true);
+    let found = lines[0].cells[0].error.expect("an error");
+    let known = cell(&case("spring_1"), method("dp8"), 100_000).error.expect("an error");
+    assert!((found - known).abs() < 1e-12, "{found:e} {known:e}");
+}
+
+#[test]
+fn a_spring_that_loses_its_length_stops_every_method_that_shows_its_steps() {
+    for name in ["dp5", "dp8", "taylor", "gauss4", "gauss16", "rattle2", "rattle8"] {
+        let seen = cell(&case("spring_zero_length"), method(name), 1_000_000);
+        let stop = seen.stop.unwrap_or_else(|| panic!("{name} did not stop: {:?}", seen.error));
+        assert_eq!(stop.cause, Cause::SpringWithoutLength, "{name}: {stop}");
+        assert!(stop.what.contains("`spring`") && (stop.t - 0.0953).abs() < 1e-3, "{name}: {stop}");
+        // A tenth of a millimetre is a length.
+        let near = cell(&case("spring_near_zero_length"), method(name), 4_000_000);
+        assert!(near.stop.is_none_or(|stop| stop.cause != Cause::SpringWithoutLength), "{name}");
+    }
+}
+
+#[test]
+fn springs_whose_ends_cannot_meet_change_nothing() {
+    // With its other end 1e-12 m too far away the spring is not looked after, and the motion is the same.
+    let mut scene = common::free();
+    scene.start = vec![Start { phi: 0.5, omega: 0.0 }, Start { phi: 0.2, omega: 0.0 }];
+    let mut end = |x: f64| {
+        let ground = Place { bar: None, point: [x, 0.0] };
+        let bar = Place { bar: Some(0), point: [0.4, 0.0] };
+        scene.springs = vec![driftless::scene::Spring { between: [ground, bar], ..spring(0.0) }];
+        let request = Request { method: Some(method("taylor")), until: Some(1.0), ..Request::default() };
+        simulate(&scene, &request, &mut |_| Ok(())).expect("a run")
+    };
+    let (watched, free) = (end(-0.4), end(-0.4 - 1e-8));
+    assert_eq!(watched.tally.steps, free.tally.steps);
+    assert!((watched.last.phi[0] - free.last.phi[0]).abs() < 1e-6);
+}
+
+#[test]
+fn steps_too_long_for_a_stiff_spring_stop_or_say_so() {
+    let map = stability(method("gauss4"), &mut |_, _| true).expect("a map");
+    assert_eq!(map.cells.len(), map.steps * map.stiffnesses);
+    let soft = &map.cells[..map.steps];
+    assert!(soft[0].error.is_some_and(|error| error < 1e-10), "{:?}", soft[0]);
+    // Order 4: halving the step takes the error to a sixteenth.
+    let errors: Vec<f64> = soft.iter().filter_map(|cell| cell.error).filter(|error| (1e-9..1e-3).contains(error)).collect();
+    assert!(errors.windows(2).all(|pair| (8.0..32.0).contains(&(pair[1] / pair[0]))), "{errors:?}");
+}
