@@ -10,6 +10,7 @@
 pub mod checkpoint;
 pub mod contact;
 pub mod drift;
+pub mod fast;
 #[cfg(feature = "files")]
 pub mod files;
 pub mod flip;
@@ -31,6 +32,7 @@ pub mod trust;
 pub use checkpoint::{CheckpointError, Checkpoints, Loaded};
 pub use contact::{Hold, Strike};
 pub use drift::{Drift, Limits};
+pub use fast::FastMode;
 #[cfg(feature = "files")]
 pub use files::{Cursor, FileError, Folder, Stream};
 pub use flip::Flip;

@@ -2,6 +2,7 @@
 //!
 //! A pairing that makes no sense is refused here, before anything is computed, with the reason and an alternative.
 
+use super::fast::FastMode;
 use super::methods::{MethodId, Stabilization};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::compile::DENSE_LIMIT;
@@ -62,6 +63,8 @@ pub struct Plan {
     pub rows: u64,
     /// Why this method, in one line, where it was not asked for.
     pub why: Option<String>,
+    /// The fastest mode at the start, of scenes with springs.
+    pub stiffness: Option<FastMode>,
     /// What was adjusted or left out, one line each.
     pub notes: Vec<String>,
 }
@@ -127,6 +130,11 @@ impl Plan {
         } else {
             step = Some(fixed_step(method, request, rate, until, &mut every, &mut notes)?);
         }
+        let stiffness = FastMode::measure(scene, mechanism, method, step, until);
+        if let Some(mode) = &stiffness {
+            mode.check(method, request, until)?;
+            notes.extend(mode.note(method, until));
+        }
         let rows = rows(until, every);
         if rows > MAX_ROWS {
             return Err(usage("--every", format!("{rows:.1e} rows would be written; at most {MAX_ROWS:.0e}"), "a longer output interval"));
@@ -149,6 +157,7 @@ impl Plan {
             every,
             rows: rows as u64,
             why,
+            stiffness,
             notes,
         })
     }
@@ -167,6 +176,7 @@ impl Plan {
             every: until,
             rows: 1,
             why: None,
+            stiffness: None,
             notes: Vec::new(),
         }
     }

@@ -196,7 +196,7 @@ impl Gauss {
     /// A momentum at rest under forces that cancel is all rounding and has no scale of its own.
     fn check<F: Field + ?Sized>(&self, problem: &mut F, state: &State) -> Result<(), StepError> {
         let scratch = &self.scratch;
-        let (d, angles) = (state.y.len(), problem.angles());
+        let angles = problem.angles();
         let stop = |cause, what| StepError {
             cause,
             method: self.label().into(),
@@ -208,8 +208,7 @@ impl Gauss {
         if let Some(k) = scratch.total.iter().position(|total| !total.is_finite()) {
             return Err(stop(Cause::NotFinite, format!("the rate of {} came out not finite", problem.label(k))));
         }
-        let judged = if angles > 0 { angles } else { d };
-        for k in 0..judged {
+        for k in 0..scratch.judged {
             let floor = if k < angles { LEAST_ANGLE } else { 0.0 };
             let scale = scratch.size[k].max(floor);
             if scratch.rest[k] > LARGEST_REST * scale {
