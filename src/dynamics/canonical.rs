@@ -16,6 +16,7 @@ mod stages;
 use super::jacobian::{LANES, Slopes};
 use super::kernel::{Kernel, dot};
 use super::law::Phase;
+use super::stiffness::Stiffness;
 use super::tree::{self, size};
 use super::{Field, Form, Mechanism, Motion, Points, State, Time};
 use crate::arithmetic::{DoubleDouble, Real, Scalar};
@@ -206,6 +207,13 @@ impl<const N: usize, const ACCOUNT: bool> Field for Canonical<N, ACCOUNT> {
         let scratch = self.slopes.get_or_insert_with(|| Box::new(Scratch::new(&self.mechanism)));
         slopes(scratch, ACCOUNT, &self.mechanism, t, y, y_by_y);
         true
+    }
+
+    fn stiffness(&mut self, t: Time, y: &[f64]) -> Option<Stiffness> {
+        // Leaves the rates of all bodies behind.
+        self.rate(t, y, &mut vec![0.0; y.len()]);
+        let phi: Vec<f64> = self.mechanism.ties.bodies.iter().map(|tie| tie.place(t, y).angle).collect();
+        Some(Stiffness::at(&self.mechanism, t, &phi, &self.work.omega))
     }
 
     fn label(&self, i: usize) -> String {

@@ -21,6 +21,7 @@ pub struct Elimination<const N: usize> {
     /// True where no driven angle accelerates.
     is_steady: bool,
     phi: Vec<f64>,
+    low: Vec<f64>,
     omega: Vec<f64>,
     drive_acceleration: Vec<f64>,
     drive_rate: Vec<f64>,
@@ -42,6 +43,7 @@ impl<const N: usize> Elimination<N> {
         Self {
             kernel: Kernel::dense_without_rows(&mechanism),
             phi: zeros(),
+            low: zeros(),
             share: zeros(),
             omega: zeros(),
             drive_acceleration: zeros(),
@@ -135,6 +137,17 @@ impl<const N: usize> Field for Elimination<N> {
             2 => self.rate_sized::<2>(t, y, rate),
             _ => self.rate_sized::<0>(t, y, rate),
         }
+    }
+
+    fn fine_rate(&mut self, t: Time, y: &[f64], low: &[f64], rate: &mut [f64]) {
+        let ties = &self.mechanism.ties;
+        for (k, tie) in ties.bodies.iter().enumerate() {
+            self.phi[k] = tie.place(t, y).angle;
+            self.low[k] = tie.base.map_or(0.0, |base| low[base]);
+        }
+        self.kernel.measure(&self.mechanism, &self.phi, &self.low);
+        self.rate(t, y, rate);
+        self.kernel.stretch.clear();
     }
 
     fn jacobian(&mut self, t: Time, y: &[f64], y_by_y: &mut [f64]) -> bool {

@@ -145,12 +145,20 @@ impl Mechanism {
 
     /// Adds the generalized forces \[N·m, N\] of springs, dampers and applied forces.
     #[inline(always)]
-    pub fn push<T: Real>(&self, t: Time, at: Posture<T>, load: &mut [T]) {
-        for spring in &self.springs {
-            spring.span.pull(spring.force(at.z, at.omega), at.z, load);
+    pub fn push<T: Real>(&self, t: Time, at: Posture<T>, stretch: &[T], load: &mut [T]) {
+        for (s, spring) in self.springs.iter().enumerate() {
+            let force = match stretch.get(s) {
+                Some(&stretch) if spring.free_length > 0.0 => spring.stretched(stretch, at.z, at.omega),
+                _ => spring.force(at.z, at.omega),
+            };
+            spring.span.pull(force, at.z, load);
         }
-        for torsion in &self.torsions {
-            torsion.pull(torsion.torque(at.phi, at.omega), load);
+        for (s, torsion) in self.torsions.iter().enumerate() {
+            let torque = match stretch.get(self.springs.len() + s) {
+                Some(&stretch) => torsion.drag(at.omega) - stretch.scale(torsion.stiffness),
+                None => torsion.torque(at.phi, at.omega),
+            };
+            torsion.pull(torque, load);
         }
         for action in &self.actions {
             action.pull(action.factor(t), at.z, load);

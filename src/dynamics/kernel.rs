@@ -13,7 +13,7 @@ use super::row::{Linearised, Posture};
 use super::schur::{self, Weakest};
 use super::tree::{self, size};
 use super::{Mechanism, Time};
-use crate::arithmetic::{Complex, Real, Scalar};
+use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
 
 /// What a stabilizer adds to the convective term of every row: `rate · C' + position · C`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -60,6 +60,8 @@ pub struct Kernel<T> {
     pub correction: Vec<T>,
     /// What stands in place of the matrices where the mechanism is evaluated body by body; they are empty then.
     pub bodywise: Option<Box<Evaluation<T>>>,
+    /// Stretches of springs \[m\], then of torsion springs \[rad\], where [`Kernel::measure`] has found them; empty otherwise.
+    pub stretch: Vec<T>,
     /// Force and u of a vibration (n each), where there is one.
     pub vibration: [Vec<T>; 2],
     /// Feet of the bodies and their velocities, where energies are formed body by body.
@@ -110,6 +112,7 @@ impl<T: Scalar> Kernel<T> {
             multiplier: vec![T::ZERO; rows],
             correction: vec![T::ZERO; rows],
             bodywise: None,
+            stretch: Vec::new(),
             vibration: Default::default(),
             feet: Default::default(),
         }
@@ -137,7 +140,7 @@ impl<T: Real> Kernel<T> {
     pub fn assemble<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
         mechanism.tree.couple::<T, N>(&self.z, &mut self.mass, &mut self.twist);
         mechanism.tree.load::<T, N>(&self.z, omega, &self.twist, &mut self.load);
-        mechanism.push(t, Posture { phi, z: &self.z, omega }, &mut self.load);
+        mechanism.push(t, Posture { phi, z: &self.z, omega }, &self.stretch, &mut self.load);
     }
 
     /// M and its twist at the elements in `z`, where there are such matrices.
@@ -169,7 +172,7 @@ impl<T: Real> Kernel<T> {
             && let Some(bodywise) = &mut self.bodywise
         {
             bodywise.face(phi, &mut self.z);
-            bodywise.fold(mechanism, t, Posture { phi, z: &self.z, omega }, &mut self.load);
+            bodywise.fold(mechanism, t, Posture { phi, z: &self.z, omega }, &self.stretch, &mut self.load);
             bodywise.unfold(&mut self.load);
             return;
         }
@@ -198,7 +201,7 @@ impl<T: Real> Kernel<T> {
         let Some(bodywise) = &mut self.bodywise else { return };
         bodywise.face(phi, &mut self.z);
         let at = Posture { phi, z: &self.z, omega };
-        bodywise.fold(mechanism, t, at, &mut self.load);
+        bodywise.fold(mechanism, t, at, &self.stretch, &mut self.load);
         if !mechanism.rows.is_empty() {
             let found = (&mut self.rows[..], &mut self.multiplier[..], &mut self.correction[..]);
             self.weakest = bodywise.constrain(mechanism, t, at, bias, found);
@@ -368,6 +371,30 @@ impl<T: Real> Kernel<T> {
     /// C' of row `r` \[rad/s or m/s\], after [`Kernel::linearise`].
     pub fn row_rate(&self, r: usize, omega: &[T]) -> T {
         self.row_speed(r, omega) + self.rows[r].drive
+    }
+}
+
+impl Kernel<f64> {
+    /// The stretches of all springs for the evaluations that follow, at angles and feet given with what they leave out \[rad, m\].
+    ///
+    /// The force of a stiff spring is the difference of two lengths times k: in doubles it is rounded to 1e-16 k L, which is more than all other forces together
+    /// from k = 1e16 m g / L on, and makes implicit methods with long steps pay from 1e8 m g / L.  In double-double nothing of that is left.
+    pub fn measure(&mut self, mechanism: &Mechanism, phi: &[f64], low: &[f64]) {
+        self.stretch.clear();
+        for spring in &mechanism.springs {
+            let span = &spring.span;
+            let turning = span.terms.iter().map(|&(k, gamma)| Complex::unit(DoubleDouble::sum(phi[k], low[k])).turn(gamma));
+            let carried = span.shifts.iter().map(|&(x, share)| {
+                Complex::new(DoubleDouble::sum(phi[x], low[x]), DoubleDouble::sum(phi[x + 1], low[x + 1])).times(DoubleDouble::of(share))
+            });
+            let end = turning.chain(carried).fold(Complex::of(span.root), |sum, part| sum + part);
+            self.stretch.push(spring.stretch(end).hi);
+        }
+        for torsion in &mechanism.torsions {
+            let whole = |k: usize| DoubleDouble::sum(phi[k], low[k]);
+            let twist = torsion.base.map_or(whole(torsion.body), |base| whole(torsion.body) - whole(base));
+            self.stretch.push((twist - DoubleDouble::of(torsion.free_angle)).hi);
+        }
     }
 }
 

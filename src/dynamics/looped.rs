@@ -13,6 +13,7 @@ use super::force::action::Kind;
 use super::multiplier::Multiplier;
 use super::natural::columns::{self, Columns, Row, load, store};
 use super::natural::{Reduced, sorted_rows};
+use super::stiffness::Stiffness;
 use super::{Coordinates, Field, Form, Glance, Mechanism, Motion, State, Time};
 #[cfg(target_arch = "x86_64")]
 use crate::arithmetic::lanes::Avx;
@@ -229,8 +230,16 @@ impl Field for Looped {
         (rate[2 * n], rate[2 * n + 1]) = (mechanism.force_power(t, z, omega), 0.0);
     }
 
+    fn fine_rate(&mut self, t: Time, y: &[f64], low: &[f64], rate: &mut [f64]) {
+        if self.mechanism.springs.is_empty() { self.rate(t, y, rate) } else { self.angles.fine_rate(t, y, low, rate) }
+    }
+
     fn jacobian(&mut self, t: Time, y: &[f64], jacobian: &mut [f64]) -> bool {
         self.angles.jacobian(t, y, jacobian)
+    }
+
+    fn stiffness(&mut self, t: Time, y: &[f64]) -> Option<Stiffness> {
+        self.angles.stiffness(t, y)
     }
 
     fn label(&self, i: usize) -> String {

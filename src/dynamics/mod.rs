@@ -155,6 +155,11 @@ pub trait Field {
     /// Writes y' at (t, y).  Never fails: what cannot be computed comes out non-finite, and the method stops with [`Field::label`].
     fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]);
 
+    /// Writes y' at a point given with what it leaves out; fields that can take the forces of stiff springs from there, which plain doubles round.
+    fn fine_rate(&mut self, t: Time, y: &[f64], _low: &[f64], rate: &mut [f64]) {
+        self.rate(t, y, rate);
+    }
+
     /// Writes y' at several points; a field that can evaluates them as lanes of one scalar.
     fn rates(&mut self, points: &mut Points) {
         points.each(|t, y, rate| self.rate(t, y, rate));
@@ -168,6 +173,11 @@ pub trait Field {
     /// Writes dy'/dy at (t, y), row by row (d × d); false, and nothing written, where the field has none.
     fn jacobian(&mut self, _t: Time, _y: &[f64], _jacobian: &mut [f64]) -> bool {
         false
+    }
+
+    /// How stiff the mechanism is at (t, y); `None` where the field stands for none.
+    fn stiffness(&mut self, _t: Time, _y: &[f64]) -> Option<Stiffness> {
+        None
     }
 
     /// What unknown `i` is, for messages: `omega of bar2`.

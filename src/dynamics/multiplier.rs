@@ -5,6 +5,7 @@
 
 use super::jacobian::Jacobian;
 use super::kernel::{Bias, Kernel};
+use super::stiffness::Stiffness;
 use super::tree::size;
 use super::{Coordinates, Field, Form, Glance, Mechanism, Motion, State, Time};
 use crate::arithmetic::DoubleDouble;
@@ -47,6 +48,13 @@ impl<const N: usize, const ACCOUNT: bool> Multiplier<N, ACCOUNT> {
         }
     }
 
+    /// [`Field::fine_rate`] with a stabilizer's bias in every row.
+    pub fn fine_biased_rate(&mut self, t: Time, y: &[f64], low: &[f64], rate: &mut [f64], bias: Bias) {
+        self.kernel.measure(&self.mechanism, y, low);
+        self.biased_rate(t, y, rate, bias);
+        self.kernel.stretch.clear();
+    }
+
     /// dy'/dy with a stabilizer's bias in every row.
     pub fn biased_jacobian(&mut self, t: Time, y: &[f64], y_by_y: &mut [f64], bias: Bias) {
         let (n, d) = (self.mechanism.coordinates(), self.dimension());
@@ -70,9 +78,18 @@ impl<const N: usize, const ACCOUNT: bool> Field for Multiplier<N, ACCOUNT> {
         self.biased_rate(t, y, rate, Bias::default());
     }
 
+    fn fine_rate(&mut self, t: Time, y: &[f64], low: &[f64], rate: &mut [f64]) {
+        self.fine_biased_rate(t, y, low, rate, Bias::default());
+    }
+
     fn jacobian(&mut self, t: Time, y: &[f64], jacobian: &mut [f64]) -> bool {
         self.biased_jacobian(t, y, jacobian, Bias::default());
         true
+    }
+
+    fn stiffness(&mut self, t: Time, y: &[f64]) -> Option<Stiffness> {
+        let n = self.mechanism.coordinates();
+        Some(Stiffness::at(&self.mechanism, t, &y[..n], &y[n..2 * n]))
     }
 
     fn label(&self, i: usize) -> String {

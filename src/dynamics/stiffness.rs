@@ -37,6 +37,8 @@ pub struct Stiffness {
     pub culprit: Option<String>,
     /// Energy in that spring's own motion \[J\]: of its stretch and of its rate.
     pub energy: f64,
+    /// The same over the mechanism's energy scale.
+    pub share: f64,
 }
 
 impl Stiffness {
@@ -44,9 +46,10 @@ impl Stiffness {
     pub fn at(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Self {
         let lambda = if phi.len() <= EXACT { spectrum(mechanism, time, phi, omega) } else { largest(mechanism, time, phi, omega) };
         let fastest = lambda.norm_squared().sqrt();
-        let mut found = Self { fastest, decay: -lambda.re, slow: slow(mechanism, time, omega), culprit: None, energy: 0.0 };
+        let mut found = Self { fastest, decay: -lambda.re, slow: slow(mechanism, time, omega), ..Self::default() };
         if let Some(mode) = fastest_spring(mechanism, time, phi, omega).filter(|mode| mode.rate >= SHARE * fastest) {
-            (found.culprit, found.energy) = (Some(mode.name), mode.energy);
+            found.culprit = Some(mode.name);
+            (found.energy, found.share) = (mode.energy, mode.energy / mechanism.energy_scale);
         }
         found
     }

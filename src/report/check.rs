@@ -65,6 +65,7 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Value {
         "settings": super::settings(plan),
         "until": plan.until,
         "rows": plan.rows,
+        "stiffness": plan.stiffness,
         "notes": plan.notes,
     })
 }

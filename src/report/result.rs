@@ -40,6 +40,8 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value 
         "steps": tally.steps,
         "evaluations": tally.evaluations,
         "rejected": tally.rejected,
+        "jacobians": tally.jacobians,
+        "newton_steps": tally.newton_steps,
         "wall_s": outcome.wall.as_secs_f64(),
         "final": moment(mechanism, &outcome.last),
         "energy": {
@@ -57,6 +59,7 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value 
         "impacts": impacts,
         "holds": holds,
         "trust": {"error_estimate": null, "horizon_s": null, "how": "none"},
+        "stiffness": plan.stiffness,
         "notes": plan.notes,
         "stop": outcome.stop,
     })

@@ -11,6 +11,7 @@ pub mod checkpoint;
 pub mod choice;
 pub mod contact;
 pub mod drift;
+pub mod fast;
 #[cfg(feature = "files")]
 pub mod files;
 pub mod flip;
@@ -33,6 +34,7 @@ pub use checkpoint::{CheckpointError, Checkpoints, Loaded};
 pub use choice::Prefer;
 pub use contact::{Hold, Strike};
 pub use drift::{Drift, Limits};
+pub use fast::FastMode;
 #[cfg(feature = "files")]
 pub use files::{Cursor, FileError, Folder, Stream};
 pub use flip::Flip;

@@ -3,6 +3,7 @@
 //! A pairing that makes no sense is refused here, before anything is computed, with the reason and an alternative.
 
 use super::choice::{Prefer, choose};
+use super::fast::FastMode;
 use super::methods::{MethodId, Stabilization};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::compile::DENSE_LIMIT;
@@ -65,6 +66,8 @@ pub struct Plan {
     pub rows: u64,
     /// Why this method, in one line, where it was not asked for.
     pub why: Option<String>,
+    /// The fastest mode at the start, of scenes with springs.
+    pub stiffness: Option<FastMode>,
     /// What was adjusted or left out, one line each.
     pub notes: Vec<String>,
 }
@@ -126,6 +129,11 @@ impl Plan {
         } else {
             step = Some(fixed_step(method, request, rate, until, &mut every, &mut notes)?);
         }
+        let stiffness = FastMode::measure(scene, mechanism, method, step, until);
+        if let Some(mode) = &stiffness {
+            mode.check(method, request, until)?;
+            notes.extend(mode.note(method, until));
+        }
         let rows = rows(until, every);
         if rows > MAX_ROWS {
             return Err(usage("--every", format!("{rows:.1e} rows would be written; at most {MAX_ROWS:.0e}"), "a longer output interval"));
@@ -148,6 +156,7 @@ impl Plan {
             every,
             rows: rows as u64,
             why,
+            stiffness,
             notes,
         })
     }
@@ -166,6 +175,7 @@ impl Plan {
             every: until,
             rows: 1,
             why: None,
+            stiffness: None,
             notes: Vec::new(),
         }
     }
@@ -325,7 +335,7 @@ fn check_size(mechanism: &Mechanism, method: MethodId, request: &Request) -> Res
 /// The mean force of a vibration is known to the explicit methods, and right where the vibration is much faster than all else.
 fn check_vibration(mechanism: &Mechanism, method: MethodId, rate: f64, notes: &mut Vec<String>) -> Result<(), Refusal> {
     let Some(Vibration { name, energy, frequency, .. }) = &mechanism.vibration else { return Ok(()) };
-    if !matches!(method, MethodId::Dopri5 | MethodId::Dop853 | MethodId::Dp5 | MethodId::Dp8) {
+    if !matches!(method, MethodId::Dopri5 | MethodId::Dop853 | MethodId::Dp5 | MethodId::Dp8 | MethodId::Radau(_)) {
         let reason = "the mean force of its vibration comes from the mass matrix, of which this method knows no derivative";
         return Err(mismatch(format!("{method} with the rigid spring `{name}`"), reason, "--method dp8, or dop853"));
     }

@@ -390,6 +390,11 @@ impl Running {
     pub fn finish(mut self) -> Outcome {
         self.course.end(self.outcome.last.t, &mut self.outcome);
         self.outcome.tally = self.course.tally();
+        let Tally { steps, newton_steps, .. } = self.outcome.tally;
+        if newton_steps > 0 {
+            let note = format!("{newton_steps} of {steps} steps found their stages by Newton's method: sweeps contract slowly there");
+            self.outcome.plan.notes.push(note);
+        }
         if self.outcome.drift.is_doubtful() {
             let how = if self.outcome.plan.step.is_some() { "a shorter step" } else { "a tighter tolerance" };
             let off = self.outcome.drift.energy_share;

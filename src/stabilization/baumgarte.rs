@@ -41,6 +41,10 @@ impl<const N: usize> Field for Baumgarte<N> {
         self.inner.biased_rate(t, y, rate, self.bias);
     }
 
+    fn fine_rate(&mut self, t: Time, y: &[f64], low: &[f64], rate: &mut [f64]) {
+        self.inner.fine_biased_rate(t, y, low, rate, self.bias);
+    }
+
     fn jacobian(&mut self, t: Time, y: &[f64], jacobian: &mut [f64]) -> bool {
         self.inner.biased_jacobian(t, y, jacobian, self.bias);
         true

@@ -2,8 +2,9 @@
 //!
 //! Symplectic in the canonical form (q, p), symmetric in time, A-stable; energy is not conserved but stays within a band that does not grow.
 //! Run at the rounding optimum, where the error of the energy is a random walk of the rounding errors and nothing else (Brouwer's law).
-//! To choose for long horizons: bounded systems over 1e4 s and more, where the invariants count.  It asks for a smooth, not stiff field:
-//! stages are found by sweeps, which converge up to about `step · fastest rate = 2`.  In (q, w) the same coefficients are not symplectic.
+//! To choose for long horizons: bounded systems over 1e4 s and more, where the invariants count.  It asks for a smooth field:
+//! stages are found by sweeps and, from about `step · fastest rate = 2` on, by Newton's method (`newton.rs`).  Beyond 4 a fast mode with energy in it is not followed any more,
+//! and the slow motion goes wrong while the energy stays bounded: the method stops there.  In (q, w) the same coefficients are not symplectic.
 //!
 //! ```text
 //! L_j = h b_j f(t + c_j h, Y_j),      Y_i = y + Σ_j mu_ij L_j,      mu_ij = 1/2 + sigma_ij,  sigma_ij = -sigma_ji
@@ -30,11 +31,13 @@
 //! 2nd ed. (2006), sections VIII.6 (starting values, sweeps).  Summing outwards from the midpoint and the evaluations in pairs are ours.
 
 mod lanes;
+mod newton;
 mod tableau;
 
 use super::{Cause, Method, Reached, StepError, Tally, Watch};
 use crate::dynamics::{Field, State, Time};
 use lanes::Scratch;
+use newton::Newton;
 use tableau::Tableau;
 
 const NAMES: [&str; 7] = ["gauss4", "gauss6", "gauss8", "gauss10", "gauss12", "gauss14", "gauss16"];
@@ -49,6 +52,14 @@ const MOST_EXACT_SWEEPS: u32 = 12;
 const LARGEST_REST: f64 = 1e-10;
 /// Scale of an angle near zero \[rad\]: forces that cancel leave an angle a noise that is not relative to its size.
 const LEAST_ANGLE: f64 = 1e-2;
+/// Contraction from which sweeps are given up for Newton's method, and the radians of the fastest mode a step that make them as slow as that is worth.
+const SLOW: f64 = 0.6;
+const FAST_RADIANS: f64 = 2.0;
+/// Steps by Newton's method after which sweeps are tried again.
+const NEWTON_STEPS: f64 = 50.0;
+/// Radians of the fastest mode a step up to which it is followed, and the share of the energy scale in it from which it must be.
+const RESOLVED: f64 = 4.0;
+const EXCITED: f64 = 1e-6;
 /// Part of a step that a remaining time may differ from whole steps.
 const WHOLE: f64 = 1e-9;
 
@@ -60,6 +71,9 @@ pub struct Gauss {
     scratch: Scratch,
     portable: bool,
     exact: u32,
+    newton: Option<Box<Newton>>,
+    /// Contraction of the sweeps above which Newton's method takes over.
+    slow: f64,
 }
 
 impl Gauss {
@@ -68,12 +82,17 @@ impl Gauss {
     /// `None` unless 2 ≤ `stages` ≤ 8 and the step is finite and not zero.
     pub fn new(stages: usize, step: f64) -> Option<Self> {
         let sound = (2..=8).contains(&stages) && step.is_finite() && step != 0.0;
-        sound.then(|| Self {
-            step: step.abs(),
-            tableau: Tableau::new(stages),
-            scratch: Scratch::default(),
-            portable: false,
-            exact: MOST_EXACT_SWEEPS,
+        sound.then(|| {
+            let tableau = Tableau::new(stages);
+            Self {
+                step: step.abs(),
+                slow: SLOW.min(FAST_RADIANS * newton::largest_mode(&tableau)),
+                tableau,
+                scratch: Scratch::default(),
+                portable: false,
+                exact: MOST_EXACT_SWEEPS,
+                newton: None,
+            }
         })
     }
 
@@ -134,6 +153,7 @@ impl<F: Field + ?Sized> Method<F> for Gauss {
             (steps, (span.abs() - steps * self.step).copysign(span))
         };
         self.scratch.points.resize(problem.dimension());
+        self.scratch.judged = if problem.angles() > 0 { problem.angles() } else { problem.dimension() };
         for (step, count) in [(self.step.copysign(span), steps as u64), (last, u64::from(last != 0.0))] {
             self.scratch.scale(&self.tableau, step);
             if lanes::march(self, problem, state, count, tally, watch)? == Reached::Pause {
@@ -145,6 +165,27 @@ impl<F: Field + ?Sized> Method<F> for Gauss {
 }
 
 impl Gauss {
+    /// Refuses to go on with steps too long for a fast mode that has a part in the motion; asked where Newton's method takes over, and then now and again.
+    fn follow<F: Field + ?Sized>(&self, problem: &mut F, state: &State) -> Result<(), StepError> {
+        let Some(found) = problem.stiffness(state.time, &state.y) else { return Ok(()) };
+        let radians = found.radians(self.scratch.step.abs());
+        if radians <= RESOLVED || found.is_damped() || found.share <= EXCITED {
+            return Ok(());
+        }
+        let whose = found.culprit.map_or_else(|| "a mode of the bars".into(), |name| format!("spring `{name}`"));
+        Err(StepError {
+            cause: Cause::Unresolved,
+            method: self.label().into(),
+            t: state.time.hi,
+            step: self.scratch.step,
+            what: format!(
+                "{whose} swings at {:.2e} rad/s, {radians:.1} rad a step, with {:.0e} of the energy scale in it",
+                found.fastest, found.share
+            ),
+            hint: format!("a step of {:.1e} s follows it", 1.0 / found.fastest),
+        })
+    }
+
     fn label(&self) -> &'static str {
         NAMES[self.stages() - 2]
     }
@@ -155,7 +196,7 @@ impl Gauss {
     /// A momentum at rest under forces that cancel is all rounding and has no scale of its own.
     fn check<F: Field + ?Sized>(&self, problem: &mut F, state: &State) -> Result<(), StepError> {
         let scratch = &self.scratch;
-        let (d, angles) = (state.y.len(), problem.angles());
+        let angles = problem.angles();
         let stop = |cause, what| StepError {
             cause,
             method: self.label().into(),
@@ -167,12 +208,12 @@ impl Gauss {
         if let Some(k) = scratch.total.iter().position(|total| !total.is_finite()) {
             return Err(stop(Cause::NotFinite, format!("the rate of {} came out not finite", problem.label(k))));
         }
-        let judged = if angles > 0 { angles } else { d };
-        for k in 0..judged {
+        for k in 0..scratch.judged {
             let floor = if k < angles { LEAST_ANGLE } else { 0.0 };
             let scale = scratch.size[k].max(floor);
             if scratch.rest[k] > LARGEST_REST * scale {
-                let what = format!("the sweeps left a change of {:.1e} in {} and did not bring it down", scratch.rest[k], problem.label(k));
+                let what =
+                    format!("the iteration left a change of {:.1e} in {} and did not bring it down", scratch.rest[k], problem.label(k));
                 return Err(stop(Cause::NotConverged, what));
             }
         }

@@ -174,6 +174,8 @@ pub enum Cause {
     EffortExhausted,
     /// An implicit step did not converge.
     NotConverged,
+    /// The step is too long for a fast mode that has a part in the motion.
+    Unresolved,
     /// The projection onto the constraints did not converge.
     ProjectionFailed,
     /// Energy jumped at a singular position: the motion left on another branch.
@@ -196,6 +198,7 @@ impl Cause {
             Self::StepTooSmall => "step_too_small",
             Self::EffortExhausted => "effort_exhausted",
             Self::NotConverged => "not_converged",
+            Self::Unresolved => "unresolved",
             Self::ProjectionFailed => "projection_failed",
             Self::BranchLost => "branch_lost",
             Self::SpringWithoutLength => "spring_without_length",

@@ -71,6 +71,7 @@ struct Work {
     /// (d each)
     scale: Vec<f64>,
     stage: Vec<f64>,
+    low: Vec<f64>,
     mode: Vec<f64>,
     wide: Vec<Complex<f64>>,
     error: Vec<f64>,
@@ -85,8 +86,6 @@ struct Work {
 /// What the next step depends on beside the unknowns, the last polynomial and the Jacobian.
 #[derive(Clone, Copy, Debug)]
 struct Control {
-    /// Steps since the last output time.
-    taken: f64,
     /// The step proposed \[s\].
     wanted: f64,
     /// The last accepted step \[s\], zero before the first, and its error.
@@ -99,7 +98,7 @@ struct Control {
 }
 
 /// Numbers of [`Control`] and of the time of the Jacobian.
-const CONTROLS: usize = 8;
+const CONTROLS: usize = 7;
 
 /// How an iteration ended.
 enum Solved {
@@ -131,8 +130,8 @@ impl Radau {
         else {
             return false;
         };
-        let &[taken, wanted, accepted, error, contraction, keeps, hi, lo] = numbers;
-        *control = Control { taken, wanted, accepted, error, contraction, keeps };
+        let &[wanted, accepted, error, contraction, keeps, hi, lo] = numbers;
+        *control = Control { wanted, accepted, error, contraction, keeps };
         let (place, last) = rest.split_at(d);
         self.work.last.copy_from_slice(last);
         let time = Time { hi, lo };
@@ -144,10 +143,10 @@ impl Radau {
     }
 
     fn remember(&self, state: &mut State, control: &Control) {
-        let &Control { taken, wanted, accepted, error, contraction, keeps } = control;
+        let &Control { wanted, accepted, error, contraction, keeps } = control;
         let (Time { hi, lo }, place) = &self.work.place;
         state.memory.clear();
-        state.memory.extend([taken, wanted, accepted, error, contraction, keeps, *hi, *lo]);
+        state.memory.extend([wanted, accepted, error, contraction, keeps, *hi, *lo]);
         state.memory.extend_from_slice(place);
         state.memory.extend_from_slice(&self.work.last);
     }
@@ -257,9 +256,10 @@ impl Radau {
         let (s, d) = (tableau.stages(), state.y.len());
         for (i, rates) in work.rates.chunks_exact_mut(d).enumerate() {
             for (k, stage) in work.stage.iter_mut().enumerate() {
-                *stage = state.y[k] + (work.z[i * d + k] + state.low[k]);
+                let (sum, rest) = two_sum(state.y[k], work.z[i * d + k]);
+                (*stage, work.low[k]) = fast_two_sum(sum, rest + state.low[k]);
             }
-            field.rate(state.time + tableau.nodes[i].hi * h, &work.stage, rates);
+            field.fine_rate(state.time + tableau.nodes[i].hi * h, &work.stage, &work.low, rates);
         }
         tally.evaluations += s as u64;
         for i in 0..s {
@@ -320,9 +320,10 @@ impl Radau {
         let mut size = norm(&mut error, work);
         if is_hard && size >= 1.0 {
             for k in 0..d {
-                work.stage[k] = state.y[k] + error[k];
+                let (sum, rest) = two_sum(state.y[k], error[k]);
+                (work.stage[k], work.low[k]) = fast_two_sum(sum, rest + state.low[k]);
             }
-            field.rate(state.time, &work.stage, &mut error);
+            field.fine_rate(state.time, &work.stage, &work.low, &mut error);
             tally.evaluations += 1;
             for k in 0..d {
                 error[k] += work.mode[k];
@@ -363,6 +364,7 @@ impl Radau {
             &mut work.start,
             &mut work.scale,
             &mut work.stage,
+            &mut work.low,
             &mut work.mode,
             &mut work.error,
             &mut work.next,
@@ -425,12 +427,12 @@ impl<F: Field + ?Sized> Method<F> for Radau {
         super::refuse_the_past(self.id(), state, until)?;
         self.resize(d, events);
         let mut left = (until - state.time).hi;
-        let mut control = Control { taken: 0.0, wanted: 0.0, accepted: 0.0, error: 1.0, contraction: 1.0, keeps: 0.0 };
+        let mut control = Control { wanted: 0.0, accepted: 0.0, error: 1.0, contraction: 1.0, keeps: 0.0 };
         let knows = self.recall(state, &mut control);
         let (mut has_start, mut is_hard, mut cuts) = (false, !knows, 0);
         while left > 0.0 {
             if !has_start {
-                field.rate(state.time, &state.y, &mut self.work.start);
+                field.fine_rate(state.time, &state.y, &state.low, &mut self.work.start);
                 tally.evaluations += 1;
                 scales(self.tolerance, &state.y, &mut self.work.scale);
                 has_start = true;
@@ -446,7 +448,6 @@ impl<F: Field + ?Sized> Method<F> for Radau {
             } else {
                 control.wanted
             };
-            control.taken += 1.0;
             tally.check(self.id(), state.time.hi, h)?;
             if h < 1e-14 * state.time.hi.abs().max(1e-3) && !whole {
                 let what = format!("{} asks for ever smaller steps", self.culprit(field));
@@ -577,10 +578,103 @@ impl<F: Field + ?Sized> Method<F> for Radau {
         inside.wrap();
     }
 
-    /// The step goes on as it was going.
-    fn arrive(&self, state: &mut State) {
-        if let Some(taken) = state.memory.first_mut() {
-            *taken = 0.0;
+    /// The next step goes on as this one.
+    fn arrive(&self, _state: &mut State) {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// y' = y² cos t, y = 1/(2 - sin t): nonlinear, and a stage at a wrong time costs the order.
+    struct Bernoulli;
+
+    fn exact(t: f64) -> f64 {
+        1.0 / (2.0 - t.sin())
+    }
+
+    impl Field for Bernoulli {
+        fn dimension(&self) -> usize {
+            1
+        }
+
+        fn angles(&self) -> usize {
+            0
+        }
+
+        fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
+            rate[0] = y[0] * y[0] * t.hi.cos();
+        }
+
+        fn jacobian(&mut self, t: Time, y: &[f64], jacobian: &mut [f64]) -> bool {
+            jacobian[0] = 2.0 * y[0] * t.hi.cos();
+            true
+        }
+
+        fn label(&self, _: usize) -> String {
+            "y".into()
+        }
+    }
+
+    /// The error after steps of `h` to t = 3, whatever its estimate says.
+    fn error(stages: usize, count: u32) -> f64 {
+        let mut radau = Radau::new(stages, Tolerance { relative: 1e-13, absolute: 1e-13 }).expect("a method");
+        let (h, mut tally) = (3.0 / f64::from(count), Tally::default());
+        let mut state = State { y: vec![exact(0.0)], low: vec![0.0], ..State::default() };
+        radau.resize(1, 0);
+        for step in 1..=count {
+            scales(radau.tolerance, &state.y, &mut radau.work.scale);
+            radau.differentiate(&mut Bernoulli, Some(&state), &mut tally);
+            assert!(radau.repeat(&mut Bernoulli, &state, h, &mut tally), "step {step} of {count}");
+            state.y.copy_from_slice(&radau.work.next);
+            state.low.copy_from_slice(&radau.work.next_low);
+            state.time = Time::of(f64::from(step) * h);
+        }
+        (state.y[0] - exact(3.0)).abs()
+    }
+
+    #[test]
+    fn the_order_of_a_step_is_the_declared_one() {
+        for (stages, counts) in [(3, [16, 32, 64]), (5, [6, 9, 12])] {
+            let declared = 2.0 * stages as f64 - 1.0;
+            let errors = counts.map(|count| error(stages, count));
+            let slope = (errors[0] / errors[2]).ln() / (f64::from(counts[2]) / f64::from(counts[0])).ln();
+            println!("{slope} {errors:e?}");
+            assert!((slope - declared).abs() < 0.5, "order {slope}, declared {declared}: {errors:e?}");
+        }
+    }
+
+    /// A linear system whose fast mode dies at once: the method follows the slow one with long steps, and its estimate sees no more.
+    #[test]
+    fn what_has_died_away_costs_nothing() {
+        struct Fast;
+        impl Field for Fast {
+            fn dimension(&self) -> usize {
+                2
+            }
+            fn angles(&self) -> usize {
+                0
+            }
+            fn rate(&mut self, _: Time, y: &[f64], rate: &mut [f64]) {
+                rate.copy_from_slice(&[-y[0], -1e9 * (y[1] - y[0])]);
+            }
+            fn jacobian(&mut self, _: Time, _: &[f64], jacobian: &mut [f64]) -> bool {
+                jacobian.copy_from_slice(&[-1.0, 0.0, 1e9, -1e9]);
+                true
+            }
+            fn label(&self, i: usize) -> String {
+                i.to_string()
+            }
+        }
+        for stages in [3, 5] {
+            let mut radau = Radau::new(stages, Tolerance { relative: 1e-8, absolute: 1e-8 }).expect("a method");
+            let mut state = State { y: vec![1.0, 3.0], low: vec![0.0; 2], ..State::default() };
+            let mut tally = Tally::default();
+            let reached = radau.advance(&mut Fast, &mut state, Time::of(2.0), &mut tally, &mut |_, _| Ok(super::super::Seen::Kept));
+            assert_eq!(reached, Ok(Reached::Until));
+            let exact = (-2.0_f64).exp();
+            assert!(state.y.iter().all(|y| (y - exact).abs() < 1e-7), "{:?}", state.y);
+            assert!(tally.steps < 120 && tally.evaluations < 1500, "{tally:?}");
         }
     }
 }

@@ -46,6 +46,21 @@ impl Spring {
         span.times(((T::of(self.free_length) - length) / length).scale(self.stiffness))
     }
 
+    /// Force \[N\] on the first end of a spring whose stretch \[m\] is known better than its length.
+    #[inline(always)]
+    pub fn stretched<T: Scalar>(&self, stretch: T, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
+        let span = self.span.position(z);
+        let elastic = -span.times((stretch / span.norm_squared().sqrt()).scale(self.stiffness));
+        if self.damping == 0.0 { elastic } else { elastic + self.drag(z, omega) }
+    }
+
+    /// L - L0 \[m\] of a span D, without a square root in the difference.
+    pub fn stretch<T: Scalar>(&self, span: Complex<T>) -> T {
+        let square = span.norm_squared();
+        let free = T::of(self.free_length);
+        (square - free * free) / (square.sqrt() + free)
+    }
+
     /// Force \[N\] of the damper alone on the first end.
     #[inline(always)]
     pub fn drag<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> Complex<T> {

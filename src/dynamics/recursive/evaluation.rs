@@ -85,13 +85,13 @@ impl<T: Real> Evaluation<T> {
         self.trees.pivots(pivots);
     }
 
-    /// The factors of M, and what is left of all forces; overwrites `load`.
+    /// The factors of M, and what is left of all forces, springs by their stretches where these are known; overwrites `load`.
     #[inline]
-    pub fn fold(&mut self, mechanism: &Mechanism, t: Time, at: Posture<T>, load: &mut [T]) {
+    pub fn fold(&mut self, mechanism: &Mechanism, t: Time, at: Posture<T>, stretch: &[T], load: &mut [T]) {
         self.trees.convect(&self.recursion.links, at.z, at.omega);
         if mechanism.is_forced() {
             load.fill(T::ZERO);
-            mechanism.push(t, at, load);
+            mechanism.push(t, at, stretch, load);
             self.trees.burden(&self.recursion.links, load);
         }
         self.trees.fold(&self.recursion.links);

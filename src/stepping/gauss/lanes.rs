@@ -1,7 +1,8 @@
 //! The steps themselves, a stage a lane; the one place where code compiled for the processor is entered.
 
+use super::newton::Newton;
 use super::tableau::{Tableau, lane};
-use super::{Gauss, IDLE_SWEEPS, MOST_SWEEPS};
+use super::{Gauss, IDLE_SWEEPS, MOST_SWEEPS, NEWTON_STEPS};
 use crate::arithmetic::eight::{LANES, Octet};
 #[cfg(target_arch = "x86_64")]
 use crate::arithmetic::lanes::{Avx, available};
@@ -32,7 +33,19 @@ pub(super) struct Scratch {
     pub size: Vec<f64>,
     /// The sum of all increments (d).
     pub total: Vec<DoubleDouble>,
+    /// How many unknowns, from the first, tell how fast the iteration contracts.
+    pub judged: usize,
+    /// True where the field has been found to have no Jacobian.
+    is_sweeping: bool,
+    /// Steps by Newton's method before sweeps are tried again, this one counted; zero where it was made by sweeps.
+    newton_left: f64,
 }
+
+/// Sweeps before the contraction is looked at, and the change \[rad\] below which it is one of rounding.
+const EARLY: usize = 8;
+const NOISE: f64 = 1e-9;
+/// Newton iterations after which a step is given up.
+const MOST_ITERATIONS: usize = 60;
 
 /// One step about to be taken.
 struct Step<'a> {
@@ -40,6 +53,8 @@ struct Step<'a> {
     scratch: &'a mut Scratch,
     /// Evaluations after the last sweep that carry what doubles leave out.
     exact: u32,
+    newton: &'a mut Option<Box<Newton>>,
+    slow: f64,
 }
 
 /// `count` steps of `scratch.step`, or as many as the watcher wants.
@@ -53,11 +68,16 @@ pub(super) fn march<F: Field + ?Sized>(
 ) -> Result<Reached, StepError> {
     for _ in 0..count {
         tally.check(gauss.label(), state.time.hi, gauss.scratch.step)?;
-        let mut step = Step { tableau: &gauss.tableau, scratch: &mut gauss.scratch, exact: gauss.exact };
-        take(gauss.portable, &mut step, &mut Of(problem), state, tally);
+        let Gauss { tableau, scratch, exact, newton, slow, portable, .. } = &mut *gauss;
+        let mut step = Step { tableau, scratch, exact: *exact, newton, slow: *slow };
+        take(*portable, &mut step, &mut Of(problem), state, tally);
+        if gauss.scratch.newton_left == NEWTON_STEPS {
+            gauss.follow(problem, state)?;
+        }
         gauss.check(problem, state)?;
         gauss.scratch.commit(state, gauss.tableau.nodes.len());
         tally.steps += 1;
+        tally.newton_steps += u64::from(gauss.scratch.newton_left > 0.0);
         let seen = watch(problem, state)?;
         if seen.is_changed() {
             state.memory.clear();
@@ -73,6 +93,7 @@ pub(super) fn march<F: Field + ?Sized>(
 trait Rates {
     fn rates(&mut self, points: &mut Points);
     fn exact_rates(&mut self, points: &mut Points) -> bool;
+    fn jacobian(&mut self, t: Time, y: &[f64], jacobian: &mut [f64]) -> bool;
 }
 
 /// A field behind a table of functions, so that the steps are compiled once and not with every field.
@@ -85,6 +106,10 @@ impl<F: Field + ?Sized> Rates for Of<'_, F> {
 
     fn exact_rates(&mut self, points: &mut Points) -> bool {
         self.0.exact_rates(points)
+    }
+
+    fn jacobian(&mut self, t: Time, y: &[f64], jacobian: &mut [f64]) -> bool {
+        self.0.jacobian(t, y, jacobian)
     }
 }
 
@@ -113,7 +138,17 @@ impl Step<'_> {
     #[inline(always)]
     fn take<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, tally: &mut Tally) {
         self.predict::<L>(state);
-        self.sweep::<L>(problem, state, tally);
+        // Beside the increments there is a number where the last step was made by Newton's method.
+        let (known, all) = (state.memory.len(), self.tableau.nodes.len() * state.y.len() + 1);
+        let left = if known == all + 1 { state.memory[all] - 1.0 } else { 0.0 };
+        self.scratch.newton_left = left;
+        if left > 0.0 && self.differentiate(problem, state, tally) {
+            return self.solve::<L>(problem, state, tally);
+        }
+        if !self.sweep::<L>(problem, state, tally) {
+            self.scratch.newton_left = NEWTON_STEPS;
+            return self.solve::<L>(problem, state, tally);
+        }
         self.scratch.judge();
         self.scratch.points.rate_low.fill(Octet::default());
         self.refine::<L>(problem, state, tally);
@@ -129,7 +164,7 @@ impl Step<'_> {
         }
         let stages = &mut scratch.points.y;
         let known = match state.memory.split_first() {
-            Some((&step, last)) if step == scratch.step && last.len() == s * state.y.len() => last,
+            Some((&step, last)) if step == scratch.step && last.len() >= s * state.y.len() => &last[..s * state.y.len()],
             _ => &[],
         };
         for (stage, &y) in stages.iter_mut().zip(&state.y) {
@@ -145,21 +180,32 @@ impl Step<'_> {
         }
     }
 
-    /// Sweeps the stages until no unknown's change falls any further.
+    /// Sweeps the stages until no unknown's change falls any further; false where that takes so long that Newton's method is to be used, for which all is ready then.
     #[inline(always)]
-    fn sweep<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, tally: &mut Tally) {
+    fn sweep<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, tally: &mut Tally) -> bool {
         self.scratch.least.fill(f64::INFINITY);
         let mut idle = 0;
-        for _ in 0..MOST_SWEEPS {
+        let mut sizes = [f64::NAN; 5];
+        for sweep in 0..MOST_SWEEPS {
             problem.rates(&mut self.scratch.points);
             self.multiply::<L>();
             tally.evaluations += self.tableau.nodes.len() as u64;
             self.restage::<L, false>(state);
             idle = if self.scratch.falls() { 0 } else { idle + 1 };
-            if idle == IDLE_SWEEPS || self.scratch.change.iter().all(|&change| change == 0.0) {
-                return;
+            let is_over = idle == IDLE_SWEEPS || self.scratch.change.iter().all(|&change| change == 0.0);
+            sizes[sweep % 5] = self.scratch.size_of_change();
+            let (now, before) = (sizes[sweep % 5], sizes[(sweep + 1) % 5]);
+            // Over four sweeps, because coordinates and momenta take turns, and well above rounding; the first sweeps are still finding their direction.
+            let contraction = (now / before).sqrt().sqrt();
+            let is_slow = now > NOISE && (is_over || sweep >= EARLY && contraction > self.slow);
+            if is_slow && !self.scratch.is_sweeping && self.differentiate(problem, state, tally) {
+                return false;
+            }
+            if is_over {
+                return true;
             }
         }
+        true
     }
 
     /// Evaluations that carry what doubles leave out, at stages that are pairs, until the stages stay as they are to the last bit, or their changes fall no
@@ -181,6 +227,89 @@ impl Step<'_> {
             self.restage::<L, true>(state);
             idle = if self.scratch.falls() { 0 } else { idle + 1 };
             if idle == IDLE_SWEEPS || self.scratch.change.iter().all(|&change| change == 0.0) {
+                return;
+            }
+        }
+    }
+
+    /// The Jacobian at the middle of the predicted step and its factors; false where the field has none.
+    fn differentiate(&mut self, problem: &mut dyn Rates, state: &State, tally: &mut Tally) -> bool {
+        self.predict::<Portable>(state);
+        let (s, d) = (self.tableau.nodes.len(), state.y.len());
+        let scratch = &mut *self.scratch;
+        let middle: Vec<f64> = scratch.points.y.iter().map(|y| 0.5 * (y.0[lane((s - 1) / 2, s)] + y.0[lane(s / 2, s)])).collect();
+        let newton = self.newton.get_or_insert_with(|| Box::new(Newton::new(self.tableau)));
+        newton.jacobian.resize(d * d, 0.0);
+        scratch.is_sweeping = !problem.jacobian(state.time + 0.5 * scratch.step, &middle, &mut newton.jacobian);
+        if scratch.is_sweeping {
+            return false;
+        }
+        tally.jacobians += 1;
+        newton.factor(scratch.step, d);
+        true
+    }
+
+    /// All of a step but its acceptance by Newton's method, from the predicted stages and the factors in place.
+    #[inline(always)]
+    fn solve<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, tally: &mut Tally) {
+        let (s, d) = (self.tableau.nodes.len(), state.y.len());
+        let last = match state.memory.split_first() {
+            Some((&step, last)) if step == self.scratch.step && last.len() >= s * d => &last[..s * d],
+            _ => &[],
+        };
+        let mut rate = Vec::new();
+        if last.is_empty() {
+            // All stages are still at y.
+            problem.rates(&mut self.scratch.points);
+            tally.evaluations += 1;
+            rate.extend(self.scratch.points.rate.iter().map(|rate| rate.0[lane(0, s)]));
+        }
+        if let Some(newton) = &self.newton {
+            newton.predict(last, s, &rate, &self.scratch.span, &mut self.scratch.increment);
+        }
+        self.restage::<L, false>(state);
+        self.iterate::<L, false>(problem, state, tally, MOST_ITERATIONS);
+        self.scratch.judge();
+        if self.exact > 0 {
+            self.restage::<L, true>(state);
+            self.iterate::<L, true>(problem, state, tally, self.exact as usize);
+        }
+    }
+
+    /// Newton iterations until no unknown's change falls any further; with `LOW` on stages that are pairs, where the field has such rates.
+    #[inline(always)]
+    fn iterate<L: Lanes, const LOW: bool>(&mut self, problem: &mut dyn Rates, state: &State, tally: &mut Tally, most: usize) {
+        let (s, d) = (self.tableau.nodes.len(), state.y.len());
+        self.scratch.least.fill(f64::INFINITY);
+        let mut idle = 0;
+        for _ in 0..most {
+            if !LOW {
+                problem.rates(&mut self.scratch.points);
+            } else if !problem.exact_rates(&mut self.scratch.points) {
+                return;
+            }
+            tally.evaluations += s as u64;
+            let (scratch, Some(newton)) = (&mut *self.scratch, self.newton.as_mut()) else { return };
+            newton.correction.clear();
+            for i in 0..s {
+                let at = lane(i, s);
+                newton.correction.extend((0..d).map(|k| {
+                    let (span, points) = (scratch.span.0[at], &scratch.points);
+                    let rest = libm::fma(span, points.rate[k].0[at], -scratch.increment[k].0[at]);
+                    if LOW { libm::fma(span, points.rate_low[k].0[at], rest) } else { rest }
+                }));
+            }
+            newton.solve(&scratch.span, s, d);
+            for k in 0..d {
+                scratch.total[k] = newton.total(&scratch.increment[k], s, d, k);
+                for i in 0..s {
+                    scratch.increment[k].0[lane(i, s)] += newton.correction[i * d + k];
+                }
+            }
+            self.restage::<L, LOW>(state);
+            idle = if self.scratch.falls() { 0 } else { idle + 1 };
+            let size = self.scratch.size_of_change();
+            if idle == IDLE_SWEEPS || size.is_nan() || self.scratch.change.iter().all(|&change| change == 0.0) {
                 return;
             }
         }
@@ -284,6 +413,9 @@ impl Scratch {
         state.memory.clear();
         state.memory.push(self.step);
         state.memory.extend(self.increment.iter().flat_map(|increment| (0..s).map(|i| increment.0[lane(i, s)])));
+        if self.newton_left > 0.0 {
+            state.memory.push(self.newton_left);
+        }
     }
 
     /// True where some unknown changed less than ever before in this step; no change at all may be an accident and is not counted.
@@ -296,6 +428,13 @@ impl Scratch {
             }
         }
         falls
+    }
+
+    /// The largest change of the last sweep among the unknowns that tell; not a number where one is.
+    fn size_of_change(&self) -> f64 {
+        self.change[..self.judged]
+            .iter()
+            .fold(0.0, |size: f64, &change| if change.is_nan() || size.is_nan() { f64::NAN } else { size.max(change) })
     }
 
     /// Keeps what convergence is judged by.

@@ -66,6 +66,16 @@ impl Tableau {
         }
         Self { nodes, weights, even, odd, forecast }
     }
+
+    /// a_ij.
+    pub fn entry(&self, i: usize, j: usize) -> f64 {
+        integral(&self.nodes, &self.weights, j, DoubleDouble::ZERO, self.nodes[i]).hi
+    }
+
+    /// (b_i/b_j) l_j(1 + c_i): what increment j of one step gives to increment i of the next.
+    pub fn carried(&self, i: usize, j: usize) -> f64 {
+        (lagrange(&self.nodes, j, DoubleDouble::ONE + self.nodes[i]) * self.weights[i] / self.weights[j]).hi
+    }
 }
 
 /// Nodes and weights on [0, 1].
@@ -102,11 +112,13 @@ fn legendre(s: usize, x: DoubleDouble) -> (DoubleDouble, DoubleDouble) {
 
 /// The integral of l_j from `from` to `from + length`.
 fn integral(nodes: &[DoubleDouble], weights: &[DoubleDouble], j: usize, from: DoubleDouble, length: DoubleDouble) -> DoubleDouble {
-    let lagrange = |x: DoubleDouble| {
-        let others = (0..nodes.len()).filter(|&k| k != j);
-        others.fold(DoubleDouble::ONE, |product, k| product * ((x - nodes[k]) / (nodes[j] - nodes[k])))
-    };
-    length * nodes.iter().zip(weights).fold(DoubleDouble::ZERO, |sum, (&c, &b)| sum + b * lagrange(from + length * c))
+    length * nodes.iter().zip(weights).fold(DoubleDouble::ZERO, |sum, (&c, &b)| sum + b * lagrange(nodes, j, from + length * c))
+}
+
+/// l_j at `x`.
+fn lagrange(nodes: &[DoubleDouble], j: usize, x: DoubleDouble) -> DoubleDouble {
+    let others = (0..nodes.len()).filter(|&k| k != j);
+    others.fold(DoubleDouble::ONE, |product, k| product * ((x - nodes[k]) / (nodes[j] - nodes[k])))
 }
 
 #[cfg(test)]

@@ -1,0 +1,120 @@
+//! What is said of a stiff scene before it is run: which spring is fast, how many of its periods there are to follow, and in about how many steps.
+//!
+//! A fast mode that swings is resolved, whatever it takes: its energy acts on the slow motion, and a method that damps it away returns a wrong one, smoothly.
+//! Past 1e8 radians that wants to be asked for.
+
+use super::methods::MethodId;
+use super::plan::{Refusal, Request};
+use crate::dynamics::{Mechanism, Stiffness};
+use crate::scene::Scene;
+
+/// How much faster than all else a mode must be to be worth a note.
+const STIFF: f64 = 30.0;
+/// Phase of a fast mode up to which it is followed unasked \[rad\]: about half a minute of computing.
+const MOST_RADIANS: f64 = 1e8;
+/// Share of the energy scale from which the energy of a fast mode counts.
+const EXCITED: f64 = 1e-6;
+
+/// The fastest mode at the start of a run.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct FastMode {
+    /// The spring or damper it belongs to, if any.
+    pub spring: Option<String>,
+    /// Its rate \[rad/s\].
+    pub rate: f64,
+    /// How fast it dies away \[1/s\].
+    pub decay: f64,
+    /// The rate of all else \[rad/s\].
+    pub slow: f64,
+    /// Its periods to the horizon; zero where it dies away within a few.
+    pub periods: f64,
+    /// About how many steps the method takes to follow it; zero where it need not.
+    pub steps: f64,
+    /// Energy in it over the energy scale.
+    pub energy_share: f64,
+}
+
+impl FastMode {
+    /// That of a scene with springs, on the way to `until` \[s\] by a method; `step` is that of a fixed-step method \[s\].
+    pub fn measure(scene: &Scene, mechanism: &Mechanism, method: MethodId, step: Option<f64>, until: f64) -> Option<Self> {
+        if mechanism.springs.is_empty() && mechanism.torsions.is_empty() {
+            return None;
+        }
+        let start = mechanism.start(scene);
+        let [phi, omega] = [&start.phi, &start.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<_>>());
+        let found = Stiffness::at(mechanism, start.time, &phi, &omega);
+        let is_damped = found.is_damped();
+        let dies = is_damped && matches!(method, MethodId::Radau(_));
+        let steps = step.map_or(found.radians(until) / radians_a_step(method), |step| until / step);
+        Some(Self {
+            periods: if is_damped { 0.0 } else { found.periods(until) },
+            steps: if dies { 0.0 } else { steps },
+            spring: found.culprit,
+            rate: found.fastest,
+            decay: found.decay,
+            slow: found.slow,
+            energy_share: found.share,
+        })
+    }
+
+    /// True where it is so much faster than all else that it decides what a run costs.
+    pub fn is_stiff(&self) -> bool {
+        self.rate > STIFF * self.slow
+    }
+
+    /// True where it swings on, period after period.
+    fn swings(&self) -> bool {
+        self.periods > 0.0
+    }
+
+    fn name(&self) -> String {
+        self.spring.as_ref().map_or_else(|| "the fastest mode".into(), |name| format!("spring {name}"))
+    }
+
+    /// Refuses to follow very many periods unless that is asked for; Radau methods do not follow them, and fixed steps are what they were asked to be.
+    ///
+    /// # Errors
+    /// More than 1e8 rad, no effort stated.
+    pub fn check(&self, method: MethodId, request: &Request, until: f64) -> Result<(), Refusal> {
+        let is_asked_for = request.effort.is_some() || !method.is_adaptive() || matches!(method, MethodId::Radau(_));
+        if is_asked_for || !self.swings() || self.rate * until <= MOST_RADIANS {
+            return Ok(());
+        }
+        let (rate, periods) = (self.rate, self.periods);
+        Err(Refusal {
+            is_usage: false,
+            what: format!("{} over {until} s", self.name()),
+            reason: format!("it oscillates at {rate:.1e} rad/s, {periods:.1e} periods until t = {until} s, about {:.1e} steps", self.steps),
+            alternative: "a shorter --until, \"model\": \"rigid\" for the spring, or --effort with the evaluations that may take".into(),
+        })
+    }
+
+    /// What there is to say of it, if it is stiff.
+    pub fn note(&self, method: MethodId, until: f64) -> Option<String> {
+        if !self.is_stiff() {
+            return None;
+        }
+        let (name, rate, share) = (self.name(), self.rate, self.energy_share);
+        if !self.swings() {
+            let cost = if self.steps > 0.0 { format!("; {method} follows it in about {:.1e} steps", self.steps) } else { String::new() };
+            return Some(format!("{name} is stiff, {rate:.1e} rad/s, and dies away at {:.1e} /s{cost}", self.decay));
+        }
+        let swing = format!("{name} oscillates at {rate:.1e} rad/s, {:.1e} periods until t = {until} s", self.periods);
+        Some(match method {
+            MethodId::Radau(_) if share > EXCITED => {
+                format!("{swing}; {method} takes its energy away, {share:.0e} of the scale, wherever its steps are longer than a period")
+            }
+            _ => format!("{swing}, about {:.1e} steps; energy in it {share:.0e} of the scale", self.steps),
+        })
+    }
+}
+
+/// Phase of a fast mode in a step that follows it, about: by stability for the explicit methods at everyday tolerances, by the radius of convergence for the series.
+fn radians_a_step(method: MethodId) -> f64 {
+    match method {
+        MethodId::Dopri5 | MethodId::Dp5 => 0.5,
+        MethodId::Dop853 | MethodId::Dp8 => 2.0,
+        MethodId::Taylor => 2.6,
+        _ => 1.0,
+    }
+}
