@@ -1,10 +1,12 @@
 //! The same bits on every machine: the ends of shipped scenes by every kind of method, as hashes.
 //!
-//! A change of the arithmetic changes them; then the new ones are printed, and belong here with a word in the changelog.
+//! A change of the arithmetic changes them; then the new ones are printed, and belong here with a word in the changelog.  They are the same with and without
+//! the processor's vectors, in debug and release builds, with and without `target-cpu=native`: `.ci/bits` runs this in all of these.
 
 mod common;
 
 use common::{run, shipped};
+use driftless::arithmetic::lanes;
 use driftless::run::{Request, Stabilization};
 use driftless::scene::Scene;
 
@@ -39,8 +41,17 @@ fn hash(numbers: impl Iterator<Item = f64>) -> u64 {
     numbers.flat_map(f64::to_le_bytes).fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
+/// The first time with the processor's vectors, where it has them, the second time without.
 #[test]
 fn ends_have_the_bits_they_always_had() {
+    ends();
+    lanes::disable(true);
+    assert!(lanes::hardware().is_none());
+    ends();
+    lanes::disable(false);
+}
+
+fn ends() {
     let mut changed = Vec::new();
     for &(name, method, setting, stabilize, until, expected) in ENDS {
         let scene = Scene { until, every: until / 4.0, ..shipped(name, &[]) };

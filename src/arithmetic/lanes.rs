@@ -4,10 +4,11 @@
 //! vector type for AVX with FMA, and a portable one for everything else.  Each operation is exactly rounded and
 //! [`Lanes::mul_add`] is *always* fused: where the processor has no such instruction it is computed in software, slowly but to the same bits.
 //!
-//! A kernel is written once over [`Lanes`], every function of it `#[inline(always)]`, and compiled twice: the outermost function of the fast
-//! build carries `#[target_feature(enable = "avx,fma")]` and is entered only after [`available`] has said yes.
+//! A kernel is written once over [`Lanes`] and compiled twice: it is a piece of [`Code`], which [`run`] enters as compiled for the processor, where that has
+//! AVX and FMA, or as portable code.  `unsafe` is nowhere in the crate but in the file that does so, `lanes/hardware.rs`.
 
 use std::fmt::Debug;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Four doubles; lanes 0-1 and 2-3 are pairs, which are halves of the vector.
 pub trait Lanes: Copy + Debug + 'static {
@@ -159,175 +160,102 @@ impl Lanes for Portable {
 }
 
 #[cfg(target_arch = "x86_64")]
-pub use hardware::{Avx, available};
-
-/// True where [`Avx`] may be used; never, on this architecture.
-#[cfg(not(target_arch = "x86_64"))]
-pub fn available() -> bool {
-    false
-}
-
+mod hardware;
 #[cfg(target_arch = "x86_64")]
-mod hardware {
-    use super::Lanes;
-    use std::arch::x86_64::*;
+pub use hardware::Hardware;
+#[cfg(target_arch = "x86_64")]
+pub(crate) use hardware::Vector;
 
-    /// Four doubles in one register of AVX; values exist only below functions entered after [`available`] has said yes.
-    #[derive(Clone, Copy, Debug)]
-    pub struct Avx(__m256d);
+/// The widest vectors there is code for.
+#[cfg(not(target_arch = "x86_64"))]
+pub(crate) type Vector = Portable;
 
-    /// True where the processor has AVX and FMA.
-    pub fn available() -> bool {
-        is_x86_feature_detected!("avx") && is_x86_feature_detected!("fma")
+/// The proof that the processor has instructions there is code for; never, on this architecture.
+#[cfg(not(target_arch = "x86_64"))]
+#[derive(Clone, Copy, Debug)]
+pub enum Hardware {}
+
+#[cfg(not(target_arch = "x86_64"))]
+impl Hardware {
+    /// None.
+    pub fn ask() -> Option<Self> {
+        None
     }
 
-    /// The instruction itself.
-    ///
-    /// A trait's methods cannot carry `#[target_feature]`, so each is entered here.
-    macro_rules! instruction {
-        ($call:expr) => {{
-            // SAFETY: kernels over `Avx` are entered only through functions with `#[target_feature(enable = "avx,fma")]`, after `available`.
-            #[allow(unsafe_code)]
-            unsafe {
-                $call
-            }
-        }};
-    }
-
-    /// The same double in every lane, as a constant.
-    const fn constant(value: f64) -> Avx {
-        // SAFETY: both types are four doubles without padding, and every pattern of bits is valid in each.
-        #[allow(unsafe_code)]
-        unsafe {
-            std::mem::transmute::<[f64; 4], Avx>([value; 4])
-        }
-    }
-
-    impl Lanes for Avx {
-        const UNROLLED: bool = true;
-
-        const ZERO: Self = constant(0.0);
-        const ONE: Self = constant(1.0);
-
-        #[inline(always)]
-        fn of(lanes: [f64; 4]) -> Self {
-            instruction!(Self(_mm256_loadu_pd(lanes.as_ptr())))
-        }
-
-        #[inline(always)]
-        fn array(self) -> [f64; 4] {
-            let mut lanes = [0.0; 4];
-            instruction!(_mm256_storeu_pd(lanes.as_mut_ptr(), self.0));
-            lanes
-        }
-
-        #[inline(always)]
-        fn splat(value: f64) -> Self {
-            instruction!(Self(_mm256_set1_pd(value)))
-        }
-
-        #[inline(always)]
-        fn add(self, other: Self) -> Self {
-            instruction!(Self(_mm256_add_pd(self.0, other.0)))
-        }
-
-        #[inline(always)]
-        fn sub(self, other: Self) -> Self {
-            instruction!(Self(_mm256_sub_pd(self.0, other.0)))
-        }
-
-        #[inline(always)]
-        fn mul(self, other: Self) -> Self {
-            instruction!(Self(_mm256_mul_pd(self.0, other.0)))
-        }
-
-        #[inline(always)]
-        fn div(self, other: Self) -> Self {
-            instruction!(Self(_mm256_div_pd(self.0, other.0)))
-        }
-
-        #[inline(always)]
-        fn sqrt(self) -> Self {
-            instruction!(Self(_mm256_sqrt_pd(self.0)))
-        }
-
-        #[inline(always)]
-        fn mul_add(self, factor: Self, addend: Self) -> Self {
-            instruction!(Self(_mm256_fmadd_pd(self.0, factor.0, addend.0)))
-        }
-
-        #[inline(always)]
-        fn neg_mul_add(self, factor: Self, addend: Self) -> Self {
-            instruction!(Self(_mm256_fnmadd_pd(self.0, factor.0, addend.0)))
-        }
-
-        #[inline(always)]
-        fn swap_pairs(self) -> Self {
-            instruction!(Self(_mm256_permute_pd::<0b0101>(self.0)))
-        }
-
-        #[inline(always)]
-        fn swap_halves(self) -> Self {
-            instruction!(Self(_mm256_permute2f128_pd::<0x01>(self.0, self.0)))
-        }
-
-        #[inline(always)]
-        fn abs(self) -> Self {
-            instruction!(Self(_mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0)))
-        }
-
-        #[inline(always)]
-        fn max(self, other: Self) -> Self {
-            instruction!(Self(_mm256_max_pd(self.0, other.0)))
-        }
-
-        #[inline(always)]
-        fn are_within(self, bound: f64) -> bool {
-            instruction!(_mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LE_OQ>(self.abs().0, _mm256_set1_pd(bound))) == 0b1111)
-        }
-
-        #[inline(always)]
-        fn neg(self) -> Self {
-            instruction!(Self(_mm256_xor_pd(_mm256_set1_pd(-0.0), self.0)))
-        }
+    /// Nobody holds such a proof.
+    pub fn run<C: Code>(self, _: C) -> C::Output {
+        match self {}
     }
 }
 
-#[cfg(all(test, target_arch = "x86_64"))]
+/// Code written once over lanes: its [`Code::run`], and every function below it, is `#[inline(always)]`, so that it is compiled as the place is it is called from.
+pub trait Code {
+    /// What comes of it.
+    type Output;
+
+    /// Runs it on one kind of lanes.
+    fn run<L: Lanes>(self) -> Self::Output;
+}
+
+static IS_DISABLED: AtomicBool = AtomicBool::new(false);
+
+/// Takes the processor for one without vectors from here on, or for what it is again, in the whole process: for tests that the bits are the same.
+pub fn disable(is_disabled: bool) {
+    IS_DISABLED.store(is_disabled, Ordering::Relaxed);
+}
+
+/// The proof that the processor has vectors, where it has and nobody disabled them.
+#[inline]
+pub fn hardware() -> Option<Hardware> {
+    if IS_DISABLED.load(Ordering::Relaxed) { None } else { Hardware::ask() }
+}
+
+/// Runs code in the processor's vectors where it has them and `is_portable` does not forbid it, else in portable ones: slowly to the same bits.
+#[inline(always)]
+pub fn run<C: Code>(code: C, is_portable: bool) -> C::Output {
+    match hardware().filter(|_| !is_portable) {
+        Some(hardware) => hardware.run(code),
+        None => code.run::<Portable>(),
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
 
     /// Every operation on the same operands, as bits.
-    #[inline(always)]
-    fn everything<L: Lanes>(a: [f64; 4], b: [f64; 4], c: [f64; 4]) -> Vec<[u64; 4]> {
-        let (x, y, z) = (L::of(a), L::of(b), L::of(c));
-        [
-            x.add(y),
-            x.sub(y),
-            x.mul(y),
-            x.div(y),
-            x.abs().sqrt(),
-            x.neg(),
-            x.mul_add(y, z),
-            x.neg_mul_add(y, z),
-            x.swap_pairs(),
-            x.swap_halves(),
-            x.abs(),
-            x.max(y),
-            L::splat(a[0]),
-            L::splat(f64::from(u8::from(x.are_within(500.0)))),
-            L::ZERO,
-            L::ONE,
-        ]
-        .iter()
-        .map(|lanes| lanes.array().map(f64::to_bits))
-        .collect()
-    }
+    struct Everything([f64; 4], [f64; 4], [f64; 4]);
 
-    #[target_feature(enable = "avx,fma")]
-    fn in_hardware(a: [f64; 4], b: [f64; 4], c: [f64; 4]) -> Vec<[u64; 4]> {
-        everything::<Avx>(a, b, c)
+    impl Code for Everything {
+        type Output = Vec<[u64; 4]>;
+
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> Vec<[u64; 4]> {
+            let Self(a, b, c) = self;
+            let (x, y, z) = (L::of(a), L::of(b), L::of(c));
+            [
+                x.add(y),
+                x.sub(y),
+                x.mul(y),
+                x.div(y),
+                x.abs().sqrt(),
+                x.neg(),
+                x.mul_add(y, z),
+                x.neg_mul_add(y, z),
+                x.swap_pairs(),
+                x.swap_halves(),
+                x.abs(),
+                x.max(y),
+                L::splat(a[0]),
+                L::splat(f64::from(u8::from(x.are_within(500.0)))),
+                L::ZERO,
+                L::ONE,
+            ]
+            .iter()
+            .map(|lanes| lanes.array().map(f64::to_bits))
+            .collect()
+        }
     }
 
     proptest! {
@@ -337,11 +265,8 @@ mod tests {
             b in prop::array::uniform4(-1e3..1e3f64),
             c in prop::array::uniform4(-1e6..1e6f64),
         ) {
-            if available() {
-                // SAFETY: the processor has been asked.
-                #[allow(unsafe_code)]
-                let fast = unsafe { in_hardware(a, b, c) };
-                prop_assert_eq!(fast, everything::<Portable>(a, b, c));
+            if let Some(hardware) = Hardware::ask() {
+                prop_assert_eq!(hardware.run(Everything(a, b, c)), Everything(a, b, c).run::<Portable>());
             }
         }
     }

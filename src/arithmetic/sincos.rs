@@ -14,9 +14,7 @@
 //!
 //! Source of the reduction: W. J. Cody, W. Waite, *Software Manual for the Elementary Functions* (1980), section 8, with a fused multiply-add.
 
-#[cfg(target_arch = "x86_64")]
-use super::lanes::{self, Avx};
-use super::lanes::{Lanes, Portable};
+use super::lanes::{self, Code, Lanes};
 use super::{Complex, DoubleDouble, Scalar};
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
@@ -131,22 +129,21 @@ pub fn sin_cos<L: Lanes>(angle: L, rest: L) -> (L, L) {
 
 /// Writes the unit vectors at these angles \[rad\], four at a time.
 pub fn units(angles: &[f64], units: &mut [Complex<f64>]) {
-    #[cfg(target_arch = "x86_64")]
-    if lanes::available() {
-        // SAFETY: the processor has been asked.
-        #[allow(unsafe_code)]
-        unsafe {
-            units_fused(angles, units)
-        };
-        return;
-    }
-    units_in::<Portable>(angles, units);
+    lanes::run(Units { angles, units }, false);
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx,fma")]
-fn units_fused(angles: &[f64], units: &mut [Complex<f64>]) {
-    units_in::<Avx>(angles, units);
+struct Units<'a> {
+    angles: &'a [f64],
+    units: &'a mut [Complex<f64>],
+}
+
+impl Code for Units<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        units_in::<L>(self.angles, self.units);
+    }
 }
 
 #[inline(always)]
@@ -233,6 +230,7 @@ fn far_pair<L: Lanes>(angles: [f64; 4], rests: [f64; 4]) -> (Pair<L>, Pair<L>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::arithmetic::lanes::Portable;
     use std::f64::consts::{PI, TAU};
 
     /// Sine and cosine in double-double; quarter turns are taken off in three parts first, which [`DoubleDouble`] does in two.

@@ -6,8 +6,7 @@
 use super::kernel::{Kernel, dot};
 use super::row::Posture;
 use super::{Mechanism, Motion, Time, tree};
-#[cfg(target_arch = "x86_64")]
-use crate::arithmetic::lanes;
+use crate::arithmetic::lanes::{self, Code, Lanes};
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
 use crate::scene::Scene;
 
@@ -27,11 +26,20 @@ impl<T: Scalar> Energy<T> {
     }
 }
 
-/// The one place where the monitors' code for the processor at hand is entered.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx,fma")]
-fn fused_energy(mechanism: &Mechanism, kernel: &mut Kernel<DoubleDouble>, motion: &Motion) -> Energy<DoubleDouble> {
-    mechanism.energy(kernel, &motion.phi, &motion.omega)
+/// Energies of a motion, by the processor's fused multiply-add where it has one.
+struct ExactEnergy<'a> {
+    mechanism: &'a Mechanism,
+    kernel: &'a mut Kernel<DoubleDouble>,
+    motion: &'a Motion,
+}
+
+impl Code for ExactEnergy<'_> {
+    type Output = Energy<DoubleDouble>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Energy<DoubleDouble> {
+        self.mechanism.energy(self.kernel, &self.motion.phi, &self.motion.omega)
+    }
 }
 
 impl Mechanism {
@@ -84,13 +92,7 @@ impl Mechanism {
     ///
     /// The bits are those of [`Mechanism::energy`]: a fused multiply-add is rounded once, whoever computes it.
     pub fn exact_energy(&self, kernel: &mut Kernel<DoubleDouble>, motion: &Motion) -> Energy<DoubleDouble> {
-        #[cfg(target_arch = "x86_64")]
-        if lanes::available() {
-            // SAFETY: the processor has been asked.
-            #[allow(unsafe_code)]
-            return unsafe { fused_energy(self, kernel, motion) };
-        }
-        self.energy(kernel, &motion.phi, &motion.omega)
+        lanes::run(ExactEnergy { mechanism: self, kernel, motion }, false)
     }
 
     /// Energies of a motion; overwrites `kernel`.

@@ -7,7 +7,7 @@
 //! Pins, lines of the ground and locked angles are linear in z and part of the constant W: what is left is one row a body, and no velocity term but w².
 //! Half the cost of [`Multiplier`] with its factors of M and of the rows' S, whose unknowns and account of work it shares.
 //!
-//! Written once over [`Lanes`] and compiled twice, to the same bits; this file is the one place where its code for the processor is entered.
+//! Written once over [`Lanes`] and compiled twice, to the same bits.
 
 use super::force::action::Kind;
 use super::multiplier::Multiplier;
@@ -15,9 +15,7 @@ use super::natural::columns::{self, Columns, Row, load, store};
 use super::natural::{Reduced, sorted_rows};
 use super::stiffness::Stiffness;
 use super::{Coordinates, Field, Form, Glance, Mechanism, Motion, State, Time};
-#[cfg(target_arch = "x86_64")]
-use crate::arithmetic::lanes::Avx;
-use crate::arithmetic::lanes::{self, Lanes, Portable};
+use crate::arithmetic::lanes::{self, Code, Lanes};
 use crate::arithmetic::{Complex, sincos};
 use std::sync::Arc;
 
@@ -104,30 +102,26 @@ impl<const B: usize> Bench<B> {
 
     /// Accelerations and unit vectors, by the processor's vectors where it has them; `None` near a singular position.
     fn run(&mut self, mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64], is_portable: bool) -> Option<(&[f64], &[Complex<f64>])> {
-        self.accelerate(mechanism, t, phi, omega, is_portable);
+        lanes::run(Accelerations { bench: self, mechanism, t, phi, omega }, is_portable);
         (self.least >= NEAR).then(|| (&self.alpha.as_flattened()[..phi.len()], &self.z[..]))
-    }
-
-    fn accelerate(&mut self, mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64], is_portable: bool) {
-        #[cfg(target_arch = "x86_64")]
-        if !is_portable && lanes::available() {
-            // SAFETY: the processor has been asked; all else in that code is safe.
-            #[allow(unsafe_code)]
-            unsafe {
-                hardware(self, mechanism, t, phi, omega);
-            }
-            return;
-        }
-        let _ = is_portable;
-        accelerate::<Portable, B>(self, mechanism, t, phi, omega);
     }
 }
 
-/// The same code compiled for the processor.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx,fma")]
-fn hardware<const B: usize>(bench: &mut Bench<B>, mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64]) {
-    accelerate::<Avx, B>(bench, mechanism, t, phi, omega);
+struct Accelerations<'a, const B: usize> {
+    bench: &'a mut Bench<B>,
+    mechanism: &'a Mechanism,
+    t: Time,
+    phi: &'a [f64],
+    omega: &'a [f64],
+}
+
+impl<const B: usize> Code for Accelerations<'_, B> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        accelerate::<L, B>(self.bench, self.mechanism, self.t, self.phi, self.omega);
+    }
 }
 
 /// Accelerations \[rad/s²\] into `alpha`.

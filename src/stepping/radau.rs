@@ -639,8 +639,7 @@ mod tests {
             let declared = 2.0 * stages as f64 - 1.0;
             let errors = counts.map(|count| error(stages, count));
             let slope = (errors[0] / errors[2]).ln() / (f64::from(counts[2]) / f64::from(counts[0])).ln();
-            println!("{slope} {errors:e?}");
-            assert!((slope - declared).abs() < 0.5, "order {slope}, declared {declared}: {errors:e?}");
+            assert!((slope - declared).abs() < 0.5, "order {slope}, declared {declared}: {errors:?}");
         }
     }
 

@@ -1,13 +1,11 @@
-//! The canonical form at eight points at once, one a lane; the one place of this form where code compiled for the processor is entered.
+//! The canonical form at eight points at once, one a lane.
 //!
 //! The formulas are those of a single point, evaluated on [`Eight`] and, where what doubles drop is wanted too, on [`Pairs`].  What depends on time alone
 //! is formed once for each set of times, in double-double.
 
 use super::Scratch;
 use crate::arithmetic::eight::{Eight, LANES, Lanewise, Octet};
-#[cfg(target_arch = "x86_64")]
-use crate::arithmetic::lanes::{self, Avx};
-use crate::arithmetic::lanes::{Lanes, Portable};
+use crate::arithmetic::lanes::{self, Code, Hardware, Lanes, Portable, Vector};
 use crate::arithmetic::pairs::Pairs;
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::dynamics::law::Phase;
@@ -25,8 +23,7 @@ pub struct Stages {
 #[derive(Clone, Debug)]
 enum Room {
     Portable(Box<Both<Portable>>),
-    #[cfg(target_arch = "x86_64")]
-    Hardware(Box<Both<Avx>>),
+    Hardware(Hardware, Box<Both<Vector>>),
 }
 
 #[derive(Clone, Debug)]
@@ -107,23 +104,36 @@ impl<L: Lanes> Both<L> {
     }
 }
 
+struct Rates<'a, const N: usize, const ACCOUNT: bool, const EXACT: bool>(&'a mut Both<Vector>, &'a Mechanism, &'a mut Points);
+
+impl<const N: usize, const ACCOUNT: bool, const EXACT: bool> Code for Rates<'_, N, ACCOUNT, EXACT> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        self.0.rates::<N, ACCOUNT, EXACT>(self.1, self.2);
+    }
+}
+
 /// The same code compiled for the processor.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx,fma")]
-fn hardware<const N: usize, const ACCOUNT: bool, const EXACT: bool>(both: &mut Both<Avx>, mechanism: &Mechanism, points: &mut Points) {
-    both.rates::<N, ACCOUNT, EXACT>(mechanism, points);
+fn in_hardware<const N: usize, const ACCOUNT: bool, const EXACT: bool>(
+    hardware: Hardware,
+    both: &mut Both<Vector>,
+    mechanism: &Mechanism,
+    points: &mut Points,
+) {
+    hardware.run(Rates::<N, ACCOUNT, EXACT>(both, mechanism, points));
 }
 
 impl Stages {
     /// Room for a mechanism, in the processor's vectors where it has them and `portable` does not forbid it.
     pub fn new(mechanism: &Mechanism, portable: bool) -> Self {
         let time = [Time::of(f64::NAN); LANES];
-        #[cfg(target_arch = "x86_64")]
-        if !portable && lanes::available() {
-            return Self { time, room: Room::Hardware(Box::new(Both::new(mechanism))) };
-        }
-        let _ = portable;
-        Self { time, room: Room::Portable(Box::new(Both::new(mechanism))) }
+        let room = match lanes::hardware().filter(|_| !portable) {
+            Some(hardware) => Room::Hardware(hardware, Box::new(Both::new(mechanism))),
+            None => Room::Portable(Box::new(Both::new(mechanism))),
+        };
+        Self { time, room }
     }
 
     /// The rates at all points; with `exact`, what doubles leave out of points and rates too.  `account`: the form carries p_t.
@@ -134,8 +144,7 @@ impl Stages {
             self.time = points.time;
             match &mut self.room {
                 Room::Portable(both) => both.drive(mechanism, &self.time),
-                #[cfg(target_arch = "x86_64")]
-                Room::Hardware(both) => both.drive(mechanism, &self.time),
+                Room::Hardware(_, both) => both.drive(mechanism, &self.time),
             }
         }
         // The sizes worth unrolling; any other count of the same operations has the same bits.
@@ -146,26 +155,21 @@ impl Stages {
                 (true, false) => both.rates::<0, true, false>(mechanism, points),
                 (true, true) => both.rates::<0, true, true>(mechanism, points),
             },
-            #[cfg(target_arch = "x86_64")]
-            Room::Hardware(both) => {
-                let code: unsafe fn(&mut Both<Avx>, &Mechanism, &mut Points) = match (mechanism.size(), account, exact) {
-                    (1, false, false) => hardware::<1, false, false>,
-                    (2, false, false) => hardware::<2, false, false>,
-                    (3, false, false) => hardware::<3, false, false>,
-                    (4, false, false) => hardware::<4, false, false>,
-                    (_, false, false) => hardware::<0, false, false>,
-                    (2, false, true) => hardware::<2, false, true>,
-                    (_, false, true) => hardware::<0, false, true>,
-                    (2, true, false) => hardware::<2, true, false>,
-                    (_, true, false) => hardware::<0, true, false>,
-                    (2, true, true) => hardware::<2, true, true>,
-                    (_, true, true) => hardware::<0, true, true>,
+            Room::Hardware(hardware, both) => {
+                let code = match (mechanism.size(), account, exact) {
+                    (1, false, false) => in_hardware::<1, false, false>,
+                    (2, false, false) => in_hardware::<2, false, false>,
+                    (3, false, false) => in_hardware::<3, false, false>,
+                    (4, false, false) => in_hardware::<4, false, false>,
+                    (_, false, false) => in_hardware::<0, false, false>,
+                    (2, false, true) => in_hardware::<2, false, true>,
+                    (_, false, true) => in_hardware::<0, false, true>,
+                    (2, true, false) => in_hardware::<2, true, false>,
+                    (_, true, false) => in_hardware::<0, true, false>,
+                    (2, true, true) => in_hardware::<2, true, true>,
+                    (_, true, true) => in_hardware::<0, true, true>,
                 };
-                // SAFETY: this room is made only where the processor was found to have AVX and FMA; all else in that code is safe.
-                #[allow(unsafe_code)]
-                unsafe {
-                    code(both, mechanism, points);
-                }
+                code(*hardware, both, mechanism, points);
             }
         }
     }

@@ -1,12 +1,10 @@
-//! The steps themselves, a stage a lane; the one place where code compiled for the processor is entered.
+//! The steps themselves, a stage a lane.
 
 use super::newton::Newton;
 use super::tableau::{Tableau, lane};
 use super::{Gauss, IDLE_SWEEPS, MOST_SWEEPS, NEWTON_STEPS};
 use crate::arithmetic::eight::{LANES, Octet};
-#[cfg(target_arch = "x86_64")]
-use crate::arithmetic::lanes::{Avx, available};
-use crate::arithmetic::lanes::{Lanes, Portable};
+use crate::arithmetic::lanes::{self, Code, Lanes, Portable};
 use crate::arithmetic::sum::two_sum;
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Field, Points, State, Time};
@@ -70,7 +68,7 @@ pub(super) fn march<F: Field + ?Sized>(
         tally.check(gauss.label(), state.time.hi, gauss.scratch.step)?;
         let Gauss { tableau, scratch, exact, newton, slow, portable, .. } = &mut *gauss;
         let mut step = Step { tableau, scratch, exact: *exact, newton, slow: *slow };
-        take(*portable, &mut step, &mut Of(problem), state, tally);
+        lanes::run(Take { step: &mut step, problem: &mut Of(problem), state, tally }, *portable);
         if gauss.scratch.newton_left == NEWTON_STEPS {
             gauss.follow(problem, state)?;
         }
@@ -113,24 +111,21 @@ impl<F: Field + ?Sized> Rates for Of<'_, F> {
     }
 }
 
-/// One step but its acceptance, by the processor's vectors where it has them and `is_portable` does not forbid it.
-fn take(is_portable: bool, step: &mut Step, problem: &mut dyn Rates, state: &State, tally: &mut Tally) {
-    #[cfg(target_arch = "x86_64")]
-    if !is_portable && available() {
-        // SAFETY: the processor has just been asked; all else in that code is safe.
-        #[allow(unsafe_code)]
-        unsafe {
-            hardware(step, problem, state, tally);
-        }
-        return;
-    }
-    step.take::<Portable>(problem, state, tally);
+/// One step but its acceptance.
+struct Take<'a, 'b> {
+    step: &'a mut Step<'b>,
+    problem: &'a mut dyn Rates,
+    state: &'a State,
+    tally: &'a mut Tally,
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx,fma")]
-fn hardware(step: &mut Step, problem: &mut dyn Rates, state: &State, tally: &mut Tally) {
-    step.take::<Avx>(problem, state, tally);
+impl Code for Take<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        self.step.take::<L>(self.problem, self.state, self.tally);
+    }
 }
 
 impl Step<'_> {

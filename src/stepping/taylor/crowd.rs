@@ -7,9 +7,7 @@
 use super::pace::{self, Pace};
 use super::terms::{add_to, over};
 use super::{JUDGES, Kernel, stop};
-#[cfg(target_arch = "x86_64")]
-use crate::arithmetic::lanes::Avx;
-use crate::arithmetic::lanes::{self, Lanes, Portable};
+use crate::arithmetic::lanes::{self, Code, Lanes};
 use crate::arithmetic::{angle, sincos};
 use crate::dynamics::{Mechanism, State, Time};
 use crate::stepping::{Cause, StepError, Tally, Tolerance};
@@ -120,38 +118,29 @@ impl Crowd {
     /// All mechanisms must be such as [`Crowd::takes`], of the same number of bodies; any other is stopped as unsuited.  The result of each does not depend on the others.
     pub fn march(&self, entrants: &mut [Entrant], until: Time, watch: &mut dyn FnMut(usize, &Passage) -> Going) {
         let Some(bodies) = entrants.first().map(|first| first.mechanism.tree.coordinates) else { return };
-        let march = match bodies {
-            1 => dispatch::<1>(self.is_portable),
-            2 => dispatch::<2>(self.is_portable),
-            3 => dispatch::<3>(self.is_portable),
-            _ => dispatch::<4>(self.is_portable),
-        };
-        // SAFETY: `dispatch` hands out code for AVX and FMA only after the processor was asked for them; all else in it is safe code.
-        #[allow(unsafe_code)]
-        unsafe {
-            march(self, entrants, until, watch)
+        match bodies {
+            1 => lanes::run(March::<1> { crowd: self, entrants, until, watch }, self.is_portable),
+            2 => lanes::run(March::<2> { crowd: self, entrants, until, watch }, self.is_portable),
+            3 => lanes::run(March::<3> { crowd: self, entrants, until, watch }, self.is_portable),
+            _ => lanes::run(March::<4> { crowd: self, entrants, until, watch }, self.is_portable),
         }
     }
 }
 
-type March = unsafe fn(&Crowd, &mut [Entrant], Time, &mut dyn FnMut(usize, &Passage) -> Going);
+struct March<'a, 'b, const N: usize> {
+    crowd: &'a Crowd,
+    entrants: &'a mut [Entrant<'b>],
+    until: Time,
+    watch: &'a mut dyn FnMut(usize, &Passage) -> Going,
+}
 
-fn dispatch<const N: usize>(is_portable: bool) -> March {
-    #[cfg(target_arch = "x86_64")]
-    if !is_portable && lanes::available() {
-        return hardware::<N>;
+impl<const N: usize> Code for March<'_, '_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        march::<L, N>(self.crowd, self.entrants, self.until, self.watch);
     }
-    portable::<N>
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx,fma")]
-fn hardware<const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], until: Time, watch: &mut dyn FnMut(usize, &Passage) -> Going) {
-    march::<Avx, N>(crowd, entrants, until, watch);
-}
-
-fn portable<const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], until: Time, watch: &mut dyn FnMut(usize, &Passage) -> Going) {
-    march::<Portable, N>(crowd, entrants, until, watch);
 }
 
 /// Constants, states and coefficients of the trajectories in the lanes.

@@ -1,4 +1,4 @@
-//! Which fast kernel fits a mechanism, an order and the processor; the one place where compiled-for-the-processor code is entered.
+//! Which fast kernel fits a mechanism and an order.
 
 use super::bodies::{self, Bodies};
 use super::driven::{self, Driven};
@@ -6,9 +6,7 @@ use super::extended;
 use super::looped::{self, Looped};
 use super::pace::Pace;
 use super::pair::{self, Pair};
-#[cfg(target_arch = "x86_64")]
-use crate::arithmetic::lanes::Avx;
-use crate::arithmetic::lanes::{self, Lanes, Portable};
+use crate::arithmetic::lanes::{self, Code, Lanes};
 use crate::dynamics::{Mechanism, State};
 
 /// The least order mechanisms with loops are expanded to: each costs little beside the matrices of the step.
@@ -49,39 +47,43 @@ enum Form {
     ManyLooped(Box<Looped<4>>),
 }
 
-/// One step of a state by at most so many seconds: the step wanted and the step taken, or `None` where the series of any mechanism must take over.
-type Step = unsafe fn(&mut Form, &Pace, &mut State, f64) -> Option<(f64, f64)>;
+/// One step of a state by at most so many seconds, without the processor's vectors where the last is true: the step wanted and the step taken, or `None` where
+/// the series of any mechanism must take over.
+type Step = fn(&mut Form, &Pace, &mut State, f64, bool) -> Option<(f64, f64)>;
 
-/// From the last step's start on by so many seconds.
-type Go = unsafe fn(&mut Form, &mut State, f64);
+/// From the last step's start on by so many seconds, likewise.
+type Go = fn(&mut Form, &mut State, f64, bool);
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx,fma")]
-fn hardware_go<const P: usize>(form: &mut Form, state: &mut State, h: f64) {
-    go::<Avx, P>(form, state, h);
-}
+/// A step of order `P`.
+struct Stepping<'a, const P: usize>(&'a mut Form, &'a Pace, &'a mut State, f64);
 
-fn portable_go<const P: usize>(form: &mut Form, state: &mut State, h: f64) {
-    go::<Portable, P>(form, state, h);
-}
+impl<const P: usize> Code for Stepping<'_, P> {
+    type Output = Option<(f64, f64)>;
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx,fma")]
-fn hardware<const P: usize>(form: &mut Form, pace: &Pace, state: &mut State, left: f64) -> Option<(f64, f64)> {
-    step::<Avx, P>(form, pace, state, left)
-}
-
-fn portable<const P: usize>(form: &mut Form, pace: &Pace, state: &mut State, left: f64) -> Option<(f64, f64)> {
-    step::<Portable, P>(form, pace, state, left)
-}
-
-/// The code of one order for this processor.
-fn of_order<const P: usize>(is_portable: bool) -> (Step, Go) {
-    #[cfg(target_arch = "x86_64")]
-    if !is_portable && lanes::available() {
-        return (hardware::<P>, hardware_go::<P>);
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Option<(f64, f64)> {
+        step::<L, P>(self.0, self.1, self.2, self.3)
     }
-    (portable::<P>, portable_go::<P>)
+}
+
+/// A way on by a series of order `P`.
+struct Going<'a, const P: usize>(&'a mut Form, &'a mut State, f64);
+
+impl<const P: usize> Code for Going<'_, P> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        go::<L, P>(self.0, self.1, self.2);
+    }
+}
+
+/// The code of one order.
+fn of_order<const P: usize>() -> (Step, Go) {
+    (
+        |form, pace, state, left, is_portable| lanes::run(Stepping::<P>(form, pace, state, left), is_portable),
+        |form, state, h, is_portable| lanes::run(Going::<P>(form, state, h), is_portable),
+    )
 }
 
 #[inline(always)]
@@ -136,34 +138,36 @@ fn go<L: Lanes, const P: usize>(form: &mut Form, state: &mut State, h: f64) {
     }
 }
 
-/// The code of mechanisms with loops, which takes every order, for this processor.
-fn of_loops(is_portable: bool) -> (Step, Go) {
-    #[cfg(target_arch = "x86_64")]
-    if !is_portable && lanes::available() {
-        return (looped_hardware, looped_hardware_go);
+/// A step of a mechanism with loops, of any order.
+struct LoopedStepping<'a>(&'a mut Form, &'a mut State, f64);
+
+impl Code for LoopedStepping<'_> {
+    type Output = Option<(f64, f64)>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Option<(f64, f64)> {
+        looped_step::<L>(self.0, self.1, self.2)
     }
-    let _ = is_portable;
-    (looped_portable, looped_portable_go)
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx,fma")]
-fn looped_hardware(form: &mut Form, _: &Pace, state: &mut State, left: f64) -> Option<(f64, f64)> {
-    looped_step::<Avx>(form, state, left)
+/// A way on by the series of a mechanism with loops.
+struct LoopedGoing<'a>(&'a mut Form, &'a mut State, f64);
+
+impl Code for LoopedGoing<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        looped_go::<L>(self.0, self.1, self.2);
+    }
 }
 
-fn looped_portable(form: &mut Form, _: &Pace, state: &mut State, left: f64) -> Option<(f64, f64)> {
-    looped_step::<Portable>(form, state, left)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx,fma")]
-fn looped_hardware_go(form: &mut Form, state: &mut State, h: f64) {
-    looped_go::<Avx>(form, state, h);
-}
-
-fn looped_portable_go(form: &mut Form, state: &mut State, h: f64) {
-    looped_go::<Portable>(form, state, h);
+/// The code of mechanisms with loops, which takes every order.
+fn of_loops() -> (Step, Go) {
+    (
+        |form, _, state, left, is_portable| lanes::run(LoopedStepping(form, state, left), is_portable),
+        |form, state, h, is_portable| lanes::run(LoopedGoing(form, state, h), is_portable),
+    )
 }
 
 #[inline(always)]
@@ -190,9 +194,9 @@ impl Fast {
     /// The kernel, where there is one; `is_extended`: with the first orders in double-double.
     pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize, is_portable: bool, is_extended: bool) -> Option<Self> {
         let (step, go) = match order {
-            16 => of_order::<16>(is_portable),
-            20 => of_order::<20>(is_portable),
-            24 => of_order::<24>(is_portable),
+            16 => of_order::<16>(),
+            20 => of_order::<20>(),
+            24 => of_order::<24>(),
             _ => return None,
         };
         let (form, longest) = if is_extended {
@@ -225,7 +229,7 @@ impl Fast {
             5..=8 => Form::SeveralLooped(Box::new(Looped::new(mechanism, tolerance, highest)?)),
             _ => Form::ManyLooped(Box::new(Looped::new(mechanism, tolerance, highest)?)),
         };
-        let (step, go) = of_loops(is_portable);
+        let (step, go) = of_loops();
         let settings = Settings { mechanism: mechanism.clone(), tolerance, order, is_portable, is_extended: false };
         Some(Self { settings, form, pace: Pace::new(tolerance, order, f64::INFINITY), step, go })
     }
@@ -240,19 +244,11 @@ impl Fast {
     /// One step of at most `left` \[s\] from the state's unknowns, which are then the new ones; returns the step wanted and the step taken.
     #[inline]
     pub fn step(&mut self, state: &mut State, left: f64) -> Option<(f64, f64)> {
-        // SAFETY: `of_order` hands out code for AVX and FMA only after the processor was asked for them; all else in it is safe code.
-        #[allow(unsafe_code)]
-        unsafe {
-            (self.step)(&mut self.form, &self.pace, state, left)
-        }
+        (self.step)(&mut self.form, &self.pace, state, left, self.settings.is_portable)
     }
 
     /// Takes a state that stands where the last step began on by `h` \[s\], as the step would have.
     pub fn go(&mut self, state: &mut State, h: f64) {
-        // SAFETY: as in `step`.
-        #[allow(unsafe_code)]
-        unsafe {
-            (self.go)(&mut self.form, state, h);
-        }
+        (self.go)(&mut self.form, state, h, self.settings.is_portable);
     }
 }

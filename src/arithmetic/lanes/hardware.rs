@@ -1,0 +1,148 @@
+//! The one place of the crate with `unsafe` in it: instructions special to the processor, and the door to code compiled for them.
+//!
+//! [`Hardware`] is the proof that the processor has them: it is made only after it was asked.  What is `unsafe` here rests on this alone:
+//!
+//! - [`Hardware::run`] enters a function compiled for AVX and FMA;
+//! - the operations of [`Avx`] are such instructions.  Values of it are made and used below `run`, or by somebody who holds a `Hardware`.
+
+#![allow(unsafe_code)]
+
+use super::{Code, Lanes};
+use std::arch::x86_64::*;
+
+/// The proof that the processor has AVX and FMA.
+#[derive(Clone, Copy, Debug)]
+pub struct Hardware(());
+
+/// Four doubles in one register of AVX.
+#[derive(Clone, Copy, Debug)]
+pub struct Avx(__m256d);
+
+/// The widest vectors there is code for.
+pub type Vector = Avx;
+
+impl Hardware {
+    /// Asks the processor.
+    #[inline]
+    pub fn ask() -> Option<Self> {
+        (is_x86_feature_detected!("avx") && is_x86_feature_detected!("fma")).then_some(Self(()))
+    }
+
+    /// Runs code in the processor's vectors.
+    #[inline(always)]
+    pub fn run<C: Code>(self, code: C) -> C::Output {
+        // SAFETY: the processor was asked for AVX and FMA before this proof of them was made.
+        unsafe { compiled(code) }
+    }
+}
+
+/// Code compiled for AVX and FMA.
+#[target_feature(enable = "avx,fma")]
+fn compiled<C: Code>(code: C) -> C::Output {
+    code.run::<Avx>()
+}
+
+/// The instruction itself.
+///
+/// A trait's methods cannot carry `#[target_feature]`, so each is entered here.
+macro_rules! instruction {
+    ($call:expr) => {{
+        // SAFETY: values of `Avx` are made and used by code that runs below `Hardware::run`, or whose owner holds a `Hardware`.
+        unsafe { $call }
+    }};
+}
+
+/// The same double in every lane, as a constant.
+const fn constant(value: f64) -> Avx {
+    // SAFETY: both types are four doubles without padding, and every pattern of bits is valid in each.
+    unsafe { std::mem::transmute::<[f64; 4], Avx>([value; 4]) }
+}
+
+impl Lanes for Avx {
+    const UNROLLED: bool = true;
+
+    const ZERO: Self = constant(0.0);
+    const ONE: Self = constant(1.0);
+
+    #[inline(always)]
+    fn of(lanes: [f64; 4]) -> Self {
+        instruction!(Self(_mm256_loadu_pd(lanes.as_ptr())))
+    }
+
+    #[inline(always)]
+    fn array(self) -> [f64; 4] {
+        let mut lanes = [0.0; 4];
+        instruction!(_mm256_storeu_pd(lanes.as_mut_ptr(), self.0));
+        lanes
+    }
+
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        instruction!(Self(_mm256_set1_pd(value)))
+    }
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        instruction!(Self(_mm256_add_pd(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        instruction!(Self(_mm256_sub_pd(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        instruction!(Self(_mm256_mul_pd(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        instruction!(Self(_mm256_div_pd(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        instruction!(Self(_mm256_sqrt_pd(self.0)))
+    }
+
+    #[inline(always)]
+    fn mul_add(self, factor: Self, addend: Self) -> Self {
+        instruction!(Self(_mm256_fmadd_pd(self.0, factor.0, addend.0)))
+    }
+
+    #[inline(always)]
+    fn neg_mul_add(self, factor: Self, addend: Self) -> Self {
+        instruction!(Self(_mm256_fnmadd_pd(self.0, factor.0, addend.0)))
+    }
+
+    #[inline(always)]
+    fn swap_pairs(self) -> Self {
+        instruction!(Self(_mm256_permute_pd::<0b0101>(self.0)))
+    }
+
+    #[inline(always)]
+    fn swap_halves(self) -> Self {
+        instruction!(Self(_mm256_permute2f128_pd::<0x01>(self.0, self.0)))
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        instruction!(Self(_mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0)))
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        instruction!(Self(_mm256_max_pd(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn are_within(self, bound: f64) -> bool {
+        instruction!(_mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LE_OQ>(self.abs().0, _mm256_set1_pd(bound))) == 0b1111)
+    }
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        instruction!(Self(_mm256_xor_pd(_mm256_set1_pd(-0.0), self.0)))
+    }
+}
