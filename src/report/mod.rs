@@ -9,12 +9,14 @@
 //! | [`inspect`] | the scene's start | `inspect.rs` |
 //! | [`result`] | a run | `result.rs` |
 //! | `sweep` | a sweep, with its chart | `sweep.rs`, with the feature `files` |
+//! | [`compare`] | methods compared, with charts | `compare.rs` |
 //! | [`methods`] | the table of methods | `methods.rs` |
 //! | `charts` | a run, in pictures | `charts.rs`, with the feature `charts` |
 
 #[cfg(feature = "charts")]
 pub mod charts;
 pub mod check;
+pub mod compare;
 #[cfg(feature = "charts")]
 mod curves;
 pub mod inspect;

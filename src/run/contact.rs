@@ -134,6 +134,11 @@ impl Course {
         self.sampler.take(&self.shown)
     }
 
+    /// The motion last sampled.
+    pub(super) fn shown(&self) -> &Motion {
+        &self.shown
+    }
+
     /// Counts of all marchers so far.
     pub(super) fn tally(&self) -> Tally {
         self.marcher.tally()

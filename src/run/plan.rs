@@ -93,7 +93,7 @@ const SEPARATE: f64 = 100.0;
 /// Runs of at least so many seconds are marched symplectically where that is possible.
 const LONG: f64 = 60.0;
 /// So many coordinates are cheaper body by body, with multipliers, than in the matrices that eliminated coordinates and momenta ask for.
-const MANY_COORDINATES: usize = 48;
+pub(super) const MANY_COORDINATES: usize = 48;
 /// Steps beyond which a fixed step is not chosen unasked.
 const MANY_STEPS: f64 = 2e7;
 
