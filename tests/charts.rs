@@ -65,6 +65,46 @@ fn pendulum() -> MechanismChart {
     }
 }
 
+/// All methods at many settings, as a comparison has them.
+fn crowd() -> WorkPrecision {
+    let line = |(k, method): (usize, &&str)| {
+        let order = 3.0 + (k % 7) as f64;
+        let points =
+            (0..9).map(|n| [1e-4 * (1.0 + k as f64) * 1.7_f64.powi(n), (1e-2 * 1.7_f64.powf(-order * f64::from(n))).max(1e-14)]).collect();
+        WorkSeries { method: (*method).to_owned(), name: (*method).to_owned(), points }
+    };
+    let methods = [
+        "dopri5",
+        "dop853",
+        "dp5",
+        "dp8",
+        "taylor",
+        "taylor extended",
+        "gauss4",
+        "gauss6",
+        "gauss8",
+        "gauss10",
+        "gauss12",
+        "gauss14",
+        "gauss16",
+        "rattle2",
+        "rattle4",
+        "rattle6",
+        "rattle8",
+        "radau5",
+        "radau9",
+    ];
+    WorkPrecision {
+        title: "Error against evaluations".to_owned(),
+        caption: words(&["scene free", "all methods"]),
+        cost: Cost::Count("evaluations".to_owned()),
+        error_name: "largest error of angles [rad]".to_owned(),
+        series: methods.iter().enumerate().map(line).collect(),
+        lost: Some(1e-3),
+        floor: None,
+    }
+}
+
 /// One picture of each chart with data as they come from runs.
 fn gallery() -> Vec<(&'static str, Picture)> {
     let resolution = 1.0;
@@ -110,7 +150,7 @@ fn gallery() -> Vec<(&'static str, Picture)> {
     let work = WorkPrecision {
         title: "Error against run time".to_owned(),
         caption: words(&["scene free"]),
-        time_name: "run time per simulated second".to_owned(),
+        cost: Cost::Time("run time per simulated second".to_owned()),
         error_name: "largest error [rad, rad/s]".to_owned(),
         series: ["dopri5", "dop853", "gauss16", "taylor"]
             .iter()
@@ -123,6 +163,7 @@ fn gallery() -> Vec<(&'static str, Picture)> {
                     .collect(),
             })
             .collect(),
+        lost: None,
         floor: Some((1e-11, "rounding of the constants".to_owned())),
     };
     vec![
@@ -135,6 +176,7 @@ fn gallery() -> Vec<(&'static str, Picture)> {
         ("torque", torque_power(&torque(time.clone(), wave(1)), resolution).unwrap()),
         ("two motors", torque_power(&two, resolution).unwrap()),
         ("work", work_precision(&work, resolution).unwrap()),
+        ("crowd", work_precision(&crowd(), resolution).unwrap()),
     ]
 }
 

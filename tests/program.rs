@@ -30,7 +30,7 @@ fn has_keys(object: &Value, expected: &[&str]) {
 #[test]
 fn help_lists_the_commands_and_fits_a_terminal() {
     let program = Program::new();
-    let commands = ["check", "inspect", "run", "sweep", "methods", "schema", "completions"];
+    let commands = ["check", "inspect", "run", "sweep", "compare", "methods", "schema", "completions"];
     program.run("--help").exits(0).shows(&commands).shows(&["Exit codes"]);
     program.run("--version").exits(0).shows(&["driftless "]);
     for command in commands {

@@ -13,7 +13,7 @@
 //! | [`energy_drift()`] | [`EnergyDrift`] | largest relative energy error so far |
 //! | [`constraint_drift()`] | [`ConstraintDrift`] | defects of constraints, positions beside velocities |
 //! | [`torque_power()`] | [`TorquePower`] | torque above power of motors |
-//! | [`work_precision()`] | [`WorkPrecision`] | error against run time |
+//! | [`work_precision()`] | [`WorkPrecision`] | error against run time or evaluations |
 //! | [`map()`] | [`Map`] | a value over two others, as colours |
 //! | [`matrix()`] | [`Matrix`] | outcomes by row and column, as colours and words |
 //! | [`profile()`] | [`Profile`] | a value over one other |
@@ -56,7 +56,7 @@ pub use profile::{Profile, profile};
 pub use sketch::{HingeSketch, MotorPose, Pose, Sketch, SliderPose, SpringSketch, WallSketch};
 pub use text::{TextBox, plain, unmarked};
 pub use torque_power::{MotorSeries, TorquePower, torque_power};
-pub use work_precision::{WorkPrecision, WorkSeries, work_precision};
+pub use work_precision::{Cost, WorkPrecision, WorkSeries, work_precision};
 
 use std::path::PathBuf;
 use thiserror::Error;

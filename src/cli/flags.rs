@@ -39,6 +39,8 @@ pub enum Command {
     Run(Box<RunFlags>),
     /// Run a scene over a grid of starts and parameters, one row of a table a point
     Sweep(Box<SweepFlags>),
+    /// Run a scene with every method at all its settings: error, drift and run time, and what to choose
+    Compare(Box<CompareFlags>),
     /// Go on with an interrupted run or sweep: it ends as if nothing had been, byte for byte
     Resume(ResumeFlags),
     /// Run stiff and extreme scenes by every method: each ends right, refused or stopped, and none wrong
@@ -243,6 +245,36 @@ pub struct StressFlags {
     pub tell: TellFlags,
 }
 
+/// `driftless compare`.
+#[derive(Debug, Args)]
+pub struct CompareFlags {
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub scene: SceneFlags,
+    /// Methods, joined by commas [default: all]
+    #[arg(long, value_name = "METHODS", value_parser = methods(), value_delimiter = ',', help_heading = "Comparison")]
+    pub methods: Vec<MethodId>,
+    /// How constraints are kept; several, joined by commas, are compared with one another [default: each method's usual way]
+    #[arg(long, value_name = "HOW", value_parser = stabilizations(), value_delimiter = ',', help_heading = "Comparison")]
+    pub stabilize: Vec<Stabilization>,
+    /// Horizon in seconds [default: the scene's, or what there is time for]
+    #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true, help_heading = "Comparison")]
+    pub until: Option<f64>,
+    /// Seconds to spend: for the reference, for one run of each setting, and for repetitions that make their times sure
+    #[arg(long, value_name = "S", value_parser = wait, default_value = "90", allow_hyphen_values = true, help_heading = "Comparison")]
+    pub budget: f64,
+    /// Folder under which `SCENE/compare` is made
+    #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
+    pub out: PathBuf,
+    /// Overwrite the comparison that is in the folder
+    #[arg(long, help_heading = "Files")]
+    pub force: bool,
+    /// Draw no PNG charts
+    #[cfg(feature = "charts")]
+    #[arg(long, help_heading = "Files")]
+    pub no_charts: bool,
+}
+
 /// How often checkpoints are written.
 #[derive(Clone, Debug, Args)]
 pub struct CheckpointFlags {
@@ -297,6 +329,7 @@ impl Flags {
             Command::Inspect(flags) => flags.scene.tell.json,
             Command::Run(flags) => flags.scene.tell.json,
             Command::Sweep(flags) => flags.scene.tell.json,
+            Command::Compare(flags) => flags.scene.tell.json,
             Command::Resume(flags) => flags.tell.json,
             Command::Stress(flags) => flags.tell.json,
             Command::Methods { json } => *json,

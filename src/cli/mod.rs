@@ -2,6 +2,7 @@
 //!
 //! Data go to stdout or into files, progress and messages to stderr.  Exit codes are in [`failure::Exit`].
 
+mod compare;
 pub mod failure;
 pub mod flags;
 mod interrupt;
@@ -34,6 +35,7 @@ pub fn run(flags: &Flags) -> Result<(), Failure> {
         Command::Inspect(flags) => inspect(flags),
         Command::Run(given) => simulate::run(given, &flags.arguments),
         Command::Sweep(given) => sweep::run(given, &flags.arguments),
+        Command::Compare(flags) => compare::run(flags),
         Command::Resume(flags) => resume::run(flags),
         Command::Stress(flags) => stress::run(flags),
         Command::Methods { json: true } => print_object(&report::methods::object()),

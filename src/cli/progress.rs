@@ -1,6 +1,7 @@
 //! How far a run is: a bar on a terminal, a line now and then elsewhere, nothing when quiet.
 
 use super::output::message;
+use crate::run::compare::Stage;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
@@ -53,6 +54,16 @@ impl Looks {
     }
 }
 
+/// A bar of this length with words behind it, where stderr is a terminal.
+fn bar(scene: &str, length: u64, words: &str, quiet: bool) -> Option<ProgressBar> {
+    (!quiet && std::io::stderr().is_terminal()).then(|| {
+        let bar = ProgressBar::new(length).with_prefix(scene.chars().take(20).collect::<String>());
+        let style = ProgressStyle::with_template(&format!("{{prefix}} [{{bar:24}}] {{percent:>3}} %  {words}"));
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
+        bar
+    })
+}
+
 /// Shows the progress of a sweep: its rate so far, and the time the rest takes at that rate.
 pub struct Points {
     scene: String,
@@ -68,12 +79,7 @@ pub struct Points {
 impl Points {
     /// Begins; `count` is the number of points, of which `before` were finished earlier.
     pub fn new(scene: &str, before: u64, count: u64, quiet: bool) -> Self {
-        let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
-            let bar = ProgressBar::new(count).with_prefix(scene.chars().take(20).collect::<String>());
-            let style = ProgressStyle::with_template("{prefix} [{bar:24}] {percent:>3} %  {msg}");
-            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
-            bar
-        });
+        let bar = bar(scene, count, "{msg}", quiet);
         let begin = Instant::now();
         Self { scene: scene.to_owned(), before, count, begin, next: begin + if bar.is_some() { BAR } else { LINE }, bar, quiet }
     }
@@ -106,18 +112,66 @@ impl Points {
     }
 }
 
+/// Shows the progress of a comparison: what is being done, and the most time that is left.
+pub struct Stages {
+    scene: String,
+    bar: Option<ProgressBar>,
+    next: Instant,
+    quiet: bool,
+}
+
+impl Stages {
+    /// Begins.
+    pub fn new(scene: &str, quiet: bool) -> Self {
+        let bar = bar(scene, POSITIONS as u64, "{msg}", quiet);
+        let wait = if bar.is_some() { BAR } else { LINE };
+        Self { scene: scene.to_owned(), next: Instant::now() + wait, bar, quiet }
+    }
+
+    /// Takes how far it is.
+    pub fn see(&mut self, stage: &Stage) {
+        let now = Instant::now();
+        if self.quiet || now < self.next {
+            return;
+        }
+        let words = format!("{}, {} left at most", stage.doing, left(stage.left.as_secs_f64()));
+        match &self.bar {
+            Some(bar) => {
+                bar.set_message(words);
+                bar.set_position((stage.share * POSITIONS) as u64);
+                self.next = now + BAR;
+            }
+            None => {
+                message(&format!("{}: {:.0} %, {words}", self.scene, 100.0 * stage.share));
+                self.next = now + LINE;
+            }
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// A time \[s\] as it is told.
+fn left(seconds: f64) -> String {
+    match seconds {
+        left if left < 100.0 => format!("{left:.0} s"),
+        left if left < 6000.0 => format!("{:.0} min", left / 60.0),
+        left => format!("{:.1} h", left / 3600.0),
+    }
+}
+
 /// `1200 of 4096 points, 85.3 a second, 34 s left`.
 fn told(before: u64, finished: u64, count: u64, spent: Duration) -> String {
     let rate = finished.saturating_sub(before) as f64 / spent.as_secs_f64().max(1e-9);
     if finished <= before {
         return format!("{finished} of {count} points");
     }
-    let left = count.saturating_sub(finished) as f64 / rate;
-    let left = match left {
-        left if left < 100.0 => format!("{left:.0} s"),
-        left if left < 6000.0 => format!("{:.0} min", left / 60.0),
-        left => format!("{:.1} h", left / 3600.0),
-    };
+    let left = left(count.saturating_sub(finished) as f64 / rate);
     let rate = if rate < 10.0 { format!("{rate:.2}") } else { format!("{rate:.0}") };
     format!("{finished} of {count} points, {rate} a second, {left} left")
 }
@@ -125,12 +179,7 @@ fn told(before: u64, finished: u64, count: u64, spent: Duration) -> String {
 impl Progress {
     /// Begins; `until` is the horizon \[s\].
     pub fn new(scene: &str, until: f64, quiet: bool) -> Self {
-        let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
-            let bar = ProgressBar::new(POSITIONS as u64).with_prefix(scene.chars().take(20).collect::<String>());
-            let style = ProgressStyle::with_template("{prefix} [{bar:24}] {percent:>3} %  {msg}  {elapsed}, {eta} left");
-            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
-            bar
-        });
+        let bar = bar(scene, POSITIONS as u64, "{msg}  {elapsed}, {eta} left", quiet);
         let wait = if bar.is_some() { BAR } else { LINE };
         let now = Instant::now();
         Self { scene: scene.to_owned(), until, bar, next: now + wait, looks: Looks::new(), quiet }

@@ -10,12 +10,14 @@
 //! | [`result`] | a run | `result.rs` |
 //! | `sweep` | a sweep, with its chart | `sweep.rs`, with the feature `files` |
 //! | [`stress`] | stiff and extreme scenes by every method | `stress.rs` |
+//! | [`compare`] | methods compared, with charts | `compare.rs` |
 //! | [`methods`] | the table of methods | `methods.rs` |
 //! | `charts` | a run, in pictures | `charts.rs`, with the feature `charts` |
 
 #[cfg(feature = "charts")]
 pub mod charts;
 pub mod check;
+pub mod compare;
 #[cfg(feature = "charts")]
 mod curves;
 pub mod inspect;

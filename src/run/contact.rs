@@ -134,6 +134,11 @@ impl Course {
         self.sampler.take(&self.shown)
     }
 
+    /// The motion last sampled.
+    pub(super) fn shown(&self) -> &Motion {
+        &self.shown
+    }
+
     /// Counts of all marchers so far.
     pub(super) fn tally(&self) -> Tally {
         self.marcher.tally()
@@ -396,11 +401,6 @@ impl Course {
     /// The same into a motion that is there already.
     pub(super) fn look(&mut self, motion: &mut Motion) {
         self.marcher.read(motion);
-    }
-
-    /// The motion last sampled.
-    pub(super) fn shown(&self) -> &Motion {
-        &self.shown
     }
 
     fn name(&self, contact: usize) -> &str {

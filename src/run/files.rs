@@ -23,6 +23,10 @@ pub const RECORD: &str = "run.json";
 pub const SWEEP: &str = "sweep.csv";
 /// Settings and totals of a sweep.
 pub const SWEEP_RECORD: &str = "sweep.json";
+/// The settings of a comparison, a row each.
+pub const COMPARISON: &str = "compare.csv";
+/// Settings, figures and advice of a comparison.
+pub const COMPARISON_RECORD: &str = "compare.json";
 /// How names of unfinished files begin.
 pub(super) const UNFINISHED: &str = ".unfinished-";
 
@@ -116,7 +120,9 @@ impl Folder {
         if !overwrite && checkpoint::is_in(path) {
             return Err(FileError::Interrupted { folder: folder() });
         }
-        if !overwrite && [TRAJECTORY, RECORD, SWEEP, SWEEP_RECORD].iter().any(|name| path.join(name).exists()) {
+        if !overwrite
+            && [TRAJECTORY, RECORD, SWEEP, SWEEP_RECORD, COMPARISON, COMPARISON_RECORD].iter().any(|name| path.join(name).exists())
+        {
             return Err(FileError::Occupied { folder: folder() });
         }
         // Without their table the checkpoints are of no use.

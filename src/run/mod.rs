@@ -3,12 +3,14 @@
 //! [`plan`] decides, with [`choice`] of the method, [`mod@march`] builds the marcher, [`running`] goes with it from one output time to the next and can pause, [`contact`] through impacts and
 //! contacts that last, [`sample`] reads off what there is to
 //! know at each, [`drift`] and [`trace`] keep bounded records of it, [`table`] writes it down,
-//! [`files`] keeps whole files only, and [`checkpoint`] what a run needs to go on after whatever ended it.  [`mod@sweep`] runs a grid of starts and parameters, on the lookout for bars that turn over ([`flip`]), and
-//! [`mod@stress`] stiff and extreme scenes by every method.
+//! [`files`] keeps whole files only, and [`checkpoint`] what a run needs to go on after whatever ended it.  [`mod@sweep`] runs a grid of starts and parameters, on the
+//! lookout for bars that turn over ([`flip`]); [`mod@compare`] runs all methods at all settings, and times them; [`mod@stress`] runs stiff and extreme scenes by
+//! every method.
 
 #[cfg(feature = "files")]
 pub mod checkpoint;
 pub mod choice;
+pub mod compare;
 pub mod contact;
 pub mod drift;
 pub mod fast;
@@ -32,6 +34,7 @@ pub mod trust;
 #[cfg(feature = "files")]
 pub use checkpoint::{CheckpointError, Checkpoints, Loaded};
 pub use choice::Prefer;
+pub use compare::{Asked, Comparison, compare};
 pub use contact::{Hold, Strike};
 pub use drift::{Drift, Limits};
 pub use fast::FastMode;

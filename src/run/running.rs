@@ -386,6 +386,17 @@ impl Running {
         Ok(true)
     }
 
+    /// Marches to the horizon without a look at what there is to see at the output times: all that the method itself costs.  False where it paused or stopped.
+    pub(super) fn rush(&mut self, pause: &mut Pause) -> bool {
+        let Self { course, outcome, resting, .. } = self;
+        resting.is_none() && (1..=outcome.plan.rows).all(|row| course.go(outcome.plan.time(row), outcome, pause) == Ok(true))
+    }
+
+    /// The motion at the last output time, to the last digit.
+    pub fn motion(&self) -> &Motion {
+        self.course.shown()
+    }
+
     /// How it ended.
     pub fn finish(mut self) -> Outcome {
         self.course.end(self.outcome.last.t, &mut self.outcome);

@@ -1,0 +1,404 @@
+//! Methods compared: one JSON object, a table for spreadsheets, a page, and three charts.
+
+use super::page::{Page, figure, magnitude, rough};
+#[cfg(feature = "charts")]
+use crate::chart::{self, ChartError, Cost, FILE_RESOLUTION, WorkPrecision, WorkSeries, plain};
+use crate::dynamics::Mechanism;
+use crate::run::compare::{Advice, Comparison, Entry, Fate, Found, LOST};
+use crate::run::{Drift, MethodId, Plan, Stabilization};
+use crate::scene::Scene;
+use serde_json::{Value, json};
+
+/// The comparison as one JSON object: `rows`, `reference`, `recommendations`, `notes`; times in seconds.  What was not measured is `null`.
+pub fn object(scene: &Scene, mechanism: &Mechanism, comparison: &Comparison) -> Value {
+    let front = comparison.front();
+    let truth = &comparison.truth;
+    json!({
+        "scene": scene.name,
+        "until": comparison.until,
+        "energy_kind": Drift::new(mechanism, comparison.until).kind,
+        "rows": comparison.entries.iter().enumerate().map(|(k, entry)| row(entry, front.contains(&k))).collect::<Vec<_>>(),
+        "reference": {
+            "how": truth.how,
+            "until": truth.until,
+            "horizon_s": truth.horizon,
+            "accuracy": if truth.until > 0.0 { Some(truth.accuracy) } else { None },
+            "times": truth.marks().collect::<Vec<_>>(),
+        },
+        "recommendations": comparison.advice().iter().map(|advice| recommendation(comparison, advice)).collect::<Vec<_>>(),
+        "notes": comparison.notes,
+        "complete": comparison.is_whole,
+        "wall_s": comparison.wall.as_secs_f64(),
+    })
+}
+
+fn row(entry: &Entry, is_on_front: bool) -> Value {
+    let found = entry.found.as_ref();
+    let done = found.filter(|_| entry.fate == Fate::Done);
+    let plan = entry.plan.as_ref();
+    let tolerance = plan.and_then(|plan| plan.tolerance);
+    let (stop, refusal, reached) = match &entry.fate {
+        Fate::Done => (None, None, plan.map(|plan| plan.until)),
+        Fate::Stopped(stop) => (Some(stop), None, Some(stop.t)),
+        Fate::Refused(refusal) => {
+            (None, Some(json!({"what": refusal.what, "reason": refusal.reason, "alternative": refusal.alternative})), None)
+        }
+        Fate::Late(t) => (None, None, Some(*t)),
+    };
+    json!({
+        "method": entry.method.info().name,
+        "setting": plan.map(setting),
+        "stabilize": entry.stabilization,
+        "status": status(&entry.fate),
+        "error": entry.error(),
+        "rate_error": done.map(|found| found.rate_error),
+        "errors": done.map(|found| &found.errors),
+        "energy_drift": done.map(|found| found.energy),
+        "constraint_drift": done.and_then(|found| found.constraint).map(|levels| levels[0]),
+        "constraint_rate_drift": done.and_then(|found| found.constraint).map(|levels| levels[1]),
+        "wall_s": entry.median(),
+        "wall_spread": entry.spread(),
+        "wall_min_s": entry.blocks.iter().copied().reduce(f64::min),
+        "blocks": entry.blocks.len(),
+        "evaluations": found.map(|found| found.tally.evaluations),
+        "steps": found.map(|found| found.tally.steps),
+        "rejected": found.map(|found| found.tally.rejected),
+        "step": plan.and_then(|plan| plan.step),
+        "rtol": tolerance.map(|tolerance| tolerance.relative),
+        "atol": tolerance.map(|tolerance| tolerance.absolute),
+        "extended": entry.extended,
+        "pareto": is_on_front,
+        "t": reached,
+        "stop": stop,
+        "refusal": refusal,
+    })
+}
+
+/// One word for what became of a setting.
+fn status(fate: &Fate) -> &'static str {
+    match fate {
+        Fate::Done => "done",
+        Fate::Stopped(_) => "stopped",
+        Fate::Refused(_) => "refused",
+        Fate::Late(_) => "over_budget",
+    }
+}
+
+fn recommendation(comparison: &Comparison, advice: &Advice) -> Value {
+    let chosen = advice.entry.map(|number| &comparison.entries[number]);
+    json!({
+        "error": advice.target,
+        "method": chosen.map(|entry| entry.method.info().name),
+        "setting": chosen.and_then(|entry| entry.plan.as_ref()).map(setting),
+        "stabilize": chosen.and_then(|entry| entry.stabilization),
+        "options": chosen.and_then(options),
+        "row": advice.entry,
+        "sentence": sentence(comparison, advice),
+    })
+}
+
+/// `1e-9`, `0.005 s`, `1e-20 extended`.
+fn setting(plan: &Plan) -> String {
+    match (plan.step, plan.tolerance) {
+        (Some(step), _) => format!("{step} s"),
+        (None, tolerance) => {
+            format!("{:e}{}", tolerance.unwrap_or_default().relative, if plan.extended { " extended" } else { "" })
+        }
+    }
+}
+
+/// What to give to `run` for it.
+fn options(entry: &Entry) -> Option<String> {
+    let plan = entry.plan.as_ref()?;
+    let value = match (plan.step, plan.tolerance) {
+        (Some(step), _) => format!("--step {step}"),
+        (None, tolerance) => format!("--rtol {:e}", tolerance?.relative),
+    };
+    let extended = if plan.extended { " --extended" } else { "" };
+    let kept = match entry.stabilization {
+        Some(kind) if !matches!(entry.method, MethodId::Rattle(_)) => format!(" --stabilize {kind}"),
+        _ => String::new(),
+    };
+    Some(format!("--method {} {value}{extended}{kept}", entry.method))
+}
+
+/// One plain sentence: what to choose for an error on this scene.
+fn sentence(comparison: &Comparison, advice: &Advice) -> String {
+    let target = advice.target;
+    if advice.is_blind {
+        return match comparison.truth.until > 0.0 {
+            true => format!("For {target:e} nothing can be said: the reference is good to {}.", magnitude(comparison.truth.accuracy)),
+            false => format!("For {target:e} nothing can be said: there is no reference."),
+        };
+    }
+    let described = |number: usize| {
+        let entry = &comparison.entries[number];
+        Some((entry, options(entry)?, entry.error()?, entry.median()?))
+    };
+    match (advice.entry.and_then(described), advice.nearest.and_then(described)) {
+        (Some((_, options, error, time)), _) => {
+            let next = advice.next.and_then(described).map_or(String::new(), |(_, options, _, other)| {
+                format!("; next is {options}, {} times as long", rough((10.0 * other / time).round() / 10.0))
+            });
+            format!("For {target:e} take {options}: error {}, {}{next}.", magnitude(error), duration(time))
+        }
+        (None, Some((_, options, error, _))) => {
+            format!("No method reaches {target:e} here; the nearest is {options} with {}.", magnitude(error))
+        }
+        (None, None) => format!("No method reaches {target:e} here."),
+    }
+}
+
+/// `12.3 µs`, `4.56 ms`, `7.89 s`.
+fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 1e-3 => format!("{} µs", rough(1e6 * s)),
+        s if s < 1.0 => format!("{} ms", rough(1e3 * s)),
+        s => format!("{} s", rough(s)),
+    }
+}
+
+/// The rows as a table for spreadsheets, with units in its head; what was not measured is empty.
+pub fn csv(comparison: &Comparison) -> String {
+    const HEAD: &str = "method,setting,stabilize,status,error [rad],rate_error [rad/s],energy_drift [1],constraint_drift [rad or m],\
+                        constraint_rate_drift [rad/s or m/s],wall [s],wall_spread [s],evaluations,steps,rejected,pareto\n";
+    let front = comparison.front();
+    let number = |x: Option<f64>| x.filter(|x| x.is_finite()).map_or(String::new(), |x| format!("{x:e}"));
+    let mut text = HEAD.to_owned();
+    for (k, entry) in comparison.entries.iter().enumerate() {
+        let found = entry.found.as_ref().filter(|_| entry.fate == Fate::Done);
+        let of = |what: &dyn Fn(&Found) -> Option<f64>| number(found.and_then(what));
+        let count = |what: &dyn Fn(&Found) -> u64| entry.found.as_ref().map_or(String::new(), |found| what(found).to_string());
+        let cells = [
+            entry.method.info().name.to_owned(),
+            entry.plan.as_ref().map_or(String::new(), setting),
+            entry.stabilization.map_or(String::new(), |kind| kind.name().to_owned()),
+            status(&entry.fate).to_owned(),
+            number(entry.error()),
+            of(&|found| Some(found.rate_error)),
+            of(&|found| Some(found.energy)),
+            of(&|found| found.constraint.map(|levels| levels[0])),
+            of(&|found| found.constraint.map(|levels| levels[1])),
+            number(entry.median()),
+            number(entry.spread()),
+            count(&|found| found.tally.evaluations),
+            count(&|found| found.tally.steps),
+            count(&|found| found.tally.rejected),
+            u8::from(front.contains(&k)).to_string(),
+        ];
+        text += &cells.join(",");
+        text.push('\n');
+    }
+    text
+}
+
+/// The comparison as a page.
+pub fn text(scene: &Scene, mechanism: &Mechanism, comparison: &Comparison) -> String {
+    let truth = &comparison.truth;
+    let mut page = Page::new(&scene.name, &scene.description);
+    page.entry("horizon", &format!("{} s", figure(comparison.until)));
+    if truth.until > 0.0 {
+        page.entry("reference", &format!("{}, good to {}", truth.how, magnitude(truth.accuracy)));
+        page.entry("errors", &format!("of angles in rad, largest up to t = {} s", figure(truth.until)));
+    } else {
+        page.entry("reference", "none");
+    }
+    if let Some(horizon) = truth.horizon {
+        page.entry("", &format!("starts an ulp apart part by 1e-3 rad after {} s: beyond it no path means anything", rough(horizon)));
+    }
+    for note in &comparison.notes {
+        page.entry("note", note);
+    }
+    let letters = has_letters(comparison);
+    if letters {
+        page.entry("stabilization", "n none, b baumgarte, p projection, e elimination");
+    }
+    table(&mut page, mechanism, comparison, letters);
+    failures(&mut page, comparison, letters);
+    for (k, advice) in comparison.advice().iter().enumerate() {
+        page.entry(if k == 0 { "to choose" } else { "" }, &sentence(comparison, advice));
+    }
+    if !comparison.is_whole {
+        page.entry("interrupted", "what is above is all there was");
+    }
+    page.into_text()
+}
+
+/// Whether a method appears with several stabilizations, which are then told by a letter.
+fn has_letters(comparison: &Comparison) -> bool {
+    let several = |a: &Entry, b: &Entry| a.method == b.method && a.stabilization != b.stabilization;
+    comparison.entries.iter().any(|a| comparison.entries.iter().any(|b| several(a, b)))
+}
+
+/// `dp8 p 1e-9`, `gauss16 0.005`, `taylor+ 1e-20`.
+fn short(entry: &Entry, letters: bool) -> String {
+    let letter = match entry.stabilization.filter(|_| letters) {
+        None => "",
+        Some(Stabilization::None) => " n",
+        Some(Stabilization::Baumgarte) => " b",
+        Some(Stabilization::Projection) => " p",
+        Some(Stabilization::Elimination) => " e",
+    };
+    let value = match entry.plan.as_ref().map(|plan| (plan.step, plan.tolerance)) {
+        // Steps have few digits, but where the horizon has many.
+        Some((Some(step), _)) if step.to_string().len() <= 9 => format!(" {step}"),
+        Some((Some(step), _)) => format!(" {step:.3e}"),
+        Some((None, tolerance)) => format!(" {:e}", tolerance.unwrap_or_default().relative),
+        None => String::new(),
+    };
+    format!("{}{}{letter}{value}", entry.method, if entry.extended { "+" } else { "" })
+}
+
+fn table(page: &mut Page, mechanism: &Mechanism, comparison: &Comparison, letters: bool) {
+    let front = comparison.front();
+    let has_rows = !mechanism.rows.is_empty();
+    let mut head = vec!["", "error", "energy"];
+    head.extend(has_rows.then_some(["|C|", "|C'|"]).into_iter().flatten());
+    head.extend(["time", "+-", "evals"]);
+    let mut rows = Vec::new();
+    for (k, entry) in sorted(comparison) {
+        let Some(found) = entry.found.as_ref().filter(|_| entry.fate == Fate::Done) else { continue };
+        let mark = if front.contains(&k) { "*" } else { " " };
+        let mut cells = vec![format!("{mark} {}", short(entry, letters))];
+        cells.push(match entry.error() {
+            None => "-".into(),
+            Some(error) if error > LOST => "lost".into(),
+            Some(error) => magnitude(error),
+        });
+        cells.push(magnitude(found.energy));
+        cells.extend(found.constraint.filter(|_| has_rows).into_iter().flatten().map(magnitude));
+        let time = entry.median().unwrap_or(f64::NAN);
+        cells.push(duration(time));
+        cells.push(entry.spread().map_or("-".into(), |spread| format!("{:.0}%", 50.0 * spread / time)));
+        cells.push(count(found.tally.evaluations));
+        rows.push(cells);
+    }
+    if rows.is_empty() {
+        return;
+    }
+    page.table(&head, &rows);
+    let extended = if comparison.entries.iter().any(|entry| entry.extended) { "; + first orders in double-double" } else { "" };
+    let lost = format!("lost: off by more than {LOST} rad");
+    page.entry("", &format!("* no other is faster and more accurate; +- half the distance of the quartiles; {lost}{extended}"));
+}
+
+/// `850`, `12.3k`, `4.56M`.
+fn count(number: u64) -> String {
+    match number as f64 {
+        n if n < 1e4 => format!("{number}"),
+        n if n < 1e6 => format!("{}k", rough(n / 1e3)),
+        n if n < 1e9 => format!("{}M", rough(n / 1e6)),
+        n => format!("{}G", rough(n / 1e9)),
+    }
+}
+
+/// Settings of one method together, in the order of the table of methods.
+fn sorted(comparison: &Comparison) -> Vec<(usize, &Entry)> {
+    let mut entries: Vec<(usize, &Entry)> = comparison.entries.iter().enumerate().collect();
+    let place = |entry: &Entry| {
+        let first = comparison.entries.iter().position(|other| other.name() == entry.name());
+        (crate::run::METHODS.iter().position(|info| info.id == entry.method), entry.extended, first)
+    };
+    entries.sort_by_key(|(number, entry)| (place(entry), *number));
+    entries
+}
+
+/// What did not come to its end, and why.
+fn failures(page: &mut Page, comparison: &Comparison, letters: bool) {
+    let mut label = "not finished";
+    let mut last = None;
+    for (_, entry) in sorted(comparison) {
+        // All that are finer than one that took too long are one line.
+        let is_again = last.replace((entry.name(), entry.fate.clone())) == Some((entry.name(), Fate::Late(0.0)));
+        let why = match &entry.fate {
+            Fate::Done => continue,
+            Fate::Late(0.0) if is_again => continue,
+            Fate::Stopped(stop) => format!("stopped ({}) at t = {} s: {}", stop.cause.word(), rough(stop.t), stop.what),
+            Fate::Refused(refusal) => format!("refused: {}", refusal.reason),
+            Fate::Late(0.0) => "and finer ones left out: a coarser one took too long".into(),
+            Fate::Late(t) => format!("at t = {} s its share of the time was over", rough(*t)),
+        };
+        let kept = match (&entry.fate, entry.stabilization) {
+            (Fate::Refused(_), Some(kind)) => format!(" with {kind}"),
+            _ => String::new(),
+        };
+        page.entry(std::mem::take(&mut label), &format!("{}{kept}: {why}", short(entry, letters && kept.is_empty())));
+    }
+}
+
+/// A chart of a comparison.
+#[cfg(feature = "charts")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CompareChart {
+    /// Error against run time.
+    ErrorTime,
+    /// Energy drift against run time.
+    EnergyTime,
+    /// Error against evaluations.
+    ErrorEvaluations,
+}
+
+#[cfg(feature = "charts")]
+impl CompareChart {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::ErrorTime, Self::EnergyTime, Self::ErrorEvaluations];
+
+    /// Name of its file.
+    pub fn file(self) -> &'static str {
+        match self {
+            Self::ErrorTime => "error_against_run_time.png",
+            Self::EnergyTime => "energy_drift_against_run_time.png",
+            Self::ErrorEvaluations => "error_against_evaluations.png",
+        }
+    }
+}
+
+/// Draws one chart; returns the content of its file.
+///
+/// # Errors
+/// Drawing or encoding fails.
+#[cfg(feature = "charts")]
+pub fn draw(kind: CompareChart, scene: &Scene, mechanism: &Mechanism, comparison: &Comparison) -> Result<Vec<u8>, ChartError> {
+    let of_energy = kind == CompareChart::EnergyTime;
+    let truth = &comparison.truth;
+    let point = |entry: &Entry| {
+        let found = entry.found.as_ref().filter(|_| entry.fate == Fate::Done)?;
+        let cost = if kind == CompareChart::ErrorEvaluations { found.tally.evaluations as f64 } else { entry.median()? };
+        Some([cost, if of_energy { found.energy } else { entry.error()? }])
+    };
+    let mut series: Vec<WorkSeries> = Vec::new();
+    let several = has_letters(comparison);
+    for (_, entry) in sorted(comparison) {
+        let name = if several { entry.name() } else { Entry { stabilization: None, ..entry.clone() }.name() };
+        if series.last().is_none_or(|last| last.name != name) {
+            series.push(WorkSeries { method: entry.method.info().name.to_owned(), name, points: Vec::new() });
+        }
+        if let Some(series) = series.last_mut() {
+            series.points.extend(point(entry));
+        }
+    }
+    series.retain(|series| !series.points.is_empty());
+    let until = format!("{} s", figure(comparison.until));
+    let drifting = Drift::new(mechanism, comparison.until).kind;
+    let mut caption = vec![format!("scene {}", plain(&scene.name)), format!("runs of {until}")];
+    if of_energy {
+        caption.push("largest value on the way, over the energy scale".into());
+    } else {
+        caption.push(format!("largest error up to *t* = {} s, against {}", figure(truth.until), plain(&truth.how)));
+    }
+    if kind != CompareChart::ErrorEvaluations {
+        caption.push("medians on one core".into());
+    }
+    let cost = match kind {
+        CompareChart::ErrorEvaluations => Cost::Count("evaluations of the equations (of taylor: expansions)".into()),
+        _ => Cost::Time(format!("run time of {until}")),
+    };
+    let (title, error_name) = match kind {
+        CompareChart::ErrorTime => ("Error against run time", "largest error of angles [rad]".to_owned()),
+        CompareChart::ErrorEvaluations => ("Error against evaluations", "largest error of angles [rad]".to_owned()),
+        CompareChart::EnergyTime => ("Energy drift against run time", format!("relative drift of {drifting}")),
+    };
+    let lost = if of_energy { None } else { Some(LOST) };
+    let chart = WorkPrecision { title: title.into(), caption, cost, error_name, series, lost, floor: None };
+    chart::work_precision(&chart, FILE_RESOLUTION)?.png_bytes()
+}

@@ -1,0 +1,130 @@
+//! One setting of one method: how far off it is, and how long it takes.
+
+use super::truth::{Room, Truth};
+use crate::dynamics::{Mechanism, Motion};
+use crate::run::drift::Limits;
+use crate::run::plan::Plan;
+use crate::run::running::{Run, RunError, Running};
+use crate::stepping::{StepError, Tally};
+use std::cell::Cell;
+use std::sync::Arc;
+
+/// What a run was found to be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    /// Largest distance from the reference as far as that reaches: of an angle \[rad\], or a place over the mechanism's size.  Not a number where there is no reference.
+    pub error: f64,
+    /// The same of rates \[rad/s\].
+    pub rate_error: f64,
+    /// Distances of angles at the times the comparison names \[rad\].
+    pub errors: Vec<f64>,
+    /// Largest drift of energy, or energy minus work, over the energy scale.
+    pub energy: f64,
+    /// Largest violation of any constraint, at position \[rad or m\] and velocity level \[rad/s or m/s\], where there are any.
+    pub constraint: Option<[f64; 2]>,
+    /// Counts.
+    pub tally: Tally,
+}
+
+/// How a measurement ended.
+pub(super) enum Ended {
+    /// At the horizon, with the plan as it was carried out.
+    Whole(Found, Plan),
+    /// The method stopped on the way.
+    Stopped(Found, StepError),
+    /// Its time was over, at so many seconds of the motion.
+    Late(f64),
+    /// It was to be given up.
+    Over,
+}
+
+/// Runs a plan and looks at it at its output times.
+pub(super) fn measure(
+    mechanism: &Arc<Mechanism>,
+    start: &Motion,
+    plan: Plan,
+    truth: &Truth,
+    room: Room,
+    is_over: &dyn Fn() -> bool,
+) -> Result<Ended, StepError> {
+    let mut running = Running::new(Run::new(Arc::clone(mechanism), plan, Limits::default(), start)?);
+    let plan = running.plan().clone();
+    let mut found =
+        Found { error: f64::NAN, rate_error: f64::NAN, errors: Vec::new(), energy: 0.0, constraint: None, tally: Tally::default() };
+    let begin = (room.clock)();
+    let is_late = || (room.clock)().saturating_sub(begin).as_secs_f64() > room.seconds;
+    let is_row = Cell::new(false);
+    loop {
+        let mut observer = |_: &_| {
+            is_row.set(true);
+            Ok(())
+        };
+        let gone = running.go(&mut observer, &mut || is_row.get() || is_over() || is_late());
+        if is_row.take()
+            && let Some(([error, rate_error], mark)) = truth.error(running.motion())
+        {
+            found.error = largest(found.error, error);
+            found.rate_error = largest(found.rate_error, rate_error);
+            found.errors.extend(mark.map(|_| error));
+        }
+        match gone {
+            Ok(true) => break,
+            Ok(false) if is_over() => return Ok(Ended::Over),
+            Ok(false) if is_late() => return Ok(Ended::Late(running.time())),
+            Ok(false) => {}
+            Err(RunError::Step(stop)) => return Err(stop),
+            // Nothing observes that could fail.
+            Err(_) => return Ok(Ended::Over),
+        }
+    }
+    let outcome = running.finish();
+    let levels = outcome.drift.constraints.iter().map(|(_, [position, velocity])| [position.max, velocity.max]);
+    found.constraint = levels.reduce(|a, b| [0, 1].map(|level| if a[level].is_nan() { a[level] } else { a[level].max(b[level]) }));
+    found.energy = outcome.drift.energy.max;
+    found.tally = outcome.tally;
+    Ok(match outcome.stop {
+        None => Ended::Whole(found, plan),
+        Some(stop) => Ended::Stopped(found, stop),
+    })
+}
+
+/// The larger of what was there, if anything, and a distance; once that is not a number it is infinite.
+fn largest(most: f64, value: f64) -> f64 {
+    if value.is_nan() { f64::INFINITY } else { most.max(value) }
+}
+
+/// Mean time of a run \[s\] over as many repetitions as fill a quantum \[s\], without looking at anything on the way; `None` where it was given up.
+///
+/// A run shorter than that is made once before the clock is looked at, so that the caches hold what is its own.
+pub(super) fn time(
+    mechanism: &Arc<Mechanism>,
+    start: &Motion,
+    plan: &Plan,
+    before: Option<f64>,
+    room: Room,
+    is_over: &dyn Fn() -> bool,
+) -> Option<f64> {
+    let once = || {
+        let mut running = Running::new(Run::new(Arc::clone(mechanism), plan.clone(), Limits::default(), start).ok()?);
+        let begin = (room.clock)();
+        running.rush(&mut || is_over()).then(|| (room.clock)().saturating_sub(begin).as_secs_f64())
+    };
+    if before.is_none_or(|before| before < room.seconds) {
+        let first = once()?;
+        if first >= room.seconds {
+            return Some(first);
+        }
+    }
+    let (mut total, mut count) = (0.0, 0.0);
+    while total < room.seconds {
+        total += once()?;
+        count += 1.0;
+        if count >= MOST {
+            break;
+        }
+    }
+    Some(total / count)
+}
+
+/// Repetitions of a run that takes next to no time.
+const MOST: f64 = 1e4;
