@@ -143,6 +143,8 @@ impl<const D: usize, const CLOCK: bool> Sub for Dual<D, CLOCK> {
 
 impl<const D: usize, const CLOCK: bool> Mul for Dual<D, CLOCK> {
     type Output = Self;
+    // The product rule is a sum.
+    #[allow(clippy::suspicious_arithmetic_impl)]
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         self.join(other, self.value * other.value, |a, b| a * other.value + b * self.value)
