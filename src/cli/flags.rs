@@ -2,6 +2,7 @@
 
 use super::failure::{Exit, Failure};
 use super::output::{message, print};
+use crate::run::trust::Level;
 use crate::run::{Limits, METHODS, MethodId, Request, Stabilization, Vary};
 use crate::scene::Override;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -133,6 +134,9 @@ pub struct RunFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub plan: PlanFlags,
+    /// Estimate the error of the result and the time up to which it can be trusted: off, auto (at most 30 % of the run), full (whatever it takes)
+    #[arg(long, value_name = "HOW", value_parser = levels(), default_value = Level::Auto.name(), help_heading = "Trust")]
+    pub trust: Level,
     /// Stop with exit code 5 where the energy is off by more than this share of its scale
     #[arg(long, value_name = "SHARE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
     pub max_energy_drift: Option<f64>,
@@ -330,6 +334,10 @@ fn methods() -> impl TypedValueParser<Value = MethodId> {
 
 fn stabilizations() -> impl TypedValueParser<Value = Stabilization> {
     PossibleValuesParser::new(Stabilization::ALL.map(Stabilization::name)).try_map(|name| name.parse::<Stabilization>())
+}
+
+fn levels() -> impl TypedValueParser<Value = Level> {
+    PossibleValuesParser::new(Level::ALL.map(Level::name)).try_map(|name| name.parse::<Level>())
 }
 
 /// A number, or a fraction of two.

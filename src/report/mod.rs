@@ -9,6 +9,7 @@
 //! | [`inspect`] | the scene's start | `inspect.rs` |
 //! | [`result`] | a run | `result.rs` |
 //! | `sweep` | a sweep, with its chart | `sweep.rs`, with the feature `files` |
+//! | [`trust`] | how far a run may be trusted | `trust.rs` |
 //! | [`methods`] | the table of methods | `methods.rs` |
 //! | `charts` | a run, in pictures | `charts.rs`, with the feature `charts` |
 
@@ -23,6 +24,7 @@ pub mod page;
 pub mod result;
 #[cfg(feature = "files")]
 pub mod sweep;
+pub mod trust;
 
 use crate::run::Plan;
 use serde_json::{Value, json};
