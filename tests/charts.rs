@@ -17,7 +17,7 @@ fn words(text: &[&str]) -> Vec<String> {
 fn torque(time: Vec<f64>, torque: Vec<f64>) -> TorquePower {
     let power = torque.iter().map(|v| 6.0 * v).collect();
     let motors = vec![MotorSeries { name: "motor".to_owned(), time, torque, power }];
-    TorquePower { title: "Motor torque and power".to_owned(), caption: words(&["scene motor", "dop853"]), motors }
+    TorquePower { title: "Motor torque and power".to_owned(), caption: words(&["scene motor", "dop853"]), motors, horizon: None }
 }
 
 fn drift(method: &str, time: Vec<f64>, error: Vec<f64>) -> DriftSeries {
@@ -62,6 +62,7 @@ fn pendulum() -> MechanismChart {
         sketch: sketch(),
         poses: vec![pose([0.4, 0.2], 1.0), pose([0.7, -0.3], 1.0)],
         trails: vec![trail],
+        horizon: None,
     }
 }
 
@@ -115,6 +116,7 @@ fn gallery() -> Vec<(&'static str, Picture)> {
         caption: words(&["scene chain"]),
         time: time.clone(),
         series: (0..count).map(|k| AngleSeries { name: format!("bar {k}"), angle: wave(k) }).collect(),
+        horizon: None,
     };
     let energy = |log_time: bool| EnergyDrift {
         title: "Energy drift".to_owned(),
@@ -371,8 +373,15 @@ fn angles_are_told_in_pi_or_turns() {
 fn the_animation_runs_for_ever_and_repeats_only_what_changes() {
     let poses: Vec<Pose> = times(12, 0.1).iter().map(|t| pose([t.cos(), 2.0 * t.sin()], 1.0)).collect();
     let trail = times(111, 0.01).iter().map(|t| pose([t.cos(), 2.0 * t.sin()], 1.0).points[0]).collect();
-    let chart =
-        MotionGif { title: "Double pendulum".to_owned(), sketch: sketch(), poses, time: times(12, 0.1), trails: vec![trail], delay: 4 };
+    let chart = MotionGif {
+        title: "Double pendulum".to_owned(),
+        sketch: sketch(),
+        poses,
+        time: times(12, 0.1),
+        trails: vec![trail],
+        delay: 4,
+        horizon: None,
+    };
     let animation = motion_gif(&chart).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("motion.gif");

@@ -6,6 +6,7 @@ use super::grid::{label_room, shortened, stacked};
 use super::lines::Point;
 use super::palette::marks;
 use super::sheet::Sheet;
+use super::ticks::figure;
 use super::{ChartError, PAGE};
 use std::f64::consts::{PI, TAU};
 
@@ -32,6 +33,8 @@ pub struct Angles {
     pub time: Vec<f64>,
     /// The bars.
     pub series: Vec<AngleSeries>,
+    /// The time from which on the angles are pale: the horizon up to which they can be trusted \[s\].
+    pub horizon: Option<f64>,
 }
 
 /// Draws up to three bars in panels of their own, more of them in one panel.
@@ -85,11 +88,12 @@ pub fn angles(chart: &Angles, px_per_pt: f64) -> Result<Picture, ChartError> {
     let right = if apart { 20.0 } else { label_room(&sheet, labels.iter().map(String::as_str), false) };
     let marks = marks(chart.series.iter().map(|series| series.name.as_str()));
     let panels = stacked(&sheet, under, &x, ys(), right)?;
+    let label = chart.horizon.map(|horizon| format!("trusted until {} s", figure(horizon)));
     for (k, (panel, lines)) in panels.iter().zip(&lines).enumerate() {
         let mut ends = Vec::new();
         for (i, line) in lines.iter().enumerate() {
             let mark = marks[if apart { k } else { i }];
-            let pieces = panel.trace(line, mark.colour, if lines.len() > 3 { 1.4 } else { 1.6 })?;
+            let pieces = panel.trusted(line, mark.colour, if lines.len() > 3 { 1.4 } else { 1.6 }, chart.horizon)?;
             if let (false, Some(end)) = (apart, pieces.last().and_then(|piece| piece.last())) {
                 ends.push((end[1], labels[i].clone(), mark));
             }
@@ -98,6 +102,7 @@ pub fn angles(chart: &Angles, px_per_pt: f64) -> Result<Picture, ChartError> {
             panel.empty("no data")?;
         }
         panel.end_labels(&ends, false)?;
+        panel.horizon(chart.horizon, label.as_deref().filter(|_| k == 0))?;
     }
     Ok(sheet.picture(&chart.title, &caption))
 }

@@ -3,7 +3,7 @@
 use super::file::Picture;
 use super::grid::AIR;
 use super::labels::Occupied;
-use super::panel::{Panel, Written, left_room};
+use super::panel::{Panel, Written, left_room, pale};
 use super::sheet::{EDGE, Sheet};
 use super::sketch::{Pencil, Pose, Sketch, symbol_size, trail_colour};
 use super::view::View;
@@ -25,6 +25,8 @@ pub struct MechanismChart {
     pub poses: Vec<Pose>,
     /// Paths of the sketch's points (x, y) \[m\], oldest place first; points that are not numbers break a path.
     pub trails: Vec<Vec<[f64; 2]>>,
+    /// The point of the paths from which on they are pale: beyond the horizon up to which they can be trusted.
+    pub horizon: Option<usize>,
 }
 
 /// Draws the mechanism with gravity pointing down the page and equal scales.
@@ -63,7 +65,9 @@ pub fn mechanism(chart: &MechanismChart, px_per_pt: f64) -> Result<Picture, Char
             pencil.ghost(pose, 1.0 - k as f64 / before.len() as f64)?;
         }
         for (k, trail) in chart.trails.iter().enumerate() {
-            pencil.trail(trail, trail_colour(k), 160, &mut occupied)?;
+            let trusted = chart.horizon.map_or(trail.len(), |horizon| horizon.min(trail.len()));
+            pencil.trail(&trail[trusted.saturating_sub(1)..], pale(trail_colour(k)), 160, &mut occupied)?;
+            pencil.trail(&trail[..trusted], trail_colour(k), 160, &mut occupied)?;
         }
         pencil.pose(&chart.sketch, last, &mut occupied)?;
         pencil.compass(&mut occupied)?;

@@ -5,7 +5,7 @@ use super::file::write_whole;
 use super::gif::Encoder;
 use super::labels::Occupied;
 use super::palette::{GREY, GRID};
-use super::panel::Panel;
+use super::panel::{Panel, pale};
 use super::sheet::{CAPTION, EDGE, Pen, Sheet};
 use super::sketch::{Pencil, Pose, Sketch, symbol_size, trail_colour};
 use super::text::{Align, Lettering, Level};
@@ -36,6 +36,8 @@ pub struct MotionGif {
     pub trails: Vec<Vec<[f64; 2]>>,
     /// Time a frame stays \[1/100 s\]; 4 gives 25 frames a second.
     pub delay: u16,
+    /// The time from which on the paths are pale: the horizon up to which they can be trusted \[s\].
+    pub horizon: Option<f64>,
 }
 
 /// A finished animation.
@@ -87,13 +89,16 @@ pub fn motion_gif(chart: &MotionGif) -> Result<Animation, ChartError> {
         sheet.restore(&background);
         let Some(pose) = chart.poses.get(k) else { return Ok(sheet.pixels()) };
         let mut occupied = Occupied::default();
+        let is_past = chart.horizon.zip(chart.time.get(k)).is_some_and(|(horizon, &time)| time > horizon);
         for (number, trail) in chart.trails.iter().enumerate() {
-            pencil.trail(tail(trail, k, frames), trail_colour(number), SHADES, &mut occupied)?;
+            let colour = trail_colour(number);
+            pencil.trail(tail(trail, k, frames), if is_past { pale(colour) } else { colour }, SHADES, &mut occupied)?;
         }
         pencil.pose(&chart.sketch, pose, &mut occupied)?;
         if let Some(&time) = chart.time.get(k) {
             let words = Lettering::new(CAPTION, GREY).at(Align::Right, Level::Baseline);
-            sheet.words(&format!("*t* = {} s", decimal(time, 2)), words, [right - 5.0, bottom - 5.0])?;
+            let past = if is_past { ", beyond trust" } else { "" };
+            sheet.words(&format!("*t* = {} s{past}", decimal(time, 2)), words, [right - 5.0, bottom - 5.0])?;
         }
         Ok(sheet.pixels())
     };

@@ -83,6 +83,23 @@ pub(crate) fn right_room(sheet: &Sheet, axis: &Axis, width: f64) -> f64 {
     ticks.majors.iter().map(over).fold(0.0, f64::max)
 }
 
+/// What is drawn of a line beyond its horizon.
+pub(crate) fn pale(colour: Colour) -> Colour {
+    mix(colour, WHITE, 0.7)
+}
+
+/// Points up to a time and from it on; both have the one at it.
+fn divided(points: &[Point], at: f64) -> (Vec<Point>, Vec<Point>) {
+    let first = points.partition_point(|point| point[0] <= at || point[0].is_nan());
+    let (mut before, mut beyond) = (points[..first].to_vec(), points[first..].to_vec());
+    if let (Some(&[t0, y0]), Some(&[t1, y1])) = (before.last(), beyond.first()) {
+        let middle = [at, y0 + (y1 - y0) * ((at - t0) / (t1 - t0))];
+        before.push(middle);
+        beyond.insert(0, middle);
+    }
+    (before, beyond)
+}
+
 impl<'a> Panel<'a> {
     pub(crate) fn new(sheet: &'a Sheet, bounds: [f64; 4], x: Axis, y: Axis) -> Self {
         let (x_most, y_most) = (most_along(sheet, &x, bounds[2] - bounds[0]), most_up(bounds[3] - bounds[1]));
@@ -212,6 +229,37 @@ impl<'a> Panel<'a> {
             self.sheet.line(edge, &Pen::new(colour, 0.7))?;
         }
         Ok(vec![upper, lower])
+    }
+
+    /// [`Panel::trace`] in full colour up to a time, and pale beyond it.
+    pub(crate) fn trusted(
+        &self,
+        points: &[Point],
+        colour: Colour,
+        width: f64,
+        horizon: Option<f64>,
+    ) -> Result<Vec<Vec<Point>>, ChartError> {
+        let Some(horizon) = horizon else { return self.trace(points, colour, width) };
+        let (before, beyond) = divided(points, horizon);
+        // The pale part first, so that the line begins where the other ends.
+        let mut pieces = Vec::new();
+        for (part, colour) in [(beyond, pale(colour)), (before, colour)] {
+            if !part.is_empty() {
+                pieces.push(self.trace(&part, colour, width)?);
+            }
+        }
+        Ok(pieces.into_iter().rev().flatten().collect())
+    }
+
+    /// A thin upright line at a time, with words at its top where there is room for them.
+    pub(crate) fn horizon(&self, at: Option<f64>, words: Option<&str>) -> Result<(), ChartError> {
+        let Some(share) = at.map(|at| self.x.fraction(at)).filter(|share| (0.0..=1.0).contains(share)) else { return Ok(()) };
+        let ([x, top], [_, bottom]) = (self.page([share, 1.0]), self.page([share, 0.0]));
+        self.sheet.line(&[[x, top], [x, bottom]], &Pen::new(GREY, 0.75))?;
+        let Some(words) = words else { return Ok(()) };
+        let half = 0.5 * self.sheet.width(words, NOTE, false);
+        let middle = x.clamp(self.bounds[0] + half, (self.bounds[2] - half).max(self.bounds[0] + half));
+        self.sheet.words(words, note(GREY, Align::Centre, Level::Baseline), [middle, top - 3.0])
     }
 
     /// Data that make no line, as dots.

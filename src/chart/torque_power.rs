@@ -33,6 +33,8 @@ pub struct TorquePower {
     pub caption: Vec<String>,
     /// The motors.
     pub motors: Vec<MotorSeries>,
+    /// The time from which on the curves are pale: the horizon up to which they can be trusted \[s\].
+    pub horizon: Option<f64>,
 }
 
 /// Draws both curves of each motor with a ring and a figure at each largest magnitude.
@@ -64,13 +66,14 @@ pub fn torque_power(chart: &TorquePower, px_per_pt: f64) -> Result<Picture, Char
     let under = sheet.heading(&chart.title, &caption)?;
     let right = if several { label_room(&sheet, labels.iter().map(String::as_str), false) } else { 20.0 };
     let panels = stacked(&sheet, under, &x, rows.iter().map(y).collect(), right)?;
+    let label = chart.horizon.map(|horizon| format!("trusted until {} s", figure(horizon)));
     for (k, (panel, (lines, _, unit))) in panels.iter().zip(&rows).enumerate() {
         panel.series(&[[panel.x.from, 0.0], [panel.x.to, 0.0]], &Pen::new(SPINE, 0.75))?;
         let own = [Mark { colour: BLUE, shape: Shape::Disc, turn: 0 }, Mark { colour: VERMILLION, shape: Shape::Disc, turn: 0 }];
         let mark = |motor: usize| if several { marks[motor] } else { own[k] };
         let (mut occupied, mut ends) = (Occupied::default(), Vec::new());
         for (motor, line) in lines.iter().enumerate() {
-            let pieces = panel.trace(line, mark(motor).colour, 1.8)?;
+            let pieces = panel.trusted(line, mark(motor).colour, 1.8, chart.horizon)?;
             pieces.iter().for_each(|piece| occupied.line(piece));
             if let Some(end) = pieces.last().and_then(|piece| piece.last()) {
                 ends.push((end[1], labels[motor].clone(), mark(motor)));
@@ -80,6 +83,7 @@ pub fn torque_power(chart: &TorquePower, px_per_pt: f64) -> Result<Picture, Char
         for (motor, line) in lines.iter().enumerate().filter(|_| lines.len() <= 3) {
             peak(&sheet, panel, line, unit, mark(motor).colour, &mut occupied)?;
         }
+        panel.horizon(chart.horizon, label.as_deref().filter(|_| k == 0))?;
         if lines.iter().flatten().all(|p| !p[1].is_finite()) {
             panel.empty("no data")?;
         }

@@ -3,6 +3,7 @@
 use super::failure::{Exit, Failure};
 use super::output::{message, print};
 use crate::run::stress::EFFORT;
+use crate::run::trust::Level;
 use crate::run::{Limits, METHODS, MethodId, Prefer, Request, Stabilization, Vary};
 use crate::scene::Override;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -144,6 +145,9 @@ pub struct RunFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub plan: PlanFlags,
+    /// Estimate the error of the result and the time up to which it can be trusted: off, auto (at most 30 % of the run), full (whatever it takes)
+    #[arg(long, value_name = "HOW", value_parser = levels(), default_value = Level::Auto.name(), help_heading = "Trust")]
+    pub trust: Level,
     /// Stop with exit code 5 where the energy is off by more than this share of its scale [default: 0.01 of the largest energy there has been]
     #[arg(long, value_name = "SHARE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
     pub max_energy_drift: Option<f64>,
@@ -412,6 +416,10 @@ fn stabilizations() -> impl TypedValueParser<Value = Stabilization> {
 
 fn preferences() -> impl TypedValueParser<Value = Prefer> {
     PossibleValuesParser::new(Prefer::ALL.map(Prefer::name)).try_map(|name| name.parse::<Prefer>())
+}
+
+fn levels() -> impl TypedValueParser<Value = Level> {
+    PossibleValuesParser::new(Level::ALL.map(Level::name)).try_map(|name| name.parse::<Level>())
 }
 
 /// A number, or a fraction of two.

@@ -89,7 +89,8 @@ impl Task<'_> {
     /// Runs one plan in a folder of its own.
     fn run(&self, plan: Plan) -> Result<Done, Failure> {
         let Self { scene, mechanism, flags, .. } = *self;
-        let run = Run::new(Arc::clone(mechanism), plan, flags.limits(), &mechanism.start(scene))?;
+        let start = mechanism.start(scene);
+        let run = Run::new(Arc::clone(mechanism), plan, flags.limits(), &start)?.trusted(flags.trust, &start);
         let plan = run.plan();
         flags.scene.remark(&format!("{}; {}", report::setting(plan), plan.why.as_deref().unwrap_or("as asked for")));
         for note in &plan.notes {

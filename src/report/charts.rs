@@ -147,6 +147,12 @@ impl Finished<'_> {
         caption
     }
 
+    /// The time up to which the path can be trusted \[s\], where that ends before `end`; and what to say about it.
+    fn horizon(&self, end: f64) -> (Option<f64>, Option<String>) {
+        let horizon = self.outcome.trust.as_ref().and_then(|trust| trust.horizon).filter(|&horizon| horizon < end);
+        (horizon, horizon.map(|horizon| format!("pale beyond the trust horizon, {} s", rough(horizon))))
+    }
+
     /// Samples in which single swings can be told apart: of the whole run, or else of its beginning; and what to say about it.
     fn window(&self) -> (Vec<&Sample>, Option<String>) {
         let trace = &self.outcome.trace;
@@ -217,7 +223,11 @@ impl Finished<'_> {
             format!("{path} of the {end} of {}", names.join(", "))
         };
         let more = (!coarse).then(|| format!("last {} s of {} s", rough(span(&path)), figure(self.outcome.last.t)));
-        MechanismChart { title, caption: self.caption(more), sketch: self.sketch(), poses, trails }
+        let (horizon, past) = self.horizon(self.outcome.last.t);
+        let trusted = horizon.filter(|_| !coarse).map(|horizon| smoothed(&path).partition_point(|(t, _)| *t <= horizon));
+        let mut caption = self.caption(more);
+        caption.extend(past);
+        MechanismChart { title, caption, sketch: self.sketch(), poses, trails, horizon: trusted }
     }
 
     fn angles(&self) -> Angles {
@@ -229,11 +239,15 @@ impl Finished<'_> {
             .iter()
             .enumerate()
             .map(|(k, body)| AngleSeries { name: plain(&body.name), angle: smooth.iter().map(|(_, phi)| phi[k]).collect() });
+        let (horizon, past) = self.horizon(window.last().map_or(0.0, |sample| sample.t));
+        let mut caption = self.caption(more);
+        caption.extend(past);
         Angles {
             title: "Angles of the bars".to_owned(),
-            caption: self.caption(more),
+            caption,
             time: smooth.iter().map(|(t, _)| *t).collect(),
             series: series.collect(),
+            horizon,
         }
     }
 
@@ -297,7 +311,10 @@ impl Finished<'_> {
         });
         let motors: Vec<MotorSeries> = motors.collect();
         let names: Vec<&str> = motors.iter().map(|motor| motor.name.as_str()).collect();
-        TorquePower { title: format!("Torque and power of {}", names.join(", ")), caption: self.caption(more), motors }
+        let (horizon, past) = self.horizon(window.last().map_or(0.0, |sample| sample.t));
+        let mut caption = self.caption(more);
+        caption.extend(past);
+        TorquePower { title: format!("Torque and power of {}", names.join(", ")), caption, motors, horizon }
     }
 
     /// The first seconds in their own time; faster or slower where too much or nothing would be seen.
@@ -339,6 +356,7 @@ impl Finished<'_> {
             trails: trails.collect(),
             time,
             delay: DELAY,
+            horizon: self.horizon(until).0,
         }
     }
 

@@ -11,6 +11,7 @@
 //! | `sweep` | a sweep, with its chart | `sweep.rs`, with the feature `files` |
 //! | [`stress`] | stiff and extreme scenes by every method | `stress.rs` |
 //! | [`compare`] | methods compared, with charts | `compare.rs` |
+//! | [`trust`] | how far a run may be trusted | `trust.rs` |
 //! | [`methods`] | the table of methods | `methods.rs` |
 //! | `charts` | a run, in pictures | `charts.rs`, with the feature `charts` |
 
@@ -27,6 +28,7 @@ pub mod result;
 pub mod stress;
 #[cfg(feature = "files")]
 pub mod sweep;
+pub mod trust;
 
 use crate::run::Plan;
 use serde_json::{Value, json};

@@ -10,7 +10,7 @@ use crate::scene::Scene;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
-/// The report as one JSON object; `wall_s` \[s\] is the time from the first output row to the last.
+/// The report as one JSON object; `wall_s` \[s\] is the time from the first output row to the last without the companion's, which is `trust_wall_s`.
 pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value {
     let Outcome { plan, tally, drift, .. } = outcome;
     let constraints: Map<String, Value> = (drift.constraints.iter().zip(&mechanism.rows))
@@ -43,6 +43,7 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value 
         "jacobians": tally.jacobians,
         "newton_steps": tally.newton_steps,
         "wall_s": outcome.wall.as_secs_f64(),
+        "trust_wall_s": outcome.trust_wall.as_secs_f64(),
         "final": moment(mechanism, &outcome.last),
         "energy": {
             "kind": drift.kind,
@@ -58,7 +59,7 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value 
         "stabilizer": stabilizer,
         "impacts": impacts,
         "holds": holds,
-        "trust": {"error_estimate": null, "horizon_s": null, "how": "none"},
+        "trust": super::trust::object(outcome.trust.as_ref()),
         "stiffness": plan.stiffness,
         "notes": plan.notes,
         "stop": outcome.stop,
@@ -81,6 +82,7 @@ fn moment(mechanism: &Mechanism, sample: &Sample) -> Value {
 pub fn record(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome, trajectory_sha256: &str) -> Value {
     let mut report = object(scene, mechanism, outcome);
     let wall = report.as_object_mut().and_then(|members| members.shift_remove("wall_s"));
+    let trust_wall = report.as_object_mut().and_then(|members| members.shift_remove("trust_wall_s"));
     let input = scene.to_input();
     json!({
         "format": 1,
@@ -88,7 +90,7 @@ pub fn record(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome, trajector
         "hashes": {"scene_sha256": sha256(&input.to_string()), "trajectory_sha256": trajectory_sha256},
         "result": report,
         "resolved_scene": input,
-        "timings": {"wall_s": wall},
+        "timings": {"wall_s": wall, "trust_wall_s": trust_wall},
     })
 }
 
@@ -171,6 +173,6 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
             page.entry("stays on walls", &format!("{}, {} s in all{still}", outcome.hold_count, figure(outcome.hold_time)));
         }
     }
-    page.entry("trust", "no estimate of the solution's error yet");
+    super::trust::describe(&mut page, mechanism, outcome);
     page.into_text()
 }

@@ -51,14 +51,18 @@ pub struct Reference {
 /// # Errors
 /// The stop of the series: a number that is not finite, a time before the start, a singular position it does not get through.
 pub fn reference(mechanism: &Arc<Mechanism>, start: &Motion, times: &[Time]) -> Result<Reference, StepError> {
-    if !mechanism.tree.is_dense() || mechanism.vibration.is_some() {
-        let what = match mechanism.vibration {
-            Some(_) => "the mean force of a rigid spring's vibration has no series",
-            None => "a series takes the matrices of the tree, which are too large here",
-        };
-        let hint = "compare with dop853 at a tighter tolerance";
-        let cause = Cause::Unsuited;
-        return Err(StepError { cause, method: "taylor".into(), t: start.time.hi, step: 0.0, what: what.into(), hint: hint.into() });
+    let unsuited = |what: &str, hint: &str| {
+        let (cause, t) = (Cause::Unsuited, start.time.hi);
+        Err(StepError { cause, method: "taylor".into(), t, step: 0.0, what: what.into(), hint: hint.into() })
+    };
+    if !mechanism.tree.is_dense() {
+        return unsuited("a series takes the matrices of the tree, which are too large here", "compare with dop853 at a tighter tolerance");
+    }
+    if mechanism.vibration.is_some() {
+        return unsuited("the mean force of a rigid spring's vibration has no series", "compare with dop853 at a tighter tolerance");
+    }
+    if !std::iter::once(&start.time).chain(times).is_sorted() {
+        return unsuited("a time lies behind the one before it", "ask for times in ascending order");
     }
     let is_free = mechanism.contacts.is_empty();
     let both = [0, 1].map(|i| {

@@ -298,7 +298,7 @@ impl Running {
         let Snapshot { limits, station, mut outcome, row, resting, horizon, companion } = snapshot;
         outcome.drift.kind = Drift::new(&mechanism, outcome.plan.until).kind;
         let companion = match companion {
-            Some(kept) => Some(Companion::resume(&mechanism, start, kept, horizon.into())?.ok_or(ResumeError::Misfit)?),
+            Some(kept) => Some(Companion::resume(&mechanism, &outcome.plan, start, kept, horizon.into())?.ok_or(ResumeError::Misfit)?),
             None => None,
         };
         let course = Course::resume(mechanism, &outcome.plan, start, station, horizon.into())?.ok_or(ResumeError::Misfit)?;

@@ -6,7 +6,7 @@
 use crate::dynamics::Mechanism;
 use crate::run::methods::MethodId;
 use crate::run::plan::Plan;
-use crate::stepping::Tally;
+use crate::stepping::{Tally, Taylor};
 
 /// Largest share of the run's work that its companion may take.
 pub const SHARE: f64 = 0.3;
@@ -18,8 +18,8 @@ pub const GRACE: f64 = 50e6;
 pub struct Prices {
     /// One evaluation of the equations.
     pub evaluation: f64,
-    /// One step of a series.
-    pub series: f64,
+    /// One step of the companion's series, and of the run's where it has one.
+    pub series: [f64; 2],
     /// A sample, its monitors and its line in the table.
     pub row: f64,
     /// The companion's motion at an output time, and how far it is from the run's.
@@ -27,26 +27,30 @@ pub struct Prices {
 }
 
 impl Prices {
-    /// Those of a mechanism, with the order of its series.
-    pub fn new(mechanism: &Mechanism, order: usize, is_extended: bool) -> Self {
+    /// Those of a mechanism, for the plans of a companion and of its run.
+    pub fn new(mechanism: &Mechanism, companion: &Plan, run: &Plan) -> Self {
         let (n, rows) = (mechanism.coordinates() as f64, mechanism.rows.len() as f64);
         let forces = (mechanism.springs.len() + mechanism.torsions.len() + mechanism.actions.len()) as f64;
         let evaluation = 15.0 + 20.0 * n + 4.0 * n * n.min(12.0) + 60.0 * rows + 20.0 * forces;
         let has_lanes = mechanism.is_plain() && !mechanism.is_tied_up() && mechanism.contacts.is_empty();
-        let products = (order as f64 / 20.0).powi(2);
         let plain = if has_lanes { 250.0 + 130.0 * n } else { 700.0 + 400.0 * n + 150.0 * n * n + 700.0 * rows + 700.0 * forces };
-        let wide = match (is_extended, has_lanes && n <= 2.0 && rows == 0.0) {
-            (false, _) => 1.0,
-            (true, true) => 3.0,
-            (true, false) => 10.0,
+        let series = |plan: &Plan| {
+            let order = Taylor::new(plan.tolerance.unwrap_or_default()).order as f64;
+            let wide = match (plan.extended, has_lanes && n <= 2.0 && rows == 0.0) {
+                (false, _) => 1.0,
+                (true, true) => 3.0,
+                (true, false) => 10.0,
+            };
+            plain * wide * (order / 20.0).powi(2)
         };
         let row = 1200.0 + 600.0 * n + 1200.0 * rows;
-        Self { evaluation, series: plain * products * wide, row, look: 200.0 + 60.0 * n + if rows > 0.0 { evaluation } else { 0.0 } }
+        let look = 200.0 + 60.0 * n + if rows > 0.0 { evaluation } else { 0.0 };
+        Self { evaluation, series: [series(companion), series(run)], row, look }
     }
 
     /// The work of a run so far.
     pub fn run(&self, plan: &Plan, tally: Tally, rows: u64) -> f64 {
-        let each = if plan.method == MethodId::Taylor { self.series } else { self.evaluation };
+        let each = if plan.method == MethodId::Taylor { self.series[1] } else { self.evaluation };
         tally.evaluations as f64 * each + rows as f64 * self.row
     }
 }

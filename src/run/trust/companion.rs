@@ -130,19 +130,14 @@ fn planned(mechanism: &Mechanism, plan: &Plan, level: Level) -> (Plan, String) {
     let mut series = Plan::of_series(mechanism, tolerance, plan.until);
     series.extended = is_extended;
     let orders = if is_extended { ", first orders in double-double" } else { "" };
-    (series, format!("taylor at {:e}{orders}", tolerance.relative))
-}
-
-fn prices(mechanism: &Mechanism, series: &Plan) -> Prices {
-    let order = if series.tolerance.unwrap_or_default().relative < 1e-15 { 24 } else { 20 };
-    Prices::new(mechanism, order, series.extended)
+    (series, format!("taylor at {:.0e}{orders}", tolerance.relative))
 }
 
 impl Companion {
     /// One for a run by a plan from a motion; where none can begin it says so in its figures.
     pub(in crate::run) fn new(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion, level: Level) -> Self {
         let (mut series, name) = planned(mechanism, plan, level);
-        let prices = prices(mechanism, &series);
+        let prices = Prices::new(mechanism, &series, plan);
         let mut measured = Measured {
             level,
             name,
@@ -169,11 +164,17 @@ impl Companion {
     }
 
     /// Goes on from what was kept; `None` where it cannot be of this mechanism.
-    pub(in crate::run) fn resume(mechanism: &Arc<Mechanism>, start: &Motion, kept: Kept, horizon: Time) -> Result<Option<Self>, StepError> {
+    pub(in crate::run) fn resume(
+        mechanism: &Arc<Mechanism>,
+        plan: &Plan,
+        start: &Motion,
+        kept: Kept,
+        horizon: Time,
+    ) -> Result<Option<Self>, StepError> {
         let Kept { measured, shadow } = kept;
         let ruler = Ruler::new(mechanism);
         let Some(KeptShadow { station, outcome, path, last }) = shadow else {
-            let prices = Prices::new(mechanism, 20, false);
+            let prices = Prices::new(mechanism, plan, plan);
             return Ok(Some(Self { ruler, prices, measured, shadow: None }));
         };
         let Some(course) = Course::resume(Arc::clone(mechanism), &outcome.plan, start, station, horizon)? else { return Ok(None) };
@@ -184,7 +185,7 @@ impl Companion {
                 tangent => tangent,
             },
         };
-        let (prices, is_extended) = (prices(mechanism, &outcome.plan), outcome.plan.extended);
+        let (prices, is_extended) = (Prices::new(mechanism, &outcome.plan, plan), outcome.plan.extended);
         let shadow = Shadow { course, outcome, motion: Motion::default(), tangent, is_extended, last };
         Ok(Some(Self { ruler, prices, measured, shadow: Some(shadow) }))
     }
@@ -210,8 +211,11 @@ impl Companion {
         if measured.level == Level::Auto && measured.spent > budget {
             return self.end("more would have taken too large a share of the run");
         }
-        let before = shadow.tangent.as_ref().map(Tangent::history);
-        if let Err(stop) = shadow.go(motion.time, prices, &mut measured.spent) {
+        let before = shadow.tangent.as_ref().map(Tangent::now);
+        // The last step of a fixed-step run may end beyond the horizon by rounding.
+        let horizon = Time::from(shadow.outcome.plan.until);
+        let time = if motion.time > horizon { horizon } else { motion.time };
+        if let Err(stop) = shadow.go(time, prices, &mut measured.spent) {
             return self.end(&stop);
         }
         if measured.lost.is_some() {
@@ -229,7 +233,10 @@ impl Companion {
         }
         let (t, last) = (motion.time.hi, measured.error.max(LEAST));
         if error > HORIZON && measured.horizon.is_none() {
-            let grown = before.into_iter().flatten().chain(shadow.tangent.as_ref().map(Tangent::history).into_iter().flatten());
+            let grown = before
+                .map(|[_, log]| [measured.until, log])
+                .into_iter()
+                .chain(shadow.tangent.as_ref().map(Tangent::history).into_iter().flatten());
             measured.horizon = Some(crossing([measured.until, last], [t, error], grown));
             measured.input_error = shadow.tangent.as_ref().map(|tangent| LAST_DIGIT * tangent.reach());
         }
@@ -260,7 +267,10 @@ impl Companion {
     pub(in crate::run) fn trust(mut self, t: f64) -> Trust {
         let is_whole = self.shadow.is_some();
         self.end("");
-        let Measured { name, until, error, record, horizon, lost, input_error, why, history, .. } = self.measured;
+        let Measured { name, until, error, mut record, horizon, lost, input_error, why, history, .. } = self.measured;
+        if record.last().is_some_and(|last| last[0] < until) {
+            record.push([until, error]);
+        }
         let lyapunov = tangent::exponent(&history);
         let mut trust = Trust {
             how: How::None,
@@ -344,7 +354,7 @@ impl Shadow {
         self.course.go(until, &mut self.outcome, &mut || false).map_err(stopped)?;
         self.course.look(&mut self.motion);
         let tally = self.course.tally();
-        *spent += (tally.evaluations - self.last.evaluations) as f64 * prices.series + prices.look;
+        *spent += (tally.evaluations - self.last.evaluations) as f64 * prices.series[0] + prices.look;
         self.last = tally;
         Ok(())
     }

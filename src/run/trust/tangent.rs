@@ -6,7 +6,7 @@
 //! P <- Phi (P + Q_a) Phiᵀ + Q_b                                                    covariance of what rounding left
 //! ```
 //!
-//! The motion is known at the beginning, middle and end of each step h, whatever made it; h follows the largest entry J of da/dq, `h sqrt(J) = 0.35`.  Few
+//! The motion is known at the beginning, middle and end of each step h, whatever made it; h follows the steepest pull J met in a step, `h sqrt(J) = 0.45`.  Few
 //! coordinates carry the whole matrix, more of them two vectors, whose growth stands for that of the matrix.
 
 use super::Ruler;
@@ -22,7 +22,7 @@ const WHOLE: usize = 3;
 /// Vectors carried for more of them.
 const VECTORS: usize = 2;
 /// Step over the fastest rate, squared rates being the entries of da/dq.
-const REACH: f64 = 0.35;
+const REACH: f64 = 0.45;
 /// The difference taken, relative to 1 rad and the fastest rate.
 const DIFFERENCE: f64 = 1e-7;
 /// Half a unit in the last place of 1.
@@ -39,9 +39,22 @@ pub struct Tangent {
     problem: Box<dyn Problem>,
     weights: Vec<f64>,
     path: Path,
-    /// Rate at the beginning of the step, in its middle, at its end, and beside one of them.
-    rates: [Vec<f64>; 4],
+    /// Rate at the beginning of the step, in its middle, and at its end.
+    rates: [Vec<f64>; 3],
+    scratch: Scratch,
+}
+
+/// Room for a step.
+#[derive(Default)]
+struct Scratch {
+    /// A point beside another, and the rate there.
+    moved: Vec<f64>,
     beside: Vec<f64>,
+    from: Vec<f64>,
+    slopes: [Vec<f64>; 4],
+    /// Columns of the step's own matrix.
+    step: Vec<Vec<f64>>,
+    half: Vec<f64>,
 }
 
 /// All that what follows depends on.
@@ -93,7 +106,9 @@ impl Tangent {
             tangent.derivative(0, motion.time, &state.y, &column, &mut found);
             most = found[f..].iter().fold(most, |most, entry| most.max(entry.abs()));
         }
-        let rate = most.sqrt().max(10.0 / until.max(f64::MIN_POSITIVE));
+        // At the start there may be no force to be felt yet.
+        let turning = state.y[f..2 * f].iter().fold(0.0, |most: f64, rate| most.max(rate.abs()));
+        let rate = most.sqrt().max(turning).max(mechanism.tree.fastest_rate()).max(10.0 / until.max(f64::MIN_POSITIVE));
         let columns = if mechanism.has_multipliers() {
             (0..VECTORS).map(|k| tangent.slide(mechanism, &state, k, rate)).collect()
         } else if f > whole {
@@ -151,7 +166,10 @@ impl Tangent {
             seen: 0,
             reach: 0.0,
         };
-        (!weights.is_empty()).then(|| Self { weights, rates, beside: vec![0.0; problem.dimension()], problem, path })
+        let room = || vec![0.0; 2 * weights.len()];
+        let scratch =
+            Scratch { beside: vec![0.0; problem.dimension()], from: room(), slopes: std::array::from_fn(|_| room()), ..Scratch::default() };
+        (!weights.is_empty()).then(|| Self { rates, scratch, weights, problem, path })
     }
 
     /// Goes on from a path; `None` where it cannot be one of this mechanism.
@@ -223,11 +241,16 @@ impl Tangent {
         self.path.log
     }
 
+    /// The time reached \[s\], and the natural logarithm of the growth there.
+    pub(super) fn now(&self) -> [f64; 2] {
+        [self.path.time, self.path.log]
+    }
+
     /// Growth \[ln\] against time, thinned out; the last one is that of now.
     pub(super) fn history(&self) -> Vec<[f64; 2]> {
         let mut history = self.path.growth.clone();
         if history.last().is_some_and(|last| last[0] < self.path.time) {
-            history.push([self.path.time, self.path.log]);
+            history.push(self.now());
         }
         history
     }
@@ -243,12 +266,13 @@ impl Tangent {
             return;
         }
         let small = DIFFERENCE / largest;
-        let Self { beside, rates, problem, .. } = self;
-        let mut moved = y.to_vec();
+        let Self { scratch: Scratch { moved, beside, .. }, rates, problem, .. } = self;
+        moved.clear();
+        moved.extend_from_slice(y);
         for i in 0..2 * f {
             moved[i] += small * column[i];
         }
-        problem.rate(t, &moved, beside);
+        problem.rate(t, moved, beside);
         found[..f].copy_from_slice(&column[f..2 * f]);
         for i in f..2 * f {
             found[i] = (beside[i] - rates[at][i]) / small;
@@ -268,30 +292,33 @@ impl Tangent {
         let is_whole = self.path.columns.len() == 2 * f;
         let rate = self.path.rate;
         let mut steepest = 0.0_f64;
-        let mut moved: Vec<Vec<f64>> = if is_whole { (0..2 * f).map(|j| unit(j, f, rate)).collect() } else { self.path.columns.clone() };
-        for column in &mut moved {
-            let from = column.clone();
-            let mut slopes = [(); 4].map(|()| vec![0.0; 2 * f]);
+        let size = |column: &[f64]| column.iter().fold(0.0, |most: f64, entry| most.max(entry.abs()));
+        let mut moved = std::mem::take(&mut self.scratch.step);
+        moved.resize_with(self.path.columns.len(), || vec![0.0; 2 * f]);
+        let (mut from, mut slopes) = (std::mem::take(&mut self.scratch.from), std::mem::take(&mut self.scratch.slopes));
+        for (j, column) in moved.iter_mut().enumerate() {
+            if is_whole {
+                column.fill(0.0);
+                column[j] = if j < f { 1.0 } else { rate };
+            } else {
+                column.copy_from_slice(&self.path.columns[j]);
+            }
+            from.copy_from_slice(column);
             for (k, (point, ahead)) in [(0, 0.0), (1, 0.5 * h), (1, 0.5 * h), (2, h)].into_iter().enumerate() {
-                if k > 0 {
+                let (before, rest) = slopes.split_at_mut(k);
+                if let Some(before) = before.last() {
                     for i in 0..2 * f {
-                        column[i] = from[i] + ahead * slopes[k - 1][i];
+                        column[i] = from[i] + ahead * before[i];
                     }
                 }
-                let mut found = std::mem::take(&mut slopes[k]);
-                self.derivative(point, times[point], &points[point], column, &mut found);
-                slopes[k] = found;
-            }
-            let size = |column: &[f64]| column.iter().fold(0.0, |most: f64, entry| most.max(entry.abs()));
-            let (turned, pulled) = (size(&from[..f]), size(&slopes[0][f..]));
-            let scale = if is_whole { turned } else { turned.max(size(&from[f..]) / rate) };
-            if scale > 0.0 {
-                steepest = steepest.max(pulled / scale);
+                self.derivative(point, times[point], &points[point], column, &mut rest[0]);
+                steepest = steepest.max(size(&rest[0][f..]) / size(&column[..f]).max(size(&column[f..]) / rate));
             }
             for i in 0..2 * f {
                 column[i] = from[i] + h / 6.0 * (slopes[0][i] + 2.0 * (slopes[1][i] + slopes[2][i]) + slopes[3][i]);
             }
         }
+        (self.scratch.from, self.scratch.slopes) = (from, slopes);
         let taken = steps.saturating_sub(self.path.steps) as f64;
         self.path.steps = steps;
         let before = self.path.log;
@@ -299,14 +326,15 @@ impl Tangent {
             self.round(&moved, &points[0][f..2 * f], h, taken);
             self.multiply(&moved);
         } else {
-            self.path.columns = moved;
+            std::mem::swap(&mut self.path.columns, &mut moved);
         }
+        self.scratch.step = moved;
         let norm = self.norm();
         self.path.columns.iter_mut().flatten().for_each(|entry| *entry /= norm);
         self.path.log += libm::log(norm);
         if !is_whole {
-            // One number for all: what there is grows as the vectors do, and never falls.
-            let grown = libm::exp(2.0 * (self.path.log - before)).max(1.0);
+            // One number for all: what there is grows as the vectors do.
+            let grown = libm::exp(2.0 * (self.path.log - before));
             let added = taken * 4.0 * (UNIT * UNIT);
             self.path.covariance[0] = grown * self.path.covariance[0] + added;
         }
@@ -314,7 +342,7 @@ impl Tangent {
         self.path.start = end;
         self.path.time = t + h;
         let wanted = REACH / steepest.sqrt();
-        self.path.step = if wanted.is_nan() { h } else { wanted.clamp(0.5 * h, 2.0 * h) };
+        self.path.step = if wanted.is_nan() { h } else { wanted.clamp(0.5 * h, 2.0 * h).min(2.0 * REACH / rate) };
         self.keep();
     }
 
@@ -322,8 +350,10 @@ impl Tangent {
     fn multiply(&mut self, step: &[Vec<f64>]) {
         let f = self.weights.len();
         let rate = self.path.rate;
+        let from = &mut self.scratch.from;
         for column in &mut self.path.columns {
-            let from = std::mem::replace(column, vec![0.0; 2 * f]);
+            from.copy_from_slice(column);
+            column.fill(0.0);
             for (j, part) in step.iter().enumerate() {
                 // Columns of rates are those of `rate` times 1.
                 let share = if j < f { from[j] } else { from[j] / rate };
@@ -344,7 +374,8 @@ impl Tangent {
         for i in 0..f {
             before[i * n + i] += taken * (0.35 * UNIT).powi(2);
         }
-        let mut half = vec![0.0; n * n];
+        let half = &mut self.scratch.half;
+        half.resize(n * n, 0.0);
         for i in 0..n {
             for j in 0..n {
                 half[i * n + j] = (0..n).map(|k| phi(i, k) * before[k * n + j]).sum();

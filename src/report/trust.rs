@@ -1,0 +1,92 @@
+//! How far a run may be trusted, in numbers and in words.
+
+use super::page::{Page, magnitude, rough};
+use crate::dynamics::Mechanism;
+use crate::run::Outcome;
+use crate::run::trust::{HORIZON, How, LOST, Trust};
+use serde_json::{Value, json};
+
+/// The entry `trust` of a run's report: errors in rad, or as shares of the longest bar; times in s.  `null` where there is no figure.
+pub fn object(trust: Option<&Trust>) -> Value {
+    let Some(trust) = trust else {
+        return json!({"error_estimate": null, "horizon_s": null, "how": How::None.word(), "why": "not asked for"});
+    };
+    let from = match trust.how {
+        How::Extrapolated(from) => Some(from),
+        How::Companion | How::None => None,
+    };
+    json!({
+        "error_estimate": trust.error_estimate,
+        "horizon_s": trust.horizon,
+        "how": trust.how.word(),
+        "at_s": trust.at,
+        "tolerance": HORIZON,
+        "lost_s": trust.lost,
+        "companion": trust.companion,
+        "covered_s": trust.covered,
+        "extrapolated_from_s": from,
+        "why": trust.why,
+        "lyapunov": trust.lyapunov.map(|found| json!({
+            "exponent_per_s": found.exponent,
+            "uncertainty_per_s": found.uncertainty,
+            "until_s": found.until,
+        })),
+        "input_error": trust.input_error,
+    })
+}
+
+/// The same on a page.
+pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
+    let Some(trust) = &outcome.trust else {
+        return page.entry("trust", "not asked for: --trust auto estimates the error");
+    };
+    let what = if mechanism.coordinates() > mechanism.bodies.len() { "rad, and positions to as much of the longest bar" } else { "rad" };
+    let source = match (trust.how, &trust.companion) {
+        (How::Extrapolated(from), _) => format!("carried on from t = {} s", rough(from)),
+        (_, Some(name)) => format!("estimated beside {name}"),
+        (_, None) => "estimated".into(),
+    };
+    match (trust.horizon, trust.error_estimate) {
+        (Some(horizon), _) => {
+            let growth = trust.lyapunov.map_or(String::new(), |found| format!("; errors grow tenfold every {} s", rough(found.tenfold())));
+            page.entry("trust", &format!("trusted until {} s ({HORIZON:e} rad, {source}){growth}", rough(horizon)));
+            page.entry("", &beyond(mechanism, outcome, horizon));
+        }
+        (None, Some(error)) => {
+            page.entry("trust", &format!("angles accurate to typically {} {what} at {} s ({source})", magnitude(error), rough(trust.at)));
+            page.entry("", &format!("no horizon within {} s", rough(trust.at)));
+        }
+        (None, None) => {
+            let why = trust.why.as_deref().unwrap_or("nothing was to be compared");
+            page.entry("trust", &format!("no estimate of the error at {} s: {why}", rough(trust.at)));
+            if let Some([t, error]) = trust.record.last().filter(|point| point[0] > 0.0) {
+                page.entry("", &format!("typically {} rad at {} s ({source})", magnitude(1.2 * error), rough(*t)));
+            }
+        }
+    }
+    if let Some(lost) = trust.lost {
+        page.entry("", &format!("more than {LOST} rad off from {} s on", rough(lost)));
+    }
+    if let Some(found) = trust.lyapunov {
+        let (exponent, uncertainty) = (rough(found.exponent), magnitude(found.uncertainty));
+        page.entry("lyapunov", &format!("largest exponent {exponent} ± {uncertainty} per s, over {} s", rough(found.until)));
+    }
+    if let Some(error) = trust.input_error {
+        page.entry("inputs", &format!("their last digit comes to about {} rad at {} s", magnitude(error), rough(trust.at)));
+    }
+}
+
+/// What still holds beyond the horizon.
+fn beyond(mechanism: &Mechanism, outcome: &Outcome, horizon: f64) -> String {
+    let drift = &outcome.drift;
+    let kept = if drift.kind == "energy" { "Energy" } else { "Energy minus work" };
+    let most = drift.constraints.iter().map(|(_, [position, _])| position.max).fold(0.0, f64::max);
+    let rows = if mechanism.rows.is_empty() { String::new() } else { format!(" and constraints ({})", magnitude(most)) };
+    let holds = if mechanism.rows.is_empty() { "still holds" } else { "still hold" };
+    format!(
+        "After {} s read the path as a typical motion of the scene, not as the motion of this start. {kept} (drift {}){rows} {holds}; use averages and \
+         distributions, not angles at a time.",
+        rough(horizon),
+        magnitude(drift.energy.max)
+    )
+}
