@@ -274,7 +274,7 @@ fn marcher<P: Form + ?Sized + 'static, M: Method<P> + 'static>(problem: Box<P>, 
     match shrinking(problem.mechanism()) {
         // The ends of windows say nothing of what is between them.
         springs if springs.is_empty() || steps == Steps::Unseen => boxed(problem, method, start, steps),
-        springs => boxed(problem, Shrinking::new(method, springs), start, steps),
+        springs => boxed(problem, Shrinking::new(Box::new(method), springs), start, steps),
     }
 }
 

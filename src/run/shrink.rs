@@ -18,8 +18,8 @@ const PARTS: usize = 16;
 const HALVINGS: usize = 50;
 
 /// A method that stops where a spring loses its length.
-pub(super) struct Shrinking<M> {
-    method: M,
+pub(super) struct Shrinking<P: ?Sized> {
+    method: Box<dyn Method<P>>,
     /// Numbers of the springs that can.
     springs: Vec<usize>,
     before: Glance,
@@ -50,8 +50,8 @@ struct Approach {
     after: f64,
 }
 
-impl<M> Shrinking<M> {
-    pub fn new(method: M, springs: Vec<usize>) -> Self {
+impl<P: Form + ?Sized> Shrinking<P> {
+    pub fn new(method: Box<dyn Method<P>>, springs: Vec<usize>) -> Self {
         Self { method, springs, before: Glance::default(), now: Glance::default(), from: State::default(), z: Vec::new() }
     }
 }
@@ -90,12 +90,9 @@ fn suspected(number: usize, a: [Complex<f64>; 2], b: [Complex<f64>; 2], time: f6
     is_near.then_some((Approach { spring: number, length, after: share * time }, off))
 }
 
-impl<M> Shrinking<M> {
+impl<P: Form + ?Sized> Shrinking<P> {
     /// The nearest approach of a spring in the last step, by the motion inside it.
-    fn searched<P: Form + ?Sized>(&mut self, problem: &mut P, number: usize, time: f64) -> Option<Approach>
-    where
-        M: Method<P>,
-    {
+    fn searched(&mut self, problem: &mut P, number: usize, time: f64) -> Option<Approach> {
         let Self { method, from, before, z, .. } = self;
         let mut inside = from.clone();
         let mut at = |seconds: f64| {
@@ -124,10 +121,7 @@ impl<M> Shrinking<M> {
         nearest
     }
 
-    fn stop<P: Form + ?Sized>(&self, problem: &P, approach: Approach, time: f64) -> StepError
-    where
-        M: Method<P>,
-    {
+    fn stop(&self, problem: &P, approach: Approach, time: f64) -> StepError {
         let spring = &problem.mechanism().springs[approach.spring];
         let t = self.from.time.hi + approach.after;
         StepError {
@@ -141,7 +135,7 @@ impl<M> Shrinking<M> {
     }
 }
 
-impl<P: Form + ?Sized, M: Method<P>> Method<P> for Shrinking<M> {
+impl<P: Form + ?Sized> Method<P> for Shrinking<P> {
     fn name(&self) -> &'static str {
         self.method.name()
     }
