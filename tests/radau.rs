@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{compile, run, shipped};
+use common::{run, shipped};
 use driftless::run::{MethodId, Outcome, Request, Stabilization};
 use driftless::scene::Scene;
 use driftless::stepping::Cause;
@@ -165,9 +165,8 @@ fn what_is_not_finite_ends_in_a_typed_stop() {
     for method in RADAU {
         let outcome = run(&scene, &Request { until: Some(0.2), every: Some(0.01), ..request(method, 1e-8) });
         let stop = outcome.stop.expect("a stop");
-        assert!(matches!(stop.cause, Cause::NotFinite | Cause::StepTooSmall), "{stop}");
+        assert_eq!(stop.cause, Cause::SpringWithoutLength, "{stop}");
         assert!((stop.t - 0.0953).abs() < 1e-3, "{stop}");
     }
     assert!(driftless::stepping::Radau::new(4, Default::default()).is_none());
-    let _ = compile(&scene);
 }

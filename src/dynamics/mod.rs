@@ -30,6 +30,7 @@
 //! The same mechanism is marched in several forms, chosen before the first step:
 //! [`multiplier`] in (q, w) with one multiplier per row, [`looped`] the same with the solve in natural coordinates, [`elimination`] with the driven angles as known functions of
 //! time, [`canonical`] in (q, p), the form in which Gauss methods are symplectic, and [`natural`] in the unit vectors themselves, for RATTLE.
+//! Evaluated on dual numbers the same formulas are their own [`jacobian`], for implicit methods and for [`stiffness`], the fastest mode and its spring.
 
 pub mod assembly;
 pub mod canonical;

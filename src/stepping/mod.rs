@@ -1,7 +1,7 @@
 //! Methods: how a state is marched from one time to another.
 //!
 //! A method is configuration and scratch space; the [`State`] belongs to the caller and holds everything a restart needs.  The
-//! problem is a type parameter: Dormand–Prince and Gauss are `Method<F: Field>`, RATTLE is `Method<Natural>`, so a wrong pairing does
+//! problem is a type parameter: Dormand–Prince, Radau and Gauss are `Method<F: Field>`, RATTLE is `Method<Natural>`, so a wrong pairing does
 //! not compile.
 
 pub mod composition;
