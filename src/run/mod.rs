@@ -2,7 +2,7 @@
 //!
 //! [`plan`] decides, with [`choice`] of the method, [`mod@march`] builds the marcher, [`running`] goes with it from one output time to the next and can pause, [`contact`] through impacts and
 //! contacts that last, [`sample`] reads off what there is to
-//! know at each, [`drift`] and [`trace`] keep bounded records of it, [`table`] writes it down,
+//! know at each, [`trust`] estimates its error beside it, [`mod@reference`] is what it is measured against, [`drift`] and [`trace`] keep bounded records of it, [`table`] writes it down,
 //! [`files`] keeps whole files only, and [`checkpoint`] what a run needs to go on after whatever ended it.  [`mod@sweep`] runs a grid of starts and parameters, on the
 //! lookout for bars that turn over ([`flip`]); [`mod@compare`] runs all methods at all settings, and times them; [`mod@stress`] runs stiff and extreme scenes by
 //! every method.

@@ -207,15 +207,15 @@ impl Companion {
         if measured.seen > 0 && motion.time.hi <= measured.until {
             return;
         }
-        let budget = GRACE + SHARE * prices.run(plan, tally, rows);
-        if measured.level == Level::Auto && measured.spent > budget {
-            return self.end("more would have taken too large a share of the run");
-        }
+        let budget = match measured.level {
+            Level::Auto => GRACE + SHARE * prices.run(plan, tally, rows),
+            Level::Off | Level::Full => f64::INFINITY,
+        };
         let before = shadow.tangent.as_ref().map(Tangent::now);
         // The last step of a fixed-step run may end beyond the horizon by rounding.
         let horizon = Time::from(shadow.outcome.plan.until);
         let time = if motion.time > horizon { horizon } else { motion.time };
-        if let Err(stop) = shadow.go(time, prices, &mut measured.spent) {
+        if let Err(stop) = shadow.go(time, prices, &mut measured.spent, budget) {
             return self.end(&stop);
         }
         if measured.lost.is_some() {
@@ -341,17 +341,30 @@ fn begun(mechanism: &Arc<Mechanism>, series: &mut Plan, start: &Motion) -> Resul
 }
 
 impl Shadow {
-    /// To a time, with the motion there in `motion`; what it cost is added to `spent`.
-    fn go(&mut self, until: Time, prices: &Prices, spent: &mut f64) -> Result<(), String> {
-        let stopped = |stop: StepError| format!("the companion stopped at t = {} s: {}", stop.t, stop.what);
-        while let Some(tangent) = self.tangent.as_mut().filter(|tangent| tangent.next() <= until.hi) {
-            self.course.go(Time::from(tangent.next()), &mut self.outcome, &mut || false).map_err(stopped)?;
-            self.course.look(&mut self.motion);
-            let steps = if self.is_extended { 0 } else { self.course.tally().steps };
-            tangent.take(&self.motion, steps);
-            *spent += 0.5 * tangent.evaluations() as f64 * prices.evaluation + prices.look;
+    /// To a time, with the motion there in `motion`; what it cost is added to `spent`, which must not pass the budget.
+    fn go(&mut self, until: Time, prices: &Prices, spent: &mut f64, budget: f64) -> Result<(), String> {
+        while let Some(next) = self.tangent.as_ref().map(Tangent::next).filter(|&next| next <= until.hi) {
+            self.march(Time::from(next), prices, spent, budget)?;
+            let steps = if self.is_extended { 0 } else { self.last.steps };
+            if let Some(tangent) = &mut self.tangent {
+                tangent.take(&self.motion, steps);
+                *spent += 0.5 * tangent.evaluations() as f64 * prices.evaluation;
+            }
         }
-        self.course.go(until, &mut self.outcome, &mut || false).map_err(stopped)?;
+        self.march(until, prices, spent, budget)
+    }
+
+    /// The same without the tangent flow.
+    fn march(&mut self, until: Time, prices: &Prices, spent: &mut f64, budget: f64) -> Result<(), String> {
+        let mut left = ((budget - *spent) / prices.series[0]) as u64;
+        let mut is_spent = || {
+            left = left.saturating_sub(1);
+            left == 0
+        };
+        let arrived = self.course.go(until, &mut self.outcome, &mut is_spent);
+        if !arrived.map_err(|stop| format!("the companion stopped at t = {} s: {}", stop.t, stop.what))? || *spent > budget {
+            return Err("more would have taken too large a share of the run".into());
+        }
         self.course.look(&mut self.motion);
         let tally = self.course.tally();
         *spent += (tally.evaluations - self.last.evaluations) as f64 * prices.series[0] + prices.look;
