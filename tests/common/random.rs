@@ -251,7 +251,7 @@ pub fn request(draw: &mut Draw, until: f64, effort: u64) -> Request {
     if draw.chance(30) {
         request.stabilize = Some(*draw.one(&Stabilization::ALL));
     }
-    request.time_constant = (request.stabilize == Some(Stabilization::Baumgarte) && draw.chance(30)).then(|| 1e-3 * until);
+    request.time_constant = (request.stabilize == Some(Stabilization::Baumgarte) && draw.chance(30)).then_some(1e-3 * until);
     request.extended = draw.chance(3);
     request
 }

@@ -84,8 +84,24 @@ pub fn scene_tree(bytes: &[u8]) -> u64 {
 
 const WORDS: &[&str] =
     &["ground", "bar1", "bar2", "A", "slider", "", "..", "../up", "full", "locked", "body", "con", "ä", "a/b", "bar1\u{0}"];
-const NUMBERS: &[f64] =
-    &[0.0, -0.0, 1.0, -1.0, 0.5, 1e-300, 1e300, 1e-30, 1e30, -1e30, 1e-9, 1e9, 8.796093e12, 3.141592653589793, 4503599627370497.0, 5e-324];
+const NUMBERS: &[f64] = &[
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    0.5,
+    1e-300,
+    1e300,
+    1e-30,
+    1e30,
+    -1e30,
+    1e-9,
+    1e9,
+    8.796093e12,
+    std::f64::consts::PI,
+    4503599627370497.0,
+    5e-324,
+];
 
 /// Goes down the tree and changes something there.
 fn change(node: &mut Value, draw: &mut Draw) {
@@ -137,8 +153,11 @@ fn change(node: &mut Value, draw: &mut Draw) {
     }
 }
 
-/// Sound checkpoints of runs by methods of every kind, and what they were made of.
-static CHECKPOINTS: LazyLock<Vec<(Scene, Arc<Mechanism>, Vec<u8>)>> = LazyLock::new(|| {
+/// A scene, its equations, and a checkpoint of a run of it.
+type Sound = (Scene, Arc<Mechanism>, Vec<u8>);
+
+/// Sound checkpoints of runs by methods of every kind.
+static CHECKPOINTS: LazyLock<Vec<Sound>> = LazyLock::new(|| {
     let methods = ["dp8", "taylor", "dp5", "rattle6", "gauss8", "dop853", "taylor"];
     let of = |(name, method): (&str, &str)| {
         let text = SCENES.iter().find(|text| text.contains(&format!("\"name\": \"{name}\""))).expect("a shipped scene");
