@@ -230,6 +230,49 @@ fn effort_that_is_used_up_is_a_typed_stop() {
     }
 }
 
+/// Found by fuzzing: a place so far away that the length of its bar is rounded off it.  There is no constraint to blame, and none is.
+#[test]
+fn places_beyond_rounding_are_refused_or_met() {
+    for (length, origin) in [(1e-20, 1e25), (1.0, 1e30), (1e-30, 1.0), (1e20, 1e-20), (1e-3, 1e18)] {
+        let text = format!(
+            r#"{{"name": "far", "gravity": [9.81, 0], "bars": [{{"name": "bar", "mass": 1, "centre": [{length:e}, 0], "inertia": 1}}],
+               "start": {{"bar": {{"phi": 1, "omega": 0, "origin": [{origin:e}, 0], "velocity": [0, 1]}}}}, "until": 1, "every": 1}}"#
+        );
+        let scene = driftless::scene::parse_scene(&text, "far.json", &[]).expect("valid as far as single values go");
+        if let Err(error) = driftless::dynamics::Mechanism::new(&scene) {
+            assert!(error.to_string().contains("start"), "{error}");
+        }
+    }
+}
+
+/// Found by fuzzing: whoever turns more often than doubles can count would be shown at another angle.
+#[test]
+fn turns_beyond_counting_are_a_typed_stop() {
+    let text = r#"{"name": "fast", "gravity": [0, 0], "bars": [{"name": "bar", "mass": 1, "centre": [0, 0], "inertia": 1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+        "motors": [{"name": "motor", "body": "bar", "law": {"start": 0, "rate": 1e10}}], "until": 1e12, "every": 1e6}"#;
+    let scene = driftless::scene::parse_scene(text, "fast.json", &[]).expect("a scene");
+    for method in [MethodId::Dop853, MethodId::Dp8, MethodId::Taylor, MethodId::Gauss(8)] {
+        let step = (!method.is_adaptive()).then_some(1e6);
+        let outcome = run(&scene, &Request { method: Some(method), step, ..Request::default() });
+        let stop = outcome.stop.expect("a stop");
+        assert!(stop.cause == Cause::NotFinite && stop.what.contains("turned"), "{method}: {stop}");
+        assert_eq!(outcome.last.t, 6e6, "{method}");
+    }
+}
+
+/// A scene of a few lines does not fill a disk unless it is told to.
+#[test]
+fn a_trajectory_of_gigabytes_has_to_be_asked_for() {
+    use driftless::run::Plan;
+    let scene = Scene { until: 1e6, every: 0.01, ..shipped("free", &[]) };
+    let mechanism = compile(&scene);
+    let refusal = Plan::new(&scene, &mechanism, &Request::default()).expect_err("a refusal");
+    assert!(!refusal.is_usage && refusal.to_string().contains("34 GB") && refusal.to_string().contains("--every"), "{refusal}");
+    assert!(Plan::new(&scene, &mechanism, &Request { every: Some(0.01), ..Request::default() }).is_ok());
+    assert!(Plan::new(&scene, &mechanism, &Request { every: Some(1e-4), ..Request::default() }).is_err());
+}
+
 /// A wall that bounces faster and faster, and a horizon that is never reached: the effort bounds both.
 #[test]
 fn nothing_takes_for_ever() {

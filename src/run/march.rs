@@ -18,8 +18,8 @@ use crate::stepping::rattle::Rattle;
 use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Method, Radau, Reached, Seen, StepError, Tally, Taylor, Tolerance};
 use std::sync::Arc;
 
-/// Turns that a state read from somewhere may have at most: all that doubles count.
-const MOST_TURNS: u64 = 1 << 53;
+/// Turns that a state may have at most: all that doubles count.
+pub(super) const MOST_TURNS: u64 = 1 << 53;
 
 /// A mechanism in some form, as a first-order system.
 pub trait Problem: Field + Form {}

@@ -3,7 +3,7 @@
 use super::contact::{Course, Hold, Station, Strike};
 use super::drift::{Drift, Limits};
 use super::flip::{Flip, Lookout};
-use super::march::{March, Pause, build};
+use super::march::{MOST_TURNS, March, Pause, build};
 use super::methods::{MethodId, Stabilization};
 use super::plan::{Plan, Refusal, Request};
 use super::sample::Sample;
@@ -365,6 +365,7 @@ impl Running {
             outcome.stop = stopped
                 .err()
                 .or_else(|| (!sample.is_finite()).then(|| not_finite(&outcome.plan, sample.t)))
+                .or_else(|| uncounted(&outcome.plan, sample))
                 .or_else(|| if is_tied_up { came_apart(&outcome.plan, &outcome.drift, sample) } else { None })
                 .or_else(|| exceeded.err().map(|what| drift_stop(&outcome.plan, sample.t, what)));
             outcome.last.clone_from(sample);
@@ -432,6 +433,19 @@ fn came_apart(plan: &Plan, drift: &Drift, sample: &Sample) -> Option<StepError> 
         step: plan.step.unwrap_or(0.0),
         what: format!("the energy balance is off by {off:.1e} of its scale: constraint {weakest} or its like has let go"),
         hint: "--method dp8 or taylor with --stabilize projection, or a tighter tolerance".into(),
+    })
+}
+
+/// Doubles do not count further turns: the angle shown would be another one.
+fn uncounted(plan: &Plan, sample: &Sample) -> Option<StepError> {
+    let angles = &sample.phi[..sample.centre.len()];
+    angles.iter().any(|phi| phi.abs() > MOST_TURNS as f64 * std::f64::consts::TAU).then(|| StepError {
+        cause: Cause::NotFinite,
+        method: plan.method.to_string(),
+        t: sample.t,
+        step: plan.step.unwrap_or(0.0),
+        what: "a body has turned more often than doubles can count".into(),
+        hint: "look for rates far out of proportion, or shorten the horizon".into(),
     })
 }
 

@@ -211,14 +211,15 @@ impl<'a> Problem<'a> {
         };
         let others: Vec<Found> = (1..=others).filter_map(|k| self.attempt(&self.other_guess(&guess, &missing, k), &missing).ok()).collect();
         let impossible = |(row, left): (usize, f64)| {
-            let row = &self.mechanism.rows[row];
-            CompileError::Impossible { row: row.name.clone(), left, unit: row.unit() }
+            // Without rows it is the places given that rounding keeps from being met.
+            let (row, unit) = self.mechanism.rows.get(row).map_or(("start", "m"), |row| (&row.name, row.unit()));
+            CompileError::Impossible { row: row.into(), left, unit }
         };
         let (best, others) = match first {
             Ok(found) => (found, others),
             Err(worst) => {
                 let mut others = others.into_iter();
-                (others.next().ok_or(impossible(worst))?, others.collect())
+                (others.next().ok_or_else(|| impossible(worst))?, others.collect())
             }
         };
         let mut all = vec![best];
@@ -429,9 +430,10 @@ impl<'a> Problem<'a> {
             let slips = self.slips(q, &omega);
             let measured = |i: &usize| slips[*i].abs() / self.lever[*i];
             let worst = (0..slips.len()).max_by(|a, b| measured(a).total_cmp(&measured(b))).unwrap_or(0);
-            let row = &self.mechanism.rows[worst];
-            let unit = if row.is_angle() { "rad/s" } else { "m/s" };
-            return Err(CompileError::ImpossibleRates { row: row.name.clone(), left: slips[worst].abs(), unit });
+            let unit = |row: &super::row::Row| if row.is_angle() { "rad/s" } else { "m/s" };
+            let (row, unit) = self.mechanism.rows.get(worst).map_or(("start", "m/s"), |row| (&row.name, unit(row)));
+            let left = slips.get(worst).map_or(0.0, |slip| slip.abs());
+            return Err(CompileError::ImpossibleRates { row: row.into(), left, unit });
         }
         if is_singular && !missing.is_empty() && omega.iter().any(|omega| omega.hi != 0.0) {
             // Rows of lost rank would take any rates for these.

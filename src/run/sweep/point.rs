@@ -7,6 +7,7 @@ use crate::dynamics::kernel::Kernel;
 use crate::dynamics::{Form, Glance, Mechanism, Motion};
 use crate::run::drift::{ENERGY_MOST, larger};
 use crate::run::flip::{self, Flip};
+use crate::run::march::MOST_TURNS;
 use crate::run::methods::MethodId;
 use crate::run::plan::Plan;
 use crate::run::running::{Run, Running};
@@ -317,6 +318,10 @@ impl Lane {
             Some(stopped) => Some(stopped.clone()),
             None if point.energy.is_nan() => {
                 Some(stop(Cause::NotFinite, "the energy is not finite".into(), "look for rates far out of proportion"))
+            }
+            None if state.turns.iter().any(|turns| turns.unsigned_abs() > MOST_TURNS) => {
+                let what = "a body has turned more often than doubles can count".into();
+                Some(stop(Cause::NotFinite, what, "look for rates far out of proportion"))
             }
             None if point.energy > limit => {
                 let what = format!("energy is off by {:.2e} of the scale, the limit is {limit:e}", point.energy);

@@ -1,0 +1,8 @@
+//! The fuzz targets, which the tests of the crate run too.
+
+#[path = "../../tests/common/audit.rs"]
+mod audit;
+#[path = "../../tests/common/random.rs"]
+pub mod random;
+#[path = "../../tests/common/targets.rs"]
+pub mod targets;

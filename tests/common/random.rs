@@ -1,0 +1,257 @@
+//! Random scenes and requests, drawn from a string of bytes: what a fuzzer can steer, and a seed can give.
+
+use driftless::run::{METHODS, Request, Stabilization};
+use serde_json::{Map, Value, json};
+use std::f64::consts::PI;
+
+/// A string of bytes that choices are drawn from; zeros once it is used up.
+#[derive(Clone)]
+pub struct Draw<'a> {
+    bytes: &'a [u8],
+}
+
+impl<'a> Draw<'a> {
+    pub fn new(bytes: &'a [u8]) -> Self {
+        Self { bytes }
+    }
+
+    pub fn rest(self) -> &'a [u8] {
+        self.bytes
+    }
+
+    pub fn byte(&mut self) -> u8 {
+        let Some((&byte, rest)) = self.bytes.split_first() else { return 0 };
+        self.bytes = rest;
+        byte
+    }
+
+    pub fn word(&mut self) -> u64 {
+        (0..8).fold(0, |word, _| word << 8 | u64::from(self.byte()))
+    }
+
+    /// One of 0 … n - 1.
+    pub fn below(&mut self, n: usize) -> usize {
+        if n <= 256 { usize::from(self.byte()) % n.max(1) } else { (usize::from(self.byte()) << 8 | usize::from(self.byte())) % n }
+    }
+
+    /// True in about `percent` of a hundred cases.
+    pub fn chance(&mut self, percent: usize) -> bool {
+        usize::from(self.byte()) * 100 >= (100 - percent.min(100)) * 256
+    }
+
+    /// From 0 to 1.
+    pub fn share(&mut self) -> f64 {
+        f64::from(u16::from(self.byte()) << 8 | u16::from(self.byte())) / 65535.0
+    }
+
+    pub fn one<'b, T>(&mut self, of: &'b [T]) -> &'b T {
+        &of[self.below(of.len())]
+    }
+}
+
+/// How far numbers stray from the usual: decades up and down.
+#[derive(Clone, Copy)]
+struct Spread(f64);
+
+impl Spread {
+    /// A positive number about `usual`.
+    fn size(self, draw: &mut Draw, usual: f64) -> f64 {
+        (usual * 10f64.powf(self.0 * (2.0 * draw.share() - 1.0))).clamp(1e-30, 1e30)
+    }
+
+    /// The same with either sign, or zero.
+    fn signed(self, draw: &mut Draw, usual: f64) -> f64 {
+        match draw.below(4) {
+            0 => 0.0,
+            1 => -self.size(draw, usual),
+            _ => self.size(draw, usual),
+        }
+    }
+}
+
+fn angle(draw: &mut Draw) -> f64 {
+    match draw.below(8) {
+        0 => 0.0,
+        1 => PI,
+        2 => PI / 2.0,
+        3 => 1e6 * (draw.share() - 0.5),
+        _ => 2.0 * PI * (draw.share() - 0.5),
+    }
+}
+
+fn law(draw: &mut Draw, spread: Spread, rate: f64) -> Value {
+    let mut law = Map::new();
+    law.insert("start".into(), json!(angle(draw)));
+    if draw.chance(70) {
+        law.insert("rate".into(), json!(spread.signed(draw, rate)));
+    }
+    if draw.chance(20) {
+        law.insert("acceleration".into(), json!(spread.signed(draw, rate)));
+    }
+    if draw.chance(30) {
+        let sine = json!({"amplitude": spread.signed(draw, 0.3), "frequency": spread.signed(draw, 3.0), "phase": angle(draw)});
+        law.insert("sines".into(), json!([sine]));
+    }
+    Value::Object(law)
+}
+
+/// A place on bar `k`, or on the ground.
+fn place(draw: &mut Draw, spread: Spread, bar: Option<usize>, length: f64) -> Value {
+    let point = match draw.below(4) {
+        0 => [0.0, 0.0],
+        1 | 2 => [length, 0.0],
+        _ => [spread.signed(draw, length), spread.signed(draw, 0.1 * length)],
+    };
+    json!({"body": bar.map_or("ground".into(), |k| format!("bar{k}")), "point": point})
+}
+
+/// The text of a scene that is valid as far as single values go; what does not fit together is refused by the reader or the compiler.
+pub fn scene(draw: &mut Draw) -> String {
+    let spread = Spread(*draw.one(&[0.5, 0.5, 1.0, 3.0, 6.0, 25.0]));
+    let length = spread.size(draw, 0.6);
+    let gravity = if draw.chance(80) { [spread.size(draw, 9.81), 0.0] } else { [spread.signed(draw, 9.81), spread.signed(draw, 9.81)] };
+    let pull = gravity[0].abs().max(gravity[1].abs()).max(1e-30);
+    let rate = (pull / length).sqrt();
+    let n = *draw.one(&[1, 1, 2, 2, 2, 3, 3, 4, 5, 6]);
+    let mut bars = Vec::new();
+    let mut lengths = Vec::new();
+    let mut mass = 1.0;
+    for k in 0..n {
+        let own = if draw.chance(70) { length } else { spread.size(draw, length) };
+        lengths.push(own);
+        let name = format!("bar{k}");
+        bars.push(if draw.chance(60) {
+            let inertia = *draw.one(&["full", "slender"]);
+            json!({"name": name, "length": own, "width": 0.1 * own, "thickness": 0.01, "density": spread.size(draw, 700.0), "inertia": inertia})
+        } else {
+            mass = spread.size(draw, 1.0);
+            let centre = [spread.signed(draw, 0.5 * own), if draw.chance(30) { spread.signed(draw, 0.1 * own) } else { 0.0 }];
+            let inertia = if draw.chance(20) { 0.0 } else { spread.size(draw, mass * own * own / 12.0) };
+            json!({"name": name, "mass": mass, "centre": centre, "inertia": inertia, "length": own})
+        });
+    }
+    let mut hinges = Vec::new();
+    let is_loose = draw.chance(10);
+    for k in 0..n {
+        if is_loose && draw.chance(50) {
+            continue;
+        }
+        let parent = if k == 0 { None } else { [None, Some(k - 1), Some(k - 1), Some(draw.below(k))][draw.below(4)] };
+        let there = place(draw, spread, parent, parent.map_or(0.0, |parent| lengths[parent]));
+        hinges.push(json!({"name": format!("h{k}"), "between": [there, {"body": format!("bar{k}"), "point": [0, 0]}]}));
+    }
+    if draw.chance(20) {
+        let ends = [Some(draw.below(n)), [None, Some(draw.below(n))][draw.below(2)]];
+        let ends = ends.map(|bar| place(draw, spread, bar, bar.map_or(1.5 * length, |bar| lengths[bar])));
+        hinges.push(json!({"name": "loop", "between": ends}));
+    }
+    let mut scene = Map::new();
+    let mut some = |name: &str, percent: usize, draw: &mut Draw, make: &mut dyn FnMut(&mut Draw) -> Value| {
+        if draw.chance(percent) {
+            let count = 1 + usize::from(draw.chance(15));
+            let list: Vec<Value> = (0..count)
+                .map(|number| {
+                    let mut made = make(draw);
+                    made["name"] = json!(format!("{name}{number}"));
+                    made
+                })
+                .collect();
+            scene.insert(name.into(), json!(list));
+        }
+    };
+    let body = |draw: &mut Draw| format!("bar{}", draw.below(n));
+    let ends = |draw: &mut Draw| {
+        let bars = [[None, Some(draw.below(n))][draw.below(2)], Some(draw.below(n))];
+        bars.map(|bar| place(draw, spread, bar, bar.map_or(length, |bar| lengths[bar])))
+    };
+    let stiffness = mass * pull / length;
+    some("springs", 25, draw, &mut |draw| {
+        let damping = if draw.chance(30) { spread.size(draw, mass * rate) } else { 0.0 };
+        let (stiffness, free) = (spread.size(draw, 5.0 * stiffness), spread.size(draw, length));
+        json!({"between": ends(draw), "stiffness": stiffness, "free_length": free, "damping": damping})
+    });
+    some("torsion_springs", 15, draw, &mut |draw| {
+        let damping = if draw.chance(30) { spread.size(draw, mass * length * length * rate) } else { 0.0 };
+        json!({"body": body(draw), "stiffness": spread.size(draw, stiffness * length * length), "free_angle": angle(draw), "damping": damping})
+    });
+    some("forces", 10, draw, &mut |draw| {
+        let force = [spread.signed(draw, mass * pull), spread.signed(draw, mass * pull)];
+        let frame = *draw.one(&["ground", "body"]);
+        let mut made = json!({"body": body(draw), "point": [length, 0], "force": force, "frame": frame});
+        if draw.chance(40) {
+            made["law"] = law(draw, spread, rate);
+        }
+        made
+    });
+    some("torques", 10, draw, &mut |draw| {
+        let mut made = json!({"body": body(draw), "torque": spread.signed(draw, mass * pull * length)});
+        if draw.chance(40) {
+            made["law"] = law(draw, spread, rate);
+        }
+        made
+    });
+    some("sliders", 10, draw, &mut |draw| {
+        let [_, point] = ends(draw);
+        let rail = json!({"body": "ground", "point": [0, spread.signed(draw, length)], "direction": [1, draw.below(2)]});
+        json!({"point": point, "rail": rail, "angle": *draw.one(&["free", "free", "locked"])})
+    });
+    some("welds", 3, draw, &mut |draw| json!({"between": ends(draw)}));
+    some("locks", 4, draw, &mut |draw| json!({"body": body(draw)}));
+    some("walls", 12, draw, &mut |draw| {
+        let line = json!({"through": [0, -spread.size(draw, length)], "normal": [draw.below(2), 1]});
+        json!({"body": body(draw), "point": [length, 0], "line": line, "restitution": *draw.one(&[0.0, 0.3, 0.5, 0.9, 1.0])})
+    });
+    let mut driven = Vec::new();
+    if draw.chance(25) {
+        let k = draw.below(n);
+        driven.push(k);
+        let mut motor = json!({"name": "motor", "body": format!("bar{k}"), "law": law(draw, spread, rate)});
+        if draw.chance(15) && k > 0 {
+            motor["relative_to"] = json!("bar0");
+        }
+        scene.insert("motors".into(), json!([motor]));
+    }
+    let mut start = Map::new();
+    for k in (0..n).filter(|k| !driven.contains(k)) {
+        if is_loose && draw.chance(10) {
+            continue;
+        }
+        let mut given = json!({"phi": angle(draw), "omega": if draw.chance(50) { 0.0 } else { spread.signed(draw, rate) }});
+        if is_loose {
+            given["origin"] = json!([spread.signed(draw, length), 0]);
+            given["velocity"] = json!([0, spread.signed(draw, length * rate)]);
+        }
+        start.insert(format!("bar{k}"), given);
+    }
+    let until = spread.size(draw, 1.0 / rate).clamp(1e-20, 1e12);
+    let rows = *draw.one(&[1.0, 2.0, 5.0, 16.0]);
+    scene.insert("name".into(), json!("random"));
+    scene.insert("gravity".into(), json!(gravity));
+    scene.insert("bars".into(), json!(bars));
+    scene.insert("hinges".into(), json!(hinges));
+    scene.insert("start".into(), json!(start));
+    scene.insert("until".into(), json!(until));
+    scene.insert("every".into(), json!(until / rows));
+    Value::Object(scene).to_string()
+}
+
+/// What is asked of a run.
+pub fn request(draw: &mut Draw, until: f64, effort: u64) -> Request {
+    let mut request = Request { effort: Some(effort), ..Request::default() };
+    if draw.chance(75) {
+        request.method = Some(draw.one(METHODS).id);
+    }
+    let is_adaptive = request.method.is_none_or(|method| method.is_adaptive());
+    if is_adaptive && draw.chance(60) {
+        request.rtol = Some(10f64.powi(-2 - draw.below(13) as i32));
+        request.atol = draw.chance(10).then(|| 10f64.powi(-2 - draw.below(13) as i32));
+    } else if !is_adaptive && draw.chance(70) {
+        request.step = Some(until / f64::from(1 << draw.below(8)));
+    }
+    if draw.chance(30) {
+        request.stabilize = Some(*draw.one(&Stabilization::ALL));
+    }
+    request.time_constant = (request.stabilize == Some(Stabilization::Baumgarte) && draw.chance(30)).then_some(1e-3 * until);
+    request.extended = draw.chance(3);
+    request
+}
