@@ -42,6 +42,9 @@ const NO_BETTER: [f64; 3] = [0.5, 1e-4, 1e-13];
 /// Settings of a method, and how many times the time of `dp8` at 1e-9 one of them takes, in the mean; to guess what a horizon costs.
 const GUESS: [f64; 2] = [8.0, 8.0];
 
+/// Output times of the run that tells what a horizon costs.
+const PARTS: f64 = 200.0;
+
 /// What is to be compared.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Asked {
@@ -280,7 +283,8 @@ impl Task<'_> {
     /// A horizon up to which there is probably time to take all methods \[s\], where that is less than `until` \[s\].
     fn possible(&self, until: f64, lines: usize) -> Option<f64> {
         let method = if self.mechanism.tree.is_dense() || !self.mechanism.rows.is_empty() { MethodId::Dp8 } else { MethodId::Dop853 };
-        let request = Request { method: Some(method), until: Some(until), every: Some(until), ..Request::default() };
+        // How far it is, is told by the last output time.
+        let request = Request { method: Some(method), until: Some(until), every: Some(until / PARTS), ..Request::default() };
         let plan = Plan::new(self.scene, self.mechanism, &request).ok()?;
         let begin = (self.clock)();
         let room = Room { clock: self.clock, seconds: 0.1 };
