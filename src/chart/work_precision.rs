@@ -182,7 +182,7 @@ fn curve(sheet: &Sheet, panel: &Panel, points: &[Point], mark: &Mark, pen: Pen, 
 fn along(sheet: &Sheet, panel: &Panel, points: &[Point], words: &str, colour: Colour, occupied: &mut Occupied) -> Result<(), ChartError> {
     let size = [sheet.width(words, NOTE, false), 0.8 * NOTE];
     let [left, top, right, bottom] = panel.bounds;
-    let room = [left, top, right + 20.0, bottom];
+    let room = [left, top, right + 20.0, bottom - 3.0];
     let count = points.len();
     // The finest setting, then the coarsest, then what is between.
     let ranks = points.iter().enumerate().map(|(k, at)| {

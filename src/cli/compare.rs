@@ -14,6 +14,9 @@ use crate::scene::Scene;
 use serde_json::json;
 use std::time::{Duration, Instant};
 
+/// Blocks of repeated runs of each setting.
+const BLOCKS: usize = 9;
+
 /// Compares methods on a scene.
 ///
 /// # Errors
@@ -23,7 +26,7 @@ pub fn run(flags: &CompareFlags) -> Result<(), Failure> {
     let (scene, mechanism) = super::load(&flags.scene)?;
     let budget = Duration::try_from_secs_f64(flags.budget).ok().filter(|budget| !budget.is_zero());
     let budget = budget.ok_or_else(|| Failure::new(Exit::Usage, "--budget: not a time above 0\nhint: --budget 60"))?;
-    let asked = Asked { methods: flags.methods.clone(), stabilize: flags.stabilize.clone(), until: flags.until, budget };
+    let asked = Asked { methods: flags.methods.clone(), stabilize: flags.stabilize.clone(), until: flags.until, budget, blocks: BLOCKS };
     asked.horizon(&scene, &mechanism)?;
     let mut folder = Folder::open(&flags.out.join(&scene.name).join("compare"), flags.force)?;
     let mut progress = Stages::new(&scene.name, flags.scene.tell.quiet);

@@ -359,6 +359,12 @@ impl CompareChart {
 /// Drawing or encoding fails.
 #[cfg(feature = "charts")]
 pub fn draw(kind: CompareChart, scene: &Scene, mechanism: &Mechanism, comparison: &Comparison) -> Result<Vec<u8>, ChartError> {
+    chart::work_precision(&chart_data(kind, scene, mechanism, comparison), FILE_RESOLUTION)?.png_bytes()
+}
+
+/// The data of one chart.
+#[cfg(feature = "charts")]
+pub fn chart_data(kind: CompareChart, scene: &Scene, mechanism: &Mechanism, comparison: &Comparison) -> WorkPrecision {
     let of_energy = kind == CompareChart::EnergyTime;
     let truth = &comparison.truth;
     let point = |entry: &Entry| {
@@ -399,6 +405,5 @@ pub fn draw(kind: CompareChart, scene: &Scene, mechanism: &Mechanism, comparison
         CompareChart::EnergyTime => ("Energy drift against run time", format!("relative drift of {drifting}")),
     };
     let lost = if of_energy { None } else { Some(LOST) };
-    let chart = WorkPrecision { title: title.into(), caption, cost, error_name, series, lost, floor: None };
-    chart::work_precision(&chart, FILE_RESOLUTION)?.png_bytes()
+    WorkPrecision { title: title.into(), caption, cost, error_name, series, lost, floor: None }
 }

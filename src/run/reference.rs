@@ -6,12 +6,13 @@
 //! Impacts are located in doubles.  Scenes with walls have references of that accuracy, and say so.
 
 use super::contact::Course;
-use super::march::{build, exact};
+use super::march::{March, Pause, build, exact};
+use super::methods::MethodId;
 use super::plan::Plan;
 use super::running::Outcome;
 use super::trust::Ruler;
 use crate::dynamics::{Mechanism, Motion, Time};
-use crate::stepping::{Cause, StepError, Tolerance};
+use crate::stepping::{Cause, Reached, StepError, Tolerance};
 use std::sync::Arc;
 
 /// Orders and tolerances \[rad/s\] of the motion given, and of the one it is compared with.
@@ -51,6 +52,20 @@ pub struct Reference {
 /// # Errors
 /// The stop of the series: a number that is not finite, a time before the start, a singular position it does not get through.
 pub fn reference(mechanism: &Arc<Mechanism>, start: &Motion, times: &[Time]) -> Result<Reference, StepError> {
+    let (found, stop) = reference_while(mechanism, start, times, &mut || false)?;
+    stop.map_or(Ok(found), Err)
+}
+
+/// The same as far as it gets: until it stops, which is told then, or `pause` is true.
+///
+/// # Errors
+/// There can be no such motion.
+pub(super) fn reference_while(
+    mechanism: &Arc<Mechanism>,
+    start: &Motion,
+    times: &[Time],
+    pause: &mut Pause,
+) -> Result<(Reference, Option<StepError>), StepError> {
     let unsuited = |what: &str, hint: &str| {
         let (cause, t) = (Cause::Unsuited, start.time.hi);
         Err(StepError { cause, method: "taylor".into(), t, step: 0.0, what: what.into(), hint: hint.into() })
@@ -64,44 +79,86 @@ pub fn reference(mechanism: &Arc<Mechanism>, start: &Motion, times: &[Time]) -> 
     if !std::iter::once(&start.time).chain(times).is_sorted() {
         return unsuited("a time lies behind the one before it", "ask for times in ascending order");
     }
-    let is_free = mechanism.contacts.is_empty();
-    let both = [0, 1].map(|i| {
-        let (order, tolerance) = EXACT[i];
-        if is_free { unhindered(mechanism, start, times, order, tolerance) } else { struck(mechanism, start, times, LOCATED[i]) }
-    });
-    let [motions, others] = both;
-    let (motions, ruler) = (motions?, Ruler::new(mechanism));
-    let floor = if is_free { 0.0 } else { LOCATED_TO };
-    let off = |(one, other): (&Motion, &Motion)| ruler.apart(one, other).max(ruler.rates_apart(one, other)).max(floor);
-    let accuracy = motions.iter().zip(&others?).map(off).collect();
-    Ok(Reference { motions, accuracy })
-}
-
-/// By the series in double-double.
-fn unhindered(mechanism: &Arc<Mechanism>, start: &Motion, times: &[Time], order: usize, tolerance: f64) -> Result<Vec<Motion>, StepError> {
-    let mut marcher = exact(mechanism, start, order, tolerance);
     let horizon = times.last().copied().unwrap_or_default();
-    let mut at = |&time: &Time| {
-        marcher.advance(time, horizon, None, &mut || false)?;
-        let mut motion = Motion::default();
-        marcher.read(&mut motion);
-        Ok(motion)
-    };
-    times.iter().map(&mut at).collect()
+    if mechanism.contacts.is_empty() {
+        let walks = EXACT.map(|(order, tolerance)| Walk::exact(mechanism, start, order, tolerance, horizon));
+        return Ok(side_by_side(mechanism, walks, times, 0.0, pause));
+    }
+    let [fine, coarse] = LOCATED.map(|tolerance| Walk::in_doubles(mechanism, start, MethodId::Taylor, tolerance, horizon));
+    Ok(side_by_side(mechanism, [fine?, coarse?], times, LOCATED_TO, pause))
 }
 
-/// By the series in doubles, through impacts and holds.
-fn struck(mechanism: &Arc<Mechanism>, start: &Motion, times: &[Time], tolerance: f64) -> Result<Vec<Motion>, StepError> {
-    let until = times.last().copied().unwrap_or_default().hi;
-    let tolerance = Tolerance { relative: tolerance, absolute: tolerance };
-    let mut plan = Plan::of_series(mechanism, tolerance, until);
-    let marcher = build(mechanism, &mut plan, start)?;
-    let mut outcome = Outcome::begun(mechanism, plan);
-    let mut course = Course::new(Arc::clone(mechanism), marcher);
-    course.meet(&mut outcome)?;
-    let mut at = |&time: &Time| {
-        course.go(time, &mut outcome, &mut || false)?;
-        Ok(course.motion())
-    };
-    times.iter().map(&mut at).collect()
+/// Two motions of one mechanism, of which the first counts and the second tells how far it is off, `floor` at least: as far as both get, and what stopped them.
+pub(super) fn side_by_side(
+    mechanism: &Mechanism,
+    mut walks: [Walk; 2],
+    times: &[Time],
+    floor: f64,
+    pause: &mut Pause,
+) -> (Reference, Option<StepError>) {
+    let ruler = Ruler::new(mechanism);
+    let mut found = Reference::default();
+    for &time in times {
+        let [one, other] = &mut walks;
+        match one.to(time, pause).and_then(|one| Ok((one, other.to(time, pause)?))) {
+            Ok((Some(one), Some(other))) => {
+                found.accuracy.push(ruler.apart(&one, &other).max(ruler.rates_apart(&one, &other)).max(floor));
+                found.motions.push(one);
+            }
+            Ok(_) => return (found, None),
+            Err(stop) => return (found, Some(stop)),
+        }
+    }
+    (found, None)
+}
+
+/// A motion that is read at one time after another.
+pub(super) enum Walk {
+    /// By the series in double-double, on its way to a horizon.
+    Exact(Box<dyn March>, Time),
+    /// By a method in doubles, through impacts and holds.
+    InDoubles(Box<(Course, Outcome)>),
+}
+
+impl Walk {
+    fn exact(mechanism: &Arc<Mechanism>, start: &Motion, order: usize, tolerance: f64, horizon: Time) -> Self {
+        Self::Exact(exact(mechanism, start, order, tolerance), horizon)
+    }
+
+    /// By an adaptive method at a tolerance.
+    pub(super) fn in_doubles(
+        mechanism: &Arc<Mechanism>,
+        start: &Motion,
+        method: MethodId,
+        tolerance: f64,
+        horizon: Time,
+    ) -> Result<Self, StepError> {
+        let tolerance = Tolerance { relative: tolerance, absolute: tolerance };
+        // Whatever time is asked for must not lie beyond the plan's, which is a double.
+        let until = if horizon.lo > 0.0 { horizon.hi.next_up() } else { horizon.hi };
+        let mut plan = Plan { method, ..Plan::of_series(mechanism, tolerance, until) };
+        let marcher = build(mechanism, &mut plan, start)?;
+        let mut outcome = Outcome::begun(mechanism, plan);
+        let mut course = Course::new(Arc::clone(mechanism), marcher);
+        course.meet(&mut outcome)?;
+        Ok(Self::InDoubles(Box::new((course, outcome))))
+    }
+
+    /// The motion at a time; `None` where `pause` was true on the way.
+    pub(super) fn to(&mut self, time: Time, pause: &mut Pause) -> Result<Option<Motion>, StepError> {
+        match self {
+            Self::Exact(marcher, horizon) => {
+                if marcher.advance(time, *horizon, None, pause)? == Reached::Pause {
+                    return Ok(None);
+                }
+                let mut motion = Motion::default();
+                marcher.read(&mut motion);
+                Ok(Some(motion))
+            }
+            Self::InDoubles(walk) => {
+                let (course, outcome) = &mut **walk;
+                Ok(course.go(time, outcome, pause)?.then(|| course.motion()))
+            }
+        }
+    }
 }

@@ -16,8 +16,8 @@ pub struct Found {
     pub error: f64,
     /// The same of rates \[rad/s\].
     pub rate_error: f64,
-    /// Distances of angles at the times the comparison names \[rad\].
-    pub errors: Vec<f64>,
+    /// Both at the times the comparison names.
+    pub errors: Vec<[f64; 2]>,
     /// Largest drift of energy, or energy minus work, over the energy scale.
     pub energy: f64,
     /// Largest violation of any constraint, at position \[rad or m\] and velocity level \[rad/s or m/s\], where there are any.
@@ -51,21 +51,20 @@ pub(super) fn measure(
     let plan = running.plan().clone();
     let mut found =
         Found { error: f64::NAN, rate_error: f64::NAN, errors: Vec::new(), energy: 0.0, constraint: None, tally: Tally::default() };
-    let begin = (room.clock)();
-    let is_late = || (room.clock)().saturating_sub(begin).as_secs_f64() > room.seconds;
+    let is_late = room.runs_out(is_over);
     let is_row = Cell::new(false);
     loop {
         let mut observer = |_: &_| {
             is_row.set(true);
             Ok(())
         };
-        let gone = running.go(&mut observer, &mut || is_row.get() || is_over() || is_late());
+        let gone = running.go(&mut observer, &mut || is_row.get() || is_late());
         if is_row.take()
             && let Some(([error, rate_error], mark)) = truth.error(running.motion())
         {
             found.error = largest(found.error, error);
             found.rate_error = largest(found.rate_error, rate_error);
-            found.errors.extend(mark.map(|_| error));
+            found.errors.extend(mark.then_some([error, rate_error]));
         }
         match gone {
             Ok(true) => break,

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Settings go from coarse to fine, and end where finer ones bring nothing more.  What a method refuses or where it stops is an entry like
-//! any other.  Nothing but times, and what is left out for want of time, depends on the machine.
+//! any other.  Nothing but times, and what is left out or cut short for want of time, depends on the machine.
 
 mod ladder;
 mod measure;
@@ -31,18 +31,19 @@ use std::time::Duration;
 
 /// Time a block of repeated short runs fills \[s\].
 const QUANTUM: f64 = 0.01;
-/// Blocks of each setting, at most.
-const BLOCKS: usize = 9;
 /// Shares of the budget for the common life of two near runs, for the reference, and up to which settings are measured.
 const SHARES: [f64; 3] = [0.05, 0.25, 0.6];
-/// Output times on the way to where errors are measured, at least, and in all.
-const LOOKS: f64 = 16.0;
+/// Output times on the way to where errors are measured, at least, and most of all: methods that are not dense cut their steps there, so that they are few.
+const LOOKS: f64 = 8.0;
 const MOST_LOOKS: f64 = 1e6;
 /// A finer setting whose error is above this share of the best so far brings nothing, once errors are below the second number \[rad\]; below the third
 /// there is nothing to be gained.
 const NO_BETTER: [f64; 3] = [0.5, 1e-4, 1e-13];
 /// Settings of a method, and how many times the time of `dp8` at 1e-9 one of them takes, in the mean; to guess what a horizon costs.
 const GUESS: [f64; 2] = [8.0, 8.0];
+
+/// Output times of the run that tells what a horizon costs.
+const PARTS: f64 = 200.0;
 
 /// What is to be compared.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,6 +56,8 @@ pub struct Asked {
     pub until: Option<f64>,
     /// Time for all of it.
     pub budget: Duration,
+    /// Blocks of repeated runs that tell the time of each setting, as far as there is time; 9 make a sure median.
+    pub blocks: usize,
 }
 
 impl Asked {
@@ -216,13 +219,10 @@ impl Task<'_> {
             ));
         }
         measured = measured.min(until);
-        let looks = (LOOKS * until / measured.max(f64::MIN_POSITIVE)).clamp(2.0 * LOOKS, MOST_LOOKS);
+        let looks = (LOOKS * until / measured.max(f64::MIN_POSITIVE)).clamp(LOOKS, MOST_LOOKS);
         let every = ladder::interval(until, looks);
         see(&self.stage("reference"));
-        let mut truth = match (self.is_over)() {
-            true => Truth::none(self.mechanism),
-            false => Truth::new(self.mechanism, self.start, every, measured, self.room(SHARES[1])),
-        };
+        let mut truth = Truth::new(self.mechanism, self.start, every, measured, self.room(SHARES[1]), self.is_over);
         truth.horizon = near.horizon.filter(|&horizon| horizon < until);
         if let Some(why) = &truth.why {
             notes.push(format!("errors are measured up to t = {:.4} s: {why}", truth.until));
@@ -283,7 +283,8 @@ impl Task<'_> {
     /// A horizon up to which there is probably time to take all methods \[s\], where that is less than `until` \[s\].
     fn possible(&self, until: f64, lines: usize) -> Option<f64> {
         let method = if self.mechanism.tree.is_dense() || !self.mechanism.rows.is_empty() { MethodId::Dp8 } else { MethodId::Dop853 };
-        let request = Request { method: Some(method), until: Some(until), every: Some(until), ..Request::default() };
+        // How far it is, is told by the last output time.
+        let request = Request { method: Some(method), until: Some(until), every: Some(until / PARTS), ..Request::default() };
         let plan = Plan::new(self.scene, self.mechanism, &request).ok()?;
         let begin = (self.clock)();
         let room = Room { clock: self.clock, seconds: 0.1 };
@@ -365,11 +366,11 @@ impl Task<'_> {
 
     /// Times all settings again, in turn and in another order each time, as long as there is time; true where it came to its end.
     fn repeat(&self, comparison: &mut Comparison, see: &mut dyn FnMut(&Stage)) -> bool {
-        let count = comparison.entries.len();
-        for round in 1..BLOCKS {
+        let (blocks, count) = (self.asked.blocks, comparison.entries.len());
+        for round in 1..blocks {
             for k in 0..count {
                 // A step that goes through all of them in another order each time.
-                let number = (k + round * count.div_ceil(BLOCKS)) % count;
+                let number = (k + round * count.div_ceil(blocks)) % count;
                 if (self.is_over)() {
                     return false;
                 }
@@ -379,7 +380,7 @@ impl Task<'_> {
                     continue;
                 }
                 let costs = comparison.entries.iter().filter_map(Entry::median).map(|median| median.max(QUANTUM)).sum::<f64>();
-                let rest = ((BLOCKS - round) as f64 - k as f64 / count as f64) * costs;
+                let rest = ((blocks - round) as f64 - k as f64 / count as f64) * costs;
                 let mut stage = self.stage("timing");
                 stage.left = stage.left.min(Duration::from_secs_f64(rest));
                 stage.share = self.spent().as_secs_f64() / (self.spent() + stage.left).as_secs_f64().max(1e-9);

@@ -2,14 +2,11 @@
 
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::{Mechanism, Motion, Time};
-use crate::run::contact::Course;
-use crate::run::march::build;
 use crate::run::methods::MethodId;
-use crate::run::plan::{MANY_COORDINATES, Plan};
-use crate::run::reference::{Reference, reference};
-use crate::run::running::Outcome;
+use crate::run::plan::MANY_COORDINATES;
+use crate::run::reference::{Reference, Walk, reference_while, side_by_side};
 use crate::run::trust::Ruler;
-use crate::stepping::{StepError, Tolerance};
+use crate::stepping::StepError;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -68,9 +65,9 @@ impl Truth {
         self.marks.iter().map(|&row| self.motions[row].time.hi)
     }
 
-    /// How far a motion is off: angles \[rad\] or places over the mechanism's size, and rates; and the number among [`Truth::marks`], where it is one.
+    /// How far a motion is off: angles \[rad\] or places over the mechanism's size, and rates; and whether its time is one of [`Truth::marks`].
     /// `None` where there is no reference at its time.
-    pub fn error(&self, motion: &Motion) -> Option<([f64; 2], Option<usize>)> {
+    pub fn error(&self, motion: &Motion) -> Option<([f64; 2], bool)> {
         let row = (motion.time.hi / self.every).round() as usize;
         let known = self.motions.get(row.wrapping_sub(1))?;
         let late = (motion.time - known.time).hi;
@@ -91,49 +88,30 @@ impl Truth {
             there = moved;
             &there
         };
-        let mark = self.marks.iter().position(|&mark| mark == row - 1);
-        Some(([self.ruler.apart(motion, known), self.ruler.rates_apart(motion, known)], mark))
+        Some(([self.ruler.apart(motion, known), self.ruler.rates_apart(motion, known)], self.marks.contains(&(row - 1))))
     }
 
     /// The reference of a mechanism every so often \[s\], as far as `until` \[s\] and what time there is for it.
-    pub(super) fn new(mechanism: &Arc<Mechanism>, start: &Motion, every: f64, until: f64, room: Room) -> Self {
+    pub(super) fn new(mechanism: &Arc<Mechanism>, start: &Motion, every: f64, until: f64, room: Room, is_over: &dyn Fn() -> bool) -> Self {
         let count = (until / every * (1.0 + 1e-12)).floor() as usize;
-        let times: Vec<Time> = (1..=count).map(|row| Time::product(every, row as f64)).collect();
-        let is_large = is_in_doubles(mechanism);
-        let make = |times: &[Time]| if is_large { fine(mechanism, start, times) } else { reference(mechanism, start, times) };
-        let mut why = None;
         if count == 0 {
             return Self { why: Some("paths part at once".to_owned()), ..Self::none(mechanism) };
         }
-        // A first part tells what the whole would take.
-        let first = count.div_ceil(32).min(count);
-        let begin = (room.clock)();
-        let mut found = make(&times[..first]);
-        let spent = (room.clock)().saturating_sub(begin).as_secs_f64();
-        let possible = (room.seconds / spent.max(1e-9) * first as f64) as usize;
-        if found.is_ok() && count > first {
-            if possible < count {
-                why = Some("the reference takes too long for more".to_owned());
-            }
-            found = make(&times[..count.min(possible.max(first))]);
-        }
-        // Where it stops on the way, what comes before is as good.
-        let mut most = count;
-        let found = loop {
-            match found {
-                Ok(found) => break found,
-                Err(stop) => {
-                    why = Some(format!("the reference stopped at t = {:.4} s: {}", stop.t, stop.what));
-                    let reached = ((stop.t / every) as usize).min(most.saturating_sub(1));
-                    if reached == 0 {
-                        break Reference::default();
-                    }
-                    most = reached;
-                    found = make(&times[..reached]);
-                }
-            }
+        let times: Vec<Time> = (1..=count).map(|row| Time::product(every, row as f64)).collect();
+        let mut pause = room.runs_out(is_over);
+        let is_plain = is_in_doubles(mechanism);
+        let found = if is_plain {
+            let walk = |tolerance| Walk::in_doubles(mechanism, start, MethodId::Dp8, tolerance, times[count - 1]);
+            let [fine, coarse] = FINE.map(walk);
+            fine.and_then(|fine| Ok(side_by_side(mechanism, [fine, coarse?], &times, 0.0, &mut pause)))
+        } else {
+            reference_while(mechanism, start, &times, &mut pause)
         };
-        let Reference { mut motions, accuracy } = found;
+        let (Reference { mut motions, accuracy }, stop) = found.unwrap_or_else(|stop| (Reference::default(), Some(stop)));
+        let mut why = stop.map(|stop| format!("the reference stopped at t = {:.4} s: {}", stop.t, stop.what));
+        if why.is_none() && motions.len() < count {
+            why = Some("the reference takes too long for more".to_owned());
+        }
         let sound = accuracy.iter().take_while(|&&accuracy| accuracy < PARTED).count();
         if sound < motions.len() {
             why = Some("the reference itself is no better there".to_owned());
@@ -143,7 +121,7 @@ impl Truth {
         let accelerations = motions.iter().map(|motion| acceleration(mechanism, &mut kernel, motion)).collect();
         let count = motions.len();
         let marks = (1..=MARKS.min(count)).map(|mark| mark * count / MARKS.min(count) - 1).collect();
-        let how = if is_large {
+        let how = if is_plain {
             format!("dp8 at tolerance {:e}", FINE[0])
         } else if mechanism.contacts.is_empty() {
             "taylor of order 30 in double-double".to_owned()
@@ -173,46 +151,17 @@ pub(super) struct Room<'a> {
     pub seconds: f64,
 }
 
-/// A run that is read at any times, without drift or samples.
-struct Walk {
-    course: Course,
-    outcome: Outcome,
-}
-
-impl Walk {
-    fn begin(mechanism: &Arc<Mechanism>, start: &Motion, method: MethodId, tolerance: f64, until: f64) -> Result<Self, StepError> {
-        let tolerance = Tolerance { relative: tolerance, absolute: tolerance };
-        let mut plan = Plan { method, ..Plan::of_series(mechanism, tolerance, until) };
-        let marcher = build(mechanism, &mut plan, start)?;
-        let mut outcome = Outcome::begun(mechanism, plan);
-        let mut course = Course::new(Arc::clone(mechanism), marcher);
-        course.meet(&mut outcome)?;
-        Ok(Self { course, outcome })
-    }
-
-    /// The motion at a time; `None` where that was given up.
-    fn to(&mut self, time: Time, is_over: &dyn Fn() -> bool) -> Result<Option<Motion>, StepError> {
-        Ok(self.course.go(time, &mut self.outcome, &mut || is_over())?.then(|| self.course.motion()))
+impl<'a> Room<'a> {
+    /// True from when that time is over, or all is.
+    pub(super) fn runs_out(self, is_over: &'a dyn Fn() -> bool) -> impl Fn() -> bool + 'a {
+        let begin = (self.clock)();
+        move || is_over() || (self.clock)().saturating_sub(begin).as_secs_f64() > self.seconds
     }
 }
 
 /// True where there is no series in double-double, or where it would take too long.
 fn is_in_doubles(mechanism: &Mechanism) -> bool {
     mechanism.coordinates() > MANY_COORDINATES || mechanism.vibration.is_some()
-}
-
-/// A reference in doubles, for mechanisms whose series in double-double would take too long.
-fn fine(mechanism: &Arc<Mechanism>, start: &Motion, times: &[Time]) -> Result<Reference, StepError> {
-    let until = times.last().copied().unwrap_or_default().hi;
-    let all = |tolerance| {
-        let mut walk = Walk::begin(mechanism, start, MethodId::Dp8, tolerance, until)?;
-        times.iter().filter_map(|&time| walk.to(time, &|| false).transpose()).collect::<Result<Vec<Motion>, StepError>>()
-    };
-    let [motions, others] = FINE.map(all);
-    let (motions, others, ruler) = (motions?, others?, Ruler::new(mechanism));
-    let apart = |(one, other): (&Motion, &Motion)| ruler.apart(one, other).max(ruler.rates_apart(one, other));
-    let accuracy = motions.iter().zip(&others).map(apart).collect();
-    Ok(Reference { motions, accuracy })
 }
 
 /// Accelerations of all coordinates at a motion.
@@ -247,16 +196,15 @@ pub(super) fn together(
         *phi += Time::from(f64::EPSILON * phi.hi.abs().max(0.5));
     }
     let ruler = Ruler::new(mechanism);
-    let begin = (room.clock)();
-    let is_late = || is_over() || (room.clock)().saturating_sub(begin).as_secs_f64() > room.seconds;
+    let is_late = room.runs_out(is_over);
     let mut reached = 0.0;
     let follow = |reached: &mut f64| -> Result<Option<f64>, StepError> {
-        let mut walks =
-            [Walk::begin(mechanism, start, method, tolerance, until)?, Walk::begin(mechanism, &near, method, tolerance, until)?];
+        let begin = |start| Walk::in_doubles(mechanism, start, method, tolerance, Time::from(until));
+        let (mut one, mut other) = (begin(start)?, begin(&near)?);
         while *reached < until && !is_late() {
             let t = (*reached + every.max(GROWTH * *reached)).min(until);
-            let [one, other] = &mut walks;
-            let (Some(one), Some(other)) = (one.to(Time::from(t), &is_late)?, other.to(Time::from(t), &is_late)?) else { break };
+            let at = |walk: &mut Walk| walk.to(Time::from(t), &mut || is_late());
+            let (Some(one), Some(other)) = (at(&mut one)?, at(&mut other)?) else { break };
             let apart = ruler.apart(&one, &other);
             if apart > PARTED || apart.is_nan() {
                 return Ok(Some(*reached));
