@@ -16,7 +16,7 @@ fn sprung(factor: f64, damping: f64, stretch: f64) -> Scene {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes/spring.json");
     let mut scene = read_scene(&folder, &[]).expect("a valid scene");
     (scene.springs[0].stiffness, scene.springs[0].damping) = (7.394_287_5 * factor, damping);
-    (scene.start[0].phi, scene.start[1].phi) = (1.955_193_101_290_539_7 + stretch, 1.570_796_326_794_896_6);
+    (scene.start[0].phi, scene.start[1].phi) = (1.955_193_101_290_539_7 + stretch, std::f64::consts::FRAC_PI_2);
     (scene.until, scene.every) = (1.0, 1.0);
     scene
 }

@@ -13,7 +13,7 @@ const RADAU: [MethodId; 2] = [MethodId::Radau(3), MethodId::Radau(5)];
 fn sprung(factor: f64, damping: f64) -> Scene {
     let mut scene = shipped("spring", &[]);
     (scene.springs[0].stiffness, scene.springs[0].damping) = (7.394_287_5 * factor, damping);
-    (scene.start[0].phi, scene.start[1].phi) = (1.955_193_101_290_539_7, 1.570_796_326_794_896_6);
+    (scene.start[0].phi, scene.start[1].phi) = (1.955_193_101_290_539_7, std::f64::consts::FRAC_PI_2);
     (scene.until, scene.every) = (1.0, 1.0);
     scene
 }

@@ -115,7 +115,7 @@ fn a_step_too_long_for_an_excited_spring_stops_with_its_name_and_the_step_to_tak
 fn sprung(factor: f64, until: f64) -> Scene {
     let mut scene = shipped("spring", &[]);
     scene.springs[0].stiffness = 7.394_287_5 * factor;
-    (scene.start[0].phi, scene.start[1].phi) = (1.955_193_101_290_539_7, 1.570_796_326_794_896_6);
+    (scene.start[0].phi, scene.start[1].phi) = (1.955_193_101_290_539_7, std::f64::consts::FRAC_PI_2);
     (scene.until, scene.every) = (until, until);
     scene
 }

@@ -239,7 +239,7 @@ mod tests {
     fn sprung(factor: f64, damping: f64) -> Scene {
         let mut scene = scene("spring", &[]);
         (scene.springs[0].stiffness, scene.springs[0].damping) = (7.394_287_5 * factor, damping);
-        (scene.start[0].phi, scene.start[1].phi) = (1.955_193_101_290_539_7, 1.570_796_326_794_896_6);
+        (scene.start[0].phi, scene.start[1].phi) = (1.955_193_101_290_539_7, std::f64::consts::FRAC_PI_2);
         scene
     }
 
