@@ -45,6 +45,12 @@ impl<const D: usize, const CLOCK: bool> Dual<D, CLOCK> {
         Self { value, slope: self.slope.map(|slope| slope * derivative) }
     }
 
+    /// (a b, a b' + a' b).
+    #[inline(always)]
+    fn product(self, other: Self) -> Self {
+        self.join(other, self.value * other.value, |a, b| a * other.value + b * self.value)
+    }
+
     /// Slopes joined one by one.
     #[inline(always)]
     fn join(self, other: Self, value: f64, slope: impl Fn(f64, f64) -> f64) -> Self {
@@ -147,7 +153,7 @@ impl<const D: usize, const CLOCK: bool> Mul for Dual<D, CLOCK> {
     #[allow(clippy::suspicious_arithmetic_impl)]
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
-        self.join(other, self.value * other.value, |a, b| a * other.value + b * self.value)
+        self.product(other)
     }
 }
 
