@@ -88,7 +88,7 @@ pub fn angles(chart: &Angles, px_per_pt: f64) -> Result<Picture, ChartError> {
     let right = if apart { 20.0 } else { label_room(&sheet, labels.iter().map(String::as_str), false) };
     let marks = marks(chart.series.iter().map(|series| series.name.as_str()));
     let panels = stacked(&sheet, under, &x, ys(), right)?;
-    let label = chart.horizon.map(|horizon| format!("trusted until {} s", figure(horizon)));
+    let label = chart.horizon.map(|horizon| format!("{} s", figure(horizon)));
     for (k, (panel, lines)) in panels.iter().zip(&lines).enumerate() {
         let mut ends = Vec::new();
         for (i, line) in lines.iter().enumerate() {

@@ -255,7 +255,7 @@ impl<'a> Panel<'a> {
     pub(crate) fn horizon(&self, at: Option<f64>, words: Option<&str>) -> Result<(), ChartError> {
         let Some(share) = at.map(|at| self.x.fraction(at)).filter(|share| (0.0..=1.0).contains(share)) else { return Ok(()) };
         let ([x, top], [_, bottom]) = (self.page([share, 1.0]), self.page([share, 0.0]));
-        self.sheet.line(&[[x, top], [x, bottom]], &Pen::new(GREY, 0.75))?;
+        self.sheet.line(&[[x, top], [x, bottom]], &Pen::new(GREY, 0.6))?;
         let Some(words) = words else { return Ok(()) };
         let half = 0.5 * self.sheet.width(words, NOTE, false);
         let middle = x.clamp(self.bounds[0] + half, (self.bounds[2] - half).max(self.bounds[0] + half));

@@ -66,7 +66,7 @@ pub fn torque_power(chart: &TorquePower, px_per_pt: f64) -> Result<Picture, Char
     let under = sheet.heading(&chart.title, &caption)?;
     let right = if several { label_room(&sheet, labels.iter().map(String::as_str), false) } else { 20.0 };
     let panels = stacked(&sheet, under, &x, rows.iter().map(y).collect(), right)?;
-    let label = chart.horizon.map(|horizon| format!("trusted until {} s", figure(horizon)));
+    let label = chart.horizon.map(|horizon| format!("{} s", figure(horizon)));
     for (k, (panel, (lines, _, unit))) in panels.iter().zip(&rows).enumerate() {
         panel.series(&[[panel.x.from, 0.0], [panel.x.to, 0.0]], &Pen::new(SPINE, 0.75))?;
         let own = [Mark { colour: BLUE, shape: Shape::Disc, turn: 0 }, Mark { colour: VERMILLION, shape: Shape::Disc, turn: 0 }];

@@ -19,6 +19,8 @@ const FINER: f64 = 100.0;
 /// Tolerance \[rad/s\] of companions in doubles whose run is near rounding, and from which tolerance of a run on that is so.
 const FINEST: f64 = 1e-16;
 const NEAR_ROUNDING: f64 = 1e-10;
+/// Tolerance \[rad/s\] of all others, at most.
+const FINE: f64 = 1e-14;
 /// Tolerance \[rad/s\] with the first orders in double-double.
 const EXTENDED: f64 = 1e-20;
 /// Times at which the estimate is kept.
@@ -123,7 +125,8 @@ fn planned(mechanism: &Mechanism, plan: &Plan, level: Level) -> (Plan, String) {
     let tolerance = match finer {
         Some(finer) if is_extended => finer.min(EXTENDED),
         None if is_extended => EXTENDED,
-        Some(finer) if !is_near_rounding => finer,
+        // Steps that end at every output time are often far better than their tolerance, and a finer series costs little.
+        Some(finer) if !is_near_rounding => finer.min(FINE),
         _ => FINEST,
     };
     let tolerance = Tolerance { relative: tolerance, absolute: tolerance };
@@ -319,7 +322,7 @@ impl Measured {
             });
             self.stride *= 2;
         }
-        if self.seen.is_multiple_of(self.stride) || self.error > HORIZON {
+        if self.seen.is_multiple_of(self.stride) {
             self.record.push([self.until, self.error]);
         }
         self.seen += 1;

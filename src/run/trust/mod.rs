@@ -1,7 +1,7 @@
 //! How far a run may be trusted: its error estimated while it goes, and the time from which its path is no longer that of its start.
 //!
-//! Beside the run goes a *companion*: the same mechanism from the same bits by [`taylor`](crate::stepping::taylor) at a hundredth of the run's tolerance, or
-//! with its first orders in double-double where the run is near rounding itself.  Both are looked at at the output times:
+//! Beside the run goes a *companion*: the same mechanism from the same bits by [`taylor`](crate::stepping::taylor) at 1e-14 or a
+//! hundredth of the run's tolerance, or with its first orders in double-double where the run is near rounding.  Both are looked at at the output times:
 //!
 //! ```text
 //! E(t) = max over the output times up to t of sqrt(d² + R²)      d  largest difference of an angle [rad], or of a position over the longest bar

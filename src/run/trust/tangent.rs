@@ -25,8 +25,8 @@ const VECTORS: usize = 2;
 const REACH: f64 = 0.45;
 /// The difference taken, relative to 1 rad and the fastest rate.
 const DIFFERENCE: f64 = 1e-7;
-/// Half a unit in the last place of 1.
-const UNIT: f64 = 1.1e-16;
+/// Of half a unit in the last place of 1, what a step of the series leaves: its state is a pair, and so are its constants.
+const ROUNDED: f64 = 0.1 * 1.1e-16;
 /// Times at which the growth is kept.
 const KEPT: usize = 256;
 /// Growth \[ln\] within the second half of the time from which on a motion counts as chaotic; a regular one's is that of a power of the time.
@@ -70,7 +70,7 @@ pub(super) struct Path {
     /// Columns of Phi(t, 0) over exp(log), those of rates times `rate`; or the vectors.
     columns: Vec<Vec<f64>>,
     log: f64,
-    /// Covariance of rounding, row by row; or one number.
+    /// Covariance of rounding, row by row; empty where there is no matrix.
     covariance: Vec<f64>,
     steps: u64,
     /// Times and the logarithm of the growth, thinned out.
@@ -116,7 +116,7 @@ impl Tangent {
         } else {
             (0..2 * f).map(|j| unit(j, f, rate)).collect::<Vec<_>>()
         };
-        let covariance = if columns.len() == 2 * f { vec![0.0; 4 * f * f] } else { vec![0.0] };
+        let covariance = if columns.len() == 2 * f { vec![0.0; 4 * f * f] } else { Vec::new() };
         tangent.path = Path {
             time,
             step: (REACH / rate).min(until / 16.0),
@@ -181,7 +181,7 @@ impl Tangent {
             && (path.middle.is_empty() || path.middle.len() == dimension)
             && count > 0
             && path.columns.iter().all(|column| column.len() == 2 * f)
-            && path.covariance.len() == if count == 2 * f { 4 * f * f } else { 1 }
+            && path.covariance.len() == if count == 2 * f { 4 * f * f } else { 0 }
             && path.step > 0.0
             && path.stride > 0
             && !path.growth.is_empty();
@@ -222,13 +222,11 @@ impl Tangent {
         self.path.columns.iter().enumerate().map(|(j, column)| column.iter().map(|entry| entry * size(j)).collect()).collect()
     }
 
-    /// Standard deviation of the largest coordinate that rounding has left \[rad\].
+    /// Standard deviation of the largest coordinate that rounding has left \[rad\]; zero where there is no matrix to tell it.
     pub fn rounding(&self) -> f64 {
         let (f, covariance) = (self.weights.len(), &self.path.covariance);
-        match covariance[..] {
-            [one] => one.sqrt(),
-            _ => (0..f).map(|i| covariance[i * 2 * f + i].sqrt() * self.weights[i]).fold(0.0, f64::max),
-        }
+        let deviation = |i: usize| covariance[i * 2 * f + i].sqrt() * self.weights[i];
+        if covariance.is_empty() { 0.0 } else { (0..f).map(deviation).fold(0.0, f64::max) }
     }
 
     /// What a change of 1 in every constant and start comes to in a position, about: the largest norm of the rows of positions of Phi(t, 0) so far.
@@ -321,7 +319,6 @@ impl Tangent {
         (self.scratch.from, self.scratch.slopes) = (from, slopes);
         let taken = steps.saturating_sub(self.path.steps) as f64;
         self.path.steps = steps;
-        let before = self.path.log;
         if is_whole {
             self.round(&moved, &points[0][f..2 * f], h, taken);
             self.multiply(&moved);
@@ -332,12 +329,6 @@ impl Tangent {
         let norm = self.norm();
         self.path.columns.iter_mut().flatten().for_each(|entry| *entry /= norm);
         self.path.log += libm::log(norm);
-        if !is_whole {
-            // One number for all: what there is grows as the vectors do.
-            let grown = libm::exp(2.0 * (self.path.log - before));
-            let added = taken * 4.0 * (UNIT * UNIT);
-            self.path.covariance[0] = grown * self.path.covariance[0] + added;
-        }
         let [_, _, end] = points;
         self.path.start = end;
         self.path.time = t + h;
@@ -372,7 +363,7 @@ impl Tangent {
         let phi = |i: usize, j: usize| if j < f { step[j][i] } else { step[j][i] / rate };
         let mut before = std::mem::take(&mut self.path.covariance);
         for i in 0..f {
-            before[i * n + i] += taken * (0.35 * UNIT).powi(2);
+            before[i * n + i] += taken * (0.35 * ROUNDED).powi(2);
         }
         let half = &mut self.scratch.half;
         half.resize(n * n, 0.0);
@@ -392,8 +383,8 @@ impl Tangent {
             let pulls: f64 = (0..f).map(|j| (phi(f + i, j) / h).abs()).sum();
             let acceleration = self.rates[0][f + i].abs();
             let span = each.min(2.0 / pulls.sqrt().max(f64::MIN_POSITIVE));
-            before[i * n + i] += taken * (0.175 * UNIT * each * v[i]).powi(2);
-            let (force, sum) = (0.035 * UNIT * span * (pulls + acceleration), 0.05 * UNIT * span * acceleration);
+            before[i * n + i] += taken * (0.175 * ROUNDED * each * v[i]).powi(2);
+            let (force, sum) = (0.035 * ROUNDED * span * (pulls + acceleration), 0.05 * ROUNDED * span * acceleration);
             before[(f + i) * n + f + i] += taken * (force * force + sum * sum);
         }
         self.path.covariance = before;
