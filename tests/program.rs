@@ -170,7 +170,7 @@ fn check_says_what_is_active_and_what_is_left_out() {
     let program = Program::with_scenes(&["free", "motor", "wall", "branch"]);
     let check = |arguments: &str| program.run(&format!("check {arguments} --json")).exits(0).object();
     let free = check("free.json");
-    assert_eq!((&free["method"], &free["degrees_of_freedom"]), (&"dop853".into(), &2.into()));
+    assert_eq!((&free["method"], &free["degrees_of_freedom"]), (&"taylor".into(), &2.into()));
     let left_out = free["left_out"].to_string();
     for what in ["motors", "springs", "multipliers", "projection", "impacts", "off-axis"] {
         assert!(left_out.contains(what), "{left_out}");
@@ -268,7 +268,7 @@ fn run_writes_whole_files_and_one_object() {
     near(&object["constraints"]["motor"]["position_max"], 0.0, 0.0);
     assert_eq!(object["stop"], Value::Null);
 
-    let folder = "output/motor/dop853-1e-9-elimination";
+    let folder = "output/motor/taylor-1e-9-elimination";
     let files = [format!("{folder}/run.json"), format!("{folder}/trajectory.csv")];
     assert_eq!(program.files(), [&["motor.json".to_owned()], &files[..]].concat());
     let mut listed: Vec<&str> = object["files"].as_array().expect("a list").iter().filter_map(Value::as_str).collect();
@@ -291,7 +291,7 @@ fn the_record_holds_the_scene_and_repeats_bit_for_bit() {
         program
             .run(&format!("run motor.json --until 1 -q --no-charts --out {out} --set motors.motor.law.rate=6 --set start.bar2.omega=6"))
             .exits(0);
-        serde_json::from_str::<Value>(&program.read(&format!("{out}/motor/dop853-1e-9-elimination/run.json"))).expect("JSON")
+        serde_json::from_str::<Value>(&program.read(&format!("{out}/motor/taylor-1e-9-elimination/run.json"))).expect("JSON")
     };
     let (mut one, mut two) = (record("one"), record("two"));
     assert_eq!(one["resolved_scene"]["motors"][0]["law"]["rate"], 6.0);
@@ -303,25 +303,25 @@ fn the_record_holds_the_scene_and_repeats_bit_for_bit() {
     // The resolved scene is a scene, and the same one.
     program.write("again.json", &one["resolved_scene"].to_string());
     program.run("run again.json --until 1 -q --no-charts --out three").exits(0);
-    let three: Value = serde_json::from_str(&program.read("three/motor/dop853-1e-9-elimination/run.json")).expect("JSON");
+    let three: Value = serde_json::from_str(&program.read("three/motor/taylor-1e-9-elimination/run.json")).expect("JSON");
     assert_eq!(three["hashes"], one["hashes"]);
 }
 
 #[test]
 fn a_run_is_not_overwritten_unasked() {
     let program = Program::with_scenes(&["free"]);
-    let trajectory = "o/free/dop853-1e-9/trajectory.csv";
+    let trajectory = "o/free/taylor-1e-9/trajectory.csv";
     program.run("run free.json --until 1 --no-charts --out o").exits(0);
     let before = program.read(trajectory);
     program.run("run free.json --until 2 --no-charts --out o").exits(6).says(&["holds a run already", "--force"]);
     assert_eq!(program.read(trajectory), before);
-    program.write("o/free/dop853-1e-9/notes.txt", "mine");
-    program.write("o/free/dop853-1e-9/torque_power.png", "of an older run");
-    program.write("o/free/dop853-1e-9/.unfinished-abctrajectory.csv", "half");
+    program.write("o/free/taylor-1e-9/notes.txt", "mine");
+    program.write("o/free/taylor-1e-9/torque_power.png", "of an older run");
+    program.write("o/free/taylor-1e-9/.unfinished-abctrajectory.csv", "half");
     program.run("run free.json --until 2 --no-charts --out o --force").exits(0);
     assert!(program.read(trajectory).starts_with(&before[..1000]) && program.read(trajectory).len() > before.len());
     let files: Vec<String> = program.files().into_iter().filter(|file| file.starts_with("o/")).collect();
-    assert_eq!(files, ["notes.txt", "run.json", "trajectory.csv"].map(|name| format!("o/free/dop853-1e-9/{name}")));
+    assert_eq!(files, ["notes.txt", "run.json", "trajectory.csv"].map(|name| format!("o/free/taylor-1e-9/{name}")));
 }
 
 #[test]
@@ -337,7 +337,7 @@ fn quiet_stays_silent_and_the_rest_is_not() {
     let program = Program::with_scenes(&["free"]);
     program.run("run free.json --until 1 --no-charts -q").exits(0).stays_silent();
     let ran =
-        program.run("run free.json --until 1 --no-charts --out b").exits(0).shows(&["dop853", "energy drift", "trust", "trajectory.csv"]);
+        program.run("run free.json --until 1 --no-charts --out b").exits(0).shows(&["taylor", "energy drift", "trust", "trajectory.csv"]);
     assert!(ran.stdout.lines().all(|line| line.chars().count() <= 80), "{}", ran.stdout);
     let ran = program.run("run free.json --until 1 --no-charts --out c -v").exits(0);
     ran.says(&["free.json", "trajectory.csv"]);
@@ -364,7 +364,7 @@ fn stated_limits_exit_5() {
     assert_eq!(object["stop"]["cause"], "drift_limit");
     let t = object["final"]["t"].as_f64().expect("a number");
     assert!(t > 0.0 && t < 10.0, "it stopped there, not at the end: {t}");
-    let table = program.read("output/free/dop853-1e-3/trajectory.csv");
+    let table = program.read("output/free/taylor-1e-3/trajectory.csv");
     assert!(table.lines().last().is_some_and(|line| line.starts_with(&format!("{t:?},"))), "kept up to the stop");
     program
         .run("run motor_sine.json --until 10 --method dp5 --rtol 1e-3 --stabilize none --max-constraint-drift 1e-12 --no-charts -q")
@@ -443,7 +443,7 @@ fn charts_are_drawn_for_what_the_scene_has() {
         ["angles.png", "constraint_drift.png", "energy_drift.png", "mechanism.gif", "mechanism.png", "torque_power.png"]
     );
     assert!(pictures("c/").is_empty());
-    let read = |file: &str| std::fs::read(program.path(&format!("b/motor/dop853-1e-9-elimination/{file}"))).expect("a picture");
+    let read = |file: &str| std::fs::read(program.path(&format!("b/motor/taylor-1e-9-elimination/{file}"))).expect("a picture");
     let picture = read("angles.png");
     assert_eq!(&picture[..8], b"\x89PNG\r\n\x1a\n");
     let width = u32::from_be_bytes([picture[16], picture[17], picture[18], picture[19]]);

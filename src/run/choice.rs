@@ -107,7 +107,7 @@ fn chosen(mechanism: &Mechanism, request: &Request, start: &Motion, until: f64, 
     if let Some(damped) = stiffness.as_ref().filter(|stiffness| stiffness.is_damped() && stiffness.ratio() > STIFF) {
         let stages = if tolerance.unwrap_or_default() >= TIGHT { 3 } else { 5 };
         let mode = damped.culprit.as_ref().map_or("the fastest mode".to_owned(), |name| format!("the mode of {name}"));
-        return (MethodId::Radau(stages), format!("{mode} dies away {:.0} times as fast as the rest moves", damped.ratio()));
+        return (MethodId::Radau(stages), format!("{mode} is {:.0} times as fast as the rest, and dies away", damped.ratio()));
     }
     if !is_free {
         return (MethodId::Dp8, "the scene has walls, and impacts are located inside its steps".into());

@@ -30,7 +30,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Evaluations of a cell where nobody says: all its runs together.
-pub const EFFORT: u64 = 4_000_000;
+pub const EFFORT: u64 = 1_000_000;
 /// How often a setting is refined.
 const REFINEMENTS: u32 = 3;
 /// By how much, of a tolerance and of a step.
