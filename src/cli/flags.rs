@@ -145,7 +145,7 @@ pub struct RunFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub plan: PlanFlags,
-    /// Estimate the error of the result and the time up to which it can be trusted: off, auto (at most 30 % of the run), full (whatever it takes)
+    /// Estimate the error of the result and the time up to which it can be trusted: off, auto (50 ms, and 30 % of what the run takes), full (whatever it takes)
     #[arg(long, value_name = "HOW", value_parser = levels(), default_value = Level::Auto.name(), help_heading = "Trust")]
     pub trust: Level,
     /// Stop with exit code 5 where the energy is off by more than this share of its scale [default: 0.01 of the largest energy there has been]

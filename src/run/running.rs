@@ -369,17 +369,17 @@ impl Running {
                 .or_else(|| if is_tied_up { came_apart(&outcome.plan, &outcome.drift, sample) } else { None })
                 .or_else(|| exceeded.err().map(|what| drift_stop(&outcome.plan, sample.t, what)));
             outcome.last.clone_from(sample);
-            if let Some(companion) = companion {
-                let begin = Instant::now();
-                companion.see(course.shown(), &outcome.plan, course.tally(), self.row + 1);
-                outcome.trust_wall += begin.elapsed();
-            }
             // A dense method is ahead of what it shows.
             let reached = outcome.last.t;
             outcome.flip = course.lookout.as_ref().and_then(|lookout| lookout.flip).filter(|flip| flip.t <= reached);
             self.row += 1;
             let has_flipped = *ensemble == Some(true) && outcome.flip.is_some();
             self.is_over = outcome.stop.is_some() || has_flipped || self.row > outcome.plan.rows;
+            if let Some(companion) = companion.as_mut().filter(|companion| self.is_over || companion.is_due(reached)) {
+                let begin = Instant::now();
+                companion.see(course.shown(), &outcome.plan, course.tally(), self.row);
+                outcome.trust_wall += begin.elapsed();
+            }
             if !self.is_over && pause() {
                 return Ok(false);
             }

@@ -23,6 +23,8 @@ const NEAR_ROUNDING: f64 = 1e-10;
 const FINE: f64 = 1e-14;
 /// Tolerance \[rad/s\] with the first orders in double-double.
 const EXTENDED: f64 = 1e-20;
+/// An error \[rad\] near the horizon.
+const NEAR: f64 = 0.03 * HORIZON;
 /// Times at which the estimate is kept.
 const KEPT: usize = 512;
 /// Growth within the second half of the time \[ln\] up to which a motion is regular.
@@ -64,8 +66,8 @@ struct Shadow {
     outcome: Outcome,
     motion: Motion,
     tangent: Option<Tangent>,
-    /// True where its own rounding does not count.
-    is_extended: bool,
+    /// True where its own rounding counts: the run is as near it.
+    is_rounded: bool,
     last: Tally,
 }
 
@@ -188,8 +190,8 @@ impl Companion {
                 tangent => tangent,
             },
         };
-        let (prices, is_extended) = (Prices::new(mechanism, &outcome.plan, plan), outcome.plan.extended);
-        let shadow = Shadow { course, outcome, motion: Motion::default(), tangent, is_extended, last };
+        let (prices, is_rounded) = (Prices::new(mechanism, &outcome.plan, plan), is_rounded(&outcome.plan));
+        let shadow = Shadow { course, outcome, motion: Motion::default(), tangent, is_rounded, last };
         Ok(Some(Self { ruler, prices, measured, shadow: Some(shadow) }))
     }
 
@@ -202,6 +204,14 @@ impl Companion {
             last: shadow.last,
         });
         Kept { measured: self.measured.clone(), shadow }
+    }
+
+    /// True where the run is to be looked at at this output time \[s\]: errors change with the motion, so that between the points where the tangent flow asks
+    /// for it there is little to be seen but near the horizon.
+    pub(in crate::run) fn is_due(&self, t: f64) -> bool {
+        let tangent = self.shadow.as_ref().and_then(|shadow| shadow.tangent.as_ref());
+        let is_near = self.measured.error > NEAR && self.measured.lost.is_none();
+        self.measured.seen == 0 || is_near || tangent.is_none_or(|tangent| tangent.next() <= t)
     }
 
     /// Looks at the run at an output time, after so much work of its own.
@@ -229,7 +239,7 @@ impl Companion {
             return;
         }
         let apart = ruler.apart(motion, &shadow.motion);
-        let rounding = shadow.tangent.as_ref().filter(|_| !shadow.is_extended).map_or(0.0, Tangent::rounding);
+        let rounding = shadow.tangent.as_ref().filter(|_| shadow.is_rounded).map_or(0.0, Tangent::rounding);
         let error = apart.hypot(rounding);
         if !error.is_finite() {
             return self.end("what small differences come to is beyond all numbers");
@@ -329,6 +339,11 @@ impl Measured {
     }
 }
 
+/// Whether a companion's own rounding counts.
+fn is_rounded(series: &Plan) -> bool {
+    !series.extended && series.tolerance.unwrap_or_default().relative <= FINEST
+}
+
 /// A companion at its start.
 fn begun(mechanism: &Arc<Mechanism>, series: &mut Plan, start: &Motion) -> Result<Shadow, String> {
     if !mechanism.tree.is_dense() {
@@ -339,8 +354,8 @@ fn begun(mechanism: &Arc<Mechanism>, series: &mut Plan, start: &Motion) -> Resul
     let mut course = Course::new(Arc::clone(mechanism), marcher);
     course.meet(&mut outcome).map_err(|stop| stop.what)?;
     let tangent = Tangent::new(mechanism, start, series.until);
-    let is_extended = series.extended;
-    Ok(Shadow { course, outcome, motion: Motion::default(), tangent, is_extended, last: Tally::default() })
+    let is_rounded = is_rounded(series);
+    Ok(Shadow { course, outcome, motion: Motion::default(), tangent, is_rounded, last: Tally::default() })
 }
 
 impl Shadow {
@@ -348,7 +363,7 @@ impl Shadow {
     fn go(&mut self, until: Time, prices: &Prices, spent: &mut f64, budget: f64) -> Result<(), String> {
         while let Some(next) = self.tangent.as_ref().map(Tangent::next).filter(|&next| next <= until.hi) {
             self.march(Time::from(next), prices, spent, budget)?;
-            let steps = if self.is_extended { 0 } else { self.last.steps };
+            let steps = if self.is_rounded { self.last.steps } else { 0 };
             if let Some(tangent) = &mut self.tangent {
                 tangent.take(&self.motion, steps);
                 *spent += 0.5 * tangent.evaluations() as f64 * prices.evaluation;

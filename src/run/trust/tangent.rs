@@ -21,8 +21,8 @@ use std::sync::Arc;
 const WHOLE: usize = 3;
 /// Vectors carried for more of them.
 const VECTORS: usize = 2;
-/// Step over the fastest rate, squared rates being the entries of da/dq.
-const REACH: f64 = 0.45;
+/// Step over the fastest rate, squared rates being the entries of da/dq: beside runs, and where the whole matrix is asked for.
+const REACH: [f64; 2] = [0.45, 0.3];
 /// The difference taken, relative to 1 rad and the fastest rate.
 const DIFFERENCE: f64 = 1e-7;
 /// Of half a unit in the last place of 1, what a step of the series leaves: its state is a pair, and so are its constants.
@@ -65,8 +65,9 @@ pub(super) struct Path {
     step: f64,
     start: Vec<f64>,
     middle: Vec<f64>,
-    /// About the fastest rate \[rad/s\]: what rates are divided by to be compared with angles.
+    /// About the fastest rate \[rad/s\]: what rates are divided by to be compared with angles; and the step over it.
     rate: f64,
+    span: f64,
     /// Columns of Phi(t, 0) over exp(log), those of rates times `rate`; or the vectors.
     columns: Vec<Vec<f64>>,
     log: f64,
@@ -84,15 +85,15 @@ pub(super) struct Path {
 impl Tangent {
     /// The flow from a motion; `None` for mechanisms with walls, and those too large for matrices.
     pub fn new(mechanism: &Arc<Mechanism>, motion: &Motion, until: f64) -> Option<Self> {
-        Self::of(mechanism, motion, until, WHOLE)
+        Self::of(mechanism, motion, until, WHOLE, REACH[0])
     }
 
-    /// The same with the whole matrix, whatever that costs.
+    /// The same with the whole matrix to two digits and more, whatever that costs.
     pub fn whole(mechanism: &Arc<Mechanism>, motion: &Motion, until: f64) -> Option<Self> {
-        Self::of(mechanism, motion, until, usize::MAX)
+        Self::of(mechanism, motion, until, usize::MAX, REACH[1])
     }
 
-    fn of(mechanism: &Arc<Mechanism>, motion: &Motion, until: f64, whole: usize) -> Option<Self> {
+    fn of(mechanism: &Arc<Mechanism>, motion: &Motion, until: f64, whole: usize, span: f64) -> Option<Self> {
         let mut tangent = Self::bare(mechanism)?;
         let f = tangent.weights.len();
         let state = tangent.problem.state(motion);
@@ -119,7 +120,8 @@ impl Tangent {
         let covariance = if columns.len() == 2 * f { vec![0.0; 4 * f * f] } else { Vec::new() };
         tangent.path = Path {
             time,
-            step: (REACH / rate).min(until / 16.0),
+            step: (span / rate).min(until / 16.0),
+            span,
             start: state.y,
             middle: Vec::new(),
             rate,
@@ -157,6 +159,7 @@ impl Tangent {
             start: Vec::new(),
             middle: Vec::new(),
             rate: 1.0,
+            span: REACH[0],
             columns: Vec::new(),
             log: 0.0,
             covariance: Vec::new(),
@@ -183,6 +186,7 @@ impl Tangent {
             && path.columns.iter().all(|column| column.len() == 2 * f)
             && path.covariance.len() == if count == 2 * f { 4 * f * f } else { 0 }
             && path.step > 0.0
+            && path.span > 0.0
             && path.stride > 0
             && !path.growth.is_empty();
         fits.then_some(Self { path, ..tangent })
@@ -332,8 +336,8 @@ impl Tangent {
         let [_, _, end] = points;
         self.path.start = end;
         self.path.time = t + h;
-        let wanted = REACH / steepest.sqrt();
-        self.path.step = if wanted.is_nan() { h } else { wanted.clamp(0.5 * h, 2.0 * h).min(2.0 * REACH / rate) };
+        let wanted = self.path.span / steepest.sqrt();
+        self.path.step = if wanted.is_nan() { h } else { wanted.clamp(0.5 * h, 2.0 * h).min(2.0 * self.path.span / rate) };
         self.keep();
     }
 
