@@ -208,14 +208,9 @@ impl Gauss {
         if let Some(k) = scratch.total.iter().position(|total| !total.is_finite()) {
             return Err(stop(Cause::NotFinite, format!("the rate of {} came out not finite", problem.label(k))));
         }
-        for k in 0..scratch.judged {
-            let floor = if k < angles { LEAST_ANGLE } else { 0.0 };
-            let scale = scratch.size[k].max(floor);
-            if scratch.rest[k] > LARGEST_REST * scale {
-                let what =
-                    format!("the iteration left a change of {:.1e} in {} and did not bring it down", scratch.rest[k], problem.label(k));
-                return Err(stop(Cause::NotConverged, what));
-            }
+        if let Some(k) = scratch.unsettled(angles) {
+            let what = format!("the iteration left a change of {:.1e} in {} and did not bring it down", scratch.rest[k], problem.label(k));
+            return Err(stop(Cause::NotConverged, what));
         }
         Ok(())
     }

@@ -37,6 +37,10 @@ const REFINEMENTS: u32 = 3;
 const FINER: (f64, f64) = (1e-2, 0.5);
 /// Steps of the power series up to which an end is looked for in double-double.
 const EXPANSIONS: u64 = 20_000;
+/// Share of the tolerance below which a run's own estimate is enough.
+const SURE: f64 = 1e-3;
+/// The error of the finer of two runs over their difference, at most: methods of higher order leave less, steps across a corner of the force as much.
+const MARGIN: f64 = 3.0;
 /// Least tolerance of a refinement.
 const LEAST: f64 = 1e-13;
 
@@ -323,9 +327,16 @@ impl Trial<'_> {
             }
             let end = self.end(&outcome);
             self.score(&outcome, &end, cell);
-            // Where the run knows its own error up to the end, no other is needed.
+            // What a run knows is the error of its angles, and it knows the more the smoother its motion: where that is not far below what is asked for, and
+            // for the rates, a finer run has its say.
             let known = outcome.trust.as_ref().filter(|trust| trust.how == How::Companion && trust.at >= self.scene.until);
-            cell.estimate = known.and_then(|trust| trust.error_estimate).or(before.as_ref().map(|before| end.apart(before)));
+            let known = known.and_then(|trust| trust.error_estimate);
+            let finer = before.as_ref().map(|before| MARGIN * end.apart(before));
+            cell.estimate = match (known, finer) {
+                (Some(known), None) if known > SURE * self.case.tolerance => None,
+                (Some(known), finer) => Some(finer.map_or(known, |finer| finer.max(known))),
+                (None, finer) => finer,
+            };
             let is_no_matter_of_ends = matches!(self.case.expected, Expected::Energy | Expected::Stop(_));
             if is_no_matter_of_ends || cell.estimate.is_some_and(|estimate| estimate <= self.case.tolerance) {
                 return Ok(());

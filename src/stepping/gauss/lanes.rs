@@ -2,7 +2,7 @@
 
 use super::newton::Newton;
 use super::tableau::{Tableau, lane};
-use super::{Gauss, IDLE_SWEEPS, MOST_SWEEPS, NEWTON_STEPS};
+use super::{Gauss, IDLE_SWEEPS, LARGEST_REST, LEAST_ANGLE, MOST_SWEEPS, NEWTON_STEPS};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::{self, Code, Lanes, Portable};
 use crate::arithmetic::sum::two_sum;
@@ -53,6 +53,8 @@ struct Step<'a> {
     exact: u32,
     newton: &'a mut Option<Box<Newton>>,
     slow: f64,
+    /// How many unknowns, from the first, are angles.
+    angles: usize,
 }
 
 /// `count` steps of `scratch.step`, or as many as the watcher wants.
@@ -67,7 +69,7 @@ pub(super) fn march<F: Field + ?Sized>(
     for _ in 0..count {
         tally.check(gauss.label(), state.time.hi, gauss.scratch.step)?;
         let Gauss { tableau, scratch, exact, newton, slow, portable, .. } = &mut *gauss;
-        let mut step = Step { tableau, scratch, exact: *exact, newton, slow: *slow };
+        let mut step = Step { tableau, scratch, exact: *exact, newton, slow: *slow, angles: problem.angles() };
         lanes::run(Take { step: &mut step, problem: &mut Of(problem), state, tally }, *portable);
         if gauss.scratch.newton_left == NEWTON_STEPS {
             gauss.follow(problem, state)?;
@@ -137,12 +139,22 @@ impl Step<'_> {
         let (known, all) = (state.memory.len(), self.tableau.nodes.len() * state.y.len() + 1);
         let left = if known == all + 1 { state.memory[all] - 1.0 } else { 0.0 };
         self.scratch.newton_left = left;
-        if left > 0.0 && self.differentiate(problem, state, tally) {
-            return self.solve::<L>(problem, state, tally);
-        }
-        if !self.sweep::<L>(problem, state, tally) {
-            self.scratch.newton_left = NEWTON_STEPS;
-            return self.solve::<L>(problem, state, tally);
+        let has_changed = left > 0.0 && self.differentiate(problem, state, tally)
+            || !self.sweep::<L>(problem, state, tally) && {
+                self.scratch.newton_left = NEWTON_STEPS;
+                true
+            };
+        if has_changed {
+            self.solve::<L>(problem, state, tally);
+            if self.scratch.unsettled(self.angles).is_none() {
+                return;
+            }
+            // A Jacobian that turns far within the step does worse than sweeps.
+            self.scratch.newton_left = 0.0;
+            self.scratch.is_sweeping = true;
+            self.predict::<L>(state);
+            self.sweep::<L>(problem, state, tally);
+            self.scratch.is_sweeping = false;
         }
         self.scratch.judge();
         self.scratch.points.rate_low.fill(Octet::default());
@@ -438,6 +450,14 @@ impl Scratch {
         for (size, stage) in self.size.iter_mut().zip(&self.points.y) {
             *size = stage.0.iter().fold(0.0, |size, y| y.abs().max(size));
         }
+    }
+
+    /// The first unknown whose change did not come down, where the first so many are angles.
+    pub(super) fn unsettled(&self, angles: usize) -> Option<usize> {
+        (0..self.judged).find(|&k| {
+            let floor = if k < angles { LEAST_ANGLE } else { 0.0 };
+            self.rest[k].is_nan() || self.rest[k] > LARGEST_REST * self.size[k].max(floor)
+        })
     }
 }
 
