@@ -115,6 +115,8 @@ pub fn matrix(plan: &Stress, lines: &[Line]) -> Result<Vec<u8>, ChartError> {
     };
     let said = |cell: &Cell| match (cell.error, cell.verdict) {
         (Some(error), Verdict::Right | Verdict::Wrong) => short(error),
+        (None, Verdict::Right) if cell.refusal.is_some() => "refused".into(),
+        (None, Verdict::Right) if cell.stop.is_some() => "stops".into(),
         _ => String::new(),
     };
     let chart = Matrix {
