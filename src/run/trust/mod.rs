@@ -81,13 +81,14 @@ impl FromStr for Level {
 }
 
 /// Where an error estimate comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum How {
     /// From a companion up to its time.
     Companion,
     /// Carried on by a power law from the time the companion ended \[s\].
     Extrapolated(f64),
     /// There is none for this time.
+    #[default]
     None,
 }
 
@@ -145,12 +146,6 @@ pub struct Trust {
     pub why: Option<String>,
     /// Times \[s\] and estimates \[rad\] up to there, thinned out.
     pub record: Vec<[f64; 2]>,
-}
-
-impl Default for How {
-    fn default() -> Self {
-        Self::None
-    }
 }
 
 impl Trust {
