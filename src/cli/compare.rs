@@ -3,7 +3,7 @@
 use super::failure::{Exit, Failure};
 use super::flags::CompareFlags;
 use super::interrupt;
-use super::output::{print, print_object};
+use super::output::{name_files, print, print_object};
 use super::progress::Stages;
 use crate::dynamics::Mechanism;
 use crate::report;
@@ -11,7 +11,6 @@ use crate::run::compare::{Asked, Comparison, compare};
 use crate::run::files::{COMPARISON, COMPARISON_RECORD, quoted};
 use crate::run::{Folder, MethodId};
 use crate::scene::Scene;
-use serde_json::json;
 use std::time::{Duration, Instant};
 
 /// Blocks of repeated runs of each setting.
@@ -78,8 +77,7 @@ const FILES: &[&str] =
 fn tell(scene: &Scene, mechanism: &Mechanism, comparison: &Comparison, folder: &Folder, flags: &CompareFlags) -> Result<(), Failure> {
     if flags.scene.tell.json {
         let mut object = report::compare::object(scene, mechanism, comparison);
-        object["folder"] = json!(folder.path().display().to_string());
-        object["files"] = json!(folder.files().iter().map(|file| file.display().to_string()).collect::<Vec<_>>());
+        name_files(&mut object, folder);
         return print_object(&object);
     }
     if flags.scene.tell.quiet {

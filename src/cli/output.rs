@@ -1,7 +1,8 @@
 //! Writing to stdout and stderr, where a reader that went away is no failure.
 
 use super::failure::{Exit, Failure};
-use serde_json::Value;
+use crate::run::Folder;
+use serde_json::{Value, json};
 use std::io::{ErrorKind, Write};
 
 /// Prints data.
@@ -26,6 +27,12 @@ pub fn print_object(object: &Value) -> Result<(), Failure> {
     print(&format!("{object:#}\n"))
 }
 
+/// Says in an object which folder it stands in, and which files.
+pub fn name_files(object: &mut Value, folder: &Folder) {
+    object["folder"] = json!(folder.path().display().to_string());
+    object["files"] = json!(folder.files().iter().map(|file| file.display().to_string()).collect::<Vec<_>>());
+}
+
 /// Prints a message on stderr; nobody can be told where that fails.
 pub fn message(text: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");
@@ -37,7 +44,7 @@ pub fn print_objects(mut objects: Vec<Value>) -> Result<(), Failure> {
         Some(only) if objects.is_empty() => print_object(&only),
         last => {
             objects.extend(last);
-            print_object(&serde_json::json!({ "runs": objects }))
+            print_object(&json!({ "runs": objects }))
         }
     }
 }

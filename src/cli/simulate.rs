@@ -3,7 +3,7 @@
 use super::failure::{Exit, Failure};
 use super::flags::RunFlags;
 use super::interrupt::{self, Watchman};
-use super::output::{print, print_objects};
+use super::output::{name_files, print, print_objects};
 use super::progress::Progress;
 use super::resume::{Saved, Work};
 use crate::dynamics::Mechanism;
@@ -12,7 +12,6 @@ use crate::run::files::{RECORD, TRAJECTORY};
 use crate::run::table::Table;
 use crate::run::{Checkpoints, Folder, Outcome, Plan, ResumeError, Run, RunError, Running, Sample, Stream};
 use crate::scene::{Scene, read_text};
-use serde_json::json;
 use std::sync::Arc;
 
 /// Every file a run may leave; those of an earlier run in the same folder go with it.
@@ -228,8 +227,7 @@ fn tell(scene: &Scene, mechanism: &Mechanism, done: &[Done], flags: &RunFlags) -
     if flags.scene.tell.json {
         let object = |Done { outcome, folder, failure }: &Done| {
             let mut object = report::result::object(scene, mechanism, outcome);
-            object["folder"] = json!(folder.path().display().to_string());
-            object["files"] = json!(folder.files().iter().map(|file| file.display().to_string()).collect::<Vec<_>>());
+            name_files(&mut object, folder);
             if let Some(failure) = failure {
                 object["error"] = failure.object();
             }

@@ -3,13 +3,12 @@
 use super::failure::{Exit, Failure};
 use super::flags::StressFlags;
 use super::interrupt;
-use super::output::{print, print_object};
+use super::output::{name_files, print, print_object};
 use super::progress::Points;
 use crate::report;
 use crate::run::Folder;
 use crate::run::stress::{Case, Expected, Line, Stress, Verdict, stress};
 use crate::scene::read_text;
-use serde_json::json;
 
 /// The files it may leave; those of an earlier one in the same folder go with it.
 const FILES: &[&str] = &[TABLE, RECORD, MATRIX, STABILITY[0].1, STABILITY[1].1];
@@ -72,8 +71,7 @@ fn publish(plan: &Stress, lines: &[Line], folder: &mut Folder, flags: &StressFla
     let mut object = report::stress::object(plan, lines);
     folder.write(RECORD, format!("{object:#}\n").as_bytes())?;
     if flags.tell.json {
-        object["folder"] = json!(folder.path().display().to_string());
-        object["files"] = json!(folder.files().iter().map(|file| file.display().to_string()).collect::<Vec<_>>());
+        name_files(&mut object, folder);
         return print_object(&object);
     }
     if flags.tell.quiet {

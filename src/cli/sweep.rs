@@ -3,7 +3,7 @@
 use super::failure::{Exit, Failure};
 use super::flags::SweepFlags;
 use super::interrupt::{self, Watchman};
-use super::output::{print, print_object};
+use super::output::{name_files, print, print_object};
 use super::progress::Points;
 use super::resume::{Saved, Work};
 use crate::report;
@@ -14,7 +14,6 @@ use crate::run::{
     Checkpoints, Folder, Limits, Observer, Point, Request, ResumeError, Stream, Sweep, SweepError, SweepTable, Totals, sweep_on,
 };
 use crate::scene::{Template, read_text};
-use serde_json::json;
 
 /// Every file a sweep may leave; those of an earlier one in the same folder go with it.
 const FILES: &[&str] = &[SWEEP, SWEEP_RECORD, "map.png", "profile.png"];
@@ -239,8 +238,7 @@ fn draw(plan: &Sweep, curve: &Curve, folder: &mut Folder, flags: &SweepFlags) ->
 fn tell(plan: &Sweep, totals: &Totals, folder: &Folder, flags: &SweepFlags) -> Result<(), Failure> {
     if flags.scene.tell.json {
         let mut object = report::sweep::object(plan, totals);
-        object["folder"] = json!(folder.path().display().to_string());
-        object["files"] = json!(folder.files().iter().map(|file| file.display().to_string()).collect::<Vec<_>>());
+        name_files(&mut object, folder);
         return print_object(&object);
     }
     if flags.scene.tell.quiet {

@@ -11,7 +11,7 @@
 use super::jacobian::Jacobian;
 use super::kernel::{Bias, Kernel, dot};
 use super::tree;
-use super::{Mechanism, Time};
+use super::{Mechanism, Motion, Time};
 use crate::arithmetic::{Complex, Dual};
 use nalgebra::{DMatrix, linalg::Schur};
 
@@ -52,6 +52,13 @@ impl Stiffness {
             (found.energy, found.share) = (mode.energy, mode.energy / mechanism.energy_scale);
         }
         found
+    }
+
+    /// That of the start of a run, where springs or dampers can make it stiff.
+    pub fn at_start(mechanism: &Mechanism, start: &Motion) -> Option<Self> {
+        let has_any = !mechanism.springs.is_empty() || !mechanism.torsions.is_empty();
+        let [phi, omega] = [&start.phi, &start.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<f64>>());
+        has_any.then(|| Self::at(mechanism, start.time, &phi, &omega))
     }
 
     /// True where the mode dies away within a few periods, or does not swing at all.

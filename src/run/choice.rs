@@ -15,8 +15,8 @@
 
 use super::methods::{MethodId, Stabilization};
 use super::plan::{MANY_COORDINATES, Request, usual};
+use crate::dynamics::Mechanism;
 use crate::dynamics::stiffness::Stiffness;
-use crate::dynamics::{Mechanism, Motion};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
@@ -74,13 +74,13 @@ impl FromStr for Prefer {
     }
 }
 
-/// The method for a run to `until` \[s\] from `start`, where the scene's rates go up to `rate` \[rad/s\], and why.
-pub(super) fn choose(mechanism: &Mechanism, request: &Request, start: &Motion, until: f64, rate: f64) -> (MethodId, String) {
-    let (method, why) = chosen(mechanism, request, start, until, rate);
+/// The method for a run to `until` \[s\] of a mechanism so stiff at its start, where the scene's rates go up to `rate` \[rad/s\], and why.
+pub(super) fn choose(mechanism: &Mechanism, request: &Request, stiffness: Option<&Stiffness>, until: f64, rate: f64) -> (MethodId, String) {
+    let (method, why) = chosen(mechanism, request, stiffness, until, rate);
     (method, format!("{method}: {why}"))
 }
 
-fn chosen(mechanism: &Mechanism, request: &Request, start: &Motion, until: f64, rate: f64) -> (MethodId, String) {
+fn chosen(mechanism: &Mechanism, request: &Request, stiffness: Option<&Stiffness>, until: f64, rate: f64) -> (MethodId, String) {
     if request.extended {
         return (MethodId::Taylor, "extended orders are those of its series".into());
     }
@@ -103,8 +103,7 @@ fn chosen(mechanism: &Mechanism, request: &Request, start: &Motion, until: f64, 
         return (MethodId::Gauss(8), format!("a fixed step was given; {why}"));
     }
     let tolerance = request.rtol.or(request.atol);
-    let stiffness = stiffness(mechanism, start);
-    if let Some(damped) = stiffness.as_ref().filter(|stiffness| stiffness.is_damped() && stiffness.ratio() > STIFF) {
+    if let Some(damped) = stiffness.filter(|stiffness| stiffness.is_damped() && stiffness.ratio() > STIFF) {
         let stages = if tolerance.unwrap_or_default() >= TIGHT { 3 } else { 5 };
         let mode = damped.culprit.as_ref().map_or("the fastest mode".to_owned(), |name| format!("the mode of {name}"));
         return (MethodId::Radau(stages), format!("{mode} is {:.0} times as fast as the rest, and dies away", damped.ratio()));
@@ -113,7 +112,7 @@ fn chosen(mechanism: &Mechanism, request: &Request, start: &Motion, until: f64, 
         return (MethodId::Dp8, "the scene has walls, and impacts are located inside its steps".into());
     }
     let is_eliminated = !has_rows || kept == Stabilization::Elimination;
-    let fastest = stiffness.as_ref().map_or(rate, |stiffness| stiffness.fastest.max(rate));
+    let fastest = stiffness.map_or(rate, |stiffness| stiffness.fastest.max(rate));
     let is_bearable = until * fastest / STEP <= MANY_STEPS;
     let keeps = tolerance.is_none() && !mechanism.is_damped() && is_eliminated && is_bearable;
     match request.prefer {
@@ -131,7 +130,7 @@ fn chosen(mechanism: &Mechanism, request: &Request, start: &Motion, until: f64, 
     if n > FEW_COORDINATES {
         return (classic, format!("{n} coordinates are cheaper to evaluate than to expand"));
     }
-    let fast = stiffness.as_ref().filter(|stiffness| stiffness.ratio() > STIFF);
+    let fast = stiffness.filter(|stiffness| stiffness.ratio() > STIFF);
     let why = if let Some(name) = fast.and_then(|fast| fast.culprit.as_ref()) {
         format!("spring {name} vibrates undamped and is resolved, which its long steps do best")
     } else if mechanism.is_tied_up() {
@@ -148,13 +147,6 @@ fn chosen(mechanism: &Mechanism, request: &Request, start: &Motion, until: f64, 
         "over a short horizon its series is the most accurate for the time".into()
     };
     (MethodId::Taylor, why)
-}
-
-/// How stiff the mechanism is at its start, where springs or dampers can make it so.
-fn stiffness(mechanism: &Mechanism, start: &Motion) -> Option<Stiffness> {
-    let has_any = !mechanism.springs.is_empty() || !mechanism.torsions.is_empty();
-    let [phi, omega] = [&start.phi, &start.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<f64>>());
-    has_any.then(|| Stiffness::at(mechanism, start.time, &phi, &omega))
 }
 
 #[cfg(test)]

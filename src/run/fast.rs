@@ -5,8 +5,7 @@
 
 use super::methods::MethodId;
 use super::plan::{Refusal, Request};
-use crate::dynamics::{Mechanism, Stiffness};
-use crate::scene::Scene;
+use crate::dynamics::Stiffness;
 
 /// How much faster than all else a mode must be to be worth a note.
 const STIFF: f64 = 30.0;
@@ -35,18 +34,12 @@ pub struct FastMode {
 }
 
 impl FastMode {
-    /// That of a scene with springs, on the way to `until` \[s\] by a method; `step` is that of a fixed-step method \[s\].
-    pub fn measure(scene: &Scene, mechanism: &Mechanism, method: MethodId, step: Option<f64>, until: f64) -> Option<Self> {
-        if mechanism.springs.is_empty() && mechanism.torsions.is_empty() {
-            return None;
-        }
-        let start = mechanism.start(scene);
-        let [phi, omega] = [&start.phi, &start.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<_>>());
-        let found = Stiffness::at(mechanism, start.time, &phi, &omega);
+    /// What is `found` of the start, on the way to `until` \[s\] by a method; `step` is that of a fixed-step method \[s\].
+    pub fn new(found: Stiffness, method: MethodId, step: Option<f64>, until: f64) -> Self {
         let is_damped = found.is_damped();
         let dies = is_damped && matches!(method, MethodId::Radau(_));
         let steps = step.map_or(found.radians(until) / radians_a_step(method), |step| until / step);
-        Some(Self {
+        Self {
             periods: if is_damped { 0.0 } else { found.periods(until) },
             steps: if dies { 0.0 } else { steps },
             spring: found.culprit,
@@ -54,7 +47,7 @@ impl FastMode {
             decay: found.decay,
             slow: found.slow,
             energy_share: found.share,
-        })
+        }
     }
 
     /// True where it is so much faster than all else that it decides what a run costs.

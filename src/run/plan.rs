@@ -10,7 +10,7 @@ use crate::dynamics::compile::DENSE_LIMIT;
 use crate::dynamics::force::Vibration;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::natural::Natural;
-use crate::dynamics::{Mechanism, Time};
+use crate::dynamics::{Mechanism, Stiffness, Time};
 use crate::scene::Scene;
 use crate::stepping::Tolerance;
 
@@ -113,10 +113,11 @@ impl Plan {
             notes.push(format!("the output interval is cut to the horizon, {until} s"));
         }
         let rate = fastest_rate(scene, mechanism);
+        let stiffness = Stiffness::at_start(mechanism, &mechanism.start(scene));
         let (method, why) = match request.method {
             Some(method) => (method, None),
             None => {
-                let (method, why) = choose(mechanism, request, &mechanism.start(scene), until, rate);
+                let (method, why) = choose(mechanism, request, stiffness.as_ref(), until, rate);
                 (method, Some(why))
             }
         };
@@ -129,7 +130,7 @@ impl Plan {
         } else {
             step = Some(fixed_step(method, request, rate, until, &mut every, &mut notes)?);
         }
-        let stiffness = FastMode::measure(scene, mechanism, method, step, until);
+        let stiffness = stiffness.map(|found| FastMode::new(found, method, step, until));
         if let Some(mode) = &stiffness {
             mode.check(method, request, until)?;
             notes.extend(mode.note(method, until));

@@ -168,7 +168,11 @@ impl<P: Form + ?Sized> Method<P> for Shrinking<P> {
                 let seen = watch(problem, state)?;
                 is_enough = seen.is_enough();
                 if found.is_none() {
-                    problem.glance(state, before);
+                    if seen.is_changed() {
+                        problem.glance(state, before);
+                    } else {
+                        std::mem::swap(before, now);
+                    }
                     from.clone_from(state);
                     return Ok(seen);
                 }

@@ -266,21 +266,14 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
         let mut cuts = 0;
         let mut rejected_before = false;
         while left > 0.0 {
-            let whole = wanted >= left * (1.0 - 1e-12);
-            let h = if whole {
-                left
-            } else if wanted > 0.5 * left {
-                0.5 * left
-            } else {
-                wanted
-            };
+            let (h, whole) = super::reach(wanted, left);
             tally.check(P::NAME, state.time.hi, h)?;
             self.step(field, state, h, tally);
             let error = P::error(h, &self.k, &self.scale).sqrt();
             if !error.is_finite() {
                 cuts += 1;
                 tally.rejected += 1;
-                if cuts > 10 || h < 1e-14 * state.time.hi.abs().max(1e-3) {
+                if cuts > 10 || h < super::finest(state) {
                     let what = format!("{} is not finite", self.culprit(field, n));
                     return Err(Self::stop(
                         Cause::NotFinite,
@@ -301,7 +294,7 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
                 tally.rejected += 1;
                 rejected_before = true;
                 wanted = h * factor.min(0.9);
-                if wanted < 1e-14 * state.time.hi.abs().max(1e-3) {
+                if wanted < super::finest(state) {
                     let what = format!("{} asks for ever smaller steps", self.culprit(field, n));
                     return Err(Self::stop(Cause::StepTooSmall, state, h, what, "loosen the tolerance or use a stiff method"));
                 }
@@ -327,9 +320,7 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
                         continue;
                     }
                     Found::Inside => {
-                        let what = "a point has come to rest on a wall".into();
-                        let hint = "go on with the contact held (`Mechanism::holding`), or raise the restitution";
-                        return Err(Self::stop(Cause::RestingContact, state, h, what, hint));
+                        return Err(super::at_rest(P::NAME, state, h));
                     }
                 }
             }

@@ -234,6 +234,31 @@ fn scales(tolerance: Tolerance, y: &[f64], scale: &mut [f64]) {
     }
 }
 
+/// The step \[s\] of a method that wants `wanted` with `left` to go, and whether it goes all the way: two halves rather than a step and a sliver.
+fn reach(wanted: f64, left: f64) -> (f64, bool) {
+    if wanted >= left * (1.0 - 1e-12) {
+        return (left, true);
+    }
+    (if wanted > 0.5 * left { 0.5 * left } else { wanted }, false)
+}
+
+/// Steps \[s\] below this are lost in the resolution of time.
+fn finest(state: &State) -> f64 {
+    1e-14 * state.time.hi.abs().max(1e-3)
+}
+
+/// The stop of a step \[s\] in which a point came to rest on its wall.
+fn at_rest(method: &str, state: &State, step: f64) -> StepError {
+    StepError {
+        cause: Cause::RestingContact,
+        method: method.into(),
+        t: state.time.hi,
+        step,
+        what: "a point has come to rest on a wall".into(),
+        hint: "go on with the contact held (`Mechanism::holding`), or raise the restitution".into(),
+    }
+}
+
 /// The adaptive methods march forwards only; a time behind by no more than rounding has been reached.
 fn refuse_the_past(method: &str, state: &State, until: Time) -> Result<(), StepError> {
     let left = (until - state.time).hi;

@@ -440,16 +440,9 @@ impl<F: Field + ?Sized> Method<F> for Radau {
             if control.wanted == 0.0 {
                 control.wanted = self.first_step(state, left);
             }
-            let whole = control.wanted >= left * (1.0 - 1e-12);
-            let h = if whole {
-                left
-            } else if control.wanted > 0.5 * left {
-                0.5 * left
-            } else {
-                control.wanted
-            };
+            let (h, whole) = super::reach(control.wanted, left);
             tally.check(self.id(), state.time.hi, h)?;
-            if h < 1e-14 * state.time.hi.abs().max(1e-3) && !whole {
+            if h < super::finest(state) && !whole {
                 let what = format!("{} asks for ever smaller steps", self.culprit(field));
                 return Err(self.stop(
                     Cause::StepTooSmall,
@@ -519,9 +512,7 @@ impl<F: Field + ?Sized> Method<F> for Radau {
                         continue;
                     }
                     _ => {
-                        let what = "a point has come to rest on a wall".into();
-                        let hint = "go on with the contact held (`Mechanism::holding`), or raise the restitution";
-                        return Err(self.stop(Cause::RestingContact, state, h, what, hint));
+                        return Err(super::at_rest(self.id(), state, h));
                     }
                 }
             }

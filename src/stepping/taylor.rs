@@ -169,7 +169,7 @@ impl<T: Coefficient, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
                 let lost = problem.label(problem.angles() + self.expansion.as_ref().map_or(0, Expansion::lost));
                 return Err(stop(Cause::NotFinite, state, 0.0, format!("the series of {lost} is not finite"), hint));
             }
-            if wanted < 1e-14 * state.time.hi.abs().max(1e-3) {
+            if wanted < super::finest(state) {
                 return Err(stop(Cause::StepTooSmall, state, wanted, "the series converges in ever smaller circles".into(), hint));
             }
             let mut event = None;
@@ -271,8 +271,7 @@ impl<T: Coefficient> Taylor<T> {
                 Crossing::At(t) => (first, event) = (t, Some(contact)),
                 Crossing::Inside(t) if t > RESTING => (first, event) = (t, None),
                 Crossing::Inside(_) => {
-                    let hint = "go on with the contact held (`Mechanism::holding`), or raise the restitution";
-                    return Err(stop(Cause::RestingContact, state, h, "a point has come to rest on a wall".into(), hint));
+                    return Err(super::at_rest("taylor", state, h));
                 }
             }
         }

@@ -3,6 +3,7 @@
 use super::truth::{Room, Truth};
 use crate::dynamics::{Mechanism, Motion};
 use crate::run::drift::Limits;
+use crate::run::drift::larger;
 use crate::run::plan::Plan;
 use crate::run::running::{Run, RunError, Running};
 use crate::stepping::{StepError, Tally};
@@ -78,7 +79,7 @@ pub(super) fn measure(
     }
     let outcome = running.finish();
     let levels = outcome.drift.constraints.iter().map(|(_, [position, velocity])| [position.max, velocity.max]);
-    found.constraint = levels.reduce(|a, b| [0, 1].map(|level| if a[level].is_nan() { a[level] } else { a[level].max(b[level]) }));
+    found.constraint = levels.reduce(|a, b| [0, 1].map(|level| larger(a[level], b[level])));
     found.energy = outcome.drift.energy.max;
     found.tally = outcome.tally;
     Ok(match outcome.stop {

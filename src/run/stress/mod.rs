@@ -17,6 +17,7 @@ mod steps;
 pub use set::shipped;
 pub use steps::{Stability, StabilityMap, stability};
 
+use super::drift::larger;
 use super::methods::{METHODS, MethodId};
 use super::plan::{Plan, Request};
 use super::running::{Outcome, Run, march};
@@ -250,15 +251,14 @@ fn prepared(case: &Case) -> Result<(Scene, Arc<Mechanism>), String> {
 /// What a finished cell amounts to.
 fn verdict(case: &Case, cell: &Cell) -> Verdict {
     let is_named = |culprit: &str| cell.stop.as_ref().is_some_and(|stop| stop.what.contains(culprit));
-    let is_confirmed = cell.refusal.is_none() && cell.stop.is_none();
     match &case.expected {
         Expected::Refusal if cell.refusal.is_some() => Verdict::Right,
         Expected::Stop(culprit) if is_named(culprit) => Verdict::Right,
         _ if cell.refusal.is_some() => Verdict::Refused,
         _ if cell.stop.is_some() => Verdict::Stopped,
-        Expected::Unknown if is_confirmed => Verdict::Right,
+        Expected::Unknown => Verdict::Right,
         // Not a number is not within the tolerance.
-        _ if is_confirmed && cell.error.is_some_and(|error| error <= case.tolerance) => Verdict::Right,
+        _ if cell.error.is_some_and(|error| error <= case.tolerance) => Verdict::Right,
         _ => Verdict::Wrong,
     }
 }
@@ -290,8 +290,7 @@ impl End {
     fn apart(&self, other: &Self) -> f64 {
         let angles = self.angles.iter().zip(&other.angles).map(|(a, b)| (a - b).abs());
         let rates = self.rates.iter().zip(&other.rates).map(|(a, b)| (a - b).abs() / b.abs().max(1.0));
-        // max() of floats passes over what is not a number.
-        angles.chain(rates).fold(0.0, |most: f64, off| if off > most || off.is_nan() { off } else { most })
+        angles.chain(rates).fold(0.0, larger)
     }
 }
 
@@ -352,7 +351,7 @@ impl Trial<'_> {
         Ok(())
     }
 
-    /// True while there is effort for a run twice as dear as all so far.
+    /// True while there is effort for another run.
     fn is_left(&self, cell: &Cell) -> bool {
         cell.evaluations < self.effort
     }

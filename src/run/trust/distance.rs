@@ -2,6 +2,7 @@
 
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Mechanism, Motion};
+use crate::run::drift::larger;
 
 /// Measures distances: angles as they are \[rad\], positions of free feet over the mechanism's size.
 #[derive(Clone, Copy, Debug)]
@@ -41,10 +42,7 @@ impl Ruler {
     }
 
     fn largest(&self, differences: impl Iterator<Item = f64>) -> f64 {
-        differences.enumerate().fold(0.0, |most: f64, (k, difference)| {
-            let size = difference.abs() * self.weight(k);
-            if size.is_nan() || most.is_nan() { f64::NAN } else { most.max(size) }
-        })
+        differences.enumerate().fold(0.0, |most, (k, difference)| larger(most, difference.abs() * self.weight(k)))
     }
 }
 
