@@ -20,7 +20,7 @@ const ENDS: &[End] = &[
     ("free", "taylor", 1e-12, None, 10.0, 0x16cb_04dc_7f78_7f28),
     ("gentle", "gauss16", 1.0 / 64.0, None, 10.0, 0xb1e2_bc96_53fd_6a40),
     ("spring", "dp5", 1e-8, None, 3.0, 0x798c_9b99_0f30_683b),
-    ("spring", "taylor", 1e-10, None, 3.0, 0x6fd1_42ed_dfd4_0c82),
+    ("spring", "taylor", 1e-10, None, 3.0, 0x5796_59f8_8c05_61b2),
     ("motor", "taylor", 1e-9, Some(Stabilization::Elimination), 10.0, 0xd21d_8adf_982b_f62e),
     ("motor_sine", "dp8", 1e-9, Some(Stabilization::Projection), 3.0, 0x0848_9eee_52d2_c01e),
     ("motor_sine", "gauss8", 1.0 / 128.0, None, 3.0, 0x81fe_c74d_d8c2_5be7),

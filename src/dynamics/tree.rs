@@ -8,6 +8,7 @@
 //!
 //! Loops run over `N` bodies where `N > 0`, so that small sizes are unrolled, and over the number at hand where `N = 0`.
 
+use super::force::Spring;
 use crate::arithmetic::{Complex, Scalar};
 
 /// `N`, or the number at hand where `N` is 0.
@@ -39,10 +40,11 @@ impl Tree {
         self.coupling.len() == self.coordinates * self.coordinates
     }
 
-    /// About the fastest rate of small oscillations under gravity \[rad/s\], for hinges on the bodies' axes.
+    /// About the fastest rate of small oscillations under gravity and springs between hanging bodies \[rad/s\], for hinges on the bodies' axes.
     ///
-    /// Stretched, the chain has the least inertia against bending: the trace of M⁻¹ W there is about the square of its fastest rate.
-    pub fn fastest_rate(&self) -> f64 {
+    /// Stretched, the chain has the least inertia against bending: the trace of M⁻¹ W there is about the square of its fastest rate, and that of M⁻¹ K at most
+    /// k (Σ |gamma_i| (M⁻¹)_ii^(1/2))² for each spring.
+    pub fn fastest_rate(&self, springs: &[Spring]) -> f64 {
         let n = self.coordinates;
         let mut mass: Vec<f64> = self.coupling.iter().map(|h| h.re).collect();
         for i in 0..n {
@@ -50,14 +52,17 @@ impl Tree {
         }
         let mut pivot = vec![0.0; n];
         factor::<f64, 0>(n, &mut mass, &mut pivot);
-        let mut square = 0.0;
-        for i in 0..n {
+        let mobility = |i: usize| {
             let mut unit = vec![0.0; n];
-            unit[i] = self.weight[i].norm_squared().sqrt();
+            unit[i] = 1.0;
             solve::<f64, 0>(n, &mass, &pivot, &mut unit);
-            square += unit[i];
-        }
-        square.sqrt()
+            unit[i]
+        };
+        let mobility: Vec<f64> = (0..n).map(mobility).collect();
+        let gravity: f64 = self.weight.iter().zip(&mobility).map(|(weight, mobility)| weight.norm_squared().sqrt() * mobility).sum();
+        let moved = |spring: &Spring| spring.span.terms.iter().map(|&(i, gamma)| (gamma.norm_squared() * mobility[i]).sqrt()).sum::<f64>();
+        let pulled: f64 = springs.iter().map(|spring| spring.stiffness * moved(spring).powi(2)).sum();
+        (gravity + pulled).sqrt()
     }
 
     /// Writes M above and on the diagonal and Im p above it, both row by row (n × n) \[kg·m²\].

@@ -36,6 +36,7 @@ mod jump;
 mod looped;
 mod pace;
 mod pair;
+mod springs;
 mod terms;
 mod wide;
 
@@ -47,7 +48,7 @@ use super::{Cause, Method, Reached, StepError, Tally, Tolerance, Watch};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics;
 use crate::dynamics::series::Coefficient;
-use crate::dynamics::{Coordinates, Field, Form, State, Time};
+use crate::dynamics::{Coordinates, Field, Form, Mechanism, State, Time};
 
 /// Powers the step is taken from.
 const JUDGES: usize = 5;
@@ -115,15 +116,20 @@ impl<T: Coefficient> Taylor<T> {
 }
 
 impl Taylor<f64> {
-    /// The method at a tolerance, with the order that serves it: 16 from 1e-8 up, 20 from 1e-15 up, 24 below.
+    /// The method at a tolerance, with the order that serves it: 16 from 1e-7 up, 20 from 1e-15 up, 24 below.
     pub fn new(tolerance: Tolerance) -> Self {
         let tolerance = tolerance.relative.min(tolerance.absolute);
         let order = match tolerance {
-            t if t >= 1e-8 => 16,
+            t if t >= 1e-7 => 16,
             t if t >= 1e-15 => 20,
             _ => 24,
         };
         Self::with_order(tolerance, order)
+    }
+
+    /// True where free motions of the mechanism are expanded in lanes, or their first orders in double-double where `extended`.
+    pub fn has_lanes(mechanism: &Mechanism, extended: bool) -> bool {
+        mechanism.contacts.is_empty() && Fast::new(mechanism, 1.0, 24, false, extended).is_some()
     }
 }
 

@@ -28,6 +28,11 @@ pub struct Spring {
 }
 
 impl Spring {
+    /// True where the force depends on the length, and not on the span alone.
+    pub fn needs_length(&self) -> bool {
+        self.free_length != 0.0 || self.damping != 0.0
+    }
+
     /// Force \[N\] on the first end.
     #[inline(always)]
     pub fn force<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> Complex<T> {

@@ -31,7 +31,7 @@ impl<T: Real> SpringSeries<T> {
         let (is_long, is_damped) = (spring.free_length != 0.0, spring.damping != 0.0);
         Self {
             span: vec![Complex::ZERO; order + 1],
-            square: room(is_long || is_damped),
+            square: room(spring.needs_length()),
             inverse_length: room(is_long),
             inverse_square: room(is_damped),
             closing: room(is_damped),
@@ -56,7 +56,7 @@ impl<T: Real> SpringSeries<T> {
         self.span[m] = if m == 0 { spring.span.position(z) } else { at(m) };
         let span = &self.span[..=m];
         let mut force = -span[m].times(T::of(spring.stiffness));
-        if spring.free_length == 0.0 && spring.damping == 0.0 {
+        if !spring.needs_length() {
             return force;
         }
         self.square[m] = product(span, span, |a, b| a.dot(b));

@@ -32,11 +32,15 @@ impl Prices {
         let (n, rows) = (mechanism.coordinates() as f64, mechanism.rows.len() as f64);
         let forces = (mechanism.springs.len() + mechanism.torsions.len() + mechanism.actions.len()) as f64;
         let evaluation = 15.0 + 20.0 * n + 4.0 * n * n.min(12.0) + 60.0 * rows + 20.0 * forces;
-        let has_lanes = mechanism.is_plain() && !mechanism.is_tied_up() && mechanism.contacts.is_empty();
-        let plain = if has_lanes { 250.0 + 130.0 * n } else { 700.0 + 400.0 * n + 150.0 * n * n + 700.0 * rows + 700.0 * forces };
+        let has_lanes = Taylor::has_lanes(mechanism, false);
+        let plain = match has_lanes {
+            true if n <= 2.0 && forces == 0.0 => 400.0,
+            true => 300.0 + 220.0 * n + if forces > 0.0 { 600.0 } else { 0.0 },
+            false => 700.0 + 400.0 * n + 150.0 * n * n + 700.0 * rows + 700.0 * forces,
+        };
         let series = |plan: &Plan| {
             let order = Taylor::new(plan.tolerance.unwrap_or_default()).order as f64;
-            let wide = match (plan.extended, has_lanes && n <= 2.0 && rows == 0.0) {
+            let wide = match (plan.extended, Taylor::has_lanes(mechanism, true)) {
                 (false, _) => 1.0,
                 (true, true) => 3.0,
                 (true, false) => 10.0,

@@ -10,7 +10,7 @@ use crate::run::methods::MethodId;
 use crate::run::plan::Plan;
 use crate::run::running::Outcome;
 use crate::stepping::composition::Composition;
-use crate::stepping::{StepError, Tally, Tolerance};
+use crate::stepping::{StepError, Tally, Taylor, Tolerance};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -121,7 +121,7 @@ fn planned(mechanism: &Mechanism, plan: &Plan, level: Level) -> (Plan, String) {
         (_, finer) => finer.is_some_and(|finer| finer * FINER < NEAR_ROUNDING),
     };
     // Two bodies under gravity have a kernel for it; rows kept by projection are kept in doubles.
-    let has_kernel = mechanism.is_plain() && mechanism.rows.is_empty() && mechanism.bodies.len() <= 2 && mechanism.contacts.is_empty();
+    let has_kernel = Taylor::has_lanes(mechanism, true);
     let may_extend = !mechanism.has_multipliers() && mechanism.contacts.is_empty();
     let is_extended = may_extend && (level == Level::Full || (is_near_rounding && has_kernel));
     let tolerance = match finer {

@@ -109,7 +109,7 @@ impl Tangent {
         }
         // At the start there may be no force to be felt yet.
         let turning = state.y[f..2 * f].iter().fold(0.0, |most: f64, rate| most.max(rate.abs()));
-        let rate = most.sqrt().max(turning).max(mechanism.tree.fastest_rate()).max(10.0 / until.max(f64::MIN_POSITIVE));
+        let rate = most.sqrt().max(turning).max(mechanism.tree.fastest_rate(&[])).max(10.0 / until.max(f64::MIN_POSITIVE));
         let columns = if mechanism.has_multipliers() {
             (0..VECTORS).map(|k| tangent.slide(mechanism, &state, k, rate)).collect()
         } else if f > whole {

@@ -1,4 +1,4 @@
-//! A few bodies without springs and motors, one lane a body.
+//! A few bodies without motors, one lane a body.
 //!
 //! The equation of [`pair`](super::pair) for n bodies, with dense A: per order four Cauchy products a body, two orders in one pass.  M_0⁻¹ and its products with A
 //! are formed once a step, so that an order waits for two sums over the bodies, one after the other:
@@ -9,11 +9,15 @@
 //! v_{k+1} = M_0⁻¹ r - C g_x - S g_y,    C = M_0⁻¹ c_0 A,  S = M_0⁻¹ s_0 A,    f_{k+1} = g + v_{k+1} e_0
 //! ```
 //!
+//! What springs and dampers add to P is made in [`springs`](super::springs); without them there is no trace of it in the code.
+//!
 //! Scene constants enter as in `pair`: fractions of low orders in two terms, and the solutions of the first orders refined.
 
 use super::direction;
 use super::pace::{self, Pace};
+use super::springs::Springs;
 use super::terms::over;
+use super::wide::{self, Wide};
 use crate::arithmetic::DoubleDouble;
 use crate::arithmetic::lanes::Lanes;
 use crate::dynamics::{Mechanism, State};
@@ -26,19 +30,21 @@ pub const fn room(blocks: usize) -> usize {
 }
 
 /// Four numbers a vector, `B` vectors.
-type Row<const B: usize> = [[f64; 4]; B];
+pub type Row<const B: usize> = [[f64; 4]; B];
 
-/// Constants of the mechanism; lanes beyond the last body are zero.
+/// Constants of the mechanism, whose springs fill `S` vectors; lanes beyond the last body are zero.
 #[derive(Clone, Debug)]
-pub struct Bodies<const B: usize> {
+pub struct Bodies<const B: usize, const S: usize> {
     count: usize,
+    /// Highest power of the rates, an even number.
+    order: usize,
+    pace: Pace,
     /// Column j of A: A_ij over i, zero on the diagonal \[kg·m²\].
     coupling: Vec<Row<B>>,
     diagonal: Row<B>,
     /// W \[N·m\].
     weight: [Row<B>; 2],
-    /// About the fastest rate of small oscillations \[rad/s\].
-    rate: f64,
+    springs: Springs<B, S>,
     /// Of the step's start, over the columns.
     columns: Vec<Column<B>>,
     scratch: Box<Scratch<B>>,
@@ -81,14 +87,16 @@ struct Sums<L, const B: usize> {
     load: [L; B],
 }
 
-impl<const B: usize> Bodies<B> {
-    /// The constants, where this form fits: up to 4 B bodies on their axes, neither springs nor rows.
-    pub fn new(mechanism: &Mechanism) -> Option<Self> {
+impl<const B: usize, const S: usize> Bodies<B, S> {
+    /// The constants, where this form fits: up to 4 B bodies on their axes, as many springs as fill `S` vectors, no rows, and an even order.
+    pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize) -> Option<Self> {
         let tree = &mechanism.tree;
         let n = tree.coordinates;
-        if n == 0 || n > room(B) || tree.off_axis || !mechanism.is_plain() || !mechanism.rows.is_empty() {
+        let is_sprung_only = mechanism.torsions.is_empty() && mechanism.actions.is_empty() && mechanism.rows.is_empty();
+        if n == 0 || n > room(B) || tree.off_axis || !is_sprung_only || order > MOST || order % 2 == 1 {
             return None;
         }
+        let springs = Springs::new(mechanism)?;
         let zero = [[0.0; 4]; B];
         let mut coupling = vec![zero; n];
         let (mut diagonal, mut weight) = (zero, [zero; 2]);
@@ -101,25 +109,24 @@ impl<const B: usize> Bodies<B> {
                 coupling[i][j / 4][j % 4] = tree.coupling[i * n + j].re;
             }
         }
+        // The longest step in which the terms left out still fall.
+        let longest = order as f64 / 3.0 / tree.fastest_rate(&mechanism.springs);
         Some(Self {
             count: n,
+            order,
+            pace: Pace::new(tolerance, order, longest),
             coupling,
             diagonal,
             weight,
-            rate: tree.fastest_rate(),
+            springs,
             columns: vec![Column { mass: zero, inverse: zero, cos: zero, sin: zero }; n],
             scratch: Box::new(Scratch { e: [[zero; 2]; MOST + 2], v: [[zero; 3]; MOST + 1] }),
         })
     }
-
-    /// The longest step in which the terms left out still fall \[s\].
-    pub fn longest(&self, order: usize) -> f64 {
-        order as f64 / 3.0 / self.rate
-    }
 }
 
 #[inline(always)]
-fn load<L: Lanes, const B: usize>(row: &Row<B>) -> [L; B] {
+pub fn load<L: Lanes, const B: usize>(row: &Row<B>) -> [L; B] {
     let mut lanes = [L::splat(0.0); B];
     for b in 0..B {
         lanes[b] = L::of(row[b]);
@@ -128,7 +135,7 @@ fn load<L: Lanes, const B: usize>(row: &Row<B>) -> [L; B] {
 }
 
 #[inline(always)]
-fn store<L: Lanes, const B: usize>(lanes: [L; B]) -> Row<B> {
+pub fn store<L: Lanes, const B: usize>(lanes: [L; B]) -> Row<B> {
     let mut row = [[0.0; 4]; B];
     for b in 0..B {
         row[b] = lanes[b].array();
@@ -186,7 +193,7 @@ fn turn<L: Lanes, const B: usize>(scratch: &mut Scratch<B>, k: usize, f: [[L; B]
     e
 }
 
-/// Order k: v_{k+1}, P_{k+1} and f_{k+1} from the sums and e_{k+1}.
+/// Order k: v_{k+1}, P_{k+1} and f_{k+1} from the sums, e_{k+1}, and what springs add to P_{k+1}.
 #[inline(always)]
 fn order<L: Lanes, const B: usize>(
     (coupling, columns): (&[Row<B>], &[Column<B>]),
@@ -194,13 +201,20 @@ fn order<L: Lanes, const B: usize>(
     scratch: &mut Scratch<B>,
     k: usize,
     sums: Sums<L, B>,
-    e: [[L; B]; 2],
+    (e, pull): ([[L; B]; 2], Option<[[L; B]; 2]>),
 ) -> [[L; B]; 2] {
     let Sums { mut g, load: mut r } = sums;
     let [c, s]: [[L; B]; 2] = [load(&scratch.e[k][0]), load(&scratch.e[k][1])];
     for b in 0..B {
         (g[0][b], g[1][b]) = (start.v[b].mul_add(e[0][b], g[0][b]), start.v[b].mul_add(e[1][b], g[1][b]));
         r[b] = s[b].neg_mul_add(start.weight[0][b], c[b].mul_add(start.weight[1][b], L::splat(0.0).sub(r[b])));
+    }
+    let (mut px, mut py) = ([L::splat(0.0); B], [L::splat(0.0); B]);
+    if let Some(pull) = pull {
+        for b in 0..B {
+            r[b] = start.e[0][b].neg_mul_add(pull[0][b], start.e[1][b].neg_mul_add(pull[1][b], r[b]));
+        }
+        [px, py] = pull;
     }
     let v = if k < 2 { refined((coupling, columns), start, k, r, g) } else { solved(columns, k, r, g) };
     let mut f = g;
@@ -213,7 +227,6 @@ fn order<L: Lanes, const B: usize>(
         (scaled[0][b], scaled[1][b]) = (f[0][b].mul(rate), f[1][b].mul(rate));
     }
     let (fx, fy) = (store(scaled[0]), store(scaled[1]));
-    let (mut px, mut py) = ([L::splat(0.0); B], [L::splat(0.0); B]);
     for ((column, &x), &y) in coupling.iter().zip(fx.as_flattened()).zip(fy.as_flattened()) {
         let (x, y) = (L::splat(x), L::splat(y));
         for b in 0..B {
@@ -276,9 +289,10 @@ fn refined<L: Lanes, const B: usize>(
 
 /// One step of at most `left` \[s\]; returns the step wanted and the step taken.
 #[inline(always)]
-pub fn step<L: Lanes, const P: usize, const B: usize>(bodies: &mut Bodies<B>, pace: &Pace, state: &mut State, left: f64) -> (f64, f64) {
-    begin::<L, B>(bodies, state);
-    let Bodies { coupling, diagonal, weight, columns, scratch, .. } = bodies;
+pub fn step<L: Lanes, const B: usize, const S: usize>(bodies: &mut Bodies<B, S>, state: &mut State, left: f64) -> (f64, f64) {
+    begin::<L, B, S>(bodies, state);
+    let Bodies { order: last, pace, coupling, diagonal, weight, columns, springs, scratch, .. } = bodies;
+    let last = *last;
     let start: Start<L, B> = Start {
         e: [load(&scratch.e[0][0]), load(&scratch.e[0][1])],
         v: load(&scratch.v[0][0]),
@@ -289,11 +303,13 @@ pub fn step<L: Lanes, const P: usize, const B: usize>(bodies: &mut Bodies<B>, pa
     for b in 0..B {
         (f[0][b], f[1][b]) = (start.v[b].mul(start.e[0][b]), start.v[b].mul(start.e[1][b]));
     }
-    for k in (0..P).step_by(2) {
+    for k in (0..last).step_by(2) {
         let e = turn(scratch, k, f);
+        let pull = springs.pull(k, &scratch.e[k + 1]);
         let [first, mut second] = sums::<L, B>(scratch, k);
-        f = order((coupling, columns), &start, scratch, k, first, e);
+        f = order((coupling, columns), &start, scratch, k, first, (e, pull));
         let e = turn(scratch, k + 1, f);
+        let pull = springs.pull(k + 1, &scratch.e[k + 2]);
         for b in 0..B {
             let [v, px, py] = &scratch.v[k + 1];
             let (v, px, py) = (L::of(v[b]), L::of(px[b]), L::of(py[b]));
@@ -301,42 +317,46 @@ pub fn step<L: Lanes, const P: usize, const B: usize>(bodies: &mut Bodies<B>, pa
             (second.g[0][b], second.g[1][b]) = (v.mul_add(c, second.g[0][b]), v.mul_add(s, second.g[1][b]));
             second.load[b] = px.mul_add(c, py.mul_add(s, second.load[b]));
         }
-        f = order((coupling, columns), &start, scratch, k + 1, second, e);
+        f = order((coupling, columns), &start, scratch, k + 1, second, (e, pull));
     }
     let mut sizes = [0.0; super::JUDGES];
     for (i, size) in sizes.iter_mut().enumerate() {
         let mut largest = L::splat(0.0);
-        for &lanes in &scratch.v[P - i][0] {
+        for &lanes in &scratch.v[last - i][0] {
             largest = L::of(lanes).abs().max(largest);
         }
         *size = largest.array().into_iter().fold(0.0, |a, b| if a > b { a } else { b });
     }
-    if !scratch.v[P][0].iter().flatten().all(|v| v.is_finite()) {
+    if !scratch.v[last][0].iter().flatten().all(|v| v.is_finite()) {
         return (f64::NAN, 0.0);
     }
-    let wanted = pace.step::<P>(&sizes);
+    let wanted = pace.step_of(last, &sizes);
     let h = pace::taken(wanted, left);
     if h > 0.0 {
-        finish::<L, P, B>(scratch, state, bodies.count, h);
+        go::<L, B, S>(bodies, state, h);
     }
     (wanted, h)
 }
 
 /// Power zero, M_0 and what is formed from it.
 #[inline(always)]
-fn begin<L: Lanes, const B: usize>(bodies: &mut Bodies<B>, state: &State) {
+fn begin<L: Lanes, const B: usize, const S: usize>(bodies: &mut Bodies<B, S>, state: &State) {
     let n = bodies.count;
-    let Bodies { coupling, diagonal, columns, scratch, .. } = bodies;
-    let mut pairs = [[0.0; 2]; 8];
+    let Bodies { coupling, diagonal, columns, springs, scratch, .. } = bodies;
+    let mut pairs = [[0.0; 4]; 8];
     for first in (0..n).step_by(2) {
         let second = (first + 1).min(n - 1);
         let (a, b) = (state.y[first], state.y[second]);
         let (a_low, b_low) = (state.low[first], state.low[second]);
-        let [ca, sa, cb, sb] = direction::unit(L::of([a, a, b, b]), L::of([a_low, a_low, b_low, b_low])).array();
-        pairs[first] = [ca, sa];
-        pairs[second] = [cb, sb];
+        let (angles, rests) = (L::of([a, a, b, b]), L::of([a_low, a_low, b_low, b_low]));
+        // Springs ask for what the unit vectors leave out.
+        let unit = if S == 0 { Wide::of(direction::unit(angles, rests)) } else { wide::unit(Wide { hi: angles, lo: rests }) };
+        let ([ca, sa, cb, sb], [ca_low, sa_low, cb_low, sb_low]) = (unit.hi.array(), unit.lo.array());
+        pairs[first] = [ca, sa, ca_low, sa_low];
+        pairs[second] = [cb, sb, cb_low, sb_low];
     }
-    for (i, [c, s]) in pairs.into_iter().enumerate().take(n) {
+    springs.begin::<L>(&pairs[..n]);
+    for (i, [c, s, ..]) in pairs.into_iter().enumerate().take(n) {
         scratch.e[0][0][i / 4][i % 4] = c;
         scratch.e[0][1][i / 4][i % 4] = s;
         scratch.v[0][0][i / 4][i % 4] = state.y[n + i];
@@ -396,17 +416,12 @@ fn invert<L: Lanes, const B: usize>(columns: &mut [Column<B>]) {
 
 /// Takes the state from the step's start on by `h` \[s\].
 #[inline(always)]
-pub fn go<L: Lanes, const P: usize, const B: usize>(bodies: &Bodies<B>, state: &mut State, h: f64) {
-    finish::<L, P, B>(&bodies.scratch, state, bodies.count, h);
-}
-
-/// The new state.
-#[inline(always)]
-fn finish<L: Lanes, const P: usize, const B: usize>(scratch: &Scratch<B>, state: &mut State, n: usize, h: f64) {
+pub fn go<L: Lanes, const B: usize, const S: usize>(bodies: &Bodies<B, S>, state: &mut State, h: f64) {
+    let (scratch, n) = (&bodies.scratch, bodies.count);
     let (step, square) = (L::splat(h), L::splat(h * h));
     for b in 0..B {
         let (mut angles, mut rates) = ([L::splat(0.0); 2], [L::splat(0.0); 2]);
-        let mut k = P;
+        let mut k = bodies.order;
         while k > 0 {
             let v = L::of(scratch.v[k][0][b]);
             angles[k % 2] = angles[k % 2].mul_add(square, over(v, k + 1));
@@ -419,10 +434,20 @@ fn finish<L: Lanes, const P: usize, const B: usize>(scratch: &Scratch<B>, state:
             let i = 4 * b + lane;
             if i < n {
                 for (at, increment) in [(i, angle[lane] + h * state.low[n + i]), (n + i, rate[lane])] {
-                    let sum = DoubleDouble::sum(state.y[at], state.low[at]) + increment;
-                    (state.y[at], state.low[at]) = (sum.hi, sum.lo);
+                    add(state, at, increment);
                 }
             }
         }
     }
+    let power = bodies.springs.power(bodies.order);
+    if !power.is_empty() {
+        let work = power.iter().enumerate().rev().fold(0.0, |sum, (m, &power)| sum * h + power / (m + 1) as f64);
+        add(state, 2 * n, work * h);
+    }
+}
+
+#[inline(always)]
+fn add(state: &mut State, at: usize, increment: f64) {
+    let sum = DoubleDouble::sum(state.y[at], state.low[at]) + increment;
+    (state.y[at], state.low[at]) = (sum.hi, sum.lo);
 }

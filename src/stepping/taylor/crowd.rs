@@ -278,7 +278,7 @@ fn march<L: Lanes, const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], unti
                     Some(index) => {
                         let entrant = &entrants[index];
                         team.seat(lane, entrant);
-                        let longest = order as f64 / 3.0 / entrant.mechanism.tree.fastest_rate();
+                        let longest = order as f64 / 3.0 / entrant.mechanism.tree.fastest_rate(&[]);
                         (seat.pace, seat.time) = (Pace::new(crowd.tolerance, order, longest), entrant.state.time);
                     }
                     None => team.park(lane),

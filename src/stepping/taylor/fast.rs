@@ -40,8 +40,10 @@ enum Form {
     Pair(Pair, Box<pair::Scratch>),
     Extended(Pair, Box<extended::Scratch>),
     Driven(Box<Driven>, Box<driven::Scratch>),
-    Few(Box<Bodies<1>>),
-    Several(Box<Bodies<2>>),
+    Few(Box<Bodies<1, 0>>),
+    Several(Box<Bodies<2, 0>>),
+    FewSprung(Box<Bodies<1, 1>>),
+    SeveralSprung(Box<Bodies<2, 1>>),
     FewLooped(Box<Looped<1>>),
     SeveralLooped(Box<Looped<2>>),
     ManyLooped(Box<Looped<4>>),
@@ -107,8 +109,6 @@ fn step<L: Lanes, const P: usize>(form: &mut Form, pace: &Pace, state: &mut Stat
             flow.write(state);
             steps
         }
-        Form::Few(bodies) => bodies::step::<L, P, 1>(bodies, pace, state, left),
-        Form::Several(bodies) => bodies::step::<L, P, 2>(bodies, pace, state, left),
         _ => (f64::NAN, 0.0),
     })
 }
@@ -132,47 +132,49 @@ fn go<L: Lanes, const P: usize>(form: &mut Form, state: &mut State, h: f64) {
             driven::go::<L, P>(driven, scratch, &mut flow, h);
             flow.write(state);
         }
-        Form::Few(bodies) => bodies::go::<L, P, 1>(bodies, state, h),
-        Form::Several(bodies) => bodies::go::<L, P, 2>(bodies, state, h),
         _ => {}
     }
 }
 
-/// A step of a mechanism with loops, of any order.
-struct LoopedStepping<'a>(&'a mut Form, &'a mut State, f64);
+/// A step of any order, by the forms that know theirs.
+struct AnyStepping<'a>(&'a mut Form, &'a mut State, f64);
 
-impl Code for LoopedStepping<'_> {
+impl Code for AnyStepping<'_> {
     type Output = Option<(f64, f64)>;
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Option<(f64, f64)> {
-        looped_step::<L>(self.0, self.1, self.2)
+        any_step::<L>(self.0, self.1, self.2)
     }
 }
 
-/// A way on by the series of a mechanism with loops.
-struct LoopedGoing<'a>(&'a mut Form, &'a mut State, f64);
+/// A way on by such a series.
+struct AnyGoing<'a>(&'a mut Form, &'a mut State, f64);
 
-impl Code for LoopedGoing<'_> {
+impl Code for AnyGoing<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        looped_go::<L>(self.0, self.1, self.2);
+        any_go::<L>(self.0, self.1, self.2);
     }
 }
 
-/// The code of mechanisms with loops, which takes every order.
-fn of_loops() -> (Step, Go) {
+/// The code of all orders.
+fn of_any() -> (Step, Go) {
     (
-        |form, _, state, left, is_portable| lanes::run(LoopedStepping(form, state, left), is_portable),
-        |form, state, h, is_portable| lanes::run(LoopedGoing(form, state, h), is_portable),
+        |form, _, state, left, is_portable| lanes::run(AnyStepping(form, state, left), is_portable),
+        |form, state, h, is_portable| lanes::run(AnyGoing(form, state, h), is_portable),
     )
 }
 
 #[inline(always)]
-fn looped_step<L: Lanes>(form: &mut Form, state: &mut State, left: f64) -> Option<(f64, f64)> {
+fn any_step<L: Lanes>(form: &mut Form, state: &mut State, left: f64) -> Option<(f64, f64)> {
     match form {
+        Form::Few(bodies) => Some(bodies::step::<L, _, _>(bodies, state, left)),
+        Form::Several(bodies) => Some(bodies::step::<L, _, _>(bodies, state, left)),
+        Form::FewSprung(bodies) => Some(bodies::step::<L, _, _>(bodies, state, left)),
+        Form::SeveralSprung(bodies) => Some(bodies::step::<L, _, _>(bodies, state, left)),
         Form::FewLooped(looped) => looped::step::<L, 1>(looped, state, left),
         Form::SeveralLooped(looped) => looped::step::<L, 2>(looped, state, left),
         Form::ManyLooped(looped) => looped::step::<L, 4>(looped, state, left),
@@ -181,8 +183,12 @@ fn looped_step<L: Lanes>(form: &mut Form, state: &mut State, left: f64) -> Optio
 }
 
 #[inline(always)]
-fn looped_go<L: Lanes>(form: &mut Form, state: &mut State, h: f64) {
+fn any_go<L: Lanes>(form: &mut Form, state: &mut State, h: f64) {
     match form {
+        Form::Few(bodies) => bodies::go::<L, _, _>(bodies, state, h),
+        Form::Several(bodies) => bodies::go::<L, _, _>(bodies, state, h),
+        Form::FewSprung(bodies) => bodies::go::<L, _, _>(bodies, state, h),
+        Form::SeveralSprung(bodies) => bodies::go::<L, _, _>(bodies, state, h),
         Form::FewLooped(looped) => looped::go::<L, 1>(looped, state, h),
         Form::SeveralLooped(looped) => looped::go::<L, 2>(looped, state, h),
         Form::ManyLooped(looped) => looped::go::<L, 4>(looped, state, h),
@@ -193,12 +199,7 @@ fn looped_go<L: Lanes>(form: &mut Form, state: &mut State, h: f64) {
 impl Fast {
     /// The kernel, where there is one; `is_extended`: with the first orders in double-double.
     pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize, is_portable: bool, is_extended: bool) -> Option<Self> {
-        let (step, go) = match order {
-            16 => of_order::<16>(),
-            20 => of_order::<20>(),
-            24 => of_order::<24>(),
-            _ => return None,
-        };
+        let settings = Settings { mechanism: mechanism.clone(), tolerance, order, is_portable, is_extended };
         let (form, longest) = if is_extended {
             let pair = Pair::new(mechanism).filter(|_| order == EXTENDED)?;
             let longest = pair.longest(order);
@@ -209,16 +210,25 @@ impl Fast {
         } else if let Some(driven) = Driven::new(mechanism) {
             let longest = driven.longest(order);
             (Form::Driven(Box::new(driven), Box::default()), longest)
-        } else if let Some(bodies) = Bodies::<1>::new(mechanism) {
-            let longest = bodies.longest(order);
-            (Form::Few(Box::new(bodies)), longest)
         } else {
-            let bodies = Bodies::<2>::new(mechanism)?;
-            let longest = bodies.longest(order);
-            (Form::Several(Box::new(bodies)), longest)
+            return Some(Self::of_any(settings, Self::bodies(mechanism, tolerance, order)?));
         };
-        let settings = Settings { mechanism: mechanism.clone(), tolerance, order, is_portable, is_extended };
+        let (step, go) = match order {
+            16 => of_order::<16>(),
+            20 => of_order::<20>(),
+            24 => of_order::<24>(),
+            _ => return None,
+        };
         Some(Self { settings, form, pace: Pace::new(tolerance, order, longest), step, go })
+    }
+
+    /// The smallest form that has room for all bodies and springs.
+    fn bodies(mechanism: &Mechanism, tolerance: f64, order: usize) -> Option<Form> {
+        let few = Bodies::new(mechanism, tolerance, order).map(|bodies| Form::Few(Box::new(bodies)));
+        let several = || Bodies::new(mechanism, tolerance, order).map(|bodies| Form::Several(Box::new(bodies)));
+        let few_sprung = || Bodies::new(mechanism, tolerance, order).map(|bodies| Form::FewSprung(Box::new(bodies)));
+        let several_sprung = || Bodies::new(mechanism, tolerance, order).map(|bodies| Form::SeveralSprung(Box::new(bodies)));
+        few.or_else(several).or_else(few_sprung).or_else(several_sprung)
     }
 
     /// The kernel of a mechanism with loops, where there is one: it sums the best of all orders up to the one asked for, or to 20 where that is higher.
@@ -229,9 +239,14 @@ impl Fast {
             5..=8 => Form::SeveralLooped(Box::new(Looped::new(mechanism, tolerance, highest)?)),
             _ => Form::ManyLooped(Box::new(Looped::new(mechanism, tolerance, highest)?)),
         };
-        let (step, go) = of_loops();
         let settings = Settings { mechanism: mechanism.clone(), tolerance, order, is_portable, is_extended: false };
-        Some(Self { settings, form, pace: Pace::new(tolerance, order, f64::INFINITY), step, go })
+        Some(Self::of_any(settings, form))
+    }
+
+    /// With a form that knows its order and its pace.
+    fn of_any(settings: Settings, form: Form) -> Self {
+        let (step, go) = of_any();
+        Self { pace: Pace::new(settings.tolerance, settings.order, f64::INFINITY), settings, form, step, go }
     }
 
     /// True where it was made for all these.

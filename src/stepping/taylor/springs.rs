@@ -1,0 +1,264 @@
+//! Springs and dampers beside the [`bodies`](super::bodies), one lane a spring.
+//!
+//! The force of a spring is its span D times a factor κ, and joins the P of the bodies one order later:
+//!
+//! ```text
+//! D = p0 + Σ gamma_j e_j,    q = |D|²,    s = 1/|D|,    a = D·D'/q
+//! κ = k (L0 s - 1) - c a,    F_m = Σ_{j=0..m} κ_j D_{m-j},    P_{m+1} += left(Σ conj(gamma) F_m)
+//! h_m = (m/2) q_m,    q_0 a_m = h_{m+1} - Σ_{j=1..m} q_j a_{m-j},    (m+1) s_{m+1} = -Σ_{j=0..m} a_j s_{m-j}
+//! power of the dampers = -Σ_{j=0..m} c a_j h_{m+1-j}
+//! ```
+//!
+//! κ_0 = -k (L - L0)/L takes the stretch L - L0 from spans in double-double: the difference of two lengths, rounded, times a stiff k would outweigh
+//! all other rounding.  A spring of free length zero without damper has no use for its length, and lanes without a spring have none: their q is zero
+//! but for q_0 = 1.
+
+use super::bodies::{Row, room, store};
+use super::terms::over;
+use super::wide::Wide;
+use crate::arithmetic::lanes::Lanes;
+use crate::dynamics::Mechanism;
+
+/// Largest order there is room for.
+const MOST: usize = super::bodies::MOST;
+
+/// Constants of the springs in `S` vectors, and their coefficients in the step; with `S = 0` nothing at all.
+#[derive(Clone, Debug)]
+pub struct Springs<const B: usize, const S: usize> {
+    is_damped: bool,
+    root: [Row<S>; 2],
+    /// gamma over the bodies \[m\], lanes over springs.
+    gamma: Vec<[Row<S>; 2]>,
+    /// gamma over the springs, lanes over bodies.
+    spread: Vec<[Row<B>; 2]>,
+    stiffness: Row<S>,
+    free_length: Row<S>,
+    damping: Row<S>,
+    /// One where the length matters, zero elsewhere.
+    measured: Row<S>,
+    scratch: Box<Scratch<S>>,
+}
+
+/// Coefficients of one step.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+struct Scratch<const S: usize> {
+    /// 1/q_0.
+    inverse: Row<S>,
+    /// D.
+    x: [Row<S>; MOST + 2],
+    y: [Row<S>; MOST + 2],
+    /// q, h, a, s and κ.
+    square: [Row<S>; MOST + 2],
+    half: [Row<S>; MOST + 2],
+    strain: [Row<S>; MOST + 2],
+    reciprocal: [Row<S>; MOST + 2],
+    factor: [Row<S>; MOST + 2],
+    power: [f64; MOST + 1],
+}
+
+impl<const B: usize, const S: usize> Springs<B, S> {
+    /// The constants, where this form fits: springs in `S` vectors between points of bodies that hang on the ground.
+    pub fn new(mechanism: &Mechanism) -> Option<Self> {
+        let (n, springs) = (mechanism.bodies.len(), &mechanism.springs);
+        if springs.len() > room(S) || (S > 0 && springs.is_empty()) || mechanism.coordinates() != n {
+            return None;
+        }
+        let row = |of: &dyn Fn(usize) -> f64| {
+            let mut row = [[0.0; 4]; S];
+            for i in 0..springs.len() {
+                row[i / 4][i % 4] = of(i);
+            }
+            row
+        };
+        let gamma = |body: usize| [row(&|i| springs[i].span.gamma(body).re), row(&|i| springs[i].span.gamma(body).im)];
+        let mut spread = vec![[[[0.0; 4]; B]; 2]; springs.len()];
+        for (spread, spring) in spread.iter_mut().zip(springs) {
+            for &(body, gamma) in &spring.span.terms {
+                (spread[0][body / 4][body % 4], spread[1][body / 4][body % 4]) = (gamma.re, gamma.im);
+            }
+        }
+        let zero = [[0.0; 4]; S];
+        Some(Self {
+            is_damped: mechanism.is_damped(),
+            root: [row(&|i| springs[i].span.root.re), row(&|i| springs[i].span.root.im)],
+            gamma: (0..n).map(gamma).collect(),
+            spread,
+            stiffness: row(&|i| springs[i].stiffness),
+            free_length: row(&|i| springs[i].free_length),
+            damping: row(&|i| springs[i].damping),
+            measured: row(&|i| if springs[i].needs_length() { 1.0 } else { 0.0 }),
+            scratch: Box::new(Scratch {
+                inverse: zero,
+                x: [zero; MOST + 2],
+                y: [zero; MOST + 2],
+                square: [zero; MOST + 2],
+                half: [zero; MOST + 2],
+                strain: [zero; MOST + 2],
+                reciprocal: [zero; MOST + 2],
+                factor: [zero; MOST + 2],
+                power: [0.0; MOST + 1],
+            }),
+        })
+    }
+
+    /// Powers below `order` of the dampers' power \[W/s^m\]; none where there are no dampers.
+    #[inline(always)]
+    pub fn power(&self, order: usize) -> &[f64] {
+        if self.is_damped { &self.scratch.power[..order] } else { &[] }
+    }
+
+    /// Power zero, from cos and sin of the bodies' angles and what these leave out.
+    #[inline(always)]
+    pub fn begin<L: Lanes>(&mut self, units: &[[f64; 4]]) {
+        let Self { root, gamma, stiffness, free_length, measured, scratch, .. } = self;
+        for v in 0..S {
+            let (mut x, mut y) = (Wide::of(L::of(root[0][v])), Wide::of(L::of(root[1][v])));
+            for (&[c, s, c_low, s_low], gamma) in units.iter().zip(gamma.iter()) {
+                let (c, s) = (Wide::from([c; 4], [c_low; 4]), Wide::from([s; 4], [s_low; 4]));
+                let (re, im) = (L::of(gamma[0][v]), L::of(gamma[1][v]));
+                (x, y) = (x.add(c.scale(re)).add(s.scale(im).minus()), y.add(s.scale(re)).add(c.scale(im)));
+            }
+            let (free, measured) = (L::of(free_length[v]), L::of(measured[v]));
+            let rest = L::ONE.sub(measured);
+            let square = x.mul(x).add(y.mul(y));
+            let surplus = square.add(Wide::of(free).mul(Wide::of(free)).minus()).hi;
+            let size = square.hi.mul_add(measured, rest);
+            let length = size.sqrt();
+            let relative = surplus.div(length.add(free).mul(length));
+            (scratch.x[0][v], scratch.y[0][v]) = (x.hi.array(), y.hi.array());
+            scratch.square[0][v] = size.array();
+            scratch.inverse[v] = L::ONE.div(size).array();
+            scratch.reciprocal[0][v] = L::ONE.div(length).array();
+            scratch.factor[0][v] = L::ZERO.sub(L::of(stiffness[v])).mul(relative.mul_add(measured, rest)).array();
+        }
+    }
+
+    /// Power m >= 1 of the spans, q and s, and power m-1 of a, from that power of the bodies' unit vectors.
+    #[inline(always)]
+    fn raise<L: Lanes>(&mut self, m: usize, e: &[Row<B>; 2]) {
+        let Self { gamma, stiffness, free_length, damping, measured, scratch, .. } = self;
+        let (mut x, mut y) = ([L::ZERO; S], [L::ZERO; S]);
+        for ((gamma, &c), &s) in gamma.iter().zip(e[0].as_flattened()).zip(e[1].as_flattened()) {
+            let (c, s) = (L::splat(c), L::splat(s));
+            for v in 0..S {
+                let (re, im) = (L::of(gamma[0][v]), L::of(gamma[1][v]));
+                x[v] = s.neg_mul_add(im, c.mul_add(re, x[v]));
+                y[v] = c.mul_add(im, s.mul_add(re, y[v]));
+            }
+        }
+        (scratch.x[m], scratch.y[m]) = (store(x), store(y));
+        let within = half_square::<L, S>(&scratch.x[1..m], &scratch.y[1..m]);
+        let [without, falling] = products::<L, S>(&scratch.strain[..m - 1], &scratch.square[1..m], &scratch.reciprocal[1..m]);
+        for v in 0..S {
+            let (along, across) = (L::of(scratch.x[0][v]), L::of(scratch.y[0][v]));
+            let half_sum = along.mul_add(x[v], across.mul_add(y[v], within[v])).mul(L::of(measured[v]));
+            let square = half_sum.add(half_sum);
+            let half = half_sum.mul(L::splat(m as f64));
+            let strain = half.sub(without[v]).mul(L::of(scratch.inverse[v]));
+            let reciprocal = over(L::ZERO.sub(strain.mul_add(L::of(scratch.reciprocal[0][v]), falling[v])), m);
+            (scratch.square[m][v], scratch.half[m][v]) = (square.array(), half.array());
+            (scratch.strain[m - 1][v], scratch.reciprocal[m][v]) = (strain.array(), reciprocal.array());
+            // One factor after the other: their product would be a constant rounded once.
+            scratch.factor[m][v] = L::of(stiffness[v]).mul(L::of(free_length[v]).mul(reciprocal)).array();
+            if self.is_damped {
+                let elastic = L::of(scratch.factor[m - 1][v]);
+                scratch.factor[m - 1][v] = strain.neg_mul_add(L::of(damping[v]), elastic).array();
+            }
+        }
+    }
+
+    /// What the forces of power m add to power m+1 of P, from that power of the bodies' unit vectors; `None` without springs.
+    #[inline(always)]
+    pub fn pull<L: Lanes>(&mut self, m: usize, e: &[Row<B>; 2]) -> Option<[[L; B]; 2]> {
+        if S == 0 {
+            return None;
+        }
+        self.raise::<L>(m + 1, e);
+        Some(self.share(m))
+    }
+
+    /// What the forces of power m add to power m+1 of P, after [`Springs::raise`] of that one.
+    #[inline(always)]
+    fn share<L: Lanes>(&mut self, m: usize) -> [[L; B]; 2] {
+        let Self { spread, damping, scratch, .. } = self;
+        let [fx, fy] = products::<L, S>(&scratch.factor[..=m], &scratch.x[..=m], &scratch.y[..=m]).map(store);
+        let (mut px, mut py) = ([L::ZERO; B], [L::ZERO; B]);
+        for ((gamma, &x), &y) in spread.iter().zip(fx.as_flattened()).zip(fy.as_flattened()) {
+            let (x, y) = (L::splat(x), L::splat(y));
+            for b in 0..B {
+                let (re, im) = (L::of(gamma[0][b]), L::of(gamma[1][b]));
+                px[b] = re.neg_mul_add(y, im.mul_add(x, px[b]));
+                py[b] = re.mul_add(x, im.mul_add(y, py[b]));
+            }
+        }
+        if self.is_damped {
+            let mut lost = [L::ZERO; S];
+            for (strain, half) in scratch.strain[..=m].iter().zip(scratch.half[1..=m + 1].iter().rev()) {
+                for v in 0..S {
+                    lost[v] = L::of(strain[v]).mul_add(L::of(half[v]), lost[v]);
+                }
+            }
+            let lost = store(lost);
+            let each = damping.as_flattened().iter().zip(lost.as_flattened());
+            scratch.power[m] = each.fold(0.0, |sum, (&damping, &lost)| sum - damping * lost);
+        }
+        [px, py]
+    }
+}
+
+/// Σ a_j b_{last-j} and Σ a_j c_{last-j}, from the middle outwards in two chains each, so that the newest coefficients come last and nothing waits for them.
+#[inline(always)]
+fn products<L: Lanes, const S: usize>(a: &[Row<S>], b: &[Row<S>], c: &[Row<S>]) -> [[L; S]; 2] {
+    let mut inner = [[L::ZERO; S]; 2];
+    let mut outer = inner;
+    let (a_low, a_high) = a.split_at(a.len() / 2);
+    let [(b_low, b_high), (c_low, c_high)] = [b, c].map(|rows| rows.split_at(rows.len() - a.len() / 2));
+    let lows = a_low.iter().rev().zip(b_high).zip(c_high);
+    let mut highs = a_high.iter().zip(b_low.iter().rev()).zip(c_low.iter().rev());
+    let add = |sums: &mut [[L; S]; 2], ((a, b), c): ((&Row<S>, &Row<S>), &Row<S>)| {
+        for v in 0..S {
+            let factor = L::of(a[v]);
+            sums[0][v] = factor.mul_add(L::of(b[v]), sums[0][v]);
+            sums[1][v] = factor.mul_add(L::of(c[v]), sums[1][v]);
+        }
+    };
+    for (low, high) in lows.zip(highs.by_ref()) {
+        add(&mut inner, low);
+        add(&mut outer, high);
+    }
+    if let Some(last) = highs.next() {
+        add(&mut outer, last);
+    }
+    for (inner, outer) in inner.iter_mut().zip(&outer) {
+        for v in 0..S {
+            inner[v] = inner[v].add(outer[v]);
+        }
+    }
+    inner
+}
+
+/// Half of Σ a_j a_{last-j} + b_j b_{last-j}, likewise.
+#[inline(always)]
+fn half_square<'a, L: Lanes, const S: usize>(a: &'a [Row<S>], b: &'a [Row<S>]) -> [L; S] {
+    let (middle, above) = (a.len() / 2, a.len().div_ceil(2));
+    let mut sums = [[L::ZERO; S]; 2];
+    for (sum, rows) in sums.iter_mut().zip([a, b]) {
+        for (v, sum) in sum.iter_mut().enumerate().filter(|_| above > middle) {
+            let central = L::of(rows[middle][v]);
+            *sum = central.mul(central).mul(L::splat(0.5));
+        }
+    }
+    let pairs = |rows: &'a [Row<S>]| rows[..middle].iter().rev().zip(&rows[above..]);
+    for ((a_low, a_high), (b_low, b_high)) in pairs(a).zip(pairs(b)) {
+        for v in 0..S {
+            sums[0][v] = L::of(a_low[v]).mul_add(L::of(a_high[v]), sums[0][v]);
+            sums[1][v] = L::of(b_low[v]).mul_add(L::of(b_high[v]), sums[1][v]);
+        }
+    }
+    let [mut sum, other] = sums;
+    for v in 0..S {
+        sum[v] = sum[v].add(other[v]);
+    }
+    sum
+}
