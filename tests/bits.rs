@@ -1,14 +1,20 @@
 //! The same bits on every machine: the ends of shipped scenes by every kind of method, as hashes.
 //!
 //! A change of the arithmetic changes them; then the new ones are printed, and belong here with a word in the changelog.  They are the same with and without
-//! the processor's vectors, in debug and release builds, with and without `target-cpu=native`: `.ci/bits` runs this in all of these.
+//! the processor's vectors and its fused multiply-add, which is what is compared here; in a release build, whose program `.ci/bits release` takes; and in debug
+//! builds and with `target-cpu=native`, where `.ci/bits native plain` runs this.
 
 mod common;
+#[cfg(feature = "cli")]
+#[path = "common/program.rs"]
+#[allow(dead_code)]
+mod program;
 
 use common::{run, shipped};
-use driftless::arithmetic::lanes;
+use driftless::arithmetic::lanes::{self, Code, Lanes};
 use driftless::run::{Request, Stabilization};
 use driftless::scene::Scene;
+use std::process::Command;
 
 type End = (&'static str, &'static str, f64, Option<Stabilization>, f64, u64);
 
@@ -41,14 +47,46 @@ fn hash(numbers: impl Iterator<Item = f64>) -> u64 {
     numbers.flat_map(f64::to_le_bytes).fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// The first time with the processor's vectors, where it has them, the second time without.
+/// Which code is entered.
+struct Entered;
+
+impl Code for Entered {
+    type Output = &'static str;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Self::Output {
+        std::any::type_name::<L>()
+    }
+}
+
+/// As on this processor, with its vectors where it has them.
 #[test]
 fn ends_have_the_bits_they_always_had() {
+    let entered = lanes::run(Entered, false);
+    assert_eq!(lanes::hardware().is_none(), entered.ends_with("Portable"), "{entered}");
     ends();
+}
+
+/// As on a processor without vectors, in a process of its own, in which the C library (that of GNU) does not use the fused multiply-add either: where the
+/// build does not count on the instruction, `f64::mul_add` asks the library, which then works in software.
+#[test]
+fn ends_have_the_same_bits_without_vector_units() {
+    let ran = Command::new(std::env::current_exe().expect("this test"))
+        .args(["--exact", "ends_of_portable_code", "--ignored", "--nocapture"])
+        .env("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-AVX,-AVX2,-FMA,-FMA4")
+        .output()
+        .expect("runs");
+    let said = String::from_utf8_lossy(&ran.stdout);
+    assert!(ran.status.success() && said.contains("1 passed"), "{said}{}", String::from_utf8_lossy(&ran.stderr));
+}
+
+#[test]
+#[ignore = "run by ends_have_the_same_bits_without_vector_units, as a process of its own"]
+fn ends_of_portable_code() {
     lanes::disable(true);
-    assert!(lanes::hardware().is_none());
+    let entered = lanes::run(Entered, false);
+    assert!(lanes::hardware().is_none() && entered.ends_with("Portable"), "{entered}");
     ends();
-    lanes::disable(false);
 }
 
 fn ends() {
@@ -68,6 +106,26 @@ fn ends() {
         let found = hash(last.phi.iter().chain(&last.omega).chain([&last.work, &last.imbalance]).copied());
         if found != expected {
             changed.push(format!("    {name}, {method}: 0x{found:016x}"));
+        }
+    }
+    assert!(changed.is_empty(), "changed:\n{}", changed.join("\n"));
+}
+
+/// What the program writes: `.ci/bits release` compares the same trajectories of a release build.
+#[cfg(feature = "cli")]
+#[test]
+fn trajectories_have_the_bytes_they_always_had() {
+    let lines = include_str!("data/trajectories.sha256").lines().map(|line| line.split_once(' ').expect("a hash and a run"));
+    let mut changed = Vec::new();
+    for (hash, line) in lines {
+        let (name, _) = line.split_once(".json").expect("a scene");
+        let program = program::Program::with_scenes(&[name]);
+        program.run(&format!("run {line} --out out --quiet --no-charts --trust off")).exits(0);
+        let files = program.files();
+        let record = files.iter().find(|file| file.ends_with("run.json")).expect("a record");
+        let record: serde_json::Value = serde_json::from_str(&program.read(record)).expect("JSON");
+        if record["hashes"]["trajectory_sha256"] != hash {
+            changed.push(format!("{} {line}", record["hashes"]["trajectory_sha256"]));
         }
     }
     assert!(changed.is_empty(), "changed:\n{}", changed.join("\n"));
