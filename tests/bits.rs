@@ -1,8 +1,8 @@
 //! The same bits on every machine: the ends of shipped scenes by every kind of method, as hashes.
 //!
 //! A change of the arithmetic changes them; then the new ones are printed, and belong here with a word in the changelog.  They are the same with and without
-//! the processor's vectors and its fused multiply-add, which is what is compared here; in a release build, whose program `.ci/bits release` takes; and in debug
-//! builds and with `target-cpu=native`, where `.ci/bits native plain` runs this.
+//! the processor's vectors, which is what is compared here; in a release build, whose program `.ci/bits release` takes; and in debug builds and with
+//! `target-cpu=native`, where `.ci/bits native plain` runs this.
 
 mod common;
 #[cfg(feature = "cli")]
@@ -14,7 +14,6 @@ use common::{run, shipped};
 use driftless::arithmetic::lanes::{self, Code, Lanes};
 use driftless::run::{Request, Stabilization};
 use driftless::scene::Scene;
-use std::process::Command;
 
 type End = (&'static str, &'static str, f64, Option<Stabilization>, f64, u64);
 
@@ -59,34 +58,16 @@ impl Code for Entered {
     }
 }
 
-/// As on this processor, with its vectors where it has them.
+/// The first time with the processor's vectors, where it has them, the second time in portable code.
 #[test]
 fn ends_have_the_bits_they_always_had() {
-    let entered = lanes::run(Entered, false);
-    assert_eq!(lanes::hardware().is_none(), entered.ends_with("Portable"), "{entered}");
+    let is_portable = || lanes::run(Entered, false).ends_with("Portable");
+    assert_eq!(is_portable(), lanes::hardware().is_none());
     ends();
-}
-
-/// As on a processor without vectors, in a process of its own, in which the C library (that of GNU) does not use the fused multiply-add either: where the
-/// build does not count on the instruction, `f64::mul_add` asks the library, which then works in software.
-#[test]
-fn ends_have_the_same_bits_without_vector_units() {
-    let ran = Command::new(std::env::current_exe().expect("this test"))
-        .args(["--exact", "ends_of_portable_code", "--ignored", "--nocapture"])
-        .env("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-AVX,-AVX2,-FMA,-FMA4")
-        .output()
-        .expect("runs");
-    let said = String::from_utf8_lossy(&ran.stdout);
-    assert!(ran.status.success() && said.contains("1 passed"), "{said}{}", String::from_utf8_lossy(&ran.stderr));
-}
-
-#[test]
-#[ignore = "run by ends_have_the_same_bits_without_vector_units, as a process of its own"]
-fn ends_of_portable_code() {
     lanes::disable(true);
-    let entered = lanes::run(Entered, false);
-    assert!(lanes::hardware().is_none() && entered.ends_with("Portable"), "{entered}");
+    assert!(is_portable() && lanes::hardware().is_none());
     ends();
+    lanes::disable(false);
 }
 
 fn ends() {

@@ -248,64 +248,69 @@ pub fn checkpoint(bytes: &[u8]) -> u64 {
     }
 }
 
-const OPTIONS: &[&str] = &[
-    "run",
-    "check",
-    "inspect",
-    "sweep",
-    "resume",
-    "methods",
-    "schema",
-    "completions",
-    "free.json",
-    "--method",
-    "dp8",
-    "gauss16",
-    "--step",
-    "--rtol",
-    "--atol",
-    "--until",
-    "--every",
-    "--stabilize",
-    "none,projection",
-    "baumgarte",
-    "--time-constant",
-    "--extended",
-    "--effort",
-    "1e5",
-    "--set",
-    "a.b[0]=1",
-    "walls.wall.restitution=0.5",
-    "--strict",
-    "--json",
-    "-q",
-    "-v",
-    "--vary",
-    "bar1.phi=-pi..pi:64",
-    "--to-flip",
-    "--threads",
-    "--map",
-    "--max-energy-drift",
-    "--max-constraint-drift",
-    "--out",
-    "output",
-    "--force",
-    "--checkpoint-every",
-    "--no-charts",
-    "--gif",
-    "--help",
-    "--version",
+const COMMANDS: &[&str] =
+    &["run", "run", "run", "check", "sweep", "inspect", "compare", "stress", "resume", "methods", "schema", "completions"];
+/// Options with values that suit them; none where they take none.
+const OPTIONS: &[(&str, &str)] = &[
+    ("--method", "dp8"),
+    ("--method", "gauss16"),
+    ("--method", "taylor"),
+    ("--methods", "dp8,taylor"),
+    ("--step", "1/64"),
+    ("--rtol", "1e-9"),
+    ("--atol", "1e-12"),
+    ("--until", "100"),
+    ("--every", "0.25"),
+    ("--stabilize", "none,projection"),
+    ("--stabilize", "baumgarte"),
+    ("--time-constant", "0.01"),
+    ("--extended", ""),
+    ("--effort", "1e5"),
+    ("--prefer", "path"),
+    ("--set", "bars[0].length=1"),
+    ("--set", "walls.wall.restitution=0.5"),
+    ("--set", "gravity=[0,-9.81]"),
+    ("--strict", ""),
+    ("--json", ""),
+    ("-q", ""),
+    ("-v", ""),
+    ("--vary", "bar1.phi=-pi..pi:64"),
+    ("--vary", "bars[0].length=1..2:3"),
+    ("--to-flip", ""),
+    ("--threads", "2"),
+    ("--map", "flip_time"),
+    ("--trust", "full"),
+    ("--budget", "5"),
+    ("--tolerance", "1e-3"),
+    ("--max-energy-drift", "1e-6"),
+    ("--max-constraint-drift", "1e-6"),
+    ("--out", "results"),
+    ("--force", ""),
+    ("--checkpoint-every", "0"),
+    ("--no-charts", ""),
+    ("--gif", ""),
+    ("--help", ""),
+    ("--version", ""),
+];
+const VALUES: &[&str] = &[
     "1/64",
     "1e-9",
     "-1",
     "nan",
     "inf",
     "0",
+    "1/0",
+    "1e308",
     "18446744073709551616",
     "bash",
     "--",
     "=",
     "",
+    "free.json",
+    "none",
+    "pi",
+    "..",
+    "x=1..2:0",
 ];
 
 /// A scene that options are tried on.
@@ -347,26 +352,37 @@ pub fn command_line(bytes: &[u8]) -> u64 {
     let mut draw = Draw::new(bytes);
     let is_compared = draw.chance(5);
     let mut words = vec!["driftless".to_owned()];
-    for _ in 0..draw.below(12) {
-        words.push(match draw.below(6) {
+    if draw.chance(90) {
+        words.push((*draw.one(COMMANDS)).to_owned());
+    }
+    if draw.chance(80) {
+        words.push("free.json".to_owned());
+    }
+    for _ in 0..draw.below(8) {
+        let (option, value) = *draw.one(OPTIONS);
+        match draw.below(16) {
             0 => {
                 let length = draw.below(12);
                 let letters: Vec<u8> = (0..length).map(|_| draw.byte()).collect();
-                String::from_utf8_lossy(&letters).into_owned()
+                words.push(String::from_utf8_lossy(&letters).into_owned());
             }
-            1 => format!("{}={}", draw.one(OPTIONS), draw.one(OPTIONS)),
-            _ => (*draw.one(OPTIONS)).to_owned(),
-        });
+            1 => words.push((*draw.one(VALUES)).to_owned()),
+            2 => words.extend([option.to_owned(), (*draw.one(VALUES)).to_owned()]),
+            3 => words.push(format!("{option}={value}")),
+            _ => words.extend([option, value].into_iter().filter(|word| !word.is_empty()).map(str::to_owned)),
+        }
     }
     let rest = String::from_utf8_lossy(draw.rest()).into_owned();
+    let mut sets = Vec::new();
     for word in words.iter().chain([&rest]) {
         if let Ok(vary) = word.parse::<Vary>() {
             assert!(vary.count > 0 && (0..vary.count.min(5)).all(|index| vary.value(index).is_finite()), "{vary:?}");
         }
-        if let Ok(set) = word.parse::<Override>() {
-            // A value that is set anywhere is judged as one of the file.
-            let _ = parse_scene(&FREE.text, "fuzzed.json", &[set]);
-        }
+        sets.extend(word.parse::<Override>());
+    }
+    if !sets.is_empty() {
+        // What is set anywhere is judged as what the file says.
+        let _ = parse_scene(&FREE.text, "fuzzed.json", &sets);
     }
     let read = flags(&words);
     if is_compared {
