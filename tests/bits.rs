@@ -1,12 +1,17 @@
 //! The same bits on every machine: the ends of shipped scenes by every kind of method, as hashes.
 //!
 //! A change of the arithmetic changes them; then the new ones are printed, and belong here with a word in the changelog.  They are the same with and without
-//! the processor's vectors, in debug and release builds, with and without `target-cpu=native`: `.ci/bits` runs this in all of these.
+//! the processor's vectors, which is what is compared here; in a release build, whose program `.ci/bits release` takes; and in debug builds and with
+//! `target-cpu=native`, where `.ci/bits native plain` runs this.
 
 mod common;
+#[cfg(feature = "cli")]
+#[path = "common/program.rs"]
+#[allow(dead_code)]
+mod program;
 
 use common::{run, shipped};
-use driftless::arithmetic::lanes;
+use driftless::arithmetic::lanes::{self, Code, Lanes};
 use driftless::run::{Request, Stabilization};
 use driftless::scene::Scene;
 
@@ -41,12 +46,26 @@ fn hash(numbers: impl Iterator<Item = f64>) -> u64 {
     numbers.flat_map(f64::to_le_bytes).fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// The first time with the processor's vectors, where it has them, the second time without.
+/// Which code is entered.
+struct Entered;
+
+impl Code for Entered {
+    type Output = &'static str;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Self::Output {
+        std::any::type_name::<L>()
+    }
+}
+
+/// The first time with the processor's vectors, where it has them, the second time in portable code.
 #[test]
 fn ends_have_the_bits_they_always_had() {
+    let is_portable = || lanes::run(Entered, false).ends_with("Portable");
+    assert_eq!(is_portable(), lanes::hardware().is_none());
     ends();
     lanes::disable(true);
-    assert!(lanes::hardware().is_none());
+    assert!(is_portable() && lanes::hardware().is_none());
     ends();
     lanes::disable(false);
 }
@@ -68,6 +87,26 @@ fn ends() {
         let found = hash(last.phi.iter().chain(&last.omega).chain([&last.work, &last.imbalance]).copied());
         if found != expected {
             changed.push(format!("    {name}, {method}: 0x{found:016x}"));
+        }
+    }
+    assert!(changed.is_empty(), "changed:\n{}", changed.join("\n"));
+}
+
+/// What the program writes: `.ci/bits release` compares the same trajectories of a release build.
+#[cfg(feature = "cli")]
+#[test]
+fn trajectories_have_the_bytes_they_always_had() {
+    let lines = include_str!("data/trajectories.sha256").lines().map(|line| line.split_once(' ').expect("a hash and a run"));
+    let mut changed = Vec::new();
+    for (hash, line) in lines {
+        let (name, _) = line.split_once(".json").expect("a scene");
+        let program = program::Program::with_scenes(&[name]);
+        program.run(&format!("run {line} --out out --quiet --no-charts --trust off")).exits(0);
+        let files = program.files();
+        let record = files.iter().find(|file| file.ends_with("run.json")).expect("a record");
+        let record: serde_json::Value = serde_json::from_str(&program.read(record)).expect("JSON");
+        if record["hashes"]["trajectory_sha256"] != hash {
+            changed.push(format!("{} {line}", record["hashes"]["trajectory_sha256"]));
         }
     }
     assert!(changed.is_empty(), "changed:\n{}", changed.join("\n"));

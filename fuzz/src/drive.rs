@@ -1,6 +1,7 @@
 //! Runs a target on mutations of its corpus: seeded, on stable, without coverage; inputs of which something new comes are kept for further mutation.
-//!   drive TARGET EXECUTIONS [SEED]
-//! Findings go to `fuzz/artifacts/TARGET`; with KEEP=1 small inputs that were new go to `fuzz/corpus/TARGET`.
+//!   drive TARGET EXECUTIONS [SEED]    until there are so many in all, of any seed; what was done before counts, however it ended
+//!   drive TARGET FILE                 one input
+//! Findings go to `fuzz/artifacts/TARGET`, counts to `fuzz/artifacts/TARGET.count`; with KEEP=1 small inputs that were new go to `fuzz/corpus/TARGET`.
 
 use driftless_fuzz::targets::{SCENES, TARGETS};
 use std::collections::HashSet;
@@ -11,6 +12,8 @@ use std::time::{Duration, Instant};
 /// Inputs kept for mutation at most, and their length.
 const KEPT: usize = 4096;
 const LONGEST: usize = 8192;
+/// Executions between two times the counts are written.
+const OFTEN: u64 = 10_000;
 /// An execution longer than this is a finding.
 const LONG: Duration = Duration::from_secs(5);
 
@@ -99,12 +102,38 @@ fn mutate(input: &mut Vec<u8>, other: &[u8], random: &mut Random) {
     input.truncate(LONGEST);
 }
 
+/// Bytes enough to draw anything from.
+fn drawn(random: &mut Random) -> Vec<u8> {
+    (0..40).flat_map(|_| random.next().to_le_bytes()).collect()
+}
+
 fn keep(folder: &Path, input: &[u8]) -> PathBuf {
     std::fs::create_dir_all(folder).expect("a folder");
     let name = input.iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3));
     let path = folder.join(format!("{name:016x}"));
     std::fs::write(&path, input).expect("written");
     path
+}
+
+/// What was done of a target, by this and all former drives.
+#[derive(Clone, Copy, Default)]
+struct Count {
+    executions: u64,
+    findings: u64,
+    seconds: f64,
+}
+
+impl Count {
+    fn read(file: &Path) -> Self {
+        let text = std::fs::read_to_string(file).unwrap_or_default();
+        let mut words = text.split_whitespace();
+        let mut number = || words.next().and_then(|word| word.parse::<f64>().ok()).unwrap_or(0.0);
+        Self { executions: number() as u64, findings: number() as u64, seconds: number() }
+    }
+
+    fn write(self, file: &Path) {
+        std::fs::write(file, format!("{} {} {:.0}\n", self.executions, self.findings, self.seconds)).expect("written");
+    }
 }
 
 fn main() {
@@ -116,32 +145,54 @@ fn main() {
         return;
     }
     let number = |place: usize, usual: u64| words.get(place).map_or(usual, |word| word.parse().expect("a number"));
-    let (executions, mut random) = (number(2, 100_000), Random(number(3, 1)));
+    let (executions, seed) = (number(2, 100_000), number(3, 1));
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let (corpus, artifacts) = (here.join("corpus").join(name), here.join("artifacts").join(name));
+    std::fs::create_dir_all(&artifacts).expect("a folder");
+    let file = artifacts.with_extension("count");
+    let former = Count::read(&file);
+    // What goes on goes elsewhere.
+    let mut random = Random(seed ^ former.executions.wrapping_mul(0xd134_2543_de82_ef95));
     let is_kept = std::env::var_os("KEEP").is_some();
     let mut inputs: Vec<Vec<u8>> = vec![Vec::new()];
     if let Ok(files) = std::fs::read_dir(&corpus) {
         inputs.extend(files.flatten().map(|file| std::fs::read(file.path()).expect("an input")));
     }
-    if name == "scene_text" {
+    // Bytes that choices are drawn from may be any; a text is one of somebody's.
+    let is_text = name == "scene_text";
+    if is_text {
         inputs.extend(SCENES.iter().map(|text| text.clone().into_bytes()));
     } else {
-        inputs.extend((0..64).map(|_| (0..300).map(|_| random.next() as u8).collect()));
+        inputs.extend((0..64).map(|_| drawn(&mut random)));
     }
     // What is found is told below, and once.
     std::panic::set_hook(Box::new(|_| {}));
-    let (mut kinds, mut findings, mut messages) = (HashSet::new(), 0_u64, HashSet::new());
+    let (mut kinds, mut findings, mut messages) = (HashSet::new(), former.findings, HashSet::new());
     let (begin, mut slowest) = (Instant::now(), Duration::ZERO);
-    for execution in 0..executions {
-        let mut input = inputs[random.below(inputs.len())].clone();
-        if execution as usize >= inputs.len() {
-            let other = random.below(inputs.len());
-            mutate(&mut input, &inputs[other].clone(), &mut random);
+    let tell = |done: u64, kinds: usize, findings: u64, slowest: Duration| {
+        let count = Count { executions: former.executions + done, findings, seconds: former.seconds + begin.elapsed().as_secs_f64() };
+        count.write(&file);
+        if done.is_multiple_of(50 * OFTEN) || count.executions >= executions {
+            let Count { executions, seconds, .. } = count;
+            println!("{name}: {executions} executions in all, {kinds} kinds, {findings} findings, {seconds:.0} s, slowest {slowest:?}");
         }
-        let one = Instant::now();
-        let came = catch_unwind(AssertUnwindSafe(|| target(&input)));
-        let took = one.elapsed();
+    };
+    for execution in 0..executions.saturating_sub(former.executions) {
+        let is_new = !is_text && random.below(4) == 0;
+        let mut input = if is_new { drawn(&mut random) } else { inputs[random.below(inputs.len())].clone() };
+        if execution as usize >= inputs.len() && !is_new {
+            let other = random.below(inputs.len());
+            mutate(&mut input, &inputs[other], &mut random);
+        }
+        let once = || {
+            let begin = Instant::now();
+            (catch_unwind(AssertUnwindSafe(|| target(&input))), begin.elapsed())
+        };
+        let (came, mut took) = once();
+        if took > LONG {
+            // A busy machine makes anything take long, but not each time.
+            took = (0..5).fold(took, |least, _| least.min(once().1));
+        }
         slowest = slowest.max(took);
         let message = match &came {
             Err(panic) => Some(
@@ -171,19 +222,10 @@ fn main() {
                 inputs.push(input);
             }
         }
-        if execution % 1_000_000 == 999_999 {
-            println!(
-                "{name}: {} executions, {} kinds, {findings} findings, {:.0} s",
-                execution + 1,
-                kinds.len(),
-                begin.elapsed().as_secs_f64()
-            );
+        if (execution + 1).is_multiple_of(OFTEN) {
+            tell(execution + 1, kinds.len(), findings, slowest);
         }
     }
-    println!(
-        "{name}: {executions} executions, {} kinds, {findings} findings, {:.0} s, slowest {slowest:?}",
-        kinds.len(),
-        begin.elapsed().as_secs_f64()
-    );
+    tell(executions.saturating_sub(former.executions), kinds.len(), findings, slowest);
     std::process::exit(i32::from(findings > 0));
 }

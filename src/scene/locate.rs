@@ -7,9 +7,13 @@
 use super::error::{Excerpt, Refusal, SceneError};
 use serde::de::IgnoredAny;
 use std::collections::HashMap;
+use std::fmt::Write;
 
 /// Deeper than any scene, shallow enough for recursion.
 const DEEPEST: usize = 32;
+
+/// Keys of an object up to which one written twice is looked for among them all, beyond by its hash.
+const FEW: usize = 16;
 
 /// The longest piece of a text shown in a message \[characters\].
 const SHOWN: usize = 60;
@@ -197,6 +201,9 @@ pub(super) fn position(text: &str, byte: usize) -> (usize, usize) {
 
 /// A text on one line, printable, and at most [`SHOWN`] characters long.
 pub(super) fn clipped(text: &str) -> String {
+    if text.len() <= SHOWN && text.bytes().all(|byte| matches!(byte, b' '..=b'~')) {
+        return text.to_owned();
+    }
     let mut shown = String::new();
     for (count, word) in text.chars().enumerate() {
         if count == SHOWN {
@@ -240,7 +247,7 @@ impl Locator<'_> {
 
     fn object(&mut self, depth: usize) -> Result<Value, SceneError> {
         let mut members: Vec<Member> = Vec::new();
-        let mut seen: HashMap<String, Span> = HashMap::new();
+        let mut seen = HashMap::new();
         let parent = self.path.len();
         self.at += 1;
         loop {
@@ -251,7 +258,7 @@ impl Locator<'_> {
                     let (key, span) = self.string()?;
                     let written = self.source.written(self.span(span.start as usize + 1, span.end as usize - 1));
                     push_key(&mut self.path, &written);
-                    if let Some(first) = seen.insert(key.clone(), span) {
+                    if let Some(first) = twice(&members, &mut seen, &key) {
                         let hint = format!("it stands first at {}; remove one of the two", self.source.place(first));
                         return Err(self.source.refusal(span, &self.path, "appears twice", "each key may appear once in an object", &hint));
                     }
@@ -302,6 +309,10 @@ impl Locator<'_> {
         self.at = (self.at + 1).min(self.json.len());
         let span = self.span(start, self.at);
         let written = self.json.get(start..self.at).unwrap_or("");
+        let quoted = written.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
+        if let Some(plain) = quoted.filter(|quoted| !quoted.contains('\\')) {
+            return Ok((plain.to_owned(), span));
+        }
         let decoded = serde_json::from_str(written).map_err(|_| {
             let hint = "write a character above U+FFFF as itself, or as both halves of its surrogate pair";
             self.source.refused_value(span, &self.path, "must be valid Unicode", hint)
@@ -342,6 +353,15 @@ impl Locator<'_> {
     }
 }
 
+/// Where a key stands among the members of its object so far; `seen` are those beyond the first few.
+fn twice(members: &[Member], seen: &mut HashMap<String, Span>, key: &str) -> Option<Span> {
+    let (few, others) = members.split_at(members.len().min(FEW));
+    if let Some(member) = others.last() {
+        seen.insert(member.key.clone(), member.span);
+    }
+    few.iter().find(|member| member.key == key).map(|member| member.span).or_else(|| seen.get(key).copied())
+}
+
 /// Appends a key to a path: `bars[0]` and `name` to `bars[0].name`.
 pub(super) fn push_key(path: &mut String, key: &str) {
     if !path.is_empty() {
@@ -352,5 +372,6 @@ pub(super) fn push_key(path: &mut String, key: &str) {
 
 /// Appends an index to a path: `bars` and 0 to `bars[0]`.
 pub(super) fn push_index(path: &mut String, index: usize) {
-    path.push_str(&format!("[{index}]"));
+    // Writing to a text does not fail.
+    let _ = write!(path, "[{index}]");
 }

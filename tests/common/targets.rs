@@ -2,14 +2,19 @@
 
 use super::audit::audit;
 use super::random::{self, Draw};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory, FromArgMatches, Parser};
+use driftless::cli::Flags;
+use driftless::cli::flags::Command;
 use driftless::dynamics::Mechanism;
 use driftless::report;
 use driftless::run::checkpoint::{opened, sealed};
 use driftless::run::table::Table;
 use driftless::run::{Limits, MethodId, Plan, Request, Run, Running, Sample, Snapshot, Vary};
-use driftless::scene::{Override, Scene, parse_scene};
+use driftless::scene::{Override, Refusal, Scene, parse_scene};
 use driftless::stepping::Cause;
 use serde_json::{Value, json};
+use std::cell::RefCell;
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
@@ -42,13 +47,20 @@ fn kind(message: &str) -> u64 {
     words.flat_map(str::bytes).fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
+/// What kind of a refusal a scene's is; what the text says itself is left out, or every other text would be of a kind of its own.
+fn kind_of(refusal: &Refusal) -> u64 {
+    let depth = refusal.path.bytes().filter(|&byte| byte == b'.' || byte == b'[').count() as u64;
+    let words = refusal.problem.split(['`', '"', '=']).next().unwrap_or_default();
+    kind(words) ^ kind(&refusal.allowed).rotate_left(1) ^ depth
+}
+
 /// A text becomes a scene or a refusal that names its place; a scene comes back from its own text as it was.
 fn judge(text: &str) -> u64 {
     let scene = match parse_scene(text, "fuzzed.json", &[]) {
         Ok(scene) => scene,
         Err(error) => {
             assert!(!error.is_io() && error.to_string().starts_with("fuzzed.json"), "{error}");
-            return kind(&error.to_string());
+            return kind_of(error.refusal());
         }
     };
     // What a folder is named after leads nowhere else.
@@ -74,8 +86,10 @@ pub fn scene_text(bytes: &[u8]) -> u64 {
 
 /// A shipped scene of which some values, keys and elements were changed.
 pub fn scene_tree(bytes: &[u8]) -> u64 {
+    static TREES: LazyLock<Vec<Value>> =
+        LazyLock::new(|| SCENES.iter().map(|text| serde_json::from_str(text).expect("a shipped scene")).collect());
     let mut draw = Draw::new(bytes);
-    let mut tree: Value = serde_json::from_str(draw.one(&SCENES[..]).as_str()).expect("a shipped scene");
+    let mut tree = draw.one(&TREES).clone();
     for _ in 0..1 + draw.below(4) {
         change(&mut tree, &mut draw);
     }
@@ -215,14 +229,16 @@ pub fn checkpoint(bytes: &[u8]) -> u64 {
         Ok(snapshot) => snapshot,
         Err(error) => return kind(&error.to_string()),
     };
-    snapshot.allow(2000);
+    // Mostly a few steps, at times many.
+    let (effort, most) = *draw.one(&[(150, 2), (150, 2), (150, 2), (150, 2), (150, 2), (150, 2), (500, 4), (2000, 10)]);
+    snapshot.allow(effort);
     match Running::resume(Arc::clone(mechanism), &mechanism.start(scene), snapshot) {
         Err(error) => kind(&error.to_string()),
         Ok(mut running) => {
             let mut calls = 0;
             let is_over = running.go(&mut |_| Ok(()), &mut || {
                 calls += 1;
-                calls >= 10
+                calls >= most
             });
             if !is_over.expect("nobody fails") {
                 return 2;
@@ -232,95 +248,150 @@ pub fn checkpoint(bytes: &[u8]) -> u64 {
     }
 }
 
-const OPTIONS: &[&str] = &[
-    "run",
-    "check",
-    "inspect",
-    "sweep",
-    "resume",
-    "methods",
-    "schema",
-    "completions",
-    "free.json",
-    "--method",
-    "dp8",
-    "gauss16",
-    "--step",
-    "--rtol",
-    "--atol",
-    "--until",
-    "--every",
-    "--stabilize",
-    "none,projection",
-    "baumgarte",
-    "--time-constant",
-    "--extended",
-    "--effort",
-    "1e5",
-    "--set",
-    "a.b[0]=1",
-    "walls.wall.restitution=0.5",
-    "--strict",
-    "--json",
-    "-q",
-    "-v",
-    "--vary",
-    "bar1.phi=-pi..pi:64",
-    "--to-flip",
-    "--threads",
-    "--map",
-    "--max-energy-drift",
-    "--max-constraint-drift",
-    "--out",
-    "output",
-    "--force",
-    "--checkpoint-every",
-    "--no-charts",
-    "--gif",
-    "--help",
-    "--version",
+const COMMANDS: &[&str] =
+    &["run", "run", "run", "check", "sweep", "inspect", "compare", "stress", "resume", "methods", "schema", "completions"];
+/// Options with values that suit them; none where they take none.
+const OPTIONS: &[(&str, &str)] = &[
+    ("--method", "dp8"),
+    ("--method", "gauss16"),
+    ("--method", "taylor"),
+    ("--methods", "dp8,taylor"),
+    ("--step", "1/64"),
+    ("--rtol", "1e-9"),
+    ("--atol", "1e-12"),
+    ("--until", "100"),
+    ("--every", "0.25"),
+    ("--stabilize", "none,projection"),
+    ("--stabilize", "baumgarte"),
+    ("--time-constant", "0.01"),
+    ("--extended", ""),
+    ("--effort", "1e5"),
+    ("--prefer", "path"),
+    ("--set", "bars[0].length=1"),
+    ("--set", "walls.wall.restitution=0.5"),
+    ("--set", "gravity=[0,-9.81]"),
+    ("--strict", ""),
+    ("--json", ""),
+    ("-q", ""),
+    ("-v", ""),
+    ("--vary", "bar1.phi=-pi..pi:64"),
+    ("--vary", "bars[0].length=1..2:3"),
+    ("--to-flip", ""),
+    ("--threads", "2"),
+    ("--map", "flip_time"),
+    ("--trust", "full"),
+    ("--budget", "5"),
+    ("--tolerance", "1e-3"),
+    ("--max-energy-drift", "1e-6"),
+    ("--max-constraint-drift", "1e-6"),
+    ("--out", "results"),
+    ("--force", ""),
+    ("--checkpoint-every", "0"),
+    ("--no-charts", ""),
+    ("--gif", ""),
+    ("--help", ""),
+    ("--version", ""),
+];
+const VALUES: &[&str] = &[
     "1/64",
     "1e-9",
     "-1",
     "nan",
     "inf",
     "0",
+    "1/0",
+    "1e308",
     "18446744073709551616",
     "bash",
     "--",
     "=",
     "",
+    "free.json",
+    "none",
+    "pi",
+    "..",
+    "x=1..2:0",
 ];
+
+/// A scene that options are tried on.
+struct Tried {
+    text: String,
+    scene: Scene,
+    mechanism: Mechanism,
+}
+
+static FREE: LazyLock<Tried> = LazyLock::new(|| {
+    let text = SCENES.iter().find(|text| text.contains("\"name\": \"free\"")).expect("a shipped scene").clone();
+    let scene = parse_scene(&text, "free", &[]).expect("a scene");
+    let mechanism = Mechanism::new(&scene).expect("equations");
+    Tried { text, scene, mechanism }
+});
+
+/// The parser of the program, made once: that takes longer than to parse a line.
+fn flags(words: &[String]) -> Result<Flags, clap::Error> {
+    thread_local! {
+        static PARSER: RefCell<clap::Command> = RefCell::new(Flags::command());
+    }
+    let matches = PARSER.with_borrow_mut(|parser| parser.try_get_matches_from_mut(words))?;
+    Flags::from_arg_matches(&matches)
+}
+
+/// What kind of an error a command line's is, and the option it is about; one nobody knows counts as any other.
+fn kinds(error: &clap::Error) -> u64 {
+    let said = error.to_string();
+    assert!(!said.is_empty());
+    let option = match error.get(ContextKind::InvalidArg) {
+        Some(ContextValue::String(option)) if error.kind() != ErrorKind::UnknownArgument => kind(option),
+        _ => 0,
+    };
+    kind(&error.kind().to_string()) ^ option.rotate_left(1)
+}
 
 /// Words of a command line, known ones and others: flags, or a message; and the texts of options by themselves.
 pub fn command_line(bytes: &[u8]) -> u64 {
-    use clap::Parser;
     let mut draw = Draw::new(bytes);
+    let is_compared = draw.chance(5);
     let mut words = vec!["driftless".to_owned()];
-    for _ in 0..draw.below(12) {
-        words.push(match draw.below(6) {
+    if draw.chance(90) {
+        words.push((*draw.one(COMMANDS)).to_owned());
+    }
+    if draw.chance(80) {
+        words.push("free.json".to_owned());
+    }
+    for _ in 0..draw.below(8) {
+        let (option, value) = *draw.one(OPTIONS);
+        match draw.below(16) {
             0 => {
                 let length = draw.below(12);
                 let letters: Vec<u8> = (0..length).map(|_| draw.byte()).collect();
-                String::from_utf8_lossy(&letters).into_owned()
+                words.push(String::from_utf8_lossy(&letters).into_owned());
             }
-            1 => format!("{}={}", draw.one(OPTIONS), draw.one(OPTIONS)),
-            _ => (*draw.one(OPTIONS)).to_owned(),
-        });
+            1 => words.push((*draw.one(VALUES)).to_owned()),
+            2 => words.extend([option.to_owned(), (*draw.one(VALUES)).to_owned()]),
+            3 => words.push(format!("{option}={value}")),
+            _ => words.extend([option, value].into_iter().filter(|word| !word.is_empty()).map(str::to_owned)),
+        }
     }
     let rest = String::from_utf8_lossy(draw.rest()).into_owned();
+    let mut sets = Vec::new();
     for word in words.iter().chain([&rest]) {
         if let Ok(vary) = word.parse::<Vary>() {
             assert!(vary.count > 0 && (0..vary.count.min(5)).all(|index| vary.value(index).is_finite()), "{vary:?}");
         }
-        if let Ok(set) = word.parse::<Override>() {
-            // A value that is set anywhere is judged as one of the file.
-            let _ = parse_scene(&SCENES[0], "fuzzed.json", &[set]);
-        }
+        sets.extend(word.parse::<Override>());
     }
-    match driftless::cli::Flags::try_parse_from(&words) {
+    if !sets.is_empty() {
+        // What is set anywhere is judged as what the file says.
+        let _ = parse_scene(&FREE.text, "fuzzed.json", &sets);
+    }
+    let read = flags(&words);
+    if is_compared {
+        // As the program does, which makes its parser anew.
+        let said = |read: &Result<Flags, clap::Error>| read.as_ref().map_or_else(clap::Error::to_string, |flags| format!("{flags:?}"));
+        assert_eq!(said(&read), said(&Flags::try_parse_from(&words)));
+    }
+    match read {
         Ok(flags) => {
-            use driftless::cli::flags::Command;
             let requests = match &flags.command {
                 Command::Run(run) => run.plan.requests(),
                 Command::Check(check) => check.plan.requests(),
@@ -329,20 +400,14 @@ pub fn command_line(bytes: &[u8]) -> u64 {
             };
             let mut kinds = 4;
             for request in requests {
-                static FREE: LazyLock<(Scene, Mechanism)> = LazyLock::new(|| {
-                    let text = SCENES.iter().find(|text| text.contains("\"name\": \"free\"")).expect("a shipped scene");
-                    let scene = parse_scene(text, "free", &[]).expect("a scene");
-                    let mechanism = Mechanism::new(&scene).expect("equations");
-                    (scene, mechanism)
-                });
-                match Plan::new(&FREE.0, &FREE.1, &request) {
+                match Plan::new(&FREE.scene, &FREE.mechanism, &request) {
                     Ok(plan) => assert!(plan.until > 0.0 && plan.every > 0.0 && plan.rows > 0 && plan.effort > 0, "{plan:?}"),
                     Err(refusal) => kinds ^= kind(&refusal.reason),
                 }
             }
             kinds
         }
-        Err(error) => kind(&error.kind().to_string()) ^ kind(&error.to_string()),
+        Err(error) => kinds(&error),
     }
 }
 
@@ -380,16 +445,22 @@ pub fn simulate(text: &str, draw: &mut Draw, effort: u64) -> Ending {
         table.write(sample)
     });
     let outcome = outcome.expect("nobody fails");
-    let report = report::result::object(&scene, &mechanism, &outcome);
-    report::result::text(&scene, &mechanism, &outcome);
     let rows = table.finish().expect("room");
+    let report = || {
+        report::result::text(&scene, &mechanism, &outcome);
+        report::result::object(&scene, &mechanism, &outcome)
+    };
     match &outcome.stop {
         Some(stop) => {
             assert!(!stop.what.is_empty() && !stop.hint.is_empty() && stop.t.is_finite(), "{stop}");
+            // What is told of a run that stopped comes of the same code as what is told of one that did not.
+            if draw.chance(25) {
+                report();
+            }
             stopped(stop.cause)
         }
         None => {
-            let rows = String::from_utf8(rows).expect("text");
+            let (rows, report) = (String::from_utf8(rows).expect("text"), report());
             assert!(!rows.contains("NaN") && !rows.contains("inf"), "the table holds what is no number: {request:?}");
             assert!(all_finite(&report), "the report holds what is no number: {request:?} {report}");
             if let Err(fault) = audit(&scene, &mechanism, &samples, &outcome) {
@@ -418,11 +489,12 @@ fn all_finite(report: &Value) -> bool {
             .all(|row| numbers(row, &["position_max", "velocity_max", "position_slope", "velocity_slope"]))
 }
 
-/// A random scene and a random request, with little effort.
+/// A random scene and a random request, mostly with very little effort.
 pub fn physics(bytes: &[u8]) -> u64 {
     let mut draw = Draw::new(bytes);
+    let effort = *draw.one(&[80, 80, 80, 80, 80, 80, 80, 80, 80, 80, 80, 80, 300, 300, 300, 2000]);
     let text = random::scene(&mut draw);
-    match simulate(&text, &mut draw, 300) {
+    match simulate(&text, &mut draw, effort) {
         Ending::Done => 5,
         Ending::Refused => 6,
         Ending::Stopped(cause) => kind(cause),

@@ -258,9 +258,12 @@ pub(in crate::scene) fn listed(words: &[&str]) -> String {
 /// The known word within a third of its letters of `wanted`.
 pub(in crate::scene) fn nearest<'a>(wanted: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let wanted: String = wanted.chars().take(LONGEST_NAME).flat_map(char::to_lowercase).collect();
-    let far = (wanted.chars().count() / 3).max(1);
+    let letters = wanted.chars().count();
+    let far = (letters / 3).max(1);
     known
         .into_iter()
+        // Words are at least as far from each other as their lengths are.
+        .filter(|word| word.chars().count().abs_diff(letters) <= far)
         .map(|word| (strsim::damerau_levenshtein(&wanted, &word.to_lowercase()), word))
         .filter(|(distance, word)| *distance <= far && *distance < word.chars().count())
         .min_by_key(|(distance, _)| *distance)
