@@ -11,7 +11,8 @@ use driftless::arithmetic::{Complex, DoubleDouble, Real, Scalar};
 use driftless::dynamics::kernel::{Bias, Kernel};
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::row::{line_row, slot_row};
-use driftless::dynamics::{Field, Form, Mechanism, Time};
+use driftless::dynamics::series::{Coefficient, Series};
+use driftless::dynamics::{Coordinates, Field, Form, Mechanism, Time};
 use driftless::run::{MethodId, Plan, Request, Stabilization, simulate};
 
 use driftless::scene::{Force, Given, Place, Scene, Start, Torque, TorsionSpring};
@@ -161,6 +162,52 @@ fn the_random_mechanisms_have_rows_and_differ_by_rounding() {
     }
     assert!(compared > 200 && rows > 300, "{compared} {rows}");
     assert!(worst[0] < 1e-26 && worst[1] < 1e-26 && worst[2] < 1e-9 && worst[3] < 1e-9, "{worst:?}");
+}
+
+/// The power series of a mechanism at a start: rates, elements, multipliers and power, power by power.
+fn expand<T: Coefficient>(mechanism: &Mechanism, scene: &Scene, order: usize) -> Vec<Vec<T>> {
+    let (start, n) = (mechanism.start(scene), mechanism.coordinates());
+    let round = |x: &[DoubleDouble]| x.iter().map(|&x| T::split(x).0).collect::<Vec<_>>();
+    let mut series = Series::<T>::new(mechanism, Coordinates::All, order);
+    series.expand(mechanism, Time::from(0.375), &round(&start.phi), &vec![T::ZERO; n], &round(&start.omega));
+    (0..order)
+        .map(|m| {
+            let elements = series.z[(m + 2) * n..(m + 3) * n].iter().flat_map(|z| [z.re, z.im]);
+            let rates = &series.rate[(m + 1) * n..(m + 2) * n];
+            elements.chain(rates.iter().chain(series.multipliers(m)).copied()).chain([series.power[m]]).collect()
+        })
+        .collect()
+}
+
+/// The largest difference of any power, over the largest number of that power.
+fn part<T: Real>(found: &[Vec<T>], expected: &[Vec<T>]) -> f64 {
+    let of_power = |(found, expected): (&Vec<T>, &Vec<T>)| {
+        let largest = expected.iter().fold(1e-3, |most: f64, x| most.max(x.value().abs()));
+        found.iter().zip(expected).fold(0.0, |most: f64, (&a, &b)| most.max((a - b).value().abs() / largest))
+    };
+    found.iter().zip(expected).map(of_power).fold(0.0, f64::max)
+}
+
+/// With every kind of row and load, feet, and more and fewer bodies than lanes: in double-double the same to its rounding, in double to that.
+#[test]
+fn series_body_by_body_are_those_of_the_matrices() {
+    let (mut compared, mut rows, mut worst) = (0, 0, [0.0_f64; 2]);
+    for seed in 0..200 {
+        let (scene, mechanism) = mechanism(2 + seed as usize % 13, seed);
+        let (Some(dense), bodywise) = (mechanism.by_matrices(), mechanism.body_by_body()) else { continue };
+        let start = mechanism.start(&scene);
+        if evaluate(&dense, &start.phi, &start.omega, Bias::default()).weakest.share < 1e-3 {
+            continue;
+        }
+        compared += 1;
+        rows += mechanism.rows.len();
+        let exact = expand::<DoubleDouble>(&dense, &scene, 9);
+        worst[0] = worst[0].max(part(&expand::<DoubleDouble>(&bodywise, &scene, 9), &exact));
+        let plain: Vec<Vec<f64>> = exact.iter().map(|power| power.iter().map(|x| x.hi).collect()).collect();
+        worst[1] = worst[1].max(part(&expand::<f64>(&bodywise, &scene, 9), &plain));
+    }
+    assert!(compared > 100 && rows > 100, "{compared} {rows}");
+    assert!(worst[0] < 1e-24 && worst[1] < 1e-8, "{worst:?}");
 }
 
 /// A chain of `n` links, bent and in motion.

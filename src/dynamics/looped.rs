@@ -29,6 +29,7 @@ pub const NEAR: f64 = 1e-2;
 #[derive(Clone, Debug)]
 pub struct Looped {
     mechanism: Arc<Mechanism>,
+    reduced: Reduced,
     /// What all else is asked of.
     angles: Multiplier<0, true>,
     room: Room,
@@ -76,7 +77,7 @@ impl Looped {
             5..=8 => Room::Several(Box::new(Bench::new(&reduced))),
             _ => Room::Many(Box::new(Bench::new(&reduced))),
         };
-        Some(Self { angles: Multiplier::new(Arc::clone(&mechanism)), mechanism, room, is_portable: false })
+        Some(Self { angles: Multiplier::new(Arc::clone(&mechanism)), mechanism, reduced, room, is_portable: false })
     }
 
     /// The same without instructions special to the processor: slowly to the same bits.
@@ -248,6 +249,10 @@ impl Form for Looped {
 
     fn coordinates(&self) -> Coordinates {
         Coordinates::All
+    }
+
+    fn reduced(&self) -> Option<&Reduced> {
+        Some(&self.reduced)
     }
 
     fn state(&self, motion: &Motion) -> State {

@@ -65,6 +65,7 @@ pub use points::Points;
 pub use stiffness::Stiffness;
 
 use crate::arithmetic::{DoubleDouble, Scalar, angle};
+use natural::Reduced;
 
 /// Time \[s\], as a pair: at 1e6 s a plain double resolves no better than 1e-10 s, and a motor's phase with it.
 pub type Time = DoubleDouble;
@@ -212,6 +213,11 @@ pub trait Form {
     /// What its first unknowns are, for methods that expand the mechanism itself.
     fn coordinates(&self) -> Coordinates {
         Coordinates::Other
+    }
+
+    /// The matrices of the natural form, of a form that solves with them.
+    fn reduced(&self) -> Option<&Reduced> {
+        None
     }
 
     /// The state in which this motion is held.

@@ -20,6 +20,7 @@
 
 pub mod columns;
 mod guide;
+pub mod keeper;
 mod reduced;
 
 pub use guide::{Demand, Guide};

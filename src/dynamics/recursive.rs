@@ -26,6 +26,7 @@
 //! products with u are formed before the division by d is done, which is what the recursion waits for.
 
 pub mod evaluation;
+pub mod load;
 pub mod rows;
 
 pub use evaluation::{Evaluation, Recursion};
@@ -68,6 +69,8 @@ pub struct Links {
     coordinates: usize,
     /// Gravity \[m/s²\].
     gravity: Complex<f64>,
+    /// Σ m gamma of each body, over all that it carries, itself included \[kg·m\].
+    carried: Vec<Complex<f64>>,
 }
 
 impl Links {
@@ -114,7 +117,8 @@ impl Links {
                 child = before[child];
             }
         }
-        Self { links, place, coordinates: forest.coordinates, gravity }
+        let carried = carried(&links);
+        Self { links, place, coordinates: forest.coordinates, gravity, carried }
     }
 
     /// Number of bodies.
@@ -126,6 +130,18 @@ impl Links {
     pub fn coordinates(&self) -> usize {
         self.coordinates
     }
+}
+
+/// Σ m gamma of each body: of its own mass and of what hangs on it, at their hinges.
+fn carried(links: &[Link]) -> Vec<Complex<f64>> {
+    let mut mass: Vec<f64> = links.iter().map(|link| link.mass).collect();
+    let mut carried: Vec<Complex<f64>> = links.iter().map(|link| -link.moment.left()).collect();
+    for k in (1..links.len()).rev() {
+        let parent = links[k].parent;
+        carried[parent] += links[k].hinge.times(mass[k]);
+        mass[parent] += mass[k];
+    }
+    carried
 }
 
 /// A body at one moment: what its motion alone asks for.

@@ -14,18 +14,25 @@
 //! of driven bodies lack of balance is the motors' torque, whose power is integrated with the rest.  Rows that are not eliminated border
 //! M_0 with their Jacobian (module `rows`).
 //!
-//! Loops run over `N` bodies where `N > 0`, so that small sizes are unrolled, to the same bits as `N = 0` for any number.
+//! Loops run over `N` bodies where `N > 0`, so that small sizes are unrolled, to the same bits as `N = 0` for any number.  Mechanisms that are evaluated body by body
+//! are expanded body by body: H u and M_0⁻¹ by passes over the trees ([`recursive`](super::recursive)), rows by their ways to the ground, and Cauchy products component by
+//! component, so that an order costs O(n) beside them.
 //!
 //! Source: Jorba & Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor methods*, Experimental
 //! Mathematics 14 (2005), for the products; the in-series solve with constant couplings is ours.
 
+mod account;
 mod action;
+mod bodywise;
+mod coefficient;
 mod drive;
 pub mod polynomial;
 mod rows;
 mod spring;
 
 use self::action::ActionSeries;
+use self::bodywise::Bodywise;
+pub use self::coefficient::Coefficient;
 use self::polynomial::{Fractions, UNROLLED, convolve, copy, copy_vectors, width, zeros};
 use self::rows::RowSeries;
 use self::spring::SpringSeries;
@@ -77,33 +84,9 @@ pub struct Series<T> {
     reduced: Vec<T>,
     pivot: Vec<T>,
     solution: Vec<T>,
+    /// What stands in place of the matrices where the mechanism is evaluated body by body; they are empty then.
+    bodywise: Option<Box<Bodywise<T>>>,
 }
-
-/// A number whose series are compiled with this crate, once, and not anew wherever they are used.
-pub trait Coefficient: Real {
-    /// Power zero, and the laws' series.
-    fn begin(series: &mut Series<Self>, t: Time, u: &[Self], u_rest: &[Self], u_rate: &[Self]);
-
-    /// The powers from `first` on.
-    fn orders(series: &mut Series<Self>, mechanism: &Mechanism, first: usize);
-}
-
-macro_rules! coefficient {
-    ($number:ty) => {
-        impl Coefficient for $number {
-            fn begin(series: &mut Series<Self>, t: Time, u: &[Self], u_rest: &[Self], u_rate: &[Self]) {
-                series.begin(t, u, u_rest, u_rate);
-            }
-
-            fn orders(series: &mut Series<Self>, mechanism: &Mechanism, first: usize) {
-                series.sized_orders(mechanism, first);
-            }
-        }
-    };
-}
-
-coefficient!(f64);
-coefficient!(DoubleDouble);
 
 impl<T: Coefficient> Series<T> {
     /// Room for series of a mechanism in some coordinates up to this power of the rates, at least 2.
@@ -111,6 +94,8 @@ impl<T: Coefficient> Series<T> {
         let n = mechanism.coordinates();
         let ties = if coordinates == Coordinates::Independent { mechanism.ties.clone() } else { Ties::free(mechanism) };
         let f = ties.count();
+        let bodywise = Bodywise::new(mechanism, order).filter(|_| !ties.driven()).map(Box::new);
+        let matrix = |size: usize| zeros(if bodywise.is_some() { 0 } else { size });
         Self {
             order,
             elements: n,
@@ -128,15 +113,16 @@ impl<T: Coefficient> Series<T> {
             phi: zeros(n),
             actions: mechanism.actions.iter().map(|action| ActionSeries::new(action, order)).collect(),
             springs: mechanism.springs.iter().map(|spring| SpringSeries::new(spring, order)).collect(),
-            rows: RowSeries::new(mechanism, &ties, order),
+            rows: RowSeries::new(mechanism, &ties, order, bodywise.is_none()),
             turned: vec![Complex::ZERO; n],
             bend: vec![Complex::ZERO; n],
             load: zeros(n),
-            mass: zeros(n * n),
-            twist: zeros(n * n),
-            reduced: zeros(f * f),
-            pivot: zeros(f.max(n)),
+            mass: matrix(n * n),
+            twist: matrix(n * n),
+            reduced: matrix(f * f),
+            pivot: matrix(f.max(n)),
             solution: zeros(f),
+            bodywise,
             ties,
         }
     }
@@ -247,7 +233,7 @@ impl<T: Coefficient> Series<T> {
         if !T::IS_PLAIN {
             return self.orders::<0>(mechanism, first);
         }
-        match if self.angles == self.elements { self.angles } else { 0 } {
+        match if self.angles == self.elements && self.bodywise.is_none() { self.angles } else { 0 } {
             1 => self.orders::<1>(mechanism, first),
             2 => self.orders::<2>(mechanism, first),
             3 => self.orders::<3>(mechanism, first),
@@ -261,8 +247,44 @@ impl<T: Coefficient> Series<T> {
     /// The factors of M_0, and the powers from `first` on.
     #[inline(never)]
     fn orders<const N: usize>(&mut self, mechanism: &Mechanism, first: usize) {
-        let (n, f) = (size::<N>(self.elements), self.ties.count());
+        let n = size::<N>(self.elements);
         let angles = size::<N>(self.angles);
+        self.factor::<N>(mechanism);
+        if first == 0 {
+            // The first power of z needs only rates.
+            for i in 0..angles {
+                self.z[n + i] = self.z[i].left().times(self.omega[i]);
+            }
+            for x in (angles..n).step_by(2) {
+                self.z[n + x] = Complex::new(self.omega[x], self.omega[x + 1]);
+            }
+        }
+        if let Some(bodywise) = &mut self.bodywise {
+            bodywise.begin(&self.omega[..(first + 1) * n], &self.rest[..first * n]);
+        }
+        for m in first..self.order {
+            if N == 0 && self.bodywise.is_some() {
+                self.advance_bodywise(mechanism, m);
+            } else {
+                self.bend::<N>(m);
+                self.balance::<N>(mechanism, m);
+                self.solve::<N>(mechanism, m);
+            }
+            self.account(mechanism, m);
+        }
+    }
+
+    /// The factors of M_0, and those of the rows.
+    #[inline(always)]
+    fn factor<const N: usize>(&mut self, mechanism: &Mechanism) {
+        let (n, f) = (size::<N>(self.elements), self.ties.count());
+        if N == 0
+            && let Some(bodywise) = &mut self.bodywise
+        {
+            bodywise.factor(&self.z[..n], &self.omega[..n]);
+            self.rows.prepare_bodywise(&mut bodywise.evaluation, &self.z[..n]);
+            return;
+        }
         mechanism.tree.couple::<T, N>(&self.z[..n], &mut self.mass, &mut self.twist);
         if self.is_tied {
             self.ties.reduce(&self.mass, &mut self.reduced);
@@ -273,21 +295,6 @@ impl<T: Coefficient> Series<T> {
         }
         if !self.rows.is_empty() {
             self.rows.prepare(&self.ties, &self.z[..n], &self.reduced, &self.pivot);
-        }
-        if first == 0 {
-            // The first power of z needs only rates.
-            for i in 0..angles {
-                self.z[n + i] = self.z[i].left().times(self.omega[i]);
-            }
-            for x in (angles..n).step_by(2) {
-                self.z[n + x] = Complex::new(self.omega[x], self.omega[x + 1]);
-            }
-        }
-        for m in first..self.order {
-            self.bend::<N>(m);
-            self.balance::<N>(mechanism, m);
-            self.solve::<N>(mechanism, m);
-            self.account(mechanism, m);
         }
     }
 
@@ -323,12 +330,41 @@ impl<T: Coefficient> Series<T> {
                 self.bend[i] += self.z[i].left().times(given);
             }
         }
+        self.weigh(mechanism, m);
+        couple::<T, N>(mechanism, &self.bend, &mut self.rest[m * n..(m + 1) * n]);
+        self.force(mechanism, m);
         let (before, rest) = self.rest.split_at_mut(m * n);
         let rest = &mut rest[..n];
-        for (rest, &weight) in rest.iter_mut().zip(&mechanism.tree.weight) {
+        let (z, load) = (&self.z[..(m + 1) * n], &mut self.load[..n]);
+        for x in (angles..n).step_by(2) {
+            load[x] -= rest[x].re;
+            load[x + 1] -= rest[x].im;
+        }
+        let mut first = 0;
+        while first < angles {
+            // Of l = 0 only, R is not complete yet.
+            let sums: [T; UNROLLED] = convolve::<N, _, _, _>(n, first, &z[n..], before, |z, rest| z.cross(rest));
+            for i in 0..width::<N>() {
+                let k = first + i;
+                load[k] -= sums[i] + z[k].cross(rest[k]);
+            }
+            first += width::<N>();
+        }
+    }
+
+    /// Gravity in R_m, and nothing else.
+    #[inline(always)]
+    fn weigh(&mut self, mechanism: &Mechanism, m: usize) {
+        for (rest, &weight) in self.rest[m * self.elements..].iter_mut().zip(&mechanism.tree.weight) {
             *rest = if m == 0 { -Complex::of(weight) } else { Complex::ZERO };
         }
-        couple::<T, N>(mechanism, &self.bend, rest);
+    }
+
+    /// Adds what all other forces leave in R_m, and torques to the load.
+    #[inline(always)]
+    fn force(&mut self, mechanism: &Mechanism, m: usize) {
+        let n = self.elements;
+        let rest = &mut self.rest[m * n..(m + 1) * n];
         for (spring, series) in mechanism.springs.iter().zip(&mut self.springs) {
             let force = series.force(spring, m, &self.z, n);
             spring.span.spread(force, |k, force| rest[k] -= force);
@@ -347,21 +383,6 @@ impl<T: Coefficient> Series<T> {
             }
         }
         self.rows.swing(m, &self.z, n, rest);
-        let (z, load) = (&self.z[..(m + 1) * n], &mut self.load[..n]);
-        for x in (angles..n).step_by(2) {
-            load[x] -= rest[x].re;
-            load[x + 1] -= rest[x].im;
-        }
-        let mut first = 0;
-        while first < angles {
-            // Of l = 0 only, R is not complete yet.
-            let sums: [T; UNROLLED] = convolve::<N, _, _, _>(n, first, &z[n..], before, |z, rest| z.cross(rest));
-            for i in 0..width::<N>() {
-                let k = first + i;
-                load[k] -= sums[i] + z[k].cross(rest[k]);
-            }
-            first += width::<N>();
-        }
     }
 
     /// a_m from the loads, the newest powers of w and z, and R_m completed.
@@ -412,39 +433,6 @@ impl<T: Coefficient> Series<T> {
             newest[i] = self.fractions.vector_over((self.turned[i] + z[i].times(omega[i])).left(), m + 2);
         }
         couple::<T, N>(mechanism, &self.bend, rest);
-    }
-
-    /// Torques of the driven bodies and the power of motors and dampers at this order.
-    #[inline(always)]
-    fn account(&mut self, mechanism: &Mechanism, m: usize) {
-        let n = self.elements;
-        let mut power = T::ZERO;
-        if self.is_tied {
-            for (i, _) in self.ties.bodies.iter().enumerate().filter(|(_, tie)| !tie.laws.is_empty()) {
-                let mut torque = (self.omega[(m + 1) * n + i] * T::of((m + 1) as f64)).scale(mechanism.tree.diagonal[i]);
-                for (z, &rest) in self.z[i..].iter().step_by(n).zip(self.rest[..=m * n + i].iter().rev().step_by(n)) {
-                    torque += z.cross(rest);
-                }
-                torque -= self.applied[m * n + i];
-                self.torque[m * n + i] = torque;
-                for (&torque, &drive) in self.torque[i..].iter().step_by(n).zip(self.drive[..=m * n + i].iter().rev().step_by(n)) {
-                    power += torque * drive;
-                }
-            }
-        }
-        if !self.rows.is_empty() {
-            power += self.rows.power(m, &self.omega[m * n..(m + 1) * n]);
-        }
-        for (spring, series) in mechanism.springs.iter().zip(&self.springs).filter(|(spring, _)| spring.damping != 0.0) {
-            power += series.loss(spring, m);
-        }
-        for torsion in mechanism.torsions.iter().filter(|torsion| torsion.damping != 0.0) {
-            power += action::loss(torsion, m, &self.omega, n);
-        }
-        for (action, series) in mechanism.actions.iter().zip(&mut self.actions) {
-            power += series.power(action, m, &self.omega[m * n..(m + 1) * n]);
-        }
-        self.power[m] = power;
     }
 }
 

@@ -5,9 +5,12 @@
 //! velocity:  S dm = G w + C_t,      w -= M⁻¹ Gᵀ dm      with G, S and C_t at the new position and the new time
 //! ```
 //!
-//! The shortest way in the metric of the mass matrix.  Source: E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), section VII.2
+//! The shortest way in the metric of the mass matrix; small mechanisms with loops go it in natural coordinates (module `natural`).  Source: E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), section VII.2
 //! (algorithm 2.1); E. Eich, SIAM J. Numer. Anal. 30 (1993).
 
+mod natural;
+
+use self::natural::Natural;
 use crate::arithmetic::Complex;
 use crate::arithmetic::sum::two_sum;
 use crate::dynamics::kernel::Kernel;
@@ -20,7 +23,7 @@ use crate::stepping::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
 #[derive(Clone, Debug)]
 pub struct Projected<M> {
     inner: M,
-    kernel: Option<Kernel<f64>>,
+    projector: Option<Projector>,
     /// Energy less work after the last step, and whether that ended near a singular position.
     balance: Option<f64>,
     near: bool,
@@ -34,7 +37,7 @@ pub struct Projected<M> {
 impl<M> Projected<M> {
     /// Projects after the steps of `inner`.
     pub fn new(inner: M) -> Self {
-        Self { inner, kernel: None, balance: None, near: false, has_paused: false, tolerance: 1e-13 }
+        Self { inner, projector: None, balance: None, near: false, has_paused: false, tolerance: 1e-13 }
     }
 }
 
@@ -65,10 +68,10 @@ where
             // What impacts change is not a step's.
             self.balance = None;
         }
-        let kernel = self.kernel.get_or_insert_with(|| Kernel::new(mechanism));
+        let projector = self.projector.get_or_insert_with(|| Projector::new(problem));
         let Self { inner, balance, near, .. } = self;
         let reached = inner.advance(problem, state, until, tally, &mut |problem, state| {
-            let landing = project(problem.mechanism(), kernel, state, tolerance).map_err(|(row, left)| StepError {
+            let landing = projector.project(problem.mechanism(), state, tolerance).map_err(|(row, left)| StepError {
                 cause: Cause::ProjectionFailed,
                 method: name.into(),
                 t: state.time.hi,
@@ -76,13 +79,13 @@ where
                 what: format!("projection leaves {left:.1e} of constraint {row}"),
                 hint: "tighten the tolerance, or check that no motors work against each other".into(),
             })?;
-            let was_near = std::mem::replace(near, kernel.weakest.share < NEAR);
+            let was_near = std::mem::replace(near, landing.is_near);
             let last = balance.replace(landing.balance);
             let lost = last.map_or(0.0, |last| (landing.balance - last).abs()) + landing.energy_change.abs();
             let mechanism = problem.mechanism();
             let lost = lost / mechanism.energy_scale;
             if (was_near || *near) && (lost > LOST || lost.is_nan()) {
-                let row = mechanism.rows[kernel.weakest.row].name();
+                let row = mechanism.rows[projector.kernel.weakest.row].name();
                 return Err(StepError {
                     cause: Cause::BranchLost,
                     method: name.into(),
@@ -128,9 +131,9 @@ where
     /// Inside a step the constraints are kept as well as at its end; where they cannot be, the state is the step's own.
     fn within(&mut self, problem: &mut P, from: &State, time: Time, inside: &mut State) {
         self.inner.within(problem, from, time, inside);
-        if let Some(kernel) = &mut self.kernel {
+        if let Some(projector) = &mut self.projector {
             // The violation left is on record in the constraints' drift.
-            let _ = project(problem.mechanism(), kernel, inside, self.tolerance);
+            let _ = projector.project(problem.mechanism(), inside, self.tolerance);
         }
     }
 }
@@ -145,6 +148,46 @@ const ROUNDING: f64 = 1e-14;
 /// Change of energy less work, or of energy by projection, in a step near a singular position, over the energy scale: more is another branch.
 const LOST: f64 = 1e-3;
 
+/// Projects the states of one form: in natural coordinates where it is solved in these, else in angles.
+#[derive(Clone, Debug)]
+struct Projector {
+    kernel: Kernel<f64>,
+    natural: Option<Natural>,
+}
+
+impl Projector {
+    fn new<P: Form + ?Sized>(problem: &P) -> Self {
+        Self { kernel: Kernel::new(problem.mechanism()), natural: problem.reduced().map(Natural::new) }
+    }
+
+    fn project(&mut self, mechanism: &Mechanism, state: &mut State, tolerance: f64) -> Result<Landing, (String, f64)> {
+        match self.project_naturally(mechanism, state) {
+            Some(landing) => Ok(landing),
+            None => project(mechanism, &mut self.kernel, state, tolerance),
+        }
+    }
+
+    /// `None`, and nothing done, where there are no natural coordinates or the position is nearly singular.
+    fn project_naturally(&mut self, mechanism: &Mechanism, state: &mut State) -> Option<Landing> {
+        let Self { kernel, natural: Some(natural) } = self else { return None };
+        let n = mechanism.coordinates();
+        natural.face(state, &mut kernel.z);
+        let energy =
+            |kernel: &mut Kernel<f64>, state: &State| mechanism.energy_facing::<f64, 0>(kernel, &state.y[..n], &state.y[n..2 * n]).total();
+        let energy_before = energy(kernel, state);
+        let balance = energy_before - state.y[2 * n] - state.y[2 * n + 1];
+        let [turn, change] = natural.land(state, &mut kernel.z)?;
+        let mut energy_change = 0.0;
+        if turn + change > 0.0 {
+            state.wrap();
+            energy_change = energy(kernel, state) - energy_before;
+            state.y[2 * n + 1] += energy_change;
+        }
+        let fastest = state.y[n..2 * n].iter().fold(1.0, |most: f64, omega| most.max(omega.abs()));
+        Some(Landing { has_moved: turn.max(change / fastest) > ROUNDING, balance, energy_change, is_near: false })
+    }
+}
+
 /// What a projection found and did.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Landing {
@@ -154,6 +197,8 @@ pub struct Landing {
     pub balance: f64,
     /// Energy the projection put in \[J\].
     pub energy_change: f64,
+    /// True near a singular position.
+    pub is_near: bool,
 }
 
 /// Projects coordinates and rates of a state onto all rows.
@@ -236,7 +281,7 @@ fn project_sized<const N: usize>(
         energy_change = mechanism.energy_facing::<f64, N>(kernel, &state.y[..n], &state.y[n..2 * n]).total() - energy_before;
         state.y[2 * n + 1] += energy_change;
     }
-    Ok(Landing { has_moved: far > ROUNDING, balance, energy_change })
+    Ok(Landing { has_moved: far > ROUNDING, balance, energy_change, is_near: kernel.weakest.share < NEAR })
 }
 
 /// Adds M⁻¹ Gᵀ times what is in `multiplier`, with a sign, to the unknowns `from`…, and leaves it in `load`; returns its largest entry.

@@ -239,7 +239,13 @@ impl<T: Coefficient> Taylor<T> {
             self.fast = None;
         } else if !self.fast.as_ref().is_some_and(|fast| fast.is_for(mechanism, tolerance, order, is_portable, extended)) {
             self.fast = match is_looped {
-                true => Fast::of_looped(mechanism, tolerance, order, is_portable),
+                true => {
+                    let of = |reduced: &_| Fast::of_looped(mechanism, reduced, tolerance, order, is_portable);
+                    match problem.reduced() {
+                        Some(reduced) => of(reduced),
+                        None => dynamics::looped::reduced(mechanism).as_ref().and_then(of),
+                    }
+                }
                 false => Fast::new(mechanism, tolerance, order, is_portable, extended),
             };
         }

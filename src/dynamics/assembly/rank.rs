@@ -22,7 +22,7 @@ impl Problem<'_> {
         let conditioning = if rows == 0 {
             1.0
         } else if q.len() <= DENSE {
-            here.svd().conditioning(DEPENDENT)
+            conditioning(&here)
         } else {
             f64::NAN
         };
@@ -58,6 +58,13 @@ impl Problem<'_> {
             ..Assembly::default()
         }
     }
+}
+
+/// The least singular value that counts over the largest; 1 without any.
+fn conditioning(jacobian: &Matrix) -> f64 {
+    let values = jacobian.values();
+    let smallest = values.iter().copied().filter(|&sigma| sigma > DEPENDENT).fold(f64::INFINITY, f64::min);
+    if smallest.is_finite() { smallest / values.iter().copied().fold(0.0, f64::max) } else { 1.0 }
 }
 
 /// Which rows are combinations of those before.

@@ -14,7 +14,7 @@ impl Mechanism {
     /// equations; zeros of redundant rows are not counted.  Not a number where there are no rows, or too many for singular values.
     pub fn conditioning(&self, kernel: &Kernel<f64>) -> f64 {
         let Some(jacobian) = self.measured(kernel) else { return f64::NAN };
-        let mut values = jacobian.svd().values();
+        let mut values = jacobian.values();
         values.sort_by(f64::total_cmp);
         let independent = (jacobian.rows - self.assembly.redundant.len().min(jacobian.rows)).min(jacobian.columns);
         match values.len().checked_sub(independent).and_then(|first| values.get(first)) {

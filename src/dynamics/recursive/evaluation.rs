@@ -1,5 +1,6 @@
 //! One evaluation of the equations body by body, in place of the dense matrices of [`Kernel`](crate::dynamics::kernel::Kernel).
 
+use super::load::{Order, Passes};
 use super::rows::{Rows, Ways};
 use super::{Links, Recursive};
 use crate::arithmetic::{Complex, Real};
@@ -128,13 +129,50 @@ impl<T: Real> Evaluation<T> {
             rows[r] = here;
         }
         let weakest = self.rows.couple(ways, &self.trees);
+        self.settle(multiplier);
+        if is_biased {
+            self.solve_rows(correction);
+        }
+        weakest
+    }
+
+    /// Replaces the convective terms of all rows by their multipliers, after [`couple`](Self::couple), and takes these off the load.
+    #[inline]
+    pub fn settle(&mut self, multiplier: &mut [T]) {
+        let ways = &self.recursion.ways;
         self.rows.project(ways, &self.trees, multiplier);
         self.rows.solve(ways, multiplier);
-        if is_biased {
-            self.rows.solve(ways, correction);
-        }
         self.rows.resist(ways, &mut self.trees, multiplier);
-        weakest
+    }
+
+    /// One row's Jacobian, as `add` adds it up.
+    #[inline]
+    pub fn take(&mut self, row: usize, add: impl FnOnce(&mut [T])) {
+        add(&mut self.jacobian);
+        self.rows.take(&self.recursion.ways, row, &mut self.jacobian);
+    }
+
+    /// Takes the factors of M at hand for the [passes](Passes) of a series.
+    pub fn brace(&self, passes: &mut Passes<T>) {
+        passes.face(&self.recursion.links, &self.trees);
+    }
+
+    /// What is left of the load of one order of a series.
+    #[inline]
+    pub fn bear(&mut self, passes: &mut Passes<T>, order: Order<T>) {
+        passes.bear(&self.recursion.links, &mut self.trees, order);
+    }
+
+    /// Writes the accelerations \[rad/s², m/s²\] of that order.
+    #[inline]
+    pub fn unfold_order(&self, passes: &mut Passes<T>, alpha: &mut [T]) {
+        passes.unfold(&self.recursion.links, &self.trees, alpha);
+    }
+
+    /// Adds H x without its diagonal to `rest`, x all of that order.
+    #[inline]
+    pub fn close(&self, passes: &mut Passes<T>, x: &[Complex<T>], rest: &mut [Complex<T>]) {
+        passes.close(&self.recursion.links, x, rest);
     }
 
     /// C, G, C_t, gamma of every row, and nothing else.

@@ -7,7 +7,7 @@
 //! M_0 a_m + Jᵀ lambda_m = load_m:   S = J M_0⁻¹ Jᵀ,   S lambda_m = J M_0⁻¹ load_m - (J a)_m
 //! ```
 //!
-//! S is factored once a step.  The products of earlier multipliers with later powers of z enter through the loads like those of any force.
+//! S is factored once a step; where the mechanism is evaluated body by body, in its envelope.  The products of earlier multipliers with later powers of z enter through the loads like those of any force.
 
 use super::drive;
 use super::polynomial::{copy, zeros};
@@ -15,6 +15,7 @@ use crate::arithmetic::{Complex, Real};
 use crate::dynamics::kernel::dot;
 use crate::dynamics::law::Law;
 use crate::dynamics::quadratic::Quadratic;
+use crate::dynamics::recursive::Evaluation;
 use crate::dynamics::row::{Measure, Row};
 use crate::dynamics::schur::{self, Weakest};
 use crate::dynamics::ties::Ties;
@@ -47,9 +48,34 @@ enum Kind<T> {
     Angle { body: usize, base: Option<usize>, law: Law, drive: Vec<T>, speed: Vec<T> },
 }
 
+impl<T: Real> Kind<T> {
+    /// Parts of dC/dq, coordinate by coordinate; a coordinate may come up more than once.
+    fn slopes(&self, z: &[Complex<T>], mut each: impl FnMut(usize, T)) {
+        match self {
+            Self::Place { place, .. } => place.slopes(z, each),
+            Self::Angle { body, base, .. } => {
+                each(*body, T::ONE);
+                base.iter().for_each(|&base| each(base, -T::ONE));
+            }
+        }
+    }
+
+    /// `free`, and what else there is of power m of the second derivative, less that of its law.
+    fn known(&self, m: usize, z: &[Complex<T>], bend: &[Complex<T>], free: T) -> T {
+        match self {
+            Self::Place { place, drive, .. } => {
+                let known = free + bent(place, m, z, bend);
+                drive.get(m + 1).map_or(known, |&drive| known - drive.scale((m + 1) as f64))
+            }
+            Self::Angle { drive, .. } => free - drive[m + 1].scale((m + 1) as f64),
+        }
+    }
+}
+
 impl<T: Real> RowSeries<T> {
     /// Room for the rows that `ties` do not fulfil already: all but the motors' where these are eliminated.
-    pub fn new(mechanism: &Mechanism, ties: &Ties, order: usize) -> Self {
+    /// Without matrices where `is_dense` is false.
+    pub fn new(mechanism: &Mechanism, ties: &Ties, order: usize, is_dense: bool) -> Self {
         let kind = |row: &Row| match (&row.measure, &row.law) {
             (Measure::Angle { .. }, _) if ties.driven() => None,
             (&Measure::Angle { body, base }, law) => {
@@ -64,13 +90,14 @@ impl<T: Real> RowSeries<T> {
         let scale = in_force.map(|row| row.scale(&mechanism.tree)).collect();
         let kinds: Vec<Kind<T>> = mechanism.rows.iter().filter_map(kind).collect();
         let (r, f) = (kinds.len(), ties.count());
+        let matrix = |size: usize| zeros(if is_dense { size } else { 0 });
         Self {
             kinds,
             coordinates: f,
-            jacobian: zeros(r * f),
-            lifted: zeros(r * f),
-            schur: zeros(r * r),
-            pivot: zeros(r),
+            jacobian: matrix(r * f),
+            lifted: matrix(r * f),
+            schur: matrix(r * r),
+            pivot: matrix(r),
             scale,
             weakest: Weakest::NONE,
             multiplier: zeros(order * r),
@@ -109,18 +136,11 @@ impl<T: Real> RowSeries<T> {
         let (r, f) = (self.kinds.len(), self.coordinates);
         self.jacobian.fill(T::ZERO);
         for (kind, jacobian) in self.kinds.iter().zip(self.jacobian.chunks_exact_mut(f.max(1))) {
-            let mut add = |body: usize, entry: T| {
+            kind.slopes(z, |body, entry| {
                 if let Some(base) = ties.bodies[body].base {
                     jacobian[base] += entry;
                 }
-            };
-            match kind {
-                Kind::Place { place, .. } => place.slopes(z, add),
-                Kind::Angle { body, base, .. } => {
-                    add(*body, T::ONE);
-                    base.iter().for_each(|&base| add(base, -T::ONE));
-                }
-            }
+            });
         }
         self.lifted.copy_from_slice(&self.jacobian);
         for lifted in self.lifted.chunks_exact_mut(f.max(1)) {
@@ -134,19 +154,33 @@ impl<T: Real> RowSeries<T> {
         self.weakest = schur::factor::<T, 0>(r, &mut self.schur, &mut self.pivot, &self.scale);
     }
 
+    /// The same body by body, where all coordinates are free.
+    pub fn prepare_bodywise(&mut self, evaluation: &mut Evaluation<T>, z: &[Complex<T>]) {
+        if self.is_empty() {
+            return;
+        }
+        for (r, kind) in self.kinds.iter().enumerate() {
+            evaluation.take(r, |jacobian| kind.slopes(z, |coordinate, entry| jacobian[coordinate] += entry));
+        }
+        self.weakest = evaluation.couple();
+    }
+
+    /// What is known of power m of every row's second derivative, less that of its law: where its multipliers will be.
+    pub fn known(&mut self, m: usize, z: &[Complex<T>], bend: &[Complex<T>]) -> &mut [T] {
+        let r = self.kinds.len();
+        let multiplier = &mut self.multiplier[m * r..(m + 1) * r];
+        for (multiplier, kind) in multiplier.iter_mut().zip(&self.kinds) {
+            *multiplier = kind.known(m, z, bend, T::ZERO);
+        }
+        multiplier
+    }
+
     /// Multipliers of power m from the free accelerations of the coordinates, which become the constrained ones.
     pub fn solve(&mut self, m: usize, z: &[Complex<T>], bend: &[Complex<T>], solution: &mut [T]) {
         let (r, f) = (self.kinds.len(), self.coordinates);
         let multiplier = &mut self.multiplier[m * r..(m + 1) * r];
         for (i, kind) in self.kinds.iter().enumerate() {
-            let free = dot(&self.jacobian[i * f..(i + 1) * f], solution);
-            multiplier[i] = match kind {
-                Kind::Place { place, drive, .. } => {
-                    let known = free + bent(place, m, z, bend);
-                    drive.get(m + 1).map_or(known, |&drive| known - drive.scale((m + 1) as f64))
-                }
-                Kind::Angle { drive, .. } => free - drive[m + 1].scale((m + 1) as f64),
-            };
+            multiplier[i] = kind.known(m, z, bend, dot(&self.jacobian[i * f..(i + 1) * f], solution));
         }
         tree::solve::<T, 0>(r, &self.schur, &self.pivot, multiplier);
         for (i, &multiplier) in multiplier.iter().enumerate() {

@@ -7,6 +7,7 @@ use super::looped::{self, Looped};
 use super::pace::Pace;
 use super::pair::{self, Pair};
 use crate::arithmetic::lanes::{self, Code, Lanes};
+use crate::dynamics::natural::Reduced;
 use crate::dynamics::{Mechanism, State};
 
 /// The least order mechanisms with loops are expanded to: each costs little beside the matrices of the step.
@@ -232,12 +233,12 @@ impl Fast {
     }
 
     /// The kernel of a mechanism with loops, where there is one: it sums the best of all orders up to the one asked for, or to 20 where that is higher.
-    pub fn of_looped(mechanism: &Mechanism, tolerance: f64, order: usize, is_portable: bool) -> Option<Self> {
+    pub fn of_looped(mechanism: &Mechanism, reduced: &Reduced, tolerance: f64, order: usize, is_portable: bool) -> Option<Self> {
         let highest = order.max(LOOPED);
         let form = match mechanism.bodies.len() {
-            0..=4 => Form::FewLooped(Box::new(Looped::new(mechanism, tolerance, highest)?)),
-            5..=8 => Form::SeveralLooped(Box::new(Looped::new(mechanism, tolerance, highest)?)),
-            _ => Form::ManyLooped(Box::new(Looped::new(mechanism, tolerance, highest)?)),
+            0..=4 => Form::FewLooped(Box::new(Looped::new(mechanism, reduced, tolerance, highest)?)),
+            5..=8 => Form::SeveralLooped(Box::new(Looped::new(mechanism, reduced, tolerance, highest)?)),
+            _ => Form::ManyLooped(Box::new(Looped::new(mechanism, reduced, tolerance, highest)?)),
         };
         let settings = Settings { mechanism: mechanism.clone(), tolerance, order, is_portable, is_extended: false };
         Some(Self::of_any(settings, form))

@@ -20,9 +20,10 @@ use crate::arithmetic::DoubleDouble;
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::{Complex, sincos};
 use crate::dynamics::force::action::Kind;
-use crate::dynamics::looped::{NEAR, reduced};
+use crate::dynamics::looped::NEAR;
 use crate::dynamics::natural::Reduced;
-use crate::dynamics::natural::columns::{self, Columns, Row, load, store};
+use crate::dynamics::natural::columns::{self, Row, load, store};
+use crate::dynamics::natural::keeper::{Keeper, at};
 use crate::dynamics::{Mechanism, State};
 use std::f64::consts::TAU;
 
@@ -32,9 +33,6 @@ pub const MOST: usize = 24;
 const JUDGES: usize = 4;
 /// The least order.
 const LEAST: usize = 8;
-/// Sweeps at the end of a step, at most, and what of the lengths one sweep is enough for.
-const SWEEPS: usize = 6;
-const CLOSE: f64 = 1e-9;
 
 /// Constants of the mechanism and coefficients of one step; lanes beyond the last body are zero.
 #[derive(Clone, Debug)]
@@ -42,47 +40,35 @@ pub struct Looped<const B: usize> {
     count: usize,
     order: usize,
     log_tolerance: f64,
-    columns: Columns<B>,
+    /// W, S and V, and the linear rows.
+    keeper: Keeper<B>,
     /// Gravity and constant forces, and the share of the latter \[N·m\].
     weight: [Row<B>; 2],
     applied: Vec<Complex<f64>>,
     /// Constant torque on each body \[N·m\].
     torque: Row<B>,
     springs: Vec<Spring>,
-    /// The linear rows: elements and gradients, the constant, and their columns of R.
-    rows: Vec<Linear<B>>,
     /// Highest power of z summed in the last step.
     summed: usize,
     /// z: powers 0…P+1.
     z: [[Row<B>; 2]; MOST + 2],
     /// mu: powers 0…P-1.
     mu: [Row<B>; MOST],
-    /// S, then S⁻¹, column by column.
-    schur: Vec<Row<B>>,
-    /// V, U, their transpose G = Uᵀ, and P: x and y, column by column.
-    lifted: Vec<[Row<B>; 2]>,
+    /// U, its transpose G = Uᵀ, and P: x and y, column by column.
     spread: Vec<[Row<B>; 2]>,
     across: Vec<[Row<B>; 2]>,
     projected: Vec<[Row<B>; 4]>,
 }
 
-#[derive(Clone, Debug)]
-struct Linear<const B: usize> {
-    terms: Vec<(usize, Complex<f64>)>,
-    constant: f64,
-    back: [Row<B>; 2],
-}
-
 impl<const B: usize> Looped<B> {
-    /// The constants, where this form fits: up to 4 B hinged bodies with loops, constant forces, springs without dampers.
-    pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize) -> Option<Self> {
+    /// The constants of a mechanism with these matrices, where this form fits: up to 4 B bodies, constant forces, springs without dampers.
+    pub fn new(mechanism: &Mechanism, reduced: &Reduced, tolerance: f64, order: usize) -> Option<Self> {
         let n = mechanism.bodies.len();
         let is_plain =
             mechanism.torsions.is_empty() && !mechanism.is_damped() && mechanism.actions.iter().all(|action| action.law.is_none());
         if n > columns::room(B) || !is_plain || order > MOST {
             return None;
         }
-        let reduced = reduced(mechanism)?;
         let mut applied = vec![Complex::ZERO; n];
         let mut torque = [[0.0; 4]; B];
         for action in &mechanism.actions {
@@ -106,51 +92,18 @@ impl<const B: usize> Looped<B> {
             count: n,
             order,
             log_tolerance: libm::log2(tolerance),
-            columns: Columns::new(&reduced),
+            keeper: Keeper::new(reduced),
             weight,
             applied,
             torque,
             springs: mechanism.springs.iter().map(Spring::new).collect(),
-            rows: linear_rows(&reduced),
             summed: 0,
             z: [[zero; 2]; MOST + 2],
             mu: [zero; MOST],
-            schur: vec![zero; n],
-            lifted: vec![[zero; 2]; n],
             spread: vec![[zero; 2]; n],
             across: vec![[zero; 2]; n],
             projected: vec![[zero; 4]; n],
         })
-    }
-}
-
-fn linear_rows<const B: usize>(reduced: &Reduced) -> Vec<Linear<B>> {
-    let n = reduced.free.len();
-    let row = |(row, back): (&crate::dynamics::natural::Linear, &[Complex<f64>])| {
-        let mut lanes = [[[0.0; 4]; B]; 2];
-        for (i, back) in back.iter().enumerate() {
-            (lanes[0][i / 4][i % 4], lanes[1][i / 4][i % 4]) = (back.re, back.im);
-        }
-        Linear { terms: row.place.linear.clone(), constant: row.place.constant, back: lanes }
-    };
-    reduced.rows.iter().zip(reduced.back.chunks(n.max(1))).map(row).collect()
-}
-
-#[inline(always)]
-fn at<const B: usize>(row: &Row<B>, i: usize) -> f64 {
-    row[i / 4][i % 4]
-}
-
-/// V and S at unit vectors.
-#[inline(always)]
-fn face<L: Lanes, const B: usize>(columns: &Columns<B>, z: &[Row<B>; 2], lifted: &mut [[Row<B>; 2]], schur: &mut [Row<B>]) {
-    let (c, s): ([L; B], [L; B]) = (load(&z[0]), load(&z[1]));
-    for (j, block) in columns.blocks.iter().enumerate() {
-        let [x, y] = columns::turned::<L, B>(block, at(&z[0], j), at(&z[1], j));
-        for b in 0..B {
-            schur[j][b] = c[b].mul_add(x[b], s[b].mul(y[b])).array();
-        }
-        lifted[j] = [store(x), store(y)];
     }
 }
 
@@ -172,9 +125,9 @@ fn begin<L: Lanes, const B: usize>(looped: &mut Looped<B>, state: &State) -> f64
         (looped.z[0][0][b], looped.z[0][1][b]) = (c.array(), s.array());
         (looped.z[1][0][b], looped.z[1][1][b]) = (s.mul(w).neg().array(), c.mul(w).array());
     }
-    let Looped { columns, z, schur, lifted, spread, across, projected, .. } = looped;
-    face::<L, B>(columns, &z[0], lifted, schur);
-    let least = columns::invert::<L, B>(schur, &columns.scale);
+    let Looped { keeper, z, spread, across, projected, .. } = looped;
+    let least = keeper.face::<L>(&z[0]);
+    let Keeper { columns, schur, lifted, .. } = keeper;
     for j in 0..n {
         let mut sum = [[L::ZERO; B]; 2];
         for i in 0..n {
@@ -248,7 +201,7 @@ fn forces<L: Lanes, const B: usize>(looped: &mut Looped<B>, m: usize) -> [[L; B]
 #[inline(always)]
 fn order<L: Lanes, const B: usize>(looped: &mut Looped<B>, m: usize) {
     let mut f = forces::<L, B>(looped, m);
-    let Looped { count, z, mu, schur, spread, across, projected, .. } = looped;
+    let Looped { count, z, mu, keeper: Keeper { schur, .. }, spread, across, projected, .. } = looped;
     let n = *count;
     let mut q = [L::ZERO; B];
     for b in 0..B {
@@ -373,7 +326,9 @@ pub fn go<L: Lanes, const B: usize>(looped: &mut Looped<B>, state: &mut State, h
             z[axis][b] = L::of(start[axis][b]).add(L::of(z[axis][b])).array();
         }
     }
-    put_back::<L, B>(looped, &mut z, &mut v);
+    // V and S⁻¹ of the step's start have served: the next step makes its own.
+    looped.keeper.put_back::<L>(&mut z);
+    looped.keeper.put_rates_back::<L>(&z, &mut v);
     let half = sum::<L, B>(looped, 0.5 * h)[0];
     let half = [store(half[0]), store(half[1])];
     let n = looped.count;
@@ -395,80 +350,4 @@ pub fn go<L: Lanes, const B: usize>(looped: &mut Looped<B>, state: &mut State, h
     }
     let work = DoubleDouble::sum(state.y[2 * n], state.low[2 * n]) + work;
     (state.y[2 * n], state.low[2 * n]) = (work.hi, work.lo);
-}
-
-/// Elements and rates onto the linear rows, then onto the unit lengths, with the S of the position at hand: one sweep, unless the step was long.
-#[inline(always)]
-fn put_back<L: Lanes, const B: usize>(looped: &mut Looped<B>, z: &mut [Row<B>; 2], v: &mut [Row<B>; 2]) {
-    let Looped { columns, rows, schur, lifted, .. } = looped;
-    let (mut place, mut rate) = ([[L::ZERO; B]; 2], [[L::ZERO; B]; 2]);
-    for row in rows.iter() {
-        let (mut far, mut fast) = (row.constant, 0.0);
-        for &(k, g) in &row.terms {
-            far += g.re * at(&z[0], k) + g.im * at(&z[1], k);
-            fast += g.re * at(&v[0], k) + g.im * at(&v[1], k);
-        }
-        add::<L, B>(&mut place, &row.back, far);
-        add::<L, B>(&mut rate, &row.back, fast);
-    }
-    subtract::<L, B>(z, &place);
-    subtract::<L, B>(v, &rate);
-    for _ in 0..SWEEPS {
-        // V and S⁻¹ of the step's start have served: the next step makes its own.
-        face::<L, B>(columns, z, lifted, schur);
-        columns::invert::<L, B>(schur, &columns.scale);
-        let mut far = [L::ZERO; B];
-        for b in 0..B {
-            let (x, y) = (L::of(z[0][b]), L::of(z[1][b]));
-            far[b] = x.mul_add(x, y.mul(y)).sub(L::ONE).mul(L::splat(0.5));
-        }
-        let far = store(far);
-        shift::<L, B>(schur, lifted, &far, z);
-        // What a sweep leaves is about the square of what it found.
-        let most = far.as_flattened().iter().take(schur.len()).fold(0.0, |most, &far| larger(most, far));
-        if most <= CLOSE {
-            break;
-        }
-    }
-    let mut fast = [L::ZERO; B];
-    for b in 0..B {
-        fast[b] = L::of(z[0][b]).mul_add(L::of(v[0][b]), L::of(z[1][b]).mul(L::of(v[1][b])));
-    }
-    shift::<L, B>(schur, lifted, &store(fast), v);
-}
-
-/// x -= V S⁻¹ violation.
-#[inline(always)]
-fn shift<L: Lanes, const B: usize>(inverse: &[Row<B>], lifted: &[[Row<B>; 2]], violation: &Row<B>, x: &mut [Row<B>; 2]) {
-    let mut factors = [L::ZERO; B];
-    for (j, column) in inverse.iter().enumerate() {
-        let violation = L::splat(at(violation, j));
-        for b in 0..B {
-            factors[b] = L::of(column[b]).mul_add(violation, factors[b]);
-        }
-    }
-    let factors = store(factors);
-    let mut change = [[L::ZERO; B]; 2];
-    for (j, column) in lifted.iter().enumerate() {
-        add::<L, B>(&mut change, column, at(&factors, j));
-    }
-    subtract::<L, B>(x, &change);
-}
-
-/// Adds a column times a factor.
-#[inline(always)]
-fn add<L: Lanes, const B: usize>(change: &mut [[L; B]; 2], column: &[Row<B>; 2], factor: f64) {
-    let factor = L::splat(factor);
-    for b in 0..B {
-        change[0][b] = L::of(column[0][b]).mul_add(factor, change[0][b]);
-        change[1][b] = L::of(column[1][b]).mul_add(factor, change[1][b]);
-    }
-}
-
-#[inline(always)]
-fn subtract<L: Lanes, const B: usize>(x: &mut [Row<B>; 2], change: &[[L; B]; 2]) {
-    for b in 0..B {
-        x[0][b] = L::of(x[0][b]).sub(change[0][b]).array();
-        x[1][b] = L::of(x[1][b]).sub(change[1][b]).array();
-    }
 }
