@@ -340,4 +340,10 @@ fn a_very_long_chain_runs_and_says_what_it_does_not_take() {
     }
     let plan = Plan::new(&scene, &mechanism, &Request::default()).expect("a plan");
     assert_eq!((plan.method, plan.stabilization), (MethodId::Dop853, Stabilization::None));
+    // Where there are matrices the series does without them, too, and takes fewer steps.
+    for n in [20, 200] {
+        let scene = chain(n);
+        let plan = Plan::new(&scene, &Mechanism::new(&scene).expect("equations"), &Request::default()).expect("a plan");
+        assert_eq!(plan.method, MethodId::Taylor);
+    }
 }

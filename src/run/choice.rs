@@ -3,13 +3,13 @@
 //! | asked | what decides | method |
 //! | --- | --- | --- |
 //! | 1 | extended orders | `taylor` has them |
-//! | 2 | more coordinates than matrices pay for | `dop853`, `dp8` with rows, body by body |
+//! | 2 | more coordinates than matrices pay for | `taylor`, body by body; `dop853`, `dp8` with rows, where there are no matrices at all |
 //! | 3 | a rigid spring that vibrates | `dp8`, `dop853`: its mean force is known to them |
 //! | 4 | walls | `dp8` locates impacts; `radau9` where a damped mode is stiff |
 //! | 5 | a fixed step | `gauss16`, the most accurate of those |
 //! | 6 | a mode much faster than the rest that dies away | `radau5`, `radau9` below 1e-7 |
 //! | 7 | invariants before the path: asked for, or a long horizon without dampers | `gauss16`, where its steps are not too many |
-//! | 8 | the path | `taylor`; `dop853` where Baumgarte's term is asked for or coordinates are many |
+//! | 8 | the path | `taylor`; `dop853` where Baumgarte's term is asked for, or coordinates are many and not taken body by body |
 //!
 //! Everywhere else the series is the faster one at every tolerance measured: a seventh of the time of the classic pairs at 1e-6, a sixteenth at 1e-9.
 
@@ -31,7 +31,7 @@ const STEP: f64 = 0.12;
 const STIFF: f64 = 300.0;
 /// Tolerances below this are for the five-stage method.
 const TIGHT: f64 = 1e-7;
-/// Coordinates beyond which the products of a series cost more than the evaluations it saves.
+/// Coordinates beyond which the matrices of a series cost more than the evaluations it saves.
 const FEW_COORDINATES: usize = 12;
 
 /// What matters more.
@@ -87,8 +87,14 @@ fn chosen(mechanism: &Mechanism, request: &Request, stiffness: Option<&Stiffness
     let kept = request.stabilize.unwrap_or(usual(mechanism));
     let (has_rows, is_free, n) = (!mechanism.rows.is_empty(), mechanism.contacts.is_empty(), mechanism.coordinates());
     let classic = if has_rows && kept == Stabilization::Projection { MethodId::Dp8 } else { MethodId::Dop853 };
+    let is_kept = kept == Stabilization::None || kept == Stabilization::Projection || !has_rows;
+    let is_expanded = mechanism.recursion.is_some() && mechanism.tree.is_dense() && is_kept && mechanism.vibration.is_none();
     if n > MANY_COORDINATES && is_free && request.step.is_none() {
-        let method = if has_rows { MethodId::Dp8 } else { MethodId::Dop853 };
+        let method = match (is_expanded, has_rows) {
+            (true, _) => MethodId::Taylor,
+            (false, true) => MethodId::Dp8,
+            (false, false) => MethodId::Dop853,
+        };
         return (method, format!("{n} coordinates are taken body by body"));
     }
     if let Some(vibration) = &mechanism.vibration {
@@ -127,7 +133,7 @@ fn chosen(mechanism: &Mechanism, request: &Request, stiffness: Option<&Stiffness
     if kept == Stabilization::Baumgarte && has_rows {
         return (MethodId::Dop853, "Baumgarte's term is a force, and the everyday choice takes any".into());
     }
-    if n > FEW_COORDINATES {
+    if n > FEW_COORDINATES && !is_expanded {
         return (classic, format!("{n} coordinates are cheaper to evaluate than to expand"));
     }
     let fast = stiffness.filter(|stiffness| stiffness.ratio() > STIFF);
