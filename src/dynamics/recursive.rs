@@ -33,7 +33,7 @@ pub use evaluation::{Evaluation, Recursion};
 
 use super::compile::Body;
 use super::forest::{Foot, Forest};
-use crate::arithmetic::{Complex, Real, Scalar};
+use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
 
 /// A body in the order of the trees: every branch in one piece, inner bodies first, the ground before all.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,7 +70,9 @@ pub struct Links {
     /// Gravity \[m/s²\].
     gravity: Complex<f64>,
     /// Σ m gamma of each body, over all that it carries, itself included \[kg·m\].
-    carried: Vec<Complex<f64>>,
+    ///
+    /// In double-double: M knows nothing of them, and what sums rounded otherwise leave is no mechanism's motion.
+    carried: Vec<Complex<DoubleDouble>>,
 }
 
 impl Links {
@@ -133,13 +135,14 @@ impl Links {
 }
 
 /// Σ m gamma of each body: of its own mass and of what hangs on it, at their hinges.
-fn carried(links: &[Link]) -> Vec<Complex<f64>> {
-    let mut mass: Vec<f64> = links.iter().map(|link| link.mass).collect();
-    let mut carried: Vec<Complex<f64>> = links.iter().map(|link| -link.moment.left()).collect();
+fn carried(links: &[Link]) -> Vec<Complex<DoubleDouble>> {
+    let mut mass: Vec<DoubleDouble> = links.iter().map(|link| DoubleDouble::of(link.mass)).collect();
+    let mut carried: Vec<Complex<DoubleDouble>> = links.iter().map(|link| Complex::of(-link.moment.left())).collect();
     for k in (1..links.len()).rev() {
         let parent = links[k].parent;
-        carried[parent] += links[k].hinge.times(mass[k]);
-        mass[parent] += mass[k];
+        let (beyond, hinge) = (mass[k], Complex::of(links[k].hinge));
+        carried[parent] += hinge.times(beyond);
+        mass[parent] += beyond;
     }
     carried
 }

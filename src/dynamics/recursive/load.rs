@@ -60,7 +60,9 @@ pub struct Order<'a, T> {
 /// The passes of one posture; nothing is allocated after [`Passes::new`].
 #[derive(Clone, Debug)]
 pub struct Passes<T> {
-    /// The ground's, then the bodies'.
+    /// Σ m gamma of the ground, then of the bodies \[kg·m\].
+    carried: Vec<Complex<T>>,
+    /// Likewise.
     braces: Vec<Brace<T>>,
     /// A, likewise.
     inner: Vec<Complex<T>>,
@@ -75,6 +77,7 @@ impl<T: Real> Passes<T> {
     pub fn new(links: &Links) -> Self {
         let n = links.bodies() + 1;
         Self {
+            carried: links.carried.iter().map(|c| Complex::new(T::split(c.re).0, T::split(c.im).0)).collect(),
             braces: vec![Brace::default(); n],
             inner: vec![Complex::ZERO; n],
             forks: vec![(Complex::ZERO, T::ZERO); n],
@@ -96,7 +99,7 @@ impl<T: Real> Passes<T> {
     pub fn bear(&mut self, links: &Links, trees: &mut Recursive<T>, order: Order<T>) {
         let all = &links.links[..];
         let n = all.len();
-        let (carried, braces, inner) = (&links.carried[..n], &self.braces[..n], &mut self.inner[..n]);
+        let (carried, braces, inner) = (&self.carried[..n], &self.braces[..n], &mut self.inner[..n]);
         let (joints, forks) = (&mut trees.joints[..], &mut self.outer[..n]);
         let Order { z, known, rest, load } = order;
         let (mut at, mut last) = (Complex::ZERO, Complex::ZERO);
@@ -119,10 +122,10 @@ impl<T: Real> Passes<T> {
             if link.forks {
                 outer = std::mem::take(&mut forks[k]);
             }
-            let rest_here = rest[link.body] + inner[k].turn(carried[k].conj()) + outer.felt;
+            let rest_here = rest[link.body] + inner[k] * carried[k].conj() + outer.felt;
             let excess = load[link.body] - z[link.body].cross(rest_here) - outer.torque;
             joints[link.body].excess = excess;
-            let sum = outer.carried + known[link.body].turn(carried[k]);
+            let sum = outer.carried + known[link.body] * carried[k];
             let passed = Passed {
                 force: outer.force + brace.share.times(excess),
                 torque: brace.lever.dot(outer.force) + brace.back * excess,
@@ -180,15 +183,15 @@ impl<T: Real> Passes<T> {
     pub fn close(&mut self, links: &Links, x: &[Complex<T>], rest: &mut [Complex<T>]) {
         let all = &links.links[..];
         let n = all.len();
-        let (carried, inner, forks) = (&links.carried[..n], &self.inner[..n], &mut self.outer[..n]);
+        let (carried, inner, forks) = (&self.carried[..n], &self.inner[..n], &mut self.outer[..n]);
         let (mut sum, mut felt) = (Complex::ZERO, Complex::ZERO);
         for k in (1..n).rev() {
             let link = &all[k];
             if link.forks {
                 (sum, felt) = (std::mem::take(&mut forks[k].carried), std::mem::take(&mut forks[k].felt));
             }
-            rest[link.body] += inner[k].turn(carried[k].conj()) + felt;
-            sum += x[link.body].turn(carried[k]);
+            rest[link.body] += inner[k] * carried[k].conj() + felt;
+            sum += x[link.body] * carried[k];
             felt = sum.turn(link.hinge.conj());
             if link.alone {
                 continue;

@@ -31,12 +31,16 @@ impl Prices {
     pub fn new(mechanism: &Mechanism, companion: &Plan, run: &Plan) -> Self {
         let (n, rows) = (mechanism.coordinates() as f64, mechanism.rows.len() as f64);
         let forces = (mechanism.springs.len() + mechanism.torsions.len() + mechanism.actions.len()) as f64;
-        let evaluation = 15.0 + 20.0 * n + 4.0 * n * n.min(12.0) + 60.0 * rows + 20.0 * forces;
-        let has_lanes = Taylor::has_lanes(mechanism, false);
-        let plain = match has_lanes {
-            true if n <= 2.0 && forces == 0.0 => 400.0,
-            true => 300.0 + 220.0 * n + if forces > 0.0 { 600.0 } else { 0.0 },
-            false => 700.0 + 400.0 * n + 150.0 * n * n + 700.0 * rows + 700.0 * forces,
+        let goes_bodywise = mechanism.recursion.is_some();
+        let matrices = if goes_bodywise { 7.0 * n } else { 4.0 * n * n };
+        let evaluation = 15.0 + 20.0 * n + matrices + 60.0 * rows + 20.0 * forces;
+        let plain = if !Taylor::has_lanes(mechanism, false) {
+            let matrices = if goes_bodywise { 200.0 * n } else { 150.0 * n * n + 300.0 * rows };
+            700.0 + 400.0 * n + matrices + 400.0 * rows + 700.0 * forces
+        } else if n <= 2.0 && forces == 0.0 {
+            400.0
+        } else {
+            300.0 + 220.0 * n + if forces > 0.0 { 600.0 } else { 0.0 }
         };
         let series = |plan: &Plan| {
             let order = Taylor::new(plan.tolerance.unwrap_or_default()).order as f64;
