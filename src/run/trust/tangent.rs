@@ -1,13 +1,14 @@
 //! The tangent flow along a motion: how small differences grow.
 //!
 //! ```text
-//! V' = (dq', dw') = (dw, da),    da = (a(q + e dq, w + e dw) - a(q, w)) / e        columns of V marched by the classical Runge–Kutta method
+//! V' = (dq', dw') = (dw, da),    da = A_q dq + A_w dw        columns of V marched by the classical Runge–Kutta method
 //! Phi(t + h, t) = V with V(t) = 1,    Phi(t, 0) = product of these
-//! P <- Phi (P + Q_a) Phiᵀ + Q_b                                                    covariance of what rounding left
+//! P <- Phi (P + Q_a) Phiᵀ + Q_b                              covariance of what rounding left
 //! ```
 //!
 //! The motion is known at the beginning, middle and end of each step h, whatever made it; h follows the steepest pull J met in a step, `h sqrt(J) = 0.45`.  Few
-//! coordinates carry the whole matrix, more of them two vectors, whose growth stands for that of the matrix.
+//! coordinates carry the whole matrix, with da by the Jacobian; more of them two vectors, whose growth stands for that of the matrix, with da by differences,
+//! (a(q + e dq, w + e dw) - a(q, w)) / e.
 
 use super::Ruler;
 use crate::dynamics::kernel::Kernel;
@@ -55,6 +56,9 @@ struct Scratch {
     /// Columns of the step's own matrix.
     step: Vec<Vec<f64>>,
     half: Vec<f64>,
+    /// dy'/dy at the beginning of the step, in its middle, and at its end (d × d each); and whether the first one is there.
+    jacobians: [Vec<f64>; 3],
+    knows_first: bool,
 }
 
 /// All that what follows depends on.
@@ -212,16 +216,22 @@ impl Tangent {
         }
     }
 
-    /// Evaluations of the equations in a step.
+    /// True where the whole matrix is carried.
+    fn is_whole(&self) -> bool {
+        self.path.columns.len() == 2 * self.weights.len()
+    }
+
+    /// What a step costs in evaluations of the equations, about; of a Jacobian four columns come to five.
     pub fn evaluations(&self) -> u64 {
-        3 + 4 * self.path.columns.len() as u64
+        let columns = self.path.columns.len() as u64;
+        if self.is_whole() { 1 + 10 * columns.div_ceil(4) } else { 3 + 4 * columns }
     }
 
     /// Phi(t, 0) column by column, in unknowns as they are \[rad, rad/s\]; of two vectors only, where there is no matrix.
     pub fn columns(&self) -> Vec<Vec<f64>> {
         let f = self.weights.len();
         let grown = libm::exp(self.path.log);
-        let is_whole = self.path.columns.len() == 2 * f;
+        let is_whole = self.is_whole();
         let size = |j: usize| if is_whole && j >= f { grown / self.path.rate } else { grown };
         self.path.columns.iter().enumerate().map(|(j, column)| column.iter().map(|entry| entry * size(j)).collect()).collect()
     }
@@ -257,9 +267,17 @@ impl Tangent {
         history
     }
 
-    /// V' in `found`: `at` 0…2 says which of the rates kept belongs to (t, y).
+    /// V' in `found`: `at` 0…2 says which of the rates and Jacobians kept belongs to (t, y).
     fn derivative(&mut self, at: usize, t: Time, y: &[f64], column: &[f64], found: &mut [f64]) {
         let f = self.weights.len();
+        found[..f].copy_from_slice(&column[f..2 * f]);
+        if self.is_whole() {
+            let rows = self.scratch.jacobians[at].chunks_exact(y.len()).skip(f);
+            for (found, row) in found[f..].iter_mut().zip(rows) {
+                *found = row.iter().zip(column).fold(0.0, |sum, (slope, entry)| sum + slope * entry);
+            }
+            return;
+        }
         let largest = (0..f).fold(0.0, |most: f64, i| {
             most.max(column[i].abs() * self.weights[i]).max(column[f + i].abs() * self.weights[i] / self.path.rate)
         });
@@ -275,10 +293,26 @@ impl Tangent {
             moved[i] += small * column[i];
         }
         problem.rate(t, moved, beside);
-        found[..f].copy_from_slice(&column[f..2 * f]);
         for i in f..2 * f {
             found[i] = (beside[i] - rates[at][i]) / small;
         }
+    }
+
+    /// What [`Tangent::derivative`] asks for at the three points of a step.
+    fn prepare(&mut self, times: [Time; 3], points: &[Vec<f64>; 3]) {
+        let is_whole = self.is_whole();
+        let Self { problem, rates, scratch: Scratch { jacobians, knows_first, .. }, .. } = self;
+        problem.rate(times[0], &points[0], &mut rates[0]);
+        if !is_whole {
+            (1..3).for_each(|k| problem.rate(times[k], &points[k], &mut rates[k]));
+            return;
+        }
+        jacobians.swap(0, 2);
+        for k in usize::from(*knows_first)..3 {
+            jacobians[k].resize(points[k].len() * points[k].len(), 0.0);
+            problem.jacobian(times[k], &points[k], &mut jacobians[k]);
+        }
+        *knows_first = true;
     }
 
     /// A step that ends with the unknowns `end`.
@@ -287,11 +321,8 @@ impl Tangent {
         let (h, t) = (self.path.step, self.path.time);
         let times = [t, t + 0.5 * h, t + h].map(Time::from);
         let points = [std::mem::take(&mut self.path.start), std::mem::take(&mut self.path.middle), end];
-        for (k, point) in points.iter().enumerate() {
-            let Self { problem, rates, .. } = self;
-            problem.rate(times[k], point, &mut rates[k]);
-        }
-        let is_whole = self.path.columns.len() == 2 * f;
+        self.prepare(times, &points);
+        let is_whole = self.is_whole();
         let rate = self.path.rate;
         let mut steepest = 0.0_f64;
         let size = |column: &[f64]| column.iter().fold(0.0, |most: f64, entry| most.max(entry.abs()));
@@ -407,7 +438,7 @@ impl Tangent {
     /// Keeps the growth at this time.
     fn keep(&mut self) {
         let f = self.weights.len();
-        let is_whole = self.path.columns.len() == 2 * f;
+        let is_whole = self.is_whole();
         let size = |j: usize, column: &Vec<f64>| {
             let share = if is_whole && j >= f { 1.0 / self.path.rate } else { 1.0 };
             (0..f).map(|i| (share * column[i] * self.weights[i]).powi(2)).sum::<f64>()
