@@ -4,8 +4,9 @@ mod common;
 
 use common::{compile, pendulum, quarter_period, run, run_limited, shipped};
 use driftless::run::{Limits, MethodId, Outcome, Request, Stabilization};
-use driftless::scene::{Place, Scene, Spring};
+use driftless::scene::{Place, Scene, Spring, parse_scene};
 use driftless::stepping::Cause;
+use driftless::stepping::composition::Composition;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 const EXPLICIT: [MethodId; 4] = [MethodId::Dopri5, MethodId::Dop853, MethodId::Dp5, MethodId::Dp8];
@@ -295,6 +296,40 @@ fn a_step_far_too_long_is_a_typed_stop() {
         let stop = run(&shipped("spinning", &[]), &fixed).stop.expect("a stop");
         assert!(matches!(stop.cause, Cause::NotConverged | Cause::NotFinite), "{stop}");
         assert!(stop.t < 100.0 && stop.hint.contains("step"), "{stop}");
+    }
+}
+
+/// A step that is looked at again, because the ends of a spring come near one another in it, may be the last before an output time; the run goes on all the same.
+#[test]
+fn a_look_at_a_spring_ends_no_run() {
+    let text = r#"{"name": "near", "gravity": [25.9, 0], "bars": [{"name": "bar", "length": 0.92, "width": 0.092, "thickness": 0.01, "density": 575}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+        "springs": [{"name": "spring", "between": [{"body": "ground", "point": [0.92, 0]}, {"body": "bar", "point": [0.92, 0]}],
+            "stiffness": 211, "free_length": 0.4}],
+        "start": {"bar": {"phi": 1.57, "omega": 11.4}}, "until": 0.188, "every": 0.047}"#;
+    let scene = parse_scene(text, "near", &[]).expect("a scene");
+    for method in [MethodId::Gauss(2), MethodId::Gauss(8), MethodId::Dp8, MethodId::Taylor] {
+        for parts in [4.0, 8.0, 64.0] {
+            let step = (!method.is_adaptive()).then_some(scene.until / parts);
+            let outcome = run(&scene, &Request { method: Some(method), step, ..Request::default() });
+            assert!(outcome.stop.is_some() || outcome.last.t == scene.until, "{method}, {parts} steps: ended at {} s", outcome.last.t);
+        }
+    }
+}
+
+/// What turns on a circle is where it was after a whole turn, and a step over many of them would lose count.
+#[test]
+fn a_motor_that_turns_often_in_a_step_is_a_typed_stop() {
+    let mut scene = shipped("motor", &[]);
+    let rate = scene.motors[0].law.rate;
+    scene.gravity = [0.0, 0.0];
+    for turns in [1.0, 36.0] {
+        let step = turns * std::f64::consts::TAU / rate.abs();
+        let method = Some(MethodId::Rattle(Composition::Single));
+        let request = Request { method, step: Some(step), until: Some(4.0 * step), every: Some(step), ..Request::default() };
+        let outcome = run(&scene, &request);
+        let stop = outcome.stop.expect("a stop");
+        assert!(stop.cause == Cause::NotConverged && stop.t == 0.0 && stop.hint.contains("step"), "{stop}");
     }
 }
 

@@ -192,8 +192,12 @@ impl<P: Form + ?Sized> Method<P> for Shrinking<P> {
                 state.clone_from(&self.from);
                 return Err(stop);
             }
-            if is_enough || reached != Reached::Pause || state.time >= until {
+            if is_enough || reached != Reached::Pause {
                 return Ok(reached);
+            }
+            // It paused for the look at the spring alone, and may have arrived.
+            if state.time >= until {
+                return Ok(Reached::Until);
             }
         }
     }

@@ -3,8 +3,10 @@
 use super::newton::Matrix;
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
 use crate::dynamics::natural::{Demand, Natural, times, upper};
+use crate::dynamics::row::Measure;
 use crate::dynamics::tree::{self, size};
 use crate::dynamics::{Form, State, Time, schur};
+use std::f64::consts::FRAC_PI_2;
 
 /// Newton sweeps before a step is given up; an ordinary step takes three or four.
 const SWEEPS: usize = 30;
@@ -149,7 +151,7 @@ impl Work {
         self.kick::<N, true>(h);
         self.settle::<N, GUIDED>(natural, h)?;
         self.account::<GUIDED>(h);
-        self.turn::<N, GUIDED>(natural)?;
+        self.turn::<N, GUIDED>(natural, h)?;
         self.face::<N, GUIDED>(natural);
         self.solve_velocity::<N, GUIDED>(natural, h)?;
         self.kick::<N, false>(h);
@@ -396,9 +398,9 @@ impl Work {
         Ok(())
     }
 
-    /// Arrives at `predicted` and counts turns; refuses the root on the far side of the circle.
+    /// Arrives at `predicted`, `h` \[s\] later, and counts turns; refuses the root on the far side of the circle.
     #[inline(always)]
-    fn turn<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural) -> Result<(), Failure> {
+    fn turn<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural, h: f64) -> Result<(), Failure> {
         let (n, bodies) = (size::<N>(self.z.len()), self.bodies::<N, GUIDED>());
         let (z, predicted, here, turns) = (&mut self.z[..n], &self.predicted[..n], &mut self.here[..n], &mut self.turns[..bodies]);
         for k in 0..bodies {
@@ -421,7 +423,10 @@ impl Work {
         }
         if GUIDED {
             for (r, guide) in natural.guides().iter().enumerate() {
-                if guide.mismatch(&self.plain_demand[r], here).re <= 0.0 {
+                let demand = &self.plain_demand[r];
+                // Whole turns that an angle is asked to make within a substep are seen by nobody.
+                let leaps = matches!(guide.measure, Measure::Angle { .. }) && (demand.rate * h).abs() >= FRAC_PI_2;
+                if leaps || guide.mismatch(demand, here).re <= 0.0 {
                     return Err(Failure::TooFar(bodies + r));
                 }
             }
