@@ -400,3 +400,24 @@ fn a_stated_drift_limit_stops_the_run_with_its_time() {
     assert_eq!(stop.cause, Cause::DriftLimit);
     assert!(stop.t > 0.0 && stop.t <= 10.0 && stop.what.contains("limit"), "{stop}");
 }
+
+/// A torsion spring wound up by thousands of turns pulls at a motor that stands still: in a step of hours what is rounded of it is worth several turns.
+#[test]
+fn whole_turns_a_motor_lost_are_no_success() {
+    let text = r#"{"name": "wound", "gravity": [5e-5, 0],
+        "bars": [{"name": "bar", "length": 0.0049, "width": 0.00049, "thickness": 0.01, "density": 438, "inertia": "slender"}],
+        "hinges": [{"name": "h", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+        "torsion_springs": [{"name": "spring", "body": "bar", "stiffness": 1.1e-6, "free_angle": 30251, "damping": 0}],
+        "motors": [{"name": "motor", "body": "bar", "law": {"start": 1.5707963267948966, "rate": 0}}],
+        "start": {}, "until": 35716.24, "every": 35716.24}"#;
+    let scene = parse_scene(text, "wound.json", &[]).expect("a scene");
+    let whole = Request { every: Some(scene.until), ..request(MethodId::Taylor, 1e-13, scene.until) };
+    let hours = run_limited(&scene, &whole, Limits::default());
+    let off = (hours.last.phi[0] - scene.motors[0].law.start).abs();
+    match hours.stop {
+        Some(stop) => assert_eq!(stop.cause, Cause::BranchLost, "{stop}"),
+        None => assert!(off < 1e-9, "{off}"),
+    }
+    let second = assert_sound(&scene, &request(MethodId::Taylor, 1e-13, 1.0), 1e-9);
+    assert!((second.last.phi[0] - scene.motors[0].law.start).abs() < 1e-12);
+}

@@ -30,6 +30,7 @@ pub mod sweep;
 pub mod table;
 pub mod trace;
 pub mod trust;
+mod turns;
 
 #[cfg(feature = "files")]
 pub use checkpoint::{CheckpointError, Checkpoints, Loaded};

@@ -9,6 +9,7 @@ use super::plan::{Plan, Refusal, Request};
 use super::sample::Sample;
 use super::trace::Trace;
 use super::trust::{Companion, Kept, Level, Trust};
+use super::turns::Turns;
 use crate::dynamics::{CompileError, Mechanism, Motion};
 use crate::scene::Scene;
 use crate::stepping::{Cause, StepError, Tally};
@@ -24,6 +25,7 @@ pub struct Run {
     plan: Plan,
     limits: Limits,
     marcher: Box<dyn March>,
+    turns: Turns,
     /// For runs of an ensemble, which look for bars that turn over and keep no samples: whether they end with the first.
     ensemble: Option<bool>,
     companion: Option<Companion>,
@@ -115,7 +117,8 @@ impl Run {
     pub fn new(mechanism: Arc<Mechanism>, mut plan: Plan, limits: Limits, start: &Motion) -> Result<Self, StepError> {
         let mut marcher = build(&mechanism, &mut plan, start)?;
         marcher.allow(plan.effort);
-        Ok(Self { mechanism, plan, limits, marcher, ensemble: None, companion: None })
+        let turns = Turns::new(&mechanism, start);
+        Ok(Self { mechanism, plan, limits, marcher, turns, ensemble: None, companion: None })
     }
 
     /// The same, accompanied by an estimate of its error; `start` is the motion it begins with.
@@ -192,6 +195,7 @@ pub struct Running {
     limits: Limits,
     course: Course,
     outcome: Outcome,
+    turns: Turns,
     /// For runs of an ensemble: whether they end with the first flip.
     ensemble: Option<bool>,
     companion: Option<Companion>,
@@ -278,13 +282,13 @@ impl Snapshot {
 impl Running {
     /// Begins a run: whatever touches and moves into its wall at the start is struck.
     pub fn new(run: Run) -> Self {
-        let Run { mechanism, plan, limits, marcher, ensemble, companion } = run;
+        let Run { mechanism, plan, limits, marcher, turns, ensemble, companion } = run;
         let mut outcome = Outcome::begun(&mechanism, plan);
         let mut course = Course::new(mechanism, marcher);
         course.lookout = ensemble.map(|_| Lookout::default());
         // The reference of the energy is what impacts at the start leave.
         let resting = course.meet(&mut outcome).err();
-        Self { limits, course, outcome, ensemble, companion, row: 0, resting, is_over: false }
+        Self { limits, course, outcome, turns, ensemble, companion, row: 0, resting, is_over: false }
     }
 
     /// Goes on from a snapshot of a run of the same mechanism and start.
@@ -301,8 +305,9 @@ impl Running {
             Some(kept) => Some(Companion::resume(&mechanism, &outcome.plan, start, kept, horizon.into())?.ok_or(ResumeError::Misfit)?),
             None => None,
         };
+        let turns = Turns::new(&mechanism, start);
         let course = Course::resume(mechanism, &outcome.plan, start, station, horizon.into())?.ok_or(ResumeError::Misfit)?;
-        Ok(Self { limits, course, outcome, ensemble: None, companion, row, resting, is_over: false })
+        Ok(Self { limits, course, outcome, turns, ensemble: None, companion, row, resting, is_over: false })
     }
 
     /// All that the rest of the run depends on.
@@ -342,7 +347,7 @@ impl Running {
     }
 
     fn rows(&mut self, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>, pause: &mut Pause) -> Result<bool, RunError> {
-        let Self { limits, course, outcome, ensemble, companion, .. } = self;
+        let Self { limits, course, outcome, ensemble, companion, turns, .. } = self;
         while !self.is_over {
             let stopped = match self.resting.take() {
                 Some(stop) => Err(stop),
@@ -366,6 +371,7 @@ impl Running {
                 .err()
                 .or_else(|| (!sample.is_finite()).then(|| not_finite(&outcome.plan, sample.t)))
                 .or_else(|| uncounted(&outcome.plan, sample))
+                .or_else(|| turns.lost(&outcome.plan, sample))
                 .or_else(|| if is_tied_up { came_apart(&outcome.plan, &outcome.drift, sample) } else { None })
                 .or_else(|| exceeded.err().map(|what| drift_stop(&outcome.plan, sample.t, what)));
             outcome.last.clone_from(sample);

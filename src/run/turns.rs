@@ -1,0 +1,59 @@
+//! Whole turns of given angles: rows measure an angle modulo turns, so that a step too long for what pulls at a motor can lose some.
+
+use super::plan::Plan;
+use super::sample::Sample;
+use crate::dynamics::row::Measure;
+use crate::dynamics::{Mechanism, Motion, Time};
+use crate::scene::Law;
+use crate::stepping::{Cause, StepError};
+use std::f64::consts::TAU;
+
+/// The given angles that are rows, and how far they are from their laws.
+#[derive(Clone, Debug, Default)]
+pub struct Turns(Vec<Angle>);
+
+#[derive(Clone, Debug)]
+struct Angle {
+    name: String,
+    body: usize,
+    base: Option<usize>,
+    law: Law,
+    /// Whole turns off at the start.
+    off: f64,
+}
+
+impl Angle {
+    /// Whole turns between the law and an angle at a time \[s\].
+    fn off(&self, t: Time, phi: impl Fn(usize) -> f64) -> f64 {
+        let (angle, _, turns) = self.law.winding(t);
+        let given = phi(self.body) - self.base.map_or(0.0, phi);
+        ((given - angle.hi) / TAU - turns).round()
+    }
+}
+
+impl Turns {
+    /// Those of a motion about to start; none where given angles are eliminated, which keep their laws to the last bit.
+    pub fn new(mechanism: &Mechanism, start: &Motion) -> Self {
+        let rows = mechanism.rows.iter().filter(|_| mechanism.has_multipliers());
+        let angles = rows.filter_map(|row| {
+            let (Measure::Angle { body, base }, Some(law)) = (&row.measure, &row.law) else { return None };
+            let mut angle = Angle { name: row.name().into(), body: *body, base: *base, law: law.clone(), off: 0.0 };
+            angle.off = angle.off(start.time, |k| start.unwrapped(k));
+            Some(angle)
+        });
+        Self(angles.collect())
+    }
+
+    /// Why the run is no success where an angle has left its law by whole turns.
+    pub fn lost(&self, plan: &Plan, sample: &Sample) -> Option<StepError> {
+        let lost = |angle: &&Angle| angle.off(Time::from(sample.t), |k| sample.phi[k]) != angle.off;
+        self.0.iter().find(lost).map(|angle| StepError {
+            cause: Cause::BranchLost,
+            method: plan.method.to_string(),
+            t: sample.t,
+            step: plan.step.unwrap_or(0.0),
+            what: format!("constraint {} has lost whole turns: a step was too long for what pulls at it", angle.name),
+            hint: "give a shorter output interval with dop853, or a smaller step".into(),
+        })
+    }
+}
