@@ -39,6 +39,9 @@ pub struct Bodies<const B: usize, const S: usize> {
     /// Highest power of the rates, an even number.
     order: usize,
     pace: Pace,
+    /// About the fastest rate of small oscillations without springs \[rad/s\], and the longest step wherever the springs are \[s\].
+    rate: f64,
+    longest: f64,
     /// Column j of A: A_ij over i, zero on the diagonal \[kg·m²\].
     coupling: Vec<Row<B>>,
     diagonal: Row<B>,
@@ -109,12 +112,14 @@ impl<const B: usize, const S: usize> Bodies<B, S> {
                 coupling[i][j / 4][j % 4] = tree.coupling[i * n + j].re;
             }
         }
-        // The longest step in which the terms left out still fall.
-        let longest = order as f64 / 3.0 / tree.fastest_rate(&mechanism.springs);
+        let rate = tree.fastest_rate(&[]);
+        let longest = reach(order, tree.fastest_rate(&mechanism.springs));
         Some(Self {
             count: n,
             order,
-            pace: Pace::new(tolerance, order, longest),
+            pace: Pace::new(tolerance, order, if S == 0 { longest } else { f64::INFINITY }),
+            rate,
+            longest,
             coupling,
             diagonal,
             weight,
@@ -123,6 +128,11 @@ impl<const B: usize, const S: usize> Bodies<B, S> {
             scratch: Box::new(Scratch { e: [[zero; 2]; MOST + 2], v: [[zero; 3]; MOST + 1] }),
         })
     }
+}
+
+/// The longest step in which the terms left out of an oscillation of this rate \[rad/s\] still fall \[s\].
+fn reach(order: usize, rate: f64) -> f64 {
+    order as f64 / 3.0 / rate
 }
 
 #[inline(always)]
@@ -291,7 +301,7 @@ fn refined<L: Lanes, const B: usize>(
 #[inline(always)]
 pub fn step<L: Lanes, const B: usize, const S: usize>(bodies: &mut Bodies<B, S>, state: &mut State, left: f64) -> (f64, f64) {
     begin::<L, B, S>(bodies, state);
-    let Bodies { order: last, pace, coupling, diagonal, weight, columns, springs, scratch, .. } = bodies;
+    let Bodies { order: last, pace, rate, longest, coupling, diagonal, weight, columns, springs, scratch, .. } = bodies;
     let last = *last;
     let start: Start<L, B> = Start {
         e: [load(&scratch.e[0][0]), load(&scratch.e[0][1])],
@@ -330,7 +340,11 @@ pub fn step<L: Lanes, const B: usize, const S: usize>(bodies: &mut Bodies<B, S>,
     if !scratch.v[last][0].iter().flatten().all(|v| v.is_finite()) {
         return (f64::NAN, 0.0);
     }
-    let wanted = pace.step_of(last, &sizes);
+    let mut wanted = pace.step_of(last, &sizes);
+    if S > 0 && wanted > *longest {
+        let solve = |x: &Row<B>| store(apply::<L, B>(columns.iter().map(|column| &column.inverse), x));
+        wanted = wanted.min(reach(last, (*rate * *rate + springs.rate_squared(&scratch.e[0], solve)).sqrt()));
+    }
     let h = pace::taken(wanted, left);
     if h > 0.0 {
         go::<L, B, S>(bodies, state, h);

@@ -18,6 +18,7 @@ use super::terms::over;
 use super::wide::Wide;
 use crate::arithmetic::lanes::Lanes;
 use crate::dynamics::Mechanism;
+use crate::dynamics::force::Spring;
 
 /// Largest order there is room for.
 const MOST: usize = super::bodies::MOST;
@@ -36,6 +37,8 @@ pub struct Springs<const B: usize, const S: usize> {
     damping: Row<S>,
     /// One where the length matters, zero elsewhere.
     measured: Row<S>,
+    /// What each spring adds at most to the square of the fastest rate \[rad²/s²\].
+    most: Row<S>,
     scratch: Box<Scratch<S>>,
 }
 
@@ -88,6 +91,10 @@ impl<const B: usize, const S: usize> Springs<B, S> {
             free_length: row(&|i| springs[i].free_length),
             damping: row(&|i| springs[i].damping),
             measured: row(&|i| if springs[i].needs_length() { 1.0 } else { 0.0 }),
+            most: row(&|i| {
+                let rate = |springs: &[Spring]| mechanism.tree.fastest_rate(springs);
+                rate(&springs[i..=i]).powi(2) - rate(&[]).powi(2)
+            }),
             scratch: Box::new(Scratch {
                 inverse: zero,
                 x: [zero; MOST + 2],
@@ -132,6 +139,27 @@ impl<const B: usize, const S: usize> Springs<B, S> {
             scratch.reciprocal[0][v] = L::ONE.div(length).array();
             scratch.factor[0][v] = L::ZERO.sub(L::of(stiffness[v])).mul(relative.mul_add(measured, rest)).array();
         }
+    }
+
+    /// About the square of the fastest rate the springs cause where the step begins \[rad²/s²\], from cos and sin of the bodies' angles and M⁻¹ times a vector:
+    /// k J·M⁻¹ J for the pull along the spring, J_b = (gamma_b e_b) × D/L, and at most |κ_0| |gamma|² M⁻¹ for its turning.
+    pub fn rate_squared(&self, e: &[Row<B>; 2], solve: impl Fn(&Row<B>) -> Row<B>) -> f64 {
+        let first = |rows: &[Row<S>; MOST + 2], i: usize| rows[0][i / 4][i % 4];
+        let of_spring = |(i, gamma): (usize, &[Row<B>; 2])| {
+            let of = |row: &Row<S>| row[i / 4][i % 4];
+            let scratch = &self.scratch;
+            let (x, y, reciprocal) = (first(&scratch.x, i), first(&scratch.y, i), first(&scratch.reciprocal, i));
+            let mut lever = [[0.0; 4]; B];
+            for (b, lever) in lever.as_flattened_mut().iter_mut().enumerate() {
+                let [c, s, re, im] = [e[0], e[1], gamma[0], gamma[1]].map(|row| row[b / 4][b % 4]);
+                *lever = ((re * c - im * s) * y - (re * s + im * c) * x) * reciprocal;
+            }
+            let moved = solve(&lever);
+            let along: f64 = lever.as_flattened().iter().zip(moved.as_flattened()).map(|(lever, moved)| lever * moved).sum();
+            let slack = if of(&self.stiffness) > 0.0 { first(&scratch.factor, i).abs() / of(&self.stiffness) } else { 0.0 };
+            of(&self.measured) * of(&self.stiffness) * along + slack * of(&self.most)
+        };
+        self.spread.iter().enumerate().map(of_spring).sum()
     }
 
     /// Power m >= 1 of the spans, q and s, and power m-1 of a, from that power of the bodies' unit vectors.
