@@ -161,6 +161,7 @@ impl Lanes for Portable {
 
 #[cfg(target_arch = "x86_64")]
 mod hardware;
+pub mod row;
 #[cfg(target_arch = "x86_64")]
 pub use hardware::Hardware;
 #[cfg(target_arch = "x86_64")]

@@ -11,10 +11,11 @@
 
 use super::force::action::Kind;
 use super::multiplier::Multiplier;
-use super::natural::columns::{self, Columns, Row, load, store};
+use super::natural::columns::{self, Columns};
 use super::natural::{Reduced, sorted_rows};
 use super::stiffness::Stiffness;
 use super::{Coordinates, Field, Form, Glance, Mechanism, Motion, State, Time};
+use crate::arithmetic::lanes::row::{Row, load, store};
 use crate::arithmetic::lanes::{self, Code, Lanes};
 use crate::arithmetic::{Complex, sincos};
 use std::sync::Arc;

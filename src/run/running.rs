@@ -117,7 +117,7 @@ impl Run {
     pub fn new(mechanism: Arc<Mechanism>, mut plan: Plan, limits: Limits, start: &Motion) -> Result<Self, StepError> {
         let mut marcher = build(&mechanism, &mut plan, start)?;
         marcher.allow(plan.effort);
-        let turns = Turns::new(&mechanism, start);
+        let turns = Turns::new(&mechanism, &plan, start);
         Ok(Self { mechanism, plan, limits, marcher, turns, ensemble: None, companion: None })
     }
 
@@ -305,7 +305,7 @@ impl Running {
             Some(kept) => Some(Companion::resume(&mechanism, &outcome.plan, start, kept, horizon.into())?.ok_or(ResumeError::Misfit)?),
             None => None,
         };
-        let turns = Turns::new(&mechanism, start);
+        let turns = Turns::new(&mechanism, &outcome.plan, start);
         let course = Course::resume(mechanism, &outcome.plan, start, station, horizon.into())?.ok_or(ResumeError::Misfit)?;
         Ok(Self { limits, course, outcome, turns, ensemble: None, companion, row, resting, is_over: false })
     }

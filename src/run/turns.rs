@@ -1,5 +1,6 @@
 //! Whole turns of given angles: rows measure an angle modulo turns, so that a step too long for what pulls at a motor can lose some.
 
+use super::methods::Stabilization;
 use super::plan::Plan;
 use super::sample::Sample;
 use crate::dynamics::row::Measure;
@@ -9,7 +10,7 @@ use crate::stepping::{Cause, StepError};
 use std::f64::consts::TAU;
 
 /// The given angles that are rows, and how far they are from their laws.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Turns(Vec<Angle>);
 
 #[derive(Clone, Debug)]
@@ -33,8 +34,8 @@ impl Angle {
 
 impl Turns {
     /// Those of a motion about to start; none where given angles are eliminated, which keep their laws to the last bit.
-    pub fn new(mechanism: &Mechanism, start: &Motion) -> Self {
-        let rows = mechanism.rows.iter().filter(|_| mechanism.has_multipliers());
+    pub fn new(mechanism: &Mechanism, plan: &Plan, start: &Motion) -> Self {
+        let rows = mechanism.rows.iter().filter(|_| plan.stabilization != Stabilization::Elimination);
         let angles = rows.filter_map(|row| {
             let (Measure::Angle { body, base }, Some(law)) = (&row.measure, &row.law) else { return None };
             let mut angle = Angle { name: row.name().into(), body: *body, base: *base, law: law.clone(), off: 0.0 };
@@ -55,5 +56,34 @@ impl Turns {
             what: format!("constraint {} has lost whole turns: a step was too long for what pulls at it", angle.name),
             hint: "give a shorter output interval with dop853, or a smaller step".into(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::{MethodId, Request};
+    use crate::scene::read_scene;
+
+    #[test]
+    fn turns_lost_by_a_motor_are_seen_however_it_is_kept() {
+        let scene = read_scene("examples/scenes/motor.json".as_ref(), &[]).expect("a scene");
+        let mechanism = Mechanism::new(&scene).expect("equations");
+        let start = mechanism.start(&scene);
+        for stabilize in Stabilization::ALL {
+            let request = Request { method: Some(MethodId::Dp8), stabilize: Some(stabilize), ..Request::default() };
+            let plan = Plan::new(&scene, &mechanism, &request).expect("a sensible pairing");
+            let turns = Turns::new(&mechanism, &plan, &start);
+            let t = 0.7;
+            let given = scene.motors[0].law.angle(t.into()).hi;
+            let cause = |off: f64| {
+                let sample = Sample { t, phi: vec![given + off, 0.3], ..Sample::default() };
+                turns.lost(&plan, &sample).map(|stop| stop.cause)
+            };
+            assert_eq!((cause(0.0), cause(1e-3)), (None, None), "{stabilize}");
+            // An eliminated angle is its law.
+            let expected = (stabilize != Stabilization::Elimination).then_some(Cause::BranchLost);
+            assert_eq!((cause(TAU), cause(-2.0 * TAU)), (expected, expected), "{stabilize}");
+        }
     }
 }

@@ -7,15 +7,8 @@
 
 use super::reduced::Reduced;
 use crate::arithmetic::lanes::Lanes;
+use crate::arithmetic::lanes::row::{Row, load};
 use crate::dynamics::schur::DROPPED;
-
-/// Four numbers a vector, `B` vectors.
-pub type Row<const B: usize> = [[f64; 4]; B];
-
-/// Largest number of bodies in `B` vectors.
-pub const fn room(blocks: usize) -> usize {
-    4 * blocks
-}
 
 /// W column by column, in lanes over its rows; lanes beyond the last body are zero.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,26 +33,6 @@ impl<const B: usize> Columns<B> {
         }
         Self { blocks, scale: reduced.free.clone() }
     }
-}
-
-/// From memory.
-#[inline(always)]
-pub fn load<L: Lanes, const B: usize>(row: &Row<B>) -> [L; B] {
-    let mut lanes = [L::ZERO; B];
-    for b in 0..B {
-        lanes[b] = L::of(row[b]);
-    }
-    lanes
-}
-
-/// To memory.
-#[inline(always)]
-pub fn store<L: Lanes, const B: usize>(lanes: [L; B]) -> Row<B> {
-    let mut row = [[0.0; 4]; B];
-    for b in 0..B {
-        row[b] = lanes[b].array();
-    }
-    row
 }
 
 /// Column j of W z: its x and y components.

@@ -7,10 +7,11 @@
 //!
 //! The shortest way in the metric of the mass matrix, as that of the angle form to first order; with one set of factors for both levels.
 
-use super::columns::{self, Columns, Row, load, store};
+use super::columns::{self, Columns};
 use super::reduced::{self, Reduced};
 use crate::arithmetic::Complex;
 use crate::arithmetic::lanes::Lanes;
+use crate::arithmetic::lanes::row::{Row, at, load, store};
 
 /// Sweeps onto the unit lengths, at most.
 const SWEEPS: usize = 6;
@@ -152,12 +153,6 @@ impl<const B: usize> Keeper<B> {
         }
         change
     }
-}
-
-/// Lane i.
-#[inline(always)]
-pub fn at<const B: usize>(row: &Row<B>, i: usize) -> f64 {
-    row[i / 4][i % 4]
 }
 
 /// Adds a column times a factor.

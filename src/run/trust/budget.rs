@@ -44,10 +44,10 @@ impl Prices {
         };
         let series = |plan: &Plan| {
             let order = Taylor::new(plan.tolerance.unwrap_or_default()).order as f64;
-            let wide = match (plan.extended, Taylor::has_lanes(mechanism, true)) {
-                (false, _) => 1.0,
-                (true, true) => 3.0,
-                (true, false) => 10.0,
+            let wide = match plan.extended {
+                false => 1.0,
+                true if Taylor::has_lanes(mechanism, true) => 3.0,
+                true => 10.0,
             };
             plain * wide * (order / 20.0).powi(2)
         };

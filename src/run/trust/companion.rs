@@ -120,10 +120,9 @@ fn planned(mechanism: &Mechanism, plan: &Plan, level: Level) -> (Plan, String) {
         (MethodId::Rattle(composition), _) => !matches!(composition, Composition::Single | Composition::Suzuki5),
         (_, finer) => finer.is_some_and(|finer| finer * FINER < NEAR_ROUNDING),
     };
-    // Two bodies under gravity have a kernel for it; rows kept by projection are kept in doubles.
-    let has_kernel = Taylor::has_lanes(mechanism, true);
+    // Rows kept by projection are kept in doubles; two bodies under gravity have a kernel in double-double.
     let may_extend = !mechanism.has_multipliers() && mechanism.contacts.is_empty();
-    let is_extended = may_extend && (level == Level::Full || (is_near_rounding && has_kernel));
+    let is_extended = may_extend && (level == Level::Full || (is_near_rounding && Taylor::has_lanes(mechanism, true)));
     let tolerance = match finer {
         Some(finer) if is_extended => finer.min(EXTENDED),
         None if is_extended => EXTENDED,

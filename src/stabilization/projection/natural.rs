@@ -8,19 +8,19 @@
 //! The shortest way in the metric of the mass matrix, as in angles, for about a fifth of the time.
 
 use crate::arithmetic::Complex;
+use crate::arithmetic::lanes::row::{Row, at, room};
 use crate::arithmetic::lanes::{self, Code, Lanes};
 use crate::arithmetic::sincos;
 use crate::arithmetic::sum::two_sum;
 use crate::dynamics::State;
 use crate::dynamics::looped::NEAR;
 use crate::dynamics::natural::Reduced;
-use crate::dynamics::natural::columns::{self, Row};
-use crate::dynamics::natural::keeper::{CLOSE, Keeper, at};
+use crate::dynamics::natural::keeper::{CLOSE, Keeper};
 
 /// Turns up to this \[rad\] are their sines' series.
 const SMALL: f64 = 1e-4;
 /// Most bodies.
-const MOST: usize = columns::room(4);
+const MOST: usize = room(4);
 
 /// Up to four, eight or sixteen bodies.
 #[derive(Clone, Debug)]

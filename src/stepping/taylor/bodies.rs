@@ -20,18 +20,11 @@ use super::terms::over;
 use super::wide::{self, Wide};
 use crate::arithmetic::DoubleDouble;
 use crate::arithmetic::lanes::Lanes;
+use crate::arithmetic::lanes::row::{Row, at, load, room, store};
 use crate::dynamics::{Mechanism, State};
 
 /// Largest order there is room for.
 pub const MOST: usize = 24;
-/// Largest number of bodies in `B` vectors of four lanes.
-pub const fn room(blocks: usize) -> usize {
-    4 * blocks
-}
-
-/// Four numbers a vector, `B` vectors.
-pub type Row<const B: usize> = [[f64; 4]; B];
-
 /// Constants of the mechanism, whose springs fill `S` vectors; lanes beyond the last body are zero.
 #[derive(Clone, Debug)]
 pub struct Bodies<const B: usize, const S: usize> {
@@ -133,24 +126,6 @@ impl<const B: usize, const S: usize> Bodies<B, S> {
 /// The longest step in which the terms left out of an oscillation of this rate \[rad/s\] still fall \[s\].
 fn reach(order: usize, rate: f64) -> f64 {
     order as f64 / 3.0 / rate
-}
-
-#[inline(always)]
-pub fn load<L: Lanes, const B: usize>(row: &Row<B>) -> [L; B] {
-    let mut lanes = [L::splat(0.0); B];
-    for b in 0..B {
-        lanes[b] = L::of(row[b]);
-    }
-    lanes
-}
-
-#[inline(always)]
-pub fn store<L: Lanes, const B: usize>(lanes: [L; B]) -> Row<B> {
-    let mut row = [[0.0; 4]; B];
-    for b in 0..B {
-        row[b] = lanes[b].array();
-    }
-    row
 }
 
 /// Σ_j columns_j x_j.
@@ -412,14 +387,14 @@ fn unit<L: Lanes, const B: usize>(j: usize) -> [L; B] {
 fn invert<L: Lanes, const B: usize>(columns: &mut [Column<B>]) {
     for p in 0..columns.len() {
         let unit = unit::<L, B>(p);
-        let pivot = 1.0 / columns[p].inverse[p / 4][p % 4];
+        let pivot = 1.0 / at(&columns[p].inverse, p);
         let (mut keep, mut full) = (unit, unit);
         for b in 0..B {
             keep[b] = L::splat(1.0).sub(unit[b]);
             full[b] = keep[b].neg_mul_add(L::of(columns[p].inverse[b]), unit[b]);
         }
         for (j, column) in columns.iter_mut().enumerate() {
-            let factor = L::splat(if j == p { pivot } else { column.inverse[p / 4][p % 4] * pivot });
+            let factor = L::splat(if j == p { pivot } else { at(&column.inverse, p) * pivot });
             for b in 0..B {
                 let kept = if j == p { L::splat(0.0) } else { keep[b].mul(L::of(column.inverse[b])) };
                 column.inverse[b] = full[b].mul_add(factor, kept).array();

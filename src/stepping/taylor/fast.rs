@@ -200,7 +200,7 @@ fn any_go<L: Lanes>(form: &mut Form, state: &mut State, h: f64) {
 impl Fast {
     /// The kernel, where there is one; `is_extended`: with the first orders in double-double.
     pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize, is_portable: bool, is_extended: bool) -> Option<Self> {
-        let settings = Settings { mechanism: mechanism.clone(), tolerance, order, is_portable, is_extended };
+        let settings = || Settings { mechanism: mechanism.clone(), tolerance, order, is_portable, is_extended };
         let (form, longest) = if is_extended {
             let pair = Pair::new(mechanism).filter(|_| order == EXTENDED)?;
             let longest = pair.longest(order);
@@ -212,7 +212,8 @@ impl Fast {
             let longest = driven.longest(order);
             (Form::Driven(Box::new(driven), Box::default()), longest)
         } else {
-            return Some(Self::of_any(settings, Self::bodies(mechanism, tolerance, order)?));
+            let form = Self::bodies(mechanism, tolerance, order)?;
+            return Some(Self::of_any(settings(), form));
         };
         let (step, go) = match order {
             16 => of_order::<16>(),
@@ -220,7 +221,7 @@ impl Fast {
             24 => of_order::<24>(),
             _ => return None,
         };
-        Some(Self { settings, form, pace: Pace::new(tolerance, order, longest), step, go })
+        Some(Self { settings: settings(), form, pace: Pace::new(tolerance, order, longest), step, go })
     }
 
     /// The smallest form that has room for all bodies and springs.

@@ -18,12 +18,12 @@ use self::spring::{Spring, pull};
 use super::expansion::{larger, minus_log2};
 use crate::arithmetic::DoubleDouble;
 use crate::arithmetic::lanes::Lanes;
+use crate::arithmetic::lanes::row::{Row, at, load, room, store};
 use crate::arithmetic::{Complex, sincos};
 use crate::dynamics::force::action::Kind;
 use crate::dynamics::looped::NEAR;
 use crate::dynamics::natural::Reduced;
-use crate::dynamics::natural::columns::{self, Row, load, store};
-use crate::dynamics::natural::keeper::{Keeper, at};
+use crate::dynamics::natural::keeper::Keeper;
 use crate::dynamics::{Mechanism, State};
 use std::f64::consts::TAU;
 
@@ -66,7 +66,7 @@ impl<const B: usize> Looped<B> {
         let n = mechanism.bodies.len();
         let is_plain =
             mechanism.torsions.is_empty() && !mechanism.is_damped() && mechanism.actions.iter().all(|action| action.law.is_none());
-        if n > columns::room(B) || !is_plain || order > MOST {
+        if n > room(B) || !is_plain || order > MOST {
             return None;
         }
         let mut applied = vec![Complex::ZERO; n];

@@ -13,10 +13,10 @@
 //! all other rounding.  A spring of free length zero without damper has no use for its length, and lanes without a spring have none: their q is zero
 //! but for q_0 = 1.
 
-use super::bodies::{Row, room, store};
 use super::terms::over;
 use super::wide::Wide;
 use crate::arithmetic::lanes::Lanes;
+use crate::arithmetic::lanes::row::{Row, at, room, store};
 use crate::dynamics::Mechanism;
 use crate::dynamics::force::Spring;
 
@@ -144,20 +144,19 @@ impl<const B: usize, const S: usize> Springs<B, S> {
     /// About the square of the fastest rate the springs cause where the step begins \[rad²/s²\], from cos and sin of the bodies' angles and M⁻¹ times a vector:
     /// k J·M⁻¹ J for the pull along the spring, J_b = (gamma_b e_b) × D/L, and at most |κ_0| |gamma|² M⁻¹ for its turning.
     pub fn rate_squared(&self, e: &[Row<B>; 2], solve: impl Fn(&Row<B>) -> Row<B>) -> f64 {
-        let first = |rows: &[Row<S>; MOST + 2], i: usize| rows[0][i / 4][i % 4];
+        let Self { stiffness, measured, most, scratch, .. } = self;
         let of_spring = |(i, gamma): (usize, &[Row<B>; 2])| {
-            let of = |row: &Row<S>| row[i / 4][i % 4];
-            let scratch = &self.scratch;
-            let (x, y, reciprocal) = (first(&scratch.x, i), first(&scratch.y, i), first(&scratch.reciprocal, i));
+            let [stiffness, measured, most] = [stiffness, measured, most].map(|row| at(row, i));
+            let [x, y, reciprocal, factor] = [&scratch.x, &scratch.y, &scratch.reciprocal, &scratch.factor].map(|rows| at(&rows[0], i));
             let mut lever = [[0.0; 4]; B];
             for (b, lever) in lever.as_flattened_mut().iter_mut().enumerate() {
-                let [c, s, re, im] = [e[0], e[1], gamma[0], gamma[1]].map(|row| row[b / 4][b % 4]);
+                let [c, s, re, im] = [&e[0], &e[1], &gamma[0], &gamma[1]].map(|row| at(row, b));
                 *lever = ((re * c - im * s) * y - (re * s + im * c) * x) * reciprocal;
             }
             let moved = solve(&lever);
             let along: f64 = lever.as_flattened().iter().zip(moved.as_flattened()).map(|(lever, moved)| lever * moved).sum();
-            let slack = if of(&self.stiffness) > 0.0 { first(&scratch.factor, i).abs() / of(&self.stiffness) } else { 0.0 };
-            of(&self.measured) * of(&self.stiffness) * along + slack * of(&self.most)
+            let slack = if stiffness > 0.0 { factor.abs() / stiffness } else { 0.0 };
+            measured * stiffness * along + slack * most
         };
         self.spread.iter().enumerate().map(of_spring).sum()
     }
