@@ -9,6 +9,7 @@ use super::resume::{Saved, Work};
 use crate::dynamics::Mechanism;
 use crate::report;
 use crate::run::files::{RECORD, TRAJECTORY};
+use crate::run::scribe::Scribe;
 use crate::run::table::Table;
 use crate::run::{Checkpoints, Folder, Outcome, Plan, ResumeError, Run, RunError, Running, Sample, Stream};
 use crate::scene::{Scene, read_text};
@@ -72,9 +73,9 @@ pub fn resume(flags: &RunFlags, saved: Saved, until: Option<f64>, folder: Folder
     }
     flags.scene.remark(&format!("{}; from t = {} s on", report::setting(snapshot.plan()), snapshot.time()));
     let running = Running::resume(Arc::clone(&mechanism), &mechanism.start(&scene), *snapshot)?;
-    let table = Table::going_on(folder.take_up(TRAJECTORY, &cursor)?);
+    let table = Table::going_on(&mechanism, folder.take_up(TRAJECTORY, &cursor)?);
     let task = Task { scene: &scene, mechanism: &mechanism, flags, text: &text, arguments: &arguments };
-    let done = vec![task.finish(running, table, folder, checkpoints)?];
+    let done = vec![task.finish(running, Scribe::new(table), folder, checkpoints)?];
     conclude(&scene, &mechanism, done, flags)
 }
 
@@ -98,19 +99,19 @@ impl Task<'_> {
         let path = flags.out.join(&scene.name).join(plan.folder(mechanism));
         let folder = Folder::open(&path, flags.force)?;
         let table = Table::new(mechanism, folder.begin(TRAJECTORY)?).map_err(|error| folder.failed(TRAJECTORY, error.into()))?;
-        self.finish(Running::new(run), table, folder, Checkpoints::none(&path))
+        self.finish(Running::new(run), Scribe::new(table), folder, Checkpoints::none(&path))
     }
 
     /// Takes a run to its end.
     fn finish(
         &self,
         mut running: Running,
-        mut table: Table<Stream>,
+        mut scribe: Scribe<Stream>,
         mut folder: Folder,
         mut checkpoints: Checkpoints,
     ) -> Result<Done, Failure> {
-        let marched = self.march(&mut running, &mut table, &folder, &mut checkpoints);
-        let done = marched.and_then(|()| self.publish(running.finish(), table, &mut folder));
+        let marched = self.march(&mut running, &mut scribe, &folder, &mut checkpoints);
+        let done = marched.and_then(|()| self.publish(running.finish(), scribe, &mut folder));
         let outcome = done.map_err(|failure| {
             let is_left = checkpoints.has_any() && failure.exit != Exit::Interrupted;
             if is_left { failure.with_checkpoint(folder.path()) } else { failure }
@@ -124,7 +125,7 @@ impl Task<'_> {
     fn march(
         &self,
         running: &mut Running,
-        table: &mut Table<Stream>,
+        scribe: &mut Scribe<Stream>,
         folder: &Folder,
         checkpoints: &mut Checkpoints,
     ) -> Result<(), Failure> {
@@ -132,7 +133,7 @@ impl Task<'_> {
         let mut progress = Progress::new(&self.scene.name, running.plan().until, self.flags.scene.tell.quiet);
         loop {
             let mut observer = |sample: &Sample| {
-                table.write(sample)?;
+                scribe.write(sample)?;
                 progress.see(sample.t);
                 Ok(())
             };
@@ -148,7 +149,7 @@ impl Task<'_> {
                     return ended.map(drop);
                 }
             }
-            self.save(running, table, folder, checkpoints).inspect_err(|_| progress.finish())?;
+            self.save(running, scribe, folder, checkpoints).inspect_err(|_| progress.finish())?;
             watchman.written();
             if interrupt::is_asked() {
                 progress.finish();
@@ -157,9 +158,9 @@ impl Task<'_> {
         }
     }
 
-    fn save(&self, running: &Running, table: &mut Table<Stream>, folder: &Folder, checkpoints: &mut Checkpoints) -> Result<(), Failure> {
+    fn save(&self, running: &Running, scribe: &mut Scribe<Stream>, folder: &Folder, checkpoints: &mut Checkpoints) -> Result<(), Failure> {
         let failed = |error| folder.failed(TRAJECTORY, error);
-        let stream = table.written().map_err(failed)?;
+        let stream = scribe.table().and_then(Table::written).map_err(failed)?;
         checkpoints.save(&Saved {
             version: env!("CARGO_PKG_VERSION").into(),
             arguments: self.arguments.to_vec(),
@@ -172,9 +173,9 @@ impl Task<'_> {
     }
 
     /// Gives the trajectory its name, draws, and writes the record.
-    fn publish(&self, outcome: Outcome, table: Table<Stream>, folder: &mut Folder) -> Result<Outcome, Failure> {
+    fn publish(&self, outcome: Outcome, scribe: Scribe<Stream>, folder: &mut Folder) -> Result<Outcome, Failure> {
         let Self { scene, mechanism, flags, .. } = *self;
-        let stream = table.finish().map_err(|error| folder.failed(TRAJECTORY, error))?;
+        let stream = scribe.finish().map_err(|error| folder.failed(TRAJECTORY, error))?;
         if flags.force {
             // Nothing of an older run may stand beside the new trajectory.
             folder.clear(&FILES[1..])?;

@@ -23,6 +23,8 @@ pub mod plan;
 pub mod reference;
 pub mod running;
 pub mod sample;
+#[cfg(feature = "files")]
+pub mod scribe;
 mod shrink;
 pub mod stress;
 pub mod sweep;

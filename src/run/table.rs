@@ -11,6 +11,27 @@ const BUFFER: usize = 1 << 16;
 pub struct Table<W: Write> {
     writer: W,
     buffer: Vec<u8>,
+    /// Numbers of a row.
+    width: usize,
+    row: Vec<f64>,
+}
+
+/// Appends the numbers of a row.
+pub(super) fn columns(sample: &Sample, numbers: &mut Vec<f64>) {
+    numbers.push(sample.t);
+    for k in 0..sample.centre.len() {
+        let ([x, y], [vx, vy]) = (sample.centre[k], sample.velocity[k]);
+        numbers.extend([sample.phi[k], sample.omega[k], x, y, vx, vy]);
+    }
+    numbers.extend([sample.kinetic, sample.potential, sample.work, sample.imbalance]);
+    for (&[position, velocity], &[torque, power]) in sample.constraints.iter().zip(&sample.motors) {
+        numbers.extend([position, velocity, torque, power]);
+    }
+}
+
+/// How many numbers that are.
+fn width(mechanism: &Mechanism) -> usize {
+    1 + 6 * mechanism.bodies.len() + 4 + 4 * mechanism.rows.len()
 }
 
 impl<W: Write> Table<W> {
@@ -41,12 +62,13 @@ impl<W: Write> Table<W> {
         let mut titles = csv::Writer::from_writer(Vec::with_capacity(BUFFER + BUFFER / 4));
         titles.write_record(&header)?;
         let buffer = titles.into_inner().map_err(|error| error.into_error())?;
-        Ok(Self { writer, buffer })
+        debug_assert_eq!(header.len(), width(mechanism));
+        Ok(Self { writer, buffer, width: header.len(), row: Vec::new() })
     }
 
     /// Goes on with a table whose header and first rows were written before.
-    pub fn going_on(writer: W) -> Self {
-        Self { writer, buffer: Vec::with_capacity(BUFFER + BUFFER / 4) }
+    pub fn going_on(mechanism: &Mechanism, writer: W) -> Self {
+        Self { writer, buffer: Vec::with_capacity(BUFFER + BUFFER / 4), width: width(mechanism), row: Vec::new() }
     }
 
     /// The writer, once it has every row.
@@ -65,29 +87,28 @@ impl<W: Write> Table<W> {
     /// # Errors
     /// What the writer says.
     pub fn write(&mut self, sample: &Sample) -> io::Result<()> {
-        let buffer = &mut self.buffer;
-        put(buffer, sample.t);
-        for k in 0..sample.centre.len() {
-            for value in
-                [sample.phi[k], sample.omega[k], sample.centre[k][0], sample.centre[k][1], sample.velocity[k][0], sample.velocity[k][1]]
-            {
+        let mut row = std::mem::take(&mut self.row);
+        columns(sample, &mut row);
+        let written = self.lines(&row);
+        row.clear();
+        self.row = row;
+        written
+    }
+
+    /// Writes rows of [`columns`], one after the other.
+    pub(super) fn lines(&mut self, numbers: &[f64]) -> io::Result<()> {
+        for row in numbers.chunks_exact(self.width) {
+            let buffer = &mut self.buffer;
+            for &value in row {
                 put(buffer, value);
             }
-        }
-        for value in [sample.kinetic, sample.potential, sample.work, sample.imbalance] {
-            put(buffer, value);
-        }
-        for (constraint, motor) in sample.constraints.iter().zip(&sample.motors) {
-            for value in [constraint[0], constraint[1], motor[0], motor[1]] {
-                put(buffer, value);
+            if let Some(last) = buffer.last_mut() {
+                *last = b'\n';
             }
-        }
-        if let Some(last) = buffer.last_mut() {
-            *last = b'\n';
-        }
-        if buffer.len() >= BUFFER {
-            self.writer.write_all(buffer)?;
-            buffer.clear();
+            if buffer.len() >= BUFFER {
+                self.writer.write_all(buffer)?;
+                buffer.clear();
+            }
         }
         Ok(())
     }
