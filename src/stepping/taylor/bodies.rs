@@ -408,17 +408,21 @@ fn invert<L: Lanes, const B: usize>(columns: &mut [Column<B>]) {
 pub fn go<L: Lanes, const B: usize, const S: usize>(bodies: &Bodies<B, S>, state: &mut State, h: f64) {
     let (scratch, n) = (&bodies.scratch, bodies.count);
     let (step, square) = (L::splat(h), L::splat(h * h));
-    for b in 0..B {
-        let (mut angles, mut rates) = ([L::splat(0.0); 2], [L::splat(0.0); 2]);
-        let mut k = bodies.order;
-        while k > 0 {
-            let v = L::of(scratch.v[k][0][b]);
-            angles[k % 2] = angles[k % 2].mul_add(square, over(v, k + 1));
-            rates[k % 2] = rates[k % 2].mul_add(square, v);
-            k -= 1;
+    let zero = [L::ZERO; B];
+    // Even and odd powers by themselves.
+    let (mut angles, mut rates) = ([zero; 2], [zero; 2]);
+    for k in (2..=bodies.order).rev().step_by(2) {
+        for (parity, k) in [(0, k), (1, k - 1)] {
+            for b in 0..B {
+                let v = L::of(scratch.v[k][0][b]);
+                angles[parity][b] = angles[parity][b].mul_add(square, over(v, k + 1));
+                rates[parity][b] = rates[parity][b].mul_add(square, v);
+            }
         }
-        let angle = angles[0].mul_add(step, angles[1]).mul_add(step, L::of(scratch.v[0][0][b])).mul(step).array();
-        let rate = rates[0].mul_add(step, rates[1]).mul(step).array();
+    }
+    for b in 0..B {
+        let angle = angles[0][b].mul_add(step, angles[1][b]).mul_add(step, L::of(scratch.v[0][0][b])).mul(step).array();
+        let rate = rates[0][b].mul_add(step, rates[1][b]).mul(step).array();
         for lane in 0..4 {
             let i = 4 * b + lane;
             if i < n {
