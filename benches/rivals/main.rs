@@ -5,6 +5,8 @@
 //! Errors are the largest difference in an angle \[rad\] or a rate \[rad/s\] from a double-double run that shares the constants and the starts to the bit;
 //! times are microseconds per simulated second and trajectory, minimum and median of the blocks.
 //!
+//! With `--angles` rates are not judged: those of fast bars are ten times and more as far off.
+//!
 //! `cargo bench --bench rivals -- --serve` answers the script in `benches/peers` line by line instead.
 
 mod by_hand;
@@ -39,7 +41,8 @@ fn main() {
         if !wanted.is_empty() && !wanted.iter().any(|word| word == name) {
             continue;
         }
-        let problem = Problem::named(name).expect("a scene of this bench");
+        let mut problem = Problem::named(name).expect("a scene of this bench");
+        problem.with_rates = std::env::args().all(|word| word != "--angles");
         let mut candidates = candidates::all(&problem);
         for &target in targets {
             let settings: Vec<_> = candidates.iter_mut().map(|candidate| setting(candidate, &problem, target)).collect();

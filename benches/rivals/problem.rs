@@ -17,6 +17,8 @@ pub struct Problem {
     pub starts: Vec<Motion>,
     /// The ends by the power series in double-double.
     pub ends: Vec<Motion>,
+    /// Whether rates are judged beside angles.
+    pub with_rates: bool,
 }
 
 impl Problem {
@@ -42,13 +44,22 @@ impl Problem {
             })
             .collect();
         let ends = starts.iter().map(|start| exact(&mechanism, start, until)).collect();
-        Some(Self { mechanism, until, starts, ends })
+        Some(Self { mechanism, until, starts, ends, with_rates: true })
     }
 
     /// Geometric mean over the starts of the largest difference in an angle or a rate.
     pub fn error(&self, ends: &[Motion]) -> f64 {
-        let logs: f64 = ends.iter().zip(&self.ends).map(|(end, exact)| apart(end, exact).max(1e-18).ln()).sum();
+        let logs: f64 = ends.iter().zip(&self.ends).map(|(end, exact)| self.apart(end, exact).max(1e-18).ln()).sum();
         (logs / ends.len() as f64).exp()
+    }
+
+    /// Angles modulo a turn, so that codes that do not count turns are judged alike.
+    fn apart(&self, a: &Motion, b: &Motion) -> f64 {
+        (0..a.phi.len()).fold(0.0, |worst: f64, k| {
+            let angle = (a.phi[k] - b.phi[k]).reduced().0.hi.abs();
+            let rate = if self.with_rates { (a.omega[k] - b.omega[k]).hi.abs() } else { 0.0 };
+            worst.max(angle).max(rate)
+        })
     }
 
     /// States in the form of the elimination.
@@ -56,14 +67,6 @@ impl Problem {
         let form = Elimination::<0>::new(Arc::clone(&self.mechanism));
         self.starts.iter().map(|start| form.state(start)).collect()
     }
-}
-
-/// Angles modulo a turn, so that codes that do not count turns are judged alike.
-fn apart(a: &Motion, b: &Motion) -> f64 {
-    (0..a.phi.len()).fold(0.0, |worst: f64, k| {
-        let angle = (a.phi[k] - b.phi[k]).reduced().0.hi.abs();
-        worst.max(angle).max((a.omega[k] - b.omega[k]).hi.abs())
-    })
 }
 
 fn exact(mechanism: &Arc<Mechanism>, start: &Motion, until: f64) -> Motion {
