@@ -20,7 +20,6 @@ const EXTENDED: usize = 24;
 pub struct Fast {
     settings: Settings,
     form: Form,
-    pace: Pace,
     step: Step,
     go: Go,
 }
@@ -35,12 +34,12 @@ struct Settings {
     is_extended: bool,
 }
 
-/// What it runs on.
+/// What it runs on; the first three do not know their pace.
 #[derive(Clone, Debug)]
 enum Form {
-    Pair(Pair, Box<pair::Scratch>),
-    Extended(Pair, Box<extended::Scratch>),
-    Driven(Box<Driven>, Box<driven::Scratch>),
+    Pair(Pair, Pace, Box<pair::Scratch>),
+    Extended(Pair, Pace, Box<extended::Scratch>),
+    Driven(Box<Driven>, Pace, Box<driven::Scratch>),
     Few(Box<Bodies<1, 0>>),
     Several(Box<Bodies<2, 0>>),
     FewSprung(Box<Bodies<1, 1>>),
@@ -52,20 +51,20 @@ enum Form {
 
 /// One step of a state by at most so many seconds, without the processor's vectors where the last is true: the step wanted and the step taken, or `None` where
 /// the series of any mechanism must take over.
-type Step = fn(&mut Form, &Pace, &mut State, f64, bool) -> Option<(f64, f64)>;
+type Step = fn(&mut Form, &mut State, f64, bool) -> Option<(f64, f64)>;
 
 /// From the last step's start on by so many seconds, likewise.
 type Go = fn(&mut Form, &mut State, f64, bool);
 
 /// A step of order `P`.
-struct Stepping<'a, const P: usize>(&'a mut Form, &'a Pace, &'a mut State, f64);
+struct Stepping<'a, const P: usize>(&'a mut Form, &'a mut State, f64);
 
 impl<const P: usize> Code for Stepping<'_, P> {
     type Output = Option<(f64, f64)>;
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Option<(f64, f64)> {
-        step::<L, P>(self.0, self.1, self.2, self.3)
+        step::<L, P>(self.0, self.1, self.2)
     }
 }
 
@@ -84,27 +83,27 @@ impl<const P: usize> Code for Going<'_, P> {
 /// The code of one order.
 fn of_order<const P: usize>() -> (Step, Go) {
     (
-        |form, pace, state, left, is_portable| lanes::run(Stepping::<P>(form, pace, state, left), is_portable),
+        |form, state, left, is_portable| lanes::run(Stepping::<P>(form, state, left), is_portable),
         |form, state, h, is_portable| lanes::run(Going::<P>(form, state, h), is_portable),
     )
 }
 
 #[inline(always)]
-fn step<L: Lanes, const P: usize>(form: &mut Form, pace: &Pace, state: &mut State, left: f64) -> Option<(f64, f64)> {
+fn step<L: Lanes, const P: usize>(form: &mut Form, state: &mut State, left: f64) -> Option<(f64, f64)> {
     Some(match form {
-        Form::Pair(pair, scratch) => {
+        Form::Pair(pair, pace, scratch) => {
             let mut flow = pair::Flow::of(pair, state);
             let steps = pair::step::<L, P>(pair, pace, scratch, &mut flow, left);
             flow.write(pair, state);
             steps
         }
-        Form::Extended(pair, scratch) if P == EXTENDED => {
+        Form::Extended(pair, pace, scratch) if P == EXTENDED => {
             let mut flow = pair::Flow::of(pair, state);
             let steps = extended::step::<L, P>(pair, pace, scratch, &mut flow, left);
             flow.write(pair, state);
             steps
         }
-        Form::Driven(driven, scratch) => {
+        Form::Driven(driven, pace, scratch) => {
             let mut flow = driven::Flow::of(state);
             let steps = driven::step::<L, P>(driven, pace, scratch, &mut flow, state.time, left);
             flow.write(state);
@@ -118,17 +117,17 @@ fn step<L: Lanes, const P: usize>(form: &mut Form, pace: &Pace, state: &mut Stat
 #[inline(always)]
 fn go<L: Lanes, const P: usize>(form: &mut Form, state: &mut State, h: f64) {
     match form {
-        Form::Pair(pair, scratch) => {
+        Form::Pair(pair, _, scratch) => {
             let mut flow = pair::Flow::of(pair, state);
             pair::go::<L, P>(scratch, &mut flow, h);
             flow.write(pair, state);
         }
-        Form::Extended(pair, scratch) => {
+        Form::Extended(pair, _, scratch) => {
             let mut flow = pair::Flow::of(pair, state);
             extended::go::<L, P>(scratch, &mut flow, h);
             flow.write(pair, state);
         }
-        Form::Driven(driven, scratch) => {
+        Form::Driven(driven, _, scratch) => {
             let mut flow = driven::Flow::of(state);
             driven::go::<L, P>(driven, scratch, &mut flow, h);
             flow.write(state);
@@ -164,7 +163,7 @@ impl Code for AnyGoing<'_> {
 /// The code of all orders.
 fn of_any() -> (Step, Go) {
     (
-        |form, _, state, left, is_portable| lanes::run(AnyStepping(form, state, left), is_portable),
+        |form, state, left, is_portable| lanes::run(AnyStepping(form, state, left), is_portable),
         |form, state, h, is_portable| lanes::run(AnyGoing(form, state, h), is_portable),
     )
 }
@@ -201,16 +200,17 @@ impl Fast {
     /// The kernel, where there is one; `is_extended`: with the first orders in double-double.
     pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize, is_portable: bool, is_extended: bool) -> Option<Self> {
         let settings = || Settings { mechanism: mechanism.clone(), tolerance, order, is_portable, is_extended };
-        let (form, longest) = if is_extended {
+        let pace = |longest| Pace::new(tolerance, order, longest);
+        let form = if is_extended {
             let pair = Pair::new(mechanism).filter(|_| order == EXTENDED)?;
-            let longest = pair.longest(order);
-            (Form::Extended(pair, Box::default()), longest)
+            let pace = pace(pair.longest(order));
+            Form::Extended(pair, pace, Box::default())
         } else if let Some(pair) = Pair::new(mechanism) {
-            let longest = pair.longest(order);
-            (Form::Pair(pair, Box::default()), longest)
+            let pace = pace(pair.longest(order));
+            Form::Pair(pair, pace, Box::default())
         } else if let Some(driven) = Driven::new(mechanism) {
-            let longest = driven.longest(order);
-            (Form::Driven(Box::new(driven), Box::default()), longest)
+            let pace = pace(driven.longest(order));
+            Form::Driven(Box::new(driven), pace, Box::default())
         } else {
             let form = Self::bodies(mechanism, tolerance, order)?;
             return Some(Self::of_any(settings(), form));
@@ -221,16 +221,17 @@ impl Fast {
             24 => of_order::<24>(),
             _ => return None,
         };
-        Some(Self { settings: settings(), form, pace: Pace::new(tolerance, order, longest), step, go })
+        Some(Self { settings: settings(), form, step, go })
     }
 
     /// The smallest form that has room for all bodies and springs.
     fn bodies(mechanism: &Mechanism, tolerance: f64, order: usize) -> Option<Form> {
-        let few = Bodies::new(mechanism, tolerance, order).map(|bodies| Form::Few(Box::new(bodies)));
-        let several = || Bodies::new(mechanism, tolerance, order).map(|bodies| Form::Several(Box::new(bodies)));
-        let few_sprung = || Bodies::new(mechanism, tolerance, order).map(|bodies| Form::FewSprung(Box::new(bodies)));
-        let several_sprung = || Bodies::new(mechanism, tolerance, order).map(|bodies| Form::SeveralSprung(Box::new(bodies)));
-        few.or_else(several).or_else(few_sprung).or_else(several_sprung)
+        fn of<const B: usize, const S: usize>((mechanism, tolerance, order): (&Mechanism, f64, usize)) -> Option<Box<Bodies<B, S>>> {
+            Bodies::new(mechanism, tolerance, order).map(Box::new)
+        }
+        let wanted = (mechanism, tolerance, order);
+        let free = of(wanted).map(Form::Few).or_else(|| of(wanted).map(Form::Several));
+        free.or_else(|| of(wanted).map(Form::FewSprung)).or_else(|| of(wanted).map(Form::SeveralSprung))
     }
 
     /// The kernel of a mechanism with loops, where there is one: it sums the best of all orders up to the one asked for, or to 20 where that is higher.
@@ -248,7 +249,7 @@ impl Fast {
     /// With a form that knows its order and its pace.
     fn of_any(settings: Settings, form: Form) -> Self {
         let (step, go) = of_any();
-        Self { pace: Pace::new(settings.tolerance, settings.order, f64::INFINITY), settings, form, step, go }
+        Self { settings, form, step, go }
     }
 
     /// True where it was made for all these.
@@ -261,7 +262,7 @@ impl Fast {
     /// One step of at most `left` \[s\] from the state's unknowns, which are then the new ones; returns the step wanted and the step taken.
     #[inline]
     pub fn step(&mut self, state: &mut State, left: f64) -> Option<(f64, f64)> {
-        (self.step)(&mut self.form, &self.pace, state, left, self.settings.is_portable)
+        (self.step)(&mut self.form, state, left, self.settings.is_portable)
     }
 
     /// Takes a state that stands where the last step began on by `h` \[s\], as the step would have.
