@@ -2,7 +2,7 @@
 
 use driftless::dynamics::Mechanism;
 use driftless::run::{Outcome, Sample};
-use driftless::scene::{Law, Place, Scene};
+use driftless::scene::{Law, Place, Scene, Sine};
 
 /// What the program promises of a success without stated limits, with a little room for the rounding of this audit.
 const ENERGY: f64 = 1.1e-2;
@@ -97,9 +97,10 @@ impl Auditor<'_> {
         for motor in &scene.motors {
             let from = motor.relative_to.map_or(0.0, |k| sample.phi[k]);
             let asked = law(&motor.law, sample.t);
+            let of_sine = |sine: &Sine| sine.amplitude.abs() * (1.0 + (sine.frequency * sample.t).abs() + sine.phase.abs());
             let sizes = asked.abs()
                 + from.abs()
-                + motor.law.sines.iter().map(|sine| sine.amplitude.abs() * (1.0 + (sine.frequency * sample.t).abs())).sum::<f64>()
+                + motor.law.sines.iter().map(of_sine).sum::<f64>()
                 + (motor.law.rate * sample.t).abs()
                 + (motor.law.acceleration * sample.t * sample.t).abs();
             see(((sample.phi[motor.bar] - from - asked).abs() - 1e-14 * sizes).max(0.0), &motor.name);
