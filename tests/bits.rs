@@ -1,8 +1,8 @@
 //! The same bits on every machine: the ends of shipped scenes by every kind of method, as hashes.
 //!
 //! A change of the arithmetic changes them; then the new ones are printed, and belong here with a word in the changelog.  They are the same with and without
-//! the processor's vectors, which is what is compared here; in a release build, whose program `.ci/bits release` takes; and in debug builds and with
-//! `target-cpu=native`, where `.ci/bits native plain` runs this.
+//! the processor's vectors, which is what is compared here; in a release build, whose program `.ci/bits release` takes; and in debug builds, with
+//! `target-cpu=native`, and on other processors, where `.ci/bits` runs this.
 
 mod common;
 #[cfg(feature = "cli")]
