@@ -7,6 +7,7 @@
 //! A kernel is written once over [`Lanes`] and compiled twice: it is a piece of [`Code`], which [`run`] enters as compiled for the processor, where that has
 //! AVX and FMA, or as portable code.  `unsafe` is nowhere in the crate but in the file that does so, `lanes/hardware.rs`.
 
+use super::sum;
 use std::fmt::Debug;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -69,7 +70,7 @@ impl Portable {
 #[cfg_attr(all(target_arch = "x86_64", not(target_feature = "fma")), inline(never))]
 #[cfg_attr(not(all(target_arch = "x86_64", not(target_feature = "fma"))), inline(always))]
 fn fused(a: [f64; 4], b: [f64; 4], c: [f64; 4]) -> [f64; 4] {
-    [a[0].mul_add(b[0], c[0]), a[1].mul_add(b[1], c[1]), a[2].mul_add(b[2], c[2]), a[3].mul_add(b[3], c[3])]
+    [sum::fused(a[0], b[0], c[0]), sum::fused(a[1], b[1], c[1]), sum::fused(a[2], b[2], c[2]), sum::fused(a[3], b[3], c[3])]
 }
 
 impl Lanes for Portable {

@@ -4,7 +4,7 @@
 //! [`DoubleDouble`] (monitors, references), on [`Dual`] numbers (Jacobians), and on [`Eight`](eight::Eight) lanes and their [`Pairs`](pairs::Pairs) (stages of implicit methods).
 //!
 //! Two rules keep the bits the same on every machine: trigonometry comes from pure Rust (the `libm` crate, or our own series
-//! in lanes and in double-double), and a fused multiply-add is written as one wherever it is used ([`sum::two_product`], [`lanes`]), never left to the compiler:
+//! in lanes and in double-double), and a fused multiply-add is written as one wherever it is used ([`sum::fused`], [`lanes`]), never left to the compiler:
 //! it is rounded once by definition, so it makes no difference to the bits whether the processor has the instruction.
 
 pub mod angle;

@@ -20,12 +20,19 @@ pub fn fast_two_sum(a: f64, b: f64) -> (f64, f64) {
 }
 
 /// `a * b = product + error` exactly (barring underflow), by one fused multiply-add.
-///
-/// A fused multiply-add is correctly rounded in hardware and in software alike, so the bits do not depend on the processor.
 #[inline(always)]
 pub fn two_product(a: f64, b: f64) -> (f64, f64) {
     let product = a * b;
-    (product, a.mul_add(b, -product))
+    (product, fused(a, b, -product))
+}
+
+/// `a * b + c`, rounded once: by the processor or in software, to the same bits.
+///
+/// Not by the C library of 32-bit x86, which computes in 80 bits: musl's rounds twice where c is zero.
+#[inline(always)]
+#[expect(clippy::disallowed_methods, reason = "the one place that knows where it is rounded once")]
+pub fn fused(a: f64, b: f64, c: f64) -> f64 {
+    if cfg!(target_arch = "x86") { libm::fma(a, b, c) } else { a.mul_add(b, c) }
 }
 
 /// The nearest whole number, ties to even; two additions where the size allows it, since the baseline processor has no instruction for it.
@@ -45,6 +52,16 @@ mod tests {
         assert_eq!(two_sum(1.0, 2f64.powi(-60)), (1.0, 2f64.powi(-60)));
         assert_eq!(two_sum(2f64.powi(-60), 1.0), (1.0, 2f64.powi(-60)));
         assert_eq!(fast_two_sum(1.0, -2f64.powi(-70)), (1.0, -2f64.powi(-70)));
+    }
+
+    #[test]
+    fn a_fused_multiply_add_is_rounded_once() {
+        // Halfway between two doubles in 64 bits, just below it in full.
+        let (a, b) = (f64::from_bits(0x3fc7_5d27_d400_0000), f64::from_bits(0x3fde_1fdc_7ff1_9194));
+        assert_eq!(fused(a, b, 0.0).to_bits(), 0x3fb5_fe98_9331_476f);
+        let (half, less) = (f64::EPSILON / 2.0, 2f64.powi(-90));
+        assert_eq!((fused(1.0, half, 1.0), fused(1.0 + f64::EPSILON, half, 1.0)), (1.0, 1.0 + f64::EPSILON));
+        assert_eq!((fused(less, less, 1.0 + f64::EPSILON), fused(-less, less, 1.0)), (1.0 + f64::EPSILON, 1.0));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::tableau::{Tableau, lane};
 use super::{Gauss, IDLE_SWEEPS, LARGEST_REST, LEAST_ANGLE, MOST_SWEEPS, NEWTON_STEPS};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::{self, Code, Lanes, Portable};
-use crate::arithmetic::sum::two_sum;
+use crate::arithmetic::sum::{fused, two_sum};
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Field, Points, State, Time};
 use crate::stepping::{Reached, StepError, Tally, Watch};
@@ -302,8 +302,8 @@ impl Step<'_> {
                 let at = lane(i, s);
                 newton.correction.extend((0..d).map(|k| {
                     let (span, points) = (scratch.span.0[at], &scratch.points);
-                    let rest = libm::fma(span, points.rate[k].0[at], -scratch.increment[k].0[at]);
-                    if LOW { libm::fma(span, points.rate_low[k].0[at], rest) } else { rest }
+                    let rest = fused(span, points.rate[k].0[at], -scratch.increment[k].0[at]);
+                    if LOW { fused(span, points.rate_low[k].0[at], rest) } else { rest }
                 }));
             }
             newton.solve(&scratch.span, s, d);
