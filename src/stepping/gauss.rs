@@ -1,7 +1,8 @@
 //! Gauss collocation with s = 2…8 stages, order 2s, fixed step: `gauss4`, `gauss6`, … `gauss16`.
 //!
 //! Symplectic in the canonical form (q, p), symmetric in time, A-stable; energy is not conserved but stays within a band that does not grow.
-//! Run at the rounding optimum, where the error of the energy is a random walk of the rounding errors and nothing else (Brouwer's law).
+//! What rounding does to the energy is a random walk and nothing else (Brouwer's law), some 1e-21 of it in a thousand seconds: below the method's own error,
+//! which swings with the motion, unless steps are short.
 //! To choose for long horizons: bounded systems over 1e4 s and more, where the invariants count.  It asks for a smooth field:
 //! stages are found by sweeps and, from about `step · fastest rate = 2` on, by Newton's method (`newton.rs`).  Beyond 4 a fast mode with energy in it is not followed any more,
 //! and the slow motion goes wrong while the energy stays bounded: the method stops there.  In (q, w) the same coefficients are not symplectic.
@@ -18,10 +19,10 @@
 //! * Sweeps go on until no unknown's change falls any further, and one sweep more.  A tolerance would leave the same rest in every step.
 //! * State and time are pairs; the update sums exact products in double-double.
 //! * Stages are summed outwards from the step's midpoint `y + Σ L_j / 2` in mirror pairs, so that a step and its reverse round alike.
-//! * Evaluations at the end in pairs of doubles, at stages that are pairs too ([`Field::exact_rates`]): what remains of the random walk is
-//!   the rounding of `L_j` in the stages.  They go on until the stages stay as they are to the last bit, or their changes fall no further: an
-//!   update with exact rates at odds with stages made from plain ones drifts linearly where the motion is regular.  On `gentle` a step takes
-//!   about nine of them at h = 2⁻⁶ s and twelve at 2⁻⁵ s.
+//! * Evaluations at the end in pairs of doubles ([`Field::exact_rates`]), with stages and `L_j` that are pairs too.  They go on until the stages
+//!   move by less than 2⁻⁸⁴ of their size, or no less than before: five to nine of them a step.  Increments rounded to doubles would hold the stages
+//!   a little to the side from which the plain sweeps came, and that is the same side in every step, by how the constants happen to be rounded: 2e-21 of the
+//!   energy per second on `gentle` at 2⁻⁵ s, up or down.
 //!
 //! The stages lie in lanes: a sweep is one evaluation of the field on vectors of eight ([`Field::rates`]).
 //!
@@ -50,8 +51,9 @@ const NAMES: [&str; 7] = ["gauss4", "gauss6", "gauss8", "gauss10", "gauss12", "g
 const MOST_SWEEPS: usize = 200;
 /// Sweeps in a row without a fall that end the iteration: the one that shows it, and one of grace.
 const IDLE_SWEEPS: usize = 2;
-/// Most evaluations after the last sweep that carry what doubles leave out.
+/// Most evaluations after the last sweep that carry what doubles leave out, and the change over the size of an unknown that ends them.
 const MOST_EXACT_SWEEPS: u32 = 12;
+const SETTLED: f64 = 1.0 / (1_u128 << 84) as f64;
 /// Largest last change, relative to its scale, that can be rounding; anything above has not converged.
 const LARGEST_REST: f64 = 1e-10;
 /// Scale of an angle near zero \[rad\]: forces that cancel leave an angle a noise that is not relative to its size.
@@ -108,7 +110,7 @@ impl Gauss {
         Self::new(place + 2, step)
     }
 
-    /// The same without the evaluations that carry what doubles leave out: less time, and about ten times the drift.
+    /// The same without the evaluations that carry what doubles leave out: half the time, and the random walk of plain doubles.
     pub fn plain(self) -> Self {
         Self { exact: 0, ..self }
     }
@@ -312,7 +314,7 @@ mod tests {
     }
 
     /// Weights the stages do not know drift linearly and in proportion: -1.8e-20 J/s for what doubles leave out of ours, 17 times more where
-    /// the second half of the stages does without.  At their true size the random walk hides that for 1e8 s, so they are enlarged here.
+    /// the second half of the stages does without.  At their true size the method's own error hides that for minutes, so they are enlarged here.
     #[test]
     fn low_parts_of_the_weights_in_the_update_only_drift_linearly() {
         let marks = [1 << 11, 1 << 12, 1 << 13];

@@ -2,10 +2,10 @@
 
 use super::newton::Newton;
 use super::tableau::{Tableau, lane};
-use super::{Gauss, IDLE_SWEEPS, LARGEST_REST, LEAST_ANGLE, MOST_SWEEPS, NEWTON_STEPS};
+use super::{Gauss, IDLE_SWEEPS, LARGEST_REST, LEAST_ANGLE, MOST_SWEEPS, NEWTON_STEPS, SETTLED};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::{self, Code, Lanes, Portable};
-use crate::arithmetic::sum::{fused, two_sum};
+use crate::arithmetic::sum::{fast_two_sum, fused, two_sum};
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Field, Points, State, Time};
 use crate::stepping::{Reached, StepError, Tally, Watch};
@@ -21,8 +21,9 @@ pub(super) struct Scratch {
     offset: [Time; LANES],
     /// Stages and their rates.
     pub points: Points,
-    /// L (d).
+    /// L, and what it leaves out (d, d).
     increment: Vec<Octet>,
+    increment_low: Vec<Octet>,
     /// Largest change of each unknown in the last sweep, and the least so far (d, d).
     change: Vec<f64>,
     least: Vec<f64>,
@@ -147,6 +148,7 @@ impl Step<'_> {
         if has_changed {
             self.solve::<L>(problem, state, tally);
             if self.scratch.unsettled(self.angles).is_none() {
+                self.scratch.sum_exactly::<L>();
                 return;
             }
             // A Jacobian that turns far within the step does worse than sweeps.
@@ -158,6 +160,7 @@ impl Step<'_> {
         }
         self.scratch.judge();
         self.scratch.points.rate_low.fill(Octet::default());
+        self.multiply_low::<L>();
         self.refine::<L>(problem, state, tally);
         self.scratch.sum_exactly::<L>();
     }
@@ -197,7 +200,7 @@ impl Step<'_> {
             problem.rates(&mut self.scratch.points);
             self.multiply::<L>();
             tally.evaluations += self.tableau.nodes.len() as u64;
-            self.restage::<L, false>(state);
+            self.restage::<L>(state);
             idle = if self.scratch.falls() { 0 } else { idle + 1 };
             let is_over = idle == IDLE_SWEEPS || self.scratch.change.iter().all(|&change| change == 0.0);
             sizes[sweep % 5] = self.scratch.size_of_change();
@@ -215,11 +218,11 @@ impl Step<'_> {
         true
     }
 
-    /// Evaluations that carry what doubles leave out, at stages that are pairs, until the stages stay as they are to the last bit, or their changes fall no
-    /// further.  A rest of the iteration would have the direction of time in it, and drift.
+    /// Evaluations that carry what doubles leave out, at stages that are pairs, until these have settled or their changes fall no further.  A rest of the
+    /// iteration would have the direction of time in it, and drift.
     #[inline(always)]
     fn refine<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, tally: &mut Tally) {
-        self.restage::<L, true>(state);
+        self.restage_exactly::<L>(state);
         self.scratch.least.fill(f64::INFINITY);
         let mut idle = 0;
         for sweep in 0..self.exact {
@@ -227,13 +230,14 @@ impl Step<'_> {
                 return;
             }
             self.multiply::<L>();
+            self.multiply_low::<L>();
             tally.evaluations += self.tableau.nodes.len() as u64;
             if sweep + 1 == self.exact {
                 return;
             }
-            self.restage::<L, true>(state);
+            self.restage_exactly::<L>(state);
             idle = if self.scratch.falls() { 0 } else { idle + 1 };
-            if idle == IDLE_SWEEPS || self.scratch.change.iter().all(|&change| change == 0.0) {
+            if idle == IDLE_SWEEPS || self.scratch.is_settled() {
                 return;
             }
         }
@@ -274,11 +278,12 @@ impl Step<'_> {
         if let Some(newton) = &self.newton {
             newton.predict(last, s, &rate, &self.scratch.span, &mut self.scratch.increment);
         }
-        self.restage::<L, false>(state);
+        self.scratch.increment_low.fill(Octet::default());
+        self.restage::<L>(state);
         self.iterate::<L, false>(problem, state, tally, MOST_ITERATIONS);
         self.scratch.judge();
         if self.exact > 0 {
-            self.restage::<L, true>(state);
+            self.restage_exactly::<L>(state);
             self.iterate::<L, true>(problem, state, tally, self.exact as usize);
         }
     }
@@ -302,21 +307,27 @@ impl Step<'_> {
                 let at = lane(i, s);
                 newton.correction.extend((0..d).map(|k| {
                     let (span, points) = (scratch.span.0[at], &scratch.points);
-                    let rest = fused(span, points.rate[k].0[at], -scratch.increment[k].0[at]);
+                    let rest = fused(span, points.rate[k].0[at], -scratch.increment[k].0[at]) - scratch.increment_low[k].0[at];
                     if LOW { fused(span, points.rate_low[k].0[at], rest) } else { rest }
                 }));
             }
             newton.solve(&scratch.span, s, d);
             for k in 0..d {
-                scratch.total[k] = newton.total(&scratch.increment[k], s, d, k);
                 for i in 0..s {
-                    scratch.increment[k].0[lane(i, s)] += newton.correction[i * d + k];
+                    let (at, correction) = (lane(i, s), newton.correction[i * d + k]);
+                    let (increment, low) = (&mut scratch.increment[k].0[at], &mut scratch.increment_low[k].0[at]);
+                    let (sum, rest) = two_sum(*increment, correction);
+                    (*increment, *low) = fast_two_sum(sum, rest + *low);
                 }
             }
-            self.restage::<L, LOW>(state);
+            if LOW {
+                self.restage_exactly::<L>(state)
+            } else {
+                self.restage::<L>(state)
+            }
             idle = if self.scratch.falls() { 0 } else { idle + 1 };
-            let size = self.scratch.size_of_change();
-            if idle == IDLE_SWEEPS || size.is_nan() || self.scratch.change.iter().all(|&change| change == 0.0) {
+            let is_over = if LOW { self.scratch.is_settled() } else { self.scratch.change.iter().all(|&change| change == 0.0) };
+            if idle == IDLE_SWEEPS || is_over || self.scratch.size_of_change().is_nan() {
                 return;
             }
         }
@@ -333,9 +344,21 @@ impl Step<'_> {
         }
     }
 
-    /// The stages from L, with `LOW` what they leave out too, and how far they moved.
+    /// What L leaves out.
     #[inline(always)]
-    fn restage<L: Lanes, const LOW: bool>(&mut self, state: &State) {
+    fn multiply_low<L: Lanes>(&mut self) {
+        let Scratch { span, points, increment, increment_low, .. } = &mut *self.scratch;
+        let span = span.halves::<L>();
+        for (k, left) in increment_low.iter_mut().enumerate() {
+            let (rate, low, product) = (points.rate[k].halves::<L>(), points.rate_low[k].halves::<L>(), increment[k].halves::<L>());
+            let rest = |half: usize| span[half].mul_add(low[half], span[half].mul_add(rate[half], product[half].neg()));
+            *left = Octet::of([rest(0), rest(1)]);
+        }
+    }
+
+    /// The stages from L, and how far they moved.
+    #[inline(always)]
+    fn restage<L: Lanes>(&mut self, state: &State) {
         let scratch = &mut *self.scratch;
         let (even, odd) = (self.tableau.even.map(L::of), self.tableau.odd.map(L::of));
         for k in 0..state.y.len() {
@@ -349,26 +372,70 @@ impl Step<'_> {
                 across = odd[j].mul_add(L::splat(differences[j]), across);
             }
             let (middle, rest) = (L::splat(middle), L::splat(rest));
-            let offset = [across.add(up).add(rest), across.sub(up).add(rest)];
-            let moved = offset.map(|offset| middle.add(offset));
+            let moved = [across.add(up).add(rest), across.sub(up).add(rest)].map(|offset| middle.add(offset));
             let before = scratch.points.y[k].halves::<L>();
-            let mut change = [moved[0].sub(before[0]), moved[1].sub(before[1])];
-            if LOW {
-                let low_before = scratch.points.low[k].halves::<L>();
-                let low = |half: usize| {
-                    let part = moved[half].sub(middle);
-                    middle.sub(moved[half].sub(part)).add(offset[half].sub(part))
-                };
-                let low = [low(0), low(1)];
-                change = [change[0].add(low[0].sub(low_before[0])), change[1].add(low[1].sub(low_before[1]))];
-                scratch.points.low[k] = Octet::of(low);
-            }
-            let change = change[0].abs().max(change[1].abs());
-            let change = change.max(change.swap_halves());
-            scratch.change[k] = change.max(change.swap_pairs()).array()[0];
+            scratch.change[k] = largest([moved[0].sub(before[0]), moved[1].sub(before[1])]);
             scratch.points.y[k] = Octet::of(moved);
         }
     }
+
+    /// The same in pairs.
+    #[inline(always)]
+    fn restage_exactly<L: Lanes>(&mut self, state: &State) {
+        let scratch = &mut *self.scratch;
+        let (even, odd) = (self.tableau.even.map(L::of), self.tableau.odd.map(L::of));
+        for k in 0..state.y.len() {
+            let ([first, second], [first_low, second_low]) = (scratch.increment[k].halves::<L>(), scratch.increment_low[k].halves::<L>());
+            let ((sums, sums_low), (differences, differences_low)) = (two_sums(first, second), two_sums(first, second.neg()));
+            let (sums_low, differences_low) = (sums_low.add(first_low.add(second_low)), differences_low.add(first_low.sub(second_low)));
+            let (up, up_low) = combine(&even, sums.array(), sums_low.array());
+            let (across, across_low) = combine(&odd, differences.array(), differences_low.array());
+            let (total, total_low) = sum_of(sums, sums_low);
+            let (middle, rest) = two_sum(state.y[k], 0.5 * total);
+            let rest = rest + (state.low[k] + 0.5 * total_low);
+            let (middle, across) = ((L::splat(middle), L::splat(rest)), (across, across_low));
+            let (first, first_low) = shifted(middle, across, (up, up_low));
+            let (second, second_low) = shifted(middle, across, (up.neg(), up_low.neg()));
+            let (before, low_before) = (scratch.points.y[k].halves::<L>(), scratch.points.low[k].halves::<L>());
+            let change = [first.sub(before[0]).add(first_low.sub(low_before[0])), second.sub(before[1]).add(second_low.sub(low_before[1]))];
+            scratch.change[k] = largest(change);
+            scratch.points.y[k] = Octet::of([first, second]);
+            scratch.points.low[k] = Octet::of([first_low, second_low]);
+        }
+    }
+}
+
+/// `middle + (across + up)` in pairs, the first by far the largest.
+#[inline(always)]
+fn shifted<L: Lanes>(middle: (L, L), across: (L, L), up: (L, L)) -> (L, L) {
+    let (offset, error) = two_sums(across.0, up.0);
+    let (high, more) = two_sums(middle.0, offset);
+    let low = more.add(error.add(across.1.add(up.1)).add(middle.1));
+    let sum = high.add(low);
+    (sum, low.sub(sum.sub(high)))
+}
+
+/// The largest magnitude of all lanes.
+#[inline(always)]
+fn largest<L: Lanes>(change: [L; 2]) -> f64 {
+    let change = change[0].abs().max(change[1].abs());
+    let change = change.max(change.swap_halves());
+    change.max(change.swap_pairs()).array()[0]
+}
+
+/// Σ_j column_j x_j in pairs.
+#[inline(always)]
+fn combine<L: Lanes>(columns: &[L; 4], x: [f64; 4], low: [f64; 4]) -> (L, L) {
+    let mut sum = columns[0].mul(L::splat(x[0]));
+    let mut rest = columns[0].mul_add(L::splat(low[0]), columns[0].mul_add(L::splat(x[0]), sum.neg()));
+    for j in 1..4 {
+        let factor = L::splat(x[j]);
+        let product = columns[j].mul(factor);
+        let error = columns[j].mul_add(L::splat(low[j]), columns[j].mul_add(factor, product.neg()));
+        let (next, more) = two_sums(sum, product);
+        (sum, rest) = (next, rest.add(error.add(more)));
+    }
+    (sum, rest)
 }
 
 impl Scratch {
@@ -385,27 +452,21 @@ impl Scratch {
             self.points.used[lane(i, s)] = true;
         }
         self.increment.resize(d, Octet::default());
+        self.increment_low.resize(d, Octet::default());
         for vector in [&mut self.change, &mut self.least, &mut self.rest, &mut self.size] {
             vector.resize(d, 0.0);
         }
         self.total.resize(d, DoubleDouble::ZERO);
     }
 
-    /// Σ h b_j f_j with exact products, mirror images first.
+    /// Σ L_j with what each leaves out, mirror images first.
     #[inline(always)]
     fn sum_exactly<L: Lanes>(&mut self) {
-        let span = self.span.halves::<L>();
-        for ((total, rate), low) in self.total.iter_mut().zip(&self.points.rate).zip(&self.points.rate_low) {
-            let (rate, low) = (rate.halves::<L>(), low.halves::<L>());
-            let product = [span[0].mul(rate[0]), span[1].mul(rate[1])];
-            let rest = |half: usize| span[half].mul_add(low[half], span[half].mul_add(rate[half], product[half].neg()));
-            let (sum, error) = two_sums(product[0], product[1]);
-            let error = error.add(rest(0).add(rest(1)));
-            let (sum, more) = two_sums(sum, sum.swap_halves());
-            let error = error.add(error.swap_halves()).add(more);
-            let (sum, more) = two_sums(sum, sum.swap_pairs());
-            let error = error.add(error.swap_pairs()).add(more);
-            *total = DoubleDouble::sum(sum.array()[0], error.array()[0]);
+        for ((total, increment), low) in self.total.iter_mut().zip(&self.increment).zip(&self.increment_low) {
+            let ([first, second], low) = (increment.halves::<L>(), low.halves::<L>());
+            let (sums, error) = two_sums(first, second);
+            let (high, low) = sum_of(sums, error.add(low[0].add(low[1])));
+            *total = DoubleDouble::sum(high, low);
         }
     }
 
@@ -437,6 +498,11 @@ impl Scratch {
         falls
     }
 
+    /// True where no unknown moved by more than what settles it.
+    fn is_settled(&self) -> bool {
+        self.change.iter().zip(&self.size).all(|(change, size)| *change <= SETTLED * size)
+    }
+
     /// The largest change of the last sweep among the unknowns that tell; not a number where one is.
     fn size_of_change(&self) -> f64 {
         self.change[..self.judged]
@@ -459,6 +525,15 @@ impl Scratch {
             self.rest[k].is_nan() || self.rest[k] > LARGEST_REST * self.size[k].max(floor)
         })
     }
+}
+
+/// The sum of four pairs, and what it leaves out.
+#[inline(always)]
+fn sum_of<L: Lanes>(high: L, low: L) -> (f64, f64) {
+    let (sum, error) = two_sums(high, high.swap_halves());
+    let (sum, more) = two_sums(sum, sum.swap_pairs());
+    let low = low.add(low.swap_halves()).add(error);
+    (sum.array()[0], low.add(low.swap_pairs()).add(more).array()[0])
 }
 
 /// a + b and its error, lane by lane.

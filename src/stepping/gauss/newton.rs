@@ -12,8 +12,8 @@
 //! A. Murua, *Efficient implementation of symplectic implicit Runge–Kutta schemes with simplified Newton iterations*, Numer. Algorithms 78 (2018).
 
 use super::tableau::{Tableau, lane};
+use crate::arithmetic::Complex;
 use crate::arithmetic::eight::Octet;
-use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::stepping::linear::{Entry, Factors};
 use nalgebra::{DMatrix, linalg::Schur};
 
@@ -130,13 +130,6 @@ impl Newton {
             }
         }
         self.correction = solved;
-    }
-
-    /// Σ (L_j + dL_j) of unknown `k`, mirror images first.
-    pub fn total(&self, increment: &Octet, s: usize, d: usize, k: usize) -> DoubleDouble {
-        let whole = |i: usize| DoubleDouble::sum(increment.0[lane(i, s)], self.correction[i * d + k]);
-        let pairs = (0..s / 2).fold(DoubleDouble::ZERO, |sum, i| sum + (whole(i) + whole(s - 1 - i)));
-        if s % 2 == 1 { pairs + whole(s / 2) } else { pairs }
     }
 }
 
