@@ -44,7 +44,7 @@ fn the_shipped_set_is_whole() {
 fn no_answer_is_wrong() {
     // The whole set by one method of each kind; `driftless stress` has them all.
     let methods: Vec<MethodId> = ["dp8", "taylor", "gauss16", "rattle4"].map(method).into();
-    let plan = Stress { methods, effort: 150_000, ..Stress::default() };
+    let plan = Stress { methods, effort: 200_000, ..Stress::default() };
     let lines = stress(&plan, &mut |_| true);
     assert_eq!(lines.len(), plan.cases.len());
     let cells = || lines.iter().flat_map(|line| line.cells.iter().map(move |cell| (line, cell)));

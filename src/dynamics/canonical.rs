@@ -198,9 +198,12 @@ impl<const N: usize, const ACCOUNT: bool> Field for Canonical<N, ACCOUNT> {
         self.stages.rates(ACCOUNT, false, &self.mechanism, points);
     }
 
-    fn exact_rates(&mut self, points: &mut Points) -> bool {
-        self.stages.rates(ACCOUNT, true, &self.mechanism, points);
+    fn has_exact_rates(&self) -> bool {
         true
+    }
+
+    fn exact_rates(&mut self, points: &mut Points) {
+        self.stages.rates(ACCOUNT, true, &self.mechanism, points);
     }
 
     fn jacobian(&mut self, t: Time, y: &[f64], y_by_y: &mut [f64]) -> bool {

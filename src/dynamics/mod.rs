@@ -167,10 +167,13 @@ pub trait Field {
         points.each(|t, y, rate| self.rate(t, y, rate));
     }
 
-    /// Writes y' and what it leaves out at points given with what *they* leave out; false, and nothing written, where the field cannot.
-    fn exact_rates(&mut self, _points: &mut Points) -> bool {
+    /// Whether it has [`Field::exact_rates`].
+    fn has_exact_rates(&self) -> bool {
         false
     }
+
+    /// Writes y' and what it leaves out at points given with what *they* leave out; nothing where the field cannot.
+    fn exact_rates(&mut self, _points: &mut Points) {}
 
     /// Writes dy'/dy at (t, y), row by row (d × d); false, and nothing written, where the field has none.
     fn jacobian(&mut self, _t: Time, _y: &[f64], _jacobian: &mut [f64]) -> bool {

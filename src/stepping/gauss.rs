@@ -16,11 +16,11 @@
 //! * `h b_j` is one double, the same in stages and update; sigma is antisymmetric exactly.  So the method as computed is
 //!   symplectic, for weights a rounding away from Gauss's.  Weights in full in the update alone are a linear drift, as a test below shows.
 //! * sigma and `h b_j` are also the same read backwards, so the method as computed is symmetric in time.
-//! * Sweeps go on until no unknown's change falls any further, and one sweep more.  A tolerance would leave the same rest in every step.
+//! * Sweeps of doubles go on until no unknown's change falls any further, and one sweep more.  A tolerance would leave the same rest in every step.
 //! * State and time are pairs; the update sums exact products in double-double.
 //! * Stages are summed outwards from the step's midpoint `y + Σ L_j / 2` in mirror pairs, so that a step and its reverse round alike.
 //! * Evaluations at the end in pairs of doubles ([`Field::exact_rates`]), with stages and `L_j` that are pairs too.  They go on until the stages
-//!   move by less than 2⁻⁸⁴ of their size, or no less than before: five to nine of them a step.  Increments rounded to doubles would hold the stages
+//!   move by less than 2⁻⁷⁸ of their size, or no less than before: five to eight of them a step.  Increments rounded to doubles would hold the stages
 //!   a little to the side from which the plain sweeps came, and that is the same side in every step, by how the constants happen to be rounded: 2e-21 of the
 //!   energy per second on `gentle` at 2⁻⁵ s, up or down.
 //!
@@ -51,9 +51,11 @@ const NAMES: [&str; 7] = ["gauss4", "gauss6", "gauss8", "gauss10", "gauss12", "g
 const MOST_SWEEPS: usize = 200;
 /// Sweeps in a row without a fall that end the iteration: the one that shows it, and one of grace.
 const IDLE_SWEEPS: usize = 2;
-/// Most evaluations after the last sweep that carry what doubles leave out, and the change over the size of an unknown that ends them.
+/// Most evaluations after the last sweep that carry what doubles leave out.
 const MOST_EXACT_SWEEPS: u32 = 12;
-const SETTLED: f64 = 1.0 / (1_u128 << 84) as f64;
+/// Changes over the sizes of unknowns that end the sweeps before them, and that end them.
+const NEARLY: f64 = 1.0 / (1_u64 << 46) as f64;
+const SETTLED: f64 = 1.0 / (1_u128 << 78) as f64;
 /// Largest last change, relative to its scale, that can be rounding; anything above has not converged.
 const LARGEST_REST: f64 = 1e-10;
 /// Scale of an angle near zero \[rad\]: forces that cancel leave an angle a noise that is not relative to its size.

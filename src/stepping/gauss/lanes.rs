@@ -2,7 +2,7 @@
 
 use super::newton::Newton;
 use super::tableau::{Tableau, lane};
-use super::{Gauss, IDLE_SWEEPS, LARGEST_REST, LEAST_ANGLE, MOST_SWEEPS, NEWTON_STEPS, SETTLED};
+use super::{Gauss, IDLE_SWEEPS, LARGEST_REST, LEAST_ANGLE, MOST_SWEEPS, NEARLY, NEWTON_STEPS, SETTLED};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::{self, Code, Lanes, Portable};
 use crate::arithmetic::sum::{fast_two_sum, fused, two_sum};
@@ -70,7 +70,8 @@ pub(super) fn march<F: Field + ?Sized>(
     for _ in 0..count {
         tally.check(gauss.label(), state.time.hi, gauss.scratch.step)?;
         let Gauss { tableau, scratch, exact, newton, slow, portable, .. } = &mut *gauss;
-        let mut step = Step { tableau, scratch, exact: *exact, newton, slow: *slow, angles: problem.angles() };
+        let exact = if problem.has_exact_rates() { *exact } else { 0 };
+        let mut step = Step { tableau, scratch, exact, newton, slow: *slow, angles: problem.angles() };
         lanes::run(Take { step: &mut step, problem: &mut Of(problem), state, tally }, *portable);
         if gauss.scratch.newton_left == NEWTON_STEPS {
             gauss.follow(problem, state)?;
@@ -93,7 +94,7 @@ pub(super) fn march<F: Field + ?Sized>(
 /// What a step asks of a field.
 trait Rates {
     fn rates(&mut self, points: &mut Points);
-    fn exact_rates(&mut self, points: &mut Points) -> bool;
+    fn exact_rates(&mut self, points: &mut Points);
     fn jacobian(&mut self, t: Time, y: &[f64], jacobian: &mut [f64]) -> bool;
 }
 
@@ -105,8 +106,8 @@ impl<F: Field + ?Sized> Rates for Of<'_, F> {
         self.0.rates(points);
     }
 
-    fn exact_rates(&mut self, points: &mut Points) -> bool {
-        self.0.exact_rates(points)
+    fn exact_rates(&mut self, points: &mut Points) {
+        self.0.exact_rates(points);
     }
 
     fn jacobian(&mut self, t: Time, y: &[f64], jacobian: &mut [f64]) -> bool {
@@ -161,7 +162,9 @@ impl Step<'_> {
         self.scratch.judge();
         self.scratch.points.rate_low.fill(Octet::default());
         self.multiply_low::<L>();
-        self.refine::<L>(problem, state, tally);
+        if self.exact > 0 {
+            self.refine::<L>(problem, state, tally);
+        }
         self.scratch.sum_exactly::<L>();
     }
 
@@ -202,7 +205,7 @@ impl Step<'_> {
             tally.evaluations += self.tableau.nodes.len() as u64;
             self.restage::<L>(state);
             idle = if self.scratch.falls() { 0 } else { idle + 1 };
-            let is_over = idle == IDLE_SWEEPS || self.scratch.change.iter().all(|&change| change == 0.0);
+            let is_over = idle == IDLE_SWEEPS || self.scratch.is_within(if self.exact > 0 { NEARLY } else { 0.0 });
             sizes[sweep % 5] = self.scratch.size_of_change();
             let (now, before) = (sizes[sweep % 5], sizes[(sweep + 1) % 5]);
             // Over four sweeps, because coordinates and momenta take turns, and well above rounding; the first sweeps are still finding their direction.
@@ -226,9 +229,7 @@ impl Step<'_> {
         self.scratch.least.fill(f64::INFINITY);
         let mut idle = 0;
         for sweep in 0..self.exact {
-            if !problem.exact_rates(&mut self.scratch.points) {
-                return;
-            }
+            problem.exact_rates(&mut self.scratch.points);
             self.multiply::<L>();
             self.multiply_low::<L>();
             tally.evaluations += self.tableau.nodes.len() as u64;
@@ -237,7 +238,7 @@ impl Step<'_> {
             }
             self.restage_exactly::<L>(state);
             idle = if self.scratch.falls() { 0 } else { idle + 1 };
-            if idle == IDLE_SWEEPS || self.scratch.is_settled() {
+            if idle == IDLE_SWEEPS || self.scratch.is_within(SETTLED) {
                 return;
             }
         }
@@ -295,10 +296,10 @@ impl Step<'_> {
         self.scratch.least.fill(f64::INFINITY);
         let mut idle = 0;
         for _ in 0..most {
-            if !LOW {
+            if LOW {
+                problem.exact_rates(&mut self.scratch.points);
+            } else {
                 problem.rates(&mut self.scratch.points);
-            } else if !problem.exact_rates(&mut self.scratch.points) {
-                return;
             }
             tally.evaluations += s as u64;
             let (scratch, Some(newton)) = (&mut *self.scratch, self.newton.as_mut()) else { return };
@@ -326,7 +327,7 @@ impl Step<'_> {
                 self.restage::<L>(state)
             }
             idle = if self.scratch.falls() { 0 } else { idle + 1 };
-            let is_over = if LOW { self.scratch.is_settled() } else { self.scratch.change.iter().all(|&change| change == 0.0) };
+            let is_over = self.scratch.is_within(if LOW { SETTLED } else { 0.0 });
             if idle == IDLE_SWEEPS || is_over || self.scratch.size_of_change().is_nan() {
                 return;
             }
@@ -498,9 +499,10 @@ impl Scratch {
         falls
     }
 
-    /// True where no unknown moved by more than what settles it.
-    fn is_settled(&self) -> bool {
-        self.change.iter().zip(&self.size).all(|(change, size)| *change <= SETTLED * size)
+    /// True where no unknown moved by more than this share of its size.
+    fn is_within(&self, share: f64) -> bool {
+        let size = |stage: &Octet| stage.0.iter().fold(0.0, |size: f64, y| y.abs().max(size));
+        self.change.iter().zip(&self.points.y).all(|(&change, stage)| change == 0.0 || change <= share * size(stage))
     }
 
     /// The largest change of the last sweep among the unknowns that tell; not a number where one is.
