@@ -20,7 +20,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 /// Rounds of each candidate.
-const ROUNDS: usize = 15;
+const ROUNDS: usize = 25;
 
 struct Case {
     scene: &'static str,
@@ -30,12 +30,12 @@ struct Case {
 }
 
 const CASES: [Case; 6] = [
-    Case { scene: "free", method: MethodId::Dop853, until: 2000.0, every: 0.02 },
-    Case { scene: "free", method: MethodId::Dop853, until: 5000.0, every: 0.1 },
-    Case { scene: "free", method: MethodId::Taylor, until: 4000.0, every: 0.02 },
-    Case { scene: "free", method: MethodId::Taylor, until: 30_000.0, every: 1.0 },
-    Case { scene: "motor", method: MethodId::Dop853, until: 2000.0, every: 0.02 },
-    Case { scene: "gentle", method: MethodId::Gauss(8), until: 2000.0, every: 0.1 },
+    Case { scene: "free", method: MethodId::Dop853, until: 200.0, every: 0.02 },
+    Case { scene: "free", method: MethodId::Dop853, until: 1000.0, every: 0.1 },
+    Case { scene: "free", method: MethodId::Taylor, until: 1600.0, every: 0.02 },
+    Case { scene: "free", method: MethodId::Taylor, until: 10_000.0, every: 1.0 },
+    Case { scene: "motor", method: MethodId::Dop853, until: 200.0, every: 0.02 },
+    Case { scene: "gentle", method: MethodId::Gauss(8), until: 400.0, every: 0.1 },
 ];
 
 fn path(scene: &str) -> PathBuf {
