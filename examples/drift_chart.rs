@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         series.push(DriftSeries { method: method.into(), name: format!("{method}, {words}"), time, error });
     }
     let chart = EnergyDrift {
-        title: format!("Energy drift over {until} s: gauss16 stays at rounding"),
+        title: format!("Energy drift over {until} s: gauss16 stays below rounding"),
         caption: vec!["scene free, released from π/2".into(), "largest |Δ*E*| so far over 2*mgl*, evaluated in double-double".into()],
         quantity: "energy".into(),
         series,

@@ -552,16 +552,16 @@ fn ensemble(title: &str, scene: &Scene, scale: f64, method: &Gauss, until: f64, 
         let (n, mean) = (values.len() as f64, mean_of(values));
         (values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / (n - 1.0) / n).sqrt()
     };
-    let rms_of = |values: &mut dyn Iterator<Item = f64>| mean_of(&values.map(|error| error * error).collect::<Vec<_>>()).sqrt();
+    let rms_of = |values: &[f64]| (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt();
     // Over every so many runs, from one of the first on.
     let exponent = |from: usize, every: usize| {
-        let rms = |errors: &Vec<f64>| rms_of(&mut errors.iter().copied().skip(from).step_by(every));
+        let rms = |errors: &Vec<f64>| rms_of(&errors.iter().copied().skip(from).step_by(every).collect::<Vec<_>>());
         slope(&marks.iter().zip(&errors).map(|(mark, errors)| (mark.ln(), rms(errors).ln())).collect::<Vec<_>>())
     };
     let parts: Vec<f64> = (0..PARTS).map(|part| exponent(part, PARTS)).collect();
     let mut walk = Walk { rms: 0.0, bias: 0.0, exponent: (exponent(0, 1), scatter_of(&parts)) };
     for (mark, errors) in marks.iter().zip(&errors) {
-        let (rms, mean, scatter) = (rms_of(&mut errors.iter().copied()), mean_of(errors), scatter_of(errors));
+        let (rms, mean, scatter) = (rms_of(errors), mean_of(errors), scatter_of(errors));
         println!("{title} {mark:7} s: rms {rms:.2e}, mean {mean:+.1e} ± {scatter:.1e}");
         (walk.rms, walk.bias) = (rms, mean / scatter);
     }

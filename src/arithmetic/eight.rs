@@ -20,6 +20,11 @@ impl Octet {
         Self([value; LANES])
     }
 
+    /// The largest magnitude of all lanes that are numbers.
+    pub fn size(&self) -> f64 {
+        self.0.iter().fold(0.0, |size, lane| lane.abs().max(size))
+    }
+
     /// The two halves.
     #[inline(always)]
     pub fn halves<L: Lanes>(&self) -> [L; 2] {

@@ -53,6 +53,21 @@ pub trait Lanes: Copy + Debug + 'static {
     fn are_within(self, bound: f64) -> bool;
     /// The negatives, zeros included.
     fn neg(self) -> Self;
+
+    /// `self + other` exactly: the sum and its error, as [`sum::two_sum`].
+    #[inline(always)]
+    fn two_sum(self, other: Self) -> (Self, Self) {
+        let sum = self.add(other);
+        let part = sum.sub(self);
+        (sum, self.sub(sum.sub(part)).add(other.sub(part)))
+    }
+
+    /// The same where `|self| >= |other|`, as [`sum::fast_two_sum`].
+    #[inline(always)]
+    fn fast_two_sum(self, other: Self) -> (Self, Self) {
+        let sum = self.add(other);
+        (sum, other.sub(sum.sub(self)))
+    }
 }
 
 /// Plain code, with a software fused multiply-add where the processor lacks one.

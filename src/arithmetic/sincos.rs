@@ -166,8 +166,8 @@ type Pair<L> = [L; 2];
 
 #[inline(always)]
 fn quick<L: Lanes>(high: L, low: L) -> Pair<L> {
-    let sum = high.add(low);
-    [sum, low.sub(sum.sub(high))]
+    let (high, low) = high.fast_two_sum(low);
+    [high, low]
 }
 
 /// a + b where |a| >= |b|.

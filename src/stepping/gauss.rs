@@ -16,7 +16,8 @@
 //! * `h b_j` is one double, the same in stages and update; sigma is antisymmetric exactly.  So the method as computed is
 //!   symplectic, for weights a rounding away from Gauss's.  Weights in full in the update alone are a linear drift, as a test below shows.
 //! * sigma and `h b_j` are also the same read backwards, so the method as computed is symmetric in time.
-//! * Sweeps of doubles go on until no unknown's change falls any further, and one sweep more.  A tolerance would leave the same rest in every step.
+//! * Sweeps of doubles that no pairs follow go on until no unknown's change falls any further, and one sweep more.  A tolerance would leave the same rest
+//!   in every step.
 //! * State and time are pairs; the update sums exact products in double-double.
 //! * Stages are summed outwards from the step's midpoint `y + Σ L_j / 2` in mirror pairs, so that a step and its reverse round alike.
 //! * Evaluations at the end in pairs of doubles ([`Field::exact_rates`]), with stages and `L_j` that are pairs too.  They go on until the stages
@@ -33,6 +34,7 @@
 
 mod lanes;
 mod newton;
+mod sums;
 mod tableau;
 
 use super::{Cause, Method, Reached, StepError, Tally, Watch};
@@ -53,7 +55,7 @@ const MOST_SWEEPS: usize = 200;
 const IDLE_SWEEPS: usize = 2;
 /// Most evaluations after the last sweep that carry what doubles leave out.
 const MOST_EXACT_SWEEPS: u32 = 12;
-/// Changes over the sizes of unknowns that end the sweeps before them, and that end them.
+/// Changes over the sizes of unknowns at which sweeps give way to these, and at which these end.
 const NEARLY: f64 = 1.0 / (1_u64 << 46) as f64;
 const SETTLED: f64 = 1.0 / (1_u128 << 78) as f64;
 /// Largest last change, relative to its scale, that can be rounding; anything above has not converged.

@@ -1,11 +1,12 @@
 //! The steps themselves, a stage a lane.
 
 use super::newton::Newton;
+use super::sums::{combine, largest, shifted, sum_of};
 use super::tableau::{Tableau, lane};
 use super::{Gauss, IDLE_SWEEPS, LARGEST_REST, LEAST_ANGLE, MOST_SWEEPS, NEARLY, NEWTON_STEPS, SETTLED};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::{self, Code, Lanes, Portable};
-use crate::arithmetic::sum::{fast_two_sum, fused, two_sum};
+use crate::arithmetic::sum::{fused, two_sum};
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Field, Points, State, Time};
 use crate::stepping::{Reached, StepError, Tally, Watch};
@@ -316,9 +317,9 @@ impl Step<'_> {
             for k in 0..d {
                 for i in 0..s {
                     let (at, correction) = (lane(i, s), newton.correction[i * d + k]);
-                    let (increment, low) = (&mut scratch.increment[k].0[at], &mut scratch.increment_low[k].0[at]);
-                    let (sum, rest) = two_sum(*increment, correction);
-                    (*increment, *low) = fast_two_sum(sum, rest + *low);
+                    let (hi, lo) = (&mut scratch.increment[k].0[at], &mut scratch.increment_low[k].0[at]);
+                    let increment = DoubleDouble { hi: *hi, lo: *lo } + correction;
+                    (*hi, *lo) = (increment.hi, increment.lo);
                 }
             }
             if LOW {
@@ -387,7 +388,7 @@ impl Step<'_> {
         let (even, odd) = (self.tableau.even.map(L::of), self.tableau.odd.map(L::of));
         for k in 0..state.y.len() {
             let ([first, second], [first_low, second_low]) = (scratch.increment[k].halves::<L>(), scratch.increment_low[k].halves::<L>());
-            let ((sums, sums_low), (differences, differences_low)) = (two_sums(first, second), two_sums(first, second.neg()));
+            let ((sums, sums_low), (differences, differences_low)) = (first.two_sum(second), first.two_sum(second.neg()));
             let (sums_low, differences_low) = (sums_low.add(first_low.add(second_low)), differences_low.add(first_low.sub(second_low)));
             let (up, up_low) = combine(&even, sums.array(), sums_low.array());
             let (across, across_low) = combine(&odd, differences.array(), differences_low.array());
@@ -404,39 +405,6 @@ impl Step<'_> {
             scratch.points.low[k] = Octet::of([first_low, second_low]);
         }
     }
-}
-
-/// `middle + (across + up)` in pairs, the first by far the largest.
-#[inline(always)]
-fn shifted<L: Lanes>(middle: (L, L), across: (L, L), up: (L, L)) -> (L, L) {
-    let (offset, error) = two_sums(across.0, up.0);
-    let (high, more) = two_sums(middle.0, offset);
-    let low = more.add(error.add(across.1.add(up.1)).add(middle.1));
-    let sum = high.add(low);
-    (sum, low.sub(sum.sub(high)))
-}
-
-/// The largest magnitude of all lanes.
-#[inline(always)]
-fn largest<L: Lanes>(change: [L; 2]) -> f64 {
-    let change = change[0].abs().max(change[1].abs());
-    let change = change.max(change.swap_halves());
-    change.max(change.swap_pairs()).array()[0]
-}
-
-/// Σ_j column_j x_j in pairs.
-#[inline(always)]
-fn combine<L: Lanes>(columns: &[L; 4], x: [f64; 4], low: [f64; 4]) -> (L, L) {
-    let mut sum = columns[0].mul(L::splat(x[0]));
-    let mut rest = columns[0].mul_add(L::splat(low[0]), columns[0].mul_add(L::splat(x[0]), sum.neg()));
-    for j in 1..4 {
-        let factor = L::splat(x[j]);
-        let product = columns[j].mul(factor);
-        let error = columns[j].mul_add(L::splat(low[j]), columns[j].mul_add(factor, product.neg()));
-        let (next, more) = two_sums(sum, product);
-        (sum, rest) = (next, rest.add(error.add(more)));
-    }
-    (sum, rest)
 }
 
 impl Scratch {
@@ -465,7 +433,7 @@ impl Scratch {
     fn sum_exactly<L: Lanes>(&mut self) {
         for ((total, increment), low) in self.total.iter_mut().zip(&self.increment).zip(&self.increment_low) {
             let ([first, second], low) = (increment.halves::<L>(), low.halves::<L>());
-            let (sums, error) = two_sums(first, second);
+            let (sums, error) = first.two_sum(second);
             let (high, low) = sum_of(sums, error.add(low[0].add(low[1])));
             *total = DoubleDouble::sum(high, low);
         }
@@ -501,8 +469,7 @@ impl Scratch {
 
     /// True where no unknown moved by more than this share of its size.
     fn is_within(&self, share: f64) -> bool {
-        let size = |stage: &Octet| stage.0.iter().fold(0.0, |size: f64, y| y.abs().max(size));
-        self.change.iter().zip(&self.points.y).all(|(&change, stage)| change == 0.0 || change <= share * size(stage))
+        self.change.iter().zip(&self.points.y).all(|(&change, stage)| change == 0.0 || change <= share * stage.size())
     }
 
     /// The largest change of the last sweep among the unknowns that tell; not a number where one is.
@@ -516,7 +483,7 @@ impl Scratch {
     fn judge(&mut self) {
         self.rest.copy_from_slice(&self.change);
         for (size, stage) in self.size.iter_mut().zip(&self.points.y) {
-            *size = stage.0.iter().fold(0.0, |size, y| y.abs().max(size));
+            *size = stage.size();
         }
     }
 
@@ -527,21 +494,4 @@ impl Scratch {
             self.rest[k].is_nan() || self.rest[k] > LARGEST_REST * self.size[k].max(floor)
         })
     }
-}
-
-/// The sum of four pairs, and what it leaves out.
-#[inline(always)]
-fn sum_of<L: Lanes>(high: L, low: L) -> (f64, f64) {
-    let (sum, error) = two_sums(high, high.swap_halves());
-    let (sum, more) = two_sums(sum, sum.swap_pairs());
-    let low = low.add(low.swap_halves()).add(error);
-    (sum.array()[0], low.add(low.swap_pairs()).add(more).array()[0])
-}
-
-/// a + b and its error, lane by lane.
-#[inline(always)]
-fn two_sums<L: Lanes>(a: L, b: L) -> (L, L) {
-    let sum = a.add(b);
-    let part = sum.sub(a);
-    (sum, a.sub(sum.sub(part)).add(b.sub(part)))
 }

@@ -75,11 +75,9 @@ pub fn over_first<L: Lanes>(x: L, k: usize) -> L {
 /// `[high, low] + increment + rest` as pairs: a two-sum, then the low parts, then a quick two-sum.
 #[inline(always)]
 pub fn add_to<L: Lanes>([high, low]: [L; 2], increment: L, rest: L) -> [L; 2] {
-    let sum = high.add(increment);
-    let second = sum.sub(high);
-    let error = high.sub(sum.sub(second)).add(increment.sub(second)).add(low.add(rest));
-    let total = sum.add(error);
-    [total, error.sub(total.sub(sum))]
+    let (sum, error) = high.two_sum(increment);
+    let (high, low) = sum.fast_two_sum(error.add(low.add(rest)));
+    [high, low]
 }
 
 /// Sums within pairs, in both lanes of each.

@@ -29,16 +29,15 @@ impl<L: Lanes> Wide<L> {
     /// `hi + lo` where `hi` is the larger, brought into form.
     #[inline(always)]
     fn quick(hi: L, lo: L) -> Self {
-        let sum = hi.add(lo);
-        Self { hi: sum, lo: lo.sub(sum.sub(hi)) }
+        let (hi, lo) = hi.fast_two_sum(lo);
+        Self { hi, lo }
     }
 
     /// `a + b` exactly.
     #[inline(always)]
     fn sum(a: L, b: L) -> Self {
-        let sum = a.add(b);
-        let second = sum.sub(a);
-        Self { hi: sum, lo: a.sub(sum.sub(second)).add(b.sub(second)) }
+        let (hi, lo) = a.two_sum(b);
+        Self { hi, lo }
     }
 
     /// Sum.
