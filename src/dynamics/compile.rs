@@ -224,7 +224,7 @@ impl Mechanism {
                 let offset = normal.dot(Complex::new(wall.through[0], wall.through[1]));
                 let site = forest.site(&Place { bar: Some(wall.bar), point: wall.point });
                 let row = row::line_row(&wall.name, &site, normal, offset, None, bodies.len());
-                Contact { row, point: site.point, normal, restitution: wall.restitution }
+                Contact { row, point: site.point, normal, restitution: wall.restitution, length: 1.0, force: 1.0 }
             })
             .collect();
         let roots = forest.roots();
@@ -255,7 +255,9 @@ impl Mechanism {
             return Err(CompileError::TooMany(recursion.ways.rows()));
         }
         mechanism.check_mass(scene)?;
-        mechanism.energy_scale = mechanism.scale_of_energy(&mechanism.start(scene));
+        let start = mechanism.start(scene);
+        mechanism.energy_scale = mechanism.scale_of_energy(&start);
+        mechanism.scale_contacts(&start);
         Ok(mechanism)
     }
 

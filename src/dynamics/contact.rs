@@ -9,13 +9,16 @@
 //! Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996), chapter 5; the set is found by adding the point that is
 //! pressed hardest and dropping those that would be pulled (C. Lawson, R. Hanson, *Solving Least Squares Problems* (1974), chapter 23).
 
+pub mod scale;
+
 use super::kernel::{Kernel, dot};
 use super::{Mechanism, Time};
 use nalgebra::{DMatrix, DVector};
 
-/// Height of a rebound \[m\] below which a pressed point stays: ten times the least gap the search for impacts tells from touching.
+/// Height of a rebound over the length of the contact below which a pressed point stays: ten times the least gap the search for impacts tells from
+/// touching.
 pub const REST_HEIGHT: f64 = 1e-11;
-/// Contact force over the energy scale \[1/m\] below which a point is not pressed; rounding makes forces of this size.
+/// Contact force over the force of the contact below which a point is not pressed; rounding makes forces of this size.
 const LEAST_FORCE: f64 = 4e-12;
 /// |G| over the levers of the point below which it stands at a dead centre: there its wall has no hold on it, and a row would be singular.
 const DEAD_CENTRE: f64 = 1e-5;
@@ -52,12 +55,13 @@ impl Mechanism {
         }
         let schur = DMatrix::from_fn(size, size, |r, s| dot(part(&kernel.jacobian, r, n), part(&kernel.lifted, s, n)));
         let free = DVector::from_fn(size, |r, _| dot(part(&kernel.jacobian, r, n), &kernel.load) + kernel.rows[r].convective);
-        let least = LEAST_FORCE * self.energy_scale;
+        let contact = |r: usize| &self.contacts[touching[r - motors]];
+        let least = |r: usize| LEAST_FORCE * contact(r).force;
         let mut set: Vec<usize> = (0..motors).collect();
         // Every round adds or drops one point; more rounds than this would go in a circle.
         for _ in 0..4 * size + 4 {
             let multiplier = solve(&schur, &set, &free)?;
-            let pulled = (set.iter().copied().filter(|&r| r >= motors && -multiplier[r] < least))
+            let pulled = (set.iter().copied().filter(|&r| r >= motors && -multiplier[r] < least(r)))
                 .max_by(|&a, &b| multiplier[a].total_cmp(&multiplier[b]));
             if let Some(pulled) = pulled {
                 set.retain(|&r| r != pulled);
@@ -66,20 +70,20 @@ impl Mechanism {
             let acceleration = &free - &schur * &multiplier;
             let mut hardest: Option<(usize, f64)> = None;
             for r in (motors..size).filter(|r| !set.contains(r)) {
-                let terms = &self.contacts[touching[r - motors]].point.terms;
+                let terms = &contact(r).point.terms;
                 let levers: f64 = terms.iter().map(|term| term.1.norm_squared()).sum();
                 let jacobian = part(&kernel.jacobian, r, n);
                 let inward = -acceleration[r];
                 let speed = kernel.row_rate(r, omega);
                 let dead = dot(jacobian, jacobian) < DEAD_CENTRE * DEAD_CENTRE * levers;
-                if dead || inward <= 0.0 || speed * speed > 2.0 * REST_HEIGHT * inward {
+                if dead || inward <= 0.0 || speed * speed > 2.0 * REST_HEIGHT * contact(r).length * inward {
                     continue;
                 }
                 // What the rows in force leave of the point's freedom to give way.
                 let freedom = schur[(r, r)] - schur.column(r).dot(&solve(&schur, &set, &schur.column(r).into_owned())?);
                 if freedom > 1e-12 * schur[(r, r)] {
                     let force = inward / freedom;
-                    if force > least && hardest.is_none_or(|(_, most)| force > most) {
+                    if force > least(r) && hardest.is_none_or(|(_, most)| force > most) {
                         hardest = Some((r, force));
                     }
                 } else if inward > 1e-9 * (free[r].abs() + (free[r] - acceleration[r]).abs()) {

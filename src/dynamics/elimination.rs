@@ -187,7 +187,7 @@ impl<const N: usize> Field for Elimination<N> {
         }
         ties.feet(y, &mut kernel.z);
         for (gap, contact) in gaps.iter_mut().zip(&self.mechanism.contacts) {
-            *gap = contact.row.gap(&kernel.z);
+            *gap = contact.gap(&kernel.z);
         }
     }
 }

@@ -25,6 +25,22 @@ pub struct Contact {
     pub normal: Complex<f64>,
     /// Restitution e.
     pub restitution: f64,
+    /// What gaps are divided by \[m\], a power of two: see [`contact::scale`](super::contact::scale).
+    pub length: f64,
+    /// What forces of the wall are divided by \[N\], a power of two.
+    pub force: f64,
+}
+
+impl Contact {
+    /// The gap over the length of the contact: the event function of a point that may meet its wall.
+    pub fn gap(&self, z: &[Complex<f64>]) -> f64 {
+        self.row.gap(z) / self.length
+    }
+
+    /// The force of the wall over the force of the contact: the event function of a point that is held.
+    pub fn pressure(&self, multiplier: f64) -> f64 {
+        -multiplier / self.force
+    }
 }
 
 /// What an impact did.

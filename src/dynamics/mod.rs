@@ -193,7 +193,7 @@ pub trait Field {
         0
     }
 
-    /// Writes the event functions (gaps \[m\], or forces over the energy scale \[1/m\]) at (t, y): an event is a passage from positive to negative.
+    /// Writes the event functions (gaps over the length, or forces over the force of their contact) at (t, y): an event is a passage from positive to negative.
     fn gaps(&mut self, _t: Time, _y: &[f64], _gaps: &mut [f64]) {}
 }
 

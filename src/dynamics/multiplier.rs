@@ -111,14 +111,14 @@ impl<const N: usize, const ACCOUNT: bool> Field for Multiplier<N, ACCOUNT> {
         let n = size::<N>(mechanism.coordinates());
         self.kernel.face::<N>(mechanism, &y[..n]);
         for (gap, contact) in gaps.iter_mut().zip(&mechanism.contacts) {
-            *gap = contact.row.gap(&self.kernel.z);
+            *gap = contact.gap(&self.kernel.z);
         }
         if !mechanism.held.is_empty() {
             self.kernel.accelerate::<N>(mechanism, t, &y[..n], &y[n..2 * n], Bias::default());
         }
         // What is held ends where the wall would have to pull.
         for (&contact, multiplier) in mechanism.held.iter().zip(&self.kernel.multiplier[mechanism.standing_rows()..]) {
-            gaps[contact] = -multiplier / mechanism.energy_scale;
+            gaps[contact] = mechanism.contacts[contact].pressure(*multiplier);
         }
     }
 }

@@ -36,7 +36,8 @@ pub use self::coefficient::Coefficient;
 use self::polynomial::{Fractions, UNROLLED, convolve, copy, copy_vectors, width, zeros};
 use self::rows::RowSeries;
 use self::spring::SpringSeries;
-use super::row::{Measure, Row};
+use super::impact::Contact;
+use super::row::Measure;
 use super::schur::Weakest;
 use super::ties::Ties;
 use super::tree::{self, size};
@@ -165,16 +166,17 @@ impl<T: Coefficient> Series<T> {
         T::orders(self, mechanism, first.order.min(self.order));
     }
 
-    /// Powers 0, 1, … of the gap of a wall \[m/s^m\], to that of the unit vectors.
-    pub fn gap(&self, row: &Row, powers: &mut Vec<f64>) {
+    /// Powers 0, 1, … of the gap of a wall over the length of its contact \[1/s^m\], to that of the unit vectors.
+    pub fn gap(&self, contact: &Contact, powers: &mut Vec<f64>) {
         powers.clear();
         // Walls are of the ground, so that the gap is linear.
-        let Measure::Place(place) = &row.measure else { return };
+        let Measure::Place(place) = &contact.row.measure else { return };
         let elements = self.z.chunks_exact(self.elements.max(1));
         powers.extend(elements.map(|z| place.linear.iter().fold(T::ZERO, |sum, &(k, g)| sum + Complex::of(g).dot(z[k])).value()));
         if let Some(first) = powers.first_mut() {
             *first += place.constant;
         }
+        powers.iter_mut().for_each(|power| *power /= contact.length);
     }
 
     /// The row in force nearest to being left out at the start.

@@ -69,7 +69,7 @@ pub struct Impact {
     pub omega: Vec<f64>,
 }
 
-/// A gap below which a point is on its wall \[m\].
+/// A gap, over the length of its contact, below which a point is on its wall.
 const TOUCHING: f64 = 1e-12;
 
 /// Looks at the start of a scene.
@@ -112,7 +112,8 @@ fn contacts(mechanism: &Mechanism, start: &Motion, phi: &[f64], mut omega: Vec<f
         let mut jacobian = vec![0.0; phi.len()];
         contact.row.differentiate(start.time, Posture { phi, z: &kernel.z, omega: &omega }, &mut jacobian);
         let approach = crate::dynamics::kernel::dot(&jacobian, &omega);
-        let jump = if gap <= TOUCHING && approach < 0.0 { mechanism.strike(number, start.time, phi, &omega) } else { None };
+        let jump =
+            if gap <= TOUCHING * contact.length && approach < 0.0 { mechanism.strike(number, start.time, phi, &omega) } else { None };
         let impact = jump.map(|jump| {
             omega.clone_from(&jump.omega);
             let energy_lost = jump.motor_work - jump.energy_change;

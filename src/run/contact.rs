@@ -53,7 +53,7 @@ const EVENTS_MOST: usize = 10_000;
 const HOLDS_MOST: usize = 1000;
 /// Rounds of impacts at one moment after which what is left of the approach is left to the holds.
 const ROUNDS: usize = 100;
-/// A gap that counts as touching \[m\], with what the search for impacts leaves of it.
+/// A gap that counts as touching, over the length of its contact, with what the search for impacts leaves of it.
 const TOUCH: f64 = 2e-12;
 
 /// A contact that is held.
@@ -236,13 +236,13 @@ impl Course {
             let mut quiet = true;
             for contact in 0..self.free.contacts.len() {
                 let motion = self.motion();
-                let Contact { row, point, normal, .. } = &self.free.contacts[contact];
+                let Contact { point, normal, .. } = &self.free.contacts[contact];
                 let (z, _, omega) = posture(&motion);
                 let fastest = point.terms.iter().fold(0.0, |most: f64, &(k, gamma)| most.max(gamma.norm_squared().sqrt() * omega[k].abs()));
                 let approach = normal.dot(point.velocity(&z, &omega));
                 let held = self.mechanism.held.contains(&contact);
                 // Rounding leaves this much of a velocity that an impact took off.
-                if !held && row.gap(&z) <= TOUCH && approach < -1e-13 * fastest {
+                if !held && self.free.contacts[contact].gap(&z) <= TOUCH && approach < -1e-13 * fastest {
                     self.strike(contact, outcome)?;
                     quiet = false;
                 }
@@ -300,7 +300,7 @@ impl Course {
         let motion = self.motion();
         let (z, phi, omega) = posture(&motion);
         let touching: Vec<usize> = (0..self.free.contacts.len())
-            .filter(|&contact| Some(contact) != released && self.free.contacts[contact].row.gap(&z) <= TOUCH)
+            .filter(|&contact| Some(contact) != released && self.free.contacts[contact].gap(&z) <= TOUCH)
             .collect();
         if touching.is_empty() && self.mechanism.held.is_empty() {
             return Ok(());

@@ -314,18 +314,18 @@ impl<T: Coefficient> Taylor<T> {
     }
 }
 
-/// Powers of an event function along the series: the gap of a wall \[m\], or the force on a point held there over the energy scale \[1/m\].
+/// Powers of an event function along the series: the gap of a wall over its contact's length, or the force on a point held there over its contact's force.
 fn trace<T: Coefficient, P: Form + ?Sized>(problem: &P, expansion: &Expansion<T>, contact: usize, powers: &mut Vec<f64>) {
     let mechanism = problem.mechanism();
     let series = expansion.series();
     match mechanism.held.iter().position(|&held| held == contact) {
-        None => series.gap(&mechanism.contacts[contact].row, powers),
+        None => series.gap(&mechanism.contacts[contact], powers),
         Some(place) => {
             // The rows of the contacts that are held are the last ones.
             let from_end = mechanism.held.len() - place;
             let force = |m| series.multipliers(m).iter().nth_back(from_end - 1).map_or(f64::NAN, |multiplier| -multiplier.value());
             powers.clear();
-            powers.extend((0..series.order()).map(|m| force(m) / mechanism.energy_scale));
+            powers.extend((0..series.order()).map(|m| force(m) / mechanism.contacts[contact].force));
         }
     }
 }
