@@ -6,11 +6,12 @@
 //!
 //! Unknowns: u (f), u' (f), work of motors, dampers and applied forces \[J\].  The rows hold exactly, whatever the method.
 
+use super::gap::turning;
 use super::jacobian::Jacobian;
 use super::kernel::{Bias, Kernel};
 use super::tree::{self, size};
-use super::{Coordinates, Field, Form, Glance, Mechanism, Motion, State, Time};
-use crate::arithmetic::DoubleDouble;
+use super::{Along, Coordinates, Field, Form, Glance, Mechanism, Motion, State, Time};
+use crate::arithmetic::{Complex, DoubleDouble};
 use std::sync::Arc;
 
 /// Equations in the independent coordinates, for `N` bodies (any number where `N` is 0).
@@ -189,6 +190,36 @@ impl<const N: usize> Field for Elimination<N> {
         for (gap, contact) in gaps.iter_mut().zip(&self.mechanism.contacts) {
             *gap = contact.gap(&kernel.z);
         }
+    }
+
+    fn watched(&self) -> usize {
+        self.mechanism.ties.count()
+    }
+
+    fn gap(&self, event: usize, along: Along) -> Option<[f64; 2]> {
+        let Along { time, pace, y, slope } = along;
+        let ties = &self.mechanism.ties;
+        self.mechanism.contacts[event].row.gap_along(|k| {
+            let tie = &ties.bodies[k];
+            if k < ties.angles {
+                let placed = tie.place(time, &y[..ties.count()]);
+                return turning(placed.unit, pace * placed.rate + tie.base.map_or(0.0, |base| slope[base]));
+            }
+            tie.base.map_or([Complex::ZERO; 2], |x| [Complex::new(y[x], y[x + 1]), Complex::new(slope[x], slope[x + 1])])
+        })
+    }
+
+    fn gap_bounds(&self, event: usize, t: f64, pace: f64, first: &[f64], second: &[f64]) -> [f64; 2] {
+        let (ties, row) = (&self.mechanism.ties, &self.mechanism.contacts[event].row);
+        let most = |k: usize| {
+            let tie = &ties.bodies[k];
+            let start = tie.base.map_or([0.0; 2], |base| [second[base], first[base]]);
+            tie.laws.iter().fold(start, |[second, first], (_, law)| {
+                let [rate, acceleration] = law.bounds(t);
+                [second + pace * pace * acceleration, first + pace * rate]
+            })
+        };
+        [row.gap_bend(most), row.gap_size()]
     }
 }
 

@@ -41,6 +41,7 @@ pub mod energy;
 pub mod envelope;
 pub mod force;
 pub mod forest;
+pub mod gap;
 pub mod impact;
 pub mod jacobian;
 pub mod kernel;
@@ -195,6 +196,34 @@ pub trait Field {
 
     /// Writes the event functions (gaps over the length, or forces over the force of their contact) at (t, y): an event is a passage from positive to negative.
     fn gaps(&mut self, _t: Time, _y: &[f64], _gaps: &mut [f64]) {}
+
+    /// How many of the first unknowns the event functions depend on.
+    fn watched(&self) -> usize {
+        self.dimension()
+    }
+
+    /// An event function and its slope along a motion; `None` for one of which only the value is known.
+    fn gap(&self, _event: usize, _along: Along) -> Option<[f64; 2]> {
+        None
+    }
+
+    /// Bounds of its second derivative, and of the terms it is the sum of, up to the time `t` \[s\], where derivatives of the unknowns are at most these.
+    fn gap_bounds(&self, _event: usize, _t: f64, _pace: f64, _first: &[f64], _second: &[f64]) -> [f64; 2] {
+        [f64::INFINITY; 2]
+    }
+}
+
+/// A moment of a motion that goes by something else than time: the share of a step.
+#[derive(Clone, Copy, Debug)]
+pub struct Along<'a> {
+    /// Time.
+    pub time: Time,
+    /// How fast time goes by \[s\].
+    pub pace: f64,
+    /// Unknowns, as many as are [watched](Field::watched) at least.
+    pub y: &'a [f64],
+    /// Their derivatives.
+    pub slope: &'a [f64],
 }
 
 /// What the first unknowns of a form are; their rates follow, then the work of motors and dampers where there are any.

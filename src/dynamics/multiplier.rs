@@ -3,12 +3,13 @@
 //! Unknowns: coordinates (n), rates (n) and, where the scene has rows or forces that do work, the work of motors, dampers and applied forces and
 //! the energy the stabilizer puts in \[J\].  With `ACCOUNT = false` neither rows nor accounts exist in the code.
 
+use super::gap::turning;
 use super::jacobian::Jacobian;
 use super::kernel::{Bias, Kernel};
 use super::stiffness::Stiffness;
 use super::tree::size;
-use super::{Coordinates, Field, Form, Glance, Mechanism, Motion, State, Time};
-use crate::arithmetic::DoubleDouble;
+use super::{Along, Coordinates, Field, Form, Glance, Mechanism, Motion, State, Time};
+use crate::arithmetic::{Complex, DoubleDouble};
 use std::sync::Arc;
 
 /// Equations in angles and rates, for `N` bodies (any number where `N` is 0).
@@ -120,6 +121,29 @@ impl<const N: usize, const ACCOUNT: bool> Field for Multiplier<N, ACCOUNT> {
         for (&contact, multiplier) in mechanism.held.iter().zip(&self.kernel.multiplier[mechanism.standing_rows()..]) {
             gaps[contact] = mechanism.contacts[contact].pressure(*multiplier);
         }
+    }
+
+    fn watched(&self) -> usize {
+        if self.mechanism.held.is_empty() { self.mechanism.coordinates() } else { self.dimension() }
+    }
+
+    fn gap(&self, event: usize, along: Along) -> Option<[f64; 2]> {
+        let Along { y, slope, .. } = along;
+        let bodies = self.mechanism.bodies.len();
+        let of = |k: usize| match k < bodies {
+            true => turning(Complex::unit(y[k]), slope[k]),
+            false => [Complex::new(y[k], y[k + 1]), Complex::new(slope[k], slope[k + 1])],
+        };
+        if self.mechanism.held.contains(&event) { None } else { self.mechanism.contacts[event].row.gap_along(of) }
+    }
+
+    fn gap_bounds(&self, event: usize, _t: f64, _pace: f64, first: &[f64], second: &[f64]) -> [f64; 2] {
+        // Nothing bounds the force on a point that is held.
+        if self.mechanism.held.contains(&event) {
+            return [f64::INFINITY; 2];
+        }
+        let row = &self.mechanism.contacts[event].row;
+        [row.gap_bend(|k| [second[k], first[k]]), row.gap_size()]
     }
 }
 

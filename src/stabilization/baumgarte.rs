@@ -11,7 +11,7 @@
 
 use crate::dynamics::kernel::Bias;
 use crate::dynamics::multiplier::Multiplier;
-use crate::dynamics::{Field, Form, Mechanism, Motion, State, Time};
+use crate::dynamics::{Along, Field, Form, Mechanism, Motion, State, Time};
 
 /// The multiplier form with a Baumgarte term in every row.
 #[derive(Clone, Debug)]
@@ -60,6 +60,18 @@ impl<const N: usize> Field for Baumgarte<N> {
 
     fn gaps(&mut self, t: Time, y: &[f64], gaps: &mut [f64]) {
         self.inner.gaps(t, y, gaps);
+    }
+
+    fn watched(&self) -> usize {
+        self.inner.watched()
+    }
+
+    fn gap(&self, event: usize, along: Along) -> Option<[f64; 2]> {
+        self.inner.gap(event, along)
+    }
+
+    fn gap_bounds(&self, event: usize, t: f64, pace: f64, first: &[f64], second: &[f64]) -> [f64; 2] {
+        self.inner.gap_bounds(event, t, pace, first, second)
     }
 }
 

@@ -6,7 +6,7 @@
 //! Source: J. R. Dormand, P. J. Prince, *A family of embedded Runge-Kutta formulae*, J. Comp. Appl. Math. 6 (1980), table 2; the
 //! interpolation is L. F. Shampine's, as printed in Hairer, Nørsett, Wanner I, section II.6.
 
-use super::explicit::{Explicit, Pair, Row};
+use super::explicit::{Explicit, NESTED, Pair, Row};
 
 /// The coefficients of Dormand–Prince 5(4).
 #[derive(Clone, Copy, Debug)]
@@ -45,6 +45,7 @@ impl Pair for DormandPrince5 {
     const ORDER: u32 = 5;
     const STAGES: usize = 6;
     const EXTRA: usize = 0;
+    const DEGREE: usize = 4;
     const A: &'static [Row] = &A;
     const C: &'static [f64] = &C;
     const B: Row = B;
@@ -57,12 +58,11 @@ impl Pair for DormandPrince5 {
 
     fn extra_stages(_rate: &mut dyn FnMut(usize, f64, Row)) {}
 
-    fn interpolate(theta: f64, h: f64, change: f64, k: &dyn Fn(usize) -> f64) -> f64 {
-        let rest = 1.0 - theta;
+    fn interpolate(h: f64, change: f64, k: &dyn Fn(usize) -> f64) -> [f64; NESTED] {
         let start = h * k(0) - change;
         let end = change - h * k(6) - start;
         let bend = h * DENSE.iter().fold(0.0, |sum, &(j, d)| sum + d * k(j));
-        theta * (change + rest * (start + theta * (end + rest * bend)))
+        [change, start, end, bend, 0.0, 0.0, 0.0]
     }
 }
 

@@ -6,7 +6,7 @@
 //! Source: P. J. Prince, J. R. Dormand, *High order embedded Runge-Kutta formulae*, J. Comp. Appl. Math. 7 (1981); coefficients, error estimate and interpolation of
 //! order 7 as in Hairer, Nørsett, Wanner I, sections II.5 and II.6 (DOP853).
 
-use super::explicit::{Explicit, Pair, Row};
+use super::explicit::{Explicit, NESTED, Pair, Row};
 
 /// The coefficients of Dormand–Prince 8(5,3).
 #[derive(Clone, Copy, Debug)]
@@ -222,6 +222,7 @@ impl Pair for DormandPrince8 {
     const ORDER: u32 = 8;
     const STAGES: usize = 12;
     const EXTRA: usize = 3;
+    const DEGREE: usize = 7;
     const A: &'static [Row] = &A;
     const C: &'static [f64] = &C;
     const B: Row = B;
@@ -245,12 +246,11 @@ impl Pair for DormandPrince8 {
         }
     }
 
-    fn interpolate(theta: f64, h: f64, change: f64, k: &dyn Fn(usize) -> f64) -> f64 {
-        let rest = 1.0 - theta;
+    fn interpolate(h: f64, change: f64, k: &dyn Fn(usize) -> f64) -> [f64; NESTED] {
         let start = h * k(0) - change;
         let end = change - h * k(12) - start;
         let [a, b, c, d] = DENSE.map(|row| h * row.iter().fold(0.0, |sum, &(j, d)| sum + d * k(j)));
-        theta * (change + rest * (start + theta * (end + rest * (a + theta * (b + rest * (c + theta * d))))))
+        [change, start, end, a, b, c, d]
     }
 }
 

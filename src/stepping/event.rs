@@ -1,19 +1,84 @@
-//! Events inside a step: found on the interpolated solution, then landed on by steps that end there.
+//! Events inside a step: found on its dense output by [`search`](super::search), then landed on by steps that end there.
 //!
-//! The step is repeated to end on the event, so that the state there has the accuracy of a step and not of its interpolation.
+//! The step is repeated to end on the event, so that the state there has the accuracy of a step and not of its interpolation.  Where the dense output comes
+//! so near to zero that it does not know the side, the step is repeated to end at the minimum, and what is looked at then has the accuracy of a step, too.
 
-use super::Tally;
-use crate::dynamics::{Field, State};
+use super::search::{Chebyshev, Crossing, Curve, Part, ROUNDING, crossing, doubtful, root, shift, value};
+use super::{Tally, finest};
+use crate::dynamics::{Along, Field, State};
+use std::cell::RefCell;
 
-/// Interior samples a step is searched for events with.
-pub(super) const SAMPLES: usize = 8;
 /// Steps an event is landed on with, at most.
-const LANDINGS: usize = 6;
+const LANDINGS: usize = 8;
+/// A value that is zero where a step ends on it.
+const ZERO: f64 = 1e-15;
+/// Times a step is repeated to end at a minimum.
+const ROUNDS: usize = 4;
+/// Degrees of interpolants of event functions that nothing bounds.
+const DEGREES: [usize; 4] = [8, 16, 32, 64];
+/// Share of its largest value that such an interpolant may be off.
+const RESOLVED: f64 = 1e-10;
+/// Room for a dense output's powers.
+const WIDEST: usize = 10;
+
+/// The dense output of a step: its unknowns as polynomials of the share of the step.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Dense {
+    /// Powers 0, 1, …, unknown by unknown.
+    pub powers: Vec<f64>,
+    /// Number of powers of each.
+    pub width: usize,
+    /// How much each may be off at most within the step.
+    pub off: Vec<f64>,
+}
+
+impl Dense {
+    /// Room for the first `count` unknowns of a state, and their values as constant powers.
+    pub fn begin(&mut self, count: usize, width: usize, state: &State) {
+        self.width = width;
+        self.powers.resize(count * width, 0.0);
+        self.off.resize(count, 0.0);
+        for (powers, (y, low)) in self.powers.chunks_exact_mut(width).zip(state.y.iter().zip(&state.low)) {
+            powers[0] = y + low;
+        }
+    }
+
+    /// Each unknown's powers, and what they may be off.
+    pub fn each(&mut self) -> impl Iterator<Item = (&mut [f64], &mut f64)> {
+        self.powers.chunks_exact_mut(self.width).zip(&mut self.off)
+    }
+
+    /// Unknowns, and their derivatives by the share.
+    fn at(&self, share: f64, y: &mut [f64], slope: &mut [f64]) {
+        for (powers, (y, slope)) in self.powers.chunks_exact(self.width).zip(y.iter_mut().zip(slope)) {
+            [*y, *slope] = value(powers, share);
+        }
+    }
+
+    /// Bounds of their first and second derivatives near a share of the step.
+    fn bounds(&self, centre: f64, radius: f64, first: &mut [f64], second: &mut [f64]) {
+        let mut room = [0.0; WIDEST];
+        let local = &mut room[..self.width];
+        for (powers, (first, second)) in self.powers.chunks_exact(self.width).zip(first.iter_mut().zip(second)) {
+            local.copy_from_slice(powers);
+            shift(local, centre);
+            (*first, *second) = (0.0, 0.0);
+            for (m, a) in local.iter().enumerate().skip(1).rev() {
+                let m = m as f64;
+                *second = *second * radius + if m > 1.0 { m * (m - 1.0) * a.abs() } else { 0.0 };
+                *first = *first * radius + m * a.abs();
+            }
+        }
+    }
+}
 
 /// A step just made from a state, as the search sees it.
 pub(super) trait Stride<F: Field + ?Sized> {
-    /// Writes the unknowns at a share of the step of `h`.
-    fn inside(&self, state: &State, h: f64, share: f64, y: &mut [f64]);
+    /// Writes the dense output of as many unknowns as the field's event functions ask for.
+    fn dense(&mut self, field: &mut F, state: &State, h: f64, dense: &mut Dense, tally: &mut Tally);
+
+    /// Bound of what it is off at a share of the step, over that of the whole step.
+    fn off(share: f64) -> f64;
 
     /// Makes the step anew, `h` long; false where it cannot be made.
     fn repeat(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) -> bool;
@@ -22,120 +87,214 @@ pub(super) trait Stride<F: Field + ?Sized> {
     fn end(&self) -> (&[f64], &[f64]);
 }
 
-/// What a step holds.
-pub(super) enum Found {
+/// What a step holds, as shares of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Found {
     Nothing,
-    /// Event number and share of the step.
+    /// Event number, and where it is.
     At(usize, f64),
-    /// The point does not leave the wall at all.
-    Inside,
+    /// A minimum of which the dense output does not know the side.
+    Near(f64),
+    /// A point leaves its wall through the wall.
+    Inside(f64),
+}
+
+impl Found {
+    fn share(self) -> f64 {
+        match self {
+            Self::Nothing => 1.0,
+            Self::At(_, share) | Self::Near(share) | Self::Inside(share) => share,
+        }
+    }
+}
+
+/// What became of a step that was searched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Met {
+    /// Nothing is in its way.
+    Whole,
+    /// It was made anew, to end after so long \[s\].
+    Short(f64),
+    /// It was made anew, to end with this event.
+    Event(f64, usize),
+    /// It could not be made anew.
+    Failed,
+    /// A point is where it can only go through its wall.
+    AtRest,
 }
 
 /// Scratch space of the search.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Search {
+    dense: Dense,
+    room: RefCell<[Vec<f64>; 2]>,
     gaps: Vec<f64>,
-    samples: Vec<f64>,
-    point: Vec<f64>,
+    values: Vec<Vec<f64>>,
+    opaque: Vec<usize>,
+}
+
+/// An event function on the dense output of a step.
+struct Gap<'a, F: ?Sized> {
+    field: &'a F,
+    event: usize,
+    dense: &'a Dense,
+    state: &'a State,
+    h: f64,
+    room: &'a RefCell<[Vec<f64>; 2]>,
+}
+
+impl<F: Field + ?Sized> Curve for Gap<'_, F> {
+    fn at(&self, t: f64) -> [f64; 2] {
+        let [y, slope] = &mut *self.room.borrow_mut();
+        self.dense.at(t, y, slope);
+        let along = Along { time: self.state.time + t * self.h, pace: self.h, y, slope };
+        self.field.gap(self.event, along).unwrap_or([f64::NAN; 2])
+    }
+
+    fn about(&self, centre: f64, radius: f64) -> Part {
+        let [value, slope] = self.at(centre);
+        let [first, second] = &mut *self.room.borrow_mut();
+        self.dense.bounds(centre, radius, first, second);
+        let time = self.state.time.hi.abs() + self.h;
+        let [bend, size] = self.field.gap_bounds(self.event, time, self.h, first, second);
+        Part { value, slope, bend, rounding: ROUNDING * size }
+    }
 }
 
 impl Search {
-    /// Room for so many event functions of d unknowns.
-    pub fn resize(&mut self, events: usize, dimension: usize) {
-        self.gaps.resize(events, 0.0);
-        self.samples.resize(events, 0.0);
-        self.point.resize(dimension, 0.0);
-    }
-
-    /// The first event inside the step just made, as a share of it, or what forbids the step.
-    pub fn first<F: Field + ?Sized>(&mut self, field: &mut F, step: &impl Stride<F>, state: &State, h: f64) -> Found {
-        field.gaps(state.time, &state.y, &mut self.gaps);
-        for sample in 1..=SAMPLES {
-            let (low, high) = ((sample - 1) as f64 / SAMPLES as f64, sample as f64 / SAMPLES as f64);
-            self.gaps_at(field, step, state, h, high);
-            let mut first: Option<(usize, f64)> = None;
-            for event in 0..self.gaps.len() {
-                let (before, after) = (self.gaps[event], self.samples[event]);
-                if after > 0.0 || after.is_nan() {
-                    continue;
-                }
-                // Leaving a wall the gap starts at zero within rounding; it must open before it can close.
-                if before <= 1e-12 {
-                    // A point at the bound that is on its way out is not going through.
-                    if after < -1e-12 && after < before {
-                        return Found::Inside;
-                    }
-                    continue;
-                }
-                let theta = self.root(field, step, state, h, event, low, high);
-                if first.is_none_or(|(_, earliest)| theta < earliest) {
-                    first = Some((event, theta));
-                }
-                // The search wrote over the samples.
-                self.gaps_at(field, step, state, h, high);
-            }
-            if let Some((event, theta)) = first {
-                return Found::At(event, theta);
-            }
-            std::mem::swap(&mut self.gaps, &mut self.samples);
-        }
-        Found::Nothing
-    }
-
-    /// Event functions of the interpolated solution at a share of the step, into `samples`.
-    fn gaps_at<F: Field + ?Sized>(&mut self, field: &mut F, step: &impl Stride<F>, state: &State, h: f64, theta: f64) {
-        step.inside(state, h, theta, &mut self.point);
-        field.gaps(state.time + theta * h, &self.point, &mut self.samples);
-    }
-
-    /// The zero of an event function on the interpolated solution between two shares of the step (bisection, then the last bits).
-    #[expect(clippy::too_many_arguments)]
-    fn root<F: Field + ?Sized>(
+    /// Looks through the step just made, and makes it anew to end on the first event in it, or where more is to be seen.
+    pub fn meet<F: Field + ?Sized, S: Stride<F>>(
         &mut self,
         field: &mut F,
-        step: &impl Stride<F>,
+        step: &mut S,
+        state: &State,
+        whole: f64,
+        tally: &mut Tally,
+    ) -> Met {
+        let mut h = whole;
+        for round in 0..=ROUNDS {
+            let found = self.first(field, step, state, h, round < ROUNDS, tally);
+            let shorter = found.share() * h;
+            match found {
+                Found::Nothing => break,
+                Found::At(event, _) => {
+                    let landed = self.land(field, step, state, shorter, event, tally);
+                    return landed.map_or(Met::Failed, |h| Met::Event(h, event));
+                }
+                Found::Near(_) if shorter <= finest(state) => break,
+                Found::Inside(_) if shorter <= finest(state) => return Met::AtRest,
+                Found::Inside(_) | Found::Near(_) => {
+                    if !step.repeat(field, state, shorter, tally) {
+                        return Met::Failed;
+                    }
+                    h = shorter;
+                    if matches!(found, Found::Inside(_)) {
+                        break;
+                    }
+                }
+            }
+        }
+        if h == whole { Met::Whole } else { Met::Short(h) }
+    }
+
+    /// The first that is to be seen inside the step just made; minima that may be on either side of zero where these are `asked` for.
+    fn first<F: Field + ?Sized, S: Stride<F>>(
+        &mut self,
+        field: &mut F,
+        step: &mut S,
         state: &State,
         h: f64,
-        event: usize,
-        low: f64,
-        high: f64,
-    ) -> f64 {
-        let (mut low, mut high) = (low, high);
-        while high - low > 4.0 * f64::EPSILON {
-            let middle = 0.5 * (low + high);
-            self.gaps_at(field, step, state, h, middle);
-            if self.samples[event] > 0.0 { low = middle } else { high = middle }
+        asked: bool,
+        tally: &mut Tally,
+    ) -> Found {
+        step.dense(field, state, h, &mut self.dense, tally);
+        let count = self.dense.off.len();
+        for room in self.room.get_mut() {
+            room.resize(count, 0.0);
         }
-        high
+        let Self { dense, room, opaque, .. } = self;
+        let (mut found, time) = (Found::Nothing, state.time.hi.abs() + h);
+        let none = vec![0.0; count];
+        opaque.clear();
+        for event in 0..field.events() {
+            let [off, _] = field.gap_bounds(event, time, 0.0, &none, &dense.off);
+            if !off.is_finite() {
+                opaque.push(event);
+                continue;
+            }
+            let gap = Gap { field: &*field, event, dense, state, h, room };
+            found = earlier(found, event, &gap, off * f64::from(asked), S::off);
+        }
+        if self.opaque.is_empty() { found } else { self.opaquely(field, state, h, found) }
+    }
+
+    /// The first of the events whose functions are known by their values alone, or what was found before.
+    fn opaquely<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, mut found: Found) -> Found {
+        let Self { dense, room, gaps, values, opaque, .. } = self;
+        gaps.resize(field.events(), 0.0);
+        values.resize(opaque.len(), Vec::new());
+        let [y, slope] = room.get_mut();
+        for degree in DEGREES {
+            values.iter_mut().for_each(Vec::clear);
+            for share in Chebyshev::nodes(degree) {
+                dense.at(share, y, slope);
+                field.gaps(state.time + share * h, y, gaps);
+                for (values, &event) in values.iter_mut().zip(&*opaque) {
+                    values.push(gaps[event]);
+                }
+            }
+            let mut pending = 0;
+            for (values, &event) in values.iter().zip(&*opaque) {
+                let curve = Chebyshev::through(values);
+                let tail = curve.tail();
+                if tail <= RESOLVED * curve.most() || Some(&degree) == DEGREES.last() {
+                    found = earlier(found, event, &curve, 0.0, |_| 0.0);
+                } else if curve.least() <= 10.0 * tail {
+                    pending += 1;
+                }
+            }
+            if pending == 0 {
+                break;
+            }
+        }
+        found
     }
 
     /// Repeats the step so that it ends where the event function is zero to rounding; returns its length, `None` where it cannot be made.
-    pub fn land<F: Field + ?Sized>(
+    fn land<F: Field + ?Sized, S: Stride<F>>(
         &mut self,
         field: &mut F,
-        step: &mut impl Stride<F>,
+        step: &mut S,
         state: &State,
         h: f64,
         event: usize,
         tally: &mut Tally,
     ) -> Option<f64> {
+        self.gaps.resize(field.events(), 0.0);
         let mut best = h;
         let (mut before, mut gap_before) = (0.0, f64::NAN);
         for attempt in 1..=LANDINGS {
             if !step.repeat(field, state, best, tally) {
                 return None;
             }
-            field.gaps(state.time + best, step.end().0, &mut self.samples);
-            let gap = self.samples[event];
+            let (y, slope) = step.end();
+            let known = field.gap(event, Along { time: state.time + best, pace: 1.0, y, slope });
+            let gap = match known {
+                Some([gap, _]) => gap,
+                None => {
+                    field.gaps(state.time + best, y, &mut self.gaps);
+                    self.gaps[event]
+                }
+            };
             // The last attempt stands: the step must be the one that was made.
-            if gap.abs() <= 1e-15 || attempt == LANDINGS {
+            if gap.abs() <= ZERO || attempt == LANDINGS {
                 break;
             }
-            // A secant once there are two points; the closing speed from the first step until then.
-            let slope = if gap_before.is_nan() {
-                self.closing_speed(field, step, state, best, event)
-            } else {
-                (gap - gap_before) / (best - before)
+            let slope = match known {
+                Some([_, slope]) => slope,
+                // A secant once there are two points; the closing speed from the first step until then.
+                None if gap_before.is_nan() => self.closing_speed(field, step, state, best, event, gap),
+                None => (gap - gap_before) / (best - before),
             };
             (before, gap_before) = (best, gap);
             let moved = best - gap / slope;
@@ -147,15 +306,38 @@ impl Search {
         Some(best)
     }
 
-    /// Rate of an event function \[m/s\] at the end of the step just made.
-    fn closing_speed<F: Field + ?Sized>(&mut self, field: &mut F, step: &impl Stride<F>, state: &State, h: f64, event: usize) -> f64 {
-        let at_end = self.samples[event];
+    /// Rate of an event function at the end of the step just made.
+    fn closing_speed<F: Field + ?Sized>(
+        &mut self,
+        field: &mut F,
+        step: &impl Stride<F>,
+        state: &State,
+        h: f64,
+        event: usize,
+        at_end: f64,
+    ) -> f64 {
         let dt = 1e-7 * h;
         let (end, rate) = step.end();
-        for ((point, end), rate) in self.point.iter_mut().zip(end).zip(rate) {
-            *point = end - dt * rate;
-        }
-        field.gaps(state.time + (h - dt), &self.point, &mut self.gaps);
+        let point: Vec<f64> = end.iter().zip(rate).map(|(end, rate)| end - dt * rate).collect();
+        field.gaps(state.time + (h - dt), &point, &mut self.gaps);
         (at_end - self.gaps[event]) / dt
+    }
+}
+
+/// What comes first: that which was found, or what this event function, off by `zone` at most, has to say.
+fn earlier(found: Found, event: usize, curve: &impl Curve, zone: f64, off: impl Fn(f64) -> f64) -> Found {
+    let end = found.share();
+    // Most steps end here.
+    if zone > 0.0 && curve.at(0.0)[0] > zone && root(curve, zone, 0.0, end).is_none() {
+        return found;
+    }
+    let crosses = crossing(curve, end);
+    let passes = if let Crossing::At(share) = crosses { Some(share) } else { None };
+    let near = if zone > 0.0 { doubtful(curve, zone, |share| zone * off(share), end, passes) } else { None };
+    match (crosses, near) {
+        (Crossing::Inside(share), near) if near.is_none_or(|near| share <= near) => Found::Inside(share),
+        (_, Some(near)) => Found::Near(near),
+        (Crossing::At(share), None) => Found::At(event, share),
+        (Crossing::Nothing | Crossing::Inside(_), None) => found,
     }
 }

@@ -11,7 +11,7 @@
 //!
 //! Source: E. Hairer, S. P. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sections II.4-II.6.
 
-use super::event::{Found, SAMPLES, Search, Stride};
+use super::event::{Dense, Met, Search, Stride};
 use super::{Cause, Method, Reached, StepError, Tally, Watch};
 use crate::arithmetic::sum::{fast_two_sum, two_sum};
 use crate::arithmetic::{DoubleDouble, Scalar};
@@ -31,6 +31,8 @@ pub trait Pair {
     const STAGES: usize;
     /// Further stages of the interpolation.
     const EXTRA: usize;
+    /// Highest power of the interpolation.
+    const DEGREE: usize;
     /// a_ij of stages 2…
     const A: &'static [Row];
     /// c_i.
@@ -45,9 +47,12 @@ pub trait Pair {
     /// stage number `STAGES`, the extra ones follow.
     fn extra_stages(rate: &mut dyn FnMut(usize, f64, Row));
 
-    /// The unknown `i` at `t + theta h`, as a change from y.
-    fn interpolate(theta: f64, h: f64, change: f64, k: &dyn Fn(usize) -> f64) -> f64;
+    /// Coefficients of the interpolation, of an unknown that changes by `change`: at the share s of the step it is y + s (c_1 + (1-s) (c_2 + s (c_3 + …))).
+    fn interpolate(h: f64, change: f64, k: &dyn Fn(usize) -> f64) -> [f64; NESTED];
 }
+
+/// Coefficients of an interpolation at most; those there are none of are zero.
+pub const NESTED: usize = 7;
 
 /// Relative and absolute tolerance of one step.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -93,12 +98,11 @@ impl<P: Pair> Explicit<P> {
         }
     }
 
-    fn resize(&mut self, n: usize, events: usize) {
+    fn resize(&mut self, n: usize) {
         self.k.resize((P::STAGES + 1 + P::EXTRA) * n, 0.0);
         for vector in [&mut self.stage, &mut self.scale, &mut self.next, &mut self.next_low] {
             vector.resize(n, 0.0);
         }
-        self.search.resize(events, n);
     }
 
     /// Stages 2… and the new state of a step of `h` from `state`; stage 1 is in place.
@@ -209,13 +213,38 @@ fn sum_up_sized<const D: usize>(row: Row, k: &[f64], out: &mut [f64]) {
     out.copy_from_slice(&sums);
 }
 
-impl<P: Pair, F: Field + ?Sized> Stride<F> for Explicit<P> {
-    fn inside(&self, state: &State, h: f64, share: f64, y: &mut [f64]) {
-        let n = state.y.len();
-        for i in 0..n {
-            let change = (self.next[i] - state.y[i]) + (self.next_low[i] - state.low[i]);
-            y[i] = state.y[i] + P::interpolate(share, h, change, &|stage| self.k[stage * n + i]);
+/// Powers of `s (c_1 + (1-s) (c_2 + s (c_3 + …)))` after the constant one.
+fn expand(nested: &[f64], powers: &mut [f64]) {
+    powers.fill(0.0);
+    for (m, c) in nested.iter().enumerate().rev() {
+        // c + (1-s) p, or c + s p.
+        for k in (1..powers.len()).rev() {
+            powers[k] = if m % 2 == 0 { powers[k] - powers[k - 1] } else { powers[k - 1] };
         }
+        powers[0] = if m % 2 == 0 { powers[0] } else { 0.0 } + c;
+    }
+}
+
+impl<P: Pair, F: Field + ?Sized> Stride<F> for Explicit<P> {
+    fn dense(&mut self, field: &mut F, state: &State, h: f64, dense: &mut Dense, tally: &mut Tally) {
+        self.interpolate(field, state, h, tally);
+        let n = state.y.len();
+        dense.begin(field.watched(), P::DEGREE + 1, state);
+        // The last one is that of a polynomial that is zero, and smallest by far, at both ends of the step.
+        let (s, t) = ((P::DEGREE / 2) as f64 / P::DEGREE as f64, P::DEGREE.div_ceil(2) as f64 / P::DEGREE as f64);
+        let weight = libm::pow(s, (P::DEGREE / 2) as f64) * libm::pow(t, P::DEGREE.div_ceil(2) as f64);
+        for (i, (powers, off)) in dense.each().enumerate() {
+            let change = (self.next[i] - state.y[i]) + (self.next_low[i] - state.low[i]);
+            let nested = P::interpolate(h, change, &|stage| self.k[stage * n + i]);
+            expand(&nested[..P::DEGREE], &mut powers[1..]);
+            *off = weight * nested[P::DEGREE - 1].abs();
+        }
+    }
+
+    /// As s² (1-s)² over its largest value.
+    fn off(share: f64) -> f64 {
+        let bell = 4.0 * share * (1.0 - share);
+        bell * bell
     }
 
     fn repeat(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) -> bool {
@@ -248,7 +277,7 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
     ) -> Result<Reached, StepError> {
         let (n, events) = (state.y.len(), field.events());
         super::refuse_the_past(P::NAME, state, until)?;
-        self.resize(n, events);
+        self.resize(n);
         // The step proposed last; where the last call was cut short also the rate where it is known.
         let proposed = state.memory.first().copied();
         if state.memory.len() == 1 + n {
@@ -303,25 +332,14 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
             let mut h = h;
             let mut reached = if whole { Some(Reached::Until) } else { None };
             if events > 0 {
-                self.interpolate(field, state, h, tally);
                 let mut search = std::mem::take(&mut self.search);
-                let found = search.first(field, self, state, h);
-                if let Found::At(event, theta) = found {
-                    h = search.land(field, self, state, theta * h, event, tally).unwrap_or(h);
-                    reached = Some(Reached::Event(event));
-                }
+                let met = search.meet(field, self, state, h, tally);
                 self.search = search;
-                match found {
-                    Found::Nothing | Found::At(..) => {}
-                    Found::Inside if h > 1e-9 => {
-                        tally.rejected += 1;
-                        rejected_before = true;
-                        wanted = h / SAMPLES as f64;
-                        continue;
-                    }
-                    Found::Inside => {
-                        return Err(super::at_rest(P::NAME, state, h));
-                    }
+                match met {
+                    Met::Whole => {}
+                    Met::Short(short) => (h, reached) = (short, None),
+                    Met::Event(short, event) => (h, reached) = (short, Some(Reached::Event(event))),
+                    Met::Failed | Met::AtRest => return Err(super::at_rest(P::NAME, state, h)),
                 }
             }
             let grown = h * if rejected_before { factor.min(1.0) } else { factor };
@@ -359,7 +377,7 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
 /// What every tableau must fulfil.
 #[cfg(test)]
 pub(super) mod checks {
-    use super::{Pair, Row};
+    use super::{NESTED, Pair, Row};
 
     pub fn rows_sum_to_nodes<P: Pair>(tolerance: f64) {
         for (row, c) in P::A.iter().zip(&P::C[1..]) {
@@ -384,8 +402,10 @@ pub(super) mod checks {
             let mut k: Vec<f64> = P::C.iter().map(|c| rate(t + c * h)).collect();
             k.push(rate(t + h));
             P::extra_stages(&mut |_, c, _: Row| k.push(rate(t + c * h)));
+            let mut powers = [0.0; NESTED];
+            super::expand(&P::interpolate(h, exact(t + h), &|stage| k[stage])[..P::DEGREE], &mut powers[..P::DEGREE]);
             for theta in [0.1, 0.5, 0.8, 1.0] {
-                let found = P::interpolate(theta, h, exact(t + h), &|stage| k[stage]);
+                let found = powers.iter().rev().fold(0.0, |sum, power| (sum + power) * theta);
                 assert!((found - exact(t + theta * h)).abs() < tolerance, "power {m} at {theta}: {found}");
             }
         }

@@ -13,6 +13,7 @@ pub mod gauss;
 mod linear;
 pub mod radau;
 pub mod rattle;
+pub(crate) mod search;
 pub mod taylor;
 pub mod windows;
 

@@ -22,7 +22,7 @@ mod tableau;
 
 use self::newton::Solved;
 use self::tableau::Tableau;
-use super::event::{Found, SAMPLES, Search, Stride};
+use super::event::{Dense, Met, Search, Stride};
 use super::linear::Factors;
 use super::{Cause, Method, Reached, StepError, Tally, Tolerance, Watch, scales};
 use crate::arithmetic::sum::{fast_two_sum, two_sum};
@@ -205,7 +205,7 @@ impl Radau {
         (0..self.work.scale.len()).max_by(|&a, &b| share(a).total_cmp(&share(b))).map_or_else(String::new, |k| field.label(k))
     }
 
-    fn resize(&mut self, d: usize, events: usize) {
+    fn resize(&mut self, d: usize) {
         let s = self.tableau.stages();
         let work = &mut self.work;
         for stages in [&mut work.z, &mut work.change, &mut work.rates, &mut work.last] {
@@ -226,18 +226,25 @@ impl Radau {
         }
         work.wide.resize(d, Complex::ZERO);
         work.weights.resize(s, 0.0);
-        work.search.resize(events, d);
     }
 }
 
 impl<F: Field + ?Sized> Stride<F> for Radau {
-    fn inside(&self, state: &State, _h: f64, share: f64, y: &mut [f64]) {
+    /// Its powers, and what it may be off: it has not the slope of the solution at the start, but at the stages.
+    fn dense(&mut self, field: &mut F, state: &State, h: f64, dense: &mut Dense, _tally: &mut Tally) {
         let (s, d) = (self.tableau.stages(), state.y.len());
-        let mut weights = [0.0; 5];
-        self.tableau.lagrange(share, &mut weights[..s]);
-        for k in 0..d {
-            y[k] = state.y[k] + (0..s).fold(state.low[k], |sum, j| sum + weights[j] * self.work.z[j * d + k]);
+        dense.begin(field.watched(), s + 1, state);
+        for (k, (powers, off)) in dense.each().enumerate() {
+            for (m, power) in powers[1..].iter_mut().enumerate() {
+                *power = (0..s).fold(0.0, |sum, j| sum + self.tableau.powers[j * s + m] * self.work.z[j * d + k]);
+            }
+            *off = self.tableau.off * (h * self.work.start[k] - powers[1]).abs();
         }
+    }
+
+    /// As s (1-s)² over its largest value.
+    fn off(share: f64) -> f64 {
+        6.75 * share * (1.0 - share) * (1.0 - share)
     }
 
     fn repeat(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) -> bool {
@@ -276,7 +283,7 @@ impl<F: Field + ?Sized> Method<F> for Radau {
     ) -> Result<Reached, StepError> {
         let (d, events) = (state.y.len(), field.events());
         super::refuse_the_past(self.id(), state, until)?;
-        self.resize(d, events);
+        self.resize(d);
         let mut left = (until - state.time).hi;
         let mut control = Control { wanted: 0.0, accepted: 0.0, error: 1.0, contraction: 1.0, keeps: 0.0 };
         let knows = self.recall(state, &mut control);
@@ -348,23 +355,18 @@ impl<F: Field + ?Sized> Method<F> for Radau {
             let mut reached = if whole { Some(Reached::Until) } else { None };
             if events > 0 {
                 let mut search = std::mem::take(&mut self.work.search);
-                let found = search.first(field, self, state, h);
-                let landed = match found {
-                    Found::At(event, theta) => search.land(field, self, state, theta * h, event, tally).map(|h| (h, event)),
-                    _ => None,
-                };
+                let met = search.meet(field, self, state, h, tally);
                 self.work.search = search;
-                match (found, landed) {
-                    (Found::Nothing, _) => {}
-                    (Found::At(..), Some((length, event))) => (h, reached) = (length, Some(Reached::Event(event))),
-                    (Found::At(..) | Found::Inside, None) if h > 1e-9 => {
+                match met {
+                    Met::Whole => {}
+                    Met::Short(short) => (h, reached) = (short, None),
+                    Met::Event(short, event) => (h, reached) = (short, Some(Reached::Event(event))),
+                    Met::Failed if h > super::finest(state) => {
                         tally.rejected += 1;
-                        (is_hard, control.wanted) = (true, h / SAMPLES as f64);
+                        (is_hard, control.wanted) = (true, h / 8.0);
                         continue;
                     }
-                    _ => {
-                        return Err(super::at_rest(self.id(), state, h));
-                    }
+                    Met::Failed | Met::AtRest => return Err(super::at_rest(self.id(), state, h)),
                 }
             }
             if control.accepted > 0.0 {
@@ -463,7 +465,7 @@ mod tests {
         let mut radau = Radau::new(stages, Tolerance { relative: 1e-12, absolute: 1e-12 }).expect("a method");
         let (h, mut tally) = (3.0 / f64::from(count), Tally::default());
         let mut state = State { y: vec![exact(0.0)], low: vec![0.0], ..State::default() };
-        radau.resize(1, 0);
+        radau.resize(1);
         for step in 1..=count {
             scales(radau.tolerance, &state.y, &mut radau.work.scale);
             radau.differentiate(&mut Bernoulli, Some(&state), &mut tally);

@@ -18,7 +18,7 @@
 //! positions the series of any mechanism takes over (module `jump`).
 //!
 //! The series is the dense output: [`Method::within`] sums it at any time in the step, so that steps need not end on output times.  It is
-//! the event finder, too: gaps of walls are polynomials of the step (module `event`), and the state is brought onto their first zero.
+//! the event finder, too: gaps of walls are polynomials of the step (module `search`), and the state is brought onto their first zero.
 //! With [`Taylor::extended`] the first powers are found in double-double, and the later ones go on from them.
 //!
 //! Source: À. Jorba, M. Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor methods*,
@@ -28,7 +28,6 @@ mod bodies;
 pub mod crowd;
 mod direction;
 mod driven;
-mod event;
 mod expansion;
 mod extended;
 mod fast;
@@ -41,9 +40,9 @@ mod terms;
 mod wide;
 
 pub use self::crowd::Crowd;
-use self::event::Crossing;
 use self::expansion::Expansion;
 use self::fast::Fast;
+use super::search::{self, Crossing, Powers};
 use super::{Cause, Method, Reached, StepError, Tally, Tolerance, Watch};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics;
@@ -54,8 +53,6 @@ use crate::dynamics::{Coordinates, Field, Form, Mechanism, State, Time};
 const JUDGES: usize = 5;
 /// Powers of the rates beyond the first that `extended` carries in double-double.
 const LEADING: usize = 6;
-/// A step \[s\] too short to tell a point that rests on a wall from one that goes through.
-const RESTING: f64 = 1e-9;
 /// States an event is landed on with, at most.
 const LANDINGS: usize = 6;
 
@@ -278,10 +275,10 @@ impl<T: Coefficient> Taylor<T> {
         let (mut first, mut event) = (h, None);
         for contact in 0..problem.events() {
             trace(problem, expansion, contact, powers);
-            match event::crossing(powers, first) {
+            match search::crossing(&Powers { powers, end: first }, first) {
                 Crossing::Nothing => {}
                 Crossing::At(t) => (first, event) = (t, Some(contact)),
-                Crossing::Inside(t) if t > RESTING => (first, event) = (t, None),
+                Crossing::Inside(t) if t > super::finest(state) => (first, event) = (t, None),
                 Crossing::Inside(_) => {
                     return Err(super::at_rest("taylor", state, h));
                 }
@@ -303,7 +300,7 @@ impl<T: Coefficient> Taylor<T> {
             inside.clone_from(state);
             expansion.go(inside, DoubleDouble::from(best));
             problem.gaps(state.time + best, &inside.y, gaps);
-            let (gap, (_, slope)) = (gaps[event], event::value(powers, best));
+            let (gap, [_, slope]) = (gaps[event], search::value(powers, best));
             let moved = best - gap / slope;
             if gap.abs() <= 1e-15 || !((moved - t).abs() < 0.1 * h && moved > 0.0 && moved <= h) {
                 break;

@@ -37,6 +37,10 @@ pub(super) struct Tableau {
     pub estimate: Vec<f64>,
     /// 1/Π_(k≠j) (x_j - x_k) of the nodes 0, c (s + 1).
     barycentric: Vec<f64>,
+    /// Powers 1…s of the l_j that are zero at 0, row by row (s × s).
+    pub powers: Vec<f64>,
+    /// What a wrong slope at the start of a step, h times that, is within it at most: max |∫ Π (1 - x/c_i)|, and as much again.
+    pub off: f64,
 }
 
 const fn z(re: f64, im: f64) -> Complex<f64> {
@@ -135,6 +139,8 @@ impl Tableau {
             real,
             pairs,
             estimate: estimate(nodes, DoubleDouble::of(real.value)).iter().map(|entry| entry.hi).collect(),
+            powers: powers(nodes),
+            off: if stages == 3 { 0.1 } else { 0.04 },
             barycentric: (0..=stages).map(|j| (DoubleDouble::ONE / product(j)).hi).collect(),
         })
     }
@@ -183,6 +189,13 @@ fn lagrange_coefficients(nodes: &[DoubleDouble], j: usize) -> Vec<DoubleDouble> 
         }
     }
     coefficients
+}
+
+/// The powers 1…s of the polynomials that are one at a node, zero at the others and at 0.
+fn powers(nodes: &[DoubleDouble]) -> Vec<f64> {
+    let mut with_zero = vec![DoubleDouble::ZERO];
+    with_zero.extend_from_slice(nodes);
+    (1..=nodes.len()).flat_map(|j| lagrange_coefficients(&with_zero, j).into_iter().skip(1).map(|power| power.hi)).collect()
 }
 
 /// e: what the quadrature of order s with the weight mu_0 at 0 has more than the method, in terms of z.

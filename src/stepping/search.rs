@@ -1,0 +1,307 @@
+//! The first zero of an event function inside a step, told by bounds and not by samples.
+//!
+//! ```text
+//! on |t - c| <= r, with B a bound of |g''| there:
+//! |g(c)| > |g'(c)| r + B r²/2     no zero
+//! |g'(c)| > B r                   monotone: at most one, told by the signs at the ends
+//! else                            both halves, the earlier one first
+//! ```
+//!
+//! An event function is a [`Curve`]: a power series ([`Powers`]), a function of a motion whose unknowns are polynomials (`event`, and whatever else watches a
+//! motion), or a Chebyshev interpolant ([`Chebyshev`]) where nothing bounds it.  Where all that is left of a part is rounding, there is nothing to be told
+//! apart, and signs at the ends decide.
+//!
+//! Two zeros as close together as 1e-9 of the step are found.  Source: R. E. Moore, *Methods and Applications of Interval Analysis* (1979),
+//! chapter 5, for exclusion by bounds; Newton's method inside a bracket after W. Press et al., *Numerical Recipes*, 3rd ed. (2007), section 9.4.
+
+/// A value that counts as zero at the step's start: it must open before it can close.
+pub const TOUCH: f64 = 1e-12;
+/// Share of the step below which two zeros are one.
+const CLOSE: f64 = 1e-9;
+/// Share of the step from which on down a power series is taken about the middle of a part.
+const SMALL: f64 = 1.0 / 64.0;
+/// Roundings of its largest terms up to which a value is zero.
+pub const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+/// A function of time, or of the share of a step, with bounds.
+pub trait Curve {
+    /// Value and slope at `t`.
+    fn at(&self, t: f64) -> [f64; 2];
+
+    /// What is known of it at most `radius` away from `centre`.
+    fn about(&self, centre: f64, radius: f64) -> Part;
+}
+
+/// A function on a part of a step.
+#[derive(Clone, Copy, Debug)]
+pub struct Part {
+    /// Value in the middle.
+    pub value: f64,
+    /// Slope there.
+    pub slope: f64,
+    /// Bound of the second derivative; more exactly the slope is off by no more than this times the distance from the middle.
+    pub bend: f64,
+    /// What rounding may do to values.
+    pub rounding: f64,
+}
+
+/// What bounds tell of a part.
+enum Told {
+    NoZero,
+    /// At most one, or nothing but rounding: the signs at the ends tell.
+    BySigns,
+    Open,
+}
+
+impl Part {
+    fn tells(&self, level: f64, radius: f64) -> Told {
+        let (value, slope) = ((self.value - level).abs(), self.slope.abs());
+        let tilt = self.bend * radius;
+        let reach = radius * (slope + 0.5 * tilt);
+        let most = value + reach;
+        if value > reach.max(self.rounding) {
+            Told::NoZero
+        } else if slope > tilt || most <= self.rounding || most.is_nan() {
+            Told::BySigns
+        } else {
+            Told::Open
+        }
+    }
+}
+
+/// What an event function does in a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Crossing {
+    /// It stays positive, or at zero.
+    Nothing,
+    /// It passes from positive to negative here.
+    At(f64),
+    /// From zero it goes negative without opening first; it has left zero here.
+    Inside(f64),
+}
+
+/// The first passage of a function within `end`.
+pub fn crossing(curve: &impl Curve, end: f64) -> Crossing {
+    let [first, _] = curve.at(0.0);
+    if first > TOUCH {
+        return root(curve, 0.0, 0.0, end).map_or(Crossing::Nothing, Crossing::At);
+    }
+    let opens = root(curve, TOUCH, 0.0, end);
+    let is_below = first <= -TOUCH;
+    let sinks = root(curve, if is_below { first - 0.1 * TOUCH } else { -TOUCH }, 0.0, end);
+    match (opens, sinks) {
+        (open, Some(sink)) if open.is_none_or(|open| sink < open) => Crossing::Inside(if is_below { 0.0 } else { sink }),
+        (Some(open), _) => root(curve, 0.0, open, end).map_or(Crossing::Nothing, Crossing::At),
+        (None, _) => Crossing::Nothing,
+    }
+}
+
+/// The first minimum within `end`, and before a passage at `passes` that does not lead to it, whose value is not known to be on either side of zero: where
+/// values are `off(t) <= zone` from the truth.
+pub fn doubtful(curve: &impl Curve, zone: f64, off: impl Fn(f64) -> f64, end: f64, passes: Option<f64>) -> Option<f64> {
+    let mut begin = 0.0;
+    while begin < end {
+        let low = if curve.at(begin)[0] < zone { begin } else { root(curve, zone, begin, end)? };
+        let high = root(curve, zone, low, end).unwrap_or(end);
+        if curve.at(low)[1] < 0.0 && curve.at(high)[1] > 0.0 {
+            let lowest = turn(curve, low, high);
+            if curve.at(lowest)[0].abs() < off(lowest) {
+                return Some(lowest);
+            }
+        }
+        if high <= begin || passes.is_some_and(|passes| passes <= high) {
+            break;
+        }
+        begin = high;
+    }
+    None
+}
+
+/// A minimum between two places where the slope is negative, and positive.
+fn turn(curve: &impl Curve, mut low: f64, mut high: f64) -> f64 {
+    while high - low > 4.0 * f64::EPSILON * high {
+        let middle = 0.5 * (low + high);
+        if curve.at(middle)[1] < 0.0 { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}
+
+/// The first change of sign of `curve - level` in (from, to].
+pub fn root(curve: &impl Curve, level: f64, from: f64, to: f64) -> Option<f64> {
+    search(curve, level, from, to).0
+}
+
+/// The same, and the number of parts it took.
+fn search(curve: &impl Curve, level: f64, from: f64, to: f64) -> (Option<f64>, usize) {
+    // Later halves wait; thirty halvings come down to what counts as close.
+    let mut parts = [(from, to); 40];
+    let (mut count, mut seen) = (1, 0);
+    let least = CLOSE * (to - from);
+    while count > 0 {
+        count -= 1;
+        seen += 1;
+        let (low, high) = parts[count];
+        let (centre, radius) = (0.5 * (low + high), 0.5 * (high - low));
+        match curve.about(centre, radius).tells(level, radius) {
+            Told::NoZero => {}
+            Told::Open if radius >= least && count + 2 <= parts.len() => {
+                (parts[count], parts[count + 1]) = ((centre, high), (low, centre));
+                count += 2;
+            }
+            _ => {
+                let at = |t: f64| curve.at(t)[0] - level;
+                let (before, after) = (at(low), at(high));
+                // A zero at the beginning is the one the search starts from.
+                if before != 0.0 && (before > 0.0) != (after > 0.0) {
+                    return (Some(bracketed(curve, level, low, high, before > 0.0)), seen);
+                }
+            }
+        }
+    }
+    (None, seen)
+}
+
+/// The zero between two places at which the signs differ: Newton's method, and bisection where it would leave the bracket.
+fn bracketed(curve: &impl Curve, level: f64, mut low: f64, mut high: f64, falls: bool) -> f64 {
+    let mut t = 0.5 * (low + high);
+    for _ in 0..100 {
+        let [value, slope] = curve.at(t);
+        let value = value - level;
+        if (value > 0.0) == falls {
+            low = t
+        } else {
+            high = t
+        }
+        let next = t - value / slope;
+        let next = if next > low && next < high { next } else { 0.5 * (low + high) };
+        if next == t || next <= low || next >= high {
+            break;
+        }
+        if (next - t).abs() <= f64::EPSILON * t {
+            return next;
+        }
+        t = next;
+    }
+    high
+}
+
+/// A power series about zero, for the search up to `end`.
+///
+/// The bound of its second derivative is a sum of magnitudes, and far too large where high powers cancel: on small parts it is that of the powers a_k about
+/// their middle, `Σ k |a_k| r^(k-2)`.
+#[derive(Clone, Copy, Debug)]
+pub struct Powers<'a> {
+    /// a_0, a_1, …
+    pub powers: &'a [f64],
+    /// The end of the step.
+    pub end: f64,
+}
+
+impl Curve for Powers<'_> {
+    fn at(&self, t: f64) -> [f64; 2] {
+        value(self.powers, t)
+    }
+
+    fn about(&self, centre: f64, radius: f64) -> Part {
+        if radius > SMALL * self.end {
+            let ([value, slope], bend) = (value(self.powers, centre), bend(self.powers, centre + radius));
+            return Part { value, slope, bend, rounding: 0.0 };
+        }
+        let mut local = self.powers.to_vec();
+        shift(&mut local, centre);
+        let steeper = |sum: f64, (m, a): (usize, &f64)| sum * radius + m as f64 * a.abs();
+        let bend = local.iter().enumerate().skip(2).rev().fold(0.0, steeper);
+        let rounding = ROUNDING * size(self.powers, centre + radius);
+        Part { value: local.first().copied().unwrap_or(0.0), slope: local.get(1).copied().unwrap_or(0.0), bend, rounding }
+    }
+}
+
+/// Powers about `centre`, in their place: Horner's scheme, once a power.
+pub fn shift(powers: &mut [f64], centre: f64) {
+    for first in 0..powers.len() {
+        for m in (first + 1..powers.len()).rev() {
+            powers[m - 1] += centre * powers[m];
+        }
+    }
+}
+
+/// Value and slope of a polynomial.
+pub fn value(powers: &[f64], t: f64) -> [f64; 2] {
+    powers.iter().rev().fold([0.0, 0.0], |[value, slope], &power| [value * t + power, slope * t + value])
+}
+
+/// Sum of the magnitudes of all terms up to time `t`.
+fn size(powers: &[f64], t: f64) -> f64 {
+    powers.iter().rev().fold(0.0, |sum, power| sum * t + power.abs())
+}
+
+/// A bound of the second derivative up to time `t`.
+fn bend(powers: &[f64], t: f64) -> f64 {
+    let terms = powers.iter().enumerate().skip(2).rev();
+    terms.fold(0.0, |sum, (m, power)| sum * t + (m * (m - 1)) as f64 * power.abs())
+}
+
+/// A function on [0, 1] known by its values alone: its interpolant `Σ c_k T_k(2t - 1)`.
+///
+/// Its bound is |T_k''| <= k² (k² - 1)/3, which the fall of the c_k keeps small.  Source: L. N. Trefethen, *Approximation Theory and Approximation Practice*
+/// (2013), chapters 2, 3 and 8.
+#[derive(Clone, Debug)]
+pub struct Chebyshev {
+    coefficients: Vec<f64>,
+    bend: f64,
+}
+
+impl Chebyshev {
+    /// The places of `degree + 1` values, from 1 to 0.
+    pub fn nodes(degree: usize) -> impl Iterator<Item = f64> {
+        (0..=degree).map(move |j| 0.5 + 0.5 * libm::cos(std::f64::consts::PI * j as f64 / degree as f64))
+    }
+
+    /// The interpolant of values at the nodes, two at least.
+    pub fn through(values: &[f64]) -> Self {
+        let degree = values.len().max(2) - 1;
+        let end = |k: usize| if k == 0 || k == degree { 0.5 } else { 1.0 };
+        let wave = |j: usize, k: usize| libm::cos(std::f64::consts::PI * ((j * k) % (2 * degree)) as f64 / degree as f64);
+        let sum = |k: usize| values.iter().enumerate().fold(0.0, |sum, (j, value)| sum + end(j) * value * wave(j, k));
+        let coefficients: Vec<f64> = (0..=degree).map(|k| 2.0 / degree as f64 * end(k) * sum(k)).collect();
+        let steep = |k: usize| 4.0 * (k * k * (k * k - k.min(1))) as f64 / 3.0;
+        let bend = coefficients.iter().enumerate().fold(0.0, |sum, (k, c)| sum + steep(k) * c.abs());
+        Self { coefficients, bend }
+    }
+
+    /// What the last coefficients say it may be off.
+    pub fn tail(&self) -> f64 {
+        self.coefficients.iter().rev().take(3).fold(0.0, |most, c| f64::max(most, c.abs()))
+    }
+
+    /// The least magnitude it can have.
+    pub fn least(&self) -> f64 {
+        self.coefficients.iter().skip(1).fold(self.coefficients[0].abs(), |left, c| left - c.abs())
+    }
+
+    /// The largest magnitude it can have.
+    pub fn most(&self) -> f64 {
+        self.coefficients.iter().fold(0.0, |sum, c| sum + c.abs())
+    }
+}
+
+impl Curve for Chebyshev {
+    fn at(&self, t: f64) -> [f64; 2] {
+        let x = 2.0 * t - 1.0;
+        // Clenshaw's recurrence, and its derivative.
+        let ([mut b, mut before], [mut slope, mut slope_before]) = ([0.0; 2], [0.0; 2]);
+        for &c in self.coefficients.iter().skip(1).rev() {
+            (slope, slope_before) = (2.0 * b + 2.0 * x * slope - slope_before, slope);
+            (b, before) = (c + 2.0 * x * b - before, b);
+        }
+        [self.coefficients[0] + x * b - before, 2.0 * (b + x * slope - slope_before)]
+    }
+
+    fn about(&self, centre: f64, _radius: f64) -> Part {
+        let [value, slope] = self.at(centre);
+        Part { value, slope, bend: self.bend, rounding: ROUNDING * self.most() }
+    }
+}
+
+#[cfg(test)]
+mod tests;
