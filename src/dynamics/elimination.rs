@@ -196,10 +196,10 @@ impl<const N: usize> Field for Elimination<N> {
         self.mechanism.ties.count()
     }
 
-    fn gap(&self, event: usize, along: Along) -> Option<[f64; 2]> {
+    fn gap(&self, event: usize, along: Along) -> Option<[f64; 3]> {
         let Along { time, pace, y, slope } = along;
         let ties = &self.mechanism.ties;
-        self.mechanism.contacts[event].row.gap_along(|k| {
+        self.mechanism.contacts[event].gap_along(|k| {
             let tie = &ties.bodies[k];
             if k < ties.angles {
                 let placed = tie.place(time, &y[..ties.count()]);
@@ -209,8 +209,8 @@ impl<const N: usize> Field for Elimination<N> {
         })
     }
 
-    fn gap_bounds(&self, event: usize, t: f64, pace: f64, first: &[f64], second: &[f64]) -> [f64; 2] {
-        let (ties, row) = (&self.mechanism.ties, &self.mechanism.contacts[event].row);
+    fn gap_bend(&self, event: usize, t: f64, pace: f64, first: &[f64], second: &[f64]) -> f64 {
+        let ties = &self.mechanism.ties;
         let most = |k: usize| {
             let tie = &ties.bodies[k];
             let start = tie.base.map_or([0.0; 2], |base| [second[base], first[base]]);
@@ -219,7 +219,7 @@ impl<const N: usize> Field for Elimination<N> {
                 [second + pace * pace * acceleration, first + pace * rate]
             })
         };
-        [row.gap_bend(most), row.gap_size()]
+        self.mechanism.contacts[event].gap_bend(most)
     }
 }
 

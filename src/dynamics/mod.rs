@@ -202,14 +202,14 @@ pub trait Field {
         self.dimension()
     }
 
-    /// An event function and its slope along a motion; `None` for one of which only the value is known.
-    fn gap(&self, _event: usize, _along: Along) -> Option<[f64; 2]> {
+    /// An event function along a motion, its slope, and the magnitude it is rounded to; `None` for one of which only the value is known.
+    fn gap(&self, _event: usize, _along: Along) -> Option<[f64; 3]> {
         None
     }
 
-    /// Bounds of its second derivative, and of the terms it is the sum of, up to the time `t` \[s\], where derivatives of the unknowns are at most these.
-    fn gap_bounds(&self, _event: usize, _t: f64, _pace: f64, _first: &[f64], _second: &[f64]) -> [f64; 2] {
-        [f64::INFINITY; 2]
+    /// A bound of its second derivative up to the time `t` \[s\], where derivatives of the unknowns are at most these; none where it is infinite.
+    fn gap_bend(&self, _event: usize, _t: f64, _pace: f64, _first: &[f64], _second: &[f64]) -> f64 {
+        f64::INFINITY
     }
 }
 

@@ -127,23 +127,22 @@ impl<const N: usize, const ACCOUNT: bool> Field for Multiplier<N, ACCOUNT> {
         if self.mechanism.held.is_empty() { self.mechanism.coordinates() } else { self.dimension() }
     }
 
-    fn gap(&self, event: usize, along: Along) -> Option<[f64; 2]> {
+    fn gap(&self, event: usize, along: Along) -> Option<[f64; 3]> {
         let Along { y, slope, .. } = along;
         let bodies = self.mechanism.bodies.len();
         let of = |k: usize| match k < bodies {
             true => turning(Complex::unit(y[k]), slope[k]),
             false => [Complex::new(y[k], y[k + 1]), Complex::new(slope[k], slope[k + 1])],
         };
-        if self.mechanism.held.contains(&event) { None } else { self.mechanism.contacts[event].row.gap_along(of) }
+        if self.mechanism.held.contains(&event) { None } else { self.mechanism.contacts[event].gap_along(of) }
     }
 
-    fn gap_bounds(&self, event: usize, _t: f64, _pace: f64, first: &[f64], second: &[f64]) -> [f64; 2] {
+    fn gap_bend(&self, event: usize, _t: f64, _pace: f64, first: &[f64], second: &[f64]) -> f64 {
         // Nothing bounds the force on a point that is held.
         if self.mechanism.held.contains(&event) {
-            return [f64::INFINITY; 2];
+            return f64::INFINITY;
         }
-        let row = &self.mechanism.contacts[event].row;
-        [row.gap_bend(|k| [second[k], first[k]]), row.gap_size()]
+        self.mechanism.contacts[event].gap_bend(|k| [second[k], first[k]])
     }
 }
 

@@ -1,12 +1,14 @@
 //! Bars that turn over: the first time an angle passes an odd multiple of π.
 //!
-//! That is where wrapped angles jump, so a step in which a bar's count of turns changes holds a passage.  A step in which a bar turns back near the
-//! boundary may hold two; the cubic through angles and rates at both ends of the step says which steps to go through again, in parts.  The passage itself is
-//! found by Newton's method on the motion, marched again from the beginning of the step, so it is as accurate as the run.  Methods that cannot march a part of
-//! a step, or do not show their steps, are traced by `dp8` there.
+//! Every step in which an angle can come as far as that is looked through: the angles inside it are interpolated until that is resolved, and the passage is
+//! found on the interpolant by the [search](crate::stepping::search) that finds all events.  Whole turns are counted for it where the mechanism itself does
+//! not, since there they matter (torsion springs).  The passage itself is found by Newton's method on the motion, marched again from the beginning of the
+//! step, so it is as accurate as the run.  Methods that cannot march a part of a step, or do not show their steps, are traced by `dp8` there.
 
+use crate::arithmetic::angle;
 use crate::dynamics::{Form, Glance, State};
-use std::f64::consts::PI;
+use crate::stepping::search::{Chebyshev, Crossing, crossing};
+use std::f64::consts::{PI, TAU};
 
 /// The first passage of a bar.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -17,10 +19,13 @@ pub struct Flip {
     pub bar: usize,
 }
 
-/// Parts of a step that is gone through again.
-const PARTS: usize = 8;
-/// What a cubic over a step may miss of an angle \[rad\], and of its rise over the step's ends.
-const MISSED: [f64; 2] = [0.05, 0.3];
+/// Share of a step that is interpolated at once; of larger parts it is only asked whether a bar can pass.
+const SMALLEST: f64 = 0.25;
+/// Degrees of the interpolants, and what the last coefficients may be \[rad\].
+const DEGREES: [usize; 3] = [8, 16, 32];
+const RESOLVED: f64 = 1e-10;
+/// Steps of Newton's method at most.
+const ROUNDS: usize = 8;
 
 /// A step that holds a passage, or may.
 pub(super) struct Suspect {
@@ -28,6 +33,7 @@ pub(super) struct Suspect {
     pub from: State,
     /// Its length \[s\].
     pub span: f64,
+    /// What there is to see at both ends.
     pub ends: [Glance; 2],
 }
 
@@ -46,7 +52,7 @@ pub(super) struct Lookout {
 impl Lookout {
     /// Takes the state from which the next steps are taken.
     pub fn begin<P: Form + ?Sized>(&mut self, problem: &mut P, state: &State) {
-        problem.glance(state, &mut self.before);
+        look(problem, state, &mut self.before);
         remember(&mut self.from, state);
     }
 
@@ -55,10 +61,10 @@ impl Lookout {
         if self.closed {
             return false;
         }
-        problem.glance(state, &mut self.now);
+        look(problem, state, &mut self.now);
         let span = (state.time - self.from.time).hi;
         self.closed = self.before.turns != self.now.turns;
-        let suspicious = all || self.closed || (0..self.now.phi.len()).any(|bar| may_pass(bar, &self.before, &self.now, span));
+        let suspicious = all || self.closed || can_pass(&self.before, &self.now, span);
         if suspicious {
             self.suspects.push(Suspect { from: self.from.clone(), span, ends: [self.before.clone(), self.now.clone()] });
         }
@@ -82,132 +88,116 @@ impl Lookout {
     }
 }
 
+/// Angles and rates of the bodies alone, whole turns taken off and counted whatever the mechanism does with them.
+pub(super) fn look<P: Form + ?Sized>(problem: &mut P, state: &State, glance: &mut Glance) {
+    problem.glance(state, glance);
+    let bodies = problem.mechanism().bodies.len();
+    glance.phi.truncate(bodies);
+    glance.omega.truncate(bodies);
+    glance.turns.resize(bodies, 0);
+    for (phi, turns) in glance.phi.iter_mut().zip(&mut glance.turns) {
+        *turns = turns.saturating_add(angle::wrap(phi, &mut 0.0));
+    }
+}
+
 /// Copies a state but for what a method remembers.
 fn remember(copy: &mut State, state: &State) {
     copy.time = state.time;
     copy.y.clone_from(&state.y);
     copy.low.clone_from(&state.low);
     copy.turns.clone_from(&state.turns);
+    copy.is_winding = state.is_winding;
 }
 
-/// True where the bar moves outwards from a place whence a step may take it to the boundary and back.
-pub(super) fn heads_out(phi: f64, omega: f64) -> bool {
-    phi.abs() > 1.0 && phi * omega > 0.0
-}
-
-/// True where the bar turns back within a step so near the boundary that it may have been beyond.
-pub(super) fn may_pass(bar: usize, a: &Glance, b: &Glance, span: f64) -> bool {
-    let side = if a.phi[bar] < 0.0 { -1.0 } else { 1.0 };
-    if !heads_out(a.phi[bar], a.omega[bar]) || side * b.omega[bar] >= 0.0 {
-        return false;
-    }
-    let top = (1..PARTS).map(|k| side * Cubic::of(bar, a, b, span).at(k as f64 / PARTS as f64 * span)).fold(0.0, f64::max);
-    top + MISSED[0] + MISSED[1] * (top - (side * a.phi[bar]).max(side * b.phi[bar])).max(0.0) > PI
-}
-
-/// The cubic through angle and rate of a bar at both ends of a step, the angle without the turns of its beginning.
-struct Cubic {
-    ends: [f64; 2],
-    rates: [f64; 2],
-    span: f64,
-}
-
-impl Cubic {
-    fn of(bar: usize, a: &Glance, b: &Glance, span: f64) -> Self {
-        Self { ends: [a.phi[bar], winding(bar, a, b)], rates: [a.omega[bar], b.omega[bar]], span }
-    }
-
-    fn at(&self, t: f64) -> f64 {
-        let (s, rest) = (t / self.span, 1.0 - t / self.span);
-        let angles = rest * rest * (1.0 + 2.0 * s) * self.ends[0] + s * s * (3.0 - 2.0 * s) * self.ends[1];
-        angles + s * rest * self.span * (rest * self.rates[0] - s * self.rates[1])
-    }
-
-    /// A time at which it takes a value that lies between its ends.
-    fn solve(&self, value: f64) -> f64 {
-        let rises = self.ends[1] > self.ends[0];
-        let (mut low, mut high) = (0.0, self.span);
-        for _ in 0..30 {
-            let middle = 0.5 * (low + high);
-            if (self.at(middle) < value) == rises { low = middle } else { high = middle }
-        }
-        0.5 * (low + high)
-    }
-
-    /// Time of the largest value of `side` times it, on a grid.
-    fn top(&self, side: f64) -> f64 {
-        let places = (0..=32).map(|k| self.span * f64::from(k) / 32.0);
-        places.max_by(|&a, &b| (side * self.at(a)).total_cmp(&(side * self.at(b)))).unwrap_or(0.0)
-    }
+/// True where a bar may come to the boundary in a step, if it is at most twice as fast on the way as at the ends.
+pub(super) fn can_pass(a: &Glance, b: &Glance, span: f64) -> bool {
+    (0..a.phi.len()).any(|bar| {
+        let (from, to) = (a.omega[bar], b.omega[bar]);
+        let reach = span * (from.abs().max(to.abs()) + (to - from).abs());
+        // Not a number is looked at.
+        a.turns[bar] != b.turns[bar] || !(a.phi[bar].abs().max(b.phi[bar].abs()) + reach < PI)
+    })
 }
 
 /// The angle at `b`, less the turns of `a` \[rad\].
 fn winding(bar: usize, a: &Glance, b: &Glance) -> f64 {
-    b.phi[bar] + 2.0 * PI * (b.turns[bar] - a.turns[bar]) as f64
+    b.phi[bar] + TAU * (b.turns[bar] - a.turns[bar]) as f64
 }
 
 /// The first passage in a step that begins at `start` \[s\] and takes `span` \[s\]; `at` looks so many seconds after its beginning.
 pub(super) fn search(start: f64, span: f64, [first, last]: &[Glance; 2], at: &mut dyn FnMut(f64) -> Option<Glance>) -> Option<Flip> {
-    let plain = |bar: usize| first.omega[bar] * last.omega[bar] > 0.0;
-    if first.turns != last.turns && (0..first.phi.len()).all(plain) {
-        return passage(start, [0.0, span], first, last, at);
-    }
-    let (mut begin, mut a) = (0.0, first.clone());
-    for part in 1..=PARTS {
-        let end = span * part as f64 / PARTS as f64;
-        let b = if part == PARTS { last.clone() } else { at(end)? };
-        if a.turns != b.turns {
-            return passage(start, [begin, end], &a, &b, at);
+    // Later halves wait.
+    let mut parts = vec![(0.0, span, first.clone(), last.clone())];
+    while let Some((begin, end, a, b)) = parts.pop() {
+        if !can_pass(&a, &b, end - begin) {
+            continue;
         }
-        for bar in 0..a.phi.len() {
-            let (cubic, side) = (Cubic::of(bar, &a, &b, end - begin), if a.phi[bar] < 0.0 { -1.0 } else { 1.0 });
-            let top = cubic.top(side);
-            if top > 0.0 && top < end - begin && side * cubic.at(top) > PI {
-                let there = at(begin + top)?;
-                if a.turns != there.turns {
-                    return passage(start, [begin, begin + top], &a, &there, at);
-                }
-            }
+        if end - begin > span * SMALLEST {
+            let middle = 0.5 * (begin + end);
+            let there = at(middle)?;
+            parts.push((middle, end, there.clone(), b));
+            parts.push((begin, middle, a, there));
+        } else if let Some(flip) = within(start, [begin, end], &a, at) {
+            return Some(flip);
         }
-        (begin, a) = (end, b);
     }
     None
 }
 
-/// The first of the passages between two moments whose turns differ.
-fn passage(start: f64, span: [f64; 2], a: &Glance, b: &Glance, at: &mut dyn FnMut(f64) -> Option<Glance>) -> Option<Flip> {
-    let changed = (0..a.phi.len()).filter(|&bar| a.turns[bar] != b.turns[bar]);
-    let found: Vec<Flip> = changed.filter_map(|bar| Some(Flip { t: start + root(bar, span, a, b, at)?, bar })).collect();
-    found.into_iter().min_by(|x, y| x.t.total_cmp(&y.t))
+/// The first passage in a part of a step, which begins with `first`.
+fn within(start: f64, [begin, end]: [f64; 2], first: &Glance, at: &mut dyn FnMut(f64) -> Option<Glance>) -> Option<Flip> {
+    let span = end - begin;
+    let mut angles = vec![Vec::new(); first.phi.len()];
+    for degree in DEGREES {
+        angles.iter_mut().for_each(Vec::clear);
+        for node in Chebyshev::nodes(degree) {
+            let there = at(begin + node * span)?;
+            angles.iter_mut().enumerate().for_each(|(bar, angles)| angles.push(winding(bar, first, &there)));
+        }
+        if angles.iter().all(|angles| Chebyshev::through(angles).tail() < RESOLVED) {
+            break;
+        }
+    }
+    let mut found: Option<(f64, usize, f64)> = None;
+    for (bar, angles) in angles.iter().enumerate() {
+        for side in [1.0, -1.0] {
+            let room: Vec<f64> = angles.iter().map(|angle| PI - side * angle).collect();
+            let share = match crossing(&Chebyshev::through(&room), 1.0) {
+                Crossing::At(share) => share,
+                // It stood on the boundary.
+                Crossing::Inside(_) => 0.0,
+                Crossing::Nothing => continue,
+            };
+            if found.is_none_or(|(earliest, ..)| share < earliest) {
+                found = Some((share, bar, side));
+            }
+        }
+    }
+    found.map(|(share, bar, side)| Flip { t: start + passage(bar, side, first, begin + share * span, [begin, end], at), bar })
 }
 
-/// The time after the step's beginning at which a bar is on the boundary between `a` and `b` \[s\].
-fn root(bar: usize, [begin, end]: [f64; 2], a: &Glance, b: &Glance, at: &mut dyn FnMut(f64) -> Option<Glance>) -> Option<f64> {
-    let side = if b.turns[bar] > a.turns[bar] { 1.0 } else { -1.0 };
-    let (mut low, mut high) = (begin, end);
-    let mut t = begin + Cubic::of(bar, a, b, end - begin).solve(side * PI);
-    for _ in 0..20 {
-        let there = at(t)?;
-        let beyond = side * winding(bar, a, &there) - PI;
-        if beyond < 0.0 {
-            low = t
-        } else {
-            high = t
+/// The time after the step's beginning at which a bar is on the boundary, near `t` \[s\].
+fn passage(bar: usize, side: f64, first: &Glance, near: f64, [begin, end]: [f64; 2], at: &mut dyn FnMut(f64) -> Option<Glance>) -> f64 {
+    let mut t = near;
+    for _ in 0..ROUNDS {
+        let Some(there) = at(t) else { break };
+        let moved = t - (side * winding(bar, first, &there) - PI) / (side * there.omega[bar]);
+        // Where it hardly passes at all the interpolant knows better.
+        if near == begin || !(begin..=end).contains(&moved) || (moved - near).abs() > 1e-3 * (end - begin) {
+            break;
         }
-        let newton = t - beyond / (side * there.omega[bar]);
-        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-        if (next - t).abs() <= 1e-14 * end.max(1e-3) || beyond == 0.0 {
-            return Some(t);
+        let change = (moved - t).abs();
+        t = moved;
+        if change <= 1e-15 * end {
+            break;
         }
-        t = next;
     }
-    Some(t)
+    t
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arithmetic::angle;
 
     fn glance(phi: f64, omega: f64) -> Glance {
         let (mut hi, mut lo) = (phi, 0.0);
@@ -218,7 +208,7 @@ mod tests {
     /// The first passage of a given motion in one step.
     fn search(motion: impl Fn(f64) -> [f64; 2], span: f64) -> Option<Flip> {
         let ends = [0.0, span].map(|t| glance(motion(t)[0], motion(t)[1]));
-        let suspicious = ends[0].turns != ends[1].turns || may_pass(0, &ends[0], &ends[1], span);
+        let suspicious = can_pass(&ends[0], &ends[1], span);
         suspicious.then(|| super::search(2.0, span, &ends, &mut |t| Some(glance(motion(t)[0], motion(t)[1]))))?
     }
 
@@ -236,11 +226,24 @@ mod tests {
     #[test]
     fn there_and_back_within_one_step_is_seen() {
         let top = |height: f64| move |t: f64| [height - (t - 0.4) * (t - 0.4), -2.0 * (t - 0.4)];
-        let found = search(top(PI + 1e-4), 1.0).expect("it passes twice");
-        assert!((found.t - 2.0 - 0.39).abs() < 1e-9, "{found:?}");
-        assert_eq!(search(top(PI - 1e-4), 1.0), None);
+        for height in [1e-4_f64, 1e-8, 1e-10] {
+            let found = search(top(PI + height), 1.0).expect("it passes twice");
+            assert!((found.t - 2.4 + height.sqrt()).abs() < 1e-9, "{height}: {found:?}");
+            assert_eq!(search(top(PI - height), 1.0), None);
+        }
         assert_eq!(search(top(2.0), 1.0), None);
         let below = search(|t| [-PI - 0.01 + (t - 0.5) * (t - 0.5), 2.0 * (t - 0.5)], 1.0).expect("on the other side");
         assert!((below.t - 2.0 - 0.4).abs() < 1e-9, "{below:?}");
+        // Twice out and back, and the ends of the step head inwards.
+        let wave = |t: f64| [3.0 + 0.2 * (12.0 * t - 1.0).cos(), -2.4 * (12.0 * t - 1.0).sin()];
+        let twice = search(wave, 1.0).expect("it passes");
+        assert!((twice.t - 2.0).abs() < 0.3 && (wave(twice.t - 2.0)[0] - PI).abs() < 1e-12, "{twice:?}");
+    }
+
+    #[test]
+    fn a_bar_that_stands_on_the_boundary_passes_it_where_it_falls_outwards() {
+        assert_eq!(search(|t| [PI + t * t, 2.0 * t], 1.0), Some(Flip { t: 2.0, bar: 0 }));
+        assert_eq!(search(|t| [PI - t * t, -2.0 * t], 1.0), None);
+        assert_eq!(search(|t| [-PI - t * t, -2.0 * t], 1.0), Some(Flip { t: 2.0, bar: 0 }));
     }
 }

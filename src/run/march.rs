@@ -139,7 +139,7 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
                     flip::search(from.time.hi, *span, ends, &mut |seconds| {
                         method.within(problem, from, from.time + seconds, inside);
                         let mut glance = Glance::default();
-                        problem.glance(inside, &mut glance);
+                        flip::look(&mut **problem, inside, &mut glance);
                         Some(glance)
                     })
                 });
@@ -245,7 +245,7 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
             let mut tally = Tally { effort: self.tally.effort, ..Tally::default() };
             self.method.advance(&mut self.problem, &mut state, until, &mut tally, &mut |_, _| Ok(Seen::Kept)).ok()?;
             let mut glance = Glance::default();
-            self.problem.glance(&state, &mut glance);
+            flip::look(&mut *self.problem, &state, &mut glance);
             Some(glance)
         })
     }

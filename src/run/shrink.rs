@@ -1,21 +1,30 @@
 //! Springs that lose their length on the way: their force has no direction there, and a step can leap over the place without a trace.
 //!
 //! A power series takes sqrt(|D|²) through zero to a negative length, and a fixed step does not see the jump of the force at all; both come out on the other
-//! side with another energy, or nearly the same.  Where the two ends of a spring with a free length can meet, every step is looked at: by the motion inside it
-//! where the method knows that, else by the cubic through its ends.  Mechanisms whose springs are too far from their places for that are marched without.
+//! side with another energy, or nearly the same.  Where the two ends of a spring with a free length can meet, every step is looked at: where the method knows
+//! the motion inside it by the [search](crate::stepping::search) for all events, of the squared length
+//!
+//! ```text
+//! g = |D|² - (1e-6 L0)²,     |g''| <= 2 |D'|² + 2 |D| |D''|
+//! ```
+//!
+//! and else by the cubic through its ends.  Mechanisms whose springs are too far from their places for that are marched without.
 
 use crate::arithmetic::Complex;
 use crate::dynamics::force::Spring;
 use crate::dynamics::{Form, Glance, Mechanism, State, Time};
+use crate::stepping::search::{Chebyshev, Crossing, Curve, Part, crossing};
 use crate::stepping::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
 
 /// A length below this share of the free length is none.
 const NONE: f64 = 1e-6;
 /// Approaches to less than this share of the shorter length at the step's ends are looked at.
 const NEAR: f64 = 0.5;
-/// Parts of a step in which an approach is looked for, and halvings by which it is found.
-const PARTS: usize = 16;
+/// Halvings by which the nearest point of a cubic is found.
 const HALVINGS: usize = 50;
+/// Degrees of the interpolants of a span inside a step, and what the last coefficients may be of the free length.
+const DEGREES: [usize; 3] = [8, 16, 32];
+const RESOLVED: f64 = 1e-9;
 
 /// A method that stops where a spring loses its length.
 pub(super) struct Shrinking<P: ?Sized> {
@@ -36,7 +45,7 @@ pub(super) fn shrinking(mechanism: &Mechanism) -> Vec<usize> {
         let (all, most) = (lengths.iter().sum::<f64>(), lengths.iter().copied().fold(0.0, f64::max));
         let pulls = spring.free_length > 0.0 && (spring.stiffness > 0.0 || spring.damping > 0.0);
         // Rounding must not open a gap that is none.
-        pulls && spring.span.shifts.is_empty() && 2.0 * most <= all * (1.0 + 1e-9)
+        pulls && (!spring.span.shifts.is_empty() || 2.0 * most <= all * (1.0 + 1e-9))
     };
     mechanism.springs.iter().enumerate().filter(|(_, spring)| can(spring)).map(|(number, _)| number).collect()
 }
@@ -56,11 +65,41 @@ impl<P: Form + ?Sized> Shrinking<P> {
     }
 }
 
-/// D and D' of a spring \[m, m/s\].
-fn span(spring: &Spring, at: &Glance, z: &mut Vec<Complex<f64>>) -> [Complex<f64>; 2] {
+/// D and D' of a spring of a mechanism \[m, m/s\].
+fn span(mechanism: &Mechanism, number: usize, at: &Glance, z: &mut Vec<Complex<f64>>) -> [Complex<f64>; 2] {
+    let (spring, bodies) = (&mechanism.springs[number], mechanism.bodies.len());
     z.clear();
-    z.extend(at.phi.iter().map(|&phi| Complex::unit(phi)));
+    z.extend(at.phi[..bodies].iter().map(|&phi| Complex::unit(phi)));
+    // The feet of bodies that hang on nothing are where the first of their coordinates is.
+    z.extend((bodies..at.phi.len()).map(|x| Complex::new(at.phi[x], at.phi.get(x + 1).copied().unwrap_or_default())));
     [spring.span.position(z), spring.span.velocity(z, &at.omega)]
+}
+
+/// |D|² less what counts as none, over the free length: D's components over it.
+struct Length([Chebyshev; 2]);
+
+impl Curve for Length {
+    fn at(&self, t: f64) -> [f64; 2] {
+        let [x, y] = [self.0[0].at(t), self.0[1].at(t)];
+        [x[0] * x[0] + y[0] * y[0] - NONE * NONE, 2.0 * (x[0] * x[1] + y[0] * y[1])]
+    }
+
+    fn about(&self, centre: f64, radius: f64) -> Part {
+        let [x, y] = [self.0[0].about(centre, radius), self.0[1].about(centre, radius)];
+        let [value, slope] = self.at(centre);
+        let bend = libm::hypot(x.bend, y.bend);
+        let speed = libm::hypot(x.slope, y.slope) + bend * radius;
+        let length = libm::hypot(x.value, y.value) + speed * radius;
+        Part { value, slope, bend: 2.0 * (speed * speed + length * bend), rounding: length * (x.rounding + y.rounding) }
+    }
+}
+
+/// True where the ends of a spring may meet in a step, if they are at most twice as fast on the way as at its ends.
+fn can_meet(a: [Complex<f64>; 2], b: [Complex<f64>; 2], time: f64) -> bool {
+    let size = |x: Complex<f64>| x.norm_squared().sqrt();
+    let reach = time * (size(a[1]).max(size(b[1])) + size(b[1] - a[1]));
+    // Not a number is looked at.
+    !(size(a[0]).min(size(b[0])) > reach)
 }
 
 /// The cubic through D and D' at both ends of a step, `share` of the way.
@@ -91,34 +130,31 @@ fn suspected(number: usize, a: [Complex<f64>; 2], b: [Complex<f64>; 2], time: f6
 }
 
 impl<P: Form + ?Sized> Shrinking<P> {
-    /// The nearest approach of a spring in the last step, by the motion inside it.
+    /// Where a spring loses its length in the last step, by the motion inside it.
     fn searched(&mut self, problem: &mut P, number: usize, time: f64) -> Option<Approach> {
         let Self { method, from, before, z, .. } = self;
         let mut inside = from.clone();
-        let mut at = |seconds: f64| {
-            method.within(problem, from, from.time + seconds, &mut inside);
-            problem.glance(&inside, before);
-            span(&problem.mechanism().springs[number], before, z)
-        };
-        let closing = |[span, rate]: [Complex<f64>; 2]| span.dot(rate) < 0.0;
-        let mut nearest: Option<Approach> = None;
-        let mut was_closing = closing(at(0.0));
-        for part in 1..=PARTS {
-            let [mut low, mut high] = [part - 1, part].map(|part| part as f64 / PARTS as f64 * time);
-            let is_closing = closing(at(high));
-            if was_closing && !is_closing {
-                for _ in 0..HALVINGS {
-                    let middle = 0.5 * (low + high);
-                    if closing(at(middle)) { low = middle } else { high = middle }
-                }
-                let length = at(low)[0].norm_squared().sqrt();
-                if nearest.is_none_or(|nearest| length < nearest.length) {
-                    nearest = Some(Approach { spring: number, length, after: low });
-                }
+        let free = problem.mechanism().springs[number].free_length;
+        let mut spans = [Vec::new(), Vec::new()];
+        for degree in DEGREES {
+            spans.iter_mut().for_each(Vec::clear);
+            for share in Chebyshev::nodes(degree) {
+                method.within(problem, from, from.time + share * time, &mut inside);
+                problem.glance(&inside, before);
+                let [here, _] = span(problem.mechanism(), number, before, z);
+                spans[0].push(here.re / free);
+                spans[1].push(here.im / free);
             }
-            was_closing = is_closing;
+            if spans.iter().all(|values| Chebyshev::through(values).tail() < RESOLVED) {
+                break;
+            }
         }
-        nearest
+        let length = Length(spans.map(|values| Chebyshev::through(&values)));
+        match crossing(&length, 1.0) {
+            Crossing::At(share) => Some(Approach { spring: number, length: NONE * free, after: share * time }),
+            Crossing::Inside(_) => Some(Approach { spring: number, length: NONE * free, after: 0.0 }),
+            Crossing::Nothing => None,
+        }
     }
 
     fn stop(&self, problem: &P, approach: Approach, time: f64) -> StepError {
@@ -155,19 +191,23 @@ impl<P: Form + ?Sized> Method<P> for Shrinking<P> {
         loop {
             problem.glance(state, &mut self.before);
             self.from.clone_from(state);
-            let mut found: Option<(Approach, f64)> = None;
+            let mut found: Vec<(Approach, f64)> = Vec::new();
             let mut is_enough = false;
+            let is_dense = self.method.is_dense();
             let Self { method, springs, before, now, from, z, .. } = self;
             let reached = method.advance(problem, state, until, tally, &mut |problem, state| {
                 problem.glance(state, now);
                 let time = (state.time - from.time).hi;
-                found = springs.iter().find_map(|&number| {
-                    let spring = &problem.mechanism().springs[number];
-                    suspected(number, span(spring, before, z), span(spring, now, z), time)
-                });
+                found.extend(springs.iter().filter_map(|&number| {
+                    let [a, b] = [span(problem.mechanism(), number, before, z), span(problem.mechanism(), number, now, z)];
+                    match is_dense {
+                        true => can_meet(a, b, time).then_some((Approach { spring: number, length: 0.0, after: 0.0 }, 0.0)),
+                        false => suspected(number, a, b, time),
+                    }
+                }));
                 let seen = watch(problem, state)?;
                 is_enough = seen.is_enough();
-                if found.is_none() {
+                if found.is_empty() {
                     if seen.is_changed() {
                         problem.glance(state, before);
                     } else {
@@ -178,17 +218,20 @@ impl<P: Form + ?Sized> Method<P> for Shrinking<P> {
                 }
                 Ok(if seen.is_changed() { Seen::ChangedEnough } else { Seen::Enough })
             })?;
-            let Some((approach, off)) = found else { return Ok(reached) };
+            if found.is_empty() {
+                return Ok(reached);
+            }
             let time = (state.time - self.from.time).hi;
-            let (approach, off) = match self.method.is_dense() {
-                true => (self.searched(problem, approach.spring, time), 0.0),
-                false => (Some(approach), off),
+            let seen: Vec<Approach> = match is_dense {
+                true => found.iter().filter_map(|(approach, _)| self.searched(problem, approach.spring, time)).collect(),
+                false => {
+                    let free = |spring: usize| problem.mechanism().springs[spring].free_length;
+                    let is_none = |(approach, off): &&(Approach, f64)| approach.length <= NONE * free(approach.spring) + off;
+                    found.iter().filter(is_none).map(|found| found.0).collect()
+                }
             };
-            if let Some(approach) = approach.filter(|approach| {
-                let free = problem.mechanism().springs[approach.spring].free_length;
-                approach.length <= NONE * free + off
-            }) {
-                let stop = self.stop(problem, approach, time);
+            if let Some(first) = seen.into_iter().min_by(|a, b| a.after.total_cmp(&b.after)) {
+                let stop = self.stop(problem, first, time);
                 state.clone_from(&self.from);
                 return Err(stop);
             }

@@ -66,12 +66,12 @@ impl<const N: usize> Field for Baumgarte<N> {
         self.inner.watched()
     }
 
-    fn gap(&self, event: usize, along: Along) -> Option<[f64; 2]> {
+    fn gap(&self, event: usize, along: Along) -> Option<[f64; 3]> {
         self.inner.gap(event, along)
     }
 
-    fn gap_bounds(&self, event: usize, t: f64, pace: f64, first: &[f64], second: &[f64]) -> [f64; 2] {
-        self.inner.gap_bounds(event, t, pace, first, second)
+    fn gap_bend(&self, event: usize, t: f64, pace: f64, first: &[f64], second: &[f64]) -> f64 {
+        self.inner.gap_bend(event, t, pace, first, second)
     }
 }
 

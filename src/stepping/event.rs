@@ -143,20 +143,27 @@ struct Gap<'a, F: ?Sized> {
     room: &'a RefCell<[Vec<f64>; 2]>,
 }
 
-impl<F: Field + ?Sized> Curve for Gap<'_, F> {
-    fn at(&self, t: f64) -> [f64; 2] {
+impl<F: Field + ?Sized> Gap<'_, F> {
+    fn along(&self, t: f64) -> [f64; 3] {
         let [y, slope] = &mut *self.room.borrow_mut();
         self.dense.at(t, y, slope);
         let along = Along { time: self.state.time + t * self.h, pace: self.h, y, slope };
-        self.field.gap(self.event, along).unwrap_or([f64::NAN; 2])
+        self.field.gap(self.event, along).unwrap_or([f64::NAN; 3])
+    }
+}
+
+impl<F: Field + ?Sized> Curve for Gap<'_, F> {
+    fn at(&self, t: f64) -> [f64; 2] {
+        let [value, slope, _] = self.along(t);
+        [value, slope]
     }
 
     fn about(&self, centre: f64, radius: f64) -> Part {
-        let [value, slope] = self.at(centre);
+        let [value, slope, size] = self.along(centre);
         let [first, second] = &mut *self.room.borrow_mut();
         self.dense.bounds(centre, radius, first, second);
         let time = self.state.time.hi.abs() + self.h;
-        let [bend, size] = self.field.gap_bounds(self.event, time, self.h, first, second);
+        let bend = self.field.gap_bend(self.event, time, self.h, first, second);
         Part { value, slope, bend, rounding: ROUNDING * size }
     }
 }
@@ -217,7 +224,7 @@ impl Search {
         let none = vec![0.0; count];
         opaque.clear();
         for event in 0..field.events() {
-            let [off, _] = field.gap_bounds(event, time, 0.0, &none, &dense.off);
+            let off = field.gap_bend(event, time, 0.0, &none, &dense.off);
             if !off.is_finite() {
                 opaque.push(event);
                 continue;
@@ -280,7 +287,7 @@ impl Search {
             let (y, slope) = step.end();
             let known = field.gap(event, Along { time: state.time + best, pace: 1.0, y, slope });
             let gap = match known {
-                Some([gap, _]) => gap,
+                Some([gap, ..]) => gap,
                 None => {
                     field.gaps(state.time + best, y, &mut self.gaps);
                     self.gaps[event]
@@ -291,7 +298,7 @@ impl Search {
                 break;
             }
             let slope = match known {
-                Some([_, slope]) => slope,
+                Some([_, slope, _]) => slope,
                 // A secant once there are two points; the closing speed from the first step until then.
                 None if gap_before.is_nan() => self.closing_speed(field, step, state, best, event, gap),
                 None => (gap - gap_before) / (best - before),

@@ -18,6 +18,8 @@
 pub const TOUCH: f64 = 1e-12;
 /// Share of the step below which two zeros are one.
 const CLOSE: f64 = 1e-9;
+/// Parts looked at before signs at the ends of what is left decide: by then there is nothing but rounding.
+const MOST: usize = 4000;
 /// Share of the step from which on down a power series is taken about the middle of a part.
 const SMALL: f64 = 1.0 / 64.0;
 /// Roundings of its largest terms up to which a value is zero.
@@ -144,7 +146,7 @@ fn search(curve: &impl Curve, level: f64, from: f64, to: f64) -> (Option<f64>, u
         let (centre, radius) = (0.5 * (low + high), 0.5 * (high - low));
         match curve.about(centre, radius).tells(level, radius) {
             Told::NoZero => {}
-            Told::Open if radius >= least && count + 2 <= parts.len() => {
+            Told::Open if radius >= least && seen < MOST && count + 2 <= parts.len() => {
                 (parts[count], parts[count + 1]) = ((centre, high), (low, centre));
                 count += 2;
             }
@@ -241,7 +243,7 @@ fn bend(powers: &[f64], t: f64) -> f64 {
     terms.fold(0.0, |sum, (m, power)| sum * t + (m * (m - 1)) as f64 * power.abs())
 }
 
-/// A function on [0, 1] known by its values alone: its interpolant `Σ c_k T_k(2t - 1)`.
+/// A function on \[0, 1\] known by its values alone: its interpolant `Σ c_k T_k(2t - 1)`.
 ///
 /// Its bound is |T_k''| <= k² (k² - 1)/3, which the fall of the c_k keeps small.  Source: L. N. Trefethen, *Approximation Theory and Approximation Practice*
 /// (2013), chapters 2, 3 and 8.
@@ -261,11 +263,11 @@ impl Chebyshev {
     pub fn through(values: &[f64]) -> Self {
         let degree = values.len().max(2) - 1;
         let end = |k: usize| if k == 0 || k == degree { 0.5 } else { 1.0 };
-        let wave = |j: usize, k: usize| libm::cos(std::f64::consts::PI * ((j * k) % (2 * degree)) as f64 / degree as f64);
-        let sum = |k: usize| values.iter().enumerate().fold(0.0, |sum, (j, value)| sum + end(j) * value * wave(j, k));
+        let wave: Vec<f64> = (0..2 * degree).map(|m| libm::cos(std::f64::consts::PI * m as f64 / degree as f64)).collect();
+        let sum = |k: usize| values.iter().enumerate().fold(0.0, |sum, (j, value)| sum + end(j) * value * wave[(j * k) % (2 * degree)]);
         let coefficients: Vec<f64> = (0..=degree).map(|k| 2.0 / degree as f64 * end(k) * sum(k)).collect();
-        let steep = |k: usize| 4.0 * (k * k * (k * k - k.min(1))) as f64 / 3.0;
-        let bend = coefficients.iter().enumerate().fold(0.0, |sum, (k, c)| sum + steep(k) * c.abs());
+        let steep = |(k, c): (usize, &f64)| 4.0 * (k * k * (k * k - k.min(1))) as f64 / 3.0 * c.abs();
+        let bend = coefficients.iter().enumerate().map(steep).sum();
         Self { coefficients, bend }
     }
 

@@ -256,14 +256,6 @@ struct Lane {
 impl Lane {
     /// Looks for a bar that turns over in a step.
     fn look(&mut self, bodies: usize, passage: &Passage) {
-        let turned = passage.turned[..bodies].iter().any(|&turned| turned != 0);
-        let heads_out = |bar: usize| {
-            let (phi, omega) = passage.at(bar, 0.0);
-            flip::heads_out(phi, omega)
-        };
-        if !turned && !(0..bodies).any(heads_out) {
-            return;
-        }
         let glance = |after: f64, glance: &mut Glance| {
             glance.phi.clear();
             glance.turns.clear();
@@ -280,7 +272,7 @@ impl Lane {
         glance(0.0, &mut self.seen[0]);
         glance(passage.step, &mut self.seen[1]);
         let [a, b] = &self.seen;
-        if turned || (0..bodies).any(|bar| flip::may_pass(bar, a, b, passage.step)) {
+        if flip::can_pass(a, b, passage.step) {
             self.point.flip = flip::search(passage.from.hi, passage.step, &self.seen, &mut |after| {
                 let mut there = Glance::default();
                 glance(after, &mut there);

@@ -1,0 +1,217 @@
+//! Events inside a step: impacts, turn-overs and springs without length are found however long the step is and however shallow the passage.
+
+mod common;
+
+use common::{pendulum, quarter_period, run};
+use driftless::run::{MethodId, Outcome, Request, Stabilization, Sweep, Vary, sweep};
+use driftless::scene::{Scene, Template, Wall, parse_scene};
+use driftless::stepping::Cause;
+use std::f64::consts::PI;
+
+/// The methods that take walls.
+const METHODS: [&str; 5] = ["taylor", "dp8", "dp5", "radau5", "radau9"];
+
+fn method(name: &str) -> Option<MethodId> {
+    Some(name.parse().expect("a method"))
+}
+
+fn by(name: &str, until: f64) -> Request {
+    Request { method: method(name), until: Some(until), every: Some(until), ..Request::default() }
+}
+
+/// A bar that turns freely about one end, at a constant rate but for impacts, and a wall for its tip.
+fn turning(length: f64, start: [f64; 2], through: [f64; 2], normal: [f64; 2]) -> Scene {
+    let [phi, omega] = start;
+    let text = format!(
+        r#"{{"name": "turning", "gravity": [0, 0], "until": 6, "every": 6,
+        "bars": [{{"name": "bar", "mass": 1, "centre": [{}, 0], "inertia": 0.05, "length": {length}}}],
+        "hinges": [{{"name": "O", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "bar", "point": [0, 0]}}]}}],
+        "walls": [{{"name": "wall", "body": "bar", "point": [{length}, 0], "restitution": 0.5,
+                    "line": {{"through": [{}, {}], "normal": [{}, {}]}}}}],
+        "start": {{"bar": {{"phi": {phi}, "omega": {omega}}}}}}}"#,
+        0.5 * length,
+        through[0],
+        through[1],
+        normal[0],
+        normal[1]
+    );
+    parse_scene(&text, "turning", &[]).expect("a scene")
+}
+
+/// From 0.3 rad up and over to the wall near the lowest point, back and over to its other side: twice half the rate is left.
+#[test]
+fn a_tip_that_dips_below_its_wall_for_a_moment_is_stopped_both_times() {
+    let edge = 0.999_f64.asin();
+    let (first, second) = (PI + edge, -edge);
+    let t = [(first - 0.3) / 3.0, (first - 0.3) / 3.0 + (first - second) / 1.5];
+    for name in METHODS {
+        for every in [6.0, 0.01] {
+            let scene = turning(1.0, [0.3, 3.0], [0.0, -0.999], [0.0, 1.0]);
+            let outcome = run(&scene, &Request { every: Some(every), ..by(name, 6.0) });
+            assert_eq!((outcome.stop.as_ref(), outcome.strike_count), (None, 2), "{name}, every {every}");
+            for (strike, t) in outcome.strikes.iter().zip(t) {
+                assert!((strike.t - t).abs() < 1e-11, "{name}, every {every}: {} instead of {t}", strike.t);
+            }
+            let phi = second + 0.75 * (6.0 - t[1]);
+            assert!((outcome.last.phi[0] - phi).abs() < 1e-11, "{name}, every {every}: {} instead of {phi}", outcome.last.phi[0]);
+        }
+    }
+}
+
+/// A tip that turns at 50 rad/s grazes a wall across its circle at the depths 1e-4 to 1e-12 of its length: it is there ∓acos(1 - depth) from the crown, which
+/// is 2.8e-8 s for the last.
+#[test]
+fn a_turning_tip_grazes_its_wall_however_shallowly() {
+    for name in METHODS {
+        for digits in [4, 6, 8, 10, 12] {
+            let depth = 10_f64.powi(-digits);
+            let scene = turning(0.6, [-2.0, 50.0], [0.6 * (1.0 - depth), 0.0], [-1.0, 0.0]);
+            let outcome = run(&scene, &by(name, 0.06));
+            assert_eq!((outcome.stop.as_ref(), outcome.strike_count), (None, 1), "{name} at depth {depth:e}");
+            // 1 - cos of a small angle.
+            let before = 2.0 * (0.5 * depth).sqrt().asin();
+            let t = (2.0 - before) / 50.0;
+            // Rounding of the gap over its slope.
+            let unsure = 1e-12 + 1e-15 / (50.0 * before);
+            assert!((outcome.strikes[0].t - t).abs() < unsure, "{name} at depth {depth:e}: {} instead of {t}", outcome.strikes[0].t);
+        }
+        let clear = turning(0.6, [-2.0, 50.0], [0.6 * (1.0 + 1e-12), 0.0], [-1.0, 0.0]);
+        assert_eq!(run(&clear, &by(name, 0.06)).strike_count, 0, "{name}");
+    }
+}
+
+/// A pendulum let go at 1 rad turns back at -1 rad, just beyond or just before a wall through its hinge.
+fn swinging(depth: f64) -> Scene {
+    let mut scene = pendulum(1.0, 0.0);
+    let angle = depth - 1.0;
+    let normal = [-angle.sin(), angle.cos()];
+    scene.walls.push(Wall { name: "wall".into(), bar: 0, point: [1.0, 0.0], through: [0.0, 0.0], normal, restitution: 0.5 });
+    scene
+}
+
+#[test]
+fn a_swing_that_turns_back_at_its_wall_touches_it_or_does_not() {
+    let half = 2.0 * quarter_period(1.0);
+    // The amplitude is only known as well as the tolerance says.
+    for (name, rtol, least) in [
+        ("taylor", 1e-15, 1e-12),
+        ("dp8", 1e-12, 1e-10),
+        ("dp5", 1e-12, 1e-9),
+        ("radau9", 1e-12, 1e-10),
+        ("radau5", 1e-11, 1e-8),
+        ("dp8", 1e-9, 1e-7),
+        ("dp5", 1e-6, 1e-4),
+        ("radau9", 1e-6, 1e-4),
+        ("dp8", 1e-4, 1e-2),
+    ] {
+        let mut depth = 1e-2;
+        while depth >= 0.99 * least {
+            let request = Request { rtol: Some(rtol), ..by(name, 1.5 * half) };
+            let outcome = run(&swinging(depth), &request);
+            assert_eq!((outcome.stop.as_ref(), outcome.strike_count), (None, 1), "{name} at {rtol:e}, depth {depth:e}");
+            // omega² = 30 (cos(1 - depth) - cos 1).
+            let speed = (30.0 * ((1.0 - depth).cos() - 1f64.cos())).sqrt();
+            let seen = -outcome.strikes[0].approach;
+            assert!((seen - speed).abs() < 20.0 * least / speed, "{name} at {rtol:e}, depth {depth:e}: {seen:e} instead of {speed:e} m/s");
+            let clear = run(&swinging(-depth), &request);
+            assert_eq!((clear.stop.as_ref(), clear.strike_count), (None, 0), "{name} at {rtol:e}, {depth:e} before the wall");
+            depth *= 0.1;
+        }
+    }
+}
+
+/// The driven angle is a law of time and no unknown where it is eliminated.
+#[test]
+fn a_wall_behind_a_driven_bar_is_met_by_every_form() {
+    let text = r#"{"name": "driven", "gravity": [0, -9.81], "until": 3, "every": 3,
+        "bars": [{"name": "crank", "mass": 0.1, "centre": [0.1, 0], "inertia": 0.001, "length": 0.2},
+                 {"name": "flail", "mass": 0.2, "centre": [0.3, 0], "inertia": 0.006, "length": 0.6}],
+        "hinges": [{"name": "O", "between": [{"body": "ground", "point": [0, 0]}, {"body": "crank", "point": [0, 0]}]},
+                   {"name": "P", "between": [{"body": "crank", "point": [0.2, 0]}, {"body": "flail", "point": [0, 0]}]}],
+        "motors": [{"name": "motor", "body": "crank", "law": {"start": 0, "rate": 4, "sines": [{"amplitude": 0.3, "frequency": 9, "phase": 0}]}}],
+        "walls": [{"name": "wall", "body": "flail", "point": [0.6, 0], "restitution": 0.7, "line": {"through": [0, -0.75], "normal": [0, 1]}}],
+        "start": {"flail": {"phi": -0.5, "omega": 0}}}"#;
+    let scene = parse_scene(text, "driven", &[]).expect("a scene");
+    let of = |name: &str, stabilize: Option<Stabilization>| -> Outcome {
+        run(&scene, &Request { rtol: Some(1e-11), stabilize, ..by(name, 3.0) })
+    };
+    let known = of("taylor", None);
+    assert!(known.stop.is_none() && known.strike_count > 0, "{known:?}");
+    for name in ["dp8", "dp5", "radau9"] {
+        for stabilization in [Stabilization::Elimination, Stabilization::Projection] {
+            let outcome = of(name, Some(stabilization));
+            assert_eq!((outcome.stop.as_ref(), outcome.strike_count), (None, known.strike_count), "{name} {stabilization:?}");
+            for (a, b) in outcome.strikes.iter().zip(&known.strikes) {
+                assert!((a.t - b.t).abs() < 1e-7, "{name} {stabilization:?}: {a:?} {b:?}");
+            }
+        }
+    }
+}
+
+/// Angles of a bar on a torsion spring wind, and are not wrapped: `t = ∫ dphi/omega` from 0 to π, with omega² = omega_0² - 2 m g l sin(phi)/I.
+#[test]
+fn a_bar_on_a_torsion_spring_turns_over_when_it_does() {
+    let text = r#"{"name": "winding", "gravity": [0, -9.81], "until": 2, "every": 0.5,
+        "bars": [{"name": "bar", "mass": 1, "centre": [0.5, 0], "inertia": 0.083, "length": 1}],
+        "hinges": [{"name": "O", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+        "torsion_springs": [{"name": "spring", "body": "bar", "stiffness": 1e-12, "free_angle": 0}],
+        "start": {"bar": {"phi": 0, "omega": 10}}}"#;
+    let expected = |omega: f64| {
+        let rate = |phi: f64| (omega * omega - 2.0 * 9.81 * 0.5 * phi.sin() / 0.333).sqrt();
+        // Simpson's rule.
+        let (parts, h) = (2000, PI / 2000.0);
+        let weight = |k: u32| if k == 0 || k == parts { 1.0 } else { 2.0 + 2.0 * f64::from(k % 2) };
+        (0..=parts).map(|k| weight(k) / rate(f64::from(k) * h)).sum::<f64>() * h / 3.0
+    };
+    for name in ["taylor", "dp5", "dp8", "dopri5", "dop853", "radau5", "radau9", "gauss8", "gauss16", "rattle6"] {
+        let vary: Vec<Vary> = vec!["start.bar.omega=8..10:2".parse().expect("a range")];
+        let step = name.starts_with(['g', 'r']).then_some(1e-3).filter(|_| !name.starts_with("radau"));
+        let request = Request { method: method(name), until: Some(2.0), step, ..Request::default() };
+        let template = Template::new(text.into(), "winding".into(), &[]);
+        let plan = match Sweep::new(&template, vary, &request) {
+            Ok(plan) => plan,
+            Err(refused) => {
+                // Natural coordinates know no turns.
+                assert!(name.starts_with("rattle"), "{name}: {refused}");
+                continue;
+            }
+        };
+        let mut flips = Vec::new();
+        sweep(&plan, 1, &mut |point| {
+            flips.push(point.flip.map_or(f64::NAN, |flip| flip.t));
+            Ok(())
+        })
+        .expect("all points");
+        for (found, omega) in flips.iter().zip([8.0, 10.0]) {
+            let loose = if name == "rattle6" { 1e-6 } else { 1e-8 };
+            assert!((found - expected(omega)).abs() < loose, "{name}: {found} instead of {}", expected(omega));
+        }
+    }
+}
+
+/// A ball without hinges on a spring to the ground: x = L0 + (x0 - L0) cos(w t) + v0/w sin(w t) until the ends meet.
+#[test]
+fn a_spring_on_a_free_body_is_watched_for_zero_length() {
+    let scene = |aside: f64| {
+        let text = format!(
+            r#"{{"name": "ball", "gravity": [0, 0], "until": 1, "every": 0.1,
+            "bars": [{{"name": "ball", "mass": 0.5, "centre": [0, 0], "inertia": 0.1}}],
+            "springs": [{{"name": "spring", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "ball", "point": [0, 0]}}],
+                          "stiffness": 2, "free_length": 0.5}}],
+            "start": {{"ball": {{"phi": 0, "omega": 0, "origin": [0.3, {aside}], "velocity": [-2, 0]}}}}}}"#
+        );
+        parse_scene(&text, "ball", &[]).expect("a scene")
+    };
+    // w = 2 /s: 0.5 - 0.2 cos 2t - sin 2t = 0.
+    let size = 0.2_f64.hypot(1.0);
+    let t = 0.5 * ((0.5 / size).asin() - (0.2 / size).asin());
+    for name in ["taylor", "dp8", "dp5", "radau5", "radau9", "gauss8"] {
+        let step = name.starts_with('g').then_some(0.01);
+        let request = |name: &str| Request { step, every: Some(0.1), ..by(name, 1.0) };
+        let stop = run(&scene(0.0), &request(name)).stop.unwrap_or_else(|| panic!("{name} did not stop"));
+        assert_eq!(stop.cause, Cause::SpringWithoutLength, "{name}: {stop}");
+        assert!(stop.what.contains("`spring`") && (stop.t - t).abs() < 1e-5, "{name}: {stop}, not at {t}");
+        let past = run(&scene(0.05), &request(name)).stop;
+        assert!(past.as_ref().is_none_or(|stop| stop.cause != Cause::SpringWithoutLength), "{name}: {past:?}");
+    }
+}
