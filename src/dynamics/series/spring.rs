@@ -71,7 +71,8 @@ impl<T: Real> SpringSeries<T> {
                 sum / square[0].scale(m as f64)
             };
             let stretched = product(span, &self.inverse_length[..=m], |span, s| span.times(s));
-            force += stretched.times(T::of(spring.stiffness * spring.free_length));
+            // In double-double the product must not be rounded: a constant error acts in every step.
+            force += stretched.times(T::of(spring.stiffness).scale(spring.free_length));
         }
         if spring.damping != 0.0 {
             self.inverse_square[m] = if m == 0 {
