@@ -176,6 +176,10 @@ impl<const N: usize> Field for Elimination<N> {
         }
     }
 
+    fn unit(&self, i: usize) -> f64 {
+        if i < 2 * self.mechanism.ties.count() { 1.0 } else { self.mechanism.energy_scale }
+    }
+
     fn events(&self) -> usize {
         self.mechanism.contacts.len()
     }

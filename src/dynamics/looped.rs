@@ -241,6 +241,10 @@ impl Field for Looped {
     fn label(&self, i: usize) -> String {
         self.angles.label(i)
     }
+
+    fn unit(&self, i: usize) -> f64 {
+        self.angles.unit(i)
+    }
 }
 
 impl Form for Looped {

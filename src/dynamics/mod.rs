@@ -189,6 +189,12 @@ pub trait Field {
     /// What unknown `i` is, for messages: `omega of bar2`.
     fn label(&self, i: usize) -> String;
 
+    /// What the absolute tolerance of unknown `i` counts in: 1, or the energy scale of the mechanism \[J\] for work and other energies.  Unknowns in another unit
+    /// than 1 are quadratures: no rate depends on them.
+    fn unit(&self, _i: usize) -> f64 {
+        1.0
+    }
+
     /// Number of event functions; none by default.
     fn events(&self) -> usize {
         0

@@ -103,6 +103,10 @@ impl<const N: usize, const ACCOUNT: bool> Field for Multiplier<N, ACCOUNT> {
         }
     }
 
+    fn unit(&self, i: usize) -> f64 {
+        if i < 2 * self.mechanism.coordinates() { 1.0 } else { self.mechanism.energy_scale }
+    }
+
     fn events(&self) -> usize {
         self.mechanism.contacts.len()
     }

@@ -54,6 +54,10 @@ impl<const N: usize> Field for Baumgarte<N> {
         self.inner.label(i)
     }
 
+    fn unit(&self, i: usize) -> f64 {
+        self.inner.unit(i)
+    }
+
     fn events(&self) -> usize {
         self.inner.events()
     }

@@ -77,6 +77,7 @@ pub struct Explicit<P> {
     k: Vec<f64>,
     stage: Vec<f64>,
     scale: Vec<f64>,
+    units: Vec<f64>,
     next: Vec<f64>,
     next_low: Vec<f64>,
     search: Search,
@@ -91,6 +92,7 @@ impl<P: Pair> Explicit<P> {
             k: Vec::new(),
             stage: Vec::new(),
             scale: Vec::new(),
+            units: Vec::new(),
             next: Vec::new(),
             next_low: Vec::new(),
             search: Search::default(),
@@ -119,7 +121,8 @@ impl<P: Pair> Explicit<P> {
             let change = self.stage[i] * h;
             let (sum, rest) = two_sum(state.y[i], change);
             (self.next[i], self.next_low[i]) = fast_two_sum(sum, rest + state.low[i]);
-            self.scale[i] = self.tolerance.absolute + self.tolerance.relative * state.y[i].abs().max(self.next[i].abs());
+            let size = state.y[i].abs().max(self.next[i].abs());
+            self.scale[i] = self.tolerance.absolute * self.units[i] + self.tolerance.relative * size;
         }
         let (_, rest) = self.k.split_at_mut(P::STAGES * n);
         field.rate(state.time + h, &self.next, &mut rest[..n]);
@@ -129,9 +132,7 @@ impl<P: Pair> Explicit<P> {
     /// A first step from the size of the rate and its change (Hairer, Nørsett, Wanner, page 169).
     fn first_step<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, span: f64, tally: &mut Tally) -> f64 {
         let n = state.y.len();
-        for i in 0..n {
-            self.scale[i] = self.tolerance.absolute + self.tolerance.relative * state.y[i].abs();
-        }
+        super::scales(self.tolerance, &state.y, &self.units, &mut self.scale);
         let norm = |x: &dyn Fn(usize) -> f64, scale: &[f64]| ((0..n).map(|i| (x(i) / scale[i]).powi(2)).sum::<f64>() / n as f64).sqrt();
         let (d0, d1) = (norm(&|i| state.y[i], &self.scale), norm(&|i| self.k[i], &self.scale));
         let guess = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 };
@@ -283,6 +284,7 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
         if state.memory.len() == 1 + n {
             self.k[..n].copy_from_slice(&state.memory[1..]);
         } else {
+        super::units(field, n, &mut self.units);
             field.rate(state.time, &state.y, &mut self.k[..n]);
             tally.evaluations += 1;
         }

@@ -24,7 +24,7 @@ pub use radau::Radau;
 pub use taylor::Taylor;
 pub use windows::{Dop853, Dopri5};
 
-use crate::dynamics::{State, Time};
+use crate::dynamics::{Field, State, Time};
 
 /// Counts of one run, and the effort it is allowed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -228,10 +228,16 @@ pub struct StepError {
     pub hint: String,
 }
 
-/// An unknown's size over its tolerance: what errors and changes of unknowns are divided by.
-fn scales(tolerance: Tolerance, y: &[f64], scale: &mut [f64]) {
-    for (scale, y) in scale.iter_mut().zip(y) {
-        *scale = tolerance.absolute + tolerance.relative * y.abs();
+/// Writes the units the unknowns of a field are measured in.
+fn units<F: Field + ?Sized>(field: &F, count: usize, units: &mut Vec<f64>) {
+    units.clear();
+    units.extend((0..count).map(|i| field.unit(i)));
+}
+
+/// The tolerance of every unknown: what errors and changes of unknowns are divided by.
+fn scales(tolerance: Tolerance, y: &[f64], units: &[f64], scale: &mut [f64]) {
+    for ((scale, y), unit) in scale.iter_mut().zip(y).zip(units) {
+        *scale = tolerance.absolute * unit + tolerance.relative * y.abs();
     }
 }
 

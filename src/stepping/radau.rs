@@ -69,6 +69,7 @@ struct Work {
     /// f(y), for the state of the step (d).
     start: Vec<f64>,
     /// (d each)
+    units: Vec<f64>,
     scale: Vec<f64>,
     stage: Vec<f64>,
     low: Vec<f64>,
@@ -287,12 +288,13 @@ impl<F: Field + ?Sized> Method<F> for Radau {
         let mut left = (until - state.time).hi;
         let mut control = Control { wanted: 0.0, accepted: 0.0, error: 1.0, contraction: 1.0, keeps: 0.0 };
         let knows = self.recall(state, &mut control);
+        super::units(field, d, &mut self.work.units);
         let (mut has_start, mut is_hard, mut cuts) = (false, !knows, 0);
         while left > 0.0 {
             if !has_start {
                 field.fine_rate(state.time, &state.y, &state.low, &mut self.work.start);
                 tally.evaluations += 1;
-                scales(self.tolerance, &state.y, &mut self.work.scale);
+                scales(self.tolerance, &state.y, &self.work.units, &mut self.work.scale);
                 has_start = true;
             }
             if control.wanted == 0.0 {
@@ -467,7 +469,7 @@ mod tests {
         let mut state = State { y: vec![exact(0.0)], low: vec![0.0], ..State::default() };
         radau.resize(1);
         for step in 1..=count {
-            scales(radau.tolerance, &state.y, &mut radau.work.scale);
+            scales(radau.tolerance, &state.y, &[1.0], &mut radau.work.scale);
             radau.differentiate(&mut Bernoulli, Some(&state), &mut tally);
             // Goes on from where the iteration before gave up.
             assert!((0..5).any(|_| radau.repeat(&mut Bernoulli, &state, h, &mut tally)), "step {step} of {count}");

@@ -57,6 +57,8 @@ struct Window<'a, F: ?Sized> {
     field: RefCell<&'a mut F>,
     start: Time,
     n: usize,
+    /// Unknowns that are marched in another unit than their own, and that unit: the crate has one absolute tolerance for all.
+    scaled: Vec<(usize, f64)>,
     /// Rows that may still be kept.
     rows: usize,
 }
@@ -64,6 +66,9 @@ struct Window<'a, F: ?Sized> {
 impl<F: Field + ?Sized> Window<'_, F> {
     fn rate(&self, y: &[f64], rate: &mut [f64]) {
         self.field.borrow_mut().rate(self.start + DoubleDouble::of(y[self.n]), &y[..self.n], &mut rate[..self.n]);
+        for &(i, unit) in &self.scaled {
+            rate[i] /= unit;
+        }
         rate[self.n] = 1.0;
     }
 
@@ -188,10 +193,13 @@ fn part<F: Field + ?Sized>(
     }
     let mut y = state.y.clone();
     y.push(0.0);
+    let scaled: Vec<(usize, f64)> = (0..n).map(|i| (i, field.unit(i))).filter(|(_, unit)| *unit != 1.0).collect();
+    scaled.iter().for_each(|&(i, unit)| y[i] /= unit);
     let first = state.memory.first().map_or(0.0, |&h| h.min(span));
     let most = tally.effort.saturating_sub(tally.evaluations).div_ceil(stepper.attempt).min(u64::from(u32::MAX)) as u32;
     let rows = (MOST_KEPT / (n + 2)).max(LEAST_KEPT);
-    let (times, last, outcome) = integrate(Window { field: RefCell::new(field), start: state.time, n, rows }, &y, span, first, most);
+    let part = Window { field: RefCell::new(field), start: state.time, n, scaled: scaled.clone(), rows };
+    let (times, mut last, outcome) = integrate(part, &y, span, first, most);
     let reached_time = |x: f64| state.time.hi + x;
     match outcome {
         Ok(stats) => {
@@ -208,6 +216,11 @@ fn part<F: Field + ?Sized>(
         Err(IntegrationError::StepSizeUnderflow { x } | IntegrationError::StiffnessDetected { x }) => {
             let what = "the step fell below the resolution of time, or a rate became not finite".into();
             return Err(stop(Cause::StepTooSmall, reached_time(x), 0.0, what, "loosen the tolerance or use a stiff method"));
+        }
+    }
+    for &(i, unit) in &scaled {
+        if let Some(last) = last.get_mut(i) {
+            *last *= unit;
         }
     }
     if let Some(i) = last.iter().take(n).position(|y| !y.is_finite()) {

@@ -41,6 +41,8 @@ pub struct Bodies<const B: usize, const S: usize> {
     /// W \[N·m\].
     weight: [Row<B>; 2],
     springs: Springs<B, S>,
+    /// The energy scale \[J\].
+    energy: f64,
     /// Of the step's start, over the columns.
     columns: Vec<Column<B>>,
     scratch: Box<Scratch<B>>,
@@ -117,6 +119,7 @@ impl<const B: usize, const S: usize> Bodies<B, S> {
             diagonal,
             weight,
             springs,
+            energy: mechanism.energy_scale,
             columns: vec![Column { mass: zero, inverse: zero, cos: zero, sin: zero }; n],
             scratch: Box::new(Scratch { e: [[zero; 2]; MOST + 2], v: [[zero; 3]; MOST + 1] }),
         })
@@ -276,7 +279,7 @@ fn refined<L: Lanes, const B: usize>(
 #[inline(always)]
 pub fn step<L: Lanes, const B: usize, const S: usize>(bodies: &mut Bodies<B, S>, state: &mut State, left: f64) -> (f64, f64) {
     begin::<L, B, S>(bodies, state);
-    let Bodies { order: last, pace, rate, longest, coupling, diagonal, weight, columns, springs, scratch, .. } = bodies;
+    let Bodies { order: last, pace, rate, longest, coupling, diagonal, weight, columns, springs, energy, scratch, .. } = bodies;
     let last = *last;
     let start: Start<L, B> = Start {
         e: [load(&scratch.e[0][0]), load(&scratch.e[0][1])],
@@ -314,6 +317,12 @@ pub fn step<L: Lanes, const B: usize, const S: usize>(bodies: &mut Bodies<B, S>,
     }
     if !scratch.v[last][0].iter().flatten().all(|v| v.is_finite()) {
         return (f64::NAN, 0.0);
+    }
+    if let Some(power) = springs.power(last).last_chunk::<{ super::JUDGES }>() {
+        // The dampers' work over the energy scale counts as the rates do.
+        for (i, (size, power)) in sizes.iter_mut().zip(power.iter().rev()).enumerate() {
+            *size = size.max((power / ((last - i) as f64 * *energy)).abs());
+        }
     }
     let mut wanted = pace.step_of(last, &sizes);
     if S > 0 && wanted > *longest {

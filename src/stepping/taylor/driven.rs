@@ -41,6 +41,8 @@ pub struct Driven {
     load: [[[f64; 4]; 2]; MOST + 1],
     /// Fastest rate: small oscillations, and the motor \[rad/s\].
     rate: f64,
+    /// What an error of the unit vectors comes to in the work, over the energy scale: a part, and a part times the free body's rate \[s\].
+    share: [f64; 2],
 }
 
 /// Angle and rate of the free body and the motor's work, and what their leading parts leave out.
@@ -107,7 +109,9 @@ impl Driven {
         }
         let stiffness = pull.norm_squared().sqrt() + a.abs() * w * w;
         let rate = (stiffness / d).sqrt().max(w.abs());
-        Some(Self { law: law.clone(), coupling: a, weight: tree.weight[driven], load, rate })
+        let (swing, weight) = ((w * a).abs() / mechanism.energy_scale, tree.weight[driven]);
+        let share = [swing * w.abs() + weight.norm_squared().sqrt() / mechanism.energy_scale, swing];
+        Some(Self { law: law.clone(), coupling: a, weight, load, rate, share })
     }
 
     /// The longest step in which the terms left out still fall \[s\].
@@ -207,8 +211,12 @@ pub fn step<L: Lanes, const P: usize>(
         return (f64::NAN, 0.0);
     }
     let mut largest = [0.0; super::JUDGES];
+    // The work is made of the unit vectors, whose powers may fall more slowly than those of the rate.
+    let share = L::splat(driven.share[0] + driven.share[1] * v.abs());
     for (i, largest) in largest.iter_mut().enumerate() {
-        *largest = scratch.v[P - i][0].abs();
+        let vectors = L::of(scratch.e[P - i]).abs().mul(share);
+        let both = vectors.max(L::of(scratch.v[P - i]).abs()).array();
+        *largest = both.into_iter().fold(0.0, |most, size| if size > most { size } else { most });
     }
     let wanted = pace.step::<P>(&largest);
     let h = pace::taken(wanted, left);

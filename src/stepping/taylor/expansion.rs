@@ -87,6 +87,7 @@ impl<T: Coefficient> Expansion<T> {
         for (i, &size) in last.iter().enumerate() {
             least = least.min(minus_log2(size) / (order - i) as f64);
         }
+        least = least.min(self.work_allows());
         if with_vectors {
             let n = self.mechanism.coordinates();
             for k in order + 2 - JUDGES..=order + 1 {
@@ -98,6 +99,16 @@ impl<T: Coefficient> Expansion<T> {
         let step = libm::exp2(least + libm::log2(tolerance) / (order + 1) as f64).min(LONGEST);
         let beginning = largest(0).max(largest(1) * step);
         if tolerance < 0.1 * SHARE * beginning || last == [0.0; JUDGES] { step } else { self.shortened(&last, largest, step) }
+    }
+
+    /// The same of the work over the energy scale: the power of motors, dampers and applied forces may fall more slowly than the rates, and where all is driven
+    /// there are no rates.
+    fn work_allows(&self) -> f64 {
+        let (order, scale) = (self.series.order(), self.mechanism.energy_scale);
+        (order + 1 - JUDGES..=order).fold(f64::INFINITY, |least, k| {
+            let size = (self.series.power[k - 1].value() / (k as f64 * scale)).abs();
+            if size.is_nan() { least } else { least.min(minus_log2(size) / k as f64) }
+        })
     }
 
     /// The step of a motion that is smaller than the tolerance, whose terms must fall nevertheless.
