@@ -46,7 +46,7 @@ pub(super) trait March {
     /// pauses after a step where `pause` is true.
     fn advance(&mut self, until: Time, horizon: Time, lookout: Option<&mut Lookout>, pause: &mut Pause) -> Result<Reached, StepError>;
     fn read(&mut self, motion: &mut Motion);
-    /// Goes on from another motion, with what the method remembers.
+    /// Goes on from another motion: of what the method remembers with the step alone.
     fn jump(&mut self, motion: &Motion);
     fn tally(&self) -> Tally;
     /// Bounds the evaluations.
@@ -170,6 +170,7 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
         let memory = std::mem::take(&mut self.state.memory);
         self.state = self.problem.state(motion);
         self.state.memory = memory;
+        self.method.reset(&mut self.state);
     }
 
     fn tally(&self) -> Tally {
@@ -191,6 +192,7 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
     fn follow(&mut self, other: &dyn March) {
         self.tally = other.tally();
         self.state.memory = other.memory().to_vec();
+        self.method.reset(&mut self.state);
     }
 
     fn place(&self) -> Place {

@@ -257,6 +257,10 @@ impl<P: Form + ?Sized> Method<P> for Shrinking<P> {
         self.method.arrive(state);
     }
 
+    fn reset(&mut self, state: &mut State) {
+        self.method.reset(state);
+    }
+
     fn knows(&self) -> Vec<f64> {
         self.method.knows()
     }

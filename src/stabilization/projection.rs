@@ -115,6 +115,12 @@ where
         self.inner.arrive(state);
     }
 
+    /// What impacts change of the energy is not a step's.
+    fn reset(&mut self, state: &mut State) {
+        self.balance = None;
+        self.inner.reset(state);
+    }
+
     /// The balance after the last step, if any, and what there is to know of its end; then what the inner method knows.
     fn knows(&self) -> Vec<f64> {
         let own = [f64::from(self.balance.is_some()), self.balance.unwrap_or_default(), f64::from(self.near), f64::from(self.has_paused)];

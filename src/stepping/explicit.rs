@@ -268,6 +268,11 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
         P::ORDER
     }
 
+    /// Keeps the step proposed.
+    fn reset(&mut self, state: &mut State) {
+        state.memory.truncate(1);
+    }
+
     fn advance(
         &mut self,
         field: &mut F,
@@ -279,12 +284,12 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
         let (n, events) = (state.y.len(), field.events());
         super::refuse_the_past(P::NAME, state, until)?;
         self.resize(n);
+        super::units(field, n, &mut self.units);
         // The step proposed last; where the last call was cut short also the rate where it is known.
         let proposed = state.memory.first().copied();
         if state.memory.len() == 1 + n {
             self.k[..n].copy_from_slice(&state.memory[1..]);
         } else {
-        super::units(field, n, &mut self.units);
             field.rate(state.time, &state.y, &mut self.k[..n]);
             tally.evaluations += 1;
         }

@@ -147,6 +147,12 @@ pub trait Method<P: ?Sized> {
     /// Nothing of the method or of the march changes by it; methods that are not dense write nothing.
     fn within(&mut self, _problem: &mut P, _from: &State, _time: Time, _inside: &mut State) {}
 
+    /// Called where the state was changed from outside at once: an impact, or a contact that begins or ends.  Forgets all that depends on the motion before it:
+    /// predictors, Jacobians, rates, the history of errors.  Of the state's memory only the step remains, as a proposal.
+    fn reset(&mut self, state: &mut State) {
+        state.memory.clear();
+    }
+
     /// Called where a dense march has come to an output time: forgets what was of concern on the way to it.
     fn arrive(&self, state: &mut State) {
         state.memory.clear();

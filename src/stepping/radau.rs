@@ -115,9 +115,12 @@ impl Radau {
         StepError { cause, method: self.id().into(), t: state.time.hi, step, what, hint: hint.into() }
     }
 
-    /// Takes back what the state carries; false where it carries nothing of the kind.
+    /// Takes back what the state carries; false where it carries nothing of the kind, or a proposed step alone.
     fn recall(&mut self, state: &State, control: &mut Control) -> bool {
         let (d, s) = (state.y.len(), self.tableau.stages());
+        if let [wanted] = state.memory[..] {
+            control.wanted = wanted;
+        }
         let (Some((numbers, rest)), true) = (state.memory.split_first_chunk::<CONTROLS>(), state.memory.len() == CONTROLS + (s + 1) * d)
         else {
             return false;
@@ -285,10 +288,10 @@ impl<F: Field + ?Sized> Method<F> for Radau {
         let (d, events) = (state.y.len(), field.events());
         super::refuse_the_past(self.id(), state, until)?;
         self.resize(d);
+        super::units(field, d, &mut self.work.units);
         let mut left = (until - state.time).hi;
         let mut control = Control { wanted: 0.0, accepted: 0.0, error: 1.0, contraction: 1.0, keeps: 0.0 };
         let knows = self.recall(state, &mut control);
-        super::units(field, d, &mut self.work.units);
         let (mut has_start, mut is_hard, mut cuts) = (false, !knows, 0);
         while left > 0.0 {
             if !has_start {
@@ -426,6 +429,11 @@ impl<F: Field + ?Sized> Method<F> for Radau {
 
     /// The next step goes on as this one.
     fn arrive(&self, _state: &mut State) {}
+
+    /// Keeps the step proposed, which comes first.
+    fn reset(&mut self, state: &mut State) {
+        state.memory.truncate(1);
+    }
 }
 
 #[cfg(test)]

@@ -253,6 +253,9 @@ impl<F: Field + ?Sized> Method<F> for Dopri5 {
         5
     }
 
+    /// What it remembers is the step found.
+    fn reset(&mut self, _state: &mut State) {}
+
     fn advance(
         &mut self,
         field: &mut F,
@@ -278,6 +281,9 @@ impl<F: Field + ?Sized> Method<F> for Dop853 {
     fn order(&self) -> u32 {
         8
     }
+
+    /// What it remembers is the step found.
+    fn reset(&mut self, _state: &mut State) {}
 
     fn advance(
         &mut self,
