@@ -60,3 +60,51 @@ impl Law {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::point::Point;
+    use crate::dynamics::quadratic::Quadratic;
+    use crate::dynamics::row::Row;
+    use crate::scene::Sine;
+
+    #[test]
+    fn slopes_are_derivatives_and_bounds_are_bounds() {
+        let normal = Complex::unit(0.7);
+        let point = Point::floating(2).along(0, Complex::new(0.6, 0.1)).along(1, Complex::new(0.2, -0.4));
+        let measure = Measure::Place(Quadratic::along(&point, normal, 2));
+        let row = Row { name: "wall".into(), measure, law: None, push: None };
+        let contact = Contact { row, point, normal, restitution: 1.0, length: 0.5, force: 1.0 };
+        // Two angles and a foot, each a parabola in t.
+        let powers = [[0.3, 2.0, -1.5], [-1.0, -4.0, 0.4], [0.1, 0.5, 2.0], [0.7, -0.3, -1.0]];
+        let at = |k: usize, t: f64| [powers[k][0] + t * (powers[k][1] + t * powers[k][2]), powers[k][1] + 2.0 * t * powers[k][2]];
+        let gap = |t: f64| {
+            let element = |k: usize| match k < 2 {
+                true => turning(Complex::unit(at(k, t)[0]), at(k, t)[1]),
+                false => [Complex::new(at(2, t)[0], at(3, t)[0]), Complex::new(at(2, t)[1], at(3, t)[1])],
+            };
+            contact.gap_along(element).expect("a sum of elements")
+        };
+        let most = |k: usize| [2.0 * powers[k][2].abs(), powers[k][1].abs() + 2.0 * powers[k][2].abs()];
+        let (bound, h) = (contact.gap_bend(most), 1e-5);
+        let mut steepest = 0.0_f64;
+        for share in 0..=50 {
+            let t = f64::from(share) / 50.0;
+            let [before, here, after] = [gap(t - h), gap(t), gap(t + h)];
+            assert!((here[1] - (after[0] - before[0]) / (2.0 * h)).abs() < 1e-7 && here[2] >= here[0].abs());
+            steepest = steepest.max(((after[1] - before[1]) / (2.0 * h)).abs());
+        }
+        assert!(steepest <= bound && bound < 20.0 * steepest, "{steepest} {bound}");
+    }
+
+    #[test]
+    fn no_law_is_faster_than_its_bounds() {
+        let law = Law { start: 0.3, rate: -2.0, acceleration: 0.5, sines: vec![Sine { amplitude: 0.4, frequency: 7.0, phase: 0.1 }] };
+        let [rate, acceleration] = law.bounds(2.0);
+        for step in 0..=200 {
+            let [_, v, a] = law.angles::<f64>(crate::dynamics::Time::from(f64::from(step) * 0.01));
+            assert!(v.abs() <= rate && a.abs() <= acceleration);
+        }
+    }
+}
