@@ -2,24 +2,29 @@
 //!
 //! ```text
 //! of all points that touch and do not move along their normals:
-//! a_c >= 0,    f_c = -lambda_c >= 0,    a_c f_c = 0          a = a0 - S lambda,  S = G M⁻¹ Gᵀ,  rows of the motors always in force
+//! a_c >= 0,    f_c = -lambda_c >= 0,    a_c f_c = 0          a = a0 - S lambda,  S = G M⁻¹ Gᵀ,  the mechanism's rows always in force
 //! ```
 //!
 //! A wall has no friction, so that a contact that lasts is a row like any other as long as it presses, and does no work.
 //! Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996), chapter 5; the set is found by adding the point that is
 //! pressed hardest and dropping those that would be pulled (C. Lawson, R. Hanson, *Solving Least Squares Problems* (1974), chapter 23).
 
+pub mod metric;
 pub mod scale;
 
-use super::kernel::{Kernel, dot};
+use self::metric::{Basis, Gradient, Metric};
+use super::impact::{Contact, NO_FREEDOM};
+use super::kernel::dot;
+use super::row::Posture;
 use super::{Mechanism, Time};
-use nalgebra::{DMatrix, DVector};
+use crate::arithmetic::Complex;
+use nalgebra::DVector;
 
 /// Height of a rebound over the length of the contact below which a pressed point stays: ten times the least gap the search for impacts tells from
 /// touching.
 pub const REST_HEIGHT: f64 = 1e-11;
 /// Contact force over the force of the contact below which a point is not pressed; rounding makes forces of this size.
-const LEAST_FORCE: f64 = 4e-12;
+const LEAST_PRESSURE: f64 = 4e-12;
 /// |G| over the levers of the point below which it stands at a dead centre: there its wall has no hold on it, and a row would be singular.
 const DEAD_CENTRE: f64 = 1e-5;
 
@@ -36,64 +41,64 @@ impl Mechanism {
         mechanism
     }
 
+    /// The elements at these coordinates \[rad, m\].
+    pub fn elements(&self, phi: &[f64]) -> Vec<Complex<f64>> {
+        let mut z = vec![Complex::ZERO; self.coordinates()];
+        self.tree.face::<f64, 0>(phi, &mut z);
+        z
+    }
+
     /// Rows that are in force whatever touches.
     pub fn standing_rows(&self) -> usize {
         self.rows.len() - self.held.len()
     }
 
-    /// Which of the contacts `touching` stay, or `None` where the motors leave no freedom to keep a point out of its wall.
+    /// Which of the contacts `touching` stay, or `None` where the constraints leave no freedom to keep a point out of its wall.
     ///
-    /// Angles \[rad\] and rates \[rad/s\] of all bodies.  A point stays where it would rebound to less than [`REST_HEIGHT`] and be pressed.
+    /// Coordinates \[rad, m\] and rates \[rad/s, m/s\].  A point stays where it would rebound to less than [`REST_HEIGHT`] and be pressed.
     pub fn staying(&self, touching: &[usize], t: Time, phi: &[f64], omega: &[f64]) -> Option<Vec<usize>> {
-        let all = self.holding(touching);
-        let (n, size, motors) = (self.coordinates(), all.rows.len(), self.standing_rows());
-        let mut kernel = Kernel::<f64>::dense(&all);
-        kernel.accelerate_free::<0>(&all, t, phi, omega);
-        kernel.linearise::<0>(&all, t, phi, omega);
-        fn part(rows: &[f64], r: usize, n: usize) -> &[f64] {
-            &rows[r * n..(r + 1) * n]
-        }
-        let schur = DMatrix::from_fn(size, size, |r, s| dot(part(&kernel.jacobian, r, n), part(&kernel.lifted, s, n)));
-        let free = DVector::from_fn(size, |r, _| dot(part(&kernel.jacobian, r, n), &kernel.load) + kernel.rows[r].convective);
-        let contact = |r: usize| &self.contacts[touching[r - motors]];
-        let least = |r: usize| LEAST_FORCE * contact(r).force;
-        let mut set: Vec<usize> = (0..motors).collect();
+        let (metric, z) = (Metric::at(self, t, phi, omega)?, self.elements(phi));
+        let at = Posture { phi, z: &z, omega };
+        let acceleration = metric.acceleration();
+        let met = |&contact: &usize| {
+            Met::new(&self.contacts[contact], &metric, &acceleration, Gradient::of(&self.contacts[contact].row, t, at), omega)
+        };
+        let points: Vec<Met> = touching.iter().map(met).collect();
+        let mut set: Vec<usize> = Vec::new();
         // Every round adds or drops one point; more rounds than this would go in a circle.
-        for _ in 0..4 * size + 4 {
-            let multiplier = solve(&schur, &set, &free)?;
-            let pulled = (set.iter().copied().filter(|&r| r >= motors && -multiplier[r] < least(r)))
-                .max_by(|&a, &b| multiplier[a].total_cmp(&multiplier[b]));
-            if let Some(pulled) = pulled {
-                set.retain(|&r| r != pulled);
+        for _ in 0..4 * points.len() + 4 {
+            let mut basis = Basis::new(phi.len());
+            set.retain(|&c| basis.push(&points[c].free));
+            let change = basis.least(&set.iter().map(|&c| -points[c].acceleration).collect::<Vec<_>>());
+            let forces = basis.shares(&change);
+            let pulled = (set.iter().zip(&forces).map(|(&c, force)| (c, force / points[c].contact.force)))
+                .filter(|(_, pressure)| *pressure < LEAST_PRESSURE)
+                .min_by(|a, b| a.1.total_cmp(&b.1));
+            if let Some((pulled, _)) = pulled {
+                set.retain(|&c| c != pulled);
                 continue;
             }
-            let acceleration = &free - &schur * &multiplier;
             let mut hardest: Option<(usize, f64)> = None;
-            for r in (motors..size).filter(|r| !set.contains(r)) {
-                let terms = &contact(r).point.terms;
-                let levers: f64 = terms.iter().map(|term| term.1.norm_squared()).sum();
-                let jacobian = part(&kernel.jacobian, r, n);
-                let inward = -acceleration[r];
-                let speed = kernel.row_rate(r, omega);
-                let dead = dot(jacobian, jacobian) < DEAD_CENTRE * DEAD_CENTRE * levers;
-                if dead || inward <= 0.0 || speed * speed > 2.0 * REST_HEIGHT * contact(r).length * inward {
+            for (c, point) in points.iter().enumerate().filter(|(c, _)| !set.contains(c)) {
+                let inward = -(point.acceleration + point.free.dot(&change));
+                if point.is_dead || inward <= 0.0 || point.speed * point.speed > 2.0 * REST_HEIGHT * point.contact.length * inward {
                     continue;
                 }
                 // What the rows in force leave of the point's freedom to give way.
-                let freedom = schur[(r, r)] - schur.column(r).dot(&solve(&schur, &set, &schur.column(r).into_owned())?);
-                if freedom > 1e-12 * schur[(r, r)] {
-                    let force = inward / freedom;
-                    if force > least(r) && hardest.is_none_or(|(_, most)| force > most) {
-                        hardest = Some((r, force));
+                let freedom = basis.rest(&point.free).norm();
+                if freedom > NO_FREEDOM * point.norm {
+                    let pressure = inward / (freedom * freedom) / point.contact.force;
+                    if pressure > LEAST_PRESSURE && hardest.is_none_or(|(_, most)| pressure > most) {
+                        hardest = Some((c, pressure));
                     }
-                } else if inward > 1e-9 * (free[r].abs() + (free[r] - acceleration[r]).abs()) {
+                } else if inward > 1e-9 * (point.size + point.norm * change.norm()) {
                     return None;
                 }
             }
             match hardest {
-                Some((r, _)) => set.push(r),
+                Some((c, _)) => set.push(c),
                 None => {
-                    let mut staying: Vec<usize> = set[motors..].iter().map(|&r| touching[r - motors]).collect();
+                    let mut staying: Vec<usize> = set.iter().map(|&c| touching[c]).collect();
                     staying.sort_unstable();
                     return Some(staying);
                 }
@@ -103,15 +108,34 @@ impl Mechanism {
     }
 }
 
-/// The multipliers of the rows in `set` that bring about `right` there; zero elsewhere.
-fn solve(schur: &DMatrix<f64>, set: &[usize], right: &DVector<f64>) -> Option<DVector<f64>> {
-    let mut multiplier = DVector::zeros(right.len());
-    if !set.is_empty() {
-        let part = schur.select_rows(set).select_columns(set);
-        let found = part.full_piv_lu().solve(&right.select_rows(set)).filter(|x| x.iter().all(|x| x.is_finite()))?;
-        for (&r, &value) in set.iter().zip(found.iter()) {
-            multiplier[r] = value;
+/// A contact that touches, as the set of those that stay is found.
+struct Met<'a> {
+    contact: &'a Contact,
+    /// What the constraints leave of its freedom, and the size of all of it.
+    free: DVector<f64>,
+    norm: f64,
+    /// Normal velocity \[m/s\], normal acceleration under the constraints alone and the sum of the magnitudes of its parts \[m/s²\].
+    speed: f64,
+    acceleration: f64,
+    size: f64,
+    /// True at a dead centre.
+    is_dead: bool,
+}
+
+impl<'a> Met<'a> {
+    fn new(contact: &'a Contact, metric: &Metric, acceleration: &DVector<f64>, gradient: Gradient, omega: &[f64]) -> Self {
+        let Gradient { row, along } = gradient;
+        let column = metric.column(&along);
+        let levers: f64 = contact.point.terms.iter().map(|term| term.1.norm_squared()).sum();
+        let parts = column.component_mul(acceleration);
+        Self {
+            contact,
+            speed: dot(&along, omega),
+            acceleration: parts.sum() + row.convective,
+            size: parts.iter().map(|part| part.abs()).sum::<f64>() + row.convective.abs(),
+            is_dead: contact.point.shifts.is_empty() && dot(&along, &along) < DEAD_CENTRE * DEAD_CENTRE * levers,
+            free: metric.free(&column),
+            norm: column.norm(),
         }
     }
-    Some(multiplier)
 }

@@ -4,15 +4,25 @@
 //! M (w⁺ - w⁻) + Jᵀ rho + Gᵀ sigma = 0,    J w⁺ = -e J w⁻,    G w⁺ + C_t = 0
 //! ```
 //!
+//! In the coordinates of [`metric`](super::contact::metric): v⁺ = v + (c - Q Qᵀ c) f, v being the velocity nearest to v⁻ that keeps the rows and f what
+//! brings c·v⁺ to -e c·v⁻.  Rows that depend on others get no impulse.
+//!
 //! The impulse on the point along the wall's normal is -rho, never negative.  Without motors the energy changes by `-rho (1-e) J w⁻ / 2`.
 //! Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996), section 8.2 (Newton's law of impact).
 
-use super::kernel::{Kernel, dot};
+use super::contact::metric::{Gradient, Metric};
+use super::contact::scale::magnitudes;
+use super::kernel::dot;
 use super::point::Point;
 use super::row::{Posture, Row};
-use super::{Mechanism, Time, tree};
+use super::{Mechanism, Time};
 use crate::arithmetic::Complex;
-use nalgebra::{DMatrix, DVector};
+
+/// What constraints leave of a point's freedom along its normal, over what it has without them, below which they leave none: rounding leaves as much.
+pub(super) const NO_FREEDOM: f64 = 1e-11;
+
+/// A gap that counts as touching, over the length of its contact, with what the search for impacts leaves of it.
+pub const TOUCH: f64 = 2e-12;
 
 /// A wall as the mechanism meets it.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,6 +47,22 @@ impl Contact {
         self.row.gap(z) / self.length
     }
 
+    /// True where the point is on its wall, or behind it: by [`TOUCH`] of its length, or by the rounding of the gap at these elements.
+    pub fn touches(&self, z: &[Complex<f64>]) -> bool {
+        self.gap(z) <= TOUCH.max(4.0 * f64::EPSILON * magnitudes(&self.row, z) / self.length)
+    }
+
+    /// The largest velocity the parts of the point have along the normal \[m/s\]: rounding of its normal velocity is a share of it.
+    pub fn pace(&self, omega: &[f64]) -> f64 {
+        let turning = self.point.terms.iter().map(|&(k, gamma)| gamma.norm_squared().sqrt() * omega[k].abs());
+        let carried = self
+            .point
+            .shifts
+            .iter()
+            .map(|&(x, share)| share.abs() * ((self.normal.re * omega[x]).abs() + (self.normal.im * omega[x + 1]).abs()));
+        turning.chain(carried).fold(0.0, f64::max)
+    }
+
     /// The force of the wall over the force of the contact: the event function of a point that is held.
     pub fn pressure(&self, multiplier: f64) -> f64 {
         -multiplier / self.force
@@ -46,7 +72,7 @@ impl Contact {
 /// What an impact did.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Impact {
-    /// Rates of all bodies after it \[rad/s\].
+    /// Rates of all coordinates after it \[rad/s, m/s\].
     pub omega: Vec<f64>,
     /// Normal velocity of the point before it \[m/s\], negative.
     pub approach: f64,
@@ -63,63 +89,34 @@ pub struct Impact {
 impl Mechanism {
     /// The jump at contact `contact`, or `None` where the motors leave the point no freedom to rebound.
     ///
-    /// Angles \[rad\] and rates \[rad/s\] of all bodies at the moment of impact; a point that is not approaching keeps its rates.
+    /// Coordinates \[rad, m\] and rates \[rad/s, m/s\] at the moment of impact; a point that is not approaching keeps its rates.
     pub fn strike(&self, contact: usize, t: Time, phi: &[f64], omega: &[f64]) -> Option<Impact> {
         let Contact { row, restitution, .. } = &self.contacts[contact];
-        let n = self.coordinates();
-        let mut kernel = Kernel::<f64>::dense_without_rows(self);
-        kernel.face::<0>(self, phi);
-        self.tree.couple::<f64, 0>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
-        let mut jacobian = vec![0.0; n];
-        row.differentiate(t, Posture { phi, z: &kernel.z, omega }, &mut jacobian);
-        let approach = dot(&jacobian, omega);
+        let metric = Metric::at(self, t, phi, omega)?;
+        let z = self.elements(phi);
+        let along = Gradient::of(row, t, Posture { phi, z: &z, omega }).along;
+        let approach = dot(&along, omega);
         if approach >= 0.0 {
             let row_impulses = vec![0.0; self.rows.len()];
             return Some(Impact { omega: omega.to_vec(), approach, impulse: 0.0, row_impulses, energy_change: 0.0, motor_work: 0.0 });
         }
-        let mut momentum = vec![0.0; n];
-        tree::multiply::<f64, 0>(n, &kernel.mass, omega, &mut momentum);
-        let size = n + 1 + self.rows.len();
-        let (mut matrix, mut right) = (DMatrix::<f64>::zeros(size, size), DVector::<f64>::zeros(size));
-        for i in 0..n {
-            for j in i..n {
-                matrix[(i, j)] = kernel.mass[i * n + j];
-                matrix[(j, i)] = kernel.mass[i * n + j];
-            }
-            right[i] = momentum[i];
-        }
-        let mut drives = Vec::new();
-        let mut border = |at: usize, jacobian: &[f64]| {
-            for k in 0..n {
-                matrix[(at, k)] = jacobian[k];
-                matrix[(k, at)] = jacobian[k];
-            }
-        };
-        border(n, &jacobian);
-        right[n] = -restitution * approach;
-        for (r, row) in self.rows.iter().enumerate() {
-            let mut given = vec![0.0; n];
-            let drive = row.linearise(t, Posture { phi, z: &kernel.z, omega }, &mut given).drive;
-            border(n + 1 + r, &given);
-            right[n + 1 + r] = -drive;
-            drives.push(drive);
-        }
-        // Rows scaled by the masses would be nicer to the pivots; full pivoting does as well at this size.
-        let solution = matrix.full_piv_lu().solve(&right).filter(|x| x.iter().all(|x| x.is_finite()))?;
-        let after: Vec<f64> = solution.iter().take(n).copied().collect();
-        if (dot(&jacobian, &after) + restitution * approach).abs() > 1e-9 * approach.abs() {
+        let (column, before) = (metric.column(&along), metric.velocity(omega));
+        let (free, kept) = (metric.free(&column), metric.kept(&before));
+        if free.norm() <= NO_FREEDOM * column.norm() {
             return None;
         }
-        let mut momentum_after = vec![0.0; n];
-        tree::multiply::<f64, 0>(n, &kernel.mass, &after, &mut momentum_after);
-        let motor_work = drives.iter().enumerate().map(|(r, drive)| solution[n + 1 + r] * drive).sum();
-        Some(Impact {
+        let impulse = (-restitution * approach - column.dot(&kept)) / free.norm_squared();
+        let after = &kept + &free * impulse;
+        let row_impulses = metric.multipliers(&(&column * impulse - (&after - &before)));
+        let motor_work = row_impulses.iter().zip(&metric.rows).map(|(impulse, row)| impulse * row.row.drive).sum();
+        let is_finite = impulse.is_finite() && after.iter().chain(&row_impulses).all(|x| x.is_finite());
+        is_finite.then(|| Impact {
             approach,
-            impulse: -solution[n],
-            row_impulses: solution.iter().skip(n + 1).copied().collect(),
-            energy_change: 0.5 * (dot(&momentum_after, &after) - dot(&momentum, omega)),
+            impulse,
+            row_impulses,
+            energy_change: 0.5 * (&after - &before).dot(&(&after + &before)),
             motor_work,
-            omega: after,
+            omega: metric.rates(&after),
         })
     }
 }

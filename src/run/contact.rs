@@ -5,13 +5,13 @@
 //! booked as lost in impacts.  From then on the wall is a row kept by projection, until its force would have to pull.
 
 use super::flip::Lookout;
+use super::impact_monitor::{self, Claim};
 use super::march::{March, Pause, Place, build};
 use super::methods::Stabilization;
 use super::plan::Plan;
 use super::running::Outcome;
 use super::sample::{Sample, Sampler};
 use crate::arithmetic::{Complex, DoubleDouble};
-use crate::dynamics::impact::Contact;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::multiplier::Multiplier;
 use crate::dynamics::{Form, Mechanism, Motion, Time};
@@ -53,8 +53,8 @@ const EVENTS_MOST: usize = 10_000;
 const HOLDS_MOST: usize = 1000;
 /// Rounds of impacts at one moment after which what is left of the approach is left to the holds.
 const ROUNDS: usize = 100;
-/// A gap that counts as touching, over the length of its contact, with what the search for impacts leaves of it.
-const TOUCH: f64 = 2e-12;
+/// Normal velocity, over those of the point's parts or the hardest approach of the moment, that rounding leaves where an impact took it off.
+const NO_SPEED: f64 = 1e-13;
 
 /// A contact that is held.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -208,10 +208,10 @@ impl Course {
                     self.is_between = true;
                     return Ok(false);
                 }
-                Ok(Reached::Event(contact)) if self.mechanism.held.contains(&contact) => self.settle(Some(contact), outcome)?,
+                Ok(Reached::Event(contact)) if self.mechanism.held.contains(&contact) => self.settle(None, Some(contact), outcome)?,
                 Ok(Reached::Event(contact)) => {
-                    self.strike(contact, outcome)?;
-                    self.meet(outcome)?;
+                    let approach = self.strike(contact, outcome)?;
+                    self.meet_after(Some(contact), approach, outcome)?;
                 }
                 Err(stop) if stop.cause == Cause::RestingContact => {
                     let before = (outcome.strike_count, self.mechanism.held.clone());
@@ -232,18 +232,20 @@ impl Course {
 
     /// Strikes every point that touches a wall and moves into it, then holds those that stay.
     pub(super) fn meet(&mut self, outcome: &mut Outcome) -> Result<(), StepError> {
+        self.meet_after(None, 0.0, outcome)
+    }
+
+    /// The same after an impact of a contact, at this approach \[m/s\].
+    fn meet_after(&mut self, struck: Option<usize>, mut hardest: f64, outcome: &mut Outcome) -> Result<(), StepError> {
         for _ in 0..ROUNDS {
             let mut quiet = true;
-            for contact in 0..self.free.contacts.len() {
-                let motion = self.motion();
-                let Contact { point, normal, .. } = &self.free.contacts[contact];
-                let (z, _, omega) = posture(&motion);
-                let fastest = point.terms.iter().fold(0.0, |most: f64, &(k, gamma)| most.max(gamma.norm_squared().sqrt() * omega[k].abs()));
-                let approach = normal.dot(point.velocity(&z, &omega));
-                let held = self.mechanism.held.contains(&contact);
-                // Rounding leaves this much of a velocity that an impact took off.
-                if !held && self.free.contacts[contact].gap(&z) <= TOUCH && approach < -1e-13 * fastest {
-                    self.strike(contact, outcome)?;
+            for number in 0..self.free.contacts.len() {
+                let posture = self.posture();
+                let contact = &self.free.contacts[number];
+                let approach = -contact.normal.dot(contact.point.velocity(&posture.z, &posture.omega));
+                let is_met = contact.touches(&posture.z) && approach > NO_SPEED * contact.pace(&posture.omega).max(hardest);
+                if is_met && !self.mechanism.held.contains(&number) {
+                    hardest = hardest.max(self.strike(number, outcome)?);
                     quiet = false;
                 }
             }
@@ -251,18 +253,21 @@ impl Course {
                 break;
             }
         }
-        self.settle(None, outcome)
+        self.settle(struck, None, outcome)
     }
 
-    /// Lets the impact at a wall take effect; points that the others would have to pull are let go.
-    fn strike(&mut self, contact: usize, outcome: &mut Outcome) -> Result<(), StepError> {
-        let mut motion = self.motion();
-        let before = self.sampler.balance(&motion);
-        let (_, phi, omega) = posture(&motion);
+    /// Lets the impact at a wall take effect, and returns the approach \[m/s\]; points that the others would have to pull are let go.
+    fn strike(&mut self, contact: usize, outcome: &mut Outcome) -> Result<f64, StepError> {
+        let t = self.motion().time;
+        let Posture { phi, omega, .. } = self.posture();
         let impact = loop {
-            let Some(impact) = self.mechanism.strike(contact, motion.time, &phi, &omega) else {
-                let what = format!("the motors drive a point into wall {}", self.name(contact));
-                return Err(self.stopped(&outcome.plan, what, "change the motors' laws, or end the run before"));
+            let Some(impact) = self.mechanism.strike(contact, t, &phi, &omega) else {
+                let what = format!("the constraints leave a point that meets wall {} no way back", self.name(contact));
+                return Err(self.stopped(
+                    &outcome.plan,
+                    what,
+                    "look for motors that drive it there and change their laws, or end the run before",
+                ));
             };
             let pulled = (self.mechanism.held.iter().zip(&impact.row_impulses[self.mechanism.standing_rows()..]))
                 .filter(|(_, pull)| **pull > 1e-12 * impact.impulse)
@@ -275,12 +280,24 @@ impl Course {
                 None => break impact,
             }
         };
-        motion = self.motion();
+        if impact.approach >= 0.0 {
+            return Ok(0.0);
+        }
+        // Letting others go may have moved it by rounding.
+        let last = self.motion();
+        let (mut motion, before) = (last.clone(), self.sampler.balance(&last));
         motion.omega = impact.omega.iter().map(|&omega| DoubleDouble::from(omega)).collect();
         motion.work = motion.work + impact.motor_work;
         self.marcher.jump(&motion);
         let change = self.sampler.balance(&motion) - before;
         self.sampler.shift(change);
+        let claim = Claim { contact, impulse: impact.impulse, energy_lost: -change.hi };
+        let tolerance = outcome.plan.tolerance.unwrap_or_default().relative;
+        let after = self.motion();
+        if let Err(what) = impact_monitor::check(&self.mechanism, tolerance, &last, &after, &claim) {
+            let (cause, what) = (Cause::ImpactCheckFailed, format!("impact at wall {}: {what}", self.name(contact)));
+            return Err(StepError { cause, ..self.stopped(&outcome.plan, what, "tighten the tolerance, or use --method taylor") });
+        }
         outcome.strike_count += 1;
         outcome.strike_loss -= change.hi;
         if outcome.strikes.len() < KEPT {
@@ -292,16 +309,16 @@ impl Course {
                 energy_lost: -change.hi,
             });
         }
-        Ok(())
+        Ok(-impact.approach)
     }
 
-    /// Holds the points that touch and stay, and lets the others go; `released` goes in any case.
-    fn settle(&mut self, released: Option<usize>, outcome: &mut Outcome) -> Result<(), StepError> {
+    /// Holds the points that touch and stay, and lets the others go; `struck` touches, wherever a projection has put it, and `released` goes in any case.
+    fn settle(&mut self, struck: Option<usize>, released: Option<usize>, outcome: &mut Outcome) -> Result<(), StepError> {
         let motion = self.motion();
-        let (z, phi, omega) = posture(&motion);
-        let touching: Vec<usize> = (0..self.free.contacts.len())
-            .filter(|&contact| Some(contact) != released && self.free.contacts[contact].gap(&z) <= TOUCH)
-            .collect();
+        let Posture { z, phi, omega } = self.posture();
+        let touches =
+            |contact: &usize| Some(*contact) == struck || self.mechanism.held.contains(contact) || self.free.contacts[*contact].touches(&z);
+        let touching: Vec<usize> = (0..self.free.contacts.len()).filter(|contact| Some(*contact) != released && touches(contact)).collect();
         if touching.is_empty() && self.mechanism.held.is_empty() {
             return Ok(());
         }
@@ -403,6 +420,26 @@ impl Course {
         self.marcher.read(motion);
     }
 
+    /// The present motion in doubles.
+    fn posture(&mut self) -> Posture {
+        let motion = self.motion();
+        let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
+        Posture { z: self.free.elements(&phi), omega: motion.omega.iter().map(|omega| omega.hi).collect(), phi }
+    }
+
+    /// Why the present moment cannot be the first one of a run with walls: its coordinates are not those of the start, or its rates are others without impacts.
+    pub(super) fn begun_elsewhere(&mut self, start: &Motion, outcome: &Outcome) -> Option<StepError> {
+        if self.free.contacts.is_empty() {
+            return None;
+        }
+        let keeps_rates = outcome.strike_count == 0 && outcome.hold_count == 0;
+        let first = self.motion();
+        let what = impact_monitor::is_start(&self.free, start, &first, keeps_rates).err()?;
+        let what = format!("the first sample is not the start: {what}");
+        let stop = self.stopped(&outcome.plan, what, "state the walls and the start so that no point is behind its wall");
+        Some(StepError { cause: Cause::ImpactCheckFailed, ..stop })
+    }
+
     fn name(&self, contact: usize) -> &str {
         &self.free.contacts[contact].row.name
     }
@@ -417,8 +454,9 @@ impl Course {
     }
 }
 
-/// Unit vectors, angles \[rad\] and rates \[rad/s\] as doubles.
-fn posture(motion: &Motion) -> (Vec<Complex<f64>>, Vec<f64>, Vec<f64>) {
-    let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
-    (phi.iter().map(|&phi| Complex::unit(phi)).collect(), phi, motion.omega.iter().map(|omega| omega.hi).collect())
+/// Elements, coordinates \[rad, m\] and rates \[rad/s, m/s\] as doubles.
+struct Posture {
+    z: Vec<Complex<f64>>,
+    phi: Vec<f64>,
+    omega: Vec<f64>,
 }

@@ -2,10 +2,12 @@
 //! [`running`](super::running) is the loop around it.
 
 use super::flip::{self, Flip, Lookout, Suspect};
+use super::impact_monitor::closed;
 use super::methods::{MethodId, Stabilization};
 use super::plan::Plan;
 use super::shrink::{Shrinking, shrinking};
-use crate::arithmetic::DoubleDouble;
+use super::wall_guard::{POINTS, WallGuard};
+use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::elimination::Elimination;
 use crate::dynamics::looped::Looped;
@@ -57,6 +59,8 @@ pub(super) trait March {
     fn forget(&mut self);
     /// Goes on counting, and with the steps, where another left off.
     fn follow(&mut self, other: &dyn March);
+    /// Counts this gap, over the length of its contact, as zero where it looks for walls that were passed.
+    fn guard(&mut self, closed: f64);
     /// Everything it needs to go on.
     fn place(&self) -> Place;
     /// Goes on from a place, which was reached on the way to `horizon`; false where it cannot be one of this problem and method.
@@ -104,6 +108,8 @@ struct Marcher<P: ?Sized, M> {
     steps: Steps,
     /// What marches parts of steps where the method cannot, once one is needed.
     tracer: Option<Box<dyn March>>,
+    /// Watches the walls, where there are any.
+    guard: Option<WallGuard>,
 }
 
 impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
@@ -112,7 +118,8 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
         if !self.method.is_dense() {
             return self.land(until, lookout, pause);
         }
-        let Self { problem, method, state, tally, from, inside, is_inside, ahead, .. } = self;
+        let Self { problem, method, state, tally, from, inside, is_inside, ahead, guard, .. } = self;
+        let (name, mut glance, mut is_suspect) = (Method::<P>::name(method), Glance::default(), false);
         // Steps are as long as the method likes; output times are read off them.
         *is_inside = false;
         while state.time < until {
@@ -124,15 +131,34 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
             if let Some(lookout) = &mut lookout {
                 lookout.begin(&mut **problem, state);
             }
+            if let Some(guard) = guard {
+                problem.glance(state, &mut glance);
+                guard.begin(problem.mechanism(), state.time.hi, &glance);
+            }
             let reached = method.advance(problem, state, horizon, tally, &mut |problem, state| {
+                if let Some(guard) = guard {
+                    problem.glance(state, &mut glance);
+                    is_suspect = guard.step(problem.mechanism(), state.time.hi, &glance).map_err(|passed| passed.stop(name))?;
+                }
                 // A step in which a bar may have turned over is searched before the next one.
                 paused = pause();
-                let enough = lookout.as_mut().is_some_and(|lookout| lookout.step(problem, state, false)) || state.time >= until || paused;
+                let enough = lookout.as_mut().is_some_and(|lookout| lookout.step(problem, state, false))
+                    || state.time >= until
+                    || paused
+                    || is_suspect;
                 if !enough {
                     from.clone_from(state);
                 }
                 Ok(if enough { Seen::Enough } else { Seen::Kept })
             })?;
+            if let Some(guard) = guard.as_ref().filter(|_| std::mem::take(&mut is_suspect)) {
+                let span = state.time - from.time;
+                for i in 1..POINTS {
+                    method.within(problem, from, from.time + span.scale(i as f64 / POINTS as f64), inside);
+                    problem.glance(inside, &mut glance);
+                    guard.look(problem.mechanism(), inside.time.hi, &glance).map_err(|passed| passed.stop(name))?;
+                }
+            }
             if let Some(lookout) = &mut lookout {
                 lookout.search(&mut |suspect| {
                     let Suspect { from, span, ends } = suspect;
@@ -195,6 +221,10 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
         self.method.reset(&mut self.state);
     }
 
+    fn guard(&mut self, closed: f64) {
+        self.guard = (!self.problem.mechanism().contacts.is_empty()).then(|| WallGuard::new(closed));
+    }
+
     fn place(&self) -> Place {
         Place { state: self.state.clone(), tally: self.tally, from: self.from.clone(), ahead: self.ahead, known: self.method.knows() }
     }
@@ -225,18 +255,54 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
 impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
     /// Marches a method that is not dense to `until` itself.
     fn land(&mut self, until: Time, mut lookout: Option<&mut Lookout>, pause: &mut Pause) -> Result<Reached, StepError> {
-        let Self { problem, method, state, tally, .. } = self;
-        let Some(lookout) = &mut lookout else {
-            return method.advance(problem, state, until, tally, &mut |_, _| Ok(if pause() { Seen::Enough } else { Seen::Kept }));
-        };
-        let all = self.steps == Steps::Unseen;
-        lookout.begin(&mut **problem, state);
+        let Self { problem, method, state, tally, guard, .. } = self;
+        let (all, name, mut glance) = (self.steps == Steps::Unseen, Method::<P>::name(method), Glance::default());
+        let (mut from, mut suspects) = (State::default(), Vec::new());
+        if let Some(lookout) = &mut lookout {
+            lookout.begin(&mut **problem, state);
+        }
+        if let Some(guard) = guard {
+            problem.glance(state, &mut glance);
+            guard.begin(problem.mechanism(), state.time.hi, &glance);
+            from.clone_from(state);
+        }
         let reached = method.advance(problem, state, until, tally, &mut |problem, state| {
-            lookout.step(problem, state, all);
+            if let Some(guard) = guard {
+                problem.glance(state, &mut glance);
+                if guard.step(problem.mechanism(), state.time.hi, &glance).map_err(|passed| passed.stop(name))? {
+                    suspects.push((from.clone(), state.time - from.time));
+                }
+                from.clone_from(state);
+            }
+            if let Some(lookout) = &mut lookout {
+                lookout.step(problem, state, all);
+            }
             Ok(if pause() { Seen::Enough } else { Seen::Kept })
         });
-        lookout.search(&mut |suspect| if self.steps == Steps::Own { self.again(suspect) } else { self.traced(suspect) });
+        if let Some(lookout) = &mut lookout {
+            lookout.search(&mut |suspect| if self.steps == Steps::Own { self.again(suspect) } else { self.traced(suspect) });
+        }
+        for (from, span) in suspects {
+            self.look_again(&from, span)?;
+        }
         reached
+    }
+
+    /// Marches parts of a step again that may have passed a wall.
+    fn look_again(&mut self, from: &State, span: Time) -> Result<(), StepError> {
+        let Self { problem, method, guard: Some(guard), tally, .. } = self else { return Ok(()) };
+        let mut glance = Glance::default();
+        for i in 1..POINTS {
+            let mut state = from.clone();
+            let until = from.time + span.scale(i as f64 / POINTS as f64);
+            let mut effort = Tally { effort: tally.effort, ..Tally::default() };
+            let Ok(reached) = method.advance(problem, &mut state, until, &mut effort, &mut |_, _| Ok(Seen::Kept)) else { continue };
+            problem.glance(&state, &mut glance);
+            let looked = guard.look(problem.mechanism(), state.time.hi, &glance);
+            let met = if let Reached::Event(event) = reached { guard.met(problem.mechanism(), state.time.hi, event) } else { Ok(()) };
+            looked.and(met).map_err(|passed| passed.stop(Method::<P>::name(method)))?;
+        }
+        Ok(())
     }
 
     /// The first bar that turns over in a step, parts of which are marched again; the run itself does not notice.
@@ -294,6 +360,7 @@ fn boxed<P: Form + ?Sized + 'static, M: Method<P> + 'static>(problem: Box<P>, me
         ahead: None,
         steps,
         tracer: None,
+        guard: None,
     })
 }
 
@@ -326,6 +393,12 @@ fn canonical<const N: usize>(mechanism: &Arc<Mechanism>) -> Box<dyn Problem> {
 
 /// Builds what a plan asks for; Baumgarte's time constant is measured first where none was given.
 pub(super) fn build(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<Box<dyn March>, StepError> {
+    let mut marcher = built(mechanism, plan, start)?;
+    marcher.guard(closed(plan.tolerance.unwrap_or_default().relative));
+    Ok(marcher)
+}
+
+fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<Box<dyn March>, StepError> {
     let n = mechanism.size();
     let tolerance = plan.tolerance.unwrap_or_default();
     let step = plan.step.unwrap_or(0.0);

@@ -17,6 +17,7 @@ pub mod fast;
 #[cfg(feature = "files")]
 pub mod files;
 pub mod flip;
+mod impact_monitor;
 pub mod march;
 pub mod methods;
 pub mod plan;
@@ -33,6 +34,7 @@ pub mod table;
 pub mod trace;
 pub mod trust;
 mod turns;
+mod wall_guard;
 
 #[cfg(feature = "files")]
 pub use checkpoint::{CheckpointError, Checkpoints, Loaded};

@@ -29,6 +29,7 @@ pub struct Run {
     /// For runs of an ensemble, which look for bars that turn over and keep no samples: whether they end with the first.
     ensemble: Option<bool>,
     companion: Option<Companion>,
+    begun: Motion,
 }
 
 /// How a run ended, or how it stands.
@@ -118,7 +119,7 @@ impl Run {
         let mut marcher = build(&mechanism, &mut plan, start)?;
         marcher.allow(plan.effort);
         let turns = Turns::new(&mechanism, &plan, start);
-        Ok(Self { mechanism, plan, limits, marcher, turns, ensemble: None, companion: None })
+        Ok(Self { mechanism, plan, limits, marcher, turns, ensemble: None, companion: None, begun: start.clone() })
     }
 
     /// The same, accompanied by an estimate of its error; `start` is the motion it begins with.
@@ -204,6 +205,8 @@ pub struct Running {
     /// What keeps it from leaving its start.
     resting: Option<StepError>,
     is_over: bool,
+    /// The start, until the first sample has been compared with it.
+    begun: Option<Motion>,
 }
 
 /// All that the rest of a run depends on, beside its mechanism: what a checkpoint holds.
@@ -282,13 +285,13 @@ impl Snapshot {
 impl Running {
     /// Begins a run: whatever touches and moves into its wall at the start is struck.
     pub fn new(run: Run) -> Self {
-        let Run { mechanism, plan, limits, marcher, turns, ensemble, companion } = run;
+        let Run { mechanism, plan, limits, marcher, turns, ensemble, companion, begun } = run;
         let mut outcome = Outcome::begun(&mechanism, plan);
         let mut course = Course::new(mechanism, marcher);
         course.lookout = ensemble.map(|_| Lookout::default());
         // The reference of the energy is what impacts at the start leave.
         let resting = course.meet(&mut outcome).err();
-        Self { limits, course, outcome, turns, ensemble, companion, row: 0, resting, is_over: false }
+        Self { limits, course, outcome, turns, ensemble, companion, row: 0, resting, is_over: false, begun: Some(begun) }
     }
 
     /// Goes on from a snapshot of a run of the same mechanism and start.
@@ -307,7 +310,8 @@ impl Running {
         };
         let turns = Turns::new(&mechanism, &outcome.plan, start);
         let course = Course::resume(mechanism, &outcome.plan, start, station, horizon.into())?.ok_or(ResumeError::Misfit)?;
-        Ok(Self { limits, course, outcome, turns, ensemble: None, companion, row, resting, is_over: false })
+        let begun = (row == 0).then(|| start.clone());
+        Ok(Self { limits, course, outcome, turns, ensemble: None, companion, row, resting, is_over: false, begun })
     }
 
     /// All that the rest of the run depends on.
@@ -347,7 +351,7 @@ impl Running {
     }
 
     fn rows(&mut self, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>, pause: &mut Pause) -> Result<bool, RunError> {
-        let Self { limits, course, outcome, ensemble, companion, turns, .. } = self;
+        let Self { limits, course, outcome, ensemble, companion, turns, begun, .. } = self;
         while !self.is_over {
             let stopped = match self.resting.take() {
                 Some(stop) => Err(stop),
@@ -358,6 +362,7 @@ impl Running {
                 return Ok(false);
             }
             let is_tied_up = course.is_tied_up();
+            let moved = begun.take().and_then(|begun| course.begun_elsewhere(&begun, outcome));
             let sample = course.sample();
             // A stop before any progress leaves the state of the row before.
             if self.row == 0 || sample.t > outcome.last.t {
@@ -369,6 +374,7 @@ impl Running {
             let exceeded = outcome.drift.see(sample, limits);
             outcome.stop = stopped
                 .err()
+                .or(moved)
                 .or_else(|| (!sample.is_finite()).then(|| not_finite(&outcome.plan, sample.t)))
                 .or_else(|| uncounted(&outcome.plan, sample))
                 .or_else(|| turns.lost(&outcome.plan, sample))

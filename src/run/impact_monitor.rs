@@ -1,0 +1,213 @@
+//! Checks every impact from positions and rates on both sides, and that no wall is passed between impacts.
+//!
+//! ```text
+//! positions unchanged;   gap = 0;   v_n⁺ = -e v_n⁻;   rates of the other constraints as before or zero
+//! D = Σ (m |Δv|² + J Δω²) / 2 over the bodies:      impulse (1+e) |v_n⁻| = 2 D,      energy lost = D (1-e) / (1+e)
+//! ```
+//!
+//! The last line is Kelvin's and Carnot's theorem on impulses along one normal; the motors' impulsive work, which is accounted for, is not in it.
+//! Velocities are those of the centres of mass, walked from body to body; the mass matrix, in whose terms impacts are found, is not used.
+//! Source: E. T. Whittaker, *A Treatise on the Analytical Dynamics of Particles and Rigid Bodies*, 4th ed. (1937), sections 106 to 108.
+
+use crate::arithmetic::{Complex, DoubleDouble, Scalar};
+use crate::dynamics::contact::scale::magnitudes;
+use crate::dynamics::forest::Foot;
+use crate::dynamics::impact::Contact;
+use crate::dynamics::row::{Measure, Posture};
+use crate::dynamics::{Mechanism, Motion};
+
+/// Energies, velocities and rates that agree to this share of the magnitudes they are made of agree.
+const AGREES: f64 = 1e-9;
+/// Change of a coordinate \[rad\], or over the size of the mechanism and its own magnitude, that is rounding.
+const UNMOVED: f64 = 1e-12;
+/// A gap that counts as zero, over the length of its contact, at least.
+const CLOSED: f64 = 1e-9;
+
+/// What an impact claims to have done.
+pub(super) struct Claim {
+    /// The contact.
+    pub contact: usize,
+    /// Impulse along the normal \[N·s\].
+    pub impulse: f64,
+    /// Energy lost \[J\].
+    pub energy_lost: f64,
+}
+
+/// The gap that counts as zero over the length of a contact, for a method of this relative tolerance: projections move the end of a step by as much.
+pub(super) fn closed(tolerance: f64) -> f64 {
+    CLOSED.max(100.0 * tolerance)
+}
+
+/// The gap of a wall over the length of its contact, and its rounding, in doubles.
+pub(super) fn gap(contact: &Contact, angles: usize, phi: &[f64]) -> (f64, f64) {
+    let z = elements(angles, phi);
+    let rounding = 16.0 * f64::EPSILON * magnitudes(&contact.row, &z) / contact.length;
+    ((contact.normal.dot(contact.point.position(&z)) - offset(contact)) / contact.length, rounding)
+}
+
+/// The rate of that gap \[1/s\].
+pub(super) fn gap_rate(contact: &Contact, angles: usize, phi: &[f64], omega: &[f64]) -> f64 {
+    contact.normal.dot(contact.point.velocity(&elements(angles, phi), omega)) / contact.length
+}
+
+/// Whether an impact is what Newton's law of impact makes of the motion before it; else what is wrong.
+pub(super) fn check(mechanism: &Mechanism, tolerance: f64, before: &Motion, after: &Motion, claim: &Claim) -> Result<(), String> {
+    unmoved(mechanism, UNMOVED, before, after)?;
+    let contact = &mechanism.contacts[claim.contact];
+    let phi: Vec<f64> = before.phi.iter().map(|phi| phi.hi).collect();
+    let (gap, rounding) = gap(contact, mechanism.bodies.len(), &phi);
+    if beyond(gap.abs(), closed(tolerance) + rounding) {
+        return Err(format!("the point is {:.2e} m from the wall at the impact", gap * contact.length));
+    }
+    let (here, slips) = (Sides::new(mechanism, before, after), slips(mechanism, before, after));
+    let [approach, departure] = [&before.omega, &after.omega].map(|omega| contact.normal_velocity(&here.z, omega));
+    let pace = contact.pace(&before.omega.iter().map(|omega| omega.hi).collect::<Vec<_>>());
+    let speed_error = departure + contact.restitution * approach;
+    if beyond(speed_error.abs(), AGREES * approach.abs() + 1e-13 * pace) {
+        return Err(format!("the point leaves at {departure:.6e} m/s after an approach at {:.6e} m/s", -approach));
+    }
+    let [drift, slip] = slips?;
+    if beyond(slip, AGREES.max(2.0 * drift)) {
+        return Err(format!("another constraint slips by {slip:.2e} of its speed after the impact"));
+    }
+    // What constraints had drifted apart by is put right with the impact.
+    let scale = here.exchange * (AGREES + 10.0 * drift);
+    let (e, jump) = (contact.restitution, here.jump);
+    let work_error = claim.impulse * (departure - approach) - 2.0 * jump;
+    if beyond(work_error.abs(), scale) {
+        return Err(format!(
+            "the impulse is {:.6e} N s, and momenta change as by {:.6e} N s",
+            claim.impulse,
+            2.0 * jump / (departure - approach)
+        ));
+    }
+    let lost = jump * (1.0 - e) / (1.0 + e);
+    if beyond((claim.energy_lost - lost).abs(), scale) {
+        return Err(format!("{:.6e} J are lost, and restitution {e} loses {lost:.6e} J", claim.energy_lost));
+    }
+    let work = (after.work - before.work).hi;
+    if beyond((here.gain - work + lost).abs(), scale) {
+        return Err(format!("kinetic energy changes by {:.6e} J, with {work:.6e} J of the motors and {lost:.6e} J lost", here.gain));
+    }
+    Ok(())
+}
+
+/// Whether the first moment of a run is its start; else what is not as it was given.
+pub(super) fn is_start(mechanism: &Mechanism, start: &Motion, first: &Motion, keeps_rates: bool) -> Result<(), String> {
+    unmoved(mechanism, AGREES, start, first)?;
+    let angles = mechanism.bodies.len();
+    let fastest = |range: &[DoubleDouble]| range.iter().fold(0.0f64, |most, omega| most.max(omega.hi.abs()));
+    let (turning, moving) = start.omega.split_at(angles);
+    let pace = [fastest(turning), fastest(moving)];
+    let differs = |&k: &usize| {
+        beyond((first.omega[k] - start.omega[k]).hi.abs(), AGREES * pace[usize::from(k >= angles)].max(1e-12 * pace[0].max(pace[1])))
+    };
+    match (0..start.omega.len()).filter(|_| keeps_rates).find(differs) {
+        Some(k) => Err(format!("the rate of {} is {} and not {}", mechanism.coordinate_name(k), first.omega[k].hi, start.omega[k].hi)),
+        None => Ok(()),
+    }
+}
+
+/// Whether every coordinate is the same on both sides; else which one moved.
+fn unmoved(mechanism: &Mechanism, share: f64, before: &Motion, after: &Motion) -> Result<(), String> {
+    let (size, angles) = (mechanism.size_of_parts(), mechanism.bodies.len());
+    for (k, (one, other)) in before.phi.iter().zip(&after.phi).enumerate() {
+        let turns = before.turns.get(k).zip(after.turns.get(k)).map_or(0.0, |(one, other)| (other - one) as f64);
+        let moved = (*other - *one + DoubleDouble::TAU.scale(turns)).hi;
+        let unit = if k < angles { 1.0 + one.hi.abs() } else { size + one.hi.abs() };
+        if beyond(moved.abs(), share * unit) {
+            return Err(format!("{} changed by {moved:.2e} at once", mechanism.coordinate_name(k)));
+        }
+    }
+    Ok(())
+}
+
+/// True where a magnitude is beyond a bound, or no number.
+fn beyond(value: f64, bound: f64) -> bool {
+    value.is_nan() || value > bound
+}
+
+/// n·through of a wall \[m\].
+fn offset(contact: &Contact) -> f64 {
+    let Measure::Place(place) = &contact.row.measure else { return 0.0 };
+    contact.normal.dot(contact.point.root) - place.constant
+}
+
+fn elements<T: Scalar>(angles: usize, phi: &[T]) -> Vec<Complex<T>> {
+    let place = |k: usize| if (k - angles) % 2 == 0 { Complex::new(phi[k], phi[k + 1]) } else { Complex::ZERO };
+    (0..phi.len()).map(|k| if k < angles { Complex::unit(phi[k]) } else { place(k) }).collect()
+}
+
+impl Contact {
+    /// Velocity of the point along the normal \[m/s\].
+    fn normal_velocity(&self, z: &[Complex<DoubleDouble>], omega: &[DoubleDouble]) -> f64 {
+        Complex::<DoubleDouble>::of(self.normal).dot(self.point.velocity(z, omega)).hi
+    }
+}
+
+/// The bodies on both sides of an impact.
+struct Sides {
+    z: Vec<Complex<DoubleDouble>>,
+    /// Kinetic energy of the change of all velocities \[J\].
+    jump: f64,
+    /// Change of the kinetic energy \[J\].
+    gain: f64,
+    /// The sum of the magnitudes that change is made of \[J\].
+    exchange: f64,
+}
+
+impl Sides {
+    fn new(mechanism: &Mechanism, before: &Motion, after: &Motion) -> Self {
+        let z = elements(mechanism.bodies.len(), &before.phi);
+        let velocities = [before, after].map(|motion| centre_velocities(mechanism, &z, &motion.omega));
+        let (mut jump, mut gain, mut exchange) = (DoubleDouble::ZERO, DoubleDouble::ZERO, 0.0);
+        for (k, body) in mechanism.bodies.iter().enumerate() {
+            let ([v, w], [turn, turned]) = ([velocities[0][k], velocities[1][k]], [before.omega[k], after.omega[k]]);
+            let (change, sum) = (w - v, w + v);
+            let (spin, spins) = (turned - turn, turned + turn);
+            jump += change.norm_squared().scale(0.5 * body.mass) + (spin * spin).scale(0.5 * body.inertia);
+            gain += change.dot(sum).scale(0.5 * body.mass) + (spin * spins).scale(0.5 * body.inertia);
+            let size = |v: Complex<DoubleDouble>| v.norm_squared().hi.sqrt();
+            exchange +=
+                0.5 * (body.mass * size(change) * (size(v) + size(w)) + body.inertia * spin.hi.abs() * (turn.hi.abs() + turned.hi.abs()));
+        }
+        Self { z, jump: jump.hi, gain: gain.hi, exchange }
+    }
+}
+
+/// Velocities of the centres of mass, from body to body \[m/s\].
+fn centre_velocities(mechanism: &Mechanism, z: &[Complex<DoubleDouble>], omega: &[DoubleDouble]) -> Vec<Complex<DoubleDouble>> {
+    let mut feet = vec![Complex::<DoubleDouble>::ZERO; mechanism.bodies.len()];
+    for &k in &mechanism.forest.order {
+        feet[k] = match mechanism.forest.hangs[k].foot {
+            Foot::Ground(_) => Complex::ZERO,
+            Foot::On(parent, arm) => feet[parent] + z[parent].turn(arm).left().times(omega[parent]),
+            Foot::Free(x) => Complex::new(omega[x], omega[x + 1]),
+        };
+    }
+    let arm = |k: usize| z[k].turn(mechanism.bodies[k].centre).left().times(omega[k]);
+    feet.iter().enumerate().map(|(k, &foot)| foot + arm(k)).collect()
+}
+
+/// The worst rate of the constraints before and after, each over the magnitudes it is made of on both sides.
+fn slips(mechanism: &Mechanism, before: &Motion, after: &Motion) -> Result<[f64; 2], String> {
+    let z = elements(mechanism.bodies.len(), &before.phi);
+    let mut worst = [0.0f64; 2];
+    for row in &mechanism.rows {
+        let mut jacobian = vec![DoubleDouble::ZERO; before.phi.len()];
+        let here = row.differentiate(before.time, Posture { phi: &before.phi, z: &z, omega: &before.omega }, &mut jacobian);
+        let sides = [before, after].map(|motion| {
+            let parts = jacobian.iter().zip(&motion.omega).map(|(&g, &w)| g * w);
+            let (rate, size) = parts.fold((here.drive, here.drive.hi.abs()), |(rate, size), part| (rate + part, size + part.hi.abs()));
+            (rate.hi.abs(), size)
+        });
+        let size = sides[0].1.max(sides[1].1);
+        for (worst, (rate, _)) in worst.iter_mut().zip(sides) {
+            if !rate.is_finite() {
+                return Err(format!("the rate of {} is not finite", row.name()));
+            }
+            *worst = if size > 0.0 { worst.max(rate / size) } else { *worst };
+        }
+    }
+    Ok(worst)
+}
