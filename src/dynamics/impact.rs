@@ -106,17 +106,18 @@ impl Mechanism {
             return None;
         }
         let impulse = (-restitution * approach - column.dot(&kept)) / free.norm_squared();
-        let after = &kept + &free * impulse;
-        let row_impulses = metric.multipliers(&(&column * impulse - (&after - &before)));
+        let change = &kept - &before + &free * impulse;
+        let row_impulses = metric.multipliers(&(&column * impulse - &change));
         let motor_work = row_impulses.iter().zip(&metric.rows).map(|(impulse, row)| impulse * row.row.drive).sum();
-        let is_finite = impulse.is_finite() && after.iter().chain(&row_impulses).all(|x| x.is_finite());
+        let is_finite = impulse.is_finite() && change.iter().chain(&row_impulses).all(|x| x.is_finite());
         is_finite.then(|| Impact {
             approach,
             impulse,
             row_impulses,
-            energy_change: 0.5 * (&after - &before).dot(&(&after + &before)),
+            energy_change: change.dot(&before) + 0.5 * change.norm_squared(),
             motor_work,
-            omega: metric.rates(&after),
+            // What takes no part keeps its rate to the last bit.
+            omega: metric.rates(&change).iter().zip(omega).map(|(change, omega)| omega + change).collect(),
         })
     }
 }

@@ -6,7 +6,7 @@ use super::impact_monitor::closed;
 use super::methods::{MethodId, Stabilization};
 use super::plan::Plan;
 use super::shrink::{Shrinking, shrinking};
-use super::wall_guard::{POINTS, WallGuard};
+use super::wall_guard::WallGuard;
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::elimination::Elimination;
@@ -119,7 +119,7 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
             return self.land(until, lookout, pause);
         }
         let Self { problem, method, state, tally, from, inside, is_inside, ahead, guard, .. } = self;
-        let (name, mut glance, mut is_suspect) = (Method::<P>::name(method), Glance::default(), false);
+        let (name, mut glance, mut suspect) = (Method::<P>::name(method), Glance::default(), None);
         // Steps are as long as the method likes; output times are read off them.
         *is_inside = false;
         while state.time < until {
@@ -138,26 +138,28 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
             let reached = method.advance(problem, state, horizon, tally, &mut |problem, state| {
                 if let Some(guard) = guard {
                     problem.glance(state, &mut glance);
-                    is_suspect = guard.step(problem.mechanism(), state.time.hi, &glance).map_err(|passed| passed.stop(name))?;
+                    suspect = guard.step(problem.mechanism(), state.time.hi, &glance).map_err(|passed| passed.stop(name))?;
                 }
                 // A step in which a bar may have turned over is searched before the next one.
                 paused = pause();
                 let enough = lookout.as_mut().is_some_and(|lookout| lookout.step(problem, state, false))
                     || state.time >= until
                     || paused
-                    || is_suspect;
+                    || suspect.is_some();
                 if !enough {
                     from.clone_from(state);
                 }
                 Ok(if enough { Seen::Enough } else { Seen::Kept })
             })?;
-            if let Some(guard) = guard.as_ref().filter(|_| std::mem::take(&mut is_suspect)) {
-                let span = state.time - from.time;
-                for i in 1..POINTS {
-                    method.within(problem, from, from.time + span.scale(i as f64 / POINTS as f64), inside);
+            if let Some((guard, contact)) = guard.as_ref().zip(suspect.take()) {
+                let (span, mechanism) = (state.time - from.time, problem.mechanism().clone());
+                let mut at = |share: f64| {
+                    method.within(problem, from, from.time + span.scale(share), inside);
+                    let mut glance = Glance::default();
                     problem.glance(inside, &mut glance);
-                    guard.look(problem.mechanism(), inside.time.hi, &glance).map_err(|passed| passed.stop(name))?;
-                }
+                    Some((inside.time.hi, glance))
+                };
+                guard.search(&mechanism, contact, &mut at).map_err(|passed| passed.stop(name))?;
             }
             if let Some(lookout) = &mut lookout {
                 lookout.search(&mut |suspect| {
@@ -269,8 +271,8 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
         let reached = method.advance(problem, state, until, tally, &mut |problem, state| {
             if let Some(guard) = guard {
                 problem.glance(state, &mut glance);
-                if guard.step(problem.mechanism(), state.time.hi, &glance).map_err(|passed| passed.stop(name))? {
-                    suspects.push((from.clone(), state.time - from.time));
+                if let Some(contact) = guard.step(problem.mechanism(), state.time.hi, &glance).map_err(|passed| passed.stop(name))? {
+                    suspects.push((contact, from.clone(), state.time - from.time));
                 }
                 from.clone_from(state);
             }
@@ -282,27 +284,29 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
         if let Some(lookout) = &mut lookout {
             lookout.search(&mut |suspect| if self.steps == Steps::Own { self.again(suspect) } else { self.traced(suspect) });
         }
-        for (from, span) in suspects {
-            self.look_again(&from, span)?;
+        for (contact, from, span) in suspects {
+            self.look_again(contact, &from, span)?;
         }
         reached
     }
 
-    /// Marches parts of a step again that may have passed a wall.
-    fn look_again(&mut self, from: &State, span: Time) -> Result<(), StepError> {
+    /// Marches parts of a step again that may have passed the wall of a contact.
+    fn look_again(&mut self, contact: usize, from: &State, span: Time) -> Result<(), StepError> {
         let Self { problem, method, guard: Some(guard), tally, .. } = self else { return Ok(()) };
-        let mut glance = Glance::default();
-        for i in 1..POINTS {
-            let mut state = from.clone();
-            let until = from.time + span.scale(i as f64 / POINTS as f64);
+        let mechanism = problem.mechanism().clone();
+        let mut met = None;
+        let searched = guard.search(&mechanism, contact, |share| {
+            let (mut state, mut glance) = (from.clone(), Glance::default());
             let mut effort = Tally { effort: tally.effort, ..Tally::default() };
-            let Ok(reached) = method.advance(problem, &mut state, until, &mut effort, &mut |_, _| Ok(Seen::Kept)) else { continue };
+            match method.advance(problem, &mut state, from.time + span.scale(share), &mut effort, &mut |_, _| Ok(Seen::Kept)).ok()? {
+                Reached::Event(event) => met = met.or(Some((state.time.hi, event))),
+                Reached::Until | Reached::Pause => {}
+            }
             problem.glance(&state, &mut glance);
-            let looked = guard.look(problem.mechanism(), state.time.hi, &glance);
-            let met = if let Reached::Event(event) = reached { guard.met(problem.mechanism(), state.time.hi, event) } else { Ok(()) };
-            looked.and(met).map_err(|passed| passed.stop(Method::<P>::name(method)))?;
-        }
-        Ok(())
+            Some((state.time.hi, glance))
+        });
+        let met = met.map_or(Ok(()), |(t, event)| guard.met(&mechanism, t, event));
+        searched.and(met).map_err(|passed| passed.stop(Method::<P>::name(method)))
     }
 
     /// The first bar that turns over in a step, parts of which are marched again; the run itself does not notice.

@@ -1,13 +1,17 @@
-//! Watches that no wall is passed: gaps at the end of every step, and, where a cubic through the ends of a step dips behind a wall, inside it.
+//! Watches that no wall is passed: gaps at the end of every step, and inside it where a cubic through its ends has a minimum near a wall.
 //!
-//! It looks at positions and rates alone and shares nothing with the search for events, whose misses it is to find.
+//! Such a minimum is looked for on the motion itself, at even distances and then by golden section, to see whether it is behind the wall.  Positions and
+//! rates are all that is looked at; nothing is shared with the search for events, whose misses are to be found.
 
 use super::impact_monitor::{gap, gap_rate};
 use crate::dynamics::{Glance, Mechanism};
 use crate::stepping::{Cause, StepError};
 
-/// Points at which the inside of a step is looked at, cubic or dense output.
-pub(super) const POINTS: usize = 32;
+/// Parts of a step between which it is looked at, and golden sections after that.
+const PARTS: usize = 16;
+const SECTIONS: usize = 24;
+/// A minimum of the cubic above this share of the largest gap or change of it in the step is far from the wall, whatever the cubic leaves out.
+const NEAR: f64 = 0.2;
 
 /// Gaps over the lengths of their contacts, and their rates, at the end of the last step.
 #[derive(Clone, Debug, Default)]
@@ -30,18 +34,56 @@ impl WallGuard {
         self.gaps = gaps(mechanism, glance);
     }
 
-    /// Takes the end of a step; true where its inside is to be looked at.
+    /// Takes the end of a step, and tells a contact for which its inside is to be looked at.
     ///
     /// # Errors
     /// A wall that has been passed.
-    pub fn step(&mut self, mechanism: &Mechanism, t: f64, glance: &Glance) -> Result<bool, Box<Passed>> {
+    pub fn step(&mut self, mechanism: &Mechanism, t: f64, glance: &Glance) -> Result<Option<usize>, Box<Passed>> {
         self.look(mechanism, t, glance)?;
         let (h, now) = (t - self.t, gaps(mechanism, glance));
-        let dips =
-            |before: &[f64; 2], after: &[f64; 2]| (1..POINTS).any(|i| cubic(before, after, h, i as f64 / POINTS as f64) < -self.closed);
-        let is_suspect = (0..now.len()).any(|c| !mechanism.held.contains(&c) && dips(&self.gaps[c], &now[c]));
+        let suspect = (0..now.len()).find(|&c| !mechanism.held.contains(&c) && dips(&self.gaps[c], &now[c], h));
         (self.t, self.gaps) = (t, now);
-        Ok(is_suspect)
+        Ok(suspect)
+    }
+
+    /// Looks inside a step for the least gap of a contact; `at` tells time and motion at a share of the step, nothing where it cannot.
+    ///
+    /// # Errors
+    /// A wall that has been passed.
+    pub fn search(
+        &self,
+        mechanism: &Mechanism,
+        contact: usize,
+        mut at: impl FnMut(f64) -> Option<(f64, Glance)>,
+    ) -> Result<(), Box<Passed>> {
+        let mut gap_at = |share: f64| -> Result<f64, Box<Passed>> {
+            let Some((t, glance)) = at(share) else { return Ok(f64::INFINITY) };
+            self.look(mechanism, t, &glance)?;
+            Ok(gap(&mechanism.contacts[contact], mechanism.bodies.len(), &glance.phi).0)
+        };
+        let (mut least, mut place) = (f64::INFINITY, 1);
+        for i in 1..PARTS {
+            let gap = gap_at(i as f64 / PARTS as f64)?;
+            if gap < least {
+                (least, place) = (gap, i);
+            }
+        }
+        let golden = 0.5 * (5f64.sqrt() - 1.0);
+        let (mut low, mut high) = ((place - 1) as f64 / PARTS as f64, (place + 1) as f64 / PARTS as f64);
+        let [mut one, mut other] = [high - golden * (high - low), low + golden * (high - low)];
+        let [mut gap_one, mut gap_other] = [gap_at(one)?, gap_at(other)?];
+        for _ in 0..SECTIONS {
+            if gap_one < gap_other {
+                (high, other, gap_other) = (other, one, gap_one);
+                one = high - golden * (high - low);
+                gap_one = gap_at(one)?;
+            } else {
+                (low, one, gap_one) = (one, other, gap_other);
+                other = low + golden * (high - low);
+                gap_other = gap_at(other)?;
+            }
+        }
+        Ok(())
     }
 
     /// Looks at one moment.
@@ -78,6 +120,13 @@ fn gaps(mechanism: &Mechanism, glance: &Glance) -> Vec<[f64; 2]> {
         .collect()
 }
 
+/// Whether the cubic of a step of `h` has a minimum inside that is near the wall or behind it.
+fn dips(before: &[f64; 2], after: &[f64; 2], h: f64) -> bool {
+    let size = [before[0].abs(), after[0].abs(), (h * before[1]).abs(), (h * after[1]).abs()].into_iter().fold(0.0, f64::max);
+    let value = |i: usize| cubic(before, after, h, i as f64 / PARTS as f64);
+    (1..PARTS).any(|i| value(i) < NEAR * size && value(i) <= value(i - 1) && value(i) <= value(i + 1))
+}
+
 /// Hermite's cubic through values and rates at both ends of `h`, at a share of it.
 fn cubic([a, a_rate]: &[f64; 2], [b, b_rate]: &[f64; 2], h: f64, share: f64) -> f64 {
     let (s, r) = (share, 1.0 - share);
@@ -99,6 +148,7 @@ impl Passed {
         let Self { t, wall, gap, is_held } = self;
         let what = match is_held {
             true => format!("a point that is held at wall {wall} is {gap:.3e} m from it"),
+            false if gap == 0.0 => format!("a point meets wall {wall} and no impact was found"),
             false => format!("a point is {:.3e} m behind wall {wall} and no impact was found", -gap),
         };
         let hint = "tighten the tolerance, or use --method taylor".into();
