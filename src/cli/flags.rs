@@ -148,7 +148,7 @@ pub struct RunFlags {
     /// Estimate the error of the result and the time up to which it can be trusted: off, auto (50 ms, and 30 % of what the run takes), full (whatever it takes)
     #[arg(long, value_name = "HOW", value_parser = levels(), default_value = Level::Auto.name(), help_heading = "Trust")]
     pub trust: Level,
-    /// Stop with exit code 5 where the energy is off by more than this share of its scale [default: 0.01 of the largest energy there has been]
+    /// Stop with exit code 5 where the energy is off by more than this share of its scale [default: what the tolerance explains, 0.01 of the largest energy there has been at most]
     #[arg(long, value_name = "SHARE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
     pub max_energy_drift: Option<f64>,
     /// Stop with exit code 5 where a constraint is off by more, in rad or m, or that per second [default: 0.01 rad, or sizes of the mechanism, in position]
@@ -191,7 +191,7 @@ pub struct SweepFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub plan: PlanFlags,
-    /// Stop a point where its energy is off by more than this share of its scale [default: 0.01]
+    /// Stop a point where its energy is off by more than this share of its scale [default: what the tolerance explains, 0.01 at most]
     #[arg(long, value_name = "SHARE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
     pub max_energy_drift: Option<f64>,
     /// Stop a point where a constraint is off by more, in rad or m, or that per second [default: 0.01 rad, or sizes of the mechanism, in position]

@@ -3,6 +3,8 @@
 //! Memory does not grow with the run: the horizon is divided into a fixed number of intervals, and the record for charts
 //! is kept at times that grow by a constant factor.
 
+use super::allowance::{Allowance, EnergyLimit, Moment};
+use super::plan::Plan;
 use super::sample::Sample;
 use crate::dynamics::Mechanism;
 
@@ -97,9 +99,10 @@ impl Excursion {
     }
 }
 
-/// Where no limit on the energy is stated: the imbalance, over the largest energy or work there has been, beyond which a run is no success.
+/// Where no limit on the energy is stated: the imbalance, over the largest energy or work there has been, beyond which no run is a success; those at a tolerance
+/// have a tighter limit, see [`Drift::energy_limit`].
 pub const ENERGY_MOST: f64 = 1e-2;
-/// And beyond which its result says that it is in doubt.
+/// And beyond which every result says that it is in doubt.
 pub const ENERGY_DOUBT: f64 = 1e-4;
 /// Where no limit on the constraints is stated: the violation at position level, in rad or sizes of the mechanism, beyond which a run is no success.
 pub const POSITION_MOST: f64 = 1e-2;
@@ -107,7 +110,7 @@ pub const POSITION_MOST: f64 = 1e-2;
 /// Stated limits; a run that exceeds one stops.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Limits {
-    /// On the energy imbalance over the energy scale; `None`: [`ENERGY_MOST`].
+    /// On the energy imbalance over the energy scale; `None`: [`Drift::energy_limit`].
     pub energy: Option<f64>,
     /// On every constraint, at position \[rad or m\] and velocity level \[rad/s or m/s\]; `None`: [`POSITION_MOST`].
     pub constraint: Option<f64>,
@@ -149,6 +152,9 @@ pub struct Drift {
     pub energy_share: f64,
     /// The largest energy or work by now \[J\], at least the energy scale.
     largest: f64,
+    /// What its tolerance explains of the imbalance, and the limit that follows from it.
+    allowance: Option<Allowance>,
+    limit: EnergyLimit,
     /// What the imbalance is given in \[J\], and violations of each row are measured in: 1 rad, or the size of the mechanism \[m\].
     scale: f64,
     units: Vec<f64>,
@@ -168,14 +174,32 @@ impl Drift {
             stabilizer_max: 0.0,
             energy_share: 0.0,
             largest: mechanism.energy_scale,
+            allowance: None,
+            limit: EnergyLimit::default(),
             scale: mechanism.energy_scale,
             units: mechanism.rows.iter().map(|row| if row.is_angle() { 1.0 } else { mechanism.size_of_parts() }).collect(),
         }
     }
 
+    /// The same of a run by a plan, whose tolerance limits the energy's imbalance.
+    pub fn of_plan(mechanism: &Mechanism, plan: &Plan) -> Self {
+        Self { allowance: Allowance::new(mechanism, plan), ..Self::new(mechanism, plan.until) }
+    }
+
+    /// The imbalance, over the largest energy or work there has been, beyond which the run is no success where no limit is stated: what errors at the tolerance in
+    /// every step so far explain, twenty times, and never more than [`ENERGY_MOST`].
+    pub fn energy_limit(&self) -> f64 {
+        self.limit.most
+    }
+
+    /// The imbalance over the energy scale beyond which loops and sliders that nothing projects count as torn.
+    pub(super) fn apart(&self) -> f64 {
+        self.limit.apart
+    }
+
     /// Whether the energy balance leaves the result in doubt.
     pub fn is_doubtful(&self) -> bool {
-        self.energy_share.is_nan() || self.energy_share > ENERGY_DOUBT
+        self.energy_share.is_nan() || self.energy_share > self.limit.doubt
     }
 
     /// Goes on towards a later horizon \[s\].
@@ -193,13 +217,17 @@ impl Drift {
             && excursions.all(|excursion| excursion.intervals.len() == INTERVALS && excursion.until > 0.0)
     }
 
-    /// Takes a sample; names the first limit it exceeds.
-    pub fn see(&mut self, sample: &Sample, limits: &Limits) -> Result<(), String> {
+    /// Takes a sample after so many steps; names the first limit it exceeds.
+    pub fn see(&mut self, sample: &Sample, limits: &Limits, steps: u64) -> Result<(), String> {
         self.energy.see(sample.t, sample.imbalance);
         self.stabilizer = sample.stabilizer;
         self.stabilizer_max = larger(sample.stabilizer.abs(), self.stabilizer_max);
         self.largest = self.largest.max(sample.kinetic.abs()).max(sample.work.abs());
         self.energy_share = larger(sample.imbalance.abs() * (self.scale / self.largest), self.energy_share);
+        if let Some(allowance) = &self.allowance {
+            let feet = &sample.phi[sample.centre.len()..];
+            self.limit.see(allowance, &Moment { omega: &sample.omega, feet, work: sample.work, largest: self.largest, steps });
+        }
         for ((_, monitors), values) in self.constraints.iter_mut().zip(&sample.constraints) {
             for (monitor, &value) in monitors.iter_mut().zip(values) {
                 monitor.see(sample.t, value);
@@ -210,9 +238,11 @@ impl Drift {
             self.singular = Some(Singular { smallest: sample.singular, t: sample.t, constraint });
         }
         let beyond = |value: f64, limit: f64| value.is_nan() || value > limit;
-        let (off, limit) = limits.energy.map_or((self.energy_share, ENERGY_MOST), |limit| (self.energy.max, limit));
+        let (off, limit) = limits.energy.map_or((self.energy_share, self.limit.most), |limit| (self.energy.max, limit));
         if beyond(off, limit) {
-            return Err(format!("{} is off by {off:.2e} of the scale, the limit is {limit:e}", self.kind));
+            let explained = if limits.energy.is_none() && limit < ENERGY_MOST { " of errors at the tolerance" } else { "" };
+            let limit = if explained.is_empty() { format!("{limit:e}") } else { format!("{limit:.1e}") };
+            return Err(format!("{} is off by {off:.2e} of the scale, the limit{explained} is {limit}", self.kind));
         }
         for ((name, [position, velocity]), unit) in self.constraints.iter().zip(&self.units) {
             let (most, levels) = limits.constraint.map_or((POSITION_MOST * unit, 1), |limit| (limit, 2));

@@ -7,6 +7,7 @@
 //! lookout for bars that turn over ([`flip`]); [`mod@compare`] runs all methods at all settings, and times them; [`mod@stress`] runs stiff and extreme scenes by
 //! every method.
 
+mod allowance;
 #[cfg(feature = "files")]
 pub mod checkpoint;
 pub mod choice;

@@ -16,9 +16,6 @@ use crate::stepping::{Cause, StepError, Tally};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Energy balance over its scale beyond which loops and sliders that nothing projects count as torn.
-const APART: f64 = 1e-4;
-
 /// A run about to begin.
 pub struct Run {
     mechanism: Arc<Mechanism>,
@@ -75,7 +72,7 @@ impl Outcome {
         Self {
             last: Sample::default(),
             tally: Tally::default(),
-            drift: Drift::new(mechanism, plan.until),
+            drift: Drift::of_plan(mechanism, &plan),
             trace: Trace::default(),
             strikes: Vec::new(),
             strike_count: 0,
@@ -361,7 +358,7 @@ impl Running {
             if stopped == Ok(false) {
                 return Ok(false);
             }
-            let is_tied_up = course.is_tied_up();
+            let (is_tied_up, steps) = (course.is_tied_up(), course.tally().steps);
             let moved = begun.take().and_then(|begun| course.begun_elsewhere(&begun, outcome));
             let sample = course.sample();
             // A stop before any progress leaves the state of the row before.
@@ -371,7 +368,7 @@ impl Running {
                     outcome.trace.see(sample);
                 }
             }
-            let exceeded = outcome.drift.see(sample, limits);
+            let exceeded = outcome.drift.see(sample, limits, steps);
             outcome.stop = stopped
                 .err()
                 .or(moved)
@@ -438,7 +435,7 @@ fn came_apart(plan: &Plan, drift: &Drift, sample: &Sample) -> Option<StepError> 
         matches!(plan.stabilization, Stabilization::None | Stabilization::Baumgarte) && !matches!(plan.method, MethodId::Rattle(_));
     let off = sample.imbalance.abs();
     let weakest = drift.constraints.get(sample.weakest).map_or("", |(name, _)| name);
-    (is_loose && off > APART).then(|| StepError {
+    (is_loose && off > drift.apart()).then(|| StepError {
         cause: Cause::BranchLost,
         method: plan.method.to_string(),
         t: sample.t,

@@ -5,7 +5,8 @@ use crate::arithmetic::DoubleDouble;
 use crate::dynamics::elimination::Elimination;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::{Form, Glance, Mechanism, Motion};
-use crate::run::drift::{ENERGY_MOST, larger};
+use crate::run::allowance::{Allowance, EnergyLimit, Moment};
+use crate::run::drift::larger;
 use crate::run::flip::{self, Flip};
 use crate::run::march::MOST_TURNS;
 use crate::run::methods::MethodId;
@@ -208,7 +209,14 @@ impl Sweep {
             entrant.tally.effort = ready.plan.effort;
             entrants.push(entrant);
             let reference = ready.mechanism.energy(&mut kernel, &ready.start.phi, &ready.start.omega).total();
-            lanes.push(Lane { point: ready.point.clone(), reference, scale: ready.scale, seen: [Glance::default(), Glance::default()] });
+            lanes.push(Lane {
+                point: ready.point.clone(),
+                reference,
+                scale: ready.scale,
+                seen: [Glance::default(), Glance::default()],
+                allowance: Allowance::new(&ready.mechanism, &ready.plan),
+                limit: EnergyLimit::default(),
+            });
         }
         let mut found = Vec::with_capacity(ready.len());
         let mut motion = Motion::default();
@@ -227,7 +235,7 @@ impl Sweep {
             while number < lanes.len() {
                 let (lane, entrant) = (&mut lanes[number], &entrants[number]);
                 let over = row == plan.rows || (self.ends_at_flips && lane.point.flip.is_some());
-                if lane.measure(entrant, &mut motion, &mut kernel, self.limits.energy.unwrap_or(ENERGY_MOST), &plan) && !over {
+                if lane.measure(entrant, &mut motion, &mut kernel, self.limits.energy, &plan) && !over {
                     number += 1;
                     continue;
                 }
@@ -251,6 +259,9 @@ struct Lane {
     scale: f64,
     /// Both ends of a step.
     seen: [Glance; 2],
+    /// What the tolerance explains of the energy's imbalance, and the limit that follows from it.
+    allowance: Option<Allowance>,
+    limit: EnergyLimit,
 }
 
 impl Lane {
@@ -282,7 +293,14 @@ impl Lane {
     }
 
     /// Takes what an entrant has come to; false where the point goes no further.
-    fn measure(&mut self, entrant: &Entrant, motion: &mut Motion, kernel: &mut Kernel<DoubleDouble>, limit: f64, plan: &Plan) -> bool {
+    fn measure(
+        &mut self,
+        entrant: &Entrant,
+        motion: &mut Motion,
+        kernel: &mut Kernel<DoubleDouble>,
+        stated: Option<f64>,
+        plan: &Plan,
+    ) -> bool {
         let n = entrant.mechanism.bodies.len();
         let state = &entrant.state;
         motion.resize(n);
@@ -298,6 +316,11 @@ impl Lane {
         point.phi = (0..n).map(|k| motion.unwrapped(k)).collect();
         point.omega = motion.omega.iter().map(|omega| omega.hi).collect();
         point.steps = entrant.tally.steps;
+        if let Some(allowance) = &self.allowance {
+            let moment = Moment { omega: &point.omega, feet: &[], work: 0.0, largest: self.scale, steps: point.steps };
+            self.limit.see(allowance, &moment);
+        }
+        let limit = stated.unwrap_or(self.limit.most);
         let stop = |cause, what: String, hint: &str| StepError {
             cause,
             method: plan.method.to_string(),
@@ -316,7 +339,7 @@ impl Lane {
                 Some(stop(Cause::NotFinite, what, "look for rates far out of proportion"))
             }
             None if point.energy > limit => {
-                let what = format!("energy is off by {:.2e} of the scale, the limit is {limit:e}", point.energy);
+                let what = format!("energy is off by {:.2e} of the scale, the limit is {limit:.1e}", point.energy);
                 Some(stop(Cause::DriftLimit, what, "tighten the tolerance"))
             }
             None => None,
