@@ -1,9 +1,9 @@
-//! Constraint drift: how far each constraint is off, at the level of positions and of velocities, side by side.
+//! Constraint drift: how far each constraint is off, at the level of positions and of velocities, side by side; angles and lengths in rows of their own.
 
 use super::axis::Axis;
 use super::energy_drift::{DriftSeries, draw, drift_axis, is_zero, label};
 use super::file::Picture;
-use super::grid::{beside, label_room};
+use super::grid::{label_room, rows};
 use super::lines::{Point, running_maximum};
 use super::palette::{GREY, WHITE, marks, mix};
 use super::panel::Panel;
@@ -16,7 +16,7 @@ use super::{ChartError, PAGE};
 pub struct DefectPanel {
     /// Name of the y axis with its unit in brackets, with markup: `|*C*| [rad]`.
     pub name: String,
-    /// A line for each stabilization or each constraint; the same names in the same order in every panel.
+    /// A line for each stabilization or each constraint; the same names in the same order in both panels of a row.
     pub series: Vec<DriftSeries>,
 }
 
@@ -27,7 +27,7 @@ pub struct ConstraintDrift {
     pub title: String,
     /// Parts of the caption, with markup; what is drawn is added.
     pub caption: Vec<String>,
-    /// Panels from left to right: position level, velocity level.
+    /// Panels from left to right, position level and velocity level; then those of constraints of another unit, below.
     pub panels: Vec<DefectPanel>,
     /// Logarithmic time.
     pub log_time: bool,
@@ -36,6 +36,11 @@ pub struct ConstraintDrift {
 /// Violations \[rad, m\] below which the axis does not go.
 const NOTHING: f64 = 1e-20;
 
+/// Panels beside each other.
+const COLUMNS: usize = 2;
+/// Height of the page for each row of panels after the first \[pt\].
+const ROW: f64 = 170.0;
+
 /// Draws the samples as light dots and their running maximum as a line.
 ///
 /// A series without any defect is drawn as markers on the lower edge and labelled as exactly 0.
@@ -43,7 +48,8 @@ const NOTHING: f64 = 1e-20;
 /// # Errors
 /// [`ChartError`] if the resolution is out of range or drawing fails.
 pub fn constraint_drift(chart: &ConstraintDrift, px_per_pt: f64) -> Result<Picture, ChartError> {
-    let sheet = Sheet::new(PAGE, px_per_pt)?;
+    let more = chart.panels.len().div_ceil(COLUMNS).saturating_sub(1);
+    let sheet = Sheet::new([PAGE[0], PAGE[1] + more as f64 * ROW], px_per_pt)?;
     let mut caption = chart.caption.clone();
     caption.push("dots: samples, lines: largest so far".to_owned());
     let under = sheet.heading(&chart.title, &caption)?;
@@ -64,7 +70,8 @@ pub fn constraint_drift(chart: &ConstraintDrift, px_per_pt: f64) -> Result<Pictu
         .map(|(panel, lines)| panel.series.iter().zip(lines).map(|(series, line)| label(&sheet, &series.name, line)).collect())
         .collect();
     let right = label_room(&sheet, words.iter().flatten().map(String::as_str), true);
-    let panels = beside(&sheet, under, axes.collect(), right)?;
+    let axes: Vec<(Axis, Axis)> = axes.collect();
+    let panels = rows(&sheet, under, axes.chunks(COLUMNS).map(<[_]>::to_vec).collect(), right)?;
     for (k, (panel, (data, lines))) in panels.iter().zip(chart.panels.iter().zip(&all)).enumerate() {
         let marks = marks(data.series.iter().map(|series| series.method.as_str()));
         for (series, mark) in data.series.iter().zip(&marks) {
@@ -86,7 +93,7 @@ pub fn constraint_drift(chart: &ConstraintDrift, px_per_pt: f64) -> Result<Pictu
         if ends.is_empty() {
             panel.empty("no data")?;
         }
-        if k + 1 == panels.len() {
+        if k % COLUMNS == COLUMNS - 1 || k + 1 == panels.len() {
             panel.end_labels(&ends, true)?;
         } else {
             zeros(&sheet, panel, data, lines)?;

@@ -55,21 +55,31 @@ pub(crate) fn stacked<'a>(sheet: &'a Sheet, under: f64, x: &Axis, ys: Vec<Axis>,
     Ok(panels)
 }
 
-/// Panels side by side, each with its own axes, frames drawn.
-pub(crate) fn beside<'a>(sheet: &'a Sheet, under: f64, axes: Vec<(Axis, Axis)>, right: f64) -> Result<Vec<Panel<'a>>, ChartError> {
-    let (top, bottom) = (under + AIR, sheet.size[1] - BOTTOM);
-    let lefts: Vec<f64> = axes.iter().map(|(_, y)| left_room(sheet, y, bottom - top)).collect();
-    let count = axes.len().max(1) as f64;
+/// Rows of panels side by side, row by row from above, each panel with its own axes, frames drawn.
+pub(crate) fn rows<'a>(sheet: &'a Sheet, under: f64, rows: Vec<Vec<(Axis, Axis)>>, right: f64) -> Result<Vec<Panel<'a>>, ChartError> {
+    let (top, bottom) = (under + AIR, sheet.size[1]);
+    let pitch = (bottom - top) / rows.len().max(1) as f64;
+    let height = pitch - BOTTOM;
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let left_of = |column: usize| {
+        let rooms = rows.iter().filter_map(|row| row.get(column)).map(|(_, y)| left_room(sheet, y, height));
+        rooms.fold(0.0, f64::max)
+    };
+    let lefts: Vec<f64> = (0..columns).map(left_of).collect();
     let between = 16.0;
-    let width = (sheet.size[0] - EDGE - right - lefts.iter().sum::<f64>() - (count - 1.0) * between) / count;
-    let mut left = EDGE;
+    let width =
+        (sheet.size[0] - EDGE - right - lefts.iter().sum::<f64>() - (columns.max(1) as f64 - 1.0) * between) / columns.max(1) as f64;
     let mut panels = Vec::new();
-    for ((x, y), room) in axes.into_iter().zip(lefts) {
-        left += room;
-        let panel = Panel::new(sheet, [left, top, left + width.max(20.0), bottom], x, y);
-        panel.frame(Written { x: true, y_name_at: panel.name_place() })?;
-        left += width + between;
-        panels.push(panel);
+    for (k, row) in rows.into_iter().enumerate() {
+        let top = top + k as f64 * pitch;
+        let mut left = EDGE;
+        for ((x, y), room) in row.into_iter().zip(&lefts) {
+            left += room;
+            let panel = Panel::new(sheet, [left, top, left + width.max(20.0), top + height], x, y);
+            panel.frame(Written { x: true, y_name_at: panel.name_place() })?;
+            left += width + between;
+            panels.push(panel);
+        }
     }
     Ok(panels)
 }

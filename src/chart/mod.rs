@@ -55,7 +55,7 @@ pub use motion::{Animation, MotionGif, motion_gif};
 pub use profile::{Profile, profile};
 pub use sketch::{HingeSketch, MotorPose, Pose, Sketch, SliderPose, SpringSketch, WallSketch};
 pub use text::{TextBox, plain, unmarked};
-pub use torque_power::{MotorSeries, TorquePower, torque_power};
+pub use torque_power::{MotorSeries, TorquePower, force_power, torque_power};
 pub use work_precision::{Cost, WorkPrecision, WorkSeries, work_precision};
 
 use std::path::PathBuf;

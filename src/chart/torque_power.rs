@@ -1,4 +1,4 @@
-//! Torque and power of motors against time, above each other, the largest magnitudes marked.
+//! Torque or force and power of motors against time, above each other, the largest magnitudes marked.
 
 use super::axis::Axis;
 use super::file::Picture;
@@ -18,7 +18,7 @@ pub struct MotorSeries {
     pub name: String,
     /// Times \[s\], ascending.
     pub time: Vec<f64>,
-    /// Torque on the driven bar at these times \[N·m\].
+    /// Torque on the driven bar at these times \[N·m\], or force on the point of the driven slider \[N\]: see [`force_power`].
     pub torque: Vec<f64>,
     /// Power fed in at these times \[W\].
     pub power: Vec<f64>,
@@ -37,28 +37,51 @@ pub struct TorquePower {
     pub horizon: Option<f64>,
 }
 
+/// What a third panel adds to the height of the page \[pt\].
+const HIGHER: f64 = 110.0;
+
 /// Draws both curves of each motor with a ring and a figure at each largest magnitude.
 ///
 /// # Errors
 /// [`ChartError`] if the resolution is out of range or drawing fails.
 pub fn torque_power(chart: &TorquePower, px_per_pt: f64) -> Result<Picture, ChartError> {
-    let sheet = Sheet::new(PAGE, px_per_pt)?;
-    let data = |values: fn(&MotorSeries) -> &Vec<f64>| -> Vec<Vec<Point>> {
-        let line = |motor: &MotorSeries| motor.time.iter().zip(values(motor)).map(|(&t, &v)| [t, v]).collect();
-        chart.motors.iter().map(line).collect()
+    force_power(chart, &[], px_per_pt)
+}
+
+/// The same where some motors, by number, push a slider: what stands for their torques are forces \[N\], in a panel between torques and powers.
+///
+/// # Errors
+/// As [`torque_power`].
+pub fn force_power(chart: &TorquePower, sliders: &[usize], px_per_pt: f64) -> Result<Picture, ChartError> {
+    let is_kept = |force: Option<bool>, motor: usize| force.is_none_or(|force| sliders.contains(&motor) == force);
+    let data = |values: fn(&MotorSeries) -> &Vec<f64>, force: Option<bool>| -> Vec<Vec<Point>> {
+        let line = |(k, motor): (usize, &MotorSeries)| {
+            motor.time.iter().zip(values(motor)).filter(|_| is_kept(force, k)).map(|(&t, &v)| [t, v]).collect()
+        };
+        chart.motors.iter().enumerate().map(line).collect()
     };
-    let rows = [(data(|m| &m.torque), "torque [N·m]", "N·m"), (data(|m| &m.power), "power [W]", "W")];
+    let mut rows = Vec::with_capacity(3);
+    if sliders.is_empty() || (0..chart.motors.len()).any(|motor| is_kept(Some(false), motor)) {
+        rows.push((data(|motor| &motor.torque, Some(false)), "torque [N·m]", "N·m"));
+    }
+    if !sliders.is_empty() {
+        rows.push((data(|motor| &motor.torque, Some(true)), "force [N]", "N"));
+    }
+    rows.push((data(|motor| &motor.power, None), "power [W]", "W"));
+    let size = [PAGE[0], PAGE[1] + (rows.len() - 2) as f64 * HIGHER];
+    let sheet = Sheet::new(size, px_per_pt)?;
     let marks = marks(chart.motors.iter().map(|motor| motor.name.as_str()));
     let several = chart.motors.len() > 1;
     let labels: Vec<String> = chart.motors.iter().map(|motor| shortened(&sheet, &motor.name)).collect();
 
-    let x = Axis::tight("time [s]", rows[0].0.iter().flatten().filter(|p| p[1].is_finite()).map(|p| p[0]));
+    let powers = rows.iter().flat_map(|row| &row.0);
+    let x = Axis::tight("time [s]", powers.flatten().filter(|p| p[1].is_finite()).map(|p| p[0]));
     // Zero belongs to both: its line parts driving from braking.
     let y = |row: &(Vec<Vec<Point>>, &str, &str)| Axis::fit(row.1, row.0.iter().flatten().map(|p| p[1]).chain(zero(&row.0)));
     let mut caption = chart.caption.clone();
     let crowded = {
         // Tried on a page of its own: the caption has to be known before the panels have their places.
-        let trial = Sheet::new(PAGE, 0.5)?;
+        let trial = Sheet::new(size, 0.5)?;
         let panels = stacked(&trial, 40.0, &x, rows.iter().map(y).collect(), 20.0)?;
         panels.iter().zip(&rows).any(|(panel, row)| row.0.iter().any(|line| panel.crowded(line)))
     };
@@ -69,8 +92,8 @@ pub fn torque_power(chart: &TorquePower, px_per_pt: f64) -> Result<Picture, Char
     let label = chart.horizon.map(|horizon| format!("{} s", figure(horizon)));
     for (k, (panel, (lines, _, unit))) in panels.iter().zip(&rows).enumerate() {
         panel.series(&[[panel.x.from, 0.0], [panel.x.to, 0.0]], &Pen::new(SPINE, 0.75))?;
-        let own = [Mark { colour: BLUE, shape: Shape::Disc, turn: 0 }, Mark { colour: VERMILLION, shape: Shape::Disc, turn: 0 }];
-        let mark = |motor: usize| if several { marks[motor] } else { own[k] };
+        let own = Mark { colour: if *unit == "W" { VERMILLION } else { BLUE }, shape: Shape::Disc, turn: 0 };
+        let mark = |motor: usize| if several { marks[motor] } else { own };
         let (mut occupied, mut ends) = (Occupied::default(), Vec::new());
         for (motor, line) in lines.iter().enumerate() {
             let pieces = panel.trusted(line, mark(motor).colour, 1.8, chart.horizon)?;
@@ -80,7 +103,7 @@ pub fn torque_power(chart: &TorquePower, px_per_pt: f64) -> Result<Picture, Char
             }
         }
         // Rings of many motors would say less than none.
-        for (motor, line) in lines.iter().enumerate().filter(|_| lines.len() <= 3) {
+        for (motor, line) in lines.iter().enumerate().filter(|(_, line)| lines.len() <= 3 && !line.is_empty()) {
             peak(&sheet, panel, line, unit, mark(motor).colour, &mut occupied)?;
         }
         panel.horizon(chart.horizon, label.as_deref().filter(|_| k == 0))?;

@@ -45,6 +45,8 @@ pub struct Mechanism {
     pub actions: Vec<Action>,
     /// Constraint rows: given angles, then points that coincide or stay on lines, then one per contact that is held.
     pub rows: Vec<Row>,
+    /// How many motors give angles; their rows come first.
+    pub motors: usize,
     /// Walls.
     pub contacts: Vec<Contact>,
     /// The contacts held, by number, in the order of their rows; none as compiled: see [`Mechanism::holding`].
@@ -240,6 +242,7 @@ impl Mechanism {
             torsions,
             vibration: None,
             rows,
+            motors: scene.motors.len(),
             contacts,
             held: Vec::new(),
             ties,
@@ -390,6 +393,22 @@ impl Mechanism {
     /// True where whole turns matter, so that angles are not wrapped.
     pub fn is_winding(&self) -> bool {
         !self.torsions.is_empty()
+    }
+
+    /// True where row number `row` is that of a motor, on an angle or on a slider; not where it locks an angle.
+    pub fn is_motor(&self, row: usize) -> bool {
+        row < self.motors || self.rows[row].law.is_some() && !self.rows[row].is_angle()
+    }
+
+    /// The unit of what rows measure: `rad`, `m`, or `rad or m` where some measure angles and some lengths; none without rows.
+    pub fn unit_of_rows(&self) -> Option<&'static str> {
+        let [angles, lengths] = [true, false].map(|kind| self.rows.iter().any(|row| row.is_angle() == kind));
+        match (angles, lengths) {
+            (true, true) => Some("rad or m"),
+            (true, false) => Some("rad"),
+            (false, true) => Some("m"),
+            (false, false) => None,
+        }
     }
 
     /// True where a row is left when the given angles are eliminated: loops, sliders, contacts that are held.

@@ -72,7 +72,10 @@ pub fn draw(chart: Chart, scene: &Scene, mechanism: &Mechanism, outcome: &Outcom
         Chart::Angles => chart::angles(&run.angles(), FILE_RESOLUTION),
         Chart::EnergyDrift => chart::energy_drift(&run.energy_drift(), FILE_RESOLUTION),
         Chart::ConstraintDrift => chart::constraint_drift(&run.constraint_drift(), FILE_RESOLUTION),
-        Chart::TorquePower => chart::torque_power(&run.torque_power(), FILE_RESOLUTION),
+        Chart::TorquePower => {
+            let (chart, sliders) = run.torque_power();
+            chart::force_power(&chart, &sliders, FILE_RESOLUTION)
+        }
         Chart::Motion => return Ok(chart::motion_gif(&run.motion())?.bytes),
     };
     picture?.png_bytes()
@@ -83,17 +86,18 @@ pub fn draw(chart: Chart, scene: &Scene, mechanism: &Mechanism, outcome: &Outcom
 /// # Errors
 /// Drawing or encoding fails.
 pub fn overlay(scene: &Scene, mechanism: &Mechanism, outcomes: &[&Outcome]) -> Result<Vec<u8>, ChartError> {
-    let unit = mechanism.rows.first().map_or("rad", Row::unit);
-    let panel = |level: usize| DefectPanel {
+    let panel = |unit: &str, level: usize| DefectPanel {
         name: defect_name(level, unit),
         series: (outcomes.iter())
             .flat_map(|outcome| {
                 let kind = outcome.plan.stabilization.to_string();
-                (outcome.drift.constraints.iter().enumerate()).map(move |(r, (constraint, _))| {
-                    let several = outcome.drift.constraints.len() > 1;
-                    let name = if several { format!("{kind}, {}", plain(constraint)) } else { kind.clone() };
-                    Finished { scene, mechanism, outcome }.defects(r, level, kind.clone(), name)
-                })
+                (outcome.drift.constraints.iter().enumerate()).filter(|(r, _)| mechanism.rows[*r].unit() == unit).map(
+                    move |(r, (constraint, _))| {
+                        let several = outcome.drift.constraints.len() > 1;
+                        let name = if several { format!("{kind}, {}", plain(constraint)) } else { kind.clone() };
+                        Finished { scene, mechanism, outcome }.defects(r, level, kind.clone(), name)
+                    },
+                )
             })
             .collect(),
     };
@@ -102,10 +106,15 @@ pub fn overlay(scene: &Scene, mechanism: &Mechanism, outcomes: &[&Outcome]) -> R
     let chart = ConstraintDrift {
         title: format!("Constraint drift under {} stabilizations", outcomes.len()),
         caption: std::iter::once(format!("scene {}", plain(&scene.name))).chain(settings).collect(),
-        panels: vec![panel(0), panel(1)],
+        panels: units(mechanism).into_iter().flat_map(|unit| [panel(unit, 0), panel(unit, 1)]).collect(),
         log_time: outcomes.iter().any(|outcome| is_long(&outcome.drift.energy)),
     };
     chart::constraint_drift(&chart, FILE_RESOLUTION)?.png_bytes()
+}
+
+/// The units of the constraints, each with a row of panels.
+fn units(mechanism: &Mechanism) -> Vec<&'static str> {
+    mechanism.unit_of_rows().map_or(Vec::new(), |units| units.split(" or ").collect())
 }
 
 /// Name of the axis of violations at one level.
@@ -270,22 +279,27 @@ impl Finished<'_> {
 
     fn constraint_drift(&self) -> ConstraintDrift {
         let Outcome { plan, drift, .. } = self.outcome;
-        let unit = self.mechanism.rows.first().map_or("rad", Row::unit);
-        let panel = |level: usize| DefectPanel {
+        let of = |unit: &'static str| (drift.constraints.iter().enumerate()).filter(move |(r, _)| self.mechanism.rows[*r].unit() == unit);
+        let panel = |unit: &'static str, level: usize| DefectPanel {
             name: defect_name(level, unit),
-            series: (drift.constraints.iter().enumerate())
+            series: of(unit)
                 .map(|(r, (constraint, _))| {
                     let method = if drift.constraints.len() == 1 { plan.stabilization.to_string() } else { constraint.clone() };
                     self.defects(r, level, method, plain(constraint))
                 })
                 .collect(),
         };
-        let most = drift.constraints.iter().map(|(_, [position, _])| position.max).fold(0.0, f64::max);
-        let kept = if most == 0.0 { "are kept exactly".to_owned() } else { format!("keep to {} {unit}", power(most)) };
+        let units = units(self.mechanism);
+        let most = |unit: &'static str| of(unit).map(|(_, (_, [position, _]))| position.max).fold(0.0, f64::max);
+        let kept = if units.iter().all(|unit| most(unit) == 0.0) {
+            "are kept exactly".to_owned()
+        } else {
+            format!("keep to {}", units.iter().map(|unit| format!("{} {unit}", power(most(unit)))).collect::<Vec<_>>().join(" and "))
+        };
         ConstraintDrift {
             title: format!("Constraints {kept} over {} s", figure(self.outcome.last.t)),
             caption: self.caption(None),
-            panels: vec![panel(0), panel(1)],
+            panels: units.into_iter().flat_map(|unit| [panel(unit, 0), panel(unit, 1)]).collect(),
             log_time: is_long(&drift.energy),
         }
     }
@@ -301,8 +315,11 @@ impl Finished<'_> {
         DriftSeries { method, name, time, error }
     }
 
-    fn torque_power(&self) -> TorquePower {
+    /// The motors, and which of them push sliders.
+    fn torque_power(&self) -> (TorquePower, Vec<usize>) {
         let (window, more) = self.window();
+        let driven = self.mechanism.rows.iter().filter(|row| row.is_motor());
+        let sliders: Vec<usize> = driven.enumerate().filter(|(_, row)| !row.is_angle()).map(|(k, _)| k).collect();
         let motors = (self.mechanism.rows.iter().enumerate()).filter(|(_, row)| row.is_motor()).map(|(r, row)| MotorSeries {
             name: plain(row.name()),
             time: window.iter().map(|sample| sample.t).collect(),
@@ -314,7 +331,12 @@ impl Finished<'_> {
         let (horizon, past) = self.horizon(window.last().map_or(0.0, |sample| sample.t));
         let mut caption = self.caption(more);
         caption.extend(past);
-        TorquePower { title: format!("Torque and power of {}", names.join(", ")), caption, motors, horizon }
+        let what = match sliders.len() {
+            0 => "Torque",
+            all if all == motors.len() => "Force",
+            _ => "Torque, force",
+        };
+        (TorquePower { title: format!("{what} and power of {}", names.join(", ")), caption, motors, horizon }, sliders)
     }
 
     /// The first seconds in their own time; faster or slower where too much or nothing would be seen.

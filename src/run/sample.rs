@@ -42,7 +42,8 @@ pub struct Sample {
     pub singular: f64,
     /// See [`Sample::singular`].
     pub weakest: usize,
-    /// Torque \[N·m\], or force \[N\] along a slider, and power \[W\] of each motor.
+    /// Torque \[N·m\] on the driven body, or force \[N\] along the rail on the point that slides, and power \[W\] of each row that a motor, lock or weld
+    /// keeps at a law; zeros for others.
     pub motors: Vec<[f64; 2]>,
 }
 

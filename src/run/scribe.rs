@@ -3,7 +3,7 @@
 //! Rows go over as numbers, many at a time; short runs, and machines that give no thread, write where they are.  The bytes are those of [`Table`].
 
 use super::sample::Sample;
-use super::table::{Table, columns};
+use super::table::{Shown, Table, columns};
 use std::io::{self, Write};
 use std::panic::resume_unwind;
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
@@ -23,6 +23,7 @@ pub struct Scribe<W: Write + Send + 'static> {
     away: Option<Away<W>>,
     /// Rows to hand over.
     numbers: Vec<f64>,
+    shown: Shown,
 }
 
 /// The thread that writes.
@@ -64,7 +65,7 @@ impl<W: Write + Send + 'static> Away<W> {
 impl<W: Write + Send + 'static> Scribe<W> {
     /// Goes on with a table.
     pub fn new(table: Table<W>) -> Self {
-        Self { table: Some(table), away: None, numbers: Vec::new() }
+        Self { shown: table.shown(), table: Some(table), away: None, numbers: Vec::new() }
     }
 
     /// Writes a row, sooner or later.
@@ -72,7 +73,7 @@ impl<W: Write + Send + 'static> Scribe<W> {
     /// # Errors
     /// What the writer said of earlier rows.
     pub fn write(&mut self, sample: &Sample) -> io::Result<()> {
-        columns(sample, &mut self.numbers);
+        columns(sample, &self.shown, &mut self.numbers);
         if self.numbers.len() < BATCH { Ok(()) } else { self.hand_over() }
     }
 

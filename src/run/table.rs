@@ -1,8 +1,13 @@
 //! The trajectory as a table: one row an output time, units in the header, digits that read back to the same doubles.
+//!
+//! Every constraint has its residual and the rate of that.  A motor has its torque on the driven body, or its force on the point that slides, along the
+//! rail, and its power beside them; a lock, a weld or a locked slider the torque it exerts on its body, [`Row`](crate::dynamics::row::Row) by row.
 
 use super::sample::Sample;
 use crate::dynamics::Mechanism;
+use crate::dynamics::row::Row;
 use std::io::{self, Write};
+use std::sync::Arc;
 
 /// Bytes gathered before the writer sees them.
 const BUFFER: usize = 1 << 16;
@@ -14,24 +19,33 @@ pub struct Table<W: Write> {
     /// Numbers of a row.
     width: usize,
     row: Vec<f64>,
+    shown: Shown,
+}
+
+/// What the table shows of each constraint's force: nothing, a torque or force, or its power too.
+pub(super) type Shown = Arc<[usize]>;
+
+fn shown(mechanism: &Mechanism) -> Shown {
+    let count = |(r, row): (usize, &Row)| if mechanism.is_motor(r) { 2 } else { usize::from(row.law.is_some()) };
+    mechanism.rows.iter().enumerate().map(count).collect()
 }
 
 /// Appends the numbers of a row.
-pub(super) fn columns(sample: &Sample, numbers: &mut Vec<f64>) {
+pub(super) fn columns(sample: &Sample, shown: &[usize], numbers: &mut Vec<f64>) {
     numbers.push(sample.t);
     for k in 0..sample.centre.len() {
         let ([x, y], [vx, vy]) = (sample.centre[k], sample.velocity[k]);
         numbers.extend([sample.phi[k], sample.omega[k], x, y, vx, vy]);
     }
     numbers.extend([sample.kinetic, sample.potential, sample.work, sample.imbalance]);
-    for (&[position, velocity], &[torque, power]) in sample.constraints.iter().zip(&sample.motors) {
-        numbers.extend([position, velocity, torque, power]);
+    for ((constraint, motor), &shown) in sample.constraints.iter().zip(&sample.motors).zip(shown) {
+        numbers.extend(constraint.iter().chain(&motor[..shown]));
     }
 }
 
 /// How many numbers that are.
-fn width(mechanism: &Mechanism) -> usize {
-    1 + 6 * mechanism.bodies.len() + 4 + 4 * mechanism.rows.len()
+fn width(mechanism: &Mechanism, shown: &[usize]) -> usize {
+    1 + 6 * mechanism.bodies.len() + 4 + 2 * mechanism.rows.len() + shown.iter().sum::<usize>()
 }
 
 impl<W: Write> Table<W> {
@@ -49,26 +63,30 @@ impl<W: Write> Table<W> {
         for (quantity, unit) in [("kinetic", "J"), ("potential", "J"), ("work", "J"), ("imbalance", "1")] {
             header.push(format!("{quantity} [{unit}]"));
         }
-        for row in &mechanism.rows {
-            let unit = row.unit();
-            let name = row.name();
-            header.extend([
-                format!("{name}.C [{unit}]"),
-                format!("{name}.C' [{unit}/s]"),
-                format!("{name}.torque [N m]"),
-                format!("{name}.power [W]"),
-            ]);
+        let shown = shown(mechanism);
+        for (row, &shown) in mechanism.rows.iter().zip(shown.iter()) {
+            let (unit, name) = (row.unit(), row.name());
+            header.extend([format!("{name}.C [{unit}]"), format!("{name}.C' [{unit}/s]")]);
+            let force = if row.is_angle() { "torque" } else { "force" };
+            header.extend([format!("{name}.{force} [{}]", row.unit_of_force()), format!("{name}.power [W]")].into_iter().take(shown));
         }
         let mut titles = csv::Writer::from_writer(Vec::with_capacity(BUFFER + BUFFER / 4));
         titles.write_record(&header)?;
         let buffer = titles.into_inner().map_err(|error| error.into_error())?;
-        debug_assert_eq!(header.len(), width(mechanism));
-        Ok(Self { writer, buffer, width: header.len(), row: Vec::new() })
+        debug_assert_eq!(header.len(), width(mechanism, &shown));
+        Ok(Self { writer, buffer, width: header.len(), row: Vec::new(), shown })
     }
 
     /// Goes on with a table whose header and first rows were written before.
     pub fn going_on(mechanism: &Mechanism, writer: W) -> Self {
-        Self { writer, buffer: Vec::with_capacity(BUFFER + BUFFER / 4), width: width(mechanism), row: Vec::new() }
+        let shown = shown(mechanism);
+        let width = width(mechanism, &shown);
+        Self { writer, buffer: Vec::with_capacity(BUFFER + BUFFER / 4), width, row: Vec::new(), shown }
+    }
+
+    /// What it shows of each constraint's force.
+    pub(super) fn shown(&self) -> Shown {
+        Arc::clone(&self.shown)
     }
 
     /// The writer, once it has every row.
@@ -88,7 +106,7 @@ impl<W: Write> Table<W> {
     /// What the writer says.
     pub fn write(&mut self, sample: &Sample) -> io::Result<()> {
         let mut row = std::mem::take(&mut self.row);
-        columns(sample, &mut row);
+        columns(sample, &self.shown, &mut row);
         let written = self.lines(&row);
         row.clear();
         self.row = row;

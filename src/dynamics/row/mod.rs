@@ -134,6 +134,11 @@ impl Row {
         if self.is_angle() { "rad" } else { "m" }
     }
 
+    /// Unit of its multiplier and of the torque or force it exerts: `N m` or `N`.
+    pub fn unit_of_force(&self) -> &'static str {
+        if self.is_angle() { "N m" } else { "N" }
+    }
+
     /// True for rows that give an angle.
     pub fn is_angle(&self) -> bool {
         matches!(self.measure, Measure::Angle { .. })

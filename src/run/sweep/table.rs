@@ -1,7 +1,6 @@
 //! The points of a sweep as a table: one row a point, units in the header, digits that read back to the same doubles.
 
 use super::{Point, Status, Sweep};
-use crate::dynamics::row::Row;
 use std::io::Write;
 
 /// Writes a sweep as CSV.
@@ -19,9 +18,12 @@ pub fn columns(sweep: &Sweep) -> Vec<String> {
     for body in &sweep.mechanism().bodies {
         columns.extend([format!("{}.phi [rad]", body.name), format!("{}.omega [rad/s]", body.name)]);
     }
-    let unit = sweep.mechanism().rows.first().map_or("rad", Row::unit);
+    let unit = sweep.mechanism().unit_of_rows().unwrap_or("rad");
     columns.push("energy_drift [1]".to_owned());
-    columns.extend([format!("constraint_drift [{unit}]"), format!("constraint_rate_drift [{unit}/s]")]);
+    columns.extend([
+        format!("constraint_drift [{unit}]"),
+        format!("constraint_rate_drift [{}]", unit.split(" or ").map(|unit| format!("{unit}/s")).collect::<Vec<_>>().join(" or ")),
+    ]);
     columns.extend(["steps", "flip_time [s]", "flip_bar", "status", "cause"].map(str::to_owned));
     columns
 }
