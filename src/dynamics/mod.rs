@@ -43,6 +43,7 @@ pub mod force;
 pub mod forest;
 pub mod gap;
 pub mod impact;
+pub mod indeterminate;
 pub mod jacobian;
 pub mod kernel;
 pub mod law;

@@ -5,6 +5,8 @@
 //! ```
 //!
 //! No unknowns are added for it; it equals the multipliers of the pinned form.  A hinge that closes a loop carries the force of its own rows.
+//!
+//! Signs: the force of a hinge or weld is the one its first body, in the scene's order, exerts on its second, whichever of the two is the ground.
 
 use super::compile::Joint;
 use super::forest::swing;
@@ -42,7 +44,12 @@ impl Mechanism {
         for action in &self.actions {
             needed[action.body] -= action.force(action.factor(t), z);
         }
-        for (row, &multiplier) in self.rows.iter().zip(&kernel.multiplier) {
+        self.transmitted(z, &kernel.multiplier, needed)
+    }
+
+    /// The forces of the hinges and welds under which each body gets the force \[N\] it needs, less what rows with these multipliers push it with.
+    pub(super) fn transmitted(&self, z: &[Complex<f64>], multipliers: &[f64], mut needed: Vec<Complex<f64>>) -> Vec<Complex<f64>> {
+        for (row, &multiplier) in self.rows.iter().zip(multipliers) {
             let Some(push) = &row.push else { continue };
             let direction = push.direction(z);
             for (body, sign) in [(push.on, 1.0), (push.from, -1.0)] {
@@ -62,7 +69,7 @@ impl Mechanism {
             (Some(outer), _) if joint.between[1] == Some(outer) => carried[outer],
             (Some(outer), _) => -carried[outer],
             // The rows push the first body by -lambda, and the second by lambda.
-            (None, Some(row)) => Complex::new(kernel.multiplier[row], kernel.multiplier[row + 1]),
+            (None, Some(row)) => Complex::new(multipliers[row], multipliers[row + 1]),
             (None, None) => Complex::ZERO,
         };
         self.joints.iter().map(force).collect()

@@ -1,12 +1,26 @@
 //! The start of a scene, looked at closely: accelerations, multipliers, motors, hinge forces, energies, impacts.
 //!
-//! Signs: a hinge's force is the one of the first body listed in the hinge on the second; a motor's torque acts on the driven body,
-//! and its power is what it feeds in; an impulse acts on the wall's point along the normal.
+//! Signs, whichever body is the ground:
+//!
+//! | of | force or torque | on | from |
+//! | --- | --- | --- | --- |
+//! | hinge, weld | force | the second body in `between` | the first |
+//! | slider | force across the rail | the body of its `point` | the body of its `rail` |
+//! | rigid spring | force | the first body in `between` | the second |
+//! | motor, lock | torque | its `body` | what `relative_to` names, else the ground |
+//! | motor on a slider | force along the rail, positive in its direction | the body of the slider's `point` | that of the rail |
+//! | weld's `NAME.angle` | torque | the second body, or the first where the second is the ground | the other |
+//! | locked slider's `NAME.angle` | torque | the body of its `point`, or of the rail where that is of the ground | the other |
+//! | wall | impulse along the normal | its `body` | the ground |
+//!
+//! Forces are in the directions of the ground, torques counter-clockwise; each body that is named `from` gets the opposite at the same place.  A torque is minus
+//! its constraint's multiplier, a force minus the multiplier along the constraint's direction: the rail's direction for a travel, that turned left by a quarter for a
+//! slider, x and y for `NAME.x` and `NAME.y` of a hinge that closes a loop, on its first body.  A power is what a motor feeds in.
 
 use super::page::{Page, figure};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::{Bias, Kernel};
-use crate::dynamics::row::Posture;
+use crate::dynamics::row::{Measure, Posture, Row};
 use crate::dynamics::{Mechanism, Motion};
 use crate::scene::Scene;
 use serde_json::{Map, Value, json};
@@ -18,7 +32,9 @@ pub struct Inspection {
     pub bodies: Vec<(String, [f64; 3])>,
     /// Each constraint with its multiplier \[N·m or N\], its violation \[rad or m\] and the rate of that \[rad/s or m/s\].
     pub constraints: Vec<(String, [f64; 3])>,
-    /// Each motor with its torque \[N·m\] and power \[W\].
+    /// What each of the constraints exerts, in their order.
+    pub reactions: Vec<Reaction>,
+    /// Each motor with its torque \[N·m\], or its force \[N\] on a slider, and power \[W\].
     pub motors: Vec<(String, [f64; 2])>,
     /// Each hinge with what it does.
     pub hinges: Vec<HingeForce>,
@@ -41,6 +57,27 @@ pub struct HingeForce {
     pub on: String,
     /// The body it comes from.
     pub from: String,
+    /// False where redundant constraints leave it open: it is one of those of least norm then.  `None` where that was not examined.
+    pub is_determinate: Option<bool>,
+}
+
+/// What a constraint exerts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Reaction {
+    /// Unit of what it measures, `rad` or `m`.
+    pub unit: &'static str,
+    /// Unit of its multiplier, `N m` or `N`.
+    pub unit_of_multiplier: &'static str,
+    /// Torque on a body \[N·m\], for constraints of angles.
+    pub torque: Option<f64>,
+    /// Force (x, y) on a body \[N\], for others.
+    pub force: Option<[f64; 2]>,
+    /// The body it acts on.
+    pub on: String,
+    /// The body it comes from.
+    pub from: String,
+    /// As that of a hinge.
+    pub is_determinate: Option<bool>,
 }
 
 /// A wall at the start.
@@ -85,23 +122,44 @@ pub fn inspect(scene: &Scene, mechanism: &Mechanism) -> Inspection {
     for (k, (body, centre)) in mechanism.bodies.iter().zip(centres).enumerate() {
         found.bodies.push((body.name.clone(), [centre.re, centre.im, kernel.load[k]]));
     }
+    let forces = mechanism.joint_forces(start.time, &kernel, &phi, &omega);
+    let name = |body: Option<usize>| body.map_or("ground", |body| mechanism.bodies[body].name.as_str()).to_owned();
     for (r, row) in mechanism.rows.iter().enumerate() {
-        let here = kernel.rows[r];
-        found.constraints.push((row.name().to_owned(), [kernel.multiplier[r], here.position, kernel.row_rate(r, &omega)]));
-        if row.law.is_some() {
-            let torque = -kernel.multiplier[r];
-            found.motors.push((row.name().to_owned(), [torque, -torque * here.drive]));
+        let (here, multiplier) = (kernel.rows[r], forces.multipliers[r]);
+        found.constraints.push((row.name().to_owned(), [multiplier, here.position, kernel.row_rate(r, &omega)]));
+        if mechanism.is_motor(r) {
+            found.motors.push((row.name().to_owned(), [-multiplier, multiplier * here.drive]));
         }
+        let [on, from] = sides(row).map(name);
+        let force = row.push.as_ref().map(|push| push.direction(&kernel.z).times(-multiplier)).map(|force| [force.re, force.im]);
+        found.reactions.push(Reaction {
+            unit: row.unit(),
+            unit_of_multiplier: row.unit_of_force(),
+            torque: row.is_angle().then_some(-multiplier),
+            force,
+            on,
+            from,
+            is_determinate: forces.row_is_determinate[r],
+        });
     }
-    let forces = mechanism.hinge_forces(start.time, &kernel, &omega);
-    for (joint, force) in mechanism.joints.iter().zip(forces) {
-        let [from, on] = joint.between.map(|body| body.map_or("ground", |body| mechanism.bodies[body].name.as_str()).to_owned());
-        found.hinges.push(HingeForce { name: joint.name.clone(), force: [force.re, force.im], on, from });
+    for (j, joint) in mechanism.joints.iter().enumerate() {
+        let ([from, on], force) = (joint.between.map(name), forces.hinges[j]);
+        let is_determinate = forces.hinge_is_determinate[j];
+        found.hinges.push(HingeForce { name: joint.name.clone(), force: [force.re, force.im], on, from, is_determinate });
     }
     let energy = mechanism.energy(&mut Kernel::<DoubleDouble>::without_rows(mechanism), &start.phi, &start.omega);
     found.energy = [energy.kinetic.hi, energy.potential.hi];
     found.walls = contacts(mechanism, &start, &phi, omega, &kernel);
     found
+}
+
+/// The body a row's force or torque acts on, and the one it comes from.
+fn sides(row: &Row) -> [Option<usize>; 2] {
+    match (&row.measure, &row.push) {
+        (Measure::Angle { body, base }, _) => [Some(*body), *base],
+        (_, Some(push)) => [push.on, push.from],
+        (_, None) => [None, None],
+    }
 }
 
 /// The walls one after another, each with the rates that the one before left, as a run meets them.
@@ -129,15 +187,42 @@ impl Inspection {
     pub fn object(&self, scene: &Scene) -> Value {
         let bodies: Map<String, Value> =
             self.bodies.iter().map(|(name, [x, y, phi])| (name.clone(), json!({"x": x, "y": y, "phi": phi}))).collect();
-        let constraints: Map<String, Value> = (self.constraints.iter())
-            .map(|(name, [multiplier, position, velocity])| {
-                (name.clone(), json!({"multiplier": multiplier, "position": position, "velocity": velocity}))
+        let constraints: Map<String, Value> = (self.constraints.iter().zip(&self.reactions))
+            .map(|((name, [multiplier, position, velocity]), reaction)| {
+                let mut told = json!({
+                    "multiplier": multiplier,
+                    "position": position,
+                    "velocity": velocity,
+                    "unit": reaction.unit,
+                    "unit_of_multiplier": reaction.unit_of_multiplier,
+                    "on": reaction.on,
+                    "from": reaction.from,
+                    "determinate": reaction.is_determinate,
+                });
+                match (reaction.torque, reaction.force) {
+                    (Some(torque), _) => told["torque"] = json!(torque),
+                    (None, force) => told["force"] = json!(force),
+                }
+                (name.clone(), told)
             })
             .collect();
-        let motors: Map<String, Value> =
-            self.motors.iter().map(|(name, [torque, power])| (name.clone(), json!({"torque": torque, "power": power}))).collect();
+        let motors: Map<String, Value> = (self.motors.iter())
+            .map(|(name, [torque, power])| {
+                let reaction = self.reaction(name);
+                let told = json!({
+                    "torque": torque,
+                    "power": power,
+                    "unit": reaction.map(|reaction| reaction.unit_of_multiplier),
+                    "determinate": reaction.and_then(|reaction| reaction.is_determinate),
+                });
+                (name.clone(), told)
+            })
+            .collect();
         let hinges: Map<String, Value> = (self.hinges.iter())
-            .map(|hinge| (hinge.name.clone(), json!({"force": hinge.force, "on": hinge.on, "from": hinge.from})))
+            .map(|hinge| {
+                let told = json!({"force": hinge.force, "on": hinge.on, "from": hinge.from, "determinate": hinge.is_determinate});
+                (hinge.name.clone(), told)
+            })
             .collect();
         let walls: Map<String, Value> = (self.walls.iter())
             .map(|wall| {
@@ -166,6 +251,58 @@ impl Inspection {
         })
     }
 
+    /// What the constraint of that name exerts.
+    fn reaction(&self, name: &str) -> Option<&Reaction> {
+        self.constraints.iter().position(|(known, _)| known == name).and_then(|r| self.reactions.get(r))
+    }
+
+    /// Constraints and motors, those of angles and those of lengths in tables of their own.
+    fn describe_constraints(&self, page: &mut Page) {
+        for (unit, heads, head_of_motors) in [
+            ("rad", ["name", "multiplier [N m]", "C [rad]", "C' [rad/s]", "torque on"], ["name", "torque [N m]", "power [W]", "on"]),
+            ("m", ["name", "multiplier [N]", "C [m]", "C' [m/s]", "force on"], ["name", "force [N]", "power [W]", "on"]),
+        ] {
+            let cells = |name: &str, values: &[f64], on: &str| -> Vec<String> {
+                std::iter::once(name.to_owned()).chain(values.iter().map(|&x| figure(x))).chain([on.to_owned()]).collect()
+            };
+            let here = |name: &str| self.reaction(name).filter(|reaction| reaction.unit == unit);
+            let rows: Vec<Vec<String>> = (self.constraints.iter().zip(&self.reactions))
+                .filter(|(_, reaction)| reaction.unit == unit)
+                .map(|((name, values), reaction)| cells(name, values, &reaction.on))
+                .collect();
+            if !rows.is_empty() {
+                page.entry("constraints", if unit == "rad" { "of angles" } else { "of places" });
+                page.table(&heads, &rows);
+            }
+            let rows: Vec<Vec<String>> =
+                self.motors.iter().filter_map(|(name, values)| Some(cells(name, values, &here(name)?.on))).collect();
+            if !rows.is_empty() {
+                page.entry("motors", "");
+                page.table(&head_of_motors, &rows);
+            }
+        }
+    }
+
+    /// Which forces and torques redundant constraints leave open.
+    fn describe_open(&self, page: &mut Page) {
+        let known = self.hinges.iter().map(|hinge| (&hinge.name, hinge.is_determinate));
+        let rows = self.constraints.iter().zip(&self.reactions).map(|((name, _), reaction)| (name, reaction.is_determinate));
+        let all: Vec<(&String, Option<bool>)> = known.chain(rows).collect();
+        let open: Vec<&str> = all.iter().filter(|(_, known)| *known == Some(false)).map(|(name, _)| name.as_str()).collect();
+        if !open.is_empty() {
+            let text = format!(
+                "{}: constraints are redundant here, and rigid bodies do not tell how these joints share the load; shown are the forces of least norm",
+                open.join(", ")
+            );
+            page.entry("indeterminate", &text);
+        } else if all.iter().any(|(_, known)| known.is_none()) {
+            page.entry(
+                "indeterminate",
+                "some forces may be: constraints are redundant, and too many to tell which forces that leaves open",
+            );
+        }
+    }
+
     /// The report as a page.
     pub fn text(&self, scene: &Scene) -> String {
         let mut page = Page::new(&scene.name, &scene.description);
@@ -173,21 +310,13 @@ impl Inspection {
         let rows: Vec<Vec<String>> = self.bodies.iter().map(|(name, values)| row(name, values)).collect();
         page.entry("accelerations", "of the centres of mass at the start");
         page.table(&["body", "x [m/s²]", "y [m/s²]", "phi [rad/s²]"], &rows);
-        if !self.constraints.is_empty() {
-            let rows: Vec<Vec<String>> = self.constraints.iter().map(|(name, values)| row(name, values)).collect();
-            page.entry("constraints", "");
-            page.table(&["name", "multiplier [N m]", "C [rad]", "C' [rad/s]"], &rows);
-        }
-        if !self.motors.is_empty() {
-            let rows: Vec<Vec<String>> = self.motors.iter().map(|(name, values)| row(name, values)).collect();
-            page.entry("motors", "");
-            page.table(&["name", "torque [N m]", "power [W]"], &rows);
-        }
+        self.describe_constraints(&mut page);
         let rows: Vec<Vec<String>> = (self.hinges.iter())
             .map(|hinge| vec![hinge.name.clone(), figure(hinge.force[0]), figure(hinge.force[1]), hinge.on.clone(), hinge.from.clone()])
             .collect();
         page.entry("hinges", "");
         page.table(&["name", "Fx [N]", "Fy [N]", "on", "from"], &rows);
+        self.describe_open(&mut page);
         let [kinetic, potential] = self.energy;
         page.entry(
             "energy",

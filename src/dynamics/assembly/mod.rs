@@ -11,7 +11,7 @@
 
 mod newton;
 mod rank;
-mod svd;
+pub(in crate::dynamics) mod svd;
 mod watch;
 
 use super::compile::CompileError;

@@ -183,6 +183,12 @@ impl Svd {
         self.triples.iter().fold(0.0, |most, triple| triple.0.max(most))
     }
 
+    /// The left vectors of the largest singular values, so many at most.
+    pub fn left(mut self, count: usize) -> Vec<Vec<f64>> {
+        self.triples.sort_by(|a, b| b.0.total_cmp(&a.0));
+        self.triples.into_iter().take(count).map(|(_, u, _)| u).collect()
+    }
+
     /// The part of `b` that A x can be, singular values below a share of the largest counting as zero.
     pub fn in_range(&self, b: &[f64], share: f64) -> Vec<f64> {
         let least = share * self.largest();
