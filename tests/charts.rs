@@ -308,6 +308,80 @@ fn zero_drift_is_seen_and_named() {
     assert!(energy_drift(&energy, 1.0).unwrap().texts.iter().any(|text| text.text.contains("exactly 0")));
 }
 
+/// The texts of a picture, none of which covers another or leaves the page.
+fn texts_in_order(picture: &Picture) -> Vec<&str> {
+    let size = [f64::from(picture.width), f64::from(picture.height)].map(|pixels| pixels / picture.px_per_pt);
+    for (k, text) in picture.texts.iter().enumerate() {
+        let [left, top, right, bottom] = text.bounds();
+        assert!(left >= 0.0 && top >= 0.0 && right <= size[0] && bottom <= size[1], "{} is cut", text.text);
+        let covered = picture.texts[..k].iter().find(|other| other.overlaps(text));
+        assert!(covered.is_none(), "{} is covered by {}", text.text, covered.map_or("", |other| other.text.as_str()));
+    }
+    picture.texts.iter().map(|text| text.text.as_str()).collect()
+}
+
+#[test]
+fn angles_and_lengths_have_axes_of_their_own() {
+    let panel = |name: &str, series: &[&str]| DefectPanel {
+        name: name.to_owned(),
+        series: series.iter().enumerate().map(|(k, name)| growing(name, 1e-12 * 10_f64.powi(k as i32), 1.0)).collect(),
+    };
+    let (angles, lengths) = (["motor", "slider.angle"], ["B.x", "B.y", "slider"]);
+    let chart = ConstraintDrift {
+        title: "Constraints".to_owned(),
+        panels: vec![
+            panel("|*C*| [rad]", &angles),
+            panel("|*C′*| [rad/s]", &angles),
+            panel("|*C*| [m]", &lengths),
+            panel("|*C′*| [m/s]", &lengths),
+        ],
+        ..ConstraintDrift::default()
+    };
+    let picture = constraint_drift(&chart, 2.0).unwrap();
+    let texts = texts_in_order(&picture);
+    for word in ["|*C*| [rad]", "|*C*| [m]", "motor", "slider"] {
+        assert!(texts.iter().any(|text| text.contains(word)), "{word} in {texts:?}");
+    }
+    assert_eq!(picture.panels.len(), 4);
+    let [first, second, third, fourth] = [0, 1, 2, 3].map(|k| picture.panels[k]);
+    assert!(first[3] < third[1] && second[3] < fourth[1], "rows of their own");
+    assert_eq!([first[0], first[2]], [third[0], third[2]], "in line");
+}
+
+#[test]
+fn a_motor_on_a_slider_is_drawn_with_a_force() {
+    let time = times(50, 0.1);
+    let wave = |k: usize| time.iter().map(|t| (k as f64 + 1.0) * (t + k as f64).sin()).collect::<Vec<f64>>();
+    let mut chart = torque(time.clone(), wave(0));
+    let only = force_power(&chart, &[0], 2.0).unwrap();
+    let texts = texts_in_order(&only);
+    assert!(texts.iter().any(|text| text.contains("force [N]")) && !texts.iter().any(|text| text.contains("N·m")), "{texts:?}");
+    chart.motors.push(MotorSeries { name: "push".to_owned(), time: time.clone(), torque: wave(3), power: wave(2) });
+    let both = force_power(&chart, &[1], 2.0).unwrap();
+    let texts = texts_in_order(&both);
+    assert!(["torque [N·m]", "force [N]", "power [W]"].iter().all(|word| texts.iter().any(|text| text == word)), "{texts:?}");
+    assert_eq!(both.panels.len(), 3);
+}
+
+#[test]
+fn values_at_zero_leave_the_colours_to_the_others() {
+    // A twentieth happens at once, as bars do that start upside down; the rest within 0.2 to 10 s.
+    let cells: Vec<Cell> =
+        (0..1600).map(|k| Cell::Value(if k % 20 == 0 { 1e-10 } else { 0.2 * 50_f64.powf((k % 97) as f64 / 96.0) })).collect();
+    let axis = MapAxis { name: "*a*".to_owned(), from: 0.0, to: 1.0, count: 40, log: false };
+    let chart = Map { x: axis.clone(), y: axis, cells, value: "time [s]".to_owned(), log: true, dark_high: true, ..Map::default() };
+    let picture = map(&chart, 1.0).unwrap();
+    let [left, top, right, bottom] = picture.panels[picture.panels.len() - 1].map(|edge| edge as usize);
+    let mut colours = std::collections::BTreeSet::new();
+    for y in top + 1..bottom {
+        for x in left + 1..right {
+            colours.insert(picture.rgb.as_chunks::<3>().0[y * picture.width as usize + x]);
+        }
+    }
+    assert!(colours.len() > 30, "{} colours", colours.len());
+    assert!(picture.texts.iter().any(|text| text.text.starts_with('≤')), "{:?}", picture.texts);
+}
+
 #[test]
 fn gravity_points_down_the_page_and_motors_turn_as_they_should() {
     let middle = |picture: &Picture, name: &str| {

@@ -26,6 +26,11 @@ const GAP: f64 = 7.5;
 /// Side of a square of the legend \[pt\].
 const SWATCH: f64 = 8.0;
 
+/// Values below the lower quartile count where they are within this power of the quartiles' ratio, which is taken to be at least `MIDDLE`.
+const FENCE: f64 = 1.5;
+/// See [`FENCE`].
+const MIDDLE: f64 = 10.0;
+
 /// What a map shows in one place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cell {
@@ -73,7 +78,7 @@ pub struct Map {
     pub log: bool,
     /// Dark colours for large values instead of small ones.
     pub dark_high: bool,
-    /// Ends of the colours; `None`: those of the values, of which a logarithm leaves out the smallest hundredth.
+    /// Ends of the colours; `None`: those of the values, of which a logarithm leaves out the smallest hundredth and what lies decades below the rest.
     pub range: Option<[f64; 2]>,
     /// What [`Cell::Never`], [`Cell::Excluded`] and [`Cell::Failed`] mean, with markup.
     pub words: [String; 3],
@@ -193,7 +198,11 @@ impl Colours {
             values.sort_by(f64::total_cmp);
             match (chart.log, values.first(), values.last()) {
                 (true, Some(_), Some(&high)) => {
-                    let low = round_down(values[values.len() / 100]);
+                    let quartile = |share: usize| values[share * (values.len() - 1) / 4];
+                    // A few values near zero would leave one colour to all others.
+                    let fence = quartile(1) / (quartile(3) / quartile(1)).clamp(MIDDLE, 1e100).powf(FENCE);
+                    let inside = values.partition_point(|&value| value < fence);
+                    let low = round_down(values[inside.max(values.len() / 100)]);
                     [low, if high >= 2.0 * low { high } else { 2.0 * low }]
                 }
                 (false, Some(&low), Some(&high)) if low < high => [low, high],

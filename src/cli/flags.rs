@@ -5,7 +5,7 @@ use super::output::{message, print};
 use crate::run::stress::EFFORT;
 use crate::run::trust::Level;
 use crate::run::{Limits, METHODS, MethodId, Prefer, Request, Stabilization, Vary};
-use crate::scene::Override;
+use crate::scene::{self, Override};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand};
@@ -64,10 +64,10 @@ pub enum Command {
 /// Which scene, and how to talk about it.
 #[derive(Debug, Args)]
 pub struct SceneFlags {
-    /// Scene file (JSON); `driftless schema` describes it
+    /// Scene file (JSON), - for standard input; `driftless schema` describes it
     #[arg(value_name = "SCENE")]
     pub scene: PathBuf,
-    /// Set a value of the scene, as in walls.wall.restitution=0.5; repeatable
+    /// Set a value of the scene, as in walls.wall.restitution=0.5, bar1.phi=pi/2 or start.bar1.omega=-1/3; repeatable
     #[arg(long, value_name = "PATH=VALUE")]
     pub set: Vec<Override>,
     /// Refuse a scene of which something given for the start must change to fit its constraints
@@ -128,8 +128,20 @@ pub struct CheckFlags {
     pub plan: PlanFlags,
 }
 
+const SIGNS: &str = "\
+Signs, in the directions of the ground, torques counter-clockwise:
+  hinge, weld      force of the first body of `between` on the second, also where the ground is second
+  slider           force across the rail on the body of its `point`
+  motor, lock      torque on its `body`; of a motor on a slider, force along the rail on the body of the slider's `point`
+  NAME.angle       torque of a weld on the second body, of a locked slider on the body of its `point`; on the other body
+                   where that is the ground
+  power            what the motor feeds in
+A force or torque is minus the multiplier of its constraint; `on` and `from` name both bodies.  Where constraints are
+redundant, forces that rigid bodies leave open are named as indeterminate; those shown are the ones of least norm.";
+
 /// `driftless inspect`.
 #[derive(Debug, Args)]
+#[command(after_help = SIGNS)]
 pub struct InspectFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
@@ -282,7 +294,7 @@ pub struct CompareFlags {
 /// How often checkpoints are written.
 #[derive(Clone, Debug, Args)]
 pub struct CheckpointFlags {
-    /// Seconds of computing between two checkpoints, from which `driftless resume` goes on; 0: none but at Ctrl-C and SIGTERM
+    /// Seconds of computing between two checkpoints, from which `driftless resume` goes on, after a first one at the start; 0: none but at Ctrl-C and SIGTERM
     #[arg(
         long,
         value_name = "S",
@@ -311,7 +323,7 @@ pub struct TellFlags {
 /// `driftless resume`.
 #[derive(Debug, Args)]
 pub struct ResumeFlags {
-    /// The folder of the run or sweep
+    /// The folder of the run or sweep, or one above it that holds no other interrupted one
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
     /// A later horizon in seconds, for a run
@@ -422,13 +434,10 @@ fn levels() -> impl TypedValueParser<Value = Level> {
     PossibleValuesParser::new(Level::ALL.map(Level::name)).try_map(|name| name.parse::<Level>())
 }
 
-/// A number, or a fraction of two.
+/// A number as everywhere on the command line; infinities and NaN, which a plan refuses, are numbers too.
 fn number(text: &str) -> Result<f64, String> {
-    let read = |part: &str| part.trim().parse::<f64>().map_err(|_| "not a number; write 0.01, 1e-9 or 1/64".to_owned());
-    match text.split_once('/') {
-        Some((above, below)) => Ok(read(above)? / read(below)?),
-        None => read(text),
-    }
+    let read = scene::number(text).or_else(|| text.trim().parse().ok());
+    read.ok_or_else(|| "not a number; write 0.01, 1e-9, 1/64 or pi/2".to_owned())
 }
 
 /// A whole number from 1 to 1e18, as 50000 or 5e4.

@@ -18,8 +18,9 @@ pub use flags::{Flags, parse};
 
 use crate::dynamics::Mechanism;
 use crate::report;
+use crate::report::page::counted;
 use crate::run::{Plan, Run};
-use crate::scene::{self, Scene};
+use crate::scene::{self, Override, Scene, Template};
 use clap::CommandFactory;
 use flags::{CheckFlags, Command, InspectFlags, SceneFlags};
 use output::{print, print_object};
@@ -79,14 +80,35 @@ fn load(flags: &SceneFlags) -> Result<(Scene, Arc<Mechanism>), Failure> {
 
 /// Compiles the scene of this text.
 fn compile(flags: &SceneFlags, text: &str) -> Result<(Scene, Arc<Mechanism>), Failure> {
-    let scene = scene::parse_scene(text, &flags.scene.display().to_string(), &flags.set)?;
-    flags.remark(&format!("read {}: scene {}, {} bodies", flags.scene.display(), scene.name, scene.bars.len()));
+    let scene = scene::parse_scene(text, &scene::source_name(&flags.scene), &flags.set)?;
+    flags.remark(&format!(
+        "read {}: scene {}, {}",
+        scene::source_name(&flags.scene),
+        scene.name,
+        counted(scene.bars.len() as u64, "body", "bodies")
+    ));
     for set in &flags.set {
         flags.remark(&format!("set {} to {}", set.path, set.value));
     }
     let mechanism = Arc::new(Mechanism::new(&scene)?);
     settle(flags, &mechanism)?;
+    if !flags.tell.quiet {
+        stays(flags, text, &scene).iter().for_each(|note| output::message(&format!("note: {note}")));
+    }
     Ok((scene, mechanism))
+}
+
+/// What lengths that are set leave where it is.
+fn stays(flags: &SceneFlags, text: &str, scene: &Scene) -> Vec<String> {
+    if flags.set.is_empty() {
+        return Vec::new();
+    }
+    let template = Template::new(text.to_owned(), scene::source_name(&flags.scene), &flags.set);
+    let note = |set: &Override| {
+        let path = template.variable(&set.path).ok()?.path;
+        scene::points_that_stay(scene, &path, set.number())
+    };
+    flags.set.iter().filter_map(note).collect()
 }
 
 /// Tells how the start differs from what the scene gives, or refuses it.

@@ -1,6 +1,7 @@
 //! How far a run is: a bar on a terminal, a line now and then elsewhere, nothing when quiet.
 
 use super::output::message;
+use crate::report::page::counted;
 use crate::run::compare::Stage;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
@@ -167,13 +168,14 @@ fn left(seconds: f64) -> String {
 
 /// `1200 of 4096 points, 85.3 a second, 34 s left`.
 fn told(before: u64, finished: u64, count: u64, spent: Duration) -> String {
+    let of = counted(count, "point", "points");
     let rate = finished.saturating_sub(before) as f64 / spent.as_secs_f64().max(1e-9);
     if finished <= before {
-        return format!("{finished} of {count} points");
+        return format!("{finished} of {of}");
     }
     let left = left(count.saturating_sub(finished) as f64 / rate);
     let rate = if rate < 10.0 { format!("{rate:.2}") } else { format!("{rate:.0}") };
-    format!("{finished} of {count} points, {rate} a second, {left} left")
+    format!("{finished} of {of}, {rate} a second, {left} left")
 }
 
 impl Progress {

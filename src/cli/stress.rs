@@ -8,7 +8,7 @@ use super::progress::Points;
 use crate::report;
 use crate::run::Folder;
 use crate::run::stress::{Case, Expected, Line, Stress, Verdict, stress};
-use crate::scene::read_text;
+use crate::scene::{read_text, source_name};
 
 /// The files it may leave; those of an earlier one in the same folder go with it.
 const FILES: &[&str] = &[TABLE, RECORD, MATRIX, STABILITY[0].1, STABILITY[1].1];
@@ -51,7 +51,7 @@ fn plan(flags: &StressFlags) -> Result<Stress, Failure> {
         usual.cases
     } else {
         let case = |path: &std::path::PathBuf| {
-            let origin = path.display().to_string();
+            let origin = source_name(path);
             let name = path.file_stem().map_or_else(|| origin.clone(), |stem| stem.to_string_lossy().into_owned());
             Ok(Case { name, origin, text: read_text(path)?, tolerance: flags.tolerance, expected: Expected::Unknown })
         };

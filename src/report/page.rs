@@ -115,6 +115,11 @@ fn digits(x: f64, digits: i32) -> String {
     if plain.contains('.') { plain.trim_end_matches('0').trim_end_matches('.').to_owned() } else { plain }
 }
 
+/// So many of something: `1 point`, `4096 points`.
+pub fn counted(count: u64, one: &str, many: &str) -> String {
+    if count == 1 { format!("1 {one}") } else { format!("{count} {many}") }
+}
+
 /// A size that matters by its magnitude only: `2.1e-13`.
 pub fn magnitude(x: f64) -> String {
     match x {

@@ -1,8 +1,10 @@
 //! How a run went.
 
 use super::check::describe;
-use super::page::{Page, figure, magnitude};
+use super::page::{Page, counted, figure, magnitude};
 use crate::dynamics::Mechanism;
+#[cfg(feature = "files")]
+use crate::run::Plan;
 #[cfg(feature = "files")]
 use crate::run::files::sha256;
 use crate::run::{Outcome, Sample};
@@ -80,10 +82,11 @@ fn moment(mechanism: &Mechanism, sample: &Sample) -> Value {
 /// What `run.json` holds: the report, the resolved scene, versions, hashes; what differs from run to run stands in `timings` alone.
 #[cfg(feature = "files")]
 pub fn record(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome, trajectory_sha256: &str) -> Value {
+    let plan = &outcome.plan;
     let mut report = object(scene, mechanism, outcome);
     let wall = report.as_object_mut().and_then(|members| members.shift_remove("wall_s"));
     let trust_wall = report.as_object_mut().and_then(|members| members.shift_remove("trust_wall_s"));
-    let input = scene.to_input();
+    let input = as_run(scene, plan).to_input();
     json!({
         "format": 1,
         "versions": {"driftless": env!("CARGO_PKG_VERSION"), "target": target()},
@@ -92,6 +95,12 @@ pub fn record(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome, trajector
         "resolved_scene": input,
         "timings": {"wall_s": wall, "trust_wall_s": trust_wall},
     })
+}
+
+/// The scene with the horizon and the output interval it was run with.
+#[cfg(feature = "files")]
+pub(super) fn as_run(scene: &Scene, plan: &Plan) -> Scene {
+    Scene { until: plan.until, every: plan.every, ..scene.clone() }
 }
 
 /// The platform the program was compiled for: `x86_64-linux-gnu`.
@@ -122,9 +131,9 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
     page.entry(
         "cost",
         &format!(
-            "{} steps, {} evaluations, {} rejected, {:.3} s",
-            tally.steps,
-            tally.evaluations,
+            "{}, {}, {} rejected, {:.3} s",
+            counted(tally.steps, "step", "steps"),
+            counted(tally.evaluations, "evaluation", "evaluations"),
             tally.rejected,
             outcome.wall.as_secs_f64()
         ),

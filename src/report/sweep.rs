@@ -1,6 +1,6 @@
 //! What a sweep amounted to, and its chart.
 
-use super::page::{Page, figure, magnitude};
+use super::page::{Page, counted, figure, magnitude};
 #[cfg(feature = "charts")]
 use crate::chart::{self, Cell, ChartError, FILE_RESOLUTION, Map, MapAxis, Profile, plain};
 use crate::run::files::sha256;
@@ -49,7 +49,7 @@ pub fn record(sweep: &Sweep, totals: &Totals, table_sha256: &str) -> Value {
     let mut report = object(sweep, totals);
     let mut taken = |key: &str| report.as_object_mut().and_then(|members| members.shift_remove(key));
     let timings = json!({"wall_s": taken("wall_s"), "threads": taken("threads")});
-    let input = sweep.scene().to_input();
+    let input = super::result::as_run(sweep.scene(), sweep.plan()).to_input();
     json!({
         "format": 1,
         "versions": {"driftless": env!("CARGO_PKG_VERSION"), "target": super::result::target()},
@@ -68,29 +68,32 @@ pub fn text(sweep: &Sweep, totals: &Totals) -> String {
     page.entry("", sweep.plan().why.as_deref().unwrap_or("as asked for"));
     for (number, (axis, variable)) in sweep.grid().axes().iter().zip(sweep.variables()).enumerate() {
         let unit = if variable.unit.is_empty() { String::new() } else { format!(" {}", variable.unit) };
-        let range = format!("{}: {} to {}{unit}, {} values", variable.path, figure(axis.from), figure(axis.to), axis.count);
+        let range =
+            format!("{}: {} to {}{unit}, {}", variable.path, figure(axis.from), figure(axis.to), counted(axis.count, "value", "values"));
         page.entry(if number == 0 { "varied" } else { "" }, &range);
     }
     let seconds = totals.wall.as_secs_f64();
     let rate = figure((sweep.grid().count() as f64 / seconds.max(1e-9)).round());
-    let threads = if totals.threads == 1 { "1 thread".to_owned() } else { format!("{} threads", totals.threads) };
-    page.entry(
-        "cost",
-        &format!("{} points, {} steps, {seconds:.3} s on {threads}, {rate} points a second", sweep.grid().count(), totals.steps),
-    );
-    page.entry("points", &counted(totals));
-    page.entry("turned over", &format!("{} of them, by t = {} s", totals.flipped, figure(sweep.plan().until)));
+    let [points, steps] = [counted(sweep.grid().count(), "point", "points"), counted(totals.steps, "step", "steps")];
+    let threads = counted(totals.threads as u64, "thread", "threads");
+    page.entry("cost", &format!("{points}, {steps}, {seconds:.3} s on {threads}, {rate} points a second"));
+    page.entry("points", &by_status(totals));
+    page.entry("turned over", &format!("{} of {points}, by t = {} s", totals.flipped, figure(sweep.plan().until)));
     page.entry("energy drift", &format!("{} of its scale at most, in row {}", magnitude(totals.energy.0), totals.energy.1 + 1));
-    if let Some(row) = sweep.mechanism().rows.first() {
-        let unit = row.unit();
+    if let Some(unit) = sweep.mechanism().unit_of_rows() {
         let [position, velocity] = totals.constraint.map(magnitude);
-        page.entry("constraints", &format!("{position} {unit} and {velocity} {unit}/s at most"));
+        page.entry("constraints", &format!("{position} {unit} and {velocity} {} at most", per_second(unit)));
     }
     page.into_text()
 }
 
+/// The unit of the rate of a constraint.
+fn per_second(unit: &str) -> String {
+    unit.split(" or ").map(|unit| format!("{unit}/s")).collect::<Vec<_>>().join(" or ")
+}
+
 /// `12 done, 3 stopped, 1 refused`.
-fn counted(totals: &Totals) -> String {
+fn by_status(totals: &Totals) -> String {
     let kinds = [(totals.done, "done"), (totals.stopped, "stopped"), (totals.refused, "refused"), (totals.skipped, "skipped")];
     kinds
         .iter()
@@ -205,8 +208,9 @@ impl Curve {
         let plan = sweep.plan();
         let mut caption = vec![format!("scene {}", plain(&sweep.scene().name)), plain(&super::setting(plan))];
         caption.push(format!(
-            "{} points, {} s each",
+            "{} {}, {} s each",
             axes.iter().map(|axis| axis.count.to_string()).collect::<Vec<_>>().join(" × "),
+            if sweep.grid().count() == 1 { "point" } else { "points" },
             figure(plan.until)
         ));
         let log = is_flip || names[self.column.unwrap_or_default()].contains("drift") || name == "steps";

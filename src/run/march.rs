@@ -472,7 +472,7 @@ pub(super) fn tangent_form(mechanism: &Arc<Mechanism>) -> Box<dyn Problem> {
 }
 
 fn cannot_begin(plan: &Plan, what: String) -> StepError {
-    let hint = "use dp8".into();
+    let hint = "--method dp8".into();
     StepError { cause: Cause::Unsuited, method: plan.method.to_string(), t: 0.0, step: plan.step.unwrap_or(0.0), what, hint }
 }
 

@@ -260,6 +260,8 @@ fn check_numbers(request: &Request) -> Result<(), Refusal> {
     ];
     for (option, value, most) in positive {
         if let Some(value) = value.filter(|&value| !(value > 0.0 && value <= most)) {
+            let is_short = value == 0.0 || (1e-6..1e16).contains(&value.abs());
+            let value = if is_short { value.to_string() } else { format!("{value:e}") };
             return Err(usage(
                 option,
                 format!("{value} is not a number of seconds above 0 and up to {most:e}"),

@@ -371,6 +371,7 @@ impl Running {
             let exceeded = outcome.drift.see(sample, limits, steps);
             outcome.stop = stopped
                 .err()
+                .map(|stop| advised(stop, is_tied_up))
                 .or(moved)
                 .or_else(|| (!sample.is_finite()).then(|| not_finite(&outcome.plan, sample.t)))
                 .or_else(|| uncounted(&outcome.plan, sample))
@@ -427,6 +428,15 @@ impl Running {
         self.outcome.trust = self.companion.take().map(|companion| companion.trust(self.outcome.last.t));
         self.outcome
     }
+}
+
+/// Steps that shrink where loops and sliders are have another cause than a stiff spring.
+fn advised(stop: StepError, is_tied_up: bool) -> StepError {
+    if stop.cause != Cause::StepTooSmall || !is_tied_up {
+        return stop;
+    }
+    let hint = if stop.method == "taylor" { "--method dp8 with --stabilize projection" } else { "--method taylor" };
+    StepError { hint: format!("a singular position of the constraints may be near: {hint}, or another tolerance"), ..stop }
 }
 
 /// Loops and sliders that nothing projects let go at singular positions, and the motion goes on smoothly on another branch: such a run is no success.

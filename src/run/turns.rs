@@ -54,7 +54,7 @@ impl Turns {
             t: sample.t,
             step: plan.step.unwrap_or(0.0),
             what: format!("constraint {} has lost whole turns: a step was too long for what pulls at it", angle.name),
-            hint: "give a shorter output interval with dop853, or a smaller step".into(),
+            hint: "a shorter --every with dop853, else a smaller --step or --rtol".into(),
         })
     }
 }

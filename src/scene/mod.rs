@@ -7,16 +7,20 @@ mod error;
 mod fit;
 mod format;
 mod locate;
+mod number;
 pub mod read;
 mod schema;
 mod set;
+mod stays;
 mod template;
 mod write;
 
 pub use error::{Refusal, SceneError};
-pub use read::{parse_scene, read_scene, read_text};
+pub use number::number;
+pub use read::{parse_scene, read_scene, read_text, source_name};
 pub use schema::schema;
 pub use set::{Override, OverrideError};
+pub use stays::points_that_stay;
 pub use template::{StartValue, Template, Variable};
 
 use serde::Serialize;

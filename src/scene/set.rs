@@ -2,13 +2,16 @@
 
 use super::error::SceneError;
 use super::locate::{Member, Node, Source, Text, Value, push_index, push_key};
+use super::number;
 use super::read::nearest;
+use super::template::{is_number, whole};
 use std::str::FromStr;
 
 /// One value of a scene set from outside, as `PATH=VALUE`.
 ///
 /// A path is made of keys (`until`), indices (`gravity[0]`, `bars[1].length`) and, in a list, names (`bars.bar2.length`,
-/// `motors.motor.law.rate`).  What holds the value must exist already; a key may be new (`springs.spring.damping`).
+/// `motors.motor.law.rate`), or the short form of one (`bar1.phi`, `motor.rate`).  What holds the value must exist already, but for the start of a bar and
+/// the law of a force; a key may be new (`springs.spring.damping`).  Numbers may be written as [`number`] takes them.
 ///
 /// ```
 /// let set: driftless::scene::Override = "walls.wall.restitution=0.5".parse().expect("a path and a value");
@@ -34,7 +37,7 @@ pub struct OverrideError {
 impl FromStr for Override {
     type Err = OverrideError;
 
-    /// The value is read as JSON, or else taken as text.
+    /// The value is read as JSON, or else taken as text; text such as `pi/2` counts as a number where a number is meant.
     fn from_str(given: &str) -> Result<Self, OverrideError> {
         let fail = || OverrideError { given: given.to_owned() };
         let (path, value) = given.split_once('=').ok_or_else(fail)?;
@@ -46,6 +49,11 @@ impl FromStr for Override {
 }
 
 impl Override {
+    /// The value as a number, where it is one.
+    pub fn number(&self) -> Option<f64> {
+        self.value.as_f64().or_else(|| self.value.as_str().and_then(number))
+    }
+
     /// This option as a text of its own.
     pub(super) fn text(&self) -> Text {
         let json = self.value.to_string();
@@ -81,14 +89,37 @@ pub(super) fn steps(path: &str) -> Option<Vec<Step<'_>>> {
     Some(steps)
 }
 
-/// Puts `value` into `tree` at the path of `set`.
+/// Puts `value` into `tree` at the path of `set`, written out or short.
 pub(super) fn put(source: &Source, tree: &mut Node, set: &Override, value: Node) -> Result<(), SceneError> {
+    let path = match whole(&set.path, tree) {
+        Ok(path) => path,
+        Err(hint) if hint.starts_with(SEVERAL) => {
+            return Err(source.refusal(value.span, &set.path, "is ambiguous", "must mean one value of the scene", &hint));
+        }
+        // The walk along the path says what is wrong with it.
+        Err(_) => set.path.clone(),
+    };
+    let typed = if let Value::Text(text) = &value.value { number(text) } else { None };
+    let span = value.span;
+    place(source, tree, &path, value)?;
+    match typed.filter(|_| is_number(&path, tree)) {
+        Some(number) => place(source, tree, &path, Node { span, value: Value::Number(number) }),
+        None => Ok(()),
+    }
+}
+
+/// How a hint at several things of one name begins.
+pub(super) const SEVERAL: &str = "several things are called";
+
+/// Puts `value` into `tree` at a whole path.
+fn place(source: &Source, tree: &mut Node, path: &str, value: Node) -> Result<(), SceneError> {
     let span = value.span;
     let refused = |path: &str, problem: &str, allowed: &str, hint: &str| source.refusal(span, path, problem, allowed, hint);
-    let Some(steps) = steps(&set.path) else {
+    let Some(steps) = steps(path) else {
         let hint = "for example walls.wall.restitution, bars[1].length, gravity[0]";
-        return Err(refused(&set.path, "is not a path", "must be keys, names and [indices] joined by dots", hint));
+        return Err(refused(path, "is not a path", "must be keys, names and [indices] joined by dots", hint));
     };
+    let bars = names(tree);
     let mut at = tree;
     let mut path = String::new();
     let last = steps.len() - 1;
@@ -104,8 +135,16 @@ pub(super) fn put(source: &Source, tree: &mut Node, set: &Override, value: Node)
                         members.push(Member { key: (*key).to_owned(), span, node: value });
                         return Ok(());
                     }
+                    None if may_be_added(&steps[..=number], &bars) => {
+                        members.push(Member { key: (*key).to_owned(), span, node: Node { span, value: Value::Object(Vec::new()) } });
+                        let Some(added) = members.last_mut() else { return Ok(()) };
+                        at = &mut added.node;
+                    }
                     None => {
-                        let known: Vec<&str> = members.iter().map(|member| member.key.as_str()).collect();
+                        let known: Vec<&str> = match steps[..number] {
+                            [Step::Key("start")] => bars.iter().map(String::as_str).collect(),
+                            _ => members.iter().map(|member| member.key.as_str()).collect(),
+                        };
                         let hint = hint(key, &known);
                         return Err(refused(&path, "does not exist", "what holds the value must be in the scene", &hint));
                     }
@@ -141,6 +180,25 @@ pub(super) fn put(source: &Source, tree: &mut Node, set: &Override, value: Node)
     }
     *at = value;
     Ok(())
+}
+
+/// Objects that a scene may do without and that a path may begin: the start, that of a bar, the law of a force or torque.
+fn may_be_added(steps: &[Step], bars: &[String]) -> bool {
+    match steps {
+        [Step::Key("start")] => true,
+        [Step::Key("start"), Step::Key(bar)] => bars.iter().any(|known| known == bar),
+        [Step::Key("forces" | "torques"), _, Step::Key("law")] => true,
+        _ => false,
+    }
+}
+
+/// The names of the bars.
+fn names(tree: &Node) -> Vec<String> {
+    let Value::Object(members) = &tree.value else { return Vec::new() };
+    match members.iter().find(|member| member.key == "bars").map(|member| &member.node.value) {
+        Some(Value::List(nodes)) => nodes.iter().filter_map(name).map(str::to_owned).collect(),
+        _ => Vec::new(),
+    }
 }
 
 pub(super) fn name(node: &Node) -> Option<&str> {

@@ -8,8 +8,8 @@ use super::Scene;
 use super::error::SceneError;
 use super::format::{Field, LAW, SCENE, START, Shape, Table, UNIFORM_BAR, kind};
 use super::locate::{Node, Value, push_index, push_key};
-use super::read::{listed, nearest, parse_scene, put_together, read_text};
-use super::set::{Override, Step, hint, name, steps};
+use super::read::{listed, nearest, parse_scene, put_together, read_text, source_name};
+use super::set::{Override, SEVERAL, Step, hint, name, steps};
 use std::path::Path;
 
 /// The text of a scene, and the overrides it is always read with.
@@ -50,7 +50,7 @@ impl Template {
     /// # Errors
     /// As [`read_text`].
     pub fn read(path: &Path, overrides: &[Override]) -> Result<Self, SceneError> {
-        Ok(Self::new(read_text(path)?, path.display().to_string(), overrides))
+        Ok(Self::new(read_text(path)?, source_name(path), overrides))
     }
 
     /// Takes the text of a scene; `source` is the name of its file in messages.
@@ -111,12 +111,15 @@ impl Template {
 }
 
 /// A short name written out; else a hint at what is near.
-fn whole(short: &str, tree: &Node) -> Result<String, String> {
+pub(super) fn whole(short: &str, tree: &Node) -> Result<String, String> {
     let first = short.split(['.', '[']).next().unwrap_or("");
     if SCENE.field(first).is_some() {
         return Ok(short.to_owned());
     }
     let rest = short[first.len()..].trim_start_matches('.');
+    if rest.is_empty() {
+        return Err("go on with a key, as in bar1.phi".to_owned());
+    }
     let mut found = Vec::new();
     let mut known: Vec<&str> = SCENE.fields.iter().map(|field| field.name).collect();
     for list in LISTS {
@@ -133,8 +136,13 @@ fn whole(short: &str, tree: &Node) -> Result<String, String> {
     match &found[..] {
         [only] => Ok(only.clone()),
         [] => Err(hint(first, &known)),
-        several => Err(format!("several things are called {first}; write {}", several.join(" or "))),
+        several => Err(format!("{SEVERAL} {first}; write {}", several.join(" or "))),
     }
+}
+
+/// True where a whole path leads to a number of the format.
+pub(super) fn is_number(path: &str, tree: &Node) -> bool {
+    Walk { tree }.unit(path).is_ok()
 }
 
 fn member<'a>(node: &'a Node, key: &str) -> Option<&'a Node> {

@@ -94,7 +94,12 @@ where
                     what: format!(
                         "energy changed by {lost:.1e} of its scale where constraint {row} loses its hold: the motion left its branch"
                     ),
-                    hint: "try --method taylor, or another tolerance".into(),
+                    hint: if name == "taylor" {
+                        "try --method dp8, or another tolerance"
+                    } else {
+                        "try --method taylor, or another tolerance"
+                    }
+                    .into(),
                 });
             }
             Ok(match watch(problem, state)? {

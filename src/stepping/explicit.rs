@@ -332,7 +332,7 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
                 wanted = h * factor.min(0.9);
                 if wanted < super::finest(state) {
                     let what = format!("{} asks for ever smaller steps", self.culprit(field, n));
-                    return Err(Self::stop(Cause::StepTooSmall, state, h, what, "loosen the tolerance or use a stiff method"));
+                    return Err(Self::stop(Cause::StepTooSmall, state, h, what, "loosen the tolerance, or take --method taylor or radau9"));
                 }
                 continue;
             }

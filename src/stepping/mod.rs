@@ -274,7 +274,7 @@ fn at_rest(method: &str, state: &State, step: f64) -> StepError {
         t: state.time.hi,
         step,
         what: "a point has come to rest on a wall".into(),
-        hint: "go on with the contact held (`Mechanism::holding`), or raise the restitution".into(),
+        hint: "raise the restitution of the wall, or change what presses the point against it".into(),
     }
 }
 

@@ -215,7 +215,7 @@ fn part<F: Field + ?Sized>(
         }
         Err(IntegrationError::StepSizeUnderflow { x } | IntegrationError::StiffnessDetected { x }) => {
             let what = "the step fell below the resolution of time, or a rate became not finite".into();
-            return Err(stop(Cause::StepTooSmall, reached_time(x), 0.0, what, "loosen the tolerance or use a stiff method"));
+            return Err(stop(Cause::StepTooSmall, reached_time(x), 0.0, what, "loosen the tolerance, or take --method taylor or radau9"));
         }
     }
     for &(i, unit) in &scaled {

@@ -402,7 +402,7 @@ impl Trial<'_> {
             t: self.scene.until,
             step: 0.0,
             what: format!("the error of the end is {off}, and {:.0e} was asked for", self.case.tolerance),
-            hint: "allow more effort, or take a method of higher order".into(),
+            hint: "allow more with --effort, or take a method of higher order".into(),
         }
     }
 }

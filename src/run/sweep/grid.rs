@@ -1,5 +1,6 @@
 //! The grid of a sweep: named values, each from one end to the other in equal steps.
 
+use crate::scene::number;
 use std::str::FromStr;
 
 /// A value that is varied: `bar1.phi=-pi..pi:512`.
@@ -48,23 +49,6 @@ impl FromStr for Vary {
         }
         Ok(Self { name: name.trim().to_owned(), from, to, count })
     }
-}
-
-/// A finite number: a decimal, a multiple of pi, or a fraction of such.
-fn number(text: &str) -> Option<f64> {
-    let factor = |part: &str| {
-        let part = part.trim();
-        match part.strip_suffix("pi").or_else(|| part.strip_suffix('π')) {
-            None => part.parse::<f64>().ok(),
-            Some(sign @ ("" | "+" | "-")) => Some(if sign == "-" { -1.0 } else { 1.0 } * std::f64::consts::PI),
-            Some(multiple) => multiple.trim_end_matches('*').parse::<f64>().ok().map(|multiple| multiple * std::f64::consts::PI),
-        }
-    };
-    let value = match text.split_once('/') {
-        Some((above, below)) => factor(above)? / factor(below)?,
-        None => factor(text)?,
-    };
-    value.is_finite().then_some(value)
 }
 
 impl Vary {

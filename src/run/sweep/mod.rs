@@ -198,6 +198,13 @@ impl Sweep {
         Self { ends_at_flips: true, ..self }
     }
 
+    /// The same with a note among those of its plan.
+    #[must_use]
+    pub fn noted(mut self, note: String) -> Self {
+        self.plan.notes.push(note);
+        self
+    }
+
     /// The scene whose values are varied.
     pub fn scene(&self) -> &Scene {
         &self.scene

@@ -186,7 +186,7 @@ pub(super) fn about(number: f64) -> String {
 }
 
 /// A number as people write it.
-fn plain(number: f64) -> String {
+pub(super) fn plain(number: f64) -> String {
     let size = number.abs();
     if size != 0.0 && !(1e-3..1e6).contains(&size) { format!("{number:e}") } else { number.to_string() }
 }

@@ -3,6 +3,7 @@
 use crate::scene::error::SceneError;
 use crate::scene::format::{Field, LONGEST_NAME, LONGEST_TEXT, Quantity, Shape, Table, about};
 use crate::scene::locate::{Member, Node, Source, Span, Value, clipped, push_index, push_key};
+use crate::scene::number;
 
 /// A value with its path.
 #[derive(Clone)]
@@ -112,8 +113,18 @@ impl<'a> At<'a> {
             Value::Text(text) if text.trim().parse::<f64>().is_ok_and(f64::is_finite) => {
                 Err(self.refuse_value(&allowed(), &format!("write it without quotes: {}", clipped(text.trim()))))
             }
-            _ => Err(self.refuse_value(&allowed(), &field.for_example())),
+            _ => Err(self.refuse_value(&allowed(), &self.formula().unwrap_or_else(|| field.for_example()))),
         }
+    }
+
+    /// The hint at a text such as `pi/2` where a number must stand.
+    fn formula(&self) -> Option<String> {
+        let Value::Text(text) = &self.node.value else { return None };
+        Some(format!(
+            "a scene file holds plain numbers: write {}; `--set` and `--vary` take {} as it is",
+            number(text)?,
+            clipped(text.trim())
+        ))
     }
 
     /// Refuses this object where what follows from it is out of range.
@@ -240,7 +251,7 @@ impl At<'_> {
     fn coordinate(&self, field: &Field, quantity: &Quantity) -> Result<f64, SceneError> {
         match self.node.value {
             Value::Number(number) if quantity.holds(number) => Ok(number),
-            _ => Err(self.refuse_value(&Shape::Number(*quantity).allowed(), &field.for_example())),
+            _ => Err(self.refuse_value(&Shape::Number(*quantity).allowed(), &self.formula().unwrap_or_else(|| field.for_example()))),
         }
     }
 }

@@ -15,7 +15,7 @@ pub(super) use start::GivenStart;
 
 use super::error::SceneError;
 use super::fit;
-use super::format::{LONGEST_FILE, SCENE};
+use super::format::{LONGEST_FILE, SCENE, plain};
 use super::locate::{Node, Source, Text};
 use super::set::{Override, put};
 use super::{Drive, Motor, Scene};
@@ -30,19 +30,22 @@ use std::path::Path;
 /// The file cannot be read ([`SceneError::is_io`]), or what it says is no scene: the error names line, column, field, value, what is
 /// allowed, and a hint.
 pub fn read_scene(path: &Path, overrides: &[Override]) -> Result<Scene, SceneError> {
-    parse_scene(&read_text(path)?, &path.display().to_string(), overrides)
+    parse_scene(&read_text(path)?, &source_name(path), overrides)
 }
 
-/// Reads the text of the scene file `path`.
+/// Reads the text of the scene file `path`, or of standard input where that is `-`.
 ///
 /// # Errors
 /// The file cannot be read ([`SceneError::is_io`]), is too long, or is not UTF-8.
 pub fn read_text(path: &Path) -> Result<String, SceneError> {
-    let file = path.display().to_string();
+    let file = source_name(path);
     let mut bytes = Vec::new();
-    std::fs::File::open(path)
-        .and_then(|opened| opened.take(LONGEST_FILE + 1).read_to_end(&mut bytes))
-        .map_err(|error| SceneError::unreadable(&file, &error))?;
+    let read = if is_stdin(path) {
+        std::io::stdin().lock().take(LONGEST_FILE + 1).read_to_end(&mut bytes)
+    } else {
+        std::fs::File::open(path).and_then(|opened| opened.take(LONGEST_FILE + 1).read_to_end(&mut bytes))
+    };
+    read.map_err(|error| SceneError::unreadable(&file, &error))?;
     if bytes.len() as u64 > LONGEST_FILE {
         let hint = "a scene of 10 000 bars fits well into this; is this the right file?";
         return Err(SceneError::whole_file(&file, "is too long", "must be at most 16 MiB", hint));
@@ -56,6 +59,15 @@ pub fn read_text(path: &Path) -> Result<String, SceneError> {
         let hint = "save the file as UTF-8; names of bars and hinges are plain ASCII anyway";
         source.refusal(span, "", "not UTF-8", "must be text in UTF-8", hint)
     })
+}
+
+/// What messages call the scene file `path`.
+pub fn source_name(path: &Path) -> String {
+    if is_stdin(path) { "standard input".to_owned() } else { path.display().to_string() }
+}
+
+fn is_stdin(path: &Path) -> bool {
+    path.as_os_str() == "-"
 }
 
 /// Reads the scene in `text`; `source` is the name of its file in messages.
@@ -156,7 +168,7 @@ fn times(scene: &Fields) -> Result<[f64; 2], SceneError> {
     let every = scene.number("every")?;
     let every_at = scene.required("every")?;
     if every > until {
-        let allowed = format!("must be at most the horizon `until`, {until} s");
+        let allowed = format!("must be at most the horizon `until`, {} s", plain(until));
         return Err(every_at.refuse_value(&allowed, "shorten the output interval or lengthen the horizon"));
     }
     if until / every > MOST_OUTPUTS {

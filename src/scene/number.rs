@@ -1,0 +1,26 @@
+//! Numbers as people type them on a command line.
+
+use std::f64::consts::PI;
+
+/// A finite number: a decimal (`0.1`, `1e-3`), a multiple of pi (`pi`, `-0.5pi`, `2*pi`), or a fraction of two such (`1/64`, `pi/2`).
+///
+/// ```
+/// use driftless::scene::number;
+/// assert_eq!(number("-pi/2"), Some(-std::f64::consts::FRAC_PI_2));
+/// assert_eq!((number("1/64"), number("ten"), number("1/0")), (Some(0.015625), None, None));
+/// ```
+pub fn number(text: &str) -> Option<f64> {
+    let factor = |part: &str| {
+        let part = part.trim();
+        match part.strip_suffix("pi").or_else(|| part.strip_suffix('π')) {
+            None => part.parse::<f64>().ok(),
+            Some(sign @ ("" | "+" | "-")) => Some(if sign == "-" { -PI } else { PI }),
+            Some(multiple) => multiple.trim_end_matches('*').trim_end().parse::<f64>().ok().map(|multiple| multiple * PI),
+        }
+    };
+    let value = match text.split_once('/') {
+        Some((above, below)) => factor(above)? / factor(below)?,
+        None => factor(text)?,
+    };
+    value.is_finite().then_some(value)
+}
