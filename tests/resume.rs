@@ -384,6 +384,51 @@ mod command {
         assert!(run_results(&program) == uninterrupted());
     }
 
+    /// A run that writes no checkpoint but the first, killed as soon as that is there.
+    fn killed_at_once(program: &Program, command: &str, out: &str, folder: &str) {
+        let mut child = started(program, &format!("{command} --checkpoint-every 600 --out {out}"));
+        await_checkpoint(&program.path(&format!("{out}/{folder}")), &mut child);
+        signal(&child, "-KILL");
+        assert_eq!(ended(child).code, -1);
+    }
+
+    #[test]
+    fn killed_before_its_first_step_it_goes_on_from_any_folder_above() {
+        const LONG: &str = "run free.json --method taylor --until 2e4 --every 1 --no-charts";
+        let program = Program::with_scenes(&["free"]);
+        killed_at_once(&program, LONG, "output", "free/taylor-1e-9");
+        std::fs::remove_file(program.path("free.json")).expect("removed");
+        program.run("resume .").exits(0).says(&[FOLDER]);
+        assert!(run_results(&program) == uninterrupted());
+        program.run("resume output").exits(6).says(&["no interrupted run"]);
+    }
+
+    #[test]
+    fn of_several_interrupted_ones_all_are_named() {
+        const LONG: &str = "run free.json --method taylor --until 2e4 --every 1 --no-charts";
+        const SWEEP: &str = "sweep free.json --vary bar1.phi=-pi..pi:60 --vary bar2.phi=-pi..pi:60 --until 100 --no-charts";
+        let program = Program::with_scenes(&["free"]);
+        let sweep = "free/sweep-start.bar1.phi-start.bar2.phi-taylor-1e-9";
+        killed_at_once(&program, LONG, "out/a", "free/taylor-1e-9");
+        killed_at_once(&program, SWEEP, "out/b", sweep);
+        program.run("resume out").exits(6).says(&[
+            "2 interrupted runs",
+            "driftless resume out/a/free/taylor-1e-9",
+            &format!("driftless resume out/b/{sweep}"),
+        ]);
+        program.run("resume out/b -q").exits(0).stays_silent();
+        let whole = Program::with_scenes(&["free"]);
+        whole.run(&format!("{SWEEP} -q")).exits(0);
+        let table = |program: &Program, out: &str| program.read(&format!("{out}/{sweep}/sweep.csv"));
+        assert!(table(&program, "out/b") == table(&whole, "output"));
+        // What is left is the one, and what somebody is writing does not count.
+        let mut child = started(&program, &format!("{SWEEP} --out out/c"));
+        await_checkpoint(&program.path(&format!("out/c/{sweep}")), &mut child);
+        program.run("resume out -q").exits(0);
+        signal(&child, "-KILL");
+        ended(child);
+    }
+
     #[test]
     fn one_folder_takes_one_run_at_a_time() {
         let program = Program::with_scenes(&["free"]);

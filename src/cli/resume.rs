@@ -32,18 +32,20 @@ pub enum Work {
     Sweep(Totals, Option<Vec<u8>>),
 }
 
-/// Levels of folders that are searched for interrupted runs to hint at.
-const LEVELS: usize = 3;
-/// Most of them that are named.
-const NAMED: usize = 5;
+/// Levels of folders that are searched for interrupted runs.
+const LEVELS: usize = 6;
 
-/// Goes on with what the folder holds.
+/// Goes on with what the folder holds, or with the one interrupted run below it.
 ///
 /// # Errors
 /// There is nothing to go on with, somebody else does already, or what the run or sweep itself fails with.
 pub fn run(flags: &ResumeFlags) -> Result<(), Failure> {
+    let path = located(&flags.folder)?;
+    if path != flags.folder && !flags.tell.quiet {
+        message(&format!("going on with {}", path.display()));
+    }
     // Locked before anything is read: nobody else goes on with it meanwhile.
-    let folder = if flags.folder.is_dir() { Folder::reopen(&flags.folder)? } else { return Err(nothing(&flags.folder)) };
+    let folder = Folder::reopen(&path)?;
     let (checkpoints, loaded) = match Checkpoints::load::<Saved>(folder.path()) {
         Err(CheckpointError::Missing { .. }) => return Err(nothing(folder.path())),
         loaded => loaded?,
@@ -77,30 +79,46 @@ pub fn run(flags: &ResumeFlags) -> Result<(), Failure> {
     }
 }
 
-/// Why there is nothing to go on with in a folder, and where there is.
-fn nothing(folder: &Path) -> Failure {
-    if !folder.is_dir() {
-        return Failure::new(Exit::Io, format!("there is no folder {}", folder.display()));
-    }
-    if [RECORD, SWEEP_RECORD].iter().any(|name| folder.join(name).exists()) {
-        return Failure::new(Exit::Io, format!("the run in {} is finished: there is nothing to resume", folder.display()));
+/// The folder itself, or the one below it that holds an interrupted run.
+fn located(folder: &Path) -> Result<PathBuf, Failure> {
+    if !folder.is_dir() || checkpoint::is_in(folder) {
+        return if folder.is_dir() { Ok(folder.to_owned()) } else { Err(nothing(folder)) };
     }
     let mut found = Vec::new();
     search(folder, LEVELS, &mut found);
     found.sort();
-    let mut text = format!("{} holds no interrupted run", folder.display());
-    for path in found.iter().take(NAMED) {
-        text += &format!("\nhint: `driftless resume {}`", quoted(path));
+    // What is being written is not interrupted; where there is nothing else, whoever opens it says so.
+    let is_idle: Vec<bool> = found.iter().map(|path| !Folder::is_busy(path)).collect();
+    let idle: Vec<&PathBuf> = found.iter().zip(&is_idle).filter(|(_, is_idle)| **is_idle).map(|(path, _)| path).collect();
+    match (&idle[..], found.first()) {
+        ([only], _) => Ok((*only).clone()),
+        ([], None) => Err(nothing(folder)),
+        ([], Some(busy)) => Ok(busy.clone()),
+        (several, _) => {
+            let mut text = format!("{} holds {} interrupted runs; name one", folder.display(), several.len());
+            several.iter().for_each(|path| text += &format!("\nhint: `driftless resume {}`", quoted(path)));
+            Err(Failure::new(Exit::Io, text))
+        }
     }
-    if found.len() > NAMED {
-        text += &format!("\nand {} more", found.len() - NAMED);
-    }
+}
+
+/// Why there is nothing to go on with in a folder.
+fn nothing(folder: &Path) -> Failure {
+    let text = if !folder.is_dir() {
+        format!("there is no folder {}", folder.display())
+    } else if [RECORD, SWEEP_RECORD].iter().any(|name| folder.join(name).exists()) {
+        format!("the run in {} is finished: there is nothing to resume", folder.display())
+    } else {
+        format!("{} holds no interrupted run, nor does a folder below it", folder.display())
+    };
     Failure::new(Exit::Io, text)
 }
 
+/// Folders with a checkpoint below `folder`; links are not followed.
 fn search(folder: &Path, levels: usize, found: &mut Vec<PathBuf>) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
-    for path in entries.flatten().map(|entry| entry.path()).filter(|path| path.is_dir()) {
+    for entry in entries.flatten().filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_dir())) {
+        let path = entry.path();
         if checkpoint::is_in(&path) {
             found.push(path);
         } else if levels > 1 {

@@ -11,7 +11,7 @@ use crate::report;
 use crate::run::files::{RECORD, TRAJECTORY};
 use crate::run::scribe::Scribe;
 use crate::run::table::Table;
-use crate::run::{Checkpoints, Folder, Outcome, Plan, ResumeError, Run, RunError, Running, Sample, Stream};
+use crate::run::{Checkpoints, Folder, Outcome, Plan, Request, ResumeError, Run, RunError, Running, Sample, Stream};
 use crate::scene::{Scene, read_text};
 use std::sync::Arc;
 
@@ -45,11 +45,15 @@ pub fn run(flags: &RunFlags, arguments: &[String]) -> Result<(), Failure> {
     let text = read_text(&flags.scene.scene)?;
     let (scene, mechanism) = super::compile(&flags.scene, &text)?;
     // All plans stand before the first run: a pairing that is refused costs nothing.
-    let plans: Vec<Plan> = flags.plan.requests().iter().map(|request| Plan::new(&scene, &mechanism, request)).collect::<Result<_, _>>()?;
+    let requests = flags.plan.requests();
+    let mut plans: Vec<Plan> = requests.iter().map(|request| Plan::new(&scene, &mechanism, request)).collect::<Result<_, _>>()?;
+    let notes = super::stays(&flags.scene, &text, &scene);
+    plans.iter_mut().for_each(|plan| plan.notes.extend(notes.iter().cloned()));
+    let folders = folders(&requests, &plans, &mechanism);
     let task = Task { scene: &scene, mechanism: &mechanism, flags, text: &text, arguments };
     let mut done = Vec::new();
-    for plan in plans {
-        done.push(task.run(plan)?);
+    for (plan, folder) in plans.into_iter().zip(&folders) {
+        done.push(task.run(plan, folder)?);
     }
     overlay(&scene, &mechanism, &done, flags)?;
     conclude(&scene, &mechanism, done, flags)
@@ -79,6 +83,18 @@ pub fn resume(flags: &RunFlags, saved: Saved, until: Option<f64>, folder: Folder
     conclude(&scene, &mechanism, done, flags)
 }
 
+/// A folder for each plan: its usual one, with the stabilization asked for where several of one command would share it, as they do where there is nothing to
+/// stabilize.
+fn folders(requests: &[Request], plans: &[Plan], mechanism: &Mechanism) -> Vec<String> {
+    let usual: Vec<String> = plans.iter().map(|plan| plan.folder(mechanism)).collect();
+    let is_shared = |name: &String| usual.iter().filter(|other| *other == name).count() > 1;
+    let name = |(request, usual): (&Request, &String)| match request.stabilize {
+        Some(asked) if is_shared(usual) => format!("{usual}-{asked}"),
+        _ => usual.clone(),
+    };
+    requests.iter().zip(&usual).map(name).collect()
+}
+
 /// Says what came of it all.
 fn conclude(scene: &Scene, mechanism: &Mechanism, done: Vec<Done>, flags: &RunFlags) -> Result<(), Failure> {
     tell(scene, mechanism, &done, flags)?;
@@ -87,7 +103,7 @@ fn conclude(scene: &Scene, mechanism: &Mechanism, done: Vec<Done>, flags: &RunFl
 
 impl Task<'_> {
     /// Runs one plan in a folder of its own.
-    fn run(&self, plan: Plan) -> Result<Done, Failure> {
+    fn run(&self, plan: Plan, folder: &str) -> Result<Done, Failure> {
         let Self { scene, mechanism, flags, .. } = *self;
         let start = mechanism.start(scene);
         let run = Run::new(Arc::clone(mechanism), plan, flags.limits(), &start)?.trusted(flags.trust, &start);
@@ -96,7 +112,7 @@ impl Task<'_> {
         for note in &plan.notes {
             flags.scene.remark(note);
         }
-        let path = flags.out.join(&scene.name).join(plan.folder(mechanism));
+        let path = flags.out.join(&scene.name).join(folder);
         let folder = Folder::open(&path, flags.force)?;
         let table = Table::new(mechanism, folder.begin(TRAJECTORY)?).map_err(|error| folder.failed(TRAJECTORY, error.into()))?;
         self.finish(Running::new(run), Scribe::new(table), folder, Checkpoints::none(&path))
@@ -121,7 +137,7 @@ impl Task<'_> {
         Ok(Done { outcome, folder, failure })
     }
 
-    /// Marches, writes the trajectory as it comes, and a checkpoint now and then.
+    /// Marches, writes the trajectory as it comes, and a checkpoint before the first step and now and then.
     fn march(
         &self,
         running: &mut Running,
@@ -129,7 +145,11 @@ impl Task<'_> {
         folder: &Folder,
         checkpoints: &mut Checkpoints,
     ) -> Result<(), Failure> {
-        let mut watchman = Watchman::new(self.flags.checkpoints.checkpoint_every);
+        let every = self.flags.checkpoints.checkpoint_every;
+        if every > 0.0 && !checkpoints.has_any() {
+            self.save(running, scribe, folder, checkpoints)?;
+        }
+        let mut watchman = Watchman::new(every);
         let mut progress = Progress::new(&self.scene.name, running.plan().until, self.flags.scene.tell.quiet);
         loop {
             let mut observer = |sample: &Sample| {

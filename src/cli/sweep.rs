@@ -7,13 +7,14 @@ use super::output::{name_files, print, print_object};
 use super::progress::Points;
 use super::resume::{Saved, Work};
 use crate::report;
+use crate::report::page::counted;
 #[cfg(feature = "charts")]
 use crate::report::sweep::{Curve, NoChart};
 use crate::run::files::{SWEEP, SWEEP_RECORD};
 use crate::run::{
     Checkpoints, Folder, Limits, Observer, Point, Request, ResumeError, Stream, Sweep, SweepError, SweepTable, Totals, sweep_on,
 };
-use crate::scene::{Template, read_text};
+use crate::scene::{Template, points_that_stay, read_text, source_name};
 
 /// Every file a sweep may leave; those of an earlier one in the same folder go with it.
 const FILES: &[&str] = &[SWEEP, SWEEP_RECORD, "map.png", "profile.png"];
@@ -29,7 +30,14 @@ pub fn run(flags: &SweepFlags, arguments: &[String]) -> Result<(), Failure> {
     let text = read_text(&flags.scene.scene)?;
     let plan = prepared(flags, &text)?;
     for (axis, variable) in plan.grid().axes().iter().zip(plan.variables()) {
-        flags.scene.remark(&format!("vary {} from {} to {} {}, {} values", variable.path, axis.from, axis.to, variable.unit, axis.count));
+        flags.scene.remark(&format!(
+            "vary {} from {} to {} {}, {}",
+            variable.path,
+            axis.from,
+            axis.to,
+            variable.unit,
+            counted(axis.count, "value", "values")
+        ));
     }
     flags.scene.remark(&format!("{}; {}", report::setting(plan.plan()), plan.plan().why.as_deref().unwrap_or("as asked for")));
     #[cfg(feature = "charts")]
@@ -88,8 +96,11 @@ pub fn resume(flags: &SweepFlags, saved: Saved, folder: Folder, checkpoints: Che
     finish(&plan, writer, seen, flags)
 }
 
-/// Takes a sweep to its end.
+/// Takes a sweep to its end; before its first point there is a checkpoint.
 fn finish(plan: &Sweep, mut writer: Writer, seen: Totals, flags: &SweepFlags) -> Result<(), Failure> {
+    if flags.checkpoints.checkpoint_every > 0.0 && !writer.checkpoints.has_any() {
+        writer.save(&seen)?;
+    }
     let totals = sweep_on(plan, flags.threads.map_or(0, usize::from), seen, &mut writer);
     writer.progress.finish();
     let totals = totals.map_err(|error| match (writer.trouble.take(), error) {
@@ -129,10 +140,17 @@ fn prepared(flags: &SweepFlags, text: &str) -> Result<Sweep, Failure> {
     let [request]: &[Request; 1] = requests.as_slice().try_into().map_err(|_| {
         Failure::new(Exit::Usage, "--stabilize: a sweep keeps its constraints in one way\nhint: name one, or sweep several times")
     })?;
-    let template = Template::new(text.to_owned(), flags.scene.scene.display().to_string(), &flags.scene.set);
+    let template = Template::new(text.to_owned(), source_name(&flags.scene.scene), &flags.scene.set);
     let limits = Limits { energy: flags.max_energy_drift, constraint: flags.max_constraint_drift };
     let plan = Sweep::new(&template, flags.vary.clone(), request)?.with_limits(limits);
     super::settle(&flags.scene, plan.mechanism())?;
+    let notes: Vec<String> = (plan.variables().iter().zip(plan.grid().axes()))
+        .filter_map(|(variable, axis)| points_that_stay(plan.scene(), &variable.path, (axis.count == 1).then_some(axis.from)))
+        .collect();
+    if !flags.scene.tell.quiet {
+        notes.iter().for_each(|note| super::output::message(&format!("note: {note}")));
+    }
+    let plan = notes.into_iter().fold(plan, Sweep::noted);
     let plan = if flags.scene.strict { plan.strictly() } else { plan };
     Ok(if flags.to_flip { plan.ending_at_flips() } else { plan })
 }

@@ -141,6 +141,11 @@ impl Folder {
         Ok(Self { path: path.to_owned(), written: Vec::new(), _lock: lock })
     }
 
+    /// True where somebody is writing into a folder.
+    pub fn is_busy(path: &Path) -> bool {
+        matches!(lock(path), Err(FileError::Busy { .. }))
+    }
+
     /// Opens a folder to put whole files into, beside whatever is there and whoever else does.
     ///
     /// # Errors
