@@ -1,0 +1,170 @@
+//! The auditor's motion of a scene at its output times, with all that the program reports of it, and how far its start determines it.
+
+use super::double_double::Dd;
+use super::model::{Model, State};
+use super::motion::Lost;
+use super::start::{Start, project};
+use super::walls::{Course, Impact, Stay};
+
+/// One output time.
+#[derive(Clone, Debug)]
+pub struct Look {
+    pub state: State,
+    pub acceleration: Vec<Dd>,
+    /// Of each joint's equation, and whether redundant ones leave it open.
+    pub multipliers: Vec<Dd>,
+    pub is_open: Vec<bool>,
+    /// Power of each joint's target \[W\].
+    pub motor_power: Vec<Dd>,
+    pub energy: [Dd; 2],
+    pub is_held: bool,
+}
+
+/// A motion.
+pub struct Record {
+    pub model: Model,
+    pub looks: Vec<Look>,
+    pub impacts: Vec<Impact>,
+    pub stays: Vec<Stay>,
+    /// Time from which the motion is not unique, and why.
+    pub doubt: Option<(f64, String)>,
+    /// By how much a small change of the start has grown up to each output time.
+    pub growth: Vec<f64>,
+    pub evaluations: u64,
+    pub scales: Scales,
+}
+
+/// What differences are divided by.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Scales {
+    /// \[m\]
+    pub length: f64,
+    /// The fastest rate \[1/s\].
+    pub rate: f64,
+    /// \[N\]
+    pub force: f64,
+    /// \[N·m\]
+    pub torque: f64,
+    /// \[J\]
+    pub energy: f64,
+    /// \[N·s\]
+    pub impulse: f64,
+}
+
+/// A change of the start that is followed to see how it grows.
+const CHANGE: f64 = 1e-11;
+
+impl Record {
+    /// The motion from a start at the times k·every and at the end.
+    pub fn new(start: Start, times: &[f64], most_evaluations: u64) -> Result<Self, Lost> {
+        let Start { model, state, .. } = start;
+        let (looks, course) = march(&model, state.clone(), times, most_evaluations)?;
+        let scales = Scales::of(&model, &looks, &course.impacts);
+        let (impacts, stays, doubt) = (course.impacts, course.stays, course.doubt);
+        let mut evaluations = course.integrator.evaluations;
+        let growth = match march(&model, changed(&model, &state, scales)?, times, most_evaluations) {
+            Ok((other, course)) => {
+                evaluations += course.integrator.evaluations;
+                growth(&looks, &other, scales)
+            }
+            // A neighbour that cannot be followed tells that this one is on an edge.
+            Err(_) => vec![f64::INFINITY; looks.len()],
+        };
+        Ok(Self { model, looks, impacts, stays, doubt, growth, evaluations, scales })
+    }
+}
+
+fn march<'a>(model: &'a Model, state: State, times: &[f64], most: u64) -> Result<(Vec<Look>, Course<'a>), Lost> {
+    let mut course = Course::new(model, state, most)?;
+    let mut looks = vec![look(&course)];
+    for &t in times.iter().filter(|&&t| t > 0.0) {
+        course.go(Dd::from(t))?;
+        looks.push(look(&course));
+    }
+    if course.integrator.least_pivot < 1e-9 {
+        return Err(Lost("a singular position".into()));
+    }
+    Ok((looks, course))
+}
+
+fn look(course: &Course) -> Look {
+    let model = course.integrator.model;
+    let found = model.accelerations(&course.state, &course.held);
+    Look {
+        acceleration: found.solution.x,
+        multipliers: found.solution.multipliers,
+        is_open: found.solution.is_open,
+        motor_power: found.motor_power,
+        energy: model.energy(&course.state),
+        is_held: !course.held.is_empty(),
+        state: course.state.clone(),
+    }
+}
+
+/// The start with every number a little off, back on its constraints and in front of its walls.
+fn changed(model: &Model, state: &State, scales: Scales) -> Result<State, Lost> {
+    let mut changed = state.clone();
+    for i in 0..state.q.len() {
+        // Shares without a pattern.
+        let share = |salt: f64| ((i as f64 + 1.0) * salt).sin();
+        let unit = if i % 3 == 2 { 1.0 } else { scales.length };
+        changed.q[i] += Dd::from(CHANGE * unit * share(12.9898));
+        changed.v[i] += Dd::from(CHANGE * unit * scales.rate * share(78.233));
+    }
+    project(model, &mut changed, &[])?;
+    let behind = (0..model.scene.walls.len()).any(|wall| model.gap(wall, &changed).off.hi < 1e-9 * scales.length);
+    // A start on a wall stays as it is.
+    Ok(if behind { state.clone() } else { changed })
+}
+
+fn growth(looks: &[Look], other: &[Look], scales: Scales) -> Vec<f64> {
+    let mut most: f64 = 1.0;
+    let one = |(a, b): (&Look, &Look)| {
+        for i in 0..a.state.q.len() {
+            let unit = if i % 3 == 2 { 1.0 } else { scales.length };
+            let position = (a.state.q[i] - b.state.q[i]).hi.abs() / unit;
+            let rate = (a.state.v[i] - b.state.v[i]).hi.abs() / (unit * scales.rate);
+            most = most.max(position / CHANGE).max(rate / CHANGE);
+        }
+        most
+    };
+    looks.iter().zip(other).map(one).collect()
+}
+
+impl Scales {
+    fn of(model: &Model, looks: &[Look], impacts: &[Impact]) -> Self {
+        let (n, length) = (model.scene.bodies.len(), model.scene.size);
+        let mut scales = Self { length, rate: 0.1 / model.scene.until, ..Self::default() };
+        let total: f64 = model.scene.bodies.iter().map(|body| body.mass.hi).sum();
+        let weight = total * model.scene.gravity.length().hi;
+        scales.force = weight;
+        let first = looks[0].energy[1];
+        for look in looks {
+            for k in 0..n {
+                let [ax, ay, alpha] = [0, 1, 2].map(|i| look.acceleration[3 * k + i].hi);
+                let [vx, vy, omega] = [0, 1, 2].map(|i| look.state.v[3 * k + i].hi);
+                let (speed, pull) = (vx.hypot(vy), ax.hypot(ay));
+                scales.rate = scales.rate.max(omega.abs()).max(speed / length).max(alpha.abs().sqrt()).max((pull / length).sqrt());
+                scales.force = scales.force.max(model.mass[3 * k].hi * pull);
+                scales.torque = scales.torque.max(model.mass[3 * k + 2].hi * alpha.abs());
+                scales.impulse = scales.impulse.max(model.mass[3 * k].hi * speed);
+            }
+            for (joint, lambda) in model.scene.joints.iter().zip(&look.multipliers) {
+                let most = if joint.is_angle() { &mut scales.torque } else { &mut scales.force };
+                *most = most.max(lambda.hi.abs());
+            }
+            let terms = [look.energy[0], look.energy[1] - first, look.state.work];
+            scales.energy = terms.iter().fold(scales.energy, |most, term| most.max(term.hi.abs()));
+        }
+        scales.torque = scales.torque.max(scales.force * length);
+        scales.energy = scales.energy.max(weight * length);
+        scales.impulse = impacts.iter().fold(scales.impulse, |most, impact| most.max(impact.impulse));
+        // What is all at rest is measured by what would count as motion.
+        let floor = |value: f64, unit: f64| if value > 0.0 { value } else { unit };
+        scales.force = floor(scales.force, total * length * scales.rate * scales.rate);
+        scales.torque = floor(scales.torque, scales.force * length);
+        scales.energy = floor(scales.energy, scales.force * length);
+        scales.impulse = floor(scales.impulse, scales.force / scales.rate);
+        scales
+    }
+}

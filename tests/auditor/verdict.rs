@@ -1,0 +1,252 @@
+//! The program's motion against the auditor's.
+//!
+//! A disagreement is a difference beyond ten times the error that the run claims, or 1e-6 of the quantity's scale, whichever is larger, that the run does
+//! not report itself by a stop, a note of doubt, or a trust horizon before it.
+
+use super::reader::Measure;
+use super::record::{Look, Record};
+use driftless::dynamics::kernel::{Bias, Kernel};
+use driftless::dynamics::{Mechanism, Time};
+use driftless::run::trust::Level;
+use driftless::run::{Limits, Outcome, Plan, Request, Run, RunError, Sample, march};
+use driftless::scene::parse_scene;
+use std::fmt;
+use std::sync::Arc;
+
+/// What a difference may be where the run claims less.
+const ALLOWED: f64 = 1e-6;
+/// How many times the claimed error a difference may be.
+const CLAIMED: f64 = 10.0;
+/// Growth of a change of the start beyond which the auditor's own rounding would be seen.
+const MOST_GROWTH: f64 = 1e8;
+
+/// A run of the program.
+pub struct Ran {
+    pub mechanism: Arc<Mechanism>,
+    pub samples: Vec<Sample>,
+    pub outcome: Outcome,
+    /// At each sample, the force of each hinge or weld, of its first body on its second, and the multiplier of each row.
+    pub forces: Vec<(Vec<[f64; 2]>, Vec<f64>)>,
+}
+
+/// Runs a scene by the library.
+pub fn run(text: &str, request: &Request) -> Result<Ran, String> {
+    let scene = parse_scene(text, "audit", &[]).map_err(|error| format!("reader: {error}"))?;
+    let mechanism = Arc::new(Mechanism::new(&scene).map_err(|error| format!("compiler: {error}"))?);
+    let plan = Plan::new(&scene, &mechanism, request).map_err(|refusal| format!("plan: {refusal}"))?;
+    let start = mechanism.start(&scene);
+    let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).map_err(|error| format!("start: {error}"))?;
+    let mut samples = Vec::new();
+    let outcome = march(run.trusted(Level::Full, &start), &mut |sample| {
+        samples.push(sample.clone());
+        Ok(())
+    });
+    let outcome = outcome.map_err(|error: RunError| format!("run: {error}"))?;
+    let mut kernel = Kernel::<f64>::new(&mechanism);
+    let forces = samples.iter().map(|sample| {
+        kernel.accelerate::<0>(&mechanism, Time::from(sample.t), &sample.phi, &sample.omega, Bias::default());
+        mechanism.spread_multipliers(&mut kernel);
+        let forces = mechanism.hinge_forces(Time::from(sample.t), &kernel, &sample.omega);
+        (forces.iter().map(|force| [force.re, force.im]).collect(), kernel.multiplier.clone())
+    });
+    let forces = forces.collect();
+    Ok(Ran { samples, forces, outcome, mechanism })
+}
+
+/// What came of a comparison.
+#[derive(Clone, Debug)]
+pub enum Verdict {
+    /// All within what is allowed; the largest share of it.
+    Agrees(f64),
+    /// The run reports of itself that it is not to be relied on: how.
+    Reported(String),
+    /// Nothing can be said: why.
+    Unclear(String),
+    Differs(Vec<Difference>),
+}
+
+/// One quantity that differs.
+#[derive(Clone, Debug)]
+pub struct Difference {
+    pub what: String,
+    pub t: f64,
+    pub run: f64,
+    pub auditor: f64,
+    /// Over the quantity's scale.
+    pub error: f64,
+    pub allowed: f64,
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Self { what, t, run, auditor, error, allowed } = self;
+        write!(f, "{what} at t = {t}: run {run:.12e}, auditor {auditor:.12e}, {error:.1e} of its scale, allowed {allowed:.1e}")
+    }
+}
+
+/// Collects differences of one pair.
+struct Judge<'a> {
+    record: &'a Record,
+    ran: &'a Ran,
+    allowed: f64,
+    worst: f64,
+    found: Vec<Difference>,
+}
+
+/// Compares a run with the auditor's motion.
+pub fn compare(record: &Record, ran: &Ran) -> Verdict {
+    let Outcome { stop, trust, drift, .. } = &ran.outcome;
+    let claimed = trust.as_ref().and_then(|trust| trust.error_estimate);
+    let horizon = trust.as_ref().and_then(|trust| trust.horizon).unwrap_or(f64::INFINITY);
+    let mut judge = Judge { record, ran, allowed: ALLOWED.max(CLAIMED * claimed.unwrap_or(0.0)), worst: 0.0, found: Vec::new() };
+    let doubt = record.doubt.as_ref().map_or(f64::INFINITY, |(t, _)| *t);
+    let chaos = record.looks.iter().zip(&record.growth).find(|(_, growth)| **growth > MOST_GROWTH).map_or(f64::INFINITY, |(look, _)| look.state.t.hi);
+    let until = doubt.min(chaos).min(horizon);
+    let mut compared = 0;
+    for (sample, (forces, multipliers)) in ran.samples.iter().zip(&ran.forces) {
+        let Some(look) = record.looks.iter().find(|look| (look.state.t.hi - sample.t).abs() < 1e-12 * (1.0 + sample.t)) else { continue };
+        if sample.t >= until || stop.as_ref().is_some_and(|stop| sample.t >= stop.t) {
+            break;
+        }
+        judge.moment(look, sample);
+        if !look.is_held && !judge.is_at_impact(sample.t) {
+            judge.forces(look, sample, forces, multipliers);
+        }
+        compared += 1;
+    }
+    let reached = ran.samples.last().map_or(0.0, |sample| sample.t).min(until);
+    judge.impacts(reached);
+    if let Some(stop) = stop {
+        return Verdict::Reported(format!("{:?}", stop.cause));
+    }
+    if judge.found.is_empty() {
+        return match compared {
+            0 | 1 if until.is_finite() => {
+                let why = record.doubt.as_ref().filter(|_| doubt == until).map_or("the motion is too sensitive", |(_, why)| why);
+                Verdict::Unclear(why.into())
+            }
+            _ => Verdict::Agrees(judge.worst),
+        };
+    }
+    if drift.is_doubtful() {
+        return Verdict::Reported("a note of doubt".into());
+    }
+    if claimed.is_none() && horizon.is_infinite() && judge.found.iter().all(|difference| difference.error < 1e-2) {
+        return Verdict::Reported("no estimate".into());
+    }
+    judge.found.sort_by(|a, b| (b.error / b.allowed).total_cmp(&(a.error / a.allowed)));
+    Verdict::Differs(judge.found)
+}
+
+impl Judge<'_> {
+    /// Compares a number, over its scale.
+    fn number(&mut self, what: impl Fn() -> String, t: f64, run: f64, auditor: f64, scale: f64) {
+        let error = (run - auditor).abs() / scale;
+        self.worst = self.worst.max(error / self.allowed);
+        if !(error <= self.allowed) {
+            self.found.push(Difference { what: what(), t, run, auditor, error, allowed: self.allowed });
+        }
+    }
+
+    /// True where an impact happened at about that time, so that rates on either side of it are right.
+    fn is_at_impact(&self, t: f64) -> bool {
+        let near = self.allowed.max(1e-9) * 100.0 / self.record.scales.rate;
+        t > 0.0 && self.record.impacts.iter().any(|impact| (impact.t - t).abs() < near)
+    }
+
+    fn moment(&mut self, look: &Look, sample: &Sample) {
+        let (model, scales, t) = (&self.record.model, self.record.scales, sample.t);
+        let (first, first_sample) = (&self.record.looks[0], &self.ran.samples[0]);
+        let at_impact = self.is_at_impact(t);
+        for (k, body) in model.scene.bodies.iter().enumerate() {
+            let name = |what: &str| format!("{what} of {}", body.name);
+            let [x, y, phi] = [0, 1, 2].map(|i| look.state.q[3 * k + i].hi);
+            let [vx, vy, omega] = [0, 1, 2].map(|i| look.state.v[3 * k + i].hi);
+            // Angles beyond 1e9 rad have no more digits than this.
+            self.number(|| name("phi"), t, sample.phi[k], phi, 1.0 + 1e-9 * phi.abs());
+            self.number(|| name("x"), t, sample.centre[k][0], x, scales.length);
+            self.number(|| name("y"), t, sample.centre[k][1], y, scales.length);
+            if !at_impact {
+                self.number(|| name("omega"), t, sample.omega[k], omega, scales.rate);
+                self.number(|| name("vx"), t, sample.velocity[k][0], vx, scales.rate * scales.length);
+                self.number(|| name("vy"), t, sample.velocity[k][1], vy, scales.rate * scales.length);
+            }
+        }
+        if !at_impact {
+            self.number(|| "kinetic energy".into(), t, sample.kinetic, look.energy[0].hi, scales.energy);
+            let potential = (look.energy[1] - first.energy[1]).hi;
+            self.number(|| "potential energy".into(), t, sample.potential - first_sample.potential, potential, scales.energy);
+            self.number(|| "work".into(), t, sample.work, look.state.work.hi, scales.energy);
+        }
+    }
+
+    fn forces(&mut self, look: &Look, sample: &Sample, hinges: &[[f64; 2]], multipliers: &[f64]) {
+        let (record, ran, scales, t) = (self.record, self.ran, self.record.scales, sample.t);
+        for (joint, force) in ran.mechanism.joints.iter().zip(hinges) {
+            for (axis, letter) in ["x", "y"].iter().enumerate() {
+                let name = format!("{}.{letter}", joint.name);
+                let Some(place) = record.model.scene.joints.iter().position(|own| own.name == name) else { continue };
+                if !look.is_open[place] {
+                    // The equation's multiplier acts on the first body, the force reported on the second.
+                    self.number(|| format!("force of {name}"), t, force[axis], -look.multipliers[place].hi, scales.force);
+                }
+            }
+        }
+        for (r, row) in ran.mechanism.rows.iter().enumerate() {
+            let own = record.model.scene.joints.iter().position(|own| own.name == row.name() && !matches!(own.kind, "hinge"));
+            let Some((place, joint)) = own.map(|place| (place, &record.model.scene.joints[place])) else { continue };
+            if look.is_open[place] || (joint.kind == "weld" && !joint.is_angle()) {
+                continue;
+            }
+            // Torques are those on the body; where the ground comes in its place, on the other.
+            let sign = if let Measure::Angle { body: None, .. } = joint.measure { -1.0 } else { 1.0 };
+            let (force, scale) = (sign * look.multipliers[place].hi, if joint.is_angle() { scales.torque } else { scales.force });
+            self.number(|| format!("force or torque of {}", joint.name), t, -multipliers[r], force, scale);
+            if joint.kind.ends_with("motor") {
+                self.number(|| format!("torque of {}", joint.name), t, sample.motors[r][0], force, scale);
+                let power = look.motor_power[place].hi;
+                let speed = if joint.is_angle() { scales.rate } else { scales.rate * scales.length };
+                self.number(|| format!("power of {}", joint.name), t, sample.motors[r][1], power, scale * speed);
+            }
+        }
+    }
+
+    /// Impacts up to a time, each against one of the other's at the same wall.
+    fn impacts(&mut self, until: f64) {
+        let (record, ran, scales) = (self.record, self.ran, self.record.scales);
+        let walls = &record.model.scene.walls;
+        // The last ones of a chatter are cut off by either in its own way.
+        let fastest = record.impacts.iter().fold(1e-4 * scales.rate * scales.length, |most: f64, impact| most.max(-impact.approach));
+        let least = 1e-3 * fastest;
+        let window = |approach: f64| self.allowed * (1.0 / scales.rate + scales.length / approach.abs());
+        let mut matched = vec![false; ran.outcome.strikes.len()];
+        let mut pairs = Vec::new();
+        for own in record.impacts.iter().filter(|own| -own.approach > least && own.t < until - window(own.approach)) {
+            let near = |(_, strike): &(usize, &driftless::run::Strike)| strike.wall == walls[own.wall].name;
+            let best = (ran.outcome.strikes.iter().enumerate().filter(near).filter(|(i, _)| !matched[*i]))
+                .min_by(|a, b| (a.1.t - own.t).abs().total_cmp(&(b.1.t - own.t).abs()));
+            if let Some((i, _)) = best {
+                matched[i] = true;
+            }
+            pairs.push((own.clone(), best.map(|(_, strike)| strike.clone())));
+        }
+        let windows: Vec<f64> = pairs.iter().map(|(own, _)| window(own.approach)).collect();
+        for ((own, strike), window) in pairs.into_iter().zip(windows) {
+            let wall = walls[own.wall].name.clone();
+            let Some(strike) = strike else {
+                self.number(|| format!("impact at {wall}"), own.t, f64::NAN, own.t, 1.0);
+                continue;
+            };
+            let unit = window / self.allowed;
+            self.number(|| format!("time of impact at {wall}"), own.t, strike.t, own.t, unit);
+            self.number(|| format!("impulse at {wall}"), own.t, strike.impulse, own.impulse, scales.impulse);
+            self.number(|| format!("approach at {wall}"), own.t, strike.approach, own.approach, scales.rate * scales.length);
+            self.number(|| format!("energy lost at {wall}"), own.t, strike.energy_lost, own.energy_lost, scales.energy);
+        }
+        for (strike, _) in ran.outcome.strikes.iter().zip(matched).filter(|(strike, matched)| !matched && -strike.approach > 2.0 * least) {
+            if strike.t < until {
+                self.number(|| format!("impact at {} that is none", strike.wall), strike.t, strike.t, f64::NAN, 1.0);
+            }
+        }
+    }
+}
