@@ -3,6 +3,7 @@
 #[path = "auditor/mod.rs"]
 mod auditor;
 
+use auditor::pairs::{Summary, pairs};
 use auditor::reader::Scene;
 use auditor::record::Record;
 use auditor::start::start;
@@ -39,7 +40,14 @@ fn folder() {
                 continue;
             }
         };
-        println!("{name}: {} evaluations, {:.1?}, growth {:.1e}, doubt {:?}, impacts {}", record.evaluations, begin.elapsed(), record.growth.last().expect("one"), record.doubt, record.impacts.len());
+        println!(
+            "{name}: {} evaluations, {:.1?}, growth {:.1e}, doubt {:?}, impacts {}",
+            record.evaluations,
+            begin.elapsed(),
+            record.growth.last().expect("one"),
+            record.doubt,
+            record.impacts.len()
+        );
         for method in METHODS {
             if only.as_ref().is_some_and(|only| only != method.name) {
                 continue;
@@ -55,13 +63,33 @@ fn folder() {
             };
             match compare(&record, &ran) {
                 Verdict::Differs(found) => {
-                    println!("    {:8} DIFFERS {} times, est {:?}", method.name, found.len(), ran.outcome.trust.as_ref().and_then(|t| t.error_estimate));
+                    println!(
+                        "    {:8} DIFFERS {} times, est {:?}",
+                        method.name,
+                        found.len(),
+                        ran.outcome.trust.as_ref().and_then(|t| t.error_estimate)
+                    );
                     found.iter().take(4).for_each(|difference| println!("             {difference}"));
                 }
                 other => println!("    {:8} {other:?}", method.name),
             }
         }
     }
+}
+
+/// Random scenes by random methods: `PAIRS` and `SEED` say how many and which.
+#[test]
+fn motions_agree_with_the_auditor() {
+    let number = |name: &str, usual: u64| std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(usual);
+    let summary = Summary::of(pairs(number("PAIRS", 300) as usize, number("SEED", 1)));
+    println!("{}", summary.text());
+    if let Ok(folder) = std::env::var("AUDIT_OUT") {
+        std::fs::create_dir_all(&folder).expect("a folder");
+        for (seed, ..) in &summary.differing {
+            std::fs::write(format!("{folder}/{seed}.json"), auditor::mechanisms::scene(*seed).text).expect("room");
+        }
+    }
+    assert!(summary.differing.is_empty(), "{} pairs differ", summary.differing.len());
 }
 
 /// The auditor's motion at the times of a scene's rows.

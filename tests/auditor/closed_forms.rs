@@ -245,7 +245,14 @@ fn two_discs_swing_against_each_other() {
     let coils = json!([{"name": "k", "body": "b", "relative_to": "a", "stiffness": 3, "free_angle": turns}]);
     let law = json!({"start": 0.5, "rate": 0.25, "sines": [{"amplitude": 2, "frequency": 5, "phase": 0.7}]});
     let torques = json!([{"name": "m", "body": "b", "relative_to": "a", "torque": 2, "law": law}]);
-    let record = record(&scene([0.0, 0.0], bars, json!({"a": placed(0.0, 1.0), "b": placed(0.0, 1.0)}), 2.0, 0.5, json!({"torsion_springs": coils, "torques": torques})));
+    let record = record(&scene(
+        [0.0, 0.0],
+        bars,
+        json!({"a": placed(0.0, 1.0), "b": placed(0.0, 1.0)}),
+        2.0,
+        0.5,
+        json!({"torsion_springs": coils, "torques": torques}),
+    ));
     // With u the angle between them: u'' = 6 (torque(t) - 3 (u - turns)), a forced oscillator of rate √18.
     let rate = 18f64.sqrt();
     let forced = |t: f64| turns + 6.0 * 2.0 * ((0.5 + 0.25 * t) / 18.0 + 2.0 * (5.0 * t + 0.7).sin() / (18.0 - 25.0));
@@ -313,7 +320,8 @@ fn rows_are_derivatives() {
     let (q, v, a) = ([0.3, -0.4, 1.1, 0.7, 0.2, -2.0], [1.0, -2.0, 0.7, 0.3, 0.9, -1.5], [0.4, 0.2, -0.9, 1.3, -0.7, 0.6]);
     let of = |f: &dyn Fn(usize) -> f64| (0..6).map(|i| Dd::from(f(i))).collect::<Vec<_>>();
     let at = |t: f64| {
-        let exact = |i: usize, p: [f64; 3]| Dd::from(p[0]) + Dd::from(p[1]).scale(t) + Dd::from(p[2]).scale(t).scale(0.5 * t + i as f64 * 0.0);
+        let exact =
+            |i: usize, p: [f64; 3]| Dd::from(p[0]) + Dd::from(p[1]).scale(t) + Dd::from(p[2]).scale(t).scale(0.5 * t + i as f64 * 0.0);
         let state = super::model::State {
             t: Dd::from(t),
             q: (0..6).map(|i| exact(i, [q[i], v[i], a[i]])).collect(),
@@ -331,6 +339,10 @@ fn rows_are_derivatives() {
         let along = here.row.iter().fold(here.bend, |sum, &(k, g)| sum + g.scale(a[k]));
         let Joint { name, measure, .. } = joint;
         assert!(!matches!(measure, Measure::Angle { .. }));
-        assert!((rate - here.rate).hi.abs() < 1e-13 && (second - along).hi.abs() < 1e-12, "{name}: {rate:?} {:?}, {second:?} {along:?}", here.rate);
+        assert!(
+            (rate - here.rate).hi.abs() < 1e-13 && (second - along).hi.abs() < 1e-12,
+            "{name}: {rate:?} {:?}, {second:?} {along:?}",
+            here.rate
+        );
     }
 }

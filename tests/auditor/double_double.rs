@@ -66,10 +66,6 @@ impl Dd {
         if self.hi < 0.0 { -self } else { self }
     }
 
-    pub fn max(self, other: Self) -> Self {
-        if self.hi < other.hi { other } else { self }
-    }
-
     /// Exact for powers of two.
     pub fn scale(self, factor: f64) -> Self {
         let product = two_product(self.hi, factor);

@@ -17,10 +17,16 @@
 
 pub mod double_double;
 pub mod linear;
+#[path = "../common/mechanisms/mod.rs"]
+pub mod mechanisms;
 pub mod model;
 pub mod motion;
+pub mod pairs;
 pub mod reader;
-pub mod start;
-pub mod walls;
 pub mod record;
+pub mod start;
 pub mod verdict;
+pub mod walls;
+
+#[cfg(test)]
+mod closed_forms;

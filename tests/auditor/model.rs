@@ -9,6 +9,7 @@
 use super::double_double::{Dd, Vec2};
 use super::linear::{self, Row, Solution};
 use super::reader::{Law, Measure, Place, Push, Scene, Target};
+use std::cell::OnceCell;
 
 /// Positions and rates, three numbers for each body: x, y \[m\], angle \[rad\], whole turns counted.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -50,6 +51,23 @@ struct Spot {
     bend: Vec2,
 }
 
+/// A state with the sines and cosines of its angles, each computed once.
+struct Pose<'a> {
+    state: &'a State,
+    turns: Vec<OnceCell<(Dd, Dd)>>,
+}
+
+impl<'a> Pose<'a> {
+    fn new(state: &'a State) -> Self {
+        Self { state, turns: vec![OnceCell::new(); state.q.len() / 3] }
+    }
+
+    /// Sine and cosine of a body's angle; of zero for the ground.
+    fn turn(&self, body: Option<usize>) -> (Dd, Dd) {
+        body.map_or((Dd::ZERO, Dd::ONE), |k| *self.turns[k].get_or_init(|| self.state.q[3 * k + 2].sin_cos()))
+    }
+}
+
 /// Accelerations and what goes with them.
 pub struct Accelerations {
     pub solution: Solution,
@@ -66,27 +84,24 @@ impl Model {
         Self { targets: targets.collect(), mass, scene }
     }
 
-    fn spot(&self, place: &Place, state: &State) -> Spot {
+    fn spot(&self, place: &Place, pose: &Pose) -> Spot {
+        let state = pose.state;
         let Some(k) = place.body else {
             return Spot { body: None, at: place.point, velocity: Vec2::default(), arm: Vec2::default(), bend: Vec2::default() };
         };
-        let [x, y, phi] = [0, 1, 2].map(|i| state.q[3 * k + i]);
+        let [x, y] = [0, 1].map(|i| state.q[3 * k + i]);
         let [vx, vy, omega] = [0, 1, 2].map(|i| state.v[3 * k + i]);
-        let arm = place.point.turned(phi.sin_cos());
+        let arm = place.point.turned(pose.turn(Some(k)));
         let velocity = Vec2 { x: vx, y: vy } + arm.left().times(omega);
         Spot { body: Some(k), at: Vec2 { x, y } + arm, velocity, arm, bend: arm.times(-(omega * omega)) }
     }
 
-    /// Position of a place \[m\].
-    pub fn position(&self, place: &Place, state: &State) -> Vec2 {
-        self.spot(place, state).at
-    }
-
     /// A measure at a state, before any target is taken off.
-    fn measured(&self, measure: &Measure, state: &State) -> Equation {
+    fn measured(&self, measure: &Measure, pose: &Pose) -> Equation {
+        let state = pose.state;
         match measure {
             Measure::Difference { places, axis } => {
-                let [a, b] = places.each_ref().map(|place| self.spot(place, state));
+                let [a, b] = places.each_ref().map(|place| self.spot(place, pose));
                 let mut row = Row::new();
                 a.push(&mut row, *axis);
                 b.push(&mut row, Vec2::default() - *axis);
@@ -94,9 +109,9 @@ impl Model {
                 Equation { off, rate, row, bend }
             }
             Measure::Along { point, rail, direction } => {
-                let [a, b] = [point, rail].map(|place| self.spot(place, state));
-                let (angle, omega) = rail.body.map_or((Dd::ZERO, Dd::ZERO), |k| (state.q[3 * k + 2], state.v[3 * k + 2]));
-                let along = direction.turned(angle.sin_cos());
+                let [a, b] = [point, rail].map(|place| self.spot(place, pose));
+                let omega = rail.body.map_or(Dd::ZERO, |k| state.v[3 * k + 2]);
+                let along = direction.turned(pose.turn(rail.body));
                 let (span, speed) = (a.at - b.at, a.velocity - b.velocity);
                 let mut row = Row::new();
                 a.push(&mut row, along);
@@ -122,14 +137,19 @@ impl Model {
 
     /// Every joint's measure, the value that [`Target::AsAtStart`] keeps.
     pub fn measures(&self, state: &State) -> Vec<Dd> {
-        self.scene.joints.iter().map(|joint| self.measured(&joint.measure, state).off).collect()
+        let pose = Pose::new(state);
+        self.scene.joints.iter().map(|joint| self.measured(&joint.measure, &pose).off).collect()
     }
 
     /// All equations of joints at a state.
     pub fn equations(&self, state: &State) -> Vec<Equation> {
+        self.equations_at(&Pose::new(state))
+    }
+
+    fn equations_at(&self, pose: &Pose) -> Vec<Equation> {
         let one = |(joint, target): (&super::reader::Joint, &Law)| {
-            let mut equation = self.measured(&joint.measure, state);
-            let [value, rate, acceleration] = target.at(state.t);
+            let mut equation = self.measured(&joint.measure, pose);
+            let [value, rate, acceleration] = target.at(pose.state.t);
             equation.off -= value;
             equation.rate -= rate;
             equation.bend -= acceleration;
@@ -146,7 +166,7 @@ impl Model {
     /// The distance of a wall's point from its wall, as an equation.
     pub fn gap(&self, wall: usize, state: &State) -> Equation {
         let wall = &self.scene.walls[wall];
-        let spot = self.spot(&wall.place, state);
+        let spot = self.spot(&wall.place, &Pose::new(state));
         let mut row = Row::new();
         spot.push(&mut row, wall.normal);
         let off = wall.normal.dot(spot.at - wall.through);
@@ -154,8 +174,8 @@ impl Model {
     }
 
     /// Applied forces at a state, and the power of those that have no potential energy.
-    fn forces(&self, state: &State) -> (Vec<Dd>, Dd) {
-        let scene = &self.scene;
+    fn forces(&self, pose: &Pose) -> (Vec<Dd>, Dd) {
+        let (scene, state) = (&self.scene, pose.state);
         let mut f = vec![Dd::ZERO; self.mass.len()];
         let mut power = Dd::ZERO;
         for (k, body) in scene.bodies.iter().enumerate() {
@@ -163,7 +183,7 @@ impl Model {
             f[3 * k + 1] += body.mass * scene.gravity.y;
         }
         for spring in &scene.springs {
-            let [a, b] = spring.places.each_ref().map(|place| self.spot(place, state));
+            let [a, b] = spring.places.each_ref().map(|place| self.spot(place, pose));
             let span = a.at - b.at;
             let length = span.length();
             // A spring without free length pulls along its span however short; a damper has a direction only where there is one.
@@ -187,9 +207,8 @@ impl Model {
             let factor = |law: &Option<Law>| law.as_ref().map_or(Dd::ONE, |law| law.at(state.t)[0]);
             match push {
                 Push::Force { place, force, turns, law } => {
-                    let spot = self.spot(place, state);
-                    let angle = place.body.map_or(Dd::ZERO, |k| state.q[3 * k + 2]);
-                    let force = if *turns { force.turned(angle.sin_cos()) } else { *force }.times(factor(law));
+                    let spot = self.spot(place, pose);
+                    let force = if *turns { force.turned(pose.turn(place.body)) } else { *force }.times(factor(law));
                     spot.press(&mut f, force);
                     power += force.dot(spot.velocity);
                 }
@@ -205,13 +224,15 @@ impl Model {
 
     /// Accelerations, with the points of the walls `held` kept on them; their multipliers come after those of the joints.
     pub fn accelerations(&self, state: &State, held: &[usize]) -> Accelerations {
-        let (f, mut power) = self.forces(state);
-        let mut equations = self.equations(state);
+        let pose = Pose::new(state);
+        let (f, mut power) = self.forces(&pose);
+        let mut equations = self.equations_at(&pose);
         equations.extend(held.iter().map(|&wall| self.gap(wall, state)));
         let right: Vec<Dd> = equations.iter().map(|equation| -equation.bend).collect();
         let rows: Vec<Row> = equations.into_iter().map(|equation| equation.row).collect();
         let solution = linear::solve(&self.mass, &rows, &f, &right);
-        let motor_power: Vec<Dd> = self.targets.iter().zip(&solution.multipliers).map(|(law, &lambda)| law.at(state.t)[1] * lambda).collect();
+        let motor_power: Vec<Dd> =
+            self.targets.iter().zip(&solution.multipliers).map(|(law, &lambda)| law.at(state.t)[1] * lambda).collect();
         power = motor_power.iter().fold(power, |sum, &one| sum + one);
         Accelerations { solution, power, motor_power }
     }
@@ -219,12 +240,13 @@ impl Model {
     /// Kinetic energy, and potential energy of gravity and springs \[J\].
     pub fn energy(&self, state: &State) -> [Dd; 2] {
         let kinetic = (0..self.mass.len()).fold(Dd::ZERO, |sum, i| sum + (self.mass[i] * state.v[i] * state.v[i]).scale(0.5));
+        let pose = Pose::new(state);
         let mut potential = Dd::ZERO;
         for (k, body) in self.scene.bodies.iter().enumerate() {
             potential -= body.mass * (self.scene.gravity.x * state.q[3 * k] + self.scene.gravity.y * state.q[3 * k + 1]);
         }
         for spring in &self.scene.springs {
-            let [a, b] = spring.places.each_ref().map(|place| self.position(place, state));
+            let [a, b] = spring.places.each_ref().map(|place| self.spot(place, &pose).at);
             let stretch = (a - b).length() - spring.free_length;
             potential += (spring.stiffness * stretch * stretch).scale(0.5);
         }

@@ -161,11 +161,8 @@ fn law(value: &Value) -> Option<Law> {
 impl Law {
     /// Value, rate and acceleration.
     pub fn at(&self, t: Dd) -> [Dd; 3] {
-        let mut found = [
-            self.start + self.rate * t + (self.acceleration * t * t).scale(0.5),
-            self.rate + self.acceleration * t,
-            self.acceleration,
-        ];
+        let mut found =
+            [self.start + self.rate * t + (self.acceleration * t * t).scale(0.5), self.rate + self.acceleration * t, self.acceleration];
         for &[amplitude, frequency, phase] in &self.sines {
             let (sine, cosine) = (frequency * t + phase).sin_cos();
             found[0] += amplitude * sine;

@@ -30,6 +30,8 @@ pub struct Record {
     pub doubt: Option<(f64, String)>,
     /// By how much a small change of the start has grown up to each output time.
     pub growth: Vec<f64>,
+    /// What a change of positions comes to in other quantities.
+    pub response: Response,
     pub evaluations: u64,
     pub scales: Scales,
 }
@@ -51,6 +53,14 @@ pub struct Scales {
     pub impulse: f64,
 }
 
+/// Of a neighbouring motion, the largest difference of a quantity over its scale, over the largest difference of positions; at least 1.
+#[derive(Clone, Copy, Debug)]
+pub struct Response {
+    pub rate: f64,
+    pub force: f64,
+    pub energy: f64,
+}
+
 /// A change of the start that is followed to see how it grows.
 const CHANGE: f64 = 1e-11;
 
@@ -62,15 +72,15 @@ impl Record {
         let scales = Scales::of(&model, &looks, &course.impacts);
         let (impacts, stays, doubt) = (course.impacts, course.stays, course.doubt);
         let mut evaluations = course.integrator.evaluations;
-        let growth = match march(&model, changed(&model, &state, scales)?, times, most_evaluations) {
+        let (growth, response) = match march(&model, changed(&model, &state, scales)?, times, most_evaluations) {
             Ok((other, course)) => {
                 evaluations += course.integrator.evaluations;
-                growth(&looks, &other, scales)
+                (growth(&looks, &other, scales), Response::of(&model, &looks, &other, scales))
             }
             // A neighbour that cannot be followed tells that this one is on an edge.
-            Err(_) => vec![f64::INFINITY; looks.len()],
+            Err(_) => (vec![f64::INFINITY; looks.len()], Response { rate: 1.0, force: 1.0, energy: 1.0 }),
         };
-        Ok(Self { model, looks, impacts, stays, doubt, growth, evaluations, scales })
+        Ok(Self { model, looks, impacts, stays, doubt, growth, response, evaluations, scales })
     }
 }
 
@@ -81,7 +91,7 @@ fn march<'a>(model: &'a Model, state: State, times: &[f64], most: u64) -> Result
         course.go(Dd::from(t))?;
         looks.push(look(&course));
     }
-    if course.integrator.least_pivot < 1e-9 {
+    if course.integrator.least_pivot < 1e-18 {
         return Err(Lost("a singular position".into()));
     }
     Ok((looks, course))
@@ -129,6 +139,35 @@ fn growth(looks: &[Look], other: &[Look], scales: Scales) -> Vec<f64> {
         most
     };
     looks.iter().zip(other).map(one).collect()
+}
+
+impl Response {
+    fn of(model: &Model, looks: &[Look], others: &[Look], scales: Scales) -> Self {
+        let mut most = [0.0f64; 4];
+        let mut see = |class: usize, a: Dd, b: Dd, scale: f64| {
+            let share = (a - b).hi.abs() / scale;
+            if share.is_finite() {
+                most[class] = most[class].max(share);
+            }
+        };
+        for (a, b) in looks.iter().zip(others) {
+            for i in 0..a.state.q.len() {
+                let unit = if i % 3 == 2 { 1.0 } else { scales.length };
+                see(0, a.state.q[i], b.state.q[i], unit);
+                see(1, a.state.v[i], b.state.v[i], unit * scales.rate);
+            }
+            for (r, joint) in model.scene.joints.iter().enumerate().filter(|_| a.is_held == b.is_held) {
+                if !a.is_open[r] {
+                    see(2, a.multipliers[r], b.multipliers[r], if joint.is_angle() { scales.torque } else { scales.force });
+                }
+            }
+            see(3, a.energy[0], b.energy[0], scales.energy);
+            see(3, a.energy[1] - looks[0].energy[1], b.energy[1] - others[0].energy[1], scales.energy);
+            see(3, a.state.work, b.state.work, scales.energy);
+        }
+        let over = |class: usize| if most[0] > 0.0 { (most[class] / most[0]).max(1.0) } else { 1.0 };
+        Self { rate: over(1), force: over(2), energy: over(3) }
+    }
 }
 
 impl Scales {

@@ -24,7 +24,8 @@ pub fn project(model: &Model, state: &mut State, held: &[usize]) -> Result<(), L
     for round in 0.. {
         let equations = equations(state);
         let most = equations.iter().fold(0.0, |most: f64, equation| most.max(equation.off.hi.abs())) / model.scene.size.min(1.0);
-        if most < CLOSED || (most < 1e-24 && most >= before) {
+        // Redundant equations that contradict each other by the rounding of the scene's numbers do not close further.
+        if most < CLOSED || (most < 1e-12 && most >= 0.5 * before) {
             break;
         }
         if round > 40 || !most.is_finite() || most > 1e3 {

@@ -10,7 +10,7 @@
 //!
 //! Both complementarities are solved by trying every set.
 
-use super::double_double::{Dd, Vec2};
+use super::double_double::Dd;
 use super::linear::{self, Row};
 use super::model::{Model, State};
 use super::motion::{Integrator, Lost};
@@ -300,7 +300,8 @@ impl<'a> Course<'a> {
             let small = 1e-20 * jump.multipliers[joints].hi.abs();
             let presses = jump.multipliers[joints + 1..].iter().all(|eta| eta.hi >= -small);
             let leaves = self.held.iter().filter(|held| !set.contains(held));
-            let opens = { leaves }.all(|&held| linear::row_times(&model.gap(held, &self.state).row, &jump.x).hi >= -1e-20 * gap.rate.hi.abs());
+            let opens =
+                { leaves }.all(|&held| linear::row_times(&model.gap(held, &self.state).row, &jump.x).hi >= -1e-20 * gap.rate.hi.abs());
             if !presses || !opens {
                 continue;
             }
@@ -345,7 +346,8 @@ impl<'a> Course<'a> {
             let presses = found.multipliers[joints..].iter().all(|lambda| lambda.hi > 1e-18 * scale);
             let opens = candidates.iter().filter(|wall| !set.contains(wall)).all(|&wall| {
                 let gap = model.gap(wall, &self.state);
-                (linear::row_times(&gap.row, &found.x) + gap.bend).hi >= -1e-15 * (found.x.iter().fold(0.0, |most: f64, a| most.max(a.hi.abs())))
+                (linear::row_times(&gap.row, &found.x) + gap.bend).hi
+                    >= -1e-15 * (found.x.iter().fold(0.0, |most: f64, a| most.max(a.hi.abs())))
             });
             if presses && opens {
                 self.hold(set.clone());
@@ -370,8 +372,9 @@ impl<'a> Course<'a> {
 
 /// All subsets, the largest first.
 fn subsets(of: &[usize]) -> Vec<Vec<usize>> {
-    let mut all: Vec<Vec<usize>> =
-        (0..1usize << of.len()).map(|bits| of.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, &wall)| wall).collect()).collect();
+    let mut all: Vec<Vec<usize>> = (0..1usize << of.len())
+        .map(|bits| of.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, &wall)| wall).collect())
+        .collect();
     all.sort_by_key(|set| std::cmp::Reverse(set.len()));
     all
 }
@@ -406,9 +409,4 @@ impl Arc {
         }
         state
     }
-}
-
-/// Where a wall's point is \[m\]: for reports.
-pub fn point_at(model: &Model, wall: usize, state: &State) -> Vec2 {
-    model.position(&model.scene.walls[wall].place, state)
 }
