@@ -15,6 +15,7 @@
 //! | [`verdict`] | the program's motion against the auditor's |
 //! | [`coverage`] | which kinds met which methods |
 
+mod coverage;
 pub mod double_double;
 pub mod linear;
 #[path = "../common/mechanisms/mod.rs"]
