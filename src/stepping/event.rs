@@ -62,12 +62,9 @@ impl Dense {
         for (powers, (first, second)) in self.powers.chunks_exact(self.width).zip(first.iter_mut().zip(second)) {
             local.copy_from_slice(powers);
             shift(local, centre);
-            (*first, *second) = (0.0, 0.0);
-            for (m, a) in local.iter().enumerate().skip(1).rev() {
-                let m = m as f64;
-                *second = *second * radius + if m > 1.0 { m * (m - 1.0) * a.abs() } else { 0.0 };
-                *first = *first * radius + m * a.abs();
-            }
+            let terms = |skip: usize| local.iter().enumerate().skip(skip).rev();
+            *first = terms(1).fold(0.0, |sum, (m, a)| sum * radius + m as f64 * a.abs());
+            *second = terms(2).fold(0.0, |sum, (m, a)| sum * radius + (m * (m - 1)) as f64 * a.abs());
         }
     }
 }
@@ -346,5 +343,33 @@ fn earlier(found: Found, event: usize, curve: &impl Curve, zone: f64, off: impl 
         (_, Some(near)) => Found::Near(near),
         (Crossing::At(share), None) => Found::At(event, share),
         (Crossing::Nothing | Crossing::Inside(_), None) => found,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn derivatives_of_a_dense_output_keep_to_their_bounds() {
+        let dense = Dense { powers: vec![0.3, -1.0, 0.7, 2.0, -0.4, 1.0, 0.0, -3.0, 0.0, 0.5], width: 5, off: vec![0.0; 2] };
+        let (mut y, mut slope, mut before) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+        for (centre, radius) in [(0.5, 0.5), (0.3, 0.1), (0.9, 0.01)] {
+            let (mut first, mut second) = ([0.0; 2], [0.0; 2]);
+            dense.bounds(centre, radius, &mut first, &mut second);
+            let mut most = [[0.0_f64; 2]; 2];
+            for k in -50..=50 {
+                let (t, h) = (centre + radius * f64::from(k) / 50.0, 1e-6);
+                dense.at(t - h, &mut y, &mut before);
+                dense.at(t + h, &mut y, &mut slope);
+                for i in 0..2 {
+                    most[i] = [most[i][0].max(slope[i].abs()), most[i][1].max(((slope[i] - before[i]) / (2.0 * h)).abs())];
+                }
+            }
+            for i in 0..2 {
+                assert!(most[i][0] <= first[i] + 1e-4 && most[i][1] <= second[i] + 1e-4, "{most:?} {first:?} {second:?}");
+                assert!(radius > 0.1 || first[i] < 1.2 * most[i][0] + 0.1, "{most:?} {first:?}");
+            }
+        }
     }
 }

@@ -104,7 +104,8 @@ pub fn doubtful(curve: &impl Curve, zone: f64, off: impl Fn(f64) -> f64, end: f6
     let mut begin = 0.0;
     while begin < end {
         let low = if curve.at(begin)[0] < zone { begin } else { root(curve, zone, begin, end)? };
-        let high = root(curve, zone, low, end).unwrap_or(end);
+        // Above the level by more than rounding.
+        let high = root(curve, zone * (1.0 + 1e-9) + f64::EPSILON, low, end).unwrap_or(end);
         if curve.at(low)[1] < 0.0 && curve.at(high)[1] > 0.0 {
             let lowest = turn(curve, low, high);
             if curve.at(lowest)[0].abs() < off(lowest) {
