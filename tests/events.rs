@@ -177,7 +177,7 @@ fn a_bar_on_a_torsion_spring_turns_over_when_it_does() {
             }
         };
         let mut flips = Vec::new();
-        sweep(&plan, 1, &mut |point| {
+        sweep(&plan, 1, &mut |point: &driftless::run::Point| {
             flips.push(point.flip.map_or(f64::NAN, |flip| flip.t));
             Ok(())
         })
