@@ -59,6 +59,13 @@ impl Envelope {
     #[inline]
     pub fn factor<T: Real>(&self, matrix: &mut [T], pivot: &mut [T], scale: &[f64]) -> Weakest {
         let mut weakest = Weakest::NONE;
+        self.factor_by(matrix, pivot, |i, diagonal| weakest.reciprocal(i, diagonal, scale[i]));
+        weakest
+    }
+
+    /// The same, `reciprocal` telling the reciprocal of a row's pivot, or zero where the row is left out.
+    #[inline]
+    pub fn factor_by<T: Real>(&self, matrix: &mut [T], pivot: &mut [T], mut reciprocal: impl FnMut(usize, T) -> T) {
         for i in 0..self.rows.len() {
             let (first, here) = self.row(i);
             let (done, row) = matrix.split_at_mut(here.start);
@@ -78,9 +85,8 @@ impl Envelope {
                 diagonal -= g * l;
                 row[j - first] = l;
             }
-            pivot[i] = weakest.reciprocal(i, diagonal, scale[i]);
+            pivot[i] = reciprocal(i, diagonal);
         }
-        weakest
     }
 
     /// Solves in place with the factors.

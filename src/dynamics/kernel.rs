@@ -7,10 +7,13 @@
 //! A scene without rows never enters the second line.  Mechanisms of many bodies are evaluated without these matrices, by the passes of
 //! [`recursive`](super::recursive); what is found is the same.
 
+mod exact;
+
 use super::force::Vibration;
+use super::rank::Metric;
 use super::recursive::Evaluation;
 use super::row::{Linearised, Posture};
-use super::schur::{self, Weakest};
+use super::schur::{self, NEAR, Weakest};
 use super::tree::{self, size};
 use super::{Mechanism, Time};
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
@@ -50,8 +53,14 @@ pub struct Kernel<T> {
     pub schur_pivot: Vec<T>,
     /// What pivots of S are measured against (r).
     pub scale: Vec<f64>,
+    /// What the rank of the rows is measured with.
+    metric: Metric,
     /// The row nearest to being left out in the last evaluation.
     pub weakest: Weakest,
+    /// The same in double-double, where doubles have too few digits for light members or long levers; made when first asked for.
+    exact: Option<Box<Kernel<DoubleDouble>>>,
+    /// True where the last evaluation was made there.
+    is_exact: bool,
     /// The rows at this moment (r).
     pub rows: Vec<Linearised<T>>,
     /// Multipliers (r) \[N·m or N\].
@@ -73,26 +82,26 @@ impl<T: Scalar> Kernel<T> {
     pub fn dense(mechanism: &Mechanism) -> Self {
         let size = if mechanism.vibration.is_some() { mechanism.coordinates() } else { 0 };
         let vibration = std::array::from_fn(|_| vec![T::ZERO; size]);
-        Self { vibration, ..Self::sized(mechanism.coordinates(), mechanism.row_scales(), true) }
+        Self { vibration, ..Self::sized(mechanism.coordinates(), mechanism.row_scales(), mechanism.rank_metric(), true) }
     }
 
     /// The same for a mechanism whose rows nobody asks about.
     pub fn dense_without_rows(mechanism: &Mechanism) -> Self {
-        Self::sized(mechanism.coordinates(), Vec::new(), true)
+        Self::sized(mechanism.coordinates(), Vec::new(), Metric::default(), true)
     }
 
     /// Scratch space for energies.
     pub fn without_rows(mechanism: &Mechanism) -> Self {
         // They are rounded, and what Gauss methods keep is the energy with these very numbers.
         let is_dense = mechanism.tree.is_dense() && (mechanism.recursion.is_none() || mechanism.coordinates() <= COUPLED);
-        let mut kernel = Self::sized(mechanism.coordinates(), Vec::new(), is_dense);
+        let mut kernel = Self::sized(mechanism.coordinates(), Vec::new(), Metric::default(), is_dense);
         if !is_dense {
             kernel.feet = std::array::from_fn(|_| vec![Complex::ZERO; mechanism.bodies.len()]);
         }
         kernel
     }
 
-    fn sized(n: usize, scale: Vec<f64>, is_dense: bool) -> Self {
+    fn sized(n: usize, scale: Vec<f64>, metric: Metric, is_dense: bool) -> Self {
         let rows = scale.len();
         let matrix = |size: usize| vec![T::ZERO; if is_dense { size } else { 0 }];
         let idle = Linearised { position: T::ZERO, drive: T::ZERO, convective: T::ZERO };
@@ -107,7 +116,10 @@ impl<T: Scalar> Kernel<T> {
             schur: matrix(rows * rows),
             schur_pivot: matrix(rows),
             scale,
+            metric,
             weakest: Weakest::NONE,
+            exact: None,
+            is_exact: false,
             rows: vec![idle; rows],
             multiplier: vec![T::ZERO; rows],
             correction: vec![T::ZERO; rows],
@@ -129,8 +141,8 @@ impl<T: Real> Kernel<T> {
     /// Scratch space for a mechanism and its rows, in the form the mechanism is evaluated in.
     pub fn new(mechanism: &Mechanism) -> Self {
         let Some(recursion) = &mechanism.recursion else { return Self::dense(mechanism) };
-        let mut kernel = Self::sized(mechanism.coordinates(), mechanism.row_scales(), false);
-        kernel.bodywise = Some(Box::new(Evaluation::new(recursion, &kernel.scale)));
+        let mut kernel = Self::sized(mechanism.coordinates(), mechanism.row_scales(), mechanism.rank_metric(), false);
+        kernel.bodywise = Some(Box::new(Evaluation::new(recursion, &kernel.scale, kernel.metric.clone())));
         kernel.feet = std::array::from_fn(|_| vec![Complex::ZERO; mechanism.bodies.len()]);
         kernel
     }
@@ -186,13 +198,18 @@ impl<T: Real> Kernel<T> {
     #[inline(always)]
     pub fn accelerate<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T], bias: Bias) {
         if N == 0 && self.bodywise.is_some() {
-            return self.accelerate_bodywise(mechanism, t, phi, omega, bias);
+            self.accelerate_bodywise(mechanism, t, phi, omega, bias);
+        } else {
+            self.accelerate_free::<N>(mechanism, t, phi, omega);
+            match mechanism.rows.len() {
+                1 => self.constrain::<N, 1>(mechanism, t, phi, omega, bias),
+                2 => self.constrain::<N, 2>(mechanism, t, phi, omega, bias),
+                _ => self.constrain::<N, 0>(mechanism, t, phi, omega, bias),
+            }
         }
-        self.accelerate_free::<N>(mechanism, t, phi, omega);
-        match mechanism.rows.len() {
-            1 => self.constrain::<N, 1>(mechanism, t, phi, omega, bias),
-            2 => self.constrain::<N, 2>(mechanism, t, phi, omega, bias),
-            _ => self.constrain::<N, 0>(mechanism, t, phi, omega, bias),
+        self.is_exact = T::IS_PLAIN && self.weakest.is_delicate;
+        if self.is_exact {
+            self.accelerate_exactly(mechanism, t, phi, omega, bias);
         }
     }
 
@@ -279,9 +296,10 @@ impl<T: Real> Kernel<T> {
         self.rows_at(mechanism, t, phi, omega);
         if let Some(bodywise) = &mut self.bodywise {
             self.weakest = bodywise.couple();
-            return;
+        } else {
+            self.couple_rows::<N, 0>(size::<N>(mechanism.tree.coordinates), mechanism.rows.len());
         }
-        self.couple_rows::<N, 0>(size::<N>(mechanism.tree.coordinates), mechanism.rows.len());
+        self.linearise_exactly(mechanism, t, phi, omega);
     }
 
     /// The same at other coordinates than the last: elements, M and its factors first.
@@ -323,10 +341,16 @@ impl<T: Real> Kernel<T> {
             }
         }
         self.weakest = schur::factor::<T, R>(rows, schur, &mut self.schur_pivot, &self.scale);
+        if self.weakest.share < NEAR {
+            self.weakest = schur::look_closer(&self.metric, &self.scale, self.weakest, [jacobian, lifted], schur, &mut self.schur_pivot);
+        }
     }
 
     /// Replaces what is in `multiplier` by S⁻¹ of it; after [`Kernel::linearise`].
     pub fn solve_rows(&mut self) {
+        if self.is_exact {
+            return self.solve_rows_exactly();
+        }
         match &mut self.bodywise {
             Some(bodywise) => bodywise.solve_rows(&mut self.multiplier),
             None => tree::solve::<T, 0>(self.multiplier.len(), &self.schur, &self.schur_pivot, &mut self.multiplier),
@@ -335,6 +359,9 @@ impl<T: Real> Kernel<T> {
 
     /// Writes M⁻¹ Gᵀ of what is in `multiplier` to `load`; after [`Kernel::linearise`].
     pub fn lift(&mut self) {
+        if self.is_exact {
+            return self.lift_exactly();
+        }
         if let Some(bodywise) = &mut self.bodywise {
             return bodywise.lift(&self.multiplier, &mut self.load);
         }
@@ -346,6 +373,9 @@ impl<T: Real> Kernel<T> {
 
     /// True where row `r` was left out, its pivot lost; after [`Kernel::linearise`].
     pub fn is_left_out(&self, r: usize) -> bool {
+        if let Some(exact) = self.exact.as_ref().filter(|_| self.is_exact) {
+            return exact.is_left_out(r);
+        }
         match &self.bodywise {
             Some(bodywise) => bodywise.is_left_out(r),
             None => self.schur_pivot[r] == T::ZERO,

@@ -25,7 +25,7 @@
 //! body by body ([`recursive`]), and those of rows from the factors left behind.
 //!
 //! **Everything else is a row.**  The hinges make a [`forest`]; those that close a loop, sliders, slots, locks and motors are rows, each a measured angle or a quadratic
-//! function of the elements ([`row`]).  Where rows lose their independence they are left out ([`schur`]); the start is found from them ([`assembly`]).
+//! function of the elements ([`row`]).  Where rows lose their independence ([`rank`]) they are left out ([`schur`]); the start is found from them ([`assembly`]).
 //!
 //! The same mechanism is marched in several forms, chosen before the first step:
 //! [`multiplier`] in (q, w) with one multiplier per row, [`looped`] the same with the solve in natural coordinates, [`elimination`] with the driven angles as known functions of
@@ -53,6 +53,7 @@ pub mod natural;
 pub mod point;
 pub mod points;
 pub mod quadratic;
+pub mod rank;
 pub mod reaction;
 pub mod recursive;
 pub mod row;

@@ -5,11 +5,13 @@
 //! ```
 //!
 //! Where a mechanism has all its links in line, rows lose their independence: pivots fall with the square of the distance, and the multipliers of what is
-//! left are rounding divided by it.  A row whose share is below [`DROPPED`] is left out, in accelerations and projections alike, and its
-//! multiplier is zero.  Against the row's constant scale, because whole rows vanish together: a pivot over the present diagonal would not see it.
+//! left are rounding divided by it.  Light members and long levers make pivots small as well: below [`NEAR`] the [`rank`](super::rank) of the rows decides, which knows
+//! no masses.  A row whose share there is below [`DROPPED`] is left out, in accelerations and projections alike, and its multiplier is zero.  Against the row's constant scale, because whole rows vanish together: a pivot over the present diagonal would not see it.
 //! Rows that depend on others for ever are left out in the same way.
 
 use super::Mechanism;
+use super::kernel::dot;
+use super::rank::Metric;
 use super::row::{Measure, Row};
 use super::tree::{Tree, size};
 use crate::arithmetic::Real;
@@ -26,20 +28,35 @@ pub struct Weakest {
     pub share: f64,
     /// The row.
     pub row: usize,
+    /// True where light members or long levers cost S more digits than the position does.
+    pub is_delicate: bool,
 }
 
 impl Weakest {
     /// Before any row has been looked at.
-    pub const NONE: Self = Self { share: f64::INFINITY, row: 0 };
+    pub const NONE: Self = Self { share: f64::INFINITY, row: 0, is_delicate: false };
 
     /// Looks at the pivot of a row against its scale: its reciprocal, or zero where the row is left out.
     #[inline(always)]
     pub fn reciprocal<T: Real>(&mut self, row: usize, pivot: T, scale: f64) -> T {
         let share = pivot.value() / scale;
         if share < self.share {
-            *self = Self { share, row };
+            *self = Self { share, row, is_delicate: false };
         }
         if share < DROPPED { T::ZERO } else { T::ONE / pivot }
+    }
+
+    /// The same where it is known whether the row is left out.
+    pub fn reciprocal_kept<T: Real>(&mut self, row: usize, pivot: T, scale: f64, is_left_out: bool) -> T {
+        if is_left_out {
+            return T::ZERO;
+        }
+        let share = pivot.value() / scale;
+        if !(share >= self.share) {
+            *self = Self { share, row, is_delicate: false };
+        }
+        // Where rounding has eaten it, more digits are needed.
+        if pivot.value() > 0.0 { T::ONE / pivot } else { T::ZERO }
     }
 }
 
@@ -78,11 +95,19 @@ impl Mechanism {
 /// Solved with [`tree::solve`](super::tree::solve), which then gives these rows no multiplier.
 #[inline(always)]
 pub fn factor<T: Real, const R: usize>(rows: usize, schur: &mut [T], pivot: &mut [T], scale: &[f64]) -> Weakest {
-    let r = size::<R>(rows);
-    let (schur, pivot, scale) = (&mut schur[..r * r], &mut pivot[..r], &scale[..r]);
+    let scale = &scale[..size::<R>(rows)];
     let mut weakest = Weakest::NONE;
+    factor_by::<T, R>(rows, schur, pivot, |k, pivot| weakest.reciprocal(k, pivot, scale[k]));
+    weakest
+}
+
+/// The same, `reciprocal` telling the reciprocal of a row's pivot, or zero where the row is left out.
+#[inline(always)]
+pub fn factor_by<T: Real, const R: usize>(rows: usize, schur: &mut [T], pivot: &mut [T], mut reciprocal: impl FnMut(usize, T) -> T) {
+    let r = size::<R>(rows);
+    let (schur, pivot) = (&mut schur[..r * r], &mut pivot[..r]);
     for k in (0..r).rev() {
-        pivot[k] = weakest.reciprocal(k, schur[k * r + k], scale[k]);
+        pivot[k] = reciprocal(k, schur[k * r + k]);
         for i in 0..k {
             let l = schur[i * r + k] * pivot[k];
             for j in 0..=i {
@@ -91,7 +116,36 @@ pub fn factor<T: Real, const R: usize>(rows: usize, schur: &mut [T], pivot: &mut
             }
         }
     }
-    weakest
+}
+
+/// S of rows J and M⁻¹ Jᵀ (each r × n), above and on its diagonal.
+#[inline(always)]
+pub fn product<T: Real>(rows: usize, jacobian: &[T], lifted: &[T], schur: &mut [T]) {
+    let n = jacobian.len() / rows.max(1);
+    for r in 0..rows {
+        for s in r..rows {
+            schur[r * rows + s] = dot(&jacobian[r * n..(r + 1) * n], &lifted[s * n..(s + 1) * n]);
+        }
+    }
+}
+
+/// What there is to do where a factored S has small pivots: the rank of the rows is looked at, and S factored again where other rows are to be left out.
+#[cold]
+pub fn look_closer<T: Real>(
+    metric: &Metric,
+    scale: &[f64],
+    mass: Weakest,
+    [jacobian, lifted]: [&[T]; 2],
+    schur: &mut [T],
+    pivot: &mut [T],
+) -> Weakest {
+    let rows = scale.len();
+    metric.judge(jacobian).settle(mass, |is_left_out| {
+        let mut weakest = Weakest::NONE;
+        product(rows, jacobian, lifted, schur);
+        factor_by::<T, 0>(rows, schur, pivot, |k, pivot| weakest.reciprocal_kept(k, pivot, scale[k], is_left_out[k]));
+        weakest.share
+    })
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ use crate::arithmetic::{Complex, Real};
 use crate::dynamics::compile::Body;
 use crate::dynamics::forest::Forest;
 use crate::dynamics::kernel::Bias;
+use crate::dynamics::rank::{Metric, Verdict};
 use crate::dynamics::row::{Linearised, Posture, Row};
 use crate::dynamics::schur::Weakest;
 use crate::dynamics::{Mechanism, Time};
@@ -55,11 +56,11 @@ pub struct Evaluation<T> {
 }
 
 impl<T: Real> Evaluation<T> {
-    /// Scratch space for these constants and the [scales](Row::scale) of their rows.
-    pub fn new(recursion: &Arc<Recursion>, scales: &[f64]) -> Self {
+    /// Scratch space for these constants and the [scales](Row::scale) of their rows, and what their rank is measured with.
+    pub fn new(recursion: &Arc<Recursion>, scales: &[f64], metric: Metric) -> Self {
         Self {
             trees: Recursive::new(&recursion.links),
-            rows: Rows::new(&recursion.ways, scales),
+            rows: Rows::new(&recursion.ways, scales, metric),
             jacobian: vec![T::ZERO; recursion.links.coordinates()],
             recursion: Arc::clone(recursion),
         }
@@ -186,6 +187,11 @@ impl<T: Real> Evaluation<T> {
     /// The factors of S, after [`rows_at`](Self::rows_at) and the factors of M.
     pub fn couple(&mut self) -> Weakest {
         self.rows.couple(&self.recursion.ways, &self.trees)
+    }
+
+    /// The rank of the rows, after [`rows_at`](Self::rows_at).
+    pub fn judge(&self) -> Verdict {
+        self.rows.judge(&self.recursion.ways)
     }
 
     /// Replaces x by S⁻¹ x.

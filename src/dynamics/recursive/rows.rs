@@ -11,7 +11,8 @@
 use super::{Links, Recursive};
 use crate::arithmetic::{Complex, Real};
 use crate::dynamics::envelope::{Envelope, compact_order};
-use crate::dynamics::schur::Weakest;
+use crate::dynamics::rank::{Metric, Verdict};
+use crate::dynamics::schur::{DROPPED, NEAR, Weakest};
 
 /// One coordinate on a row's way to the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -132,6 +133,24 @@ impl Ways {
         self.place.len()
     }
 
+    /// Writes Σ e_r e_s p over the coordinates on both rows' ways, p by coordinates.
+    #[inline]
+    fn cross<T: Real>(&self, matrix: &mut [T], e: &[T], p: impl Fn(usize) -> T) {
+        matrix.fill(T::ZERO);
+        let mut begin = 0;
+        for &(coordinate, end) in &self.crossed {
+            let pivot = p(coordinate);
+            let rows = &self.crossings[begin..end];
+            for (last, &(i, at)) in rows.iter().enumerate() {
+                let share = e[at] * pivot;
+                for &(j, other) in &rows[..=last] {
+                    self.envelope.add(matrix, i, j, share * e[other]);
+                }
+            }
+            begin = end;
+        }
+    }
+
     /// Numbers in S.
     pub fn entries(&self) -> usize {
         self.envelope.entries()
@@ -165,13 +184,15 @@ pub struct Rows<T> {
     pivot: Vec<T>,
     /// What pivots are measured against.
     scale: Vec<f64>,
+    /// What the rank of the rows is measured with.
+    metric: Metric,
     /// A vector in the order of S.
     right: Vec<T>,
 }
 
 impl<T: Real> Rows<T> {
     /// Scratch space for the rows of these ways, with their [scales](crate::dynamics::row::Row::scale).
-    pub fn new(ways: &Ways, scales: &[f64]) -> Self {
+    pub fn new(ways: &Ways, scales: &[f64], metric: Metric) -> Self {
         let mut scale = vec![0.0; ways.rows()];
         for (&place, &of_row) in ways.place.iter().zip(scales) {
             scale[place] = of_row;
@@ -184,6 +205,7 @@ impl<T: Real> Rows<T> {
             schur: vec![T::ZERO; ways.entries()],
             pivot: vec![T::ZERO; ways.rows()],
             scale,
+            metric,
             right: vec![T::ZERO; ways.rows()],
         }
     }
@@ -215,21 +237,38 @@ impl<T: Real> Rows<T> {
         for row in 0..ways.rows() {
             self.reach(ways, trees, row);
         }
-        self.schur.fill(T::ZERO);
-        let mut begin = 0;
-        for &(coordinate, end) in &ways.crossed {
-            let pivot = trees.joints[coordinate].pivot;
-            let rows = &ways.crossings[begin..end];
-            for (last, &(i, at)) in rows.iter().enumerate() {
-                let share = self.excess[at] * pivot;
-                for &(j, other) in &rows[..=last] {
-                    ways.envelope.add(&mut self.schur, i, j, share * self.excess[other]);
-                }
-            }
-            begin = end;
+        ways.cross(&mut self.schur, &self.excess, |coordinate| trees.joints[coordinate].pivot);
+        let mut weakest = ways.envelope.factor(&mut self.schur, &mut self.pivot, &self.scale);
+        if weakest.share < NEAR {
+            weakest = self.look_closer(ways, trees, weakest);
         }
-        let Weakest { share, row: place } = ways.envelope.factor(&mut self.schur, &mut self.pivot, &self.scale);
-        Weakest { share, row: ways.order.get(place).copied().unwrap_or(0) }
+        Weakest { row: ways.order.get(weakest.row).copied().unwrap_or(0), ..weakest }
+    }
+
+    /// What there is to do where pivots are small, see [`schur::look_closer`](crate::dynamics::schur::look_closer).
+    #[cold]
+    fn look_closer(&mut self, ways: &Ways, trees: &Recursive<T>, mass: Weakest) -> Weakest {
+        self.judge(ways).settle(mass, |is_left_out| {
+            let mut weakest = Weakest::NONE;
+            ways.cross(&mut self.schur, &self.excess, |coordinate| trees.joints[coordinate].pivot);
+            let scale = &self.scale;
+            let reciprocal = |i: usize, pivot| weakest.reciprocal_kept(i, pivot, scale[i], is_left_out[i]);
+            ways.envelope.factor_by(&mut self.schur, &mut self.pivot, reciprocal);
+            weakest.share
+        })
+    }
+
+    /// The rank of the rows, in the order of S.
+    pub fn judge(&self, ways: &Ways) -> Verdict {
+        let gradient: Vec<f64> = self.gradient.iter().map(|gradient| gradient.value()).collect();
+        let (mut matrix, mut shares) = (vec![0.0; ways.entries()], vec![0.0; ways.rows()]);
+        let mut pivot = shares.clone();
+        ways.cross(&mut matrix, &gradient, |coordinate| self.metric.columns[coordinate]);
+        ways.envelope.factor_by(&mut matrix, &mut pivot, |i, pivot: f64| {
+            shares[i] = pivot / self.metric.rows[ways.order[i]];
+            if shares[i] >= DROPPED { 1.0 / pivot } else { 0.0 }
+        });
+        self.metric.verdict(&shares)
     }
 
     /// The inward pass of one row.

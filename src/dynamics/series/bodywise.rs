@@ -34,7 +34,7 @@ impl<T: Real> Bodywise<T> {
         let n = mechanism.coordinates();
         let recursion = mechanism.recursion.as_ref()?;
         Some(Self {
-            evaluation: Evaluation::new(recursion, &mechanism.row_scales()),
+            evaluation: Evaluation::new(recursion, &mechanism.row_scales(), mechanism.rank_metric()),
             passes: Passes::new(&recursion.links),
             spread: vec![Complex::ZERO; (order + 1) * n],
             across: vec![Complex::ZERO; order * n],

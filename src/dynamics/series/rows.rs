@@ -15,9 +15,10 @@ use crate::arithmetic::{Complex, Real};
 use crate::dynamics::kernel::dot;
 use crate::dynamics::law::Law;
 use crate::dynamics::quadratic::Quadratic;
+use crate::dynamics::rank::{Levers, Metric};
 use crate::dynamics::recursive::Evaluation;
 use crate::dynamics::row::{Measure, Row};
-use crate::dynamics::schur::{self, Weakest};
+use crate::dynamics::schur::{self, NEAR, Weakest};
 use crate::dynamics::ties::Ties;
 use crate::dynamics::{Mechanism, Time, tree};
 
@@ -33,6 +34,8 @@ pub struct RowSeries<T> {
     pivot: Vec<T>,
     /// What pivots are measured against (r).
     scale: Vec<f64>,
+    /// What the rank of the rows is measured with.
+    metric: Metric,
     /// The row nearest to being left out at the start.
     weakest: Weakest,
     /// lambda: powers 0…P-1 (P × r).
@@ -86,8 +89,12 @@ impl<T: Real> RowSeries<T> {
                 Some(Kind::Place { place: place.clone(), law: law.clone(), drive: zeros(if law.is_some() { order + 1 } else { 0 }) })
             }
         };
-        let in_force = mechanism.rows.iter().filter(|row| !(row.is_angle() && ties.driven()));
-        let scale = in_force.map(|row| row.scale(&mechanism.tree)).collect();
+        let in_force = || mechanism.rows.iter().filter(|row| !(row.is_angle() && ties.driven()));
+        let scale = in_force().map(|row| row.scale(&mechanism.tree)).collect();
+        let size = mechanism.size_of_parts();
+        let base = |(k, b): (usize, f64)| ties.bodies[k].base.map(|base| (base, b));
+        let levers: Vec<Levers> = in_force().map(|row| row.levers(size).into_iter().filter_map(base).collect()).collect();
+        let metric = Metric::new(&levers, ties.count(), mechanism.assembly.redundant.len());
         let kinds: Vec<Kind<T>> = mechanism.rows.iter().filter_map(kind).collect();
         let (r, f) = (kinds.len(), ties.count());
         let matrix = |size: usize| zeros(if is_dense { size } else { 0 });
@@ -99,6 +106,7 @@ impl<T: Real> RowSeries<T> {
             schur: matrix(r * r),
             pivot: matrix(r),
             scale,
+            metric,
             weakest: Weakest::NONE,
             multiplier: zeros(order * r),
         }
@@ -146,12 +154,12 @@ impl<T: Real> RowSeries<T> {
         for lifted in self.lifted.chunks_exact_mut(f.max(1)) {
             tree::solve::<T, 0>(f, mass, pivot, lifted);
         }
-        for i in 0..r {
-            for j in i..r {
-                self.schur[i * r + j] = dot(&self.jacobian[i * f..(i + 1) * f], &self.lifted[j * f..(j + 1) * f]);
-            }
-        }
+        schur::product(r, &self.jacobian, &self.lifted, &mut self.schur);
         self.weakest = schur::factor::<T, 0>(r, &mut self.schur, &mut self.pivot, &self.scale);
+        if self.weakest.share < NEAR {
+            let rows = [&self.jacobian[..], &self.lifted[..]];
+            self.weakest = schur::look_closer(&self.metric, &self.scale, self.weakest, rows, &mut self.schur, &mut self.pivot);
+        }
     }
 
     /// The same body by body, where all coordinates are free.

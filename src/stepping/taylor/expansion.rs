@@ -19,6 +19,8 @@ pub struct Expansion<T> {
     series: Series<T>,
     /// The first powers in double-double, where the rest goes on from these.
     first: Option<Box<Series<DoubleDouble>>>,
+    /// All powers in double-double, where doubles have too few digits for light members or long levers; made when first asked for.
+    whole: Option<Box<Series<DoubleDouble>>>,
     /// Powers of the rates that are summed: all, or those before noise takes over in a step through a singular position.
     summed: usize,
     u: [Vec<T>; 3],
@@ -35,6 +37,7 @@ impl<T: Coefficient> Expansion<T> {
             coordinates,
             summed: order + 1,
             first: (extended && T::IS_PLAIN).then(|| Box::new(Series::new(mechanism, coordinates, LEADING))),
+            whole: None,
             u: std::array::from_fn(|_| vec![T::ZERO; f]),
             exact: std::array::from_fn(|_| vec![DoubleDouble::default(); f]),
             series,
@@ -61,16 +64,33 @@ impl<T: Coefficient> Expansion<T> {
             (u[i], rest[i]) = T::split(state.unknown(i));
             rate[i] = T::split(state.unknown(f + i)).0;
         }
-        let Some(first) = &mut self.first else {
+        let [exact, none, exact_rate] = &mut self.exact;
+        if let Some(first) = &mut self.first {
+            for i in 0..f {
+                (exact[i], exact_rate[i]) = (state.unknown(i), state.unknown(f + i));
+            }
+            first.expand(mechanism, state.time, exact, none, exact_rate);
+            self.series.carry_on(mechanism, state.time, u, rest, rate, first);
+        } else {
             self.series.expand(mechanism, state.time, u, rest, rate);
-            return;
-        };
+        }
+        if T::IS_PLAIN && self.series.weakest().is_delicate {
+            self.expand_wholly(mechanism, state);
+        }
+    }
+
+    /// Rounds powers found in double-double.
+    #[cold]
+    fn expand_wholly(&mut self, mechanism: &Mechanism, state: &State) {
+        let (f, order) = (self.series.coordinates(), self.series.order());
+        let whole = self.whole.get_or_insert_with(|| Box::new(Series::new(mechanism, self.coordinates, order)));
         let [exact, none, exact_rate] = &mut self.exact;
         for i in 0..f {
             (exact[i], exact_rate[i]) = (state.unknown(i), state.unknown(f + i));
         }
-        first.expand(mechanism, state.time, exact, none, exact_rate);
-        self.series.carry_on(mechanism, state.time, u, rest, rate, first);
+        whole.expand(mechanism, state.time, exact, none, exact_rate);
+        let [u, rest, rate] = &self.u;
+        self.series.carry_on(mechanism, state.time, u, rest, rate, whole);
     }
 
     /// The step at which the last powers fall below the tolerance \[s\], those of the unit vectors too where `with_vectors`; not a number
@@ -136,6 +156,11 @@ impl<T: Coefficient> Expansion<T> {
     pub fn sum_to_smallest(&mut self, h: f64) {
         let smallest = (1..=self.series.order()).min_by(|&a, &b| self.size(a, h).total_cmp(&self.size(b, h)));
         self.summed = smallest.unwrap_or(self.series.order()) + 1;
+    }
+
+    /// Sums all powers again.
+    pub fn sum_all(&mut self) {
+        self.summed = self.series.order() + 1;
     }
 
     /// The smallest power at `h` \[s\] over the largest.

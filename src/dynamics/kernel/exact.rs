@@ -1,0 +1,82 @@
+//! What light members and long levers ask for beyond doubles, and the rank of the constraints, which knows no masses.
+//!
+//! A body of a billionth of the others' mass gives way a billion times more easily: S = G M⁻¹ Gᵀ is the sum of what is left of it and of numbers a billion times larger, and
+//! its pivots have lost nine digits.  In double-double they are evaluated anew, and rounded.
+
+use super::{Bias, Kernel};
+use crate::arithmetic::{DoubleDouble, Real};
+use crate::dynamics::{Mechanism, Time};
+
+impl<T: Real> Kernel<T> {
+    /// Writes accelerations and multipliers of the evaluation in double-double.
+    #[cold]
+    pub(super) fn accelerate_exactly(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T], bias: Bias) {
+        let exact = self.exact.get_or_insert_with(|| Box::new(Kernel::new(mechanism)));
+        let wide = |x: &[T]| -> Vec<DoubleDouble> { x.iter().map(|x| x.double_double()).collect() };
+        exact.stretch = wide(&self.stretch);
+        exact.accelerate::<0>(mechanism, t, &wide(phi), &wide(omega), bias);
+        let pairs = [(&mut self.load, &exact.load), (&mut self.multiplier, &exact.multiplier), (&mut self.correction, &exact.correction)];
+        for (rounded, exact) in pairs {
+            round(rounded, exact);
+        }
+    }
+
+    /// The factors in double-double, where those in doubles have too few digits.
+    pub(super) fn linearise_exactly(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
+        self.is_exact = T::IS_PLAIN && self.weakest.is_delicate;
+        if self.is_exact {
+            let exact = self.exact.get_or_insert_with(|| Box::new(Kernel::new(mechanism)));
+            let wide = |x: &[T]| -> Vec<DoubleDouble> { x.iter().map(|x| x.double_double()).collect() };
+            exact.linearise_at::<0>(mechanism, t, &wide(phi), &wide(omega));
+        }
+    }
+
+    /// [`Kernel::solve_rows`] with the factors in double-double.
+    #[cold]
+    pub(super) fn solve_rows_exactly(&mut self) {
+        let Some(exact) = &mut self.exact else { return };
+        exact.multiplier.iter_mut().zip(&self.multiplier).for_each(|(exact, x)| *exact = x.double_double());
+        exact.solve_rows();
+        round(&mut self.multiplier, &exact.multiplier);
+    }
+
+    /// [`Kernel::lift`] with the factors in double-double.
+    #[cold]
+    pub(super) fn lift_exactly(&mut self) {
+        let Some(exact) = &mut self.exact else { return };
+        // What has just been solved for keeps its digits.
+        for (exact, x) in exact.multiplier.iter_mut().zip(&self.multiplier) {
+            if exact.hi != x.value() {
+                *exact = x.double_double();
+            }
+        }
+        exact.lift();
+        round(&mut self.load, &exact.load);
+    }
+
+    /// The least share of a constraint at other coordinates than the last, which knows no masses ([`rank`](super::rank)); and all of [`Kernel::rows_at`].
+    pub fn independence_at(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) -> f64 {
+        self.face::<0>(mechanism, phi);
+        self.rows_at(mechanism, t, phi, omega);
+        match &self.bodywise {
+            Some(bodywise) => bodywise.judge().share(),
+            None => self.metric.judge(&self.jacobian).share(),
+        }
+    }
+
+    /// The largest C of the last evaluation, angles in rad and lengths in sizes of the mechanism.
+    pub fn violation(&self, mechanism: &Mechanism) -> f64 {
+        let size = mechanism.size_of_parts();
+        mechanism.rows.iter().zip(&self.rows).fold(0.0, |most, (row, here)| {
+            let off = here.position.value().abs() / if row.is_angle() { 1.0 } else { size };
+            if off > most || off.is_nan() { off } else { most }
+        })
+    }
+}
+
+/// Rounds numbers.
+fn round<T: Real>(rounded: &mut [T], exact: &[DoubleDouble]) {
+    for (rounded, &exact) in rounded.iter_mut().zip(exact) {
+        *rounded = T::split(exact).0;
+    }
+}

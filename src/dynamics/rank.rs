@@ -1,0 +1,165 @@
+//! The rank of constraints: a property of their Jacobian, whatever the masses are.
+//!
+//! ```text
+//! A = G D Gᵀ = L P Lᵀ,   share of constraint r:  P_r / Σ_k b_rk d_k,   |g_rk|² <= b_rk          D: d_k = 1 / max_r b_rk / max_j (b_rj d_j)
+//! ```
+//!
+//! Pivots of S = G M⁻¹ Gᵀ are small where constraints lose their independence, and where members are light or levers long.  Those of A know no masses, and D takes out
+//! units and lengths: the bounds b of the entries of G are scaled to one, column by column and row by row.  The share is about the square of the
+//! distance from a singular position.  Pivots are taken in the order of S, so that the constraints that A finds dependent are those that have no pivot in S.
+
+use super::Mechanism;
+use super::row::{Measure, Row, Way};
+use super::schur::{DROPPED, Weakest};
+use crate::arithmetic::Real;
+
+/// Rounds of the scaling.
+const ROUNDS: usize = 4;
+/// Pivots of S below this part of those of A owe it to masses and levers: so many digits are lost to them.
+const LOSS: f64 = 1e-3;
+
+/// Squared bounds of a constraint's derivatives by the coordinates; a coordinate may come up more than once.
+pub type Levers = Vec<(usize, f64)>;
+
+/// What the rank of constraints is measured with.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Metric {
+    /// D, a number a column of G.
+    pub columns: Vec<f64>,
+    /// What pivots of A are measured against.
+    pub rows: Vec<f64>,
+    /// Number of constraints that depend on others everywhere.
+    redundant: usize,
+}
+
+/// Which constraints depend on others at one position.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Verdict {
+    /// The least share, in the order of A.
+    weakest: Weakest,
+    /// The least share of those that are kept.
+    kept: f64,
+    /// The dependent ones.
+    pub is_left_out: Vec<bool>,
+}
+
+impl Metric {
+    /// Of constraints with these levers in so many columns.
+    pub fn new(levers: &[Levers], columns: usize, redundant: usize) -> Self {
+        let inverse = |most: f64| if most > 0.0 { 1.0 / most } else { 1.0 };
+        let most = |levers: &Levers, d: &[f64]| levers.iter().fold(0.0, |most: f64, &(k, b)| most.max(b * d[k]));
+        let mut d = vec![1.0; columns];
+        for _ in 0..ROUNDS {
+            let mut largest = vec![0.0_f64; columns];
+            for levers in levers {
+                let e = inverse(most(levers, &d));
+                levers.iter().for_each(|&(k, b)| largest[k] = largest[k].max(e * b));
+            }
+            d = largest.into_iter().map(inverse).collect();
+        }
+        let rows = levers.iter().map(|levers| levers.iter().map(|&(k, b)| b * d[k]).sum()).collect();
+        Self { columns: d, rows, redundant }
+    }
+
+    /// The verdict on constraints with this Jacobian (r × columns).
+    pub fn judge<T: Real>(&self, jacobian: &[T]) -> Verdict {
+        let (r, n) = (self.rows.len(), self.columns.len());
+        let row = |i: usize| &jacobian[i * n..(i + 1) * n];
+        let mut a = vec![0.0; r * r];
+        for i in 0..r {
+            for j in i..r {
+                let products = row(i).iter().zip(row(j)).zip(&self.columns);
+                a[i * r + j] = products.map(|((x, y), d)| x.value() * y.value() * d).sum();
+            }
+        }
+        let mut shares = vec![0.0; r];
+        for k in (0..r).rev() {
+            let pivot = a[k * r + k];
+            shares[k] = pivot / self.rows[k];
+            if is_dependent(shares[k]) {
+                continue;
+            }
+            for i in 0..k {
+                let l = a[i * r + k] / pivot;
+                for j in 0..=i {
+                    a[j * r + i] -= l * a[j * r + k];
+                }
+            }
+        }
+        self.verdict(&shares)
+    }
+
+    /// The verdict on constraints with these shares.
+    pub fn verdict(&self, shares: &[f64]) -> Verdict {
+        let least = |weakest: Weakest, (row, &share): (usize, &f64)| {
+            if share < weakest.share { Weakest { share, row, ..weakest } } else { weakest }
+        };
+        let is_left_out: Vec<bool> = shares.iter().map(|&share| is_dependent(share)).collect();
+        let is_kept = |(row, _): &(usize, &f64)| !is_left_out[*row];
+        let kept = shares.iter().enumerate().filter(is_kept).fold(Weakest::NONE, least);
+        // Constraints that are redundant everywhere say nothing of the position.
+        let is_singular = is_left_out.iter().filter(|&&is_left_out| is_left_out).count() > self.redundant;
+        let weakest = if is_singular { shares.iter().enumerate().fold(Weakest::NONE, least) } else { kept };
+        Verdict { weakest, kept: kept.share, is_left_out }
+    }
+}
+
+/// True of a share that is too small, or no number.
+fn is_dependent(share: f64) -> bool {
+    !(share >= DROPPED)
+}
+
+impl Verdict {
+    /// The least share.
+    pub fn share(&self) -> f64 {
+        self.weakest.share
+    }
+
+    /// The weakest constraint where S has been factored with `mass` as its own; `again` factors it without the constraints that are to be left out and tells the
+    /// least share of a pivot.
+    pub fn settle(&self, mass: Weakest, again: impl FnOnce(&[bool]) -> f64) -> Weakest {
+        let is_right = mass.share >= DROPPED && !self.is_left_out.contains(&true);
+        let share = if is_right { mass.share } else { again(&self.is_left_out) };
+        Weakest { is_delicate: !(share >= LOSS * self.kept), ..self.weakest }
+    }
+}
+
+impl Row {
+    /// Its levers, angles in rad; `size` \[m\] bounds what nothing else does.
+    pub fn levers(&self, size: f64) -> Levers {
+        let square = size * size;
+        if let Some(Way::Span(span, _)) = self.push.as_ref().map(|push| &push.way) {
+            let carried = span.shifts.iter().flat_map(|&(x, share)| [(x, share * share), (x + 1, share * share)]);
+            return span.terms.iter().map(|&(k, gamma)| (k, gamma.norm_squared())).chain(carried).collect();
+        }
+        let place = match &self.measure {
+            Measure::Angle { body, base } => return std::iter::once(*body).chain(*base).map(|k| (k, 1.0)).collect(),
+            Measure::Place(place) => place,
+        };
+        let mut levers = Levers::new();
+        for &(k, g) in &place.linear {
+            match k < place.angles {
+                true => levers.push((k, g.norm_squared())),
+                false => levers.extend([(k, g.re * g.re), (k + 1, g.im * g.im)]),
+            }
+        }
+        for &(j, k, h) in &place.bilinear {
+            let h = h.norm_squared();
+            for (one, other) in [(j, k), (k, j)] {
+                let bound = if other < place.angles { h } else { h * square };
+                levers.push((one, bound));
+                levers.extend((one >= place.angles).then_some((one + 1, bound)));
+            }
+        }
+        levers
+    }
+}
+
+impl Mechanism {
+    /// What the rank of its constraints is measured with.
+    pub fn rank_metric(&self) -> Metric {
+        let size = self.size_of_parts();
+        let levers: Vec<Levers> = self.rows.iter().map(|row| row.levers(size)).collect();
+        Metric::new(&levers, self.coordinates(), self.assembly.redundant.len())
+    }
+}
