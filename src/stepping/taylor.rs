@@ -42,6 +42,7 @@ mod wide;
 pub use self::crowd::Crowd;
 use self::expansion::Expansion;
 use self::fast::Fast;
+use self::jump::Leap;
 use super::search::{self, Crossing, Powers};
 use super::{Cause, Method, Reached, StepError, Tally, Tolerance, Watch};
 use crate::arithmetic::DoubleDouble;
@@ -85,8 +86,8 @@ pub struct Taylor<T> {
     expansion: Option<Expansion<T>>,
     /// True where the last step was made by the expansion.
     by_series: bool,
-    /// Where singular positions are looked for.
-    ahead: Option<dynamics::kernel::Kernel<f64>>,
+    /// What leaps through singular positions are looked for with.
+    leap: Option<Leap<T>>,
     powers: Vec<f64>,
     gaps: Vec<f64>,
     inside: State,
@@ -104,7 +105,7 @@ impl<T: Coefficient> Taylor<T> {
             fast: None,
             expansion: None,
             by_series: true,
-            ahead: None,
+            leap: None,
             powers: Vec::new(),
             gaps: Vec::new(),
             inside: State::default(),
@@ -250,6 +251,7 @@ impl<T: Coefficient> Taylor<T> {
             self.expansion = None;
         } else if !self.expansion.as_ref().is_some_and(|expansion| expansion.is_for(mechanism, coordinates, order, extended)) {
             self.expansion = Some(Expansion::new(mechanism, coordinates, order, extended));
+            self.leap = None;
         }
         Ok(())
     }
@@ -260,11 +262,17 @@ impl<T: Coefficient> Taylor<T> {
         expansion.expand(problem.mechanism(), state);
         // What a wall sees of the motion are the unit vectors.
         let mut wanted = expansion.wanted(self.tolerance, problem.events() > 0);
-        if !problem.mechanism().rows.is_empty()
-            && let Some(through) = jump::length(problem, expansion, &mut self.ahead, state, wanted)
-        {
-            wanted = through;
-            expansion.sum_to_smallest(through.min(left));
+        if !problem.mechanism().rows.is_empty() && jump::is_near(problem, expansion) {
+            let leap = self.leap.get_or_insert_with(|| Leap::new(problem.mechanism(), problem.coordinates(), expansion));
+            if let Some(through) = leap.length(problem, expansion, state, wanted) {
+                let whole = through.min(left);
+                expansion.sum_to_smallest(whole);
+                if leap.is_confirmed(problem, expansion, state, whole, self.tolerance) {
+                    wanted = through;
+                } else {
+                    expansion.sum_all();
+                }
+            }
         }
         (wanted, if wanted.is_nan() { 0.0 } else { pace::taken(wanted, left) })
     }

@@ -1,16 +1,20 @@
-//! Singular positions: where all links lie in line the rows lose their independence, and a step must not end near it.
+//! Singular positions: where all links lie in line the constraints lose their independence, and a step must not end near it.
 //!
 //! Off the constraints the equations have a pole at the distance d of the singular position, and rounding off the constraints grows as 1/d: a step size rule
 //! that heeds the pole ends ever closer to it, until noise sends the motion out on another branch, smoothly.  So a step that begins near such
-//! a position goes through: the share of the weakest row ([`schur`](crate::dynamics::schur)) is followed along the low powers of the series to its
-//! minimum and on to where it is what it was, and the step ends there.  The series itself is that of a smooth motion; its late powers are
+//! a position goes through: the share of the weakest constraint ([`rank`](crate::dynamics::rank)), which knows no masses, is followed along the low powers of the
+//! series to its minimum and on to where it is what it was, and the step ends there.  The series itself is that of a smooth motion; its late powers are
 //! noise times d^-k, so that it is summed to its smallest power only.
+//!
+//! Such a step is longer than the powers allow by themselves, so it is made only where it is confirmed: at its end the constraints and the energy balance hold, and
+//! the series about its end leads back to its start.  Else the step is as any, and what the projection finds at its end is told.
 
 use super::expansion::Expansion;
+use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::schur::NEAR;
 use crate::dynamics::series::Coefficient;
-use crate::dynamics::{Coordinates, Form, State};
+use crate::dynamics::{Coordinates, Form, Mechanism, State};
 
 /// Powers the way through is looked for with.
 const LOW: usize = 8;
@@ -21,46 +25,98 @@ const LONGEST: f64 = 12.0;
 const FALL: f64 = 0.1;
 /// Largest share of the motion that the smallest power in such a step may have.
 const NOISE: f64 = 1e-6;
+/// Largest difference between the start and where the way back leads, over the tolerance; and the limits of that \[rad\]: a leap a little off is better than steps that end
+/// at the singular position, and none is worth more than this.
+const ASTRAY: f64 = 1e3;
+const LIMITS: [f64; 2] = [1e-6, 1e-4];
 
-/// How long a step must be to go through a singular position and come out as far from it as it is now; `None` where there is none ahead.
-pub fn length<T: Coefficient, P: Form + ?Sized>(
-    problem: &P,
-    expansion: &Expansion<T>,
-    kernel: &mut Option<Kernel<f64>>,
-    state: &State,
-    wanted: f64,
-) -> Option<f64> {
-    let here = expansion.series().weakest().share;
-    if here >= NEAR || problem.coordinates() != Coordinates::All {
-        return None;
+/// What leaps are looked for and confirmed with.
+#[derive(Clone, Debug)]
+pub struct Leap<T> {
+    kernel: Kernel<f64>,
+    /// The series about a leap's end.
+    back: Expansion<T>,
+    end: State,
+}
+
+impl<T: Coefficient> Leap<T> {
+    /// For the problem an expansion is of.
+    pub fn new(mechanism: &Mechanism, coordinates: Coordinates, expansion: &Expansion<T>) -> Self {
+        let back = Expansion::new(mechanism, coordinates, expansion.series().order(), false);
+        Self { kernel: Kernel::new(mechanism), back, end: State::default() }
     }
-    let mechanism = problem.mechanism();
-    let kernel = kernel.get_or_insert_with(|| Kernel::new(mechanism));
-    let (series, n) = (expansion.series(), mechanism.coordinates());
-    let mut phi = vec![0.0; n];
-    let mut share = |h: f64| {
-        for (i, phi) in phi.iter_mut().enumerate() {
-            let rates = (0..LOW.min(series.order())).rev().map(|m| series.rate[m * n + i].value() / (m + 1) as f64);
-            *phi = state.y[i] + h * rates.fold(0.0, |sum, rate| sum * h + rate);
+
+    /// How long a step must be to go through a singular position and come out as far from it as it is now; `None` where there is none ahead.
+    pub fn length<P: Form + ?Sized>(&mut self, problem: &P, expansion: &Expansion<T>, state: &State, wanted: f64) -> Option<f64> {
+        let mechanism = problem.mechanism();
+        let (series, n) = (expansion.series(), mechanism.coordinates());
+        let kernel = &mut self.kernel;
+        let mut phi = vec![0.0; n];
+        let mut share = |h: f64| {
+            for (i, phi) in phi.iter_mut().enumerate() {
+                let rates = (0..LOW.min(series.order())).rev().map(|m| series.rate[m * n + i].value() / (m + 1) as f64);
+                *phi = state.y[i] + h * rates.fold(0.0, |sum, rate| sum * h + rate);
+            }
+            kernel.independence_at(mechanism, state.time, &phi, &state.y[n..2 * n])
+        };
+        let here = share(0.0);
+        // From well inside the step on: what comes back sooner needs no jump.
+        let (mut least, mut fell) = (here, false);
+        for point in 1..=POINTS {
+            let h = LONGEST * wanted * (point as f64 / POINTS as f64);
+            let now = share(h);
+            if now.is_nan() {
+                return None;
+            }
+            if now < least {
+                (least, fell) = (now, true);
+            } else if fell && now >= here {
+                return (h > wanted && least < FALL * here && expansion.smallest(h) < NOISE).then_some(h);
+            } else if !fell && now > here {
+                return None;
+            }
         }
-        kernel.linearise_at::<0>(mechanism, state.time, &phi, &state.y[n..2 * n]);
-        kernel.weakest.share
-    };
-    // From well inside the step on: what comes back sooner needs no jump.
-    let (mut least, mut fell) = (here, false);
-    for point in 1..=POINTS {
-        let h = LONGEST * wanted * (point as f64 / POINTS as f64);
-        let now = share(h);
-        if now.is_nan() {
-            return None;
-        }
-        if now < least {
-            (least, fell) = (now, true);
-        } else if fell && now >= here {
-            return (h > wanted && least < FALL * here && expansion.smallest(h) < NOISE).then_some(h);
-        } else if !fell && now > here {
-            return None;
-        }
+        None
     }
-    None
+
+    /// True where a step of `h` \[s\], as it is summed, keeps the constraints and the energy balance, and the series about its end leads back.
+    pub fn is_confirmed<P: Form + ?Sized>(&mut self, problem: &P, expansion: &Expansion<T>, state: &State, h: f64, tolerance: f64) -> bool {
+        let Self { kernel, back, end } = self;
+        let mechanism = problem.mechanism();
+        let n = mechanism.coordinates();
+        let limit = (ASTRAY * tolerance).clamp(LIMITS[0], LIMITS[1]);
+        end.clone_from(state);
+        expansion.go(end, DoubleDouble::from(h));
+        end.time = state.time + h;
+        end.wrap();
+        let balance = |kernel: &mut Kernel<f64>, state: &State| {
+            kernel.face::<0>(mechanism, &state.y[..n]);
+            let energy = mechanism.energy_facing::<f64, 0>(kernel, &state.y[..n], &state.y[n..2 * n]).total();
+            energy - state.y.get(2 * n).copied().unwrap_or(0.0)
+        };
+        let lost = balance(kernel, end) - balance(kernel, state);
+        let is_energy_kept = lost.abs() <= limit * mechanism.energy_scale;
+        let off = kernel.independence_at(mechanism, end.time, &end.y[..n], &end.y[n..2 * n]);
+        let is_kept = off.is_finite() && kernel.violation(mechanism) <= limit;
+        if !(is_energy_kept && is_kept) {
+            return false;
+        }
+        back.expand(mechanism, end);
+        back.sum_to_smallest(h);
+        let mut start = end.clone();
+        back.go(&mut start, DoubleDouble::from(-h));
+        let fastest = state.y[n..2 * n].iter().fold(1.0, |most: f64, rate| most.max(rate.abs()));
+        (0..2 * n).all(|i| {
+            let size = if i < n { 1.0 } else { fastest };
+            let off = (start.unknown(i) - state.unknown(i)).hi;
+            // A turn may lie between the two.
+            let off = if i < mechanism.bodies.len() { libm::remainder(off, std::f64::consts::TAU) } else { off };
+            off.abs() <= limit * size
+        })
+    }
+}
+
+/// True where a singular position may be ahead.
+pub fn is_near<T: Coefficient, P: Form + ?Sized>(problem: &P, expansion: &Expansion<T>) -> bool {
+    expansion.series().weakest().share < NEAR && problem.coordinates() == Coordinates::All
 }
