@@ -77,7 +77,7 @@ where
                 t: state.time.hi,
                 step: 0.0,
                 what: format!("projection leaves {left:.1e} of constraint {row}"),
-                hint: "tighten the tolerance, or check that no motors work against each other".into(),
+                hint: hint(problem.mechanism(), &projector.kernel, name).into(),
             })?;
             let was_near = std::mem::replace(near, landing.is_near);
             let last = balance.replace(landing.balance);
@@ -94,12 +94,7 @@ where
                     what: format!(
                         "energy changed by {lost:.1e} of its scale where constraint {row} loses its hold: the motion left its branch"
                     ),
-                    hint: if name == "taylor" {
-                        "try --method dp8, or another tolerance"
-                    } else {
-                        "try --method taylor, or another tolerance"
-                    }
-                    .into(),
+                    hint: past_singular(name).into(),
                 });
             }
             Ok(match watch(problem, state)? {
@@ -146,6 +141,26 @@ where
             // The violation left is on record in the constraints' drift.
             let _ = projector.project(problem.mechanism(), inside, self.tolerance);
         }
+    }
+}
+
+/// What to try where constraints cannot be met.
+fn hint(mechanism: &Mechanism, kernel: &Kernel<f64>, method: &str) -> &'static str {
+    if kernel.weakest.share < NEAR {
+        past_singular(method)
+    } else if mechanism.rows.iter().filter(|row| row.is_motor()).count() > 1 {
+        "tighten the tolerance, or check that no motors work against each other"
+    } else {
+        "tighten the tolerance, and look for masses or lengths far out of proportion"
+    }
+}
+
+/// What to try where a singular position has not been passed.
+fn past_singular(method: &str) -> &'static str {
+    if method == "taylor" {
+        "this position is singular: try another tolerance, --method dp8, or a start that does not lead through it"
+    } else {
+        "this position is singular: try --method taylor, or another tolerance"
     }
 }
 
