@@ -174,6 +174,10 @@ impl<T: Coefficient, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
                 return Err(stop(Cause::NotFinite, state, 0.0, format!("the series of {lost} is not finite"), hint));
             }
             if wanted < super::finest(state) {
+                if self.by_series && self.expansion.as_ref().is_some_and(|expansion| jump::is_near(problem, expansion)) {
+                    let what = "the constraints are dependent here, and no way through the singular position is confirmed".into();
+                    return Err(stop(Cause::BranchLost, state, wanted, what, jump::HINT));
+                }
                 return Err(stop(Cause::StepTooSmall, state, wanted, "the series converges in ever smaller circles".into(), hint));
             }
             let mut event = None;

@@ -30,6 +30,9 @@ const NOISE: f64 = 1e-6;
 const ASTRAY: f64 = 1e3;
 const LIMITS: [f64; 2] = [1e-6, 1e-4];
 
+/// What to try where there is no way through.
+pub const HINT: &str = "try another tolerance, --method dp8, or a start that does not lead through it";
+
 /// What leaps are looked for and confirmed with.
 #[derive(Clone, Debug)]
 pub struct Leap<T> {
