@@ -3,21 +3,30 @@
 
 #[path = "common/audit.rs"]
 mod audit;
+#[path = "common/extremes.rs"]
+mod extremes;
+#[path = "common/mechanisms/mod.rs"]
+mod mechanisms;
 #[path = "common/program.rs"]
 #[allow(dead_code)]
 mod program;
 #[path = "common/random.rs"]
 mod random;
+#[path = "common/relations.rs"]
+mod relations;
 #[path = "common/targets.rs"]
 mod targets;
 
 use driftless::run::Request;
+use driftless::run::trust::Level;
 use program::Program;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use random::Draw;
 use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+use std::time::{Duration, Instant};
 use targets::{Ending, TARGETS};
 
 /// Executions of each target where nobody says how many.
@@ -84,31 +93,26 @@ fn no_physics_makes_a_wrong_success() {
     run("physics");
 }
 
+/// Evaluations allowed to a run of an extreme scene.
+const EFFORT: u64 = 20_000;
+
 /// Random scenes with numbers far out, by every method, with an effort of `EFFORT` evaluations: each ends with exit code 0, 3, 4 or 5, every success stands up to
-/// an independent audit of its energy and its joints, and the program says the same of a part of them.  `.ci/extremes N SEED` has more.
+/// an independent audit of its first row, its energy and its joints, and the program says the same of a part of them; a part is swept, with a look-out for bars that
+/// turn over, and a part has its error estimated.  `.ci/extremes N SEED` has more; scenes that fail go to the folder that `FOUND` names.
 #[test]
 fn random_extreme_scenes_end_as_promised() {
-    const EFFORT: u64 = 20_000;
     let number = |name: &str, usual: u64| std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(usual);
     let (count, seed) = (number("EXTREMES", 600), number("SEED", 1));
     let program = Program::new();
-    let mut endings: BTreeMap<Ending, u64> = BTreeMap::new();
-    let (mut shown, mut failures) = (0, Vec::new());
+    let mut seen = Seen::default();
     for index in 0..count {
-        let bytes = bytes_of(seed.wrapping_mul(0x1_0000_0001).wrapping_add(index));
+        let own = seed.wrapping_mul(0x1_0000_0001).wrapping_add(index);
+        let bytes = bytes_of(own);
         let mut draw = Draw::new(&bytes);
-        let text = random::scene(&mut draw);
-        let simulated = std::panic::catch_unwind(|| {
-            let mut draw = draw.clone();
-            targets::simulate(&text, &mut draw, EFFORT)
-        });
-        let Ok(ending) = simulated else {
-            failures.push(format!("scene {index} of seed {seed}: {text}"));
-            continue;
-        };
-        *endings.entry(ending).or_default() += 1;
-        if index % 100 == 0 {
-            shown += 1;
+        let text = if index % 2 == 0 { random::scene(&mut draw) } else { in_extreme_units(own, &mut draw) };
+        let Some(ending) = seen.run(index, &text, &draw) else { continue };
+        if index % 100 < 2 {
+            seen.shown += 1;
             program.write("random.json", &text);
             let until = serde_json::from_str::<serde_json::Value>(&text).expect("JSON")["until"].as_f64().expect("a horizon");
             let options = options(&random::request(&mut draw, until, EFFORT));
@@ -126,9 +130,98 @@ fn random_extreme_scenes_end_as_promised() {
             );
         }
     }
-    println!("{count} random scenes, {shown} of them by the program too: {endings:?}");
+    seen.tell(count);
+    let Seen { failures, endings, .. } = seen;
     assert!(failures.is_empty(), "{} failures, of which\n{}", failures.len(), failures[..failures.len().min(5)].join("\n"));
     assert!(count < 100 || [Ending::Done, Ending::Refused].iter().all(|ending| endings.get(ending).is_some_and(|&some| some > count / 20)));
+}
+
+/// A scene that is consistent, in units far from the usual ones.
+fn in_extreme_units(seed: u64, draw: &mut Draw) -> String {
+    let made = mechanisms::scene(seed);
+    let units = [0, 1, 2].map(|_| *draw.one(&[1e-9, 1e-6, 1e-3, 1.0, 1.0, 1.0, 1e3, 1e6, 1e9]));
+    match extremes::parsed(&made.text) {
+        Some(scene) => relations::scaled(&scene, units).scene.to_input().to_string(),
+        None => made.text,
+    }
+}
+
+/// What came of all scenes.
+#[derive(Default)]
+struct Seen {
+    endings: BTreeMap<Ending, u64>,
+    /// Scenes of each kind, and how many of them ran to their end.
+    kinds: BTreeMap<&'static str, [u64; 2]>,
+    swept: [u64; 4],
+    /// Runs whose error was asked for, and for which it was given.
+    trusted: [u64; 2],
+    slowest: (Duration, u64),
+    shown: u64,
+    failures: Vec<String>,
+}
+
+impl Seen {
+    /// A scene through a run, and at times a sweep and an estimate; nothing where one of them panics.
+    fn run(&mut self, index: u64, text: &str, draw: &Draw) -> Option<Ending> {
+        let begin = Instant::now();
+        let ending = self.caught(index, text, "run", || targets::simulate(text, &mut draw.clone(), EFFORT))?;
+        *self.endings.entry(ending).or_default() += 1;
+        if let Some(scene) = extremes::parsed(text) {
+            for kind in extremes::kinds(&scene) {
+                let counts = self.kinds.entry(kind).or_default();
+                *counts = [counts[0] + 1, counts[1] + u64::from(ending == Ending::Done)];
+            }
+            if matches!(index % 12, 2 | 3 | 5) && ending != Ending::Refused {
+                let swept = self.caught(index, text, "sweep", || extremes::sweep_of(text, &scene, &mut draw.clone(), EFFORT / 4))?;
+                let of_all = [swept.points, swept.done, swept.flipped, swept.compared];
+                self.swept.iter_mut().zip(of_all).for_each(|(sum, own)| *sum += own);
+            }
+            if matches!(index % 12, 6 | 7 | 9) && ending != Ending::Refused {
+                let request = random::request(&mut draw.clone(), scene.until, EFFORT);
+                // What it costs is bounded by the run's work.
+                let level = if index % 4 == 3 { Level::Full } else { Level::Auto };
+                let given = self.caught(index, text, "trust", || extremes::trust_of(&scene, &request, level))?;
+                self.trusted = [self.trusted[0] + u64::from(given.is_some()), self.trusted[1] + u64::from(given == Some(true))];
+            }
+        }
+        self.slowest = self.slowest.max((begin.elapsed(), index));
+        Some(ending)
+    }
+
+    /// What comes of it, unless it panics, which is a failure.
+    fn caught<T>(&mut self, index: u64, text: &str, what: &str, work: impl FnOnce() -> T) -> Option<T> {
+        if let Some(folder) = std::env::var_os("FOUND") {
+            // What never comes back is found here.
+            std::fs::write(Path::new(&folder).join("current.json"), format!("{index} {what} {text}\n")).expect("a folder");
+        }
+        match catch_unwind(AssertUnwindSafe(work)) {
+            Ok(found) => Some(found),
+            Err(panic) => {
+                let said = panic.downcast_ref::<String>().cloned().or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned()));
+                let said = said.unwrap_or_default();
+                if let Some(folder) = std::env::var_os("FOUND") {
+                    let scene: serde_json::Value = serde_json::from_str(text).expect("JSON");
+                    let found = serde_json::json!({"command": what, "what": said, "scene": scene});
+                    std::fs::write(Path::new(&folder).join(format!("{what}-{index}.json")), format!("{found:#}\n")).expect("a folder");
+                }
+                self.failures.push(format!("{what} of scene {index}: {said}\n  {text}"));
+                None
+            }
+        }
+    }
+
+    fn tell(&self, count: u64) {
+        let Self { endings, kinds, swept, trusted, slowest, shown, .. } = self;
+        println!("{count} random scenes, {shown} of them by the program too: {endings:?}");
+        println!(
+            "{} points swept, {} done, {} with a bar that turns over, {} compared with the rows of a run",
+            swept[0], swept[1], swept[2], swept[3]
+        );
+        println!("{} runs with an estimate asked for, {} with one given; slowest scene {slowest:?}", trusted[0], trusted[1]);
+        for (kind, [met, done]) in kinds {
+            println!("  {kind:28} {met:6} scenes, {done:6} ran to their end");
+        }
+    }
 }
 
 /// Bytes of a seed (SplitMix64).

@@ -2,7 +2,7 @@
 
 use driftless::dynamics::Mechanism;
 use driftless::run::{Outcome, Sample};
-use driftless::scene::{Law, Place, Scene, Sine};
+use driftless::scene::{Given, Law, Place, Scene, Sine, Slider};
 
 /// What the program promises of a success without stated limits, with a little room for the rounding of this audit.
 const ENERGY: f64 = 1.1e-2;
@@ -11,6 +11,13 @@ const POSITION: f64 = 1.1e-2;
 fn law(law: &Law, t: f64) -> f64 {
     let sines: f64 = law.sines.iter().map(|sine| sine.amplitude * (sine.frequency * t + sine.phase).sin()).sum();
     law.start + law.rate * t + 0.5 * law.acceleration * t * t + sines
+}
+
+/// The sizes that a law's value is a sum of.
+fn sizes(law: &Law, t: f64) -> f64 {
+    let of_sine = |sine: &Sine| sine.amplitude.abs() * (1.0 + (sine.frequency * t).abs() + sine.phase.abs());
+    let sines: f64 = law.sines.iter().map(of_sine).sum();
+    law.start.abs() + sines + (law.rate * t).abs() + (law.acceleration * t * t).abs()
 }
 
 fn length(x: [f64; 2]) -> f64 {
@@ -46,7 +53,7 @@ impl Auditor<'_> {
                 terms += (bar.mass * scene.gravity[i] * sample.centre[k][i]).abs();
             }
         }
-        for spring in &scene.springs {
+        for spring in scene.springs.iter().filter(|spring| !spring.rigid) {
             let [a, b] = [0, 1].map(|end| self.at(&spring.between[end], sample));
             let stretch = length([b[0] - a[0], b[1] - a[1]]) - spring.free_length;
             let own = 0.5 * spring.stiffness * stretch * stretch;
@@ -87,25 +94,70 @@ impl Auditor<'_> {
         scene.hinges.iter().for_each(|hinge| see(gap(&hinge.between), &hinge.name));
         scene.welds.iter().for_each(|weld| see(gap(&weld.between), &weld.name));
         for slider in &scene.sliders {
-            let (point, foot) = (self.at(&slider.point, sample), self.at(&slider.rail.place, sample));
-            let (sin, cos) = slider.rail.place.bar.map_or(0.0, |k| sample.phi[k]).sin_cos();
-            let [x, y] = slider.rail.direction;
-            let along = [cos * x - sin * y, sin * x + cos * y];
-            let off = (along[0] * (point[1] - foot[1]) - along[1] * (point[0] - foot[0])).abs() / length(along);
-            see((off - rest).max(0.0) / self.size, &slider.name);
+            let [_, off] = self.on_rail(slider, sample);
+            see((off.abs() - rest).max(0.0) / self.size, &slider.name);
+        }
+        for drive in &scene.drives {
+            let [travel, _] = self.on_rail(&scene.sliders[drive.slider], sample);
+            let off = (travel - law(&drive.law, sample.t)).abs() - rest - 1e-14 * sizes(&drive.law, sample.t);
+            see(off.max(0.0) / self.size, &drive.name);
+        }
+        // A rod that vibrates has its length on average, which the energy of its start tells; one that does not has it always.
+        for rod in scene.springs.iter().filter(|spring| spring.rigid) {
+            let [a, b] = [0, 1].map(|end| self.at(&rod.between[end], sample));
+            let off = (length([b[0] - a[0], b[1] - a[1]]) - rod.free_length).abs();
+            see((off - rest).max(0.0) / self.size, &rod.name);
         }
         for motor in &scene.motors {
             let from = motor.relative_to.map_or(0.0, |k| sample.phi[k]);
-            let asked = law(&motor.law, sample.t);
-            let of_sine = |sine: &Sine| sine.amplitude.abs() * (1.0 + (sine.frequency * sample.t).abs() + sine.phase.abs());
-            let sizes = asked.abs()
-                + from.abs()
-                + motor.law.sines.iter().map(of_sine).sum::<f64>()
-                + (motor.law.rate * sample.t).abs()
-                + (motor.law.acceleration * sample.t * sample.t).abs();
-            see(((sample.phi[motor.bar] - from - asked).abs() - 1e-14 * sizes).max(0.0), &motor.name);
+            let off = (sample.phi[motor.bar] - from - law(&motor.law, sample.t)).abs();
+            see((off - 1e-14 * (from.abs() + sizes(&motor.law, sample.t))).max(0.0), &motor.name);
+        }
+        for lock in &scene.locks {
+            let Some(angle) = lock.angle else { continue };
+            let from = lock.relative_to.map_or(0.0, |k| sample.phi[k]);
+            let off = (sample.phi[lock.bar] - from - angle).abs();
+            see((off - 1e-14 * (from.abs() + angle.abs())).max(0.0), &lock.name);
+        }
+        for wall in &scene.walls {
+            let point = self.at(&Place { bar: Some(wall.bar), point: wall.point }, sample);
+            let gap = (point[0] - wall.through[0]) * wall.normal[0] + (point[1] - wall.through[1]) * wall.normal[1];
+            see((-gap - rest - 1e-14 * length(wall.through)).max(0.0) / self.size, &wall.name);
         }
         worst
+    }
+
+    /// Travel of a slider along its rail, and how far it is off \[m\].
+    fn on_rail(&self, slider: &Slider, sample: &Sample) -> [f64; 2] {
+        let (point, foot) = (self.at(&slider.point, sample), self.at(&slider.rail.place, sample));
+        let (sin, cos) = slider.rail.place.bar.map_or(0.0, |k| sample.phi[k]).sin_cos();
+        let [x, y] = slider.rail.direction;
+        let along = [cos * x - sin * y, sin * x + cos * y].map(|part| part / length([x, y]));
+        let span = [point[0] - foot[0], point[1] - foot[1]];
+        [along[0] * span[0] + along[1] * span[1], along[0] * span[1] - along[1] * span[0]]
+    }
+
+    /// What the first row says otherwise than the scene, of whose start nothing had to be changed; `struck` where impacts changed its rates.
+    fn start(&self, first: &Sample, struck: bool) -> Option<String> {
+        let scene = self.scene;
+        let differ = |a: f64, b: f64, size: f64| (a - b).abs() > 1e-10 * (size + a.abs() + b.abs()) || a.is_nan();
+        for (k, bar) in scene.bars.iter().enumerate() {
+            let given = scene.given.get(k).copied().unwrap_or(Given::ANGLE_AND_RATE);
+            let (start, name) = (scene.start[k], &bar.name);
+            if given.phi && differ(first.phi[k], start.phi, 1.0) {
+                return Some(format!("the first row has {name} at {} rad, the scene at {} rad", first.phi[k], start.phi));
+            }
+            let fastest = scene.start.iter().fold(0.0, |most: f64, start| most.max(start.omega.abs()));
+            if given.omega && !struck && differ(first.omega[k], start.omega, fastest) {
+                return Some(format!("the first row has {name} at {} rad/s, the scene at {} rad/s", first.omega[k], start.omega));
+            }
+            let at = self.at(&Place { bar: Some(k), point: [0.0, 0.0] }, first);
+            let turned = self.size * (1.0 + 1e-5 * first.phi[k].abs());
+            if let Some(origin) = given.origin.filter(|origin| (0..2).any(|i| differ(at[i], origin[i], turned + length(*origin)))) {
+                return Some(format!("the first row has the origin of {name} at {at:?} m, the scene at {origin:?} m"));
+            }
+        }
+        None
     }
 }
 
@@ -123,11 +175,16 @@ pub fn audit(scene: &Scene, mechanism: &Mechanism, samples: &[Sample], outcome: 
         return Err("rows are missing, or hold what is no number".into());
     }
     let arms = scene.hinges.iter().map(|hinge| &hinge.between).chain(scene.welds.iter().map(|weld| &weld.between)).flatten();
-    let places =
-        arms.chain(scene.springs.iter().flat_map(|spring| &spring.between)).chain(scene.sliders.iter().map(|slider| &slider.point));
+    let places = (arms.chain(scene.springs.iter().flat_map(|spring| &spring.between)))
+        .chain(scene.sliders.iter().flat_map(|slider| [&slider.point, &slider.rail.place]));
     let size =
         places.map(|place| length(place.point)).chain(scene.bars.iter().map(|bar| bar.length.max(length(bar.centre)))).fold(0.0, f64::max);
     let auditor = Auditor { scene, size: if size > 0.0 { size } else { 1.0 } };
+    let struck = outcome.strike_count + outcome.hold_count > 0;
+    let is_changed = !mechanism.assembly.changes.is_empty();
+    if let Some(fault) = auditor.start(first, struck).filter(|_| !is_changed) {
+        return Err(fault);
+    }
     let (kinetic, potential, _) = auditor.energy(first);
     let begun = kinetic + potential;
     let mut largest = mechanism.energy_scale;
@@ -142,7 +199,8 @@ pub fn audit(scene: &Scene, mechanism: &Mechanism, samples: &[Sample], outcome: 
         } else {
             !(off <= room && -off <= room + outcome.strike_loss.abs())
         };
-        if is_off && terms.is_finite() {
+        // What a rod's vibration holds is no energy of the places of bodies.
+        if is_off && terms.is_finite() && mechanism.vibration.is_none() {
             return Err(format!("the energy is off by {off:e} J of {largest:e} J at t = {} s", sample.t));
         }
         let (worst, name) = auditor.joints(sample);

@@ -160,19 +160,34 @@ pub fn scene(draw: &mut Draw) -> String {
         }
     };
     let body = |draw: &mut Draw| format!("bar{}", draw.below(n));
+    let relative = |draw: &mut Draw, made: &mut Value, percent: usize| {
+        if draw.chance(percent) {
+            made["relative_to"] = json!([body(draw), body(draw), "ground".into()][draw.below(3)]);
+        }
+    };
     let ends = |draw: &mut Draw| {
         let bars = [[None, Some(draw.below(n))][draw.below(2)], Some(draw.below(n))];
         bars.map(|bar| place(draw, spread, bar, bar.map_or(length, |bar| lengths[bar])))
     };
     let stiffness = mass * pull / length;
     some("springs", 25, draw, &mut |draw| {
-        let damping = if draw.chance(30) { spread.size(draw, mass * rate) } else { 0.0 };
-        let (stiffness, free) = (spread.size(draw, 5.0 * stiffness), spread.size(draw, length));
-        json!({"between": ends(draw), "stiffness": stiffness, "free_length": free, "damping": damping})
+        let is_rigid = draw.chance(12);
+        let damping = if !is_rigid && draw.chance(30) { spread.size(draw, mass * rate) } else { 0.0 };
+        let is_damper = damping > 0.0 && draw.chance(20);
+        let stiffness = if is_damper { 0.0 } else { spread.size(draw, if is_rigid { 1e6 } else { 5.0 } * stiffness) };
+        let free = if !is_rigid && draw.chance(15) { 0.0 } else { spread.size(draw, length) };
+        let mut made = json!({"between": ends(draw), "stiffness": stiffness, "free_length": free, "damping": damping});
+        if is_rigid {
+            made["model"] = json!("rigid");
+        }
+        made
     });
     some("torsion_springs", 15, draw, &mut |draw| {
         let damping = if draw.chance(30) { spread.size(draw, mass * length * length * rate) } else { 0.0 };
-        json!({"body": body(draw), "stiffness": spread.size(draw, stiffness * length * length), "free_angle": angle(draw), "damping": damping})
+        let stiffness = spread.size(draw, stiffness * length * length);
+        let mut made = json!({"body": body(draw), "stiffness": stiffness, "free_angle": angle(draw), "damping": damping});
+        relative(draw, &mut made, 40);
+        made
     });
     some("forces", 10, draw, &mut |draw| {
         let force = [spread.signed(draw, mass * pull), spread.signed(draw, mass * pull)];
@@ -185,31 +200,49 @@ pub fn scene(draw: &mut Draw) -> String {
     });
     some("torques", 10, draw, &mut |draw| {
         let mut made = json!({"body": body(draw), "torque": spread.signed(draw, mass * pull * length)});
+        relative(draw, &mut made, 40);
         if draw.chance(40) {
             made["law"] = law(draw, spread, rate);
         }
         made
     });
-    some("sliders", 10, draw, &mut |draw| {
-        let [_, point] = ends(draw);
-        let rail = json!({"body": "ground", "point": [0, spread.signed(draw, length)], "direction": [1, draw.below(2)]});
+    some("sliders", 12, draw, &mut |draw| {
+        let [place, point] = ends(draw);
+        let mut rail = json!({"body": "ground", "point": [0, spread.signed(draw, length)], "direction": [1, draw.below(2)]});
+        if draw.chance(40) {
+            rail["body"] = place["body"].clone();
+            rail["point"] = place["point"].clone();
+        }
         json!({"point": point, "rail": rail, "angle": *draw.one(&["free", "free", "locked"])})
     });
     some("welds", 3, draw, &mut |draw| json!({"between": ends(draw)}));
-    some("locks", 4, draw, &mut |draw| json!({"body": body(draw)}));
+    some("locks", 5, draw, &mut |draw| {
+        let mut made = json!({"body": body(draw)});
+        if draw.chance(30) {
+            made["angle"] = json!(angle(draw));
+        }
+        relative(draw, &mut made, 50);
+        made
+    });
     some("walls", 12, draw, &mut |draw| {
         let line = json!({"through": [0, -spread.size(draw, length)], "normal": [draw.below(2), 1]});
         json!({"body": body(draw), "point": [length, 0], "line": line, "restitution": *draw.one(&[0.0, 0.3, 0.5, 0.9, 1.0])})
     });
-    let mut driven = Vec::new();
+    let (mut driven, mut motors) = (Vec::new(), Vec::new());
     if draw.chance(25) {
         let k = draw.below(n);
         driven.push(k);
         let mut motor = json!({"name": "motor", "body": format!("bar{k}"), "law": law(draw, spread, rate)});
-        if draw.chance(15) && k > 0 {
-            motor["relative_to"] = json!("bar0");
-        }
-        scene.insert("motors".into(), json!([motor]));
+        relative(draw, &mut motor, 20);
+        motors.push(motor);
+    }
+    if scene.contains_key("sliders") && draw.chance(50) {
+        let mut law = law(draw, spread, rate * length);
+        law["start"] = json!(spread.signed(draw, length));
+        motors.push(json!({"name": "drive", "slider": "sliders0", "law": law}));
+    }
+    if !motors.is_empty() {
+        scene.insert("motors".into(), json!(motors));
     }
     let mut start = Map::new();
     for k in (0..n).filter(|k| !driven.contains(k)) {
