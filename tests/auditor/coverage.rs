@@ -1,7 +1,7 @@
 //! The table of what was compared with what, so that a blind spot shows.
 
 use super::mechanisms::Kind;
-use super::pairs::Summary;
+use super::pairs::{Summary, total_of};
 use driftless::run::METHODS;
 use std::fmt::Write;
 
@@ -16,8 +16,8 @@ impl Summary {
             self.with_walls,
             self.agreeing,
             self.differing.len(),
-            self.reported.values().sum::<usize>(),
-            self.unclear.values().sum::<usize>()
+            total_of(&self.reported),
+            total_of(&self.unclear)
         );
         let at = |kind: Kind, method: &'static str| self.methods.get(&(kind, method)).copied().unwrap_or(0);
         let names: Vec<&'static str> = METHODS.iter().map(|info| info.name).collect();

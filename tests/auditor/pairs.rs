@@ -119,8 +119,9 @@ pub struct Summary {
     pub total: usize,
     pub agreeing: usize,
     pub with_walls: usize,
-    pub reported: BTreeMap<String, usize>,
-    pub unclear: BTreeMap<String, usize>,
+    pub reported: BTreeMap<String, (usize, u64)>,
+    /// Counts, and the first scene of each.
+    pub unclear: BTreeMap<String, (usize, u64)>,
     pub differing: Vec<(u64, Request, Vec<Difference>)>,
     /// Compared pairs of two kinds, and of a kind with a method.
     pub kinds: BTreeMap<(Kind, Kind), usize>,
@@ -147,8 +148,8 @@ impl Summary {
             }
             match verdict {
                 Verdict::Agrees(_) => summary.agreeing += 1,
-                Verdict::Reported(how) => *summary.reported.entry(how).or_default() += 1,
-                Verdict::Unclear(why) => *summary.unclear.entry(digitless(&why)).or_default() += 1,
+                Verdict::Reported(how) => summary.reported.entry(digitless(&how)).or_insert((0, seed)).0 += 1,
+                Verdict::Unclear(why) => summary.unclear.entry(digitless(&why)).or_insert((0, seed)).0 += 1,
                 Verdict::Differs(found) => summary.differing.push((seed, request, found)),
             }
         }
@@ -158,16 +159,15 @@ impl Summary {
     /// Counts on a page.
     pub fn text(&self) -> String {
         let Self { total, agreeing, with_walls, reported, unclear, differing, .. } = self;
-        let sum = |counts: &BTreeMap<String, usize>| counts.values().sum::<usize>();
         let mut text = format!(
             "{total} pairs: {agreeing} agree, {} differ, {} report themselves, {} are unclear; {with_walls} of those compared have walls\n",
             differing.len(),
-            sum(reported),
-            sum(unclear)
+            total_of(reported),
+            total_of(unclear)
         );
         for (title, counts) in [("report themselves", reported), ("unclear", unclear)] {
-            for (why, count) in counts {
-                text += &format!("    {title}: {count:5}  {why}\n");
+            for (why, (count, seed)) in counts {
+                text += &format!("    {title}: {count:5}  {why} (seed {seed})\n");
             }
         }
         for (seed, request, found) in differing {
@@ -178,6 +178,11 @@ impl Summary {
         }
         text
     }
+}
+
+/// All of such counts.
+pub fn total_of(counts: &BTreeMap<String, (usize, u64)>) -> usize {
+    counts.values().map(|(count, _)| count).sum()
 }
 
 /// Numbers in a reason say nothing of its kind.
