@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Methods tried on each scene.
 const METHODS_A_SCENE: usize = 5;
 /// Evaluations of the auditor's after which a scene is left alone.
-const MOST_EVALUATIONS: u64 = 60_000;
+const MOST_EVALUATIONS: u64 = 150_000;
 /// Evaluations a run may take.
 const EFFORT: u64 = 300_000;
 

@@ -55,6 +55,8 @@ pub struct Course<'a> {
     /// Why the motion is not unique from a time on: grazing impacts, two at once.
     pub doubt: Option<(f64, String)>,
     events: usize,
+    /// A step that the polynomial was seen to follow \[s\].
+    span: f64,
 }
 
 enum Event {
@@ -72,6 +74,7 @@ impl<'a> Course<'a> {
             stays: Vec::new(),
             doubt: None,
             events: 0,
+            span: f64::INFINITY,
         };
         for wall in 0..model.scene.walls.len() {
             let gap = model.gap(wall, &course.state);
@@ -92,7 +95,9 @@ impl<'a> Course<'a> {
         while (until - self.state.t).hi > 0.0 {
             let before = self.state.clone();
             let held = self.held.clone();
-            let mut after = self.integrator.step(&before, until - before.t, &held)?;
+            let rest = until - before.t;
+            let most = if rest.hi > 1.2 * self.span { Dd::from(self.span) } else { rest };
+            let mut after = self.integrator.step(&before, most, &held)?;
             if (until - after.t).hi.abs() <= 1e-28 * until.hi.abs() {
                 after.t = until;
             }
@@ -133,6 +138,7 @@ impl<'a> Course<'a> {
         let off = |i: usize, a: Dd, b: Dd| (a - b).hi.abs() / if i % 3 == 2 { 1.0 } else { size };
         let polynomial = arc.at(0.5);
         let worst = (0..before.q.len()).map(|i| off(i, polynomial.q[i], middle.q[i])).fold(0.0, f64::max);
+        self.span = step.hi * (0.7 * (FINE / worst.max(1e-30)).powf(1.0 / 6.0)).clamp(0.3, 2.0);
         if worst > FINE {
             let found = self.first(before, &middle)?;
             return if found.is_some() { Ok(found) } else { self.first(&middle, after) };
@@ -294,8 +300,9 @@ impl<'a> Course<'a> {
             }
             let jump = linear::solve(&model.mass, &rows, &zero, &right);
             let reached = linear::row_times(&gap.row, &jump.x);
+            // No freedom is left for the point to rebound with.
             if jump.is_open[joints] || (reached - right[joints]).hi.abs() > 1e-15 * gap.rate.hi.abs() {
-                return Err(Lost("motors drive a point into its wall".into()));
+                continue;
             }
             let small = 1e-20 * jump.multipliers[joints].hi.abs();
             let presses = jump.multipliers[joints + 1..].iter().all(|eta| eta.hi >= -small);
@@ -319,7 +326,7 @@ impl<'a> Course<'a> {
             debug_assert!(let_go.iter().all(|wall| !self.held.contains(wall)));
             return Ok(());
         }
-        Err(Lost("no set of contacts takes the impact".into()))
+        Err(Lost("no set of contacts leaves a point the freedom to rebound".into()))
     }
 
     /// Decides which touching points stay on their walls.
