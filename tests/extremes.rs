@@ -286,6 +286,14 @@ fn nothing_takes_for_ever() {
     // What nobody bounds is bounded all the same.
     let plan = run(&shipped("free", &[]), &Request { until: Some(1.0), ..Request::default() }).plan;
     assert_eq!(plan.effort, 110_000_000);
+    // And not by the horizon alone: what cannot be reached is said beforehand.
+    let (scene, most) = (shipped("free", &[]), [(MethodId::Dp8, 10_000_000_000), (MethodId::Taylor, 1_000_000_000)]);
+    for (method, effort) in most {
+        let request = Request { until: Some(1e9), every: Some(1e9), method: Some(method), ..Request::default() };
+        let plan = driftless::run::Plan::new(&scene, &compile(&scene), &request).expect("a plan");
+        assert_eq!(plan.effort, effort);
+        assert!(plan.notes.iter().any(|note| note.contains("--effort") && note.contains("may stop")), "{:?}", plan.notes);
+    }
 }
 
 #[test]

@@ -4,8 +4,10 @@ mod common;
 
 use common::spring;
 use driftless::dynamics::Mechanism;
-use driftless::run::{MethodId, Plan, Request, simulate};
-use driftless::scene::{Scene, Spring, Start};
+use driftless::run::trust::Level;
+use driftless::run::{Limits, MethodId, Plan, Request, Run, simulate};
+use driftless::scene::{Given, Scene, Spring, Start};
+use std::sync::Arc;
 
 /// The double pendulum on a spring so many times stiffer than the source's, whose length starts off by what gives it `energy` \[J\].
 fn scene(factor: f64, energy: f64, rigid: bool) -> Scene {
@@ -70,6 +72,101 @@ fn a_spring_that_does_not_vibrate_is_a_rod_to_its_stretch() {
     }
 }
 
+/// Two bars in the plane without gravity, tied by a spring between their ends that starts with `energy` \[J\] of stretch and lengthens at `rate` \[m/s\].
+fn floating(stiffness: f64, energy: f64, rate: f64, model: &str) -> Scene {
+    let unit = |angle: f64| [libm::cos(angle), libm::sin(angle)];
+    let (b, c, along) = (unit(0.8), unit(2.0), unit(0.3));
+    let length = 0.5 + (2.0 * energy / stiffness).sqrt();
+    let origin = [0, 1].map(|i| b[i] + length * along[i] - 0.9 * c[i]);
+    // Bar b turns at 1 rad/s about its resting origin, bar c at -0.5 rad/s.
+    let between = [-0.5 * 0.9 * -c[1] + b[1], -0.5 * 0.9 * c[0] - b[0]];
+    let missing = rate - (between[0] * along[0] + between[1] * along[1]);
+    let text = format!(
+        r#"{{"name": "floating", "gravity": [0, 0],
+        "bars": [{{"name": "b", "mass": 1, "centre": [0.5, 0], "inertia": 0.08, "length": 1}},
+                 {{"name": "c", "mass": 2, "centre": [0.5, 0], "inertia": 0.2, "length": 1}}],
+        "springs": [{{"name": "rod", "between": [{{"body": "b", "point": [1, 0]}}, {{"body": "c", "point": [0.9, 0]}}],
+                     "stiffness": {stiffness:?}, "free_length": 0.5, "model": "{model}"}}],
+        "start": {{"b": {{"phi": 0.8, "omega": 1, "origin": [0, 0], "velocity": [0, 0]}},
+                  "c": {{"phi": 2, "omega": -0.5, "origin": {origin:?}, "velocity": {velocity:?}}}}},
+        "until": 1, "every": 0.05}}"#,
+        velocity = [missing * along[0], missing * along[1]],
+    );
+    driftless::scene::parse_scene(&text, "floating.json", &[]).expect("a scene")
+}
+
+/// All angles and positions, at all output times.
+fn whole_path(scene: &Scene, method: MethodId, tolerance: f64) -> Vec<f64> {
+    let request = Request { method: Some(method), rtol: Some(tolerance), ..Request::default() };
+    let mut path = Vec::new();
+    let outcome = simulate(scene, &request, &mut |sample| {
+        path.extend_from_slice(&sample.phi);
+        Ok(())
+    });
+    assert_eq!(outcome.expect("a run").stop, None);
+    path
+}
+
+#[test]
+fn free_bodies_feel_the_mean_force_of_their_spring() {
+    let error = |stiffness: f64| {
+        let elastic = whole_path(&floating(stiffness, 0.5, 1.0, "elastic"), MethodId::Taylor, 1e-11);
+        let rigid = whole_path(&floating(stiffness, 0.5, 1.0, "rigid"), MethodId::Dp8, 1e-9);
+        elastic.iter().zip(&rigid).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    let errors = [1e6, 1e7, 1e8].map(error);
+    // A rod alone, or one whose start keeps the rate along the spring, is tenths of a radian off at every stiffness.
+    assert!(errors[0] < 1e-2 && errors[2] < 1e-3, "{errors:?}");
+    let falls = [errors[0] / errors[1], errors[1] / errors[2]];
+    assert!(falls.iter().all(|fall| (2.0..5.0).contains(fall)), "as 1/sqrt(k), by 3.2 each: {errors:?}");
+}
+
+#[test]
+fn a_rate_along_the_spring_is_its_vibration() {
+    // Bar 1 turns at 2 rad/s, which its spring lets it do for a moment; the slow motion begins without it.
+    let moving = |factor: f64, rigid: bool| {
+        let mut scene = scene(factor, 0.0, rigid);
+        (scene.start[0].omega, scene.start[1].omega) = (2.0, 1.0);
+        scene
+    };
+    let error = |factor: f64| {
+        let elastic = path(&moving(factor, false), &request(MethodId::Taylor, 1e-12));
+        let rigid = path(&moving(factor, true), &request(MethodId::Dp8, 1e-9));
+        elastic.iter().zip(&rigid).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    let errors = [error(1e6), error(1e8)];
+    assert!(errors[1] < 1e-3 && (6.0..16.0).contains(&(errors[0] / errors[1])), "{errors:?}");
+}
+
+#[test]
+fn a_start_given_in_part_vibrates_as_the_whole_one() {
+    let mut partial = scene(1e7, 0.35, true);
+    partial.given = vec![Given::ANGLE_AND_RATE, Given { omega: false, ..Given::ANGLE_AND_RATE }];
+    let elastic = path(&scene(1e7, 0.35, false), &request(MethodId::Taylor, 1e-12));
+    let rigid = path(&partial, &request(MethodId::Dp8, 1e-9));
+    let error = elastic.iter().zip(&rigid).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(error < 3e-3, "{error:e}");
+}
+
+#[test]
+fn the_model_is_no_better_than_it_says() {
+    for (stiffness, energy, rate) in [(1e6, 0.5, 1.0), (1e7, 0.0, 0.0)] {
+        let scene = floating(stiffness, energy, rate, "rigid");
+        let mechanism = Arc::new(Mechanism::new(&scene).expect("a mechanism"));
+        let start = mechanism.start(&scene);
+        let plan = Plan::new(&scene, &mechanism, &Request { method: Some(MethodId::Dp8), ..Request::default() }).expect("a plan");
+        let said = plan.model_error.expect("an error of the model");
+        assert!(plan.notes.iter().any(|note| note.contains("are a model")), "{:?}", plan.notes);
+        let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a run").trusted(Level::Auto, &start);
+        let trust = driftless::run::march(run, &mut |_| Ok(())).expect("an outcome").trust.expect("asked for");
+        assert!(trust.model_error == Some(said) && trust.error_estimate.is_none_or(|estimate| estimate >= said), "{trust:?}");
+        let elastic = whole_path(&floating(stiffness, energy, rate, "elastic"), MethodId::Taylor, 1e-11);
+        let rigid = whole_path(&scene, MethodId::Dp8, 1e-9);
+        let error = elastic.iter().zip(&rigid).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(error < 5.0 * said && error > 1e-3 * said, "{error:e} of {said:e}");
+    }
+}
+
 #[test]
 fn the_energy_with_its_potential_is_kept() {
     let outcome = simulate(&scene(1e6, 0.35, true), &request(MethodId::Dp8, 1e-12), &mut |_| Ok(())).expect("a run");
@@ -95,6 +192,11 @@ fn what_the_mean_force_is_not_known_for_is_refused() {
     }
     let soft = refusal(&scene(1e4, 0.35, true), None).expect_err("a refusal");
     assert!(soft.contains("not 100 times as fast"), "{soft}");
+    // A damper elsewhere takes the vibration's energy away, too.
+    let mut damped = scene(1e6, 0.35, true);
+    damped.springs.push(Spring { name: "damper".into(), rigid: false, damping: 0.1, stiffness: 1.0, ..damped.springs[0].clone() });
+    let text = refusal(&damped, None).expect_err("a refusal");
+    assert!(text.contains("wall or damper"), "{text}");
     let mut two = scene(1e6, 0.35, true);
     two.springs.push(Spring { name: "other".into(), ..two.springs[0].clone() });
     two.springs[1].between[1].point = [0.5, 0.0];

@@ -466,3 +466,15 @@ fn what_the_budget_does_not_pay_for_is_carried_on_and_said_to_be() {
     let ratio = auto.error_estimate.expect("a figure") / full.error_estimate.expect("a figure");
     assert!((1.0 / 3.0..10.0).contains(&ratio), "{ratio}");
 }
+
+/// A stiff damped spring costs an implicit method nothing and a series a million steps a second: `full` stops where the run itself would have to.
+#[test]
+fn full_trust_takes_no_more_evaluations_than_a_run_may() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/stress/spring_damped_1e12.json");
+    let scene = driftless::scene::read_scene(&path, &[]).expect("a shipped scene");
+    let request = Request { effort: Some(20_000), ..asked("radau5", 1e-6, 1.0, 0.1) };
+    let outcome = trusted(&scene, &request, Level::Full);
+    assert_eq!(outcome.stop, None);
+    let trust = outcome.trust.expect("asked for");
+    assert!(trust.covered < 1.0 && trust.cut().is_some_and(|why| why.contains("expansions")), "{trust:?}");
+}

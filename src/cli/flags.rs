@@ -91,7 +91,8 @@ pub struct PlanFlags {
     /// Relative tolerance of an adaptive method [default: 1e-9]
     #[arg(long, value_name = "TOL", value_parser = number, allow_hyphen_values = true)]
     pub rtol: Option<f64>,
-    /// Absolute tolerance of an adaptive method [default: as --rtol]
+    /// Absolute tolerance of an adaptive method: in rad, and in the mechanism's own units of length, time and energy, which are m, s and J where it is of human
+    /// size and powers of 1024 times these elsewhere [default: as --rtol]
     #[arg(long, value_name = "TOL", value_parser = number, allow_hyphen_values = true)]
     pub atol: Option<f64>,
     /// Horizon in seconds [default: the scene's]
@@ -109,7 +110,8 @@ pub struct PlanFlags {
     /// Carry the first orders of taylor's series in double-double: rounding in energy a thousandth of a plain run's, at tolerances down to 1e-25 [default: 1e-20]
     #[arg(long)]
     pub extended: bool,
-    /// Evaluations of the equations allowed in a run; one that needs more stops with exit code 4 [default: 1e8, and 1e7 a simulated second]
+    /// Evaluations of the equations allowed in a run; one that needs more stops with exit code 4 [default: 1e8, and 1e7 a simulated second, at most 1e10; at most
+    /// 1e9 expansions of taylor's series]
     #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true)]
     pub effort: Option<u64>,
     /// What a method is chosen for where none is named [default: the path, and invariants over a minute or more]
@@ -157,7 +159,7 @@ pub struct RunFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub plan: PlanFlags,
-    /// Estimate the error of the result and the time up to which it can be trusted: off, auto (50 ms, and 30 % of what the run takes), full (whatever it takes)
+    /// Estimate the error of the result and the time up to which it can be trusted: off, auto (50 ms, and 30 % of what the run takes), full (5 s, and thirty times what the run takes, but no more evaluations than --effort)
     #[arg(long, value_name = "HOW", value_parser = levels(), default_value = Level::Auto.name(), help_heading = "Trust")]
     pub trust: Level,
     /// Stop with exit code 5 where the energy is off by more than this share of its scale [default: what the tolerance explains, 0.01 of the largest energy there has been at most]
@@ -329,6 +331,9 @@ pub struct ResumeFlags {
     /// A later horizon in seconds, for a run
     #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
     pub until: Option<f64>,
+    /// Evaluations allowed in the whole run, those made so far counted in [default: as the run was begun]
+    #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true)]
+    pub effort: Option<u64>,
     #[allow(missing_docs)]
     #[command(flatten)]
     pub checkpoints: CheckpointFlags,

@@ -50,7 +50,7 @@ pub fn run(flags: &ResumeFlags) -> Result<(), Failure> {
         Err(CheckpointError::Missing { .. }) => return Err(nothing(folder.path())),
         loaded => loaded?,
     };
-    let Loaded { content: saved, instead_of } = loaded;
+    let Loaded { content: mut saved, instead_of } = loaded;
     if let Some(error) = instead_of {
         message(&format!("{error}; going on from the checkpoint before it"));
     }
@@ -59,6 +59,9 @@ pub fn run(flags: &ResumeFlags) -> Result<(), Failure> {
         message(&format!(
             "the run was begun by driftless {theirs}, this is {ours}: its end may differ in the last digits from one run by either alone"
         ));
+    }
+    if let (Some(effort), Work::Run(snapshot)) = (flags.effort, &mut saved.work) {
+        snapshot.allow(effort);
     }
     let damaged = || Failure::new(Exit::Io, "the command line in the checkpoint cannot be read");
     match (Flags::try_parse_from(&saved.arguments).map_err(|_| damaged())?.command, &saved.work) {
@@ -69,6 +72,9 @@ pub fn run(flags: &ResumeFlags) -> Result<(), Failure> {
         }
         (Command::Sweep(_), Work::Sweep(..)) if flags.until.is_some() => {
             Err(Failure::new(Exit::Usage, "--until: the points of a sweep have one horizon\nhint: a new sweep"))
+        }
+        (Command::Sweep(_), Work::Sweep(..)) if flags.effort.is_some() => {
+            Err(Failure::new(Exit::Usage, "--effort: the points of a sweep have one limit\nhint: a new sweep"))
         }
         (Command::Sweep(mut sweep), Work::Sweep(..)) => {
             sweep.scene.tell = flags.tell.clone();

@@ -12,6 +12,7 @@ use super::recursive::Recursion;
 use super::row::{self, Row, Site};
 use super::ties::Ties;
 use super::tree::Tree;
+use super::units::Units;
 use crate::arithmetic::Complex;
 use crate::scene::{Place, Scene};
 use parts::{actions, given_angles, joints, kept_angles, slide, travel};
@@ -41,6 +42,8 @@ pub struct Mechanism {
     pub torsions: Vec<Torsion>,
     /// The fast vibration of the rigid spring, where it carries energy.
     pub vibration: Option<Vibration>,
+    /// The slowest vibration of a rigid spring at the start, whether it carries energy or not \[rad/s\].
+    pub rigid_rate: Option<f64>,
     /// Applied forces and torques.
     pub actions: Vec<Action>,
     /// Constraint rows: given angles, then points that coincide or stay on lines, then one per contact that is held.
@@ -59,6 +62,8 @@ pub struct Mechanism {
     pub ground_energy: f64,
     /// What energies are divided by in reports \[J\]: see [`Mechanism::energy_scale`](super::energy).
     pub energy_scale: f64,
+    /// What absolute tolerances and other thresholds are multiplied by.
+    pub units: Units,
     /// How the start was found.
     pub assembly: Assembly,
     /// The constants of the recursive form, where that is the one evaluated.
@@ -153,7 +158,7 @@ pub enum CompileError {
     SpringWithoutLength(String),
     /// A rigid spring that vibrates is not the only constraint.
     #[error(
-        "rigid spring `{spring}` starts with {energy:.3e} J of vibration, and its mean force is known only where no other constraint or wall is\nhint: start it at its free length and without a rate along it, or leave its `model` out"
+        "rigid spring `{spring}` starts with {energy:.3e} J of vibration, and its mean force is known only where no other constraint, wall or damper is\nhint: start it at its free length and without a rate along it, or leave its `model` out"
     )]
     NotAlone {
         /// The spring.
@@ -241,6 +246,7 @@ impl Mechanism {
             springs,
             torsions,
             vibration: None,
+            rigid_rate: None,
             rows,
             motors: scene.motors.len(),
             contacts,
@@ -248,11 +254,12 @@ impl Mechanism {
             ties,
             gravity,
             energy_scale: 1.0,
+            units: Units::default(),
             assembly: Assembly::default(),
             recursion: None,
         }
         .assembled(scene, &kept_angles(scene))?;
-        mechanism.vibration = mechanism.vibrates(scene)?;
+        mechanism.vibrates(scene)?;
         mechanism.choose_form();
         if let Some(recursion) = mechanism.recursion.as_ref().filter(|recursion| recursion.ways.entries() > DENSE_LIMIT * DENSE_LIMIT) {
             return Err(CompileError::TooMany(recursion.ways.rows()));
@@ -261,35 +268,39 @@ impl Mechanism {
         let start = mechanism.start(scene);
         mechanism.energy_scale = mechanism.scale_of_energy(&start);
         mechanism.scale_contacts(&start);
+        mechanism.units = Units::new(&mechanism, scene, &start);
         Ok(mechanism)
     }
 
-    /// The vibration of a rigid spring that the start gives energy to.
-    fn vibrates(&self, scene: &Scene) -> Result<Option<Vibration>, CompileError> {
+    /// Finds the vibration of a rigid spring that the start gives energy to, and takes it out of the start: what is left moves along the rod.
+    fn vibrates(&mut self, scene: &Scene) -> Result<(), CompileError> {
         let rigid = || scene.springs.iter().filter(|spring| spring.rigid);
-        let is_whole = (0..scene.bars.len()).all(|bar| scene.given.get(bar).is_none_or(|given| given.phi && given.omega));
-        if rigid().next().is_none() || !self.tree.is_dense() || self.coordinates() > self.bodies.len() || !is_whole {
-            return Ok(None);
+        if rigid().next().is_none() || !self.tree.is_dense() {
+            return Ok(());
         }
-        let given = self.start_as_given(scene);
-        let z: Vec<Complex<f64>> = given.phi.iter().map(|phi| Complex::unit(phi.hi)).collect();
+        let given = self.start_with_vibration(scene);
+        let phi: Vec<f64> = given.phi.iter().map(|phi| phi.hi).collect();
         let omega: Vec<f64> = given.omega.iter().map(|omega| omega.hi).collect();
+        let mut z = vec![Complex::ZERO; phi.len()];
+        self.tree.face::<f64, 0>(&phi, &mut z);
         let scale = self.scale_of_energy(&self.start(scene));
-        let started =
-            rigid().map(|spring| {
+        let started: Vec<Vibration> = rigid()
+            .map(|spring| {
                 let span = self.forest.point(&spring.between[0]).minus(&self.forest.point(&spring.between[1]));
                 Vibration { name: spring.name.clone(), span, stiffness: spring.stiffness, action: 0.0, energy: 0.0, frequency: 0.0 }
                     .started(self, spring.free_length, &z, &omega)
-            });
+            })
+            .collect();
+        self.rigid_rate = started.iter().map(|vibration| vibration.frequency).reduce(f64::min);
         // What rounding puts into a spring is nothing; not a number counts as energy.
-        let Some(vibration) = started.reduce(|most, other| if other.energy > most.energy { other } else { most }) else { return Ok(None) };
-        if vibration.energy <= NO_ENERGY * scale {
-            return Ok(None);
-        }
-        if self.rows.len() > 1 || !self.contacts.is_empty() {
+        let most = started.into_iter().reduce(|most, other| if other.energy > most.energy { other } else { most });
+        let Some(vibration) = most.filter(|most| most.energy.is_nan() || most.energy > NO_ENERGY * scale) else { return Ok(()) };
+        if self.rows.len() > 1 || !self.contacts.is_empty() || self.is_damped() {
             return Err(CompileError::NotAlone { spring: vibration.name, energy: vibration.energy });
         }
-        Ok(Some(vibration))
+        self.settle_vibration(scene, given);
+        self.vibration = Some(vibration);
+        Ok(())
     }
 
     /// Decides in which form the equations are evaluated, body by body or by the matrices of the tree, by what they cost with these rows.

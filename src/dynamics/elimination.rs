@@ -177,7 +177,11 @@ impl<const N: usize> Field for Elimination<N> {
     }
 
     fn unit(&self, i: usize) -> f64 {
-        if i < 2 * self.mechanism.ties.count() { 1.0 } else { self.mechanism.energy_scale }
+        self.mechanism.unit_of(i, self.mechanism.ties.count(), self.mechanism.ties.turning())
+    }
+
+    fn time_unit(&self) -> f64 {
+        self.mechanism.units.time
     }
 
     fn events(&self) -> usize {

@@ -3,6 +3,7 @@
 //! Written over the scalar trait and used in double-double by the monitors: at 1e-15 of the scale an energy evaluated in plain doubles shows
 //! its own rounding.
 
+use super::force::action::Kind;
 use super::kernel::{Kernel, dot};
 use super::row::Posture;
 use super::{Mechanism, Motion, Time, tree};
@@ -63,7 +64,7 @@ impl Mechanism {
     }
 
     /// Positions and velocities of free feet, from those given for the origin of some bar of each group.
-    fn put_feet(&self, scene: &Scene, motion: &mut Motion) {
+    pub(super) fn put_feet(&self, scene: &Scene, motion: &mut Motion) {
         let bars = self.bodies.len();
         if bars == self.coordinates() {
             return;
@@ -183,7 +184,8 @@ impl Mechanism {
         power
     }
 
-    /// Work of gravity from hanging to horizontal, Σ |weight_k|, plus kinetic and spring energy at the start \[J\]; 1 J where all of these are zero.
+    /// Work of gravity from hanging to horizontal, Σ |weight_k|, plus kinetic and spring energy at the start \[J\].  Where all of these are zero, that of gravity on
+    /// free bodies and of applied forces along the size of the mechanism, and of torques over 1 rad; 1 J where these are zero, too.
     pub fn scale_of_energy(&self, start: &Motion) -> f64 {
         let mut kernel = Kernel::<DoubleDouble>::without_rows(self);
         let kinetic = self.energy(&mut kernel, &start.phi, &start.omega).kinetic.hi;
@@ -192,6 +194,16 @@ impl Mechanism {
         let gravity: f64 = self.tree.weight[..self.bodies.len()].iter().map(|weight| weight.norm_squared().sqrt()).sum();
         let vibration = self.vibration.as_ref().map_or(0.0, |vibration| vibration.energy);
         let scale = gravity + kinetic + springs + torsions + vibration;
+        if scale > 0.0 {
+            return scale;
+        }
+        let size = self.size_of_parts();
+        let falling: f64 = self.bodies.iter().map(|body| body.mass * self.gravity.norm_squared().sqrt() * size).sum();
+        let applied = self.actions.iter().map(|action| match &action.kind {
+            Kind::Force { force, .. } => force.norm_squared().sqrt() * size,
+            Kind::Torque { torque, .. } => torque.abs(),
+        });
+        let scale = falling + applied.sum::<f64>();
         if scale > 0.0 { scale } else { 1.0 }
     }
 }

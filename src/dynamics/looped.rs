@@ -245,6 +245,10 @@ impl Field for Looped {
     fn unit(&self, i: usize) -> f64 {
         self.angles.unit(i)
     }
+
+    fn time_unit(&self) -> f64 {
+        self.mechanism.units.time
+    }
 }
 
 impl Form for Looped {

@@ -62,10 +62,12 @@ pub mod series;
 pub mod stiffness;
 pub mod ties;
 pub mod tree;
+pub mod units;
 
 pub use compile::{CompileError, Mechanism};
 pub use points::Points;
 pub use stiffness::Stiffness;
+pub use units::Units;
 
 use crate::arithmetic::{DoubleDouble, Scalar, angle};
 use natural::Reduced;
@@ -191,9 +193,14 @@ pub trait Field {
     /// What unknown `i` is, for messages: `omega of bar2`.
     fn label(&self, i: usize) -> String;
 
-    /// What the absolute tolerance of unknown `i` counts in: 1, or the energy scale of the mechanism \[J\] for work and other energies.  Unknowns in another unit
-    /// than 1 are quadratures: no rate depends on them.
+    /// What the absolute tolerance of unknown `i` counts in: 1 for angles, the units of the mechanism for positions and rates (see [`Units`]), its energy scale
+    /// \[J\] for work and other energies.  Energies are quadratures: no rate depends on them.
     fn unit(&self, _i: usize) -> f64 {
+        1.0
+    }
+
+    /// The unit of time \[s\]: see [`Units`].
+    fn time_unit(&self) -> f64 {
         1.0
     }
 

@@ -104,7 +104,11 @@ impl<const N: usize, const ACCOUNT: bool> Field for Multiplier<N, ACCOUNT> {
     }
 
     fn unit(&self, i: usize) -> f64 {
-        if i < 2 * self.mechanism.coordinates() { 1.0 } else { self.mechanism.energy_scale }
+        self.mechanism.unit_of(i, self.mechanism.coordinates(), self.mechanism.bodies.len())
+    }
+
+    fn time_unit(&self) -> f64 {
+        self.mechanism.units.time
     }
 
     fn events(&self) -> usize {

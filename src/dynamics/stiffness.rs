@@ -160,7 +160,7 @@ fn slow(mechanism: &Mechanism, time: Time, omega: &[f64]) -> f64 {
         let rate = law.rates::<f64>(time).0.abs();
         law.sines.iter().map(|sine| sine.frequency.abs()).chain([rate])
     });
-    swings.chain(spins).chain(laws).fold(0.0, f64::max).max(1e-3)
+    swings.chain(spins).chain(laws).fold(0.0, f64::max).max(1e-3 / mechanism.units.time)
 }
 
 /// A spring's own motion.

@@ -32,6 +32,7 @@ pub fn object(trust: Option<&Trust>) -> Value {
             "until_s": found.until,
         })),
         "input_error": trust.input_error,
+        "model_error": trust.model_error,
     })
 }
 
@@ -63,6 +64,12 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
                 page.entry("", &format!("typically {} rad at {} s ({source})", magnitude(1.2 * error), rough(*t)));
             }
         }
+    }
+    if let (Some(why), true) = (trust.cut(), trust.error_estimate.is_some()) {
+        page.entry("", why);
+    }
+    if let Some(error) = trust.model_error {
+        page.entry("model", &format!("springs taken for rods: off by about {} rad, which no companion sees", magnitude(error)));
     }
     if let Some(lost) = trust.lost {
         page.entry("", &format!("more than {LOST} rad off from {} s on", rough(lost)));

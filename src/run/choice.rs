@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// Runs of at least so many seconds are about invariants where nobody says otherwise.
+/// Runs of at least so many units of time (seconds, where the mechanism is of human size) are about invariants where nobody says otherwise.
 const LONG: f64 = 60.0;
 /// Steps beyond which a fixed step is not chosen unasked.
 const MANY_STEPS: f64 = 2e7;
@@ -81,6 +81,7 @@ pub(super) fn choose(mechanism: &Mechanism, request: &Request, stiffness: Option
 }
 
 fn chosen(mechanism: &Mechanism, request: &Request, stiffness: Option<&Stiffness>, until: f64, rate: f64) -> (MethodId, String) {
+    let long = LONG * mechanism.units.time;
     if request.extended {
         return (MethodId::Taylor, "extended orders are those of its series".into());
     }
@@ -125,7 +126,7 @@ fn chosen(mechanism: &Mechanism, request: &Request, stiffness: Option<&Stiffness
         Some(Prefer::Invariants) if keeps => {
             return (MethodId::Gauss(8), "invariants were asked for, and a symplectic method keeps them best".into());
         }
-        None if keeps && until >= LONG => {
+        None if keeps && until >= long => {
             return (MethodId::Gauss(8), format!("over {until} s a symplectic method keeps the energy best"));
         }
         _ => {}
@@ -147,7 +148,7 @@ fn chosen(mechanism: &Mechanism, request: &Request, stiffness: Option<&Stiffness
         "a tolerance was given, and its series is the fastest to it".into()
     } else if mechanism.is_damped() {
         "the scene is damped, and its series is the most accurate for the time".into()
-    } else if until >= LONG {
+    } else if until >= long {
         "fixed steps would be too many, and its series drifts least".into()
     } else {
         "over a short horizon its series is the most accurate for the time".into()

@@ -103,11 +103,22 @@ impl FastMode {
 }
 
 /// Phase of a fast mode in a step that follows it, about: by stability for the explicit methods at everyday tolerances, by the radius of convergence for the series.
-fn radians_a_step(method: MethodId) -> f64 {
+pub(super) fn radians_a_step(method: MethodId) -> f64 {
     match method {
         MethodId::Dopri5 | MethodId::Dp5 => 0.5,
         MethodId::Dop853 | MethodId::Dp8 => 2.0,
         MethodId::Taylor => 2.6,
         _ => 1.0,
+    }
+}
+
+/// Evaluations of the equations in a step, at least; an expansion of a series counts as one.
+pub(super) fn evaluations_a_step(method: MethodId) -> f64 {
+    match method {
+        MethodId::Dopri5 | MethodId::Dp5 => 6.0,
+        MethodId::Dop853 | MethodId::Dp8 => 11.0,
+        MethodId::Radau(stages) => 2.0 * stages as f64,
+        MethodId::Gauss(stages) => 4.0 * stages as f64,
+        MethodId::Taylor | MethodId::Rattle(_) => 1.0,
     }
 }

@@ -3,7 +3,7 @@
 //! A pairing that makes no sense is refused here, before anything is computed, with the reason and an alternative.
 
 use super::choice::{Prefer, choose};
-use super::fast::FastMode;
+use super::fast::{self, FastMode};
 use super::methods::{MethodId, Stabilization};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::compile::DENSE_LIMIT;
@@ -68,6 +68,8 @@ pub struct Plan {
     pub why: Option<String>,
     /// The fastest mode at the start, of scenes with springs.
     pub stiffness: Option<FastMode>,
+    /// What taking stiff springs for rods may do to an angle \[rad\], about: the model's own error, that of no method.
+    pub model_error: Option<f64>,
     /// What was adjusted or left out, one line each.
     pub notes: Vec<String>,
 }
@@ -88,6 +90,8 @@ pub struct Refusal {
 
 /// Evaluations allowed where nobody says: so many at once, and so many a simulated second.  A thousand times what everyday scenes take.
 const EFFORT: (f64, f64) = (1e8, 1e7);
+/// The most of them, whatever the horizon, and the most expansions of a series, each of which takes about as long as ten: some minutes to an hour of computing.
+const MOST_EFFORT: [f64; 2] = [1e10, 1e9];
 /// Most rows a run may write.
 pub const MAX_ROWS: f64 = 1e9;
 /// Most numbers of a trajectory that a scene asks for by itself: about a gigabyte.
@@ -135,6 +139,8 @@ impl Plan {
             mode.check(method, request, until)?;
             notes.extend(mode.note(method, until));
         }
+        let effort = request.effort.unwrap_or(usual_effort(method, until));
+        notes.extend(cut_short(method, step, rate, until, effort));
         let rows = rows(until, every);
         if rows > MAX_ROWS {
             return Err(usage("--every", format!("{rows:.1e} rows would be written; at most {MAX_ROWS:.0e}"), "a longer output interval"));
@@ -152,12 +158,13 @@ impl Plan {
             stabilization,
             time_constant: request.time_constant,
             extended: request.extended,
-            effort: request.effort.unwrap_or(usual_effort(until)),
+            effort,
             until,
             every,
             rows: rows as u64,
             why,
             stiffness,
+            model_error: model_error(mechanism, rate, &mut notes),
             notes,
         })
     }
@@ -171,12 +178,13 @@ impl Plan {
             stabilization: if mechanism.rows.is_empty() { Stabilization::None } else { usual(mechanism) },
             time_constant: None,
             extended: false,
-            effort: usual_effort(until),
+            effort: usual_effort(MethodId::Taylor, until),
             until,
             every: until,
             rows: 1,
             why: None,
             stiffness: None,
+            model_error: None,
             notes: Vec::new(),
         }
     }
@@ -188,8 +196,8 @@ impl Plan {
         let is_whole = self.step.is_none_or(|step| is_whole(until, step));
         let is_possible = until.is_finite() && rows <= MAX_ROWS && is_whole;
         if is_possible {
-            if self.effort == usual_effort(self.until) {
-                self.effort = usual_effort(until);
+            if self.effort == usual_effort(self.method, self.until) {
+                self.effort = usual_effort(self.method, until);
             }
             (self.until, self.rows) = (until, rows as u64);
         }
@@ -235,8 +243,20 @@ impl Plan {
 }
 
 /// Evaluations allowed up to a horizon \[s\] where nobody says how many.
-fn usual_effort(until: f64) -> u64 {
-    (EFFORT.0 + EFFORT.1 * until) as u64
+fn usual_effort(method: MethodId, until: f64) -> u64 {
+    (EFFORT.0 + EFFORT.1 * until).min(MOST_EFFORT[usize::from(method == MethodId::Taylor)]) as u64
+}
+
+/// What there is to say of a horizon \[s\] that lies beyond what the evaluations allowed can reach, where the scene's rates go up to `rate` \[rad/s\].
+fn cut_short(method: MethodId, step: Option<f64>, rate: f64, until: f64, effort: u64) -> Option<String> {
+    let steps = step.map_or(until * rate / fast::radians_a_step(method), |step| until / step);
+    let reached = effort as f64 / (steps * fast::evaluations_a_step(method)) * until;
+    (reached < until).then(|| {
+        format!(
+            "{until} s take {method} up to {steps:.0e} steps, and {effort:.0e} evaluations are allowed: it may stop from about {reached:.0e} s on; \
+             --effort allows more, with `resume` too"
+        )
+    })
 }
 
 /// True where so many steps end on the horizon.
@@ -351,6 +371,17 @@ fn check_vibration(mechanism: &Mechanism, method: MethodId, rate: f64, notes: &m
         "rigid spring {name}: {energy:.3e} J of vibration ({share:.1e} of the scale) at {frequency:.3e} rad/s act on average; its force is a mean"
     ));
     Ok(())
+}
+
+/// What rods instead of stiff springs may do to an angle \[rad\], about: a vibration acts by its mean up to the first order of slow over fast, a stretch that
+/// does not vibrate is of the second.  What grows in the motion grows with it.
+fn model_error(mechanism: &Mechanism, rate: f64, notes: &mut Vec<String>) -> Option<f64> {
+    let share = rate / mechanism.rigid_rate?;
+    let error = if mechanism.vibration.is_some() { 2.0 * share } else { share * share };
+    notes.push(format!(
+        "rigid springs are a model: angles may be off by about {error:.0e} rad, whatever the tolerance, and more where errors grow"
+    ));
+    Some(error)
 }
 
 /// The stabilization of a pairing, or why there is none.
@@ -480,7 +511,9 @@ fn fastest_rate(scene: &Scene, mechanism: &Mechanism) -> f64 {
     let mut kernel = Kernel::<f64>::new(mechanism);
     let energy = mechanism.energy(&mut kernel, &phi, &omega);
     kernel.factor::<0>(mechanism, &omega);
-    let lightest = kernel.pivot.iter().fold(0.0, |most: f64, &pivot| most.max(pivot));
+    // The mobility of a foot along its way counts as that of a turn at the unit of length.
+    let unit = |k: usize| if k < mechanism.bodies.len() { 1.0 } else { mechanism.units.length };
+    let lightest = kernel.pivot.iter().enumerate().fold(0.0, |most: f64, (k, &pivot)| most.max(pivot / (unit(k) * unit(k))));
     let gravity: f64 = mechanism.tree.weight[..mechanism.bodies.len()].iter().map(|weight| weight.norm_squared().sqrt()).sum();
     let available = (energy.total() - mechanism.ground_energy + gravity).max(0.0);
     let springs: f64 = mechanism
@@ -496,5 +529,5 @@ fn fastest_rate(scene: &Scene, mechanism: &Mechanism) -> f64 {
         })
         .sum();
     let spinning = omega.iter().fold(0.0, |most: f64, omega| most.max(omega.abs()));
-    (((2.0 * available + gravity + springs) * lightest).sqrt()).max(spinning).max(1e-3) + drives
+    (((2.0 * available + gravity + springs) * lightest).sqrt()).max(spinning).max(1e-3 / mechanism.units.time) + drives
 }

@@ -425,7 +425,8 @@ impl Running {
                 .notes
                 .push(format!("the energy balance is off by {off:.1e} of its scale, and the motion may be off by more: try {how}"));
         }
-        self.outcome.trust = self.companion.take().map(|companion| companion.trust(self.outcome.last.t));
+        self.outcome.trust =
+            self.companion.take().map(|companion| companion.trust(self.outcome.last.t).with_model(self.outcome.plan.model_error));
         self.outcome
     }
 }

@@ -58,6 +58,10 @@ impl<const N: usize> Field for Baumgarte<N> {
         self.inner.unit(i)
     }
 
+    fn time_unit(&self) -> f64 {
+        self.inner.time_unit()
+    }
+
     fn events(&self) -> usize {
         self.inner.events()
     }

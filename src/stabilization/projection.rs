@@ -29,7 +29,7 @@ pub struct Projected<M> {
     near: bool,
     /// True where the last call ended with a pause: nothing has changed since.
     has_paused: bool,
-    /// Largest violation left that counts as converged, at both levels \[rad, rad/s or m, m/s\], relative to levers and
+    /// Largest violation left that counts as converged, at both levels, in the units of the mechanism, relative to levers and
     /// speeds where these are larger.
     pub tolerance: f64,
 }
@@ -183,7 +183,9 @@ struct Projector {
 
 impl Projector {
     fn new<P: Form + ?Sized>(problem: &P) -> Self {
-        Self { kernel: Kernel::new(problem.mechanism()), natural: problem.reduced().map(Natural::new) }
+        let mechanism = problem.mechanism();
+        let natural = problem.reduced().map(|reduced| Natural::new(reduced, 1.0 / mechanism.units.time));
+        Self { kernel: Kernel::new(mechanism), natural }
     }
 
     fn project(&mut self, mechanism: &Mechanism, state: &mut State, tolerance: f64) -> Result<Landing, (String, f64)> {
@@ -209,7 +211,7 @@ impl Projector {
             energy_change = energy(kernel, state) - energy_before;
             state.y[2 * n + 1] += energy_change;
         }
-        let fastest = state.y[n..2 * n].iter().fold(1.0, |most: f64, omega| most.max(omega.abs()));
+        let fastest = state.y[n..2 * n].iter().fold(1.0 / mechanism.units.time, |most: f64, omega| most.max(omega.abs()));
         Some(Landing { has_moved: turn.max(change / fastest) > ROUNDING, balance, energy_change, is_near: false })
     }
 }
@@ -257,7 +259,7 @@ fn project_sized<const N: usize>(
     loop {
         // Rows left out have their say once they are back.
         let in_force = (0..rows).filter(|&r| !kernel.is_left_out(r));
-        let worst = in_force.map(|r| kernel.rows[r].position.abs()).fold(0.0, largest);
+        let worst = in_force.map(|r| kernel.rows[r].position.abs() / unit(mechanism, r)).fold(0.0, largest);
         // At rounding, or no longer falling: another sweep would only move it about.
         if worst <= 1e-16 || worst >= 0.5 * last || worst.is_nan() {
             break;
@@ -267,7 +269,7 @@ fn project_sized<const N: usize>(
             kernel.multiplier[r] = kernel.rows[r].position;
         }
         kernel.solve_rows();
-        let turn = shift(kernel, state, 0, -1.0);
+        let turn = shift(mechanism, kernel, state, 0, -1.0);
         (moved, far) = (true, largest(far, turn));
         let (phi, omega) = (&state.y[..n], &state.y[n..2 * n]);
         if turn <= SMALL {
@@ -283,22 +285,23 @@ fn project_sized<const N: usize>(
             kernel.linearise_at::<N>(mechanism, state.time, phi, omega);
         }
     }
-    check(mechanism, kernel, tolerance, |r| (kernel.rows[r].position, lever(kernel, r)))?;
+    check(mechanism, kernel, tolerance, |r| (kernel.rows[r].position, lever(mechanism, kernel, r)))?;
     let mut fast = 0.0;
     for r in 0..rows {
         let omega = &state.y[n..2 * n];
         kernel.multiplier[r] = kernel.row_rate(r, omega);
         if !kernel.is_left_out(r) {
-            fast = largest(fast, kernel.multiplier[r].abs() / pace(kernel, omega, r));
+            fast = largest(fast, kernel.multiplier[r].abs() / pace(mechanism, kernel, omega, r));
         }
     }
     if fast > 2.0 * f64::EPSILON || fast.is_nan() {
         kernel.solve_rows();
-        let change = shift(kernel, state, n, -1.0);
-        let most = state.y[n..2 * n].iter().fold(1.0, |most: f64, omega| most.max(omega.abs()));
+        let change = shift(mechanism, kernel, state, n, -1.0);
+        let rates = state.y[n..2 * n].iter().enumerate();
+        let most = rates.fold(1.0 / mechanism.units.time, |most: f64, (k, omega)| most.max(omega.abs() / size(mechanism, k)));
         (moved, far) = (true, largest(far, change / most));
         let omega = &state.y[n..2 * n];
-        check(mechanism, kernel, tolerance, |r| (kernel.row_rate(r, omega), pace(kernel, omega, r)))?;
+        check(mechanism, kernel, tolerance, |r| (kernel.row_rate(r, omega), pace(mechanism, kernel, omega, r)))?;
     }
     let balance = energy_before - state.y[2 * n] - state.y[2 * n + 1];
     let mut energy_change = 0.0;
@@ -310,25 +313,36 @@ fn project_sized<const N: usize>(
     Ok(Landing { has_moved: far > ROUNDING, balance, energy_change, is_near: kernel.weakest.share < NEAR })
 }
 
-/// Adds M⁻¹ Gᵀ times what is in `multiplier`, with a sign, to the unknowns `from`…, and leaves it in `load`; returns its largest entry.
-pub(super) fn shift(kernel: &mut Kernel<f64>, state: &mut State, from: usize, sign: f64) -> f64 {
+/// The unit of coordinate `k` \[rad, m\].
+pub(super) fn size(mechanism: &Mechanism, k: usize) -> f64 {
+    if k < mechanism.bodies.len() { 1.0 } else { mechanism.units.length }
+}
+
+/// The unit of row `r` \[rad, m\].
+pub(super) fn unit(mechanism: &Mechanism, r: usize) -> f64 {
+    if mechanism.rows[r].is_angle() { 1.0 } else { mechanism.units.length }
+}
+
+/// Adds M⁻¹ Gᵀ times what is in `multiplier`, with a sign, to the unknowns `from`…, and leaves it in `load`; returns its largest entry, those of positions over
+/// the unit of length.
+pub(super) fn shift(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &mut State, from: usize, sign: f64) -> f64 {
     kernel.lift();
     let mut largest_change = 0.0;
     for (k, &change) in kernel.load.iter().enumerate() {
         (state.y[from + k], state.low[from + k]) = two_sum(state.y[from + k], state.low[from + k] + sign * change);
-        largest_change = largest(largest_change, change.abs());
+        largest_change = largest(largest_change, change.abs() / size(mechanism, k));
     }
     largest_change
 }
 
-/// The longest lever of row `r`, or one \[m\].
-fn lever(kernel: &Kernel<f64>, r: usize) -> f64 {
-    kernel.fold_gradient(r, 1.0, |most: f64, _, g| most.max(g.abs()))
+/// The longest lever of row `r`, or its unit.
+fn lever(mechanism: &Mechanism, kernel: &Kernel<f64>, r: usize) -> f64 {
+    kernel.fold_gradient(r, unit(mechanism, r), |most: f64, k, g| most.max(g.abs() * size(mechanism, k)))
 }
 
-/// The largest part of the rate of row `r`, or one: a row's rate is a sum of G_k w_k, and no smaller than their rounding.
-fn pace(kernel: &Kernel<f64>, omega: &[f64], r: usize) -> f64 {
-    let least = kernel.rows[r].drive.abs().max(1.0);
+/// The largest part of the rate of row `r`, or its unit over that of time: a row's rate is a sum of G_k w_k, and no smaller than their rounding.
+fn pace(mechanism: &Mechanism, kernel: &Kernel<f64>, omega: &[f64], r: usize) -> f64 {
+    let least = kernel.rows[r].drive.abs().max(unit(mechanism, r) / mechanism.units.time);
     kernel.fold_gradient(r, least, |most, k, g| most.max((g * omega[k]).abs()))
 }
 
@@ -337,8 +351,8 @@ fn pace(kernel: &Kernel<f64>, omega: &[f64], r: usize) -> f64 {
 /// # Errors
 /// Name of the first row that is not, and its violation.
 pub(super) fn is_kept(mechanism: &Mechanism, kernel: &Kernel<f64>, omega: &[f64], tolerance: f64) -> Result<(), (String, f64)> {
-    check(mechanism, kernel, tolerance, |r| (kernel.rows[r].position, lever(kernel, r)))?;
-    check(mechanism, kernel, tolerance, |r| (kernel.row_rate(r, omega), pace(kernel, omega, r)))
+    check(mechanism, kernel, tolerance, |r| (kernel.rows[r].position, lever(mechanism, kernel, r)))?;
+    check(mechanism, kernel, tolerance, |r| (kernel.row_rate(r, omega), pace(mechanism, kernel, omega, r)))
 }
 
 /// The worst row must be below tolerance, each measured against its own size.  Near a singular position rounding grows with the inverse of the distance, of

@@ -22,7 +22,8 @@ use crate::stepping::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
 const ROUNDS: usize = 20;
 /// Sweeps onto the constraints.
 const SWEEPS: usize = 20;
-/// Largest violation and largest mismatch of the multipliers that count as converged, relative to levers and speeds.
+/// Largest violation, relative to levers and speeds, and largest change by the multipliers' mismatch, relative to turns and speeds, that count as
+/// converged.
 const TOLERANCE: f64 = 1e-12;
 
 /// A Gauss method with symmetric projection; its problem must be in coordinates and rates, as
@@ -69,21 +70,20 @@ impl SymmetricGauss {
             trial.clone_from(state);
             trial.memory.truncate(own);
             face(problem.mechanism(), kernel, trial);
-            shift(kernel, trial, mu);
+            shift(problem.mechanism(), kernel, trial, mu);
             inner.advance(problem, trial, until, &mut one, &mut |_, _| Ok(Seen::Kept))?;
             tally.evaluations += std::mem::take(&mut one.evaluations);
             nu.clone_from(mu);
             land(problem.mechanism(), kernel, trial, best, nu)
                 .map_err(|(row, left)| stop(format!("projection leaves {left:.1e} of constraint {row}")))?;
-            let mismatch = mu.iter().zip(nu.iter()).fold(0.0, |most: f64, (mu, nu)| most.max((mu - nu).abs()));
+            let mismatch = mismatch(problem.mechanism(), kernel, best, mu, nu);
             for (mu, nu) in mu.iter_mut().zip(nu.iter()) {
                 *mu += 0.5 * (nu - *mu);
             }
             // Rounds contract by about the step: what no longer falls is rounding.
-            if mismatch == 0.0 || mismatch >= 0.5 * last {
-                let size = mu.iter().fold(0.0, |most: f64, mu| most.max(mu.abs()));
-                if mismatch > TOLERANCE * size.max(1.0) {
-                    return Err(stop(format!("the multipliers of both ends differ by {mismatch:.1e} and do not come closer")));
+            if mismatch == 0.0 || mismatch >= 0.5 * last || mismatch.is_nan() {
+                if mismatch > TOLERANCE || mismatch.is_nan() {
+                    return Err(stop(format!("the shifts of both ends differ by {mismatch:.1e} of the motion and do not come closer")));
                 }
                 break;
             }
@@ -103,12 +103,31 @@ fn face(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &State) {
     kernel.linearise_at::<0>(mechanism, state.time, &state.y[..n], &state.y[n..2 * n]);
 }
 
+/// The largest entry of D (mu - nu), with the directions of the state faced last: of coordinates over their units, or over their sizes where these are larger,
+/// of rates over the units of rates or the fastest.
+fn mismatch(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &State, mu: &[f64], nu: &[f64]) -> f64 {
+    let (n, r) = (kernel.z.len(), kernel.rows.len());
+    let size = |k: usize| projection::size(mechanism, k);
+    let fastest = (0..n).fold(1.0 / mechanism.units.time, |most, k| (state.y[n + k] / size(k)).abs().max(most));
+    let mut most = 0.0_f64;
+    for level in [0, r] {
+        kernel.multiplier.iter_mut().zip(&mu[level..]).zip(&nu[level..]).for_each(|((change, mu), nu)| *change = mu - nu);
+        kernel.lift();
+        for (k, change) in kernel.load.iter().enumerate() {
+            let whole = if level == 0 { size(k).max(state.y[k].abs()) } else { size(k) * fastest };
+            let share = change.abs() / whole;
+            most = if share.is_nan() { share } else { most.max(share) };
+        }
+    }
+    most
+}
+
 /// y + D mu, with the directions of the state faced last.
-fn shift(kernel: &mut Kernel<f64>, state: &mut State, mu: &[f64]) {
+fn shift(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &mut State, mu: &[f64]) {
     let (n, r) = (kernel.z.len(), kernel.rows.len());
     for (from, mu) in [(0, &mu[..r]), (n, &mu[r..])] {
         kernel.multiplier.copy_from_slice(mu);
-        projection::shift(kernel, state, from, 1.0);
+        projection::shift(mechanism, kernel, state, from, 1.0);
     }
 }
 
@@ -120,14 +139,15 @@ fn land(mechanism: &Mechanism, kernel: &mut Kernel<f64>, end: &State, landed: &m
     let mut last = f64::INFINITY;
     for _ in 0..SWEEPS {
         landed.clone_from(end);
-        shift(kernel, landed, nu);
+        shift(mechanism, kernel, landed, nu);
         face(mechanism, kernel, landed);
         let mut worst = 0.0_f64;
         for level in [0, r] {
             for row in 0..r {
                 let left = if level == 0 { kernel.rows[row].position } else { kernel.row_rate(row, &landed.y[n..2 * n]) };
                 kernel.multiplier[row] = left;
-                worst = if left.is_nan() { f64::NAN } else { worst.max(left.abs()) };
+                let left = left.abs() / projection::unit(mechanism, row) * if level == 0 { 1.0 } else { mechanism.units.time };
+                worst = if left.is_nan() { f64::NAN } else { worst.max(left) };
             }
             kernel.solve_rows();
             if worst > 1e-16 && worst < 0.5 * last {

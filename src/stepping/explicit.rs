@@ -59,7 +59,8 @@ pub const NESTED: usize = 7;
 pub struct Tolerance {
     /// Relative to the size of each unknown.
     pub relative: f64,
-    /// Absolute, in the unknown's own unit.
+    /// Absolute: in rad for angles, in the mechanism's own units of length, time and energy for all else
+    /// (see [`Units`](crate::dynamics::Units): m, s and J where it is of human size).
     pub absolute: f64,
 }
 
@@ -133,9 +134,12 @@ impl<P: Pair> Explicit<P> {
     fn first_step<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, span: f64, tally: &mut Tally) -> f64 {
         let n = state.y.len();
         super::scales(self.tolerance, &state.y, &self.units, &mut self.scale);
+        // What nothing is known of begins with a millionth of the unit of time.
+        let unit = field.time_unit();
+        let short = 1e-6 * unit;
         let norm = |x: &dyn Fn(usize) -> f64, scale: &[f64]| ((0..n).map(|i| (x(i) / scale[i]).powi(2)).sum::<f64>() / n as f64).sqrt();
         let (d0, d1) = (norm(&|i| state.y[i], &self.scale), norm(&|i| self.k[i], &self.scale));
-        let guess = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 };
+        let guess = if d0 < 1e-5 || d1 * unit < 1e-5 { short } else { 0.01 * d0 / d1 };
         let guess = guess.min(span);
         for i in 0..n {
             self.stage[i] = state.y[i] + guess * self.k[i];
@@ -144,10 +148,11 @@ impl<P: Pair> Explicit<P> {
         field.rate(state.time + guess, &self.stage, &mut rest[..n]);
         tally.evaluations += 1;
         let d2 = norm(&|i| rest[i] - first[i], &self.scale) / guess;
-        let steepest = d1.max(d2);
-        let second = if steepest <= 1e-15 { (1e-3 * guess).max(1e-6) } else { libm::pow(0.01 / steepest, 1.0 / f64::from(P::ORDER)) };
+        let steepest = (d1 * unit).max(d2 * unit * unit);
+        let second =
+            if steepest <= 1e-15 { (1e-3 * guess).max(short) } else { unit * libm::pow(0.01 / steepest, 1.0 / f64::from(P::ORDER)) };
         let first = (100.0 * guess).min(second).min(span);
-        if first.is_finite() { first } else { span.min(1e-6) }
+        if first.is_finite() { first } else { span.min(short) }
     }
 
     /// The stages an interpolation of the step just made asks for beside its own.
@@ -282,9 +287,10 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
         watch: &mut Watch<F>,
     ) -> Result<Reached, StepError> {
         let (n, events) = (state.y.len(), field.events());
-        super::refuse_the_past(P::NAME, state, until)?;
+        super::refuse_the_past(P::NAME, state, until, field.time_unit())?;
         self.resize(n);
         super::units(field, n, &mut self.units);
+        let finest = |state: &State, field: &F| super::finest(state, field.time_unit());
         // The step proposed last; where the last call was cut short also the rate where it is known.
         let proposed = state.memory.first().copied();
         if state.memory.len() == 1 + n {
@@ -309,7 +315,7 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
             if !error.is_finite() {
                 cuts += 1;
                 tally.rejected += 1;
-                if cuts > 10 || h < super::finest(state) {
+                if cuts > 10 || h < finest(state, field) {
                     let what = format!("{} is not finite", self.culprit(field, n));
                     return Err(Self::stop(
                         Cause::NotFinite,
@@ -330,7 +336,7 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
                 tally.rejected += 1;
                 rejected_before = true;
                 wanted = h * factor.min(0.9);
-                if wanted < super::finest(state) {
+                if wanted < finest(state, field) {
                     let what = format!("{} asks for ever smaller steps", self.culprit(field, n));
                     return Err(Self::stop(Cause::StepTooSmall, state, h, what, "loosen the tolerance, or take --method taylor or radau9"));
                 }

@@ -68,7 +68,7 @@ impl Tally {
             t,
             step,
             what: format!("the effort allowed, {} evaluations, is used up", self.effort),
-            hint: "loosen the tolerance or lengthen the step, shorten the horizon, or allow more with --effort".into(),
+            hint: "loosen the tolerance or lengthen the step, shorten the horizon, or allow more with --effort (of `resume` too)".into(),
         }
     }
 }
@@ -255,9 +255,9 @@ fn reach(wanted: f64, left: f64) -> (f64, bool) {
     (if wanted > 0.5 * left { 0.5 * left } else { wanted }, false)
 }
 
-/// Steps \[s\] below this are lost in the resolution of time.
-fn finest(state: &State) -> f64 {
-    1e-14 * state.time.hi.abs().max(1e-3)
+/// Steps \[s\] below this are lost in the resolution of time, or in the first thousandth of the unit of time.
+fn finest(state: &State, time_unit: f64) -> f64 {
+    1e-14 * state.time.hi.abs().max(1e-3 * time_unit)
 }
 
 /// The stop of a step \[s\] in which a point came to rest on its wall.
@@ -273,9 +273,9 @@ fn at_rest(method: &str, state: &State, step: f64) -> StepError {
 }
 
 /// The adaptive methods march forwards only; a time behind by no more than rounding has been reached.
-fn refuse_the_past(method: &str, state: &State, until: Time) -> Result<(), StepError> {
+fn refuse_the_past(method: &str, state: &State, until: Time, time_unit: f64) -> Result<(), StepError> {
     let left = (until - state.time).hi;
-    if left >= -1e-9 * state.time.hi.abs().max(1e-3) {
+    if left >= -1e-9 * state.time.hi.abs().max(1e-3 * time_unit) {
         return Ok(());
     }
     Err(StepError {

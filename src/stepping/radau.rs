@@ -147,10 +147,10 @@ impl Radau {
     }
 
     /// A first step from the sizes of unknowns and rates; the error estimate corrects it.
-    fn first_step(&self, state: &State, span: f64) -> f64 {
+    fn first_step(&self, state: &State, span: f64, short: f64) -> f64 {
         let norm = |x: &[f64]| x.iter().zip(&self.work.scale).map(|(x, scale)| (x / scale) * (x / scale)).sum::<f64>().sqrt();
         let guess = 0.01 * norm(&state.y) / norm(&self.work.start);
-        if guess.is_finite() && guess > 0.0 { guess.min(span) } else { span.min(1e-6) }
+        if guess.is_finite() && guess > 0.0 { guess.min(span) } else { span.min(short) }
     }
 
     /// The new state, and the error over the tolerance; filtered once more where the step is a hard one, just rejected or the first.
@@ -286,7 +286,7 @@ impl<F: Field + ?Sized> Method<F> for Radau {
         watch: &mut Watch<F>,
     ) -> Result<Reached, StepError> {
         let (d, events) = (state.y.len(), field.events());
-        super::refuse_the_past(self.id(), state, until)?;
+        super::refuse_the_past(self.id(), state, until, field.time_unit())?;
         self.resize(d);
         super::units(field, d, &mut self.work.units);
         let mut left = (until - state.time).hi;
@@ -301,11 +301,11 @@ impl<F: Field + ?Sized> Method<F> for Radau {
                 has_start = true;
             }
             if control.wanted == 0.0 {
-                control.wanted = self.first_step(state, left);
+                control.wanted = self.first_step(state, left, 1e-6 * field.time_unit());
             }
             let (h, whole) = super::reach(control.wanted, left);
             tally.check(self.id(), state.time.hi, h)?;
-            if h < super::finest(state) && !whole {
+            if h < super::finest(state, field.time_unit()) && !whole {
                 let what = format!("{} asks for ever smaller steps", self.culprit(field));
                 return Err(self.stop(
                     Cause::StepTooSmall,

@@ -72,7 +72,8 @@ pub enum Kernel {
 /// The method on numbers of type `T`: `f64`, or `DoubleDouble` for references.
 #[derive(Clone, Debug)]
 pub struct Taylor<T> {
-    /// First term left out of a rate \[rad/s\] in a step; those of the angles are smaller by the step over the order.
+    /// First term left out of a rate in a step, in the units of the mechanism (rad/s where it is of human size: see
+    /// [`Units`](crate::dynamics::Units)); those of the angles are smaller by the step over the order.
     pub tolerance: f64,
     /// Highest power of the rates.
     pub order: usize,
@@ -155,7 +156,7 @@ impl<T: Coefficient, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
         tally: &mut Tally,
         watch: &mut Watch<P>,
     ) -> Result<Reached, StepError> {
-        super::refuse_the_past("taylor", state, until)?;
+        super::refuse_the_past("taylor", state, until, problem.time_unit())?;
         self.choose(problem, state)?;
         state.memory.clear();
         loop {
@@ -173,7 +174,7 @@ impl<T: Coefficient, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
                 let lost = problem.label(problem.angles() + self.expansion.as_ref().map_or(0, Expansion::lost));
                 return Err(stop(Cause::NotFinite, state, 0.0, format!("the series of {lost} is not finite"), hint));
             }
-            if wanted < super::finest(state) {
+            if wanted < super::finest(state, problem.time_unit()) {
                 if self.by_series && self.expansion.as_ref().is_some_and(|expansion| jump::is_near(problem, expansion)) {
                     let what = "the constraints are dependent here, and no way through the singular position is confirmed".into();
                     return Err(stop(Cause::BranchLost, state, wanted, what, jump::HINT));

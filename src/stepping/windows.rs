@@ -52,23 +52,25 @@ impl Dop853 {
     }
 }
 
-/// The field as the crate calls it: unknowns of the field, then the time since the window's start.
+/// The field as the crate calls it: unknowns of the field, then the time since the window's start, all over their units.
 struct Window<'a, F: ?Sized> {
     field: RefCell<&'a mut F>,
     start: Time,
     n: usize,
-    /// Unknowns that are marched in another unit than their own, and that unit: the crate has one absolute tolerance for all.
-    scaled: Vec<(usize, f64)>,
+    /// The units of the unknowns and of time, and room for the unknowns.
+    unit: &'a [f64],
+    time_unit: f64,
+    y: RefCell<Vec<f64>>,
     /// Rows that may still be kept.
     rows: usize,
 }
 
 impl<F: Field + ?Sized> Window<'_, F> {
     fn rate(&self, y: &[f64], rate: &mut [f64]) {
-        self.field.borrow_mut().rate(self.start + DoubleDouble::of(y[self.n]), &y[..self.n], &mut rate[..self.n]);
-        for &(i, unit) in &self.scaled {
-            rate[i] /= unit;
-        }
+        let mut unknowns = self.y.borrow_mut();
+        unknowns.iter_mut().zip(y).zip(self.unit).for_each(|((unknown, y), unit)| *unknown = y * unit);
+        self.field.borrow_mut().rate(self.start + DoubleDouble::of(y[self.n] * self.time_unit), &unknowns, &mut rate[..self.n]);
+        rate.iter_mut().zip(self.unit).for_each(|(rate, unit)| *rate = *rate * self.time_unit / unit);
         rate[self.n] = 1.0;
     }
 
@@ -161,7 +163,7 @@ fn window<F: Field + ?Sized>(
     tally: &mut Tally,
     watch: &mut Watch<F>,
 ) -> Result<Reached, StepError> {
-    super::refuse_the_past(stepper.name, state, until)?;
+    super::refuse_the_past(stepper.name, state, until, field.time_unit())?;
     while (until - state.time).hi > 0.0 {
         part(stepper, integrate, field, state, until, tally)?;
         if watch(field, state)?.is_enough() && state.time < until {
@@ -191,16 +193,19 @@ fn part<F: Field + ?Sized>(
         let hint = "look for a spring of length zero or a position without inertia";
         return Err(stop(Cause::NotFinite, state.time.hi, 0.0, format!("the rate of {} is not finite", field.label(i)), hint));
     }
-    let mut y = state.y.clone();
+    let (mut unit, time_unit) = (Vec::new(), field.time_unit());
+    super::units(field, n, &mut unit);
+    let mut y: Vec<f64> = state.y.iter().zip(&unit).map(|(y, unit)| y / unit).collect();
     y.push(0.0);
-    let scaled: Vec<(usize, f64)> = (0..n).map(|i| (i, field.unit(i))).filter(|(_, unit)| *unit != 1.0).collect();
-    scaled.iter().for_each(|&(i, unit)| y[i] /= unit);
-    let first = state.memory.first().map_or(0.0, |&h| h.min(span));
+    let first = state.memory.first().map_or(0.0, |&h| h.min(span)) / time_unit;
     let most = tally.effort.saturating_sub(tally.evaluations).div_ceil(stepper.attempt).min(u64::from(u32::MAX)) as u32;
     let rows = (MOST_KEPT / (n + 2)).max(LEAST_KEPT);
-    let part = Window { field: RefCell::new(field), start: state.time, n, scaled: scaled.clone(), rows };
-    let (times, mut last, outcome) = integrate(part, &y, span, first, most);
-    let reached_time = |x: f64| state.time.hi + x;
+    let (times, last, outcome) = {
+        let room = RefCell::new(vec![0.0; n]);
+        let window = Window { field: RefCell::new(field), start: state.time, n, unit: &unit, time_unit, y: room, rows };
+        integrate(window, &y, span / time_unit, first, most)
+    };
+    let reached_time = |x: f64| state.time.hi + x * time_unit;
     match outcome {
         Ok(stats) => {
             tally.steps += u64::from(stats.accepted_steps);
@@ -218,25 +223,21 @@ fn part<F: Field + ?Sized>(
             return Err(stop(Cause::StepTooSmall, reached_time(x), 0.0, what, "loosen the tolerance, or take --method taylor or radau9"));
         }
     }
-    for &(i, unit) in &scaled {
-        if let Some(last) = last.get_mut(i) {
-            *last *= unit;
-        }
-    }
     if let Some(i) = last.iter().take(n).position(|y| !y.is_finite()) {
         let what = format!("{} is not finite", field.label(i));
         return Err(stop(Cause::NotFinite, state.time.hi, span, what, "tighten the tolerance"));
     }
+    let times: Vec<f64> = times.iter().map(|t| t * time_unit).collect();
     let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let next = match steps[..] {
         // One step was enough, or would have been: the second, cut to fit, was still the longer.
-        [_] => span.max(first),
+        [_] => span.max(first * time_unit),
         [one, two] if two > one => span,
         _ => steps.iter().copied().fold(0.0, f64::max),
     };
     state.memory.resize(1, 0.0);
     state.memory[0] = next;
-    state.y.copy_from_slice(&last[..n]);
+    state.y.iter_mut().zip(&last).zip(&unit).for_each(|((y, last), unit)| *y = last * unit);
     state.low.fill(0.0);
     let reached = times.last().copied().unwrap_or(span);
     state.time = if reached < span * (1.0 - 1e-12) { state.time + reached } else { until };

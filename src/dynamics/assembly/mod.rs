@@ -11,6 +11,7 @@
 
 mod newton;
 mod rank;
+mod slow;
 pub(in crate::dynamics) mod svd;
 mod watch;
 
@@ -398,15 +399,7 @@ impl<'a> Problem<'a> {
         is_singular: bool,
         changes: &mut Vec<Change>,
     ) -> Result<Vec<DoubleDouble>, CompileError> {
-        let mut aims = Vec::new();
-        for (bar, start) in scene.start.iter().enumerate() {
-            if given(bar).omega {
-                aims.push(Aim { bar, goal: Goal::Coordinate(bar), given: start.omega });
-            }
-            if let Some(velocity) = given(bar).velocity {
-                aims.extend(of_origin(self.mechanism, bar, velocity));
-            }
-        }
+        let aims = self.rate_aims(scene, given);
         let mut guess = vec![DoubleDouble::ZERO; q.len()];
         for aim in &aims {
             if let Goal::Coordinate(k) = aim.goal {
@@ -439,12 +432,29 @@ impl<'a> Problem<'a> {
             // Rows of lost rank would take any rates for these.
             self.check_open(q, &every, &aims, &missing, "omega")?;
         }
-        let z = self.face::<DoubleDouble>(q).1;
-        for aim in &aims {
-            let used = self.aim_rate(aim, &z, &omega).hi;
-            changes.extend(self.change(aim, used, ["omega", "velocity"], ["rad/s", "m/s"]));
-        }
+        changes.extend(self.rate_changes(&aims, q, &omega));
         Ok(omega)
+    }
+
+    /// The rates that the scene gives.
+    fn rate_aims(&self, scene: &Scene, given: &dyn Fn(usize) -> Given) -> Vec<Aim> {
+        let mut aims = Vec::new();
+        for (bar, start) in scene.start.iter().enumerate() {
+            if given(bar).omega {
+                aims.push(Aim { bar, goal: Goal::Coordinate(bar), given: start.omega });
+            }
+            if let Some(velocity) = given(bar).velocity {
+                aims.extend(of_origin(self.mechanism, bar, velocity));
+            }
+        }
+        aims
+    }
+
+    /// What of the rates is not as given.
+    fn rate_changes(&self, aims: &[Aim], q: &[DoubleDouble], omega: &[DoubleDouble]) -> Vec<Change> {
+        let z = self.face::<DoubleDouble>(q).1;
+        let change = |aim: &Aim| self.change(aim, self.aim_rate(aim, &z, omega).hi, ["omega", "velocity"], ["rad/s", "m/s"]);
+        aims.iter().filter_map(change).collect()
     }
 }
 

@@ -253,6 +253,9 @@ impl Problem<'_> {
     /// Changes the rates that are not held, as little as may be, so that all rows keep; returns what is left, measured, relative to the rates.
     pub fn rates(&self, q: &[DoubleDouble], omega: &mut [DoubleDouble], aims: &[Aim], held: &[bool]) -> f64 {
         let columns = Problem { aims: aims.to_vec(), ..self.clone() }.columns(held);
+        let rates =
+            |omega: &[DoubleDouble]| omega.iter().zip(&self.unit).fold(0.0, |most: f64, (omega, unit)| most.max((omega.hi / unit).abs()));
+        let guessed = rates(omega);
         let mut matrix = Matrix { rows: 0, columns: columns.len(), entries: Vec::new() };
         let mut full = vec![0.0; self.coordinates()];
         let z = self.visit::<f64>(q, &vec![0.0; self.coordinates()], |i, _, gradient| {
@@ -282,8 +285,8 @@ impl Problem<'_> {
             omega.copy_from_slice(&trial);
             now = there;
         }
-        let fastest = omega.iter().zip(&self.unit).fold(1.0, |most: f64, (omega, unit)| most.max((omega.hi / unit).abs()));
-        largest(&now) / fastest
+        let (left, fastest) = (largest(&now), guessed.max(rates(omega)));
+        if left > 0.0 { left / fastest } else { left }
     }
 
     /// C' = G w + C_t of every row \[rad/s or m/s\].

@@ -13,6 +13,11 @@ pub const SHARE: f64 = 0.3;
 /// Work that is free: what nobody notices at the end of a run.
 pub const GRACE: f64 = 50e6;
 
+/// The same where the estimate is to be had at all costs: thirty times the run's work, and five seconds that nobody asks after.
+pub const FULL_SHARE: f64 = 30.0;
+/// See [`FULL_SHARE`].
+pub const FULL_GRACE: f64 = 5e9;
+
 /// Prices of a mechanism's parts.
 #[derive(Clone, Copy, Debug)]
 pub struct Prices {

@@ -1,8 +1,8 @@
 //! The companion of a run: the same motion by a finer series, looked at where the run is.
 
-use super::budget::{GRACE, Prices, SHARE};
+use super::budget::{FULL_GRACE, FULL_SHARE, GRACE, Prices, SHARE};
 use super::tangent::{self, Path, Tangent};
-use super::{CAUTION, HORIZON, How, LEAST, LOST, Level, Ruler, Trust};
+use super::{CAUTION, CUT, HORIZON, How, LEAST, LOST, Level, Ruler, Trust};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::contact::{Course, Station};
 use crate::run::march::build;
@@ -221,14 +221,23 @@ impl Companion {
         }
         let budget = match measured.level {
             Level::Auto => GRACE + SHARE * prices.run(plan, tally, rows),
-            Level::Off | Level::Full => f64::INFINITY,
+            // No more evaluations than the run is allowed itself.
+            Level::Off | Level::Full => {
+                (FULL_GRACE + FULL_SHARE * prices.run(plan, tally, rows)).min(plan.effort as f64 * prices.series[0])
+            }
         };
         let before = shadow.tangent.as_ref().map(Tangent::now);
         // The last step of a fixed-step run may end beyond the horizon by rounding.
         let horizon = Time::from(shadow.outcome.plan.until);
         let time = if motion.time > horizon { horizon } else { motion.time };
         if let Err(stop) = shadow.go(time, prices, &mut measured.spent, budget) {
-            return self.end(&stop);
+            let why = stop.unwrap_or_else(|| match measured.level {
+                Level::Full => {
+                    format!("{CUT}, {} expansions, was used up after t = {} s", shadow.course.tally().evaluations, measured.until)
+                }
+                Level::Off | Level::Auto => "more would have taken too large a share of the run".into(),
+            });
+            return self.end(&why);
         }
         if measured.lost.is_some() {
             let growth = shadow.tangent.as_ref().map_or(f64::INFINITY, Tangent::growth);
@@ -292,6 +301,7 @@ impl Companion {
             lost,
             lyapunov,
             input_error,
+            model_error: None,
             companion: Some(name),
             covered: until,
             why: if is_whole { None } else { why },
@@ -359,7 +369,10 @@ fn begun(mechanism: &Arc<Mechanism>, series: &mut Plan, start: &Motion) -> Resul
 
 impl Shadow {
     /// To a time, with the motion there in `motion`; what it cost is added to `spent`, which must not pass the budget.
-    fn go(&mut self, until: Time, prices: &Prices, spent: &mut f64, budget: f64) -> Result<(), String> {
+    ///
+    /// # Errors
+    /// Why the companion stopped, or `None` where the budget was used up.
+    fn go(&mut self, until: Time, prices: &Prices, spent: &mut f64, budget: f64) -> Result<(), Option<String>> {
         while let Some(next) = self.tangent.as_ref().map(Tangent::next).filter(|&next| next <= until.hi) {
             self.march(Time::from(next), prices, spent, budget)?;
             let steps = if self.is_rounded { self.last.steps } else { 0 };
@@ -372,15 +385,15 @@ impl Shadow {
     }
 
     /// The same without the tangent flow.
-    fn march(&mut self, until: Time, prices: &Prices, spent: &mut f64, budget: f64) -> Result<(), String> {
+    fn march(&mut self, until: Time, prices: &Prices, spent: &mut f64, budget: f64) -> Result<(), Option<String>> {
         let mut left = ((budget - *spent) / prices.series[0]) as u64;
         let mut is_spent = || {
             left = left.saturating_sub(1);
             left == 0
         };
         let arrived = self.course.go(until, &mut self.outcome, &mut is_spent);
-        if !arrived.map_err(|stop| format!("the companion stopped at t = {} s: {}", stop.t, stop.what))? || *spent > budget {
-            return Err("more would have taken too large a share of the run".into());
+        if !arrived.map_err(|stop| Some(format!("the companion stopped at t = {} s: {}", stop.t, stop.what)))? || *spent > budget {
+            return Err(None);
         }
         self.course.look(&mut self.motion);
         let tally = self.course.tally();

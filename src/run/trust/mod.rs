@@ -35,6 +35,8 @@ use std::str::FromStr;
 pub const HORIZON: f64 = 1e-3;
 /// The error \[rad\] beyond which the run and its companion are two motions.
 pub const LOST: f64 = 0.1;
+/// What is said to be used up where the companion of [`Level::Full`] was cut short.
+const CUT: &str = "the companion's work limit";
 /// What is printed is so many times E, and at least the rounding of an angle \[rad\].
 const CAUTION: f64 = 1.2;
 const LEAST: f64 = 2e-15;
@@ -48,7 +50,7 @@ pub enum Level {
     /// At most [`budget::SHARE`] of the run's work.
     #[default]
     Auto,
-    /// Whatever it takes, with the companion's first orders in double-double.
+    /// With the companion's first orders in double-double, up to [`budget::FULL_SHARE`] times the run's work and no more evaluations than it is allowed.
     Full,
 }
 
@@ -138,6 +140,8 @@ pub struct Trust {
     pub lyapunov: Option<Lyapunov>,
     /// What a change in the last digit of the scene's numbers comes to at `at` \[rad\]; no error of the method.
     pub input_error: Option<f64>,
+    /// What the model is off by whatever the method does, where springs are taken for rods \[rad\]; the estimate is no smaller.
+    pub model_error: Option<f64>,
     /// The companion, in words.
     pub companion: Option<String>,
     /// How far it went beside the run \[s\].
@@ -149,6 +153,20 @@ pub struct Trust {
 }
 
 impl Trust {
+    /// The same of a model with an error of its own \[rad\], which the companion shares.
+    pub(in crate::run) fn with_model(mut self, error: Option<f64>) -> Self {
+        self.model_error = error;
+        if let (Some(estimate), Some(model)) = (&mut self.error_estimate, error) {
+            *estimate = estimate.max(model);
+        }
+        self
+    }
+
+    /// Why the companion was cut short, where all was to be spent on it.
+    pub fn cut(&self) -> Option<&str> {
+        self.why.as_deref().filter(|why| why.starts_with(CUT))
+    }
+
     /// True where the end of the run lies beyond its horizon: the angles there are those of a typical motion at most.
     pub fn is_past(&self) -> bool {
         self.horizon.is_some()

@@ -36,15 +36,17 @@ pub struct Bench<const B: usize> {
     keeper: Keeper<B>,
     z: [Row<B>; 2],
     rate: Row<B>,
+    /// What rates count as at least \[rad/s\].
+    unit: f64,
 }
 
 impl Natural {
-    /// Of a form's matrices.
-    pub fn new(reduced: &Reduced) -> Self {
+    /// Of a form's matrices, with the mechanism's unit of rates \[rad/s\].
+    pub fn new(reduced: &Reduced, unit: f64) -> Self {
         match reduced.free.len() {
-            0..=4 => Self::Few(Box::new(Bench::new(reduced))),
-            5..=8 => Self::Several(Box::new(Bench::new(reduced))),
-            _ => Self::Many(Box::new(Bench::new(reduced))),
+            0..=4 => Self::Few(Box::new(Bench::new(reduced, unit))),
+            5..=8 => Self::Several(Box::new(Bench::new(reduced, unit))),
+            _ => Self::Many(Box::new(Bench::new(reduced, unit))),
         }
     }
 
@@ -69,9 +71,9 @@ impl Natural {
 }
 
 impl<const B: usize> Bench<B> {
-    fn new(reduced: &Reduced) -> Self {
+    fn new(reduced: &Reduced, unit: f64) -> Self {
         let zero = [[[0.0; 4]; B]; 2];
-        Self { keeper: Keeper::new(reduced), z: zero, rate: [[0.0; 4]; B] }
+        Self { keeper: Keeper::new(reduced), z: zero, rate: [[0.0; 4]; B], unit }
     }
 }
 
@@ -119,7 +121,7 @@ impl<const B: usize> Code for Land<'_, B> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Option<[f64; 2]> {
-        let Self { bench: Bench { keeper, z, rate }, state, z: elements } = self;
+        let Self { bench: Bench { keeper, z, rate, unit }, state, z: elements } = self;
         let n = elements.len();
         let moved = keeper.put_back::<L>(z);
         // What is not a number is not sound.
@@ -134,7 +136,7 @@ impl<const B: usize> Code for Land<'_, B> {
         }
         let slowed = keeper.put_rates_back::<L>(z, &mut v);
         let mut changes = [[0.0; 2]; MOST];
-        let (mut most, mut fastest) = ([0.0_f64; 2], 1.0_f64);
+        let (mut most, mut fastest) = ([0.0_f64; 2], *unit);
         for (i, change) in changes[..n].iter_mut().enumerate() {
             let (from, away) = (elements[i], vector(&moved.change, i));
             *change = [-arc(from.cross(away), 1.0 - from.dot(away)), -vector(z, i).cross(vector(&slowed, i))];

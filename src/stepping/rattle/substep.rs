@@ -2,7 +2,7 @@
 
 use super::newton::Matrix;
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
-use crate::dynamics::natural::{Demand, Natural, times, upper};
+use crate::dynamics::natural::{Demand, Guide, Natural, times, upper};
 use crate::dynamics::row::Measure;
 use crate::dynamics::tree::{self, size};
 use crate::dynamics::{Form, State, Time, schur};
@@ -17,7 +17,7 @@ const LEFT_OVER: f64 = 1e-13;
 /// Largest change, against the forces, at which a solve that has stopped improving counts as solved.
 const STALLED: f64 = 1e-11;
 
-/// What may be left of a row before the last sweep, at a position where some row is lost.
+/// What may be left of a row before the last sweep, in its unit, at a position where some row is lost.
 const KEPT: f64 = 1e-10;
 
 /// Why a substep failed, with the row or element at fault.
@@ -77,6 +77,9 @@ pub struct Work {
     offset: Vec<f64>,
     /// Right side, then solution (R).
     change: Vec<f64>,
+    /// The unit of each row \[rad, m\] (R), and of length \[m\].
+    unit: Vec<f64>,
+    length: f64,
     /// Largest force, and largest inertia \[N·m, kg·m²\].
     strength: f64,
     inertia: f64,
@@ -103,6 +106,11 @@ impl Work {
         self.plain_demand.resize(guides, Demand::default());
         self.drive.resize(guides, 0.0);
         natural.scales(&mut self.scales);
+        self.length = natural.mechanism().units.length;
+        let of = |guide: &Guide| if matches!(guide.measure, Measure::Angle { .. }) { 1.0 } else { self.length };
+        self.unit.clear();
+        self.unit.resize(rows - guides, 1.0);
+        self.unit.extend(natural.guides().iter().map(of));
         self.newton.resize(&self.scales);
         self.schur.resize(rows * rows, 0.0);
         for column in [&mut self.multiplier, &mut self.guess, &mut self.pivot, &mut self.offset, &mut self.change] {
@@ -244,9 +252,12 @@ impl Work {
             let (mut largest, mut culprit, mut scale) = (0.0, 0, self.scale);
             for p in 0..rows {
                 multiplier[p] += change[p];
-                scale = multiplier[p].abs().max(scale);
-                if change[p].abs() > largest || change[p].is_nan() {
-                    (largest, culprit) = (change[p].abs(), p);
+                // Forces of guides count as moments at the unit of length.
+                let unit = if GUIDED { self.unit[p] } else { 1.0 };
+                let size = change[p].abs() * unit;
+                scale = (multiplier[p].abs() * unit).max(scale);
+                if size > largest || size.is_nan() {
+                    (largest, culprit) = (size, p);
                 }
             }
             if !largest.is_finite() {
@@ -376,7 +387,7 @@ impl Work {
             }
         }
         for (row, change) in change.iter().enumerate() {
-            let is_kept = change.abs() <= KEPT * per_push;
+            let is_kept = change.abs() <= KEPT * per_push * self.unit[row];
             if !is_kept {
                 return Err(Failure::NotConverged(row));
             }
@@ -447,7 +458,8 @@ impl Work {
         let (w, lifted) = (&natural.reduced().inverse[..n * n], &mut self.lifted[..rows * n]);
         self.strength = 0.0;
         for i in 0..n {
-            self.strength = self.strength.max(force[i].re.abs()).max(force[i].im.abs());
+            let unit = if i < bodies { 1.0 } else { self.length };
+            self.strength = self.strength.max(force[i].re.abs() * unit).max(force[i].im.abs() * unit);
             let mut sum = Complex::ZERO;
             for j in 0..n {
                 sum += times(&w[i * n + j], force[j]);

@@ -41,7 +41,7 @@ pub struct Bodies<const B: usize, const S: usize> {
     /// W \[N·m\].
     weight: [Row<B>; 2],
     springs: Springs<B, S>,
-    /// The energy scale \[J\].
+    /// The energy scale times the unit of time \[J s\].
     energy: f64,
     /// Of the step's start, over the columns.
     columns: Vec<Column<B>>,
@@ -112,14 +112,14 @@ impl<const B: usize, const S: usize> Bodies<B, S> {
         Some(Self {
             count: n,
             order,
-            pace: Pace::new(tolerance, order, if S == 0 { longest } else { f64::INFINITY }),
+            pace: Pace::new(tolerance, order, if S == 0 { longest } else { f64::INFINITY }).over(mechanism.units.time),
             rate,
             longest,
             coupling,
             diagonal,
             weight,
             springs,
-            energy: mechanism.energy_scale,
+            energy: mechanism.energy_scale * mechanism.units.time,
             columns: vec![Column { mass: zero, inverse: zero, cos: zero, sin: zero }; n],
             scratch: Box::new(Scratch { e: [[zero; 2]; MOST + 2], v: [[zero; 3]; MOST + 1] }),
         })

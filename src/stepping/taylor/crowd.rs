@@ -178,6 +178,8 @@ struct Seat {
     entrant: Option<usize>,
     pace: Pace,
     time: Time,
+    /// The mechanism's unit of time \[s\].
+    unit: f64,
     /// The last step wanted and the one taken \[s\].
     wanted: f64,
     taken: f64,
@@ -190,7 +192,7 @@ impl Seat {
         let stop = |cause, what: &str| stop(cause, &State { time: self.time, ..State::default() }, self.taken, what.into(), hint);
         if self.wanted.is_nan() {
             Err(stop(Cause::NotFinite, "the series is not finite"))
-        } else if self.wanted < 1e-14 * self.time.hi.abs().max(1e-3) {
+        } else if self.wanted < 1e-14 * self.time.hi.abs().max(1e-3 * self.unit) {
             Err(stop(Cause::StepTooSmall, "the series converges in ever smaller circles"))
         } else {
             tally.check("taylor", self.time.hi, self.taken)
@@ -265,7 +267,7 @@ fn march<L: Lanes, const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], unti
         powers: [power; MOST + 1],
     };
     let mut teams = Box::new([team.clone(), team]);
-    let empty = Seat { entrant: None, pace: Pace::new(1.0, order, 0.0), time: until, wanted: 0.0, taken: 0.0 };
+    let empty = Seat { entrant: None, pace: Pace::new(1.0, order, 0.0), time: until, unit: 1.0, wanted: 0.0, taken: 0.0 };
     let mut seats: [Seat; WIDTH * TEAMS] = std::array::from_fn(|_| empty.clone());
     let mut waiting = 0;
     loop {
@@ -279,7 +281,9 @@ fn march<L: Lanes, const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], unti
                         let entrant = &entrants[index];
                         team.seat(lane, entrant);
                         let longest = order as f64 / 3.0 / entrant.mechanism.tree.fastest_rate(&[]);
-                        (seat.pace, seat.time) = (Pace::new(crowd.tolerance, order, longest), entrant.state.time);
+                        (seat.pace, seat.time) =
+                            (Pace::new(crowd.tolerance, order, longest).over(entrant.mechanism.units.time), entrant.state.time);
+                        seat.unit = entrant.mechanism.units.time;
                     }
                     None => team.park(lane),
                 }

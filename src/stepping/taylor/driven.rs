@@ -41,7 +41,7 @@ pub struct Driven {
     load: [[[f64; 4]; 2]; MOST + 1],
     /// Fastest rate: small oscillations, and the motor \[rad/s\].
     rate: f64,
-    /// What an error of the unit vectors comes to in the work, over the energy scale: a part, and a part times the free body's rate \[s\].
+    /// What an error of the unit vectors comes to in the work, over the energy scale and the unit of time: a part \[1/s\], and a part times the free body's rate.
     share: [f64; 2],
 }
 
@@ -110,7 +110,7 @@ impl Driven {
         let stiffness = pull.norm_squared().sqrt() + a.abs() * w * w;
         let rate = (stiffness / d).sqrt().max(w.abs());
         let (swing, weight) = ((w * a).abs() / mechanism.energy_scale, tree.weight[driven]);
-        let share = [swing * w.abs() + weight.norm_squared().sqrt() / mechanism.energy_scale, swing];
+        let share = [swing * w.abs() + weight.norm_squared().sqrt() / mechanism.energy_scale, swing].map(|share| share / mechanism.units.time);
         Some(Self { law: law.clone(), coupling: a, weight, load, rate, share })
     }
 

@@ -1,14 +1,14 @@
 //! The series of any mechanism about a step's start, and how far it carries.
 
 use super::{JUDGES, LEADING};
-use crate::arithmetic::DoubleDouble;
+use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::series::polynomial::{integral, tail};
 use crate::dynamics::series::{Coefficient, Series};
 use crate::dynamics::{Coordinates, Mechanism, State, Time};
 
 /// Largest share of a motion that its last powers may have, however small it is: beyond, the powers left out are the larger ones.
 const SHARE: f64 = 1e-3;
-/// The step where every power but the first vanishes \[s\].
+/// The step where every power but the first vanishes, in units of time.
 const LONGEST: f64 = 1e9;
 
 /// Series and what goes into them.
@@ -98,7 +98,13 @@ impl<T: Coefficient> Expansion<T> {
     /// of them is.
     pub fn wanted(&self, tolerance: f64, with_vectors: bool) -> f64 {
         let (order, f) = (self.series.order(), self.series.coordinates());
-        let largest = |k: usize| self.series.rate[k * f..(k + 1) * f].iter().fold(0.0, |most, rate| larger(most, rate.value()));
+        let units = self.mechanism.units;
+        let angles = if self.coordinates == Coordinates::All { self.mechanism.bodies.len() } else { self.mechanism.ties.turning() };
+        let largest = |k: usize| {
+            let rates = &self.series.rate[k * f..(k + 1) * f];
+            let turning = rates[..angles].iter().fold(0.0, |most, rate| larger(most, rate.value()));
+            rates[angles..].iter().fold(turning, |most, rate| larger(most, rate.value() / units.length)) * units.time
+        };
         let last: [f64; JUDGES] = std::array::from_fn(|i| largest(order - i));
         if last[0].is_nan() {
             return f64::NAN;
@@ -112,11 +118,13 @@ impl<T: Coefficient> Expansion<T> {
             let n = self.mechanism.coordinates();
             for k in order + 2 - JUDGES..=order + 1 {
                 let vectors = &self.series.z[k * n..(k + 1) * n];
-                let size = vectors.iter().fold(0.0, |most, z| larger(larger(most, z.re.value()), z.im.value()));
+                let of = |vectors: &[Complex<T>]| vectors.iter().fold(0.0, |most, z| larger(larger(most, z.re.value()), z.im.value()));
+                let (turning, sliding) = vectors.split_at(self.mechanism.bodies.len());
+                let size = larger(of(turning), of(sliding) / units.length);
                 least = least.min(minus_log2(size) / k as f64);
             }
         }
-        let step = libm::exp2(least + libm::log2(tolerance) / (order + 1) as f64).min(LONGEST);
+        let step = libm::exp2(least + libm::log2(tolerance) / (order + 1) as f64).min(LONGEST * units.time);
         let beginning = largest(0).max(largest(1) * step);
         if tolerance < 0.1 * SHARE * beginning || last == [0.0; JUDGES] { step } else { self.shortened(&last, largest, step) }
     }

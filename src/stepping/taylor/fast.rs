@@ -200,7 +200,7 @@ impl Fast {
     /// The kernel, where there is one; `is_extended`: with the first orders in double-double.
     pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize, is_portable: bool, is_extended: bool) -> Option<Self> {
         let settings = || Settings { mechanism: mechanism.clone(), tolerance, order, is_portable, is_extended };
-        let pace = |longest| Pace::new(tolerance, order, longest);
+        let pace = |longest| Pace::new(tolerance, order, longest).over(mechanism.units.time);
         let form = if is_extended {
             let pair = Pair::new(mechanism).filter(|_| order == EXTENDED)?;
             let pace = pace(pair.longest(order));

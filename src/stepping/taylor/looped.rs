@@ -40,6 +40,9 @@ pub struct Looped<const B: usize> {
     count: usize,
     order: usize,
     log_tolerance: f64,
+    /// log2 of the longest step, 2^30 units of time, and the unit of time \[s\].
+    longest: f64,
+    unit: f64,
     /// W, S and V, and the linear rows.
     keeper: Keeper<B>,
     /// Gravity and constant forces, and the share of the latter \[N·m\].
@@ -92,6 +95,8 @@ impl<const B: usize> Looped<B> {
             count: n,
             order,
             log_tolerance: libm::log2(tolerance),
+            longest: 30.0 + libm::log2(mechanism.units.time),
+            unit: mechanism.units.time,
             keeper: Keeper::new(reduced),
             weight,
             applied,
@@ -281,7 +286,7 @@ fn pace<L: Lanes, const B: usize>(looped: &Looped<B>) -> (f64, usize) {
             most = L::of(looped.z[k + 1][1][b]).abs().max(most);
         }
         let size = most.array().into_iter().fold(0.0, |a, b| if a > b { a } else { b }) * (k + 1) as f64;
-        roots[k % JUDGES] = minus_log2(size) / k as f64;
+        roots[k % JUDGES] = minus_log2(size * looped.unit) / k as f64;
         let least = roots.iter().fold(f64::INFINITY, |a, &b| if a < b { a } else { b });
         let allowed = least + looped.log_tolerance / (k + 1) as f64;
         if k >= LEAST && allowed > best {
@@ -290,7 +295,7 @@ fn pace<L: Lanes, const B: usize>(looped: &Looped<B>) -> (f64, usize) {
     }
     let last = &looped.z[looped.order + 1];
     let is_finite = last.iter().flatten().flatten().fold(0.0, |most, &z| larger(most, z)).is_finite();
-    if is_finite { (libm::exp2(best.min(30.0)), chosen) } else { (f64::NAN, chosen) }
+    if is_finite { (libm::exp2(best.min(looped.longest)), chosen) } else { (f64::NAN, chosen) }
 }
 
 /// Σ z_k h^k without power zero, and the rates.

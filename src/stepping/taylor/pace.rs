@@ -1,7 +1,7 @@
 //! The step from the last coefficients, without a logarithm or a power function.
 //!
 //! ```text
-//! h = tolerance^(1/(P+1)) min_k |v_k|^(-1/k),   k = P-4…P
+//! h = tolerance^(1/(P+1)) min_k |v_k|^(-1/k),   k = P-4…P,   v_k over the unit of rates
 //! ```
 //!
 //! which puts the first term left out of a rate at the tolerance.  The logarithm taken straight from the bits of a double is piecewise linear, its error
@@ -16,12 +16,19 @@ pub struct Pace {
     exponent: f64,
     /// The longest step \[s\].
     longest: f64,
+    /// The bits of the unit of rates \[rad/s\], a power of two.
+    unit: i64,
 }
 
 impl Pace {
     /// For a tolerance \[rad/s\] and an order, with a longest step \[s\].
     pub fn new(tolerance: f64, order: usize, longest: f64) -> Self {
-        Self { exponent: libm::log2(tolerance) / (order + 1) as f64, longest }
+        Self { exponent: libm::log2(tolerance) / (order + 1) as f64, longest, unit: 1f64.to_bits() as i64 }
+    }
+
+    /// The same for a tolerance in rad over a unit of time \[s\], a power of two.
+    pub fn over(self, time: f64) -> Self {
+        Self { unit: (1.0 / time).to_bits() as i64, ..self }
     }
 
     /// The step from the largest coefficients of orders P, P-1, … \[s\]; the longest one where they vanish.
@@ -35,7 +42,7 @@ impl Pace {
     pub fn step_of(&self, order: usize, largest: &[f64; JUDGES]) -> f64 {
         let mut least = f64::INFINITY;
         for (i, &size) in largest.iter().enumerate() {
-            let log = (1f64.to_bits() as i64 - size.to_bits() as i64) as f64;
+            let log = (self.unit - size.to_bits() as i64) as f64;
             let root = log * (1.0 / ((1_u64 << 52) as f64 * (order - i) as f64));
             least = if root < least { root } else { least };
         }
