@@ -3,13 +3,13 @@
 //! The step is repeated to end on the event, so that the state there has the accuracy of a step and not of its interpolation.  Where the dense output comes
 //! so near to zero that it does not know the side, the step is repeated to end at the minimum, and what is looked at then has the accuracy of a step, too.
 
-use super::search::{Chebyshev, Crossing, Curve, Part, ROUNDING, crossing, doubtful, root, shift, value};
+use super::search::{Chebyshev, Crossing, Curve, Part, ROUNDING, TOUCH, crossing, doubtful, root, shift, value};
 use super::{Tally, finest};
 use crate::dynamics::{Along, Field, State};
 use std::cell::RefCell;
 
 /// Steps an event is landed on with, at most.
-const LANDINGS: usize = 8;
+const LANDINGS: usize = 12;
 /// A value that is zero where a step ends on it.
 const ZERO: f64 = 1e-15;
 /// Times a step is repeated to end at a minimum.
@@ -275,7 +275,7 @@ impl Search {
         tally: &mut Tally,
     ) -> Option<f64> {
         self.gaps.resize(field.events(), 0.0);
-        let mut best = h;
+        let (mut best, mut low, mut high) = (h, 0.0, 1.1 * h);
         let (mut before, mut gap_before) = (0.0, f64::NAN);
         for attempt in 1..=LANDINGS {
             if !step.repeat(field, state, best, tally) {
@@ -301,8 +301,11 @@ impl Search {
                 None => (gap - gap_before) / (best - before),
             };
             (before, gap_before) = (best, gap);
+            // Where it opens again the passage lies behind.
+            *(if gap > 0.0 && (known.is_none() || slope < 0.0) { &mut low } else { &mut high }) = best;
             let moved = best - gap / slope;
-            if !(moved.is_finite() && (moved - h).abs() < 0.1 * h) || moved == best {
+            let moved = if moved > low && moved < high { moved } else { 0.5 * (low + high) };
+            if (moved - best).abs() <= f64::EPSILON * best {
                 break;
             }
             best = moved;
@@ -331,6 +334,8 @@ impl Search {
 /// What comes first: that which was found, or what this event function, off by `zone` at most, has to say.
 fn earlier(found: Found, event: usize, curve: &impl Curve, zone: f64, off: impl Fn(f64) -> f64) -> Found {
     let end = found.share();
+    // Below, it is known as well as zero is.
+    let zone = if zone < 0.1 * TOUCH { 0.0 } else { zone };
     // Most steps end here.
     if zone > 0.0 && curve.at(0.0)[0] > zone && root(curve, zone, 0.0, end).is_none() {
         return found;

@@ -18,6 +18,8 @@
 pub const TOUCH: f64 = 1e-12;
 /// Share of the step below which two zeros are one.
 const CLOSE: f64 = 1e-9;
+/// Dips into the zone of doubt that are looked at in a step.
+const DIPS: usize = 64;
 /// Parts looked at before signs at the ends of what is left decide: by then there is nothing but rounding.
 const MOST: usize = 4000;
 /// Share of the step from which on down a power series is taken about the middle of a part.
@@ -102,17 +104,17 @@ pub fn crossing(curve: &impl Curve, end: f64) -> Crossing {
 /// values are `off(t) <= zone` from the truth.
 pub fn doubtful(curve: &impl Curve, zone: f64, off: impl Fn(f64) -> f64, end: f64, passes: Option<f64>) -> Option<f64> {
     let mut begin = 0.0;
-    while begin < end {
+    for _ in 0..DIPS {
         let low = if curve.at(begin)[0] < zone { begin } else { root(curve, zone, begin, end)? };
-        // Above the level by more than rounding.
-        let high = root(curve, zone * (1.0 + 1e-9) + f64::EPSILON, low, end).unwrap_or(end);
+        // So far above the level it came down to that rounding makes no dips.
+        let high = root(curve, 2.0 * zone, low, end).unwrap_or(end);
         if curve.at(low)[1] < 0.0 && curve.at(high)[1] > 0.0 {
             let lowest = turn(curve, low, high);
             if curve.at(lowest)[0].abs() < off(lowest) {
                 return Some(lowest);
             }
         }
-        if high <= begin || passes.is_some_and(|passes| passes <= high) {
+        if high >= end || passes.is_some_and(|passes| passes <= high) {
             break;
         }
         begin = high;
