@@ -3,7 +3,7 @@
 mod common;
 
 use common::{pendulum, quarter_period, run};
-use driftless::run::{MethodId, Outcome, Request, Stabilization, Sweep, Vary, sweep};
+use driftless::run::{MethodId, Outcome, Point, Request, Stabilization, Sweep, Vary, sweep};
 use driftless::scene::{Scene, Template, Wall, parse_scene};
 use driftless::stepping::Cause;
 use std::f64::consts::PI;
@@ -177,7 +177,7 @@ fn a_bar_on_a_torsion_spring_turns_over_when_it_does() {
             }
         };
         let mut flips = Vec::new();
-        sweep(&plan, 1, &mut |point: &driftless::run::Point| {
+        sweep(&plan, 1, &mut |point: &Point| {
             flips.push(point.flip.map_or(f64::NAN, |flip| flip.t));
             Ok(())
         })
