@@ -185,8 +185,8 @@ impl Search {
                     let landed = self.land(field, step, state, shorter, event, tally);
                     return landed.map_or(Met::Failed, |h| Met::Event(h, event));
                 }
-                Found::Near(_) if shorter <= finest(state) => break,
-                Found::Inside(_) if shorter <= finest(state) => return Met::AtRest,
+                Found::Near(_) if shorter <= finest(state, field.time_unit()) => break,
+                Found::Inside(_) if shorter <= finest(state, field.time_unit()) => return Met::AtRest,
                 Found::Inside(_) | Found::Near(_) => {
                     if !step.repeat(field, state, shorter, tally) {
                         return Met::Failed;

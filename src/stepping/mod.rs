@@ -191,6 +191,10 @@ pub enum Cause {
     SpringWithoutLength,
     /// A point came to rest on a wall, and it could not be held there or the motors leave it no freedom.
     RestingContact,
+    /// A point was found behind a wall, or away from the wall it is held at: an impact was missed.
+    WallPassed,
+    /// An impact was not what the law of impact makes of the motion before it, or the first sample is not the start.
+    ImpactCheckFailed,
     /// The method does not fit the mechanism.
     Unsuited,
     /// A stated drift limit was exceeded.
@@ -210,6 +214,8 @@ impl Cause {
             Self::BranchLost => "branch_lost",
             Self::SpringWithoutLength => "spring_without_length",
             Self::RestingContact => "resting_contact",
+            Self::WallPassed => "wall_passed",
+            Self::ImpactCheckFailed => "impact_check_failed",
             Self::Unsuited => "unsuited",
             Self::DriftLimit => "drift_limit",
         }

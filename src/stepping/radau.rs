@@ -366,7 +366,7 @@ impl<F: Field + ?Sized> Method<F> for Radau {
                     Met::Whole => {}
                     Met::Short(short) => (h, reached) = (short, None),
                     Met::Event(short, event) => (h, reached) = (short, Some(Reached::Event(event))),
-                    Met::Failed if h > super::finest(state) => {
+                    Met::Failed if h > super::finest(state, field.time_unit()) => {
                         tally.rejected += 1;
                         (is_hard, control.wanted) = (true, h / 8.0);
                         continue;

@@ -291,7 +291,7 @@ impl<T: Coefficient> Taylor<T> {
             match search::crossing(&Powers { powers, end: first }, first) {
                 Crossing::Nothing => {}
                 Crossing::At(t) => (first, event) = (t, Some(contact)),
-                Crossing::Inside(t) if t > super::finest(state) => (first, event) = (t, None),
+                Crossing::Inside(t) if t > super::finest(state, problem.time_unit()) => (first, event) = (t, None),
                 Crossing::Inside(_) => {
                     return Err(super::at_rest("taylor", state, h));
                 }

@@ -109,12 +109,14 @@ proptest! {
     fn the_first_of_random_zeros_is_found(first in 0.01..0.9_f64, apart in -8.0..-0.5_f64, others in prop::collection::vec(1.1..3.0_f64, 0..8)) {
         // Two zeros close together, the others beyond the step.
         let mut roots = vec![first, first + 10_f64.powf(apart)];
-        roots.extend(others);
+        roots.extend(&others);
         let powers = through(&roots, if roots.len() % 2 == 0 { 1.0 } else { -1.0 });
+        // The dip is a parabola, and its powers are rounded.
+        let bend: f64 = others.iter().map(|root| root - first).product();
+        let unsure = 1e-9 + (10.0 * f64::EPSILON * size(&powers, 1.0) / bend).sqrt();
         match crossing(&powers, 1.0) {
-            Crossing::At(t) => prop_assert!((t - first).abs() < 1e-7 * (1.0 + 1e-8 / 10_f64.powf(apart)), "{t} {first}"),
-            // So flat that rounding fills the dip.
-            other => prop_assert!(apart < -6.5, "{other:?}"),
+            Crossing::At(t) => prop_assert!((t - first).abs() < unsure, "{t} {first} {unsure:e}"),
+            other => prop_assert!(10_f64.powf(apart) < unsure, "{other:?} {unsure:e}"),
         }
     }
 
@@ -143,7 +145,7 @@ fn a_minimum_whose_side_is_unknown_is_told() {
         let found = doubtful(&curve, 1e-6, |_| 1e-6, 1.0, passes);
         assert_eq!(found.is_none(), is_known, "{height}: {found:?}");
         assert!(found.is_none_or(|t| (t - 0.6).abs() < 1e-9), "{found:?}");
-        // Exact where the dip is.
-        assert_eq!(doubtful(&curve, 1e-6, |t| 1e-6 * (t - 0.6).abs(), 1.0, passes), None);
+        // Known well enough where the dip is, and nowhere else.
+        assert!(height == 0.0 || doubtful(&curve, 1e-6, |t| 1e-6 * (t - 0.6).abs(), 1.0, passes).is_none());
     }
 }
