@@ -20,7 +20,7 @@ pub struct Flip {
 }
 
 /// Share of a step that is interpolated at once; of larger parts it is only asked whether a bar can pass.
-const SMALLEST: f64 = 0.25;
+const SMALLEST: f64 = 1.0 / 16.0;
 /// Degrees of the interpolants, and what the last coefficients may be \[rad\].
 const DEGREES: [usize; 3] = [8, 16, 32];
 const RESOLVED: f64 = 1e-10;
