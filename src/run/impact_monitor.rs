@@ -24,6 +24,7 @@ const UNMOVED: f64 = 1e-12;
 const CLOSED: f64 = 1e-9;
 
 /// What an impact claims to have done.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Claim {
     /// The contact.
     pub contact: usize,
@@ -213,4 +214,83 @@ fn slips(mechanism: &Mechanism, before: &Motion, after: &Motion) -> Result<[f64;
         }
     }
     Ok(worst)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::parse_scene;
+
+    /// A motion just before its impact.
+    fn met(scene: &str) -> (Mechanism, Motion) {
+        let scene = parse_scene(scene, "test", &[]).expect("a scene");
+        let mechanism = Mechanism::new(&scene).expect("a mechanism");
+        let start = mechanism.start(&scene);
+        (mechanism, start)
+    }
+
+    /// The motion after it as the impact code has it, and what it claims.
+    fn struck(mechanism: &Mechanism, before: &Motion) -> (Motion, Claim) {
+        let plain = |numbers: &[DoubleDouble]| numbers.iter().map(|x| x.hi).collect::<Vec<_>>();
+        let impact = mechanism.strike(0, before.time, &plain(&before.phi), &plain(&before.omega)).expect("a rebound");
+        let omega = impact.omega.iter().map(|&omega| DoubleDouble::from(omega)).collect();
+        let after = Motion { omega, work: before.work + impact.motor_work, ..before.clone() };
+        (after, Claim { contact: 0, impulse: impact.impulse, energy_lost: impact.motor_work - impact.energy_change })
+    }
+
+    /// A rod that falls on its lower end, and a cart that carries a driven arm against a stop.
+    const SCENES: [&str; 2] = [
+        r#"{"name": "rod", "gravity": [0, -9.81], "bars": [{"name": "rod", "mass": 2, "centre": [0.5, 0], "inertia": 0.2, "length": 1}],
+            "walls": [{"name": "floor", "body": "rod", "point": [0, 0], "line": {"through": [0, 0], "normal": [0, 1]}, "restitution": 0.6}],
+            "start": {"rod": {"phi": 0.4, "omega": 1.1, "origin": [3, 0], "velocity": [0.3, -2]}}, "until": 1, "every": 1}"#,
+        r#"{"name": "cart", "gravity": [0, -9.81], "bars": [{"name": "cart", "mass": 2, "centre": [0, 0], "inertia": 0.1, "length": 0.1},
+                {"name": "arm", "mass": 0.5, "centre": [0.3, 0], "inertia": 0.02, "length": 0.6}],
+            "hinges": [{"name": "H", "between": [{"body": "cart", "point": [0, 0]}, {"body": "arm", "point": [0, 0]}]}],
+            "sliders": [{"name": "rail", "point": {"body": "cart", "point": [0, 0]},
+                "rail": {"body": "ground", "point": [0, 0], "direction": [1, 0]}, "angle": "locked"}],
+            "motors": [{"name": "motor", "body": "arm", "law": {"start": 0.7, "rate": -3}}],
+            "walls": [{"name": "stop", "body": "arm", "point": [0.6, 0],
+                "line": {"through": [0.4589053124, 0], "normal": [-1, 0]}, "restitution": 0.3}],
+            "start": {"cart": {"phi": 0, "origin": [0, 0], "velocity": [1, 0]}}, "until": 1, "every": 1}"#,
+    ];
+
+    #[test]
+    fn right_impacts_pass_and_wrong_ones_do_not() {
+        for scene in SCENES {
+            let (mechanism, before) = met(scene);
+            let (after, claim) = struck(&mechanism, &before);
+            let tell = |after: &Motion, claim: &Claim| check(&mechanism, 1e-9, &before, after, claim);
+            assert_eq!(tell(&after, &claim), Ok(()), "{scene}");
+            let said = |wrong: Result<(), String>, words: &str| {
+                let what = wrong.expect_err(words);
+                assert!(what.contains(words), "{what}");
+            };
+            said(tell(&after, &Claim { impulse: 1.000_1 * claim.impulse, ..claim }), "impulse");
+            said(tell(&after, &Claim { energy_lost: claim.energy_lost + 1e-6, ..claim }), "are lost");
+            said(tell(&Motion { work: after.work + 1e-6, ..after.clone() }, &claim), "kinetic energy");
+            for k in 0..before.phi.len() {
+                let mut moved = after.clone();
+                moved.phi[k] += DoubleDouble::from(1e-9);
+                said(tell(&moved, &claim), "changed by");
+                let mut turned = after.clone();
+                turned.omega[k] += DoubleDouble::from(1e-4);
+                assert!(tell(&turned, &claim).is_err(), "rate {k}");
+            }
+            // As though nothing had been met at all.
+            said(tell(&before, &claim), "leaves at");
+        }
+    }
+
+    #[test]
+    fn an_impact_away_from_its_wall_and_a_start_elsewhere_are_told() {
+        let (mechanism, mut before) = met(SCENES[0]);
+        before.phi[2] += DoubleDouble::from(1e-3);
+        let (after, claim) = struck(&mechanism, &before);
+        assert!(check(&mechanism, 1e-9, &before, &after, &claim).is_err_and(|what| what.contains("from the wall")));
+        assert!(is_start(&mechanism, &before, &after, false).is_ok());
+        assert!(is_start(&mechanism, &before, &after, true).is_err_and(|what| what.contains("rate")));
+        let mut elsewhere = before.clone();
+        elsewhere.phi[2] += DoubleDouble::from(1e-6);
+        assert!(is_start(&mechanism, &before, &elsewhere, true).is_err_and(|what| what.contains("y of rod")));
+    }
 }

@@ -169,4 +169,44 @@ mod tests {
             assert!((found - at(1.0 + 2.0 * share)).abs() < 1e-13);
         }
     }
+
+    /// A ball over a floor, and where it is.
+    fn ball() -> (Mechanism, Glance) {
+        let scene = r#"{"name": "ball", "gravity": [0, -9.81], "bars": [{"name": "ball", "mass": 1, "centre": [0, 0], "inertia": 0.1}],
+            "walls": [{"name": "floor", "body": "ball", "point": [0, 0], "line": {"through": [0, 0], "normal": [0, 1]}, "restitution": 0.5}],
+            "start": {"ball": {"phi": 0, "omega": 0, "origin": [3, 1], "velocity": [0, 0]}}, "until": 1, "every": 1}"#;
+        let scene = crate::scene::parse_scene(scene, "test", &[]).expect("a scene");
+        let glance = Glance { phi: vec![0.0, 3.0, 1.0], turns: vec![0; 3], omega: vec![0.0, 0.0, -2.0] };
+        (Mechanism::new(&scene).expect("a mechanism"), glance)
+    }
+
+    #[test]
+    fn what_is_behind_a_wall_or_left_it_is_told() {
+        let (mechanism, mut glance) = ball();
+        let (guard, held) = (WallGuard::new(1e-9), mechanism.holding(&[0]));
+        assert!(guard.look(&mechanism, 0.0, &glance).is_ok());
+        let stop = guard.look(&held, 0.5, &glance).expect_err("it is above").stop("dp8");
+        assert!(stop.what.contains("held at wall floor") && stop.t == 0.5 && stop.cause == Cause::WallPassed, "{stop}");
+        glance.phi[2] = -1e-6;
+        let stop = guard.look(&mechanism, 0.5, &glance).expect_err("it is below").stop("dp8");
+        assert!(stop.what.contains("1.000e-6 m behind wall floor"), "{stop}");
+    }
+
+    #[test]
+    fn a_dip_inside_a_step_is_found_where_both_ends_are_in_front() {
+        let (mechanism, glance) = ball();
+        // y = (t - 0.3)² - depth on [0, 1], met at no end of it.
+        for (depth, is_behind) in [(1e-4, true), (1e-8, true), (-1e-4, false)] {
+            let at = |t: f64| Glance {
+                phi: vec![0.0, 3.0, (t - 0.3) * (t - 0.3) - depth],
+                omega: vec![0.0, 0.0, 2.0 * (t - 0.3)],
+                ..glance.clone()
+            };
+            let mut guard = WallGuard::new(1e-9);
+            guard.begin(&mechanism, 0.0, &at(0.0));
+            assert_eq!(guard.step(&mechanism, 1.0, &at(1.0)), Ok(Some(0)));
+            let found = guard.search(&mechanism, 0, |share| Some((share, at(share))));
+            assert_eq!(found.is_err(), is_behind, "{depth:e}");
+        }
+    }
 }
