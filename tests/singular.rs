@@ -72,9 +72,7 @@ fn solve(mut matrix: Vec<Vec<DoubleDouble>>) -> Vec<f64> {
         let pivot = matrix[p].clone();
         for row in &mut matrix[p + 1..] {
             let factor = row[p] / pivot[p];
-            for k in p..=n {
-                row[k] = row[k] - factor * pivot[k];
-            }
+            row.iter_mut().zip(&pivot).skip(p).for_each(|(x, &pivot)| *x -= factor * pivot);
         }
     }
     let mut x = vec![DoubleDouble::ZERO; n];
@@ -136,9 +134,8 @@ fn reference(scene: &Value, phi: &[f64], omega: &[f64]) -> Vec<f64> {
         }
     }
     for (r, row) in rows.iter().enumerate() {
-        for k in 0..n {
-            matrix[n + r][k] = row[k];
-            matrix[k][n + r] = row[k];
+        for (k, &entry) in row[..n].iter().enumerate() {
+            (matrix[n + r][k], matrix[k][n + r]) = (entry, entry);
         }
         matrix[n + r][size] = row[n];
     }
@@ -304,23 +301,20 @@ fn regular_linkages(wanted: usize, seed: u64) -> Count {
         count.left_out += usize::from(!is_sound);
         for found in &found {
             let off = difference(&scene, found, &expected, &omega);
-            if !(off <= count.accelerations) {
-                count.accelerations = off;
-                eprintln!("accelerations {off:.1e} off: {scene}");
-            }
+            count.accelerations = count.accelerations.max(if off.is_nan() { f64::INFINITY } else { off });
         }
         for outcome in &outcomes {
             if let Some(stop) = &outcome.stop {
                 count.stopped.push(format!("{kind:?} {stop}\n{scene}"));
             }
-            if !(outcome.drift.energy.max < 1e-7) {
+            if outcome.drift.energy.max.is_nan() || outcome.drift.energy.max >= 1e-7 {
                 count.apart.push(format!("{kind:?} energy {:.1e} by {}\n{scene}", outcome.drift.energy.max, outcome.plan.method));
             }
         }
         let [one, other] = &outcomes;
         if one.stop.is_none() && other.stop.is_none() {
             let off = one.last.phi.iter().zip(&other.last.phi).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            if !(off < 1e-7) {
+            if off.is_nan() || off >= 1e-7 {
                 count.apart.push(format!("{kind:?} {off:.1e} rad\n{scene}"));
             }
         }
@@ -345,14 +339,7 @@ fn assert_regular(count: &Count) {
 
 /// Mass ratios, short cranks and levers to 1e-9.
 #[test]
-fn light_members_and_long_levers_make_no_singular_position() {
-    assert_regular(&regular_linkages(60, 1));
-}
-
-/// The same for many.
-#[test]
-#[ignore = "takes a minute"]
-fn a_thousand_linkages_with_light_members_have_no_singular_position() {
+fn a_thousand_linkages_with_light_members_and_long_levers_have_no_singular_position() {
     assert_regular(&regular_linkages(1000, 2));
 }
 
@@ -398,8 +385,9 @@ fn a_series_does_not_leap_where_nothing_is_singular() {
     }
 }
 
-/// A four-bar whose longest and shortest links are together as long as the others, on its way to the position with all links in line.
-fn change_point(random: &mut Random) -> (f64, Value) {
+/// A four-bar with two links together as long as the others, on its way to the position with all links in line, and whether it is a parallelogram; `None` where the lengths
+/// do not close.
+fn change_point(random: &mut Random) -> Option<(bool, Value)> {
     let (a, k) = (random.between(0.3, 1.0), random.between(0.5, 1.5));
     // A parallelogram now and then, of which the coupler stays parallel; else the sum of two links is that of the others.
     let is_parallelogram = random.next() < 0.3;
@@ -447,10 +435,7 @@ fn change_points(wanted: usize, seed: u64) {
     let mut random = Random(seed);
     let (mut passed, mut stopped, mut seen, mut near) = (0, 0, 0, 0);
     while seen < wanted {
-        let (kind, scene) = change_point(&mut random);
-        if kind.is_nan() {
-            continue;
-        }
+        let Some((is_parallelogram, scene)) = change_point(&mut random) else { continue };
         let scene = parsed(&scene.to_string());
         if Mechanism::new(&scene).is_err() {
             continue;
@@ -467,7 +452,7 @@ fn change_points(wanted: usize, seed: u64) {
                 stopped += 1;
             } else if finest.stop.is_none() {
                 assert!(
-                    keeps_its_branch(&outcome, kind == 0.0, &finest.last.phi),
+                    keeps_its_branch(&outcome, is_parallelogram, &finest.last.phi),
                     "{method} {rtol:e}: {:?}\n{:?}\n{scene:?}",
                     outcome.last.phi,
                     finest.last.phi
@@ -481,12 +466,6 @@ fn change_points(wanted: usize, seed: u64) {
 }
 
 #[test]
-fn change_points_are_passed_on_the_right_branch() {
-    change_points(40, 3);
-}
-
-#[test]
-#[ignore = "takes a minute"]
 fn two_hundred_change_points_are_passed_on_the_right_branch() {
     change_points(200, 4);
 }

@@ -207,7 +207,7 @@ impl<T: Real> Kernel<T> {
                 _ => self.constrain::<N, 0>(mechanism, t, phi, omega, bias),
             }
         }
-        self.is_exact = T::IS_PLAIN && self.weakest.is_delicate;
+        self.is_exact = self.is_delicate(mechanism);
         if self.is_exact {
             self.accelerate_exactly(mechanism, t, phi, omega, bias);
         }

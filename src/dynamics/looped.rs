@@ -26,6 +26,9 @@ pub const MOST: usize = 16;
 /// Share of a pivot of S below which the angle form takes over.
 pub const NEAR: f64 = 1e-2;
 
+/// Part of a product with W that may cancel.
+const WORST: f64 = 1e4;
+
 /// Equations in angles and rates, solved in natural coordinates.
 #[derive(Clone, Debug)]
 pub struct Looped {
@@ -66,7 +69,13 @@ pub fn reduced(mechanism: &Mechanism) -> Option<Reduced> {
         return None;
     }
     let (linear, guides) = sorted_rows(mechanism);
-    if guides.is_empty() { Reduced::new(mechanism, linear).ok() } else { None }
+    if !guides.is_empty() {
+        return None;
+    }
+    let reduced = Reduced::new(mechanism, linear).ok()?;
+    // Light members that carry heavy ones: W has entries that cancel everywhere, M in angles only where these are in line.
+    let is_sound = reduced.free.iter().zip(&mechanism.tree.diagonal).all(|(free, diagonal)| free * diagonal < WORST);
+    is_sound.then_some(reduced)
 }
 
 impl Looped {

@@ -106,7 +106,7 @@ impl Metric {
 
 /// True of a share that is too small, or no number.
 fn is_dependent(share: f64) -> bool {
-    !(share >= DROPPED)
+    share.is_nan() || share < DROPPED
 }
 
 impl Verdict {
@@ -120,7 +120,7 @@ impl Verdict {
     pub fn settle(&self, mass: Weakest, again: impl FnOnce(&[bool]) -> f64) -> Weakest {
         let is_right = mass.share >= DROPPED && !self.is_left_out.contains(&true);
         let share = if is_right { mass.share } else { again(&self.is_left_out) };
-        Weakest { is_delicate: !(share >= LOSS * self.kept), ..self.weakest }
+        Weakest { is_delicate: share.is_nan() || share < LOSS * self.kept, ..self.weakest }
     }
 }
 

@@ -52,12 +52,21 @@ impl Weakest {
             return T::ZERO;
         }
         let share = pivot.value() / scale;
-        if !(share >= self.share) {
+        if share.is_nan() || share < self.share {
             *self = Self { share, row, is_delicate: false };
         }
         // Where rounding has eaten it, more digits are needed.
         if pivot.value() > 0.0 { T::ONE / pivot } else { T::ZERO }
     }
+}
+
+/// Diagonal of M over its pivots from which on so many digits are lost in M⁻¹ that S is delicate.
+const DEEP: f64 = 1e4;
+
+/// True where light members carry heavy ones in line: reciprocal pivots of M against its diagonal.
+#[inline(always)]
+pub fn is_deep<T: Real>(pivot: &[T], diagonal: impl Iterator<Item = f64>) -> bool {
+    pivot.iter().zip(diagonal).any(|(pivot, diagonal)| pivot.value() * diagonal > DEEP)
 }
 
 impl Measure {

@@ -38,7 +38,7 @@ use self::rows::RowSeries;
 use self::spring::SpringSeries;
 use super::impact::Contact;
 use super::row::Measure;
-use super::schur::Weakest;
+use super::schur::{self, Weakest};
 use super::ties::Ties;
 use super::tree::{self, size};
 use super::{Coordinates, Mechanism, Time};
@@ -297,6 +297,8 @@ impl<T: Coefficient> Series<T> {
         }
         if !self.rows.is_empty() {
             self.rows.prepare(&self.ties, &self.z[..n], &self.reduced, &self.pivot);
+            let diagonal = self.ties.independent.iter().map(|&body| mechanism.tree.diagonal[body]);
+            self.rows.mark(schur::is_deep(&self.pivot[..f], diagonal));
         }
     }
 

@@ -5,9 +5,16 @@
 
 use super::{Bias, Kernel};
 use crate::arithmetic::{DoubleDouble, Real};
-use crate::dynamics::{Mechanism, Time};
+use crate::dynamics::{Mechanism, Time, schur};
 
 impl<T: Real> Kernel<T> {
+    /// True where doubles have too few digits for S, or with it for M.
+    #[inline(always)]
+    pub(super) fn is_delicate(&self, mechanism: &Mechanism) -> bool {
+        let is_deep = || self.bodywise.is_none() && schur::is_deep(&self.pivot, mechanism.tree.diagonal.iter().copied());
+        T::IS_PLAIN && !mechanism.rows.is_empty() && (self.weakest.is_delicate || is_deep())
+    }
+
     /// Writes accelerations and multipliers of the evaluation in double-double.
     #[cold]
     pub(super) fn accelerate_exactly(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T], bias: Bias) {
@@ -23,7 +30,7 @@ impl<T: Real> Kernel<T> {
 
     /// The factors in double-double, where those in doubles have too few digits.
     pub(super) fn linearise_exactly(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
-        self.is_exact = T::IS_PLAIN && self.weakest.is_delicate;
+        self.is_exact = self.is_delicate(mechanism);
         if self.is_exact {
             let exact = self.exact.get_or_insert_with(|| Box::new(Kernel::new(mechanism)));
             let wide = |x: &[T]| -> Vec<DoubleDouble> { x.iter().map(|x| x.double_double()).collect() };

@@ -123,6 +123,11 @@ impl<T: Real> RowSeries<T> {
         self.weakest
     }
 
+    /// Marks S as delicate where M is.
+    pub fn mark(&mut self, is_deep: bool) {
+        self.weakest.is_delicate |= is_deep;
+    }
+
     /// Power `m` of the multipliers of the rows in force \[N, N·m over s^m\].
     pub fn multipliers(&self, m: usize) -> &[T] {
         let rows = self.kinds.len();
