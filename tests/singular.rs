@@ -412,16 +412,7 @@ fn change_point(random: &mut Random) -> Option<(bool, Value)> {
     let start = json!({"a": {"phi": angle, "omega": random.between(1.0, 4.0) * -angle.signum()}, "k": {"phi": coupler}, "c": {"phi": end[1].atan2(end[0])}});
     let scene =
         json!({"name": "change_point", "gravity": [0.0, 0.0], "bars": bars, "hinges": hinges, "start": start, "until": 4.0, "every": 0.05});
-    (
-        if is_parallelogram && ground > 0.1 {
-            0.0
-        } else if ground > 0.1 && bend.is_finite() {
-            1.0
-        } else {
-            f64::NAN
-        },
-        scene,
-    )
+    (ground > 0.1 && (is_parallelogram || bend.is_finite())).then_some((is_parallelogram, scene))
 }
 
 /// The branch a run is on: energy and constraints, and of a parallelogram the coupler.
