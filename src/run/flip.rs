@@ -114,8 +114,8 @@ pub(super) fn can_pass(a: &Glance, b: &Glance, span: f64) -> bool {
     (0..a.phi.len()).any(|bar| {
         let (from, to) = (a.omega[bar], b.omega[bar]);
         let reach = span * (from.abs().max(to.abs()) + (to - from).abs());
-        // Not a number is looked at.
-        a.turns[bar] != b.turns[bar] || !(a.phi[bar].abs().max(b.phi[bar].abs()) + reach < PI)
+        let farthest = a.phi[bar].abs().max(b.phi[bar].abs()) + reach;
+        a.turns[bar] != b.turns[bar] || farthest >= PI || farthest.is_nan()
     })
 }
 

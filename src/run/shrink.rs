@@ -98,8 +98,8 @@ impl Curve for Length {
 fn can_meet(a: [Complex<f64>; 2], b: [Complex<f64>; 2], time: f64) -> bool {
     let size = |x: Complex<f64>| x.norm_squared().sqrt();
     let reach = time * (size(a[1]).max(size(b[1])) + size(b[1] - a[1]));
-    // Not a number is looked at.
-    !(size(a[0]).min(size(b[0])) > reach)
+    let nearest = size(a[0]).min(size(b[0]));
+    nearest <= reach || reach.is_nan()
 }
 
 /// The cubic through D and D' at both ends of a step, `share` of the way.
