@@ -78,11 +78,14 @@ impl Mechanism {
             let given = |k: &usize| scene.given.get(*k);
             let origin = group.iter().find_map(|k| Some((*k, given(k)?.origin?)));
             if let Some((k, [at_x, at_y])) = origin {
+                // Counted from the foot, wherever that was.
+                kernel.z[x] = Complex::ZERO;
                 let reach = self.end(k, 0).point.position(&kernel.z);
                 (motion.phi[x], motion.phi[x + 1]) = (DoubleDouble::of(at_x) - reach.re, DoubleDouble::of(at_y) - reach.im);
             }
             let velocity = group.iter().find_map(|k| Some((*k, given(k)?.velocity?)));
             if let Some((k, [v_x, v_y])) = velocity {
+                (motion.omega[x], motion.omega[x + 1]) = (DoubleDouble::ZERO, DoubleDouble::ZERO);
                 let swing = self.end(k, 0).point.velocity(&kernel.z, &motion.omega);
                 (motion.omega[x], motion.omega[x + 1]) = (DoubleDouble::of(v_x) - swing.re, DoubleDouble::of(v_y) - swing.im);
             }
