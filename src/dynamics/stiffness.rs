@@ -21,6 +21,8 @@ const EXACT: usize = 16;
 const ROUNDS: usize = 60;
 /// Coordinates up to which springs are told apart.
 const NAMED: usize = 200;
+/// Eigenvalues whose squares differ by this share are as large as one another.
+const ALIKE: f64 = 1e-6;
 /// Share of the fastest rate that a spring must reach by itself to be what makes it.
 const SHARE: f64 = 0.5;
 
@@ -103,10 +105,12 @@ fn spectrum(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Co
     });
     let Some(schur) = Schur::try_new(matrix, f64::EPSILON, 10_000) else { return unknown };
     let values = schur.complex_eigenvalues();
-    values
-        .iter()
-        .map(|value| Complex::new(value.re, value.im.abs()))
-        .fold(Complex::ZERO, |most, value| if value.norm_squared() > most.norm_squared() { value } else { most })
+    values.iter().map(|value| Complex::new(value.re, value.im.abs())).fold(Complex::ZERO, |most, value| {
+        // Of a mode that grows and one that dies away as fast, rounding is not to choose: the first counts.
+        let share = value.norm_squared() / most.norm_squared();
+        let is_alike = (share - 1.0).abs() <= ALIKE;
+        if if is_alike { value.re > most.re } else { value.norm_squared() > most.norm_squared() } { value } else { most }
+    })
 }
 
 /// The largest eigenvalue or pair, by power iteration with products of the Jacobian and a vector: x'' = b x' + c x fitted to three iterates.
