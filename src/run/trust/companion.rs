@@ -287,7 +287,9 @@ impl Companion {
     /// What it has come to at the end of the run, `t` \[s\].
     pub(in crate::run) fn trust(mut self, t: f64) -> Trust {
         let is_whole = self.shadow.is_some();
-        self.end("");
+        if is_whole {
+            self.end("");
+        }
         let Measured { name, until, error, mut record, horizon, lost, input_error, why, history, .. } = self.measured;
         if record.last().is_some_and(|last| last[0] < until) {
             record.push([until, error]);
