@@ -110,7 +110,8 @@ impl Driven {
         let stiffness = pull.norm_squared().sqrt() + a.abs() * w * w;
         let rate = (stiffness / d).sqrt().max(w.abs());
         let (swing, weight) = ((w * a).abs() / mechanism.energy_scale, tree.weight[driven]);
-        let share = [swing * w.abs() + weight.norm_squared().sqrt() / mechanism.energy_scale, swing].map(|share| share / mechanism.units.time);
+        let share =
+            [swing * w.abs() + weight.norm_squared().sqrt() / mechanism.energy_scale, swing].map(|share| share / mechanism.units.time);
         Some(Self { law: law.clone(), coupling: a, weight, load, rate, share })
     }
 
