@@ -2,8 +2,9 @@
 //!
 //! ```text
 //! limit = min(1e-2, 20 (N + 10) e),   e = (s + a_w) / E   with errors at the tolerance in every unknown:  d_q = atol + rtol |q| + 1e-14,  d_w likewise
-//! s = sqrt(E) (Σ r_i d_wi + R d_q) + (Σ |W_i| + (Σ r_i |w_i|)²) d_q,    a_w = atol E + rtol |work|
-//! r_i = sqrt(2 M_ii),   R = Σ sqrt(2 k) (Σ |gamma|),   M_ii, W_i, gamma: inertia, weights and levers, see `dynamics::tree`
+//! s = sqrt(E) (Σ r_i d_wi + Σ R d_q) + Σ |W_i| d_q + (Σ r_i |w_i|)² d_q,    a_w = atol E + rtol |work|
+//! r_i = sqrt(2 M_ii),   R = sqrt(2 k) (Σ |gamma|),   M_ii, W_i, gamma: inertia, weights and levers, see `dynamics::tree`
+//! absolute tolerances are in the mechanism's own units of length and time
 //! ```
 //!
 //! E is the largest energy or work there has been, at least the energy scale, and N the number of steps taken.  Every term is a bound on the gradient of the
@@ -32,11 +33,14 @@ const DOUBTFUL: f64 = 0.1;
 pub(super) struct Allowance {
     /// Relative and absolute, rounding included.
     tolerance: [f64; 2],
-    /// r: sqrt(2 M_ii) of every coordinate, and R \[sqrt(J) over rad or m\].
+    /// The mechanism's units of length \[m\] and time \[s\], and how many of the coordinates are angles.
+    units: [f64; 2],
+    angles: usize,
+    /// r: sqrt(2 M_ii) of every coordinate \[sqrt(J) s over rad or m\].
     inertia: Vec<f64>,
-    rigidity: f64,
-    /// Σ |W| \[J over rad or m\].
-    weight: f64,
+    /// Σ R and Σ |W|, of angles \[sqrt(J), J\] and of positions \[the same over m\].
+    rigidity: [f64; 2],
+    weight: [f64; 2],
     /// False where loops and sliders are not put back onto their constraints: what these let go is not the steps' error.
     is_kept: bool,
 }
@@ -61,30 +65,41 @@ impl Allowance {
         let tolerance = plan.tolerance?;
         let is_loose = matches!(plan.stabilization, Stabilization::None | Stabilization::Baumgarte);
         let tree = &mechanism.tree;
-        let springs = mechanism.springs.iter().map(|spring| {
+        let (mut rigidity, mut weight) = ([0.0; 2], [0.0; 2]);
+        for spring in &mechanism.springs {
             let levers: f64 = spring.span.terms.iter().map(|(_, gamma)| gamma.norm_squared().sqrt()).sum();
-            (2.0 * spring.stiffness).sqrt() * (levers + spring.span.shifts.len() as f64)
-        });
-        let torsions = mechanism.torsions.iter().map(|torsion| 2.0 * (2.0 * torsion.stiffness).sqrt());
+            let stiff = (2.0 * spring.stiffness).sqrt();
+            rigidity[0] += stiff * levers;
+            rigidity[1] += stiff * spring.span.shifts.len() as f64;
+        }
+        rigidity[0] += mechanism.torsions.iter().map(|torsion| 2.0 * (2.0 * torsion.stiffness).sqrt()).sum::<f64>();
+        let angles = mechanism.bodies.len();
+        for (k, pull) in tree.weight.iter().enumerate() {
+            weight[usize::from(k >= angles)] += pull.norm_squared().sqrt();
+        }
         Some(Self {
             tolerance: [tolerance.relative + ROUNDING, tolerance.absolute + ROUNDING],
+            units: [mechanism.units.length, mechanism.units.time],
+            angles,
             inertia: tree.diagonal.iter().map(|inertia| (2.0 * inertia).sqrt()).collect(),
-            rigidity: springs.chain(torsions).sum(),
-            weight: tree.weight.iter().map(|weight| weight.norm_squared().sqrt()).sum(),
+            rigidity,
+            weight,
             is_kept: !(is_loose && mechanism.has_multipliers()),
         })
     }
 
     /// What errors at the tolerance in every unknown come to in the energy at most, over the largest.
     fn share(&self, moment: &Moment) -> f64 {
-        let ([relative, absolute], largest) = (self.tolerance, moment.largest);
+        let ([relative, absolute], [length, time], largest) = (self.tolerance, self.units, moment.largest);
+        let unit = |k: usize| if k < self.angles { 1.0 / time } else { length / time };
         let rates = || self.inertia.iter().zip(moment.omega);
-        let fast: f64 = rates().map(|(inertia, omega)| inertia * (absolute + relative * omega.abs())).sum();
+        let fast: f64 = rates().enumerate().map(|(k, (inertia, omega))| inertia * (absolute * unit(k) + relative * omega.abs())).sum();
         let swing: f64 = rates().map(|(inertia, omega)| inertia * omega.abs()).sum();
         // Angles are kept in [-π, π].
-        let far = moment.feet.iter().fold(std::f64::consts::PI, |most: f64, x| most.max(x.abs()));
-        let moved = absolute + relative * far;
-        let energy = largest.sqrt() * (fast + self.rigidity * moved) + (self.weight + swing * swing) * moved;
+        let far = moment.feet.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let moved = [absolute + relative * std::f64::consts::PI, absolute * length + relative * far];
+        let sum = |parts: [f64; 2]| parts[0] * moved[0] + parts[1] * moved[1];
+        let energy = largest.sqrt() * (fast + sum(self.rigidity)) + sum(self.weight) + swing * swing * moved[0];
         (energy + relative * moment.work.abs()) / largest + absolute
     }
 }
