@@ -119,6 +119,8 @@ pub struct Summary {
     pub total: usize,
     pub agreeing: usize,
     pub with_walls: usize,
+    /// Of the pairs that agree, the largest difference over what is allowed.
+    pub nearest: f64,
     pub reported: BTreeMap<String, (usize, u64)>,
     /// Counts, and the first scene of each.
     pub unclear: BTreeMap<String, (usize, u64)>,
@@ -147,7 +149,10 @@ impl Summary {
                 }
             }
             match verdict {
-                Verdict::Agrees(_) => summary.agreeing += 1,
+                Verdict::Agrees(worst) => {
+                    summary.agreeing += 1;
+                    summary.nearest = summary.nearest.max(worst);
+                }
                 Verdict::Reported(how) => summary.reported.entry(digitless(&how)).or_insert((0, seed)).0 += 1,
                 Verdict::Unclear(why) => summary.unclear.entry(digitless(&why)).or_insert((0, seed)).0 += 1,
                 Verdict::Differs(found) => summary.differing.push((seed, request, found)),
@@ -158,9 +163,9 @@ impl Summary {
 
     /// Counts on a page.
     pub fn text(&self) -> String {
-        let Self { total, agreeing, with_walls, reported, unclear, differing, .. } = self;
+        let Self { total, agreeing, with_walls, nearest, reported, unclear, differing, .. } = self;
         let mut text = format!(
-            "{total} pairs: {agreeing} agree, {} differ, {} report themselves, {} are unclear; {with_walls} of those compared have walls\n",
+            "{total} pairs: {agreeing} agree, {} differ, {} report themselves, {} are unclear; {with_walls} of those compared have walls; the largest difference that agrees is {nearest:.2} of what is allowed\n",
             differing.len(),
             total_of(reported),
             total_of(unclear)
