@@ -93,7 +93,8 @@ fn motions_agree_with_the_auditor() {
     }
     if let Ok(folder) = std::env::var("AUDIT_OUT") {
         std::fs::create_dir_all(&folder).expect("a folder");
-        for (seed, ..) in &summary.differing {
+        let others = summary.reported.values().chain(summary.unclear.values()).map(|(_, seed)| seed);
+        for seed in summary.differing.iter().map(|(seed, ..)| seed).chain(others) {
             std::fs::write(format!("{folder}/{seed}.json"), auditor::mechanisms::scene(*seed).text).expect("room");
         }
     }

@@ -202,8 +202,10 @@ impl Judge<'_> {
             let potential = (look.energy[1] - first.energy[1]).hi;
             let gained = sample.potential - first_sample.potential;
             self.response(|| "potential energy".into(), t, [gained, potential], scales.energy, response.energy);
-            // A known shortfall: the work of the order-two method is as good as its steps, and no estimate covers it.
-            let rough = if self.ran.outcome.plan.method.info().name == "rattle2" { ROUGH_WORK } else { 1.0 };
+            // No estimate covers the work: what a run claims of it is its tolerance.  A known shortfall: that of the order-two method is as good as its steps.
+            let tolerance = self.ran.outcome.plan.tolerance.map_or(0.0, |tolerance| tolerance.relative);
+            let claimed = (CLAIMED * tolerance / self.allowed).max(1.0);
+            let rough = if self.ran.outcome.plan.method.info().name == "rattle2" { ROUGH_WORK } else { claimed };
             self.response(|| "work".into(), t, [sample.work, look.state.work.hi], rough * scales.energy, response.energy);
         }
     }
