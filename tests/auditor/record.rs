@@ -198,12 +198,11 @@ impl Scales {
         scales.torque = scales.torque.max(scales.force * length);
         scales.energy = scales.energy.max(weight * length);
         scales.impulse = impacts.iter().fold(scales.impulse, |most, impact| most.max(impact.impulse));
-        // What is all at rest is measured by what would count as motion.
-        let floor = |value: f64, unit: f64| if value > 0.0 { value } else { unit };
-        scales.force = floor(scales.force, total * length * scales.rate * scales.rate);
-        scales.torque = floor(scales.torque, scales.force * length);
-        scales.energy = floor(scales.energy, scales.force * length);
-        scales.impulse = floor(scales.impulse, scales.force / scales.rate);
+        // Forces that only rounding makes are measured by those that would move the bodies at such rates.
+        scales.force = scales.force.max(1e-3 * total * length * scales.rate * scales.rate);
+        scales.torque = scales.torque.max(scales.force * length);
+        scales.energy = scales.energy.max(scales.force * length);
+        scales.impulse = scales.impulse.max(scales.force / scales.rate);
         scales
     }
 }
