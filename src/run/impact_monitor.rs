@@ -193,20 +193,28 @@ fn centre_velocities(mechanism: &Mechanism, z: &[Complex<DoubleDouble>], omega: 
     feet.iter().enumerate().map(|(k, &foot)| foot + arm(k)).collect()
 }
 
-/// The worst rate of the constraints before and after, each over the magnitudes it is made of on both sides.
+/// The worst rate of the constraints before and after, each over the magnitudes it would be made of if all of the mechanism moved as fast as the fastest of it.
 fn slips(mechanism: &Mechanism, before: &Motion, after: &Motion) -> Result<[f64; 2], String> {
-    let z = elements(mechanism.bodies.len(), &before.phi);
+    let (angles, length) = (mechanism.bodies.len(), mechanism.size_of_parts());
+    let z = elements(angles, &before.phi);
+    let fastest = |range: std::ops::Range<usize>| {
+        [before, after].iter().flat_map(|motion| &motion.omega[range.clone()]).fold(0.0f64, |most, omega| most.max(omega.hi.abs()))
+    };
+    let (turning, moving) = (fastest(0..angles), fastest(angles..before.omega.len()));
+    // Impacts are solved for with all rates at once, and rounded to those.
+    let turning = turning.max(moving / length);
+    let moving = moving.max(turning * length);
     let mut worst = [0.0f64; 2];
     for row in &mechanism.rows {
         let mut jacobian = vec![DoubleDouble::ZERO; before.phi.len()];
         let here = row.differentiate(before.time, Posture { phi: &before.phi, z: &z, omega: &before.omega }, &mut jacobian);
         let sides = [before, after].map(|motion| {
-            let parts = jacobian.iter().zip(&motion.omega).map(|(&g, &w)| g * w);
-            let (rate, size) = parts.fold((here.drive, here.drive.hi.abs()), |(rate, size), part| (rate + part, size + part.hi.abs()));
-            (rate.hi.abs(), size)
+            let rate = jacobian.iter().zip(&motion.omega).fold(here.drive, |rate, (&g, &w)| rate + g * w);
+            rate.hi.abs()
         });
-        let size = sides[0].1.max(sides[1].1);
-        for (worst, (rate, _)) in worst.iter_mut().zip(sides) {
+        let size = (jacobian.iter().enumerate())
+            .fold(here.drive.hi.abs(), |size, (k, g)| size + g.hi.abs() * if k < angles { turning } else { moving });
+        for (worst, rate) in worst.iter_mut().zip(sides) {
             if !rate.is_finite() {
                 return Err(format!("the rate of {} is not finite", row.name()));
             }
