@@ -59,7 +59,8 @@ impl Tree {
             unit[i]
         };
         let mobility: Vec<f64> = (0..n).map(mobility).collect();
-        let gravity: f64 = self.weight.iter().zip(&mobility).map(|(weight, mobility)| weight.norm_squared().sqrt() * mobility).sum();
+        let gravity: f64 =
+            self.weight[..self.angles].iter().zip(&mobility).map(|(weight, mobility)| weight.norm_squared().sqrt() * mobility).sum();
         let moved = |spring: &Spring| spring.span.terms.iter().map(|&(i, gamma)| (gamma.norm_squared() * mobility[i]).sqrt()).sum::<f64>();
         let pulled: f64 = springs.iter().map(|spring| spring.stiffness * moved(spring).powi(2)).sum();
         (gravity + pulled).sqrt()

@@ -14,6 +14,7 @@
 
 use super::projection::{self, is_kept};
 use crate::dynamics::kernel::Kernel;
+use crate::dynamics::schur::DROPPED;
 use crate::dynamics::{Field, Form, Mechanism, State, Time};
 use crate::stepping::gauss::Gauss;
 use crate::stepping::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
@@ -82,7 +83,9 @@ impl SymmetricGauss {
             }
             // Rounds contract by about the step: what no longer falls is rounding.
             if mismatch == 0.0 || mismatch >= 0.5 * last || mismatch.is_nan() {
-                if mismatch > TOLERANCE || mismatch.is_nan() {
+                // As in the projection itself: near a singular position rounding grows with the inverse of the distance.
+                let near = kernel.weakest.share.clamp(DROPPED, 1.0).sqrt();
+                if mismatch > TOLERANCE / near || mismatch.is_nan() {
                     return Err(stop(format!("the shifts of both ends differ by {mismatch:.1e} of the motion and do not come closer")));
                 }
                 break;

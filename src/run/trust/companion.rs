@@ -233,7 +233,8 @@ impl Companion {
         if let Err(stop) = shadow.go(time, prices, &mut measured.spent, budget) {
             let why = stop.unwrap_or_else(|| match measured.level {
                 Level::Full => {
-                    format!("{CUT}, {} expansions, was used up after t = {} s", shadow.course.tally().evaluations, measured.until)
+                    let expansions = shadow.course.tally().evaluations;
+                    format!("{CUT} was used up after t = {} s, by {expansions} expansions and the tangent flow along them", measured.until)
                 }
                 Level::Off | Level::Auto => "more would have taken too large a share of the run".into(),
             });

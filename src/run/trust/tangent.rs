@@ -109,10 +109,12 @@ impl Tangent {
         for j in 0..f {
             let column: Vec<f64> = (0..2 * f).map(|i| f64::from(i == j)).collect();
             tangent.derivative(0, motion.time, &state.y, &column, &mut found);
-            most = found[f..].iter().fold(most, |most, entry| most.max(entry.abs()));
+            // Positions count over the mechanism's size, as they do in the estimate.
+            most = (0..f).fold(most, |most, i| most.max((found[f + i] * tangent.weights[i] / tangent.weights[j]).abs()));
         }
         // At the start there may be no force to be felt yet.
-        let turning = state.y[f..2 * f].iter().fold(0.0, |most: f64, rate| most.max(rate.abs()));
+        let rates = state.y[f..2 * f].iter().zip(&tangent.weights);
+        let turning = rates.fold(0.0, |most: f64, (rate, weight)| most.max((rate * weight).abs()));
         let rate = most.sqrt().max(turning).max(mechanism.tree.fastest_rate(&[])).max(10.0 / until.max(f64::MIN_POSITIVE));
         let columns = if mechanism.has_multipliers() {
             (0..VECTORS).map(|k| tangent.slide(mechanism, &state, k, rate)).collect()
