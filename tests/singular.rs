@@ -313,7 +313,10 @@ fn regular_linkages(wanted: usize, seed: u64) -> Count {
         }
         let [one, other] = &outcomes;
         if one.stop.is_none() && other.stop.is_none() {
-            let off = one.last.phi.iter().zip(&other.last.phi).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let length = |k: usize| scene["bars"][k]["length"].as_f64().expect("a length");
+            // Rounding of the other links' angles turns a crank of a millionth of their length by its inverse: of that one it is known where its end is.
+            let weight = |k: usize| if length(k) < 1e-6 { length(k) } else { 1.0 };
+            let off = (0..one.last.phi.len()).map(|k| (one.last.phi[k] - other.last.phi[k]).abs() * weight(k)).fold(0.0, f64::max);
             if off.is_nan() || off >= 1e-7 {
                 count.apart.push(format!("{kind:?} {off:.1e} rad\n{scene}"));
             }

@@ -10,13 +10,16 @@
 
 use super::Mechanism;
 use super::row::{Measure, Row, Way};
-use super::schur::{DROPPED, Weakest};
+use super::schur::{DROPPED, NEAR, Weakest};
 use crate::arithmetic::Real;
 
 /// Rounds of the scaling.
 const ROUNDS: usize = 4;
 /// Pivots of S below this part of those of A owe it to masses and levers: so many digits are lost to them.
 const LOSS: f64 = 1e-3;
+
+/// Share above which a position is far from any singular one.
+const WIDE: f64 = 0.3;
 
 /// Squared bounds of a constraint's derivatives by the coordinates; a coordinate may come up more than once.
 pub type Levers = Vec<(usize, f64)>;
@@ -115,12 +118,23 @@ impl Verdict {
         self.weakest.share
     }
 
-    /// The weakest constraint where S has been factored with `mass` as its own; `again` factors it without the constraints that are to be left out and tells the
-    /// least share of a pivot.
-    pub fn settle(&self, mass: Weakest, again: impl FnOnce(&[bool]) -> f64) -> Weakest {
-        let is_right = mass.share >= DROPPED && !self.is_left_out.contains(&true);
-        let share = if is_right { mass.share } else { again(&self.is_left_out) };
-        Weakest { is_delicate: share.is_nan() || share < LOSS * self.kept, ..self.weakest }
+    /// The weakest constraint where S has been factored with `mass` as its own and these reciprocal pivots and scales; `again` factors it anew, without the constraints that
+    /// are to be left out or, with none, as it was, and tells the least share of a pivot.
+    ///
+    /// Where masses do not matter much the position alone makes pivots small, and what was left out stays so.
+    pub fn settle(&self, mass: Weakest, [pivot, scale]: [&[f64]; 2], mut again: impl FnMut(Option<&[bool]>) -> f64) -> Weakest {
+        let is_right = pivot.iter().zip(&self.is_left_out).all(|(&pivot, &is_left_out)| (pivot == 0.0) == is_left_out);
+        let kept = || pivot.iter().zip(scale).filter(|(pivot, _)| **pivot != 0.0).map(|(pivot, scale)| 1.0 / (pivot * scale));
+        let share = if is_right { kept().fold(f64::INFINITY, f64::min) } else { again(Some(&self.is_left_out)) };
+        let is_delicate = share.is_nan() || share < LOSS * self.kept;
+        let is_near = self.weakest.share < WIDE;
+        if is_delicate || self.weakest.share >= NEAR {
+            return Weakest { is_delicate, is_near, ..self.weakest };
+        }
+        if !is_right {
+            again(None);
+        }
+        Weakest { is_near, ..mass }
     }
 }
 

@@ -30,18 +30,20 @@ pub struct Weakest {
     pub row: usize,
     /// True where light members or long levers cost S more digits than the position does.
     pub is_delicate: bool,
+    /// True of a position that may be near a singular one, with some room.
+    pub is_near: bool,
 }
 
 impl Weakest {
     /// Before any row has been looked at.
-    pub const NONE: Self = Self { share: f64::INFINITY, row: 0, is_delicate: false };
+    pub const NONE: Self = Self { share: f64::INFINITY, row: 0, is_delicate: false, is_near: false };
 
     /// Looks at the pivot of a row against its scale: its reciprocal, or zero where the row is left out.
     #[inline(always)]
     pub fn reciprocal<T: Real>(&mut self, row: usize, pivot: T, scale: f64) -> T {
         let share = pivot.value() / scale;
         if share < self.share {
-            *self = Self { share, row, is_delicate: false };
+            *self = Self { share, row, is_delicate: false, is_near: false };
         }
         if share < DROPPED { T::ZERO } else { T::ONE / pivot }
     }
@@ -53,7 +55,7 @@ impl Weakest {
         }
         let share = pivot.value() / scale;
         if share.is_nan() || share < self.share {
-            *self = Self { share, row, is_delicate: false };
+            *self = Self { share, row, is_delicate: false, is_near: false };
         }
         // Where rounding has eaten it, more digits are needed.
         if pivot.value() > 0.0 { T::ONE / pivot } else { T::ZERO }
@@ -149,9 +151,11 @@ pub fn look_closer<T: Real>(
     pivot: &mut [T],
 ) -> Weakest {
     let rows = scale.len();
-    metric.judge(jacobian).settle(mass, |is_left_out| {
-        let mut weakest = Weakest::NONE;
+    let before: Vec<f64> = pivot[..rows].iter().map(|pivot| pivot.value()).collect();
+    metric.judge(jacobian).settle(mass, [&before, scale], |is_left_out| {
         product(rows, jacobian, lifted, schur);
+        let Some(is_left_out) = is_left_out else { return factor::<T, 0>(rows, schur, pivot, scale).share };
+        let mut weakest = Weakest::NONE;
         factor_by::<T, 0>(rows, schur, pivot, |k, pivot| weakest.reciprocal_kept(k, pivot, scale[k], is_left_out[k]));
         weakest.share
     })

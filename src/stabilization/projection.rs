@@ -310,7 +310,7 @@ fn project_sized<const N: usize>(
         energy_change = mechanism.energy_facing::<f64, N>(kernel, &state.y[..n], &state.y[n..2 * n]).total() - energy_before;
         state.y[2 * n + 1] += energy_change;
     }
-    Ok(Landing { has_moved: far > ROUNDING, balance, energy_change, is_near: kernel.weakest.share < NEAR })
+    Ok(Landing { has_moved: far > ROUNDING, balance, energy_change, is_near: kernel.weakest.is_near })
 }
 
 /// The unit of coordinate `k` \[rad, m\].

@@ -248,12 +248,14 @@ impl<T: Real> Rows<T> {
     /// What there is to do where pivots are small, see [`schur::look_closer`](crate::dynamics::schur::look_closer).
     #[cold]
     fn look_closer(&mut self, ways: &Ways, trees: &Recursive<T>, mass: Weakest) -> Weakest {
-        self.judge(ways).settle(mass, |is_left_out| {
+        let verdict = self.judge(ways);
+        let before: Vec<f64> = self.pivot.iter().map(|pivot| pivot.value()).collect();
+        let Self { schur, excess, scale, pivot, .. } = self;
+        verdict.settle(mass, [&before, scale], |is_left_out| {
+            ways.cross(schur, excess, |coordinate| trees.joints[coordinate].pivot);
+            let Some(is_left_out) = is_left_out else { return ways.envelope.factor(schur, pivot, scale).share };
             let mut weakest = Weakest::NONE;
-            ways.cross(&mut self.schur, &self.excess, |coordinate| trees.joints[coordinate].pivot);
-            let scale = &self.scale;
-            let reciprocal = |i: usize, pivot| weakest.reciprocal_kept(i, pivot, scale[i], is_left_out[i]);
-            ways.envelope.factor_by(&mut self.schur, &mut self.pivot, reciprocal);
+            ways.envelope.factor_by(schur, pivot, |i, pivot| weakest.reciprocal_kept(i, pivot, scale[i], is_left_out[i]));
             weakest.share
         })
     }
