@@ -23,7 +23,7 @@ const GENEROUS: f64 = 20.0;
 const FIRST_STEPS: f64 = 10.0;
 /// The tolerance that rounding leaves of a tighter one.
 const ROUNDING: f64 = 1e-14;
-/// Energy balance beyond which loops and sliders that nothing projects count as torn, where the tolerance does not explain more.
+/// Energy balance beyond which loops and sliders that nothing projects count as torn: at a singular position they may let go at any tolerance, in steps that err by less.
 const APART: f64 = 1e-4;
 /// Share of the limit from which a result says that it is in doubt.
 const DOUBTFUL: f64 = 0.1;
@@ -129,7 +129,6 @@ impl EnergyLimit {
         let share = allowance.share(moment);
         self.share = if share.is_nan() { f64::INFINITY } else { share.max(self.share) };
         let explained = GENEROUS * (moment.steps as f64 + FIRST_STEPS) * self.share;
-        self.apart = explained.clamp(APART, ENERGY_MOST);
         if allowance.is_kept {
             self.most = explained.min(ENERGY_MOST);
             self.doubt = (DOUBTFUL * explained).min(ENERGY_DOUBT);
