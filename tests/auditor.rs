@@ -113,7 +113,7 @@ fn record_of(text: &str) -> Result<Record, String> {
             start(scene, Some(&guess(&first.samples[0]))).map_err(|lost| lost.0)?
         }
     };
-    if !(start.correction[0] < 1e-9) {
+    if start.correction[0].is_nan() || start.correction[0] >= 1e-9 {
         return Err(format!("start off by {:?}", start.correction));
     }
     Record::new(start, &times, 400_000).map_err(|lost| lost.0)

@@ -30,7 +30,7 @@ const ENDS: &[End] = &[
     ("motor_sine", "dp8", 1e-9, Some(Stabilization::Projection), 3.0, 0x9fdb_05eb_518d_0e5a),
     ("motor_sine", "gauss8", 1.0 / 128.0, None, 3.0, 0x8e71_b050_e99a_ef9a),
     ("motor_sine", "rattle6", 1.0 / 128.0, None, 3.0, 0xbe9d_d5cb_c8a0_b5f9),
-    ("wall", "dp8", 1e-10, None, 3.0, 0x1a51_e614_e5ec_4c36),
+    ("wall", "dp8", 1e-10, None, 3.0, 0x1f56_55c6_c07c_431f),
     ("chain8", "dp8", 1e-8, None, 1.0, 0x3b20_e06c_b102_ca9e),
     ("branch", "taylor", 1e-10, None, 3.0, 0xbae9_ee99_71b5_7629),
     ("andrews", "taylor", 1e-10, None, 0.03, 0x797c_b012_266b_31dd),

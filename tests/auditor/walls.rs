@@ -165,7 +165,7 @@ impl<'a> Course<'a> {
                 if gap.off.hi.abs() < 1e-24 * size || gap.rate.hi >= 0.0 {
                     break;
                 }
-                t = t - gap.off / gap.rate;
+                t -= gap.off / gap.rate;
                 at = self.integrator.reach(before, t, &held)?;
             }
         }

@@ -19,9 +19,6 @@ use crate::dynamics::quadratic::Quadratic;
 /// What is left of a dependent row, against itself.
 const DEPENDENT: f64 = 1e-10;
 
-/// Part of D⁻¹ below which W is noise.
-const NOISE: f64 = 1e-12;
-
 /// A 2 × 2 block of W: xx, xy, yx, yy.
 pub type Block = [f64; 4];
 
@@ -140,13 +137,6 @@ impl Reduced {
             rows,
             back: back.iter().flatten().map(plain).collect(),
         })
-    }
-
-    /// The largest that z·W_kk z may be for the unit vector of an element \[1/(kg·m²)\]; not below the noise of W where the linear rows hold it.
-    pub fn mobility(&self, k: usize) -> f64 {
-        let [xx, xy, _, yy] = self.inverse[k * self.elements + k];
-        let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
-        (mean + (half * half + xy * xy).sqrt()).max(NOISE * self.free[k])
     }
 
     /// W x.
