@@ -1,7 +1,7 @@
 //! Bars that turn over: the first time an angle passes an odd multiple of π.
 //!
 //! Every step in which an angle can come as far as that is looked through: the angles inside it are interpolated until that is resolved, and the passage is
-//! found on the interpolant by the [search](crate::stepping::search) that finds all events.  Whole turns are counted for it where the mechanism itself does
+//! found on the interpolant by the search (`stepping/search.rs`) that finds all events.  Whole turns are counted for it where the mechanism itself does
 //! not, since there they matter (torsion springs).  The passage itself is found by Newton's method on the motion, marched again from the beginning of the
 //! step, so it is as accurate as the run.  Methods that cannot march a part of a step, or do not show their steps, are traced by `dp8` there.
 

@@ -1,7 +1,7 @@
 //! The trajectory as a table: one row an output time, units in the header, digits that read back to the same doubles.
 //!
 //! Every constraint has its residual and the rate of that.  A motor has its torque on the driven body, or its force on the point that slides, along the
-//! rail, and its power beside them; a lock, a weld or a locked slider the torque it exerts on its body, [`Row`](crate::dynamics::row::Row) by row.
+//! rail, and its power beside them; a lock, a weld or a locked slider the torque it exerts on its body, [`Row`] by row.
 
 use super::sample::Sample;
 use crate::dynamics::Mechanism;

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Masses, lengths and times of any unit come out the same, but for rounding, and no matrix is squared.  Rows that say nothing new are left out by
-//! their geometry alone, masses aside: see [`new_rows`].  Source: Å. Björck, *Numerical Methods for Least Squares Problems* (1996), sections 2.4.5
+//! their geometry alone, masses aside: see `new_rows`.  Source: Å. Björck, *Numerical Methods for Least Squares Problems* (1996), sections 2.4.5
 //! (orthogonalized twice) and 2.7.3.
 
 use crate::dynamics::kernel::Kernel;

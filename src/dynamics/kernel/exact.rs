@@ -61,7 +61,7 @@ impl<T: Real> Kernel<T> {
         round(&mut self.load, &exact.load);
     }
 
-    /// The least share of a constraint at other coordinates than the last, which knows no masses ([`rank`](super::rank)); and all of [`Kernel::rows_at`].
+    /// The least share of a constraint at other coordinates than the last, which knows no masses ([`rank`](crate::dynamics::rank)); and all of [`Kernel::rows_at`].
     pub fn independence_at(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) -> f64 {
         self.face::<0>(mechanism, phi);
         self.rows_at(mechanism, t, phi, omega);
