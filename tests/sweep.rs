@@ -5,7 +5,9 @@
 #[allow(dead_code)]
 mod program;
 
-use driftless::run::{Flip, MethodId, Observer, Point, Request, Stabilization, Status, Sweep, SweepError, Vary, simulate, sweep};
+use driftless::run::{
+    Flip, MethodId, Observer, Point, Request, Stabilization, Status, Sweep, SweepError, SweepTable, Vary, simulate, sweep,
+};
 use driftless::scene::Template;
 use driftless::stepping::Cause;
 use std::f64::consts::PI;
@@ -179,6 +181,58 @@ fn a_bar_that_starts_upright_turns_over_where_it_falls_outwards() {
     for (lane, single) in found.iter().zip(times("dp8")) {
         assert_eq!(lane.is_some(), single.is_some(), "{found:?}");
         assert!(lane.is_none_or(|t| t < 1e-6) && single.is_none_or(|t| t < 1e-6), "{lane:?} {single:?}");
+    }
+}
+
+/// A bar passes the boundary and comes back within a step, and later steps before the next look hold no passage, or one: the first counts.
+#[test]
+fn there_and_back_within_a_step_is_not_forgotten() {
+    let light = r#"{"name": "light", "gravity": [0, -9.81],
+        "bars": [{"name": "upper", "mass": 2.245e-10, "centre": [0.1235, 0], "inertia": 2.535e-12},
+            {"name": "lower", "mass": 1.1837e-7, "centre": [0.2656, 0], "inertia": 2.871e-9}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "upper", "point": [0, 0]}]},
+            {"name": "B", "between": [{"body": "upper", "point": [0.3721, 0]}, {"body": "lower", "point": [0, 0]}]}],
+        "springs": [{"name": "spring", "between": [{"body": "ground", "point": [-1.0615, -0.40277]}, {"body": "lower", "point": [0.50185, 0]}],
+            "stiffness": 1.8143e-5, "free_length": 0.4375}],
+        "start": {"upper": {"phi": 0.05, "omega": 2.0299}, "lower": {"phi": -3.1133, "omega": -5.3381}}, "until": 0.58, "every": 0.029}"#;
+    let coil = r#"{"name": "coil", "gravity": [0, -9.81], "bars": [{"name": "bar", "mass": 1.085, "centre": [0.335, -0.26], "inertia": 0.1664}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+        "torsion_springs": [{"name": "coil", "body": "bar", "stiffness": 15.6, "free_angle": 2.668, "damping": 0.6965}],
+        "torques": [{"name": "torque", "body": "bar", "torque": -6.794,
+            "law": {"start": 0.3463, "sines": [{"amplitude": 0.3419, "frequency": 4.23, "phase": -0.2008}]}}],
+        "start": {"bar": {"phi": 1.4718, "omega": -5.403}}, "until": 1.48, "every": 0.074}"#;
+    for (text, vary, rtol) in [(light, "upper.phi=0.05..0.05:1", 1e-4), (coil, "bar.omega=-5.4..-5.0:41", 1e-9)] {
+        let template = Template::new(text.into(), "there.json".into(), &[]);
+        let flips = |method: &str, rtol: f64| -> Vec<Option<f64>> {
+            let request = Request { rtol: Some(rtol), ..request(method, template.scene().expect("a scene").until) };
+            let plan = Sweep::new(&template, vec![vary.parse().expect("a range")], &request).expect("a sweep");
+            points(&plan, 1).iter().map(|point| point.flip.map(|flip| flip.t)).collect()
+        };
+        let (found, right) = (flips("taylor", rtol), flips("dp8", 1e-12));
+        for (found, right) in found.iter().zip(&right) {
+            let differ = found.zip(*right).map_or(found.is_some() != right.is_some(), |(found, right)| (found - right).abs() > 1e-4);
+            assert!(!differ, "{found:?} s and not {right:?} s, {vary}");
+        }
+        assert!(right.iter().any(Option::is_some));
+    }
+}
+
+/// Bodies that float have two coordinates more than angles, which are no columns.
+#[test]
+fn points_of_floating_bodies_are_rows_of_as_many_columns() {
+    let text = r#"{"name": "float", "gravity": [0, -9.81], "bars": [{"name": "plate", "mass": 2, "centre": [0.1, 0], "inertia": 0.3}],
+        "start": {"plate": {"phi": 1, "omega": 2, "origin": [3, 4], "velocity": [5, 6]}}, "until": 0.5, "every": 0.1}"#;
+    let template = Template::new(text.into(), "float.json".into(), &[]);
+    let plan = Sweep::new(&template, vec!["plate.omega=1..2:2".parse().expect("a range")], &Request::default()).expect("a sweep");
+    let mut table = SweepTable::new(&plan, Vec::new()).expect("room");
+    sweep(&plan, 1, &mut |point: &Point| Ok(table.write(point)?)).expect("all points");
+    let text = String::from_utf8(table.finish().expect("room")).expect("text");
+    let rows: Vec<Vec<&str>> = text.lines().map(|row| row.split(',').collect()).collect();
+    assert!(rows.len() == 3 && rows.iter().all(|row| row.len() == rows[0].len()), "{text}");
+    // phi = 1 + omega t of a body that nothing turns.
+    for (row, omega) in rows[1..].iter().zip([1.0, 2.0]) {
+        let phi: f64 = row[2].parse().expect("an angle");
+        assert!((phi - (1.0 + 0.5 * omega)).abs() < 1e-9 && row[rows[0].len() - 2] == "done", "{text}");
     }
 }
 

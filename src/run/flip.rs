@@ -58,7 +58,7 @@ impl Lookout {
 
     /// Takes the state after a step, and tells whether the step is to be searched; with `all` it is in any case.
     pub fn step<P: Form + ?Sized>(&mut self, problem: &mut P, state: &State, all: bool) -> bool {
-        if self.closed {
+        if self.closed || self.flip.is_some() {
             return false;
         }
         look(problem, state, &mut self.now);
@@ -76,14 +76,15 @@ impl Lookout {
     /// Goes through the suspicious steps, oldest first, until `find` finds the passage.
     pub fn search(&mut self, find: &mut dyn FnMut(&Suspect) -> Option<Flip>) {
         for suspect in std::mem::take(&mut self.suspects) {
+            // The first passage is not given up for one of a later step.
+            if self.flip.is_some() {
+                return;
+            }
             let [a, b] = &suspect.ends;
             // A passage so near the end of the step that rounding decides is there.
             let turned = || (0..a.turns.len()).find(|&bar| a.turns[bar] != b.turns[bar]);
             let at_end = || turned().map(|bar| Flip { t: suspect.from.time.hi + suspect.span, bar });
             self.flip = find(&suspect).or_else(at_end);
-            if self.flip.is_some() {
-                return;
-            }
         }
     }
 }

@@ -36,7 +36,8 @@ pub fn numbers(point: &Point, bars: usize) -> Vec<f64> {
         return numbers;
     }
     numbers.push(point.t);
-    for (&phi, &omega) in point.phi.iter().zip(&point.omega) {
+    // Behind the angles of the bodies are the coordinates of those that float.
+    for (&phi, &omega) in point.phi.iter().zip(&point.omega).take(bars) {
         numbers.extend([phi, omega]);
     }
     numbers.push(point.energy);
