@@ -3,7 +3,7 @@
 use super::random::{self, Draw};
 use driftless::dynamics::Mechanism;
 use driftless::run::trust::{How, Level};
-use driftless::run::{Limits, Outcome, Plan, Point, Request, Run, Sample, Status, Sweep, Totals, Vary, march, sweep};
+use driftless::run::{Limits, Outcome, Plan, Point, Request, Run, Sample, Status, Sweep, SweepTable, Totals, Vary, march, sweep};
 use driftless::scene::{Scene, Template, parse_scene};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -101,12 +101,15 @@ pub fn sweep_of(text: &str, scene: &Scene, draw: &mut Draw, effort: u64) -> Swep
     let Ok(plan) = Sweep::new(&template, vec![vary], &request) else { return found };
     let plan = if draw.chance(30) { plan.ending_at_flips() } else { plan };
     let mut points: Vec<Point> = Vec::new();
+    let mut table = SweepTable::new(&plan, Vec::new()).expect("room");
     let totals: Totals = sweep(&plan, 1, &mut |point: &Point| {
         points.push(point.clone());
-        Ok(())
+        Ok(table.write(point)?)
     })
     .expect("nobody fails");
     assert_eq!((points.len() as u64, totals.points()), (plan.grid().count(), plan.grid().count()));
+    let rows = String::from_utf8(table.finish().expect("room")).expect("text");
+    assert_eq!(rows.lines().count(), points.len() + 1, "a table of {} points: {rows}", points.len());
     for point in &points {
         found.points += 1;
         found.done += u64::from(point.status == Status::Done);
