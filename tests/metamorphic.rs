@@ -465,6 +465,11 @@ fn a_run_goes_back_to_its_start() {
                 let stop = back.outcome.stop.map(|stop| stop.to_string()).unwrap_or_default();
                 return account.lone_stop(made, method, scenes, &format!("stops on the way back: {stop}"));
             }
+            // What a method without projection leaves of a rod's length is a vibration on the way back.
+            Err(_) if scene.springs.iter().any(|spring| spring.rigid) => {
+                account.refused += 1;
+                return;
+            }
             Err(refusal) => return account.fault(made, method, scenes, &format!("cannot go back: {refusal}")),
         };
         let (Some(first), Some(last)) = (there.samples.first(), back.samples.last()) else { return };
