@@ -92,7 +92,9 @@ mod tests {
         for share in 0..=50 {
             let t = f64::from(share) / 50.0;
             let [before, here, after] = [gap(t - h), gap(t), gap(t + h)];
-            assert!((here[1] - (after[0] - before[0]) / (2.0 * h)).abs() < 1e-7 && here[2] >= here[0].abs());
+            let slope = (after[0] - before[0]) / (2.0 * h);
+            assert!((here[1] - slope).abs() < 1e-7, "{t}: {} {slope}", here[1]);
+            assert!(here[2] * (1.0 + 1e-15) >= here[0].abs(), "{t}: {here:?}");
             steepest = steepest.max(((after[1] - before[1]) / (2.0 * h)).abs());
         }
         assert!(steepest <= bound && bound < 20.0 * steepest, "{steepest} {bound}");
