@@ -393,3 +393,47 @@ fn welded_halves_swing_as_the_whole() {
         }
     }
 }
+
+/// Two cranks whose lengths differ by a third of a percent: a parallelogram but for that, which passes beside its change points.
+const NEAR_PARALLELOGRAM: &str = r#"{
+    "name": "near_parallelogram", "gravity": [9.81, 0],
+    "bars": [
+      {"name": "bar1", "mass": 0.0603, "length": 0.3, "centre": [0.15, 0], "inertia": 0.0004648125},
+      {"name": "bar2", "mass": 0.0603, "length": 0.6, "centre": [0.3, 0], "inertia": 0.0018215625},
+      {"name": "bar3", "mass": 0.0603, "length": 0.301, "centre": [0.1505, 0], "inertia": 0.000467832525}
+    ],
+    "hinges": [
+      {"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar1", "point": [0, 0]}]},
+      {"name": "B", "between": [{"body": "bar1", "point": [0.3, 0]}, {"body": "bar2", "point": [0, 0]}]},
+      {"name": "C", "between": [{"body": "bar2", "point": [0.6, 0]}, {"body": "bar3", "point": [0, 0]}]},
+      {"name": "D", "between": [{"body": "ground", "point": [0, 0.6]}, {"body": "bar3", "point": [0.301, 0]}]}
+    ],
+    "start": {
+      "bar1": {"phi": 0.3, "omega": 9.0},
+      "bar2": {"phi": 1.5690515479909157, "omega": -0.00485609713747868},
+      "bar3": {"phi": 3.4405619465492783, "omega": 8.967227686060262}
+    },
+    "until": 1, "every": 0.02
+}"#;
+
+/// Beside a singular position the shifts of both ends of a step come together slowly, which is no reason to stop: the error that is left is that of the method.
+#[test]
+fn gauss_methods_pass_beside_singular_positions() {
+    let scene = driftless::scene::parse_scene(NEAR_PARALLELOGRAM, "near_parallelogram.json", &[]).expect("a scene");
+    let end = |request: &Request| {
+        let outcome = finished(&scene, request);
+        assert!(violations(&outcome)[0] < 1e-12, "{}", outcome.plan.method);
+        outcome.last.phi
+    };
+    let exact = end(&by("taylor", 1e-13));
+    // The step of a method by itself, and half and a quarter of it.
+    for (method, step, most) in
+        [("gauss4", 1.25e-3, [1e-7, 1e-8, 1e-9]), ("gauss6", 1.25e-3, [1e-9, 1e-11, 1e-12]), ("gauss8", 2.5e-3, [1e-7, 1e-11, 1e-12])]
+    {
+        for (part, most) in most.into_iter().enumerate() {
+            let found = end(&steps(method, step / f64::from(1 << part)));
+            let error = found.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(error < most, "{method} with 1/{} of its step: {error:.1e}", 1 << part);
+        }
+    }
+}

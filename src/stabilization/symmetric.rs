@@ -20,9 +20,11 @@ use crate::stepping::gauss::Gauss;
 use crate::stepping::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
 
 /// Gauss steps per step before it is given up; an ordinary one takes three or four.
-const ROUNDS: usize = 20;
+const ROUNDS: usize = 60;
 /// Sweeps onto the constraints.
-const SWEEPS: usize = 20;
+const SWEEPS: usize = 60;
+/// Rounds in which nothing is gained before no more is expected.
+const STALLED: usize = 3;
 /// Largest violation, relative to levers and speeds, and largest change by the multipliers' mismatch, relative to turns and speeds, that count as
 /// converged.
 const TOLERANCE: f64 = 1e-12;
@@ -65,7 +67,7 @@ impl SymmetricGauss {
             what,
             hint: "halve the step".into(),
         };
-        let mut last = f64::INFINITY;
+        let (mut last, mut stalled, mut is_closed) = (f64::INFINITY, 0, false);
         let mut one = Tally::default();
         for _ in 0..ROUNDS {
             trial.clone_from(state);
@@ -81,16 +83,20 @@ impl SymmetricGauss {
             for (mu, nu) in mu.iter_mut().zip(nu.iter()) {
                 *mu += 0.5 * (nu - *mu);
             }
-            // Rounds contract by about the step: what no longer falls is rounding.
+            // Rounds contract by about the step, near singular positions more slowly: what no longer falls is rounding, which grows there with the
+            // inverse of the distance, as in the projection itself.
             if mismatch == 0.0 || mismatch >= 0.5 * last || mismatch.is_nan() {
-                // As in the projection itself: near a singular position rounding grows with the inverse of the distance.
                 let near = kernel.weakest.share.clamp(DROPPED, 1.0).sqrt();
-                if mismatch > TOLERANCE / near || mismatch.is_nan() {
-                    return Err(stop(format!("the shifts of both ends differ by {mismatch:.1e} of the motion and do not come closer")));
-                }
-                break;
+                is_closed = mismatch <= TOLERANCE / near;
+                stalled += usize::from(mismatch.is_nan() || mismatch >= 0.95 * last);
             }
             last = mismatch;
+            if is_closed || stalled == STALLED {
+                break;
+            }
+        }
+        if !is_closed {
+            return Err(stop(format!("the shifts of both ends differ by {last:.1e} of the motion and do not come closer")));
         }
         state.clone_from(best);
         state.wrap();
@@ -139,7 +145,7 @@ fn land(mechanism: &Mechanism, kernel: &mut Kernel<f64>, end: &State, landed: &m
     let (n, r) = (mechanism.coordinates(), mechanism.rows.len());
     landed.clone_from(end);
     face(mechanism, kernel, landed);
-    let mut last = f64::INFINITY;
+    let (mut last, mut stalled) = (f64::INFINITY, 0);
     for _ in 0..SWEEPS {
         landed.clone_from(end);
         shift(mechanism, kernel, landed, nu);
@@ -153,13 +159,15 @@ fn land(mechanism: &Mechanism, kernel: &mut Kernel<f64>, end: &State, landed: &m
                 worst = if left.is_nan() { f64::NAN } else { worst.max(left) };
             }
             kernel.solve_rows();
-            if worst > 1e-16 && worst < 0.5 * last {
+            if worst > 1e-16 && (worst < 0.5 * last || worst > TOLERANCE) {
                 for row in 0..r {
                     nu[level + row] -= kernel.multiplier[row];
                 }
             }
         }
-        if worst <= 1e-16 || worst >= 0.5 * last || worst.is_nan() {
+        stalled += usize::from(worst >= 0.95 * last);
+        // Sweeps contract slowly where a step ends far from where it began; below the tolerance what no longer falls is rounding.
+        if worst <= 1e-16 || (worst >= 0.5 * last && worst <= TOLERANCE) || stalled == STALLED || worst.is_nan() {
             break;
         }
         last = worst;
