@@ -185,7 +185,6 @@ impl Search {
                     let landed = self.land(field, step, state, shorter, event, tally);
                     return landed.map_or(Met::Failed, |h| Met::Event(h, event));
                 }
-                Found::Near(_) if shorter <= finest(state, field.time_unit()) => break,
                 Found::Inside(_) if shorter <= finest(state, field.time_unit()) => return Met::AtRest,
                 Found::Inside(_) | Found::Near(_) => {
                     if !step.repeat(field, state, shorter, tally) {
@@ -219,6 +218,8 @@ impl Search {
         let Self { dense, room, opaque, .. } = self;
         let (mut found, time) = (Found::Nothing, state.time.hi.abs() + h);
         let none = vec![0.0; count];
+        // Of its beginning the side is known, whatever rounding makes of a slope there.
+        let begin = finest(state, field.time_unit()) / h;
         opaque.clear();
         for event in 0..field.events() {
             let off = field.gap_bend(event, time, 0.0, &none, &dense.off);
@@ -227,7 +228,7 @@ impl Search {
                 continue;
             }
             let gap = Gap { field: &*field, event, dense, state, h, room };
-            found = earlier(found, event, &gap, off * f64::from(asked), S::off);
+            found = earlier(found, event, &gap, off * f64::from(asked), S::off, begin);
         }
         if self.opaque.is_empty() { found } else { self.opaquely(field, state, h, found) }
     }
@@ -252,7 +253,7 @@ impl Search {
                 let curve = Chebyshev::through(values);
                 let tail = curve.tail();
                 if tail <= RESOLVED * curve.most() || Some(&degree) == DEGREES.last() {
-                    found = earlier(found, event, &curve, 0.0, |_| 0.0);
+                    found = earlier(found, event, &curve, 0.0, |_| 0.0, 0.0);
                 } else if curve.least() <= 10.0 * tail {
                     pending += 1;
                 }
@@ -331,8 +332,8 @@ impl Search {
     }
 }
 
-/// What comes first: that which was found, or what this event function, off by `zone` at most, has to say.
-fn earlier(found: Found, event: usize, curve: &impl Curve, zone: f64, off: impl Fn(f64) -> f64) -> Found {
+/// What comes first: that which was found, or what this event function, off by `zone` at most, has to say; minima up to `begin` are none.
+fn earlier(found: Found, event: usize, curve: &impl Curve, zone: f64, off: impl Fn(f64) -> f64, begin: f64) -> Found {
     let end = found.share();
     // Below, it is known as well as zero is.
     let zone = if zone < 0.1 * TOUCH { 0.0 } else { zone };
@@ -342,7 +343,7 @@ fn earlier(found: Found, event: usize, curve: &impl Curve, zone: f64, off: impl 
     }
     let crosses = crossing(curve, end);
     let passes = if let Crossing::At(share) = crosses { Some(share) } else { None };
-    let near = if zone > 0.0 { doubtful(curve, zone, |share| zone * off(share), end, passes) } else { None };
+    let near = if zone > 0.0 { doubtful(curve, zone, |share| zone * off(share), [begin, end], passes) } else { None };
     match (crosses, near) {
         (Crossing::Inside(share), near) if near.is_none_or(|near| share <= near) => Found::Inside(share),
         (_, Some(near)) => Found::Near(near),

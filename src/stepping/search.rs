@@ -100,9 +100,10 @@ pub fn crossing(curve: &impl Curve, end: f64) -> Crossing {
     }
 }
 
-/// The first minimum within `end`, and before a passage at `passes` that does not lead to it, whose value is not known to be on either side of zero: where
+/// The first minimum in (begin, end], and before a passage at `passes` that does not lead to it, whose value is not known to be on either side of zero: where
 /// values are `off(t) <= zone` from the truth.
-pub fn doubtful(curve: &impl Curve, zone: f64, off: impl Fn(f64) -> f64, end: f64, passes: Option<f64>) -> Option<f64> {
+pub fn doubtful(curve: &impl Curve, zone: f64, off: impl Fn(f64) -> f64, [begin, end]: [f64; 2], passes: Option<f64>) -> Option<f64> {
+    let known = begin;
     let mut begin = 0.0;
     for _ in 0..DIPS {
         let low = if curve.at(begin)[0] < zone { begin } else { root(curve, zone, begin, end)? };
@@ -110,7 +111,7 @@ pub fn doubtful(curve: &impl Curve, zone: f64, off: impl Fn(f64) -> f64, end: f6
         let high = root(curve, 2.0 * zone, low, end).unwrap_or(end);
         if curve.at(low)[1] < 0.0 && curve.at(high)[1] > 0.0 {
             let lowest = turn(curve, low, high);
-            if curve.at(lowest)[0].abs() < off(lowest) {
+            if lowest > known && curve.at(lowest)[0].abs() < off(lowest) {
                 return Some(lowest);
             }
         }

@@ -242,41 +242,77 @@ impl Judge<'_> {
         }
     }
 
-    /// Impacts up to a time, each against one of the other's at the same wall.
+    /// Impacts up to a time, each against one of the other's at the same wall: in their order, or by their times, whichever fits better.  In a chatter they follow
+    /// each other more closely than either tells their times.
     fn impacts(&mut self, until: f64) {
-        let (record, ran, scales) = (self.record, self.ran, self.record.scales);
-        let walls = &record.model.scene.walls;
-        // The last ones of a chatter are cut off by either in its own way.
-        let fastest = record.impacts.iter().fold(1e-4 * scales.rate * scales.length, |most: f64, impact| most.max(-impact.approach));
-        let least = 1e-3 * fastest;
-        let window = |approach: f64| self.allowed * (1.0 / scales.rate + scales.length / approach.abs());
-        let mut matched = vec![false; ran.outcome.strikes.len()];
-        let mut pairs = Vec::new();
-        for own in record.impacts.iter().filter(|own| -own.approach > least && own.t < until - window(own.approach)) {
-            let near = |(_, strike): &(usize, &driftless::run::Strike)| strike.wall == walls[own.wall].name;
-            let best = (ran.outcome.strikes.iter().enumerate().filter(near).filter(|(i, _)| !matched[*i]))
-                .min_by(|a, b| (a.1.t - own.t).abs().total_cmp(&(b.1.t - own.t).abs()));
-            if let Some((i, _)) = best {
-                matched[i] = true;
-            }
-            pairs.push((own.clone(), best.map(|(_, strike)| strike.clone())));
+        let before = self.worst;
+        let [by_order, by_time] = [Self::by_order, Self::by_time].map(|pair| {
+            self.worst = before;
+            let partners = pair(self);
+            let others = std::mem::take(&mut self.found);
+            self.compare_impacts(until, &partners);
+            (std::mem::replace(&mut self.found, others), self.worst)
+        });
+        let (found, worst) = if by_order.0.len() <= by_time.0.len() { by_order } else { by_time };
+        self.found.extend(found);
+        self.worst = worst;
+    }
+
+    /// True of an impact of the run at the wall of one of the auditor's.
+    fn is_same_wall(&self, own: usize, strike: usize) -> bool {
+        let (record, strikes) = (self.record, &self.ran.outcome.strikes);
+        strikes[strike].wall == record.model.scene.walls[record.impacts[own].wall].name
+    }
+
+    /// The run's impact for each of the auditor's: the first at a wall for the first there.
+    fn by_order(&self) -> Vec<Option<usize>> {
+        let (impacts, strikes) = (&self.record.impacts, &self.ran.outcome.strikes);
+        let place = |own: usize| (0..own).filter(|&other| impacts[other].wall == impacts[own].wall).count();
+        (0..impacts.len()).map(|own| (0..strikes.len()).filter(|&strike| self.is_same_wall(own, strike)).nth(place(own))).collect()
+    }
+
+    /// The same with the nearest in time, hard impacts first.
+    fn by_time(&self) -> Vec<Option<usize>> {
+        let (impacts, strikes) = (&self.record.impacts, &self.ran.outcome.strikes);
+        let (mut is_taken, mut partners) = (vec![false; strikes.len()], vec![None; impacts.len()]);
+        let (hard, soft): (Vec<usize>, Vec<usize>) = (0..impacts.len()).partition(|&own| -impacts[own].approach > self.least_approach());
+        for own in hard.into_iter().chain(soft) {
+            let free = (0..strikes.len()).filter(|&strike| !is_taken[strike] && self.is_same_wall(own, strike));
+            let away = |strike: &usize| (strikes[*strike].t - impacts[own].t).abs();
+            partners[own] = free.min_by(|a, b| away(a).total_cmp(&away(b)));
+            partners[own].into_iter().for_each(|strike| is_taken[strike] = true);
         }
-        let windows: Vec<f64> = pairs.iter().map(|(own, _)| window(own.approach)).collect();
-        for ((own, strike), window) in pairs.into_iter().zip(windows) {
-            let wall = walls[own.wall].name.clone();
-            let Some(strike) = strike else {
+        partners
+    }
+
+    /// The last ones of a chatter are cut off by either in its own way \[m/s\].
+    fn least_approach(&self) -> f64 {
+        let fastest = 1e-4 * self.record.scales.rate * self.record.scales.length;
+        1e-3 * self.record.impacts.iter().fold(fastest, |most: f64, impact| most.max(-impact.approach))
+    }
+
+    /// Compares impacts that are partners; neither may have one by itself, unless so near the end that the other's may come after it.
+    fn compare_impacts(&mut self, until: f64, partners: &[Option<usize>]) {
+        let (record, ran, scales) = (self.record, self.ran, self.record.scales);
+        let (least, unit) = (self.least_approach(), |approach: f64| 1.0 / scales.rate + scales.length / approach.abs());
+        let is_due = |t: f64, approach: f64, allowed: f64| t < until - allowed * unit(approach);
+        for (own, partner) in record.impacts.iter().zip(partners) {
+            if -own.approach <= least || !is_due(own.t, own.approach, self.allowed) {
+                continue;
+            }
+            let wall = &record.model.scene.walls[own.wall].name;
+            let Some(strike) = partner.map(|strike| &ran.outcome.strikes[strike]) else {
                 self.number(|| format!("impact at {wall}"), own.t, f64::NAN, own.t, 1.0);
                 continue;
             };
-            let unit = window / self.allowed;
-            self.number(|| format!("time of impact at {wall}"), own.t, strike.t, own.t, unit);
+            self.number(|| format!("time of impact at {wall}"), own.t, strike.t, own.t, unit(own.approach));
             let (response, speed) = (record.response.rate, scales.rate * scales.length);
             self.response(|| format!("impulse at {wall}"), own.t, [strike.impulse, own.impulse], scales.impulse, response);
             self.response(|| format!("approach at {wall}"), own.t, [strike.approach, own.approach], speed, response);
             self.response(|| format!("energy lost at {wall}"), own.t, [strike.energy_lost, own.energy_lost], scales.energy, response);
         }
-        for (strike, _) in ran.outcome.strikes.iter().zip(matched).filter(|(strike, matched)| !matched && -strike.approach > 2.0 * least) {
-            if strike.t < until {
+        for (i, strike) in ran.outcome.strikes.iter().enumerate() {
+            if !partners.contains(&Some(i)) && -strike.approach > 2.0 * least && is_due(strike.t, strike.approach, self.allowed) {
                 self.number(|| format!("impact at {} that is none", strike.wall), strike.t, strike.t, f64::NAN, 1.0);
             }
         }

@@ -142,10 +142,10 @@ fn a_minimum_whose_side_is_unknown_is_told() {
         let powers = dip(height);
         let curve = Powers { powers: &powers, end: 1.0 };
         let passes = if let Crossing::At(t) = crossing(&powers, 1.0) { Some(t) } else { None };
-        let found = doubtful(&curve, 1e-6, |_| 1e-6, 1.0, passes);
+        let found = doubtful(&curve, 1e-6, |_| 1e-6, [0.0, 1.0], passes);
         assert_eq!(found.is_none(), is_known, "{height}: {found:?}");
         assert!(found.is_none_or(|t| (t - 0.6).abs() < 1e-9), "{found:?}");
         // Known well enough where the dip is, and nowhere else.
-        assert!(height == 0.0 || doubtful(&curve, 1e-6, |t| 1e-6 * (t - 0.6).abs(), 1.0, passes).is_none());
+        assert!(height == 0.0 || doubtful(&curve, 1e-6, |t| 1e-6 * (t - 0.6).abs(), [0.0, 1.0], passes).is_none());
     }
 }
