@@ -17,6 +17,9 @@ pub fn object(trust: Option<&Trust>) -> Value {
     };
     json!({
         "error_estimate": trust.error_estimate,
+        "rate_error": trust.rate_error,
+        "torque_error": trust.torque_error,
+        "is_upper_bound": trust.is_upper_bound,
         "horizon_s": trust.horizon,
         "how": trust.how.word(),
         "at_s": trust.at,
@@ -33,6 +36,7 @@ pub fn object(trust: Option<&Trust>) -> Value {
         })),
         "input_error": trust.input_error,
         "model_error": trust.model_error,
+        "not_judged": trust.shared,
     })
 }
 
@@ -54,7 +58,7 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
             page.entry("", &beyond(mechanism, outcome, horizon));
         }
         (None, Some(error)) => {
-            page.entry("trust", &format!("angles accurate to typically {} {what} at {} s ({source})", magnitude(error), rough(trust.at)));
+            page.entry("trust", &format!("angles accurate to {} {} {what} at {} s ({source})", how_near(trust), magnitude(error), rough(trust.at)));
             page.entry("", &format!("no horizon within {} s", rough(trust.at)));
         }
         (None, None) => {
@@ -64,6 +68,12 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
                 page.entry("", &format!("typically {} rad at {} s ({source})", magnitude(1.2 * error), rough(*t)));
             }
         }
+    }
+    if let Some(beside) = beside(trust) {
+        page.entry("", &beside);
+    }
+    if trust.shared.len() > 1 {
+        page.entry("", &format!("not judged, as run and companion share them: {}", trust.shared.join(", ")));
     }
     if let (Some(why), true) = (trust.cut(), trust.error_estimate.is_some()) {
         page.entry("", why);
@@ -81,6 +91,19 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
     if let Some(error) = trust.input_error {
         page.entry("inputs", &format!("their last digit comes to about {} rad at {} s", magnitude(error), rough(trust.at)));
     }
+}
+
+/// How the estimate is to be read.
+fn how_near(trust: &Trust) -> &'static str {
+    if trust.is_upper_bound { "at most about" } else { "typically" }
+}
+
+/// The errors of rates and torques, at the same time.
+fn beside(trust: &Trust) -> Option<String> {
+    let rate = trust.rate_error?;
+    let torque = trust.torque_error.map_or(String::new(), |torque| format!(", torques to {} N·m", magnitude(torque)));
+    let at = if trust.horizon.is_some() { "then " } else { "" };
+    Some(format!("rates {at}to {} {} rad/s{torque}", how_near(trust), magnitude(rate)))
 }
 
 /// What still holds beyond the horizon.

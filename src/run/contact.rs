@@ -8,6 +8,7 @@ use super::flip::Lookout;
 use super::impact_monitor::{self, Claim};
 use super::march::{March, Pause, Place, build};
 use super::methods::Stabilization;
+use super::monitor::{Monitor, lent};
 use super::plan::Plan;
 use super::running::Outcome;
 use super::sample::{Sample, Sampler};
@@ -198,11 +199,26 @@ impl Course {
 
     /// Advances to an output time, through impacts and holds; false where it paused on the way.
     pub(super) fn go(&mut self, until: Time, outcome: &mut Outcome, pause: &mut Pause) -> Result<bool, StepError> {
+        self.go_watched(until, outcome, None, pause)
+    }
+
+    /// The same, looked at on the way.
+    pub(super) fn go_watched(
+        &mut self,
+        until: Time,
+        outcome: &mut Outcome,
+        mut monitor: Option<&mut dyn Monitor>,
+        pause: &mut Pause,
+    ) -> Result<bool, StepError> {
         if !std::mem::take(&mut self.is_between) {
             (self.holds_in_row, self.events_in_row) = (0, 0);
         }
         while self.events_in_row < EVENTS_MOST {
-            match self.marcher.advance(until, outcome.plan.time(outcome.plan.rows), self.lookout.as_mut(), pause) {
+            if let Some(monitor) = &mut monitor {
+                monitor.count_events(outcome.strike_count + outcome.hold_count);
+            }
+            let horizon = outcome.plan.time(outcome.plan.rows);
+            match self.marcher.advance(until, horizon, self.lookout.as_mut(), lent(&mut monitor), pause) {
                 Ok(Reached::Until) => return Ok(true),
                 Ok(Reached::Pause) => {
                     self.is_between = true;

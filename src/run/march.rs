@@ -4,6 +4,7 @@
 use super::flip::{self, Flip, Lookout, Suspect};
 use super::impact_monitor::closed;
 use super::methods::{MethodId, Stabilization};
+use super::monitor::{Monitor, lent};
 use super::plan::Plan;
 use super::shrink::{Shrinking, shrinking};
 use super::wall_guard::WallGuard;
@@ -44,9 +45,16 @@ macro_rules! sized {
 
 /// A problem, its method and its state.
 pub(super) trait March {
-    /// To the output time `until`, on the way to `horizon`; what is read then is the motion there.  Looks for bars that turn over, where asked to, and
-    /// pauses after a step where `pause` is true.
-    fn advance(&mut self, until: Time, horizon: Time, lookout: Option<&mut Lookout>, pause: &mut Pause) -> Result<Reached, StepError>;
+    /// To the output time `until`, on the way to `horizon`; what is read then is the motion there.  Looks for bars that turn over, where asked to, shows
+    /// the motion to a monitor when it is due, and pauses after a step where `pause` is true.
+    fn advance(
+        &mut self,
+        until: Time,
+        horizon: Time,
+        lookout: Option<&mut Lookout>,
+        monitor: Option<&mut dyn Monitor>,
+        pause: &mut Pause,
+    ) -> Result<Reached, StepError>;
     fn read(&mut self, motion: &mut Motion);
     /// Goes on from another motion: of what the method remembers with the step alone.
     fn jump(&mut self, motion: &Motion);
@@ -103,6 +111,8 @@ struct Marcher<P: ?Sized, M> {
     /// The motion at an output time inside that step, while it is the one to be read.
     inside: State,
     is_inside: bool,
+    /// The motion last shown to a monitor, kept for its room.
+    observed: Motion,
     /// The event the last step ended with, where output times came first.
     ahead: Option<usize>,
     steps: Steps,
@@ -113,12 +123,19 @@ struct Marcher<P: ?Sized, M> {
 }
 
 impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
-    fn advance(&mut self, until: Time, horizon: Time, lookout: Option<&mut Lookout>, pause: &mut Pause) -> Result<Reached, StepError> {
+    fn advance(
+        &mut self,
+        until: Time,
+        horizon: Time,
+        lookout: Option<&mut Lookout>,
+        mut monitor: Option<&mut dyn Monitor>,
+        pause: &mut Pause,
+    ) -> Result<Reached, StepError> {
         let mut lookout = lookout.filter(|lookout| lookout.flip.is_none());
         if !self.method.is_dense() {
-            return self.land(until, lookout, pause);
+            return self.land_watched(until, lookout, monitor, pause);
         }
-        let Self { problem, method, state, tally, from, inside, is_inside, ahead, guard, .. } = self;
+        let Self { problem, method, state, tally, from, inside, is_inside, ahead, guard, observed, .. } = self;
         let (name, mut glance, mut suspect) = (Method::<P>::name(method), Glance::default(), None);
         // Steps are as long as the method likes; output times are read off them.
         *is_inside = false;
@@ -145,7 +162,8 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
                 let enough = lookout.as_mut().is_some_and(|lookout| lookout.step(problem, state, false))
                     || state.time >= until
                     || paused
-                    || suspect.is_some();
+                    || suspect.is_some()
+                    || monitor.as_ref().is_some_and(|monitor| monitor.due() <= state.time.hi);
                 if !enough {
                     from.clone_from(state);
                 }
@@ -171,6 +189,15 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
                         Some(glance)
                     })
                 });
+            }
+            while let Some(monitor) = lent(&mut monitor).filter(|monitor| monitor.due() <= state.time.hi) {
+                if monitor.due() > from.time.hi && monitor.due() < state.time.hi {
+                    method.within(problem, from, Time::from(monitor.due()), inside);
+                    problem.read(inside, observed);
+                } else {
+                    problem.read(state, observed);
+                }
+                monitor.observe(observed, *tally);
             }
             if let Reached::Event(event) = reached {
                 if state.time <= until {
@@ -255,8 +282,69 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
 }
 
 impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
+    /// Marches a method that is not dense to `until` itself, and shows the ends of its steps to a monitor when it is due.
+    fn land_watched(
+        &mut self,
+        until: Time,
+        mut lookout: Option<&mut Lookout>,
+        monitor: Option<&mut dyn Monitor>,
+        pause: &mut Pause,
+    ) -> Result<Reached, StepError> {
+        let Some(monitor) = monitor else { return self.land(until, lookout, pause) };
+        loop {
+            let (due, mut paused) = (monitor.due(), false);
+            let begun = (self.steps == Steps::Unseen && due < until.hi).then(|| self.state.clone());
+            self.method.keep_ends(begun.is_some());
+            let mut is_enough = || {
+                paused = pause();
+                paused
+            };
+            // What is kept of a window is gone with the next.
+            let due = if begun.is_some() { f64::NEG_INFINITY } else { due };
+            let reached = self.land_until(until, due, lookout.as_deref_mut(), &mut is_enough);
+            if let Some(begun) = begun {
+                self.show_ends(begun, monitor);
+            }
+            if self.state.time.hi >= monitor.due() {
+                self.problem.read(&self.state, &mut self.observed);
+                monitor.observe(&self.observed, self.tally);
+            }
+            if reached != Ok(Reached::Pause) || paused {
+                return reached;
+            }
+        }
+    }
+
+    /// Shows what a method kept of the ends of its steps since `begun`.
+    fn show_ends(&mut self, begun: State, monitor: &mut dyn Monitor) {
+        let Self { problem, method, inside, observed, tally, .. } = self;
+        let Some(ends) = method.ends() else { return };
+        for (&after, y) in ends.after.iter().zip(ends.y.chunks_exact(begun.y.len())) {
+            if begun.time.hi + after >= monitor.due() {
+                inside.clone_from(&begun);
+                inside.y.copy_from_slice(y);
+                inside.low.fill(0.0);
+                inside.time = begun.time + after;
+                inside.wrap();
+                problem.read(inside, observed);
+                monitor.observe(observed, *tally);
+            }
+        }
+    }
+
     /// Marches a method that is not dense to `until` itself.
-    fn land(&mut self, until: Time, mut lookout: Option<&mut Lookout>, pause: &mut Pause) -> Result<Reached, StepError> {
+    fn land(&mut self, until: Time, lookout: Option<&mut Lookout>, pause: &mut Pause) -> Result<Reached, StepError> {
+        self.land_until(until, f64::INFINITY, lookout, pause)
+    }
+
+    /// The same, but it pauses where a step reaches `due` \[s\] too.
+    fn land_until(
+        &mut self,
+        until: Time,
+        due: f64,
+        mut lookout: Option<&mut Lookout>,
+        pause: &mut Pause,
+    ) -> Result<Reached, StepError> {
         let Self { problem, method, state, tally, guard, .. } = self;
         let (all, name, mut glance) = (self.steps == Steps::Unseen, Method::<P>::name(method), Glance::default());
         let (mut from, mut suspects) = (State::default(), Vec::new());
@@ -279,7 +367,7 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
             if let Some(lookout) = &mut lookout {
                 lookout.step(problem, state, all);
             }
-            Ok(if pause() { Seen::Enough } else { Seen::Kept })
+            Ok(if pause() || state.time.hi >= due { Seen::Enough } else { Seen::Kept })
         });
         if let Some(lookout) = &mut lookout {
             lookout.search(&mut |suspect| if self.steps == Steps::Own { self.again(suspect) } else { self.traced(suspect) });
@@ -337,7 +425,7 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
         let mut lookout = Lookout::default();
         let until = from.time + *span;
         // Where that stops, what was seen up to there counts.
-        let _ = tracer.advance(until, until, Some(&mut lookout), &mut || false);
+        let _ = tracer.advance(until, until, Some(&mut lookout), None, &mut || false);
         lookout.flip
     }
 }
@@ -361,6 +449,7 @@ fn boxed<P: Form + ?Sized + 'static, M: Method<P> + 'static>(problem: Box<P>, me
         from: idle(),
         inside: idle(),
         is_inside: false,
+        observed: Motion::default(),
         ahead: None,
         steps,
         tracer: None,
@@ -423,6 +512,10 @@ fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<
         MethodId::Taylor if mechanism.vibration.is_some() => {
             return Err(cannot_begin(plan, "the mean force of a rigid spring's vibration has no series".into()));
         }
+        MethodId::Taylor if plan.in_double_double => {
+            let (order, tolerance) = (order_in_double_double(tolerance.relative), tolerance.relative);
+            exact(mechanism, start, order, tolerance)
+        }
         MethodId::Taylor => {
             let mut taylor = Taylor::new(tolerance);
             taylor.extended = plan.extended;
@@ -454,6 +547,11 @@ fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<
     })
 }
 
+/// The order of a series in double-double that takes the least work at a tolerance: a step costs as its square, and is as long as its root of the tolerance.
+pub(super) fn order_in_double_double(tolerance: f64) -> usize {
+    (-0.5 * libm::log(tolerance)).round().clamp(20.0, 30.0) as usize
+}
+
 /// The series of a mechanism in double-double, from `start`, with its order and tolerance \[rad/s\].
 pub(super) fn exact(mechanism: &Arc<Mechanism>, start: &Motion, order: usize, tolerance: f64) -> Box<dyn March> {
     let taylor = Taylor::<DoubleDouble>::with_order(tolerance, order);
@@ -483,7 +581,7 @@ fn pilot(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion) -> Result<f64,
     marcher.allow(plan.effort);
     let rows = plan.rows.min(20);
     for row in 1..=rows {
-        match marcher.advance(plan.time(row), plan.time(plan.rows), None, &mut || false) {
+        match marcher.advance(plan.time(row), plan.time(plan.rows), None, None, &mut || false) {
             Ok(Reached::Until | Reached::Pause) => {}
             Ok(Reached::Event(_)) => break,
             Err(stop) if stop.cause == Cause::RestingContact => break,

@@ -21,6 +21,7 @@ pub mod flip;
 mod impact_monitor;
 pub mod march;
 pub mod methods;
+mod monitor;
 pub mod plan;
 pub mod reference;
 pub mod running;

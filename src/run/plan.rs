@@ -56,6 +56,8 @@ pub struct Plan {
     pub time_constant: Option<f64>,
     /// The first orders of the series in double-double.
     pub extended: bool,
+    /// All of the series in double-double, as references are.
+    pub in_double_double: bool,
     /// Evaluations allowed, expansions of a series counted alike: a run that needs more stops.
     pub effort: u64,
     /// Horizon \[s\].
@@ -158,6 +160,7 @@ impl Plan {
             stabilization,
             time_constant: request.time_constant,
             extended: request.extended,
+            in_double_double: false,
             effort,
             until,
             every,
@@ -178,6 +181,7 @@ impl Plan {
             stabilization: if mechanism.rows.is_empty() { Stabilization::None } else { usual(mechanism) },
             time_constant: None,
             extended: false,
+            in_double_double: false,
             effort: usual_effort(MethodId::Taylor, until),
             until,
             every: until,

@@ -148,7 +148,7 @@ impl Walk {
     pub(super) fn to(&mut self, time: Time, pause: &mut Pause) -> Result<Option<Motion>, StepError> {
         match self {
             Self::Exact(marcher, horizon) => {
-                if marcher.advance(time, *horizon, None, pause)? == Reached::Pause {
+                if marcher.advance(time, *horizon, None, None, pause)? == Reached::Pause {
                     return Ok(None);
                 }
                 let mut motion = Motion::default();

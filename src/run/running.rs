@@ -5,6 +5,7 @@ use super::drift::{Drift, Limits};
 use super::flip::{Flip, Lookout};
 use super::march::{MOST_TURNS, March, Pause, build};
 use super::methods::{MethodId, Stabilization};
+use super::monitor::Monitor;
 use super::plan::{Plan, Refusal, Request};
 use super::sample::Sample;
 use super::trace::Trace;
@@ -353,8 +354,14 @@ impl Running {
             let stopped = match self.resting.take() {
                 Some(stop) => Err(stop),
                 None if self.row == 0 => Ok(true),
-                None => course.go(outcome.plan.time(self.row), outcome, pause),
+                None => {
+                    let monitor = companion.as_mut().map(|companion| companion as &mut dyn Monitor);
+                    course.go_watched(outcome.plan.time(self.row), outcome, monitor, pause)
+                }
             };
+            if let Some(companion) = companion {
+                outcome.trust_wall += companion.take_wall();
+            }
             if stopped == Ok(false) {
                 return Ok(false);
             }
@@ -385,10 +392,9 @@ impl Running {
             self.row += 1;
             let has_flipped = *ensemble == Some(true) && outcome.flip.is_some();
             self.is_over = outcome.stop.is_some() || has_flipped || self.row > outcome.plan.rows;
-            if let Some(companion) = companion.as_mut().filter(|companion| self.is_over || companion.is_due(reached)) {
-                let begin = Instant::now();
-                companion.see(course.shown(), &outcome.plan, course.tally(), self.row);
-                outcome.trust_wall += begin.elapsed();
+            if let Some(companion) = companion.as_mut().filter(|_| self.is_over || self.row == 1) {
+                companion.observe(course.shown(), course.tally());
+                outcome.trust_wall += companion.take_wall();
             }
             if !self.is_over && pause() {
                 return Ok(false);

@@ -113,6 +113,15 @@ impl Seen {
 /// Shown the state after every accepted step; may change it, or stop the run.
 pub type Watch<'a, P> = dyn FnMut(&mut P, &mut State) -> Result<Seen, StepError> + 'a;
 
+/// Ends of steps that no watcher has seen.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Ends {
+    /// Times after the beginning of the call \[s\].
+    pub after: Vec<f64>,
+    /// The unknowns then, one step after the other, angles as they wind.
+    pub y: Vec<f64>,
+}
+
 /// Marches a problem `P`.
 pub trait Method<P: ?Sized> {
     /// Name in reports: which code made a result.
@@ -156,6 +165,14 @@ pub trait Method<P: ?Sized> {
     /// Called where a dense march has come to an output time: forgets what was of concern on the way to it.
     fn arrive(&self, state: &mut State) {
         state.memory.clear();
+    }
+
+    /// Keeps the ends of its steps from now on, or no longer; of use with methods that show the ends of their windows only.
+    fn keep_ends(&mut self, _keep: bool) {}
+
+    /// The ends of the steps of the last call, where they are kept.
+    fn ends(&self) -> Option<&Ends> {
+        None
     }
 
     /// What a method knows beside the state that has a say in what follows; nothing unless said otherwise.

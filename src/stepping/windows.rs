@@ -12,7 +12,7 @@
 //!
 //! The step the crate found is passed on to the next window through the state's memory.
 
-use super::{Cause, Method, Reached, StepError, Tally, Tolerance, Watch};
+use super::{Cause, Ends, Method, Reached, StepError, Tally, Tolerance, Watch};
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Field, State, Time};
 use nalgebra::{DVector, SVector};
@@ -24,6 +24,7 @@ use std::cell::RefCell;
 pub struct Dopri5 {
     /// Tolerance of a step.
     pub tolerance: Tolerance,
+    ends: Option<Ends>,
 }
 
 /// Dormand–Prince 8(5,3) of `ode_solvers`: everyday runs at 1e-6…1e-12.
@@ -31,6 +32,7 @@ pub struct Dopri5 {
 pub struct Dop853 {
     /// Tolerance of a step.
     pub tolerance: Tolerance,
+    ends: Option<Ends>,
 }
 
 /// Most numbers among the rows of one call of the crate, which keeps them all: after so many a window is begun anew.
@@ -41,14 +43,14 @@ const LEAST_KEPT: usize = 64;
 impl Dopri5 {
     /// The method at a tolerance.
     pub fn new(tolerance: Tolerance) -> Self {
-        Self { tolerance }
+        Self { tolerance, ends: None }
     }
 }
 
 impl Dop853 {
     /// The method at a tolerance.
     pub fn new(tolerance: Tolerance) -> Self {
-        Self { tolerance }
+        Self { tolerance, ends: None }
     }
 }
 
@@ -101,13 +103,13 @@ impl<F: Field + ?Sized> System<f64, DVector<f64>> for Window<'_, F> {
     }
 }
 
-/// A window's outcome in plain numbers: the rows' times, the last row, counts.
+/// A window's outcome in plain numbers: the rows' times, the last row or all of them, counts.
 type Outcome = (Vec<f64>, Vec<f64>, Result<Stats, IntegrationError>);
 
 /// `march!(Stepper, vector)` integrates one window.
 macro_rules! march {
     ($stepper:path, $window:expr, $vector:expr, $span:expr, $settings:expr) => {{
-        let (tolerance, controller, first, max_steps) = $settings;
+        let (tolerance, controller, first, max_steps, keeps) = $settings;
         let (beta, fac_min, fac_max): (f64, f64, f64) = controller;
         let mut stepper = <$stepper>::from_param(
             $window,
@@ -128,8 +130,10 @@ macro_rules! march {
             OutputType::Sparse,
         );
         let outcome = stepper.integrate();
-        let last = stepper.y_out().last().map(|y| y.as_slice().to_vec()).unwrap_or_default();
-        (stepper.x_out().clone(), last, outcome)
+        let rows = stepper.y_out();
+        let shown = if keeps { 0 } else { rows.len().saturating_sub(1) };
+        let rows = rows[shown..].iter().flat_map(|y| y.as_slice().iter().copied()).collect();
+        (stepper.x_out().clone(), rows, outcome)
     }};
 }
 
@@ -144,10 +148,12 @@ macro_rules! by_length {
 }
 
 /// A stepper of the crate, and what it evaluates in every attempt at a step, and again in every accepted one; it does not count a rejection before the first acceptance.
-struct Stepper {
+struct Stepper<'a> {
     name: &'static str,
     attempt: u64,
     accepted: u64,
+    /// Where the ends of its steps go, if anywhere.
+    ends: Option<&'a mut Ends>,
 }
 
 /// What integrates one window: it, the unknowns, its length \[s\], the first step \[s\], and most steps.
@@ -155,7 +161,7 @@ type Integrate<'a, F> = dyn FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome +
 
 /// One window of either method, or as many as its rows fill.
 fn window<F: Field + ?Sized>(
-    stepper: &Stepper,
+    stepper: &mut Stepper,
     integrate: &mut Integrate<F>,
     field: &mut F,
     state: &mut State,
@@ -175,7 +181,7 @@ fn window<F: Field + ?Sized>(
 
 /// One call of the crate: to `until`, or to where its rows are as many as may be kept.
 fn part<F: Field + ?Sized>(
-    stepper: &Stepper,
+    stepper: &mut Stepper,
     integrate: &mut Integrate<F>,
     field: &mut F,
     state: &mut State,
@@ -199,10 +205,10 @@ fn part<F: Field + ?Sized>(
     y.push(0.0);
     let first = state.memory.first().map_or(0.0, |&h| h.min(span)) / time_unit;
     let most = tally.effort.saturating_sub(tally.evaluations).div_ceil(stepper.attempt).min(u64::from(u32::MAX)) as u32;
-    let rows = (MOST_KEPT / (n + 2)).max(LEAST_KEPT);
-    let (times, last, outcome) = {
+    let most_rows = (MOST_KEPT / (n + 2)).max(LEAST_KEPT);
+    let (times, rows, outcome) = {
         let room = RefCell::new(vec![0.0; n]);
-        let window = Window { field: RefCell::new(field), start: state.time, n, unit: &unit, time_unit, y: room, rows };
+        let window = Window { field: RefCell::new(field), start: state.time, n, unit: &unit, time_unit, y: room, rows: most_rows };
         integrate(window, &y, span / time_unit, first, most)
     };
     let reached_time = |x: f64| state.time.hi + x * time_unit;
@@ -223,11 +229,17 @@ fn part<F: Field + ?Sized>(
             return Err(stop(Cause::StepTooSmall, reached_time(x), 0.0, what, "loosen the tolerance, or take --method taylor or radau9"));
         }
     }
+    let last = rows.rchunks(n + 1).next().unwrap_or_default();
     if let Some(i) = last.iter().take(n).position(|y| !y.is_finite()) {
         let what = format!("{} is not finite", field.label(i));
         return Err(stop(Cause::NotFinite, state.time.hi, span, what, "tighten the tolerance"));
     }
     let times: Vec<f64> = times.iter().map(|t| t * time_unit).collect();
+    if let Some(ends) = &mut stepper.ends {
+        let in_units = |row: &[f64]| row.iter().zip(&unit).map(|(y, unit)| y * unit).collect::<Vec<_>>();
+        ends.y = rows.chunks_exact(n + 1).flat_map(in_units).collect();
+        ends.after.clone_from(&times);
+    }
     let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let next = match steps[..] {
         // One step was enough, or would have been: the second, cut to fit, was still the longer.
@@ -237,7 +249,7 @@ fn part<F: Field + ?Sized>(
     };
     state.memory.resize(1, 0.0);
     state.memory[0] = next;
-    state.y.iter_mut().zip(&last).zip(&unit).for_each(|((y, last), unit)| *y = last * unit);
+    state.y.iter_mut().zip(last).zip(&unit).for_each(|((y, last), unit)| *y = last * unit);
     state.low.fill(0.0);
     let reached = times.last().copied().unwrap_or(span);
     state.time = if reached < span * (1.0 - 1e-12) { state.time + reached } else { until };
@@ -265,12 +277,22 @@ impl<F: Field + ?Sized> Method<F> for Dopri5 {
         tally: &mut Tally,
         watch: &mut Watch<F>,
     ) -> Result<Reached, StepError> {
-        let tolerance = self.tolerance;
+        let Self { tolerance, ends } = self;
+        let (tolerance, keeps) = (*tolerance, ends.is_some());
         let mut integrate = |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| -> Outcome {
-            let settings = (tolerance, (0.04, 0.2, 10.0), first, most);
+            let settings = (tolerance, (0.04, 0.2, 10.0), first, most, keeps);
             by_length!(ode_solvers::Dopri5<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
         };
-        window(&Stepper { name: "dopri5", attempt: 6, accepted: 0 }, &mut integrate, field, state, until, tally, watch)
+        let mut stepper = Stepper { name: "dopri5", attempt: 6, accepted: 0, ends: ends.as_mut() };
+        window(&mut stepper, &mut integrate, field, state, until, tally, watch)
+    }
+
+    fn keep_ends(&mut self, keep: bool) {
+        self.ends = keep.then(|| self.ends.take().unwrap_or_default());
+    }
+
+    fn ends(&self) -> Option<&Ends> {
+        self.ends.as_ref()
     }
 }
 
@@ -294,11 +316,21 @@ impl<F: Field + ?Sized> Method<F> for Dop853 {
         tally: &mut Tally,
         watch: &mut Watch<F>,
     ) -> Result<Reached, StepError> {
-        let tolerance = self.tolerance;
+        let Self { tolerance, ends } = self;
+        let (tolerance, keeps) = (*tolerance, ends.is_some());
         let mut integrate = |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| -> Outcome {
-            let settings = (tolerance, (0.0, 1.0 / 3.0, 6.0), first, most);
+            let settings = (tolerance, (0.0, 1.0 / 3.0, 6.0), first, most, keeps);
             by_length!(ode_solvers::Dop853<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
         };
-        window(&Stepper { name: "dop853", attempt: 11, accepted: 1 }, &mut integrate, field, state, until, tally, watch)
+        let mut stepper = Stepper { name: "dop853", attempt: 11, accepted: 1, ends: ends.as_mut() };
+        window(&mut stepper, &mut integrate, field, state, until, tally, watch)
+    }
+
+    fn keep_ends(&mut self, keep: bool) {
+        self.ends = keep.then(|| self.ends.take().unwrap_or_default());
+    }
+
+    fn ends(&self) -> Option<&Ends> {
+        self.ends.as_ref()
     }
 }

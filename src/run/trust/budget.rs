@@ -4,6 +4,7 @@
 //! really costs beside runs of the shipped scenes is what `cargo bench --bench trust` prints.
 
 use crate::dynamics::Mechanism;
+use crate::run::march::order_in_double_double;
 use crate::run::methods::MethodId;
 use crate::run::plan::Plan;
 use crate::stepping::{Tally, Taylor};
@@ -18,6 +19,9 @@ pub const FULL_SHARE: f64 = 30.0;
 /// See [`FULL_SHARE`].
 pub const FULL_GRACE: f64 = 5e9;
 
+/// A step of the series in double-double over one of the series in doubles.
+const DOUBLE_DOUBLE: f64 = 20.0;
+
 /// Prices of a mechanism's parts.
 #[derive(Clone, Copy, Debug)]
 pub struct Prices {
@@ -25,9 +29,7 @@ pub struct Prices {
     pub evaluation: f64,
     /// One step of the companion's series, and of the run's where it has one.
     pub series: [f64; 2],
-    /// A sample, its monitors and its line in the table.
-    pub row: f64,
-    /// The companion's motion at an output time, and how far it is from the run's.
+    /// The companion's motion at one time, and how far it is from the run's.
     pub look: f64,
 }
 
@@ -39,31 +41,36 @@ impl Prices {
         let goes_bodywise = mechanism.recursion.is_some();
         let matrices = if goes_bodywise { 7.0 * n } else { 4.0 * n * n };
         let evaluation = 15.0 + 20.0 * n + matrices + 60.0 * rows + 20.0 * forces;
+        let of_series = if goes_bodywise { 200.0 * n } else { 150.0 * n * n + 300.0 * rows };
+        let general = 700.0 + 400.0 * n + of_series + 400.0 * rows + 700.0 * forces;
         let plain = if !Taylor::has_lanes(mechanism, false) {
-            let matrices = if goes_bodywise { 200.0 * n } else { 150.0 * n * n + 300.0 * rows };
-            700.0 + 400.0 * n + matrices + 400.0 * rows + 700.0 * forces
+            general
         } else if n <= 2.0 && forces == 0.0 {
             400.0
         } else {
             300.0 + 220.0 * n + if forces > 0.0 { 600.0 } else { 0.0 }
         };
         let series = |plan: &Plan| {
-            let order = Taylor::new(plan.tolerance.unwrap_or_default()).order as f64;
+            let tolerance = plan.tolerance.unwrap_or_default();
+            let order = match plan.in_double_double {
+                true => order_in_double_double(tolerance.relative),
+                false => Taylor::new(tolerance).order,
+            } as f64;
             let wide = match plan.extended {
+                _ if plan.in_double_double => DOUBLE_DOUBLE,
                 false => 1.0,
                 true if Taylor::has_lanes(mechanism, true) => 3.0,
                 true => 10.0,
             };
-            plain * wide * (order / 20.0).powi(2)
+            let each = if plan.in_double_double { general } else { plain };
+            each * wide * (order / 20.0).powi(2)
         };
-        let row = 1200.0 + 600.0 * n + 1200.0 * rows;
         let look = 200.0 + 60.0 * n + if rows > 0.0 { evaluation } else { 0.0 };
-        Self { evaluation, series: [series(companion), series(run)], row, look }
+        Self { evaluation, series: [series(companion), series(run)], look }
     }
 
-    /// The work of a run so far.
-    pub fn run(&self, plan: &Plan, tally: Tally, rows: u64) -> f64 {
-        let each = if plan.method == MethodId::Taylor { self.series[1] } else { self.evaluation };
-        tally.evaluations as f64 * each + rows as f64 * self.row
+    /// The work of a run so far, its output left out: estimates do not depend on that.
+    pub fn run(&self, method: MethodId, tally: Tally) -> f64 {
+        tally.evaluations as f64 * if method == MethodId::Taylor { self.series[1] } else { self.evaluation }
     }
 }

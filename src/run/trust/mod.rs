@@ -1,11 +1,12 @@
 //! How far a run may be trusted: its error estimated while it goes, and the time from which its path is no longer that of its start.
 //!
 //! Beside the run goes a *companion*: the same mechanism from the same bits by [`taylor`](crate::stepping::taylor) at 1e-14 or a
-//! hundredth of the run's tolerance, or with its first orders in double-double where the run is near rounding.  Both are looked at at the output times:
+//! hundredth of the run's tolerance, or in double-double where the run is near rounding ([`finer`]).  Both are looked at at times of the companion's own,
+//! which depend neither on output times nor on rests:
 //!
 //! ```text
-//! E(t) = max over the output times up to t of sqrt(d² + R²)      d  largest difference of an angle [rad], or of a position over the longest bar
-//!                                                                 R  the companion's own rounding, carried along by the tangent flow
+//! E(t) = max over the looks up to t of sqrt(d² + R²)      d  largest difference of an angle [rad], or of a position over the longest bar
+//!                                                          R  the companion's own rounding where it is in doubles, carried along by the tangent flow
 //! ```
 //!
 //! d is exact whatever the motion does, R matters near rounding only.  The *error estimate* is 1.2 E, the *horizon* the first time E passes
@@ -21,6 +22,9 @@
 pub mod budget;
 mod companion;
 mod distance;
+mod finer;
+mod measured;
+mod shadow;
 pub mod tangent;
 
 pub(super) use companion::{Companion, Kept};
@@ -130,11 +134,17 @@ pub struct Trust {
     pub how: How,
     /// The largest error of an angle \[rad\], or of a position over the longest bar, up to `at`, as estimated.
     pub error_estimate: Option<f64>,
+    /// The largest error of a rate up to `at` \[rad/s\], or of a velocity over the longest bar \[1/s\].
+    pub rate_error: Option<f64>,
+    /// The largest error of a motor's torque up to `at` \[N·m\], or of its force \[N\].
+    pub torque_error: Option<f64>,
+    /// True where the companion is hardly finer than the run, so that the error is at most what is estimated.
+    pub is_upper_bound: bool,
     /// The end of the run, or the horizon where that comes first \[s\].
     pub at: f64,
     /// The first time the error passes [`HORIZON`] \[s\].
     pub horizon: Option<f64>,
-    /// The first output time at which it is beyond [`LOST`] \[s\].
+    /// The first look at which it is beyond [`LOST`] \[s\].
     pub lost: Option<f64>,
     /// For chaotic motions.
     pub lyapunov: Option<Lyapunov>,
@@ -144,6 +154,8 @@ pub struct Trust {
     pub model_error: Option<f64>,
     /// The companion, in words.
     pub companion: Option<String>,
+    /// What it shares with the run, so that it cannot tell where that is wrong, in words.
+    pub shared: Vec<String>,
     /// How far it went beside the run \[s\].
     pub covered: f64,
     /// Why it went no further, where it did not.

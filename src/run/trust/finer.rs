@@ -1,0 +1,79 @@
+//! Which series accompanies a run: always one that is finer than the run itself, as far as there is one.
+
+use super::Level;
+use crate::dynamics::Mechanism;
+use crate::run::methods::MethodId;
+use crate::run::plan::Plan;
+use crate::stepping::composition::Composition;
+use crate::stepping::{Taylor, Tolerance};
+
+/// The companion's tolerance over the run's.
+const FINER: f64 = 100.0;
+/// From which tolerance of a run on its rounding counts.
+const NEAR_ROUNDING: f64 = 1e-10;
+/// Tolerance \[rad/s\] of companions in doubles: of runs that are not near rounding, at most, and of all others.
+const FINE: f64 = 1e-14;
+const FINEST: f64 = 1e-16;
+/// Tolerance \[rad/s\] with the first orders in double-double, of companions all in double-double, and of those of runs with extended orders.
+const EXTENDED: f64 = 1e-20;
+const BEYOND: f64 = 1e-26;
+
+/// A companion's plan, and what it is in words.
+pub(super) struct Finer {
+    pub plan: Plan,
+    pub name: String,
+}
+
+/// True where the rounding of a run counts.
+fn is_near_rounding(plan: &Plan) -> bool {
+    match plan.method {
+        MethodId::Gauss(stages) => stages > 2,
+        MethodId::Rattle(composition) => !matches!(composition, Composition::Single | Composition::Suzuki5),
+        _ => tolerance(plan).is_some_and(|tolerance| tolerance < NEAR_ROUNDING),
+    }
+}
+
+fn tolerance(plan: &Plan) -> Option<f64> {
+    plan.tolerance.map(|tolerance| tolerance.relative.min(tolerance.absolute))
+}
+
+/// The first companion of a run.
+pub(super) fn first(mechanism: &Mechanism, run: &Plan, level: Level) -> Finer {
+    let finer = tolerance(run).map(|tolerance| tolerance / FINER);
+    let is_near = is_near_rounding(run);
+    // Impacts are located in doubles.
+    let may_extend = mechanism.contacts.is_empty() && (is_near || level == Level::Full);
+    let has_lanes = may_extend && !run.extended && !mechanism.has_multipliers() && Taylor::has_lanes(mechanism, true);
+    if may_extend && !has_lanes {
+        let tolerance = if run.extended { BEYOND } else { EXTENDED };
+        return series(mechanism, run, finer.unwrap_or(tolerance).min(tolerance), [false, true]);
+    }
+    match finer {
+        _ if has_lanes => series(mechanism, run, finer.unwrap_or(EXTENDED).min(EXTENDED), [true, false]),
+        // Steps that end at every output time are often far better than their tolerance, and a finer series costs little.
+        Some(finer) if !is_near => series(mechanism, run, finer.min(FINE), [false; 2]),
+        _ => series(mechanism, run, FINEST, [false; 2]),
+    }
+}
+
+/// The one that goes on in doubles where double-double would cost too much.
+pub(super) fn second(mechanism: &Mechanism, run: &Plan) -> Finer {
+    series(mechanism, run, FINEST, [false; 2])
+}
+
+fn series(mechanism: &Mechanism, run: &Plan, tolerance: f64, [extended, in_double_double]: [bool; 2]) -> Finer {
+    let tolerance = Tolerance { relative: tolerance, absolute: tolerance };
+    let mut plan = Plan::of_series(mechanism, tolerance, run.until);
+    (plan.extended, plan.in_double_double) = (extended, in_double_double);
+    let digits = match (in_double_double, extended) {
+        (true, _) => " in double-double",
+        (_, true) => ", first orders in double-double",
+        _ => "",
+    };
+    Finer { name: format!("taylor at {:.0e}{digits}", tolerance.relative), plan }
+}
+
+/// Whether a companion's own rounding counts.
+pub(super) fn is_rounded(series: &Plan) -> bool {
+    !series.extended && !series.in_double_double && series.tolerance.unwrap_or_default().relative <= FINEST
+}

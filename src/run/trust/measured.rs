@@ -1,0 +1,236 @@
+//! What a companion has measured so far, and what it amounts to.
+
+use super::tangent;
+use super::{CAUTION, HORIZON, How, LEAST, LOST, Level, Trust};
+use serde::{Deserialize, Serialize};
+
+/// Times at which the estimate is kept.
+const KEPT: usize = 512;
+/// Growth within the second half of the time \[ln\] up to which a motion is regular.
+const REGULAR: f64 = 2.0;
+/// Powers of time with which the error of a regular motion grows.
+const POWERS: [f64; 2] = [1.0, 2.0];
+
+/// How far a run and its companion are apart at one time: an angle \[rad\], a rate \[rad/s\], and the torque of a motor \[N·m\], each the largest.  `None`
+/// where it is not to be told there.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Apart {
+    pub angle: f64,
+    pub rate: Option<f64>,
+    pub torque: Option<f64>,
+}
+
+/// What is measured.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Measured {
+    pub level: Level,
+    /// The companion, in words.
+    pub name: String,
+    /// What it cannot see, in words.
+    pub shared: Vec<String>,
+    /// True once its own rounding may be as large as the run's error: E is an upper bound then.
+    pub is_bound: bool,
+    /// The time reached \[s\], and E there: of angles, rates and torques.
+    pub until: f64,
+    pub error: f64,
+    pub rate: f64,
+    pub torque: Option<f64>,
+    /// The largest rate \[rad/s\] and torque \[N·m\] seen: what their rounding is measured against.
+    pub fastest: f64,
+    pub strongest: f64,
+    pub record: Vec<[f64; 2]>,
+    stride: u64,
+    pub seen: u64,
+    /// The time of the next look \[s\].
+    pub due: f64,
+    pub horizon: Option<f64>,
+    /// Errors of rates and torques at the horizon.
+    beside: Option<(f64, Option<f64>)>,
+    pub lost: Option<f64>,
+    /// What the last digit of the inputs came to at the horizon.
+    pub input_error: Option<f64>,
+    /// Why it went no further.
+    pub why: Option<String>,
+    /// Growth of small differences against time, once the companion has ended.
+    pub history: Vec<[f64; 2]>,
+    /// Work spent.
+    pub spent: f64,
+}
+
+impl Measured {
+    /// Nothing so far.
+    pub(super) fn new(level: Level, name: String, shared: Vec<String>) -> Self {
+        Self {
+            level,
+            name,
+            shared,
+            is_bound: false,
+            until: 0.0,
+            error: 0.0,
+            rate: 0.0,
+            torque: None,
+            fastest: 0.0,
+            strongest: 0.0,
+            record: Vec::new(),
+            stride: 1,
+            seen: 0,
+            due: 0.0,
+            horizon: None,
+            beside: None,
+            lost: None,
+            input_error: None,
+            why: None,
+            history: Vec::new(),
+            spent: 0.0,
+        }
+    }
+
+    pub(super) fn is_sound(&self) -> bool {
+        self.stride > 0 && !self.due.is_nan()
+    }
+
+    /// Takes what there is to see at a time \[s\]; true where the horizon is passed by it.
+    pub(super) fn take(&mut self, t: f64, apart: Apart) -> bool {
+        let passes = apart.angle > HORIZON && self.horizon.is_none();
+        if passes {
+            self.horizon = Some(crossing([self.until, self.error], [t, apart.angle]));
+            // Of the look before, or of this one where it was the first: brought to where the error is that of the horizon.
+            let share = HORIZON / apart.angle;
+            let larger = |before: f64, now: Option<f64>| now.map_or(before, |now| before.max(now * share));
+            let torque = self.torque.or(apart.torque).map(|_| larger(self.torque.unwrap_or_default(), apart.torque));
+            self.beside = Some((larger(self.rate, apart.rate), torque));
+        }
+        (self.until, self.error) = (t, self.error.max(apart.angle));
+        self.rate = apart.rate.map_or(self.rate, |rate| self.rate.max(rate));
+        if let Some(torque) = apart.torque {
+            self.torque = Some(self.torque.unwrap_or_default().max(torque));
+        }
+        self.keep();
+        passes
+    }
+
+    /// Keeps the estimate of this time.
+    fn keep(&mut self) {
+        if self.record.len() == KEPT {
+            // The first one stays.
+            let mut keep = false;
+            self.record.retain(|_| {
+                keep = !keep;
+                keep
+            });
+            self.stride *= 2;
+        }
+        if self.seen.is_multiple_of(self.stride) {
+            self.record.push([self.until, self.error]);
+        }
+        self.seen += 1;
+    }
+
+    /// What it has come to at the end of the run, `t` \[s\].
+    pub(super) fn trust(self, t: f64) -> Trust {
+        let Self { name, shared, until, error, mut record, horizon, lost, input_error, why, history, .. } = self;
+        if record.last().is_some_and(|last| last[0] < until) {
+            record.push([until, error]);
+        }
+        let mut trust = Trust {
+            how: How::None,
+            error_estimate: None,
+            rate_error: None,
+            torque_error: None,
+            is_upper_bound: self.is_bound,
+            at: t,
+            horizon,
+            lost,
+            lyapunov: tangent::exponent(&history),
+            input_error,
+            model_error: None,
+            companion: Some(name),
+            shared,
+            covered: until,
+            why,
+            record,
+        };
+        let printed = |error: f64| (CAUTION * error).max(LEAST);
+        let (mut rate, mut torque) = (self.rate, self.torque);
+        if let (Some(horizon), Some(beside)) = (trust.horizon, self.beside) {
+            trust.how = How::Companion;
+            (trust.error_estimate, trust.at) = (Some(printed(HORIZON)), horizon);
+            (rate, torque) = beside;
+        } else if until >= t && trust.record.len() > 1 || t == 0.0 {
+            (trust.how, trust.error_estimate) = (How::Companion, Some(printed(error)));
+        } else if let Some(power) = power(&trust.record, &history) {
+            trust.how = How::Extrapolated(until);
+            let base = error.max(LEAST);
+            let ahead = base * libm::pow(t / until, power);
+            if ahead > HORIZON {
+                let at = until * libm::pow(HORIZON / base, 1.0 / power);
+                (trust.horizon, trust.at) = (Some(at), at);
+            }
+            if ahead > LOST {
+                trust.lost = Some(until * libm::pow(LOST / base, 1.0 / power));
+            }
+            let share = ahead.min(HORIZON) / base;
+            (rate, torque) = (rate * share, torque.map(|torque| torque * share));
+            trust.error_estimate = Some(printed(ahead.min(HORIZON)));
+        }
+        if trust.error_estimate.is_some() {
+            trust.rate_error = Some((CAUTION * rate).max(LEAST * self.fastest));
+            trust.torque_error = torque.map(|torque| (CAUTION * torque).max(LEAST * self.strongest));
+        }
+        trust
+    }
+}
+
+/// The time at which the error passes the horizon between two looks, `[t, E]` each: it grows exponentially from one to the other, or as the square of the
+/// time from nothing.
+fn crossing([t0, e0]: [f64; 2], [t1, e1]: [f64; 2]) -> f64 {
+    if e0 <= 0.0 {
+        return t0 + (t1 - t0) * (HORIZON / e1).sqrt();
+    }
+    t0 + (t1 - t0) * (libm::log(HORIZON / e0) / libm::log(e1 / e0))
+}
+
+/// The power of time with which the error of a regular motion grew over the last three quarters of the logarithm of time; `None` where it is not known to be regular.
+fn power(record: &[[f64; 2]], history: &[[f64; 2]]) -> Option<f64> {
+    let (last, end) = (history.last()?, record.last()?);
+    let half = history.iter().rev().find(|point| point[0] <= 0.5 * last[0])?;
+    if !last[1].is_finite() || last[1] - half[1] > REGULAR {
+        return None;
+    }
+    let first = record.iter().find(|point| point[0] > 0.0)?;
+    let from = first[0] * libm::pow(end[0] / first[0], 0.25);
+    let points: Vec<[f64; 2]> =
+        record.iter().filter(|point| point[0] >= from && point[1] > 0.0).map(|point| point.map(libm::log)).collect();
+    let count = points.len() as f64;
+    let mean = |k: usize| points.iter().map(|point| point[k]).sum::<f64>() / count;
+    let (x, y) = (mean(0), mean(1));
+    let (above, below) = points
+        .iter()
+        .fold((0.0, 0.0), |(above, below), point| (above + (point[0] - x) * (point[1] - y), below + (point[0] - x) * (point[0] - x)));
+    let slope = if below > 0.0 { above / below } else { POWERS[1] };
+    Some(slope.clamp(POWERS[0], POWERS[1]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_horizon_lies_where_the_error_passes_it() {
+        // Tenfold a second from 1e-6 at 0.
+        let found = crossing([0.0, 1e-6], [5.0, 0.1]);
+        assert!((found - 3.0).abs() < 1e-12);
+        let found = crossing([1.0, 0.0], [3.0, 4e-3]);
+        assert!((found - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_regular_error_is_carried_on_by_its_power_and_a_chaotic_one_is_not() {
+        let times: Vec<f64> = (0..100).map(f64::from).collect();
+        let record: Vec<[f64; 2]> = times.iter().map(|&t| [t, 1e-12 * t.powf(1.5)]).collect();
+        let regular: Vec<[f64; 2]> = times.iter().map(|&t| [t, (1.0 + t).ln()]).collect();
+        let chaotic: Vec<[f64; 2]> = times.iter().map(|&t| [t, t]).collect();
+        assert!((power(&record, &regular).expect("regular") - 1.5).abs() < 1e-9);
+        assert_eq!(power(&record, &chaotic), None);
+    }
+}

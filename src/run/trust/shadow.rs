@@ -1,0 +1,177 @@
+//! A companion under way: the series, and the tangent flow along it.
+
+use super::budget::Prices;
+use super::finer::is_rounded;
+use super::tangent::{Path, Tangent};
+use crate::dynamics::{Mechanism, Motion, Time};
+use crate::run::contact::{Course, Station};
+use crate::run::march::build;
+use crate::run::plan::Plan;
+use crate::run::running::Outcome;
+use crate::stepping::{StepError, Tally};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// A companion under way.
+pub(super) struct Shadow {
+    course: Course,
+    pub outcome: Outcome,
+    pub motion: Motion,
+    pub tangent: Option<Tangent>,
+    /// True where its own rounding counts: the run is as near it.
+    pub is_rounded: bool,
+    /// The time at which the series began \[s\].
+    begun: f64,
+    last: Tally,
+}
+
+/// All that the rest of it depends on.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct KeptShadow {
+    station: Station,
+    outcome: Outcome,
+    path: Option<Path>,
+    begun: f64,
+    last: Tally,
+}
+
+impl KeptShadow {
+    /// On the way to a later horizon \[s\].
+    pub(super) fn extend(&mut self, until: f64) {
+        (self.outcome.plan.until, self.outcome.plan.every) = (until, until);
+    }
+
+    /// Whether its parts go together.
+    pub(super) fn is_sound(&self) -> bool {
+        let Outcome { plan, holds, .. } = &self.outcome;
+        plan.is_sound() && Course::names_holds(&self.station) <= holds.len()
+    }
+}
+
+/// What a companion may cost, and what it has cost.
+pub(super) struct Purse<'a> {
+    pub prices: &'a Prices,
+    pub spent: &'a mut f64,
+    pub budget: f64,
+}
+
+fn course(mechanism: &Arc<Mechanism>, series: &mut Plan, start: &Motion) -> Result<(Course, Outcome), String> {
+    let marcher = build(mechanism, series, start).map_err(|stop| stop.what)?;
+    let mut outcome = Outcome::begun(mechanism, series.clone());
+    let mut course = Course::new(Arc::clone(mechanism), marcher);
+    course.meet(&mut outcome).map_err(|stop| stop.what)?;
+    Ok((course, outcome))
+}
+
+impl Shadow {
+    /// One at the start of a run.
+    ///
+    /// # Errors
+    /// Why there can be none.
+    pub(super) fn new(mechanism: &Arc<Mechanism>, series: &mut Plan, start: &Motion) -> Result<Self, String> {
+        if !mechanism.tree.is_dense() {
+            return Err("a series takes the matrices of the tree, which are too large here".into());
+        }
+        let (course, outcome) = course(mechanism, series, start)?;
+        let tangent = Tangent::new(mechanism, start, series.until);
+        let (is_rounded, begun) = (is_rounded(series), start.time.hi);
+        Ok(Self { course, outcome, motion: start.clone(), tangent, is_rounded, begun, last: Tally::default() })
+    }
+
+    /// Goes on by another series from where it is.
+    ///
+    /// # Errors
+    /// Why it cannot.
+    pub(super) fn change(&mut self, mechanism: &Arc<Mechanism>, mut series: Plan) -> Result<(), String> {
+        let motion = self.motion.clone();
+        (self.course, self.outcome) = course(mechanism, &mut series, &motion)?;
+        (self.is_rounded, self.begun, self.last) = (is_rounded(&series), motion.time.hi, Tally::default());
+        Ok(())
+    }
+
+    pub(super) fn kept(&self) -> KeptShadow {
+        KeptShadow {
+            station: self.course.station(),
+            outcome: self.outcome.clone(),
+            path: self.tangent.as_ref().map(|tangent| tangent.path().clone()),
+            begun: self.begun,
+            last: self.last,
+        }
+    }
+
+    /// Goes on from what was kept, which was reached on the way to `horizon`; `None` where it cannot be of this mechanism.
+    pub(super) fn resume(
+        mechanism: &Arc<Mechanism>,
+        start: &Motion,
+        kept: KeptShadow,
+        horizon: Time,
+    ) -> Result<Option<Self>, StepError> {
+        let KeptShadow { station, outcome, path, begun, last } = kept;
+        let Some(mut course) = Course::resume(Arc::clone(mechanism), &outcome.plan, start, station, horizon)? else { return Ok(None) };
+        let tangent = match path {
+            None => None,
+            Some(path) => match Tangent::resume(mechanism, path) {
+                None => return Ok(None),
+                tangent => tangent,
+            },
+        };
+        let is_rounded = is_rounded(&outcome.plan);
+        let motion = course.motion();
+        Ok(Some(Self { course, outcome, motion, tangent, is_rounded, begun, last }))
+    }
+
+    /// Its plan.
+    pub(super) fn plan(&self) -> &Plan {
+        &self.outcome.plan
+    }
+
+    /// Expansions of its series so far.
+    pub(super) fn expansions(&self) -> u64 {
+        self.course.tally().evaluations
+    }
+
+    /// Impacts and lasting contacts so far.
+    pub(super) fn events(&self) -> u64 {
+        self.outcome.strike_count + self.outcome.hold_count
+    }
+
+    /// The mean length of its steps \[s\], of those up to `t` \[s\].
+    pub(super) fn mean_step(&self, t: f64) -> f64 {
+        (t - self.begun) / self.last.steps.max(1) as f64
+    }
+
+    /// To a time, with the motion there in `motion`; what it cost is added to what was spent, which must not pass the budget.
+    ///
+    /// # Errors
+    /// Why the companion stopped, or `None` where the budget was used up.
+    pub(super) fn go(&mut self, until: Time, purse: &mut Purse) -> Result<(), Option<String>> {
+        while let Some(next) = self.tangent.as_ref().map(Tangent::next).filter(|&next| next <= until.hi) {
+            self.march(Time::from(next), purse)?;
+            let steps = if self.is_rounded { self.last.steps } else { 0 };
+            if let Some(tangent) = &mut self.tangent {
+                tangent.take(&self.motion, steps);
+                *purse.spent += 0.5 * tangent.evaluations() as f64 * purse.prices.evaluation;
+            }
+        }
+        self.march(until, purse)
+    }
+
+    /// The same without the tangent flow.
+    fn march(&mut self, until: Time, purse: &mut Purse) -> Result<(), Option<String>> {
+        let each = purse.prices.series[0];
+        let mut left = ((purse.budget - *purse.spent) / each) as u64;
+        let mut is_spent = || {
+            left = left.saturating_sub(1);
+            left == 0
+        };
+        let arrived = self.course.go(until, &mut self.outcome, &mut is_spent);
+        if !arrived.map_err(|stop| Some(format!("the companion stopped at t = {} s: {}", stop.t, stop.what)))? || *purse.spent > purse.budget {
+            return Err(None);
+        }
+        self.course.look(&mut self.motion);
+        let tally = self.course.tally();
+        *purse.spent += (tally.evaluations - self.last.evaluations) as f64 * each + purse.prices.look;
+        self.last = tally;
+        Ok(())
+    }
+}
