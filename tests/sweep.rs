@@ -5,8 +5,10 @@
 #[allow(dead_code)]
 mod program;
 
+use driftless::dynamics::{Mechanism, Time};
+use driftless::run::trust::Level;
 use driftless::run::{
-    Flip, MethodId, Observer, Point, Request, Stabilization, Status, Sweep, SweepError, SweepTable, Vary, simulate, sweep,
+    Flip, MethodId, Observer, Point, Request, Stabilization, Status, Sweep, SweepError, SweepTable, Vary, reference, simulate, sweep,
 };
 use driftless::scene::Template;
 use driftless::stepping::Cause;
@@ -73,6 +75,37 @@ fn points_in_lanes_agree_with_single_runs() {
             assert!((found - exact).abs() < 1e-9, "{point:?}");
         }
         assert!(point.energy < 1e-12, "{point:?}");
+    }
+}
+
+/// In lanes and one by one: no point changes, and errors are those against the motion in double-double.
+#[test]
+fn estimates_of_points_are_near_the_truth() {
+    for (scene, method, tolerance, until) in [("free", "taylor", 1e-8, 6.0), ("free", "dp8", 1e-7, 6.0), ("gentle", "taylor", 1e-5, 8.0)] {
+        let request = Request { rtol: Some(tolerance), every: Some(0.5), ..request(method, until) };
+        let vary = ["bar1.phi=-2.5..2.5:4", "bar2.phi=0.3..2.9:3"];
+        let bare = points(&prepared(scene, &vary, &request), 1);
+        let plan = prepared(scene, &vary, &request).trusted(Level::Auto);
+        let judged = points(&plan, 1);
+        let (mut inside, mut count, mut lost) = (0, 0, 0);
+        for (mut point, bare) in judged.into_iter().zip(bare) {
+            let trust = point.trust.take().expect("asked for");
+            assert_eq!(point, bare, "{scene} by {method}");
+            let alone = template(scene).filled(plan.variables(), &point.values).expect("a scene");
+            let mechanism = std::sync::Arc::new(Mechanism::new(&alone).expect("equations"));
+            let exact = reference(&mechanism, &mechanism.start(&alone), &[Time::from(until)]).expect("a reference");
+            let off = (0..point.phi.len()).map(|k| (point.phi[k] - exact.motions[0].unwrapped(k)).abs()).fold(0.0, f64::max);
+            if off > 2e-3 {
+                assert!(trust.is_doubtful(), "{scene} by {method}: {trust:?} for {off:e}");
+                lost += 1;
+            } else if off > 1e-13 && off < 5e-4 {
+                let ratio = trust.error.expect("a figure") / off;
+                count += 1;
+                // The largest error may have been before the end.
+                inside += usize::from((1.0 / 3.0..=30.0).contains(&ratio));
+            }
+        }
+        assert!(count + lost >= 6 && inside + 1 >= count, "{scene} by {method}: {inside} of {count}");
     }
 }
 
@@ -363,6 +396,23 @@ mod command {
         assert!(program.files().iter().any(|file| file.ends_with("/profile.png")), "{:?}", program.files());
         let table = program.read(program.files().iter().find(|file| file.ends_with("sweep.csv")).expect("a table"));
         assert!(rows(&table)[1..].iter().all(|row| row[7] == "0.0" && row[12] == "done"), "{table}");
+    }
+
+    #[test]
+    fn estimates_are_two_columns_where_they_are_asked_for() {
+        let program = Program::with_scenes(&["free"]);
+        let ask = "sweep free.json --vary bar1.phi=-2..2:5 --until 12 --every 1 --no-charts --json";
+        let bare = program.run(&format!("{ask} --out a")).exits(0).object();
+        let judged = program.run(&format!("{ask} --out b --trust auto")).exits(0).object();
+        assert!(bare["trust"].is_null());
+        assert_eq!(judged["trust"]["judged"], 5);
+        let columns = judged["columns"].as_array().expect("names").len();
+        assert_eq!(columns, bare["columns"].as_array().expect("names").len() + 2);
+        program
+            .run(&format!("{} --out c --trust auto --map horizon", ask.replace(" --no-charts --json", "")))
+            .exits(0)
+            .shows(&["trust", "in doubt"]);
+        program.run("sweep free.json --vary bar1.phi=-2..2:5 --until 0.1 --out d --trust maybe").exits(2);
     }
 
     #[test]

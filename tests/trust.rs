@@ -478,3 +478,145 @@ fn full_trust_takes_no_more_evaluations_than_a_run_may() {
     let trust = outcome.trust.expect("asked for");
     assert!(trust.covered < 1.0 && trust.cut().is_some_and(|why| why.contains("expansions")), "{trust:?}");
 }
+
+/// What a run says of itself, but for how long it took: dense methods and fixed steps do not know of output times.
+#[test]
+fn estimates_depend_neither_on_output_times_nor_on_rests() {
+    for (name, method, setting) in [
+        ("free", "taylor", 1e-9),
+        ("motor", "radau9", 1e-7),
+        ("four_bars", "taylor", 1e-6),
+        ("free", "gauss8", 0.01),
+        ("spring", "rattle6", 0.01),
+        ("chain8", "gauss16", 0.005),
+    ] {
+        let scene = shipped(name, &[]);
+        let at = |every: f64| asked(method, setting, 20.0, every);
+        let [coarse, fine] = [20.0, 0.1].map(|every| trusted(&scene, &at(every), Level::Auto).trust.expect("asked for"));
+        assert_eq!(coarse, fine, "{name} by {method}");
+        let mechanism = compile(&scene);
+        let start = mechanism.start(&scene);
+        let plan = Plan::new(&scene, &mechanism, &at(1.0)).expect("a plan");
+        let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).expect("a run").trusted(Level::Auto, &start);
+        let (mut running, mut rests) = (Running::new(run), 0);
+        let mut left = 37;
+        while !running
+            .go(&mut |_| Ok(()), &mut || {
+                left -= 1;
+                left == 0
+            })
+            .expect("no observer fails")
+        {
+            (rests, left) = (rests + 1, 37);
+            running = Running::resume(Arc::clone(&mechanism), &start, running.snapshot()).expect("a snapshot of this run");
+        }
+        assert!(rests > 1, "{name} by {method}");
+        assert_eq!(running.finish().trust, Some(coarse), "{name} by {method}");
+    }
+}
+
+/// Where steps end on output times these change the motion itself: the horizon told is that of each motion.
+#[test]
+fn horizons_are_right_however_coarse_the_output_is() {
+    let scene = shipped("free", &[]);
+    for (method, setting, every, horizon) in
+        [("taylor", 1e-9, 40.0, 11.8), ("taylor", 1e-9, 0.01, 11.8), ("dopri5", 1e-5, 20.0, 3.0), ("dopri5", 1e-5, 40.0, 3.0)]
+    {
+        let trust = trusted(&scene, &asked(method, setting, 40.0, every), Level::Auto).trust.expect("asked for");
+        let found = trust.horizon.expect("it is lost long before");
+        assert!((found / horizon - 1.0).abs() < 0.03, "{method}, every {every} s: {found} instead of {horizon}");
+    }
+}
+
+/// The largest errors of angles and rates against the motion in double-double, and what was told of them.
+fn told_and_true(scene: &Scene, request: &Request) -> [[f64; 2]; 2] {
+    let mechanism = compile(scene);
+    let start = mechanism.start(scene);
+    let plan = Plan::new(scene, &mechanism, request).expect("a plan");
+    let times: Vec<Time> = (0..=plan.rows).map(|row| plan.time(row)).collect();
+    let exact = reference(&mechanism, &start, &times).expect("a reference");
+    let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).expect("a run");
+    let (mut most, mut row) = ([0.0_f64; 2], 0);
+    let outcome = march(run.trusted(Level::Auto, &start), &mut |sample| {
+        let exact = &exact.motions[row];
+        for k in 0..sample.phi.len() {
+            most[0] = most[0].max((sample.phi[k] - exact.unwrapped(k)).abs());
+            most[1] = most[1].max((sample.omega[k] - exact.omega[k].hi).abs());
+        }
+        row += 1;
+        Ok(())
+    });
+    let trust = outcome.expect("no observer fails").trust.expect("asked for");
+    assert_eq!(trust.horizon, None);
+    [[trust.error_estimate.expect("a figure"), most[0]], [trust.rate_error.expect("a figure"), most[1]]]
+}
+
+/// Runs near rounding have companions that are finer than that, with any number of bodies, with loops and with sliders.
+#[test]
+fn companions_are_finer_than_the_runs_they_judge() {
+    for (name, method, setting, until) in [
+        ("chain8", "taylor", 1e-14, 2.0),
+        ("chain8", "gauss16", 0.0025, 2.0),
+        ("four_bars", "gauss16", 0.005, 4.0),
+        ("slider_crank_torque", "taylor", 1e-14, 2.0),
+        ("four_bars", "rattle8", 0.002, 3.0),
+        ("spring", "gauss12", 0.005, 4.0),
+    ] {
+        let [[told, truth], [told_rate, rate]] = told_and_true(&shipped(name, &[]), &asked(method, setting, until, 0.05));
+        assert!(told > truth / 3.0 && told < (10.0 * truth).max(1e-13), "{name} by {method}: {told:e} for {truth:e}");
+        assert!(told_rate > rate / 3.0 && told_rate < (10.0 * rate).max(1e-11), "{name} by {method}, rates: {told_rate:e} for {rate:e}");
+    }
+}
+
+/// Extended orders leave less than doubles can show, and it is seen.
+#[test]
+fn extended_runs_are_judged_in_double_double() {
+    let request = Request { extended: true, ..asked("taylor", 1e-20, 10.0, 0.5) };
+    let trust = trusted(&shipped("free", &[]), &request, Level::Auto).trust.expect("asked for");
+    assert!(trust.companion.as_ref().is_some_and(|name| name.contains("in double-double")), "{:?}", trust.companion);
+    assert!(trust.error_estimate.is_some_and(|error| error < 1e-13), "{:?}, {:?}", trust.error_estimate, trust.why);
+}
+
+#[test]
+fn rates_and_torques_have_estimates_of_their_own() {
+    let [angles, rates] = told_and_true(&shipped("spring", &[]), &asked("dp8", 1e-7, 5.0, 0.05));
+    for [told, truth] in [angles, rates] {
+        assert!((1.0 / 3.0..10.0).contains(&(told / truth)), "{told:e} for {truth:e}");
+    }
+    // Of a driven pendulum the torque of a run is compared with that of a much finer one.
+    let scene = shipped("motor", &[]);
+    let torques = |rtol: f64| {
+        let mut torques = Vec::new();
+        let mechanism = compile(&scene);
+        let start = mechanism.start(&scene);
+        let plan = Plan::new(&scene, &mechanism, &asked("dp8", rtol, 4.0, 0.05)).expect("a plan");
+        let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a run").trusted(Level::Auto, &start);
+        let outcome = march(run, &mut |sample| {
+            torques.push(sample.motors[0][0]);
+            Ok(())
+        });
+        (torques, outcome.expect("no observer fails").trust.expect("asked for").torque_error)
+    };
+    let ((coarse, told), (fine, _)) = (torques(1e-6), torques(1e-12));
+    let off = coarse.iter().zip(&fine).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+    let told = told.expect("a motor");
+    assert!((1.0 / 3.0..10.0).contains(&(told / off)), "{told:e} for {off:e}");
+}
+
+#[test]
+fn the_reason_for_no_estimate_is_told() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/stress/spring_damped_1e12.json");
+    let scene = driftless::scene::read_scene(&path, &[]).expect("a shipped scene");
+    let trust = trusted(&scene, &asked("radau5", 1e-6, 1.0, 0.1), Level::Auto).trust.expect("asked for");
+    assert!(trust.covered < 1.0 && trust.why.as_ref().is_some_and(|why| why.contains("share of the run")), "{:?}", trust.why);
+}
+
+#[test]
+fn what_run_and_companion_share_is_told() {
+    let of = |name: &str, method: &str| {
+        trusted(&shipped(name, &[]), &asked(method, 1e-9, 0.5, 0.1), Level::Auto).trust.expect("asked for").shared
+    };
+    assert_eq!(of("free", "taylor"), ["compilation"]);
+    assert_eq!(of("wall", "dp8"), ["impact law", "compilation"]);
+    assert_eq!(of("wall", "taylor"), ["impact law", "compilation"]);
+}

@@ -142,7 +142,7 @@ fn prepared(flags: &SweepFlags, text: &str) -> Result<Sweep, Failure> {
     })?;
     let template = Template::new(text.to_owned(), source_name(&flags.scene.scene), &flags.scene.set);
     let limits = Limits { energy: flags.max_energy_drift, constraint: flags.max_constraint_drift };
-    let plan = Sweep::new(&template, flags.vary.clone(), request)?.with_limits(limits);
+    let plan = Sweep::new(&template, flags.vary.clone(), request)?.with_limits(limits).trusted(flags.trust);
     super::settle(&flags.scene, plan.mechanism())?;
     let notes: Vec<String> = (plan.variables().iter().zip(plan.grid().axes()))
         .filter_map(|(variable, axis)| points_that_stay(plan.scene(), &variable.path, (axis.count == 1).then_some(axis.from)))

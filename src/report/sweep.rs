@@ -7,6 +7,7 @@ use crate::run::files::sha256;
 use crate::run::sweep::table::columns;
 #[cfg(feature = "charts")]
 use crate::run::sweep::table::numbers;
+use crate::run::trust::{HORIZON, Level};
 #[cfg(feature = "charts")]
 use crate::run::{Point, Status};
 use crate::run::{Sweep, Totals};
@@ -35,6 +36,12 @@ pub fn object(sweep: &Sweep, totals: &Totals) -> Value {
         "refused": totals.refused,
         "skipped": totals.skipped,
         "flipped": totals.flipped,
+        "trust": (sweep.trust() != Level::Off).then(|| json!({
+            "level": sweep.trust().name(),
+            "tolerance": HORIZON,
+            "judged": totals.judged,
+            "in_doubt": totals.doubtful,
+        })),
         "steps": totals.steps,
         "energy": {"max_relative": totals.energy.0, "point": totals.energy.1},
         "constraints": {"position_max": totals.constraint[0], "velocity_max": totals.constraint[1]},
@@ -79,6 +86,18 @@ pub fn text(sweep: &Sweep, totals: &Totals) -> String {
     page.entry("cost", &format!("{points}, {steps}, {seconds:.3} s on {threads}, {rate} points a second"));
     page.entry("points", &by_status(totals));
     page.entry("turned over", &format!("{} of {points}, by t = {} s", totals.flipped, figure(sweep.plan().until)));
+    if sweep.trust() != Level::Off {
+        let (of, without) = (totals.judged, totals.done - totals.judged.min(totals.done));
+        let rest = if without > 0 { format!("; {without} without an estimate") } else { String::new() };
+        page.entry(
+            "trust",
+            &format!(
+                "{} of {} in doubt: off by more than {HORIZON:e} rad at their end{rest}",
+                totals.doubtful,
+                counted(of, "point", "points")
+            ),
+        );
+    }
     page.entry("energy drift", &format!("{} of its scale at most, in row {}", magnitude(totals.energy.0), totals.energy.1 + 1));
     if let Some(unit) = sweep.mechanism().unit_of_rows() {
         let [position, velocity] = totals.constraint.map(magnitude);
@@ -114,6 +133,7 @@ pub struct Curve {
     /// Which of the numbers of a row.
     column: Option<usize>,
     bars: usize,
+    is_judged: bool,
     /// The numbers of all points so far; not a number where there is none.
     seen: Vec<f64>,
     failed: Vec<bool>,
@@ -162,7 +182,13 @@ impl Curve {
                     .ok_or_else(|| NoChart::Column(wanted.to_owned(), listed(sweep)))?,
             ),
         };
-        Ok(Self { column, bars: sweep.mechanism().bodies.len(), seen: Vec::new(), failed: Vec::new() })
+        Ok(Self {
+            column,
+            bars: sweep.mechanism().bodies.len(),
+            is_judged: sweep.trust() != Level::Off,
+            seen: Vec::new(),
+            failed: Vec::new(),
+        })
     }
 
     /// Whether it can be the chart of so many points of a sweep.
@@ -174,7 +200,7 @@ impl Curve {
 
     /// Takes a point.
     pub fn see(&mut self, point: &Point) {
-        let numbers = numbers(point, self.bars);
+        let numbers = numbers(point, self.bars, self.is_judged);
         let column = self.column.map_or(numbers.len() - 1, |column| column + point.values.len());
         self.seen.push(numbers[column]);
         self.failed.push(matches!(point.status, Status::Stopped(_) | Status::Refused(_)));

@@ -58,7 +58,10 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
             page.entry("", &beyond(mechanism, outcome, horizon));
         }
         (None, Some(error)) => {
-            page.entry("trust", &format!("angles accurate to {} {} {what} at {} s ({source})", how_near(trust), magnitude(error), rough(trust.at)));
+            page.entry(
+                "trust",
+                &format!("angles accurate to {} {} {what} at {} s ({source})", how_near(trust), magnitude(error), rough(trust.at)),
+            );
             page.entry("", &format!("no horizon within {} s", rough(trust.at)));
         }
         (None, None) => {

@@ -338,13 +338,7 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
     }
 
     /// The same, but it pauses where a step reaches `due` \[s\] too.
-    fn land_until(
-        &mut self,
-        until: Time,
-        due: f64,
-        mut lookout: Option<&mut Lookout>,
-        pause: &mut Pause,
-    ) -> Result<Reached, StepError> {
+    fn land_until(&mut self, until: Time, due: f64, mut lookout: Option<&mut Lookout>, pause: &mut Pause) -> Result<Reached, StepError> {
         let Self { problem, method, state, tally, guard, .. } = self;
         let (all, name, mut glance) = (self.steps == Steps::Unseen, Method::<P>::name(method), Glance::default());
         let (mut from, mut suspects) = (State::default(), Vec::new());

@@ -23,6 +23,7 @@
 //! ```
 
 mod grid;
+mod judge;
 mod point;
 #[cfg(feature = "files")]
 pub mod table;
@@ -30,11 +31,13 @@ pub mod table;
 mod threads;
 
 pub use grid::{Grid, Vary, VaryError};
+pub use judge::PointTrust;
 pub use point::{Point, Status};
 
 use super::drift::Limits;
 use super::methods::MethodId;
 use super::plan::{MAX_ROWS, Plan, Refusal, Request};
+use super::trust::Level;
 use crate::dynamics::{CompileError, Mechanism};
 use crate::scene::{Scene, SceneError, Template, Variable};
 use crate::stepping::taylor::crowd::Crowd;
@@ -63,6 +66,7 @@ pub struct Sweep {
     skips: Option<Box<Judge>>,
     ends_at_flips: bool,
     is_strict: bool,
+    trust: Level,
     /// True where only starts are varied in which nothing else has a say: all points share one mechanism.
     shares: bool,
 }
@@ -123,6 +127,10 @@ pub struct Totals {
     pub skipped: u64,
     /// Points in which a bar turned over.
     pub flipped: u64,
+    /// Points done whose error was estimated, and those of them that are in doubt: see [`PointTrust::is_doubtful`].
+    pub judged: u64,
+    /// See `judged`.
+    pub doubtful: u64,
     /// Steps of all of them.
     pub steps: u64,
     /// Largest energy drift among those done, over the energy scale, and the point's number.
@@ -174,6 +182,7 @@ impl Sweep {
             skips: None,
             ends_at_flips: false,
             is_strict: false,
+            trust: Level::Off,
             shares,
         })
     }
@@ -191,6 +200,17 @@ impl Sweep {
     /// The same, where a point is refused of which something given for the start must change to fit its constraints.
     pub fn strictly(self) -> Self {
         Self { is_strict: true, ..self }
+    }
+
+    /// The same with an estimate of the error of every point: in lanes by a second sweep at a hundredth of the tolerance, compared at the output times, else
+    /// (and with [`Level::Full`] always) as single runs have it.  No point changes by it.
+    pub fn trusted(self, trust: Level) -> Self {
+        Self { trust, ..self }
+    }
+
+    /// How much is spent on trust.
+    pub fn trust(&self) -> Level {
+        self.trust
     }
 
     /// The same with points that end when a bar turns over, at the end of that step or at the next output time.
@@ -363,6 +383,10 @@ impl Totals {
             Status::Skipped => self.skipped += 1,
         }
         self.flipped += u64::from(point.flip.is_some());
+        if let (Status::Done, Some(trust)) = (&point.status, &point.trust) {
+            self.judged += u64::from(trust.error.is_some());
+            self.doubtful += u64::from(trust.is_doubtful());
+        }
         self.steps += point.steps;
         if point.status == Status::Done {
             if point.energy > self.energy.0 {

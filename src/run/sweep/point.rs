@@ -1,5 +1,6 @@
 //! One point of a sweep, or several marched in lanes.
 
+use super::judge::{Judge, PointTrust};
 use super::{Sweep, timed};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::elimination::Elimination;
@@ -12,6 +13,7 @@ use crate::run::march::MOST_TURNS;
 use crate::run::methods::MethodId;
 use crate::run::plan::Plan;
 use crate::run::running::{Run, Running};
+use crate::run::trust::Level;
 use crate::scene::StartValue;
 use crate::stepping::taylor::crowd::{Crowd, Entrant, Going, Passage};
 use crate::stepping::{Cause, StepError};
@@ -55,14 +57,16 @@ pub struct Point {
     pub steps: u64,
     /// The first time the angle of any bar, driven ones included, passed an odd multiple of π.
     pub flip: Option<Flip>,
+    /// How far it may be trusted, where that was asked for.
+    pub trust: Option<PointTrust>,
 }
 
 /// A point ready to run.
-struct Ready {
+pub(super) struct Ready {
     point: Point,
-    mechanism: Arc<Mechanism>,
-    plan: Plan,
-    start: Motion,
+    pub mechanism: Arc<Mechanism>,
+    pub plan: Plan,
+    pub start: Motion,
     /// What its energies are divided by \[J\].
     scale: f64,
 }
@@ -97,7 +101,11 @@ impl Sweep {
     /// True for a point that can be marched beside others.
     fn takes(&self, ready: &Ready) -> bool {
         let alike = (ready.plan.until, ready.plan.rows) == (self.plan.until, self.plan.rows);
-        alike && ready.plan.method == MethodId::Taylor && !ready.plan.extended && Crowd::takes(&ready.mechanism)
+        alike
+            && self.trust != Level::Full
+            && ready.plan.method == MethodId::Taylor
+            && !ready.plan.extended
+            && Crowd::takes(&ready.mechanism)
     }
 
     /// Puts the values in; a point that cannot run is finished.
@@ -114,6 +122,7 @@ impl Sweep {
             constraint: None,
             steps: 0,
             flip: None,
+            trust: None,
         };
         if self.skips.as_ref().is_some_and(|skips| skips(&point.values)) {
             point.status = Status::Skipped;
@@ -171,7 +180,7 @@ impl Sweep {
         let mechanism =
             if scale == mechanism.energy_scale { mechanism } else { Arc::new(Mechanism { energy_scale: scale, ..(*mechanism).clone() }) };
         let mut running = match Run::new(mechanism, plan, self.limits, &start) {
-            Ok(run) => Running::new(run.of_ensemble(self.ends_at_flips)),
+            Ok(run) => Running::new(run.of_ensemble(self.ends_at_flips).trusted(self.trust, &start)),
             Err(stop) => {
                 point.status = Status::Stopped(stop);
                 return point;
@@ -188,6 +197,7 @@ impl Sweep {
                 point.constraint = levels.reduce(|a, b| [larger(a[0], b[0]), larger(a[1], b[1])]);
                 point.steps = outcome.tally.steps;
                 point.flip = outcome.flip;
+                point.trust = outcome.trust.as_ref().map(PointTrust::from);
                 point.status = outcome.stop.map_or(Status::Done, Status::Stopped);
             }
             Err(error) => point.status = Status::Refused(error.to_string()),
@@ -218,6 +228,7 @@ impl Sweep {
                 limit: EnergyLimit::default(),
             });
         }
+        let mut judge = (self.trust != Level::Off).then(|| Judge::new(&ready, &plan));
         let mut found = Vec::with_capacity(ready.len());
         let mut motion = Motion::default();
         for row in 1..=plan.rows {
@@ -231,6 +242,9 @@ impl Sweep {
             if is_over() {
                 return found;
             }
+            if let Some(judge) = &mut judge {
+                judge.march(&entrants, plan.time(row));
+            }
             let mut number = 0;
             while number < lanes.len() {
                 let (lane, entrant) = (&mut lanes[number], &entrants[number]);
@@ -239,7 +253,9 @@ impl Sweep {
                     number += 1;
                     continue;
                 }
-                found.push(lanes.swap_remove(number).point);
+                let mut point = lanes.swap_remove(number).point;
+                point.trust = judge.as_mut().map(|judge| judge.remove(number));
+                found.push(point);
                 entrants.swap_remove(number);
                 finished();
             }

@@ -1,12 +1,14 @@
 //! The points of a sweep as a table: one row a point, units in the header, digits that read back to the same doubles.
 
 use super::{Point, Status, Sweep};
+use crate::run::trust::Level;
 use std::io::Write;
 
 /// Writes a sweep as CSV.
 pub struct SweepTable<W: Write> {
     writer: csv::Writer<W>,
     bars: Vec<String>,
+    is_judged: bool,
     fields: Vec<String>,
 }
 
@@ -24,15 +26,18 @@ pub fn columns(sweep: &Sweep) -> Vec<String> {
         format!("constraint_drift [{unit}]"),
         format!("constraint_rate_drift [{}]", unit.split(" or ").map(|unit| format!("{unit}/s")).collect::<Vec<_>>().join(" or ")),
     ]);
+    if sweep.trust() != Level::Off {
+        columns.extend(["error_estimate [rad]", "horizon [s]"].map(str::to_owned));
+    }
     columns.extend(["steps", "flip_time [s]", "flip_bar", "status", "cause"].map(str::to_owned));
     columns
 }
 
 /// The numbers of a point's row, in the order of [`columns`] up to the flip time; not a number where there is none.
-pub fn numbers(point: &Point, bars: usize) -> Vec<f64> {
+pub fn numbers(point: &Point, bars: usize, is_judged: bool) -> Vec<f64> {
     let mut numbers = point.values.clone();
     if point.phi.is_empty() {
-        numbers.resize(numbers.len() + 2 * bars + 5, f64::NAN);
+        numbers.resize(numbers.len() + 2 * bars + if is_judged { 7 } else { 5 }, f64::NAN);
         return numbers;
     }
     numbers.push(point.t);
@@ -42,6 +47,10 @@ pub fn numbers(point: &Point, bars: usize) -> Vec<f64> {
     }
     numbers.push(point.energy);
     numbers.extend(point.constraint.unwrap_or([f64::NAN; 2]));
+    if is_judged {
+        let trust = point.trust.clone().unwrap_or_default();
+        numbers.extend([trust.error, trust.horizon].map(|number| number.unwrap_or(f64::NAN)));
+    }
     numbers.extend([point.steps as f64, point.flip.map_or(f64::NAN, |flip| flip.t)]);
     numbers
 }
@@ -60,7 +69,8 @@ impl<W: Write> SweepTable<W> {
     /// Goes on with a table whose header and first rows were written before.
     pub fn going_on(sweep: &Sweep, writer: W) -> Self {
         let bars = sweep.mechanism().bodies.iter().map(|body| body.name.clone()).collect();
-        Self { writer: csv::Writer::from_writer(writer), bars, fields: vec![String::new(); columns(sweep).len()] }
+        let is_judged = sweep.trust() != Level::Off;
+        Self { writer: csv::Writer::from_writer(writer), bars, is_judged, fields: vec![String::new(); columns(sweep).len()] }
     }
 
     /// The writer, once it has every row.
@@ -77,7 +87,7 @@ impl<W: Write> SweepTable<W> {
     /// # Errors
     /// What the writer says.
     pub fn write(&mut self, point: &Point) -> csv::Result<()> {
-        let numbers = numbers(point, self.bars.len());
+        let numbers = numbers(point, self.bars.len(), self.is_judged);
         let steps = numbers.len() - 2;
         self.fields.iter_mut().for_each(String::clear);
         for (column, (field, number)) in self.fields.iter_mut().zip(&numbers).enumerate() {

@@ -51,6 +51,9 @@ impl Prices {
             300.0 + 220.0 * n + if forces > 0.0 { 600.0 } else { 0.0 }
         };
         let series = |plan: &Plan| {
+            if plan.method != MethodId::Taylor {
+                return evaluation;
+            }
             let tolerance = plan.tolerance.unwrap_or_default();
             let order = match plan.in_double_double {
                 true => order_in_double_double(tolerance.relative),

@@ -10,6 +10,7 @@ use super::tangent::Tangent;
 use super::{CUT, HORIZON, LOST, Level, Ruler, Trust};
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::{Mechanism, Motion, Time};
+use crate::run::methods::MethodId;
 use crate::run::monitor::Monitor;
 use crate::run::plan::Plan;
 use crate::stepping::{StepError, Tally};
@@ -97,9 +98,11 @@ impl Torques {
 }
 
 /// What a companion shares with its run, so that it cannot tell where that is wrong.
-fn shared(mechanism: &Mechanism) -> Vec<String> {
-    let walls = if mechanism.contacts.is_empty() { &[][..] } else { &["impact law", "contact detection"] };
-    walls.iter().chain(&["compilation"]).map(|&word| word.to_owned()).collect()
+fn shared(mechanism: &Mechanism, run: &Plan, companion: &Plan) -> Vec<String> {
+    let has_walls = !mechanism.contacts.is_empty();
+    let finds_likewise = (run.method == MethodId::Taylor) == (companion.method == MethodId::Taylor);
+    let words = [(has_walls, "impact law"), (has_walls && finds_likewise, "contact detection"), (true, "compilation")];
+    words.into_iter().filter(|(is_shared, _)| *is_shared).map(|(_, word)| word.to_owned()).collect()
 }
 
 impl Companion {
@@ -107,9 +110,9 @@ impl Companion {
     pub(in crate::run) fn new(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion, level: Level) -> Self {
         let finer::Finer { plan: mut series, name } = finer::first(mechanism, plan, level);
         let prices = Prices::new(mechanism, &series, plan);
-        let mut measured = Measured::new(level, name, shared(mechanism));
+        let mut measured = Measured::new(level, name, shared(mechanism, plan, &series));
         let shadow = Shadow::new(mechanism, &mut series, start).map_err(|why| measured.why = Some(why)).ok();
-        measured.is_bound = finer::is_rounded(&series);
+        measured.is_bound = finer::is_bound(&series, plan);
         Self::with(mechanism, plan, prices, measured, shadow)
     }
 
@@ -175,9 +178,9 @@ impl Companion {
         let Self { shadow: Some(shadow), prices, measured, .. } = self else { return Ok(()) };
         let mut purse = Purse { prices, spent: &mut measured.spent, budget };
         let Err(stop) = shadow.go(time, &mut purse) else { return Ok(()) };
-        if shadow.plan().in_double_double && !self.run.extended {
+        let is_dear = shadow.plan().in_double_double;
+        if let Some(finer::Finer { mut plan, name }) = is_dear.then(|| finer::second(&self.mechanism, &self.run)).flatten() {
             let from = shadow.motion.time.hi;
-            let finer::Finer { mut plan, name } = finer::second(&self.mechanism, &self.run);
             (plan.until, plan.every) = (shadow.plan().until, shadow.plan().every);
             self.prices = Prices::new(&self.mechanism, &plan, &self.run);
             shadow.change(&self.mechanism, plan)?;

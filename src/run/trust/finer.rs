@@ -16,7 +16,7 @@ const FINE: f64 = 1e-14;
 const FINEST: f64 = 1e-16;
 /// Tolerance \[rad/s\] with the first orders in double-double, of companions all in double-double, and of those of runs with extended orders.
 const EXTENDED: f64 = 1e-20;
-const BEYOND: f64 = 1e-26;
+const BEYOND: f64 = 1e-22;
 
 /// A companion's plan, and what it is in words.
 pub(super) struct Finer {
@@ -40,6 +40,11 @@ fn tolerance(plan: &Plan) -> Option<f64> {
 /// The first companion of a run.
 pub(super) fn first(mechanism: &Mechanism, run: &Plan, level: Level) -> Finer {
     let finer = tolerance(run).map(|tolerance| tolerance / FINER);
+    let has_series = mechanism.vibration.is_none() && mechanism.tree.is_dense();
+    let finds_impacts_likewise = run.method == MethodId::Taylor && !mechanism.contacts.is_empty();
+    if !has_series || finds_impacts_likewise {
+        return stepwise(mechanism, run, finer.filter(|_| !finds_impacts_likewise).unwrap_or(FINE).max(FINE));
+    }
     let is_near = is_near_rounding(run);
     // Impacts are located in doubles.
     let may_extend = mechanism.contacts.is_empty() && (is_near || level == Level::Full);
@@ -56,9 +61,20 @@ pub(super) fn first(mechanism: &Mechanism, run: &Plan, level: Level) -> Finer {
     }
 }
 
-/// The one that goes on in doubles where double-double would cost too much.
-pub(super) fn second(mechanism: &Mechanism, run: &Plan) -> Finer {
-    series(mechanism, run, FINEST, [false; 2])
+/// The one that goes on where double-double would cost too much; `None` where it would be coarser than the run.
+pub(super) fn second(mechanism: &Mechanism, run: &Plan) -> Option<Finer> {
+    if !run.extended {
+        return Some(series(mechanism, run, FINEST, [false; 2]));
+    }
+    let has_lanes = !mechanism.has_multipliers() && Taylor::has_lanes(mechanism, true);
+    has_lanes.then(|| series(mechanism, run, BEYOND, [true, false]))
+}
+
+/// Where there is no series, or the run is one that finds its impacts on it.
+fn stepwise(mechanism: &Mechanism, run: &Plan, tolerance: f64) -> Finer {
+    let tolerance = Tolerance { relative: tolerance, absolute: tolerance };
+    let plan = Plan { method: MethodId::Dp8, ..Plan::of_series(mechanism, tolerance, run.until) };
+    Finer { name: format!("dp8 at {:.0e}", tolerance.relative), plan }
 }
 
 fn series(mechanism: &Mechanism, run: &Plan, tolerance: f64, [extended, in_double_double]: [bool; 2]) -> Finer {
@@ -73,7 +89,16 @@ fn series(mechanism: &Mechanism, run: &Plan, tolerance: f64, [extended, in_doubl
     Finer { name: format!("taylor at {:.0e}{digits}", tolerance.relative), plan }
 }
 
+/// Whether a companion may be no finer than its run.
+pub(super) fn is_bound(series: &Plan, run: &Plan) -> bool {
+    let tolerance = tolerance(run).unwrap_or_default();
+    is_rounded(series) || (series.method != MethodId::Taylor && (run.method == MethodId::Taylor || tolerance < NEAR_ROUNDING))
+}
+
 /// Whether a companion's own rounding counts.
 pub(super) fn is_rounded(series: &Plan) -> bool {
-    !series.extended && !series.in_double_double && series.tolerance.unwrap_or_default().relative <= FINEST
+    series.method == MethodId::Taylor
+        && !series.extended
+        && !series.in_double_double
+        && series.tolerance.unwrap_or_default().relative <= FINEST
 }

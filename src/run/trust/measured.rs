@@ -183,7 +183,7 @@ impl Measured {
 
 /// The time at which the error passes the horizon between two looks, `[t, E]` each: it grows exponentially from one to the other, or as the square of the
 /// time from nothing.
-fn crossing([t0, e0]: [f64; 2], [t1, e1]: [f64; 2]) -> f64 {
+pub(in crate::run) fn crossing([t0, e0]: [f64; 2], [t1, e1]: [f64; 2]) -> f64 {
     if e0 <= 0.0 {
         return t0 + (t1 - t0) * (HORIZON / e1).sqrt();
     }

@@ -29,6 +29,7 @@ pub mod tangent;
 
 pub(super) use companion::{Companion, Kept};
 pub use distance::Ruler;
+pub(super) use measured::crossing;
 pub use tangent::Tangent;
 
 use serde::{Deserialize, Serialize};
@@ -42,8 +43,8 @@ pub const LOST: f64 = 0.1;
 /// What is said to be used up where the companion of [`Level::Full`] was cut short.
 const CUT: &str = "the companion's work limit";
 /// What is printed is so many times E, and at least the rounding of an angle \[rad\].
-const CAUTION: f64 = 1.2;
-const LEAST: f64 = 2e-15;
+pub(super) const CAUTION: f64 = 1.2;
+pub(super) const LEAST: f64 = 2e-15;
 
 /// How much may be spent on trust.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -6,11 +6,15 @@ use super::tangent::{Path, Tangent};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::contact::{Course, Station};
 use crate::run::march::build;
+use crate::run::methods::MethodId;
 use crate::run::plan::Plan;
 use crate::run::running::Outcome;
 use crate::stepping::{StepError, Tally};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+
+/// Steps that are taken for granted where the companion has to end one at every look.
+const STEPS: f64 = 256.0;
 
 /// A companion under way.
 pub(super) struct Shadow {
@@ -69,11 +73,8 @@ impl Shadow {
     /// # Errors
     /// Why there can be none.
     pub(super) fn new(mechanism: &Arc<Mechanism>, series: &mut Plan, start: &Motion) -> Result<Self, String> {
-        if !mechanism.tree.is_dense() {
-            return Err("a series takes the matrices of the tree, which are too large here".into());
-        }
         let (course, outcome) = course(mechanism, series, start)?;
-        let tangent = Tangent::new(mechanism, start, series.until);
+        let tangent = (series.method == MethodId::Taylor).then(|| Tangent::new(mechanism, start, series.until)).flatten();
         let (is_rounded, begun) = (is_rounded(series), start.time.hi);
         Ok(Self { course, outcome, motion: start.clone(), tangent, is_rounded, begun, last: Tally::default() })
     }
@@ -100,12 +101,7 @@ impl Shadow {
     }
 
     /// Goes on from what was kept, which was reached on the way to `horizon`; `None` where it cannot be of this mechanism.
-    pub(super) fn resume(
-        mechanism: &Arc<Mechanism>,
-        start: &Motion,
-        kept: KeptShadow,
-        horizon: Time,
-    ) -> Result<Option<Self>, StepError> {
+    pub(super) fn resume(mechanism: &Arc<Mechanism>, start: &Motion, kept: KeptShadow, horizon: Time) -> Result<Option<Self>, StepError> {
         let KeptShadow { station, outcome, path, begun, last } = kept;
         let Some(mut course) = Course::resume(Arc::clone(mechanism), &outcome.plan, start, station, horizon)? else { return Ok(None) };
         let tangent = match path {
@@ -135,8 +131,11 @@ impl Shadow {
         self.outcome.strike_count + self.outcome.hold_count
     }
 
-    /// The mean length of its steps \[s\], of those up to `t` \[s\].
+    /// The mean length of its steps \[s\], of those up to `t` \[s\]; where they end at every look it has no say in when these are.
     pub(super) fn mean_step(&self, t: f64) -> f64 {
+        if self.plan().method != MethodId::Taylor {
+            return self.plan().until / STEPS;
+        }
         (t - self.begun) / self.last.steps.max(1) as f64
     }
 
@@ -165,7 +164,9 @@ impl Shadow {
             left == 0
         };
         let arrived = self.course.go(until, &mut self.outcome, &mut is_spent);
-        if !arrived.map_err(|stop| Some(format!("the companion stopped at t = {} s: {}", stop.t, stop.what)))? || *purse.spent > purse.budget {
+        if !arrived.map_err(|stop| Some(format!("the companion stopped at t = {} s: {}", stop.t, stop.what)))?
+            || *purse.spent > purse.budget
+        {
             return Err(None);
         }
         self.course.look(&mut self.motion);
