@@ -557,9 +557,9 @@ fn companions_are_finer_than_the_runs_they_judge() {
     for (name, method, setting, until) in [
         ("chain8", "taylor", 1e-14, 2.0),
         ("chain8", "gauss16", 0.0025, 2.0),
-        ("four_bars", "gauss16", 0.005, 4.0),
+        ("four_bars", "gauss16", 0.005, 0.5),
         ("slider_crank_torque", "taylor", 1e-14, 2.0),
-        ("four_bars", "rattle8", 0.002, 3.0),
+        ("four_bars", "rattle8", 0.002, 0.5),
         ("spring", "gauss12", 0.005, 4.0),
     ] {
         let [[told, truth], [told_rate, rate]] = told_and_true(&shipped(name, &[]), &asked(method, setting, until, 0.05));

@@ -159,7 +159,7 @@ pub struct RunFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub plan: PlanFlags,
-    /// Estimate the error of the result and the time up to which it can be trusted: off, auto (50 ms, and 30 % of what the run takes), full (5 s, and thirty times what the run takes, but no more evaluations than --effort)
+    /// Estimate the error of the result and the time up to which it can be trusted: off, auto (50 ms, and 30 % of what the run takes without its output), full (5 s, and thirty times that, but no more evaluations than --effort)
     #[arg(long, value_name = "HOW", value_parser = levels(), default_value = Level::Auto.name(), help_heading = "Trust")]
     pub trust: Level,
     /// Stop with exit code 5 where the energy is off by more than this share of its scale [default: what the tolerance explains, 0.01 of the largest energy there has been at most]
@@ -205,7 +205,7 @@ pub struct SweepFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub plan: PlanFlags,
-    /// Estimate the error of every point and the time up to which it can be trusted, in two more columns: off, auto, full (as single runs)
+    /// Estimate the error of every point and the time up to which it can be trusted, in two more columns: off, auto (in lanes a second sweep at a hundredth of the tolerance: about 2.5 times the work), full (as single runs)
     #[arg(long, value_name = "HOW", value_parser = levels(), default_value = Level::Off.name(), help_heading = "Trust")]
     pub trust: Level,
     /// Stop a point where its energy is off by more than this share of its scale [default: what the tolerance explains, 0.01 at most]

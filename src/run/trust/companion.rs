@@ -1,6 +1,6 @@
 //! The companion of a run: the same motion by a finer series, looked at together with the run.
 //!
-//! Looks are half a mean step of the companion apart, twice as many near the horizon: neither output times nor rests have a say in when they are.
+//! Looks are a mean step of the companion apart, a quarter of it near the horizon: neither output times nor rests have a say in when they are.
 
 use super::budget::{FULL_GRACE, FULL_SHARE, GRACE, Prices, SHARE};
 use super::finer;
@@ -27,7 +27,7 @@ const LAST_DIGIT: f64 = 2.5 * 1.1e-16;
 /// The first look, in units of time of the mechanism.
 const FIRST: f64 = 1e-3;
 /// The time to the next look over the companion's mean step: usually, near the horizon, and where the run is lost.
-const GAPS: [f64; 3] = [0.5, 0.25, 4.0];
+const GAPS: [f64; 3] = [1.0, 0.25, 4.0];
 /// Share of the budget for double-double, after which doubles go on.
 const DOUBLE_DOUBLE: f64 = 0.5;
 
@@ -101,7 +101,13 @@ impl Torques {
 fn shared(mechanism: &Mechanism, run: &Plan, companion: &Plan) -> Vec<String> {
     let has_walls = !mechanism.contacts.is_empty();
     let finds_likewise = (run.method == MethodId::Taylor) == (companion.method == MethodId::Taylor);
-    let words = [(has_walls, "impact law"), (has_walls && finds_likewise, "contact detection"), (true, "compilation")];
+    let leaps = mechanism.is_tied_up() && run.method == MethodId::Taylor;
+    let words = [
+        (has_walls, "impact law"),
+        (has_walls && finds_likewise, "contact detection"),
+        (leaps, "leaps through singular positions"),
+        (true, "compilation"),
+    ];
     words.into_iter().filter(|(is_shared, _)| *is_shared).map(|(_, word)| word.to_owned()).collect()
 }
 
@@ -239,6 +245,7 @@ impl Companion {
         if !angle.is_finite() || rate.is_some_and(|rate| !rate.is_finite()) {
             return self.end("what small differences come to is beyond all numbers");
         }
+        measured.farthest = measured.farthest.max(ruler.reach(motion));
         measured.fastest = motion.omega.iter().fold(measured.fastest, |most, omega| most.max(omega.hi.abs()));
         measured.strongest = torque.map_or(measured.strongest, |[_, most]| measured.strongest.max(most));
         let t = motion.time.hi;

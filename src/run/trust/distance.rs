@@ -36,6 +36,11 @@ impl Ruler {
         self.largest((0..one.phi.len().min(other.phi.len())).map(difference))
     }
 
+    /// The largest angle of a motion, whole turns counted \[rad\], or position over the size.
+    pub fn reach(&self, motion: &Motion) -> f64 {
+        self.largest((0..motion.phi.len()).map(|k| motion.unwrapped(k)))
+    }
+
     /// The largest difference of a rate \[rad/s\], or of a velocity over the size \[1/s\].
     pub fn rates_apart(&self, one: &Motion, other: &Motion) -> f64 {
         self.largest(one.omega.iter().zip(&other.omega).map(|(&a, &b)| (a - b).hi))

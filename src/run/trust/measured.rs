@@ -11,6 +11,9 @@ const REGULAR: f64 = 2.0;
 /// Powers of time with which the error of a regular motion grows.
 const POWERS: [f64; 2] = [1.0, 2.0];
 
+/// What a number loses where it is written as a double, as a share of it.
+const ROUNDED: f64 = 2.2e-16;
+
 /// How far a run and its companion are apart at one time: an angle \[rad\], a rate \[rad/s\], and the torque of a motor \[N·m\], each the largest.  `None`
 /// where it is not to be told there.
 #[derive(Clone, Copy, Debug, Default)]
@@ -35,7 +38,8 @@ pub(super) struct Measured {
     pub error: f64,
     pub rate: f64,
     pub torque: Option<f64>,
-    /// The largest rate \[rad/s\] and torque \[N·m\] seen: what their rounding is measured against.
+    /// The largest angle \[rad\], whole turns counted, or position over the longest bar, the largest rate \[rad/s\] and torque \[N·m\] seen: what their rounding is measured against.
+    pub farthest: f64,
     pub fastest: f64,
     pub strongest: f64,
     pub record: Vec<[f64; 2]>,
@@ -69,6 +73,7 @@ impl Measured {
             error: 0.0,
             rate: 0.0,
             torque: None,
+            farthest: 0.0,
             fastest: 0.0,
             strongest: 0.0,
             record: Vec::new(),
@@ -150,7 +155,9 @@ impl Measured {
             why,
             record,
         };
-        let printed = |error: f64| (CAUTION * error).max(LEAST);
+        // Angles and positions are written as doubles.
+        let least = LEAST.max(ROUNDED * self.farthest);
+        let printed = |error: f64| (CAUTION * error).max(least);
         let (mut rate, mut torque) = (self.rate, self.torque);
         if let (Some(horizon), Some(beside)) = (trust.horizon, self.beside) {
             trust.how = How::Companion;

@@ -55,7 +55,7 @@ pub enum Level {
     /// At most [`budget::SHARE`] of the run's work.
     #[default]
     Auto,
-    /// With the companion's first orders in double-double, up to [`budget::FULL_SHARE`] times the run's work and no more evaluations than it is allowed.
+    /// With a companion in double-double, up to [`budget::FULL_SHARE`] times the run's work and no more evaluations than it is allowed.
     Full,
 }
 
