@@ -136,9 +136,6 @@ fn chain(dice: &mut Dice) -> (Scene, Vec<&'static str>) {
 /// A scene of any kind, a while longer than usual in half of all cases.
 fn of_any_kind(seed: u64, dice: &mut Dice) -> Option<(Scene, Vec<&'static str>)> {
     let generated = mechanisms::scene(seed);
-    if let Ok(path) = std::env::var("FOUND") {
-        let _ = std::fs::write(format!("{path}/{seed}.json"), &generated.text);
-    }
     let mut scene = parse_scene(&generated.text, "scene", &[]).ok()?;
     scene.until *= if dice.chance(0.5) { dice.size(1.0, 8.0) } else { 1.0 };
     let mechanism = Mechanism::new(&scene).ok()?;
@@ -433,6 +430,9 @@ fn estimates_are_near_the_truth() {
     let mut table = Table::default();
     for seed in first..first + cases {
         let Some(case) = case(seed) else { continue };
+        if let Ok(path) = std::env::var("FOUND") {
+            std::fs::write(format!("{path}/{seed}.json"), case.scene.to_input().to_string()).expect("a folder");
+        }
         let verdict = judge(&case);
         let method = case.request.method.map_or("chosen".to_owned(), |method| method.to_string());
         table.take(&case, &verdict, &method);

@@ -205,7 +205,7 @@ pub struct SweepFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub plan: PlanFlags,
-    /// Estimate the error of every point and the time up to which it can be trusted, in two more columns: off, auto (in lanes a second sweep at a hundredth of the tolerance: about 2.5 times the work), full (as single runs)
+    /// Estimate the error of every point and the time up to which it can be trusted, in two more columns: off, auto (in lanes a second sweep at a hundredth of the tolerance: about 2.2 times the work), full (as single runs)
     #[arg(long, value_name = "HOW", value_parser = levels(), default_value = Level::Off.name(), help_heading = "Trust")]
     pub trust: Level,
     /// Stop a point where its energy is off by more than this share of its scale [default: what the tolerance explains, 0.01 at most]

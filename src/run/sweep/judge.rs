@@ -1,7 +1,7 @@
 //! How far the points of a sweep may be trusted: in lanes by a second march at a hundredth of the tolerance beside the first.
 //!
 //! The second march has an order of its own, so that steps that end at the same output times have other errors.  Both are compared at the output times and where
-//! a point ends, and the horizon is interpolated between these.  Beside a march at 1e-9 it costs about as much again and a half.
+//! a point ends, and the horizon is interpolated between these.  Beside a march at 1e-9 both together cost 2.2 times as much (32 points of `free`, counted instructions).
 
 use super::point::Ready;
 use crate::arithmetic::{DoubleDouble, Scalar};

@@ -19,8 +19,8 @@ pub const FULL_SHARE: f64 = 30.0;
 /// See [`FULL_SHARE`].
 pub const FULL_GRACE: f64 = 5e9;
 
-/// A step of the series in double-double over one of the series in doubles.
-const DOUBLE_DOUBLE: f64 = 20.0;
+/// A step of the series in double-double over one of the series in doubles of the same order, by counted instructions.
+const DOUBLE_DOUBLE: f64 = 8.0;
 
 /// Prices of a mechanism's parts.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,6 @@
 //! The companion of a run: the same motion by a finer series, looked at together with the run.
 //!
-//! Looks are a mean step of the companion apart, a quarter of it near the horizon: neither output times nor rests have a say in when they are.
+//! Looks are a mean step of the companion apart, a half of it in the beginning and a quarter near the horizon: neither output times nor rests have a say in when they are.
 
 use super::budget::{FULL_GRACE, FULL_SHARE, GRACE, Prices, SHARE};
 use super::finer;
@@ -26,8 +26,12 @@ const ENOUGH: f64 = 2000.0;
 const LAST_DIGIT: f64 = 2.5 * 1.1e-16;
 /// The first look, in units of time of the mechanism.
 const FIRST: f64 = 1e-3;
-/// The time to the next look over the companion's mean step: usually, near the horizon, and where the run is lost.
-const GAPS: [f64; 3] = [1.0, 0.25, 4.0];
+/// The time to the next look over the companion's mean step: in the beginning, usually, near the horizon, and where the run is lost.
+const GAPS: [f64; 4] = [0.5, 1.0, 0.25, 4.0];
+/// Looks that belong to the beginning.
+const BEGINNING: u64 = 128;
+/// The companion's own rounding over what was measured, at most.
+const MOST_ROUNDING: f64 = 2.0;
 /// Share of the budget for double-double, after which doubles go on.
 const DOUBLE_DOUBLE: f64 = 0.5;
 
@@ -222,10 +226,11 @@ impl Companion {
             self.end("");
         }
         let Self { shadow: Some(shadow), measured, .. } = self else { return };
-        let [usual, near, lost] = GAPS;
+        let [first, usual, near, lost] = GAPS;
         let share = match measured.lost {
             Some(_) => lost,
             None if measured.error > NEAR => near,
+            None if measured.seen < BEGINNING => first,
             None => usual,
         };
         measured.due = if t > 0.0 { t + share * shadow.mean_step(t) } else { FIRST * self.mechanism.units.time };
@@ -238,7 +243,9 @@ impl Companion {
     fn measure(&mut self, motion: &Motion) {
         let Self { mechanism, ruler, measured, shadow: Some(shadow), torques, .. } = self else { return };
         let rounding = shadow.tangent.as_ref().filter(|_| shadow.is_rounded).map_or(0.0, Tangent::rounding);
-        let angle = ruler.apart(motion, &shadow.motion).hypot(rounding);
+        let apart = ruler.apart(motion, &shadow.motion);
+        // It is there for differences that are small by chance.
+        let angle = apart.hypot(rounding.min(MOST_ROUNDING * apart.max(measured.error)));
         // Between an impact of the one and that of the other rates differ by all of it.
         let rate = (self.events == shadow.events()).then(|| ruler.rates_apart(motion, &shadow.motion));
         let torque = torques.as_mut().map(|torques| torques.apart(mechanism, [motion, &shadow.motion]));

@@ -11,11 +11,10 @@ use crate::stepping::{Taylor, Tolerance};
 const FINER: f64 = 100.0;
 /// From which tolerance of a run on its rounding counts.
 const NEAR_ROUNDING: f64 = 1e-10;
-/// Tolerance \[rad/s\] of companions in doubles: of runs that are not near rounding, at most, and of all others.
+/// Tolerance \[rad/s\] of companions in doubles: of runs that are not near rounding, at most, and of all others.  Below 1e-15 the last orders of a series in
+/// doubles are rounding, and its steps come out too long for modes that are fast, and for chains of bodies.
 const FINE: f64 = 1e-14;
-const FINEST: f64 = 1e-16;
-/// The same where there are dampers: at 1e-16 the rounding of a mode that has died away long ago decides on the steps, which come out too long for it.
-const FINEST_DAMPED: f64 = 1e-15;
+const FINEST: f64 = 1e-15;
 /// Tolerance \[rad/s\] with the first orders in double-double, of companions all in double-double, and of those of runs with extended orders.
 const EXTENDED: f64 = 1e-20;
 const BEYOND: f64 = 1e-22;
@@ -59,22 +58,17 @@ pub(super) fn first(mechanism: &Mechanism, run: &Plan, level: Level) -> Finer {
         _ if has_lanes => series(mechanism, run, finer.unwrap_or(EXTENDED).min(EXTENDED), [true, false]),
         // Steps that end at every output time are often far better than their tolerance, and a finer series costs little.
         Some(finer) if !is_near => series(mechanism, run, finer.min(FINE), [false; 2]),
-        _ => series(mechanism, run, finest(mechanism), [false; 2]),
+        _ => series(mechanism, run, FINEST, [false; 2]),
     }
 }
 
 /// The one that goes on where double-double would cost too much; `None` where it would be coarser than the run.
 pub(super) fn second(mechanism: &Mechanism, run: &Plan) -> Option<Finer> {
     if !run.extended {
-        return Some(series(mechanism, run, finest(mechanism), [false; 2]));
+        return Some(series(mechanism, run, FINEST, [false; 2]));
     }
     let has_lanes = !mechanism.has_multipliers() && Taylor::has_lanes(mechanism, true);
     has_lanes.then(|| series(mechanism, run, BEYOND, [true, false]))
-}
-
-/// The finest tolerance of a series in doubles.
-fn finest(mechanism: &Mechanism) -> f64 {
-    if mechanism.is_damped() { FINEST_DAMPED } else { FINEST }
 }
 
 /// Where there is no series, or the run is one that finds its impacts on it.
@@ -107,5 +101,5 @@ pub(super) fn is_rounded(series: &Plan) -> bool {
     series.method == MethodId::Taylor
         && !series.extended
         && !series.in_double_double
-        && series.tolerance.unwrap_or_default().relative <= FINEST_DAMPED
+        && series.tolerance.unwrap_or_default().relative <= FINEST
 }

@@ -1,7 +1,7 @@
 //! How far a run may be trusted: its error estimated while it goes, and the time from which its path is no longer that of its start.
 //!
 //! Beside the run goes a *companion*: the same mechanism from the same bits by [`taylor`](crate::stepping::taylor) at 1e-14 or a
-//! hundredth of the run's tolerance, or in double-double where the run is near rounding ([`finer`]).  Both are looked at at times of the companion's own,
+//! hundredth of the run's tolerance, or in double-double where the run is near rounding (module `finer`).  Both are looked at at times of the companion's own,
 //! which depend neither on output times nor on rests:
 //!
 //! ```text
