@@ -32,8 +32,8 @@ const GAPS: [f64; 4] = [0.5, 1.0, 0.25, 4.0];
 const BEGINNING: u64 = 128;
 /// The companion's own rounding over what was measured, at most.
 const MOST_ROUNDING: f64 = 2.0;
-/// Share of the budget for double-double, after which doubles go on.
-const DOUBLE_DOUBLE: f64 = 0.5;
+/// Share of the budget for double-double, after which doubles go on: of runs near rounding, and of others.
+const DOUBLE_DOUBLE: [f64; 2] = [0.5, 0.2];
 
 /// A companion, and what it has measured so far.
 pub(in crate::run) struct Companion {
@@ -175,8 +175,11 @@ impl Companion {
             // No more evaluations than the run is allowed itself.
             Level::Off | Level::Full => (FULL_GRACE + FULL_SHARE * run).min(self.run.effort as f64 * self.prices.series[0]),
         };
-        let is_dear = self.shadow.as_ref().is_some_and(|shadow| shadow.plan().in_double_double) && self.measured.level != Level::Full;
-        if is_dear { DOUBLE_DOUBLE * whole } else { whole }
+        let is_wide = self.shadow.as_ref().is_some_and(|shadow| shadow.plan().in_double_double);
+        if !is_wide || self.measured.level == Level::Full {
+            return whole;
+        }
+        DOUBLE_DOUBLE[usize::from(!finer::is_near_rounding(&self.run))] * whole
     }
 
     /// Goes to a time beside the run, if need be by another series.

@@ -26,7 +26,7 @@ pub(super) struct Finer {
 }
 
 /// True where the rounding of a run counts.
-fn is_near_rounding(plan: &Plan) -> bool {
+pub(super) fn is_near_rounding(plan: &Plan) -> bool {
     match plan.method {
         MethodId::Gauss(stages) => stages > 2,
         MethodId::Rattle(composition) => !matches!(composition, Composition::Single | Composition::Suzuki5),
@@ -48,7 +48,9 @@ pub(super) fn first(mechanism: &Mechanism, run: &Plan, level: Level) -> Finer {
     }
     let is_near = is_near_rounding(run);
     // Impacts are located in doubles.
-    let may_extend = mechanism.contacts.is_empty() && (is_near || level == Level::Full);
+    // A series whose steps are those of the run shares their errors; with loops and sliders these are in what no step is judged by.
+    let is_alike = run.method == MethodId::Taylor && mechanism.has_multipliers();
+    let may_extend = mechanism.contacts.is_empty() && (is_near || is_alike || level == Level::Full);
     let has_lanes = may_extend && !run.extended && !mechanism.has_multipliers() && Taylor::has_lanes(mechanism, true);
     if may_extend && !has_lanes {
         let tolerance = if run.extended { BEYOND } else { EXTENDED };
