@@ -178,8 +178,11 @@ fn apart(ruler: &Ruler, one: &[Vec<f64>; 2], other: &[Vec<f64>; 2]) -> [f64; 2] 
     [0, 1].map(|i| one[i].iter().zip(&other[i]).enumerate().fold(0.0, |most: f64, (k, (a, b))| most.max((a - b).abs() * ruler.weight(k))))
 }
 
-/// Angles and rates at these times, and how far they are off.
-fn truth(scene: &Scene, mechanism: &Arc<Mechanism>, start: &Motion, times: &[f64]) -> Option<(Vec<[Vec<f64>; 2]>, Vec<f64>)> {
+/// Angles and rates at some times, and how far they are off.
+type Known = (Vec<[Vec<f64>; 2]>, Vec<f64>);
+
+/// The truth at these times.
+fn truth(scene: &Scene, mechanism: &Arc<Mechanism>, start: &Motion, times: &[f64]) -> Option<Known> {
     let at: Vec<Time> = times.iter().map(|&t| Time::from(t)).collect();
     if scene.walls.is_empty()
         && let Ok(found) = reference(mechanism, start, &at)
@@ -250,7 +253,7 @@ fn judge(case: &Case) -> Verdict {
         .unwrap_or(told_by_run);
     let Some((exact, accuracy)) = truth(&case.scene, &mechanism, &start, &shown.times) else { return Verdict::Unknown("no truth") };
     let ruler = Ruler::new(&mechanism);
-    let is_sparse = shown.times.len() < FINE as usize;
+    let is_sparse = (shown.times.len() as f64) < 0.5 * FINE;
     let mut errors = Errors { is_sparse, times: shown.times.clone(), most: Vec::new(), known: accuracy };
     let mut most = [0.0_f64; 2];
     for (sample, exact) in shown.samples.iter().zip(&exact) {

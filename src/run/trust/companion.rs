@@ -236,10 +236,8 @@ impl Companion {
             None if measured.seen < BEGINNING => first,
             None => usual,
         };
-        measured.due = if t > 0.0 { t + share * shadow.mean_step(t) } else { FIRST * self.mechanism.units.time };
-        if !(measured.due > t) {
-            measured.due = t.next_up();
-        }
+        let due = if t > 0.0 { t + share * shadow.mean_step(t) } else { FIRST * self.mechanism.units.time };
+        measured.due = due.max(t.next_up());
     }
 
     /// Measures how far the run and its companion are apart.
