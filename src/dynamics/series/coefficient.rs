@@ -1,7 +1,7 @@
 //! Numbers there are series of.
 
 use super::{Series, bodywise};
-use crate::arithmetic::{Complex, DoubleDouble, Real};
+use crate::arithmetic::{Complex, DoubleDouble, Dual, Real};
 use crate::dynamics::{Mechanism, Time};
 
 /// A number whose series are compiled with this crate, once, and not anew wherever they are used.
@@ -17,14 +17,14 @@ pub trait Coefficient: Real {
 }
 
 macro_rules! coefficient {
-    ($number:ty, $products:path) => {
-        impl Coefficient for $number {
+    ($number:ty, $products:path, $orders:expr $(, const $size:ident)?) => {
+        impl $(<const $size: usize>)? Coefficient for $number {
             fn begin(series: &mut Series<Self>, t: Time, u: &[Self], u_rest: &[Self], u_rate: &[Self]) {
                 series.begin(t, u, u_rest, u_rate);
             }
 
             fn orders(series: &mut Series<Self>, mechanism: &Mechanism, first: usize) {
-                series.sized_orders(mechanism, first);
+                $orders(series, mechanism, first);
             }
 
             #[inline]
@@ -35,5 +35,7 @@ macro_rules! coefficient {
     };
 }
 
-coefficient!(f64, bodywise::products_in_lanes);
-coefficient!(DoubleDouble, bodywise::products);
+coefficient!(f64, bodywise::products_in_lanes, Series::sized_orders);
+coefficient!(DoubleDouble, bodywise::products, Series::sized_orders);
+// The series of a motion with those of small differences beside it: one size of code is enough of each.
+coefficient!(Dual<D, false>, bodywise::products, Series::orders::<0>, const D);
