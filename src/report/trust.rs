@@ -34,6 +34,8 @@ pub fn object(trust: Option<&Trust>) -> Value {
             "uncertainty_per_s": found.uncertainty,
             "until_s": found.until,
         })),
+        "growth_power": trust.growth_power,
+        "growth_why": trust.no_growth,
         "input_error": trust.input_error,
         "model_error": trust.model_error,
         "not_judged": trust.shared,
@@ -91,8 +93,19 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
         let (exponent, uncertainty) = (rough(found.exponent), magnitude(found.uncertainty));
         page.entry("lyapunov", &format!("largest exponent {exponent} ± {uncertainty} per s, over {} s", rough(found.until)));
     }
+    if let Some(power) = trust.growth_power {
+        let how = if power < 0.05 { "errors do not grow".into() } else { format!("errors grow about as t^{power:.1}") };
+        page.entry("growth", &format!("regular motion: {how}"));
+    }
+    if let Some(why) = &trust.no_growth {
+        page.entry("growth", &format!("not known: {why}"));
+    }
     if let Some(error) = trust.input_error {
-        page.entry("inputs", &format!("their last digit comes to about {} rad at {} s", magnitude(error), rough(trust.at)));
+        let what = match error < 1.0 {
+            true => format!("their last digit comes to about {} rad at {} s", magnitude(error), rough(trust.at)),
+            false => format!("their last digit leaves no angle certain at {} s", rough(trust.at)),
+        };
+        page.entry("inputs", &what);
     }
 }
 

@@ -66,6 +66,18 @@ struct Held {
     kept: Option<usize>,
 }
 
+/// What happened between two steps: an impact, or points held or released.
+#[derive(Clone, Debug)]
+pub(super) struct Jump {
+    /// The contact of an impact.
+    pub contact: Option<usize>,
+    /// The motion on both sides.
+    pub before: Motion,
+    pub after: Motion,
+    /// The mechanism with the contacts held from then on.
+    pub mechanism: Arc<Mechanism>,
+}
+
 /// Where a course is: all that what follows depends on.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Station {
@@ -101,6 +113,8 @@ pub(super) struct Course {
     pub(super) lookout: Option<Lookout>,
     /// Energy stabilizers put in before the present marcher \[J\].
     stabilizer: f64,
+    /// Impacts, holds and releases since somebody last took them, where somebody asks.
+    pub(super) jumps: Option<Vec<Jump>>,
 }
 
 impl Course {
@@ -118,7 +132,13 @@ impl Course {
             is_between: false,
             lookout: None,
             stabilizer: 0.0,
+            jumps: None,
         }
+    }
+
+    /// The mechanism with the contacts held at the moment.
+    pub(super) fn holding(&self) -> &Arc<Mechanism> {
+        &self.mechanism
     }
 
     /// True where loops or sliders have to be kept.
@@ -314,6 +334,9 @@ impl Course {
             let (cause, what) = (Cause::ImpactCheckFailed, format!("impact at wall {}: {what}", self.name(contact)));
             return Err(StepError { cause, ..self.stopped(&outcome.plan, what, "tighten the tolerance, or use --method taylor") });
         }
+        if let Some(jumps) = &mut self.jumps {
+            jumps.push(Jump { contact: Some(contact), before: last, after, mechanism: Arc::clone(&self.mechanism) });
+        }
         outcome.strike_count += 1;
         outcome.strike_loss -= change.hi;
         if outcome.strikes.len() < KEPT {
@@ -348,6 +371,7 @@ impl Course {
     /// Goes on with these contacts held.
     fn switch(&mut self, contacts: Vec<usize>, outcome: &mut Outcome) -> Result<(), StepError> {
         let mut motion = self.motion();
+        let before = self.jumps.is_some().then(|| motion.clone());
         self.stabilizer += std::mem::take(&mut motion.stabilizer);
         self.record(&contacts, motion.time.hi, outcome);
         let mut plan = outcome.plan.clone();
@@ -362,6 +386,9 @@ impl Course {
         let last = std::mem::replace(&mut self.marcher, next);
         self.marcher.follow(&*last);
         self.sampler.hold(Arc::clone(&self.mechanism));
+        if let (Some(jumps), Some(before)) = (&mut self.jumps, before) {
+            jumps.push(Jump { contact: None, before, after: motion.clone(), mechanism: Arc::clone(&self.mechanism) });
+        }
         if self.holds_in_row > HOLDS_MOST {
             let what = format!("more than {HOLDS_MOST} holds before the next output time at wall {}", self.names(&contacts));
             return Err(self.stopped(&outcome.plan, what, "shorten the output interval, or loosen the tolerance"));

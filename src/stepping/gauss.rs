@@ -73,6 +73,13 @@ const EXCITED: f64 = 1e-6;
 /// Part of a step that a remaining time may differ from whole steps.
 const WHOLE: f64 = 1e-9;
 
+/// Nodes c, weights b and coefficients a, row by row, of collocation at so many Gauss points.
+pub fn collocation(stages: usize) -> [Vec<f64>; 3] {
+    let tableau = Tableau::new(stages);
+    let entries = (0..stages * stages).map(|k| tableau.entry(k / stages, k % stages)).collect();
+    [tableau.nodes.iter().map(|node| node.hi).collect(), tableau.weights.iter().map(|weight| weight.hi).collect(), entries]
+}
+
 /// A Gauss method with its step and scratch space.
 #[derive(Clone, Debug)]
 pub struct Gauss {

@@ -4,7 +4,8 @@
 
 use super::budget::{FULL_GRACE, FULL_SHARE, GRACE, Prices, SHARE};
 use super::finer;
-use super::measured::{Apart, Measured};
+use super::growth::Nature;
+use super::measured::{Apart, LAST_DIGIT, Measured};
 use super::shadow::{KeptShadow, Purse, Shadow};
 use super::tangent::Tangent;
 use super::{CUT, HORIZON, LOST, Level, Ruler, Trust};
@@ -22,8 +23,6 @@ use std::time::{Duration, Instant};
 const NEAR: f64 = 0.03 * HORIZON;
 /// Growth \[ln\] beyond which the exponent is known well enough.
 const ENOUGH: f64 = 2000.0;
-/// What the last digit of the scene's numbers moves them by, in units of their size; fitted.
-const LAST_DIGIT: f64 = 2.5 * 1.1e-16;
 /// The first look, in units of time of the mechanism.
 const FIRST: f64 = 1e-3;
 /// The time to the next look over the companion's mean step: in the beginning, usually, near the horizon, and where the run is lost.
@@ -121,7 +120,11 @@ impl Companion {
         let finer::Finer { plan: mut series, name } = finer::first(mechanism, plan, level);
         let prices = Prices::new(mechanism, &series, plan);
         let mut measured = Measured::new(level, name, shared(mechanism, plan, &series));
-        let shadow = Shadow::new(mechanism, &mut series, start).map_err(|why| measured.why = Some(why)).ok();
+        let mut shadow = Shadow::new(mechanism, &mut series, start).map_err(|why| measured.why = Some(why)).ok();
+        if let Some(shadow) = &mut shadow {
+            measured.no_growth = shadow.no_growth.take();
+            measured.nature = shadow.tangent.as_ref().map_or(Nature::default(), |tangent| Nature::new(mechanism, tangent));
+        }
         measured.is_bound = finer::is_bound(&series, plan);
         Self::with(mechanism, plan, prices, measured, shadow)
     }
@@ -190,7 +193,12 @@ impl Companion {
         let budget = self.budget(tally);
         let Self { shadow: Some(shadow), prices, measured, .. } = self else { return Ok(()) };
         let mut purse = Purse { prices, spent: &mut measured.spent, budget };
-        let Err(stop) = shadow.go(time, &mut purse) else { return Ok(()) };
+        let gone = shadow.go(time, &mut purse);
+        if let Some(why) = shadow.tangent.as_ref().and_then(Tangent::lost) {
+            measured.no_growth = Some(why.into());
+            measured.conclude(shadow.tangent.take().as_ref());
+        }
+        let Err(stop) = gone else { return Ok(()) };
         let is_dear = shadow.plan().in_double_double;
         if let Some(finer::Finer { mut plan, name }) = is_dear.then(|| finer::second(&self.mechanism, &self.run)).flatten() {
             let from = shadow.motion.time.hi;
@@ -258,7 +266,8 @@ impl Companion {
         measured.strongest = torque.map_or(measured.strongest, |[_, most]| measured.strongest.max(most));
         let t = motion.time.hi;
         if measured.take(t, Apart { angle, rate, torque: torque.map(|[apart, _]| apart) }) {
-            measured.input_error = shadow.tangent.as_ref().map(|tangent| LAST_DIGIT * tangent.reach());
+            let at = measured.horizon.unwrap_or(t);
+            measured.input_error = shadow.tangent.as_ref().map(|tangent| LAST_DIGIT * tangent.reach(at));
         }
         if angle > LOST {
             measured.lost = Some(t);
@@ -270,11 +279,8 @@ impl Companion {
 
     /// Ends it, for a reason where there is one to be told.
     fn end(&mut self, why: &str) {
-        if let Some(tangent) = self.shadow.take().and_then(|shadow| shadow.tangent) {
-            self.measured.history = tangent.history();
-            if self.measured.input_error.is_none() {
-                self.measured.input_error = Some(LAST_DIGIT * tangent.reach());
-            }
+        if let Some(shadow) = self.shadow.take() {
+            self.measured.conclude(shadow.tangent.as_ref());
         }
         if self.measured.lost.is_none() && self.measured.why.is_none() && !why.is_empty() {
             self.measured.why = Some(why.into());

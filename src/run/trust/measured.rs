@@ -1,8 +1,10 @@
 //! What a companion has measured so far, and what it amounts to.
 
-use super::tangent;
+use super::growth::{Growth, Nature};
+use super::tangent::Tangent;
 use super::{CAUTION, HORIZON, How, LEAST, LOST, Level, Trust};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
 
 /// Times at which the estimate is kept.
 const KEPT: usize = 512;
@@ -13,6 +15,8 @@ const POWERS: [f64; 2] = [1.0, 2.0];
 
 /// What a number loses where it is written as a double, as a share of it.
 const ROUNDED: f64 = 2.2e-16;
+/// What the last digit of the scene's numbers moves them by, in units of their size; fitted.
+pub(super) const LAST_DIGIT: f64 = 2.5 * 1.1e-16;
 
 /// How far a run and its companion are apart at one time: an angle \[rad\], a rate \[rad/s\], and the torque of a motor \[N·m\], each the largest.  `None`
 /// where it is not to be told there.
@@ -55,8 +59,11 @@ pub(super) struct Measured {
     pub input_error: Option<f64>,
     /// Why it went no further.
     pub why: Option<String>,
-    /// Growth of small differences against time, once the companion has ended.
+    /// Growth of small differences against time, once the companion has ended, and of which kind it may be.
     pub history: Vec<[f64; 2]>,
+    pub nature: Nature,
+    /// Why nothing is known of it, or not from some time on.
+    pub no_growth: Option<String>,
     /// Work spent.
     pub spent: f64,
 }
@@ -86,6 +93,8 @@ impl Measured {
             input_error: None,
             why: None,
             history: Vec::new(),
+            nature: Nature::default(),
+            no_growth: None,
             spent: 0.0,
         }
     }
@@ -114,6 +123,16 @@ impl Measured {
         passes
     }
 
+    /// Takes what is known of growth when its flow ends.
+    pub(super) fn conclude(&mut self, tangent: Option<&Tangent>) {
+        let Some(tangent) = tangent else { return };
+        self.history = tangent.history();
+        // Where the flow ended early, what inputs come to at the end is not known.
+        if self.input_error.is_none() && tangent.lost().is_none() {
+            self.input_error = Some(LAST_DIGIT * tangent.reach(tangent.now()[0]));
+        }
+    }
+
     /// Keeps the estimate of this time.
     fn keep(&mut self) {
         if self.record.len() == KEPT {
@@ -133,10 +152,11 @@ impl Measured {
 
     /// What it has come to at the end of the run, `t` \[s\].
     pub(super) fn trust(self, t: f64) -> Trust {
-        let Self { name, shared, until, error, mut record, horizon, lost, input_error, why, history, .. } = self;
+        let Self { name, shared, until, error, mut record, horizon, lost, input_error, why, history, nature, no_growth, .. } = self;
         if record.last().is_some_and(|last| last[0] < until) {
             record.push([until, error]);
         }
+        let Growth { lyapunov, power: growth_power } = if no_growth.is_some() { Growth::default() } else { nature.judge(&history) };
         let mut trust = Trust {
             how: How::None,
             error_estimate: None,
@@ -146,8 +166,11 @@ impl Measured {
             at: t,
             horizon,
             lost,
-            lyapunov: tangent::exponent(&history),
-            input_error,
+            lyapunov,
+            growth_power,
+            no_growth,
+            // More is no more uncertain.
+            input_error: input_error.filter(|&error| error > 0.0).map(|error| error.min(TAU)),
             model_error: None,
             companion: Some(name),
             shared,

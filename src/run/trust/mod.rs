@@ -10,7 +10,8 @@
 //! ```
 //!
 //! d is exact whatever the motion does, R matters near rounding only.  The *error estimate* is 1.2 E, the *horizon* the first time E passes
-//! [`HORIZON`], and beyond [`LOST`] nothing is measured any more.  The tangent flow tells the largest Lyapunov exponent besides, and what the last digit
+//! [`HORIZON`], and beyond [`LOST`] nothing is measured any more.  The tangent flow tells besides how small
+//! differences grow, exponentially or as a power of time (module `growth`), and what the last digit
 //! of the inputs comes to.
 //!
 //! What the companion may cost is counted in work, not in seconds: the same run has the same figures on every machine ([`budget`]).  Where it is used
@@ -23,12 +24,15 @@ pub mod budget;
 mod companion;
 mod distance;
 mod finer;
+mod flow;
+mod growth;
 mod measured;
 mod shadow;
 pub mod tangent;
 
 pub(super) use companion::{Companion, Kept};
 pub use distance::Ruler;
+pub use flow::{Flow, Moment, flow};
 pub(super) use measured::crossing;
 pub use tangent::Tangent;
 
@@ -149,6 +153,12 @@ pub struct Trust {
     pub lost: Option<f64>,
     /// For chaotic motions.
     pub lyapunov: Option<Lyapunov>,
+    /// Of regular motions: the power of time with which small differences grow.
+    #[serde(default)]
+    pub growth_power: Option<f64>,
+    /// Why nothing is known of the growth of small differences, or not from some time on.
+    #[serde(default)]
+    pub no_growth: Option<String>,
     /// What a change in the last digit of the scene's numbers comes to at `at` \[rad\]; no error of the method.
     pub input_error: Option<f64>,
     /// What the model is off by whatever the method does, where springs are taken for rods \[rad\]; the estimate is no smaller.

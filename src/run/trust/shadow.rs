@@ -22,6 +22,8 @@ pub(super) struct Shadow {
     pub outcome: Outcome,
     pub motion: Motion,
     pub tangent: Option<Tangent>,
+    /// Why there is no tangent flow.
+    pub no_growth: Option<String>,
     /// True where its own rounding counts: the run is as near it.
     pub is_rounded: bool,
     /// The time at which the series began \[s\].
@@ -74,9 +76,18 @@ impl Shadow {
     /// Why there can be none.
     pub(super) fn new(mechanism: &Arc<Mechanism>, series: &mut Plan, start: &Motion) -> Result<Self, String> {
         let (course, outcome) = course(mechanism, series, start)?;
-        let tangent = (series.method == MethodId::Taylor).then(|| Tangent::new(mechanism, start, series.until)).flatten();
+        let mut course = course;
+        let begun = match series.method {
+            MethodId::Taylor => Tangent::new(&Arc::clone(course.holding()), &course.motion(), series.until),
+            _ => Err("the companion is no series".into()),
+        };
+        let (tangent, no_growth) = match begun {
+            Ok(tangent) => (Some(tangent), None),
+            Err(why) => (None, Some(why)),
+        };
+        course.jumps = tangent.is_some().then(Vec::new);
         let (is_rounded, begun) = (is_rounded(series), start.time.hi);
-        Ok(Self { course, outcome, motion: start.clone(), tangent, is_rounded, begun, last: Tally::default() })
+        Ok(Self { course, outcome, motion: start.clone(), tangent, no_growth, is_rounded, begun, last: Tally::default() })
     }
 
     /// Goes on by another series from where it is.
@@ -86,6 +97,7 @@ impl Shadow {
     pub(super) fn change(&mut self, mechanism: &Arc<Mechanism>, mut series: Plan) -> Result<(), String> {
         let motion = self.motion.clone();
         (self.course, self.outcome) = course(mechanism, &mut series, &motion)?;
+        self.course.jumps = self.tangent.is_some().then(Vec::new);
         (self.is_rounded, self.begun, self.last) = (is_rounded(&series), motion.time.hi, Tally::default());
         Ok(())
     }
@@ -111,9 +123,10 @@ impl Shadow {
                 tangent => tangent,
             },
         };
+        course.jumps = tangent.is_some().then(Vec::new);
         let is_rounded = is_rounded(&outcome.plan);
         let motion = course.motion();
-        Ok(Some(Self { course, outcome, motion, tangent, is_rounded, begun, last }))
+        Ok(Some(Self { course, outcome, motion, tangent, no_growth: None, is_rounded, begun, last }))
     }
 
     /// Its plan.
@@ -149,7 +162,7 @@ impl Shadow {
             let steps = if self.is_rounded { self.last.steps } else { 0 };
             if let Some(tangent) = &mut self.tangent {
                 tangent.take(&self.motion, steps);
-                *purse.spent += 0.5 * tangent.evaluations() as f64 * purse.prices.evaluation;
+                *purse.spent += tangent.evaluations() as f64 * purse.prices.evaluation;
             }
         }
         self.march(until, purse)
@@ -170,6 +183,9 @@ impl Shadow {
             return Err(None);
         }
         self.course.look(&mut self.motion);
+        if let (Some(tangent), Some(jumps)) = (&mut self.tangent, &mut self.course.jumps) {
+            tangent.jump(&std::mem::take(jumps));
+        }
         let tally = self.course.tally();
         *purse.spent += (tally.evaluations - self.last.evaluations) as f64 * each + purse.prices.look;
         self.last = tally;

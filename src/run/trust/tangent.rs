@@ -1,201 +1,211 @@
 //! The tangent flow along a motion: how small differences grow.
 //!
 //! ```text
-//! V' = (dq', dw') = (dw, da),    da = A_q dq + A_w dw        columns of V marched by the classical Runge–Kutta method
-//! Phi(t + h, t) = V with V(t) = 1,    Phi(t, 0) = product of these
+//! V' = (dq', dw') = (dw, da),    da = A_q dq + A_w dw        columns of V expanded beside the motion on dual numbers (module `beside`)
+//! G dq = 0,  (G w + C_t)' (dq, dw) = 0                       kept after every step (module `ground`)
+//! Phi(t, 0) = product of the steps' matrices                 through impacts by the saltation matrix (module `impact`)
 //! P <- Phi (P + Q_a) Phiᵀ + Q_b                              covariance of what rounding left
+//! s <- Phi s + h (σ a)                                       what a relative change of every force by 1, of random sign, and of the start comes to
 //! ```
 //!
-//! The motion is known at the beginning, middle and end of each step h, whatever made it; h follows the steepest pull J met in a step, `h sqrt(J) = 0.45`.  Few
-//! coordinates carry the whole matrix, with da by the Jacobian; more of them two vectors, whose growth stands for that of the matrix, with da by differences,
-//! (a(q + e dq, w + e dw) - a(q, w)) / e.
+//! The motion is that of the companion at the flow's own times, the ends of its steps.  Up to three coordinates that nothing ties carry the whole matrix,
+//! few degrees of freedom a basis of the directions tangent to the constraints, more of them vectors of random directions, whose growth stands for that of the matrix.
+//!
+//! Where neighbours do not go the same way there is no such flow: where a wall is grazed, and in singular positions.  From there on it is absent.
 
+mod beside;
+mod gauss;
+mod ground;
+mod impact;
+mod record;
+mod rounding;
+mod start;
+
+use self::beside::Beside;
+use self::gauss::Gauss;
+use self::ground::Ground;
+use self::start::{Dice, unit};
 use super::Ruler;
-use crate::dynamics::kernel::Kernel;
+use crate::dynamics::schur::NEAR;
 use crate::dynamics::{Coordinates, Mechanism, Motion, State, Time};
 use crate::run::march::{Problem, tangent_form};
-use crate::stabilization::projection::project;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Coordinates up to which the whole matrix is carried.
 const WHOLE: usize = 3;
-/// Vectors carried for more of them.
-const VECTORS: usize = 2;
-/// Step over the fastest rate, squared rates being the entries of da/dq: beside runs, and where the whole matrix is asked for.
-const REACH: [f64; 2] = [0.45, 0.3];
-/// The difference taken, relative to 1 rad and the fastest rate.
-const DIFFERENCE: f64 = 1e-7;
+/// Vectors carried for more of them, and directions of changed inputs.
+const VECTORS: usize = 4;
+const INPUTS: [usize; 2] = [4, 2];
+/// The longest step over the slowest of the rates it is measured by.
+const LONGEST: f64 = 10.0;
 /// Of half a unit in the last place of 1, what a step of the series leaves: its state is a pair, and so are its constants.
 const ROUNDED: f64 = 0.1 * 1.1e-16;
-/// Times at which the growth is kept.
-const KEPT: usize = 256;
-/// Growth \[ln\] within the second half of the time from which on a motion counts as chaotic; a regular one's is that of a power of the time.
-const CHAOTIC: f64 = 4.0;
-/// Blocks the uncertainty of the exponent is taken from.
-const BLOCKS: usize = 8;
+/// The shortest step, over the time of the fastest rate.
+const SHORTEST: f64 = 1e-7;
 
 /// The flow, on the way.
 pub struct Tangent {
+    /// The mechanism with the contacts held at the moment, and its unknowns.
+    mechanism: Arc<Mechanism>,
     problem: Box<dyn Problem>,
+    coordinates: Coordinates,
     weights: Vec<f64>,
+    series: Vec<(usize, Box<dyn Beside>)>,
+    gauss: Gauss,
+    ground: Option<Ground>,
+    /// The columns the series are of.
+    seeds: Vec<Vec<f64>>,
+    rates: Vec<f64>,
     path: Path,
-    /// Rate at the beginning of the step, in its middle, and at its end.
-    rates: [Vec<f64>; 3],
-    scratch: Scratch,
-}
-
-/// Room for a step.
-#[derive(Default)]
-struct Scratch {
-    /// A point beside another, and the rate there.
-    moved: Vec<f64>,
-    beside: Vec<f64>,
-    from: Vec<f64>,
-    slopes: [Vec<f64>; 4],
-    /// Columns of the step's own matrix.
-    step: Vec<Vec<f64>>,
-    half: Vec<f64>,
-    /// dy'/dy at the beginning of the step, in its middle, and at its end (d × d each); and whether the first one is there.
-    jacobians: [Vec<f64>; 3],
-    knows_first: bool,
 }
 
 /// All that what follows depends on.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Path {
-    /// Beginning of the step under way \[s\], its length, and the unknowns there and in its middle.
-    time: f64,
+    /// The beginning of the step under way, its length \[s\], and the contacts held.
+    state: State,
     step: f64,
-    start: Vec<f64>,
-    middle: Vec<f64>,
-    /// About the fastest rate \[rad/s\]: what rates are divided by to be compared with angles; and the step over it.
+    held: Vec<usize>,
+    /// Degrees of freedom at the start.
+    freedom: usize,
+    /// About the fastest rate \[rad/s\]: what rates are divided by to be compared with angles.
     rate: f64,
-    span: f64,
     /// Columns of Phi(t, 0) over exp(log), those of rates times `rate`; or the vectors.
     columns: Vec<Vec<f64>>,
     log: f64,
-    /// Covariance of rounding, row by row; empty where there is no matrix.
+    /// True where the columns are those of the whole matrix, and where the step's own comes from Jacobians (module `gauss`).
+    is_whole: bool,
+    is_plain: bool,
+    /// Unknowns inside the step, where Jacobians are asked for.
+    nodes: Vec<Vec<f64>>,
+    /// What changed inputs come to, over exp(input_log).
+    inputs: Vec<Vec<f64>>,
+    input_log: f64,
+    /// Covariance of rounding, row by row; where there is no matrix, one variance.
     covariance: Vec<f64>,
     steps: u64,
-    /// Times and the logarithm of the growth, thinned out.
-    growth: Vec<[f64; 2]>,
+    /// Times, the logarithm of the growth, and that of what changed inputs came to at most, thinned out.
+    growth: Vec<[f64; 3]>,
     stride: u64,
     seen: u64,
-    /// The largest norm of the rows of positions of Phi so far.
     reach: f64,
+    /// Why the flow ended.
+    lost: Option<String>,
 }
 
 impl Tangent {
-    /// The flow from a motion; `None` for mechanisms with walls, and those too large for matrices.
-    pub fn new(mechanism: &Arc<Mechanism>, motion: &Motion, until: f64) -> Option<Self> {
-        Self::of(mechanism, motion, until, WHOLE, REACH[0])
+    /// The flow from a motion of a mechanism with the contacts held there.
+    ///
+    /// # Errors
+    /// Why there is none: all is driven, or the matrices would be too large.
+    pub fn new(mechanism: &Arc<Mechanism>, motion: &Motion, until: f64) -> Result<Self, String> {
+        Self::of(mechanism, motion, until, false)
     }
 
-    /// The same with the whole matrix to two digits and more, whatever that costs.
-    pub fn whole(mechanism: &Arc<Mechanism>, motion: &Motion, until: f64) -> Option<Self> {
-        Self::of(mechanism, motion, until, usize::MAX, REACH[1])
+    /// The same with the whole matrix, and by the series, whatever that costs.
+    ///
+    /// # Errors
+    /// See [`Tangent::new`].
+    pub fn whole(mechanism: &Arc<Mechanism>, motion: &Motion, until: f64) -> Result<Self, String> {
+        Self::of(mechanism, motion, until, true)
     }
 
-    fn of(mechanism: &Arc<Mechanism>, motion: &Motion, until: f64, whole: usize, span: f64) -> Option<Self> {
+    fn of(mechanism: &Arc<Mechanism>, motion: &Motion, until: f64, is_exact: bool) -> Result<Self, String> {
         let mut tangent = Self::bare(mechanism)?;
         let f = tangent.weights.len();
         let state = tangent.problem.state(motion);
-        let time = motion.time.hi;
-        tangent.problem.rate(motion.time, &state.y, &mut tangent.rates[0]);
-        tangent.path.rate = 1.0;
-        let mut most = 0.0_f64;
-        let mut found = vec![0.0; 2 * f];
-        for j in 0..f {
-            let column: Vec<f64> = (0..2 * f).map(|i| f64::from(i == j)).collect();
-            tangent.derivative(0, motion.time, &state.y, &column, &mut found);
-            // Positions count over the mechanism's size, as they do in the estimate.
-            most = (0..f).fold(most, |most, i| most.max((found[f + i] * tangent.weights[i] / tangent.weights[j]).abs()));
+        let rows = tangent.ground.as_mut().map_or(0, |ground| ground.stand(mechanism, &state));
+        let freedom = f.saturating_sub(rows);
+        if freedom == 0 {
+            return Err("the motors leave no freedom: neighbouring motions are the same".into());
         }
-        // At the start there may be no force to be felt yet.
-        let rates = state.y[f..2 * f].iter().zip(&tangent.weights);
-        let turning = rates.fold(0.0, |most: f64, (rate, weight)| most.max((rate * weight).abs()));
-        let rate = most.sqrt().max(turning).max(mechanism.tree.fastest_rate(&[])).max(10.0 / until.max(f64::MIN_POSITIVE));
-        let columns = if mechanism.has_multipliers() {
-            (0..VECTORS).map(|k| tangent.slide(mechanism, &state, k, rate)).collect()
-        } else if f > whole {
-            (0..VECTORS).map(|k| scattered(2 * f, k)).map(|column| scaled(column, f, rate)).collect()
-        } else {
-            (0..2 * f).map(|j| unit(j, f, rate)).collect::<Vec<_>>()
+        let is_whole = (is_exact || f <= WHOLE) && tangent.ground.is_none() && mechanism.contacts.is_empty();
+        let is_plain = is_whole && !is_exact && mechanism.rows.is_empty() && !mechanism.is_forced() && gauss::is_slow(mechanism);
+        let count = if is_whole || freedom <= WHOLE { 2 * freedom } else { VECTORS };
+        tangent.path = Path { freedom, is_whole, is_plain, held: mechanism.held.clone(), stride: 1, state, ..Path::default() };
+        tangent.path.rate = tangent.fastest(until);
+        tangent.path.covariance = vec![0.0; if is_whole { 4 * f * f } else { 1 }];
+        let mut dice = Dice(1);
+        tangent.path.columns = match is_whole {
+            true => (0..2 * f).map(|j| unit(j, f, tangent.path.rate)).collect(),
+            false => tangent.basis(count, &mut dice),
         };
-        let covariance = if columns.len() == 2 * f { vec![0.0; 4 * f * f] } else { Vec::new() };
-        tangent.path = Path {
-            time,
-            step: (span / rate).min(until / 16.0),
-            span,
-            start: state.y,
-            middle: Vec::new(),
-            rate,
-            columns,
-            log: 0.0,
-            covariance,
-            steps: 0,
-            growth: vec![[time, 0.0]],
-            stride: 1,
-            seen: 0,
-            reach: 0.0,
-        };
-        let norm = tangent.norm();
-        tangent.path.columns.iter_mut().flatten().for_each(|entry| *entry /= norm);
-        tangent.path.log = libm::log(norm);
-        tangent.path.growth[0][1] = tangent.path.log;
-        Some(tangent)
+        tangent.path.inputs = tangent.changes(INPUTS[usize::from(!is_whole)], &mut dice);
+        // Vectors stand for as many as there are directions.
+        tangent.path.log = 0.5 * libm::log(2.0 * freedom as f64 / count as f64);
+        tangent.make_room();
+        tangent.normalise();
+        tangent.path.growth = vec![[tangent.path.state.time.hi, tangent.path.log, f64::NEG_INFINITY]];
+        tangent.path.step = 0.1 / tangent.path.rate;
+        tangent.evaluate();
+        tangent.prepare();
+        Ok(tangent)
     }
 
     /// Without a path.
-    fn bare(mechanism: &Arc<Mechanism>) -> Option<Self> {
-        if !mechanism.contacts.is_empty() || !mechanism.tree.is_dense() {
-            return None;
+    fn bare(mechanism: &Arc<Mechanism>) -> Result<Self, String> {
+        if !mechanism.tree.is_dense() {
+            return Err("a series takes the matrices of the tree, which are too large here".into());
         }
         let problem = tangent_form(mechanism);
         let ruler = Ruler::new(mechanism);
-        let weights: Vec<f64> = match problem.coordinates() {
+        let coordinates = problem.coordinates();
+        let weights: Vec<f64> = match coordinates {
             Coordinates::Independent => mechanism.ties.independent.iter().map(|&k| ruler.weight(k)).collect(),
             _ => (0..mechanism.coordinates()).map(|k| ruler.weight(k)).collect(),
         };
-        let rates = std::array::from_fn(|_| vec![0.0; problem.dimension()]);
-        let path = Path {
-            time: 0.0,
-            step: 0.0,
-            start: Vec::new(),
-            middle: Vec::new(),
-            rate: 1.0,
-            span: REACH[0],
-            columns: Vec::new(),
-            log: 0.0,
-            covariance: Vec::new(),
-            steps: 0,
-            growth: Vec::new(),
-            stride: 1,
-            seen: 0,
-            reach: 0.0,
-        };
-        let room = || vec![0.0; 2 * weights.len()];
-        let scratch =
-            Scratch { beside: vec![0.0; problem.dimension()], from: room(), slopes: std::array::from_fn(|_| room()), ..Scratch::default() };
-        (!weights.is_empty()).then(|| Self { rates, scratch, weights, problem, path })
+        if weights.is_empty() {
+            return Err("the motors leave no freedom: neighbouring motions are the same".into());
+        }
+        let rates = vec![0.0; problem.dimension()];
+        let ground = (coordinates == Coordinates::All && !mechanism.rows.is_empty()).then(|| Ground::new(mechanism));
+        let mechanism = Arc::clone(mechanism);
+        Ok(Self {
+            mechanism,
+            problem,
+            coordinates,
+            weights,
+            series: Vec::new(),
+            gauss: Gauss::new(),
+            ground,
+            seeds: Vec::new(),
+            rates,
+            path: Path::default(),
+        })
     }
 
-    /// Goes on from a path; `None` where it cannot be one of this mechanism.
+    /// Goes on from a path; `None` where it cannot be one of this mechanism, which is given without holds.
     pub(super) fn resume(mechanism: &Arc<Mechanism>, path: Path) -> Option<Self> {
-        let tangent = Self::bare(mechanism)?;
+        let is_known = |&contact: &usize| contact < mechanism.contacts.len();
+        if !path.held.iter().all(is_known) {
+            return None;
+        }
+        let holding = if path.held.is_empty() { Arc::clone(mechanism) } else { Arc::new(mechanism.holding(&path.held)) };
+        let mut tangent = Self::bare(&holding).ok()?;
         let (f, dimension) = (tangent.weights.len(), tangent.problem.dimension());
         let count = path.columns.len();
-        let fits = path.start.len() == dimension
-            && (path.middle.is_empty() || path.middle.len() == dimension)
+        let fits = path.state.y.len() == dimension
+            && path.state.low.len() == dimension
             && count > 0
-            && path.columns.iter().all(|column| column.len() == 2 * f)
-            && path.covariance.len() == if count == 2 * f { 4 * f * f } else { 0 }
-            && path.step > 0.0
-            && path.span > 0.0
+            && path.columns.iter().chain(&path.inputs).all(|column| column.len() == 2 * f)
+            && (!path.is_whole || count == 2 * f && tangent.ground.is_none())
+            && path.covariance.len() == if path.is_whole { 4 * f * f } else { 1 }
+            && path.nodes.len() < gauss::STAGES
+            && path.nodes.iter().all(|node| node.len() == dimension)
+            && (!path.is_plain || path.is_whole && path.step > 0.0)
             && path.stride > 0
             && !path.growth.is_empty();
-        fits.then_some(Self { path, ..tangent })
+        if !fits {
+            return None;
+        }
+        tangent.path = path;
+        tangent.make_room();
+        tangent.evaluate();
+        if tangent.path.lost.is_none() {
+            tangent.prepare();
+        }
+        Some(tangent)
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -204,317 +214,221 @@ impl Tangent {
 
     /// The next time \[s\] at which it asks for the motion.
     pub fn next(&self) -> f64 {
-        let Path { time, step, middle, .. } = &self.path;
-        time + if middle.is_empty() { 0.5 * step } else { *step }
+        let Path { state, step, nodes, is_plain, .. } = &self.path;
+        let share = if *is_plain { self.gauss.nodes.get(nodes.len()).copied().unwrap_or(1.0) } else { 1.0 };
+        (state.time + share * step).hi
+    }
+
+    /// The same, or `until`, where that comes before: the flow of a plain mechanism has no shorter steps than those under way.
+    pub(super) fn next_within(&mut self, until: f64) -> f64 {
+        let Path { state, step, nodes, is_plain, .. } = &mut self.path;
+        if *is_plain && nodes.is_empty() {
+            *step = step.min((Time::from(until) - state.time).hi);
+        }
+        self.next().min(until)
+    }
+
+    /// Why the flow has ended, where it has.
+    pub fn lost(&self) -> Option<&str> {
+        self.path.lost.as_deref()
     }
 
     /// Takes the motion at [`Tangent::next`], to which `steps` steps in doubles have led so far (none where their rounding does not count).
     pub fn take(&mut self, motion: &Motion, steps: u64) {
-        let State { y, .. } = self.problem.state(motion);
-        if self.path.middle.is_empty() {
-            self.path.middle = y;
-        } else {
-            self.step(y, steps);
+        let state = self.problem.state(motion);
+        if self.path.is_plain {
+            self.path.nodes.push(state.y.clone());
+            if self.path.nodes.len() < gauss::STAGES {
+                return;
+            }
+        }
+        let taken = steps.saturating_sub(self.path.steps) as f64;
+        self.path.steps = steps;
+        match self.path.is_plain {
+            // The last node is near enough to the end for what else is asked of it.
+            true => self.step(self.path.step, State { time: self.path.state.time + self.path.step, ..state }, taken),
+            false => self.advance(motion.time, Some(state), taken),
         }
     }
 
-    /// True where the whole matrix is carried.
-    fn is_whole(&self) -> bool {
-        self.path.columns.len() == 2 * self.weights.len()
+    /// Unknowns' rates at the beginning of the step.
+    fn evaluate(&mut self) {
+        let Self { problem, rates, path, .. } = self;
+        problem.rate(path.state.time, &path.state.y, rates);
     }
 
-    /// What a step costs in evaluations of the equations, about; of a Jacobian four columns come to five.
+    /// What taking a motion costs in evaluations of the equations, about; of a Jacobian four columns come to five.
     pub fn evaluations(&self) -> u64 {
-        let columns = self.path.columns.len() as u64;
-        if self.is_whole() { 1 + 10 * columns.div_ceil(4) } else { 3 + 4 * columns }
+        if self.path.is_plain {
+            return 1 + 5 * self.path.columns.len().div_ceil(4) as u64;
+        }
+        // Of the prices of `budget`: the series at this order, and the columns beside it, which are worked on by vectors.
+        let (n, rows) = (self.mechanism.coordinates() as f64, self.mechanism.rows.len() as f64);
+        let forces = (self.mechanism.springs.len() + self.mechanism.torsions.len() + self.mechanism.actions.len()) as f64;
+        let series = 700.0 + 400.0 * n + 150.0 * n * n + 700.0 * (rows + forces);
+        let evaluation = 15.0 + 20.0 * n + 4.0 * n * n + 60.0 * rows + 20.0 * forces;
+        (0.35 * series * (1.0 + 0.75 * self.seeds.len() as f64) / evaluation) as u64
     }
 
-    /// Phi(t, 0) column by column, in unknowns as they are \[rad, rad/s\]; of two vectors only, where there is no matrix.
+    /// Phi(t, 0) column by column, in all coordinates and rates as they are \[rad, m, rad/s, m/s\]; of a basis or of vectors only, where there is no matrix.
     pub fn columns(&self) -> Vec<Vec<f64>> {
         let f = self.weights.len();
         let grown = libm::exp(self.path.log);
-        let is_whole = self.is_whole();
-        let size = |j: usize| if is_whole && j >= f { grown / self.path.rate } else { grown };
-        self.path.columns.iter().enumerate().map(|(j, column)| column.iter().map(|entry| entry * size(j)).collect()).collect()
+        let size = |j: usize| if self.path.is_whole && j >= f { grown / self.path.rate } else { grown };
+        let scaled = |(j, column): (usize, &Vec<f64>)| self.spread(column).into_iter().map(|entry| entry * size(j)).collect();
+        self.path.columns.iter().enumerate().map(scaled).collect()
     }
 
-    /// Standard deviation of the largest coordinate that rounding has left \[rad\]; zero where there is no matrix to tell it.
-    pub fn rounding(&self) -> f64 {
-        let (f, covariance) = (self.weights.len(), &self.path.covariance);
-        let deviation = |i: usize| covariance[i * 2 * f + i].sqrt() * self.weights[i];
-        if covariance.is_empty() { 0.0 } else { (0..f).map(deviation).fold(0.0, f64::max) }
-    }
-
-    /// What a change of 1 in every constant and start comes to in a position, about: the largest norm of the rows of positions of Phi(t, 0) so far.
-    pub fn reach(&self) -> f64 {
-        self.path.reach
-    }
-
-    /// Natural logarithm of the growth so far.
-    pub fn growth(&self) -> f64 {
-        self.path.log
-    }
-
-    /// The time reached \[s\], and the natural logarithm of the growth there.
-    pub(super) fn now(&self) -> [f64; 2] {
-        [self.path.time, self.path.log]
-    }
-
-    /// Growth \[ln\] against time, thinned out; the last one is that of now.
-    pub(super) fn history(&self) -> Vec<[f64; 2]> {
-        let mut history = self.path.growth.clone();
-        if history.last().is_some_and(|last| last[0] < self.path.time) {
-            history.push(self.now());
-        }
-        history
-    }
-
-    /// V' in `found`: `at` 0…2 says which of the rates and Jacobians kept belongs to (t, y).
-    fn derivative(&mut self, at: usize, t: Time, y: &[f64], column: &[f64], found: &mut [f64]) {
-        let f = self.weights.len();
-        found[..f].copy_from_slice(&column[f..2 * f]);
-        if self.is_whole() {
-            let rows = self.scratch.jacobians[at].chunks_exact(y.len()).skip(f);
-            for (found, row) in found[f..].iter_mut().zip(rows) {
-                *found = row.iter().zip(column).fold(0.0, |sum, (slope, entry)| sum + slope * entry);
-            }
+    /// Room for the series of all columns.
+    fn make_room(&mut self) {
+        let Path { columns, inputs, is_whole, .. } = &self.path;
+        let count = if *is_whole { columns.len() } else { columns.len() + inputs.len() };
+        self.seeds = vec![vec![0.0; 2 * self.weights.len()]; count];
+        if self.path.is_plain {
             return;
         }
-        let largest = (0..f).fold(0.0, |most: f64, i| {
-            most.max(column[i].abs() * self.weights[i]).max(column[f + i].abs() * self.weights[i] / self.path.rate)
-        });
-        if largest == 0.0 || !largest.is_finite() {
-            found.fill(if largest == 0.0 { 0.0 } else { f64::NAN });
+        self.series = beside::room(&self.mechanism, self.coordinates, count);
+    }
+
+    /// Expands the columns about the present state, and chooses the step.
+    fn prepare(&mut self) {
+        if self.path.is_plain {
             return;
         }
-        let small = DIFFERENCE / largest;
-        let Self { scratch: Scratch { moved, beside, .. }, rates, problem, .. } = self;
-        moved.clear();
-        moved.extend_from_slice(y);
-        for i in 0..2 * f {
-            moved[i] += small * column[i];
+        let Self { path, seeds, mechanism, weights, .. } = self;
+        let f = weights.len();
+        for (j, seed) in seeds.iter_mut().enumerate() {
+            match path.is_whole {
+                true => seed.copy_from_slice(&unit(j, f, path.rate)),
+                false => seed.copy_from_slice(path.columns.get(j).unwrap_or_else(|| &path.inputs[j - path.columns.len()])),
+            }
         }
-        problem.rate(t, moved, beside);
-        for i in f..2 * f {
-            found[i] = (beside[i] - rates[at][i]) / small;
+        let (mut reach, mut is_near, mut rest) = (LONGEST / path.rate, false, &seeds[..]);
+        for (count, series) in &mut self.series {
+            let (now, later) = rest.split_at(*count);
+            series.expand(mechanism, &path.state, now);
+            is_near = self.ground.is_some() && series.weakest() < NEAR;
+            let here = series.reach(weights, is_near);
+            reach = if here.is_nan() || reach.is_nan() { f64::NAN } else { reach.min(here) };
+            rest = later;
+        }
+        path.step = reach;
+        if reach.is_nan() || reach * self.path.rate < SHORTEST {
+            self.lose(match is_near {
+                true => "a singular position is too near to tell which way neighbouring motions go",
+                false => "small differences are beyond all numbers",
+            });
         }
     }
 
-    /// What [`Tangent::derivative`] asks for at the three points of a step.
-    fn prepare(&mut self, times: [Time; 3], points: &[Vec<f64>; 3]) {
-        let is_whole = self.is_whole();
-        let Self { problem, rates, scratch: Scratch { jacobians, knows_first, .. }, .. } = self;
-        problem.rate(times[0], &points[0], &mut rates[0]);
-        if !is_whole {
-            (1..3).for_each(|k| problem.rate(times[k], &points[k], &mut rates[k]));
-            return;
-        }
-        jacobians.swap(0, 2);
-        for k in usize::from(*knows_first)..3 {
-            jacobians[k].resize(points[k].len() * points[k].len(), 0.0);
-            problem.jacobian(times[k], &points[k], &mut jacobians[k]);
-        }
-        *knows_first = true;
+    /// The flow ends at the present time.
+    fn lose(&mut self, why: &str) {
+        self.path.step = f64::INFINITY;
+        self.path.lost = Some(format!("{why}, at t = {} s", self.path.state.time.hi));
     }
 
-    /// A step that ends with the unknowns `end`.
-    fn step(&mut self, end: Vec<f64>, steps: u64) {
-        let f = self.weights.len();
-        let (h, t) = (self.path.step, self.path.time);
-        let times = [t, t + 0.5 * h, t + h].map(Time::from);
-        let points = [std::mem::take(&mut self.path.start), std::mem::take(&mut self.path.middle), end];
-        self.prepare(times, &points);
-        let is_whole = self.is_whole();
-        let rate = self.path.rate;
-        let mut steepest = 0.0_f64;
-        let size = |column: &[f64]| column.iter().fold(0.0, |most: f64, entry| most.max(entry.abs()));
-        let mut moved = std::mem::take(&mut self.scratch.step);
-        moved.resize_with(self.path.columns.len(), || vec![0.0; 2 * f]);
-        let (mut from, mut slopes) = (std::mem::take(&mut self.scratch.from), std::mem::take(&mut self.scratch.slopes));
-        for (j, column) in moved.iter_mut().enumerate() {
-            if is_whole {
-                column.fill(0.0);
-                column[j] = if j < f { 1.0 } else { rate };
-            } else {
-                column.copy_from_slice(&self.path.columns[j]);
+    /// On to a time at which the state is known, or follows from the series.
+    fn advance(&mut self, until: Time, mut arrived: Option<State>, taken: f64) {
+        while self.path.lost.is_none() {
+            let left = (until - self.path.state.time).hi;
+            if left <= 0.0 {
+                break;
             }
-            from.copy_from_slice(column);
-            for (k, (point, ahead)) in [(0, 0.0), (1, 0.5 * h), (1, 0.5 * h), (2, h)].into_iter().enumerate() {
-                let (before, rest) = slopes.split_at_mut(k);
-                if let Some(before) = before.last() {
-                    for i in 0..2 * f {
-                        column[i] = from[i] + ahead * before[i];
-                    }
-                }
-                self.derivative(point, times[point], &points[point], column, &mut rest[0]);
-                steepest = steepest.max(size(&rest[0][f..]) / size(&column[..f]).max(size(&column[f..]) / rate));
+            let is_last = self.path.step >= left * (1.0 - 1e-9);
+            let h = if is_last { left } else { self.path.step };
+            let mut state = self.path.state.clone();
+            match arrived.take_if(|_| is_last) {
+                Some(arrived) => state = arrived,
+                None => self.series[0].1.carry(h, &mut state),
             }
-            for i in 0..2 * f {
-                column[i] = from[i] + h / 6.0 * (slopes[0][i] + 2.0 * (slopes[1][i] + slopes[2][i]) + slopes[3][i]);
+            if is_last {
+                state.time = until;
             }
+            self.step(h, state, taken * h / left);
         }
-        (self.scratch.from, self.scratch.slopes) = (from, slopes);
-        let taken = steps.saturating_sub(self.path.steps) as f64;
-        self.path.steps = steps;
-        if is_whole {
-            self.round(&moved, &points[0][f..2 * f], h, taken);
-            self.multiply(&moved);
+    }
+
+    /// A step that ends in a state.
+    fn step(&mut self, h: f64, state: State, taken: f64) {
+        let mut rest = &mut self.seeds[..];
+        for (count, series) in &self.series {
+            let (now, later) = rest.split_at_mut(*count);
+            series.go(h, now);
+            rest = later;
+        }
+        if self.path.is_plain && !self.collocate(h) {
+            return self.lose("small differences are beyond all numbers");
+        }
+        if self.path.is_whole {
+            self.round(h, taken);
+            self.multiply();
         } else {
-            std::mem::swap(&mut self.path.columns, &mut moved);
+            let before = self.norm(&self.path.columns);
+            for (column, seed) in self.path.columns.iter_mut().chain(&mut self.path.inputs).zip(&self.seeds) {
+                column.copy_from_slice(seed);
+            }
+            self.scatter(h, taken, before);
         }
-        self.scratch.step = moved;
-        let norm = self.norm();
-        self.path.columns.iter_mut().flatten().for_each(|entry| *entry /= norm);
-        self.path.log += libm::log(norm);
-        let [_, _, end] = points;
-        self.path.start = end;
-        self.path.time = t + h;
-        let wanted = self.path.span / steepest.sqrt();
-        self.path.step = if wanted.is_nan() { h } else { wanted.clamp(0.5 * h, 2.0 * h).min(2.0 * self.path.span / rate) };
+        self.path.state = state;
         self.keep();
+        self.evaluate();
+        self.kick(h);
+        if self.normalise() {
+            self.record();
+            self.prepare();
+        }
+    }
+
+    /// The step's own matrix from the Jacobians at its nodes, and the next step.
+    fn collocate(&mut self, h: f64) -> bool {
+        let f = self.weights.len();
+        let Self { problem, path, seeds, weights, gauss, .. } = self;
+        let (mut reach, mut jacobian, mut pull) = (0.0, Vec::new(), Vec::new());
+        for (y, share) in path.nodes.drain(..).zip(&gauss.nodes) {
+            jacobian.resize(y.len() * y.len(), 0.0);
+            problem.jacobian(path.state.time + *share * h, &y, &mut jacobian);
+            pull.push(jacobian.chunks_exact(y.len()).skip(f).take(f).flat_map(|row| &row[..2 * f]).copied().collect::<Vec<f64>>());
+            reach = pull.last().map_or(0.0, |pull| gauss::reach(f, weights, pull, &y[f..]));
+        }
+        path.step = reach.clamp(0.5 * h, 2.0 * h).min(LONGEST / path.rate);
+        pull.len() == gauss::STAGES && gauss.step(f, h, path.rate, &pull, seeds)
+    }
+
+    /// Puts the columns back onto the constraints.
+    fn keep(&mut self) {
+        let Self { mechanism, ground: Some(ground), path: Path { state, columns, inputs, .. }, .. } = self else { return };
+        ground.stand(mechanism, state);
+        ground.keep(mechanism, state, columns.iter_mut().chain(inputs));
+    }
+
+    /// What changed forces have done in a step.
+    fn kick(&mut self, h: f64) {
+        let f = self.weights.len();
+        let Self { rates, path, .. } = self;
+        let size = h * libm::exp(-path.input_log);
+        for (k, column) in path.inputs.iter_mut().enumerate() {
+            let mut dice = Dice(k as u64 + 100);
+            for i in 0..f {
+                column[f + i] += dice.sign() * size * rates[f + i];
+            }
+        }
+        let Self { mechanism, ground: Some(ground), path: Path { state, inputs, .. }, .. } = self else { return };
+        ground.keep(mechanism, state, inputs.iter_mut());
     }
 
     /// Phi(t, 0) after a step, from Phi of the step.
-    fn multiply(&mut self, step: &[Vec<f64>]) {
+    fn multiply(&mut self) {
         let f = self.weights.len();
-        let rate = self.path.rate;
-        let from = &mut self.scratch.from;
-        for column in &mut self.path.columns {
-            from.copy_from_slice(column);
-            column.fill(0.0);
-            for (j, part) in step.iter().enumerate() {
+        let Self { path: Path { columns, inputs, rate, .. }, seeds, .. } = self;
+        for column in columns.iter_mut().chain(inputs) {
+            let from = std::mem::replace(column, vec![0.0; 2 * f]);
+            for (j, part) in seeds.iter().enumerate() {
                 // Columns of rates are those of `rate` times 1.
-                let share = if j < f { from[j] } else { from[j] / rate };
+                let share = if j < f { from[j] } else { from[j] / *rate };
                 for i in 0..2 * f {
                     column[i] += share * part[i];
                 }
             }
         }
     }
-
-    /// The covariance after a step of `h` \[s\], in which the series took `taken` steps.
-    fn round(&mut self, step: &[Vec<f64>], v: &[f64], h: f64, taken: f64) {
-        let f = self.weights.len();
-        let n = 2 * f;
-        let rate = self.path.rate;
-        let phi = |i: usize, j: usize| if j < f { step[j][i] } else { step[j][i] / rate };
-        let mut before = std::mem::take(&mut self.path.covariance);
-        for i in 0..f {
-            before[i * n + i] += taken * (0.35 * ROUNDED).powi(2);
-        }
-        let half = &mut self.scratch.half;
-        half.resize(n * n, 0.0);
-        for i in 0..n {
-            for j in 0..n {
-                half[i * n + j] = (0..n).map(|k| phi(i, k) * before[k * n + j]).sum();
-            }
-        }
-        for i in 0..n {
-            for j in 0..n {
-                before[i * n + j] = (0..n).map(|k| half[i * n + k] * phi(j, k)).sum();
-            }
-        }
-        // Of the series' steps, of which there are this many in `h`.
-        let each = if taken > 0.0 { h / taken } else { 0.0 };
-        for i in 0..f {
-            let pulls: f64 = (0..f).map(|j| (phi(f + i, j) / h).abs()).sum();
-            let acceleration = self.rates[0][f + i].abs();
-            let span = each.min(2.0 / pulls.sqrt().max(f64::MIN_POSITIVE));
-            before[i * n + i] += taken * (0.175 * ROUNDED * each * v[i]).powi(2);
-            let (force, sum) = (0.035 * ROUNDED * span * (pulls + acceleration), 0.05 * ROUNDED * span * acceleration);
-            before[(f + i) * n + f + i] += taken * (force * force + sum * sum);
-        }
-        self.path.covariance = before;
-    }
-
-    /// Size of the columns: positions, and rates over the fastest one.
-    fn norm(&self) -> f64 {
-        let f = self.weights.len();
-        let Path { columns, rate, .. } = &self.path;
-        let squares = columns.iter().map(|column| {
-            (0..f).map(|i| ((column[i] * self.weights[i]).powi(2)) + (column[f + i] * self.weights[i] / rate).powi(2)).sum::<f64>()
-        });
-        squares.sum::<f64>().sqrt()
-    }
-
-    /// Keeps the growth at this time.
-    fn keep(&mut self) {
-        let f = self.weights.len();
-        let is_whole = self.is_whole();
-        let size = |j: usize, column: &Vec<f64>| {
-            let share = if is_whole && j >= f { 1.0 / self.path.rate } else { 1.0 };
-            (0..f).map(|i| (share * column[i] * self.weights[i]).powi(2)).sum::<f64>()
-        };
-        let positions = self.path.columns.iter().enumerate().map(|(j, column)| size(j, column)).sum::<f64>().sqrt();
-        self.path.reach = self.path.reach.max(positions * libm::exp(self.path.log.min(700.0)));
-        self.path.seen += 1;
-        if !self.path.seen.is_multiple_of(self.path.stride) {
-            return;
-        }
-        if self.path.growth.len() == KEPT {
-            let mut keep = false;
-            self.path.growth.retain(|_| {
-                keep = !keep;
-                keep
-            });
-            self.path.stride *= 2;
-            if !self.path.seen.is_multiple_of(self.path.stride) {
-                return;
-            }
-        }
-        self.path.growth.push([self.path.time, self.path.log]);
-    }
-
-    /// A small displacement along the rows: of a vector put back onto them.
-    fn slide(&mut self, mechanism: &Mechanism, state: &State, k: usize, rate: f64) -> Vec<f64> {
-        let f = self.weights.len();
-        let column = scaled(scattered(2 * f, k), f, rate);
-        let small = 1e-6;
-        let mut kernel = Kernel::new(mechanism);
-        let (mut moved, mut still) = (state.clone(), state.clone());
-        for i in 0..2 * f {
-            moved.y[i] += small * column[i];
-        }
-        let done = [&mut moved, &mut still].map(|state| project(mechanism, &mut kernel, state, 1e-9).is_ok());
-        if done != [true; 2] {
-            return column;
-        }
-        let slid: Vec<f64> = (0..2 * f).map(|i| (moved.unknown(i) - still.unknown(i)).hi / small).collect();
-        if slid.iter().any(|&entry| entry != 0.0) { slid } else { column }
-    }
-}
-
-/// The largest exponent \[1/s\] from the growth against time, its standard error and the time it is of \[s\]; `None` where that is the growth of a regular motion.
-pub(super) fn exponent(history: &[[f64; 2]]) -> Option<super::Lyapunov> {
-    let ([begin, first], [end, last]) = (*history.first()?, *history.last()?);
-    let at = |t: f64| {
-        let after = history.partition_point(|point| point[0] < t).clamp(1, history.len() - 1);
-        let ([t0, g0], [t1, g1]) = (history[after - 1], history[after]);
-        g0 + (g1 - g0) * ((t - t0) / (t1 - t0)).clamp(0.0, 1.0)
-    };
-    if history.len() < 2 * BLOCKS || !last.is_finite() || last - at(0.5 * (begin + end)) < CHAOTIC {
-        return None;
-    }
-    let span = (end - begin) / BLOCKS as f64;
-    let rates: Vec<f64> = (0..BLOCKS).map(|k| (at(begin + (k + 1) as f64 * span) - at(begin + k as f64 * span)) / span).collect();
-    let exponent = (last - first) / (end - begin);
-    let spread = rates.iter().map(|rate| (rate - exponent).powi(2)).sum::<f64>() / (BLOCKS - 1) as f64;
-    Some(super::Lyapunov { exponent, uncertainty: (spread / BLOCKS as f64).sqrt(), until: end })
-}
-
-/// 1 in coordinate `j`, or `rate` in a rate.
-fn unit(j: usize, f: usize, rate: f64) -> Vec<f64> {
-    let size = if j < f { 1.0 } else { rate };
-    (0..2 * f).map(|i| if i == j { size } else { 0.0 }).collect()
-}
-
-/// A vector of no particular direction.
-fn scattered(length: usize, k: usize) -> Vec<f64> {
-    (0..length).map(|i| 0.5 + (0.618_033_988_749_895 * (i + 1) as f64 + 0.414_213_562_373_095 * (k * (i + 2)) as f64).fract()).collect()
-}
-
-/// With its rates scaled.
-fn scaled(mut column: Vec<f64>, f: usize, rate: f64) -> Vec<f64> {
-    column[f..].iter_mut().for_each(|entry| *entry *= rate);
-    column
 }

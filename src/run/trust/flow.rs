@@ -1,0 +1,70 @@
+//! The tangent flow of a scene at times of one's own.
+
+use super::Tangent;
+use crate::dynamics::{Mechanism, Motion, Time};
+use crate::run::contact::Course;
+use crate::run::march::build;
+use crate::run::plan::Plan;
+use crate::run::running::Outcome;
+use std::sync::Arc;
+
+/// A motion with the small differences beside it.
+#[derive(Clone, Debug)]
+pub struct Moment {
+    /// The motion.
+    pub motion: Motion,
+    /// Differences in all coordinates and rates \[rad, m, rad/s, m/s\], those of the start carried along.
+    pub columns: Vec<Vec<f64>>,
+    /// Natural logarithm of the growth.
+    pub growth: f64,
+}
+
+/// The flow along a motion.
+#[derive(Clone, Debug)]
+pub struct Flow {
+    /// The start, after what impacts there are at it, and at the times asked for, as far as the flow goes.
+    pub moments: Vec<Moment>,
+    /// What rates are divided by to be compared with positions \[rad/s\].
+    pub rate: f64,
+    /// Steps of the flow.
+    pub steps: u64,
+    /// Why it ended before, where it did.
+    pub lost: Option<String>,
+}
+
+/// The flow along the motion that a plan makes from a start, at rising times \[s\].
+///
+/// # Errors
+/// Why there is no such flow, or no such motion.
+pub fn flow(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion, times: &[f64]) -> Result<Flow, String> {
+    let mut plan = plan.clone();
+    let mut outcome = Outcome::begun(mechanism, plan.clone());
+    let marcher = build(mechanism, &mut plan, start).map_err(|stop| stop.what)?;
+    let mut course = Course::new(Arc::clone(mechanism), marcher);
+    course.meet(&mut outcome).map_err(|stop| stop.what)?;
+    let begin = course.motion();
+    let mut tangent = Tangent::new(course.holding(), &begin, plan.until)?;
+    course.jumps = Some(Vec::new());
+    let moment = |motion: Motion, tangent: &Tangent| Moment { motion, columns: tangent.columns(), growth: tangent.growth() };
+    let mut flow = Flow { moments: vec![moment(begin, &tangent)], rate: tangent.rate(), steps: 0, lost: None };
+    for &time in times {
+        loop {
+            let next = tangent.next_within(time);
+            course.go(Time::from(next), &mut outcome, &mut || false).map_err(|stop| format!("at {} s: {}", stop.t, stop.what))?;
+            tangent.jump(&std::mem::take(course.jumps.get_or_insert_default()));
+            tangent.take(&course.motion(), 0);
+            flow.steps += 1;
+            if let Some(lost) = tangent.lost() {
+                flow.lost = Some(lost.into());
+                return Ok(flow);
+            }
+            if tangent.now()[0] >= time {
+                break;
+            }
+        }
+        // The last motion asked for may be one before the end of a step.
+        course.go(Time::from(time), &mut outcome, &mut || false).map_err(|stop| format!("at {} s: {}", stop.t, stop.what))?;
+        flow.moments.push(moment(course.motion(), &tangent));
+    }
+    Ok(flow)
+}

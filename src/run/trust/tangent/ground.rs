@@ -1,0 +1,78 @@
+//! Columns of the tangent flow kept tangent to the constraints, at both levels.
+//!
+//! ```text
+//! positions:  S x = G dq,                  dq -= M⁻¹ Gᵀ x
+//! rates:      S y = G dw + (G w + C_t)'dq,  dw -= M⁻¹ Gᵀ y           (…)'dq: along dq, on dual numbers
+//! ```
+//!
+//! The least change in the metric of the mass matrix, as in [`projection`](crate::stabilization::projection), whose derivative this is on the constraints.
+
+use crate::arithmetic::{Complex, Dual, Scalar};
+use crate::dynamics::kernel::{Kernel, dot};
+use crate::dynamics::row::Posture;
+use crate::dynamics::{Mechanism, State};
+
+type Number = Dual<1, false>;
+
+/// What columns are put back with.
+pub struct Ground {
+    kernel: Kernel<f64>,
+    phi: Vec<Number>,
+    omega: Vec<Number>,
+    z: Vec<Complex<Number>>,
+    gradient: Vec<Number>,
+}
+
+impl Ground {
+    /// For all coordinates of a mechanism.
+    pub fn new(mechanism: &Mechanism) -> Self {
+        let n = mechanism.coordinates();
+        let room = || vec![Number::ZERO; n];
+        Self { kernel: Kernel::new(mechanism), phi: room(), omega: room(), z: vec![Complex::ZERO; n], gradient: room() }
+    }
+
+    /// Takes a state on the constraints, and tells how many of them are independent there.
+    pub fn stand(&mut self, mechanism: &Mechanism, state: &State) -> usize {
+        let n = mechanism.coordinates();
+        self.kernel.linearise_at::<0>(mechanism, state.time, &state.y[..n], &state.y[n..2 * n]);
+        (0..mechanism.rows.len()).filter(|&r| !self.kernel.is_left_out(r)).count()
+    }
+
+    /// Makes columns tangent at the state taken last.
+    pub fn keep<'a>(&mut self, mechanism: &Mechanism, state: &State, columns: impl Iterator<Item = &'a mut Vec<f64>>) {
+        let n = mechanism.coordinates();
+        for column in columns {
+            for r in 0..mechanism.rows.len() {
+                self.kernel.multiplier[r] = self.kernel.fold_gradient(r, 0.0, |sum, k, g| sum + g * column[k]);
+            }
+            self.shift(&mut column[..n]);
+            self.rates(mechanism, state, column);
+            self.shift(&mut column[n..2 * n]);
+        }
+    }
+
+    /// How fast the rows part along a column, as multipliers.
+    fn rates(&mut self, mechanism: &Mechanism, state: &State, column: &[f64]) {
+        let n = mechanism.coordinates();
+        for k in 0..n {
+            self.phi[k] = Number { value: state.y[k], slope: [column[k]] };
+            self.omega[k] = Number { value: state.y[n + k], slope: [column[n + k]] };
+        }
+        mechanism.tree.face::<Number, 0>(&self.phi, &mut self.z);
+        let at = Posture { phi: &self.phi, z: &self.z, omega: &self.omega };
+        for (row, multiplier) in mechanism.rows.iter().zip(&mut self.kernel.multiplier) {
+            self.gradient.fill(Number::ZERO);
+            let here = row.linearise(state.time, at, &mut self.gradient);
+            *multiplier = (dot(&self.gradient, &self.omega) + here.drive).slope[0];
+        }
+    }
+
+    /// Takes M⁻¹ Gᵀ S⁻¹ of the multipliers off one half of a column.
+    fn shift(&mut self, half: &mut [f64]) {
+        self.kernel.solve_rows();
+        self.kernel.lift();
+        for (entry, &change) in half.iter_mut().zip(&self.kernel.load) {
+            *entry -= change;
+        }
+    }
+}
