@@ -91,8 +91,9 @@ struct Judge<'a> {
     record: &'a Record,
     ran: &'a Ran,
     allowed: f64,
-    /// What the run claims for positions.
+    /// What the run claims for positions, and for rates over their scale.
     claimed: f64,
+    claimed_rate: f64,
     worst: f64,
     found: Vec<Difference>,
 }
@@ -104,7 +105,9 @@ pub fn compare(record: &Record, ran: &Ran) -> Verdict {
     let horizon = trust.as_ref().and_then(|trust| trust.horizon).unwrap_or(f64::INFINITY);
     let error = claimed.unwrap_or(0.0);
     let error = error.max(looseness(record) / CLAIMED);
-    let mut judge = Judge { record, ran, allowed: ALLOWED.max(CLAIMED * error), claimed: error, worst: 0.0, found: Vec::new() };
+    let claimed_rate = trust.as_ref().and_then(|trust| trust.rate_error).unwrap_or(0.0) / record.scales.rate;
+    let mut judge =
+        Judge { record, ran, allowed: ALLOWED.max(CLAIMED * error), claimed: error, claimed_rate, worst: 0.0, found: Vec::new() };
     let doubt = record.doubt.as_ref().map_or(f64::INFINITY, |(t, _)| *t);
     let chaos = record
         .looks
@@ -160,13 +163,17 @@ fn looseness(record: &Record) -> f64 {
 impl Judge<'_> {
     /// Compares a number, over its scale.
     fn number(&mut self, what: impl Fn() -> String, t: f64, run: f64, auditor: f64, scale: f64) {
-        self.response(what, t, [run, auditor], scale, 1.0);
+        self.within(what, t, [run, auditor], scale, self.allowed);
     }
 
-    /// The same for a quantity that differs so many times as much as positions do.
-    fn response(&mut self, what: impl Fn() -> String, t: f64, [run, auditor]: [f64; 2], scale: f64, response: f64) {
+    /// The same for a quantity that differs so many times as much as positions do, and as rates do where those are claimed to be worse.
+    fn response(&mut self, what: impl Fn() -> String, t: f64, pair: [f64; 2], scale: f64, response: f64) {
+        let claimed = self.claimed.max(self.claimed_rate / self.record.response.rate);
+        self.within(what, t, pair, scale, self.allowed.max(CLAIMED * claimed * response));
+    }
+
+    fn within(&mut self, what: impl Fn() -> String, t: f64, [run, auditor]: [f64; 2], scale: f64, allowed: f64) {
         let error = (run - auditor).abs() / scale;
-        let allowed = self.allowed.max(CLAIMED * self.claimed * response);
         self.worst = self.worst.max(error / allowed);
         if error.is_nan() || error > allowed {
             self.found.push(Difference { what: what(), t, run, auditor, error, allowed });
