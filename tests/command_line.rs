@@ -114,7 +114,7 @@ fn one_is_one() {
     let program = Program::with_scenes(&["free"]);
     let ran = program.run("sweep free.json --vary bar1.phi=1..1:1 --until 1 --no-charts --threads 1").exits(0);
     let ran = ran.shows(&["1 value\n", "1 point,", "on 1 thread,", "0 of 1 point,"]);
-    assert!(!ran.stdout.contains("1 points") && !ran.stdout.contains("1 values"), "{ran:?}");
+    assert!(!ran.stdout.contains(" 1 points") && !ran.stdout.contains(" 1 values"), "{ran:?}");
 }
 
 #[test]

@@ -150,8 +150,26 @@ impl Measured {
         self.seen += 1;
     }
 
+    /// Leaves out what was seen after the last output time of a run that stopped, `t` \[s\].
+    fn cut(&mut self, t: f64) {
+        self.lost = self.lost.filter(|&lost| lost <= t);
+        if self.horizon.is_some_and(|horizon| horizon > t) {
+            (self.horizon, self.beside, self.input_error) = (None, None, None);
+        }
+        if self.horizon.is_none() {
+            let before = self.record.iter().rev().find(|look| look[0] <= t);
+            let after = self.record.iter().find(|look| look[0] > t && look[1] <= HORIZON);
+            self.error = after.or(before).map_or(self.error.min(HORIZON), |look| look[1]);
+        }
+        self.record.retain(|look| look[0] <= t);
+        self.until = t;
+    }
+
     /// What it has come to at the end of the run, `t` \[s\].
-    pub(super) fn trust(self, t: f64) -> Trust {
+    pub(super) fn trust(mut self, t: f64) -> Trust {
+        if self.until > t {
+            self.cut(t);
+        }
         let Self { name, shared, until, error, mut record, horizon, lost, input_error, why, history, nature, no_growth, .. } = self;
         if record.last().is_some_and(|last| last[0] < until) {
             record.push([until, error]);
@@ -252,6 +270,19 @@ mod tests {
         assert!((found - 3.0).abs() < 1e-12);
         let found = crossing([1.0, 0.0], [3.0, 4e-3]);
         assert!((found - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_seen_after_the_last_row_is_left_out() {
+        let mut measured = Measured::new(Level::Auto, String::new(), Vec::new());
+        for (t, angle) in [(0.0, 0.0), (1.0, 1e-9), (2.0, 1e-6), (3.0, 0.2)] {
+            measured.take(t, Apart { angle, ..Apart::default() });
+        }
+        measured.lost = Some(3.0);
+        assert!(measured.clone().trust(3.0).horizon.is_some_and(|horizon| horizon > 2.0));
+        let trust = measured.trust(1.5);
+        assert_eq!((trust.horizon, trust.lost, trust.covered, trust.at), (None, None, 1.5, 1.5));
+        assert_eq!((trust.error_estimate, trust.record.last()), (Some(CAUTION * 1e-6), Some(&[1.5, 1e-6])));
     }
 
     #[test]
