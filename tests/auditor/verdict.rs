@@ -17,8 +17,8 @@ use std::sync::Arc;
 const ALLOWED: f64 = 1e-6;
 /// How many times the claimed error a difference may be.
 const CLAIMED: f64 = 10.0;
-/// How many times as much the work of `rattle2` may differ.
-const ROUGH_WORK: f64 = 100.0;
+/// The same of the imbalance of energy and work that it reports, which is measured and not estimated.
+const MEASURED: f64 = 1.2;
 /// Growth of a change of the start beyond which the auditor's own rounding would be seen.
 const MOST_GROWTH: f64 = 1e8;
 
@@ -209,10 +209,11 @@ impl Judge<'_> {
             let potential = (look.energy[1] - first.energy[1]).hi;
             let gained = sample.potential - first_sample.potential;
             self.response(|| "potential energy".into(), t, [gained, potential], scales.energy, response.energy);
-            // No estimate covers the work: what a run claims of it is its tolerance.  A known shortfall: that of the order-two method is as good as its steps.
-            let tolerance = self.ran.outcome.plan.tolerance.map_or(0.0, |tolerance| tolerance.relative);
-            let claimed = (CLAIMED * tolerance / self.allowed).max(1.0);
-            let rough = if self.ran.outcome.plan.method.info().name == "rattle2" { ROUGH_WORK } else { claimed };
+            // No estimate covers the work: what a run claims of it is its tolerance, and the imbalance of energy and work that it reports.
+            let Outcome { plan, drift, .. } = &self.ran.outcome;
+            let tolerance = plan.tolerance.map_or(0.0, |tolerance| tolerance.relative);
+            let reported = drift.energy.max * self.ran.mechanism.energy_scale / scales.energy;
+            let rough = ((CLAIMED * tolerance).max(MEASURED * reported) / self.allowed).max(1.0);
             self.response(|| "work".into(), t, [sample.work, look.state.work.hi], rough * scales.energy, response.energy);
         }
     }
