@@ -75,8 +75,7 @@ impl Shadow {
     /// # Errors
     /// Why there can be none.
     pub(super) fn new(mechanism: &Arc<Mechanism>, series: &mut Plan, start: &Motion) -> Result<Self, String> {
-        let (course, outcome) = course(mechanism, series, start)?;
-        let mut course = course;
+        let (mut course, outcome) = course(mechanism, series, start)?;
         let begun = match series.method {
             MethodId::Taylor => Tangent::new(&Arc::clone(course.holding()), &course.motion(), series.until),
             _ => Err("the companion is no series".into()),
