@@ -162,6 +162,9 @@ pub struct RunFlags {
     /// Estimate the error of the result and the time up to which it can be trusted: off, auto (50 ms, and 30 % of what the run takes without its output), full (5 s, and thirty times that, but no more evaluations than --effort)
     #[arg(long, value_name = "HOW", value_parser = levels(), default_value = Level::Auto.name(), help_heading = "Trust")]
     pub trust: Level,
+    /// Tell what the last digit of every number comes to, as it is written in the scene or in --set (0.25 is uncertain by 0.005, 670 by 0.5; 0, pi/2 and defaults are exact), in a table: two to four runs for each number
+    #[arg(long, help_heading = "Trust")]
+    pub inputs: bool,
     /// Stop with exit code 5 where the energy is off by more than this share of its scale [default: what the tolerance explains, 0.01 of the largest energy there has been at most]
     #[arg(long, value_name = "SHARE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
     pub max_energy_drift: Option<f64>,

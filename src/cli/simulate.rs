@@ -11,9 +11,11 @@ use crate::report;
 use crate::run::files::{RECORD, TRAJECTORY};
 use crate::run::scribe::Scribe;
 use crate::run::table::Table;
+use crate::run::trust::Level;
 use crate::run::{Checkpoints, Folder, Outcome, Plan, Request, ResumeError, Run, RunError, Running, Sample, Stream};
-use crate::scene::{Scene, read_text};
+use crate::scene::{Override, Scene, Template, read_text, source_name};
 use std::sync::Arc;
+use std::time::Instant;
 
 /// Every file a run may leave; those of an earlier run in the same folder go with it.
 const FILES: &[&str] =
@@ -24,6 +26,21 @@ struct Done {
     outcome: Outcome,
     folder: Folder,
     failure: Option<Failure>,
+}
+
+/// The overrides as they were typed, with all their digits; none where the command line does not show them.
+fn typed(arguments: &[String], set: &[Override]) -> Vec<String> {
+    let mut found = Vec::new();
+    let mut arguments = arguments.iter();
+    while let Some(argument) = arguments.next() {
+        match argument.strip_prefix("--set") {
+            Some("") => found.extend(arguments.next().cloned()),
+            Some(value) => found.extend(value.strip_prefix('=').map(str::to_owned)),
+            None => {}
+        }
+    }
+    let is_same = |(typed, set): (&String, &Override)| typed.parse::<Override>().as_ref() == Ok(set);
+    if found.len() == set.len() && found.iter().zip(set).all(is_same) { found } else { Vec::new() }
 }
 
 /// What is run, and what was said on the command line.
@@ -42,6 +59,10 @@ struct Task<'a> {
 /// The scene, a plan, a folder, the method or a limit; files of what was reached are kept.
 pub fn run(flags: &RunFlags, arguments: &[String]) -> Result<(), Failure> {
     interrupt::listen()?;
+    if flags.inputs && flags.trust == Level::Off {
+        let text = "--inputs with --trust off: effects are told up to the horizon, which is not estimated then\nhint: leave --trust out";
+        return Err(Failure::new(Exit::Usage, text));
+    }
     let text = read_text(&flags.scene.scene)?;
     let (scene, mechanism) = super::compile(&flags.scene, &text)?;
     // All plans stand before the first run: a pairing that is refused costs nothing.
@@ -127,7 +148,7 @@ impl Task<'_> {
         mut checkpoints: Checkpoints,
     ) -> Result<Done, Failure> {
         let marched = self.march(&mut running, &mut scribe, &folder, &mut checkpoints);
-        let done = marched.and_then(|()| self.publish(running.finish(), scribe, &mut folder));
+        let done = marched.and_then(|()| self.publish(self.with_inputs(running.finish())?, scribe, &mut folder));
         let outcome = done.map_err(|failure| {
             let is_left = checkpoints.has_any() && failure.exit != Exit::Interrupted;
             if is_left { failure.with_checkpoint(folder.path()) } else { failure }
@@ -190,6 +211,20 @@ impl Task<'_> {
         })?;
         stream.outlive();
         Ok(())
+    }
+
+    /// Adds what the digits of the scene's numbers come to, where that is asked for.
+    fn with_inputs(&self, mut outcome: Outcome) -> Result<Outcome, Failure> {
+        let flags = &self.flags.scene;
+        if let Some(trust) = outcome.trust.take_if(|_| self.flags.inputs) {
+            let template = Template::new(self.text.to_owned(), source_name(&flags.scene), &flags.set);
+            flags.remark("running neighbouring scenes, for what the digits of the numbers come to");
+            let begin = Instant::now();
+            let found = trust.with_inputs(&template, &typed(self.arguments, &flags.set), &outcome.plan, &mut interrupt::is_asked)?;
+            outcome.trust_wall += begin.elapsed();
+            outcome.trust = Some(found);
+        }
+        Ok(outcome)
     }
 
     /// Gives the trajectory its name, draws, and writes the record.

@@ -21,6 +21,7 @@ pub mod check;
 pub mod compare;
 #[cfg(feature = "charts")]
 mod curves;
+mod inputs;
 pub mod inspect;
 pub mod methods;
 pub mod page;

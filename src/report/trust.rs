@@ -37,6 +37,7 @@ pub fn object(trust: Option<&Trust>) -> Value {
         "growth_power": trust.growth_power,
         "growth_why": trust.no_growth,
         "input_error": trust.input_error,
+        "inputs": super::inputs::object(trust.inputs.as_ref()),
         "model_error": trust.model_error,
         "not_judged": trust.shared,
     })
@@ -100,7 +101,9 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
     if let Some(why) = &trust.no_growth {
         page.entry("growth", &format!("not known: {why}"));
     }
-    if let Some(error) = trust.input_error {
+    if let Some(inputs) = &trust.inputs {
+        super::inputs::describe(page, trust, inputs);
+    } else if let Some(error) = trust.input_error {
         let what = match error < 1.0 {
             true => format!("their last digit comes to about {} rad at {} s", magnitude(error), rough(trust.at)),
             false => format!("their last digit leaves no angle certain at {} s", rough(trust.at)),

@@ -127,6 +127,13 @@ impl Source {
         clipped(json.get(span.start as usize..span.end as usize).unwrap_or(""))
     }
 
+    /// The number of the text of `span`, its bytes as written, and whether they are all of that text.
+    pub fn text(&self, span: Span) -> (usize, &str, bool) {
+        let Span { text, start, end } = span;
+        let json = &self.texts[text as usize].json;
+        (text as usize, json.get(start as usize..end as usize).unwrap_or(""), (start, end as usize) == (0, json.len()))
+    }
+
     /// "line 3, column 7", or the option.
     pub fn place(&self, span: Span) -> String {
         let text = &self.texts[span.text as usize];

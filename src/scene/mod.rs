@@ -3,6 +3,7 @@
 //! [`read`] turns JSON into a [`Scene`] or refuses it with one precise error.  What stands here is already *resolved*: a uniform bar
 //! has become mass, centre and inertia; names have become indices.  Angles are absolute, from +x, counter-clockwise, in radians.
 
+mod digits;
 mod error;
 mod fit;
 mod format;
@@ -15,6 +16,7 @@ mod stays;
 mod template;
 mod write;
 
+pub use digits::Written;
 pub use error::{Refusal, SceneError};
 pub use number::number;
 pub use read::{parse_scene, read_scene, read_text, source_name};

@@ -76,6 +76,11 @@ impl Template {
         parse_scene(&self.text, &self.source, &overrides)
     }
 
+    /// Its text, the name of its file, and its overrides.
+    pub(super) fn parts(&self) -> (&str, &str, &[Override]) {
+        (&self.text, &self.source, &self.overrides)
+    }
+
     /// The number called `name`: a path, or the short form of one.
     ///
     /// # Errors
@@ -151,13 +156,13 @@ fn member<'a>(node: &'a Node, key: &str) -> Option<&'a Node> {
 }
 
 /// Follows a path through the format's tables and the scene's tree side by side.
-struct Walk<'a> {
-    tree: &'a Node,
+pub(super) struct Walk<'a> {
+    pub tree: &'a Node,
 }
 
 impl Walk<'_> {
     /// The unit of the number at the end of a path; else what is wrong and a hint.
-    fn unit(&self, path: &str) -> Result<&'static str, (String, String)> {
+    pub fn unit(&self, path: &str) -> Result<&'static str, (String, String)> {
         let steps = steps(path).ok_or_else(|| ("it is not a path".to_owned(), "keys, names and [indices] joined by dots".to_owned()))?;
         let mut steps = steps.into_iter().peekable();
         let (mut table, mut node, mut walked): (&'static Table, Option<&Node>, String) = (&SCENE, Some(self.tree), String::new());

@@ -73,6 +73,14 @@ pub(super) fn second(mechanism: &Mechanism, run: &Plan) -> Option<Finer> {
     has_lanes.then(|| series(mechanism, run, BEYOND, [true, false]))
 }
 
+/// For runs of neighbouring scenes, which share no impacts with the run: the first series in doubles at so many times its tolerance, up to a time \[s\].
+pub(super) fn neighbour(mechanism: &Mechanism, until: f64, coarser: f64) -> Plan {
+    let has_series = mechanism.vibration.is_none() && mechanism.tree.is_dense();
+    let tolerance = Tolerance { relative: coarser * FINE, absolute: coarser * FINE };
+    let method = if has_series { MethodId::Taylor } else { MethodId::Dp8 };
+    Plan { method, ..Plan::of_series(mechanism, tolerance, until) }
+}
+
 /// Where there is no series, or the run is one that finds its impacts on it.
 fn stepwise(mechanism: &Mechanism, run: &Plan, tolerance: f64) -> Finer {
     let tolerance = Tolerance { relative: tolerance, absolute: tolerance };

@@ -189,6 +189,7 @@ impl Measured {
             no_growth,
             // More is no more uncertain.
             input_error: input_error.filter(|&error| error > 0.0).map(|error| error.min(TAU)),
+            inputs: None,
             model_error: None,
             companion: Some(name),
             shared,

@@ -26,6 +26,7 @@ mod distance;
 mod finer;
 mod flow;
 mod growth;
+pub mod inputs;
 mod measured;
 mod shadow;
 pub mod tangent;
@@ -33,6 +34,7 @@ pub mod tangent;
 pub(super) use companion::{Companion, Kept};
 pub use distance::Ruler;
 pub use flow::{Flow, Moment, flow};
+pub use inputs::{Input, Inputs};
 pub(super) use measured::crossing;
 pub use tangent::Tangent;
 
@@ -159,8 +161,11 @@ pub struct Trust {
     /// Why nothing is known of the growth of small differences, or not from some time on.
     #[serde(default)]
     pub no_growth: Option<String>,
-    /// What a change in the last digit of the scene's numbers comes to at `at` \[rad\]; no error of the method.
+    /// What changes of the scene's numbers by about a last digit of a double come to at `at` \[rad\], or, with `inputs`, of their last digits as written; no
+    /// error of the method.
     pub input_error: Option<f64>,
+    /// What the digits of every number of the scene come to, where that was asked for (module [`inputs`]).
+    pub inputs: Option<Inputs>,
     /// What the model is off by whatever the method does, where springs are taken for rods \[rad\]; the estimate is no smaller.
     pub model_error: Option<f64>,
     /// The companion, in words.
