@@ -32,6 +32,8 @@ const COARSER: f64 = 2.0;
 /// Rounding \[rad\] up to which a difference can be told, and the least there is.
 const MOST_NOISE: f64 = 1e-4;
 const LEAST_NOISE: f64 = 1e-15;
+/// Differences \[rad\] so small may be rounding whatever two runs of the scene tell: where its motion is a polynomial they are the same.
+const ROUNDING: f64 = 1e-10;
 /// The difference aimed at \[rad\]: so many times the rounding, within these bounds; and how far from it may be taken.
 const ABOVE_NOISE: f64 = 1e3;
 const DIFFERENCE: [f64; 2] = [1e-7, 1e-3];
@@ -252,7 +254,7 @@ impl<'a, 'b> Neighbours<'a, 'b> {
         let [least, most] = CHANGE.map(|change| change * number.value.abs());
         let mut wanted = (ABOVE_NOISE * self.noise).clamp(DIFFERENCE[0], DIFFERENCE[1]);
         let mut h = (wanted / self.reach * number.value.abs()).clamp(least, most);
-        let (mut why, mut stops) = (String::new(), 0);
+        let (mut why, mut stops, mut before) = (String::new(), 0, None);
         for _ in 0..TRIES {
             if stops == STOPS {
                 break;
@@ -269,6 +271,20 @@ impl<'a, 'b> Neighbours<'a, 'b> {
                 }
             };
             let difference = self.apart(&main.motions, &self.motions);
+            if difference > 0.0 && difference < ROUNDING.max(ABOVE_NOISE * self.noise) {
+                // A larger change that does no more, or none but rounding has done anything.
+                match before.replace([h, difference]) {
+                    Some([other, less]) if is_flat([h, difference], [other, less]) => {
+                        self.noise = self.noise.max(difference.min(less));
+                        return Ok((difference.max(less) / h.max(other), true));
+                    }
+                    None if h == most => {
+                        h /= SMALLER;
+                        continue;
+                    }
+                    _ => {}
+                }
+            }
             let is_rounding = difference < 3.0 * self.noise;
             let is_far = difference > WINDOW[1] * wanted && h > least;
             let is_near = difference < WINDOW[0] * wanted && h < most;
@@ -329,6 +345,12 @@ impl<'a, 'b> Neighbours<'a, 'b> {
         let apart = one.iter().zip(other).map(|(one, other)| self.ruler.apart(one, other));
         apart.fold(0.0, |most, apart| if apart.is_nan() { f64::INFINITY } else { most.max(apart) })
     }
+}
+
+/// True where differences `[change, difference]` hardly follow their changes.
+fn is_flat([h, difference]: [f64; 2], [other, less]: [f64; 2]) -> bool {
+    let ratio = |a: f64, b: f64| libm::log(a / b).abs();
+    ratio(h, other) > libm::log(10.0) && ratio(difference, less) < 0.5 * ratio(h, other)
 }
 
 /// The first line of a message.
