@@ -42,7 +42,7 @@ fn bounded(effect: f64) -> f64 {
 
 /// All digits of a number, the exponent apart where it is far from everyday size.
 fn plain(x: f64) -> String {
-    if (1e-4..1e9).contains(&x.abs()) { x.to_string() } else { format!("{x:e}") }
+    if (1e-5..1e9).contains(&x.abs()) { x.to_string() } else { format!("{x:e}") }
 }
 
 /// The same on a page.
@@ -75,8 +75,7 @@ pub fn describe(page: &mut Page, trust: &Trust, inputs: &Inputs) {
     }
     if known > SHOWN {
         let rest = inputs.numbers[SHOWN..known].iter().filter_map(|input| input.effect).map(|effect| effect * effect).sum::<f64>().sqrt();
-        let more = counted((known - SHOWN) as u64, "number", "numbers");
-        page.entry("", &format!("and {more} that come to {} rad together", magnitude(bounded(rest))));
+        page.entry("", &format!("and {} more, {} rad together", known - SHOWN, magnitude(bounded(rest))));
     }
     for input in inputs.numbers.iter().skip(known).take(SHOWN) {
         page.entry("", &format!("{}: not known, {}", input.path, input.why.as_deref().unwrap_or("nothing was compared")));

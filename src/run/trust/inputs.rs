@@ -186,8 +186,7 @@ impl<'a, 'b> Neighbours<'a, 'b> {
         let mut kept = 0;
         for (one, other) in motions.iter().zip(others) {
             let apart = self.ruler.apart(one, other);
-            // Not a number is no smaller.
-            if !(apart <= MOST_NOISE) {
+            if apart.is_nan() || apart > MOST_NOISE {
                 break;
             }
             (self.noise, kept) = (self.noise.max(apart), kept + 1);

@@ -12,7 +12,7 @@
 //! d is exact whatever the motion does, R matters near rounding only.  The *error estimate* is 1.2 E, the *horizon* the first time E passes
 //! [`HORIZON`], and beyond [`LOST`] nothing is measured any more.  The tangent flow tells besides how small
 //! differences grow, exponentially or as a power of time (module `growth`), and what the last digit
-//! of the inputs comes to.
+//! of the inputs as doubles comes to, about; what every number comes to by the digits it is written with, runs of neighbouring scenes tell (module [`inputs`]).
 //!
 //! What the companion may cost is counted in work, not in seconds: the same run has the same figures on every machine ([`budget`]).  Where it is used
 //! up, a regular motion's error is carried on by the power law it followed so far, and said to be *extrapolated*.
