@@ -14,7 +14,7 @@ use crate::arithmetic::Complex;
 use crate::dynamics::force::Spring;
 use crate::dynamics::{Form, Glance, Mechanism, State, Time};
 use crate::stepping::search::{Chebyshev, Crossing, Curve, Part, crossing};
-use crate::stepping::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
+use crate::stepping::{Cause, Method, StepError, Tally};
 
 /// A length below this share of the free length is none.
 const NONE: f64 = 1e-6;
@@ -34,6 +34,8 @@ pub(super) struct Shrinking<P: ?Sized> {
     before: Glance,
     now: Glance,
     from: State,
+    /// True where `before` is not the state the next step begins from.
+    is_stale: bool,
     z: Vec<Complex<f64>>,
 }
 
@@ -61,7 +63,7 @@ struct Approach {
 
 impl<P: Form + ?Sized> Shrinking<P> {
     pub fn new(method: Box<dyn Method<P>>, springs: Vec<usize>) -> Self {
-        Self { method, springs, before: Glance::default(), now: Glance::default(), from: State::default(), z: Vec::new() }
+        Self { method, springs, before: Glance::default(), now: Glance::default(), from: State::default(), is_stale: true, z: Vec::new() }
     }
 }
 
@@ -130,18 +132,36 @@ fn suspected(number: usize, a: [Complex<f64>; 2], b: [Complex<f64>; 2], time: f6
 }
 
 impl<P: Form + ?Sized> Shrinking<P> {
+    /// Where a spring first loses its length in a step of `time` \[s\] between the two states looked at.
+    fn lost(&mut self, problem: &mut P, time: f64) -> Option<Approach> {
+        let is_dense = self.method.is_dense();
+        let mut first: Option<Approach> = None;
+        for place in 0..self.springs.len() {
+            let number = self.springs[place];
+            let free = problem.mechanism().springs[number].free_length;
+            let [a, b] = [&self.before, &self.now].map(|at| span(problem.mechanism(), number, at, &mut self.z));
+            let found = match is_dense {
+                true if can_meet(a, b, time) => self.searched(problem, number, time),
+                true => None,
+                false => suspected(number, a, b, time).filter(|(approach, off)| approach.length <= NONE * free + off).map(|found| found.0),
+            };
+            first = [first, found].into_iter().flatten().min_by(|a, b| a.after.total_cmp(&b.after));
+        }
+        first
+    }
+
     /// Where a spring loses its length in the last step, by the motion inside it.
     fn searched(&mut self, problem: &mut P, number: usize, time: f64) -> Option<Approach> {
-        let Self { method, from, before, z, .. } = self;
-        let mut inside = from.clone();
+        let Self { method, from, z, .. } = self;
+        let (mut inside, mut at) = (from.clone(), Glance::default());
         let free = problem.mechanism().springs[number].free_length;
         let mut spans = [Vec::new(), Vec::new()];
         for degree in DEGREES {
             spans.iter_mut().for_each(Vec::clear);
             for share in Chebyshev::nodes(degree) {
                 method.within(problem, from, from.time + share * time, &mut inside);
-                problem.glance(&inside, before);
-                let [here, _] = span(problem.mechanism(), number, before, z);
+                problem.glance(&inside, &mut at);
+                let [here, _] = span(problem.mechanism(), number, &at, z);
                 spans[0].push(here.re / free);
                 spans[1].push(here.im / free);
             }
@@ -180,69 +200,40 @@ impl<P: Form + ?Sized> Method<P> for Shrinking<P> {
         self.method.order()
     }
 
-    fn advance(
-        &mut self,
-        problem: &mut P,
-        state: &mut State,
-        until: Time,
-        tally: &mut Tally,
-        watch: &mut Watch<P>,
-    ) -> Result<Reached, StepError> {
-        loop {
+    fn begin(&mut self, problem: &mut P, state: &mut State, until: Time) -> Result<(), StepError> {
+        self.is_stale = true;
+        self.method.begin(problem, state, until)
+    }
+
+    /// A step of the inner method, looked at.
+    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
+        if std::mem::take(&mut self.is_stale) {
             problem.glance(state, &mut self.before);
-            self.from.clone_from(state);
-            let mut found: Vec<(Approach, f64)> = Vec::new();
-            let mut is_enough = false;
-            let is_dense = self.method.is_dense();
-            let Self { method, springs, before, now, from, z, .. } = self;
-            let reached = method.advance(problem, state, until, tally, &mut |problem, state| {
-                problem.glance(state, now);
-                let time = (state.time - from.time).hi;
-                found.extend(springs.iter().filter_map(|&number| {
-                    let [a, b] = [span(problem.mechanism(), number, before, z), span(problem.mechanism(), number, now, z)];
-                    match is_dense {
-                        true => can_meet(a, b, time).then_some((Approach { spring: number, length: 0.0, after: 0.0 }, 0.0)),
-                        false => suspected(number, a, b, time),
-                    }
-                }));
-                let seen = watch(problem, state)?;
-                is_enough = seen.is_enough();
-                if found.is_empty() {
-                    if seen.is_changed() {
-                        problem.glance(state, before);
-                    } else {
-                        std::mem::swap(before, now);
-                    }
-                    from.clone_from(state);
-                    return Ok(seen);
-                }
-                Ok(if seen.is_changed() { Seen::ChangedEnough } else { Seen::Enough })
-            })?;
-            if found.is_empty() {
-                return Ok(reached);
-            }
-            let time = (state.time - self.from.time).hi;
-            let seen: Vec<Approach> = match is_dense {
-                true => found.iter().filter_map(|(approach, _)| self.searched(problem, approach.spring, time)).collect(),
-                false => {
-                    let free = |spring: usize| problem.mechanism().springs[spring].free_length;
-                    let is_none = |(approach, off): &&(Approach, f64)| approach.length <= NONE * free(approach.spring) + off;
-                    found.iter().filter(is_none).map(|found| found.0).collect()
-                }
-            };
-            if let Some(first) = seen.into_iter().min_by(|a, b| a.after.total_cmp(&b.after)) {
-                let stop = self.stop(problem, first, time);
-                state.clone_from(&self.from);
-                return Err(stop);
-            }
-            if is_enough || reached != Reached::Pause {
-                return Ok(reached);
-            }
-            // It paused for the look at the spring alone, and may have arrived.
-            if state.time >= until {
-                return Ok(Reached::Until);
-            }
         }
+        self.from.clone_from(state);
+        let event = self.method.step(problem, state, until, tally)?;
+        problem.glance(state, &mut self.now);
+        let time = (state.time - self.from.time).hi;
+        if let Some(first) = self.lost(problem, time) {
+            let stop = self.stop(problem, first, time);
+            state.clone_from(&self.from);
+            return Err(stop);
+        }
+        std::mem::swap(&mut self.before, &mut self.now);
+        Ok(event)
+    }
+
+    fn is_at(&self, state: &State, until: Time) -> bool {
+        self.method.is_at(state, until)
+    }
+
+    fn changed(&mut self, state: &mut State) {
+        self.is_stale = true;
+        self.method.changed(state);
+    }
+
+    fn save(&mut self, state: &mut State) {
+        self.method.save(state);
     }
 
     fn is_dense(&self) -> bool {

@@ -16,7 +16,7 @@ use crate::arithmetic::sum::two_sum;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::schur::{DROPPED, NEAR};
 use crate::dynamics::{Field, Form, Mechanism, State, Time, tree};
-use crate::stepping::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
+use crate::stepping::{Cause, Method, StepError, Tally};
 
 /// A method followed by projection after each of its steps; its problem must be in angles and rates, as
 /// [`Multiplier`](crate::dynamics::multiplier::Multiplier) is.
@@ -41,6 +41,40 @@ impl<M> Projected<M> {
     }
 }
 
+impl<M> Projected<M> {
+    /// Projects the end of a step; true where that moved it by more than rounding.
+    fn put_back<P: ?Sized>(&mut self, mechanism: &Mechanism, state: &mut State) -> Result<bool, StepError>
+    where
+        M: Method<P>,
+    {
+        let name = self.inner.name();
+        let Some(projector) = &mut self.projector else { return Ok(false) };
+        let stop = |cause, state: &State, what, hint: &str| StepError {
+            cause,
+            method: name.into(),
+            t: state.time.hi,
+            step: 0.0,
+            what,
+            hint: hint.into(),
+        };
+        let landing = projector.project(mechanism, state, self.tolerance).map_err(|(row, left)| {
+            let what = format!("projection leaves {left:.1e} of constraint {row}");
+            stop(Cause::ProjectionFailed, state, what, hint(mechanism, &projector.kernel, name))
+        })?;
+        let was_near = std::mem::replace(&mut self.near, landing.is_near);
+        let last = self.balance.replace(landing.balance);
+        let lost = last.map_or(0.0, |last| (landing.balance - last).abs()) + landing.energy_change.abs();
+        let lost = lost / mechanism.energy_scale;
+        if (was_near || self.near) && (lost > LOST || lost.is_nan()) {
+            let row = mechanism.rows[projector.kernel.weakest.row].name();
+            let what =
+                format!("energy changed by {lost:.1e} of its scale where constraint {row} loses its hold: the motion left its branch");
+            return Err(stop(Cause::BranchLost, state, what, past_singular(name)));
+        }
+        Ok(landing.has_moved)
+    }
+}
+
 impl<M, P> Method<P> for Projected<M>
 where
     M: Method<P>,
@@ -54,57 +88,36 @@ where
         self.inner.order()
     }
 
-    fn advance(
-        &mut self,
-        problem: &mut P,
-        state: &mut State,
-        until: Time,
-        tally: &mut Tally,
-        watch: &mut Watch<P>,
-    ) -> Result<Reached, StepError> {
-        let (name, tolerance) = (self.inner.name(), self.tolerance);
-        let mechanism = problem.mechanism();
-        if !mechanism.contacts.is_empty() && !self.has_paused {
-            // What impacts change is not a step's.
+    fn begin(&mut self, problem: &mut P, state: &mut State, until: Time) -> Result<(), StepError> {
+        // What impacts change is not a step's.
+        if !problem.mechanism().contacts.is_empty() && !self.has_paused {
             self.balance = None;
         }
-        let projector = self.projector.get_or_insert_with(|| Projector::new(problem));
-        let Self { inner, balance, near, .. } = self;
-        let reached = inner.advance(problem, state, until, tally, &mut |problem, state| {
-            let landing = projector.project(problem.mechanism(), state, tolerance).map_err(|(row, left)| StepError {
-                cause: Cause::ProjectionFailed,
-                method: name.into(),
-                t: state.time.hi,
-                step: 0.0,
-                what: format!("projection leaves {left:.1e} of constraint {row}"),
-                hint: hint(problem.mechanism(), &projector.kernel, name).into(),
-            })?;
-            let was_near = std::mem::replace(near, landing.is_near);
-            let last = balance.replace(landing.balance);
-            let lost = last.map_or(0.0, |last| (landing.balance - last).abs()) + landing.energy_change.abs();
-            let mechanism = problem.mechanism();
-            let lost = lost / mechanism.energy_scale;
-            if (was_near || *near) && (lost > LOST || lost.is_nan()) {
-                let row = mechanism.rows[projector.kernel.weakest.row].name();
-                return Err(StepError {
-                    cause: Cause::BranchLost,
-                    method: name.into(),
-                    t: state.time.hi,
-                    step: 0.0,
-                    what: format!(
-                        "energy changed by {lost:.1e} of its scale where constraint {row} loses its hold: the motion left its branch"
-                    ),
-                    hint: past_singular(name).into(),
-                });
-            }
-            Ok(match watch(problem, state)? {
-                Seen::Kept if landing.has_moved => Seen::Changed,
-                Seen::Enough if landing.has_moved => Seen::ChangedEnough,
-                seen => seen,
-            })
-        });
-        self.has_paused = reached == Ok(Reached::Pause);
-        reached
+        self.has_paused = false;
+        self.projector.get_or_insert_with(|| Projector::new(problem));
+        self.inner.begin(problem, state, until)
+    }
+
+    /// A step of the inner method, put back onto the constraints.
+    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
+        let event = self.inner.step(problem, state, until, tally)?;
+        if self.put_back(problem.mechanism(), state)? {
+            self.inner.changed(state);
+        }
+        Ok(event)
+    }
+
+    fn is_at(&self, state: &State, until: Time) -> bool {
+        self.inner.is_at(state, until)
+    }
+
+    fn changed(&mut self, state: &mut State) {
+        self.inner.changed(state);
+    }
+
+    fn save(&mut self, state: &mut State) {
+        self.has_paused = true;
+        self.inner.save(state);
     }
 
     fn is_dense(&self) -> bool {

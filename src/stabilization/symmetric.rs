@@ -17,7 +17,7 @@ use crate::dynamics::kernel::Kernel;
 use crate::dynamics::schur::DROPPED;
 use crate::dynamics::{Field, Form, Mechanism, State, Time};
 use crate::stepping::gauss::Gauss;
-use crate::stepping::{Cause, Method, Reached, Seen, StepError, Tally, Watch};
+use crate::stepping::{Cause, Method, Seen, StepError, Tally};
 
 /// Gauss steps per step before it is given up; an ordinary one takes three or four.
 const ROUNDS: usize = 60;
@@ -50,8 +50,14 @@ impl SymmetricGauss {
         Self { inner, kernel: None, trial: State::default(), best: State::default(), mu: Vec::new(), nu: Vec::new() }
     }
 
-    /// One step of `h` \[s\].
-    fn step<P: Field + Form + ?Sized>(&mut self, problem: &mut P, state: &mut State, h: f64, tally: &mut Tally) -> Result<(), StepError> {
+    /// One step of `h` \[s\], between states shifted alike.
+    fn shifted<P: Field + Form + ?Sized>(
+        &mut self,
+        problem: &mut P,
+        state: &mut State,
+        h: f64,
+        tally: &mut Tally,
+    ) -> Result<(), StepError> {
         let Self { inner, kernel: Some(kernel), trial, best, mu, nu } = self else { return Ok(()) };
         let (r, until) = (problem.mechanism().rows.len(), state.time + h);
         let own = state.memory.len().saturating_sub(2 * r);
@@ -184,32 +190,26 @@ impl<P: Field + Form + ?Sized> Method<P> for SymmetricGauss {
         Method::<P>::order(&self.inner)
     }
 
-    /// Takes whole steps; see [`Gauss`].  The state's memory is that of the Gauss method, then mu.
-    fn advance(
-        &mut self,
-        problem: &mut P,
-        state: &mut State,
-        until: Time,
-        tally: &mut Tally,
-        watch: &mut Watch<P>,
-    ) -> Result<Reached, StepError> {
+    fn begin(&mut self, problem: &mut P, _state: &mut State, _until: Time) -> Result<(), StepError> {
         if self.kernel.is_none() {
             self.kernel = Some(Kernel::new(problem.mechanism()));
         }
-        let span = (until - state.time).hi;
-        let count = (span / self.inner.step()).abs().round();
-        let h = self.inner.step().copysign(span);
-        for _ in 0..count as u64 {
-            tally.check(Method::<P>::name(self), state.time.hi, h)?;
-            self.step(problem, state, h, tally)?;
-            let seen = watch(problem, state)?;
-            if seen.is_changed() {
-                state.memory.clear();
-            }
-            if seen.is_enough() {
-                return Ok(Reached::Pause);
-            }
-        }
-        Ok(Reached::Until)
+        Ok(())
+    }
+
+    /// A whole step; see [`Gauss`].  The state's memory is that of the Gauss method, then mu.
+    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
+        let h = self.inner.step().copysign((until - state.time).hi);
+        tally.check(Method::<P>::name(self), state.time.hi, h)?;
+        self.shifted(problem, state, h, tally)?;
+        Ok(None)
+    }
+
+    fn is_at(&self, state: &State, until: Time) -> bool {
+        ((until - state.time).hi / self.inner.step()).abs().round() == 0.0
+    }
+
+    fn changed(&mut self, state: &mut State) {
+        state.memory.clear();
     }
 }

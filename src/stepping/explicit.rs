@@ -12,7 +12,7 @@
 //! Source: E. Hairer, S. P. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sections II.4-II.6.
 
 use super::event::{Dense, Met, Search, Stride};
-use super::{Cause, Method, Reached, StepError, Tally, Watch};
+use super::{Cause, Method, StepError, Tally};
 use crate::arithmetic::sum::{fast_two_sum, two_sum};
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Field, State, Time};
@@ -82,8 +82,14 @@ pub struct Explicit<P> {
     next: Vec<f64>,
     next_low: Vec<f64>,
     search: Search,
+    /// The step proposed \[s\], where there is one, and whether the rate at the state is known.
+    wanted: Option<f64>,
+    has_rate: bool,
     pair: PhantomData<P>,
 }
+
+/// Steps in a row that come out not finite before the method stops.
+const MOST_CUTS: u32 = 10;
 
 impl<P: Pair> Explicit<P> {
     /// The method at a tolerance.
@@ -97,6 +103,8 @@ impl<P: Pair> Explicit<P> {
             next: Vec::new(),
             next_low: Vec::new(),
             search: Search::default(),
+            wanted: None,
+            has_rate: false,
             pair: PhantomData,
         }
     }
@@ -109,7 +117,7 @@ impl<P: Pair> Explicit<P> {
     }
 
     /// Stages 2… and the new state of a step of `h` from `state`; stage 1 is in place.
-    fn step<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) {
+    fn attempt<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) {
         let n = state.y.len();
         for (i, row) in P::A.iter().enumerate() {
             combine(&state.y, h, row, &self.k, &mut self.stage);
@@ -164,6 +172,17 @@ impl<P: Pair> Explicit<P> {
             field.rate(state.time + c * h, stage, &mut k[number * n..(number + 1) * n]);
             tally.evaluations += 1;
         });
+    }
+
+    /// Looks for events in the step just made.
+    fn meet<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) -> Met {
+        if field.events() == 0 {
+            return Met::Whole;
+        }
+        let mut search = std::mem::take(&mut self.search);
+        let met = search.meet(field, self, state, h, tally);
+        self.search = search;
+        met
     }
 
     /// The component that asks most of the step, or the first that is not finite.
@@ -254,7 +273,7 @@ impl<P: Pair, F: Field + ?Sized> Stride<F> for Explicit<P> {
     }
 
     fn repeat(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) -> bool {
-        self.step(field, state, h, tally);
+        self.attempt(field, state, h, tally);
         true
     }
 
@@ -278,112 +297,91 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
         state.memory.truncate(1);
     }
 
-    fn advance(
-        &mut self,
-        field: &mut F,
-        state: &mut State,
-        until: Time,
-        tally: &mut Tally,
-        watch: &mut Watch<F>,
-    ) -> Result<Reached, StepError> {
-        let (n, events) = (state.y.len(), field.events());
+    fn begin(&mut self, field: &mut F, state: &mut State, until: Time) -> Result<(), StepError> {
+        let n = state.y.len();
         super::refuse_the_past(P::NAME, state, until, field.time_unit())?;
         self.resize(n);
         super::units(field, n, &mut self.units);
-        let finest = |state: &State, field: &F| super::finest(state, field.time_unit());
-        // The step proposed last; where the last call was cut short also the rate where it is known.
-        let proposed = state.memory.first().copied();
-        if state.memory.len() == 1 + n {
+        // The step proposed last; where the last step was not cut short also the rate.
+        self.wanted = state.memory.first().copied();
+        self.has_rate = state.memory.len() == 1 + n;
+        if self.has_rate {
             self.k[..n].copy_from_slice(&state.memory[1..]);
-        } else {
+        }
+        state.memory.truncate(1);
+        Ok(())
+    }
+
+    fn step(&mut self, field: &mut F, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
+        let n = state.y.len();
+        let left = (until - state.time).hi;
+        if !std::mem::replace(&mut self.has_rate, true) {
             field.rate(state.time, &state.y, &mut self.k[..n]);
             tally.evaluations += 1;
         }
-        state.memory.truncate(1);
-        let mut left = (until - state.time).hi;
-        let mut wanted = match proposed {
+        let mut wanted = match self.wanted {
             Some(h) => h,
             None => self.first_step(field, state, left, tally),
         };
-        let mut cuts = 0;
-        let mut rejected_before = false;
-        while left > 0.0 {
+        let (mut cuts, mut is_rejected) = (0, false);
+        loop {
             let (h, whole) = super::reach(wanted, left);
             tally.check(P::NAME, state.time.hi, h)?;
-            self.step(field, state, h, tally);
+            self.attempt(field, state, h, tally);
             let error = P::error(h, &self.k, &self.scale).sqrt();
             if !error.is_finite() {
                 cuts += 1;
                 tally.rejected += 1;
-                if cuts > 10 || h < finest(state, field) {
+                if cuts > MOST_CUTS || h < super::finest(state, field.time_unit()) {
                     let what = format!("{} is not finite", self.culprit(field, n));
-                    return Err(Self::stop(
-                        Cause::NotFinite,
-                        state,
-                        h,
-                        what,
-                        "look for a spring of length zero or a position without inertia",
-                    ));
+                    let hint = "look for a spring of length zero or a position without inertia";
+                    return Err(Self::stop(Cause::NotFinite, state, h, what, hint));
                 }
-                wanted = 0.1 * h;
-                rejected_before = true;
+                (wanted, is_rejected) = (0.1 * h, true);
                 continue;
             }
             cuts = 0;
-            let exponent = 1.0 / f64::from(P::ORDER);
-            let factor = (0.9 * libm::pow(error, -exponent)).clamp(1.0 / 3.0, 6.0);
+            let factor = (0.9 * libm::pow(error, -1.0 / f64::from(P::ORDER))).clamp(1.0 / 3.0, 6.0);
             if error > 1.0 {
                 tally.rejected += 1;
-                rejected_before = true;
-                wanted = h * factor.min(0.9);
-                if wanted < finest(state, field) {
+                (wanted, is_rejected) = (h * factor.min(0.9), true);
+                if wanted < super::finest(state, field.time_unit()) {
                     let what = format!("{} asks for ever smaller steps", self.culprit(field, n));
                     return Err(Self::stop(Cause::StepTooSmall, state, h, what, "loosen the tolerance, or take --method taylor or radau9"));
                 }
                 continue;
             }
-            let mut h = h;
-            let mut reached = if whole { Some(Reached::Until) } else { None };
-            if events > 0 {
-                let mut search = std::mem::take(&mut self.search);
-                let met = search.meet(field, self, state, h, tally);
-                self.search = search;
-                match met {
-                    Met::Whole => {}
-                    Met::Short(short) => (h, reached) = (short, None),
-                    Met::Event(short, event) => (h, reached) = (short, Some(Reached::Event(event))),
-                    Met::Failed | Met::AtRest => return Err(super::at_rest(P::NAME, state, h)),
-                }
-            }
-            let grown = h * if rejected_before { factor.min(1.0) } else { factor };
-            rejected_before = false;
+            let (h, event, lands) = match self.meet(field, state, h, tally) {
+                Met::Whole => (h, None, whole),
+                Met::Short(short) => (short, None, false),
+                Met::Event(short, event) => (short, Some(event), false),
+                Met::Failed | Met::AtRest => return Err(super::at_rest(P::NAME, state, h)),
+            };
+            let grown = h * if is_rejected { factor.min(1.0) } else { factor };
             // A step cut short says nothing against the longer one proposed before it.
-            wanted = if h < wanted { grown.max(wanted) } else { grown };
+            let wanted = if h < wanted { grown.max(wanted) } else { grown };
             state.y.copy_from_slice(&self.next);
             state.low.copy_from_slice(&self.next_low);
-            state.time = if reached == Some(Reached::Until) { until } else { state.time + DoubleDouble::of(h) };
+            state.time = if lands { until } else { state.time + DoubleDouble::of(h) };
             state.wrap();
-            state.memory.resize(1, 0.0);
-            state.memory[0] = wanted;
+            state.memory.clear();
+            state.memory.push(wanted);
+            self.wanted = Some(wanted);
             tally.steps += 1;
             self.k.copy_within(P::STAGES * n..(P::STAGES + 1) * n, 0);
-            let seen = watch(field, state)?;
-            if seen.is_enough() && reached.is_none() {
-                if !seen.is_changed() {
-                    state.memory.extend_from_slice(&self.k[..n]);
-                }
-                return Ok(Reached::Pause);
-            }
-            if seen.is_changed() {
-                field.rate(state.time, &state.y, &mut self.k[..n]);
-                tally.evaluations += 1;
-            }
-            if let Some(reached) = reached {
-                return Ok(reached);
-            }
-            left = (until - state.time).hi;
+            return Ok(event);
         }
-        Ok(Reached::Until)
+    }
+
+    fn changed(&mut self, _state: &mut State) {
+        self.has_rate = false;
+    }
+
+    fn save(&mut self, state: &mut State) {
+        if self.has_rate {
+            state.memory.truncate(1);
+            state.memory.extend_from_slice(&self.k[..state.y.len()]);
+        }
     }
 }
 

@@ -37,7 +37,7 @@ mod newton;
 mod sums;
 mod tableau;
 
-use super::{Cause, Method, Reached, StepError, Tally, Watch};
+use super::{Cause, Method, StepError, Tally};
 use crate::dynamics::{Field, State, Time};
 use lanes::Scratch;
 use newton::Newton;
@@ -151,39 +151,46 @@ impl<F: Field + ?Sized> Method<F> for Gauss {
         2 * self.stages() as u32
     }
 
-    /// Takes whole steps, forwards or backwards.  Where `until` is not a whole number of steps away (to 1e-9 of a step and the resolution
-    /// of `until`), one shorter step ends the march there; done often, that costs the long-time behaviour: ask for multiples of the step.
-    /// Events are not looked for: the canonical form has none.
-    fn advance(
-        &mut self,
-        problem: &mut F,
-        state: &mut State,
-        until: Time,
-        tally: &mut Tally,
-        watch: &mut Watch<F>,
-    ) -> Result<Reached, StepError> {
-        let span = (until - state.time).hi;
-        let whole = (span / self.step).abs().round();
-        let rest = span.abs() - whole * self.step;
-        let (steps, last) = if rest.abs() <= WHOLE * self.step + 4.0 * f64::EPSILON * until.hi.abs() {
-            (whole, 0.0)
-        } else {
-            let steps = (span / self.step).abs().floor();
-            (steps, (span.abs() - steps * self.step).copysign(span))
-        };
+    fn begin(&mut self, problem: &mut F, _state: &mut State, _until: Time) -> Result<(), StepError> {
         self.scratch.points.resize(problem.dimension());
+        self.scratch.step = 0.0;
         self.scratch.judged = if problem.angles() > 0 { problem.angles() } else { problem.dimension() };
-        for (step, count) in [(self.step.copysign(span), steps as u64), (last, u64::from(last != 0.0))] {
+        Ok(())
+    }
+
+    /// A whole step, forwards or backwards.  Where `until` is not a whole number of steps away (to 1e-9 of a step and the resolution
+    /// of `until`), one shorter step ends there; done often, that costs the long-time behaviour: ask for multiples of the step.
+    /// Events are not looked for: the canonical form has none.
+    fn step(&mut self, problem: &mut F, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
+        let step = self.next(state, until);
+        if step != self.scratch.step {
             self.scratch.scale(self.tableau, step);
-            if lanes::march(self, problem, state, count, tally, watch)? == Reached::Pause {
-                return Ok(Reached::Pause);
-            }
         }
-        Ok(Reached::Until)
+        lanes::step(self, problem, state, tally)?;
+        Ok(None)
+    }
+
+    fn is_at(&self, state: &State, until: Time) -> bool {
+        self.next(state, until) == 0.0
+    }
+
+    fn changed(&mut self, state: &mut State) {
+        state.memory.clear();
     }
 }
 
 impl Gauss {
+    /// The next step \[s\] on the way to `until`: a whole one, what is left where that is shorter, or zero.
+    fn next(&self, state: &State, until: Time) -> f64 {
+        let span = (until - state.time).hi;
+        let (whole, least) = ((span / self.step).abs().round(), WHOLE * self.step + 4.0 * f64::EPSILON * until.hi.abs());
+        let rest = span.abs() - whole * self.step;
+        if rest.abs() <= least {
+            return if whole > 0.0 { self.step.copysign(span) } else { 0.0 };
+        }
+        if span.abs() >= self.step { self.step.copysign(span) } else { span }
+    }
+
     /// Refuses to go on with steps too long for a fast mode that has a part in the motion; asked where Newton's method takes over, and then now and again.
     fn follow<F: Field + ?Sized>(&self, problem: &mut F, state: &State) -> Result<(), StepError> {
         let Some(found) = problem.stiffness(state.time, &state.y) else { return Ok(()) };

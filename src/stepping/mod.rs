@@ -122,7 +122,11 @@ pub struct Ends {
     pub y: Vec<f64>,
 }
 
-/// Marches a problem `P`.
+/// Integrates a problem `P`, one accepted step after the other.
+///
+/// The contract: [`begin`](Method::begin) takes up a state, [`step`](Method::step) makes one accepted step from it, [`within`](Method::within) is the solution
+/// inside that step, and [`save`](Method::save) leaves in the state what `begin` needs to go on to the same bits.  A method has no loop of its own over steps:
+/// that is [`advance`](Method::advance), or the caller's.
 pub trait Method<P: ?Sized> {
     /// Name in reports: which code made a result.
     fn name(&self) -> &'static str;
@@ -130,13 +134,37 @@ pub trait Method<P: ?Sized> {
     /// Order of the error of one run in the step.
     fn order(&self) -> u32;
 
-    /// Marches `state` to `until` \[s\], or to the first event before it.
+    /// Takes up a state, on the way to `until` \[s\]: what was remembered of the steps before is in its memory.  Called before the first step, and wherever
+    /// the state is not the end of the step made last.
     ///
-    /// Adaptive methods land on `until`, which must not lie behind; fixed-step methods take the whole number of steps nearest to it.
+    /// # Errors
+    /// The method cannot integrate this problem, or not in this direction.
+    fn begin(&mut self, problem: &mut P, state: &mut State, until: Time) -> Result<(), StepError>;
+
+    /// Makes one accepted step from the state taken up, or from the end of the last one, and not beyond `until` \[s\], which lies ahead; the number of the event
+    /// located at its end, if there is one.  The state is then the one just before that takes effect.
+    ///
+    /// # Errors
+    /// A typed stop with time, step, culprit and suggestion; the state is unchanged.
+    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError>;
+
+    /// True where no step is left before `until`: adaptive methods land on it, fixed-step methods take the whole number of steps nearest to it.
+    fn is_at(&self, state: &State, until: Time) -> bool {
+        (until - state.time).hi <= 0.0
+    }
+
+    /// Called where the unknowns of the state were changed a little after a step (projection): what the method knows of the rate there is stale.
+    fn changed(&mut self, _state: &mut State) {}
+
+    /// Leaves in the state's memory all that [`begin`](Method::begin) needs to go on as if nothing had been between.
+    fn save(&mut self, _state: &mut State) {}
+
+    /// Integrates `state` to `until` \[s\], or to the first event before it: the loop over steps for all methods.
+    ///
     /// The same call from the same state gives the same bits, and where a watcher had enough on the way, so does calling again from there.
     ///
     /// # Errors
-    /// A typed stop with time, step, culprit and suggestion; the state is then the last accepted one.
+    /// A typed stop; the state is then the last accepted one.
     fn advance(
         &mut self,
         problem: &mut P,
@@ -144,7 +172,24 @@ pub trait Method<P: ?Sized> {
         until: Time,
         tally: &mut Tally,
         watch: &mut Watch<P>,
-    ) -> Result<Reached, StepError>;
+    ) -> Result<Reached, StepError> {
+        self.begin(problem, state, until)?;
+        while !self.is_at(state, until) {
+            let event = self.step(problem, state, until, tally)?;
+            let seen = watch(problem, state)?;
+            if seen.is_changed() {
+                self.changed(state);
+            }
+            if let Some(event) = event {
+                return Ok(Reached::Event(event));
+            }
+            if seen.is_enough() && !self.is_at(state, until) {
+                self.save(state);
+                return Ok(Reached::Pause);
+            }
+        }
+        Ok(Reached::Until)
+    }
 
     /// True where the method knows the motion inside its steps: [`Method::within`] answers.
     fn is_dense(&self) -> bool {

@@ -24,7 +24,7 @@ use self::newton::Solved;
 use self::tableau::Tableau;
 use super::event::{Dense, Met, Search, Stride};
 use super::linear::Factors;
-use super::{Cause, Method, Reached, StepError, Tally, Tolerance, Watch, scales};
+use super::{Cause, Method, StepError, Tally, Tolerance, scales};
 use crate::arithmetic::sum::{fast_two_sum, two_sum};
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::dynamics::{Field, State, Time};
@@ -47,6 +47,9 @@ pub struct Radau {
     pub tolerance: Tolerance,
     tableau: Tableau,
     work: Work,
+    control: Control,
+    /// True where the step is the first, or the last attempt was rejected.
+    is_hard: bool,
 }
 
 /// Scratch space of d unknowns and s stages.
@@ -85,7 +88,7 @@ struct Work {
 }
 
 /// What the next step depends on beside the unknowns, the last polynomial and the Jacobian.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Control {
     /// The step proposed \[s\].
     wanted: f64,
@@ -98,13 +101,30 @@ struct Control {
     keeps: f64,
 }
 
+impl Control {
+    /// Proposes the next step after an accepted one of `h` \[s\] with its error, the quotient that asks for, and the contraction of its iteration.
+    fn accept(&mut self, h: f64, error: f64, exponent: f64, mut quotient: f64, theta: f64, is_hard: bool) {
+        if self.accepted > 0.0 {
+            let predicted = (self.accepted / h) * libm::pow(error * error / self.error, exponent) / SAFE;
+            quotient = quotient.max(predicted.clamp(QUOTIENT[0], QUOTIENT[1]));
+        }
+        let grown = if is_hard && self.accepted > 0.0 { (h / quotient).min(h) } else { h / quotient };
+        (self.accepted, self.error) = (h, error.max(1e-2));
+        self.keeps = f64::from(theta <= KEPT);
+        let same = theta <= KEPT && (1.0..=SAME).contains(&(grown / h));
+        let proposed = if same { h } else { grown };
+        // A step cut short says nothing against the longer one proposed before it.
+        self.wanted = if h < self.wanted { proposed.max(self.wanted) } else { proposed };
+    }
+}
+
 /// Numbers of [`Control`] and of the time of the Jacobian.
 const CONTROLS: usize = 7;
 
 impl Radau {
     /// The method of three or five stages; `None` for any other number.
     pub fn new(stages: usize, tolerance: Tolerance) -> Option<Self> {
-        Some(Self { tolerance, tableau: Tableau::new(stages)?, work: Work::default() })
+        Some(Self { tolerance, tableau: Tableau::new(stages)?, work: Work::default(), control: Control::default(), is_hard: true })
     }
 
     fn id(&self) -> &'static str {
@@ -200,6 +220,17 @@ impl Radau {
         }
     }
 
+    /// Looks for events in the step just made.
+    fn meet<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) -> Met {
+        if field.events() == 0 {
+            return Met::Whole;
+        }
+        let mut search = std::mem::take(&mut self.work.search);
+        let met = search.meet(field, self, state, h, tally);
+        self.work.search = search;
+        met
+    }
+
     /// The component that asks most of the step.
     fn culprit<F: Field + ?Sized>(&self, field: &F) -> String {
         let share = |k: usize| {
@@ -277,43 +308,33 @@ impl<F: Field + ?Sized> Method<F> for Radau {
         2 * self.tableau.stages() as u32 - 1
     }
 
-    fn advance(
-        &mut self,
-        field: &mut F,
-        state: &mut State,
-        until: Time,
-        tally: &mut Tally,
-        watch: &mut Watch<F>,
-    ) -> Result<Reached, StepError> {
-        let (d, events) = (state.y.len(), field.events());
+    fn begin(&mut self, field: &mut F, state: &mut State, until: Time) -> Result<(), StepError> {
+        let d = state.y.len();
         super::refuse_the_past(self.id(), state, until, field.time_unit())?;
         self.resize(d);
         super::units(field, d, &mut self.work.units);
-        let mut left = (until - state.time).hi;
         let mut control = Control { wanted: 0.0, accepted: 0.0, error: 1.0, contraction: 1.0, keeps: 0.0 };
-        let knows = self.recall(state, &mut control);
-        let (mut has_start, mut is_hard, mut cuts) = (false, !knows, 0);
-        while left > 0.0 {
-            if !has_start {
-                field.fine_rate(state.time, &state.y, &state.low, &mut self.work.start);
-                tally.evaluations += 1;
-                scales(self.tolerance, &state.y, &self.work.units, &mut self.work.scale);
-                has_start = true;
-            }
-            if control.wanted == 0.0 {
-                control.wanted = self.first_step(state, left, 1e-6 * field.time_unit());
-            }
+        self.is_hard = !self.recall(state, &mut control);
+        self.control = control;
+        Ok(())
+    }
+
+    fn step(&mut self, field: &mut F, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
+        let (d, left) = (state.y.len(), (until - state.time).hi);
+        field.fine_rate(state.time, &state.y, &state.low, &mut self.work.start);
+        tally.evaluations += 1;
+        scales(self.tolerance, &state.y, &self.work.units, &mut self.work.scale);
+        let (mut control, mut cuts) = (self.control, 0);
+        if control.wanted == 0.0 {
+            control.wanted = self.first_step(state, left, 1e-6 * field.time_unit());
+        }
+        loop {
             let (h, whole) = super::reach(control.wanted, left);
             tally.check(self.id(), state.time.hi, h)?;
             if h < super::finest(state, field.time_unit()) && !whole {
                 let what = format!("{} asks for ever smaller steps", self.culprit(field));
-                return Err(self.stop(
-                    Cause::StepTooSmall,
-                    state,
-                    h,
-                    what,
-                    "loosen the tolerance: forces of stiff springs have a rounding of their own",
-                ));
+                let hint = "loosen the tolerance: forces of stiff springs have a rounding of their own";
+                return Err(self.stop(Cause::StepTooSmall, state, h, what, hint));
             }
             let is_fresh = control.keeps == 0.0 && !(self.work.place.0 == state.time && self.work.place.1 == state.y);
             if (is_fresh || self.work.jacobian.is_empty()) && !self.differentiate(field, is_fresh.then_some(&*state), tally) {
@@ -329,12 +350,12 @@ impl<F: Field + ?Sized> Method<F> for Radau {
                 Solved::Converged(theta, sweeps) => (theta, sweeps),
                 Solved::Slow(factor) => {
                     tally.rejected += 1;
-                    (is_hard, control.wanted, control.keeps) = (true, h * factor, 0.0);
+                    (self.is_hard, control.wanted, control.keeps) = (true, h * factor, 0.0);
                     continue;
                 }
                 Solved::NotFinite => (f64::NAN, 0),
             };
-            let error = if sweeps > 0 { self.estimate(field, state, h, is_hard, tally).max(1e-10) } else { f64::NAN };
+            let error = if sweeps > 0 { self.estimate(field, state, h, self.is_hard, tally).max(1e-10) } else { f64::NAN };
             if !error.is_finite() {
                 cuts += 1;
                 tally.rejected += 1;
@@ -343,68 +364,43 @@ impl<F: Field + ?Sized> Method<F> for Radau {
                     let hint = "look for a spring of length zero or a position without inertia";
                     return Err(self.stop(Cause::NotFinite, state, h, what, hint));
                 }
-                (is_hard, control.wanted, control.keeps) = (true, 0.1 * h, 0.0);
+                (self.is_hard, control.wanted, control.keeps) = (true, 0.1 * h, 0.0);
                 continue;
             }
             cuts = 0;
             let (exponent, most) = (1.0 / (self.tableau.stages() as f64 + 1.0), if self.tableau.stages() == 3 { 7.0 } else { 12.0 });
             let factor = SAFE.min(SAFE * (1.0 + 2.0 * most) / (sweeps as f64 + 2.0 * most));
-            let mut quotient = (libm::pow(error, exponent) / factor).clamp(QUOTIENT[0], QUOTIENT[1]);
+            let quotient = (libm::pow(error, exponent) / factor).clamp(QUOTIENT[0], QUOTIENT[1]);
             if error >= 1.0 {
                 tally.rejected += 1;
                 let is_first = control.accepted == 0.0;
-                (is_hard, control.wanted, control.keeps) = (true, if is_first { 0.1 * h } else { h / quotient }, 0.0);
+                (self.is_hard, control.wanted, control.keeps) = (true, if is_first { 0.1 * h } else { h / quotient }, 0.0);
                 continue;
             }
-            let mut h = h;
-            let mut reached = if whole { Some(Reached::Until) } else { None };
-            if events > 0 {
-                let mut search = std::mem::take(&mut self.work.search);
-                let met = search.meet(field, self, state, h, tally);
-                self.work.search = search;
-                match met {
-                    Met::Whole => {}
-                    Met::Short(short) => (h, reached) = (short, None),
-                    Met::Event(short, event) => (h, reached) = (short, Some(Reached::Event(event))),
-                    Met::Failed if h > super::finest(state, field.time_unit()) => {
-                        tally.rejected += 1;
-                        (is_hard, control.wanted) = (true, h / 8.0);
-                        continue;
-                    }
-                    Met::Failed | Met::AtRest => return Err(super::at_rest(self.id(), state, h)),
+            let (h, event, lands) = match self.meet(field, state, h, tally) {
+                Met::Whole => (h, None, whole),
+                Met::Short(short) => (short, None, false),
+                Met::Event(short, event) => (short, Some(event), false),
+                Met::Failed if h > super::finest(state, field.time_unit()) => {
+                    tally.rejected += 1;
+                    (self.is_hard, control.wanted) = (true, h / 8.0);
+                    continue;
                 }
-            }
-            if control.accepted > 0.0 {
-                let predicted = (control.accepted / h) * libm::pow(error * error / control.error, exponent) / SAFE;
-                quotient = quotient.max(predicted.clamp(QUOTIENT[0], QUOTIENT[1]));
-            }
-            let grown = if is_hard && control.accepted > 0.0 { (h / quotient).min(h) } else { h / quotient };
-            (control.accepted, control.error) = (h, error.max(1e-2));
-            control.keeps = f64::from(theta <= KEPT);
-            let same = theta <= KEPT && (1.0..=SAME).contains(&(grown / h));
-            let proposed = if same { h } else { grown };
-            // A step cut short says nothing against the longer one proposed before it.
-            control.wanted = if h < control.wanted { proposed.max(control.wanted) } else { proposed };
-            is_hard = false;
+                Met::Failed | Met::AtRest => return Err(super::at_rest(self.id(), state, h)),
+            };
+            control.accept(h, error, exponent, quotient, theta, self.is_hard);
+            self.is_hard = false;
+            self.control = control;
             self.work.last.copy_from_slice(&self.work.z);
             self.work.length = h;
             state.y.copy_from_slice(&self.work.next);
             state.low.copy_from_slice(&self.work.next_low);
-            state.time = if reached == Some(Reached::Until) { until } else { state.time + DoubleDouble::of(h) };
+            state.time = if lands { until } else { state.time + DoubleDouble::of(h) };
             state.wrap();
             self.remember(state, &control);
             tally.steps += 1;
-            has_start = false;
-            let seen = watch(field, state)?;
-            if let Some(reached) = reached {
-                return Ok(reached);
-            }
-            if seen.is_enough() {
-                return Ok(Reached::Pause);
-            }
-            left = (until - state.time).hi;
+            return Ok(event);
         }
-        Ok(Reached::Until)
     }
 
     fn is_dense(&self) -> bool {
@@ -525,7 +521,7 @@ mod tests {
             let mut state = State { y: vec![1.0, 3.0], low: vec![0.0; 2], ..State::default() };
             let mut tally = Tally::default();
             let reached = radau.advance(&mut Fast, &mut state, Time::of(2.0), &mut tally, &mut |_, _| Ok(super::super::Seen::Kept));
-            assert_eq!(reached, Ok(Reached::Until));
+            assert_eq!(reached, Ok(crate::stepping::Reached::Until));
             let exact = (-2.0_f64).exp();
             assert!(state.y.iter().all(|y| (y - exact).abs() < 1e-7), "{:?}", state.y);
             assert!(tally.steps < 200 && tally.evaluations < 1500, "{tally:?}");

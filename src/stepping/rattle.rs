@@ -28,7 +28,7 @@ mod substep;
 
 use self::substep::{Failure, Work};
 use super::composition::Composition;
-use super::{Cause, Method, Reached, StepError, Tally, Watch};
+use super::{Cause, Method, StepError, Tally};
 use crate::arithmetic::Scalar;
 use crate::dynamics::natural::Natural;
 use crate::dynamics::{State, Time};
@@ -42,6 +42,8 @@ pub struct Rattle {
     /// Time from the start of the step to the end of each substep \[s\].
     ends: Vec<Time>,
     work: Work,
+    /// True where the state was changed since the last step.
+    is_stale: bool,
 }
 
 impl Rattle {
@@ -57,7 +59,7 @@ impl Rattle {
         if let Some(last) = ends.last_mut() {
             *last = Time::of(step);
         }
-        Self { composition, step, substeps, ends, work: Work::default() }
+        Self { composition, step, substeps, ends, work: Work::default(), is_stale: false }
     }
 
     /// The step \[s\].
@@ -69,6 +71,23 @@ impl Rattle {
     pub fn composition(&self) -> Composition {
         self.composition
     }
+}
+
+/// Calls a method for the numbers of bodies compiled in, and whether there are guides or feet: `sized!(problem, state, receiver.method(arguments))`.
+macro_rules! sized {
+    ($problem:expr, $state:expr, $object:ident $(. $part:ident)+ ($($argument:expr),*)) => {{
+        let turns = $state.turns.len();
+        let (is_plain, bodies) = ($problem.guides().is_empty() && $problem.elements() == turns, if $problem.elements() == turns { turns } else { 0 });
+        match (bodies, is_plain) {
+            (1, true) => $object $(. $part)+::<1, false>($($argument),*),
+            (2, true) => $object $(. $part)+::<2, false>($($argument),*),
+            (3, true) => $object $(. $part)+::<3, false>($($argument),*),
+            (4, true) => $object $(. $part)+::<4, false>($($argument),*),
+            (_, true) => $object $(. $part)+::<0, false>($($argument),*),
+            (2, false) => $object $(. $part)+::<2, true>($($argument),*),
+            (_, false) => $object $(. $part)+::<0, true>($($argument),*),
+        }
+    }};
 }
 
 impl Method<Natural> for Rattle {
@@ -85,67 +104,53 @@ impl Method<Natural> for Rattle {
         self.composition.order()
     }
 
-    fn advance(
-        &mut self,
-        problem: &mut Natural,
-        state: &mut State,
-        until: Time,
-        tally: &mut Tally,
-        watch: &mut Watch<Natural>,
-    ) -> Result<Reached, StepError> {
-        let is_plain = problem.guides().is_empty() && problem.elements() == state.turns.len();
-        let bodies = if problem.elements() == state.turns.len() { state.turns.len() } else { 0 };
-        match (bodies, is_plain) {
-            (1, true) => self.march::<1, false>(problem, state, until, tally, watch),
-            (2, true) => self.march::<2, false>(problem, state, until, tally, watch),
-            (3, true) => self.march::<3, false>(problem, state, until, tally, watch),
-            (4, true) => self.march::<4, false>(problem, state, until, tally, watch),
-            (_, true) => self.march::<0, false>(problem, state, until, tally, watch),
-            (2, false) => self.march::<2, true>(problem, state, until, tally, watch),
-            (_, false) => self.march::<0, true>(problem, state, until, tally, watch),
+    fn begin(&mut self, problem: &mut Natural, state: &mut State, _until: Time) -> Result<(), StepError> {
+        if self.step == 0.0 || !self.step.is_finite() {
+            return Err(self.refuse(state.time.hi));
         }
+        self.work.resize(problem);
+        sized!(problem, state, self.work.load(problem, state));
+        self.is_stale = false;
+        Ok(())
+    }
+
+    fn step(&mut self, problem: &mut Natural, state: &mut State, _until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
+        tally.check(Method::name(self), state.time.hi, self.step)?;
+        if std::mem::take(&mut self.is_stale) {
+            sized!(problem, state, self.work.load(problem, state));
+        }
+        sized!(problem, state, self.substeps(problem, state, tally))?;
+        state.time += Time::of(self.step);
+        self.work.store(state);
+        tally.steps += 1;
+        Ok(None)
+    }
+
+    fn is_at(&self, state: &State, until: Time) -> bool {
+        ((until - state.time).hi / self.step).round() <= 0.0
+    }
+
+    fn changed(&mut self, state: &mut State) {
+        state.memory.clear();
+        self.is_stale = true;
     }
 }
 
 impl Rattle {
-    /// Whole steps to the time nearest to `until`, for `N` bodies (any number where `N` is 0), with guides or feet where `GUIDED`.
-    fn march<const N: usize, const GUIDED: bool>(
+    /// All substeps of a step, for `N` bodies (any number where `N` is 0), with guides or feet where `GUIDED`.
+    fn substeps<const N: usize, const GUIDED: bool>(
         &mut self,
-        natural: &mut Natural,
-        state: &mut State,
-        until: Time,
+        natural: &Natural,
+        state: &State,
         tally: &mut Tally,
-        watch: &mut Watch<Natural>,
-    ) -> Result<Reached, StepError> {
-        if self.step == 0.0 || !self.step.is_finite() {
-            return Err(self.refuse(state.time.hi));
+    ) -> Result<(), StepError> {
+        for (&h, &end) in self.substeps.iter().zip(&self.ends) {
+            if let Err(failure) = self.work.substep::<N, GUIDED>(natural, h, state.time + end) {
+                return Err(self.explain(natural, state.time.hi, failure));
+            }
+            tally.evaluations += 1;
         }
-        let count = ((until - state.time).hi / self.step).round();
-        self.work.resize(natural);
-        self.work.load::<N, GUIDED>(natural, state);
-        let mut done = 0.0;
-        while done < count {
-            tally.check(Method::name(self), state.time.hi, self.step)?;
-            for (&h, &end) in self.substeps.iter().zip(&self.ends) {
-                if let Err(failure) = self.work.substep::<N, GUIDED>(natural, h, state.time + end) {
-                    return Err(self.explain(natural, state.time.hi, failure));
-                }
-                tally.evaluations += 1;
-            }
-            state.time += Time::of(self.step);
-            self.work.store(state);
-            tally.steps += 1;
-            done += 1.0;
-            let seen = watch(natural, state)?;
-            if seen.is_changed() {
-                state.memory.clear();
-                self.work.load::<N, GUIDED>(natural, state);
-            }
-            if seen.is_enough() {
-                return Ok(Reached::Pause);
-            }
-        }
-        Ok(Reached::Until)
+        Ok(())
     }
 
     fn refuse(&self, t: f64) -> StepError {

@@ -44,7 +44,7 @@ use self::expansion::Expansion;
 use self::fast::Fast;
 use self::jump::Leap;
 use super::search::{self, Crossing, Powers};
-use super::{Cause, Method, Reached, StepError, Tally, Tolerance, Watch};
+use super::{Cause, Method, StepError, Tally, Tolerance};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics;
 use crate::dynamics::series::Coefficient;
@@ -148,59 +148,45 @@ impl<T: Coefficient, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
         self.order as u32
     }
 
-    fn advance(
-        &mut self,
-        problem: &mut P,
-        state: &mut State,
-        until: Time,
-        tally: &mut Tally,
-        watch: &mut Watch<P>,
-    ) -> Result<Reached, StepError> {
+    fn begin(&mut self, problem: &mut P, state: &mut State, until: Time) -> Result<(), StepError> {
         super::refuse_the_past("taylor", state, until, problem.time_unit())?;
         self.choose(problem, state)?;
         state.memory.clear();
-        loop {
-            let left = until - state.time;
-            if left.hi <= 0.0 {
-                return Ok(Reached::Until);
+        Ok(())
+    }
+
+    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
+        let left = until - state.time;
+        tally.check("taylor", state.time.hi, 0.0)?;
+        tally.evaluations += 1;
+        let quick = self.fast.as_mut().and_then(|fast| fast.step(state, left.hi));
+        self.by_series = quick.is_none();
+        let (wanted, mut h) = quick.unwrap_or_else(|| self.expand(problem, state, left.hi));
+        let hint = "look for a spring of length zero or a position without inertia";
+        if wanted.is_nan() {
+            let lost = problem.label(problem.angles() + self.expansion.as_ref().map_or(0, Expansion::lost));
+            return Err(stop(Cause::NotFinite, state, 0.0, format!("the series of {lost} is not finite"), hint));
+        }
+        if wanted < super::finest(state, problem.time_unit()) {
+            if self.by_series && self.expansion.as_ref().is_some_and(|expansion| jump::is_near(problem, expansion)) {
+                let what = "the constraints are dependent here, and no way through the singular position is confirmed".into();
+                return Err(stop(Cause::BranchLost, state, wanted, what, jump::HINT));
             }
-            tally.check("taylor", state.time.hi, 0.0)?;
-            tally.evaluations += 1;
-            let quick = self.fast.as_mut().and_then(|fast| fast.step(state, left.hi));
-            self.by_series = quick.is_none();
-            let (wanted, mut h) = quick.unwrap_or_else(|| self.expand(problem, state, left.hi));
-            let hint = "look for a spring of length zero or a position without inertia";
-            if wanted.is_nan() {
-                let lost = problem.label(problem.angles() + self.expansion.as_ref().map_or(0, Expansion::lost));
-                return Err(stop(Cause::NotFinite, state, 0.0, format!("the series of {lost} is not finite"), hint));
+            return Err(stop(Cause::StepTooSmall, state, wanted, "the series converges in ever smaller circles".into(), hint));
+        }
+        let mut event = None;
+        if self.by_series {
+            if problem.events() > 0 {
+                (h, event) = self.meet(problem, state, h)?;
             }
-            if wanted < super::finest(state, problem.time_unit()) {
-                if self.by_series && self.expansion.as_ref().is_some_and(|expansion| jump::is_near(problem, expansion)) {
-                    let what = "the constraints are dependent here, and no way through the singular position is confirmed".into();
-                    return Err(stop(Cause::BranchLost, state, wanted, what, jump::HINT));
-                }
-                return Err(stop(Cause::StepTooSmall, state, wanted, "the series converges in ever smaller circles".into(), hint));
-            }
-            let mut event = None;
-            if self.by_series {
-                if problem.events() > 0 {
-                    (h, event) = self.meet(problem, state, h)?;
-                }
-                if let Some(expansion) = &self.expansion {
-                    expansion.go(state, if h == left.hi { left } else { DoubleDouble::from(h) });
-                }
-            }
-            state.time = if h == left.hi { until } else { state.time + h };
-            state.wrap();
-            tally.steps += 1;
-            let seen = watch(problem, state)?;
-            if let Some(event) = event {
-                return Ok(Reached::Event(event));
-            }
-            if seen.is_enough() {
-                return Ok(Reached::Pause);
+            if let Some(expansion) = &self.expansion {
+                expansion.go(state, if h == left.hi { left } else { DoubleDouble::from(h) });
             }
         }
+        state.time = if h == left.hi { until } else { state.time + h };
+        state.wrap();
+        tally.steps += 1;
+        Ok(event)
     }
 
     fn is_dense(&self) -> bool {

@@ -12,7 +12,7 @@
 //!
 //! The step the crate found is passed on to the next window through the state's memory.
 
-use super::{Cause, Ends, Method, Reached, StepError, Tally, Tolerance, Watch};
+use super::{Cause, Ends, Method, StepError, Tally, Tolerance};
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Field, State, Time};
 use nalgebra::{DVector, SVector};
@@ -159,26 +159,6 @@ struct Stepper<'a> {
 /// What integrates one window: it, the unknowns, its length \[s\], the first step \[s\], and most steps.
 type Integrate<'a, F> = dyn FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome + 'a;
 
-/// One window of either method, or as many as its rows fill.
-fn window<F: Field + ?Sized>(
-    stepper: &mut Stepper,
-    integrate: &mut Integrate<F>,
-    field: &mut F,
-    state: &mut State,
-    until: Time,
-    tally: &mut Tally,
-    watch: &mut Watch<F>,
-) -> Result<Reached, StepError> {
-    super::refuse_the_past(stepper.name, state, until, field.time_unit())?;
-    while (until - state.time).hi > 0.0 {
-        part(stepper, integrate, field, state, until, tally)?;
-        if watch(field, state)?.is_enough() && state.time < until {
-            return Ok(Reached::Pause);
-        }
-    }
-    Ok(Reached::Until)
-}
-
 /// One call of the crate: to `until`, or to where its rows are as many as may be kept.
 fn part<F: Field + ?Sized>(
     stepper: &mut Stepper,
@@ -269,14 +249,12 @@ impl<F: Field + ?Sized> Method<F> for Dopri5 {
     /// What it remembers is the step found.
     fn reset(&mut self, _state: &mut State) {}
 
-    fn advance(
-        &mut self,
-        field: &mut F,
-        state: &mut State,
-        until: Time,
-        tally: &mut Tally,
-        watch: &mut Watch<F>,
-    ) -> Result<Reached, StepError> {
+    fn begin(&mut self, field: &mut F, state: &mut State, until: Time) -> Result<(), StepError> {
+        super::refuse_the_past("dopri5", state, until, field.time_unit())
+    }
+
+    /// One window.
+    fn step(&mut self, field: &mut F, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
         let Self { tolerance, ends } = self;
         let (tolerance, keeps) = (*tolerance, ends.is_some());
         let mut integrate = |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| -> Outcome {
@@ -284,7 +262,8 @@ impl<F: Field + ?Sized> Method<F> for Dopri5 {
             by_length!(ode_solvers::Dopri5<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
         };
         let mut stepper = Stepper { name: "dopri5", attempt: 6, accepted: 0, ends: ends.as_mut() };
-        window(&mut stepper, &mut integrate, field, state, until, tally, watch)
+        part(&mut stepper, &mut integrate, field, state, until, tally)?;
+        Ok(None)
     }
 
     fn keep_ends(&mut self, keep: bool) {
@@ -308,14 +287,12 @@ impl<F: Field + ?Sized> Method<F> for Dop853 {
     /// What it remembers is the step found.
     fn reset(&mut self, _state: &mut State) {}
 
-    fn advance(
-        &mut self,
-        field: &mut F,
-        state: &mut State,
-        until: Time,
-        tally: &mut Tally,
-        watch: &mut Watch<F>,
-    ) -> Result<Reached, StepError> {
+    fn begin(&mut self, field: &mut F, state: &mut State, until: Time) -> Result<(), StepError> {
+        super::refuse_the_past("dop853", state, until, field.time_unit())
+    }
+
+    /// One window.
+    fn step(&mut self, field: &mut F, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
         let Self { tolerance, ends } = self;
         let (tolerance, keeps) = (*tolerance, ends.is_some());
         let mut integrate = |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| -> Outcome {
@@ -323,7 +300,8 @@ impl<F: Field + ?Sized> Method<F> for Dop853 {
             by_length!(ode_solvers::Dop853<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
         };
         let mut stepper = Stepper { name: "dop853", attempt: 11, accepted: 1, ends: ends.as_mut() };
-        window(&mut stepper, &mut integrate, field, state, until, tally, watch)
+        part(&mut stepper, &mut integrate, field, state, until, tally)?;
+        Ok(None)
     }
 
     fn keep_ends(&mut self, keep: bool) {

@@ -9,7 +9,7 @@ use crate::arithmetic::lanes::{self, Code, Lanes, Portable};
 use crate::arithmetic::sum::{fused, two_sum};
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Field, Points, State, Time};
-use crate::stepping::{Reached, StepError, Tally, Watch};
+use crate::stepping::{StepError, Tally};
 
 /// Scratch space of d unknowns.
 #[derive(Clone, Debug, Default)]
@@ -59,37 +59,21 @@ struct Step<'a> {
     angles: usize,
 }
 
-/// `count` steps of `scratch.step`, or as many as the watcher wants.
-pub(super) fn march<F: Field + ?Sized>(
-    gauss: &mut Gauss,
-    problem: &mut F,
-    state: &mut State,
-    count: u64,
-    tally: &mut Tally,
-    watch: &mut Watch<F>,
-) -> Result<Reached, StepError> {
-    for _ in 0..count {
-        tally.check(gauss.label(), state.time.hi, gauss.scratch.step)?;
-        let Gauss { tableau, scratch, exact, newton, slow, portable, .. } = &mut *gauss;
-        let exact = if problem.has_exact_rates() { *exact } else { 0 };
-        let mut step = Step { tableau, scratch, exact, newton, slow: *slow, angles: problem.angles() };
-        lanes::run(Take { step: &mut step, problem: &mut Of(problem), state, tally }, *portable);
-        if gauss.scratch.newton_left == NEWTON_STEPS {
-            gauss.follow(problem, state)?;
-        }
-        gauss.check(problem, state)?;
-        gauss.scratch.commit(state, gauss.tableau.nodes.len());
-        tally.steps += 1;
-        tally.newton_steps += u64::from(gauss.scratch.newton_left > 0.0);
-        let seen = watch(problem, state)?;
-        if seen.is_changed() {
-            state.memory.clear();
-        }
-        if seen.is_enough() {
-            return Ok(Reached::Pause);
-        }
+/// One step of `scratch.step`.
+pub(super) fn step<F: Field + ?Sized>(gauss: &mut Gauss, problem: &mut F, state: &mut State, tally: &mut Tally) -> Result<(), StepError> {
+    tally.check(gauss.label(), state.time.hi, gauss.scratch.step)?;
+    let Gauss { tableau, scratch, exact, newton, slow, portable, .. } = &mut *gauss;
+    let exact = if problem.has_exact_rates() { *exact } else { 0 };
+    let mut step = Step { tableau, scratch, exact, newton, slow: *slow, angles: problem.angles() };
+    lanes::run(Take { step: &mut step, problem: &mut Of(problem), state, tally }, *portable);
+    if gauss.scratch.newton_left == NEWTON_STEPS {
+        gauss.follow(problem, state)?;
     }
-    Ok(Reached::Until)
+    gauss.check(problem, state)?;
+    gauss.scratch.commit(state, gauss.tableau.nodes.len());
+    tally.steps += 1;
+    tally.newton_steps += u64::from(gauss.scratch.newton_left > 0.0);
+    Ok(())
 }
 
 /// What a step asks of a field.
