@@ -4,7 +4,7 @@
 use super::flip::{self, Flip, Lookout, Suspect};
 use super::impact_monitor::closed;
 use super::methods::{MethodId, Stabilization};
-use super::monitor::{Monitor, lent};
+use super::monitor::Monitor;
 use super::plan::Plan;
 use super::shrink::{Shrinking, shrinking};
 use super::wall_guard::WallGuard;
@@ -18,7 +18,7 @@ use crate::dynamics::{Field, Form, Glance, Mechanism, Motion, State, Time};
 use crate::stabilization::{Baumgarte, Projected, SymmetricGauss};
 use crate::stepping::gauss::Gauss;
 use crate::stepping::rattle::Rattle;
-use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Method, Radau, Reached, Seen, StepError, Tally, Taylor, Tolerance};
+use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Method, Radau, Reached, StepError, Tally, Taylor, Tolerance};
 use std::sync::Arc;
 
 /// Turns that a state may have at most: all that doubles count.
@@ -86,16 +86,18 @@ pub(super) struct Place {
     /// Where a dense method began its last step; without unknowns where it made none.
     from: State,
     ahead: Option<usize>,
+    /// False where the state is not the end of that step.
+    goes_on: bool,
     /// What the method knows beside.
     known: Vec<f64>,
 }
 
-/// What can be seen of the steps of a method that is not dense.
+/// What can be seen of the steps of a method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Steps {
-    /// Each of them; the method can also march a part of one.
-    Own,
-    /// Each of them, all of one length.
+    /// Each of them, and the solution inside: they are as long as the method likes.
+    Dense,
+    /// Each of them, all of one length; output times are ends of steps.
     Fixed,
     /// Nothing but the time asked for.
     Unseen,
@@ -106,7 +108,7 @@ struct Marcher<P: ?Sized, M> {
     method: M,
     state: State,
     tally: Tally,
-    /// Where a dense method began its last step.
+    /// Where the last step began.
     from: State,
     /// The motion at an output time inside that step, while it is the one to be read.
     inside: State,
@@ -115,8 +117,10 @@ struct Marcher<P: ?Sized, M> {
     observed: Motion,
     /// The event the last step ended with, where output times came first.
     ahead: Option<usize>,
+    /// True where the state is the end of the method's last step, so that it goes on from there.
+    goes_on: bool,
     steps: Steps,
-    /// What marches parts of steps where the method cannot, once one is needed.
+    /// What integrates parts of steps where the method has no solution inside, once one is needed.
     tracer: Option<Box<dyn March>>,
     /// Watches the walls, where there are any.
     guard: Option<WallGuard>,
@@ -132,87 +136,38 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
         pause: &mut Pause,
     ) -> Result<Reached, StepError> {
         let mut lookout = lookout.filter(|lookout| lookout.flip.is_none());
-        if !self.method.is_dense() {
-            return self.land_watched(until, lookout, monitor, pause);
-        }
-        let Self { problem, method, state, tally, from, inside, is_inside, ahead, guard, observed, .. } = self;
-        let (name, mut glance, mut suspect) = (Method::<P>::name(method), Glance::default(), None);
-        // Steps are as long as the method likes; output times are read off them.
-        *is_inside = false;
-        while state.time < until {
-            if let Some(event) = ahead.take() {
+        let is_dense = self.steps == Steps::Dense;
+        // Dense methods take steps as long as they like; output times are read off them.
+        let target = if is_dense { horizon } else { until };
+        self.is_inside = false;
+        self.begin(target, lookout.as_deref_mut())?;
+        while if is_dense { self.state.time < until } else { !self.method.is_at(&self.state, until) } {
+            if let Some(event) = self.ahead.take() {
                 return Ok(Reached::Event(event));
             }
-            from.clone_from(state);
-            let mut paused = false;
+            self.method.keep_ends(self.steps == Steps::Unseen && monitor.as_ref().is_some_and(|monitor| monitor.due() < until.hi));
+            self.method.save(&mut self.state);
+            self.from.clone_from(&self.state);
+            let event = self.method.step(&mut self.problem, &mut self.state, target, &mut self.tally)?;
+            self.check_walls()?;
             if let Some(lookout) = &mut lookout {
-                lookout.begin(&mut **problem, state);
+                self.look_for_flips(lookout);
             }
-            if let Some(guard) = guard {
-                problem.glance(state, &mut glance);
-                guard.begin(problem.mechanism(), state.time.hi, &glance);
+            if let Some(monitor) = &mut monitor {
+                self.show(*monitor);
             }
-            let reached = method.advance(problem, state, horizon, tally, &mut |problem, state| {
-                if let Some(guard) = guard {
-                    problem.glance(state, &mut glance);
-                    suspect = guard.step(problem.mechanism(), state.time.hi, &glance).map_err(|passed| passed.stop(name))?;
-                }
-                // A step in which a bar may have turned over is searched before the next one.
-                paused = pause();
-                let enough = lookout.as_mut().is_some_and(|lookout| lookout.step(problem, state, false))
-                    || state.time >= until
-                    || paused
-                    || suspect.is_some()
-                    || monitor.as_ref().is_some_and(|monitor| monitor.due() <= state.time.hi);
-                if !enough {
-                    from.clone_from(state);
-                }
-                Ok(if enough { Seen::Enough } else { Seen::Kept })
-            })?;
-            if let Some((guard, contact)) = guard.as_ref().zip(suspect.take()) {
-                let (span, mechanism) = (state.time - from.time, problem.mechanism().clone());
-                let mut at = |share: f64| {
-                    method.within(problem, from, from.time + span.scale(share), inside);
-                    let mut glance = Glance::default();
-                    problem.glance(inside, &mut glance);
-                    Some((inside.time.hi, glance))
-                };
-                guard.search(&mechanism, contact, &mut at).map_err(|passed| passed.stop(name))?;
+            if event.is_some() && self.state.time <= until {
+                return Ok(event.map_or(Reached::Until, Reached::Event));
             }
-            if let Some(lookout) = &mut lookout {
-                lookout.search(&mut |suspect| {
-                    let Suspect { from, span, ends } = suspect;
-                    flip::search(from.time.hi, *span, ends, &mut |seconds| {
-                        method.within(problem, from, from.time + seconds, inside);
-                        let mut glance = Glance::default();
-                        flip::look(&mut **problem, inside, &mut glance);
-                        Some(glance)
-                    })
-                });
-            }
-            while let Some(monitor) = lent(&mut monitor).filter(|monitor| monitor.due() <= state.time.hi) {
-                if monitor.due() > from.time.hi && monitor.due() < state.time.hi {
-                    method.within(problem, from, Time::from(monitor.due()), inside);
-                    problem.read(inside, observed);
-                } else {
-                    problem.read(state, observed);
-                }
-                monitor.observe(observed, *tally);
-            }
-            if let Reached::Event(event) = reached {
-                if state.time <= until {
-                    return Ok(reached);
-                }
-                *ahead = Some(event);
-            }
-            if paused && state.time < until {
+            self.ahead = event;
+            if pause() && self.state.time < until {
                 return Ok(Reached::Pause);
             }
         }
-        Method::<P>::arrive(method, state);
-        if state.time > until {
+        if self.state.time > until && is_dense {
+            let Self { problem, method, from, inside, .. } = self;
             method.within(problem, from, until, inside);
-            *is_inside = true;
+            self.is_inside = true;
         }
         Ok(Reached::Until)
     }
@@ -226,6 +181,7 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
         self.state = self.problem.state(motion);
         self.state.memory = memory;
         self.method.reset(&mut self.state);
+        self.goes_on = false;
     }
 
     fn tally(&self) -> Tally {
@@ -242,12 +198,14 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
 
     fn forget(&mut self) {
         self.state.memory.clear();
+        self.goes_on = false;
     }
 
     fn follow(&mut self, other: &dyn March) {
         self.tally = other.tally();
         self.state.memory = other.memory().to_vec();
         self.method.reset(&mut self.state);
+        self.goes_on = false;
     }
 
     fn guard(&mut self, closed: f64) {
@@ -255,13 +213,15 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
     }
 
     fn place(&self) -> Place {
-        Place { state: self.state.clone(), tally: self.tally, from: self.from.clone(), ahead: self.ahead, known: self.method.knows() }
+        let mut state = self.state.clone();
+        self.method.save(&mut state);
+        Place { state, tally: self.tally, from: self.from.clone(), ahead: self.ahead, goes_on: self.goes_on, known: self.method.knows() }
     }
 
     fn resume(&mut self, place: Place, horizon: Time) -> Result<bool, StepError> {
         let shape = |state: &State| (state.y.len(), state.low.len(), state.turns.len(), state.is_winding);
         let alike = |state: &State| shape(state) == shape(&self.state) && state.turns.iter().all(|turns| turns.unsigned_abs() < MOST_TURNS);
-        let steps_back = self.method.is_dense() && !place.from.y.is_empty() && place.from.time < place.state.time;
+        let steps_back = self.steps == Steps::Dense && place.goes_on && !place.from.y.is_empty() && place.from.time < place.state.time;
         let counts = [place.tally.steps, place.tally.evaluations, place.tally.rejected];
         let is_event = |event: usize| event < self.problem.mechanism().contacts.len();
         if counts.iter().any(|&count| count >= MOST_TURNS)
@@ -274,57 +234,96 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
         if steps_back {
             // What the method knows of the inside of its last step it finds again by repeating it.
             let mut state = place.from.clone();
-            self.method.advance(&mut self.problem, &mut state, horizon, &mut Tally::default(), &mut |_, _| Ok(Seen::Enough))?;
+            self.method.begin(&mut self.problem, &mut state, horizon)?;
+            self.method.step(&mut self.problem, &mut state, horizon, &mut Tally::default())?;
         }
-        (self.state, self.tally, self.from, self.ahead) = (place.state, place.tally, place.from, place.ahead);
+        (self.state, self.tally, self.from, self.ahead, self.goes_on) = (place.state, place.tally, place.from, place.ahead, steps_back);
         Ok(self.method.learn(&place.known))
     }
 }
 
 impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
-    /// Marches a method that is not dense to `until` itself, and shows the ends of its steps to a monitor when it is due.
-    fn land_watched(
-        &mut self,
-        until: Time,
-        mut lookout: Option<&mut Lookout>,
-        monitor: Option<&mut dyn Monitor>,
-        pause: &mut Pause,
-    ) -> Result<Reached, StepError> {
-        let Some(monitor) = monitor else { return self.land(until, lookout, pause) };
-        loop {
-            let (due, mut paused) = (monitor.due(), false);
-            let begun = (self.steps == Steps::Unseen && due < until.hi).then(|| self.state.clone());
-            self.method.keep_ends(begun.is_some());
-            let mut is_enough = || {
-                paused = pause();
-                paused
-            };
-            // What is kept of a window is gone with the next.
-            let due = if begun.is_some() { f64::NEG_INFINITY } else { due };
-            let reached = self.land_until(until, due, lookout.as_deref_mut(), &mut is_enough);
-            if let Some(begun) = begun {
-                self.show_ends(begun, monitor);
+    /// Makes everything ready for a step from the present state.
+    fn begin(&mut self, target: Time, lookout: Option<&mut Lookout>) -> Result<(), StepError> {
+        let Self { problem, method, state, guard, .. } = self;
+        if !std::mem::replace(&mut self.goes_on, self.steps == Steps::Dense) {
+            method.begin(problem, state, target)?;
+        }
+        if let Some(lookout) = lookout {
+            lookout.begin(&mut **problem, state);
+        }
+        if let Some(guard) = guard {
+            let mut glance = Glance::default();
+            problem.glance(state, &mut glance);
+            guard.begin(problem.mechanism(), state.time.hi, &glance);
+        }
+        Ok(())
+    }
+
+    /// Looks whether the last step has passed a wall.
+    fn check_walls(&mut self) -> Result<(), StepError> {
+        let Self { problem, method, state, guard: Some(guard), from, inside, .. } = self else { return Ok(()) };
+        let (name, mut glance) = (Method::<P>::name(method), Glance::default());
+        problem.glance(state, &mut glance);
+        let suspect = guard.step(problem.mechanism(), state.time.hi, &glance).map_err(|passed| passed.stop(name))?;
+        let Some(contact) = suspect.filter(|_| self.steps == Steps::Dense) else { return Ok(()) };
+        let (span, mechanism) = (state.time - from.time, problem.mechanism().clone());
+        let mut at = |share: f64| {
+            method.within(problem, from, from.time + span.scale(share), inside);
+            let mut glance = Glance::default();
+            problem.glance(inside, &mut glance);
+            Some((inside.time.hi, glance))
+        };
+        guard.search(&mechanism, contact, &mut at).map_err(|passed| passed.stop(name))
+    }
+
+    /// Looks for the first bar that turns over in the last step.
+    fn look_for_flips(&mut self, lookout: &mut Lookout) {
+        if !lookout.step(&mut *self.problem, &self.state, self.steps == Steps::Unseen) {
+            return;
+        }
+        lookout.search(&mut |suspect| {
+            if self.steps != Steps::Dense {
+                return self.traced(suspect);
             }
-            if self.state.time.hi >= monitor.due() {
-                self.problem.read(&self.state, &mut self.observed);
-                monitor.observe(&self.observed, self.tally);
+            let Self { problem, method, inside, .. } = self;
+            let Suspect { from, span, ends } = suspect;
+            flip::search(from.time.hi, *span, ends, &mut |seconds| {
+                method.within(problem, from, from.time + seconds, inside);
+                let mut glance = Glance::default();
+                flip::look(&mut **problem, inside, &mut glance);
+                Some(glance)
+            })
+        });
+    }
+
+    /// Shows the motion of the last step to a monitor where it is due.
+    fn show(&mut self, monitor: &mut dyn Monitor) {
+        if self.steps == Steps::Unseen {
+            self.show_ends(monitor);
+        }
+        let Self { problem, method, state, from, inside, observed, tally, .. } = self;
+        while monitor.due() <= state.time.hi {
+            if self.steps == Steps::Dense && monitor.due() > from.time.hi && monitor.due() < state.time.hi {
+                method.within(problem, from, Time::from(monitor.due()), inside);
+                problem.read(inside, observed);
+            } else {
+                problem.read(state, observed);
             }
-            if reached != Ok(Reached::Pause) || paused {
-                return reached;
-            }
+            monitor.observe(observed, *tally);
         }
     }
 
-    /// Shows what a method kept of the ends of its steps since `begun`.
-    fn show_ends(&mut self, begun: State, monitor: &mut dyn Monitor) {
-        let Self { problem, method, inside, observed, tally, .. } = self;
+    /// Shows what a method kept of the ends of its steps in the last window.
+    fn show_ends(&mut self, monitor: &mut dyn Monitor) {
+        let Self { problem, method, from, inside, observed, tally, .. } = self;
         let Some(ends) = method.ends() else { return };
-        for (&after, y) in ends.after.iter().zip(ends.y.chunks_exact(begun.y.len())) {
-            if begun.time.hi + after >= monitor.due() {
-                inside.clone_from(&begun);
+        for (&after, y) in ends.after.iter().zip(ends.y.chunks_exact(from.y.len())) {
+            if from.time.hi + after >= monitor.due() {
+                inside.clone_from(from);
                 inside.y.copy_from_slice(y);
                 inside.low.fill(0.0);
-                inside.time = begun.time + after;
+                inside.time = from.time + after;
                 inside.wrap();
                 problem.read(inside, observed);
                 monitor.observe(observed, *tally);
@@ -332,92 +331,20 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
         }
     }
 
-    /// Marches a method that is not dense to `until` itself.
-    fn land(&mut self, until: Time, lookout: Option<&mut Lookout>, pause: &mut Pause) -> Result<Reached, StepError> {
-        self.land_until(until, f64::INFINITY, lookout, pause)
-    }
-
-    /// The same, but it pauses where a step reaches `due` \[s\] too.
-    fn land_until(&mut self, until: Time, due: f64, mut lookout: Option<&mut Lookout>, pause: &mut Pause) -> Result<Reached, StepError> {
-        let Self { problem, method, state, tally, guard, .. } = self;
-        let (all, name, mut glance) = (self.steps == Steps::Unseen, Method::<P>::name(method), Glance::default());
-        let (mut from, mut suspects) = (State::default(), Vec::new());
-        if let Some(lookout) = &mut lookout {
-            lookout.begin(&mut **problem, state);
-        }
-        if let Some(guard) = guard {
-            problem.glance(state, &mut glance);
-            guard.begin(problem.mechanism(), state.time.hi, &glance);
-            from.clone_from(state);
-        }
-        let reached = method.advance(problem, state, until, tally, &mut |problem, state| {
-            if let Some(guard) = guard {
-                problem.glance(state, &mut glance);
-                if let Some(contact) = guard.step(problem.mechanism(), state.time.hi, &glance).map_err(|passed| passed.stop(name))? {
-                    suspects.push((contact, from.clone(), state.time - from.time));
-                }
-                from.clone_from(state);
-            }
-            if let Some(lookout) = &mut lookout {
-                lookout.step(problem, state, all);
-            }
-            Ok(if pause() || state.time.hi >= due { Seen::Enough } else { Seen::Kept })
-        });
-        if let Some(lookout) = &mut lookout {
-            lookout.search(&mut |suspect| if self.steps == Steps::Own { self.again(suspect) } else { self.traced(suspect) });
-        }
-        for (contact, from, span) in suspects {
-            self.look_again(contact, &from, span)?;
-        }
-        reached
-    }
-
-    /// Marches parts of a step again that may have passed the wall of a contact.
-    fn look_again(&mut self, contact: usize, from: &State, span: Time) -> Result<(), StepError> {
-        let Self { problem, method, guard: Some(guard), tally, .. } = self else { return Ok(()) };
-        let mechanism = problem.mechanism().clone();
-        let mut met = None;
-        let searched = guard.search(&mechanism, contact, |share| {
-            let (mut state, mut glance) = (from.clone(), Glance::default());
-            let mut effort = Tally { effort: tally.effort, ..Tally::default() };
-            match method.advance(problem, &mut state, from.time + span.scale(share), &mut effort, &mut |_, _| Ok(Seen::Kept)).ok()? {
-                Reached::Event(event) => met = met.or(Some((state.time.hi, event))),
-                Reached::Until | Reached::Pause => {}
-            }
-            problem.glance(&state, &mut glance);
-            Some((state.time.hi, glance))
-        });
-        let met = met.map_or(Ok(()), |(t, event)| guard.met(&mechanism, t, event));
-        searched.and(met).map_err(|passed| passed.stop(Method::<P>::name(method)))
-    }
-
-    /// The first bar that turns over in a step, parts of which are marched again; the run itself does not notice.
-    fn again(&mut self, Suspect { from, span, ends }: &Suspect) -> Option<Flip> {
-        flip::search(from.time.hi, *span, ends, &mut |seconds| {
-            let mut state = from.clone();
-            let until = state.time + seconds;
-            let mut tally = Tally { effort: self.tally.effort, ..Tally::default() };
-            self.method.advance(&mut self.problem, &mut state, until, &mut tally, &mut |_, _| Ok(Seen::Kept)).ok()?;
-            let mut glance = Glance::default();
-            flip::look(&mut *self.problem, &state, &mut glance);
-            Some(glance)
-        })
-    }
-
     /// The first bar that turns over in a step, which another method marches again.
-    fn traced(&mut self, Suspect { from, span, .. }: &Suspect) -> Option<Flip> {
+    fn traced(&mut self, &Suspect { ref from, span, .. }: &Suspect) -> Option<Flip> {
         let mut motion = Motion::default();
         self.problem.read(from, &mut motion);
         let tracer = self.tracer.get_or_insert_with(|| {
             let mechanism = Arc::new(self.problem.mechanism().clone());
             let tolerance = Tolerance { relative: 1e-13, absolute: 1e-13 };
-            marcher(sized!(mechanism.size(), form(&mechanism, Stabilization::None, 1.0)), Dp8::new(tolerance), &motion, Steps::Own)
+            marcher(sized!(mechanism.size(), form(&mechanism, Stabilization::None, 1.0)), Dp8::new(tolerance), &motion, Steps::Dense)
         });
         tracer.jump(&motion);
         tracer.forget();
         tracer.allow(tracer.tally().evaluations.saturating_add(self.tally.effort));
         let mut lookout = Lookout::default();
-        let until = from.time + *span;
+        let until = from.time + span;
         // Where that stops, what was seen up to there counts.
         let _ = tracer.advance(until, until, Some(&mut lookout), None, &mut || false);
         lookout.flip
@@ -445,6 +372,7 @@ fn boxed<P: Form + ?Sized + 'static, M: Method<P> + 'static>(problem: Box<P>, me
         is_inside: false,
         observed: Motion::default(),
         ahead: None,
+        goes_on: false,
         steps,
         tracer: None,
         guard: None,
@@ -499,10 +427,10 @@ fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<
     Ok(match plan.method {
         MethodId::Dopri5 => marcher(problem(), Dopri5::new(tolerance), start, Steps::Unseen),
         MethodId::Dop853 => marcher(problem(), Dop853::new(tolerance), start, Steps::Unseen),
-        MethodId::Dp5 if projected => marcher(problem(), Projected::new(Dp5::new(tolerance)), start, Steps::Own),
-        MethodId::Dp8 if projected => marcher(problem(), Projected::new(Dp8::new(tolerance)), start, Steps::Own),
-        MethodId::Dp5 => marcher(problem(), Dp5::new(tolerance), start, Steps::Own),
-        MethodId::Dp8 => marcher(problem(), Dp8::new(tolerance), start, Steps::Own),
+        MethodId::Dp5 if projected => marcher(problem(), Projected::new(Dp5::new(tolerance)), start, Steps::Dense),
+        MethodId::Dp8 if projected => marcher(problem(), Projected::new(Dp8::new(tolerance)), start, Steps::Dense),
+        MethodId::Dp5 => marcher(problem(), Dp5::new(tolerance), start, Steps::Dense),
+        MethodId::Dp8 => marcher(problem(), Dp8::new(tolerance), start, Steps::Dense),
         MethodId::Taylor if mechanism.vibration.is_some() => {
             return Err(cannot_begin(plan, "the mean force of a rigid spring's vibration has no series".into()));
         }
@@ -514,17 +442,17 @@ fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<
             let mut taylor = Taylor::new(tolerance);
             taylor.extended = plan.extended;
             match plan.stabilization {
-                Stabilization::None if mechanism.rows.is_empty() => marcher(sized!(n, eliminated(mechanism)), taylor, start, Steps::Own),
-                Stabilization::Projection => marcher(problem(), Projected::new(taylor), start, Steps::Own),
-                _ => marcher(problem(), taylor, start, Steps::Own),
+                Stabilization::None if mechanism.rows.is_empty() => marcher(sized!(n, eliminated(mechanism)), taylor, start, Steps::Dense),
+                Stabilization::Projection => marcher(problem(), Projected::new(taylor), start, Steps::Dense),
+                _ => marcher(problem(), taylor, start, Steps::Dense),
             }
         }
         MethodId::Radau(stages) => {
             let radau = Radau::new(stages, tolerance).ok_or_else(|| cannot_begin(plan, format!("no Radau method has {stages} stages")))?;
             if projected {
-                return Ok(marcher(problem(), Projected::new(radau), start, Steps::Own));
+                return Ok(marcher(problem(), Projected::new(radau), start, Steps::Dense));
             }
-            marcher(problem(), radau, start, Steps::Own)
+            marcher(problem(), radau, start, Steps::Dense)
         }
         MethodId::Gauss(stages) => {
             let gauss = Gauss::new(stages, step)
@@ -550,8 +478,8 @@ pub(super) fn order_in_double_double(tolerance: f64) -> usize {
 pub(super) fn exact(mechanism: &Arc<Mechanism>, start: &Motion, order: usize, tolerance: f64) -> Box<dyn March> {
     let taylor = Taylor::<DoubleDouble>::with_order(tolerance, order);
     match mechanism.has_multipliers() {
-        true => marcher(form::<0>(mechanism, Stabilization::None, 1.0), taylor, start, Steps::Own),
-        false => marcher(eliminated::<0>(mechanism), taylor, start, Steps::Own),
+        true => marcher(form::<0>(mechanism, Stabilization::None, 1.0), taylor, start, Steps::Dense),
+        false => marcher(eliminated::<0>(mechanism), taylor, start, Steps::Dense),
     }
 }
 

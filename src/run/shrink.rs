@@ -232,7 +232,7 @@ impl<P: Form + ?Sized> Method<P> for Shrinking<P> {
         self.method.changed(state);
     }
 
-    fn save(&mut self, state: &mut State) {
+    fn save(&self, state: &mut State) {
         self.method.save(state);
     }
 
@@ -242,10 +242,6 @@ impl<P: Form + ?Sized> Method<P> for Shrinking<P> {
 
     fn within(&mut self, problem: &mut P, from: &State, time: Time, inside: &mut State) {
         self.method.within(problem, from, time, inside);
-    }
-
-    fn arrive(&self, state: &mut State) {
-        self.method.arrive(state);
     }
 
     fn reset(&mut self, state: &mut State) {

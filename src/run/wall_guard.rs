@@ -101,16 +101,6 @@ impl WallGuard {
         }
         Ok(())
     }
-
-    /// The wall of an event that a part of a step has, and the step has not.
-    ///
-    /// # Errors
-    /// A wall that has been passed, where the event is no release.
-    pub fn met(&self, mechanism: &Mechanism, t: f64, event: usize) -> Result<(), Box<Passed>> {
-        let is_held = mechanism.held.contains(&event);
-        let wall = &mechanism.contacts[event].row.name;
-        if is_held { Ok(()) } else { Err(Box::new(Passed { t, wall: wall.clone(), gap: 0.0, is_held })) }
-    }
 }
 
 fn gaps(mechanism: &Mechanism, glance: &Glance) -> Vec<[f64; 2]> {
@@ -148,7 +138,6 @@ impl Passed {
         let Self { t, wall, gap, is_held } = self;
         let what = match is_held {
             true => format!("a point that is held at wall {wall} is {gap:.3e} m from it"),
-            false if gap == 0.0 => format!("a point meets wall {wall} and no impact was found"),
             false => format!("a point is {:.3e} m behind wall {wall} and no impact was found", -gap),
         };
         let hint = "tighten the tolerance, or use --method taylor".into();

@@ -27,8 +27,6 @@ pub struct Projected<M> {
     /// Energy less work after the last step, and whether that ended near a singular position.
     balance: Option<f64>,
     near: bool,
-    /// True where the last call ended with a pause: nothing has changed since.
-    has_paused: bool,
     /// Largest violation left that counts as converged, at both levels, in the units of the mechanism, relative to levers and
     /// speeds where these are larger.
     pub tolerance: f64,
@@ -37,7 +35,7 @@ pub struct Projected<M> {
 impl<M> Projected<M> {
     /// Projects after the steps of `inner`.
     pub fn new(inner: M) -> Self {
-        Self { inner, projector: None, balance: None, near: false, has_paused: false, tolerance: 1e-13 }
+        Self { inner, projector: None, balance: None, near: false, tolerance: 1e-13 }
     }
 }
 
@@ -89,11 +87,8 @@ where
     }
 
     fn begin(&mut self, problem: &mut P, state: &mut State, until: Time) -> Result<(), StepError> {
-        // What impacts change is not a step's.
-        if !problem.mechanism().contacts.is_empty() && !self.has_paused {
-            self.balance = None;
-        }
-        self.has_paused = false;
+        // What changes between steps is not a step's.
+        self.balance = None;
         self.projector.get_or_insert_with(|| Projector::new(problem));
         self.inner.begin(problem, state, until)
     }
@@ -115,17 +110,12 @@ where
         self.inner.changed(state);
     }
 
-    fn save(&mut self, state: &mut State) {
-        self.has_paused = true;
+    fn save(&self, state: &mut State) {
         self.inner.save(state);
     }
 
     fn is_dense(&self) -> bool {
         self.inner.is_dense()
-    }
-
-    fn arrive(&self, state: &mut State) {
-        self.inner.arrive(state);
     }
 
     /// What impacts change of the energy is not a step's.
@@ -136,14 +126,14 @@ where
 
     /// The balance after the last step, if any, and what there is to know of its end; then what the inner method knows.
     fn knows(&self) -> Vec<f64> {
-        let own = [f64::from(self.balance.is_some()), self.balance.unwrap_or_default(), f64::from(self.near), f64::from(self.has_paused)];
+        let own = [f64::from(self.balance.is_some()), self.balance.unwrap_or_default(), f64::from(self.near)];
         own.into_iter().chain(self.inner.knows()).collect()
     }
 
     fn learn(&mut self, known: &[f64]) -> bool {
-        let Some((&[has_balance, balance, near, has_paused], rest)) = known.split_first_chunk() else { return false };
+        let Some((&[has_balance, balance, near], rest)) = known.split_first_chunk() else { return false };
         self.balance = (has_balance != 0.0).then_some(balance);
-        (self.near, self.has_paused) = (near != 0.0, has_paused != 0.0);
+        self.near = near != 0.0;
         self.inner.learn(rest)
     }
 

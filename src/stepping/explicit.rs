@@ -82,10 +82,23 @@ pub struct Explicit<P> {
     next: Vec<f64>,
     next_low: Vec<f64>,
     search: Search,
-    /// The step proposed \[s\], where there is one, and whether the rate at the state is known.
+    /// The step proposed \[s\], where there is one, and where the rate at the state is.
     wanted: Option<f64>,
-    has_rate: bool,
+    rate: Rate,
+    /// Length of the last step \[s\], and whether the stages of its interpolation are there.
+    length: f64,
+    has_extra: bool,
     pair: PhantomData<P>,
+}
+
+/// Where the rate at the state is among the stages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Rate {
+    Unknown,
+    /// In the first place, for the step to come.
+    First,
+    /// After the stages of the step just made.
+    Last,
 }
 
 /// Steps in a row that come out not finite before the method stops.
@@ -104,7 +117,9 @@ impl<P: Pair> Explicit<P> {
             next_low: Vec::new(),
             search: Search::default(),
             wanted: None,
-            has_rate: false,
+            rate: Rate::Unknown,
+            length: 0.0,
+            has_extra: false,
             pair: PhantomData,
         }
     }
@@ -119,6 +134,7 @@ impl<P: Pair> Explicit<P> {
     /// Stages 2… and the new state of a step of `h` from `state`; stage 1 is in place.
     fn attempt<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) {
         let n = state.y.len();
+        self.has_extra = false;
         for (i, row) in P::A.iter().enumerate() {
             combine(&state.y, h, row, &self.k, &mut self.stage);
             let (_, rest) = self.k.split_at_mut((i + 1) * n);
@@ -166,6 +182,7 @@ impl<P: Pair> Explicit<P> {
     /// The stages an interpolation of the step just made asks for beside its own.
     fn interpolate<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) {
         let n = state.y.len();
+        self.has_extra = true;
         let (k, stage) = (&mut self.k, &mut self.stage);
         P::extra_stages(&mut |number, c, row| {
             combine(&state.y, h, row, k, stage);
@@ -238,6 +255,11 @@ fn sum_up_sized<const D: usize>(row: Row, k: &[f64], out: &mut [f64]) {
     out.copy_from_slice(&sums);
 }
 
+/// `c_1 + (1-s) (c_2 + s (c_3 + …))`.
+fn nest(nested: &[f64], s: f64) -> f64 {
+    nested.iter().enumerate().rev().fold(0.0, |sum, (m, c)| c + if m % 2 == 0 { 1.0 - s } else { s } * sum)
+}
+
 /// Powers of `s (c_1 + (1-s) (c_2 + s (c_3 + …)))` after the constant one.
 fn expand(nested: &[f64], powers: &mut [f64]) {
     powers.fill(0.0);
@@ -304,20 +326,24 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
         super::units(field, n, &mut self.units);
         // The step proposed last; where the last step was not cut short also the rate.
         self.wanted = state.memory.first().copied();
-        self.has_rate = state.memory.len() == 1 + n;
-        if self.has_rate {
+        self.rate = Rate::Unknown;
+        if state.memory.len() == 1 + n {
             self.k[..n].copy_from_slice(&state.memory[1..]);
+            self.rate = Rate::First;
         }
-        state.memory.truncate(1);
         Ok(())
     }
 
     fn step(&mut self, field: &mut F, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
         let n = state.y.len();
         let left = (until - state.time).hi;
-        if !std::mem::replace(&mut self.has_rate, true) {
-            field.rate(state.time, &state.y, &mut self.k[..n]);
-            tally.evaluations += 1;
+        match std::mem::replace(&mut self.rate, Rate::First) {
+            Rate::First => {}
+            Rate::Last => self.k.copy_within(P::STAGES * n..(P::STAGES + 1) * n, 0),
+            Rate::Unknown => {
+                field.rate(state.time, &state.y, &mut self.k[..n]);
+                tally.evaluations += 1;
+            }
         }
         let mut wanted = match self.wanted {
             Some(h) => h,
@@ -366,22 +392,50 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
             state.wrap();
             state.memory.clear();
             state.memory.push(wanted);
-            self.wanted = Some(wanted);
+            (self.wanted, self.length, self.rate) = (Some(wanted), h, Rate::Last);
             tally.steps += 1;
-            self.k.copy_within(P::STAGES * n..(P::STAGES + 1) * n, 0);
             return Ok(event);
         }
     }
 
     fn changed(&mut self, _state: &mut State) {
-        self.has_rate = false;
+        self.rate = Rate::Unknown;
     }
 
-    fn save(&mut self, state: &mut State) {
-        if self.has_rate {
-            state.memory.truncate(1);
-            state.memory.extend_from_slice(&self.k[..state.y.len()]);
+    fn save(&self, state: &mut State) {
+        let n = state.y.len();
+        let at = match self.rate {
+            Rate::Unknown => return,
+            Rate::First => 0,
+            Rate::Last => P::STAGES * n,
+        };
+        state.memory.truncate(1);
+        if !state.memory.is_empty() {
+            state.memory.extend_from_slice(&self.k[at..at + n]);
         }
+    }
+
+    fn is_dense(&self) -> bool {
+        true
+    }
+
+    /// By the pair's own interpolation, whose stages beside those of the step are evaluated the first time.
+    fn within(&mut self, field: &mut F, from: &State, time: Time, inside: &mut State) {
+        let n = from.y.len();
+        if !self.has_extra {
+            self.interpolate(field, from, self.length, &mut Tally::default());
+        }
+        inside.clone_from(from);
+        inside.memory.clear();
+        inside.time = time;
+        let share = (time - from.time).hi / self.length;
+        for i in 0..n {
+            let change = (self.next[i] - from.y[i]) + (self.next_low[i] - from.low[i]);
+            let nested = P::interpolate(self.length, change, &|stage| self.k[stage * n + i]);
+            let change = share * nest(&nested[..P::DEGREE], share);
+            (inside.y[i], inside.low[i]) = two_sum(from.y[i], change + from.low[i]);
+        }
+        inside.wrap();
     }
 }
 

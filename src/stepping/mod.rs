@@ -157,7 +157,7 @@ pub trait Method<P: ?Sized> {
     fn changed(&mut self, _state: &mut State) {}
 
     /// Leaves in the state's memory all that [`begin`](Method::begin) needs to go on as if nothing had been between.
-    fn save(&mut self, _state: &mut State) {}
+    fn save(&self, _state: &mut State) {}
 
     /// Integrates `state` to `until` \[s\], or to the first event before it: the loop over steps for all methods.
     ///
@@ -204,11 +204,6 @@ pub trait Method<P: ?Sized> {
     /// Called where the state was changed from outside at once: an impact, or a contact that begins or ends.  Forgets all that depends on the motion before it:
     /// predictors, Jacobians, rates, the history of errors.  Of the state's memory only the step remains, as a proposal.
     fn reset(&mut self, state: &mut State) {
-        state.memory.clear();
-    }
-
-    /// Called where a dense march has come to an output time: forgets what was of concern on the way to it.
-    fn arrive(&self, state: &mut State) {
         state.memory.clear();
     }
 

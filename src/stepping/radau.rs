@@ -423,9 +423,6 @@ impl<F: Field + ?Sized> Method<F> for Radau {
         inside.wrap();
     }
 
-    /// The next step goes on as this one.
-    fn arrive(&self, _state: &mut State) {}
-
     /// Keeps the step proposed, which comes first.
     fn reset(&mut self, state: &mut State) {
         state.memory.truncate(1);
