@@ -27,7 +27,7 @@ const ENDS: &[End] = &[
     ("spring", "dp5", 1e-8, None, 3.0, 0x02bf_b842_c6b0_6ce8),
     ("spring", "taylor", 1e-10, None, 3.0, 0x5796_59f8_8c05_61b2),
     ("motor", "taylor", 1e-9, Some(Stabilization::Elimination), 10.0, 0x8bf9_1a8f_c0a4_274e),
-    ("motor_sine", "dp8", 1e-9, Some(Stabilization::Projection), 3.0, 0xe8af_d435_6068_0c10),
+    ("motor_sine", "dp8", 1e-9, Some(Stabilization::Projection), 3.0, 0xe8af_d435_6067_9c10),
     ("motor_sine", "gauss8", 1.0 / 128.0, None, 3.0, 0x8e71_b050_e99a_ef9a),
     ("motor_sine", "rattle6", 1.0 / 128.0, None, 3.0, 0xbe9d_d5cb_c8a0_b5f9),
     ("wall", "dp8", 1e-10, None, 3.0, 0x4488_b69b_79f6_6328),

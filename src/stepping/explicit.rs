@@ -5,7 +5,7 @@
 //! h⁺ = h · clamp(0.9 err^(-1/p), 1/3, 6)
 //! ```
 //!
-//! Steps end on the times asked for; the step proposed before the last one was cut short is kept for the next.  The update is
+//! Steps are as long as the tolerance allows, and output times are read off the pair's interpolation; the step proposed before one that was cut short is kept.  The update is
 //! compensated: what rounding drops from y is carried in the state's low part.  Events are bracketed on the interpolated solution and
 //! the step is then repeated to end on the event, so the state there has the accuracy of a step.
 //!

@@ -168,8 +168,9 @@ struct Line {
     best: f64,
     /// Settings in a row that brought nothing.
     idle: usize,
-    /// Time of the last one \[s\].
+    /// Time of the last one \[s\], and its evaluations.
     last: f64,
+    evaluations: u64,
 }
 
 /// Compares methods on a scene; `see` is told how far it is, and it is given up where all `is_over`.
@@ -274,7 +275,7 @@ impl Task<'_> {
                     None => ladder::tolerances(method.info(), extended).iter().map(|&rtol| at(Some(rtol), None)).collect(),
                 };
                 rungs.reverse();
-                lines.push(Line { method, extended, stabilize, rungs, best: f64::INFINITY, idle: 0, last: 0.0 });
+                lines.push(Line { method, extended, stabilize, rungs, best: f64::INFINITY, idle: 0, last: 0.0, evaluations: 0 });
             }
         }
         lines
@@ -419,7 +420,9 @@ impl Line {
     /// Ends the line where finer settings bring nothing: twice in a row the error, or where there is none to be had the drift, is no better.
     fn judge(&mut self, found: &Found) {
         let figure = if found.error.is_finite() { found.error } else { found.energy };
-        let is_idle = figure > NO_BETTER[0] * self.best && self.best < NO_BETTER[1];
+        // A setting that takes no more evaluations than the one before has made the same steps, and says nothing.
+        let has_worked = found.tally.evaluations > std::mem::replace(&mut self.evaluations, found.tally.evaluations);
+        let is_idle = has_worked && figure > NO_BETTER[0] * self.best && self.best < NO_BETTER[1];
         self.idle = if is_idle { self.idle + 1 } else { 0 };
         self.best = self.best.min(figure);
         if self.idle >= 2 || self.best <= NO_BETTER[2] {
@@ -466,9 +469,12 @@ mod tests {
             best: f64::INFINITY,
             idle: 0,
             last: 0.0,
+            evaluations: 0,
         };
+        let mut tally = crate::stepping::Tally::default();
         let mut goes_on = |error: f64| {
-            let found = Found { error, rate_error: error, errors: Vec::new(), energy: 1e-9, constraint: None, tally: Default::default() };
+            tally.evaluations += 10;
+            let found = Found { error, rate_error: error, errors: Vec::new(), energy: 1e-9, constraint: None, tally };
             line.judge(&found);
             !line.rungs.is_empty()
         };
