@@ -1,6 +1,6 @@
 //! The start of scenes with loops, sliders and free bodies: kept where given, found where not, refused where impossible or ambiguous.
 
-mod common;
+use crate::common;
 
 use common::shipped;
 use driftless::arithmetic::{Complex, DoubleDouble, Scalar};

@@ -3,7 +3,7 @@
 //! Numbers and their public source: `data/tudelft_double_pendulum_instants.json`.  Its sign rule: the force on bar 1 is minus the multiplier
 //! at A and minus the multiplier at B.
 
-mod common;
+use crate::common;
 
 use common::{Inertia, double_pendulum, spring};
 use driftless::arithmetic::DoubleDouble;

@@ -1,11 +1,9 @@
 //! The equations body by body: against the matrices on random mechanisms, and on chains too long for matrices.
 
-mod common;
 #[allow(dead_code)]
 #[path = "../examples/chain.rs"]
 mod hanging;
-#[path = "common/trees.rs"]
-mod trees;
+use crate::trees;
 
 use driftless::arithmetic::{Complex, DoubleDouble, Real, Scalar};
 use driftless::dynamics::kernel::{Bias, Kernel};

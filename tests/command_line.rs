@@ -1,9 +1,7 @@
 //! What people type, and what they are told: short names and numbers of `--set`, scenes from standard input, folders, words and notes.
 #![cfg(feature = "cli")]
 
-#[path = "common/program.rs"]
-#[allow(dead_code)]
-mod program;
+use crate::program;
 
 use program::{Program, Ran};
 use serde_json::Value;

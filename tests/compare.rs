@@ -1,10 +1,8 @@
 //! Comparisons: errors are true ones, nothing vanishes, advice follows from the figures, and what was measured survives an interruption.
 
-mod common;
+use crate::common;
 #[cfg(feature = "cli")]
-#[path = "common/program.rs"]
-#[allow(dead_code)]
-mod program;
+use crate::program;
 
 use common::{compile, shipped};
 use driftless::run::compare::{Asked, Comparison, Fate, compare};

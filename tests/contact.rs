@@ -3,7 +3,7 @@
 //! References: energies of a single bar in closed form, the double pendulum whose end slides along a floor written out by hand for this
 //! file, and, under a motor, the same equations read backwards from a motion that is known.
 
-mod common;
+use crate::common;
 
 use common::{LENGTH, MASS, PENDULUM_SQUARED, compile, double_pendulum, pendulum, run, shipped};
 use driftless::arithmetic::Complex;

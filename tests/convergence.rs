@@ -4,7 +4,7 @@
 //! everything, it makes exactly one step a window.  The error at a fixed horizon against h then has the method's order as its slope.  References come
 //! from `gauss16` in the canonical form: another method, in other unknowns.
 
-mod common;
+use crate::common;
 
 use common::{go, order, shipped};
 use driftless::arithmetic::DoubleDouble;

@@ -1,6 +1,6 @@
 //! Many trajectories in lanes: against double-double one by one, and independent of who marches beside whom.
 
-mod common;
+use crate::common;
 
 use common::{compile, shipped};
 use driftless::dynamics::elimination::Elimination;

@@ -3,7 +3,7 @@
 //! The constant-speed motor's row is linear, so every Runge–Kutta method keeps it to rounding from a consistent start and a test on that proves
 //! nothing: starts here are 1e-6 rad/s off, or the law has a sine in it.
 
-mod common;
+use crate::common;
 
 use common::{run, run_from, shipped};
 use driftless::dynamics::kernel::Kernel;

@@ -1,6 +1,6 @@
 //! The solution inside a step, and what follows from it: output times that have no say in the steps.
 
-mod common;
+use crate::common;
 
 use common::{compile, order, shipped};
 use driftless::arithmetic::DoubleDouble;

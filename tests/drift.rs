@@ -2,7 +2,7 @@
 //!
 //! Bounds are those the project states (1e-12 of the energy scale) or a small multiple of what was measured, as each test says.
 
-mod common;
+use crate::common;
 
 use common::{run, shipped};
 use driftless::run::{MethodId, Outcome, Request, Stabilization};

@@ -7,9 +7,8 @@
 //! `.ci/estimates [CASES [SEED]]` runs more cases; with `TABLE=1` it writes `docs/estimates.md` anew.  `SHOW=1` prints every case that is outside, and
 //! `FOUND` names a folder for the scenes.
 
-mod common;
-#[path = "common/mechanisms/mod.rs"]
-mod mechanisms;
+use crate::common;
+use crate::mechanisms;
 
 use common::shipped;
 use driftless::dynamics::{Mechanism, Motion, Time};

@@ -1,6 +1,6 @@
 //! Events inside a step: impacts, turn-overs and springs without length are found however long the step is and however shallow the passage.
 
-mod common;
+use crate::common;
 
 use common::{pendulum, quarter_period, run};
 use driftless::run::{MethodId, Outcome, Point, Request, Stabilization, Sweep, Vary, sweep};

@@ -1,6 +1,6 @@
 //! Extremes: each ends in a right answer or in a typed stop with a time in it; nothing hangs.
 
-mod common;
+use crate::common;
 
 use common::{compile, pendulum, quarter_period, run, run_limited, shipped};
 use driftless::run::{Limits, MethodId, Outcome, Request, Stabilization};

@@ -1,21 +1,12 @@
 //! The targets of `fuzz/` on inputs of a fixed seed, so that every change meets some; `FUZZ=1000000 cargo test --test fuzz` has more.
 #![cfg(feature = "cli")]
 
-#[path = "common/audit.rs"]
-mod audit;
-#[path = "common/extremes.rs"]
-mod extremes;
-#[path = "common/mechanisms/mod.rs"]
-mod mechanisms;
-#[path = "common/program.rs"]
-#[allow(dead_code)]
-mod program;
-#[path = "common/random.rs"]
-mod random;
-#[path = "common/relations.rs"]
-mod relations;
-#[path = "common/targets.rs"]
-mod targets;
+use crate::extremes;
+use crate::mechanisms;
+use crate::program;
+use crate::random;
+use crate::relations;
+use crate::targets;
 
 use driftless::run::Request;
 use driftless::run::trust::Level;

@@ -2,7 +2,7 @@
 //!
 //! The long measurements are `cargo test --release --test gauss -- --ignored --nocapture`.
 
-mod common;
+use crate::common;
 
 use common::{Inertia, LENGTH, ONE_TURN, compile, double_pendulum, free, motor, spring};
 use driftless::arithmetic::{DoubleDouble, Scalar};

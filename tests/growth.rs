@@ -2,9 +2,8 @@
 //!
 //! `COUNT=300 cargo test --test growth -- --nocapture` compares more random scenes; `SEED` is the first.
 
-mod common;
-#[path = "common/mechanisms/mod.rs"]
-mod mechanisms;
+use crate::common;
+use crate::mechanisms;
 
 use common::{compile, pendulum, quarter_period, shipped};
 use driftless::dynamics::{Mechanism, Motion, Time};

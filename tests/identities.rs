@@ -1,8 +1,7 @@
 //! Identities of the equations of motion on random trees: one to six bodies, branches, off-axis centres and hinges, springs, dampers, motors.
 
-mod common;
-#[path = "common/trees.rs"]
-mod trees;
+use crate::common;
+use crate::trees;
 
 use driftless::arithmetic::{Complex, DoubleDouble, Scalar};
 use driftless::dynamics::canonical::Canonical;

@@ -3,7 +3,7 @@
 //! A single bar against a wall has closed forms: it swings to the wall in a quarter period of the pendulum of its amplitude, which the arithmetic-
 //! geometric mean gives to rounding, and rebounds with -e times its rate.
 
-mod common;
+use crate::common;
 
 use common::{PENDULUM_SQUARED, compile, pendulum, quarter_period, run, shipped};
 use driftless::dynamics::multiplier::Multiplier;

@@ -1,9 +1,7 @@
 //! What `inspect` and the table say of forces: hung weights tell every sign, redundant constraints are named, and each column has the unit of what is in it.
 #![cfg(feature = "cli")]
 
-#[path = "common/program.rs"]
-#[allow(dead_code)]
-mod program;
+use crate::program;
 
 use program::Program;
 use serde_json::{Value, json};

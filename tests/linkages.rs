@@ -1,8 +1,7 @@
 //! Published problems of linkages, and other mechanisms with a closed form, by every method that fits.
 
-#[path = "common/andrews.rs"]
-mod andrews;
-mod common;
+use crate::andrews;
+use crate::common;
 #[allow(dead_code)]
 #[path = "../examples/four_bars.rs"]
 mod four_bars;

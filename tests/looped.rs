@@ -3,9 +3,8 @@
 //! Andrews' squeezing mechanism (W. Giles, 1978; D. Manning, 1981) with the data of the Test Set for IVP Solvers; its end state is from an extrapolation method
 //! of order 16 in quadruple precision with projection, which agrees with the Test Set's own to the digits that hold there.
 
-#[path = "common/andrews.rs"]
-mod andrews;
-mod common;
+use crate::andrews;
+use crate::common;
 
 use andrews::{error, reference};
 use common::started;

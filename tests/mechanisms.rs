@@ -1,7 +1,6 @@
 //! The generator of random scenes that other tests compare motions on: every scene is accepted, and begins as it says.
 
-#[path = "common/mechanisms/mod.rs"]
-mod mechanisms;
+use crate::mechanisms;
 
 use driftless::dynamics::Mechanism;
 use driftless::run::{Limits, Plan, Request, Run, Sample, march};

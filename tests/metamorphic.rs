@@ -4,10 +4,8 @@
 //! `METAMORPHIC=2000 cargo test --test metamorphic -- --nocapture` runs more scenes per relation; `SEED` is the first, and `FOUND` names a folder
 //! for the scenes of faults.
 
-#[path = "common/mechanisms/mod.rs"]
-mod mechanisms;
-#[path = "common/relations.rs"]
-mod relations;
+use crate::mechanisms;
+use crate::relations;
 
 use driftless::dynamics::Mechanism;
 use driftless::run::trust::Level;

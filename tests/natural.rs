@@ -1,8 +1,7 @@
 //! Natural coordinates of any mechanism against the angle form: accelerations, multipliers, hinge forces.
 
-mod common;
-#[path = "common/trees.rs"]
-mod trees;
+use crate::common;
+use crate::trees;
 
 use driftless::arithmetic::Complex;
 use driftless::dynamics::kernel::{Bias, Kernel};

@@ -1,8 +1,7 @@
 //! The program from outside: exit codes, what goes to stdout, stderr and files, and the names scripts rely on.
 #![cfg(feature = "cli")]
 
-#[path = "common/program.rs"]
-mod program;
+use crate::program;
 
 use program::Program;
 use serde_json::Value;

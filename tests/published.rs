@@ -1,6 +1,6 @@
 //! Published accelerations, torque and power of the source problem (TU Delft ME41055, homework 4) and its neighbours.
 
-mod common;
+use crate::common;
 
 use common::{Inertia, ONE_TURN, compile, double_pendulum, free, motor, shipped, spring};
 use driftless::arithmetic::Complex;

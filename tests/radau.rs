@@ -1,6 +1,6 @@
 //! Radau IIA on stiff scenes: reference results, what stiffness costs, constraints, impacts, output times, and the same bits again.
 
-mod common;
+use crate::common;
 
 use common::{run, shipped};
 use driftless::run::{MethodId, Outcome, Request, Stabilization};

@@ -1,6 +1,6 @@
 //! Natural coordinates against the angle form, and what RATTLE promises: order, constraints, energy, time symmetry, restart.
 
-mod common;
+use crate::common;
 
 use common::{Inertia, ONE_TURN, compile, double_pendulum, free, motor, spring};
 use driftless::arithmetic::{Complex, DoubleDouble};

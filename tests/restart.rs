@@ -1,6 +1,6 @@
 //! Restart is bit for bit: a state cloned in the middle goes on as the run it was taken from.
 
-mod common;
+use crate::common;
 
 use common::{go, shipped};
 use driftless::arithmetic::DoubleDouble;

@@ -1,10 +1,8 @@
 //! A run that is taken down and goes on elsewhere comes out as if nothing had been: bit for bit, wherever it paused and how often.
 
-mod common;
+use crate::common;
 #[cfg(feature = "cli")]
-#[path = "common/program.rs"]
-#[allow(dead_code)]
-mod program;
+use crate::program;
 
 use common::shipped;
 use driftless::dynamics::multiplier::Multiplier;

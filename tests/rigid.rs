@@ -1,6 +1,6 @@
 //! Very stiff springs taken for rods, with what their vibration does on average, against the vibration resolved.
 
-mod common;
+use crate::common;
 
 use common::spring;
 use driftless::dynamics::Mechanism;

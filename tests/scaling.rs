@@ -2,8 +2,7 @@
 //! and stops at the same place for the same reason.
 
 #[allow(dead_code)]
-#[path = "common/scaled.rs"]
-mod scaled;
+use crate::scaled;
 
 use driftless::dynamics::{Mechanism, Units};
 use driftless::run::{METHODS, MethodId, Request, RunError, simulate};

@@ -3,7 +3,7 @@
 //! Random linkages are checked by the singular values of their loop equations, scaled to unit columns, so that they are known to be regular without the program; their
 //! accelerations by the equations of Newton and Euler for every body by itself, joints as constraints, in double-double.
 
-mod common;
+use crate::common;
 
 use common::run;
 use driftless::arithmetic::{DoubleDouble, Scalar};

@@ -1,6 +1,6 @@
 //! The same scene under every stabilization, by every method that takes it.
 
-mod common;
+use crate::common;
 
 use common::shipped;
 use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Stabilization, march};

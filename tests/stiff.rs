@@ -1,6 +1,6 @@
 //! Gauss methods on stiff scenes: Newton's method where sweeps contract slowly, the published stiff double pendulum, typed stops and refusals, and what is said of stiffness.
 
-mod common;
+use crate::common;
 
 use common::{compile, run, shipped};
 use driftless::arithmetic::Complex;

@@ -1,6 +1,6 @@
 //! Stiff and extreme scenes: right, refused or stopped, and never wrong.
 
-mod common;
+use crate::common;
 
 use common::spring;
 use driftless::dynamics::Mechanism;

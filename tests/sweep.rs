@@ -1,9 +1,7 @@
 //! Sweeps: each point is the run it stands for, the table does not depend on the threads, bad points end nothing, flips are where they are.
 
 #[cfg(feature = "cli")]
-#[path = "common/program.rs"]
-#[allow(dead_code)]
-mod program;
+use crate::program;
 
 use driftless::dynamics::{Mechanism, Time};
 use driftless::run::trust::Level;

@@ -1,6 +1,6 @@
 //! The power series of the motion: against Dormand–Prince, against itself in double-double, at symmetric releases.
 
-mod common;
+use crate::common;
 
 use common::{ONE_TURN, compile, shipped};
 use driftless::arithmetic::{Complex, DoubleDouble};

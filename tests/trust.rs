@@ -1,6 +1,6 @@
 //! How far results may be trusted: references, error estimates, horizons.
 
-mod common;
+use crate::common;
 
 use common::{compile, run, shipped};
 use driftless::dynamics::canonical::Canonical;

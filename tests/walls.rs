@@ -1,6 +1,6 @@
 //! Walls with sliders, bodies that hang on nothing, and loops: impacts, rest, sliding and release against closed forms.
 
-mod common;
+use crate::common;
 
 use common::compile;
 use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Sample, march};

@@ -2,12 +2,9 @@
 //!
 //! References are closed forms: of one driven bar, of a driven Scotch yoke, and of a bar on a torsion spring with a damper between elastic impacts.
 
-mod common;
-#[path = "common/random.rs"]
-#[allow(dead_code)]
-mod random;
-#[path = "common/trees.rs"]
-mod trees;
+use crate::common;
+use crate::random;
+use crate::trees;
 
 use common::{compile, run, shipped};
 use driftless::arithmetic::DoubleDouble;

@@ -1,0 +1,58 @@
+//! Mechanics and integration, by the library alone.
+//!
+//! One program for many files: what they share is compiled once.
+
+#[path = "common/andrews.rs"]
+#[allow(dead_code)]
+mod andrews;
+mod common;
+#[path = "common/mechanisms/mod.rs"]
+#[allow(dead_code)]
+mod mechanisms;
+#[path = "common/random.rs"]
+#[allow(dead_code)]
+mod random;
+#[path = "common/relations.rs"]
+#[allow(dead_code)]
+mod relations;
+#[path = "common/scaled.rs"]
+#[allow(dead_code)]
+mod scaled;
+#[path = "common/trees.rs"]
+#[allow(dead_code)]
+mod trees;
+
+mod assembly;
+mod benchmarks;
+mod chains;
+mod contact;
+mod convergence;
+mod crowd;
+mod defect;
+mod dense;
+mod drift;
+mod events;
+mod extremes;
+mod gauss;
+mod identities;
+mod impact;
+mod linkage_scenes;
+mod linkages;
+mod looped;
+mod metamorphic;
+mod natural;
+mod published;
+mod radau;
+#[path = "mechanisms.rs"]
+mod random_mechanisms;
+mod rattle;
+mod restart;
+mod rigid;
+mod scaling;
+mod scenes;
+mod singular;
+mod stabilization;
+mod stiff;
+mod taylor;
+mod walls;
+mod work;

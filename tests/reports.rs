@@ -1,0 +1,41 @@
+//! Estimates, comparisons, sweeps, stress, and the program with its files and charts.
+//!
+//! One program for many files: what they share is compiled once.
+
+#[path = "common/audit.rs"]
+#[allow(dead_code)]
+mod audit;
+mod common;
+#[path = "common/extremes.rs"]
+#[allow(dead_code)]
+mod extremes;
+#[path = "common/mechanisms/mod.rs"]
+#[allow(dead_code)]
+mod mechanisms;
+#[path = "common/program.rs"]
+#[allow(dead_code)]
+mod program;
+#[path = "common/random.rs"]
+#[allow(dead_code)]
+mod random;
+#[path = "common/relations.rs"]
+#[allow(dead_code)]
+mod relations;
+#[path = "common/targets.rs"]
+#[allow(dead_code)]
+mod targets;
+
+mod charts;
+mod command_line;
+mod compare;
+mod estimates;
+mod fuzz;
+mod growth;
+mod joint_forces;
+mod readme;
+mod resume;
+mod stress;
+mod sweep;
+mod trust;
+#[path = "program.rs"]
+mod whole_program;
