@@ -11,8 +11,12 @@ use crate::stepping::{Tally, Taylor};
 
 /// Largest share of the run's work that its companion may take.
 pub const SHARE: f64 = 0.3;
-/// Work that is free: what nobody notices at the end of a run.
-pub const GRACE: f64 = 50e6;
+/// Work that is free: what nobody notices at the end of a run, and of runs near rounding, for which double-double is needed.
+pub const GRACE: [f64; 2] = [20e6, 50e6];
+/// Share and work free of charge of a companion in double-double, where the run is not near rounding.
+pub const DOUBLE_DOUBLE: [f64; 2] = [0.05, 100e3];
+/// The same of the tangent flow from Jacobians, and from series on dual numbers.
+pub const FLOW: [[f64; 2]; 2] = [[0.5, 200e3], [0.15, 200e3]];
 
 /// The same where the estimate is to be had at all costs: thirty times the run's work, and five seconds that nobody asks after.
 pub const FULL_SHARE: f64 = 30.0;
@@ -20,7 +24,7 @@ pub const FULL_SHARE: f64 = 30.0;
 pub const FULL_GRACE: f64 = 5e9;
 
 /// A step of the series in double-double over one of the series in doubles of the same order, by counted instructions.
-const DOUBLE_DOUBLE: f64 = 8.0;
+const WIDE: f64 = 8.0;
 
 /// Prices of a mechanism's parts.
 #[derive(Clone, Copy, Debug)]
@@ -60,7 +64,7 @@ impl Prices {
                 false => Taylor::new(tolerance).order,
             } as f64;
             let wide = match plan.extended {
-                _ if plan.in_double_double => DOUBLE_DOUBLE,
+                _ if plan.in_double_double => WIDE,
                 false => 1.0,
                 true if Taylor::has_lanes(mechanism, true) => 3.0,
                 true => 10.0,

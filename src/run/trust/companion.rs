@@ -2,7 +2,7 @@
 //!
 //! Looks are a mean step of the companion apart, a half of it in the beginning and a quarter near the horizon: neither output times nor rests have a say in when they are.
 
-use super::budget::{FULL_GRACE, FULL_SHARE, GRACE, Prices, SHARE};
+use super::budget::{DOUBLE_DOUBLE, FLOW, FULL_GRACE, FULL_SHARE, GRACE, Prices, SHARE};
 use super::finer;
 use super::growth::Nature;
 use super::measured::{Apart, LAST_DIGIT, Measured};
@@ -31,8 +31,8 @@ const GAPS: [f64; 4] = [0.5, 1.0, 0.25, 4.0];
 const BEGINNING: u64 = 128;
 /// The companion's own rounding over what was measured, at most.
 const MOST_ROUNDING: f64 = 2.0;
-/// Share of the budget for double-double, after which doubles go on: of runs near rounding, and of others.
-const DOUBLE_DOUBLE: [f64; 2] = [0.5, 0.2];
+/// Share of the budget for double-double, after which doubles go on, of runs near rounding.
+const NEAR_ROUNDING: f64 = 0.5;
 
 /// A companion, and what it has measured so far.
 pub(in crate::run) struct Companion {
@@ -173,8 +173,9 @@ impl Companion {
     /// What it may cost after so much work of the run.
     fn budget(&self, tally: Tally) -> f64 {
         let run = self.prices.run(self.run.method, tally);
+        let is_near = finer::is_near_rounding(&self.run);
         let whole = match self.measured.level {
-            Level::Auto => GRACE + SHARE * run,
+            Level::Auto => GRACE[usize::from(is_near)] + SHARE * run,
             // No more evaluations than the run is allowed itself.
             Level::Off | Level::Full => (FULL_GRACE + FULL_SHARE * run).min(self.run.effort as f64 * self.prices.series[0]),
         };
@@ -182,7 +183,21 @@ impl Companion {
         if !is_wide || self.measured.level == Level::Full {
             return whole;
         }
-        DOUBLE_DOUBLE[usize::from(!finer::is_near_rounding(&self.run))] * whole
+        match is_near {
+            true => NEAR_ROUNDING * whole,
+            false => DOUBLE_DOUBLE[0] * run + DOUBLE_DOUBLE[1],
+        }
+    }
+
+    /// Ends the tangent flow where it has cost its share; where the companion's own rounding counts it is needed to the end.
+    fn stint(&mut self, tally: Tally) {
+        let run = self.prices.run(self.run.method, tally);
+        let Self { shadow: Some(shadow), measured, .. } = self else { return };
+        let Some(tangent) = &shadow.tangent else { return };
+        let [share, grace] = FLOW[usize::from(!tangent.is_plain())];
+        if measured.level == Level::Auto && !shadow.is_rounded && measured.flow > share * run + grace {
+            measured.stop_growth(shadow.end_flow().as_ref());
+        }
     }
 
     /// Goes to a time beside the run, if need be by another series.
@@ -192,11 +207,11 @@ impl Companion {
     fn accompany(&mut self, time: Time, tally: Tally) -> Result<(), String> {
         let budget = self.budget(tally);
         let Self { shadow: Some(shadow), prices, measured, .. } = self else { return Ok(()) };
-        let mut purse = Purse { prices, spent: &mut measured.spent, budget };
+        let mut purse = Purse { prices, spent: &mut measured.spent, budget, flow: &mut measured.flow };
         let gone = shadow.go(time, &mut purse);
         if let Some(why) = shadow.tangent.as_ref().and_then(Tangent::lost) {
             measured.no_growth = Some(why.into());
-            measured.conclude(shadow.tangent.take().as_ref());
+            measured.conclude(shadow.end_flow().as_ref());
         }
         let Err(stop) = gone else { return Ok(()) };
         let is_dear = shadow.plan().in_double_double;
@@ -205,7 +220,7 @@ impl Companion {
             (plan.until, plan.every) = (shadow.plan().until, shadow.plan().every);
             self.prices = Prices::new(&self.mechanism, &plan, &self.run);
             shadow.change(&self.mechanism, plan)?;
-            measured.is_bound = true;
+            measured.is_bound |= finer::is_bound(shadow.plan(), &self.run);
             measured.name = format!("{}, from {from:.3e} s on {name}", measured.name);
             return self.accompany(time, tally);
         }
@@ -230,6 +245,7 @@ impl Companion {
         if let Err(why) = self.accompany(if motion.time > horizon { horizon } else { motion.time }, tally) {
             return self.end(&why);
         }
+        self.stint(tally);
         let Self { shadow: Some(shadow), measured, .. } = self else { return };
         if measured.lost.is_none() {
             self.measure(motion);
@@ -273,7 +289,23 @@ impl Companion {
             measured.lost = Some(t);
             if shadow.tangent.is_none() {
                 self.end("");
+            } else {
+                self.ease();
             }
+        }
+    }
+
+    /// Goes on by a coarse series where only growth is still asked for: any motion nearby tells it.
+    fn ease(&mut self) {
+        let Self { mechanism, run, prices, shadow: Some(shadow), .. } = self else { return };
+        if !mechanism.contacts.is_empty() || shadow.plan().method != MethodId::Taylor {
+            return;
+        }
+        let finer::Finer { mut plan, .. } = finer::coarse(mechanism, run);
+        (plan.until, plan.every) = (shadow.plan().until, shadow.plan().every);
+        *prices = Prices::new(mechanism, &plan, run);
+        if let Err(why) = shadow.change(mechanism, plan) {
+            self.end(&why);
         }
     }
 

@@ -18,6 +18,8 @@ const FINEST: f64 = 1e-15;
 /// Tolerance \[rad/s\] with the first orders in double-double, of companions all in double-double, and of those of runs with extended orders.
 const EXTENDED: f64 = 1e-20;
 const BEYOND: f64 = 1e-22;
+/// The same where only the growth of small differences is asked for.
+const COARSE: f64 = 1e-8;
 
 /// A companion's plan, and what it is in words.
 pub(super) struct Finer {
@@ -54,20 +56,32 @@ pub(super) fn first(mechanism: &Mechanism, run: &Plan, level: Level) -> Finer {
     let has_lanes = may_extend && !run.extended && !mechanism.has_multipliers() && Taylor::has_lanes(mechanism, true);
     if may_extend && !has_lanes {
         let tolerance = if run.extended { BEYOND } else { EXTENDED };
-        return series(mechanism, run, finer.unwrap_or(tolerance).min(tolerance), [false, true]);
+        // There it is the other form that counts, not the digits.
+        let least = if is_near || level == Level::Full { tolerance } else { 1.0 };
+        return series(mechanism, run, finer.unwrap_or(tolerance).min(least), [false, true]);
     }
-    match finer {
-        _ if has_lanes => series(mechanism, run, finer.unwrap_or(EXTENDED).min(EXTENDED), [true, false]),
+    if has_lanes {
+        return series(mechanism, run, finer.unwrap_or(EXTENDED).min(EXTENDED), [true, false]);
+    }
+    in_doubles(mechanism, run)
+}
+
+/// The finest that is of use in doubles.
+fn in_doubles(mechanism: &Mechanism, run: &Plan) -> Finer {
+    let finer = tolerance(run).filter(|_| !is_near_rounding(run)).map(|tolerance| tolerance / FINER);
+    let tolerance = match finer {
+        Some(finer) if run.method == MethodId::Taylor => finer.max(FINEST),
         // Steps that end at every output time are often far better than their tolerance, and a finer series costs little.
-        Some(finer) if !is_near => series(mechanism, run, finer.min(FINE), [false; 2]),
-        _ => series(mechanism, run, FINEST, [false; 2]),
-    }
+        Some(finer) => finer.min(FINE),
+        None => FINEST,
+    };
+    series(mechanism, run, tolerance, [false; 2])
 }
 
 /// The one that goes on where double-double would cost too much; `None` where it would be coarser than the run.
 pub(super) fn second(mechanism: &Mechanism, run: &Plan) -> Option<Finer> {
     if !run.extended {
-        return Some(series(mechanism, run, FINEST, [false; 2]));
+        return Some(in_doubles(mechanism, run));
     }
     let has_lanes = !mechanism.has_multipliers() && Taylor::has_lanes(mechanism, true);
     has_lanes.then(|| series(mechanism, run, BEYOND, [true, false]))
@@ -79,6 +93,11 @@ pub(super) fn neighbour(mechanism: &Mechanism, until: f64, coarser: f64) -> Plan
     let tolerance = Tolerance { relative: coarser * FINE, absolute: coarser * FINE };
     let method = if has_series { MethodId::Taylor } else { MethodId::Dp8 };
     Plan { method, ..Plan::of_series(mechanism, tolerance, until) }
+}
+
+/// What is still near a motion where no more is asked of it.
+pub(super) fn coarse(mechanism: &Mechanism, run: &Plan) -> Finer {
+    series(mechanism, run, COARSE, [false; 2])
 }
 
 /// Where there is no series, or the run is one that finds its impacts on it.

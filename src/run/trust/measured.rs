@@ -64,8 +64,11 @@ pub(super) struct Measured {
     pub nature: Nature,
     /// Why nothing is known of it, or not from some time on.
     pub no_growth: Option<String>,
-    /// Work spent.
+    /// The time \[s\] up to which it was followed where that would have cost too much, and what the last digit of the inputs had come to.
+    stopped: Option<[f64; 2]>,
+    /// Work spent, and of it that of the tangent flow.
     pub spent: f64,
+    pub flow: f64,
 }
 
 impl Measured {
@@ -95,7 +98,9 @@ impl Measured {
             history: Vec::new(),
             nature: Nature::default(),
             no_growth: None,
+            stopped: None,
             spent: 0.0,
+            flow: 0.0,
         }
     }
 
@@ -131,6 +136,22 @@ impl Measured {
         if self.input_error.is_none() && tangent.lost().is_none() {
             self.input_error = Some(LAST_DIGIT * tangent.reach(tangent.now()[0]));
         }
+    }
+
+    /// Takes what is known of growth where following it further would cost too much.
+    pub(super) fn stop_growth(&mut self, tangent: Option<&Tangent>) {
+        let Some(tangent) = tangent else { return };
+        let [t, _] = tangent.now();
+        (self.history, self.stopped) = (tangent.history(), Some([t, LAST_DIGIT * tangent.reach(t)]));
+    }
+
+    /// What the last digit of the inputs comes to at a time \[s\]: beyond what was followed it grows as the error of the run does, which is a small
+    /// difference, too.
+    fn inputs_at(&self, t: f64) -> Option<f64> {
+        let [until, reach] = self.stopped?;
+        let error = |t: f64| self.record.iter().take_while(|look| look[0] <= t).last().map_or(LEAST, |look| look[1].max(LEAST));
+        let grown = if t >= self.until { self.error } else { error(t) };
+        (t <= self.until).then(|| reach * (grown / error(until)).max(1.0))
     }
 
     /// Keeps the estimate of this time.
@@ -170,11 +191,13 @@ impl Measured {
         if self.until > t {
             self.cut(t);
         }
-        let Self { name, shared, until, error, mut record, horizon, lost, input_error, why, history, nature, no_growth, .. } = self;
+        let Growth { lyapunov, power: growth_power } =
+            if self.no_growth.is_some() { Growth::default() } else { self.nature.judge(&self.history) };
+        let input_error = self.input_error.or_else(|| self.inputs_at(self.horizon.unwrap_or(t)));
+        let Self { name, shared, until, error, mut record, horizon, lost, why, history, no_growth, .. } = self;
         if record.last().is_some_and(|last| last[0] < until) {
             record.push([until, error]);
         }
-        let Growth { lyapunov, power: growth_power } = if no_growth.is_some() { Growth::default() } else { nature.judge(&history) };
         let mut trust = Trust {
             how: How::None,
             error_estimate: None,

@@ -59,6 +59,8 @@ pub(super) struct Purse<'a> {
     pub prices: &'a Prices,
     pub spent: &'a mut f64,
     pub budget: f64,
+    /// Of what was spent, that of the tangent flow.
+    pub flow: &'a mut f64,
 }
 
 fn course(mechanism: &Arc<Mechanism>, series: &mut Plan, start: &Motion) -> Result<(Course, Outcome), String> {
@@ -128,6 +130,12 @@ impl Shadow {
         Ok(Some(Self { course, outcome, motion, tangent, no_growth: None, is_rounded, begun, last }))
     }
 
+    /// Ends the tangent flow.
+    pub(super) fn end_flow(&mut self) -> Option<Tangent> {
+        self.course.jumps = None;
+        self.tangent.take()
+    }
+
     /// Its plan.
     pub(super) fn plan(&self) -> &Plan {
         &self.outcome.plan
@@ -161,7 +169,8 @@ impl Shadow {
             let steps = if self.is_rounded { self.last.steps } else { 0 };
             if let Some(tangent) = &mut self.tangent {
                 tangent.take(&self.motion, steps);
-                *purse.spent += tangent.evaluations() as f64 * purse.prices.evaluation;
+                let cost = tangent.evaluations() as f64 * purse.prices.evaluation;
+                (*purse.spent, *purse.flow) = (*purse.spent + cost, *purse.flow + cost);
             }
         }
         self.march(until, purse)

@@ -35,8 +35,8 @@ use std::sync::Arc;
 /// Coordinates up to which the whole matrix is carried.
 const WHOLE: usize = 3;
 /// Vectors carried for more of them, and directions of changed inputs.
-const VECTORS: usize = 4;
-const INPUTS: [usize; 2] = [4, 2];
+const VECTORS: usize = 3;
+const INPUTS: [usize; 2] = [4, 1];
 /// The longest step over the slowest of the rates it is measured by.
 const LONGEST: f64 = 10.0;
 /// Of half a unit in the last place of 1, what a step of the series leaves: its state is a pair, and so are its constants.
@@ -57,6 +57,9 @@ pub struct Tangent {
     /// The columns the series are of.
     seeds: Vec<Vec<f64>>,
     rates: Vec<f64>,
+    /// Room for a Jacobian, and for a column.
+    jacobian: Vec<f64>,
+    column: Vec<f64>,
     path: Path,
 }
 
@@ -77,8 +80,10 @@ pub(super) struct Path {
     /// True where the columns are those of the whole matrix, and where the step's own comes from Jacobians (module `gauss`).
     is_whole: bool,
     is_plain: bool,
-    /// Unknowns inside the step, where Jacobians are asked for.
-    nodes: Vec<Vec<f64>>,
+    /// Accelerations by coordinates and rates at the nodes so far, one after the other.
+    nodes: Vec<f64>,
+    /// Highest power of the series on dual numbers.
+    order: usize,
     /// What changed inputs come to, over exp(input_log).
     inputs: Vec<Vec<f64>>,
     input_log: f64,
@@ -131,6 +136,12 @@ impl Tangent {
             true => (0..2 * f).map(|j| unit(j, f, tangent.path.rate)).collect(),
             false => tangent.basis(count, &mut dice),
         };
+        // The more directions there are, the less each of them must be known.
+        tangent.path.order = match (is_exact || tangent.ground.is_some(), is_whole || freedom <= WHOLE) {
+            (true, true) => beside::ORDERS[0],
+            (true, false) | (false, true) => beside::ORDERS[1],
+            (false, false) => beside::ORDERS[2],
+        };
         tangent.path.inputs = tangent.changes(INPUTS[usize::from(!is_whole)], &mut dice);
         // Vectors stand for as many as there are directions.
         tangent.path.log = 0.5 * libm::log(2.0 * freedom as f64 / count as f64);
@@ -171,6 +182,8 @@ impl Tangent {
             ground,
             seeds: Vec::new(),
             rates,
+            jacobian: Vec::new(),
+            column: Vec::new(),
             path: Path::default(),
         })
     }
@@ -191,8 +204,9 @@ impl Tangent {
             && path.columns.iter().chain(&path.inputs).all(|column| column.len() == 2 * f)
             && (!path.is_whole || count == 2 * f && tangent.ground.is_none())
             && path.covariance.len() == if path.is_whole { 4 * f * f } else { 1 }
-            && path.nodes.len() < gauss::STAGES
-            && path.nodes.iter().all(|node| node.len() == dimension)
+            && path.nodes.len() < gauss::STAGES * 2 * f * f
+            && path.nodes.len().is_multiple_of(2 * f * f)
+            && beside::ORDERS.contains(&path.order)
             && (!path.is_plain || path.is_whole && path.step > 0.0)
             && path.stride > 0
             && !path.growth.is_empty();
@@ -214,8 +228,8 @@ impl Tangent {
 
     /// The next time \[s\] at which it asks for the motion.
     pub fn next(&self) -> f64 {
-        let Path { state, step, nodes, is_plain, .. } = &self.path;
-        let share = if *is_plain { self.gauss.nodes.get(nodes.len()).copied().unwrap_or(1.0) } else { 1.0 };
+        let Path { state, step, is_plain, .. } = &self.path;
+        let share = if *is_plain { self.gauss.nodes.get(self.node()).copied().unwrap_or(1.0) } else { 1.0 };
         (state.time + share * step).hi
     }
 
@@ -235,13 +249,10 @@ impl Tangent {
 
     /// Takes the motion at [`Tangent::next`], to which `steps` steps in doubles have led so far (none where their rounding does not count).
     pub fn take(&mut self, motion: &Motion, steps: u64) {
-        let state = self.problem.state(motion);
-        if self.path.is_plain {
-            self.path.nodes.push(state.y.clone());
-            if self.path.nodes.len() < gauss::STAGES {
-                return;
-            }
+        if self.path.is_plain && !self.take_node(motion) {
+            return;
         }
+        let state = self.problem.state(motion);
         let taken = steps.saturating_sub(self.path.steps) as f64;
         self.path.steps = steps;
         match self.path.is_plain {
@@ -251,13 +262,41 @@ impl Tangent {
         }
     }
 
+    /// The number of the next node.
+    fn node(&self) -> usize {
+        self.path.nodes.len() / (2 * self.weights.len().pow(2))
+    }
+
+    /// Takes the Jacobian at a node; true with the last one, which tells the length of the next step.
+    fn take_node(&mut self, motion: &Motion) -> bool {
+        let (f, node) = (self.weights.len(), self.node());
+        let Self { mechanism, problem, path, weights, gauss, jacobian, column, .. } = self;
+        let dimension = problem.dimension();
+        column.clear();
+        column.resize(dimension, 0.0);
+        for (i, &k) in mechanism.ties.independent.iter().enumerate() {
+            (column[i], column[f + i]) = (motion.phi[k].hi, motion.omega[k].hi);
+        }
+        jacobian.resize(dimension * dimension, 0.0);
+        problem.jacobian(motion.time, column, jacobian);
+        for row in jacobian.chunks_exact(dimension).skip(f).take(f) {
+            path.nodes.extend(&row[..2 * f]);
+        }
+        let is_last = node + 1 == gauss::STAGES;
+        if is_last {
+            let reach = gauss::reach(f, weights, &path.nodes[node * 2 * f * f..], &column[f..]);
+            gauss.next = reach.clamp(0.5 * path.step, 2.0 * path.step).min(LONGEST / path.rate);
+        }
+        is_last
+    }
+
     /// Unknowns' rates at the beginning of the step.
     fn evaluate(&mut self) {
         let Self { problem, rates, path, .. } = self;
         problem.rate(path.state.time, &path.state.y, rates);
     }
 
-    /// What taking a motion costs in evaluations of the equations, about; of a Jacobian four columns come to five.
+    /// What taking a motion costs in evaluations of the equations, about, by counted instructions; of a Jacobian four columns come to five.
     pub fn evaluations(&self) -> u64 {
         if self.path.is_plain {
             return 1 + 5 * self.path.columns.len().div_ceil(4) as u64;
@@ -267,7 +306,7 @@ impl Tangent {
         let forces = (self.mechanism.springs.len() + self.mechanism.torsions.len() + self.mechanism.actions.len()) as f64;
         let series = 700.0 + 400.0 * n + 150.0 * n * n + 700.0 * (rows + forces);
         let evaluation = 15.0 + 20.0 * n + 4.0 * n * n + 60.0 * rows + 20.0 * forces;
-        (0.35 * series * (1.0 + 0.75 * self.seeds.len() as f64) / evaluation) as u64
+        (0.2 * series * (1.0 + 0.75 * self.seeds.len() as f64) / evaluation) as u64
     }
 
     /// Phi(t, 0) column by column, in all coordinates and rates as they are \[rad, m, rad/s, m/s\]; of a basis or of vectors only, where there is no matrix.
@@ -287,7 +326,7 @@ impl Tangent {
         if self.path.is_plain {
             return;
         }
-        self.series = beside::room(&self.mechanism, self.coordinates, count);
+        self.series = beside::room(&self.mechanism, self.coordinates, self.path.order, count);
     }
 
     /// Expands the columns about the present state, and chooses the step.
@@ -382,16 +421,11 @@ impl Tangent {
     /// The step's own matrix from the Jacobians at its nodes, and the next step.
     fn collocate(&mut self, h: f64) -> bool {
         let f = self.weights.len();
-        let Self { problem, path, seeds, weights, gauss, .. } = self;
-        let (mut reach, mut jacobian, mut pull) = (0.0, Vec::new(), Vec::new());
-        for (y, share) in path.nodes.drain(..).zip(&gauss.nodes) {
-            jacobian.resize(y.len() * y.len(), 0.0);
-            problem.jacobian(path.state.time + *share * h, &y, &mut jacobian);
-            pull.push(jacobian.chunks_exact(y.len()).skip(f).take(f).flat_map(|row| &row[..2 * f]).copied().collect::<Vec<f64>>());
-            reach = pull.last().map_or(0.0, |pull| gauss::reach(f, weights, pull, &y[f..]));
-        }
-        path.step = reach.clamp(0.5 * h, 2.0 * h).min(LONGEST / path.rate);
-        pull.len() == gauss::STAGES && gauss.step(f, h, path.rate, &pull, seeds)
+        let Self { path, seeds, gauss, .. } = self;
+        let is_possible = gauss.step(f, h, path.rate, &path.nodes, seeds);
+        path.nodes.clear();
+        path.step = gauss.next;
+        is_possible
     }
 
     /// Puts the columns back onto the constraints.
@@ -419,9 +453,11 @@ impl Tangent {
     /// Phi(t, 0) after a step, from Phi of the step.
     fn multiply(&mut self) {
         let f = self.weights.len();
-        let Self { path: Path { columns, inputs, rate, .. }, seeds, .. } = self;
+        let Self { path: Path { columns, inputs, rate, .. }, seeds, column: from, .. } = self;
         for column in columns.iter_mut().chain(inputs) {
-            let from = std::mem::replace(column, vec![0.0; 2 * f]);
+            from.clear();
+            from.append(column);
+            column.resize(2 * f, 0.0);
             for (j, part) in seeds.iter().enumerate() {
                 // Columns of rates are those of `rate` times 1.
                 let share = if j < f { from[j] } else { from[j] / *rate };

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! (w_m, w_m') of (u, w) moved by (du, dw):      du(h) = du + Σ w_m' h^(m+1)/(m+1),   dw(h) = Σ w_m' h^m,      m = 0…P
-//! r = min over the last powers k and the columns of max((|w_0'|/|w_k'|)^(1/k), (|w_1'|/|w_k'|)^(1/(k-1))),     h = r TOLERANCE^(1/(P+1))
+//! r = min over the last powers k and the columns of max((|w_0'|/|w_k'|)^(1/k), (|w_1'|/|w_k'|)^(1/(k-1))),     h = r tolerance^(1/(P+1))
 //! ```
 //!
 //! Near singular positions the radius is that of the lower powers, and the sums end with the smallest one.  The same recurrence that expands the motion is its own derivative, multipliers included, to rounding.
@@ -11,10 +11,9 @@ use crate::arithmetic::{DoubleDouble, Dual, Scalar};
 use crate::dynamics::series::Series;
 use crate::dynamics::{Coordinates, Mechanism, State};
 
-/// Highest power P of the rates.
-pub const ORDER: usize = 10;
-/// First term left out of a column, over the column: errors multiply over the steps.
-const TOLERANCE: f64 = 1e-7;
+/// Highest powers P of the rates, and the first term left out of a column with each, over the column: errors multiply over the steps.
+pub const ORDERS: [usize; 3] = [10, 8, 7];
+const TOLERANCES: [f64; 3] = [1e-7, 1e-5, 1e-4];
 /// Powers the step is taken from.
 const JUDGES: usize = 4;
 /// The same near singular positions, where rounding off the constraints spoils the later powers.
@@ -45,17 +44,17 @@ pub trait Beside {
     fn weakest(&self) -> f64;
 }
 
-/// Room for this many columns, six in a series at most.
-pub fn room(mechanism: &Mechanism, coordinates: Coordinates, mut columns: usize) -> Vec<(usize, Box<dyn Beside>)> {
+/// Room for this many columns with powers up to `order`, one of [`ORDERS`], six in a series at most.
+pub fn room(mechanism: &Mechanism, coordinates: Coordinates, order: usize, mut columns: usize) -> Vec<(usize, Box<dyn Beside>)> {
     let mut groups = Vec::new();
     while columns > 0 {
         let count = columns.min(6);
         groups.push((
             count,
             match count {
-                1 | 2 => Box::new(Expanded::<2>::new(mechanism, coordinates)) as Box<dyn Beside>,
-                3 | 4 => Box::new(Expanded::<4>::new(mechanism, coordinates)),
-                _ => Box::new(Expanded::<6>::new(mechanism, coordinates)),
+                1 | 2 => Box::new(Expanded::<2>::new(mechanism, coordinates, order)) as Box<dyn Beside>,
+                3 | 4 => Box::new(Expanded::<4>::new(mechanism, coordinates, order)),
+                _ => Box::new(Expanded::<6>::new(mechanism, coordinates, order)),
             },
         ));
         columns -= count;
@@ -66,6 +65,7 @@ pub fn room(mechanism: &Mechanism, coordinates: Coordinates, mut columns: usize)
 /// Room for `D` columns, of which some may be idle.
 struct Expanded<const D: usize> {
     count: usize,
+    order: usize,
     /// Powers of the rates that are summed.
     summed: usize,
     series: Series<Dual<D, false>>,
@@ -73,10 +73,10 @@ struct Expanded<const D: usize> {
 }
 
 impl<const D: usize> Expanded<D> {
-    fn new(mechanism: &Mechanism, coordinates: Coordinates) -> Self {
-        let series = Series::new(mechanism, coordinates, ORDER);
+    fn new(mechanism: &Mechanism, coordinates: Coordinates, order: usize) -> Self {
+        let series = Series::new(mechanism, coordinates, order);
         let f = series.coordinates();
-        Self { count: 0, summed: ORDER + 1, series, unknowns: std::array::from_fn(|_| vec![Dual::ZERO; f]) }
+        Self { count: 0, order, summed: order + 1, series, unknowns: std::array::from_fn(|_| vec![Dual::ZERO; f]) }
     }
 
     /// Power `m` of the rates.
@@ -126,8 +126,10 @@ impl<const D: usize> Beside for Expanded<D> {
     }
 
     fn reach(&mut self, weights: &[f64], is_near: bool) -> f64 {
-        self.summed = ORDER + 1;
-        let reach = self.radius(weights, ORDER) * libm::pow(TOLERANCE, 1.0 / (ORDER + 1) as f64);
+        let order = self.order;
+        self.summed = order + 1;
+        let tolerance = ORDERS.iter().zip(TOLERANCES).find(|(known, _)| **known == order).map_or(TOLERANCES[0], |(_, tolerance)| tolerance);
+        let reach = self.radius(weights, order) * libm::pow(tolerance, 1.0 / (order + 1) as f64);
         if !is_near {
             return reach;
         }
@@ -142,7 +144,7 @@ impl<const D: usize> Beside for Expanded<D> {
             };
             (0..self.count).map(of).fold(0.0, f64::max)
         };
-        let (last, noise) = (2..=ORDER).map(|m| (m, share(m))).fold((2, f64::INFINITY), |a, b| if b.1 < a.1 { b } else { a });
+        let (last, noise) = (2..=order).map(|m| (m, share(m))).fold((2, f64::INFINITY), |a, b| if b.1 < a.1 { b } else { a });
         self.summed = last + 1;
         if noise < NOISE { low } else { f64::NAN }
     }

@@ -17,7 +17,7 @@ use crate::stepping::gauss::collocation;
 /// Stages.
 pub const STAGES: usize = 4;
 /// Step over the fastest rate.
-const SPAN: f64 = 0.55;
+const SPAN: f64 = 0.65;
 
 /// Diagonal of M over its pivots, with all links in line, beyond which a motion has moments much faster than all before: where heavy members jerk light ones straight.
 const LIGHT: f64 = 30.0;
@@ -40,6 +40,8 @@ pub struct Gauss {
     /// a, and a a.
     coupling: [Vec<f64>; 2],
     system: Vec<f64>,
+    /// The length of the next step, once the nodes of this one are known.
+    pub next: f64,
 }
 
 impl Gauss {
@@ -47,14 +49,14 @@ impl Gauss {
         let [nodes, weights, coupling] = collocation(STAGES);
         let entry = |k: usize| (0..STAGES).map(|j| coupling[k / STAGES * STAGES + j] * coupling[j * STAGES + k % STAGES]).sum();
         let square = (0..STAGES * STAGES).map(entry).collect();
-        Self { nodes, weights, coupling: [coupling, square], system: Vec::new() }
+        Self { nodes, weights, coupling: [coupling, square], system: Vec::new(), next: 0.0 }
     }
 
-    /// Writes the columns of Phi, those of rates times `rate`, from y'' by y at the nodes: matrices B and C of `f` × 2f, row by row.
+    /// Writes the columns of Phi, those of rates times `rate`, from y'' by y at the nodes, one after the other: matrices B and C of `f` × 2f, row by row.
     ///
     /// False where there is no such matrix.
-    pub fn step(&mut self, f: usize, h: f64, rate: f64, pull: &[Vec<f64>], columns: &mut [Vec<f64>]) -> bool {
-        let Self { nodes, weights, coupling: [a, aa], system } = self;
+    pub fn step(&mut self, f: usize, h: f64, rate: f64, pull: &[f64], columns: &mut [Vec<f64>]) -> bool {
+        let Self { nodes, weights, coupling: [a, aa], system, .. } = self;
         let (n, size) = (2 * f, STAGES * f);
         let width = size + n;
         system.clear();
@@ -62,7 +64,7 @@ impl Gauss {
         for i in 0..STAGES {
             for row in 0..f {
                 let line = &mut system[(i * f + row) * width..][..width];
-                let (turn, drag) = pull[i][row * n..(row + 1) * n].split_at(f);
+                let (turn, drag) = pull[(i * f + row) * n..][..n].split_at(f);
                 for k in 0..f {
                     for j in 0..STAGES {
                         line[j * f + k] = -h * (h * aa[i * STAGES + j] * turn[k] + a[i * STAGES + j] * drag[k]);
@@ -89,25 +91,36 @@ impl Gauss {
     }
 }
 
-/// Solves in place, by Gauss-Jordan with the largest pivots.
+/// Solves in place, with the largest pivots: rows below are eliminated first, then those above from the last one up.
 fn eliminate(size: usize, width: usize, system: &mut [f64]) -> bool {
     for p in 0..size {
-        let best = (p..size).max_by(|&a, &b| system[a * width + p].abs().total_cmp(&system[b * width + p].abs())).unwrap_or(p);
+        let mut best = p;
+        for row in p + 1..size {
+            if system[row * width + p].abs() > system[best * width + p].abs() {
+                best = row;
+            }
+        }
         let pivot = system[best * width + p];
         if !(pivot.is_finite() && pivot != 0.0) {
             return false;
         }
-        for k in p..width {
-            system.swap(p * width + k, best * width + k);
-            system[p * width + k] /= pivot;
+        let (above, below) = system.split_at_mut((p + 1) * width);
+        let line = &mut above[p * width + p..];
+        if best != p {
+            line.swap_with_slice(&mut below[(best - p - 1) * width + p..][..width - p]);
         }
-        for row in (0..size).filter(|&row| row != p) {
-            let factor = system[row * width + p];
-            if factor != 0.0 {
-                for k in p..width {
-                    system[row * width + k] -= factor * system[p * width + k];
-                }
-            }
+        line.iter_mut().for_each(|entry| *entry /= pivot);
+        for row in below.chunks_exact_mut(width) {
+            let factor = row[p];
+            row[p..].iter_mut().zip(&*line).for_each(|(entry, line)| *entry -= factor * line);
+        }
+    }
+    for p in (1..size).rev() {
+        let (above, below) = system.split_at_mut(p * width);
+        let line = &below[size..width];
+        for row in above.chunks_exact_mut(width) {
+            let factor = row[p];
+            row[size..].iter_mut().zip(line).for_each(|(entry, line)| *entry -= factor * line);
         }
     }
     true
@@ -134,7 +147,7 @@ mod tests {
 
     #[test]
     fn an_oscillation_is_kept_and_its_phase_is_right_to_the_eighth_order() {
-        let (rate, pull) = (2.0, vec![vec![-4.0, 0.0]; STAGES]);
+        let (rate, pull) = (2.0, [-4.0, 0.0].repeat(STAGES));
         let off = [0.8, 0.4].map(|h| {
             let mut columns = vec![vec![0.0; 2]; 2];
             assert!(Gauss::new().step(1, h, rate, &pull, &mut columns));

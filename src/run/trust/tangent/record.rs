@@ -35,6 +35,11 @@ impl Tangent {
         self.path.log
     }
 
+    /// True where it comes from Jacobians.
+    pub(in super::super) fn is_plain(&self) -> bool {
+        self.path.is_plain
+    }
+
     /// Degrees of freedom at the start.
     pub(in super::super) fn freedom(&self) -> usize {
         self.path.freedom

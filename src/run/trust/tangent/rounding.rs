@@ -10,6 +10,10 @@ impl Tangent {
     pub(super) fn round(&mut self, h: f64, taken: f64) {
         let f = self.weights.len();
         let n = 2 * f;
+        // Where the rounding of the series does not count there is none.
+        if taken == 0.0 && self.path.covariance.iter().all(|&entry| entry == 0.0) {
+            return;
+        }
         let Self { seeds, rates, path: Path { rate, covariance, state, .. }, .. } = self;
         let phi = |i: usize, j: usize| if j < f { seeds[j][i] } else { seeds[j][i] / *rate };
         for i in 0..f {

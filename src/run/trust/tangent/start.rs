@@ -15,7 +15,7 @@ impl Tangent {
             ground.keep(mechanism, &path.state, columns.iter_mut());
         }
         let mut squared = 0.0_f64;
-        for (count, mut series) in beside::room(mechanism, self.coordinates, columns.len()) {
+        for (count, mut series) in beside::room(mechanism, self.coordinates, beside::ORDERS[0], columns.len()) {
             let some: Vec<Vec<f64>> = columns.drain(..count).collect();
             series.expand(mechanism, &path.state, &some);
             squared = squared.max(series.pull(weights));
