@@ -620,3 +620,24 @@ fn what_run_and_companion_share_is_told() {
     assert_eq!(of("wall", "dp8"), ["impact law", "compilation"]);
     assert_eq!(of("wall", "taylor"), ["impact law", "compilation"]);
 }
+
+/// Of a run by the series at its default settings the companion takes little more work than the run itself, and the tangent flow a share of that: beside
+/// what the output of these scenes costs that is about a third (`.ci/cost`).
+#[test]
+fn companions_take_little_more_work_than_their_runs() {
+    for name in SCENES {
+        let scene = shipped(name, &[]);
+        let request = Request { until: Some(scene.until.min(10.0)), ..Request::default() };
+        let outcome = trusted(&scene, &request, Level::Auto);
+        if outcome.plan.method != MethodId::Taylor {
+            continue;
+        }
+        let trust = outcome.trust.expect("asked for");
+        let [companion, flow, run] = trust.work;
+        let units = 1e5;
+        println!("{name}: companion {:.2}, flow {:.2}, run {:.2}", companion / units, flow / units, run / units);
+        assert!(companion > flow && run > 0.0, "{name}");
+        assert!(flow < 0.5 * run + 2.6 * units, "{name}: the flow took {flow:e} beside {run:e}");
+        assert!(companion - flow < 2.0 * run + 5.0 * units, "{name}: the companion took {companion:e} beside {run:e}");
+    }
+}

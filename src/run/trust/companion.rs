@@ -1,6 +1,6 @@
 //! The companion of a run: the same motion by a finer series, looked at together with the run.
 //!
-//! Looks are a mean step of the companion apart, a half of it in the beginning and a quarter near the horizon: neither output times nor rests have a say in when they are.
+//! Looks are a mean step of the companion apart, a half of it in the beginning and near the horizon: neither output times nor rests have a say in when they are.
 
 use super::budget::{DOUBLE_DOUBLE, FLOW, FULL_GRACE, FULL_SHARE, GRACE, Prices, SHARE};
 use super::finer;
@@ -26,7 +26,7 @@ const ENOUGH: f64 = 2000.0;
 /// The first look, in units of time of the mechanism.
 const FIRST: f64 = 1e-3;
 /// The time to the next look over the companion's mean step: in the beginning, usually, near the horizon, and where the run is lost.
-const GAPS: [f64; 4] = [0.5, 1.0, 0.25, 4.0];
+const GAPS: [f64; 4] = [0.5, 1.0, 0.5, 4.0];
 /// Looks that belong to the beginning.
 const BEGINNING: u64 = 128;
 /// The companion's own rounding over what was measured, at most.
@@ -190,12 +190,11 @@ impl Companion {
     }
 
     /// Ends the tangent flow where it has cost its share; where the companion's own rounding counts it is needed to the end.
-    fn stint(&mut self, tally: Tally) {
-        let run = self.prices.run(self.run.method, tally);
+    fn stint(&mut self) {
         let Self { shadow: Some(shadow), measured, .. } = self else { return };
         let Some(tangent) = &shadow.tangent else { return };
         let [share, grace] = FLOW[usize::from(!tangent.is_plain())];
-        if measured.level == Level::Auto && !shadow.is_rounded && measured.flow > share * run + grace {
+        if measured.level == Level::Auto && !shadow.is_rounded && measured.flow > share * measured.run + grace {
             measured.stop_growth(shadow.end_flow().as_ref());
         }
     }
@@ -245,7 +244,8 @@ impl Companion {
         if let Err(why) = self.accompany(if motion.time > horizon { horizon } else { motion.time }, tally) {
             return self.end(&why);
         }
-        self.stint(tally);
+        self.measured.run = self.prices.run(self.run.method, tally);
+        self.stint();
         let Self { shadow: Some(shadow), measured, .. } = self else { return };
         if measured.lost.is_none() {
             self.measure(motion);

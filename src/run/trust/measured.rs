@@ -69,6 +69,8 @@ pub(super) struct Measured {
     /// Work spent, and of it that of the tangent flow.
     pub spent: f64,
     pub flow: f64,
+    /// The work of the run so far.
+    pub run: f64,
 }
 
 impl Measured {
@@ -101,6 +103,7 @@ impl Measured {
             stopped: None,
             spent: 0.0,
             flow: 0.0,
+            run: 0.0,
         }
     }
 
@@ -193,6 +196,10 @@ impl Measured {
         }
         let Growth { lyapunov, power: growth_power } =
             if self.no_growth.is_some() { Growth::default() } else { self.nature.judge(&self.history) };
+        if let (Some([followed, _]), None, None) = (self.stopped, lyapunov, growth_power) {
+            let why = || format!("it was followed to t = {followed:.3e} s only, more would have taken too large a share of the run");
+            self.no_growth.get_or_insert_with(why);
+        }
         let input_error = self.input_error.or_else(|| self.inputs_at(self.horizon.unwrap_or(t)));
         let Self { name, shared, until, error, mut record, horizon, lost, why, history, no_growth, .. } = self;
         if record.last().is_some_and(|last| last[0] < until) {
@@ -219,6 +226,7 @@ impl Measured {
             covered: until,
             why,
             record,
+            work: [self.spent, self.flow, self.run],
         };
         // Angles and positions are written as doubles.
         let least = LEAST.max(ROUNDED * self.farthest);

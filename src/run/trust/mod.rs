@@ -178,6 +178,9 @@ pub struct Trust {
     pub why: Option<String>,
     /// Times \[s\] and estimates \[rad\] up to there, thinned out.
     pub record: Vec<[f64; 2]>,
+    /// Work of the companion, of that the tangent flow's, and the work of the run beside it, as counted by the prices of [`budget`] \[ns\].
+    #[serde(default)]
+    pub work: [f64; 3],
 }
 
 impl Trust {

@@ -17,7 +17,7 @@ use crate::stepping::gauss::collocation;
 /// Stages.
 pub const STAGES: usize = 4;
 /// Step over the fastest rate.
-const SPAN: f64 = 0.65;
+const SPAN: f64 = 0.55;
 
 /// Diagonal of M over its pivots, with all links in line, beyond which a motion has moments much faster than all before: where heavy members jerk light ones straight.
 const LIGHT: f64 = 30.0;
