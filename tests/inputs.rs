@@ -2,13 +2,10 @@
 //!
 //! `COUNT=300 cargo test --test inputs -- --nocapture` compares more random scenes; `SEED` is the first, `EACH` how many numbers of each.
 
-mod common;
-#[path = "common/mechanisms/mod.rs"]
-mod mechanisms;
+use crate::common;
+use crate::mechanisms;
 #[cfg(feature = "cli")]
-#[path = "common/program.rs"]
-#[allow(dead_code)]
-mod program;
+use crate::program;
 
 use common::compile;
 use driftless::dynamics::{Mechanism, Motion};

@@ -31,6 +31,7 @@ mod compare;
 mod estimates;
 mod fuzz;
 mod growth;
+mod inputs;
 mod joint_forces;
 mod readme;
 mod resume;
