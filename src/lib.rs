@@ -60,3 +60,13 @@ pub mod stepping;
 
 #[doc = include_str!("../docs/source-problem.md")]
 pub mod source_problem {}
+
+// The examples of the README and of the chapter on the library are compiled and run as documentation tests.
+#[cfg(doctest)]
+mod documentation {
+    #[doc = include_str!("../README.md")]
+    mod readme {}
+
+    #[doc = include_str!("../docs/library.md")]
+    mod library {}
+}
