@@ -118,10 +118,12 @@ impl Page {
 
     /// Pieces of inline code, with their lines.
     pub fn inline_code(&self) -> Vec<(usize, String)> {
-        let lines = self.prose();
-        let pieces =
-            |line: &Line| -> Vec<_> { line.text.split('`').skip(1).step_by(2).map(|code| (line.number, code.to_owned())).collect() };
-        lines.iter().flat_map(pieces).collect()
+        let mut pieces = Vec::new();
+        for line in self.prose() {
+            assert!(line.text.matches('`').count() % 2 == 0, "{}:{}: code goes on in the next line", self.name, line.number);
+            pieces.extend(line.text.split('`').skip(1).step_by(2).map(|code| (line.number, code.to_owned())));
+        }
+        pieces
     }
 
     /// The file a link of this page leads to, and the anchor in it.
