@@ -1,4 +1,4 @@
-//! The targets of `fuzz/` on inputs of a fixed seed, so that every change meets some; `FUZZ=1000000 cargo test --test fuzz` has more.
+//! The targets of `fuzz/` on inputs of a fixed seed, so that every change meets some; `FUZZ=1000000 cargo test --test reports fuzz::` has more.
 #![cfg(feature = "cli")]
 
 use crate::extremes;

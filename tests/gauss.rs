@@ -1,6 +1,6 @@
 //! Gauss collocation: measured order, drift at the rounding level, reversal, restart, refusals.
 //!
-//! The long measurements are `cargo test --release --test gauss -- --ignored --nocapture`.
+//! The long measurements are `cargo test --release --test physics -- gauss:: --ignored --nocapture`.
 
 use crate::common;
 

@@ -1,6 +1,6 @@
 //! The tangent flow against runs from neighbouring starts, and against closed forms.
 //!
-//! `COUNT=300 cargo test --test growth -- --nocapture` compares more random scenes; `SEED` is the first.
+//! `COUNT=300 cargo test --test reports -- growth:: --nocapture` compares more random scenes; `SEED` is the first.
 
 use crate::common;
 use crate::mechanisms;

@@ -1,6 +1,6 @@
 //! What the digits of a scene's numbers come to, against runs from neighbouring scenes by another method, and against closed forms.
 //!
-//! `COUNT=300 cargo test --test inputs -- --nocapture` compares more random scenes; `SEED` is the first, `EACH` how many numbers of each.
+//! `COUNT=300 cargo test --test reports -- inputs:: --nocapture` compares more random scenes; `SEED` is the first, `EACH` how many numbers of each.
 
 use crate::common;
 use crate::mechanisms;

@@ -9,7 +9,7 @@ use mechanisms::{Generated, Kind};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Seeds where nobody says how many: `SEEDS=10000 cargo test --test mechanisms -- --nocapture`.
+/// Seeds where nobody says how many: `SEEDS=10000 cargo test --test physics -- mechanisms:: --nocapture`.
 fn seeds(usual: u64) -> u64 {
     std::env::var("SEEDS").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
 }

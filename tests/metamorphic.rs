@@ -1,7 +1,7 @@
 //! Whole runs of random scenes of every kind against runs of scenes that describe the same motion otherwise: other order, names and ends of
 //! joints, mirrored, turned, shifted, in other units, back in time, a body cut in two and welded.
 //!
-//! `METAMORPHIC=2000 cargo test --test metamorphic -- --nocapture` runs more scenes per relation; `SEED` is the first, and `FOUND` names a folder
+//! `METAMORPHIC=2000 cargo test --test physics -- metamorphic:: --nocapture` runs more scenes per relation; `SEED` is the first, and `FOUND` names a folder
 //! for the scenes of faults.
 
 use crate::mechanisms;

@@ -33,7 +33,6 @@ mod fuzz;
 mod growth;
 mod inputs;
 mod joint_forces;
-mod readme;
 mod resume;
 mod stress;
 mod sweep;
