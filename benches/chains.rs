@@ -1,4 +1,4 @@
-//! What chains, ladders and long runs of them cost: one evaluation by matrices and body by body, and a hanging chain marched.
+//! What chains, ladders and long runs of them cost: one evaluation by matrices and body by body, and a hanging chain integrated.
 //!
 //! `cargo bench --no-default-features --bench chains [-- evaluations | hanging | ladders]`: alternating blocks in one process, minimum and median.
 //! Chains are 1 m and 1 kg in all, their links thin rods; ladders are the four-bars of `examples/four_bars.rs`.
@@ -15,7 +15,7 @@ use driftless::dynamics::{Field, Form, Mechanism, Motion, Time};
 use driftless::run::{MethodId, Request, Stabilization, simulate};
 use driftless::scene::{Scene, Start};
 use driftless::stabilization::Projected;
-use driftless::stepping::{Dop853, Dp8, Method, Reached, Seen, Tally, Taylor, Tolerance};
+use driftless::stepping::{Dop853, Dp8, Integrator, Reached, Seen, Tally, Taylor, Tolerance};
 use std::f64::consts::FRAC_PI_2;
 use std::hint::black_box;
 use std::sync::Arc;
@@ -119,7 +119,7 @@ fn computed(begin: Instant) -> f64 {
 }
 
 /// CPU seconds per simulated second of a run by the program's own loop, samples and all.
-fn march(name: &str, scene: &Scene, request: &Request) {
+fn integrate(name: &str, scene: &Scene, request: &Request) {
     let (mut times, mut tally) = (Vec::new(), None);
     for _ in 0..5 {
         let clock = Instant::now();
@@ -233,7 +233,7 @@ fn evaluations() {
 type Angles = Multiplier<0, true>;
 
 /// The method alone, without the program's loop and monitors: angles \[rad\] at the end, milliseconds, evaluations or expansions.
-fn alone(mechanism: &Arc<Mechanism>, scene: &Scene, method: &mut dyn Method<Angles>) -> (Vec<f64>, f64, u64) {
+fn alone(mechanism: &Arc<Mechanism>, scene: &Scene, method: &mut dyn Integrator<Angles>) -> (Vec<f64>, f64, u64) {
     let mut form = Angles::new(Arc::clone(mechanism));
     let mut state = form.state(&mechanism.start(scene));
     let mut tally = Tally::default();
@@ -253,13 +253,13 @@ fn methods(links: usize) {
     let both = |relative| Tolerance { relative, absolute: relative };
     let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
     let exact = alone(&mechanism, &scene, &mut Taylor::<f64>::with_order(1e-14, 24)).0;
-    type Candidate = (String, Box<dyn Fn() -> Box<dyn Method<Angles>>>);
+    type Candidate = (String, Box<dyn Fn() -> Box<dyn Integrator<Angles>>>);
     let mut candidates: Vec<Candidate> = Vec::new();
     for tolerance in [1e-4, 1e-6, 1e-8, 1e-10] {
         candidates.push((format!("dop853 {tolerance:.0e}"), Box::new(move || Box::new(Dop853::new(both(tolerance))))));
         candidates.push((format!("dp8 {tolerance:.0e}"), Box::new(move || Box::new(Dp8::new(both(tolerance))))));
         for order in [16, 20, 24, 28] {
-            let series = move || Box::new(Taylor::<f64>::with_order(tolerance, order)) as Box<dyn Method<_>>;
+            let series = move || Box::new(Taylor::<f64>::with_order(tolerance, order)) as Box<dyn Integrator<_>>;
             candidates.push((format!("taylor {tolerance:.0e}, order {order}"), Box::new(series)));
         }
     }
@@ -285,7 +285,7 @@ fn hanging() {
     for (name, angle) in [("0.2 rad", 0.2), ("0.5 rad", 0.5), ("horizontal", FRAC_PI_2)] {
         for (method, tolerance) in [(MethodId::Dop853, 1e-6), (MethodId::Taylor, 1e-6), (MethodId::Taylor, 1e-8)] {
             let request = Request { method: Some(method), rtol: Some(tolerance), ..Request::default() };
-            march(&format!("{name}, {method} {tolerance:.0e}"), &chain(128, Some(angle)), &request);
+            integrate(&format!("{name}, {method} {tolerance:.0e}"), &chain(128, Some(angle)), &request);
         }
     }
     let kept = Request {
@@ -295,5 +295,5 @@ fn hanging() {
         until: Some(0.25),
         ..Request::default()
     };
-    march("ladder of 40, dp8", &ladder(40), &kept);
+    integrate("ladder of 40, dp8", &ladder(40), &kept);
 }

@@ -10,7 +10,7 @@ use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::{Field, Form, Mechanism, Motion, Time};
 use driftless::scene::read_scene;
 use driftless::stabilization::{Baumgarte, Projected};
-use driftless::stepping::{Dp8, Method, Reached, Seen, Tally, Tolerance};
+use driftless::stepping::{Dp8, Integrator, Reached, Seen, Tally, Tolerance};
 use std::hint::black_box;
 use std::path::Path;
 use std::sync::Arc;
@@ -126,7 +126,7 @@ fn table<'a>(lines: impl Iterator<Item = (&'a str, &'a mut Vec<f64>)>) {
     }
 }
 
-/// A scene on its way, marched block by block.
+/// A scene on its way, integrated block by block.
 struct Traveller {
     name: &'static str,
     advance: Box<dyn FnMut(f64) -> u64>,
@@ -135,7 +135,7 @@ struct Traveller {
 }
 
 impl Traveller {
-    fn new<P: Form + 'static, M: Method<P> + 'static>(name: &'static str, mut problem: P, mut method: M, start: &Motion) -> Self {
+    fn new<P: Form + 'static, M: Integrator<P> + 'static>(name: &'static str, mut problem: P, mut method: M, start: &Motion) -> Self {
         let mut state = problem.state(start);
         let advance = move |span: f64| {
             let (mut tally, until) = (Tally::default(), state.time + span);

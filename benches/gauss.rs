@@ -7,7 +7,7 @@ use driftless::dynamics::canonical::Canonical;
 use driftless::dynamics::{Field, Form, Mechanism, State, Time};
 use driftless::scene::{Scene, read_scene};
 use driftless::stepping::gauss::Gauss;
-use driftless::stepping::{Method, Seen, Tally};
+use driftless::stepping::{Integrator, Seen, Tally};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -52,7 +52,7 @@ impl Candidate {
     fn block(&mut self) {
         let until = self.state.time + f64::from(BLOCK) * self.method.step();
         let begin = Instant::now();
-        self.method.advance(&mut *self.field, &mut self.state, until, &mut self.tally, &mut |_, _| Ok(Seen::Kept)).expect("a march");
+        self.method.advance(&mut *self.field, &mut self.state, until, &mut self.tally, &mut |_, _| Ok(Seen::Kept)).expect("an integration");
         self.times.push(begin.elapsed().as_secs_f64() * 1e6 / f64::from(BLOCK));
     }
 }

@@ -18,7 +18,7 @@ use driftless::stepping::composition::Composition;
 use driftless::stepping::gauss::Gauss;
 use driftless::stepping::rattle::Rattle;
 use driftless::stepping::taylor::Kernel as Expansion;
-use driftless::stepping::{Dop853, Dp5, Dp8, Method, Seen, Tally, Taylor, Tolerance};
+use driftless::stepping::{Dop853, Dp5, Dp8, Integrator, Seen, Tally, Taylor, Tolerance};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -36,7 +36,7 @@ struct Ran {
     tally: Tally,
 }
 
-fn march<P: Form + ?Sized>(problem: &mut P, start: &Motion, mut method: impl Method<P>, watched: bool) -> Ran {
+fn integrate<P: Form + ?Sized>(problem: &mut P, start: &Motion, mut method: impl Integrator<P>, watched: bool) -> Ran {
     let mut state = problem.state(start);
     let mut tally = Tally::default();
     let mechanism = problem.mechanism().clone();
@@ -105,34 +105,38 @@ fn main() {
         if tolerance > 1e-9 {
             candidates.push((
                 name("dp5, projected"),
-                Box::new(move |w| march(&mut looped(), start, Projected::new(Dp5::new(both(tolerance))), w)),
+                Box::new(move |w| integrate(&mut looped(), start, Projected::new(Dp5::new(both(tolerance))), w)),
             ));
         }
-        candidates
-            .push((name("dp8, projected"), Box::new(move |w| march(&mut looped(), start, Projected::new(Dp8::new(both(tolerance))), w))));
+        candidates.push((
+            name("dp8, projected"),
+            Box::new(move |w| integrate(&mut looped(), start, Projected::new(Dp8::new(both(tolerance))), w)),
+        ));
         candidates.push((
             name("dp8 in angles, projected"),
-            Box::new(move |w| march(&mut multiplier(), start, Projected::new(Dp8::new(both(tolerance))), w)),
+            Box::new(move |w| integrate(&mut multiplier(), start, Projected::new(Dp8::new(both(tolerance))), w)),
         ));
-        candidates.push((name("dp8"), Box::new(move |w| march(&mut looped(), start, Dp8::new(both(tolerance)), w))));
-        candidates.push((name("dop853"), Box::new(move |w| march(&mut looped(), start, Dop853::new(both(tolerance)), w))));
+        candidates.push((name("dp8"), Box::new(move |w| integrate(&mut looped(), start, Dp8::new(both(tolerance)), w))));
+        candidates.push((name("dop853"), Box::new(move |w| integrate(&mut looped(), start, Dop853::new(both(tolerance)), w))));
     }
     for tolerance in [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-12] {
         let name = |method: &str| format!("{method} {tolerance:.0e}");
         let taylor = move || Taylor::<f64>::new(both(tolerance));
-        candidates.push((name("taylor"), Box::new(move |w| march(&mut looped(), start, taylor(), w))));
-        candidates.push((name("taylor, projected"), Box::new(move |w| march(&mut looped(), start, Projected::new(taylor()), w))));
+        candidates.push((name("taylor"), Box::new(move |w| integrate(&mut looped(), start, taylor(), w))));
+        candidates.push((name("taylor, projected"), Box::new(move |w| integrate(&mut looped(), start, Projected::new(taylor()), w))));
         let series = move || {
             let mut series = taylor();
             series.kernel = Expansion::Series;
             series
         };
-        candidates
-            .push((name("taylor in angles, projected"), Box::new(move |w| march(&mut multiplier(), start, Projected::new(series()), w))));
+        candidates.push((
+            name("taylor in angles, projected"),
+            Box::new(move |w| integrate(&mut multiplier(), start, Projected::new(series()), w)),
+        ));
     }
     for steps in [50.0, 100.0, 200.0] {
         let gauss = move || SymmetricGauss::new(Gauss::new(8, 0.03 / steps).expect("sound settings"));
-        candidates.push((format!("gauss16, projected 0.03/{steps}"), Box::new(move |w| march(&mut looped(), start, gauss(), w))));
+        candidates.push((format!("gauss16, projected 0.03/{steps}"), Box::new(move |w| integrate(&mut looped(), start, gauss(), w))));
     }
     let compositions = [
         ("rattle2", Composition::Single),
@@ -143,7 +147,7 @@ fn main() {
     for (name, composition) in compositions {
         for steps in [200.0, 400.0, 800.0] {
             let rattle = move || Rattle::new(composition, 0.03 / steps);
-            candidates.push((format!("{name} 0.03/{steps}"), Box::new(move |w| march(&mut natural(), start, rattle(), w))));
+            candidates.push((format!("{name} 0.03/{steps}"), Box::new(move |w| integrate(&mut natural(), start, rattle(), w))));
         }
     }
     let mut times = vec![Vec::new(); candidates.len()];

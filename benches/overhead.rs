@@ -7,13 +7,13 @@ use driftless::dynamics::canonical::Canonical;
 use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::{Form, Mechanism, State};
+use driftless::run::async_writer::AsyncWriter;
 use driftless::run::files::TRAJECTORY;
-use driftless::run::scribe::Scribe;
 use driftless::run::table::Table;
-use driftless::run::{Folder, Limits, MethodId, Plan, Request, Run, march};
+use driftless::run::{Folder, Limits, MethodId, Plan, Request, Run, integrate};
 use driftless::scene::{Scene, read_scene};
 use driftless::stepping::gauss::Gauss;
-use driftless::stepping::{Dop853, Method, Seen, Tally, Taylor};
+use driftless::stepping::{Dop853, Integrator, Seen, Tally, Taylor};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
@@ -43,7 +43,7 @@ fn path(scene: &str) -> PathBuf {
 }
 
 /// The method alone, to every output time.
-fn bare<P: Form, M: Method<P>>(problem: &mut P, method: &mut M, mut state: State, plan: &Plan) {
+fn bare<P: Form, M: Integrator<P>>(problem: &mut P, method: &mut M, mut state: State, plan: &Plan) {
     let (mut tally, horizon) = (Tally::default(), plan.time(plan.rows));
     let (mut from, mut inside) = (State::default(), State::default());
     for row in 1..=plan.rows {
@@ -64,7 +64,7 @@ fn bare<P: Form, M: Method<P>>(problem: &mut P, method: &mut M, mut state: State
             method.advance(problem, &mut state, horizon, &mut tally, watch).expect("a step");
         }
         if state.time > until {
-            method.within(problem, &from, until, &mut inside);
+            method.interpolate(problem, &from, until, &mut inside);
         }
     }
 }
@@ -112,9 +112,9 @@ fn main() {
         let with_files = || {
             let mut folder = Folder::open(&place, false).expect("a folder");
             let table = Table::new(&mechanism, folder.begin(TRAJECTORY).expect("a file")).expect("a header");
-            let mut scribe = Scribe::new(table);
-            march(run(), &mut |sample| scribe.write(sample)).expect("a run");
-            folder.keep(scribe.finish().expect("written")).expect("kept");
+            let mut writer = AsyncWriter::new(table);
+            integrate(run(), &mut |sample| writer.write(sample)).expect("a run");
+            folder.keep(writer.finish().expect("written")).expect("kept");
         };
         let program = || {
             let mut command = Command::new(env!("CARGO_BIN_EXE_driftless"));
@@ -129,7 +129,7 @@ fn main() {
         };
         let candidates: [Candidate; 4] = [
             ("method alone", Box::new(|| alone(case, &scene, &mechanism, &plan))),
-            ("library loop with monitors", Box::new(|| drop(march(run(), &mut |_| Ok(())).expect("a run")))),
+            ("library loop with monitors", Box::new(|| drop(integrate(run(), &mut |_| Ok(())).expect("a run")))),
             ("the same, trajectory written", Box::new(with_files)),
             ("driftless run, whole process", Box::new(program)),
         ];

@@ -4,7 +4,7 @@
 //! t = 1 s against `taylor` at 1e-14, and the ratio to the first line, `dop853` of the crate `ode_solvers`, round by round.
 
 use driftless::dynamics::Mechanism;
-use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, march};
+use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, integrate};
 use driftless::scene::{Scene, read_scene};
 use std::path::Path;
 use std::sync::Arc;
@@ -26,7 +26,7 @@ fn run(scene: &Scene, mechanism: &Arc<Mechanism>, method: MethodId, setting: f64
     let request = Request { method: Some(method), rtol: setting.0, step: setting.1, ..Request::default() };
     let plan = Plan::new(scene, mechanism, &request).expect("a plan");
     let run = Run::new(Arc::clone(mechanism), plan, Limits::default(), &mechanism.start(scene)).expect("a beginning");
-    march(run, &mut |_| Ok(())).expect("an end")
+    integrate(run, &mut |_| Ok(())).expect("an end")
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

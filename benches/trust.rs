@@ -7,7 +7,7 @@ use driftless::dynamics::Mechanism;
 use driftless::run::files::TRAJECTORY;
 use driftless::run::table::Table;
 use driftless::run::trust::Level;
-use driftless::run::{Folder, Limits, Plan, Request, Run, march};
+use driftless::run::{Folder, Limits, Plan, Request, Run, integrate};
 use driftless::scene::read_scene;
 use std::path::Path;
 use std::sync::Arc;
@@ -59,7 +59,7 @@ fn main() {
             let mut folder = Folder::open(&place, false).expect("a folder");
             let mut table = Table::new(&mechanism, folder.begin(TRAJECTORY).expect("a file")).expect("a header");
             let run = Run::new(Arc::clone(&mechanism), plan.clone(), Limits::default(), &start).expect("a beginning");
-            let outcome = march(run.trusted(level, &start), &mut |sample| table.write(sample)).expect("a run");
+            let outcome = integrate(run.trusted(level, &start), &mut |sample| table.write(sample)).expect("a run");
             folder.keep(table.finish().expect("written")).expect("kept");
             (begin.elapsed().as_secs_f64(), outcome.trust.map_or("", |trust| trust.how.word()))
         };

@@ -1,13 +1,13 @@
 //! Energy over a long run by six methods: which climb, and which stay where they are.
 //!
-//! `cargo run --release --example drift_chart` marches the free double pendulum for 1000 s (give another horizon as the first argument) and
+//! `cargo run --release --example drift_chart` integrates the free double pendulum for 1000 s (give another horizon as the first argument) and
 //! writes `output/energy_drift.png`.
 
 use driftless::chart::{DriftSeries, EnergyDrift, FILE_RESOLUTION, energy_drift};
 use driftless::run::{Request, simulate};
 use driftless::scene::read_scene;
 
-/// Method, fixed step \[s\] or tolerance, and its words in the chart.
+/// Integrator, fixed step \[s\] or tolerance, and its words in the chart.
 const RUNS: [(&str, Setting, &str); 6] = [
     ("dopri5", Setting::Tolerance(1e-10), "10^{−10}"),
     ("dop853", Setting::Tolerance(1e-10), "10^{−10}"),

@@ -1,6 +1,6 @@
 //! A hundred million seconds of `gentle` by Gauss's method, in as many sittings as it takes.
 //!
-//! `cargo run --release --example long_horizon -- [SECONDS]` marches on to that simulated time, from where the last call stopped; without SECONDS it
+//! `cargo run --release --example long_horizon -- [SECONDS]` integrates on to that simulated time, from where the last call stopped; without SECONDS it
 //! goes on for three seconds of real time.  `output/long_horizon/checkpoint.json` holds the state to the last bit and is replaced whole.
 //!
 //! Plain doubles in the stages, on purpose: the evaluations in pairs leave a fifth of the walk over 1e5 s, but a climb of 2e-21 a second at this step, which a
@@ -14,7 +14,7 @@ use driftless::dynamics::kernel::Kernel;
 use driftless::dynamics::{Form, Mechanism, Motion, State, Time};
 use driftless::scene::read_scene;
 use driftless::stepping::gauss::Gauss;
-use driftless::stepping::{Method, Seen};
+use driftless::stepping::{Integrator, Seen};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::{Duration, Instant};

@@ -1,11 +1,11 @@
 //! One motor scene, its start 1e-6 rad/s off, under four stabilizations: what each leaves of the constraint, and what it does to the energy.
 //!
-//! `cargo run --release --example stabilizations` marches 100 s (give another horizon as the first argument) and writes `output/constraint_drift.png`.
+//! `cargo run --release --example stabilizations` integrates 100 s (give another horizon as the first argument) and writes `output/constraint_drift.png`.
 
 use driftless::arithmetic::DoubleDouble;
 use driftless::chart::{ConstraintDrift, DefectPanel, DriftSeries, FILE_RESOLUTION, constraint_drift};
 use driftless::dynamics::Mechanism;
-use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Stabilization, march};
+use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Stabilization, integrate};
 use driftless::scene::read_scene;
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for stabilize in Stabilization::ALL {
         let request = Request { method: Some(MethodId::Dp8), stabilize: Some(stabilize), until: Some(until), ..Request::default() };
         let plan = Plan::new(&scene, &mechanism, &request)?;
-        let outcome = march(Run::new(mechanism.clone(), plan, Limits::default(), &start)?, &mut |_| Ok(()))?;
+        let outcome = integrate(Run::new(mechanism.clone(), plan, Limits::default(), &start)?, &mut |_| Ok(()))?;
         let [position, velocity] = &outcome.drift.constraints[0].1;
         let figures = [position.max, position.slope(), velocity.max];
         println!("{stabilize:12} {:10.1e} {:10.1e} {:10.1e} {:14.1e}", figures[0], figures[1], figures[2], outcome.drift.stabilizer);

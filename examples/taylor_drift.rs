@@ -7,7 +7,7 @@ use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::kernel::Kernel;
 use driftless::dynamics::{Form, Mechanism, Motion, Time};
 use driftless::scene::read_scene;
-use driftless::stepping::{Method, Seen, Taylor};
+use driftless::stepping::{Integrator, Seen, Taylor};
 use std::sync::Arc;
 use std::time::Instant;
 

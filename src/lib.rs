@@ -2,7 +2,7 @@
 #![warn(missing_docs)]
 //! Long-horizon integration of planar mechanisms with constraint stabilization.
 //!
-//! A *scene* (bars, hinges, springs, motors, walls) is compiled into equations of motion; a method marches them; drift of energy and constraints
+//! A *scene* (bars, hinges, springs, motors, walls) is compiled into equations of motion; a method integrates them; drift of energy and constraints
 //! is watched on the way and reported with the result.
 //!
 //! ```

@@ -67,7 +67,7 @@ fn pendulum() -> MechanismChart {
 }
 
 /// All methods at many settings, as a comparison has them.
-fn crowd() -> WorkPrecision {
+fn batch() -> WorkPrecision {
     let line = |(k, method): (usize, &&str)| {
         let order = 3.0 + (k % 7) as f64;
         let points =
@@ -178,7 +178,7 @@ fn gallery() -> Vec<(&'static str, Picture)> {
         ("torque", torque_power(&torque(time.clone(), wave(1)), resolution).unwrap()),
         ("two motors", torque_power(&two, resolution).unwrap()),
         ("work", work_precision(&work, resolution).unwrap()),
-        ("crowd", work_precision(&crowd(), resolution).unwrap()),
+        ("batch", work_precision(&batch(), resolution).unwrap()),
     ]
 }
 

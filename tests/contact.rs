@@ -9,7 +9,7 @@ use common::{LENGTH, MASS, PENDULUM_SQUARED, compile, double_pendulum, pendulum,
 use driftless::arithmetic::Complex;
 use driftless::dynamics::Mechanism;
 use driftless::dynamics::kernel::{Bias, Kernel};
-use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Sample, Stabilization, march};
+use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Sample, Stabilization, integrate};
 use driftless::scene::{Law, Motor, Scene, Sine, Start, Wall};
 use driftless::stepping::Cause;
 use std::sync::Arc;
@@ -30,7 +30,7 @@ fn watched(scene: &Scene, request: &Request) -> (Outcome, Vec<Sample>) {
     let start = mechanism.start(scene);
     let mut samples = Vec::new();
     let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a beginning");
-    let outcome = march(run, &mut |sample| {
+    let outcome = integrate(run, &mut |sample| {
         samples.push(sample.clone());
         Ok(())
     });

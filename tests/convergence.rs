@@ -1,6 +1,6 @@
 //! Measured order of the Dormand–Prince methods on nonlinear scenes.
 //!
-//! An adaptive method has no step to set, but it never steps over a time asked for: marched in windows of length h at a tolerance that accepts
+//! An adaptive method has no step to set, but it never steps over a time asked for: integrated in windows of length h at a tolerance that accepts
 //! everything, it makes exactly one step a window.  The error at a fixed horizon against h then has the method's order as its slope.  References come
 //! from `gauss16` in the canonical form: another method, in other unknowns.
 
@@ -13,7 +13,7 @@ use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::{Field, Form, Mechanism, Motion, State, Time};
 use driftless::stepping::gauss::Gauss;
-use driftless::stepping::{Dop853, Dopri5, Dp5, Dp8, Method, Reached, Seen, Tally, Tolerance};
+use driftless::stepping::{Dop853, Dopri5, Dp5, Dp8, Integrator, Reached, Seen, Tally, Tolerance};
 use nalgebra::SVector;
 use ode_solvers::dop_shared::{OutputType, System};
 use std::sync::Arc;
@@ -43,8 +43,8 @@ fn error(mechanism: &Mechanism, found: &Motion, reference: &Motion) -> f64 {
 /// Moments of the horizon at which the error is looked at: its largest counts, so that no chance cancellation at one moment is taken for order.
 const LOOKS: u64 = 8;
 
-/// Marches one step a window and returns the motion at every look.
-fn steps<F: Field + Form>(method: &mut impl Method<F>, form: &mut F, start: &Motion, count: u64) -> Vec<Motion> {
+/// Integrates one step a window and returns the motion at every look.
+fn steps<F: Field + Form>(method: &mut impl Integrator<F>, form: &mut F, start: &Motion, count: u64) -> Vec<Motion> {
     let h = HORIZON / count as f64;
     let mut state = form.state(start);
     state.memory = vec![h];
@@ -77,7 +77,7 @@ fn reference<const ACCOUNT: bool>(mechanism: &Arc<Mechanism>, start: &Motion) ->
 }
 
 /// The slope of the error for these numbers of steps.
-fn measured<F: Field + Form>(method: &mut impl Method<F>, form: &mut F, start: &Motion, reference: &[Motion], counts: &[u64]) -> f64 {
+fn measured<F: Field + Form>(method: &mut impl Integrator<F>, form: &mut F, start: &Motion, reference: &[Motion], counts: &[u64]) -> f64 {
     let points: Vec<(f64, f64)> = counts
         .iter()
         .map(|&count| {
@@ -198,7 +198,7 @@ fn the_crates_own_dop853_loses_its_order_where_time_matters_and_ours_does_not() 
         let h = END / count as f64;
         let y = (0..count).fold(exact(0.0), |y, k| raw_step(k as f64 * h, y, h));
         raw.push((h, (y - exact(END)).abs()));
-        let march = |method: &mut dyn Method<Bernoulli>| {
+        let integrate = |method: &mut dyn Integrator<Bernoulli>| {
             let mut state = State::new(&[DoubleDouble::from(exact(0.0))], 0);
             state.memory = vec![h];
             let mut tally = Tally::default();
@@ -210,8 +210,8 @@ fn the_crates_own_dop853_loses_its_order_where_time_matters_and_ours_does_not() 
             assert_eq!(tally.steps, count);
             (h, (state.y[0] - exact(END)).abs())
         };
-        adapted.push(march(&mut Dop853::new(LOOSE)));
-        own.push(march(&mut Dp8::new(LOOSE)));
+        adapted.push(integrate(&mut Dop853::new(LOOSE)));
+        own.push(integrate(&mut Dp8::new(LOOSE)));
     }
     let (raw, adapted, own) = (order(&raw, 1e-15, 1.0), order(&adapted, 1e-15, 1.0), order(&own, 1e-15, 1.0));
     println!("raw {raw:.2} adapted {adapted:.2} own {own:.2}");
@@ -224,7 +224,7 @@ fn the_crates_own_dop853_loses_its_order_where_time_matters_and_ours_does_not() 
 fn the_time_of_an_event_has_the_order_of_a_step() {
     // y falls from pi/2 to 3 pi/2.  The worst of several events at three fifths of a step, against chance cancellation.
     const EVENTS: [f64; 4] = [2.4, 2.6, 2.8, 3.0];
-    let locate = |method: &mut dyn Method<Bernoulli>, h: f64, event: f64| {
+    let locate = |method: &mut dyn Integrator<Bernoulli>, h: f64, event: f64| {
         let start = event - 0.6 * h;
         let mut state = State::new(&[DoubleDouble::from(exact(start))], 0);
         (state.time, state.memory) = (Time::from(start), vec![h]);
@@ -235,7 +235,7 @@ fn the_time_of_an_event_has_the_order_of_a_step() {
         assert!((state.y[0] - exact(event)).abs() < 1e-15, "the state lies on the event");
         (state.time.hi - event).abs()
     };
-    let sweep = |method: &mut dyn Method<Bernoulli>, steps: &[f64]| -> f64 {
+    let sweep = |method: &mut dyn Integrator<Bernoulli>, steps: &[f64]| -> f64 {
         let points: Vec<(f64, f64)> =
             steps.iter().map(|&h| (h, EVENTS.iter().map(|&event| locate(method, h, event)).fold(0.0, f64::max))).collect();
         println!("{} {points:?}", method.name());

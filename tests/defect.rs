@@ -13,7 +13,7 @@ use driftless::dynamics::{Form, Mechanism, Motion, State, Time};
 use driftless::run::{Limits, MethodId, Outcome, Request, Stabilization};
 use driftless::scene::{Law, Scene};
 use driftless::stabilization::{Projected, projection};
-use driftless::stepping::{Cause, Dp8, Method, Reached, Seen, Tally, Tolerance};
+use driftless::stepping::{Cause, Dp8, Integrator, Reached, Seen, Tally, Tolerance};
 use std::sync::Arc;
 
 /// How far off the start is \[rad/s\].
@@ -122,7 +122,7 @@ fn the_stabilizers_energy_is_the_jump_it_makes() {
     let mechanism = common::compile(&scene);
     let mut start = mechanism.start(&scene);
     start.omega[0] = start.omega[0] + OFF;
-    let end = |method: &mut dyn Method<Multiplier<2, true>>| {
+    let end = |method: &mut dyn Integrator<Multiplier<2, true>>| {
         let mut form = Multiplier::<2, true>::new(Arc::clone(&mechanism));
         let mut state = form.state(&start);
         state.memory = vec![1e-3];

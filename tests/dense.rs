@@ -5,9 +5,9 @@ use crate::common;
 use common::{compile, order, shipped};
 use driftless::arithmetic::DoubleDouble;
 use driftless::dynamics::{Field, State, Time};
-use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Stabilization, march};
+use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Stabilization, integrate};
 use driftless::scene::Scene;
-use driftless::stepping::{Dp5, Dp8, Method, Radau, Tally, Tolerance};
+use driftless::stepping::{Dp5, Dp8, Integrator, Radau, Tally, Tolerance};
 
 /// y' = y² cos t, whose solution from 1/2 is y = 1 / (2 - sin t).
 struct Bernoulli;
@@ -36,7 +36,7 @@ impl Field for Bernoulli {
 }
 
 /// The largest error inside one step of `h` from an exact state, over several steps and places in them.
-fn inside(method: &mut dyn Method<Bernoulli>, h: f64) -> f64 {
+fn inside(method: &mut dyn Integrator<Bernoulli>, h: f64) -> f64 {
     let mut worst = 0.0_f64;
     for begin in [0.2, 0.7, 1.3, 2.1] {
         let mut from = State::new(&[DoubleDouble::from(exact(begin))], 0);
@@ -48,7 +48,7 @@ fn inside(method: &mut dyn Method<Bernoulli>, h: f64) -> f64 {
         let mut there = State::default();
         for share in [0.15, 0.4, 0.65, 0.9] {
             let time = Time::from(begin) + share * h;
-            method.within(&mut Bernoulli, &from, time, &mut there);
+            method.interpolate(&mut Bernoulli, &from, time, &mut there);
             worst = worst.max((there.y[0] - exact(time.hi)).abs());
         }
     }
@@ -61,7 +61,7 @@ fn the_solution_inside_a_step_has_the_order_of_its_polynomial() {
     const LOOSE: Tolerance = Tolerance { relative: 1e6, absolute: 1e6 };
     let radau = |stages, tolerance| Radau::new(stages, tolerance).expect("a method");
     // Newton's iteration of the implicit ones is as exact as their tolerance: a tight one, which a first step proposed below the error keeps.
-    let methods: [(&mut dyn Method<Bernoulli>, f64, &[f64]); 3] = [
+    let methods: [(&mut dyn Integrator<Bernoulli>, f64, &[f64]); 3] = [
         (&mut Dp5::new(LOOSE), 5.0, &[0.12, 0.1, 0.08, 0.06, 0.04, 0.03]),
         (&mut Dp8::new(LOOSE), 8.0, &[0.8, 0.6, 0.5, 0.4, 0.3]),
         (&mut radau(3, Tolerance { relative: 1e-7, absolute: 1e-7 }), 4.0, &[0.04, 0.03, 0.02, 0.015, 0.01]),
@@ -81,7 +81,7 @@ fn run(scene: &Scene, method: MethodId, stabilize: Option<Stabilization>, every:
     let plan = Plan::new(scene, &mechanism, &request).expect("a sensible pairing");
     let start = mechanism.start(scene);
     let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a beginning");
-    march(run, &mut |_| Ok(())).expect("no observer fails")
+    integrate(run, &mut |_| Ok(())).expect("no observer fails")
 }
 
 #[test]

@@ -13,7 +13,7 @@ use crate::mechanisms;
 use common::shipped;
 use driftless::dynamics::{Mechanism, Motion, Time};
 use driftless::run::trust::{How, Level, Ruler, Trust};
-use driftless::run::{Limits, METHODS, MethodId, Plan, Request, Run, march, reference};
+use driftless::run::{Limits, METHODS, MethodId, Plan, Request, Run, integrate, reference};
 use driftless::scene::{Scene, parse_scene};
 use mechanisms::Dice;
 use std::collections::BTreeMap;
@@ -163,7 +163,7 @@ struct Told {
 fn told(mechanism: &Arc<Mechanism>, plan: Plan, start: &Motion, level: Level) -> Result<Told, &'static str> {
     let run = Run::new(Arc::clone(mechanism), plan, Limits::default(), start).map_err(|_| "cannot begin")?;
     let (mut times, mut samples) = (Vec::new(), Vec::new());
-    let outcome = march(run.trusted(level, start), &mut |sample| {
+    let outcome = integrate(run.trusted(level, start), &mut |sample| {
         times.push(sample.t);
         samples.push([sample.phi.clone(), sample.omega.clone()]);
         Ok(())

@@ -11,7 +11,7 @@ use driftless::dynamics::kernel::Kernel;
 use driftless::dynamics::{Field, Form, Mechanism, Motion, Points, State, Time};
 use driftless::scene::{Hinge, Place, Scene, Sine, Start};
 use driftless::stepping::gauss::Gauss;
-use driftless::stepping::{Cause, Method, Reached, Seen, StepError, Tally};
+use driftless::stepping::{Cause, Integrator, Reached, Seen, StepError, Tally};
 
 /// A small swing about hanging.
 fn gentle() -> Scene {
@@ -63,8 +63,8 @@ fn gauss(stages: usize, step: f64) -> Gauss {
     Gauss::new(stages, step).expect("sound settings")
 }
 
-/// Marches on to `until`.
-fn march<F: Field + ?Sized>(method: &mut Gauss, problem: &mut F, state: &mut State, until: f64) -> Result<Tally, StepError> {
+/// Integrates on to `until`.
+fn integrate<F: Field + ?Sized>(method: &mut Gauss, problem: &mut F, state: &mut State, until: f64) -> Result<Tally, StepError> {
     let mut tally = Tally::default();
     let reached = method.advance(problem, state, Time::of(until), &mut tally, &mut |_, _| Ok(Seen::Kept))?;
     assert_eq!(reached, Reached::Until);
@@ -101,7 +101,7 @@ fn drift<F: Field + Form>(form: &mut F, method: &mut Gauss, state: &mut State, u
         }
         Ok(Seen::Kept)
     };
-    method.advance(form, state, Time::of(until), &mut Tally::default(), &mut watch).expect("a finished march");
+    method.advance(form, state, Time::of(until), &mut Tally::default(), &mut watch).expect("a finished integrate");
     (samples.iter().fold(0.0, |worst: f64, sample| worst.max(sample.1.abs())), slope(&samples))
 }
 
@@ -119,7 +119,7 @@ fn slope(points: &[(f64, f64)]) -> f64 {
 fn measured_order<F: Field + Form>(form: &mut F, starts: &[State], stages: usize) -> f64 {
     let end = |form: &mut F, start: &State, steps: u32, stages: usize| {
         let mut state = start.clone();
-        march(&mut gauss(stages, 1.0 / f64::from(steps)), form, &mut state, 1.0).expect("a march");
+        integrate(&mut gauss(stages, 1.0 / f64::from(steps)), form, &mut state, 1.0).expect("an integration");
         state
     };
     let references: Vec<State> = starts.iter().map(|start| end(form, start, 512, 8)).collect();
@@ -153,7 +153,7 @@ fn the_error_falls_with_the_declared_order() {
     let driven_starts = starts(&|scene| start_of(&driven, scene), &driven_by_a_sine());
     // Orders of 10 and more show their slope below the rounding of doubles only: in double-double, beside the coefficients.
     for stages in 2..=4 {
-        let nominal = f64::from(Method::<Free2>::order(&gauss(stages, 0.1)));
+        let nominal = f64::from(Integrator::<Free2>::order(&gauss(stages, 0.1)));
         for found in [measured_order(&mut free, &free_starts, stages), measured_order(&mut driven, &driven_starts, stages)] {
             println!("s = {stages}: {found:.2}");
             assert!((found - nominal).abs() < 0.35, "s = {stages}: order {found:.2} is not {nominal}");
@@ -228,9 +228,9 @@ fn a_reversed_march_returns_to_the_start() {
     let mut form = Free2::new(compile(&free()));
     let start = start_of(&form, &free());
     let (mut state, mut method) = (start.clone(), gauss(8, 1.0 / 128.0));
-    march(&mut method, &mut form, &mut state, 4.0).expect("there");
+    integrate(&mut method, &mut form, &mut state, 4.0).expect("there");
     assert!((state.y[0] - start.y[0]).abs() > 0.1);
-    march(&mut method, &mut form, &mut state, 0.0).expect("and back");
+    integrate(&mut method, &mut form, &mut state, 0.0).expect("and back");
     assert_eq!(state.time, start.time);
     for i in 0..4 {
         let rest = (state.unknown(i) - start.unknown(i)).hi;
@@ -244,11 +244,11 @@ fn a_restart_goes_on_bit_for_bit() {
     let mut form = Driven2::new(compile(&driven_by_a_sine()));
     let start = start_of(&form, &driven_by_a_sine());
     let mut through = start.clone();
-    march(&mut gauss(6, 1.0 / 128.0), &mut form, &mut through, 4.0).expect("one march");
+    integrate(&mut gauss(6, 1.0 / 128.0), &mut form, &mut through, 4.0).expect("one integration");
     let mut parted = start.clone();
-    march(&mut gauss(6, 1.0 / 128.0), &mut form, &mut parted, 1.25).expect("first part");
+    integrate(&mut gauss(6, 1.0 / 128.0), &mut form, &mut parted, 1.25).expect("first part");
     let mut parted = parted.clone();
-    march(&mut gauss(6, 1.0 / 128.0), &mut form, &mut parted, 4.0).expect("second part");
+    integrate(&mut gauss(6, 1.0 / 128.0), &mut form, &mut parted, 4.0).expect("second part");
     assert_eq!(through, parted);
 }
 
@@ -267,10 +267,10 @@ fn a_changed_state_is_not_predicted_from_its_past() {
 
     // A memory of another step, another method or nonsense is not used either.
     let mut clean = state.clone();
-    march(&mut method, &mut form, &mut clean, 1.0).expect("a march");
+    integrate(&mut method, &mut form, &mut clean, 1.0).expect("an integration");
     for memory in [vec![1.0 / 64.0; 33], vec![f64::NAN; 33], vec![1.0 / 128.0; 4], vec![1.0 / 128.0; 25]] {
         let mut other = State { memory, ..state.clone() };
-        march(&mut method, &mut form, &mut other, 1.0).expect("a march");
+        integrate(&mut method, &mut form, &mut other, 1.0).expect("an integration");
         assert_eq!(other, clean);
     }
 }
@@ -280,7 +280,7 @@ fn a_step_far_too_long_is_refused_with_its_time_and_the_unknown_at_fault() {
     let mut form = Free2::new(compile(&free()));
     for step in [0.125, 0.5, 4.0] {
         let mut state = start_of(&form, &free());
-        let stop = march(&mut gauss(8, step), &mut form, &mut state, 40.0).expect_err("no step for this scene");
+        let stop = integrate(&mut gauss(8, step), &mut form, &mut state, 40.0).expect_err("no step for this scene");
         assert!(matches!(stop.cause, Cause::NotConverged | Cause::NotFinite), "{stop}");
         assert!(stop.what.contains("bar1") || stop.what.contains("bar2"), "{stop}");
         assert!(stop.t == state.time.hi && state.y.iter().all(|y| y.is_finite()), "the last accepted state stays");
@@ -293,7 +293,7 @@ fn a_state_that_is_not_a_number_is_refused() {
     let mut form = Free2::new(compile(&free()));
     let mut state = start_of(&form, &free());
     state.y[1] = f64::NAN;
-    let stop = march(&mut gauss(4, 0.01), &mut form, &mut state, 1.0).expect_err("not a number");
+    let stop = integrate(&mut gauss(4, 0.01), &mut form, &mut state, 1.0).expect_err("not a number");
     assert_eq!(stop.cause, Cause::NotFinite);
     assert_eq!(stop.t, 0.0);
 }
@@ -306,13 +306,13 @@ fn a_mechanism_at_rest_is_left_alone() {
     scene.gravity = [9.81 * angle.cos(), 9.81 * angle.sin()];
     let mut form = Free2::new(compile(&scene));
     let mut state = start_of(&form, &scene);
-    march(&mut gauss(8, 1.0 / 64.0), &mut form, &mut state, 20.0).expect("rest");
+    integrate(&mut gauss(8, 1.0 / 64.0), &mut form, &mut state, 20.0).expect("rest");
     assert!((state.y[0] - angle).abs() < 1e-14 && (state.y[1] - angle).abs() < 1e-14);
 
     let hanging = double_pendulum(Inertia::Full, [(0.0, 0.0), (0.0, 0.0)]);
     let mut form = Free2::new(compile(&hanging));
     let mut state = start_of(&form, &hanging);
-    let tally = march(&mut gauss(8, 1.0 / 64.0), &mut form, &mut state, 1.0).expect("rest");
+    let tally = integrate(&mut gauss(8, 1.0 / 64.0), &mut form, &mut state, 1.0).expect("rest");
     assert_eq!(state.y, [0.0; 4]);
     assert_eq!((tally.steps, tally.evaluations), (64, 64 * 16), "nothing moves: one sweep a step, and one exact evaluation");
 }
@@ -321,16 +321,16 @@ fn a_mechanism_at_rest_is_left_alone() {
 fn a_remaining_time_that_is_no_whole_step_ends_in_a_shorter_one() {
     let mut form = Free2::new(compile(&gentle()));
     let mut state = start_of(&form, &gentle());
-    let tally = march(&mut gauss(8, 0.01), &mut form, &mut state, 1.005).expect("a march");
+    let tally = integrate(&mut gauss(8, 0.01), &mut form, &mut state, 1.005).expect("an integration");
     assert_eq!(tally.steps, 101);
     assert!((state.time - Time::of(1.005)).hi.abs() < 1e-16);
     let mut fine = start_of(&form, &gentle());
-    march(&mut gauss(8, 0.005), &mut form, &mut fine, 1.005).expect("a march");
+    integrate(&mut gauss(8, 0.005), &mut form, &mut fine, 1.005).expect("an integration");
     assert!((0..4).all(|i| (state.unknown(i) - fine.unknown(i)).hi.abs() < 1e-14));
     // A decimal time whose doubles are a rounding off whole steps takes none.
     let mut state = start_of(&form, &gentle());
-    assert_eq!(march(&mut gauss(8, 0.01), &mut form, &mut state, 100.0 * 0.07).expect("a march").steps, 700);
-    assert_eq!(march(&mut gauss(8, 0.01), &mut form, &mut state, 7.0).expect("a march").steps, 0);
+    assert_eq!(integrate(&mut gauss(8, 0.01), &mut form, &mut state, 100.0 * 0.07).expect("an integration").steps, 700);
+    assert_eq!(integrate(&mut gauss(8, 0.01), &mut form, &mut state, 7.0).expect("an integration").steps, 0);
 }
 
 /// A pendulum whose momentum is counted in units of 1/`unit`.
@@ -361,7 +361,7 @@ impl Field for Scaled {
 fn the_unit_of_an_unknown_does_not_matter() {
     let march_in = |unit: f64| {
         let mut state = State::new(&[DoubleDouble::of(1.0), DoubleDouble::of(0.5 * unit)], 0);
-        let tally = march(&mut gauss(8, 0.125), &mut Scaled { unit }, &mut state, 50.0).expect("a march");
+        let tally = integrate(&mut gauss(8, 0.125), &mut Scaled { unit }, &mut state, 50.0).expect("an integration");
         (state.unknown(0), state.unknown(1).ldexp(1.0 / unit), tally)
     };
     let plain = march_in(1.0);
@@ -378,7 +378,7 @@ fn a_stiff_spring_converges_or_is_refused() {
         scene.springs[0].stiffness *= factor;
         let mut form = Free2::new(compile(&scene));
         let mut state = start_of(&form, &scene);
-        match march(&mut gauss(8, 1.0 / 128.0), &mut form, &mut state, 1.0) {
+        match integrate(&mut gauss(8, 1.0 / 128.0), &mut form, &mut state, 1.0) {
             Ok(tally) => println!("spring x {factor:e}: {:.1} sweeps a step", tally.evaluations as f64 / tally.steps as f64 / 8.0),
             Err(stop) => {
                 println!("spring x {factor:e}: {stop}");
@@ -404,7 +404,8 @@ fn hardware_and_portable_lanes_march_to_the_same_bits() {
             let mut form = Canonical::<N, ACCOUNT>::with_lanes(mechanism.clone(), portable);
             let mut state = start_of(&form, scene);
             let method = gauss(stages, 1.0 / 128.0);
-            let tally = march(&mut if portable { method.portable() } else { method }, &mut form, &mut state, 1.0).expect("a march");
+            let tally =
+                integrate(&mut if portable { method.portable() } else { method }, &mut form, &mut state, 1.0).expect("an integration");
             (state, tally)
         };
         assert_eq!(march_in(false), march_in(true), "{}, s = {stages}", scene.name);
@@ -482,8 +483,8 @@ fn a_field_without_lanes_marches_all_the_same() {
     let mut form = Free2::new(compile(&free()));
     let start = start_of(&form, &free());
     let (mut lanes, mut single) = (start.clone(), start);
-    march(&mut gauss(8, 1.0 / 128.0), &mut form, &mut lanes, 1.0).expect("a march");
-    march(&mut gauss(8, 1.0 / 128.0), &mut OneByOne(form), &mut single, 1.0).expect("a march");
+    integrate(&mut gauss(8, 1.0 / 128.0), &mut form, &mut lanes, 1.0).expect("an integration");
+    integrate(&mut gauss(8, 1.0 / 128.0), &mut OneByOne(form), &mut single, 1.0).expect("an integration");
     assert!((0..4).all(|i| (lanes.unknown(i) - single.unknown(i)).hi.abs() < 1e-13));
 }
 
@@ -491,7 +492,7 @@ fn a_field_without_lanes_marches_all_the_same() {
 fn names_and_settings() {
     for (stages, name) in (2..).zip(["gauss4", "gauss6", "gauss8", "gauss10", "gauss12", "gauss14", "gauss16"]) {
         let method = Gauss::named(name, -0.5).expect("a known name");
-        assert_eq!((Method::<Free2>::name(&method), method.stages(), method.step()), (name, stages, 0.5));
+        assert_eq!((Integrator::<Free2>::name(&method), method.stages(), method.step()), (name, stages, 0.5));
     }
     assert!(Gauss::named("gauss5", 0.1).is_none() && Gauss::new(1, 0.1).is_none() && Gauss::new(9, 0.1).is_none());
     assert!(Gauss::new(4, 0.0).is_none() && Gauss::new(4, f64::NAN).is_none() && Gauss::new(4, f64::INFINITY).is_none());
@@ -502,9 +503,9 @@ fn a_boxed_field_gives_the_same_bits() {
     let mut form = Free2::new(compile(&free()));
     let start = start_of(&form, &free());
     let (mut plain, mut boxed) = (start.clone(), start);
-    march(&mut gauss(8, 1.0 / 128.0), &mut form, &mut plain, 1.0).expect("a march");
+    integrate(&mut gauss(8, 1.0 / 128.0), &mut form, &mut plain, 1.0).expect("an integration");
     let mut field: Box<dyn Field> = Box::new(form);
-    march(&mut gauss(8, 1.0 / 128.0), &mut *field, &mut boxed, 1.0).expect("a march");
+    integrate(&mut gauss(8, 1.0 / 128.0), &mut *field, &mut boxed, 1.0).expect("an integration");
     assert_eq!(plain, boxed);
 }
 
@@ -542,7 +543,7 @@ fn ensemble(title: &str, scene: &Scene, scale: f64, method: &Gauss, until: f64, 
         let start = balance.at(&mut form, &state);
         let mut method = method.clone();
         for (mark, errors) in marks.iter().zip(&mut errors) {
-            let part = march(&mut method, &mut form, &mut state, *mark).expect("a march");
+            let part = integrate(&mut method, &mut form, &mut state, *mark).expect("an integration");
             (tally.steps, tally.evaluations) = (tally.steps + part.steps, tally.evaluations + part.evaluations);
             errors.push((balance.at(&mut form, &state) - start).hi / scale);
         }
@@ -581,7 +582,7 @@ fn a_small_ensemble_tells_pairs_from_doubles() {
             perturb(&mut state, f64::from(k));
             let mut balance = Balance::new(form.mechanism());
             let start = balance.at(&mut form, &state);
-            march(&mut method(), &mut form, &mut state, 64.0).expect("a march");
+            integrate(&mut method(), &mut form, &mut state, 64.0).expect("an integration");
             ((balance.at(&mut form, &state) - start).hi / 14.4).powi(2)
         });
         (errors.sum::<f64>() / 30.0).sqrt()

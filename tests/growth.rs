@@ -8,7 +8,7 @@ use crate::mechanisms;
 use common::{compile, pendulum, quarter_period, shipped};
 use driftless::dynamics::{Mechanism, Motion, Time};
 use driftless::run::trust::{Flow, Level, Ruler, Tangent, Trust, flow};
-use driftless::run::{Limits, Plan, Request, Run, Running, march, reference};
+use driftless::run::{Limits, Plan, Request, Run, Running, integrate, reference};
 use driftless::scene::{Scene, parse_scene};
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -114,7 +114,7 @@ fn trust(scene: &Scene, until: f64) -> Trust {
     let start = mechanism.start(scene);
     let plan = Plan::new(scene, &mechanism, &request(until, until / 64.0)).expect("a plan");
     let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a beginning").trusted(Level::Full, &start);
-    march(run, &mut |_| Ok(())).expect("no observer fails").trust.expect("asked for")
+    integrate(run, &mut |_| Ok(())).expect("no observer fails").trust.expect("asked for")
 }
 
 /// Scenes of all kinds: within a factor of three in 95 %, and never a hundred off.
@@ -163,7 +163,7 @@ fn events(scene: &Scene, until: f64) {
     let start = mechanism.start(scene);
     let plan = Plan::new(scene, &mechanism, &request(until, until)).expect("a plan");
     let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a beginning");
-    let outcome = march(run, &mut |_| Ok(())).expect("no observer fails");
+    let outcome = integrate(run, &mut |_| Ok(())).expect("no observer fails");
     outcome.strikes.iter().for_each(|strike| println!("  strike at {} s, {} at {:.3e} m/s", strike.t, strike.wall, strike.approach));
     outcome.holds.iter().for_each(|hold| println!("  hold from {} s to {:?}, {}", hold.t, hold.until, hold.wall));
 }
@@ -372,7 +372,7 @@ fn input_errors_belong_to_their_time() {
         let request = Request { rtol: Some(1e-12), ..request(60.0, every) };
         let plan = Plan::new(&scene, &mechanism, &request).expect("a plan");
         let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a beginning").trusted(Level::Auto, &start);
-        let trust = march(run, &mut |_| Ok(())).expect("no observer fails").trust.expect("asked for");
+        let trust = integrate(run, &mut |_| Ok(())).expect("no observer fails").trust.expect("asked for");
         [trust.horizon.expect("chaotic"), trust.input_error.expect("a figure")]
     };
     let [[early, fine], [late, coarse]] = [0.05, 20.0].map(told);

@@ -10,7 +10,7 @@ use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::{Form, Mechanism, State, Time};
 use driftless::run::{MethodId, Outcome, Plan, Request};
 use driftless::scene::{Law, Motor, Scene, Wall};
-use driftless::stepping::{Cause, Dp8, Method, Reached, Seen, Tally, Tolerance};
+use driftless::stepping::{Cause, Dp8, Integrator, Reached, Seen, Tally, Tolerance};
 use std::f64::consts::PI;
 use std::sync::Arc;
 

@@ -10,7 +10,7 @@ use crate::program;
 use common::compile;
 use driftless::dynamics::{Mechanism, Motion};
 use driftless::run::trust::{Inputs, Level, Ruler};
-use driftless::run::{Limits, MethodId, Plan, Request, Run, Running, march};
+use driftless::run::{Limits, MethodId, Plan, Request, Run, Running, integrate};
 use driftless::scene::{Scene, Template, Variable, Written};
 use std::sync::Arc;
 
@@ -195,7 +195,7 @@ fn the_order_of_magnitude_is_that_of_all_numbers() {
         let Ok(plan) = Plan::new(&scene, &mechanism, &request) else { continue };
         let start = mechanism.start(&scene);
         let Ok(run) = Run::new(mechanism, plan, Limits::default(), &start) else { continue };
-        let trust = march(run.trusted(Level::Auto, &start), &mut |_| Ok(())).expect("no observer fails").trust.expect("asked for");
+        let trust = integrate(run.trusted(Level::Auto, &start), &mut |_| Ok(())).expect("no observer fails").trust.expect("asked for");
         let Some(told) = trust.input_error else { continue };
         let mut numbers = template.written_numbers(&[]).expect("a scene");
         for number in &mut numbers {

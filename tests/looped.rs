@@ -19,7 +19,7 @@ use driftless::stabilization::Projected;
 use driftless::stepping::composition::Composition;
 use driftless::stepping::rattle::Rattle;
 use driftless::stepping::taylor::Kernel;
-use driftless::stepping::{Dp8, Method, Reached, Seen, Tally, Taylor, Tolerance};
+use driftless::stepping::{Dp8, Integrator, Reached, Seen, Tally, Taylor, Tolerance};
 use std::sync::Arc;
 
 fn both(tolerance: f64) -> Tolerance {
@@ -37,7 +37,7 @@ fn looped(mechanism: &Arc<Mechanism>) -> Looped {
 }
 
 /// A run to a time: the motion there, the steps, and the largest violation of a row after any of them, relative to 0.1 m and to 0.1 m times the fastest rate.
-fn run<P: Form + ?Sized>(problem: &mut P, start: &Motion, method: &mut impl Method<P>, until: f64) -> (Motion, Tally, f64) {
+fn run<P: Form + ?Sized>(problem: &mut P, start: &Motion, method: &mut impl Integrator<P>, until: f64) -> (Motion, Tally, f64) {
     let mut state = problem.state(start);
     let mut tally = Tally::default();
     let mechanism = problem.mechanism().clone();
@@ -177,7 +177,7 @@ fn the_series_is_its_own_dense_output() {
     }
     let middle = from.time + 0.4 * (state.time - from.time).hi;
     let mut inside = State::default();
-    taylor.within(&mut form, &from, middle, &mut inside);
+    taylor.interpolate(&mut form, &from, middle, &mut inside);
     let mut found = Motion::default();
     form.read(&inside, &mut found);
     let (exact, ..) = run(&mut looped(&mechanism), &start, &mut Taylor::<f64>::new(both(1e-10)), middle.hi);

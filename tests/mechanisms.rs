@@ -3,7 +3,7 @@
 use crate::mechanisms;
 
 use driftless::dynamics::Mechanism;
-use driftless::run::{Limits, Plan, Request, Run, Sample, march};
+use driftless::run::{Limits, Plan, Request, Run, Sample, integrate};
 use driftless::scene::parse_scene;
 use mechanisms::{Generated, Kind};
 use std::collections::BTreeMap;
@@ -39,7 +39,7 @@ fn fault(made: &Generated) -> Option<String> {
         Err(stop) => return Some(format!("does not begin: {stop}")),
     };
     let mut first: Option<Sample> = None;
-    let outcome = march(run, &mut |sample| {
+    let outcome = integrate(run, &mut |sample| {
         first.get_or_insert_with(|| sample.clone());
         Ok(())
     });

@@ -16,7 +16,7 @@ use driftless::stabilization::{Baumgarte, Projected};
 use driftless::stepping::composition::Composition;
 use driftless::stepping::gauss::Gauss;
 use driftless::stepping::rattle::Rattle;
-use driftless::stepping::{Dop853, Dopri5, Dp5, Dp8, Method, Reached, Seen, Tally, Tolerance};
+use driftless::stepping::{Dop853, Dopri5, Dp5, Dp8, Integrator, Reached, Seen, Tally, Tolerance};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::sync::Arc;
@@ -67,7 +67,7 @@ static ALLOCATOR: Counting = Counting;
 const TOLERANCE: Tolerance = Tolerance { relative: 1e-9, absolute: 1e-9 };
 
 /// Allocations of one call of `advance` over `span` \[s\], and its steps.
-fn allocations<P: Form + ?Sized>(method: &mut dyn Method<P>, form: &mut P, start: &Motion, span: f64) -> (u64, u64) {
+fn allocations<P: Form + ?Sized>(method: &mut dyn Integrator<P>, form: &mut P, start: &Motion, span: f64) -> (u64, u64) {
     let mut state = form.state(start);
     let mut tally = Tally::default();
     // The first call sizes scratch space and the state's memory.
@@ -83,7 +83,7 @@ fn allocations<P: Form + ?Sized>(method: &mut dyn Method<P>, form: &mut P, start
 }
 
 /// Ten times the steps take not one allocation more.
-fn check<P: Form + ?Sized>(method: &mut dyn Method<P>, form: &mut P, start: &Motion) {
+fn check<P: Form + ?Sized>(method: &mut dyn Integrator<P>, form: &mut P, start: &Motion) {
     let (short, few) = allocations(method, form, start, 0.5);
     let (long, many) = allocations(method, form, start, 5.0);
     assert!(many > 5 * few && few > 2, "{} {few} {many}", method.name());
@@ -127,7 +127,7 @@ fn steps_of_rattle_allocate_nothing() {
 #[test]
 fn windows_cost_the_same_each() {
     let (mechanism, start) = common::started("gentle");
-    let methods: [Box<dyn Method<Multiplier<2, false>>>; 2] = [Box::new(Dopri5::new(TOLERANCE)), Box::new(Dop853::new(TOLERANCE))];
+    let methods: [Box<dyn Integrator<Multiplier<2, false>>>; 2] = [Box::new(Dopri5::new(TOLERANCE)), Box::new(Dop853::new(TOLERANCE))];
     for mut method in methods {
         let mut form = Multiplier::<2, false>::new(Arc::clone(&mechanism));
         let mut state = form.state(&start);

@@ -9,7 +9,7 @@ use crate::relations;
 
 use driftless::dynamics::Mechanism;
 use driftless::run::trust::Level;
-use driftless::run::{Limits, METHODS, MethodId, Outcome, Plan, Request, Run, Sample, Strike, march};
+use driftless::run::{Limits, METHODS, MethodId, Outcome, Plan, Request, Run, Sample, Strike, integrate};
 use driftless::scene::{Scene, parse_scene};
 use mechanisms::{Dice, Generated, Kind, Scales};
 use relations::{Back, Related};
@@ -43,7 +43,7 @@ fn run(scene: &Scene, request: &Request, level: Level) -> Result<Seen, String> {
     let start = mechanism.start(scene);
     let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).map_err(|stop| stop.to_string())?;
     let mut samples = Vec::new();
-    let outcome = march(run.trusted(level, &start), &mut |sample| {
+    let outcome = integrate(run.trusted(level, &start), &mut |sample| {
         samples.push(sample.clone());
         Ok(())
     });

@@ -23,11 +23,11 @@ mod scaled;
 mod trees;
 
 mod assembly;
+mod batch;
 mod benchmarks;
 mod chains;
 mod contact;
 mod convergence;
-mod crowd;
 mod defect;
 mod dense;
 mod drift;

@@ -11,7 +11,7 @@ use driftless::dynamics::{Field, Form, Motion, State, Time};
 use driftless::scene::{Bar, Hinge, Law, Motor, Place, Scene, Sine, Start, Wall};
 use driftless::stepping::composition::Composition;
 use driftless::stepping::rattle::Rattle;
-use driftless::stepping::{Cause, Method, Reached, Seen, StepError, Tally};
+use driftless::stepping::{Cause, Integrator, Reached, Seen, StepError, Tally};
 use proptest::prelude::*;
 use std::f64::consts::{FRAC_PI_2, TAU};
 

@@ -11,7 +11,7 @@ use driftless::dynamics::{Field, Form, Motion, State, Time};
 use driftless::run::{MethodId, Request, Stabilization};
 use driftless::stabilization::{Baumgarte, Projected};
 use driftless::stepping::gauss::Gauss;
-use driftless::stepping::{Dop853, Dopri5, Dp5, Dp8, Method, Seen, Tally, Taylor, Tolerance};
+use driftless::stepping::{Dop853, Dopri5, Dp5, Dp8, Integrator, Seen, Tally, Taylor, Tolerance};
 use std::sync::Arc;
 
 const TOLERANCE: Tolerance = Tolerance { relative: 1e-9, absolute: 1e-9 };
@@ -19,7 +19,7 @@ const TOLERANCE: Tolerance = Tolerance { relative: 1e-9, absolute: 1e-9 };
 const EVERY: f64 = 0.0625;
 
 /// Forty intervals in one go, and in two halves by another method object and another form from a clone of the state.
-fn check<F: Field + Form, M: Method<F>>(form: &dyn Fn() -> F, method: &dyn Fn() -> M, start: &Motion) {
+fn check<F: Field + Form, M: Integrator<F>>(form: &dyn Fn() -> F, method: &dyn Fn() -> M, start: &Motion) {
     let (mut whole_form, mut whole_method) = (form(), method());
     let mut whole = whole_form.state(start);
     go(&mut whole_method, &mut whole_form, &mut whole, EVERY, 1..=20);
@@ -103,12 +103,12 @@ fn a_run_with_its_rates_turned_round_comes_back() {
     }
 }
 
-/// Our Dormand–Prince methods march forwards; a time that lies behind is refused, never passed over in silence.
+/// Our Dormand–Prince methods integrate forwards; a time that lies behind is refused, never passed over in silence.
 #[test]
 fn a_time_that_lies_behind_is_refused() {
     let (mechanism, start) = common::started("free");
     let mut form = Multiplier::<2, false>::new(Arc::clone(&mechanism));
-    let methods: [Box<dyn Method<Multiplier<2, false>>>; 4] =
+    let methods: [Box<dyn Integrator<Multiplier<2, false>>>; 4] =
         [Box::new(Dp5::new(TOLERANCE)), Box::new(Dp8::new(TOLERANCE)), Box::new(Dopri5::new(TOLERANCE)), Box::new(Dop853::new(TOLERANCE))];
     for mut method in methods {
         let mut state = form.state(&start);

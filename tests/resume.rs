@@ -10,7 +10,7 @@ use driftless::dynamics::{Form, Mechanism};
 use driftless::run::{Limits, METHODS, MethodId, Outcome, Plan, Request, Run, Running, Sample, Snapshot, Stabilization};
 use driftless::scene::Scene;
 use driftless::stepping::composition::Composition::Single;
-use driftless::stepping::{Cause, Dp8, Method, Reached, Seen, Tally, Taylor, Tolerance};
+use driftless::stepping::{Cause, Dp8, Integrator, Reached, Seen, Tally, Taylor, Tolerance};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -167,7 +167,7 @@ fn so_do_rows_inside_one_step() {
 /// A method whose effort is used up stops at the same place where it was cut short on the way.
 #[test]
 fn effort_is_not_allowed_anew() {
-    fn stops_at<M: Method<Multiplier<2, false>>>(mut method: M, seen: Seen) -> f64 {
+    fn stops_at<M: Integrator<Multiplier<2, false>>>(mut method: M, seen: Seen) -> f64 {
         let (mechanism, start) = common::started("free");
         let mut form = Multiplier::<2, false>::new(mechanism);
         let mut state = form.state(&start);
@@ -224,7 +224,7 @@ fn the_horizon_can_be_put_off() {
     }
 }
 
-/// Whatever bytes a snapshot is made of, it is refused or marched; nothing panics, and nothing takes for ever.
+/// Whatever bytes a snapshot is made of, it is refused or integrated; nothing panics, and nothing takes for ever.
 mod bytes {
     use super::*;
     use proptest::prelude::*;

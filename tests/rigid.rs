@@ -158,7 +158,7 @@ fn the_model_is_no_better_than_it_says() {
         let said = plan.model_error.expect("an error of the model");
         assert!(plan.notes.iter().any(|note| note.contains("are a model")), "{:?}", plan.notes);
         let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a run").trusted(Level::Auto, &start);
-        let trust = driftless::run::march(run, &mut |_| Ok(())).expect("an outcome").trust.expect("asked for");
+        let trust = driftless::run::integrate(run, &mut |_| Ok(())).expect("an outcome").trust.expect("asked for");
         assert!(trust.model_error == Some(said) && trust.error_estimate.is_none_or(|estimate| estimate >= said), "{trust:?}");
         let elastic = whole_path(&floating(stiffness, energy, rate, "elastic"), MethodId::Taylor, 1e-11);
         let rigid = whole_path(&scene, MethodId::Dp8, 1e-9);

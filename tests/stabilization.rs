@@ -3,7 +3,7 @@
 use crate::common;
 
 use common::shipped;
-use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Stabilization, march};
+use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Stabilization, integrate};
 use std::sync::Arc;
 
 fn run(scene: &str, request: &Request) -> Outcome {
@@ -12,7 +12,7 @@ fn run(scene: &str, request: &Request) -> Outcome {
     let plan = Plan::new(&scene, &mechanism, request).expect("a sensible pairing");
     let start = mechanism.start(&scene);
     let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).expect("a beginning");
-    let outcome = march(run, &mut |_| Ok(())).expect("no observer fails");
+    let outcome = integrate(run, &mut |_| Ok(())).expect("no observer fails");
     assert_eq!(outcome.stop, None);
     outcome
 }

@@ -9,15 +9,15 @@ use driftless::dynamics::kernel::Kernel as Energies;
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::row::Posture;
 use driftless::dynamics::{Form, Mechanism, Motion, State, Time};
-use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Sample, march};
+use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Sample, integrate};
 use driftless::scene::{Bar, Hinge, Place, Scene, Spring, Start};
 use driftless::stabilization::Projected;
 use driftless::stepping::taylor::Kernel;
-use driftless::stepping::{Dp8, Method, Reached, Seen, Tally, Taylor, Tolerance};
+use driftless::stepping::{Dp8, Integrator, Reached, Seen, Tally, Taylor, Tolerance};
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
-fn end<M: Method<Elimination<0>>>(scene: &Scene, mut method: M, until: f64) -> Motion {
+fn end<M: Integrator<Elimination<0>>>(scene: &Scene, mut method: M, until: f64) -> Motion {
     let mechanism = compile(scene);
     let mut problem = Elimination::<0>::new(mechanism.clone());
     let mut state = problem.state(&mechanism.start(scene));
@@ -238,15 +238,15 @@ fn a_run_continued_from_a_stored_state_has_the_same_bits() {
     for (name, scene) in fast_scenes() {
         let mechanism = compile(&scene);
         let mut problem = Elimination::<0>::new(mechanism.clone());
-        let march = |problem: &mut Elimination<0>, state: &mut State, method: &mut Taylor<f64>, until: f64| {
+        let integrate = |problem: &mut Elimination<0>, state: &mut State, method: &mut Taylor<f64>, until: f64| {
             method.advance(problem, state, Time::from(until), &mut Tally::default(), &mut |_, _| Ok(Seen::Kept)).expect("an end");
         };
         let mut method = on(Kernel::Fastest, 1e-15, 20);
         let mut whole = problem.state(&mechanism.start(&scene));
-        march(&mut problem, &mut whole, &mut method, 3.0);
+        integrate(&mut problem, &mut whole, &mut method, 3.0);
         let mut stored = whole.clone();
-        march(&mut problem, &mut whole, &mut method, 7.0);
-        march(&mut Elimination::<0>::new(mechanism.clone()), &mut stored, &mut on(Kernel::Fastest, 1e-15, 20), 7.0);
+        integrate(&mut problem, &mut whole, &mut method, 7.0);
+        integrate(&mut Elimination::<0>::new(mechanism.clone()), &mut stored, &mut on(Kernel::Fastest, 1e-15, 20), 7.0);
         assert_eq!(whole, stored, "{name}");
     }
 }
@@ -285,7 +285,7 @@ fn rows(scene: &Scene, every: f64, until: f64) -> (Outcome, Vec<Sample>) {
     let start = mechanism.start(scene);
     let mut samples = Vec::new();
     let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a beginning");
-    let outcome = march(run, &mut |sample| {
+    let outcome = integrate(run, &mut |sample| {
         samples.push(sample.clone());
         Ok(())
     });
@@ -407,8 +407,8 @@ impl FourBar {
 
 const FOUR_BAR: FourBar = FourBar { length: [0.3, 1.0, 0.8], mass: [0.5, 1.2, 0.9] };
 
-/// Marches a mechanism by multipliers.
-fn bordered<M: Method<Multiplier<0, true>>>(mechanism: &Arc<Mechanism>, start: &Motion, mut method: M, until: f64) -> Motion {
+/// Integrates a mechanism by multipliers.
+fn bordered<M: Integrator<Multiplier<0, true>>>(mechanism: &Arc<Mechanism>, start: &Motion, mut method: M, until: f64) -> Motion {
     let mut form = Multiplier::<0, true>::new(Arc::clone(mechanism));
     let mut state = form.state(start);
     method.advance(&mut form, &mut state, Time::from(until), &mut Tally::default(), &mut |_, _| Ok(Seen::Kept)).expect("an end");
@@ -575,7 +575,7 @@ fn a_march_goes_on_bit_for_bit_from_where_its_last_step_began() {
             let reached = method.advance(form, state, horizon, &mut Tally::default(), &mut watch);
             assert_eq!(reached, Ok(Reached::Pause), "{name}");
             let mut inside = State::default();
-            method.within(form, &from, row, &mut inside);
+            method.interpolate(form, &from, row, &mut inside);
             (from, inside)
         };
         let finish = |form: &mut Elimination<0>, method: &mut Taylor<f64>, state: &mut State| {

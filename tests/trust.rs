@@ -6,7 +6,7 @@ use common::{compile, run, shipped};
 use driftless::dynamics::canonical::Canonical;
 use driftless::dynamics::{Form, Motion, Time};
 use driftless::run::trust::{How, Level, Ruler, Tangent};
-use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Running, march, reference};
+use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Running, integrate, reference};
 use driftless::scene::Scene;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -185,7 +185,7 @@ impl Table {
             let Ok(run) = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start) else { continue };
             let mut truth: Vec<[f64; 2]> = Vec::new();
             let mut largest = 0.0_f64;
-            let outcome = march(run.trusted(Level::Auto, &start), &mut |sample| {
+            let outcome = integrate(run.trusted(Level::Auto, &start), &mut |sample| {
                 let exact = &exact.motions[truth.len()];
                 for k in 0..sample.phi.len() {
                     largest = largest.max((sample.phi[k] - exact.unwrapped(k)).abs() * ruler.weight(k));
@@ -320,7 +320,7 @@ fn begun(scene: &Scene, request: &Request, level: Level) -> Run {
 }
 
 fn trusted(scene: &Scene, request: &Request, level: Level) -> Outcome {
-    march(begun(scene, request, level), &mut |_| Ok(())).expect("no observer fails")
+    integrate(begun(scene, request, level), &mut |_| Ok(())).expect("no observer fails")
 }
 
 /// Scenes of every kind, each by a method of another kind.
@@ -537,7 +537,7 @@ fn told_and_true(scene: &Scene, request: &Request) -> [[f64; 2]; 2] {
     let exact = reference(&mechanism, &start, &times).expect("a reference");
     let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).expect("a run");
     let (mut most, mut row) = ([0.0_f64; 2], 0);
-    let outcome = march(run.trusted(Level::Auto, &start), &mut |sample| {
+    let outcome = integrate(run.trusted(Level::Auto, &start), &mut |sample| {
         let exact = &exact.motions[row];
         for k in 0..sample.phi.len() {
             most[0] = most[0].max((sample.phi[k] - exact.unwrapped(k)).abs());
@@ -591,7 +591,7 @@ fn rates_and_torques_have_estimates_of_their_own() {
         let start = mechanism.start(&scene);
         let plan = Plan::new(&scene, &mechanism, &asked("dp8", rtol, 4.0, 0.05)).expect("a plan");
         let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a run").trusted(Level::Auto, &start);
-        let outcome = march(run, &mut |sample| {
+        let outcome = integrate(run, &mut |sample| {
             torques.push(sample.motors[0][0]);
             Ok(())
         });

@@ -3,7 +3,7 @@
 use crate::common;
 
 use common::compile;
-use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Sample, march};
+use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Sample, integrate};
 use driftless::scene::{Scene, parse_scene};
 use serde_json::{Value, json};
 
@@ -26,7 +26,7 @@ fn seen(scene: &Value, method: MethodId, until: f64, every: f64, rtol: f64) -> (
     let start = mechanism.start(&scene);
     let mut samples = Vec::new();
     let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a beginning");
-    let outcome = march(run, &mut |sample| {
+    let outcome = integrate(run, &mut |sample| {
         samples.push(sample.clone());
         Ok(())
     });

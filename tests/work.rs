@@ -19,7 +19,7 @@ use driftless::stabilization::{Projected, SymmetricGauss};
 use driftless::stepping::composition::Composition;
 use driftless::stepping::gauss::Gauss;
 use driftless::stepping::rattle::Rattle;
-use driftless::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Method, Radau, Seen, Tally, Taylor, Tolerance};
+use driftless::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Integrator, Radau, Seen, Tally, Taylor, Tolerance};
 use std::sync::Arc;
 use trees::{Dice, tree};
 
@@ -289,8 +289,8 @@ fn honest_runs_of_all_shipped_scenes_keep_the_limits() {
     println!("nearest to its limit: {closest:.1e} of it");
 }
 
-/// Marches a method to `t` \[s\], has every rate jump there, and asserts that it goes on as another one that knows nothing but the step proposed.
-fn forgets<P: Form + ?Sized, M: Method<P>>(make: impl Fn() -> M, problem: &mut P, start: &Motion, t: f64, is_stepping: bool) {
+/// Integrates a method to `t` \[s\], has every rate jump there, and asserts that it goes on as another one that knows nothing but the step proposed.
+fn forgets<P: Form + ?Sized, M: Integrator<P>>(make: impl Fn() -> M, problem: &mut P, start: &Motion, t: f64, is_stepping: bool) {
     let mut used = make();
     let mut state = problem.state(start);
     let advance = |method: &mut M, problem: &mut P, state: &mut driftless::dynamics::State, until: f64| {
@@ -384,12 +384,12 @@ fn what_fails_by_its_tolerance_is_wrong() {
         let start = mechanism.start(&scene);
         let method = adaptive().nth(hash(index) as usize % 7).expect("a method");
         let rtol = 10f64.powi(-3 - (hash(index + 7) % 10) as i32);
-        let march = |request: &Request| -> Option<Outcome> {
+        let integrate = |request: &Request| -> Option<Outcome> {
             let plan = Plan::new(&scene, &mechanism, request).ok()?;
             let run = driftless::run::Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).ok()?;
-            driftless::run::march(run, &mut |_| Ok(())).ok()
+            driftless::run::integrate(run, &mut |_| Ok(())).ok()
         };
-        let Some(outcome) = march(&Request { effort: Some(20_000), ..at(method, rtol) }) else { continue };
+        let Some(outcome) = integrate(&Request { effort: Some(20_000), ..at(method, rtol) }) else { continue };
         let (off, limit) = (outcome.drift.energy_share, outcome.drift.energy_limit());
         judged += usize::from(limit < 1e-2 && outcome.stop.is_none());
         if limit >= 1e-2 || off <= limit || off.is_nan() {
@@ -398,7 +398,7 @@ fn what_fails_by_its_tolerance_is_wrong() {
         failed += 1;
         let t = outcome.last.t;
         let finer = Request { until: Some(t), every: Some(t), effort: Some(400_000), ..at(MethodId::Dp8, 1e-13) };
-        let Some(reference) = march(&finer).filter(|reference| reference.stop.is_none()) else {
+        let Some(reference) = integrate(&finer).filter(|reference| reference.stop.is_none()) else {
             println!("{index} {method} {rtol:.0e}: energy {off:.1e}, limit {limit:.1e}, no reference");
             continue;
         };

@@ -5,8 +5,8 @@ use crate::problem::Problem;
 use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::{Form, Motion, State, Time};
-use driftless::stepping::taylor::crowd::{Crowd, Entrant, Going};
-use driftless::stepping::{Dop853, Method, Seen, Taylor, Tolerance};
+use driftless::stepping::taylor::batch::{Batch, BatchMember, Going};
+use driftless::stepping::{Dop853, Integrator, Seen, Taylor, Tolerance};
 use std::sync::Arc;
 
 /// All ends of a problem at a tolerance.
@@ -24,15 +24,15 @@ fn both(tolerance: f64) -> Tolerance {
 /// Everything that fits a problem.
 pub fn all(problem: &Problem) -> Vec<Candidate<'_>> {
     let mut all: Vec<Candidate> = [None, Some(16), Some(20), Some(24)].into_iter().map(|order| taylor(problem, order)).collect();
-    if Crowd::takes(&problem.mechanism) {
-        all.extend([16, 20, 24].map(|order| crowd(problem, order)));
+    if Batch::takes(&problem.mechanism) {
+        all.extend([16, 20, 24].map(|order| batch(problem, order)));
     }
     if problem.mechanism.bodies.len() == 2 {
         all.push(dop853(problem));
         if problem.mechanism.rows.is_empty() {
             let hand = TwoBars::of(&problem.mechanism);
-            let each = move |march: fn(&TwoBars, &Motion, f64, f64) -> Motion| -> Runner {
-                Box::new(move |tolerance| problem.starts.iter().map(|start| march(&hand, start, problem.until, tolerance)).collect())
+            let each = move |integrate: fn(&TwoBars, &Motion, f64, f64) -> Motion| -> Runner {
+                Box::new(move |tolerance| problem.starts.iter().map(|start| integrate(&hand, start, problem.until, tolerance)).collect())
             };
             all.push(Candidate { name: "ode_solvers Dop853, by hand".into(), run: each(TwoBars::ode_solvers) });
             all.push(Candidate { name: "differential-equations rkv988e".into(), run: each(TwoBars::verner) });
@@ -61,13 +61,13 @@ pub fn taylor(problem: &Problem, order: Option<usize>) -> Candidate<'_> {
 }
 
 /// All trajectories at once.
-pub fn crowd(problem: &Problem, order: usize) -> Candidate<'_> {
+pub fn batch(problem: &Problem, order: usize) -> Candidate<'_> {
     let mut form = Elimination::<0>::new(Arc::clone(&problem.mechanism));
     let starts = problem.states();
     let run = move |tolerance: f64| {
-        let mut entrants: Vec<Entrant> = starts.iter().map(|start| Entrant::new(&problem.mechanism, start.clone())).collect();
-        Crowd::new(both(tolerance)).with_order(order).march(&mut entrants, Time::from(problem.until), &mut |_, _| Going::On);
-        let states: Vec<State> = entrants.into_iter().map(|entrant| entrant.state).collect();
+        let mut members: Vec<BatchMember> = starts.iter().map(|start| BatchMember::new(&problem.mechanism, start.clone())).collect();
+        Batch::new(both(tolerance)).with_order(order).integrate(&mut members, Time::from(problem.until), &mut |_, _| Going::On);
+        let states: Vec<State> = members.into_iter().map(|member| member.state).collect();
         ends(&mut form, &states, |_, _| true)
     };
     Candidate { name: format!("taylor, order {order}, in lanes"), run: Box::new(run) }
@@ -93,13 +93,13 @@ fn dop853(problem: &Problem) -> Candidate<'_> {
     Candidate { name: "dop853".into(), run: Box::new(run) }
 }
 
-/// The motions at the ends of the marches.
-fn ends<F: Form>(form: &mut F, starts: &[State], mut march: impl FnMut(&mut F, &mut State) -> bool) -> Vec<Motion> {
+/// The motions at the ends of the integrates.
+fn ends<F: Form>(form: &mut F, starts: &[State], mut integrate: impl FnMut(&mut F, &mut State) -> bool) -> Vec<Motion> {
     starts
         .iter()
         .map(|start| {
             let mut state = start.clone();
-            assert!(march(form, &mut state), "a march stopped");
+            assert!(integrate(form, &mut state), "an integration stopped");
             let mut motion = Motion::default();
             form.read(&state, &mut motion);
             motion

@@ -3,7 +3,7 @@
 use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::{Form, Mechanism, Motion, State, Time};
 use driftless::scene::{Scene, read_scene};
-use driftless::stepping::{Method, Seen, Taylor};
+use driftless::stepping::{Integrator, Seen, Taylor};
 use std::path::Path;
 use std::sync::Arc;
 

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! problem SCENE                constants, starts and true ends
-//! time taylor|crowd ORDER TOLERANCE    error and microseconds per simulated second and trajectory of one run over all starts
+//! time taylor|batch ORDER TOLERANCE    error and microseconds per simulated second and trajectory of one run over all starts
 //! ```
 
 use crate::candidates;
@@ -50,7 +50,7 @@ fn timed(problem: &Problem, code: &str, order: &str, tolerance: &str) -> Option<
     let (order, tolerance) = (order.parse().ok()?, tolerance.parse().ok()?);
     let mut candidate = match code {
         "taylor" => candidates::taylor(problem, Some(order)),
-        "crowd" => candidates::crowd(problem, order),
+        "batch" => candidates::batch(problem, order),
         _ => return None,
     };
     let error = problem.error(&(candidate.run)(tolerance));

@@ -1,4 +1,4 @@
-//! `driftless run`: march, and keep what came of it.
+//! `driftless run`: integrate, and keep what came of it.
 
 use super::failure::{Exit, Failure};
 use super::flags::RunFlags;
@@ -8,8 +8,8 @@ use super::progress::Progress;
 use super::resume::{Saved, Work};
 use crate::dynamics::Mechanism;
 use crate::report;
+use crate::run::async_writer::AsyncWriter;
 use crate::run::files::{RECORD, TRAJECTORY};
-use crate::run::scribe::Scribe;
 use crate::run::table::Table;
 use crate::run::trust::Level;
 use crate::run::{Checkpoints, Folder, Outcome, Plan, Request, ResumeError, Run, RunError, Running, Sample, Stream};
@@ -100,7 +100,7 @@ pub fn resume(flags: &RunFlags, saved: Saved, until: Option<f64>, folder: Folder
     let running = Running::resume(Arc::clone(&mechanism), &mechanism.start(&scene), *snapshot)?;
     let table = Table::going_on(&mechanism, folder.take_up(TRAJECTORY, &cursor)?);
     let task = Task { scene: &scene, mechanism: &mechanism, flags, text: &text, arguments: &arguments };
-    let done = vec![task.finish(running, Scribe::new(table), folder, checkpoints)?];
+    let done = vec![task.finish(running, AsyncWriter::new(table), folder, checkpoints)?];
     conclude(&scene, &mechanism, done, flags)
 }
 
@@ -136,19 +136,19 @@ impl Task<'_> {
         let path = flags.out.join(&scene.name).join(folder);
         let folder = Folder::open(&path, flags.force)?;
         let table = Table::new(mechanism, folder.begin(TRAJECTORY)?).map_err(|error| folder.failed(TRAJECTORY, error.into()))?;
-        self.finish(Running::new(run), Scribe::new(table), folder, Checkpoints::none(&path))
+        self.finish(Running::new(run), AsyncWriter::new(table), folder, Checkpoints::none(&path))
     }
 
     /// Takes a run to its end.
     fn finish(
         &self,
         mut running: Running,
-        mut scribe: Scribe<Stream>,
+        mut writer: AsyncWriter<Stream>,
         mut folder: Folder,
         mut checkpoints: Checkpoints,
     ) -> Result<Done, Failure> {
-        let marched = self.march(&mut running, &mut scribe, &folder, &mut checkpoints);
-        let done = marched.and_then(|()| self.publish(self.with_inputs(running.finish())?, scribe, &mut folder));
+        let integrated = self.integrate(&mut running, &mut writer, &folder, &mut checkpoints);
+        let done = integrated.and_then(|()| self.publish(self.with_inputs(running.finish())?, writer, &mut folder));
         let outcome = done.map_err(|failure| {
             let is_left = checkpoints.has_any() && failure.exit != Exit::Interrupted;
             if is_left { failure.with_checkpoint(folder.path()) } else { failure }
@@ -158,23 +158,23 @@ impl Task<'_> {
         Ok(Done { outcome, folder, failure })
     }
 
-    /// Marches, writes the trajectory as it comes, and a checkpoint before the first step and now and then.
-    fn march(
+    /// Integrates, writes the trajectory as it comes, and a checkpoint before the first step and now and then.
+    fn integrate(
         &self,
         running: &mut Running,
-        scribe: &mut Scribe<Stream>,
+        writer: &mut AsyncWriter<Stream>,
         folder: &Folder,
         checkpoints: &mut Checkpoints,
     ) -> Result<(), Failure> {
         let every = self.flags.checkpoints.checkpoint_every;
         if every > 0.0 && !checkpoints.has_any() {
-            self.save(running, scribe, folder, checkpoints)?;
+            self.save(running, writer, folder, checkpoints)?;
         }
         let mut watchman = Watchman::new(every);
         let mut progress = Progress::new(&self.scene.name, running.plan().until, self.flags.scene.tell.quiet);
         loop {
             let mut observer = |sample: &Sample| {
-                scribe.write(sample)?;
+                writer.write(sample)?;
                 progress.see(sample.t);
                 Ok(())
             };
@@ -190,7 +190,7 @@ impl Task<'_> {
                     return ended.map(drop);
                 }
             }
-            self.save(running, scribe, folder, checkpoints).inspect_err(|_| progress.finish())?;
+            self.save(running, writer, folder, checkpoints).inspect_err(|_| progress.finish())?;
             watchman.written();
             if interrupt::is_asked() {
                 progress.finish();
@@ -199,9 +199,15 @@ impl Task<'_> {
         }
     }
 
-    fn save(&self, running: &Running, scribe: &mut Scribe<Stream>, folder: &Folder, checkpoints: &mut Checkpoints) -> Result<(), Failure> {
+    fn save(
+        &self,
+        running: &Running,
+        writer: &mut AsyncWriter<Stream>,
+        folder: &Folder,
+        checkpoints: &mut Checkpoints,
+    ) -> Result<(), Failure> {
         let failed = |error| folder.failed(TRAJECTORY, error);
-        let stream = scribe.table().and_then(Table::written).map_err(failed)?;
+        let stream = writer.table().and_then(Table::written).map_err(failed)?;
         checkpoints.save(&Saved {
             version: env!("CARGO_PKG_VERSION").into(),
             arguments: self.arguments.to_vec(),
@@ -228,9 +234,9 @@ impl Task<'_> {
     }
 
     /// Gives the trajectory its name, draws, and writes the record.
-    fn publish(&self, outcome: Outcome, scribe: Scribe<Stream>, folder: &mut Folder) -> Result<Outcome, Failure> {
+    fn publish(&self, outcome: Outcome, writer: AsyncWriter<Stream>, folder: &mut Folder) -> Result<Outcome, Failure> {
         let Self { scene, mechanism, flags, .. } = *self;
-        let stream = scribe.finish().map_err(|error| folder.failed(TRAJECTORY, error))?;
+        let stream = writer.finish().map_err(|error| folder.failed(TRAJECTORY, error))?;
         if flags.force {
             // Nothing of an older run may stand beside the new trajectory.
             folder.clear(&FILES[1..])?;

@@ -1,4 +1,4 @@
-//! `driftless sweep`: march a grid of points, and keep a row of each.
+//! `driftless sweep`: integrate a grid of points, and keep a row of each.
 
 use super::failure::{Exit, Failure};
 use super::flags::SweepFlags;

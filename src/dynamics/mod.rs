@@ -27,7 +27,7 @@
 //! **Everything else is a row.**  The hinges make a [`forest`]; those that close a loop, sliders, slots, locks and motors are rows, each a measured angle or a quadratic
 //! function of the elements ([`row`]).  Where rows lose their independence ([`rank`]) they are left out ([`schur`]); the start is found from them ([`assembly`]).
 //!
-//! The same mechanism is marched in several forms, chosen before the first step:
+//! The same mechanism is integrated in several forms, chosen before the first step:
 //! [`multiplier`] in (q, w) with one multiplier per row, [`looped`] the same with the solve in natural coordinates, [`elimination`] with the driven angles as known functions of
 //! time, [`canonical`] in (q, p), the form in which Gauss methods are symplectic, and [`natural`] in the unit vectors themselves, for RATTLE.
 //! Evaluated on dual numbers the same formulas are their own [`jacobian`], for implicit methods and for [`stiffness`], the fastest mode and its spring.
@@ -75,7 +75,7 @@ use natural::Reduced;
 /// Time \[s\], as a pair: at 1e6 s a plain double resolves no better than 1e-10 s, and a motor's phase with it.
 pub type Time = DoubleDouble;
 
-/// What a method marches: the numbers, and everything else a restart needs to go on bit for bit.
+/// What a method integrates: the numbers, and everything else a restart needs to go on bit for bit.
 #[derive(Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct State {
     /// Time.

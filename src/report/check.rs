@@ -7,7 +7,7 @@ use crate::run::{MethodId, Plan, Stabilization};
 use crate::scene::{Scene, Spring};
 use serde_json::{Value, json};
 
-/// The form of the equations that a plan marches in.
+/// The form of the equations that a plan integrates in.
 pub fn form(mechanism: &Mechanism, plan: &Plan) -> &'static str {
     match (plan.method, plan.stabilization) {
         (MethodId::Rattle(_), _) => "unit vectors and their rates, with a constant mass matrix",
@@ -130,7 +130,7 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> String {
     page.into_text()
 }
 
-/// Method, stabilization, horizon and notes of a plan.
+/// Integrator, stabilization, horizon and notes of a plan.
 pub(super) fn describe(page: &mut Page, mechanism: &Mechanism, plan: &Plan) {
     page.entry("method", &super::setting(plan));
     if let Some(why) = &plan.why {

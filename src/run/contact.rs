@@ -4,9 +4,9 @@
 //! [`REST_HEIGHT`](crate::dynamics::contact::REST_HEIGHT): bounces that accumulate end so.  What is left of its normal velocity is taken off it and
 //! booked as lost in impacts.  From then on the wall is a row kept by projection, until its force would have to pull.
 
-use super::flip::Lookout;
+use super::driver::{Driver, Pause, Place, build};
+use super::flip::FlipDetector;
 use super::impact_monitor::{self, Claim};
-use super::march::{March, Pause, Place, build};
 use super::methods::Stabilization;
 use super::monitor::{Monitor, lent};
 use super::plan::Plan;
@@ -93,13 +93,13 @@ pub(super) struct Station {
     stabilizer: f64,
 }
 
-/// A marcher on its way through impacts and holds.
+/// A driver on its way through impacts and holds.
 pub(super) struct Course {
     /// The mechanism without holds.
     free: Arc<Mechanism>,
     /// The mechanism with the contacts held at the moment.
     mechanism: Arc<Mechanism>,
-    marcher: Box<dyn March>,
+    driver: Box<dyn Driver>,
     sampler: Sampler,
     /// The motion last sampled, kept for its room.
     shown: Motion,
@@ -110,8 +110,8 @@ pub(super) struct Course {
     /// True where it paused on the way to an output time.
     is_between: bool,
     /// Looks for bars that turn over, where somebody asked.
-    pub(super) lookout: Option<Lookout>,
-    /// Energy stabilizers put in before the present marcher \[J\].
+    pub(super) flips: Option<FlipDetector>,
+    /// Energy stabilizers put in before the present driver \[J\].
     stabilizer: f64,
     /// Impacts, holds and releases since somebody last took them, where somebody asks.
     pub(super) jumps: Option<Vec<Jump>>,
@@ -119,18 +119,18 @@ pub(super) struct Course {
 
 impl Course {
     /// A run's beginning: whatever touches and moves into its wall is struck, and what is pressed is held.
-    pub(super) fn new(mechanism: Arc<Mechanism>, marcher: Box<dyn March>) -> Self {
+    pub(super) fn new(mechanism: Arc<Mechanism>, driver: Box<dyn Driver>) -> Self {
         Self {
             sampler: Sampler::new(Arc::clone(&mechanism)),
             free: Arc::clone(&mechanism),
             mechanism,
-            marcher,
+            driver,
             shown: Motion::default(),
             held: Vec::new(),
             holds_in_row: 0,
             events_in_row: 0,
             is_between: false,
-            lookout: None,
+            flips: None,
             stabilizer: 0.0,
             jumps: None,
         }
@@ -150,7 +150,7 @@ impl Course {
     pub(super) fn sample(&mut self) -> &Sample {
         // A form writes only what it keeps.
         (self.shown.work, self.shown.stabilizer) = (DoubleDouble::default(), 0.0);
-        self.marcher.read(&mut self.shown);
+        self.driver.read(&mut self.shown);
         self.shown.stabilizer += self.stabilizer;
         self.sampler.take(&self.shown)
     }
@@ -160,15 +160,15 @@ impl Course {
         &self.shown
     }
 
-    /// Counts of all marchers so far.
+    /// Counts of all drivers so far.
     pub(super) fn tally(&self) -> Tally {
-        self.marcher.tally()
+        self.driver.tally()
     }
 
     /// Where it is, to go on from.
     pub(super) fn station(&self) -> Station {
         Station {
-            place: self.marcher.place(),
+            place: self.driver.place(),
             reference: self.sampler.reference(),
             contacts: self.mechanism.held.clone(),
             held: self.held.clone(),
@@ -205,10 +205,10 @@ impl Course {
             plan.stabilization = Stabilization::Projection;
         }
         let mut course = Self::new(Arc::clone(&mechanism), build(&holding, &mut plan, start)?);
-        if !course.marcher.resume(place, horizon)? {
+        if !course.driver.resume(place, horizon)? {
             return Ok(None);
         }
-        course.marcher.allow(plan.effort);
+        course.driver.allow(plan.effort);
         if !contacts.is_empty() {
             course.sampler.hold(Arc::clone(&holding));
             course.mechanism = holding;
@@ -238,7 +238,7 @@ impl Course {
                 monitor.count_events(outcome.strike_count + outcome.hold_count);
             }
             let horizon = outcome.plan.time(outcome.plan.rows);
-            match self.marcher.advance(until, horizon, self.lookout.as_mut(), lent(&mut monitor), pause) {
+            match self.driver.advance(until, horizon, self.flips.as_mut(), lent(&mut monitor), pause) {
                 Ok(Reached::Until) => return Ok(true),
                 Ok(Reached::Pause) => {
                     self.is_between = true;
@@ -256,7 +256,7 @@ impl Course {
                         return Err(stop);
                     }
                     // The steps that closed in on the wall are too short to see the point leave it.
-                    self.marcher.forget();
+                    self.driver.forget();
                 }
                 Err(stop) => return Err(stop),
             }
@@ -324,7 +324,7 @@ impl Course {
         let (mut motion, before) = (last.clone(), self.sampler.balance(&last));
         motion.omega = impact.omega.iter().map(|&omega| DoubleDouble::from(omega)).collect();
         motion.work = motion.work + impact.motor_work;
-        self.marcher.jump(&motion);
+        self.driver.jump(&motion);
         let change = self.sampler.balance(&motion) - before;
         self.sampler.shift(change);
         let claim = Claim { contact, impulse: impact.impulse, energy_lost: -change.hi };
@@ -388,8 +388,8 @@ impl Course {
             self.put_on(&mut motion, outcome)?;
         }
         let next = build(&self.mechanism, &mut plan, &motion)?;
-        let last = std::mem::replace(&mut self.marcher, next);
-        self.marcher.follow(&*last);
+        let last = std::mem::replace(&mut self.driver, next);
+        self.driver.follow(&*last);
         self.sampler.hold(Arc::clone(&self.mechanism));
         if let (Some(jumps), Some(before)) = (&mut self.jumps, before) {
             jumps.push(Jump { contact: None, before, after: motion.clone(), mechanism: Arc::clone(&self.mechanism) });
@@ -465,7 +465,7 @@ impl Course {
 
     /// The same into a motion that is there already.
     pub(super) fn look(&mut self, motion: &mut Motion) {
-        self.marcher.read(motion);
+        self.driver.read(motion);
     }
 
     /// The present motion in doubles.

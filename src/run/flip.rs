@@ -2,8 +2,8 @@
 //!
 //! Every step in which an angle can come as far as that is looked through: the angles inside it are interpolated until that is resolved, and the passage is
 //! found on the interpolant by the search (`stepping/search.rs`) that finds all events.  Whole turns are counted for it where the mechanism itself does
-//! not, since there they matter (torsion springs).  The passage itself is found by Newton's method on the motion, marched again from the beginning of the
-//! step, so it is as accurate as the run.  Methods that cannot march a part of a step, or do not show their steps, are traced by `dp8` there.
+//! not, since there they matter (torsion springs).  The passage itself is found by Newton's method on the motion, integrated again from the beginning of the
+//! step, so it is as accurate as the run.  Methods that cannot integrate a part of a step, or do not show their steps, are traced by `dp8` there.
 
 use crate::arithmetic::angle;
 use crate::dynamics::{Form, Glance, State};
@@ -28,7 +28,7 @@ const RESOLVED: f64 = 1e-10;
 const ROUNDS: usize = 8;
 
 /// A step that holds a passage, or may.
-pub(super) struct Suspect {
+pub(super) struct Candidate {
     /// Where it begins.
     pub from: State,
     /// Its length \[s\].
@@ -39,9 +39,9 @@ pub(super) struct Suspect {
 
 /// Looks at every step until the first passage.
 #[derive(Default)]
-pub(super) struct Lookout {
+pub(super) struct FlipDetector {
     pub flip: Option<Flip>,
-    suspects: Vec<Suspect>,
+    candidates: Vec<Candidate>,
     before: Glance,
     now: Glance,
     from: State,
@@ -49,7 +49,7 @@ pub(super) struct Lookout {
     closed: bool,
 }
 
-impl Lookout {
+impl FlipDetector {
     /// Takes the state from which the next steps are taken.
     pub fn begin<P: Form + ?Sized>(&mut self, problem: &mut P, state: &State) {
         look(problem, state, &mut self.before);
@@ -66,7 +66,7 @@ impl Lookout {
         self.closed = self.before.turns != self.now.turns;
         let suspicious = all || self.closed || can_pass(&self.before, &self.now, span);
         if suspicious {
-            self.suspects.push(Suspect { from: self.from.clone(), span, ends: [self.before.clone(), self.now.clone()] });
+            self.candidates.push(Candidate { from: self.from.clone(), span, ends: [self.before.clone(), self.now.clone()] });
         }
         std::mem::swap(&mut self.before, &mut self.now);
         remember(&mut self.from, state);
@@ -74,17 +74,17 @@ impl Lookout {
     }
 
     /// Goes through the suspicious steps, oldest first, until `find` finds the passage.
-    pub fn search(&mut self, find: &mut dyn FnMut(&Suspect) -> Option<Flip>) {
-        for suspect in std::mem::take(&mut self.suspects) {
+    pub fn search(&mut self, find: &mut dyn FnMut(&Candidate) -> Option<Flip>) {
+        for candidate in std::mem::take(&mut self.candidates) {
             // The first passage is not given up for one of a later step.
             if self.flip.is_some() {
                 return;
             }
-            let [a, b] = &suspect.ends;
+            let [a, b] = &candidate.ends;
             // A passage so near the end of the step that rounding decides is there.
             let turned = || (0..a.turns.len()).find(|&bar| a.turns[bar] != b.turns[bar]);
-            let at_end = || turned().map(|bar| Flip { t: suspect.from.time.hi + suspect.span, bar });
-            self.flip = find(&suspect).or_else(at_end);
+            let at_end = || turned().map(|bar| Flip { t: candidate.from.time.hi + candidate.span, bar });
+            self.flip = find(&candidate).or_else(at_end);
         }
     }
 }
@@ -138,7 +138,7 @@ pub(super) fn search(start: f64, span: f64, [first, last]: &[Glance; 2], at: &mu
             let there = at(middle)?;
             parts.push((middle, end, there.clone(), b));
             parts.push((begin, middle, a, there));
-        } else if let Some(flip) = within(start, [begin, end], &a, at) {
+        } else if let Some(flip) = first_passage(start, [begin, end], &a, at) {
             return Some(flip);
         }
     }
@@ -146,7 +146,7 @@ pub(super) fn search(start: f64, span: f64, [first, last]: &[Glance; 2], at: &mu
 }
 
 /// The first passage in a part of a step, which begins with `first`.
-fn within(start: f64, [begin, end]: [f64; 2], first: &Glance, at: &mut dyn FnMut(f64) -> Option<Glance>) -> Option<Flip> {
+fn first_passage(start: f64, [begin, end]: [f64; 2], first: &Glance, at: &mut dyn FnMut(f64) -> Option<Glance>) -> Option<Flip> {
     let span = end - begin;
     let mut angles = vec![Vec::new(); first.phi.len()];
     for degree in DEGREES {

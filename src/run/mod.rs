@@ -1,33 +1,33 @@
 //! A run: the loop around a method, and what watches it.
 //!
-//! [`plan`] decides, with [`choice`] of the method, [`mod@march`] builds the marcher, [`running`] goes with it from one output time to the next and can pause, [`contact`] through impacts and
+//! [`plan`] decides, with [`choice`] of the method, [`mod@integrate`] builds the driver, [`running`] goes with it from one output time to the next and can pause, [`contact`] through impacts and
 //! contacts that last, [`sample`] reads off what there is to
 //! know at each, [`trust`] estimates its error beside it, [`mod@reference`] is what it is measured against, [`drift`] and [`trace`] keep bounded records of it, [`table`] writes it down,
 //! [`files`] keeps whole files only, and [`checkpoint`] what a run needs to go on after whatever ended it.  [`mod@sweep`] runs a grid of starts and parameters, on the
-//! lookout for bars that turn over ([`flip`]); [`mod@compare`] runs all methods at all settings, and times them; [`mod@stress`] runs stiff and extreme scenes by
+//! flips for bars that turn over ([`flip`]); [`mod@compare`] runs all methods at all settings, and times them; [`mod@stress`] runs stiff and extreme scenes by
 //! every method.
 
 mod allowance;
+#[cfg(feature = "files")]
+pub mod async_writer;
 #[cfg(feature = "files")]
 pub mod checkpoint;
 pub mod choice;
 pub mod compare;
 pub mod contact;
 pub mod drift;
+pub mod driver;
 pub mod fast;
 #[cfg(feature = "files")]
 pub mod files;
 pub mod flip;
 mod impact_monitor;
-pub mod march;
 pub mod methods;
 mod monitor;
 pub mod plan;
 pub mod reference;
 pub mod running;
 pub mod sample;
-#[cfg(feature = "files")]
-pub mod scribe;
 mod shrink;
 pub mod stress;
 pub mod sweep;
@@ -44,15 +44,15 @@ pub use choice::Prefer;
 pub use compare::{Asked, Comparison, compare};
 pub use contact::{Hold, Strike};
 pub use drift::{Drift, Limits};
+pub use driver::Pause;
 pub use fast::FastMode;
 #[cfg(feature = "files")]
 pub use files::{Cursor, FileError, Folder, Stream};
 pub use flip::Flip;
-pub use march::Pause;
 pub use methods::{METHODS, MethodId, MethodInfo, Stabilization};
 pub use plan::{Plan, Refusal, Request};
 pub use reference::{Reference, reference};
-pub use running::{Outcome, ResumeError, Run, RunError, Running, Snapshot, march, simulate};
+pub use running::{Outcome, ResumeError, Run, RunError, Running, Snapshot, integrate, simulate};
 pub use sample::{Sample, Sampler};
 #[cfg(feature = "files")]
 pub use sweep::table::SweepTable;

@@ -6,7 +6,7 @@
 //! Impacts are located in doubles.  Scenes with walls have references of that accuracy, and say so.
 
 use super::contact::Course;
-use super::march::{March, Pause, build, exact};
+use super::driver::{Driver, Pause, build, exact};
 use super::methods::MethodId;
 use super::plan::Plan;
 use super::running::Outcome;
@@ -115,7 +115,7 @@ pub(super) fn side_by_side(
 /// A motion that is read at one time after another.
 pub(super) enum Walk {
     /// By the series in double-double, on its way to a horizon.
-    Exact(Box<dyn March>, Time),
+    Exact(Box<dyn Driver>, Time),
     /// By a method in doubles, through impacts and holds.
     InDoubles(Box<(Course, Outcome)>),
 }
@@ -137,9 +137,9 @@ impl Walk {
         // Whatever time is asked for must not lie beyond the plan's, which is a double.
         let until = if horizon.lo > 0.0 { horizon.hi.next_up() } else { horizon.hi };
         let mut plan = Plan { method, ..Plan::of_series(mechanism, tolerance, until) };
-        let marcher = build(mechanism, &mut plan, start)?;
+        let driver = build(mechanism, &mut plan, start)?;
         let mut outcome = Outcome::begun(mechanism, plan);
-        let mut course = Course::new(Arc::clone(mechanism), marcher);
+        let mut course = Course::new(Arc::clone(mechanism), driver);
         course.meet(&mut outcome)?;
         Ok(Self::InDoubles(Box::new((course, outcome))))
     }
@@ -147,12 +147,12 @@ impl Walk {
     /// The motion at a time; `None` where `pause` was true on the way.
     pub(super) fn to(&mut self, time: Time, pause: &mut Pause) -> Result<Option<Motion>, StepError> {
         match self {
-            Self::Exact(marcher, horizon) => {
-                if marcher.advance(time, *horizon, None, None, pause)? == Reached::Pause {
+            Self::Exact(driver, horizon) => {
+                if driver.advance(time, *horizon, None, None, pause)? == Reached::Pause {
                     return Ok(None);
                 }
                 let mut motion = Motion::default();
-                marcher.read(&mut motion);
+                driver.read(&mut motion);
                 Ok(Some(motion))
             }
             Self::InDoubles(walk) => {

@@ -2,8 +2,8 @@
 
 use super::contact::{Course, Hold, Station, Strike};
 use super::drift::{Drift, Limits};
-use super::flip::{Flip, Lookout};
-use super::march::{MOST_TURNS, March, Pause, build};
+use super::driver::{Driver, MOST_TURNS, Pause, build};
+use super::flip::{Flip, FlipDetector};
 use super::methods::{MethodId, Stabilization};
 use super::monitor::Monitor;
 use super::plan::{Plan, Refusal, Request};
@@ -22,7 +22,7 @@ pub struct Run {
     mechanism: Arc<Mechanism>,
     plan: Plan,
     limits: Limits,
-    marcher: Box<dyn March>,
+    driver: Box<dyn Driver>,
     turns: Turns,
     /// For runs of an ensemble, which look for bars that turn over and keep no samples: whether they end with the first.
     ensemble: Option<bool>,
@@ -114,10 +114,10 @@ impl Run {
     /// # Errors
     /// A method that cannot begin there.
     pub fn new(mechanism: Arc<Mechanism>, mut plan: Plan, limits: Limits, start: &Motion) -> Result<Self, StepError> {
-        let mut marcher = build(&mechanism, &mut plan, start)?;
-        marcher.allow(plan.effort);
+        let mut driver = build(&mechanism, &mut plan, start)?;
+        driver.allow(plan.effort);
         let turns = Turns::new(&mechanism, &plan, start);
-        Ok(Self { mechanism, plan, limits, marcher, turns, ensemble: None, companion: None, begun: start.clone() })
+        Ok(Self { mechanism, plan, limits, driver, turns, ensemble: None, companion: None, begun: start.clone() })
     }
 
     /// The same, accompanied by an estimate of its error; `start` is the motion it begins with.
@@ -129,7 +129,7 @@ impl Run {
         Self { companion, ..self }
     }
 
-    /// The same as one of many: on the lookout for the first bar that turns over, and without samples for charts.
+    /// The same as one of many: on the flips for the first bar that turns over, and without samples for charts.
     pub(super) fn of_ensemble(self, ends_at_flip: bool) -> Self {
         Self { ensemble: Some(ends_at_flip), ..self }
     }
@@ -140,7 +140,7 @@ impl Run {
     }
 }
 
-/// A scene from its start to its horizon in one call: compiles, plans, marches.
+/// A scene from its start to its horizon in one call: compiles, plans, integrates.
 ///
 /// # Errors
 /// Whatever keeps it from beginning, and what the observer failed with; a stop on the way is part of the [`Outcome`].
@@ -148,16 +148,16 @@ pub fn simulate(scene: &Scene, request: &Request, observer: &mut dyn FnMut(&Samp
     let mechanism = Arc::new(Mechanism::new(scene)?);
     let plan = Plan::new(scene, &mechanism, request)?;
     let start = mechanism.start(scene);
-    march(Run::new(mechanism, plan, Limits::default(), &start)?, observer)
+    integrate(Run::new(mechanism, plan, Limits::default(), &start)?, observer)
 }
 
-/// Marches a run to its horizon, shows every sample to `observer`, and tells how it ended.
+/// Integrates a run to its horizon, shows every sample to `observer`, and tells how it ended.
 ///
 /// A stop of the method is part of the [`Outcome`]; everything up to it has been shown.
 ///
 /// # Errors
 /// What the observer failed with.
-pub fn march(run: Run, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>) -> Result<Outcome, RunError> {
+pub fn integrate(run: Run, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>) -> Result<Outcome, RunError> {
     let mut running = Running::new(run);
     running.go(observer, &mut || false)?;
     Ok(running.finish())
@@ -283,10 +283,10 @@ impl Snapshot {
 impl Running {
     /// Begins a run: whatever touches and moves into its wall at the start is struck.
     pub fn new(run: Run) -> Self {
-        let Run { mechanism, plan, limits, marcher, turns, ensemble, companion, begun } = run;
+        let Run { mechanism, plan, limits, driver, turns, ensemble, companion, begun } = run;
         let mut outcome = Outcome::begun(&mechanism, plan);
-        let mut course = Course::new(mechanism, marcher);
-        course.lookout = ensemble.map(|_| Lookout::default());
+        let mut course = Course::new(mechanism, driver);
+        course.flips = ensemble.map(|_| FlipDetector::default());
         // The reference of the energy is what impacts at the start leave.
         let resting = course.meet(&mut outcome).err();
         Self { limits, course, outcome, turns, ensemble, companion, row: 0, resting, is_over: false, begun: Some(begun) }
@@ -335,7 +335,7 @@ impl Running {
         self.outcome.last.t
     }
 
-    /// Marches on until it is over (true), or `pause`, asked after every step and every row, wants it to pause (false).
+    /// Integrates on until it is over (true), or `pause`, asked after every step and every row, wants it to pause (false).
     ///
     /// `dopri5` and `dop853` show no steps but the ends of their windows, which are the output times.  Where it paused changes nothing of what follows.
     ///
@@ -388,7 +388,7 @@ impl Running {
             outcome.last.clone_from(sample);
             // A dense method is ahead of what it shows.
             let reached = outcome.last.t;
-            outcome.flip = course.lookout.as_ref().and_then(|lookout| lookout.flip).filter(|flip| flip.t <= reached);
+            outcome.flip = course.flips.as_ref().and_then(|flips| flips.flip).filter(|flip| flip.t <= reached);
             self.row += 1;
             let has_flipped = *ensemble == Some(true) && outcome.flip.is_some();
             self.is_over = outcome.stop.is_some() || has_flipped || self.row > outcome.plan.rows;
@@ -403,7 +403,7 @@ impl Running {
         Ok(true)
     }
 
-    /// Marches to the horizon without a look at what there is to see at the output times: all that the method itself costs.  False where it paused or stopped.
+    /// Integrates to the horizon without a look at what there is to see at the output times: all that the method itself costs.  False where it paused or stopped.
     pub(super) fn rush(&mut self, pause: &mut Pause) -> bool {
         let Self { course, outcome, resting, .. } = self;
         resting.is_none() && (1..=outcome.plan.rows).all(|row| course.go(outcome.plan.time(row), outcome, pause) == Ok(true))

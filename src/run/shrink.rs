@@ -8,13 +8,13 @@
 //! g = |D|² - (1e-6 L0)²,     |g''| <= 2 |D'|² + 2 |D| |D''|
 //! ```
 //!
-//! and else by the cubic through its ends.  Mechanisms whose springs are too far from their places for that are marched without.
+//! and else by the cubic through its ends.  Mechanisms whose springs are too far from their places for that are integrated without.
 
 use crate::arithmetic::Complex;
 use crate::dynamics::force::Spring;
 use crate::dynamics::{Form, Glance, Mechanism, State, Time};
 use crate::stepping::search::{Chebyshev, Crossing, Curve, Part, crossing};
-use crate::stepping::{Cause, Method, StepError, Tally};
+use crate::stepping::{Cause, Integrator, StepError, Tally};
 
 /// A length below this share of the free length is none.
 const NONE: f64 = 1e-6;
@@ -28,7 +28,7 @@ const RESOLVED: f64 = 1e-9;
 
 /// A method that stops where a spring loses its length.
 pub(super) struct Shrinking<P: ?Sized> {
-    method: Box<dyn Method<P>>,
+    method: Box<dyn Integrator<P>>,
     /// Numbers of the springs that can.
     springs: Vec<usize>,
     before: Glance,
@@ -62,7 +62,7 @@ struct Approach {
 }
 
 impl<P: Form + ?Sized> Shrinking<P> {
-    pub fn new(method: Box<dyn Method<P>>, springs: Vec<usize>) -> Self {
+    pub fn new(method: Box<dyn Integrator<P>>, springs: Vec<usize>) -> Self {
         Self { method, springs, before: Glance::default(), now: Glance::default(), from: State::default(), is_stale: true, z: Vec::new() }
     }
 }
@@ -159,7 +159,7 @@ impl<P: Form + ?Sized> Shrinking<P> {
         for degree in DEGREES {
             spans.iter_mut().for_each(Vec::clear);
             for share in Chebyshev::nodes(degree) {
-                method.within(problem, from, from.time + share * time, &mut inside);
+                method.interpolate(problem, from, from.time + share * time, &mut inside);
                 problem.glance(&inside, &mut at);
                 let [here, _] = span(problem.mechanism(), number, &at, z);
                 spans[0].push(here.re / free);
@@ -191,7 +191,7 @@ impl<P: Form + ?Sized> Shrinking<P> {
     }
 }
 
-impl<P: Form + ?Sized> Method<P> for Shrinking<P> {
+impl<P: Form + ?Sized> Integrator<P> for Shrinking<P> {
     fn name(&self) -> &'static str {
         self.method.name()
     }
@@ -240,19 +240,19 @@ impl<P: Form + ?Sized> Method<P> for Shrinking<P> {
         self.method.is_dense()
     }
 
-    fn within(&mut self, problem: &mut P, from: &State, time: Time, inside: &mut State) {
-        self.method.within(problem, from, time, inside);
+    fn interpolate(&mut self, problem: &mut P, from: &State, time: Time, inside: &mut State) {
+        self.method.interpolate(problem, from, time, inside);
     }
 
     fn reset(&mut self, state: &mut State) {
         self.method.reset(state);
     }
 
-    fn knows(&self) -> Vec<f64> {
-        self.method.knows()
+    fn internal_state(&self) -> Vec<f64> {
+        self.method.internal_state()
     }
 
-    fn learn(&mut self, known: &[f64]) -> bool {
-        self.method.learn(known)
+    fn restore_internal_state(&mut self, known: &[f64]) -> bool {
+        self.method.restore_internal_state(known)
     }
 }

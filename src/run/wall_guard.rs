@@ -41,9 +41,9 @@ impl WallGuard {
     pub fn step(&mut self, mechanism: &Mechanism, t: f64, glance: &Glance) -> Result<Option<usize>, Box<Passed>> {
         self.look(mechanism, t, glance)?;
         let (h, now) = (t - self.t, gaps(mechanism, glance));
-        let suspect = (0..now.len()).find(|&c| !mechanism.held.contains(&c) && dips(&self.gaps[c], &now[c], h));
+        let candidate = (0..now.len()).find(|&c| !mechanism.held.contains(&c) && dips(&self.gaps[c], &now[c], h));
         (self.t, self.gaps) = (t, now);
-        Ok(suspect)
+        Ok(candidate)
     }
 
     /// Looks inside a step for the least gap of a contact; `at` tells time and motion at a share of the step, nothing where it cannot.

@@ -16,7 +16,7 @@ use crate::arithmetic::sum::two_sum;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::schur::{DROPPED, NEAR};
 use crate::dynamics::{Field, Form, Mechanism, State, Time, tree};
-use crate::stepping::{Cause, Method, StepError, Tally};
+use crate::stepping::{Cause, Integrator, StepError, Tally};
 
 /// A method followed by projection after each of its steps; its problem must be in angles and rates, as
 /// [`Multiplier`](crate::dynamics::multiplier::Multiplier) is.
@@ -43,7 +43,7 @@ impl<M> Projected<M> {
     /// Projects the end of a step; true where that moved it by more than rounding.
     fn put_back<P: ?Sized>(&mut self, mechanism: &Mechanism, state: &mut State) -> Result<bool, StepError>
     where
-        M: Method<P>,
+        M: Integrator<P>,
     {
         let name = self.inner.name();
         let Some(projector) = &mut self.projector else { return Ok(false) };
@@ -73,9 +73,9 @@ impl<M> Projected<M> {
     }
 }
 
-impl<M, P> Method<P> for Projected<M>
+impl<M, P> Integrator<P> for Projected<M>
 where
-    M: Method<P>,
+    M: Integrator<P>,
     P: Field + Form + ?Sized,
 {
     fn name(&self) -> &'static str {
@@ -125,21 +125,21 @@ where
     }
 
     /// The balance after the last step, if any, and what there is to know of its end; then what the inner method knows.
-    fn knows(&self) -> Vec<f64> {
+    fn internal_state(&self) -> Vec<f64> {
         let own = [f64::from(self.balance.is_some()), self.balance.unwrap_or_default(), f64::from(self.near)];
-        own.into_iter().chain(self.inner.knows()).collect()
+        own.into_iter().chain(self.inner.internal_state()).collect()
     }
 
-    fn learn(&mut self, known: &[f64]) -> bool {
+    fn restore_internal_state(&mut self, known: &[f64]) -> bool {
         let Some((&[has_balance, balance, near], rest)) = known.split_first_chunk() else { return false };
         self.balance = (has_balance != 0.0).then_some(balance);
         self.near = near != 0.0;
-        self.inner.learn(rest)
+        self.inner.restore_internal_state(rest)
     }
 
     /// Inside a step the constraints are kept as well as at its end; where they cannot be, the state is the step's own.
-    fn within(&mut self, problem: &mut P, from: &State, time: Time, inside: &mut State) {
-        self.inner.within(problem, from, time, inside);
+    fn interpolate(&mut self, problem: &mut P, from: &State, time: Time, inside: &mut State) {
+        self.inner.interpolate(problem, from, time, inside);
         if let Some(projector) = &mut self.projector {
             // The violation left is on record in the constraints' drift.
             let _ = projector.project(problem.mechanism(), inside, self.tolerance);

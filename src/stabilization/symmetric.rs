@@ -17,7 +17,7 @@ use crate::dynamics::kernel::Kernel;
 use crate::dynamics::schur::DROPPED;
 use crate::dynamics::{Field, Form, Mechanism, State, Time};
 use crate::stepping::gauss::Gauss;
-use crate::stepping::{Cause, Method, Seen, StepError, Tally};
+use crate::stepping::{Cause, Integrator, Seen, StepError, Tally};
 
 /// Gauss steps per step before it is given up; an ordinary one takes three or four.
 const ROUNDS: usize = 60;
@@ -64,7 +64,7 @@ impl SymmetricGauss {
         mu.clear();
         mu.extend_from_slice(&state.memory[own..]);
         mu.resize(2 * r, 0.0);
-        let (name, t) = (Method::<P>::name(inner), state.time.hi);
+        let (name, t) = (Integrator::<P>::name(inner), state.time.hi);
         let stop = |what: String| StepError {
             cause: Cause::ProjectionFailed,
             method: name.into(),
@@ -181,13 +181,13 @@ fn land(mechanism: &Mechanism, kernel: &mut Kernel<f64>, end: &State, landed: &m
     is_kept(mechanism, kernel, &landed.y[n..2 * n], TOLERANCE)
 }
 
-impl<P: Field + Form + ?Sized> Method<P> for SymmetricGauss {
+impl<P: Field + Form + ?Sized> Integrator<P> for SymmetricGauss {
     fn name(&self) -> &'static str {
-        Method::<P>::name(&self.inner)
+        Integrator::<P>::name(&self.inner)
     }
 
     fn order(&self) -> u32 {
-        Method::<P>::order(&self.inner)
+        Integrator::<P>::order(&self.inner)
     }
 
     fn begin(&mut self, problem: &mut P, _state: &mut State, _until: Time) -> Result<(), StepError> {
@@ -200,7 +200,7 @@ impl<P: Field + Form + ?Sized> Method<P> for SymmetricGauss {
     /// A whole step; see [`Gauss`].  The state's memory is that of the Gauss method, then mu.
     fn step(&mut self, problem: &mut P, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
         let h = self.inner.step().copysign((until - state.time).hi);
-        tally.check(Method::<P>::name(self), state.time.hi, h)?;
+        tally.check(Integrator::<P>::name(self), state.time.hi, h)?;
         self.shifted(problem, state, h, tally)?;
         Ok(None)
     }

@@ -12,7 +12,7 @@
 //! Source: E. Hairer, S. P. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sections II.4-II.6.
 
 use super::event::{Dense, Met, Search, Stride};
-use super::{Cause, Method, StepError, Tally};
+use super::{Cause, Integrator, StepError, Tally};
 use crate::arithmetic::sum::{fast_two_sum, two_sum};
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Field, State, Time};
@@ -88,6 +88,8 @@ pub struct Explicit<P> {
     /// Length of the last step \[s\], and whether the stages of its interpolation are there.
     length: f64,
     has_extra: bool,
+    /// What makes shorter steps where the interpolation is too coarse.
+    shorter: Option<Box<Self>>,
     pair: PhantomData<P>,
 }
 
@@ -120,6 +122,7 @@ impl<P: Pair> Explicit<P> {
             rate: Rate::Unknown,
             length: 0.0,
             has_extra: false,
+            shorter: None,
             pair: PhantomData,
         }
     }
@@ -180,7 +183,7 @@ impl<P: Pair> Explicit<P> {
     }
 
     /// The stages an interpolation of the step just made asks for beside its own.
-    fn interpolate<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) {
+    fn evaluate_extra_stages<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) {
         let n = state.y.len();
         self.has_extra = true;
         let (k, stage) = (&mut self.k, &mut self.stage);
@@ -200,6 +203,23 @@ impl<P: Pair> Explicit<P> {
         let met = search.meet(field, self, state, h, tally);
         self.search = search;
         met
+    }
+
+    /// Writes the end of a step of `h` from the beginning of the last one, where that is within the tolerance: for where the interpolation is not, as in long steps
+    /// on the way out of an unstable equilibrium.
+    fn step_inside<F: Field + ?Sized>(&mut self, field: &mut F, from: &State, h: f64, inside: &mut State) {
+        let n = from.y.len();
+        let mut shorter = self.shorter.take().unwrap_or_else(|| Box::new(Self::new(self.tolerance)));
+        shorter.resize(n);
+        shorter.units.clone_from(&self.units);
+        shorter.k[..n].copy_from_slice(&self.k[..n]);
+        shorter.attempt(field, from, h, &mut Tally::default());
+        // Near a singular position a step that ends in it may be far worse than one that leads past it.
+        if P::error(h, &shorter.k, &shorter.scale) <= 1.0 {
+            inside.y.copy_from_slice(&shorter.next);
+            inside.low.copy_from_slice(&shorter.next_low);
+        }
+        self.shorter = Some(shorter);
     }
 
     /// The component that asks most of the step, or the first that is not finite.
@@ -255,6 +275,13 @@ fn sum_up_sized<const D: usize>(row: Row, k: &[f64], out: &mut [f64]) {
     out.copy_from_slice(&sums);
 }
 
+/// The largest value of what the last coefficient is that of: a polynomial that is zero, and smallest by far, at both ends of the step.
+fn highest<P: Pair>() -> f64 {
+    let (low, high) = (P::DEGREE / 2, P::DEGREE.div_ceil(2));
+    let [s, t] = [low, high].map(|power| power as f64 / P::DEGREE as f64);
+    libm::pow(s, low as f64) * libm::pow(t, high as f64)
+}
+
 /// `c_1 + (1-s) (c_2 + s (c_3 + …))`.
 fn nest(nested: &[f64], s: f64) -> f64 {
     nested.iter().enumerate().rev().fold(0.0, |sum, (m, c)| c + if m % 2 == 0 { 1.0 - s } else { s } * sum)
@@ -274,17 +301,15 @@ fn expand(nested: &[f64], powers: &mut [f64]) {
 
 impl<P: Pair, F: Field + ?Sized> Stride<F> for Explicit<P> {
     fn dense(&mut self, field: &mut F, state: &State, h: f64, dense: &mut Dense, tally: &mut Tally) {
-        self.interpolate(field, state, h, tally);
+        self.evaluate_extra_stages(field, state, h, tally);
         let n = state.y.len();
         dense.begin(field.watched(), P::DEGREE + 1, state);
-        // The last one is that of a polynomial that is zero, and smallest by far, at both ends of the step.
-        let (s, t) = ((P::DEGREE / 2) as f64 / P::DEGREE as f64, P::DEGREE.div_ceil(2) as f64 / P::DEGREE as f64);
-        let weight = libm::pow(s, (P::DEGREE / 2) as f64) * libm::pow(t, P::DEGREE.div_ceil(2) as f64);
+        let most = highest::<P>();
         for (i, (powers, off)) in dense.each().enumerate() {
             let change = (self.next[i] - state.y[i]) + (self.next_low[i] - state.low[i]);
             let nested = P::interpolate(h, change, &|stage| self.k[stage * n + i]);
             expand(&nested[..P::DEGREE], &mut powers[1..]);
-            *off = weight * nested[P::DEGREE - 1].abs();
+            *off = most * nested[P::DEGREE - 1].abs();
         }
     }
 
@@ -305,7 +330,7 @@ impl<P: Pair, F: Field + ?Sized> Stride<F> for Explicit<P> {
     }
 }
 
-impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
+impl<P: Pair, F: Field + ?Sized> Integrator<F> for Explicit<P> {
     fn name(&self) -> &'static str {
         P::NAME
     }
@@ -420,20 +445,25 @@ impl<P: Pair, F: Field + ?Sized> Method<F> for Explicit<P> {
     }
 
     /// By the pair's own interpolation, whose stages beside those of the step are evaluated the first time.
-    fn within(&mut self, field: &mut F, from: &State, time: Time, inside: &mut State) {
+    fn interpolate(&mut self, field: &mut F, from: &State, time: Time, inside: &mut State) {
         let n = from.y.len();
         if !self.has_extra {
-            self.interpolate(field, from, self.length, &mut Tally::default());
+            self.evaluate_extra_stages(field, from, self.length, &mut Tally::default());
         }
         inside.clone_from(from);
         inside.memory.clear();
         inside.time = time;
         let share = (time - from.time).hi / self.length;
+        let (most, mut off) = (highest::<P>() * <Self as Stride<F>>::off(share), 0.0_f64);
         for i in 0..n {
             let change = (self.next[i] - from.y[i]) + (self.next_low[i] - from.low[i]);
             let nested = P::interpolate(self.length, change, &|stage| self.k[stage * n + i]);
             let change = share * nest(&nested[..P::DEGREE], share);
             (inside.y[i], inside.low[i]) = two_sum(from.y[i], change + from.low[i]);
+            off = off.max(most * nested[P::DEGREE - 1].abs() / self.scale[i]);
+        }
+        if off > 1.0 {
+            self.step_inside(field, from, (time - from.time).hi, inside);
         }
         inside.wrap();
     }

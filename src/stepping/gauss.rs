@@ -37,7 +37,7 @@ mod newton;
 mod sums;
 mod tableau;
 
-use super::{Cause, Method, StepError, Tally};
+use super::{Cause, Integrator, StepError, Tally};
 use crate::dynamics::{Field, State, Time};
 use lanes::Scratch;
 use newton::Newton;
@@ -94,7 +94,7 @@ pub struct Gauss {
 }
 
 impl Gauss {
-    /// The method of `stages` stages and this step \[s\]; the direction of time follows from the march, not from the step's sign.
+    /// The method of `stages` stages and this step \[s\]; the direction of time follows from the integration, not from the step's sign.
     ///
     /// `None` unless 2 ≤ `stages` ≤ 8 and the step is finite and not zero.
     pub fn new(stages: usize, step: f64) -> Option<Self> {
@@ -142,7 +142,7 @@ impl Gauss {
     }
 }
 
-impl<F: Field + ?Sized> Method<F> for Gauss {
+impl<F: Field + ?Sized> Integrator<F> for Gauss {
     fn name(&self) -> &'static str {
         NAMES[self.stages() - 2]
     }

@@ -1,7 +1,7 @@
-//! Methods: how a state is marched from one time to another.
+//! Methods: how a state is integrated from one time to another.
 //!
 //! A method is configuration and scratch space; the [`State`] belongs to the caller and holds everything a restart needs.  The
-//! problem is a type parameter: Dormand–Prince, Radau and Gauss are `Method<F: Field>`, RATTLE is `Method<Natural>`, so a wrong pairing does
+//! problem is a type parameter: Dormand–Prince, Radau and Gauss are `Integrator<F: Field>`, RATTLE is `Integrator<Natural>`, so a wrong pairing does
 //! not compile.
 
 pub mod composition;
@@ -73,7 +73,7 @@ impl Tally {
     }
 }
 
-/// Where [`Method::advance`] stopped.
+/// Where [`Integrator::advance`] stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reached {
     /// At the time asked for.
@@ -124,10 +124,10 @@ pub struct Ends {
 
 /// Integrates a problem `P`, one accepted step after the other.
 ///
-/// The contract: [`begin`](Method::begin) takes up a state, [`step`](Method::step) makes one accepted step from it, [`within`](Method::within) is the solution
-/// inside that step, and [`save`](Method::save) leaves in the state what `begin` needs to go on to the same bits.  A method has no loop of its own over steps:
-/// that is [`advance`](Method::advance), or the caller's.
-pub trait Method<P: ?Sized> {
+/// The contract: [`begin`](Integrator::begin) takes up a state, [`step`](Integrator::step) makes one accepted step from it, [`within`](Integrator::interpolate) is the solution
+/// inside that step, and [`save`](Integrator::save) leaves in the state what `begin` needs to go on to the same bits.  A method has no loop of its own over steps:
+/// that is [`advance`](Integrator::advance), or the caller's.
+pub trait Integrator<P: ?Sized> {
     /// Name in reports: which code made a result.
     fn name(&self) -> &'static str;
 
@@ -156,7 +156,7 @@ pub trait Method<P: ?Sized> {
     /// Called where the unknowns of the state were changed a little after a step (projection): what the method knows of the rate there is stale.
     fn changed(&mut self, _state: &mut State) {}
 
-    /// Leaves in the state's memory all that [`begin`](Method::begin) needs to go on as if nothing had been between.
+    /// Leaves in the state's memory all that [`begin`](Integrator::begin) needs to go on as if nothing had been between.
     fn save(&self, _state: &mut State) {}
 
     /// Integrates `state` to `until` \[s\], or to the first event before it: the loop over steps for all methods.
@@ -191,15 +191,15 @@ pub trait Method<P: ?Sized> {
         Ok(Reached::Until)
     }
 
-    /// True where the method knows the motion inside its steps: [`Method::within`] answers.
+    /// True where the method knows the motion inside its steps: [`Integrator::interpolate`] answers.
     fn is_dense(&self) -> bool {
         false
     }
 
     /// Writes the state at `time` \[s\] inside the last step, which began at `from`, to the accuracy of the step.
     ///
-    /// Nothing of the method or of the march changes by it; methods that are not dense write nothing.
-    fn within(&mut self, _problem: &mut P, _from: &State, _time: Time, _inside: &mut State) {}
+    /// Nothing of the method or of the integration changes by it; methods that are not dense write nothing.
+    fn interpolate(&mut self, _problem: &mut P, _from: &State, _time: Time, _inside: &mut State) {}
 
     /// Called where the state was changed from outside at once: an impact, or a contact that begins or ends.  Forgets all that depends on the motion before it:
     /// predictors, Jacobians, rates, the history of errors.  Of the state's memory only the step remains, as a proposal.
@@ -216,12 +216,12 @@ pub trait Method<P: ?Sized> {
     }
 
     /// What a method knows beside the state that has a say in what follows; nothing unless said otherwise.
-    fn knows(&self) -> Vec<f64> {
+    fn internal_state(&self) -> Vec<f64> {
         Vec::new()
     }
 
     /// Takes over what another one of its kind knew at the same state; false where it can be no such thing.
-    fn learn(&mut self, known: &[f64]) -> bool {
+    fn restore_internal_state(&mut self, known: &[f64]) -> bool {
         known.is_empty()
     }
 }
@@ -335,7 +335,7 @@ fn at_rest(method: &str, state: &State, step: f64) -> StepError {
     }
 }
 
-/// The adaptive methods march forwards only; a time behind by no more than rounding has been reached.
+/// The adaptive methods integrate forwards only; a time behind by no more than rounding has been reached.
 fn refuse_the_past(method: &str, state: &State, until: Time, time_unit: f64) -> Result<(), StepError> {
     let left = (until - state.time).hi;
     if left >= -1e-9 * state.time.hi.abs().max(1e-3 * time_unit) {
@@ -347,6 +347,6 @@ fn refuse_the_past(method: &str, state: &State, until: Time, time_unit: f64) -> 
         t: state.time.hi,
         step: left,
         what: format!("t = {} s lies behind", until.hi),
-        hint: "turn the rates round and march forwards, or use a Gauss method".into(),
+        hint: "turn the rates round and integrate forwards, or use a Gauss method".into(),
     })
 }

@@ -24,7 +24,7 @@ use self::newton::Solved;
 use self::tableau::Tableau;
 use super::event::{Dense, Met, Search, Stride};
 use super::linear::Factors;
-use super::{Cause, Method, StepError, Tally, Tolerance, scales};
+use super::{Cause, Integrator, StepError, Tally, Tolerance, scales};
 use crate::arithmetic::sum::{fast_two_sum, two_sum};
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::dynamics::{Field, State, Time};
@@ -299,7 +299,7 @@ impl<F: Field + ?Sized> Stride<F> for Radau {
     }
 }
 
-impl<F: Field + ?Sized> Method<F> for Radau {
+impl<F: Field + ?Sized> Integrator<F> for Radau {
     fn name(&self) -> &'static str {
         self.id()
     }
@@ -408,7 +408,7 @@ impl<F: Field + ?Sized> Method<F> for Radau {
     }
 
     /// By the polynomial through the stages, to the order of the stages.
-    fn within(&mut self, _problem: &mut F, from: &State, time: Time, inside: &mut State) {
+    fn interpolate(&mut self, _problem: &mut F, from: &State, time: Time, inside: &mut State) {
         let (s, d) = (self.tableau.stages(), from.y.len());
         inside.clone_from(from);
         inside.memory.clear();

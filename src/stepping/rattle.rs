@@ -28,7 +28,7 @@ mod substep;
 
 use self::substep::{Failure, Work};
 use super::composition::Composition;
-use super::{Cause, Method, StepError, Tally};
+use super::{Cause, Integrator, StepError, Tally};
 use crate::arithmetic::Scalar;
 use crate::dynamics::natural::Natural;
 use crate::dynamics::{State, Time};
@@ -90,7 +90,7 @@ macro_rules! sized {
     }};
 }
 
-impl Method<Natural> for Rattle {
+impl Integrator<Natural> for Rattle {
     fn name(&self) -> &'static str {
         match self.composition {
             Composition::Single => "rattle2",
@@ -115,7 +115,7 @@ impl Method<Natural> for Rattle {
     }
 
     fn step(&mut self, problem: &mut Natural, state: &mut State, _until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
-        tally.check(Method::name(self), state.time.hi, self.step)?;
+        tally.check(Integrator::name(self), state.time.hi, self.step)?;
         if std::mem::take(&mut self.is_stale) {
             sized!(problem, state, self.work.load(problem, state));
         }

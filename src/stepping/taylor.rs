@@ -17,15 +17,15 @@
 //! Small mechanisms with loops are expanded in unit vectors (module `looped`) and put back onto all rows at the end of every step; near singular
 //! positions the series of any mechanism takes over (module `jump`).
 //!
-//! The series is the dense output: [`Method::within`] sums it at any time in the step, so that steps need not end on output times.  It is
+//! The series is the dense output: [`Integrator::interpolate`] sums it at any time in the step, so that steps need not end on output times.  It is
 //! the event finder, too: gaps of walls are polynomials of the step (module `search`), and the state is brought onto their first zero.
 //! With [`Taylor::extended`] the first powers are found in double-double, and the later ones go on from them.
 //!
 //! Source: À. Jorba, M. Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor methods*,
 //! Experimental Mathematics 14 (2005), section 3.2, for steps from the last powers; their two are five here.
 
+pub mod batch;
 mod bodies;
-pub mod crowd;
 mod direction;
 mod driven;
 mod expansion;
@@ -39,12 +39,12 @@ mod springs;
 mod terms;
 mod wide;
 
-pub use self::crowd::Crowd;
+pub use self::batch::Batch;
 use self::expansion::Expansion;
 use self::fast::Fast;
 use self::jump::Leap;
 use super::search::{self, Crossing, Powers};
-use super::{Cause, Method, StepError, Tally, Tolerance};
+use super::{Cause, Integrator, StepError, Tally, Tolerance};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics;
 use crate::dynamics::series::Coefficient;
@@ -139,7 +139,7 @@ impl Taylor<DoubleDouble> {
     }
 }
 
-impl<T: Coefficient, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
+impl<T: Coefficient, P: Field + Form + ?Sized> Integrator<P> for Taylor<T> {
     fn name(&self) -> &'static str {
         "taylor"
     }
@@ -193,7 +193,7 @@ impl<T: Coefficient, P: Field + Form + ?Sized> Method<P> for Taylor<T> {
         true
     }
 
-    fn within(&mut self, _: &mut P, from: &State, time: Time, inside: &mut State) {
+    fn interpolate(&mut self, _: &mut P, from: &State, time: Time, inside: &mut State) {
         inside.clone_from(from);
         let h = time - from.time;
         match (&mut self.fast, &self.expansion) {
@@ -215,7 +215,7 @@ impl<T: Coefficient> Taylor<T> {
     fn choose<P: Field + Form + ?Sized>(&mut self, problem: &P, state: &State) -> Result<(), StepError> {
         let (mechanism, coordinates) = (problem.mechanism(), problem.coordinates());
         if coordinates == Coordinates::Other {
-            let hint = "march the mechanism in angles and rates, by multipliers or with the motors eliminated";
+            let hint = "integrate the mechanism in angles and rates, by multipliers or with the motors eliminated";
             return Err(stop(Cause::Unsuited, state, 0.0, "the unknowns are not those a series is expanded in".into(), hint));
         }
         let is_portable = self.kernel == Kernel::Portable;

@@ -1,6 +1,6 @@
-//! `dopri5` and `dop853`: the Dormand–Prince methods of the crate `ode_solvers`, marched in windows.
+//! `dopri5` and `dop853`: the Dormand–Prince methods of the crate `ode_solvers`, integrated in windows.
 //!
-//! The only file that knows the crate.  It owns its loop and keeps every row, so a call of [`Method::advance`] is one window: a
+//! The only file that knows the crate.  It owns its loop and keeps every row, so a call of [`Integrator::advance`] is one window: a
 //! fresh integration from one time asked for to the next, which makes memory flat and restart exact.  Its ways, and what is done about them:
 //!
 //! - Dense output hands out times and states that do not belong together: `Sparse` rows are used, and only the last one counts.
@@ -12,7 +12,7 @@
 //!
 //! The step the crate found is passed on to the next window through the state's memory.
 
-use super::{Cause, Ends, Method, StepError, Tally, Tolerance};
+use super::{Cause, Ends, Integrator, StepError, Tally, Tolerance};
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Field, State, Time};
 use nalgebra::{DVector, SVector};
@@ -106,8 +106,8 @@ impl<F: Field + ?Sized> System<f64, DVector<f64>> for Window<'_, F> {
 /// A window's outcome in plain numbers: the rows' times, the last row or all of them, counts.
 type Outcome = (Vec<f64>, Vec<f64>, Result<Stats, IntegrationError>);
 
-/// `march!(Stepper, vector)` integrates one window.
-macro_rules! march {
+/// `integrate!(Stepper, vector)` integrates one window.
+macro_rules! integrate {
     ($stepper:path, $window:expr, $vector:expr, $span:expr, $settings:expr) => {{
         let (tolerance, controller, first, max_steps, keeps) = $settings;
         let (beta, fac_min, fac_max): (f64, f64, f64) = controller;
@@ -141,8 +141,8 @@ macro_rules! march {
 macro_rules! by_length {
     ($stepper:path, $window:expr, $y:expr, $span:expr, $settings:expr; $($d:literal)*) => {
         match $y.len() {
-            $($d => march!($stepper, $window, SVector::<f64, $d>::from_column_slice($y), $span, $settings),)*
-            _ => march!($stepper, $window, DVector::from_column_slice($y), $span, $settings),
+            $($d => integrate!($stepper, $window, SVector::<f64, $d>::from_column_slice($y), $span, $settings),)*
+            _ => integrate!($stepper, $window, DVector::from_column_slice($y), $span, $settings),
         }
     };
 }
@@ -237,7 +237,7 @@ fn part<F: Field + ?Sized>(
     Ok(())
 }
 
-impl<F: Field + ?Sized> Method<F> for Dopri5 {
+impl<F: Field + ?Sized> Integrator<F> for Dopri5 {
     fn name(&self) -> &'static str {
         "dopri5"
     }
@@ -275,7 +275,7 @@ impl<F: Field + ?Sized> Method<F> for Dopri5 {
     }
 }
 
-impl<F: Field + ?Sized> Method<F> for Dop853 {
+impl<F: Field + ?Sized> Integrator<F> for Dop853 {
     fn name(&self) -> &'static str {
         "dop853"
     }

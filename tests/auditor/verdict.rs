@@ -8,7 +8,7 @@ use super::record::{Look, Record};
 use driftless::dynamics::kernel::{Bias, Kernel};
 use driftless::dynamics::{Mechanism, Time};
 use driftless::run::trust::Level;
-use driftless::run::{Limits, Outcome, Plan, Request, Run, RunError, Sample, march};
+use driftless::run::{Limits, Outcome, Plan, Request, Run, RunError, Sample, integrate};
 use driftless::scene::parse_scene;
 use std::fmt;
 use std::sync::Arc;
@@ -39,7 +39,7 @@ pub fn run(text: &str, request: &Request) -> Result<Ran, String> {
     let start = mechanism.start(&scene);
     let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).map_err(|error| format!("start: {error}"))?;
     let mut samples = Vec::new();
-    let outcome = march(run.trusted(Level::Full, &start), &mut |sample| {
+    let outcome = integrate(run.trusted(Level::Full, &start), &mut |sample| {
         samples.push(sample.clone());
         Ok(())
     });

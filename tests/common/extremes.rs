@@ -3,7 +3,7 @@
 use super::random::{self, Draw};
 use driftless::dynamics::Mechanism;
 use driftless::run::trust::{How, Level};
-use driftless::run::{Limits, Outcome, Plan, Point, Request, Run, Sample, Status, Sweep, SweepTable, Totals, Vary, march, sweep};
+use driftless::run::{Limits, Outcome, Plan, Point, Request, Run, Sample, Status, Sweep, SweepTable, Totals, Vary, integrate, sweep};
 use driftless::scene::{Scene, Template, parse_scene};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -62,7 +62,7 @@ fn run(scene: &Scene, request: &Request, level: Level) -> Option<(Vec<Sample>, O
     let start = mechanism.start(scene);
     let run = Run::new(mechanism, plan, Limits::default(), &start).ok()?;
     let mut samples = Vec::new();
-    let outcome = march(run.trusted(level, &start), &mut |sample| {
+    let outcome = integrate(run.trusted(level, &start), &mut |sample| {
         samples.push(sample.clone());
         Ok(())
     });

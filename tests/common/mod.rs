@@ -3,9 +3,9 @@
 
 use driftless::arithmetic::DoubleDouble;
 use driftless::dynamics::{Mechanism, Motion, State};
-use driftless::run::{Limits, Outcome, Plan, Request, Run, march};
+use driftless::run::{Limits, Outcome, Plan, Request, Run, integrate};
 use driftless::scene::{Bar, Hinge, Law, Motor, Place, Scene, Spring, Start};
-use driftless::stepping::{Method, Reached, Seen, Tally};
+use driftless::stepping::{Integrator, Reached, Seen, Tally};
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
 
@@ -106,7 +106,7 @@ pub fn run_limited(scene: &Scene, request: &Request, limits: Limits) -> Outcome 
 pub fn run_from(scene: &Scene, mechanism: &Arc<Mechanism>, request: &Request, limits: Limits, start: &Motion) -> Outcome {
     let plan = Plan::new(scene, mechanism, request).expect("a sensible pairing");
     let run = Run::new(Arc::clone(mechanism), plan, limits, start).expect("a beginning");
-    march(run, &mut |_| Ok(())).expect("no observer fails")
+    integrate(run, &mut |_| Ok(())).expect("no observer fails")
 }
 
 /// A single uniform slender bar of length 1 m and mass 1 kg on a ground hinge, hanging down at phi = 0 under 10 m/s²: a physical pendulum
@@ -151,9 +151,9 @@ pub fn order(points: &[(f64, f64)], floor: f64, ceiling: f64) -> f64 {
     above / below
 }
 
-/// Marches a problem from one output time to the next, `every` \[s\] apart, and asserts that nothing stops it.
+/// Integrates a problem from one output time to the next, `every` \[s\] apart, and asserts that nothing stops it.
 pub fn go<P: ?Sized>(
-    method: &mut impl Method<P>,
+    method: &mut impl Integrator<P>,
     problem: &mut P,
     state: &mut State,
     every: f64,

@@ -440,7 +440,7 @@ pub fn simulate(text: &str, draw: &mut Draw, effort: u64) -> Ending {
     };
     let mut table = Table::new(&mechanism, Vec::new()).expect("room");
     let mut samples: Vec<Sample> = Vec::new();
-    let outcome = driftless::run::march(run, &mut |sample| {
+    let outcome = driftless::run::integrate(run, &mut |sample| {
         samples.push(sample.clone());
         table.write(sample)
     });

@@ -138,7 +138,7 @@ impl Stages {
 
     /// The rates at all points; with `exact`, what doubles leave out of points and rates too.  `account`: the form carries p_t.
     ///
-    /// Not generic, so that it is compiled once and not with every program that marches a mechanism.
+    /// Not generic, so that it is compiled once and not with every program that integrates a mechanism.
     pub fn rates(&mut self, account: bool, exact: bool, mechanism: &Mechanism, points: &mut Points) {
         if account && self.time != points.time {
             self.time = points.time;

@@ -4,7 +4,7 @@
 //! theta = q_a - q_b:   torque on a = -(k (theta - theta0) + c theta'),   the opposite on b,   V = k (theta - theta0)² / 2
 //! ```
 //!
-//! Whole turns count: a mechanism with a torsion spring is marched in winding angles.
+//! Whole turns count: a mechanism with a torsion spring is integrated in winding angles.
 
 use crate::arithmetic::Scalar;
 

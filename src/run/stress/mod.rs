@@ -20,7 +20,7 @@ pub use steps::{Stability, StabilityMap, stability};
 use super::drift::larger;
 use super::methods::{METHODS, MethodId};
 use super::plan::{Plan, Request};
-use super::running::{Outcome, Run, march};
+use super::running::{Outcome, Run, integrate};
 use super::trust::{How, Level};
 use super::{Limits, Sample, reference};
 use crate::arithmetic::{DoubleDouble, Scalar};
@@ -205,7 +205,7 @@ fn known(case: &Case) -> Case {
         let start = mechanism.start(&scene);
         let request = Request { method: Some(MethodId::Taylor), every: Some(scene.until), effort: Some(EXPANSIONS), ..Request::default() };
         let plan = Plan::new(&scene, &mechanism, &request).ok()?;
-        let trial = march(Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).ok()?, &mut |_| Ok(())).ok()?;
+        let trial = integrate(Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).ok()?, &mut |_| Ok(())).ok()?;
         let found = reference(&mechanism, &start, &[trial.stop.is_none().then_some(scene.until)?.into()]).ok()?;
         // What it is off must be nothing beside the tolerance.
         let is_known = found.accuracy.iter().all(|&accuracy| accuracy <= 1e-3 * case.tolerance);
@@ -305,7 +305,7 @@ impl Trial<'_> {
             let start = self.mechanism.start(self.scene);
             cell.runs += 1;
             let outcome = match Run::new(Arc::clone(self.mechanism), plan, Limits::default(), &start) {
-                Ok(run) => march(run.trusted(Level::Auto, &start), &mut |_| Ok(())).map_err(|error| error.to_string())?,
+                Ok(run) => integrate(run.trusted(Level::Auto, &start), &mut |_| Ok(())).map_err(|error| error.to_string())?,
                 Err(stop) => {
                     cell.stop = Some(stop);
                     return Ok(());

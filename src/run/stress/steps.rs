@@ -4,7 +4,7 @@ use super::{End, Verdict};
 use crate::dynamics::Mechanism;
 use crate::run::methods::MethodId;
 use crate::run::plan::{Plan, Request};
-use crate::run::running::{Run, march};
+use crate::run::running::{Run, integrate};
 use crate::run::{Limits, Outcome};
 use crate::scene::{Scene, parse_scene};
 use std::sync::Arc;
@@ -87,5 +87,5 @@ pub fn stability(method: MethodId, finished: &mut dyn FnMut(usize, usize) -> boo
 
 fn run(scene: &Scene, mechanism: &Arc<Mechanism>, request: &Request) -> Option<Outcome> {
     let plan = Plan::new(scene, mechanism, request).ok()?;
-    march(Run::new(Arc::clone(mechanism), plan, Limits::default(), &mechanism.start(scene)).ok()?, &mut |_| Ok(())).ok()
+    integrate(Run::new(Arc::clone(mechanism), plan, Limits::default(), &mechanism.start(scene)).ok()?, &mut |_| Ok(())).ok()
 }

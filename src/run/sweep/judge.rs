@@ -1,7 +1,7 @@
-//! How far the points of a sweep may be trusted: in lanes by a second march at a hundredth of the tolerance beside the first.
+//! How far the points of a sweep may be trusted: in lanes by a second integration at a hundredth of the tolerance beside the first.
 //!
-//! The second march has an order of its own, so that steps that end at the same output times have other errors.  Both are compared at the output times and where
-//! a point ends, and the horizon is interpolated between these.  Beside a march at 1e-9 both together cost 2.2 times as much (32 points of `free`, counted instructions).
+//! The second integration has an order of its own, so that steps that end at the same output times have other errors.  Both are compared at the output times and where
+//! a point ends, and the horizon is interpolated between these.  Beside an integration at 1e-9 both together cost 2.2 times as much (32 points of `free`, counted instructions).
 
 use super::point::Ready;
 use crate::arithmetic::{DoubleDouble, Scalar};
@@ -11,10 +11,10 @@ use crate::run::drift::larger;
 use crate::run::plan::Plan;
 use crate::run::trust::{CAUTION, HORIZON, LEAST, Trust, crossing};
 use crate::stepping::Tolerance;
-use crate::stepping::taylor::crowd::{Crowd, Entrant, Going};
+use crate::stepping::taylor::batch::{Batch, BatchMember, Going};
 use std::sync::Arc;
 
-/// Tolerance of the second march over that of the first, its least, and its order.
+/// Tolerance of the second integration over that of the first, its least, and its order.
 const FINER: f64 = 100.0;
 const FINEST: f64 = 1e-16;
 const ORDER: usize = 24;
@@ -50,10 +50,10 @@ struct Known {
     is_lost: bool,
 }
 
-/// The second march.
+/// The second integration.
 pub(super) struct Judge<'a> {
-    crowd: Crowd,
-    entrants: Vec<Entrant<'a>>,
+    batch: Batch,
+    members: Vec<BatchMember<'a>>,
     known: Vec<Known>,
 }
 
@@ -62,36 +62,36 @@ impl<'a> Judge<'a> {
     pub(super) fn new(ready: &'a [Ready], plan: &Plan) -> Self {
         let tolerance = plan.tolerance.unwrap_or_default();
         let finer = (tolerance.relative.min(tolerance.absolute) / FINER).max(FINEST);
-        let crowd = Crowd::new(Tolerance { relative: finer, absolute: finer }).with_order(ORDER);
-        let entrant = |ready: &'a Ready| {
+        let batch = Batch::new(Tolerance { relative: finer, absolute: finer }).with_order(ORDER);
+        let member = |ready: &'a Ready| {
             let state = Elimination::<0>::new(Arc::clone(&ready.mechanism)).state(&ready.start);
-            let mut entrant = Entrant::new(&ready.mechanism, state);
-            entrant.tally.effort = ready.plan.effort.saturating_mul(2);
-            entrant
+            let mut member = BatchMember::new(&ready.mechanism, state);
+            member.tally.effort = ready.plan.effort.saturating_mul(2);
+            member
         };
-        Self { crowd, entrants: ready.iter().map(entrant).collect(), known: vec![Known::default(); ready.len()] }
+        Self { batch, members: ready.iter().map(member).collect(), known: vec![Known::default(); ready.len()] }
     }
 
     /// Goes on to an output time, and compares all points: at their ends, where these come before it.
-    pub(super) fn march(&mut self, points: &[Entrant], until: Time) {
-        let Self { crowd, entrants, known } = self;
+    pub(super) fn integrate(&mut self, points: &[BatchMember], until: Time) {
+        let Self { batch, members, known } = self;
         for (number, point) in points.iter().enumerate() {
             if point.state.time < until {
-                crowd.march(&mut entrants[number..=number], point.state.time, &mut |_, _| Going::On);
-                known[number].take(&point.state, &entrants[number]);
+                batch.integrate(&mut members[number..=number], point.state.time, &mut |_, _| Going::On);
+                known[number].take(&point.state, &members[number]);
             }
         }
-        crowd.march(entrants, until, &mut |_, _| Going::On);
-        for ((point, entrant), known) in points.iter().zip(entrants).zip(known) {
+        batch.integrate(members, until, &mut |_, _| Going::On);
+        for ((point, member), known) in points.iter().zip(members).zip(known) {
             if point.state.time >= until {
-                known.take(&point.state, entrant);
+                known.take(&point.state, member);
             }
         }
     }
 
     /// What is known of a point, which goes no further.
     pub(super) fn remove(&mut self, number: usize) -> PointTrust {
-        self.entrants.swap_remove(number);
+        self.members.swap_remove(number);
         let Known { last: [_, error], horizon, is_lost } = self.known.swap_remove(number);
         let printed = |error: f64| (CAUTION * error).max(LEAST);
         match horizon {
@@ -102,7 +102,7 @@ impl<'a> Judge<'a> {
 }
 
 impl Known {
-    fn take(&mut self, point: &State, finer: &Entrant) {
+    fn take(&mut self, point: &State, finer: &BatchMember) {
         let difference = |k: usize| {
             let turns = point.turns[k].wrapping_sub(finer.state.turns[k]) as f64;
             (point.unknown(k) - finer.state.unknown(k) + DoubleDouble::TAU.scale(turns)).hi

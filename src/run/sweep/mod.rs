@@ -1,6 +1,6 @@
 //! Sweeps: many runs of one scene over a grid of starts and parameters.
 //!
-//! Every point is a run of its own, with the same result whichever thread marches it and whoever its neighbours are, so that what comes out does not
+//! Every point is a run of its own, with the same result whichever thread integrates it and whoever its neighbours are, so that what comes out does not
 //! depend on the number of threads.  Points are handed out in chunks, of which a bounded number is under way; results are shown in the order of the
 //! grid, and memory does not grow with it.  A point that cannot be run, or stops, says so in its own result and ends nothing else.
 //!
@@ -40,7 +40,7 @@ use super::plan::{MAX_ROWS, Plan, Refusal, Request};
 use super::trust::Level;
 use crate::dynamics::{CompileError, Mechanism};
 use crate::scene::{Scene, SceneError, Template, Variable};
-use crate::stepping::taylor::crowd::Crowd;
+use crate::stepping::taylor::batch::Batch;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -146,7 +146,7 @@ pub struct Totals {
 impl Sweep {
     /// Prepares a sweep over the grid of `vary`, the first of which varies slowest.
     ///
-    /// Without a method of its own a request gets `taylor` where points can be marched several at a time, else the one a single run would get; without an
+    /// Without a method of its own a request gets `taylor` where points can be integrated several at a time, else the one a single run would get; without an
     /// output interval, drift is looked at eight times on the way.
     ///
     /// # Errors
@@ -157,13 +157,13 @@ impl Sweep {
         let variables = vary.iter().map(|vary| template.variable(&vary.name)).collect::<Result<Vec<_>, _>>()?;
         let grid = grid(vary, &variables)?;
         let mut request = request.clone();
-        let in_lanes = request.method.is_none() && request.step.is_none() && !request.extended && Crowd::takes(&mechanism);
+        let in_lanes = request.method.is_none() && request.step.is_none() && !request.extended && Batch::takes(&mechanism);
         if in_lanes {
             request.method = Some(MethodId::Taylor);
         }
         let mut plan = Plan::new(&scene, &mechanism, &timed(&request, &scene))?;
         if in_lanes {
-            plan.why = Some("taylor: free bodies are marched several at a time".into());
+            plan.why = Some("taylor: free bodies are integrated several at a time".into());
         }
         // What one point gets unasked, all get.
         request.method = Some(plan.method);
@@ -250,7 +250,7 @@ impl Sweep {
         &self.variables
     }
 
-    /// Points marched as one task: enough to fill lanes, few enough to spread over the threads.
+    /// Points integrated as one task: enough to fill lanes, few enough to spread over the threads.
     fn chunk(&self, threads: usize) -> u64 {
         (self.grid.count() / (16 * threads as u64)).clamp(1, CHUNK)
     }
@@ -300,13 +300,13 @@ impl Shared<'_> {
     }
 
     /// The points of a chunk; fewer where nobody wants them any more.
-    fn march(&self, chunk: u64) -> Vec<Point> {
+    fn integrate(&self, chunk: u64) -> Vec<Point> {
         let first = self.first + chunk * self.chunk;
         let last = (first + self.chunk).min(self.sweep.grid.count());
         let finished = || {
             self.finished.fetch_add(1, Ordering::Relaxed);
         };
-        self.sweep.march(first..last, &finished, &|| self.is_over.load(Ordering::Relaxed))
+        self.sweep.integrate(first..last, &finished, &|| self.is_over.load(Ordering::Relaxed))
     }
 }
 
@@ -338,10 +338,10 @@ pub fn sweep_on(sweep: &Sweep, threads: usize, seen: Totals, observer: &mut dyn 
     let shared = Shared { sweep, chunk: sweep.chunk(threads), first, finished: AtomicU64::new(first), is_over: AtomicBool::new(false) };
     let mut audience = Audience { observer, begin, before: seen.wall, totals: Totals { threads, ..seen } };
     #[cfg(feature = "threads")]
-    threads::march(&shared, threads, &mut audience)?;
+    threads::integrate(&shared, threads, &mut audience)?;
     #[cfg(not(feature = "threads"))]
     for chunk in 0..shared.chunks() {
-        shared.march(chunk).iter().try_for_each(|point| audience.see(point))?;
+        shared.integrate(chunk).iter().try_for_each(|point| audience.see(point))?;
         audience.finished(shared.finished.load(Ordering::Relaxed))?;
     }
     audience.totals.wall = audience.before + begin.elapsed();

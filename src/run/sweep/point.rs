@@ -1,4 +1,4 @@
-//! One point of a sweep, or several marched in lanes.
+//! One point of a sweep, or several integrated in lanes.
 
 use super::judge::{Judge, PointTrust};
 use super::{Sweep, timed};
@@ -8,14 +8,14 @@ use crate::dynamics::kernel::Kernel;
 use crate::dynamics::{Form, Glance, Mechanism, Motion};
 use crate::run::allowance::{Allowance, EnergyLimit, Moment};
 use crate::run::drift::larger;
+use crate::run::driver::MOST_TURNS;
 use crate::run::flip::{self, Flip};
-use crate::run::march::MOST_TURNS;
 use crate::run::methods::MethodId;
 use crate::run::plan::Plan;
 use crate::run::running::{Run, Running};
 use crate::run::trust::Level;
 use crate::scene::StartValue;
-use crate::stepping::taylor::crowd::{Crowd, Entrant, Going, Passage};
+use crate::stepping::taylor::batch::{Batch, BatchMember, Going, Passage};
 use crate::stepping::{Cause, StepError};
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -74,11 +74,11 @@ pub(super) struct Ready {
 impl Sweep {
     /// Runs one point; the same as in a whole sweep.
     pub fn point(&self, index: u64) -> Option<Point> {
-        if index < self.grid.count() { self.march(index..index + 1, &|| (), &|| false).pop() } else { None }
+        if index < self.grid.count() { self.integrate(index..index + 1, &|| (), &|| false).pop() } else { None }
     }
 
     /// Runs points; tells of each that is `finished`, and gives up where all `is_over`.
-    pub(super) fn march(&self, points: Range<u64>, finished: &dyn Fn(), is_over: &dyn Fn() -> bool) -> Vec<Point> {
+    pub(super) fn integrate(&self, points: Range<u64>, finished: &dyn Fn(), is_over: &dyn Fn() -> bool) -> Vec<Point> {
         let mut found = Vec::with_capacity((points.end - points.start) as usize);
         let mut in_lanes = Vec::new();
         for index in points {
@@ -93,19 +93,19 @@ impl Sweep {
                 }
             }
         }
-        found.extend(self.crowd(in_lanes, finished, is_over));
+        found.extend(self.batch(in_lanes, finished, is_over));
         found.sort_by_key(|point| point.index);
         found
     }
 
-    /// True for a point that can be marched beside others.
+    /// True for a point that can be integrated beside others.
     fn takes(&self, ready: &Ready) -> bool {
         let alike = (ready.plan.until, ready.plan.rows) == (self.plan.until, self.plan.rows);
         alike
             && self.trust != Level::Full
             && ready.plan.method == MethodId::Taylor
             && !ready.plan.extended
-            && Crowd::takes(&ready.mechanism)
+            && Batch::takes(&ready.mechanism)
     }
 
     /// Puts the values in; a point that cannot run is finished.
@@ -206,18 +206,18 @@ impl Sweep {
     }
 
     /// Runs points beside each other, a lane each.
-    fn crowd(&self, ready: Vec<Ready>, finished: &dyn Fn(), is_over: &dyn Fn() -> bool) -> Vec<Point> {
+    fn batch(&self, ready: Vec<Ready>, finished: &dyn Fn(), is_over: &dyn Fn() -> bool) -> Vec<Point> {
         let Some(first) = ready.first() else { return Vec::new() };
         let (plan, bodies) = (first.plan.clone(), first.mechanism.bodies.len());
-        let crowd = Crowd::new(plan.tolerance.unwrap_or_default());
+        let batch = Batch::new(plan.tolerance.unwrap_or_default());
         let mut kernel = Kernel::<DoubleDouble>::without_rows(&first.mechanism);
         let mut lanes: Vec<Lane> = Vec::with_capacity(ready.len());
-        let mut entrants: Vec<Entrant> = Vec::with_capacity(ready.len());
+        let mut members: Vec<BatchMember> = Vec::with_capacity(ready.len());
         for ready in &ready {
             let state = Elimination::<0>::new(Arc::clone(&ready.mechanism)).state(&ready.start);
-            let mut entrant = Entrant::new(&ready.mechanism, state);
-            entrant.tally.effort = ready.plan.effort;
-            entrants.push(entrant);
+            let mut member = BatchMember::new(&ready.mechanism, state);
+            member.tally.effort = ready.plan.effort;
+            members.push(member);
             let reference = ready.mechanism.energy(&mut kernel, &ready.start.phi, &ready.start.omega).total();
             lanes.push(Lane {
                 point: ready.point.clone(),
@@ -232,7 +232,7 @@ impl Sweep {
         let mut found = Vec::with_capacity(ready.len());
         let mut motion = Motion::default();
         for row in 1..=plan.rows {
-            crowd.march(&mut entrants, plan.time(row), &mut |lane, passage| {
+            batch.integrate(&mut members, plan.time(row), &mut |lane, passage| {
                 let lane = &mut lanes[lane];
                 if lane.point.flip.is_none() {
                     lane.look(bodies, passage);
@@ -243,20 +243,20 @@ impl Sweep {
                 return found;
             }
             if let Some(judge) = &mut judge {
-                judge.march(&entrants, plan.time(row));
+                judge.integrate(&members, plan.time(row));
             }
             let mut number = 0;
             while number < lanes.len() {
-                let (lane, entrant) = (&mut lanes[number], &entrants[number]);
+                let (lane, member) = (&mut lanes[number], &members[number]);
                 let over = row == plan.rows || (self.ends_at_flips && lane.point.flip.is_some());
-                if lane.measure(entrant, &mut motion, &mut kernel, self.limits.energy, &plan) && !over {
+                if lane.measure(member, &mut motion, &mut kernel, self.limits.energy, &plan) && !over {
                     number += 1;
                     continue;
                 }
                 let mut point = lanes.swap_remove(number).point;
                 point.trust = judge.as_mut().map(|judge| judge.remove(number));
                 found.push(point);
-                entrants.swap_remove(number);
+                members.swap_remove(number);
                 finished();
             }
             if lanes.is_empty() {
@@ -267,7 +267,7 @@ impl Sweep {
     }
 }
 
-/// A point marched in a lane.
+/// A point integrated in a lane.
 struct Lane {
     point: Point,
     /// Energy at the start \[J\].
@@ -308,30 +308,30 @@ impl Lane {
         }
     }
 
-    /// Takes what an entrant has come to; false where the point goes no further.
+    /// Takes what an member has come to; false where the point goes no further.
     fn measure(
         &mut self,
-        entrant: &Entrant,
+        member: &BatchMember,
         motion: &mut Motion,
         kernel: &mut Kernel<DoubleDouble>,
         stated: Option<f64>,
         plan: &Plan,
     ) -> bool {
-        let n = entrant.mechanism.bodies.len();
-        let state = &entrant.state;
+        let n = member.mechanism.bodies.len();
+        let state = &member.state;
         motion.resize(n);
         motion.turns.copy_from_slice(&state.turns);
         for k in 0..n {
             (motion.phi[k], motion.omega[k]) = (state.unknown(k), state.unknown(n + k));
         }
         let point = &mut self.point;
-        let energy = entrant.mechanism.energy(kernel, &motion.phi, &motion.omega).total();
+        let energy = member.mechanism.energy(kernel, &motion.phi, &motion.omega).total();
         let imbalance = ((energy - self.reference).hi / self.scale).abs();
         point.energy = larger(imbalance, point.energy);
         point.t = state.time.hi;
         point.phi = (0..n).map(|k| motion.unwrapped(k)).collect();
         point.omega = motion.omega.iter().map(|omega| omega.hi).collect();
-        point.steps = entrant.tally.steps;
+        point.steps = member.tally.steps;
         if let Some(allowance) = &self.allowance {
             let moment = Moment { omega: &point.omega, feet: &[], work: 0.0, largest: self.scale, steps: point.steps };
             self.limit.see(allowance, &moment);
@@ -345,7 +345,7 @@ impl Lane {
             what,
             hint: hint.into(),
         };
-        let stopped = match &entrant.stopped {
+        let stopped = match &member.stopped {
             Some(stopped) => Some(stopped.clone()),
             None if point.energy.is_nan() => {
                 Some(stop(Cause::NotFinite, "the energy is not finite".into(), "look for rates far out of proportion"))

@@ -14,7 +14,7 @@ const TICK: Duration = Duration::from_millis(100);
 /// A finished chunk; none where its thread panicked.
 type Finished = (u64, Option<Vec<Point>>);
 
-/// Sends word even where marching panics.
+/// Sends word even where integrating panics.
 struct Messenger {
     chunk: u64,
     points: Option<Vec<Point>>,
@@ -28,8 +28,8 @@ impl Drop for Messenger {
     }
 }
 
-/// Marches all chunks and shows them in order.
-pub(super) fn march(shared: &Shared, threads: usize, audience: &mut Audience) -> Result<(), SweepError> {
+/// Integrates all chunks and shows them in order.
+pub(super) fn integrate(shared: &Shared, threads: usize, audience: &mut Audience) -> Result<(), SweepError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| SweepError::Threads(error.to_string()))?;
     let (send, receive) = channel::<Finished>();
     pool.in_place_scope(|scope| {
@@ -41,7 +41,7 @@ pub(super) fn march(shared: &Shared, threads: usize, audience: &mut Audience) ->
                 while begun < chunks.min(seen + ahead) {
                     let mut messenger = Messenger { chunk: begun, points: None, send: send.clone() };
                     scope.spawn(move |_| {
-                        messenger.points = Some(shared.march(messenger.chunk));
+                        messenger.points = Some(shared.integrate(messenger.chunk));
                         drop(messenger);
                     });
                     begun += 1;

@@ -3,7 +3,7 @@
 use super::Tangent;
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::contact::Course;
-use crate::run::march::build;
+use crate::run::driver::build;
 use crate::run::plan::Plan;
 use crate::run::running::Outcome;
 use std::sync::Arc;
@@ -39,8 +39,8 @@ pub struct Flow {
 pub fn flow(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion, times: &[f64]) -> Result<Flow, String> {
     let mut plan = plan.clone();
     let mut outcome = Outcome::begun(mechanism, plan.clone());
-    let marcher = build(mechanism, &mut plan, start).map_err(|stop| stop.what)?;
-    let mut course = Course::new(Arc::clone(mechanism), marcher);
+    let driver = build(mechanism, &mut plan, start).map_err(|stop| stop.what)?;
+    let mut course = Course::new(Arc::clone(mechanism), driver);
     course.meet(&mut outcome).map_err(|stop| stop.what)?;
     let begin = course.motion();
     let mut tangent = Tangent::new(course.holding(), &begin, plan.until)?;

@@ -17,7 +17,7 @@ use super::measured::LAST_DIGIT;
 use super::{Ruler, Trust};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::contact::Course;
-use crate::run::march::{Pause, build};
+use crate::run::driver::{Pause, build};
 use crate::run::plan::Plan;
 use crate::run::running::Outcome;
 use crate::scene::{Scene, SceneError, Template, Variable, Written};
@@ -211,12 +211,12 @@ impl<'a, 'b> Neighbours<'a, 'b> {
         let mut motions = Vec::new();
         let mut plan = Plan { effort: self.effort, ..neighbour(mechanism, until.hi, coarser) };
         let mut outcome = Outcome::begun(mechanism, plan.clone());
-        let mut marcher = match build(mechanism, &mut plan, &mechanism.start(scene)) {
-            Ok(marcher) => marcher,
+        let mut driver = match build(mechanism, &mut plan, &mechanism.start(scene)) {
+            Ok(driver) => driver,
             Err(stop) => return (motions, Some(stop.what)),
         };
-        marcher.allow(self.effort);
-        let mut course = Course::new(Arc::clone(mechanism), marcher);
+        driver.allow(self.effort);
+        let mut course = Course::new(Arc::clone(mechanism), driver);
         self.inputs.runs += 1;
         let mut stop = course.meet(&mut outcome).err();
         let mut is_paused = false;

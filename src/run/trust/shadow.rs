@@ -5,7 +5,7 @@ use super::finer::is_rounded;
 use super::tangent::{Path, Tangent};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::contact::{Course, Station};
-use crate::run::march::build;
+use crate::run::driver::build;
 use crate::run::methods::MethodId;
 use crate::run::plan::Plan;
 use crate::run::running::Outcome;
@@ -64,9 +64,9 @@ pub(super) struct Purse<'a> {
 }
 
 fn course(mechanism: &Arc<Mechanism>, series: &mut Plan, start: &Motion) -> Result<(Course, Outcome), String> {
-    let marcher = build(mechanism, series, start).map_err(|stop| stop.what)?;
+    let driver = build(mechanism, series, start).map_err(|stop| stop.what)?;
     let mut outcome = Outcome::begun(mechanism, series.clone());
-    let mut course = Course::new(Arc::clone(mechanism), marcher);
+    let mut course = Course::new(Arc::clone(mechanism), driver);
     course.meet(&mut outcome).map_err(|stop| stop.what)?;
     Ok((course, outcome))
 }
@@ -165,7 +165,7 @@ impl Shadow {
     /// Why the companion stopped, or `None` where the budget was used up.
     pub(super) fn go(&mut self, until: Time, purse: &mut Purse) -> Result<(), Option<String>> {
         while let Some(next) = self.tangent.as_ref().map(Tangent::next).filter(|&next| next <= until.hi) {
-            self.march(Time::from(next), purse)?;
+            self.integrate(Time::from(next), purse)?;
             let steps = if self.is_rounded { self.last.steps } else { 0 };
             if let Some(tangent) = &mut self.tangent {
                 tangent.take(&self.motion, steps);
@@ -173,11 +173,11 @@ impl Shadow {
                 (*purse.spent, *purse.flow) = (*purse.spent + cost, *purse.flow + cost);
             }
         }
-        self.march(until, purse)
+        self.integrate(until, purse)
     }
 
     /// The same without the tangent flow.
-    fn march(&mut self, until: Time, purse: &mut Purse) -> Result<(), Option<String>> {
+    fn integrate(&mut self, until: Time, purse: &mut Purse) -> Result<(), Option<String>> {
         let each = purse.prices.series[0];
         let mut left = ((purse.budget - *purse.spent) / each) as u64;
         let mut is_spent = || {

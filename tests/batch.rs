@@ -1,4 +1,4 @@
-//! Many trajectories in lanes: against double-double one by one, and independent of who marches beside whom.
+//! Many trajectories in lanes: against double-double one by one, and independent of who integrates beside whom.
 
 use crate::common;
 
@@ -7,8 +7,8 @@ use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::{Form, Mechanism, State, Time};
 use driftless::scene::{Scene, parse_scene};
 use driftless::stepping::taylor::Kernel;
-use driftless::stepping::taylor::crowd::{Crowd, Entrant, Going};
-use driftless::stepping::{Cause, Method, Seen, Taylor, Tolerance};
+use driftless::stepping::taylor::batch::{Batch, BatchMember, Going};
+use driftless::stepping::{Cause, Integrator, Seen, Taylor, Tolerance};
 use std::sync::Arc;
 
 /// A chain of unequal bars, the first one's angle at the start moved by `shift` \[rad\].
@@ -49,19 +49,20 @@ fn one_to_four_bodies_agree_with_double_double() {
         let mechanisms: Vec<_> = scenes.iter().map(compile).collect();
         let starts: Vec<State> = mechanisms.iter().zip(&scenes).map(|(mechanism, scene)| start(mechanism, scene)).collect();
         for order in [16, 20, 24] {
-            let mut entrants: Vec<Entrant> = mechanisms.iter().zip(&starts).map(|(m, state)| Entrant::new(m, state.clone())).collect();
-            Crowd::new(tight()).with_order(order).march(&mut entrants, Time::from(1.0), &mut |_, _| Going::On);
-            for (entrant, (mechanism, start)) in entrants.iter().zip(mechanisms.iter().zip(&starts)) {
+            let mut members: Vec<BatchMember> =
+                mechanisms.iter().zip(&starts).map(|(m, state)| BatchMember::new(m, state.clone())).collect();
+            Batch::new(tight()).with_order(order).integrate(&mut members, Time::from(1.0), &mut |_, _| Going::On);
+            for (member, (mechanism, start)) in members.iter().zip(mechanisms.iter().zip(&starts)) {
                 let mut exact = start.clone();
                 let mut problem = Elimination::<0>::new(Arc::clone(mechanism));
                 let mut tally = Default::default();
                 Taylor::reference()
                     .advance(&mut problem, &mut exact, Time::from(1.0), &mut tally, &mut |_, _| Ok(Seen::Kept))
                     .expect("an end");
-                assert!(entrant.stopped.is_none() && entrant.tally.steps > 3);
-                assert_eq!((entrant.state.time, &entrant.state.turns), (exact.time, &exact.turns));
+                assert!(member.stopped.is_none() && member.tally.steps > 3);
+                assert_eq!((member.state.time, &member.state.turns), (exact.time, &exact.turns));
                 for i in 0..2 * bars {
-                    let error = (entrant.state.unknown(i) - exact.unknown(i)).hi.abs();
+                    let error = (member.state.unknown(i) - exact.unknown(i)).hi.abs();
                     assert!(error < 3e-13, "{bars} bars, order {order}, unknown {i}: {error:e}");
                 }
             }
@@ -74,22 +75,22 @@ fn neighbours_and_the_processor_make_no_difference_to_the_bits() {
     let scene = shipped("free", &[]);
     let heavy = shipped("free", &["bars.bar2.density=900"]);
     let (light, heavy) = (compile(&scene), compile(&heavy));
-    let entrant = |i: usize| {
+    let member = |i: usize| {
         let mechanism = if i.is_multiple_of(3) { &heavy } else { &light };
         let mut motion = mechanism.start(&scene);
         motion.phi[0] = motion.phi[0] + 0.01 * i as f64;
-        Entrant::new(mechanism, Elimination::<0>::new(Arc::clone(mechanism)).state(&motion))
+        BatchMember::new(mechanism, Elimination::<0>::new(Arc::clone(mechanism)).state(&motion))
     };
-    let crowd = Crowd::new(Tolerance { relative: 1e-12, absolute: 1e-12 });
-    let march = |crowd: &Crowd, mut entrants: Vec<Entrant>| -> Vec<State> {
-        crowd.march(&mut entrants, Time::from(5.0), &mut |_, _| Going::On);
-        entrants.into_iter().map(|entrant| entrant.state).collect()
+    let batch = Batch::new(Tolerance { relative: 1e-12, absolute: 1e-12 });
+    let integrate = |batch: &Batch, mut members: Vec<BatchMember>| -> Vec<State> {
+        batch.integrate(&mut members, Time::from(5.0), &mut |_, _| Going::On);
+        members.into_iter().map(|member| member.state).collect()
     };
-    let together = march(&crowd, (0..13).map(entrant).collect());
-    let backwards = march(&crowd, (0..13).rev().map(entrant).collect());
-    let portable = march(&crowd.clone().with_kernel(Kernel::Portable), (0..13).map(entrant).collect());
+    let together = integrate(&batch, (0..13).map(member).collect());
+    let backwards = integrate(&batch, (0..13).rev().map(member).collect());
+    let portable = integrate(&batch.clone().with_kernel(Kernel::Portable), (0..13).map(member).collect());
     for i in 0..13 {
-        assert_eq!(march(&crowd, vec![entrant(i)])[0], together[i], "{i}");
+        assert_eq!(integrate(&batch, vec![member(i)])[0], together[i], "{i}");
         assert_eq!(backwards[12 - i], together[i], "{i}");
         assert_eq!(portable[i], together[i], "{i}");
     }
@@ -99,9 +100,9 @@ fn neighbours_and_the_processor_make_no_difference_to_the_bits() {
 fn a_flip_is_found_within_its_step_and_ends_the_trajectory() {
     let scene = shipped("free", &["start.bar1.phi=3", "start.bar2.phi=2.9"]);
     let mechanism = compile(&scene);
-    let mut entrants = [Entrant::new(&mechanism, start(&mechanism, &scene))];
+    let mut members = [BatchMember::new(&mechanism, start(&mechanism, &scene))];
     let mut found = None;
-    Crowd::new(tight()).march(&mut entrants, Time::from(20.0), &mut |_, passage| {
+    Batch::new(tight()).integrate(&mut members, Time::from(20.0), &mut |_, passage| {
         let Some(body) = (0..2).find(|&body| passage.turned[body] != 0) else { return Going::On };
         let target = std::f64::consts::PI * passage.turned[body].signum() as f64;
         let beyond = |after: f64| (passage.at(body, after).0 - target) * target > 0.0;
@@ -115,7 +116,7 @@ fn a_flip_is_found_within_its_step_and_ends_the_trajectory() {
         Going::Enough
     });
     let (body, time, target) = found.expect("a flip");
-    let end = entrants[0].state.time.hi;
+    let end = members[0].state.time.hi;
     assert!(time < end && end < time + 0.5 && end < 20.0);
     // The same moment by the scalar method.
     let mut problem = Elimination::<0>::new(Arc::clone(&mechanism));
@@ -134,18 +135,18 @@ fn one_bad_trajectory_leaves_the_others_alone() {
     let (mut lost, mut past) = (good.clone(), good.clone());
     lost.y[2] = f64::NAN;
     past.time = Time::from(3.0);
-    let mut entrants = [
-        Entrant::new(&mechanism, lost),
-        Entrant::new(&motor, start(&motor, &driven)),
-        Entrant::new(&mechanism, past.clone()),
-        Entrant::new(&mechanism, good),
+    let mut members = [
+        BatchMember::new(&mechanism, lost),
+        BatchMember::new(&motor, start(&motor, &driven)),
+        BatchMember::new(&mechanism, past.clone()),
+        BatchMember::new(&mechanism, good),
     ];
-    Crowd::new(tight()).march(&mut entrants, Time::from(2.0), &mut |_, _| Going::On);
-    let causes: Vec<_> = entrants.iter().map(|entrant| entrant.stopped.as_ref().map(|stop| stop.cause)).collect();
+    Batch::new(tight()).integrate(&mut members, Time::from(2.0), &mut |_, _| Going::On);
+    let causes: Vec<_> = members.iter().map(|member| member.stopped.as_ref().map(|stop| stop.cause)).collect();
     assert_eq!(causes, [Some(Cause::NotFinite), Some(Cause::Unsuited), None, None]);
-    assert_eq!(entrants[2].state, past);
-    assert_eq!(entrants[3].state.time, Time::from(2.0));
-    assert!(!Crowd::takes(&motor) && Crowd::takes(&mechanism));
+    assert_eq!(members[2].state, past);
+    assert_eq!(members[3].state.time, Time::from(2.0));
+    assert!(!Batch::takes(&motor) && Batch::takes(&mechanism));
 }
 
 /// Released from rest both bars horizontal only every fourth power is there; hanging, none; both upright, they stay.
@@ -155,14 +156,14 @@ fn symmetric_releases_and_equilibria_are_no_trap() {
     for (phi1, phi2) in angles {
         let scene = shipped("free", &[&format!("start.bar1.phi={phi1}"), &format!("start.bar2.phi={phi2}")]);
         let mechanism = compile(&scene);
-        let mut entrants = [Entrant::new(&mechanism, start(&mechanism, &scene))];
-        Crowd::new(tight()).march(&mut entrants, Time::from(1.0), &mut |_, _| Going::On);
+        let mut members = [BatchMember::new(&mechanism, start(&mechanism, &scene))];
+        Batch::new(tight()).integrate(&mut members, Time::from(1.0), &mut |_, _| Going::On);
         let mut exact = start(&mechanism, &scene);
         let mut problem = Elimination::<0>::new(Arc::clone(&mechanism));
         let mut tally = Default::default();
         Taylor::reference().advance(&mut problem, &mut exact, Time::from(1.0), &mut tally, &mut |_, _| Ok(Seen::Kept)).expect("an end");
         for i in 0..4 {
-            let error = (entrants[0].state.unknown(i) - exact.unknown(i)).hi.abs();
+            let error = (members[0].state.unknown(i) - exact.unknown(i)).hi.abs();
             assert!(error < 1e-14 * f64::exp(8.0), "{phi1}, unknown {i}: {error:e}");
         }
     }

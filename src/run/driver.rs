@@ -1,7 +1,7 @@
 //! A problem, its method and its state under one roof, from one output time to the next; [`contact`](super::contact) takes it through impacts,
 //! [`running`](super::running) is the loop around it.
 
-use super::flip::{self, Flip, Lookout, Suspect};
+use super::flip::{self, Candidate, Flip, FlipDetector};
 use super::impact_monitor::closed;
 use super::methods::{MethodId, Stabilization};
 use super::monitor::Monitor;
@@ -18,7 +18,7 @@ use crate::dynamics::{Field, Form, Glance, Mechanism, Motion, State, Time};
 use crate::stabilization::{Baumgarte, Projected, SymmetricGauss};
 use crate::stepping::gauss::Gauss;
 use crate::stepping::rattle::Rattle;
-use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Method, Radau, Reached, StepError, Tally, Taylor, Tolerance};
+use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Integrator, Radau, Reached, StepError, Tally, Taylor, Tolerance};
 use std::sync::Arc;
 
 /// Turns that a state may have at most: all that doubles count.
@@ -44,14 +44,14 @@ macro_rules! sized {
 }
 
 /// A problem, its method and its state.
-pub(super) trait March {
+pub(super) trait Driver {
     /// To the output time `until`, on the way to `horizon`; what is read then is the motion there.  Looks for bars that turn over, where asked to, shows
     /// the motion to a monitor when it is due, and pauses after a step where `pause` is true.
     fn advance(
         &mut self,
         until: Time,
         horizon: Time,
-        lookout: Option<&mut Lookout>,
+        flips: Option<&mut FlipDetector>,
         monitor: Option<&mut dyn Monitor>,
         pause: &mut Pause,
     ) -> Result<Reached, StepError>;
@@ -66,7 +66,7 @@ pub(super) trait March {
     /// Makes the method choose its step anew.
     fn forget(&mut self);
     /// Goes on counting, and with the steps, where another left off.
-    fn follow(&mut self, other: &dyn March);
+    fn follow(&mut self, other: &dyn Driver);
     /// Counts this gap, over the length of its contact, as zero where it looks for walls that were passed.
     fn guard(&mut self, closed: f64);
     /// Everything it needs to go on.
@@ -78,7 +78,7 @@ pub(super) trait March {
 /// Asked after every step and every row whether the run shall pause.
 pub type Pause<'a> = dyn FnMut() -> bool + 'a;
 
-/// Where a marcher is, with all that its next step depends on.
+/// Where a driver is, with all that its next step depends on.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Place {
     state: State,
@@ -103,7 +103,7 @@ enum Steps {
     Unseen,
 }
 
-struct Marcher<P: ?Sized, M> {
+struct StepLoop<P: ?Sized, M> {
     problem: Box<P>,
     method: M,
     state: State,
@@ -121,26 +121,26 @@ struct Marcher<P: ?Sized, M> {
     goes_on: bool,
     steps: Steps,
     /// What integrates parts of steps where the method has no solution inside, once one is needed.
-    tracer: Option<Box<dyn March>>,
+    tracer: Option<Box<dyn Driver>>,
     /// Watches the walls, where there are any.
     guard: Option<WallGuard>,
 }
 
-impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
+impl<P: Form + ?Sized, M: Integrator<P>> Driver for StepLoop<P, M> {
     fn advance(
         &mut self,
         until: Time,
         horizon: Time,
-        lookout: Option<&mut Lookout>,
+        flips: Option<&mut FlipDetector>,
         mut monitor: Option<&mut dyn Monitor>,
         pause: &mut Pause,
     ) -> Result<Reached, StepError> {
-        let mut lookout = lookout.filter(|lookout| lookout.flip.is_none());
+        let mut flips = flips.filter(|flips| flips.flip.is_none());
         let is_dense = self.steps == Steps::Dense;
         // Dense methods take steps as long as they like; output times are read off them.
         let target = if is_dense { horizon } else { until };
         self.is_inside = false;
-        self.begin(target, lookout.as_deref_mut())?;
+        self.begin(target, flips.as_deref_mut())?;
         while if is_dense { self.state.time < until } else { !self.method.is_at(&self.state, until) } {
             if let Some(event) = self.ahead.take() {
                 return Ok(Reached::Event(event));
@@ -150,8 +150,8 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
             self.from.clone_from(&self.state);
             let event = self.method.step(&mut self.problem, &mut self.state, target, &mut self.tally)?;
             self.check_walls()?;
-            if let Some(lookout) = &mut lookout {
-                self.look_for_flips(lookout);
+            if let Some(flips) = &mut flips {
+                self.look_for_flips(flips);
             }
             if let Some(monitor) = &mut monitor {
                 self.show(*monitor);
@@ -166,7 +166,7 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
         }
         if self.state.time > until && is_dense {
             let Self { problem, method, from, inside, .. } = self;
-            method.within(problem, from, until, inside);
+            method.interpolate(problem, from, until, inside);
             self.is_inside = true;
         }
         Ok(Reached::Until)
@@ -201,7 +201,7 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
         self.goes_on = false;
     }
 
-    fn follow(&mut self, other: &dyn March) {
+    fn follow(&mut self, other: &dyn Driver) {
         self.tally = other.tally();
         self.state.memory = other.memory().to_vec();
         self.method.reset(&mut self.state);
@@ -215,7 +215,14 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
     fn place(&self) -> Place {
         let mut state = self.state.clone();
         self.method.save(&mut state);
-        Place { state, tally: self.tally, from: self.from.clone(), ahead: self.ahead, goes_on: self.goes_on, known: self.method.knows() }
+        Place {
+            state,
+            tally: self.tally,
+            from: self.from.clone(),
+            ahead: self.ahead,
+            goes_on: self.goes_on,
+            known: self.method.internal_state(),
+        }
     }
 
     fn resume(&mut self, place: Place, horizon: Time) -> Result<bool, StepError> {
@@ -238,19 +245,19 @@ impl<P: Form + ?Sized, M: Method<P>> March for Marcher<P, M> {
             self.method.step(&mut self.problem, &mut state, horizon, &mut Tally::default())?;
         }
         (self.state, self.tally, self.from, self.ahead, self.goes_on) = (place.state, place.tally, place.from, place.ahead, steps_back);
-        Ok(self.method.learn(&place.known))
+        Ok(self.method.restore_internal_state(&place.known))
     }
 }
 
-impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
+impl<P: Form + ?Sized, M: Integrator<P>> StepLoop<P, M> {
     /// Makes everything ready for a step from the present state.
-    fn begin(&mut self, target: Time, lookout: Option<&mut Lookout>) -> Result<(), StepError> {
+    fn begin(&mut self, target: Time, flips: Option<&mut FlipDetector>) -> Result<(), StepError> {
         let Self { problem, method, state, guard, .. } = self;
         if !std::mem::replace(&mut self.goes_on, self.steps == Steps::Dense) {
             method.begin(problem, state, target)?;
         }
-        if let Some(lookout) = lookout {
-            lookout.begin(&mut **problem, state);
+        if let Some(flips) = flips {
+            flips.begin(&mut **problem, state);
         }
         if let Some(guard) = guard {
             let mut glance = Glance::default();
@@ -263,13 +270,13 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
     /// Looks whether the last step has passed a wall.
     fn check_walls(&mut self) -> Result<(), StepError> {
         let Self { problem, method, state, guard: Some(guard), from, inside, .. } = self else { return Ok(()) };
-        let (name, mut glance) = (Method::<P>::name(method), Glance::default());
+        let (name, mut glance) = (Integrator::<P>::name(method), Glance::default());
         problem.glance(state, &mut glance);
-        let suspect = guard.step(problem.mechanism(), state.time.hi, &glance).map_err(|passed| passed.stop(name))?;
-        let Some(contact) = suspect.filter(|_| self.steps == Steps::Dense) else { return Ok(()) };
+        let candidate = guard.step(problem.mechanism(), state.time.hi, &glance).map_err(|passed| passed.stop(name))?;
+        let Some(contact) = candidate.filter(|_| self.steps == Steps::Dense) else { return Ok(()) };
         let (span, mechanism) = (state.time - from.time, problem.mechanism().clone());
         let mut at = |share: f64| {
-            method.within(problem, from, from.time + span.scale(share), inside);
+            method.interpolate(problem, from, from.time + span.scale(share), inside);
             let mut glance = Glance::default();
             problem.glance(inside, &mut glance);
             Some((inside.time.hi, glance))
@@ -278,18 +285,18 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
     }
 
     /// Looks for the first bar that turns over in the last step.
-    fn look_for_flips(&mut self, lookout: &mut Lookout) {
-        if !lookout.step(&mut *self.problem, &self.state, self.steps == Steps::Unseen) {
+    fn look_for_flips(&mut self, flips: &mut FlipDetector) {
+        if !flips.step(&mut *self.problem, &self.state, self.steps == Steps::Unseen) {
             return;
         }
-        lookout.search(&mut |suspect| {
+        flips.search(&mut |candidate| {
             if self.steps != Steps::Dense {
-                return self.traced(suspect);
+                return self.traced(candidate);
             }
             let Self { problem, method, inside, .. } = self;
-            let Suspect { from, span, ends } = suspect;
+            let Candidate { from, span, ends } = candidate;
             flip::search(from.time.hi, *span, ends, &mut |seconds| {
-                method.within(problem, from, from.time + seconds, inside);
+                method.interpolate(problem, from, from.time + seconds, inside);
                 let mut glance = Glance::default();
                 flip::look(&mut **problem, inside, &mut glance);
                 Some(glance)
@@ -305,7 +312,7 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
         let Self { problem, method, state, from, inside, observed, tally, .. } = self;
         while monitor.due() <= state.time.hi {
             if self.steps == Steps::Dense && monitor.due() > from.time.hi && monitor.due() < state.time.hi {
-                method.within(problem, from, Time::from(monitor.due()), inside);
+                method.interpolate(problem, from, Time::from(monitor.due()), inside);
                 problem.read(inside, observed);
             } else {
                 problem.read(state, observed);
@@ -331,27 +338,32 @@ impl<P: Form + ?Sized, M: Method<P>> Marcher<P, M> {
         }
     }
 
-    /// The first bar that turns over in a step, which another method marches again.
-    fn traced(&mut self, &Suspect { ref from, span, .. }: &Suspect) -> Option<Flip> {
+    /// The first bar that turns over in a step, which another method integrates again.
+    fn traced(&mut self, &Candidate { ref from, span, .. }: &Candidate) -> Option<Flip> {
         let mut motion = Motion::default();
         self.problem.read(from, &mut motion);
         let tracer = self.tracer.get_or_insert_with(|| {
             let mechanism = Arc::new(self.problem.mechanism().clone());
             let tolerance = Tolerance { relative: 1e-13, absolute: 1e-13 };
-            marcher(sized!(mechanism.size(), form(&mechanism, Stabilization::None, 1.0)), Dp8::new(tolerance), &motion, Steps::Dense)
+            driver(sized!(mechanism.size(), form(&mechanism, Stabilization::None, 1.0)), Dp8::new(tolerance), &motion, Steps::Dense)
         });
         tracer.jump(&motion);
         tracer.forget();
         tracer.allow(tracer.tally().evaluations.saturating_add(self.tally.effort));
-        let mut lookout = Lookout::default();
+        let mut flips = FlipDetector::default();
         let until = from.time + span;
         // Where that stops, what was seen up to there counts.
-        let _ = tracer.advance(until, until, Some(&mut lookout), None, &mut || false);
-        lookout.flip
+        let _ = tracer.advance(until, until, Some(&mut flips), None, &mut || false);
+        flips.flip
     }
 }
 
-fn marcher<P: Form + ?Sized + 'static, M: Method<P> + 'static>(problem: Box<P>, method: M, start: &Motion, steps: Steps) -> Box<dyn March> {
+fn driver<P: Form + ?Sized + 'static, M: Integrator<P> + 'static>(
+    problem: Box<P>,
+    method: M,
+    start: &Motion,
+    steps: Steps,
+) -> Box<dyn Driver> {
     match shrinking(problem.mechanism()) {
         // The ends of windows say nothing of what is between them.
         springs if springs.is_empty() || steps == Steps::Unseen => boxed(problem, method, start, steps),
@@ -359,10 +371,15 @@ fn marcher<P: Form + ?Sized + 'static, M: Method<P> + 'static>(problem: Box<P>, 
     }
 }
 
-fn boxed<P: Form + ?Sized + 'static, M: Method<P> + 'static>(problem: Box<P>, method: M, start: &Motion, steps: Steps) -> Box<dyn March> {
+fn boxed<P: Form + ?Sized + 'static, M: Integrator<P> + 'static>(
+    problem: Box<P>,
+    method: M,
+    start: &Motion,
+    steps: Steps,
+) -> Box<dyn Driver> {
     let state = problem.state(start);
     let idle = State::default;
-    Box::new(Marcher {
+    Box::new(StepLoop {
         problem,
         method,
         state,
@@ -379,7 +396,7 @@ fn boxed<P: Form + ?Sized + 'static, M: Method<P> + 'static>(problem: Box<P>, me
     })
 }
 
-/// The form a stabilization marches in, for `N` bodies.
+/// The form a stabilization integrates in, for `N` bodies.
 fn form<const N: usize>(mechanism: &Arc<Mechanism>, stabilization: Stabilization, time_constant: f64) -> Box<dyn Problem> {
     let mechanism = Arc::clone(mechanism);
     if matches!(stabilization, Stabilization::None | Stabilization::Projection)
@@ -407,13 +424,13 @@ fn canonical<const N: usize>(mechanism: &Arc<Mechanism>) -> Box<dyn Problem> {
 }
 
 /// Builds what a plan asks for; Baumgarte's time constant is measured first where none was given.
-pub(super) fn build(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<Box<dyn March>, StepError> {
-    let mut marcher = built(mechanism, plan, start)?;
-    marcher.guard(closed(plan.tolerance.unwrap_or_default().relative));
-    Ok(marcher)
+pub(super) fn build(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<Box<dyn Driver>, StepError> {
+    let mut driver = built(mechanism, plan, start)?;
+    driver.guard(closed(plan.tolerance.unwrap_or_default().relative));
+    Ok(driver)
 }
 
-fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<Box<dyn March>, StepError> {
+fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<Box<dyn Driver>, StepError> {
     let n = mechanism.size();
     let tolerance = plan.tolerance.unwrap_or_default();
     let step = plan.step.unwrap_or(0.0);
@@ -425,12 +442,12 @@ fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<
     let projected = plan.stabilization == Stabilization::Projection;
     let problem = || sized!(n, form(mechanism, plan.stabilization, plan.time_constant.unwrap_or(1.0)));
     Ok(match plan.method {
-        MethodId::Dopri5 => marcher(problem(), Dopri5::new(tolerance), start, Steps::Unseen),
-        MethodId::Dop853 => marcher(problem(), Dop853::new(tolerance), start, Steps::Unseen),
-        MethodId::Dp5 if projected => marcher(problem(), Projected::new(Dp5::new(tolerance)), start, Steps::Dense),
-        MethodId::Dp8 if projected => marcher(problem(), Projected::new(Dp8::new(tolerance)), start, Steps::Dense),
-        MethodId::Dp5 => marcher(problem(), Dp5::new(tolerance), start, Steps::Dense),
-        MethodId::Dp8 => marcher(problem(), Dp8::new(tolerance), start, Steps::Dense),
+        MethodId::Dopri5 => driver(problem(), Dopri5::new(tolerance), start, Steps::Unseen),
+        MethodId::Dop853 => driver(problem(), Dop853::new(tolerance), start, Steps::Unseen),
+        MethodId::Dp5 if projected => driver(problem(), Projected::new(Dp5::new(tolerance)), start, Steps::Dense),
+        MethodId::Dp8 if projected => driver(problem(), Projected::new(Dp8::new(tolerance)), start, Steps::Dense),
+        MethodId::Dp5 => driver(problem(), Dp5::new(tolerance), start, Steps::Dense),
+        MethodId::Dp8 => driver(problem(), Dp8::new(tolerance), start, Steps::Dense),
         MethodId::Taylor if mechanism.vibration.is_some() => {
             return Err(cannot_begin(plan, "the mean force of a rigid spring's vibration has no series".into()));
         }
@@ -442,29 +459,29 @@ fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<
             let mut taylor = Taylor::new(tolerance);
             taylor.extended = plan.extended;
             match plan.stabilization {
-                Stabilization::None if mechanism.rows.is_empty() => marcher(sized!(n, eliminated(mechanism)), taylor, start, Steps::Dense),
-                Stabilization::Projection => marcher(problem(), Projected::new(taylor), start, Steps::Dense),
-                _ => marcher(problem(), taylor, start, Steps::Dense),
+                Stabilization::None if mechanism.rows.is_empty() => driver(sized!(n, eliminated(mechanism)), taylor, start, Steps::Dense),
+                Stabilization::Projection => driver(problem(), Projected::new(taylor), start, Steps::Dense),
+                _ => driver(problem(), taylor, start, Steps::Dense),
             }
         }
         MethodId::Radau(stages) => {
             let radau = Radau::new(stages, tolerance).ok_or_else(|| cannot_begin(plan, format!("no Radau method has {stages} stages")))?;
             if projected {
-                return Ok(marcher(problem(), Projected::new(radau), start, Steps::Dense));
+                return Ok(driver(problem(), Projected::new(radau), start, Steps::Dense));
             }
-            marcher(problem(), radau, start, Steps::Dense)
+            driver(problem(), radau, start, Steps::Dense)
         }
         MethodId::Gauss(stages) => {
             let gauss = Gauss::new(stages, step)
                 .ok_or_else(|| cannot_begin(plan, format!("no Gauss method has {stages} stages and step {step} s")))?;
             if projected {
-                return Ok(marcher(problem(), SymmetricGauss::new(gauss), start, Steps::Fixed));
+                return Ok(driver(problem(), SymmetricGauss::new(gauss), start, Steps::Fixed));
             }
-            marcher(sized!(n, canonical(mechanism)), gauss, start, Steps::Fixed)
+            driver(sized!(n, canonical(mechanism)), gauss, start, Steps::Fixed)
         }
         MethodId::Rattle(composition) => {
             let natural = Natural::new(Arc::clone(mechanism)).map_err(|error| cannot_begin(plan, error.to_string()))?;
-            marcher(Box::new(natural), Rattle::new(composition, step), start, Steps::Fixed)
+            driver(Box::new(natural), Rattle::new(composition, step), start, Steps::Fixed)
         }
     })
 }
@@ -475,11 +492,11 @@ pub(super) fn order_in_double_double(tolerance: f64) -> usize {
 }
 
 /// The series of a mechanism in double-double, from `start`, with its order and tolerance \[rad/s\].
-pub(super) fn exact(mechanism: &Arc<Mechanism>, start: &Motion, order: usize, tolerance: f64) -> Box<dyn March> {
+pub(super) fn exact(mechanism: &Arc<Mechanism>, start: &Motion, order: usize, tolerance: f64) -> Box<dyn Driver> {
     let taylor = Taylor::<DoubleDouble>::with_order(tolerance, order);
     match mechanism.has_multipliers() {
-        true => marcher(form::<0>(mechanism, Stabilization::None, 1.0), taylor, start, Steps::Dense),
-        false => marcher(eliminated::<0>(mechanism), taylor, start, Steps::Dense),
+        true => driver(form::<0>(mechanism, Stabilization::None, 1.0), taylor, start, Steps::Dense),
+        false => driver(eliminated::<0>(mechanism), taylor, start, Steps::Dense),
     }
 }
 
@@ -499,11 +516,11 @@ fn cannot_begin(plan: &Plan, what: String) -> StepError {
 /// Five mean steps of the unstabilized run over its first output intervals (at most twenty) \[s\].
 fn pilot(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion) -> Result<f64, StepError> {
     let mut plain = Plan { stabilization: Stabilization::None, ..plan.clone() };
-    let mut marcher = build(mechanism, &mut plain, start)?;
-    marcher.allow(plan.effort);
+    let mut driver = build(mechanism, &mut plain, start)?;
+    driver.allow(plan.effort);
     let rows = plan.rows.min(20);
     for row in 1..=rows {
-        match marcher.advance(plan.time(row), plan.time(plan.rows), None, None, &mut || false) {
+        match driver.advance(plan.time(row), plan.time(plan.rows), None, None, &mut || false) {
             Ok(Reached::Until | Reached::Pause) => {}
             Ok(Reached::Event(_)) => break,
             Err(stop) if stop.cause == Cause::RestingContact => break,
@@ -511,6 +528,6 @@ fn pilot(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion) -> Result<f64,
         }
     }
     let mut motion = Motion::default();
-    marcher.read(&mut motion);
-    Ok(5.0 * motion.time.hi.max(f64::MIN_POSITIVE) / marcher.tally().steps.max(1) as f64)
+    driver.read(&mut motion);
+    Ok(5.0 * motion.time.hi.max(f64::MIN_POSITIVE) / driver.tally().steps.max(1) as f64)
 }

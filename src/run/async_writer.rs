@@ -17,7 +17,7 @@ const WAITING: usize = 4;
 /// Writes samples into a table.
 ///
 /// What the writer fails with is told by a later call: some batches later, at the latest where the table is asked for.
-pub struct Scribe<W: Write + Send + 'static> {
+pub struct AsyncWriter<W: Write + Send + 'static> {
     /// Where no thread has it.
     table: Option<Table<W>>,
     away: Option<Away<W>>,
@@ -62,7 +62,7 @@ impl<W: Write + Send + 'static> Away<W> {
     }
 }
 
-impl<W: Write + Send + 'static> Scribe<W> {
+impl<W: Write + Send + 'static> AsyncWriter<W> {
     /// Goes on with a table.
     pub fn new(table: Table<W>) -> Self {
         Self { shown: table.shown(), table: Some(table), away: None, numbers: Vec::new() }
@@ -115,7 +115,7 @@ impl<W: Write + Send + 'static> Scribe<W> {
     }
 }
 
-impl<W: Write + Send + 'static> Drop for Scribe<W> {
+impl<W: Write + Send + 'static> Drop for AsyncWriter<W> {
     /// Waits until nothing is written any more.
     fn drop(&mut self) {
         if let Some(Away { full, thread, .. }) = self.away.take() {
@@ -157,16 +157,16 @@ mod tests {
         let mechanism = mechanism();
         for rows in [0, 1, 100, 4 * WAITING as u32 * BATCH as u32 / 20] {
             let mut table = Table::new(&mechanism, Vec::new()).expect("a header");
-            let mut scribe = Scribe::new(Table::new(&mechanism, Vec::new()).expect("a header"));
+            let mut writer = AsyncWriter::new(Table::new(&mechanism, Vec::new()).expect("a header"));
             for i in 0..rows {
                 table.write(&sample(i)).expect("room");
-                scribe.write(&sample(i)).expect("room");
+                writer.write(&sample(i)).expect("room");
                 if i == rows / 3 {
                     let length = |table: &mut Table<Vec<u8>>| table.written().expect("room").len();
-                    assert_eq!(length(scribe.table().expect("room")), length(&mut table));
+                    assert_eq!(length(writer.table().expect("room")), length(&mut table));
                 }
             }
-            assert!(scribe.finish().expect("room") == table.finish().expect("room"), "{rows} rows");
+            assert!(writer.finish().expect("room") == table.finish().expect("room"), "{rows} rows");
         }
     }
 
@@ -194,21 +194,21 @@ mod tests {
     fn what_the_writer_fails_with_ends_the_run() {
         let gone = Arc::new(Mutex::new(false));
         let table = Table::new(&mechanism(), Full(1 << 20, Arc::clone(&gone))).expect("a header");
-        let mut scribe = Scribe::new(table);
-        let failed = (0..1 << 20).find_map(|i| scribe.write(&sample(i)).err()).expect("an error");
+        let mut writer = AsyncWriter::new(table);
+        let failed = (0..1 << 20).find_map(|i| writer.write(&sample(i)).err()).expect("an error");
         assert_eq!(failed.kind(), io::ErrorKind::StorageFull);
-        drop(scribe);
+        drop(writer);
         assert!(*gone.lock().expect("nobody panicked"));
     }
 
     #[test]
     fn a_scribe_given_up_leaves_no_writer_behind() {
         let gone = Arc::new(Mutex::new(false));
-        let mut scribe = Scribe::new(Table::new(&mechanism(), Full(usize::MAX, Arc::clone(&gone))).expect("a header"));
+        let mut writer = AsyncWriter::new(Table::new(&mechanism(), Full(usize::MAX, Arc::clone(&gone))).expect("a header"));
         for i in 0..10_000 {
-            scribe.write(&sample(i)).expect("room");
+            writer.write(&sample(i)).expect("room");
         }
-        drop(scribe);
+        drop(writer);
         assert!(*gone.lock().expect("nobody panicked"));
     }
 }

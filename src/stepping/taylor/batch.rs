@@ -16,7 +16,7 @@ use crate::stepping::{Cause, StepError, Tally, Tolerance};
 const MOST: usize = 24;
 /// Lanes of a vector.
 const WIDTH: usize = 4;
-/// Vectors marched in step with each other: while one waits for its newest coefficients, the other keeps the multipliers busy.
+/// Vectors integrated in step with each other: while one waits for its newest coefficients, the other keeps the multipliers busy.
 const TEAMS: usize = 2;
 /// Largest number of bodies.
 const BODIES: usize = 4;
@@ -26,8 +26,8 @@ type Quad = [f64; WIDTH];
 
 /// One trajectory: its mechanism, its state in the form of [`Elimination`](crate::dynamics::elimination::Elimination), and how it went.
 #[derive(Clone, Debug)]
-pub struct Entrant<'a> {
-    /// What is marched.
+pub struct BatchMember<'a> {
+    /// What is integrated.
     pub mechanism: &'a Mechanism,
     /// The start, and in the end the last state reached.
     pub state: State,
@@ -37,7 +37,7 @@ pub struct Entrant<'a> {
     pub stopped: Option<StepError>,
 }
 
-impl<'a> Entrant<'a> {
+impl<'a> BatchMember<'a> {
     /// A trajectory about to start.
     pub fn new(mechanism: &'a Mechanism, state: State) -> Self {
         Self { mechanism, state, tally: Tally::default(), stopped: None }
@@ -71,17 +71,17 @@ impl Passage<'_> {
     }
 }
 
-/// Marches many trajectories of free mechanisms.
+/// Integrates many trajectories of free mechanisms.
 ///
 /// Source of the method: see [`Taylor`](super::Taylor), whose tolerance and orders these are.
 #[derive(Clone, Debug)]
-pub struct Crowd {
+pub struct Batch {
     tolerance: f64,
     order: usize,
     is_portable: bool,
 }
 
-impl Crowd {
+impl Batch {
     /// The method at a tolerance, of order 20, or 24 below 1e-15.
     pub fn new(tolerance: Tolerance) -> Self {
         let tolerance = tolerance.relative.min(tolerance.absolute);
@@ -103,7 +103,7 @@ impl Crowd {
         self.order
     }
 
-    /// True for what it can march: one to four bodies with hinges and centres of mass on their axes, neither springs nor motors nor walls.
+    /// True for what it can integrate: one to four bodies with hinges and centres of mass on their axes, neither springs nor motors nor walls.
     pub fn takes(mechanism: &Mechanism) -> bool {
         let tree = &mechanism.tree;
         (1..=BODIES).contains(&tree.coordinates)
@@ -113,23 +113,23 @@ impl Crowd {
             && mechanism.contacts.is_empty()
     }
 
-    /// Marches all trajectories to `until`; `watch` is shown every step with the trajectory's index and may end that one.
+    /// Integrates all trajectories to `until`; `watch` is shown every step with the trajectory's index and may end that one.
     ///
-    /// All mechanisms must be such as [`Crowd::takes`], of the same number of bodies; any other is stopped as unsuited.  The result of each does not depend on the others.
-    pub fn march(&self, entrants: &mut [Entrant], until: Time, watch: &mut dyn FnMut(usize, &Passage) -> Going) {
-        let Some(bodies) = entrants.first().map(|first| first.mechanism.tree.coordinates) else { return };
+    /// All mechanisms must be such as [`Batch::takes`], of the same number of bodies; any other is stopped as unsuited.  The result of each does not depend on the others.
+    pub fn integrate(&self, members: &mut [BatchMember], until: Time, watch: &mut dyn FnMut(usize, &Passage) -> Going) {
+        let Some(bodies) = members.first().map(|first| first.mechanism.tree.coordinates) else { return };
         match bodies {
-            1 => lanes::run(March::<1> { crowd: self, entrants, until, watch }, self.is_portable),
-            2 => lanes::run(March::<2> { crowd: self, entrants, until, watch }, self.is_portable),
-            3 => lanes::run(March::<3> { crowd: self, entrants, until, watch }, self.is_portable),
-            _ => lanes::run(March::<4> { crowd: self, entrants, until, watch }, self.is_portable),
+            1 => lanes::run(March::<1> { batch: self, members, until, watch }, self.is_portable),
+            2 => lanes::run(March::<2> { batch: self, members, until, watch }, self.is_portable),
+            3 => lanes::run(March::<3> { batch: self, members, until, watch }, self.is_portable),
+            _ => lanes::run(March::<4> { batch: self, members, until, watch }, self.is_portable),
         }
     }
 }
 
 struct March<'a, 'b, const N: usize> {
-    crowd: &'a Crowd,
-    entrants: &'a mut [Entrant<'b>],
+    batch: &'a Batch,
+    members: &'a mut [BatchMember<'b>],
     until: Time,
     watch: &'a mut dyn FnMut(usize, &Passage) -> Going,
 }
@@ -139,7 +139,7 @@ impl<const N: usize> Code for March<'_, '_, N> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        march::<L, N>(self.crowd, self.entrants, self.until, self.watch);
+        integrate::<L, N>(self.batch, self.members, self.until, self.watch);
     }
 }
 
@@ -175,7 +175,7 @@ struct Power<const N: usize> {
 #[derive(Clone, Debug)]
 struct Seat {
     /// Index of its trajectory.
-    entrant: Option<usize>,
+    member: Option<usize>,
     pace: Pace,
     time: Time,
     /// The mechanism's unit of time \[s\].
@@ -202,8 +202,8 @@ impl Seat {
 
 impl<const N: usize> Team<N> {
     /// Sits a trajectory down.
-    fn seat(&mut self, lane: usize, entrant: &Entrant) {
-        let tree = &entrant.mechanism.tree;
+    fn seat(&mut self, lane: usize, member: &BatchMember) {
+        let tree = &member.mechanism.tree;
         for i in 0..N {
             self.diagonal[i][lane] = tree.diagonal[i];
             self.weight[i][0][lane] = tree.weight[i].re;
@@ -213,8 +213,8 @@ impl<const N: usize> Team<N> {
                 self.coupling[j][i][lane] = tree.coupling[i * N + j].re;
             }
             for part in 0..2 {
-                self.high[part][i][lane] = entrant.state.y[part * N + i];
-                self.low[part][i][lane] = entrant.state.low[part * N + i];
+                self.high[part][i][lane] = member.state.y[part * N + i];
+                self.low[part][i][lane] = member.state.low[part * N + i];
             }
         }
     }
@@ -254,8 +254,13 @@ impl<const N: usize> Team<N> {
 }
 
 #[inline(always)]
-fn march<L: Lanes, const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], until: Time, watch: &mut dyn FnMut(usize, &Passage) -> Going) {
-    let (order, zero) = (crowd.order, [[0.0; WIDTH]; N]);
+fn integrate<L: Lanes, const N: usize>(
+    batch: &Batch,
+    members: &mut [BatchMember],
+    until: Time,
+    watch: &mut dyn FnMut(usize, &Passage) -> Going,
+) {
+    let (order, zero) = (batch.order, [[0.0; WIDTH]; N]);
     let power = Power { c: zero, s: zero, v: zero, px: zero, py: zero };
     let team = Team {
         coupling: [zero; N],
@@ -267,30 +272,30 @@ fn march<L: Lanes, const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], unti
         powers: [power; MOST + 1],
     };
     let mut teams = Box::new([team.clone(), team]);
-    let empty = Seat { entrant: None, pace: Pace::new(1.0, order, 0.0), time: until, unit: 1.0, wanted: 0.0, taken: 0.0 };
+    let empty = Seat { member: None, pace: Pace::new(1.0, order, 0.0), time: until, unit: 1.0, wanted: 0.0, taken: 0.0 };
     let mut seats: [Seat; WIDTH * TEAMS] = std::array::from_fn(|_| empty.clone());
     let mut waiting = 0;
     loop {
         let mut left = [0.0; WIDTH * TEAMS];
         for (place, seat) in seats.iter_mut().enumerate() {
             let (team, lane) = (&mut teams[place / WIDTH], place % WIDTH);
-            if seat.entrant.is_none() {
-                seat.entrant = next::<N>(entrants, &mut waiting, until);
-                match seat.entrant {
+            if seat.member.is_none() {
+                seat.member = next::<N>(members, &mut waiting, until);
+                match seat.member {
                     Some(index) => {
-                        let entrant = &entrants[index];
-                        team.seat(lane, entrant);
-                        let longest = order as f64 / 3.0 / entrant.mechanism.tree.fastest_rate(&[]);
+                        let member = &members[index];
+                        team.seat(lane, member);
+                        let longest = order as f64 / 3.0 / member.mechanism.tree.fastest_rate(&[]);
                         (seat.pace, seat.time) =
-                            (Pace::new(crowd.tolerance, order, longest).over(entrant.mechanism.units.time), entrant.state.time);
-                        seat.unit = entrant.mechanism.units.time;
+                            (Pace::new(batch.tolerance, order, longest).over(member.mechanism.units.time), member.state.time);
+                        seat.unit = member.mechanism.units.time;
                     }
                     None => team.park(lane),
                 }
             }
-            left[place] = if seat.entrant.is_some() { (until - seat.time).hi } else { 0.0 };
+            left[place] = if seat.member.is_some() { (until - seat.time).hi } else { 0.0 };
         }
-        if seats.iter().all(|seat| seat.entrant.is_none()) {
+        if seats.iter().all(|seat| seat.member.is_none()) {
             return;
         }
         let before = [teams[0].high[0], teams[1].high[0]];
@@ -310,45 +315,45 @@ fn march<L: Lanes, const N: usize>(crowd: &Crowd, entrants: &mut [Entrant], unti
             finish::<L, N>(team, order, [seats[0].taken, seats[1].taken, seats[2].taken, seats[3].taken]);
         }
         for (place, seat) in seats.iter_mut().enumerate() {
-            let Some(index) = seat.entrant else { continue };
+            let Some(index) = seat.member else { continue };
             let (team, lane) = (&mut teams[place / WIDTH], place % WIDTH);
-            let entrant = &mut entrants[index];
+            let member = &mut members[index];
             let (from, step) = (seat.time, seat.taken);
-            match seat.failure(&entrant.tally) {
-                Err(stop) => entrant.stopped = Some(stop),
+            match seat.failure(&member.tally) {
+                Err(stop) => member.stopped = Some(stop),
                 Ok(()) => {
                     seat.time = if step == left[place] { until } else { from + step };
-                    entrant.tally.steps += 1;
-                    entrant.tally.evaluations += 1;
+                    member.tally.steps += 1;
+                    member.tally.evaluations += 1;
                 }
             }
             let mut turned = [0; BODIES];
             for i in 0..N {
                 turned[i] = angle::wrap(&mut team.high[0][i][lane], &mut team.low[0][i][lane]);
-                entrant.state.turns[i] += turned[i];
+                member.state.turns[i] += turned[i];
             }
             let (view, start) = (&*team, &before[place / WIDTH]);
             let series = |body: usize, after: f64| view.at(order, lane, body, start[body][lane], after);
             let passage = Passage { from, step, turned, series: &series };
-            if entrant.stopped.is_some() || watch(index, &passage) == Going::Enough || seat.time >= until {
-                team.leave(lane, &mut entrant.state);
-                entrant.state.time = seat.time;
-                seat.entrant = None;
+            if member.stopped.is_some() || watch(index, &passage) == Going::Enough || seat.time >= until {
+                team.leave(lane, &mut member.state);
+                member.state.time = seat.time;
+                seat.member = None;
             }
         }
     }
 }
 
 /// The next trajectory that has a way to go; those that do not fit are stopped.
-fn next<const N: usize>(entrants: &mut [Entrant], waiting: &mut usize, until: Time) -> Option<usize> {
-    while *waiting < entrants.len() {
+fn next<const N: usize>(members: &mut [BatchMember], waiting: &mut usize, until: Time) -> Option<usize> {
+    while *waiting < members.len() {
         let index = *waiting;
         *waiting += 1;
-        let entrant = &mut entrants[index];
-        if !Crowd::takes(entrant.mechanism) || entrant.mechanism.tree.coordinates != N {
-            let what = "the crowd takes free mechanisms of one size".into();
-            entrant.stopped = Some(stop(Cause::Unsuited, &entrant.state, 0.0, what, "march it by `taylor`"));
-        } else if entrant.state.time < until {
+        let member = &mut members[index];
+        if !Batch::takes(member.mechanism) || member.mechanism.tree.coordinates != N {
+            let what = "the batch takes free mechanisms of one size".into();
+            member.stopped = Some(stop(Cause::Unsuited, &member.state, 0.0, what, "integrate it by `taylor`"));
+        } else if member.state.time < until {
             return Some(index);
         }
     }
