@@ -619,6 +619,7 @@ fn what_run_and_companion_share_is_told() {
     assert_eq!(of("free", "taylor"), ["compilation"]);
     assert_eq!(of("wall", "dp8"), ["impact law", "compilation"]);
     assert_eq!(of("wall", "taylor"), ["impact law", "compilation"]);
+    assert_eq!(of("motor", "taylor"), ["elimination of motors", "compilation"]);
 }
 
 /// Of a run by the series at its default settings the companion takes little more work than the run itself, and the tangent flow a share of that: beside

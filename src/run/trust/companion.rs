@@ -11,7 +11,7 @@ use super::tangent::Tangent;
 use super::{CUT, HORIZON, LOST, Level, Ruler, Trust};
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::{Mechanism, Motion, Time};
-use crate::run::methods::MethodId;
+use crate::run::methods::{MethodId, Stabilization};
 use crate::run::monitor::Monitor;
 use crate::run::plan::Plan;
 use crate::stepping::{StepError, Tally};
@@ -104,11 +104,14 @@ impl Torques {
 fn shared(mechanism: &Mechanism, run: &Plan, companion: &Plan) -> Vec<String> {
     let has_walls = !mechanism.contacts.is_empty();
     let finds_likewise = (run.method == MethodId::Taylor) == (companion.method == MethodId::Taylor);
+    let has_motors = mechanism.rows.iter().any(|row| row.law.is_some());
+    let eliminated = |plan: &Plan| has_motors && plan.stabilization == Stabilization::Elimination;
     let leaps = mechanism.is_tied_up() && run.method == MethodId::Taylor;
     let words = [
         (has_walls, "impact law"),
         (has_walls && finds_likewise, "contact detection"),
         (leaps, "leaps through singular positions"),
+        (eliminated(run) && eliminated(companion), "elimination of motors"),
         (true, "compilation"),
     ];
     words.into_iter().filter(|(is_shared, _)| *is_shared).map(|(_, word)| word.to_owned()).collect()

@@ -194,10 +194,14 @@ impl Measured {
         if self.until > t {
             self.cut(t);
         }
-        let Growth { lyapunov, power: growth_power } =
-            if self.no_growth.is_some() { Growth::default() } else { self.nature.judge(&self.history) };
+        let Growth { lyapunov, power: found } = if self.no_growth.is_some() { Growth::default() } else { self.nature.judge(&self.history) };
+        // A power shows over most of the run only: in the beginning it is that of one oscillation.
+        let growth_power = found.filter(|_| self.stopped.is_none_or(|[followed, _]| followed >= 0.5 * t));
         if let (Some([followed, _]), None, None) = (self.stopped, lyapunov, growth_power) {
-            let why = || format!("it was followed to t = {followed:.3e} s only, more would have taken too large a share of the run");
+            let why = || {
+                let seconds = if followed >= 0.01 { format!("{followed:.2}") } else { format!("{followed:.1e}") };
+                format!("it was followed to t = {seconds} s only, more would have taken too large a share of the run (see --trust full)")
+            };
             self.no_growth.get_or_insert_with(why);
         }
         let input_error = self.input_error.or_else(|| self.inputs_at(self.horizon.unwrap_or(t)));
