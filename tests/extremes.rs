@@ -128,7 +128,7 @@ fn hanging_at_rest_stays_exactly_there() {
 }
 
 /// Balanced upside down to the last bit of pi: sin(pi) is 1.2e-16, not 0, and the fall begins from there:
-/// delta grows as 1.2e-16 cosh(sqrt(15) t), give or take what rounding the angle in the first steps adds.
+/// delta grows as 1.2e-16 cosh(sqrt(15) t), give or take what rounding the angle in the first steps adds, which are long: no tolerance sees so little.
 #[test]
 fn upside_down_it_falls_as_slowly_as_its_last_bit_says() {
     let outcome = run(&pendulum(PI, 0.0), &request(MethodId::Dp8, 1e-12, 8.0));
@@ -136,7 +136,8 @@ fn upside_down_it_falls_as_slowly_as_its_last_bit_says() {
     let early = &outcome.trace.head[5];
     let expected = 1.224_646_799_147_353_2e-16 * (15f64.sqrt() * early.t).cosh();
     println!("{:?} {expected:e}", outcome.trace.head.iter().map(|sample| PI - sample.phi[0]).collect::<Vec<_>>());
-    assert!(early.phi[0] <= PI && (PI - early.phi[0] - expected).abs() < 0.5 * expected + 1e-15, "{:e}", PI - early.phi[0]);
+    let fallen = PI - early.phi[0];
+    assert!((0.1 * expected..10.0 * expected).contains(&fallen), "{fallen:e} of {expected:e}");
     assert!(outcome.drift.energy.max < 1e-10);
 }
 

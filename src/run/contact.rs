@@ -4,7 +4,8 @@
 //! [`REST_HEIGHT`](crate::dynamics::contact::REST_HEIGHT): bounces that accumulate end so.  What is left of its normal velocity is taken off it and
 //! booked as lost in impacts.  From then on the wall is a row kept by projection, until its force would have to pull.
 
-use super::driver::{Driver, Pause, Place, build};
+use super::build::build;
+use super::driver::{Driver, DriverState, Pause};
 use super::flip::FlipDetector;
 use super::impact_monitor::{self, Claim};
 use super::methods::Stabilization;
@@ -81,7 +82,7 @@ pub(super) struct Jump {
 /// Where a course is: all that what follows depends on.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Station {
-    place: Place,
+    place: DriverState,
     /// Energy less work at the start, shifted by impacts \[J\].
     reference: Option<DoubleDouble>,
     /// Contacts held, in the order of their rows.

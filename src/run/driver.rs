@@ -1,47 +1,18 @@
-//! A problem, its method and its state under one roof, from one output time to the next; [`contact`](super::contact) takes it through impacts,
-//! [`running`](super::running) is the loop around it.
+//! The loop over steps: a problem, its method and its state, from one output time to the next.
+//!
+//! Every method is taken the same way: a step is made, walls are checked, flips are looked for, monitors are shown the motion, and what lies between steps is read off them.
+//! [`contact`](super::contact) takes a driver through impacts, [`running`](super::running) is the loop over output times.
 
 use super::flip::{self, Candidate, Flip, FlipDetector};
-use super::impact_monitor::closed;
-use super::methods::{MethodId, Stabilization};
 use super::monitor::Monitor;
-use super::plan::Plan;
-use super::shrink::{Shrinking, shrinking};
 use super::wall_guard::WallGuard;
-use crate::arithmetic::{DoubleDouble, Scalar};
-use crate::dynamics::canonical::Canonical;
-use crate::dynamics::elimination::Elimination;
-use crate::dynamics::looped::Looped;
-use crate::dynamics::multiplier::Multiplier;
-use crate::dynamics::natural::Natural;
-use crate::dynamics::{Field, Form, Glance, Mechanism, Motion, State, Time};
-use crate::stabilization::{Baumgarte, Projected, SymmetricGauss};
-use crate::stepping::gauss::Gauss;
-use crate::stepping::rattle::Rattle;
-use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Integrator, Radau, Reached, StepError, Tally, Taylor, Tolerance};
+use crate::arithmetic::Scalar;
+use crate::dynamics::{Form, Glance, Mechanism, Motion, State, Time};
+use crate::stepping::{Integrator, Reached, StepError, Tally};
 use std::sync::Arc;
 
 /// Turns that a state may have at most: all that doubles count.
 pub(super) const MOST_TURNS: u64 = 1 << 53;
-
-/// A mechanism in some form, as a first-order system.
-pub trait Problem: Field + Form {}
-impl<P: Field + Form> Problem for P {}
-
-/// `sized!(n, f(args))` calls `f::<n>` for the sizes compiled in, and `f::<0>` for any other.
-macro_rules! sized {
-    ($n:expr, $function:ident($($argument:expr),*)) => {
-        match $n {
-            1 => $function::<1>($($argument),*),
-            2 => $function::<2>($($argument),*),
-            3 => $function::<3>($($argument),*),
-            4 => $function::<4>($($argument),*),
-            5 => $function::<5>($($argument),*),
-            6 => $function::<6>($($argument),*),
-            _ => $function::<0>($($argument),*),
-        }
-    };
-}
 
 /// A problem, its method and its state.
 pub(super) trait Driver {
@@ -70,9 +41,9 @@ pub(super) trait Driver {
     /// Counts this gap, over the length of its contact, as zero where it looks for walls that were passed.
     fn guard(&mut self, closed: f64);
     /// Everything it needs to go on.
-    fn place(&self) -> Place;
+    fn place(&self) -> DriverState;
     /// Goes on from a place, which was reached on the way to `horizon`; false where it cannot be one of this problem and method.
-    fn resume(&mut self, place: Place, horizon: Time) -> Result<bool, StepError>;
+    fn resume(&mut self, place: DriverState, horizon: Time) -> Result<bool, StepError>;
 }
 
 /// Asked after every step and every row whether the run shall pause.
@@ -80,7 +51,7 @@ pub type Pause<'a> = dyn FnMut() -> bool + 'a;
 
 /// Where a driver is, with all that its next step depends on.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub(super) struct Place {
+pub(super) struct DriverState {
     state: State,
     tally: Tally,
     /// Where a dense method began its last step; without unknowns where it made none.
@@ -92,9 +63,12 @@ pub(super) struct Place {
     known: Vec<f64>,
 }
 
+/// Makes a dense driver of a mechanism, from a motion on.
+pub(super) type Trace = fn(&Arc<Mechanism>, &Motion) -> Box<dyn Driver>;
+
 /// What can be seen of the steps of a method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Steps {
+pub(super) enum Steps {
     /// Each of them, and the solution inside: they are as long as the method likes.
     Dense,
     /// Each of them, all of one length; output times are ends of steps.
@@ -120,8 +94,9 @@ struct StepLoop<P: ?Sized, M> {
     /// True where the state is the end of the method's last step, so that it goes on from there.
     goes_on: bool,
     steps: Steps,
-    /// What integrates parts of steps where the method has no solution inside, once one is needed.
+    /// What integrates parts of steps where the method has no solution inside, once one is needed, and what makes it.
     tracer: Option<Box<dyn Driver>>,
+    trace: Trace,
     /// Watches the walls, where there are any.
     guard: Option<WallGuard>,
 }
@@ -212,10 +187,10 @@ impl<P: Form + ?Sized, M: Integrator<P>> Driver for StepLoop<P, M> {
         self.guard = (!self.problem.mechanism().contacts.is_empty()).then(|| WallGuard::new(closed));
     }
 
-    fn place(&self) -> Place {
+    fn place(&self) -> DriverState {
         let mut state = self.state.clone();
         self.method.save(&mut state);
-        Place {
+        DriverState {
             state,
             tally: self.tally,
             from: self.from.clone(),
@@ -225,7 +200,7 @@ impl<P: Form + ?Sized, M: Integrator<P>> Driver for StepLoop<P, M> {
         }
     }
 
-    fn resume(&mut self, place: Place, horizon: Time) -> Result<bool, StepError> {
+    fn resume(&mut self, place: DriverState, horizon: Time) -> Result<bool, StepError> {
         let shape = |state: &State| (state.y.len(), state.low.len(), state.turns.len(), state.is_winding);
         let alike = |state: &State| shape(state) == shape(&self.state) && state.turns.iter().all(|turns| turns.unsigned_abs() < MOST_TURNS);
         let steps_back = self.steps == Steps::Dense && place.goes_on && !place.from.y.is_empty() && place.from.time < place.state.time;
@@ -342,11 +317,7 @@ impl<P: Form + ?Sized, M: Integrator<P>> StepLoop<P, M> {
     fn traced(&mut self, &Candidate { ref from, span, .. }: &Candidate) -> Option<Flip> {
         let mut motion = Motion::default();
         self.problem.read(from, &mut motion);
-        let tracer = self.tracer.get_or_insert_with(|| {
-            let mechanism = Arc::new(self.problem.mechanism().clone());
-            let tolerance = Tolerance { relative: 1e-13, absolute: 1e-13 };
-            driver(sized!(mechanism.size(), form(&mechanism, Stabilization::None, 1.0)), Dp8::new(tolerance), &motion, Steps::Dense)
-        });
+        let tracer = self.tracer.get_or_insert_with(|| (self.trace)(&Arc::new(self.problem.mechanism().clone()), &motion));
         tracer.jump(&motion);
         tracer.forget();
         tracer.allow(tracer.tally().evaluations.saturating_add(self.tally.effort));
@@ -358,24 +329,13 @@ impl<P: Form + ?Sized, M: Integrator<P>> StepLoop<P, M> {
     }
 }
 
-fn driver<P: Form + ?Sized + 'static, M: Integrator<P> + 'static>(
+/// The loop for a problem in some form and a method, from a motion on.
+pub(super) fn boxed<P: Form + ?Sized + 'static, M: Integrator<P> + 'static>(
     problem: Box<P>,
     method: M,
     start: &Motion,
     steps: Steps,
-) -> Box<dyn Driver> {
-    match shrinking(problem.mechanism()) {
-        // The ends of windows say nothing of what is between them.
-        springs if springs.is_empty() || steps == Steps::Unseen => boxed(problem, method, start, steps),
-        springs => boxed(problem, Shrinking::new(Box::new(method), springs), start, steps),
-    }
-}
-
-fn boxed<P: Form + ?Sized + 'static, M: Integrator<P> + 'static>(
-    problem: Box<P>,
-    method: M,
-    start: &Motion,
-    steps: Steps,
+    trace: Trace,
 ) -> Box<dyn Driver> {
     let state = problem.state(start);
     let idle = State::default;
@@ -392,142 +352,7 @@ fn boxed<P: Form + ?Sized + 'static, M: Integrator<P> + 'static>(
         goes_on: false,
         steps,
         tracer: None,
+        trace,
         guard: None,
     })
-}
-
-/// The form a stabilization integrates in, for `N` bodies.
-fn form<const N: usize>(mechanism: &Arc<Mechanism>, stabilization: Stabilization, time_constant: f64) -> Box<dyn Problem> {
-    let mechanism = Arc::clone(mechanism);
-    if matches!(stabilization, Stabilization::None | Stabilization::Projection)
-        && let Some(looped) = Looped::new(Arc::clone(&mechanism))
-    {
-        return Box::new(looped);
-    }
-    match stabilization {
-        Stabilization::Elimination => eliminated::<N>(&mechanism),
-        Stabilization::Baumgarte => Box::new(Baumgarte::new(Multiplier::<N, true>::new(mechanism), time_constant)),
-        Stabilization::None | Stabilization::Projection if mechanism.keeps_account() => Box::new(Multiplier::<N, true>::new(mechanism)),
-        Stabilization::None | Stabilization::Projection => Box::new(Multiplier::<N, false>::new(mechanism)),
-    }
-}
-
-/// The form of the independent coordinates for `N` bodies, whether angles are driven or not.
-fn eliminated<const N: usize>(mechanism: &Arc<Mechanism>) -> Box<dyn Problem> {
-    Box::new(Elimination::<N>::new(Arc::clone(mechanism)))
-}
-
-/// The canonical form for `N` bodies.
-fn canonical<const N: usize>(mechanism: &Arc<Mechanism>) -> Box<dyn Problem> {
-    let mechanism = Arc::clone(mechanism);
-    if mechanism.keeps_account() { Box::new(Canonical::<N, true>::new(mechanism)) } else { Box::new(Canonical::<N, false>::new(mechanism)) }
-}
-
-/// Builds what a plan asks for; Baumgarte's time constant is measured first where none was given.
-pub(super) fn build(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<Box<dyn Driver>, StepError> {
-    let mut driver = built(mechanism, plan, start)?;
-    driver.guard(closed(plan.tolerance.unwrap_or_default().relative));
-    Ok(driver)
-}
-
-fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<Box<dyn Driver>, StepError> {
-    let n = mechanism.size();
-    let tolerance = plan.tolerance.unwrap_or_default();
-    let step = plan.step.unwrap_or(0.0);
-    if plan.stabilization == Stabilization::Baumgarte && plan.time_constant.is_none() {
-        let found = pilot(mechanism, plan, start)?;
-        plan.notes.push(format!("Baumgarte's time constant is {found:.3e} s, five mean steps of a pilot run"));
-        plan.time_constant = Some(found);
-    }
-    let projected = plan.stabilization == Stabilization::Projection;
-    let problem = || sized!(n, form(mechanism, plan.stabilization, plan.time_constant.unwrap_or(1.0)));
-    Ok(match plan.method {
-        MethodId::Dopri5 => driver(problem(), Dopri5::new(tolerance), start, Steps::Unseen),
-        MethodId::Dop853 => driver(problem(), Dop853::new(tolerance), start, Steps::Unseen),
-        MethodId::Dp5 if projected => driver(problem(), Projected::new(Dp5::new(tolerance)), start, Steps::Dense),
-        MethodId::Dp8 if projected => driver(problem(), Projected::new(Dp8::new(tolerance)), start, Steps::Dense),
-        MethodId::Dp5 => driver(problem(), Dp5::new(tolerance), start, Steps::Dense),
-        MethodId::Dp8 => driver(problem(), Dp8::new(tolerance), start, Steps::Dense),
-        MethodId::Taylor if mechanism.vibration.is_some() => {
-            return Err(cannot_begin(plan, "the mean force of a rigid spring's vibration has no series".into()));
-        }
-        MethodId::Taylor if plan.in_double_double => {
-            let (order, tolerance) = (order_in_double_double(tolerance.relative), tolerance.relative);
-            exact(mechanism, start, order, tolerance)
-        }
-        MethodId::Taylor => {
-            let mut taylor = Taylor::new(tolerance);
-            taylor.extended = plan.extended;
-            match plan.stabilization {
-                Stabilization::None if mechanism.rows.is_empty() => driver(sized!(n, eliminated(mechanism)), taylor, start, Steps::Dense),
-                Stabilization::Projection => driver(problem(), Projected::new(taylor), start, Steps::Dense),
-                _ => driver(problem(), taylor, start, Steps::Dense),
-            }
-        }
-        MethodId::Radau(stages) => {
-            let radau = Radau::new(stages, tolerance).ok_or_else(|| cannot_begin(plan, format!("no Radau method has {stages} stages")))?;
-            if projected {
-                return Ok(driver(problem(), Projected::new(radau), start, Steps::Dense));
-            }
-            driver(problem(), radau, start, Steps::Dense)
-        }
-        MethodId::Gauss(stages) => {
-            let gauss = Gauss::new(stages, step)
-                .ok_or_else(|| cannot_begin(plan, format!("no Gauss method has {stages} stages and step {step} s")))?;
-            if projected {
-                return Ok(driver(problem(), SymmetricGauss::new(gauss), start, Steps::Fixed));
-            }
-            driver(sized!(n, canonical(mechanism)), gauss, start, Steps::Fixed)
-        }
-        MethodId::Rattle(composition) => {
-            let natural = Natural::new(Arc::clone(mechanism)).map_err(|error| cannot_begin(plan, error.to_string()))?;
-            driver(Box::new(natural), Rattle::new(composition, step), start, Steps::Fixed)
-        }
-    })
-}
-
-/// The order of a series in double-double that takes the least work at a tolerance: a step costs as its square, and is as long as its root of the tolerance.
-pub(super) fn order_in_double_double(tolerance: f64) -> usize {
-    (-0.5 * libm::log(tolerance)).round().clamp(20.0, 30.0) as usize
-}
-
-/// The series of a mechanism in double-double, from `start`, with its order and tolerance \[rad/s\].
-pub(super) fn exact(mechanism: &Arc<Mechanism>, start: &Motion, order: usize, tolerance: f64) -> Box<dyn Driver> {
-    let taylor = Taylor::<DoubleDouble>::with_order(tolerance, order);
-    match mechanism.has_multipliers() {
-        true => driver(form::<0>(mechanism, Stabilization::None, 1.0), taylor, start, Steps::Dense),
-        false => driver(eliminated::<0>(mechanism), taylor, start, Steps::Dense),
-    }
-}
-
-/// The form whose unknowns small differences are followed in.
-pub(super) fn tangent_form(mechanism: &Arc<Mechanism>) -> Box<dyn Problem> {
-    if mechanism.has_multipliers() {
-        return sized!(mechanism.size(), form(mechanism, Stabilization::None, 1.0));
-    }
-    sized!(mechanism.size(), eliminated(mechanism))
-}
-
-fn cannot_begin(plan: &Plan, what: String) -> StepError {
-    let hint = "--method dp8".into();
-    StepError { cause: Cause::Unsuited, method: plan.method.to_string(), t: 0.0, step: plan.step.unwrap_or(0.0), what, hint }
-}
-
-/// Five mean steps of the unstabilized run over its first output intervals (at most twenty) \[s\].
-fn pilot(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion) -> Result<f64, StepError> {
-    let mut plain = Plan { stabilization: Stabilization::None, ..plan.clone() };
-    let mut driver = build(mechanism, &mut plain, start)?;
-    driver.allow(plan.effort);
-    let rows = plan.rows.min(20);
-    for row in 1..=rows {
-        match driver.advance(plan.time(row), plan.time(plan.rows), None, None, &mut || false) {
-            Ok(Reached::Until | Reached::Pause) => {}
-            Ok(Reached::Event(_)) => break,
-            Err(stop) if stop.cause == Cause::RestingContact => break,
-            Err(stop) => return Err(stop),
-        }
-    }
-    let mut motion = Motion::default();
-    driver.read(&mut motion);
-    Ok(5.0 * motion.time.hi.max(f64::MIN_POSITIVE) / driver.tally().steps.max(1) as f64)
 }

@@ -1,15 +1,15 @@
 //! A run: the loop around a method, and what watches it.
 //!
-//! [`plan`] decides, with [`choice`] of the method, [`mod@integrate`] builds the driver, [`running`] goes with it from one output time to the next and can pause, [`contact`] through impacts and
-//! contacts that last, [`sample`] reads off what there is to
-//! know at each, [`trust`] estimates its error beside it, [`mod@reference`] is what it is measured against, [`drift`] and [`trace`] keep bounded records of it, [`table`] writes it down,
-//! [`files`] keeps whole files only, and [`checkpoint`] what a run needs to go on after whatever ended it.  [`mod@sweep`] runs a grid of starts and parameters, on the
-//! flips for bars that turn over ([`flip`]); [`mod@compare`] runs all methods at all settings, and times them; [`mod@stress`] runs stiff and extreme scenes by
-//! every method.
+//! [`plan`] decides, with [`choice`] of the method; a [`driver`] of form and method makes the steps; [`contact`] takes it through impacts and contacts that last;
+//! [`running`] goes from one output time to the next and can pause; [`sample`] reads off what there is to know at each; [`trust`] estimates the error beside it,
+//! [`mod@reference`] is what it is measured against; [`drift`] and [`trace`] keep bounded records of it; [`table`] writes it down, [`files`] keeps whole files only, and
+//! [`checkpoint`] what a run needs to go on after whatever ended it.  [`mod@sweep`] runs a grid of starts and parameters and looks for bars that turn over ([`flip`]);
+//! [`mod@compare`] runs all methods at all settings, and times them; [`mod@stress`] runs stiff and extreme scenes by every method.
 
 mod allowance;
 #[cfg(feature = "files")]
 pub mod async_writer;
+mod build;
 #[cfg(feature = "files")]
 pub mod checkpoint;
 pub mod choice;

@@ -5,8 +5,9 @@
 //!
 //! Impacts are located in doubles.  Scenes with walls have references of that accuracy, and say so.
 
+use super::build::{build, exact};
 use super::contact::Course;
-use super::driver::{Driver, Pause, build, exact};
+use super::driver::{Driver, Pause};
 use super::methods::MethodId;
 use super::plan::Plan;
 use super::running::Outcome;

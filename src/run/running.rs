@@ -1,8 +1,9 @@
 //! The loop: from output time to output time, with limits watched; a run can pause in it, be taken down and go on elsewhere.
 
+use super::build::build;
 use super::contact::{Course, Hold, Station, Strike};
 use super::drift::{Drift, Limits};
-use super::driver::{Driver, MOST_TURNS, Pause, build};
+use super::driver::{Driver, MOST_TURNS, Pause};
 use super::flip::{Flip, FlipDetector};
 use super::methods::{MethodId, Stabilization};
 use super::monitor::Monitor;

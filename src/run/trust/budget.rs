@@ -4,7 +4,7 @@
 //! really costs beside runs of the shipped scenes is what `cargo bench --bench trust` prints.
 
 use crate::dynamics::Mechanism;
-use crate::run::driver::order_in_double_double;
+use crate::run::build::order_in_double_double;
 use crate::run::methods::MethodId;
 use crate::run::plan::Plan;
 use crate::stepping::{Tally, Taylor};

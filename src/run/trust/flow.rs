@@ -2,8 +2,8 @@
 
 use super::Tangent;
 use crate::dynamics::{Mechanism, Motion, Time};
+use crate::run::build::build;
 use crate::run::contact::Course;
-use crate::run::driver::build;
 use crate::run::plan::Plan;
 use crate::run::running::Outcome;
 use std::sync::Arc;

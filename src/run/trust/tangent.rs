@@ -28,7 +28,7 @@ use self::start::{Dice, unit};
 use super::Ruler;
 use crate::dynamics::schur::NEAR;
 use crate::dynamics::{Coordinates, Mechanism, Motion, State, Time};
-use crate::run::driver::{Problem, tangent_form};
+use crate::run::build::{Problem, tangent_form};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
