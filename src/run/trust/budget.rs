@@ -1,7 +1,7 @@
 //! What a companion may cost: a share of the run's work, counted and not clocked, so that the figures are the same on every machine.
 //!
 //! Work is measured in nanoseconds of the machine the constants were taken on.  They need to be right within a factor of two or so; what the companion
-//! really costs beside runs of the shipped scenes is what `cargo bench --bench trust` prints.
+//! really costs beside runs of the shipped scenes is what `.ci/cost` counts.
 
 use crate::dynamics::Mechanism;
 use crate::run::build::order_in_double_double;
@@ -11,7 +11,7 @@ use crate::stepping::{Tally, Taylor};
 
 /// Largest share of the run's work that its companion may take.
 pub const SHARE: f64 = 0.3;
-/// Work that is free: what nobody notices at the end of a run, and of runs near rounding, for which double-double is needed.
+/// Work that is free: what nobody notices at the end of a run, and of runs of fixed steps or near rounding, whose companions cost most beside them.
 pub const GRACE: [f64; 2] = [20e6, 50e6];
 /// Share and work free of charge of a companion in double-double, where the run is not near rounding.
 pub const DOUBLE_DOUBLE: [f64; 2] = [0.05, 100e3];

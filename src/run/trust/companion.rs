@@ -178,7 +178,7 @@ impl Companion {
         let run = self.prices.run(self.run.method, tally);
         let is_near = finer::is_near_rounding(&self.run);
         let whole = match self.measured.level {
-            Level::Auto => GRACE[usize::from(is_near)] + SHARE * run,
+            Level::Auto => GRACE[usize::from(self.run.step.is_some() || is_near)] + SHARE * run,
             // No more evaluations than the run is allowed itself.
             Level::Off | Level::Full => (FULL_GRACE + FULL_SHARE * run).min(self.run.effort as f64 * self.prices.series[0]),
         };
