@@ -3,23 +3,19 @@
 //! One program for many files: what they share is compiled once.
 
 #[path = "common/andrews.rs"]
-#[allow(dead_code)]
 mod andrews;
 mod common;
 #[path = "common/mechanisms/mod.rs"]
-#[allow(dead_code)]
 mod mechanisms;
 #[path = "common/random.rs"]
 #[allow(dead_code)]
 mod random;
 #[path = "common/relations.rs"]
-#[allow(dead_code)]
 mod relations;
 #[path = "common/scaled.rs"]
 #[allow(dead_code)]
 mod scaled;
 #[path = "common/trees.rs"]
-#[allow(dead_code)]
 mod trees;
 
 mod assembly;

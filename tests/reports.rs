@@ -10,7 +10,6 @@ mod common;
 #[allow(dead_code)]
 mod extremes;
 #[path = "common/mechanisms/mod.rs"]
-#[allow(dead_code)]
 mod mechanisms;
 #[path = "common/program.rs"]
 #[allow(dead_code)]
@@ -19,7 +18,6 @@ mod program;
 #[allow(dead_code)]
 mod random;
 #[path = "common/relations.rs"]
-#[allow(dead_code)]
 mod relations;
 #[path = "common/targets.rs"]
 #[allow(dead_code)]

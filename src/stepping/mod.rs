@@ -124,7 +124,7 @@ pub struct Ends {
 
 /// Integrates a problem `P`, one accepted step after the other.
 ///
-/// The contract: [`begin`](Integrator::begin) takes up a state, [`step`](Integrator::step) makes one accepted step from it, [`within`](Integrator::interpolate) is the solution
+/// The contract: [`begin`](Integrator::begin) takes up a state, [`step`](Integrator::step) makes one accepted step from it, [`interpolate`](Integrator::interpolate) is the solution
 /// inside that step, and [`save`](Integrator::save) leaves in the state what `begin` needs to go on to the same bits.  A method has no loop of its own over steps:
 /// that is [`advance`](Integrator::advance), or the caller's.
 pub trait Integrator<P: ?Sized> {

@@ -149,9 +149,10 @@ impl Measured {
     }
 
     /// What the last digit of the inputs comes to at a time \[s\]: beyond what was followed it grows as the error of the run does, which is a small
-    /// difference, too.
-    fn inputs_at(&self, t: f64) -> Option<f64> {
-        let [until, reach] = self.stopped?;
+    /// difference, too.  That goes where growth is known to be exponential, and else from the second half of the way on: in the beginning an error tells nothing
+    /// of how it grows.
+    fn inputs_at(&self, t: f64, is_chaotic: bool) -> Option<f64> {
+        let [until, reach] = self.stopped.filter(|[until, _]| is_chaotic || *until >= 0.5 * t)?;
         let error = |t: f64| self.record.iter().take_while(|look| look[0] <= t).last().map_or(LEAST, |look| look[1].max(LEAST));
         let grown = if t >= self.until { self.error } else { error(t) };
         (t <= self.until).then(|| reach * (grown / error(until)).max(1.0))
@@ -204,7 +205,7 @@ impl Measured {
             };
             self.no_growth.get_or_insert_with(why);
         }
-        let input_error = self.input_error.or_else(|| self.inputs_at(self.horizon.unwrap_or(t)));
+        let input_error = self.input_error.or_else(|| self.inputs_at(self.horizon.unwrap_or(t), lyapunov.is_some()));
         let Self { name, shared, until, error, mut record, horizon, lost, why, history, no_growth, .. } = self;
         if record.last().is_some_and(|last| last[0] < until) {
             record.push([until, error]);
