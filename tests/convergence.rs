@@ -4,6 +4,7 @@
 //! everything, it makes exactly one step a window.  The error at a fixed horizon against h then has the method's order as its slope.  References come
 //! from `gauss16` in the canonical form: another method, in other unknowns.
 
+use crate::bernoulli::{Bernoulli, exact};
 use crate::common;
 
 use common::{go, order, shipped};
@@ -121,39 +122,6 @@ fn orders_on_the_motor_with_a_sine() {
     let reference = reference::<true>(&mechanism, &start);
     check(&mut Elimination::<2>::new(Arc::clone(&mechanism)), &start, &reference);
     check(&mut Multiplier::<2, true>::new(Arc::clone(&mechanism)), &start, &reference);
-}
-
-/// y' = y² cos t, y = 1 / (2 - sin t); the event is y falling to its value at `level` \[s\].
-#[derive(Clone, Copy)]
-struct Bernoulli {
-    level: Option<f64>,
-}
-
-fn exact(t: f64) -> f64 {
-    1.0 / (2.0 - t.sin())
-}
-
-impl Field for Bernoulli {
-    fn dimension(&self) -> usize {
-        1
-    }
-    fn angles(&self) -> usize {
-        0
-    }
-    fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
-        rate[0] = y[0] * y[0] * t.hi.cos();
-    }
-    fn label(&self, _: usize) -> String {
-        "y".into()
-    }
-    fn events(&self) -> usize {
-        usize::from(self.level.is_some())
-    }
-    fn gaps(&mut self, _: Time, y: &[f64], gaps: &mut [f64]) {
-        if let Some(level) = self.level {
-            gaps[0] = y[0] - exact(level);
-        }
-    }
 }
 
 impl System<f64, SVector<f64, 1>> for Bernoulli {

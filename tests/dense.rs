@@ -1,39 +1,14 @@
 //! The solution inside a step, and what follows from it: output times that have no say in the steps.
 
+use crate::bernoulli::{Bernoulli, exact};
 use crate::common;
 
 use common::{compile, order, shipped};
 use driftless::arithmetic::DoubleDouble;
-use driftless::dynamics::{Field, State, Time};
+use driftless::dynamics::{State, Time};
 use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Stabilization, integrate};
 use driftless::scene::Scene;
 use driftless::stepping::{Dp5, Dp8, Integrator, Radau, Tally, Tolerance};
-
-/// y' = y² cos t, whose solution from 1/2 is y = 1 / (2 - sin t).
-struct Bernoulli;
-
-fn exact(t: f64) -> f64 {
-    1.0 / (2.0 - t.sin())
-}
-
-impl Field for Bernoulli {
-    fn dimension(&self) -> usize {
-        1
-    }
-    fn angles(&self) -> usize {
-        0
-    }
-    fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
-        rate[0] = y[0] * y[0] * t.hi.cos();
-    }
-    fn jacobian(&mut self, t: Time, y: &[f64], jacobian: &mut [f64]) -> bool {
-        jacobian[0] = 2.0 * y[0] * t.hi.cos();
-        true
-    }
-    fn label(&self, _: usize) -> String {
-        "y".into()
-    }
-}
 
 /// The largest error inside one step of `h` from an exact state, over several steps and places in them.
 fn inside(method: &mut dyn Integrator<Bernoulli>, h: f64) -> f64 {
@@ -42,13 +17,13 @@ fn inside(method: &mut dyn Integrator<Bernoulli>, h: f64) -> f64 {
         let mut from = State::new(&[DoubleDouble::from(exact(begin))], 0);
         (from.time, from.memory) = (Time::from(begin), vec![h]);
         let (mut state, until) = (from.clone(), Time::from(begin + h));
-        method.begin(&mut Bernoulli, &mut state, until).expect("a beginning");
-        method.step(&mut Bernoulli, &mut state, until, &mut Tally::default()).expect("a step");
+        method.begin(&mut Bernoulli { level: None }, &mut state, until).expect("a beginning");
+        method.step(&mut Bernoulli { level: None }, &mut state, until, &mut Tally::default()).expect("a step");
         assert!((state.time - until).hi.abs() < 1e-15, "one step");
         let mut there = State::default();
         for share in [0.15, 0.4, 0.65, 0.9] {
             let time = Time::from(begin) + share * h;
-            method.interpolate(&mut Bernoulli, &from, time, &mut there);
+            method.interpolate(&mut Bernoulli { level: None }, &from, time, &mut there);
             worst = worst.max((there.y[0] - exact(time.hi)).abs());
         }
     }

@@ -71,13 +71,13 @@ fn compared(scene: &Scene, until: f64, rows: u32) -> Result<Compared, String> {
     let Flow { moments, rate, steps, lost } = flow(&mechanism, &plan, &start, &times)?;
     let (ruler, n) = (Ruler::new(&mechanism), mechanism.coordinates());
     let mut ratios = Vec::new();
-    let weighed = |column: &[f64]| {
-        let weigh = |(i, entry): (usize, &f64)| ruler.weight(i % n) * if i < n { *entry } else { entry / rate };
-        column.iter().enumerate().map(weigh).collect::<Vec<f64>>()
+    let weighted = |column: &[f64]| {
+        let weight = |(i, entry): (usize, &f64)| ruler.weight(i % n) * if i < n { *entry } else { entry / rate };
+        column.iter().enumerate().map(weight).collect::<Vec<f64>>()
     };
     for j in 0..moments[0].columns.len().min(4) {
         let first = &moments[0].columns[j];
-        let small = 1e-7 / norm(&weighed(first));
+        let small = 1e-7 / norm(&weighted(first));
         let beside = |sign: f64| {
             let mut start = moments[0].motion.clone();
             for k in 0..n {
@@ -88,7 +88,7 @@ fn compared(scene: &Scene, until: f64, rows: u32) -> Result<Compared, String> {
         };
         let (Ok(ahead), Ok(behind)) = (beside(1.0), beside(-1.0)) else { continue };
         for (moment, (ahead, behind)) in moments.iter().zip(ahead.iter().zip(&behind)).skip(1) {
-            let told = weighed(&moment.columns[j]);
+            let told = weighted(&moment.columns[j]);
             let seen = apart(&ruler, ahead, behind, small, rate);
             // Beyond that they are no neighbours, and below it is rounding.
             let size = norm(&seen) * small;

@@ -4,6 +4,8 @@
 
 #[path = "common/andrews.rs"]
 mod andrews;
+#[path = "common/bernoulli.rs"]
+mod bernoulli;
 mod common;
 #[path = "common/mechanisms/mod.rs"]
 mod mechanisms;

@@ -93,7 +93,7 @@ fn dop853(problem: &Problem) -> Candidate<'_> {
     Candidate { name: "dop853".into(), run: Box::new(run) }
 }
 
-/// The motions at the ends of the integrates.
+/// The motions at the ends of the integrations.
 fn ends<F: Form>(form: &mut F, starts: &[State], mut integrate: impl FnMut(&mut F, &mut State) -> bool) -> Vec<Motion> {
     starts
         .iter()

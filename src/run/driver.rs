@@ -3,7 +3,7 @@
 //! Every method is taken the same way: a step is made, walls are checked, flips are looked for, monitors are shown the motion, and what lies between steps is read off them.
 //! [`contact`](super::contact) takes a driver through impacts, [`running`](super::running) is the loop over output times.
 
-use super::flip::{self, Candidate, Flip, FlipDetector};
+use super::flip::{self, Flip, FlipDetector};
 use super::monitor::Monitor;
 use super::wall_guard::WallGuard;
 use crate::arithmetic::Scalar;
@@ -131,8 +131,10 @@ impl<P: Form + ?Sized, M: Integrator<P>> Driver for StepLoop<P, M> {
             if let Some(monitor) = &mut monitor {
                 self.show(*monitor);
             }
-            if event.is_some() && self.state.time <= until {
-                return Ok(event.map_or(Reached::Until, Reached::Event));
+            if let Some(event) = event
+                && self.state.time <= until
+            {
+                return Ok(Reached::Event(event));
             }
             self.ahead = event;
             if pause() && self.state.time < until {
@@ -254,29 +256,28 @@ impl<P: Form + ?Sized, M: Integrator<P>> StepLoop<P, M> {
             method.interpolate(problem, from, from.time + span.scale(share), inside);
             let mut glance = Glance::default();
             problem.glance(inside, &mut glance);
-            Some((inside.time.hi, glance))
+            (inside.time.hi, glance)
         };
         guard.search(&mechanism, contact, &mut at).map_err(|passed| passed.stop(name))
     }
 
     /// Looks for the first bar that turns over in the last step.
     fn look_for_flips(&mut self, flips: &mut FlipDetector) {
-        if !flips.step(&mut *self.problem, &self.state, self.steps == Steps::Unseen) {
-            return;
-        }
-        flips.search(&mut |candidate| {
-            if self.steps != Steps::Dense {
-                return self.traced(candidate);
-            }
-            let Self { problem, method, inside, .. } = self;
-            let Candidate { from, span, ends } = candidate;
-            flip::search(from.time.hi, *span, ends, &mut |seconds| {
+        let span = (self.state.time - self.from.time).hi;
+        let Some(ends) = flips.step(&mut *self.problem, &self.state, span, self.steps == Steps::Unseen) else { return };
+        let start = self.from.time.hi;
+        let found = if self.steps == Steps::Dense {
+            let Self { problem, method, from, inside, .. } = self;
+            flip::search(start, span, &ends, &mut |seconds| {
                 method.interpolate(problem, from, from.time + seconds, inside);
                 let mut glance = Glance::default();
                 flip::look(&mut **problem, inside, &mut glance);
-                Some(glance)
+                glance
             })
-        });
+        } else {
+            self.traced(span)
+        };
+        flips.conclude(start + span, &ends, found);
     }
 
     /// Shows the motion of the last step to a monitor where it is due.
@@ -313,16 +314,16 @@ impl<P: Form + ?Sized, M: Integrator<P>> StepLoop<P, M> {
         }
     }
 
-    /// The first bar that turns over in a step, which another method integrates again.
-    fn traced(&mut self, &Candidate { ref from, span, .. }: &Candidate) -> Option<Flip> {
+    /// The first bar that turns over in the last step, of `span` \[s\], which another method integrates again.
+    fn traced(&mut self, span: f64) -> Option<Flip> {
         let mut motion = Motion::default();
-        self.problem.read(from, &mut motion);
+        self.problem.read(&self.from, &mut motion);
         let tracer = self.tracer.get_or_insert_with(|| (self.trace)(&Arc::new(self.problem.mechanism().clone()), &motion));
         tracer.jump(&motion);
         tracer.forget();
         tracer.allow(tracer.tally().evaluations.saturating_add(self.tally.effort));
         let mut flips = FlipDetector::default();
-        let until = from.time + span;
+        let until = self.from.time + span;
         // Where that stops, what was seen up to there counts.
         let _ = tracer.advance(until, until, Some(&mut flips), None, &mut || false);
         flips.flip

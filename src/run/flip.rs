@@ -2,8 +2,8 @@
 //!
 //! Every step in which an angle can come as far as that is looked through: the angles inside it are interpolated until that is resolved, and the passage is
 //! found on the interpolant by the search (`stepping/search.rs`) that finds all events.  Whole turns are counted for it where the mechanism itself does
-//! not, since there they matter (torsion springs).  The passage itself is found by Newton's method on the motion, integrated again from the beginning of the
-//! step, so it is as accurate as the run.  Methods that cannot integrate a part of a step, or do not show their steps, are traced by `dp8` there.
+//! not, since there they matter (torsion springs).  The passage itself is found by Newton's method on the dense output of the
+//! step, so it is as accurate as the run.  Steps of methods without dense output, and windows that do not show their steps, are traced by `dp8`.
 
 use crate::arithmetic::angle;
 use crate::dynamics::{Form, Glance, State};
@@ -27,65 +27,37 @@ const RESOLVED: f64 = 1e-10;
 /// Steps of Newton's method at most.
 const ROUNDS: usize = 8;
 
-/// A step that holds a passage, or may.
-pub(super) struct Candidate {
-    /// Where it begins.
-    pub from: State,
-    /// Its length \[s\].
-    pub span: f64,
-    /// What there is to see at both ends.
-    pub ends: [Glance; 2],
-}
-
 /// Looks at every step until the first passage.
 #[derive(Default)]
 pub(super) struct FlipDetector {
     pub flip: Option<Flip>,
-    candidates: Vec<Candidate>,
     before: Glance,
     now: Glance,
-    from: State,
-    /// True once a passage is certain.
-    closed: bool,
 }
 
 impl FlipDetector {
-    /// Takes the state from which the next steps are taken.
+    /// Takes the state from which the next step is taken.
     pub fn begin<P: Form + ?Sized>(&mut self, problem: &mut P, state: &State) {
         look(problem, state, &mut self.before);
-        remember(&mut self.from, state);
     }
 
-    /// Takes the state after a step, and tells whether the step is to be searched; with `all` it is in any case.
-    pub fn step<P: Form + ?Sized>(&mut self, problem: &mut P, state: &State, all: bool) -> bool {
-        if self.closed || self.flip.is_some() {
-            return false;
+    /// Takes the state after a step of `span` \[s\], and tells what there is to see at both ends of it where it holds a passage, or may; with `all` in any case.
+    pub fn step<P: Form + ?Sized>(&mut self, problem: &mut P, state: &State, span: f64, all: bool) -> Option<[Glance; 2]> {
+        if self.flip.is_some() {
+            return None;
         }
         look(problem, state, &mut self.now);
-        let span = (state.time - self.from.time).hi;
-        self.closed = self.before.turns != self.now.turns;
-        let suspicious = all || self.closed || can_pass(&self.before, &self.now, span);
-        if suspicious {
-            self.candidates.push(Candidate { from: self.from.clone(), span, ends: [self.before.clone(), self.now.clone()] });
-        }
+        let is_candidate = all || can_pass(&self.before, &self.now, span);
+        let ends = is_candidate.then(|| [self.before.clone(), self.now.clone()]);
         std::mem::swap(&mut self.before, &mut self.now);
-        remember(&mut self.from, state);
-        suspicious
+        ends
     }
 
-    /// Goes through the suspicious steps, oldest first, until `find` finds the passage.
-    pub fn search(&mut self, find: &mut dyn FnMut(&Candidate) -> Option<Flip>) {
-        for candidate in std::mem::take(&mut self.candidates) {
-            // The first passage is not given up for one of a later step.
-            if self.flip.is_some() {
-                return;
-            }
-            let [a, b] = &candidate.ends;
-            // A passage so near the end of the step that rounding decides is there.
-            let turned = || (0..a.turns.len()).find(|&bar| a.turns[bar] != b.turns[bar]);
-            let at_end = || turned().map(|bar| Flip { t: candidate.from.time.hi + candidate.span, bar });
-            self.flip = find(&candidate).or_else(at_end);
-        }
+    /// Takes what was found in a step that ends at `t` \[s\], between these ends.
+    pub fn conclude(&mut self, t: f64, [a, b]: &[Glance; 2], found: Option<Flip>) {
+        // A passage so near the end of the step that rounding decides is there.
+        let turned = || (0..a.turns.len()).find(|&bar| a.turns[bar] != b.turns[bar]);
+        self.flip = found.or_else(|| turned().map(|bar| Flip { t, bar }));
     }
 }
 
@@ -99,15 +71,6 @@ pub(super) fn look<P: Form + ?Sized>(problem: &mut P, state: &State, glance: &mu
     for (phi, turns) in glance.phi.iter_mut().zip(&mut glance.turns) {
         *turns = turns.saturating_add(angle::wrap(phi, &mut 0.0));
     }
-}
-
-/// Copies a state but for what a method remembers.
-fn remember(copy: &mut State, state: &State) {
-    copy.time = state.time;
-    copy.y.clone_from(&state.y);
-    copy.low.clone_from(&state.low);
-    copy.turns.clone_from(&state.turns);
-    copy.is_winding = state.is_winding;
 }
 
 /// True where a bar may come to the boundary in a step, if it is at most twice as fast on the way as at the ends.
@@ -126,7 +89,7 @@ fn winding(bar: usize, a: &Glance, b: &Glance) -> f64 {
 }
 
 /// The first passage in a step that begins at `start` \[s\] and takes `span` \[s\]; `at` looks so many seconds after its beginning.
-pub(super) fn search(start: f64, span: f64, [first, last]: &[Glance; 2], at: &mut dyn FnMut(f64) -> Option<Glance>) -> Option<Flip> {
+pub(super) fn search(start: f64, span: f64, [first, last]: &[Glance; 2], at: &mut dyn FnMut(f64) -> Glance) -> Option<Flip> {
     // Later halves wait.
     let mut parts = vec![(0.0, span, first.clone(), last.clone())];
     while let Some((begin, end, a, b)) = parts.pop() {
@@ -135,7 +98,7 @@ pub(super) fn search(start: f64, span: f64, [first, last]: &[Glance; 2], at: &mu
         }
         if end - begin > span * SMALLEST {
             let middle = 0.5 * (begin + end);
-            let there = at(middle)?;
+            let there = at(middle);
             parts.push((middle, end, there.clone(), b));
             parts.push((begin, middle, a, there));
         } else if let Some(flip) = first_passage(start, [begin, end], &a, at) {
@@ -146,13 +109,13 @@ pub(super) fn search(start: f64, span: f64, [first, last]: &[Glance; 2], at: &mu
 }
 
 /// The first passage in a part of a step, which begins with `first`.
-fn first_passage(start: f64, [begin, end]: [f64; 2], first: &Glance, at: &mut dyn FnMut(f64) -> Option<Glance>) -> Option<Flip> {
+fn first_passage(start: f64, [begin, end]: [f64; 2], first: &Glance, at: &mut dyn FnMut(f64) -> Glance) -> Option<Flip> {
     let span = end - begin;
     let mut angles = vec![Vec::new(); first.phi.len()];
     for degree in DEGREES {
         angles.iter_mut().for_each(Vec::clear);
         for node in Chebyshev::nodes(degree) {
-            let there = at(begin + node * span)?;
+            let there = at(begin + node * span);
             angles.iter_mut().enumerate().for_each(|(bar, angles)| angles.push(winding(bar, first, &there)));
         }
         if angles.iter().all(|angles| Chebyshev::through(angles).tail() < RESOLVED) {
@@ -178,10 +141,10 @@ fn first_passage(start: f64, [begin, end]: [f64; 2], first: &Glance, at: &mut dy
 }
 
 /// The time after the step's beginning at which a bar is on the boundary, near `t` \[s\].
-fn passage(bar: usize, side: f64, first: &Glance, near: f64, [begin, end]: [f64; 2], at: &mut dyn FnMut(f64) -> Option<Glance>) -> f64 {
+fn passage(bar: usize, side: f64, first: &Glance, near: f64, [begin, end]: [f64; 2], at: &mut dyn FnMut(f64) -> Glance) -> f64 {
     let mut t = near;
     for _ in 0..ROUNDS {
-        let Some(there) = at(t) else { break };
+        let there = at(t);
         let moved = t - (side * winding(bar, first, &there) - PI) / (side * there.omega[bar]);
         // Where it hardly passes at all the interpolant knows better.
         if near == begin || !(begin..=end).contains(&moved) || (moved - near).abs() > 1e-3 * (end - begin) {
@@ -210,7 +173,7 @@ mod tests {
     fn search(motion: impl Fn(f64) -> [f64; 2], span: f64) -> Option<Flip> {
         let ends = [0.0, span].map(|t| glance(motion(t)[0], motion(t)[1]));
         let suspicious = can_pass(&ends[0], &ends[1], span);
-        suspicious.then(|| super::search(2.0, span, &ends, &mut |t| Some(glance(motion(t)[0], motion(t)[1]))))?
+        suspicious.then(|| super::search(2.0, span, &ends, &mut |t| glance(motion(t)[0], motion(t)[1])))?
     }
 
     #[test]

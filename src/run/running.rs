@@ -130,7 +130,7 @@ impl Run {
         Self { companion, ..self }
     }
 
-    /// The same as one of many: on the flips for the first bar that turns over, and without samples for charts.
+    /// The same as one of many: looks for the first bar that turns over, and without samples for charts.
     pub(super) fn of_ensemble(self, ends_at_flip: bool) -> Self {
         Self { ensemble: Some(ends_at_flip), ..self }
     }

@@ -46,18 +46,13 @@ impl WallGuard {
         Ok(candidate)
     }
 
-    /// Looks inside a step for the least gap of a contact; `at` tells time and motion at a share of the step, nothing where it cannot.
+    /// Looks inside a step for the least gap of a contact; `at` tells time and motion at a share of the step.
     ///
     /// # Errors
     /// A wall that has been passed.
-    pub fn search(
-        &self,
-        mechanism: &Mechanism,
-        contact: usize,
-        mut at: impl FnMut(f64) -> Option<(f64, Glance)>,
-    ) -> Result<(), Box<Passed>> {
+    pub fn search(&self, mechanism: &Mechanism, contact: usize, mut at: impl FnMut(f64) -> (f64, Glance)) -> Result<(), Box<Passed>> {
         let mut gap_at = |share: f64| -> Result<f64, Box<Passed>> {
-            let Some((t, glance)) = at(share) else { return Ok(f64::INFINITY) };
+            let (t, glance) = at(share);
             self.look(mechanism, t, &glance)?;
             Ok(gap(&mechanism.contacts[contact], mechanism.bodies.len(), &glance.phi).0)
         };
@@ -194,7 +189,7 @@ mod tests {
             let mut guard = WallGuard::new(1e-9);
             guard.begin(&mechanism, 0.0, &at(0.0));
             assert_eq!(guard.step(&mechanism, 1.0, &at(1.0)), Ok(Some(0)));
-            let found = guard.search(&mechanism, 0, |share| Some((share, at(share))));
+            let found = guard.search(&mechanism, 0, |share| (share, at(share)));
             assert_eq!(found.is_err(), is_behind, "{depth:e}");
         }
     }

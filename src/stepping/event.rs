@@ -82,6 +82,23 @@ pub(super) trait Stride<F: Field + ?Sized> {
 
     /// The unknowns at its end, and their rates.
     fn end(&self) -> (&[f64], &[f64]);
+
+    /// Scratch space of the search.
+    fn search(&mut self) -> &mut Search;
+
+    /// Looks for events in the step just made, where there are any to look for.
+    fn meet(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) -> Met
+    where
+        Self: Sized,
+    {
+        if field.events() == 0 {
+            return Met::Whole;
+        }
+        let mut search = std::mem::take(self.search());
+        let met = search.meet(field, self, state, h, tally);
+        *self.search() = search;
+        met
+    }
 }
 
 /// What a step holds, as shares of it.

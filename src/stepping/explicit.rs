@@ -194,17 +194,6 @@ impl<P: Pair> Explicit<P> {
         });
     }
 
-    /// Looks for events in the step just made.
-    fn meet<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) -> Met {
-        if field.events() == 0 {
-            return Met::Whole;
-        }
-        let mut search = std::mem::take(&mut self.search);
-        let met = search.meet(field, self, state, h, tally);
-        self.search = search;
-        met
-    }
-
     /// Writes the end of a step of `h` from the beginning of the last one, where that is within the tolerance: for where the interpolation is not, as in long steps
     /// on the way out of an unstable equilibrium.
     fn step_inside<F: Field + ?Sized>(&mut self, field: &mut F, from: &State, h: f64, inside: &mut State) {
@@ -327,6 +316,10 @@ impl<P: Pair, F: Field + ?Sized> Stride<F> for Explicit<P> {
     fn end(&self) -> (&[f64], &[f64]) {
         let n = self.next.len();
         (&self.next, &self.k[P::STAGES * n..(P::STAGES + 1) * n])
+    }
+
+    fn search(&mut self) -> &mut Search {
+        &mut self.search
     }
 }
 

@@ -220,17 +220,6 @@ impl Radau {
         }
     }
 
-    /// Looks for events in the step just made.
-    fn meet<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) -> Met {
-        if field.events() == 0 {
-            return Met::Whole;
-        }
-        let mut search = std::mem::take(&mut self.work.search);
-        let met = search.meet(field, self, state, h, tally);
-        self.work.search = search;
-        met
-    }
-
     /// The component that asks most of the step.
     fn culprit<F: Field + ?Sized>(&self, field: &F) -> String {
         let share = |k: usize| {
@@ -296,6 +285,10 @@ impl<F: Field + ?Sized> Stride<F> for Radau {
 
     fn end(&self) -> (&[f64], &[f64]) {
         (&self.work.next, &self.work.next_rate)
+    }
+
+    fn search(&mut self) -> &mut Search {
+        &mut self.work.search
     }
 }
 

@@ -73,8 +73,8 @@ impl Rattle {
     }
 }
 
-/// Calls a method for the numbers of bodies compiled in, and whether there are guides or feet: `sized!(problem, state, receiver.method(arguments))`.
-macro_rules! sized {
+/// Calls a method for the numbers of bodies compiled in, and whether there are guides or translational coordinates: `by_bodies!(problem, state, receiver.method(arguments))`.
+macro_rules! by_bodies {
     ($problem:expr, $state:expr, $object:ident $(. $part:ident)+ ($($argument:expr),*)) => {{
         let turns = $state.turns.len();
         let (is_plain, bodies) = ($problem.guides().is_empty() && $problem.elements() == turns, if $problem.elements() == turns { turns } else { 0 });
@@ -109,7 +109,7 @@ impl Integrator<Natural> for Rattle {
             return Err(self.refuse(state.time.hi));
         }
         self.work.resize(problem);
-        sized!(problem, state, self.work.load(problem, state));
+        by_bodies!(problem, state, self.work.load(problem, state));
         self.is_stale = false;
         Ok(())
     }
@@ -117,9 +117,9 @@ impl Integrator<Natural> for Rattle {
     fn step(&mut self, problem: &mut Natural, state: &mut State, _until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
         tally.check(Integrator::name(self), state.time.hi, self.step)?;
         if std::mem::take(&mut self.is_stale) {
-            sized!(problem, state, self.work.load(problem, state));
+            by_bodies!(problem, state, self.work.load(problem, state));
         }
-        sized!(problem, state, self.substeps(problem, state, tally))?;
+        by_bodies!(problem, state, self.substeps(problem, state, tally))?;
         state.time += Time::of(self.step);
         self.work.store(state);
         tally.steps += 1;
@@ -137,7 +137,7 @@ impl Integrator<Natural> for Rattle {
 }
 
 impl Rattle {
-    /// All substeps of a step, for `N` bodies (any number where `N` is 0), with guides or feet where `GUIDED`.
+    /// All substeps of a step, for `N` bodies (any number where `N` is 0), with guides or translational coordinates where `GUIDED`.
     fn substeps<const N: usize, const GUIDED: bool>(
         &mut self,
         natural: &Natural,

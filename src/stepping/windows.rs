@@ -1,6 +1,6 @@
 //! `dopri5` and `dop853`: the Dormand–Prince methods of the crate `ode_solvers`, integrated in windows.
 //!
-//! The only file that knows the crate.  It owns its loop and keeps every row, so a call of [`Integrator::advance`] is one window: a
+//! The only file that knows the crate.  It owns its loop and keeps every row, so a call of [`Integrator::step`] is one window: a
 //! fresh integration from one time asked for to the next, which makes memory flat and restart exact.  Its ways, and what is done about them:
 //!
 //! - Dense output hands out times and states that do not belong together: `Sparse` rows are used, and only the last one counts.

@@ -303,12 +303,12 @@ impl Lane {
             self.point.flip = flip::search(passage.from.hi, passage.step, &self.seen, &mut |after| {
                 let mut there = Glance::default();
                 glance(after, &mut there);
-                Some(there)
+                there
             });
         }
     }
 
-    /// Takes what an member has come to; false where the point goes no further.
+    /// Takes what a member has come to; false where the point goes no further.
     fn measure(
         &mut self,
         member: &BatchMember,

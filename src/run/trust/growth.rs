@@ -10,7 +10,7 @@ use super::{Lyapunov, Tangent};
 use crate::dynamics::Mechanism;
 use serde::{Deserialize, Serialize};
 
-/// Growth \[ln\] within the second half of the time from which on a motion may be chaotic: that of the third power is 2.1, and sizes swing by as much again.
+/// Growth \[ln\] within the second half of the time from which on a motion may be chaotic: that of the third power is 2.1, and sizes vary by as much again.
 const CHAOTIC: f64 = 4.0;
 /// How far the rates of both halves may be apart.
 const ALIKE: f64 = 4.0;

@@ -119,22 +119,22 @@ impl Batch {
     pub fn integrate(&self, members: &mut [BatchMember], until: Time, watch: &mut dyn FnMut(usize, &Passage) -> Going) {
         let Some(bodies) = members.first().map(|first| first.mechanism.tree.coordinates) else { return };
         match bodies {
-            1 => lanes::run(March::<1> { batch: self, members, until, watch }, self.is_portable),
-            2 => lanes::run(March::<2> { batch: self, members, until, watch }, self.is_portable),
-            3 => lanes::run(March::<3> { batch: self, members, until, watch }, self.is_portable),
-            _ => lanes::run(March::<4> { batch: self, members, until, watch }, self.is_portable),
+            1 => lanes::run(Integration::<1> { batch: self, members, until, watch }, self.is_portable),
+            2 => lanes::run(Integration::<2> { batch: self, members, until, watch }, self.is_portable),
+            3 => lanes::run(Integration::<3> { batch: self, members, until, watch }, self.is_portable),
+            _ => lanes::run(Integration::<4> { batch: self, members, until, watch }, self.is_portable),
         }
     }
 }
 
-struct March<'a, 'b, const N: usize> {
+struct Integration<'a, 'b, const N: usize> {
     batch: &'a Batch,
     members: &'a mut [BatchMember<'b>],
     until: Time,
     watch: &'a mut dyn FnMut(usize, &Passage) -> Going,
 }
 
-impl<const N: usize> Code for March<'_, '_, N> {
+impl<const N: usize> Code for Integration<'_, '_, N> {
     type Output = ();
 
     #[inline(always)]
