@@ -166,6 +166,9 @@ pub enum CompileError {
         /// Its energy \[J\].
         energy: f64,
     },
+    /// No bar has the name asked for.
+    #[error("no bar is called `{0}`")]
+    NoSuchBar(String),
     /// A point starts behind its wall.
     #[error("wall `{wall}` has its point {gap:.3e} m behind it at the start\nhint: start elsewhere, move the wall, or turn its normal")]
     BehindWall {

@@ -35,6 +35,7 @@
 pub mod assembly;
 pub mod canonical;
 pub mod compile;
+pub mod configuration;
 pub mod contact;
 pub mod elimination;
 pub mod energy;
@@ -65,6 +66,7 @@ pub mod tree;
 pub mod units;
 
 pub use compile::{CompileError, Mechanism};
+pub use configuration::Configuration;
 pub use points::Points;
 pub use stiffness::Stiffness;
 pub use units::Units;

@@ -1,0 +1,129 @@
+//! Where a mechanism is at a moment, as user-defined forces and events see it.
+
+use super::row::Site;
+use super::{CompileError, Mechanism};
+use crate::arithmetic::{Complex, Scalar};
+
+/// Time, angles, rates and points of a mechanism at one moment, over any scalar: plain numbers where an event function is evaluated, symbols where a
+/// [`Force`](super::force::Force) is recorded.
+///
+/// Bodies are named by their number in the order of the scene's bars ([`Mechanism::body`]), points by a [`Site`] ([`Mechanism::site`]).
+#[derive(Clone, Copy)]
+pub struct Configuration<'a, S>(&'a dyn Source<S>);
+
+/// What a configuration is read from.
+pub trait Source<S> {
+    /// Time \[s\].
+    fn time(&self) -> S;
+    /// Angle of a body \[rad\], winding.
+    fn angle(&self, body: usize) -> S;
+    /// Its rate \[rad/s\].
+    fn rate(&self, body: usize) -> S;
+    /// Its unit vector (cos, sin).
+    fn direction(&self, body: usize) -> Complex<S>;
+    /// Position of a point \[m\].
+    fn position(&self, site: &Site) -> Complex<S>;
+    /// Its velocity \[m/s\].
+    fn velocity(&self, site: &Site) -> Complex<S>;
+}
+
+impl<'a, S: Scalar> Configuration<'a, S> {
+    /// That of a source.
+    pub fn new(source: &'a dyn Source<S>) -> Self {
+        Self(source)
+    }
+
+    /// Time \[s\].
+    pub fn time(&self) -> S {
+        self.0.time()
+    }
+
+    /// Absolute angle of a body from +x, counter-clockwise, with its whole turns \[rad\].
+    ///
+    /// A force that uses it makes the mechanism integrate winding angles; [`direction`](Self::direction) does not.
+    pub fn angle(&self, body: usize) -> S {
+        self.0.angle(body)
+    }
+
+    /// Rate of that angle \[rad/s\].
+    pub fn rate(&self, body: usize) -> S {
+        self.0.rate(body)
+    }
+
+    /// Cosine and sine of that angle.
+    pub fn direction(&self, body: usize) -> [S; 2] {
+        pair(self.0.direction(body))
+    }
+
+    /// Position of a point of a body or of the ground \[m\].
+    pub fn position(&self, site: &Site) -> [S; 2] {
+        pair(self.0.position(site))
+    }
+
+    /// Velocity of that point \[m/s\].
+    pub fn velocity(&self, site: &Site) -> [S; 2] {
+        pair(self.0.velocity(site))
+    }
+}
+
+fn pair<S>(z: Complex<S>) -> [S; 2] {
+    [z.re, z.im]
+}
+
+/// A configuration given by numbers.
+pub struct Values<'a, S> {
+    /// Time \[s\].
+    pub time: S,
+    /// Winding angles of the bodies \[rad\].
+    pub phi: &'a [S],
+    /// Elements: unit vectors of the bodies, then translational coordinates.
+    pub z: &'a [Complex<S>],
+    /// Rates of all coordinates \[rad/s, m/s\].
+    pub omega: &'a [S],
+}
+
+impl<S: Scalar> Source<S> for Values<'_, S> {
+    fn time(&self) -> S {
+        self.time
+    }
+
+    fn angle(&self, body: usize) -> S {
+        self.phi[body]
+    }
+
+    fn rate(&self, body: usize) -> S {
+        self.omega[body]
+    }
+
+    fn direction(&self, body: usize) -> Complex<S> {
+        self.z[body]
+    }
+
+    fn position(&self, site: &Site) -> Complex<S> {
+        site.point.position(self.z)
+    }
+
+    fn velocity(&self, site: &Site) -> Complex<S> {
+        site.point.velocity(self.z, self.omega)
+    }
+}
+
+impl Mechanism {
+    /// Number of the bar of this name.
+    ///
+    /// # Errors
+    /// No bar has this name.
+    pub fn body(&self, name: &str) -> Result<usize, CompileError> {
+        self.bodies.iter().position(|body| body.name == name).ok_or_else(|| CompileError::NoSuchBar(name.into()))
+    }
+
+    /// The point `[x, y]` \[m\] of the bar of this name, in the bar's frame: from its origin, x along it.
+    ///
+    /// # Errors
+    /// No bar has this name.
+    pub fn site(&self, bar: &str, [x, y]: [f64; 2]) -> Result<Site, CompileError> {
+        let body = self.body(bar)?;
+        let point = self.forest.walk(body, Complex::new(x, y) + self.bodies[body].ends[0]);
+        Ok(Site { body: Some(body), point })
+    }
+}
