@@ -5,7 +5,7 @@
 //! arithmetic*, ACM TOMS 44 (2017): sums to 3 u², products to 5 u², quotients to 10 u² with u = 2⁻⁵³.
 
 use super::sum::{fast_two_sum, nearest, two_product, two_sum};
-use super::{Real, Scalar};
+use super::{Real, Scalar, elementary};
 use std::cmp::Ordering;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 use std::sync::LazyLock;
@@ -263,6 +263,22 @@ impl Scalar for DoubleDouble {
         // Not a number lands in the first entry and stays what it is.
         let (sin_k, cos_k) = CIRCLE[(k as i64).rem_euclid(PARTS) as usize];
         (sin_k * cos + cos_k * sin, cos_k * cos - sin_k * sin)
+    }
+
+    fn exp(self) -> Self {
+        elementary::exp(self)
+    }
+
+    fn ln(self) -> Self {
+        elementary::ln(self)
+    }
+
+    fn tanh(self) -> Self {
+        elementary::tanh(self)
+    }
+
+    fn atan2(self, x: Self) -> Self {
+        elementary::atan2(self, x)
     }
 }
 

@@ -89,6 +89,25 @@ impl<const D: usize, const CLOCK: bool> Scalar for Dual<D, CLOCK> {
         let (sin, cos) = Scalar::sin_cos(self.value);
         (self.map(sin, cos), self.map(cos, -sin))
     }
+
+    fn exp(self) -> Self {
+        let value = Scalar::exp(self.value);
+        self.map(value, value)
+    }
+
+    fn ln(self) -> Self {
+        self.map(Scalar::ln(self.value), 1.0 / self.value)
+    }
+
+    fn tanh(self) -> Self {
+        let value = Scalar::tanh(self.value);
+        self.map(value, 1.0 - value * value)
+    }
+
+    fn atan2(self, x: Self) -> Self {
+        let square = x.value * x.value + self.value * self.value;
+        self.join(x, Scalar::atan2(self.value, x.value), |y_rate, x_rate| (x.value * y_rate - self.value * x_rate) / square)
+    }
 }
 
 impl<const D: usize, const CLOCK: bool> Real for Dual<D, CLOCK> {

@@ -53,6 +53,11 @@ pub trait Lanewise: Scalar {
 pub struct Eight<L>(pub [L; 2]);
 
 impl<L: Lanes> Eight<L> {
+    /// A function of every lane by itself.
+    fn each(self, f: impl Fn(f64) -> f64) -> Self {
+        Self(Octet(Octet::of(self.0).0.map(f)).halves())
+    }
+
     /// `self · factor + addend`, rounded once.
     #[inline(always)]
     pub fn mul_add(self, factor: Self, addend: Self) -> Self {
@@ -107,6 +112,23 @@ impl<L: Lanes> Scalar for Eight<L> {
     fn sin_cos(self) -> (Self, Self) {
         let ((s0, c0), (s1, c1)) = (sincos::sin_cos(self.0[0], L::ZERO), sincos::sin_cos(self.0[1], L::ZERO));
         (Self([s0, s1]), Self([c0, c1]))
+    }
+
+    fn exp(self) -> Self {
+        self.each(Scalar::exp)
+    }
+
+    fn ln(self) -> Self {
+        self.each(Scalar::ln)
+    }
+
+    fn tanh(self) -> Self {
+        self.each(Scalar::tanh)
+    }
+
+    fn atan2(self, x: Self) -> Self {
+        let (Octet(y), Octet(x)) = (Octet::of(self.0), Octet::of(x.0));
+        Self(Octet(std::array::from_fn(|lane| Scalar::atan2(y[lane], x[lane]))).halves())
     }
 }
 

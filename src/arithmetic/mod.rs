@@ -12,10 +12,12 @@ pub mod complex;
 pub mod double_double;
 pub mod dual;
 pub mod eight;
+mod elementary;
 pub mod lanes;
 pub mod pairs;
 pub mod sincos;
 pub mod sum;
+pub mod tape;
 
 pub use complex::Complex;
 pub use double_double::DoubleDouble;
@@ -56,6 +58,44 @@ pub trait Scalar:
 
     /// Sine and cosine of an angle \[rad\], in this order.
     fn sin_cos(self) -> (Self, Self);
+
+    /// e to this power.
+    fn exp(self) -> Self;
+
+    /// Natural logarithm; NaN below zero.
+    fn ln(self) -> Self;
+
+    /// Hyperbolic tangent.
+    fn tanh(self) -> Self;
+
+    /// The angle \[rad\] of the vector (`x`, `self`), in (-π, π].
+    fn atan2(self, x: Self) -> Self;
+
+    /// Tangent of an angle \[rad\].
+    fn tan(self) -> Self {
+        let (sin, cos) = self.sin_cos();
+        sin / cos
+    }
+
+    /// A whole power, by squaring.
+    fn powi(self, exponent: i32) -> Self {
+        let (mut power, mut factor, mut left) = (Self::ONE, self, exponent.unsigned_abs());
+        while left > 0 {
+            if left % 2 == 1 {
+                power = power * factor;
+            }
+            left /= 2;
+            if left > 0 {
+                factor = factor * factor;
+            }
+        }
+        if exponent < 0 { Self::ONE / power } else { power }
+    }
+
+    /// Any power of a positive number.
+    fn powf(self, exponent: f64) -> Self {
+        self.ln().scale(exponent).exp()
+    }
 }
 
 /// A scalar with an order and a nearest `f64`.
@@ -113,6 +153,26 @@ impl Scalar for f64 {
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         libm::sincos(self)
+    }
+
+    #[inline(always)]
+    fn exp(self) -> Self {
+        libm::exp(self)
+    }
+
+    #[inline(always)]
+    fn ln(self) -> Self {
+        libm::log(self)
+    }
+
+    #[inline(always)]
+    fn tanh(self) -> Self {
+        libm::tanh(self)
+    }
+
+    #[inline(always)]
+    fn atan2(self, x: Self) -> Self {
+        libm::atan2(self, x)
     }
 }
 

@@ -8,7 +8,7 @@
 
 use super::eight::{Eight, Lanewise, Octet};
 use super::lanes::Lanes;
-use super::{Scalar, sincos};
+use super::{DoubleDouble, Scalar, sincos};
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// `high + low` in eight lanes.
@@ -26,6 +26,18 @@ impl<L: Lanes> Pairs<L> {
     fn quick(high: Eight<L>, low: Eight<L>) -> Self {
         let sum = high + low;
         Self { high: sum, low: low - (sum - high) }
+    }
+
+    /// A function of every lane and that of another number by itself.
+    fn each(self, other: Self, f: impl Fn(DoubleDouble, DoubleDouble) -> DoubleDouble) -> Self {
+        let memory = |x: Self| {
+            let (mut high, mut low) = (Octet::default(), Octet::default());
+            x.store(&mut high, &mut low);
+            std::array::from_fn::<_, { super::eight::LANES }, _>(|lane| DoubleDouble::sum(high.0[lane], low.0[lane]))
+        };
+        let (a, b) = (memory(self), memory(other));
+        let found = std::array::from_fn::<_, { super::eight::LANES }, _>(|lane| f(a[lane], b[lane]));
+        Self::load(&Octet(found.map(|x| x.hi)), &Octet(found.map(|x| x.lo)))
     }
 }
 
@@ -76,6 +88,22 @@ impl<L: Lanes> Scalar for Pairs<L> {
         let (sin1, cos1) = sincos::sin_cos_pair([self.high.0[1], self.low.0[1]]);
         let join = |a: [L; 2], b: [L; 2]| Self { high: Eight([a[0], b[0]]), low: Eight([a[1], b[1]]) };
         (join(sin0, sin1), join(cos0, cos1))
+    }
+
+    fn exp(self) -> Self {
+        self.each(self, |x, _| x.exp())
+    }
+
+    fn ln(self) -> Self {
+        self.each(self, |x, _| x.ln())
+    }
+
+    fn tanh(self) -> Self {
+        self.each(self, |x, _| x.tanh())
+    }
+
+    fn atan2(self, x: Self) -> Self {
+        self.each(x, DoubleDouble::atan2)
     }
 }
 

@@ -1,0 +1,182 @@
+//! Formulas as lists of operations: recorded once from code written over [`Scalar`], evaluated on any scalar and as power series.
+//!
+//! Code that is generic over the scalar cannot branch on values, so what one run of it does on [`Symbol`]s is what every run does.  The
+//! list is a straight line: an operation refers to those before it by number.  Equal operations are recorded once, constants are folded, and
+//! what no result depends on is left out.
+//!
+//! Source: A. Griewank, A. Walther, *Evaluating Derivatives*, 2nd ed. (2008), chapters 2 (evaluation procedures) and 13 (Taylor arithmetic).
+
+mod series;
+mod symbol;
+
+pub use series::TapeSeries;
+pub use symbol::Symbol;
+
+use super::Scalar;
+
+/// Number of an operation on its tape.
+pub type Slot = u32;
+
+/// One operation; its operands are the results of operations before it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Operation {
+    /// A value from outside, by number.
+    Input(u32),
+    /// A constant.
+    Constant(f64),
+    /// a + b.
+    Add(Slot, Slot),
+    /// a - b.
+    Subtract(Slot, Slot),
+    /// a b.
+    Multiply(Slot, Slot),
+    /// a / b.
+    Divide(Slot, Slot),
+    /// -a.
+    Negate(Slot),
+    /// A plain number times a.
+    Scale(Slot, f64),
+    /// Square root.
+    Root(Slot),
+    /// Sine; the cosine is the result [`Beside`](Operation::Beside) it.
+    Sine(Slot),
+    /// Exponential.
+    Exponential(Slot),
+    /// Natural logarithm.
+    Logarithm(Slot),
+    /// Hyperbolic tangent c; 1 - c² is the result [`Beside`](Operation::Beside) it.
+    HyperbolicTangent(Slot),
+    /// The angle of the vector (x, y), given y, x and x² + y².
+    Angle(Slot, Slot, Slot),
+    /// The second result of the operation before.
+    Beside,
+}
+
+impl Operation {
+    /// The operands, as far as there are any.
+    fn operands(&self) -> [Option<Slot>; 3] {
+        match *self {
+            Self::Input(_) | Self::Constant(_) | Self::Beside => [None; 3],
+            Self::Add(a, b) | Self::Subtract(a, b) | Self::Multiply(a, b) | Self::Divide(a, b) => [Some(a), Some(b), None],
+            Self::Negate(a)
+            | Self::Scale(a, _)
+            | Self::Root(a)
+            | Self::Sine(a)
+            | Self::Exponential(a)
+            | Self::Logarithm(a)
+            | Self::HyperbolicTangent(a) => [Some(a), None, None],
+            Self::Angle(y, x, square) => [Some(y), Some(x), Some(square)],
+        }
+    }
+
+    /// The same with other numbers for its operands.
+    fn renumbered(self, new: &[Slot]) -> Self {
+        let of = |slot: Slot| new[slot as usize];
+        match self {
+            Self::Input(_) | Self::Constant(_) | Self::Beside => self,
+            Self::Add(a, b) => Self::Add(of(a), of(b)),
+            Self::Subtract(a, b) => Self::Subtract(of(a), of(b)),
+            Self::Multiply(a, b) => Self::Multiply(of(a), of(b)),
+            Self::Divide(a, b) => Self::Divide(of(a), of(b)),
+            Self::Negate(a) => Self::Negate(of(a)),
+            Self::Scale(a, factor) => Self::Scale(of(a), factor),
+            Self::Root(a) => Self::Root(of(a)),
+            Self::Sine(a) => Self::Sine(of(a)),
+            Self::Exponential(a) => Self::Exponential(of(a)),
+            Self::Logarithm(a) => Self::Logarithm(of(a)),
+            Self::HyperbolicTangent(a) => Self::HyperbolicTangent(of(a)),
+            Self::Angle(y, x, square) => Self::Angle(of(y), of(x), of(square)),
+        }
+    }
+
+    /// True for operations with a second result.
+    fn has_two_results(&self) -> bool {
+        matches!(self, Self::Sine(_) | Self::HyperbolicTangent(_))
+    }
+}
+
+/// A formula with any number of results.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tape {
+    operations: Vec<Operation>,
+}
+
+impl Tape {
+    /// The formula of `operations`, of which the `results` are asked for; these are renumbered.
+    fn new(operations: &[Operation], results: &mut [Slot]) -> Self {
+        let mut is_needed = vec![false; operations.len()];
+        for &result in results.iter() {
+            is_needed[result as usize] = true;
+        }
+        for i in (0..operations.len()).rev() {
+            if operations[i] == Operation::Beside && is_needed[i] {
+                is_needed[i - 1] = true;
+            }
+            if is_needed[i] {
+                operations[i].operands().into_iter().flatten().for_each(|operand| is_needed[operand as usize] = true);
+            }
+            if operations[i].has_two_results() && is_needed[i] {
+                is_needed[i + 1] = true;
+            }
+        }
+        let mut new = vec![0; operations.len()];
+        let mut kept = Vec::new();
+        for (i, operation) in operations.iter().enumerate().filter(|(i, _)| is_needed[*i]) {
+            new[i] = kept.len() as Slot;
+            kept.push(operation.renumbered(&new));
+        }
+        results.iter_mut().for_each(|result| *result = new[*result as usize]);
+        Self { operations: kept }
+    }
+
+    /// Number of operations, and of the numbers [`Tape::evaluate`] writes.
+    pub fn len(&self) -> usize {
+        self.operations.len()
+    }
+
+    /// True for a formula without results.
+    pub fn is_empty(&self) -> bool {
+        self.operations.is_empty()
+    }
+
+    /// The numbers of the inputs it asks for.
+    pub fn inputs(&self) -> impl Iterator<Item = u32> + '_ {
+        self.operations.iter().filter_map(|operation| if let Operation::Input(input) = operation { Some(*input) } else { None })
+    }
+
+    /// Writes the results of all operations to `slots`, of which there must be [`Tape::len`].
+    #[inline]
+    pub fn evaluate<S: Scalar>(&self, input: impl Fn(u32) -> S, slots: &mut [S]) {
+        for (i, operation) in self.operations.iter().enumerate() {
+            let of = |slot: Slot| slots[slot as usize];
+            slots[i] = match *operation {
+                Operation::Input(number) => input(number),
+                Operation::Constant(value) => S::of(value),
+                Operation::Add(a, b) => of(a) + of(b),
+                Operation::Subtract(a, b) => of(a) - of(b),
+                Operation::Multiply(a, b) => of(a) * of(b),
+                Operation::Divide(a, b) => of(a) / of(b),
+                Operation::Negate(a) => -of(a),
+                Operation::Scale(a, factor) => of(a).scale(factor),
+                Operation::Root(a) => of(a).sqrt(),
+                Operation::Exponential(a) => of(a).exp(),
+                Operation::Logarithm(a) => of(a).ln(),
+                Operation::Angle(y, x, _) => of(y).atan2(of(x)),
+                Operation::Sine(a) => {
+                    let (sin, cos) = of(a).sin_cos();
+                    slots[i + 1] = cos;
+                    sin
+                }
+                Operation::HyperbolicTangent(a) => {
+                    let tangent = of(a).tanh();
+                    slots[i + 1] = S::ONE - tangent * tangent;
+                    tangent
+                }
+                Operation::Beside => continue,
+            };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
