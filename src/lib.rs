@@ -52,11 +52,25 @@ pub mod chart;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod dynamics;
+mod error;
 pub mod report;
 pub mod run;
 pub mod scene;
+mod simulation;
 pub mod stabilization;
 pub mod stepping;
+
+pub use arithmetic::{DoubleDouble, Scalar};
+pub use dynamics::force::{Force, Loads, UserForce};
+pub use dynamics::row::Site;
+pub use dynamics::{Configuration, Mechanism, Motion};
+pub use error::Error;
+pub use run::trust::Level;
+pub use run::{
+    Drift, Limits, MethodId, Outcome, Plan, Request, Run, Running, Sample, Snapshot, Stabilization, Sweep, Trust, compare, reference,
+};
+pub use scene::{Scene, SceneBuilder, Template, ground, on, parse_scene, read_scene};
+pub use simulation::Simulation;
 
 #[doc = include_str!("../docs/source-problem.md")]
 pub mod source_problem {}

@@ -49,7 +49,7 @@ fn check(case: &Value) {
         let centre = mechanism.centre(k).acceleration(&kernel.z, &omega, &kernel.load);
         accelerations.extend([centre.re, centre.im, kernel.load[k]]);
     }
-    let forces = mechanism.hinge_forces(Default::default(), &kernel, &omega);
+    let forces = mechanism.hinge_forces(Default::default(), &kernel, &phi, &omega);
     // Hinge A: of the ground on bar 1; hinge B: of bar 1 on bar 2.
     let mut multipliers = vec![-forces[0].re, -forces[0].im, forces[1].re, forces[1].im];
     multipliers.extend(&kernel.multiplier);

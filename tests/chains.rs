@@ -226,7 +226,7 @@ fn every_link_of_a_very_long_chain_is_in_balance() {
     let (phi, omega) = (plain(&start.phi), plain(&start.omega));
     let kernel = evaluate(&mechanism, &phi, &omega, Bias::default());
     assert!(kernel.load.iter().all(|alpha| alpha.is_finite()));
-    let forces = mechanism.hinge_forces(start.time, &kernel, &omega);
+    let forces = mechanism.hinge_forces(start.time, &kernel, &phi, &omega);
     let largest = forces.iter().fold(0.0, |most: f64, force| most.max(force.norm_squared().sqrt()));
     let mut worst = 0.0_f64;
     for (k, body) in mechanism.bodies.iter().enumerate() {
@@ -253,7 +253,7 @@ fn hinge_forces_are_the_multipliers_of_pins() {
     let start = hung.start(&scene);
     let plain = |x: &[DoubleDouble]| x.iter().map(|x| x.hi).collect::<Vec<_>>();
     let kernel = evaluate(&hung, &plain(&start.phi), &plain(&start.omega), Bias::default());
-    let carried = hung.hinge_forces(start.time, &kernel, &plain(&start.omega))[cut];
+    let carried = hung.hinge_forces(start.time, &kernel, &plain(&start.phi), &plain(&start.omega))[cut];
     let loose = Mechanism::new(&scene).expect("equations");
     let sites = between.map(|place| loose.forest.site(&place));
     let pinned = loose.pinned("cut", &sites[0], &sites[1]).body_by_body();

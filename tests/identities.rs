@@ -169,7 +169,7 @@ proptest! {
         let (phi, omega) = (plain(&motion.phi), plain(&motion.omega));
         let kernel = evaluate(&mechanism, &motion);
         let other = redundant(&scene, t.hi, &phi, &omega);
-        let forces = mechanism.hinge_forces(motion.time, &kernel, &omega);
+        let forces = mechanism.hinge_forces(motion.time, &kernel, &phi, &omega);
         let scale = largest(other.alpha.iter().chain(&other.motors).copied().chain(other.hinges.iter().flat_map(|f| [f.re, f.im])));
         let close = |a: f64, b: f64| (a - b).abs() < 1e-10 * scale;
         for k in 0..mechanism.bodies.len() {

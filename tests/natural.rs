@@ -188,7 +188,7 @@ proptest! {
     fn hinge_forces_are_the_multipliers_of_the_hinges_as_pins(n in 2..=5usize, seed in any::<u64>()) {
         let Sound { scene, mechanism, motion, kernel } = sound(n, seed)?;
         let (phi, omega) = numbers(&motion);
-        let forces = mechanism.hinge_forces(Time::default(), &kernel, &omega);
+        let forces = mechanism.hinge_forces(Time::default(), &kernel, &phi, &omega);
         // The same bodies in the same places, each by itself.
         let mut loose = Scene { hinges: Vec::new(), ..scene.clone() };
         for k in 0..n {

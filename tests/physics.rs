@@ -31,6 +31,7 @@ mod dense;
 mod drift;
 mod events;
 mod extremes;
+mod forces;
 mod gauss;
 mod identities;
 mod impact;

@@ -21,7 +21,7 @@ fn solve(scene: &Scene) -> ([f64; 6], Vec<f64>, Vec<Complex<f64>>) {
         let centre = mechanism.centre(k).acceleration(&kernel.z, &omega, &kernel.load);
         found[3 * k..3 * k + 3].copy_from_slice(&[centre.re, centre.im, kernel.load[k]]);
     }
-    (found, kernel.multiplier.clone(), mechanism.hinge_forces(Default::default(), &kernel, &omega))
+    (found, kernel.multiplier.clone(), mechanism.hinge_forces(Default::default(), &kernel, &phi, &omega))
 }
 
 /// Every digit printed in the source.

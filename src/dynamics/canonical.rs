@@ -13,9 +13,11 @@
 
 mod stages;
 
+use super::energy::moment;
 use super::jacobian::{LANES, Slopes};
 use super::kernel::{Kernel, dot};
 use super::law::Phase;
+use super::row::Posture;
 use super::stiffness::Stiffness;
 use super::tree::{self, size};
 use super::{Field, Form, Mechanism, Motion, Points, State, Time};
@@ -44,6 +46,8 @@ struct Scratch<T> {
     drive_acceleration: Vec<T>,
     /// What applied forces are multiplied by at that time.
     factor: Vec<T>,
+    /// That time \[s\], where forces from outside ask for it.
+    time: T,
     omega: Vec<T>,
     momentum: Vec<T>,
     reduced: Vec<T>,
@@ -58,6 +62,7 @@ impl<T: Scalar> Scratch<T> {
         Self {
             kernel: Kernel::dense_without_rows(mechanism),
             factor: vec![T::ONE; mechanism.actions.len()],
+            time: T::ZERO,
             drive: vec![Phase::default(); n],
             drive_rate: zeros(),
             drive_acceleration: zeros(),
@@ -120,6 +125,9 @@ impl<T: Scalar> Scratch<T> {
         for torsion in &mechanism.torsions {
             torsion.pull(torsion.elastic(y), &mut kernel.load);
         }
+        for force in &mechanism.forces {
+            force.pull_by_potential(self.time, Posture { phi: y, z: &kernel.z, omega: &self.omega }, &mut kernel.load);
+        }
         if !ACCOUNT {
             rate[..n].copy_from_slice(&self.omega[..n]);
             rate[n..2 * n].copy_from_slice(&kernel.load[..n]);
@@ -140,6 +148,9 @@ impl<T: Scalar> Scratch<T> {
             for (action, &factor) in mechanism.actions.iter().zip(&self.factor) {
                 action.pull(factor, &kernel.z, &mut kernel.load);
             }
+            for force in &mechanism.forces {
+                force.pull_applied(self.time, Posture { phi: y, z: &kernel.z, omega: &self.omega }, &mut kernel.load);
+            }
             mechanism.ties.gather(&kernel.load, &mut self.pivot);
             for (p, &force) in p_part.iter_mut().zip(&self.pivot) {
                 *p += force;
@@ -159,6 +170,7 @@ impl<T: Real> Scratch<T> {
         for (factor, action) in self.factor.iter_mut().zip(&mechanism.actions) {
             *factor = action.factor(t);
         }
+        self.time = moment(t);
     }
 }
 

@@ -3,7 +3,7 @@
 mod parts;
 
 use super::assembly::Assembly;
-use super::force::{Action, Spring, Torsion, Vibration};
+use super::force::{Action, Spring, Torsion, UserForce, Vibration};
 use super::forest::{Foot, Forest};
 use super::impact::Contact;
 use super::kernel::Kernel;
@@ -46,6 +46,8 @@ pub struct Mechanism {
     pub rigid_rate: Option<f64>,
     /// Applied forces and torques.
     pub actions: Vec<Action>,
+    /// Forces from outside the crate.
+    pub forces: Vec<UserForce>,
     /// Constraint rows: given angles, then points that coincide or stay on lines, then one per contact that is held.
     pub rows: Vec<Row>,
     /// How many motors give angles; their rows come first.
@@ -166,6 +168,15 @@ pub enum CompileError {
         /// Its energy \[J\].
         energy: f64,
     },
+    /// The scene was put together by hand and makes no sense.
+    #[error("the scene makes no sense: {0}")]
+    Unsound(String),
+    /// A potential depends on time or rates.
+    #[error("the potential of force `{0}` depends on time or rates\nhint: leave what does to `Force::apply`")]
+    NoPotential(String),
+    /// A force acts on a body the mechanism does not have.
+    #[error("force `{0}` is one of another mechanism: it names a body that is not there")]
+    ForeignForce(String),
     /// No bar has the name asked for.
     #[error("no bar is called `{0}`")]
     NoSuchBar(String),
@@ -185,6 +196,20 @@ impl Mechanism {
     /// # Errors
     /// What the reader of scenes refuses too (doubled motors), a singular mass matrix, or too many rows that act on one another.
     pub fn new(scene: &Scene) -> Result<Self, CompileError> {
+        Self::with_forces(scene, Vec::new())
+    }
+
+    /// Compiles a scene with forces from outside.
+    ///
+    /// # Errors
+    /// Those of [`Mechanism::new`], and forces on bodies that are not there.
+    pub fn with_forces(scene: &Scene, forces: Vec<UserForce>) -> Result<Self, CompileError> {
+        if let Some(fault) = scene.fault() {
+            return Err(CompileError::Unsound(fault));
+        }
+        if let Some(foreign) = forces.iter().find(|force| force.last_body() >= Some(scene.bars.len())) {
+            return Err(CompileError::ForeignForce(foreign.name.clone()));
+        }
         let forest = Forest::new(scene);
         let n = forest.coordinates;
         let bodies: Vec<Body> = (scene.bars.iter().zip(&forest.hangs))
@@ -243,6 +268,7 @@ impl Mechanism {
             ground_energy,
             tree: constants(&bodies, &forest, gravity),
             actions: actions(scene, &forest),
+            forces,
             bodies,
             forest,
             joints,
@@ -379,19 +405,21 @@ impl Mechanism {
         mechanism
     }
 
-    /// True where the scene has a damper.
+    /// True where the scene has a damper, or a force from outside that depends on rates.
     pub fn is_damped(&self) -> bool {
-        self.springs.iter().any(|spring| spring.damping != 0.0) || self.torsions.iter().any(|torsion| torsion.damping != 0.0)
+        self.forces.iter().any(UserForce::depends_on_rates)
+            || self.springs.iter().any(|spring| spring.damping != 0.0)
+            || self.torsions.iter().any(|torsion| torsion.damping != 0.0)
     }
 
     /// True where anything but gravity and rows acts.
     pub fn is_forced(&self) -> bool {
-        !(self.springs.is_empty() && self.torsions.is_empty() && self.actions.is_empty())
+        !(self.springs.is_empty() && self.torsions.is_empty() && self.actions.is_empty() && self.forces.is_empty())
     }
 
     /// True where forces do work that no energy stands for: dampers, applied forces and torques.
     pub fn is_worked_on(&self) -> bool {
-        self.is_damped() || !self.actions.is_empty()
+        self.is_damped() || !self.actions.is_empty() || self.forces.iter().any(UserForce::does_work)
     }
 
     /// True where motors, dampers or applied forces do work, so that a form must keep account of it.
@@ -406,7 +434,7 @@ impl Mechanism {
 
     /// True where whole turns matter, so that angles are not wrapped.
     pub fn is_winding(&self) -> bool {
-        !self.torsions.is_empty()
+        !self.torsions.is_empty() || self.forces.iter().any(UserForce::counts_turns)
     }
 
     /// True where row number `row` is that of a motor, on an angle or on a slider; not where it locks an angle.

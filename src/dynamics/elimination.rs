@@ -9,6 +9,7 @@
 use super::gap::turning;
 use super::jacobian::Jacobian;
 use super::kernel::{Bias, Kernel};
+use super::row::Posture;
 use super::tree::{self, size};
 use super::{Along, Coordinates, Field, Form, Glance, Mechanism, Motion, State, Time};
 use crate::arithmetic::{Complex, DoubleDouble};
@@ -116,7 +117,7 @@ impl<const N: usize> Elimination<N> {
         for k in 0..n {
             power -= (load[k] - given[k]) * drive_rate[k];
         }
-        power += mechanism.force_power(t, &kernel.z, omega);
+        power += mechanism.force_power(t, Posture { phi: &self.phi, z: &kernel.z, omega });
         rate[..f].copy_from_slice(&u_rate[..f]);
         rate[f..2 * f].copy_from_slice(&acceleration[..f]);
         rate[2 * f] = power;

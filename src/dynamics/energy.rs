@@ -43,7 +43,21 @@ impl Code for ExactEnergy<'_> {
     }
 }
 
+/// A time as a number of some kind, which changes with it.
+#[inline(always)]
+pub(super) fn moment<T: Real>(t: Time) -> T {
+    T::split(t).0.moving(|| 1.0)
+}
+
 impl Mechanism {
+    /// Magnitudes of the forces from outside at a motion, times `size` \[m\], and of their torques \[J\].
+    pub(super) fn forces_at_start(&self, start: &Motion, size: f64) -> f64 {
+        let [phi, omega] = [&start.phi, &start.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<f64>>());
+        let z = self.elements(&phi);
+        let magnitudes = self.forces.iter().map(|force| force.magnitudes(start.time.hi, Posture { phi: &phi, z: &z, omega: &omega }));
+        magnitudes.map(|[force, torque]| force * size + torque).sum()
+    }
+
     /// The scene's start as a motion: found from the rows where a part of it can be, else as given.
     pub fn start(&self, scene: &Scene) -> Motion {
         self.assembly.start.clone().unwrap_or_else(|| self.start_as_given(scene))
@@ -121,7 +135,7 @@ impl Mechanism {
         let elastic = vibration.map_or(springs, |potential| springs + potential);
         Energy {
             kinetic: dot(omega, &kernel.load).scale(0.5),
-            potential: self.torsions.iter().fold(elastic, |sum, torsion| sum + torsion.energy(phi)),
+            potential: self.other_energy(&kernel.z, phi, self.torsions.iter().fold(elastic, |sum, torsion| sum + torsion.energy(phi))),
         }
     }
 
@@ -146,7 +160,13 @@ impl Mechanism {
     #[inline(always)]
     fn elastic_energy<T: Real>(&self, z: &[Complex<T>], phi: &[T]) -> T {
         let springs = self.springs.iter().fold(T::ZERO, |sum, spring| sum + spring.energy(z));
-        self.torsions.iter().fold(springs, |sum, torsion| sum + torsion.energy(phi))
+        self.other_energy(z, phi, self.torsions.iter().fold(springs, |sum, torsion| sum + torsion.energy(phi)))
+    }
+
+    /// Adds the potentials of forces from outside \[J\] to a sum.
+    #[inline(always)]
+    fn other_energy<T: Real>(&self, z: &[Complex<T>], phi: &[T], sum: T) -> T {
+        self.forces.iter().fold(sum, |sum, force| sum + force.energy(T::ZERO, Posture { phi, z, omega: &[] }))
     }
 
     /// Adds the generalized forces \[N·m, N\] of springs, dampers and applied forces.
@@ -169,11 +189,14 @@ impl Mechanism {
         for action in &self.actions {
             action.pull(action.factor(t), at.z, load);
         }
+        for force in &self.forces {
+            force.pull(moment(t), at, load);
+        }
     }
 
     /// Power of dampers and applied forces on the bodies \[W\].
     #[inline(always)]
-    pub fn force_power<T: Real>(&self, t: Time, z: &[Complex<T>], omega: &[T]) -> T {
+    pub fn force_power<T: Real>(&self, t: Time, Posture { phi, z, omega }: Posture<T>) -> T {
         let mut power = T::ZERO;
         for spring in self.springs.iter().filter(|spring| spring.damping != 0.0) {
             power += spring.drag_power(z, omega);
@@ -183,6 +206,9 @@ impl Mechanism {
         }
         for action in &self.actions {
             power += action.power(action.factor(t), z, omega);
+        }
+        for force in &self.forces {
+            power += force.work_rate(moment(t), Posture { phi, z, omega });
         }
         power
     }
@@ -206,7 +232,7 @@ impl Mechanism {
             Kind::Force { force, .. } => force.norm_squared().sqrt() * size,
             Kind::Torque { torque, .. } => torque.abs(),
         });
-        let scale = falling + applied.sum::<f64>();
+        let scale = falling + applied.sum::<f64>() + self.forces_at_start(start, size);
         if scale > 0.0 { scale } else { 1.0 }
     }
 }

@@ -41,7 +41,7 @@ impl Mechanism {
     /// `multiplier` those of all rows.  Those that redundant or singular rows leave open are the ones of least norm.
     pub fn joint_forces(&self, t: Time, kernel: &Kernel<f64>, phi: &[f64], omega: &[f64]) -> JointForces {
         let (rows, joints) = (self.rows.len(), self.joints.len());
-        let hinges = self.hinge_forces(t, kernel, omega);
+        let hinges = self.hinge_forces(t, kernel, phi, omega);
         let open = (self.assembly.redundant.len() + self.assembly.singular.len()).min(rows);
         let is_known = if open == 0 { Some(true) } else { None };
         let mut found = JointForces {

@@ -54,7 +54,7 @@ impl Jacobian {
                 self.omega[k] = Slopes::unknown(omega[k], lane(n + k));
             }
             self.kernel.accelerate::<0>(mechanism, t, &self.phi, &self.omega, bias);
-            let (work, stabilizer) = self.kernel.powers(mechanism, t, &self.omega);
+            let (work, stabilizer) = self.kernel.powers(mechanism, t, &self.phi, &self.omega);
             for lane in 0..LANES.min(2 * n - first) {
                 for k in 0..n {
                     self.acceleration[2 * n * k + first + lane] = self.kernel.load[k].slope[lane];
@@ -123,7 +123,7 @@ mod tests {
         let y: Vec<_> = y.iter().enumerate().map(|(k, &y)| DoubleDouble::sum(y, off(k))).collect();
         let mut kernel = Kernel::<DoubleDouble>::new(mechanism);
         kernel.accelerate::<0>(mechanism, t, &y[..n], &y[n..], bias);
-        let (work, stabilizer) = kernel.powers(mechanism, t, &y[n..]);
+        let (work, stabilizer) = kernel.powers(mechanism, t, &y[..n], &y[n..]);
         kernel.load.iter().copied().chain([work, stabilizer]).collect()
     }
 

@@ -277,7 +277,7 @@ impl<T: Real> Kernel<T> {
 
     /// Power of motors, dampers and applied forces, and power of the bias's share of the multipliers \[W\]; after [`Kernel::accelerate`].
     #[inline(always)]
-    pub fn powers(&self, mechanism: &Mechanism, t: Time, omega: &[T]) -> (T, T) {
+    pub fn powers(&self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) -> (T, T) {
         let (mut work, mut stabilizer) = (T::ZERO, T::ZERO);
         for (r, row) in mechanism.rows.iter().enumerate() {
             // What stands still, and what moves both its points alike, does no work.
@@ -288,7 +288,7 @@ impl<T: Real> Kernel<T> {
             work -= (self.multiplier[r] - self.correction[r]) * speed;
             stabilizer -= self.correction[r] * speed;
         }
-        (work + mechanism.force_power(t, &self.z, omega), stabilizer)
+        (work + mechanism.force_power(t, Posture { phi, z: &self.z, omega }), stabilizer)
     }
 
     /// C, G, C_t, gamma of every row, and the factors of S = G M⁻¹ Gᵀ; expects the factors of M.

@@ -9,10 +9,12 @@
 //!
 //! Written once over [`Lanes`] and compiled twice, to the same bits.
 
+use super::energy::moment;
 use super::force::action::Kind;
 use super::multiplier::Multiplier;
 use super::natural::columns::{self, Columns};
 use super::natural::{Reduced, sorted_rows};
+use super::row::Posture;
 use super::stiffness::Stiffness;
 use super::{Coordinates, Field, Form, Glance, Mechanism, Motion, State, Time};
 use crate::arithmetic::lanes::row::{Row, load, store};
@@ -207,6 +209,9 @@ fn forces(mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64], z: &[Compl
             }
         }
     }
+    for user in &mechanism.forces {
+        user.spread(moment(t), Posture { phi, z, omega }, |k, pull| force[k] += pull);
+    }
 }
 
 impl Field for Looped {
@@ -232,7 +237,7 @@ impl Field for Looped {
         rate[n..2 * n].copy_from_slice(alpha);
         rate[..n].copy_from_slice(omega);
         // Rows that never move do no work.
-        (rate[2 * n], rate[2 * n + 1]) = (mechanism.force_power(t, z, omega), 0.0);
+        (rate[2 * n], rate[2 * n + 1]) = (mechanism.force_power(t, Posture { phi, z, omega }), 0.0);
     }
 
     fn fine_rate(&mut self, t: Time, y: &[f64], low: &[f64], rate: &mut [f64]) {

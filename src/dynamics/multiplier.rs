@@ -45,7 +45,7 @@ impl<const N: usize, const ACCOUNT: bool> Multiplier<N, ACCOUNT> {
             (rates[k], rates[n + k]) = (omega[k], load[k]);
         }
         if ACCOUNT {
-            (rate[2 * n], rate[2 * n + 1]) = self.kernel.powers(&self.mechanism, t, omega);
+            (rate[2 * n], rate[2 * n + 1]) = self.kernel.powers(&self.mechanism, t, phi, omega);
         }
     }
 

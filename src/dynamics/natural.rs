@@ -29,7 +29,7 @@ pub use reduced::{Block, Linear, Reduced, times};
 use super::force::action::Kind;
 use super::law::Law;
 use super::quadratic::Quadratic;
-use super::row::{Measure, Row};
+use super::row::{Measure, Posture, Row};
 use super::{Form, Mechanism, Motion, State, Time, schur, tree};
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use std::sync::Arc;
@@ -112,6 +112,9 @@ impl Natural {
         if let Some(contact) = mechanism.contacts.first() {
             return Err(NaturalError::Wall(contact.row.name.clone()));
         }
+        if let Some(force) = mechanism.forces.iter().find(|force| !force.is_potential_of_place()) {
+            return Err(NaturalError::Applied(force.name.clone()));
+        }
         let mut applied = vec![Complex::ZERO; mechanism.coordinates()];
         let mut torques = Vec::new();
         for action in &mechanism.actions {
@@ -192,6 +195,9 @@ impl Natural {
         for spring in &self.mechanism.springs {
             let pull = spring.elastic(z);
             spring.span.spread(pull, |k, pull| force[k] += pull);
+        }
+        for user in &self.mechanism.forces {
+            user.spread(T::ZERO, Posture { phi: &[], z, omega: &[] }, |k, pull| force[k] += pull);
         }
         for &Torque { body, base, torque } in &self.torques {
             force[body] += z[body].left().times(T::of(torque));

@@ -11,6 +11,7 @@
 use super::compile::Joint;
 use super::forest::swing;
 use super::kernel::Kernel;
+use super::row::Posture;
 use super::{Mechanism, Time};
 use crate::arithmetic::Complex;
 
@@ -25,9 +26,9 @@ impl Mechanism {
         found
     }
 
-    /// Force \[N\] of the first body of each hinge on the second (in the scene's order), from an evaluation of the equations at these rates
-    /// \[rad/s\]: its `load` must hold the accelerations, its `multiplier` those of all rows.
-    pub fn hinge_forces(&self, t: Time, kernel: &Kernel<f64>, omega: &[f64]) -> Vec<Complex<f64>> {
+    /// Force \[N\] of the first body of each hinge on the second (in the scene's order), from an evaluation of the equations at these angles
+    /// \[rad\] and rates \[rad/s\]: its `load` must hold the accelerations, its `multiplier` those of all rows.
+    pub fn hinge_forces(&self, t: Time, kernel: &Kernel<f64>, phi: &[f64], omega: &[f64]) -> Vec<Complex<f64>> {
         let (z, alpha) = (&kernel.z, &kernel.load);
         let mut needed = self.centre_accelerations(z, omega, alpha);
         for (needed, body) in needed.iter_mut().zip(&self.bodies) {
@@ -43,6 +44,9 @@ impl Mechanism {
         }
         for action in &self.actions {
             needed[action.body] -= action.force(action.factor(t), z);
+        }
+        for user in &self.forces {
+            user.forces(t.hi, Posture { phi, z, omega }, |body, force| needed[body] -= force);
         }
         self.transmitted(z, &kernel.multiplier, needed)
     }

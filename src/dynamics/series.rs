@@ -29,6 +29,7 @@ mod drive;
 pub mod polynomial;
 mod rows;
 mod spring;
+mod user;
 
 use self::action::ActionSeries;
 use self::bodywise::Bodywise;
@@ -36,6 +37,7 @@ pub use self::coefficient::Coefficient;
 use self::polynomial::{Fractions, UNROLLED, convolve, copy, copy_vectors, width, zeros};
 use self::rows::RowSeries;
 use self::spring::SpringSeries;
+use self::user::{At, UserSeries};
 use super::impact::Contact;
 use super::row::Measure;
 use super::schur::{self, Weakest};
@@ -76,6 +78,9 @@ pub struct Series<T> {
     phi: Vec<T>,
     springs: Vec<SpringSeries<T>>,
     actions: Vec<ActionSeries<T>>,
+    forces: Vec<UserSeries<T>>,
+    /// The time at the start \[s\].
+    time: T,
     rows: RowSeries<T>,
     turned: Vec<Complex<T>>,
     bend: Vec<Complex<T>>,
@@ -113,6 +118,8 @@ impl<T: Coefficient> Series<T> {
             applied: zeros(order * n),
             phi: zeros(n),
             actions: mechanism.actions.iter().map(|action| ActionSeries::new(action, order)).collect(),
+            forces: mechanism.forces.iter().map(|force| UserSeries::new(force, order)).collect(),
+            time: T::ZERO,
             springs: mechanism.springs.iter().map(|spring| SpringSeries::new(spring, order)).collect(),
             rows: RowSeries::new(mechanism, &ties, order, bodywise.is_none()),
             turned: vec![Complex::ZERO; n],
@@ -162,6 +169,9 @@ impl<T: Coefficient> Series<T> {
         for (spring, first) in self.springs.iter_mut().zip(&first.springs) {
             spring.take(first);
         }
+        for (force, first) in self.forces.iter_mut().zip(&first.forces) {
+            force.take(first);
+        }
         self.rows.take(&first.rows);
         T::orders(self, mechanism, first.order.min(self.order));
     }
@@ -189,6 +199,7 @@ impl<T: Coefficient> Series<T> {
         for (series, action) in self.actions.iter_mut().zip(&mechanism.actions) {
             series.begin(action, t);
         }
+        self.time = T::split(t).0;
     }
 
     /// Power `m`, below the order, of the multipliers of the rows in force \[N, N·m over s^m\]: all rows, or all but the motors' where
@@ -373,7 +384,7 @@ impl<T: Coefficient> Series<T> {
             let force = series.force(spring, m, &self.z, n);
             spring.span.spread(force, |k, force| rest[k] -= force);
         }
-        if !mechanism.torsions.is_empty() || !self.actions.is_empty() {
+        if !mechanism.torsions.is_empty() || !self.actions.is_empty() || !self.forces.is_empty() {
             let applied = &mut self.applied[m * n..(m + 1) * n];
             applied.fill(T::ZERO);
             for torsion in &mechanism.torsions {
@@ -381,6 +392,10 @@ impl<T: Coefficient> Series<T> {
             }
             for (action, series) in mechanism.actions.iter().zip(&mut self.actions) {
                 series.act(action, m, &self.z, n, rest, applied);
+            }
+            let at = At { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
+            for (force, series) in mechanism.forces.iter().zip(&mut self.forces) {
+                series.act(force, m, at, rest, applied);
             }
             for (load, &applied) in self.load.iter_mut().zip(applied.iter()) {
                 *load += applied;

@@ -58,7 +58,7 @@ impl Stiffness {
 
     /// That of the start of a run, where springs or dampers can make it stiff.
     pub fn at_start(mechanism: &Mechanism, start: &Motion) -> Option<Self> {
-        let has_any = !mechanism.springs.is_empty() || !mechanism.torsions.is_empty();
+        let has_any = !mechanism.springs.is_empty() || !mechanism.torsions.is_empty() || !mechanism.forces.is_empty();
         let [phi, omega] = [&start.phi, &start.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<f64>>());
         has_any.then(|| Self::at(mechanism, start.time, &phi, &omega))
     }

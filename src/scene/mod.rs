@@ -3,6 +3,7 @@
 //! [`read`] turns JSON into a [`Scene`] or refuses it with one precise error.  What stands here is already *resolved*: a uniform bar
 //! has become mass, centre and inertia; names have become indices.  Angles are absolute, from +x, counter-clockwise, in radians.
 
+mod build;
 mod digits;
 mod error;
 mod fit;
@@ -12,10 +13,12 @@ mod number;
 pub mod read;
 mod schema;
 mod set;
+mod sound;
 mod stays;
 mod template;
 mod write;
 
+pub use build::{SceneBuilder, ground, on};
 pub use digits::Written;
 pub use error::{Refusal, SceneError};
 pub use number::number;

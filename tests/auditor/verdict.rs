@@ -48,7 +48,7 @@ pub fn run(text: &str, request: &Request) -> Result<Ran, String> {
     let forces = samples.iter().map(|sample| {
         kernel.accelerate::<0>(&mechanism, Time::from(sample.t), &sample.phi, &sample.omega, Bias::default());
         mechanism.spread_multipliers(&mut kernel);
-        let forces = mechanism.hinge_forces(Time::from(sample.t), &kernel, &sample.omega);
+        let forces = mechanism.hinge_forces(Time::from(sample.t), &kernel, &sample.phi, &sample.omega);
         (forces.iter().map(|force| [force.re, force.im]).collect(), kernel.multiplier.clone())
     });
     let forces = forces.collect();

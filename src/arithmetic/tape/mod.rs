@@ -144,6 +144,11 @@ impl Tape {
         self.operations.iter().filter_map(|operation| if let Operation::Input(input) = operation { Some(*input) } else { None })
     }
 
+    /// The numbers of the inputs that these results depend on.
+    pub fn inputs_of(&self, results: &[Slot]) -> Vec<u32> {
+        Self::new(&self.operations, &mut results.to_vec()).inputs().collect()
+    }
+
     /// Writes the results of all operations to `slots`, of which there must be [`Tape::len`].
     #[inline]
     pub fn evaluate<S: Scalar>(&self, input: impl Fn(u32) -> S, slots: &mut [S]) {

@@ -71,16 +71,13 @@ impl Recording {
 }
 
 impl Symbol {
-    /// Records what `formula` does; the tape holds what its results depend on, and their numbers on it take the place of the symbols.
-    pub fn record<const N: usize>(formula: impl FnOnce() -> [Vec<Symbol>; N]) -> (Tape, [Vec<Slot>; N]) {
+    /// Records what `formula` does: for each list of results a tape of what they depend on, with their numbers on it.
+    pub fn record<const N: usize>(formula: impl FnOnce() -> [Vec<Symbol>; N]) -> [(Tape, Vec<Slot>); N] {
         let before = RECORDING.with(|recording| recording.replace(Some(Recording::default())));
         let results = formula();
         let slots = results.map(|results| results.into_iter().map(Self::slot).collect::<Vec<Slot>>());
         let recording = RECORDING.with(|recording| recording.replace(before)).unwrap_or_default();
-        let mut all: Vec<Slot> = slots.iter().flatten().copied().collect();
-        let tape = Tape::new(&recording.operations, &mut all);
-        let mut rest = all.into_iter();
-        (tape, slots.map(|slots| rest.by_ref().take(slots.len()).collect()))
+        slots.map(|mut slots| (Tape::new(&recording.operations, &mut slots), slots))
     }
 
     /// The value from outside with this number.

@@ -11,13 +11,13 @@ fn formula<S: Scalar>(x: S, y: S) -> S {
 
 fn recorded() -> (Tape, Slot, Vec<(u32, Slot)>) {
     let mut inputs = Vec::new();
-    let (tape, [value, gradient]) = Symbol::record(|| {
+    let [(tape, results)] = Symbol::record(|| {
         let value = formula(Symbol::input(0), Symbol::input(1));
         let gradient = value.gradient();
         inputs = gradient.iter().map(|part| part.0).collect();
-        [vec![value], gradient.into_iter().map(|part| part.1).collect()]
+        [std::iter::once(value).chain(gradient.into_iter().map(|part| part.1)).collect()]
     });
-    (tape, value[0], inputs.into_iter().zip(gradient).collect())
+    (tape, results[0], inputs.into_iter().zip(results[1..].iter().copied()).collect())
 }
 
 fn evaluated<S: Scalar>(tape: &Tape, at: [S; 2]) -> Vec<S> {
@@ -70,7 +70,7 @@ fn series_agree_with_differences_of_values_along_a_path() {
 
 #[test]
 fn what_is_said_twice_is_recorded_once_and_what_nobody_asks_for_is_not() {
-    let (tape, _) = Symbol::record(|| {
+    let [(tape, _)] = Symbol::record(|| {
         let x = Symbol::input(0);
         let unused = x.exp();
         let _ = unused * unused;

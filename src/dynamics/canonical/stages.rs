@@ -70,6 +70,11 @@ impl<T: Lanewise> Bench<T> {
         self.scratch.drive(k, phase);
     }
 
+    /// Takes the times of all points.
+    fn set(&mut self, time: &[Time; LANES]) {
+        self.scratch.time = T::load(&Octet(time.map(|time| time.hi)), &Octet(time.map(|time| time.lo)));
+    }
+
     /// Takes what applied force `a` is multiplied by at all points.
     fn multiply(&mut self, a: usize, factors: &[DoubleDouble; LANES]) {
         self.scratch.factor[a] = T::load(&Octet(factors.map(|factor| factor.hi)), &Octet(factors.map(|factor| factor.lo)));
@@ -101,6 +106,8 @@ impl<L: Lanes> Both<L> {
             self.plain.multiply(a, &factors);
             self.exact.multiply(a, &factors);
         }
+        self.plain.set(time);
+        self.exact.set(time);
     }
 }
 

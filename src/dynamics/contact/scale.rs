@@ -32,6 +32,7 @@ impl Mechanism {
         let others = own.iter().copied().fold(0.0, f64::max);
         let gravity = self.gravity.norm_squared().sqrt();
         let energy = self.energy_of_start(start);
+        let pushed = self.forces_at_start(start, size(&self.bodies));
         let mass: f64 = self.bodies.iter().map(|body| body.mass).sum();
         for (contact, own) in self.contacts.iter_mut().zip(own) {
             let speed = contact.normal.dot(contact.point.velocity(&z, &omega));
@@ -42,7 +43,8 @@ impl Mechanism {
             let force = energy / contact.length
                 + mass * gravity
                 + driven(&self.rows, mass, contact.length)
-                + applied(&self.actions, contact.length);
+                + applied(&self.actions, contact.length)
+                + pushed / contact.length;
             contact.force = power_of_two(if force.is_finite() && force > 0.0 { force } else { 1.0 });
         }
     }

@@ -3,9 +3,11 @@
 pub mod action;
 pub mod spring;
 pub mod torsion;
+pub mod user;
 pub mod vibration;
 
 pub use action::Action;
 pub use spring::Spring;
 pub use torsion::Torsion;
+pub use user::{Force, Loads, UserForce};
 pub use vibration::Vibration;

@@ -35,6 +35,9 @@ impl<T: Coefficient> Series<T> {
         for (action, series) in mechanism.actions.iter().zip(&mut self.actions) {
             power += series.power(action, m, &self.omega[m * n..(m + 1) * n]);
         }
+        for (force, series) in mechanism.forces.iter().zip(&self.forces) {
+            power += series.power(force, m);
+        }
         self.power[m] = power;
     }
 }

@@ -41,7 +41,7 @@ impl Prices {
     /// Those of a mechanism, for the plans of a companion and of its run.
     pub fn new(mechanism: &Mechanism, companion: &Plan, run: &Plan) -> Self {
         let (n, rows) = (mechanism.coordinates() as f64, mechanism.rows.len() as f64);
-        let forces = (mechanism.springs.len() + mechanism.torsions.len() + mechanism.actions.len()) as f64;
+        let forces = (mechanism.springs.len() + mechanism.torsions.len() + mechanism.actions.len() + mechanism.forces.len()) as f64;
         let goes_bodywise = mechanism.recursion.is_some();
         let matrices = if goes_bodywise { 7.0 * n } else { 4.0 * n * n };
         let evaluation = 15.0 + 20.0 * n + matrices + 60.0 * rows + 20.0 * forces;

@@ -303,7 +303,9 @@ impl Tangent {
         }
         // Of the prices of `budget`: the series at this order, and the columns beside it, which are worked on by vectors.
         let (n, rows) = (self.mechanism.coordinates() as f64, self.mechanism.rows.len() as f64);
-        let forces = (self.mechanism.springs.len() + self.mechanism.torsions.len() + self.mechanism.actions.len()) as f64;
+        let forces =
+            (self.mechanism.springs.len() + self.mechanism.torsions.len() + self.mechanism.actions.len() + self.mechanism.forces.len())
+                as f64;
         let series = 700.0 + 400.0 * n + 150.0 * n * n + 700.0 * (rows + forces);
         let evaluation = 15.0 + 20.0 * n + 4.0 * n * n + 60.0 * rows + 20.0 * forces;
         (0.2 * series * (1.0 + 0.75 * self.seeds.len() as f64) / evaluation) as u64

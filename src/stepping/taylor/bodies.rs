@@ -90,7 +90,8 @@ impl<const B: usize, const S: usize> Bodies<B, S> {
     pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize) -> Option<Self> {
         let tree = &mechanism.tree;
         let n = tree.coordinates;
-        let is_sprung_only = mechanism.torsions.is_empty() && mechanism.actions.is_empty() && mechanism.rows.is_empty();
+        let is_sprung_only =
+            mechanism.torsions.is_empty() && mechanism.actions.is_empty() && mechanism.forces.is_empty() && mechanism.rows.is_empty();
         if n == 0 || n > room(B) || tree.off_axis || !is_sprung_only || order > MOST || order % 2 == 1 {
             return None;
         }

@@ -67,8 +67,10 @@ impl<const B: usize> Looped<B> {
     /// The constants of a mechanism with these matrices, where this form fits: up to 4 B bodies, constant forces, springs without dampers.
     pub fn new(mechanism: &Mechanism, reduced: &Reduced, tolerance: f64, order: usize) -> Option<Self> {
         let n = mechanism.bodies.len();
-        let is_plain =
-            mechanism.torsions.is_empty() && !mechanism.is_damped() && mechanism.actions.iter().all(|action| action.law.is_none());
+        let is_plain = mechanism.torsions.is_empty()
+            && mechanism.forces.is_empty()
+            && !mechanism.is_damped()
+            && mechanism.actions.iter().all(|action| action.law.is_none());
         if n > room(B) || !is_plain || order > MOST {
             return None;
         }

@@ -1,0 +1,426 @@
+//! Forces from outside the crate, written once and exact in every method.
+//!
+//! A [`Force`] is run once, on symbols; what it does is kept as a [`Tape`], which the equations evaluate on plain numbers, on double-double, on
+//! dual numbers (Jacobians, growth of errors), on lanes (stages of Gauss methods) and as power series.  The potential is differentiated on
+//! the tape:
+//!
+//! ```text
+//! F_P = -∂V/∂P  at every point it depends on,   torque = -∂V/∂q - (-sin q ∂V/∂cos q + cos q ∂V/∂sin q)  on every body
+//! power accounted as work = Σ F·P' + Σ torque w  of what is applied beside
+//! ```
+
+use crate::arithmetic::tape::{Slot, Symbol, Tape};
+use crate::arithmetic::{Complex, Scalar};
+use crate::dynamics::CompileError;
+use crate::dynamics::configuration::{Configuration, Source};
+use crate::dynamics::row::{Posture, Site};
+use std::cell::RefCell;
+
+/// A force or torque that acts on a mechanism, beside those a scene knows.
+///
+/// Written over the scalar trait, it works in every method that takes forces of its kind; it cannot branch on values.  RATTLE takes
+/// potentials of positions and directions only.
+///
+/// ```
+/// use driftless::arithmetic::Scalar;
+/// use driftless::dynamics::force::{Force, Loads};
+/// use driftless::dynamics::row::Site;
+/// use driftless::dynamics::Configuration;
+///
+/// /// Drag against the square of the speed, and a Duffing spring from the same point to the ground.
+/// struct Plate {
+///     tip: Site,
+///     drag: f64,
+///     stiffness: f64,
+/// }
+///
+/// impl Force for Plate {
+///     fn name(&self) -> &str {
+///         "plate"
+///     }
+///
+///     fn potential<S: Scalar>(&self, at: &Configuration<S>) -> S {
+///         let [x, y] = at.position(&self.tip);
+///         let square = x * x + y * y;
+///         square.scale(0.5 * self.stiffness) + (square * square).scale(0.25 * self.stiffness)
+///     }
+///
+///     fn apply<S: Scalar>(&self, at: &Configuration<S>, loads: &mut Loads<S>) {
+///         let [vx, vy] = at.velocity(&self.tip);
+///         let speed = (vx * vx + vy * vy + S::of(1e-12)).sqrt().scale(-self.drag);
+///         loads.force(&self.tip, [vx * speed, vy * speed]);
+///     }
+/// }
+/// ```
+pub trait Force {
+    /// Name in messages and reports.
+    fn name(&self) -> &str;
+
+    /// Potential energy \[J\]; its gradient acts on the mechanism, and the energy balance keeps it.  It must depend
+    /// on neither time nor rates.
+    fn potential<S: Scalar>(&self, _at: &Configuration<S>) -> S {
+        S::ZERO
+    }
+
+    /// Adds forces and torques beside those of the potential; their work is accounted for.
+    fn apply<S: Scalar>(&self, _at: &Configuration<S>, _loads: &mut Loads<S>) {}
+}
+
+/// Forces and torques that act at one moment.
+#[derive(Clone, Debug, Default)]
+pub struct Loads<S> {
+    forces: Vec<(Site, [S; 2])>,
+    torques: Vec<(usize, S)>,
+}
+
+impl<S: Scalar> Loads<S> {
+    /// Adds a force \[N\] at a point; at a point of the ground it does nothing.
+    pub fn force(&mut self, site: &Site, force: [S; 2]) {
+        if site.body.is_some() {
+            self.forces.push((site.clone(), force));
+        }
+    }
+
+    /// Adds a torque \[N·m\] on a body; the opposite one on another body or the ground is for the caller to add.
+    pub fn torque(&mut self, body: usize, torque: S) {
+        self.torques.push((body, torque));
+    }
+}
+
+/// What an input of the tape is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::dynamics) enum Input {
+    Time,
+    Angle(usize),
+    Rate(usize),
+    Cosine(usize),
+    Sine(usize),
+    X(usize),
+    Y(usize),
+    XRate(usize),
+    YRate(usize),
+}
+
+/// Forces and torques as results of a tape.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(in crate::dynamics) struct Part {
+    pub tape: Tape,
+    /// Sites and both components \[N\].
+    pub forces: Vec<(usize, [Slot; 2])>,
+    /// Bodies \[N·m\].
+    pub torques: Vec<(usize, Slot)>,
+    /// Power accounted as work \[W\].
+    pub power: Option<Slot>,
+}
+
+/// A recorded force.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UserForce {
+    /// Name in messages.
+    pub name: String,
+    pub(in crate::dynamics) inputs: Vec<Input>,
+    pub(in crate::dynamics) sites: Vec<Site>,
+    /// What its potential does, and what it applies beside.
+    pub(in crate::dynamics) parts: [Part; 2],
+    /// Potential energy \[J\].
+    potential: Option<(Tape, Slot)>,
+}
+
+/// Hands out inputs while a force is recorded.
+#[derive(Default)]
+struct Recorder {
+    inputs: RefCell<Vec<Input>>,
+    sites: RefCell<Vec<Site>>,
+}
+
+impl Recorder {
+    fn input(&self, input: Input) -> Symbol {
+        let mut inputs = self.inputs.borrow_mut();
+        let number = inputs.iter().position(|known| *known == input).unwrap_or_else(|| {
+            inputs.push(input);
+            inputs.len() - 1
+        });
+        Symbol::input(number as u32)
+    }
+
+    fn site(&self, site: &Site) -> usize {
+        let mut sites = self.sites.borrow_mut();
+        sites.iter().position(|known| known == site).unwrap_or_else(|| {
+            sites.push(site.clone());
+            sites.len() - 1
+        })
+    }
+}
+
+impl Source<Symbol> for Recorder {
+    fn time(&self) -> Symbol {
+        self.input(Input::Time)
+    }
+
+    fn angle(&self, body: usize) -> Symbol {
+        self.input(Input::Angle(body))
+    }
+
+    fn rate(&self, body: usize) -> Symbol {
+        self.input(Input::Rate(body))
+    }
+
+    fn direction(&self, body: usize) -> Complex<Symbol> {
+        Complex::new(self.input(Input::Cosine(body)), self.input(Input::Sine(body)))
+    }
+
+    fn position(&self, site: &Site) -> Complex<Symbol> {
+        if site.body.is_none() {
+            return Complex::of(site.point.root);
+        }
+        let site = self.site(site);
+        Complex::new(self.input(Input::X(site)), self.input(Input::Y(site)))
+    }
+
+    fn velocity(&self, site: &Site) -> Complex<Symbol> {
+        if site.body.is_none() {
+            return Complex::ZERO;
+        }
+        let site = self.site(site);
+        Complex::new(self.input(Input::XRate(site)), self.input(Input::YRate(site)))
+    }
+}
+
+/// What a force comes to, in symbols.
+#[derive(Default)]
+struct Recorded {
+    forces: Vec<(usize, [Symbol; 2])>,
+    torques: Vec<(usize, Symbol)>,
+}
+
+impl Recorded {
+    /// Adds a share of a generalized force that belongs to an input.
+    fn add(&mut self, recorder: &Recorder, input: Input, share: Symbol) {
+        let (place, vector) = match input {
+            Input::X(site) => (site, [share, Symbol::ZERO]),
+            Input::Y(site) => (site, [Symbol::ZERO, share]),
+            Input::Angle(body) => return self.torques.push((body, share)),
+            Input::Cosine(body) => return self.torques.push((body, -(share * recorder.input(Input::Sine(body))))),
+            Input::Sine(body) => return self.torques.push((body, share * recorder.input(Input::Cosine(body)))),
+            _ => return,
+        };
+        match self.forces.iter_mut().find(|(site, _)| *site == place) {
+            Some((_, force)) => force.iter_mut().zip(vector).for_each(|(force, more)| *force += more),
+            None => self.forces.push((place, vector)),
+        }
+    }
+
+    fn symbols(&self) -> Vec<Symbol> {
+        self.forces.iter().flat_map(|force| force.1).chain(self.torques.iter().map(|torque| torque.1)).collect()
+    }
+
+    /// Of results and their tape: forces, torques, and the power if there is one more.
+    fn part(&self, (tape, slots): (Tape, Vec<Slot>)) -> Part {
+        let (forces, rest) = slots.split_at(2 * self.forces.len());
+        let (torques, power) = rest.split_at(self.torques.len());
+        Part {
+            tape,
+            forces: self.forces.iter().zip(forces.chunks_exact(2)).map(|(force, slots)| (force.0, [slots[0], slots[1]])).collect(),
+            torques: self.torques.iter().zip(torques).map(|(torque, &slot)| (torque.0, slot)).collect(),
+            power: power.first().copied(),
+        }
+    }
+}
+
+impl UserForce {
+    /// Records a force.
+    ///
+    /// # Errors
+    /// A potential that depends on time or rates.
+    pub fn record(force: &impl Force) -> Result<Self, CompileError> {
+        let recorder = Recorder::default();
+        let (mut conservative, mut applied) = (Recorded::default(), Recorded::default());
+        let mut refused = None;
+        let [by_potential, beside, energy] = Symbol::record(|| {
+            let at = Configuration::new(&recorder);
+            let potential = force.potential(&at);
+            for (number, slope) in potential.gradient() {
+                let input = recorder.inputs.borrow()[number as usize];
+                match input {
+                    Input::Time | Input::Rate(_) | Input::XRate(_) | Input::YRate(_) => {
+                        refused = Some(CompileError::NoPotential(force.name().into()));
+                    }
+                    _ => conservative.add(&recorder, input, -slope),
+                }
+            }
+            let mut loads = Loads::default();
+            force.apply(&at, &mut loads);
+            let mut power = Symbol::ZERO;
+            for (site, [x, y]) in loads.forces {
+                let velocity = recorder.velocity(&site);
+                power += x * velocity.re + y * velocity.im;
+                let site = recorder.site(&site);
+                applied.add(&recorder, Input::X(site), x);
+                applied.add(&recorder, Input::Y(site), y);
+            }
+            for (body, torque) in loads.torques {
+                power += torque * recorder.rate(body);
+                applied.add(&recorder, Input::Angle(body), torque);
+            }
+            let some = |symbol: Symbol| (!symbol.is_zero()).then_some(symbol);
+            let beside = applied.symbols().into_iter().chain(some(power)).collect();
+            [conservative.symbols(), beside, some(potential).into_iter().collect()]
+        });
+        if let Some(refused) = refused {
+            return Err(refused);
+        }
+        Ok(Self {
+            name: force.name().into(),
+            parts: [conservative.part(by_potential), applied.part(beside)],
+            potential: energy.1.first().map(|&slot| (energy.0, slot)),
+            inputs: recorder.inputs.into_inner(),
+            sites: recorder.sites.into_inner(),
+        })
+    }
+
+    /// True where it does work that no energy stands for.
+    pub fn does_work(&self) -> bool {
+        self.parts[1].power.is_some()
+    }
+
+    /// True where a part asks for an input of this kind.
+    fn asks_for(&self, parts: &[Part], kind: impl Fn(Input) -> bool) -> bool {
+        parts.iter().flat_map(|part| part.tape.inputs()).any(|number| kind(self.inputs[number as usize]))
+    }
+
+    /// True where whole turns matter to it.
+    pub fn counts_turns(&self) -> bool {
+        self.asks_for(&self.parts, |input| matches!(input, Input::Angle(_)))
+    }
+
+    /// True where what is applied depends on rates, as drag does.
+    pub fn depends_on_rates(&self) -> bool {
+        let Part { tape, forces, torques, .. } = &self.parts[1];
+        let acting: Vec<Slot> = forces.iter().flat_map(|force| force.1).chain(torques.iter().map(|torque| torque.1)).collect();
+        let mut needed = tape.inputs_of(&acting).into_iter();
+        needed.any(|number| matches!(self.inputs[number as usize], Input::Rate(_) | Input::XRate(_) | Input::YRate(_)))
+    }
+
+    /// True for a potential of positions and directions alone.
+    pub fn is_potential_of_place(&self) -> bool {
+        !self.does_work() && !self.counts_turns()
+    }
+
+    /// The largest number of a body it acts on or asks for.
+    pub fn last_body(&self) -> Option<usize> {
+        let asked = self.inputs.iter().filter_map(|input| match input {
+            Input::Angle(body) | Input::Rate(body) | Input::Cosine(body) | Input::Sine(body) => Some(*body),
+            _ => None,
+        });
+        let torques = self.parts[1].torques.iter().map(|torque| torque.0);
+        asked.chain(self.sites.iter().filter_map(|site| site.body)).chain(torques).max()
+    }
+
+    /// Evaluates a tape at `time` \[s\] and calls `then` with all results.
+    #[inline]
+    fn at<T: Scalar, R>(&self, tape: &Tape, time: T, at: Posture<T>, then: impl FnOnce(&[T]) -> R) -> R {
+        /// So many results need no allocation.
+        const FEW: usize = 48;
+        let input = |number: u32| match self.inputs[number as usize] {
+            Input::Time => time,
+            Input::Angle(body) => at.phi[body],
+            Input::Rate(body) => at.omega[body],
+            Input::Cosine(body) => at.z[body].re,
+            Input::Sine(body) => at.z[body].im,
+            Input::X(site) => self.sites[site].point.position(at.z).re,
+            Input::Y(site) => self.sites[site].point.position(at.z).im,
+            Input::XRate(site) => self.sites[site].point.velocity(at.z, at.omega).re,
+            Input::YRate(site) => self.sites[site].point.velocity(at.z, at.omega).im,
+        };
+        if tape.len() <= FEW {
+            let mut slots = [T::ZERO; FEW];
+            tape.evaluate(input, &mut slots[..tape.len()]);
+            return then(&slots);
+        }
+        let mut slots = vec![T::ZERO; tape.len()];
+        tape.evaluate(input, &mut slots);
+        then(&slots)
+    }
+
+    /// Calls `force` with every site and the force \[N\] there, and `torque` with every body and the torque \[N·m\] on it.
+    #[inline]
+    fn each<T: Scalar>(
+        &self,
+        part: &Part,
+        time: T,
+        at: Posture<T>,
+        mut force: impl FnMut(&Site, Complex<T>),
+        mut torque: impl FnMut(usize, T),
+    ) {
+        if part.tape.is_empty() {
+            return;
+        }
+        self.at(&part.tape, time, at, |slots| {
+            for &(site, [x, y]) in &part.forces {
+                force(&self.sites[site], Complex::new(slots[x as usize], slots[y as usize]));
+            }
+            for &(body, slot) in &part.torques {
+                torque(body, slots[slot as usize]);
+            }
+        });
+    }
+
+    /// Adds the generalized forces \[N·m, N\] of a part.
+    fn pull_part<T: Scalar>(&self, part: &Part, time: T, at: Posture<T>, load: &mut [T]) {
+        let load = std::cell::RefCell::new(load);
+        let pull = |site: &Site, force| site.point.pull(force, at.z, &mut load.borrow_mut());
+        self.each(part, time, at, pull, |body, torque| load.borrow_mut()[body] += torque);
+    }
+
+    /// Adds all its generalized forces \[N·m, N\].
+    pub fn pull<T: Scalar>(&self, time: T, at: Posture<T>, load: &mut [T]) {
+        self.parts.iter().for_each(|part| self.pull_part(part, time, at, load));
+    }
+
+    /// Adds those of its potential.
+    pub fn pull_by_potential<T: Scalar>(&self, time: T, at: Posture<T>, load: &mut [T]) {
+        self.pull_part(&self.parts[0], time, at, load);
+    }
+
+    /// Adds those applied beside.
+    pub fn pull_applied<T: Scalar>(&self, time: T, at: Posture<T>, load: &mut [T]) {
+        self.pull_part(&self.parts[1], time, at, load);
+    }
+
+    /// Calls `force` with every element and the force \[N·m, N\] on it; torques act across their unit vectors.
+    pub fn spread<T: Scalar>(&self, time: T, at: Posture<T>, force: impl FnMut(usize, Complex<T>)) {
+        let force = std::cell::RefCell::new(force);
+        let torque = |body: usize, torque| (force.borrow_mut())(body, at.z[body].left().times(torque));
+        for part in &self.parts {
+            self.each(part, time, at, |site, pull| site.point.spread(pull, &mut *force.borrow_mut()), torque);
+        }
+    }
+
+    /// Calls `force` with the body and the force \[N\] at every point it acts at.
+    pub fn forces(&self, time: f64, at: Posture<f64>, mut force: impl FnMut(usize, Complex<f64>)) {
+        for part in &self.parts {
+            self.each(part, time, at, |site, pull| site.body.into_iter().for_each(|body| force(body, pull)), |_, _| {});
+        }
+    }
+
+    /// Magnitudes of forces \[N\] and torques \[N·m\] at a moment, summed.
+    pub fn magnitudes(&self, time: f64, at: Posture<f64>) -> [f64; 2] {
+        let [mut force, mut torque] = [0.0; 2];
+        for part in &self.parts {
+            self.each(part, time, at, |_, pull| force += pull.norm_squared().sqrt(), |_, more| torque += more.abs());
+        }
+        [force, torque]
+    }
+
+    /// Potential energy \[J\].
+    pub fn energy<T: Scalar>(&self, time: T, at: Posture<T>) -> T {
+        let Some((tape, slot)) = &self.potential else { return T::ZERO };
+        self.at(tape, time, at, |slots| slots[*slot as usize])
+    }
+
+    /// Power accounted as work \[W\].
+    pub fn work_rate<T: Scalar>(&self, time: T, at: Posture<T>) -> T {
+        let Part { tape, power: Some(slot), .. } = &self.parts[1] else { return T::ZERO };
+        self.at(tape, time, at, |slots| slots[*slot as usize])
+    }
+}

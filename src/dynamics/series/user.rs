@@ -1,0 +1,83 @@
+//! The series of forces from outside the crate: their tape, order by order.
+
+use crate::arithmetic::tape::TapeSeries;
+use crate::arithmetic::{Complex, DoubleDouble, Real};
+use crate::dynamics::force::UserForce;
+use crate::dynamics::force::user::Input;
+
+/// Series of one force, powers 0 to P.
+#[derive(Clone, Debug)]
+pub struct UserSeries<T>([TapeSeries<T>; 2]);
+
+/// What the powers of a motion of `n` elements are, as far as they are known.
+#[derive(Clone, Copy)]
+pub struct At<'a, T> {
+    /// The time at the start \[s\].
+    pub time: T,
+    /// Angles at the start \[rad\].
+    pub phi: &'a [T],
+    /// Powers of the elements, one more than are asked for.
+    pub z: &'a [Complex<T>],
+    /// Powers of the rates.
+    pub omega: &'a [T],
+    /// Elements.
+    pub n: usize,
+}
+
+impl<T: Real> At<'_, T> {
+    /// Power `m` of an input.
+    fn power(&self, force: &UserForce, input: Input, m: usize) -> T {
+        let z = |m: usize| &self.z[m * self.n..(m + 1) * self.n];
+        let omega = |m: usize| &self.omega[m * self.n..(m + 1) * self.n];
+        let place = |site: usize| {
+            let point = &force.sites[site].point;
+            if m == 0 { point.position(z(0)) } else { point.turned(z(m)) }
+        };
+        let velocity = |site: usize| force.sites[site].point.turned(z(m + 1)).times(T::of((m + 1) as f64));
+        match (input, m) {
+            (Input::Time, 0) => self.time,
+            (Input::Time, m) => T::of(if m == 1 { 1.0 } else { 0.0 }),
+            (Input::Angle(body), 0) => self.phi[body],
+            (Input::Angle(body), m) => omega(m - 1)[body] / T::of(m as f64),
+            (Input::Rate(body), m) => omega(m)[body],
+            (Input::Cosine(body), m) => z(m)[body].re,
+            (Input::Sine(body), m) => z(m)[body].im,
+            (Input::X(site), _) => place(site).re,
+            (Input::Y(site), _) => place(site).im,
+            (Input::XRate(site), _) => velocity(site).re,
+            (Input::YRate(site), _) => velocity(site).im,
+        }
+    }
+}
+
+impl<T: Real> UserSeries<T> {
+    /// Room for powers up to `order`.
+    pub fn new(force: &UserForce, order: usize) -> Self {
+        Self(force.parts.each_ref().map(|part| TapeSeries::new(&part.tape, order)))
+    }
+
+    /// Takes power m of the forces off the elements' balance, and adds that of torques to `load`.
+    pub fn act(&mut self, force: &UserForce, m: usize, at: At<T>, rest: &mut [Complex<T>], load: &mut [T]) {
+        for (part, series) in force.parts.iter().zip(&mut self.0) {
+            series.advance(&part.tape, m, |number| at.power(force, force.inputs[number as usize], m));
+            for &(site, [x, y]) in &part.forces {
+                force.sites[site].point.spread(Complex::new(series.of(x)[m], series.of(y)[m]), |k, force| rest[k] -= force);
+            }
+            for &(body, torque) in &part.torques {
+                load[body] += series.of(torque)[m];
+            }
+        }
+    }
+
+    /// Power m of the power accounted as work \[W/s^m\].
+    pub fn power(&self, force: &UserForce, m: usize) -> T {
+        force.parts[1].power.map_or(T::ZERO, |slot| self.0[1].of(slot)[m])
+    }
+
+    /// The first powers from a series in more digits.
+    pub fn take(&mut self, other: &UserSeries<DoubleDouble>) {
+        for (series, other) in self.0.iter_mut().zip(&other.0) {
+            series.take(other);
+        }
+    }
+}

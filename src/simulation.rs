@@ -1,0 +1,198 @@
+//! The way in for programs: a scene, what acts on it from outside, and how it is to be integrated.
+
+use crate::Error;
+use crate::dynamics::force::{Force, UserForce};
+use crate::dynamics::row::Site;
+use crate::dynamics::{Mechanism, Motion};
+use crate::run::trust::Level;
+use crate::run::{Limits, MethodId, Outcome, Plan, Request, Run, Sample, Stabilization, integrate};
+use crate::scene::Scene;
+use std::sync::Arc;
+
+/// A scene about to be integrated.
+///
+/// What is not said is decided as by the program: the method by the scene and the horizon, the tolerance by the method, the stabilization by the
+/// constraints.
+///
+/// ```
+/// use driftless::{Configuration, Force, Loads, MethodId, Scalar, Simulation, Site, read_scene};
+///
+/// /// Drag against the square of the speed of a point.
+/// struct Drag {
+///     at: Site,
+///     factor: f64,
+/// }
+///
+/// impl Force for Drag {
+///     fn name(&self) -> &str {
+///         "drag"
+///     }
+///
+///     fn apply<S: Scalar>(&self, at: &Configuration<S>, loads: &mut Loads<S>) {
+///         let [vx, vy] = at.velocity(&self.at);
+///         let speed = (vx * vx + vy * vy + S::of(1e-12)).sqrt().scale(-self.factor);
+///         loads.force(&self.at, [vx * speed, vy * speed]);
+///     }
+/// }
+///
+/// # fn main() -> Result<(), driftless::Error> {
+/// let scene = read_scene("examples/scenes/free.json".as_ref(), &[])?;
+/// let simulation = Simulation::new(&scene)?;
+/// let drag = Drag { at: simulation.site("bar2", [0.6, 0.0])?, factor: 0.02 };
+/// let outcome = simulation.force(&drag)?.until(3.0).every(0.1).method(MethodId::Taylor).run()?;
+/// // The energy that the drag has taken is accounted for to the last digits.
+/// assert!(outcome.last.work < -0.01 && outcome.drift.energy.max < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct Simulation {
+    scene: Scene,
+    mechanism: Arc<Mechanism>,
+    forces: Vec<UserForce>,
+    request: Request,
+    limits: Limits,
+    level: Level,
+}
+
+impl Simulation {
+    /// Of a scene, as it says.
+    ///
+    /// # Errors
+    /// A scene without equations of motion, or one put together by hand that makes no sense.
+    pub fn new(scene: &Scene) -> Result<Self, Error> {
+        Ok(Self {
+            scene: scene.clone(),
+            mechanism: Arc::new(Mechanism::new(scene)?),
+            forces: Vec::new(),
+            request: Request::default(),
+            limits: Limits::default(),
+            level: Level::Off,
+        })
+    }
+
+    /// The equations of motion, with all forces added so far.
+    pub fn mechanism(&self) -> &Arc<Mechanism> {
+        &self.mechanism
+    }
+
+    /// The motion at t = 0.
+    pub fn start(&self) -> Motion {
+        self.mechanism.start(&self.scene)
+    }
+
+    /// Number of the bar of this name.
+    ///
+    /// # Errors
+    /// No bar has this name.
+    pub fn body(&self, bar: &str) -> Result<usize, Error> {
+        Ok(self.mechanism.body(bar)?)
+    }
+
+    /// The point `[x, y]` \[m\] of a bar, in its frame.
+    ///
+    /// # Errors
+    /// No bar has this name.
+    pub fn site(&self, bar: &str, point: [f64; 2]) -> Result<Site, Error> {
+        Ok(self.mechanism.site(bar, point)?)
+    }
+
+    /// Adds a force.
+    ///
+    /// # Errors
+    /// A potential that depends on time or rates, or a body that is not there.
+    pub fn force(mut self, force: &impl Force) -> Result<Self, Error> {
+        self.forces.push(UserForce::record(force)?);
+        self.mechanism = Arc::new(Mechanism::with_forces(&self.scene, self.forces.clone())?);
+        Ok(self)
+    }
+
+    /// Horizon \[s\].
+    #[must_use]
+    pub fn until(mut self, until: f64) -> Self {
+        self.request.until = Some(until);
+        self
+    }
+
+    /// Output interval \[s\].
+    #[must_use]
+    pub fn every(mut self, every: f64) -> Self {
+        self.request.every = Some(every);
+        self
+    }
+
+    /// Method.
+    #[must_use]
+    pub fn method(mut self, method: MethodId) -> Self {
+        self.request.method = Some(method);
+        self
+    }
+
+    /// Relative and absolute tolerance of an adaptive method.
+    #[must_use]
+    pub fn tolerance(mut self, relative: f64, absolute: f64) -> Self {
+        (self.request.rtol, self.request.atol) = (Some(relative), Some(absolute));
+        self
+    }
+
+    /// Step of a fixed-step method \[s\].
+    #[must_use]
+    pub fn step(mut self, step: f64) -> Self {
+        self.request.step = Some(step);
+        self
+    }
+
+    /// How constraints are kept.
+    #[must_use]
+    pub fn stabilize(mut self, stabilization: Stabilization) -> Self {
+        self.request.stabilize = Some(stabilization);
+        self
+    }
+
+    /// Everything that may be asked for, in place of what was asked for before.
+    #[must_use]
+    pub fn options(mut self, request: Request) -> Self {
+        self.request = request;
+        self
+    }
+
+    /// Stops where the drift of energy or of a constraint exceeds these.
+    #[must_use]
+    pub fn limits(mut self, limits: Limits) -> Self {
+        self.limits = limits;
+        self
+    }
+
+    /// Estimates the error beside the run: see [`Outcome::trust`].
+    #[must_use]
+    pub fn trust(mut self, level: Level) -> Self {
+        self.level = level;
+        self
+    }
+
+    /// The run as it would be carried out.
+    ///
+    /// # Errors
+    /// A request that makes no sense for the scene, or a method that cannot begin there.
+    pub fn prepare(&self) -> Result<Run, Error> {
+        let plan = Plan::new(&self.scene, &self.mechanism, &self.request)?;
+        let start = self.start();
+        Ok(Run::new(Arc::clone(&self.mechanism), plan, self.limits, &start)?.trusted(self.level, &start))
+    }
+
+    /// Integrates to the horizon.
+    ///
+    /// # Errors
+    /// Whatever keeps it from beginning; a stop on the way is part of the [`Outcome`].
+    pub fn run(&self) -> Result<Outcome, Error> {
+        self.run_with(|_| Ok(()))
+    }
+
+    /// The same, showing every sample.
+    ///
+    /// # Errors
+    /// Those of [`run`](Self::run), and what the observer failed with.
+    pub fn run_with(&self, mut observer: impl FnMut(&Sample) -> std::io::Result<()>) -> Result<Outcome, Error> {
+        Ok(integrate(self.prepare()?, &mut observer)?)
+    }
+}
