@@ -7,16 +7,26 @@
 //! in lanes and in double-double), and a fused multiply-add is written as one wherever it is used ([`sum::fused`], [`lanes`]), never left to the compiler:
 //! it is rounded once by definition, so it makes no difference to the bits whether the processor has the instruction.
 
+#[doc(hidden)]
 pub mod angle;
+#[doc(hidden)]
 pub mod complex;
+#[doc(hidden)]
 pub mod double_double;
+#[doc(hidden)]
 pub mod dual;
+#[doc(hidden)]
 pub mod eight;
 mod elementary;
+#[doc(hidden)]
 pub mod lanes;
+#[doc(hidden)]
 pub mod pairs;
+#[doc(hidden)]
 pub mod sincos;
+#[doc(hidden)]
 pub mod sum;
+#[doc(hidden)]
 pub mod tape;
 
 pub use complex::Complex;

@@ -1,6 +1,6 @@
 //! Eight lanes of high and low parts: a quick double-double whose rounding errors are a few 2⁻¹⁰⁵ of the operands.
 //!
-//! Quicker than [`DoubleDouble`](super::DoubleDouble) and less exact where leading parts cancel, and its sine and cosine carry about 66
+//! Quicker than [`DoubleDouble`] and less exact where leading parts cancel, and its sine and cosine carry about 66
 //! bits: enough for what doubles drop at the last evaluations of an implicit step, not for references.
 //!
 //! Source: T. J. Dekker, *A floating-point technique for extending the available precision*, Numer. Math. 18 (1971), add2, mul2, div2,

@@ -3,7 +3,9 @@
 //! Data go to stdout or into files, progress and messages to stderr.  Exit codes are in [`failure::Exit`].
 
 mod compare;
+#[doc(hidden)]
 pub mod failure;
+#[doc(hidden)]
 pub mod flags;
 mod interrupt;
 mod output;

@@ -32,37 +32,69 @@
 //! time, [`canonical`] in (q, p), the form in which Gauss methods are symplectic, and [`natural`] in the unit vectors themselves, for RATTLE.
 //! Evaluated on dual numbers the same formulas are their own [`jacobian`], for implicit methods and for [`stiffness`], the fastest mode and its spring.
 
+#[doc(hidden)]
 pub mod assembly;
+#[doc(hidden)]
 pub mod canonical;
+#[doc(hidden)]
 pub mod compile;
+#[doc(hidden)]
 pub mod configuration;
+#[doc(hidden)]
 pub mod contact;
+#[doc(hidden)]
 pub mod elimination;
+#[doc(hidden)]
 pub mod energy;
+#[doc(hidden)]
 pub mod envelope;
+#[doc(hidden)]
 pub mod force;
+#[doc(hidden)]
 pub mod forest;
+#[doc(hidden)]
 pub mod gap;
+#[doc(hidden)]
 pub mod impact;
+#[doc(hidden)]
 pub mod indeterminate;
+#[doc(hidden)]
 pub mod jacobian;
+#[doc(hidden)]
 pub mod kernel;
+#[doc(hidden)]
 pub mod law;
+#[doc(hidden)]
 pub mod looped;
+#[doc(hidden)]
 pub mod multiplier;
+#[doc(hidden)]
 pub mod natural;
+#[doc(hidden)]
 pub mod point;
+#[doc(hidden)]
 pub mod points;
+#[doc(hidden)]
 pub mod quadratic;
+#[doc(hidden)]
 pub mod rank;
+#[doc(hidden)]
 pub mod reaction;
+#[doc(hidden)]
 pub mod recursive;
+#[doc(hidden)]
 pub mod row;
+#[doc(hidden)]
 pub mod schur;
+#[doc(hidden)]
 pub mod series;
+#[doc(hidden)]
 pub mod stiffness;
+#[doc(hidden)]
 pub mod ties;
+#[doc(hidden)]
 pub mod tree;
+#[doc(hidden)]
 pub mod units;
 
 pub use compile::{CompileError, Mechanism};

@@ -15,20 +15,30 @@
 //! | [`methods`] | the table of methods | `methods.rs` |
 //! | `charts` | a run, in pictures | `charts.rs`, with the feature `charts` |
 
+#[doc(hidden)]
 #[cfg(feature = "charts")]
 pub mod charts;
+#[doc(hidden)]
 pub mod check;
+#[doc(hidden)]
 pub mod compare;
 #[cfg(feature = "charts")]
 mod curves;
 mod inputs;
+#[doc(hidden)]
 pub mod inspect;
+#[doc(hidden)]
 pub mod methods;
+#[doc(hidden)]
 pub mod page;
+#[doc(hidden)]
 pub mod result;
+#[doc(hidden)]
 pub mod stress;
+#[doc(hidden)]
 #[cfg(feature = "files")]
 pub mod sweep;
+#[doc(hidden)]
 pub mod trust;
 
 use crate::run::Plan;

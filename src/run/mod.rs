@@ -7,33 +7,53 @@
 //! [`mod@compare`] runs all methods at all settings, and times them; [`mod@stress`] runs stiff and extreme scenes by every method.
 
 mod allowance;
+#[doc(hidden)]
 #[cfg(feature = "files")]
 pub mod async_writer;
 mod build;
+#[doc(hidden)]
 #[cfg(feature = "files")]
 pub mod checkpoint;
+#[doc(hidden)]
 pub mod choice;
+#[doc(hidden)]
 pub mod compare;
+#[doc(hidden)]
 pub mod contact;
+#[doc(hidden)]
 pub mod drift;
+#[doc(hidden)]
 pub mod driver;
+#[doc(hidden)]
 pub mod fast;
+#[doc(hidden)]
 #[cfg(feature = "files")]
 pub mod files;
+#[doc(hidden)]
 pub mod flip;
 mod impact_monitor;
+#[doc(hidden)]
 pub mod methods;
 mod monitor;
+#[doc(hidden)]
 pub mod plan;
+#[doc(hidden)]
 pub mod reference;
+#[doc(hidden)]
 pub mod running;
+#[doc(hidden)]
 pub mod sample;
 mod shrink;
+#[doc(hidden)]
 pub mod stress;
+#[doc(hidden)]
 pub mod sweep;
+#[doc(hidden)]
 #[cfg(feature = "files")]
 pub mod table;
+#[doc(hidden)]
 pub mod trace;
+#[doc(hidden)]
 pub mod trust;
 mod turns;
 mod wall_guard;

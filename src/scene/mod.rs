@@ -10,6 +10,7 @@ mod fit;
 mod format;
 mod locate;
 mod number;
+#[doc(hidden)]
 pub mod read;
 mod schema;
 mod set;

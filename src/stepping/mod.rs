@@ -4,17 +4,26 @@
 //! problem is a type parameter: Dormand–Prince, Radau and Gauss are `Integrator<F: Field>`, RATTLE is `Integrator<Natural>`, so a wrong pairing does
 //! not compile.
 
+#[doc(hidden)]
 pub mod composition;
+#[doc(hidden)]
 pub mod dp5;
+#[doc(hidden)]
 pub mod dp8;
 mod event;
+#[doc(hidden)]
 pub mod explicit;
+#[doc(hidden)]
 pub mod gauss;
 mod linear;
+#[doc(hidden)]
 pub mod radau;
+#[doc(hidden)]
 pub mod rattle;
 pub(crate) mod search;
+#[doc(hidden)]
 pub mod taylor;
+#[doc(hidden)]
 pub mod windows;
 
 pub use dp5::Dp5;
