@@ -67,7 +67,8 @@ pub use dynamics::{Configuration, Mechanism, Motion};
 pub use error::Error;
 pub use run::trust::Level;
 pub use run::{
-    Drift, Limits, MethodId, Outcome, Plan, Request, Run, Running, Sample, Snapshot, Stabilization, Sweep, Trust, compare, reference,
+    Action, Change, Direction, Drift, Event, EventRecord, Limits, MethodId, Observer, Outcome, Plan, Request, Run, Running, Sample,
+    Snapshot, Stabilization, Step, Sweep, Trust, compare, reference,
 };
 pub use scene::{Scene, SceneBuilder, Template, ground, on, parse_scene, read_scene};
 pub use simulation::Simulation;

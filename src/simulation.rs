@@ -5,7 +5,7 @@ use crate::dynamics::force::{Force, UserForce};
 use crate::dynamics::row::Site;
 use crate::dynamics::{Mechanism, Motion};
 use crate::run::trust::Level;
-use crate::run::{Limits, MethodId, Outcome, Plan, Request, Run, Sample, Stabilization, integrate};
+use crate::run::{Event, Limits, MethodId, Observer, Outcome, Plan, Request, Run, Running, Sample, Stabilization, integrate};
 use crate::scene::Scene;
 use std::sync::Arc;
 
@@ -45,7 +45,6 @@ use std::sync::Arc;
 /// # Ok(())
 /// # }
 /// ```
-#[derive(Clone, Debug)]
 pub struct Simulation {
     scene: Scene,
     mechanism: Arc<Mechanism>,
@@ -53,6 +52,7 @@ pub struct Simulation {
     request: Request,
     limits: Limits,
     level: Level,
+    events: Vec<Box<dyn Event>>,
 }
 
 impl Simulation {
@@ -68,6 +68,7 @@ impl Simulation {
             request: Request::default(),
             limits: Limits::default(),
             level: Level::Off,
+            events: Vec::new(),
         })
     }
 
@@ -105,6 +106,19 @@ impl Simulation {
         self.forces.push(UserForce::record(force)?);
         self.mechanism = Arc::new(Mechanism::with_forces(&self.scene, self.forces.clone())?);
         Ok(self)
+    }
+
+    /// Looks for an event.
+    #[must_use]
+    pub fn event(self, event: impl Event + 'static) -> Self {
+        self.boxed_event(Box::new(event))
+    }
+
+    /// The same for one of many kinds.
+    #[must_use]
+    pub fn boxed_event(mut self, event: Box<dyn Event>) -> Self {
+        self.events.push(event);
+        self
     }
 
     /// Horizon \[s\].
@@ -174,25 +188,36 @@ impl Simulation {
     ///
     /// # Errors
     /// A request that makes no sense for the scene, or a method that cannot begin there.
-    pub fn prepare(&self) -> Result<Run, Error> {
+    pub fn prepare(self) -> Result<Run, Error> {
         let plan = Plan::new(&self.scene, &self.mechanism, &self.request)?;
         let start = self.start();
-        Ok(Run::new(Arc::clone(&self.mechanism), plan, self.limits, &start)?.trusted(self.level, &start))
+        let run = Run::new(Arc::clone(&self.mechanism), plan, self.limits, &start)?;
+        Ok(run.trusted(self.level, &start).with_events(self.events))
     }
 
     /// Integrates to the horizon.
     ///
     /// # Errors
     /// Whatever keeps it from beginning; a stop on the way is part of the [`Outcome`].
-    pub fn run(&self) -> Result<Outcome, Error> {
+    pub fn run(self) -> Result<Outcome, Error> {
         self.run_with(|_| Ok(()))
+    }
+
+    /// The same for an [`Observer`], which sees steps and samples and may end the run.
+    ///
+    /// # Errors
+    /// Those of [`run`](Self::run).
+    pub fn run_observed(self, observer: &mut dyn Observer) -> Result<Outcome, Error> {
+        let mut running = Running::new(self.prepare()?);
+        running.go_observed(observer, &mut || false);
+        Ok(running.finish())
     }
 
     /// The same, showing every sample.
     ///
     /// # Errors
     /// Those of [`run`](Self::run), and what the observer failed with.
-    pub fn run_with(&self, mut observer: impl FnMut(&Sample) -> std::io::Result<()>) -> Result<Outcome, Error> {
+    pub fn run_with(self, mut observer: impl FnMut(&Sample) -> std::io::Result<()>) -> Result<Outcome, Error> {
         Ok(integrate(self.prepare()?, &mut observer)?)
     }
 }

@@ -28,6 +28,7 @@ mod contact;
 mod convergence;
 mod defect;
 mod dense;
+mod doors;
 mod drift;
 mod events;
 mod extremes;

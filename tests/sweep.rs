@@ -6,7 +6,7 @@ use crate::program;
 use driftless::dynamics::{Mechanism, Time};
 use driftless::run::trust::Level;
 use driftless::run::{
-    Flip, MethodId, Observer, Point, Request, Stabilization, Status, Sweep, SweepError, SweepTable, Vary, reference, simulate, sweep,
+    Flip, MethodId, Point, PointObserver, Request, Stabilization, Status, Sweep, SweepError, SweepTable, Vary, reference, simulate, sweep,
 };
 use driftless::scene::Template;
 use driftless::stepping::Cause;
@@ -292,7 +292,7 @@ struct Fussy {
     seen: u64,
 }
 
-impl Observer for Fussy {
+impl PointObserver for Fussy {
     fn see(&mut self, _: &Point) -> std::io::Result<()> {
         self.seen += 1;
         if self.seen == 5 { Err(std::io::Error::other("enough")) } else { Ok(()) }

@@ -12,7 +12,7 @@ use crate::report::page::counted;
 use crate::report::sweep::{Curve, NoChart};
 use crate::run::files::{SWEEP, SWEEP_RECORD};
 use crate::run::{
-    Checkpoints, Folder, Limits, Observer, Point, Request, ResumeError, Stream, Sweep, SweepError, SweepTable, Totals, sweep_on,
+    Checkpoints, Folder, Limits, Point, PointObserver, Request, ResumeError, Stream, Sweep, SweepError, SweepTable, Totals, sweep_on,
 };
 use crate::scene::{Template, points_that_stay, read_text, source_name};
 
@@ -199,7 +199,7 @@ impl Writer<'_> {
     }
 }
 
-impl Observer for Writer<'_> {
+impl PointObserver for Writer<'_> {
     fn see(&mut self, point: &Point) -> std::io::Result<()> {
         #[cfg(feature = "charts")]
         if let Some(curve) = &mut self.curve {

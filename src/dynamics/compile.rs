@@ -394,6 +394,27 @@ impl Mechanism {
         }
     }
 
+    /// The mechanism without some of its springs, torsion springs, applied forces and torques, by name.
+    ///
+    /// # Errors
+    /// A name that none of them has.
+    pub fn without(&self, parts: &[String]) -> Result<Self, String> {
+        let names = (self.springs.iter().map(|part| &part.name))
+            .chain(self.torsions.iter().map(|part| &part.name))
+            .chain(self.actions.iter().map(|part| &part.name))
+            .chain(self.forces.iter().map(|part| &part.name));
+        let names: Vec<&String> = names.collect();
+        if let Some(unknown) = parts.iter().find(|part| !names.contains(part)) {
+            return Err(unknown.clone());
+        }
+        let mut mechanism = self.clone();
+        mechanism.springs.retain(|part| !parts.contains(&part.name));
+        mechanism.torsions.retain(|part| !parts.contains(&part.name));
+        mechanism.actions.retain(|part| !parts.contains(&part.name));
+        mechanism.forces.retain(|part| !parts.contains(&part.name));
+        Ok(mechanism)
+    }
+
     /// The mechanism with two of its points pinned to one another by two more rows: a closed loop.
     ///
     /// The loop must be closed at the start, and not be one that the rows there are close already.

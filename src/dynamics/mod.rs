@@ -348,7 +348,7 @@ impl Glance {
 }
 
 /// What every form can tell of a moment: angles and rates of all bodies, and the work done on them.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Motion {
     /// Time.
     pub time: Time,

@@ -1,6 +1,6 @@
 //! From a plan to a driver: the form of the equations a stabilization asks for, the method, and what is measured before the first step.
 
-use super::driver::{Driver, Steps, boxed};
+use super::driver::{Driver, Halt, Steps, Watch, boxed};
 use super::impact_monitor::closed;
 use super::methods::{MethodId, Stabilization};
 use super::plan::Plan;
@@ -15,12 +15,12 @@ use crate::dynamics::{Field, Form, Mechanism, Motion};
 use crate::stabilization::{Baumgarte, Projected, SymmetricGauss};
 use crate::stepping::gauss::Gauss;
 use crate::stepping::rattle::Rattle;
-use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Integrator, Radau, Reached, StepError, Taylor, Tolerance};
+use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Integrator, Radau, StepError, Taylor, Tolerance};
 use std::sync::Arc;
 
 /// A mechanism in some form, as a first-order system.
-pub trait Problem: Field + Form {}
-impl<P: Field + Form> Problem for P {}
+pub trait Problem: Field + Form + Send {}
+impl<P: Field + Form + Send> Problem for P {}
 
 /// `sized!(n, f(args))` calls `f::<n>` for the sizes compiled in, and `f::<0>` for any other.
 macro_rules! sized {
@@ -37,7 +37,7 @@ macro_rules! sized {
     };
 }
 
-fn driver<P: Form + ?Sized + 'static, M: Integrator<P> + 'static>(
+fn driver<P: Form + Send + ?Sized + 'static, M: Integrator<P> + Send + 'static>(
     problem: Box<P>,
     method: M,
     start: &Motion,
@@ -180,9 +180,9 @@ fn pilot(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion) -> Result<f64,
     driver.allow(plan.effort);
     let rows = plan.rows.min(20);
     for row in 1..=rows {
-        match driver.advance(plan.time(row), plan.time(plan.rows), None, None, &mut || false) {
-            Ok(Reached::Until | Reached::Pause) => {}
-            Ok(Reached::Event(_)) => break,
+        match driver.advance(plan.time(row), plan.time(plan.rows), Watch::default(), &mut || false) {
+            Ok(Halt::Until | Halt::Pause) => {}
+            Ok(Halt::Contact(_) | Halt::Cut) => break,
             Err(stop) if stop.cause == Cause::RestingContact => break,
             Err(stop) => return Err(stop),
         }

@@ -5,9 +5,11 @@
 //! booked as lost in impacts.  From then on the wall is a row kept by projection, until its force would have to pull.
 
 use super::build::build;
-use super::driver::{Driver, DriverState, Pause};
+use super::driver::{Driver, DriverState, Halt, Pause, Watch};
+use super::event::{EventDetector, Memory};
 use super::flip::FlipDetector;
 use super::impact_monitor::{self, Claim};
+use super::inside::{Both, StepWatcher, Watching};
 use super::methods::Stabilization;
 use super::monitor::{Monitor, lent};
 use super::plan::Plan;
@@ -18,7 +20,7 @@ use crate::dynamics::kernel::Kernel;
 use crate::dynamics::multiplier::Multiplier;
 use crate::dynamics::{Form, Mechanism, Motion, Time};
 use crate::stabilization::projection::project;
-use crate::stepping::{Cause, Reached, StepError, Tally};
+use crate::stepping::{Cause, StepError, Tally};
 use std::sync::Arc;
 
 /// One impact of a run.
@@ -92,16 +94,23 @@ pub(super) struct Station {
     events_in_row: usize,
     is_between: bool,
     stabilizer: f64,
+    /// Parts that do not act at the moment.
+    off: Vec<String>,
+    /// What the detector of events remembers, where there is one.
+    events: Option<Memory>,
 }
 
 /// A driver on its way through impacts and holds.
 pub(super) struct Course {
+    /// The mechanism with all its parts, and those that do not act at the moment.
+    pub(super) whole: Arc<Mechanism>,
+    pub(super) off: Vec<String>,
     /// The mechanism without holds.
-    free: Arc<Mechanism>,
+    pub(super) free: Arc<Mechanism>,
     /// The mechanism with the contacts held at the moment.
-    mechanism: Arc<Mechanism>,
-    driver: Box<dyn Driver>,
-    sampler: Sampler,
+    pub(super) mechanism: Arc<Mechanism>,
+    pub(super) driver: Box<dyn Driver>,
+    pub(super) sampler: Sampler,
     /// The motion last sampled, kept for its room.
     shown: Motion,
     held: Vec<Held>,
@@ -112,8 +121,14 @@ pub(super) struct Course {
     is_between: bool,
     /// Looks for bars that turn over, where somebody asked.
     pub(super) flips: Option<FlipDetector>,
+    /// Looks for events from outside, where there are any.
+    pub(super) events: Option<EventDetector>,
+    /// What such a detector remembered, until there is one again.
+    remembered: Option<Memory>,
+    /// The event that has ended the run.
+    pub(super) ended_by: Option<String>,
     /// Energy stabilizers put in before the present driver \[J\].
-    stabilizer: f64,
+    pub(super) stabilizer: f64,
     /// Impacts, holds and releases since somebody last took them, where somebody asks.
     pub(super) jumps: Option<Vec<Jump>>,
 }
@@ -123,9 +138,14 @@ impl Course {
     pub(super) fn new(mechanism: Arc<Mechanism>, driver: Box<dyn Driver>) -> Self {
         Self {
             sampler: Sampler::new(Arc::clone(&mechanism)),
+            whole: Arc::clone(&mechanism),
+            off: Vec::new(),
             free: Arc::clone(&mechanism),
             mechanism,
             driver,
+            events: None,
+            remembered: None,
+            ended_by: None,
             shown: Motion::default(),
             held: Vec::new(),
             holds_in_row: 0,
@@ -140,6 +160,11 @@ impl Course {
     /// The mechanism with the contacts held at the moment.
     pub(super) fn holding(&self) -> &Arc<Mechanism> {
         &self.mechanism
+    }
+
+    /// The mechanism with all its parts and no holds.
+    pub(super) fn whole(&self) -> &Arc<Mechanism> {
+        &self.whole
     }
 
     /// True where loops or sliders have to be kept.
@@ -177,7 +202,16 @@ impl Course {
             events_in_row: self.events_in_row,
             is_between: self.is_between,
             stabilizer: self.stabilizer,
+            off: self.off.clone(),
+            events: self.events.as_ref().map(|events| events.memory.clone()).or_else(|| self.remembered.clone()),
         }
+    }
+
+    /// Looks for these events from now on; false where what is remembered of events is of others.
+    pub(super) fn watch_for(&mut self, mut detector: EventDetector) -> bool {
+        let fits = self.remembered.take().is_none_or(|memory| detector.restore(memory));
+        self.events = Some(detector);
+        fits
     }
 
     /// How many holds must be kept by name for a station to be consistent.
@@ -193,7 +227,9 @@ impl Course {
         station: Station,
         horizon: Time,
     ) -> Result<Option<Self>, StepError> {
-        let Station { place, reference, contacts, held, holds_in_row, events_in_row, is_between, stabilizer } = station;
+        let Station { place, reference, contacts, held, holds_in_row, events_in_row, is_between, stabilizer, off, events } = station;
+        let whole = mechanism;
+        let Ok(mechanism) = whole.without(&off).map(Arc::new) else { return Ok(None) };
         let known = |contact: usize| contact < mechanism.contacts.len();
         let once = contacts.iter().enumerate().all(|(i, contact)| !contacts[..i].contains(contact));
         if !once || !contacts.iter().copied().chain(held.iter().map(|held| held.contact)).all(known) {
@@ -215,20 +251,21 @@ impl Course {
             course.mechanism = holding;
         }
         course.sampler.refer(reference);
-        Ok(Some(Self { held, holds_in_row, events_in_row, is_between, stabilizer, ..course }))
+        Ok(Some(Self { whole, off, remembered: events, held, holds_in_row, events_in_row, is_between, stabilizer, ..course }))
     }
 
     /// Advances to an output time, through impacts and holds; false where it paused on the way.
     pub(super) fn go(&mut self, until: Time, outcome: &mut Outcome, pause: &mut Pause) -> Result<bool, StepError> {
-        self.go_watched(until, outcome, None, pause)
+        self.go_watched(until, outcome, None, None, pause)
     }
 
-    /// The same, looked at on the way.
+    /// The same, looked at on the way by a monitor.
     pub(super) fn go_watched(
         &mut self,
         until: Time,
         outcome: &mut Outcome,
         mut monitor: Option<&mut dyn Monitor>,
+        mut observer: Option<&mut Watching>,
         pause: &mut Pause,
     ) -> Result<bool, StepError> {
         if !std::mem::take(&mut self.is_between) {
@@ -239,14 +276,28 @@ impl Course {
                 monitor.count_events(outcome.strike_count + outcome.hold_count);
             }
             let horizon = outcome.plan.time(outcome.plan.rows);
-            match self.driver.advance(until, horizon, self.flips.as_mut(), lent(&mut monitor), pause) {
-                Ok(Reached::Until) => return Ok(true),
-                Ok(Reached::Pause) => {
+            let mut both = Both { events: self.events.as_mut(), observer: observer.as_deref_mut() };
+            let steps = both.is_asked().then_some(&mut both as &mut dyn StepWatcher);
+            let watch = Watch { flips: self.flips.as_mut(), monitor: lent(&mut monitor), steps };
+            let halt = self.driver.advance(until, horizon, watch, pause);
+            self.record_events(outcome);
+            match halt {
+                Ok(Halt::Until) => return Ok(true),
+                Ok(Halt::Cut) => {
+                    self.act(outcome, lent(&mut monitor))?;
+                    if observer.as_ref().is_some_and(|observer| observer.has_enough) {
+                        self.ended_by = Some("observer".into());
+                    }
+                    if self.ended_by.is_some() {
+                        return Ok(true);
+                    }
+                }
+                Ok(Halt::Pause) => {
                     self.is_between = true;
                     return Ok(false);
                 }
-                Ok(Reached::Event(contact)) if self.mechanism.held.contains(&contact) => self.settle(None, Some(contact), outcome)?,
-                Ok(Reached::Event(contact)) => {
+                Ok(Halt::Contact(contact)) if self.mechanism.held.contains(&contact) => self.settle(None, Some(contact), outcome)?,
+                Ok(Halt::Contact(contact)) => {
                     let approach = self.strike(contact, outcome)?;
                     self.meet_after(Some(contact), approach, outcome)?;
                 }

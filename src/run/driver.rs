@@ -4,28 +4,45 @@
 //! [`contact`](super::contact) takes a driver through impacts, [`running`](super::running) is the loop over output times.
 
 use super::flip::{self, Flip, FlipDetector};
+use super::inside::{Inside, StepWatcher};
 use super::monitor::Monitor;
 use super::wall_guard::WallGuard;
 use crate::arithmetic::Scalar;
 use crate::dynamics::{Form, Glance, Mechanism, Motion, State, Time};
-use crate::stepping::{Integrator, Reached, StepError, Tally};
+use crate::stepping::{Integrator, StepError, Tally};
 use std::sync::Arc;
 
 /// Turns that a state may have at most: all that doubles count.
 pub(super) const MOST_TURNS: u64 = 1 << 53;
 
+/// Where a driver halts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Halt {
+    /// At the output time asked for.
+    Until,
+    /// At a contact's event, just before it takes effect.
+    Contact(usize),
+    /// Where what watches its steps has cut one short.
+    Cut,
+    /// At the end of a step, since a pause was asked for.
+    Pause,
+}
+
+/// What looks at a driver's steps.
+#[derive(Default)]
+pub(super) struct Watch<'a> {
+    /// Looks for bars that turn over.
+    pub flips: Option<&'a mut FlipDetector>,
+    /// Is shown the motion when it is due.
+    pub monitor: Option<&'a mut dyn Monitor>,
+    /// Is shown every step, and may cut it short.
+    pub steps: Option<&'a mut dyn StepWatcher>,
+}
+
 /// A problem, its method and its state.
-pub(super) trait Driver {
-    /// To the output time `until`, on the way to `horizon`; what is read then is the motion there.  Looks for bars that turn over, where asked to, shows
-    /// the motion to a monitor when it is due, and pauses after a step where `pause` is true.
-    fn advance(
-        &mut self,
-        until: Time,
-        horizon: Time,
-        flips: Option<&mut FlipDetector>,
-        monitor: Option<&mut dyn Monitor>,
-        pause: &mut Pause,
-    ) -> Result<Reached, StepError>;
+pub(super) trait Driver: Send {
+    /// To the output time `until`, on the way to `horizon`; what is read then is the motion there.  Pauses after a step where `pause` is true.
+    fn advance(&mut self, until: Time, horizon: Time, watch: Watch, pause: &mut Pause) -> Result<Halt, StepError>;
     fn read(&mut self, motion: &mut Motion);
     /// Goes on from another motion: of what the method remembers with the step alone.
     fn jump(&mut self, motion: &Motion);
@@ -57,6 +74,8 @@ pub(super) struct DriverState {
     /// Where a dense method began its last step; without unknowns where it made none.
     from: State,
     ahead: Option<usize>,
+    /// True where it was cut short.
+    is_cut: bool,
     /// False where the state is not the end of that step.
     goes_on: bool,
     /// What the method knows beside.
@@ -91,6 +110,8 @@ struct StepLoop<P: ?Sized, M> {
     observed: Motion,
     /// The event the last step ended with, where output times came first.
     ahead: Option<usize>,
+    /// True where it was cut short, and nobody has been told.
+    is_cut: bool,
     /// True where the state is the end of the method's last step, so that it goes on from there.
     goes_on: bool,
     steps: Steps,
@@ -101,15 +122,9 @@ struct StepLoop<P: ?Sized, M> {
     guard: Option<WallGuard>,
 }
 
-impl<P: Form + ?Sized, M: Integrator<P>> Driver for StepLoop<P, M> {
-    fn advance(
-        &mut self,
-        until: Time,
-        horizon: Time,
-        flips: Option<&mut FlipDetector>,
-        mut monitor: Option<&mut dyn Monitor>,
-        pause: &mut Pause,
-    ) -> Result<Reached, StepError> {
+impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M> {
+    fn advance(&mut self, until: Time, horizon: Time, watch: Watch, pause: &mut Pause) -> Result<Halt, StepError> {
+        let Watch { flips, mut monitor, mut steps } = watch;
         let mut flips = flips.filter(|flips| flips.flip.is_none());
         let is_dense = self.steps == Steps::Dense;
         // Dense methods take steps as long as they like; output times are read off them.
@@ -117,14 +132,22 @@ impl<P: Form + ?Sized, M: Integrator<P>> Driver for StepLoop<P, M> {
         self.is_inside = false;
         self.begin(target, flips.as_deref_mut())?;
         while if is_dense { self.state.time < until } else { !self.method.is_at(&self.state, until) } {
+            if self.is_cut {
+                return Ok(self.tell_cut());
+            }
             if let Some(event) = self.ahead.take() {
-                return Ok(Reached::Event(event));
+                return Ok(Halt::Contact(event));
             }
             self.method.keep_ends(self.steps == Steps::Unseen && monitor.as_ref().is_some_and(|monitor| monitor.due() < until.hi));
             self.method.save(&mut self.state);
             self.from.clone_from(&self.state);
-            let event = self.method.step(&mut self.problem, &mut self.state, target, &mut self.tally)?;
+            let mut event = self.method.step(&mut self.problem, &mut self.state, target, &mut self.tally)?;
             self.check_walls()?;
+            if let Some(steps) = &mut steps
+                && self.is_cut_by(*steps)
+            {
+                event = None;
+            }
             if let Some(flips) = &mut flips {
                 self.look_for_flips(flips);
             }
@@ -134,11 +157,14 @@ impl<P: Form + ?Sized, M: Integrator<P>> Driver for StepLoop<P, M> {
             if let Some(event) = event
                 && self.state.time <= until
             {
-                return Ok(Reached::Event(event));
+                return Ok(Halt::Contact(event));
             }
             self.ahead = event;
+            if self.is_cut && self.state.time <= until {
+                return Ok(self.tell_cut());
+            }
             if pause() && self.state.time < until {
-                return Ok(Reached::Pause);
+                return Ok(Halt::Pause);
             }
         }
         if self.state.time > until && is_dense {
@@ -146,7 +172,7 @@ impl<P: Form + ?Sized, M: Integrator<P>> Driver for StepLoop<P, M> {
             method.interpolate(problem, from, until, inside);
             self.is_inside = true;
         }
-        Ok(Reached::Until)
+        Ok(Halt::Until)
     }
 
     fn read(&mut self, motion: &mut Motion) {
@@ -197,6 +223,7 @@ impl<P: Form + ?Sized, M: Integrator<P>> Driver for StepLoop<P, M> {
             tally: self.tally,
             from: self.from.clone(),
             ahead: self.ahead,
+            is_cut: self.is_cut,
             goes_on: self.goes_on,
             known: self.method.internal_state(),
         }
@@ -222,11 +249,12 @@ impl<P: Form + ?Sized, M: Integrator<P>> Driver for StepLoop<P, M> {
             self.method.step(&mut self.problem, &mut state, horizon, &mut Tally::default())?;
         }
         (self.state, self.tally, self.from, self.ahead, self.goes_on) = (place.state, place.tally, place.from, place.ahead, steps_back);
+        self.is_cut = place.is_cut;
         Ok(self.method.restore_internal_state(&place.known))
     }
 }
 
-impl<P: Form + ?Sized, M: Integrator<P>> StepLoop<P, M> {
+impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
     /// Makes everything ready for a step from the present state.
     fn begin(&mut self, target: Time, flips: Option<&mut FlipDetector>) -> Result<(), StepError> {
         let Self { problem, method, state, guard, .. } = self;
@@ -242,6 +270,32 @@ impl<P: Form + ?Sized, M: Integrator<P>> StepLoop<P, M> {
             guard.begin(problem.mechanism(), state.time.hi, &glance);
         }
         Ok(())
+    }
+
+    /// Halts where the last step was cut short: what follows begins a step of its own.
+    fn tell_cut(&mut self) -> Halt {
+        (self.is_cut, self.goes_on) = (false, false);
+        Halt::Cut
+    }
+
+    /// Shows the last step, which ends earlier where the watcher wants that.
+    fn is_cut_by(&mut self, watcher: &mut dyn StepWatcher) -> bool {
+        let Some(time) = watcher.step(self) else { return false };
+        if time < self.state.time {
+            let memory = std::mem::take(&mut self.state.memory);
+            if self.steps == Steps::Dense {
+                let Self { problem, method, from, inside, .. } = self;
+                method.interpolate(problem, from, time, inside);
+                self.state.clone_from(&self.inside);
+            } else {
+                let motion = self.at(time).clone();
+                self.state = self.problem.state(&motion);
+            }
+            self.state.time = time;
+            self.state.memory = memory;
+        }
+        self.is_cut = true;
+        true
     }
 
     /// Looks whether the last step has passed a wall.
@@ -316,22 +370,55 @@ impl<P: Form + ?Sized, M: Integrator<P>> StepLoop<P, M> {
 
     /// The first bar that turns over in the last step, of `span` \[s\], which another method integrates again.
     fn traced(&mut self, span: f64) -> Option<Flip> {
+        self.tracer_from_the_last_step();
+        let mut flips = FlipDetector::default();
+        let until = self.from.time + span;
+        let tracer = self.tracer.as_mut()?;
+        // Where that stops, what was seen up to there counts.
+        let _ = tracer.advance(until, until, Watch { flips: Some(&mut flips), ..Watch::default() }, &mut || false);
+        flips.flip
+    }
+
+    /// What integrates parts of the last step again, at its beginning.
+    fn tracer_from_the_last_step(&mut self) -> &mut Box<dyn Driver> {
         let mut motion = Motion::default();
         self.problem.read(&self.from, &mut motion);
         let tracer = self.tracer.get_or_insert_with(|| (self.trace)(&Arc::new(self.problem.mechanism().clone()), &motion));
         tracer.jump(&motion);
         tracer.forget();
         tracer.allow(tracer.tally().evaluations.saturating_add(self.tally.effort));
-        let mut flips = FlipDetector::default();
-        let until = self.from.time + span;
-        // Where that stops, what was seen up to there counts.
-        let _ = tracer.advance(until, until, Some(&mut flips), None, &mut || false);
-        flips.flip
+        tracer
+    }
+}
+
+impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Inside for StepLoop<P, M> {
+    fn span(&self) -> (Time, Time) {
+        (self.from.time, self.state.time)
+    }
+
+    fn at(&mut self, time: Time) -> &Motion {
+        if time >= self.state.time {
+            self.problem.read(&self.state, &mut self.observed);
+        } else if time <= self.from.time {
+            self.problem.read(&self.from, &mut self.observed);
+        } else if self.steps == Steps::Dense {
+            let Self { problem, method, from, inside, observed, .. } = self;
+            method.interpolate(problem, from, time, inside);
+            problem.read(inside, observed);
+        } else {
+            let tracer = self.tracer_from_the_last_step();
+            // Where that stops, what it came to counts.
+            let _ = tracer.advance(time, time, Watch::default(), &mut || false);
+            let mut motion = Motion::default();
+            tracer.read(&mut motion);
+            self.observed = motion;
+        }
+        &self.observed
     }
 }
 
 /// The loop for a problem in some form and a method, from a motion on.
-pub(super) fn boxed<P: Form + ?Sized + 'static, M: Integrator<P> + 'static>(
+pub(super) fn boxed<P: Form + Send + ?Sized + 'static, M: Integrator<P> + Send + 'static>(
     problem: Box<P>,
     method: M,
     start: &Motion,
@@ -350,6 +437,7 @@ pub(super) fn boxed<P: Form + ?Sized + 'static, M: Integrator<P> + 'static>(
         is_inside: false,
         observed: Motion::default(),
         ahead: None,
+        is_cut: false,
         goes_on: false,
         steps,
         tracer: None,

@@ -11,6 +11,7 @@ mod allowance;
 #[cfg(feature = "files")]
 pub mod async_writer;
 mod build;
+mod change;
 #[doc(hidden)]
 #[cfg(feature = "files")]
 pub mod checkpoint;
@@ -25,6 +26,8 @@ pub mod drift;
 #[doc(hidden)]
 pub mod driver;
 #[doc(hidden)]
+pub mod event;
+#[doc(hidden)]
 pub mod fast;
 #[doc(hidden)]
 #[cfg(feature = "files")]
@@ -32,6 +35,8 @@ pub mod files;
 #[doc(hidden)]
 pub mod flip;
 mod impact_monitor;
+#[doc(hidden)]
+pub mod inside;
 #[doc(hidden)]
 pub mod methods;
 mod monitor;
@@ -65,10 +70,12 @@ pub use compare::{Asked, Comparison, compare};
 pub use contact::{Hold, Strike};
 pub use drift::{Drift, Limits};
 pub use driver::Pause;
+pub use event::{Action, Change, Direction, Event, EventRecord};
 pub use fast::FastMode;
 #[cfg(feature = "files")]
 pub use files::{Cursor, FileError, Folder, Stream};
 pub use flip::Flip;
+pub use inside::{Observer, Step};
 pub use methods::{METHODS, MethodId, MethodInfo, Stabilization};
 pub use plan::{Plan, Refusal, Request};
 pub use reference::{Reference, reference};
@@ -76,6 +83,6 @@ pub use running::{Outcome, ResumeError, Run, RunError, Running, Snapshot, integr
 pub use sample::{Sample, Sampler};
 #[cfg(feature = "files")]
 pub use sweep::table::SweepTable;
-pub use sweep::{Grid, Observer, Point, Status, Sweep, SweepError, Totals, Vary, VaryError, sweep, sweep_on};
+pub use sweep::{Grid, Point, PointObserver, Status, Sweep, SweepError, Totals, Vary, VaryError, sweep, sweep_on};
 pub use trace::Trace;
 pub use trust::Trust;

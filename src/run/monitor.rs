@@ -15,6 +15,9 @@ pub(super) trait Monitor {
 
     /// Told how many impacts and lasting contacts there have been so far.
     fn count_events(&mut self, count: u64);
+
+    /// Told that the run goes on as it cannot follow, and why.
+    fn end(&mut self, why: &str);
 }
 
 /// The same monitor for a shorter time.

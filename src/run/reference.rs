@@ -7,13 +7,13 @@
 
 use super::build::{build, exact};
 use super::contact::Course;
-use super::driver::{Driver, Pause};
+use super::driver::{Driver, Halt, Pause, Watch};
 use super::methods::MethodId;
 use super::plan::Plan;
 use super::running::Outcome;
 use super::trust::Ruler;
 use crate::dynamics::{Mechanism, Motion, Time};
-use crate::stepping::{Cause, Reached, StepError, Tolerance};
+use crate::stepping::{Cause, StepError, Tolerance};
 use std::sync::Arc;
 
 /// Orders and tolerances \[rad/s\] of the motion given, and of the one it is compared with.
@@ -149,7 +149,7 @@ impl Walk {
     pub(super) fn to(&mut self, time: Time, pause: &mut Pause) -> Result<Option<Motion>, StepError> {
         match self {
             Self::Exact(driver, horizon) => {
-                if driver.advance(time, *horizon, None, None, pause)? == Reached::Pause {
+                if driver.advance(time, *horizon, Watch::default(), pause)? == Halt::Pause {
                     return Ok(None);
                 }
                 let mut motion = Motion::default();

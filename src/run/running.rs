@@ -4,7 +4,9 @@ use super::build::build;
 use super::contact::{Course, Hold, Station, Strike};
 use super::drift::{Drift, Limits};
 use super::driver::{Driver, MOST_TURNS, Pause};
+use super::event::{Event, EventDetector, EventRecord};
 use super::flip::{Flip, FlipDetector};
+use super::inside::{Observer, Step, Watching};
 use super::methods::{MethodId, Stabilization};
 use super::monitor::Monitor;
 use super::plan::{Plan, Refusal, Request};
@@ -15,6 +17,8 @@ use super::turns::Turns;
 use crate::dynamics::{CompileError, Mechanism, Motion};
 use crate::scene::Scene;
 use crate::stepping::{Cause, StepError, Tally};
+use std::cell::{Cell, RefCell};
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -28,6 +32,7 @@ pub struct Run {
     /// For runs of an ensemble, which look for bars that turn over and keep no samples: whether they end with the first.
     ensemble: Option<bool>,
     companion: Option<Companion>,
+    events: Vec<Box<dyn Event>>,
     begun: Motion,
 }
 
@@ -64,6 +69,14 @@ pub struct Outcome {
     pub trust: Option<Trust>,
     /// The first time a bar turned over, where the run is one of an ensemble.
     pub flip: Option<Flip>,
+    /// Events from outside that happened, the first hundred thousand.
+    pub events: Vec<EventRecord>,
+    /// Their number.
+    pub event_count: u64,
+    /// Energy that events have put into the mechanism \[J\].
+    pub event_energy: f64,
+    /// The event that ended it, or `observer`; a run ended so is no failure.
+    pub ended_by: Option<String>,
     /// Why it ended before its horizon.
     pub stop: Option<StepError>,
 }
@@ -86,6 +99,10 @@ impl Outcome {
             trust_wall: Duration::ZERO,
             trust: None,
             flip: None,
+            events: Vec::new(),
+            event_count: 0,
+            event_energy: 0.0,
+            ended_by: None,
             stop: None,
             plan,
         }
@@ -118,7 +135,7 @@ impl Run {
         let mut driver = build(&mechanism, &mut plan, start)?;
         driver.allow(plan.effort);
         let turns = Turns::new(&mechanism, &plan, start);
-        Ok(Self { mechanism, plan, limits, driver, turns, ensemble: None, companion: None, begun: start.clone() })
+        Ok(Self { mechanism, plan, limits, driver, turns, ensemble: None, companion: None, events: Vec::new(), begun: start.clone() })
     }
 
     /// The same, accompanied by an estimate of its error; `start` is the motion it begins with.
@@ -128,6 +145,12 @@ impl Run {
     pub fn trusted(self, level: Level, start: &Motion) -> Self {
         let companion = (level != Level::Off).then(|| Companion::new(&self.mechanism, &self.plan, start, level));
         Self { companion, ..self }
+    }
+
+    /// The same with events; where one changes the run, the estimate of its error ends.
+    #[must_use]
+    pub fn with_events(self, events: Vec<Box<dyn Event>>) -> Self {
+        Self { events, ..self }
     }
 
     /// The same as one of many: looks for the first bar that turns over, and without samples for charts.
@@ -284,9 +307,11 @@ impl Snapshot {
 impl Running {
     /// Begins a run: whatever touches and moves into its wall at the start is struck.
     pub fn new(run: Run) -> Self {
-        let Run { mechanism, plan, limits, driver, turns, ensemble, companion, begun } = run;
+        let Run { mechanism, plan, limits, driver, turns, ensemble, companion, events, begun } = run;
         let mut outcome = Outcome::begun(&mechanism, plan);
+        let detector = (!events.is_empty()).then(|| EventDetector::new(Arc::clone(&mechanism), events));
         let mut course = Course::new(mechanism, driver);
+        course.events = detector;
         course.flips = ensemble.map(|_| FlipDetector::default());
         // The reference of the energy is what impacts at the start leave.
         let resting = course.meet(&mut outcome).err();
@@ -311,6 +336,15 @@ impl Running {
         let course = Course::resume(mechanism, &outcome.plan, start, station, horizon.into())?.ok_or(ResumeError::Misfit)?;
         let begun = (row == 0).then(|| start.clone());
         Ok(Self { limits, course, outcome, turns, ensemble: None, companion, row, resting, is_over: false, begun })
+    }
+
+    /// Goes on looking for the events that the run before the snapshot looked for.
+    ///
+    /// # Errors
+    /// They are others.
+    pub fn with_events(mut self, events: Vec<Box<dyn Event>>) -> Result<Self, ResumeError> {
+        let detector = EventDetector::new(Arc::clone(self.course.whole()), events);
+        if self.course.watch_for(detector) { Ok(self) } else { Err(ResumeError::Misfit) }
     }
 
     /// All that the rest of the run depends on.
@@ -344,12 +378,40 @@ impl Running {
     /// What the observer failed with; the run cannot go on then.
     pub fn go(&mut self, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>, pause: &mut Pause) -> Result<bool, RunError> {
         let (begin, before) = (Instant::now(), self.outcome.trust_wall);
-        let is_over = self.rows(observer, pause);
+        let is_over = self.rows(observer, None, pause);
         self.outcome.wall += begin.elapsed().saturating_sub(self.outcome.trust_wall - before);
         is_over
     }
 
-    fn rows(&mut self, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>, pause: &mut Pause) -> Result<bool, RunError> {
+    /// The same for an [`Observer`], which sees steps and samples and may end the run: its outcome is kept, and says so.
+    pub fn go_observed(&mut self, observer: &mut dyn Observer, pause: &mut Pause) -> bool {
+        let wants_steps = observer.wants_steps();
+        let observer = RefCell::new(observer);
+        let mut steps = StepsOf(&observer);
+        let mut watching = Watching { observer: &mut steps, has_enough: false };
+        let watching = if wants_steps { Some(&mut watching) } else { None };
+        let is_enough = Cell::new(false);
+        let gone = self.rows(
+            &mut |sample| {
+                is_enough.set(is_enough.get() || observer.borrow_mut().sample(sample).is_break());
+                Ok(())
+            },
+            watching,
+            &mut || is_enough.get() || pause(),
+        );
+        if is_enough.get() && !self.is_over {
+            self.outcome.ended_by = Some("observer".into());
+            self.is_over = true;
+        }
+        self.is_over || gone.unwrap_or(true)
+    }
+
+    fn rows(
+        &mut self,
+        observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>,
+        mut steps: Option<&mut Watching>,
+        pause: &mut Pause,
+    ) -> Result<bool, RunError> {
         let Self { limits, course, outcome, ensemble, companion, turns, begun, .. } = self;
         while !self.is_over {
             let stopped = match self.resting.take() {
@@ -357,7 +419,7 @@ impl Running {
                 None if self.row == 0 => Ok(true),
                 None => {
                     let monitor = companion.as_mut().map(|companion| companion as &mut dyn Monitor);
-                    course.go_watched(outcome.plan.time(self.row), outcome, monitor, pause)
+                    course.go_watched(outcome.plan.time(self.row), outcome, monitor, steps.as_deref_mut(), pause)
                 }
             };
             if let Some(companion) = companion {
@@ -366,7 +428,8 @@ impl Running {
             if stopped == Ok(false) {
                 return Ok(false);
             }
-            let (is_tied_up, steps) = (course.is_tied_up(), course.tally().steps);
+            outcome.ended_by = course.ended_by.take();
+            let (is_tied_up, steps_made) = (course.is_tied_up(), course.tally().steps);
             let moved = begun.take().and_then(|begun| course.begun_elsewhere(&begun, outcome));
             let sample = course.sample();
             // A stop before any progress leaves the state of the row before.
@@ -376,7 +439,7 @@ impl Running {
                     outcome.trace.see(sample);
                 }
             }
-            let exceeded = outcome.drift.see(sample, limits, steps);
+            let exceeded = outcome.drift.see(sample, limits, steps_made);
             outcome.stop = stopped
                 .err()
                 .map(|stop| advised(stop, is_tied_up))
@@ -392,7 +455,7 @@ impl Running {
             outcome.flip = course.flips.as_ref().and_then(|flips| flips.flip).filter(|flip| flip.t <= reached);
             self.row += 1;
             let has_flipped = *ensemble == Some(true) && outcome.flip.is_some();
-            self.is_over = outcome.stop.is_some() || has_flipped || self.row > outcome.plan.rows;
+            self.is_over = outcome.stop.is_some() || outcome.ended_by.is_some() || has_flipped || self.row > outcome.plan.rows;
             if let Some(companion) = companion.as_mut().filter(|_| self.is_over || self.row == 1) {
                 companion.observe(course.shown(), course.tally());
                 outcome.trust_wall += companion.take_wall();
@@ -435,6 +498,15 @@ impl Running {
         self.outcome.trust =
             self.companion.take().map(|companion| companion.trust(self.outcome.last.t).with_model(self.outcome.plan.model_error));
         self.outcome
+    }
+}
+
+/// The steps of an observer, who is lent out for samples as well.
+struct StepsOf<'a, 'b>(&'a RefCell<&'b mut dyn Observer>);
+
+impl Observer for StepsOf<'_, '_> {
+    fn step(&mut self, step: &mut Step) -> ControlFlow<()> {
+        self.0.borrow_mut().step(step)
     }
 }
 

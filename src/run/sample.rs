@@ -132,6 +132,12 @@ impl Sampler {
         self.holding = mechanism;
     }
 
+    /// From here on energies are those of `free`, the same mechanism with other parts that act, and forces those of `holding`.
+    pub fn exchange(&mut self, free: Arc<Mechanism>, holding: Arc<Mechanism>) {
+        self.mechanism = free;
+        self.hold(holding);
+    }
+
     /// Energy less work at the start, shifted by impacts \[J\]; `None` before the first sample.
     pub fn reference(&self) -> Option<DoubleDouble> {
         self.reference

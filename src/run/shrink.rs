@@ -28,7 +28,7 @@ const RESOLVED: f64 = 1e-9;
 
 /// A method that stops where a spring loses its length.
 pub(super) struct Shrinking<P: ?Sized> {
-    method: Box<dyn Integrator<P>>,
+    method: Box<dyn Integrator<P> + Send>,
     /// Numbers of the springs that can.
     springs: Vec<usize>,
     before: Glance,
@@ -62,7 +62,7 @@ struct Approach {
 }
 
 impl<P: Form + ?Sized> Shrinking<P> {
-    pub fn new(method: Box<dyn Integrator<P>>, springs: Vec<usize>) -> Self {
+    pub fn new(method: Box<dyn Integrator<P> + Send>, springs: Vec<usize>) -> Self {
         Self { method, springs, before: Glance::default(), now: Glance::default(), from: State::default(), is_stale: true, z: Vec::new() }
     }
 }

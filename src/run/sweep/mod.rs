@@ -92,7 +92,7 @@ pub enum SweepError {
 }
 
 /// Sees the points of a sweep, in the order of the grid.
-pub trait Observer {
+pub trait PointObserver {
     /// Takes a point.
     ///
     /// # Errors
@@ -108,7 +108,7 @@ pub trait Observer {
     }
 }
 
-impl<F: FnMut(&Point) -> std::io::Result<()>> Observer for F {
+impl<F: FnMut(&Point) -> std::io::Result<()>> PointObserver for F {
     fn see(&mut self, point: &Point) -> std::io::Result<()> {
         self(point)
     }
@@ -316,7 +316,7 @@ impl Shared<'_> {
 ///
 /// # Errors
 /// What the observer failed with; a point that fails is part of what it is shown.
-pub fn sweep(sweep: &Sweep, threads: usize, observer: &mut dyn Observer) -> Result<Totals, SweepError> {
+pub fn sweep(sweep: &Sweep, threads: usize, observer: &mut dyn PointObserver) -> Result<Totals, SweepError> {
     sweep_on(sweep, threads, Totals::default(), observer)
 }
 
@@ -324,7 +324,7 @@ pub fn sweep(sweep: &Sweep, threads: usize, observer: &mut dyn Observer) -> Resu
 ///
 /// # Errors
 /// As [`sweep`].
-pub fn sweep_on(sweep: &Sweep, threads: usize, seen: Totals, observer: &mut dyn Observer) -> Result<Totals, SweepError> {
+pub fn sweep_on(sweep: &Sweep, threads: usize, seen: Totals, observer: &mut dyn PointObserver) -> Result<Totals, SweepError> {
     let begin = Instant::now();
     let available = || std::thread::available_parallelism().map_or(1, usize::from);
     let threads = if cfg!(not(feature = "threads")) {
@@ -350,7 +350,7 @@ pub fn sweep_on(sweep: &Sweep, threads: usize, seen: Totals, observer: &mut dyn 
 
 /// An observer, and what it has seen.
 struct Audience<'a> {
-    observer: &'a mut dyn Observer,
+    observer: &'a mut dyn PointObserver,
     begin: Instant,
     /// Time spent before this part of the sweep.
     before: Duration,

@@ -343,4 +343,8 @@ impl Monitor for Companion {
     fn count_events(&mut self, count: u64) {
         self.events = count;
     }
+
+    fn end(&mut self, why: &str) {
+        Self::end(self, why);
+    }
 }

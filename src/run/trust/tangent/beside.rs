@@ -23,7 +23,7 @@ const LOW_TOLERANCE: f64 = 1e-5;
 const NOISE: f64 = 1e-3;
 
 /// So many columns beside a motion.
-pub trait Beside {
+pub trait Beside: Send {
     /// Expands the motion through a state, and the columns from `first` on, that many as it has room for.
     fn expand(&mut self, mechanism: &Mechanism, state: &State, columns: &[Vec<f64>]);
 

@@ -1,0 +1,117 @@
+//! What events from outside do to a run: it stops, its motion is changed, parts of the scene begin or cease to act.
+
+use super::build::build;
+use super::contact::Course;
+use super::event::{Action, Change};
+use super::monitor::Monitor;
+use super::running::Outcome;
+use crate::dynamics::kernel::Kernel;
+use crate::dynamics::{Mechanism, Motion};
+use crate::stepping::{Cause, StepError};
+use std::sync::Arc;
+
+/// Violation of a constraint, angles in rad and lengths in sizes of the mechanism, and its rate in units of the mechanism, up to which a changed motion satisfies it.
+const SATISFIED: f64 = 1e-8;
+
+impl Course {
+    /// Takes the events found in the last steps into the outcome.
+    pub(super) fn record_events(&mut self, outcome: &mut Outcome) {
+        if let Some(events) = &mut self.events {
+            outcome.event_count += events.take_found(&mut outcome.events);
+        }
+    }
+
+    /// Lets the event at which the last step was cut short take effect.
+    pub(super) fn act(&mut self, outcome: &mut Outcome, monitor: Option<&mut dyn Monitor>) -> Result<(), StepError> {
+        let Some(events) = &mut self.events else { return Ok(()) };
+        let Some((event, action)) = events.memory.pending.take() else { return Ok(()) };
+        let name = events.name(event).to_owned();
+        match action {
+            Action::Record => Ok(()),
+            Action::Stop => {
+                self.ended_by = Some(name);
+                Ok(())
+            }
+            Action::Change(change) => {
+                if let Some(monitor) = monitor {
+                    monitor.end(&format!("event `{name}` changed the run, which nothing beside it follows"));
+                }
+                self.change(&name, change, outcome)
+            }
+        }
+    }
+
+    fn change(&mut self, event: &str, Change { motion, switches }: Change, outcome: &mut Outcome) -> Result<(), StepError> {
+        let refused = |course: &mut Self, what: String, hint: &str| StepError {
+            cause: Cause::Unsuited,
+            method: outcome.plan.method.to_string(),
+            t: course.motion().time.hi,
+            step: 0.0,
+            what: format!("event `{event}` {what}"),
+            hint: hint.into(),
+        };
+        if outcome.plan.step.is_some() {
+            return Err(refused(
+                self,
+                "changes the run, and steps of one length would no longer end on the output times".into(),
+                "--method taylor or dp8",
+            ));
+        }
+        let before = self.motion();
+        let balance = self.sampler.balance(&before);
+        let mut after = before.clone();
+        if let Some(motion) = motion {
+            let n = before.phi.len();
+            if (motion.phi.len(), motion.omega.len(), motion.turns.len()) != (n, n, before.turns.len()) {
+                return Err(refused(self, "gives a motion of other coordinates".into(), "change a clone of the motion it is shown"));
+            }
+            (after.phi, after.omega, after.turns) = (motion.phi, motion.omega, motion.turns);
+        }
+        for (part, on) in switches {
+            self.off.retain(|off| *off != part);
+            if !on {
+                self.off.push(part);
+            }
+        }
+        let free = match self.whole.without(&self.off) {
+            Ok(free) => Arc::new(free),
+            Err(part) => return Err(refused(self, format!("switches `{part}`"), "name a spring, a torsion spring, a force or a torque")),
+        };
+        if let Some(what) = broken(&free, &after) {
+            return Err(refused(self, what, "change rates along what the constraints allow"));
+        }
+        self.mechanism = if self.mechanism.held.is_empty() { Arc::clone(&free) } else { Arc::new(free.holding(&self.mechanism.held)) };
+        self.free = free;
+        self.stabilizer += std::mem::take(&mut after.stabilizer);
+        let mut plan = outcome.plan.clone();
+        if !self.mechanism.held.is_empty() {
+            plan.stabilization = super::methods::Stabilization::Projection;
+        }
+        let next = build(&self.mechanism, &mut plan, &after)?;
+        let last = std::mem::replace(&mut self.driver, next);
+        self.driver.follow(&*last);
+        self.sampler.exchange(Arc::clone(&self.free), Arc::clone(&self.mechanism));
+        let change = self.sampler.balance(&after) - balance;
+        self.sampler.shift(change);
+        outcome.event_energy += change.hi;
+        self.meet(outcome)
+    }
+}
+
+/// The constraint that a motion does not satisfy.
+fn broken(mechanism: &Mechanism, motion: &Motion) -> Option<String> {
+    let [phi, omega] = [&motion.phi, &motion.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<f64>>());
+    if phi.iter().chain(&omega).any(|x| !x.is_finite()) {
+        return Some("gives numbers that are not finite".into());
+    }
+    let mut kernel = Kernel::<f64>::new(mechanism);
+    kernel.linearise_at::<0>(mechanism, motion.time, &phi, &omega);
+    let (size, time) = (mechanism.size_of_parts(), mechanism.units.time);
+    mechanism.rows.iter().enumerate().find_map(|(r, row)| {
+        let unit = if row.is_angle() { 1.0 } else { size };
+        let (position, rate) = (kernel.rows[r].position.abs() / unit, kernel.row_rate(r, &omega).abs() / unit * time);
+        let pace = omega.iter().fold(1.0, |most: f64, omega| most.max(omega.abs() * time));
+        (position > SATISFIED || rate > SATISFIED * pace)
+            .then(|| format!("leaves constraint {} by {position:.1e} at position and {rate:.1e} at velocity level", row.name))
+    })
+}

@@ -1,0 +1,127 @@
+//! The inside of accepted steps, for what watches a run: events, observers, trajectories.
+
+use super::event::EventDetector;
+use super::sample::Sample;
+use crate::dynamics::{Motion, Time};
+use std::ops::ControlFlow;
+
+/// An accepted step and the motion inside it.
+pub(super) trait Inside {
+    /// Its beginning and its end.
+    fn span(&self) -> (Time, Time);
+
+    /// The motion at a time inside it; times outside count as the nearer end.
+    fn at(&mut self, time: Time) -> &Motion;
+}
+
+/// Shown every accepted step; may cut it short.
+pub(super) trait StepWatcher {
+    /// The time the step is to end at, where that is earlier: what watches has something to do there.
+    fn step(&mut self, inside: &mut dyn Inside) -> Option<Time>;
+}
+
+/// An accepted step, as an [`Observer`] sees it.
+pub struct Step<'a>(&'a mut dyn Inside);
+
+impl Step<'_> {
+    /// Its beginning \[s\].
+    pub fn begin(&self) -> f64 {
+        self.0.span().0.hi
+    }
+
+    /// Its end \[s\].
+    pub fn end(&self) -> f64 {
+        self.0.span().1.hi
+    }
+
+    /// The motion at a time inside it \[s\], by the method's dense output; fixed-step methods and the windows of `ode_solvers` are integrated again there by
+    /// `dp8` at 1e-13.
+    pub fn at(&mut self, time: f64) -> &Motion {
+        self.0.at(Time::from(time))
+    }
+}
+
+/// Sees a run from outside, and may end it; what it was up to there is kept.
+///
+/// Closures that take a [`Sample`] are observers.
+pub trait Observer {
+    /// Shown every accepted step.  A run asks only those observers that [want](Observer::wants_steps) it.
+    fn step(&mut self, _step: &mut Step) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+
+    /// Shown the sample of every output time.
+    fn sample(&mut self, _sample: &Sample) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+
+    /// Whether it is to be shown steps.
+    fn wants_steps(&self) -> bool {
+        true
+    }
+}
+
+impl<F: FnMut(&Sample) -> ControlFlow<()>> Observer for F {
+    fn sample(&mut self, sample: &Sample) -> ControlFlow<()> {
+        self(sample)
+    }
+
+    fn wants_steps(&self) -> bool {
+        false
+    }
+}
+
+/// An observer as a watcher of steps.
+pub(super) struct Watching<'a, 'b> {
+    pub observer: &'a mut (dyn Observer + 'b),
+    /// True once it wanted to stop.
+    pub has_enough: bool,
+}
+
+impl StepWatcher for Watching<'_, '_> {
+    fn step(&mut self, inside: &mut dyn Inside) -> Option<Time> {
+        let end = inside.span().1;
+        self.has_enough |= self.observer.step(&mut Step(inside)).is_break();
+        self.has_enough.then_some(end)
+    }
+}
+
+/// The events of a run and an observer, one after the other.
+pub(super) struct Both<'a, 'b, 'c> {
+    pub events: Option<&'a mut EventDetector>,
+    pub observer: Option<&'a mut Watching<'b, 'c>>,
+}
+
+impl Both<'_, '_, '_> {
+    /// True where anybody looks at steps.
+    pub fn is_asked(&self) -> bool {
+        self.events.is_some() || self.observer.as_ref().is_some_and(|watching| watching.observer.wants_steps())
+    }
+}
+
+impl StepWatcher for Both<'_, '_, '_> {
+    fn step(&mut self, inside: &mut dyn Inside) -> Option<Time> {
+        let cut = self.events.as_mut().and_then(|events| events.step(inside));
+        let Some(observer) = self.observer.as_mut().filter(|watching| watching.observer.wants_steps()) else { return cut };
+        match cut {
+            Some(end) => observer.step(&mut Shortened { inside, end }).or(cut),
+            None => observer.step(inside),
+        }
+    }
+}
+
+/// A step up to an earlier end.
+struct Shortened<'a> {
+    inside: &'a mut dyn Inside,
+    end: Time,
+}
+
+impl Inside for Shortened<'_> {
+    fn span(&self) -> (Time, Time) {
+        (self.inside.span().0, self.end)
+    }
+
+    fn at(&mut self, time: Time) -> &Motion {
+        self.inside.at(if time > self.end { self.end } else { time })
+    }
+}

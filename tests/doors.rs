@@ -1,0 +1,318 @@
+//! Events and observers from outside the crate.
+
+use driftless::run::{Action, Change, Direction, Event, EventRecord, Observer, Step};
+use driftless::stepping::composition::Composition;
+use driftless::{
+    Configuration, Level, Limits, Mechanism, MethodId, Motion, Outcome, Plan, Request, Run, Running, Sample, Scalar, Scene, SceneBuilder,
+    Simulation, Site, ground, on,
+};
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// An event function of time and configuration with a direction and what it does.
+struct When<V, A>(&'static str, Direction, V, A);
+
+impl<V, A> Event for When<V, A>
+where
+    V: Fn(&Configuration<f64>) -> f64 + Send + Sync,
+    A: FnMut(&Motion) -> Action + Send + Sync,
+{
+    fn name(&self) -> &str {
+        self.0
+    }
+
+    fn value(&self, at: &Configuration<f64>) -> f64 {
+        self.2(at)
+    }
+
+    fn direction(&self) -> Direction {
+        self.1
+    }
+
+    fn action(&mut self, _at: &Configuration<f64>, motion: &Motion) -> Action {
+        self.3(motion)
+    }
+}
+
+fn record(name: &'static str, direction: Direction, value: impl Fn(&Configuration<f64>) -> f64 + Send + Sync + 'static) -> Box<dyn Event> {
+    Box::new(When(name, direction, value, |_: &Motion| Action::Record))
+}
+
+fn every_method() -> Vec<Request> {
+    let adaptive = |method, rtol| Request { method: Some(method), rtol: Some(rtol), atol: Some(rtol), ..Request::default() };
+    let fixed = |method| Request { method: Some(method), step: Some(0.01), ..Request::default() };
+    vec![
+        adaptive(MethodId::Dopri5, 1e-9),
+        adaptive(MethodId::Dop853, 1e-11),
+        adaptive(MethodId::Dp5, 1e-9),
+        adaptive(MethodId::Dp8, 1e-12),
+        adaptive(MethodId::Taylor, 1e-13),
+        adaptive(MethodId::Radau(3), 1e-10),
+        adaptive(MethodId::Radau(5), 1e-12),
+        fixed(MethodId::Gauss(8)),
+        fixed(MethodId::Rattle(Composition::KahanLi17)),
+    ]
+}
+
+/// A body that hangs on nothing, at a height \[m\].
+fn ball(height: f64, until: f64) -> Scene {
+    SceneBuilder::new("ball")
+        .gravity([0.0, -9.81])
+        .body("ball", 2.0, [0.0, 0.0], 0.1, 0.1)
+        .start("ball", 0.0, 0.0)
+        .with("origin", vec![0.0, height])
+        .with("velocity", vec![0.0, 0.0])
+        .until(until, until)
+        .build()
+        .expect("a scene")
+}
+
+#[test]
+fn a_bouncing_ball_meets_the_ground_when_its_closed_form_says() {
+    let (height, restitution, gravity) = (1.0_f64, 0.8, 9.81);
+    let first = (2.0 * height / gravity).sqrt();
+    let times: Vec<f64> = (0..8).map(|k| (0..k).fold(first, |t, j| t + 2.0 * first * f64::powi(restitution, j + 1))).collect();
+    for request in every_method() {
+        let method = request.method.expect("a method");
+        if !method.is_adaptive() {
+            continue;
+        }
+        let simulation = Simulation::new(&ball(height, times[7] + 0.01)).expect("equations").options(request);
+        let site = simulation.site("ball", [0.0, 0.0]).expect("a point");
+        let bounce = move |motion: &Motion| {
+            let mut after = motion.clone();
+            after.omega[2] = after.omega[2].scale(-restitution);
+            Action::Change(Change::default().to(after))
+        };
+        let event = When("ground", Direction::Falling, move |at: &Configuration<f64>| at.position(&site)[1], bounce);
+        let outcome = simulation.event(event).run().expect("a run");
+        assert_eq!(outcome.stop, None, "{method}");
+        assert_eq!(outcome.event_count, 8, "{method}");
+        for (found, expected) in outcome.events.iter().zip(&times) {
+            assert!((found.t - expected).abs() < 3e-9, "{method}: {} {expected}", found.t);
+        }
+        let lost: f64 = (0..8).map(|k| 2.0 * gravity * height * f64::powi(restitution, 2 * k) * (1.0 - restitution * restitution)).sum();
+        assert!((outcome.event_energy + lost).abs() < 1e-7 * lost, "{method}: {} {lost}", outcome.event_energy);
+        assert!(outcome.drift.energy.max < 1e-8, "{method}: the balance drifts by {:e}", outcome.drift.energy.max);
+    }
+}
+
+/// A bar turned by a motor at 2 rad/s with another one on it: times at which it points somewhere are known.
+fn turned() -> Scene {
+    SceneBuilder::new("turned")
+        .gravity([0.0, -9.81])
+        .bar("crank", 0.4, 0.5)
+        .bar("arm", 0.6, 0.5)
+        .hinge("A", ground([0.0, 0.0]), on("crank", [0.0, 0.0]))
+        .hinge("B", on("crank", [0.4, 0.0]), on("arm", [0.0, 0.0]))
+        .motor("motor", "crank", 0.1, 2.0)
+        .start("arm", 0.3, 1.0)
+        .until(4.0, 0.5)
+        .build()
+        .expect("a scene")
+}
+
+#[test]
+fn events_are_located_by_every_method_in_order_and_several_in_a_step() {
+    let pi = std::f64::consts::PI;
+    for request in every_method() {
+        let method = request.method.expect("a method");
+        let simulation = Simulation::new(&turned()).expect("equations").options(request);
+        let tip = simulation.site("crank", [0.4, 0.0]).expect("a point");
+        let tip_again = tip.clone();
+        let events = vec![
+            record("up", Direction::Rising, move |at| at.position(&tip)[1]),
+            record("across", Direction::Either, move |at| at.position(&tip_again)[0]),
+            // Two zeros a ten-thousandth of a second apart, and a touch that is none.
+            record("twice", Direction::Either, |at| (at.time() - 1.2345) * (at.time() - 1.2345) - 2.5e-9),
+            record("never", Direction::Either, |at| (at.time() - 2.5) * (at.time() - 2.5) + 1e-9),
+            record("clock", Direction::Rising, |at| at.time() - 3.0),
+        ];
+        let outcome = events.into_iter().fold(simulation, Simulation::boxed_event).run().expect("a run");
+        assert_eq!(outcome.stop, None, "{method}");
+        let found = |name: &str| outcome.events.iter().filter(|event| event.name == name).map(|event| event.t).collect::<Vec<_>>();
+        let near = |name: &str, expected: &[f64], bound: f64| {
+            let found = found(name);
+            assert_eq!(found.len(), expected.len(), "{method}, {name}: {found:?} {expected:?}");
+            for (found, expected) in found.iter().zip(expected) {
+                assert!((found - expected).abs() < bound, "{method}, {name}: {found} {expected}");
+            }
+        };
+        near("up", &[(2.0 * pi - 0.1) / 2.0], 1e-10);
+        near("across", &[(0.5 * pi - 0.1) / 2.0, (1.5 * pi - 0.1) / 2.0, (2.5 * pi - 0.1) / 2.0], 1e-10);
+        near("twice", &[1.2345 - 5e-5, 1.2345 + 5e-5], 1e-9);
+        near("never", &[], 0.0);
+        near("clock", &[3.0], 1e-13);
+        assert!(outcome.events.windows(2).all(|pair| pair[0].t <= pair[1].t), "{method}");
+    }
+}
+
+fn crossings(every: f64, pause_every: Option<u64>) -> (Outcome, Vec<EventRecord>) {
+    let mut scene = turned();
+    scene.every = every;
+    let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
+    let tip = mechanism.site("arm", [0.6, 0.0]).expect("a point");
+    let events = move || -> Vec<Box<dyn Event>> {
+        let tip = tip.clone();
+        let kick = |motion: &Motion| {
+            let mut after = motion.clone();
+            after.omega[1] = after.omega[1].scale(0.9);
+            Action::Change(Change::default().to(after))
+        };
+        vec![Box::new(When("level", Direction::Either, move |at: &Configuration<f64>| at.position(&tip)[1] - 0.2, kick))]
+    };
+    let request = Request { method: Some(MethodId::Dp8), ..Request::default() };
+    let plan = Plan::new(&scene, &mechanism, &request).expect("a plan");
+    let start = mechanism.start(&scene);
+    let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).expect("a run");
+    let mut running = Running::new(run.with_events(events()));
+    let mut asked = 0;
+    loop {
+        let mut pause = || {
+            asked += 1;
+            pause_every.is_some_and(|every| asked % every == 0)
+        };
+        if running.go(&mut |_| Ok(()), &mut pause).expect("samples") {
+            break;
+        }
+        running =
+            Running::resume(Arc::clone(&mechanism), &start, running.snapshot()).expect("the same").with_events(events()).expect("the same");
+    }
+    let outcome = running.finish();
+    let events = outcome.events.clone();
+    (outcome, events)
+}
+
+#[test]
+fn neither_output_times_nor_pauses_change_events_or_what_they_do() {
+    let (outcome, events) = crossings(0.5, None);
+    assert!(events.len() >= 4 && outcome.stop.is_none(), "{events:?} {:?}", outcome.stop);
+    for (every, pause) in [(0.01, None), (4.0, None), (0.5, Some(1)), (0.01, Some(7))] {
+        let (other, found) = crossings(every, pause);
+        assert_eq!((&events, &outcome.last.phi, &outcome.last.omega), (&found, &other.last.phi, &other.last.omega), "{every} {pause:?}");
+        assert_eq!(outcome.tally, other.tally);
+    }
+}
+
+#[test]
+fn a_spring_that_is_switched_off_leaves_the_motion_it_made_and_takes_its_energy() {
+    let scene = driftless::read_scene("examples/scenes/spring.json".as_ref(), &[]).expect("a scene");
+    let name = scene.springs[0].name.clone();
+    let off = |t: f64| {
+        let name = name.clone();
+        let action = move |_: &Motion| Action::Change(Change::default().switch(&name, false));
+        When("off", Direction::Rising, move |at: &Configuration<f64>| at.time() - t, action)
+    };
+    let taylor = Request { method: Some(MethodId::Taylor), rtol: Some(1e-14), until: Some(2.0), every: Some(0.5), ..Request::default() };
+    let outcome = Simulation::new(&scene).expect("equations").options(taylor.clone()).event(off(0.7)).run().expect("a run");
+    // By hand: to 0.7 s with the spring, and from there without.
+    let first = Request { until: Some(0.7), every: Some(0.7), ..taylor.clone() };
+    let before = Simulation::new(&scene).expect("equations").options(first).run().expect("a run");
+    let mut without = scene.clone();
+    without.springs.clear();
+    for (start, (phi, omega)) in without.start.iter_mut().zip(before.last.phi.iter().zip(&before.last.omega)) {
+        (start.phi, start.omega) = (*phi, *omega);
+    }
+    let rest = Request { until: Some(1.3), every: Some(1.3), ..taylor };
+    let after = Simulation::new(&without).expect("equations").options(rest).run().expect("a run");
+    for (a, b) in outcome.last.phi.iter().chain(&outcome.last.omega).zip(after.last.phi.iter().chain(&after.last.omega)) {
+        assert!((a - b).abs() < 1e-11, "{a} {b}");
+    }
+    let lost = after.last.kinetic + after.last.potential - before.last.kinetic - before.last.potential;
+    assert!((outcome.event_energy - lost).abs() < 1e-11, "{} {lost}", outcome.event_energy);
+    assert!(outcome.drift.energy.max < 1e-12, "{:e}", outcome.drift.energy.max);
+}
+
+#[test]
+fn what_an_event_must_not_do_is_refused_with_its_name() {
+    let stopped = |request: Request, change: fn(&Motion) -> Change| {
+        let action = move |motion: &Motion| Action::Change(change(motion));
+        let event = When("kick", Direction::Rising, |at: &Configuration<f64>| at.time() - 1.0, action);
+        let outcome = Simulation::new(&turned()).expect("equations").options(request).event(event).run().expect("a run");
+        outcome.stop.expect("a stop")
+    };
+    let by = |method| Request { method: Some(method), ..Request::default() };
+    let faster = |motion: &Motion| {
+        let mut after = motion.clone();
+        after.omega[0] = after.omega[0] + after.omega[0];
+        Change::default().to(after)
+    };
+    let stop = stopped(Request { step: Some(0.01), ..by(MethodId::Gauss(4)) }, faster);
+    assert!(stop.what.contains("kick") && stop.hint.contains("taylor"), "{stop}");
+    let stop = stopped(by(MethodId::Dp8), faster);
+    assert!(stop.what.contains("leaves constraint motor"), "{stop}");
+    let stop = stopped(by(MethodId::Dp8), |_| Change::default().switch("motor", false));
+    assert!(stop.what.contains("switches `motor`"), "{stop}");
+}
+
+#[test]
+fn a_run_that_an_event_ends_is_no_failure_and_ends_there() {
+    for request in every_method() {
+        let method = request.method.expect("a method");
+        let event = When("enough", Direction::Rising, |at: &Configuration<f64>| at.angle(0) - 4.0, |_: &Motion| Action::Stop);
+        let outcome = Simulation::new(&turned()).expect("equations").options(request).event(event).run().expect("a run");
+        assert_eq!((outcome.stop, outcome.ended_by.as_deref()), (None, Some("enough")), "{method}");
+        assert!((outcome.last.t - 1.95).abs() < 1e-9 && (outcome.last.phi[0] - 4.0).abs() < 1e-9, "{method}: {}", outcome.last.t);
+    }
+}
+
+/// Counts, and has enough after so many.
+struct Counter {
+    steps: u64,
+    samples: u64,
+    most_samples: u64,
+    last: f64,
+    tip: Site,
+}
+
+impl Observer for Counter {
+    fn step(&mut self, step: &mut Step) -> ControlFlow<()> {
+        assert_eq!(step.begin(), self.last);
+        let middle = 0.5 * (step.begin() + step.end());
+        // The motor's angle is known at every time.
+        let phi = step.at(middle).unwrapped(0);
+        assert!((phi - 0.1 - 2.0 * middle).abs() < 1e-9, "{phi} at {middle}");
+        (self.last, self.steps) = (step.end(), self.steps + 1);
+        ControlFlow::Continue(())
+    }
+
+    fn sample(&mut self, sample: &Sample) -> ControlFlow<()> {
+        assert!(self.tip.body.is_some() && sample.t >= 0.0);
+        self.samples += 1;
+        if self.samples == self.most_samples { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}
+
+#[test]
+fn an_observer_sees_every_step_and_sample_and_may_end_the_run() {
+    for request in every_method() {
+        let method = request.method.expect("a method");
+        for most_samples in [4, u64::MAX] {
+            let simulation = Simulation::new(&turned()).expect("equations").options(request.clone());
+            let tip = simulation.site("arm", [0.6, 0.0]).expect("a point");
+            let mut counter = Counter { steps: 0, samples: 0, most_samples, last: 0.0, tip };
+            let outcome = simulation.run_observed(&mut counter).expect("a run");
+            if most_samples == 4 {
+                assert_eq!((counter.samples, outcome.last.t, outcome.ended_by.as_deref()), (4, 1.5, Some("observer")), "{method}");
+            } else {
+                assert_eq!((counter.samples, outcome.ended_by), (9, None), "{method}");
+                let windows = matches!(method, MethodId::Dopri5 | MethodId::Dop853);
+                assert!(windows || counter.steps == outcome.tally.steps, "{method}: {} {}", counter.steps, outcome.tally.steps);
+            }
+        }
+    }
+}
+
+#[test]
+fn runs_may_go_to_other_threads() {
+    fn is_send<T: Send>() {}
+    is_send::<Run>();
+    is_send::<Running>();
+    is_send::<Outcome>();
+    is_send::<Simulation>();
+    let scene = turned();
+    let simulation = Simulation::new(&scene).expect("equations").trust(Level::Auto).until(1.0);
+    let elsewhere = std::thread::spawn(move || simulation.run().expect("a run").last.phi);
+    let here = Simulation::new(&scene).expect("equations").trust(Level::Auto).until(1.0).run().expect("a run").last.phi;
+    assert_eq!(elsewhere.join().expect("a result"), here);
+}
