@@ -63,15 +63,16 @@ pub mod stepping;
 pub use arithmetic::{DoubleDouble, Scalar};
 pub use dynamics::force::{Force, Loads, UserForce};
 pub use dynamics::row::Site;
-pub use dynamics::{Configuration, Mechanism, Motion};
+pub use dynamics::{Configuration, Field, Mechanism, Motion, State, Time};
 pub use error::Error;
 pub use run::trust::Level;
 pub use run::{
-    Action, Change, Direction, Drift, Event, EventRecord, Limits, MethodId, Observer, Outcome, Plan, Request, Run, Running, Sample,
-    Snapshot, Stabilization, Step, Sweep, Trust, compare, reference,
+    Action, Change, Custom, Direction, Drift, Event, EventRecord, Limits, MethodId, Observer, Outcome, Plan, Problem, Request, Run,
+    Running, Sample, Snapshot, Stabilization, Step, Sweep, Trust, compare, reference,
 };
 pub use scene::{Scene, SceneBuilder, Template, ground, on, parse_scene, read_scene};
 pub use simulation::Simulation;
+pub use stepping::{Integrator, StepError, Tally};
 
 #[doc = include_str!("../docs/source-problem.md")]
 pub mod source_problem {}

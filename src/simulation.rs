@@ -5,7 +5,7 @@ use crate::dynamics::force::{Force, UserForce};
 use crate::dynamics::row::Site;
 use crate::dynamics::{Mechanism, Motion};
 use crate::run::trust::Level;
-use crate::run::{Event, Limits, MethodId, Observer, Outcome, Plan, Request, Run, Running, Sample, Stabilization, integrate};
+use crate::run::{Custom, Event, Limits, MethodId, Observer, Outcome, Plan, Request, Run, Running, Sample, Stabilization, integrate};
 use crate::scene::Scene;
 use std::sync::Arc;
 
@@ -53,6 +53,7 @@ pub struct Simulation {
     limits: Limits,
     level: Level,
     events: Vec<Box<dyn Event>>,
+    integrator: Option<Custom>,
 }
 
 impl Simulation {
@@ -69,6 +70,7 @@ impl Simulation {
             limits: Limits::default(),
             level: Level::Off,
             events: Vec::new(),
+            integrator: None,
         })
     }
 
@@ -142,6 +144,13 @@ impl Simulation {
         self
     }
 
+    /// An integrator from outside the crate, by what makes it.
+    #[must_use]
+    pub fn integrator(mut self, integrator: Custom) -> Self {
+        self.integrator = Some(integrator);
+        self
+    }
+
     /// Relative and absolute tolerance of an adaptive method.
     #[must_use]
     pub fn tolerance(mut self, relative: f64, absolute: f64) -> Self {
@@ -189,8 +198,13 @@ impl Simulation {
     /// # Errors
     /// A request that makes no sense for the scene, or a method that cannot begin there.
     pub fn prepare(self) -> Result<Run, Error> {
-        let plan = Plan::new(&self.scene, &self.mechanism, &self.request)?;
-        let start = self.start();
+        // An adaptive method stands for what is not known of the integrator.
+        let stand_in = Request { method: self.request.method.or(self.integrator.as_ref().map(|_| MethodId::Dp8)), ..self.request };
+        let mut plan = Plan::new(&self.scene, &self.mechanism, &stand_in)?;
+        if let Some(integrator) = self.integrator {
+            plan = plan.integrated_by(integrator);
+        }
+        let start = self.mechanism.start(&self.scene);
         let run = Run::new(Arc::clone(&self.mechanism), plan, self.limits, &start)?;
         Ok(run.trusted(self.level, &start).with_events(self.events))
     }

@@ -1,10 +1,11 @@
 //! Events and observers from outside the crate.
 
+use driftless::dynamics::Field;
 use driftless::run::{Action, Change, Direction, Event, EventRecord, Observer, Step};
 use driftless::stepping::composition::Composition;
 use driftless::{
-    Configuration, Level, Limits, Mechanism, MethodId, Motion, Outcome, Plan, Request, Run, Running, Sample, Scalar, Scene, SceneBuilder,
-    Simulation, Site, ground, on,
+    Configuration, Custom, Integrator, Level, Limits, Mechanism, MethodId, Motion, Outcome, Plan, Problem, Request, Run, Running, Sample,
+    Scalar, Scene, SceneBuilder, Simulation, Site, State, StepError, Tally, Time, ground, on,
 };
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -315,4 +316,105 @@ fn runs_may_go_to_other_threads() {
     let elsewhere = std::thread::spawn(move || simulation.run().expect("a run").last.phi);
     let here = Simulation::new(&scene).expect("equations").trust(Level::Auto).until(1.0).run().expect("a run").last.phi;
     assert_eq!(elsewhere.join().expect("a result"), here);
+}
+
+/// The classical method of Runge (1895) and Kutta (1901): four stages, order 4.
+struct Rk4 {
+    step: f64,
+    stages: [Vec<f64>; 5],
+}
+
+impl Rk4 {
+    fn boxed(step: f64) -> Box<dyn Integrator<dyn Problem> + Send> {
+        Box::new(Self { step, stages: Default::default() })
+    }
+}
+
+impl<P: Field + ?Sized> Integrator<P> for Rk4 {
+    fn name(&self) -> &'static str {
+        "rk4"
+    }
+
+    fn order(&self) -> u32 {
+        4
+    }
+
+    fn begin(&mut self, problem: &mut P, state: &mut State, _until: Time) -> Result<(), StepError> {
+        assert_eq!(problem.dimension(), state.y.len());
+        self.stages.iter_mut().for_each(|stage| stage.resize(state.y.len(), 0.0));
+        Ok(())
+    }
+
+    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
+        let left = (until - state.time).hi;
+        let h = if left < 1.5 * self.step { left } else { self.step };
+        let (start, [k1, k2, k3, k4, y]) = (state.y.clone(), &mut self.stages);
+        let moved = |y: &mut Vec<f64>, k: &[f64], h: f64| y.iter_mut().zip(&start).zip(k).for_each(|((y, start), k)| *y = start + h * k);
+        problem.rate(state.time, &start, k1);
+        moved(y, k1, 0.5 * h);
+        problem.rate(state.time + 0.5 * h, y, k2);
+        moved(y, k2, 0.5 * h);
+        problem.rate(state.time + 0.5 * h, y, k3);
+        moved(y, k3, h);
+        problem.rate(state.time + h, y, k4);
+        for i in 0..start.len() {
+            state.y[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
+        }
+        state.time = if h == left { until } else { state.time + h };
+        state.wrap();
+        (tally.steps, tally.evaluations) = (tally.steps + 1, tally.evaluations + 4);
+        Ok(None)
+    }
+}
+
+#[test]
+fn an_integrator_from_outside_is_driven_like_the_others() {
+    for name in ["free", "spring", "motor", "four_bars"] {
+        let scene = driftless::read_scene(format!("examples/scenes/{name}.json").as_ref(), &[]).expect("a scene");
+        let simulation = || Simulation::new(&scene).expect("equations").until(0.5).every(0.1);
+        let exact = simulation().method(MethodId::Taylor).tolerance(1e-14, 1e-14).run().expect("a run");
+        let run = |step: f64| {
+            let custom = Custom::new("rk4", move || Rk4::boxed(step));
+            simulation().integrator(custom).trust(Level::Auto).run().expect("a run")
+        };
+        let error = |outcome: &Outcome| {
+            assert_eq!(outcome.stop, None, "{name}");
+            outcome.last.phi.iter().zip(&exact.last.phi).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()))
+        };
+        let (coarse, fine) = (run(2e-3), run(1e-3));
+        let order = (error(&coarse) / error(&fine)).log2();
+        assert!((order - 4.0).abs() < 0.35, "{name}: order {order}");
+        // Drift, estimate and counts come with it.
+        assert!(fine.drift.energy.max > 0.0 && fine.drift.energy.max < coarse.drift.energy.max, "{name}");
+        let estimate = coarse.trust.as_ref().and_then(|trust| trust.error_estimate).expect("an estimate");
+        assert!(estimate > error(&coarse) / 3.0 && estimate < 10.0 * error(&coarse), "{name}: {estimate:e} for {:e}", error(&coarse));
+        assert_eq!((coarse.tally.steps, coarse.tally.evaluations, coarse.plan.method.to_string()), (250, 1000, "custom".into()), "{name}");
+    }
+}
+
+#[test]
+fn a_run_by_an_integrator_from_outside_goes_on_to_the_same_bits() {
+    let scene = driftless::read_scene("examples/scenes/spring.json".as_ref(), &[]).expect("a scene");
+    let custom = || Custom::new("rk4", || Rk4::boxed(1e-3));
+    let simulation = || Simulation::new(&scene).expect("equations").until(0.5).every(0.1).integrator(custom());
+    let whole = simulation().run().expect("a run");
+    let (mechanism, start) = (Arc::clone(simulation().mechanism()), simulation().start());
+    let mut running = Running::new(simulation().prepare().expect("a run"));
+    let mut asked = 0;
+    let is_over = running.go(&mut |_| Ok(()), &mut || {
+        asked += 1;
+        asked == 123
+    });
+    assert!(!is_over.expect("samples"));
+    // As a file would hold it: without the integrator.
+    let text = serde_json::to_string(&running.snapshot()).expect("text");
+    let kept = || serde_json::from_str::<driftless::Snapshot>(&text).expect("a snapshot");
+    let refused = Running::resume(Arc::clone(&mechanism), &start, kept()).err().expect("a refusal");
+    assert!(refused.to_string().contains("from outside the crate"), "{refused}");
+    let mut snapshot = kept();
+    snapshot.integrated_by(custom());
+    let mut rest = Running::resume(mechanism, &start, snapshot).expect("the same");
+    assert!(rest.go(&mut |_| Ok(()), &mut || false).expect("samples"));
+    let rest = rest.finish();
+    assert_eq!((rest.last, rest.tally), (whole.last, whole.tally));
 }

@@ -102,6 +102,18 @@ fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<
     let projected = plan.stabilization == Stabilization::Projection;
     let problem = || sized!(n, form(mechanism, plan.stabilization, plan.time_constant.unwrap_or(1.0)));
     Ok(match plan.method {
+        MethodId::Custom => {
+            let Some(custom) = &plan.integrator else {
+                return Err(cannot_begin(plan, "the integrator of this run is from outside the crate, and was not given again".into()));
+            };
+            let integrator = custom.make();
+            let steps = if integrator.is_dense() { Steps::Dense } else { Steps::Fixed };
+            if projected {
+                driver(problem(), Projected::new(integrator), start, steps)
+            } else {
+                driver(problem(), integrator, start, steps)
+            }
+        }
         MethodId::Dopri5 => driver(problem(), Dopri5::new(tolerance), start, Steps::Unseen),
         MethodId::Dop853 => driver(problem(), Dop853::new(tolerance), start, Steps::Unseen),
         MethodId::Dp5 if projected => driver(problem(), Projected::new(Dp5::new(tolerance)), start, Steps::Dense),

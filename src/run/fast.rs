@@ -119,6 +119,6 @@ pub(super) fn evaluations_a_step(method: MethodId) -> f64 {
         MethodId::Dop853 | MethodId::Dp8 => 11.0,
         MethodId::Radau(stages) => 2.0 * stages as f64,
         MethodId::Gauss(stages) => 4.0 * stages as f64,
-        MethodId::Taylor | MethodId::Rattle(_) => 1.0,
+        MethodId::Taylor | MethodId::Rattle(_) | MethodId::Custom => 1.0,
     }
 }

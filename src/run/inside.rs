@@ -44,6 +44,23 @@ impl Step<'_> {
 /// Sees a run from outside, and may end it; what it was up to there is kept.
 ///
 /// Closures that take a [`Sample`] are observers.
+///
+/// ```
+/// use driftless::{Sample, Simulation, read_scene};
+/// use std::ops::ControlFlow;
+///
+/// # fn main() -> Result<(), driftless::Error> {
+/// let scene = read_scene("examples/scenes/free.json".as_ref(), &[])?;
+/// let mut fastest = 0.0;
+/// let mut observer = |sample: &Sample| {
+///     fastest = sample.omega.iter().fold(fastest, |most: f64, omega| most.max(omega.abs()));
+///     if fastest > 10.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+/// };
+/// let outcome = Simulation::new(&scene)?.run_observed(&mut observer)?;
+/// assert!(fastest > 10.0 && outcome.last.t < scene.until && outcome.ended_by.as_deref() == Some("observer"));
+/// # Ok(())
+/// # }
+/// ```
 pub trait Observer {
     /// Shown every accepted step.  A run asks only those observers that [want](Observer::wants_steps) it.
     fn step(&mut self, _step: &mut Step) -> ControlFlow<()> {

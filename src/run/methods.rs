@@ -23,6 +23,8 @@ pub enum MethodId {
     Gauss(usize),
     /// RATTLE and its compositions.
     Rattle(Composition),
+    /// An integrator from outside the crate: see [`Custom`](super::Custom).
+    Custom,
 }
 
 /// How a method's step is given.
@@ -83,6 +85,9 @@ pub const METHODS: &[MethodInfo] = &[
     rattle(Composition::KahanLi17, 8, "rattle8"),
 ];
 
+/// What there is to say of an integrator from outside.
+const CUSTOM: MethodInfo = adaptive(MethodId::Custom, "custom", 0, "an integrator from outside the crate", "what it asks for itself");
+
 const fn adaptive(id: MethodId, name: &'static str, order: u32, purpose: &'static str, needs: &'static str) -> MethodInfo {
     MethodInfo { id, name, order, stepping: Stepping::Adaptive, symplectic: false, purpose, needs }
 }
@@ -119,7 +124,7 @@ const fn rattle(composition: Composition, order: u32, name: &'static str) -> Met
 impl MethodId {
     /// Its line of the table.
     pub fn info(self) -> &'static MethodInfo {
-        METHODS.iter().find(|info| info.id == self).unwrap_or(&METHODS[0])
+        METHODS.iter().find(|info| info.id == self).unwrap_or(&CUSTOM)
     }
 
     /// True for the methods that take tolerances.

@@ -22,6 +22,8 @@ pub mod compare;
 #[doc(hidden)]
 pub mod contact;
 #[doc(hidden)]
+pub mod custom;
+#[doc(hidden)]
 pub mod drift;
 #[doc(hidden)]
 pub mod driver;
@@ -63,11 +65,13 @@ pub mod trust;
 mod turns;
 mod wall_guard;
 
+pub use build::Problem;
 #[cfg(feature = "files")]
 pub use checkpoint::{CheckpointError, Checkpoints, Loaded};
 pub use choice::Prefer;
 pub use compare::{Asked, Comparison, compare};
 pub use contact::{Hold, Strike};
+pub use custom::Custom;
 pub use drift::{Drift, Limits};
 pub use driver::Pause;
 pub use event::{Action, Change, Direction, Event, EventRecord};

@@ -3,6 +3,7 @@
 //! A pairing that makes no sense is refused here, before anything is computed, with the reason and an alternative.
 
 use super::choice::{Prefer, choose};
+use super::custom::Custom;
 use super::fast::{self, FastMode};
 use super::methods::{MethodId, Stabilization};
 use crate::arithmetic::DoubleDouble;
@@ -74,6 +75,9 @@ pub struct Plan {
     pub model_error: Option<f64>,
     /// What was adjusted or left out, one line each.
     pub notes: Vec<String>,
+    /// The integrator from outside, of [`MethodId::Custom`].
+    #[serde(skip)]
+    pub integrator: Option<Custom>,
 }
 
 /// Why a request was refused.
@@ -106,6 +110,15 @@ const SEPARATE: f64 = 100.0;
 pub(super) const MANY_COORDINATES: usize = 48;
 
 impl Plan {
+    /// The same by an integrator from outside; tolerance and step are its own affair, the stabilization is kept.
+    #[must_use]
+    pub fn integrated_by(mut self, integrator: Custom) -> Self {
+        (self.method, self.step, self.why) = (MethodId::Custom, None, None);
+        (self.extended, self.in_double_double) = (false, false);
+        self.integrator = Some(integrator);
+        self
+    }
+
     /// Decides; see [`Plan::notes`] and [`Plan::why`] for what it decided by itself.
     ///
     /// # Errors
@@ -169,6 +182,7 @@ impl Plan {
             stiffness,
             model_error: model_error(mechanism, rate, &mut notes),
             notes,
+            integrator: None,
         })
     }
 
@@ -190,6 +204,7 @@ impl Plan {
             stiffness: None,
             model_error: None,
             notes: Vec::new(),
+            integrator: None,
         }
     }
 
@@ -215,7 +230,7 @@ impl Plan {
         let numbers = [Some(self.until), Some(self.every), self.step, self.time_constant];
         let given = if self.method.is_adaptive() { self.tolerance.is_some() } else { self.step.is_some() }
             && (self.stabilization != Stabilization::Baumgarte || self.time_constant.is_some());
-        let is_known = super::methods::METHODS.iter().any(|info| info.id == self.method);
+        let is_known = self.method == MethodId::Custom || super::methods::METHODS.iter().any(|info| info.id == self.method);
         numbers.into_iter().all(positive) && tolerances && given && is_known && rows(self.until, self.every) == self.rows as f64
     }
 

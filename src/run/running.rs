@@ -2,6 +2,7 @@
 
 use super::build::build;
 use super::contact::{Course, Hold, Station, Strike};
+use super::custom::Custom;
 use super::drift::{Drift, Limits};
 use super::driver::{Driver, MOST_TURNS, Pause};
 use super::event::{Event, EventDetector, EventRecord};
@@ -264,6 +265,11 @@ impl Snapshot {
     /// The last output time reached \[s\].
     pub fn time(&self) -> f64 {
         self.outcome.last.t
+    }
+
+    /// Goes on by an integrator from outside, which snapshots in files do not hold.
+    pub fn integrated_by(&mut self, integrator: Custom) {
+        self.outcome.plan.integrator = Some(integrator);
     }
 
     /// Bounds the evaluations of the whole run anew, those made so far counted in.

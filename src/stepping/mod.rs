@@ -235,6 +235,64 @@ pub trait Integrator<P: ?Sized> {
     }
 }
 
+impl<P: ?Sized> Integrator<P> for Box<dyn Integrator<P> + Send> {
+    fn name(&self) -> &'static str {
+        (**self).name()
+    }
+
+    fn order(&self) -> u32 {
+        (**self).order()
+    }
+
+    fn begin(&mut self, problem: &mut P, state: &mut State, until: Time) -> Result<(), StepError> {
+        (**self).begin(problem, state, until)
+    }
+
+    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
+        (**self).step(problem, state, until, tally)
+    }
+
+    fn is_at(&self, state: &State, until: Time) -> bool {
+        (**self).is_at(state, until)
+    }
+
+    fn changed(&mut self, state: &mut State) {
+        (**self).changed(state);
+    }
+
+    fn save(&self, state: &mut State) {
+        (**self).save(state);
+    }
+
+    fn is_dense(&self) -> bool {
+        (**self).is_dense()
+    }
+
+    fn interpolate(&mut self, problem: &mut P, from: &State, time: Time, inside: &mut State) {
+        (**self).interpolate(problem, from, time, inside);
+    }
+
+    fn reset(&mut self, state: &mut State) {
+        (**self).reset(state);
+    }
+
+    fn keep_ends(&mut self, keep: bool) {
+        (**self).keep_ends(keep);
+    }
+
+    fn ends(&self) -> Option<&Ends> {
+        (**self).ends()
+    }
+
+    fn internal_state(&self) -> Vec<f64> {
+        (**self).internal_state()
+    }
+
+    fn restore_internal_state(&mut self, known: &[f64]) -> bool {
+        (**self).restore_internal_state(known)
+    }
+}
+
 /// Why a method stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]

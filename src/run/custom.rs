@@ -1,0 +1,89 @@
+//! Integrators from outside the crate.
+
+use super::build::Problem;
+use crate::stepping::Integrator;
+use std::fmt;
+use std::sync::Arc;
+
+/// Makes an integrator of any mechanism: it is called for the run, for what is integrated again after impacts, and where a run goes on.
+type Make = dyn Fn() -> Box<dyn Integrator<dyn Problem> + Send> + Send + Sync;
+
+/// An integrator from outside, as a plan holds it; two are the same where one is a clone of the other.
+///
+/// It is driven as the crate's own ones: events and impacts, monitors, projection after its steps, the error estimate, pauses.  One that is
+/// [dense](Integrator::is_dense) takes steps as long as it likes; one that is not is asked for steps that end on output times.
+///
+/// ```
+/// use driftless::{Custom, Field, Integrator, Simulation, State, StepError, Tally, Time, read_scene};
+///
+/// /// Heun's method with a step of its own: order 2.
+/// struct Heun {
+///     step: f64,
+/// }
+///
+/// impl<P: Field + ?Sized> Integrator<P> for Heun {
+///     fn name(&self) -> &'static str {
+///         "heun"
+///     }
+///
+///     fn order(&self) -> u32 {
+///         2
+///     }
+///
+///     fn begin(&mut self, _: &mut P, _: &mut State, _: Time) -> Result<(), StepError> {
+///         Ok(())
+///     }
+///
+///     fn step(&mut self, problem: &mut P, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
+///         let left = (until - state.time).hi;
+///         let h = if left < 1.5 * self.step { left } else { self.step };
+///         let (mut first, mut second) = (vec![0.0; state.y.len()], vec![0.0; state.y.len()]);
+///         problem.rate(state.time, &state.y, &mut first);
+///         let there: Vec<f64> = state.y.iter().zip(&first).map(|(y, rate)| y + h * rate).collect();
+///         problem.rate(state.time + h, &there, &mut second);
+///         for i in 0..there.len() {
+///             state.y[i] += 0.5 * h * (first[i] + second[i]);
+///         }
+///         state.time = if h == left { until } else { state.time + h };
+///         state.wrap();
+///         (tally.steps, tally.evaluations) = (tally.steps + 1, tally.evaluations + 2);
+///         Ok(None)
+///     }
+/// }
+///
+/// # fn main() -> Result<(), driftless::Error> {
+/// let scene = read_scene("examples/scenes/free.json".as_ref(), &[])?;
+/// let heun = Custom::new("heun", || Box::new(Heun { step: 1e-4 }));
+/// let outcome = Simulation::new(&scene)?.until(1.0).integrator(heun).run()?;
+/// assert!(outcome.stop.is_none() && outcome.drift.energy.max < 1e-5);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone)]
+pub struct Custom {
+    name: String,
+    make: Arc<Make>,
+}
+
+impl Custom {
+    /// Of a name, for messages, and what makes one.
+    pub fn new(name: &str, make: impl Fn() -> Box<dyn Integrator<dyn Problem> + Send> + Send + Sync + 'static) -> Self {
+        Self { name: name.into(), make: Arc::new(make) }
+    }
+
+    pub(super) fn make(&self) -> Box<dyn Integrator<dyn Problem> + Send> {
+        (self.make)()
+    }
+}
+
+impl fmt::Debug for Custom {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.debug_tuple("Custom").field(&self.name).finish()
+    }
+}
+
+impl PartialEq for Custom {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.make, &other.make)
+    }
+}
