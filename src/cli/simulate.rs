@@ -12,7 +12,7 @@ use crate::run::async_writer::AsyncWriter;
 use crate::run::files::{RECORD, TRAJECTORY};
 use crate::run::table::Table;
 use crate::run::trust::Level;
-use crate::run::{Checkpoints, Folder, Outcome, Plan, Request, ResumeError, Run, RunError, Running, Sample, Stream};
+use crate::run::{Checkpoints, Folder, Outcome, Plan, Request, ResumeError, Run, RunError, Running, Sample, Stream, wall_clock};
 use crate::scene::{Override, Scene, Template, read_text, source_name};
 use std::sync::Arc;
 use std::time::Instant;
@@ -97,7 +97,7 @@ pub fn resume(flags: &RunFlags, saved: Saved, until: Option<f64>, folder: Folder
         return Err(Failure::new(Exit::Usage, text));
     }
     flags.scene.remark(&format!("{}; from t = {} s on", report::setting(snapshot.plan()), snapshot.time()));
-    let running = Running::resume(Arc::clone(&mechanism), &mechanism.start(&scene), *snapshot)?;
+    let running = Running::resume(Arc::clone(&mechanism), &mechanism.start(&scene), *snapshot)?.timed(wall_clock);
     let table = Table::going_on(&mechanism, folder.take_up(TRAJECTORY, &cursor)?);
     let task = Task { scene: &scene, mechanism: &mechanism, flags, text: &text, arguments: &arguments };
     let done = vec![task.finish(running, AsyncWriter::new(table), folder, checkpoints)?];
@@ -136,7 +136,7 @@ impl Task<'_> {
         let path = flags.out.join(&scene.name).join(folder);
         let folder = Folder::open(&path, flags.force)?;
         let table = Table::new(mechanism, folder.begin(TRAJECTORY)?).map_err(|error| folder.failed(TRAJECTORY, error.into()))?;
-        self.finish(Running::new(run), AsyncWriter::new(table), folder, Checkpoints::none(&path))
+        self.finish(Running::new(run.timed(wall_clock)), AsyncWriter::new(table), folder, Checkpoints::none(&path))
     }
 
     /// Takes a run to its end.

@@ -18,6 +18,8 @@ pub mod checkpoint;
 #[doc(hidden)]
 pub mod choice;
 #[doc(hidden)]
+pub mod clock;
+#[doc(hidden)]
 pub mod compare;
 #[doc(hidden)]
 pub mod contact;
@@ -69,6 +71,7 @@ pub use build::Problem;
 #[cfg(feature = "files")]
 pub use checkpoint::{CheckpointError, Checkpoints, Loaded};
 pub use choice::Prefer;
+pub use clock::{Clock, wall_clock};
 pub use compare::{Asked, Comparison, compare};
 pub use contact::{Hold, Strike};
 pub use custom::Custom;

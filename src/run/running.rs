@@ -1,6 +1,7 @@
 //! The loop: from output time to output time, with limits watched; a run can pause in it, be taken down and go on elsewhere.
 
 use super::build::build;
+use super::clock::{Clock, still};
 use super::contact::{Course, Hold, Station, Strike};
 use super::custom::Custom;
 use super::drift::{Drift, Limits};
@@ -21,7 +22,7 @@ use crate::stepping::{Cause, StepError, Tally};
 use std::cell::{Cell, RefCell};
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// A run about to begin.
 pub struct Run {
@@ -34,6 +35,7 @@ pub struct Run {
     ensemble: Option<bool>,
     companion: Option<Companion>,
     events: Vec<Box<dyn Event>>,
+    clock: Clock,
     begun: Motion,
 }
 
@@ -62,7 +64,7 @@ pub struct Outcome {
     pub hold_count: u64,
     /// Time spent so, summed over the points \[s\].
     pub hold_time: f64,
-    /// Time spent between the first output time and the last, pauses and the companion left out.
+    /// Time spent between the first output time and the last, pauses and the companion left out; zero where nobody [times](Run::timed) the run.
     pub wall: Duration,
     /// Time the companion took.
     pub trust_wall: Duration,
@@ -136,7 +138,18 @@ impl Run {
         let mut driver = build(&mechanism, &mut plan, start)?;
         driver.allow(plan.effort);
         let turns = Turns::new(&mechanism, &plan, start);
-        Ok(Self { mechanism, plan, limits, driver, turns, ensemble: None, companion: None, events: Vec::new(), begun: start.clone() })
+        Ok(Self {
+            mechanism,
+            plan,
+            limits,
+            driver,
+            turns,
+            ensemble: None,
+            companion: None,
+            events: Vec::new(),
+            clock: still,
+            begun: start.clone(),
+        })
     }
 
     /// The same, accompanied by an estimate of its error; `start` is the motion it begins with.
@@ -146,6 +159,12 @@ impl Run {
     pub fn trusted(self, level: Level, start: &Motion) -> Self {
         let companion = (level != Level::Off).then(|| Companion::new(&self.mechanism, &self.plan, start, level));
         Self { companion, ..self }
+    }
+
+    /// The same, timed by a clock: see [`Outcome::wall`].
+    #[must_use]
+    pub fn timed(self, clock: Clock) -> Self {
+        Self { clock, ..self }
     }
 
     /// The same with events; where one changes the run, the estimate of its error ends.
@@ -230,6 +249,7 @@ pub struct Running {
     is_over: bool,
     /// The start, until the first sample has been compared with it.
     begun: Option<Motion>,
+    clock: Clock,
 }
 
 /// All that the rest of a run depends on, beside its mechanism: what a checkpoint holds.
@@ -313,7 +333,7 @@ impl Snapshot {
 impl Running {
     /// Begins a run: whatever touches and moves into its wall at the start is struck.
     pub fn new(run: Run) -> Self {
-        let Run { mechanism, plan, limits, driver, turns, ensemble, companion, events, begun } = run;
+        let Run { mechanism, plan, limits, driver, turns, ensemble, companion, events, clock, begun } = run;
         let mut outcome = Outcome::begun(&mechanism, plan);
         let detector = (!events.is_empty()).then(|| EventDetector::new(Arc::clone(&mechanism), events));
         let mut course = Course::new(mechanism, driver);
@@ -321,7 +341,8 @@ impl Running {
         course.flips = ensemble.map(|_| FlipDetector::default());
         // The reference of the energy is what impacts at the start leave.
         let resting = course.meet(&mut outcome).err();
-        Self { limits, course, outcome, turns, ensemble, companion, row: 0, resting, is_over: false, begun: Some(begun) }
+        Self { limits, course, outcome, turns, ensemble, companion, row: 0, resting, is_over: false, begun: Some(begun), clock: still }
+            .timed(clock)
     }
 
     /// Goes on from a snapshot of a run of the same mechanism and start.
@@ -341,7 +362,17 @@ impl Running {
         let turns = Turns::new(&mechanism, &outcome.plan, start);
         let course = Course::resume(mechanism, &outcome.plan, start, station, horizon.into())?.ok_or(ResumeError::Misfit)?;
         let begun = (row == 0).then(|| start.clone());
-        Ok(Self { limits, course, outcome, turns, ensemble: None, companion, row, resting, is_over: false, begun })
+        Ok(Self { limits, course, outcome, turns, ensemble: None, companion, row, resting, is_over: false, begun, clock: still })
+    }
+
+    /// Timed by a clock from now on.
+    #[must_use]
+    pub fn timed(mut self, clock: Clock) -> Self {
+        self.clock = clock;
+        if let Some(companion) = &mut self.companion {
+            companion.clock = clock;
+        }
+        self
     }
 
     /// Goes on looking for the events that the run before the snapshot looked for.
@@ -383,14 +414,15 @@ impl Running {
     /// # Errors
     /// What the observer failed with; the run cannot go on then.
     pub fn go(&mut self, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>, pause: &mut Pause) -> Result<bool, RunError> {
-        let (begin, before) = (Instant::now(), self.outcome.trust_wall);
+        let (begin, before) = ((self.clock)(), self.outcome.trust_wall);
         let is_over = self.rows(observer, None, pause);
-        self.outcome.wall += begin.elapsed().saturating_sub(self.outcome.trust_wall - before);
+        self.outcome.wall += ((self.clock)() - begin).saturating_sub(self.outcome.trust_wall - before);
         is_over
     }
 
     /// The same for an [`Observer`], which sees steps and samples and may end the run: its outcome is kept, and says so.
     pub fn go_observed(&mut self, observer: &mut dyn Observer, pause: &mut Pause) -> bool {
+        let (begin, before) = ((self.clock)(), self.outcome.trust_wall);
         let wants_steps = observer.wants_steps();
         let observer = RefCell::new(observer);
         let mut steps = StepsOf(&observer);
@@ -405,6 +437,7 @@ impl Running {
             watching,
             &mut || is_enough.get() || pause(),
         );
+        self.outcome.wall += ((self.clock)() - begin).saturating_sub(self.outcome.trust_wall - before);
         if is_enough.get() && !self.is_over {
             self.outcome.ended_by = Some("observer".into());
             self.is_over = true;

@@ -11,13 +11,14 @@ use super::tangent::Tangent;
 use super::{CUT, HORIZON, LOST, Level, Ruler, Trust};
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::{Mechanism, Motion, Time};
+use crate::run::clock::{Clock, still};
 use crate::run::methods::{MethodId, Stabilization};
 use crate::run::monitor::Monitor;
 use crate::run::plan::Plan;
 use crate::stepping::{StepError, Tally};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// An error \[rad\] near the horizon.
 const NEAR: f64 = 0.03 * HORIZON;
@@ -48,6 +49,8 @@ pub(in crate::run) struct Companion {
     torques: Option<Torques>,
     /// Time spent since this was last asked for.
     wall: Duration,
+    /// What that is taken from.
+    pub(in crate::run) clock: Clock,
 }
 
 /// All that the rest of it depends on.
@@ -143,6 +146,7 @@ impl Companion {
             events: 0,
             torques: Torques::new(mechanism),
             wall: Duration::ZERO,
+            clock: still,
         }
     }
 
@@ -335,9 +339,9 @@ impl Monitor for Companion {
     }
 
     fn observe(&mut self, motion: &Motion, tally: Tally) {
-        let begin = Instant::now();
+        let begin = (self.clock)();
         self.look(motion, tally);
-        self.wall += begin.elapsed();
+        self.wall += (self.clock)() - begin;
     }
 
     fn count_events(&mut self, count: u64) {
