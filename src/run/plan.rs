@@ -2,7 +2,7 @@
 //!
 //! A pairing that makes no sense is refused here, before anything is computed, with the reason and an alternative.
 
-use super::choice::{Prefer, choose};
+use super::choice::{Choice, Prefer, choose, least_tolerance, usual_tolerance};
 use super::custom::Custom;
 use super::fast::{self, FastMode};
 use super::methods::{MethodId, Stabilization};
@@ -102,8 +102,6 @@ const MOST_EFFORT: [f64; 2] = [1e10, 1e9];
 pub const MAX_ROWS: f64 = 1e9;
 /// Most numbers of a trajectory that a scene asks for by itself: about a gigabyte.
 const MOST_NUMBERS: f64 = 5e7;
-/// Least tolerance where the first orders are in double-double: far below what the others are rounded to.
-const LEAST_EXTENDED: f64 = 1e-25;
 /// How much faster than all else a vibration must be to be taken for its mean force: a turn of it within a hundredth of theirs.
 const SEPARATE: f64 = 100.0;
 /// So many coordinates are cheaper body by body, with multipliers, than in the matrices that eliminated coordinates and momenta ask for.
@@ -133,18 +131,19 @@ impl Plan {
         }
         let rate = fastest_rate(scene, mechanism);
         let stiffness = Stiffness::at_start(mechanism, &mechanism.start(scene));
-        let (method, why) = match request.method {
-            Some(method) => (method, None),
+        let (method, extended, why) = match request.method {
+            Some(method) => (method, request.extended, None),
             None => {
-                let (method, why) = choose(mechanism, request, stiffness.as_ref(), until, rate);
-                (method, Some(why))
+                let Choice { method, extended, why } = choose(mechanism, request, stiffness.as_ref(), until, rate);
+                (method, extended, Some(why))
             }
         };
+        check_tolerances(request, method, extended)?;
         let stabilization = pair(mechanism, method, request, &mut notes)?;
         check_vibration(mechanism, method, rate, &mut notes)?;
         let (mut step, mut tolerance) = (None, None);
         if method.is_adaptive() {
-            let relative = request.rtol.unwrap_or(if request.extended { 1e-20 } else { 1e-9 });
+            let relative = request.rtol.unwrap_or_else(|| usual_tolerance(mechanism, method, extended, until));
             tolerance = Some(Tolerance { relative, absolute: request.atol.unwrap_or(relative) });
         } else {
             step = Some(fixed_step(method, request, rate, until, &mut every, &mut notes)?);
@@ -172,7 +171,7 @@ impl Plan {
             tolerance,
             stabilization,
             time_constant: request.time_constant,
-            extended: request.extended,
+            extended,
             in_double_double: false,
             effort,
             until,
@@ -308,12 +307,6 @@ fn check_numbers(request: &Request) -> Result<(), Refusal> {
             ));
         }
     }
-    for (option, value) in [("--rtol", request.rtol), ("--atol", request.atol)] {
-        let least = if request.extended { LEAST_EXTENDED } else { 1e-15 };
-        if let Some(value) = value.filter(|&value| !(least..=0.1).contains(&value)) {
-            return Err(usage(option, format!("{value:e} is not within {least:e} to 0.1"), "1e-9 is a good beginning"));
-        }
-    }
     if request.extended && request.method.is_some_and(|method| method != MethodId::Taylor) {
         let reason = "it carries the first orders of a series in double-double, and only taylor has one";
         return Err(usage("--extended", reason.into(), "--method taylor, or leave it out"));
@@ -336,6 +329,18 @@ fn check_numbers(request: &Request) -> Result<(), Refusal> {
     if request.time_constant.is_some() && request.stabilize != Some(Stabilization::Baumgarte) {
         let reason = "it is the time constant of Baumgarte's term, and of nothing else";
         return Err(usage("--time-constant", reason.into(), "--stabilize baumgarte, or leave it out"));
+    }
+    Ok(())
+}
+
+/// Tolerances must be such as the method makes use of.
+fn check_tolerances(request: &Request, method: MethodId, extended: bool) -> Result<(), Refusal> {
+    let least = least_tolerance(method, extended);
+    for (option, value) in [("--rtol", request.rtol), ("--atol", request.atol)] {
+        if let Some(value) = value.filter(|&value| !(least..=0.1).contains(&value)) {
+            let by = if extended { format!("{method} --extended") } else { method.to_string() };
+            return Err(usage(option, format!("{value:e} is not within {least:e} to 0.1, what {by} takes"), "1e-9 is a good beginning"));
+        }
     }
     Ok(())
 }
