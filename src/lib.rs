@@ -6,26 +6,34 @@
 //! is watched on the way and reported with the result.
 //!
 //! ```
-//! use driftless::run::{MethodId, Request, simulate};
-//! use driftless::scene::read_scene;
+//! use driftless::{MethodId, Simulation, read_scene};
 //!
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # fn main() -> Result<(), driftless::Error> {
 //! let scene = read_scene("examples/scenes/motor.json".as_ref(), &[])?;
-//! let request = Request { method: Some(MethodId::Gauss(8)), until: Some(5.0), every: Some(0.5), ..Request::default() };
-//! let outcome = simulate(&scene, &request, &mut |sample| {
+//! let outcome = Simulation::new(&scene)?.method(MethodId::Taylor).tolerance(1e-15, 1e-15).until(5.0).every(0.5).run_with(|sample| {
 //!     println!("{:4.1} s: second bar at {:7.3} rad, torque {:6.3} N m", sample.t, sample.phi[1], sample.motors[0][0]);
 //!     Ok(())
 //! })?;
-//! // Energy minus the motor's work stays put to thirteen digits, and its angle to the last.
+//! // The energy balance is kept to thirteen digits, and the motor's angle to the last.
 //! assert!(outcome.drift.energy.max < 1e-13);
 //! assert_eq!(outcome.drift.constraints[0].1[0].max, 0.0);
 //! # Ok(())
 //! # }
 //! ```
 //!
+//! # Where to begin
+//!
+//! | for | see |
+//! | --- | --- |
+//! | a scene | [`read_scene`], [`SceneBuilder`], [`Scene`] |
+//! | a run | [`Simulation`], [`Outcome`], [`Trajectory`]; step by step [`Run`], [`Running`], [`Snapshot`] |
+//! | something of your own | [`Force`], [`Event`], [`Observer`], [`Integrator`] |
+//! | many runs | [`Sweep`], [`compare`](run::compare) |
+//! | what went wrong | [`Error`] |
+//!
 //! # The rooms, in reading order
 //!
-//! Each uses only those before it.
+//! Each uses only those before it.  What stands on a room's page is for users; its modules are for those who work on the crate, and may change.
 //!
 //! | module | holds |
 //! | --- | --- |
@@ -68,7 +76,7 @@ pub use error::Error;
 pub use run::trust::Level;
 pub use run::{
     Action, Change, Custom, Direction, Drift, Event, EventRecord, Limits, MethodId, Observer, Outcome, Plan, Problem, Request, Run,
-    Running, Sample, Snapshot, Stabilization, Step, Sweep, Trust, compare, reference,
+    Running, Sample, Snapshot, Stabilization, Step, Sweep, Trajectory, Trust, compare, reference,
 };
 pub use scene::{Scene, SceneBuilder, Template, ground, on, parse_scene, read_scene};
 pub use simulation::Simulation;

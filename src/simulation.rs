@@ -4,6 +4,7 @@ use crate::Error;
 use crate::dynamics::force::{Force, UserForce};
 use crate::dynamics::row::Site;
 use crate::dynamics::{Mechanism, Motion};
+use crate::run::trajectory::{Recorder, Trajectory};
 use crate::run::trust::Level;
 use crate::run::{Custom, Event, Limits, MethodId, Observer, Outcome, Plan, Request, Run, Running, Sample, Stabilization, integrate};
 use crate::scene::Scene;
@@ -225,6 +226,16 @@ impl Simulation {
         let mut running = Running::new(self.prepare()?);
         running.go_observed(observer, &mut || false);
         Ok(running.finish())
+    }
+
+    /// The same, with the motion at every time.
+    ///
+    /// # Errors
+    /// Those of [`run`](Self::run).
+    pub fn trajectory(self) -> Result<Trajectory, Error> {
+        let mut recorder = Recorder::default();
+        let outcome = self.run_observed(&mut recorder)?;
+        Ok(recorder.into_trajectory(outcome))
     }
 
     /// The same, showing every sample.

@@ -418,3 +418,26 @@ fn a_run_by_an_integrator_from_outside_goes_on_to_the_same_bits() {
     let rest = rest.finish();
     assert_eq!((rest.last, rest.tally), (whole.last, whole.tally));
 }
+
+#[test]
+fn a_trajectory_is_the_motion_at_every_time_by_every_method() {
+    let exact = |t: f64| {
+        let simulation = Simulation::new(&turned()).expect("equations").until(t).every(t).method(MethodId::Taylor).tolerance(1e-15, 1e-15);
+        let last = simulation.run().expect("a run").last;
+        (last.phi, last.omega)
+    };
+    let times = [0.013, 0.5, 0.777_7, 1.234_5, 1.999];
+    let expected = times.map(exact);
+    for request in every_method() {
+        let method = request.method.expect("a method");
+        let request = Request { until: Some(2.0), ..request };
+        let trajectory = Simulation::new(&turned()).expect("equations").options(request).trajectory().expect("a run");
+        for (t, (phi, omega)) in times.iter().zip(&expected) {
+            let (found, rates) = trajectory.at(*t).expect("within the run");
+            let off = found.iter().zip(phi).chain(rates.iter().zip(omega)).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+            assert!(off < 1e-7, "{method} at {t}: {off:e}");
+        }
+        assert!(trajectory.at(-0.1).is_none() && trajectory.at(2.1).is_none(), "{method}");
+        assert!(trajectory.times().count() as u64 >= 1, "{method}");
+    }
+}

@@ -62,6 +62,7 @@ pub mod sweep;
 pub mod table;
 #[doc(hidden)]
 pub mod trace;
+pub(crate) mod trajectory;
 #[doc(hidden)]
 pub mod trust;
 mod turns;
@@ -92,4 +93,5 @@ pub use sample::{Sample, Sampler};
 pub use sweep::table::SweepTable;
 pub use sweep::{Grid, Point, PointObserver, Status, Sweep, SweepError, Totals, Vary, VaryError, sweep, sweep_on};
 pub use trace::Trace;
+pub use trajectory::Trajectory;
 pub use trust::Trust;
