@@ -24,6 +24,7 @@ mod relations;
 mod targets;
 
 mod charts;
+mod choices;
 mod command_line;
 mod compare;
 mod estimates;

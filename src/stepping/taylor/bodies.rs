@@ -12,6 +12,8 @@
 //! What springs and dampers add to P is made in [`springs`](super::springs); without them there is no trace of it in the code.
 //!
 //! Scene constants enter as in `pair`: fractions of low orders in two terms, and the solutions of the first orders refined.
+//!
+//! Wins over the series of any mechanism (whole runs by `taylor`): 1.5 times on `spring` at 1e-9, 1.7 at 1e-14.
 
 use super::direction;
 use super::pace::{self, Pace};
