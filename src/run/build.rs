@@ -1,6 +1,6 @@
 //! From a plan to a driver: the form of the equations a stabilization asks for, the method, and what is measured before the first step.
 
-use super::driver::{Driver, Halt, Steps, Watch, boxed};
+use super::driver::{Driver, Halt, Watch, boxed};
 use super::impact_monitor::closed;
 use super::methods::{MethodId, Stabilization};
 use super::plan::Plan;
@@ -15,7 +15,7 @@ use crate::dynamics::{Field, Form, Mechanism, Motion};
 use crate::stabilization::{Baumgarte, Projected, SymmetricGauss};
 use crate::stepping::gauss::Gauss;
 use crate::stepping::rattle::Rattle;
-use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Integrator, Radau, StepError, Taylor, Tolerance};
+use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Integrator, Radau, StepError, Taylor};
 use std::sync::Arc;
 
 /// A mechanism in some form, as a first-order system.
@@ -41,19 +41,11 @@ fn driver<P: Form + Send + ?Sized + 'static, M: Integrator<P> + Send + 'static>(
     problem: Box<P>,
     method: M,
     start: &Motion,
-    steps: Steps,
 ) -> Box<dyn Driver> {
     match shrinking(problem.mechanism()) {
-        // The ends of windows say nothing of what is between them.
-        springs if springs.is_empty() || steps == Steps::Unseen => boxed(problem, method, start, steps, tracer),
-        springs => boxed(problem, Shrinking::new(Box::new(method), springs), start, steps, tracer),
+        springs if springs.is_empty() => boxed(problem, method, start),
+        springs => boxed(problem, Shrinking::new(Box::new(method), springs), start),
     }
-}
-
-/// What integrates parts of steps for methods without a solution inside them.
-fn tracer(mechanism: &Arc<Mechanism>, start: &Motion) -> Box<dyn Driver> {
-    let tolerance = Tolerance { relative: 1e-13, absolute: 1e-13 };
-    driver(sized!(mechanism.size(), form(mechanism, Stabilization::None, 1.0)), Dp8::new(tolerance), start, Steps::Dense)
 }
 
 /// The form a stabilization integrates in, for `N` bodies.
@@ -107,19 +99,14 @@ fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<
                 return Err(cannot_begin(plan, "the integrator of this run is from outside the crate, and was not given again".into()));
             };
             let integrator = custom.make();
-            let steps = if integrator.is_dense() { Steps::Dense } else { Steps::Fixed };
-            if projected {
-                driver(problem(), Projected::new(integrator), start, steps)
-            } else {
-                driver(problem(), integrator, start, steps)
-            }
+            if projected { driver(problem(), Projected::new(integrator), start) } else { driver(problem(), integrator, start) }
         }
-        MethodId::Dopri5 => driver(problem(), Dopri5::new(tolerance), start, Steps::Unseen),
-        MethodId::Dop853 => driver(problem(), Dop853::new(tolerance), start, Steps::Unseen),
-        MethodId::Dp5 if projected => driver(problem(), Projected::new(Dp5::new(tolerance)), start, Steps::Dense),
-        MethodId::Dp8 if projected => driver(problem(), Projected::new(Dp8::new(tolerance)), start, Steps::Dense),
-        MethodId::Dp5 => driver(problem(), Dp5::new(tolerance), start, Steps::Dense),
-        MethodId::Dp8 => driver(problem(), Dp8::new(tolerance), start, Steps::Dense),
+        MethodId::Dopri5 => driver(problem(), Dopri5::new(tolerance), start),
+        MethodId::Dop853 => driver(problem(), Dop853::new(tolerance), start),
+        MethodId::Dp5 if projected => driver(problem(), Projected::new(Dp5::new(tolerance)), start),
+        MethodId::Dp8 if projected => driver(problem(), Projected::new(Dp8::new(tolerance)), start),
+        MethodId::Dp5 => driver(problem(), Dp5::new(tolerance), start),
+        MethodId::Dp8 => driver(problem(), Dp8::new(tolerance), start),
         MethodId::Taylor if mechanism.vibration.is_some() => {
             return Err(cannot_begin(plan, "the mean force of a rigid spring's vibration has no series".into()));
         }
@@ -131,29 +118,29 @@ fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<
             let mut taylor = Taylor::new(tolerance);
             taylor.extended = plan.extended;
             match plan.stabilization {
-                Stabilization::None if mechanism.rows.is_empty() => driver(sized!(n, eliminated(mechanism)), taylor, start, Steps::Dense),
-                Stabilization::Projection => driver(problem(), Projected::new(taylor), start, Steps::Dense),
-                _ => driver(problem(), taylor, start, Steps::Dense),
+                Stabilization::None if mechanism.rows.is_empty() => driver(sized!(n, eliminated(mechanism)), taylor, start),
+                Stabilization::Projection => driver(problem(), Projected::new(taylor), start),
+                _ => driver(problem(), taylor, start),
             }
         }
         MethodId::Radau(stages) => {
             let radau = Radau::new(stages, tolerance).ok_or_else(|| cannot_begin(plan, format!("no Radau method has {stages} stages")))?;
             if projected {
-                return Ok(driver(problem(), Projected::new(radau), start, Steps::Dense));
+                return Ok(driver(problem(), Projected::new(radau), start));
             }
-            driver(problem(), radau, start, Steps::Dense)
+            driver(problem(), radau, start)
         }
         MethodId::Gauss(stages) => {
             let gauss = Gauss::new(stages, step)
                 .ok_or_else(|| cannot_begin(plan, format!("no Gauss method has {stages} stages and step {step} s")))?;
             if projected {
-                return Ok(driver(problem(), SymmetricGauss::new(gauss), start, Steps::Fixed));
+                return Ok(driver(problem(), SymmetricGauss::new(gauss), start));
             }
-            driver(sized!(n, canonical(mechanism)), gauss, start, Steps::Fixed)
+            driver(sized!(n, canonical(mechanism)), gauss, start)
         }
         MethodId::Rattle(composition) => {
             let natural = Natural::new(Arc::clone(mechanism)).map_err(|error| cannot_begin(plan, error.to_string()))?;
-            driver(Box::new(natural), Rattle::new(composition, step), start, Steps::Fixed)
+            driver(Box::new(natural), Rattle::new(composition, step), start)
         }
     })
 }
@@ -167,8 +154,8 @@ pub(super) fn order_in_double_double(tolerance: f64) -> usize {
 pub(super) fn exact(mechanism: &Arc<Mechanism>, start: &Motion, order: usize, tolerance: f64) -> Box<dyn Driver> {
     let taylor = Taylor::<DoubleDouble>::with_order(tolerance, order);
     match mechanism.has_multipliers() {
-        true => driver(form::<0>(mechanism, Stabilization::None, 1.0), taylor, start, Steps::Dense),
-        false => driver(eliminated::<0>(mechanism), taylor, start, Steps::Dense),
+        true => driver(form::<0>(mechanism, Stabilization::None, 1.0), taylor, start),
+        false => driver(eliminated::<0>(mechanism), taylor, start),
     }
 }
 

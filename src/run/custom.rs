@@ -1,7 +1,8 @@
 //! Integrators from outside the crate.
 
 use super::build::Problem;
-use crate::stepping::Integrator;
+use crate::dynamics::{State, Time};
+use crate::stepping::{Integrator, StepError, Tally, shortened};
 use std::fmt;
 use std::sync::Arc;
 
@@ -71,8 +72,78 @@ impl Custom {
         Self { name: name.into(), make: Arc::new(make) }
     }
 
-    pub(super) fn make(&self) -> Box<dyn Integrator<dyn Problem> + Send> {
-        (self.make)()
+    pub(super) fn make(&self) -> Outside {
+        Outside { inner: (self.make)(), make: Arc::clone(&self.make), spare: None }
+    }
+}
+
+/// One as the driver calls it.
+pub(super) struct Outside {
+    inner: Box<dyn Integrator<dyn Problem> + Send>,
+    make: Arc<Make>,
+    /// Makes shorter steps, once one is asked for.
+    spare: Option<Box<dyn Integrator<dyn Problem> + Send>>,
+}
+
+impl Integrator<dyn Problem> for Outside {
+    fn name(&self) -> &'static str {
+        self.inner.name()
+    }
+
+    fn order(&self) -> u32 {
+        self.inner.order()
+    }
+
+    fn begin(&mut self, problem: &mut (dyn Problem + 'static), state: &mut State, until: Time) -> Result<(), StepError> {
+        self.inner.begin(problem, state, until)
+    }
+
+    fn step(
+        &mut self,
+        problem: &mut (dyn Problem + 'static),
+        state: &mut State,
+        until: Time,
+        tally: &mut Tally,
+    ) -> Result<Option<usize>, StepError> {
+        self.inner.step(problem, state, until, tally)
+    }
+
+    fn is_at(&self, state: &State, until: Time) -> bool {
+        self.inner.is_at(state, until)
+    }
+
+    fn changed(&mut self, state: &mut State) {
+        self.inner.changed(state);
+    }
+
+    fn save(&self, state: &mut State) {
+        self.inner.save(state);
+    }
+
+    fn is_dense(&self) -> bool {
+        self.inner.is_dense()
+    }
+
+    /// By a shorter step of another one of its kind, where it is not dense.
+    fn interpolate(&mut self, problem: &mut (dyn Problem + 'static), from: &State, time: Time, inside: &mut State) {
+        if self.inner.is_dense() {
+            return self.inner.interpolate(problem, from, time, inside);
+        }
+        let make = &self.make;
+        let spare = self.spare.get_or_insert_with(|| make());
+        shortened(&mut **spare, problem, from, time, inside);
+    }
+
+    fn reset(&mut self, state: &mut State) {
+        self.inner.reset(state);
+    }
+
+    fn internal_state(&self) -> Vec<f64> {
+        self.inner.internal_state()
+    }
+
+    fn restore_internal_state(&mut self, known: &[f64]) -> bool {
+        self.inner.restore_internal_state(known)
     }
 }
 

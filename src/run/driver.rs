@@ -3,14 +3,13 @@
 //! Every method is taken the same way: a step is made, walls are checked, flips are looked for, monitors are shown the motion, and what lies between steps is read off them.
 //! [`contact`](super::contact) takes a driver through impacts, [`running`](super::running) is the loop over output times.
 
-use super::flip::{self, Flip, FlipDetector};
+use super::flip::{self, FlipDetector};
 use super::inside::{Inside, StepWatcher};
 use super::monitor::Monitor;
 use super::wall_guard::WallGuard;
 use crate::arithmetic::Scalar;
-use crate::dynamics::{Form, Glance, Mechanism, Motion, State, Time};
+use crate::dynamics::{Form, Glance, Motion, State, Time};
 use crate::stepping::{Integrator, StepError, Tally};
-use std::sync::Arc;
 
 /// Turns that a state may have at most: all that doubles count.
 pub(super) const MOST_TURNS: u64 = 1 << 53;
@@ -82,20 +81,6 @@ pub(super) struct DriverState {
     known: Vec<f64>,
 }
 
-/// Makes a dense driver of a mechanism, from a motion on.
-pub(super) type Trace = fn(&Arc<Mechanism>, &Motion) -> Box<dyn Driver>;
-
-/// What can be seen of the steps of a method.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Steps {
-    /// Each of them, and the solution inside: they are as long as the method likes.
-    Dense,
-    /// Each of them, all of one length; output times are ends of steps.
-    Fixed,
-    /// Nothing but the time asked for.
-    Unseen,
-}
-
 struct StepLoop<P: ?Sized, M> {
     problem: Box<P>,
     method: M,
@@ -114,10 +99,8 @@ struct StepLoop<P: ?Sized, M> {
     is_cut: bool,
     /// True where the state is the end of the method's last step, so that it goes on from there.
     goes_on: bool,
-    steps: Steps,
-    /// What integrates parts of steps where the method has no solution inside, once one is needed, and what makes it.
-    tracer: Option<Box<dyn Driver>>,
-    trace: Trace,
+    /// True where output times are read off steps as long as the method likes; the steps of others end on them.
+    is_dense: bool,
     /// Watches the walls, where there are any.
     guard: Option<WallGuard>,
 }
@@ -126,7 +109,7 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
     fn advance(&mut self, until: Time, horizon: Time, watch: Watch, pause: &mut Pause) -> Result<Halt, StepError> {
         let Watch { flips, mut monitor, mut steps } = watch;
         let mut flips = flips.filter(|flips| flips.flip.is_none());
-        let is_dense = self.steps == Steps::Dense;
+        let is_dense = self.is_dense;
         // Dense methods take steps as long as they like; output times are read off them.
         let target = if is_dense { horizon } else { until };
         self.is_inside = false;
@@ -138,7 +121,6 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
             if let Some(event) = self.ahead.take() {
                 return Ok(Halt::Contact(event));
             }
-            self.method.keep_ends(self.steps == Steps::Unseen && monitor.as_ref().is_some_and(|monitor| monitor.due() < until.hi));
             self.method.save(&mut self.state);
             self.from.clone_from(&self.state);
             let mut event = self.method.step(&mut self.problem, &mut self.state, target, &mut self.tally)?;
@@ -232,7 +214,7 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
     fn resume(&mut self, place: DriverState, horizon: Time) -> Result<bool, StepError> {
         let shape = |state: &State| (state.y.len(), state.low.len(), state.turns.len(), state.is_winding);
         let alike = |state: &State| shape(state) == shape(&self.state) && state.turns.iter().all(|turns| turns.unsigned_abs() < MOST_TURNS);
-        let steps_back = self.steps == Steps::Dense && place.goes_on && !place.from.y.is_empty() && place.from.time < place.state.time;
+        let steps_back = self.is_dense && place.goes_on && !place.from.y.is_empty() && place.from.time < place.state.time;
         let counts = [place.tally.steps, place.tally.evaluations, place.tally.rejected];
         let is_event = |event: usize| event < self.problem.mechanism().contacts.len();
         if counts.iter().any(|&count| count >= MOST_TURNS)
@@ -258,7 +240,7 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
     /// Makes everything ready for a step from the present state.
     fn begin(&mut self, target: Time, flips: Option<&mut FlipDetector>) -> Result<(), StepError> {
         let Self { problem, method, state, guard, .. } = self;
-        if !std::mem::replace(&mut self.goes_on, self.steps == Steps::Dense) {
+        if !std::mem::replace(&mut self.goes_on, self.is_dense) {
             method.begin(problem, state, target)?;
         }
         if let Some(flips) = flips {
@@ -283,14 +265,9 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
         let Some(time) = watcher.step(self) else { return false };
         if time < self.state.time {
             let memory = std::mem::take(&mut self.state.memory);
-            if self.steps == Steps::Dense {
-                let Self { problem, method, from, inside, .. } = self;
-                method.interpolate(problem, from, time, inside);
-                self.state.clone_from(&self.inside);
-            } else {
-                let motion = self.at(time).clone();
-                self.state = self.problem.state(&motion);
-            }
+            let Self { problem, method, from, inside, .. } = self;
+            method.interpolate(problem, from, time, inside);
+            self.state.clone_from(&self.inside);
             self.state.time = time;
             self.state.memory = memory;
         }
@@ -304,7 +281,7 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
         let (name, mut glance) = (Integrator::<P>::name(method), Glance::default());
         problem.glance(state, &mut glance);
         let candidate = guard.step(problem.mechanism(), state.time.hi, &glance).map_err(|passed| passed.stop(name))?;
-        let Some(contact) = candidate.filter(|_| self.steps == Steps::Dense) else { return Ok(()) };
+        let Some(contact) = candidate.filter(|_| self.is_dense) else { return Ok(()) };
         let (span, mechanism) = (state.time - from.time, problem.mechanism().clone());
         let mut at = |share: f64| {
             method.interpolate(problem, from, from.time + span.scale(share), inside);
@@ -318,30 +295,23 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
     /// Looks for the first bar that turns over in the last step.
     fn look_for_flips(&mut self, flips: &mut FlipDetector) {
         let span = (self.state.time - self.from.time).hi;
-        let Some(ends) = flips.step(&mut *self.problem, &self.state, span, self.steps == Steps::Unseen) else { return };
+        let Some(ends) = flips.step(&mut *self.problem, &self.state, span) else { return };
         let start = self.from.time.hi;
-        let found = if self.steps == Steps::Dense {
-            let Self { problem, method, from, inside, .. } = self;
-            flip::search(start, span, &ends, &mut |seconds| {
-                method.interpolate(problem, from, from.time + seconds, inside);
-                let mut glance = Glance::default();
-                flip::look(&mut **problem, inside, &mut glance);
-                glance
-            })
-        } else {
-            self.traced(span)
-        };
+        let Self { problem, method, from, inside, .. } = self;
+        let found = flip::search(start, span, &ends, &mut |seconds| {
+            method.interpolate(problem, from, from.time + seconds, inside);
+            let mut glance = Glance::default();
+            flip::look(&mut **problem, inside, &mut glance);
+            glance
+        });
         flips.conclude(start + span, &ends, found);
     }
 
     /// Shows the motion of the last step to a monitor where it is due.
     fn show(&mut self, monitor: &mut dyn Monitor) {
-        if self.steps == Steps::Unseen {
-            self.show_ends(monitor);
-        }
-        let Self { problem, method, state, from, inside, observed, tally, .. } = self;
+        let Self { problem, method, state, from, inside, observed, tally, is_dense, .. } = self;
         while monitor.due() <= state.time.hi {
-            if self.steps == Steps::Dense && monitor.due() > from.time.hi && monitor.due() < state.time.hi {
+            if *is_dense && monitor.due() > from.time.hi && monitor.due() < state.time.hi {
                 method.interpolate(problem, from, Time::from(monitor.due()), inside);
                 problem.read(inside, observed);
             } else {
@@ -349,45 +319,6 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
             }
             monitor.observe(observed, *tally);
         }
-    }
-
-    /// Shows what a method kept of the ends of its steps in the last window.
-    fn show_ends(&mut self, monitor: &mut dyn Monitor) {
-        let Self { problem, method, from, inside, observed, tally, .. } = self;
-        let Some(ends) = method.ends() else { return };
-        for (&after, y) in ends.after.iter().zip(ends.y.chunks_exact(from.y.len())) {
-            if from.time.hi + after >= monitor.due() {
-                inside.clone_from(from);
-                inside.y.copy_from_slice(y);
-                inside.low.fill(0.0);
-                inside.time = from.time + after;
-                inside.wrap();
-                problem.read(inside, observed);
-                monitor.observe(observed, *tally);
-            }
-        }
-    }
-
-    /// The first bar that turns over in the last step, of `span` \[s\], which another method integrates again.
-    fn traced(&mut self, span: f64) -> Option<Flip> {
-        self.tracer_from_the_last_step();
-        let mut flips = FlipDetector::default();
-        let until = self.from.time + span;
-        let tracer = self.tracer.as_mut()?;
-        // Where that stops, what was seen up to there counts.
-        let _ = tracer.advance(until, until, Watch { flips: Some(&mut flips), ..Watch::default() }, &mut || false);
-        flips.flip
-    }
-
-    /// What integrates parts of the last step again, at its beginning.
-    fn tracer_from_the_last_step(&mut self) -> &mut Box<dyn Driver> {
-        let mut motion = Motion::default();
-        self.problem.read(&self.from, &mut motion);
-        let tracer = self.tracer.get_or_insert_with(|| (self.trace)(&Arc::new(self.problem.mechanism().clone()), &motion));
-        tracer.jump(&motion);
-        tracer.forget();
-        tracer.allow(tracer.tally().evaluations.saturating_add(self.tally.effort));
-        tracer
     }
 }
 
@@ -401,17 +332,10 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Inside for StepLoop<P, M>
             self.problem.read(&self.state, &mut self.observed);
         } else if time <= self.from.time {
             self.problem.read(&self.from, &mut self.observed);
-        } else if self.steps == Steps::Dense {
+        } else {
             let Self { problem, method, from, inside, observed, .. } = self;
             method.interpolate(problem, from, time, inside);
             problem.read(inside, observed);
-        } else {
-            let tracer = self.tracer_from_the_last_step();
-            // Where that stops, what it came to counts.
-            let _ = tracer.advance(time, time, Watch::default(), &mut || false);
-            let mut motion = Motion::default();
-            tracer.read(&mut motion);
-            self.observed = motion;
         }
         &self.observed
     }
@@ -422,10 +346,8 @@ pub(super) fn boxed<P: Form + Send + ?Sized + 'static, M: Integrator<P> + Send +
     problem: Box<P>,
     method: M,
     start: &Motion,
-    steps: Steps,
-    trace: Trace,
 ) -> Box<dyn Driver> {
-    let state = problem.state(start);
+    let (state, is_dense) = (problem.state(start), method.is_dense());
     let idle = State::default;
     Box::new(StepLoop {
         problem,
@@ -439,9 +361,7 @@ pub(super) fn boxed<P: Form + Send + ?Sized + 'static, M: Integrator<P> + Send +
         ahead: None,
         is_cut: false,
         goes_on: false,
-        steps,
-        tracer: None,
-        trace,
+        is_dense,
         guard: None,
     })
 }

@@ -3,7 +3,7 @@
 //! Every step in which an angle can come as far as that is looked through: the angles inside it are interpolated until that is resolved, and the passage is
 //! found on the interpolant by the search (`stepping/search.rs`) that finds all events.  Whole turns are counted for it where the mechanism itself does
 //! not, since there they matter (torsion springs).  The passage itself is found by Newton's method on the dense output of the
-//! step, so it is as accurate as the run.  Steps of methods without dense output, and windows that do not show their steps, are traced by `dp8`.
+//! step, so it is as accurate as the run.
 
 use crate::arithmetic::angle;
 use crate::dynamics::{Form, Glance, State};
@@ -41,13 +41,13 @@ impl FlipDetector {
         look(problem, state, &mut self.before);
     }
 
-    /// Takes the state after a step of `span` \[s\], and tells what there is to see at both ends of it where it holds a passage, or may; with `all` in any case.
-    pub fn step<P: Form + ?Sized>(&mut self, problem: &mut P, state: &State, span: f64, all: bool) -> Option<[Glance; 2]> {
+    /// Takes the state after a step of `span` \[s\], and tells what there is to see at both ends of it where it holds a passage, or may.
+    pub fn step<P: Form + ?Sized>(&mut self, problem: &mut P, state: &State, span: f64) -> Option<[Glance; 2]> {
         if self.flip.is_some() {
             return None;
         }
         look(problem, state, &mut self.now);
-        let is_candidate = all || can_pass(&self.before, &self.now, span);
+        let is_candidate = can_pass(&self.before, &self.now, span);
         let ends = is_candidate.then(|| [self.before.clone(), self.now.clone()]);
         std::mem::swap(&mut self.before, &mut self.now);
         ends

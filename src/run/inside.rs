@@ -34,8 +34,7 @@ impl Step<'_> {
         self.0.span().1.hi
     }
 
-    /// The motion at a time inside it \[s\], by the method's dense output; fixed-step methods and the windows of `ode_solvers` are integrated again there by
-    /// `dp8` at 1e-13.
+    /// The motion at a time inside it \[s\], by the method's dense output, or a shorter step of fixed-step methods and `ode_solvers`.
     pub fn at(&mut self, time: f64) -> &Motion {
         self.0.at(Time::from(time))
     }

@@ -1,14 +1,14 @@
 //! Springs that lose their length on the way: their force has no direction there, and a step can leap over the place without a trace.
 //!
 //! A power series takes sqrt(|D|²) through zero to a negative length, and a fixed step does not see the jump of the force at all; both come out on the other
-//! side with another energy, or nearly the same.  Where the two ends of a spring with a free length can meet, every step is looked at: where the method knows
-//! the motion inside it by the [search](crate::stepping::search) for all events, of the squared length
+//! side with another energy, or nearly the same.  Where the two ends of a spring with a free length can meet, every step is looked at, by the [search](crate::stepping::search) for all events on its
+//! dense output, of the squared length
 //!
 //! ```text
 //! g = |D|² - (1e-6 L0)²,     |g''| <= 2 |D'|² + 2 |D| |D''|
 //! ```
 //!
-//! and else by the cubic through its ends.  Mechanisms whose springs are too far from their places for that are integrated without.
+//! Mechanisms whose springs are too far from their places for that are integrated without.
 
 use crate::arithmetic::Complex;
 use crate::dynamics::force::Spring;
@@ -18,10 +18,6 @@ use crate::stepping::{Cause, Integrator, StepError, Tally};
 
 /// A length below this share of the free length is none.
 const NONE: f64 = 1e-6;
-/// Approaches to less than this share of the shorter length at the step's ends are looked at.
-const NEAR: f64 = 0.5;
-/// Halvings by which the nearest point of a cubic is found.
-const HALVINGS: usize = 50;
 /// Degrees of the interpolants of a span inside a step, and what the last coefficients may be of the free length.
 const DEGREES: [usize; 3] = [8, 16, 32];
 const RESOLVED: f64 = 1e-9;
@@ -52,11 +48,10 @@ pub(super) fn shrinking(mechanism: &Mechanism) -> Vec<usize> {
     mechanism.springs.iter().enumerate().filter(|(_, spring)| can(spring)).map(|(number, _)| number).collect()
 }
 
-/// The nearest the ends come to one another, and when.
+/// Ends that meet, and when.
 #[derive(Clone, Copy)]
 struct Approach {
     spring: usize,
-    length: f64,
     /// After the beginning of the step \[s\].
     after: f64,
 }
@@ -104,47 +99,14 @@ fn can_meet(a: [Complex<f64>; 2], b: [Complex<f64>; 2], time: f64) -> bool {
     nearest <= reach || reach.is_nan()
 }
 
-/// The cubic through D and D' at both ends of a step, `share` of the way.
-fn cubic([from, from_rate]: [Complex<f64>; 2], [to, to_rate]: [Complex<f64>; 2], time: f64, share: f64) -> Complex<f64> {
-    let rest = 1.0 - share;
-    let ends = from.times(rest * rest * (1.0 + 2.0 * share)) + to.times(share * share * (3.0 - 2.0 * share));
-    ends + (from_rate.times(rest) - to_rate.times(share)).times(share * rest * time)
-}
-
-/// The approach inside a step as its ends tell, where there is one near enough to be looked at, and what it may be off \[m\].
-fn suspected(number: usize, a: [Complex<f64>; 2], b: [Complex<f64>; 2], time: f64) -> Option<(Approach, f64)> {
-    let size = |x: Complex<f64>| x.norm_squared().sqrt();
-    if !(a[0].dot(a[1]) < 0.0 && b[0].dot(b[1]) > 0.0) {
-        return None;
-    }
-    let at = |share: f64| size(cubic(a, b, time, share));
-    let (mut low, mut high) = (0.0, 1.0);
-    for _ in 0..HALVINGS {
-        let [left, right] = [low + (high - low) / 3.0, high - (high - low) / 3.0];
-        if at(left) < at(right) { high = right } else { low = left }
-    }
-    let (share, length) = (0.5 * (low + high), at(0.5 * (low + high)));
-    // The fourth derivative is about the speed times the third power of the rate at which the velocity turns.
-    let speed = size(a[1]).max(size(b[1]));
-    let off = time * speed * (size(b[1] - a[1]) / speed).powi(3) / 384.0;
-    let is_near = length < NEAR * size(a[0]).min(size(b[0])) + off;
-    is_near.then_some((Approach { spring: number, length, after: share * time }, off))
-}
-
 impl<P: Form + ?Sized> Shrinking<P> {
     /// Where a spring first loses its length in a step of `time` \[s\] between the two states looked at.
     fn lost(&mut self, problem: &mut P, time: f64) -> Option<Approach> {
-        let is_dense = self.method.is_dense();
         let mut first: Option<Approach> = None;
         for place in 0..self.springs.len() {
             let number = self.springs[place];
-            let free = problem.mechanism().springs[number].free_length;
             let [a, b] = [&self.before, &self.now].map(|at| span(problem.mechanism(), number, at, &mut self.z));
-            let found = match is_dense {
-                true if can_meet(a, b, time) => self.searched(problem, number, time),
-                true => None,
-                false => suspected(number, a, b, time).filter(|(approach, off)| approach.length <= NONE * free + off).map(|found| found.0),
-            };
+            let found = if can_meet(a, b, time) { self.searched(problem, number, time) } else { None };
             first = [first, found].into_iter().flatten().min_by(|a, b| a.after.total_cmp(&b.after));
         }
         first
@@ -171,8 +133,8 @@ impl<P: Form + ?Sized> Shrinking<P> {
         }
         let length = Length(spans.map(|values| Chebyshev::through(&values)));
         match crossing(&length, 1.0) {
-            Crossing::At(share) => Some(Approach { spring: number, length: NONE * free, after: share * time }),
-            Crossing::Inside(_) => Some(Approach { spring: number, length: NONE * free, after: 0.0 }),
+            Crossing::At(share) => Some(Approach { spring: number, after: share * time }),
+            Crossing::Inside(_) => Some(Approach { spring: number, after: 0.0 }),
             Crossing::Nothing => None,
         }
     }

@@ -42,12 +42,14 @@ pub struct SymmetricGauss {
     mu: Vec<f64>,
     /// What the end asks for (2 r).
     nu: Vec<f64>,
+    /// Makes shorter steps, once one is asked for.
+    spare: Option<Box<SymmetricGauss>>,
 }
 
 impl SymmetricGauss {
     /// Projects the steps of a Gauss method.
     pub fn new(inner: Gauss) -> Self {
-        Self { inner, kernel: None, trial: State::default(), best: State::default(), mu: Vec::new(), nu: Vec::new() }
+        Self { inner, kernel: None, trial: State::default(), best: State::default(), mu: Vec::new(), nu: Vec::new(), spare: None }
     }
 
     /// One step of `h` \[s\], between states shifted alike.
@@ -58,7 +60,7 @@ impl SymmetricGauss {
         h: f64,
         tally: &mut Tally,
     ) -> Result<(), StepError> {
-        let Self { inner, kernel: Some(kernel), trial, best, mu, nu } = self else { return Ok(()) };
+        let Self { inner, kernel: Some(kernel), trial, best, mu, nu, .. } = self else { return Ok(()) };
         let (r, until) = (problem.mechanism().rows.len(), state.time + h);
         let own = state.memory.len().saturating_sub(2 * r);
         mu.clear();
@@ -211,5 +213,15 @@ impl<P: Field + Form + ?Sized> Integrator<P> for SymmetricGauss {
 
     fn changed(&mut self, state: &mut State) {
         state.memory.clear();
+    }
+
+    /// By a shorter step, as long as it takes: see [`Gauss`].
+    fn interpolate(&mut self, problem: &mut P, from: &State, time: Time, inside: &mut State) {
+        inside.clone_from(from);
+        inside.memory.clear();
+        let spare = self.spare.get_or_insert_with(|| Box::new(Self::new(self.inner.another())));
+        spare.kernel.get_or_insert_with(|| Kernel::new(problem.mechanism()));
+        // Where that fails, the state is the beginning of the step.
+        let _ = spare.shifted(problem, inside, (time - from.time).hi, &mut Tally::default());
     }
 }

@@ -89,6 +89,8 @@ pub struct Gauss {
     portable: bool,
     exact: u32,
     newton: Option<Box<Newton>>,
+    /// Makes shorter steps, once one is asked for.
+    spare: Option<Box<Gauss>>,
     /// Contraction of the sweeps above which Newton's method takes over.
     slow: f64,
 }
@@ -112,6 +114,7 @@ impl Gauss {
             portable: false,
             exact: MOST_EXACT_SWEEPS,
             newton: None,
+            spare: None,
         })
     }
 
@@ -129,6 +132,11 @@ impl Gauss {
     /// The same without the processor's vector instructions, to the same bits.
     pub fn portable(self) -> Self {
         Self { portable: true, ..self }
+    }
+
+    /// The same method, which knows nothing yet.
+    pub(crate) fn another(&self) -> Self {
+        Self { scratch: Scratch::default(), newton: None, spare: None, ..*self }
     }
 
     /// Number of stages s.
@@ -176,6 +184,13 @@ impl<F: Field + ?Sized> Integrator<F> for Gauss {
 
     fn changed(&mut self, state: &mut State) {
         state.memory.clear();
+    }
+
+    /// By a shorter step: the collocation polynomial is of order s only inside, the step of order 2s at its end.
+    fn interpolate(&mut self, problem: &mut F, from: &State, time: Time, inside: &mut State) {
+        let mut spare = self.spare.take().unwrap_or_else(|| Box::new(self.another()));
+        super::shortened(&mut *spare, problem, from, time, inside);
+        self.spare = Some(spare);
     }
 }
 

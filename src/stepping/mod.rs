@@ -100,8 +100,7 @@ pub enum Seen {
     Kept,
     /// It changed the unknowns (projection): what the method knows of the rate there is stale.
     Changed,
-    /// Nothing, and it is enough for now: the method stops here, with all it needs to go on in the state's memory.  `dopri5` and `dop853`, which show the
-    /// ends of their windows only, stop there in any case.
+    /// Nothing, and it is enough for now: the method stops here, with all it needs to go on in the state's memory.
     Enough,
     /// It changed the unknowns, and that is enough for now.
     ChangedEnough,
@@ -121,15 +120,6 @@ impl Seen {
 
 /// Shown the state after every accepted step; may change it, or stop the run.
 pub type Watch<'a, P> = dyn FnMut(&mut P, &mut State) -> Result<Seen, StepError> + 'a;
-
-/// Ends of steps that no watcher has seen.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Ends {
-    /// Times after the beginning of the call \[s\].
-    pub after: Vec<f64>,
-    /// The unknowns then, one step after the other, angles as they wind.
-    pub y: Vec<f64>,
-}
 
 /// Integrates a problem `P`, one accepted step after the other.
 ///
@@ -200,28 +190,21 @@ pub trait Integrator<P: ?Sized> {
         Ok(Reached::Until)
     }
 
-    /// True where the method knows the motion inside its steps: [`Integrator::interpolate`] answers.
+    /// True where output times are read off its steps by [`Integrator::interpolate`]; the steps of all others end on output times.
     fn is_dense(&self) -> bool {
         false
     }
 
     /// Writes the state at `time` \[s\] inside the last step, which began at `from`, to the accuracy of the step.
     ///
-    /// Nothing of the method or of the integration changes by it; methods that are not dense write nothing.
+    /// Nothing of the method or of the integration changes by it.  Methods that have no polynomial of that accuracy make a shorter step from
+    /// `from`.  What writes nothing, as here, is given such a step by a run, where it is not [dense](Integrator::is_dense).
     fn interpolate(&mut self, _problem: &mut P, _from: &State, _time: Time, _inside: &mut State) {}
 
     /// Called where the state was changed from outside at once: an impact, or a contact that begins or ends.  Forgets all that depends on the motion before it:
     /// predictors, Jacobians, rates, the history of errors.  Of the state's memory only the step remains, as a proposal.
     fn reset(&mut self, state: &mut State) {
         state.memory.clear();
-    }
-
-    /// Keeps the ends of its steps from now on, or no longer; of use with methods that show the ends of their windows only.
-    fn keep_ends(&mut self, _keep: bool) {}
-
-    /// The ends of the steps of the last call, where they are kept.
-    fn ends(&self) -> Option<&Ends> {
-        None
     }
 
     /// What a method knows beside the state that has a say in what follows; nothing unless said otherwise.
@@ -235,62 +218,25 @@ pub trait Integrator<P: ?Sized> {
     }
 }
 
-impl<P: ?Sized> Integrator<P> for Box<dyn Integrator<P> + Send> {
-    fn name(&self) -> &'static str {
-        (**self).name()
-    }
-
-    fn order(&self) -> u32 {
-        (**self).order()
-    }
-
-    fn begin(&mut self, problem: &mut P, state: &mut State, until: Time) -> Result<(), StepError> {
-        (**self).begin(problem, state, until)
-    }
-
-    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
-        (**self).step(problem, state, until, tally)
-    }
-
-    fn is_at(&self, state: &State, until: Time) -> bool {
-        (**self).is_at(state, until)
-    }
-
-    fn changed(&mut self, state: &mut State) {
-        (**self).changed(state);
-    }
-
-    fn save(&self, state: &mut State) {
-        (**self).save(state);
-    }
-
-    fn is_dense(&self) -> bool {
-        (**self).is_dense()
-    }
-
-    fn interpolate(&mut self, problem: &mut P, from: &State, time: Time, inside: &mut State) {
-        (**self).interpolate(problem, from, time, inside);
-    }
-
-    fn reset(&mut self, state: &mut State) {
-        (**self).reset(state);
-    }
-
-    fn keep_ends(&mut self, keep: bool) {
-        (**self).keep_ends(keep);
-    }
-
-    fn ends(&self) -> Option<&Ends> {
-        (**self).ends()
-    }
-
-    fn internal_state(&self) -> Vec<f64> {
-        (**self).internal_state()
-    }
-
-    fn restore_internal_state(&mut self, known: &[f64]) -> bool {
-        (**self).restore_internal_state(known)
-    }
+/// The state at `time` \[s\], by as short a step of `method` from `from`, of which nothing but the motion is known; where that fails, what it came to.
+pub(crate) fn shortened<P: ?Sized, M: Integrator<P> + ?Sized>(
+    method: &mut M,
+    problem: &mut P,
+    from: &State,
+    time: Time,
+    inside: &mut State,
+) {
+    let memory = std::mem::take(&mut inside.memory);
+    inside.clone_from(from);
+    inside.memory = memory;
+    inside.memory.clear();
+    let mut tally = Tally::default();
+    let _ = method.begin(problem, inside, time).and_then(|()| {
+        while !method.is_at(inside, time) {
+            method.step(problem, inside, time, &mut tally)?;
+        }
+        Ok(())
+    });
 }
 
 /// Why a method stopped.

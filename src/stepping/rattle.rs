@@ -42,6 +42,8 @@ pub struct Rattle {
     /// Time from the start of the step to the end of each substep \[s\].
     ends: Vec<Time>,
     work: Work,
+    /// Makes shorter steps, once one is asked for.
+    spare: Option<Box<Rattle>>,
     /// True where the state was changed since the last step.
     is_stale: bool,
 }
@@ -59,7 +61,7 @@ impl Rattle {
         if let Some(last) = ends.last_mut() {
             *last = Time::of(step);
         }
-        Self { composition, step, substeps, ends, work: Work::default(), is_stale: false }
+        Self { composition, step, substeps, ends, work: Work::default(), spare: None, is_stale: false }
     }
 
     /// The step \[s\].
@@ -133,6 +135,14 @@ impl Integrator<Natural> for Rattle {
     fn changed(&mut self, state: &mut State) {
         state.memory.clear();
         self.is_stale = true;
+    }
+
+    /// By a shorter step, which keeps the constraints as well.
+    fn interpolate(&mut self, problem: &mut Natural, from: &State, time: Time, inside: &mut State) {
+        let work = self.spare.take().map(|spare| spare.work).unwrap_or_default();
+        let mut spare = Self { work, ..Self::new(self.composition, (time - from.time).hi) };
+        super::shortened(&mut spare, problem, from, time, inside);
+        self.spare = Some(Box::new(spare));
     }
 }
 

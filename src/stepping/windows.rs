@@ -1,18 +1,20 @@
 //! `dopri5` and `dop853`: the Dormand–Prince methods of the crate `ode_solvers`, integrated in windows.
 //!
-//! The only file that knows the crate.  It owns its loop and keeps every row, so a call of [`Integrator::step`] is one window: a
-//! fresh integration from one time asked for to the next, which makes memory flat and restart exact.  Its ways, and what is done about them:
+//! The only file that knows the crate.  It owns its loop and keeps every row: a window, from where it began to the time asked for, is integrated at once,
+//! and its steps are handed out one by one.  A state in the middle of a window remembers where that began, so that it is integrated again where a run goes on.
+//! Its ways, and what is done about them:
 //!
 //! - Dense output hands out times and states that do not belong together: `Sparse` rows are used, and only the last one counts.
 //! - The twelfth stage of `Dop853` is given the time of the step's start instead of its end (0.6.2), which spoils the order where the
 //!   equations depend on time: time rides along as an unknown, and the crate's own is ignored.
 //! - 100 000 steps by default: the budget is ours.  A rate that is not finite comes back as a step-size underflow: it is looked for first.
 //! - Fixed-size vectors are 3 to 4 times faster than dynamic ones: chosen here by length.
-//! - The watcher sees the state at the end of a window only, since rows come back when it is over: no projection, no events.  `dp5` and `dp8` are for those.
+//! - What is between two rows is a shorter step from the first of them.
+//! - Rows cannot be changed while a window lasts: no projection, no walls.  `dp5` and `dp8` are for those.
 //!
 //! The step the crate found is passed on to the next window through the state's memory.
 
-use super::{Cause, Ends, Integrator, StepError, Tally, Tolerance};
+use super::{Cause, Integrator, StepError, Tally, Tolerance};
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Field, State, Time};
 use nalgebra::{DVector, SVector};
@@ -24,7 +26,7 @@ use std::cell::RefCell;
 pub struct Dopri5 {
     /// Tolerance of a step.
     pub tolerance: Tolerance,
-    ends: Option<Ends>,
+    rows: Rows,
 }
 
 /// Dormand–Prince 8(5,3) of `ode_solvers`: everyday runs at 1e-6…1e-12.
@@ -32,7 +34,7 @@ pub struct Dopri5 {
 pub struct Dop853 {
     /// Tolerance of a step.
     pub tolerance: Tolerance,
-    ends: Option<Ends>,
+    rows: Rows,
 }
 
 /// Most numbers among the rows of one call of the crate, which keeps them all: after so many a window is begun anew.
@@ -43,14 +45,14 @@ const LEAST_KEPT: usize = 64;
 impl Dopri5 {
     /// The method at a tolerance.
     pub fn new(tolerance: Tolerance) -> Self {
-        Self { tolerance, ends: None }
+        Self { tolerance, rows: Rows::default() }
     }
 }
 
 impl Dop853 {
     /// The method at a tolerance.
     pub fn new(tolerance: Tolerance) -> Self {
-        Self { tolerance, ends: None }
+        Self { tolerance, rows: Rows::default() }
     }
 }
 
@@ -103,13 +105,13 @@ impl<F: Field + ?Sized> System<f64, DVector<f64>> for Window<'_, F> {
     }
 }
 
-/// A window's outcome in plain numbers: the rows' times, the last row or all of them, counts.
+/// A window's outcome in plain numbers: the rows' times, the rows, counts.
 type Outcome = (Vec<f64>, Vec<f64>, Result<Stats, IntegrationError>);
 
 /// `integrate!(Stepper, vector)` integrates one window.
 macro_rules! integrate {
     ($stepper:path, $window:expr, $vector:expr, $span:expr, $settings:expr) => {{
-        let (tolerance, controller, first, max_steps, keeps) = $settings;
+        let (tolerance, controller, first, max_steps) = $settings;
         let (beta, fac_min, fac_max): (f64, f64, f64) = controller;
         let mut stepper = <$stepper>::from_param(
             $window,
@@ -130,9 +132,7 @@ macro_rules! integrate {
             OutputType::Sparse,
         );
         let outcome = stepper.integrate();
-        let rows = stepper.y_out();
-        let shown = if keeps { 0 } else { rows.len().saturating_sub(1) };
-        let rows = rows[shown..].iter().flat_map(|y| y.as_slice().iter().copied()).collect();
+        let rows = stepper.y_out().iter().flat_map(|y| y.as_slice().iter().copied()).collect();
         (stepper.x_out().clone(), rows, outcome)
     }};
 }
@@ -148,23 +148,139 @@ macro_rules! by_length {
 }
 
 /// A stepper of the crate, and what it evaluates in every attempt at a step, and again in every accepted one; it does not count a rejection before the first acceptance.
-struct Stepper<'a> {
+struct Stepper {
     name: &'static str,
     attempt: u64,
     accepted: u64,
-    /// Where the ends of its steps go, if anywhere.
-    ends: Option<&'a mut Ends>,
 }
 
 /// What integrates one window: it, the unknowns, its length \[s\], the first step \[s\], and most steps.
 type Integrate<'a, F> = dyn FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome + 'a;
 
-/// One call of the crate: to `until`, or to where its rows are as many as may be kept.
-fn part<F: Field + ?Sized>(
-    stepper: &mut Stepper,
+/// The rows of a window.
+#[derive(Clone, Debug, Default)]
+struct Rows {
+    /// Where it began, with the first step it was given \[s\], and where it was to end.
+    start: State,
+    until: Time,
+    /// Times after its beginning \[s\], and the unknowns then, over their units and followed by the time.
+    after: Vec<f64>,
+    y: Vec<f64>,
+    unit: Vec<f64>,
+    /// The row handed out last.
+    last: usize,
+    /// The step passed on to the next window \[s\].
+    next: f64,
+}
+
+impl Rows {
+    /// True where rows are left on the way to `until`.
+    fn has_more(&self, until: Time) -> bool {
+        self.until == until && self.last + 1 < self.after.len()
+    }
+
+    /// Forgets them.
+    fn clear(&mut self) {
+        self.after.clear();
+    }
+
+    /// What a state in the middle of a window remembers: the step passed on, the row it is, and where the window began.
+    fn remember(&self, memory: &mut Vec<f64>) {
+        let Self { start, until, .. } = self;
+        let first = start.memory.first().copied().unwrap_or_default();
+        memory.clear();
+        memory.extend([self.next, self.last as f64, first, start.time.hi, start.time.lo, until.hi, until.lo]);
+        memory.extend(start.y.iter().copied().chain(start.turns.iter().map(|&turns| turns as f64)));
+    }
+
+    /// The beginning of the window that a state on the way to `until` is in the middle of, and which of its rows it is.
+    fn recall(state: &State, until: Time) -> Option<(State, usize)> {
+        let Some((&[_, row, first, time, low, end, end_low], rest)) = state.memory.split_first_chunk() else { return None };
+        let (y, turns) = rest.split_at_checked(state.y.len())?;
+        if [end, end_low] != [until.hi, until.lo] || turns.len() != state.turns.len() {
+            return None;
+        }
+        let mut start = State { time: Time { hi: time, lo: low }, y: y.to_vec(), memory: vec![first], ..state.clone() };
+        start.low.fill(0.0);
+        start.turns = turns.iter().map(|&turns| turns as i64).collect();
+        Some((start, row as usize))
+    }
+
+    /// Writes row `last` to a state.
+    fn hand_out(&self, state: &mut State) {
+        let n = state.y.len();
+        let row = &self.y[self.last * (n + 1)..];
+        state.y.iter_mut().zip(row).zip(&self.unit).for_each(|((y, row), unit)| *y = row * unit);
+        state.low.fill(0.0);
+        state.turns.clone_from(&self.start.turns);
+        let (is_last, after) = (self.last + 1 == self.after.len(), self.after[self.last]);
+        let is_end = is_last && after >= (self.until - self.start.time).hi * (1.0 - 1e-12);
+        state.time = if is_end { self.until } else { self.start.time + after };
+        state.wrap();
+        if is_last {
+            state.memory.clear();
+            state.memory.push(self.next);
+        } else {
+            self.remember(&mut state.memory);
+        }
+    }
+}
+
+/// Takes up a state in the middle of a window, or at the beginning of one.
+fn begin<F: Field + ?Sized>(
+    rows: &mut Rows,
+    stepper: &Stepper,
     integrate: &mut Integrate<F>,
     field: &mut F,
     state: &mut State,
+    until: Time,
+) -> Result<(), StepError> {
+    super::refuse_the_past(stepper.name, state, until, field.time_unit())?;
+    if let Some((start, row)) = Rows::recall(state, until) {
+        let is_known = rows.start == start && rows.has_more(until);
+        if !is_known {
+            part(rows, stepper, integrate, field, &start, until, &mut Tally::default())?;
+        }
+        if row < rows.after.len() {
+            let mut there = state.clone();
+            rows.last = row;
+            rows.hand_out(&mut there);
+            if there == *state {
+                return Ok(());
+            }
+        }
+    }
+    rows.clear();
+    Ok(())
+}
+
+/// The next step of a window, or the first of a new one.
+fn step<F: Field + ?Sized>(
+    rows: &mut Rows,
+    stepper: &Stepper,
+    integrate: &mut Integrate<F>,
+    field: &mut F,
+    state: &mut State,
+    until: Time,
+    tally: &mut Tally,
+) -> Result<Option<usize>, StepError> {
+    if !rows.has_more(until) {
+        rows.clear();
+        part(rows, stepper, integrate, field, state, until, tally)?;
+    }
+    rows.last += 1;
+    rows.hand_out(state);
+    tally.steps += 1;
+    Ok(None)
+}
+
+/// One call of the crate: to `until`, or to where its rows are as many as may be kept.
+fn part<F: Field + ?Sized>(
+    kept: &mut Rows,
+    stepper: &Stepper,
+    integrate: &mut Integrate<F>,
+    field: &mut F,
+    state: &State,
     until: Time,
     tally: &mut Tally,
 ) -> Result<(), StepError> {
@@ -194,7 +310,6 @@ fn part<F: Field + ?Sized>(
     let reached_time = |x: f64| state.time.hi + x * time_unit;
     match outcome {
         Ok(stats) => {
-            tally.steps += u64::from(stats.accepted_steps);
             tally.evaluations += u64::from(stats.num_eval);
             let begun = if first == 0.0 { 3 } else { 1 };
             let attempts = (u64::from(stats.num_eval) - begun - stepper.accepted * u64::from(stats.accepted_steps)) / stepper.attempt;
@@ -215,10 +330,9 @@ fn part<F: Field + ?Sized>(
         return Err(stop(Cause::NotFinite, state.time.hi, span, what, "tighten the tolerance"));
     }
     let times: Vec<f64> = times.iter().map(|t| t * time_unit).collect();
-    if let Some(ends) = &mut stepper.ends {
-        let in_units = |row: &[f64]| row.iter().zip(&unit).map(|(y, unit)| y * unit).collect::<Vec<_>>();
-        ends.y = rows.chunks_exact(n + 1).flat_map(in_units).collect();
-        ends.after.clone_from(&times);
+    if times.len() < 2 || rows.len() != times.len() * (n + 1) {
+        let what = "the crate made no step".into();
+        return Err(stop(Cause::StepTooSmall, state.time.hi, span, what, "take --method taylor or dp8"));
     }
     let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let next = match steps[..] {
@@ -227,14 +341,42 @@ fn part<F: Field + ?Sized>(
         [one, two] if two > one => span,
         _ => steps.iter().copied().fold(0.0, f64::max),
     };
-    state.memory.resize(1, 0.0);
-    state.memory[0] = next;
-    state.y.iter_mut().zip(last).zip(&unit).for_each(|((y, last), unit)| *y = last * unit);
-    state.low.fill(0.0);
-    let reached = times.last().copied().unwrap_or(span);
-    state.time = if reached < span * (1.0 - 1e-12) { state.time + reached } else { until };
-    state.wrap();
+    kept.start.clone_from(state);
+    kept.start.low.fill(0.0);
+    kept.start.memory.truncate(1);
+    (kept.until, kept.after, kept.y, kept.unit, kept.last, kept.next) = (until, times, rows, unit, 0, next);
     Ok(())
+}
+
+/// The state at `time` \[s\], by a step of its own from the row before it; where that fails, that row.
+fn shorter<F: Field + ?Sized>(
+    stepper: &Stepper,
+    integrate: &mut Integrate<F>,
+    field: &mut F,
+    from: &State,
+    time: Time,
+    inside: &mut State,
+) {
+    inside.clone_from(from);
+    inside.memory.clear();
+    inside.memory.push((time - from.time).hi);
+    let mut rows = Rows::default();
+    if part(&mut rows, stepper, integrate, field, inside, time, &mut Tally::default()).is_ok() {
+        rows.last = rows.after.len() - 1;
+        rows.hand_out(inside);
+    }
+}
+
+impl Dopri5 {
+    /// The crate's method as it is called.
+    fn crate_call<F: Field + ?Sized>(&self) -> (Stepper, impl FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome + use<F>) {
+        let tolerance = self.tolerance;
+        let integrate = move |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| -> Outcome {
+            let settings = (tolerance, (0.04, 0.2, 10.0), first, most);
+            by_length!(ode_solvers::Dopri5<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
+        };
+        (Stepper { name: "dopri5", attempt: 6, accepted: 0 }, integrate)
+    }
 }
 
 impl<F: Field + ?Sized> Integrator<F> for Dopri5 {
@@ -246,32 +388,42 @@ impl<F: Field + ?Sized> Integrator<F> for Dopri5 {
         5
     }
 
-    /// What it remembers is the step found.
-    fn reset(&mut self, _state: &mut State) {}
-
     fn begin(&mut self, field: &mut F, state: &mut State, until: Time) -> Result<(), StepError> {
-        super::refuse_the_past("dopri5", state, until, field.time_unit())
+        let (stepper, mut integrate) = self.crate_call();
+        begin(&mut self.rows, &stepper, &mut integrate, field, state, until)
     }
 
-    /// One window.
     fn step(&mut self, field: &mut F, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
-        let Self { tolerance, ends } = self;
-        let (tolerance, keeps) = (*tolerance, ends.is_some());
-        let mut integrate = |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| -> Outcome {
-            let settings = (tolerance, (0.04, 0.2, 10.0), first, most, keeps);
-            by_length!(ode_solvers::Dopri5<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
+        let (stepper, mut integrate) = self.crate_call();
+        step(&mut self.rows, &stepper, &mut integrate, field, state, until, tally)
+    }
+
+    fn changed(&mut self, state: &mut State) {
+        state.memory.truncate(1);
+        self.rows.clear();
+    }
+
+    /// What it remembers beyond a window is the step found.
+    fn reset(&mut self, state: &mut State) {
+        state.memory.truncate(1);
+        self.rows.clear();
+    }
+
+    fn interpolate(&mut self, field: &mut F, from: &State, time: Time, inside: &mut State) {
+        let (stepper, mut integrate) = self.crate_call();
+        shorter(&stepper, &mut integrate, field, from, time, inside);
+    }
+}
+
+impl Dop853 {
+    /// The crate's method as it is called.
+    fn crate_call<F: Field + ?Sized>(&self) -> (Stepper, impl FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome + use<F>) {
+        let tolerance = self.tolerance;
+        let integrate = move |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| -> Outcome {
+            let settings = (tolerance, (0.0, 1.0 / 3.0, 6.0), first, most);
+            by_length!(ode_solvers::Dop853<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
         };
-        let mut stepper = Stepper { name: "dopri5", attempt: 6, accepted: 0, ends: ends.as_mut() };
-        part(&mut stepper, &mut integrate, field, state, until, tally)?;
-        Ok(None)
-    }
-
-    fn keep_ends(&mut self, keep: bool) {
-        self.ends = keep.then(|| self.ends.take().unwrap_or_default());
-    }
-
-    fn ends(&self) -> Option<&Ends> {
-        self.ends.as_ref()
+        (Stepper { name: "dop853", attempt: 11, accepted: 1 }, integrate)
     }
 }
 
@@ -284,31 +436,29 @@ impl<F: Field + ?Sized> Integrator<F> for Dop853 {
         8
     }
 
-    /// What it remembers is the step found.
-    fn reset(&mut self, _state: &mut State) {}
-
     fn begin(&mut self, field: &mut F, state: &mut State, until: Time) -> Result<(), StepError> {
-        super::refuse_the_past("dop853", state, until, field.time_unit())
+        let (stepper, mut integrate) = self.crate_call();
+        begin(&mut self.rows, &stepper, &mut integrate, field, state, until)
     }
 
-    /// One window.
     fn step(&mut self, field: &mut F, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
-        let Self { tolerance, ends } = self;
-        let (tolerance, keeps) = (*tolerance, ends.is_some());
-        let mut integrate = |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| -> Outcome {
-            let settings = (tolerance, (0.0, 1.0 / 3.0, 6.0), first, most, keeps);
-            by_length!(ode_solvers::Dop853<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
-        };
-        let mut stepper = Stepper { name: "dop853", attempt: 11, accepted: 1, ends: ends.as_mut() };
-        part(&mut stepper, &mut integrate, field, state, until, tally)?;
-        Ok(None)
+        let (stepper, mut integrate) = self.crate_call();
+        step(&mut self.rows, &stepper, &mut integrate, field, state, until, tally)
     }
 
-    fn keep_ends(&mut self, keep: bool) {
-        self.ends = keep.then(|| self.ends.take().unwrap_or_default());
+    fn changed(&mut self, state: &mut State) {
+        state.memory.truncate(1);
+        self.rows.clear();
     }
 
-    fn ends(&self) -> Option<&Ends> {
-        self.ends.as_ref()
+    /// What it remembers beyond a window is the step found.
+    fn reset(&mut self, state: &mut State) {
+        state.memory.truncate(1);
+        self.rows.clear();
+    }
+
+    fn interpolate(&mut self, field: &mut F, from: &State, time: Time, inside: &mut State) {
+        let (stepper, mut integrate) = self.crate_call();
+        shorter(&stepper, &mut integrate, field, from, time, inside);
     }
 }
