@@ -195,7 +195,7 @@ impl Rows {
 
     /// The beginning of the window that a state on the way to `until` is in the middle of, and which of its rows it is.
     fn recall(state: &State, until: Time) -> Option<(State, usize)> {
-        let Some((&[_, row, first, time, low, end, end_low], rest)) = state.memory.split_first_chunk() else { return None };
+        let (&[_, row, first, time, low, end, end_low], rest) = state.memory.split_first_chunk()?;
         let (y, turns) = rest.split_at_checked(state.y.len())?;
         if [end, end_low] != [until.hi, until.lo] || turns.len() != state.turns.len() {
             return None;
@@ -368,14 +368,15 @@ fn shorter<F: Field + ?Sized>(
 }
 
 impl Dopri5 {
+    const STEPPER: Stepper = Stepper { name: "dopri5", attempt: 6, accepted: 0 };
+
     /// The crate's method as it is called.
-    fn crate_call<F: Field + ?Sized>(&self) -> (Stepper, impl FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome + use<F>) {
+    fn call<F: Field + ?Sized>(&self) -> impl FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome + use<F> {
         let tolerance = self.tolerance;
-        let integrate = move |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| -> Outcome {
+        move |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| -> Outcome {
             let settings = (tolerance, (0.04, 0.2, 10.0), first, most);
             by_length!(ode_solvers::Dopri5<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
-        };
-        (Stepper { name: "dopri5", attempt: 6, accepted: 0 }, integrate)
+        }
     }
 }
 
@@ -389,13 +390,13 @@ impl<F: Field + ?Sized> Integrator<F> for Dopri5 {
     }
 
     fn begin(&mut self, field: &mut F, state: &mut State, until: Time) -> Result<(), StepError> {
-        let (stepper, mut integrate) = self.crate_call();
-        begin(&mut self.rows, &stepper, &mut integrate, field, state, until)
+        let mut integrate = self.call();
+        begin(&mut self.rows, &Self::STEPPER, &mut integrate, field, state, until)
     }
 
     fn step(&mut self, field: &mut F, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
-        let (stepper, mut integrate) = self.crate_call();
-        step(&mut self.rows, &stepper, &mut integrate, field, state, until, tally)
+        let mut integrate = self.call();
+        step(&mut self.rows, &Self::STEPPER, &mut integrate, field, state, until, tally)
     }
 
     fn changed(&mut self, state: &mut State) {
@@ -410,20 +411,21 @@ impl<F: Field + ?Sized> Integrator<F> for Dopri5 {
     }
 
     fn interpolate(&mut self, field: &mut F, from: &State, time: Time, inside: &mut State) {
-        let (stepper, mut integrate) = self.crate_call();
-        shorter(&stepper, &mut integrate, field, from, time, inside);
+        let mut integrate = self.call();
+        shorter(&Self::STEPPER, &mut integrate, field, from, time, inside);
     }
 }
 
 impl Dop853 {
+    const STEPPER: Stepper = Stepper { name: "dop853", attempt: 11, accepted: 1 };
+
     /// The crate's method as it is called.
-    fn crate_call<F: Field + ?Sized>(&self) -> (Stepper, impl FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome + use<F>) {
+    fn call<F: Field + ?Sized>(&self) -> impl FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome + use<F> {
         let tolerance = self.tolerance;
-        let integrate = move |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| -> Outcome {
+        move |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| -> Outcome {
             let settings = (tolerance, (0.0, 1.0 / 3.0, 6.0), first, most);
             by_length!(ode_solvers::Dop853<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
-        };
-        (Stepper { name: "dop853", attempt: 11, accepted: 1 }, integrate)
+        }
     }
 }
 
@@ -437,13 +439,13 @@ impl<F: Field + ?Sized> Integrator<F> for Dop853 {
     }
 
     fn begin(&mut self, field: &mut F, state: &mut State, until: Time) -> Result<(), StepError> {
-        let (stepper, mut integrate) = self.crate_call();
-        begin(&mut self.rows, &stepper, &mut integrate, field, state, until)
+        let mut integrate = self.call();
+        begin(&mut self.rows, &Self::STEPPER, &mut integrate, field, state, until)
     }
 
     fn step(&mut self, field: &mut F, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
-        let (stepper, mut integrate) = self.crate_call();
-        step(&mut self.rows, &stepper, &mut integrate, field, state, until, tally)
+        let mut integrate = self.call();
+        step(&mut self.rows, &Self::STEPPER, &mut integrate, field, state, until, tally)
     }
 
     fn changed(&mut self, state: &mut State) {
@@ -458,7 +460,7 @@ impl<F: Field + ?Sized> Integrator<F> for Dop853 {
     }
 
     fn interpolate(&mut self, field: &mut F, from: &State, time: Time, inside: &mut State) {
-        let (stepper, mut integrate) = self.crate_call();
-        shorter(&stepper, &mut integrate, field, from, time, inside);
+        let mut integrate = self.call();
+        shorter(&Self::STEPPER, &mut integrate, field, from, time, inside);
     }
 }
