@@ -137,3 +137,14 @@ fn tolerances_reach_what_each_method_makes_use_of() {
         assert!(refused.contains("--rtol") && refused.contains(&method.to_string()), "{refused}");
     }
 }
+
+/// At 1e-15, the finest default of shorter runs, truncation alone comes to 4e-13 here.
+#[test]
+fn ten_thousand_seconds_leave_rounding_as_what_drifts() {
+    let scene = read_scene("examples/scenes/free.json".as_ref(), &[]).expect("a scene");
+    let request = Request { method: Some(MethodId::Taylor), until: Some(1e4), every: Some(100.0), ..Request::default() };
+    let run = Simulation::new(&scene).expect("equations").options(request).trust(Level::Off).prepare().expect("a plan");
+    assert_eq!(run.plan().tolerance.expect("a tolerance").relative, 1e-17);
+    let outcome = driftless::run::integrate(run, &mut |_| Ok(())).expect("a run");
+    assert!(outcome.drift.energy.max < 1e-13, "{:e}", outcome.drift.energy.max);
+}

@@ -88,7 +88,7 @@ pub struct PlanFlags {
     /// Step of a fixed-step method in seconds, as 0.01 or 1/64
     #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
     pub step: Option<f64>,
-    /// Relative tolerance of an adaptive method [default: 1e-9; over a minute and more 1e-15 for taylor, 1e-13 for dp8 and dop853]
+    /// Relative tolerance of an adaptive method [default: 1e-9; over a minute and more 1e-15 for taylor and less over 100 s, 1e-13 for dp8 and dop853]
     #[arg(long, value_name = "TOL", value_parser = number, allow_hyphen_values = true)]
     pub rtol: Option<f64>,
     /// Absolute tolerance of an adaptive method: in rad, and in the mechanism's own units of length, time and energy, which are m, s and J where it is of human
