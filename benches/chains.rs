@@ -11,11 +11,11 @@ mod four_bars;
 mod links;
 
 use driftless::dynamics::multiplier::Multiplier;
-use driftless::dynamics::{Field, Form, Mechanism, Motion, Time};
+use driftless::dynamics::{Form, Mechanism, Motion, OdeSystem, Time};
 use driftless::run::{MethodId, Request, Stabilization, simulate};
 use driftless::scene::{Scene, Start};
 use driftless::stabilization::Projected;
-use driftless::stepping::{Dop853, Dp8, Integrator, Reached, Seen, Tally, Taylor, Tolerance};
+use driftless::stepping::{Dop853, Dp8, Integrator, Reached, Seen, Statistics, Taylor, Tolerance};
 use std::f64::consts::FRAC_PI_2;
 use std::hint::black_box;
 use std::sync::Arc;
@@ -45,7 +45,7 @@ fn ladder(n: usize) -> Scene {
 
 /// A form and its state, timed block by block.
 struct Candidate {
-    field: Box<dyn Field>,
+    field: Box<dyn OdeSystem>,
     y: Vec<f64>,
     rate: Vec<f64>,
     count: usize,
@@ -56,7 +56,7 @@ impl Candidate {
     fn new(mechanism: Mechanism, scene: &Scene) -> Self {
         let mechanism = Arc::new(mechanism);
         let start = mechanism.start(scene);
-        let mut made = if mechanism.keeps_account() {
+        let mut made = if mechanism.has_work_integral() {
             let form = Multiplier::<0, true>::new(mechanism);
             Self { y: form.state(&start).y, field: Box::new(form), rate: Vec::new(), count: 1, times: Vec::new() }
         } else {
@@ -73,7 +73,7 @@ impl Candidate {
     fn block(&mut self) {
         let begin = Instant::now();
         for _ in 0..self.count {
-            self.field.rate(Time::default(), black_box(&self.y), &mut self.rate);
+            self.field.rhs(Time::default(), black_box(&self.y), &mut self.rate);
             // A little further each time, so that nothing can be hoisted out.
             self.y[0] += 1e-13 * self.rate[self.rate.len() / 2];
         }
@@ -120,19 +120,19 @@ fn computed(begin: Instant) -> f64 {
 
 /// CPU seconds per simulated second of a run by the program's own loop, samples and all.
 fn integrate(name: &str, scene: &Scene, request: &Request) {
-    let (mut times, mut tally) = (Vec::new(), None);
+    let (mut times, mut statistics) = (Vec::new(), None);
     for _ in 0..5 {
         let clock = Instant::now();
         let begin = computed(clock);
         let outcome = simulate(scene, request, &mut |_| Ok(()));
         times.push((computed(clock) - begin) / request.until.unwrap_or(scene.until));
         match outcome {
-            Ok(outcome) => tally = Some((outcome.tally.evaluations, outcome.drift.energy.max)),
+            Ok(outcome) => statistics = Some((outcome.statistics.evaluations, outcome.drift.energy.max)),
             Err(error) => return println!("{name:>24}: {error}"),
         }
     }
     times.sort_by(f64::total_cmp);
-    let (evaluations, energy) = tally.unwrap_or_default();
+    let (evaluations, energy) = statistics.unwrap_or_default();
     println!("{name:>24} {:>9.4} {:>9.4} {evaluations:>9} {energy:>9.1e}", times[0], times[2]);
 }
 
@@ -170,7 +170,7 @@ fn ladders(n: usize) {
             let outcome = simulate(&scene, &request, &mut |_| Ok(()));
             times.push((computed(clock) - begin) * 1e3);
             match outcome {
-                Ok(outcome) => *found = (outcome.tally.steps, (outcome.last.phi[0] - expected).abs()),
+                Ok(outcome) => *found = (outcome.statistics.steps, (outcome.last.phi[0] - expected).abs()),
                 Err(error) => println!("{tolerance:.0e}: {error}"),
             }
         }
@@ -236,15 +236,15 @@ type Angles = Multiplier<0, true>;
 fn alone(mechanism: &Arc<Mechanism>, scene: &Scene, method: &mut dyn Integrator<Angles>) -> (Vec<f64>, f64, u64) {
     let mut form = Angles::new(Arc::clone(mechanism));
     let mut state = form.state(&mechanism.start(scene));
-    let mut tally = Tally::default();
+    let mut statistics = Statistics::default();
     let clock = Instant::now();
     let begin = computed(clock);
-    let reached = method.advance(&mut form, &mut state, Time::from(scene.until), &mut tally, &mut |_, _| Ok(Seen::Kept));
+    let reached = method.advance(&mut form, &mut state, Time::from(scene.until), &mut statistics, &mut |_, _| Ok(Seen::Kept));
     let elapsed = (computed(clock) - begin) * 1e3;
     assert_eq!(reached, Ok(Reached::Until));
     let mut end = Motion::default();
     form.read(&state, &mut end);
-    ((0..scene.bars.len()).map(|k| end.unwrapped(k)).collect(), elapsed, tally.evaluations)
+    ((0..scene.bars.len()).map(|k| end.unwrapped(k)).collect(), elapsed, statistics.evaluations)
 }
 
 /// Chains let go at 0.2 rad: one simulated second by the methods alone, in turn, with the largest error of an angle against the tightest of them.

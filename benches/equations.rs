@@ -7,10 +7,10 @@
 use driftless::dynamics::canonical::Canonical;
 use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::multiplier::Multiplier;
-use driftless::dynamics::{Field, Form, Mechanism, Motion, Time};
+use driftless::dynamics::{Form, Mechanism, Motion, OdeSystem, Time};
 use driftless::scene::read_scene;
 use driftless::stabilization::{Baumgarte, Projected};
-use driftless::stepping::{Dp8, Integrator, Reached, Seen, Tally, Tolerance};
+use driftless::stepping::{Dp8, Integrator, Reached, Seen, Statistics, Tolerance};
 use std::hint::black_box;
 use std::path::Path;
 use std::sync::Arc;
@@ -29,7 +29,7 @@ struct ByHand {
     weight: [f64; 2],
 }
 
-impl Field for ByHand {
+impl OdeSystem for ByHand {
     fn dimension(&self) -> usize {
         4
     }
@@ -38,7 +38,7 @@ impl Field for ByHand {
         2
     }
 
-    fn rate(&mut self, _t: Time, y: &[f64], rate: &mut [f64]) {
+    fn rhs(&mut self, _t: Time, y: &[f64], rate: &mut [f64]) {
         let &[phi1, phi2, w1, w2] = y else { return };
         let ((s1, c1), (s2, c2)) = (libm::sincos(phi1), libm::sincos(phi2));
         let (cos, sin) = (c1 * c2 + s1 * s2, s1 * c2 - c1 * s2);
@@ -55,10 +55,10 @@ impl Field for ByHand {
 }
 
 /// Nanoseconds an evaluation over one block; the state moves a little each time, so that nothing can be hoisted out.
-fn block(field: &mut dyn Field, y: &mut [f64], rate: &mut [f64]) -> f64 {
+fn block(field: &mut dyn OdeSystem, y: &mut [f64], rate: &mut [f64]) -> f64 {
     let begin = Instant::now();
     for _ in 0..BLOCK {
-        field.rate(Time::default(), black_box(y), rate);
+        field.rhs(Time::default(), black_box(y), rate);
         y[0] += 1e-9 * rate[2];
     }
     begin.elapsed().as_secs_f64() * 1e9 / BLOCK as f64
@@ -94,7 +94,7 @@ fn main() {
     let y = multiplier.state(&start).y;
     let momenta = canonical.state(&start).y;
     let (with_rows, without) = (rows.state(&motor_start).y, eliminated.state(&motor_start).y);
-    let mut candidates: Vec<(&str, Box<dyn Field>, Vec<f64>)> = vec![
+    let mut candidates: Vec<(&str, Box<dyn OdeSystem>, Vec<f64>)> = vec![
         ("written by hand (free)", Box::new(hand), y.clone()),
         ("driftless, free", Box::new(multiplier), y.clone()),
         ("driftless, free, size at run time", Box::new(any_size), y),
@@ -138,10 +138,10 @@ impl Traveller {
     fn new<P: Form + 'static, M: Integrator<P> + 'static>(name: &'static str, mut problem: P, mut method: M, start: &Motion) -> Self {
         let mut state = problem.state(start);
         let advance = move |span: f64| {
-            let (mut tally, until) = (Tally::default(), state.time + span);
-            let reached = method.advance(&mut problem, &mut state, until, &mut tally, &mut |_, _| Ok(Seen::Kept));
+            let (mut statistics, until) = (Statistics::default(), state.time + span);
+            let reached = method.advance(&mut problem, &mut state, until, &mut statistics, &mut |_, _| Ok(Seen::Kept));
             assert_eq!(reached, Ok(Reached::Until));
-            tally.evaluations
+            statistics.evaluations
         };
         Self { name, advance: Box::new(advance), per_evaluation: Vec::new(), per_second: Vec::new() }
     }

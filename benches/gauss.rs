@@ -4,10 +4,10 @@
 //! the default block by block.
 
 use driftless::dynamics::canonical::Canonical;
-use driftless::dynamics::{Field, Form, Mechanism, State, Time};
+use driftless::dynamics::{Form, Mechanism, OdeSystem, State, Time};
 use driftless::scene::{Scene, read_scene};
 use driftless::stepping::gauss::Gauss;
-use driftless::stepping::{Integrator, Seen, Tally};
+use driftless::stepping::{Integrator, Seen, Statistics};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -20,7 +20,7 @@ const BLOCKS: usize = 300;
 /// A field evaluated one point at a time, in plain doubles.
 struct OneByOne<F>(F);
 
-impl<F: Field> Field for OneByOne<F> {
+impl<F: OdeSystem> OdeSystem for OneByOne<F> {
     fn dimension(&self) -> usize {
         self.0.dimension()
     }
@@ -29,8 +29,8 @@ impl<F: Field> Field for OneByOne<F> {
         self.0.angles()
     }
 
-    fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
-        self.0.rate(t, y, rate);
+    fn rhs(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
+        self.0.rhs(t, y, rate);
     }
 
     fn label(&self, i: usize) -> String {
@@ -41,10 +41,10 @@ impl<F: Field> Field for OneByOne<F> {
 /// A method on a field, and how far it has come.
 struct Candidate {
     name: &'static str,
-    field: Box<dyn Field>,
+    field: Box<dyn OdeSystem>,
     method: Gauss,
     state: State,
-    tally: Tally,
+    statistics: Statistics,
     times: Vec<f64>,
 }
 
@@ -52,7 +52,9 @@ impl Candidate {
     fn block(&mut self) {
         let until = self.state.time + f64::from(BLOCK) * self.method.step();
         let begin = Instant::now();
-        self.method.advance(&mut *self.field, &mut self.state, until, &mut self.tally, &mut |_, _| Ok(Seen::Kept)).expect("an integration");
+        self.method
+            .advance(&mut *self.field, &mut self.state, until, &mut self.statistics, &mut |_, _| Ok(Seen::Kept))
+            .expect("an integration");
         self.times.push(begin.elapsed().as_secs_f64() * 1e6 / f64::from(BLOCK));
     }
 }
@@ -62,14 +64,14 @@ fn median(values: &mut [f64]) -> f64 {
     values[values.len() / 2]
 }
 
-fn compare<const N: usize, const ACCOUNT: bool>(scene: &Scene, step: f64) {
+fn compare<const N: usize, const WORK: bool>(scene: &Scene, step: f64) {
     let mechanism = Arc::new(Mechanism::new(scene).expect("equations"));
-    let form = || Canonical::<N, ACCOUNT>::new(Arc::clone(&mechanism));
+    let form = || Canonical::<N, WORK>::new(Arc::clone(&mechanism));
     let start = form().state(&mechanism.start(scene));
     let gauss = || Gauss::new(8, step).expect("sound settings");
-    let candidate = |name, field: Box<dyn Field>, method| {
-        let (state, tally) = (start.clone(), Tally::default());
-        Candidate { name, field, method, state, tally, times: Vec::new() }
+    let candidate = |name, field: Box<dyn OdeSystem>, method| {
+        let (state, statistics) = (start.clone(), Statistics::default());
+        Candidate { name, field, method, state, statistics, times: Vec::new() }
     };
     let mut candidates = [
         candidate("lanes", Box::new(form()), gauss()),
@@ -85,7 +87,7 @@ fn compare<const N: usize, const ACCOUNT: bool>(scene: &Scene, step: f64) {
     for candidate in &mut candidates {
         let mut ratios: Vec<f64> = candidate.times.iter().zip(&first).map(|(time, first)| time / first).collect();
         let (least, middle) = (candidate.times.iter().copied().fold(f64::INFINITY, f64::min), median(&mut candidate.times));
-        let evaluations = candidate.tally.evaluations as f64 / candidate.tally.steps as f64 / 8.0;
+        let evaluations = candidate.statistics.evaluations as f64 / candidate.statistics.steps as f64 / 8.0;
         println!(
             "{:10} {:18} {least:7.2} {middle:7.2} us a step, ratio {:5.2}, {evaluations:4.1} evaluations of all stages",
             scene.name,
@@ -107,6 +109,6 @@ fn main() {
     compare::<2, true>(&scene("motor_sine"), 1.0 / 128.0);
     compare::<0, false>(&scene("chain8"), 1.0 / 256.0);
     let spring = scene("spring");
-    let keeps_account = Mechanism::new(&spring).expect("equations").keeps_account();
-    if keeps_account { compare::<2, true>(&spring, 1.0 / 128.0) } else { compare::<2, false>(&spring, 1.0 / 128.0) }
+    let has_work_integral = Mechanism::new(&spring).expect("equations").has_work_integral();
+    if has_work_integral { compare::<2, true>(&spring, 1.0 / 128.0) } else { compare::<2, false>(&spring, 1.0 / 128.0) }
 }

@@ -11,14 +11,14 @@ use driftless::dynamics::kernel::Kernel;
 use driftless::dynamics::looped::Looped;
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::natural::Natural;
-use driftless::dynamics::{Field, Form, Mechanism, Motion, State, Time};
+use driftless::dynamics::{Form, Mechanism, Motion, OdeSystem, State, Time};
 use driftless::scene::read_scene;
 use driftless::stabilization::{Projected, SymmetricGauss};
 use driftless::stepping::composition::Composition;
 use driftless::stepping::gauss::Gauss;
 use driftless::stepping::rattle::Rattle;
 use driftless::stepping::taylor::Kernel as Expansion;
-use driftless::stepping::{Dop853, Dp5, Dp8, Integrator, Seen, Tally, Taylor, Tolerance};
+use driftless::stepping::{Dop853, Dp5, Dp8, Integrator, Seen, Statistics, Taylor, Tolerance};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -33,17 +33,17 @@ struct Ran {
     seconds: f64,
     error: f64,
     residual: f64,
-    tally: Tally,
+    statistics: Statistics,
 }
 
 fn integrate<P: Form + ?Sized>(problem: &mut P, start: &Motion, mut method: impl Integrator<P>, watched: bool) -> Ran {
     let mut state = problem.state(start);
-    let mut tally = Tally::default();
+    let mut statistics = Statistics::default();
     let mechanism = problem.mechanism().clone();
     let mut kernel = Kernel::<f64>::new(&mechanism);
     let (mut motion, mut residual) = (Motion::default(), 0.0f64);
     let begin = Instant::now();
-    let ended = method.advance(problem, &mut state, Time::from(0.03), &mut tally, &mut |problem: &mut P, state: &mut State| {
+    let ended = method.advance(problem, &mut state, Time::from(0.03), &mut statistics, &mut |problem: &mut P, state: &mut State| {
         if watched {
             problem.read(state, &mut motion);
             residual = residual.max(andrews::violation(&mechanism, &mut kernel, &motion));
@@ -56,7 +56,7 @@ fn integrate<P: Form + ?Sized>(problem: &mut P, start: &Motion, mut method: impl
     }
     let mut end = Motion::default();
     problem.read(&state, &mut end);
-    Ran { seconds, error: andrews::error(&end), residual, tally }
+    Ran { seconds, error: andrews::error(&end), residual, statistics }
 }
 
 /// A name and what runs it.
@@ -76,10 +76,10 @@ fn evaluations(mechanism: &Arc<Mechanism>, start: &Motion) {
     let (mut first, mut second) = (Vec::new(), Vec::new());
     for _ in 0..200 {
         let begin = Instant::now();
-        (0..EVALUATIONS).for_each(|_| looped.rate(Time::default(), std::hint::black_box(&state.y), &mut rate));
+        (0..EVALUATIONS).for_each(|_| looped.rhs(Time::default(), std::hint::black_box(&state.y), &mut rate));
         first.push(begin.elapsed().as_secs_f64() * 1e9 / EVALUATIONS as f64);
         let begin = Instant::now();
-        (0..EVALUATIONS).for_each(|_| angles.rate(Time::default(), std::hint::black_box(&state.y), &mut rate));
+        (0..EVALUATIONS).for_each(|_| angles.rhs(Time::default(), std::hint::black_box(&state.y), &mut rate));
         second.push(begin.elapsed().as_secs_f64() * 1e9 / EVALUATIONS as f64);
     }
     for (name, mut times) in [("natural solve", first), ("angles and multipliers", second)] {
@@ -158,8 +158,13 @@ fn main() {
     }
     println!("{:34} {:>8} {:>8} {:>9} {:>9} {:>6} {:>6}", "", "min ms", "median", "error", "residual", "steps", "evals");
     for ((name, run), times) in candidates.iter().zip(&mut times) {
-        let Ran { error, residual, tally, .. } = run(true);
+        let Ran { error, residual, statistics, .. } = run(true);
         let least = times.iter().copied().fold(f64::INFINITY, f64::min);
-        println!("{name:34} {least:8.3} {:8.3} {error:9.1e} {residual:9.1e} {:6} {:6}", median(times), tally.steps, tally.evaluations);
+        println!(
+            "{name:34} {least:8.3} {:8.3} {error:9.1e} {residual:9.1e} {:6} {:6}",
+            median(times),
+            statistics.steps,
+            statistics.evaluations
+        );
     }
 }

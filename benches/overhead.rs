@@ -13,7 +13,7 @@ use driftless::run::table::Table;
 use driftless::run::{Folder, Limits, MethodId, Plan, Request, Run, integrate};
 use driftless::scene::{Scene, read_scene};
 use driftless::stepping::gauss::Gauss;
-use driftless::stepping::{Dop853, Integrator, Seen, Tally, Taylor};
+use driftless::stepping::{Dop853, Integrator, Seen, Statistics, Taylor};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
@@ -44,12 +44,12 @@ fn path(scene: &str) -> PathBuf {
 
 /// The method alone, to every output time.
 fn bare<P: Form, M: Integrator<P>>(problem: &mut P, method: &mut M, mut state: State, plan: &Plan) {
-    let (mut tally, horizon) = (Tally::default(), plan.time(plan.rows));
+    let (mut statistics, horizon) = (Statistics::default(), plan.time(plan.rows));
     let (mut from, mut inside) = (State::default(), State::default());
     for row in 1..=plan.rows {
         let until = plan.time(row);
         if !method.is_dense() {
-            method.advance(problem, &mut state, until, &mut tally, &mut |_, _| Ok(Seen::Kept)).expect("a step");
+            method.advance(problem, &mut state, until, &mut statistics, &mut |_, _| Ok(Seen::Kept)).expect("a step");
             continue;
         }
         while state.time < until {
@@ -61,7 +61,7 @@ fn bare<P: Form, M: Integrator<P>>(problem: &mut P, method: &mut M, mut state: S
                 }
                 Ok(if passed { Seen::Enough } else { Seen::Kept })
             };
-            method.advance(problem, &mut state, horizon, &mut tally, watch).expect("a step");
+            method.advance(problem, &mut state, horizon, &mut statistics, watch).expect("a step");
         }
         if state.time > until {
             method.interpolate(problem, &from, until, &mut inside);
@@ -72,7 +72,7 @@ fn bare<P: Form, M: Integrator<P>>(problem: &mut P, method: &mut M, mut state: S
 fn alone(case: &Case, scene: &Scene, mechanism: &Arc<Mechanism>, plan: &Plan) {
     let (start, tolerance) = (mechanism.start(scene), plan.tolerance.unwrap_or_default());
     let shared = || Arc::clone(mechanism);
-    match (case.method, mechanism.rows.is_empty()) {
+    match (case.method, mechanism.constraints.is_empty()) {
         (MethodId::Dop853, true) => {
             let mut problem = Multiplier::<2, false>::new(shared());
             let state = problem.state(&start);

@@ -53,7 +53,7 @@ fn compare(title: &str, scene: &Scene, candidates: &[(MethodId, f64)]) {
         let error = outcome.last.phi.iter().zip(&reference.phi).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
         let least = own.iter().copied().fold(f64::INFINITY, f64::min);
         let ratio = median(own.iter().zip(&times[0]).map(|(own, first)| own / first).collect());
-        let (steps, evaluations) = (outcome.tally.steps, outcome.tally.evaluations);
+        let (steps, evaluations) = (outcome.statistics.steps, outcome.statistics.evaluations);
         println!(
             "  {method:8} {setting:8.1e} {steps:7} {evaluations:12} {least:9.0} {:10.0} {ratio:6.2} {error:8.1e}",
             median(own.clone())

@@ -1,6 +1,6 @@
-//! What an estimate of the error costs: runs with their trajectories written, with and without a companion.
+//! What an estimate of the error costs: runs with their trajectories written, with and without a reference solution.
 //!
-//! `cargo bench --bench trust`: alternating rounds in one process at the scenes' own output intervals; what the companion adds, in percent of the run
+//! `cargo bench --bench trust`: alternating rounds in one process at the scenes' own output intervals; what the reference solution adds, in percent of the run
 //! without it (minimum over minimum, and the median of the rounds' ratios).
 
 use driftless::dynamics::Mechanism;

@@ -19,7 +19,7 @@ pub fn scene(n: usize) -> Scene {
     let tip = |bar| Place { bar: Some(bar), point: [1.0, 0.0] };
     // The uprights are bars 0 to N, the couplers follow.
     let coupler = |i: usize| n + 1 + i;
-    let feet = (0..=n).map(|i| {
+    let translations = (0..=n).map(|i| {
         let ground = Place { bar: None, point: [i as f64, 0.0] };
         Hinge { name: format!("A{i}"), between: [ground, root(i)] }
     });
@@ -33,7 +33,7 @@ pub fn scene(n: usize) -> Scene {
         description: format!("{n} four-bars side by side pass through positions in which all links lie in line (IFToMM benchmark A02)."),
         gravity: [0.0, -9.81],
         bars: (0..=n).map(|i| bar(format!("U{i}"))).chain((0..n).map(|i| bar(format!("C{i}")))).collect(),
-        hinges: feet.chain(tops).collect(),
+        hinges: translations.chain(tops).collect(),
         start: (0..=n).map(|_| Start { phi: FRAC_PI_2, omega: -1.0 }).chain((0..n).map(|_| Start { phi: 0.0, omega: 0.0 })).collect(),
         until: 10.0,
         every: 0.01,

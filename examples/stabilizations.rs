@@ -3,7 +3,7 @@
 //! `cargo run --release --example stabilizations` integrates 100 s (give another horizon as the first argument) and writes `output/constraint_drift.png`.
 
 use driftless::arithmetic::DoubleDouble;
-use driftless::chart::{ConstraintDrift, DefectPanel, DriftSeries, FILE_RESOLUTION, constraint_drift};
+use driftless::chart::{ConstraintDrift, DriftSeries, FILE_RESOLUTION, ResidualPanel, constraint_drift};
 use driftless::dynamics::Mechanism;
 use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Stabilization, integrate};
 use driftless::scene::read_scene;
@@ -39,12 +39,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// Violation of the motor's row at one level, one line a stabilization.
-fn panel(level: usize, name: &str, outcomes: &[Outcome]) -> DefectPanel {
+fn panel(level: usize, name: &str, outcomes: &[Outcome]) -> ResidualPanel {
     let series = outcomes.iter().map(|outcome| {
         let samples = outcome.trace.whole.iter().filter(|sample| sample.t > 0.0);
         let (time, error) = samples.map(|sample| (sample.t, sample.constraints[0][level])).unzip();
         let name = outcome.plan.stabilization.to_string();
         DriftSeries { method: name.clone(), name, time, error }
     });
-    DefectPanel { name: name.into(), series: series.collect() }
+    ResidualPanel { name: name.into(), series: series.collect() }
 }

@@ -12,7 +12,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scene = read_scene("examples/scenes/free.json".as_ref(), &[])?;
     let request = Request { method: Some(MethodId::Dop853), rtol: Some(1e-10), ..Request::default() };
     let outcome = simulate(&scene, &request, &mut |_| Ok(()))?;
-    println!("{} steps, {} evaluations", outcome.tally.steps, outcome.tally.evaluations);
+    println!("{} steps, {} evaluations", outcome.statistics.steps, outcome.statistics.evaluations);
     println!("energy drifted by {:.1e} of its scale", outcome.drift.energy.max);
     std::fs::write("output/free_angles.png", draw(Chart::Angles, &scene, &Mechanism::new(&scene)?, &outcome)?)?;
     Ok(())

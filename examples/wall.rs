@@ -13,10 +13,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let set = format!("walls.wall.restitution={restitution}").parse()?;
         let scene = read_scene("examples/scenes/wall.json".as_ref(), &[set])?;
         let outcome = simulate(&scene, &Request { until: Some(3.0), ..Request::default() }, &mut |_| Ok(()))?;
-        let first = &outcome.strikes[0];
+        let first = &outcome.impacts[0];
         println!(
             "e = {restitution}: impulse {:.6} N s, {:.6} J lost at once; {} impacts in {} s; energy balance kept to {:.1e}",
-            first.impulse, first.energy_lost, outcome.strike_count, outcome.last.t, outcome.drift.energy.max
+            first.impulse, first.energy_lost, outcome.impact_count, outcome.last.t, outcome.drift.energy.max
         );
         if restitution == 0.5 {
             std::fs::write("output/wall.png", draw(Chart::Mechanism, &scene, &Mechanism::new(&scene)?, &outcome)?)?;

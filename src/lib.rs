@@ -69,9 +69,9 @@ pub mod stabilization;
 pub mod stepping;
 
 pub use arithmetic::{DoubleDouble, Scalar};
+pub use dynamics::constraint::Site;
 pub use dynamics::force::{Force, Loads, UserForce};
-pub use dynamics::row::Site;
-pub use dynamics::{Configuration, Field, Mechanism, Motion, State, Time};
+pub use dynamics::{Configuration, Mechanism, Motion, OdeSystem, State, Time};
 pub use error::Error;
 pub use run::trust::Level;
 pub use run::{
@@ -80,7 +80,7 @@ pub use run::{
 };
 pub use scene::{Scene, SceneBuilder, Template, ground, on, parse_scene, read_scene};
 pub use simulation::Simulation;
-pub use stepping::{Integrator, StepError, Tally};
+pub use stepping::{Integrator, Statistics, StepError};
 
 #[doc = include_str!("../docs/source-problem.md")]
 pub mod source_problem {}

@@ -1,8 +1,8 @@
 //! The way in for programs: a scene, what acts on it from outside, and how it is to be integrated.
 
 use crate::Error;
+use crate::dynamics::constraint::Site;
 use crate::dynamics::force::{Force, UserForce};
-use crate::dynamics::row::Site;
 use crate::dynamics::{Mechanism, Motion};
 use crate::run::trajectory::{Recorder, Trajectory};
 use crate::run::trust::Level;

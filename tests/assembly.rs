@@ -5,7 +5,7 @@ use crate::common;
 use common::shipped;
 use driftless::arithmetic::{Complex, DoubleDouble, Scalar};
 use driftless::dynamics::assembly::Assembly;
-use driftless::dynamics::row::Posture;
+use driftless::dynamics::constraint::Posture;
 use driftless::dynamics::{CompileError, Mechanism};
 use driftless::scene::{Scene, parse_scene};
 use serde_json::{Value, json};
@@ -42,9 +42,9 @@ fn left(mechanism: &Mechanism, scene: &Scene) -> [f64; 2] {
     let start = mechanism.start(scene);
     let n = mechanism.coordinates();
     let mut z = vec![Complex::ZERO; n];
-    mechanism.tree.face::<DoubleDouble, 0>(&start.phi, &mut z);
+    mechanism.tree.unit_vectors::<DoubleDouble, 0>(&start.phi, &mut z);
     let at = Posture { phi: &start.phi, z: &z, omega: &start.omega };
-    mechanism.rows.iter().fold([0.0; 2], |[position, slip], row| {
+    mechanism.constraints.iter().fold([0.0; 2], |[position, slip], row| {
         let mut jacobian = vec![DoubleDouble::ZERO; n];
         let here = row.linearise(start.time, at, &mut jacobian);
         let rate = jacobian.iter().zip(&start.omega).fold(here.drive, |sum, (&g, &w)| sum + g * w);
@@ -235,7 +235,7 @@ fn a_third_leg_is_redundant_and_a_straight_line_is_singular() {
     let scene = table(all(1.0));
     let mechanism = compiled(&scene);
     let assembly = &mechanism.assembly;
-    assert_eq!((mechanism.rows.len(), assembly.degrees_of_freedom), (4, 1));
+    assert_eq!((mechanism.constraints.len(), assembly.degrees_of_freedom), (4, 1));
     assert_eq!(assembly.redundant.len(), 1, "{:?}", assembly.redundant);
     assert!(assembly.redundant[0].starts_with("top_right") && assembly.singular.is_empty(), "{assembly:?}");
     assert!(found(&mechanism, &scene).iter().zip([1.0, 1.0, 1.0, 0.0]).all(|(bar, omega)| (bar.1 - omega).abs() < 1e-14));

@@ -52,7 +52,7 @@ fn folder() {
             if only.as_ref().is_some_and(|only| only != method.name) {
                 continue;
             }
-            let request = Request { method: Some(method.id), effort: Some(2_000_000), ..Request::default() };
+            let request = Request { method: Some(method.id), max_evaluations: Some(2_000_000), ..Request::default() };
             let ran = match run(&text, &request) {
                 Ok(ran) => ran,
                 Err(why) => {

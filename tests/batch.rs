@@ -55,11 +55,11 @@ fn one_to_four_bodies_agree_with_double_double() {
             for (member, (mechanism, start)) in members.iter().zip(mechanisms.iter().zip(&starts)) {
                 let mut exact = start.clone();
                 let mut problem = Elimination::<0>::new(Arc::clone(mechanism));
-                let mut tally = Default::default();
+                let mut statistics = Default::default();
                 Taylor::reference()
-                    .advance(&mut problem, &mut exact, Time::from(1.0), &mut tally, &mut |_, _| Ok(Seen::Kept))
+                    .advance(&mut problem, &mut exact, Time::from(1.0), &mut statistics, &mut |_, _| Ok(Seen::Kept))
                     .expect("an end");
-                assert!(member.stopped.is_none() && member.tally.steps > 3);
+                assert!(member.stopped.is_none() && member.statistics.steps > 3);
                 assert_eq!((member.state.time, &member.state.turns), (exact.time, &exact.turns));
                 for i in 0..2 * bars {
                     let error = (member.state.unknown(i) - exact.unknown(i)).hi.abs();
@@ -121,8 +121,8 @@ fn a_flip_is_found_within_its_step_and_ends_the_trajectory() {
     // The same moment by the scalar method.
     let mut problem = Elimination::<0>::new(Arc::clone(&mechanism));
     let mut state = start(&mechanism, &scene);
-    let mut tally = Default::default();
-    Taylor::reference().advance(&mut problem, &mut state, Time::from(time), &mut tally, &mut |_, _| Ok(Seen::Kept)).expect("an end");
+    let mut statistics = Default::default();
+    Taylor::reference().advance(&mut problem, &mut state, Time::from(time), &mut statistics, &mut |_, _| Ok(Seen::Kept)).expect("an end");
     let apart = (state.y[body].abs() - target.abs()).abs();
     assert!(apart < 1e-10, "{apart:e}");
 }
@@ -160,8 +160,10 @@ fn symmetric_releases_and_equilibria_are_no_trap() {
         Batch::new(tight()).integrate(&mut members, Time::from(1.0), &mut |_, _| Going::On);
         let mut exact = start(&mechanism, &scene);
         let mut problem = Elimination::<0>::new(Arc::clone(&mechanism));
-        let mut tally = Default::default();
-        Taylor::reference().advance(&mut problem, &mut exact, Time::from(1.0), &mut tally, &mut |_, _| Ok(Seen::Kept)).expect("an end");
+        let mut statistics = Default::default();
+        Taylor::reference()
+            .advance(&mut problem, &mut exact, Time::from(1.0), &mut statistics, &mut |_, _| Ok(Seen::Kept))
+            .expect("an end");
         for i in 0..4 {
             let error = (members[0].state.unknown(i) - exact.unknown(i)).hi.abs();
             assert!(error < 1e-14 * f64::exp(8.0), "{phi1}, unknown {i}: {error:e}");

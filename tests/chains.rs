@@ -6,11 +6,11 @@ mod hanging;
 use crate::trees;
 
 use driftless::arithmetic::{Complex, DoubleDouble, Real, Scalar};
+use driftless::dynamics::constraint::{line_equation, slot_equation};
 use driftless::dynamics::kernel::{Bias, Kernel};
 use driftless::dynamics::multiplier::Multiplier;
-use driftless::dynamics::row::{line_row, slot_row};
 use driftless::dynamics::series::{Coefficient, Series};
-use driftless::dynamics::{Coordinates, Field, Form, Mechanism, Time};
+use driftless::dynamics::{Coordinates, Form, Mechanism, OdeSystem, Time};
 use driftless::run::{MethodId, Plan, Request, Stabilization, simulate};
 
 use driftless::scene::{Force, Given, Place, Scene, Start, Torque, TorsionSpring};
@@ -74,16 +74,16 @@ fn mechanism(n: usize, seed: u64) -> (Scene, Mechanism) {
         let point = point.map(|x| (x * 256.0).round() / 256.0);
         mechanism.forest.site(&Place { bar, point })
     };
-    let free = |mechanism: &Mechanism| mechanism.coordinates() > mechanism.rows.len() + 2;
+    let free = |mechanism: &Mechanism| mechanism.coordinates() > mechanism.constraints.len() + 2;
     for k in 0..dice.pick(3) {
         let (bar, rail) = (dice.pick(n), body(&mut dice));
         let (at, on) = (point(&mut dice), point(&mut dice));
         if rail != Some(bar) && free(&mechanism) {
             let (at, on) = (site(&mechanism, Some(bar), at), site(&mechanism, rail, on));
             let (name, direction) = (format!("slider{k}"), Complex::new(0.6, 0.8));
-            mechanism.rows.push(match rail {
-                Some(rail) => slot_row(&name, &at, rail, &on, direction, None, n),
-                None => line_row(&name, &at, direction, 0.25, None, n),
+            mechanism.constraints.push(match rail {
+                Some(rail) => slot_equation(&name, &at, rail, &on, direction, None, n),
+                None => line_equation(&name, &at, direction, 0.25, None, n),
             });
         }
     }
@@ -132,7 +132,7 @@ fn compare((scene, mechanism): &(Scene, Mechanism)) -> Option<([f64; 4], usize)>
             difference(&coarse.load, &plain(&exact.load)),
             difference(&coarse.multiplier, &plain(&exact.multiplier)),
         ],
-        mechanism.rows.len(),
+        mechanism.constraints.len(),
     ))
 }
 
@@ -186,7 +186,7 @@ fn part<T: Real>(found: &[Vec<T>], expected: &[Vec<T>]) -> f64 {
     found.iter().zip(expected).map(of_power).fold(0.0, f64::max)
 }
 
-/// With every kind of row and load, feet, and more and fewer bodies than lanes: in double-double the same to its rounding, in double to that.
+/// With every kind of row and load, translational coordinates, and more and fewer bodies than lanes: in double-double the same to its rounding, in double to that.
 #[test]
 fn series_body_by_body_are_those_of_the_matrices() {
     let (mut compared, mut rows, mut worst) = (0, 0, [0.0_f64; 2]);
@@ -198,7 +198,7 @@ fn series_body_by_body_are_those_of_the_matrices() {
             continue;
         }
         compared += 1;
-        rows += mechanism.rows.len();
+        rows += mechanism.constraints.len();
         let exact = expand::<DoubleDouble>(&dense, &scene, 9);
         worst[0] = worst[0].max(part(&expand::<DoubleDouble>(&bodywise, &scene, 9), &exact));
         let plain: Vec<Vec<f64>> = exact.iter().map(|power| power.iter().map(|x| x.hi).collect()).collect();
@@ -258,9 +258,9 @@ fn hinge_forces_are_the_multipliers_of_pins() {
     let sites = between.map(|place| loose.forest.site(&place));
     let pinned = loose.pinned("cut", &sites[0], &sites[1]).body_by_body();
     let (n, x) = (pinned.coordinates(), pinned.bodies.len());
-    assert_eq!((n, pinned.rows.len()), (14, 2));
+    assert_eq!((n, pinned.constraints.len()), (14, 2));
     let (mut phi, mut omega) = (plain(&start.phi), plain(&start.omega));
-    // The foot is where the link above ends, and moves with it.
+    // The origin is where the link above ends, and moves with it.
     let above = &sites[0].point;
     phi.resize(n, 0.0);
     omega.resize(n, 0.0);
@@ -278,13 +278,13 @@ fn the_power_of_a_form_is_the_rate_of_its_energy() {
         let (scene, mechanism) = mechanism(4 + seed as usize % 5, seed);
         let mechanism = Arc::new(mechanism.body_by_body());
         let start = mechanism.start(&scene);
-        if evaluate(&mechanism, &start.phi, &start.omega, Bias::default()).weakest.share < 1e-3 || mechanism.is_tied_up() {
+        if evaluate(&mechanism, &start.phi, &start.omega, Bias::default()).weakest.share < 1e-3 || mechanism.has_closed_loops() {
             continue;
         }
         let mut form = Multiplier::<0, true>::new(Arc::clone(&mechanism));
         let state = form.state(&start);
         let mut rate = vec![0.0; form.dimension()];
-        form.rate(Time::default(), &state.y, &mut rate);
+        form.rhs(Time::default(), &state.y, &mut rate);
         let n = mechanism.coordinates();
         let mut kernel = Kernel::<DoubleDouble>::without_rows(&mechanism);
         let h = DoubleDouble::of(1e-9);
@@ -315,7 +315,7 @@ fn projection_lands_where_the_matrices_put_it() {
             ended.is_ok().then_some(state.y)
         });
         let [Some(dense), Some(bodywise)] = &mut ends else { continue };
-        seen += usize::from(!mechanism.rows.is_empty());
+        seen += usize::from(!mechanism.constraints.is_empty());
         // Energies put in by the stabilizer are sums of large numbers.
         dense.pop();
         bodywise.pop();

@@ -132,7 +132,7 @@ fn gallery() -> Vec<(&'static str, Picture)> {
         ],
         log_time,
     };
-    let level = |name: &str, size: f64| DefectPanel {
+    let level = |name: &str, size: f64| ResidualPanel {
         name: name.to_owned(),
         series: vec![
             growing("none", 1e3 * size, 1.0),
@@ -297,7 +297,7 @@ fn ink_is_where_the_data_are_and_nowhere_else() {
 #[test]
 fn zero_drift_is_seen_and_named() {
     let zero = drift("elimination", times(50, 0.1), vec![0.0; 50]);
-    let panel = |name: &str| DefectPanel { name: name.to_owned(), series: vec![growing("none", 1e-9, 1.0), zero.clone()] };
+    let panel = |name: &str| ResidualPanel { name: name.to_owned(), series: vec![growing("none", 1e-9, 1.0), zero.clone()] };
     let chart = ConstraintDrift { panels: vec![panel("|*C*| [rad]"), panel("|d*C*| [rad/s]")], ..ConstraintDrift::default() };
     let picture = constraint_drift(&chart, 2.0).unwrap();
     let said = picture.texts.iter().filter(|text| text.text.contains("exactly 0")).count();
@@ -322,7 +322,7 @@ fn texts_in_order(picture: &Picture) -> Vec<&str> {
 
 #[test]
 fn angles_and_lengths_have_axes_of_their_own() {
-    let panel = |name: &str, series: &[&str]| DefectPanel {
+    let panel = |name: &str, series: &[&str]| ResidualPanel {
         name: name.to_owned(),
         series: series.iter().enumerate().map(|(k, name)| growing(name, 1e-12 * 10_f64.powi(k as i32), 1.0)).collect(),
     };
@@ -526,7 +526,7 @@ fn odd_pictures(time: &[f64], values: &[f64]) -> Vec<Picture> {
     sketch.walls = points.iter().map(|&through| WallSketch { through, normal: through }).collect();
     let mut out = Vec::new();
     for log_time in [false, true] {
-        let panels = vec![DefectPanel { name: "|*C*| [m]".to_owned(), series: series.clone() }; 2];
+        let panels = vec![ResidualPanel { name: "|*C*| [m]".to_owned(), series: series.clone() }; 2];
         let title = || "odd".to_owned();
         out.push(energy_drift(&EnergyDrift { title: title(), series: series.clone(), log_time, ..EnergyDrift::default() }, 0.5).unwrap());
         out.push(constraint_drift(&ConstraintDrift { title: title(), panels, log_time, ..ConstraintDrift::default() }, 0.5).unwrap());

@@ -62,7 +62,7 @@ fn beaten(scene: &driftless::Scene, until: f64) -> Vec<String> {
     let error = |outcome: &Outcome| truth.as_ref().filter(|_| until <= SHORT).map_or(0.0, |truth| apart(outcome, truth));
     let mut found = Vec::new();
     for (name, request) in alternatives() {
-        let request = Request { effort: Some(40 * chosen.tally.evaluations + 10_000), ..horizon(request) };
+        let request = Request { max_evaluations: Some(40 * chosen.statistics.evaluations + 10_000), ..horizon(request) };
         let Some((other, least)) = timed(scene, &request, 3) else { continue };
         let is_faster = least.as_secs_f64() * FASTER < time.as_secs_f64();
         let drifts_less = other.drift.energy.max <= chosen.drift.energy.max.max(NO_DRIFT);

@@ -119,9 +119,9 @@ fn case_f_without_restitution_goes_on_to_its_horizon() {
         let scene = shipped("wall", &["walls.wall.restitution=0"]);
         let (outcome, samples) = watched(&scene, &by(method, 10.0, 1e-3, 1e-10));
         assert_eq!(outcome.stop, None);
-        assert!(outcome.hold_count > 0 && outcome.hold_count as usize == outcome.holds.len());
+        assert!(outcome.persistent_contact_count > 0 && outcome.persistent_contact_count as usize == outcome.holds.len());
         let total: f64 = outcome.holds.iter().map(|hold| hold.until.unwrap_or(10.0) - hold.t).sum();
-        assert!((outcome.hold_time - total).abs() < 1e-12);
+        assert!((outcome.persistent_contact_time - total).abs() < 1e-12);
         assert!(outcome.drift.energy.max < 2e-9, "{:e}", outcome.drift.energy.max);
         let worst = worst_gap(&scene, &outcome, &samples);
         assert!(worst < 1e-12, "{worst:e} m");
@@ -155,12 +155,12 @@ fn a_bar_that_falls_on_a_wall_comes_to_rest_there_for_good() {
             assert!((outcome.last.phi[0] - 0.5).abs() < 1e-14 && outcome.last.omega[0].abs() < 1e-14, "{:?}", outcome.last);
             // All the height it had is lost: m g l / 2 (cos 0.5 - cos 1).
             let lost = 5.0 * (0.5f64.cos() - 1f64.cos());
-            assert!((outcome.strike_loss - lost).abs() < 1e-9, "{} J instead of {lost} J", outcome.strike_loss);
+            assert!((outcome.impact_loss - lost).abs() < 1e-9, "{} J instead of {lost} J", outcome.impact_loss);
             assert!(outcome.drift.energy.max < 1e-9, "{:e}", outcome.drift.energy.max);
             assert!(worst_gap(&scene, &outcome, &samples) < 1e-15);
             // Small bounces are a geometric series under the angular acceleration 15 sin 0.5.
             if restitution > 0.0 {
-                let small = outcome.strikes.iter().find(|strike| strike.approach.abs() < 1e-3).expect("small bounces");
+                let small = outcome.impacts.iter().find(|strike| strike.approach.abs() < 1e-3).expect("small bounces");
                 let rebound = -small.approach * restitution;
                 let rest = small.t + 2.0 * rebound / (PENDULUM_SQUARED * 0.5f64.sin()) / (1.0 - restitution);
                 let from = outcome.holds[0].t;
@@ -300,10 +300,10 @@ fn the_account_of_work_goes_through_holds_and_releases() {
             let request = Request { stabilize: Some(stabilize), ..by(method, 1.5, 0.01, 1e-11) };
             let (outcome, samples) = watched(&scene, &request);
             assert_eq!(outcome.stop, None, "{stabilize}");
-            assert!(outcome.holds[0].until.is_some() && outcome.strike_count > 1, "{:?} {:?}", outcome.holds, outcome.strike_count);
+            assert!(outcome.holds[0].until.is_some() && outcome.impact_count > 1, "{:?} {:?}", outcome.holds, outcome.impact_count);
             assert!(outcome.drift.energy.max < 1e-9, "{stabilize}: {:e}", outcome.drift.energy.max);
             assert!(worst_gap(&scene, &outcome, &samples) < 1e-12);
-            finals.push((outcome.last.phi[1], outcome.last.work, outcome.hold_count));
+            finals.push((outcome.last.phi[1], outcome.last.work, outcome.persistent_contact_count));
         }
         assert_eq!(finals[0].2, finals[1].2);
         assert!((finals[0].0 - finals[1].0).abs() < 1e-6 && (finals[0].1 - finals[1].1).abs() < 1e-6, "{finals:?}");
@@ -324,11 +324,11 @@ fn two_points_are_held_at_once() {
         scene.start.push(Start { phi: 1.3, omega: 0.0 });
         scene.walls.push(Wall { name: "other".into(), bar: 1, ..scene.walls[0].clone() });
         let outcome = run(&scene, &by(method, 10.0, 0.1, 1e-10));
-        assert_eq!((outcome.stop.as_ref(), outcome.hold_count), (None, 2));
+        assert_eq!((outcome.stop.as_ref(), outcome.persistent_contact_count), (None, 2));
         assert!(outcome.holds.iter().all(|hold| hold.until.is_none()) && outcome.holds[0].t < outcome.holds[1].t);
         assert!(outcome.last.phi.iter().all(|phi| (phi - 0.5).abs() < 1e-14) && outcome.last.omega.iter().all(|omega| omega.abs() < 1e-14));
         let lost = 5.0 * (2.0 * 0.5f64.cos() - 1f64.cos() - 1.3f64.cos());
-        assert!((outcome.strike_loss - lost).abs() < 1e-9);
+        assert!((outcome.impact_loss - lost).abs() < 1e-9);
     }
 }
 
@@ -339,7 +339,7 @@ fn points_that_touch_without_being_needed_are_not_held() {
         let mut scene = against(0.5, 0.5, 0.5);
         scene.walls.push(Wall { name: "same".into(), point: [0.5, 0.0], ..scene.walls[0].clone() });
         let outcome = run(&scene, &by(method, 5.0, 0.1, 1e-10));
-        assert_eq!((outcome.stop.as_ref(), outcome.strike_count, outcome.hold_count), (None, 0, 1));
+        assert_eq!((outcome.stop.as_ref(), outcome.impact_count, outcome.persistent_contact_count), (None, 0, 1));
         assert!((outcome.last.phi[0] - 0.5).abs() < 1e-14 && outcome.last.omega[0] == 0.0);
     }
 }
@@ -364,8 +364,8 @@ fn the_same_run_gives_the_same_bits() {
             let scene = shipped("wall", &[&format!("walls.wall.restitution={restitution}")]);
             let [first, second] = std::array::from_fn(|_| watched(&scene, &by(method, 4.0, 0.01, 1e-9)));
             assert_eq!(first.1, second.1);
-            assert_eq!((&first.0.strikes, &first.0.holds, first.0.tally), (&second.0.strikes, &second.0.holds, second.0.tally));
-            assert_eq!(first.0.hold_time.to_bits(), second.0.hold_time.to_bits());
+            assert_eq!((&first.0.impacts, &first.0.holds, first.0.statistics), (&second.0.impacts, &second.0.holds, second.0.statistics));
+            assert_eq!(first.0.persistent_contact_time.to_bits(), second.0.persistent_contact_time.to_bits());
         }
     }
 }
@@ -377,7 +377,7 @@ fn a_run_that_begins_at_rest_on_a_wall_stays_there() {
         assert_eq!(mechanism.staying(&[0], Default::default(), &[0.5], &[0.0]), Some(vec![0]));
         assert_eq!(mechanism.staying(&[0], Default::default(), &[0.5], &[1e-3]), Some(vec![]));
         let outcome = run(&against(0.5, 0.5, 1.0), &by(method, 5.0, 0.1, 1e-10));
-        assert_eq!((outcome.stop, outcome.strike_count, outcome.hold_time), (None, 0, 5.0));
+        assert_eq!((outcome.stop, outcome.impact_count, outcome.persistent_contact_time), (None, 0, 5.0));
         assert_eq!(outcome.last.imbalance, 0.0);
     }
 }

@@ -12,9 +12,9 @@ use driftless::arithmetic::DoubleDouble;
 use driftless::dynamics::canonical::Canonical;
 use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::multiplier::Multiplier;
-use driftless::dynamics::{Field, Form, Mechanism, Motion, State, Time};
+use driftless::dynamics::{Form, Mechanism, Motion, OdeSystem, State, Time};
 use driftless::stepping::gauss::Gauss;
-use driftless::stepping::{Dop853, Dopri5, Dp5, Dp8, Integrator, Reached, Seen, Tally, Tolerance};
+use driftless::stepping::{Dop853, Dopri5, Dp5, Dp8, Integrator, Reached, Seen, Statistics, Tolerance};
 use nalgebra::SVector;
 use ode_solvers::dop_shared::{OutputType, System};
 use std::sync::Arc;
@@ -45,7 +45,7 @@ fn error(mechanism: &Mechanism, found: &Motion, reference: &Motion) -> f64 {
 const LOOKS: u64 = 8;
 
 /// Integrates one step a window and returns the motion at every look.
-fn steps<F: Field + Form>(method: &mut impl Integrator<F>, form: &mut F, start: &Motion, count: u64) -> Vec<Motion> {
+fn steps<F: OdeSystem + Form>(method: &mut impl Integrator<F>, form: &mut F, start: &Motion, count: u64) -> Vec<Motion> {
     let h = HORIZON / count as f64;
     let mut state = form.state(start);
     state.memory = vec![h];
@@ -53,8 +53,8 @@ fn steps<F: Field + Form>(method: &mut impl Integrator<F>, form: &mut F, start: 
     assert_eq!(between * LOOKS, count, "whole steps to every look");
     (0..LOOKS)
         .map(|look| {
-            let tally = go(method, form, &mut state, h, look * between + 1..=(look + 1) * between);
-            assert_eq!((tally.steps, tally.rejected), (between, 0), "one step a window");
+            let statistics = go(method, form, &mut state, h, look * between + 1..=(look + 1) * between);
+            assert_eq!((statistics.steps, statistics.rejected), (between, 0), "one step a window");
             let mut motion = Motion::default();
             form.read(&state, &mut motion);
             motion
@@ -63,8 +63,8 @@ fn steps<F: Field + Form>(method: &mut impl Integrator<F>, form: &mut F, start: 
 }
 
 /// A scene's motion at every look by `gauss16`.
-fn reference<const ACCOUNT: bool>(mechanism: &Arc<Mechanism>, start: &Motion) -> Vec<Motion> {
-    let mut form = Canonical::<2, ACCOUNT>::new(Arc::clone(mechanism));
+fn reference<const WORK: bool>(mechanism: &Arc<Mechanism>, start: &Motion) -> Vec<Motion> {
+    let mut form = Canonical::<2, WORK>::new(Arc::clone(mechanism));
     let mut state = form.state(start);
     let mut gauss = Gauss::new(8, HORIZON / 256.0).expect("a method");
     (1..=LOOKS)
@@ -78,7 +78,13 @@ fn reference<const ACCOUNT: bool>(mechanism: &Arc<Mechanism>, start: &Motion) ->
 }
 
 /// The slope of the error for these numbers of steps.
-fn measured<F: Field + Form>(method: &mut impl Integrator<F>, form: &mut F, start: &Motion, reference: &[Motion], counts: &[u64]) -> f64 {
+fn measured<F: OdeSystem + Form>(
+    method: &mut impl Integrator<F>,
+    form: &mut F,
+    start: &Motion,
+    reference: &[Motion],
+    counts: &[u64],
+) -> f64 {
     let points: Vec<(f64, f64)> = counts
         .iter()
         .map(|&count| {
@@ -94,7 +100,7 @@ fn measured<F: Field + Form>(method: &mut impl Integrator<F>, form: &mut F, star
 }
 
 /// All four methods on one form.
-fn check<F: Field + Form>(form: &mut F, start: &Motion, reference: &[Motion]) {
+fn check<F: OdeSystem + Form>(form: &mut F, start: &Motion, reference: &[Motion]) {
     let slopes = [
         (measured(&mut Dp5::new(LOOSE), form, start, reference, FIFTH), 5.0),
         (measured(&mut Dopri5::new(LOOSE), form, start, reference, FIFTH), 5.0),
@@ -169,13 +175,13 @@ fn the_crates_own_dop853_loses_its_order_where_time_matters_and_ours_does_not() 
         let integrate = |method: &mut dyn Integrator<Bernoulli>| {
             let mut state = State::new(&[DoubleDouble::from(exact(0.0))], 0);
             state.memory = vec![h];
-            let mut tally = Tally::default();
+            let mut statistics = Statistics::default();
             for row in 1..=count {
                 let until = DoubleDouble::product(h, row as f64);
                 let watch = &mut |_: &mut Bernoulli, _: &mut State| Ok(Seen::Kept);
-                assert_eq!(method.advance(&mut Bernoulli { level: None }, &mut state, until, &mut tally, watch), Ok(Reached::Until));
+                assert_eq!(method.advance(&mut Bernoulli { level: None }, &mut state, until, &mut statistics, watch), Ok(Reached::Until));
             }
-            assert_eq!(tally.steps, count);
+            assert_eq!(statistics.steps, count);
             (h, (state.y[0] - exact(END)).abs())
         };
         adapted.push(integrate(&mut Dop853::new(LOOSE)));
@@ -198,7 +204,7 @@ fn the_time_of_an_event_has_the_order_of_a_step() {
         (state.time, state.memory) = (Time::from(start), vec![h]);
         let watch = &mut |_: &mut Bernoulli, _: &mut State| Ok(Seen::Kept);
         let reached =
-            method.advance(&mut Bernoulli { level: Some(event) }, &mut state, Time::from(start + h), &mut Tally::default(), watch);
+            method.advance(&mut Bernoulli { level: Some(event) }, &mut state, Time::from(start + h), &mut Statistics::default(), watch);
         assert_eq!(reached, Ok(Reached::Event(0)));
         assert!((state.y[0] - exact(event)).abs() < 1e-15, "the state lies on the event");
         (state.time.hi - event).abs()

@@ -6,14 +6,14 @@
 use crate::common;
 
 use common::{run, run_from, shipped};
+use driftless::dynamics::constraint::angle_equation;
 use driftless::dynamics::kernel::Kernel;
 use driftless::dynamics::multiplier::Multiplier;
-use driftless::dynamics::row::angle_row;
 use driftless::dynamics::{Form, Mechanism, Motion, State, Time};
 use driftless::run::{Limits, MethodId, Outcome, Request, Stabilization};
 use driftless::scene::{Law, Scene};
 use driftless::stabilization::{Projected, projection};
-use driftless::stepping::{Cause, Dp8, Integrator, Reached, Seen, Tally, Tolerance};
+use driftless::stepping::{Cause, Dp8, Integrator, Reached, Seen, Statistics, Tolerance};
 use std::sync::Arc;
 
 /// How far off the start is \[rad/s\].
@@ -126,9 +126,9 @@ fn the_stabilizers_energy_is_the_jump_it_makes() {
         let mut form = Multiplier::<2, true>::new(Arc::clone(&mechanism));
         let mut state = form.state(&start);
         state.memory = vec![1e-3];
-        let mut tally = Tally::default();
-        let reached = method.advance(&mut form, &mut state, Time::from(1e-3), &mut tally, &mut |_, _| Ok(Seen::Kept));
-        assert_eq!((reached, tally.steps), (Ok(Reached::Until), 1));
+        let mut statistics = Statistics::default();
+        let reached = method.advance(&mut form, &mut state, Time::from(1e-3), &mut statistics, &mut |_, _| Ok(Seen::Kept));
+        assert_eq!((reached, statistics.steps), (Ok(Reached::Until), 1));
         let mut motion = Motion::default();
         form.read(&state, &mut motion);
         let mut kernel = Kernel::without_rows(&mechanism);
@@ -189,14 +189,14 @@ fn a_failed_projection_is_a_typed_stop() {
     let mut method = Projected::new(Dp8::new(Tolerance::default()));
     // Nothing rounds to exactly nothing.
     method.tolerance = -1.0;
-    let stop = method.advance(&mut form, &mut state, Time::from(1.0), &mut Tally::default(), &mut |_, _| Ok(Seen::Kept));
+    let stop = method.advance(&mut form, &mut state, Time::from(1.0), &mut Statistics::default(), &mut |_, _| Ok(Seen::Kept));
     let stop = stop.expect_err("a stop");
     assert_eq!(stop.cause, Cause::ProjectionFailed);
     assert!(stop.t > 0.0 && stop.what.contains("motor"), "{stop}");
 
     // Two rows that contradict one another have no solution at all.
     let mut contradictory: Mechanism = (*mechanism).clone();
-    contradictory.rows.push(angle_row("lock", 0, None, Law::constant(0.5)));
+    contradictory.constraints.push(angle_equation("lock", 0, None, Law::constant(0.5)));
     let mut kernel = Kernel::new(&contradictory);
     let mut state: State = form.state(&start);
     let (row, _) = projection::project(&contradictory, &mut kernel, &mut state, 1e-13).expect_err("a failure");

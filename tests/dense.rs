@@ -8,7 +8,7 @@ use driftless::arithmetic::DoubleDouble;
 use driftless::dynamics::{State, Time};
 use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Stabilization, integrate};
 use driftless::scene::Scene;
-use driftless::stepping::{Dp5, Dp8, Integrator, Radau, Tally, Tolerance};
+use driftless::stepping::{Dp5, Dp8, Integrator, Radau, Statistics, Tolerance};
 
 /// The largest error inside one step of `h` from an exact state, over several steps and places in them.
 fn inside(method: &mut dyn Integrator<Bernoulli>, h: f64) -> f64 {
@@ -18,7 +18,7 @@ fn inside(method: &mut dyn Integrator<Bernoulli>, h: f64) -> f64 {
         (from.time, from.memory) = (Time::from(begin), vec![h]);
         let (mut state, until) = (from.clone(), Time::from(begin + h));
         method.begin(&mut Bernoulli { level: None }, &mut state, until).expect("a beginning");
-        method.step(&mut Bernoulli { level: None }, &mut state, until, &mut Tally::default()).expect("a step");
+        method.step(&mut Bernoulli { level: None }, &mut state, until, &mut Statistics::default()).expect("a step");
         assert!((state.time - until).hi.abs() < 1e-15, "one step");
         let mut there = State::default();
         for share in [0.15, 0.4, 0.65, 0.9] {
@@ -68,8 +68,8 @@ fn output_times_change_the_steps_of_no_adaptive_method() {
             let [fine, odd, coarse] = [0.01, 0.37, 2.0].map(|every| run(&shipped(name, &[]), method, stabilize, every));
             assert_eq!(fine.stop, None, "{name}, {method}");
             for other in [odd, coarse] {
-                assert_eq!((&fine.last, fine.tally), (&other.last, other.tally), "{name}, {method}");
-                assert_eq!(fine.strikes, other.strikes, "{name}, {method}");
+                assert_eq!((&fine.last, fine.statistics), (&other.last, other.statistics), "{name}, {method}");
+                assert_eq!(fine.impacts, other.impacts, "{name}, {method}");
             }
         }
     }

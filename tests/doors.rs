@@ -1,11 +1,11 @@
 //! Events and observers from outside the crate.
 
-use driftless::dynamics::Field;
+use driftless::dynamics::OdeSystem;
 use driftless::run::{Action, Change, Direction, Event, EventRecord, Observer, Step};
 use driftless::stepping::composition::Composition;
 use driftless::{
     Configuration, Custom, Integrator, Level, Limits, Mechanism, MethodId, Motion, Outcome, Plan, Problem, Request, Run, Running, Sample,
-    Scalar, Scene, SceneBuilder, Simulation, Site, State, StepError, Tally, Time, ground, on,
+    Scalar, Scene, SceneBuilder, Simulation, Site, State, Statistics, StepError, Time, ground, on,
 };
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -191,7 +191,7 @@ fn neither_output_times_nor_pauses_change_events_or_what_they_do() {
     for (every, pause) in [(0.01, None), (4.0, None), (0.5, Some(1)), (0.01, Some(7))] {
         let (other, found) = crossings(every, pause);
         assert_eq!((&events, &outcome.last.phi, &outcome.last.omega), (&found, &other.last.phi, &other.last.omega), "{every} {pause:?}");
-        assert_eq!(outcome.tally, other.tally);
+        assert_eq!(outcome.statistics, other.statistics);
     }
 }
 
@@ -298,7 +298,7 @@ fn an_observer_sees_every_step_and_sample_and_may_end_the_run() {
             } else {
                 assert_eq!((counter.samples, outcome.ended_by), (9, None), "{method}");
                 let windows = matches!(method, MethodId::Dopri5 | MethodId::Dop853);
-                assert!(windows || counter.steps == outcome.tally.steps, "{method}: {} {}", counter.steps, outcome.tally.steps);
+                assert!(windows || counter.steps == outcome.statistics.steps, "{method}: {} {}", counter.steps, outcome.statistics.steps);
             }
         }
     }
@@ -330,7 +330,7 @@ impl Rk4 {
     }
 }
 
-impl<P: Field + ?Sized> Integrator<P> for Rk4 {
+impl<P: OdeSystem + ?Sized> Integrator<P> for Rk4 {
     fn name(&self) -> &'static str {
         "rk4"
     }
@@ -345,24 +345,24 @@ impl<P: Field + ?Sized> Integrator<P> for Rk4 {
         Ok(())
     }
 
-    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
+    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError> {
         let left = (until - state.time).hi;
         let h = if left < 1.5 * self.step { left } else { self.step };
         let (start, [k1, k2, k3, k4, y]) = (state.y.clone(), &mut self.stages);
         let moved = |y: &mut Vec<f64>, k: &[f64], h: f64| y.iter_mut().zip(&start).zip(k).for_each(|((y, start), k)| *y = start + h * k);
-        problem.rate(state.time, &start, k1);
+        problem.rhs(state.time, &start, k1);
         moved(y, k1, 0.5 * h);
-        problem.rate(state.time + 0.5 * h, y, k2);
+        problem.rhs(state.time + 0.5 * h, y, k2);
         moved(y, k2, 0.5 * h);
-        problem.rate(state.time + 0.5 * h, y, k3);
+        problem.rhs(state.time + 0.5 * h, y, k3);
         moved(y, k3, h);
-        problem.rate(state.time + h, y, k4);
+        problem.rhs(state.time + h, y, k4);
         for i in 0..start.len() {
             state.y[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
         }
         state.time = if h == left { until } else { state.time + h };
         state.wrap();
-        (tally.steps, tally.evaluations) = (tally.steps + 1, tally.evaluations + 4);
+        (statistics.steps, statistics.evaluations) = (statistics.steps + 1, statistics.evaluations + 4);
         Ok(None)
     }
 }
@@ -388,7 +388,11 @@ fn an_integrator_from_outside_is_driven_like_the_others() {
         assert!(fine.drift.energy.max > 0.0 && fine.drift.energy.max < coarse.drift.energy.max, "{name}");
         let estimate = coarse.trust.as_ref().and_then(|trust| trust.error_estimate).expect("an estimate");
         assert!(estimate > error(&coarse) / 3.0 && estimate < 10.0 * error(&coarse), "{name}: {estimate:e} for {:e}", error(&coarse));
-        assert_eq!((coarse.tally.steps, coarse.tally.evaluations, coarse.plan.method.to_string()), (250, 1000, "custom".into()), "{name}");
+        assert_eq!(
+            (coarse.statistics.steps, coarse.statistics.evaluations, coarse.plan.method.to_string()),
+            (250, 1000, "custom".into()),
+            "{name}"
+        );
     }
 }
 
@@ -416,7 +420,7 @@ fn a_run_by_an_integrator_from_outside_goes_on_to_the_same_bits() {
     let mut rest = Running::resume(mechanism, &start, snapshot).expect("the same");
     assert!(rest.go(&mut |_| Ok(()), &mut || false).expect("samples"));
     let rest = rest.finish();
-    assert_eq!((rest.last, rest.tally), (whole.last, whole.tally));
+    assert_eq!((rest.last, rest.statistics), (whole.last, whole.statistics));
 }
 
 #[test]

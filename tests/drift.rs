@@ -28,7 +28,7 @@ fn finished(scene: &Scene, request: &Request) -> Outcome {
         outcome.plan.method,
         energy.max,
         energy.slope(),
-        outcome.tally.evaluations,
+        outcome.statistics.evaluations,
         outcome.wall.as_secs_f64()
     );
     outcome
@@ -72,7 +72,7 @@ fn gauss16_keeps_energy_minus_work_of_driven_scenes() {
         assert_no_climb(&outcome, 1e-14);
         // The winding angle is whole turns and a small rest: 300 turns lose nothing.
         let mechanism = common::compile(&shipped(name, &[]));
-        let law = mechanism.rows[0].law.as_ref().expect("a motor");
+        let law = mechanism.constraints[0].law.as_ref().expect("a motor");
         assert_eq!(outcome.last.phi[0], law.angle(300.0.into()).hi);
     }
 }

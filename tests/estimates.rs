@@ -12,7 +12,7 @@ use crate::mechanisms;
 
 use common::shipped;
 use driftless::dynamics::{Mechanism, Motion, Time};
-use driftless::run::trust::{How, Level, Ruler, Trust};
+use driftless::run::trust::{DistanceMetric, How, Level, Trust};
 use driftless::run::{Limits, METHODS, MethodId, Plan, Request, Run, integrate, reference};
 use driftless::scene::{Scene, parse_scene};
 use mechanisms::Dice;
@@ -24,7 +24,7 @@ use std::sync::Arc;
 const USUAL: u64 = 60;
 const FIRST: u64 = 1;
 /// Evaluations allowed to a run.
-const EFFORT: u64 = 300_000;
+const MAX_EVALUATIONS: u64 = 300_000;
 /// Rows of fine output.
 const FINE: f64 = 160.0;
 /// How much finer than an error a truth must be.
@@ -63,7 +63,7 @@ fn case(seed: u64) -> Option<Case> {
     let (scene, kinds) = if dice.chance(0.35) { chain(&mut dice) } else { of_any_kind(seed, &mut dice)? };
     let info = dice.one(METHODS);
     let is_default = dice.chance(0.5);
-    let mut request = Request { method: Some(info.id), effort: Some(EFFORT), ..Request::default() };
+    let mut request = Request { method: Some(info.id), max_evaluations: Some(MAX_EVALUATIONS), ..Request::default() };
     // A quarter of the default ones is run by the method the program chooses.
     if is_default && dice.chance(0.5) {
         request.method = None;
@@ -141,7 +141,7 @@ fn of_any_kind(seed: u64, dice: &mut Dice) -> Option<(Scene, Vec<&'static str>)>
     let has = |what: bool, name: &'static str| what.then_some(name);
     let kinds: Vec<&str> = [
         has(!scene.walls.is_empty(), "walls"),
-        has(mechanism.is_tied_up(), "loops and sliders"),
+        has(mechanism.has_closed_loops(), "loops and sliders"),
         has(mechanism.coordinates() > mechanism.bodies.len(), "floating bodies"),
         has(!scene.motors.is_empty() || !scene.drives.is_empty(), "motors"),
         has(mechanism.vibration.is_some() || mechanism.rigid_rate.is_some(), "rigid springs"),
@@ -173,7 +173,7 @@ fn told(mechanism: &Arc<Mechanism>, plan: Plan, start: &Motion, level: Level) ->
 }
 
 /// The largest differences of angles and rates over what they are measured by.
-fn apart(ruler: &Ruler, one: &[Vec<f64>; 2], other: &[Vec<f64>; 2]) -> [f64; 2] {
+fn apart(ruler: &DistanceMetric, one: &[Vec<f64>; 2], other: &[Vec<f64>; 2]) -> [f64; 2] {
     [0, 1].map(|i| one[i].iter().zip(&other[i]).enumerate().fold(0.0, |most: f64, (k, (a, b))| most.max((a - b).abs() * ruler.weight(k))))
 }
 
@@ -195,7 +195,7 @@ fn truth(scene: &Scene, mechanism: &Arc<Mechanism>, start: &Motion, times: &[f64
     let by = |method, rtol| Request {
         method: Some(method),
         rtol: Some(rtol),
-        effort: Some(40 * EFFORT),
+        max_evaluations: Some(40 * MAX_EVALUATIONS),
         every,
         until: Some(scene.until),
         ..Request::default()
@@ -213,7 +213,7 @@ fn truth(scene: &Scene, mechanism: &Arc<Mechanism>, start: &Motion, times: &[f64
         }
         _ => return None,
     };
-    let ruler = Ruler::new(mechanism);
+    let ruler = DistanceMetric::new(mechanism);
     let accuracy = one.samples.iter().zip(&other.samples).map(|(one, other)| apart(&ruler, one, other)[0].max(1e-14)).collect();
     Some((one.samples, accuracy))
 }
@@ -251,7 +251,7 @@ fn judge(case: &Case) -> Verdict {
         .filter(|fine| fine.samples.last() == ends.as_ref())
         .unwrap_or(told_by_run);
     let Some((exact, accuracy)) = truth(&case.scene, &mechanism, &start, &shown.times) else { return Verdict::Unknown("no truth") };
-    let ruler = Ruler::new(&mechanism);
+    let ruler = DistanceMetric::new(&mechanism);
     let is_sparse = (shown.times.len() as f64) < 0.5 * FINE;
     let mut errors = Errors { is_sparse, times: shown.times.clone(), most: Vec::new(), known: accuracy };
     let mut most = [0.0_f64; 2];

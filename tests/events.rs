@@ -48,8 +48,8 @@ fn a_tip_that_dips_below_its_wall_for_a_moment_is_stopped_both_times() {
         for every in [6.0, 0.01] {
             let scene = turning(1.0, [0.3, 3.0], [0.0, -0.999], [0.0, 1.0]);
             let outcome = run(&scene, &Request { every: Some(every), ..by(name, 6.0) });
-            assert_eq!((outcome.stop.as_ref(), outcome.strike_count), (None, 2), "{name}, every {every}");
-            for (strike, t) in outcome.strikes.iter().zip(t) {
+            assert_eq!((outcome.stop.as_ref(), outcome.impact_count), (None, 2), "{name}, every {every}");
+            for (strike, t) in outcome.impacts.iter().zip(t) {
                 assert!((strike.t - t).abs() < 1e-11, "{name}, every {every}: {} instead of {t}", strike.t);
             }
             let phi = second + 0.75 * (6.0 - t[1]);
@@ -67,16 +67,16 @@ fn a_turning_tip_grazes_its_wall_however_shallowly() {
             let depth = 10_f64.powi(-digits);
             let scene = turning(0.6, [-2.0, 50.0], [0.6 * (1.0 - depth), 0.0], [-1.0, 0.0]);
             let outcome = run(&scene, &by(name, 0.06));
-            assert_eq!((outcome.stop.as_ref(), outcome.strike_count), (None, 1), "{name} at depth {depth:e}");
+            assert_eq!((outcome.stop.as_ref(), outcome.impact_count), (None, 1), "{name} at depth {depth:e}");
             // 1 - cos of a small angle.
             let before = 2.0 * (0.5 * depth).sqrt().asin();
             let t = (2.0 - before) / 50.0;
             // Rounding of the gap over its slope.
             let unsure = 1e-12 + 1e-15 / (50.0 * before);
-            assert!((outcome.strikes[0].t - t).abs() < unsure, "{name} at depth {depth:e}: {} instead of {t}", outcome.strikes[0].t);
+            assert!((outcome.impacts[0].t - t).abs() < unsure, "{name} at depth {depth:e}: {} instead of {t}", outcome.impacts[0].t);
         }
         let clear = turning(0.6, [-2.0, 50.0], [0.6 * (1.0 + 1e-12), 0.0], [-1.0, 0.0]);
-        assert_eq!(run(&clear, &by(name, 0.06)).strike_count, 0, "{name}");
+        assert_eq!(run(&clear, &by(name, 0.06)).impact_count, 0, "{name}");
     }
 }
 
@@ -108,13 +108,13 @@ fn a_swing_that_turns_back_at_its_wall_touches_it_or_does_not() {
         while depth >= 0.99 * least {
             let request = Request { rtol: Some(rtol), ..by(name, 1.5 * half) };
             let outcome = run(&swinging(depth), &request);
-            assert_eq!((outcome.stop.as_ref(), outcome.strike_count), (None, 1), "{name} at {rtol:e}, depth {depth:e}");
+            assert_eq!((outcome.stop.as_ref(), outcome.impact_count), (None, 1), "{name} at {rtol:e}, depth {depth:e}");
             // omega² = 30 (cos(1 - depth) - cos 1).
             let speed = (30.0 * ((1.0 - depth).cos() - 1f64.cos())).sqrt();
-            let seen = -outcome.strikes[0].approach;
+            let seen = -outcome.impacts[0].approach;
             assert!((seen - speed).abs() < 20.0 * least / speed, "{name} at {rtol:e}, depth {depth:e}: {seen:e} instead of {speed:e} m/s");
             let clear = run(&swinging(-depth), &request);
-            assert_eq!((clear.stop.as_ref(), clear.strike_count), (None, 0), "{name} at {rtol:e}, {depth:e} before the wall");
+            assert_eq!((clear.stop.as_ref(), clear.impact_count), (None, 0), "{name} at {rtol:e}, {depth:e} before the wall");
             depth *= 0.1;
         }
     }
@@ -136,12 +136,12 @@ fn a_wall_behind_a_driven_bar_is_met_by_every_form() {
         run(&scene, &Request { rtol: Some(1e-11), stabilize, ..by(name, 3.0) })
     };
     let known = of("taylor", None);
-    assert!(known.stop.is_none() && known.strike_count > 0, "{known:?}");
+    assert!(known.stop.is_none() && known.impact_count > 0, "{known:?}");
     for name in ["dp8", "dp5", "radau9"] {
         for stabilization in [Stabilization::Elimination, Stabilization::Projection] {
             let outcome = of(name, Some(stabilization));
-            assert_eq!((outcome.stop.as_ref(), outcome.strike_count), (None, known.strike_count), "{name} {stabilization:?}");
-            for (a, b) in outcome.strikes.iter().zip(&known.strikes) {
+            assert_eq!((outcome.stop.as_ref(), outcome.impact_count), (None, known.impact_count), "{name} {stabilization:?}");
+            for (a, b) in outcome.impacts.iter().zip(&known.impacts) {
                 assert!((a.t - b.t).abs() < 1e-7, "{name} {stabilization:?}: {a:?} {b:?}");
             }
         }
@@ -243,7 +243,7 @@ fn an_impact_is_found_right_after_another_body_has_left_its_wall() {
             );
             let scene = parse_scene(&text, "two", &[]).expect("a scene");
             let outcome = run(&scene, &Request { method: method(name), ..Request::default() });
-            assert_eq!((outcome.stop.as_ref(), outcome.strike_count), (None, 2), "{name}, ceiling at {at} rad");
+            assert_eq!((outcome.stop.as_ref(), outcome.impact_count), (None, 2), "{name}, ceiling at {at} rad");
             let (found, exact) = (outcome.last.velocity[1][1], 9.81 * (0.5 * fall - rest));
             assert!((found - exact).abs() < 1e-9, "{name}, ceiling at {at} rad: {found} instead of {exact}");
         }

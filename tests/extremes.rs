@@ -200,13 +200,21 @@ fn a_spring_of_no_length_is_a_typed_stop() {
 /// Every method ends where the effort it is allowed does, and says when and how to go further.
 #[test]
 fn effort_that_is_used_up_is_a_typed_stop() {
-    const EFFORT: u64 = 2000;
+    const MAX_EVALUATIONS: u64 = 2000;
     let named = |name: &str, method: &str, stabilize: Option<Stabilization>| {
         let method: MethodId = method.parse().expect("a method");
         let step = (!method.is_adaptive()).then_some(1.0 / 256.0);
         let rtol = method.is_adaptive().then_some(1e-12);
         let time_constant = (stabilize == Some(Stabilization::Baumgarte)).then_some(0.05);
-        let request = Request { method: Some(method), step, rtol, stabilize, time_constant, effort: Some(EFFORT), ..Request::default() };
+        let request = Request {
+            method: Some(method),
+            step,
+            rtol,
+            stabilize,
+            time_constant,
+            max_evaluations: Some(MAX_EVALUATIONS),
+            ..Request::default()
+        };
         (Scene { until: 1e4, every: 50.0, ..shipped(name, &[]) }, request)
     };
     let of_any =
@@ -224,10 +232,10 @@ fn effort_that_is_used_up_is_a_typed_stop() {
         let outcome = run(&scene, &request);
         let stop = outcome.stop.unwrap_or_else(|| panic!("{}, {:?} ended", scene.name, request.method));
         assert_eq!(stop.cause, Cause::EffortExhausted, "{stop}");
-        assert!(stop.t > 0.0 && stop.t < 1e4 && stop.hint.contains("--effort") && stop.what.contains("2000"), "{stop}");
+        assert!(stop.t > 0.0 && stop.t < 1e4 && stop.hint.contains("--max-evaluations") && stop.what.contains("2000"), "{stop}");
         // Steps that have begun are finished.
-        assert!((EFFORT..EFFORT + 1000).contains(&outcome.tally.evaluations), "{stop} {:?}", outcome.tally);
-        let more = run(&scene, &Request { effort: Some(2 * EFFORT), ..request }).stop.expect("a stop");
+        assert!((MAX_EVALUATIONS..MAX_EVALUATIONS + 1000).contains(&outcome.statistics.evaluations), "{stop} {:?}", outcome.statistics);
+        let more = run(&scene, &Request { max_evaluations: Some(2 * MAX_EVALUATIONS), ..request }).stop.expect("a stop");
         assert!(more.t > stop.t || outcome.plan.method == MethodId::Dop853 || outcome.plan.method == MethodId::Dopri5, "{more}");
     }
 }
@@ -280,20 +288,21 @@ fn a_trajectory_of_gigabytes_has_to_be_asked_for() {
 fn nothing_takes_for_ever() {
     let bouncing = shipped("wall", &["walls.wall.restitution=1", "gravity=[9.81, 0]"]);
     for method in [MethodId::Dp5, MethodId::Dp8, MethodId::Taylor] {
-        let request = Request { until: Some(1e9), every: Some(1e9), effort: Some(50_000), method: Some(method), ..Request::default() };
+        let request =
+            Request { until: Some(1e9), every: Some(1e9), max_evaluations: Some(50_000), method: Some(method), ..Request::default() };
         let stop = run(&bouncing, &request).stop.expect("a stop");
         assert!(matches!(stop.cause, Cause::EffortExhausted | Cause::RestingContact), "{stop}");
     }
     // What nobody bounds is bounded all the same.
     let plan = run(&shipped("free", &[]), &Request { until: Some(1.0), ..Request::default() }).plan;
-    assert_eq!(plan.effort, 110_000_000);
+    assert_eq!(plan.max_evaluations, 110_000_000);
     // And not by the horizon alone: what cannot be reached is said beforehand.
     let (scene, most) = (shipped("free", &[]), [(MethodId::Dp8, 10_000_000_000), (MethodId::Taylor, 1_000_000_000)]);
-    for (method, effort) in most {
+    for (method, max_evaluations) in most {
         let request = Request { until: Some(1e9), every: Some(1e9), method: Some(method), ..Request::default() };
         let plan = driftless::run::Plan::new(&scene, &compile(&scene), &request).expect("a plan");
-        assert_eq!(plan.effort, effort);
-        assert!(plan.notes.iter().any(|note| note.contains("--effort") && note.contains("may stop")), "{:?}", plan.notes);
+        assert_eq!(plan.max_evaluations, max_evaluations);
+        assert!(plan.notes.iter().any(|note| note.contains("--max-evaluations") && note.contains("may stop")), "{:?}", plan.notes);
     }
 }
 

@@ -1,9 +1,9 @@
 //! Forces from outside the crate: written once over the scalar, they must do in every method what the scene's own parts do.
 
 use driftless::arithmetic::Scalar;
+use driftless::dynamics::constraint::Site;
 use driftless::dynamics::force::{Force, Loads, UserForce};
 use driftless::dynamics::kernel::{Bias, Kernel};
-use driftless::dynamics::row::Site;
 use driftless::dynamics::{CompileError, Configuration, Mechanism};
 use driftless::run::trust::Level;
 use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Stabilization, integrate};

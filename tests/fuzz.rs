@@ -85,9 +85,9 @@ fn no_physics_makes_a_wrong_success() {
 }
 
 /// Evaluations allowed to a run of an extreme scene.
-const EFFORT: u64 = 20_000;
+const MAX_EVALUATIONS: u64 = 20_000;
 
-/// Random scenes with numbers far out, by every method, with an effort of `EFFORT` evaluations: each ends with exit code 0, 3, 4 or 5, every success stands up to
+/// Random scenes with numbers far out, by every method, with an effort of `MAX_EVALUATIONS` evaluations: each ends with exit code 0, 3, 4 or 5, every success stands up to
 /// an independent audit of its first row, its energy and its joints, and the program says the same of a part of them; a part is swept, with a look-out for bars that
 /// turn over, and a part has its error estimated.  `.ci/extremes N SEED` has more; scenes that fail go to the folder that `FOUND` names.
 #[test]
@@ -106,7 +106,7 @@ fn random_extreme_scenes_end_as_promised() {
             seen.shown += 1;
             program.write("random.json", &text);
             let until = serde_json::from_str::<serde_json::Value>(&text).expect("JSON")["until"].as_f64().expect("a horizon");
-            let options = options(&random::request(&mut draw, until, EFFORT));
+            let options = options(&random::request(&mut draw, until, MAX_EVALUATIONS));
             let ran = program.run(&format!("run random.json --force --quiet --no-charts {options}"));
             let code = match ending {
                 Ending::Done => 0,
@@ -155,7 +155,7 @@ impl Seen {
     /// A scene through a run, and at times a sweep and an estimate; nothing where one of them panics.
     fn run(&mut self, index: u64, text: &str, draw: &Draw) -> Option<Ending> {
         let begin = Instant::now();
-        let ending = self.caught(index, text, "run", || targets::simulate(text, &mut draw.clone(), EFFORT))?;
+        let ending = self.caught(index, text, "run", || targets::simulate(text, &mut draw.clone(), MAX_EVALUATIONS))?;
         *self.endings.entry(ending).or_default() += 1;
         if let Some(scene) = extremes::parsed(text) {
             for kind in extremes::kinds(&scene) {
@@ -163,12 +163,13 @@ impl Seen {
                 *counts = [counts[0] + 1, counts[1] + u64::from(ending == Ending::Done)];
             }
             if matches!(index % 12, 2 | 3 | 5) && ending != Ending::Refused {
-                let swept = self.caught(index, text, "sweep", || extremes::sweep_of(text, &scene, &mut draw.clone(), EFFORT / 4))?;
+                let swept =
+                    self.caught(index, text, "sweep", || extremes::sweep_of(text, &scene, &mut draw.clone(), MAX_EVALUATIONS / 4))?;
                 let of_all = [swept.points, swept.done, swept.flipped, swept.compared];
                 self.swept.iter_mut().zip(of_all).for_each(|(sum, own)| *sum += own);
             }
             if matches!(index % 12, 6 | 7 | 9) && ending != Ending::Refused {
-                let request = random::request(&mut draw.clone(), scene.until, EFFORT);
+                let request = random::request(&mut draw.clone(), scene.until, MAX_EVALUATIONS);
                 // What it costs is bounded by the run's work.
                 let level = if index % 4 == 3 { Level::Full } else { Level::Auto };
                 let given = self.caught(index, text, "trust", || extremes::trust_of(&scene, &request, level))?;
@@ -242,7 +243,7 @@ fn options(request: &Request) -> String {
     say("atol", request.atol.map(|value| format!("{value:e}")));
     say("time-constant", request.time_constant.map(|value| format!("{value:e}")));
     say("stabilize", request.stabilize.map(|how| how.to_string()));
-    say("effort", request.effort.map(|effort| effort.to_string()));
+    say("effort", request.max_evaluations.map(|max_evaluations| max_evaluations.to_string()));
     if request.extended {
         options += "--extended ";
     }

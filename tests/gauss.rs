@@ -8,10 +8,10 @@ use common::{Inertia, LENGTH, ONE_TURN, compile, double_pendulum, free, motor, s
 use driftless::arithmetic::{DoubleDouble, Scalar};
 use driftless::dynamics::canonical::Canonical;
 use driftless::dynamics::kernel::Kernel;
-use driftless::dynamics::{Field, Form, Mechanism, Motion, Points, State, Time};
+use driftless::dynamics::{Form, Mechanism, Motion, OdeSystem, Points, State, Time};
 use driftless::scene::{Hinge, Place, Scene, Sine, Start};
 use driftless::stepping::gauss::Gauss;
-use driftless::stepping::{Cause, Integrator, Reached, Seen, StepError, Tally};
+use driftless::stepping::{Cause, Integrator, Reached, Seen, Statistics, StepError};
 
 /// A small swing about hanging.
 fn gentle() -> Scene {
@@ -64,11 +64,11 @@ fn gauss(stages: usize, step: f64) -> Gauss {
 }
 
 /// Integrates on to `until`.
-fn integrate<F: Field + ?Sized>(method: &mut Gauss, problem: &mut F, state: &mut State, until: f64) -> Result<Tally, StepError> {
-    let mut tally = Tally::default();
-    let reached = method.advance(problem, state, Time::of(until), &mut tally, &mut |_, _| Ok(Seen::Kept))?;
+fn integrate<F: OdeSystem + ?Sized>(method: &mut Gauss, problem: &mut F, state: &mut State, until: f64) -> Result<Statistics, StepError> {
+    let mut statistics = Statistics::default();
+    let reached = method.advance(problem, state, Time::of(until), &mut statistics, &mut |_, _| Ok(Seen::Kept))?;
     assert_eq!(reached, Reached::Until);
-    Ok(tally)
+    Ok(statistics)
 }
 
 /// Energy less the work of motors, in double-double.
@@ -89,7 +89,7 @@ impl Balance {
 }
 
 /// Largest excursion of the balance over its scale, and the slope \[1/s\] of a straight line through it, sampled every `every` steps.
-fn drift<F: Field + Form>(form: &mut F, method: &mut Gauss, state: &mut State, until: f64, every: usize) -> (f64, f64) {
+fn drift<F: OdeSystem + Form>(form: &mut F, method: &mut Gauss, state: &mut State, until: f64, every: usize) -> (f64, f64) {
     let mut balance = Balance::new(form.mechanism());
     let scale = form.mechanism().energy_scale;
     let start = balance.at(form, state);
@@ -101,7 +101,7 @@ fn drift<F: Field + Form>(form: &mut F, method: &mut Gauss, state: &mut State, u
         }
         Ok(Seen::Kept)
     };
-    method.advance(form, state, Time::of(until), &mut Tally::default(), &mut watch).expect("a finished integrate");
+    method.advance(form, state, Time::of(until), &mut Statistics::default(), &mut watch).expect("a finished integrate");
     (samples.iter().fold(0.0, |worst: f64, sample| worst.max(sample.1.abs())), slope(&samples))
 }
 
@@ -116,7 +116,7 @@ fn slope(points: &[(f64, f64)]) -> f64 {
 /// Order from the errors at 1 s: slope of the mean log error over `starts` on log step, for the six finest steps above rounding.
 ///
 /// One start will not do: along a sequence of steps its error crosses zero here and there.
-fn measured_order<F: Field + Form>(form: &mut F, starts: &[State], stages: usize) -> f64 {
+fn measured_order<F: OdeSystem + Form>(form: &mut F, starts: &[State], stages: usize) -> f64 {
     let end = |form: &mut F, start: &State, steps: u32, stages: usize| {
         let mut state = start.clone();
         integrate(&mut gauss(stages, 1.0 / f64::from(steps)), form, &mut state, 1.0).expect("an integration");
@@ -262,7 +262,7 @@ fn a_changed_state_is_not_predicted_from_its_past() {
         state.y[2] += 1e-3;
         Ok(Seen::Changed)
     };
-    method.advance(&mut form, &mut state, Time::of(1.0 / 128.0), &mut Tally::default(), &mut jolt).expect("a jolt");
+    method.advance(&mut form, &mut state, Time::of(1.0 / 128.0), &mut Statistics::default(), &mut jolt).expect("a jolt");
     assert!(state.memory.is_empty());
 
     // A memory of another step, another method or nonsense is not used either.
@@ -312,17 +312,17 @@ fn a_mechanism_at_rest_is_left_alone() {
     let hanging = double_pendulum(Inertia::Full, [(0.0, 0.0), (0.0, 0.0)]);
     let mut form = Free2::new(compile(&hanging));
     let mut state = start_of(&form, &hanging);
-    let tally = integrate(&mut gauss(8, 1.0 / 64.0), &mut form, &mut state, 1.0).expect("rest");
+    let statistics = integrate(&mut gauss(8, 1.0 / 64.0), &mut form, &mut state, 1.0).expect("rest");
     assert_eq!(state.y, [0.0; 4]);
-    assert_eq!((tally.steps, tally.evaluations), (64, 64 * 16), "nothing moves: one sweep a step, and one exact evaluation");
+    assert_eq!((statistics.steps, statistics.evaluations), (64, 64 * 16), "nothing moves: one sweep a step, and one exact evaluation");
 }
 
 #[test]
 fn a_remaining_time_that_is_no_whole_step_ends_in_a_shorter_one() {
     let mut form = Free2::new(compile(&gentle()));
     let mut state = start_of(&form, &gentle());
-    let tally = integrate(&mut gauss(8, 0.01), &mut form, &mut state, 1.005).expect("an integration");
-    assert_eq!(tally.steps, 101);
+    let statistics = integrate(&mut gauss(8, 0.01), &mut form, &mut state, 1.005).expect("an integration");
+    assert_eq!(statistics.steps, 101);
     assert!((state.time - Time::of(1.005)).hi.abs() < 1e-16);
     let mut fine = start_of(&form, &gentle());
     integrate(&mut gauss(8, 0.005), &mut form, &mut fine, 1.005).expect("an integration");
@@ -338,7 +338,7 @@ struct Scaled {
     unit: f64,
 }
 
-impl Field for Scaled {
+impl OdeSystem for Scaled {
     fn dimension(&self) -> usize {
         2
     }
@@ -347,7 +347,7 @@ impl Field for Scaled {
         0
     }
 
-    fn rate(&mut self, _t: Time, y: &[f64], rate: &mut [f64]) {
+    fn rhs(&mut self, _t: Time, y: &[f64], rate: &mut [f64]) {
         rate[0] = y[1] / self.unit;
         rate[1] = -self.unit * libm::sin(y[0]);
     }
@@ -361,8 +361,8 @@ impl Field for Scaled {
 fn the_unit_of_an_unknown_does_not_matter() {
     let march_in = |unit: f64| {
         let mut state = State::new(&[DoubleDouble::of(1.0), DoubleDouble::of(0.5 * unit)], 0);
-        let tally = integrate(&mut gauss(8, 0.125), &mut Scaled { unit }, &mut state, 50.0).expect("an integration");
-        (state.unknown(0), state.unknown(1).ldexp(1.0 / unit), tally)
+        let statistics = integrate(&mut gauss(8, 0.125), &mut Scaled { unit }, &mut state, 50.0).expect("an integration");
+        (state.unknown(0), state.unknown(1).ldexp(1.0 / unit), statistics)
     };
     let plain = march_in(1.0);
     for unit in [2f64.powi(-40), 2f64.powi(60)] {
@@ -379,7 +379,9 @@ fn a_stiff_spring_converges_or_is_refused() {
         let mut form = Free2::new(compile(&scene));
         let mut state = start_of(&form, &scene);
         match integrate(&mut gauss(8, 1.0 / 128.0), &mut form, &mut state, 1.0) {
-            Ok(tally) => println!("spring x {factor:e}: {:.1} sweeps a step", tally.evaluations as f64 / tally.steps as f64 / 8.0),
+            Ok(statistics) => {
+                println!("spring x {factor:e}: {:.1} sweeps a step", statistics.evaluations as f64 / statistics.steps as f64 / 8.0)
+            }
             Err(stop) => {
                 println!("spring x {factor:e}: {stop}");
                 assert!(factor >= 1e3, "{stop}");
@@ -398,15 +400,15 @@ fn everything() -> Scene {
 
 #[test]
 fn hardware_and_portable_lanes_march_to_the_same_bits() {
-    fn both<const N: usize, const ACCOUNT: bool>(scene: &Scene, stages: usize) {
+    fn both<const N: usize, const WORK: bool>(scene: &Scene, stages: usize) {
         let mechanism = compile(scene);
         let march_in = |portable: bool| {
-            let mut form = Canonical::<N, ACCOUNT>::with_lanes(mechanism.clone(), portable);
+            let mut form = Canonical::<N, WORK>::with_lanes(mechanism.clone(), portable);
             let mut state = start_of(&form, scene);
             let method = gauss(stages, 1.0 / 128.0);
-            let tally =
+            let statistics =
                 integrate(&mut if portable { method.portable() } else { method }, &mut form, &mut state, 1.0).expect("an integration");
-            (state, tally)
+            (state, statistics)
         };
         assert_eq!(march_in(false), march_in(true), "{}, s = {stages}", scene.name);
     }
@@ -423,7 +425,7 @@ fn hardware_and_portable_lanes_march_to_the_same_bits() {
 /// The canonical form one point at a time, as any field without lanes.
 struct OneByOne<F>(F);
 
-impl<F: Field> Field for OneByOne<F> {
+impl<F: OdeSystem> OdeSystem for OneByOne<F> {
     fn dimension(&self) -> usize {
         self.0.dimension()
     }
@@ -432,8 +434,8 @@ impl<F: Field> Field for OneByOne<F> {
         self.0.angles()
     }
 
-    fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
-        self.0.rate(t, y, rate);
+    fn rhs(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
+        self.0.rhs(t, y, rate);
     }
 
     fn label(&self, i: usize) -> String {
@@ -443,8 +445,8 @@ impl<F: Field> Field for OneByOne<F> {
 
 #[test]
 fn lanes_evaluate_what_a_single_point_does() {
-    fn check<const N: usize, const ACCOUNT: bool>(scene: &Scene) {
-        let mut form = Canonical::<N, ACCOUNT>::new(compile(scene));
+    fn check<const N: usize, const WORK: bool>(scene: &Scene) {
+        let mut form = Canonical::<N, WORK>::new(compile(scene));
         let d = form.dimension();
         let mut points = Points { used: [true; 8], ..Points::default() };
         points.resize(d);
@@ -458,7 +460,7 @@ fn lanes_evaluate_what_a_single_point_does() {
         let (mut lanes, mut exact, mut single) = (points.clone(), points.clone(), points);
         form.rates(&mut lanes);
         form.exact_rates(&mut exact);
-        single.each(|t, y, rate| form.rate(t, y, rate));
+        single.each(|t, y, rate| form.rhs(t, y, rate));
         for k in 0..d {
             for lane in 0..8 {
                 let (plain, pair, alone) = (lanes.rate[k].0[lane], exact.rate[k].0[lane], single.rate[k].0[lane]);
@@ -504,7 +506,7 @@ fn a_boxed_field_gives_the_same_bits() {
     let start = start_of(&form, &free());
     let (mut plain, mut boxed) = (start.clone(), start);
     integrate(&mut gauss(8, 1.0 / 128.0), &mut form, &mut plain, 1.0).expect("an integration");
-    let mut field: Box<dyn Field> = Box::new(form);
+    let mut field: Box<dyn OdeSystem> = Box::new(form);
     integrate(&mut gauss(8, 1.0 / 128.0), &mut *field, &mut boxed, 1.0).expect("an integration");
     assert_eq!(plain, boxed);
 }
@@ -535,7 +537,7 @@ fn ensemble(title: &str, scene: &Scene, scale: f64, method: &Gauss, until: f64, 
     let mut form = Free2::new(compile(scene));
     let marks: Vec<f64> = (0..7).rev().map(|k| until / 2f64.powi(k)).collect();
     let mut errors = vec![Vec::new(); marks.len()];
-    let (mut tally, clock) = (Tally::default(), std::time::Instant::now());
+    let (mut statistics, clock) = (Statistics::default(), std::time::Instant::now());
     for run in 0..runs {
         let mut state = start_of(&form, scene);
         prepare(&mut state, run as f64);
@@ -544,7 +546,7 @@ fn ensemble(title: &str, scene: &Scene, scale: f64, method: &Gauss, until: f64, 
         let mut method = method.clone();
         for (mark, errors) in marks.iter().zip(&mut errors) {
             let part = integrate(&mut method, &mut form, &mut state, *mark).expect("an integration");
-            (tally.steps, tally.evaluations) = (tally.steps + part.steps, tally.evaluations + part.evaluations);
+            (statistics.steps, statistics.evaluations) = (statistics.steps + part.steps, statistics.evaluations + part.evaluations);
             errors.push((balance.at(&mut form, &state) - start).hi / scale);
         }
     }
@@ -566,7 +568,8 @@ fn ensemble(title: &str, scene: &Scene, scale: f64, method: &Gauss, until: f64, 
         println!("{title} {mark:7} s: rms {rms:.2e}, mean {mean:+.1e} ± {scatter:.1e}");
         (walk.rms, walk.bias) = (rms, mean / scatter);
     }
-    let (evaluations, time) = (tally.evaluations as f64 / tally.steps as f64, clock.elapsed().as_secs_f64() * 1e6 / tally.steps as f64);
+    let (evaluations, time) =
+        (statistics.evaluations as f64 / statistics.steps as f64, clock.elapsed().as_secs_f64() * 1e6 / statistics.steps as f64);
     let (power, error) = walk.exponent;
     println!("{title}: rms grows as t^({power:.3} ± {error:.3}); {evaluations:.1} evaluations and {time:.2} µs a step");
     walk

@@ -7,7 +7,7 @@ use crate::mechanisms;
 
 use common::{compile, pendulum, quarter_period, shipped};
 use driftless::dynamics::{Mechanism, Motion, Time};
-use driftless::run::trust::{Flow, Level, Ruler, Tangent, Trust, flow};
+use driftless::run::trust::{DistanceMetric, Flow, Level, Tangent, Trust, flow};
 use driftless::run::{Limits, Plan, Request, Run, Running, integrate, reference};
 use driftless::scene::{Scene, parse_scene};
 use std::f64::consts::TAU;
@@ -19,7 +19,7 @@ fn number(name: &str, usual: u64) -> u64 {
 
 fn request(until: f64, every: f64) -> Request {
     let method = Some("taylor".parse().expect("a method"));
-    Request { method, rtol: Some(1e-14), until: Some(until), every: Some(every), effort: Some(300_000), ..Request::default() }
+    Request { method, rtol: Some(1e-14), until: Some(until), every: Some(every), max_evaluations: Some(300_000), ..Request::default() }
 }
 
 /// The motions at the rows of a run.
@@ -39,7 +39,7 @@ fn motions(scene: &Scene, mechanism: &Arc<Mechanism>, start: &Motion, until: f64
 }
 
 /// Half the difference of two motions over a size: positions, and rates over `rate`, as they are weighed.
-fn apart(ruler: &Ruler, ahead: &Motion, behind: &Motion, size: f64, rate: f64) -> Vec<f64> {
+fn apart(ruler: &DistanceMetric, ahead: &Motion, behind: &Motion, size: f64, rate: f64) -> Vec<f64> {
     let n = ahead.phi.len();
     let positions = (0..n).map(|k| {
         let off = (ahead.phi[k] - behind.phi[k]).hi;
@@ -69,7 +69,7 @@ fn compared(scene: &Scene, until: f64, rows: u32) -> Result<Compared, String> {
     let plan = Plan::new(scene, &mechanism, &request(until, until)).map_err(|refusal| refusal.to_string())?;
     let times: Vec<f64> = (1..=rows).map(|k| until * f64::from(k) / f64::from(rows)).collect();
     let Flow { moments, rate, steps, lost } = flow(&mechanism, &plan, &start, &times)?;
-    let (ruler, n) = (Ruler::new(&mechanism), mechanism.coordinates());
+    let (ruler, n) = (DistanceMetric::new(&mechanism), mechanism.coordinates());
     let mut ratios = Vec::new();
     let weighted = |column: &[f64]| {
         let weight = |(i, entry): (usize, &f64)| ruler.weight(i % n) * if i < n { *entry } else { entry / rate };
@@ -164,7 +164,7 @@ fn events(scene: &Scene, until: f64) {
     let plan = Plan::new(scene, &mechanism, &request(until, until)).expect("a plan");
     let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a beginning");
     let outcome = integrate(run, &mut |_| Ok(())).expect("no observer fails");
-    outcome.strikes.iter().for_each(|strike| println!("  strike at {} s, {} at {:.3e} m/s", strike.t, strike.wall, strike.approach));
+    outcome.impacts.iter().for_each(|strike| println!("  strike at {} s, {} at {:.3e} m/s", strike.t, strike.wall, strike.approach));
     outcome.holds.iter().for_each(|hold| println!("  hold from {} s to {:?}, {}", hold.t, hold.until, hold.wall));
 }
 
@@ -352,7 +352,7 @@ fn input_errors_are_those_of_runs_with_other_numbers() {
             other.bars.iter_mut().for_each(|bar| [&mut bar.mass, &mut bar.inertia].into_iter().for_each(&mut change));
             other.springs.iter_mut().for_each(|spring| change(&mut spring.stiffness));
             other.start.iter_mut().for_each(|start| [&mut start.phi, &mut start.omega].into_iter().for_each(&mut change));
-            let ruler = Ruler::new(&compile(&other));
+            let ruler = DistanceMetric::new(&compile(&other));
             let most = plain.iter().zip(last(&other)).map(|(one, other)| ruler.apart(one, &other)).fold(0.0, f64::max);
             squares += 0.25 * (most / 1e-9).powi(2);
         }
@@ -400,8 +400,8 @@ fn rounding_of_many_bodies_is_told() {
             }
         }
         found.push(running.motion().clone());
-        let per_second = running.finish().tally.steps as f64 / until;
-        let ruler = Ruler::new(&mechanism);
+        let per_second = running.finish().statistics.steps as f64 / until;
+        let ruler = DistanceMetric::new(&mechanism);
         let mut tangent = Tangent::new(&mechanism, &start, until).expect("a flow");
         let (mut seen, mut told) = (0.0_f64, 0.0_f64);
         for (exact, found) in exact.iter().zip(&found) {

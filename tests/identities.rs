@@ -8,7 +8,7 @@ use driftless::dynamics::canonical::Canonical;
 use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::kernel::{Bias, Kernel};
 use driftless::dynamics::multiplier::Multiplier;
-use driftless::dynamics::{Field, Form, Mechanism, Motion, State, Time, tree};
+use driftless::dynamics::{Form, Mechanism, Motion, OdeSystem, State, Time, tree};
 use driftless::run::{Plan, Request};
 use driftless::scene::Scene;
 use proptest::prelude::*;
@@ -25,7 +25,7 @@ fn at_a_time(scene: &Scene) -> (Arc<Mechanism>, Time) {
 
 /// A motion at time `t` that fulfils every motor: the independent angles and rates are the scene's, the others follow from the laws.
 fn consistent(scene: &Scene, mechanism: &Arc<Mechanism>, t: Time) -> Motion {
-    let free = &mechanism.ties.independent;
+    let free = &mechanism.partition.independent;
     let mut unknowns: Vec<DoubleDouble> = free.iter().map(|&k| DoubleDouble::from(scene.start[k].phi)).collect();
     unknowns.extend(free.iter().map(|&k| DoubleDouble::from(scene.start[k].omega)));
     unknowns.push(DoubleDouble::ZERO);
@@ -72,16 +72,16 @@ fn moved(motion: &Motion, alpha: &[DoubleDouble], power: f64, dt: f64) -> Motion
 }
 
 /// y' of a form at a motion.
-fn rate_of<F: Field + Form>(form: &mut F, motion: &Motion) -> Vec<f64> {
+fn rate_of<F: OdeSystem + Form>(form: &mut F, motion: &Motion) -> Vec<f64> {
     let state = form.state(motion);
     let mut rate = vec![0.0; form.dimension()];
-    form.rate(state.time, &state.y, &mut rate);
+    form.rhs(state.time, &state.y, &mut rate);
     rate
 }
 
 /// y' of the multiplier form, the elimination form and the canonical form for `N` bodies.
 fn rates<const N: usize>(mechanism: &Arc<Mechanism>, motion: &Motion) -> [Vec<f64>; 3] {
-    let accounts = !mechanism.rows.is_empty() || mechanism.is_damped();
+    let accounts = !mechanism.constraints.is_empty() || mechanism.is_damped();
     let shared = || Arc::clone(mechanism);
     [
         if accounts {
@@ -99,22 +99,22 @@ fn rates<const N: usize>(mechanism: &Arc<Mechanism>, motion: &Motion) -> [Vec<f6
 }
 
 /// The canonical form's rates against differences of its state along the multiplier form's motion.
-fn check_canonical<const ACCOUNT: bool>(
+fn check_canonical<const WORK: bool>(
     mechanism: &Arc<Mechanism>,
     motion: &Motion,
     alpha: &[DoubleDouble],
     power: f64,
 ) -> Result<(), TestCaseError> {
     const DT: f64 = 1e-8;
-    let mut form = Canonical::<0, ACCOUNT>::new(Arc::clone(mechanism));
+    let mut form = Canonical::<0, WORK>::new(Arc::clone(mechanism));
     let (before, after) = (form.state(&moved(motion, alpha, power, -DT)), form.state(&moved(motion, alpha, power, DT)));
     let rate = rate_of(&mut form, motion);
     let scale = largest(rate.iter().copied());
-    for (i, &rate) in rate.iter().enumerate().skip(mechanism.ties.count()) {
+    for (i, &rate) in rate.iter().enumerate().skip(mechanism.partition.count()) {
         let difference = ((after.unknown(i) - before.unknown(i)) / DoubleDouble::from(2.0 * DT)).hi;
         prop_assert!((difference - rate).abs() < 1e-9 * scale, "{}: {difference} is not {rate}", form.label(i));
     }
-    for (i, &body) in mechanism.ties.independent.iter().enumerate() {
+    for (i, &body) in mechanism.partition.independent.iter().enumerate() {
         prop_assert!((rate[i] - motion.omega[body].hi).abs() < ROUNDING * scale, "{}", form.label(i));
     }
     // And back: the state stands for the very motion it was made from.
@@ -198,7 +198,7 @@ proptest! {
         };
         let change = ((energy(DT) - energy(-DT)) / DoubleDouble::from(2.0 * DT)).hi;
         // A motor's power is its torque, minus the multiplier, times the rate its law asks for.
-        let motors: f64 = mechanism.rows.iter().zip(&exact.multiplier).map(|(row, multiplier)| {
+        let motors: f64 = mechanism.constraints.iter().zip(&exact.multiplier).map(|(row, multiplier)| {
             row.law.as_ref().map_or(0.0, |law| -multiplier.hi * law.at::<f64>(t).rate)
         }).sum();
         let dampers: f64 = mechanism.springs.iter().map(|spring| spring.drag_power(&exact.z, &motion.omega).hi).sum();
@@ -219,8 +219,8 @@ proptest! {
         let kernel = evaluate(&mechanism, &motion);
         let [_, elimination, _] = rates::<0>(&mechanism, &motion);
         let scale = largest(kernel.load.iter().copied());
-        let f = mechanism.ties.count();
-        for (i, &body) in mechanism.ties.independent.iter().enumerate() {
+        let f = mechanism.partition.count();
+        for (i, &body) in mechanism.partition.independent.iter().enumerate() {
             prop_assert!((elimination[f + i] - kernel.load[body]).abs() < ROUNDING * scale, "seed {seed}");
         }
     }
@@ -236,7 +236,7 @@ proptest! {
         let alpha = evaluate_exactly(&mechanism, &motion).load;
         let [_, elimination, _] = rates::<0>(&mechanism, &motion);
         let power = elimination[elimination.len() - 1];
-        if mechanism.rows.is_empty() && !mechanism.is_damped() {
+        if mechanism.constraints.is_empty() && !mechanism.is_damped() {
             check_canonical::<false>(&mechanism, &motion, &alpha, power)?;
         } else {
             check_canonical::<true>(&mechanism, &motion, &alpha, power)?;
@@ -283,7 +283,7 @@ proptest! {
         // Neither rows nor accounts are unknowns, and the rate is the plain solve, bit for bit.
         let mut form = Multiplier::<0, false>::new(Arc::clone(&mechanism));
         prop_assert_eq!(form.dimension(), 2 * n);
-        prop_assert!(mechanism.rows.is_empty() && !mechanism.ties.driven() && mechanism.ties.count() == n);
+        prop_assert!(mechanism.constraints.is_empty() && !mechanism.partition.driven() && mechanism.partition.count() == n);
         let rate = rate_of(&mut form, &motion);
         let mut kernel = Kernel::<f64>::without_rows(&mechanism);
         kernel.accelerate_free::<0>(&mechanism, motion.time, &plain(&motion.phi), &plain(&motion.omega));

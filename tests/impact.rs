@@ -10,7 +10,7 @@ use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::{Form, Mechanism, State, Time};
 use driftless::run::{MethodId, Outcome, Plan, Request};
 use driftless::scene::{Law, Motor, Scene, Wall};
-use driftless::stepping::{Cause, Dp8, Integrator, Reached, Seen, Tally, Tolerance};
+use driftless::stepping::{Cause, Dp8, Integrator, Reached, Seen, Statistics, Tolerance};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -43,7 +43,7 @@ fn the_first_impact_at_the_very_start_is_case_f() {
         for e in [0.0, 0.5, 1.0] {
             let outcome = run(&shipped("wall", &[&format!("walls.wall.restitution={e}")]), &by(method, 0.005, 0.001, 1e-12));
             assert_eq!(outcome.stop, None, "e = {e}");
-            let first = &outcome.strikes[0];
+            let first = &outcome.impacts[0];
             // Rates from the hand-written solution of tests/published.rs.
             assert_eq!((first.t, first.wall.as_str()), (0.0, "wall"));
             assert!((first.impulse - (1.0 + e) * 7.0 / 6.0 * PI * common::MASS * common::LENGTH).abs() < 1e-13);
@@ -60,9 +60,9 @@ fn strikes_come_at_the_quarter_periods_and_an_elastic_wall_keeps_the_energy() {
         let quarter = quarter_period(1.0);
         let outcome = run(&bouncing(0.0, 1.0, 1.0), &by(method, 200.5 * quarter, 0.1, 1e-12));
         assert_eq!(outcome.stop, None);
-        assert_eq!(outcome.strike_count, 100);
+        assert_eq!(outcome.impact_count, 100);
         let speed = (2.0 * PENDULUM_SQUARED * (1.0 - 1f64.cos())).sqrt();
-        for (j, strike) in outcome.strikes.iter().enumerate() {
+        for (j, strike) in outcome.impacts.iter().enumerate() {
             let expected = (2 * j + 1) as f64 * quarter;
             assert!((strike.t - expected).abs() < 1e-9, "strike {j} at {} s instead of {expected} s", strike.t);
             assert!((strike.approach + speed).abs() < 1e-9 && (strike.impulse - 2.0 * speed / 3.0).abs() < 1e-9);
@@ -78,7 +78,7 @@ fn at_half_restitution_every_swing_has_a_quarter_of_the_height() {
         let outcome = run(&bouncing(0.0, 1.0, 0.5), &by(method, 12.0, 0.01, 1e-12));
         assert_eq!(outcome.stop, None);
         let (mut t, mut height, energy) = (quarter_period(1.0), 1.0 - 1f64.cos(), 5.0);
-        for strike in &outcome.strikes[..8] {
+        for strike in &outcome.impacts[..8] {
             assert!((strike.t - t).abs() < 1e-9, "at {} s instead of {t} s", strike.t);
             assert!((strike.energy_lost - 0.75 * energy * height).abs() < 1e-9);
             height *= 0.25;
@@ -98,7 +98,7 @@ fn the_state_at_a_strike_lies_on_the_wall_to_rounding() {
         let mut form = Multiplier::<1, false>::new(Arc::clone(&mechanism));
         let mut state: State = form.state(&mechanism.start(&scene));
         let mut method = Dp8::new(Tolerance { relative: 1e-8, absolute: 1e-8 });
-        let reached = method.advance(&mut form, &mut state, Time::from(10.0), &mut Tally::default(), &mut |_, _| Ok(Seen::Kept));
+        let reached = method.advance(&mut form, &mut state, Time::from(10.0), &mut Statistics::default(), &mut |_, _| Ok(Seen::Kept));
         assert_eq!(reached, Ok(Reached::Event(0)));
         let gap = mechanism.contacts[0].row.gap(&[driftless::arithmetic::Complex::unit(state.y[0])]);
         assert!(gap.abs() < 1e-14, "{gap:e} m");
@@ -111,8 +111,8 @@ fn the_state_at_a_strike_lies_on_the_wall_to_rounding() {
 fn case_f_without_restitution_is_held_at_its_second_impact() {
     for method in LOCATED {
         let outcome = run(&shipped("wall", &["walls.wall.restitution=0"]), &by(method, 0.02, 0.001, 1e-12));
-        assert_eq!((outcome.stop.as_ref(), outcome.strike_count, outcome.hold_count), (None, 2, 1));
-        let (second, hold) = (&outcome.strikes[1], &outcome.holds[0]);
+        assert_eq!((outcome.stop.as_ref(), outcome.impact_count, outcome.persistent_contact_count), (None, 2, 1));
+        let (second, hold) = (&outcome.impacts[1], &outcome.holds[0]);
         assert!((second.t - 0.0098).abs() < 1e-3 && second.t == hold.t, "{second:?} {hold:?}");
     }
 }
@@ -134,7 +134,7 @@ fn points_that_touch_at_the_same_moment_are_both_struck() {
         let outcome = run(&scene, &by(method, 3.0, 0.1, 1e-10));
         let alone = run(&bouncing(0.0, 1.0, 0.5), &by(method, 3.0, 0.1, 1e-10));
         assert_eq!(outcome.stop, None);
-        assert_eq!(outcome.strike_count, 2 * alone.strike_count);
+        assert_eq!(outcome.impact_count, 2 * alone.impact_count);
         assert!((outcome.last.phi[0] - alone.last.phi[0]).abs() < 1e-8 && (outcome.last.phi[0] + outcome.last.phi[1]).abs() < 1e-12);
     }
 }
@@ -149,9 +149,9 @@ fn of_two_walls_in_one_step_the_nearer_is_struck() {
             let outcome = run(&scene, &by(method, 5.0, 0.1, 1e-9));
             assert_eq!(outcome.stop, None, "{names:?}");
             assert!(
-                outcome.strike_count > 4 && outcome.strikes.iter().all(|strike| strike.wall == "near"),
+                outcome.impact_count > 4 && outcome.impacts.iter().all(|strike| strike.wall == "near"),
                 "{names:?}: {:?}",
-                outcome.strikes
+                outcome.impacts
             );
         }
     }
@@ -163,12 +163,12 @@ fn a_point_pressed_against_its_wall_is_held_there() {
         // The wall stands at 0.5 rad, where gravity presses the bar into it.  Without restitution it rests at the first strike; with it the
         // strikes come closer and closer to a moment the small-bounce series gives.
         let plastic = run(&bouncing(0.5, 1.0, 0.0), &by(method, 10.0, 0.01, 1e-10));
-        assert_eq!((plastic.stop.as_ref(), plastic.strike_count, plastic.hold_count), (None, 1, 1));
-        assert_eq!(plastic.holds[0].t, plastic.strikes[0].t);
+        assert_eq!((plastic.stop.as_ref(), plastic.impact_count, plastic.persistent_contact_count), (None, 1, 1));
+        assert_eq!(plastic.holds[0].t, plastic.impacts[0].t);
         let lively = run(&bouncing(0.5, 1.0, 0.5), &by(method, 10.0, 0.01, 1e-10));
-        assert_eq!((lively.stop.as_ref(), lively.hold_count), (None, 1));
+        assert_eq!((lively.stop.as_ref(), lively.persistent_contact_count), (None, 1));
         // Under the nearly constant angular acceleration 15 sin 0.5 a rebound at w takes 2 w / (15 sin 0.5), and halves every time.
-        let last = lively.strikes.iter().rev().find(|strike| strike.approach < -1e-4).expect("a small bounce");
+        let last = lively.impacts.iter().rev().find(|strike| strike.approach < -1e-4).expect("a small bounce");
         let rest = last.t + 2.0 * -last.approach / (PENDULUM_SQUARED * 0.5f64.sin());
         // Bounces of less than 1e-11 m are not resolved: sqrt(8e-11 / 7.2) s before the end of all of them.
         assert!((lively.holds[0].t - rest).abs() < 1e-5, "{:?}, not {rest} s", lively.holds[0]);
@@ -180,7 +180,7 @@ fn a_bar_that_comes_to_rest_where_nothing_presses_it_hangs_there() {
     for method in LOCATED {
         // Plastic wall at the lowest point: after the one strike the bar hangs at rest, in contact without force.
         let outcome = run(&bouncing(0.0, 1.0, 0.0), &by(method, 5.0, 0.1, 1e-12));
-        assert_eq!((outcome.stop.as_ref(), outcome.strike_count), (None, 1));
+        assert_eq!((outcome.stop.as_ref(), outcome.impact_count), (None, 1));
         assert!(outcome.last.phi[0].abs() < 1e-12 && outcome.last.omega[0].abs() < 1e-12);
     }
 }

@@ -9,12 +9,12 @@ use crate::program;
 
 use common::compile;
 use driftless::dynamics::{Mechanism, Motion};
-use driftless::run::trust::{Inputs, Level, Ruler};
+use driftless::run::trust::{DistanceMetric, Inputs, Level};
 use driftless::run::{Limits, MethodId, Plan, Request, Run, Running, integrate};
 use driftless::scene::{Scene, Template, Variable, Written};
 use std::sync::Arc;
 
-const EFFORT: u64 = 300_000;
+const MAX_EVALUATIONS: u64 = 300_000;
 const LOOKS: u32 = 64;
 
 fn number(name: &str, usual: u64) -> u64 {
@@ -26,7 +26,7 @@ fn template(text: &str) -> Template {
 }
 
 fn effects(template: &Template, numbers: &[Written], until: f64) -> Inputs {
-    Inputs::of(template, numbers, until, EFFORT, None, &mut || false)
+    Inputs::of(template, numbers, until, MAX_EVALUATIONS, None, &mut || false)
 }
 
 /// The motions of a scene at equally spaced times, by a method.
@@ -37,7 +37,7 @@ fn motions(scene: &Scene, method: MethodId, rtol: f64, until: f64) -> Result<Vec
         rtol: Some(rtol),
         until: Some(until),
         every: Some(until / f64::from(LOOKS)),
-        effort: Some(10 * EFFORT),
+        max_evaluations: Some(10 * MAX_EVALUATIONS),
         ..Request::default()
     };
     let plan = Plan::new(scene, &mechanism, &request).map_err(|refusal| refusal.to_string())?;
@@ -62,7 +62,7 @@ fn motions(scene: &Scene, method: MethodId, rtol: f64, until: f64) -> Result<Vec
     running.finish().stop.map_or(Ok(found), |stop| Err(stop.to_string()))
 }
 
-fn apart(ruler: &Ruler, one: &[Motion], other: &[Motion]) -> f64 {
+fn apart(ruler: &DistanceMetric, one: &[Motion], other: &[Motion]) -> f64 {
     assert_eq!(one.len(), other.len());
     one.iter().zip(other).map(|(one, other)| ruler.apart(one, other)).fold(0.0, f64::max)
 }
@@ -88,7 +88,7 @@ fn judged(template: &Template, number: &Written, told: &driftless::run::trust::I
     let slope = effect / number.uncertainty;
     let mut h = (1e-5 / slope).min(1e-3 * number.value.abs());
     let scene = template.scene().expect("a scene");
-    let ruler = Ruler::new(&compile(&scene));
+    let ruler = DistanceMetric::new(&compile(&scene));
     let of = |h: f64| {
         let scene = changed(template, number, number.value + h).ok_or("refused")?;
         motions(&scene, MethodId::Dp8, 1e-13, until)
@@ -143,7 +143,7 @@ fn effects_are_those_of_runs_with_a_number_changed() {
             println!("{seed}: none: {:?} {:?}", found.why, found.numbers.first().and_then(|number| number.why.clone()));
             continue;
         };
-        let ruler = Ruler::new(&compile(&scene));
+        let ruler = DistanceMetric::new(&compile(&scene));
         let Ok(other) = motions(&scene, MethodId::Dp8, 3e-13, until) else { continue };
         let noise = apart(&ruler, &base, &other).max(1e-14);
         scenes += 1;
@@ -191,7 +191,7 @@ fn the_order_of_magnitude_is_that_of_all_numbers() {
         let template = template(&made.text);
         let scene = template.scene().expect("a scene");
         let mechanism = compile(&scene);
-        let request = Request { until: Some(until), every: Some(until), effort: Some(EFFORT), ..Request::default() };
+        let request = Request { until: Some(until), every: Some(until), max_evaluations: Some(MAX_EVALUATIONS), ..Request::default() };
         let Ok(plan) = Plan::new(&scene, &mechanism, &request) else { continue };
         let start = mechanism.start(&scene);
         let Ok(run) = Run::new(mechanism, plan, Limits::default(), &start) else { continue };
@@ -345,7 +345,7 @@ fn effects_end_where_rounding_rules() {
     assert!(found.at > 8.0 && found.at < 40.0 && found.why.is_some(), "{found:?}");
     let none = effects(&template, &numbers, 0.0);
     assert!(none.why.is_some() && none.numbers.is_empty() && none.total.is_none());
-    let stopped = Inputs::of(&template, &numbers, 1.0, EFFORT, None, &mut || true);
+    let stopped = Inputs::of(&template, &numbers, 1.0, MAX_EVALUATIONS, None, &mut || true);
     assert!(stopped.total.is_none() && stopped.why.is_some_and(|why| why.contains("interrupted")));
 }
 

@@ -141,13 +141,13 @@ fn three_equal_cranks_share_what_they_may() {
     let hinge = |name: String, a: Value, b: Value| json!({"name": name, "between": [a, b]});
     let at = |body: &str, x: f64| json!({"body": body, "point": [x, 0]});
     let cranks = ["left", "middle", "right"];
-    let feet = cranks.iter().enumerate().map(|(i, name)| hinge(format!("A{i}"), at("ground", i as f64), at(name, 0.0)));
+    let translations = cranks.iter().enumerate().map(|(i, name)| hinge(format!("A{i}"), at("ground", i as f64), at(name, 0.0)));
     let tops = cranks.iter().enumerate().map(|(i, name)| hinge(format!("B{i}"), at("coupler", i as f64), at(name, 1.0)));
     let start = json!({"phi": 1.3, "omega": 0.0});
     let scene = json!({
         "name": "cranks", "gravity": [9.81, 0],
         "bars": [bar("left", 1.0), bar("middle", 1.0), bar("right", 1.0), bar("coupler", 2.0)],
-        "hinges": feet.chain(tops).collect::<Vec<_>>(),
+        "hinges": translations.chain(tops).collect::<Vec<_>>(),
         "start": {"left": start, "middle": start, "right": start, "coupler": {"phi": 0, "omega": 0}},
         "until": 1, "every": 0.1,
     });

@@ -209,7 +209,7 @@ fn four_bar_with_a_motor() {
         let crank = FRAC_PI_2 + TAU * until;
         let (x, y) = (d - a * crank.cos(), -a * crank.sin());
         let span = x.hypot(y);
-        // Seen from the foot of the rocker, the crank pin is at this angle, and the rocker that much to its right.
+        // Seen from the origin of the rocker, the crank pin is at this angle, and the rocker that much to its right.
         let rocker = (-y).atan2(-x) - ((c * c + span * span - b * b) / (2.0 * c * span)).acos();
         for request in [by("taylor", 1e-11), by("dp8", 1e-11), steps("gauss16", until / 1024.0), steps("rattle8", until / 8192.0)] {
             let outcome = finished(&Scene { until, every: until, ..scene.clone() }, &request);

@@ -14,12 +14,12 @@ use driftless::dynamics::looped::Looped;
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::natural::Natural;
 use driftless::dynamics::schur::NEAR;
-use driftless::dynamics::{Field, Form, Mechanism, Motion, State, Time};
+use driftless::dynamics::{Form, Mechanism, Motion, OdeSystem, State, Time};
 use driftless::stabilization::Projected;
 use driftless::stepping::composition::Composition;
 use driftless::stepping::rattle::Rattle;
 use driftless::stepping::taylor::Kernel;
-use driftless::stepping::{Dp8, Integrator, Reached, Seen, Tally, Taylor, Tolerance};
+use driftless::stepping::{Dp8, Integrator, Reached, Seen, Statistics, Taylor, Tolerance};
 use std::sync::Arc;
 
 fn both(tolerance: f64) -> Tolerance {
@@ -37,13 +37,13 @@ fn looped(mechanism: &Arc<Mechanism>) -> Looped {
 }
 
 /// A run to a time: the motion there, the steps, and the largest violation of a row after any of them, relative to 0.1 m and to 0.1 m times the fastest rate.
-fn run<P: Form + ?Sized>(problem: &mut P, start: &Motion, method: &mut impl Integrator<P>, until: f64) -> (Motion, Tally, f64) {
+fn run<P: Form + ?Sized>(problem: &mut P, start: &Motion, method: &mut impl Integrator<P>, until: f64) -> (Motion, Statistics, f64) {
     let mut state = problem.state(start);
-    let mut tally = Tally::default();
+    let mut statistics = Statistics::default();
     let mechanism = problem.mechanism().clone();
     let mut kernel = Rows::<f64>::new(&mechanism);
     let (mut motion, mut worst) = (Motion::default(), 0.0f64);
-    let reached = method.advance(problem, &mut state, Time::from(until), &mut tally, &mut |problem: &mut P, state: &mut State| {
+    let reached = method.advance(problem, &mut state, Time::from(until), &mut statistics, &mut |problem: &mut P, state: &mut State| {
         problem.read(state, &mut motion);
         worst = worst.max(andrews::violation(&mechanism, &mut kernel, &motion));
         Ok(Seen::Kept)
@@ -51,7 +51,7 @@ fn run<P: Form + ?Sized>(problem: &mut P, start: &Motion, method: &mut impl Inte
     assert_eq!(reached, Ok(Reached::Until));
     let mut end = Motion::default();
     problem.read(&state, &mut end);
-    (end, tally, worst)
+    (end, statistics, worst)
 }
 
 fn distance(a: &Motion, b: &Motion) -> f64 {
@@ -72,23 +72,24 @@ fn the_natural_solve_gives_the_accelerations_of_the_angle_form() {
         let mut method = Projected::new(Dp8::new(both(1e-9)));
         let (mut worst, mut rates) = (0.0f64, vec![vec![0.0; state.y.len()]; 3]);
         let (mut rows, n) = (Rows::<f64>::new(&mechanism), mechanism.bodies.len());
-        let mut tally = Tally::default();
-        let reached = method.advance(&mut form, &mut state, Time::from(until), &mut tally, &mut |form: &mut Looped, state: &mut State| {
-            form.rate(state.time, &state.y, &mut rates[0]);
-            angles.rate(state.time, &state.y, &mut rates[1]);
-            portable.rate(state.time, &state.y, &mut rates[2]);
-            assert_eq!(rates[0], rates[2]);
-            // Near singular positions both are noise over nothing.
-            rows.linearise_at::<0>(&mechanism, state.time, &state.y[..n], &state.y[n..2 * n]);
-            if rows.weakest.share < NEAR {
-                return Ok(Seen::Kept);
-            }
-            let most = rates[1].iter().fold(1.0f64, |most, rate| most.max(rate.abs()));
-            worst = rates[0].iter().zip(&rates[1]).fold(worst, |worst, (a, b)| worst.max((a - b).abs() / most));
-            Ok(Seen::Kept)
-        });
+        let mut statistics = Statistics::default();
+        let reached =
+            method.advance(&mut form, &mut state, Time::from(until), &mut statistics, &mut |form: &mut Looped, state: &mut State| {
+                form.rhs(state.time, &state.y, &mut rates[0]);
+                angles.rhs(state.time, &state.y, &mut rates[1]);
+                portable.rhs(state.time, &state.y, &mut rates[2]);
+                assert_eq!(rates[0], rates[2]);
+                // Near singular positions both are noise over nothing.
+                rows.linearise_at::<0>(&mechanism, state.time, &state.y[..n], &state.y[n..2 * n]);
+                if rows.weakest.share < NEAR {
+                    return Ok(Seen::Kept);
+                }
+                let most = rates[1].iter().fold(1.0f64, |most, rate| most.max(rate.abs()));
+                worst = rates[0].iter().zip(&rates[1]).fold(worst, |worst, (a, b)| worst.max((a - b).abs() / most));
+                Ok(Seen::Kept)
+            });
         assert_eq!(reached, Ok(Reached::Until), "{name}");
-        assert!(worst < 1e-12, "{name}: {worst:e} after {tally:?}");
+        assert!(worst < 1e-12, "{name}: {worst:e} after {statistics:?}");
     }
 }
 
@@ -105,10 +106,10 @@ fn projection_in_natural_coordinates_lands_where_that_in_angles_does() {
         let mut angles = Multiplier::<0, true>::new(Arc::clone(&mechanism));
         let mut ends = [angles.state(&start), angles.state(&start)];
         let method = || Projected::new(Dp8::new(both(1e-9)));
-        let (mut tally, until) = (Tally::default(), Time::from(1e-9));
-        assert_eq!(method().advance(&mut angles, &mut ends[0], until, &mut tally, &mut |_, _| Ok(Seen::Kept)), Ok(Reached::Until));
+        let (mut statistics, until) = (Statistics::default(), Time::from(1e-9));
+        assert_eq!(method().advance(&mut angles, &mut ends[0], until, &mut statistics, &mut |_, _| Ok(Seen::Kept)), Ok(Reached::Until));
         assert_eq!(
-            method().advance(&mut looped(&mechanism), &mut ends[1], until, &mut tally, &mut |_, _| Ok(Seen::Kept)),
+            method().advance(&mut looped(&mechanism), &mut ends[1], until, &mut statistics, &mut |_, _| Ok(Seen::Kept)),
             Ok(Reached::Until)
         );
         let moved = (0..2 * n).fold(0.0, |most: f64, i| most.max((ends[0].y[i] - angles.state(&start).y[i]).abs()));
@@ -170,10 +171,10 @@ fn the_series_is_its_own_dense_output() {
     let mut form = looped(&mechanism);
     let mut taylor = Taylor::<f64>::new(both(1e-10));
     let mut state = form.state(&start);
-    let (mut from, mut tally) = (state.clone(), Tally::default());
+    let (mut from, mut statistics) = (state.clone(), Statistics::default());
     while state.time.hi < 0.02 {
         from.clone_from(&state);
-        taylor.advance(&mut form, &mut state, Time::from(0.03), &mut tally, &mut |_, _| Ok(Seen::Enough)).expect("a step");
+        taylor.advance(&mut form, &mut state, Time::from(0.03), &mut statistics, &mut |_, _| Ok(Seen::Enough)).expect("a step");
     }
     let middle = from.time + 0.4 * (state.time - from.time).hi;
     let mut inside = State::default();
@@ -227,7 +228,7 @@ fn rattle_keeps_energy_less_work_of_driven_mechanisms() {
             &mut natural,
             &mut state,
             Time::from(until),
-            &mut Tally::default(),
+            &mut Statistics::default(),
             &mut |natural: &mut Natural, state: &mut State| {
                 natural.read(state, &mut motion);
                 worst = worst.max((balance(&motion) - before).abs());
@@ -245,7 +246,7 @@ fn rattle_keeps_energy_less_work_of_driven_mechanisms() {
                 &mut field,
                 &mut state,
                 Time::from(until),
-                &mut Tally::default(),
+                &mut Statistics::default(),
                 &mut |_, _| Ok(Seen::Kept),
             );
             assert_eq!(reached, Ok(Reached::Until), "{name}");

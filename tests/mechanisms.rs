@@ -46,7 +46,7 @@ fn fault(made: &Generated) -> Option<String> {
     let outcome = outcome.expect("no observer fails");
     let Some(first) = first else { return Some(format!("has no rows: {:?}", outcome.stop)) };
     // Impacts at t = 0 change rates before the first row.
-    let struck = outcome.strikes.iter().any(|strike| strike.t == 0.0) || outcome.holds.iter().any(|hold| hold.t == 0.0);
+    let struck = outcome.impacts.iter().any(|strike| strike.t == 0.0) || outcome.holds.iter().any(|hold| hold.t == 0.0);
     let written: serde_json::Value = serde_json::from_str(&made.text).expect("JSON");
     for (k, bar) in scene.bars.iter().enumerate() {
         let given = &written["start"][&bar.name];

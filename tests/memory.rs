@@ -16,7 +16,7 @@ use driftless::stabilization::{Baumgarte, Projected};
 use driftless::stepping::composition::Composition;
 use driftless::stepping::gauss::Gauss;
 use driftless::stepping::rattle::Rattle;
-use driftless::stepping::{Dop853, Dopri5, Dp5, Dp8, Integrator, Reached, Seen, Tally, Tolerance};
+use driftless::stepping::{Dop853, Dopri5, Dp5, Dp8, Integrator, Reached, Seen, Statistics, Tolerance};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::sync::Arc;
@@ -69,12 +69,12 @@ const TOLERANCE: Tolerance = Tolerance { relative: 1e-9, absolute: 1e-9 };
 /// Allocations of one call of `advance` over `span` \[s\], and its steps.
 fn allocations<P: Form + ?Sized>(method: &mut dyn Integrator<P>, form: &mut P, start: &Motion, span: f64) -> (u64, u64) {
     let mut state = form.state(start);
-    let mut tally = Tally::default();
+    let mut statistics = Statistics::default();
     // The first call sizes scratch space and the state's memory.
     let mut advance = |until: f64| {
-        let reached = method.advance(form, &mut state, Time::from(until), &mut tally, &mut |_, _| Ok(Seen::Kept));
+        let reached = method.advance(form, &mut state, Time::from(until), &mut statistics, &mut |_, _| Ok(Seen::Kept));
         assert_eq!(reached, Ok(Reached::Until));
-        tally.steps
+        statistics.steps
     };
     let before = advance(0.125);
     let count = ALLOCATIONS.get();
@@ -132,11 +132,11 @@ fn windows_cost_the_same_each() {
         let mut form = Multiplier::<2, false>::new(Arc::clone(&mechanism));
         let mut state = form.state(&start);
         let mut most = 0;
-        let mut tally = Tally::default();
+        let mut statistics = Statistics::default();
         for row in 1..=200 {
             let count = ALLOCATIONS.get();
             let reached =
-                method.advance(&mut form, &mut state, Time::from(0.0625 * f64::from(row)), &mut tally, &mut |_, _| Ok(Seen::Kept));
+                method.advance(&mut form, &mut state, Time::from(0.0625 * f64::from(row)), &mut statistics, &mut |_, _| Ok(Seen::Kept));
             assert_eq!(reached, Ok(Reached::Until));
             if row > 1 {
                 most = most.max(ALLOCATIONS.get() - count);

@@ -9,7 +9,7 @@ use crate::relations;
 
 use driftless::dynamics::Mechanism;
 use driftless::run::trust::Level;
-use driftless::run::{Limits, METHODS, MethodId, Outcome, Plan, Request, Run, Sample, Strike, integrate};
+use driftless::run::{ImpactRecord, Limits, METHODS, MethodId, Outcome, Plan, Request, Run, Sample, integrate};
 use driftless::scene::{Scene, parse_scene};
 use mechanisms::{Dice, Generated, Kind, Scales};
 use relations::{Back, Related};
@@ -20,7 +20,7 @@ use std::sync::Arc;
 /// Scenes for each relation where nobody says how many.
 const USUAL: u64 = 250;
 /// Evaluations allowed to a run.
-const EFFORT: u64 = 400_000;
+const MAX_EVALUATIONS: u64 = 400_000;
 /// Agreement that is asked for in any case: of angles \[rad\], and of places over the scene's length.
 const AGREEMENT: f64 = 1e-6;
 /// How much more rates, and forces and torques, may differ, over their natural scales.
@@ -52,7 +52,7 @@ fn run(scene: &Scene, request: &Request, level: Level) -> Result<Seen, String> {
 
 /// What is asked of a method in a scene of these scales; the same to rounding in other units.
 fn request(method: MethodId, scene: &Scene) -> Request {
-    let mut request = Request { method: Some(method), effort: Some(EFFORT), ..Request::default() };
+    let mut request = Request { method: Some(method), max_evaluations: Some(MAX_EVALUATIONS), ..Request::default() };
     match method {
         MethodId::Dp5 | MethodId::Dopri5 | MethodId::Radau(3) => request.rtol = Some(1e-8),
         _ if method.is_adaptive() => request.rtol = Some(1e-10),
@@ -89,7 +89,7 @@ fn motors(scene: &Scene, mechanism: &Mechanism) -> Vec<(String, usize, bool)> {
     let named = angles.chain(scene.drives.iter().map(|drive| (drive.name.clone(), false)));
     named
         .filter_map(|(name, is_angle)| {
-            let row = mechanism.rows.iter().position(|row| row.name() == name)?;
+            let row = mechanism.constraints.iter().position(|row| row.name() == name)?;
             Some((name, row, is_angle))
         })
         .collect()
@@ -100,7 +100,7 @@ fn compare(scene: &Scene, scales: &Scales, first: &Seen, second: &Seen, related:
     let back = &related.back;
     let mut apart = Apart { most: 0.0, what: String::new() };
     let allowed = AGREEMENT.max(10.0 * claimed(first).unwrap_or(0.0)).max(10.0 * claimed(second).unwrap_or(0.0));
-    let strikes: Vec<f64> = first.outcome.strikes.iter().map(|strike| strike.t).collect();
+    let strikes: Vec<f64> = first.outcome.impacts.iter().map(|strike| strike.t).collect();
     let driven = motors(scene, &first.mechanism);
     let others = motors(&related.scene, &second.mechanism);
     let size = |values: &mut dyn Iterator<Item = f64>, least: f64| values.fold(least, |most, value| most.max(value.abs()));
@@ -148,15 +148,15 @@ fn compare(scene: &Scene, scales: &Scales, first: &Seen, second: &Seen, related:
             }
         }
     }
-    impacts(scales, [&first.outcome.strikes, &second.outcome.strikes], back, allowed, first.outcome.plan.until, &mut apart);
+    impacts(scales, [&first.outcome.impacts, &second.outcome.impacts], back, allowed, first.outcome.plan.until, &mut apart);
     apart
 }
 
 /// Compares impacts, as far as the points come fast.
-fn impacts(scales: &Scales, [first, second]: [&[Strike]; 2], back: &Back, allowed: f64, until: f64, apart: &mut Apart) {
+fn impacts(scales: &Scales, [first, second]: [&[ImpactRecord]; 2], back: &Back, allowed: f64, until: f64, apart: &mut Apart) {
     let speed = scales.length / scales.time;
-    let fast = |strikes: &[Strike], [mass, length, time]: [f64; 3]| -> Vec<Strike> {
-        let in_units = |strike: &Strike| Strike {
+    let fast = |strikes: &[ImpactRecord], [mass, length, time]: [f64; 3]| -> Vec<ImpactRecord> {
+        let in_units = |strike: &ImpactRecord| ImpactRecord {
             t: strike.t / time,
             wall: strike.wall.clone(),
             impulse: strike.impulse / (mass * length / time),
@@ -166,9 +166,9 @@ fn impacts(scales: &Scales, [first, second]: [&[Strike]; 2], back: &Back, allowe
         strikes.iter().map(in_units).filter(|strike| strike.approach.abs() > SLOW * speed).collect()
     };
     let (first, second) = (fast(first, [1.0; 3]), fast(second, [back.mass, back.length, back.time]));
-    let is_near_end = |strike: &Strike| until - strike.t < 1e-5 * scales.time;
+    let is_near_end = |strike: &ImpactRecord| until - strike.t < 1e-5 * scales.time;
     if first.len() != second.len() && !first.iter().chain(&second).any(is_near_end) {
-        let times = |strikes: &[Strike]| strikes.iter().map(|strike| (strike.t, strike.approach)).collect::<Vec<_>>();
+        let times = |strikes: &[ImpactRecord]| strikes.iter().map(|strike| (strike.t, strike.approach)).collect::<Vec<_>>();
         apart.see(f64::INFINITY, || format!("impacts: {:?} and {:?}", times(&first), times(&second)));
         return;
     }
@@ -310,7 +310,7 @@ fn once(made: &Generated, scene: &Scene, related: &Related, method: MethodId, ac
         account.fault(made, method, scenes, &format!("{} times too far apart: {}", apart.most, apart.what));
     }
     account.compared += 1;
-    account.with_impacts += u64::from(first.outcome.strike_count > 0);
+    account.with_impacts += u64::from(first.outcome.impact_count > 0);
     *account.by_method.entry(method.info().name).or_default() += 1;
     made.kinds.iter().for_each(|&kind| *account.by_kind.entry(kind).or_default() += 1);
 }
@@ -452,7 +452,7 @@ fn a_run_goes_back_to_its_start() {
         let Ok(there) = run(scene, &asked, Level::Auto) else { return };
         let Some(end) = there.samples.last().filter(|_| there.outcome.stop.is_none()) else { return };
         // A point that rests on its wall has lost what it would need to leave it.
-        if there.outcome.hold_count > 0 || claimed(&there).is_some_and(|error| error > 1e-6) {
+        if there.outcome.persistent_contact_count > 0 || claimed(&there).is_some_and(|error| error > 1e-6) {
             return;
         }
         let reversed = relations::backwards(scene, end);
@@ -477,7 +477,7 @@ fn a_run_goes_back_to_its_start() {
             most.max((first.phi[k] - last.phi[k]).abs()).max(way[0].hypot(way[1]) / made.scales.length)
         });
         // Impacts at the start are not undone by those at the end, which the way back does not reach.
-        let touched = there.outcome.strikes.iter().chain(&back.outcome.strikes).any(|strike| strike.t < 1e-6 * made.scales.time);
+        let touched = there.outcome.impacts.iter().chain(&back.outcome.impacts).any(|strike| strike.t < 1e-6 * made.scales.time);
         if !(off <= allowed || touched) {
             let here = relations::shifted(scene, [0.0; 2]);
             let apart = compare(scene, &made.scales, &there, &there, &here);
@@ -488,7 +488,7 @@ fn a_run_goes_back_to_its_start() {
             account.fault(made, method, scenes, &format!("comes back {off:e} away, {allowed:e} are allowed"));
         }
         account.compared += 1;
-        account.with_impacts += u64::from(there.outcome.strike_count > 0);
+        account.with_impacts += u64::from(there.outcome.impact_count > 0);
         *account.by_method.entry(method.info().name).or_default() += 1;
         made.kinds.iter().for_each(|&kind| *account.by_kind.entry(kind).or_default() += 1);
     });

@@ -4,9 +4,9 @@ use crate::common;
 use crate::trees;
 
 use driftless::arithmetic::Complex;
+use driftless::dynamics::constraint::Site;
 use driftless::dynamics::kernel::{Bias, Kernel};
 use driftless::dynamics::natural::{Natural, NaturalError};
-use driftless::dynamics::row::Site;
 use driftless::dynamics::{Form, Mechanism, Motion, Time};
 use driftless::scene::{Drive, Force, Given, Hinge, Law, Lock, Place, Rail, Scene, Sine, Slider, Torque, TorsionSpring};
 use proptest::prelude::*;
@@ -19,7 +19,7 @@ type C = Complex<f64>;
 struct Posture {
     mechanism: Mechanism,
     kernel: Kernel<f64>,
-    feet: Vec<C>,
+    translations: Vec<C>,
 }
 
 impl Posture {
@@ -27,21 +27,21 @@ impl Posture {
         let mechanism = Mechanism::new(scene).ok()?;
         let phi: Vec<f64> = motion(&mechanism).phi.iter().map(|phi| phi.hi).collect();
         let mut kernel = Kernel::new(&mechanism);
-        kernel.face::<0>(&mechanism, &phi);
-        let mut feet = vec![C::ZERO; mechanism.bodies.len()];
-        mechanism.forest.feet(&kernel.z, &mut feet);
-        Some(Self { mechanism, kernel, feet })
+        kernel.unit_vectors::<0>(&mechanism, &phi);
+        let mut translations = vec![C::ZERO; mechanism.bodies.len()];
+        mechanism.forest.translations(&kernel.z, &mut translations);
+        Some(Self { mechanism, kernel, translations })
     }
 
     /// A place of a bar in the world.
     fn at(&self, place: Place) -> C {
         let point = C::new(place.point[0], place.point[1]);
-        place.bar.map_or(point, |bar| self.feet[bar] + self.kernel.z[bar] * (point - self.mechanism.forest.hangs[bar].own))
+        place.bar.map_or(point, |bar| self.translations[bar] + self.kernel.z[bar] * (point - self.mechanism.forest.hangs[bar].own))
     }
 
     /// The place of a bar that is at a point of the world.
     fn place(&self, bar: Option<usize>, at: C) -> Place {
-        let point = bar.map_or(at, |bar| self.mechanism.forest.hangs[bar].own + self.kernel.z[bar].conj() * (at - self.feet[bar]));
+        let point = bar.map_or(at, |bar| self.mechanism.forest.hangs[bar].own + self.kernel.z[bar].conj() * (at - self.translations[bar]));
         Place { bar, point: [point.re, point.im] }
     }
 
@@ -113,10 +113,10 @@ fn is_sound(mechanism: &Mechanism, motion: &Motion) -> bool {
     kernel.accelerate::<0>(mechanism, Time::default(), &phi, &omega, Bias::default());
     // Of rows that depend on others everywhere each form may leave out another one; light members cost both forms digits.
     let share = |r: usize| if kernel.is_left_out(r) { 0.0 } else { 1.0 / (kernel.schur_pivot[r] * kernel.scale[r]) };
-    let is_regular = kernel.weakest.share > 1e-3 && (0..mechanism.rows.len()).all(|r| share(r) > 1e-3);
+    let is_regular = kernel.weakest.share > 1e-3 && (0..mechanism.constraints.len()).all(|r| share(r) > 1e-3);
     kernel.rows_at(mechanism, Time::default(), &phi, &omega);
     let is_kept = |r: usize| kernel.rows[r].position.abs() < 1e-12 && kernel.row_rate(r, &omega).abs() < 1e-12;
-    is_regular && (0..mechanism.rows.len()).all(is_kept)
+    is_regular && (0..mechanism.constraints.len()).all(is_kept)
 }
 
 fn numbers(motion: &Motion) -> (Vec<f64>, Vec<f64>) {
@@ -166,19 +166,19 @@ proptest! {
         let Sound { mechanism, motion, kernel, .. } = sound(n, seed)?;
         let (z, _, acceleration, multiplier) = natural(&mechanism, &motion);
         // Accelerations are what is left of the parts that loads and multipliers have in them.
-        let parts = kernel.multiplier.iter().zip(kernel.lifted.chunks(mechanism.coordinates().max(1)));
-        let parts = parts.fold(1.0, |most: f64, (multiplier, lifted)| most.max(multiplier.abs() * largest(lifted)));
+        let parts = kernel.multiplier.iter().zip(kernel.minv_jt.chunks(mechanism.coordinates().max(1)));
+        let parts = parts.fold(1.0, |most: f64, (multiplier, minv_jt)| most.max(multiplier.abs() * largest(minv_jt)));
         let (fastest, strongest) = (largest(&kernel.load).max(1e-3 * parts), largest(&kernel.multiplier));
         for k in 0..n {
             let alpha = z[k].cross(acceleration[k]);
             prop_assert!((alpha - kernel.load[k]).abs() < 1e-9 * fastest, "{alpha} {} of {fastest}", kernel.load[k]);
         }
         for x in (n..mechanism.coordinates()).step_by(2) {
-            let foot = acceleration[x] - C::new(kernel.load[x], kernel.load[x + 1]);
-            prop_assert!(foot.norm_squared().sqrt() < 1e-9 * fastest, "{foot:?} of {fastest}");
+            let origin_point = acceleration[x] - C::new(kernel.load[x], kernel.load[x + 1]);
+            prop_assert!(origin_point.norm_squared().sqrt() < 1e-9 * fastest, "{origin_point:?} of {fastest}");
         }
         prop_assert_eq!(multiplier.len(), kernel.multiplier.len());
-        for ((found, exact), row) in multiplier.iter().zip(&kernel.multiplier).zip(&mechanism.rows) {
+        for ((found, exact), row) in multiplier.iter().zip(&kernel.multiplier).zip(&mechanism.constraints) {
             prop_assert!((found - exact).abs() < 1e-9 * strongest, "{}: {found} {exact} of {strongest}", row.name);
         }
     }
@@ -205,7 +205,7 @@ proptest! {
             apart = apart.pinned(&hinge.name, &site(&apart, &hinge.between[0]), &site(&apart, &hinge.between[1]));
         }
         let (_, _, _, multiplier) = natural(&apart, &spread);
-        let first = apart.rows.iter().position(|row| row.name == format!("{}.x", scene.hinges[0].name)).expect("the first pin");
+        let first = apart.constraints.iter().position(|row| row.name == format!("{}.x", scene.hinges[0].name)).expect("the first pin");
         let strongest = forces.iter().fold(1.0f64, |most, force| most.max(force.norm_squared().sqrt()));
         for ((h, force), hinge) in forces.iter().enumerate().zip(&scene.hinges) {
             let pin = C::new(multiplier[first + 2 * h], multiplier[first + 2 * h + 1]);

@@ -135,7 +135,7 @@ fn case_f_the_impact_at_three_restitutions() {
         let phi: Vec<f64> = scene.start.iter().map(|start| start.phi).collect();
         let omega: Vec<f64> = scene.start.iter().map(|start| start.omega).collect();
         assert_eq!((phi.as_slice(), omega.as_slice()), (&[FRAC_PI_2; 2][..], &[2.0 * PI; 2][..]));
-        let impact = mechanism.strike(0, Default::default(), &phi, &omega).expect("a rebound");
+        let impact = mechanism.impact_at(0, Default::default(), &phi, &omega).expect("a rebound");
         let gain = (1.0 + e) * PI;
         let expected = [2.0 * PI + gain, 2.0 * PI - 5.0 * gain];
         for k in 0..2 {

@@ -55,8 +55,8 @@ fn damped_stiff_springs_and_stiff_dampers_end_where_they_should() {
         for (method, tolerance, bound) in [(RADAU[0], 1e-6, 2e-6), (RADAU[0], 1e-9, 1e-9), (RADAU[1], 1e-6, 2e-6), (RADAU[1], 1e-9, 1e-10)]
         {
             let outcome = finished(&scene, &request(method, tolerance));
-            let (error, tally) = (error(&outcome, reference), outcome.tally);
-            println!("{name} {method} {tolerance:e}: {error:.1e}, {tally:?}");
+            let (error, statistics) = (error(&outcome, reference), outcome.statistics);
+            println!("{name} {method} {tolerance:e}: {error:.1e}, {statistics:?}");
             assert!(error < bound, "{name} {method} {tolerance:e}: {error:e}");
             assert!(outcome.drift.energy.max < 100.0 * tolerance, "{name} {method}: {:e}", outcome.drift.energy.max);
         }
@@ -68,12 +68,12 @@ fn damped_stiff_springs_and_stiff_dampers_end_where_they_should() {
 fn nine_orders_of_stiffness_do_not_cost_twice_the_evaluations() {
     for method in RADAU {
         let costs: Vec<u64> =
-            (3..=12).map(|power| finished(&damped(10f64.powi(power)), &request(method, 1e-6)).tally.evaluations).collect();
+            (3..=12).map(|power| finished(&damped(10f64.powi(power)), &request(method, 1e-6)).statistics.evaluations).collect();
         println!("{method}: {costs:?}");
         assert!(costs.iter().all(|&cost| cost <= 2 * costs[0]), "{method}: {costs:?}");
     }
-    let explicit = run(&damped(1e6), &request(MethodId::Dop853, 1e-6)).tally.evaluations;
-    assert!(explicit > 10 * finished(&damped(1e6), &request(RADAU[0], 1e-6)).tally.evaluations, "{explicit}");
+    let explicit = run(&damped(1e6), &request(MethodId::Dop853, 1e-6)).statistics.evaluations;
+    assert!(explicit > 10 * finished(&damped(1e6), &request(RADAU[0], 1e-6)).statistics.evaluations, "{explicit}");
 }
 
 #[test]
@@ -120,8 +120,8 @@ fn impacts_are_located_inside_its_steps() {
     let reference = finished(&scene, &ask(MethodId::Taylor, 1e-13));
     for method in RADAU {
         let outcome = finished(&scene, &ask(method, 1e-10));
-        assert_eq!(outcome.strike_count, reference.strike_count, "{method}");
-        for (found, expected) in outcome.strikes.iter().zip(&reference.strikes) {
+        assert_eq!(outcome.impact_count, reference.impact_count, "{method}");
+        for (found, expected) in outcome.impacts.iter().zip(&reference.impacts) {
             assert!((found.t - expected.t).abs() < 1e-6, "{method}: {} {}", found.t, expected.t);
         }
     }
@@ -134,7 +134,7 @@ fn looking_more_often_changes_nothing_of_the_motion() {
         let scene = damped(1e6);
         let ends = [1.0, 0.01, 0.01].map(|every| finished(&scene, &Request { every: Some(every), ..request(method, 1e-7) }));
         let [once, often, again] = &ends;
-        assert_eq!((&once.last.phi, &once.last.omega, once.tally), (&often.last.phi, &often.last.omega, often.tally), "{method}");
+        assert_eq!((&once.last.phi, &once.last.omega, once.statistics), (&often.last.phi, &often.last.omega, often.statistics), "{method}");
         assert_eq!((&often.last, &often.drift), (&again.last, &again.drift), "{method}");
         // In between the polynomial is as good as the tolerance.
         let half = |every| finished(&scene, &Request { until: Some(0.5), every: Some(every), ..request(method, 1e-7) }).last.phi[1];

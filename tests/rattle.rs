@@ -7,11 +7,11 @@ use driftless::arithmetic::{Complex, DoubleDouble};
 use driftless::dynamics::kernel::{Bias, Kernel};
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::natural::{Natural, NaturalError};
-use driftless::dynamics::{Field, Form, Motion, State, Time};
+use driftless::dynamics::{Form, Motion, OdeSystem, State, Time};
 use driftless::scene::{Bar, Hinge, Law, Motor, Place, Scene, Sine, Start, Wall};
 use driftless::stepping::composition::Composition;
 use driftless::stepping::rattle::Rattle;
-use driftless::stepping::{Cause, Integrator, Reached, Seen, StepError, Tally};
+use driftless::stepping::{Cause, Integrator, Reached, Seen, Statistics, StepError};
 use proptest::prelude::*;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -91,7 +91,7 @@ struct Run {
     natural: Natural,
     method: Rattle,
     state: State,
-    tally: Tally,
+    statistics: Statistics,
     kernel: Kernel<DoubleDouble>,
 }
 
@@ -101,11 +101,11 @@ impl Run {
         let natural = Natural::new(mechanism.clone()).expect("a scene with a natural form");
         let state = natural.state(&mechanism.start(scene));
         let kernel = Kernel::without_rows(&mechanism);
-        Self { natural, method: Rattle::new(composition, step), state, tally: Tally::default(), kernel }
+        Self { natural, method: Rattle::new(composition, step), state, statistics: Statistics::default(), kernel }
     }
 
     fn to(&mut self, until: f64) -> Result<Reached, StepError> {
-        self.method.advance(&mut self.natural, &mut self.state, Time::from(until), &mut self.tally, &mut |_, _| Ok(Seen::Kept))
+        self.method.advance(&mut self.natural, &mut self.state, Time::from(until), &mut self.statistics, &mut |_, _| Ok(Seen::Kept))
     }
 
     fn motion(&mut self) -> Motion {
@@ -145,7 +145,7 @@ fn runge_kutta(scene: &Scene, until: f64, steps: u32) -> Motion {
             for j in 0..n {
                 y[j] = state.y[j] + if i == 0 { 0.0 } else { part * h * k[i - 1][j] };
             }
-            field.rate(t + Time::from(part * h), &y, &mut k[i]);
+            field.rhs(t + Time::from(part * h), &y, &mut k[i]);
         }
         for (j, (hi, lo)) in state.y.iter_mut().zip(&mut state.low).enumerate() {
             let sum = DoubleDouble::sum(*hi, *lo) + h / 6.0 * (k[0][j] + 2.0 * (k[1][j] + k[2][j]) + k[3][j]);
@@ -508,5 +508,5 @@ fn bars_at_rest_without_gravity_stay_and_count() {
     let start = run.motion();
     run.to(1.0).unwrap();
     assert!(distance(&run.motion(), &start) < 1e-30);
-    assert_eq!(run.tally, Tally { steps: 100, evaluations: 900, ..Tally::default() });
+    assert_eq!(run.statistics, Statistics { steps: 100, evaluations: 900, ..Statistics::default() });
 }

@@ -7,11 +7,11 @@ use driftless::arithmetic::DoubleDouble;
 use driftless::dynamics::canonical::Canonical;
 use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::multiplier::Multiplier;
-use driftless::dynamics::{Field, Form, Motion, State, Time};
+use driftless::dynamics::{Form, Motion, OdeSystem, State, Time};
 use driftless::run::{MethodId, Request, Stabilization};
 use driftless::stabilization::{Baumgarte, Projected};
 use driftless::stepping::gauss::Gauss;
-use driftless::stepping::{Dop853, Dopri5, Dp5, Dp8, Integrator, Seen, Tally, Taylor, Tolerance};
+use driftless::stepping::{Dop853, Dopri5, Dp5, Dp8, Integrator, Seen, Statistics, Taylor, Tolerance};
 use std::sync::Arc;
 
 const TOLERANCE: Tolerance = Tolerance { relative: 1e-9, absolute: 1e-9 };
@@ -19,7 +19,7 @@ const TOLERANCE: Tolerance = Tolerance { relative: 1e-9, absolute: 1e-9 };
 const EVERY: f64 = 0.0625;
 
 /// Forty intervals in one go, and in two halves by another method object and another form from a clone of the state.
-fn check<F: Field + Form, M: Integrator<F>>(form: &dyn Fn() -> F, method: &dyn Fn() -> M, start: &Motion) {
+fn check<F: OdeSystem + Form, M: Integrator<F>>(form: &dyn Fn() -> F, method: &dyn Fn() -> M, start: &Motion) {
     let (mut whole_form, mut whole_method) = (form(), method());
     let mut whole = whole_form.state(start);
     go(&mut whole_method, &mut whole_form, &mut whole, EVERY, 1..=20);
@@ -76,7 +76,7 @@ fn the_same_run_twice_gives_the_same_bits() {
         let request =
             Request { method: Some(method), stabilize: Some(stabilize), until: Some(0.5), every: Some(0.0625), ..Request::default() };
         let [first, second] = [(); 2].map(|()| common::run(&shipped(name, &[]), &request));
-        assert_eq!((&first.last, &first.tally, &first.strikes), (&second.last, &second.tally, &second.strikes), "{name}");
+        assert_eq!((&first.last, &first.statistics, &first.impacts), (&second.last, &second.statistics, &second.impacts), "{name}");
         assert_eq!(first.drift, second.drift, "{name}");
     }
 }
@@ -113,7 +113,7 @@ fn a_time_that_lies_behind_is_refused() {
     for mut method in methods {
         let mut state = form.state(&start);
         state.time = DoubleDouble::from(1.0);
-        let stop = method.advance(&mut form, &mut state, Time::from(0.5), &mut Tally::default(), &mut |_, _| Ok(Seen::Kept));
+        let stop = method.advance(&mut form, &mut state, Time::from(0.5), &mut Statistics::default(), &mut |_, _| Ok(Seen::Kept));
         let stop = stop.expect_err("a refusal");
         assert_eq!((stop.cause, stop.t), (driftless::stepping::Cause::Unsuited, 1.0), "{stop}");
     }

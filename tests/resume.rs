@@ -10,7 +10,7 @@ use driftless::dynamics::{Form, Mechanism};
 use driftless::run::{Limits, METHODS, MethodId, Outcome, Plan, Request, Run, Running, Sample, Snapshot, Stabilization};
 use driftless::scene::Scene;
 use driftless::stepping::composition::Composition::Single;
-use driftless::stepping::{Cause, Dp8, Integrator, Reached, Seen, Tally, Taylor, Tolerance};
+use driftless::stepping::{Cause, Dp8, Integrator, Reached, Seen, Statistics, Taylor, Tolerance};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -171,9 +171,9 @@ fn effort_is_not_allowed_anew() {
         let (mechanism, start) = common::started("free");
         let mut form = Multiplier::<2, false>::new(mechanism);
         let mut state = form.state(&start);
-        let mut tally = Tally { effort: 400, ..Tally::default() };
+        let mut statistics = Statistics { max_evaluations: 400, ..Statistics::default() };
         loop {
-            match method.advance(&mut form, &mut state, 1e3.into(), &mut tally, &mut |_, _| Ok(seen)) {
+            match method.advance(&mut form, &mut state, 1e3.into(), &mut statistics, &mut |_, _| Ok(seen)) {
                 Ok(reached) => assert_eq!(reached, Reached::Pause),
                 Err(stop) => {
                     assert_eq!(stop.cause, Cause::EffortExhausted);

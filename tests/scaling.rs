@@ -42,7 +42,7 @@ fn run(scene: &Scene, request: &Request, by: Scale) -> Run {
         Ok(outcome) => Run {
             end: outcome.plan.method.to_string(),
             stopped: outcome.stop.as_ref().map(|stop| (stop.cause, stop.t / by.time)),
-            steps: outcome.tally.steps,
+            steps: outcome.statistics.steps,
             rows,
             energy,
         },
@@ -106,8 +106,14 @@ fn compared(folder: &str, ways: &dyn Fn() -> Vec<(Option<MethodId>, Vec<Scale>)>
         for (method, scales) in ways() {
             let until = scene.until.min(1.0).max(scene.every);
             let rtol = method.filter(|method| method.is_adaptive()).map(|_| 1e-6);
-            let request =
-                Request { method, rtol, until: Some(until), every: Some(until / 10.0), effort: Some(500_000), ..Request::default() };
+            let request = Request {
+                method,
+                rtol,
+                until: Some(until),
+                every: Some(until / 10.0),
+                max_evaluations: Some(500_000),
+                ..Request::default()
+            };
             let plain = run(&scene, &request, Scale::ONE);
             for &by in &scales {
                 let label = method.map_or("default".to_owned(), |method| method.to_string());

@@ -9,7 +9,7 @@ use common::run;
 use driftless::arithmetic::{DoubleDouble, Scalar};
 use driftless::dynamics::kernel::{Bias, Kernel};
 use driftless::dynamics::looped::Looped;
-use driftless::dynamics::{Field, Form, Mechanism, Time};
+use driftless::dynamics::{Form, Mechanism, OdeSystem, Time};
 use driftless::run::{Outcome, Request};
 use driftless::scene::{Scene, parse_scene};
 use driftless::stepping::Cause;
@@ -209,9 +209,9 @@ fn linkage(random: &mut Random) -> (Kind, Value) {
         sliders.push(json!({"name": "s", "point": point, "rail": rail}));
     } else {
         let last = names.len() - 1;
-        let foot = [tip[0] - length[last] * phi[last].cos(), tip[1] - length[last] * phi[last].sin()];
+        let origin_point = [tip[0] - length[last] * phi[last].cos(), tip[1] - length[last] * phi[last].sin()];
         hinges.push(json!({"name": "tip", "between": [place(names[last - 1], length[last - 1], 0.0), place("c", length[last], 0.0)]}));
-        hinges.push(json!({"name": "C", "between": [place("ground", foot[0], foot[1]), place("c", 0.0, 0.0)]}));
+        hinges.push(json!({"name": "C", "between": [place("ground", origin_point[0], origin_point[1]), place("c", 0.0, 0.0)]}));
     }
     let mut start = serde_json::Map::new();
     for (i, name) in names.iter().enumerate() {
@@ -234,7 +234,7 @@ fn linkage(random: &mut Random) -> (Kind, Value) {
 fn accelerations(mechanism: &Arc<Mechanism>, phi: &[f64], omega: &[f64]) -> (Vec<Vec<f64>>, bool) {
     let mut kernel = Kernel::<f64>::new(mechanism);
     kernel.accelerate::<0>(mechanism, Time::default(), phi, omega, Bias::default());
-    let rows = mechanism.rows.len();
+    let rows = mechanism.constraints.len();
     let is_sound = (0..rows).all(|r| !kernel.is_left_out(r)) && kernel.weakest.share > 1e-2;
     let mut found = vec![kernel.load.clone()];
     if let Some(mut looped) = Looped::new(Arc::clone(mechanism)) {
@@ -242,7 +242,7 @@ fn accelerations(mechanism: &Arc<Mechanism>, phi: &[f64], omega: &[f64]) -> (Vec
         let mut y: Vec<f64> = phi.iter().chain(omega).copied().collect();
         y.resize(looped.dimension(), 0.0);
         let mut rate = y.clone();
-        looped.rate(Time::default(), &y, &mut rate);
+        looped.rhs(Time::default(), &y, &mut rate);
         assert_eq!(looped.mechanism().coordinates(), n);
         found.push(rate[n..2 * n].to_vec());
     }
@@ -281,8 +281,8 @@ fn regular_linkages(wanted: usize, seed: u64) -> Count {
         let expected = reference(&scene, &phi, &omega);
         let (found, is_sound) = accelerations(&mechanism, &phi, &omega);
         // About as long as the fastest link needs for half a turn.
-        let pace = expected.iter().zip(&omega).fold(1.0, |most: f64, (a, w)| most.max(a.abs().sqrt()).max(w.abs()));
-        let until = 1.5 / pace;
+        let step_size = expected.iter().zip(&omega).fold(1.0, |most: f64, (a, w)| most.max(a.abs().sqrt()).max(w.abs()));
+        let until = 1.5 / step_size;
         (scene["until"], scene["every"]) = (until.into(), (until / 16.0).into());
         let scene_run = parsed(&scene.to_string());
         let mut least = f64::INFINITY;

@@ -56,7 +56,7 @@ fn energy_error(c: f64, stages: usize, step: f64, until: f64) -> (f64, Outcome) 
     let mut kernel = driftless::dynamics::kernel::Kernel::without_rows(&mechanism);
     let energy = mechanism.energy(&mut kernel, &start.phi, &start.omega).total().hi;
     let error = outcome.drift.energy.max * mechanism.energy_scale / energy.abs();
-    println!("C = {c}, s = {stages}, h = {step}: {error:.2e} of {energy} J, {:?}, {:?}", outcome.tally, outcome.wall);
+    println!("C = {c}, s = {stages}, h = {step}: {error:.2e} of {energy} J, {:?}, {:?}", outcome.statistics, outcome.wall);
     (error, outcome)
 }
 
@@ -92,12 +92,12 @@ fn the_stiff_pendulum_ends_where_it_should() {
 #[test]
 fn newtons_method_takes_over_where_sweeps_are_slow_and_says_so() {
     let (_, soft) = energy_error(32.0, 6, STEP, 4.0);
-    assert_eq!(soft.tally.newton_steps, 0, "{:?}", soft.tally);
+    assert_eq!(soft.statistics.newton_steps, 0, "{:?}", soft.statistics);
     let (error, stiff) = energy_error(128.0, 8, STEP, 4.0);
-    assert!(stiff.tally.newton_steps > stiff.tally.steps / 2 && error < 1e-9, "{:?}, {error:e}", stiff.tally);
+    assert!(stiff.statistics.newton_steps > stiff.statistics.steps / 2 && error < 1e-9, "{:?}, {error:e}", stiff.statistics);
     assert!(stiff.plan.notes.iter().any(|note| note.contains("Newton's method")), "{:?}", stiff.plan.notes);
     let again = run(&stiff_pendulum(128.0, 4.0), &gauss(8, STEP));
-    assert_eq!((again.last, again.tally), (stiff.last, stiff.tally));
+    assert_eq!((again.last, again.statistics), (stiff.last, stiff.statistics));
 }
 
 #[test]
@@ -129,7 +129,7 @@ fn a_fast_mode_without_energy_may_be_stepped_over() {
         return;
     }
     for (found, expected) in outcome.last.phi.iter().zip(reference) {
-        assert!((found - expected).abs() < 1e-6, "{found} {expected}, {:?}", outcome.tally);
+        assert!((found - expected).abs() < 1e-6, "{found} {expected}, {:?}", outcome.statistics);
     }
 }
 
@@ -170,7 +170,7 @@ fn loops_with_stiff_springs_end_right_or_stop() {
             Some(stop) => assert!(radians > 1.0, "{radians}: {stop}"),
             None => {
                 let apart = outcome.last.phi.iter().zip(&reference.last.phi).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
-                assert!(apart < 1e-4, "{radians} rad a step: {apart:e}, {:?}", outcome.tally);
+                assert!(apart < 1e-4, "{radians} rad a step: {apart:e}, {:?}", outcome.statistics);
             }
         }
     }
@@ -188,9 +188,9 @@ fn a_stiff_spring_is_resolved_and_its_periods_are_told() {
     assert!(said, "{:?}", plan.notes);
     // 1e8 rad are 1600 s of it.
     let refusal = Plan::new(&scene, &mechanism, &ask(MethodId::Taylor, 2000.0)).expect_err("a refusal").to_string();
-    assert!(["periods", "rigid", "--until", "--effort"].iter().all(|word| refusal.contains(word)), "{refusal}");
-    let effort = Request { effort: Some(1_000_000), ..ask(MethodId::Taylor, 2000.0) };
-    assert!(Plan::new(&scene, &mechanism, &effort).is_ok());
+    assert!(["periods", "rigid", "--until", "--max-evaluations"].iter().all(|word| refusal.contains(word)), "{refusal}");
+    let max_evaluations = Request { max_evaluations: Some(1_000_000), ..ask(MethodId::Taylor, 2000.0) };
+    assert!(Plan::new(&scene, &mechanism, &max_evaluations).is_ok());
     // A soft spring is not worth a word.
     let soft = sprung(1.0, 1.0);
     let plan = Plan::new(&soft, &compile(&soft), &ask(MethodId::Taylor, 1.0)).expect("a plan");
@@ -206,7 +206,7 @@ fn a_stiff_spring_that_swings_is_followed_to_six_digits() {
     for (method, rtol) in [(MethodId::Taylor, 1e-9), (MethodId::Dp8, 1e-9)] {
         let outcome = run(&scene, &Request { method: Some(method), rtol: Some(rtol), ..Request::default() });
         assert_eq!(outcome.stop, None);
-        println!("{method}: {:?}, {:?}", outcome.tally, outcome.wall);
+        println!("{method}: {:?}, {:?}", outcome.statistics, outcome.wall);
         for (found, expected) in outcome.last.phi.iter().zip(reference) {
             assert!((found - expected).abs() < 1e-5, "{method}: {found} {expected}");
         }

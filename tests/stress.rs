@@ -44,13 +44,13 @@ fn the_shipped_set_is_whole() {
 fn no_answer_is_wrong() {
     // The whole set by one method of each kind; `driftless stress` has them all.
     let methods: Vec<MethodId> = ["dp8", "taylor", "gauss16", "rattle4"].map(method).into();
-    let plan = Stress { methods, effort: 200_000, ..Stress::default() };
+    let plan = Stress { methods, max_evaluations: 200_000, ..Stress::default() };
     let lines = stress(&plan, &mut |_| true);
     assert_eq!(lines.len(), plan.cases.len());
     let cells = || lines.iter().flat_map(|line| line.cells.iter().map(move |cell| (line, cell)));
     for (line, cell) in cells() {
         assert_ne!(cell.verdict, Verdict::Wrong, "{} {cell:?}", line.scene);
-        assert!(cell.evaluations < 2 * plan.effort, "{} {cell:?}", line.scene);
+        assert!(cell.evaluations < 2 * plan.max_evaluations, "{} {cell:?}", line.scene);
         if let Some(stop) = &cell.stop {
             assert!(!stop.what.is_empty() && !stop.hint.is_empty() && stop.t.is_finite(), "{} {cell:?}", line.scene);
         }
@@ -78,7 +78,7 @@ fn a_wrong_answer_would_be_seen() {
 fn cells_do_not_depend_on_the_number_of_threads() {
     let cases: Vec<Case> = ["spring_1", "spring_zero_length", "massless_bar", "motor_1"].map(case).into();
     let methods: Vec<MethodId> = ["dp5", "radau5", "gauss8", "rattle2"].map(method).into();
-    let plan = |threads| Stress { cases: cases.clone(), methods: methods.clone(), effort: 20_000, threads };
+    let plan = |threads| Stress { cases: cases.clone(), methods: methods.clone(), max_evaluations: 20_000, threads };
     assert_eq!(stress(&plan(1), &mut |_| true), stress(&plan(3), &mut |_| true));
 }
 
@@ -96,7 +96,7 @@ fn an_unconfirmed_end_is_a_stop() {
 #[test]
 fn a_scene_without_a_known_end_gets_one() {
     let unknown = Case { expected: Expected::Unknown, ..case("spring_1") };
-    let plan = Stress { cases: vec![unknown], methods: vec![method("dp8")], effort: 100_000, threads: 1 };
+    let plan = Stress { cases: vec![unknown], methods: vec![method("dp8")], max_evaluations: 100_000, threads: 1 };
     let lines = stress(&plan, &mut |_| true);
     let found = lines[0].cells[0].error.expect("an error");
     let known = cell(&case("spring_1"), method("dp8"), 100_000).error.expect("an error");
@@ -129,7 +129,7 @@ fn springs_whose_ends_cannot_meet_change_nothing() {
         simulate(&scene, &request, &mut |_| Ok(())).expect("a run")
     };
     let (watched, free) = (end(-0.4), end(-0.4 - 1e-8));
-    assert_eq!(watched.tally.steps, free.tally.steps);
+    assert_eq!(watched.statistics.steps, free.statistics.steps);
     assert!((watched.last.phi[0] - free.last.phi[0]).abs() < 1e-6);
 }
 

@@ -54,7 +54,7 @@ fn every_point_is_the_run_it_stands_for() {
             let outcome = simulate(&alone, &request, &mut |_| Ok(())).expect("a run");
             assert_eq!(point.status, outcome.stop.clone().map_or(Status::Done, Status::Stopped));
             assert_eq!((point.t, &point.phi, &point.omega), (outcome.last.t, &outcome.last.phi, &outcome.last.omega), "{scene} {method}");
-            assert_eq!((point.energy, point.steps), (outcome.drift.energy.max, outcome.tally.steps), "{scene} {method}");
+            assert_eq!((point.energy, point.steps), (outcome.drift.energy.max, outcome.statistics.steps), "{scene} {method}");
             let defects = outcome.drift.constraints.first().map(|(_, levels)| [levels[0].max, levels[1].max]);
             assert_eq!(point.constraint, defects);
         }

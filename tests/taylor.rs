@@ -4,16 +4,16 @@ use crate::common;
 
 use common::{ONE_TURN, compile, shipped};
 use driftless::arithmetic::{Complex, DoubleDouble};
+use driftless::dynamics::constraint::Posture;
 use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::kernel::Kernel as Energies;
 use driftless::dynamics::multiplier::Multiplier;
-use driftless::dynamics::row::Posture;
 use driftless::dynamics::{Form, Mechanism, Motion, State, Time};
 use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Sample, integrate};
 use driftless::scene::{Bar, Hinge, Place, Scene, Spring, Start};
 use driftless::stabilization::Projected;
 use driftless::stepping::taylor::Kernel;
-use driftless::stepping::{Dp8, Integrator, Reached, Seen, Tally, Taylor, Tolerance};
+use driftless::stepping::{Dp8, Integrator, Reached, Seen, Statistics, Taylor, Tolerance};
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
@@ -21,8 +21,8 @@ fn end<M: Integrator<Elimination<0>>>(scene: &Scene, mut method: M, until: f64) 
     let mechanism = compile(scene);
     let mut problem = Elimination::<0>::new(mechanism.clone());
     let mut state = problem.state(&mechanism.start(scene));
-    let mut tally = Default::default();
-    method.advance(&mut problem, &mut state, Time::from(until), &mut tally, &mut |_, _| Ok(Seen::Kept)).expect("an end");
+    let mut statistics = Default::default();
+    method.advance(&mut problem, &mut state, Time::from(until), &mut statistics, &mut |_, _| Ok(Seen::Kept)).expect("an end");
     let mut motion = Motion::default();
     problem.read(&state, &mut motion);
     motion
@@ -216,7 +216,9 @@ fn a_symmetric_release_takes_no_step_too_long() {
                 times.push(state.time);
                 Ok(Seen::Kept)
             };
-            on(kernel, 1e-12, order).advance(&mut problem, &mut state, Time::from(1.0), &mut Tally::default(), &mut watch).expect("an end");
+            on(kernel, 1e-12, order)
+                .advance(&mut problem, &mut state, Time::from(1.0), &mut Statistics::default(), &mut watch)
+                .expect("an end");
             let after_one = end(&scene, on(kernel, 1e-12, order), times[0].hi);
             let exact = end(&scene, Taylor::reference(), times[0].hi);
             assert!(times[0].hi > 0.01 && distance(&after_one, &exact) < 1e-11, "{:e}", distance(&after_one, &exact));
@@ -239,7 +241,7 @@ fn a_run_continued_from_a_stored_state_has_the_same_bits() {
         let mechanism = compile(&scene);
         let mut problem = Elimination::<0>::new(mechanism.clone());
         let integrate = |problem: &mut Elimination<0>, state: &mut State, method: &mut Taylor<f64>, until: f64| {
-            method.advance(problem, state, Time::from(until), &mut Tally::default(), &mut |_, _| Ok(Seen::Kept)).expect("an end");
+            method.advance(problem, state, Time::from(until), &mut Statistics::default(), &mut |_, _| Ok(Seen::Kept)).expect("an end");
         };
         let mut method = on(Kernel::Fastest, 1e-15, 20);
         let mut whole = problem.state(&mechanism.start(&scene));
@@ -271,8 +273,9 @@ fn numbers_out_of_range_are_a_typed_stop() {
     let mechanism = compile(&scene);
     let mut problem = Elimination::<0>::new(mechanism.clone());
     let mut state = problem.state(&mechanism.start(&scene));
-    let stop = on(Kernel::Fastest, 1e-12, 20)
-        .advance(&mut problem, &mut state, Time::from(1.0), &mut Tally::default(), &mut |_, _| Ok(Seen::Kept));
+    let stop =
+        on(Kernel::Fastest, 1e-12, 20)
+            .advance(&mut problem, &mut state, Time::from(1.0), &mut Statistics::default(), &mut |_, _| Ok(Seen::Kept));
     assert!(stop.is_err());
 }
 
@@ -299,7 +302,7 @@ fn the_end_has_the_same_bits_whatever_the_output_interval() {
     for (name, scene) in scenes {
         let [fine, odd, coarse] = [0.001, 0.037, 2.0].map(|every| rows(&scene, every, 2.0).0);
         for other in [odd, coarse] {
-            assert_eq!((&fine.last, fine.tally), (&other.last, other.tally), "{name}");
+            assert_eq!((&fine.last, fine.statistics), (&other.last, other.statistics), "{name}");
         }
     }
 }
@@ -310,7 +313,7 @@ fn rows_inside_a_step_are_as_exact_as_its_end() {
     scenes.extend(["motor_sine"].map(|name| (name, shipped(name, &[]))));
     for (name, scene) in scenes {
         let (outcome, samples) = rows(&scene, 0.01, 1.0);
-        assert!(outcome.tally.steps < 90, "{name}: steps are cut at the rows");
+        assert!(outcome.statistics.steps < 90, "{name}: steps are cut at the rows");
         for sample in samples.iter().skip(1).step_by(31) {
             let exact = end(&scene, Taylor::reference(), sample.t);
             for k in 0..sample.phi.len() {
@@ -389,12 +392,12 @@ impl FourBar {
         scene.bars.clear();
         scene.hinges.clear();
         scene.start.clear();
-        let foot = [(None, [0.0, 0.0]), (Some(0), [self.length[0], 0.0]), (None, Self::GROUND)];
+        let origin_point = [(None, [0.0, 0.0]), (Some(0), [self.length[0], 0.0]), (None, Self::GROUND)];
         for k in 0..3 {
             let (length, mass) = (self.length[k], self.mass[k]);
             let inertia = mass * length * length / 12.0;
             scene.bars.push(Bar { name: format!("bar{k}"), length, mass, centre: [0.5 * length, 0.0], inertia });
-            let between = [Place { bar: foot[k].0, point: foot[k].1 }, Place { bar: Some(k), point: [0.0, 0.0] }];
+            let between = [Place { bar: origin_point[k].0, point: origin_point[k].1 }, Place { bar: Some(k), point: [0.0, 0.0] }];
             scene.hinges.push(Hinge { name: format!("hinge{k}"), between });
             scene.start.push(Start { phi: phi[k], omega: rate * rates[k] });
         }
@@ -411,7 +414,7 @@ const FOUR_BAR: FourBar = FourBar { length: [0.3, 1.0, 0.8], mass: [0.5, 1.2, 0.
 fn bordered<M: Integrator<Multiplier<0, true>>>(mechanism: &Arc<Mechanism>, start: &Motion, mut method: M, until: f64) -> Motion {
     let mut form = Multiplier::<0, true>::new(Arc::clone(mechanism));
     let mut state = form.state(start);
-    method.advance(&mut form, &mut state, Time::from(until), &mut Tally::default(), &mut |_, _| Ok(Seen::Kept)).expect("an end");
+    method.advance(&mut form, &mut state, Time::from(until), &mut Statistics::default(), &mut |_, _| Ok(Seen::Kept)).expect("an end");
     let mut motion = Motion::default();
     form.read(&state, &mut motion);
     motion
@@ -421,7 +424,7 @@ fn bordered<M: Integrator<Multiplier<0, true>>>(mechanism: &Arc<Mechanism>, star
 fn opening(mechanism: &Mechanism, motion: &Motion) -> [f64; 2] {
     let z: Vec<_> = motion.phi.iter().map(|&phi| Complex::unit(phi)).collect();
     let mut worst = [0.0_f64; 2];
-    for row in &mechanism.rows {
+    for row in &mechanism.constraints {
         let mut jacobian = vec![DoubleDouble::default(); z.len()];
         let here = row.linearise(motion.time, Posture { phi: &motion.phi, z: &z, omega: &motion.omega }, &mut jacobian);
         let rate = jacobian.iter().zip(&motion.omega).fold(here.drive, |sum, (&g, &w)| sum + g * w);
@@ -572,14 +575,14 @@ fn a_march_goes_on_bit_for_bit_from_where_its_last_step_began() {
                 from.clone_from(state);
                 Ok(Seen::Kept)
             };
-            let reached = method.advance(form, state, horizon, &mut Tally::default(), &mut watch);
+            let reached = method.advance(form, state, horizon, &mut Statistics::default(), &mut watch);
             assert_eq!(reached, Ok(Reached::Pause), "{name}");
             let mut inside = State::default();
             method.interpolate(form, &from, row, &mut inside);
             (from, inside)
         };
         let finish = |form: &mut Elimination<0>, method: &mut Taylor<f64>, state: &mut State| {
-            method.advance(form, state, horizon, &mut Tally::default(), &mut |_, _| Ok(Seen::Kept)).expect("an end");
+            method.advance(form, state, horizon, &mut Statistics::default(), &mut |_, _| Ok(Seen::Kept)).expect("an end");
         };
         let mut form = Elimination::<0>::new(mechanism.clone());
         let mut method = on(Kernel::Fastest, 1e-15, 20);

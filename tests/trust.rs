@@ -5,7 +5,7 @@ use crate::common;
 use common::{compile, run, shipped};
 use driftless::dynamics::canonical::Canonical;
 use driftless::dynamics::{Form, Motion, Time};
-use driftless::run::trust::{How, Level, Ruler, Tangent};
+use driftless::run::trust::{DistanceMetric, How, Level, Tangent};
 use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Running, integrate, reference};
 use driftless::scene::Scene;
 use std::f64::consts::{PI, TAU};
@@ -169,7 +169,7 @@ impl Table {
         let Case { class, name, scene } = case;
         let mechanism = compile(scene);
         let start = mechanism.start(scene);
-        let ruler = Ruler::new(&mechanism);
+        let ruler = DistanceMetric::new(&mechanism);
         let plan = Plan::new(scene, &mechanism, &Request::default()).expect("a plan");
         let times: Vec<Time> = (0..=plan.rows).map(|row| plan.time(row)).collect();
         let exact = reference(&mechanism, &start, &times).expect("a reference");
@@ -346,8 +346,8 @@ fn a_run_has_the_same_bits_whatever_is_asked_of_its_trust() {
             let trust = other.trust.as_ref().expect("asked for");
             assert!(trust.error_estimate.is_some_and(|error| error > 0.0 && error < 0.01), "{name}: {trust:?}");
             assert_eq!(
-                (&off.last, off.tally, &off.trace, &off.strikes),
-                (&other.last, other.tally, &other.trace, &other.strikes),
+                (&off.last, off.statistics, &off.trace, &off.impacts),
+                (&other.last, other.statistics, &other.trace, &other.impacts),
                 "{name}"
             );
             assert_eq!(off.drift, other.drift, "{name}");
@@ -453,7 +453,7 @@ fn a_run_past_its_horizon_is_flagged_and_its_exponent_is_told() {
         assert!(trust.input_error.is_some_and(|error| error > 0.0), "{method}");
     }
     let regular = trusted(&shipped("gentle", &[]), &asked("taylor", 1e-9, 60.0, 0.05), Level::Auto).trust.expect("asked for");
-    assert_eq!((regular.horizon, regular.lyapunov, regular.how), (None, None, How::Companion));
+    assert_eq!((regular.horizon, regular.lyapunov, regular.how), (None, None, How::ReferenceSolution));
 }
 
 #[test]
@@ -462,7 +462,7 @@ fn what_the_budget_does_not_pay_for_is_carried_on_and_said_to_be() {
     let request = asked("taylor", 1e-9, 20_000.0, 1000.0);
     let [auto, full] = [Level::Auto, Level::Full].map(|level| trusted(&scene, &request, level).trust.expect("asked for"));
     assert!(matches!(auto.how, How::Extrapolated(from) if from < 20_000.0 && from == auto.covered), "{auto:?}");
-    assert!(auto.why.is_some() && full.how == How::Companion);
+    assert!(auto.why.is_some() && full.how == How::ReferenceSolution);
     let ratio = auto.error_estimate.expect("a figure") / full.error_estimate.expect("a figure");
     assert!((1.0 / 3.0..10.0).contains(&ratio), "{ratio}");
 }
@@ -472,7 +472,7 @@ fn what_the_budget_does_not_pay_for_is_carried_on_and_said_to_be() {
 fn full_trust_takes_no_more_evaluations_than_a_run_may() {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/stress/spring_damped_1e12.json");
     let scene = driftless::scene::read_scene(&path, &[]).expect("a shipped scene");
-    let request = Request { effort: Some(20_000), ..asked("radau5", 1e-6, 1.0, 0.1) };
+    let request = Request { max_evaluations: Some(20_000), ..asked("radau5", 1e-6, 1.0, 0.1) };
     let outcome = trusted(&scene, &request, Level::Full);
     assert_eq!(outcome.stop, None);
     let trust = outcome.trust.expect("asked for");
@@ -551,7 +551,7 @@ fn told_and_true(scene: &Scene, request: &Request) -> [[f64; 2]; 2] {
     [[trust.error_estimate.expect("a figure"), most[0]], [trust.rate_error.expect("a figure"), most[1]]]
 }
 
-/// Runs near rounding have companions that are finer than that, with any number of bodies, with loops and with sliders.
+/// Runs near rounding have reference solutions that are finer than that, with any number of bodies, with loops and with sliders.
 #[test]
 fn companions_are_finer_than_the_runs_they_judge() {
     for (name, method, setting, until) in [
@@ -573,7 +573,7 @@ fn companions_are_finer_than_the_runs_they_judge() {
 fn extended_runs_are_judged_in_double_double() {
     let request = Request { extended: true, ..asked("taylor", 1e-20, 10.0, 0.5) };
     let trust = trusted(&shipped("free", &[]), &request, Level::Auto).trust.expect("asked for");
-    assert!(trust.companion.as_ref().is_some_and(|name| name.contains("in double-double")), "{:?}", trust.companion);
+    assert!(trust.error_estimator.as_ref().is_some_and(|name| name.contains("in double-double")), "{:?}", trust.error_estimator);
     assert!(trust.error_estimate.is_some_and(|error| error < 1e-13), "{:?}, {:?}", trust.error_estimate, trust.why);
 }
 
@@ -622,7 +622,7 @@ fn what_run_and_companion_share_is_told() {
     assert_eq!(of("motor", "taylor"), ["elimination of motors", "compilation"]);
 }
 
-/// Of a run by the series at its default settings the companion takes little more work than the run itself, and the tangent flow a share of that: beside
+/// Of a run by the series at its default settings the reference solution takes little more work than the run itself, and the tangent flow a share of that: beside
 /// what the output of these scenes costs that is about a third (`.ci/cost`).
 #[test]
 fn companions_take_little_more_work_than_their_runs() {
@@ -634,11 +634,11 @@ fn companions_take_little_more_work_than_their_runs() {
             continue;
         }
         let trust = outcome.trust.expect("asked for");
-        let [companion, flow, run] = trust.work;
+        let [error_estimator, flow, run] = trust.work;
         let units = 1e5;
-        println!("{name}: companion {:.2}, flow {:.2}, run {:.2}", companion / units, flow / units, run / units);
-        assert!(companion > flow && run > 0.0, "{name}");
+        println!("{name}: companion {:.2}, flow {:.2}, run {:.2}", error_estimator / units, flow / units, run / units);
+        assert!(error_estimator > flow && run > 0.0, "{name}");
         assert!(flow < 0.5 * run + 2.6 * units, "{name}: the flow took {flow:e} beside {run:e}");
-        assert!(companion - flow < 2.0 * run + 5.0 * units, "{name}: the companion took {companion:e} beside {run:e}");
+        assert!(error_estimator - flow < 2.0 * run + 5.0 * units, "{name}: the companion took {error_estimator:e} beside {run:e}");
     }
 }

@@ -88,7 +88,7 @@ fn a_ball_bounces_to_rest_as_in_the_textbook() {
                 close(sample.phi[0], 0.3 + 2.0 * sample.t, 1e-9, "angle");
             }
             let mut t = first;
-            for (k, strike) in outcome.strikes.iter().enumerate().take(10) {
+            for (k, strike) in outcome.impacts.iter().enumerate().take(10) {
                 let speed = G * first * e.powi(k as i32);
                 close(strike.t, t, 1e-9 * rest, "time of impact");
                 close(strike.approach, -speed, 1e-8 * speed, "approach");
@@ -96,9 +96,9 @@ fn a_ball_bounces_to_rest_as_in_the_textbook() {
                 close(strike.energy_lost, 0.5 * (1.0 - e * e) * speed * speed, 1e-8 * speed * speed, "loss");
                 t += 2.0 * e.powi(k as i32 + 1) * first;
             }
-            assert_eq!((outcome.hold_count, outcome.holds[0].until), (1, None), "{method} e = {e}");
+            assert_eq!((outcome.persistent_contact_count, outcome.holds[0].until), (1, None), "{method} e = {e}");
             close(outcome.holds[0].t, rest, 1e-4 * rest, "rest");
-            close(outcome.strike_loss, G * height, 1e-8 * G * height, "all of the height");
+            close(outcome.impact_loss, G * height, 1e-8 * G * height, "all of the height");
         }
     }
 }
@@ -124,20 +124,20 @@ fn cart(x: f64, v: f64, stops: &[(&str, f64, f64)], e: f64) -> Value {
 fn a_cart_meets_its_stops_where_they_are() {
     for method in METHODS {
         let (outcome, samples) = through(&cart(0.0, 1.0, &[("stop", 1.0, -1.0)], 0.5), method, 2.0, 0.1);
-        assert_eq!((samples[0].phi[1], outcome.strike_count), (0.0, 1));
+        assert_eq!((samples[0].phi[1], outcome.impact_count), (0.0, 1));
         // A gap of 1e-12 of its distance counts as none.
-        close(outcome.strikes[0].t, 1.0, 2e-12, "time");
+        close(outcome.impacts[0].t, 1.0, 2e-12, "time");
         close(outcome.last.phi[1], 0.5, 4e-12, "place");
         let (outcome, _) = through(&cart(2.0, 1.0, &[("right", 3.0, -1.0), ("left", -0.5, 1.0)], 0.5), method, 20.0, 0.1);
         // Right at 1 s, left 3.5 m further at half the speed, right again at a quarter.
-        let times: Vec<f64> = outcome.strikes.iter().map(|strike| strike.t).collect();
+        let times: Vec<f64> = outcome.impacts.iter().map(|strike| strike.t).collect();
         assert_eq!(times.len(), 2);
         close(times[0], 1.0, 1e-11, "right");
         close(times[1], 8.0, 1e-10, "left");
         close(outcome.last.phi[1], -0.5 + 0.25 * 12.0, 1e-10, "place");
         // Elastic stops, two hundred times.
         let (outcome, _) = through(&cart(0.25, 1.0, &[("right", 1.0, -1.0), ("left", 0.0, 1.0)], 1.0), method, 200.0, 1.0);
-        assert_eq!(outcome.strike_count, 200);
+        assert_eq!(outcome.impact_count, 200);
         close(outcome.last.phi[1], 0.25, 1e-9, "place");
     }
 }
@@ -156,12 +156,12 @@ fn a_rod_dropped_on_one_end_turns() {
             "start": {"rod": {"phi": phi, "omega": 0, "origin": [0, half * phi.sin() + 0.3], "velocity": [0.2, -speed]}},
         });
         let (outcome, _) = through(&scene, method, 0.12, 0.01);
-        let strike = &outcome.strikes[0];
+        let strike = &outcome.impacts[0];
         let arm = half * phi.cos();
         let impulse = (1.0 + e) * speed / (1.0 / m + arm * arm / inertia);
         close(strike.t, 0.1, 1e-12, "time");
         close(strike.impulse, impulse, 1e-9, "impulse");
-        assert_eq!((strike.wall.as_str(), outcome.strike_count), ("low", 1));
+        assert_eq!((strike.wall.as_str(), outcome.impact_count), ("low", 1));
         close(outcome.last.omega[0], -arm * impulse / inertia, 1e-9, "rate");
         close(outcome.last.omega[1], 0.2, 1e-12, "along the floor");
         close(outcome.last.omega[2], -speed + impulse / m, 1e-9, "upwards");
@@ -181,7 +181,7 @@ fn a_cart_with_a_pendulum_meets_a_stop() {
         scene["hinges"] = json!([{"name": "H", "between": [{"body": "cart", "point": [0, 0]}, {"body": "pole", "point": [0, 0]}]}]);
         scene["start"] = json!({"cart": {"phi": 0, "origin": [0, 0], "velocity": [0.5, 0]}, "pole": {"phi": -1.0, "omega": 1.5}});
         let (outcome, _) = through(&scene, method, 0.6, 0.1);
-        let strike = &outcome.strikes[0];
+        let strike = &outcome.impacts[0];
         // Cut at the impact, the run ends with the angle it has there.
         let (at_impact, _) = through(&scene, method, strike.t, strike.t);
         let mass = big + m - (m * r * at_impact.last.phi[1].sin()).powi(2) / (inertia + m * r * r);
@@ -224,7 +224,7 @@ fn the_block_of_a_slider_crank_meets_a_stop() {
         let mass = inertia / (dx * dx);
         let (outcome, _) = seen(&scene, method, 2.0, 0.01, rtol);
         assert_eq!(outcome.stop, None, "{method}");
-        let strike = &outcome.strikes[0];
+        let strike = &outcome.impacts[0];
         let most = f64::max(1e-9, 100.0 * rtol);
         close(strike.impulse, -(1.0 + e) * mass * strike.approach, most, "impulse");
         close(strike.energy_lost, 0.5 * (1.0 - e * e) * mass * strike.approach.powi(2), most, "loss");
@@ -253,11 +253,11 @@ fn a_ladder_between_two_rails_meets_a_stop() {
             "bars": [{"name": "rod", "mass": m, "centre": [0, 0], "inertia": inertia, "length": half}],
             "sliders": [slide("along", -half, [1.0, 0.0]), slide("up", half, [0.0, 1.0])],
             "walls": [{"name": "stop", "body": "rod", "point": [-half, 0], "line": {"through": [-0.8, 0], "normal": [1, 0]}, "restitution": e}],
-            // The foot at x = -cos phi, the head at y = sin phi.
+            // The origin at x = -cos phi, the head at y = sin phi.
             "start": {"rod": {"phi": 1.2, "omega": -0.5}},
         });
         let (outcome, samples) = through(&scene, method, 0.6, 0.01);
-        let strike = &outcome.strikes[0];
+        let strike = &outcome.impacts[0];
         // About the corner the rod swings as a pendulum of inertia I + m half²: the centre is always half away from it.
         let whole = inertia + m * half * half;
         let phi = 0.8f64.acos();
@@ -275,17 +275,17 @@ fn a_platform_on_redundant_cranks_meets_a_wall() {
     let (r, platform, crank, e) = (0.5, 2.0, 0.1, 0.5);
     for method in METHODS {
         let bar = |name: &str| json!({"name": name, "mass": 1, "centre": [0, 0], "inertia": crank, "length": r});
-        let foot = |k: usize| json!({"name": format!("O{k}"), "between": [{"body": "ground", "point": [k, 0]}, {"body": format!("c{k}"), "point": [0, 0]}]});
+        let origin_point = |k: usize| json!({"name": format!("O{k}"), "between": [{"body": "ground", "point": [k, 0]}, {"body": format!("c{k}"), "point": [0, 0]}]});
         let head = |k: usize| json!({"name": format!("P{k}"), "between": [{"body": format!("c{k}"), "point": [r, 0]}, {"body": "platform", "point": [k, 0]}]});
         let scene = json!({
             "gravity": [0, 0],
             "bars": [bar("c0"), bar("c1"), bar("c2"), {"name": "platform", "mass": platform, "centre": [1, 0], "inertia": 0.3, "length": 2}],
-            "hinges": [foot(0), foot(1), foot(2), head(0), head(1), head(2)],
+            "hinges": [origin_point(0), origin_point(1), origin_point(2), head(0), head(1), head(2)],
             "walls": [{"name": "wall", "body": "platform", "point": [2, 0], "line": {"through": [2.4, 0], "normal": [-1, 0]}, "restitution": e}],
             "start": {"c0": {"phi": 1.5, "omega": -1.0}, "c1": {"phi": 1.5}, "c2": {"phi": 1.5}, "platform": {"phi": 0}},
         });
         let (outcome, _) = through(&scene, method, 2.0, 0.1);
-        let strike = &outcome.strikes[0];
+        let strike = &outcome.impacts[0];
         // r cos phi = 0.4; every crank turns alike, and the platform moves on a circle.
         let (sin, whole) = ((1.0f64 - 0.64).sqrt(), 3.0 * crank + platform * r * r);
         close(strike.t, 1.5 - 0.8f64.acos(), 1e-10, "time");
@@ -304,7 +304,7 @@ fn held_points_slide_and_are_lifted() {
         let mut scene = ball([0.0, 0.0], [0.0, 0.0], 0.0);
         scene["walls"][0]["line"]["normal"] = json!([-angle.sin(), angle.cos()]);
         let (outcome, samples) = through(&scene, method, 3.0, 0.1);
-        assert_eq!((outcome.strike_count, outcome.hold_count, outcome.holds[0].until), (0, 1, None));
+        assert_eq!((outcome.impact_count, outcome.persistent_contact_count, outcome.holds[0].until), (0, 1, None));
         for sample in &samples {
             let way = 0.5 * G * angle.sin() * sample.t * sample.t;
             close(sample.phi[1], -way * angle.cos(), 1e-9, "x");
@@ -335,7 +335,7 @@ fn a_ball_slides_into_a_corner() {
         let (outcome, samples) = through(&scene, method, 8.0, 0.05);
         // Reaches the wall after 1 = t + t²/2; then bounces under 1 m/s² to rest.
         let first = 3f64.sqrt() - 1.0;
-        close(outcome.strikes[0].t, first, 1e-10, "time");
+        close(outcome.impacts[0].t, first, 1e-10, "time");
         let speed = 1.0 + first;
         let rest = first + 2.0 * 0.5 * speed / 0.5;
         assert!(samples.iter().all(|sample| sample.phi[2].abs() < 1e-12 && sample.phi[1] > -1e-9));
@@ -393,7 +393,12 @@ fn units_do_not_matter() {
     for method in [MethodId::Dp8, MethodId::Taylor, MethodId::Radau(3)] {
         let request = |t: f64, scene: &Value| through(scene, method, 2.0 * t, 0.05 * t);
         let (reference, plain) = request(1.0, &scaled(1.0, 1.0, 1.0));
-        assert!(reference.strike_count > 20 && reference.hold_count >= 2, "{} {}", reference.strike_count, reference.hold_count);
+        assert!(
+            reference.impact_count > 20 && reference.persistent_contact_count >= 2,
+            "{} {}",
+            reference.impact_count,
+            reference.persistent_contact_count
+        );
         for (mass, length, time) in
             [-9i32, -6, -3, 3, 6].into_iter().flat_map(|k| [(k, 0, 0), (0, k, 0), (0, 0, k)]).chain([(9, 0, 0), (-9, -9, -6), (9, 6, 3)])
         {
@@ -403,14 +408,14 @@ fn units_do_not_matter() {
             }
             let what = format!("{method}: masses 1e{mass}, lengths 1e{length}, times 1e{time}");
             let (outcome, samples) = request(t, &scaled(m, l, t));
-            assert_eq!(outcome.hold_count, reference.hold_count, "{what}");
+            assert_eq!(outcome.persistent_contact_count, reference.persistent_contact_count, "{what}");
             for (sample, plain) in samples.iter().zip(&plain) {
                 let unit = |k: usize| if k < 4 { 1.0 } else { l };
                 for k in 0..sample.phi.len() {
                     close(sample.phi[k] / unit(k), plain.phi[k], 1e-7, &format!("{what}: coordinate {k} at {} s", plain.t));
                 }
             }
-            for (strike, plain) in outcome.strikes.iter().zip(&reference.strikes).take(10) {
+            for (strike, plain) in outcome.impacts.iter().zip(&reference.impacts).take(10) {
                 assert_eq!(strike.wall, plain.wall, "{what}");
                 close(strike.t / t, plain.t, 1e-8, &what);
                 close(strike.impulse / (m * l / t), plain.impulse, 1e-6 * plain.impulse, &what);

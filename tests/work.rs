@@ -19,7 +19,7 @@ use driftless::stabilization::{Projected, SymmetricGauss};
 use driftless::stepping::composition::Composition;
 use driftless::stepping::gauss::Gauss;
 use driftless::stepping::rattle::Rattle;
-use driftless::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Integrator, Radau, Seen, Tally, Taylor, Tolerance};
+use driftless::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Integrator, Radau, Seen, Statistics, Taylor, Tolerance};
 use std::sync::Arc;
 use trees::{Dice, tree};
 
@@ -170,7 +170,7 @@ fn the_energy_of_a_damped_torsion_spring_is_kept_through_elastic_impacts() {
             let outcome = finished(&scene, &at(method, rtol));
             // Each of the impacts hands on the error of its time.
             let (last, most) = (&outcome.last, 1000.0 * rtol + 1e-11);
-            assert_eq!(outcome.strike_count, impacts, "{method} at {rtol:e}");
+            assert_eq!(outcome.impact_count, impacts, "{method} at {rtol:e}");
             assert!((last.work - lost).abs() < most, "{method} at {rtol:e}: work {:.1e} J off", last.work - lost);
             assert!((last.phi[0] - phi).abs() < most, "{method} at {rtol:e}: {:.1e} rad off", last.phi[0] - phi);
             assert!((last.omega[0] - omega).abs() < 10.0 * most, "{method} at {rtol:e}: {:.1e} rad/s off", last.omega[0] - omega);
@@ -270,7 +270,8 @@ fn honest_runs_of_all_shipped_scenes_keep_the_limits() {
         for method in adaptive() {
             for rtol in [1e-3, 1e-5, 1e-7, 1e-9, 1e-12] {
                 let until = Some(scene.until.min(3.0));
-                let request = Request { until, every: Some(scene.until.min(3.0) / 10.0), effort: Some(200_000), ..at(method, rtol) };
+                let request =
+                    Request { until, every: Some(scene.until.min(3.0) / 10.0), max_evaluations: Some(200_000), ..at(method, rtol) };
                 if Plan::new(&scene, &mechanism, &request).is_err() {
                     continue;
                 }
@@ -294,9 +295,9 @@ fn forgets<P: Form + ?Sized, M: Integrator<P>>(make: impl Fn() -> M, problem: &m
     let mut used = make();
     let mut state = problem.state(start);
     let advance = |method: &mut M, problem: &mut P, state: &mut driftless::dynamics::State, until: f64| {
-        let mut tally = Tally::default();
+        let mut statistics = Statistics::default();
         let until = DoubleDouble::from(until);
-        method.advance(problem, state, until, &mut tally, &mut |_, _| Ok(Seen::Kept)).expect("no stop");
+        method.advance(problem, state, until, &mut statistics, &mut |_, _| Ok(Seen::Kept)).expect("no stop");
     };
     advance(&mut used, problem, &mut state, t);
     let mut motion = Motion::default();
@@ -356,7 +357,7 @@ fn honest_runs_of_random_trees_keep_the_limits() {
         let mechanism = compile(&scene);
         for method in adaptive() {
             for rtol in [1e-3, 1e-5, 1e-7, 1e-9, 1e-12] {
-                let request = Request { effort: Some(100_000), ..at(method, rtol) };
+                let request = Request { max_evaluations: Some(100_000), ..at(method, rtol) };
                 if Plan::new(&scene, &mechanism, &request).is_err() {
                     continue;
                 }
@@ -389,7 +390,7 @@ fn what_fails_by_its_tolerance_is_wrong() {
             let run = driftless::run::Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).ok()?;
             driftless::run::integrate(run, &mut |_| Ok(())).ok()
         };
-        let Some(outcome) = integrate(&Request { effort: Some(20_000), ..at(method, rtol) }) else { continue };
+        let Some(outcome) = integrate(&Request { max_evaluations: Some(20_000), ..at(method, rtol) }) else { continue };
         let (off, limit) = (outcome.drift.energy_share, outcome.drift.energy_limit());
         judged += usize::from(limit < 1e-2 && outcome.stop.is_none());
         if limit >= 1e-2 || off <= limit || off.is_nan() {
@@ -397,7 +398,7 @@ fn what_fails_by_its_tolerance_is_wrong() {
         }
         failed += 1;
         let t = outcome.last.t;
-        let finer = Request { until: Some(t), every: Some(t), effort: Some(400_000), ..at(MethodId::Dp8, 1e-13) };
+        let finer = Request { until: Some(t), every: Some(t), max_evaluations: Some(400_000), ..at(MethodId::Dp8, 1e-13) };
         let Some(reference) = integrate(&finer).filter(|reference| reference.stop.is_none()) else {
             println!("{index} {method} {rtol:.0e}: energy {off:.1e}, limit {limit:.1e}, no reference");
             continue;

@@ -29,7 +29,7 @@ pub fn all(problem: &Problem) -> Vec<Candidate<'_>> {
     }
     if problem.mechanism.bodies.len() == 2 {
         all.push(dop853(problem));
-        if problem.mechanism.rows.is_empty() {
+        if problem.mechanism.constraints.is_empty() {
             let hand = TwoBars::of(&problem.mechanism);
             let each = move |integrate: fn(&TwoBars, &Motion, f64, f64) -> Motion| -> Runner {
                 Box::new(move |tolerance| problem.starts.iter().map(|start| integrate(&hand, start, problem.until, tolerance)).collect())
@@ -52,8 +52,8 @@ pub fn taylor(problem: &Problem, order: Option<usize>) -> Candidate<'_> {
             method = Taylor::with_order(tolerance, order);
         }
         ends(&mut form, &starts, |form, state| {
-            let mut tally = Default::default();
-            method.advance(form, state, Time::from(problem.until), &mut tally, &mut |_, _| Ok(Seen::Kept)).is_ok()
+            let mut statistics = Default::default();
+            method.advance(form, state, Time::from(problem.until), &mut statistics, &mut |_, _| Ok(Seen::Kept)).is_ok()
         })
     };
     let name = order.map_or("taylor".into(), |order| format!("taylor, order {order}"));
@@ -79,14 +79,16 @@ fn dop853(problem: &Problem) -> Candidate<'_> {
         (Multiplier::<2, false>::new(Arc::clone(&problem.mechanism)), Elimination::<2>::new(Arc::clone(&problem.mechanism)));
     let run = move |tolerance: f64| {
         let mut method = Dop853::new(both(tolerance));
-        let (until, mut tally) = (Time::from(problem.until), Default::default());
-        if problem.mechanism.rows.is_empty() {
+        let (until, mut statistics) = (Time::from(problem.until), Default::default());
+        if problem.mechanism.constraints.is_empty() {
             let starts: Vec<State> = problem.starts.iter().map(|start| multiplier.state(start)).collect();
-            ends(&mut multiplier, &starts, |form, state| method.advance(form, state, until, &mut tally, &mut |_, _| Ok(Seen::Kept)).is_ok())
+            ends(&mut multiplier, &starts, |form, state| {
+                method.advance(form, state, until, &mut statistics, &mut |_, _| Ok(Seen::Kept)).is_ok()
+            })
         } else {
             let starts = problem.states();
             ends(&mut elimination, &starts, |form, state| {
-                method.advance(form, state, until, &mut tally, &mut |_, _| Ok(Seen::Kept)).is_ok()
+                method.advance(form, state, until, &mut statistics, &mut |_, _| Ok(Seen::Kept)).is_ok()
             })
         }
     };

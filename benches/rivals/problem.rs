@@ -37,7 +37,7 @@ impl Problem {
         let starts: Vec<Motion> = (0..STARTS)
             .map(|i| {
                 let mut motion = mechanism.start(&scene);
-                for &body in &mechanism.ties.independent {
+                for &body in &mechanism.partition.independent {
                     motion.phi[body] = motion.phi[body] + 5e-4 * spread(STARTS * body + i + 1);
                 }
                 motion
@@ -72,9 +72,9 @@ impl Problem {
 fn exact(mechanism: &Arc<Mechanism>, start: &Motion, until: f64) -> Motion {
     let mut problem = Elimination::<0>::new(Arc::clone(mechanism));
     let mut state = problem.state(start);
-    let mut tally = Default::default();
+    let mut statistics = Default::default();
     let mut method = Taylor::reference();
-    method.advance(&mut problem, &mut state, Time::from(until), &mut tally, &mut |_, _| Ok(Seen::Kept)).expect("an end");
+    method.advance(&mut problem, &mut state, Time::from(until), &mut statistics, &mut |_, _| Ok(Seen::Kept)).expect("an end");
     let mut motion = Motion::default();
     problem.read(&state, &mut motion);
     motion

@@ -34,7 +34,14 @@ pub fn serve() {
 fn describe(problem: &Problem) -> serde_json::Value {
     let numbers = |motion: &Motion| motion.phi.iter().chain(&motion.omega).map(|x| x.hi).collect::<Vec<f64>>();
     let tree = &problem.mechanism.tree;
-    let law = problem.mechanism.ties.bodies.iter().flat_map(|tie| &tie.laws).next().map(|(_, law)| law.at::<f64>(Default::default()).rate);
+    let law = problem
+        .mechanism
+        .partition
+        .bodies
+        .iter()
+        .flat_map(|dependent_angle| &dependent_angle.laws)
+        .next()
+        .map(|(_, law)| law.at::<f64>(Default::default()).rate);
     json!({
         "until": problem.until,
         "diagonal": tree.diagonal,

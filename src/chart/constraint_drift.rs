@@ -13,7 +13,7 @@ use super::{ChartError, PAGE};
 
 /// One level of the constraints, with its unit.
 #[derive(Clone, Debug, Default)]
-pub struct DefectPanel {
+pub struct ResidualPanel {
     /// Name of the y axis with its unit in brackets, with markup: `|*C*| [rad]`.
     pub name: String,
     /// A line for each stabilization or each constraint; the same names in the same order in both panels of a row.
@@ -28,7 +28,7 @@ pub struct ConstraintDrift {
     /// Parts of the caption, with markup; what is drawn is added.
     pub caption: Vec<String>,
     /// Panels from left to right, position level and velocity level; then those of constraints of another unit, below.
-    pub panels: Vec<DefectPanel>,
+    pub panels: Vec<ResidualPanel>,
     /// Logarithmic time.
     pub log_time: bool,
 }
@@ -53,7 +53,7 @@ pub fn constraint_drift(chart: &ConstraintDrift, px_per_pt: f64) -> Result<Pictu
     let mut caption = chart.caption.clone();
     caption.push("dots: samples, lines: largest so far".to_owned());
     let under = sheet.heading(&chart.title, &caption)?;
-    let lines = |panel: &DefectPanel| -> Vec<Vec<Point>> { panel.series.iter().map(|s| running_maximum(&s.time, &s.error)).collect() };
+    let lines = |panel: &ResidualPanel| -> Vec<Vec<Point>> { panel.series.iter().map(|s| running_maximum(&s.time, &s.error)).collect() };
     let all: Vec<Vec<Vec<Point>>> = chart.panels.iter().map(lines).collect();
     let axes = chart.panels.iter().zip(&all).map(|(panel, lines)| {
         let times = || lines.iter().flatten().map(|p| p[0]);
@@ -106,7 +106,7 @@ pub fn constraint_drift(chart: &ConstraintDrift, px_per_pt: f64) -> Result<Pictu
 }
 
 /// Says above the lower edge of a panel without end labels whose markers lie on it.
-fn zeros(sheet: &Sheet, panel: &Panel, data: &DefectPanel, lines: &[Vec<Point>]) -> Result<(), ChartError> {
+fn zeros(sheet: &Sheet, panel: &Panel, data: &ResidualPanel, lines: &[Vec<Point>]) -> Result<(), ChartError> {
     let names: Vec<&str> =
         data.series.iter().zip(lines).filter(|(_, line)| is_zero(line)).map(|(series, _)| series.name.as_str()).collect();
     if names.is_empty() {

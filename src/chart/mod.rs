@@ -45,7 +45,7 @@ mod view;
 mod work_precision;
 
 pub use angles::{AngleSeries, Angles, angles};
-pub use constraint_drift::{ConstraintDrift, DefectPanel, constraint_drift};
+pub use constraint_drift::{ConstraintDrift, ResidualPanel, constraint_drift};
 pub use energy_drift::{DriftSeries, EnergyDrift, energy_drift};
 pub use file::Picture;
 pub use map::{Cell, Map, MapAxis, map};

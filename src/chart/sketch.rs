@@ -178,11 +178,11 @@ impl Pencil<'_> {
         let count = (whole / every).floor().clamp(0.0, 1000.0) as usize;
         for k in 0..=count {
             let share = (0.5 * (whole - count as f64 * every) + k as f64 * every) / whole.max(1e-9);
-            let foot = [from[0] + share * dx, from[1] + share * dy];
+            let origin_point = [from[0] + share * dx, from[1] + share * dy];
             // All strokes lean the same way, as on a technical drawing.
             let along = [-towards[1], towards[0]];
-            let tip = [foot[0] + length * (towards[0] + 0.8 * along[0]), foot[1] + length * (towards[1] + 0.8 * along[1])];
-            self.sheet.line(&[foot, tip], &Pen { width: 0.75 * pen.width, ..pen })?;
+            let tip = [origin_point[0] + length * (towards[0] + 0.8 * along[0]), origin_point[1] + length * (towards[1] + 0.8 * along[1])];
+            self.sheet.line(&[origin_point, tip], &Pen { width: 0.75 * pen.width, ..pen })?;
         }
         self.sheet.line(&[from, to], &Pen { width: 1.3 * self.size.max(0.7), ..pen })
     }
@@ -292,8 +292,11 @@ impl Pencil<'_> {
         occupied.line(&arc);
         if motor.rate != 0.0 {
             let tip = on(start + sense * 2.72, radius);
-            let foot = start + sense * 2.36;
-            self.sheet.polygon(&[tip, on(foot, radius + 3.6), on(foot + sense * 0.06, radius), on(foot, radius - 3.6)], colour)?;
+            let origin_point = start + sense * 2.36;
+            self.sheet.polygon(
+                &[tip, on(origin_point, radius + 3.6), on(origin_point + sense * 0.06, radius), on(origin_point, radius - 3.6)],
+                colour,
+            )?;
         }
         if named {
             let best =

@@ -2,7 +2,7 @@
 
 use super::failure::{Exit, Failure};
 use super::output::{message, print};
-use crate::run::stress::EFFORT;
+use crate::run::stress::MAX_EVALUATIONS;
 use crate::run::trust::Level;
 use crate::run::{Limits, METHODS, MethodId, Prefer, Request, Stabilization, Vary};
 use crate::scene::{self, Override};
@@ -112,8 +112,8 @@ pub struct PlanFlags {
     pub extended: bool,
     /// Evaluations of the equations allowed in a run; one that needs more stops with exit code 4 [default: 1e8, and 1e7 a simulated second, at most 1e10; at most
     /// 1e9 expansions of taylor's series]
-    #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true)]
-    pub effort: Option<u64>,
+    #[arg(long, alias = "effort", value_name = "N", value_parser = count, allow_hyphen_values = true)]
+    pub max_evaluations: Option<u64>,
     /// What a method is chosen for where none is named [default: the path, and invariants over a minute or more]
     #[arg(long, value_name = "WHAT", value_parser = preferences(), conflicts_with = "method")]
     pub prefer: Option<Prefer>,
@@ -246,8 +246,8 @@ pub struct StressFlags {
     #[arg(long, value_name = "NAMES", value_parser = methods(), value_delimiter = ',')]
     pub methods: Vec<MethodId>,
     /// Evaluations allowed for each scene and method
-    #[arg(long, value_name = "N", default_value_t = EFFORT, value_parser = clap::value_parser!(u64).range(1..))]
-    pub effort: u64,
+    #[arg(long, alias = "effort", value_name = "N", default_value_t = MAX_EVALUATIONS, value_parser = clap::value_parser!(u64).range(1..))]
+    pub max_evaluations: u64,
     /// What the end of a scene given may be off, in rad
     #[arg(long, value_name = "RAD", default_value_t = 1e-4, value_parser = limit, allow_hyphen_values = true, requires = "scenes")]
     pub tolerance: f64,
@@ -338,8 +338,8 @@ pub struct ResumeFlags {
     #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
     pub until: Option<f64>,
     /// Evaluations allowed in the whole run, those made so far counted in [default: as the run was begun]
-    #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true)]
-    pub effort: Option<u64>,
+    #[arg(long, alias = "effort", value_name = "N", value_parser = count, allow_hyphen_values = true)]
+    pub max_evaluations: Option<u64>,
     #[allow(missing_docs)]
     #[command(flatten)]
     pub checkpoints: CheckpointFlags,
@@ -395,7 +395,7 @@ impl PlanFlags {
             stabilize,
             time_constant: self.time_constant,
             extended: self.extended,
-            effort: self.effort,
+            max_evaluations: self.max_evaluations,
             prefer: self.prefer,
         }
     }

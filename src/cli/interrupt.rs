@@ -30,14 +30,14 @@ pub fn is_asked() -> bool {
 }
 
 /// Says when a checkpoint is due.  Its time runs forwards only, whatever becomes of the clock on the wall.
-pub struct Watchman {
+pub struct CheckpointTimer {
     /// Time between two checkpoints; `None` for none.
     every: Option<Duration>,
     last: Instant,
     looks: Looks,
 }
 
-impl Watchman {
+impl CheckpointTimer {
     /// Checkpoints every so many seconds; 0 for none but at the end that is asked for.
     pub fn new(every: f64) -> Self {
         let every = Duration::try_from_secs_f64(every).ok().filter(|every| !every.is_zero());

@@ -60,8 +60,8 @@ pub fn run(flags: &ResumeFlags) -> Result<(), Failure> {
             "the run was begun by driftless {theirs}, this is {ours}: its end may differ in the last digits from one run by either alone"
         ));
     }
-    if let (Some(effort), Work::Run(snapshot)) = (flags.effort, &mut saved.work) {
-        snapshot.allow(effort);
+    if let (Some(max_evaluations), Work::Run(snapshot)) = (flags.max_evaluations, &mut saved.work) {
+        snapshot.allow(max_evaluations);
     }
     let damaged = || Failure::new(Exit::Io, "the command line in the checkpoint cannot be read");
     match (Flags::try_parse_from(&saved.arguments).map_err(|_| damaged())?.command, &saved.work) {
@@ -73,8 +73,8 @@ pub fn run(flags: &ResumeFlags) -> Result<(), Failure> {
         (Command::Sweep(_), Work::Sweep(..)) if flags.until.is_some() => {
             Err(Failure::new(Exit::Usage, "--until: the points of a sweep have one horizon\nhint: a new sweep"))
         }
-        (Command::Sweep(_), Work::Sweep(..)) if flags.effort.is_some() => {
-            Err(Failure::new(Exit::Usage, "--effort: the points of a sweep have one limit\nhint: a new sweep"))
+        (Command::Sweep(_), Work::Sweep(..)) if flags.max_evaluations.is_some() => {
+            Err(Failure::new(Exit::Usage, "--max-evaluations: the points of a sweep have one limit\nhint: a new sweep"))
         }
         (Command::Sweep(mut sweep), Work::Sweep(..)) => {
             sweep.scene.tell = flags.tell.clone();

@@ -2,7 +2,7 @@
 
 use super::failure::{Exit, Failure};
 use super::flags::RunFlags;
-use super::interrupt::{self, Watchman};
+use super::interrupt::{self, CheckpointTimer};
 use super::output::{name_files, print, print_objects};
 use super::progress::Progress;
 use super::resume::{Saved, Work};
@@ -170,7 +170,7 @@ impl Task<'_> {
         if every > 0.0 && !checkpoints.has_any() {
             self.save(running, writer, folder, checkpoints)?;
         }
-        let mut watchman = Watchman::new(every);
+        let mut checkpoint_timer = CheckpointTimer::new(every);
         let mut progress = Progress::new(&self.scene.name, running.plan().until, self.flags.scene.tell.quiet);
         loop {
             let mut observer = |sample: &Sample| {
@@ -178,7 +178,7 @@ impl Task<'_> {
                 progress.see(sample.t);
                 Ok(())
             };
-            let is_over = running.go(&mut observer, &mut || watchman.wants());
+            let is_over = running.go(&mut observer, &mut || checkpoint_timer.wants());
             let is_over = is_over.map_err(|error| match error {
                 RunError::Observer(error) => Failure::from(folder.failed(TRAJECTORY, error)),
                 error => error.into(),
@@ -191,7 +191,7 @@ impl Task<'_> {
                 }
             }
             self.save(running, writer, folder, checkpoints).inspect_err(|_| progress.finish())?;
-            watchman.written();
+            checkpoint_timer.written();
             if interrupt::is_asked() {
                 progress.finish();
                 return Err(Failure::interrupted(&format!("t = {} s of {} s", running.time(), running.plan().until), folder.path()));
@@ -263,7 +263,7 @@ fn draw(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome, folder: &mut Fo
 /// Constraint drift of several runs in one chart, beside their folders.
 #[cfg(feature = "charts")]
 fn overlay(scene: &Scene, mechanism: &Mechanism, done: &[Done], flags: &RunFlags) -> Result<(), Failure> {
-    if done.len() < 2 || mechanism.rows.is_empty() || flags.no_charts {
+    if done.len() < 2 || mechanism.constraints.is_empty() || flags.no_charts {
         return Ok(());
     }
     let outcomes: Vec<&Outcome> = done.iter().map(|done| &done.outcome).collect();

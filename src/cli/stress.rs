@@ -58,7 +58,7 @@ fn plan(flags: &StressFlags) -> Result<Stress, Failure> {
         flags.scenes.iter().map(case).collect::<Result<_, Failure>>()?
     };
     let methods = if flags.methods.is_empty() { usual.methods } else { flags.methods.clone() };
-    Ok(Stress { cases, methods, effort: flags.effort, threads: flags.threads.map_or(0, usize::from) })
+    Ok(Stress { cases, methods, max_evaluations: flags.max_evaluations, threads: flags.threads.map_or(0, usize::from) })
 }
 
 fn publish(plan: &Stress, lines: &[Line], folder: &mut Folder, flags: &StressFlags) -> Result<(), Failure> {

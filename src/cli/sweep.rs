@@ -2,7 +2,7 @@
 
 use super::failure::{Exit, Failure};
 use super::flags::SweepFlags;
-use super::interrupt::{self, Watchman};
+use super::interrupt::{self, CheckpointTimer};
 use super::output::{name_files, print, print_object};
 use super::progress::Points;
 use super::resume::{Saved, Work};
@@ -48,7 +48,7 @@ pub fn run(flags: &SweepFlags, arguments: &[String]) -> Result<(), Failure> {
     let writer = Writer {
         table,
         progress: Points::new(&plan.scene().name, 0, plan.grid().count(), flags.scene.tell.quiet),
-        watchman: Watchman::new(flags.checkpoints.checkpoint_every),
+        checkpoint_timer: CheckpointTimer::new(flags.checkpoints.checkpoint_every),
         checkpoints: Checkpoints::none(&path),
         text: &text,
         arguments,
@@ -84,7 +84,7 @@ pub fn resume(flags: &SweepFlags, saved: Saved, folder: Folder, checkpoints: Che
     let writer = Writer {
         table: SweepTable::going_on(&plan, folder.take_up(SWEEP, &cursor)?),
         progress: Points::new(&plan.scene().name, seen.points(), plan.grid().count(), flags.scene.tell.quiet),
-        watchman: Watchman::new(flags.checkpoints.checkpoint_every),
+        checkpoint_timer: CheckpointTimer::new(flags.checkpoints.checkpoint_every),
         checkpoints,
         text: &text,
         arguments: &arguments,
@@ -167,7 +167,7 @@ fn folder_name(plan: &Sweep) -> String {
 struct Writer<'a> {
     table: SweepTable<Stream>,
     progress: Points,
-    watchman: Watchman,
+    checkpoint_timer: CheckpointTimer,
     checkpoints: Checkpoints,
     folder: Folder,
     /// The scene's text and the command line, for checkpoints.
@@ -210,9 +210,9 @@ impl PointObserver for Writer<'_> {
 
     fn finished(&mut self, points: u64, seen: &Totals) -> std::io::Result<()> {
         self.progress.see(points);
-        if self.watchman.wants() {
+        if self.checkpoint_timer.wants() {
             let saved = self.save(seen);
-            self.watchman.written();
+            self.checkpoint_timer.written();
             self.trouble = saved.err();
             if self.trouble.is_none() && interrupt::is_asked() {
                 self.trouble = Some(Failure::interrupted(&format!("point {} of the grid", seen.points()), self.folder.path()));

@@ -13,21 +13,21 @@
 
 mod stages;
 
+use super::constraint::Posture;
 use super::energy::moment;
 use super::jacobian::{LANES, Slopes};
 use super::kernel::{Kernel, dot};
 use super::law::Phase;
-use super::row::Posture;
 use super::stiffness::Stiffness;
 use super::tree::{self, size};
-use super::{Field, Form, Mechanism, Motion, Points, State, Time};
+use super::{Form, Mechanism, Motion, OdeSystem, Points, State, Time};
 use crate::arithmetic::{DoubleDouble, Real, Scalar};
 use stages::Stages;
 use std::sync::Arc;
 
-/// Equations in coordinates and momenta, for `N` bodies (any number where `N` is 0); `ACCOUNT` carries p_t.
+/// Equations in coordinates and momenta, for `N` bodies (any number where `N` is 0); `WORK` carries p_t.
 #[derive(Clone, Debug)]
-pub struct Canonical<const N: usize, const ACCOUNT: bool> {
+pub struct Canonical<const N: usize, const WORK: bool> {
     mechanism: Arc<Mechanism>,
     work: Scratch<f64>,
     exact: Scratch<DoubleDouble>,
@@ -57,7 +57,7 @@ struct Scratch<T> {
 
 impl<T: Scalar> Scratch<T> {
     fn new(mechanism: &Mechanism) -> Self {
-        let (n, f) = (mechanism.coordinates(), mechanism.ties.count());
+        let (n, f) = (mechanism.coordinates(), mechanism.partition.count());
         let zeros = || vec![T::ZERO; n];
         Self {
             kernel: Kernel::dense_without_rows(mechanism),
@@ -82,43 +82,43 @@ impl<T: Scalar> Scratch<T> {
 
     /// From u and p to unit vectors, twist and all rates: `u_rate`, `omega`.
     #[inline(always)]
-    fn velocities<const N: usize, const ACCOUNT: bool>(&mut self, mechanism: &Mechanism, u: &[T], p: &[T]) {
+    fn velocities<const N: usize, const WORK: bool>(&mut self, mechanism: &Mechanism, u: &[T], p: &[T]) {
         let n = size::<N>(mechanism.coordinates());
-        if !ACCOUNT {
-            self.kernel.face::<N>(mechanism, u);
-            mechanism.tree.couple::<T, N>(&self.kernel.z, &mut self.kernel.mass, &mut self.kernel.twist);
+        if !WORK {
+            self.kernel.unit_vectors::<N>(mechanism, u);
+            mechanism.tree.mass_matrix::<T, N>(&self.kernel.z, &mut self.kernel.mass, &mut self.kernel.twist);
             tree::factor::<T, N>(n, &mut self.kernel.mass, &mut self.kernel.pivot);
             self.omega[..n].copy_from_slice(&p[..n]);
             tree::solve::<T, N>(n, &self.kernel.mass, &self.kernel.pivot, &mut self.omega);
             return;
         }
         let f = u.len();
-        for (k, tie) in mechanism.ties.bodies[..mechanism.ties.angles].iter().enumerate() {
-            self.kernel.z[k] = tie.face(u, &self.drive[k]);
+        for (k, dependent_angle) in mechanism.partition.bodies[..mechanism.partition.angles].iter().enumerate() {
+            self.kernel.z[k] = dependent_angle.unit_vectors(u, &self.drive[k]);
         }
-        mechanism.ties.feet(u, &mut self.kernel.z);
-        mechanism.tree.couple::<T, N>(&self.kernel.z, &mut self.kernel.mass, &mut self.kernel.twist);
+        mechanism.partition.translations(u, &mut self.kernel.z);
+        mechanism.tree.mass_matrix::<T, N>(&self.kernel.z, &mut self.kernel.mass, &mut self.kernel.twist);
         tree::multiply::<T, N>(n, &self.kernel.mass, &self.drive_rate, &mut self.momentum);
-        mechanism.ties.gather(&self.momentum, &mut self.u_rate);
+        mechanism.partition.gather(&self.momentum, &mut self.u_rate);
         for (rate, &p) in self.u_rate.iter_mut().zip(p) {
             *rate = p - *rate;
         }
-        mechanism.ties.reduce(&self.kernel.mass, &mut self.reduced);
+        mechanism.partition.reduce(&self.kernel.mass, &mut self.reduced);
         tree::factor::<T, 0>(f, &mut self.reduced, &mut self.pivot);
         tree::solve::<T, 0>(f, &self.reduced, &self.pivot, &mut self.u_rate);
         self.omega.copy_from_slice(&self.drive_rate);
-        mechanism.ties.spread(&self.u_rate, &mut self.omega);
+        mechanism.partition.spread(&self.u_rate, &mut self.omega);
         tree::multiply::<T, N>(n, &self.kernel.mass, &self.omega, &mut self.momentum);
     }
 
     /// y' at the drives taken last.
     #[inline(always)]
-    fn rate<const N: usize, const ACCOUNT: bool>(&mut self, mechanism: &Mechanism, y: &[T], rate: &mut [T]) {
+    fn rate<const N: usize, const WORK: bool>(&mut self, mechanism: &Mechanism, y: &[T], rate: &mut [T]) {
         let n = size::<N>(mechanism.coordinates());
-        let f = if ACCOUNT { mechanism.ties.count() } else { n };
-        self.velocities::<N, ACCOUNT>(mechanism, &y[..f], &y[f..2 * f]);
+        let f = if WORK { mechanism.partition.count() } else { n };
+        self.velocities::<N, WORK>(mechanism, &y[..f], &y[f..2 * f]);
         let kernel = &mut self.kernel;
-        mechanism.tree.pull::<T, N>(&kernel.z, &self.omega, &kernel.twist, &mut kernel.load);
+        mechanism.tree.lagrangian_forces::<T, N>(&kernel.z, &self.omega, &kernel.twist, &mut kernel.load);
         for spring in &mechanism.springs {
             spring.span.pull(spring.elastic(&kernel.z), &kernel.z, &mut kernel.load);
         }
@@ -128,7 +128,7 @@ impl<T: Scalar> Scratch<T> {
         for force in &mechanism.forces {
             force.pull_by_potential(self.time, Posture { phi: y, z: &kernel.z, omega: &self.omega }, &mut kernel.load);
         }
-        if !ACCOUNT {
+        if !WORK {
             rate[..n].copy_from_slice(&self.omega[..n]);
             rate[n..2 * n].copy_from_slice(&kernel.load[..n]);
             return;
@@ -136,7 +136,7 @@ impl<T: Scalar> Scratch<T> {
         rate[2 * f] = dot(&kernel.load, &self.drive_rate) + dot(&self.momentum, &self.drive_acceleration);
         let (u_part, p_part) = rate[..2 * f].split_at_mut(f);
         u_part.copy_from_slice(&self.u_rate);
-        mechanism.ties.gather(&kernel.load, p_part);
+        mechanism.partition.gather(&kernel.load, p_part);
         if mechanism.is_worked_on() {
             kernel.load.fill(T::ZERO);
             for spring in mechanism.springs.iter().filter(|spring| spring.damping != 0.0) {
@@ -151,7 +151,7 @@ impl<T: Scalar> Scratch<T> {
             for force in &mechanism.forces {
                 force.pull_applied(self.time, Posture { phi: y, z: &kernel.z, omega: &self.omega }, &mut kernel.load);
             }
-            mechanism.ties.gather(&kernel.load, &mut self.pivot);
+            mechanism.partition.gather(&kernel.load, &mut self.pivot);
             for (p, &force) in p_part.iter_mut().zip(&self.pivot) {
                 *p += force;
             }
@@ -164,8 +164,8 @@ impl<T: Real> Scratch<T> {
     /// Takes the known parts of all angles at one time.
     #[inline]
     fn drive_at(&mut self, mechanism: &Mechanism, t: Time) {
-        for (k, tie) in mechanism.ties.bodies.iter().enumerate() {
-            self.drive(k, tie.drive(t));
+        for (k, dependent_angle) in mechanism.partition.bodies.iter().enumerate() {
+            self.drive(k, dependent_angle.drive(t));
         }
         for (factor, action) in self.factor.iter_mut().zip(&mechanism.actions) {
             *factor = action.factor(t);
@@ -174,8 +174,8 @@ impl<T: Real> Scratch<T> {
     }
 }
 
-impl<const N: usize, const ACCOUNT: bool> Canonical<N, ACCOUNT> {
-    /// The form of a mechanism; `N` must be its number of bodies or 0, `ACCOUNT` true where it has rows or dampers.
+impl<const N: usize, const WORK: bool> Canonical<N, WORK> {
+    /// The form of a mechanism; `N` must be its number of bodies or 0, `WORK` true where it has rows or dampers.
     pub fn new(mechanism: Arc<Mechanism>) -> Self {
         Self::with_lanes(mechanism, false)
     }
@@ -183,31 +183,31 @@ impl<const N: usize, const ACCOUNT: bool> Canonical<N, ACCOUNT> {
     /// The same; with `portable`, without the processor's vector instructions, to the same bits.
     pub fn with_lanes(mechanism: Arc<Mechanism>, portable: bool) -> Self {
         debug_assert!(N == 0 || N == mechanism.size());
-        debug_assert!(ACCOUNT || !mechanism.keeps_account());
+        debug_assert!(WORK || !mechanism.has_work_integral());
         let (work, exact) = (Scratch::new(&mechanism), Scratch::new(&mechanism));
         Self { work, exact, stages: Stages::new(&mechanism, portable), slopes: None, mechanism }
     }
 }
 
-impl<const N: usize, const ACCOUNT: bool> Field for Canonical<N, ACCOUNT> {
+impl<const N: usize, const WORK: bool> OdeSystem for Canonical<N, WORK> {
     fn dimension(&self) -> usize {
-        2 * self.mechanism.ties.count() + usize::from(ACCOUNT)
+        2 * self.mechanism.partition.count() + usize::from(WORK)
     }
 
     fn angles(&self) -> usize {
-        self.mechanism.ties.turning()
+        self.mechanism.partition.turning()
     }
 
     #[inline]
-    fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
-        if ACCOUNT {
+    fn rhs(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
+        if WORK {
             self.work.drive_at(&self.mechanism, t);
         }
-        self.work.rate::<N, ACCOUNT>(&self.mechanism, y, rate);
+        self.work.rate::<N, WORK>(&self.mechanism, y, rate);
     }
 
     fn rates(&mut self, points: &mut Points) {
-        self.stages.rates(ACCOUNT, false, &self.mechanism, points);
+        self.stages.rates(WORK, false, &self.mechanism, points);
     }
 
     fn has_exact_rates(&self) -> bool {
@@ -215,45 +215,45 @@ impl<const N: usize, const ACCOUNT: bool> Field for Canonical<N, ACCOUNT> {
     }
 
     fn exact_rates(&mut self, points: &mut Points) {
-        self.stages.rates(ACCOUNT, true, &self.mechanism, points);
+        self.stages.rates(WORK, true, &self.mechanism, points);
     }
 
     fn jacobian(&mut self, t: Time, y: &[f64], y_by_y: &mut [f64]) -> bool {
         let scratch = self.slopes.get_or_insert_with(|| Box::new(Scratch::new(&self.mechanism)));
-        slopes(scratch, ACCOUNT, &self.mechanism, t, y, y_by_y);
+        slopes(scratch, WORK, &self.mechanism, t, y, y_by_y);
         true
     }
 
     fn stiffness(&mut self, t: Time, y: &[f64]) -> Option<Stiffness> {
         // Leaves the rates of all bodies behind.
-        self.rate(t, y, &mut vec![0.0; y.len()]);
-        let phi: Vec<f64> = self.mechanism.ties.bodies.iter().map(|tie| tie.place(t, y).angle).collect();
+        self.rhs(t, y, &mut vec![0.0; y.len()]);
+        let phi: Vec<f64> = self.mechanism.partition.bodies.iter().map(|dependent_angle| dependent_angle.place(t, y).angle).collect();
         Some(Stiffness::at(&self.mechanism, t, &phi, &self.work.omega))
     }
 
     fn label(&self, i: usize) -> String {
-        let ties = &self.mechanism.ties;
-        let f = ties.count();
+        let partition = &self.mechanism.partition;
+        let f = partition.count();
         match i {
-            i if i < f => self.mechanism.coordinate_name(ties.independent[i]),
-            i if i < 2 * f => format!("momentum along {}", self.mechanism.coordinate_name(ties.independent[i - f])),
+            i if i < f => self.mechanism.coordinate_name(partition.independent[i]),
+            i if i < 2 * f => format!("momentum along {}", self.mechanism.coordinate_name(partition.independent[i - f])),
             _ => "momentum conjugate to time".into(),
         }
     }
 }
 
 /// dy'/dy row by row (d × d); not generic, so that it is compiled once.
-fn slopes(scratch: &mut Scratch<Slopes>, account: bool, mechanism: &Mechanism, t: Time, y: &[f64], y_by_y: &mut [f64]) {
+fn slopes(scratch: &mut Scratch<Slopes>, work_integral: bool, mechanism: &Mechanism, t: Time, y: &[f64], y_by_y: &mut [f64]) {
     let d = y.len();
     let (mut point, mut rate) = (vec![Slopes::ZERO; d], vec![Slopes::ZERO; d]);
-    if account {
+    if work_integral {
         scratch.drive_at(mechanism, t);
     }
     for first in (0..d).step_by(LANES) {
         for (k, (point, &y)) in point.iter_mut().zip(y).enumerate() {
             *point = Slopes::unknown(y, k.wrapping_sub(first));
         }
-        if account {
+        if work_integral {
             scratch.rate::<0, true>(mechanism, &point, &mut rate);
         } else {
             scratch.rate::<0, false>(mechanism, &point, &mut rate);
@@ -266,27 +266,27 @@ fn slopes(scratch: &mut Scratch<Slopes>, account: bool, mechanism: &Mechanism, t
     }
 }
 
-impl<const N: usize, const ACCOUNT: bool> Form for Canonical<N, ACCOUNT> {
+impl<const N: usize, const WORK: bool> Form for Canonical<N, WORK> {
     fn mechanism(&self) -> &Mechanism {
         &self.mechanism
     }
 
     fn state(&self, motion: &Motion) -> State {
-        let (n, ties) = (self.mechanism.coordinates(), &self.mechanism.ties);
+        let (n, partition) = (self.mechanism.coordinates(), &self.mechanism.partition);
         let mut scratch = self.exact.clone();
-        scratch.kernel.face::<0>(&self.mechanism, &motion.phi);
+        scratch.kernel.unit_vectors::<0>(&self.mechanism, &motion.phi);
         let kernel = &mut scratch.kernel;
-        self.mechanism.tree.couple::<DoubleDouble, 0>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
+        self.mechanism.tree.mass_matrix::<DoubleDouble, 0>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
         tree::multiply::<DoubleDouble, 0>(n, &kernel.mass, &motion.omega, &mut scratch.momentum);
-        let mut unknowns: Vec<DoubleDouble> = ties.independent.iter().map(|&body| motion.phi[body]).collect();
-        let mut p = vec![DoubleDouble::ZERO; ties.count()];
-        ties.gather(&scratch.momentum, &mut p);
+        let mut unknowns: Vec<DoubleDouble> = partition.independent.iter().map(|&body| motion.phi[body]).collect();
+        let mut p = vec![DoubleDouble::ZERO; partition.count()];
+        partition.gather(&scratch.momentum, &mut p);
         unknowns.extend(p);
-        if ACCOUNT {
+        if WORK {
             scratch.drive_at(&self.mechanism, motion.time);
             unknowns.push(dot(&scratch.momentum, &scratch.drive_rate) - motion.work);
         }
-        let mut state = ties.state(motion, &unknowns);
+        let mut state = partition.state(motion, &unknowns);
         if self.mechanism.is_winding() {
             state.unwind();
         }
@@ -294,17 +294,17 @@ impl<const N: usize, const ACCOUNT: bool> Form for Canonical<N, ACCOUNT> {
     }
 
     fn read(&mut self, state: &State, motion: &mut Motion) {
-        let ties = &self.mechanism.ties;
-        let f = ties.count();
-        ties.read_angles(state, motion);
+        let partition = &self.mechanism.partition;
+        let f = partition.count();
+        partition.read_angles(state, motion);
         let unknowns: Vec<DoubleDouble> = (0..state.y.len()).map(|i| state.unknown(i)).collect();
         let scratch = &mut self.exact;
-        if ACCOUNT {
+        if WORK {
             scratch.drive_at(&self.mechanism, state.time);
         }
-        scratch.velocities::<0, ACCOUNT>(&self.mechanism, &unknowns[..f], &unknowns[f..2 * f]);
+        scratch.velocities::<0, WORK>(&self.mechanism, &unknowns[..f], &unknowns[f..2 * f]);
         motion.omega.copy_from_slice(&scratch.omega);
-        if ACCOUNT {
+        if WORK {
             motion.work = dot(&scratch.momentum, &scratch.drive_rate) - unknowns[2 * f];
         }
     }

@@ -3,14 +3,14 @@
 mod parts;
 
 use super::assembly::Assembly;
+use super::constraint::{self, ConstraintEquation, Site};
 use super::force::{Action, Spring, Torsion, UserForce, Vibration};
-use super::forest::{Foot, Forest};
+use super::forest::{BodyOrigin, Forest};
 use super::impact::Contact;
 use super::kernel::Kernel;
+use super::partition::CoordinatePartition;
 use super::point::Point;
 use super::recursive::Recursion;
-use super::row::{self, Row, Site};
-use super::ties::Ties;
 use super::tree::Tree;
 use super::units::Units;
 use crate::arithmetic::Complex;
@@ -48,8 +48,8 @@ pub struct Mechanism {
     pub actions: Vec<Action>,
     /// Forces from outside the crate.
     pub forces: Vec<UserForce>,
-    /// Constraint rows: given angles, then points that coincide or stay on lines, then one per contact that is held.
-    pub rows: Vec<Row>,
+    /// Constraint equations: given angles, then points that coincide or stay on lines, then one per contact that is held.
+    pub constraints: Vec<ConstraintEquation>,
     /// How many motors give angles; their rows come first.
     pub motors: usize,
     /// Walls.
@@ -57,7 +57,7 @@ pub struct Mechanism {
     /// The contacts held, by number, in the order of their rows; none as compiled: see [`Mechanism::holding`].
     pub held: Vec<usize>,
     /// The driven angles solved for: coordinates left when the rows are eliminated.
-    pub ties: Ties,
+    pub partition: CoordinatePartition,
     /// Gravity \[m/s²\].
     pub gravity: Complex<f64>,
     /// Energy of gravity of the masses if they were at the ground points they hang from \[J\].
@@ -81,7 +81,7 @@ pub struct Body {
     pub mass: f64,
     /// Moment of inertia about the centre of mass \[kg·m²\].
     pub inertia: f64,
-    /// Centre of mass, counted from the body's foot, in its frame \[m\].
+    /// Centre of mass, counted from the body's origin, in its frame \[m\].
     pub centre: Complex<f64>,
     /// Both ends of the bar, likewise, for drawings \[m\].
     pub ends: [Complex<f64>; 2],
@@ -92,7 +92,7 @@ pub struct Body {
 pub struct Joint {
     /// Name in the scene.
     pub name: String,
-    /// Where it is: a body and a point counted from its foot, in its frame, or a point of the ground \[m\].
+    /// Where it is: a body and a point counted from its origin, in its frame, or a point of the ground \[m\].
     pub at: (Option<usize>, Complex<f64>),
     /// The body that hangs on it; `None` where it closes a loop.
     pub outer: Option<usize>,
@@ -223,7 +223,7 @@ impl Mechanism {
             .collect();
         let gravity = Complex::new(scene.gravity[0], scene.gravity[1]);
         let mut rows = given_angles(scene);
-        let ties = Ties::new(bodies.len(), n, &rows)?;
+        let partition = CoordinatePartition::new(bodies.len(), n, &rows)?;
         let joints = joints(scene, &forest, &mut rows);
         scene.sliders.iter().for_each(|slider| rows.push(slide(&forest, slider)));
         for drive in &scene.drives {
@@ -231,7 +231,7 @@ impl Mechanism {
         }
         for spring in scene.springs.iter().filter(|spring| spring.rigid) {
             let [a, b] = spring.between.each_ref().map(|place| forest.site(place));
-            rows.push(row::rod_row(&spring.name, &a, &b, spring.free_length, bodies.len()));
+            rows.push(constraint::rod_equation(&spring.name, &a, &b, spring.free_length, bodies.len()));
         }
         let springs = (scene.springs.iter().filter(|spring| !spring.rigid))
             .map(|spring| Spring {
@@ -258,7 +258,7 @@ impl Mechanism {
                 let normal = Complex::new(wall.normal[0], wall.normal[1]);
                 let offset = normal.dot(Complex::new(wall.through[0], wall.through[1]));
                 let site = forest.site(&Place { bar: Some(wall.bar), point: wall.point });
-                let row = row::line_row(&wall.name, &site, normal, offset, None, bodies.len());
+                let row = constraint::line_equation(&wall.name, &site, normal, offset, None, bodies.len());
                 Contact { row, point: site.point, normal, restitution: wall.restitution, length: 1.0, force: 1.0 }
             })
             .collect();
@@ -276,11 +276,11 @@ impl Mechanism {
             torsions,
             vibration: None,
             rigid_rate: None,
-            rows,
+            constraints: rows,
             motors: scene.motors.len(),
             contacts,
             held: Vec::new(),
-            ties,
+            partition,
             gravity,
             energy_scale: 1.0,
             units: Units::default(),
@@ -311,7 +311,7 @@ impl Mechanism {
         let phi: Vec<f64> = given.phi.iter().map(|phi| phi.hi).collect();
         let omega: Vec<f64> = given.omega.iter().map(|omega| omega.hi).collect();
         let mut z = vec![Complex::ZERO; phi.len()];
-        self.tree.face::<f64, 0>(&phi, &mut z);
+        self.tree.unit_vectors::<f64, 0>(&phi, &mut z);
         let scale = self.scale_of_energy(&self.start(scene));
         let started: Vec<Vibration> = rigid()
             .map(|spring| {
@@ -324,7 +324,7 @@ impl Mechanism {
         // What rounding puts into a spring is nothing; not a number counts as energy.
         let most = started.into_iter().reduce(|most, other| if other.energy > most.energy { other } else { most });
         let Some(vibration) = most.filter(|most| most.energy.is_nan() || most.energy > NO_ENERGY * scale) else { return Ok(()) };
-        if self.rows.len() > 1 || !self.contacts.is_empty() || self.is_damped() {
+        if self.constraints.len() > 1 || !self.contacts.is_empty() || self.is_damped() {
             return Err(CompileError::NotAlone { spring: vibration.name, energy: vibration.energy });
         }
         self.settle_vibration(scene, given);
@@ -336,14 +336,14 @@ impl Mechanism {
     pub(super) fn choose_form(&mut self) {
         let is_dense = self.tree.is_dense();
         let recursion = (!is_dense || self.coordinates() > UNROLLED)
-            .then(|| Recursion::new(&self.bodies, &self.forest, &self.rows, self.gravity))
+            .then(|| Recursion::new(&self.bodies, &self.forest, &self.constraints, self.gravity))
             .filter(|recursion| !is_dense || recursion.pays() && self.vibration.is_none());
         self.recursion = recursion.map(Arc::new);
     }
 
     /// The mechanism with its equations evaluated body by body, whatever that costs.
     pub fn body_by_body(&self) -> Self {
-        let recursion = Recursion::new(&self.bodies, &self.forest, &self.rows, self.gravity);
+        let recursion = Recursion::new(&self.bodies, &self.forest, &self.constraints, self.gravity);
         Self { recursion: Some(Arc::new(recursion)), ..self.clone() }
     }
 
@@ -352,7 +352,7 @@ impl Mechanism {
         self.tree.is_dense().then(|| Self { recursion: None, ..self.clone() })
     }
 
-    /// Number of coordinates: the bodies' angles, and two for every foot that moves freely.
+    /// Number of coordinates: the bodies' angles, and two for every origin that moves freely.
     pub fn coordinates(&self) -> usize {
         self.tree.coordinates
     }
@@ -378,8 +378,8 @@ impl Mechanism {
         match k.checked_sub(self.bodies.len()) {
             None => format!("phi of {}", name(k)),
             Some(rest) => {
-                let foot = |hang: &super::forest::Hang| hang.foot == Foot::Free(k - rest % 2);
-                let body = self.forest.hangs.iter().position(foot).unwrap_or(0);
+                let origin_point = |hang: &super::forest::Hang| hang.origin_point == BodyOrigin::Free(k - rest % 2);
+                let body = self.forest.hangs.iter().position(origin_point).unwrap_or(0);
                 format!("{} of {}", if rest % 2 == 0 { "x" } else { "y" }, name(body))
             }
         }
@@ -421,7 +421,7 @@ impl Mechanism {
     pub fn pinned(&self, name: &str, a: &Site, b: &Site) -> Self {
         let mut mechanism = self.clone();
         let before_contacts = mechanism.standing_rows();
-        mechanism.rows.splice(before_contacts..before_contacts, row::pin_rows(name, a, b, self.bodies.len()));
+        mechanism.constraints.splice(before_contacts..before_contacts, constraint::pin_equations(name, a, b, self.bodies.len()));
         mechanism.choose_form();
         mechanism
     }
@@ -443,9 +443,9 @@ impl Mechanism {
         self.is_damped() || !self.actions.is_empty() || self.forces.iter().any(UserForce::does_work)
     }
 
-    /// True where motors, dampers or applied forces do work, so that a form must keep account of it.
-    pub fn keeps_account(&self) -> bool {
-        !self.rows.is_empty() || self.is_worked_on()
+    /// True where motors, dampers or applied forces do work, so that a form must integrate it.
+    pub fn has_work_integral(&self) -> bool {
+        !self.constraints.is_empty() || self.is_worked_on()
     }
 
     /// True where only gravity and rows act on bodies that hang on the ground.
@@ -460,12 +460,12 @@ impl Mechanism {
 
     /// True where row number `row` is that of a motor, on an angle or on a slider; not where it locks an angle.
     pub fn is_motor(&self, row: usize) -> bool {
-        row < self.motors || self.rows[row].law.is_some() && !self.rows[row].is_angle()
+        row < self.motors || self.constraints[row].law.is_some() && !self.constraints[row].is_angle()
     }
 
     /// The unit of what rows measure: `rad`, `m`, or `rad or m` where some measure angles and some lengths; none without rows.
     pub fn unit_of_rows(&self) -> Option<&'static str> {
-        let [angles, lengths] = [true, false].map(|kind| self.rows.iter().any(|row| row.is_angle() == kind));
+        let [angles, lengths] = [true, false].map(|kind| self.constraints.iter().any(|row| row.is_angle() == kind));
         match (angles, lengths) {
             (true, true) => Some("rad or m"),
             (true, false) => Some("rad"),
@@ -475,13 +475,13 @@ impl Mechanism {
     }
 
     /// True where a row is left when the given angles are eliminated: loops, sliders, contacts that are held.
-    pub fn is_tied_up(&self) -> bool {
-        self.rows.iter().any(|row| !row.is_angle())
+    pub fn has_closed_loops(&self) -> bool {
+        self.constraints.iter().any(|row| !row.is_angle())
     }
 
     /// True where rows cannot all be eliminated: those of loops and sliders, and given angles whose whole turns matter.
     pub fn has_multipliers(&self) -> bool {
-        self.is_tied_up() || (self.is_winding() && self.ties.driven())
+        self.has_closed_loops() || (self.is_winding() && self.partition.driven())
     }
 
     /// The mass matrix at the start must be positive definite.
@@ -489,8 +489,8 @@ impl Mechanism {
         let start = self.start(scene);
         let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
         let mut kernel = Kernel::<f64>::new(self);
-        kernel.face::<0>(self, &phi);
-        kernel.couple::<0>(self);
+        kernel.unit_vectors::<0>(self, &phi);
+        kernel.mass_matrix::<0>(self);
         kernel.factor::<0>(self, &vec![0.0; phi.len()]);
         let singular = |&k: &usize| {
             // Not a number counts as singular.
@@ -542,15 +542,15 @@ fn long_constants(bodies: &[Body], forest: &Forest, gravity: Complex<f64>) -> Tr
         diagonal[k] += inertia + mass * centre.norm_squared();
         weight[k] += (centre.conj() * gravity).times(mass);
         off_axis |= centre.im != 0.0;
-        match forest.hangs[k].foot {
-            Foot::Ground(_) => {}
-            Foot::On(parent, hinge) => {
+        match forest.hangs[k].origin_point {
+            BodyOrigin::Ground(_) => {}
+            BodyOrigin::On(parent, hinge) => {
                 diagonal[parent] += carried[k] * hinge.norm_squared();
                 weight[parent] += (hinge.conj() * gravity).times(carried[k]);
                 carried[parent] += carried[k];
                 off_axis |= hinge.im != 0.0;
             }
-            Foot::Free(x) => (diagonal[x], weight[x]) = (carried[k], gravity.times(carried[k])),
+            BodyOrigin::Free(x) => (diagonal[x], weight[x]) = (carried[k], gravity.times(carried[k])),
         }
     }
     Tree { coordinates: n, angles: bodies.len(), coupling: Vec::new(), diagonal, weight, off_axis }

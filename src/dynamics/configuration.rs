@@ -1,6 +1,6 @@
 //! Where a mechanism is at a moment, as user-defined forces and events see it.
 
-use super::row::Site;
+use super::constraint::Site;
 use super::{CompileError, Mechanism};
 use crate::arithmetic::{Complex, Scalar};
 

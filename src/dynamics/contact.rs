@@ -13,9 +13,9 @@ pub mod metric;
 pub mod scale;
 
 use self::metric::{Basis, Gradient, Metric};
+use super::constraint::Posture;
 use super::impact::{Contact, NO_FREEDOM};
 use super::kernel::dot;
-use super::row::Posture;
 use super::{Mechanism, Time};
 use crate::arithmetic::Complex;
 use nalgebra::DVector;
@@ -34,8 +34,8 @@ impl Mechanism {
     /// Nothing is renumbered: the event function of a contact that is held is its force instead of its gap.
     pub fn holding(&self, contacts: &[usize]) -> Self {
         let mut mechanism = self.clone();
-        mechanism.rows.truncate(self.standing_rows());
-        mechanism.rows.extend(contacts.iter().map(|&contact| self.contacts[contact].row.clone()));
+        mechanism.constraints.truncate(self.standing_rows());
+        mechanism.constraints.extend(contacts.iter().map(|&contact| self.contacts[contact].row.clone()));
         mechanism.held = contacts.to_vec();
         mechanism.choose_form();
         mechanism
@@ -44,13 +44,13 @@ impl Mechanism {
     /// The elements at these coordinates \[rad, m\].
     pub fn elements(&self, phi: &[f64]) -> Vec<Complex<f64>> {
         let mut z = vec![Complex::ZERO; self.coordinates()];
-        self.tree.face::<f64, 0>(phi, &mut z);
+        self.tree.unit_vectors::<f64, 0>(phi, &mut z);
         z
     }
 
     /// Rows that are in force whatever touches.
     pub fn standing_rows(&self) -> usize {
-        self.rows.len() - self.held.len()
+        self.constraints.len() - self.held.len()
     }
 
     /// Which of the contacts `touching` stay, or `None` where the constraints leave no freedom to keep a point out of its wall.

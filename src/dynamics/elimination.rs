@@ -6,12 +6,12 @@
 //!
 //! Unknowns: u (f), u' (f), work of motors, dampers and applied forces \[J\].  The rows hold exactly, whatever the method.
 
+use super::constraint::Posture;
 use super::gap::turning;
 use super::jacobian::Jacobian;
 use super::kernel::{Bias, Kernel};
-use super::row::Posture;
 use super::tree::{self, size};
-use super::{Along, Coordinates, Field, Form, Glance, Mechanism, Motion, State, Time};
+use super::{Along, BodyAngles, Coordinates, Form, Mechanism, Motion, OdeSystem, State, Time};
 use crate::arithmetic::{Complex, DoubleDouble};
 use std::sync::Arc;
 
@@ -40,7 +40,7 @@ impl<const N: usize> Elimination<N> {
     /// The form of a mechanism; `N` must be its number of bodies or 0.
     pub fn new(mechanism: Arc<Mechanism>) -> Self {
         debug_assert!(N == 0 || N == mechanism.size());
-        let (n, f) = (mechanism.coordinates(), mechanism.ties.count());
+        let (n, f) = (mechanism.coordinates(), mechanism.partition.count());
         let zeros = || vec![0.0; n];
         Self {
             kernel: Kernel::dense_without_rows(&mechanism),
@@ -54,31 +54,31 @@ impl<const N: usize> Elimination<N> {
             reduced: vec![0.0; f * f],
             pivot: vec![0.0; f],
             coordinate_acceleration: vec![0.0; f],
-            is_steady: mechanism.ties.is_steady(),
+            is_steady: mechanism.partition.is_steady(),
             jacobian: None,
             mechanism,
         }
     }
 
-    /// [`Field::rate`] for `F` coordinates (any number where `F` is 0).
+    /// [`OdeSystem::rhs`] for `F` coordinates (any number where `F` is 0).
     #[inline(always)]
     fn rate_sized<const F: usize>(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
         let mechanism = &*self.mechanism;
-        let (n, f) = (size::<N>(mechanism.coordinates()), size::<F>(mechanism.ties.count()));
-        let angles = size::<N>(mechanism.ties.angles);
+        let (n, f) = (size::<N>(mechanism.coordinates()), size::<F>(mechanism.partition.count()));
+        let angles = size::<N>(mechanism.partition.angles);
         let (u, u_rate, rate) = (&y[..f], &y[f..2 * f], &mut rate[..2 * f + 1]);
-        let ties = &mechanism.ties.bodies[..n];
+        let partition = &mechanism.partition.bodies[..n];
         let kernel = &mut self.kernel;
         let (drive_rate, drive_acceleration, omega) = (&mut self.drive_rate[..n], &mut self.drive_acceleration[..n], &mut self.omega[..n]);
         for k in 0..angles {
-            let placed = ties[k].place(t, u);
+            let placed = partition[k].place(t, u);
             (kernel.z[k], drive_rate[k], drive_acceleration[k]) = (placed.unit, placed.rate, placed.acceleration);
-            omega[k] = drive_rate[k] + ties[k].base.map_or(0.0, |base| u_rate[base]);
+            omega[k] = drive_rate[k] + partition[k].base.map_or(0.0, |base| u_rate[base]);
             self.phi[k] = placed.angle;
         }
-        mechanism.ties.feet(u, &mut kernel.z);
+        mechanism.partition.translations(u, &mut kernel.z);
         for k in angles..n {
-            omega[k] = ties[k].base.map_or(0.0, |base| u_rate[base]);
+            omega[k] = partition[k].base.map_or(0.0, |base| u_rate[base]);
         }
         kernel.assemble::<N>(mechanism, t, &self.phi, omega);
         let (mass, load, given) = (&kernel.mass[..n * n], &mut kernel.load[..n], &mut self.given[..n]);
@@ -97,11 +97,11 @@ impl<const N: usize> Elimination<N> {
             }
         }
         for i in 0..n {
-            let Some(a) = ties[i].base else { continue };
+            let Some(a) = partition[i].base else { continue };
             acceleration[a] += load[i];
             reduced[a * f + a] += mass[i * n + i];
             for j in i + 1..n {
-                let Some(b) = ties[j].base else { continue };
+                let Some(b) = partition[j].base else { continue };
                 let twice = if a == b { 2.0 } else { 1.0 };
                 reduced[a.min(b) * f + a.max(b)] += twice * mass[i * n + j];
             }
@@ -110,7 +110,7 @@ impl<const N: usize> Elimination<N> {
         tree::solve::<f64, F>(f, reduced, &self.pivot, acceleration);
         let share = &mut self.share[..n];
         for k in 0..n {
-            share[k] = ties[k].base.map_or(0.0, |base| acceleration[base]);
+            share[k] = partition[k].base.map_or(0.0, |base| acceleration[base]);
         }
         tree::multiply::<f64, N>(n, mass, share, given);
         let mut power = 0.0;
@@ -124,17 +124,17 @@ impl<const N: usize> Elimination<N> {
     }
 }
 
-impl<const N: usize> Field for Elimination<N> {
+impl<const N: usize> OdeSystem for Elimination<N> {
     fn dimension(&self) -> usize {
-        2 * self.mechanism.ties.count() + 1
+        2 * self.mechanism.partition.count() + 1
     }
 
     fn angles(&self) -> usize {
-        self.mechanism.ties.turning()
+        self.mechanism.partition.turning()
     }
 
-    fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
-        match self.mechanism.ties.count() {
+    fn rhs(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
+        match self.mechanism.partition.count() {
             1 => self.rate_sized::<1>(t, y, rate),
             2 => self.rate_sized::<2>(t, y, rate),
             _ => self.rate_sized::<0>(t, y, rate),
@@ -142,43 +142,43 @@ impl<const N: usize> Field for Elimination<N> {
     }
 
     fn fine_rate(&mut self, t: Time, y: &[f64], low: &[f64], rate: &mut [f64]) {
-        let ties = &self.mechanism.ties;
-        for (k, tie) in ties.bodies.iter().enumerate() {
-            self.phi[k] = tie.place(t, y).angle;
-            self.low[k] = tie.base.map_or(0.0, |base| low[base]);
+        let partition = &self.mechanism.partition;
+        for (k, dependent_angle) in partition.bodies.iter().enumerate() {
+            self.phi[k] = dependent_angle.place(t, y).angle;
+            self.low[k] = dependent_angle.base.map_or(0.0, |base| low[base]);
         }
         self.kernel.measure(&self.mechanism, &self.phi, &self.low);
-        self.rate(t, y, rate);
+        self.rhs(t, y, rate);
         self.kernel.stretch.clear();
     }
 
     fn jacobian(&mut self, t: Time, y: &[f64], y_by_y: &mut [f64]) -> bool {
         let mechanism = &*self.mechanism;
-        let ties = &mechanism.ties;
-        let f = ties.count();
-        for (k, tie) in ties.bodies.iter().enumerate() {
-            let placed = tie.place(t, &y[..f]);
+        let partition = &mechanism.partition;
+        let f = partition.count();
+        for (k, dependent_angle) in partition.bodies.iter().enumerate() {
+            let placed = dependent_angle.place(t, &y[..f]);
             self.phi[k] = placed.angle;
-            self.omega[k] = placed.rate + tie.base.map_or(0.0, |base| y[f + base]);
+            self.omega[k] = placed.rate + dependent_angle.base.map_or(0.0, |base| y[f + base]);
         }
         let jacobian = self.jacobian.get_or_insert_with(|| Box::new(Jacobian::new(mechanism)));
         jacobian.evaluate(mechanism, t, &self.phi, &self.omega, Bias::default());
-        jacobian.fill_independent(ties, y_by_y);
+        jacobian.fill_independent(partition, y_by_y);
         true
     }
 
     fn label(&self, i: usize) -> String {
-        let ties = &self.mechanism.ties;
-        let f = ties.count();
+        let partition = &self.mechanism.partition;
+        let f = partition.count();
         match i {
-            i if i < f => self.mechanism.coordinate_name(ties.independent[i]),
-            i if i < 2 * f => self.mechanism.rate_name(ties.independent[i - f]),
+            i if i < f => self.mechanism.coordinate_name(partition.independent[i]),
+            i if i < 2 * f => self.mechanism.rate_name(partition.independent[i - f]),
             _ => "work of motors and forces".into(),
         }
     }
 
     fn unit(&self, i: usize) -> f64 {
-        self.mechanism.unit_of(i, self.mechanism.ties.count(), self.mechanism.ties.turning())
+        self.mechanism.unit_of(i, self.mechanism.partition.count(), self.mechanism.partition.turning())
     }
 
     fn time_unit(&self) -> f64 {
@@ -190,42 +190,42 @@ impl<const N: usize> Field for Elimination<N> {
     }
 
     fn gaps(&mut self, t: Time, y: &[f64], gaps: &mut [f64]) {
-        let ties = &self.mechanism.ties;
+        let partition = &self.mechanism.partition;
         let kernel = &mut self.kernel;
-        for (z, tie) in kernel.z.iter_mut().zip(&ties.bodies[..ties.angles]) {
-            *z = tie.place(t, &y[..ties.count()]).unit;
+        for (z, dependent_angle) in kernel.z.iter_mut().zip(&partition.bodies[..partition.angles]) {
+            *z = dependent_angle.place(t, &y[..partition.count()]).unit;
         }
-        ties.feet(y, &mut kernel.z);
+        partition.translations(y, &mut kernel.z);
         for (gap, contact) in gaps.iter_mut().zip(&self.mechanism.contacts) {
             *gap = contact.gap(&kernel.z);
         }
     }
 
     fn watched(&self) -> usize {
-        self.mechanism.ties.count()
+        self.mechanism.partition.count()
     }
 
     fn gap(&self, event: usize, along: Along) -> Option<[f64; 3]> {
-        let Along { time, pace, y, slope } = along;
-        let ties = &self.mechanism.ties;
+        let Along { time, step_size, y, slope } = along;
+        let partition = &self.mechanism.partition;
         self.mechanism.contacts[event].gap_along(|k| {
-            let tie = &ties.bodies[k];
-            if k < ties.angles {
-                let placed = tie.place(time, &y[..ties.count()]);
-                return turning(placed.unit, pace * placed.rate + tie.base.map_or(0.0, |base| slope[base]));
+            let dependent_angle = &partition.bodies[k];
+            if k < partition.angles {
+                let placed = dependent_angle.place(time, &y[..partition.count()]);
+                return turning(placed.unit, step_size * placed.rate + dependent_angle.base.map_or(0.0, |base| slope[base]));
             }
-            tie.base.map_or([Complex::ZERO; 2], |x| [Complex::new(y[x], y[x + 1]), Complex::new(slope[x], slope[x + 1])])
+            dependent_angle.base.map_or([Complex::ZERO; 2], |x| [Complex::new(y[x], y[x + 1]), Complex::new(slope[x], slope[x + 1])])
         })
     }
 
-    fn gap_bend(&self, event: usize, t: f64, pace: f64, first: &[f64], second: &[f64]) -> f64 {
-        let ties = &self.mechanism.ties;
+    fn gap_bend(&self, event: usize, t: f64, step_size: f64, first: &[f64], second: &[f64]) -> f64 {
+        let partition = &self.mechanism.partition;
         let most = |k: usize| {
-            let tie = &ties.bodies[k];
-            let start = tie.base.map_or([0.0; 2], |base| [second[base], first[base]]);
-            tie.laws.iter().fold(start, |[second, first], (_, law)| {
+            let dependent_angle = &partition.bodies[k];
+            let start = dependent_angle.base.map_or([0.0; 2], |base| [second[base], first[base]]);
+            dependent_angle.laws.iter().fold(start, |[second, first], (_, law)| {
                 let [rate, acceleration] = law.bounds(t);
-                [second + pace * pace * acceleration, first + pace * rate]
+                [second + step_size * step_size * acceleration, first + step_size * rate]
             })
         };
         self.mechanism.contacts[event].gap_bend(most)
@@ -242,11 +242,11 @@ impl<const N: usize> Form for Elimination<N> {
     }
 
     fn state(&self, motion: &Motion) -> State {
-        let ties = &self.mechanism.ties;
-        let mut unknowns: Vec<DoubleDouble> = ties.independent.iter().map(|&body| motion.phi[body]).collect();
-        unknowns.extend(ties.coordinate_rates(motion));
+        let partition = &self.mechanism.partition;
+        let mut unknowns: Vec<DoubleDouble> = partition.independent.iter().map(|&body| motion.phi[body]).collect();
+        unknowns.extend(partition.coordinate_rates(motion));
         unknowns.push(motion.work);
-        let mut state = ties.state(motion, &unknowns);
+        let mut state = partition.state(motion, &unknowns);
         if self.mechanism.is_winding() {
             state.unwind();
         }
@@ -254,24 +254,24 @@ impl<const N: usize> Form for Elimination<N> {
     }
 
     fn read(&mut self, state: &State, motion: &mut Motion) {
-        let f = self.mechanism.ties.count();
-        self.mechanism.ties.read_angles(state, motion);
-        for (omega, tie) in motion.omega.iter_mut().zip(&self.mechanism.ties.bodies) {
-            if let Some(base) = tie.base {
+        let f = self.mechanism.partition.count();
+        self.mechanism.partition.read_angles(state, motion);
+        for (omega, dependent_angle) in motion.omega.iter_mut().zip(&self.mechanism.partition.bodies) {
+            if let Some(base) = dependent_angle.base {
                 *omega += state.unknown(f + base);
             }
         }
         motion.work = state.unknown(2 * f);
     }
 
-    fn glance(&mut self, state: &State, glance: &mut Glance) {
+    fn body_angles(&mut self, state: &State, body_angles: &mut BodyAngles) {
         let n = self.mechanism.coordinates();
         // Where nothing is driven the coordinates are the angles, in the same order.
-        if self.mechanism.ties.count() == n {
-            return glance.take_leading(state, n);
+        if self.mechanism.partition.count() == n {
+            return body_angles.take_leading(state, n);
         }
         let mut motion = Motion::default();
         self.read(state, &mut motion);
-        glance.take(&motion);
+        body_angles.take(&motion);
     }
 }

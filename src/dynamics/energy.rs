@@ -3,9 +3,9 @@
 //! Written over the scalar trait and used in double-double by the monitors: at 1e-15 of the scale an energy evaluated in plain doubles shows
 //! its own rounding.
 
+use super::constraint::Posture;
 use super::force::action::Kind;
 use super::kernel::{Kernel, dot};
-use super::row::Posture;
 use super::{Mechanism, Motion, Time, tree};
 use crate::arithmetic::lanes::{self, Code, Lanes};
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
@@ -73,26 +73,26 @@ impl Mechanism {
             motion.turns.push(turns as i64);
             motion.omega.push(DoubleDouble::of(start.omega));
         }
-        self.put_feet(scene, &mut motion);
+        self.put_translations(scene, &mut motion);
         motion
     }
 
-    /// Positions and velocities of free feet, from those given for the origin of some bar of each group.
-    pub(super) fn put_feet(&self, scene: &Scene, motion: &mut Motion) {
+    /// Positions and velocities of translational coordinates, from those given for the origin of some bar of each group.
+    pub(super) fn put_translations(&self, scene: &Scene, motion: &mut Motion) {
         let bars = self.bodies.len();
         if bars == self.coordinates() {
             return;
         }
         motion.resize(self.coordinates());
         let mut kernel = Kernel::<DoubleDouble>::without_rows(self);
-        kernel.face::<0>(self, &motion.phi);
+        kernel.unit_vectors::<0>(self, &motion.phi);
         for x in (bars..self.coordinates()).step_by(2) {
             let is_carried = |&k: &usize| self.end(k, 0).point.shifts.first().is_some_and(|shift| shift.0 == x);
             let group: Vec<usize> = (0..bars).filter(is_carried).collect();
             let given = |k: &usize| scene.given.get(*k);
             let origin = group.iter().find_map(|k| Some((*k, given(k)?.origin?)));
             if let Some((k, [at_x, at_y])) = origin {
-                // Counted from the foot, wherever that was.
+                // Counted from the origin, wherever that was.
                 kernel.z[x] = Complex::ZERO;
                 let reach = self.end(k, 0).point.position(&kernel.z);
                 (motion.phi[x], motion.phi[x + 1]) = (DoubleDouble::of(at_x) - reach.re, DoubleDouble::of(at_y) - reach.im);
@@ -116,18 +116,18 @@ impl Mechanism {
     /// Energies of a motion; overwrites `kernel`.
     #[inline(always)]
     pub fn energy<T: Real>(&self, kernel: &mut Kernel<T>, phi: &[T], omega: &[T]) -> Energy<T> {
-        kernel.face::<0>(self, phi);
+        kernel.unit_vectors::<0>(self, phi);
         self.energy_facing::<T, 0>(kernel, phi, omega)
     }
 
     /// Energies at the elements in `kernel` and the coordinates they stand for; it holds M and its twist afterwards; for `N` bodies (any number where `N` is 0).
     #[inline(always)]
     pub fn energy_facing<T: Real, const N: usize>(&self, kernel: &mut Kernel<T>, phi: &[T], omega: &[T]) -> Energy<T> {
-        if N == 0 && !kernel.feet[0].is_empty() {
+        if N == 0 && !kernel.translations[0].is_empty() {
             return self.energy_bodywise(kernel, phi, omega);
         }
         let n = tree::size::<N>(self.coordinates());
-        self.tree.couple::<T, N>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
+        self.tree.mass_matrix::<T, N>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
         tree::multiply::<T, N>(n, &kernel.mass, omega, &mut kernel.load);
         let gravity = self.tree.gravity_energy(&kernel.z) + T::of(self.ground_energy);
         let springs = self.springs.iter().fold(gravity, |sum, spring| sum + spring.energy(&kernel.z));
@@ -142,16 +142,16 @@ impl Mechanism {
     /// The same body by body, from the motion of every centre of mass.
     #[inline(always)]
     fn energy_bodywise<T: Real>(&self, kernel: &mut Kernel<T>, phi: &[T], omega: &[T]) -> Energy<T> {
-        let (z, [feet, velocities]) = (&kernel.z, &mut kernel.feet);
-        self.forest.feet(z, feet);
-        self.forest.foot_velocities(z, omega, velocities);
+        let (z, [translations, velocities]) = (&kernel.z, &mut kernel.translations);
+        self.forest.translations(z, translations);
+        self.forest.origin_velocities(z, omega, velocities);
         let gravity = Complex::of(self.gravity);
         let (mut kinetic, mut potential) = (T::ZERO, T::ZERO);
         for (k, body) in self.bodies.iter().enumerate() {
             let arm = z[k].turn(body.centre);
             let velocity = velocities[k] + arm.left().times(omega[k]);
             kinetic += velocity.norm_squared().scale(0.5 * body.mass) + (omega[k] * omega[k]).scale(0.5 * body.inertia);
-            potential -= gravity.dot(feet[k] + arm).scale(body.mass);
+            potential -= gravity.dot(translations[k] + arm).scale(body.mass);
         }
         Energy { kinetic, potential: potential + self.elastic_energy(z, phi) }
     }
@@ -171,7 +171,7 @@ impl Mechanism {
 
     /// Adds the generalized forces \[N·m, N\] of springs, dampers and applied forces.
     #[inline(always)]
-    pub fn push<T: Real>(&self, t: Time, at: Posture<T>, stretch: &[T], load: &mut [T]) {
+    pub fn add_applied_forces<T: Real>(&self, t: Time, at: Posture<T>, stretch: &[T], load: &mut [T]) {
         for (s, spring) in self.springs.iter().enumerate() {
             let force = match stretch.get(s) {
                 Some(&stretch) if spring.free_length > 0.0 => spring.stretched(stretch, at.z, at.omega),

@@ -3,23 +3,23 @@
 //! Breadth first from the ground, then from the first body of every group that is left: the depth is the least there is, and with it the number of
 //! couplings.  Nobody chooses the tree; a hinge between bodies that are connected already becomes a pin.
 
+use super::constraint::Site;
 use super::point::Point;
-use super::row::Site;
 use crate::arithmetic::{Complex, Scalar};
 use crate::scene::{Place, Scene};
 
-/// Where the foot of a body is: the point it hangs on, from which its points are counted.
+/// Where the origin of a body is: the point it hangs on, from which its points are counted.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Foot {
+pub enum BodyOrigin {
     /// A point of the ground \[m\].
     Ground(Complex<f64>),
-    /// A point of another body, counted from that body's foot \[m\].
+    /// A point of another body, counted from that body's origin \[m\].
     On(usize, Complex<f64>),
     /// A point that moves freely, with coordinates x and the one after it.
     Free(usize),
 }
 
-impl Foot {
+impl BodyOrigin {
     /// The body it is on.
     pub fn parent(&self) -> Option<usize> {
         if let Self::On(parent, _) = self { Some(*parent) } else { None }
@@ -29,9 +29,9 @@ impl Foot {
 /// How a body hangs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hang {
-    /// Its foot.
-    pub foot: Foot,
-    /// The foot in the body's own frame \[m\].
+    /// Its origin.
+    pub origin_point: BodyOrigin,
+    /// The origin in the body's own frame \[m\].
     pub own: Complex<f64>,
 }
 
@@ -44,7 +44,7 @@ pub struct Forest {
     pub order: Vec<usize>,
     /// The body that hangs on each hinge, then on each weld; `None` where it closes a loop.
     pub outer: Vec<Option<usize>>,
-    /// Number of coordinates: angles, and two for each foot that moves freely.
+    /// Number of coordinates: angles, and two for each origin that moves freely.
     pub coordinates: usize,
 }
 
@@ -69,7 +69,7 @@ impl Forest {
                 if hangs[body].is_some() {
                     continue;
                 }
-                hangs[body] = Some(Hang { foot: Foot::Free(coordinates), own: Complex::ZERO });
+                hangs[body] = Some(Hang { origin_point: BodyOrigin::Free(coordinates), own: Complex::ZERO });
                 coordinates += 2;
                 order.push(body);
             }
@@ -80,11 +80,11 @@ impl Forest {
                     let (near, far) = if a.bar == inner { (a, b) } else { (b, a) };
                     let Some(body) = far.bar.filter(|&body| hangs[body].is_none()) else { continue };
                     let near = Complex::new(near.point[0], near.point[1]);
-                    let foot = match inner.and_then(|parent| Some((parent, hangs[parent]?))) {
-                        Some((parent, hang)) => Foot::On(parent, near - hang.own),
-                        None => Foot::Ground(near),
+                    let origin_point = match inner.and_then(|parent| Some((parent, hangs[parent]?))) {
+                        Some((parent, hang)) => BodyOrigin::On(parent, near - hang.own),
+                        None => BodyOrigin::Ground(near),
                     };
-                    hangs[body] = Some(Hang { foot, own: Complex::new(far.point[0], far.point[1]) });
+                    hangs[body] = Some(Hang { origin_point, own: Complex::new(far.point[0], far.point[1]) });
                     outer[joint] = Some(body);
                     order.push(body);
                     front.push_back(Some(body));
@@ -102,18 +102,18 @@ impl Forest {
         }
     }
 
-    /// A point of a body, `offset` from its foot in its frame \[m\].
+    /// A point of a body, `offset` from its origin in its frame \[m\].
     pub fn walk(&self, body: usize, offset: Complex<f64>) -> Point {
         let mut path = vec![(body, offset)];
-        let mut foot = self.hangs[body].foot;
-        while let Foot::On(parent, offset) = foot {
+        let mut origin_point = self.hangs[body].origin_point;
+        while let BodyOrigin::On(parent, offset) = origin_point {
             path.push((parent, offset));
-            foot = self.hangs[parent].foot;
+            origin_point = self.hangs[parent].origin_point;
         }
-        let mut point = match foot {
-            Foot::Free(x) => Point::floating(x),
-            Foot::Ground(at) => Point { root: at, ..Point::default() },
-            Foot::On(..) => Point::default(),
+        let mut point = match origin_point {
+            BodyOrigin::Free(x) => Point::floating(x),
+            BodyOrigin::Ground(at) => Point { root: at, ..Point::default() },
+            BodyOrigin::On(..) => Point::default(),
         };
         path.sort_unstable_by_key(|term| term.0);
         path.retain(|term| term.1 != Complex::ZERO);
@@ -126,56 +126,58 @@ impl Forest {
         Site { body: place.bar, point: self.point(place) }
     }
 
-    /// The ground point that each body hangs from, one body on another; the origin where a foot moves freely \[m\].
+    /// The ground point that each body hangs from, one body on another; the origin where an origin moves freely \[m\].
     pub fn roots(&self) -> Vec<Complex<f64>> {
         let mut roots = vec![Complex::ZERO; self.hangs.len()];
         for &body in &self.order {
-            roots[body] = match self.hangs[body].foot {
-                Foot::Ground(at) => at,
-                Foot::On(parent, _) => roots[parent],
-                Foot::Free(_) => Complex::ZERO,
+            roots[body] = match self.hangs[body].origin_point {
+                BodyOrigin::Ground(at) => at,
+                BodyOrigin::On(parent, _) => roots[parent],
+                BodyOrigin::Free(_) => Complex::ZERO,
             };
         }
         roots
     }
 
-    /// Writes the feet of all bodies at the elements `z`, outwards \[m\].
+    /// Writes the translational coordinates of all bodies at the elements `z`, outwards \[m\].
     #[inline(always)]
-    pub fn feet<T: Scalar>(&self, z: &[Complex<T>], feet: &mut [Complex<T>]) {
+    pub fn translations<T: Scalar>(&self, z: &[Complex<T>], translations: &mut [Complex<T>]) {
         for &body in &self.order {
-            feet[body] = match self.hangs[body].foot {
-                Foot::Ground(at) => Complex::of(at),
-                Foot::On(parent, offset) => feet[parent] + z[parent].turn(offset),
-                Foot::Free(x) => z[x],
+            translations[body] = match self.hangs[body].origin_point {
+                BodyOrigin::Ground(at) => Complex::of(at),
+                BodyOrigin::On(parent, offset) => translations[parent] + z[parent].turn(offset),
+                BodyOrigin::Free(x) => z[x],
             };
         }
     }
 
-    /// Writes the velocities of the feet \[m/s\].
+    /// Writes the velocities of the translational coordinates \[m/s\].
     #[inline(always)]
-    pub fn foot_velocities<T: Scalar>(&self, z: &[Complex<T>], omega: &[T], feet: &mut [Complex<T>]) {
+    pub fn origin_velocities<T: Scalar>(&self, z: &[Complex<T>], omega: &[T], translations: &mut [Complex<T>]) {
         for &body in &self.order {
-            feet[body] = match self.hangs[body].foot {
-                Foot::Ground(_) => Complex::ZERO,
-                Foot::On(parent, offset) => feet[parent] + z[parent].turn(offset).left().times(omega[parent]),
-                Foot::Free(x) => Complex::new(omega[x], omega[x + 1]),
+            translations[body] = match self.hangs[body].origin_point {
+                BodyOrigin::Ground(_) => Complex::ZERO,
+                BodyOrigin::On(parent, offset) => translations[parent] + z[parent].turn(offset).left().times(omega[parent]),
+                BodyOrigin::Free(x) => Complex::new(omega[x], omega[x + 1]),
             };
         }
     }
 
-    /// Writes the accelerations of the feet \[m/s²\].
-    pub fn foot_accelerations<T: Scalar>(&self, z: &[Complex<T>], omega: &[T], alpha: &[T], feet: &mut [Complex<T>]) {
+    /// Writes the accelerations of the translational coordinates \[m/s²\].
+    pub fn origin_accelerations<T: Scalar>(&self, z: &[Complex<T>], omega: &[T], alpha: &[T], translations: &mut [Complex<T>]) {
         for &body in &self.order {
-            feet[body] = match self.hangs[body].foot {
-                Foot::Ground(_) => Complex::ZERO,
-                Foot::On(parent, offset) => feet[parent] + swing(z[parent].turn(offset), omega[parent], alpha[parent]),
-                Foot::Free(x) => Complex::new(alpha[x], alpha[x + 1]),
+            translations[body] = match self.hangs[body].origin_point {
+                BodyOrigin::Ground(_) => Complex::ZERO,
+                BodyOrigin::On(parent, offset) => {
+                    translations[parent] + turning_acceleration(z[parent].turn(offset), omega[parent], alpha[parent])
+                }
+                BodyOrigin::Free(x) => Complex::new(alpha[x], alpha[x + 1]),
             };
         }
     }
 }
 
 /// Acceleration \[m/s²\] of the end of an arm that turns.
-pub fn swing<T: Scalar>(arm: Complex<T>, omega: T, alpha: T) -> Complex<T> {
+pub fn turning_acceleration<T: Scalar>(arm: Complex<T>, omega: T, alpha: T) -> Complex<T> {
     arm.left().times(alpha) - arm.times(omega * omega)
 }

@@ -7,12 +7,12 @@
 //!
 //! Derivatives may be by time or by anything that grows in proportion with it.
 
+use super::constraint::Measure;
 use super::impact::Contact;
 use super::law::Law;
-use super::row::Measure;
 use crate::arithmetic::Complex;
 
-/// An angle or a foot, and its derivative.
+/// An angle or an origin, and its derivative.
 pub type Moving = [Complex<f64>; 2];
 
 /// A unit vector that turns at a rate.
@@ -64,9 +64,9 @@ impl Law {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dynamics::constraint::ConstraintEquation;
     use crate::dynamics::point::Point;
     use crate::dynamics::quadratic::Quadratic;
-    use crate::dynamics::row::Row;
     use crate::scene::Sine;
 
     #[test]
@@ -74,9 +74,9 @@ mod tests {
         let normal = Complex::unit(0.7);
         let point = Point::floating(2).along(0, Complex::new(0.6, 0.1)).along(1, Complex::new(0.2, -0.4));
         let measure = Measure::Place(Quadratic::along(&point, normal, 2));
-        let row = Row { name: "wall".into(), measure, law: None, push: None };
+        let row = ConstraintEquation { name: "wall".into(), measure, law: None, push: None };
         let contact = Contact { row, point, normal, restitution: 1.0, length: 0.5, force: 1.0 };
-        // Two angles and a foot, each a parabola in t.
+        // Two angles and an origin, each a parabola in t.
         let powers = [[0.3, 2.0, -1.5], [-1.0, -4.0, 0.4], [0.1, 0.5, 2.0], [0.7, -0.3, -1.0]];
         let at = |k: usize, t: f64| [powers[k][0] + t * (powers[k][1] + t * powers[k][2]), powers[k][1] + 2.0 * t * powers[k][2]];
         let gap = |t: f64| {

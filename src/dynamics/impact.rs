@@ -10,11 +10,11 @@
 //! The impulse on the point along the wall's normal is -rho, never negative.  Without motors the energy changes by `-rho (1-e) J w⁻ / 2`.
 //! Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996), section 8.2 (Newton's law of impact).
 
+use super::constraint::{ConstraintEquation, Posture};
 use super::contact::metric::{Gradient, Metric};
 use super::contact::scale::magnitudes;
 use super::kernel::dot;
 use super::point::Point;
-use super::row::{Posture, Row};
 use super::{Mechanism, Time};
 use crate::arithmetic::Complex;
 
@@ -28,7 +28,7 @@ pub const TOUCH: f64 = 2e-12;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contact {
     /// The gap and its Jacobian.
-    pub row: Row,
+    pub row: ConstraintEquation,
     /// The point.
     pub point: Point,
     /// Unit normal of the wall.
@@ -53,7 +53,7 @@ impl Contact {
     }
 
     /// The largest velocity the parts of the point have along the normal \[m/s\]: rounding of its normal velocity is a share of it.
-    pub fn pace(&self, omega: &[f64]) -> f64 {
+    pub fn step_size(&self, omega: &[f64]) -> f64 {
         let turning = self.point.terms.iter().map(|&(k, gamma)| gamma.norm_squared().sqrt() * omega[k].abs());
         let carried = self
             .point
@@ -90,14 +90,14 @@ impl Mechanism {
     /// The jump at contact `contact`, or `None` where the motors leave the point no freedom to rebound.
     ///
     /// Coordinates \[rad, m\] and rates \[rad/s, m/s\] at the moment of impact; a point that is not approaching keeps its rates.
-    pub fn strike(&self, contact: usize, t: Time, phi: &[f64], omega: &[f64]) -> Option<Impact> {
+    pub fn impact_at(&self, contact: usize, t: Time, phi: &[f64], omega: &[f64]) -> Option<Impact> {
         let Contact { row, restitution, .. } = &self.contacts[contact];
         let metric = Metric::at(self, t, phi, omega)?;
         let z = self.elements(phi);
         let along = Gradient::of(row, t, Posture { phi, z: &z, omega }).along;
         let approach = dot(&along, omega);
         if approach >= 0.0 {
-            let row_impulses = vec![0.0; self.rows.len()];
+            let row_impulses = vec![0.0; self.constraints.len()];
             return Some(Impact { omega: omega.to_vec(), approach, impulse: 0.0, row_impulses, energy_change: 0.0, motor_work: 0.0 });
         }
         let (column, before) = (metric.column(&along), metric.velocity(omega));

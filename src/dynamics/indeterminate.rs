@@ -10,8 +10,8 @@
 //! joints that give equally.
 
 use super::assembly::svd::{Matrix, dot};
+use super::constraint::Posture;
 use super::kernel::Kernel;
-use super::row::Posture;
 use super::{Mechanism, Time};
 use crate::arithmetic::Complex;
 
@@ -40,7 +40,7 @@ impl Mechanism {
     /// The joint forces of an evaluation of the equations at these angles \[rad\] and rates \[rad/s\]: its `load` must hold the accelerations and its
     /// `multiplier` those of all rows.  Those that redundant or singular rows leave open are the ones of least norm.
     pub fn joint_forces(&self, t: Time, kernel: &Kernel<f64>, phi: &[f64], omega: &[f64]) -> JointForces {
-        let (rows, joints) = (self.rows.len(), self.joints.len());
+        let (rows, joints) = (self.constraints.len(), self.joints.len());
         let hinges = self.hinge_forces(t, kernel, phi, omega);
         let open = (self.assembly.redundant.len() + self.assembly.singular.len()).min(rows);
         let is_known = if open == 0 { Some(true) } else { None };
@@ -87,25 +87,25 @@ impl Mechanism {
 
     /// The forces whose squares are added.
     fn listed(&self, hinges: &[Complex<f64>], multipliers: &[f64]) -> Vec<f64> {
-        let mut is_hinge = vec![false; self.rows.len()];
+        let mut is_hinge = vec![false; self.constraints.len()];
         for row in self.joints.iter().filter_map(|joint| joint.row) {
             is_hinge[row..row + 2].fill(true);
         }
-        let others = (0..self.rows.len()).filter(|&r| !is_hinge[r]).map(|r| self.as_force(r, multipliers[r]));
+        let others = (0..self.constraints.len()).filter(|&r| !is_hinge[r]).map(|r| self.as_force(r, multipliers[r]));
         hinges.iter().flat_map(|force| [force.re, force.im]).chain(others).collect()
     }
 
     /// A multiplier as a force \[N\].
     fn as_force(&self, row: usize, multiplier: f64) -> f64 {
-        if self.rows[row].is_angle() { multiplier / self.size_of_parts() } else { multiplier }
+        if self.constraints[row].is_angle() { multiplier / self.size_of_parts() } else { multiplier }
     }
 
     /// So many independent mu with Gᵀ mu = 0, or nearest to that.
     fn idle(&self, t: Time, kernel: &Kernel<f64>, phi: &[f64], omega: &[f64], count: usize) -> Vec<Vec<f64>> {
-        let (rows, n, size, angles) = (self.rows.len(), self.coordinates(), self.size_of_parts(), self.bodies.len());
-        let unit = |row: usize| if self.rows[row].is_angle() { 1.0 } else { 1.0 / size };
+        let (rows, n, size, angles) = (self.constraints.len(), self.coordinates(), self.size_of_parts(), self.bodies.len());
+        let unit = |row: usize| if self.constraints[row].is_angle() { 1.0 } else { 1.0 / size };
         let mut jacobian = Matrix::zero(rows, n);
-        for (r, row) in self.rows.iter().enumerate() {
+        for (r, row) in self.constraints.iter().enumerate() {
             let entries = jacobian.row_mut(r);
             row.differentiate(t, Posture { phi, z: &kernel.z, omega }, entries);
             entries.iter_mut().enumerate().for_each(|(k, entry)| *entry *= unit(r) * if k < angles { 1.0 } else { size });

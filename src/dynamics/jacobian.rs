@@ -9,7 +9,7 @@
 //! The last line holds because given angles keep their rows whatever the independent coordinates do.
 
 use super::kernel::{Bias, Kernel};
-use super::ties::Ties;
+use super::partition::CoordinatePartition;
 use super::{Mechanism, Time};
 use crate::arithmetic::{Dual, Scalar};
 
@@ -78,9 +78,9 @@ impl Jacobian {
         }
     }
 
-    /// Writes dy'/dy of y = (u, u', work) in the independent coordinates u of `ties`, row by row.
-    pub fn fill_independent(&self, ties: &Ties, y_by_y: &mut [f64]) {
-        let (n, f) = (self.phi.len(), ties.count());
+    /// Writes dy'/dy of y = (u, u', work) in the independent coordinates u of `partition`, row by row.
+    pub fn fill_independent(&self, partition: &CoordinatePartition, y_by_y: &mut [f64]) {
+        let (n, f) = (self.phi.len(), partition.count());
         y_by_y.fill(0.0);
         for (i, row) in y_by_y.chunks_exact_mut(2 * f + 1).enumerate() {
             let derivatives = match i {
@@ -88,11 +88,11 @@ impl Jacobian {
                     row[f + i] = 1.0;
                     continue;
                 }
-                i if i < 2 * f => &self.acceleration[2 * n * ties.independent[i - f]..2 * n * (ties.independent[i - f] + 1)],
+                i if i < 2 * f => &self.acceleration[2 * n * partition.independent[i - f]..2 * n * (partition.independent[i - f] + 1)],
                 _ => &self.power[..2 * n],
             };
-            for (k, tie) in ties.bodies.iter().enumerate() {
-                if let Some(base) = tie.base {
+            for (k, dependent_angle) in partition.bodies.iter().enumerate() {
+                if let Some(base) = dependent_angle.base {
                     row[base] += derivatives[k];
                     row[f + base] += derivatives[n + k];
                 }

@@ -9,10 +9,10 @@
 
 mod exact;
 
+use super::constraint::{Linearised, Posture};
 use super::force::Vibration;
 use super::rank::Metric;
 use super::recursive::Evaluation;
-use super::row::{Linearised, Posture};
 use super::schur::{self, NEAR, Weakest};
 use super::tree::{self, size};
 use super::{Mechanism, Time};
@@ -33,7 +33,7 @@ const COUPLED: usize = 48;
 /// Scratch space of an evaluation for a mechanism of n coordinates and r rows; nothing is allocated after [`Kernel::new`].
 #[derive(Clone, Debug)]
 pub struct Kernel<T> {
-    /// Elements: unit vectors, and feet at the place of their x (n).
+    /// Elements: unit vectors, and translational coordinates at the place of their x (n).
     pub z: Vec<Complex<T>>,
     /// M above and on the diagonal, then its factors (n × n) \[kg·m²\].
     pub mass: Vec<T>,
@@ -46,7 +46,7 @@ pub struct Kernel<T> {
     /// G (r × n).
     pub jacobian: Vec<T>,
     /// X = M⁻¹ Gᵀ, row by row (r × n).
-    pub lifted: Vec<T>,
+    pub minv_jt: Vec<T>,
     /// S = G M⁻¹ Gᵀ above and on the diagonal, then its factors (r × r).
     pub schur: Vec<T>,
     /// Reciprocal pivots of S (r); zero for rows left out.
@@ -73,8 +73,8 @@ pub struct Kernel<T> {
     pub stretch: Vec<T>,
     /// Force and u of a vibration (n each), where there is one.
     pub vibration: [Vec<T>; 2],
-    /// Feet of the bodies and their velocities, where energies are formed body by body.
-    pub feet: [Vec<Complex<T>>; 2],
+    /// Translational coordinates of the bodies and their velocities, where energies are formed body by body.
+    pub translations: [Vec<Complex<T>>; 2],
 }
 
 impl<T: Scalar> Kernel<T> {
@@ -96,7 +96,7 @@ impl<T: Scalar> Kernel<T> {
         let is_dense = mechanism.tree.is_dense() && (mechanism.recursion.is_none() || mechanism.coordinates() <= COUPLED);
         let mut kernel = Self::sized(mechanism.coordinates(), Vec::new(), Metric::default(), is_dense);
         if !is_dense {
-            kernel.feet = std::array::from_fn(|_| vec![Complex::ZERO; mechanism.bodies.len()]);
+            kernel.translations = std::array::from_fn(|_| vec![Complex::ZERO; mechanism.bodies.len()]);
         }
         kernel
     }
@@ -112,7 +112,7 @@ impl<T: Scalar> Kernel<T> {
             pivot: vec![T::ZERO; n],
             load: vec![T::ZERO; n],
             jacobian: matrix(rows * n),
-            lifted: matrix(rows * n),
+            minv_jt: matrix(rows * n),
             schur: matrix(rows * rows),
             schur_pivot: matrix(rows),
             scale,
@@ -126,14 +126,14 @@ impl<T: Scalar> Kernel<T> {
             bodywise: None,
             stretch: Vec::new(),
             vibration: Default::default(),
-            feet: Default::default(),
+            translations: Default::default(),
         }
     }
 
-    /// Unit vectors of these angles, and feet.
+    /// Unit vectors of these angles, and translational coordinates.
     #[inline(always)]
-    pub fn face<const N: usize>(&mut self, mechanism: &Mechanism, phi: &[T]) {
-        mechanism.tree.face::<T, N>(phi, &mut self.z);
+    pub fn unit_vectors<const N: usize>(&mut self, mechanism: &Mechanism, phi: &[T]) {
+        mechanism.tree.unit_vectors::<T, N>(phi, &mut self.z);
     }
 }
 
@@ -143,27 +143,27 @@ impl<T: Real> Kernel<T> {
         let Some(recursion) = &mechanism.recursion else { return Self::dense(mechanism) };
         let mut kernel = Self::sized(mechanism.coordinates(), mechanism.row_scales(), mechanism.rank_metric(), false);
         kernel.bodywise = Some(Box::new(Evaluation::new(recursion, &kernel.scale, kernel.metric.clone())));
-        kernel.feet = std::array::from_fn(|_| vec![Complex::ZERO; mechanism.bodies.len()]);
+        kernel.translations = std::array::from_fn(|_| vec![Complex::ZERO; mechanism.bodies.len()]);
         kernel
     }
 
     /// M, its twist and the whole load b (velocity terms, gravity, springs, dampers, applied forces) at the elements in `z`.
     #[inline(always)]
     pub fn assemble<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
-        mechanism.tree.couple::<T, N>(&self.z, &mut self.mass, &mut self.twist);
-        mechanism.tree.load::<T, N>(&self.z, omega, &self.twist, &mut self.load);
-        mechanism.push(t, Posture { phi, z: &self.z, omega }, &self.stretch, &mut self.load);
+        mechanism.tree.mass_matrix::<T, N>(&self.z, &mut self.mass, &mut self.twist);
+        mechanism.tree.velocity_and_gravity_forces::<T, N>(&self.z, omega, &self.twist, &mut self.load);
+        mechanism.add_applied_forces(t, Posture { phi, z: &self.z, omega }, &self.stretch, &mut self.load);
     }
 
     /// M and its twist at the elements in `z`, where there are such matrices.
     #[inline(always)]
-    pub fn couple<const N: usize>(&mut self, mechanism: &Mechanism) {
+    pub fn mass_matrix<const N: usize>(&mut self, mechanism: &Mechanism) {
         if N > 0 || self.bodywise.is_none() {
-            mechanism.tree.couple::<T, N>(&self.z, &mut self.mass, &mut self.twist);
+            mechanism.tree.mass_matrix::<T, N>(&self.z, &mut self.mass, &mut self.twist);
         }
     }
 
-    /// The factors of M at the elements in `z`, after [`Kernel::couple`].
+    /// The factors of M at the elements in `z`, after [`Kernel::mass_matrix`].
     #[inline(always)]
     pub fn factor<const N: usize>(&mut self, mechanism: &Mechanism, omega: &[T]) {
         if N == 0
@@ -183,12 +183,12 @@ impl<T: Real> Kernel<T> {
         if N == 0
             && let Some(bodywise) = &mut self.bodywise
         {
-            bodywise.face(phi, &mut self.z);
-            bodywise.fold(mechanism, t, Posture { phi, z: &self.z, omega }, &self.stretch, &mut self.load);
-            bodywise.unfold(&mut self.load);
+            bodywise.unit_vectors(phi, &mut self.z);
+            bodywise.inward_pass(mechanism, t, Posture { phi, z: &self.z, omega }, &self.stretch, &mut self.load);
+            bodywise.outward_pass(&mut self.load);
             return;
         }
-        self.face::<N>(mechanism, phi);
+        self.unit_vectors::<N>(mechanism, phi);
         self.assemble::<N>(mechanism, t, phi, omega);
         tree::factor::<T, N>(n, &mut self.mass, &mut self.pivot);
         tree::solve::<T, N>(n, &self.mass, &self.pivot, &mut self.load);
@@ -201,7 +201,7 @@ impl<T: Real> Kernel<T> {
             self.accelerate_bodywise(mechanism, t, phi, omega, bias);
         } else {
             self.accelerate_free::<N>(mechanism, t, phi, omega);
-            match mechanism.rows.len() {
+            match mechanism.constraints.len() {
                 1 => self.constrain::<N, 1>(mechanism, t, phi, omega, bias),
                 2 => self.constrain::<N, 2>(mechanism, t, phi, omega, bias),
                 _ => self.constrain::<N, 0>(mechanism, t, phi, omega, bias),
@@ -216,20 +216,20 @@ impl<T: Real> Kernel<T> {
     /// [`Kernel::accelerate`] where there are no matrices.
     fn accelerate_bodywise(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T], bias: Bias) {
         let Some(bodywise) = &mut self.bodywise else { return };
-        bodywise.face(phi, &mut self.z);
+        bodywise.unit_vectors(phi, &mut self.z);
         let at = Posture { phi, z: &self.z, omega };
-        bodywise.fold(mechanism, t, at, &self.stretch, &mut self.load);
-        if !mechanism.rows.is_empty() {
+        bodywise.inward_pass(mechanism, t, at, &self.stretch, &mut self.load);
+        if !mechanism.constraints.is_empty() {
             let found = (&mut self.rows[..], &mut self.multiplier[..], &mut self.correction[..]);
             self.weakest = bodywise.constrain(mechanism, t, at, bias, found);
         }
-        bodywise.unfold(&mut self.load);
+        bodywise.outward_pass(&mut self.load);
     }
 
     /// The share of `R` rows (any number where `R` is 0): expects free accelerations in `load` and the factors of M.
     #[inline(always)]
     fn constrain<const N: usize, const R: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T], bias: Bias) {
-        let (n, rows) = (size::<N>(mechanism.tree.coordinates), size::<R>(mechanism.rows.len()));
+        let (n, rows) = (size::<N>(mechanism.tree.coordinates), size::<R>(mechanism.constraints.len()));
         if let Some(vibration) = &mechanism.vibration {
             self.vibrate::<N>(mechanism, vibration);
         }
@@ -238,7 +238,7 @@ impl<T: Real> Kernel<T> {
         let (all, multiplier, correction) = (&mut self.jacobian[..rows * n], &mut self.multiplier[..rows], &mut self.correction[..rows]);
         let load = &mut self.load[..n];
         for r in 0..rows {
-            let (row, jacobian) = (&mechanism.rows[r], &mut all[r * n..(r + 1) * n]);
+            let (row, jacobian) = (&mechanism.constraints[r], &mut all[r * n..(r + 1) * n]);
             for k in 0..n {
                 jacobian[k] = T::ZERO;
             }
@@ -252,23 +252,23 @@ impl<T: Real> Kernel<T> {
             }
             self.rows[r] = here;
         }
-        self.couple_rows::<N, R>(n, rows);
+        self.schur_complement::<N, R>(n, rows);
         tree::solve::<T, R>(rows, &self.schur, &self.schur_pivot, &mut self.multiplier);
         if is_biased {
             tree::solve::<T, R>(rows, &self.schur, &self.schur_pivot, &mut self.correction);
         }
-        let (lifted, load) = (&self.lifted[..rows * n], &mut self.load[..n]);
+        let (minv_jt, load) = (&self.minv_jt[..rows * n], &mut self.load[..n]);
         for r in 0..rows {
             for k in 0..n {
-                load[k] -= lifted[r * n + k] * self.multiplier[r];
+                load[k] -= minv_jt[r * n + k] * self.multiplier[r];
             }
         }
     }
 
     /// Adds what the mean force of a vibration does to the free accelerations.
     fn vibrate<const N: usize>(&mut self, mechanism: &Mechanism, vibration: &Vibration) {
-        let [force, lifted] = &mut self.vibration;
-        vibration.push::<T, N>(&mechanism.tree, &self.z, (&self.mass, &self.pivot), &self.twist, [force, lifted]);
+        let [force, minv_jt] = &mut self.vibration;
+        vibration.push::<T, N>(&mechanism.tree, &self.z, (&self.mass, &self.pivot), &self.twist, [force, minv_jt]);
         tree::solve::<T, N>(size::<N>(mechanism.tree.coordinates), &self.mass, &self.pivot, force);
         for (load, &more) in self.load.iter_mut().zip(force.iter()) {
             *load += more;
@@ -279,7 +279,7 @@ impl<T: Real> Kernel<T> {
     #[inline(always)]
     pub fn powers(&self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) -> (T, T) {
         let (mut work, mut stabilizer) = (T::ZERO, T::ZERO);
-        for (r, row) in mechanism.rows.iter().enumerate() {
+        for (r, row) in mechanism.constraints.iter().enumerate() {
             // What stands still, and what moves both its points alike, does no work.
             if !row.is_motor() {
                 continue;
@@ -295,17 +295,17 @@ impl<T: Real> Kernel<T> {
     pub fn linearise<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
         self.rows_at(mechanism, t, phi, omega);
         if let Some(bodywise) = &mut self.bodywise {
-            self.weakest = bodywise.couple();
+            self.weakest = bodywise.factor_constraints();
         } else {
-            self.couple_rows::<N, 0>(size::<N>(mechanism.tree.coordinates), mechanism.rows.len());
+            self.schur_complement::<N, 0>(size::<N>(mechanism.tree.coordinates), mechanism.constraints.len());
         }
         self.linearise_exactly(mechanism, t, phi, omega);
     }
 
     /// The same at other coordinates than the last: elements, M and its factors first.
     pub fn linearise_at<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
-        self.face::<N>(mechanism, phi);
-        self.couple::<N>(mechanism);
+        self.unit_vectors::<N>(mechanism, phi);
+        self.mass_matrix::<N>(mechanism);
         self.factor::<N>(mechanism, omega);
         self.linearise::<N>(mechanism, t, phi, omega);
     }
@@ -319,17 +319,17 @@ impl<T: Real> Kernel<T> {
             return;
         }
         self.jacobian.fill(T::ZERO);
-        for (r, row) in mechanism.rows.iter().enumerate() {
+        for (r, row) in mechanism.constraints.iter().enumerate() {
             self.rows[r] = row.linearise(t, posture, &mut self.jacobian[r * n..(r + 1) * n]);
         }
     }
 
     /// X = M⁻¹ Gᵀ and the factors of S = G X.
     #[inline(always)]
-    fn couple_rows<const N: usize, const R: usize>(&mut self, n: usize, rows: usize) {
-        let (jacobian, lifted, schur) = (&self.jacobian[..rows * n], &mut self.lifted[..rows * n], &mut self.schur[..rows * rows]);
+    fn schur_complement<const N: usize, const R: usize>(&mut self, n: usize, rows: usize) {
+        let (jacobian, minv_jt, schur) = (&self.jacobian[..rows * n], &mut self.minv_jt[..rows * n], &mut self.schur[..rows * rows]);
         for r in 0..rows {
-            let row = &mut lifted[r * n..(r + 1) * n];
+            let row = &mut minv_jt[r * n..(r + 1) * n];
             for k in 0..n {
                 row[k] = jacobian[r * n + k];
             }
@@ -337,12 +337,12 @@ impl<T: Real> Kernel<T> {
         }
         for r in 0..rows {
             for s in r..rows {
-                schur[r * rows + s] = dot(&jacobian[r * n..(r + 1) * n], &lifted[s * n..(s + 1) * n]);
+                schur[r * rows + s] = dot(&jacobian[r * n..(r + 1) * n], &minv_jt[s * n..(s + 1) * n]);
             }
         }
         self.weakest = schur::factor::<T, R>(rows, schur, &mut self.schur_pivot, &self.scale);
         if self.weakest.share < NEAR {
-            self.weakest = schur::look_closer(&self.metric, &self.scale, self.weakest, [jacobian, lifted], schur, &mut self.schur_pivot);
+            self.weakest = schur::look_closer(&self.metric, &self.scale, self.weakest, [jacobian, minv_jt], schur, &mut self.schur_pivot);
         }
     }
 
@@ -358,16 +358,16 @@ impl<T: Real> Kernel<T> {
     }
 
     /// Writes M⁻¹ Gᵀ of what is in `multiplier` to `load`; after [`Kernel::linearise`].
-    pub fn lift(&mut self) {
+    pub fn multiplier_accelerations(&mut self) {
         if self.is_exact {
             return self.lift_exactly();
         }
         if let Some(bodywise) = &mut self.bodywise {
-            return bodywise.lift(&self.multiplier, &mut self.load);
+            return bodywise.multiplier_accelerations(&self.multiplier, &mut self.load);
         }
         let (n, rows) = (self.z.len(), self.multiplier.len());
         for k in 0..n {
-            self.load[k] = (0..rows).fold(T::ZERO, |sum, r| sum + self.lifted[r * n + k] * self.multiplier[r]);
+            self.load[k] = (0..rows).fold(T::ZERO, |sum, r| sum + self.minv_jt[r * n + k] * self.multiplier[r]);
         }
     }
 
@@ -405,7 +405,7 @@ impl<T: Real> Kernel<T> {
 }
 
 impl Kernel<f64> {
-    /// The stretches of all springs for the evaluations that follow, at angles and feet given with what they leave out \[rad, m\].
+    /// The stretches of all springs for the evaluations that follow, at angles and translational coordinates given with what they leave out \[rad, m\].
     ///
     /// The force of a stiff spring is the difference of two lengths times k: in doubles it is rounded to 1e-16 k L, which is more than all other forces together
     /// from k = 1e16 m g / L on, and makes implicit methods with long steps pay from 1e8 m g / L.  In double-double nothing of that is left.

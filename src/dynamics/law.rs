@@ -133,13 +133,13 @@ impl Law {
         if self.sines.is_empty() {
             return Phase { angle: base.angle(), unit: base.unit(), rate: self.rate, acceleration: 0.0 };
         }
-        let swing = self.swing(t);
-        let whole = base.plus(swing.angle);
-        Phase { angle: whole.angle(), unit: whole.unit(), rate: self.rate + swing.rate, acceleration: swing.acceleration }
+        let sum_of_sines = self.sum_of_sines(t);
+        let whole = base.plus(sum_of_sines.angle);
+        Phase { angle: whole.angle(), unit: whole.unit(), rate: self.rate + sum_of_sines.rate, acceleration: sum_of_sines.acceleration }
     }
 
     /// Sum of the sines and its derivatives; the unit vector is left out.
-    fn swing(&self, t: Time) -> Phase<f64> {
+    fn sum_of_sines(&self, t: Time) -> Phase<f64> {
         self.sines.iter().fold(Phase::default(), |sum, sine| {
             let Complex { re: cos, im: sin } = Reduced::new(t, sine.frequency, sine.phase).unit();
             Phase {
@@ -158,8 +158,8 @@ impl Law {
             return (T::of(self.rate), T::ZERO);
         }
         if T::IS_PLAIN && self.acceleration == 0.0 {
-            let swing = self.swing(t);
-            return (T::of(self.rate + swing.rate), T::of(swing.acceleration));
+            let sum_of_sines = self.sum_of_sines(t);
+            return (T::of(self.rate + sum_of_sines.rate), T::of(sum_of_sines.acceleration));
         }
         let [_, rate, acceleration] = self.angles(t);
         (rate, acceleration)

@@ -9,14 +9,14 @@
 //!
 //! Written once over [`Lanes`] and compiled twice, to the same bits.
 
+use super::constraint::Posture;
 use super::energy::moment;
 use super::force::action::Kind;
 use super::multiplier::Multiplier;
 use super::natural::columns::{self, Columns};
 use super::natural::{Reduced, sorted_rows};
-use super::row::Posture;
 use super::stiffness::Stiffness;
-use super::{Coordinates, Field, Form, Glance, Mechanism, Motion, State, Time};
+use super::{BodyAngles, Coordinates, Form, Mechanism, Motion, OdeSystem, State, Time};
 use crate::arithmetic::lanes::row::{Row, load, store};
 use crate::arithmetic::lanes::{self, Code, Lanes};
 use crate::arithmetic::{Complex, sincos};
@@ -67,7 +67,7 @@ struct Bench<const B: usize> {
 pub fn reduced(mechanism: &Mechanism) -> Option<Reduced> {
     let n = mechanism.bodies.len();
     let is_small = mechanism.coordinates() == n && n <= MOST && mechanism.tree.is_dense();
-    if !is_small || !mechanism.is_tied_up() || !mechanism.contacts.is_empty() || mechanism.vibration.is_some() {
+    if !is_small || !mechanism.has_closed_loops() || !mechanism.contacts.is_empty() || mechanism.vibration.is_some() {
         return None;
     }
     let (linear, guides) = sorted_rows(mechanism);
@@ -214,7 +214,7 @@ fn forces(mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64], z: &[Compl
     }
 }
 
-impl Field for Looped {
+impl OdeSystem for Looped {
     fn dimension(&self) -> usize {
         self.angles.dimension()
     }
@@ -223,7 +223,7 @@ impl Field for Looped {
         self.angles.angles()
     }
 
-    fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
+    fn rhs(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
         let mechanism = &*self.mechanism;
         let n = mechanism.bodies.len();
         let (phi, omega) = (&y[..n], &y[n..2 * n]);
@@ -233,7 +233,7 @@ impl Field for Looped {
             Room::Many(bench) => bench.run(mechanism, t, phi, omega, self.is_portable),
         };
         // Which rows to leave out near a singular position, and when, is the angle form's to say.
-        let Some((alpha, z)) = found else { return self.angles.rate(t, y, rate) };
+        let Some((alpha, z)) = found else { return self.angles.rhs(t, y, rate) };
         rate[n..2 * n].copy_from_slice(alpha);
         rate[..n].copy_from_slice(omega);
         // Rows that never move do no work.
@@ -241,7 +241,7 @@ impl Field for Looped {
     }
 
     fn fine_rate(&mut self, t: Time, y: &[f64], low: &[f64], rate: &mut [f64]) {
-        if self.mechanism.springs.is_empty() { self.rate(t, y, rate) } else { self.angles.fine_rate(t, y, low, rate) }
+        if self.mechanism.springs.is_empty() { self.rhs(t, y, rate) } else { self.angles.fine_rate(t, y, low, rate) }
     }
 
     fn jacobian(&mut self, t: Time, y: &[f64], jacobian: &mut [f64]) -> bool {
@@ -286,7 +286,7 @@ impl Form for Looped {
         self.angles.read(state, motion);
     }
 
-    fn glance(&mut self, state: &State, glance: &mut Glance) {
-        self.angles.glance(state, glance);
+    fn body_angles(&mut self, state: &State, body_angles: &mut BodyAngles) {
+        self.angles.body_angles(state, body_angles);
     }
 }

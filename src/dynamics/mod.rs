@@ -8,9 +8,9 @@
 //!
 //! | letter | name in code | meaning | unit | shape | file |
 //! | --- | --- | --- | --- | --- | --- |
-//! | q | `phi` | absolute angles of the bodies, from +x, counter-clockwise; then x and y of feet that move freely | rad, m | n | here, [`forest`] |
+//! | q | `phi` | absolute angles of the bodies, from +x, counter-clockwise; then x and y of translational coordinates that move freely | rad, m | n | here, [`forest`] |
 //! | w | `omega` | their rates q' | rad/s, m/s | n | here |
-//! | z | `z` | elements: unit vectors exp(i q), and feet x + iy at the place of their x | 1, m | n | [`forest`] |
+//! | z | `z` | elements: unit vectors exp(i q), and translational coordinates x + iy at the place of their x | 1, m | n | [`forest`] |
 //! | M | `mass` | mass matrix, `M_ij = Re(conj(z_i) H_ij z_j)` | kg m² | n × n | [`tree`] |
 //! | b | `load` | velocity terms, gravity, springs, dampers, applied forces | N m | n | [`tree`], [`force`] |
 //! | C | `position` | a constraint's violation | rad, m | rows | [`row`] |
@@ -40,6 +40,8 @@ pub mod canonical;
 pub mod compile;
 #[doc(hidden)]
 pub mod configuration;
+#[doc(hidden)]
+pub mod constraint;
 #[doc(hidden)]
 pub mod contact;
 #[doc(hidden)]
@@ -71,6 +73,8 @@ pub mod multiplier;
 #[doc(hidden)]
 pub mod natural;
 #[doc(hidden)]
+pub mod partition;
+#[doc(hidden)]
 pub mod point;
 #[doc(hidden)]
 pub mod points;
@@ -83,15 +87,11 @@ pub mod reaction;
 #[doc(hidden)]
 pub mod recursive;
 #[doc(hidden)]
-pub mod row;
-#[doc(hidden)]
 pub mod schur;
 #[doc(hidden)]
 pub mod series;
 #[doc(hidden)]
 pub mod stiffness;
-#[doc(hidden)]
-pub mod ties;
 #[doc(hidden)]
 pub mod tree;
 #[doc(hidden)]
@@ -114,7 +114,7 @@ pub type Time = DoubleDouble;
 pub struct State {
     /// Time.
     pub time: Time,
-    /// The leading parts of the unknowns; the first [`Field::angles`] are angles in [-π, π].
+    /// The leading parts of the unknowns; the first [`OdeSystem::angles`] are angles in [-π, π].
     pub y: Vec<f64>,
     /// What the leading parts leave out; zero for methods without compensation.
     pub low: Vec<f64>,
@@ -186,27 +186,27 @@ impl Clone for State {
 }
 
 /// A first-order system `y' = f(t, y)` as the methods see it.
-pub trait Field {
+pub trait OdeSystem {
     /// Number of unknowns.
     fn dimension(&self) -> usize;
 
     /// How many of the unknowns, counted from the first, are angles that may be wrapped.
     fn angles(&self) -> usize;
 
-    /// Writes y' at (t, y).  Never fails: what cannot be computed comes out non-finite, and the method stops with [`Field::label`].
-    fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]);
+    /// Writes y' at (t, y).  Never fails: what cannot be computed comes out non-finite, and the method stops with [`OdeSystem::label`].
+    fn rhs(&mut self, t: Time, y: &[f64], rate: &mut [f64]);
 
     /// Writes y' at a point given with what it leaves out; fields that can take the forces of stiff springs from there, which plain doubles round.
     fn fine_rate(&mut self, t: Time, y: &[f64], _low: &[f64], rate: &mut [f64]) {
-        self.rate(t, y, rate);
+        self.rhs(t, y, rate);
     }
 
     /// Writes y' at several points; a field that can evaluates them as lanes of one scalar.
     fn rates(&mut self, points: &mut Points) {
-        points.each(|t, y, rate| self.rate(t, y, rate));
+        points.each(|t, y, rate| self.rhs(t, y, rate));
     }
 
-    /// Whether it has [`Field::exact_rates`].
+    /// Whether it has [`OdeSystem::exact_rates`].
     fn has_exact_rates(&self) -> bool {
         false
     }
@@ -268,8 +268,8 @@ pub struct Along<'a> {
     /// Time.
     pub time: Time,
     /// How fast time goes by \[s\].
-    pub pace: f64,
-    /// Unknowns, as many as are [watched](Field::watched) at least.
+    pub step_size: f64,
+    /// Unknowns, as many as are [watched](OdeSystem::watched) at least.
     pub y: &'a [f64],
     /// Their derivatives.
     pub slope: &'a [f64],
@@ -280,7 +280,7 @@ pub struct Along<'a> {
 pub enum Coordinates {
     /// All of them: rows are kept by multipliers.
     All,
-    /// The angles left by the [`ties`], with the motors' rows eliminated.
+    /// The angles left by the [`partition`], with the motors' rows eliminated.
     Independent,
     /// Something else.
     Other,
@@ -308,16 +308,16 @@ pub trait Form {
     fn read(&mut self, state: &State, motion: &mut Motion);
 
     /// Writes what there is to see of a state in plain doubles; cheap enough for every step where a form has its own.
-    fn glance(&mut self, state: &State, glance: &mut Glance) {
+    fn body_angles(&mut self, state: &State, body_angles: &mut BodyAngles) {
         let mut motion = Motion::default();
         self.read(state, &mut motion);
-        glance.take(&motion);
+        body_angles.take(&motion);
     }
 }
 
 /// Angles and rates of all bodies at a moment, in plain doubles.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Glance {
+pub struct BodyAngles {
     /// Absolute angles in [-π, π] \[rad\].
     pub phi: Vec<f64>,
     /// Whole turns to be added to each.
@@ -326,7 +326,7 @@ pub struct Glance {
     pub omega: Vec<f64>,
 }
 
-impl Glance {
+impl BodyAngles {
     /// Takes it from a motion.
     pub fn take(&mut self, motion: &Motion) {
         self.phi.clear();
@@ -352,7 +352,7 @@ impl Glance {
 pub struct Motion {
     /// Time.
     pub time: Time,
-    /// Absolute angles \[rad\], in the order of the scene's bars and in [-π, π] but where turns matter; then positions of free feet \[m\].
+    /// Absolute angles \[rad\], in the order of the scene's bars and in [-π, π] but where turns matter; then positions of translational coordinates \[m\].
     pub phi: Vec<DoubleDouble>,
     /// Whole turns to be added to each angle.
     pub turns: Vec<i64>,

@@ -1,31 +1,31 @@
 //! The mechanism in (q, w), with one multiplier per row.
 //!
 //! Unknowns: coordinates (n), rates (n) and, where the scene has rows or forces that do work, the work of motors, dampers and applied forces and
-//! the energy the stabilizer puts in \[J\].  With `ACCOUNT = false` neither rows nor accounts exist in the code.
+//! the energy the stabilizer puts in \[J\].  With `WORK = false` neither rows nor accounts exist in the code.
 
 use super::gap::turning;
 use super::jacobian::Jacobian;
 use super::kernel::{Bias, Kernel};
 use super::stiffness::Stiffness;
 use super::tree::size;
-use super::{Along, Coordinates, Field, Form, Glance, Mechanism, Motion, State, Time};
+use super::{Along, BodyAngles, Coordinates, Form, Mechanism, Motion, OdeSystem, State, Time};
 use crate::arithmetic::{Complex, DoubleDouble};
 use std::sync::Arc;
 
 /// Equations in angles and rates, for `N` bodies (any number where `N` is 0).
 #[derive(Clone, Debug)]
-pub struct Multiplier<const N: usize, const ACCOUNT: bool> {
+pub struct Multiplier<const N: usize, const WORK: bool> {
     mechanism: Arc<Mechanism>,
     kernel: Kernel<f64>,
     /// Made when first asked for.
     jacobian: Option<Box<Jacobian>>,
 }
 
-impl<const N: usize, const ACCOUNT: bool> Multiplier<N, ACCOUNT> {
-    /// The form of a mechanism; `N` must be its number of bodies or 0, `ACCOUNT` true where it has rows or dampers.
+impl<const N: usize, const WORK: bool> Multiplier<N, WORK> {
+    /// The form of a mechanism; `N` must be its number of bodies or 0, `WORK` true where it has rows or dampers.
     pub fn new(mechanism: Arc<Mechanism>) -> Self {
         debug_assert!(N == 0 || N == mechanism.size());
-        debug_assert!(ACCOUNT || !mechanism.keeps_account());
+        debug_assert!(WORK || !mechanism.has_work_integral());
         let kernel = Kernel::new(&mechanism);
         Self { mechanism, kernel, jacobian: None }
     }
@@ -35,7 +35,7 @@ impl<const N: usize, const ACCOUNT: bool> Multiplier<N, ACCOUNT> {
     pub fn biased_rate(&mut self, t: Time, y: &[f64], rate: &mut [f64], bias: Bias) {
         let n = size::<N>(self.mechanism.coordinates());
         let (phi, omega) = (&y[..n], &y[n..2 * n]);
-        if ACCOUNT {
+        if WORK {
             self.kernel.accelerate::<N>(&self.mechanism, t, phi, omega, bias);
         } else {
             self.kernel.accelerate_free::<N>(&self.mechanism, t, phi, omega);
@@ -44,12 +44,12 @@ impl<const N: usize, const ACCOUNT: bool> Multiplier<N, ACCOUNT> {
         for k in 0..n {
             (rates[k], rates[n + k]) = (omega[k], load[k]);
         }
-        if ACCOUNT {
+        if WORK {
             (rate[2 * n], rate[2 * n + 1]) = self.kernel.powers(&self.mechanism, t, phi, omega);
         }
     }
 
-    /// [`Field::fine_rate`] with a stabilizer's bias in every row.
+    /// [`OdeSystem::fine_rate`] with a stabilizer's bias in every row.
     pub fn fine_biased_rate(&mut self, t: Time, y: &[f64], low: &[f64], rate: &mut [f64], bias: Bias) {
         self.kernel.measure(&self.mechanism, y, low);
         self.biased_rate(t, y, rate, bias);
@@ -65,9 +65,9 @@ impl<const N: usize, const ACCOUNT: bool> Multiplier<N, ACCOUNT> {
     }
 }
 
-impl<const N: usize, const ACCOUNT: bool> Field for Multiplier<N, ACCOUNT> {
+impl<const N: usize, const WORK: bool> OdeSystem for Multiplier<N, WORK> {
     fn dimension(&self) -> usize {
-        2 * self.mechanism.coordinates() + if ACCOUNT { 2 } else { 0 }
+        2 * self.mechanism.coordinates() + if WORK { 2 } else { 0 }
     }
 
     fn angles(&self) -> usize {
@@ -75,7 +75,7 @@ impl<const N: usize, const ACCOUNT: bool> Field for Multiplier<N, ACCOUNT> {
     }
 
     #[inline]
-    fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
+    fn rhs(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
         self.biased_rate(t, y, rate, Bias::default());
     }
 
@@ -118,7 +118,7 @@ impl<const N: usize, const ACCOUNT: bool> Field for Multiplier<N, ACCOUNT> {
     fn gaps(&mut self, t: Time, y: &[f64], gaps: &mut [f64]) {
         let mechanism = &*self.mechanism;
         let n = size::<N>(mechanism.coordinates());
-        self.kernel.face::<N>(mechanism, &y[..n]);
+        self.kernel.unit_vectors::<N>(mechanism, &y[..n]);
         for (gap, contact) in gaps.iter_mut().zip(&mechanism.contacts) {
             *gap = contact.gap(&self.kernel.z);
         }
@@ -154,7 +154,7 @@ impl<const N: usize, const ACCOUNT: bool> Field for Multiplier<N, ACCOUNT> {
     }
 }
 
-impl<const N: usize, const ACCOUNT: bool> Form for Multiplier<N, ACCOUNT> {
+impl<const N: usize, const WORK: bool> Form for Multiplier<N, WORK> {
     fn mechanism(&self) -> &Mechanism {
         &self.mechanism
     }
@@ -165,7 +165,7 @@ impl<const N: usize, const ACCOUNT: bool> Form for Multiplier<N, ACCOUNT> {
 
     fn state(&self, motion: &Motion) -> State {
         let mut unknowns: Vec<DoubleDouble> = motion.phi.iter().chain(&motion.omega).copied().collect();
-        if ACCOUNT {
+        if WORK {
             unknowns.extend([motion.work, DoubleDouble::from(motion.stabilizer)]);
         }
         let mut state = State::new(&unknowns, self.mechanism.bodies.len());
@@ -188,13 +188,13 @@ impl<const N: usize, const ACCOUNT: bool> Form for Multiplier<N, ACCOUNT> {
             motion.phi[k] = state.unknown(k);
             motion.omega[k] = state.unknown(n + k);
         }
-        if ACCOUNT {
+        if WORK {
             motion.work = state.unknown(2 * n);
             motion.stabilizer = state.y[2 * n + 1];
         }
     }
 
-    fn glance(&mut self, state: &State, glance: &mut Glance) {
-        glance.take_leading(state, self.mechanism.coordinates());
+    fn body_angles(&mut self, state: &State, body_angles: &mut BodyAngles) {
+        body_angles.take_leading(state, self.mechanism.coordinates());
     }
 }

@@ -1,8 +1,8 @@
-//! The mechanism in natural coordinates: the unit vectors and free feet themselves, with a *constant* mass matrix.
+//! The mechanism in natural coordinates: the unit vectors and translational coordinates themselves, with a *constant* mass matrix.
 //!
 //! ```text
 //! D z'' + Σ_k mu_k z_k + Σ_r lambda_r g_r = F(z)            [N m, N]   D = H + diag(I), Hermitian, constant
-//! (|z_k|² - 1) / 2             = 0                          one row per body, gradient z_k; none for a foot
+//! (|z_k|² - 1) / 2             = 0                          one row per body, gradient z_k; none for an origin
 //! c + Σ g_k·z_k                = 0                          pins, lines of the ground, locked angles: linear
 //! C(z, t)                      = 0                          slots, travels, motors, locked relative angles: module `guide`
 //! W = D⁻¹ less the linear rows (module `reduced`),   S_pq = g_p·W g_q,   S mu = g·W F + convective terms,   z'' = W (F - g mu)
@@ -10,7 +10,7 @@
 //!
 //! No sine, no cosine and no velocity term but those of the rows; gravity is a constant force, a force f at a point `Σ gamma_k z_k` acts on
 //! z_k as `conj(gamma_k) f`, a torque tau as `tau i z_k`.  Linear rows are removed once per scene: a closed loop never enters the inner loop.  On the constraints
-//! every row has the slope of its [`Row`] in angles, so its multiplier is the same.  Rows that depend on others get the multiplier zero.
+//! every row has the slope of its [`ConstraintEquation`] in angles, so its multiplier is the same.  Rows that depend on others get the multiplier zero.
 //!
 //! Unknowns: z (2n numbers), z' (2n) \[1/s\] and, where there are motors or applied forces, p_t \[J\], the momentum conjugate to time: p_t' = -Σ lambda C_t.
 //! Energy plus p_t, less what the constant forces have done, is a first integral: p_t starts at zero and the work is known without a quadrature.
@@ -26,10 +26,10 @@ mod reduced;
 pub use guide::{Demand, Guide};
 pub use reduced::{Block, Linear, Reduced, times};
 
+use super::constraint::{ConstraintEquation, Measure, Posture};
 use super::force::action::Kind;
 use super::law::Law;
 use super::quadratic::Quadratic;
-use super::row::{Measure, Posture, Row};
 use super::{Form, Mechanism, Motion, State, Time, schur, tree};
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use std::sync::Arc;
@@ -62,7 +62,7 @@ pub enum NaturalError {
 
 /// How far a state is from its constraints.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Defect {
+pub struct ConstraintResidual {
     /// Largest of the |z_k|² - 1 and of the C of all rows \[1, rad, m\].
     pub position: f64,
     /// Largest rate of these \[1/s, rad/s, m/s\].
@@ -157,7 +157,7 @@ impl Natural {
         &self.torques
     }
 
-    /// Number of elements n: bodies, and two for every foot that moves freely, of which the second is not used.
+    /// Number of elements n: bodies, and two for every origin that moves freely, of which the second is not used.
     pub fn elements(&self) -> usize {
         self.mechanism.coordinates()
     }
@@ -182,7 +182,7 @@ impl Natural {
     }
 
     /// True where p_t is among the unknowns.
-    pub fn keeps_account(&self) -> bool {
+    pub fn has_work_integral(&self) -> bool {
         !self.guides.is_empty() || !self.mechanism.actions.is_empty()
     }
 
@@ -224,11 +224,11 @@ impl Natural {
             multiplier[bodies + r] = guide.convective(&demand, z, rate);
         }
         let free = self.reduced.spread(&force);
-        let lifted: Vec<Vec<Complex<f64>>> = gradients.iter().map(|gradient| self.reduced.spread(gradient)).collect();
+        let minv_jt: Vec<Vec<Complex<f64>>> = gradients.iter().map(|gradient| self.reduced.spread(gradient)).collect();
         let mut matrix = vec![0.0; rows * rows];
         for p in 0..rows {
             for q in p..rows {
-                matrix[p * rows + q] = dot(&gradients[p], &lifted[q]);
+                matrix[p * rows + q] = dot(&gradients[p], &minv_jt[q]);
             }
             multiplier[p] += dot(&gradients[p], &free);
         }
@@ -240,11 +240,11 @@ impl Natural {
         let mut acceleration = free;
         for p in 0..rows {
             for k in 0..n {
-                acceleration[k] -= lifted[p][k].times(multiplier[p]);
+                acceleration[k] -= minv_jt[p][k].times(multiplier[p]);
                 force[k] -= gradients[p][k].times(multiplier[p]);
             }
         }
-        let mut all = vec![0.0; self.mechanism.rows.len()];
+        let mut all = vec![0.0; self.mechanism.constraints.len()];
         for (guide, multiplier) in self.guides.iter().zip(&multiplier[bodies..]) {
             all[guide.row] = *multiplier;
         }
@@ -261,9 +261,9 @@ impl Natural {
     }
 
     /// How far a state is from its constraints, in double-double.
-    pub fn defect(&self, state: &State) -> Defect {
+    pub fn defect(&self, state: &State) -> ConstraintResidual {
         let (z, rate) = self.vectors(state);
-        let mut defect = Defect::default();
+        let mut defect = ConstraintResidual::default();
         let mut see = |position: DoubleDouble, velocity: DoubleDouble| {
             // Unlike `max`, this does not lose a not-a-number.
             let larger = |a: f64, b: f64| if a > b || a.is_nan() { a } else { b };
@@ -304,7 +304,7 @@ impl Natural {
 /// The rows of a mechanism that are linear with constant coefficients, and all others.
 pub fn sorted_rows(mechanism: &Mechanism) -> (Vec<Linear>, Vec<Guide>) {
     let (mut linear, mut guides) = (Vec::new(), Vec::new());
-    for (number, row) in mechanism.rows.iter().enumerate() {
+    for (number, row) in mechanism.constraints.iter().enumerate() {
         match linear_place(row, mechanism.bodies.len()) {
             Some(place) => linear.push(Linear { row: number, place }),
             None => guides.push(Guide::new(number, row)),
@@ -314,7 +314,7 @@ pub fn sorted_rows(mechanism: &Mechanism) -> (Vec<Linear>, Vec<Guide>) {
 }
 
 /// A row as a linear one with constant coefficients, where it is one.
-fn linear_place(row: &Row, angles: usize) -> Option<Quadratic> {
+fn linear_place(row: &ConstraintEquation, angles: usize) -> Option<Quadratic> {
     let is_constant = row.law.as_ref().is_none_or(Law::is_constant);
     match (&row.measure, &row.law) {
         (&Measure::Angle { body, base: None }, Some(law)) if is_constant => {
@@ -347,7 +347,7 @@ impl Form for Natural {
             rate[x] = Complex::new(motion.omega[x], motion.omega[x + 1]);
         }
         let mut unknowns: Vec<DoubleDouble> = z.iter().chain(&rate).flat_map(|x| [x.re, x.im]).collect();
-        if self.keeps_account() {
+        if self.has_work_integral() {
             unknowns.push(self.done(&z, motion) - motion.work);
         }
         let mut state = State::new(&unknowns, 0);
@@ -374,7 +374,7 @@ impl Form for Natural {
             (motion.phi[x], motion.phi[x + 1]) = (z[x].re, z[x].im);
             (motion.omega[x], motion.omega[x + 1]) = (rate[x].re, rate[x].im);
         }
-        motion.work = if self.keeps_account() { self.done(&z, motion) - state.unknown(4 * n) } else { DoubleDouble::ZERO };
+        motion.work = if self.has_work_integral() { self.done(&z, motion) - state.unknown(4 * n) } else { DoubleDouble::ZERO };
     }
 }
 

@@ -1,6 +1,6 @@
 //! A point of the mechanism as a linear functional of its elements: `P = p0 + Σ gamma_k z_k + Σ ± zeta_f`.
 //!
-//! Elements are the bodies' unit vectors z_k and, of bodies that hang on nothing, the positions zeta = x + iy of their feet.  Everything that
+//! Elements are the bodies' unit vectors z_k and, of bodies that hang on nothing, the positions zeta = x + iy of their translational coordinates.  Everything that
 //! acts at a point (hinge, spring, wall, motor) is built from this list alone:
 //!
 //! ```text
@@ -18,7 +18,7 @@ pub struct Point {
     pub root: Complex<f64>,
     /// Body and gamma_k \[m\], in rising order of the bodies.
     pub terms: Vec<(usize, Complex<f64>)>,
-    /// First coordinate of a foot that moves freely, and how often it counts: 1, or -1.
+    /// First coordinate of an origin that moves freely, and how often it counts: 1, or -1.
     pub shifts: Vec<(usize, f64)>,
 }
 
@@ -28,7 +28,7 @@ impl Point {
         Self { root: Complex::new(at[0], at[1]), ..Self::default() }
     }
 
-    /// The foot whose coordinates are `x` and the one after it.
+    /// The origin whose coordinates are `x` and the one after it.
     pub fn floating(x: usize) -> Self {
         Self { shifts: vec![(x, 1.0)], ..Self::default() }
     }

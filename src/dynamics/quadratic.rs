@@ -1,26 +1,26 @@
-//! A quadratic function of the mechanism's elements, with everything a constraint row asks of it.
+//! A quadratic function of the mechanism's elements, with everything a constraint equation asks of it.
 //!
 //! ```text
-//! Q = c + Σ g_k·e_k + Σ Re(conj(e_j) h_jk e_k)                              e: unit vectors z_k, and feet zeta that move freely
+//! Q = c + Σ g_k·e_k + Σ Re(conj(e_j) h_jk e_k)                              e: unit vectors z_k, and translational coordinates zeta that move freely
 //! gradient on e_k:  g_k + Σ_j conj(h_jk) e_j + Σ_j h_kj e_j                 dQ = Σ gradient_k·de_k
 //! Q' = Σ gradient_k·e_k',   Q'' = Σ gradient_k·e_k'' + 2 Σ Re(conj(e_j') h_jk e_k')
-//! e' = i z w, e'' = i z a - z w² of a unit vector;  e' = zeta', e'' = zeta'' of a foot
+//! e' = i z w, e'' = i z a - z w² of a unit vector;  e' = zeta', e'' = zeta'' of an origin
 //! ```
 //!
 //! Points on lines of the ground are linear, points on lines of other bodies bilinear; nothing planar needs more.
 
+use super::constraint::{Linearised, Posture};
 use super::point::Point;
-use super::row::{Linearised, Posture};
 use crate::arithmetic::{Complex, Real, Scalar};
 
-/// A quadratic function of unit vectors and feet \[m\].
+/// A quadratic function of unit vectors and translational coordinates \[m\].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Quadratic {
-    /// Number of angles: elements from this one on are feet.
+    /// Number of angles: elements from this one on are translational coordinates.
     pub angles: usize,
     /// c \[m\].
     pub constant: f64,
-    /// Element and g_k \[m; 1 for a foot\].
+    /// Element and g_k \[m; 1 for an origin\].
     pub linear: Vec<(usize, Complex<f64>)>,
     /// Elements j and k, and h_jk.
     pub bilinear: Vec<(usize, usize, Complex<f64>)>,

@@ -9,7 +9,7 @@
 //! distance from a singular position.  Pivots are taken in the order of S, so that the constraints that A finds dependent are those that have no pivot in S.
 
 use super::Mechanism;
-use super::row::{Measure, Row, Way};
+use super::constraint::{ConstraintEquation, Measure, Way};
 use super::schur::{DROPPED, NEAR, Weakest};
 use crate::arithmetic::Real;
 
@@ -138,7 +138,7 @@ impl Verdict {
     }
 }
 
-impl Row {
+impl ConstraintEquation {
     /// Its levers, angles in rad; `size` \[m\] bounds what nothing else does.
     pub fn levers(&self, size: f64) -> Levers {
         let square = size * size;
@@ -173,7 +173,7 @@ impl Mechanism {
     /// What the rank of its constraints is measured with.
     pub fn rank_metric(&self) -> Metric {
         let size = self.size_of_parts();
-        let levers: Vec<Levers> = self.rows.iter().map(|row| row.levers(size)).collect();
+        let levers: Vec<Levers> = self.constraints.iter().map(|row| row.levers(size)).collect();
         Metric::new(&levers, self.coordinates(), self.assembly.redundant.len())
     }
 }

@@ -9,9 +9,9 @@
 //! Signs: the force of a hinge or weld is the one its first body, in the scene's order, exerts on its second, whichever of the two is the ground.
 
 use super::compile::Joint;
-use super::forest::swing;
+use super::constraint::Posture;
+use super::forest::turning_acceleration;
 use super::kernel::Kernel;
-use super::row::Posture;
 use super::{Mechanism, Time};
 use crate::arithmetic::Complex;
 
@@ -19,9 +19,9 @@ impl Mechanism {
     /// Accelerations \[m/s²\] of the centres of mass.
     pub fn centre_accelerations(&self, z: &[Complex<f64>], omega: &[f64], alpha: &[f64]) -> Vec<Complex<f64>> {
         let mut found = vec![Complex::ZERO; self.bodies.len()];
-        self.forest.foot_accelerations(z, omega, alpha, &mut found);
+        self.forest.origin_accelerations(z, omega, alpha, &mut found);
         for (k, (found, body)) in found.iter_mut().zip(&self.bodies).enumerate() {
-            *found += swing(z[k].turn(body.centre), omega[k], alpha[k]);
+            *found += turning_acceleration(z[k].turn(body.centre), omega[k], alpha[k]);
         }
         found
     }
@@ -53,7 +53,7 @@ impl Mechanism {
 
     /// The forces of the hinges and welds under which each body gets the force \[N\] it needs, less what rows with these multipliers push it with.
     pub(super) fn transmitted(&self, z: &[Complex<f64>], multipliers: &[f64], mut needed: Vec<Complex<f64>>) -> Vec<Complex<f64>> {
-        for (row, &multiplier) in self.rows.iter().zip(multipliers) {
+        for (row, &multiplier) in self.constraints.iter().zip(multipliers) {
             let Some(push) = &row.push else { continue };
             let direction = push.direction(z);
             for (body, sign) in [(push.on, 1.0), (push.from, -1.0)] {
@@ -64,7 +64,7 @@ impl Mechanism {
         }
         let mut carried = needed;
         for &body in self.forest.order.iter().rev() {
-            if let Some(parent) = self.forest.hangs[body].foot.parent() {
+            if let Some(parent) = self.forest.hangs[body].origin_point.parent() {
                 let force = carried[body];
                 carried[parent] += force;
             }

@@ -15,7 +15,7 @@
 //!
 //! Sums run over the bodies j that hang on k; r is the hinge on the parent and c the centre of mass, both from the body's own hinge in the body's
 //! directions; x·y is the dot product of the plane, and `i x · y` the moment of y with the arm x.  Hinge k accelerates with n_k + g + a_k.
-//! A foot that moves freely takes up no force: `A a = Q - b` there, solved as two more coordinates.
+//! An origin that moves freely takes up no force: `A a = Q - b` there, solved as two more coordinates.
 //!
 //! Eliminated this way M is L D Lᵀ with D the diagonal of the d and L the inward pass: the e are L⁻¹ of the load, and for two loads P and Q
 //! `Pᵀ M⁻¹ Q = Σ e_P e_Q / d`, of which [`rows`] makes use.
@@ -32,7 +32,7 @@ pub mod rows;
 pub use evaluation::{Evaluation, Recursion};
 
 use super::compile::Body;
-use super::forest::{Foot, Forest};
+use super::forest::{BodyOrigin, Forest};
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
 
 /// A body in the order of the trees: every branch in one piece, inner bodies first, the ground before all.
@@ -40,10 +40,10 @@ use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
 struct Link {
     /// Its number in the scene.
     body: usize,
-    /// Place of the parent; 0: the ground, or a foot that moves freely.
+    /// Place of the parent; 0: the ground, or an origin that moves freely.
     parent: usize,
-    /// Coordinate x of its foot where that moves freely; else 0, which is an angle.
-    foot: usize,
+    /// Coordinate x of its origin where that moves freely; else 0, which is an angle.
+    origin_point: usize,
     /// r \[m\].
     hinge: Complex<f64>,
     /// i m c \[kg·m\].
@@ -65,7 +65,7 @@ pub struct Links {
     links: Vec<Link>,
     /// Place of each body.
     place: Vec<usize>,
-    /// Number of coordinates: the bodies' angles, then two for every foot that moves freely.
+    /// Number of coordinates: the bodies' angles, then two for every origin that moves freely.
     coordinates: usize,
     /// Gravity \[m/s²\].
     gravity: Complex<f64>,
@@ -79,7 +79,7 @@ impl Links {
     /// Puts bodies in the order of the trees.
     pub fn new(bodies: &[Body], forest: &Forest, gravity: Complex<f64>) -> Self {
         let n = bodies.len();
-        let slot_of = |body: usize| forest.hangs[body].foot.parent().map_or(0, |parent| parent + 1);
+        let slot_of = |body: usize| forest.hangs[body].origin_point.parent().map_or(0, |parent| parent + 1);
         // What hangs on each slot, from the last body to the first; slot 0 is the ground.
         let (mut last, mut before) = (vec![0; n + 1], vec![0; n + 1]);
         for k in 0..n {
@@ -89,7 +89,7 @@ impl Links {
         let carries_one = |slot: usize| last[slot] != 0 && before[last[slot]] == 0;
         let origin = Complex::ZERO;
         let ground =
-            Link { body: 0, parent: 0, foot: 0, hinge: origin, moment: origin, mass: 0.0, inertia: 1.0, forks: true, alone: false };
+            Link { body: 0, parent: 0, origin_point: 0, hinge: origin, moment: origin, mass: 0.0, inertia: 1.0, forks: true, alone: false };
         let (mut links, mut place) = (Vec::with_capacity(n + 1), vec![0; n]);
         let mut front = vec![0usize];
         while let Some(slot) = front.pop() {
@@ -106,10 +106,10 @@ impl Links {
                     alone: parent != 0 && carries_one(parent),
                     ..ground
                 };
-                match forest.hangs[k].foot {
-                    Foot::Ground(_) => {}
-                    Foot::On(parent, hinge) => (link.parent, link.hinge) = (place[parent], hinge),
-                    Foot::Free(x) => link.foot = x,
+                match forest.hangs[k].origin_point {
+                    BodyOrigin::Ground(_) => {}
+                    BodyOrigin::On(parent, hinge) => (link.parent, link.hinge) = (place[parent], hinge),
+                    BodyOrigin::Free(x) => link.origin_point = x,
                 }
             }
             links.push(link);
@@ -169,11 +169,11 @@ struct Place<T> {
 /// A coordinate after the inward pass.
 #[derive(Clone, Copy, Debug, Default)]
 struct Joint<T> {
-    /// h \[kg·m\]; of the x of a foot what its y takes along, as a number without unit in `re`.
+    /// h \[kg·m\]; of the x of an origin what its y takes along, as a number without unit in `re`.
     moment: Complex<T>,
-    /// 1/d \[1/(kg·m²); 1/kg for a foot\].
+    /// 1/d \[1/(kg·m²); 1/kg for an origin\].
     pivot: T,
-    /// e \[N·m; N for a foot\].
+    /// e \[N·m; N for an origin\].
     excess: T,
 }
 
@@ -191,7 +191,7 @@ impl<T: Scalar> Symmetric<T> {
         Complex { re: self.xx * v.re + self.xy * v.im, im: self.xy * v.re + self.yy * v.im }
     }
 
-    /// Its two pivots, and the ratio between them: a foot.
+    /// Its two pivots, and the ratio between them: an origin.
     fn factors(self) -> [Joint<T>; 2] {
         let pivot = T::ONE / self.xx;
         let ratio = self.xy * pivot;
@@ -230,8 +230,8 @@ impl<T: Scalar> Outer<T> {
 
 /// Scratch space of an evaluation; nothing is allocated after [`Recursive::new`].
 ///
-/// An evaluation is [`convect`](Self::convect), where there are forces [`burden`](Self::burden), [`fold`](Self::fold), where there are rows what
-/// [`rows`] does, and [`unfold`](Self::unfold).
+/// An evaluation is [`convect`](Self::convect), where there are forces [`burden`](Self::burden), [`fold`](Self::inward_pass), where there are rows what
+/// [`rows`] does, and [`outward_pass`](Self::outward_pass).
 #[derive(Clone, Debug)]
 pub struct Recursive<T> {
     /// The ground, then the bodies.
@@ -284,15 +284,15 @@ impl<T: Real> Recursive<T> {
     pub fn burden(&mut self, links: &Links, load: &[T]) {
         for (place, link) in self.places.iter_mut().zip(&links.links).skip(1) {
             place.torque += load[link.body];
-            if link.foot != 0 {
-                place.force -= Complex::new(load[link.foot], load[link.foot + 1]);
+            if link.origin_point != 0 {
+                place.force -= Complex::new(load[link.origin_point], load[link.origin_point + 1]);
             }
         }
     }
 
     /// The inward pass: the factors of M, and what is left of the load.
     #[inline]
-    pub fn fold(&mut self, links: &Links) {
+    pub fn inward_pass(&mut self, links: &Links) {
         let all = &links.links[..];
         let n = all.len();
         let (places, joints, forks) = (&self.places[..n], &mut self.joints, &mut self.forks[..n]);
@@ -331,17 +331,17 @@ impl<T: Real> Recursive<T> {
             }
             forks[link.parent].join(felt);
             outer = Outer::default();
-            if link.foot != 0 {
+            if link.origin_point != 0 {
                 let ([x, y], excess) = (felt.mass.factors(), -felt.force);
-                joints[link.foot] = Joint { excess: excess.re, ..x };
-                joints[link.foot + 1] = Joint { excess: excess.im - x.moment.re * excess.re, ..y };
+                joints[link.origin_point] = Joint { excess: excess.re, ..x };
+                joints[link.origin_point + 1] = Joint { excess: excess.im - x.moment.re * excess.re, ..y };
             }
         }
     }
 
     /// The second outward pass: the accelerations \[rad/s², m/s²\] of all coordinates, or M⁻¹ of the load whose e are in place.
     #[inline]
-    pub fn unfold(&mut self, links: &Links, alpha: &mut [T]) {
+    pub fn outward_pass(&mut self, links: &Links, alpha: &mut [T]) {
         let all = &links.links[..];
         let n = all.len();
         let (places, joints, hinges) = (&self.places[..n], &self.joints[..], &mut self.hinge[..n]);
@@ -354,11 +354,11 @@ impl<T: Real> Recursive<T> {
                     parent => (hinges[parent], alpha[all[parent].body]),
                 };
             }
-            if link.foot != 0 {
-                let [x, y] = [&joints[link.foot], &joints[link.foot + 1]];
+            if link.origin_point != 0 {
+                let [x, y] = [&joints[link.origin_point], &joints[link.origin_point + 1]];
                 let up = y.excess * y.pivot;
                 a = Complex::new(x.excess * x.pivot - x.moment.re * up, up);
-                (alpha[link.foot], alpha[link.foot + 1]) = (a.re, a.im);
+                (alpha[link.origin_point], alpha[link.origin_point + 1]) = (a.re, a.im);
             }
             a += here.lever.times(turn);
             turn = (joint.excess - joint.moment.dot(a)) * joint.pivot;
@@ -367,7 +367,7 @@ impl<T: Real> Recursive<T> {
         }
     }
 
-    /// Forgets the load: what [`unfold`](Self::unfold) makes of it is zero then.
+    /// Forgets the load: what [`outward_pass`](Self::outward_pass) makes of it is zero then.
     pub fn unburden(&mut self) {
         for joint in &mut self.joints {
             joint.excess = T::ZERO;

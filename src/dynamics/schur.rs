@@ -10,9 +10,9 @@
 //! Rows that depend on others for ever are left out in the same way.
 
 use super::Mechanism;
+use super::constraint::{ConstraintEquation, Measure};
 use super::kernel::dot;
 use super::rank::Metric;
-use super::row::{Measure, Row};
 use super::tree::{Tree, size};
 use crate::arithmetic::Real;
 
@@ -79,7 +79,7 @@ impl Measure {
             Self::Angle { body, base } => free(*body) + base.map_or(0.0, free),
             Self::Place(place) => {
                 let linear: f64 = place.linear.iter().map(|&(k, g)| g.norm_squared() * free(k)).sum();
-                // Of the two elements of a product one is a unit vector; a foot is not bounded, so that the other counts alone.
+                // Of the two elements of a product one is a unit vector; an origin is not bounded, so that the other counts alone.
                 let other = |j: usize, k: usize| if k < place.angles { free(j) } else { 0.0 };
                 linear + place.bilinear.iter().map(|&(j, k, h)| h.norm_squared() * (free(k) + other(j, k))).sum::<f64>()
             }
@@ -87,7 +87,7 @@ impl Measure {
     }
 }
 
-impl Row {
+impl ConstraintEquation {
     /// What pivots of this row are measured against: its measure's scale with the diagonal of M \[1/kg, 1/(kg·m²)\].
     pub fn scale(&self, tree: &Tree) -> f64 {
         self.measure.scale(|k| 1.0 / tree.diagonal[k])
@@ -95,9 +95,9 @@ impl Row {
 }
 
 impl Mechanism {
-    /// The scale of every row, see [`Row::scale`].
+    /// The scale of every row, see [`ConstraintEquation::scale`].
     pub fn row_scales(&self) -> Vec<f64> {
-        self.rows.iter().map(|row| row.scale(&self.tree)).collect()
+        self.constraints.iter().map(|row| row.scale(&self.tree)).collect()
     }
 }
 
@@ -131,11 +131,11 @@ pub fn factor_by<T: Real, const R: usize>(rows: usize, schur: &mut [T], pivot: &
 
 /// S of rows J and M⁻¹ Jᵀ (each r × n), above and on its diagonal.
 #[inline(always)]
-pub fn product<T: Real>(rows: usize, jacobian: &[T], lifted: &[T], schur: &mut [T]) {
+pub fn product<T: Real>(rows: usize, jacobian: &[T], minv_jt: &[T], schur: &mut [T]) {
     let n = jacobian.len() / rows.max(1);
     for r in 0..rows {
         for s in r..rows {
-            schur[r * rows + s] = dot(&jacobian[r * n..(r + 1) * n], &lifted[s * n..(s + 1) * n]);
+            schur[r * rows + s] = dot(&jacobian[r * n..(r + 1) * n], &minv_jt[s * n..(s + 1) * n]);
         }
     }
 }
@@ -146,14 +146,14 @@ pub fn look_closer<T: Real>(
     metric: &Metric,
     scale: &[f64],
     mass: Weakest,
-    [jacobian, lifted]: [&[T]; 2],
+    [jacobian, minv_jt]: [&[T]; 2],
     schur: &mut [T],
     pivot: &mut [T],
 ) -> Weakest {
     let rows = scale.len();
     let before: Vec<f64> = pivot[..rows].iter().map(|pivot| pivot.value()).collect();
     metric.judge(jacobian).settle(mass, [&before, scale], |is_left_out| {
-        product(rows, jacobian, lifted, schur);
+        product(rows, jacobian, minv_jt, schur);
         let Some(is_left_out) = is_left_out else { return factor::<T, 0>(rows, schur, pivot, scale).share };
         let mut weakest = Weakest::NONE;
         factor_by::<T, 0>(rows, schur, pivot, |k, pivot| weakest.reciprocal_kept(k, pivot, scale[k], is_left_out[k]));

@@ -21,7 +21,6 @@
 //! Source: Jorba & Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor methods*, Experimental
 //! Mathematics 14 (2005), for the products; the in-series solve with constant couplings is ours.
 
-mod account;
 mod action;
 mod bodywise;
 mod coefficient;
@@ -30,6 +29,7 @@ pub mod polynomial;
 mod rows;
 mod spring;
 mod user;
+mod work_integral;
 
 use self::action::ActionSeries;
 use self::bodywise::Bodywise;
@@ -38,10 +38,10 @@ use self::polynomial::{Fractions, UNROLLED, convolve, copy, copy_vectors, width,
 use self::rows::RowSeries;
 use self::spring::SpringSeries;
 use self::user::{At, UserSeries};
+use super::constraint::Measure;
 use super::impact::Contact;
-use super::row::Measure;
+use super::partition::CoordinatePartition;
 use super::schur::{self, Weakest};
-use super::ties::Ties;
 use super::tree::{self, size};
 use super::{Coordinates, Mechanism, Time};
 use crate::arithmetic::{Complex, DoubleDouble, Real};
@@ -51,10 +51,10 @@ use crate::arithmetic::{Complex, DoubleDouble, Real};
 pub struct Series<T> {
     /// Highest power P of the rates.
     order: usize,
-    /// Number of elements n, of which so many are unit vectors; the others are feet, at the places of their x.
+    /// Number of elements n, of which so many are unit vectors; the others are translational coordinates, at the places of their x.
     elements: usize,
     angles: usize,
-    ties: Ties,
+    partition: CoordinatePartition,
     /// False where the coordinates are the bodies' angles themselves.
     is_tied: bool,
     fractions: Fractions<T>,
@@ -98,15 +98,16 @@ impl<T: Coefficient> Series<T> {
     /// Room for series of a mechanism in some coordinates up to this power of the rates, at least 2.
     pub fn new(mechanism: &Mechanism, coordinates: Coordinates, order: usize) -> Self {
         let n = mechanism.coordinates();
-        let ties = if coordinates == Coordinates::Independent { mechanism.ties.clone() } else { Ties::free(mechanism) };
-        let f = ties.count();
-        let bodywise = Bodywise::new(mechanism, order).filter(|_| !ties.driven()).map(Box::new);
+        let partition =
+            if coordinates == Coordinates::Independent { mechanism.partition.clone() } else { CoordinatePartition::free(mechanism) };
+        let f = partition.count();
+        let bodywise = Bodywise::new(mechanism, order).filter(|_| !partition.driven()).map(Box::new);
         let matrix = |size: usize| zeros(if bodywise.is_some() { 0 } else { size });
         Self {
             order,
             elements: n,
             angles: mechanism.bodies.len(),
-            is_tied: ties.driven(),
+            is_tied: partition.driven(),
             fractions: Fractions::new(order + 2),
             z: vec![Complex::ZERO; (order + 2) * n],
             omega: zeros((order + 1) * n),
@@ -121,7 +122,7 @@ impl<T: Coefficient> Series<T> {
             forces: mechanism.forces.iter().map(|force| UserSeries::new(force, order)).collect(),
             time: T::ZERO,
             springs: mechanism.springs.iter().map(|spring| SpringSeries::new(spring, order)).collect(),
-            rows: RowSeries::new(mechanism, &ties, order, bodywise.is_none()),
+            rows: RowSeries::new(mechanism, &partition, order, bodywise.is_none()),
             turned: vec![Complex::ZERO; n],
             bend: vec![Complex::ZERO; n],
             load: zeros(n),
@@ -131,7 +132,7 @@ impl<T: Coefficient> Series<T> {
             pivot: matrix(f.max(n)),
             solution: zeros(f),
             bodywise,
-            ties,
+            partition,
         }
     }
 
@@ -142,7 +143,7 @@ impl<T: Coefficient> Series<T> {
 
     /// Number of coordinates f.
     pub fn coordinates(&self) -> usize {
-        self.ties.count()
+        self.partition.count()
     }
 
     /// Expands the motion through coordinates `u` \[rad\] (leading part and rest) and rates `u_rate` \[rad/s\] at time `t`.
@@ -215,17 +216,17 @@ impl<T: Coefficient> Series<T> {
         if self.is_tied {
             self.drive.fill(T::ZERO);
         }
-        for (i, tie) in self.ties.bodies[..angles].iter().enumerate() {
+        for (i, dependent_angle) in self.partition.bodies[..angles].iter().enumerate() {
             let mut z = Complex::new(T::ONE, T::ZERO);
             self.omega[i] = T::ZERO;
-            if let Some(base) = tie.base {
+            if let Some(base) = dependent_angle.base {
                 self.phi[i] = u[base];
                 let unit = Complex::unit(u[base]);
                 // What the leading part leaves out of the angle turns the vector by a first-order rotation.
                 z = unit + unit.left().times(u_rest[base]);
                 self.omega[i] = u_rate[base];
             }
-            for (sign, law) in &tie.laws {
+            for (sign, law) in &dependent_angle.laws {
                 let phase = law.at::<T>(t);
                 z = z * if *sign > 0.0 { phase.unit } else { phase.unit.conj() };
                 drive::add(law, *sign, t, &mut self.drive, i, n);
@@ -233,9 +234,9 @@ impl<T: Coefficient> Series<T> {
             self.omega[i] += self.drive[i];
             self.z[i] = z;
         }
-        self.ties.feet(u, &mut self.z);
-        for (i, tie) in self.ties.bodies.iter().enumerate().skip(angles) {
-            self.omega[i] = tie.base.map_or(T::ZERO, |base| u_rate[base]);
+        self.partition.translations(u, &mut self.z);
+        for (i, dependent_angle) in self.partition.bodies.iter().enumerate().skip(angles) {
+            self.omega[i] = dependent_angle.base.map_or(T::ZERO, |base| u_rate[base]);
         }
         self.rows.begin(t);
     }
@@ -283,14 +284,14 @@ impl<T: Coefficient> Series<T> {
                 self.balance::<N>(mechanism, m);
                 self.solve::<N>(mechanism, m);
             }
-            self.account(mechanism, m);
+            self.work_integral(mechanism, m);
         }
     }
 
     /// The factors of M_0, and those of the rows.
     #[inline(always)]
     fn factor<const N: usize>(&mut self, mechanism: &Mechanism) {
-        let (n, f) = (size::<N>(self.elements), self.ties.count());
+        let (n, f) = (size::<N>(self.elements), self.partition.count());
         if N == 0
             && let Some(bodywise) = &mut self.bodywise
         {
@@ -298,17 +299,17 @@ impl<T: Coefficient> Series<T> {
             self.rows.prepare_bodywise(&mut bodywise.evaluation, &self.z[..n]);
             return;
         }
-        mechanism.tree.couple::<T, N>(&self.z[..n], &mut self.mass, &mut self.twist);
+        mechanism.tree.mass_matrix::<T, N>(&self.z[..n], &mut self.mass, &mut self.twist);
         if self.is_tied {
-            self.ties.reduce(&self.mass, &mut self.reduced);
+            self.partition.reduce(&self.mass, &mut self.reduced);
             tree::factor::<T, 0>(f, &mut self.reduced, &mut self.pivot);
         } else {
             self.reduced.copy_from_slice(&self.mass);
             tree::factor::<T, N>(n, &mut self.reduced, &mut self.pivot);
         }
         if !self.rows.is_empty() {
-            self.rows.prepare(&self.ties, &self.z[..n], &self.reduced, &self.pivot);
-            let diagonal = self.ties.independent.iter().map(|&body| mechanism.tree.diagonal[body]);
+            self.rows.prepare(&self.partition, &self.z[..n], &self.reduced, &self.pivot);
+            let diagonal = self.partition.independent.iter().map(|&body| mechanism.tree.diagonal[body]);
             self.rows.mark(schur::is_deep(&self.pivot[..f], diagonal));
         }
     }
@@ -345,8 +346,8 @@ impl<T: Coefficient> Series<T> {
                 self.bend[i] += self.z[i].left().times(given);
             }
         }
-        self.weigh(mechanism, m);
-        couple::<T, N>(mechanism, &self.bend, &mut self.rest[m * n..(m + 1) * n]);
+        self.gravity_forces(mechanism, m);
+        mass_terms::<T, N>(mechanism, &self.bend, &mut self.rest[m * n..(m + 1) * n]);
         self.force(mechanism, m);
         let (before, rest) = self.rest.split_at_mut(m * n);
         let rest = &mut rest[..n];
@@ -369,7 +370,7 @@ impl<T: Coefficient> Series<T> {
 
     /// Gravity in R_m, and nothing else.
     #[inline(always)]
-    fn weigh(&mut self, mechanism: &Mechanism, m: usize) {
+    fn gravity_forces(&mut self, mechanism: &Mechanism, m: usize) {
         for (rest, &weight) in self.rest[m * self.elements..].iter_mut().zip(&mechanism.tree.weight) {
             *rest = if m == 0 { -Complex::of(weight) } else { Complex::ZERO };
         }
@@ -401,17 +402,17 @@ impl<T: Coefficient> Series<T> {
                 *load += applied;
             }
         }
-        self.rows.swing(m, &self.z, n, rest);
+        self.rows.geometric_terms(m, &self.z, n, rest);
     }
 
     /// a_m from the loads, the newest powers of w and z, and R_m completed.
     #[inline(always)]
     fn solve<const N: usize>(&mut self, mechanism: &Mechanism, m: usize) {
-        let (n, f) = (size::<N>(self.elements), self.ties.count());
+        let (n, f) = (size::<N>(self.elements), self.partition.count());
         let angles = size::<N>(self.angles);
         let rest = &mut self.rest[m * n..(m + 1) * n];
         if self.is_tied {
-            self.ties.gather(&self.load, &mut self.solution);
+            self.partition.gather(&self.load, &mut self.solution);
             tree::solve::<T, 0>(f, &self.reduced, &self.pivot, &mut self.solution);
         } else {
             self.solution[..n].copy_from_slice(&self.load[..n]);
@@ -428,8 +429,9 @@ impl<T: Coefficient> Series<T> {
         let (z, newest) = (&known[..n], &mut newest[..n]);
         let omega = &mut self.omega[(m + 1) * n..(m + 2) * n];
         if self.is_tied {
-            for (i, tie) in self.ties.bodies.iter().enumerate() {
-                let (solved, rate) = tie.base.map_or((T::ZERO, T::ZERO), |base| (self.solution[base], self.rate[(m + 1) * f + base]));
+            for (i, dependent_angle) in self.partition.bodies.iter().enumerate() {
+                let (solved, rate) =
+                    dependent_angle.base.map_or((T::ZERO, T::ZERO), |base| (self.solution[base], self.rate[(m + 1) * f + base]));
                 omega[i] = rate + self.drive[(m + 1) * n + i];
                 self.bend[i] = if i < angles { z[i].left().times(solved) } else { Complex::new(solved, T::ZERO) };
             }
@@ -451,13 +453,13 @@ impl<T: Coefficient> Series<T> {
         for i in 0..angles {
             newest[i] = self.fractions.vector_over((self.turned[i] + z[i].times(omega[i])).left(), m + 2);
         }
-        couple::<T, N>(mechanism, &self.bend, rest);
+        mass_terms::<T, N>(mechanism, &self.bend, rest);
     }
 }
 
 /// Adds H x to `rest`, without the diagonal.
 #[inline(always)]
-fn couple<T: Real, const N: usize>(mechanism: &Mechanism, x: &[Complex<T>], rest: &mut [Complex<T>]) {
+fn mass_terms<T: Real, const N: usize>(mechanism: &Mechanism, x: &[Complex<T>], rest: &mut [Complex<T>]) {
     let n = size::<N>(mechanism.tree.coordinates);
     let (coupling, x, rest) = (&mechanism.tree.coupling[..n * n], &x[..n], &mut rest[..n]);
     for i in 0..n {

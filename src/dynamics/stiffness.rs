@@ -160,7 +160,7 @@ fn slow(mechanism: &Mechanism, time: Time, omega: &[f64]) -> f64 {
     let angles = mechanism.bodies.len();
     let swings = (0..angles).map(|k| (mechanism.tree.weight[k].norm_squared().sqrt() / mechanism.tree.diagonal[k]).sqrt());
     let spins = omega[..angles].iter().map(|omega| omega.abs());
-    let laws = (mechanism.rows.iter().filter_map(|row| row.law.as_ref())).flat_map(|law| {
+    let laws = (mechanism.constraints.iter().filter_map(|row| row.law.as_ref())).flat_map(|law| {
         let rate = law.rates::<f64>(time).0.abs();
         law.sines.iter().map(|sine| sine.frequency.abs()).chain([rate])
     });
@@ -225,7 +225,7 @@ fn mobility(kernel: &mut Kernel<f64>, along: &[f64]) -> f64 {
         kernel.multiplier[r] = kernel.row_speed(r, &moved);
     }
     kernel.solve_rows();
-    kernel.lift();
+    kernel.multiplier_accelerations();
     moved.iter().zip(&kernel.load).zip(along).fold(0.0, |sum, ((moved, held), along)| sum + (moved - held) * along)
 }
 

@@ -1,9 +1,9 @@
-//! The hinge trees in absolute angles and, of those that hang on nothing, the positions of their feet: mass matrix, velocity terms, gravity.
+//! The hinge trees in absolute angles and, of those that hang on nothing, the positions of their translational coordinates: mass matrix, velocity terms, gravity.
 //!
 //! ```text
 //! p_ij = conj(z_i) H_ij z_j = A cos(q_j-q_i) - B sin(q_j-q_i) + i (A sin(q_j-q_i) + B cos(q_j-q_i))
 //! M_ij = Re p_ij, M_ii = d_i;        b_i += w_j² Im p_ij,  b_j -= w_i² Im p_ij   for i < j
-//! foot f, coordinates x and y:  p_if = conj(z_i) H_if,  M_ix = Im p_if, M_iy = Re p_if, M_xx = M_yy = d_f;   b_x + i b_y += w_i² conj(p_if)
+//! origin f, coordinates x and y:  p_if = conj(z_i) H_if,  M_ix = Im p_if, M_iy = Re p_if, M_xx = M_yy = d_f;   b_x + i b_y += w_i² conj(p_if)
 //! ```
 //!
 //! Loops run over `N` bodies where `N > 0`, so that small sizes are unrolled, and over the number at hand where `N = 0`.
@@ -20,15 +20,15 @@ pub fn size<const N: usize>(n: usize) -> usize {
 /// Constants of the tree, formed once per scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tree {
-    /// Number of coordinates n: the bodies' angles, then two for every foot that moves freely.
+    /// Number of coordinates n: the bodies' angles, then two for every origin that moves freely.
     pub coordinates: usize,
     /// Number of bodies.
     pub angles: usize,
-    /// H above the diagonal, row by row (n × n) \[kg·m²; kg·m for a foot, in the column of its x\]; empty for very large trees.
+    /// H above the diagonal, row by row (n × n) \[kg·m²; kg·m for an origin, in the column of its x\]; empty for very large trees.
     pub coupling: Vec<Complex<f64>>,
-    /// Diagonal d_i = H_ii + I_i \[kg·m²; kg for a foot\].
+    /// Diagonal d_i = H_ii + I_i \[kg·m²; kg for an origin\].
     pub diagonal: Vec<f64>,
-    /// Force of gravity on z_i: conj(Σ_m m_m gamma_mi) g \[N·m; N for a foot, at its x\].
+    /// Force of gravity on z_i: conj(Σ_m m_m gamma_mi) g \[N·m; N for an origin, at its x\].
     pub weight: Vec<Complex<f64>>,
     /// False where every hinge and centre of mass lies on its body's axis: B = 0, and its products are left out.
     pub off_axis: bool,
@@ -68,7 +68,7 @@ impl Tree {
 
     /// Writes M above and on the diagonal and Im p above it, both row by row (n × n) \[kg·m²\].
     #[inline(always)]
-    pub fn couple<T: Scalar, const N: usize>(&self, z: &[Complex<T>], mass: &mut [T], twist: &mut [T]) {
+    pub fn mass_matrix<T: Scalar, const N: usize>(&self, z: &[Complex<T>], mass: &mut [T], twist: &mut [T]) {
         let (n, angles) = (size::<N>(self.coordinates), size::<N>(self.angles));
         let (z, coupling, diagonal) = (&z[..n], &self.coupling[..n * n], &self.diagonal[..n]);
         let (mass, twist) = (&mut mass[..n * n], &mut twist[..n * n]);
@@ -86,12 +86,12 @@ impl Tree {
             }
         }
         if N == 0 {
-            self.couple_feet(z, mass, twist);
+            self.translational_mass_terms(z, mass, twist);
         }
     }
 
-    /// The entries of feet; the twist holds conj(p) in the columns of x and y.
-    fn couple_feet<T: Scalar>(&self, z: &[Complex<T>], mass: &mut [T], twist: &mut [T]) {
+    /// The entries of translational coordinates; the twist holds conj(p) in the columns of x and y.
+    fn translational_mass_terms<T: Scalar>(&self, z: &[Complex<T>], mass: &mut [T], twist: &mut [T]) {
         let (n, angles) = (self.coordinates, self.angles);
         for x in (angles..n).step_by(2) {
             for i in 0..angles {
@@ -108,9 +108,9 @@ impl Tree {
 
     /// Writes the velocity terms and gravity \[N·m\].
     #[inline(always)]
-    pub fn load<T: Scalar, const N: usize>(&self, z: &[Complex<T>], omega: &[T], twist: &[T], load: &mut [T]) {
+    pub fn velocity_and_gravity_forces<T: Scalar, const N: usize>(&self, z: &[Complex<T>], omega: &[T], twist: &[T], load: &mut [T]) {
         let (n, angles) = (size::<N>(self.coordinates), size::<N>(self.angles));
-        self.weigh::<T, N>(z, load);
+        self.gravity_forces::<T, N>(z, load);
         let (omega, twist, load) = (&omega[..n], &twist[..n * n], &mut load[..n]);
         for i in 0..angles {
             for j in i + 1..angles {
@@ -125,21 +125,21 @@ impl Tree {
 
     /// Writes d(T - V)/dq \[N·m\] without springs, at fixed rates: the force of the canonical form.
     #[inline(always)]
-    pub fn pull<T: Scalar, const N: usize>(&self, z: &[Complex<T>], omega: &[T], twist: &[T], force: &mut [T]) {
-        self.weigh::<T, N>(z, force);
-        self.swing::<T, N>(omega, twist, force);
+    pub fn lagrangian_forces<T: Scalar, const N: usize>(&self, z: &[Complex<T>], omega: &[T], twist: &[T], force: &mut [T]) {
+        self.gravity_forces::<T, N>(z, force);
+        self.velocity_terms::<T, N>(omega, twist, force);
     }
 
     /// Adds dT/dq \[N·m\] at fixed rates.
     #[inline(always)]
-    pub fn swing<T: Scalar, const N: usize>(&self, omega: &[T], twist: &[T], force: &mut [T]) {
+    pub fn velocity_terms<T: Scalar, const N: usize>(&self, omega: &[T], twist: &[T], force: &mut [T]) {
         let (n, angles) = (size::<N>(self.coordinates), size::<N>(self.angles));
         let (omega, twist, force) = (&omega[..n], &twist[..n * n], &mut force[..n]);
         for i in 0..angles {
             for j in i + 1..angles {
-                let swing = twist[i * n + j] * (omega[i] * omega[j]);
-                force[i] += swing;
-                force[j] -= swing;
+                let velocity_terms = twist[i * n + j] * (omega[i] * omega[j]);
+                force[i] += velocity_terms;
+                force[j] -= velocity_terms;
             }
             for x in angles..n {
                 force[i] -= twist[i * n + x] * (omega[i] * omega[x]);
@@ -149,7 +149,7 @@ impl Tree {
 
     /// Writes the generalized forces of gravity \[N·m\].
     #[inline(always)]
-    fn weigh<T: Scalar, const N: usize>(&self, z: &[Complex<T>], force: &mut [T]) {
+    fn gravity_forces<T: Scalar, const N: usize>(&self, z: &[Complex<T>], force: &mut [T]) {
         let (n, angles) = (size::<N>(self.coordinates), size::<N>(self.angles));
         let (z, weight, force) = (&z[..n], &self.weight[..n], &mut force[..n]);
         for i in 0..angles {
@@ -160,9 +160,9 @@ impl Tree {
         }
     }
 
-    /// Elements at these coordinates: unit vectors, and feet at the place of their x.
+    /// Elements at these coordinates: unit vectors, and translational coordinates at the place of their x.
     #[inline(always)]
-    pub fn face<T: Scalar, const N: usize>(&self, phi: &[T], z: &mut [Complex<T>]) {
+    pub fn unit_vectors<T: Scalar, const N: usize>(&self, phi: &[T], z: &mut [Complex<T>]) {
         let (n, angles) = (size::<N>(self.coordinates), size::<N>(self.angles));
         let (z, phi) = (&mut z[..n], &phi[..n]);
         for k in 0..angles {

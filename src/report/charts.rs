@@ -2,12 +2,12 @@
 
 use crate::arithmetic::Complex;
 use crate::chart::{
-    self, AngleSeries, Angles, ChartError, ConstraintDrift, DefectPanel, DriftSeries, EnergyDrift, FILE_RESOLUTION, HingeSketch,
-    MechanismChart, MotionGif, MotorPose, MotorSeries, Pose, Sketch, SliderPose, SpringSketch, TorquePower, WallSketch, plain,
+    self, AngleSeries, Angles, ChartError, ConstraintDrift, DriftSeries, EnergyDrift, FILE_RESOLUTION, HingeSketch, MechanismChart,
+    MotionGif, MotorPose, MotorSeries, Pose, ResidualPanel, Sketch, SliderPose, SpringSketch, TorquePower, WallSketch, plain,
 };
 use crate::dynamics::Mechanism;
 use crate::dynamics::compile::Joint;
-use crate::dynamics::row::Row;
+use crate::dynamics::constraint::ConstraintEquation;
 use crate::report::curves::{between, furthest, is_coarse, smoothed, span};
 use crate::report::page::{figure, magnitude, rough};
 use crate::run::drift::Excursion;
@@ -51,10 +51,10 @@ impl Chart {
 
 /// The charts a scene has something to show in: none of constraints without constraints, none of torques without motors.
 pub fn wanted(mechanism: &Mechanism, pictures: bool, motion: bool) -> Vec<Chart> {
-    let driven = mechanism.rows.iter().any(Row::is_motor);
+    let driven = mechanism.constraints.iter().any(ConstraintEquation::is_motor);
     let has = |chart: &Chart| match chart {
         Chart::Mechanism | Chart::Angles | Chart::EnergyDrift => pictures,
-        Chart::ConstraintDrift => pictures && !mechanism.rows.is_empty(),
+        Chart::ConstraintDrift => pictures && !mechanism.constraints.is_empty(),
         Chart::TorquePower => pictures && driven,
         Chart::Motion => motion,
     };
@@ -86,12 +86,12 @@ pub fn draw(chart: Chart, scene: &Scene, mechanism: &Mechanism, outcome: &Outcom
 /// # Errors
 /// Drawing or encoding fails.
 pub fn overlay(scene: &Scene, mechanism: &Mechanism, outcomes: &[&Outcome]) -> Result<Vec<u8>, ChartError> {
-    let panel = |unit: &str, level: usize| DefectPanel {
+    let panel = |unit: &str, level: usize| ResidualPanel {
         name: defect_name(level, unit),
         series: (outcomes.iter())
             .flat_map(|outcome| {
                 let kind = outcome.plan.stabilization.to_string();
-                (outcome.drift.constraints.iter().enumerate()).filter(|(r, _)| mechanism.rows[*r].unit() == unit).map(
+                (outcome.drift.constraints.iter().enumerate()).filter(|(r, _)| mechanism.constraints[*r].unit() == unit).map(
                     move |(r, (constraint, _))| {
                         let several = outcome.drift.constraints.len() > 1;
                         let name = if several { format!("{kind}, {}", plain(constraint)) } else { kind.clone() };
@@ -149,7 +149,7 @@ impl Finished<'_> {
     fn caption(&self, more: Option<String>) -> Vec<String> {
         let plan = &self.outcome.plan;
         let mut caption = vec![format!("scene {}", plain(&self.scene.name)), plain(&super::setting(plan))];
-        if !self.mechanism.rows.is_empty() {
+        if !self.mechanism.constraints.is_empty() {
             caption.push(plain(&super::check::stabilization(self.mechanism, plan)));
         }
         caption.extend(more);
@@ -279,8 +279,9 @@ impl Finished<'_> {
 
     fn constraint_drift(&self) -> ConstraintDrift {
         let Outcome { plan, drift, .. } = self.outcome;
-        let of = |unit: &'static str| (drift.constraints.iter().enumerate()).filter(move |(r, _)| self.mechanism.rows[*r].unit() == unit);
-        let panel = |unit: &'static str, level: usize| DefectPanel {
+        let of =
+            |unit: &'static str| (drift.constraints.iter().enumerate()).filter(move |(r, _)| self.mechanism.constraints[*r].unit() == unit);
+        let panel = |unit: &'static str, level: usize| ResidualPanel {
             name: defect_name(level, unit),
             series: of(unit)
                 .map(|(r, (constraint, _))| {
@@ -318,9 +319,9 @@ impl Finished<'_> {
     /// The motors, and which of them push sliders.
     fn torque_power(&self) -> (TorquePower, Vec<usize>) {
         let (window, more) = self.window();
-        let driven = self.mechanism.rows.iter().filter(|row| row.is_motor());
+        let driven = self.mechanism.constraints.iter().filter(|row| row.is_motor());
         let sliders: Vec<usize> = driven.enumerate().filter(|(_, row)| !row.is_angle()).map(|(k, _)| k).collect();
-        let motors = (self.mechanism.rows.iter().enumerate()).filter(|(_, row)| row.is_motor()).map(|(r, row)| MotorSeries {
+        let motors = (self.mechanism.constraints.iter().enumerate()).filter(|(_, row)| row.is_motor()).map(|(r, row)| MotorSeries {
             name: plain(row.name()),
             time: window.iter().map(|sample| sample.t).collect(),
             torque: window.iter().map(|sample| sample.motors[r][0]).collect(),
@@ -385,21 +386,21 @@ impl Finished<'_> {
     /// Up to four bodies that no other hangs on.
     fn leaves(&self) -> Vec<usize> {
         let hangs = &self.mechanism.forest.hangs;
-        (0..hangs.len()).filter(|&k| hangs.iter().all(|hang| hang.foot.parent() != Some(k))).take(4).collect()
+        (0..hangs.len()).filter(|&k| hangs.iter().all(|hang| hang.origin_point.parent() != Some(k))).take(4).collect()
     }
 
-    /// Elements and feet at these coordinates.
+    /// Elements and translational coordinates at these coordinates.
     fn elements(&self, phi: &[f64]) -> (Vec<Complex<f64>>, Vec<Complex<f64>>) {
-        let (mut z, mut feet) = (vec![Complex::ZERO; phi.len()], vec![Complex::ZERO; self.mechanism.bodies.len()]);
-        self.mechanism.tree.face::<f64, 0>(phi, &mut z);
-        self.mechanism.forest.feet(&z, &mut feet);
-        (z, feet)
+        let (mut z, mut translations) = (vec![Complex::ZERO; phi.len()], vec![Complex::ZERO; self.mechanism.bodies.len()]);
+        self.mechanism.tree.unit_vectors::<f64, 0>(phi, &mut z);
+        self.mechanism.forest.translations(&z, &mut translations);
+        (z, translations)
     }
 
     /// The far end of a bar (x, y) \[m\].
     fn tip(&self, body: usize, phi: &[f64]) -> [f64; 2] {
-        let (z, feet) = self.elements(phi);
-        let tip = feet[body] + self.mechanism.bodies[body].ends[1] * z[body];
+        let (z, translations) = self.elements(phi);
+        let tip = translations[body] + self.mechanism.bodies[body].ends[1] * z[body];
         [tip.re, tip.im]
     }
 
@@ -416,10 +417,10 @@ impl Finished<'_> {
     }
 
     fn pose(&self, phi: &[f64], omega: &[f64]) -> Pose {
-        let (z, feet) = self.elements(phi);
+        let (z, translations) = self.elements(phi);
         let both = |point: Complex<f64>| [point.re, point.im];
         let bodies = &self.mechanism.bodies;
-        let on = |body: usize, offset: Complex<f64>| both(feet[body] + offset * z[body]);
+        let on = |body: usize, offset: Complex<f64>| both(translations[body] + offset * z[body]);
         let place = |place: &Place| match place.bar {
             None => place.point,
             Some(bar) => on(bar, bodies[bar].ends[0] + Complex::new(place.point[0], place.point[1])),
@@ -446,7 +447,7 @@ impl Finished<'_> {
         }
     }
 
-    /// What joins the origin of a bar with its hinges and spring ends that lie off it, counted from its foot \[m\].
+    /// What joins the origin of a bar with its hinges and spring ends that lie off it, counted from its origin \[m\].
     fn arms(&self) -> impl Iterator<Item = (usize, [Complex<f64>; 2])> {
         let hinges = self.scene.hinges.iter().flat_map(|hinge| hinge.between);
         let springs = self.scene.springs.iter().flat_map(|spring| spring.between);

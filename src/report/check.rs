@@ -11,21 +11,21 @@ use serde_json::{Value, json};
 pub fn form(mechanism: &Mechanism, plan: &Plan) -> &'static str {
     match (plan.method, plan.stabilization) {
         (MethodId::Rattle(_), _) => "unit vectors and their rates, with a constant mass matrix",
-        (MethodId::Gauss(_), _) if mechanism.rows.is_empty() => "angles and momenta",
+        (MethodId::Gauss(_), _) if mechanism.constraints.is_empty() => "angles and momenta",
         (MethodId::Gauss(_), _) => "angles and momenta, driven angles as functions of time",
         (_, Stabilization::Elimination) => "angles and rates, driven angles as functions of time",
-        _ if mechanism.rows.is_empty() => "angles and rates",
+        _ if mechanism.constraints.is_empty() => "angles and rates",
         _ => "angles and rates, one multiplier a constraint",
     }
 }
 
 /// What the scene does not need and the equations do not contain.
 fn left_out(mechanism: &Mechanism, plan: &Plan) -> Vec<&'static str> {
-    let multipliers = !mechanism.rows.is_empty()
+    let multipliers = !mechanism.constraints.is_empty()
         && (matches!(plan.method, MethodId::Rattle(_)) || !matches!(plan.stabilization, Stabilization::Elimination));
     let mut left_out = Vec::new();
     for (needed, what) in [
-        (!mechanism.rows.is_empty(), "motors"),
+        (!mechanism.constraints.is_empty(), "motors"),
         (multipliers, "the solve for multipliers"),
         (plan.stabilization == Stabilization::Projection, "projection"),
         (!mechanism.springs.is_empty(), "springs"),
@@ -49,7 +49,7 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Value {
         "description": scene.description,
         "bodies": names(scene.bars.iter().map(|bar| bar.name.as_str()).collect()),
         "degrees_of_freedom": mechanism.assembly.degrees_of_freedom,
-        "constraints": names(mechanism.rows.iter().map(|row| row.name()).collect()),
+        "constraints": names(mechanism.constraints.iter().map(|row| row.name()).collect()),
         "assembly": assembly(mechanism),
         "hinges": names(scene.hinges.iter().map(|hinge| hinge.name.as_str()).collect()),
         "motors": names(scene.motors.iter().map(|motor| motor.name.as_str()).collect()),
@@ -79,7 +79,7 @@ pub(super) fn assembly(mechanism: &Mechanism) -> Value {
 /// Degrees of freedom, rows that say nothing new, and what of the start is not as given.
 fn freedom(page: &mut Page, mechanism: &Mechanism) {
     let Assembly { changes, redundant, singular, degrees_of_freedom: free, .. } = &mechanism.assembly;
-    let (coordinates, rows) = (mechanism.coordinates(), mechanism.rows.len());
+    let (coordinates, rows) = (mechanism.coordinates(), mechanism.constraints.len());
     let less = match (rows, redundant.len()) {
         (0, _) => String::new(),
         (rows, 0) => format!(": {coordinates} coordinate{} less {rows} constraint{}", plural(coordinates), plural(rows)),
@@ -146,7 +146,7 @@ pub(super) fn describe(page: &mut Page, mechanism: &Mechanism, plan: &Plan) {
 /// The stabilization in words.
 pub(super) fn stabilization(mechanism: &Mechanism, plan: &Plan) -> String {
     match (plan.stabilization, plan.time_constant) {
-        _ if mechanism.rows.is_empty() => "none needed: the scene has no constraint".into(),
+        _ if mechanism.constraints.is_empty() => "none needed: the scene has no constraint".into(),
         _ if matches!(plan.method, MethodId::Rattle(_)) => "by the method itself, positions and velocities".into(),
         (Stabilization::Baumgarte, Some(constant)) => format!("baumgarte, time constant {} s", figure(constant)),
         (Stabilization::Baumgarte, None) => "baumgarte, time constant five mean steps".into(),

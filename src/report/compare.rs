@@ -60,9 +60,9 @@ fn row(entry: &Entry, is_on_front: bool) -> Value {
         "wall_spread": entry.spread(),
         "wall_min_s": entry.blocks.iter().copied().reduce(f64::min),
         "blocks": entry.blocks.len(),
-        "evaluations": found.map(|found| found.tally.evaluations),
-        "steps": found.map(|found| found.tally.steps),
-        "rejected": found.map(|found| found.tally.rejected),
+        "evaluations": found.map(|found| found.statistics.evaluations),
+        "steps": found.map(|found| found.statistics.steps),
+        "rejected": found.map(|found| found.statistics.rejected),
         "step": plan.and_then(|plan| plan.step),
         "rtol": tolerance.map(|tolerance| tolerance.relative),
         "atol": tolerance.map(|tolerance| tolerance.absolute),
@@ -181,9 +181,9 @@ pub fn csv(comparison: &Comparison) -> String {
             of(&|found| found.constraint.map(|levels| levels[1])),
             number(entry.median()),
             number(entry.spread()),
-            count(&|found| found.tally.evaluations),
-            count(&|found| found.tally.steps),
-            count(&|found| found.tally.rejected),
+            count(&|found| found.statistics.evaluations),
+            count(&|found| found.statistics.steps),
+            count(&|found| found.statistics.rejected),
             u8::from(front.contains(&k)).to_string(),
         ];
         text += &cells.join(",");
@@ -251,7 +251,7 @@ fn short(entry: &Entry, letters: bool) -> String {
 
 fn table(page: &mut Page, mechanism: &Mechanism, comparison: &Comparison, letters: bool) {
     let front = comparison.front();
-    let has_rows = !mechanism.rows.is_empty();
+    let has_rows = !mechanism.constraints.is_empty();
     let mut head = vec!["", "error", "energy"];
     head.extend(has_rows.then_some(["|C|", "|C'|"]).into_iter().flatten());
     head.extend(["time", "+-", "evals"]);
@@ -270,7 +270,7 @@ fn table(page: &mut Page, mechanism: &Mechanism, comparison: &Comparison, letter
         let time = entry.median().unwrap_or(f64::NAN);
         cells.push(duration(time));
         cells.push(entry.spread().map_or("-".into(), |spread| format!("{:.0}%", 50.0 * spread / time)));
-        cells.push(count(found.tally.evaluations));
+        cells.push(count(found.statistics.evaluations));
         rows.push(cells);
     }
     if rows.is_empty() {
@@ -369,7 +369,7 @@ pub fn chart_data(kind: CompareChart, scene: &Scene, mechanism: &Mechanism, comp
     let truth = &comparison.truth;
     let point = |entry: &Entry| {
         let found = entry.found.as_ref().filter(|_| entry.fate == Fate::Done)?;
-        let cost = if kind == CompareChart::ErrorEvaluations { found.tally.evaluations as f64 } else { entry.median()? };
+        let cost = if kind == CompareChart::ErrorEvaluations { found.statistics.evaluations as f64 } else { entry.median()? };
         Some([cost, if of_energy { found.energy } else { entry.error()? }])
     };
     let mut series: Vec<WorkSeries> = Vec::new();

@@ -19,8 +19,8 @@
 
 use super::page::{Page, figure};
 use crate::arithmetic::DoubleDouble;
+use crate::dynamics::constraint::{ConstraintEquation, Measure, Posture};
 use crate::dynamics::kernel::{Bias, Kernel};
-use crate::dynamics::row::{Measure, Posture, Row};
 use crate::dynamics::{Mechanism, Motion};
 use crate::scene::Scene;
 use serde_json::{Map, Value, json};
@@ -124,7 +124,7 @@ pub fn inspect(scene: &Scene, mechanism: &Mechanism) -> Inspection {
     }
     let forces = mechanism.joint_forces(start.time, &kernel, &phi, &omega);
     let name = |body: Option<usize>| body.map_or("ground", |body| mechanism.bodies[body].name.as_str()).to_owned();
-    for (r, row) in mechanism.rows.iter().enumerate() {
+    for (r, row) in mechanism.constraints.iter().enumerate() {
         let (here, multiplier) = (kernel.rows[r], forces.multipliers[r]);
         found.constraints.push((row.name().to_owned(), [multiplier, here.position, kernel.row_rate(r, &omega)]));
         if mechanism.is_motor(r) {
@@ -154,7 +154,7 @@ pub fn inspect(scene: &Scene, mechanism: &Mechanism) -> Inspection {
 }
 
 /// The body a row's force or torque acts on, and the one it comes from.
-fn sides(row: &Row) -> [Option<usize>; 2] {
+fn sides(row: &ConstraintEquation) -> [Option<usize>; 2] {
     match (&row.measure, &row.push) {
         (Measure::Angle { body, base }, _) => [Some(*body), *base],
         (_, Some(push)) => [push.on, push.from],
@@ -171,7 +171,7 @@ fn contacts(mechanism: &Mechanism, start: &Motion, phi: &[f64], mut omega: Vec<f
         contact.row.differentiate(start.time, Posture { phi, z: &kernel.z, omega: &omega }, &mut jacobian);
         let approach = crate::dynamics::kernel::dot(&jacobian, &omega);
         let jump =
-            if gap <= TOUCHING * contact.length && approach < 0.0 { mechanism.strike(number, start.time, phi, &omega) } else { None };
+            if gap <= TOUCHING * contact.length && approach < 0.0 { mechanism.impact_at(number, start.time, phi, &omega) } else { None };
         let impact = jump.map(|jump| {
             omega.clone_from(&jump.omega);
             let energy_lost = jump.motor_work - jump.energy_change;

@@ -54,7 +54,9 @@ pub fn settings(plan: &Plan) -> Value {
         "time_constant": plan.time_constant,
         "extended": plan.extended,
         "every": plan.every,
-        "effort": plan.effort,
+        "max_evaluations": plan.max_evaluations,
+        // The name of one version ago.
+        "effort": plan.max_evaluations,
     })
 }
 

@@ -12,10 +12,10 @@ use crate::scene::Scene;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
-/// The report as one JSON object; `wall_s` \[s\] is the time from the first output row to the last without the companion's, which is `trust_wall_s`.
+/// The report as one JSON object; `wall_s` \[s\] is the time from the first output row to the last without the reference solution's, which is `trust_wall_s`.
 pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value {
-    let Outcome { plan, tally, drift, .. } = outcome;
-    let constraints: Map<String, Value> = (drift.constraints.iter().zip(&mechanism.rows))
+    let Outcome { plan, statistics, drift, .. } = outcome;
+    let constraints: Map<String, Value> = (drift.constraints.iter().zip(&mechanism.constraints))
         .map(|((name, [position, velocity]), row)| {
             let levels = json!({
                 "position_max": position.max,
@@ -27,11 +27,11 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value 
             (name.clone(), levels)
         })
         .collect();
-    let stabilizer = (!mechanism.rows.is_empty()).then(|| json!({"energy_j": drift.stabilizer, "max_j": drift.stabilizer_max}));
+    let stabilizer = (!mechanism.constraints.is_empty()).then(|| json!({"energy_j": drift.stabilizer, "max_j": drift.stabilizer_max}));
     let impacts = (!mechanism.contacts.is_empty())
-        .then(|| json!({"count": outcome.strike_count, "energy_lost_j": outcome.strike_loss, "first": outcome.strikes}));
-    let holds =
-        (!mechanism.contacts.is_empty()).then(|| json!({"count": outcome.hold_count, "time_s": outcome.hold_time, "first": outcome.holds}));
+        .then(|| json!({"count": outcome.impact_count, "energy_lost_j": outcome.impact_loss, "first": outcome.impacts}));
+    let holds = (!mechanism.contacts.is_empty())
+        .then(|| json!({"count": outcome.persistent_contact_count, "time_s": outcome.persistent_contact_time, "first": outcome.holds}));
     let (trend, trend_error) = drift.energy.trend();
     json!({
         "scene": scene.name,
@@ -39,11 +39,11 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value 
         "why": plan.why,
         "settings": super::settings(plan),
         "until": plan.until,
-        "steps": tally.steps,
-        "evaluations": tally.evaluations,
-        "rejected": tally.rejected,
-        "jacobians": tally.jacobians,
-        "newton_steps": tally.newton_steps,
+        "steps": statistics.steps,
+        "evaluations": statistics.evaluations,
+        "rejected": statistics.rejected,
+        "jacobians": statistics.jacobians,
+        "newton_steps": statistics.newton_steps,
         "wall_s": outcome.wall.as_secs_f64(),
         "trust_wall_s": outcome.trust_wall.as_secs_f64(),
         "final": moment(mechanism, &outcome.last),
@@ -125,16 +125,16 @@ pub fn files(folder: &Path, names: &[&str]) -> String {
 
 /// The report as a page.
 pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
-    let Outcome { plan, tally, drift, last, .. } = outcome;
+    let Outcome { plan, statistics, drift, last, .. } = outcome;
     let mut page = Page::new(&scene.name, &scene.description);
     describe(&mut page, mechanism, plan);
     page.entry(
         "cost",
         &format!(
             "{}, {}, {} rejected, {:.3} s",
-            counted(tally.steps, "step", "steps"),
-            counted(tally.evaluations, "evaluation", "evaluations"),
-            tally.rejected,
+            counted(statistics.steps, "step", "steps"),
+            counted(statistics.evaluations, "evaluation", "evaluations"),
+            statistics.rejected,
             outcome.wall.as_secs_f64()
         ),
     );
@@ -162,7 +162,7 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
     if drift.kind != "energy" {
         page.entry("", &format!("measured on {}", drift.kind));
     }
-    for ((name, [position, velocity]), row) in drift.constraints.iter().zip(&mechanism.rows) {
+    for ((name, [position, velocity]), row) in drift.constraints.iter().zip(&mechanism.constraints) {
         let unit = row.unit();
         page.entry("constraint", &format!("{name}: {} {unit} and {} {unit}/s at most", magnitude(position.max), magnitude(velocity.max)));
     }
@@ -175,11 +175,14 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
         page.entry("stabilizer", &format!("put in {now} J, {most} J at most"));
     }
     if !mechanism.contacts.is_empty() {
-        page.entry("impacts", &format!("{}, {} J lost in them", outcome.strike_count, figure(outcome.strike_loss)));
-        if outcome.hold_count > 0 {
+        page.entry("impacts", &format!("{}, {} J lost in them", outcome.impact_count, figure(outcome.impact_loss)));
+        if outcome.persistent_contact_count > 0 {
             let still = outcome.holds.iter().filter(|hold| hold.until.is_none()).map(|hold| hold.wall.as_str()).collect::<Vec<_>>();
             let still = if still.is_empty() { String::new() } else { format!(", to the end on {}", still.join(", ")) };
-            page.entry("stays on walls", &format!("{}, {} s in all{still}", outcome.hold_count, figure(outcome.hold_time)));
+            page.entry(
+                "stays on walls",
+                &format!("{}, {} s in all{still}", outcome.persistent_contact_count, figure(outcome.persistent_contact_time)),
+            );
         }
     }
     super::trust::describe(&mut page, mechanism, outcome);

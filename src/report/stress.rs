@@ -13,7 +13,7 @@ pub fn object(plan: &Stress, lines: &[Line]) -> Value {
     let count = |verdict| cells(lines).filter(|cell| cell.verdict == verdict).count();
     json!({
         "methods": names(plan),
-        "effort": plan.effort,
+        "effort": plan.max_evaluations,
         "right": count(Verdict::Right),
         "refused": count(Verdict::Refused),
         "stopped": count(Verdict::Stopped),
@@ -52,7 +52,7 @@ pub fn text(plan: &Stress, lines: &[Line]) -> String {
     for (number, name) in names(plan).iter().enumerate() {
         page.entry(if number == 0 { "methods" } else { "" }, &format!("{} {name}", letter(number)));
     }
-    page.entry("effort", &format!("{} evaluations a scene and method", plan.effort));
+    page.entry("effort", &format!("{} evaluations a scene and method", plan.max_evaluations));
     page.entry("letters", "+ right, - refused, . stopped, X wrong");
     let head: Vec<char> = (0..plan.methods.len()).map(letter).collect();
     let row = |name: &str, letters: Vec<char>| vec![name.to_owned(), letters.iter().map(|letter| format!("{letter} ")).collect::<String>()];
@@ -123,7 +123,7 @@ pub fn matrix(plan: &Stress, lines: &[Line]) -> Result<Vec<u8>, ChartError> {
         title: "Stiff and extreme scenes by every method".into(),
         caption: vec![
             "errors of the end in rad, or of rates over themselves".into(),
-            format!("refined until confirmed, at most {} evaluations a cell", plan.effort),
+            format!("refined until confirmed, at most {} evaluations a cell", plan.max_evaluations),
         ],
         rows: lines.iter().map(|line| plain(&line.scene)).collect(),
         columns: names(plan).iter().map(|name| plain(name)).collect(),

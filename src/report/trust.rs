@@ -13,7 +13,7 @@ pub fn object(trust: Option<&Trust>) -> Value {
     };
     let from = match trust.how {
         How::Extrapolated(from) => Some(from),
-        How::Companion | How::None => None,
+        How::ReferenceSolution | How::None => None,
     };
     json!({
         "error_estimate": trust.error_estimate,
@@ -25,7 +25,7 @@ pub fn object(trust: Option<&Trust>) -> Value {
         "at_s": trust.at,
         "tolerance": HORIZON,
         "lost_s": trust.lost,
-        "companion": trust.companion,
+        "companion": trust.error_estimator,
         "covered_s": trust.covered,
         "extrapolated_from_s": from,
         "why": trust.why,
@@ -49,7 +49,7 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
         return page.entry("trust", "not asked for: --trust auto estimates the error");
     };
     let what = if mechanism.coordinates() > mechanism.bodies.len() { "rad, and positions to as much of the longest bar" } else { "rad" };
-    let source = match (trust.how, &trust.companion) {
+    let source = match (trust.how, &trust.error_estimator) {
         (How::Extrapolated(from), _) => format!("carried on from t = {} s", rough(from)),
         (_, Some(name)) => format!("estimated beside {name}"),
         (_, None) => "estimated".into(),
@@ -79,13 +79,13 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
         page.entry("", &beside);
     }
     if trust.shared.len() > 1 {
-        page.entry("", &format!("not judged, as run and companion share them: {}", trust.shared.join(", ")));
+        page.entry("", &format!("not judged, as run and reference solution share them: {}", trust.shared.join(", ")));
     }
     if let (Some(why), true) = (trust.cut(), trust.error_estimate.is_some()) {
         page.entry("", why);
     }
     if let Some(error) = trust.model_error {
-        page.entry("model", &format!("springs taken for rods: off by about {} rad, which no companion sees", magnitude(error)));
+        page.entry("model", &format!("springs taken for rods: off by about {} rad, which no reference solution sees", magnitude(error)));
     }
     if let Some(lost) = trust.lost {
         page.entry("", &format!("more than {LOST} rad off from {} s on", rough(lost)));
@@ -130,8 +130,8 @@ fn beyond(mechanism: &Mechanism, outcome: &Outcome, horizon: f64) -> String {
     let drift = &outcome.drift;
     let kept = if drift.kind == "energy" { "Energy" } else { "Energy minus work" };
     let most = drift.constraints.iter().map(|(_, [position, _])| position.max).fold(0.0, f64::max);
-    let rows = if mechanism.rows.is_empty() { String::new() } else { format!(" and constraints ({})", magnitude(most)) };
-    let holds = if mechanism.rows.is_empty() { "still holds" } else { "still hold" };
+    let rows = if mechanism.constraints.is_empty() { String::new() } else { format!(" and constraints ({})", magnitude(most)) };
+    let holds = if mechanism.constraints.is_empty() { "still holds" } else { "still hold" };
     format!(
         "After {} s read the path as a typical motion of the scene, not as the motion of this start. {kept} (drift {}){rows} {holds}; use averages and \
          distributions, not angles at a time.",

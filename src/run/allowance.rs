@@ -50,7 +50,7 @@ pub(super) struct Moment<'a> {
     /// Rates of all coordinates \[rad/s, m/s\].
     pub omega: &'a [f64],
     /// Coordinates that are positions \[m\].
-    pub feet: &'a [f64],
+    pub translations: &'a [f64],
     /// Work so far \[J\].
     pub work: f64,
     /// The largest energy or work so far \[J\], at least the energy scale.
@@ -96,7 +96,7 @@ impl Allowance {
         let fast: f64 = rates().enumerate().map(|(k, (inertia, omega))| inertia * (absolute * unit(k) + relative * omega.abs())).sum();
         let swing: f64 = rates().map(|(inertia, omega)| inertia * omega.abs()).sum();
         // Angles are kept in [-π, π].
-        let far = moment.feet.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let far = moment.translations.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         let moved = [absolute + relative * std::f64::consts::PI, absolute * length + relative * far];
         let sum = |parts: [f64; 2]| parts[0] * moved[0] + parts[1] * moved[1];
         let energy = largest.sqrt() * (fast + sum(self.rigidity)) + sum(self.weight) + swing * swing * moved[0];

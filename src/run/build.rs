@@ -11,7 +11,7 @@ use crate::dynamics::elimination::Elimination;
 use crate::dynamics::looped::Looped;
 use crate::dynamics::multiplier::Multiplier;
 use crate::dynamics::natural::Natural;
-use crate::dynamics::{Field, Form, Mechanism, Motion};
+use crate::dynamics::{Form, Mechanism, Motion, OdeSystem};
 use crate::stabilization::{Baumgarte, Projected, SymmetricGauss};
 use crate::stepping::gauss::Gauss;
 use crate::stepping::rattle::Rattle;
@@ -19,8 +19,8 @@ use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Integrator, Radau, StepEr
 use std::sync::Arc;
 
 /// A mechanism in some form, as a first-order system.
-pub trait Problem: Field + Form + Send {}
-impl<P: Field + Form + Send> Problem for P {}
+pub trait Problem: OdeSystem + Form + Send {}
+impl<P: OdeSystem + Form + Send> Problem for P {}
 
 /// `sized!(n, f(args))` calls `f::<n>` for the sizes compiled in, and `f::<0>` for any other.
 macro_rules! sized {
@@ -59,7 +59,7 @@ fn form<const N: usize>(mechanism: &Arc<Mechanism>, stabilization: Stabilization
     match stabilization {
         Stabilization::Elimination => eliminated::<N>(&mechanism),
         Stabilization::Baumgarte => Box::new(Baumgarte::new(Multiplier::<N, true>::new(mechanism), time_constant)),
-        Stabilization::None | Stabilization::Projection if mechanism.keeps_account() => Box::new(Multiplier::<N, true>::new(mechanism)),
+        Stabilization::None | Stabilization::Projection if mechanism.has_work_integral() => Box::new(Multiplier::<N, true>::new(mechanism)),
         Stabilization::None | Stabilization::Projection => Box::new(Multiplier::<N, false>::new(mechanism)),
     }
 }
@@ -72,7 +72,11 @@ fn eliminated<const N: usize>(mechanism: &Arc<Mechanism>) -> Box<dyn Problem> {
 /// The canonical form for `N` bodies.
 fn canonical<const N: usize>(mechanism: &Arc<Mechanism>) -> Box<dyn Problem> {
     let mechanism = Arc::clone(mechanism);
-    if mechanism.keeps_account() { Box::new(Canonical::<N, true>::new(mechanism)) } else { Box::new(Canonical::<N, false>::new(mechanism)) }
+    if mechanism.has_work_integral() {
+        Box::new(Canonical::<N, true>::new(mechanism))
+    } else {
+        Box::new(Canonical::<N, false>::new(mechanism))
+    }
 }
 
 /// Builds what a plan asks for; Baumgarte's time constant is measured first where none was given.
@@ -118,7 +122,7 @@ fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<
             let mut taylor = Taylor::new(tolerance);
             taylor.extended = plan.extended;
             match plan.stabilization {
-                Stabilization::None if mechanism.rows.is_empty() => driver(sized!(n, eliminated(mechanism)), taylor, start),
+                Stabilization::None if mechanism.constraints.is_empty() => driver(sized!(n, eliminated(mechanism)), taylor, start),
                 Stabilization::Projection => driver(problem(), Projected::new(taylor), start),
                 _ => driver(problem(), taylor, start),
             }
@@ -176,7 +180,7 @@ fn cannot_begin(plan: &Plan, what: String) -> StepError {
 fn pilot(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion) -> Result<f64, StepError> {
     let mut plain = Plan { stabilization: Stabilization::None, ..plan.clone() };
     let mut driver = build(mechanism, &mut plain, start)?;
-    driver.allow(plan.effort);
+    driver.allow(plan.max_evaluations);
     let rows = plan.rows.min(20);
     for row in 1..=rows {
         match driver.advance(plan.time(row), plan.time(plan.rows), Watch::default(), &mut || false) {
@@ -188,5 +192,5 @@ fn pilot(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion) -> Result<f64,
     }
     let mut motion = Motion::default();
     driver.read(&mut motion);
-    Ok(5.0 * motion.time.hi.max(f64::MIN_POSITIVE) / driver.tally().steps.max(1) as f64)
+    Ok(5.0 * motion.time.hi.max(f64::MIN_POSITIVE) / driver.statistics().steps.max(1) as f64)
 }

@@ -1,7 +1,7 @@
 //! What events from outside do to a run: it stops, its motion is changed, parts of the scene begin or cease to act.
 
 use super::build::build;
-use super::contact::Course;
+use super::contact::ContactDriver;
 use super::event::{Action, Change};
 use super::monitor::Monitor;
 use super::running::Outcome;
@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// Violation of a constraint, angles in rad and lengths in sizes of the mechanism, and its rate in units of the mechanism, up to which a changed motion satisfies it.
 const SATISFIED: f64 = 1e-8;
 
-impl Course {
+impl ContactDriver {
     /// Takes the events found in the last steps into the outcome.
     pub(super) fn record_events(&mut self, outcome: &mut Outcome) {
         if let Some(events) = &mut self.events {
@@ -42,10 +42,10 @@ impl Course {
     }
 
     fn change(&mut self, event: &str, Change { motion, switches }: Change, outcome: &mut Outcome) -> Result<(), StepError> {
-        let refused = |course: &mut Self, what: String, hint: &str| StepError {
+        let refused = |contact_driver: &mut Self, what: String, hint: &str| StepError {
             cause: Cause::Unsuited,
             method: outcome.plan.method.to_string(),
-            t: course.motion().time.hi,
+            t: contact_driver.motion().time.hi,
             step: 0.0,
             what: format!("event `{event}` {what}"),
             hint: hint.into(),
@@ -107,11 +107,11 @@ fn broken(mechanism: &Mechanism, motion: &Motion) -> Option<String> {
     let mut kernel = Kernel::<f64>::new(mechanism);
     kernel.linearise_at::<0>(mechanism, motion.time, &phi, &omega);
     let (size, time) = (mechanism.size_of_parts(), mechanism.units.time);
-    mechanism.rows.iter().enumerate().find_map(|(r, row)| {
+    mechanism.constraints.iter().enumerate().find_map(|(r, row)| {
         let unit = if row.is_angle() { 1.0 } else { size };
         let (position, rate) = (kernel.rows[r].position.abs() / unit, kernel.row_rate(r, &omega).abs() / unit * time);
-        let pace = omega.iter().fold(1.0, |most: f64, omega| most.max(omega.abs() * time));
-        (position > SATISFIED || rate > SATISFIED * pace)
+        let step_size = omega.iter().fold(1.0, |most: f64, omega| most.max(omega.abs() * time));
+        (position > SATISFIED || rate > SATISFIED * step_size)
             .then(|| format!("leaves constraint {} by {position:.1e} at position and {rate:.1e} at velocity level", row.name))
     })
 }

@@ -140,7 +140,7 @@ fn chosen(mechanism: &Mechanism, request: &Request, stiffness: Option<&Stiffness
         return (MethodId::Taylor, "extended orders are those of its series".into());
     }
     let kept = request.stabilize.unwrap_or(usual(mechanism));
-    let (has_rows, is_free, n) = (!mechanism.rows.is_empty(), mechanism.contacts.is_empty(), mechanism.coordinates());
+    let (has_rows, is_free, n) = (!mechanism.constraints.is_empty(), mechanism.contacts.is_empty(), mechanism.coordinates());
     let classic = if has_rows && kept == Stabilization::Projection { MethodId::Dp8 } else { MethodId::Dop853 };
     let is_kept = kept == Stabilization::None || kept == Stabilization::Projection || !has_rows;
     let is_expanded = mechanism.recursion.is_some() && mechanism.tree.is_dense() && is_kept && mechanism.vibration.is_none();
@@ -156,7 +156,7 @@ fn chosen(mechanism: &Mechanism, request: &Request, stiffness: Option<&Stiffness
         return (classic, format!("the vibration of rigid spring {} acts by its mean force", vibration.name));
     }
     if request.step.is_some() {
-        let why = if mechanism.is_tied_up() {
+        let why = if mechanism.has_closed_loops() {
             "closed loops and sliders are kept by symmetric projection"
         } else {
             "it is the most accurate such method"
@@ -191,7 +191,7 @@ fn chosen(mechanism: &Mechanism, request: &Request, stiffness: Option<&Stiffness
     let fast = stiffness.filter(|stiffness| stiffness.ratio() > STIFF);
     let why = if let Some(name) = fast.and_then(|fast| fast.culprit.as_ref()) {
         format!("spring {name} vibrates undamped and is resolved, which its long steps do best")
-    } else if mechanism.is_tied_up() {
+    } else if mechanism.has_closed_loops() {
         "closed loops and sliders are kept by projection, and its steps pass singular positions".into()
     } else if request.prefer == Some(Prefer::Path) {
         "the path was asked for, and its series is the most accurate for the time".into()

@@ -9,7 +9,7 @@ use super::driver::{Driver, DriverState, Halt, Pause, Watch};
 use super::event::{EventDetector, Memory};
 use super::flip::FlipDetector;
 use super::impact_monitor::{self, Claim};
-use super::inside::{Both, StepWatcher, Watching};
+use super::inside::{Both, ObserverAdapter, StepWatcher};
 use super::methods::Stabilization;
 use super::monitor::{Monitor, lent};
 use super::plan::Plan;
@@ -20,12 +20,12 @@ use crate::dynamics::kernel::Kernel;
 use crate::dynamics::multiplier::Multiplier;
 use crate::dynamics::{Form, Mechanism, Motion, Time};
 use crate::stabilization::projection::project;
-use crate::stepping::{Cause, StepError, Tally};
+use crate::stepping::{Cause, Statistics, StepError};
 use std::sync::Arc;
 
 /// One impact of a run.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Strike {
+pub struct ImpactRecord {
     /// Time \[s\].
     pub t: f64,
     /// Name of the wall.
@@ -40,7 +40,7 @@ pub struct Strike {
 
 /// A time a point stayed on its wall.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Hold {
+pub struct PersistentContact {
     /// Beginning \[s\].
     pub t: f64,
     /// Name of the wall.
@@ -83,7 +83,7 @@ pub(super) struct Jump {
 
 /// Where a course is: all that what follows depends on.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub(super) struct Station {
+pub(super) struct ContactDriverState {
     place: DriverState,
     /// Energy less work at the start, shifted by impacts \[J\].
     reference: Option<DoubleDouble>,
@@ -101,7 +101,7 @@ pub(super) struct Station {
 }
 
 /// A driver on its way through impacts and holds.
-pub(super) struct Course {
+pub(super) struct ContactDriver {
     /// The mechanism with all its parts, and those that do not act at the moment.
     pub(super) whole: Arc<Mechanism>,
     pub(super) off: Vec<String>,
@@ -133,7 +133,7 @@ pub(super) struct Course {
     pub(super) jumps: Option<Vec<Jump>>,
 }
 
-impl Course {
+impl ContactDriver {
     /// A run's beginning: whatever touches and moves into its wall is struck, and what is pressed is held.
     pub(super) fn new(mechanism: Arc<Mechanism>, driver: Box<dyn Driver>) -> Self {
         Self {
@@ -168,8 +168,8 @@ impl Course {
     }
 
     /// True where loops or sliders have to be kept.
-    pub(super) fn is_tied_up(&self) -> bool {
-        self.free.is_tied_up()
+    pub(super) fn has_closed_loops(&self) -> bool {
+        self.free.has_closed_loops()
     }
 
     /// The sample of the present moment.
@@ -187,13 +187,13 @@ impl Course {
     }
 
     /// Counts of all drivers so far.
-    pub(super) fn tally(&self) -> Tally {
-        self.driver.tally()
+    pub(super) fn statistics(&self) -> Statistics {
+        self.driver.statistics()
     }
 
     /// Where it is, to go on from.
-    pub(super) fn station(&self) -> Station {
-        Station {
+    pub(super) fn contact_state(&self) -> ContactDriverState {
+        ContactDriverState {
             place: self.driver.place(),
             reference: self.sampler.reference(),
             contacts: self.mechanism.held.clone(),
@@ -215,8 +215,8 @@ impl Course {
     }
 
     /// How many holds must be kept by name for a station to be consistent.
-    pub(super) fn names_holds(station: &Station) -> usize {
-        station.held.iter().filter_map(|held| held.kept).map(|kept| kept + 1).max().unwrap_or(0)
+    pub(super) fn names_holds(contact_state: &ContactDriverState) -> usize {
+        contact_state.held.iter().filter_map(|held| held.kept).map(|kept| kept + 1).max().unwrap_or(0)
     }
 
     /// A course that goes on from a station, which was reached on the way to `horizon`; `None` where it cannot be one of this mechanism and plan.
@@ -224,10 +224,11 @@ impl Course {
         mechanism: Arc<Mechanism>,
         plan: &Plan,
         start: &Motion,
-        station: Station,
+        contact_state: ContactDriverState,
         horizon: Time,
     ) -> Result<Option<Self>, StepError> {
-        let Station { place, reference, contacts, held, holds_in_row, events_in_row, is_between, stabilizer, off, events } = station;
+        let ContactDriverState { place, reference, contacts, held, holds_in_row, events_in_row, is_between, stabilizer, off, events } =
+            contact_state;
         let whole = mechanism;
         let Ok(mechanism) = whole.without(&off).map(Arc::new) else { return Ok(None) };
         let known = |contact: usize| contact < mechanism.contacts.len();
@@ -241,17 +242,17 @@ impl Course {
             holding = Arc::new(mechanism.holding(&contacts));
             plan.stabilization = Stabilization::Projection;
         }
-        let mut course = Self::new(Arc::clone(&mechanism), build(&holding, &mut plan, start)?);
-        if !course.driver.resume(place, horizon)? {
+        let mut contact_driver = Self::new(Arc::clone(&mechanism), build(&holding, &mut plan, start)?);
+        if !contact_driver.driver.resume(place, horizon)? {
             return Ok(None);
         }
-        course.driver.allow(plan.effort);
+        contact_driver.driver.allow(plan.max_evaluations);
         if !contacts.is_empty() {
-            course.sampler.hold(Arc::clone(&holding));
-            course.mechanism = holding;
+            contact_driver.sampler.hold(Arc::clone(&holding));
+            contact_driver.mechanism = holding;
         }
-        course.sampler.refer(reference);
-        Ok(Some(Self { whole, off, remembered: events, held, holds_in_row, events_in_row, is_between, stabilizer, ..course }))
+        contact_driver.sampler.refer(reference);
+        Ok(Some(Self { whole, off, remembered: events, held, holds_in_row, events_in_row, is_between, stabilizer, ..contact_driver }))
     }
 
     /// Advances to an output time, through impacts and holds; false where it paused on the way.
@@ -265,7 +266,7 @@ impl Course {
         until: Time,
         outcome: &mut Outcome,
         mut monitor: Option<&mut dyn Monitor>,
-        mut observer: Option<&mut Watching>,
+        mut observer: Option<&mut ObserverAdapter>,
         pause: &mut Pause,
     ) -> Result<bool, StepError> {
         if !std::mem::take(&mut self.is_between) {
@@ -273,7 +274,7 @@ impl Course {
         }
         while self.events_in_row < EVENTS_MOST {
             if let Some(monitor) = &mut monitor {
-                monitor.count_events(outcome.strike_count + outcome.hold_count);
+                monitor.count_events(outcome.impact_count + outcome.persistent_contact_count);
             }
             let horizon = outcome.plan.time(outcome.plan.rows);
             let mut both = Both { events: self.events.as_mut(), observer: observer.as_deref_mut() };
@@ -298,13 +299,13 @@ impl Course {
                 }
                 Ok(Halt::Contact(contact)) if self.mechanism.held.contains(&contact) => self.settle(None, Some(contact), outcome)?,
                 Ok(Halt::Contact(contact)) => {
-                    let approach = self.strike(contact, outcome)?;
+                    let approach = self.impact_at(contact, outcome)?;
                     self.meet_after(Some(contact), approach, outcome)?;
                 }
                 Err(stop) if stop.cause == Cause::RestingContact => {
-                    let before = (outcome.strike_count, self.mechanism.held.clone());
+                    let before = (outcome.impact_count, self.mechanism.held.clone());
                     self.meet(outcome)?;
-                    if before == (outcome.strike_count, self.mechanism.held.clone()) {
+                    if before == (outcome.impact_count, self.mechanism.held.clone()) {
                         return Err(stop);
                     }
                     // The steps that closed in on the wall are too short to see the point leave it.
@@ -331,9 +332,9 @@ impl Course {
                 let posture = self.posture();
                 let contact = &self.free.contacts[number];
                 let approach = -contact.normal.dot(contact.point.velocity(&posture.z, &posture.omega));
-                let is_met = contact.touches(&posture.z) && approach > NO_SPEED * contact.pace(&posture.omega).max(hardest);
+                let is_met = contact.touches(&posture.z) && approach > NO_SPEED * contact.step_size(&posture.omega).max(hardest);
                 if is_met && !self.mechanism.held.contains(&number) {
-                    hardest = hardest.max(self.strike(number, outcome)?);
+                    hardest = hardest.max(self.impact_at(number, outcome)?);
                     quiet = false;
                 }
             }
@@ -345,11 +346,11 @@ impl Course {
     }
 
     /// Lets the impact at a wall take effect, and returns the approach \[m/s\]; points that the others would have to pull are let go.
-    fn strike(&mut self, contact: usize, outcome: &mut Outcome) -> Result<f64, StepError> {
+    fn impact_at(&mut self, contact: usize, outcome: &mut Outcome) -> Result<f64, StepError> {
         let t = self.motion().time;
         let Posture { phi, omega, .. } = self.posture();
         let impact = loop {
-            let Some(impact) = self.mechanism.strike(contact, t, &phi, &omega) else {
+            let Some(impact) = self.mechanism.impact_at(contact, t, &phi, &omega) else {
                 let what = format!("the constraints leave a point that meets wall {} no way back", self.name(contact));
                 return Err(self.stopped(
                     &outcome.plan,
@@ -389,15 +390,15 @@ impl Course {
         if let Some(jumps) = &mut self.jumps {
             jumps.push(Jump { contact: Some(contact), before: last, after, mechanism: Arc::clone(&self.mechanism) });
         }
-        outcome.strike_loss -= change.hi;
+        outcome.impact_loss -= change.hi;
         // A point that hangs at its wall without a force is carried to and fro by rounding: that is taken off it, and is no impact.
         let contact_speed = self.free.contacts[contact].length / self.free.units.time;
         if -impact.approach <= NO_SPEED * contact_speed {
             return Ok(-impact.approach);
         }
-        outcome.strike_count += 1;
-        if outcome.strikes.len() < KEPT {
-            outcome.strikes.push(Strike {
+        outcome.impact_count += 1;
+        if outcome.impacts.len() < KEPT {
+            outcome.impacts.push(ImpactRecord {
                 t: motion.time.hi,
                 wall: self.name(contact).into(),
                 impulse: impact.impulse,
@@ -467,7 +468,7 @@ impl Course {
         motion.stabilizer = 0.0;
         let change = self.sampler.balance(motion) - before;
         self.sampler.shift(change);
-        outcome.strike_loss -= change.hi;
+        outcome.impact_loss -= change.hi;
         Ok(())
     }
 
@@ -476,7 +477,7 @@ impl Course {
         self.held.retain(|held| {
             let stays = contacts.contains(&held.contact);
             if !stays {
-                outcome.hold_time += t - held.since;
+                outcome.persistent_contact_time += t - held.since;
                 if let Some(kept) = held.kept {
                     outcome.holds[kept].until = Some(t);
                 }
@@ -488,10 +489,10 @@ impl Course {
                 continue;
             }
             self.holds_in_row += 1;
-            outcome.hold_count += 1;
+            outcome.persistent_contact_count += 1;
             let kept = (outcome.holds.len() < KEPT).then_some(outcome.holds.len());
             if kept.is_some() {
-                outcome.holds.push(Hold { t, wall: self.name(contact).into(), until: None });
+                outcome.holds.push(PersistentContact { t, wall: self.name(contact).into(), until: None });
             }
             self.held.push(Held { contact, since: t, kept });
         }
@@ -505,7 +506,7 @@ impl Course {
 
     /// Books the time of the holds that last to the end of the run, `t` \[s\].
     pub(super) fn end(&mut self, t: f64, outcome: &mut Outcome) {
-        outcome.hold_time += self.held.iter().map(|held| t - held.since).sum::<f64>();
+        outcome.persistent_contact_time += self.held.iter().map(|held| t - held.since).sum::<f64>();
     }
 
     /// The present motion.
@@ -532,7 +533,7 @@ impl Course {
         if self.free.contacts.is_empty() {
             return None;
         }
-        let keeps_rates = outcome.strike_count == 0 && outcome.hold_count == 0;
+        let keeps_rates = outcome.impact_count == 0 && outcome.persistent_contact_count == 0;
         let first = self.motion();
         let what = impact_monitor::is_start(&self.free, start, &first, keeps_rates).err()?;
         let what = format!("the first sample is not the start: {what}");

@@ -2,7 +2,7 @@
 
 use super::build::Problem;
 use crate::dynamics::{State, Time};
-use crate::stepping::{Integrator, StepError, Tally, shortened};
+use crate::stepping::{Integrator, Statistics, StepError, shortened};
 use std::fmt;
 use std::sync::Arc;
 
@@ -15,14 +15,14 @@ type Make = dyn Fn() -> Box<dyn Integrator<dyn Problem> + Send> + Send + Sync;
 /// [dense](Integrator::is_dense) takes steps as long as it likes; one that is not is asked for steps that end on output times.
 ///
 /// ```
-/// use driftless::{Custom, Field, Integrator, Simulation, State, StepError, Tally, Time, read_scene};
+/// use driftless::{Custom, OdeSystem, Integrator, Simulation, State, StepError, Statistics, Time, read_scene};
 ///
 /// /// Heun's method with a step of its own: order 2.
 /// struct Heun {
 ///     step: f64,
 /// }
 ///
-/// impl<P: Field + ?Sized> Integrator<P> for Heun {
+/// impl<P: OdeSystem + ?Sized> Integrator<P> for Heun {
 ///     fn name(&self) -> &'static str {
 ///         "heun"
 ///     }
@@ -35,19 +35,19 @@ type Make = dyn Fn() -> Box<dyn Integrator<dyn Problem> + Send> + Send + Sync;
 ///         Ok(())
 ///     }
 ///
-///     fn step(&mut self, problem: &mut P, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
+///     fn step(&mut self, problem: &mut P, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError> {
 ///         let left = (until - state.time).hi;
 ///         let h = if left < 1.5 * self.step { left } else { self.step };
 ///         let (mut first, mut second) = (vec![0.0; state.y.len()], vec![0.0; state.y.len()]);
-///         problem.rate(state.time, &state.y, &mut first);
+///         problem.rhs(state.time, &state.y, &mut first);
 ///         let there: Vec<f64> = state.y.iter().zip(&first).map(|(y, rate)| y + h * rate).collect();
-///         problem.rate(state.time + h, &there, &mut second);
+///         problem.rhs(state.time + h, &there, &mut second);
 ///         for i in 0..there.len() {
 ///             state.y[i] += 0.5 * h * (first[i] + second[i]);
 ///         }
 ///         state.time = if h == left { until } else { state.time + h };
 ///         state.wrap();
-///         (tally.steps, tally.evaluations) = (tally.steps + 1, tally.evaluations + 2);
+///         (statistics.steps, statistics.evaluations) = (statistics.steps + 1, statistics.evaluations + 2);
 ///         Ok(None)
 ///     }
 /// }
@@ -103,9 +103,9 @@ impl Integrator<dyn Problem> for Outside {
         problem: &mut (dyn Problem + 'static),
         state: &mut State,
         until: Time,
-        tally: &mut Tally,
+        statistics: &mut Statistics,
     ) -> Result<Option<usize>, StepError> {
-        self.inner.step(problem, state, until, tally)
+        self.inner.step(problem, state, until, statistics)
     }
 
     fn is_at(&self, state: &State, until: Time) -> bool {

@@ -163,12 +163,12 @@ pub struct Drift {
 impl Drift {
     /// Monitors of a mechanism over a horizon \[s\].
     pub fn new(mechanism: &Mechanism, until: f64) -> Self {
-        let works = mechanism.keeps_account() || !mechanism.contacts.is_empty();
+        let works = mechanism.has_work_integral() || !mechanism.contacts.is_empty();
         let pair = || [Excursion::new(until), Excursion::new(until)];
         Self {
             energy: Excursion::new(until),
             kind: if works { "energy minus work" } else { "energy" },
-            constraints: mechanism.rows.iter().map(|row| (row.name().to_owned(), pair())).collect(),
+            constraints: mechanism.constraints.iter().map(|row| (row.name().to_owned(), pair())).collect(),
             singular: None,
             stabilizer: 0.0,
             stabilizer_max: 0.0,
@@ -177,7 +177,7 @@ impl Drift {
             allowance: None,
             limit: EnergyLimit::default(),
             scale: mechanism.energy_scale,
-            units: mechanism.rows.iter().map(|row| if row.is_angle() { 1.0 } else { mechanism.size_of_parts() }).collect(),
+            units: mechanism.constraints.iter().map(|row| if row.is_angle() { 1.0 } else { mechanism.size_of_parts() }).collect(),
         }
     }
 
@@ -210,7 +210,7 @@ impl Drift {
 
     /// Whether it can be one of this mechanism.
     pub(super) fn fits(&self, mechanism: &Mechanism) -> bool {
-        let rows = mechanism.rows.iter().map(|row| row.name());
+        let rows = mechanism.constraints.iter().map(|row| row.name());
         let mut excursions = self.constraints.iter().flat_map(|(_, levels)| levels).chain([&self.energy]);
         self.constraints.iter().map(|(name, _)| name.as_str()).eq(rows)
             && self.units.len() == self.constraints.len()
@@ -225,8 +225,8 @@ impl Drift {
         self.largest = self.largest.max(sample.kinetic.abs()).max(sample.work.abs());
         self.energy_share = larger(sample.imbalance.abs() * (self.scale / self.largest), self.energy_share);
         if let Some(allowance) = &self.allowance {
-            let feet = &sample.phi[sample.centre.len()..];
-            self.limit.see(allowance, &Moment { omega: &sample.omega, feet, work: sample.work, largest: self.largest, steps });
+            let translations = &sample.phi[sample.centre.len()..];
+            self.limit.see(allowance, &Moment { omega: &sample.omega, translations, work: sample.work, largest: self.largest, steps });
         }
         for ((_, monitors), values) in self.constraints.iter_mut().zip(&sample.constraints) {
             for (monitor, &value) in monitors.iter_mut().zip(values) {

@@ -8,8 +8,8 @@ use super::inside::{Inside, StepWatcher};
 use super::monitor::Monitor;
 use super::wall_guard::WallGuard;
 use crate::arithmetic::Scalar;
-use crate::dynamics::{Form, Glance, Motion, State, Time};
-use crate::stepping::{Integrator, StepError, Tally};
+use crate::dynamics::{BodyAngles, Form, Motion, State, Time};
+use crate::stepping::{Integrator, Statistics, StepError};
 
 /// Turns that a state may have at most: all that doubles count.
 pub(super) const MOST_TURNS: u64 = 1 << 53;
@@ -45,9 +45,9 @@ pub(super) trait Driver: Send {
     fn read(&mut self, motion: &mut Motion);
     /// Goes on from another motion: of what the method remembers with the step alone.
     fn jump(&mut self, motion: &Motion);
-    fn tally(&self) -> Tally;
+    fn statistics(&self) -> Statistics;
     /// Bounds the evaluations.
-    fn allow(&mut self, effort: u64);
+    fn allow(&mut self, max_evaluations: u64);
     /// What the method carries from step to step.
     fn memory(&self) -> &[f64];
     /// Makes the method choose its step anew.
@@ -69,7 +69,7 @@ pub type Pause<'a> = dyn FnMut() -> bool + 'a;
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct DriverState {
     state: State,
-    tally: Tally,
+    statistics: Statistics,
     /// Where a dense method began its last step; without unknowns where it made none.
     from: State,
     ahead: Option<usize>,
@@ -85,7 +85,7 @@ struct StepLoop<P: ?Sized, M> {
     problem: Box<P>,
     method: M,
     state: State,
-    tally: Tally,
+    statistics: Statistics,
     /// Where the last step began.
     from: State,
     /// The motion at an output time inside that step, while it is the one to be read.
@@ -123,7 +123,7 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
             }
             self.method.save(&mut self.state);
             self.from.clone_from(&self.state);
-            let mut event = self.method.step(&mut self.problem, &mut self.state, target, &mut self.tally)?;
+            let mut event = self.method.step(&mut self.problem, &mut self.state, target, &mut self.statistics)?;
             self.check_walls()?;
             if let Some(steps) = &mut steps
                 && self.is_cut_by(*steps)
@@ -169,12 +169,12 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
         self.goes_on = false;
     }
 
-    fn tally(&self) -> Tally {
-        self.tally
+    fn statistics(&self) -> Statistics {
+        self.statistics
     }
 
-    fn allow(&mut self, effort: u64) {
-        self.tally.effort = effort;
+    fn allow(&mut self, max_evaluations: u64) {
+        self.statistics.max_evaluations = max_evaluations;
     }
 
     fn memory(&self) -> &[f64] {
@@ -187,7 +187,7 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
     }
 
     fn follow(&mut self, other: &dyn Driver) {
-        self.tally = other.tally();
+        self.statistics = other.statistics();
         self.state.memory = other.memory().to_vec();
         self.method.reset(&mut self.state);
         self.goes_on = false;
@@ -202,7 +202,7 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
         self.method.save(&mut state);
         DriverState {
             state,
-            tally: self.tally,
+            statistics: self.statistics,
             from: self.from.clone(),
             ahead: self.ahead,
             is_cut: self.is_cut,
@@ -215,7 +215,7 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
         let shape = |state: &State| (state.y.len(), state.low.len(), state.turns.len(), state.is_winding);
         let alike = |state: &State| shape(state) == shape(&self.state) && state.turns.iter().all(|turns| turns.unsigned_abs() < MOST_TURNS);
         let steps_back = self.is_dense && place.goes_on && !place.from.y.is_empty() && place.from.time < place.state.time;
-        let counts = [place.tally.steps, place.tally.evaluations, place.tally.rejected];
+        let counts = [place.statistics.steps, place.statistics.evaluations, place.statistics.rejected];
         let is_event = |event: usize| event < self.problem.mechanism().contacts.len();
         if counts.iter().any(|&count| count >= MOST_TURNS)
             || !alike(&place.state)
@@ -228,9 +228,10 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
             // What the method knows of the inside of its last step it finds again by repeating it.
             let mut state = place.from.clone();
             self.method.begin(&mut self.problem, &mut state, horizon)?;
-            self.method.step(&mut self.problem, &mut state, horizon, &mut Tally::default())?;
+            self.method.step(&mut self.problem, &mut state, horizon, &mut Statistics::default())?;
         }
-        (self.state, self.tally, self.from, self.ahead, self.goes_on) = (place.state, place.tally, place.from, place.ahead, steps_back);
+        (self.state, self.statistics, self.from, self.ahead, self.goes_on) =
+            (place.state, place.statistics, place.from, place.ahead, steps_back);
         self.is_cut = place.is_cut;
         Ok(self.method.restore_internal_state(&place.known))
     }
@@ -247,9 +248,9 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
             flips.begin(&mut **problem, state);
         }
         if let Some(guard) = guard {
-            let mut glance = Glance::default();
-            problem.glance(state, &mut glance);
-            guard.begin(problem.mechanism(), state.time.hi, &glance);
+            let mut body_angles = BodyAngles::default();
+            problem.body_angles(state, &mut body_angles);
+            guard.begin(problem.mechanism(), state.time.hi, &body_angles);
         }
         Ok(())
     }
@@ -278,16 +279,16 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
     /// Looks whether the last step has passed a wall.
     fn check_walls(&mut self) -> Result<(), StepError> {
         let Self { problem, method, state, guard: Some(guard), from, inside, .. } = self else { return Ok(()) };
-        let (name, mut glance) = (Integrator::<P>::name(method), Glance::default());
-        problem.glance(state, &mut glance);
-        let candidate = guard.step(problem.mechanism(), state.time.hi, &glance).map_err(|passed| passed.stop(name))?;
+        let (name, mut body_angles) = (Integrator::<P>::name(method), BodyAngles::default());
+        problem.body_angles(state, &mut body_angles);
+        let candidate = guard.step(problem.mechanism(), state.time.hi, &body_angles).map_err(|passed| passed.stop(name))?;
         let Some(contact) = candidate.filter(|_| self.is_dense) else { return Ok(()) };
         let (span, mechanism) = (state.time - from.time, problem.mechanism().clone());
         let mut at = |share: f64| {
             method.interpolate(problem, from, from.time + span.scale(share), inside);
-            let mut glance = Glance::default();
-            problem.glance(inside, &mut glance);
-            (inside.time.hi, glance)
+            let mut body_angles = BodyAngles::default();
+            problem.body_angles(inside, &mut body_angles);
+            (inside.time.hi, body_angles)
         };
         guard.search(&mechanism, contact, &mut at).map_err(|passed| passed.stop(name))
     }
@@ -300,16 +301,16 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
         let Self { problem, method, from, inside, .. } = self;
         let found = flip::search(start, span, &ends, &mut |seconds| {
             method.interpolate(problem, from, from.time + seconds, inside);
-            let mut glance = Glance::default();
-            flip::look(&mut **problem, inside, &mut glance);
-            glance
+            let mut body_angles = BodyAngles::default();
+            flip::look(&mut **problem, inside, &mut body_angles);
+            body_angles
         });
         flips.conclude(start + span, &ends, found);
     }
 
     /// Shows the motion of the last step to a monitor where it is due.
     fn show(&mut self, monitor: &mut dyn Monitor) {
-        let Self { problem, method, state, from, inside, observed, tally, is_dense, .. } = self;
+        let Self { problem, method, state, from, inside, observed, statistics, is_dense, .. } = self;
         while monitor.due() <= state.time.hi {
             if *is_dense && monitor.due() > from.time.hi && monitor.due() < state.time.hi {
                 method.interpolate(problem, from, Time::from(monitor.due()), inside);
@@ -317,7 +318,7 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
             } else {
                 problem.read(state, observed);
             }
-            monitor.observe(observed, *tally);
+            monitor.observe(observed, *statistics);
         }
     }
 }
@@ -353,7 +354,7 @@ pub(super) fn boxed<P: Form + Send + ?Sized + 'static, M: Integrator<P> + Send +
         problem,
         method,
         state,
-        tally: Tally::default(),
+        statistics: Statistics::default(),
         from: idle(),
         inside: idle(),
         is_inside: false,

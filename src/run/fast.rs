@@ -69,7 +69,7 @@ impl FastMode {
     /// # Errors
     /// More than 1e8 rad, no effort stated.
     pub fn check(&self, method: MethodId, request: &Request, until: f64) -> Result<(), Refusal> {
-        let is_asked_for = request.effort.is_some() || !method.is_adaptive() || matches!(method, MethodId::Radau(_));
+        let is_asked_for = request.max_evaluations.is_some() || !method.is_adaptive() || matches!(method, MethodId::Radau(_));
         if is_asked_for || !self.swings() || self.rate * until <= MOST_RADIANS {
             return Ok(());
         }
@@ -78,7 +78,8 @@ impl FastMode {
             is_usage: false,
             what: format!("{} over {until} s", self.name()),
             reason: format!("it oscillates at {rate:.1e} rad/s, {periods:.1e} periods until t = {until} s, about {:.1e} steps", self.steps),
-            alternative: "a shorter --until, \"model\": \"rigid\" for the spring, or --effort with the evaluations that may take".into(),
+            alternative: "a shorter --until, \"model\": \"rigid\" for the spring, or --max-evaluations with the evaluations that may take"
+                .into(),
         })
     }
 

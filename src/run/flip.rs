@@ -6,7 +6,7 @@
 //! step, so it is as accurate as the run.
 
 use crate::arithmetic::angle;
-use crate::dynamics::{Form, Glance, State};
+use crate::dynamics::{BodyAngles, Form, State};
 use crate::stepping::search::{Chebyshev, Crossing, crossing};
 use std::f64::consts::{PI, TAU};
 
@@ -31,8 +31,8 @@ const ROUNDS: usize = 8;
 #[derive(Default)]
 pub(super) struct FlipDetector {
     pub flip: Option<Flip>,
-    before: Glance,
-    now: Glance,
+    before: BodyAngles,
+    now: BodyAngles,
 }
 
 impl FlipDetector {
@@ -42,7 +42,7 @@ impl FlipDetector {
     }
 
     /// Takes the state after a step of `span` \[s\], and tells what there is to see at both ends of it where it holds a passage, or may.
-    pub fn step<P: Form + ?Sized>(&mut self, problem: &mut P, state: &State, span: f64) -> Option<[Glance; 2]> {
+    pub fn step<P: Form + ?Sized>(&mut self, problem: &mut P, state: &State, span: f64) -> Option<[BodyAngles; 2]> {
         if self.flip.is_some() {
             return None;
         }
@@ -54,7 +54,7 @@ impl FlipDetector {
     }
 
     /// Takes what was found in a step that ends at `t` \[s\], between these ends.
-    pub fn conclude(&mut self, t: f64, [a, b]: &[Glance; 2], found: Option<Flip>) {
+    pub fn conclude(&mut self, t: f64, [a, b]: &[BodyAngles; 2], found: Option<Flip>) {
         // A passage so near the end of the step that rounding decides is there.
         let turned = || (0..a.turns.len()).find(|&bar| a.turns[bar] != b.turns[bar]);
         self.flip = found.or_else(|| turned().map(|bar| Flip { t, bar }));
@@ -62,19 +62,19 @@ impl FlipDetector {
 }
 
 /// Angles and rates of the bodies alone, whole turns taken off and counted whatever the mechanism does with them.
-pub(super) fn look<P: Form + ?Sized>(problem: &mut P, state: &State, glance: &mut Glance) {
-    problem.glance(state, glance);
+pub(super) fn look<P: Form + ?Sized>(problem: &mut P, state: &State, body_angles: &mut BodyAngles) {
+    problem.body_angles(state, body_angles);
     let bodies = problem.mechanism().bodies.len();
-    glance.phi.truncate(bodies);
-    glance.omega.truncate(bodies);
-    glance.turns.resize(bodies, 0);
-    for (phi, turns) in glance.phi.iter_mut().zip(&mut glance.turns) {
+    body_angles.phi.truncate(bodies);
+    body_angles.omega.truncate(bodies);
+    body_angles.turns.resize(bodies, 0);
+    for (phi, turns) in body_angles.phi.iter_mut().zip(&mut body_angles.turns) {
         *turns = turns.saturating_add(angle::wrap(phi, &mut 0.0));
     }
 }
 
 /// True where a bar may come to the boundary in a step, if it is at most twice as fast on the way as at the ends.
-pub(super) fn can_pass(a: &Glance, b: &Glance, span: f64) -> bool {
+pub(super) fn can_pass(a: &BodyAngles, b: &BodyAngles, span: f64) -> bool {
     (0..a.phi.len()).any(|bar| {
         let (from, to) = (a.omega[bar], b.omega[bar]);
         let reach = span * (from.abs().max(to.abs()) + (to - from).abs());
@@ -84,12 +84,12 @@ pub(super) fn can_pass(a: &Glance, b: &Glance, span: f64) -> bool {
 }
 
 /// The angle at `b`, less the turns of `a` \[rad\].
-fn winding(bar: usize, a: &Glance, b: &Glance) -> f64 {
+fn winding(bar: usize, a: &BodyAngles, b: &BodyAngles) -> f64 {
     b.phi[bar] + TAU * (b.turns[bar] - a.turns[bar]) as f64
 }
 
 /// The first passage in a step that begins at `start` \[s\] and takes `span` \[s\]; `at` looks so many seconds after its beginning.
-pub(super) fn search(start: f64, span: f64, [first, last]: &[Glance; 2], at: &mut dyn FnMut(f64) -> Glance) -> Option<Flip> {
+pub(super) fn search(start: f64, span: f64, [first, last]: &[BodyAngles; 2], at: &mut dyn FnMut(f64) -> BodyAngles) -> Option<Flip> {
     // Later halves wait.
     let mut parts = vec![(0.0, span, first.clone(), last.clone())];
     while let Some((begin, end, a, b)) = parts.pop() {
@@ -109,7 +109,7 @@ pub(super) fn search(start: f64, span: f64, [first, last]: &[Glance; 2], at: &mu
 }
 
 /// The first passage in a part of a step, which begins with `first`.
-fn first_passage(start: f64, [begin, end]: [f64; 2], first: &Glance, at: &mut dyn FnMut(f64) -> Glance) -> Option<Flip> {
+fn first_passage(start: f64, [begin, end]: [f64; 2], first: &BodyAngles, at: &mut dyn FnMut(f64) -> BodyAngles) -> Option<Flip> {
     let span = end - begin;
     let mut angles = vec![Vec::new(); first.phi.len()];
     for degree in DEGREES {
@@ -141,7 +141,7 @@ fn first_passage(start: f64, [begin, end]: [f64; 2], first: &Glance, at: &mut dy
 }
 
 /// The time after the step's beginning at which a bar is on the boundary, near `t` \[s\].
-fn passage(bar: usize, side: f64, first: &Glance, near: f64, [begin, end]: [f64; 2], at: &mut dyn FnMut(f64) -> Glance) -> f64 {
+fn passage(bar: usize, side: f64, first: &BodyAngles, near: f64, [begin, end]: [f64; 2], at: &mut dyn FnMut(f64) -> BodyAngles) -> f64 {
     let mut t = near;
     for _ in 0..ROUNDS {
         let there = at(t);
@@ -163,17 +163,17 @@ fn passage(bar: usize, side: f64, first: &Glance, near: f64, [begin, end]: [f64;
 mod tests {
     use super::*;
 
-    fn glance(phi: f64, omega: f64) -> Glance {
+    fn body_angles(phi: f64, omega: f64) -> BodyAngles {
         let (mut hi, mut lo) = (phi, 0.0);
         let turns = angle::wrap(&mut hi, &mut lo);
-        Glance { phi: vec![hi], turns: vec![turns], omega: vec![omega] }
+        BodyAngles { phi: vec![hi], turns: vec![turns], omega: vec![omega] }
     }
 
     /// The first passage of a given motion in one step.
     fn search(motion: impl Fn(f64) -> [f64; 2], span: f64) -> Option<Flip> {
-        let ends = [0.0, span].map(|t| glance(motion(t)[0], motion(t)[1]));
+        let ends = [0.0, span].map(|t| body_angles(motion(t)[0], motion(t)[1]));
         let suspicious = can_pass(&ends[0], &ends[1], span);
-        suspicious.then(|| super::search(2.0, span, &ends, &mut |t| glance(motion(t)[0], motion(t)[1])))?
+        suspicious.then(|| super::search(2.0, span, &ends, &mut |t| body_angles(motion(t)[0], motion(t)[1])))?
     }
 
     #[test]

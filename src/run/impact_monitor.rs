@@ -10,10 +10,10 @@
 //! Source: E. T. Whittaker, *A Treatise on the Analytical Dynamics of Particles and Rigid Bodies*, 4th ed. (1937), sections 106 to 108.
 
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
+use crate::dynamics::constraint::{Measure, Posture};
 use crate::dynamics::contact::scale::magnitudes;
-use crate::dynamics::forest::Foot;
+use crate::dynamics::forest::BodyOrigin;
 use crate::dynamics::impact::Contact;
-use crate::dynamics::row::{Measure, Posture};
 use crate::dynamics::{Mechanism, Motion};
 
 /// Energies, velocities and rates that agree to this share of the magnitudes they are made of agree.
@@ -62,9 +62,9 @@ pub(super) fn check(mechanism: &Mechanism, tolerance: f64, before: &Motion, afte
     }
     let (here, slips) = (Sides::new(mechanism, before, after), slips(mechanism, before, after));
     let [approach, departure] = [&before.omega, &after.omega].map(|omega| contact.normal_velocity(&here.z, omega));
-    let pace = contact.pace(&before.omega.iter().map(|omega| omega.hi).collect::<Vec<_>>());
+    let step_size = contact.step_size(&before.omega.iter().map(|omega| omega.hi).collect::<Vec<_>>());
     let speed_error = departure + contact.restitution * approach;
-    if beyond(speed_error.abs(), AGREES * approach.abs() + 1e-13 * pace) {
+    if beyond(speed_error.abs(), AGREES * approach.abs() + 1e-13 * step_size) {
         return Err(format!("the point leaves at {departure:.6e} m/s after an approach at {:.6e} m/s", -approach));
     }
     let [drift, slip] = slips?;
@@ -99,9 +99,12 @@ pub(super) fn is_start(mechanism: &Mechanism, start: &Motion, first: &Motion, ke
     let angles = mechanism.bodies.len();
     let fastest = |range: &[DoubleDouble]| range.iter().fold(0.0f64, |most, omega| most.max(omega.hi.abs()));
     let (turning, moving) = start.omega.split_at(angles);
-    let pace = [fastest(turning), fastest(moving)];
+    let step_size = [fastest(turning), fastest(moving)];
     let differs = |&k: &usize| {
-        beyond((first.omega[k] - start.omega[k]).hi.abs(), AGREES * pace[usize::from(k >= angles)].max(1e-12 * pace[0].max(pace[1])))
+        beyond(
+            (first.omega[k] - start.omega[k]).hi.abs(),
+            AGREES * step_size[usize::from(k >= angles)].max(1e-12 * step_size[0].max(step_size[1])),
+        )
     };
     match (0..start.omega.len()).filter(|_| keeps_rates).find(differs) {
         Some(k) => Err(format!("the rate of {} is {} and not {}", mechanism.coordinate_name(k), first.omega[k].hi, start.omega[k].hi)),
@@ -181,16 +184,16 @@ impl Sides {
 
 /// Velocities of the centres of mass, from body to body \[m/s\].
 fn centre_velocities(mechanism: &Mechanism, z: &[Complex<DoubleDouble>], omega: &[DoubleDouble]) -> Vec<Complex<DoubleDouble>> {
-    let mut feet = vec![Complex::<DoubleDouble>::ZERO; mechanism.bodies.len()];
+    let mut translations = vec![Complex::<DoubleDouble>::ZERO; mechanism.bodies.len()];
     for &k in &mechanism.forest.order {
-        feet[k] = match mechanism.forest.hangs[k].foot {
-            Foot::Ground(_) => Complex::ZERO,
-            Foot::On(parent, arm) => feet[parent] + z[parent].turn(arm).left().times(omega[parent]),
-            Foot::Free(x) => Complex::new(omega[x], omega[x + 1]),
+        translations[k] = match mechanism.forest.hangs[k].origin_point {
+            BodyOrigin::Ground(_) => Complex::ZERO,
+            BodyOrigin::On(parent, arm) => translations[parent] + z[parent].turn(arm).left().times(omega[parent]),
+            BodyOrigin::Free(x) => Complex::new(omega[x], omega[x + 1]),
         };
     }
     let arm = |k: usize| z[k].turn(mechanism.bodies[k].centre).left().times(omega[k]);
-    feet.iter().enumerate().map(|(k, &foot)| foot + arm(k)).collect()
+    translations.iter().enumerate().map(|(k, &origin_point)| origin_point + arm(k)).collect()
 }
 
 /// The worst rate of the constraints before and after, each over the magnitudes it would be made of if all of the mechanism moved as fast as the fastest of it.
@@ -205,7 +208,7 @@ fn slips(mechanism: &Mechanism, before: &Motion, after: &Motion) -> Result<[f64;
     let turning = turning.max(moving / length);
     let moving = moving.max(turning * length);
     let mut worst = [0.0f64; 2];
-    for row in &mechanism.rows {
+    for row in &mechanism.constraints {
         let mut jacobian = vec![DoubleDouble::ZERO; before.phi.len()];
         let here = row.differentiate(before.time, Posture { phi: &before.phi, z: &z, omega: &before.omega }, &mut jacobian);
         let sides = [before, after].map(|motion| {
@@ -240,7 +243,7 @@ mod tests {
     /// The motion after it as the impact code has it, and what it claims.
     fn struck(mechanism: &Mechanism, before: &Motion) -> (Motion, Claim) {
         let plain = |numbers: &[DoubleDouble]| numbers.iter().map(|x| x.hi).collect::<Vec<_>>();
-        let impact = mechanism.strike(0, before.time, &plain(&before.phi), &plain(&before.omega)).expect("a rebound");
+        let impact = mechanism.impact_at(0, before.time, &plain(&before.phi), &plain(&before.omega)).expect("a rebound");
         let omega = impact.omega.iter().map(|&omega| DoubleDouble::from(omega)).collect();
         let after = Motion { omega, work: before.work + impact.motor_work, ..before.clone() };
         (after, Claim { contact: 0, impulse: impact.impulse, energy_lost: impact.motor_work - impact.energy_change })

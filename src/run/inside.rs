@@ -88,13 +88,13 @@ impl<F: FnMut(&Sample) -> ControlFlow<()>> Observer for F {
 }
 
 /// An observer as a watcher of steps.
-pub(super) struct Watching<'a, 'b> {
+pub(super) struct ObserverAdapter<'a, 'b> {
     pub observer: &'a mut (dyn Observer + 'b),
     /// True once it wanted to stop.
     pub has_enough: bool,
 }
 
-impl StepWatcher for Watching<'_, '_> {
+impl StepWatcher for ObserverAdapter<'_, '_> {
     fn step(&mut self, inside: &mut dyn Inside) -> Option<Time> {
         let end = inside.span().1;
         self.has_enough |= self.observer.step(&mut Step(inside)).is_break();
@@ -105,7 +105,7 @@ impl StepWatcher for Watching<'_, '_> {
 /// The events of a run and an observer, one after the other.
 pub(super) struct Both<'a, 'b, 'c> {
     pub events: Option<&'a mut EventDetector>,
-    pub observer: Option<&'a mut Watching<'b, 'c>>,
+    pub observer: Option<&'a mut ObserverAdapter<'b, 'c>>,
 }
 
 impl Both<'_, '_, '_> {

@@ -93,7 +93,7 @@ const fn adaptive(id: MethodId, name: &'static str, order: u32, purpose: &'stati
 }
 
 const fn radau(stages: usize, name: &'static str) -> MethodInfo {
-    let purpose = "dampers and damped stiff springs; eats the energy of stiff springs that swing";
+    let purpose = "dampers and damped stiff springs; dissipates the energy of undamped stiff springs";
     adaptive(MethodId::Radau(stages), name, 2 * stages as u32 - 1, purpose, "matrices: up to about a thousand coordinates")
 }
 

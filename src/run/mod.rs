@@ -74,7 +74,7 @@ pub use checkpoint::{CheckpointError, Checkpoints, Loaded};
 pub use choice::Prefer;
 pub use clock::{Clock, wall_clock};
 pub use compare::{Asked, Comparison, compare};
-pub use contact::{Hold, Strike};
+pub use contact::{ImpactRecord, PersistentContact};
 pub use custom::Custom;
 pub use drift::{Drift, Limits};
 pub use driver::Pause;

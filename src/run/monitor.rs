@@ -1,7 +1,7 @@
 //! Looks at a run at times of its own: neither when they are nor what is seen depends on the output times.
 
 use crate::dynamics::Motion;
-use crate::stepping::Tally;
+use crate::stepping::Statistics;
 
 /// Looks at a run while it goes.
 ///
@@ -11,7 +11,7 @@ pub(super) trait Monitor {
     fn due(&self) -> f64;
 
     /// Takes the motion, and what it has cost so far; the next look is later.
-    fn observe(&mut self, motion: &Motion, tally: Tally);
+    fn observe(&mut self, motion: &Motion, statistics: Statistics);
 
     /// Told how many impacts and lasting contacts there have been so far.
     fn count_events(&mut self, count: u64);

@@ -37,7 +37,7 @@ pub struct Request {
     /// First orders in double-double, of the method that has such a setting.
     pub extended: bool,
     /// Evaluations allowed.
-    pub effort: Option<u64>,
+    pub max_evaluations: Option<u64>,
     /// What the method is chosen for, where none is named.
     pub prefer: Option<Prefer>,
 }
@@ -60,7 +60,7 @@ pub struct Plan {
     /// All of the series in double-double, as references are.
     pub in_double_double: bool,
     /// Evaluations allowed, expansions of a series counted alike: a run that needs more stops.
-    pub effort: u64,
+    pub max_evaluations: u64,
     /// Horizon \[s\].
     pub until: f64,
     /// Output interval \[s\].
@@ -95,9 +95,9 @@ pub struct Refusal {
 }
 
 /// Evaluations allowed where nobody says: so many at once, and so many a simulated second.  A thousand times what everyday scenes take.
-const EFFORT: (f64, f64) = (1e8, 1e7);
+const MAX_EVALUATIONS: (f64, f64) = (1e8, 1e7);
 /// The most of them, whatever the horizon, and the most expansions of a series, each of which takes about as long as ten: some minutes to an hour of computing.
-const MOST_EFFORT: [f64; 2] = [1e10, 1e9];
+const MOST_EVALUATIONS: [f64; 2] = [1e10, 1e9];
 /// Most rows a run may write.
 pub const MAX_ROWS: f64 = 1e9;
 /// Most numbers of a trajectory that a scene asks for by itself: about a gigabyte.
@@ -153,13 +153,13 @@ impl Plan {
             mode.check(method, request, until)?;
             notes.extend(mode.note(method, until));
         }
-        let effort = request.effort.unwrap_or(usual_effort(method, until));
-        notes.extend(cut_short(method, step, rate, until, effort));
+        let max_evaluations = request.max_evaluations.unwrap_or(usual_max_evaluations(method, until));
+        notes.extend(cut_short(method, step, rate, until, max_evaluations));
         let rows = rows(until, every);
         if rows > MAX_ROWS {
             return Err(usage("--every", format!("{rows:.1e} rows would be written; at most {MAX_ROWS:.0e}"), "a longer output interval"));
         }
-        let numbers = rows * (5 + 6 * mechanism.bodies.len() + 4 * mechanism.rows.len()) as f64;
+        let numbers = rows * (5 + 6 * mechanism.bodies.len() + 4 * mechanism.constraints.len()) as f64;
         if request.every.is_none() && numbers > MOST_NUMBERS {
             let what = format!("an output interval of {every} s up to {until} s");
             let reason = format!("the trajectory would hold {numbers:.1e} numbers, about {:.0} GB", (numbers * 2e-8).ceil());
@@ -173,7 +173,7 @@ impl Plan {
             time_constant: request.time_constant,
             extended,
             in_double_double: false,
-            effort,
+            max_evaluations,
             until,
             every,
             rows: rows as u64,
@@ -191,11 +191,11 @@ impl Plan {
             method: MethodId::Taylor,
             step: None,
             tolerance: Some(tolerance),
-            stabilization: if mechanism.rows.is_empty() { Stabilization::None } else { usual(mechanism) },
+            stabilization: if mechanism.constraints.is_empty() { Stabilization::None } else { usual(mechanism) },
             time_constant: None,
             extended: false,
             in_double_double: false,
-            effort: usual_effort(MethodId::Taylor, until),
+            max_evaluations: usual_max_evaluations(MethodId::Taylor, until),
             until,
             every: until,
             rows: 1,
@@ -214,8 +214,8 @@ impl Plan {
         let is_whole = self.step.is_none_or(|step| is_whole(until, step));
         let is_possible = until.is_finite() && rows <= MAX_ROWS && is_whole;
         if is_possible {
-            if self.effort == usual_effort(self.method, self.until) {
-                self.effort = usual_effort(self.method, until);
+            if self.max_evaluations == usual_max_evaluations(self.method, self.until) {
+                self.max_evaluations = usual_max_evaluations(self.method, until);
             }
             (self.until, self.rows) = (until, rows as u64);
         }
@@ -255,24 +255,24 @@ impl Plan {
             (None, tolerance) => format!("{:e}", tolerance.unwrap_or_default().relative),
         };
         let setting = if self.extended { setting + "-extended" } else { setting };
-        let keeps_rows = !mechanism.rows.is_empty() && !matches!(self.method, MethodId::Rattle(_));
+        let keeps_rows = !mechanism.constraints.is_empty() && !matches!(self.method, MethodId::Rattle(_));
         if keeps_rows { format!("{}-{setting}-{}", self.method, self.stabilization) } else { format!("{}-{setting}", self.method) }
     }
 }
 
 /// Evaluations allowed up to a horizon \[s\] where nobody says how many.
-fn usual_effort(method: MethodId, until: f64) -> u64 {
-    (EFFORT.0 + EFFORT.1 * until).min(MOST_EFFORT[usize::from(method == MethodId::Taylor)]) as u64
+fn usual_max_evaluations(method: MethodId, until: f64) -> u64 {
+    (MAX_EVALUATIONS.0 + MAX_EVALUATIONS.1 * until).min(MOST_EVALUATIONS[usize::from(method == MethodId::Taylor)]) as u64
 }
 
 /// What there is to say of a horizon \[s\] that lies beyond what the evaluations allowed can reach, where the scene's rates go up to `rate` \[rad/s\].
-fn cut_short(method: MethodId, step: Option<f64>, rate: f64, until: f64, effort: u64) -> Option<String> {
+fn cut_short(method: MethodId, step: Option<f64>, rate: f64, until: f64, max_evaluations: u64) -> Option<String> {
     let steps = step.map_or(until * rate / fast::radians_a_step(method), |step| until / step);
-    let reached = effort as f64 / (steps * fast::evaluations_a_step(method)) * until;
+    let reached = max_evaluations as f64 / (steps * fast::evaluations_a_step(method)) * until;
     (reached < until).then(|| {
         format!(
-            "{until} s take {method} up to {steps:.0e} steps, and {effort:.0e} evaluations are allowed: it may stop from about {reached:.0e} s on; \
-             --effort allows more, with `resume` too"
+            "{until} s take {method} up to {steps:.0e} steps, and {max_evaluations:.0e} evaluations are allowed: it may stop from about {reached:.0e} s on; \
+             --max-evaluations allows more, with `resume` too"
         )
     })
 }
@@ -373,7 +373,7 @@ fn check_size(mechanism: &Mechanism, method: MethodId, request: &Request) -> Res
     if !mechanism.contacts.is_empty() {
         return Err(mismatch(format!("walls on {n} coordinates"), &reason.replace("its", "an impact's"), "fewer bodies"));
     }
-    if !mechanism.rows.is_empty() && request.stabilize == Some(Stabilization::Elimination) {
+    if !mechanism.constraints.is_empty() && request.stabilize == Some(Stabilization::Elimination) {
         return Err(mismatch(format!("elimination on {n} coordinates"), &reason, "--stabilize projection"));
     }
     Ok(())
@@ -431,7 +431,7 @@ fn pair(mechanism: &Mechanism, method: MethodId, request: &Request, notes: &mut 
     {
         return Err(mismatch(format!("{method} on this scene"), &error.to_string(), "--method dp8, or gauss16 for a fixed step"));
     }
-    if mechanism.rows.is_empty() {
+    if mechanism.constraints.is_empty() {
         if request.stabilize.is_some_and(|kind| kind != Stabilization::None) {
             notes.push("the scene has no constraint: nothing to stabilize".into());
         }
@@ -448,7 +448,7 @@ fn pair(mechanism: &Mechanism, method: MethodId, request: &Request, notes: &mut 
         return Ok(usual);
     };
     if asked == Stabilization::Elimination && mechanism.has_multipliers() {
-        let reason = if mechanism.is_tied_up() {
+        let reason = if mechanism.has_closed_loops() {
             "closed loops and sliders have no independent coordinates to be left with"
         } else {
             "a torsion spring counts the turns of an angle, which elimination takes modulo whole ones"
@@ -535,7 +535,7 @@ fn fastest_rate(scene: &Scene, mechanism: &Mechanism) -> f64 {
     let mut kernel = Kernel::<f64>::new(mechanism);
     let energy = mechanism.energy(&mut kernel, &phi, &omega);
     kernel.factor::<0>(mechanism, &omega);
-    // The mobility of a foot along its way counts as that of a turn at the unit of length.
+    // The mobility of an origin along its way counts as that of a turn at the unit of length.
     let unit = |k: usize| if k < mechanism.bodies.len() { 1.0 } else { mechanism.units.length };
     let lightest = kernel.pivot.iter().enumerate().fold(0.0, |most: f64, (k, &pivot)| most.max(pivot / (unit(k) * unit(k))));
     let gravity: f64 = mechanism.tree.weight[..mechanism.bodies.len()].iter().map(|weight| weight.norm_squared().sqrt()).sum();

@@ -6,12 +6,12 @@
 //! Impacts are located in doubles.  Scenes with walls have references of that accuracy, and say so.
 
 use super::build::{build, exact};
-use super::contact::Course;
+use super::contact::ContactDriver;
 use super::driver::{Driver, Halt, Pause, Watch};
 use super::methods::MethodId;
 use super::plan::Plan;
 use super::running::Outcome;
-use super::trust::Ruler;
+use super::trust::DistanceMetric;
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::stepping::{Cause, StepError, Tolerance};
 use std::sync::Arc;
@@ -97,7 +97,7 @@ pub(super) fn side_by_side(
     floor: f64,
     pause: &mut Pause,
 ) -> (Reference, Option<StepError>) {
-    let ruler = Ruler::new(mechanism);
+    let ruler = DistanceMetric::new(mechanism);
     let mut found = Reference::default();
     for &time in times {
         let [one, other] = &mut walks;
@@ -118,7 +118,7 @@ pub(super) enum Walk {
     /// By the series in double-double, on its way to a horizon.
     Exact(Box<dyn Driver>, Time),
     /// By a method in doubles, through impacts and holds.
-    InDoubles(Box<(Course, Outcome)>),
+    InDoubles(Box<(ContactDriver, Outcome)>),
 }
 
 impl Walk {
@@ -140,9 +140,9 @@ impl Walk {
         let mut plan = Plan { method, ..Plan::of_series(mechanism, tolerance, until) };
         let driver = build(mechanism, &mut plan, start)?;
         let mut outcome = Outcome::begun(mechanism, plan);
-        let mut course = Course::new(Arc::clone(mechanism), driver);
-        course.meet(&mut outcome)?;
-        Ok(Self::InDoubles(Box::new((course, outcome))))
+        let mut contact_driver = ContactDriver::new(Arc::clone(mechanism), driver);
+        contact_driver.meet(&mut outcome)?;
+        Ok(Self::InDoubles(Box::new((contact_driver, outcome))))
     }
 
     /// The motion at a time; `None` where `pause` was true on the way.
@@ -157,8 +157,8 @@ impl Walk {
                 Ok(Some(motion))
             }
             Self::InDoubles(walk) => {
-                let (course, outcome) = &mut **walk;
-                Ok(course.go(time, outcome, pause)?.then(|| course.motion()))
+                let (contact_driver, outcome) = &mut **walk;
+                Ok(contact_driver.go(time, outcome, pause)?.then(|| contact_driver.motion()))
             }
         }
     }

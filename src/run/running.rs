@@ -2,23 +2,23 @@
 
 use super::build::build;
 use super::clock::{Clock, still};
-use super::contact::{Course, Hold, Station, Strike};
+use super::contact::{ContactDriver, ContactDriverState, ImpactRecord, PersistentContact};
 use super::custom::Custom;
 use super::drift::{Drift, Limits};
 use super::driver::{Driver, MOST_TURNS, Pause};
 use super::event::{Event, EventDetector, EventRecord};
 use super::flip::{Flip, FlipDetector};
-use super::inside::{Observer, Step, Watching};
+use super::inside::{Observer, ObserverAdapter, Step};
 use super::methods::{MethodId, Stabilization};
 use super::monitor::Monitor;
 use super::plan::{Plan, Refusal, Request};
 use super::sample::Sample;
 use super::trace::Trace;
-use super::trust::{Companion, Kept, Level, Trust};
+use super::trust::{ErrorEstimator, Kept, Level, Trust};
 use super::turns::Turns;
 use crate::dynamics::{CompileError, Mechanism, Motion};
 use crate::scene::Scene;
-use crate::stepping::{Cause, StepError, Tally};
+use crate::stepping::{Cause, Statistics, StepError};
 use std::cell::{Cell, RefCell};
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -33,7 +33,7 @@ pub struct Run {
     turns: Turns,
     /// For runs of an ensemble, which look for bars that turn over and keep no samples: whether they end with the first.
     ensemble: Option<bool>,
-    companion: Option<Companion>,
+    error_estimator: Option<ErrorEstimator>,
     events: Vec<Box<dyn Event>>,
     clock: Clock,
     begun: Motion,
@@ -47,26 +47,26 @@ pub struct Outcome {
     /// The last sample.
     pub last: Sample,
     /// Counts.
-    pub tally: Tally,
+    pub statistics: Statistics,
     /// Drift.
     pub drift: Drift,
     /// Samples for charts.
     pub trace: Trace,
     /// The first impacts.
-    pub strikes: Vec<Strike>,
+    pub impacts: Vec<ImpactRecord>,
     /// Number of impacts.
-    pub strike_count: u64,
+    pub impact_count: u64,
     /// Energy lost in them and where points came to rest \[J\].
-    pub strike_loss: f64,
+    pub impact_loss: f64,
     /// The first times a point stayed on its wall.
-    pub holds: Vec<Hold>,
+    pub holds: Vec<PersistentContact>,
     /// Number of such times.
-    pub hold_count: u64,
+    pub persistent_contact_count: u64,
     /// Time spent so, summed over the points \[s\].
-    pub hold_time: f64,
-    /// Time spent between the first output time and the last, pauses and the companion left out; zero where nobody [times](Run::timed) the run.
+    pub persistent_contact_time: f64,
+    /// Time spent between the first output time and the last, pauses and the reference solution left out; zero where nobody [times](Run::timed) the run.
     pub wall: Duration,
-    /// Time the companion took.
+    /// Time the reference solution took.
     pub trust_wall: Duration,
     /// How far it may be trusted, where that was asked for: see [`Run::trusted`].
     pub trust: Option<Trust>,
@@ -89,15 +89,15 @@ impl Outcome {
     pub(super) fn begun(mechanism: &Mechanism, plan: Plan) -> Self {
         Self {
             last: Sample::default(),
-            tally: Tally::default(),
+            statistics: Statistics::default(),
             drift: Drift::of_plan(mechanism, &plan),
             trace: Trace::default(),
-            strikes: Vec::new(),
-            strike_count: 0,
-            strike_loss: 0.0,
+            impacts: Vec::new(),
+            impact_count: 0,
+            impact_loss: 0.0,
             holds: Vec::new(),
-            hold_count: 0,
-            hold_time: 0.0,
+            persistent_contact_count: 0,
+            persistent_contact_time: 0.0,
             wall: Duration::ZERO,
             trust_wall: Duration::ZERO,
             trust: None,
@@ -136,7 +136,7 @@ impl Run {
     /// A method that cannot begin there.
     pub fn new(mechanism: Arc<Mechanism>, mut plan: Plan, limits: Limits, start: &Motion) -> Result<Self, StepError> {
         let mut driver = build(&mechanism, &mut plan, start)?;
-        driver.allow(plan.effort);
+        driver.allow(plan.max_evaluations);
         let turns = Turns::new(&mechanism, &plan, start);
         Ok(Self {
             mechanism,
@@ -145,7 +145,7 @@ impl Run {
             driver,
             turns,
             ensemble: None,
-            companion: None,
+            error_estimator: None,
             events: Vec::new(),
             clock: still,
             begun: start.clone(),
@@ -157,8 +157,8 @@ impl Run {
     /// Nothing of the run itself changes by it, to the last bit.
     #[must_use]
     pub fn trusted(self, level: Level, start: &Motion) -> Self {
-        let companion = (level != Level::Off).then(|| Companion::new(&self.mechanism, &self.plan, start, level));
-        Self { companion, ..self }
+        let error_estimator = (level != Level::Off).then(|| ErrorEstimator::new(&self.mechanism, &self.plan, start, level));
+        Self { error_estimator, ..self }
     }
 
     /// The same, timed by a clock: see [`Outcome::wall`].
@@ -236,12 +236,12 @@ pub fn integrate(run: Run, observer: &mut dyn FnMut(&Sample) -> std::io::Result<
 /// ```
 pub struct Running {
     limits: Limits,
-    course: Course,
+    contact_driver: ContactDriver,
     outcome: Outcome,
     turns: Turns,
     /// For runs of an ensemble: whether they end with the first flip.
     ensemble: Option<bool>,
-    companion: Option<Companion>,
+    error_estimator: Option<ErrorEstimator>,
     /// The output row it is on the way to.
     row: u64,
     /// What keeps it from leaving its start.
@@ -256,13 +256,13 @@ pub struct Running {
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Snapshot {
     limits: Limits,
-    station: Station,
+    contact_state: ContactDriverState,
     outcome: Outcome,
     row: u64,
     resting: Option<StepError>,
     /// The horizon on the way to which the station was reached \[s\].
     horizon: f64,
-    companion: Option<Kept>,
+    error_estimator: Option<Kept>,
 }
 
 /// Why a run cannot go on from a snapshot.
@@ -293,8 +293,8 @@ impl Snapshot {
     }
 
     /// Bounds the evaluations of the whole run anew, those made so far counted in.
-    pub fn allow(&mut self, effort: u64) {
-        self.outcome.plan.effort = effort;
+    pub fn allow(&mut self, max_evaluations: u64) {
+        self.outcome.plan.max_evaluations = max_evaluations;
     }
 
     /// The same on the way to a later horizon \[s\]; false, and nothing changed, where that is not later or would write too many rows.
@@ -305,8 +305,8 @@ impl Snapshot {
         let is_possible = until > self.outcome.plan.until && self.outcome.plan.extend(until);
         if is_possible {
             self.outcome.drift.extend(until);
-            if let Some(companion) = &mut self.companion {
-                companion.extend(until);
+            if let Some(error_estimator) = &mut self.error_estimator {
+                error_estimator.extend(until);
             }
         }
         is_possible
@@ -315,7 +315,7 @@ impl Snapshot {
     /// Whether its parts go together, and with a mechanism.
     fn fits(&self, mechanism: &Mechanism) -> bool {
         let Outcome { plan, last, drift, trace, holds, .. } = &self.outcome;
-        let (n, bars, rows) = (mechanism.coordinates(), mechanism.bodies.len(), mechanism.rows.len());
+        let (n, bars, rows) = (mechanism.coordinates(), mechanism.bodies.len(), mechanism.constraints.len());
         let sizes =
             |sample: &Sample| (sample.phi.len(), sample.omega.len(), sample.constraints.len(), sample.motors.len()) == (n, n, rows, rows);
         let whole = |sample: &Sample| sizes(sample) && (sample.centre.len(), sample.velocity.len()) == (bars, bars);
@@ -325,24 +325,36 @@ impl Snapshot {
             && (self.row == 0 || whole(last))
             && trace.samples().all(sizes)
             && drift.fits(mechanism)
-            && self.companion.as_ref().is_none_or(Kept::is_sound)
-            && Course::names_holds(&self.station) <= holds.len()
+            && self.error_estimator.as_ref().is_none_or(Kept::is_sound)
+            && ContactDriver::names_holds(&self.contact_state) <= holds.len()
     }
 }
 
 impl Running {
     /// Begins a run: whatever touches and moves into its wall at the start is struck.
     pub fn new(run: Run) -> Self {
-        let Run { mechanism, plan, limits, driver, turns, ensemble, companion, events, clock, begun } = run;
+        let Run { mechanism, plan, limits, driver, turns, ensemble, error_estimator, events, clock, begun } = run;
         let mut outcome = Outcome::begun(&mechanism, plan);
         let detector = (!events.is_empty()).then(|| EventDetector::new(Arc::clone(&mechanism), events));
-        let mut course = Course::new(mechanism, driver);
-        course.events = detector;
-        course.flips = ensemble.map(|_| FlipDetector::default());
+        let mut contact_driver = ContactDriver::new(mechanism, driver);
+        contact_driver.events = detector;
+        contact_driver.flips = ensemble.map(|_| FlipDetector::default());
         // The reference of the energy is what impacts at the start leave.
-        let resting = course.meet(&mut outcome).err();
-        Self { limits, course, outcome, turns, ensemble, companion, row: 0, resting, is_over: false, begun: Some(begun), clock: still }
-            .timed(clock)
+        let resting = contact_driver.meet(&mut outcome).err();
+        Self {
+            limits,
+            contact_driver,
+            outcome,
+            turns,
+            ensemble,
+            error_estimator,
+            row: 0,
+            resting,
+            is_over: false,
+            begun: Some(begun),
+            clock: still,
+        }
+        .timed(clock)
     }
 
     /// Goes on from a snapshot of a run of the same mechanism and start.
@@ -353,24 +365,37 @@ impl Running {
         if !snapshot.fits(&mechanism) {
             return Err(ResumeError::Misfit);
         }
-        let Snapshot { limits, station, mut outcome, row, resting, horizon, companion } = snapshot;
+        let Snapshot { limits, contact_state, mut outcome, row, resting, horizon, error_estimator } = snapshot;
         outcome.drift.kind = Drift::new(&mechanism, outcome.plan.until).kind;
-        let companion = match companion {
-            Some(kept) => Some(Companion::resume(&mechanism, &outcome.plan, start, kept, horizon.into())?.ok_or(ResumeError::Misfit)?),
+        let error_estimator = match error_estimator {
+            Some(kept) => Some(ErrorEstimator::resume(&mechanism, &outcome.plan, start, kept, horizon.into())?.ok_or(ResumeError::Misfit)?),
             None => None,
         };
         let turns = Turns::new(&mechanism, &outcome.plan, start);
-        let course = Course::resume(mechanism, &outcome.plan, start, station, horizon.into())?.ok_or(ResumeError::Misfit)?;
+        let contact_driver =
+            ContactDriver::resume(mechanism, &outcome.plan, start, contact_state, horizon.into())?.ok_or(ResumeError::Misfit)?;
         let begun = (row == 0).then(|| start.clone());
-        Ok(Self { limits, course, outcome, turns, ensemble: None, companion, row, resting, is_over: false, begun, clock: still })
+        Ok(Self {
+            limits,
+            contact_driver,
+            outcome,
+            turns,
+            ensemble: None,
+            error_estimator,
+            row,
+            resting,
+            is_over: false,
+            begun,
+            clock: still,
+        })
     }
 
     /// Timed by a clock from now on.
     #[must_use]
     pub fn timed(mut self, clock: Clock) -> Self {
         self.clock = clock;
-        if let Some(companion) = &mut self.companion {
-            companion.clock = clock;
+        if let Some(error_estimator) = &mut self.error_estimator {
+            error_estimator.clock = clock;
         }
         self
     }
@@ -380,20 +405,20 @@ impl Running {
     /// # Errors
     /// They are others.
     pub fn with_events(mut self, events: Vec<Box<dyn Event>>) -> Result<Self, ResumeError> {
-        let detector = EventDetector::new(Arc::clone(self.course.whole()), events);
-        if self.course.watch_for(detector) { Ok(self) } else { Err(ResumeError::Misfit) }
+        let detector = EventDetector::new(Arc::clone(self.contact_driver.whole()), events);
+        if self.contact_driver.watch_for(detector) { Ok(self) } else { Err(ResumeError::Misfit) }
     }
 
     /// All that the rest of the run depends on.
     pub fn snapshot(&self) -> Snapshot {
         Snapshot {
             limits: self.limits,
-            station: self.course.station(),
+            contact_state: self.contact_driver.contact_state(),
             outcome: self.outcome.clone(),
             row: self.row,
             resting: self.resting.clone(),
             horizon: self.outcome.plan.until,
-            companion: self.companion.as_ref().map(Companion::kept),
+            error_estimator: self.error_estimator.as_ref().map(ErrorEstimator::kept),
         }
     }
 
@@ -426,7 +451,7 @@ impl Running {
         let wants_steps = observer.wants_steps();
         let observer = RefCell::new(observer);
         let mut steps = StepsOf(&observer);
-        let mut watching = Watching { observer: &mut steps, has_enough: false };
+        let mut watching = ObserverAdapter { observer: &mut steps, has_enough: false };
         let watching = if wants_steps { Some(&mut watching) } else { None };
         let is_enough = Cell::new(false);
         let gone = self.rows(
@@ -448,29 +473,29 @@ impl Running {
     fn rows(
         &mut self,
         observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>,
-        mut steps: Option<&mut Watching>,
+        mut steps: Option<&mut ObserverAdapter>,
         pause: &mut Pause,
     ) -> Result<bool, RunError> {
-        let Self { limits, course, outcome, ensemble, companion, turns, begun, .. } = self;
+        let Self { limits, contact_driver, outcome, ensemble, error_estimator, turns, begun, .. } = self;
         while !self.is_over {
             let stopped = match self.resting.take() {
                 Some(stop) => Err(stop),
                 None if self.row == 0 => Ok(true),
                 None => {
-                    let monitor = companion.as_mut().map(|companion| companion as &mut dyn Monitor);
-                    course.go_watched(outcome.plan.time(self.row), outcome, monitor, steps.as_deref_mut(), pause)
+                    let monitor = error_estimator.as_mut().map(|error_estimator| error_estimator as &mut dyn Monitor);
+                    contact_driver.go_watched(outcome.plan.time(self.row), outcome, monitor, steps.as_deref_mut(), pause)
                 }
             };
-            if let Some(companion) = companion {
-                outcome.trust_wall += companion.take_wall();
+            if let Some(error_estimator) = error_estimator {
+                outcome.trust_wall += error_estimator.take_wall();
             }
             if stopped == Ok(false) {
                 return Ok(false);
             }
-            outcome.ended_by = course.ended_by.take();
-            let (is_tied_up, steps_made) = (course.is_tied_up(), course.tally().steps);
-            let moved = begun.take().and_then(|begun| course.begun_elsewhere(&begun, outcome));
-            let sample = course.sample();
+            outcome.ended_by = contact_driver.ended_by.take();
+            let (has_closed_loops, steps_made) = (contact_driver.has_closed_loops(), contact_driver.statistics().steps);
+            let moved = begun.take().and_then(|begun| contact_driver.begun_elsewhere(&begun, outcome));
+            let sample = contact_driver.sample();
             // A stop before any progress leaves the state of the row before.
             if self.row == 0 || sample.t > outcome.last.t {
                 observer(sample)?;
@@ -481,23 +506,23 @@ impl Running {
             let exceeded = outcome.drift.see(sample, limits, steps_made);
             outcome.stop = stopped
                 .err()
-                .map(|stop| advised(stop, is_tied_up))
+                .map(|stop| advised(stop, has_closed_loops))
                 .or(moved)
                 .or_else(|| (!sample.is_finite()).then(|| not_finite(&outcome.plan, sample.t)))
                 .or_else(|| uncounted(&outcome.plan, sample))
                 .or_else(|| turns.lost(&outcome.plan, sample))
-                .or_else(|| if is_tied_up { came_apart(&outcome.plan, &outcome.drift, sample) } else { None })
+                .or_else(|| if has_closed_loops { came_apart(&outcome.plan, &outcome.drift, sample) } else { None })
                 .or_else(|| exceeded.err().map(|what| drift_stop(&outcome.plan, sample.t, what)));
             outcome.last.clone_from(sample);
             // A dense method is ahead of what it shows.
             let reached = outcome.last.t;
-            outcome.flip = course.flips.as_ref().and_then(|flips| flips.flip).filter(|flip| flip.t <= reached);
+            outcome.flip = contact_driver.flips.as_ref().and_then(|flips| flips.flip).filter(|flip| flip.t <= reached);
             self.row += 1;
             let has_flipped = *ensemble == Some(true) && outcome.flip.is_some();
             self.is_over = outcome.stop.is_some() || outcome.ended_by.is_some() || has_flipped || self.row > outcome.plan.rows;
-            if let Some(companion) = companion.as_mut().filter(|_| self.is_over || self.row == 1) {
-                companion.observe(course.shown(), course.tally());
-                outcome.trust_wall += companion.take_wall();
+            if let Some(error_estimator) = error_estimator.as_mut().filter(|_| self.is_over || self.row == 1) {
+                error_estimator.observe(contact_driver.shown(), contact_driver.statistics());
+                outcome.trust_wall += error_estimator.take_wall();
             }
             if !self.is_over && pause() {
                 return Ok(false);
@@ -507,21 +532,21 @@ impl Running {
     }
 
     /// Integrates to the horizon without a look at what there is to see at the output times: all that the method itself costs.  False where it paused or stopped.
-    pub(super) fn rush(&mut self, pause: &mut Pause) -> bool {
-        let Self { course, outcome, resting, .. } = self;
-        resting.is_none() && (1..=outcome.plan.rows).all(|row| course.go(outcome.plan.time(row), outcome, pause) == Ok(true))
+    pub(super) fn run_unsampled(&mut self, pause: &mut Pause) -> bool {
+        let Self { contact_driver, outcome, resting, .. } = self;
+        resting.is_none() && (1..=outcome.plan.rows).all(|row| contact_driver.go(outcome.plan.time(row), outcome, pause) == Ok(true))
     }
 
     /// The motion at the last output time, to the last digit.
     pub fn motion(&self) -> &Motion {
-        self.course.shown()
+        self.contact_driver.shown()
     }
 
     /// How it ended.
     pub fn finish(mut self) -> Outcome {
-        self.course.end(self.outcome.last.t, &mut self.outcome);
-        self.outcome.tally = self.course.tally();
-        let Tally { steps, newton_steps, .. } = self.outcome.tally;
+        self.contact_driver.end(self.outcome.last.t, &mut self.outcome);
+        self.outcome.statistics = self.contact_driver.statistics();
+        let Statistics { steps, newton_steps, .. } = self.outcome.statistics;
         if newton_steps > 0 {
             let note = format!("{newton_steps} of {steps} steps found their stages by Newton's method: sweeps contract slowly there");
             self.outcome.plan.notes.push(note);
@@ -534,8 +559,10 @@ impl Running {
                 .notes
                 .push(format!("the energy balance is off by {off:.1e} of its scale, and the motion may be off by more: try {how}"));
         }
-        self.outcome.trust =
-            self.companion.take().map(|companion| companion.trust(self.outcome.last.t).with_model(self.outcome.plan.model_error));
+        self.outcome.trust = self
+            .error_estimator
+            .take()
+            .map(|error_estimator| error_estimator.trust(self.outcome.last.t).with_model(self.outcome.plan.model_error));
         self.outcome
     }
 }
@@ -550,8 +577,8 @@ impl Observer for StepsOf<'_, '_> {
 }
 
 /// Steps that shrink where loops and sliders are have another cause than a stiff spring.
-fn advised(stop: StepError, is_tied_up: bool) -> StepError {
-    if stop.cause != Cause::StepTooSmall || !is_tied_up {
+fn advised(stop: StepError, has_closed_loops: bool) -> StepError {
+    if stop.cause != Cause::StepTooSmall || !has_closed_loops {
         return stop;
     }
     let hint = if stop.method == "taylor" { "--method dp8 with --stabilize projection" } else { "--method taylor" };

@@ -4,9 +4,9 @@
 //! rounding of its measurement.
 
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
+use crate::dynamics::constraint::Posture;
 use crate::dynamics::energy::Energy;
 use crate::dynamics::kernel::{Bias, Kernel};
-use crate::dynamics::row::Posture;
 use crate::dynamics::{Mechanism, Motion};
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ const WATCHED: f64 = 0.1;
 pub struct Sample {
     /// Time \[s\].
     pub t: f64,
-    /// Winding angles of all bodies \[rad\], then positions of free feet \[m\].
+    /// Winding angles of all bodies \[rad\], then positions of translational coordinates \[m\].
     pub phi: Vec<f64>,
     /// Rates \[rad/s, m/s\].
     pub omega: Vec<f64>,
@@ -93,8 +93,8 @@ pub struct Sampler {
     jacobian: Vec<DoubleDouble>,
     phi: Vec<f64>,
     omega: Vec<f64>,
-    /// Feet of all bodies, and their velocities.
-    feet: [Vec<Complex<f64>>; 2],
+    /// Translational coordinates of all bodies, and their velocities.
+    translations: [Vec<Complex<f64>>; 2],
     /// Energy less work at the start, in full; impacts shift it.
     reference: Option<DoubleDouble>,
     sample: Sample,
@@ -103,11 +103,11 @@ pub struct Sampler {
 impl Sampler {
     /// A sampler; the first sample it takes is the reference of the energy balance.
     pub fn new(mechanism: Arc<Mechanism>) -> Self {
-        let (n, bars, rows) = (mechanism.coordinates(), mechanism.bodies.len(), mechanism.rows.len());
+        let (n, bars, rows) = (mechanism.coordinates(), mechanism.bodies.len(), mechanism.constraints.len());
         Self {
             plain: Kernel::new(&mechanism),
             exact: Kernel::without_rows(&mechanism),
-            feet: [vec![Complex::ZERO; bars], vec![Complex::ZERO; bars]],
+            translations: [vec![Complex::ZERO; bars], vec![Complex::ZERO; bars]],
             jacobian: vec![DoubleDouble::ZERO; n],
             phi: vec![0.0; n],
             omega: vec![0.0; n],
@@ -169,13 +169,13 @@ impl Sampler {
         for k in 0..mechanism.coordinates() {
             (self.phi[k], self.omega[k]) = (motion.phi[k].hi, motion.omega[k].hi);
         }
-        if self.holding.rows.is_empty() {
-            self.plain.face::<0>(mechanism, &self.phi);
+        if self.holding.constraints.is_empty() {
+            self.plain.unit_vectors::<0>(mechanism, &self.phi);
         } else {
             self.plain.accelerate::<0>(&self.holding, motion.time, &self.phi, &self.omega, Bias::default());
             self.holding.spread_multipliers(&mut self.plain);
         }
-        let is_watched = self.plain.weakest.share < WATCHED && self.holding.is_tied_up();
+        let is_watched = self.plain.weakest.share < WATCHED && self.holding.has_closed_loops();
         let sample = &mut self.sample;
         sample.singular = if is_watched { self.holding.conditioning(&self.plain) } else { f64::NAN };
         sample.weakest = self.plain.weakest.row;
@@ -190,15 +190,15 @@ impl Sampler {
             sample.phi[k] = motion.unwrapped(k);
         }
         sample.omega.copy_from_slice(&self.omega);
-        let (z, [feet, velocities]) = (&self.plain.z, &mut self.feet);
-        mechanism.forest.feet(z, feet);
-        mechanism.forest.foot_velocities(z, &self.omega, velocities);
+        let (z, [translations, velocities]) = (&self.plain.z, &mut self.translations);
+        mechanism.forest.translations(z, translations);
+        mechanism.forest.origin_velocities(z, &self.omega, velocities);
         for (k, body) in mechanism.bodies.iter().enumerate() {
             let arm = z[k].turn(body.centre);
-            sample.centre[k] = both(feet[k] + arm);
+            sample.centre[k] = both(translations[k] + arm);
             sample.velocity[k] = both(velocities[k] + arm.left().times(self.omega[k]));
         }
-        for (r, row) in mechanism.rows.iter().enumerate() {
+        for (r, row) in mechanism.constraints.iter().enumerate() {
             self.jacobian.fill(DoubleDouble::ZERO);
             let posture = Posture { phi: &motion.phi, z: &self.exact.z, omega: &motion.omega };
             let here = row.linearise(motion.time, posture, &mut self.jacobian);

@@ -12,9 +12,9 @@
 
 use crate::arithmetic::Complex;
 use crate::dynamics::force::Spring;
-use crate::dynamics::{Form, Glance, Mechanism, State, Time};
+use crate::dynamics::{BodyAngles, Form, Mechanism, State, Time};
 use crate::stepping::search::{Chebyshev, Crossing, Curve, Part, crossing};
-use crate::stepping::{Cause, Integrator, StepError, Tally};
+use crate::stepping::{Cause, Integrator, Statistics, StepError};
 
 /// A length below this share of the free length is none.
 const NONE: f64 = 1e-6;
@@ -27,8 +27,8 @@ pub(super) struct Shrinking<P: ?Sized> {
     method: Box<dyn Integrator<P> + Send>,
     /// Numbers of the springs that can.
     springs: Vec<usize>,
-    before: Glance,
-    now: Glance,
+    before: BodyAngles,
+    now: BodyAngles,
     from: State,
     /// True where `before` is not the state the next step begins from.
     is_stale: bool,
@@ -58,16 +58,24 @@ struct Approach {
 
 impl<P: Form + ?Sized> Shrinking<P> {
     pub fn new(method: Box<dyn Integrator<P> + Send>, springs: Vec<usize>) -> Self {
-        Self { method, springs, before: Glance::default(), now: Glance::default(), from: State::default(), is_stale: true, z: Vec::new() }
+        Self {
+            method,
+            springs,
+            before: BodyAngles::default(),
+            now: BodyAngles::default(),
+            from: State::default(),
+            is_stale: true,
+            z: Vec::new(),
+        }
     }
 }
 
 /// D and D' of a spring of a mechanism \[m, m/s\].
-fn span(mechanism: &Mechanism, number: usize, at: &Glance, z: &mut Vec<Complex<f64>>) -> [Complex<f64>; 2] {
+fn span(mechanism: &Mechanism, number: usize, at: &BodyAngles, z: &mut Vec<Complex<f64>>) -> [Complex<f64>; 2] {
     let (spring, bodies) = (&mechanism.springs[number], mechanism.bodies.len());
     z.clear();
     z.extend(at.phi[..bodies].iter().map(|&phi| Complex::unit(phi)));
-    // The feet of bodies that hang on nothing are where the first of their coordinates is.
+    // The translational coordinates of bodies that hang on nothing are where the first of their coordinates is.
     z.extend((bodies..at.phi.len()).map(|x| Complex::new(at.phi[x], at.phi.get(x + 1).copied().unwrap_or_default())));
     [spring.span.position(z), spring.span.velocity(z, &at.omega)]
 }
@@ -115,14 +123,14 @@ impl<P: Form + ?Sized> Shrinking<P> {
     /// Where a spring loses its length in the last step, by the motion inside it.
     fn searched(&mut self, problem: &mut P, number: usize, time: f64) -> Option<Approach> {
         let Self { method, from, z, .. } = self;
-        let (mut inside, mut at) = (from.clone(), Glance::default());
+        let (mut inside, mut at) = (from.clone(), BodyAngles::default());
         let free = problem.mechanism().springs[number].free_length;
         let mut spans = [Vec::new(), Vec::new()];
         for degree in DEGREES {
             spans.iter_mut().for_each(Vec::clear);
             for share in Chebyshev::nodes(degree) {
                 method.interpolate(problem, from, from.time + share * time, &mut inside);
-                problem.glance(&inside, &mut at);
+                problem.body_angles(&inside, &mut at);
                 let [here, _] = span(problem.mechanism(), number, &at, z);
                 spans[0].push(here.re / free);
                 spans[1].push(here.im / free);
@@ -168,13 +176,13 @@ impl<P: Form + ?Sized> Integrator<P> for Shrinking<P> {
     }
 
     /// A step of the inner method, looked at.
-    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
+    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError> {
         if std::mem::take(&mut self.is_stale) {
-            problem.glance(state, &mut self.before);
+            problem.body_angles(state, &mut self.before);
         }
         self.from.clone_from(state);
-        let event = self.method.step(problem, state, until, tally)?;
-        problem.glance(state, &mut self.now);
+        let event = self.method.step(problem, state, until, statistics)?;
+        problem.body_angles(state, &mut self.now);
         let time = (state.time - self.from.time).hi;
         if let Some(first) = self.lost(problem, time) {
             let stop = self.stop(problem, first, time);

@@ -1,11 +1,11 @@
 //! The trajectory as a table: one row an output time, units in the header, digits that read back to the same doubles.
 //!
 //! Every constraint has its residual and the rate of that.  A motor has its torque on the driven body, or its force on the point that slides, along the
-//! rail, and its power beside them; a lock, a weld or a locked slider the torque it exerts on its body, [`Row`] by row.
+//! rail, and its power beside them; a lock, a weld or a locked slider the torque it exerts on its body, [`ConstraintEquation`] by row.
 
 use super::sample::Sample;
 use crate::dynamics::Mechanism;
-use crate::dynamics::row::Row;
+use crate::dynamics::constraint::ConstraintEquation;
 use std::io::{self, Write};
 use std::sync::Arc;
 
@@ -26,8 +26,8 @@ pub struct Table<W: Write> {
 pub(super) type Shown = Arc<[usize]>;
 
 fn shown(mechanism: &Mechanism) -> Shown {
-    let count = |(r, row): (usize, &Row)| if mechanism.is_motor(r) { 2 } else { usize::from(row.law.is_some()) };
-    mechanism.rows.iter().enumerate().map(count).collect()
+    let count = |(r, row): (usize, &ConstraintEquation)| if mechanism.is_motor(r) { 2 } else { usize::from(row.law.is_some()) };
+    mechanism.constraints.iter().enumerate().map(count).collect()
 }
 
 /// Appends the numbers of a row.
@@ -45,7 +45,7 @@ pub(super) fn columns(sample: &Sample, shown: &[usize], numbers: &mut Vec<f64>) 
 
 /// How many numbers that are.
 fn width(mechanism: &Mechanism, shown: &[usize]) -> usize {
-    1 + 6 * mechanism.bodies.len() + 4 + 2 * mechanism.rows.len() + shown.iter().sum::<usize>()
+    1 + 6 * mechanism.bodies.len() + 4 + 2 * mechanism.constraints.len() + shown.iter().sum::<usize>()
 }
 
 impl<W: Write> Table<W> {
@@ -64,7 +64,7 @@ impl<W: Write> Table<W> {
             header.push(format!("{quantity} [{unit}]"));
         }
         let shown = shown(mechanism);
-        for (row, &shown) in mechanism.rows.iter().zip(shown.iter()) {
+        for (row, &shown) in mechanism.constraints.iter().zip(shown.iter()) {
             let (unit, name) = (row.unit(), row.name());
             header.extend([format!("{name}.C [{unit}]"), format!("{name}.C' [{unit}/s]")]);
             let force = if row.is_angle() { "torque" } else { "force" };

@@ -3,7 +3,7 @@
 use super::methods::Stabilization;
 use super::plan::Plan;
 use super::sample::Sample;
-use crate::dynamics::row::Measure;
+use crate::dynamics::constraint::Measure;
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::scene::Law;
 use crate::stepping::{Cause, StepError};
@@ -35,7 +35,7 @@ impl Angle {
 impl Turns {
     /// Those of a motion about to start; none where given angles are eliminated, which keep their laws to the last bit.
     pub fn new(mechanism: &Mechanism, plan: &Plan, start: &Motion) -> Self {
-        let rows = mechanism.rows.iter().filter(|_| plan.stabilization != Stabilization::Elimination);
+        let rows = mechanism.constraints.iter().filter(|_| plan.stabilization != Stabilization::Elimination);
         let angles = rows.filter_map(|row| {
             let (Measure::Angle { body, base }, Some(law)) = (&row.measure, &row.law) else { return None };
             let mut angle = Angle { name: row.name().into(), body: *body, base: *base, law: law.clone(), off: 0.0 };

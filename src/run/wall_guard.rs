@@ -4,7 +4,7 @@
 //! rates are all that is looked at; nothing is shared with the search for events, whose misses are to be found.
 
 use super::impact_monitor::{gap, gap_rate};
-use crate::dynamics::{Glance, Mechanism};
+use crate::dynamics::{BodyAngles, Mechanism};
 use crate::stepping::{Cause, StepError};
 
 /// Parts of a step between which it is looked at, and golden sections after that.
@@ -29,18 +29,18 @@ impl WallGuard {
     }
 
     /// Begins at a moment.
-    pub fn begin(&mut self, mechanism: &Mechanism, t: f64, glance: &Glance) {
+    pub fn begin(&mut self, mechanism: &Mechanism, t: f64, body_angles: &BodyAngles) {
         self.t = t;
-        self.gaps = gaps(mechanism, glance);
+        self.gaps = gaps(mechanism, body_angles);
     }
 
     /// Takes the end of a step, and tells a contact for which its inside is to be looked at.
     ///
     /// # Errors
     /// A wall that has been passed.
-    pub fn step(&mut self, mechanism: &Mechanism, t: f64, glance: &Glance) -> Result<Option<usize>, Box<Passed>> {
-        self.look(mechanism, t, glance)?;
-        let (h, now) = (t - self.t, gaps(mechanism, glance));
+    pub fn step(&mut self, mechanism: &Mechanism, t: f64, body_angles: &BodyAngles) -> Result<Option<usize>, Box<Passed>> {
+        self.look(mechanism, t, body_angles)?;
+        let (h, now) = (t - self.t, gaps(mechanism, body_angles));
         let candidate = (0..now.len()).find(|&c| !mechanism.held.contains(&c) && dips(&self.gaps[c], &now[c], h));
         (self.t, self.gaps) = (t, now);
         Ok(candidate)
@@ -50,11 +50,11 @@ impl WallGuard {
     ///
     /// # Errors
     /// A wall that has been passed.
-    pub fn search(&self, mechanism: &Mechanism, contact: usize, mut at: impl FnMut(f64) -> (f64, Glance)) -> Result<(), Box<Passed>> {
+    pub fn search(&self, mechanism: &Mechanism, contact: usize, mut at: impl FnMut(f64) -> (f64, BodyAngles)) -> Result<(), Box<Passed>> {
         let mut gap_at = |share: f64| -> Result<f64, Box<Passed>> {
-            let (t, glance) = at(share);
-            self.look(mechanism, t, &glance)?;
-            Ok(gap(&mechanism.contacts[contact], mechanism.bodies.len(), &glance.phi).0)
+            let (t, body_angles) = at(share);
+            self.look(mechanism, t, &body_angles)?;
+            Ok(gap(&mechanism.contacts[contact], mechanism.bodies.len(), &body_angles.phi).0)
         };
         let (mut least, mut place) = (f64::INFINITY, 1);
         for i in 1..PARTS {
@@ -85,9 +85,9 @@ impl WallGuard {
     ///
     /// # Errors
     /// A wall that has been passed, or that a held point has left.
-    pub fn look(&self, mechanism: &Mechanism, t: f64, glance: &Glance) -> Result<(), Box<Passed>> {
+    pub fn look(&self, mechanism: &Mechanism, t: f64, body_angles: &BodyAngles) -> Result<(), Box<Passed>> {
         for (c, contact) in mechanism.contacts.iter().enumerate() {
-            let (gap, rounding) = gap(contact, mechanism.bodies.len(), &glance.phi);
+            let (gap, rounding) = gap(contact, mechanism.bodies.len(), &body_angles.phi);
             let is_held = mechanism.held.contains(&c);
             let off = if is_held { gap.abs() } else { -gap };
             if off.is_nan() || off > self.closed + rounding {
@@ -98,10 +98,10 @@ impl WallGuard {
     }
 }
 
-fn gaps(mechanism: &Mechanism, glance: &Glance) -> Vec<[f64; 2]> {
+fn gaps(mechanism: &Mechanism, body_angles: &BodyAngles) -> Vec<[f64; 2]> {
     let angles = mechanism.bodies.len();
     (mechanism.contacts.iter())
-        .map(|contact| [gap(contact, angles, &glance.phi).0, gap_rate(contact, angles, &glance.phi, &glance.omega)])
+        .map(|contact| [gap(contact, angles, &body_angles.phi).0, gap_rate(contact, angles, &body_angles.phi, &body_angles.omega)])
         .collect()
 }
 
@@ -155,36 +155,36 @@ mod tests {
     }
 
     /// A ball over a floor, and where it is.
-    fn ball() -> (Mechanism, Glance) {
+    fn ball() -> (Mechanism, BodyAngles) {
         let scene = r#"{"name": "ball", "gravity": [0, -9.81], "bars": [{"name": "ball", "mass": 1, "centre": [0, 0], "inertia": 0.1}],
             "walls": [{"name": "floor", "body": "ball", "point": [0, 0], "line": {"through": [0, 0], "normal": [0, 1]}, "restitution": 0.5}],
             "start": {"ball": {"phi": 0, "omega": 0, "origin": [3, 1], "velocity": [0, 0]}}, "until": 1, "every": 1}"#;
         let scene = crate::scene::parse_scene(scene, "test", &[]).expect("a scene");
-        let glance = Glance { phi: vec![0.0, 3.0, 1.0], turns: vec![0; 3], omega: vec![0.0, 0.0, -2.0] };
-        (Mechanism::new(&scene).expect("a mechanism"), glance)
+        let body_angles = BodyAngles { phi: vec![0.0, 3.0, 1.0], turns: vec![0; 3], omega: vec![0.0, 0.0, -2.0] };
+        (Mechanism::new(&scene).expect("a mechanism"), body_angles)
     }
 
     #[test]
     fn what_is_behind_a_wall_or_left_it_is_told() {
-        let (mechanism, mut glance) = ball();
+        let (mechanism, mut body_angles) = ball();
         let (guard, held) = (WallGuard::new(1e-9), mechanism.holding(&[0]));
-        assert!(guard.look(&mechanism, 0.0, &glance).is_ok());
-        let stop = guard.look(&held, 0.5, &glance).expect_err("it is above").stop("dp8");
+        assert!(guard.look(&mechanism, 0.0, &body_angles).is_ok());
+        let stop = guard.look(&held, 0.5, &body_angles).expect_err("it is above").stop("dp8");
         assert!(stop.what.contains("held at wall floor") && stop.t == 0.5 && stop.cause == Cause::WallPassed, "{stop}");
-        glance.phi[2] = -1e-6;
-        let stop = guard.look(&mechanism, 0.5, &glance).expect_err("it is below").stop("dp8");
+        body_angles.phi[2] = -1e-6;
+        let stop = guard.look(&mechanism, 0.5, &body_angles).expect_err("it is below").stop("dp8");
         assert!(stop.what.contains("1.000e-6 m behind wall floor"), "{stop}");
     }
 
     #[test]
     fn a_dip_inside_a_step_is_found_where_both_ends_are_in_front() {
-        let (mechanism, glance) = ball();
+        let (mechanism, body_angles) = ball();
         // y = (t - 0.3)² - depth on [0, 1], met at no end of it.
         for (depth, is_behind) in [(1e-4, true), (1e-8, true), (-1e-4, false)] {
-            let at = |t: f64| Glance {
+            let at = |t: f64| BodyAngles {
                 phi: vec![0.0, 3.0, (t - 0.3) * (t - 0.3) - depth],
                 omega: vec![0.0, 0.0, 2.0 * (t - 0.3)],
-                ..glance.clone()
+                ..body_angles.clone()
             };
             let mut guard = WallGuard::new(1e-9);
             guard.begin(&mechanism, 0.0, &at(0.0));

@@ -11,7 +11,7 @@
 
 use crate::dynamics::kernel::Bias;
 use crate::dynamics::multiplier::Multiplier;
-use crate::dynamics::{Along, Field, Form, Mechanism, Motion, State, Time};
+use crate::dynamics::{Along, Form, Mechanism, Motion, OdeSystem, State, Time};
 
 /// The multiplier form with a Baumgarte term in every row.
 #[derive(Clone, Debug)]
@@ -28,7 +28,7 @@ impl<const N: usize> Baumgarte<N> {
     }
 }
 
-impl<const N: usize> Field for Baumgarte<N> {
+impl<const N: usize> OdeSystem for Baumgarte<N> {
     fn dimension(&self) -> usize {
         self.inner.dimension()
     }
@@ -37,7 +37,7 @@ impl<const N: usize> Field for Baumgarte<N> {
         self.inner.angles()
     }
 
-    fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
+    fn rhs(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
         self.inner.biased_rate(t, y, rate, self.bias);
     }
 
@@ -78,8 +78,8 @@ impl<const N: usize> Field for Baumgarte<N> {
         self.inner.gap(event, along)
     }
 
-    fn gap_bend(&self, event: usize, t: f64, pace: f64, first: &[f64], second: &[f64]) -> f64 {
-        self.inner.gap_bend(event, t, pace, first, second)
+    fn gap_bend(&self, event: usize, t: f64, step_size: f64, first: &[f64], second: &[f64]) -> f64 {
+        self.inner.gap_bend(event, t, step_size, first, second)
     }
 }
 

@@ -15,8 +15,8 @@ use crate::arithmetic::Complex;
 use crate::arithmetic::sum::two_sum;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::schur::{DROPPED, NEAR};
-use crate::dynamics::{Field, Form, Mechanism, State, Time, tree};
-use crate::stepping::{Cause, Integrator, StepError, Tally};
+use crate::dynamics::{Form, Mechanism, OdeSystem, State, Time, tree};
+use crate::stepping::{Cause, Integrator, Statistics, StepError};
 
 /// A method followed by projection after each of its steps; its problem must be in angles and rates, as
 /// [`Multiplier`](crate::dynamics::multiplier::Multiplier) is.
@@ -41,7 +41,7 @@ impl<M> Projected<M> {
 
 impl<M> Projected<M> {
     /// Projects the end of a step; true where that moved it by more than rounding.
-    fn put_back<P: ?Sized>(&mut self, mechanism: &Mechanism, state: &mut State) -> Result<bool, StepError>
+    fn project_back<P: ?Sized>(&mut self, mechanism: &Mechanism, state: &mut State) -> Result<bool, StepError>
     where
         M: Integrator<P>,
     {
@@ -64,7 +64,7 @@ impl<M> Projected<M> {
         let lost = last.map_or(0.0, |last| (landing.balance - last).abs()) + landing.energy_change.abs();
         let lost = lost / mechanism.energy_scale;
         if (was_near || self.near) && (lost > LOST || lost.is_nan()) {
-            let row = mechanism.rows[projector.kernel.weakest.row].name();
+            let row = mechanism.constraints[projector.kernel.weakest.row].name();
             let what =
                 format!("energy changed by {lost:.1e} of its scale where constraint {row} loses its hold: the motion left its branch");
             return Err(stop(Cause::BranchLost, state, what, past_singular(name)));
@@ -76,7 +76,7 @@ impl<M> Projected<M> {
 impl<M, P> Integrator<P> for Projected<M>
 where
     M: Integrator<P>,
-    P: Field + Form + ?Sized,
+    P: OdeSystem + Form + ?Sized,
 {
     fn name(&self) -> &'static str {
         self.inner.name()
@@ -94,9 +94,9 @@ where
     }
 
     /// A step of the inner method, put back onto the constraints.
-    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
-        let event = self.inner.step(problem, state, until, tally)?;
-        if self.put_back(problem.mechanism(), state)? {
+    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError> {
+        let event = self.inner.step(problem, state, until, statistics)?;
+        if self.project_back(problem.mechanism(), state)? {
             self.inner.changed(state);
         }
         Ok(event)
@@ -151,7 +151,7 @@ where
 fn hint(mechanism: &Mechanism, kernel: &Kernel<f64>, method: &str) -> &'static str {
     if kernel.weakest.share < NEAR {
         past_singular(method)
-    } else if mechanism.rows.iter().filter(|row| row.is_motor()).count() > 1 {
+    } else if mechanism.constraints.iter().filter(|row| row.is_motor()).count() > 1 {
         "tighten the tolerance, or check that no motors work against each other"
     } else {
         "tighten the tolerance, and look for masses or lengths far out of proportion"
@@ -202,7 +202,7 @@ impl Projector {
     fn project_naturally(&mut self, mechanism: &Mechanism, state: &mut State) -> Option<Landing> {
         let Self { kernel, natural: Some(natural) } = self else { return None };
         let n = mechanism.coordinates();
-        natural.face(state, &mut kernel.z);
+        natural.unit_vectors(state, &mut kernel.z);
         let energy =
             |kernel: &mut Kernel<f64>, state: &State| mechanism.energy_facing::<f64, 0>(kernel, &state.y[..n], &state.y[n..2 * n]).total();
         let energy_before = energy(kernel, state);
@@ -253,8 +253,8 @@ fn project_sized<const N: usize>(
     tolerance: f64,
 ) -> Result<Landing, (String, f64)> {
     let n = tree::size::<N>(mechanism.coordinates());
-    let rows = mechanism.rows.len();
-    kernel.face::<N>(mechanism, &state.y[..n]);
+    let rows = mechanism.constraints.len();
+    kernel.unit_vectors::<N>(mechanism, &state.y[..n]);
     let energy_before = mechanism.energy_facing::<f64, N>(kernel, &state.y[..n], &state.y[n..2 * n]).total();
     kernel.factor::<N>(mechanism, &state.y[n..2 * n]);
     kernel.linearise::<N>(mechanism, state.time, &state.y[..n], &state.y[n..2 * n]);
@@ -263,7 +263,7 @@ fn project_sized<const N: usize>(
         // Rows left out have their say once they are back.
         let in_force = (0..rows).filter(|&r| !kernel.is_left_out(r));
         let worst = in_force.map(|r| kernel.rows[r].position.abs() / unit(mechanism, r)).fold(0.0, largest);
-        // At rounding, or no longer falling: another sweep would only move it about.
+        // At rounding, or no longer falling: another iteration would only move it about.
         if worst <= 1e-16 || worst >= 0.5 * last || worst.is_nan() {
             break;
         }
@@ -294,7 +294,7 @@ fn project_sized<const N: usize>(
         let omega = &state.y[n..2 * n];
         kernel.multiplier[r] = kernel.row_rate(r, omega);
         if !kernel.is_left_out(r) {
-            fast = largest(fast, kernel.multiplier[r].abs() / pace(mechanism, kernel, omega, r));
+            fast = largest(fast, kernel.multiplier[r].abs() / step_size(mechanism, kernel, omega, r));
         }
     }
     if fast > 2.0 * f64::EPSILON || fast.is_nan() {
@@ -304,7 +304,7 @@ fn project_sized<const N: usize>(
         let most = rates.fold(1.0 / mechanism.units.time, |most: f64, (k, omega)| most.max(omega.abs() / size(mechanism, k)));
         (moved, far) = (true, largest(far, change / most));
         let omega = &state.y[n..2 * n];
-        check(mechanism, kernel, tolerance, |r| (kernel.row_rate(r, omega), pace(mechanism, kernel, omega, r)))?;
+        check(mechanism, kernel, tolerance, |r| (kernel.row_rate(r, omega), step_size(mechanism, kernel, omega, r)))?;
     }
     let balance = energy_before - state.y[2 * n] - state.y[2 * n + 1];
     let mut energy_change = 0.0;
@@ -323,13 +323,13 @@ pub(super) fn size(mechanism: &Mechanism, k: usize) -> f64 {
 
 /// The unit of row `r` \[rad, m\].
 pub(super) fn unit(mechanism: &Mechanism, r: usize) -> f64 {
-    if mechanism.rows[r].is_angle() { 1.0 } else { mechanism.units.length }
+    if mechanism.constraints[r].is_angle() { 1.0 } else { mechanism.units.length }
 }
 
 /// Adds M⁻¹ Gᵀ times what is in `multiplier`, with a sign, to the unknowns `from`…, and leaves it in `load`; returns its largest entry, those of positions over
 /// the unit of length.
 pub(super) fn shift(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &mut State, from: usize, sign: f64) -> f64 {
-    kernel.lift();
+    kernel.multiplier_accelerations();
     let mut largest_change = 0.0;
     for (k, &change) in kernel.load.iter().enumerate() {
         (state.y[from + k], state.low[from + k]) = two_sum(state.y[from + k], state.low[from + k] + sign * change);
@@ -344,7 +344,7 @@ fn lever(mechanism: &Mechanism, kernel: &Kernel<f64>, r: usize) -> f64 {
 }
 
 /// The largest part of the rate of row `r`, or its unit over that of time: a row's rate is a sum of G_k w_k, and no smaller than their rounding.
-fn pace(mechanism: &Mechanism, kernel: &Kernel<f64>, omega: &[f64], r: usize) -> f64 {
+fn step_size(mechanism: &Mechanism, kernel: &Kernel<f64>, omega: &[f64], r: usize) -> f64 {
     let least = kernel.rows[r].drive.abs().max(unit(mechanism, r) / mechanism.units.time);
     kernel.fold_gradient(r, least, |most, k, g| most.max((g * omega[k]).abs()))
 }
@@ -355,7 +355,7 @@ fn pace(mechanism: &Mechanism, kernel: &Kernel<f64>, omega: &[f64], r: usize) ->
 /// Name of the first row that is not, and its violation.
 pub(super) fn is_kept(mechanism: &Mechanism, kernel: &Kernel<f64>, omega: &[f64], tolerance: f64) -> Result<(), (String, f64)> {
     check(mechanism, kernel, tolerance, |r| (kernel.rows[r].position, lever(mechanism, kernel, r)))?;
-    check(mechanism, kernel, tolerance, |r| (kernel.row_rate(r, omega), pace(mechanism, kernel, omega, r)))
+    check(mechanism, kernel, tolerance, |r| (kernel.row_rate(r, omega), step_size(mechanism, kernel, omega, r)))
 }
 
 /// The worst row must be below tolerance, each measured against its own size.  Near a singular position rounding grows with the inverse of the distance, of
@@ -367,7 +367,7 @@ fn check(
     violation: impl Fn(usize) -> (f64, f64),
 ) -> Result<(), (String, f64)> {
     let near = kernel.weakest.share.clamp(DROPPED, 1.0);
-    for (r, row) in mechanism.rows.iter().enumerate() {
+    for (r, row) in mechanism.constraints.iter().enumerate() {
         let tolerance = if kernel.is_left_out(r) { tolerance.max(LEFT_OUT) } else { tolerance / near.sqrt() };
         let (violation, size) = violation(r);
         let small = violation.abs() <= tolerance * size;

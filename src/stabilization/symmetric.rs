@@ -15,9 +15,9 @@
 use super::projection::{self, is_kept};
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::schur::DROPPED;
-use crate::dynamics::{Field, Form, Mechanism, State, Time};
+use crate::dynamics::{Form, Mechanism, OdeSystem, State, Time};
 use crate::stepping::gauss::Gauss;
-use crate::stepping::{Cause, Integrator, Seen, StepError, Tally};
+use crate::stepping::{Cause, Integrator, Seen, Statistics, StepError};
 
 /// Gauss steps per step before it is given up; an ordinary one takes three or four.
 const ROUNDS: usize = 60;
@@ -53,15 +53,15 @@ impl SymmetricGauss {
     }
 
     /// One step of `h` \[s\], between states shifted alike.
-    fn shifted<P: Field + Form + ?Sized>(
+    fn shifted<P: OdeSystem + Form + ?Sized>(
         &mut self,
         problem: &mut P,
         state: &mut State,
         h: f64,
-        tally: &mut Tally,
+        statistics: &mut Statistics,
     ) -> Result<(), StepError> {
         let Self { inner, kernel: Some(kernel), trial, best, mu, nu, .. } = self else { return Ok(()) };
-        let (r, until) = (problem.mechanism().rows.len(), state.time + h);
+        let (r, until) = (problem.mechanism().constraints.len(), state.time + h);
         let own = state.memory.len().saturating_sub(2 * r);
         mu.clear();
         mu.extend_from_slice(&state.memory[own..]);
@@ -76,14 +76,14 @@ impl SymmetricGauss {
             hint: "halve the step".into(),
         };
         let (mut last, mut stalled, mut is_closed) = (f64::INFINITY, 0, false);
-        let mut one = Tally::default();
+        let mut one = Statistics::default();
         for _ in 0..ROUNDS {
             trial.clone_from(state);
             trial.memory.truncate(own);
-            face(problem.mechanism(), kernel, trial);
+            unit_vectors(problem.mechanism(), kernel, trial);
             shift(problem.mechanism(), kernel, trial, mu);
             inner.advance(problem, trial, until, &mut one, &mut |_, _| Ok(Seen::Kept))?;
-            tally.evaluations += std::mem::take(&mut one.evaluations);
+            statistics.evaluations += std::mem::take(&mut one.evaluations);
             nu.clone_from(mu);
             land(problem.mechanism(), kernel, trial, best, nu)
                 .map_err(|(row, left)| stop(format!("projection leaves {left:.1e} of constraint {row}")))?;
@@ -109,13 +109,13 @@ impl SymmetricGauss {
         state.clone_from(best);
         state.wrap();
         state.memory.extend_from_slice(mu);
-        tally.steps += 1;
+        statistics.steps += 1;
         Ok(())
     }
 }
 
 /// Rows and directions at a state.
-fn face(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &State) {
+fn unit_vectors(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &State) {
     let n = mechanism.coordinates();
     kernel.linearise_at::<0>(mechanism, state.time, &state.y[..n], &state.y[n..2 * n]);
 }
@@ -129,7 +129,7 @@ fn mismatch(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &State, mu: 
     let mut most = 0.0_f64;
     for level in [0, r] {
         kernel.multiplier.iter_mut().zip(&mu[level..]).zip(&nu[level..]).for_each(|((change, mu), nu)| *change = mu - nu);
-        kernel.lift();
+        kernel.multiplier_accelerations();
         for (k, change) in kernel.load.iter().enumerate() {
             let whole = if level == 0 { size(k).max(state.y[k].abs()) } else { size(k) * fastest };
             let share = change.abs() / whole;
@@ -150,14 +150,14 @@ fn shift(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &mut State, mu:
 
 /// Finds nu such that `end` + D nu, written to `landed`, keeps all rows, with D taken there; starts from the nu given.
 fn land(mechanism: &Mechanism, kernel: &mut Kernel<f64>, end: &State, landed: &mut State, nu: &mut [f64]) -> Result<(), (String, f64)> {
-    let (n, r) = (mechanism.coordinates(), mechanism.rows.len());
+    let (n, r) = (mechanism.coordinates(), mechanism.constraints.len());
     landed.clone_from(end);
-    face(mechanism, kernel, landed);
+    unit_vectors(mechanism, kernel, landed);
     let (mut last, mut stalled) = (f64::INFINITY, 0);
     for _ in 0..SWEEPS {
         landed.clone_from(end);
         shift(mechanism, kernel, landed, nu);
-        face(mechanism, kernel, landed);
+        unit_vectors(mechanism, kernel, landed);
         let mut worst = 0.0_f64;
         for level in [0, r] {
             for row in 0..r {
@@ -183,7 +183,7 @@ fn land(mechanism: &Mechanism, kernel: &mut Kernel<f64>, end: &State, landed: &m
     is_kept(mechanism, kernel, &landed.y[n..2 * n], TOLERANCE)
 }
 
-impl<P: Field + Form + ?Sized> Integrator<P> for SymmetricGauss {
+impl<P: OdeSystem + Form + ?Sized> Integrator<P> for SymmetricGauss {
     fn name(&self) -> &'static str {
         Integrator::<P>::name(&self.inner)
     }
@@ -200,10 +200,10 @@ impl<P: Field + Form + ?Sized> Integrator<P> for SymmetricGauss {
     }
 
     /// A whole step; see [`Gauss`].  The state's memory is that of the Gauss method, then mu.
-    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
+    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError> {
         let h = self.inner.step().copysign((until - state.time).hi);
-        tally.check(Integrator::<P>::name(self), state.time.hi, h)?;
-        self.shifted(problem, state, h, tally)?;
+        statistics.check(Integrator::<P>::name(self), state.time.hi, h)?;
+        self.shifted(problem, state, h, statistics)?;
         Ok(None)
     }
 
@@ -222,6 +222,6 @@ impl<P: Field + Form + ?Sized> Integrator<P> for SymmetricGauss {
         let spare = self.spare.get_or_insert_with(|| Box::new(Self::new(self.inner.another())));
         spare.kernel.get_or_insert_with(|| Kernel::new(problem.mechanism()));
         // Where that fails, the state is the beginning of the step.
-        let _ = spare.shifted(problem, inside, (time - from.time).hi, &mut Tally::default());
+        let _ = spare.shifted(problem, inside, (time - from.time).hi, &mut Statistics::default());
     }
 }

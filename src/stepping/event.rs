@@ -4,8 +4,8 @@
 //! so near to zero that it does not know the side, the step is repeated to end at the minimum, and what is looked at then has the accuracy of a step, too.
 
 use super::search::{Chebyshev, Crossing, Curve, Part, ROUNDING, TOUCH, crossing, doubtful, root, shift, value};
-use super::{Tally, finest};
-use crate::dynamics::{Along, Field, State};
+use super::{Statistics, finest};
+use crate::dynamics::{Along, OdeSystem, State};
 use std::cell::RefCell;
 
 /// Steps an event is landed on with, at most.
@@ -70,15 +70,15 @@ impl Dense {
 }
 
 /// A step just made from a state, as the search sees it.
-pub(super) trait Stride<F: Field + ?Sized> {
+pub(super) trait Stride<F: OdeSystem + ?Sized> {
     /// Writes the dense output of as many unknowns as the field's event functions ask for.
-    fn dense(&mut self, field: &mut F, state: &State, h: f64, dense: &mut Dense, tally: &mut Tally);
+    fn dense(&mut self, field: &mut F, state: &State, h: f64, dense: &mut Dense, statistics: &mut Statistics);
 
     /// Bound of what it is off at a share of the step, over that of the whole step.
     fn off(share: f64) -> f64;
 
     /// Makes the step anew, `h` long; false where it cannot be made.
-    fn repeat(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) -> bool;
+    fn repeat(&mut self, field: &mut F, state: &State, h: f64, statistics: &mut Statistics) -> bool;
 
     /// The unknowns at its end, and their rates.
     fn end(&self) -> (&[f64], &[f64]);
@@ -87,7 +87,7 @@ pub(super) trait Stride<F: Field + ?Sized> {
     fn search(&mut self) -> &mut Search;
 
     /// Looks for events in the step just made, where there are any to look for.
-    fn meet(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) -> Met
+    fn meet(&mut self, field: &mut F, state: &State, h: f64, statistics: &mut Statistics) -> Met
     where
         Self: Sized,
     {
@@ -95,7 +95,7 @@ pub(super) trait Stride<F: Field + ?Sized> {
             return Met::Whole;
         }
         let mut search = std::mem::take(self.search());
-        let met = search.meet(field, self, state, h, tally);
+        let met = search.meet(field, self, state, h, statistics);
         *self.search() = search;
         met
     }
@@ -157,16 +157,16 @@ struct Gap<'a, F: ?Sized> {
     room: &'a RefCell<[Vec<f64>; 2]>,
 }
 
-impl<F: Field + ?Sized> Gap<'_, F> {
+impl<F: OdeSystem + ?Sized> Gap<'_, F> {
     fn along(&self, t: f64) -> [f64; 3] {
         let [y, slope] = &mut *self.room.borrow_mut();
         self.dense.at(t, y, slope);
-        let along = Along { time: self.state.time + t * self.h, pace: self.h, y, slope };
+        let along = Along { time: self.state.time + t * self.h, step_size: self.h, y, slope };
         self.field.gap(self.event, along).unwrap_or([f64::NAN; 3])
     }
 }
 
-impl<F: Field + ?Sized> Curve for Gap<'_, F> {
+impl<F: OdeSystem + ?Sized> Curve for Gap<'_, F> {
     fn at(&self, t: f64) -> [f64; 2] {
         let [value, slope, _] = self.along(t);
         [value, slope]
@@ -184,27 +184,27 @@ impl<F: Field + ?Sized> Curve for Gap<'_, F> {
 
 impl Search {
     /// Looks through the step just made, and makes it anew to end on the first event in it, or where more is to be seen.
-    pub fn meet<F: Field + ?Sized, S: Stride<F>>(
+    pub fn meet<F: OdeSystem + ?Sized, S: Stride<F>>(
         &mut self,
         field: &mut F,
         step: &mut S,
         state: &State,
         whole: f64,
-        tally: &mut Tally,
+        statistics: &mut Statistics,
     ) -> Met {
         let mut h = whole;
         for round in 0..=ROUNDS {
-            let found = self.first(field, step, state, h, round < ROUNDS, tally);
+            let found = self.first(field, step, state, h, round < ROUNDS, statistics);
             let shorter = found.share() * h;
             match found {
                 Found::Nothing => break,
                 Found::At(event, _) => {
-                    let landed = self.land(field, step, state, shorter, event, tally);
+                    let landed = self.land(field, step, state, shorter, event, statistics);
                     return landed.map_or(Met::Failed, |h| Met::Event(h, event));
                 }
                 Found::Inside(_) if shorter <= finest(state, field.time_unit()) => return Met::AtRest,
                 Found::Inside(_) | Found::Near(_) => {
-                    if !step.repeat(field, state, shorter, tally) {
+                    if !step.repeat(field, state, shorter, statistics) {
                         return Met::Failed;
                     }
                     h = shorter;
@@ -218,16 +218,16 @@ impl Search {
     }
 
     /// The first that is to be seen inside the step just made; minima that may be on either side of zero where these are `asked` for.
-    fn first<F: Field + ?Sized, S: Stride<F>>(
+    fn first<F: OdeSystem + ?Sized, S: Stride<F>>(
         &mut self,
         field: &mut F,
         step: &mut S,
         state: &State,
         h: f64,
         asked: bool,
-        tally: &mut Tally,
+        statistics: &mut Statistics,
     ) -> Found {
-        step.dense(field, state, h, &mut self.dense, tally);
+        step.dense(field, state, h, &mut self.dense, statistics);
         let count = self.dense.off.len();
         for room in self.room.get_mut() {
             room.resize(count, 0.0);
@@ -251,7 +251,7 @@ impl Search {
     }
 
     /// The first of the events whose functions are known by their values alone, or what was found before.
-    fn opaquely<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, mut found: Found) -> Found {
+    fn opaquely<F: OdeSystem + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, mut found: Found) -> Found {
         let Self { dense, room, gaps, values, opaque, .. } = self;
         gaps.resize(field.events(), 0.0);
         values.resize(opaque.len(), Vec::new());
@@ -283,24 +283,24 @@ impl Search {
     }
 
     /// Repeats the step so that it ends where the event function is zero to rounding; returns its length, `None` where it cannot be made.
-    fn land<F: Field + ?Sized, S: Stride<F>>(
+    fn land<F: OdeSystem + ?Sized, S: Stride<F>>(
         &mut self,
         field: &mut F,
         step: &mut S,
         state: &State,
         h: f64,
         event: usize,
-        tally: &mut Tally,
+        statistics: &mut Statistics,
     ) -> Option<f64> {
         self.gaps.resize(field.events(), 0.0);
         let (mut best, mut low, mut high) = (h, 0.0, 1.1 * h);
         let (mut before, mut gap_before) = (0.0, f64::NAN);
         for attempt in 1..=LANDINGS {
-            if !step.repeat(field, state, best, tally) {
+            if !step.repeat(field, state, best, statistics) {
                 return None;
             }
             let (y, slope) = step.end();
-            let known = field.gap(event, Along { time: state.time + best, pace: 1.0, y, slope });
+            let known = field.gap(event, Along { time: state.time + best, step_size: 1.0, y, slope });
             let gap = match known {
                 Some([gap, ..]) => gap,
                 None => {
@@ -332,7 +332,7 @@ impl Search {
     }
 
     /// Rate of an event function at the end of the step just made.
-    fn closing_speed<F: Field + ?Sized>(
+    fn closing_speed<F: OdeSystem + ?Sized>(
         &mut self,
         field: &mut F,
         step: &impl Stride<F>,

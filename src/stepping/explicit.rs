@@ -12,10 +12,10 @@
 //! Source: E. Hairer, S. P. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sections II.4-II.6.
 
 use super::event::{Dense, Met, Search, Stride};
-use super::{Cause, Integrator, StepError, Tally};
+use super::{Cause, Integrator, Statistics, StepError};
 use crate::arithmetic::sum::{fast_two_sum, two_sum};
 use crate::arithmetic::{DoubleDouble, Scalar};
-use crate::dynamics::{Field, State, Time};
+use crate::dynamics::{OdeSystem, State, Time};
 use std::marker::PhantomData;
 
 /// The nonzero entries of a row of coefficients: index and value.
@@ -135,15 +135,15 @@ impl<P: Pair> Explicit<P> {
     }
 
     /// Stages 2… and the new state of a step of `h` from `state`; stage 1 is in place.
-    fn attempt<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) {
+    fn attempt<F: OdeSystem + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, statistics: &mut Statistics) {
         let n = state.y.len();
         self.has_extra = false;
         for (i, row) in P::A.iter().enumerate() {
             combine(&state.y, h, row, &self.k, &mut self.stage);
             let (_, rest) = self.k.split_at_mut((i + 1) * n);
-            field.rate(state.time + P::C[i + 1] * h, &self.stage, &mut rest[..n]);
+            field.rhs(state.time + P::C[i + 1] * h, &self.stage, &mut rest[..n]);
         }
-        tally.evaluations += P::A.len() as u64;
+        statistics.evaluations += P::A.len() as u64;
         sum_up(P::B, &self.k, &mut self.stage);
         for i in 0..n {
             let change = self.stage[i] * h;
@@ -153,12 +153,12 @@ impl<P: Pair> Explicit<P> {
             self.scale[i] = self.tolerance.absolute * self.units[i] + self.tolerance.relative * size;
         }
         let (_, rest) = self.k.split_at_mut(P::STAGES * n);
-        field.rate(state.time + h, &self.next, &mut rest[..n]);
-        tally.evaluations += 1;
+        field.rhs(state.time + h, &self.next, &mut rest[..n]);
+        statistics.evaluations += 1;
     }
 
     /// A first step from the size of the rate and its change (Hairer, Nørsett, Wanner, page 169).
-    fn first_step<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, span: f64, tally: &mut Tally) -> f64 {
+    fn first_step<F: OdeSystem + ?Sized>(&mut self, field: &mut F, state: &State, span: f64, statistics: &mut Statistics) -> f64 {
         let n = state.y.len();
         super::scales(self.tolerance, &state.y, &self.units, &mut self.scale);
         // What nothing is known of begins with a millionth of the unit of time.
@@ -172,8 +172,8 @@ impl<P: Pair> Explicit<P> {
             self.stage[i] = state.y[i] + guess * self.k[i];
         }
         let (first, rest) = self.k.split_at_mut(n);
-        field.rate(state.time + guess, &self.stage, &mut rest[..n]);
-        tally.evaluations += 1;
+        field.rhs(state.time + guess, &self.stage, &mut rest[..n]);
+        statistics.evaluations += 1;
         let d2 = norm(&|i| rest[i] - first[i], &self.scale) / guess;
         let steepest = (d1 * unit).max(d2 * unit * unit);
         let second =
@@ -183,26 +183,26 @@ impl<P: Pair> Explicit<P> {
     }
 
     /// The stages an interpolation of the step just made asks for beside its own.
-    fn evaluate_extra_stages<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) {
+    fn evaluate_extra_stages<F: OdeSystem + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, statistics: &mut Statistics) {
         let n = state.y.len();
         self.has_extra = true;
         let (k, stage) = (&mut self.k, &mut self.stage);
         P::extra_stages(&mut |number, c, row| {
             combine(&state.y, h, row, k, stage);
-            field.rate(state.time + c * h, stage, &mut k[number * n..(number + 1) * n]);
-            tally.evaluations += 1;
+            field.rhs(state.time + c * h, stage, &mut k[number * n..(number + 1) * n]);
+            statistics.evaluations += 1;
         });
     }
 
     /// Writes the end of a step of `h` from the beginning of the last one, where that is within the tolerance: for where the interpolation is not, as in long steps
     /// on the way out of an unstable equilibrium.
-    fn step_inside<F: Field + ?Sized>(&mut self, field: &mut F, from: &State, h: f64, inside: &mut State) {
+    fn step_inside<F: OdeSystem + ?Sized>(&mut self, field: &mut F, from: &State, h: f64, inside: &mut State) {
         let n = from.y.len();
         let mut shorter = self.shorter.take().unwrap_or_else(|| Box::new(Self::new(self.tolerance)));
         shorter.resize(n);
         shorter.units.clone_from(&self.units);
         shorter.k[..n].copy_from_slice(&self.k[..n]);
-        shorter.attempt(field, from, h, &mut Tally::default());
+        shorter.attempt(field, from, h, &mut Statistics::default());
         // Near a singular position a step that ends in it may be far worse than one that leads past it.
         if P::error(h, &shorter.k, &shorter.scale) <= 1.0 {
             inside.y.copy_from_slice(&shorter.next);
@@ -212,7 +212,7 @@ impl<P: Pair> Explicit<P> {
     }
 
     /// The component that asks most of the step, or the first that is not finite.
-    fn culprit<F: Field + ?Sized>(&self, field: &F, n: usize) -> String {
+    fn culprit<F: OdeSystem + ?Sized>(&self, field: &F, n: usize) -> String {
         let last = &self.k[P::STAGES * n..(P::STAGES + 1) * n];
         let worst = (0..n)
             .find(|&i| !(self.next[i].is_finite() && last[i].is_finite()))
@@ -288,9 +288,9 @@ fn expand(nested: &[f64], powers: &mut [f64]) {
     }
 }
 
-impl<P: Pair, F: Field + ?Sized> Stride<F> for Explicit<P> {
-    fn dense(&mut self, field: &mut F, state: &State, h: f64, dense: &mut Dense, tally: &mut Tally) {
-        self.evaluate_extra_stages(field, state, h, tally);
+impl<P: Pair, F: OdeSystem + ?Sized> Stride<F> for Explicit<P> {
+    fn dense(&mut self, field: &mut F, state: &State, h: f64, dense: &mut Dense, statistics: &mut Statistics) {
+        self.evaluate_extra_stages(field, state, h, statistics);
         let n = state.y.len();
         dense.begin(field.watched(), P::DEGREE + 1, state);
         let most = highest::<P>();
@@ -308,8 +308,8 @@ impl<P: Pair, F: Field + ?Sized> Stride<F> for Explicit<P> {
         bell * bell
     }
 
-    fn repeat(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) -> bool {
-        self.attempt(field, state, h, tally);
+    fn repeat(&mut self, field: &mut F, state: &State, h: f64, statistics: &mut Statistics) -> bool {
+        self.attempt(field, state, h, statistics);
         true
     }
 
@@ -323,7 +323,7 @@ impl<P: Pair, F: Field + ?Sized> Stride<F> for Explicit<P> {
     }
 }
 
-impl<P: Pair, F: Field + ?Sized> Integrator<F> for Explicit<P> {
+impl<P: Pair, F: OdeSystem + ?Sized> Integrator<F> for Explicit<P> {
     fn name(&self) -> &'static str {
         P::NAME
     }
@@ -352,30 +352,30 @@ impl<P: Pair, F: Field + ?Sized> Integrator<F> for Explicit<P> {
         Ok(())
     }
 
-    fn step(&mut self, field: &mut F, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
+    fn step(&mut self, field: &mut F, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError> {
         let n = state.y.len();
         let left = (until - state.time).hi;
         match std::mem::replace(&mut self.rate, Rate::First) {
             Rate::First => {}
             Rate::Last => self.k.copy_within(P::STAGES * n..(P::STAGES + 1) * n, 0),
             Rate::Unknown => {
-                field.rate(state.time, &state.y, &mut self.k[..n]);
-                tally.evaluations += 1;
+                field.rhs(state.time, &state.y, &mut self.k[..n]);
+                statistics.evaluations += 1;
             }
         }
         let mut wanted = match self.wanted {
             Some(h) => h,
-            None => self.first_step(field, state, left, tally),
+            None => self.first_step(field, state, left, statistics),
         };
         let (mut cuts, mut is_rejected) = (0, false);
         loop {
             let (h, whole) = super::reach(wanted, left);
-            tally.check(P::NAME, state.time.hi, h)?;
-            self.attempt(field, state, h, tally);
+            statistics.check(P::NAME, state.time.hi, h)?;
+            self.attempt(field, state, h, statistics);
             let error = P::error(h, &self.k, &self.scale).sqrt();
             if !error.is_finite() {
                 cuts += 1;
-                tally.rejected += 1;
+                statistics.rejected += 1;
                 if cuts > MOST_CUTS || h < super::finest(state, field.time_unit()) {
                     let what = format!("{} is not finite", self.culprit(field, n));
                     let hint = "look for a spring of length zero or a position without inertia";
@@ -387,7 +387,7 @@ impl<P: Pair, F: Field + ?Sized> Integrator<F> for Explicit<P> {
             cuts = 0;
             let factor = (0.9 * libm::pow(error, -1.0 / f64::from(P::ORDER))).clamp(1.0 / 3.0, 6.0);
             if error > 1.0 {
-                tally.rejected += 1;
+                statistics.rejected += 1;
                 (wanted, is_rejected) = (h * factor.min(0.9), true);
                 if wanted < super::finest(state, field.time_unit()) {
                     let what = format!("{} asks for ever smaller steps", self.culprit(field, n));
@@ -395,7 +395,7 @@ impl<P: Pair, F: Field + ?Sized> Integrator<F> for Explicit<P> {
                 }
                 continue;
             }
-            let (h, event, lands) = match self.meet(field, state, h, tally) {
+            let (h, event, lands) = match self.meet(field, state, h, statistics) {
                 Met::Whole => (h, None, whole),
                 Met::Short(short) => (short, None, false),
                 Met::Event(short, event) => (short, Some(event), false),
@@ -411,7 +411,7 @@ impl<P: Pair, F: Field + ?Sized> Integrator<F> for Explicit<P> {
             state.memory.clear();
             state.memory.push(wanted);
             (self.wanted, self.length, self.rate) = (Some(wanted), h, Rate::Last);
-            tally.steps += 1;
+            statistics.steps += 1;
             return Ok(event);
         }
     }
@@ -441,7 +441,7 @@ impl<P: Pair, F: Field + ?Sized> Integrator<F> for Explicit<P> {
     fn interpolate(&mut self, field: &mut F, from: &State, time: Time, inside: &mut State) {
         let n = from.y.len();
         if !self.has_extra {
-            self.evaluate_extra_stages(field, from, self.length, &mut Tally::default());
+            self.evaluate_extra_stages(field, from, self.length, &mut Statistics::default());
         }
         inside.clone_from(from);
         inside.memory.clear();

@@ -4,7 +4,7 @@
 //! What rounding does to the energy is a random walk and nothing else (Brouwer's law), some 1e-21 of it in a thousand seconds: below the method's own error,
 //! which swings with the motion, unless steps are short.
 //! To choose for long horizons: bounded systems over 1e4 s and more, where the invariants count.  It asks for a smooth field:
-//! stages are found by sweeps and, from about `step · fastest rate = 2` on, by Newton's method (`newton.rs`).  Beyond 4 a fast mode with energy in it is not followed any more,
+//! stages are found by iterations and, from about `step · fastest rate = 2` on, by Newton's method (`newton.rs`).  Beyond 4 a fast mode with energy in it is not followed any more,
 //! and the slow motion goes wrong while the energy stays bounded: the method stops there.  In (q, w) the same coefficients are not symplectic.
 //!
 //! ```text
@@ -16,29 +16,29 @@
 //! * `h b_j` is one double, the same in stages and update; sigma is antisymmetric exactly.  So the method as computed is
 //!   symplectic, for weights a rounding away from Gauss's.  Weights in full in the update alone are a linear drift, as a test below shows.
 //! * sigma and `h b_j` are also the same read backwards, so the method as computed is symmetric in time.
-//! * Sweeps of doubles that no pairs follow go on until no unknown's change falls any further, and one sweep more.  A tolerance would leave the same rest
+//! * Sweeps of doubles that no pairs follow go on until no unknown's change falls any further, and one iteration more.  A tolerance would leave the same rest
 //!   in every step.
 //! * State and time are pairs; the update sums exact products in double-double.
 //! * Stages are summed outwards from the step's midpoint `y + Σ L_j / 2` in mirror pairs, so that a step and its reverse round alike.
-//! * Evaluations at the end in pairs of doubles ([`Field::exact_rates`]), with stages and `L_j` that are pairs too.  They go on until the stages
+//! * Evaluations at the end in pairs of doubles ([`OdeSystem::exact_rates`]), with stages and `L_j` that are pairs too.  They go on until the stages
 //!   move by less than 2⁻⁷⁸ of their size, or no less than before: five to eight of them a step.  Increments rounded to doubles would hold the stages
-//!   a little to the side from which the plain sweeps came, and that is the same side in every step, by how the constants happen to be rounded: 2e-21 of the
+//!   a little to the side from which the plain iterations came, and that is the same side in every step, by how the constants happen to be rounded: 2e-21 of the
 //!   energy per second on `gentle` at 2⁻⁵ s, up or down.
 //!
-//! The stages lie in lanes: a sweep is one evaluation of the field on vectors of eight ([`Field::rates`]).
+//! The stages lie in lanes: a iteration is one evaluation of the field on vectors of eight ([`OdeSystem::rhss`]).
 //!
 //! Source: M. Antoñana, J. Makazaga, A. Murua, *Reducing and monitoring round-off error propagation for symplectic implicit Runge–Kutta
 //! schemes*, Numer. Algorithms 76 (2017) 861–880, sections 3 and 4; E. Hairer, R. I. McLachlan, A. Razakarivony, *Achieving Brouwer's law
 //! with implicit Runge–Kutta methods*, BIT 48 (2008) 231–243; E. Hairer, C. Lubich, G. Wanner, *Geometric Numerical Integration*,
-//! 2nd ed. (2006), sections VIII.6 (starting values, sweeps).  Summing outwards from the midpoint and the evaluations in pairs are ours.
+//! 2nd ed. (2006), sections VIII.6 (starting values, iterations).  Summing outwards from the midpoint and the evaluations in pairs are ours.
 
 mod lanes;
 mod newton;
 mod sums;
 mod tableau;
 
-use super::{Cause, Integrator, StepError, Tally};
-use crate::dynamics::{Field, State, Time};
+use super::{Cause, Integrator, Statistics, StepError};
+use crate::dynamics::{OdeSystem, State, Time};
 use lanes::Scratch;
 use newton::Newton;
 use std::sync::OnceLock;
@@ -53,19 +53,19 @@ const NAMES: [&str; 7] = ["gauss4", "gauss6", "gauss8", "gauss10", "gauss12", "g
 const MOST_SWEEPS: usize = 200;
 /// Sweeps in a row without a fall that end the iteration: the one that shows it, and one of grace.
 const IDLE_SWEEPS: usize = 2;
-/// Most evaluations after the last sweep that carry what doubles leave out.
+/// Most evaluations after the last iteration that carry what doubles leave out.
 const MOST_EXACT_SWEEPS: u32 = 12;
-/// Changes over the sizes of unknowns at which sweeps give way to these, and at which these end.
+/// Changes over the sizes of unknowns at which iterations give way to these, and at which these end.
 const NEARLY: f64 = 1.0 / (1_u64 << 46) as f64;
 const SETTLED: f64 = 1.0 / (1_u128 << 78) as f64;
 /// Largest last change, relative to its scale, that can be rounding; anything above has not converged.
 const LARGEST_REST: f64 = 1e-10;
 /// Scale of an angle near zero \[rad\]: forces that cancel leave an angle a noise that is not relative to its size.
 const LEAST_ANGLE: f64 = 1e-2;
-/// Contraction from which sweeps are given up for Newton's method, and the radians of the fastest mode a step that make them as slow as that is worth.
+/// Contraction from which iterations are given up for Newton's method, and the radians of the fastest mode a step that make them as slow as that is worth.
 const SLOW: f64 = 0.6;
 const FAST_RADIANS: f64 = 2.0;
-/// Steps by Newton's method after which sweeps are tried again.
+/// Steps by Newton's method after which iterations are tried again.
 const NEWTON_STEPS: f64 = 50.0;
 /// Radians of the fastest mode a step up to which it is followed, and the share of the energy scale in it from which it must be.
 const RESOLVED: f64 = 4.0;
@@ -91,7 +91,7 @@ pub struct Gauss {
     newton: Option<Box<Newton>>,
     /// Makes shorter steps, once one is asked for.
     spare: Option<Box<Gauss>>,
-    /// Contraction of the sweeps above which Newton's method takes over.
+    /// Contraction of the iterations above which Newton's method takes over.
     slow: f64,
 }
 
@@ -150,7 +150,7 @@ impl Gauss {
     }
 }
 
-impl<F: Field + ?Sized> Integrator<F> for Gauss {
+impl<F: OdeSystem + ?Sized> Integrator<F> for Gauss {
     fn name(&self) -> &'static str {
         NAMES[self.stages() - 2]
     }
@@ -169,12 +169,12 @@ impl<F: Field + ?Sized> Integrator<F> for Gauss {
     /// A whole step, forwards or backwards.  Where `until` is not a whole number of steps away (to 1e-9 of a step and the resolution
     /// of `until`), one shorter step ends there; done often, that costs the long-time behaviour: ask for multiples of the step.
     /// Events are not looked for: the canonical form has none.
-    fn step(&mut self, problem: &mut F, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
+    fn step(&mut self, problem: &mut F, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError> {
         let step = self.next(state, until);
         if step != self.scratch.step {
             self.scratch.scale(self.tableau, step);
         }
-        lanes::step(self, problem, state, tally)?;
+        lanes::step(self, problem, state, statistics)?;
         Ok(None)
     }
 
@@ -207,7 +207,7 @@ impl Gauss {
     }
 
     /// Refuses to go on with steps too long for a fast mode that has a part in the motion; asked where Newton's method takes over, and then now and again.
-    fn follow<F: Field + ?Sized>(&self, problem: &mut F, state: &State) -> Result<(), StepError> {
+    fn follow<F: OdeSystem + ?Sized>(&self, problem: &mut F, state: &State) -> Result<(), StepError> {
         let Some(found) = problem.stiffness(state.time, &state.y) else { return Ok(()) };
         let radians = found.radians(self.scratch.step.abs());
         if radians <= RESOLVED || found.is_damped() || found.share <= EXCITED {
@@ -235,7 +235,7 @@ impl Gauss {
     ///
     /// Convergence is judged by the angles where the field has any: their scale is known, and whatever else moves does so through them.
     /// A momentum at rest under forces that cancel is all rounding and has no scale of its own.
-    fn check<F: Field + ?Sized>(&self, problem: &mut F, state: &State) -> Result<(), StepError> {
+    fn check<F: OdeSystem + ?Sized>(&self, problem: &mut F, state: &State) -> Result<(), StepError> {
         let scratch = &self.scratch;
         let angles = problem.angles();
         let stop = |cause, what| StepError {
@@ -313,7 +313,7 @@ mod tests {
                 while taken < mark {
                     taken += 1;
                     let until = Time::of(f64::from(taken) / 64.0);
-                    gauss.advance(&mut form, &mut state, until, &mut Tally::default(), &mut |_, _| Ok(Seen::Kept)).expect("a step");
+                    gauss.advance(&mut form, &mut state, until, &mut Statistics::default(), &mut |_, _| Ok(Seen::Kept)).expect("a step");
                     for i in (0..8).filter(|&i| part(i) != 0.0) {
                         for (k, rate) in gauss.scratch.points.rate.iter().enumerate() {
                             let y = state.unknown(k) + part(i) * low[i] * rate.0[tableau::lane(i, 8)];

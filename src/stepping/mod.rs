@@ -1,7 +1,7 @@
 //! Methods: how a state is integrated from one time to another.
 //!
 //! A method is configuration and scratch space; the [`State`] belongs to the caller and holds everything a restart needs.  The
-//! problem is a type parameter: Dormand–Prince, Radau and Gauss are `Integrator<F: Field>`, RATTLE is `Integrator<Natural>`, so a wrong pairing does
+//! problem is a type parameter: Dormand–Prince, Radau and Gauss are `Integrator<F: OdeSystem>`, RATTLE is `Integrator<Natural>`, so a wrong pairing does
 //! not compile.
 
 #[doc(hidden)]
@@ -33,11 +33,11 @@ pub use radau::Radau;
 pub use taylor::Taylor;
 pub use windows::{Dop853, Dopri5};
 
-use crate::dynamics::{Field, State, Time};
+use crate::dynamics::{OdeSystem, State, Time};
 
 /// Counts of one run, and the effort it is allowed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub struct Tally {
+pub struct Statistics {
     /// Accepted steps.
     pub steps: u64,
     /// Evaluations of the equations; a series is expanded at the price of one.
@@ -49,24 +49,24 @@ pub struct Tally {
     /// Steps whose stages were found by Newton's method, of the methods that usually sweep.
     pub newton_steps: u64,
     /// Evaluations allowed: no step begins after so many.
-    pub effort: u64,
+    pub max_evaluations: u64,
 }
 
-impl Default for Tally {
+impl Default for Statistics {
     /// Nothing done, and no bound on what may be.
     fn default() -> Self {
-        Self { steps: 0, evaluations: 0, rejected: 0, jacobians: 0, newton_steps: 0, effort: u64::MAX }
+        Self { steps: 0, evaluations: 0, rejected: 0, jacobians: 0, newton_steps: 0, max_evaluations: u64::MAX }
     }
 }
 
-impl Tally {
+impl Statistics {
     /// Whether another step may be tried, from `t` on and of `step` \[s\].
     ///
     /// # Errors
     /// The effort allowed is used up.
     #[inline]
     pub fn check(&self, method: &str, t: f64, step: f64) -> Result<(), StepError> {
-        if self.evaluations < self.effort { Ok(()) } else { Err(self.exhausted(method, t, step)) }
+        if self.evaluations < self.max_evaluations { Ok(()) } else { Err(self.exhausted(method, t, step)) }
     }
 
     #[cold]
@@ -76,8 +76,9 @@ impl Tally {
             method: method.into(),
             t,
             step,
-            what: format!("the effort allowed, {} evaluations, is used up", self.effort),
-            hint: "loosen the tolerance or lengthen the step, shorten the horizon, or allow more with --effort (of `resume` too)".into(),
+            what: format!("the maximum of {} evaluations is used up", self.max_evaluations),
+            hint: "loosen the tolerance or lengthen the step, shorten the horizon, or allow more with --max-evaluations (of `resume` too)"
+                .into(),
         }
     }
 }
@@ -145,7 +146,7 @@ pub trait Integrator<P: ?Sized> {
     ///
     /// # Errors
     /// A typed stop with time, step, culprit and suggestion; the state is unchanged.
-    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError>;
+    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError>;
 
     /// True where no step is left before `until`: adaptive methods land on it, fixed-step methods take the whole number of steps nearest to it.
     fn is_at(&self, state: &State, until: Time) -> bool {
@@ -169,12 +170,12 @@ pub trait Integrator<P: ?Sized> {
         problem: &mut P,
         state: &mut State,
         until: Time,
-        tally: &mut Tally,
+        statistics: &mut Statistics,
         watch: &mut Watch<P>,
     ) -> Result<Reached, StepError> {
         self.begin(problem, state, until)?;
         while !self.is_at(state, until) {
-            let event = self.step(problem, state, until, tally)?;
+            let event = self.step(problem, state, until, statistics)?;
             let seen = watch(problem, state)?;
             if seen.is_changed() {
                 self.changed(state);
@@ -230,10 +231,10 @@ pub(crate) fn shortened<P: ?Sized, M: Integrator<P> + ?Sized>(
     inside.clone_from(from);
     inside.memory = memory;
     inside.memory.clear();
-    let mut tally = Tally::default();
+    let mut statistics = Statistics::default();
     let _ = method.begin(problem, inside, time).and_then(|()| {
         while !method.is_at(inside, time) {
-            method.step(problem, inside, time, &mut tally)?;
+            method.step(problem, inside, time, &mut statistics)?;
         }
         Ok(())
     });
@@ -311,7 +312,7 @@ pub struct StepError {
 }
 
 /// Writes the units the unknowns of a field are measured in.
-fn units<F: Field + ?Sized>(field: &F, count: usize, units: &mut Vec<f64>) {
+fn units<F: OdeSystem + ?Sized>(field: &F, count: usize, units: &mut Vec<f64>) {
     units.clear();
     units.extend((0..count).map(|i| field.unit(i)));
 }

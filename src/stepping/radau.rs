@@ -2,7 +2,7 @@
 //!
 //! Implicit, adaptive, stiffly accurate and L-stable: fast modes that are damped cost it nothing once they have died away, and its steps follow the slow motion.
 //! To choose for dampers and damped stiff springs.  *Not* for stiff springs that swing: it eats their energy wherever its steps are longer than their
-//! periods, and where they are not the explicit methods are cheaper.  It asks for a field with a [Jacobian](Field::jacobian).
+//! periods, and where they are not the explicit methods are cheaper.  It asks for a field with a [Jacobian](OdeSystem::jacobian).
 //!
 //! ```text
 //! z_i = h Σ_j a_ij f(t + c_j h, y + z_j),      y1 = y + z_s
@@ -24,10 +24,10 @@ use self::newton::Solved;
 use self::tableau::Tableau;
 use super::event::{Dense, Met, Search, Stride};
 use super::linear::Factors;
-use super::{Cause, Integrator, StepError, Tally, Tolerance, scales};
+use super::{Cause, Integrator, Statistics, StepError, Tolerance, scales};
 use crate::arithmetic::sum::{fast_two_sum, two_sum};
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
-use crate::dynamics::{Field, State, Time};
+use crate::dynamics::{OdeSystem, State, Time};
 
 /// Safety factor of the step.
 const SAFE: f64 = 0.9;
@@ -174,7 +174,7 @@ impl Radau {
     }
 
     /// The new state, and the error over the tolerance; filtered once more where the step is a hard one, just rejected or the first.
-    fn estimate<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, is_hard: bool, tally: &mut Tally) -> f64 {
+    fn estimate<F: OdeSystem + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, is_hard: bool, statistics: &mut Statistics) -> f64 {
         let Self { tableau, work, .. } = self;
         let (s, d) = (tableau.stages(), state.y.len());
         let fade = h * tableau.real.value;
@@ -199,7 +199,7 @@ impl Radau {
                 (work.stage[k], work.low[k]) = fast_two_sum(sum, rest + state.low[k]);
             }
             field.fine_rate(state.time, &work.stage, &work.low, &mut error);
-            tally.evaluations += 1;
+            statistics.evaluations += 1;
             for k in 0..d {
                 error[k] += work.mode[k];
             }
@@ -221,7 +221,7 @@ impl Radau {
     }
 
     /// The component that asks most of the step.
-    fn culprit<F: Field + ?Sized>(&self, field: &F) -> String {
+    fn culprit<F: OdeSystem + ?Sized>(&self, field: &F) -> String {
         let share = |k: usize| {
             let share = (self.work.error[k] / self.work.scale[k]).abs();
             if share.is_nan() { f64::INFINITY } else { share }
@@ -253,9 +253,9 @@ impl Radau {
     }
 }
 
-impl<F: Field + ?Sized> Stride<F> for Radau {
+impl<F: OdeSystem + ?Sized> Stride<F> for Radau {
     /// Its powers, and what it may be off: it has not the slope of the solution at the start, but at the stages.
-    fn dense(&mut self, field: &mut F, state: &State, h: f64, dense: &mut Dense, _tally: &mut Tally) {
+    fn dense(&mut self, field: &mut F, state: &State, h: f64, dense: &mut Dense, _tally: &mut Statistics) {
         let (s, d) = (self.tableau.stages(), state.y.len());
         dense.begin(field.watched(), s + 1, state);
         for (k, (powers, off)) in dense.each().enumerate() {
@@ -271,15 +271,15 @@ impl<F: Field + ?Sized> Stride<F> for Radau {
         6.75 * share * (1.0 - share) * (1.0 - share)
     }
 
-    fn repeat(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) -> bool {
+    fn repeat(&mut self, field: &mut F, state: &State, h: f64, statistics: &mut Statistics) -> bool {
         let length = self.work.factored;
         self.predict(h, length, true);
         self.factor(h, state.y.len());
         let mut contraction = 1.0;
-        let has_converged = matches!(self.solve(field, state, h, &mut contraction, tally), Solved::Converged(..));
+        let has_converged = matches!(self.solve(field, state, h, &mut contraction, statistics), Solved::Converged(..));
         self.close(state);
-        field.rate(state.time + h, &self.work.next, &mut self.work.next_rate);
-        tally.evaluations += 1;
+        field.rhs(state.time + h, &self.work.next, &mut self.work.next_rate);
+        statistics.evaluations += 1;
         has_converged
     }
 
@@ -292,7 +292,7 @@ impl<F: Field + ?Sized> Stride<F> for Radau {
     }
 }
 
-impl<F: Field + ?Sized> Integrator<F> for Radau {
+impl<F: OdeSystem + ?Sized> Integrator<F> for Radau {
     fn name(&self) -> &'static str {
         self.id()
     }
@@ -312,10 +312,10 @@ impl<F: Field + ?Sized> Integrator<F> for Radau {
         Ok(())
     }
 
-    fn step(&mut self, field: &mut F, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
+    fn step(&mut self, field: &mut F, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError> {
         let (d, left) = (state.y.len(), (until - state.time).hi);
         field.fine_rate(state.time, &state.y, &state.low, &mut self.work.start);
-        tally.evaluations += 1;
+        statistics.evaluations += 1;
         scales(self.tolerance, &state.y, &self.work.units, &mut self.work.scale);
         let (mut control, mut cuts) = (self.control, 0);
         if control.wanted == 0.0 {
@@ -323,14 +323,14 @@ impl<F: Field + ?Sized> Integrator<F> for Radau {
         }
         loop {
             let (h, whole) = super::reach(control.wanted, left);
-            tally.check(self.id(), state.time.hi, h)?;
+            statistics.check(self.id(), state.time.hi, h)?;
             if h < super::finest(state, field.time_unit()) && !whole {
                 let what = format!("{} asks for ever smaller steps", self.culprit(field));
                 let hint = "loosen the tolerance: forces of stiff springs have a rounding of their own";
                 return Err(self.stop(Cause::StepTooSmall, state, h, what, hint));
             }
             let is_fresh = control.keeps == 0.0 && !(self.work.place.0 == state.time && self.work.place.1 == state.y);
-            if (is_fresh || self.work.jacobian.is_empty()) && !self.differentiate(field, is_fresh.then_some(&*state), tally) {
+            if (is_fresh || self.work.jacobian.is_empty()) && !self.differentiate(field, is_fresh.then_some(&*state), statistics) {
                 let what = "this form of the equations has no Jacobian".into();
                 return Err(self.stop(Cause::Unsuited, state, h, what, "use dp8"));
             }
@@ -338,20 +338,20 @@ impl<F: Field + ?Sized> Integrator<F> for Radau {
                 self.factor(h, d);
             }
             self.predict(h, control.accepted, false);
-            let solved = self.solve(field, state, h, &mut control.contraction, tally);
+            let solved = self.solve(field, state, h, &mut control.contraction, statistics);
             let (theta, sweeps) = match solved {
                 Solved::Converged(theta, sweeps) => (theta, sweeps),
                 Solved::Slow(factor) => {
-                    tally.rejected += 1;
+                    statistics.rejected += 1;
                     (self.is_hard, control.wanted, control.keeps) = (true, h * factor, 0.0);
                     continue;
                 }
                 Solved::NotFinite => (f64::NAN, 0),
             };
-            let error = if sweeps > 0 { self.estimate(field, state, h, self.is_hard, tally).max(1e-10) } else { f64::NAN };
+            let error = if sweeps > 0 { self.estimate(field, state, h, self.is_hard, statistics).max(1e-10) } else { f64::NAN };
             if !error.is_finite() {
                 cuts += 1;
-                tally.rejected += 1;
+                statistics.rejected += 1;
                 if cuts > MOST_CUTS {
                     let what = format!("{} is not finite", self.culprit(field));
                     let hint = "look for a spring of length zero or a position without inertia";
@@ -365,17 +365,17 @@ impl<F: Field + ?Sized> Integrator<F> for Radau {
             let factor = SAFE.min(SAFE * (1.0 + 2.0 * most) / (sweeps as f64 + 2.0 * most));
             let quotient = (libm::pow(error, exponent) / factor).clamp(QUOTIENT[0], QUOTIENT[1]);
             if error >= 1.0 {
-                tally.rejected += 1;
+                statistics.rejected += 1;
                 let is_first = control.accepted == 0.0;
                 (self.is_hard, control.wanted, control.keeps) = (true, if is_first { 0.1 * h } else { h / quotient }, 0.0);
                 continue;
             }
-            let (h, event, lands) = match self.meet(field, state, h, tally) {
+            let (h, event, lands) = match self.meet(field, state, h, statistics) {
                 Met::Whole => (h, None, whole),
                 Met::Short(short) => (short, None, false),
                 Met::Event(short, event) => (short, Some(event), false),
                 Met::Failed if h > super::finest(state, field.time_unit()) => {
-                    tally.rejected += 1;
+                    statistics.rejected += 1;
                     (self.is_hard, control.wanted) = (true, h / 8.0);
                     continue;
                 }
@@ -391,7 +391,7 @@ impl<F: Field + ?Sized> Integrator<F> for Radau {
             state.time = if lands { until } else { state.time + DoubleDouble::of(h) };
             state.wrap();
             self.remember(state, &control);
-            tally.steps += 1;
+            statistics.steps += 1;
             return Ok(event);
         }
     }
@@ -433,7 +433,7 @@ mod tests {
         1.0 / (2.0 - t.sin())
     }
 
-    impl Field for Bernoulli {
+    impl OdeSystem for Bernoulli {
         fn dimension(&self) -> usize {
             1
         }
@@ -442,7 +442,7 @@ mod tests {
             0
         }
 
-        fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
+        fn rhs(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
             rate[0] = y[0] * y[0] * t.hi.cos();
         }
 
@@ -459,14 +459,14 @@ mod tests {
     /// The error after steps of `h` to t = 3, whatever its estimate says.
     fn error(stages: usize, count: u32) -> f64 {
         let mut radau = Radau::new(stages, Tolerance { relative: 1e-12, absolute: 1e-12 }).expect("a method");
-        let (h, mut tally) = (3.0 / f64::from(count), Tally::default());
+        let (h, mut statistics) = (3.0 / f64::from(count), Statistics::default());
         let mut state = State { y: vec![exact(0.0)], low: vec![0.0], ..State::default() };
         radau.resize(1);
         for step in 1..=count {
             scales(radau.tolerance, &state.y, &[1.0], &mut radau.work.scale);
-            radau.differentiate(&mut Bernoulli, Some(&state), &mut tally);
+            radau.differentiate(&mut Bernoulli, Some(&state), &mut statistics);
             // Goes on from where the iteration before gave up.
-            assert!((0..5).any(|_| radau.repeat(&mut Bernoulli, &state, h, &mut tally)), "step {step} of {count}");
+            assert!((0..5).any(|_| radau.repeat(&mut Bernoulli, &state, h, &mut statistics)), "step {step} of {count}");
             state.y.copy_from_slice(&radau.work.next);
             state.low.copy_from_slice(&radau.work.next_low);
             state.time = Time::of(f64::from(step) * h);
@@ -488,14 +488,14 @@ mod tests {
     #[test]
     fn what_has_died_away_costs_nothing() {
         struct Fast;
-        impl Field for Fast {
+        impl OdeSystem for Fast {
             fn dimension(&self) -> usize {
                 2
             }
             fn angles(&self) -> usize {
                 0
             }
-            fn rate(&mut self, _: Time, y: &[f64], rate: &mut [f64]) {
+            fn rhs(&mut self, _: Time, y: &[f64], rate: &mut [f64]) {
                 rate.copy_from_slice(&[-y[0], -1e9 * (y[1] - y[0])]);
             }
             fn jacobian(&mut self, _: Time, _: &[f64], jacobian: &mut [f64]) -> bool {
@@ -509,12 +509,12 @@ mod tests {
         for stages in [3, 5] {
             let mut radau = Radau::new(stages, Tolerance { relative: 1e-8, absolute: 1e-8 }).expect("a method");
             let mut state = State { y: vec![1.0, 3.0], low: vec![0.0; 2], ..State::default() };
-            let mut tally = Tally::default();
-            let reached = radau.advance(&mut Fast, &mut state, Time::of(2.0), &mut tally, &mut |_, _| Ok(super::super::Seen::Kept));
+            let mut statistics = Statistics::default();
+            let reached = radau.advance(&mut Fast, &mut state, Time::of(2.0), &mut statistics, &mut |_, _| Ok(super::super::Seen::Kept));
             assert_eq!(reached, Ok(crate::stepping::Reached::Until));
             let exact = (-2.0_f64).exp();
             assert!(state.y.iter().all(|y| (y - exact).abs() < 1e-7), "{:?}", state.y);
-            assert!(tally.steps < 200 && tally.evaluations < 1500, "{tally:?}");
+            assert!(statistics.steps < 200 && statistics.evaluations < 1500, "{statistics:?}");
         }
     }
 }

@@ -20,7 +20,7 @@
 //! Lubich, G. Wanner, *Geometric Numerical Integration*, 2nd ed. (2006), section VII.1.4.  p_t makes time a coordinate, so that a driven
 //! scene is one without drive. Compositions: [`composition`](super::composition).
 //!
-//! Rounding: positions, velocities, p_t and time are pairs, and the last Newton sweep forms C(z1, t1) from them.  What is left is the
+//! Rounding: positions, velocities, p_t and time are pairs, and the last Newton iteration forms C(z1, t1) from them.  What is left is the
 //! rounding of h W F, 1e-16 of a *kick*, not of the state.
 
 mod newton;
@@ -28,7 +28,7 @@ mod substep;
 
 use self::substep::{Failure, Work};
 use super::composition::Composition;
-use super::{Cause, Integrator, StepError, Tally};
+use super::{Cause, Integrator, Statistics, StepError};
 use crate::arithmetic::Scalar;
 use crate::dynamics::natural::Natural;
 use crate::dynamics::{State, Time};
@@ -116,15 +116,21 @@ impl Integrator<Natural> for Rattle {
         Ok(())
     }
 
-    fn step(&mut self, problem: &mut Natural, state: &mut State, _until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
-        tally.check(Integrator::name(self), state.time.hi, self.step)?;
+    fn step(
+        &mut self,
+        problem: &mut Natural,
+        state: &mut State,
+        _until: Time,
+        statistics: &mut Statistics,
+    ) -> Result<Option<usize>, StepError> {
+        statistics.check(Integrator::name(self), state.time.hi, self.step)?;
         if std::mem::take(&mut self.is_stale) {
             by_bodies!(problem, state, self.work.load(problem, state));
         }
-        by_bodies!(problem, state, self.substeps(problem, state, tally))?;
+        by_bodies!(problem, state, self.substeps(problem, state, statistics))?;
         state.time += Time::of(self.step);
         self.work.store(state);
-        tally.steps += 1;
+        statistics.steps += 1;
         Ok(None)
     }
 
@@ -152,13 +158,13 @@ impl Rattle {
         &mut self,
         natural: &Natural,
         state: &State,
-        tally: &mut Tally,
+        statistics: &mut Statistics,
     ) -> Result<(), StepError> {
         for (&h, &end) in self.substeps.iter().zip(&self.ends) {
             if let Err(failure) = self.work.substep::<N, GUIDED>(natural, h, state.time + end) {
                 return Err(self.explain(natural, state.time.hi, failure));
             }
-            tally.evaluations += 1;
+            statistics.evaluations += 1;
         }
         Ok(())
     }

@@ -15,7 +15,7 @@
 //! turns the unit vectors at the next start.
 //!
 //! Small mechanisms with loops are expanded in unit vectors (module `looped`) and put back onto all rows at the end of every step; near singular
-//! positions the series of any mechanism takes over (module `jump`).
+//! positions the series of any mechanism takes over (module `singular`).
 //!
 //! The series is the dense output: [`Integrator::interpolate`] sums it at any time in the step, so that steps need not end on output times.  It is
 //! the event finder, too: gaps of walls are polynomials of the step (module `search`), and the state is brought onto their first zero.
@@ -31,24 +31,24 @@ mod driven;
 mod expansion;
 mod extended;
 mod fast;
-mod jump;
 mod looped;
-mod pace;
 mod pair;
+mod singular;
 mod springs;
+mod step_size;
 mod terms;
 mod wide;
 
 pub use self::batch::Batch;
 use self::expansion::Expansion;
 use self::fast::Fast;
-use self::jump::Leap;
+use self::singular::SingularPassage;
 use super::search::{self, Crossing, Powers};
-use super::{Cause, Integrator, StepError, Tally, Tolerance};
+use super::{Cause, Integrator, Statistics, StepError, Tolerance};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics;
 use crate::dynamics::series::Coefficient;
-use crate::dynamics::{Coordinates, Field, Form, Mechanism, State, Time};
+use crate::dynamics::{Coordinates, Form, Mechanism, OdeSystem, State, Time};
 
 /// Powers the step is taken from.
 const JUDGES: usize = 5;
@@ -87,8 +87,8 @@ pub struct Taylor<T> {
     expansion: Option<Expansion<T>>,
     /// True where the last step was made by the expansion.
     by_series: bool,
-    /// What leaps through singular positions are looked for with.
-    leap: Option<Leap<T>>,
+    /// What passages through singular positions are looked for with.
+    singular_passage: Option<SingularPassage<T>>,
     powers: Vec<f64>,
     gaps: Vec<f64>,
     inside: State,
@@ -106,7 +106,7 @@ impl<T: Coefficient> Taylor<T> {
             fast: None,
             expansion: None,
             by_series: true,
-            leap: None,
+            singular_passage: None,
             powers: Vec::new(),
             gaps: Vec::new(),
             inside: State::default(),
@@ -139,7 +139,7 @@ impl Taylor<DoubleDouble> {
     }
 }
 
-impl<T: Coefficient, P: Field + Form + ?Sized> Integrator<P> for Taylor<T> {
+impl<T: Coefficient, P: OdeSystem + Form + ?Sized> Integrator<P> for Taylor<T> {
     fn name(&self) -> &'static str {
         "taylor"
     }
@@ -155,10 +155,10 @@ impl<T: Coefficient, P: Field + Form + ?Sized> Integrator<P> for Taylor<T> {
         Ok(())
     }
 
-    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
+    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError> {
         let left = until - state.time;
-        tally.check("taylor", state.time.hi, 0.0)?;
-        tally.evaluations += 1;
+        statistics.check("taylor", state.time.hi, 0.0)?;
+        statistics.evaluations += 1;
         let quick = self.fast.as_mut().and_then(|fast| fast.step(state, left.hi));
         self.by_series = quick.is_none();
         let (wanted, mut h) = quick.unwrap_or_else(|| self.expand(problem, state, left.hi));
@@ -168,9 +168,9 @@ impl<T: Coefficient, P: Field + Form + ?Sized> Integrator<P> for Taylor<T> {
             return Err(stop(Cause::NotFinite, state, 0.0, format!("the series of {lost} is not finite"), hint));
         }
         if wanted < super::finest(state, problem.time_unit()) {
-            if self.by_series && self.expansion.as_ref().is_some_and(|expansion| jump::is_near(problem, expansion)) {
+            if self.by_series && self.expansion.as_ref().is_some_and(|expansion| singular::is_near(problem, expansion)) {
                 let what = "the constraints are dependent here, and no way through the singular position is confirmed".into();
-                return Err(stop(Cause::BranchLost, state, wanted, what, jump::HINT));
+                return Err(stop(Cause::BranchLost, state, wanted, what, singular::HINT));
             }
             return Err(stop(Cause::StepTooSmall, state, wanted, "the series converges in ever smaller circles".into(), hint));
         }
@@ -185,7 +185,7 @@ impl<T: Coefficient, P: Field + Form + ?Sized> Integrator<P> for Taylor<T> {
         }
         state.time = if h == left.hi { until } else { state.time + h };
         state.wrap();
-        tally.steps += 1;
+        statistics.steps += 1;
         Ok(event)
     }
 
@@ -212,7 +212,7 @@ fn stop(cause: Cause, state: &State, step: f64, what: String, hint: &str) -> Ste
 
 impl<T: Coefficient> Taylor<T> {
     /// Keeps the code at hand that fits, makes it, or leaves it to the series.
-    fn choose<P: Field + Form + ?Sized>(&mut self, problem: &P, state: &State) -> Result<(), StepError> {
+    fn choose<P: OdeSystem + Form + ?Sized>(&mut self, problem: &P, state: &State) -> Result<(), StepError> {
         let (mechanism, coordinates) = (problem.mechanism(), problem.coordinates());
         if coordinates == Coordinates::Other {
             let hint = "integrate the mechanism in angles and rates, by multipliers or with the motors eliminated";
@@ -222,8 +222,8 @@ impl<T: Coefficient> Taylor<T> {
         let (tolerance, order, extended) = (self.tolerance, self.order, self.extended);
         let is_plain = T::IS_PLAIN && self.kernel != Kernel::Series;
         // The lanes know neither walls nor rows that are not eliminated.
-        let is_simple = mechanism.contacts.is_empty() && (mechanism.rows.is_empty() || coordinates == Coordinates::Independent);
-        let is_looped = mechanism.is_tied_up() && coordinates == Coordinates::All && !extended;
+        let is_simple = mechanism.contacts.is_empty() && (mechanism.constraints.is_empty() || coordinates == Coordinates::Independent);
+        let is_looped = mechanism.has_closed_loops() && coordinates == Coordinates::All && !extended;
         if !is_plain || !(is_simple || is_looped) {
             self.fast = None;
         } else if !self.fast.as_ref().is_some_and(|fast| fast.is_for(mechanism, tolerance, order, is_portable, extended)) {
@@ -242,34 +242,35 @@ impl<T: Coefficient> Taylor<T> {
             self.expansion = None;
         } else if !self.expansion.as_ref().is_some_and(|expansion| expansion.is_for(mechanism, coordinates, order, extended)) {
             self.expansion = Some(Expansion::new(mechanism, coordinates, order, extended));
-            self.leap = None;
+            self.singular_passage = None;
         }
         Ok(())
     }
 
     /// Expands the motion by the series of any mechanism: the step wanted, and of it what `left` \[s\] leave.
-    fn expand<P: Field + Form + ?Sized>(&mut self, problem: &P, state: &State, left: f64) -> (f64, f64) {
+    fn expand<P: OdeSystem + Form + ?Sized>(&mut self, problem: &P, state: &State, left: f64) -> (f64, f64) {
         let Some(expansion) = &mut self.expansion else { return (f64::NAN, 0.0) };
         expansion.expand(problem.mechanism(), state);
         // What a wall sees of the motion are the unit vectors.
         let mut wanted = expansion.wanted(self.tolerance, problem.events() > 0);
-        if !problem.mechanism().rows.is_empty() && jump::is_near(problem, expansion) {
-            let leap = self.leap.get_or_insert_with(|| Leap::new(problem.mechanism(), problem.coordinates(), expansion));
-            if let Some(through) = leap.length(problem, expansion, state, wanted) {
+        if !problem.mechanism().constraints.is_empty() && singular::is_near(problem, expansion) {
+            let singular_passage =
+                self.singular_passage.get_or_insert_with(|| SingularPassage::new(problem.mechanism(), problem.coordinates(), expansion));
+            if let Some(through) = singular_passage.length(problem, expansion, state, wanted) {
                 let whole = through.min(left);
                 expansion.sum_to_smallest(whole);
-                if leap.is_confirmed(problem, expansion, state, whole, self.tolerance) {
+                if singular_passage.is_confirmed(problem, expansion, state, whole, self.tolerance) {
                     wanted = through;
                 } else {
                     expansion.sum_all();
                 }
             }
         }
-        (wanted, if wanted.is_nan() { 0.0 } else { pace::taken(wanted, left) })
+        (wanted, if wanted.is_nan() { 0.0 } else { step_size::taken(wanted, left) })
     }
 
     /// Of the step `h` \[s\] what comes before its first event, and which event that is.
-    fn meet<P: Field + Form + ?Sized>(&mut self, problem: &mut P, state: &State, h: f64) -> Result<(f64, Option<usize>), StepError> {
+    fn meet<P: OdeSystem + Form + ?Sized>(&mut self, problem: &mut P, state: &State, h: f64) -> Result<(f64, Option<usize>), StepError> {
         let Self { expansion: Some(expansion), powers, .. } = self else { return Ok((h, None)) };
         let (mut first, mut event) = (h, None);
         for contact in 0..problem.events() {
@@ -290,7 +291,7 @@ impl<T: Coefficient> Taylor<T> {
     }
 
     /// The moment of an event near `t` \[s\], at which the event function of the *state* is zero to rounding.
-    fn land<P: Field + Form + ?Sized>(&mut self, problem: &mut P, state: &State, event: usize, t: f64, h: f64) -> f64 {
+    fn land<P: OdeSystem + Form + ?Sized>(&mut self, problem: &mut P, state: &State, event: usize, t: f64, h: f64) -> f64 {
         let Self { expansion: Some(expansion), powers, gaps, inside, .. } = self else { return t };
         trace(problem, expansion, event, powers);
         gaps.resize(problem.events(), 0.0);

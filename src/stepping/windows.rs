@@ -14,9 +14,9 @@
 //!
 //! The step the crate found is passed on to the next window through the state's memory.
 
-use super::{Cause, Integrator, StepError, Tally, Tolerance};
+use super::{Cause, Integrator, Statistics, StepError, Tolerance};
 use crate::arithmetic::{DoubleDouble, Scalar};
-use crate::dynamics::{Field, State, Time};
+use crate::dynamics::{OdeSystem, State, Time};
 use nalgebra::{DVector, SVector};
 use ode_solvers::dop_shared::{IntegrationError, OutputType, Stats, System};
 use std::cell::RefCell;
@@ -69,11 +69,11 @@ struct Window<'a, F: ?Sized> {
     rows: usize,
 }
 
-impl<F: Field + ?Sized> Window<'_, F> {
+impl<F: OdeSystem + ?Sized> Window<'_, F> {
     fn rate(&self, y: &[f64], rate: &mut [f64]) {
         let mut unknowns = self.y.borrow_mut();
         unknowns.iter_mut().zip(y).zip(self.unit).for_each(|((unknown, y), unit)| *unknown = y * unit);
-        self.field.borrow_mut().rate(self.start + DoubleDouble::of(y[self.n] * self.time_unit), &unknowns, &mut rate[..self.n]);
+        self.field.borrow_mut().rhs(self.start + DoubleDouble::of(y[self.n] * self.time_unit), &unknowns, &mut rate[..self.n]);
         rate.iter_mut().zip(self.unit).for_each(|(rate, unit)| *rate = *rate * self.time_unit / unit);
         rate[self.n] = 1.0;
     }
@@ -85,7 +85,7 @@ impl<F: Field + ?Sized> Window<'_, F> {
     }
 }
 
-impl<F: Field + ?Sized, const D: usize> System<f64, SVector<f64, D>> for Window<'_, F> {
+impl<F: OdeSystem + ?Sized, const D: usize> System<f64, SVector<f64, D>> for Window<'_, F> {
     fn system(&self, _: f64, y: &SVector<f64, D>, rate: &mut SVector<f64, D>) {
         self.rate(y.as_slice(), rate.as_mut_slice());
     }
@@ -95,7 +95,7 @@ impl<F: Field + ?Sized, const D: usize> System<f64, SVector<f64, D>> for Window<
     }
 }
 
-impl<F: Field + ?Sized> System<f64, DVector<f64>> for Window<'_, F> {
+impl<F: OdeSystem + ?Sized> System<f64, DVector<f64>> for Window<'_, F> {
     fn system(&self, _: f64, y: &DVector<f64>, rate: &mut DVector<f64>) {
         self.rate(y.as_slice(), rate.as_mut_slice());
     }
@@ -227,7 +227,7 @@ impl Rows {
 }
 
 /// Takes up a state in the middle of a window, or at the beginning of one.
-fn begin<F: Field + ?Sized>(
+fn begin<F: OdeSystem + ?Sized>(
     rows: &mut Rows,
     stepper: &Stepper,
     integrate: &mut Integrate<F>,
@@ -239,7 +239,7 @@ fn begin<F: Field + ?Sized>(
     if let Some((start, row)) = Rows::recall(state, until) {
         let is_known = rows.start == start && rows.has_more(until);
         if !is_known {
-            part(rows, stepper, integrate, field, &start, until, &mut Tally::default())?;
+            part(rows, stepper, integrate, field, &start, until, &mut Statistics::default())?;
         }
         if row < rows.after.len() {
             let mut there = state.clone();
@@ -255,42 +255,42 @@ fn begin<F: Field + ?Sized>(
 }
 
 /// The next step of a window, or the first of a new one.
-fn step<F: Field + ?Sized>(
+fn step<F: OdeSystem + ?Sized>(
     rows: &mut Rows,
     stepper: &Stepper,
     integrate: &mut Integrate<F>,
     field: &mut F,
     state: &mut State,
     until: Time,
-    tally: &mut Tally,
+    statistics: &mut Statistics,
 ) -> Result<Option<usize>, StepError> {
     if !rows.has_more(until) {
         rows.clear();
-        part(rows, stepper, integrate, field, state, until, tally)?;
+        part(rows, stepper, integrate, field, state, until, statistics)?;
     }
     rows.last += 1;
     rows.hand_out(state);
-    tally.steps += 1;
+    statistics.steps += 1;
     Ok(None)
 }
 
 /// One call of the crate: to `until`, or to where its rows are as many as may be kept.
-fn part<F: Field + ?Sized>(
+fn part<F: OdeSystem + ?Sized>(
     kept: &mut Rows,
     stepper: &Stepper,
     integrate: &mut Integrate<F>,
     field: &mut F,
     state: &State,
     until: Time,
-    tally: &mut Tally,
+    statistics: &mut Statistics,
 ) -> Result<(), StepError> {
     let (n, name) = (state.y.len(), stepper.name);
     let span = (until - state.time).hi;
-    tally.check(name, state.time.hi, state.memory.first().copied().unwrap_or(0.0))?;
+    statistics.check(name, state.time.hi, state.memory.first().copied().unwrap_or(0.0))?;
     let stop = |cause, t: f64, step, what: String, hint: &str| StepError { cause, method: name.into(), t, step, what, hint: hint.into() };
     let mut rate = vec![0.0; n];
-    field.rate(state.time, &state.y, &mut rate);
-    tally.evaluations += 1;
+    field.rhs(state.time, &state.y, &mut rate);
+    statistics.evaluations += 1;
     if let Some(i) = rate.iter().position(|rate| !rate.is_finite()) {
         let hint = "look for a spring of length zero or a position without inertia";
         return Err(stop(Cause::NotFinite, state.time.hi, 0.0, format!("the rate of {} is not finite", field.label(i)), hint));
@@ -300,7 +300,7 @@ fn part<F: Field + ?Sized>(
     let mut y: Vec<f64> = state.y.iter().zip(&unit).map(|(y, unit)| y / unit).collect();
     y.push(0.0);
     let first = state.memory.first().map_or(0.0, |&h| h.min(span)) / time_unit;
-    let most = tally.effort.saturating_sub(tally.evaluations).div_ceil(stepper.attempt).min(u64::from(u32::MAX)) as u32;
+    let most = statistics.max_evaluations.saturating_sub(statistics.evaluations).div_ceil(stepper.attempt).min(u64::from(u32::MAX)) as u32;
     let most_rows = (MOST_KEPT / (n + 2)).max(LEAST_KEPT);
     let (times, rows, outcome) = {
         let room = RefCell::new(vec![0.0; n]);
@@ -310,14 +310,14 @@ fn part<F: Field + ?Sized>(
     let reached_time = |x: f64| state.time.hi + x * time_unit;
     match outcome {
         Ok(stats) => {
-            tally.evaluations += u64::from(stats.num_eval);
+            statistics.evaluations += u64::from(stats.num_eval);
             let begun = if first == 0.0 { 3 } else { 1 };
             let attempts = (u64::from(stats.num_eval) - begun - stepper.accepted * u64::from(stats.accepted_steps)) / stepper.attempt;
-            tally.rejected += attempts - u64::from(stats.accepted_steps);
+            statistics.rejected += attempts - u64::from(stats.accepted_steps);
         }
         Err(IntegrationError::MaxNumStepReached { x, .. }) => {
-            tally.evaluations = tally.effort;
-            return Err(tally.exhausted(name, reached_time(x), 0.0));
+            statistics.evaluations = statistics.max_evaluations;
+            return Err(statistics.exhausted(name, reached_time(x), 0.0));
         }
         Err(IntegrationError::StepSizeUnderflow { x } | IntegrationError::StiffnessDetected { x }) => {
             let what = "the step fell below the resolution of time, or a rate became not finite".into();
@@ -349,7 +349,7 @@ fn part<F: Field + ?Sized>(
 }
 
 /// The state at `time` \[s\], by a step of its own from the row before it; where that fails, that row.
-fn shorter<F: Field + ?Sized>(
+fn shorter<F: OdeSystem + ?Sized>(
     stepper: &Stepper,
     integrate: &mut Integrate<F>,
     field: &mut F,
@@ -361,7 +361,7 @@ fn shorter<F: Field + ?Sized>(
     inside.memory.clear();
     inside.memory.push((time - from.time).hi);
     let mut rows = Rows::default();
-    if part(&mut rows, stepper, integrate, field, inside, time, &mut Tally::default()).is_ok() {
+    if part(&mut rows, stepper, integrate, field, inside, time, &mut Statistics::default()).is_ok() {
         rows.last = rows.after.len() - 1;
         rows.hand_out(inside);
     }
@@ -371,7 +371,7 @@ impl Dopri5 {
     const STEPPER: Stepper = Stepper { name: "dopri5", attempt: 6, accepted: 0 };
 
     /// The crate's method as it is called.
-    fn call<F: Field + ?Sized>(&self) -> impl FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome + use<F> {
+    fn call<F: OdeSystem + ?Sized>(&self) -> impl FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome + use<F> {
         let tolerance = self.tolerance;
         move |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| -> Outcome {
             let settings = (tolerance, (0.04, 0.2, 10.0), first, most);
@@ -380,7 +380,7 @@ impl Dopri5 {
     }
 }
 
-impl<F: Field + ?Sized> Integrator<F> for Dopri5 {
+impl<F: OdeSystem + ?Sized> Integrator<F> for Dopri5 {
     fn name(&self) -> &'static str {
         "dopri5"
     }
@@ -394,9 +394,9 @@ impl<F: Field + ?Sized> Integrator<F> for Dopri5 {
         begin(&mut self.rows, &Self::STEPPER, &mut integrate, field, state, until)
     }
 
-    fn step(&mut self, field: &mut F, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
+    fn step(&mut self, field: &mut F, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError> {
         let mut integrate = self.call();
-        step(&mut self.rows, &Self::STEPPER, &mut integrate, field, state, until, tally)
+        step(&mut self.rows, &Self::STEPPER, &mut integrate, field, state, until, statistics)
     }
 
     fn changed(&mut self, state: &mut State) {
@@ -420,7 +420,7 @@ impl Dop853 {
     const STEPPER: Stepper = Stepper { name: "dop853", attempt: 11, accepted: 1 };
 
     /// The crate's method as it is called.
-    fn call<F: Field + ?Sized>(&self) -> impl FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome + use<F> {
+    fn call<F: OdeSystem + ?Sized>(&self) -> impl FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome + use<F> {
         let tolerance = self.tolerance;
         move |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| -> Outcome {
             let settings = (tolerance, (0.0, 1.0 / 3.0, 6.0), first, most);
@@ -429,7 +429,7 @@ impl Dop853 {
     }
 }
 
-impl<F: Field + ?Sized> Integrator<F> for Dop853 {
+impl<F: OdeSystem + ?Sized> Integrator<F> for Dop853 {
     fn name(&self) -> &'static str {
         "dop853"
     }
@@ -443,9 +443,9 @@ impl<F: Field + ?Sized> Integrator<F> for Dop853 {
         begin(&mut self.rows, &Self::STEPPER, &mut integrate, field, state, until)
     }
 
-    fn step(&mut self, field: &mut F, state: &mut State, until: Time, tally: &mut Tally) -> Result<Option<usize>, StepError> {
+    fn step(&mut self, field: &mut F, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError> {
         let mut integrate = self.call();
-        step(&mut self.rows, &Self::STEPPER, &mut integrate, field, state, until, tally)
+        step(&mut self.rows, &Self::STEPPER, &mut integrate, field, state, until, statistics)
     }
 
     fn changed(&mut self, state: &mut State) {

@@ -15,7 +15,7 @@ const METHODS_A_SCENE: usize = 5;
 /// Evaluations of the auditor's after which a scene is left alone.
 const MOST_EVALUATIONS: u64 = 150_000;
 /// Evaluations a run may take.
-const EFFORT: u64 = 300_000;
+const MAX_EVALUATIONS: u64 = 300_000;
 
 /// One comparison.
 pub struct Pair {
@@ -89,7 +89,7 @@ fn scene_pairs(made: &Generated) -> Vec<Pair> {
 
 /// A method with a random tolerance, and at times a stabilization.
 fn request(method: MethodId, dice: &mut Dice) -> Request {
-    let mut request = Request { method: Some(method), effort: Some(EFFORT), ..Request::default() };
+    let mut request = Request { method: Some(method), max_evaluations: Some(MAX_EVALUATIONS), ..Request::default() };
     if method.is_adaptive() && dice.chance(0.7) {
         request.rtol = Some(dice.one(&[1e-5, 1e-6, 1e-7, 1e-8, 1e-10, 1e-11, 1e-12]));
     }

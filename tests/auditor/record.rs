@@ -4,7 +4,7 @@ use super::double_double::Dd;
 use super::model::{Model, State};
 use super::motion::Lost;
 use super::start::{Start, project};
-use super::walls::{Course, Impact, Stay};
+use super::walls::{ContactDriver, Impact, Stay};
 
 /// One output time.
 #[derive(Clone, Debug)]
@@ -68,13 +68,13 @@ impl Record {
     /// The motion from a start at the times k·every and at the end.
     pub fn new(start: Start, times: &[f64], most_evaluations: u64) -> Result<Self, Lost> {
         let Start { model, state, .. } = start;
-        let (looks, course) = march(&model, state.clone(), times, most_evaluations)?;
-        let scales = Scales::of(&model, &looks, &course.impacts);
-        let (impacts, stays, doubt) = (course.impacts, course.stays, course.doubt);
-        let mut evaluations = course.integrator.evaluations;
+        let (looks, contact_driver) = march(&model, state.clone(), times, most_evaluations)?;
+        let scales = Scales::of(&model, &looks, &contact_driver.impacts);
+        let (impacts, stays, doubt) = (contact_driver.impacts, contact_driver.stays, contact_driver.doubt);
+        let mut evaluations = contact_driver.integrator.evaluations;
         let (growth, response) = match march(&model, changed(&model, &state, scales)?, times, most_evaluations) {
-            Ok((other, course)) => {
-                evaluations += course.integrator.evaluations;
+            Ok((other, contact_driver)) => {
+                evaluations += contact_driver.integrator.evaluations;
                 (growth(&looks, &other, scales), Response::of(&model, &looks, &other, scales))
             }
             // A neighbour that cannot be followed tells that this one is on an edge.
@@ -84,30 +84,30 @@ impl Record {
     }
 }
 
-fn march<'a>(model: &'a Model, state: State, times: &[f64], most: u64) -> Result<(Vec<Look>, Course<'a>), Lost> {
-    let mut course = Course::new(model, state, most)?;
-    let mut looks = vec![look(&course)];
+fn march<'a>(model: &'a Model, state: State, times: &[f64], most: u64) -> Result<(Vec<Look>, ContactDriver<'a>), Lost> {
+    let mut contact_driver = ContactDriver::new(model, state, most)?;
+    let mut looks = vec![look(&contact_driver)];
     for &t in times.iter().filter(|&&t| t > 0.0) {
-        course.go(Dd::from(t))?;
-        looks.push(look(&course));
+        contact_driver.go(Dd::from(t))?;
+        looks.push(look(&contact_driver));
     }
-    if course.integrator.least_pivot < 1e-18 {
+    if contact_driver.integrator.least_pivot < 1e-18 {
         return Err(Lost("a singular position".into()));
     }
-    Ok((looks, course))
+    Ok((looks, contact_driver))
 }
 
-fn look(course: &Course) -> Look {
-    let model = course.integrator.model;
-    let found = model.accelerations(&course.state, &course.held);
+fn look(contact_driver: &ContactDriver) -> Look {
+    let model = contact_driver.integrator.model;
+    let found = model.accelerations(&contact_driver.state, &contact_driver.held);
     Look {
         acceleration: found.solution.x,
         multipliers: found.solution.multipliers,
         is_open: found.solution.is_open,
         motor_power: found.motor_power,
-        energy: model.energy(&course.state),
-        is_held: !course.held.is_empty(),
-        state: course.state.clone(),
+        energy: model.energy(&contact_driver.state),
+        is_held: !contact_driver.held.is_empty(),
+        state: contact_driver.state.clone(),
     }
 }
 

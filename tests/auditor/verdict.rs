@@ -231,7 +231,7 @@ impl Judge<'_> {
                 }
             }
         }
-        for (r, row) in ran.mechanism.rows.iter().enumerate() {
+        for (r, row) in ran.mechanism.constraints.iter().enumerate() {
             let own = record.model.scene.joints.iter().position(|own| own.name == row.name() && !matches!(own.kind, "hinge"));
             let Some((place, joint)) = own.map(|place| (place, &record.model.scene.joints[place])) else { continue };
             if look.is_open[place] || (joint.kind == "weld" && !joint.is_angle()) {
@@ -268,20 +268,20 @@ impl Judge<'_> {
 
     /// True of an impact of the run at the wall of one of the auditor's.
     fn is_same_wall(&self, own: usize, strike: usize) -> bool {
-        let (record, strikes) = (self.record, &self.ran.outcome.strikes);
+        let (record, strikes) = (self.record, &self.ran.outcome.impacts);
         strikes[strike].wall == record.model.scene.walls[record.impacts[own].wall].name
     }
 
     /// The run's impact for each of the auditor's: the first at a wall for the first there.
     fn by_order(&self) -> Vec<Option<usize>> {
-        let (impacts, strikes) = (&self.record.impacts, &self.ran.outcome.strikes);
+        let (impacts, strikes) = (&self.record.impacts, &self.ran.outcome.impacts);
         let place = |own: usize| (0..own).filter(|&other| impacts[other].wall == impacts[own].wall).count();
         (0..impacts.len()).map(|own| (0..strikes.len()).filter(|&strike| self.is_same_wall(own, strike)).nth(place(own))).collect()
     }
 
     /// The same with the nearest in time, hard impacts first.
     fn by_time(&self) -> Vec<Option<usize>> {
-        let (impacts, strikes) = (&self.record.impacts, &self.ran.outcome.strikes);
+        let (impacts, strikes) = (&self.record.impacts, &self.ran.outcome.impacts);
         let (mut is_taken, mut partners) = (vec![false; strikes.len()], vec![None; impacts.len()]);
         let (hard, soft): (Vec<usize>, Vec<usize>) = (0..impacts.len()).partition(|&own| -impacts[own].approach > self.least_approach());
         for own in hard.into_iter().chain(soft) {
@@ -309,7 +309,7 @@ impl Judge<'_> {
                 continue;
             }
             let wall = &record.model.scene.walls[own.wall].name;
-            let Some(strike) = partner.map(|strike| &ran.outcome.strikes[strike]) else {
+            let Some(strike) = partner.map(|strike| &ran.outcome.impacts[strike]) else {
                 self.number(|| format!("impact at {wall}"), own.t, f64::NAN, own.t, 1.0);
                 continue;
             };
@@ -319,7 +319,7 @@ impl Judge<'_> {
             self.response(|| format!("approach at {wall}"), own.t, [strike.approach, own.approach], speed, response);
             self.response(|| format!("energy lost at {wall}"), own.t, [strike.energy_lost, own.energy_lost], scales.energy, response);
         }
-        for (i, strike) in ran.outcome.strikes.iter().enumerate() {
+        for (i, strike) in ran.outcome.impacts.iter().enumerate() {
             if !partners.contains(&Some(i)) && -strike.approach > 2.0 * least && is_due(strike.t, strike.approach, self.allowed) {
                 self.number(|| format!("impact at {} that is none", strike.wall), strike.t, strike.t, f64::NAN, 1.0);
             }

@@ -46,7 +46,7 @@ pub struct Stay {
 }
 
 /// A motion on its way through impacts.
-pub struct Course<'a> {
+pub struct ContactDriver<'a> {
     pub integrator: Integrator<'a>,
     pub state: State,
     pub held: Vec<usize>,
@@ -60,13 +60,13 @@ pub struct Course<'a> {
 }
 
 enum Event {
-    Strike(usize),
+    ImpactRecord(usize),
     Release(usize),
 }
 
-impl<'a> Course<'a> {
+impl<'a> ContactDriver<'a> {
     pub fn new(model: &'a Model, state: State, most_evaluations: u64) -> Result<Self, Lost> {
-        let mut course = Self {
+        let mut contact_driver = Self {
             integrator: Integrator::new(model, most_evaluations),
             state,
             held: Vec::new(),
@@ -77,13 +77,13 @@ impl<'a> Course<'a> {
             span: f64::INFINITY,
         };
         for wall in 0..model.scene.walls.len() {
-            let gap = model.gap(wall, &course.state);
+            let gap = model.gap(wall, &contact_driver.state);
             if gap.off.hi < -1e-12 * model.scene.size {
                 return Err(Lost(format!("{} starts behind its wall", model.scene.walls[wall].name)));
             }
         }
-        course.meet(None)?;
-        Ok(course)
+        contact_driver.meet(None)?;
+        Ok(contact_driver)
     }
 
     fn model(&self) -> &'a Model {
@@ -114,7 +114,7 @@ impl<'a> Course<'a> {
                     }
                     self.state = at;
                     match event {
-                        Event::Strike(_) => self.meet(None)?,
+                        Event::ImpactRecord(_) => self.meet(None)?,
                         Event::Release(wall) => self.meet(Some(wall))?,
                     }
                 }
@@ -147,7 +147,7 @@ impl<'a> Course<'a> {
         for wall in 0..self.model().scene.walls.len() {
             let found = match self.held.iter().position(|&held| held == wall) {
                 Some(place) => self.release(&arc, place).map(|s| (s, Event::Release(wall))),
-                None => self.crossing(&arc, wall).map(|s| (s, Event::Strike(wall))),
+                None => self.crossing(&arc, wall).map(|s| (s, Event::ImpactRecord(wall))),
             };
             if let Some((s, event)) = found
                 && first.as_ref().is_none_or(|(earliest, _)| s < *earliest)
@@ -158,7 +158,7 @@ impl<'a> Course<'a> {
         let Some((s, event)) = first else { return Ok(None) };
         let mut t = before.t + step.scale(s);
         let mut at = self.integrator.reach(before, t, &held)?;
-        if let Event::Strike(wall) = event {
+        if let Event::ImpactRecord(wall) = event {
             // Newton's method on the motion itself, from where the polynomial says.
             for _ in 0..12 {
                 let gap = self.model().gap(wall, &at);
@@ -270,12 +270,12 @@ impl<'a> Course<'a> {
             if striking.len() > 1 || round > 0 {
                 self.doubts("two points strike at once".into());
             }
-            self.strike(wall)?;
+            self.impact_at(wall)?;
         }
         self.settle(&touching, released)
     }
 
-    fn strike(&mut self, wall: usize) -> Result<(), Lost> {
+    fn impact_at(&mut self, wall: usize) -> Result<(), Lost> {
         let model = self.model();
         let gap = model.gap(wall, &self.state);
         if -gap.rate.hi * model.scene.until < GRAZE * model.scene.size {

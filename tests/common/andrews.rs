@@ -29,9 +29,9 @@ pub fn error(end: &Motion) -> f64 {
 pub fn violation(mechanism: &Mechanism, kernel: &mut Kernel<f64>, motion: &Motion) -> f64 {
     let plain = |numbers: &[driftless::arithmetic::DoubleDouble]| numbers.iter().map(|x| x.hi).collect::<Vec<f64>>();
     let (phi, omega) = (plain(&motion.phi), plain(&motion.omega));
-    kernel.face::<0>(mechanism, &phi);
+    kernel.unit_vectors::<0>(mechanism, &phi);
     kernel.rows_at(mechanism, motion.time, &phi, &omega);
     let fastest = omega.iter().fold(1.0, |most: f64, omega| most.max(omega.abs()));
-    (0..mechanism.rows.len())
+    (0..mechanism.constraints.len())
         .fold(0.0, |worst: f64, r| worst.max(kernel.rows[r].position.abs() / 0.1).max(kernel.row_rate(r, &omega).abs() / (0.1 * fastest)))
 }

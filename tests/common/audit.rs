@@ -129,11 +129,11 @@ impl Auditor<'_> {
 
     /// Travel of a slider along its rail, and how far it is off \[m\].
     fn on_rail(&self, slider: &Slider, sample: &Sample) -> [f64; 2] {
-        let (point, foot) = (self.at(&slider.point, sample), self.at(&slider.rail.place, sample));
+        let (point, origin_point) = (self.at(&slider.point, sample), self.at(&slider.rail.place, sample));
         let (sin, cos) = slider.rail.place.bar.map_or(0.0, |k| sample.phi[k]).sin_cos();
         let [x, y] = slider.rail.direction;
         let along = [cos * x - sin * y, sin * x + cos * y].map(|part| part / length([x, y]));
-        let span = [point[0] - foot[0], point[1] - foot[1]];
+        let span = [point[0] - origin_point[0], point[1] - origin_point[1]];
         [along[0] * span[0] + along[1] * span[1], along[0] * span[1] - along[1] * span[0]]
     }
 
@@ -183,7 +183,7 @@ pub fn audit(scene: &Scene, mechanism: &Mechanism, samples: &[Sample], outcome: 
     let size =
         places.map(|place| length(place.point)).chain(scene.bars.iter().map(|bar| bar.length.max(length(bar.centre)))).fold(0.0, f64::max);
     let auditor = Auditor { scene, size: if size > 0.0 { size } else { 1.0 } };
-    let struck = outcome.strike_count + outcome.hold_count > 0;
+    let struck = outcome.impact_count + outcome.persistent_contact_count > 0;
     let is_changed = !mechanism.assembly.changes.is_empty();
     if let Some(fault) = auditor.start(first, struck, outcome.plan.until).filter(|_| !is_changed) {
         return Err(fault);
@@ -201,10 +201,10 @@ pub fn audit(scene: &Scene, mechanism: &Mechanism, samples: &[Sample], outcome: 
         let is_off = if scene.walls.is_empty() {
             off.abs() > room || off.is_nan()
         } else {
-            !(off <= room && -off <= room + outcome.strike_loss.abs())
+            !(off <= room && -off <= room + outcome.impact_loss.abs())
         };
         // What a rod's vibration holds is no energy of the places of bodies, and what motors do in an impact is work nobody can see from outside.
-        let is_seen = mechanism.vibration.is_none() && !(outcome.strike_count > 0 && has_motors);
+        let is_seen = mechanism.vibration.is_none() && !(outcome.impact_count > 0 && has_motors);
         if is_off && terms.is_finite() && is_seen {
             return Err(format!("the energy is off by {off:e} J of {largest:e} J at t = {} s", sample.t));
         }

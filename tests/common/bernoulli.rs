@@ -1,6 +1,6 @@
 //! An equation with a closed solution: nonlinear, and dependent on time, so that a stage at a wrong time costs the order.
 
-use driftless::dynamics::{Field, Time};
+use driftless::dynamics::{OdeSystem, Time};
 
 /// y' = y² cos t, y = 1 / (2 - sin t); the event is y falling to its value at `level` \[s\].
 #[derive(Clone, Copy)]
@@ -13,14 +13,14 @@ pub fn exact(t: f64) -> f64 {
     1.0 / (2.0 - t.sin())
 }
 
-impl Field for Bernoulli {
+impl OdeSystem for Bernoulli {
     fn dimension(&self) -> usize {
         1
     }
     fn angles(&self) -> usize {
         0
     }
-    fn rate(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
+    fn rhs(&mut self, t: Time, y: &[f64], rate: &mut [f64]) {
         rate[0] = y[0] * y[0] * t.hi.cos();
     }
     fn jacobian(&mut self, t: Time, y: &[f64], jacobian: &mut [f64]) -> bool {

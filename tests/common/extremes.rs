@@ -83,7 +83,7 @@ pub struct Swept {
 ///
 /// # Panics
 /// Where points are missing, or a flip is not what the rows of the run show.
-pub fn sweep_of(text: &str, scene: &Scene, draw: &mut Draw, effort: u64) -> Swept {
+pub fn sweep_of(text: &str, scene: &Scene, draw: &mut Draw, max_evaluations: u64) -> Swept {
     let mut found = Swept::default();
     let template = Template::new(text.to_owned(), "random.json".into(), &[]);
     let bar = &scene.bars[draw.below(scene.bars.len())].name;
@@ -93,7 +93,7 @@ pub fn sweep_of(text: &str, scene: &Scene, draw: &mut Draw, effort: u64) -> Swep
         1 | 2 => Vary { name: format!("start.{bar}.omega"), from: -rate, to: rate, count: 3 },
         _ => Vary { name: "gravity[1]".into(), from: -10.0, to: 10.0, count: 2 },
     };
-    let mut request = random::request(draw, scene.until, effort);
+    let mut request = random::request(draw, scene.until, max_evaluations);
     if draw.chance(50) {
         (request.method, request.rtol, request.step, request.stabilize, request.time_constant) = (None, Some(1e-8), None, None, None);
     }

@@ -5,7 +5,7 @@ use driftless::arithmetic::DoubleDouble;
 use driftless::dynamics::{Mechanism, Motion, State};
 use driftless::run::{Limits, Outcome, Plan, Request, Run, integrate};
 use driftless::scene::{Bar, Hinge, Law, Motor, Place, Scene, Spring, Start};
-use driftless::stepping::{Integrator, Reached, Seen, Tally};
+use driftless::stepping::{Integrator, Reached, Seen, Statistics};
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
 
@@ -158,14 +158,14 @@ pub fn go<P: ?Sized>(
     state: &mut State,
     every: f64,
     rows: std::ops::RangeInclusive<u64>,
-) -> Tally {
-    let mut tally = Tally::default();
+) -> Statistics {
+    let mut statistics = Statistics::default();
     for row in rows {
         let until = DoubleDouble::product(every, row as f64);
-        let reached = method.advance(problem, state, until, &mut tally, &mut |_, _| Ok(Seen::Kept));
+        let reached = method.advance(problem, state, until, &mut statistics, &mut |_, _| Ok(Seen::Kept));
         assert_eq!(reached, Ok(Reached::Until));
     }
-    tally
+    statistics
 }
 
 /// A shipped scene's equations and its start.

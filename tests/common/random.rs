@@ -269,8 +269,8 @@ pub fn scene(draw: &mut Draw) -> String {
 }
 
 /// What is asked of a run.
-pub fn request(draw: &mut Draw, until: f64, effort: u64) -> Request {
-    let mut request = Request { effort: Some(effort), ..Request::default() };
+pub fn request(draw: &mut Draw, until: f64, max_evaluations: u64) -> Request {
+    let mut request = Request { max_evaluations: Some(max_evaluations), ..Request::default() };
     if draw.chance(75) {
         request.method = Some(draw.one(METHODS).id);
     }

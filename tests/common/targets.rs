@@ -230,8 +230,8 @@ pub fn checkpoint(bytes: &[u8]) -> u64 {
         Err(error) => return kind(&error.to_string()),
     };
     // Mostly a few steps, at times many.
-    let (effort, most) = *draw.one(&[(150, 2), (150, 2), (150, 2), (150, 2), (150, 2), (150, 2), (500, 4), (2000, 10)]);
-    snapshot.allow(effort);
+    let (max_evaluations, most) = *draw.one(&[(150, 2), (150, 2), (150, 2), (150, 2), (150, 2), (150, 2), (500, 4), (2000, 10)]);
+    snapshot.allow(max_evaluations);
     match Running::resume(Arc::clone(mechanism), &mechanism.start(scene), snapshot) {
         Err(error) => kind(&error.to_string()),
         Ok(mut running) => {
@@ -265,7 +265,7 @@ const OPTIONS: &[(&str, &str)] = &[
     ("--stabilize", "baumgarte"),
     ("--time-constant", "0.01"),
     ("--extended", ""),
-    ("--effort", "1e5"),
+    ("--max-evaluations", "1e5"),
     ("--prefer", "path"),
     ("--set", "bars[0].length=1"),
     ("--set", "walls.wall.restitution=0.5"),
@@ -401,7 +401,7 @@ pub fn command_line(bytes: &[u8]) -> u64 {
             let mut kinds = 4;
             for request in requests {
                 match Plan::new(&FREE.scene, &FREE.mechanism, &request) {
-                    Ok(plan) => assert!(plan.until > 0.0 && plan.every > 0.0 && plan.rows > 0 && plan.effort > 0, "{plan:?}"),
+                    Ok(plan) => assert!(plan.until > 0.0 && plan.every > 0.0 && plan.rows > 0 && plan.max_evaluations > 0, "{plan:?}"),
                     Err(refusal) => kinds ^= kind(&refusal.reason),
                 }
             }
@@ -428,11 +428,11 @@ pub enum Ending {
 ///
 /// # Panics
 /// Where a success does not stand up to the audit, or a report holds a number that is not finite.
-pub fn simulate(text: &str, draw: &mut Draw, effort: u64) -> Ending {
+pub fn simulate(text: &str, draw: &mut Draw, max_evaluations: u64) -> Ending {
     let Ok(scene) = parse_scene(text, "random.json", &[]) else { return Ending::Refused };
     let Ok(mechanism) = Mechanism::new(&scene) else { return Ending::Refused };
     let mechanism = Arc::new(mechanism);
-    let request = random::request(draw, scene.until, effort);
+    let request = random::request(draw, scene.until, max_evaluations);
     let Ok(plan) = Plan::new(&scene, &mechanism, &request) else { return Ending::Refused };
     let run = match Run::new(Arc::clone(&mechanism), plan, Limits::default(), &mechanism.start(&scene)) {
         Ok(run) => run,
@@ -492,9 +492,9 @@ fn all_finite(report: &Value) -> bool {
 /// A random scene and a random request, mostly with very little effort.
 pub fn physics(bytes: &[u8]) -> u64 {
     let mut draw = Draw::new(bytes);
-    let effort = *draw.one(&[80, 80, 80, 80, 80, 80, 80, 80, 80, 80, 80, 80, 300, 300, 300, 2000]);
+    let max_evaluations = *draw.one(&[80, 80, 80, 80, 80, 80, 80, 80, 80, 80, 80, 80, 300, 300, 300, 2000]);
     let text = random::scene(&mut draw);
-    match simulate(&text, &mut draw, effort) {
+    match simulate(&text, &mut draw, max_evaluations) {
         Ending::Done => 5,
         Ending::Refused => 6,
         Ending::Stopped(cause) => kind(cause),

@@ -16,10 +16,10 @@ pub(in crate::dynamics) mod svd;
 mod watch;
 
 use super::compile::CompileError;
-use super::forest::Foot;
+use super::constraint::Measure;
+use super::forest::BodyOrigin;
 use super::law::Law;
-use super::row::Measure;
-use super::ties::Ties;
+use super::partition::CoordinatePartition;
 use super::{Mechanism, Motion};
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::scene::{Given, Scene};
@@ -102,8 +102,8 @@ impl Mechanism {
     pub(super) fn assembled(mut self, scene: &Scene, kept: &[usize]) -> Result<Self, CompileError> {
         if scene.has_whole_start() {
             self.assembly = Assembly {
-                degrees_of_freedom: self.ties.count(),
-                conditioning: if self.rows.is_empty() { 1.0 } else { f64::NAN },
+                degrees_of_freedom: self.partition.count(),
+                conditioning: if self.constraints.is_empty() { 1.0 } else { f64::NAN },
                 ..Assembly::default()
             };
             return Ok(self);
@@ -114,7 +114,7 @@ impl Mechanism {
         let mut changes = problem.changes(&found.q, aims);
         let mut angles = Vec::new();
         for &row in kept {
-            if let Measure::Angle { body, base } = self.rows[row].measure.clone() {
+            if let Measure::Angle { body, base } = self.constraints[row].measure.clone() {
                 let between = found.q[body] - base.map_or(DoubleDouble::ZERO, |base| found.q[base]);
                 angles.push((row, between.hi));
             }
@@ -131,9 +131,9 @@ impl Mechanism {
         assembly.start = Some(start);
         assembly.changes = changes;
         for (row, angle) in angles {
-            self.rows[row].law = Some(Law::constant(angle));
+            self.constraints[row].law = Some(Law::constant(angle));
         }
-        self.ties = Ties::new(self.bodies.len(), self.coordinates(), &self.rows)?;
+        self.partition = CoordinatePartition::new(self.bodies.len(), self.coordinates(), &self.constraints)?;
         self.assembly = assembly;
         self.check_start(scene)?;
         Ok(self)
@@ -143,7 +143,7 @@ impl Mechanism {
     fn check_start(&self, scene: &Scene) -> Result<(), CompileError> {
         let (start, size) = (self.start(scene), self.size_of_parts());
         let mut z = vec![Complex::ZERO; self.coordinates()];
-        self.tree.face::<DoubleDouble, 0>(&start.phi, &mut z);
+        self.tree.unit_vectors::<DoubleDouble, 0>(&start.phi, &mut z);
         for spring in self.springs.iter().filter(|spring| spring.free_length > 0.0) {
             let span = spring.span.position(&z);
             if span.norm_squared().hi.sqrt() <= SAME * size {
@@ -163,7 +163,7 @@ impl Mechanism {
     pub(crate) fn size_of_parts(&self) -> f64 {
         let length = |x: &Complex<f64>| x.norm_squared().sqrt();
         let bodies = self.bodies.iter().flat_map(|body| body.ends.iter().chain([&body.centre]).map(length));
-        let levers = self.rows.iter().map(|row| if row.is_angle() { 0.0 } else { newton::lever(&row.measure, 0.0) });
+        let levers = self.constraints.iter().map(|row| if row.is_angle() { 0.0 } else { newton::lever(&row.measure, 0.0) });
         let size = bodies.chain(levers).fold(0.0, f64::max);
         if size > 0.0 { size } else { 1.0 }
     }
@@ -173,7 +173,7 @@ impl<'a> Problem<'a> {
     fn new(mechanism: &'a Mechanism, scene: &Scene, kept: &[usize], given: &dyn Fn(usize) -> Given) -> Self {
         let (size, angles) = (mechanism.size_of_parts(), mechanism.bodies.len());
         let unit = (0..mechanism.coordinates()).map(|k| if k < angles { 1.0 } else { size }).collect();
-        let lever = mechanism.rows.iter().map(|row| newton::lever(&row.measure, size)).collect();
+        let lever = mechanism.constraints.iter().map(|row| newton::lever(&row.measure, size)).collect();
         let mut aims = Vec::new();
         for (bar, start) in scene.start.iter().enumerate() {
             if given(bar).phi {
@@ -187,7 +187,7 @@ impl<'a> Problem<'a> {
             Measure::Angle { body, base } => given(*body).phi && base.is_none_or(|base| given(base).phi),
             Measure::Place(_) => true,
         };
-        let active = mechanism.rows.iter().enumerate().map(|(i, row)| !kept.contains(&i) || is_known(&row.measure)).collect();
+        let active = mechanism.constraints.iter().enumerate().map(|(i, row)| !kept.contains(&i) || is_known(&row.measure)).collect();
         Problem { mechanism, active, size, unit, lever, aims }
     }
 
@@ -213,7 +213,7 @@ impl<'a> Problem<'a> {
         let others: Vec<Found> = (1..=others).filter_map(|k| self.attempt(&self.other_guess(&guess, &missing, k), &missing).ok()).collect();
         let impossible = |(row, left): (usize, f64)| {
             // Without rows it is the places given that rounding keeps from being met.
-            let (row, unit) = self.mechanism.rows.get(row).map_or(("start", "m"), |row| (&row.name, row.unit()));
+            let (row, unit) = self.mechanism.constraints.get(row).map_or(("start", "m"), |row| (&row.name, row.unit()));
             CompileError::Impossible { row: row.into(), left, unit }
         };
         let (best, others) = match first {
@@ -313,11 +313,11 @@ impl<'a> Problem<'a> {
     fn kept(&self, aims: &[Aim], q: &[DoubleDouble], rows: &[bool]) -> Vec<bool> {
         let mut matrix = self.jacobian(q, rows);
         self.add_aims(&mut matrix, aims, q);
-        independent(&matrix, DEPENDENT).split_off(self.mechanism.rows.len())
+        independent(&matrix, DEPENDENT).split_off(self.mechanism.constraints.len())
     }
 
     fn add_aims(&self, matrix: &mut Matrix, aims: &[Aim], q: &[DoubleDouble]) {
-        let z = self.face::<f64>(q).1;
+        let z = self.unit_vectors::<f64>(q).1;
         for aim in aims {
             matrix.entries.extend(self.aim(aim, q, &z).1);
             matrix.rows += 1;
@@ -326,7 +326,7 @@ impl<'a> Problem<'a> {
 
     /// The value of every aim \[rad or m\].
     fn measured(&self, q: &[DoubleDouble]) -> impl Iterator<Item = f64> {
-        let z = self.face::<DoubleDouble>(q).1;
+        let z = self.unit_vectors::<DoubleDouble>(q).1;
         self.aims.iter().map(|aim| self.aim(aim, q, &z).0.hi).collect::<Vec<f64>>().into_iter()
     }
 
@@ -366,7 +366,7 @@ impl<'a> Problem<'a> {
             return format!("start.{}.{what}", body.name);
         }
         let x = k - (k - bodies.len()) % 2;
-        let root = hangs.iter().position(|hang| hang.foot == Foot::Free(x)).unwrap_or(0);
+        let root = hangs.iter().position(|hang| hang.origin_point == BodyOrigin::Free(x)).unwrap_or(0);
         format!("start.{}.{}", bodies[root].name, if what == "phi" { "origin" } else { "velocity" })
     }
 
@@ -382,7 +382,7 @@ impl<'a> Problem<'a> {
             return None;
         }
         let is_x = match aim.goal {
-            Goal::Coordinate(k) => self.mechanism.forest.hangs[aim.bar].foot == Foot::Free(k),
+            Goal::Coordinate(k) => self.mechanism.forest.hangs[aim.bar].origin_point == BodyOrigin::Free(k),
             Goal::Origin(axis) => axis.re == 1.0,
         };
         let quantity = if is_angle { turn.to_owned() } else { format!("{shift}.{}", if is_x { "x" } else { "y" }) };
@@ -406,7 +406,7 @@ impl<'a> Problem<'a> {
                 guess[k] = DoubleDouble::of(aim.given);
             }
         }
-        let every = vec![true; self.mechanism.rows.len()];
+        let every = vec![true; self.mechanism.constraints.len()];
         let (all, none) = (vec![true; aims.len()], vec![false; aims.len()]);
         let missing = Problem { aims: aims.clone(), ..self.clone() }.columns(&all);
         let mut ways = vec![all];
@@ -423,8 +423,8 @@ impl<'a> Problem<'a> {
             let slips = self.slips(q, &omega);
             let measured = |i: &usize| slips[*i].abs() / self.lever[*i];
             let worst = (0..slips.len()).max_by(|a, b| measured(a).total_cmp(&measured(b))).unwrap_or(0);
-            let unit = |row: &super::row::Row| if row.is_angle() { "rad/s" } else { "m/s" };
-            let (row, unit) = self.mechanism.rows.get(worst).map_or(("start", "m/s"), |row| (&row.name, unit(row)));
+            let unit = |row: &super::constraint::ConstraintEquation| if row.is_angle() { "rad/s" } else { "m/s" };
+            let (row, unit) = self.mechanism.constraints.get(worst).map_or(("start", "m/s"), |row| (&row.name, unit(row)));
             let left = slips.get(worst).map_or(0.0, |slip| slip.abs());
             return Err(CompileError::ImpossibleRates { row: row.into(), left, unit });
         }
@@ -452,7 +452,7 @@ impl<'a> Problem<'a> {
 
     /// What of the rates is not as given.
     fn rate_changes(&self, aims: &[Aim], q: &[DoubleDouble], omega: &[DoubleDouble]) -> Vec<Change> {
-        let z = self.face::<DoubleDouble>(q).1;
+        let z = self.unit_vectors::<DoubleDouble>(q).1;
         let change = |aim: &Aim| self.change(aim, self.aim_rate(aim, &z, omega).hi, ["omega", "velocity"], ["rad/s", "m/s"]);
         aims.iter().filter_map(change).collect()
     }
@@ -460,8 +460,8 @@ impl<'a> Problem<'a> {
 
 /// The aims at the origin of a bar, or at its velocity.
 fn of_origin(mechanism: &Mechanism, bar: usize, [x, y]: [f64; 2]) -> [Aim; 2] {
-    match mechanism.forest.hangs[bar].foot {
-        Foot::Free(k) => [(k, x), (k + 1, y)].map(|(k, given)| Aim { bar, goal: Goal::Coordinate(k), given }),
+    match mechanism.forest.hangs[bar].origin_point {
+        BodyOrigin::Free(k) => [(k, x), (k + 1, y)].map(|(k, given)| Aim { bar, goal: Goal::Coordinate(k), given }),
         _ => [(Complex::new(1.0, 0.0), x), (Complex::new(0.0, 1.0), y)].map(|(axis, given)| Aim { bar, goal: Goal::Origin(axis), given }),
     }
 }

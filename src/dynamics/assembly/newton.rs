@@ -10,7 +10,7 @@
 
 use super::svd::{Matrix, dot};
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
-use crate::dynamics::row::{Linearised, Measure, Posture};
+use crate::dynamics::constraint::{Linearised, Measure, Posture};
 use crate::dynamics::{Mechanism, Time};
 
 /// Singular values below this share of the largest move nothing.
@@ -62,19 +62,19 @@ impl Problem<'_> {
     }
 
     /// Elements at these coordinates.
-    pub fn face<T: Real>(&self, q: &[DoubleDouble]) -> (Vec<T>, Vec<Complex<T>>) {
+    pub fn unit_vectors<T: Real>(&self, q: &[DoubleDouble]) -> (Vec<T>, Vec<Complex<T>>) {
         let angles = self.mechanism.bodies.len();
         let phi: Vec<T> = q.iter().enumerate().map(|(k, &q)| T::split(if k < angles { q.reduced().0 } else { q }).0).collect();
         let mut z = vec![Complex::ZERO; self.coordinates()];
-        self.mechanism.tree.face::<T, 0>(&phi, &mut z);
+        self.mechanism.tree.unit_vectors::<T, 0>(&phi, &mut z);
         (phi, z)
     }
 
     /// Shows the rows at t = 0 with their gradients, one after another; returns the elements.
     fn visit<T: Real>(&self, q: &[DoubleDouble], omega: &[T], mut see: impl FnMut(usize, Linearised<T>, &[T])) -> Vec<Complex<T>> {
-        let (phi, z) = self.face::<T>(q);
+        let (phi, z) = self.unit_vectors::<T>(q);
         let mut gradient = vec![T::ZERO; self.coordinates()];
-        for (i, row) in self.mechanism.rows.iter().enumerate() {
+        for (i, row) in self.mechanism.constraints.iter().enumerate() {
             gradient.fill(T::ZERO);
             let here = row.linearise(Time::default(), Posture { phi: &phi, z: &z, omega }, &mut gradient);
             see(i, here, &gradient);
@@ -91,7 +91,7 @@ impl Problem<'_> {
     /// Every row's Jacobian in all coordinates, measured; rows that are not among `rows` come out zero.
     pub fn jacobian(&self, q: &[DoubleDouble], rows: &[bool]) -> Matrix {
         let n = self.coordinates();
-        let mut matrix = Matrix::zero(self.mechanism.rows.len(), n);
+        let mut matrix = Matrix::zero(self.mechanism.constraints.len(), n);
         self.visit::<f64>(q, &vec![0.0; n], |i, _, gradient| {
             if rows[i] {
                 self.measure(gradient, self.lever[i], matrix.row_mut(i));
@@ -267,7 +267,7 @@ impl Problem<'_> {
         let solver = matrix.solver(NOISE);
         let left = |omega: &[DoubleDouble]| {
             let mut left: Vec<f64> = self.slips(q, omega).iter().zip(&self.lever).map(|(slip, lever)| slip / lever).collect();
-            let z = self.face::<DoubleDouble>(q).1;
+            let z = self.unit_vectors::<DoubleDouble>(q).1;
             left.extend(origins().map(|aim| (self.aim_rate(aim, &z, omega) - DoubleDouble::of(aim.given)).hi / self.size));
             left
         };
@@ -291,7 +291,7 @@ impl Problem<'_> {
 
     /// C' = G w + C_t of every row \[rad/s or m/s\].
     pub fn slips(&self, q: &[DoubleDouble], omega: &[DoubleDouble]) -> Vec<f64> {
-        let mut slips = Vec::with_capacity(self.mechanism.rows.len());
+        let mut slips = Vec::with_capacity(self.mechanism.constraints.len());
         self.visit::<DoubleDouble>(q, omega, |_, here, gradient| {
             slips.push(gradient.iter().zip(omega).fold(here.drive, |sum, (&g, &w)| sum + g * w).hi);
         });
@@ -299,7 +299,7 @@ impl Problem<'_> {
     }
 }
 
-/// The largest lever of a row \[m\], feet counted with the size of the mechanism; 1 rad for an angle.
+/// The largest lever of a row \[m\], translational coordinates counted with the size of the mechanism; 1 rad for an angle.
 pub fn lever(measure: &Measure, size: f64) -> f64 {
     let Measure::Place(place) = measure else { return 1.0 };
     let length = |k: usize, g: &Complex<f64>| g.norm_squared().sqrt() * if k < place.angles { 1.0 } else { size };

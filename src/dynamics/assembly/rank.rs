@@ -13,7 +13,7 @@ const LARGEST: usize = 1 << 28;
 impl Problem<'_> {
     /// Degrees of freedom, redundant rows and singular ones.
     pub(super) fn rank(&self, q: &[DoubleDouble]) -> Assembly {
-        let rows = self.mechanism.rows.len();
+        let rows = self.mechanism.constraints.len();
         let every = vec![true; rows];
         if (rows * rows).saturating_mul(q.len()) > LARGEST {
             return Assembly { degrees_of_freedom: q.len() - rows, conditioning: f64::NAN, ..Assembly::default() };
@@ -31,7 +31,8 @@ impl Problem<'_> {
         let mut redundant = dependent.clone();
         if count(&dependent) > 0 && q.len() <= DENSE {
             // Motors may be anywhere.
-            let steady: Vec<bool> = self.mechanism.rows.iter().zip(&self.active).map(|(row, &active)| active && !row.is_motor()).collect();
+            let steady: Vec<bool> =
+                self.mechanism.constraints.iter().zip(&self.active).map(|(row, &active)| active && !row.is_motor()).collect();
             let none = vec![false; self.aims.len()];
             for k in 1..=12 {
                 // Farther and farther: close to a singular position the nearest start may be that position.
@@ -49,7 +50,7 @@ impl Problem<'_> {
         let extra = count(&dependent) - count(&redundant);
         let mut singular: Vec<usize> = (0..rows).filter(|&i| dependent[i] && !redundant[i]).collect();
         singular.drain(..singular.len().saturating_sub(extra));
-        let name = |i: usize| self.mechanism.rows[i].name.clone();
+        let name = |i: usize| self.mechanism.constraints[i].name.clone();
         Assembly {
             degrees_of_freedom: q.len() - (rows - count(&redundant)),
             singular: singular.into_iter().map(name).collect(),

@@ -32,7 +32,7 @@ impl Mechanism {
                 motion.omega[bar] = written.omega[bar];
             }
         }
-        self.put_feet(scene, &mut motion);
+        self.put_translations(scene, &mut motion);
         motion
     }
 
@@ -43,13 +43,13 @@ impl Mechanism {
             kernel.linearise_at::<0>(self, Time::default(), &motion.phi, &motion.omega);
             kernel.multiplier[0] = kernel.rows[0].position;
             kernel.solve_rows();
-            kernel.lift();
+            kernel.multiplier_accelerations();
             motion.phi.iter_mut().zip(&kernel.load).for_each(|(q, &change)| *q -= change);
         }
         kernel.linearise_at::<0>(self, Time::default(), &motion.phi, &motion.omega);
         kernel.multiplier[0] = kernel.row_rate(0, &motion.omega);
         kernel.solve_rows();
-        kernel.lift();
+        kernel.multiplier_accelerations();
         motion.omega.iter_mut().zip(&kernel.load).for_each(|(rate, &change)| *rate -= change);
         let of = |bar: usize| given(scene, bar);
         let problem = Problem::new(self, scene, &[], &of);

@@ -31,7 +31,7 @@ impl Mechanism {
         }
         let Some(jacobian) = self.measured(kernel) else { return };
         let size = self.size_of_parts();
-        let unit: Vec<f64> = self.rows.iter().map(|row| if row.is_angle() { 1.0 } else { size }).collect();
+        let unit: Vec<f64> = self.constraints.iter().map(|row| if row.is_angle() { 1.0 } else { size }).collect();
         let measured: Vec<f64> = kernel.multiplier.iter().zip(&unit).map(|(multiplier, unit)| multiplier * unit).collect();
         let least = jacobian.svd().in_range(&measured, ZERO);
         for (multiplier, (least, unit)) in kernel.multiplier.iter_mut().zip(least.iter().zip(&unit)) {
@@ -41,13 +41,13 @@ impl Mechanism {
 
     /// The rows' Jacobian in rad and sizes of the mechanism.
     fn measured(&self, kernel: &Kernel<f64>) -> Option<Matrix> {
-        let (r, n) = (self.rows.len(), self.coordinates());
+        let (r, n) = (self.constraints.len(), self.coordinates());
         if r == 0 || r > MOST || kernel.jacobian.len() != r * n {
             return None;
         }
         let (size, angles) = (self.size_of_parts(), self.bodies.len());
         let mut measured = Matrix::zero(r, n);
-        for (i, row) in self.rows.iter().enumerate() {
+        for (i, row) in self.constraints.iter().enumerate() {
             let unit = if row.is_angle() { 1.0 } else { 1.0 / size };
             for (k, (entry, g)) in measured.row_mut(i).iter_mut().zip(&kernel.jacobian[i * n..]).enumerate() {
                 *entry = g * unit * if k < angles { 1.0 } else { size };
@@ -70,13 +70,13 @@ mod tests {
             name,
             between: [Place { bar: a.0, point: [a.1, 0.0] }, Place { bar: Some(b.0), point: [b.1, 0.0] }],
         };
-        let feet = (0..3).map(|i| hinge(format!("A{i}"), (None, i as f64), (i, 0.0)));
+        let translations = (0..3).map(|i| hinge(format!("A{i}"), (None, i as f64), (i, 0.0)));
         let tops = (0..3).map(|i| hinge(format!("B{i}"), (Some(3), i as f64), (i, 1.0)));
         let scene = Scene {
             name: "three_cranks".into(),
             gravity: [9.81, 0.0],
             bars: vec![bar("left", 1.0), bar("middle", 1.0), bar("right", 1.0), bar("coupler", 2.0)],
-            hinges: feet.chain(tops).collect(),
+            hinges: translations.chain(tops).collect(),
             start: vec![Start { phi, omega: 0.0 }, Start { phi, omega: 0.0 }, Start { phi, omega: 0.0 }, Start { phi: 0.0, omega: 0.0 }],
             until: 1.0,
             every: 0.1,

@@ -42,18 +42,18 @@ struct Bench<T> {
 
 impl<T: Lanewise> Bench<T> {
     fn new(mechanism: &Mechanism) -> Self {
-        let zeros = vec![T::ZERO; 2 * mechanism.ties.count() + 1];
+        let zeros = vec![T::ZERO; 2 * mechanism.partition.count() + 1];
         Self { scratch: Scratch::new(mechanism), y: zeros.clone(), rate: zeros }
     }
 
     /// The rates at all points.
     #[inline(always)]
-    fn rates<const N: usize, const ACCOUNT: bool>(&mut self, mechanism: &Mechanism, points: &mut Points) {
+    fn rates<const N: usize, const WORK: bool>(&mut self, mechanism: &Mechanism, points: &mut Points) {
         for ((y, high), low) in self.y.iter_mut().zip(&points.y).zip(&points.low) {
             *y = T::load(high, low);
         }
         let d = points.y.len();
-        self.scratch.rate::<N, ACCOUNT>(mechanism, &self.y[..d], &mut self.rate[..d]);
+        self.scratch.rate::<N, WORK>(mechanism, &self.y[..d], &mut self.rate[..d]);
         for ((rate, high), low) in self.rate.iter().zip(&mut points.rate).zip(&mut points.rate_low) {
             rate.store(high, low);
         }
@@ -87,17 +87,17 @@ impl<L: Lanes> Both<L> {
     }
 
     #[inline(always)]
-    fn rates<const N: usize, const ACCOUNT: bool, const EXACT: bool>(&mut self, mechanism: &Mechanism, points: &mut Points) {
+    fn rates<const N: usize, const WORK: bool, const EXACT: bool>(&mut self, mechanism: &Mechanism, points: &mut Points) {
         if EXACT {
-            self.exact.rates::<N, ACCOUNT>(mechanism, points);
+            self.exact.rates::<N, WORK>(mechanism, points);
         } else {
-            self.plain.rates::<N, ACCOUNT>(mechanism, points);
+            self.plain.rates::<N, WORK>(mechanism, points);
         }
     }
 
     fn drive(&mut self, mechanism: &Mechanism, time: &[Time; LANES]) {
-        for (k, tie) in mechanism.ties.bodies.iter().enumerate() {
-            let phases = time.map(|time| tie.drive::<DoubleDouble>(time));
+        for (k, dependent_angle) in mechanism.partition.bodies.iter().enumerate() {
+            let phases = time.map(|time| dependent_angle.drive::<DoubleDouble>(time));
             self.plain.drive(k, &phases);
             self.exact.drive(k, &phases);
         }
@@ -111,25 +111,25 @@ impl<L: Lanes> Both<L> {
     }
 }
 
-struct Rates<'a, const N: usize, const ACCOUNT: bool, const EXACT: bool>(&'a mut Both<Vector>, &'a Mechanism, &'a mut Points);
+struct Rates<'a, const N: usize, const WORK: bool, const EXACT: bool>(&'a mut Both<Vector>, &'a Mechanism, &'a mut Points);
 
-impl<const N: usize, const ACCOUNT: bool, const EXACT: bool> Code for Rates<'_, N, ACCOUNT, EXACT> {
+impl<const N: usize, const WORK: bool, const EXACT: bool> Code for Rates<'_, N, WORK, EXACT> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        self.0.rates::<N, ACCOUNT, EXACT>(self.1, self.2);
+        self.0.rates::<N, WORK, EXACT>(self.1, self.2);
     }
 }
 
 /// The same code compiled for the processor.
-fn in_hardware<const N: usize, const ACCOUNT: bool, const EXACT: bool>(
+fn in_hardware<const N: usize, const WORK: bool, const EXACT: bool>(
     hardware: Hardware,
     both: &mut Both<Vector>,
     mechanism: &Mechanism,
     points: &mut Points,
 ) {
-    hardware.run(Rates::<N, ACCOUNT, EXACT>(both, mechanism, points));
+    hardware.run(Rates::<N, WORK, EXACT>(both, mechanism, points));
 }
 
 impl Stages {
@@ -143,11 +143,11 @@ impl Stages {
         Self { time, room }
     }
 
-    /// The rates at all points; with `exact`, what doubles leave out of points and rates too.  `account`: the form carries p_t.
+    /// The rates at all points; with `exact`, what doubles leave out of points and rates too.  `work_integral`: the form carries p_t.
     ///
     /// Not generic, so that it is compiled once and not with every program that integrates a mechanism.
-    pub fn rates(&mut self, account: bool, exact: bool, mechanism: &Mechanism, points: &mut Points) {
-        if account && self.time != points.time {
+    pub fn rates(&mut self, work_integral: bool, exact: bool, mechanism: &Mechanism, points: &mut Points) {
+        if work_integral && self.time != points.time {
             self.time = points.time;
             match &mut self.room {
                 Room::Portable(both) => both.drive(mechanism, &self.time),
@@ -156,14 +156,14 @@ impl Stages {
         }
         // The sizes worth unrolling; any other count of the same operations has the same bits.
         match &mut self.room {
-            Room::Portable(both) => match (account, exact) {
+            Room::Portable(both) => match (work_integral, exact) {
                 (false, false) => both.rates::<0, false, false>(mechanism, points),
                 (false, true) => both.rates::<0, false, true>(mechanism, points),
                 (true, false) => both.rates::<0, true, false>(mechanism, points),
                 (true, true) => both.rates::<0, true, true>(mechanism, points),
             },
             Room::Hardware(hardware, both) => {
-                let code = match (mechanism.size(), account, exact) {
+                let code = match (mechanism.size(), work_integral, exact) {
                     (1, false, false) => in_hardware::<1, false, false>,
                     (2, false, false) => in_hardware::<2, false, false>,
                     (3, false, false) => in_hardware::<3, false, false>,

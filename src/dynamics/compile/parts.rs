@@ -2,21 +2,21 @@
 
 use super::Joint;
 use crate::arithmetic::Complex;
+use crate::dynamics::constraint::{self, ConstraintEquation};
 use crate::dynamics::force::Action;
 use crate::dynamics::force::action::Kind;
 use crate::dynamics::forest::Forest;
 use crate::dynamics::law::Law;
-use crate::dynamics::row::{self, Row};
 use crate::scene::{Place, Scene, Slider};
 
 /// Motors, locks, and the angles that welds and locked sliders keep; those not given are what they are at the start.
-pub(super) fn given_angles(scene: &Scene) -> Vec<Row> {
-    let motors = scene.motors.iter().map(|motor| row::angle_row(&motor.name, motor.bar, motor.relative_to, motor.law.clone()));
+pub(super) fn given_angles(scene: &Scene) -> Vec<ConstraintEquation> {
+    let motors = scene.motors.iter().map(|motor| constraint::angle_equation(&motor.name, motor.bar, motor.relative_to, motor.law.clone()));
     let phi = |bar: Option<usize>| bar.map_or(0.0, |bar| scene.start[bar].phi);
     let keep = |name: &str, a: Option<usize>, b: Option<usize>, angle: Option<f64>| {
         let (body, base) = if let Some(a) = a { (a, b) } else { (b?, None) };
         let angle = angle.unwrap_or_else(|| phi(Some(body)) - phi(base));
-        Some(row::angle_row(name, body, base, Law::constant(angle)))
+        Some(constraint::angle_equation(name, body, base, Law::constant(angle)))
     };
     let locks = scene.locks.iter().filter_map(|lock| keep(&lock.name, Some(lock.bar), lock.relative_to, lock.angle));
     let welds =
@@ -35,7 +35,7 @@ pub(super) fn kept_angles(scene: &Scene) -> Vec<usize> {
 }
 
 /// Hinges and welds; those that close a loop add their rows.
-pub(super) fn joints(scene: &Scene, forest: &Forest, rows: &mut Vec<Row>) -> Vec<Joint> {
+pub(super) fn joints(scene: &Scene, forest: &Forest, rows: &mut Vec<ConstraintEquation>) -> Vec<Joint> {
     let named = scene.hinges.iter().map(|hinge| (&hinge.name, &hinge.between));
     let welded = scene.welds.iter().map(|weld| (&weld.name, &weld.between));
     let mut joints = Vec::with_capacity(forest.outer.len());
@@ -48,7 +48,7 @@ pub(super) fn joints(scene: &Scene, forest: &Forest, rows: &mut Vec<Row>) -> Vec
         let at = (inner.bar, inner.bar.map_or(point, |bar| point - forest.hangs[bar].own));
         let row = outer.is_none().then_some(rows.len());
         if outer.is_none() {
-            rows.extend(row::pin_rows(name, &forest.site(&between[0]), &forest.site(&between[1]), scene.bars.len()));
+            rows.extend(constraint::pin_equations(name, &forest.site(&between[0]), &forest.site(&between[1]), scene.bars.len()));
         }
         joints.push(Joint { name: name.clone(), at, outer, row, between: [between[0].bar, between[1].bar] });
     }
@@ -56,12 +56,12 @@ pub(super) fn joints(scene: &Scene, forest: &Forest, rows: &mut Vec<Row>) -> Vec
 }
 
 /// The row that keeps a slider on its rail.
-pub(super) fn slide(forest: &Forest, slider: &Slider) -> Row {
+pub(super) fn slide(forest: &Forest, slider: &Slider) -> ConstraintEquation {
     on_rail(forest, &slider.name, slider, rail(slider).left(), None)
 }
 
 /// The row that gives a slider's travel.
-pub(super) fn travel(forest: &Forest, name: &str, slider: &Slider, law: Law) -> Row {
+pub(super) fn travel(forest: &Forest, name: &str, slider: &Slider, law: Law) -> ConstraintEquation {
     on_rail(forest, name, slider, rail(slider), Some(law))
 }
 
@@ -69,11 +69,11 @@ fn rail(slider: &Slider) -> Complex<f64> {
     Complex::new(slider.rail.direction[0], slider.rail.direction[1])
 }
 
-fn on_rail(forest: &Forest, name: &str, slider: &Slider, direction: Complex<f64>, law: Option<Law>) -> Row {
-    let (site, foot, angles) = (forest.site(&slider.point), forest.site(&slider.rail.place), forest.hangs.len());
+fn on_rail(forest: &Forest, name: &str, slider: &Slider, direction: Complex<f64>, law: Option<Law>) -> ConstraintEquation {
+    let (site, origin_point, angles) = (forest.site(&slider.point), forest.site(&slider.rail.place), forest.hangs.len());
     match slider.rail.place.bar {
-        Some(body) => row::slot_row(name, &site, body, &foot, direction, law, angles),
-        None => row::line_row(name, &site, direction, direction.dot(foot.point.root), law, angles),
+        Some(body) => constraint::slot_equation(name, &site, body, &origin_point, direction, law, angles),
+        None => constraint::line_equation(name, &site, direction, direction.dot(origin_point.point.root), law, angles),
     }
 }
 

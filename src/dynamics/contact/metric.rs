@@ -10,8 +10,8 @@
 //! their geometry alone, masses aside: see `new_rows`.  Source: Å. Björck, *Numerical Methods for Least Squares Problems* (1996), sections 2.4.5
 //! (orthogonalized twice) and 2.7.3.
 
+use crate::dynamics::constraint::{ConstraintEquation, Linearised, Measure, Posture};
 use crate::dynamics::kernel::Kernel;
-use crate::dynamics::row::{Linearised, Measure, Posture, Row};
 use crate::dynamics::{Mechanism, Time};
 use nalgebra::{DMatrix, DVector};
 
@@ -44,13 +44,13 @@ impl Metric {
     pub fn at(mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64]) -> Option<Self> {
         let n = mechanism.coordinates();
         let mut kernel = Kernel::<f64>::dense_without_rows(mechanism);
-        kernel.face::<0>(mechanism, phi);
+        kernel.unit_vectors::<0>(mechanism, phi);
         kernel.assemble::<0>(mechanism, t, phi, omega);
         let scale = DVector::from_fn(n, |i, _| kernel.mass[i * n + i].sqrt().recip());
         let mass = DMatrix::from_fn(n, n, |i, j| kernel.mass[i.min(j) * n + i.max(j)] * scale[i] * scale[j]);
         let lower = mass.cholesky()?.unpack();
         let at = Posture { phi, z: &kernel.z, omega };
-        let rows: Vec<Gradient> = mechanism.rows.iter().map(|row| Gradient::of(row, t, at)).collect();
+        let rows: Vec<Gradient> = mechanism.constraints.iter().map(|row| Gradient::of(row, t, at)).collect();
         let counting = new_rows(mechanism, &rows);
         let mut metric = Self { lower, scale, load: kernel.load, rows, counting, basis: Basis::new(n) };
         let counting = std::mem::take(&mut metric.counting);
@@ -109,7 +109,7 @@ impl Metric {
 
 impl Gradient {
     /// That of a row.
-    pub fn of(row: &Row, t: Time, at: Posture<f64>) -> Self {
+    pub fn of(row: &ConstraintEquation, t: Time, at: Posture<f64>) -> Self {
         let mut along = vec![0.0; at.phi.len()];
         Self { row: row.differentiate(t, at, &mut along), along }
     }
@@ -118,12 +118,12 @@ impl Gradient {
 /// The rows that say something new, those that say most first: angles in rad, lengths in sizes of the mechanism, each row over the most it could say.
 fn new_rows(mechanism: &Mechanism, rows: &[Gradient]) -> Vec<usize> {
     let (size, angles) = (mechanism.size_of_parts(), mechanism.bodies.len());
-    let scaled = |(row, gradient): (&Row, &Gradient)| {
+    let scaled = |(row, gradient): (&ConstraintEquation, &Gradient)| {
         let along = DVector::from_fn(gradient.along.len(), |k, _| gradient.along[k] * if k < angles { 1.0 } else { size });
         let most = along.norm().max(reach(&row.measure, size));
         along / most
     };
-    let mut left: Vec<DVector<f64>> = mechanism.rows.iter().zip(rows).map(scaled).collect();
+    let mut left: Vec<DVector<f64>> = mechanism.constraints.iter().zip(rows).map(scaled).collect();
     let (mut found, mut basis) = (Vec::new(), Basis::new(mechanism.coordinates()));
     while found.len() < left.len() {
         let most =
@@ -138,7 +138,7 @@ fn new_rows(mechanism: &Mechanism, rows: &[Gradient]) -> Vec<usize> {
     found
 }
 
-/// The most a row changes by where one element moves by rad or the size of the mechanism, products with feet aside.
+/// The most a row changes by where one element moves by rad or the size of the mechanism, products with translational coordinates aside.
 fn reach(measure: &Measure, size: f64) -> f64 {
     let Measure::Place(place) = measure else { return 1.0 };
     let unit = |k: usize| if k < place.angles { 1.0 } else { size };

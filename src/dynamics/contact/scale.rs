@@ -11,11 +11,11 @@
 
 use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::compile::Body;
+use crate::dynamics::constraint::{ConstraintEquation, Measure};
 use crate::dynamics::force::Action;
 use crate::dynamics::force::action::Kind;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::point::Point;
-use crate::dynamics::row::{Measure, Row};
 use crate::dynamics::{Mechanism, Motion};
 
 /// Rounding of a gap over the length of its contact, at most, at the start.
@@ -25,7 +25,7 @@ impl Mechanism {
     /// Gives every contact its length \[m\] and force \[N\], from the start.
     pub(in crate::dynamics) fn scale_contacts(&mut self, start: &Motion) {
         let mut z = vec![Complex::ZERO; self.coordinates()];
-        self.tree.face::<DoubleDouble, 0>(&start.phi, &mut z);
+        self.tree.unit_vectors::<DoubleDouble, 0>(&start.phi, &mut z);
         let z: Vec<Complex<f64>> = z.iter().map(|z| Complex::new(z.re.hi, z.im.hi)).collect();
         let omega: Vec<f64> = start.omega.iter().map(|omega| omega.hi).collect();
         let own: Vec<f64> = self.contacts.iter().map(|contact| levers(&contact.point) + contact.row.gap(&z).abs()).collect();
@@ -42,7 +42,7 @@ impl Mechanism {
             contact.length = power_of_two(length.max(rounding / ROUNDED));
             let force = energy / contact.length
                 + mass * gravity
-                + driven(&self.rows, mass, contact.length)
+                + driven(&self.constraints, mass, contact.length)
                 + applied(&self.actions, contact.length)
                 + pushed / contact.length;
             contact.force = power_of_two(if force.is_finite() && force > 0.0 { force } else { 1.0 });
@@ -64,7 +64,7 @@ fn levers(point: &Point) -> f64 {
 }
 
 /// Sum of the magnitudes a gap is summed from \[m\].
-pub fn magnitudes(row: &Row, z: &[Complex<f64>]) -> f64 {
+pub fn magnitudes(row: &ConstraintEquation, z: &[Complex<f64>]) -> f64 {
     let Measure::Place(place) = &row.measure else { return 0.0 };
     let part = |&(k, g): &(usize, Complex<f64>)| (g.re * z[k].re).abs() + (g.im * z[k].im).abs();
     place.constant.abs() + place.linear.iter().map(part).sum::<f64>()
@@ -77,8 +77,8 @@ fn size(bodies: &[Body]) -> f64 {
 }
 
 /// What motors ask for at most, roughly \[N\].
-fn driven(rows: &[Row], mass: f64, length: f64) -> f64 {
-    let force = |row: &Row| {
+fn driven(rows: &[ConstraintEquation], mass: f64, length: f64) -> f64 {
+    let force = |row: &ConstraintEquation| {
         let Some(law) = &row.law else { return 0.0 };
         let (mut rate, mut acceleration) = (law.rate.abs(), law.acceleration.abs());
         for sine in &law.sines {

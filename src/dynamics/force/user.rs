@@ -13,7 +13,7 @@ use crate::arithmetic::tape::{Slot, Symbol, Tape};
 use crate::arithmetic::{Complex, Scalar};
 use crate::dynamics::CompileError;
 use crate::dynamics::configuration::{Configuration, Source};
-use crate::dynamics::row::{Posture, Site};
+use crate::dynamics::constraint::{Posture, Site};
 use std::cell::RefCell;
 
 /// A force or torque that acts on a mechanism, beside those a scene knows.

@@ -40,26 +40,26 @@ struct Found<T> {
 }
 
 impl Vibration {
-    /// Writes G to `slope` and M⁻¹ Gᵀ to `lifted`, from the factors of M.
+    /// Writes G to `slope` and M⁻¹ Gᵀ to `minv_jt`, from the factors of M.
     #[inline]
     fn find<T: Scalar, const N: usize>(
         &self,
         z: &[Complex<T>],
         (mass, pivot): (&[T], &[T]),
         slope: &mut [T],
-        lifted: &mut [T],
+        minv_jt: &mut [T],
     ) -> Found<T> {
         let span = self.span.position(z);
         let length = span.norm_squared().sqrt();
         let along = span.times(T::ONE / length);
         slope.fill(T::ZERO);
         self.span.pull(along, z, slope);
-        lifted.copy_from_slice(slope);
-        tree::solve::<T, N>(size::<N>(lifted.len()), mass, pivot, lifted);
-        Found { along, length, inertia: dot(slope, lifted) }
+        minv_jt.copy_from_slice(slope);
+        tree::solve::<T, N>(size::<N>(minv_jt.len()), mass, pivot, minv_jt);
+        Found { along, length, inertia: dot(slope, minv_jt) }
     }
 
-    /// Writes the generalized forces \[N·m, N\] to `force`; `factors` are those of M, `twist` is the one beside it, `lifted` takes u.
+    /// Writes the generalized forces \[N·m, N\] to `force`; `factors` are those of M, `twist` is the one beside it, `minv_jt` takes u.
     #[inline]
     pub fn push<T: Scalar, const N: usize>(
         &self,
@@ -67,20 +67,20 @@ impl Vibration {
         z: &[Complex<T>],
         factors: (&[T], &[T]),
         twist: &[T],
-        [force, lifted]: [&mut [T]; 2],
+        [force, minv_jt]: [&mut [T]; 2],
     ) {
-        let Found { along, length, inertia } = self.find::<T, N>(z, factors, force, lifted);
+        let Found { along, length, inertia } = self.find::<T, N>(z, factors, force, minv_jt);
         // dT/dq at the rates u, with the opposite sign, and the change of G along u.
         force.fill(T::ZERO);
-        tree.swing::<T, N>(lifted, twist, force);
+        tree.velocity_terms::<T, N>(minv_jt, twist, force);
         for force in force.iter_mut() {
             *force = -*force;
         }
-        let rate = self.span.velocity(z, lifted);
+        let rate = self.span.velocity(z, minv_jt);
         let turning = (rate - along.times(along.dot(rate))).times(T::ONE / length);
         self.span.pull(turning, z, force);
         for &(k, gamma) in &self.span.terms {
-            force[k] -= along.dot(z[k].turn(gamma)) * lifted[k];
+            force[k] -= along.dot(z[k].turn(gamma)) * minv_jt[k];
         }
         let factor = (T::of(self.stiffness) / inertia).sqrt().scale(-self.action);
         for force in force {
@@ -95,9 +95,9 @@ impl Vibration {
 
     fn frequency_and_inertia<T: Scalar>(&self, z: &[Complex<T>], mass: &[T]) -> (T, T) {
         let (n, mut mass) = (z.len(), mass.to_vec());
-        let [mut pivot, mut slope, mut lifted] = std::array::from_fn(|_| vec![T::ZERO; n]);
+        let [mut pivot, mut slope, mut minv_jt] = std::array::from_fn(|_| vec![T::ZERO; n]);
         tree::factor::<T, 0>(n, &mut mass, &mut pivot);
-        let inertia = self.find::<T, 0>(z, (&mass, &pivot), &mut slope, &mut lifted).inertia;
+        let inertia = self.find::<T, 0>(z, (&mass, &pivot), &mut slope, &mut minv_jt).inertia;
         (inertia.scale(self.stiffness).sqrt(), inertia)
     }
 
@@ -110,7 +110,7 @@ impl Vibration {
     pub(in crate::dynamics) fn started(mut self, mechanism: &Mechanism, free_length: f64, z: &[Complex<f64>], omega: &[f64]) -> Self {
         let n = mechanism.coordinates();
         let (mut mass, mut twist) = (vec![0.0; n * n], vec![0.0; n * n]);
-        mechanism.tree.couple::<f64, 0>(z, &mut mass, &mut twist);
+        mechanism.tree.mass_matrix::<f64, 0>(z, &mut mass, &mut twist);
         let (frequency, inertia) = self.frequency_and_inertia(z, &mass);
         let span = self.span.position(z);
         let length = span.norm_squared().sqrt();
@@ -138,15 +138,15 @@ mod tests {
         let potential = |phi: [f64; 2]| {
             let z = phi.map(Complex::unit);
             let (mut mass, mut twist) = ([0.0; 4], [0.0; 4]);
-            tree.couple::<f64, 0>(&z, &mut mass, &mut twist);
+            tree.mass_matrix::<f64, 0>(&z, &mut mass, &mut twist);
             vibration().potential(&z, &mass)
         };
         let phi = [0.7, -1.9];
         let (z, mut mass, mut twist, mut pivot) = (phi.map(Complex::unit), [0.0; 4], [0.0; 4], [0.0; 2]);
-        tree.couple::<f64, 0>(&z, &mut mass, &mut twist);
+        tree.mass_matrix::<f64, 0>(&z, &mut mass, &mut twist);
         tree::factor::<f64, 0>(2, &mut mass, &mut pivot);
-        let (mut force, mut lifted) = ([0.0; 2], [0.0; 2]);
-        vibration().push::<f64, 0>(&tree, &z, (&mass, &pivot), &twist, [&mut force, &mut lifted]);
+        let (mut force, mut minv_jt) = ([0.0; 2], [0.0; 2]);
+        vibration().push::<f64, 0>(&tree, &z, (&mass, &pivot), &twist, [&mut force, &mut minv_jt]);
         let h = 1e-5;
         for k in 0..2 {
             let at = |by: f64| potential(std::array::from_fn(|i| phi[i] + if i == k { by } else { 0.0 }));

@@ -12,7 +12,7 @@ impl<T: Real> Kernel<T> {
     #[inline(always)]
     pub(super) fn is_delicate(&self, mechanism: &Mechanism) -> bool {
         let is_deep = || self.bodywise.is_none() && schur::is_deep(&self.pivot, mechanism.tree.diagonal.iter().copied());
-        T::IS_PLAIN && !mechanism.rows.is_empty() && (self.weakest.is_delicate || is_deep())
+        T::IS_PLAIN && !mechanism.constraints.is_empty() && (self.weakest.is_delicate || is_deep())
     }
 
     /// Writes accelerations and multipliers of the evaluation in double-double.
@@ -47,7 +47,7 @@ impl<T: Real> Kernel<T> {
         round(&mut self.multiplier, &exact.multiplier);
     }
 
-    /// [`Kernel::lift`] with the factors in double-double.
+    /// [`Kernel::multiplier_accelerations`] with the factors in double-double.
     #[cold]
     pub(super) fn lift_exactly(&mut self) {
         let Some(exact) = &mut self.exact else { return };
@@ -57,13 +57,13 @@ impl<T: Real> Kernel<T> {
                 *exact = x.double_double();
             }
         }
-        exact.lift();
+        exact.multiplier_accelerations();
         round(&mut self.load, &exact.load);
     }
 
     /// The least share of a constraint at other coordinates than the last, which knows no masses ([`rank`](crate::dynamics::rank)); and all of [`Kernel::rows_at`].
     pub fn independence_at(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) -> f64 {
-        self.face::<0>(mechanism, phi);
+        self.unit_vectors::<0>(mechanism, phi);
         self.rows_at(mechanism, t, phi, omega);
         match &self.bodywise {
             Some(bodywise) => bodywise.judge().share(),
@@ -74,7 +74,7 @@ impl<T: Real> Kernel<T> {
     /// The largest C of the last evaluation, angles in rad and lengths in sizes of the mechanism.
     pub fn violation(&self, mechanism: &Mechanism) -> f64 {
         let size = mechanism.size_of_parts();
-        mechanism.rows.iter().zip(&self.rows).fold(0.0, |most, (row, here)| {
+        mechanism.constraints.iter().zip(&self.rows).fold(0.0, |most, (row, here)| {
             let off = here.position.value().abs() / if row.is_angle() { 1.0 } else { size };
             if off > most || off.is_nan() { off } else { most }
         })

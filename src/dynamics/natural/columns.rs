@@ -20,7 +20,7 @@ pub struct Columns<const B: usize> {
 }
 
 impl<const B: usize> Columns<B> {
-    /// Of a mechanism's matrices; there must be room, and no feet.
+    /// Of a mechanism's matrices; there must be room, and no translational coordinates.
     pub fn new(reduced: &Reduced) -> Self {
         let n = reduced.free.len();
         let mut blocks = vec![[[[0.0; 4]; B]; 4]; n];

@@ -9,8 +9,8 @@
 
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
 use crate::dynamics::Time;
+use crate::dynamics::constraint::{ConstraintEquation, Measure};
 use crate::dynamics::law::Law;
-use crate::dynamics::row::{Measure, Row};
 
 /// A row in the loop.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,7 +53,7 @@ impl Demand<DoubleDouble> {
 
 impl Guide {
     /// The row `row` of a mechanism.
-    pub fn new(number: usize, row: &Row) -> Self {
+    pub fn new(number: usize, row: &ConstraintEquation) -> Self {
         Self { row: number, name: row.name.clone(), measure: row.measure.clone(), law: row.law.clone() }
     }
 

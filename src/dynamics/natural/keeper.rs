@@ -15,7 +15,7 @@ use crate::arithmetic::lanes::row::{Row, at, load, store};
 
 /// Sweeps onto the unit lengths, at most.
 const SWEEPS: usize = 6;
-/// Violation of the lengths that one sweep is enough for.
+/// Violation of the lengths that one iteration is enough for.
 pub const CLOSE: f64 = 1e-9;
 
 /// Constants of the mechanism, and its matrices at a posture; lanes beyond the last body are zero.
@@ -28,7 +28,7 @@ pub struct Keeper<const B: usize> {
     /// S, then S⁻¹, column by column.
     pub schur: Vec<Row<B>>,
     /// V: x and y, column by column.
-    pub lifted: Vec<[Row<B>; 2]>,
+    pub minv_jt: Vec<[Row<B>; 2]>,
 }
 
 /// Elements and gradients of a row, its constant, and its column of R.
@@ -51,7 +51,7 @@ pub struct Moved<const B: usize> {
 }
 
 impl<const B: usize> Keeper<B> {
-    /// Of a mechanism's matrices; there must be room, and no feet.
+    /// Of a mechanism's matrices; there must be room, and no translational coordinates.
     pub fn new(reduced: &Reduced) -> Self {
         let n = reduced.free.len();
         let zero = [[0.0; 4]; B];
@@ -66,32 +66,32 @@ impl<const B: usize> Keeper<B> {
             columns: Columns::new(reduced),
             rows: reduced.rows.iter().zip(reduced.back.chunks(n.max(1))).map(row).collect(),
             schur: vec![zero; n],
-            lifted: vec![[zero; 2]; n],
+            minv_jt: vec![[zero; 2]; n],
         }
     }
 
     /// V and S⁻¹ at unit vectors; the least share of a pivot.
     #[inline(always)]
-    pub fn face<L: Lanes>(&mut self, z: &[Row<B>; 2]) -> f64 {
+    pub fn unit_vectors<L: Lanes>(&mut self, z: &[Row<B>; 2]) -> f64 {
         let (c, s): ([L; B], [L; B]) = (load(&z[0]), load(&z[1]));
         for (j, block) in self.columns.blocks.iter().enumerate() {
             let [x, y] = columns::turned::<L, B>(block, at(&z[0], j), at(&z[1], j));
             for b in 0..B {
                 self.schur[j][b] = c[b].mul_add(x[b], s[b].mul(y[b])).array();
             }
-            self.lifted[j] = [store(x), store(y)];
+            self.minv_jt[j] = [store(x), store(y)];
         }
         columns::invert::<L, B>(&mut self.schur, &self.columns.scale)
     }
 
-    /// Elements onto the linear rows, then onto the unit lengths, with the S of the position at hand: one sweep, unless they were far off.
+    /// Elements onto the linear rows, then onto the unit lengths, with the S of the position at hand: one iteration, unless they were far off.
     #[inline(always)]
-    pub fn put_back<L: Lanes>(&mut self, z: &mut [Row<B>; 2]) -> Moved<B> {
+    pub fn project_back<L: Lanes>(&mut self, z: &mut [Row<B>; 2]) -> Moved<B> {
         let mut moved = self.onto_rows::<L>(z, |row| row.constant);
         subtract::<L, B>(z, &moved);
         let (mut least, mut left) = (f64::INFINITY, f64::INFINITY);
         for _ in 0..SWEEPS {
-            least = self.face::<L>(z);
+            least = self.unit_vectors::<L>(z);
             let mut far = [L::ZERO; B];
             for b in 0..B {
                 let (x, y) = (L::of(z[0][b]), L::of(z[1][b]));
@@ -102,7 +102,7 @@ impl<const B: usize> Keeper<B> {
             subtract::<L, B>(z, &change);
             sum::<L, B>(&mut moved, &change);
             left = far.as_flattened()[..self.schur.len()].iter().map(|far| far.abs()).sum();
-            // What a sweep leaves is about the square of what it found.
+            // What a iteration leaves is about the square of what it found.
             if left <= CLOSE {
                 break;
             }
@@ -112,7 +112,7 @@ impl<const B: usize> Keeper<B> {
 
     /// The same of rates, after the elements `z`; what was taken off them.
     #[inline(always)]
-    pub fn put_rates_back<L: Lanes>(&self, z: &[Row<B>; 2], v: &mut [Row<B>; 2]) -> [Row<B>; 2] {
+    pub fn project_rates_back<L: Lanes>(&self, z: &[Row<B>; 2], v: &mut [Row<B>; 2]) -> [Row<B>; 2] {
         let mut moved = self.onto_rows::<L>(v, |_| 0.0);
         subtract::<L, B>(v, &moved);
         let mut fast = [L::ZERO; B];
@@ -148,7 +148,7 @@ impl<const B: usize> Keeper<B> {
         }
         let factors = store(factors);
         let mut change = [[L::ZERO; B]; 2];
-        for (j, column) in self.lifted.iter().enumerate() {
+        for (j, column) in self.minv_jt.iter().enumerate() {
             add::<L, B>(&mut change, column, at(&factors, j));
         }
         change

@@ -74,16 +74,16 @@ impl Reduced {
             let mut share = vec![DoubleDouble::ZERO; basis.len()];
             // Twice, so that what rounding leaves of the first round goes.
             for _ in 0..2 {
-                for ((q, lifted), share) in basis.iter().zip(&spreads).zip(&mut share) {
-                    let part = dot(lifted, &rest);
+                for ((q, minv_jt), share) in basis.iter().zip(&spreads).zip(&mut share) {
+                    let part = dot(minv_jt, &rest);
                     *share += part;
                     for (rest, &q) in rest.iter_mut().zip(q) {
                         *rest -= q.times(part);
                     }
                 }
             }
-            let lifted = spread(&rest);
-            let square = dot(&rest, &lifted);
+            let minv_jt = spread(&rest);
+            let square = dot(&rest, &minv_jt);
             let is_independent = square.hi > DEPENDENT * DEPENDENT * whole;
             if !is_independent {
                 continue;
@@ -92,7 +92,7 @@ impl Reduced {
             let unit = |x: &[Complex<DoubleDouble>]| x.iter().map(|x| x.times(DoubleDouble::ONE / length)).collect::<Vec<_>>();
             share.push(length);
             basis.push(unit(&rest));
-            spreads.push(unit(&lifted));
+            spreads.push(unit(&minv_jt));
             shares.push(share);
             rows.push(row);
         }
@@ -146,12 +146,12 @@ impl Reduced {
     }
 
     /// Puts elements back onto the linear rows; `change` is scratch space (n).
-    pub fn put_back(&self, z: &mut [Complex<DoubleDouble>], change: &mut [Complex<f64>]) {
+    pub fn project_back(&self, z: &mut [Complex<DoubleDouble>], change: &mut [Complex<f64>]) {
         self.put(z, change, |place, z| place.value(z));
     }
 
     /// The same for their rates.
-    pub fn put_rates_back(&self, rate: &mut [Complex<DoubleDouble>], change: &mut [Complex<f64>]) {
+    pub fn project_rates_back(&self, rate: &mut [Complex<DoubleDouble>], change: &mut [Complex<f64>]) {
         self.put(rate, change, slip);
     }
 
@@ -194,7 +194,7 @@ fn dot(a: &[Complex<DoubleDouble>], b: &[Complex<DoubleDouble>]) -> DoubleDouble
     a.iter().zip(b).fold(DoubleDouble::ZERO, |sum, (a, b)| sum + a.dot(*b))
 }
 
-/// D⁻¹ from D = L P Lᴴ (n × n); the places beside feet, which no element takes, are zero.  The error is the body whose pivot vanishes.
+/// D⁻¹ from D = L P Lᴴ (n × n); the places beside translational coordinates, which no element takes, are zero.  The error is the body whose pivot vanishes.
 fn invert(mechanism: &Mechanism) -> Result<Vec<Complex<DoubleDouble>>, usize> {
     let tree = &mechanism.tree;
     let n = tree.coordinates;

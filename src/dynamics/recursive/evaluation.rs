@@ -5,10 +5,10 @@ use super::rows::{Rows, Ways};
 use super::{Links, Recursive};
 use crate::arithmetic::{Complex, Real};
 use crate::dynamics::compile::Body;
+use crate::dynamics::constraint::{ConstraintEquation, Linearised, Posture};
 use crate::dynamics::forest::Forest;
 use crate::dynamics::kernel::Bias;
 use crate::dynamics::rank::{Metric, Verdict};
-use crate::dynamics::row::{Linearised, Posture, Row};
 use crate::dynamics::schur::Weakest;
 use crate::dynamics::{Mechanism, Time};
 use std::sync::Arc;
@@ -27,9 +27,9 @@ pub struct Recursion {
 
 impl Recursion {
     /// The trees and rows of a mechanism.
-    pub fn new(bodies: &[Body], forest: &Forest, rows: &[Row], gravity: Complex<f64>) -> Self {
+    pub fn new(bodies: &[Body], forest: &Forest, rows: &[ConstraintEquation], gravity: Complex<f64>) -> Self {
         let links = Links::new(bodies, forest, gravity);
-        let touched: Vec<_> = rows.iter().map(Row::coordinates).collect();
+        let touched: Vec<_> = rows.iter().map(ConstraintEquation::coordinates).collect();
         let ways = Ways::new(&links, &touched);
         Self { links, ways }
     }
@@ -56,7 +56,7 @@ pub struct Evaluation<T> {
 }
 
 impl<T: Real> Evaluation<T> {
-    /// Scratch space for these constants and the [scales](Row::scale) of their rows, and what their rank is measured with.
+    /// Scratch space for these constants and the [scales](ConstraintEquation::scale) of their rows, and what their rank is measured with.
     pub fn new(recursion: &Arc<Recursion>, scales: &[f64], metric: Metric) -> Self {
         Self {
             trees: Recursive::new(&recursion.links),
@@ -68,7 +68,7 @@ impl<T: Real> Evaluation<T> {
 
     /// Elements at these coordinates \[rad, m\].
     #[inline]
-    pub fn face(&self, phi: &[T], z: &mut [Complex<T>]) {
+    pub fn unit_vectors(&self, phi: &[T], z: &mut [Complex<T>]) {
         let angles = self.recursion.links.bodies();
         T::units(&phi[..angles], &mut z[..angles]);
         for x in (angles..phi.len()).step_by(2) {
@@ -79,7 +79,7 @@ impl<T: Real> Evaluation<T> {
     /// The factors of M at the elements `z`, and what is left of velocity terms and gravity.
     pub fn factor(&mut self, z: &[Complex<T>], omega: &[T]) {
         self.trees.convect(&self.recursion.links, z, omega);
-        self.trees.fold(&self.recursion.links);
+        self.trees.inward_pass(&self.recursion.links);
     }
 
     /// Writes the reciprocal pivots of M.
@@ -89,23 +89,23 @@ impl<T: Real> Evaluation<T> {
 
     /// The factors of M, and what is left of all forces, springs by their stretches where these are known; overwrites `load`.
     #[inline]
-    pub fn fold(&mut self, mechanism: &Mechanism, t: Time, at: Posture<T>, stretch: &[T], load: &mut [T]) {
+    pub fn inward_pass(&mut self, mechanism: &Mechanism, t: Time, at: Posture<T>, stretch: &[T], load: &mut [T]) {
         self.trees.convect(&self.recursion.links, at.z, at.omega);
         if mechanism.is_forced() {
             load.fill(T::ZERO);
-            mechanism.push(t, at, stretch, load);
+            mechanism.add_applied_forces(t, at, stretch, load);
             self.trees.burden(&self.recursion.links, load);
         }
-        self.trees.fold(&self.recursion.links);
+        self.trees.inward_pass(&self.recursion.links);
     }
 
     /// Writes the accelerations \[rad/s², m/s²\].
     #[inline]
-    pub fn unfold(&mut self, alpha: &mut [T]) {
-        self.trees.unfold(&self.recursion.links, alpha);
+    pub fn outward_pass(&mut self, alpha: &mut [T]) {
+        self.trees.outward_pass(&self.recursion.links, alpha);
     }
 
-    /// The multipliers and the bias's share of them after [`fold`](Self::fold), the rows as they are, and what they leave of all forces; the weakest row.
+    /// The multipliers and the bias's share of them after [`fold`](Self::inward_pass), the rows as they are, and what they leave of all forces; the weakest row.
     #[inline]
     pub fn constrain(
         &mut self,
@@ -117,7 +117,7 @@ impl<T: Real> Evaluation<T> {
     ) -> Weakest {
         let (rows, multiplier, correction) = found;
         let (ways, is_biased) = (&self.recursion.ways, bias != Bias::default());
-        for (r, row) in mechanism.rows.iter().enumerate() {
+        for (r, row) in mechanism.constraints.iter().enumerate() {
             let jacobian = &mut self.jacobian[..];
             // Only a bias asks for C.
             let here = if is_biased { row.linearise(t, at, jacobian) } else { row.differentiate(t, at, jacobian) };
@@ -129,7 +129,7 @@ impl<T: Real> Evaluation<T> {
             }
             rows[r] = here;
         }
-        let weakest = self.rows.couple(ways, &self.trees);
+        let weakest = self.rows.factor_constraints(ways, &self.trees);
         self.settle(multiplier);
         if is_biased {
             self.solve_rows(correction);
@@ -137,7 +137,7 @@ impl<T: Real> Evaluation<T> {
         weakest
     }
 
-    /// Replaces the convective terms of all rows by their multipliers, after [`couple`](Self::couple), and takes these off the load.
+    /// Replaces the convective terms of all rows by their multipliers, after [`factor_constraints`](Self::factor_constraints), and takes these off the load.
     #[inline]
     pub fn settle(&mut self, multiplier: &mut [T]) {
         let ways = &self.recursion.ways;
@@ -155,19 +155,19 @@ impl<T: Real> Evaluation<T> {
 
     /// Takes the factors of M at hand for the [passes](Passes) of a series.
     pub fn brace(&self, passes: &mut Passes<T>) {
-        passes.face(&self.recursion.links, &self.trees);
+        passes.unit_vectors(&self.recursion.links, &self.trees);
     }
 
     /// What is left of the load of one order of a series.
     #[inline]
-    pub fn bear(&mut self, passes: &mut Passes<T>, order: Order<T>) {
-        passes.bear(&self.recursion.links, &mut self.trees, order);
+    pub fn inward_loads(&mut self, passes: &mut Passes<T>, order: Order<T>) {
+        passes.inward_loads(&self.recursion.links, &mut self.trees, order);
     }
 
     /// Writes the accelerations \[rad/s², m/s²\] of that order.
     #[inline]
     pub fn unfold_order(&self, passes: &mut Passes<T>, alpha: &mut [T]) {
-        passes.unfold(&self.recursion.links, &self.trees, alpha);
+        passes.outward_pass(&self.recursion.links, &self.trees, alpha);
     }
 
     /// Adds H x without its diagonal to `rest`, x all of that order.
@@ -178,15 +178,15 @@ impl<T: Real> Evaluation<T> {
 
     /// C, G, C_t, gamma of every row, and nothing else.
     pub fn rows_at(&mut self, mechanism: &Mechanism, t: Time, at: Posture<T>, rows: &mut [Linearised<T>]) {
-        for (r, row) in mechanism.rows.iter().enumerate() {
+        for (r, row) in mechanism.constraints.iter().enumerate() {
             rows[r] = row.linearise(t, at, &mut self.jacobian);
             self.rows.take(&self.recursion.ways, r, &mut self.jacobian);
         }
     }
 
     /// The factors of S, after [`rows_at`](Self::rows_at) and the factors of M.
-    pub fn couple(&mut self) -> Weakest {
-        self.rows.couple(&self.recursion.ways, &self.trees)
+    pub fn factor_constraints(&mut self) -> Weakest {
+        self.rows.factor_constraints(&self.recursion.ways, &self.trees)
     }
 
     /// The rank of the rows, after [`rows_at`](Self::rows_at).
@@ -200,12 +200,12 @@ impl<T: Real> Evaluation<T> {
     }
 
     /// Writes M⁻¹ Gᵀ x; forgets the load.
-    pub fn lift(&mut self, x: &[T], lifted: &mut [T]) {
+    pub fn multiplier_accelerations(&mut self, x: &[T], minv_jt: &mut [T]) {
         let Recursion { links, ways } = &*self.recursion;
         self.trees.unburden();
         self.rows.resist(ways, &mut self.trees, x);
-        self.trees.unfold(links, lifted);
-        for entry in lifted {
+        self.trees.outward_pass(links, minv_jt);
+        for entry in minv_jt {
             *entry = -*entry;
         }
     }

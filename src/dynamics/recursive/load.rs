@@ -85,8 +85,8 @@ impl<T: Real> Passes<T> {
         }
     }
 
-    /// Takes the posture of the last [`Recursive::fold`].
-    pub fn face(&mut self, links: &Links, trees: &Recursive<T>) {
+    /// Takes the posture of the last [`Recursive::inward_pass`].
+    pub fn unit_vectors(&mut self, links: &Links, trees: &Recursive<T>) {
         for ((brace, place), link) in self.braces.iter_mut().zip(&trees.places).zip(&links.links).skip(1) {
             let joint = &trees.joints[link.body];
             let share = joint.moment.times(joint.pivot);
@@ -96,7 +96,7 @@ impl<T: Real> Passes<T> {
 
     /// A of what is known of x, and what is left of the load, into the joints.
     #[inline]
-    pub fn bear(&mut self, links: &Links, trees: &mut Recursive<T>, order: Order<T>) {
+    pub fn inward_loads(&mut self, links: &Links, trees: &mut Recursive<T>, order: Order<T>) {
         let all = &links.links[..];
         let n = all.len();
         let (carried, braces, inner) = (&self.carried[..n], &self.braces[..n], &mut self.inner[..n]);
@@ -106,9 +106,9 @@ impl<T: Real> Passes<T> {
         for k in 1..n {
             let link = &all[k];
             if link.parent + 1 != k || k == 1 {
-                (at, last) = match (link.parent, link.foot) {
+                (at, last) = match (link.parent, link.origin_point) {
                     (0, 0) => (Complex::ZERO, Complex::ZERO),
-                    (0, foot) => (known[foot], Complex::ZERO),
+                    (0, origin_point) => (known[origin_point], Complex::ZERO),
                     (parent, _) => (inner[parent], known[all[parent].body]),
                 };
             }
@@ -138,8 +138,8 @@ impl<T: Real> Passes<T> {
             }
             if link.parent != 0 {
                 forks[link.parent].join(passed);
-            } else if link.foot != 0 {
-                let x = link.foot;
+            } else if link.origin_point != 0 {
+                let x = link.origin_point;
                 let force = rest[x] + passed.carried + passed.force;
                 let along = load[x] - force.re;
                 joints[x].excess = along;
@@ -151,7 +151,7 @@ impl<T: Real> Passes<T> {
 
     /// The accelerations \[rad/s², m/s²\] of what is left in the joints; their A are added to that of what is known.
     #[inline]
-    pub fn unfold(&mut self, links: &Links, trees: &Recursive<T>, alpha: &mut [T]) {
+    pub fn outward_pass(&mut self, links: &Links, trees: &Recursive<T>, alpha: &mut [T]) {
         let all = &links.links[..];
         let n = all.len();
         let (braces, joints, inner, forks) = (&self.braces[..n], &trees.joints[..], &mut self.inner[..n], &mut self.forks[..n]);
@@ -161,11 +161,11 @@ impl<T: Real> Passes<T> {
             if link.parent + 1 != k || k == 1 {
                 (a, turn) = if link.parent == 0 { (Complex::ZERO, T::ZERO) } else { forks[link.parent] };
             }
-            if link.foot != 0 {
-                let [x, y] = [&joints[link.foot], &joints[link.foot + 1]];
+            if link.origin_point != 0 {
+                let [x, y] = [&joints[link.origin_point], &joints[link.origin_point + 1]];
                 let up = y.excess * y.pivot;
                 a = Complex::new(x.excess * x.pivot - x.moment.re * up, up);
-                (alpha[link.foot], alpha[link.foot + 1]) = (a.re, a.im);
+                (alpha[link.origin_point], alpha[link.origin_point + 1]) = (a.re, a.im);
             }
             let next = joints[link.body].excess * brace.pivot - brace.share.dot(a) - brace.back * turn;
             a += brace.lever.times(turn);
@@ -199,8 +199,8 @@ impl<T: Real> Passes<T> {
             if link.parent != 0 {
                 forks[link.parent].carried += sum;
                 forks[link.parent].felt += felt;
-            } else if link.foot != 0 {
-                rest[link.foot] += sum;
+            } else if link.origin_point != 0 {
+                rest[link.origin_point] += sum;
             }
             (sum, felt) = (Complex::ZERO, Complex::ZERO);
         }

@@ -1,4 +1,4 @@
-//! Constraint rows of hinge trees: what each row's force asks of the hinges on its way to the ground, and S = G M⁻¹ Gᵀ from that.
+//! Constraint equations of hinge trees: what each row's force asks of the hinges on its way to the ground, and S = G M⁻¹ Gᵀ from that.
 //!
 //! ```text
 //! M = L D Lᵀ,  e_r = L⁻¹ G_rᵀ:     S_rs = Σ e_r e_s / d      over the coordinates on both rows' ways
@@ -19,7 +19,7 @@ use crate::dynamics::schur::{DROPPED, NEAR, Weakest};
 struct Step {
     /// The coordinate.
     coordinate: usize,
-    /// Place of the body; 0 for the coordinates of a foot.
+    /// Place of the body; 0 for the coordinates of an origin.
     link: usize,
     /// How many steps on the one is that bears it; 0: the ground.
     onto: usize,
@@ -84,41 +84,45 @@ impl Ways {
         ways
     }
 
-    /// Adds a row's way; the bodies and feet on the ground that it ends at.
+    /// Adds a row's way; the bodies and translational coordinates on the ground that it ends at.
     fn push(&mut self, links: &Links, coordinates: &[usize]) -> Vec<usize> {
         let bodies = links.bodies();
         let mut on_way = std::collections::BTreeSet::new();
-        let mut feet = std::collections::BTreeSet::new();
+        let mut translations = std::collections::BTreeSet::new();
         for &coordinate in coordinates {
             if coordinate >= bodies {
-                feet.insert(coordinate - (coordinate - bodies) % 2);
+                translations.insert(coordinate - (coordinate - bodies) % 2);
                 continue;
             }
             let mut at = links.place[coordinate];
             while at != 0 && on_way.insert(at) {
-                if links.links[at].foot != 0 {
-                    feet.insert(links.links[at].foot);
+                if links.links[at].origin_point != 0 {
+                    translations.insert(links.links[at].origin_point);
                 }
                 at = links.links[at].parent;
             }
         }
         let begin = self.steps.len();
-        let (inwards, feet): (Vec<usize>, Vec<usize>) = (on_way.into_iter().rev().collect(), feet.into_iter().collect());
-        let mut branches = feet.clone();
+        let (inwards, translations): (Vec<usize>, Vec<usize>) = (on_way.into_iter().rev().collect(), translations.into_iter().collect());
+        let mut branches = translations.clone();
         for (at, &link) in inwards.iter().enumerate() {
             let here = &links.links[link];
-            let onto = match (here.foot, here.parent) {
+            let onto = match (here.origin_point, here.parent) {
                 (0, 0) => 0,
                 (0, parent) => inwards[at..].iter().position(|&link| link == parent).unwrap_or(0),
-                (foot, _) => feet.iter().position(|&x| x == foot).map_or(0, |f| inwards.len() + 2 * f - at),
+                (origin_point, _) => translations.iter().position(|&x| x == origin_point).map_or(0, |f| inwards.len() + 2 * f - at),
             };
-            if (here.foot, here.parent) == (0, 0) {
+            if (here.origin_point, here.parent) == (0, 0) {
                 branches.push(here.body);
             }
             self.steps.push(Step { coordinate: here.body, link, onto });
         }
-        self.steps.extend(feet.iter().flat_map(|&x| [(x, 1), (x + 1, 0)]).map(|(coordinate, onto)| Step { coordinate, link: 0, onto }));
-        debug_assert_eq!(self.steps.len(), begin + inwards.len() + 2 * feet.len());
+        self.steps.extend(translations.iter().flat_map(|&x| [(x, 1), (x + 1, 0)]).map(|(coordinate, onto)| Step {
+            coordinate,
+            link: 0,
+            onto,
+        }));
+        debug_assert_eq!(self.steps.len(), begin + inwards.len() + 2 * translations.len());
         self.first.push(self.steps.len());
         branches
     }
@@ -191,7 +195,7 @@ pub struct Rows<T> {
 }
 
 impl<T: Real> Rows<T> {
-    /// Scratch space for the rows of these ways, with their [scales](crate::dynamics::row::Row::scale).
+    /// Scratch space for the rows of these ways, with their [scales](crate::dynamics::row::ConstraintEquation::scale).
     pub fn new(ways: &Ways, scales: &[f64], metric: Metric) -> Self {
         let mut scale = vec![0.0; ways.rows()];
         for (&place, &of_row) in ways.place.iter().zip(scales) {
@@ -231,9 +235,9 @@ impl<T: Real> Rows<T> {
         self.gradient(ways, row).fold(T::ZERO, |sum, (k, g)| sum + g * v[k])
     }
 
-    /// The inward passes of all rows and the factors of S, after [`take`](Self::take) for every row and [`Recursive::fold`]; the weakest row.
+    /// The inward passes of all rows and the factors of S, after [`take`](Self::take) for every row and [`Recursive::inward_pass`]; the weakest row.
     #[inline]
-    pub fn couple(&mut self, ways: &Ways, trees: &Recursive<T>) -> Weakest {
+    pub fn factor_constraints(&mut self, ways: &Ways, trees: &Recursive<T>) -> Weakest {
         for row in 0..ways.rows() {
             self.reach(ways, trees, row);
         }
@@ -284,7 +288,7 @@ impl<T: Real> Rows<T> {
             let (force, torque) = passed[k];
             if step.link == 0 {
                 excess[k] = gradient[k] - force.re - torque;
-                // The x of a foot hands the force over to its y.
+                // The x of an origin hands the force over to its y.
                 if step.onto != 0 {
                     passed[k + 1] = (Complex::new(force.im, T::ZERO), trees.joints[step.coordinate].moment.re * excess[k]);
                 }
@@ -296,7 +300,7 @@ impl<T: Real> Rows<T> {
                 let felt = force + joint.moment.times(excess[k] * joint.pivot);
                 let onto = &mut passed[k + step.onto];
                 onto.0 += felt;
-                // Nothing turns about a foot.
+                // Nothing turns about an origin.
                 if steps[k + step.onto].link != 0 {
                     onto.1 += lever.dot(felt);
                 }

@@ -62,7 +62,7 @@ impl<T: Coefficient> Series<T> {
         let (n, angles) = (self.elements, self.angles);
         let factor = T::of((m + 1) as f64);
         self.load.fill(T::ZERO);
-        self.weigh(mechanism, m);
+        self.gravity_forces(mechanism, m);
         self.force(mechanism, m);
         let Some(bodywise) = &mut self.bodywise else { return };
         let Bodywise { evaluation, passes, spread, across, sums } = &mut **bodywise;
@@ -78,7 +78,7 @@ impl<T: Coefficient> Series<T> {
             *load -= sum.re + sum.im;
         }
         let rest = &mut self.rest[m * n..(m + 1) * n];
-        evaluation.bear(passes, Order { z: &self.z[..n], known: bend, rest, load: &self.load });
+        evaluation.inward_loads(passes, Order { z: &self.z[..n], known: bend, rest, load: &self.load });
         if !self.rows.is_empty() {
             evaluation.settle(self.rows.known(m, &self.z, bend));
             self.rows.push(m, &self.z[..n], rest);

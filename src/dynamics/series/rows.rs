@@ -1,4 +1,4 @@
-//! Constraint rows in the series: the multipliers are solved for with every order.
+//! Constraint equations in the series: the multipliers are solved for with every order.
 //!
 //! ```text
 //! linear in elements:   C = c + Σ g_k·e_k - s,      J_k = g_k·(i z_k,0),   J a_m = s''_m - Σ g_k·u_k,m     force lambda g_k on e_k
@@ -12,14 +12,14 @@
 use super::drive;
 use super::polynomial::{copy, zeros};
 use crate::arithmetic::{Complex, Real};
+use crate::dynamics::constraint::{ConstraintEquation, Measure};
 use crate::dynamics::kernel::dot;
 use crate::dynamics::law::Law;
+use crate::dynamics::partition::CoordinatePartition;
 use crate::dynamics::quadratic::Quadratic;
 use crate::dynamics::rank::{Levers, Metric};
 use crate::dynamics::recursive::Evaluation;
-use crate::dynamics::row::{Measure, Row};
 use crate::dynamics::schur::{self, NEAR, Weakest};
-use crate::dynamics::ties::Ties;
 use crate::dynamics::{Mechanism, Time, tree};
 
 /// Rows in force and their multipliers.
@@ -29,7 +29,7 @@ pub struct RowSeries<T> {
     coordinates: usize,
     /// J by coordinates, and M_0⁻¹ Jᵀ (r × f).
     jacobian: Vec<T>,
-    lifted: Vec<T>,
+    minv_jt: Vec<T>,
     schur: Vec<T>,
     pivot: Vec<T>,
     /// What pivots are measured against (r).
@@ -76,11 +76,11 @@ impl<T: Real> Kind<T> {
 }
 
 impl<T: Real> RowSeries<T> {
-    /// Room for the rows that `ties` do not fulfil already: all but the motors' where these are eliminated.
+    /// Room for the rows that `partition` do not fulfil already: all but the motors' where these are eliminated.
     /// Without matrices where `is_dense` is false.
-    pub fn new(mechanism: &Mechanism, ties: &Ties, order: usize, is_dense: bool) -> Self {
-        let kind = |row: &Row| match (&row.measure, &row.law) {
-            (Measure::Angle { .. }, _) if ties.driven() => None,
+    pub fn new(mechanism: &Mechanism, partition: &CoordinatePartition, order: usize, is_dense: bool) -> Self {
+        let kind = |row: &ConstraintEquation| match (&row.measure, &row.law) {
+            (Measure::Angle { .. }, _) if partition.driven() => None,
             (&Measure::Angle { body, base }, law) => {
                 let law = law.clone().unwrap_or_else(|| Law::constant(0.0));
                 Some(Kind::Angle { body, base, law, drive: zeros(order + 1), speed: zeros(order + 1) })
@@ -89,20 +89,20 @@ impl<T: Real> RowSeries<T> {
                 Some(Kind::Place { place: place.clone(), law: law.clone(), drive: zeros(if law.is_some() { order + 1 } else { 0 }) })
             }
         };
-        let in_force = || mechanism.rows.iter().filter(|row| !(row.is_angle() && ties.driven()));
+        let in_force = || mechanism.constraints.iter().filter(|row| !(row.is_angle() && partition.driven()));
         let scale = in_force().map(|row| row.scale(&mechanism.tree)).collect();
         let size = mechanism.size_of_parts();
-        let base = |(k, b): (usize, f64)| ties.bodies[k].base.map(|base| (base, b));
+        let base = |(k, b): (usize, f64)| partition.bodies[k].base.map(|base| (base, b));
         let levers: Vec<Levers> = in_force().map(|row| row.levers(size).into_iter().filter_map(base).collect()).collect();
-        let metric = Metric::new(&levers, ties.count(), mechanism.assembly.redundant.len());
-        let kinds: Vec<Kind<T>> = mechanism.rows.iter().filter_map(kind).collect();
-        let (r, f) = (kinds.len(), ties.count());
+        let metric = Metric::new(&levers, partition.count(), mechanism.assembly.redundant.len());
+        let kinds: Vec<Kind<T>> = mechanism.constraints.iter().filter_map(kind).collect();
+        let (r, f) = (kinds.len(), partition.count());
         let matrix = |size: usize| zeros(if is_dense { size } else { 0 });
         Self {
             kinds,
             coordinates: f,
             jacobian: matrix(r * f),
-            lifted: matrix(r * f),
+            minv_jt: matrix(r * f),
             schur: matrix(r * r),
             pivot: matrix(r),
             scale,
@@ -145,24 +145,24 @@ impl<T: Real> RowSeries<T> {
     }
 
     /// J and S, from the factors of the mass matrix of the coordinates.
-    pub fn prepare(&mut self, ties: &Ties, z: &[Complex<T>], mass: &[T], pivot: &[T]) {
+    pub fn prepare(&mut self, partition: &CoordinatePartition, z: &[Complex<T>], mass: &[T], pivot: &[T]) {
         let (r, f) = (self.kinds.len(), self.coordinates);
         self.jacobian.fill(T::ZERO);
         for (kind, jacobian) in self.kinds.iter().zip(self.jacobian.chunks_exact_mut(f.max(1))) {
             kind.slopes(z, |body, entry| {
-                if let Some(base) = ties.bodies[body].base {
+                if let Some(base) = partition.bodies[body].base {
                     jacobian[base] += entry;
                 }
             });
         }
-        self.lifted.copy_from_slice(&self.jacobian);
-        for lifted in self.lifted.chunks_exact_mut(f.max(1)) {
-            tree::solve::<T, 0>(f, mass, pivot, lifted);
+        self.minv_jt.copy_from_slice(&self.jacobian);
+        for minv_jt in self.minv_jt.chunks_exact_mut(f.max(1)) {
+            tree::solve::<T, 0>(f, mass, pivot, minv_jt);
         }
-        schur::product(r, &self.jacobian, &self.lifted, &mut self.schur);
+        schur::product(r, &self.jacobian, &self.minv_jt, &mut self.schur);
         self.weakest = schur::factor::<T, 0>(r, &mut self.schur, &mut self.pivot, &self.scale);
         if self.weakest.share < NEAR {
-            let rows = [&self.jacobian[..], &self.lifted[..]];
+            let rows = [&self.jacobian[..], &self.minv_jt[..]];
             self.weakest = schur::look_closer(&self.metric, &self.scale, self.weakest, rows, &mut self.schur, &mut self.pivot);
         }
     }
@@ -175,7 +175,7 @@ impl<T: Real> RowSeries<T> {
         for (r, kind) in self.kinds.iter().enumerate() {
             evaluation.take(r, |jacobian| kind.slopes(z, |coordinate, entry| jacobian[coordinate] += entry));
         }
-        self.weakest = evaluation.couple();
+        self.weakest = evaluation.factor_constraints();
     }
 
     /// What is known of power m of every row's second derivative, less that of its law: where its multipliers will be.
@@ -198,7 +198,7 @@ impl<T: Real> RowSeries<T> {
         tree::solve::<T, 0>(r, &self.schur, &self.pivot, multiplier);
         for (i, &multiplier) in multiplier.iter().enumerate() {
             for c in 0..f {
-                solution[c] -= self.lifted[i * f + c] * multiplier;
+                solution[c] -= self.minv_jt[i * f + c] * multiplier;
             }
         }
     }
@@ -214,7 +214,7 @@ impl<T: Real> RowSeries<T> {
     }
 
     /// Adds what the multipliers below power m put on the elements as these turn to `rest`: only gradients that are not constant.
-    pub fn swing(&self, m: usize, z: &[Complex<T>], n: usize, rest: &mut [Complex<T>]) {
+    pub fn geometric_terms(&self, m: usize, z: &[Complex<T>], n: usize, rest: &mut [Complex<T>]) {
         let r = self.kinds.len();
         for (i, kind) in self.kinds.iter().enumerate() {
             let Kind::Place { place, .. } = kind else { continue };

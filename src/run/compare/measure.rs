@@ -6,7 +6,7 @@ use crate::run::drift::Limits;
 use crate::run::drift::larger;
 use crate::run::plan::Plan;
 use crate::run::running::{Run, RunError, Running};
-use crate::stepping::{StepError, Tally};
+use crate::stepping::{Statistics, StepError};
 use std::cell::Cell;
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ pub struct Found {
     /// Largest violation of any constraint, at position \[rad or m\] and velocity level \[rad/s or m/s\], where there are any.
     pub constraint: Option<[f64; 2]>,
     /// Counts.
-    pub tally: Tally,
+    pub statistics: Statistics,
 }
 
 /// How a measurement ended.
@@ -50,8 +50,14 @@ pub(super) fn measure(
 ) -> Result<Ended, StepError> {
     let mut running = Running::new(Run::new(Arc::clone(mechanism), plan, Limits::default(), start)?);
     let plan = running.plan().clone();
-    let mut found =
-        Found { error: f64::NAN, rate_error: f64::NAN, errors: Vec::new(), energy: 0.0, constraint: None, tally: Tally::default() };
+    let mut found = Found {
+        error: f64::NAN,
+        rate_error: f64::NAN,
+        errors: Vec::new(),
+        energy: 0.0,
+        constraint: None,
+        statistics: Statistics::default(),
+    };
     let is_late = room.runs_out(is_over);
     let is_row = Cell::new(false);
     loop {
@@ -81,7 +87,7 @@ pub(super) fn measure(
     let levels = outcome.drift.constraints.iter().map(|(_, [position, velocity])| [position.max, velocity.max]);
     found.constraint = levels.reduce(|a, b| [0, 1].map(|level| larger(a[level], b[level])));
     found.energy = outcome.drift.energy.max;
-    found.tally = outcome.tally;
+    found.statistics = outcome.statistics;
     Ok(match outcome.stop {
         None => Ended::Whole(found, plan),
         Some(stop) => Ended::Stopped(found, stop),
@@ -107,7 +113,7 @@ pub(super) fn time(
     let once = || {
         let mut running = Running::new(Run::new(Arc::clone(mechanism), plan.clone(), Limits::default(), start).ok()?);
         let begin = (room.clock)();
-        running.rush(&mut || is_over()).then(|| (room.clock)().saturating_sub(begin).as_secs_f64())
+        running.run_unsampled(&mut || is_over()).then(|| (room.clock)().saturating_sub(begin).as_secs_f64())
     };
     if before.is_none_or(|before| before < room.seconds) {
         let first = once()?;

@@ -265,7 +265,7 @@ impl Task<'_> {
                     }
                 };
                 // Where there is nothing to stabilize all stabilizations are one.
-                let is_one = self.mechanism.rows.is_empty();
+                let is_one = self.mechanism.constraints.is_empty();
                 if is_one && lines.iter().any(|line| (line.method, line.extended) == (method, extended)) {
                     continue;
                 }
@@ -283,7 +283,8 @@ impl Task<'_> {
 
     /// A horizon up to which there is probably time to take all methods \[s\], where that is less than `until` \[s\].
     fn possible(&self, until: f64, lines: usize) -> Option<f64> {
-        let method = if self.mechanism.tree.is_dense() || !self.mechanism.rows.is_empty() { MethodId::Dp8 } else { MethodId::Dop853 };
+        let method =
+            if self.mechanism.tree.is_dense() || !self.mechanism.constraints.is_empty() { MethodId::Dp8 } else { MethodId::Dop853 };
         // How far it is, is told by the last output time.
         let request = Request { method: Some(method), until: Some(until), every: Some(until / PARTS), ..Request::default() };
         let plan = Plan::new(self.scene, self.mechanism, &request).ok()?;
@@ -332,7 +333,7 @@ impl Task<'_> {
                 return (Some(refused), false);
             }
         };
-        let has_rows = !self.mechanism.rows.is_empty();
+        let has_rows = !self.mechanism.constraints.is_empty();
         let kept = if has_rows { Some(plan.stabilization) } else { None };
         let mut entry = Entry::without(line.method, line.extended, kept, Some(plan.clone()), Fate::Late(0.0));
         // A finer setting takes no less time than the one before.
@@ -421,7 +422,7 @@ impl Line {
     fn judge(&mut self, found: &Found) {
         let figure = if found.error.is_finite() { found.error } else { found.energy };
         // A setting that takes no more evaluations than the one before has made the same steps, and says nothing.
-        let has_worked = found.tally.evaluations > std::mem::replace(&mut self.evaluations, found.tally.evaluations);
+        let has_worked = found.statistics.evaluations > std::mem::replace(&mut self.evaluations, found.statistics.evaluations);
         let is_idle = has_worked && figure > NO_BETTER[0] * self.best && self.best < NO_BETTER[1];
         self.idle = if is_idle { self.idle + 1 } else { 0 };
         self.best = self.best.min(figure);
@@ -471,10 +472,10 @@ mod tests {
             last: 0.0,
             evaluations: 0,
         };
-        let mut tally = crate::stepping::Tally::default();
+        let mut statistics = crate::stepping::Statistics::default();
         let mut goes_on = |error: f64| {
-            tally.evaluations += 10;
-            let found = Found { error, rate_error: error, errors: Vec::new(), energy: 1e-9, constraint: None, tally };
+            statistics.evaluations += 10;
+            let found = Found { error, rate_error: error, errors: Vec::new(), energy: 1e-9, constraint: None, statistics };
             line.judge(&found);
             !line.rungs.is_empty()
         };

@@ -5,7 +5,7 @@ use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::methods::MethodId;
 use crate::run::plan::MANY_COORDINATES;
 use crate::run::reference::{Reference, Walk, reference_while, side_by_side};
-use crate::run::trust::Ruler;
+use crate::run::trust::DistanceMetric;
 use crate::stepping::StepError;
 use std::sync::Arc;
 use std::time::Duration;
@@ -40,7 +40,7 @@ pub struct Truth {
     pub(super) accelerations: Vec<Vec<f64>>,
     /// Numbers of the times at which errors are told one by one.
     pub(super) marks: Vec<usize>,
-    pub(super) ruler: Ruler,
+    pub(super) ruler: DistanceMetric,
 }
 
 impl Truth {
@@ -56,7 +56,7 @@ impl Truth {
             motions: Vec::new(),
             accelerations: Vec::new(),
             marks: Vec::new(),
-            ruler: Ruler::new(mechanism),
+            ruler: DistanceMetric::new(mechanism),
         }
     }
 
@@ -138,7 +138,7 @@ impl Truth {
             motions,
             accelerations,
             marks,
-            ruler: Ruler::new(mechanism),
+            ruler: DistanceMetric::new(mechanism),
         }
     }
 }
@@ -195,7 +195,7 @@ pub(super) fn together(
     for phi in &mut near.phi {
         *phi += Time::from(f64::EPSILON * phi.hi.abs().max(0.5));
     }
-    let ruler = Ruler::new(mechanism);
+    let ruler = DistanceMetric::new(mechanism);
     let is_late = room.runs_out(is_over);
     let mut reached = 0.0;
     let follow = |reached: &mut f64| -> Result<Option<f64>, StepError> {

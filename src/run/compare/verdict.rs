@@ -85,7 +85,7 @@ mod tests {
 
     /// A run of `method` with this error and run time \[s\].
     fn entry(method: MethodId, error: f64, seconds: f64) -> Entry {
-        let found = Found { error, rate_error: 0.0, errors: Vec::new(), energy: 0.0, constraint: None, tally: Default::default() };
+        let found = Found { error, rate_error: 0.0, errors: Vec::new(), energy: 0.0, constraint: None, statistics: Default::default() };
         Entry {
             found: Some(found),
             blocks: vec![seconds, 0.9 * seconds, 3.0 * seconds],

@@ -31,7 +31,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Evaluations of a cell where nobody says: all its runs together.
-pub const EFFORT: u64 = 1_000_000;
+pub const MAX_EVALUATIONS: u64 = 1_000_000;
 /// How often a setting is refined.
 const REFINEMENTS: u32 = 3;
 /// By how much, of a tolerance and of a step.
@@ -138,7 +138,7 @@ pub struct Stress {
     /// The methods.
     pub methods: Vec<MethodId>,
     /// Evaluations of a cell.
-    pub effort: u64,
+    pub max_evaluations: u64,
     /// Threads; 0: as many as there are processors.
     pub threads: usize,
 }
@@ -146,7 +146,7 @@ pub struct Stress {
 impl Default for Stress {
     /// The shipped set by every method.
     fn default() -> Self {
-        Self { cases: shipped(), methods: METHODS.iter().map(|info| info.id).collect(), effort: EFFORT, threads: 0 }
+        Self { cases: shipped(), methods: METHODS.iter().map(|info| info.id).collect(), max_evaluations: MAX_EVALUATIONS, threads: 0 }
     }
 }
 
@@ -174,7 +174,7 @@ pub fn stress(plan: &Stress, finished: &mut dyn FnMut(usize) -> bool) -> Vec<Lin
                 while !is_over.load(Ordering::Relaxed) {
                     let index = next.fetch_add(1, Ordering::Relaxed);
                     let Some(case) = cases.get(index / plan.methods.len().max(1)).filter(|_| index < count) else { break };
-                    let cell = cell(case, plan.methods[index % plan.methods.len()], plan.effort);
+                    let cell = cell(case, plan.methods[index % plan.methods.len()], plan.max_evaluations);
                     if send.send((index, cell)).is_err() {
                         break;
                     }
@@ -203,7 +203,8 @@ fn known(case: &Case) -> Case {
     let end = || {
         let (scene, mechanism) = prepared(case).ok()?;
         let start = mechanism.start(&scene);
-        let request = Request { method: Some(MethodId::Taylor), every: Some(scene.until), effort: Some(EXPANSIONS), ..Request::default() };
+        let request =
+            Request { method: Some(MethodId::Taylor), every: Some(scene.until), max_evaluations: Some(EXPANSIONS), ..Request::default() };
         let plan = Plan::new(&scene, &mechanism, &request).ok()?;
         let trial = integrate(Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).ok()?, &mut |_| Ok(())).ok()?;
         let found = reference(&mechanism, &start, &[trial.stop.is_none().then_some(scene.until)?.into()]).ok()?;
@@ -219,7 +220,7 @@ fn known(case: &Case) -> Case {
 }
 
 /// One scene by one method.
-pub fn cell(case: &Case, method: MethodId, effort: u64) -> Cell {
+pub fn cell(case: &Case, method: MethodId, max_evaluations: u64) -> Cell {
     let mut cell = Cell {
         method: method.info().name,
         verdict: Verdict::Refused,
@@ -233,7 +234,7 @@ pub fn cell(case: &Case, method: MethodId, effort: u64) -> Cell {
         refusal: None,
     };
     let refusal = match prepared(case) {
-        Ok((scene, mechanism)) => Trial { case, scene: &scene, mechanism: &mechanism, method, effort }.run(&mut cell).err(),
+        Ok((scene, mechanism)) => Trial { case, scene: &scene, mechanism: &mechanism, method, max_evaluations }.run(&mut cell).err(),
         Err(refusal) => Some(refusal),
     };
     cell.refusal = refusal;
@@ -269,7 +270,7 @@ struct Trial<'a> {
     scene: &'a Scene,
     mechanism: &'a Arc<Mechanism>,
     method: MethodId,
-    effort: u64,
+    max_evaluations: u64,
 }
 
 /// Angles and rates at the end of a run.
@@ -311,7 +312,7 @@ impl Trial<'_> {
                     return Ok(());
                 }
             };
-            cell.evaluations += outcome.tally.evaluations;
+            cell.evaluations += outcome.statistics.evaluations;
             cell.energy = Some(outcome.drift.energy.max);
             cell.stop = outcome.stop.clone();
             if let Some(stop) = &outcome.stop {
@@ -328,7 +329,7 @@ impl Trial<'_> {
             self.score(&outcome, &end, cell);
             // What a run knows is the error of its angles, and it knows the more the smoother its motion: where that is not far below what is asked for, and
             // for the rates, a finer run has its say.
-            let known = outcome.trust.as_ref().filter(|trust| trust.how == How::Companion && trust.at >= self.scene.until);
+            let known = outcome.trust.as_ref().filter(|trust| trust.how == How::ReferenceSolution && trust.at >= self.scene.until);
             let known = known.and_then(|trust| trust.error_estimate);
             let finer = before.as_ref().map(|before| MARGIN * end.apart(before));
             cell.estimate = match (known, finer) {
@@ -353,14 +354,14 @@ impl Trial<'_> {
 
     /// True while there is effort for another run.
     fn is_left(&self, cell: &Cell) -> bool {
-        cell.evaluations < self.effort
+        cell.evaluations < self.max_evaluations
     }
 
     /// The request of a refinement.
     fn request(&self, refinement: u32, cell: &Cell) -> Result<Request, String> {
         let horizon = self.scene.until;
-        let effort = Some(self.effort.saturating_sub(cell.evaluations).max(1));
-        let request = Request { method: Some(self.method), every: Some(horizon / 100.0), effort, ..Request::default() };
+        let max_evaluations = Some(self.max_evaluations.saturating_sub(cell.evaluations).max(1));
+        let request = Request { method: Some(self.method), every: Some(horizon / 100.0), max_evaluations, ..Request::default() };
         if self.method.is_adaptive() {
             let tolerance = (Tolerance::default().relative * FINER.0.powi(refinement as i32)).max(LEAST);
             return Ok(Request { rtol: Some(tolerance), ..request });
@@ -402,7 +403,7 @@ impl Trial<'_> {
             t: self.scene.until,
             step: 0.0,
             what: format!("the error of the end is {off}, and {:.0e} was asked for", self.case.tolerance),
-            hint: "allow more with --effort, or take a method of higher order".into(),
+            hint: "allow more with --max-evaluations, or take a method of higher order".into(),
         }
     }
 }

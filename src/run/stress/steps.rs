@@ -20,7 +20,7 @@ const DECADES: std::ops::RangeInclusive<i32> = 0..=12;
 /// Tolerance of what the ends are compared with.
 const EXACT: f64 = 1e-13;
 /// Evaluations of one run.
-const EFFORT: u64 = 3_000_000;
+const MAX_EVALUATIONS: u64 = 3_000_000;
 
 /// One step at one stiffness.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,7 +67,7 @@ pub fn stability(method: MethodId, finished: &mut dyn FnMut(usize, usize) -> boo
         let exact = End::of(&run(&scene, &mechanism, &exact)?.last, 2);
         for halvings in HALVINGS.rev() {
             let step = UNTIL / libm::exp2(f64::from(halvings));
-            let request = Request { method: Some(method), step: Some(step), effort: Some(EFFORT), ..Request::default() };
+            let request = Request { method: Some(method), step: Some(step), max_evaluations: Some(MAX_EVALUATIONS), ..Request::default() };
             let outcome = run(&scene, &mechanism, &request)?;
             let end = End { rates: Vec::new(), ..End::of(&outcome.last, 2) };
             let error = outcome.stop.is_none().then(|| end.apart(&exact));

@@ -66,7 +66,7 @@ impl<'a> Judge<'a> {
         let member = |ready: &'a Ready| {
             let state = Elimination::<0>::new(Arc::clone(&ready.mechanism)).state(&ready.start);
             let mut member = BatchMember::new(&ready.mechanism, state);
-            member.tally.effort = ready.plan.effort.saturating_mul(2);
+            member.statistics.max_evaluations = ready.plan.max_evaluations.saturating_mul(2);
             member
         };
         Self { batch, members: ready.iter().map(member).collect(), known: vec![Known::default(); ready.len()] }

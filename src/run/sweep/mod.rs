@@ -336,20 +336,20 @@ pub fn sweep_on(sweep: &Sweep, threads: usize, seen: Totals, observer: &mut dyn 
     };
     let first = seen.points().min(sweep.grid.count());
     let shared = Shared { sweep, chunk: sweep.chunk(threads), first, finished: AtomicU64::new(first), is_over: AtomicBool::new(false) };
-    let mut audience = Audience { observer, begin, before: seen.wall, totals: Totals { threads, ..seen } };
+    let mut sweep_observer = SweepObserver { observer, begin, before: seen.wall, totals: Totals { threads, ..seen } };
     #[cfg(feature = "threads")]
-    threads::integrate(&shared, threads, &mut audience)?;
+    threads::integrate(&shared, threads, &mut sweep_observer)?;
     #[cfg(not(feature = "threads"))]
     for chunk in 0..shared.chunks() {
-        shared.integrate(chunk).iter().try_for_each(|point| audience.see(point))?;
-        audience.finished(shared.finished.load(Ordering::Relaxed))?;
+        shared.integrate(chunk).iter().try_for_each(|point| sweep_observer.see(point))?;
+        sweep_observer.finished(shared.finished.load(Ordering::Relaxed))?;
     }
-    audience.totals.wall = audience.before + begin.elapsed();
-    Ok(audience.totals)
+    sweep_observer.totals.wall = sweep_observer.before + begin.elapsed();
+    Ok(sweep_observer.totals)
 }
 
 /// An observer, and what it has seen.
-struct Audience<'a> {
+struct SweepObserver<'a> {
     observer: &'a mut dyn PointObserver,
     begin: Instant,
     /// Time spent before this part of the sweep.
@@ -357,7 +357,7 @@ struct Audience<'a> {
     totals: Totals,
 }
 
-impl Audience<'_> {
+impl SweepObserver<'_> {
     fn see(&mut self, point: &Point) -> std::io::Result<()> {
         self.totals.take(point);
         self.observer.see(point)

@@ -5,7 +5,7 @@ use super::{Sweep, timed};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::elimination::Elimination;
 use crate::dynamics::kernel::Kernel;
-use crate::dynamics::{Form, Glance, Mechanism, Motion};
+use crate::dynamics::{BodyAngles, Form, Mechanism, Motion};
 use crate::run::allowance::{Allowance, EnergyLimit, Moment};
 use crate::run::drift::larger;
 use crate::run::driver::MOST_TURNS;
@@ -195,7 +195,7 @@ impl Sweep {
                 point.omega = outcome.last.omega;
                 point.energy = outcome.drift.energy.max;
                 point.constraint = levels.reduce(|a, b| [larger(a[0], b[0]), larger(a[1], b[1])]);
-                point.steps = outcome.tally.steps;
+                point.steps = outcome.statistics.steps;
                 point.flip = outcome.flip;
                 point.trust = outcome.trust.as_ref().map(PointTrust::from);
                 point.status = outcome.stop.map_or(Status::Done, Status::Stopped);
@@ -216,14 +216,14 @@ impl Sweep {
         for ready in &ready {
             let state = Elimination::<0>::new(Arc::clone(&ready.mechanism)).state(&ready.start);
             let mut member = BatchMember::new(&ready.mechanism, state);
-            member.tally.effort = ready.plan.effort;
+            member.statistics.max_evaluations = ready.plan.max_evaluations;
             members.push(member);
             let reference = ready.mechanism.energy(&mut kernel, &ready.start.phi, &ready.start.omega).total();
             lanes.push(Lane {
                 point: ready.point.clone(),
                 reference,
                 scale: ready.scale,
-                seen: [Glance::default(), Glance::default()],
+                seen: [BodyAngles::default(), BodyAngles::default()],
                 allowance: Allowance::new(&ready.mechanism, &ready.plan),
                 limit: EnergyLimit::default(),
             });
@@ -274,7 +274,7 @@ struct Lane {
     reference: DoubleDouble,
     scale: f64,
     /// Both ends of a step.
-    seen: [Glance; 2],
+    seen: [BodyAngles; 2],
     /// What the tolerance explains of the energy's imbalance, and the limit that follows from it.
     allowance: Option<Allowance>,
     limit: EnergyLimit,
@@ -283,26 +283,26 @@ struct Lane {
 impl Lane {
     /// Looks for a bar that turns over in a step.
     fn look(&mut self, bodies: usize, passage: &Passage) {
-        let glance = |after: f64, glance: &mut Glance| {
-            glance.phi.clear();
-            glance.turns.clear();
-            glance.omega.clear();
+        let body_angles = |after: f64, body_angles: &mut BodyAngles| {
+            body_angles.phi.clear();
+            body_angles.turns.clear();
+            body_angles.omega.clear();
             for bar in 0..bodies {
                 let (winding, omega) = passage.at(bar, after);
                 // As states are wrapped: an angle of exactly π has not passed it.
                 let turns = if winding.abs() <= PI { 0.0 } else { (winding / (2.0 * PI)).round() };
-                glance.phi.push(winding - 2.0 * PI * turns);
-                glance.turns.push(turns as i64);
-                glance.omega.push(omega);
+                body_angles.phi.push(winding - 2.0 * PI * turns);
+                body_angles.turns.push(turns as i64);
+                body_angles.omega.push(omega);
             }
         };
-        glance(0.0, &mut self.seen[0]);
-        glance(passage.step, &mut self.seen[1]);
+        body_angles(0.0, &mut self.seen[0]);
+        body_angles(passage.step, &mut self.seen[1]);
         let [a, b] = &self.seen;
         if flip::can_pass(a, b, passage.step) {
             self.point.flip = flip::search(passage.from.hi, passage.step, &self.seen, &mut |after| {
-                let mut there = Glance::default();
-                glance(after, &mut there);
+                let mut there = BodyAngles::default();
+                body_angles(after, &mut there);
                 there
             });
         }
@@ -331,9 +331,9 @@ impl Lane {
         point.t = state.time.hi;
         point.phi = (0..n).map(|k| motion.unwrapped(k)).collect();
         point.omega = motion.omega.iter().map(|omega| omega.hi).collect();
-        point.steps = member.tally.steps;
+        point.steps = member.statistics.steps;
         if let Some(allowance) = &self.allowance {
-            let moment = Moment { omega: &point.omega, feet: &[], work: 0.0, largest: self.scale, steps: point.steps };
+            let moment = Moment { omega: &point.omega, translations: &[], work: 0.0, largest: self.scale, steps: point.steps };
             self.limit.see(allowance, &moment);
         }
         let limit = stated.unwrap_or(self.limit.most);

@@ -1,6 +1,6 @@
 //! Chunks on several threads, seen in order.
 
-use super::{Audience, Point, Shared, SweepError};
+use super::{Point, Shared, SweepError, SweepObserver};
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -15,13 +15,13 @@ const TICK: Duration = Duration::from_millis(100);
 type Finished = (u64, Option<Vec<Point>>);
 
 /// Sends word even where integrating panics.
-struct Messenger {
+struct PanicNotifier {
     chunk: u64,
     points: Option<Vec<Point>>,
     send: Sender<Finished>,
 }
 
-impl Drop for Messenger {
+impl Drop for PanicNotifier {
     fn drop(&mut self) {
         // Nobody listens any more where the sweep is over.
         let _ = self.send.send((self.chunk, self.points.take()));
@@ -29,7 +29,7 @@ impl Drop for Messenger {
 }
 
 /// Integrates all chunks and shows them in order.
-pub(super) fn integrate(shared: &Shared, threads: usize, audience: &mut Audience) -> Result<(), SweepError> {
+pub(super) fn integrate(shared: &Shared, threads: usize, sweep_observer: &mut SweepObserver) -> Result<(), SweepError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| SweepError::Threads(error.to_string()))?;
     let (send, receive) = channel::<Finished>();
     pool.in_place_scope(|scope| {
@@ -39,7 +39,7 @@ pub(super) fn integrate(shared: &Shared, threads: usize, audience: &mut Audience
         let mut go_on = || {
             while seen < chunks {
                 while begun < chunks.min(seen + ahead) {
-                    let mut messenger = Messenger { chunk: begun, points: None, send: send.clone() };
+                    let mut messenger = PanicNotifier { chunk: begun, points: None, send: send.clone() };
                     scope.spawn(move |_| {
                         messenger.points = Some(shared.integrate(messenger.chunk));
                         drop(messenger);
@@ -53,10 +53,10 @@ pub(super) fn integrate(shared: &Shared, threads: usize, audience: &mut Audience
                     Err(RecvTimeoutError::Timeout) => {}
                 }
                 while let Some(points) = waiting.remove(&seen) {
-                    points.iter().try_for_each(|point| audience.see(point))?;
+                    points.iter().try_for_each(|point| sweep_observer.see(point))?;
                     seen += 1;
                 }
-                audience.finished(shared.finished.load(Ordering::Relaxed))?;
+                sweep_observer.finished(shared.finished.load(Ordering::Relaxed))?;
             }
             Ok(())
         };

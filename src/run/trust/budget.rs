@@ -1,19 +1,19 @@
-//! What a companion may cost: a share of the run's work, counted and not clocked, so that the figures are the same on every machine.
+//! What a reference solution may cost: a share of the run's work, counted and not clocked, so that the figures are the same on every machine.
 //!
-//! Work is measured in nanoseconds of the machine the constants were taken on.  They need to be right within a factor of two or so; what the companion
+//! Work is measured in nanoseconds of the machine the constants were taken on.  They need to be right within a factor of two or so; what the reference solution
 //! really costs beside runs of the shipped scenes is what `.ci/cost` counts.
 
 use crate::dynamics::Mechanism;
 use crate::run::build::order_in_double_double;
 use crate::run::methods::MethodId;
 use crate::run::plan::Plan;
-use crate::stepping::{Tally, Taylor};
+use crate::stepping::{Statistics, Taylor};
 
-/// Largest share of the run's work that its companion may take.
+/// Largest share of the run's work that its reference solution may take.
 pub const SHARE: f64 = 0.3;
-/// Work that is free: what nobody notices at the end of a run, and of runs of fixed steps or near rounding, whose companions cost most beside them.
+/// Work that is free: what nobody notices at the end of a run, and of runs of fixed steps or near rounding, whose reference solutions cost most beside them.
 pub const GRACE: [f64; 2] = [20e6, 50e6];
-/// Share and work free of charge of a companion in double-double, where the run is not near rounding.
+/// Share and work free of charge of a reference solution in double-double, where the run is not near rounding.
 pub const DOUBLE_DOUBLE: [f64; 2] = [0.05, 100e3];
 /// The same of the tangent flow from Jacobians, and from series on dual numbers.
 pub const FLOW: [[f64; 2]; 2] = [[0.5, 200e3], [0.15, 120e3]];
@@ -31,16 +31,16 @@ const WIDE: f64 = 8.0;
 pub struct Prices {
     /// One evaluation of the equations.
     pub evaluation: f64,
-    /// One step of the companion's series, and of the run's where it has one.
+    /// One step of the reference solution's series, and of the run's where it has one.
     pub series: [f64; 2],
-    /// The companion's motion at one time, and how far it is from the run's.
+    /// The reference solution's motion at one time, and how far it is from the run's.
     pub look: f64,
 }
 
 impl Prices {
-    /// Those of a mechanism, for the plans of a companion and of its run.
-    pub fn new(mechanism: &Mechanism, companion: &Plan, run: &Plan) -> Self {
-        let (n, rows) = (mechanism.coordinates() as f64, mechanism.rows.len() as f64);
+    /// Those of a mechanism, for the plans of a reference solution and of its run.
+    pub fn new(mechanism: &Mechanism, error_estimator: &Plan, run: &Plan) -> Self {
+        let (n, rows) = (mechanism.coordinates() as f64, mechanism.constraints.len() as f64);
         let forces = (mechanism.springs.len() + mechanism.torsions.len() + mechanism.actions.len() + mechanism.forces.len()) as f64;
         let goes_bodywise = mechanism.recursion.is_some();
         let matrices = if goes_bodywise { 7.0 * n } else { 4.0 * n * n };
@@ -73,11 +73,11 @@ impl Prices {
             each * wide * (order / 20.0).powi(2)
         };
         let look = 200.0 + 60.0 * n + if rows > 0.0 { evaluation } else { 0.0 };
-        Self { evaluation, series: [series(companion), series(run)], look }
+        Self { evaluation, series: [series(error_estimator), series(run)], look }
     }
 
     /// The work of a run so far, its output left out: estimates do not depend on that.
-    pub fn run(&self, method: MethodId, tally: Tally) -> f64 {
-        tally.evaluations as f64 * if method == MethodId::Taylor { self.series[1] } else { self.evaluation }
+    pub fn run(&self, method: MethodId, statistics: Statistics) -> f64 {
+        statistics.evaluations as f64 * if method == MethodId::Taylor { self.series[1] } else { self.evaluation }
     }
 }

@@ -4,16 +4,16 @@ use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Mechanism, Motion};
 use crate::run::drift::larger;
 
-/// Measures distances: angles as they are \[rad\], positions of free feet over the mechanism's size.
+/// Measures distances: angles as they are \[rad\], positions of translational coordinates over the mechanism's size.
 #[derive(Clone, Copy, Debug)]
-pub struct Ruler {
+pub struct DistanceMetric {
     /// How many coordinates are angles; the others are positions.
     angles: usize,
     /// The longest bar \[m\], or the farthest centre of mass where none has a length.
     size: f64,
 }
 
-impl Ruler {
+impl DistanceMetric {
     /// The ruler of a mechanism.
     pub fn new(mechanism: &Mechanism) -> Self {
         let bars = mechanism.bodies.iter().map(|body| (body.ends[1] - body.ends[0]).norm_squared().sqrt()).fold(0.0, f64::max);
@@ -61,16 +61,16 @@ mod tests {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes/cart_pole.json");
         let scene = read_scene(&path, &[]).expect("a shipped scene");
         let mechanism = Mechanism::new(&scene).expect("equations");
-        let (ruler, one) = (Ruler::new(&mechanism), mechanism.start(&scene));
-        assert_eq!(ruler.apart(&one, &one), 0.0);
+        let (metric, one) = (DistanceMetric::new(&mechanism), mechanism.start(&scene));
+        assert_eq!(metric.apart(&one, &one), 0.0);
         let mut other = one.clone();
         other.turns[0] += 1;
-        assert_eq!(ruler.apart(&one, &other), std::f64::consts::TAU);
+        assert_eq!(metric.apart(&one, &other), std::f64::consts::TAU);
         let last = one.phi.len() - 1;
         assert!(last >= mechanism.bodies.len(), "a foot that moves freely");
         other = one.clone();
         other.phi[last] = other.phi[last] + 0.5;
         let longest = scene.bars.iter().map(|bar| bar.length).fold(0.0, f64::max);
-        assert!((ruler.apart(&one, &other) - 0.5 / longest).abs() < 1e-15);
+        assert!((metric.apart(&one, &other) - 0.5 / longest).abs() < 1e-15);
     }
 }

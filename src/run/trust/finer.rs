@@ -7,21 +7,21 @@ use crate::run::plan::Plan;
 use crate::stepping::composition::Composition;
 use crate::stepping::{Taylor, Tolerance};
 
-/// The companion's tolerance over the run's.
+/// The reference solution's tolerance over the run's.
 const FINER: f64 = 100.0;
 /// From which tolerance of a run on its rounding counts.
 const NEAR_ROUNDING: f64 = 1e-10;
-/// Tolerance \[rad/s\] of companions in doubles: of runs that are not near rounding, at most, and of all others.  Below 1e-15 the last orders of a series in
+/// Tolerance \[rad/s\] of reference solutions in doubles: of runs that are not near rounding, at most, and of all others.  Below 1e-15 the last orders of a series in
 /// doubles are rounding, and its steps come out too long for modes that are fast, and for chains of bodies.
 const FINE: f64 = 1e-14;
 const FINEST: f64 = 1e-15;
-/// Tolerance \[rad/s\] with the first orders in double-double, of companions all in double-double, and of those of runs with extended orders.
+/// Tolerance \[rad/s\] with the first orders in double-double, of reference solutions all in double-double, and of those of runs with extended orders.
 const EXTENDED: f64 = 1e-20;
 const BEYOND: f64 = 1e-22;
 /// The same where only the growth of small differences is asked for.
 const COARSE: f64 = 1e-8;
 
-/// A companion's plan, and what it is in words.
+/// A reference solution's plan, and what it is in words.
 pub(super) struct Finer {
     pub plan: Plan,
     pub name: String,
@@ -40,7 +40,7 @@ fn tolerance(plan: &Plan) -> Option<f64> {
     plan.tolerance.map(|tolerance| tolerance.relative.min(tolerance.absolute))
 }
 
-/// The first companion of a run.
+/// The first reference solution of a run.
 pub(super) fn first(mechanism: &Mechanism, run: &Plan, level: Level) -> Finer {
     let finer = tolerance(run).map(|tolerance| tolerance / FINER);
     let has_series = mechanism.vibration.is_none() && mechanism.tree.is_dense();
@@ -119,13 +119,13 @@ fn series(mechanism: &Mechanism, run: &Plan, tolerance: f64, [extended, in_doubl
     Finer { name: format!("taylor at {:.0e}{digits}", tolerance.relative), plan }
 }
 
-/// Whether a companion may be no finer than its run.
+/// Whether a reference solution may be no finer than its run.
 pub(super) fn is_bound(series: &Plan, run: &Plan) -> bool {
     let tolerance = tolerance(run).unwrap_or_default();
     is_rounded(series) || (series.method != MethodId::Taylor && (run.method == MethodId::Taylor || tolerance < NEAR_ROUNDING))
 }
 
-/// Whether a companion's own rounding counts.
+/// Whether a reference solution's own rounding counts.
 pub(super) fn is_rounded(series: &Plan) -> bool {
     series.method == MethodId::Taylor
         && !series.extended

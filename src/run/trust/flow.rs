@@ -3,7 +3,7 @@
 use super::Tangent;
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::build::build;
-use crate::run::contact::Course;
+use crate::run::contact::ContactDriver;
 use crate::run::plan::Plan;
 use crate::run::running::Outcome;
 use std::sync::Arc;
@@ -40,19 +40,19 @@ pub fn flow(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion, times: &[f6
     let mut plan = plan.clone();
     let mut outcome = Outcome::begun(mechanism, plan.clone());
     let driver = build(mechanism, &mut plan, start).map_err(|stop| stop.what)?;
-    let mut course = Course::new(Arc::clone(mechanism), driver);
-    course.meet(&mut outcome).map_err(|stop| stop.what)?;
-    let begin = course.motion();
-    let mut tangent = Tangent::new(course.holding(), &begin, plan.until)?;
-    course.jumps = Some(Vec::new());
+    let mut contact_driver = ContactDriver::new(Arc::clone(mechanism), driver);
+    contact_driver.meet(&mut outcome).map_err(|stop| stop.what)?;
+    let begin = contact_driver.motion();
+    let mut tangent = Tangent::new(contact_driver.holding(), &begin, plan.until)?;
+    contact_driver.jumps = Some(Vec::new());
     let moment = |motion: Motion, tangent: &Tangent| Moment { motion, columns: tangent.columns(), growth: tangent.growth() };
     let mut flow = Flow { moments: vec![moment(begin, &tangent)], rate: tangent.rate(), steps: 0, lost: None };
     for &time in times {
         loop {
             let next = tangent.next_within(time);
-            course.go(Time::from(next), &mut outcome, &mut || false).map_err(|stop| format!("at {} s: {}", stop.t, stop.what))?;
-            tangent.jump(&std::mem::take(course.jumps.get_or_insert_default()));
-            tangent.take(&course.motion(), 0);
+            contact_driver.go(Time::from(next), &mut outcome, &mut || false).map_err(|stop| format!("at {} s: {}", stop.t, stop.what))?;
+            tangent.jump(&std::mem::take(contact_driver.jumps.get_or_insert_default()));
+            tangent.take(&contact_driver.motion(), 0);
             flow.steps += 1;
             if let Some(lost) = tangent.lost() {
                 flow.lost = Some(lost.into());
@@ -63,8 +63,8 @@ pub fn flow(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion, times: &[f6
             }
         }
         // The last motion asked for may be one before the end of a step.
-        course.go(Time::from(time), &mut outcome, &mut || false).map_err(|stop| format!("at {} s: {}", stop.t, stop.what))?;
-        flow.moments.push(moment(course.motion(), &tangent));
+        contact_driver.go(Time::from(time), &mut outcome, &mut || false).map_err(|stop| format!("at {} s: {}", stop.t, stop.what))?;
+        flow.moments.push(moment(contact_driver.motion(), &tangent));
     }
     Ok(flow)
 }

@@ -42,7 +42,7 @@ pub(super) struct Growth {
 impl Nature {
     /// Of a mechanism whose flow has begun.
     pub fn new(mechanism: &Mechanism, tangent: &Tangent) -> Self {
-        let moves = mechanism.rows.iter().filter_map(|row| row.law.as_ref()).any(|law| !law.is_constant());
+        let moves = mechanism.constraints.iter().filter_map(|row| row.law.as_ref()).any(|law| !law.is_constant());
         let pushes = mechanism.actions.iter().any(|action| action.law.is_some());
         Self { is_planar: tangent.freedom() <= 1 && !moves && !pushes, rate: tangent.rate() }
     }

@@ -5,7 +5,7 @@
 //! total       = root of the sum of the squares of all effects                          x  angles, and positions over the longest bar
 //! ```
 //!
-//! x(t; p ± h) are runs from neighbouring scenes by the series in doubles, at the tolerance of a companion.  They go through whatever the scene has: impacts,
+//! x(t; p ± h) are runs from neighbouring scenes by the series in doubles, at the tolerance of a reference solution.  They go through whatever the scene has: impacts,
 //! constraints that change with p, starts that are found.  h is chosen for each number so that the difference is far above the rounding of such runs, which two runs of the
 //! scene itself tell, and small enough to be proportional to h, which the two sides tell.  The effect is that of u *in proportion*: u itself may be
 //! so large that the motion becomes another.
@@ -14,10 +14,10 @@
 
 use super::finer::neighbour;
 use super::measured::LAST_DIGIT;
-use super::{Ruler, Trust};
+use super::{DistanceMetric, Trust};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::build::build;
-use crate::run::contact::Course;
+use crate::run::contact::ContactDriver;
 use crate::run::driver::Pause;
 use crate::run::plan::Plan;
 use crate::run::running::Outcome;
@@ -88,10 +88,10 @@ pub struct Inputs {
 impl Inputs {
     /// The effects of these numbers of a scene up to `until` \[s\], on runs of at most so many evaluations each; `reach` \[rad\] is about what a relative change
     /// of 1 in all of them comes to, where that is known.
-    pub fn of(template: &Template, numbers: &[Written], until: f64, effort: u64, reach: Option<f64>, pause: &mut Pause) -> Self {
+    pub fn of(template: &Template, numbers: &[Written], until: f64, max_evaluations: u64, reach: Option<f64>, pause: &mut Pause) -> Self {
         let mut inputs = Self { at: until, ..Self::default() };
         let mut found = Vec::new();
-        match Neighbours::new(template, until, effort, reach, &mut inputs, pause) {
+        match Neighbours::new(template, until, max_evaluations, reach, &mut inputs, pause) {
             Err(why) => inputs.why = Some(why),
             Ok(mut neighbours) => found.extend(numbers.iter().map(|number| neighbours.input(number))),
         }
@@ -119,7 +119,7 @@ impl Trust {
     pub fn with_inputs(mut self, template: &Template, typed: &[String], plan: &Plan, pause: &mut Pause) -> Result<Self, SceneError> {
         let numbers = template.written_numbers(typed)?;
         let reach = self.input_error.map(|error| error / LAST_DIGIT);
-        let inputs = Inputs::of(template, &numbers, self.at, plan.effort, reach, pause);
+        let inputs = Inputs::of(template, &numbers, self.at, plan.max_evaluations, reach, pause);
         let is_whole = inputs.at == self.at;
         self.input_error = inputs.total.filter(|_| is_whole).map(|total| total.min(TAU));
         self.inputs = Some(inputs);
@@ -137,8 +137,8 @@ struct Neighbour {
 struct Neighbours<'a, 'b> {
     template: &'a Template,
     times: Vec<Time>,
-    effort: u64,
-    ruler: Ruler,
+    max_evaluations: u64,
+    metric: DistanceMetric,
     coordinates: usize,
     /// The motions of the scene itself, and what rounding does to them at most \[rad\].
     motions: Vec<Motion>,
@@ -153,7 +153,7 @@ impl<'a, 'b> Neighbours<'a, 'b> {
     fn new(
         template: &'a Template,
         until: f64,
-        effort: u64,
+        max_evaluations: u64,
         reach: Option<f64>,
         inputs: &'a mut Inputs,
         pause: &'a mut Pause<'b>,
@@ -167,8 +167,8 @@ impl<'a, 'b> Neighbours<'a, 'b> {
         let mut neighbours = Self {
             template,
             times,
-            effort,
-            ruler: Ruler::new(&mechanism),
+            max_evaluations,
+            metric: DistanceMetric::new(&mechanism),
             coordinates: mechanism.coordinates(),
             motions: Vec::new(),
             noise: LEAST_NOISE,
@@ -186,7 +186,7 @@ impl<'a, 'b> Neighbours<'a, 'b> {
     fn keep(&mut self, mut motions: Vec<Motion>, others: &[Motion], stop: Option<String>) -> Result<(), String> {
         let mut kept = 0;
         for (one, other) in motions.iter().zip(others) {
-            let apart = self.ruler.apart(one, other);
+            let apart = self.metric.apart(one, other);
             if apart.is_nan() || apart > MOST_NOISE {
                 break;
             }
@@ -210,28 +210,28 @@ impl<'a, 'b> Neighbours<'a, 'b> {
     fn go(&mut self, mechanism: &Arc<Mechanism>, scene: &Scene, coarser: f64) -> (Vec<Motion>, Option<String>) {
         let Some(&until) = self.times.last() else { return (Vec::new(), None) };
         let mut motions = Vec::new();
-        let mut plan = Plan { effort: self.effort, ..neighbour(mechanism, until.hi, coarser) };
+        let mut plan = Plan { max_evaluations: self.max_evaluations, ..neighbour(mechanism, until.hi, coarser) };
         let mut outcome = Outcome::begun(mechanism, plan.clone());
         let mut driver = match build(mechanism, &mut plan, &mechanism.start(scene)) {
             Ok(driver) => driver,
             Err(stop) => return (motions, Some(stop.what)),
         };
-        driver.allow(self.effort);
-        let mut course = Course::new(Arc::clone(mechanism), driver);
+        driver.allow(self.max_evaluations);
+        let mut contact_driver = ContactDriver::new(Arc::clone(mechanism), driver);
         self.inputs.runs += 1;
-        let mut stop = course.meet(&mut outcome).err();
+        let mut stop = contact_driver.meet(&mut outcome).err();
         let mut is_paused = false;
         for &time in &self.times {
             if stop.is_some() || is_paused {
                 break;
             }
-            match course.go(time, &mut outcome, self.pause) {
-                Ok(true) => motions.push(course.motion()),
+            match contact_driver.go(time, &mut outcome, self.pause) {
+                Ok(true) => motions.push(contact_driver.motion()),
                 Ok(false) => is_paused = true,
                 Err(reason) => stop = Some(reason),
             }
         }
-        self.inputs.evaluations += course.tally().evaluations;
+        self.inputs.evaluations += contact_driver.statistics().evaluations;
         let why = stop.map(|stop| format!("at t = {} s: {}", stop.t, stop.what));
         (motions, if is_paused { Some("interrupted".into()) } else { why })
     }
@@ -342,7 +342,7 @@ impl<'a, 'b> Neighbours<'a, 'b> {
 
     /// The largest difference at any of the times; infinite where one is not a number.
     fn apart(&self, one: &[Motion], other: &[Motion]) -> f64 {
-        let apart = one.iter().zip(other).map(|(one, other)| self.ruler.apart(one, other));
+        let apart = one.iter().zip(other).map(|(one, other)| self.metric.apart(one, other));
         apart.fold(0.0, |most, apart| if apart.is_nan() { f64::INFINITY } else { most.max(apart) })
     }
 }

@@ -1,4 +1,4 @@
-//! What a companion has measured so far, and what it amounts to.
+//! What a reference solution has measured so far, and what it amounts to.
 
 use super::growth::{Growth, Nature};
 use super::tangent::Tangent;
@@ -18,7 +18,7 @@ const ROUNDED: f64 = 2.2e-16;
 /// What the last digit of the scene's numbers moves them by, in units of their size; fitted.
 pub(super) const LAST_DIGIT: f64 = 2.5 * 1.1e-16;
 
-/// How far a run and its companion are apart at one time: an angle \[rad\], a rate \[rad/s\], and the torque of a motor \[N·m\], each the largest.  `None`
+/// How far a run and its reference solution are apart at one time: an angle \[rad\], a rate \[rad/s\], and the torque of a motor \[N·m\], each the largest.  `None`
 /// where it is not to be told there.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Apart {
@@ -31,7 +31,7 @@ pub(super) struct Apart {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Measured {
     pub level: Level,
-    /// The companion, in words.
+    /// The reference solution, in words.
     pub name: String,
     /// What it cannot see, in words.
     pub shared: Vec<String>,
@@ -59,7 +59,7 @@ pub(super) struct Measured {
     pub input_error: Option<f64>,
     /// Why it went no further.
     pub why: Option<String>,
-    /// Growth of small differences against time, once the companion has ended, and of which kind it may be.
+    /// Growth of small differences against time, once the reference solution has ended, and of which kind it may be.
     pub history: Vec<[f64; 2]>,
     pub nature: Nature,
     /// Why nothing is known of it, or not from some time on.
@@ -226,7 +226,7 @@ impl Measured {
             input_error: input_error.filter(|&error| error > 0.0).map(|error| error.min(TAU)),
             inputs: None,
             model_error: None,
-            companion: Some(name),
+            error_estimator: Some(name),
             shared,
             covered: until,
             why,
@@ -238,11 +238,11 @@ impl Measured {
         let printed = |error: f64| (CAUTION * error).max(least);
         let (mut rate, mut torque) = (self.rate, self.torque);
         if let (Some(horizon), Some(beside)) = (trust.horizon, self.beside) {
-            trust.how = How::Companion;
+            trust.how = How::ReferenceSolution;
             (trust.error_estimate, trust.at) = (Some(printed(HORIZON)), horizon);
             (rate, torque) = beside;
         } else if until >= t && trust.record.len() > 1 || t == 0.0 {
-            (trust.how, trust.error_estimate) = (How::Companion, Some(printed(error)));
+            (trust.how, trust.error_estimate) = (How::ReferenceSolution, Some(printed(error)));
         } else if let Some(power) = power(&trust.record, &history) {
             trust.how = How::Extrapolated(until);
             let base = error.max(LEAST);

@@ -1,12 +1,12 @@
 //! How far a run may be trusted: its error estimated while it goes, and the time from which its path is no longer that of its start.
 //!
-//! Beside the run goes a *companion*: the same mechanism from the same bits by [`taylor`](crate::stepping::taylor) at 1e-14 or a
-//! hundredth of the run's tolerance, or in double-double where the run is near rounding (module `finer`).  Both are looked at at times of the companion's own,
+//! Beside the run goes a *reference solution*: the same mechanism from the same bits by [`taylor`](crate::stepping::taylor) at 1e-14 or a
+//! hundredth of the run's tolerance, or in double-double where the run is near rounding (module `finer`).  Both are looked at at times of the reference solution's own,
 //! which depend neither on output times nor on rests:
 //!
 //! ```text
 //! E(t) = max over the looks up to t of sqrt(d² + R²)      d  largest difference of an angle [rad], or of a position over the longest bar
-//!                                                          R  the companion's own rounding where it is in doubles, carried along by the tangent flow
+//!                                                          R  the reference solution's own rounding where it is in doubles, carried along by the tangent flow
 //! ```
 //!
 //! d is exact whatever the motion does, R matters near rounding only.  The *error estimate* is 1.2 E, the *horizon* the first time E passes
@@ -14,25 +14,25 @@
 //! differences grow, exponentially or as a power of time (module `growth`), and what the last digit
 //! of the inputs as doubles comes to, about; what every number comes to by the digits it is written with, runs of neighbouring scenes tell (module [`inputs`]).
 //!
-//! What the companion may cost is counted in work, not in seconds: the same run has the same figures on every machine ([`budget`]).  Where it is used
+//! What the reference solution may cost is counted in work, not in seconds: the same run has the same figures on every machine ([`budget`]).  Where it is used
 //! up, a regular motion's error is carried on by the power law it followed so far, and said to be *extrapolated*.
 //!
 //! Source of the constants of R: fitted on random starts of double pendulums with springs and motors against references in double-double; the table of
 //! `tests/trust.rs` is their test.
 
 pub mod budget;
-mod companion;
 mod distance;
+mod error_estimator;
 mod finer;
 mod flow;
 mod growth;
 pub mod inputs;
 mod measured;
-mod shadow;
+mod reference_run;
 pub mod tangent;
 
-pub(super) use companion::{Companion, Kept};
-pub use distance::Ruler;
+pub use distance::DistanceMetric;
+pub(super) use error_estimator::{ErrorEstimator, Kept};
 pub use flow::{Flow, Moment, flow};
 pub use inputs::{Input, Inputs};
 pub(super) use measured::crossing;
@@ -44,10 +44,10 @@ use std::str::FromStr;
 
 /// The error \[rad\] whose first time is the horizon.
 pub const HORIZON: f64 = 1e-3;
-/// The error \[rad\] beyond which the run and its companion are two motions.
+/// The error \[rad\] beyond which the run and its reference solution are two motions.
 pub const LOST: f64 = 0.1;
-/// What is said to be used up where the companion of [`Level::Full`] was cut short.
-const CUT: &str = "the companion's work limit";
+/// What is said to be used up where the reference solution of [`Level::Full`] was cut short.
+const CUT: &str = "the work limit of the reference solution";
 /// What is printed is so many times E, and at least the rounding of an angle \[rad\].
 pub(super) const CAUTION: f64 = 1.2;
 pub(super) const LEAST: f64 = 2e-15;
@@ -61,7 +61,7 @@ pub enum Level {
     /// At most [`budget::SHARE`] of the run's work.
     #[default]
     Auto,
-    /// With a companion in double-double, up to [`budget::FULL_SHARE`] times the run's work and no more evaluations than it is allowed.
+    /// With a reference solution in double-double, up to [`budget::FULL_SHARE`] times the run's work and no more evaluations than it is allowed.
     Full,
 }
 
@@ -96,9 +96,9 @@ impl FromStr for Level {
 /// Where an error estimate comes from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum How {
-    /// From a companion up to its time.
-    Companion,
-    /// Carried on by a power law from the time the companion ended \[s\].
+    /// From a reference solution up to its time.
+    ReferenceSolution,
+    /// Carried on by a power law from the time the reference solution ended \[s\].
     Extrapolated(f64),
     /// There is none for this time.
     #[default]
@@ -109,7 +109,7 @@ impl How {
     /// One word, as in JSON.
     pub fn word(self) -> &'static str {
         match self {
-            Self::Companion => "companion",
+            Self::ReferenceSolution => "companion",
             Self::Extrapolated(_) => "extrapolated",
             Self::None => "none",
         }
@@ -145,7 +145,7 @@ pub struct Trust {
     pub rate_error: Option<f64>,
     /// The largest error of a motor's torque up to `at` \[N·m\], or of its force \[N\].
     pub torque_error: Option<f64>,
-    /// True where the companion is hardly finer than the run, so that the error is at most what is estimated.
+    /// True where the reference solution is hardly finer than the run, so that the error is at most what is estimated.
     pub is_upper_bound: bool,
     /// The end of the run, or the horizon where that comes first \[s\].
     pub at: f64,
@@ -168,8 +168,8 @@ pub struct Trust {
     pub inputs: Option<Inputs>,
     /// What the model is off by whatever the method does, where springs are taken for rods \[rad\]; the estimate is no smaller.
     pub model_error: Option<f64>,
-    /// The companion, in words.
-    pub companion: Option<String>,
+    /// The reference solution, in words.
+    pub error_estimator: Option<String>,
     /// What it shares with the run, so that it cannot tell where that is wrong, in words.
     pub shared: Vec<String>,
     /// How far it went beside the run \[s\].
@@ -178,13 +178,13 @@ pub struct Trust {
     pub why: Option<String>,
     /// Times \[s\] and estimates \[rad\] up to there, thinned out.
     pub record: Vec<[f64; 2]>,
-    /// Work of the companion, of that the tangent flow's, and the work of the run beside it, as counted by the prices of [`budget`] \[ns\].
+    /// Work of the reference solution, of that the tangent flow's, and the work of the run beside it, as counted by the prices of [`budget`] \[ns\].
     #[serde(default)]
     pub work: [f64; 3],
 }
 
 impl Trust {
-    /// The same of a model with an error of its own \[rad\], which the companion shares.
+    /// The same of a model with an error of its own \[rad\], which the reference solution shares.
     pub(in crate::run) fn with_model(mut self, error: Option<f64>) -> Self {
         self.model_error = error;
         if let (Some(estimate), Some(model)) = (&mut self.error_estimate, error) {
@@ -193,7 +193,7 @@ impl Trust {
         self
     }
 
-    /// Why the companion was cut short, where all was to be spent on it.
+    /// Why the reference solution was cut short, where all was to be spent on it.
     pub fn cut(&self) -> Option<&str> {
         self.why.as_deref().filter(|why| why.starts_with(CUT))
     }

@@ -8,7 +8,7 @@
 //! s <- Phi s + h (σ a)                                       what a relative change of every force by 1, of random sign, and of the start comes to
 //! ```
 //!
-//! The motion is that of the companion at the flow's own times, the ends of its steps.  Up to three coordinates that nothing ties carry the whole matrix,
+//! The motion is that of the reference solution at the flow's own times, the ends of its steps.  Up to three coordinates that nothing ties carry the whole matrix,
 //! few degrees of freedom a basis of the directions tangent to the constraints, more of them vectors of random directions, whose growth stands for that of the matrix.
 //!
 //! Where neighbours do not go the same way there is no such flow: where a wall is grazed, and in singular positions.  From there on it is absent.
@@ -25,7 +25,7 @@ use self::beside::Beside;
 use self::gauss::Gauss;
 use self::ground::Ground;
 use self::start::{Dice, unit};
-use super::Ruler;
+use super::DistanceMetric;
 use crate::dynamics::schur::NEAR;
 use crate::dynamics::{Coordinates, Mechanism, Motion, State, Time};
 use crate::run::build::{Problem, tangent_form};
@@ -126,7 +126,7 @@ impl Tangent {
             return Err("the motors leave no freedom: neighbouring motions are the same".into());
         }
         let is_whole = (is_exact || f <= WHOLE) && tangent.ground.is_none() && mechanism.contacts.is_empty();
-        let is_plain = is_whole && !is_exact && mechanism.rows.is_empty() && !mechanism.is_forced() && gauss::is_slow(mechanism);
+        let is_plain = is_whole && !is_exact && mechanism.constraints.is_empty() && !mechanism.is_forced() && gauss::is_slow(mechanism);
         let count = if is_whole || freedom <= WHOLE { 2 * freedom } else { VECTORS };
         tangent.path = Path { freedom, is_whole, is_plain, held: mechanism.held.clone(), stride: 1, state, ..Path::default() };
         tangent.path.rate = tangent.fastest(until);
@@ -160,17 +160,17 @@ impl Tangent {
             return Err("a series takes the matrices of the tree, which are too large here".into());
         }
         let problem = tangent_form(mechanism);
-        let ruler = Ruler::new(mechanism);
+        let metric = DistanceMetric::new(mechanism);
         let coordinates = problem.coordinates();
         let weights: Vec<f64> = match coordinates {
-            Coordinates::Independent => mechanism.ties.independent.iter().map(|&k| ruler.weight(k)).collect(),
-            _ => (0..mechanism.coordinates()).map(|k| ruler.weight(k)).collect(),
+            Coordinates::Independent => mechanism.partition.independent.iter().map(|&k| metric.weight(k)).collect(),
+            _ => (0..mechanism.coordinates()).map(|k| metric.weight(k)).collect(),
         };
         if weights.is_empty() {
             return Err("the motors leave no freedom: neighbouring motions are the same".into());
         }
         let rates = vec![0.0; problem.dimension()];
-        let ground = (coordinates == Coordinates::All && !mechanism.rows.is_empty()).then(|| Ground::new(mechanism));
+        let ground = (coordinates == Coordinates::All && !mechanism.constraints.is_empty()).then(|| Ground::new(mechanism));
         let mechanism = Arc::clone(mechanism);
         Ok(Self {
             mechanism,
@@ -274,7 +274,7 @@ impl Tangent {
         let dimension = problem.dimension();
         column.clear();
         column.resize(dimension, 0.0);
-        for (i, &k) in mechanism.ties.independent.iter().enumerate() {
+        for (i, &k) in mechanism.partition.independent.iter().enumerate() {
             (column[i], column[f + i]) = (motion.phi[k].hi, motion.omega[k].hi);
         }
         jacobian.resize(dimension * dimension, 0.0);
@@ -293,7 +293,7 @@ impl Tangent {
     /// Unknowns' rates at the beginning of the step.
     fn evaluate(&mut self) {
         let Self { problem, rates, path, .. } = self;
-        problem.rate(path.state.time, &path.state.y, rates);
+        problem.rhs(path.state.time, &path.state.y, rates);
     }
 
     /// What taking a motion costs in evaluations of the equations, about, by counted instructions; of a Jacobian four columns come to five.
@@ -302,7 +302,7 @@ impl Tangent {
             return 1 + 5 * self.path.columns.len().div_ceil(4) as u64;
         }
         // Of the prices of `budget`: the series at this order, and the columns beside it, which are worked on by vectors.
-        let (n, rows) = (self.mechanism.coordinates() as f64, self.mechanism.rows.len() as f64);
+        let (n, rows) = (self.mechanism.coordinates() as f64, self.mechanism.constraints.len() as f64);
         let forces =
             (self.mechanism.springs.len() + self.mechanism.torsions.len() + self.mechanism.actions.len() + self.mechanism.forces.len())
                 as f64;

@@ -7,7 +7,7 @@ use crate::scene::read::{At, GivenStart};
 use crate::scene::{Given, Law, Scene, Start};
 
 /// A motor on an angle, or a lock that says which.
-struct Tie<'a> {
+struct AngleConstraint<'a> {
     /// "motor" or "lock".
     kind: &'static str,
     name: &'a str,
@@ -18,7 +18,7 @@ struct Tie<'a> {
     law: Start,
 }
 
-impl<'a> Tie<'a> {
+impl<'a> AngleConstraint<'a> {
     /// Those of a scene, motors first.
     fn all(scene: &'a Scene) -> Vec<Self> {
         let motors = scene.motors.iter().map(|motor| Self {
@@ -37,8 +37,8 @@ impl<'a> Tie<'a> {
 }
 
 /// Which motors and locks tie which bodies.
-struct Ties<'a> {
-    all: Vec<Tie<'a>>,
+struct AngleConstraints<'a> {
+    all: Vec<AngleConstraint<'a>>,
     /// The ties at each body.
     at_body: Vec<Vec<usize>>,
     /// The bars of each group of tied bodies, but not of the ground's; a bar without a tie is a group of one.
@@ -48,19 +48,19 @@ struct Ties<'a> {
 /// One of the two numbers of a [`Start`].
 type Part = fn(&Start) -> f64;
 
-impl<'a> Ties<'a> {
+impl<'a> AngleConstraints<'a> {
     /// Fails with the number of the first tie whose angle the others give already.
     fn of(scene: &'a Scene) -> Result<Self, usize> {
         let bars = scene.bars.len();
-        let all = Tie::all(scene);
+        let all = AngleConstraint::all(scene);
         let mut groups = Groups::of(bars + 1);
         let mut at_body = vec![Vec::new(); bars + 1];
-        for (number, tie) in all.iter().enumerate() {
-            if !groups.join(tie.base, tie.bar) {
+        for (number, angle_constraint) in all.iter().enumerate() {
+            if !groups.join(angle_constraint.base, angle_constraint.bar) {
                 return Err(number);
             }
-            at_body[tie.base].push(number);
-            at_body[tie.bar].push(number);
+            at_body[angle_constraint.base].push(number);
+            at_body[angle_constraint.bar].push(number);
         }
         let mut members = vec![Vec::new(); bars + 1];
         for bar in 0..bars {
@@ -84,9 +84,10 @@ impl<'a> Ties<'a> {
         while let Some(here) = open.pop() {
             let Some(known) = start[here] else { continue };
             for &number in &self.at_body[here] {
-                let tie = &self.all[number];
-                let law = part(&tie.law);
-                let (to, there) = if here == tie.base { (tie.bar, known + law) } else { (tie.base, known - law) };
+                let angle_constraint = &self.all[number];
+                let law = part(&angle_constraint.law);
+                let (to, there) =
+                    if here == angle_constraint.base { (angle_constraint.bar, known + law) } else { (angle_constraint.base, known - law) };
                 if start[to].is_none() {
                     start[to] = Some(there);
                     open.push(to);
@@ -150,24 +151,24 @@ pub(super) fn starts(
             &places.locks[with_angle.map_or(0, |(number, _)| number)]
         }
     };
-    let ties = Ties::of(scene).map_err(|number| {
-        let Tie { kind, name, .. } = Tie::all(scene).swap_remove(number);
+    let angle_constraints = AngleConstraints::of(scene).map_err(|number| {
+        let AngleConstraint { kind, name, .. } = AngleConstraint::all(scene).swap_remove(number);
         let does = if kind == "motor" { "drives" } else { "holds" };
         let problem = format!("({kind} `{name}`) {does} an angle that is given already");
         let hint = "leave out one of the motors and locks that share these bars";
         place(number).refuse(&problem, "the other motors and locks must leave it free", hint)
     })?;
     if whole {
-        ties.known_whole(scene, places.root, given)?;
+        angle_constraints.known_whole(scene, places.root, given)?;
     }
     // Where all must be known, both numbers of a group are those of the same bar.
     let usable = |bar: usize| given[bar].as_ref().filter(|given| !whole || given.is_whole());
-    let phi = ties.resolved(scene.bars.len(), |start| start.phi, &|bar| usable(bar)?.phi);
-    let omega = ties.resolved(scene.bars.len(), |start| start.omega, &|bar| usable(bar)?.omega);
+    let phi = angle_constraints.resolved(scene.bars.len(), |start| start.phi, &|bar| usable(bar)?.phi);
+    let omega = angle_constraints.resolved(scene.bars.len(), |start| start.omega, &|bar| usable(bar)?.omega);
     let start: Vec<Start> = phi.into_iter().zip(omega).map(|(phi, omega)| Start { phi, omega }).collect();
     for (bar, exact) in start.iter().enumerate() {
-        let Some(&by) = ties.at_body[body(Some(bar))].first() else { continue };
-        let tie @ Tie { kind, name, .. } = &ties.all[by];
+        let Some(&by) = angle_constraints.at_body[body(Some(bar))].first() else { continue };
+        let angle_constraint @ AngleConstraint { kind, name, .. } = &angle_constraints.all[by];
         if !ANGLE.holds(exact.phi) || !RATE.holds(exact.omega) {
             let bar = &scene.bars[bar].name;
             let problem = format!("({kind} `{name}`) starts bar `{bar}` at {} rad, {} rad/s", about(exact.phi), about(exact.omega));
@@ -175,8 +176,8 @@ pub(super) fn starts(
             return Err(place(by).refuse(&problem, &allowed, "take off whole turns, and check the rates"));
         }
         if let Some(given) = &given[bar] {
-            agrees(given, "phi", given.phi, exact.phi, "rad", tie)?;
-            agrees(given, "omega", given.omega, exact.omega, "rad/s", tie)?;
+            agrees(given, "phi", given.phi, exact.phi, "rad", angle_constraint)?;
+            agrees(given, "omega", given.omega, exact.omega, "rad/s", angle_constraint)?;
         }
     }
     let mut said: Vec<Given> = if whole { Vec::new() } else { given.iter().map(said).collect() };
@@ -199,14 +200,14 @@ fn said(given: &Option<GivenStart>) -> Given {
 pub(in crate::scene) fn written_starts(scene: &Scene) -> Vec<bool> {
     let start = &scene.start;
     let mut written = vec![true; start.len()];
-    let Ok(ties) = Ties::of(scene) else { return written };
-    for group in ties.groups.iter().filter(|group| group.len() > 1) {
+    let Ok(angle_constraints) = AngleConstraints::of(scene) else { return written };
+    for group in angle_constraints.groups.iter().filter(|group| group.len() > 1) {
         let gives_all = |&bar: &usize| {
             let parts: [Part; 2] = [|start| start.phi, |start| start.omega];
             parts.into_iter().all(|part| {
                 let mut trial = vec![None; start.len() + 1];
                 trial[body(Some(bar))] = Some(part(&start[bar]));
-                ties.spread(body(Some(bar)), part, &mut trial);
+                angle_constraints.spread(body(Some(bar)), part, &mut trial);
                 group.iter().all(|&other| trial[body(Some(other))] == Some(part(&start[other])))
             })
         };
@@ -228,10 +229,17 @@ fn missing_start(root: &At, bar: &str, tied: bool) -> SceneError {
     root.missing("start", bar, "must be {\"phi\": angle in rad, \"omega\": rate in rad/s}", &hint)
 }
 
-fn agrees(at: &GivenStart, key: &str, given: Option<f64>, exact: f64, unit: &str, tie: &Tie) -> Result<(), SceneError> {
+fn agrees(
+    at: &GivenStart,
+    key: &str,
+    given: Option<f64>,
+    exact: f64,
+    unit: &str,
+    angle_constraint: &AngleConstraint,
+) -> Result<(), SceneError> {
     let Some(given) = given.filter(|given| (given - exact).abs() > SAME * exact.abs().max(1.0)) else { return Ok(()) };
-    let by = if tie.kind == "motor" { "the law of motor" } else { "lock" };
-    let allowed = format!("must be {exact:?} {unit}, by {by} `{}`", tie.name);
+    let by = if angle_constraint.kind == "motor" { "the law of motor" } else { "lock" };
+    let allowed = format!("must be {exact:?} {unit}, by {by} `{}`", angle_constraint.name);
     let turns = (given - exact) / std::f64::consts::TAU;
     let hint = if unit == "rad" && turns.abs() >= 0.5 && (turns - turns.round()).abs() < 1e-9 {
         format!("leave it out, or write {exact:?}; angles are not taken modulo a turn, and this one is {turns:.0} turns off")

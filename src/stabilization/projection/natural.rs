@@ -51,11 +51,11 @@ impl Natural {
     }
 
     /// Writes the elements at a state.
-    pub fn face(&mut self, state: &State, z: &mut [Complex<f64>]) {
+    pub fn unit_vectors(&mut self, state: &State, z: &mut [Complex<f64>]) {
         match self {
-            Self::Few(bench) => lanes::run(Face { bench, state, z }, false),
-            Self::Several(bench) => lanes::run(Face { bench, state, z }, false),
-            Self::Many(bench) => lanes::run(Face { bench, state, z }, false),
+            Self::Few(bench) => lanes::run(PositionStage { bench, state, z }, false),
+            Self::Several(bench) => lanes::run(PositionStage { bench, state, z }, false),
+            Self::Many(bench) => lanes::run(PositionStage { bench, state, z }, false),
         }
     }
 
@@ -82,13 +82,13 @@ fn vector<const B: usize>(x: &[Row<B>; 2], i: usize) -> Complex<f64> {
     Complex::new(at(&x[0], i), at(&x[1], i))
 }
 
-struct Face<'a, const B: usize> {
+struct PositionStage<'a, const B: usize> {
     bench: &'a mut Bench<B>,
     state: &'a State,
     z: &'a mut [Complex<f64>],
 }
 
-impl<const B: usize> Code for Face<'_, B> {
+impl<const B: usize> Code for PositionStage<'_, B> {
     type Output = ();
 
     #[inline(always)]
@@ -123,7 +123,7 @@ impl<const B: usize> Code for Land<'_, B> {
     fn run<L: Lanes>(self) -> Option<[f64; 2]> {
         let Self { bench: Bench { keeper, z, rate, unit }, state, z: elements } = self;
         let n = elements.len();
-        let moved = keeper.put_back::<L>(z);
+        let moved = keeper.project_back::<L>(z);
         // What is not a number is not sound.
         let is_sound = moved.least >= NEAR && moved.left <= CLOSE;
         if !is_sound {
@@ -134,7 +134,7 @@ impl<const B: usize> Code for Land<'_, B> {
             let w = L::of(rate[b]);
             (v[0][b], v[1][b]) = (L::of(z[1][b]).mul(w).neg().array(), L::of(z[0][b]).mul(w).array());
         }
-        let slowed = keeper.put_rates_back::<L>(z, &mut v);
+        let slowed = keeper.project_rates_back::<L>(z, &mut v);
         let mut changes = [[0.0; 2]; MOST];
         let (mut most, mut fastest) = ([0.0_f64; 2], *unit);
         for (i, change) in changes[..n].iter_mut().enumerate() {

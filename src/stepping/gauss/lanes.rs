@@ -8,8 +8,8 @@ use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::{self, Code, Lanes, Portable};
 use crate::arithmetic::sum::{fused, two_sum};
 use crate::arithmetic::{DoubleDouble, Scalar};
-use crate::dynamics::{Field, Points, State, Time};
-use crate::stepping::{StepError, Tally};
+use crate::dynamics::{OdeSystem, Points, State, Time};
+use crate::stepping::{Statistics, StepError};
 
 /// Scratch space of d unknowns.
 #[derive(Clone, Debug, Default)]
@@ -25,10 +25,10 @@ pub(super) struct Scratch {
     /// L, and what it leaves out (d, d).
     increment: Vec<Octet>,
     increment_low: Vec<Octet>,
-    /// Largest change of each unknown in the last sweep, and the least so far (d, d).
+    /// Largest change of each unknown in the last iteration, and the least so far (d, d).
     change: Vec<f64>,
     least: Vec<f64>,
-    /// The largest change of the last sweep in plain doubles, and the largest magnitude among the stages then (d, d): what convergence is judged by.
+    /// The largest change of the last iteration in plain doubles, and the largest magnitude among the stages then (d, d): what convergence is judged by.
     pub rest: Vec<f64>,
     pub size: Vec<f64>,
     /// The sum of all increments (d).
@@ -37,7 +37,7 @@ pub(super) struct Scratch {
     pub judged: usize,
     /// True where the field has been found to have no Jacobian.
     is_sweeping: bool,
-    /// Steps by Newton's method before sweeps are tried again, this one counted; zero where it was made by sweeps.
+    /// Steps by Newton's method before iterations are tried again, this one counted; zero where it was made by iterations.
     newton_left: f64,
 }
 
@@ -51,7 +51,7 @@ const MOST_ITERATIONS: usize = 60;
 struct Step<'a> {
     tableau: &'a Tableau,
     scratch: &'a mut Scratch,
-    /// Evaluations after the last sweep that carry what doubles leave out.
+    /// Evaluations after the last iteration that carry what doubles leave out.
     exact: u32,
     newton: &'a mut Option<Box<Newton>>,
     slow: f64,
@@ -60,19 +60,24 @@ struct Step<'a> {
 }
 
 /// One step of `scratch.step`.
-pub(super) fn step<F: Field + ?Sized>(gauss: &mut Gauss, problem: &mut F, state: &mut State, tally: &mut Tally) -> Result<(), StepError> {
-    tally.check(gauss.label(), state.time.hi, gauss.scratch.step)?;
+pub(super) fn step<F: OdeSystem + ?Sized>(
+    gauss: &mut Gauss,
+    problem: &mut F,
+    state: &mut State,
+    statistics: &mut Statistics,
+) -> Result<(), StepError> {
+    statistics.check(gauss.label(), state.time.hi, gauss.scratch.step)?;
     let Gauss { tableau, scratch, exact, newton, slow, portable, .. } = &mut *gauss;
     let exact = if problem.has_exact_rates() { *exact } else { 0 };
     let mut step = Step { tableau, scratch, exact, newton, slow: *slow, angles: problem.angles() };
-    lanes::run(Take { step: &mut step, problem: &mut Of(problem), state, tally }, *portable);
+    lanes::run(Take { step: &mut step, problem: &mut Of(problem), state, statistics }, *portable);
     if gauss.scratch.newton_left == NEWTON_STEPS {
         gauss.follow(problem, state)?;
     }
     gauss.check(problem, state)?;
     gauss.scratch.commit(state, gauss.tableau.nodes.len());
-    tally.steps += 1;
-    tally.newton_steps += u64::from(gauss.scratch.newton_left > 0.0);
+    statistics.steps += 1;
+    statistics.newton_steps += u64::from(gauss.scratch.newton_left > 0.0);
     Ok(())
 }
 
@@ -86,7 +91,7 @@ trait Rates {
 /// A field behind a table of functions, so that the steps are compiled once and not with every field.
 struct Of<'a, F: ?Sized>(&'a mut F);
 
-impl<F: Field + ?Sized> Rates for Of<'_, F> {
+impl<F: OdeSystem + ?Sized> Rates for Of<'_, F> {
     fn rates(&mut self, points: &mut Points) {
         self.0.rates(points);
     }
@@ -105,7 +110,7 @@ struct Take<'a, 'b> {
     step: &'a mut Step<'b>,
     problem: &'a mut dyn Rates,
     state: &'a State,
-    tally: &'a mut Tally,
+    statistics: &'a mut Statistics,
 }
 
 impl Code for Take<'_, '_> {
@@ -113,42 +118,42 @@ impl Code for Take<'_, '_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        self.step.take::<L>(self.problem, self.state, self.tally);
+        self.step.take::<L>(self.problem, self.state, self.statistics);
     }
 }
 
 impl Step<'_> {
     /// All of one step but its acceptance.
     #[inline(always)]
-    fn take<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, tally: &mut Tally) {
+    fn take<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, statistics: &mut Statistics) {
         self.predict::<L>(state);
         // Beside the increments there is a number where the last step was made by Newton's method.
         let (known, all) = (state.memory.len(), self.tableau.nodes.len() * state.y.len() + 1);
         let left = if known == all + 1 { state.memory[all] - 1.0 } else { 0.0 };
         self.scratch.newton_left = left;
-        let has_changed = left > 0.0 && self.differentiate(problem, state, tally)
-            || !self.sweep::<L>(problem, state, tally) && {
+        let has_changed = left > 0.0 && self.differentiate(problem, state, statistics)
+            || !self.iteration::<L>(problem, state, statistics) && {
                 self.scratch.newton_left = NEWTON_STEPS;
                 true
             };
         if has_changed {
-            self.solve::<L>(problem, state, tally);
+            self.solve::<L>(problem, state, statistics);
             if self.scratch.unsettled(self.angles).is_none() {
                 self.scratch.sum_exactly::<L>();
                 return;
             }
-            // A Jacobian that turns far within the step does worse than sweeps.
+            // A Jacobian that turns far within the step does worse than iterations.
             self.scratch.newton_left = 0.0;
             self.scratch.is_sweeping = true;
             self.predict::<L>(state);
-            self.sweep::<L>(problem, state, tally);
+            self.iteration::<L>(problem, state, statistics);
             self.scratch.is_sweeping = false;
         }
         self.scratch.judge();
         self.scratch.points.rate_low.fill(Octet::default());
         self.multiply_low::<L>();
         if self.exact > 0 {
-            self.refine::<L>(problem, state, tally);
+            self.refine::<L>(problem, state, statistics);
         }
         self.scratch.sum_exactly::<L>();
     }
@@ -180,23 +185,23 @@ impl Step<'_> {
 
     /// Sweeps the stages until no unknown's change falls any further; false where that takes so long that Newton's method is to be used, for which all is ready then.
     #[inline(always)]
-    fn sweep<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, tally: &mut Tally) -> bool {
+    fn iteration<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, statistics: &mut Statistics) -> bool {
         self.scratch.least.fill(f64::INFINITY);
         let mut idle = 0;
         let mut sizes = [f64::NAN; 5];
-        for sweep in 0..MOST_SWEEPS {
+        for iteration in 0..MOST_SWEEPS {
             problem.rates(&mut self.scratch.points);
             self.multiply::<L>();
-            tally.evaluations += self.tableau.nodes.len() as u64;
+            statistics.evaluations += self.tableau.nodes.len() as u64;
             self.restage::<L>(state);
             idle = if self.scratch.falls() { 0 } else { idle + 1 };
             let is_over = idle == IDLE_SWEEPS || self.scratch.is_within(if self.exact > 0 { NEARLY } else { 0.0 });
-            sizes[sweep % 5] = self.scratch.size_of_change();
-            let (now, before) = (sizes[sweep % 5], sizes[(sweep + 1) % 5]);
-            // Over four sweeps, because coordinates and momenta take turns, and well above rounding; the first sweeps are still finding their direction.
+            sizes[iteration % 5] = self.scratch.size_of_change();
+            let (now, before) = (sizes[iteration % 5], sizes[(iteration + 1) % 5]);
+            // Over four iterations, because coordinates and momenta take turns, and well above rounding; the first iterations are still finding their direction.
             let contraction = (now / before).sqrt().sqrt();
-            let is_slow = now > NOISE && (is_over || sweep >= EARLY && contraction > self.slow);
-            if is_slow && !self.scratch.is_sweeping && self.differentiate(problem, state, tally) {
+            let is_slow = now > NOISE && (is_over || iteration >= EARLY && contraction > self.slow);
+            if is_slow && !self.scratch.is_sweeping && self.differentiate(problem, state, statistics) {
                 return false;
             }
             if is_over {
@@ -209,16 +214,16 @@ impl Step<'_> {
     /// Evaluations that carry what doubles leave out, at stages that are pairs, until these have settled or their changes fall no further.  A rest of the
     /// iteration would have the direction of time in it, and drift.
     #[inline(always)]
-    fn refine<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, tally: &mut Tally) {
+    fn refine<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, statistics: &mut Statistics) {
         self.restage_exactly::<L>(state);
         self.scratch.least.fill(f64::INFINITY);
         let mut idle = 0;
-        for sweep in 0..self.exact {
+        for iteration in 0..self.exact {
             problem.exact_rates(&mut self.scratch.points);
             self.multiply::<L>();
             self.multiply_low::<L>();
-            tally.evaluations += self.tableau.nodes.len() as u64;
-            if sweep + 1 == self.exact {
+            statistics.evaluations += self.tableau.nodes.len() as u64;
+            if iteration + 1 == self.exact {
                 return;
             }
             self.restage_exactly::<L>(state);
@@ -230,7 +235,7 @@ impl Step<'_> {
     }
 
     /// The Jacobian at the middle of the predicted step and its factors; false where the field has none.
-    fn differentiate(&mut self, problem: &mut dyn Rates, state: &State, tally: &mut Tally) -> bool {
+    fn differentiate(&mut self, problem: &mut dyn Rates, state: &State, statistics: &mut Statistics) -> bool {
         self.predict::<Portable>(state);
         let (s, d) = (self.tableau.nodes.len(), state.y.len());
         let scratch = &mut *self.scratch;
@@ -241,14 +246,14 @@ impl Step<'_> {
         if scratch.is_sweeping {
             return false;
         }
-        tally.jacobians += 1;
+        statistics.jacobians += 1;
         newton.factor(scratch.step, d);
         true
     }
 
     /// All of a step but its acceptance by Newton's method, from the predicted stages and the factors in place.
     #[inline(always)]
-    fn solve<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, tally: &mut Tally) {
+    fn solve<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, statistics: &mut Statistics) {
         let (s, d) = (self.tableau.nodes.len(), state.y.len());
         let last = match state.memory.split_first() {
             Some((&step, last)) if step == self.scratch.step && last.len() >= s * d => &last[..s * d],
@@ -258,7 +263,7 @@ impl Step<'_> {
         if last.is_empty() {
             // All stages are still at y.
             problem.rates(&mut self.scratch.points);
-            tally.evaluations += 1;
+            statistics.evaluations += 1;
             rate.extend(self.scratch.points.rate.iter().map(|rate| rate.0[lane(0, s)]));
         }
         if let Some(newton) = &self.newton {
@@ -266,17 +271,17 @@ impl Step<'_> {
         }
         self.scratch.increment_low.fill(Octet::default());
         self.restage::<L>(state);
-        self.iterate::<L, false>(problem, state, tally, MOST_ITERATIONS);
+        self.iterate::<L, false>(problem, state, statistics, MOST_ITERATIONS);
         self.scratch.judge();
         if self.exact > 0 {
             self.restage_exactly::<L>(state);
-            self.iterate::<L, true>(problem, state, tally, self.exact as usize);
+            self.iterate::<L, true>(problem, state, statistics, self.exact as usize);
         }
     }
 
     /// Newton iterations until no unknown's change falls any further; with `LOW` on stages that are pairs, where the field has such rates.
     #[inline(always)]
-    fn iterate<L: Lanes, const LOW: bool>(&mut self, problem: &mut dyn Rates, state: &State, tally: &mut Tally, most: usize) {
+    fn iterate<L: Lanes, const LOW: bool>(&mut self, problem: &mut dyn Rates, state: &State, statistics: &mut Statistics, most: usize) {
         let (s, d) = (self.tableau.nodes.len(), state.y.len());
         self.scratch.least.fill(f64::INFINITY);
         let mut idle = 0;
@@ -286,7 +291,7 @@ impl Step<'_> {
             } else {
                 problem.rates(&mut self.scratch.points);
             }
-            tally.evaluations += s as u64;
+            statistics.evaluations += s as u64;
             let (scratch, Some(newton)) = (&mut *self.scratch, self.newton.as_mut()) else { return };
             newton.correction.clear();
             for i in 0..s {
@@ -456,7 +461,7 @@ impl Scratch {
         self.change.iter().zip(&self.points.y).all(|(&change, stage)| change == 0.0 || change <= share * stage.size())
     }
 
-    /// The largest change of the last sweep among the unknowns that tell; not a number where one is.
+    /// The largest change of the last iteration among the unknowns that tell; not a number where one is.
     fn size_of_change(&self) -> f64 {
         self.change[..self.judged]
             .iter()

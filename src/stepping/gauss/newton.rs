@@ -1,11 +1,11 @@
-//! Stages by Newton's method, where sweeps contract slowly or not at all.
+//! Stages by Newton's method, where iterations contract slowly or not at all.
 //!
 //! ```text
 //! R_j = h b_j f(Y_j) - L_j,      (1 - h A⊗J) dK = R/(h b),      L_j += h b_j dK_j                 J at the middle of the step, once a step
 //! A = Σ mu_k r_k l_k,  l_k r_k = 1:    dK = Σ r_k (1 - h mu_k J)^-1 l_k R/(h b)                   pairs of complex modes share their factors
 //! ```
 //!
-//! The residual is that of the sweeps, at the end in pairs of doubles, so that what is solved for is the same to the last bit but one; the update takes the last correction along,
+//! The residual is that of the iterations, at the end in pairs of doubles, so that what is solved for is the same to the last bit but one; the update takes the last correction along,
 //! because a rest of the residual would act on fast modes h rho times.
 //!
 //! Source: E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), section IV.8 (the transformation of the linear systems); M. Antoñana, J. Makazaga,
@@ -27,7 +27,7 @@ struct Mode {
     weight: f64,
 }
 
-/// What Newton's method needs beside the scratch space of the sweeps; made when the first step asks for it.
+/// What Newton's method needs beside the scratch space of the iterations; made when the first step asks for it.
 #[derive(Clone, Debug)]
 pub(super) struct Newton {
     modes: Vec<Mode>,
@@ -41,7 +41,7 @@ pub(super) struct Newton {
     pub correction: Vec<f64>,
 }
 
-/// The largest |mu|: sweeps contract by about h rho times that.
+/// The largest |mu|: iterations contract by about h rho times that.
 pub(super) fn largest_mode(tableau: &Tableau) -> f64 {
     values(tableau).iter().fold(0.0, |most: f64, value| most.max(value.norm_squared().sqrt()))
 }

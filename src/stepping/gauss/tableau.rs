@@ -240,15 +240,15 @@ mod tests {
         let z = [Complex::unit(y[0]), Complex::unit(y[1])];
         let (mut mass, mut twist, mut pivot) = ([DoubleDouble::ZERO; 4], [DoubleDouble::ZERO; 4], [DoubleDouble::ZERO; 2]);
         let (mut omega, mut force) = ([y[2], y[3]], [DoubleDouble::ZERO; 2]);
-        tree.couple::<DoubleDouble, 2>(&z, &mut mass, &mut twist);
+        tree.mass_matrix::<DoubleDouble, 2>(&z, &mut mass, &mut twist);
         tree::factor::<DoubleDouble, 2>(2, &mut mass, &mut pivot);
         tree::solve::<DoubleDouble, 2>(2, &mass, &pivot, &mut omega);
-        tree.pull::<DoubleDouble, 2>(&z, &omega, &twist, &mut force);
+        tree.lagrangian_forces::<DoubleDouble, 2>(&z, &omega, &twist, &mut force);
         [omega[0], omega[1], force[0], force[1]]
     }
 
     /// The state at time 1 after `steps` steps, all in double-double.
-    fn swing(tree: &Tree, stages: usize, steps: usize) -> [DoubleDouble; 4] {
+    fn simulate(tree: &Tree, stages: usize, steps: usize) -> [DoubleDouble; 4] {
         let tableau = Tableau::new(stages);
         let h = reciprocal(steps);
         let matrix: Vec<DoubleDouble> = (0..stages * stages).map(|k| h * a(&tableau, k / stages, k % stages)).collect();
@@ -271,10 +271,10 @@ mod tests {
         let weight = vec![Complex::new(1.5, 0.0), Complex::new(0.5, 0.0)];
         let coupling = vec![Complex::ZERO, Complex::new(0.5, 0.0), Complex::ZERO, Complex::ZERO];
         let tree = Tree { coordinates: 2, angles: 2, coupling, diagonal: vec![4.0 / 3.0, 1.0 / 3.0], weight, off_axis: false };
-        let exact = swing(&tree, 8, 100);
+        let exact = simulate(&tree, 8, 100);
         for stages in 2..=8 {
             let error = |steps: usize| {
-                let y = swing(&tree, stages, steps);
+                let y = simulate(&tree, stages, steps);
                 (0..4).map(|k| (y[k] - exact[k]).hi.powi(2)).sum::<f64>().sqrt()
             };
             // The finest pair whose errors stay above the rounding of pairs.

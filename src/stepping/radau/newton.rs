@@ -3,8 +3,8 @@
 use super::{KEPT, Radau, Work};
 use crate::arithmetic::Complex;
 use crate::arithmetic::sum::{fast_two_sum, two_sum};
-use crate::dynamics::{Field, State};
-use crate::stepping::Tally;
+use crate::dynamics::{OdeSystem, State};
+use crate::stepping::Statistics;
 use crate::stepping::linear::Factors;
 
 /// Contraction from which the iteration counts as diverging.
@@ -21,12 +21,17 @@ pub enum Solved {
 
 impl Radau {
     /// The Jacobian at the state, or again where it was taken before.
-    pub(super) fn differentiate<F: Field + ?Sized>(&mut self, field: &mut F, state: Option<&State>, tally: &mut Tally) -> bool {
+    pub(super) fn differentiate<F: OdeSystem + ?Sized>(
+        &mut self,
+        field: &mut F,
+        state: Option<&State>,
+        statistics: &mut Statistics,
+    ) -> bool {
         let work = &mut self.work;
         if let Some(state) = state {
             work.place.0 = state.time;
             work.place.1.clone_from(&state.y);
-            tally.jacobians += 1;
+            statistics.jacobians += 1;
         }
         let d = work.place.1.len();
         work.jacobian.resize(d * d, 0.0);
@@ -67,13 +72,13 @@ impl Radau {
     }
 
     /// Iterates the stages of a step of `h`; the factors for it are in place.
-    pub(super) fn solve<F: Field + ?Sized>(
+    pub(super) fn solve<F: OdeSystem + ?Sized>(
         &mut self,
         field: &mut F,
         state: &State,
         h: f64,
         contraction: &mut f64,
-        tally: &mut Tally,
+        statistics: &mut Statistics,
     ) -> Solved {
         let (s, d) = (self.tableau.stages(), state.y.len());
         let most = if s == 3 { 7 } else { 12 };
@@ -82,7 +87,7 @@ impl Radau {
         let (mut before, mut ratio_before, mut theta) = (f64::NAN, f64::NAN, KEPT);
         *contraction = libm::pow(contraction.max(f64::EPSILON), 0.8);
         for sweep in 1..=most {
-            self.residual(field, state, h, tally);
+            self.residual(field, state, h, statistics);
             self.correct(d);
             let work = &mut self.work;
             let mut sum = 0.0;
@@ -120,7 +125,7 @@ impl Radau {
     }
 
     /// h A F - Z into `change`.
-    fn residual<F: Field + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, tally: &mut Tally) {
+    fn residual<F: OdeSystem + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, statistics: &mut Statistics) {
         let Self { tableau, work, .. } = self;
         let (s, d) = (tableau.stages(), state.y.len());
         for (i, rates) in work.rates.chunks_exact_mut(d).enumerate() {
@@ -130,7 +135,7 @@ impl Radau {
             }
             field.fine_rate(state.time + tableau.nodes[i].hi * h, &work.stage, &work.low, rates);
         }
-        tally.evaluations += s as u64;
+        statistics.evaluations += s as u64;
         for i in 0..s {
             for k in 0..d {
                 let sum = (0..s).fold(0.0, |sum, j| sum + tableau.a[i * s + j] * work.rates[j * d + k]);

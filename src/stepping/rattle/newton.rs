@@ -1,7 +1,7 @@
-//! The linear solves of RATTLE's sweeps.
+//! The linear solves of RATTLE's iterations.
 //!
 //! In ordinary positions the Newton matrix is close to S, which is positive definite: it is factored once a substep, without exchanges.  Near a singular
-//! position its weak value changes sign across the point, and sweeps with a frozen matrix diverge: there the true matrix of every sweep is factored
+//! position its weak value changes sign across the point, and iterations with a frozen matrix diverge: there the true matrix of every iteration is factored
 //! with full pivoting, and rows whose pivot is lost get no change.
 
 use crate::dynamics::tree::size;

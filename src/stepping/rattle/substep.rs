@@ -2,22 +2,22 @@
 
 use super::newton::Matrix;
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
+use crate::dynamics::constraint::Measure;
 use crate::dynamics::natural::{Demand, Guide, Natural, times, upper};
-use crate::dynamics::row::Measure;
 use crate::dynamics::tree::{self, size};
 use crate::dynamics::{Form, State, Time, schur};
 use std::f64::consts::FRAC_PI_2;
 
-/// Newton sweeps before a step is given up; an ordinary step takes three or four.
+/// Newton iterations before a step is given up; an ordinary step takes three or four.
 const SWEEPS: usize = 30;
 
-/// What plain sweeps may leave of the multipliers, against the forces: the last sweep is made with pairs and takes the rest.
+/// What plain iterations may leave of the multipliers, against the forces: the last iteration is made with pairs and takes the rest.
 const LEFT_OVER: f64 = 1e-13;
 
 /// Largest change, against the forces, at which a solve that has stopped improving counts as solved.
 const STALLED: f64 = 1e-11;
 
-/// What may be left of a row before the last sweep, in its unit, at a position where some row is lost.
+/// What may be left of a row before the last iteration, in its unit, at a position where some row is lost.
 const KEPT: f64 = 1e-10;
 
 /// Why a substep failed, with the row or element at fault.
@@ -39,7 +39,7 @@ pub struct Work {
     /// z' (n).
     v: Vec<Complex<DoubleDouble>>,
     /// p_t.
-    account: DoubleDouble,
+    work_integral: DoubleDouble,
     /// Whole turns, one a body.
     turns: Vec<i64>,
     /// z0 + h v0 (n), and its leading parts.
@@ -55,7 +55,7 @@ pub struct Work {
     /// Scratch (n).
     change_back: Vec<Complex<f64>>,
     /// Columns W g of the rows (R × n).
-    lifted: Vec<Complex<f64>>,
+    minv_jt: Vec<Complex<f64>>,
     /// Gradients of the guides at `here` (guides × n).
     gradient: Vec<Complex<f64>>,
     /// What the guides ask for at the end of the substep.
@@ -65,7 +65,7 @@ pub struct Work {
     drive: Vec<f64>,
     /// mu (R).
     multiplier: Vec<f64>,
-    /// mu at the beginning of the sweeps (R).
+    /// mu at the beginning of the iterations (R).
     guess: Vec<f64>,
     /// Newton matrix, then its factors.
     newton: Matrix,
@@ -100,7 +100,7 @@ impl Work {
         }
         self.turns.resize(rows - guides, 0);
         self.inertia = natural.mechanism().tree.diagonal.iter().copied().fold(0.0, f64::max);
-        self.lifted.resize(rows * n, Complex::ZERO);
+        self.minv_jt.resize(rows * n, Complex::ZERO);
         self.gradient.resize(guides * n, Complex::ZERO);
         self.demand.resize(guides, Demand::default());
         self.plain_demand.resize(guides, Demand::default());
@@ -127,10 +127,10 @@ impl Work {
         }
         self.turns.copy_from_slice(&state.turns);
         if state.y.len() > 4 * n {
-            self.account = state.unknown(4 * n);
+            self.work_integral = state.unknown(4 * n);
         }
         self.ask(natural, state.time);
-        self.face::<N, GUIDED>(natural);
+        self.unit_vectors::<N, GUIDED>(natural);
         if state.memory.len() == self.multiplier.len() {
             self.multiplier.copy_from_slice(&state.memory);
         } else {
@@ -139,10 +139,10 @@ impl Work {
         }
     }
 
-    /// Hands the state back; `memory` keeps the multipliers, from which the next step's Newton sweeps start.
+    /// Hands the state back; `memory` keeps the multipliers, from which the next step's Newton iterations start.
     pub fn store(&self, state: &mut State) {
         let n = self.z.len();
-        let unknowns = self.z.iter().chain(&self.v).flat_map(|x| [x.re, x.im]).chain((state.y.len() > 4 * n).then_some(self.account));
+        let unknowns = self.z.iter().chain(&self.v).flat_map(|x| [x.re, x.im]).chain((state.y.len() > 4 * n).then_some(self.work_integral));
         for ((y, low), unknown) in state.y.iter_mut().zip(&mut state.low).zip(unknowns) {
             (*y, *low) = (unknown.hi, unknown.lo);
         }
@@ -158,12 +158,12 @@ impl Work {
         self.solve_position::<N, GUIDED>(natural, h)?;
         self.kick::<N, true>(h);
         self.settle::<N, GUIDED>(natural, h)?;
-        self.account::<GUIDED>(h);
+        self.work_integral::<GUIDED>(h);
         self.turn::<N, GUIDED>(natural, h)?;
-        self.face::<N, GUIDED>(natural);
+        self.unit_vectors::<N, GUIDED>(natural);
         self.solve_velocity::<N, GUIDED>(natural, h)?;
         self.kick::<N, false>(h);
-        self.account::<GUIDED>(h);
+        self.work_integral::<GUIDED>(h);
         Ok(())
     }
 
@@ -182,17 +182,17 @@ impl Work {
         }
     }
 
-    /// z0 + h v0, and by how much it violates the constraints at time `end`: in plain doubles, since the last sweep takes the rest.
+    /// z0 + h v0, and by how much it violates the constraints at time `end`: in plain doubles, since the last iteration takes the rest.
     #[inline(always)]
     fn predict<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural, h: f64, end: Time) {
         let (n, bodies) = (size::<N>(self.z.len()), self.bodies::<N, GUIDED>());
-        natural.reduced().put_rates_back(&mut self.v, &mut self.change_back);
+        natural.reduced().project_rates_back(&mut self.v, &mut self.change_back);
         let (z, v, predicted, ahead) = (&self.z[..n], &self.v[..n], &mut self.predicted[..n], &mut self.ahead[..n]);
         let offset = &mut self.offset;
         for k in 0..n {
             predicted[k] = Complex::new(z[k].re + v[k].re.scale(h), z[k].im + v[k].im.scale(h));
         }
-        natural.reduced().put_back(predicted, &mut self.change_back);
+        natural.reduced().project_back(predicted, &mut self.change_back);
         for k in 0..n {
             ahead[k] = plain(predicted[k]);
         }
@@ -209,33 +209,33 @@ impl Work {
         self.scale = self.strength.max(f64::EPSILON * self.inertia * (2.0 / (h * h)));
     }
 
-    /// Finds mu such that z0 + h v0 + h²/2 a(mu) keeps the constraints: by sweeps with the matrix of the first and, where these do not converge, with that
+    /// Finds mu such that z0 + h v0 + h²/2 a(mu) keeps the constraints: by iterations with the matrix of the first and, where these do not converge, with that
     /// of each.
     #[inline(always)]
     fn solve_position<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural, h: f64) -> Result<(), Failure> {
         self.guess.copy_from_slice(&self.multiplier);
-        match self.sweep::<N, GUIDED, false>(natural, h) {
+        match self.iteration::<N, GUIDED, false>(natural, h) {
             Ok(()) => Ok(()),
             Err(failure @ Failure::NotFinite(_)) => Err(failure),
             Err(_) => {
                 self.multiplier.copy_from_slice(&self.guess);
-                self.sweep::<N, GUIDED, true>(natural, h)
+                self.iteration::<N, GUIDED, true>(natural, h)
             }
         }
     }
 
-    /// The sweeps, with exchanges where `EXCHANGED`.
+    /// The iterations, with exchanges where `EXCHANGED`.
     #[inline(always)]
-    fn sweep<const N: usize, const GUIDED: bool, const EXCHANGED: bool>(&mut self, natural: &Natural, h: f64) -> Result<(), Failure> {
+    fn iteration<const N: usize, const GUIDED: bool, const EXCHANGED: bool>(&mut self, natural: &Natural, h: f64) -> Result<(), Failure> {
         let push = 0.5 * h * h;
         let mut last = f64::INFINITY;
-        for sweep in 0..SWEEPS {
+        for iteration in 0..SWEEPS {
             self.accelerate::<N, GUIDED>();
             self.residual::<N, GUIDED>(natural, push);
             if EXCHANGED {
                 self.newton_matrix::<N, GUIDED>(natural, push);
                 self.newton.factor_exchanged();
-            } else if sweep == 0 {
+            } else if iteration == 0 {
                 self.newton_matrix::<N, GUIDED>(natural, push);
                 let is_sound = if GUIDED { self.newton.factor::<0>() } else { self.newton.factor::<N>() };
                 if !is_sound {
@@ -264,7 +264,7 @@ impl Work {
                 return Err(self.lost().unwrap_or(Failure::NotConverged(culprit)));
             }
             // Sweeps contract by about largest/last, so this is what the next one would still change.
-            if largest == 0.0 || (sweep > 0 && largest * largest <= LEFT_OVER * scale * last) {
+            if largest == 0.0 || (iteration > 0 && largest * largest <= LEFT_OVER * scale * last) {
                 self.accelerate::<N, GUIDED>();
                 return Ok(());
             }
@@ -291,11 +291,11 @@ impl Work {
         let n = size::<N>(self.z.len());
         let rows = rows::<N, GUIDED>(self.multiplier.len());
         let (acceleration, free) = (&mut self.acceleration[..n], &self.free[..n]);
-        let (lifted, multiplier) = (&self.lifted[..rows * n], &self.multiplier[..rows]);
+        let (minv_jt, multiplier) = (&self.minv_jt[..rows * n], &self.multiplier[..rows]);
         acceleration.copy_from_slice(free);
         for p in 0..rows {
             for k in 0..n {
-                acceleration[k] -= lifted[p * n + k].times(multiplier[p]);
+                acceleration[k] -= minv_jt[p * n + k].times(multiplier[p]);
             }
         }
     }
@@ -332,7 +332,7 @@ impl Work {
         }
         let (bodies, rows) = (self.bodies::<N, GUIDED>(), rows::<N, GUIDED>(self.change.len()));
         let matrix = &mut self.newton.entries[..rows * rows];
-        project(n, bodies, rows, &self.here, &self.gradient, &self.lifted, matrix);
+        project(n, bodies, rows, &self.here, &self.gradient, &self.minv_jt, matrix);
     }
 
     /// Gradients of the guides at `here`.
@@ -361,16 +361,16 @@ impl Work {
 
     /// p_t -= h/2 lambda·C_t.
     #[inline(always)]
-    fn account<const GUIDED: bool>(&mut self, h: f64) {
+    fn work_integral<const GUIDED: bool>(&mut self, h: f64) {
         if GUIDED {
             let bodies = self.turns.len();
             for (lambda, drive) in self.multiplier[bodies..].iter().zip(&self.drive) {
-                self.account = self.account + -0.5 * h * lambda * drive;
+                self.work_integral = self.work_integral + -0.5 * h * lambda * drive;
             }
         }
     }
 
-    /// One more sweep, with the constraints formed from pairs.  Sweeps in plain doubles leave lengths wrong by some 1e-22 with a preferred
+    /// One more iteration, with the constraints formed from pairs.  Sweeps in plain doubles leave lengths wrong by some 1e-22 with a preferred
     /// sign, and a length that is always too short is a steady loss of energy.
     #[inline(always)]
     fn settle<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural, h: f64) -> Result<(), Failure> {
@@ -397,12 +397,12 @@ impl Work {
         } else {
             self.newton.solve::<N>(change);
         }
-        let (acceleration, lifted) = (&mut self.acceleration[..n], &self.lifted[..rows * n]);
+        let (acceleration, minv_jt) = (&mut self.acceleration[..n], &self.minv_jt[..rows * n]);
         acceleration.fill(Complex::ZERO);
         for p in 0..rows {
             self.multiplier[p] += change[p];
             for k in 0..n {
-                acceleration[k] -= lifted[p * n + k].times(change[p]);
+                acceleration[k] -= minv_jt[p * n + k].times(change[p]);
             }
         }
         self.kick::<N, true>(h);
@@ -447,7 +447,7 @@ impl Work {
 
     /// Forces, gradients and columns W g at z and the time last asked about.
     #[inline(always)]
-    fn face<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural) {
+    fn unit_vectors<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural) {
         let (n, bodies) = (size::<N>(self.z.len()), self.bodies::<N, GUIDED>());
         let rows = rows::<N, GUIDED>(self.change.len());
         for k in 0..n {
@@ -455,7 +455,7 @@ impl Work {
         }
         natural.force(&self.here[..n], &mut self.force[..n]);
         let (here, force, free) = (&self.here[..n], &self.force[..n], &mut self.free[..n]);
-        let (w, lifted) = (&natural.reduced().inverse[..n * n], &mut self.lifted[..rows * n]);
+        let (w, minv_jt) = (&natural.reduced().inverse[..n * n], &mut self.minv_jt[..rows * n]);
         self.strength = 0.0;
         for i in 0..n {
             let unit = if i < bodies { 1.0 } else { self.length };
@@ -465,7 +465,7 @@ impl Work {
                 sum += times(&w[i * n + j], force[j]);
             }
             for j in 0..bodies {
-                lifted[j * n + i] = times(&w[i * n + j], here[j]);
+                minv_jt[j * n + i] = times(&w[i * n + j], here[j]);
             }
             free[i] = sum;
         }
@@ -474,8 +474,9 @@ impl Work {
             for (r, guide) in natural.guides().iter().enumerate() {
                 self.drive[r] = guide.drive(&self.plain_demand[r], &self.here);
                 let gradient = &self.gradient[r * n..(r + 1) * n];
-                for (lifted, w) in self.lifted[(bodies + r) * n..(bodies + r + 1) * n].iter_mut().zip(natural.reduced().inverse.chunks(n)) {
-                    *lifted = w.iter().zip(gradient).fold(Complex::ZERO, |sum, (w, &g)| sum + times(w, g));
+                for (minv_jt, w) in self.minv_jt[(bodies + r) * n..(bodies + r + 1) * n].iter_mut().zip(natural.reduced().inverse.chunks(n))
+                {
+                    *minv_jt = w.iter().zip(gradient).fold(Complex::ZERO, |sum, (w, &g)| sum + times(w, g));
                 }
             }
         }
@@ -486,7 +487,7 @@ impl Work {
     fn solve_velocity<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural, h: f64) -> Result<(), Failure> {
         let (n, bodies) = (size::<N>(self.z.len()), self.bodies::<N, GUIDED>());
         let rows = rows::<N, GUIDED>(self.change.len());
-        project(n, bodies, rows, &self.here, &self.gradient, &self.lifted, &mut self.schur[..rows * rows]);
+        project(n, bodies, rows, &self.here, &self.gradient, &self.minv_jt, &mut self.schur[..rows * rows]);
         let (z, v, here, free) = (&self.z[..n], &self.v[..n], &self.here[..n], &self.free[..n]);
         if let Some(failure) = self.lost() {
             return Err(failure);
@@ -527,18 +528,18 @@ fn project(
     rows: usize,
     here: &[Complex<f64>],
     gradient: &[Complex<f64>],
-    lifted: &[Complex<f64>],
+    minv_jt: &[Complex<f64>],
     matrix: &mut [f64],
 ) {
     for p in 0..bodies {
         for q in 0..rows {
-            matrix[p * rows + q] = here[p].dot(lifted[q * n + p]);
+            matrix[p * rows + q] = here[p].dot(minv_jt[q * n + p]);
         }
     }
     for p in bodies..rows {
         let gradient = &gradient[(p - bodies) * n..(p - bodies + 1) * n];
         for q in 0..rows {
-            matrix[p * rows + q] = gradient.iter().zip(&lifted[q * n..(q + 1) * n]).map(|(g, lifted)| g.dot(*lifted)).sum();
+            matrix[p * rows + q] = gradient.iter().zip(&minv_jt[q * n..(q + 1) * n]).map(|(g, minv_jt)| g.dot(*minv_jt)).sum();
         }
     }
 }

@@ -4,13 +4,13 @@
 //! a trajectory has the same bits whoever its neighbours are; every lane has its own step, its own time, its own
 //! constants of the mechanism, and takes in the next trajectory as soon as its last one has ended.
 
-use super::pace::{self, Pace};
+use super::step_size::{self, StepSize};
 use super::terms::{add_to, over};
 use super::{JUDGES, Kernel, stop};
 use crate::arithmetic::lanes::{self, Code, Lanes};
 use crate::arithmetic::{angle, sincos};
 use crate::dynamics::{Mechanism, State, Time};
-use crate::stepping::{Cause, StepError, Tally, Tolerance};
+use crate::stepping::{Cause, Statistics, StepError, Tolerance};
 
 /// Largest order there is room for.
 const MOST: usize = 24;
@@ -32,7 +32,7 @@ pub struct BatchMember<'a> {
     /// The start, and in the end the last state reached.
     pub state: State,
     /// Steps taken, and series allowed.
-    pub tally: Tally,
+    pub statistics: Statistics,
     /// Why it stopped, if it did.
     pub stopped: Option<StepError>,
 }
@@ -40,7 +40,7 @@ pub struct BatchMember<'a> {
 impl<'a> BatchMember<'a> {
     /// A trajectory about to start.
     pub fn new(mechanism: &'a Mechanism, state: State) -> Self {
-        Self { mechanism, state, tally: Tally::default(), stopped: None }
+        Self { mechanism, state, statistics: Statistics::default(), stopped: None }
     }
 }
 
@@ -109,7 +109,7 @@ impl Batch {
         (1..=BODIES).contains(&tree.coordinates)
             && !tree.off_axis
             && mechanism.is_plain()
-            && mechanism.rows.is_empty()
+            && mechanism.constraints.is_empty()
             && mechanism.contacts.is_empty()
     }
 
@@ -173,10 +173,10 @@ struct Power<const N: usize> {
 
 /// What a lane is doing.
 #[derive(Clone, Debug)]
-struct Seat {
+struct LaneSlot {
     /// Index of its trajectory.
     member: Option<usize>,
-    pace: Pace,
+    step_size: StepSize,
     time: Time,
     /// The mechanism's unit of time \[s\].
     unit: f64,
@@ -185,9 +185,9 @@ struct Seat {
     taken: f64,
 }
 
-impl Seat {
+impl LaneSlot {
     /// Why the step just expanded cannot be taken, where it cannot.
-    fn failure(&self, tally: &Tally) -> Result<(), StepError> {
+    fn failure(&self, statistics: &Statistics) -> Result<(), StepError> {
         let hint = "look for a position without inertia";
         let stop = |cause, what: &str| stop(cause, &State { time: self.time, ..State::default() }, self.taken, what.into(), hint);
         if self.wanted.is_nan() {
@@ -195,14 +195,14 @@ impl Seat {
         } else if self.wanted < 1e-14 * self.time.hi.abs().max(1e-3 * self.unit) {
             Err(stop(Cause::StepTooSmall, "the series converges in ever smaller circles"))
         } else {
-            tally.check("taylor", self.time.hi, self.taken)
+            statistics.check("taylor", self.time.hi, self.taken)
         }
     }
 }
 
 impl<const N: usize> Team<N> {
     /// Sits a trajectory down.
-    fn seat(&mut self, lane: usize, member: &BatchMember) {
+    fn slot(&mut self, lane: usize, member: &BatchMember) {
         let tree = &member.mechanism.tree;
         for i in 0..N {
             self.diagonal[i][lane] = tree.diagonal[i];
@@ -272,35 +272,35 @@ fn integrate<L: Lanes, const N: usize>(
         powers: [power; MOST + 1],
     };
     let mut teams = Box::new([team.clone(), team]);
-    let empty = Seat { member: None, pace: Pace::new(1.0, order, 0.0), time: until, unit: 1.0, wanted: 0.0, taken: 0.0 };
-    let mut seats: [Seat; WIDTH * TEAMS] = std::array::from_fn(|_| empty.clone());
+    let empty = LaneSlot { member: None, step_size: StepSize::new(1.0, order, 0.0), time: until, unit: 1.0, wanted: 0.0, taken: 0.0 };
+    let mut slots: [LaneSlot; WIDTH * TEAMS] = std::array::from_fn(|_| empty.clone());
     let mut waiting = 0;
     loop {
         let mut left = [0.0; WIDTH * TEAMS];
-        for (place, seat) in seats.iter_mut().enumerate() {
+        for (place, slot) in slots.iter_mut().enumerate() {
             let (team, lane) = (&mut teams[place / WIDTH], place % WIDTH);
-            if seat.member.is_none() {
-                seat.member = next::<N>(members, &mut waiting, until);
-                match seat.member {
+            if slot.member.is_none() {
+                slot.member = next::<N>(members, &mut waiting, until);
+                match slot.member {
                     Some(index) => {
                         let member = &members[index];
-                        team.seat(lane, member);
+                        team.slot(lane, member);
                         let longest = order as f64 / 3.0 / member.mechanism.tree.fastest_rate(&[]);
-                        (seat.pace, seat.time) =
-                            (Pace::new(batch.tolerance, order, longest).over(member.mechanism.units.time), member.state.time);
-                        seat.unit = member.mechanism.units.time;
+                        (slot.step_size, slot.time) =
+                            (StepSize::new(batch.tolerance, order, longest).over(member.mechanism.units.time), member.state.time);
+                        slot.unit = member.mechanism.units.time;
                     }
                     None => team.park(lane),
                 }
             }
-            left[place] = if seat.member.is_some() { (until - seat.time).hi } else { 0.0 };
+            left[place] = if slot.member.is_some() { (until - slot.time).hi } else { 0.0 };
         }
-        if seats.iter().all(|seat| seat.member.is_none()) {
+        if slots.iter().all(|slot| slot.member.is_none()) {
             return;
         }
         let before = [teams[0].high[0], teams[1].high[0]];
         expand::<L, N>(&mut teams, order);
-        for (seat, (place, &left)) in seats.iter_mut().zip(left.iter().enumerate()) {
+        for (slot, (place, &left)) in slots.iter_mut().zip(left.iter().enumerate()) {
             let (team, lane) = (&teams[place / WIDTH], place % WIDTH);
             let coefficient = |k: usize, i: usize| team.powers[k].v[i][lane];
             let mut sizes = [0.0; JUDGES];
@@ -308,23 +308,23 @@ fn integrate<L: Lanes, const N: usize>(
                 *size = (0..N).fold(0.0, |largest: f64, i| largest.max(coefficient(order - back, i).abs()));
             }
             let finite = (0..N).all(|i| coefficient(order, i).is_finite());
-            seat.wanted = if finite { seat.pace.step_of(order, &sizes) } else { f64::NAN };
-            seat.taken = if finite { pace::taken(seat.wanted, left) } else { 0.0 };
+            slot.wanted = if finite { slot.step_size.step_of(order, &sizes) } else { f64::NAN };
+            slot.taken = if finite { step_size::taken(slot.wanted, left) } else { 0.0 };
         }
-        for (team, seats) in teams.iter_mut().zip(seats.chunks_exact(WIDTH)) {
-            finish::<L, N>(team, order, [seats[0].taken, seats[1].taken, seats[2].taken, seats[3].taken]);
+        for (team, slots) in teams.iter_mut().zip(slots.chunks_exact(WIDTH)) {
+            finish::<L, N>(team, order, [slots[0].taken, slots[1].taken, slots[2].taken, slots[3].taken]);
         }
-        for (place, seat) in seats.iter_mut().enumerate() {
-            let Some(index) = seat.member else { continue };
+        for (place, slot) in slots.iter_mut().enumerate() {
+            let Some(index) = slot.member else { continue };
             let (team, lane) = (&mut teams[place / WIDTH], place % WIDTH);
             let member = &mut members[index];
-            let (from, step) = (seat.time, seat.taken);
-            match seat.failure(&member.tally) {
+            let (from, step) = (slot.time, slot.taken);
+            match slot.failure(&member.statistics) {
                 Err(stop) => member.stopped = Some(stop),
                 Ok(()) => {
-                    seat.time = if step == left[place] { until } else { from + step };
-                    member.tally.steps += 1;
-                    member.tally.evaluations += 1;
+                    slot.time = if step == left[place] { until } else { from + step };
+                    member.statistics.steps += 1;
+                    member.statistics.evaluations += 1;
                 }
             }
             let mut turned = [0; BODIES];
@@ -335,10 +335,10 @@ fn integrate<L: Lanes, const N: usize>(
             let (view, start) = (&*team, &before[place / WIDTH]);
             let series = |body: usize, after: f64| view.at(order, lane, body, start[body][lane], after);
             let passage = Passage { from, step, turned, series: &series };
-            if member.stopped.is_some() || watch(index, &passage) == Going::Enough || seat.time >= until {
+            if member.stopped.is_some() || watch(index, &passage) == Going::Enough || slot.time >= until {
                 team.leave(lane, &mut member.state);
-                member.state.time = seat.time;
-                seat.member = None;
+                member.state.time = slot.time;
+                slot.member = None;
             }
         }
     }
@@ -416,7 +416,7 @@ fn raise<L: Lanes, const N: usize>(team: &mut Team<N>, f: &mut [[L; N]; 2], k: u
         }
     }
     for i in 0..N {
-        let (ax, ay) = (couple::<L, N>(&team.coupling[i], &gx, i), couple::<L, N>(&team.coupling[i], &gy, i));
+        let (ax, ay) = (mass_terms::<L, N>(&team.coupling[i], &gx, i), mass_terms::<L, N>(&team.coupling[i], &gy, i));
         let inner = L::of(team.powers[0].c[i]).mul_add(ax, L::of(team.powers[0].s[i]).mul(ay));
         torque[i] = order.neg_mul_add(inner, torque[i]);
     }
@@ -446,14 +446,14 @@ fn raise<L: Lanes, const N: usize>(team: &mut Team<N>, f: &mut [[L; N]; 2], k: u
         (f[0][i], f[1][i]) = (v.mul_add(L::of(team.powers[0].c[i]), gx[i]), v.mul_add(L::of(team.powers[0].s[i]), gy[i]));
     }
     for i in 0..N {
-        let (ax, ay) = (couple::<L, N>(&team.coupling[i], &f[0], i), couple::<L, N>(&team.coupling[i], &f[1], i));
+        let (ax, ay) = (mass_terms::<L, N>(&team.coupling[i], &f[0], i), mass_terms::<L, N>(&team.coupling[i], &f[1], i));
         (team.powers[k + 1].px[i], team.powers[k + 1].py[i]) = (ax.mul(order).array(), ay.mul(order).array());
     }
 }
 
 /// Σ_{j≠i} A_ij x_j.
 #[inline(always)]
-fn couple<L: Lanes, const N: usize>(row: &[Quad; N], x: &[L; N], i: usize) -> L {
+fn mass_terms<L: Lanes, const N: usize>(row: &[Quad; N], x: &[L; N], i: usize) -> L {
     let mut sum = L::splat(0.0);
     for j in 0..N {
         if j != i {

@@ -16,8 +16,8 @@
 //! Wins over the series of any mechanism (whole runs by `taylor`): 1.5 times on `spring` at 1e-9, 1.7 at 1e-14.
 
 use super::direction;
-use super::pace::{self, Pace};
 use super::springs::Springs;
+use super::step_size::{self, StepSize};
 use super::terms::over;
 use super::wide::{self, Wide};
 use crate::arithmetic::DoubleDouble;
@@ -33,7 +33,7 @@ pub struct Bodies<const B: usize, const S: usize> {
     count: usize,
     /// Highest power of the rates, an even number.
     order: usize,
-    pace: Pace,
+    step_size: StepSize,
     /// About the fastest rate of small oscillations without springs \[rad/s\], and the longest step wherever the springs are \[s\].
     rate: f64,
     longest: f64,
@@ -92,8 +92,10 @@ impl<const B: usize, const S: usize> Bodies<B, S> {
     pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize) -> Option<Self> {
         let tree = &mechanism.tree;
         let n = tree.coordinates;
-        let is_sprung_only =
-            mechanism.torsions.is_empty() && mechanism.actions.is_empty() && mechanism.forces.is_empty() && mechanism.rows.is_empty();
+        let is_sprung_only = mechanism.torsions.is_empty()
+            && mechanism.actions.is_empty()
+            && mechanism.forces.is_empty()
+            && mechanism.constraints.is_empty();
         if n == 0 || n > room(B) || tree.off_axis || !is_sprung_only || order > MOST || order % 2 == 1 {
             return None;
         }
@@ -115,7 +117,7 @@ impl<const B: usize, const S: usize> Bodies<B, S> {
         Some(Self {
             count: n,
             order,
-            pace: Pace::new(tolerance, order, if S == 0 { longest } else { f64::INFINITY }).over(mechanism.units.time),
+            step_size: StepSize::new(tolerance, order, if S == 0 { longest } else { f64::INFINITY }).over(mechanism.units.time),
             rate,
             longest,
             coupling,
@@ -282,7 +284,7 @@ fn refined<L: Lanes, const B: usize>(
 #[inline(always)]
 pub fn step<L: Lanes, const B: usize, const S: usize>(bodies: &mut Bodies<B, S>, state: &mut State, left: f64) -> (f64, f64) {
     begin::<L, B, S>(bodies, state);
-    let Bodies { order: last, pace, rate, longest, coupling, diagonal, weight, columns, springs, energy, scratch, .. } = bodies;
+    let Bodies { order: last, step_size, rate, longest, coupling, diagonal, weight, columns, springs, energy, scratch, .. } = bodies;
     let last = *last;
     let start: Start<L, B> = Start {
         e: [load(&scratch.e[0][0]), load(&scratch.e[0][1])],
@@ -327,12 +329,12 @@ pub fn step<L: Lanes, const B: usize, const S: usize>(bodies: &mut Bodies<B, S>,
             *size = size.max((power / ((last - i) as f64 * *energy)).abs());
         }
     }
-    let mut wanted = pace.step_of(last, &sizes);
+    let mut wanted = step_size.step_of(last, &sizes);
     if S > 0 && wanted > *longest {
         let solve = |x: &Row<B>| store(apply::<L, B>(columns.iter().map(|column| &column.inverse), x));
         wanted = wanted.min(reach(last, (*rate * *rate + springs.rate_squared(&scratch.e[0], solve)).sqrt()));
     }
-    let h = pace::taken(wanted, left);
+    let h = step_size::taken(wanted, left);
     if h > 0.0 {
         go::<L, B, S>(bodies, state, h);
     }

@@ -20,11 +20,11 @@
 //! Wins over the series of any mechanism (whole runs by `taylor`): 3.1 times on `motor` at 1e-9, 3.9 at 1e-14.
 
 use super::direction;
-use super::pace::{self, Pace};
+use super::step_size::{self, StepSize};
 use super::terms::{left_over, reciprocal};
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
-use crate::dynamics::row::{Measure, Row};
+use crate::dynamics::constraint::{ConstraintEquation, Measure};
 use crate::dynamics::{Mechanism, State, Time};
 use crate::scene::Law;
 
@@ -95,7 +95,9 @@ impl Driven {
     /// The constants, where this form fits: two bodies on their axes, one driven from the ground by a law without acceleration and sines, no springs.
     pub fn new(mechanism: &Mechanism) -> Option<Self> {
         let tree = &mechanism.tree;
-        let [Row { measure: Measure::Angle { body, base }, law: Some(law), .. }] = &mechanism.rows[..] else { return None };
+        let [ConstraintEquation { measure: Measure::Angle { body, base }, law: Some(law), .. }] = &mechanism.constraints[..] else {
+            return None;
+        };
         let is_steady = law.acceleration == 0.0 && law.sines.is_empty();
         if tree.coordinates != 2 || tree.off_axis || !mechanism.is_plain() || base.is_some() || !is_steady {
             return None;
@@ -197,7 +199,7 @@ fn expand<L: Lanes, const P: usize>(driven: &Driven, start: Newest<L>, scratch: 
 #[inline(always)]
 pub fn step<L: Lanes, const P: usize>(
     driven: &Driven,
-    pace: &Pace,
+    step_size: &StepSize,
     scratch: &mut Scratch,
     flow: &mut Flow,
     t: Time,
@@ -221,8 +223,8 @@ pub fn step<L: Lanes, const P: usize>(
         let both = vectors.max(L::of(scratch.v[P - i]).abs()).array();
         *largest = both.into_iter().fold(0.0, |most, size| if size > most { size } else { most });
     }
-    let wanted = pace.step::<P>(&largest);
-    let h = pace::taken(wanted, left);
+    let wanted = step_size.step::<P>(&largest);
+    let h = step_size::taken(wanted, left);
     if h > 0.0 {
         go::<L, P>(driven, scratch, flow, h);
     }

@@ -99,7 +99,7 @@ impl<T: Coefficient> Expansion<T> {
     pub fn wanted(&self, tolerance: f64, with_vectors: bool) -> f64 {
         let (order, f) = (self.series.order(), self.series.coordinates());
         let units = self.mechanism.units;
-        let angles = if self.coordinates == Coordinates::All { self.mechanism.bodies.len() } else { self.mechanism.ties.turning() };
+        let angles = if self.coordinates == Coordinates::All { self.mechanism.bodies.len() } else { self.mechanism.partition.turning() };
         let largest = |k: usize| {
             let rates = &self.series.rate[k * f..(k + 1) * f];
             let turning = rates[..angles].iter().fold(0.0, |most, rate| larger(most, rate.value()));

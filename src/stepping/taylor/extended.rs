@@ -9,8 +9,8 @@
 //! (k+1) v_{k+1} = M_0⁻¹ (e_k × W - A Σ_{m=1..k} m e_{k+1-m}·f_{j,m} - A (k+1) e_0·g_j),   f_{k+1} = g + v_{k+1} e_0
 //! ```
 
-use super::pace::{self, Pace};
 use super::pair::{self, Flow, Newest, Pair, Start};
+use super::step_size::{self, StepSize};
 use super::terms::{LEFT, over_first, reciprocal};
 use super::wide::{self, Wide};
 use crate::arithmetic::lanes::Lanes;
@@ -35,7 +35,7 @@ fn part<L: Lanes>(signs: [f64; 4], k: usize) -> Wide<L> {
 
 /// Expands to order P and takes one step of at most `left` \[s\]; returns the step wanted, and leaves `flow` alone where it is useless.
 #[inline(always)]
-pub fn step<L: Lanes, const P: usize>(pair: &Pair, pace: &Pace, scratch: &mut Scratch, flow: &mut Flow, left: f64) -> (f64, f64) {
+pub fn step<L: Lanes, const P: usize>(pair: &Pair, step_size: &StepSize, scratch: &mut Scratch, flow: &mut Flow, left: f64) -> (f64, f64) {
     let twice = |[_, a, _, b]: [f64; 4]| [a, a, b, b];
     let angles = |[a, _, b, _]: [f64; 4]| [a, a, b, b];
     let zero = Wide::of(L::splat(0.0));
@@ -78,11 +78,11 @@ pub fn step<L: Lanes, const P: usize>(pair: &Pair, pace: &Pace, scratch: &mut Sc
     }
     let start = Start::new(pair, e[0].hi, v[0].hi, [inverse[0].hi, inverse[1].hi]);
     pair::expand::<L, P, LEADING>(&start, plain, Newest { v: v[LEADING].hi, e: e[LEADING].hi, g: rest.hi });
-    let wanted = pair::wanted::<L, P>(pace, plain);
+    let wanted = pair::wanted::<L, P>(step_size, plain);
     if wanted.is_nan() {
         return (wanted, 0.0);
     }
-    let h = pace::taken(wanted, left);
+    let h = step_size::taken(wanted, left);
     if h > 0.0 {
         go::<L, P>(scratch, flow, h);
     }

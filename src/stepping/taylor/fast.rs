@@ -4,8 +4,8 @@ use super::bodies::{self, Bodies};
 use super::driven::{self, Driven};
 use super::extended;
 use super::looped::{self, Looped};
-use super::pace::Pace;
 use super::pair::{self, Pair};
+use super::step_size::StepSize;
 use crate::arithmetic::lanes::{self, Code, Lanes};
 use crate::dynamics::natural::Reduced;
 use crate::dynamics::{Mechanism, State};
@@ -37,9 +37,9 @@ struct Settings {
 /// What it runs on; the first three do not know their pace.
 #[derive(Clone, Debug)]
 enum Form {
-    Pair(Pair, Pace, Box<pair::Scratch>),
-    Extended(Pair, Pace, Box<extended::Scratch>),
-    Driven(Box<Driven>, Pace, Box<driven::Scratch>),
+    Pair(Pair, StepSize, Box<pair::Scratch>),
+    Extended(Pair, StepSize, Box<extended::Scratch>),
+    Driven(Box<Driven>, StepSize, Box<driven::Scratch>),
     Few(Box<Bodies<1, 0>>),
     Several(Box<Bodies<2, 0>>),
     FewSprung(Box<Bodies<1, 1>>),
@@ -91,21 +91,21 @@ fn of_order<const P: usize>() -> (Step, Go) {
 #[inline(always)]
 fn step<L: Lanes, const P: usize>(form: &mut Form, state: &mut State, left: f64) -> Option<(f64, f64)> {
     Some(match form {
-        Form::Pair(pair, pace, scratch) => {
+        Form::Pair(pair, step_size, scratch) => {
             let mut flow = pair::Flow::of(pair, state);
-            let steps = pair::step::<L, P>(pair, pace, scratch, &mut flow, left);
+            let steps = pair::step::<L, P>(pair, step_size, scratch, &mut flow, left);
             flow.write(pair, state);
             steps
         }
-        Form::Extended(pair, pace, scratch) if P == EXTENDED => {
+        Form::Extended(pair, step_size, scratch) if P == EXTENDED => {
             let mut flow = pair::Flow::of(pair, state);
-            let steps = extended::step::<L, P>(pair, pace, scratch, &mut flow, left);
+            let steps = extended::step::<L, P>(pair, step_size, scratch, &mut flow, left);
             flow.write(pair, state);
             steps
         }
-        Form::Driven(driven, pace, scratch) => {
+        Form::Driven(driven, step_size, scratch) => {
             let mut flow = driven::Flow::of(state);
-            let steps = driven::step::<L, P>(driven, pace, scratch, &mut flow, state.time, left);
+            let steps = driven::step::<L, P>(driven, step_size, scratch, &mut flow, state.time, left);
             flow.write(state);
             steps
         }
@@ -200,17 +200,17 @@ impl Fast {
     /// The kernel, where there is one; `is_extended`: with the first orders in double-double.
     pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize, is_portable: bool, is_extended: bool) -> Option<Self> {
         let settings = || Settings { mechanism: mechanism.clone(), tolerance, order, is_portable, is_extended };
-        let pace = |longest| Pace::new(tolerance, order, longest).over(mechanism.units.time);
+        let step_size = |longest| StepSize::new(tolerance, order, longest).over(mechanism.units.time);
         let form = if is_extended {
             let pair = Pair::new(mechanism).filter(|_| order == EXTENDED)?;
-            let pace = pace(pair.longest(order));
-            Form::Extended(pair, pace, Box::default())
+            let step_size = step_size(pair.longest(order));
+            Form::Extended(pair, step_size, Box::default())
         } else if let Some(pair) = Pair::new(mechanism) {
-            let pace = pace(pair.longest(order));
-            Form::Pair(pair, pace, Box::default())
+            let step_size = step_size(pair.longest(order));
+            Form::Pair(pair, step_size, Box::default())
         } else if let Some(driven) = Driven::new(mechanism) {
-            let pace = pace(driven.longest(order));
-            Form::Driven(Box::new(driven), pace, Box::default())
+            let step_size = step_size(driven.longest(order));
+            Form::Driven(Box::new(driven), step_size, Box::default())
         } else {
             let form = Self::bodies(mechanism, tolerance, order)?;
             return Some(Self::of_any(settings(), form));

@@ -135,15 +135,15 @@ fn begin<L: Lanes, const B: usize>(looped: &mut Looped<B>, state: &State) -> f64
         (looped.z[1][0][b], looped.z[1][1][b]) = (s.mul(w).neg().array(), c.mul(w).array());
     }
     let Looped { keeper, z, spread, across, projected, .. } = looped;
-    let least = keeper.face::<L>(&z[0]);
-    let Keeper { columns, schur, lifted, .. } = keeper;
+    let least = keeper.unit_vectors::<L>(&z[0]);
+    let Keeper { columns, schur, minv_jt, .. } = keeper;
     for j in 0..n {
         let mut sum = [[L::ZERO; B]; 2];
         for i in 0..n {
             let factor = L::splat(at(&schur[j], i));
             for b in 0..B {
-                sum[0][b] = L::of(lifted[i][0][b]).mul_add(factor, sum[0][b]);
-                sum[1][b] = L::of(lifted[i][1][b]).mul_add(factor, sum[1][b]);
+                sum[0][b] = L::of(minv_jt[i][0][b]).mul_add(factor, sum[0][b]);
+                sum[1][b] = L::of(minv_jt[i][1][b]).mul_add(factor, sum[1][b]);
             }
         }
         spread[j] = [store(sum[0]), store(sum[1])];
@@ -158,7 +158,7 @@ fn begin<L: Lanes, const B: usize>(looped: &mut Looped<B>, state: &State) -> f64
             block[part] = load(&columns.blocks[j][part]);
         }
         for i in 0..n {
-            let (x, y) = (L::splat(at(&lifted[i][0], j)), L::splat(at(&lifted[i][1], j)));
+            let (x, y) = (L::splat(at(&minv_jt[i][0], j)), L::splat(at(&minv_jt[i][1], j)));
             for b in 0..B {
                 let (ux, uy) = (L::of(spread[i][0][b]), L::of(spread[i][1][b]));
                 block[0][b] = ux.neg_mul_add(x, block[0][b]);
@@ -266,12 +266,12 @@ pub fn step<L: Lanes, const B: usize>(looped: &mut Looped<B>, state: &mut State,
     for m in 0..looped.order {
         order::<L, B>(looped, m);
     }
-    let (wanted, summed) = pace::<L, B>(looped);
+    let (wanted, summed) = step_size::<L, B>(looped);
     looped.summed = summed;
     if wanted.is_nan() {
         return Some((f64::NAN, 0.0));
     }
-    let h = super::pace::taken(wanted, left);
+    let h = super::step_size::taken(wanted, left);
     if h > 0.0 {
         go::<L, B>(looped, state, h);
     }
@@ -280,7 +280,7 @@ pub fn step<L: Lanes, const B: usize>(looped: &mut Looped<B>, state: &mut State,
 
 /// The longest step any order allows \[s\], and the power of z that order ends with; not a number where a coefficient is not.
 #[inline(always)]
-fn pace<L: Lanes, const B: usize>(looped: &Looped<B>) -> (f64, usize) {
+fn step_size<L: Lanes, const B: usize>(looped: &Looped<B>) -> (f64, usize) {
     let mut roots = [f64::INFINITY; JUDGES];
     let (mut best, mut chosen) = (f64::NEG_INFINITY, looped.order + 1);
     for k in LEAST - JUDGES..=looped.order {
@@ -336,8 +336,8 @@ pub fn go<L: Lanes, const B: usize>(looped: &mut Looped<B>, state: &mut State, h
         }
     }
     // V and S⁻¹ of the step's start have served: the next step makes its own.
-    looped.keeper.put_back::<L>(&mut z);
-    looped.keeper.put_rates_back::<L>(&z, &mut v);
+    looped.keeper.project_back::<L>(&mut z);
+    looped.keeper.project_rates_back::<L>(&z, &mut v);
     let half = sum::<L, B>(looped, 0.5 * h)[0];
     let half = [store(half[0]), store(half[1])];
     let n = looped.count;

@@ -23,7 +23,7 @@
 //! 1e-14, 1.4 and 1.7 on `gentle`.
 
 use super::direction;
-use super::pace::{self, Pace};
+use super::step_size::{self, StepSize};
 use super::terms::{LEFT, add_to, left_over, less_over, over, over_first, pair_sum};
 use crate::arithmetic::Complex;
 use crate::arithmetic::lanes::Lanes;
@@ -106,7 +106,7 @@ impl Pair {
     /// One body has a second one beside it that feels nothing and stays where it is.
     pub fn new(mechanism: &Mechanism) -> Option<Self> {
         let tree = &mechanism.tree;
-        if !(1..=2).contains(&tree.coordinates) || tree.off_axis || !mechanism.is_plain() || !mechanism.rows.is_empty() {
+        if !(1..=2).contains(&tree.coordinates) || tree.off_axis || !mechanism.is_plain() || !mechanism.constraints.is_empty() {
             return None;
         }
         let is_single = tree.coordinates == 1;
@@ -287,7 +287,7 @@ pub fn expand<L: Lanes, const P: usize, const FROM: usize>(start: &Start<L>, scr
 
 /// The step the last coefficients want \[s\]; not a number where one of them is not.
 #[inline(always)]
-pub fn wanted<L: Lanes, const P: usize>(pace: &Pace, scratch: &Scratch) -> f64 {
+pub fn wanted<L: Lanes, const P: usize>(step_size: &StepSize, scratch: &Scratch) -> f64 {
     let v = L::of(scratch.v[P]).abs();
     // Not a number in any order reaches the last one.
     if !v.add(v.swap_halves()).array()[0].is_finite() {
@@ -298,12 +298,12 @@ pub fn wanted<L: Lanes, const P: usize>(pace: &Pace, scratch: &Scratch) -> f64 {
         let size = L::of(scratch.v[P - i]).abs();
         *largest = size.max(size.swap_halves()).array()[0];
     }
-    pace.step::<P>(&largest)
+    step_size.step::<P>(&largest)
 }
 
 /// Expands to order P and takes one step of at most `left` \[s\]; returns the step wanted, and leaves `flow` alone where it is useless.
 #[inline(always)]
-pub fn step<L: Lanes, const P: usize>(pair: &Pair, pace: &Pace, scratch: &mut Scratch, flow: &mut Flow, left: f64) -> (f64, f64) {
+pub fn step<L: Lanes, const P: usize>(pair: &Pair, step_size: &StepSize, scratch: &mut Scratch, flow: &mut Flow, left: f64) -> (f64, f64) {
     let [phi1, v1, phi2, v2] = flow.high;
     let e0 = direction::unit(L::of([phi1, phi1, phi2, phi2]), L::of([flow.low[0], flow.low[0], flow.low[2], flow.low[2]]));
     let v0 = L::of([v1, v1, v2, v2]);
@@ -335,11 +335,11 @@ pub fn step<L: Lanes, const P: usize>(pair: &Pair, pace: &Pace, scratch: &mut Sc
     let zero = L::splat(0.0);
     let newest = order(&start, scratch, Sums { b: zero, x: zero }, Newest { v: first, e: e1, g: g1 }, 1);
     expand::<L, P, 2>(&start, scratch, newest);
-    let wanted = wanted::<L, P>(pace, scratch);
+    let wanted = wanted::<L, P>(step_size, scratch);
     if wanted.is_nan() {
         return (wanted, 0.0);
     }
-    let h = pace::taken(wanted, left);
+    let h = step_size::taken(wanted, left);
     if h > 0.0 {
         go::<L, P>(scratch, flow, h);
     }

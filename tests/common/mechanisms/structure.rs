@@ -213,15 +213,15 @@ impl Model {
         if is_own_rail {
             // A point of the parent, or of the ground, in a slot of the new body.
             point = self.spot_of(parent);
-            let foot = self.own_point();
-            place = Place { bar: Some(last), point: foot };
-            self.bring([foot[0] + travel * direction[0], foot[1] + travel * direction[1]], self.at(&point));
+            let origin_point = self.own_point();
+            place = Place { bar: Some(last), point: origin_point };
+            self.bring([origin_point[0] + travel * direction[0], origin_point[1] + travel * direction[1]], self.at(&point));
         } else {
             let own = self.own_point();
             point = Place { bar: Some(last), point: own };
             place = self.spot_of(parent);
-            let (foot, along) = (self.at(&place), parent.map_or(direction, |bar| self.turned(bar, direction)));
-            self.bring(own, [foot[0] + travel * along[0], foot[1] + travel * along[1]]);
+            let (origin_point, along) = (self.at(&place), parent.map_or(direction, |bar| self.turned(bar, direction)));
+            self.bring(own, [origin_point[0] + travel * along[0], origin_point[1] + travel * along[1]]);
         }
         let locked = self.takes(Kind::LockedSlider, 0.25);
         self.add_slider(Slider { name: String::new(), point, rail: Rail { place, direction }, locked });

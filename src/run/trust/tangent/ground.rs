@@ -8,8 +8,8 @@
 //! The least change in the metric of the mass matrix, as in [`projection`](crate::stabilization::projection), whose derivative this is on the constraints.
 
 use crate::arithmetic::{Complex, Dual, Scalar};
+use crate::dynamics::constraint::Posture;
 use crate::dynamics::kernel::{Kernel, dot};
-use crate::dynamics::row::Posture;
 use crate::dynamics::{Mechanism, State};
 
 type Number = Dual<1, false>;
@@ -35,14 +35,14 @@ impl Ground {
     pub fn stand(&mut self, mechanism: &Mechanism, state: &State) -> usize {
         let n = mechanism.coordinates();
         self.kernel.linearise_at::<0>(mechanism, state.time, &state.y[..n], &state.y[n..2 * n]);
-        (0..mechanism.rows.len()).filter(|&r| !self.kernel.is_left_out(r)).count()
+        (0..mechanism.constraints.len()).filter(|&r| !self.kernel.is_left_out(r)).count()
     }
 
     /// Makes columns tangent at the state taken last.
     pub fn keep<'a>(&mut self, mechanism: &Mechanism, state: &State, columns: impl Iterator<Item = &'a mut Vec<f64>>) {
         let n = mechanism.coordinates();
         for column in columns {
-            for r in 0..mechanism.rows.len() {
+            for r in 0..mechanism.constraints.len() {
                 self.kernel.multiplier[r] = self.kernel.fold_gradient(r, 0.0, |sum, k, g| sum + g * column[k]);
             }
             self.shift(&mut column[..n]);
@@ -58,9 +58,9 @@ impl Ground {
             self.phi[k] = Number { value: state.y[k], slope: [column[k]] };
             self.omega[k] = Number { value: state.y[n + k], slope: [column[n + k]] };
         }
-        mechanism.tree.face::<Number, 0>(&self.phi, &mut self.z);
+        mechanism.tree.unit_vectors::<Number, 0>(&self.phi, &mut self.z);
         let at = Posture { phi: &self.phi, z: &self.z, omega: &self.omega };
-        for (row, multiplier) in mechanism.rows.iter().zip(&mut self.kernel.multiplier) {
+        for (row, multiplier) in mechanism.constraints.iter().zip(&mut self.kernel.multiplier) {
             self.gradient.fill(Number::ZERO);
             let here = row.linearise(state.time, at, &mut self.gradient);
             *multiplier = (dot(&self.gradient, &self.omega) + here.drive).slope[0];
@@ -70,7 +70,7 @@ impl Ground {
     /// Takes M⁻¹ Gᵀ S⁻¹ of the multipliers off one half of a column.
     fn shift(&mut self, half: &mut [f64]) {
         self.kernel.solve_rows();
-        self.kernel.lift();
+        self.kernel.multiplier_accelerations();
         for (entry, &change) in half.iter_mut().zip(&self.kernel.load) {
             *entry -= change;
         }

@@ -8,8 +8,8 @@
 //! Source: P. C. Müller, *Calculation of Lyapunov exponents for dynamic systems with discontinuities*, Chaos, Solitons & Fractals 5 (1995).
 
 use super::Tangent;
+use crate::dynamics::constraint::Posture;
 use crate::dynamics::kernel::{Bias, Kernel, dot};
-use crate::dynamics::row::Posture;
 use crate::dynamics::{Coordinates, Mechanism, Motion};
 use crate::run::contact::Jump;
 use std::sync::Arc;
@@ -63,7 +63,7 @@ impl Tangent {
             self.path.held.clone_from(&self.mechanism.held);
         }
         if self.coordinates == Coordinates::Independent {
-            let own = &self.mechanism.ties.independent;
+            let own = &self.mechanism.partition.independent;
             for column in &mut all {
                 *column = own.iter().map(|&k| column[k]).chain(own.iter().map(|&k| column[n + k])).collect();
             }
@@ -97,7 +97,7 @@ fn cross(mechanism: &Mechanism, jumps: &[Jump], columns: &mut [Vec<f64>]) -> Res
     let z = mechanism.elements(&here.phi);
     touched.row.linearise(struck.before.time, Posture { phi: &here.phi, z: &z, omega: &here.omega }, &mut gradient);
     let approach = dot(&gradient, &here.omega);
-    if approach >= -GRAZED * touched.pace(&here.omega) {
+    if approach >= -GRAZED * touched.step_size(&here.omega) {
         return Err("a point grazes a wall, which neighbouring motions may miss".into());
     }
     for column in columns {
@@ -108,7 +108,7 @@ fn cross(mechanism: &Mechanism, jumps: &[Jump], columns: &mut [Vec<f64>]) -> Res
         }
         for jump in jumps {
             if let Some(contact) = jump.contact {
-                strike(jump, contact, late, column)?;
+                impact_at(jump, contact, late, column)?;
             }
         }
         for k in 0..n {
@@ -120,7 +120,7 @@ fn cross(mechanism: &Mechanism, jumps: &[Jump], columns: &mut [Vec<f64>]) -> Res
 }
 
 /// The derivative of an impact, along a column and `late` \[s\], by differences.
-fn strike(jump: &Jump, contact: usize, late: f64, column: &mut [f64]) -> Result<(), String> {
+fn impact_at(jump: &Jump, contact: usize, late: f64, column: &mut [f64]) -> Result<(), String> {
     let n = column.len() / 2;
     let [phi, omega] = [&jump.before.phi, &jump.before.omega].map(|all| all.iter().map(|x| x.hi).collect::<Vec<_>>());
     let size = |of: &[f64], from: &[f64]| of.iter().zip(from).fold(0.0, |most: f64, (x, y)| most.max(x.abs() / (1.0 + y.abs())));
@@ -132,7 +132,7 @@ fn strike(jump: &Jump, contact: usize, late: f64, column: &mut [f64]) -> Result<
     let beside = |sign: f64| {
         let moved = |from: &[f64], by: &[f64]| from.iter().zip(by).map(|(x, y)| x + sign * small * y).collect::<Vec<_>>();
         let t = jump.before.time + sign * small * late;
-        jump.mechanism.strike(contact, t, &moved(&phi, &column[..n]), &moved(&omega, &column[n..]))
+        jump.mechanism.impact_at(contact, t, &moved(&phi, &column[..n]), &moved(&omega, &column[n..]))
     };
     let (Some(ahead), Some(behind)) = (beside(1.0), beside(-1.0)) else {
         return Err("neighbouring motions have no way back from a wall".into());

@@ -76,8 +76,8 @@ impl Tangent {
         if self.coordinates != Coordinates::Independent {
             return column.to_vec();
         }
-        let ties = &self.mechanism.ties.bodies;
-        let half = |from: usize| ties.iter().map(move |tie| tie.base.map_or(0.0, |base| column[from + base]));
+        let partition = &self.mechanism.partition.bodies;
+        let half = |from: usize| partition.iter().map(move |dependent_angle| dependent_angle.base.map_or(0.0, |base| column[from + base]));
         half(0).chain(half(f)).collect()
     }
 }

@@ -8,16 +8,24 @@
 //!
 //! As a function of the elements it is bilinear.  The force on the point is -lambda nu, on the body lambda nu at the same place.
 
-use super::{Measure, Push, Row, Site, Way};
+use super::{ConstraintEquation, Measure, Push, Site, Way};
 use crate::arithmetic::Complex;
 use crate::dynamics::law::Law;
 use crate::dynamics::quadratic::Quadratic;
 
-/// Keeps a point at a distance, the law's or none, from the point `foot` of body `rail` along the unit vector `normal` of that body's frame.
-pub fn slot_row(name: &str, site: &Site, rail: usize, foot: &Site, normal: Complex<f64>, law: Option<Law>, angles: usize) -> Row {
-    Row {
+/// Keeps a point at a distance, the law's or none, from the point `origin_point` of body `rail` along the unit vector `normal` of that body's frame.
+pub fn slot_equation(
+    name: &str,
+    site: &Site,
+    rail: usize,
+    origin_point: &Site,
+    normal: Complex<f64>,
+    law: Option<Law>,
+    angles: usize,
+) -> ConstraintEquation {
+    ConstraintEquation {
         name: name.into(),
-        measure: Measure::Place(Quadratic::along_body(&site.point.minus(&foot.point), rail, normal, angles)),
+        measure: Measure::Place(Quadratic::along_body(&site.point.minus(&origin_point.point), rail, normal, angles)),
         law,
         push: Some(Push { on: site.body, from: Some(rail), way: Way::Body(rail, normal) }),
     }
@@ -27,24 +35,24 @@ pub fn slot_row(name: &str, site: &Site, rail: usize, foot: &Site, normal: Compl
 mod tests {
     use super::*;
     use crate::arithmetic::Scalar;
-    use crate::dynamics::row::Posture;
-    use crate::dynamics::row::tests::{assert_derivatives, crank, free, law, posture, rod};
+    use crate::dynamics::constraint::Posture;
+    use crate::dynamics::constraint::tests::{assert_derivatives, crank, free, law, posture, rod};
 
     #[test]
     fn its_derivatives_are_those_of_its_position() {
         let normal = Complex::new(-0.6, 0.8);
-        assert_derivatives(&slot_row("slot", &rod(), 0, &crank(), normal, None, 2));
-        assert_derivatives(&slot_row("travel", &free(), 1, &rod(), normal, Some(law()), 2));
+        assert_derivatives(&slot_equation("slot", &rod(), 0, &crank(), normal, None, 2));
+        assert_derivatives(&slot_equation("travel", &free(), 1, &rod(), normal, Some(law()), 2));
     }
 
     #[test]
     fn its_convective_term_is_that_of_the_turning_line() {
-        let (normal, point, foot) = (Complex::new(-0.6, 0.8), rod(), crank());
-        let row = slot_row("slot", &point, 0, &foot, normal, None, 2);
+        let (normal, point, origin_point) = (Complex::new(-0.6, 0.8), rod(), crank());
+        let row = slot_equation("slot", &point, 0, &origin_point, normal, None, 2);
         let (phi, z, omega) = posture(0.3);
         let mut jacobian = vec![Default::default(); 4];
         let here = row.linearise(Default::default(), Posture { phi: &phi, z: &z, omega: &omega }, &mut jacobian);
-        let (nu, span) = (z[0].turn(normal), point.point.minus(&foot.point));
+        let (nu, span) = (z[0].turn(normal), point.point.minus(&origin_point.point));
         let turned = omega[0] * nu.left().dot(span.velocity(&z, &omega));
         let expected = nu.dot(span.convective(&z, &omega)) + turned.scale(2.0) - omega[0] * omega[0] * nu.dot(span.position(&z));
         assert!((here.convective - expected).hi.abs() < 1e-15);

@@ -1,24 +1,24 @@
-//! A companion under way: the series, and the tangent flow along it.
+//! A reference solution under way: the series, and the tangent flow along it.
 
 use super::budget::Prices;
 use super::finer::is_rounded;
 use super::tangent::{Path, Tangent};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::build::build;
-use crate::run::contact::{Course, Station};
+use crate::run::contact::{ContactDriver, ContactDriverState};
 use crate::run::methods::MethodId;
 use crate::run::plan::Plan;
 use crate::run::running::Outcome;
-use crate::stepping::{StepError, Tally};
+use crate::stepping::{Statistics, StepError};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Steps that are taken for granted where the companion has to end one at every look.
+/// Steps that are taken for granted where the reference solution has to end one at every look.
 const STEPS: f64 = 256.0;
 
-/// A companion under way.
-pub(super) struct Shadow {
-    course: Course,
+/// A reference solution under way.
+pub(super) struct ReferenceRun {
+    contact_driver: ContactDriver,
     pub outcome: Outcome,
     pub motion: Motion,
     pub tangent: Option<Tangent>,
@@ -28,20 +28,20 @@ pub(super) struct Shadow {
     pub is_rounded: bool,
     /// The time at which the series began \[s\].
     begun: f64,
-    last: Tally,
+    last: Statistics,
 }
 
 /// All that the rest of it depends on.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub(super) struct KeptShadow {
-    station: Station,
+pub(super) struct SavedReferenceRun {
+    contact_state: ContactDriverState,
     outcome: Outcome,
     path: Option<Path>,
     begun: f64,
-    last: Tally,
+    last: Statistics,
 }
 
-impl KeptShadow {
+impl SavedReferenceRun {
     /// On the way to a later horizon \[s\].
     pub(super) fn extend(&mut self, until: f64) {
         (self.outcome.plan.until, self.outcome.plan.every) = (until, until);
@@ -50,12 +50,12 @@ impl KeptShadow {
     /// Whether its parts go together.
     pub(super) fn is_sound(&self) -> bool {
         let Outcome { plan, holds, .. } = &self.outcome;
-        plan.is_sound() && Course::names_holds(&self.station) <= holds.len()
+        plan.is_sound() && ContactDriver::names_holds(&self.contact_state) <= holds.len()
     }
 }
 
-/// What a companion may cost, and what it has cost.
-pub(super) struct Purse<'a> {
+/// What a reference solution may cost, and what it has cost.
+pub(super) struct WorkBudget<'a> {
     pub prices: &'a Prices,
     pub spent: &'a mut f64,
     pub budget: f64,
@@ -63,32 +63,32 @@ pub(super) struct Purse<'a> {
     pub flow: &'a mut f64,
 }
 
-fn course(mechanism: &Arc<Mechanism>, series: &mut Plan, start: &Motion) -> Result<(Course, Outcome), String> {
+fn contact_driver(mechanism: &Arc<Mechanism>, series: &mut Plan, start: &Motion) -> Result<(ContactDriver, Outcome), String> {
     let driver = build(mechanism, series, start).map_err(|stop| stop.what)?;
     let mut outcome = Outcome::begun(mechanism, series.clone());
-    let mut course = Course::new(Arc::clone(mechanism), driver);
-    course.meet(&mut outcome).map_err(|stop| stop.what)?;
-    Ok((course, outcome))
+    let mut contact_driver = ContactDriver::new(Arc::clone(mechanism), driver);
+    contact_driver.meet(&mut outcome).map_err(|stop| stop.what)?;
+    Ok((contact_driver, outcome))
 }
 
-impl Shadow {
+impl ReferenceRun {
     /// One at the start of a run.
     ///
     /// # Errors
     /// Why there can be none.
     pub(super) fn new(mechanism: &Arc<Mechanism>, series: &mut Plan, start: &Motion) -> Result<Self, String> {
-        let (mut course, outcome) = course(mechanism, series, start)?;
+        let (mut contact_driver, outcome) = contact_driver(mechanism, series, start)?;
         let begun = match series.method {
-            MethodId::Taylor => Tangent::new(&Arc::clone(course.holding()), &course.motion(), series.until),
-            _ => Err("the companion is no series".into()),
+            MethodId::Taylor => Tangent::new(&Arc::clone(contact_driver.holding()), &contact_driver.motion(), series.until),
+            _ => Err("the reference solution is no series".into()),
         };
         let (tangent, no_growth) = match begun {
             Ok(tangent) => (Some(tangent), None),
             Err(why) => (None, Some(why)),
         };
-        course.jumps = tangent.is_some().then(Vec::new);
+        contact_driver.jumps = tangent.is_some().then(Vec::new);
         let (is_rounded, begun) = (is_rounded(series), start.time.hi);
-        Ok(Self { course, outcome, motion: start.clone(), tangent, no_growth, is_rounded, begun, last: Tally::default() })
+        Ok(Self { contact_driver, outcome, motion: start.clone(), tangent, no_growth, is_rounded, begun, last: Statistics::default() })
     }
 
     /// Goes on by another series from where it is.
@@ -97,15 +97,15 @@ impl Shadow {
     /// Why it cannot.
     pub(super) fn change(&mut self, mechanism: &Arc<Mechanism>, mut series: Plan) -> Result<(), String> {
         let motion = self.motion.clone();
-        (self.course, self.outcome) = course(mechanism, &mut series, &motion)?;
-        self.course.jumps = self.tangent.is_some().then(Vec::new);
-        (self.is_rounded, self.begun, self.last) = (is_rounded(&series), motion.time.hi, Tally::default());
+        (self.contact_driver, self.outcome) = contact_driver(mechanism, &mut series, &motion)?;
+        self.contact_driver.jumps = self.tangent.is_some().then(Vec::new);
+        (self.is_rounded, self.begun, self.last) = (is_rounded(&series), motion.time.hi, Statistics::default());
         Ok(())
     }
 
-    pub(super) fn kept(&self) -> KeptShadow {
-        KeptShadow {
-            station: self.course.station(),
+    pub(super) fn kept(&self) -> SavedReferenceRun {
+        SavedReferenceRun {
+            contact_state: self.contact_driver.contact_state(),
             outcome: self.outcome.clone(),
             path: self.tangent.as_ref().map(|tangent| tangent.path().clone()),
             begun: self.begun,
@@ -114,9 +114,16 @@ impl Shadow {
     }
 
     /// Goes on from what was kept, which was reached on the way to `horizon`; `None` where it cannot be of this mechanism.
-    pub(super) fn resume(mechanism: &Arc<Mechanism>, start: &Motion, kept: KeptShadow, horizon: Time) -> Result<Option<Self>, StepError> {
-        let KeptShadow { station, outcome, path, begun, last } = kept;
-        let Some(mut course) = Course::resume(Arc::clone(mechanism), &outcome.plan, start, station, horizon)? else { return Ok(None) };
+    pub(super) fn resume(
+        mechanism: &Arc<Mechanism>,
+        start: &Motion,
+        kept: SavedReferenceRun,
+        horizon: Time,
+    ) -> Result<Option<Self>, StepError> {
+        let SavedReferenceRun { contact_state, outcome, path, begun, last } = kept;
+        let Some(mut contact_driver) = ContactDriver::resume(Arc::clone(mechanism), &outcome.plan, start, contact_state, horizon)? else {
+            return Ok(None);
+        };
         let tangent = match path {
             None => None,
             Some(path) => match Tangent::resume(mechanism, path) {
@@ -124,15 +131,15 @@ impl Shadow {
                 tangent => tangent,
             },
         };
-        course.jumps = tangent.is_some().then(Vec::new);
+        contact_driver.jumps = tangent.is_some().then(Vec::new);
         let is_rounded = is_rounded(&outcome.plan);
-        let motion = course.motion();
-        Ok(Some(Self { course, outcome, motion, tangent, no_growth: None, is_rounded, begun, last }))
+        let motion = contact_driver.motion();
+        Ok(Some(Self { contact_driver, outcome, motion, tangent, no_growth: None, is_rounded, begun, last }))
     }
 
     /// Ends the tangent flow.
     pub(super) fn end_flow(&mut self) -> Option<Tangent> {
-        self.course.jumps = None;
+        self.contact_driver.jumps = None;
         self.tangent.take()
     }
 
@@ -143,12 +150,12 @@ impl Shadow {
 
     /// Expansions of its series so far.
     pub(super) fn expansions(&self) -> u64 {
-        self.course.tally().evaluations
+        self.contact_driver.statistics().evaluations
     }
 
     /// Impacts and lasting contacts so far.
     pub(super) fn events(&self) -> u64 {
-        self.outcome.strike_count + self.outcome.hold_count
+        self.outcome.impact_count + self.outcome.persistent_contact_count
     }
 
     /// The mean length of its steps \[s\], of those up to `t` \[s\]; where they end at every look it has no say in when these are.
@@ -162,8 +169,8 @@ impl Shadow {
     /// To a time, with the motion there in `motion`; what it cost is added to what was spent, which must not pass the budget.
     ///
     /// # Errors
-    /// Why the companion stopped, or `None` where the budget was used up.
-    pub(super) fn go(&mut self, until: Time, purse: &mut Purse) -> Result<(), Option<String>> {
+    /// Why the reference solution stopped, or `None` where the budget was used up.
+    pub(super) fn go(&mut self, until: Time, purse: &mut WorkBudget) -> Result<(), Option<String>> {
         while let Some(next) = self.tangent.as_ref().map(Tangent::next).filter(|&next| next <= until.hi) {
             self.integrate(Time::from(next), purse)?;
             let steps = if self.is_rounded { self.last.steps } else { 0 };
@@ -177,26 +184,26 @@ impl Shadow {
     }
 
     /// The same without the tangent flow.
-    fn integrate(&mut self, until: Time, purse: &mut Purse) -> Result<(), Option<String>> {
+    fn integrate(&mut self, until: Time, purse: &mut WorkBudget) -> Result<(), Option<String>> {
         let each = purse.prices.series[0];
         let mut left = ((purse.budget - *purse.spent) / each) as u64;
         let mut is_spent = || {
             left = left.saturating_sub(1);
             left == 0
         };
-        let arrived = self.course.go(until, &mut self.outcome, &mut is_spent);
-        if !arrived.map_err(|stop| Some(format!("the companion stopped at t = {} s: {}", stop.t, stop.what)))?
+        let arrived = self.contact_driver.go(until, &mut self.outcome, &mut is_spent);
+        if !arrived.map_err(|stop| Some(format!("the reference solution stopped at t = {} s: {}", stop.t, stop.what)))?
             || *purse.spent > purse.budget
         {
             return Err(None);
         }
-        self.course.look(&mut self.motion);
-        if let (Some(tangent), Some(jumps)) = (&mut self.tangent, &mut self.course.jumps) {
+        self.contact_driver.look(&mut self.motion);
+        if let (Some(tangent), Some(jumps)) = (&mut self.tangent, &mut self.contact_driver.jumps) {
             tangent.jump(&std::mem::take(jumps));
         }
-        let tally = self.course.tally();
-        *purse.spent += (tally.evaluations - self.last.evaluations) as f64 * each + purse.prices.look;
-        self.last = tally;
+        let statistics = self.contact_driver.statistics();
+        *purse.spent += (statistics.evaluations - self.last.evaluations) as f64 * each + purse.prices.look;
+        self.last = statistics;
         Ok(())
     }
 }

@@ -6,14 +6,14 @@
 //!
 //! The force on the first point is -lambda n, on the second lambda n.
 
-use super::{Measure, Push, Row, Site, Way};
+use super::{ConstraintEquation, Measure, Push, Site, Way};
 use crate::arithmetic::Complex;
 use crate::dynamics::quadratic::Quadratic;
 
 /// Both rows that keep `a` on `b`, in a mechanism of so many angles.
-pub fn pin_rows(name: &str, a: &Site, b: &Site, angles: usize) -> [Row; 2] {
+pub fn pin_equations(name: &str, a: &Site, b: &Site, angles: usize) -> [ConstraintEquation; 2] {
     let span = a.point.minus(&b.point);
-    [("x", Complex::new(1.0, 0.0)), ("y", Complex::new(0.0, 1.0))].map(|(letter, axis)| Row {
+    [("x", Complex::new(1.0, 0.0)), ("y", Complex::new(0.0, 1.0))].map(|(letter, axis)| ConstraintEquation {
         name: format!("{name}.{letter}"),
         measure: Measure::Place(Quadratic::along(&span, axis, angles)),
         law: None,
@@ -24,12 +24,12 @@ pub fn pin_rows(name: &str, a: &Site, b: &Site, angles: usize) -> [Row; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::row::tests::{assert_derivatives, crank, free, rod};
+    use crate::dynamics::constraint::tests::{assert_derivatives, crank, free, rod};
 
     #[test]
     fn its_derivatives_are_those_of_its_position() {
         for (a, b) in [(crank(), rod()), (rod(), free()), (free(), Site::ground([0.1, 0.2]))] {
-            pin_rows("pin", &a, &b, 2).iter().for_each(assert_derivatives);
+            pin_equations("pin", &a, &b, 2).iter().for_each(assert_derivatives);
         }
     }
 }

@@ -1,9 +1,9 @@
-//! Constraint rows, one file a kind.
+//! Constraint equations, one file a kind.
 //!
 //! A row knows its violation C, its Jacobian G, its drive C_t and what is left of C'' at zero acceleration.  Sign rule everywhere:
 //! `M a + Gᵀ lambda = b`, `G a = -gamma`, `C' = G w + C_t`.
 //!
-//! Whatever its kind, a row measures either an angle or a [`Quadratic`] function of unit vectors and feet, and keeps it at zero or at a law of
+//! Whatever its kind, a row measures either an angle or a [`Quadratic`] function of unit vectors and translational coordinates, and keeps it at zero or at a law of
 //! time.  All that evaluates, projects or expands rows does so for these two measures, so that a new kind is a new function that makes one.
 
 pub mod angle;
@@ -12,11 +12,11 @@ pub mod pin;
 pub mod rod;
 pub mod slot;
 
-pub use angle::angle_row;
-pub use line::line_row;
-pub use pin::pin_rows;
-pub use rod::rod_row;
-pub use slot::slot_row;
+pub use angle::angle_equation;
+pub use line::line_equation;
+pub use pin::pin_equations;
+pub use rod::rod_equation;
+pub use slot::slot_equation;
 
 use super::Time;
 use super::law::Law;
@@ -28,9 +28,9 @@ use crate::arithmetic::{Complex, Real};
 /// Coordinates, elements and rates at one moment.
 #[derive(Clone, Copy, Debug)]
 pub struct Posture<'a, T> {
-    /// Angles in [-π, π] \[rad\], then the coordinates of feet \[m\].
+    /// Angles in [-π, π] \[rad\], then the coordinates of translational coordinates \[m\].
     pub phi: &'a [T],
-    /// Unit vectors, then feet.
+    /// Unit vectors, then translational coordinates.
     pub z: &'a [Complex<T>],
     /// Rates \[rad/s, m/s\].
     pub omega: &'a [T],
@@ -112,7 +112,7 @@ impl Push {
 
 /// A row of the mechanism: its measure less a law of time is to be zero.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub struct ConstraintEquation {
     /// Name in reports: that of the joint or motor, with an axis where there are two.
     pub name: String,
     /// What it measures.
@@ -123,7 +123,7 @@ pub struct Row {
     pub push: Option<Push>,
 }
 
-impl Row {
+impl ConstraintEquation {
     /// Name in the scene.
     pub fn name(&self) -> &str {
         &self.name
@@ -237,7 +237,7 @@ pub(super) mod tests {
         Law { start: 0.1, rate: 2.0, acceleration: 0.3, sines: vec![Sine { amplitude: 0.2, frequency: 3.0, phase: 0.5 }] }
     }
 
-    /// A point of body 0, one of body 1 which hangs on it, and a foot that moves freely, carried with body 1.
+    /// A point of body 0, one of body 1 which hangs on it, and an origin that moves freely, carried with body 1.
     pub fn crank() -> Site {
         Site { body: Some(0), point: Point::ground([0.1, 0.0]).along(0, Complex::new(0.6, 0.0)) }
     }
@@ -256,7 +256,7 @@ pub(super) mod tests {
     const RATE: [f64; 4] = [1.5, -0.7, 0.4, 0.9];
     const ACCELERATION: [f64; 4] = [0.3, 2.0, -0.6, 1.1];
 
-    /// Coordinates, elements and rates of two bodies and a foot in uniformly accelerated motion.
+    /// Coordinates, elements and rates of two bodies and an origin in uniformly accelerated motion.
     pub fn posture(t: f64) -> (Vec<DoubleDouble>, Vec<Complex<DoubleDouble>>, Vec<DoubleDouble>) {
         let (of, t) = (DoubleDouble::of, DoubleDouble::of(t));
         let phi: Vec<_> = (0..4).map(|k| of(START[k]) + t.scale(RATE[k]) + (t * t).scale(0.5 * ACCELERATION[k])).collect();
@@ -266,7 +266,7 @@ pub(super) mod tests {
     }
 
     /// Jacobian, drive and convective term against differences of the row's own C along a motion.
-    pub fn assert_derivatives(row: &Row) {
+    pub fn assert_derivatives(row: &ConstraintEquation) {
         let at = |t: f64| {
             let (phi, z, omega) = posture(t);
             let mut jacobian = [DoubleDouble::ZERO; 4];

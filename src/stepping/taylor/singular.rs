@@ -25,7 +25,7 @@ const LONGEST: f64 = 12.0;
 const FALL: f64 = 0.1;
 /// Largest share of the motion that the smallest power in such a step may have.
 const NOISE: f64 = 1e-6;
-/// Largest difference between the start and where the way back leads, over the tolerance; and the limits of that \[rad\]: a leap a little off is better than steps that end
+/// Largest difference between the start and where the way back leads, over the tolerance; and the limits of that \[rad\]: a passage a little off is better than steps that end
 /// at the singular position, and none is worth more than this.
 const ASTRAY: f64 = 1e3;
 const LIMITS: [f64; 2] = [1e-6, 1e-4];
@@ -33,16 +33,16 @@ const LIMITS: [f64; 2] = [1e-6, 1e-4];
 /// What to try where there is no way through.
 pub const HINT: &str = "try another tolerance, --method dp8, or a start that does not lead through it";
 
-/// What leaps are looked for and confirmed with.
+/// What passages are looked for and confirmed with.
 #[derive(Clone, Debug)]
-pub struct Leap<T> {
+pub struct SingularPassage<T> {
     kernel: Kernel<f64>,
-    /// The series about a leap's end.
+    /// The series about a passage's end.
     back: Expansion<T>,
     end: State,
 }
 
-impl<T: Coefficient> Leap<T> {
+impl<T: Coefficient> SingularPassage<T> {
     /// For the problem an expansion is of.
     pub fn new(mechanism: &Mechanism, coordinates: Coordinates, expansion: &Expansion<T>) -> Self {
         let back = Expansion::new(mechanism, coordinates, expansion.series().order(), false);
@@ -93,7 +93,7 @@ impl<T: Coefficient> Leap<T> {
         end.time = state.time + h;
         end.wrap();
         let balance = |kernel: &mut Kernel<f64>, state: &State| {
-            kernel.face::<0>(mechanism, &state.y[..n]);
+            kernel.unit_vectors::<0>(mechanism, &state.y[..n]);
             let energy = mechanism.energy_facing::<f64, 0>(kernel, &state.y[..n], &state.y[n..2 * n]).total();
             energy - state.y.get(2 * n).copied().unwrap_or(0.0)
         };

@@ -6,15 +6,15 @@
 //!
 //! Near the distance kept C is what the distance is off.  The force on the first point is -lambda D/L, on the second lambda D/L.
 
-use super::{Measure, Push, Row, Site, Way};
+use super::{ConstraintEquation, Measure, Push, Site, Way};
 use crate::dynamics::quadratic::Quadratic;
 
 /// Keeps `a` at the distance `length` \[m\] from `b`, in a mechanism of so many angles.
-pub fn rod_row(name: &str, a: &Site, b: &Site, length: f64, angles: usize) -> Row {
+pub fn rod_equation(name: &str, a: &Site, b: &Site, length: f64, angles: usize) -> ConstraintEquation {
     let span = a.point.minus(&b.point);
     let mut place = Quadratic::square(&span, 0.5 / length, angles);
     place.constant -= 0.5 * length;
-    Row {
+    ConstraintEquation {
         name: name.into(),
         measure: Measure::Place(place),
         law: None,
@@ -25,12 +25,12 @@ pub fn rod_row(name: &str, a: &Site, b: &Site, length: f64, angles: usize) -> Ro
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::row::tests::{assert_derivatives, crank, free, posture, rod};
+    use crate::dynamics::constraint::tests::{assert_derivatives, crank, free, posture, rod};
 
     #[test]
     fn its_derivatives_are_those_of_its_position() {
         for (a, b) in [(crank(), rod()), (rod(), free()), (free(), Site::ground([0.1, 0.2]))] {
-            assert_derivatives(&rod_row("rod", &a, &b, 0.7, 2));
+            assert_derivatives(&rod_equation("rod", &a, &b, 0.7, 2));
         }
     }
 
@@ -39,7 +39,7 @@ mod tests {
         let (a, b) = (rod(), free());
         let (_, z, _) = posture(0.3);
         let distance = a.point.minus(&b.point).position(&z).norm_squared().hi.sqrt();
-        assert!(rod_row("rod", &a, &b, distance, 2).gap(&z).hi.abs() < 1e-15);
-        assert!((rod_row("rod", &a, &b, distance - 1e-6, 2).gap(&z).hi - 1e-6).abs() < 1e-11);
+        assert!(rod_equation("rod", &a, &b, distance, 2).gap(&z).hi.abs() < 1e-15);
+        assert!((rod_equation("rod", &a, &b, distance - 1e-6, 2).gap(&z).hi - 1e-6).abs() < 1e-11);
     }
 }

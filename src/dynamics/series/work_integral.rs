@@ -7,11 +7,11 @@ use crate::dynamics::Mechanism;
 impl<T: Coefficient> Series<T> {
     /// Torques of the driven bodies and the power of motors and dampers at this order.
     #[inline(always)]
-    pub(super) fn account(&mut self, mechanism: &Mechanism, m: usize) {
+    pub(super) fn work_integral(&mut self, mechanism: &Mechanism, m: usize) {
         let n = self.elements;
         let mut power = T::ZERO;
         if self.is_tied {
-            for (i, _) in self.ties.bodies.iter().enumerate().filter(|(_, tie)| !tie.laws.is_empty()) {
+            for (i, _) in self.partition.bodies.iter().enumerate().filter(|(_, dependent_angle)| !dependent_angle.laws.is_empty()) {
                 let mut torque = (self.omega[(m + 1) * n + i] * T::of((m + 1) as f64)).scale(mechanism.tree.diagonal[i]);
                 for (z, &rest) in self.z[i..].iter().step_by(n).zip(self.rest[..=m * n + i].iter().rev().step_by(n)) {
                     torque += z.cross(rest);

@@ -6,22 +6,22 @@
 //!
 //! C is taken modulo whole turns.  The multiplier is minus the torque on body a; the motor's power is torque · theta'.
 
-use super::{Measure, Row};
+use super::{ConstraintEquation, Measure};
 use crate::dynamics::law::Law;
 
 /// Keeps the angle of `body`, measured from `base` or from +x, at a law of time.
-pub fn angle_row(name: &str, body: usize, base: Option<usize>, law: Law) -> Row {
-    Row { name: name.into(), measure: Measure::Angle { body, base }, law: Some(law), push: None }
+pub fn angle_equation(name: &str, body: usize, base: Option<usize>, law: Law) -> ConstraintEquation {
+    ConstraintEquation { name: name.into(), measure: Measure::Angle { body, base }, law: Some(law), push: None }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::row::tests::{assert_derivatives, law};
+    use crate::dynamics::constraint::tests::{assert_derivatives, law};
 
     #[test]
     fn its_derivatives_are_those_of_its_position() {
-        assert_derivatives(&angle_row("absolute", 0, None, law()));
-        assert_derivatives(&angle_row("relative", 1, Some(0), law()));
+        assert_derivatives(&angle_equation("absolute", 0, None, law()));
+        assert_derivatives(&angle_equation("relative", 1, Some(0), law()));
     }
 }

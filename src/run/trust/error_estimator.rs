@@ -1,21 +1,21 @@
-//! The companion of a run: the same motion by a finer series, looked at together with the run.
+//! The reference solution of a run: the same motion by a finer series, looked at together with the run.
 //!
-//! Looks are a mean step of the companion apart, a half of it in the beginning and near the horizon: neither output times nor rests have a say in when they are.
+//! Looks are a mean step of the reference solution apart, a half of it in the beginning and near the horizon: neither output times nor rests have a say in when they are.
 
 use super::budget::{DOUBLE_DOUBLE, FLOW, FULL_GRACE, FULL_SHARE, GRACE, Prices, SHARE};
 use super::finer;
 use super::growth::Nature;
 use super::measured::{Apart, LAST_DIGIT, Measured};
-use super::shadow::{KeptShadow, Purse, Shadow};
+use super::reference_run::{ReferenceRun, SavedReferenceRun, WorkBudget};
 use super::tangent::Tangent;
-use super::{CUT, HORIZON, LOST, Level, Ruler, Trust};
+use super::{CUT, DistanceMetric, HORIZON, LOST, Level, Trust};
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::clock::{Clock, still};
 use crate::run::methods::{MethodId, Stabilization};
 use crate::run::monitor::Monitor;
 use crate::run::plan::Plan;
-use crate::stepping::{StepError, Tally};
+use crate::stepping::{Statistics, StepError};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::Duration;
@@ -26,22 +26,22 @@ const NEAR: f64 = 0.03 * HORIZON;
 const ENOUGH: f64 = 2000.0;
 /// The first look, in units of time of the mechanism.
 const FIRST: f64 = 1e-3;
-/// The time to the next look over the companion's mean step: in the beginning, usually, near the horizon, and where the run is lost.
+/// The time to the next look over the reference solution's mean step: in the beginning, usually, near the horizon, and where the run is lost.
 const GAPS: [f64; 4] = [0.5, 1.0, 0.5, 4.0];
 /// Looks that belong to the beginning.
 const BEGINNING: u64 = 128;
-/// The companion's own rounding over what was measured, at most.
+/// The reference solution's own rounding over what was measured, at most.
 const MOST_ROUNDING: f64 = 2.0;
 /// Share of the budget for double-double, after which doubles go on, of runs near rounding.
 const NEAR_ROUNDING: f64 = 0.5;
 
-/// A companion, and what it has measured so far.
-pub(in crate::run) struct Companion {
+/// A reference solution, and what it has measured so far.
+pub(in crate::run) struct ErrorEstimator {
     mechanism: Arc<Mechanism>,
-    ruler: Ruler,
+    metric: DistanceMetric,
     prices: Prices,
     measured: Measured,
-    shadow: Option<Shadow>,
+    reference_run: Option<ReferenceRun>,
     /// The run's plan.
     run: Plan,
     /// Impacts and lasting contacts of the run.
@@ -57,20 +57,20 @@ pub(in crate::run) struct Companion {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(in crate::run) struct Kept {
     measured: Measured,
-    shadow: Option<KeptShadow>,
+    reference_run: Option<SavedReferenceRun>,
 }
 
 impl Kept {
     /// On the way to a later horizon \[s\].
     pub(in crate::run) fn extend(&mut self, until: f64) {
-        if let Some(shadow) = &mut self.shadow {
-            shadow.extend(until);
+        if let Some(reference_run) = &mut self.reference_run {
+            reference_run.extend(until);
         }
     }
 
     /// Whether its parts go together.
     pub(in crate::run) fn is_sound(&self) -> bool {
-        self.measured.is_sound() && self.shadow.as_ref().is_none_or(KeptShadow::is_sound)
+        self.measured.is_sound() && self.reference_run.as_ref().is_none_or(SavedReferenceRun::is_sound)
     }
 }
 
@@ -83,7 +83,7 @@ struct Torques {
 impl Torques {
     /// `None` where there are no motors, or walls that may hold on to a point.
     fn new(mechanism: &Mechanism) -> Option<Self> {
-        let has_motors = mechanism.contacts.is_empty() && mechanism.rows.iter().any(|row| row.law.is_some());
+        let has_motors = mechanism.contacts.is_empty() && mechanism.constraints.iter().any(|row| row.law.is_some());
         has_motors.then(|| Self { kernel: Kernel::new(mechanism), of: [Vec::new(), Vec::new()] })
     }
 
@@ -95,7 +95,7 @@ impl Torques {
             kernel.accelerate::<0>(mechanism, motion.time, &phi, &omega, Bias::default());
             mechanism.spread_multipliers(kernel);
             torques.clear();
-            let motors = mechanism.rows.iter().zip(&kernel.multiplier).filter(|(row, _)| row.law.is_some());
+            let motors = mechanism.constraints.iter().zip(&kernel.multiplier).filter(|(row, _)| row.law.is_some());
             torques.extend(motors.map(|(_, &torque)| torque));
         }
         let [one, other] = of;
@@ -103,45 +103,45 @@ impl Torques {
     }
 }
 
-/// What a companion shares with its run, so that it cannot tell where that is wrong.
-fn shared(mechanism: &Mechanism, run: &Plan, companion: &Plan) -> Vec<String> {
+/// What a reference solution shares with its run, so that it cannot tell where that is wrong.
+fn shared(mechanism: &Mechanism, run: &Plan, error_estimator: &Plan) -> Vec<String> {
     let has_walls = !mechanism.contacts.is_empty();
-    let finds_likewise = (run.method == MethodId::Taylor) == (companion.method == MethodId::Taylor);
-    let has_motors = mechanism.rows.iter().any(|row| row.law.is_some());
+    let finds_likewise = (run.method == MethodId::Taylor) == (error_estimator.method == MethodId::Taylor);
+    let has_motors = mechanism.constraints.iter().any(|row| row.law.is_some());
     let eliminated = |plan: &Plan| has_motors && plan.stabilization == Stabilization::Elimination;
-    let leaps = mechanism.is_tied_up() && run.method == MethodId::Taylor;
+    let leaps = mechanism.has_closed_loops() && run.method == MethodId::Taylor;
     let words = [
         (has_walls, "impact law"),
         (has_walls && finds_likewise, "contact detection"),
         (leaps, "leaps through singular positions"),
-        (eliminated(run) && eliminated(companion), "elimination of motors"),
+        (eliminated(run) && eliminated(error_estimator), "elimination of motors"),
         (true, "compilation"),
     ];
     words.into_iter().filter(|(is_shared, _)| *is_shared).map(|(_, word)| word.to_owned()).collect()
 }
 
-impl Companion {
+impl ErrorEstimator {
     /// One for a run by a plan from a motion; where none can begin it says so in its figures.
     pub(in crate::run) fn new(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion, level: Level) -> Self {
         let finer::Finer { plan: mut series, name } = finer::first(mechanism, plan, level);
         let prices = Prices::new(mechanism, &series, plan);
         let mut measured = Measured::new(level, name, shared(mechanism, plan, &series));
-        let mut shadow = Shadow::new(mechanism, &mut series, start).map_err(|why| measured.why = Some(why)).ok();
-        if let Some(shadow) = &mut shadow {
-            measured.no_growth = shadow.no_growth.take();
-            measured.nature = shadow.tangent.as_ref().map_or(Nature::default(), |tangent| Nature::new(mechanism, tangent));
+        let mut reference_run = ReferenceRun::new(mechanism, &mut series, start).map_err(|why| measured.why = Some(why)).ok();
+        if let Some(reference_run) = &mut reference_run {
+            measured.no_growth = reference_run.no_growth.take();
+            measured.nature = reference_run.tangent.as_ref().map_or(Nature::default(), |tangent| Nature::new(mechanism, tangent));
         }
         measured.is_bound = finer::is_bound(&series, plan);
-        Self::with(mechanism, plan, prices, measured, shadow)
+        Self::with(mechanism, plan, prices, measured, reference_run)
     }
 
-    fn with(mechanism: &Arc<Mechanism>, run: &Plan, prices: Prices, measured: Measured, shadow: Option<Shadow>) -> Self {
+    fn with(mechanism: &Arc<Mechanism>, run: &Plan, prices: Prices, measured: Measured, reference_run: Option<ReferenceRun>) -> Self {
         Self {
             mechanism: Arc::clone(mechanism),
-            ruler: Ruler::new(mechanism),
+            metric: DistanceMetric::new(mechanism),
             prices,
             measured,
-            shadow,
+            reference_run,
             run: run.clone(),
             events: 0,
             torques: Torques::new(mechanism),
@@ -158,18 +158,18 @@ impl Companion {
         kept: Kept,
         horizon: Time,
     ) -> Result<Option<Self>, StepError> {
-        let Kept { measured, shadow } = kept;
-        let Some(shadow) = shadow else {
+        let Kept { measured, reference_run } = kept;
+        let Some(reference_run) = reference_run else {
             return Ok(Some(Self::with(mechanism, plan, Prices::new(mechanism, plan, plan), measured, None)));
         };
-        let Some(shadow) = Shadow::resume(mechanism, start, shadow, horizon)? else { return Ok(None) };
-        let prices = Prices::new(mechanism, shadow.plan(), plan);
-        Ok(Some(Self::with(mechanism, plan, prices, measured, Some(shadow))))
+        let Some(reference_run) = ReferenceRun::resume(mechanism, start, reference_run, horizon)? else { return Ok(None) };
+        let prices = Prices::new(mechanism, reference_run.plan(), plan);
+        Ok(Some(Self::with(mechanism, plan, prices, measured, Some(reference_run))))
     }
 
     /// All that the rest of it depends on.
     pub(in crate::run) fn kept(&self) -> Kept {
-        Kept { measured: self.measured.clone(), shadow: self.shadow.as_ref().map(Shadow::kept) }
+        Kept { measured: self.measured.clone(), reference_run: self.reference_run.as_ref().map(ReferenceRun::kept) }
     }
 
     /// The time spent since this was last asked for.
@@ -178,15 +178,15 @@ impl Companion {
     }
 
     /// What it may cost after so much work of the run.
-    fn budget(&self, tally: Tally) -> f64 {
-        let run = self.prices.run(self.run.method, tally);
+    fn budget(&self, statistics: Statistics) -> f64 {
+        let run = self.prices.run(self.run.method, statistics);
         let is_near = finer::is_near_rounding(&self.run);
         let whole = match self.measured.level {
             Level::Auto => GRACE[usize::from(self.run.step.is_some() || is_near)] + SHARE * run,
             // No more evaluations than the run is allowed itself.
-            Level::Off | Level::Full => (FULL_GRACE + FULL_SHARE * run).min(self.run.effort as f64 * self.prices.series[0]),
+            Level::Off | Level::Full => (FULL_GRACE + FULL_SHARE * run).min(self.run.max_evaluations as f64 * self.prices.series[0]),
         };
-        let is_wide = self.shadow.as_ref().is_some_and(|shadow| shadow.plan().in_double_double);
+        let is_wide = self.reference_run.as_ref().is_some_and(|reference_run| reference_run.plan().in_double_double);
         if !is_wide || self.measured.level == Level::Full {
             return whole;
         }
@@ -196,13 +196,13 @@ impl Companion {
         }
     }
 
-    /// Ends the tangent flow where it has cost its share; where the companion's own rounding counts it is needed to the end.
+    /// Ends the tangent flow where it has cost its share; where the reference solution's own rounding counts it is needed to the end.
     fn stint(&mut self) {
-        let Self { shadow: Some(shadow), measured, .. } = self else { return };
-        let Some(tangent) = &shadow.tangent else { return };
+        let Self { reference_run: Some(reference_run), measured, .. } = self else { return };
+        let Some(tangent) = &reference_run.tangent else { return };
         let [share, grace] = FLOW[usize::from(!tangent.is_plain())];
-        if measured.level == Level::Auto && !shadow.is_rounded && measured.flow > share * measured.run + grace {
-            measured.stop_growth(shadow.end_flow().as_ref());
+        if measured.level == Level::Auto && !reference_run.is_rounded && measured.flow > share * measured.run + grace {
+            measured.stop_growth(reference_run.end_flow().as_ref());
         }
     }
 
@@ -210,29 +210,29 @@ impl Companion {
     ///
     /// # Errors
     /// Why it goes no further.
-    fn accompany(&mut self, time: Time, tally: Tally) -> Result<(), String> {
-        let budget = self.budget(tally);
-        let Self { shadow: Some(shadow), prices, measured, .. } = self else { return Ok(()) };
-        let mut purse = Purse { prices, spent: &mut measured.spent, budget, flow: &mut measured.flow };
-        let gone = shadow.go(time, &mut purse);
-        if let Some(why) = shadow.tangent.as_ref().and_then(Tangent::lost) {
+    fn accompany(&mut self, time: Time, statistics: Statistics) -> Result<(), String> {
+        let budget = self.budget(statistics);
+        let Self { reference_run: Some(reference_run), prices, measured, .. } = self else { return Ok(()) };
+        let mut purse = WorkBudget { prices, spent: &mut measured.spent, budget, flow: &mut measured.flow };
+        let gone = reference_run.go(time, &mut purse);
+        if let Some(why) = reference_run.tangent.as_ref().and_then(Tangent::lost) {
             measured.no_growth = Some(why.into());
-            measured.conclude(shadow.end_flow().as_ref());
+            measured.conclude(reference_run.end_flow().as_ref());
         }
         let Err(stop) = gone else { return Ok(()) };
-        let is_dear = shadow.plan().in_double_double;
+        let is_dear = reference_run.plan().in_double_double;
         if let Some(finer::Finer { mut plan, name }) = is_dear.then(|| finer::second(&self.mechanism, &self.run)).flatten() {
-            let from = shadow.motion.time.hi;
-            (plan.until, plan.every) = (shadow.plan().until, shadow.plan().every);
+            let from = reference_run.motion.time.hi;
+            (plan.until, plan.every) = (reference_run.plan().until, reference_run.plan().every);
             self.prices = Prices::new(&self.mechanism, &plan, &self.run);
-            shadow.change(&self.mechanism, plan)?;
-            measured.is_bound |= finer::is_bound(shadow.plan(), &self.run);
+            reference_run.change(&self.mechanism, plan)?;
+            measured.is_bound |= finer::is_bound(reference_run.plan(), &self.run);
             measured.name = format!("{}, from {from:.3e} s on {name}", measured.name);
-            return self.accompany(time, tally);
+            return self.accompany(time, statistics);
         }
         Err(stop.unwrap_or_else(|| match measured.level {
             Level::Full => {
-                let expansions = shadow.expansions();
+                let expansions = reference_run.expansions();
                 format!("{CUT} was used up after t = {} s, by {expansions} expansions and the tangent flow along them", measured.until)
             }
             Level::Off | Level::Auto => "more would have taken too large a share of the run".into(),
@@ -240,26 +240,26 @@ impl Companion {
     }
 
     /// Looks at the run.
-    fn look(&mut self, motion: &Motion, tally: Tally) {
-        let Some(until) = self.shadow.as_ref().map(|shadow| shadow.plan().until) else { return };
+    fn look(&mut self, motion: &Motion, statistics: Statistics) {
+        let Some(until) = self.reference_run.as_ref().map(|reference_run| reference_run.plan().until) else { return };
         let t = motion.time.hi;
         if self.measured.seen > 0 && t <= self.measured.until {
             return;
         }
         // The last step of a fixed-step run may end beyond the horizon by rounding.
         let horizon = Time::from(until);
-        if let Err(why) = self.accompany(if motion.time > horizon { horizon } else { motion.time }, tally) {
+        if let Err(why) = self.accompany(if motion.time > horizon { horizon } else { motion.time }, statistics) {
             return self.end(&why);
         }
-        self.measured.run = self.prices.run(self.run.method, tally);
+        self.measured.run = self.prices.run(self.run.method, statistics);
         self.stint();
-        let Self { shadow: Some(shadow), measured, .. } = self else { return };
+        let Self { reference_run: Some(reference_run), measured, .. } = self else { return };
         if measured.lost.is_none() {
             self.measure(motion);
-        } else if shadow.tangent.as_ref().map_or(f64::INFINITY, Tangent::growth) > ENOUGH {
+        } else if reference_run.tangent.as_ref().map_or(f64::INFINITY, Tangent::growth) > ENOUGH {
             self.end("");
         }
-        let Self { shadow: Some(shadow), measured, .. } = self else { return };
+        let Self { reference_run: Some(reference_run), measured, .. } = self else { return };
         let [first, usual, near, lost] = GAPS;
         let share = match measured.lost {
             Some(_) => lost,
@@ -267,34 +267,34 @@ impl Companion {
             None if measured.seen < BEGINNING => first,
             None => usual,
         };
-        let due = if t > 0.0 { t + share * shadow.mean_step(t) } else { FIRST * self.mechanism.units.time };
+        let due = if t > 0.0 { t + share * reference_run.mean_step(t) } else { FIRST * self.mechanism.units.time };
         measured.due = due.max(t.next_up());
     }
 
-    /// Measures how far the run and its companion are apart.
+    /// Measures how far the run and its reference solution are apart.
     fn measure(&mut self, motion: &Motion) {
-        let Self { mechanism, ruler, measured, shadow: Some(shadow), torques, .. } = self else { return };
-        let rounding = shadow.tangent.as_ref().filter(|_| shadow.is_rounded).map_or(0.0, Tangent::rounding);
-        let apart = ruler.apart(motion, &shadow.motion);
+        let Self { mechanism, metric, measured, reference_run: Some(reference_run), torques, .. } = self else { return };
+        let rounding = reference_run.tangent.as_ref().filter(|_| reference_run.is_rounded).map_or(0.0, Tangent::rounding);
+        let apart = metric.apart(motion, &reference_run.motion);
         // It is there for differences that are small by chance.
         let angle = apart.hypot(rounding.min(MOST_ROUNDING * apart.max(measured.error)));
         // Between an impact of the one and that of the other rates differ by all of it.
-        let rate = (self.events == shadow.events()).then(|| ruler.rates_apart(motion, &shadow.motion));
-        let torque = torques.as_mut().map(|torques| torques.apart(mechanism, [motion, &shadow.motion]));
+        let rate = (self.events == reference_run.events()).then(|| metric.rates_apart(motion, &reference_run.motion));
+        let torque = torques.as_mut().map(|torques| torques.apart(mechanism, [motion, &reference_run.motion]));
         if !angle.is_finite() || rate.is_some_and(|rate| !rate.is_finite()) {
             return self.end("what small differences come to is beyond all numbers");
         }
-        measured.farthest = measured.farthest.max(ruler.reach(motion));
+        measured.farthest = measured.farthest.max(metric.reach(motion));
         measured.fastest = motion.omega.iter().fold(measured.fastest, |most, omega| most.max(omega.hi.abs()));
         measured.strongest = torque.map_or(measured.strongest, |[_, most]| measured.strongest.max(most));
         let t = motion.time.hi;
         if measured.take(t, Apart { angle, rate, torque: torque.map(|[apart, _]| apart) }) {
             let at = measured.horizon.unwrap_or(t);
-            measured.input_error = shadow.tangent.as_ref().map(|tangent| LAST_DIGIT * tangent.reach(at));
+            measured.input_error = reference_run.tangent.as_ref().map(|tangent| LAST_DIGIT * tangent.reach(at));
         }
         if angle > LOST {
             measured.lost = Some(t);
-            if shadow.tangent.is_none() {
+            if reference_run.tangent.is_none() {
                 self.end("");
             } else {
                 self.ease();
@@ -304,22 +304,22 @@ impl Companion {
 
     /// Goes on by a coarse series where only growth is still asked for: any motion nearby tells it.
     fn ease(&mut self) {
-        let Self { mechanism, run, prices, shadow: Some(shadow), .. } = self else { return };
-        if !mechanism.contacts.is_empty() || shadow.plan().method != MethodId::Taylor {
+        let Self { mechanism, run, prices, reference_run: Some(reference_run), .. } = self else { return };
+        if !mechanism.contacts.is_empty() || reference_run.plan().method != MethodId::Taylor {
             return;
         }
         let finer::Finer { mut plan, .. } = finer::coarse(mechanism, run);
-        (plan.until, plan.every) = (shadow.plan().until, shadow.plan().every);
+        (plan.until, plan.every) = (reference_run.plan().until, reference_run.plan().every);
         *prices = Prices::new(mechanism, &plan, run);
-        if let Err(why) = shadow.change(mechanism, plan) {
+        if let Err(why) = reference_run.change(mechanism, plan) {
             self.end(&why);
         }
     }
 
     /// Ends it, for a reason where there is one to be told.
     fn end(&mut self, why: &str) {
-        if let Some(shadow) = self.shadow.take() {
-            self.measured.conclude(shadow.tangent.as_ref());
+        if let Some(reference_run) = self.reference_run.take() {
+            self.measured.conclude(reference_run.tangent.as_ref());
         }
         if self.measured.lost.is_none() && self.measured.why.is_none() && !why.is_empty() {
             self.measured.why = Some(why.into());
@@ -333,14 +333,14 @@ impl Companion {
     }
 }
 
-impl Monitor for Companion {
+impl Monitor for ErrorEstimator {
     fn due(&self) -> f64 {
-        if self.shadow.is_some() { self.measured.due } else { f64::INFINITY }
+        if self.reference_run.is_some() { self.measured.due } else { f64::INFINITY }
     }
 
-    fn observe(&mut self, motion: &Motion, tally: Tally) {
+    fn observe(&mut self, motion: &Motion, statistics: Statistics) {
         let begin = (self.clock)();
-        self.look(motion, tally);
+        self.look(motion, statistics);
         self.wall += (self.clock)() - begin;
     }
 

@@ -8,21 +8,21 @@
 //! where the group is tied to the ground.
 
 use super::compile::CompileError;
+use super::constraint::{ConstraintEquation, Measure};
 use super::law::{Law, Phase};
-use super::row::{Measure, Row};
 use super::{Mechanism, Motion, State, Time};
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar, angle};
 
 /// How one body's angle follows from the coordinates.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Tie {
+pub struct DependentAngle {
     /// The coordinate it moves with; `None`: driven from the ground.
     pub base: Option<usize>,
     /// Laws to be added, with their sign.
     pub laws: Vec<(f64, Law)>,
 }
 
-impl Tie {
+impl DependentAngle {
     /// The known part s(t) of the angle: the sum of the laws, of which a single one keeps its own numbers to the last bit.
     #[inline]
     pub fn drive<T: Real>(&self, t: Time) -> Phase<T> {
@@ -37,7 +37,7 @@ impl Tie {
 
     /// The unit vector of the body at coordinates `u` \[rad\].
     #[inline(always)]
-    pub fn face<T: Scalar>(&self, u: &[T], drive: &Phase<T>) -> Complex<T> {
+    pub fn unit_vectors<T: Scalar>(&self, u: &[T], drive: &Phase<T>) -> Complex<T> {
         match self.base {
             Some(base) if self.laws.is_empty() => Complex::unit(u[base]),
             Some(base) => Complex::unit(u[base]) * drive.unit,
@@ -59,24 +59,24 @@ impl Tie {
     fn compose<T: Real>(&self, t: Time, u: &[T]) -> Phase<T> {
         let drive = self.drive::<T>(t);
         let angle = self.base.map_or(drive.angle, |base| angle::difference(u[base], -drive.angle));
-        Phase { angle, unit: self.face(u, &drive), ..drive }
+        Phase { angle, unit: self.unit_vectors(u, &drive), ..drive }
     }
 }
 
 /// All ties of a mechanism.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Ties {
+pub struct CoordinatePartition {
     /// Number of angles.
     pub angles: usize,
-    /// One a body, then one a coordinate of a foot.
-    pub bodies: Vec<Tie>,
-    /// The body whose angle each independent coordinate is, or the coordinate of a foot.
+    /// One a body, then one a coordinate of an origin.
+    pub bodies: Vec<DependentAngle>,
+    /// The body whose angle each independent coordinate is, or the coordinate of an origin.
     pub independent: Vec<usize>,
 }
 
-impl Ties {
-    /// Walks the given angles outwards from the ground and from the first body of every group left; feet are coordinates of their own.
-    pub(super) fn new(bodies: usize, coordinates: usize, rows: &[Row]) -> Result<Self, CompileError> {
+impl CoordinatePartition {
+    /// Walks the given angles outwards from the ground and from the first body of every group left; translational coordinates are coordinates of their own.
+    pub(super) fn new(bodies: usize, coordinates: usize, rows: &[ConstraintEquation]) -> Result<Self, CompileError> {
         let given: Vec<_> = (rows.iter())
             .filter_map(|row| match (&row.measure, &row.law) {
                 (&Measure::Angle { body, base }, Some(law)) => Some((row, body, base, law)),
@@ -89,15 +89,15 @@ impl Ties {
             at[slot(base)].push(g);
             at[slot(Some(body))].push(g);
         }
-        let mut ties: Vec<Option<Tie>> = vec![None; bodies];
+        let mut partition: Vec<Option<DependentAngle>> = vec![None; bodies];
         let mut used = vec![false; given.len()];
         let mut independent = Vec::new();
         for root in std::iter::once(None).chain((0..bodies).map(Some)) {
             if let Some(body) = root {
-                if ties[body].is_some() {
+                if partition[body].is_some() {
                     continue;
                 }
-                ties[body] = Some(Tie { base: Some(independent.len()), laws: Vec::new() });
+                partition[body] = Some(DependentAngle { base: Some(independent.len()), laws: Vec::new() });
                 independent.push(body);
             }
             let mut front = vec![root];
@@ -108,28 +108,28 @@ impl Ties {
                         continue;
                     }
                     let (far, sign) = if base == near { (Some(body), 1.0) } else { (base, -1.0) };
-                    let Some(body) = far.filter(|&body| ties[body].is_none()) else {
+                    let Some(body) = far.filter(|&body| partition[body].is_none()) else {
                         return Err(CompileError::Redundant(row.name.clone()));
                     };
-                    let mut tie = near.and_then(|near| ties[near].clone()).unwrap_or_default();
-                    tie.laws.push((sign, law.clone()));
-                    ties[body] = Some(tie);
+                    let mut dependent_angle = near.and_then(|near| partition[near].clone()).unwrap_or_default();
+                    dependent_angle.laws.push((sign, law.clone()));
+                    partition[body] = Some(dependent_angle);
                     front.push(far);
                 }
             }
         }
-        let mut ties: Vec<Tie> = ties.into_iter().map(Option::unwrap_or_default).collect();
-        for foot in bodies..coordinates {
-            ties.push(Tie { base: Some(independent.len()), laws: Vec::new() });
-            independent.push(foot);
+        let mut partition: Vec<DependentAngle> = partition.into_iter().map(Option::unwrap_or_default).collect();
+        for origin_point in bodies..coordinates {
+            partition.push(DependentAngle { base: Some(independent.len()), laws: Vec::new() });
+            independent.push(origin_point);
         }
-        Ok(Self { angles: bodies, bodies: ties, independent })
+        Ok(Self { angles: bodies, bodies: partition, independent })
     }
 
-    /// Every angle and foot a coordinate of its own.
+    /// Every angle and origin a coordinate of its own.
     pub fn free(mechanism: &Mechanism) -> Self {
         let n = mechanism.coordinates();
-        let bodies = (0..n).map(|i| Tie { base: Some(i), laws: Vec::new() }).collect();
+        let bodies = (0..n).map(|i| DependentAngle { base: Some(i), laws: Vec::new() }).collect();
         Self { angles: mechanism.bodies.len(), bodies, independent: (0..n).collect() }
     }
 
@@ -138,9 +138,9 @@ impl Ties {
         self.count() + self.angles - self.bodies.len()
     }
 
-    /// Writes the feet, elements that follow from their coordinates alone.
+    /// Writes the translational coordinates, elements that follow from their coordinates alone.
     #[inline(always)]
-    pub fn feet<T: Scalar>(&self, u: &[T], z: &mut [Complex<T>]) {
+    pub fn translations<T: Scalar>(&self, u: &[T], z: &mut [Complex<T>]) {
         for x in (self.angles..self.bodies.len()).step_by(2) {
             if let Some(base) = self.bodies[x].base {
                 z[x] = Complex::new(u[base], u[base + 1]);
@@ -155,19 +155,19 @@ impl Ties {
 
     /// True where some angle is driven.
     pub fn driven(&self) -> bool {
-        self.bodies.iter().any(|tie| !tie.laws.is_empty())
+        self.bodies.iter().any(|dependent_angle| !dependent_angle.laws.is_empty())
     }
 
     /// True where no driven angle accelerates.
     pub fn is_steady(&self) -> bool {
-        self.bodies.iter().flat_map(|tie| &tie.laws).all(|(_, law)| law.is_steady())
+        self.bodies.iter().flat_map(|dependent_angle| &dependent_angle.laws).all(|(_, law)| law.is_steady())
     }
 
     /// Adds S u' to `rate`: the rates \[rad/s\] of all bodies.
     #[inline(always)]
     pub fn spread<T: Scalar>(&self, u_rate: &[T], rate: &mut [T]) {
-        for (rate, tie) in rate.iter_mut().zip(&self.bodies) {
-            if let Some(base) = tie.base {
+        for (rate, dependent_angle) in rate.iter_mut().zip(&self.bodies) {
+            if let Some(base) = dependent_angle.base {
                 *rate += u_rate[base];
             }
         }
@@ -179,8 +179,8 @@ impl Ties {
         for entry in gathered.iter_mut() {
             *entry = T::ZERO;
         }
-        for (&x, tie) in x.iter().zip(&self.bodies) {
-            if let Some(base) = tie.base {
+        for (&x, dependent_angle) in x.iter().zip(&self.bodies) {
+            if let Some(base) = dependent_angle.base {
                 gathered[base] += x;
             }
         }
@@ -224,13 +224,13 @@ impl Ties {
     pub(super) fn read_angles(&self, state: &State, motion: &mut Motion) {
         motion.resize(self.bodies.len());
         motion.time = state.time;
-        for (k, tie) in self.bodies.iter().enumerate() {
-            (motion.phi[k], motion.omega[k], motion.turns[k]) = tie.read(state, k < self.angles);
+        for (k, dependent_angle) in self.bodies.iter().enumerate() {
+            (motion.phi[k], motion.omega[k], motion.turns[k]) = dependent_angle.read(state, k < self.angles);
         }
     }
 }
 
-impl Tie {
+impl DependentAngle {
     /// The body's angle, the driven share of its rate, and its turns.
     fn read(&self, state: &State, is_angle: bool) -> (DoubleDouble, DoubleDouble, i64) {
         let turns = |base: usize| if is_angle { state.turns[base] } else { 0 };

@@ -6,27 +6,32 @@
 //!
 //! C is positive on the side the normal points to.  The force on the point is -lambda n.
 
-use super::{Measure, Push, Row, Site, Way};
+use super::{ConstraintEquation, Measure, Push, Site, Way};
 use crate::arithmetic::Complex;
 use crate::dynamics::law::Law;
 use crate::dynamics::quadratic::Quadratic;
 
 /// Keeps a point at the distance `offset` \[m\] from the origin along the unit vector `normal`, and the law's travel \[m\] further.
-pub fn line_row(name: &str, site: &Site, normal: Complex<f64>, offset: f64, law: Option<Law>, angles: usize) -> Row {
+pub fn line_equation(name: &str, site: &Site, normal: Complex<f64>, offset: f64, law: Option<Law>, angles: usize) -> ConstraintEquation {
     let mut place = Quadratic::along(&site.point, normal, angles);
     place.constant -= offset;
-    Row { name: name.into(), measure: Measure::Place(place), law, push: Some(Push { on: site.body, from: None, way: Way::Ground(normal) }) }
+    ConstraintEquation {
+        name: name.into(),
+        measure: Measure::Place(place),
+        law,
+        push: Some(Push { on: site.body, from: None, way: Way::Ground(normal) }),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::row::tests::{assert_derivatives, free, law, rod};
+    use crate::dynamics::constraint::tests::{assert_derivatives, free, law, rod};
 
     #[test]
     fn its_derivatives_are_those_of_its_position() {
         let normal = Complex::new(0.6, 0.8);
-        assert_derivatives(&line_row("wall", &rod(), normal, 0.3, None, 2));
-        assert_derivatives(&line_row("travel", &free(), normal, 0.3, Some(law()), 2));
+        assert_derivatives(&line_equation("wall", &rod(), normal, 0.3, None, 2));
+        assert_derivatives(&line_equation("travel", &free(), normal, 0.3, Some(law()), 2));
     }
 }

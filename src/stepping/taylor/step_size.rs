@@ -11,7 +11,7 @@ use super::JUDGES;
 
 /// How long steps may be.
 #[derive(Clone, Debug)]
-pub struct Pace {
+pub struct StepSize {
     /// log2 tolerance / (P+1).
     exponent: f64,
     /// The longest step \[s\].
@@ -20,7 +20,7 @@ pub struct Pace {
     unit: i64,
 }
 
-impl Pace {
+impl StepSize {
     /// For a tolerance \[rad/s\] and an order, with a longest step \[s\].
     pub fn new(tolerance: f64, order: usize, longest: f64) -> Self {
         Self { exponent: libm::log2(tolerance) / (order + 1) as f64, longest, unit: 1f64.to_bits() as i64 }
@@ -80,15 +80,15 @@ mod tests {
         for (scale, growth) in [(1.0, 20.0), (1e-12, 3.0), (1e6, 0.5)] {
             let size = |k: i32| scale * f64::powi(growth, k);
             let exact = (16..=20).map(|k| size(k).powf(-1.0 / f64::from(k))).fold(f64::INFINITY, f64::min) * 1e-13_f64.powf(1.0 / 21.0);
-            let found = Pace::new(1e-13, 20, 1e9).step::<20>(&[size(20), size(19), size(18), size(17), size(16)]);
+            let found = StepSize::new(1e-13, 20, 1e9).step::<20>(&[size(20), size(19), size(18), size(17), size(16)]);
             assert!((found / exact - 1.0).abs() < 0.02, "{found} {exact}");
         }
     }
 
     #[test]
     fn vanishing_coefficients_give_the_longest_step() {
-        assert_eq!(Pace::new(1e-13, 20, 7.0).step::<20>(&[0.0; JUDGES]), 7.0);
+        assert_eq!(StepSize::new(1e-13, 20, 7.0).step::<20>(&[0.0; JUDGES]), 7.0);
         // One of them is enough for a step that is right.
-        assert!(Pace::new(1e-13, 20, 7.0).step::<20>(&[0.0, 0.0, 0.0, 1e20, 0.0]) < 0.1);
+        assert!(StepSize::new(1e-13, 20, 7.0).step::<20>(&[0.0, 0.0, 0.0, 1e20, 0.0]) < 0.1);
     }
 }
