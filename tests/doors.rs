@@ -5,7 +5,7 @@ use driftless::run::{Action, Change, Direction, Event, EventRecord, Observer, St
 use driftless::stepping::composition::Composition;
 use driftless::{
     Configuration, Custom, Integrator, Level, Limits, Mechanism, MethodId, Motion, Outcome, Plan, Problem, Request, Run, Running, Sample,
-    Scalar, Scene, SceneBuilder, Simulation, Site, State, Statistics, StepError, Time, ground, on,
+    Scalar, Scene, SceneBuilder, Simulation, Site, Stabilization, State, Statistics, StepError, Time, ground, on,
 };
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -443,5 +443,89 @@ fn a_trajectory_is_the_motion_at_every_time_by_every_method() {
         }
         assert!(trajectory.at(-0.1).is_none() && trajectory.at(2.1).is_none(), "{method}");
         assert!(trajectory.times().count() as u64 >= 1, "{method}");
+    }
+}
+
+/// The end of each step, and the motion a third of the way through the one after it.
+struct Thirds(Vec<(f64, Vec<f64>)>);
+
+impl Observer for Thirds {
+    fn step(&mut self, step: &mut Step) -> ControlFlow<()> {
+        let t = step.begin() + (step.end() - step.begin()) / 3.0;
+        let motion = step.at(t).clone();
+        let angles = (0..motion.phi.len()).map(|k| motion.unwrapped(k)).chain(motion.omega.iter().map(|omega| omega.hi));
+        self.0.push((t, angles.collect()));
+        ControlFlow::Continue(())
+    }
+}
+
+#[test]
+fn every_method_gives_the_motion_inside_its_steps_as_well_as_at_their_ends() {
+    let scene = driftless::read_scene("examples/scenes/four_bars.json".as_ref(), &[]).expect("a scene");
+    let simulation = || Simulation::new(&scene).expect("equations").until(0.5).every(0.25);
+    let fixed = |method: MethodId| simulation().method(method).step(1.0 / 64.0).stabilize(Stabilization::Projection);
+    let tolerant = |method: MethodId| simulation().method(method).tolerance(1e-11, 1e-11);
+    for (name, simulation, bound) in [
+        ("gauss8", fixed(MethodId::Gauss(4)), 1e-10),
+        ("rattle8", fixed(MethodId::Rattle(Composition::KahanLi17)), 1e-8),
+        ("dopri5", tolerant(MethodId::Dopri5), 1e-8),
+        ("dop853", tolerant(MethodId::Dop853), 1e-8),
+    ] {
+        let mut thirds = Thirds(Vec::new());
+        simulation.run_observed(&mut thirds).expect("a run");
+        assert!(thirds.0.len() > 8, "{name}: {} steps", thirds.0.len());
+        for (t, values) in thirds.0.iter().step_by(thirds.0.len() / 8) {
+            let exact = Simulation::new(&scene).expect("equations").until(*t).every(*t).method(MethodId::Taylor).tolerance(1e-14, 1e-14);
+            let last = exact.run().expect("a run").last;
+            let off = values.iter().zip(last.phi.iter().chain(&last.omega)).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+            assert!(off < bound, "{name}: {off:e} at {t} s");
+        }
+    }
+}
+
+#[test]
+fn a_pause_between_two_output_times_of_a_window_changes_no_bit() {
+    let scene = driftless::read_scene("examples/scenes/free.json".as_ref(), &[]).expect("a scene");
+    for method in [MethodId::Dopri5, MethodId::Dop853] {
+        let simulation = || Simulation::new(&scene).expect("equations").until(20.0).every(10.0).method(method).tolerance(1e-9, 1e-9);
+        let whole = simulation().run().expect("a run");
+        for after in [1, 7, 100] {
+            let (mechanism, start) = (Arc::clone(simulation().mechanism()), simulation().start());
+            let mut running = Running::new(simulation().prepare().expect("a run"));
+            let mut asked = 0;
+            let is_over = running.go(&mut |_| Ok(()), &mut || {
+                asked += 1;
+                asked == after
+            });
+            assert!(!is_over.expect("samples"), "{method}");
+            let text = serde_json::to_string(&running.snapshot()).expect("text");
+            let mut rest = Running::resume(mechanism, &start, serde_json::from_str(&text).expect("a snapshot")).expect("the same");
+            assert!(rest.go(&mut |_| Ok(()), &mut || false).expect("samples"));
+            let rest = rest.finish();
+            assert_eq!((rest.last, rest.statistics), (whole.last.clone(), whole.statistics), "{method} after {after} steps");
+        }
+    }
+}
+
+#[test]
+fn a_spring_that_loses_its_length_inside_a_step_is_found_by_every_method() {
+    // A ball that falls 1 m onto the other end of its spring, whose pull is nothing beside its weight: after sqrt(2/g).
+    let text = r#"{"name": "through", "gravity": [0, -9.81], "bars": [{"name": "ball", "mass": 1, "centre": [0, 0], "inertia": 0.1}],
+        "springs": [{"name": "thread", "between": [{"body": "ground", "point": [0, 0]}, {"body": "ball", "point": [0, 0]}], "stiffness": 1e-9, "free_length": 0.3, "damping": 0}],
+        "start": {"ball": {"phi": 0, "omega": 0, "origin": [0, 1], "velocity": [0, 0]}}, "until": 0.6, "every": 0.6}"#;
+    let scene = driftless::parse_scene(text, "through", &[]).expect("a scene");
+    let time = (2.0_f64 / 9.81).sqrt();
+    let simulation = || Simulation::new(&scene).expect("equations");
+    for (name, simulation) in [
+        ("taylor", simulation().method(MethodId::Taylor)),
+        ("dp8", simulation().method(MethodId::Dp8)),
+        ("dopri5", simulation().method(MethodId::Dopri5)),
+        ("dop853", simulation().method(MethodId::Dop853)),
+        ("gauss8", simulation().method(MethodId::Gauss(4)).step(0.02)),
+        ("rattle4", simulation().method(MethodId::Rattle(Composition::Suzuki5)).step(0.02)),
+    ] {
+        let stop = simulation.run().expect("a run").stop.unwrap_or_else(|| panic!("{name}: it went through"));
+        assert_eq!(stop.cause.word(), "spring_without_length", "{name}: {stop}");
+        assert!((stop.t - time).abs() < 1e-6, "{name}: {} for {time}", stop.t);
     }
 }

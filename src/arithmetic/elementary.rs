@@ -36,7 +36,7 @@ fn reduced_exp_minus_one(x: DoubleDouble) -> DoubleDouble {
 pub(super) fn exp(x: DoubleDouble) -> DoubleDouble {
     let plain = libm::exp(x.hi);
     // Beyond the range of doubles, and where the low part could no longer be represented.
-    if !(x.hi.abs() < 650.0) {
+    if x.hi.is_nan() || x.hi.abs() >= 650.0 {
         return DoubleDouble::of(plain);
     }
     let k = (x.hi / LN_2.hi).round();
@@ -60,7 +60,7 @@ pub(super) fn ln(x: DoubleDouble) -> DoubleDouble {
 
 /// Hyperbolic tangent.
 pub(super) fn tanh(x: DoubleDouble) -> DoubleDouble {
-    if !(x.hi.abs() < 40.0) {
+    if x.hi.is_nan() || x.hi.abs() >= 40.0 {
         return DoubleDouble::of(libm::tanh(x.hi));
     }
     let twice = x.ldexp(2.0);
