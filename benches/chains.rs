@@ -1,7 +1,9 @@
-//! What chains, ladders and long runs of them cost: one evaluation by matrices and body by body, and a hanging chain integrated.
+//! What chains, ladders and long runs of them cost: one evaluation by matrices and body by body, and a
+//! hanging chain integrated.
 //!
-//! `cargo bench --no-default-features --bench chains [-- evaluations | hanging | ladders]`: alternating blocks in one process, minimum and median.
-//! Chains are 1 m and 1 kg in all, their links thin rods; ladders are the four-bars of `examples/four_bars.rs`.
+//! `cargo bench --no-default-features --bench chains [-- evaluations | hanging | ladders]`: alternating
+//! blocks in one process, minimum and median. Chains are 1 m and 1 kg in all, their links thin rods; ladders
+//! are the four-bars of `examples/four_bars.rs`.
 
 #[allow(dead_code)]
 #[path = "../examples/four_bars.rs"]
@@ -33,7 +35,12 @@ fn chain(links: usize, angle: Option<f64>) -> Scene {
     if angle.is_some() {
         return straight;
     }
-    Scene { start: (0..links).map(|k| Start { phi: (0.37 * k as f64).sin(), omega: (0.71 * k as f64).cos() }).collect(), ..straight }
+    Scene {
+        start: (0..links)
+            .map(|k| Start { phi: (0.37 * k as f64).sin(), omega: (0.71 * k as f64).cos() })
+            .collect(),
+        ..straight
+    }
 }
 
 /// Four-bars side by side, a little past upright.
@@ -58,10 +65,22 @@ impl Candidate {
         let start = mechanism.start(scene);
         let mut made = if mechanism.has_work_integral() {
             let form = Multiplier::<0, true>::new(mechanism);
-            Self { y: form.state(&start).y, field: Box::new(form), rate: Vec::new(), count: 1, times: Vec::new() }
+            Self {
+                y: form.state(&start).y,
+                field: Box::new(form),
+                rate: Vec::new(),
+                count: 1,
+                times: Vec::new(),
+            }
         } else {
             let form = Multiplier::<0, false>::new(mechanism);
-            Self { y: form.state(&start).y, field: Box::new(form), rate: Vec::new(), count: 1, times: Vec::new() }
+            Self {
+                y: form.state(&start).y,
+                field: Box::new(form),
+                rate: Vec::new(),
+                count: 1,
+                times: Vec::new(),
+            }
         };
         made.rate = vec![0.0; made.y.len()];
         made.block();
@@ -92,7 +111,8 @@ fn compare(name: &str, scene: &Scene) {
     let mechanism = Mechanism::new(scene).expect("equations");
     let bodies = scene.bars.len();
     let mut bodywise = Candidate::new(mechanism.body_by_body(), scene);
-    let mut dense = mechanism.by_matrices().filter(|_| bodies <= MOST_DENSE).map(|dense| Candidate::new(dense, scene));
+    let mut dense =
+        mechanism.by_matrices().filter(|_| bodies <= MOST_DENSE).map(|dense| Candidate::new(dense, scene));
     for _ in 0..BLOCKS {
         bodywise.block();
         if let Some(dense) = &mut dense {
@@ -106,7 +126,9 @@ fn compare(name: &str, scene: &Scene) {
         let (dense_least, dense_usual) = dense.result();
         (format!("{dense_least:.3} {dense_usual:.3}"), format!("{:.2}", dense_usual / usual))
     });
-    println!("{name:>10} {bodies:>6} {least:>9.3} {usual:>9.3} {per_body:>8.1} {dense:>20} {ratio:>8} {chosen:>9}");
+    println!(
+        "{name:>10} {bodies:>6} {least:>9.3} {usual:>9.3} {per_body:>8.1} {dense:>20} {ratio:>8} {chosen:>9}"
+    );
 }
 
 /// Seconds this thread has computed, where the system tells; elapsed ones elsewhere.
@@ -136,7 +158,8 @@ fn integrate(name: &str, scene: &Scene, request: &Request) {
     println!("{name:>24} {:>9.4} {:>9.4} {evaluations:>9} {energy:>9.1e}", times[0], times[2]);
 }
 
-/// Angle \[rad\] of the uprights of N four-bars, by the pendulum they make together: (N + (N+1)/3) theta'' = (N + (N+1)/2) g sin theta from the vertical.
+/// Angle \[rad\] of the uprights of N four-bars, by the pendulum they make together: (N + (N+1)/3) theta'' =
+/// (N + (N+1)/2) g sin theta from the vertical.
 fn upright(n: usize, until: f64) -> f64 {
     let n = n as f64;
     let ratio = (n + (n + 1.0) / 2.0) / (n + (n + 1.0) / 3.0) * 9.81;
@@ -155,7 +178,8 @@ fn upright(n: usize, until: f64) -> f64 {
 /// Runs of each tolerance in the table of ladders.
 const RUNS: usize = 9;
 
-/// N four-bars over 20 s, through all their singular positions: time and error of the power series, tolerance by tolerance.
+/// N four-bars over 20 s, through all their singular positions: time and error of the power series, tolerance
+/// by tolerance.
 fn ladders(n: usize) {
     let scene = Scene { until: 20.0, every: 20.0, ..four_bars::scene(n) };
     let expected = upright(n, scene.until);
@@ -164,7 +188,8 @@ fn ladders(n: usize) {
     let mut found = vec![(0, 0.0); tolerances.len()];
     for _ in 0..RUNS {
         for ((&tolerance, times), found) in tolerances.iter().zip(&mut times).zip(&mut found) {
-            let request = Request { method: Some(MethodId::Taylor), rtol: Some(tolerance), ..Request::default() };
+            let request =
+                Request { method: Some(MethodId::Taylor), rtol: Some(tolerance), ..Request::default() };
             let clock = Instant::now();
             let begin = computed(clock);
             let outcome = simulate(&scene, &request, &mut |_| Ok(()));
@@ -175,7 +200,10 @@ fn ladders(n: usize) {
             }
         }
     }
-    println!("\n{n:>3} four-bars, 20 s, taylor {:>9} {:>9} {:>9} {:>9}", "min ms", "median", "steps", "error");
+    println!(
+        "\n{n:>3} four-bars, 20 s, taylor {:>9} {:>9} {:>9} {:>9}",
+        "min ms", "median", "steps", "error"
+    );
     for ((tolerance, times), (steps, error)) in tolerances.iter().zip(&mut times).zip(found) {
         times.sort_by(f64::total_cmp);
         println!("{tolerance:>26.0e} {:>9.2} {:>9.2} {steps:>9} {error:>9.1e}", times[0], times[RUNS / 2]);
@@ -232,14 +260,22 @@ fn evaluations() {
 /// A form in angles and rates.
 type Angles = Multiplier<0, true>;
 
-/// The method alone, without the program's loop and monitors: angles \[rad\] at the end, milliseconds, evaluations or expansions.
-fn alone(mechanism: &Arc<Mechanism>, scene: &Scene, method: &mut dyn Integrator<Angles>) -> (Vec<f64>, f64, u64) {
+/// The method alone, without the program's loop and monitors: angles \[rad\] at the end, milliseconds,
+/// evaluations or expansions.
+fn alone(
+    mechanism: &Arc<Mechanism>,
+    scene: &Scene,
+    method: &mut dyn Integrator<Angles>,
+) -> (Vec<f64>, f64, u64) {
     let mut form = Angles::new(Arc::clone(mechanism));
     let mut state = form.state(&mechanism.start(scene));
     let mut statistics = Statistics::default();
     let clock = Instant::now();
     let begin = computed(clock);
-    let reached = method.advance(&mut form, &mut state, Time::from(scene.until), &mut statistics, &mut |_, _| Ok(Seen::Kept));
+    let reached =
+        method.advance(&mut form, &mut state, Time::from(scene.until), &mut statistics, &mut |_, _| {
+            Ok(Seen::Kept)
+        });
     let elapsed = (computed(clock) - begin) * 1e3;
     assert_eq!(reached, Ok(Reached::Until));
     let mut end = Motion::default();
@@ -247,7 +283,8 @@ fn alone(mechanism: &Arc<Mechanism>, scene: &Scene, method: &mut dyn Integrator<
     ((0..scene.bars.len()).map(|k| end.unwrapped(k)).collect(), elapsed, statistics.evaluations)
 }
 
-/// Chains let go at 0.2 rad: one simulated second by the methods alone, in turn, with the largest error of an angle against the tightest of them.
+/// Chains let go at 0.2 rad: one simulated second by the methods alone, in turn, with the largest error of an
+/// angle against the tightest of them.
 fn methods(links: usize) {
     let scene = Scene { until: 1.0, ..chain(links, Some(0.2)) };
     let both = |relative| Tolerance { relative, absolute: relative };
@@ -256,10 +293,15 @@ fn methods(links: usize) {
     type Candidate = (String, Box<dyn Fn() -> Box<dyn Integrator<Angles>>>);
     let mut candidates: Vec<Candidate> = Vec::new();
     for tolerance in [1e-4, 1e-6, 1e-8, 1e-10] {
-        candidates.push((format!("dop853 {tolerance:.0e}"), Box::new(move || Box::new(Dop853::new(both(tolerance))))));
-        candidates.push((format!("dp8 {tolerance:.0e}"), Box::new(move || Box::new(Dp8::new(both(tolerance))))));
+        candidates.push((
+            format!("dop853 {tolerance:.0e}"),
+            Box::new(move || Box::new(Dop853::new(both(tolerance)))),
+        ));
+        candidates
+            .push((format!("dp8 {tolerance:.0e}"), Box::new(move || Box::new(Dp8::new(both(tolerance))))));
         for order in [16, 20, 24, 28] {
-            let series = move || Box::new(Taylor::<f64>::with_order(tolerance, order)) as Box<dyn Integrator<_>>;
+            let series =
+                move || Box::new(Taylor::<f64>::with_order(tolerance, order)) as Box<dyn Integrator<_>>;
             candidates.push((format!("taylor {tolerance:.0e}, order {order}"), Box::new(series)));
         }
     }
@@ -269,21 +311,35 @@ fn methods(links: usize) {
         for ((candidate, times), found) in candidates.iter().zip(&mut times).zip(&mut found) {
             let (end, elapsed, evaluations) = alone(&mechanism, &scene, &mut *candidate.1());
             times.push(elapsed);
-            *found = (end.iter().zip(&exact).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs())), evaluations);
+            *found =
+                (end.iter().zip(&exact).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs())), evaluations);
         }
     }
-    println!("\n{links:>4} links, 1 s, methods alone {:>9} {:>9} {:>9} {:>9}", "min ms", "median", "evaluat.", "error");
+    println!(
+        "\n{links:>4} links, 1 s, methods alone {:>9} {:>9} {:>9} {:>9}",
+        "min ms", "median", "evaluat.", "error"
+    );
     for ((candidate, times), (error, evaluations)) in candidates.iter().zip(&mut times).zip(found) {
         times.sort_by(f64::total_cmp);
-        println!("{:>30} {:>9.2} {:>9.2} {evaluations:>9} {error:>9.1e}", candidate.0, times[0], times[RUNS / 2]);
+        println!(
+            "{:>30} {:>9.2} {:>9.2} {evaluations:>9} {error:>9.1e}",
+            candidate.0,
+            times[0],
+            times[RUNS / 2]
+        );
     }
 }
 
 fn hanging() {
     [16, 128].into_iter().for_each(methods);
-    println!("\n{:>24} {:>9} {:>9} {:>9} {:>9}", "one simulated second", "CPU s", "median s", "evaluat.", "energy");
+    println!(
+        "\n{:>24} {:>9} {:>9} {:>9} {:>9}",
+        "one simulated second", "CPU s", "median s", "evaluat.", "energy"
+    );
     for (name, angle) in [("0.2 rad", 0.2), ("0.5 rad", 0.5), ("horizontal", FRAC_PI_2)] {
-        for (method, tolerance) in [(MethodId::Dop853, 1e-6), (MethodId::Taylor, 1e-6), (MethodId::Taylor, 1e-8)] {
+        for (method, tolerance) in
+            [(MethodId::Dop853, 1e-6), (MethodId::Taylor, 1e-6), (MethodId::Taylor, 1e-8)]
+        {
             let request = Request { method: Some(method), rtol: Some(tolerance), ..Request::default() };
             integrate(&format!("{name}, {method} {tolerance:.0e}"), &chain(128, Some(angle)), &request);
         }

@@ -1,8 +1,9 @@
-//! What the equations cost: one evaluation beside a right-hand side written by hand for exactly the two bars at hand, and what an evaluation costs
-//! inside a run by `dp8`, its steps included, with the motor's row kept in every way beside the free scene.
+//! What the equations cost: one evaluation beside a right-hand side written by hand for exactly the two bars
+//! at hand, and what an evaluation costs inside a run by `dp8`, its steps included, with the motor's row kept
+//! in every way beside the free scene.
 //!
-//! `cargo bench --bench equations`: alternating blocks in one process; the figures are nanoseconds (minimum and median over the blocks) and
-//! the ratio of the minima and of the medians to the first line.
+//! `cargo bench --bench equations`: alternating blocks in one process; the figures are nanoseconds (minimum
+//! and median over the blocks) and the ratio of the minima and of the medians to the first line.
 
 use driftless::dynamics::canonical::Canonical;
 use driftless::dynamics::elimination::Elimination;
@@ -21,7 +22,8 @@ const BLOCK: usize = 2_000;
 /// Blocks of each candidate.
 const BLOCKS: usize = 600;
 
-/// The source problem's two bars, nothing else: the smallest code we could write, with the same sine and cosine.
+/// The source problem's two bars, nothing else: the smallest code we could write, with the same sine and
+/// cosine.
 struct ByHand {
     inner: f64,
     coupling: f64,
@@ -46,7 +48,12 @@ impl OdeSystem for ByHand {
         let b1 = -self.coupling * sin * w2 * w2 - self.weight[0] * s1;
         let b2 = self.coupling * sin * w1 * w1 - self.weight[1] * s2;
         let det = self.inner * self.outer - m12 * m12;
-        rate.copy_from_slice(&[w1, w2, (self.outer * b1 - m12 * b2) / det, (self.inner * b2 - m12 * b1) / det]);
+        rate.copy_from_slice(&[
+            w1,
+            w2,
+            (self.outer * b1 - m12 * b2) / det,
+            (self.inner * b2 - m12 * b1) / det,
+        ]);
     }
 
     fn label(&self, i: usize) -> String {
@@ -54,7 +61,8 @@ impl OdeSystem for ByHand {
     }
 }
 
-/// Nanoseconds an evaluation over one block; the state moves a little each time, so that nothing can be hoisted out.
+/// Nanoseconds an evaluation over one block; the state moves a little each time, so that nothing can be
+/// hoisted out.
 fn block(field: &mut dyn OdeSystem, y: &mut [f64], rate: &mut [f64]) -> f64 {
     let begin = Instant::now();
     for _ in 0..BLOCK {
@@ -135,11 +143,17 @@ struct Traveller {
 }
 
 impl Traveller {
-    fn new<P: Form + 'static, M: Integrator<P> + 'static>(name: &'static str, mut problem: P, mut method: M, start: &Motion) -> Self {
+    fn new<P: Form + 'static, M: Integrator<P> + 'static>(
+        name: &'static str,
+        mut problem: P,
+        mut method: M,
+        start: &Motion,
+    ) -> Self {
         let mut state = problem.state(start);
         let advance = move |span: f64| {
             let (mut statistics, until) = (Statistics::default(), state.time + span);
-            let reached = method.advance(&mut problem, &mut state, until, &mut statistics, &mut |_, _| Ok(Seen::Kept));
+            let reached =
+                method.advance(&mut problem, &mut state, until, &mut statistics, &mut |_, _| Ok(Seen::Kept));
             assert_eq!(reached, Ok(Reached::Until));
             statistics.evaluations
         };
@@ -168,7 +182,10 @@ fn steps((free, start): (&Arc<Mechanism>, &Motion), (motor, motor_start): (&Arc<
             traveller.per_second.push(spent * 1e-3 / SPAN);
         }
     }
-    println!("{:36} {:>8} {:>8} {:>8} {:>8}", "one evaluation, dp8 at 1e-9", "min ns", "ratio", "median", "ratio");
+    println!(
+        "{:36} {:>8} {:>8} {:>8} {:>8}",
+        "one evaluation, dp8 at 1e-9", "min ns", "ratio", "median", "ratio"
+    );
     table(travellers.iter_mut().map(|traveller| (traveller.name, &mut traveller.per_evaluation)));
     println!("\n{:36} {:>8} {:>8} {:>8} {:>8}", "one simulated second", "min us", "ratio", "median", "ratio");
     table(travellers.iter_mut().map(|traveller| (traveller.name, &mut traveller.per_second)));

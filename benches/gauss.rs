@@ -1,7 +1,8 @@
-//! Cost of a step of Gauss with eight stages: the stages as lanes, beside the same stages evaluated one by one.
+//! Cost of a step of Gauss with eight stages: the stages as lanes, beside the same stages evaluated one by
+//! one.
 //!
-//! `cargo bench --no-default-features --bench gauss`: alternating blocks in one process; microseconds a step (minimum and median over the blocks) and the ratio to
-//! the default block by block.
+//! `cargo bench --no-default-features --bench gauss`: alternating blocks in one process; microseconds a step
+//! (minimum and median over the blocks) and the ratio to the default block by block.
 
 use driftless::dynamics::canonical::Canonical;
 use driftless::dynamics::{Form, Mechanism, OdeSystem, State, Time};
@@ -53,7 +54,9 @@ impl Candidate {
         let until = self.state.time + f64::from(BLOCK) * self.method.step();
         let begin = Instant::now();
         self.method
-            .advance(&mut *self.field, &mut self.state, until, &mut self.statistics, &mut |_, _| Ok(Seen::Kept))
+            .advance(&mut *self.field, &mut self.state, until, &mut self.statistics, &mut |_, _| {
+                Ok(Seen::Kept)
+            })
             .expect("an integration");
         self.times.push(begin.elapsed().as_secs_f64() * 1e6 / f64::from(BLOCK));
     }
@@ -85,8 +88,10 @@ fn compare<const N: usize, const WORK: bool>(scene: &Scene, step: f64) {
     }
     let first = candidates[0].times.clone();
     for candidate in &mut candidates {
-        let mut ratios: Vec<f64> = candidate.times.iter().zip(&first).map(|(time, first)| time / first).collect();
-        let (least, middle) = (candidate.times.iter().copied().fold(f64::INFINITY, f64::min), median(&mut candidate.times));
+        let mut ratios: Vec<f64> =
+            candidate.times.iter().zip(&first).map(|(time, first)| time / first).collect();
+        let (least, middle) =
+            (candidate.times.iter().copied().fold(f64::INFINITY, f64::min), median(&mut candidate.times));
         let evaluations = candidate.statistics.evaluations as f64 / candidate.statistics.steps as f64 / 8.0;
         println!(
             "{:10} {:18} {least:7.2} {middle:7.2} us a step, ratio {:5.2}, {evaluations:4.1} evaluations of all stages",
@@ -110,5 +115,9 @@ fn main() {
     compare::<0, false>(&scene("chain8"), 1.0 / 256.0);
     let spring = scene("spring");
     let has_work_integral = Mechanism::new(&spring).expect("equations").has_work_integral();
-    if has_work_integral { compare::<2, true>(&spring, 1.0 / 128.0) } else { compare::<2, false>(&spring, 1.0 / 128.0) }
+    if has_work_integral {
+        compare::<2, true>(&spring, 1.0 / 128.0)
+    } else {
+        compare::<2, false>(&spring, 1.0 / 128.0)
+    }
 }

@@ -1,8 +1,9 @@
 //! Andrews' squeezing mechanism over its 0.03 s: run time, error and evaluations of every method.
 //!
-//! `cargo bench --no-default-features --bench mechanisms`: alternating blocks in one process, minimum and median over the blocks; the error is the largest of
-//! any angle against a quadruple-precision state (`tests/looped.rs` says whose), the residual the largest violation of a row after any step, over 0.1 m, the size of
-//! the mechanism.
+//! `cargo bench --no-default-features --bench mechanisms`: alternating blocks in one process, minimum and
+//! median over the blocks; the error is the largest of any angle against a quadruple-precision state
+//! (`tests/looped.rs` says whose), the residual the largest violation of a row after any step, over 0.1 m,
+//! the size of the mechanism.
 
 #[path = "../tests/common/andrews.rs"]
 mod andrews;
@@ -36,20 +37,31 @@ struct Ran {
     statistics: Statistics,
 }
 
-fn integrate<P: Form + ?Sized>(problem: &mut P, start: &Motion, mut method: impl Integrator<P>, watched: bool) -> Ran {
+fn integrate<P: Form + ?Sized>(
+    problem: &mut P,
+    start: &Motion,
+    mut method: impl Integrator<P>,
+    watched: bool,
+) -> Ran {
     let mut state = problem.state(start);
     let mut statistics = Statistics::default();
     let mechanism = problem.mechanism().clone();
     let mut kernel = Kernel::<f64>::new(&mechanism);
     let (mut motion, mut residual) = (Motion::default(), 0.0f64);
     let begin = Instant::now();
-    let ended = method.advance(problem, &mut state, Time::from(0.03), &mut statistics, &mut |problem: &mut P, state: &mut State| {
-        if watched {
-            problem.read(state, &mut motion);
-            residual = residual.max(andrews::violation(&mechanism, &mut kernel, &motion));
-        }
-        Ok(Seen::Kept)
-    });
+    let ended = method.advance(
+        problem,
+        &mut state,
+        Time::from(0.03),
+        &mut statistics,
+        &mut |problem: &mut P, state: &mut State| {
+            if watched {
+                problem.read(state, &mut motion);
+                residual = residual.max(andrews::violation(&mechanism, &mut kernel, &motion));
+            }
+            Ok(Seen::Kept)
+        },
+    );
     let seconds = begin.elapsed().as_secs_f64();
     if let Err(stop) = ended {
         println!("stopped: {stop}");
@@ -105,7 +117,9 @@ fn main() {
         if tolerance > 1e-9 {
             candidates.push((
                 name("dp5, projected"),
-                Box::new(move |w| integrate(&mut looped(), start, Projected::new(Dp5::new(both(tolerance))), w)),
+                Box::new(move |w| {
+                    integrate(&mut looped(), start, Projected::new(Dp5::new(both(tolerance))), w)
+                }),
             ));
         }
         candidates.push((
@@ -114,16 +128,27 @@ fn main() {
         ));
         candidates.push((
             name("dp8 in angles, projected"),
-            Box::new(move |w| integrate(&mut multiplier(), start, Projected::new(Dp8::new(both(tolerance))), w)),
+            Box::new(move |w| {
+                integrate(&mut multiplier(), start, Projected::new(Dp8::new(both(tolerance))), w)
+            }),
         ));
-        candidates.push((name("dp8"), Box::new(move |w| integrate(&mut looped(), start, Dp8::new(both(tolerance)), w))));
-        candidates.push((name("dop853"), Box::new(move |w| integrate(&mut looped(), start, Dop853::new(both(tolerance)), w))));
+        candidates.push((
+            name("dp8"),
+            Box::new(move |w| integrate(&mut looped(), start, Dp8::new(both(tolerance)), w)),
+        ));
+        candidates.push((
+            name("dop853"),
+            Box::new(move |w| integrate(&mut looped(), start, Dop853::new(both(tolerance)), w)),
+        ));
     }
     for tolerance in [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-12] {
         let name = |method: &str| format!("{method} {tolerance:.0e}");
         let taylor = move || Taylor::<f64>::new(both(tolerance));
         candidates.push((name("taylor"), Box::new(move |w| integrate(&mut looped(), start, taylor(), w))));
-        candidates.push((name("taylor, projected"), Box::new(move |w| integrate(&mut looped(), start, Projected::new(taylor()), w))));
+        candidates.push((
+            name("taylor, projected"),
+            Box::new(move |w| integrate(&mut looped(), start, Projected::new(taylor()), w)),
+        ));
         let series = move || {
             let mut series = taylor();
             series.kernel = Expansion::Series;
@@ -136,7 +161,10 @@ fn main() {
     }
     for steps in [50.0, 100.0, 200.0] {
         let gauss = move || SymmetricGauss::new(Gauss::new(8, 0.03 / steps).expect("sound settings"));
-        candidates.push((format!("gauss16, projected 0.03/{steps}"), Box::new(move |w| integrate(&mut looped(), start, gauss(), w))));
+        candidates.push((
+            format!("gauss16, projected 0.03/{steps}"),
+            Box::new(move |w| integrate(&mut looped(), start, gauss(), w)),
+        ));
     }
     let compositions = [
         ("rattle2", Composition::Single),
@@ -147,7 +175,10 @@ fn main() {
     for (name, composition) in compositions {
         for steps in [200.0, 400.0, 800.0] {
             let rattle = move || Rattle::new(composition, 0.03 / steps);
-            candidates.push((format!("{name} 0.03/{steps}"), Box::new(move |w| integrate(&mut natural(), start, rattle(), w))));
+            candidates.push((
+                format!("{name} 0.03/{steps}"),
+                Box::new(move |w| integrate(&mut natural(), start, rattle(), w)),
+            ));
         }
     }
     let mut times = vec![Vec::new(); candidates.len()];
@@ -156,7 +187,10 @@ fn main() {
             times.push(run(false).seconds * 1e3);
         }
     }
-    println!("{:34} {:>8} {:>8} {:>9} {:>9} {:>6} {:>6}", "", "min ms", "median", "error", "residual", "steps", "evals");
+    println!(
+        "{:34} {:>8} {:>8} {:>9} {:>9} {:>6} {:>6}",
+        "", "min ms", "median", "error", "residual", "steps", "evals"
+    );
     for ((name, run), times) in candidates.iter().zip(&mut times) {
         let Ran { error, residual, statistics, .. } = run(true);
         let least = times.iter().copied().fold(f64::INFINITY, f64::min);

@@ -1,7 +1,9 @@
-//! What rows cost: the method alone, the library's loop with its monitors, the same with the trajectory written, and the program as a whole process.
+//! What rows cost: the method alone, the library's loop with its monitors, the same with the trajectory
+//! written, and the program as a whole process.
 //!
-//! `cargo bench --bench overhead`: alternating rounds in one process, all to the same output times; microseconds per output row (minimum and
-//! median over the rounds), and ratios of the minima to the method alone and to the library's loop.
+//! `cargo bench --bench overhead`: alternating rounds in one process, all to the same output times;
+//! microseconds per output row (minimum and median over the rounds), and ratios of the minima to the method
+//! alone and to the library's loop.
 
 use driftless::dynamics::canonical::Canonical;
 use driftless::dynamics::elimination::Elimination;
@@ -49,7 +51,9 @@ fn bare<P: Form, M: Integrator<P>>(problem: &mut P, method: &mut M, mut state: S
     for row in 1..=plan.rows {
         let until = plan.time(row);
         if !method.is_dense() {
-            method.advance(problem, &mut state, until, &mut statistics, &mut |_, _| Ok(Seen::Kept)).expect("a step");
+            method
+                .advance(problem, &mut state, until, &mut statistics, &mut |_, _| Ok(Seen::Kept))
+                .expect("a step");
             continue;
         }
         while state.time < until {
@@ -106,9 +110,17 @@ fn main() {
     for case in &CASES {
         let scene = read_scene(&path(case.scene), &[]).expect("a shipped scene");
         let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
-        let request = Request { method: Some(case.method), until: Some(case.until), every: Some(case.every), ..Request::default() };
+        let request = Request {
+            method: Some(case.method),
+            until: Some(case.until),
+            every: Some(case.every),
+            ..Request::default()
+        };
         let plan = Plan::new(&scene, &mechanism, &request).expect("a sensible pairing");
-        let run = || Run::new(Arc::clone(&mechanism), plan.clone(), Limits::default(), &mechanism.start(&scene)).expect("a beginning");
+        let run = || {
+            Run::new(Arc::clone(&mechanism), plan.clone(), Limits::default(), &mechanism.start(&scene))
+                .expect("a beginning")
+        };
         let with_files = || {
             let mut folder = Folder::open(&place, false).expect("a folder");
             let table = Table::new(&mechanism, folder.begin(TRAJECTORY).expect("a file")).expect("a header");
@@ -129,14 +141,18 @@ fn main() {
         };
         let candidates: [Candidate; 4] = [
             ("method alone", Box::new(|| alone(case, &scene, &mechanism, &plan))),
-            ("library loop with monitors", Box::new(|| drop(integrate(run(), &mut |_| Ok(())).expect("a run")))),
+            (
+                "library loop with monitors",
+                Box::new(|| drop(integrate(run(), &mut |_| Ok(())).expect("a run"))),
+            ),
             ("the same, trajectory written", Box::new(with_files)),
             ("driftless run, whole process", Box::new(program)),
         ];
         let mut times = [const { Vec::<f64>::new() }; 4];
         for _ in 0..ROUNDS {
             for ((_, candidate), times) in candidates.iter().zip(&mut times) {
-                // Some file systems write a file out before they let another take its name: every round begins in a fresh folder.
+                // Some file systems write a file out before they let another take its name: every round
+                // begins in a fresh folder.
                 let _ = std::fs::remove_dir_all(&place);
                 let begin = Instant::now();
                 candidate();

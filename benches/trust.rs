@@ -1,7 +1,9 @@
-//! What an estimate of the error costs: runs with their trajectories written, with and without a reference solution.
+//! What an estimate of the error costs: runs with their trajectories written, with and without a reference
+//! solution.
 //!
-//! `cargo bench --bench trust`: alternating rounds in one process at the scenes' own output intervals; what the reference solution adds, in percent of the run
-//! without it (minimum over minimum, and the median of the rounds' ratios).
+//! `cargo bench --bench trust`: alternating rounds in one process at the scenes' own output intervals; what
+//! the reference solution adds, in percent of the run without it (minimum over minimum, and the median of the
+//! rounds' ratios).
 
 use driftless::dynamics::Mechanism;
 use driftless::run::files::TRAJECTORY;
@@ -16,7 +18,8 @@ use std::time::Instant;
 /// Rounds of each candidate.
 const ROUNDS: usize = 15;
 
-/// Scenes, methods where others than the chosen one are of interest, tolerances, and the longest horizon \[s\].
+/// Scenes, methods where others than the chosen one are of interest, tolerances, and the longest horizon
+/// \[s\].
 const CASES: &[(&str, &str, f64)] = &[
     ("free", "", 0.0),
     ("free", "dopri5", 1e-4),
@@ -53,13 +56,17 @@ fn main() {
         let plan = Plan::new(&scene, &mechanism, &request).expect("a sensible pairing");
         let start = mechanism.start(&scene);
         let run = |level: Level| {
-            // Some file systems write a file out before they let another take its name: every round begins in a fresh folder.
+            // Some file systems write a file out before they let another take its name: every round begins in
+            // a fresh folder.
             let _ = std::fs::remove_dir_all(&place);
             let begin = Instant::now();
             let mut folder = Folder::open(&place, false).expect("a folder");
-            let mut table = Table::new(&mechanism, folder.begin(TRAJECTORY).expect("a file")).expect("a header");
-            let run = Run::new(Arc::clone(&mechanism), plan.clone(), Limits::default(), &start).expect("a beginning");
-            let outcome = integrate(run.trusted(level, &start), &mut |sample| table.write(sample)).expect("a run");
+            let mut table =
+                Table::new(&mechanism, folder.begin(TRAJECTORY).expect("a file")).expect("a header");
+            let run = Run::new(Arc::clone(&mechanism), plan.clone(), Limits::default(), &start)
+                .expect("a beginning");
+            let outcome =
+                integrate(run.trusted(level, &start), &mut |sample| table.write(sample)).expect("a run");
             folder.keep(table.finish().expect("written")).expect("kept");
             (begin.elapsed().as_secs_f64(), outcome.trust.map_or("", |trust| trust.how.word()))
         };
@@ -77,7 +84,11 @@ fn main() {
         let percent = |ratio: f64| 100.0 * (ratio - 1.0);
         let label = format!("{name}, {}", driftless::report::setting(&plan));
         let row = 1e6 * least[0] / plan.rows as f64;
-        println!("{label:34} {row:10.2} {:7.1}% {:7.1}% {how:>14}", percent(least[1] / least[0]), percent(ratios[ROUNDS / 2]));
+        println!(
+            "{label:34} {row:10.2} {:7.1}% {:7.1}% {how:>14}",
+            percent(least[1] / least[0]),
+            percent(ratios[ROUNDS / 2])
+        );
     }
     let _ = std::fs::remove_dir_all(&place);
 }

@@ -1,6 +1,8 @@
-//! Prints the scene of a chain of N links, one metre and one kilogram in all, that hangs by one end and is let go straight at an angle:
+//! Prints the scene of a chain of N links, one metre and one kilogram in all, that hangs by one end and is
+//! let go straight at an angle:
 //!
-//! `cargo run --release --example chain -- 128 0.5 > chain.json && cargo run --release -- run chain.json --method dop853`
+//! `cargo run --release --example chain -- 128 0.5 > chain.json && cargo run --release -- run chain.json --method
+//! dop853`
 
 use driftless::scene::{Bar, Hinge, Place, Scene, Start};
 

@@ -1,7 +1,7 @@
 //! Energy over a long run by six methods: which climb, and which stay where they are.
 //!
-//! `cargo run --release --example drift_chart` integrates the free double pendulum for 1000 s (give another horizon as the first argument) and
-//! writes `output/energy_drift.png`.
+//! `cargo run --release --example drift_chart` integrates the free double pendulum for 1000 s (give another
+//! horizon as the first argument) and writes `output/energy_drift.png`.
 
 use driftless::chart::{DriftSeries, EnergyDrift, FILE_RESOLUTION, energy_drift};
 use driftless::run::{Request, simulate};
@@ -28,7 +28,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scene = read_scene("examples/scenes/free.json".as_ref(), &[])?;
     let mut series = Vec::new();
     for (method, setting, words) in RUNS {
-        let request = Request { method: Some(method.parse()?), until: Some(until), every: Some(1.0 / 16.0), ..Request::default() };
+        let request = Request {
+            method: Some(method.parse()?),
+            until: Some(until),
+            every: Some(1.0 / 16.0),
+            ..Request::default()
+        };
         let request = match setting {
             Setting::Step(step) => Request { step: Some(step), ..request },
             Setting::Tolerance(rtol) => Request { rtol: Some(rtol), ..request },
@@ -40,7 +45,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     let chart = EnergyDrift {
         title: format!("Energy drift over {until} s: gauss16 stays below rounding"),
-        caption: vec!["scene free, released from π/2".into(), "largest |Δ*E*| so far over 2*mgl*, evaluated in double-double".into()],
+        caption: vec![
+            "scene free, released from π/2".into(),
+            "largest |Δ*E*| so far over 2*mgl*, evaluated in double-double".into(),
+        ],
         quantity: "energy".into(),
         series,
         log_time: true,

@@ -1,7 +1,8 @@
-//! N four-bars side by side (IFToMM benchmark A02): N + 1 uprights and N couplers of 1 m and 1 kg, which pass twice a turn through positions in
-//! which all of them lie in line.
+//! N four-bars side by side (IFToMM benchmark A02): N + 1 uprights and N couplers of 1 m and 1 kg, which pass
+//! twice a turn through positions in which all of them lie in line.
 //!
-//! `cargo run --release --example four_bars -- [N]` prints the scene (N = 2 is `examples/scenes/four_bars.json`).
+//! `cargo run --release --example four_bars -- [N]` prints the scene (N = 2 is
+//! `examples/scenes/four_bars.json`).
 
 use driftless::scene::{Bar, Hinge, Place, Scene, Start};
 use std::f64::consts::FRAC_PI_2;
@@ -30,11 +31,16 @@ pub fn scene(n: usize) -> Scene {
     });
     Scene {
         name: format!("four_bars_{n}"),
-        description: format!("{n} four-bars side by side pass through positions in which all links lie in line (IFToMM benchmark A02)."),
+        description: format!(
+            "{n} four-bars side by side pass through positions in which all links lie in line (IFToMM benchmark A02)."
+        ),
         gravity: [0.0, -9.81],
         bars: (0..=n).map(|i| bar(format!("U{i}"))).chain((0..n).map(|i| bar(format!("C{i}")))).collect(),
         hinges: translations.chain(tops).collect(),
-        start: (0..=n).map(|_| Start { phi: FRAC_PI_2, omega: -1.0 }).chain((0..n).map(|_| Start { phi: 0.0, omega: 0.0 })).collect(),
+        start: (0..=n)
+            .map(|_| Start { phi: FRAC_PI_2, omega: -1.0 })
+            .chain((0..n).map(|_| Start { phi: 0.0, omega: 0.0 }))
+            .collect(),
         until: 10.0,
         every: 0.01,
         ..Scene::default()

@@ -1,12 +1,14 @@
 //! A hundred million seconds of `gentle` by Gauss's method, in as many sittings as it takes.
 //!
-//! `cargo run --release --example long_horizon -- [SECONDS]` integrates on to that simulated time, from where the last call stopped; without SECONDS it
-//! goes on for three seconds of real time.  `output/long_horizon/checkpoint.json` holds the state to the last bit and is replaced whole.
+//! `cargo run --release --example long_horizon -- [SECONDS]` integrates on to that simulated time, from where
+//! the last call stopped; without SECONDS it goes on for three seconds of real time.
+//! `output/long_horizon/checkpoint.json` holds the state to the last bit and is replaced whole.
 //!
-//! Plain doubles in the stages, on purpose: the evaluations in pairs leave a fifth of the walk over 1e5 s, but a climb of 2e-21 a second at this step, which a
-//! random walk undercuts from about 1e6 s on.
+//! Plain doubles in the stages, on purpose: the evaluations in pairs leave a fifth of the walk over 1e5 s,
+//! but a climb of 2e-21 a second at this step, which a random walk undercuts from about 1e6 s on.
 //!
-//! One run shows the law of its drift by the changes of energy over windows of time: a random walk changes as the square root of the window.
+//! One run shows the law of its drift by the changes of energy over windows of time: a random walk changes as
+//! the square root of the window.
 
 use driftless::arithmetic::DoubleDouble;
 use driftless::dynamics::canonical::Canonical;
@@ -34,10 +36,12 @@ struct Checkpoint {
     turns: Vec<i64>,
     memory: Vec<f64>,
     samples: u64,
-    /// Energy errors at each sample so far: the largest, and those at powers of ten \[s\], over the scale of the energy.
+    /// Energy errors at each sample so far: the largest, and those at powers of ten \[s\], over the scale of
+    /// the energy.
     largest: f64,
     decades: Vec<(f64, f64, f64)>,
-    /// For windows of 4^k samples: the error at the last window's end, the sum of squared changes, and their number.
+    /// For windows of 4^k samples: the error at the last window's end, the sum of squared changes, and their
+    /// number.
     windows: Vec<(f64, f64, u64)>,
     /// Real time spent \[s\].
     spent: f64,
@@ -70,7 +74,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     loop {
         checkpoint.samples += 1;
         let time = checkpoint.samples as f64 * SAMPLE;
-        method.advance(&mut form, &mut state, Time::from(time), &mut Default::default(), &mut |_, _| Ok(Seen::Kept))?;
+        method.advance(&mut form, &mut state, Time::from(time), &mut Default::default(), &mut |_, _| {
+            Ok(Seen::Kept)
+        })?;
         checkpoint.see(time, (energy(&mut form, &state) - start).hi / mechanism.energy_scale);
         let is_last = until.map_or(begin.elapsed() > Duration::from_secs(3), |until| time >= until);
         if is_last || saved.elapsed() > Duration::from_secs(20) {
@@ -111,12 +117,20 @@ impl Checkpoint {
     }
 
     fn report(&self, time: f64) {
-        println!("{time:e} s of `gentle`, {:.1} µs of real time a simulated second, all sittings", self.spent * 1e6 / time);
+        println!(
+            "{time:e} s of `gentle`, {:.1} µs of real time a simulated second, all sittings",
+            self.spent * 1e6 / time
+        );
         println!("\n{:>10} {:>11} {:>11}   energy error over its scale", "t [s]", "at t", "largest");
-        for (time, error, largest) in self.decades.iter().chain([&(time, self.windows.first().map_or(0.0, |w| w.0), self.largest)]) {
+        for (time, error, largest) in
+            self.decades.iter().chain([&(time, self.windows.first().map_or(0.0, |w| w.0), self.largest)])
+        {
             println!("{time:10.3e} {error:11.2e} {largest:11.2e}");
         }
-        println!("\n{:>10} {:>11} {:>11} {:>8}   changes over windows", "window [s]", "rms", "/sqrt(t)", "number");
+        println!(
+            "\n{:>10} {:>11} {:>11} {:>8}   changes over windows",
+            "window [s]", "rms", "/sqrt(t)", "number"
+        );
         for (level, (_, squares, count)) in self.windows.iter().enumerate() {
             let (window, rms) = (SAMPLE * 4f64.powi(level as i32), (squares / *count as f64).sqrt());
             println!("{window:10.0} {rms:11.2e} {:11.2e} {count:8}", rms / window.sqrt());

@@ -1,6 +1,8 @@
-//! One motor scene, its start 1e-6 rad/s off, under four stabilizations: what each leaves of the constraint, and what it does to the energy.
+//! One motor scene, its start 1e-6 rad/s off, under four stabilizations: what each leaves of the constraint,
+//! and what it does to the energy.
 //!
-//! `cargo run --release --example stabilizations` integrates 100 s (give another horizon as the first argument) and writes `output/constraint_drift.png`.
+//! `cargo run --release --example stabilizations` integrates 100 s (give another horizon as the first
+//! argument) and writes `output/constraint_drift.png`.
 
 use driftless::arithmetic::DoubleDouble;
 use driftless::chart::{ConstraintDrift, DriftSeries, FILE_RESOLUTION, ResidualPanel, constraint_drift};
@@ -20,12 +22,21 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut outcomes = Vec::new();
     println!("{:12} {:>10} {:>10} {:>10} {:>14}", "", "|C| rad", "slope /s", "|C'| rad/s", "stabilizer J");
     for stabilize in Stabilization::ALL {
-        let request = Request { method: Some(MethodId::Dp8), stabilize: Some(stabilize), until: Some(until), ..Request::default() };
+        let request = Request {
+            method: Some(MethodId::Dp8),
+            stabilize: Some(stabilize),
+            until: Some(until),
+            ..Request::default()
+        };
         let plan = Plan::new(&scene, &mechanism, &request)?;
-        let outcome = integrate(Run::new(mechanism.clone(), plan, Limits::default(), &start)?, &mut |_| Ok(()))?;
+        let outcome =
+            integrate(Run::new(mechanism.clone(), plan, Limits::default(), &start)?, &mut |_| Ok(()))?;
         let [position, velocity] = &outcome.drift.constraints[0].1;
         let figures = [position.max, position.slope(), velocity.max];
-        println!("{stabilize:12} {:10.1e} {:10.1e} {:10.1e} {:14.1e}", figures[0], figures[1], figures[2], outcome.drift.stabilizer);
+        println!(
+            "{stabilize:12} {:10.1e} {:10.1e} {:10.1e} {:14.1e}",
+            figures[0], figures[1], figures[2], outcome.drift.stabilizer
+        );
         outcomes.push(outcome);
     }
     let chart = ConstraintDrift {

@@ -1,6 +1,8 @@
-//! Energy drift of the Taylor method on `free`: mean, its standard error, and root mean square over starts a little apart.
+//! Energy drift of the Taylor method on `free`: mean, its standard error, and root mean square over starts a
+//! little apart.
 //!
-//! `cargo run --release --example taylor_drift -- [SECONDS [STARTS [TOLERANCE]]] [extended]`; energies in double-double, divided by the scene's energy scale.
+//! `cargo run --release --example taylor_drift -- [SECONDS [STARTS [TOLERANCE]]] [extended]`; energies in
+//! double-double, divided by the scene's energy scale.
 
 use driftless::arithmetic::DoubleDouble;
 use driftless::dynamics::elimination::Elimination;
@@ -12,13 +14,18 @@ use std::sync::Arc;
 use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let (settings, numbers): (Vec<String>, Vec<String>) = std::env::args().skip(1).partition(|word| word == "extended");
+    let (settings, numbers): (Vec<String>, Vec<String>) =
+        std::env::args().skip(1).partition(|word| word == "extended");
     let numbers: Vec<f64> = numbers.iter().map(|word| word.parse()).collect::<Result<_, _>>()?;
     let extended = !settings.is_empty();
     let until = numbers.first().copied().unwrap_or(1e4);
     let starts = numbers.get(1).map_or(16, |&count| count as usize);
     let tolerance = numbers.get(2).copied().unwrap_or(if extended { 1e-21 } else { 1e-19 });
-    let times: Vec<f64> = (0..).map(|i| 10f64.powf(3.0 + 0.5 * f64::from(i))).take_while(|&t| t < 0.99 * until).chain([until]).collect();
+    let times: Vec<f64> = (0..)
+        .map(|i| 10f64.powf(3.0 + 0.5 * f64::from(i)))
+        .take_while(|&t| t < 0.99 * until)
+        .chain([until])
+        .collect();
     let mut errors = vec![Vec::new(); times.len()];
     let begin = Instant::now();
     for start in 0..starts {
@@ -37,7 +44,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         };
         let first = energy(&mut problem, &state);
         for (&time, errors) in times.iter().zip(&mut errors) {
-            method.advance(&mut problem, &mut state, Time::from(time), &mut Default::default(), &mut |_, _| Ok(Seen::Kept))?;
+            method.advance(
+                &mut problem,
+                &mut state,
+                Time::from(time),
+                &mut Default::default(),
+                &mut |_, _| Ok(Seen::Kept),
+            )?;
             errors.push((energy(&mut problem, &state) - first).hi / mechanism.energy_scale);
         }
     }

@@ -14,6 +14,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let outcome = simulate(&scene, &request, &mut |_| Ok(()))?;
     println!("{} steps, {} evaluations", outcome.statistics.steps, outcome.statistics.evaluations);
     println!("energy drifted by {:.1e} of its scale", outcome.drift.energy.max);
-    std::fs::write("output/free_angles.png", draw(Chart::Angles, &scene, &Mechanism::new(&scene)?, &outcome)?)?;
+    std::fs::write(
+        "output/free_angles.png",
+        draw(Chart::Angles, &scene, &Mechanism::new(&scene)?, &outcome)?,
+    )?;
     Ok(())
 }

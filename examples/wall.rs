@@ -19,7 +19,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             first.impulse, first.energy_lost, outcome.impact_count, outcome.last.t, outcome.drift.energy.max
         );
         if restitution == 0.5 {
-            std::fs::write("output/wall.png", draw(Chart::Mechanism, &scene, &Mechanism::new(&scene)?, &outcome)?)?;
+            std::fs::write(
+                "output/wall.png",
+                draw(Chart::Mechanism, &scene, &Mechanism::new(&scene)?, &outcome)?,
+            )?;
         }
     }
     Ok(())

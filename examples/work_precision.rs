@@ -1,7 +1,8 @@
 //! Which method for which error: all of them on a scene, at all their settings, in one picture.
 //!
-//! `cargo run --release --example work_precision -- [SCENE] [SECONDS] [PICTURE]` spends so many seconds on a scene of `examples/scenes/` (`free`, 5) and
-//! draws error against run time into `output/work_precision.png`, or to where else the picture shall be.
+//! `cargo run --release --example work_precision -- [SCENE] [SECONDS] [PICTURE]` spends so many seconds on a
+//! scene of `examples/scenes/` (`free`, 5) and draws error against run time into `output/work_precision.png`,
+//! or to where else the picture shall be.
 
 use driftless::chart::work_precision;
 use driftless::dynamics::Mechanism;

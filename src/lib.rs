@@ -2,8 +2,8 @@
 #![warn(missing_docs)]
 //! Long-horizon integration of planar mechanisms with constraint stabilization.
 //!
-//! A *scene* (bars, hinges, springs, motors, walls) is compiled into equations of motion; a method integrates them; drift of energy and constraints
-//! is watched on the way and reported with the result.
+//! A *scene* (bars, hinges, springs, motors, walls) is compiled into equations of motion; a method integrates
+//! them; drift of energy and constraints is watched on the way and reported with the result.
 //!
 //! ```
 //! use driftless::{MethodId, Simulation, read_scene};
@@ -33,7 +33,8 @@
 //!
 //! # The rooms, in reading order
 //!
-//! Each uses only those before it.  What stands on a room's page is for users; its modules are for those who work on the crate, and may change.
+//! Each uses only those before it.  What stands on a room's page is for users; its modules are for those who
+//! work on the crate, and may change.
 //!
 //! | module | holds |
 //! | --- | --- |
@@ -49,8 +50,9 @@
 //!
 //! # Features
 //!
-//! `cli`, `charts` and `threads` (sweeps on several of them) are on by default; `default-features = false` leaves the core.  [`source_problem`] has the problem everything began with, its
-//! published numbers and its errata.
+//! `cli`, `charts` and `threads` (sweeps on several of them) are on by default; `default-features = false`
+//! leaves the core.  [`source_problem`] has the problem everything began with, its published numbers and its
+//! errata.
 //!
 //! Units are SI throughout, angles in radians, absolute, from +x, counter-clockwise.
 
@@ -75,8 +77,9 @@ pub use dynamics::{Configuration, Mechanism, Motion, OdeSystem, State, Time};
 pub use error::Error;
 pub use run::trust::Level;
 pub use run::{
-    Action, Change, Custom, Direction, Drift, Event, EventRecord, Limits, MethodId, Observer, Outcome, Plan, Problem, Request, Run,
-    Running, Sample, Snapshot, Stabilization, Step, Sweep, Trajectory, Trust, compare, reference,
+    Action, Change, Custom, Direction, Drift, Event, EventRecord, Limits, MethodId, Observer, Outcome, Plan,
+    Problem, Request, Run, Running, Sample, Snapshot, Stabilization, Step, Sweep, Trajectory, Trust, compare,
+    reference,
 };
 pub use scene::{Scene, SceneBuilder, Template, ground, on, parse_scene, read_scene};
 pub use simulation::Simulation;

@@ -6,14 +6,17 @@ use crate::dynamics::force::{Force, UserForce};
 use crate::dynamics::{Mechanism, Motion};
 use crate::run::trajectory::{Recorder, Trajectory};
 use crate::run::trust::Level;
-use crate::run::{Custom, Event, Limits, MethodId, Observer, Outcome, Plan, Request, Run, Running, Sample, Stabilization, integrate};
+use crate::run::{
+    Custom, Event, Limits, MethodId, Observer, Outcome, Plan, Request, Run, Running, Sample, Stabilization,
+    integrate,
+};
 use crate::scene::Scene;
 use std::sync::Arc;
 
 /// A scene about to be integrated.
 ///
-/// What is not said is decided as by the program: the method by the scene and the horizon, the tolerance by the method, the stabilization by the
-/// constraints.
+/// What is not said is decided as by the program: the method by the scene and the horizon, the tolerance by
+/// the method, the stabilization by the constraints.
 ///
 /// ```
 /// use driftless::{Configuration, Force, Loads, MethodId, Scalar, Simulation, Site, read_scene};
@@ -200,7 +203,10 @@ impl Simulation {
     /// A request that makes no sense for the scene, or a method that cannot begin there.
     pub fn prepare(self) -> Result<Run, Error> {
         // An adaptive method stands for what is not known of the integrator.
-        let stand_in = Request { method: self.request.method.or(self.integrator.as_ref().map(|_| MethodId::Dp8)), ..self.request };
+        let stand_in = Request {
+            method: self.request.method.or(self.integrator.as_ref().map(|_| MethodId::Dp8)),
+            ..self.request
+        };
         let mut plan = Plan::new(&self.scene, &self.mechanism, &stand_in)?;
         if let Some(integrator) = self.integrator {
             plan = plan.integrated_by(integrator);
@@ -242,7 +248,10 @@ impl Simulation {
     ///
     /// # Errors
     /// Those of [`run`](Self::run), and what the observer failed with.
-    pub fn run_with(self, mut observer: impl FnMut(&Sample) -> std::io::Result<()>) -> Result<Outcome, Error> {
+    pub fn run_with(
+        self,
+        mut observer: impl FnMut(&Sample) -> std::io::Result<()>,
+    ) -> Result<Outcome, Error> {
         Ok(integrate(self.prepare()?, &mut observer)?)
     }
 }

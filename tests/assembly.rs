@@ -1,4 +1,5 @@
-//! The start of scenes with loops, sliders and free bodies: kept where given, found where not, refused where impossible or ambiguous.
+//! The start of scenes with loops, sliders and free bodies: kept where given, found where not, refused where
+//! impossible or ambiguous.
 
 use crate::common;
 
@@ -79,12 +80,18 @@ fn every_shipped_scene_closes_to_the_last_place_of_a_pair() {
         assert!(position < 1e-28 && slip < 1e-24, "{name}: {position:e} {slip:e}");
         assert_eq!(mechanism.assembly.degrees_of_freedom, freedom, "{name}");
         assert!(mechanism.assembly.redundant.is_empty() && mechanism.assembly.singular.is_empty(), "{name}");
-        let changes: Vec<&str> = mechanism.assembly.changes.iter().map(|change| change.body.as_str()).collect();
+        let changes: Vec<&str> =
+            mechanism.assembly.changes.iter().map(|change| change.body.as_str()).collect();
         assert_eq!(changes, changed, "{name}");
         // The given digits that fit stay, but for rounding.
-        for ((phi, omega), (start, k)) in found(&mechanism, &scene).into_iter().zip(scene.start.iter().zip(0..)) {
+        for ((phi, omega), (start, k)) in
+            found(&mechanism, &scene).into_iter().zip(scene.start.iter().zip(0..))
+        {
             let given = scene.given.get(k).is_none_or(|given| given.phi && given.omega);
-            assert!(!given || ((phi - start.phi).abs() < 1e-15 && (omega - start.omega).abs() < 1e-14), "{name} {k}");
+            assert!(
+                !given || ((phi - start.phi).abs() < 1e-15 && (omega - start.omega).abs() < 1e-14),
+                "{name} {k}"
+            );
         }
     }
 }
@@ -103,12 +110,18 @@ fn the_start_of_a_tree_keeps_its_bits() {
 
 #[test]
 fn a_four_bar_follows_from_its_crank_and_a_rough_coupler() {
-    let scene = with("four_bar_motor", json!({"motors": [], "start": {"crank": {"phi": 1.1, "omega": 2}, "coupler": {"phi": 0.5}}}));
+    let scene = with(
+        "four_bar_motor",
+        json!({"motors": [], "start": {"crank": {"phi": 1.1, "omega": 2}, "coupler": {"phi": 0.5}}}),
+    );
     let mechanism = compiled(&scene);
     let [crank, coupler, rocker] = found(&mechanism, &scene)[..] else { panic!("three bars") };
     assert_eq!(crank, (1.1, 2.0), "what can be kept is kept to the last bit");
     let [change] = &mechanism.assembly.changes[..] else { panic!("one change") };
-    assert_eq!((change.body.as_str(), change.quantity.as_str(), change.given, change.used), ("coupler", "phi", 0.5, coupler.0));
+    assert_eq!(
+        (change.body.as_str(), change.quantity.as_str(), change.given, change.used),
+        ("coupler", "phi", 0.5, coupler.0)
+    );
     // By the cosine rule in the triangle of the coupler, the rocker and the diagonal.
     let diagonal = Complex::new(1.0 - 0.3 * 1.1_f64.cos(), -0.3 * 1.1_f64.sin());
     let length = diagonal.norm_squared().sqrt();
@@ -116,21 +129,31 @@ fn a_four_bar_follows_from_its_crank_and_a_rough_coupler() {
     assert!((coupler.0 - (diagonal.im.atan2(diagonal.re) + opening)).abs() < 1e-14);
     assert!(left(&mechanism, &scene)[0] < 1e-28);
     // The rocker's rate from the velocity of the coupler's end.
-    let end = |phi: f64, length: f64, omega: f64| Complex::new(-length * omega * phi.sin(), length * omega * phi.cos());
+    let end = |phi: f64, length: f64, omega: f64| {
+        Complex::new(-length * omega * phi.sin(), length * omega * phi.cos())
+    };
     let slip = end(1.1, 0.3, 2.0) + end(coupler.0, 0.9, coupler.1) - end(rocker.0, 0.7, rocker.1);
     assert!(slip.norm_squared().sqrt() < 1e-14);
 
     // A guess near the other branch finds that one.
-    let other = with("four_bar_motor", json!({"motors": [], "start": {"crank": {"phi": 1.1}, "coupler": {"phi": -1.1}}}));
+    let other = with(
+        "four_bar_motor",
+        json!({"motors": [], "start": {"crank": {"phi": 1.1}, "coupler": {"phi": -1.1}}}),
+    );
     let mechanism = compiled(&other);
     assert!((found(&mechanism, &other)[1].0 - (diagonal.im.atan2(diagonal.re) - opening)).abs() < 1e-14);
-    assert!(found(&mechanism, &other).iter().all(|(_, omega)| *omega == 0.0), "rates that nothing gives are the smallest");
+    assert!(
+        found(&mechanism, &other).iter().all(|(_, omega)| *omega == 0.0),
+        "rates that nothing gives are the smallest"
+    );
 }
 
 #[test]
 fn two_starts_are_no_start() {
     let scene = with("four_bar_motor", json!({"start": {}}));
-    let CompileError::Ambiguous { what, one, other, .. } = refused(&scene) else { panic!("{:?}", refused(&scene)) };
+    let CompileError::Ambiguous { what, one, other, .. } = refused(&scene) else {
+        panic!("{:?}", refused(&scene))
+    };
     assert!(["start.coupler.phi", "start.rocker.phi"].contains(&what.as_str()), "{what}");
     assert!((one - other).abs() > 0.5, "{one} {other}");
     let words = refused(&scene).to_string();
@@ -143,11 +166,17 @@ fn two_starts_are_no_start() {
     let mechanism = compiled(&ladder);
     let bars = found(&mechanism, &ladder);
     // All are given, so that all change, as little as may be.
-    assert!(bars[..3].iter().all(|bar| (bar.0 - 1.2).abs() < 1e-9 && (bar.0 - bars[0].0).abs() < 1e-14 && (bar.1 + 1.0).abs() < 1e-14));
+    assert!(bars[..3].iter().all(|bar| (bar.0 - 1.2).abs() < 1e-9
+        && (bar.0 - bars[0].0).abs() < 1e-14
+        && (bar.1 + 1.0).abs() < 1e-14));
     let rough = json!({"U0": {"phi": 1.2, "omega": -1}, "U1": {"phi": 1.3}, "U2": {"phi": 1.1}});
     let ladder = with("four_bars", json!({"start": rough}));
     let bars = found(&compiled(&ladder), &ladder);
-    assert!(bars[0].0 == 1.2 && bars[..3].iter().all(|bar| (bar.0 - 1.2).abs() < 1e-14) && bars[3].0.abs() < 1e-14);
+    assert!(
+        bars[0].0 == 1.2
+            && bars[..3].iter().all(|bar| (bar.0 - 1.2).abs() < 1e-14)
+            && bars[3].0.abs() < 1e-14
+    );
 }
 
 #[test]
@@ -161,7 +190,9 @@ fn impossible_starts_name_the_row() {
         {"name": "C", "between": [{"body": "ground", "point": [3, 0]}, {"body": "rocker", "point": [0, 0]}]}
     ], "start": {}}),
     );
-    let CompileError::Impossible { row, left, unit } = refused(&short) else { panic!("{:?}", refused(&short)) };
+    let CompileError::Impossible { row, left, unit } = refused(&short) else {
+        panic!("{:?}", refused(&short))
+    };
     assert!(["B.x", "B.y", "C.x", "C.y"].contains(&row.as_str()) && unit == "m", "{row}");
     assert!((0.3..2.0).contains(&left), "the loop stays open: {left}");
     // What is given is too far from any start to be a rough guess.
@@ -173,7 +204,9 @@ fn impossible_starts_name_the_row() {
         "slider_crank_torque",
         json!({"torques": [], "motors": drive, "start": {"crank": {"phi": 0}, "rod": {"phi": 0}, "block": {"phi": 0}}}),
     );
-    let CompileError::ImpossibleRates { row, left, .. } = refused(&dead) else { panic!("{:?}", refused(&dead)) };
+    let CompileError::ImpossibleRates { row, left, .. } = refused(&dead) else {
+        panic!("{:?}", refused(&dead))
+    };
     assert!(row == "push" && (left - 1.0).abs() < 1e-9, "{row} {left}");
 }
 
@@ -203,12 +236,18 @@ fn a_free_body_takes_its_place_from_any_origin_of_its_group() {
     );
     assert_eq!((mechanism.assembly.degrees_of_freedom, mechanism.assembly.changes.len()), (4, 0));
     // Off its rail, the cart goes there, and the rest of what is given stays.
-    let off = with("cart_pole", json!({"start": {"cart": {"phi": 0, "origin": [1, 0.25], "velocity": [3, 0]}, "pole": {"phi": 1.5}}}));
+    let off = with(
+        "cart_pole",
+        json!({"start": {"cart": {"phi": 0, "origin": [1, 0.25], "velocity": [3, 0]}, "pole": {"phi": 1.5}}}),
+    );
     let mechanism = compiled(&off);
     let start = mechanism.start(&off);
     assert_eq!((start.phi[1].hi, start.phi[2].hi, start.omega[2].hi), (1.5, 1.0, 3.0));
     assert!(start.phi[3].hi.abs() < 1e-28);
-    assert_eq!(mechanism.assembly.changes.iter().map(|change| change.quantity.as_str()).collect::<Vec<_>>(), ["origin.y"]);
+    assert_eq!(
+        mechanism.assembly.changes.iter().map(|change| change.quantity.as_str()).collect::<Vec<_>>(),
+        ["origin.y"]
+    );
 }
 
 /// Three equal uprights under one beam.
@@ -238,7 +277,12 @@ fn a_third_leg_is_redundant_and_a_straight_line_is_singular() {
     assert_eq!((mechanism.constraints.len(), assembly.degrees_of_freedom), (4, 1));
     assert_eq!(assembly.redundant.len(), 1, "{:?}", assembly.redundant);
     assert!(assembly.redundant[0].starts_with("top_right") && assembly.singular.is_empty(), "{assembly:?}");
-    assert!(found(&mechanism, &scene).iter().zip([1.0, 1.0, 1.0, 0.0]).all(|(bar, omega)| (bar.1 - omega).abs() < 1e-14));
+    assert!(
+        found(&mechanism, &scene)
+            .iter()
+            .zip([1.0, 1.0, 1.0, 0.0])
+            .all(|(bar, omega)| (bar.1 - omega).abs() < 1e-14)
+    );
     // Folded, one more row says nothing new, but only there.
     let open = refused(&table(all(0.0)));
     assert!(
@@ -251,9 +295,14 @@ fn a_third_leg_is_redundant_and_a_straight_line_is_singular() {
     let assembly = &mechanism.assembly;
     assert_eq!((assembly.redundant.len(), assembly.degrees_of_freedom), (1, 1), "{assembly:?}");
     assert!(!assembly.singular.is_empty(), "{assembly:?}");
-    let kite = with("kite", json!({"start": {"crank": {"phi": 0}, "coupler": {"phi": PI}, "rocker": {"phi": PI}}}));
+    let kite =
+        with("kite", json!({"start": {"crank": {"phi": 0}, "coupler": {"phi": PI}, "rocker": {"phi": PI}}}));
     let assembly = self::assembly(&kite);
-    assert_eq!((assembly.redundant.len(), assembly.singular.len(), assembly.degrees_of_freedom), (0, 1, 1), "{assembly:?}");
+    assert_eq!(
+        (assembly.redundant.len(), assembly.singular.len(), assembly.degrees_of_freedom),
+        (0, 1, 1),
+        "{assembly:?}"
+    );
     let equal = with(
         "slider_crank_equal",
         json!({"start": {"crank": {"phi": FRAC_PI_2, "omega": 1}, "rod": {"phi": -FRAC_PI_2, "omega": -1}, "block": {"phi": 0, "omega": 0}}}),
@@ -269,7 +318,12 @@ fn rounded_digits_change_as_little_as_may_be() {
     let scene = with("andrews", json!({"start": rounded}));
     let mechanism = compiled(&scene);
     assert!(left(&mechanism, &scene)[0] < 1e-28);
-    let most = mechanism.assembly.changes.iter().map(|change| (change.used - change.given).abs()).fold(0.0, f64::max);
+    let most = mechanism
+        .assembly
+        .changes
+        .iter()
+        .map(|change| (change.used - change.given).abs())
+        .fold(0.0, f64::max);
     assert!(most < 2e-4 && !mechanism.assembly.changes.is_empty(), "{most}");
 }
 
@@ -293,8 +347,15 @@ fn a_weld_keeps_the_angle_that_was_found() {
 fn springs_and_walls_are_looked_at_where_the_start_is_found() {
     let wall = |normal: [f64; 2]| json!([{"name": "w", "body": "rocker", "point": [0.7, 0], "line": {"through": [0.8, 0], "normal": normal}, "restitution": 1}]);
     assert!(Mechanism::new(&with("four_bar_motor", json!({"walls": wall([1.0, 0.0])}))).is_ok());
-    let CompileError::BehindWall { wall, gap } = refused(&with("four_bar_motor", json!({"walls": wall([-1.0, 0.0])}))) else { panic!() };
+    let CompileError::BehindWall { wall, gap } =
+        refused(&with("four_bar_motor", json!({"walls": wall([-1.0, 0.0])})))
+    else {
+        panic!()
+    };
     assert!(wall == "w" && gap > 0.0);
     let ends = json!([{"name": "s", "between": [{"body": "coupler", "point": [0.9, 0]}, {"body": "rocker", "point": [0.7, 0]}], "stiffness": 1, "free_length": 0.1}]);
-    assert_eq!(refused(&with("four_bar_motor", json!({"springs": ends}))), CompileError::SpringWithoutLength("s".into()));
+    assert_eq!(
+        refused(&with("four_bar_motor", json!({"springs": ends}))),
+        CompileError::SpringWithoutLength("s".into())
+    );
 }

@@ -1,4 +1,5 @@
-//! The motion of runs against an independent simulator; see `tests/auditor/mod.rs`.  `.ci/audit PAIRS SEED` compares more pairs.
+//! The motion of runs against an independent simulator; see `tests/auditor/mod.rs`.  `.ci/audit PAIRS SEED`
+//! compares more pairs.
 
 #[path = "auditor/mod.rs"]
 mod auditor;
@@ -26,7 +27,8 @@ fn folder() {
     let folder = std::env::var("AUDIT_FOLDER").unwrap_or_else(|_| "examples/scenes".into());
     let most = std::env::var("AUDIT_UNTIL").ok().and_then(|text| text.parse().ok()).unwrap_or(2.0);
     let only = std::env::var("AUDIT_METHOD").ok();
-    let mut paths: Vec<_> = std::fs::read_dir(&folder).expect("a folder").map(|entry| entry.expect("an entry").path()).collect();
+    let mut paths: Vec<_> =
+        std::fs::read_dir(&folder).expect("a folder").map(|entry| entry.expect("an entry").path()).collect();
     paths.sort();
     for path in paths.iter().filter(|path| path.extension().is_some_and(|kind| kind == "json")) {
         let text = shortened(&std::fs::read_to_string(path).expect("a scene"), most, 8.0);
@@ -52,7 +54,8 @@ fn folder() {
             if only.as_ref().is_some_and(|only| only != method.name) {
                 continue;
             }
-            let request = Request { method: Some(method.id), max_evaluations: Some(2_000_000), ..Request::default() };
+            let request =
+                Request { method: Some(method.id), max_evaluations: Some(2_000_000), ..Request::default() };
             let ran = match run(&text, &request) {
                 Ok(ran) => ran,
                 Err(why) => {
@@ -80,7 +83,8 @@ fn folder() {
 /// Random scenes by random methods: `PAIRS` and `SEED` say how many and which.
 #[test]
 fn motions_agree_with_the_auditor() {
-    let number = |name: &str, usual: u64| std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(usual);
+    let number =
+        |name: &str, usual: u64| std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(usual);
     let seed = number("SEED", 1);
     let summary = Summary::of(pairs(number("PAIRS", 300) as usize, seed));
     println!("{}", summary.text());
@@ -95,7 +99,8 @@ fn motions_agree_with_the_auditor() {
         std::fs::create_dir_all(&folder).expect("a folder");
         let others = summary.reported.values().chain(summary.unclear.values()).map(|(_, seed)| seed);
         for seed in summary.differing.iter().map(|(seed, ..)| seed).chain(others) {
-            std::fs::write(format!("{folder}/{seed}.json"), auditor::mechanisms::scene(*seed).text).expect("room");
+            std::fs::write(format!("{folder}/{seed}.json"), auditor::mechanisms::scene(*seed).text)
+                .expect("room");
         }
     }
     assert!(summary.differing.is_empty(), "{} pairs differ", summary.differing.len());
@@ -105,7 +110,9 @@ fn motions_agree_with_the_auditor() {
 fn record_of(text: &str) -> Result<Record, String> {
     let scene = Scene::read(text);
     let rows = (scene.until / scene.every).round();
-    let times: Vec<f64> = (0..=rows as usize).map(|row| if row as f64 == rows { scene.until } else { scene.every * row as f64 }).collect();
+    let times: Vec<f64> = (0..=rows as usize)
+        .map(|row| if row as f64 == rows { scene.until } else { scene.every * row as f64 })
+        .collect();
     let start = match start(scene.clone(), None) {
         Ok(start) => start,
         Err(_) => {
@@ -125,7 +132,9 @@ fn guess(sample: &driftless::run::Sample) -> auditor::model::State {
     let bodies = || 0..sample.centre.len();
     auditor::model::State {
         q: of(bodies().flat_map(|k| [sample.centre[k][0], sample.centre[k][1], sample.phi[k]]).collect()),
-        v: of(bodies().flat_map(|k| [sample.velocity[k][0], sample.velocity[k][1], sample.omega[k]]).collect()),
+        v: of(bodies()
+            .flat_map(|k| [sample.velocity[k][0], sample.velocity[k][1], sample.omega[k]])
+            .collect()),
         ..Default::default()
     }
 }

@@ -1,4 +1,5 @@
-//! Many trajectories in lanes: against double-double one by one, and independent of who integrates beside whom.
+//! Many trajectories in lanes: against double-double one by one, and independent of who integrates beside
+//! whom.
 
 use crate::common;
 
@@ -14,7 +15,12 @@ use std::sync::Arc;
 /// A chain of unequal bars, the first one's angle at the start moved by `shift` \[rad\].
 fn chain(bars: usize, shift: f64) -> Scene {
     let list = |item: &dyn Fn(usize) -> String| (0..bars).map(item).collect::<Vec<_>>().join(",");
-    let bar = |i: usize| format!(r#"{{"name":"b{i}","length":{},"width":0.05,"thickness":0.003,"density":670}}"#, 0.4 + 0.1 * i as f64);
+    let bar = |i: usize| {
+        format!(
+            r#"{{"name":"b{i}","length":{},"width":0.05,"thickness":0.003,"density":670}}"#,
+            0.4 + 0.1 * i as f64
+        )
+    };
     let hinge = |i: usize| {
         let near = if i == 0 {
             r#"{"body":"ground","point":[0,0]}"#.to_string()
@@ -23,8 +29,13 @@ fn chain(bars: usize, shift: f64) -> Scene {
         };
         format!(r#"{{"name":"h{i}","between":[{near},{{"body":"b{i}","point":[0,0]}}]}}"#)
     };
-    let start =
-        |i: usize| format!(r#""b{i}":{{"phi":{},"omega":{}}}"#, 1.5 - 0.3 * i as f64 + if i == 0 { shift } else { 0.0 }, 0.2 * i as f64);
+    let start = |i: usize| {
+        format!(
+            r#""b{i}":{{"phi":{},"omega":{}}}"#,
+            1.5 - 0.3 * i as f64 + if i == 0 { shift } else { 0.0 },
+            0.2 * i as f64
+        )
+    };
     let text = format!(
         r#"{{"name":"chain","gravity":[9.81,0],"bars":[{}],"hinges":[{}],"start":{{{}}},"until":1,"every":0.1}}"#,
         list(&bar),
@@ -47,17 +58,22 @@ fn one_to_four_bodies_agree_with_double_double() {
     for bars in 1..=4 {
         let scenes: Vec<Scene> = (0..9).map(|i| chain(bars, 0.05 * i as f64)).collect();
         let mechanisms: Vec<_> = scenes.iter().map(compile).collect();
-        let starts: Vec<State> = mechanisms.iter().zip(&scenes).map(|(mechanism, scene)| start(mechanism, scene)).collect();
+        let starts: Vec<State> =
+            mechanisms.iter().zip(&scenes).map(|(mechanism, scene)| start(mechanism, scene)).collect();
         for order in [16, 20, 24] {
             let mut members: Vec<BatchMember> =
                 mechanisms.iter().zip(&starts).map(|(m, state)| BatchMember::new(m, state.clone())).collect();
-            Batch::new(tight()).with_order(order).integrate(&mut members, Time::from(1.0), &mut |_, _| Going::On);
+            Batch::new(tight())
+                .with_order(order)
+                .integrate(&mut members, Time::from(1.0), &mut |_, _| Going::On);
             for (member, (mechanism, start)) in members.iter().zip(mechanisms.iter().zip(&starts)) {
                 let mut exact = start.clone();
                 let mut problem = Elimination::<0>::new(Arc::clone(mechanism));
                 let mut statistics = Default::default();
                 Taylor::reference()
-                    .advance(&mut problem, &mut exact, Time::from(1.0), &mut statistics, &mut |_, _| Ok(Seen::Kept))
+                    .advance(&mut problem, &mut exact, Time::from(1.0), &mut statistics, &mut |_, _| {
+                        Ok(Seen::Kept)
+                    })
                     .expect("an end");
                 assert!(member.stopped.is_none() && member.statistics.steps > 3);
                 assert_eq!((member.state.time, &member.state.turns), (exact.time, &exact.turns));
@@ -122,7 +138,9 @@ fn a_flip_is_found_within_its_step_and_ends_the_trajectory() {
     let mut problem = Elimination::<0>::new(Arc::clone(&mechanism));
     let mut state = start(&mechanism, &scene);
     let mut statistics = Default::default();
-    Taylor::reference().advance(&mut problem, &mut state, Time::from(time), &mut statistics, &mut |_, _| Ok(Seen::Kept)).expect("an end");
+    Taylor::reference()
+        .advance(&mut problem, &mut state, Time::from(time), &mut statistics, &mut |_, _| Ok(Seen::Kept))
+        .expect("an end");
     let apart = (state.y[body].abs() - target.abs()).abs();
     assert!(apart < 1e-10, "{apart:e}");
 }
@@ -142,17 +160,23 @@ fn one_bad_trajectory_leaves_the_others_alone() {
         BatchMember::new(&mechanism, good),
     ];
     Batch::new(tight()).integrate(&mut members, Time::from(2.0), &mut |_, _| Going::On);
-    let causes: Vec<_> = members.iter().map(|member| member.stopped.as_ref().map(|stop| stop.cause)).collect();
+    let causes: Vec<_> =
+        members.iter().map(|member| member.stopped.as_ref().map(|stop| stop.cause)).collect();
     assert_eq!(causes, [Some(Cause::NotFinite), Some(Cause::Unsuited), None, None]);
     assert_eq!(members[2].state, past);
     assert_eq!(members[3].state.time, Time::from(2.0));
     assert!(!Batch::takes(&motor) && Batch::takes(&mechanism));
 }
 
-/// Released from rest both bars horizontal only every fourth power is there; hanging, none; both upright, they stay.
+/// Released from rest both bars horizontal only every fourth power is there; hanging, none; both upright,
+/// they stay.
 #[test]
 fn symmetric_releases_and_equilibria_are_no_trap() {
-    let angles = [("1.5707963267948966", "1.5707963267948966"), ("0", "0"), ("3.141592653589793", "3.141592653589793")];
+    let angles = [
+        ("1.5707963267948966", "1.5707963267948966"),
+        ("0", "0"),
+        ("3.141592653589793", "3.141592653589793"),
+    ];
     for (phi1, phi2) in angles {
         let scene = shipped("free", &[&format!("start.bar1.phi={phi1}"), &format!("start.bar2.phi={phi2}")]);
         let mechanism = compile(&scene);

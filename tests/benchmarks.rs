@@ -1,7 +1,8 @@
-//! The double pendulum's instants: accelerations, joint forces, motor and guide multipliers at given positions, to twelve digits.
+//! The double pendulum's instants: accelerations, joint forces, motor and guide multipliers at given
+//! positions, to twelve digits.
 //!
-//! Numbers and their public source: `data/tudelft_double_pendulum_instants.json`.  Its sign rule: the force on bar 1 is minus the multiplier
-//! at A and minus the multiplier at B.
+//! Numbers and their public source: `data/tudelft_double_pendulum_instants.json`.  Its sign rule: the force
+//! on bar 1 is minus the multiplier at A and minus the multiplier at B.
 
 use crate::common;
 
@@ -21,7 +22,8 @@ fn numbers(value: &Value) -> Vec<f64> {
 fn check(case: &Value) {
     let name = case["case"].as_str().expect("a name");
     let start: Vec<Vec<f64>> = case["start"].as_array().expect("a list").iter().map(numbers).collect();
-    let mut scene = double_pendulum(Inertia::Slender, [(start[0][0], start[0][1]), (start[1][0], start[1][1])]);
+    let mut scene =
+        double_pendulum(Inertia::Slender, [(start[0][0], start[0][1]), (start[1][0], start[1][1])]);
     for bar in &mut scene.bars {
         bar.inertia = case["inertia"].as_f64().expect("a number");
     }
@@ -56,21 +58,31 @@ fn check(case: &Value) {
     // The first orders of the series are the same instants.
     let mut series = Series::<f64>::new(&mechanism, Coordinates::All, 8);
     series.expand(&mechanism, Default::default(), &phi, &[0.0; 2], &omega);
-    for (found, expected) in series.rate[2..4].iter().zip(&kernel.load).chain(series.multipliers(0).iter().zip(&kernel.multiplier)) {
-        assert!((found - expected).abs() <= 1e-12 * expected.abs().max(1.0), "{name}: {found} is not {expected} in the series");
-    }
-    for (what, found, expected) in
-        [("acceleration", accelerations, numbers(&case["accelerations"])), ("multiplier", multipliers, numbers(&case["multipliers"]))]
+    for (found, expected) in
+        series.rate[2..4].iter().zip(&kernel.load).chain(series.multipliers(0).iter().zip(&kernel.multiplier))
     {
+        assert!(
+            (found - expected).abs() <= 1e-12 * expected.abs().max(1.0),
+            "{name}: {found} is not {expected} in the series"
+        );
+    }
+    for (what, found, expected) in [
+        ("acceleration", accelerations, numbers(&case["accelerations"])),
+        ("multiplier", multipliers, numbers(&case["multipliers"])),
+    ] {
         assert_eq!(found.len(), expected.len(), "{name}");
         for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
-            assert!((found - expected).abs() <= 1e-12 * expected.abs().max(1.0), "{name}: {what} {i}: {found} is not {expected}");
+            assert!(
+                (found - expected).abs() <= 1e-12 * expected.abs().max(1.0),
+                "{name}: {what} {i}: {found} is not {expected}"
+            );
         }
     }
 }
 
 fn cases(guided: bool) -> Vec<Value> {
-    let file: Value = serde_json::from_str(include_str!("data/tudelft_double_pendulum_instants.json")).expect("valid JSON");
+    let file: Value =
+        serde_json::from_str(include_str!("data/tudelft_double_pendulum_instants.json")).expect("valid JSON");
     let all = file["cases"].as_array().expect("a list").clone();
     all.into_iter().filter(|case| case["guide"].is_object() == guided).collect()
 }
@@ -95,6 +107,10 @@ fn two_instants_with_a_guided_end() {
     let mut kernel = Kernel::<f64>::new(&mechanism);
     kernel.accelerate::<0>(&mechanism, start.time, &plain(&start.phi), &plain(&start.omega), Bias::default());
     let expected = numbers(&cases[1]["accelerations"]);
-    assert!((kernel.load[0] - expected[2]).abs() < 1e-11 && (kernel.load[1] - expected[5]).abs() < 1e-11, "{:?}", kernel.load);
+    assert!(
+        (kernel.load[0] - expected[2]).abs() < 1e-11 && (kernel.load[1] - expected[5]).abs() < 1e-11,
+        "{:?}",
+        kernel.load
+    );
     assert!((kernel.multiplier[0] - 0.14788575).abs() < 1e-13);
 }

@@ -1,8 +1,9 @@
 //! The same bits on every machine: the ends of shipped scenes by every kind of method, as hashes.
 //!
-//! A change of the arithmetic changes them; then the new ones are printed, and belong here with a word in the changelog.  They are the same with and without
-//! the processor's vectors, which is what is compared here; in a release build, whose program `.ci/bits release` takes; and in debug builds, with
-//! `target-cpu=native`, and on other processors, where `.ci/bits` runs this.
+//! A change of the arithmetic changes them; then the new ones are printed, and belong here with a word in the
+//! changelog.  They are the same with and without the processor's vectors, which is what is compared here; in
+//! a release build, whose program `.ci/bits release` takes; and in debug builds, with `target-cpu=native`,
+//! and on other processors, where `.ci/bits` runs this.
 
 mod common;
 #[cfg(feature = "cli")]
@@ -43,7 +44,9 @@ const ENDS: &[End] = &[
 
 /// FNV-1a over the bytes of doubles.
 fn hash(numbers: impl Iterator<Item = f64>) -> u64 {
-    numbers.flat_map(f64::to_le_bytes).fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+    numbers
+        .flat_map(f64::to_le_bytes)
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
 /// Which code is entered.
@@ -96,7 +99,9 @@ fn ends() {
 #[cfg(feature = "cli")]
 #[test]
 fn trajectories_have_the_bytes_they_always_had() {
-    let lines = include_str!("data/trajectories.sha256").lines().map(|line| line.split_once(' ').expect("a hash and a run"));
+    let lines = include_str!("data/trajectories.sha256")
+        .lines()
+        .map(|line| line.split_once(' ').expect("a hash and a run"));
     let mut changed = Vec::new();
     for (hash, line) in lines {
         let (name, _) = line.split_once(".json").expect("a scene");

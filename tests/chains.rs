@@ -1,4 +1,5 @@
-//! The equations body by body: against the matrices on random mechanisms, and on chains too long for matrices.
+//! The equations body by body: against the matrices on random mechanisms, and on chains too long for
+//! matrices.
 
 #[allow(dead_code)]
 #[path = "../examples/chain.rs"]
@@ -19,7 +20,8 @@ use proptest::prelude::*;
 use std::sync::Arc;
 use trees::{Dice, tree};
 
-/// Whole multiples of 1/256, so that masses times squares of lengths are exact and both forms have the same constants.
+/// Whole multiples of 1/256, so that masses times squares of lengths are exact and both forms have the same
+/// constants.
 fn shorten(scene: &mut Scene) {
     let short = |x: &mut f64| *x = (*x * 256.0).round() / 256.0;
     scene.gravity.iter_mut().for_each(short);
@@ -33,7 +35,8 @@ fn shorten(scene: &mut Scene) {
     hinges.chain(springs).for_each(|place| place.point.iter_mut().for_each(short));
 }
 
-/// A tree, or two of which one hangs on nothing, with motors and loads where the dice say so, then loops, rails and slots.
+/// A tree, or two of which one hangs on nothing, with motors and loads where the dice say so, then loops,
+/// rails and slots.
 ///
 /// The rows are added to the compiled mechanism, whose start need not close them.
 fn mechanism(n: usize, seed: u64) -> (Scene, Mechanism) {
@@ -45,7 +48,8 @@ fn mechanism(n: usize, seed: u64) -> (Scene, Mechanism) {
         scene.given = vec![Given { phi: true, omega: true, origin: None, velocity: None }; n];
         for place in cut.between {
             if let Some(bar) = place.bar {
-                (scene.given[bar].origin, scene.given[bar].velocity) = (Some([0.5, -0.25]), Some([0.75, 1.0]));
+                (scene.given[bar].origin, scene.given[bar].velocity) =
+                    (Some([0.5, -0.25]), Some([0.75, 1.0]));
                 break;
             }
         }
@@ -62,7 +66,14 @@ fn mechanism(n: usize, seed: u64) -> (Scene, Mechanism) {
             free_angle: 0.5,
             damping: 0.25,
         });
-        scene.forces.push(Force { name: "f".into(), bar: n - 1, point: point(&mut dice), force: [1.0, -2.0], follows: true, law: None });
+        scene.forces.push(Force {
+            name: "f".into(),
+            bar: n - 1,
+            point: point(&mut dice),
+            force: [1.0, -2.0],
+            follows: true,
+            law: None,
+        });
         scene.torques.push(Torque { name: "m".into(), bar: 0, relative_to, torque: 0.75, law: None });
     }
     shorten(&mut scene);
@@ -111,7 +122,8 @@ fn difference<T: Real>(found: &[T], expected: &[T]) -> f64 {
     found.iter().zip(expected).fold(0.0, |most: f64, (&a, &b)| most.max((a - b).value().abs() / largest))
 }
 
-/// Both forms in double-double and the recursive one in double: differences of accelerations and multipliers, and the pivots' smallest share.
+/// Both forms in double-double and the recursive one in double: differences of accelerations and multipliers,
+/// and the pivots' smallest share.
 fn compare((scene, mechanism): &(Scene, Mechanism)) -> Option<([f64; 4], usize)> {
     let (dense, bodywise) = (mechanism.by_matrices()?, mechanism.body_by_body());
     let start = mechanism.start(scene);
@@ -172,7 +184,10 @@ fn expand<T: Coefficient>(mechanism: &Mechanism, scene: &Scene, order: usize) ->
         .map(|m| {
             let elements = series.z[(m + 2) * n..(m + 3) * n].iter().flat_map(|z| [z.re, z.im]);
             let rates = &series.rate[(m + 1) * n..(m + 2) * n];
-            elements.chain(rates.iter().chain(series.multipliers(m)).copied()).chain([series.power[m]]).collect()
+            elements
+                .chain(rates.iter().chain(series.multipliers(m)).copied())
+                .chain([series.power[m]])
+                .collect()
         })
         .collect()
 }
@@ -186,7 +201,8 @@ fn part<T: Real>(found: &[Vec<T>], expected: &[Vec<T>]) -> f64 {
     found.iter().zip(expected).map(of_power).fold(0.0, f64::max)
 }
 
-/// With every kind of row and load, translational coordinates, and more and fewer bodies than lanes: in double-double the same to its rounding, in double to that.
+/// With every kind of row and load, translational coordinates, and more and fewer bodies than lanes: in
+/// double-double the same to its rounding, in double to that.
 #[test]
 fn series_body_by_body_are_those_of_the_matrices() {
     let (mut compared, mut rows, mut worst) = (0, 0, [0.0_f64; 2]);
@@ -210,7 +226,9 @@ fn series_body_by_body_are_those_of_the_matrices() {
 
 /// A chain of `n` links, bent and in motion.
 fn chain(n: usize) -> Scene {
-    let start = (0..n).map(|k| Start { phi: (0.03 * k as f64).sin(), omega: 2.0 * (0.07 * k as f64).cos() }).collect();
+    let start = (0..n)
+        .map(|k| Start { phi: (0.03 * k as f64).sin(), omega: 2.0 * (0.07 * k as f64).cos() })
+        .collect();
     Scene { start, until: 0.01, every: 0.01, ..hanging::chain(n, 0.0) }
 }
 
@@ -244,7 +262,8 @@ fn every_link_of_a_very_long_chain_is_in_balance() {
 fn hinge_forces_are_the_multipliers_of_pins() {
     let mut scene = chain(12);
     let hung = Mechanism::new(&scene).expect("equations").body_by_body();
-    // The lower half hangs on nothing but a loop's rows: its first link comes before the hinge that would carry it.
+    // The lower half hangs on nothing but a loop's rows: its first link comes before the hinge that would
+    // carry it.
     let cut = 6;
     let between = scene.hinges[cut].between;
     scene.hinges.remove(cut);
@@ -278,7 +297,9 @@ fn the_power_of_a_form_is_the_rate_of_its_energy() {
         let (scene, mechanism) = mechanism(4 + seed as usize % 5, seed);
         let mechanism = Arc::new(mechanism.body_by_body());
         let start = mechanism.start(&scene);
-        if evaluate(&mechanism, &start.phi, &start.omega, Bias::default()).weakest.share < 1e-3 || mechanism.has_closed_loops() {
+        if evaluate(&mechanism, &start.phi, &start.omega, Bias::default()).weakest.share < 1e-3
+            || mechanism.has_closed_loops()
+        {
             continue;
         }
         let mut form = Multiplier::<0, true>::new(Arc::clone(&mechanism));
@@ -289,7 +310,8 @@ fn the_power_of_a_form_is_the_rate_of_its_energy() {
         let mut kernel = Kernel::<DoubleDouble>::without_rows(&mechanism);
         let h = DoubleDouble::of(1e-9);
         let mut at = |sign: f64| {
-            let moved: Vec<DoubleDouble> = (0..2 * n).map(|i| state.unknown(i) + h.scale(sign * rate[i])).collect();
+            let moved: Vec<DoubleDouble> =
+                (0..2 * n).map(|i| state.unknown(i) + h.scale(sign * rate[i])).collect();
             mechanism.energy(&mut kernel, &moved[..n], &moved[n..]).total()
         };
         let power = ((at(1.0) - at(-1.0)) / h).scale(0.5).hi;
@@ -333,15 +355,20 @@ fn a_very_long_chain_runs_and_says_what_it_does_not_take() {
     assert!(outcome.drift.energy.max < 1e-9, "{:e}", outcome.drift.energy.max);
     let mechanism = Mechanism::new(&scene).expect("equations");
     for method in [MethodId::Taylor, MethodId::Gauss(4)] {
-        let refusal = Plan::new(&scene, &mechanism, &Request { method: Some(method), ..Request::default() }).expect_err("too large");
-        assert!(refusal.to_string().contains("3000 coordinates") && refusal.alternative.contains("dop853"), "{refusal}");
+        let refusal = Plan::new(&scene, &mechanism, &Request { method: Some(method), ..Request::default() })
+            .expect_err("too large");
+        assert!(
+            refusal.to_string().contains("3000 coordinates") && refusal.alternative.contains("dop853"),
+            "{refusal}"
+        );
     }
     let plan = Plan::new(&scene, &mechanism, &Request::default()).expect("a plan");
     assert_eq!((plan.method, plan.stabilization), (MethodId::Dop853, Stabilization::None));
     // Where there are matrices the series does without them, too, and takes fewer steps.
     for n in [20, 200] {
         let scene = chain(n);
-        let plan = Plan::new(&scene, &Mechanism::new(&scene).expect("equations"), &Request::default()).expect("a plan");
+        let plan = Plan::new(&scene, &Mechanism::new(&scene).expect("equations"), &Request::default())
+            .expect("a plan");
         assert_eq!(plan.method, MethodId::Taylor);
     }
 }

@@ -17,7 +17,12 @@ fn words(text: &[&str]) -> Vec<String> {
 fn torque(time: Vec<f64>, torque: Vec<f64>) -> TorquePower {
     let power = torque.iter().map(|v| 6.0 * v).collect();
     let motors = vec![MotorSeries { name: "motor".to_owned(), time, torque, power }];
-    TorquePower { title: "Motor torque and power".to_owned(), caption: words(&["scene motor", "dop853"]), motors, horizon: None }
+    TorquePower {
+        title: "Motor torque and power".to_owned(),
+        caption: words(&["scene motor", "dop853"]),
+        motors,
+        horizon: None,
+    }
 }
 
 fn drift(method: &str, time: Vec<f64>, error: Vec<f64>) -> DriftSeries {
@@ -47,7 +52,10 @@ fn pose(phi: [f64; 2], rate: f64) -> Pose {
 fn sketch() -> Sketch {
     Sketch {
         gravity: [9.81, 0.0],
-        hinges: vec![HingeSketch { name: "A".to_owned(), ground: true }, HingeSketch { name: "B".to_owned(), ground: false }],
+        hinges: vec![
+            HingeSketch { name: "A".to_owned(), ground: true },
+            HingeSketch { name: "B".to_owned(), ground: false },
+        ],
         springs: vec![SpringSketch { ground: [true, false] }],
         walls: vec![WallSketch { through: [1.3, 0.0], normal: [-1.0, 0.0] }],
         points: words(&["C"]),
@@ -55,7 +63,10 @@ fn sketch() -> Sketch {
 }
 
 fn pendulum() -> MechanismChart {
-    let trail = times(300, 0.01).iter().map(|t| pose([1.2 * t.cos(), 1.5 * (1.7 * t).sin()], 1.0).points[0]).collect();
+    let trail = times(300, 0.01)
+        .iter()
+        .map(|t| pose([1.2 * t.cos(), 1.5 * (1.7 * t).sin()], 1.0).points[0])
+        .collect();
     MechanismChart {
         title: "Path of the free end C".to_owned(),
         caption: words(&["scene both", "last 3 s"]),
@@ -70,8 +81,14 @@ fn pendulum() -> MechanismChart {
 fn batch() -> WorkPrecision {
     let line = |(k, method): (usize, &&str)| {
         let order = 3.0 + (k % 7) as f64;
-        let points =
-            (0..9).map(|n| [1e-4 * (1.0 + k as f64) * 1.7_f64.powi(n), (1e-2 * 1.7_f64.powf(-order * f64::from(n))).max(1e-14)]).collect();
+        let points = (0..9)
+            .map(|n| {
+                [
+                    1e-4 * (1.0 + k as f64) * 1.7_f64.powi(n),
+                    (1e-2 * 1.7_f64.powf(-order * f64::from(n))).max(1e-14),
+                ]
+            })
+            .collect();
         WorkSeries { method: (*method).to_owned(), name: (*method).to_owned(), points }
     };
     let methods = [
@@ -110,7 +127,9 @@ fn batch() -> WorkPrecision {
 fn gallery() -> Vec<(&'static str, Picture)> {
     let resolution = 1.0;
     let time = times(1500, 0.01);
-    let wave = |k: usize| time.iter().map(|t| (1.0 + 0.2 * k as f64) * (1.3 * t + k as f64).sin()).collect::<Vec<f64>>();
+    let wave = |k: usize| {
+        time.iter().map(|t| (1.0 + 0.2 * k as f64) * (1.3 * t + k as f64).sin()).collect::<Vec<f64>>()
+    };
     let angle = |count: usize| Angles {
         title: "Angles of the bars".to_owned(),
         caption: words(&["scene chain"]),
@@ -148,7 +167,12 @@ fn gallery() -> Vec<(&'static str, Picture)> {
         log_time: true,
     };
     let mut two = torque(time.clone(), wave(0));
-    two.motors.push(MotorSeries { name: "elbow".to_owned(), time: time.clone(), torque: wave(3), power: wave(2) });
+    two.motors.push(MotorSeries {
+        name: "elbow".to_owned(),
+        time: time.clone(),
+        torque: wave(3),
+        power: wave(2),
+    });
     let work = WorkPrecision {
         title: "Error against run time".to_owned(),
         caption: words(&["scene free"]),
@@ -161,7 +185,12 @@ fn gallery() -> Vec<(&'static str, Picture)> {
                 method: (*name).to_owned(),
                 name: (*name).to_owned(),
                 points: (0..7)
-                    .map(|i| [1e-5 * (1.0 + 0.3 * k as f64) * 1.6_f64.powi(i), 0.1_f64.powi(i * (k as i32 + 1)).max(1e-12)])
+                    .map(|i| {
+                        [
+                            1e-5 * (1.0 + 0.3 * k as f64) * 1.6_f64.powi(i),
+                            0.1_f64.powi(i * (k as i32 + 1)).max(1e-12),
+                        ]
+                    })
                     .collect(),
             })
             .collect(),
@@ -197,7 +226,11 @@ fn words_stay_on_the_page_apart_and_readable() {
         let (width, height) = (f64::from(picture.width), f64::from(picture.height));
         for (k, text) in picture.texts.iter().enumerate() {
             let [left, top, right, bottom] = text.bounds();
-            assert!(left >= 0.0 && top >= 0.0 && right <= width && bottom <= height, "{name}: {:?} leaves the page", text.text);
+            assert!(
+                left >= 0.0 && top >= 0.0 && right <= width && bottom <= height,
+                "{name}: {:?} leaves the page",
+                text.text
+            );
             assert!(1.05 / (luminance(text.colour) + 0.05) >= 4.5, "{name}: {:?} is too pale", text.text);
             for other in &picture.texts[..k] {
                 assert!(!text.overlaps(other), "{name}: {:?} lies on {:?}", text.text, other.text);
@@ -237,7 +270,8 @@ fn the_file_opens_and_tells_what_it_shows() {
     let info = reader.info();
     assert_eq!((info.width, info.height, info.color_type), (960, 600, png::ColorType::Rgb));
     assert_eq!(info.pixel_dims.unwrap().xppu, 5669, "144 pixels an inch");
-    let chunk = |key: &str| info.utf8_text.iter().find(|chunk| chunk.keyword == key).unwrap().get_text().unwrap();
+    let chunk =
+        |key: &str| info.utf8_text.iter().find(|chunk| chunk.keyword == key).unwrap().get_text().unwrap();
     assert_eq!(chunk("Title"), "Torque τ");
     assert!(chunk("Description").starts_with("scene motor · dop853"));
     assert!(chunk("Software").starts_with("driftless "));
@@ -252,7 +286,10 @@ fn a_missing_folder_and_a_silly_resolution_are_refused() {
     assert!(matches!(error, ChartError::Write { .. }) && error.to_string().contains("torque.png"), "{error}");
     assert!(std::fs::read_dir(folder.path()).unwrap().next().is_none());
     for resolution in [0.0, -1.0, f64::NAN, 1e9] {
-        assert!(matches!(torque_power(&TorquePower::default(), resolution), Err(ChartError::Resolution { .. })));
+        assert!(matches!(
+            torque_power(&TorquePower::default(), resolution),
+            Err(ChartError::Resolution { .. })
+        ));
     }
 }
 
@@ -261,7 +298,13 @@ fn height_of(picture: &Picture, panel: usize, ticks: [(&str, f64); 2]) -> impl F
     let [left, top, _, bottom] = picture.panels[panel];
     let middle = |label: &str| {
         let inside = |b: &[f64; 4]| b[2] < left && b[3] > top - 5.0 && b[1] < bottom + 5.0;
-        let boxes: Vec<[f64; 4]> = picture.texts.iter().filter(|text| text.text == label).map(TextBox::bounds).filter(inside).collect();
+        let boxes: Vec<[f64; 4]> = picture
+            .texts
+            .iter()
+            .filter(|text| text.text == label)
+            .map(TextBox::bounds)
+            .filter(inside)
+            .collect();
         assert_eq!(boxes.len(), 1, "one label {label}");
         0.5 * (boxes[0][1] + boxes[0][3])
     };
@@ -290,15 +333,24 @@ fn ink_is_where_the_data_are_and_nowhere_else() {
     let air = 4.5;
     for (k, _) in picture.rgb.as_chunks::<3>().0.iter().enumerate().filter(|(_, colour)| **colour == BLUE) {
         let (x, y) = ((k as u32 % picture.width) as f64 / 4.0, (k as u32 / picture.width) as f64 / 4.0);
-        assert!(x > left - air && x < right + air && y > top - air && y < bottom + air, "ink outside the panel at {x}, {y}");
+        assert!(
+            x > left - air && x < right + air && y > top - air && y < bottom + air,
+            "ink outside the panel at {x}, {y}"
+        );
     }
 }
 
 #[test]
 fn zero_drift_is_seen_and_named() {
     let zero = drift("elimination", times(50, 0.1), vec![0.0; 50]);
-    let panel = |name: &str| ResidualPanel { name: name.to_owned(), series: vec![growing("none", 1e-9, 1.0), zero.clone()] };
-    let chart = ConstraintDrift { panels: vec![panel("|*C*| [rad]"), panel("|d*C*| [rad/s]")], ..ConstraintDrift::default() };
+    let panel = |name: &str| ResidualPanel {
+        name: name.to_owned(),
+        series: vec![growing("none", 1e-9, 1.0), zero.clone()],
+    };
+    let chart = ConstraintDrift {
+        panels: vec![panel("|*C*| [rad]"), panel("|d*C*| [rad/s]")],
+        ..ConstraintDrift::default()
+    };
     let picture = constraint_drift(&chart, 2.0).unwrap();
     let said = picture.texts.iter().filter(|text| text.text.contains("exactly 0")).count();
     assert_eq!(said, 2, "once for each panel");
@@ -315,7 +367,12 @@ fn texts_in_order(picture: &Picture) -> Vec<&str> {
         let [left, top, right, bottom] = text.bounds();
         assert!(left >= 0.0 && top >= 0.0 && right <= size[0] && bottom <= size[1], "{} is cut", text.text);
         let covered = picture.texts[..k].iter().find(|other| other.overlaps(text));
-        assert!(covered.is_none(), "{} is covered by {}", text.text, covered.map_or("", |other| other.text.as_str()));
+        assert!(
+            covered.is_none(),
+            "{} is covered by {}",
+            text.text,
+            covered.map_or("", |other| other.text.as_str())
+        );
     }
     picture.texts.iter().map(|text| text.text.as_str()).collect()
 }
@@ -324,7 +381,11 @@ fn texts_in_order(picture: &Picture) -> Vec<&str> {
 fn angles_and_lengths_have_axes_of_their_own() {
     let panel = |name: &str, series: &[&str]| ResidualPanel {
         name: name.to_owned(),
-        series: series.iter().enumerate().map(|(k, name)| growing(name, 1e-12 * 10_f64.powi(k as i32), 1.0)).collect(),
+        series: series
+            .iter()
+            .enumerate()
+            .map(|(k, name)| growing(name, 1e-12 * 10_f64.powi(k as i32), 1.0))
+            .collect(),
     };
     let (angles, lengths) = (["motor", "slider.angle"], ["B.x", "B.y", "slider"]);
     let chart = ConstraintDrift {
@@ -355,21 +416,41 @@ fn a_motor_on_a_slider_is_drawn_with_a_force() {
     let mut chart = torque(time.clone(), wave(0));
     let only = force_power(&chart, &[0], 2.0).unwrap();
     let texts = texts_in_order(&only);
-    assert!(texts.iter().any(|text| text.contains("force [N]")) && !texts.iter().any(|text| text.contains("N·m")), "{texts:?}");
-    chart.motors.push(MotorSeries { name: "push".to_owned(), time: time.clone(), torque: wave(3), power: wave(2) });
+    assert!(
+        texts.iter().any(|text| text.contains("force [N]")) && !texts.iter().any(|text| text.contains("N·m")),
+        "{texts:?}"
+    );
+    chart.motors.push(MotorSeries {
+        name: "push".to_owned(),
+        time: time.clone(),
+        torque: wave(3),
+        power: wave(2),
+    });
     let both = force_power(&chart, &[1], 2.0).unwrap();
     let texts = texts_in_order(&both);
-    assert!(["torque [N·m]", "force [N]", "power [W]"].iter().all(|word| texts.iter().any(|text| text == word)), "{texts:?}");
+    assert!(
+        ["torque [N·m]", "force [N]", "power [W]"].iter().all(|word| texts.iter().any(|text| text == word)),
+        "{texts:?}"
+    );
     assert_eq!(both.panels.len(), 3);
 }
 
 #[test]
 fn values_at_zero_leave_the_colours_to_the_others() {
     // A twentieth happens at once, as bars do that start upside down; the rest within 0.2 to 10 s.
-    let cells: Vec<Cell> =
-        (0..1600).map(|k| Cell::Value(if k % 20 == 0 { 1e-10 } else { 0.2 * 50_f64.powf((k % 97) as f64 / 96.0) })).collect();
+    let cells: Vec<Cell> = (0..1600)
+        .map(|k| Cell::Value(if k % 20 == 0 { 1e-10 } else { 0.2 * 50_f64.powf((k % 97) as f64 / 96.0) }))
+        .collect();
     let axis = MapAxis { name: "*a*".to_owned(), from: 0.0, to: 1.0, count: 40, log: false };
-    let chart = Map { x: axis.clone(), y: axis, cells, value: "time [s]".to_owned(), log: true, dark_high: true, ..Map::default() };
+    let chart = Map {
+        x: axis.clone(),
+        y: axis,
+        cells,
+        value: "time [s]".to_owned(),
+        log: true,
+        dark_high: true,
+        ..Map::default()
+    };
     let picture = map(&chart, 1.0).unwrap();
     let [left, top, right, bottom] = picture.panels[picture.panels.len() - 1].map(|edge| edge as usize);
     let mut colours = std::collections::BTreeSet::new();
@@ -401,12 +482,18 @@ fn gravity_points_down_the_page_and_motors_turn_as_they_should() {
     // Counter-clockwise from straight down is to the right.
     let side = |picture: &Picture| {
         let purple: [u8; 3] = picture.texts.iter().find(|text| text.text == "*ω*").unwrap().colour;
-        let columns = picture.rgb.as_chunks::<3>().0.iter().enumerate().filter(|(_, colour)| **colour == purple);
+        let columns =
+            picture.rgb.as_chunks::<3>().0.iter().enumerate().filter(|(_, colour)| **colour == purple);
         let columns: Vec<f64> = columns.map(|(k, _)| f64::from(k as u32 % picture.width) / 2.0).collect();
         let [left, _, right, _] = picture.panels[0];
         columns.iter().sum::<f64>() / columns.len() as f64 - 0.5 * (left + right)
     };
-    assert!(side(&picture) > 5.0 && side(&hanging(-1.0)) < -5.0, "{} {}", side(&picture), side(&hanging(-1.0)));
+    assert!(
+        side(&picture) > 5.0 && side(&hanging(-1.0)) < -5.0,
+        "{} {}",
+        side(&picture),
+        side(&hanging(-1.0))
+    );
 
     // A bar along +x under gravity along -y lies to the right of its hinge.
     let mut chart = pendulum();
@@ -437,7 +524,8 @@ fn angles_are_told_in_pi_or_turns() {
         series: vec![AngleSeries { name: "*φ*".to_owned(), angle: times(100, last / 99.0) }],
         ..Angles::default()
     };
-    let has = |last: f64, word: &str| angles(&chart(last), 1.0).unwrap().texts.iter().any(|text| text.text == word);
+    let has =
+        |last: f64, word: &str| angles(&chart(last), 1.0).unwrap().texts.iter().any(|text| text.text == word);
     assert!(has(2.0 * PI, "π") && has(2.0 * PI, "*φ* [rad]"));
     assert!(has(300.0 * PI, "*φ* [turns]") && has(300.0 * PI, "100"));
     assert!(has(0.1, "0.05") || has(0.1, "0.06"), "small angles are plain numbers");
@@ -500,7 +588,13 @@ fn odd_data_draw_something_sensible() {
             for picture in pictures {
                 assert!(picture.rgb.iter().any(|&part| part < 150), "something is drawn for {values:?}");
                 let area = f64::from(picture.width) * f64::from(picture.height);
-                let dark = picture.rgb.as_chunks::<3>().0.iter().filter(|colour| colour.iter().all(|&part| part < 200)).count();
+                let dark = picture
+                    .rgb
+                    .as_chunks::<3>()
+                    .0
+                    .iter()
+                    .filter(|colour| colour.iter().all(|&part| part < 200))
+                    .count();
                 assert!((dark as f64) < 0.3 * area, "the page is not flooded for {values:?}");
             }
         }
@@ -528,8 +622,20 @@ fn odd_pictures(time: &[f64], values: &[f64]) -> Vec<Picture> {
     for log_time in [false, true] {
         let panels = vec![ResidualPanel { name: "|*C*| [m]".to_owned(), series: series.clone() }; 2];
         let title = || "odd".to_owned();
-        out.push(energy_drift(&EnergyDrift { title: title(), series: series.clone(), log_time, ..EnergyDrift::default() }, 0.5).unwrap());
-        out.push(constraint_drift(&ConstraintDrift { title: title(), panels, log_time, ..ConstraintDrift::default() }, 0.5).unwrap());
+        out.push(
+            energy_drift(
+                &EnergyDrift { title: title(), series: series.clone(), log_time, ..EnergyDrift::default() },
+                0.5,
+            )
+            .unwrap(),
+        );
+        out.push(
+            constraint_drift(
+                &ConstraintDrift { title: title(), panels, log_time, ..ConstraintDrift::default() },
+                0.5,
+            )
+            .unwrap(),
+        );
     }
     for count in [1, 3, 5] {
         let series = vec![AngleSeries { name: "bar".to_owned(), angle: values.clone() }; count];
@@ -545,7 +651,8 @@ fn odd_pictures(time: &[f64], values: &[f64]) -> Vec<Picture> {
         ..Default::default()
     };
     out.push(mechanism(&chart, 0.5).unwrap());
-    let motion = MotionGif { sketch, poses: vec![pose.clone(), pose], trails: vec![points], ..MotionGif::default() };
+    let motion =
+        MotionGif { sketch, poses: vec![pose.clone(), pose], trails: vec![points], ..MotionGif::default() };
     assert_eq!(motion_gif(&motion).unwrap().frames, 2);
     out
 }

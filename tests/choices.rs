@@ -16,7 +16,12 @@ const FASTER: f64 = 2.5;
 const SHORT: f64 = 2.0;
 
 fn alternatives() -> Vec<(&'static str, Request)> {
-    let adaptive = |method, rtol| Request { method: Some(method), rtol: Some(rtol), atol: Some(rtol), ..Request::default() };
+    let adaptive = |method, rtol| Request {
+        method: Some(method),
+        rtol: Some(rtol),
+        atol: Some(rtol),
+        ..Request::default()
+    };
     vec![
         ("taylor 1e-9", adaptive(MethodId::Taylor, 1e-9)),
         ("taylor 1e-12", adaptive(MethodId::Taylor, 1e-12)),
@@ -59,10 +64,15 @@ fn beaten(scene: &driftless::Scene, until: f64) -> Vec<String> {
     // The tightest of another kind stands for the truth.
     let tight = horizon(Request { method: Some(MethodId::Taylor), extended: true, ..Request::default() });
     let truth = timed(scene, &tight, 1).map(|(outcome, _)| outcome);
-    let error = |outcome: &Outcome| truth.as_ref().filter(|_| until <= SHORT).map_or(0.0, |truth| apart(outcome, truth));
+    let error = |outcome: &Outcome| {
+        truth.as_ref().filter(|_| until <= SHORT).map_or(0.0, |truth| apart(outcome, truth))
+    };
     let mut found = Vec::new();
     for (name, request) in alternatives() {
-        let request = Request { max_evaluations: Some(40 * chosen.statistics.evaluations + 10_000), ..horizon(request) };
+        let request = Request {
+            max_evaluations: Some(40 * chosen.statistics.evaluations + 10_000),
+            ..horizon(request)
+        };
         let Some((other, least)) = timed(scene, &request, 3) else { continue };
         let is_faster = least.as_secs_f64() * FASTER < time.as_secs_f64();
         let drifts_less = other.drift.energy.max <= chosen.drift.energy.max.max(NO_DRIFT);
@@ -83,7 +93,10 @@ fn beaten(scene: &driftless::Scene, until: f64) -> Vec<String> {
 
 #[test]
 fn no_choice_is_beaten_by_another_setting() {
-    let mut scenes: Vec<_> = std::fs::read_dir("examples/scenes").expect("scenes").map(|file| file.expect("a file").path()).collect();
+    let mut scenes: Vec<_> = std::fs::read_dir("examples/scenes")
+        .expect("scenes")
+        .map(|file| file.expect("a file").path())
+        .collect();
     scenes.sort();
     let mut covered = 0;
     for path in scenes.iter().filter(|path| path.extension().is_some_and(|extension| extension == "json")) {
@@ -121,8 +134,14 @@ fn long_horizons_leave_rounding_as_what_drifts_unless_a_tolerance_is_named() {
 fn tolerances_reach_what_each_method_makes_use_of() {
     let scene = read_scene("examples/scenes/free.json".as_ref(), &[]).expect("a scene");
     let asked = |method, rtol, extended| {
-        let request =
-            Request { method: Some(method), rtol: Some(rtol), atol: Some(rtol), extended, until: Some(1.0), ..Request::default() };
+        let request = Request {
+            method: Some(method),
+            rtol: Some(rtol),
+            atol: Some(rtol),
+            extended,
+            until: Some(1.0),
+            ..Request::default()
+        };
         Simulation::new(&scene)
             .expect("equations")
             .options(request)
@@ -132,7 +151,9 @@ fn tolerances_reach_what_each_method_makes_use_of() {
     assert_eq!(asked(MethodId::Taylor, 1e-19, false).ok(), Some(1e-19));
     assert_eq!(asked(MethodId::Taylor, 1e-25, true).ok(), Some(1e-25));
     assert_eq!(asked(MethodId::Dp8, 1e-15, false).ok(), Some(1e-15));
-    for (method, rtol, extended) in [(MethodId::Taylor, 1e-20, false), (MethodId::Taylor, 1e-26, true), (MethodId::Dp8, 1e-16, false)] {
+    for (method, rtol, extended) in
+        [(MethodId::Taylor, 1e-20, false), (MethodId::Taylor, 1e-26, true), (MethodId::Dp8, 1e-16, false)]
+    {
         let refused = asked(method, rtol, extended).expect_err("a refusal").to_string();
         assert!(refused.contains("--rtol") && refused.contains(&method.to_string()), "{refused}");
     }
@@ -142,8 +163,18 @@ fn tolerances_reach_what_each_method_makes_use_of() {
 #[test]
 fn ten_thousand_seconds_leave_rounding_as_what_drifts() {
     let scene = read_scene("examples/scenes/free.json".as_ref(), &[]).expect("a scene");
-    let request = Request { method: Some(MethodId::Taylor), until: Some(1e4), every: Some(100.0), ..Request::default() };
-    let run = Simulation::new(&scene).expect("equations").options(request).trust(Level::Off).prepare().expect("a plan");
+    let request = Request {
+        method: Some(MethodId::Taylor),
+        until: Some(1e4),
+        every: Some(100.0),
+        ..Request::default()
+    };
+    let run = Simulation::new(&scene)
+        .expect("equations")
+        .options(request)
+        .trust(Level::Off)
+        .prepare()
+        .expect("a plan");
     assert_eq!(run.plan().tolerance.expect("a tolerance").relative, 1e-17);
     let outcome = driftless::run::integrate(run, &mut |_| Ok(())).expect("a run");
     assert!(outcome.drift.energy.max < 1e-13, "{:e}", outcome.drift.energy.max);

@@ -1,4 +1,5 @@
-//! What people type, and what they are told: short names and numbers of `--set`, scenes from standard input, folders, words and notes.
+//! What people type, and what they are told: short names and numbers of `--set`, scenes from standard input,
+//! folders, words and notes.
 #![cfg(feature = "cli")]
 
 use crate::program;
@@ -11,7 +12,9 @@ use std::process::Stdio;
 
 fn with_input(program: &Program, arguments: &str, input: &str) -> Ran {
     let mut child =
-        (program.command(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped())).spawn().expect("the program");
+        (program.command(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()))
+            .spawn()
+            .expect("the program");
     child.stdin.take().expect("a pipe").write_all(input.as_bytes()).expect("taken");
     let output = child.wait_with_output().expect("it ends");
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
@@ -33,7 +36,8 @@ fn a_value_is_set_by_the_names_and_numbers_that_vary_takes() {
         ("motor", "motor.rate=pi", format!("motors.motor.law.rate={}", 2.0 * FRAC_PI_2)),
         ("free", "gravity[1]=1/8", "gravity[1]=0.125".to_owned()),
     ] {
-        let inspected = |set: &str| program.run(&format!("inspect {scene}.json --json --set {set}")).exits(0).object();
+        let inspected =
+            |set: &str| program.run(&format!("inspect {scene}.json --json --set {set}")).exits(0).object();
         assert_eq!(inspected(short), inspected(&long), "{short}");
     }
     // Text stays text where text is meant, and a name that means nothing is told.
@@ -43,7 +47,11 @@ fn a_value_is_set_by_the_names_and_numbers_that_vary_takes() {
     program.run("check free.json --set bar1.phi=ten").exits(3).says(&["start.bar1.phi", "must be a number"]);
     // Options take the same numbers.
     let until = program.run("check free.json --json --until pi").exits(0).object();
-    assert_eq!(until["until"].as_f64().or(until["plan"]["until"].as_f64()), Some(2.0 * FRAC_PI_2), "{until:#}");
+    assert_eq!(
+        until["until"].as_f64().or(until["plan"]["until"].as_f64()),
+        Some(2.0 * FRAC_PI_2),
+        "{until:#}"
+    );
 }
 
 #[test]
@@ -60,10 +68,15 @@ fn a_start_that_is_asked_for_can_be_added() {
         program.run("inspect free.json --json --set bar1.phi=1 --set bar1.omega=0 --set bar2.phi=2 --set bar2.omega=3").exits(0).object();
     let bar1 = "--set bar1.phi=1 --set bar1.omega=0";
     for (name, sets) in [("part", bar1), ("none", bar1)] {
-        let arguments = format!("inspect {name}.json --json {sets} --set start.bar2.phi=2 --set bar2.omega=3");
+        let arguments =
+            format!("inspect {name}.json --json {sets} --set start.bar2.phi=2 --set bar2.omega=3");
         assert_eq!(program.run(&arguments).exits(0).object(), expected, "{name}");
     }
-    program.run("check none.json --set start.bar3.phi=0").exits(3).says(&["start.bar3", "does not exist", "`bar1`"]);
+    program.run("check none.json --set start.bar3.phi=0").exits(3).says(&[
+        "start.bar3",
+        "does not exist",
+        "`bar1`",
+    ]);
     program.run("check free.json --set walls.wall.restitution=0").exits(3).says(&["walls", "does not exist"]);
 }
 
@@ -73,7 +86,10 @@ fn a_scene_is_read_from_standard_input() {
     let text = program.read("free.json");
     let ran = with_input(&program, "run - --until 1 --json --no-charts --out piped", &text).exits(0);
     let file = program.run("run free.json --until 1 --json --no-charts --out file").exits(0);
-    assert_eq!((&ran.object()["scene"], &ran.object()["final"]), (&file.object()["scene"], &file.object()["final"]));
+    assert_eq!(
+        (&ran.object()["scene"], &ran.object()["final"]),
+        (&file.object()["scene"], &file.object()["final"])
+    );
     with_input(&program, "inspect - --json", &text).exits(0);
     with_input(&program, "check -", "{\"name\": 3}").exits(3).says(&["standard input:1:"]);
 }
@@ -88,7 +104,8 @@ fn formulas_in_a_scene_file_get_a_hint() {
 
 #[test]
 fn a_horizon_out_of_range_is_told_in_a_line() {
-    let ran = Program::with_scenes(&["free"]).run("run free.json --until 1e300").exits(2).says(&["1e300 is not"]);
+    let ran =
+        Program::with_scenes(&["free"]).run("run free.json --until 1e300").exits(2).says(&["1e300 is not"]);
     assert!(ran.stderr.lines().all(|line| line.len() < 120), "{ran:?}");
 }
 
@@ -97,11 +114,17 @@ fn the_record_has_the_horizon_that_was_run() {
     let program = Program::with_scenes(&["free"]);
     program.run("run free.json --until 0.5 --every 0.25 -q --no-charts").exits(0);
     let found = record(&program, "output/free/taylor-1e-9/run.json");
-    assert_eq!((&found["resolved_scene"]["until"], &found["resolved_scene"]["every"]), (&0.5.into(), &0.25.into()));
+    assert_eq!(
+        (&found["resolved_scene"]["until"], &found["resolved_scene"]["every"]),
+        (&0.5.into(), &0.25.into())
+    );
     // What it holds is a scene that runs again to the same bits.
     program.write("again.json", &found["resolved_scene"].to_string());
     program.run("run again.json -q --no-charts --out again").exits(0);
-    assert_eq!(program.read("again/free/taylor-1e-9/trajectory.csv"), program.read("output/free/taylor-1e-9/trajectory.csv"));
+    assert_eq!(
+        program.read("again/free/taylor-1e-9/trajectory.csv"),
+        program.read("output/free/taylor-1e-9/trajectory.csv")
+    );
     program.run("sweep free.json --vary bar1.phi=1..2:2 --until 0.5 -q --no-charts").exits(0);
     let sweep = record(&program, "output/free/sweep-start.bar1.phi-taylor-1e-9/sweep.json");
     assert_eq!(sweep["resolved_scene"]["until"], 0.5);
@@ -110,20 +133,25 @@ fn the_record_has_the_horizon_that_was_run() {
 #[test]
 fn one_is_one() {
     let program = Program::with_scenes(&["free"]);
-    let ran = program.run("sweep free.json --vary bar1.phi=1..1:1 --until 1 --no-charts --threads 1").exits(0);
+    let ran =
+        program.run("sweep free.json --vary bar1.phi=1..1:1 --until 1 --no-charts --threads 1").exits(0);
     let ran = ran.shows(&["1 value\n", "1 point,", "on 1 thread,", "0 of 1 point,"]);
     assert!(!ran.stdout.contains(" 1 points") && !ran.stdout.contains(" 1 values"), "{ran:?}");
 }
 
 #[test]
 fn several_stabilizations_have_a_folder_each() {
-    for (scene, folders) in
-        [("free", ["taylor-1e-9-none", "taylor-1e-9-projection"]), ("motor", ["taylor-1e-9-none", "taylor-1e-9-projection"])]
-    {
+    for (scene, folders) in [
+        ("free", ["taylor-1e-9-none", "taylor-1e-9-projection"]),
+        ("motor", ["taylor-1e-9-none", "taylor-1e-9-projection"]),
+    ] {
         let program = Program::with_scenes(&[scene]);
         program.run(&format!("run {scene}.json --until 0.5 --method taylor --stabilize none,projection --out new -q --no-charts")).exits(0);
         for folder in folders {
-            assert_eq!(record(&program, &format!("new/{scene}/{folder}/run.json"))["result"]["final"]["t"], 0.5);
+            assert_eq!(
+                record(&program, &format!("new/{scene}/{folder}/run.json"))["result"]["final"]["t"],
+                0.5
+            );
         }
     }
 }
@@ -132,8 +160,12 @@ fn several_stabilizations_have_a_folder_each() {
 fn a_length_that_moves_no_point_is_told() {
     let program = Program::with_scenes(&["four_bar_motor", "free"]);
     let stays = ["note: bars.coupler.length does not move", "hinges.B.between[0].point = [0.9, 0]"];
-    program.run("sweep four_bar_motor.json --vary bars.coupler.length=0.8..1:3 --until 0.1 --no-charts").exits(0).says(&stays);
-    let found = record(&program, "output/four_bar_motor/sweep-bars.coupler.length-taylor-1e-9-projection/sweep.json");
+    program
+        .run("sweep four_bar_motor.json --vary bars.coupler.length=0.8..1:3 --until 0.1 --no-charts")
+        .exits(0)
+        .says(&stays);
+    let found =
+        record(&program, "output/four_bar_motor/sweep-bars.coupler.length-taylor-1e-9-projection/sweep.json");
     assert!(found["result"]["notes"].to_string().contains("hinges.B"), "{found:#}");
     program.run("inspect four_bar_motor.json --set coupler.length=0.8").exits(0).says(&stays);
     // A point at the new end, or a bar without points beside its origin, leaves nothing to say.
@@ -155,7 +187,11 @@ fn no_hint_speaks_of_the_library() {
             } else {
                 let text = std::fs::read_to_string(&path).expect("text");
                 for line in text.lines().filter(|line| line.trim_start().starts_with("hint:")) {
-                    assert!(!line.contains("::holding") && !line.contains("stiff method"), "{}: {line}", path.display());
+                    assert!(
+                        !line.contains("::holding") && !line.contains("stiff method"),
+                        "{}: {line}",
+                        path.display()
+                    );
                 }
             }
         }

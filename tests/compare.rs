@@ -1,4 +1,5 @@
-//! Comparisons: errors are true ones, nothing vanishes, advice follows from the figures, and what was measured survives an interruption.
+//! Comparisons: errors are true ones, nothing vanishes, advice follows from the figures, and what was
+//! measured survives an interruption.
 
 use crate::common;
 #[cfg(feature = "cli")]
@@ -11,7 +12,13 @@ use std::cell::Cell;
 use std::time::{Duration, Instant};
 
 /// Compares methods on a shipped scene to `until` \[s\], timing each setting twice.
-fn compared(name: &str, overrides: &[&str], methods: &[&str], stabilize: &[Stabilization], until: f64) -> Comparison {
+fn compared(
+    name: &str,
+    overrides: &[&str],
+    methods: &[&str],
+    stabilize: &[Stabilization],
+    until: f64,
+) -> Comparison {
     let begin = Instant::now();
     compared_by(&|| begin.elapsed(), 100.0, name, overrides, methods, stabilize, until)
 }
@@ -58,12 +65,15 @@ fn the_error_is_the_distance_from_the_true_motion() {
     for entry in found.entries.iter().filter(|entry| entry.error().is_some_and(|error| error > 1e-12)) {
         let rtol = entry.plan.as_ref().and_then(|plan| plan.tolerance).expect("a tolerance").relative;
         let rows = angles(Request { method: Some(MethodId::Dp8), rtol: Some(rtol), ..asked.clone() });
-        let distance = rows.iter().flatten().zip(exact.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let distance =
+            rows.iter().flatten().zip(exact.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         let error = entry.error().expect("an error");
         assert!((error / distance - 1.0).abs() < 0.01, "{rtol:e}: {error:e}, {distance:e}");
     }
     let at = |rtol: f64| {
-        found.entries.iter().find(|entry| entry.plan.as_ref().and_then(|plan| plan.tolerance).is_some_and(|t| t.relative == rtol))
+        found.entries.iter().find(|entry| {
+            entry.plan.as_ref().and_then(|plan| plan.tolerance).is_some_and(|t| t.relative == rtol)
+        })
     };
     let entry = at(1e-9).expect("an everyday tolerance");
     assert_eq!(entry.found.as_ref().map(|found| found.errors.len()), Some(found.truth.marks().count()));
@@ -78,10 +88,17 @@ fn a_method_that_lies_is_seen() {
     let off = |overrides: &[&str]| {
         let scene = shipped("free", overrides);
         let mechanism = compile(&scene);
-        let request =
-            Request { method: Some(MethodId::Taylor), rtol: Some(1e-14), until: Some(last), every: Some(last), ..Request::default() };
+        let request = Request {
+            method: Some(MethodId::Taylor),
+            rtol: Some(1e-14),
+            until: Some(last),
+            every: Some(last),
+            ..Request::default()
+        };
         let plan = Plan::new(&scene, &mechanism, &request).expect("a plan");
-        let mut running = Running::new(Run::new(mechanism.clone(), plan, Limits::default(), &mechanism.start(&scene)).expect("a run"));
+        let mut running = Running::new(
+            Run::new(mechanism.clone(), plan, Limits::default(), &mechanism.start(&scene)).expect("a run"),
+        );
         assert!(running.go(&mut |_| Ok(()), &mut || false).expect("an end"));
         found.truth.error(running.motion()).expect("a time of the reference").0
     };
@@ -105,11 +122,19 @@ fn every_method_gets_its_settings_and_errors_fall_with_them() {
         // A method may be at rounding with its first step.
         assert!(errors[0] > 100.0 * least || errors[0] < 1e-9, "{method}: {errors:?}");
     }
-    assert!(found.entries.iter().any(|entry| entry.extended && entry.error().is_some_and(|error| error < 1e-14)));
-    assert!(found.is_whole && found.entries.iter().all(|entry| entry.fate != Fate::Done || entry.spread().is_some()));
+    assert!(
+        found.entries.iter().any(|entry| entry.extended && entry.error().is_some_and(|error| error < 1e-14))
+    );
+    assert!(
+        found.is_whole
+            && found.entries.iter().all(|entry| entry.fate != Fate::Done || entry.spread().is_some())
+    );
     // What is advised reaches what it is advised for.
     for advice in found.advice() {
-        let error = advice.entry.and_then(|number| found.entries[number].error()).expect("within reach over a second");
+        let error = advice
+            .entry
+            .and_then(|number| found.entries[number].error())
+            .expect("within reach over a second");
         assert!(error <= advice.target);
     }
 }
@@ -118,10 +143,16 @@ fn every_method_gets_its_settings_and_errors_fall_with_them() {
 fn chaos_ends_the_measurement_of_errors_and_not_the_runs() {
     let found = compared("free", &["start.bar1.phi=3"], &["gauss12"], &[], 60.0);
     let horizon = found.truth.horizon.expect("a chaotic scene");
-    assert!((10.0..40.0).contains(&horizon) && found.truth.until <= horizon && found.truth.until > 0.7 * horizon, "{horizon}");
+    assert!(
+        (10.0..40.0).contains(&horizon) && found.truth.until <= horizon && found.truth.until > 0.7 * horizon,
+        "{horizon}"
+    );
     let finest = found.entries.iter().rfind(|entry| entry.fate == Fate::Done).expect("an end");
     assert_eq!(finest.plan.as_ref().map(|plan| plan.until), Some(60.0));
-    assert!(finest.error().is_some_and(|error| error < 1.0) && finest.found.as_ref().is_some_and(|found| found.energy < 1e-12));
+    assert!(
+        finest.error().is_some_and(|error| error < 1.0)
+            && finest.found.as_ref().is_some_and(|found| found.energy < 1e-12)
+    );
 }
 
 #[test]
@@ -130,17 +161,32 @@ fn what_is_refused_or_stops_stays_in_the_table() {
     for refused in ["dop853", "gauss4", "rattle2"] {
         let of = found.entries.iter().filter(|entry| entry.method.info().name == refused);
         assert!(
-            of.clone().count() == 1 && of.clone().all(|entry| matches!(&entry.fate, Fate::Refused(why) if why.reason.contains("impact")))
+            of.clone().count() == 1
+                && of
+                    .clone()
+                    .all(|entry| matches!(&entry.fate, Fate::Refused(why) if why.reason.contains("impact")))
         );
     }
-    assert!(found.entries.iter().any(|entry| entry.error().is_some_and(|error| error < 1e-8)), "{:?}", found.entries);
+    assert!(
+        found.entries.iter().any(|entry| entry.error().is_some_and(|error| error < 1e-8)),
+        "{:?}",
+        found.entries
+    );
     // Several stabilizations of one motor, one of which Gauss methods refuse.
     let both = [Stabilization::Elimination, Stabilization::Projection];
     let found = compared("motor", &[], &["gauss8", "dp8"], &both, 4.0);
     let kept = |method: &str, kind: Stabilization| {
-        found.entries.iter().filter(|entry| entry.method.info().name == method && entry.stabilization == Some(kind)).collect::<Vec<_>>()
+        found
+            .entries
+            .iter()
+            .filter(|entry| entry.method.info().name == method && entry.stabilization == Some(kind))
+            .collect::<Vec<_>>()
     };
-    assert!(kept("dp8", both[0]).len() > 5 && kept("dp8", both[1]).len() > 5 && !kept("gauss8", both[0]).is_empty());
+    assert!(
+        kept("dp8", both[0]).len() > 5
+            && kept("dp8", both[1]).len() > 5
+            && !kept("gauss8", both[0]).is_empty()
+    );
     assert!(matches!(kept("gauss8", both[1])[..], [entry] if matches!(entry.fate, Fate::Refused(_))));
     let drift = kept("dp8", both[0])[3].found.as_ref().and_then(|found| found.constraint);
     assert!(drift.is_some_and(|levels| levels.iter().all(|&level| level < 1e-12)));
@@ -157,7 +203,8 @@ fn settings_there_is_no_time_for_say_so() {
     let found = compared_by(&clock, 0.5, "free", &[], &["gauss4", "taylor"], &[], 5.0);
     assert!(found.entries.iter().any(|entry| matches!(entry.fate, Fate::Late(t) if t < 5.0)));
     assert!(
-        found.entries.iter().all(|entry| !matches!(entry.fate, Fate::Late(_)) || (entry.median().is_none() && entry.error().is_none()))
+        found.entries.iter().all(|entry| !matches!(entry.fate, Fate::Late(_))
+            || (entry.median().is_none() && entry.error().is_none()))
     );
 }
 
@@ -172,7 +219,11 @@ fn linkages_carts_and_chains_are_compared_too() {
         let found = compared(name, &[], methods, &[], until);
         assert!(found.truth.until > 0.9 * until && found.truth.accuracy < 1e-20, "{name}: {:?}", found.notes);
         for method in methods {
-            let errors = found.entries.iter().filter(|entry| entry.method.info().name == *method).filter_map(|entry| entry.error());
+            let errors = found
+                .entries
+                .iter()
+                .filter(|entry| entry.method.info().name == *method)
+                .filter_map(|entry| entry.error());
             let least = errors.fold(f64::INFINITY, f64::min);
             assert!(least < 1e-8, "{name}, {method}: {least:e}");
         }
@@ -182,11 +233,19 @@ fn linkages_carts_and_chains_are_compared_too() {
 #[test]
 fn it_can_be_given_up_at_any_time() {
     let scene = shipped("free", &[]);
-    let asked = Asked { methods: Vec::new(), stabilize: Vec::new(), until: Some(2.0), budget: Duration::from_secs(60), blocks: 2 };
+    let asked = Asked {
+        methods: Vec::new(),
+        stabilize: Vec::new(),
+        until: Some(2.0),
+        budget: Duration::from_secs(60),
+        blocks: 2,
+    };
     let begin = Instant::now();
     let entries = Cell::new(0);
     let mut see = |_: &driftless::run::compare::Stage| entries.set(entries.get() + 1);
-    let found = compare(&scene, &compile(&scene), &asked, &|| begin.elapsed(), &mut see, &|| entries.get() > 12).expect("a horizon");
+    let found =
+        compare(&scene, &compile(&scene), &asked, &|| begin.elapsed(), &mut see, &|| entries.get() > 12)
+            .expect("a horizon");
     assert!(!found.is_whole && (5..12).contains(&found.entries.len()), "{}", found.entries.len());
     assert!(found.entries.iter().all(|entry| entry.fate != Fate::Done || entry.median().is_some()));
 }
@@ -205,15 +264,29 @@ mod by_program {
         let rows = object["rows"].as_array().expect("rows");
         assert!(rows.len() > 15);
         for row in rows {
-            for name in ["method", "setting", "error", "energy_drift", "constraint_drift", "wall_s", "wall_spread", "evaluations", "status"]
-            {
+            for name in [
+                "method",
+                "setting",
+                "error",
+                "energy_drift",
+                "constraint_drift",
+                "wall_s",
+                "wall_spread",
+                "evaluations",
+                "status",
+            ] {
                 assert!(row.get(name).is_some(), "{name} is missing in {row}");
             }
             assert!(row["status"] != "done" || row["wall_s"].as_f64() > Some(0.0), "{row}");
         }
-        assert!(object["reference"]["accuracy"].as_f64() < Some(1e-25) && object["reference"]["until"] == 1.0);
+        assert!(
+            object["reference"]["accuracy"].as_f64() < Some(1e-25) && object["reference"]["until"] == 1.0
+        );
         let advice = object["recommendations"].as_array().expect("advice");
-        assert_eq!(advice.iter().filter_map(|advice| advice["error"].as_f64()).collect::<Vec<_>>(), [1e-3, 1e-6, 1e-9, 1e-12]);
+        assert_eq!(
+            advice.iter().filter_map(|advice| advice["error"].as_f64()).collect::<Vec<_>>(),
+            [1e-3, 1e-6, 1e-9, 1e-12]
+        );
         for advice in advice {
             let options = advice["options"].as_str().expect("within reach over a second");
             assert!(advice["sentence"].as_str().is_some_and(|sentence| sentence.contains(options)));
@@ -224,13 +297,21 @@ mod by_program {
 
         let mut expected = vec!["compare.csv", "compare.json"];
         if cfg!(feature = "charts") {
-            expected.extend(["energy_drift_against_run_time.png", "error_against_evaluations.png", "error_against_run_time.png"]);
+            expected.extend([
+                "energy_drift_against_run_time.png",
+                "error_against_evaluations.png",
+                "error_against_run_time.png",
+            ]);
         }
-        let files: Vec<String> =
-            program.files().into_iter().filter_map(|file| Some(file.strip_prefix("output/free/compare/")?.to_owned())).collect();
+        let files: Vec<String> = program
+            .files()
+            .into_iter()
+            .filter_map(|file| Some(file.strip_prefix("output/free/compare/")?.to_owned()))
+            .collect();
         assert_eq!(files, expected);
         assert_eq!(program.read("output/free/compare/compare.csv").lines().count(), rows.len() + 1);
-        let record: Value = serde_json::from_str(&program.read("output/free/compare/compare.json")).expect("JSON");
+        let record: Value =
+            serde_json::from_str(&program.read("output/free/compare/compare.json")).expect("JSON");
         assert_eq!(record["rows"], object["rows"]);
         program.run(&format!("{FEW} -q")).exits(6).says(&["--force"]);
     }
@@ -239,7 +320,12 @@ mod by_program {
     fn the_page_is_eighty_columns_wide_and_says_what_to_choose() {
         let program = Program::with_scenes(&["motor"]);
         let ran = program.run("compare motor.json --methods dp8,gauss8 --stabilize elimination,baumgarte --until 4 --budget 4 --no-charts");
-        let ran = ran.exits(0).shows(&["For 1e-6 take --method", "dp8 b 1e-9", "gauss8 with baumgarte: refused", "double-double"]);
+        let ran = ran.exits(0).shows(&[
+            "For 1e-6 take --method",
+            "dp8 b 1e-9",
+            "gauss8 with baumgarte: refused",
+            "double-double",
+        ]);
         for line in ran.stdout.lines() {
             assert!(line.chars().count() <= 80, "{line}");
         }
@@ -261,16 +347,24 @@ mod by_program {
         use std::process::{Command, Stdio};
         let program = Program::with_scenes(&["motor"]);
         let command = "compare motor.json --until 100 --budget 300 --json";
-        let child = program.command(command).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program");
+        let child = program
+            .command(command)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program");
         std::thread::sleep(std::time::Duration::from_millis(3000));
-        assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill").success());
+        assert!(
+            Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill").success()
+        );
         let output = child.wait_with_output().expect("it ends");
         assert_eq!(output.status.code(), Some(130), "{output:?}");
         let object: Value = serde_json::from_slice(&output.stdout).expect("one object");
         assert!(object["complete"] == false && object["rows"].is_array());
         let files = program.files();
         assert!(
-            files.contains(&"output/motor/compare/compare.json".to_owned()) && !files.iter().any(|file| file.contains("unfinished")),
+            files.contains(&"output/motor/compare/compare.json".to_owned())
+                && !files.iter().any(|file| file.contains("unfinished")),
             "{files:?}"
         );
     }

@@ -1,7 +1,9 @@
-//! Contacts that last: points that rest on walls, slide along them, and leave them where the wall would have to pull.
+//! Contacts that last: points that rest on walls, slide along them, and leave them where the wall would have
+//! to pull.
 //!
-//! References: energies of a single bar in closed form, the double pendulum whose end slides along a floor written out by hand for this
-//! file, and, under a motor, the same equations read backwards from a motion that is known.
+//! References: energies of a single bar in closed form, the double pendulum whose end slides along a floor
+//! written out by hand for this file, and, under a motor, the same equations read backwards from a motion
+//! that is known.
 
 use crate::common;
 
@@ -20,7 +22,13 @@ const G: f64 = 9.81;
 const LOCATED: [MethodId; 2] = [MethodId::Dp8, MethodId::Taylor];
 
 fn by(method: MethodId, until: f64, every: f64, rtol: f64) -> Request {
-    Request { method: Some(method), until: Some(until), every: Some(every), rtol: Some(rtol), ..Request::default() }
+    Request {
+        method: Some(method),
+        until: Some(until),
+        every: Some(every),
+        rtol: Some(rtol),
+        ..Request::default()
+    }
 }
 
 /// A run, and all its samples.
@@ -48,7 +56,9 @@ fn worst_gap(scene: &Scene, outcome: &Outcome, samples: &[Sample]) -> f64 {
     let mut worst = 0.0f64;
     for hold in &outcome.holds {
         let wall = scene.walls.iter().position(|wall| wall.name == hold.wall).expect("a wall");
-        for sample in samples.iter().filter(|sample| sample.t >= hold.t && sample.t <= hold.until.unwrap_or(f64::MAX)) {
+        for sample in
+            samples.iter().filter(|sample| sample.t >= hold.t && sample.t <= hold.until.unwrap_or(f64::MAX))
+        {
             worst = worst.max(gap(&mechanism, wall, &sample.phi).abs());
         }
     }
@@ -59,7 +69,14 @@ fn worst_gap(scene: &Scene, outcome: &Outcome, samples: &[Sample]) -> f64 {
 fn against(angle: f64, start: f64, restitution: f64) -> Scene {
     let mut scene = pendulum(start, 0.0);
     let normal = [-angle.sin(), angle.cos()];
-    scene.walls.push(Wall { name: "wall".into(), bar: 0, point: [1.0, 0.0], through: [0.0, 0.0], normal, restitution });
+    scene.walls.push(Wall {
+        name: "wall".into(),
+        bar: 0,
+        point: [1.0, 0.0],
+        through: [0.0, 0.0],
+        normal,
+        restitution,
+    });
     scene
 }
 
@@ -67,7 +84,14 @@ fn against(angle: f64, start: f64, restitution: f64) -> Scene {
 fn on_a_floor(depth: f64, phi: [f64; 2], omega: [f64; 2]) -> Scene {
     let mut scene = double_pendulum(common::Inertia::Slender, [(phi[0], omega[0]), (phi[1], omega[1])]);
     let normal = [-1.0, 0.0];
-    scene.walls.push(Wall { name: "floor".into(), bar: 1, point: [LENGTH, 0.0], through: [depth, 0.0], normal, restitution: 0.0 });
+    scene.walls.push(Wall {
+        name: "floor".into(),
+        bar: 1,
+        point: [LENGTH, 0.0],
+        through: [depth, 0.0],
+        normal,
+        restitution: 0.0,
+    });
     scene
 }
 
@@ -75,19 +99,24 @@ fn on_a_floor(depth: f64, phi: [f64; 2], omega: [f64; 2]) -> Scene {
 fn needed(phi: [f64; 2], omega: [f64; 2], alpha: [f64; 2]) -> [f64; 2] {
     let (c, s) = ((phi[0] - phi[1]).cos(), (phi[0] - phi[1]).sin());
     [
-        4.0 / 3.0 * alpha[0] + 0.5 * c * alpha[1] + 0.5 * s * omega[1] * omega[1] + 1.5 * G / LENGTH * phi[0].sin(),
+        4.0 / 3.0 * alpha[0]
+            + 0.5 * c * alpha[1]
+            + 0.5 * s * omega[1] * omega[1]
+            + 1.5 * G / LENGTH * phi[0].sin(),
         0.5 * c * alpha[0] + alpha[1] / 3.0 - 0.5 * s * omega[0] * omega[0] + 0.5 * G / LENGTH * phi[1].sin(),
     ]
 }
 
-/// Accelerations, and the force of the floor over m l, of the sliding double pendulum: the two equations and sin q1 a1 + sin q2 a2 = -Σ cos q w².
+/// Accelerations, and the force of the floor over m l, of the sliding double pendulum: the two equations and
+/// sin q1 a1 + sin q2 a2 = -Σ cos q w².
 fn sliding(phi: [f64; 2], omega: [f64; 2]) -> ([f64; 2], f64) {
     let c = (phi[0] - phi[1]).cos();
     let rest = needed(phi, omega, [0.0; 2]);
     let (s1, s2) = (phi[0].sin(), phi[1].sin());
     let matrix = nalgebra::Matrix3::new(4.0 / 3.0, 0.5 * c, -s1, 0.5 * c, 1.0 / 3.0, -s2, s1, s2, 0.0);
     let turning = -phi[0].cos() * omega[0].powi(2) - phi[1].cos() * omega[1].powi(2);
-    let found = matrix.lu().solve(&nalgebra::Vector3::new(-rest[0], -rest[1], turning)).expect("no dead centre");
+    let found =
+        matrix.lu().solve(&nalgebra::Vector3::new(-rest[0], -rest[1], turning)).expect("no dead centre");
     ([found[0], found[1]], found[2])
 }
 
@@ -119,13 +148,17 @@ fn case_f_without_restitution_goes_on_to_its_horizon() {
         let scene = shipped("wall", &["walls.wall.restitution=0"]);
         let (outcome, samples) = watched(&scene, &by(method, 10.0, 1e-3, 1e-10));
         assert_eq!(outcome.stop, None);
-        assert!(outcome.persistent_contact_count > 0 && outcome.persistent_contact_count as usize == outcome.holds.len());
+        assert!(
+            outcome.persistent_contact_count > 0
+                && outcome.persistent_contact_count as usize == outcome.holds.len()
+        );
         let total: f64 = outcome.holds.iter().map(|hold| hold.until.unwrap_or(10.0) - hold.t).sum();
         assert!((outcome.persistent_contact_time - total).abs() < 1e-12);
         assert!(outcome.drift.energy.max < 2e-9, "{:e}", outcome.drift.energy.max);
         let worst = worst_gap(&scene, &outcome, &samples);
         assert!(worst < 1e-12, "{worst:e} m");
-        let through = samples.iter().map(|sample| gap(&compile(&scene), 0, &sample.phi)).fold(f64::MAX, f64::min);
+        let through =
+            samples.iter().map(|sample| gap(&compile(&scene), 0, &sample.phi)).fold(f64::MAX, f64::min);
         assert!(through > -1e-11, "{through:e} m");
     }
 }
@@ -152,22 +185,38 @@ fn a_bar_that_falls_on_a_wall_comes_to_rest_there_for_good() {
             let (outcome, samples) = watched(&scene, &by(method, 20.0, 0.01, 1e-10));
             assert_eq!(outcome.stop, None, "e = {restitution}");
             assert_eq!((outcome.holds.len(), outcome.holds[0].until), (1, None));
-            assert!((outcome.last.phi[0] - 0.5).abs() < 1e-14 && outcome.last.omega[0].abs() < 1e-14, "{:?}", outcome.last);
+            assert!(
+                (outcome.last.phi[0] - 0.5).abs() < 1e-14 && outcome.last.omega[0].abs() < 1e-14,
+                "{:?}",
+                outcome.last
+            );
             // All the height it had is lost: m g l / 2 (cos 0.5 - cos 1).
             let lost = 5.0 * (0.5f64.cos() - 1f64.cos());
-            assert!((outcome.impact_loss - lost).abs() < 1e-9, "{} J instead of {lost} J", outcome.impact_loss);
+            assert!(
+                (outcome.impact_loss - lost).abs() < 1e-9,
+                "{} J instead of {lost} J",
+                outcome.impact_loss
+            );
             assert!(outcome.drift.energy.max < 1e-9, "{:e}", outcome.drift.energy.max);
             assert!(worst_gap(&scene, &outcome, &samples) < 1e-15);
             // Small bounces are a geometric series under the angular acceleration 15 sin 0.5.
             if restitution > 0.0 {
-                let small = outcome.impacts.iter().find(|strike| strike.approach.abs() < 1e-3).expect("small bounces");
+                let small = outcome
+                    .impacts
+                    .iter()
+                    .find(|strike| strike.approach.abs() < 1e-3)
+                    .expect("small bounces");
                 let rebound = -small.approach * restitution;
                 let rest = small.t + 2.0 * rebound / (PENDULUM_SQUARED * 0.5f64.sin()) / (1.0 - restitution);
                 let from = outcome.holds[0].t;
-                // The point is held where it would rebound to less than 1e-11 m; what is left of the series is no longer waited for.
+                // The point is held where it would rebound to less than 1e-11 m; what is left of the series
+                // is no longer waited for.
                 let acceleration = PENDULUM_SQUARED * 0.5f64.sin();
                 let left = 2.0 * (2e-11 / acceleration).sqrt() / (1.0 - restitution);
-                assert!((from - rest).abs() < 1.1 * left && from < rest + 1e-7, "held from {from} s, at rest at {rest} s");
+                assert!(
+                    (from - rest).abs() < 1.1 * left && from < rest + 1e-7,
+                    "held from {from} s, at rest at {rest} s"
+                );
             }
         }
     }
@@ -205,7 +254,10 @@ fn an_end_that_slides_along_a_floor_leaves_it_when_the_force_is_zero() {
         assert!((until - release).abs() < 1e-8, "released at {until} s instead of {release} s");
         // Half way, at 0.3 s.
         for k in 0..2 {
-            assert!((samples[30].phi[k] - middle[k]).abs() < 1e-4 && (samples[30].omega[k] - middle[2 + k]).abs() < 1e-2);
+            assert!(
+                (samples[30].phi[k] - middle[k]).abs() < 1e-4
+                    && (samples[30].omega[k] - middle[2 + k]).abs() < 1e-2
+            );
         }
         assert!(outcome.drift.energy.max < 1e-9, "{:e}", outcome.drift.energy.max);
         assert!(worst_gap(&scene, &outcome, &samples) < 1e-12);
@@ -225,12 +277,18 @@ fn the_sliding_motion_is_that_of_the_constrained_equation() {
         let outcome = run(&scene, &by(method, h * f64::from(steps), 0.1, 1e-12));
         for k in 0..2 {
             assert!((outcome.last.phi[k] - y[k]).abs() < 1e-9, "{} {}", outcome.last.phi[k], y[k]);
-            assert!((outcome.last.omega[k] - y[2 + k]).abs() < 1e-9, "{} {}", outcome.last.omega[k], y[2 + k]);
+            assert!(
+                (outcome.last.omega[k] - y[2 + k]).abs() < 1e-9,
+                "{} {}",
+                outcome.last.omega[k],
+                y[2 + k]
+            );
         }
     }
 }
 
-/// The first bar driven to and fro, the end of the second dragged along the floor: everything follows from the law, the motor's torque included.
+/// The first bar driven to and fro, the end of the second dragged along the floor: everything follows from
+/// the law, the motor's torque included.
 #[test]
 fn a_motor_drags_an_end_along_a_floor() {
     for method in LOCATED {
@@ -254,14 +312,23 @@ fn a_motor_drags_an_end_along_a_floor() {
             relative_to: None,
             law: Law { start, rate: 0.0, acceleration: 0.0, sines },
         });
-        for stabilize in [Stabilization::Elimination, Stabilization::Projection, Stabilization::Baumgarte, Stabilization::None] {
+        for stabilize in [
+            Stabilization::Elimination,
+            Stabilization::Projection,
+            Stabilization::Baumgarte,
+            Stabilization::None,
+        ] {
             if (method, stabilize) == (MethodId::Taylor, Stabilization::Baumgarte) {
                 continue;
             }
             let request = Request { stabilize: Some(stabilize), ..by(method, 10.0, 0.01, 1e-11) };
             let (outcome, samples) = watched(&scene, &request);
             assert_eq!(outcome.stop, None, "{stabilize}");
-            assert_eq!((outcome.holds.len(), outcome.holds[0].t, outcome.holds[0].until), (1, 0.0, None), "{stabilize}");
+            assert_eq!(
+                (outcome.holds.len(), outcome.holds[0].t, outcome.holds[0].until),
+                (1, 0.0, None),
+                "{stabilize}"
+            );
             for sample in &samples {
                 let (phi, omega, alpha) = at(sample.t);
                 assert!(
@@ -273,7 +340,10 @@ fn a_motor_drags_an_end_along_a_floor() {
                 let force = second / phi[1].sin();
                 let torque = MASS * LENGTH * LENGTH * (first - force * phi[0].sin());
                 let [found, power] = sample.motors[0];
-                assert!((found - torque).abs() < 1e-9 && (power - torque * omega[0]).abs() < 1e-9, "{found} N m, not {torque} N m");
+                assert!(
+                    (found - torque).abs() < 1e-9 && (power - torque * omega[0]).abs() < 1e-9,
+                    "{found} N m, not {torque} N m"
+                );
                 assert!(force > 0.0);
             }
             assert_eq!(samples[0].constraints.len(), 1);
@@ -284,7 +354,8 @@ fn a_motor_drags_an_end_along_a_floor() {
     }
 }
 
-/// The motor throws the end off its floor, and it falls back on it; the motor's account of work goes through hold, release and impacts.
+/// The motor throws the end off its floor, and it falls back on it; the motor's account of work goes through
+/// hold, release and impacts.
 #[test]
 fn the_account_of_work_goes_through_holds_and_releases() {
     for method in LOCATED {
@@ -300,20 +371,29 @@ fn the_account_of_work_goes_through_holds_and_releases() {
             let request = Request { stabilize: Some(stabilize), ..by(method, 1.5, 0.01, 1e-11) };
             let (outcome, samples) = watched(&scene, &request);
             assert_eq!(outcome.stop, None, "{stabilize}");
-            assert!(outcome.holds[0].until.is_some() && outcome.impact_count > 1, "{:?} {:?}", outcome.holds, outcome.impact_count);
+            assert!(
+                outcome.holds[0].until.is_some() && outcome.impact_count > 1,
+                "{:?} {:?}",
+                outcome.holds,
+                outcome.impact_count
+            );
             assert!(outcome.drift.energy.max < 1e-9, "{stabilize}: {:e}", outcome.drift.energy.max);
             assert!(worst_gap(&scene, &outcome, &samples) < 1e-12);
             finals.push((outcome.last.phi[1], outcome.last.work, outcome.persistent_contact_count));
         }
         assert_eq!(finals[0].2, finals[1].2);
-        assert!((finals[0].0 - finals[1].0).abs() < 1e-6 && (finals[0].1 - finals[1].1).abs() < 1e-6, "{finals:?}");
+        assert!(
+            (finals[0].0 - finals[1].0).abs() < 1e-6 && (finals[0].1 - finals[1].1).abs() < 1e-6,
+            "{finals:?}"
+        );
     }
 }
 
 #[test]
 fn two_points_are_held_at_once() {
     for method in LOCATED {
-        // Two bars on hinges of their own, each against a wall of its own: one falls a little further than the other.
+        // Two bars on hinges of their own, each against a wall of its own: one falls a little further than
+        // the other.
         let mut scene = against(0.5, 1.0, 0.4);
         let mut twin = scene.bars[0].clone();
         twin.name = "twin".into();
@@ -325,21 +405,30 @@ fn two_points_are_held_at_once() {
         scene.walls.push(Wall { name: "other".into(), bar: 1, ..scene.walls[0].clone() });
         let outcome = run(&scene, &by(method, 10.0, 0.1, 1e-10));
         assert_eq!((outcome.stop.as_ref(), outcome.persistent_contact_count), (None, 2));
-        assert!(outcome.holds.iter().all(|hold| hold.until.is_none()) && outcome.holds[0].t < outcome.holds[1].t);
-        assert!(outcome.last.phi.iter().all(|phi| (phi - 0.5).abs() < 1e-14) && outcome.last.omega.iter().all(|omega| omega.abs() < 1e-14));
+        assert!(
+            outcome.holds.iter().all(|hold| hold.until.is_none()) && outcome.holds[0].t < outcome.holds[1].t
+        );
+        assert!(
+            outcome.last.phi.iter().all(|phi| (phi - 0.5).abs() < 1e-14)
+                && outcome.last.omega.iter().all(|omega| omega.abs() < 1e-14)
+        );
         let lost = 5.0 * (2.0 * 0.5f64.cos() - 1f64.cos() - 1.3f64.cos());
         assert!((outcome.impact_loss - lost).abs() < 1e-9);
     }
 }
 
-/// Two walls of which one alone keeps a bar: its end touches both, and only as many rows as it has freedom are in force.
+/// Two walls of which one alone keeps a bar: its end touches both, and only as many rows as it has freedom
+/// are in force.
 #[test]
 fn points_that_touch_without_being_needed_are_not_held() {
     for method in LOCATED {
         let mut scene = against(0.5, 0.5, 0.5);
         scene.walls.push(Wall { name: "same".into(), point: [0.5, 0.0], ..scene.walls[0].clone() });
         let outcome = run(&scene, &by(method, 5.0, 0.1, 1e-10));
-        assert_eq!((outcome.stop.as_ref(), outcome.impact_count, outcome.persistent_contact_count), (None, 0, 1));
+        assert_eq!(
+            (outcome.stop.as_ref(), outcome.impact_count, outcome.persistent_contact_count),
+            (None, 0, 1)
+        );
         assert!((outcome.last.phi[0] - 0.5).abs() < 1e-14 && outcome.last.omega[0] == 0.0);
     }
 }
@@ -364,7 +453,10 @@ fn the_same_run_gives_the_same_bits() {
             let scene = shipped("wall", &[&format!("walls.wall.restitution={restitution}")]);
             let [first, second] = std::array::from_fn(|_| watched(&scene, &by(method, 4.0, 0.01, 1e-9)));
             assert_eq!(first.1, second.1);
-            assert_eq!((&first.0.impacts, &first.0.holds, first.0.statistics), (&second.0.impacts, &second.0.holds, second.0.statistics));
+            assert_eq!(
+                (&first.0.impacts, &first.0.holds, first.0.statistics),
+                (&second.0.impacts, &second.0.holds, second.0.statistics)
+            );
             assert_eq!(first.0.persistent_contact_time.to_bits(), second.0.persistent_contact_time.to_bits());
         }
     }

@@ -1,8 +1,9 @@
 //! Measured order of the Dormand–Prince methods on nonlinear scenes.
 //!
-//! An adaptive method has no step to set, but it never steps over a time asked for: integrated in windows of length h at a tolerance that accepts
-//! everything, it makes exactly one step a window.  The error at a fixed horizon against h then has the method's order as its slope.  References come
-//! from `gauss16` in the canonical form: another method, in other unknowns.
+//! An adaptive method has no step to set, but it never steps over a time asked for: integrated in windows of
+//! length h at a tolerance that accepts everything, it makes exactly one step a window.  The error at a fixed
+//! horizon against h then has the method's order as its slope.  References come from `gauss16` in the
+//! canonical form: another method, in other unknowns.
 
 use crate::bernoulli::{Bernoulli, exact};
 use crate::common;
@@ -36,16 +37,23 @@ const EIGHTH: &[u64] = &[40, 48, 56, 64, 80, 96];
 /// The largest error of angles and rates at the horizon.
 fn error(mechanism: &Mechanism, found: &Motion, reference: &Motion) -> f64 {
     (0..mechanism.bodies.len()).fold(0.0, |most: f64, k| {
-        let (phi, omega) = (found.unwrapped(k) - reference.unwrapped(k), (found.omega[k] - reference.omega[k]).hi);
+        let (phi, omega) =
+            (found.unwrapped(k) - reference.unwrapped(k), (found.omega[k] - reference.omega[k]).hi);
         most.max(phi.abs()).max(omega.abs())
     })
 }
 
-/// Moments of the horizon at which the error is looked at: its largest counts, so that no chance cancellation at one moment is taken for order.
+/// Moments of the horizon at which the error is looked at: its largest counts, so that no chance cancellation
+/// at one moment is taken for order.
 const LOOKS: u64 = 8;
 
 /// Integrates one step a window and returns the motion at every look.
-fn steps<F: OdeSystem + Form>(method: &mut impl Integrator<F>, form: &mut F, start: &Motion, count: u64) -> Vec<Motion> {
+fn steps<F: OdeSystem + Form>(
+    method: &mut impl Integrator<F>,
+    form: &mut F,
+    start: &Motion,
+    count: u64,
+) -> Vec<Motion> {
     let h = HORIZON / count as f64;
     let mut state = form.state(start);
     state.memory = vec![h];
@@ -89,13 +97,22 @@ fn measured<F: OdeSystem + Form>(
         .iter()
         .map(|&count| {
             let found = steps(method, form, start, count);
-            let worst = found.iter().zip(reference).map(|(found, reference)| error(form.mechanism(), found, reference));
+            let worst = found
+                .iter()
+                .zip(reference)
+                .map(|(found, reference)| error(form.mechanism(), found, reference));
             (HORIZON / count as f64, worst.fold(0.0, f64::max))
         })
         .collect();
     let slope = order(&points, FLOOR, CEILING);
-    let local: Vec<f64> = points.windows(2).map(|pair| (pair[0].1 / pair[1].1).ln() / (pair[0].0 / pair[1].0).ln()).collect();
-    println!("{} {slope:.3}, local {local:.2?}, errors {:.1e} to {:.1e}", method.name(), points[0].1, points[points.len() - 1].1);
+    let local: Vec<f64> =
+        points.windows(2).map(|pair| (pair[0].1 / pair[1].1).ln() / (pair[0].0 / pair[1].0).ln()).collect();
+    println!(
+        "{} {slope:.3}, local {local:.2?}, errors {:.1e} to {:.1e}",
+        method.name(),
+        points[0].1,
+        points[points.len() - 1].1
+    );
     slope
 }
 
@@ -107,7 +124,10 @@ fn check<F: OdeSystem + Form>(form: &mut F, start: &Motion, reference: &[Motion]
         (measured(&mut Dp8::new(LOOSE), form, start, reference, EIGHTH), 8.0),
         (measured(&mut Dop853::new(LOOSE), form, start, reference, EIGHTH), 8.0),
     ];
-    assert!(slopes.iter().all(|(slope, nominal): &(f64, f64)| (slope - nominal).abs() < MARGIN), "{slopes:?}");
+    assert!(
+        slopes.iter().all(|(slope, nominal): &(f64, f64)| (slope - nominal).abs() < MARGIN),
+        "{slopes:?}"
+    );
 }
 
 #[test]
@@ -162,8 +182,9 @@ fn raw_step(t: f64, y: f64, h: f64) -> f64 {
     stepper.y_out().last().expect("a row")[0]
 }
 
-/// Why `windows.rs` lets time ride along as an unknown: `ode_solvers` 0.6.2 hands the twelfth stage of `Dop853` the time of the step's start, and the
-/// eighth order is lost where the equations depend on time.  This test fails the day that is mended.
+/// Why `windows.rs` lets time ride along as an unknown: `ode_solvers` 0.6.2 hands the twelfth stage of
+/// `Dop853` the time of the step's start, and the eighth order is lost where the equations depend on time.
+/// This test fails the day that is mended.
 #[test]
 fn the_crates_own_dop853_loses_its_order_where_time_matters_and_ours_does_not() {
     const END: f64 = 2.0;
@@ -179,7 +200,10 @@ fn the_crates_own_dop853_loses_its_order_where_time_matters_and_ours_does_not() 
             for row in 1..=count {
                 let until = DoubleDouble::product(h, row as f64);
                 let watch = &mut |_: &mut Bernoulli, _: &mut State| Ok(Seen::Kept);
-                assert_eq!(method.advance(&mut Bernoulli { level: None }, &mut state, until, &mut statistics, watch), Ok(Reached::Until));
+                assert_eq!(
+                    method.advance(&mut Bernoulli { level: None }, &mut state, until, &mut statistics, watch),
+                    Ok(Reached::Until)
+                );
             }
             assert_eq!(statistics.steps, count);
             (h, (state.y[0] - exact(END)).abs())
@@ -193,25 +217,34 @@ fn the_crates_own_dop853_loses_its_order_where_time_matters_and_ours_does_not() 
     assert!((adapted - 8.0).abs() < 1.0 && (own - 8.0).abs() < 1.0, "{adapted} {own}");
 }
 
-/// An event is located to the accuracy of a step, order p + 1 for one step: the interpolation, an order lower, only finds the place to land on.
+/// An event is located to the accuracy of a step, order p + 1 for one step: the interpolation, an order
+/// lower, only finds the place to land on.
 #[test]
 fn the_time_of_an_event_has_the_order_of_a_step() {
-    // y falls from pi/2 to 3 pi/2.  The worst of several events at three fifths of a step, against chance cancellation.
+    // y falls from pi/2 to 3 pi/2.  The worst of several events at three fifths of a step, against chance
+    // cancellation.
     const EVENTS: [f64; 4] = [2.4, 2.6, 2.8, 3.0];
     let locate = |method: &mut dyn Integrator<Bernoulli>, h: f64, event: f64| {
         let start = event - 0.6 * h;
         let mut state = State::new(&[DoubleDouble::from(exact(start))], 0);
         (state.time, state.memory) = (Time::from(start), vec![h]);
         let watch = &mut |_: &mut Bernoulli, _: &mut State| Ok(Seen::Kept);
-        let reached =
-            method.advance(&mut Bernoulli { level: Some(event) }, &mut state, Time::from(start + h), &mut Statistics::default(), watch);
+        let reached = method.advance(
+            &mut Bernoulli { level: Some(event) },
+            &mut state,
+            Time::from(start + h),
+            &mut Statistics::default(),
+            watch,
+        );
         assert_eq!(reached, Ok(Reached::Event(0)));
         assert!((state.y[0] - exact(event)).abs() < 1e-15, "the state lies on the event");
         (state.time.hi - event).abs()
     };
     let sweep = |method: &mut dyn Integrator<Bernoulli>, steps: &[f64]| -> f64 {
-        let points: Vec<(f64, f64)> =
-            steps.iter().map(|&h| (h, EVENTS.iter().map(|&event| locate(method, h, event)).fold(0.0, f64::max))).collect();
+        let points: Vec<(f64, f64)> = steps
+            .iter()
+            .map(|&h| (h, EVENTS.iter().map(|&event| locate(method, h, event)).fold(0.0, f64::max)))
+            .collect();
         println!("{} {points:?}", method.name());
         order(&points, 1e-14, 1e-1)
     };

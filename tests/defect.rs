@@ -1,7 +1,8 @@
 //! Constraint drift under the four stabilizations.
 //!
-//! The constant-speed motor's row is linear, so every Runge–Kutta method keeps it to rounding from a consistent start and a test on that proves
-//! nothing: starts here are 1e-6 rad/s off, or the law has a sine in it.
+//! The constant-speed motor's row is linear, so every Runge–Kutta method keeps it to rounding from a
+//! consistent start and a test on that proves nothing: starts here are 1e-6 rad/s off, or the law has a sine
+//! in it.
 
 use crate::common;
 
@@ -43,7 +44,9 @@ fn off_start(scene: &Scene, request: &Request) -> Outcome {
 /// Largest violations at both levels from time `after` \[s\] on.
 fn violation_after(outcome: &Outcome, after: f64) -> [f64; 2] {
     let late = outcome.trace.head.iter().filter(|sample| sample.t >= after);
-    late.fold([0.0; 2], |most: [f64; 2], sample| [0, 1].map(|level| most[level].max(sample.constraints[0][level].abs())))
+    late.fold([0.0; 2], |most: [f64; 2], sample| {
+        [0, 1].map(|level| most[level].max(sample.constraints[0][level].abs()))
+    })
 }
 
 #[test]
@@ -67,7 +70,8 @@ fn from_a_bad_start_the_plain_run_drifts_and_the_stabilized_ones_return() {
     let [position, velocity] = violation_after(&projected, 0.1);
     println!("projection: {position:e} {velocity:e}");
     assert!(position <= 1e-13 && velocity <= 1e-13, "{position:e} {velocity:e}");
-    // From the first output on nothing grows; the one excursion at t = 0 pulls the fitted slope down, never up.
+    // From the first output on nothing grows; the one excursion at t = 0 pulls the fitted slope down, never
+    // up.
     assert!(projected.drift.constraints[0].1.iter().all(|level| level.slope() <= 1e-17));
 
     // Elimination has no such unknown: the start's error is not even seen.
@@ -84,12 +88,14 @@ fn sine(until: f64) {
         let levels = &outcome.drift.constraints[0].1;
         let [position, velocity] = [levels[0].max, levels[1].max];
         let [position_climb, velocity_climb] = [levels[0].slope() * until, levels[1].slope() * until];
-        println!("{stabilize}: {position:.1e} {velocity:.1e}, climbs {position_climb:.1e} {velocity_climb:.1e}");
+        println!(
+            "{stabilize}: {position:.1e} {velocity:.1e}, climbs {position_climb:.1e} {velocity_climb:.1e}"
+        );
         match stabilize {
             // Measured 2.4e-12 rad at 100 s: what the tolerance leaves; it may wander.
             Stabilization::None => assert!(position < 1e-9 && velocity < 1e-9, "{position:e} {velocity:e}"),
-            // Measured 1.9e-10 and 1.6e-9, with a time constant of five steps that no output time cuts short: the law's sine is what it follows with a
-            // lag, so it is worse than none here, but stands.
+            // Measured 1.9e-10 and 1.6e-9, with a time constant of five steps that no output time cuts short:
+            // the law's sine is what it follows with a lag, so it is worse than none here, but stands.
             Stabilization::Baumgarte => {
                 assert!(position < 1e-9 && velocity < 5e-9, "{position:e} {velocity:e}");
                 assert!(position_climb.abs() < 0.5 * position && velocity_climb.abs() < 0.5 * velocity);
@@ -97,7 +103,10 @@ fn sine(until: f64) {
             }
             Stabilization::Projection => {
                 assert!(position < 1e-12 && velocity < 1e-12, "{position:e} {velocity:e}");
-                assert!(position_climb.abs() < 1e-14 && velocity_climb.abs() < 1e-14, "{position_climb:e} {velocity_climb:e}");
+                assert!(
+                    position_climb.abs() < 1e-14 && velocity_climb.abs() < 1e-14,
+                    "{position_climb:e} {velocity_climb:e}"
+                );
             }
             Stabilization::Elimination => assert_eq!((position, velocity), (0.0, 0.0)),
         }
@@ -115,7 +124,8 @@ fn long_the_motor_with_a_sine_keeps_its_constraint() {
     sine(1000.0);
 }
 
-/// The energy projection moves is booked: it is the difference between the projected and the plain end of the first step.
+/// The energy projection moves is booked: it is the difference between the projected and the plain end of the
+/// first step.
 #[test]
 fn the_stabilizers_energy_is_the_jump_it_makes() {
     let scene = shipped("motor", &[]);
@@ -127,7 +137,10 @@ fn the_stabilizers_energy_is_the_jump_it_makes() {
         let mut state = form.state(&start);
         state.memory = vec![1e-3];
         let mut statistics = Statistics::default();
-        let reached = method.advance(&mut form, &mut state, Time::from(1e-3), &mut statistics, &mut |_, _| Ok(Seen::Kept));
+        let reached =
+            method.advance(&mut form, &mut state, Time::from(1e-3), &mut statistics, &mut |_, _| {
+                Ok(Seen::Kept)
+            });
         assert_eq!((reached, statistics.steps), (Ok(Reached::Until), 1));
         let mut motion = Motion::default();
         form.read(&state, &mut motion);
@@ -143,7 +156,8 @@ fn the_stabilizers_energy_is_the_jump_it_makes() {
     assert_eq!(none, 0.0);
     assert!(jump.abs() > 1e-8 && (booked - jump).abs() < 1e-14, "{booked:e} is not {jump:e}");
 
-    // And in a whole run the figure stays about what the first projection made it; energy less work less this closes.
+    // And in a whole run the figure stays about what the first projection made it; energy less work less this
+    // closes.
     let outcome = off_start(&scene, &request(Stabilization::Projection, 10.0));
     let relative = outcome.last.imbalance - outcome.last.stabilizer / mechanism.energy_scale;
     println!("run: booked {:e}, rest {relative:e}", outcome.drift.stabilizer);
@@ -169,8 +183,17 @@ fn a_relative_motor_is_kept_too() {
             let outcome = run(&scene, &request(stabilize, 20.0));
             assert_eq!(outcome.stop, None);
             let [position, velocity] = &outcome.drift.constraints[0].1;
-            let bound = if matches!(stabilize, Stabilization::None | Stabilization::Baumgarte) { 1e-7 } else { 1e-12 };
-            assert!(position.max < bound && velocity.max < bound, "{stabilize}: {:e} {:e}", position.max, velocity.max);
+            let bound = if matches!(stabilize, Stabilization::None | Stabilization::Baumgarte) {
+                1e-7
+            } else {
+                1e-12
+            };
+            assert!(
+                position.max < bound && velocity.max < bound,
+                "{stabilize}: {:e} {:e}",
+                position.max,
+                velocity.max
+            );
             outcome.trace.head[20].phi[0]
         })
         .collect();
@@ -189,7 +212,10 @@ fn a_failed_projection_is_a_typed_stop() {
     let mut method = Projected::new(Dp8::new(Tolerance::default()));
     // Nothing rounds to exactly nothing.
     method.tolerance = -1.0;
-    let stop = method.advance(&mut form, &mut state, Time::from(1.0), &mut Statistics::default(), &mut |_, _| Ok(Seen::Kept));
+    let stop =
+        method.advance(&mut form, &mut state, Time::from(1.0), &mut Statistics::default(), &mut |_, _| {
+            Ok(Seen::Kept)
+        });
     let stop = stop.expect_err("a stop");
     assert_eq!(stop.cause, Cause::ProjectionFailed);
     assert!(stop.t > 0.0 && stop.what.contains("motor"), "{stop}");
@@ -199,6 +225,7 @@ fn a_failed_projection_is_a_typed_stop() {
     contradictory.constraints.push(angle_equation("lock", 0, None, Law::constant(0.5)));
     let mut kernel = Kernel::new(&contradictory);
     let mut state: State = form.state(&start);
-    let (row, _) = projection::project(&contradictory, &mut kernel, &mut state, 1e-13).expect_err("a failure");
+    let (row, _) =
+        projection::project(&contradictory, &mut kernel, &mut state, 1e-13).expect_err("a failure");
     assert!(row == "motor" || row == "lock");
 }

@@ -18,7 +18,9 @@ fn inside(method: &mut dyn Integrator<Bernoulli>, h: f64) -> f64 {
         (from.time, from.memory) = (Time::from(begin), vec![h]);
         let (mut state, until) = (from.clone(), Time::from(begin + h));
         method.begin(&mut Bernoulli { level: None }, &mut state, until).expect("a beginning");
-        method.step(&mut Bernoulli { level: None }, &mut state, until, &mut Statistics::default()).expect("a step");
+        method
+            .step(&mut Bernoulli { level: None }, &mut state, until, &mut Statistics::default())
+            .expect("a step");
         assert!((state.time - until).hi.abs() < 1e-15, "one step");
         let mut there = State::default();
         for share in [0.15, 0.4, 0.65, 0.9] {
@@ -30,12 +32,14 @@ fn inside(method: &mut dyn Integrator<Bernoulli>, h: f64) -> f64 {
     worst
 }
 
-/// The pairs' own polynomials are of order 4 and 7, those through the stages of Radau IIA of order s: one more in a single step.
+/// The pairs' own polynomials are of order 4 and 7, those through the stages of Radau IIA of order s: one
+/// more in a single step.
 #[test]
 fn the_solution_inside_a_step_has_the_order_of_its_polynomial() {
     const LOOSE: Tolerance = Tolerance { relative: 1e6, absolute: 1e6 };
     let radau = |stages, tolerance| Radau::new(stages, tolerance).expect("a method");
-    // Newton's iteration of the implicit ones is as exact as their tolerance: a tight one, which a first step proposed below the error keeps.
+    // Newton's iteration of the implicit ones is as exact as their tolerance: a tight one, which a first step
+    // proposed below the error keeps.
     let methods: [(&mut dyn Integrator<Bernoulli>, f64, &[f64]); 3] = [
         (&mut Dp5::new(LOOSE), 5.0, &[0.12, 0.1, 0.08, 0.06, 0.04, 0.03]),
         (&mut Dp8::new(LOOSE), 8.0, &[0.8, 0.6, 0.5, 0.4, 0.3]),
@@ -52,7 +56,13 @@ fn the_solution_inside_a_step_has_the_order_of_its_polynomial() {
 /// A run by the program's own loop.
 fn run(scene: &Scene, method: MethodId, stabilize: Option<Stabilization>, every: f64) -> Outcome {
     let mechanism = compile(scene);
-    let request = Request { method: Some(method), stabilize, until: Some(2.0), every: Some(every), ..Request::default() };
+    let request = Request {
+        method: Some(method),
+        stabilize,
+        until: Some(2.0),
+        every: Some(every),
+        ..Request::default()
+    };
     let plan = Plan::new(scene, &mechanism, &request).expect("a sensible pairing");
     let start = mechanism.start(scene);
     let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a beginning");
@@ -62,13 +72,24 @@ fn run(scene: &Scene, method: MethodId, stabilize: Option<Stabilization>, every:
 #[test]
 fn output_times_change_the_steps_of_no_adaptive_method() {
     let methods = [MethodId::Dp5, MethodId::Dp8, MethodId::Radau(3), MethodId::Radau(5), MethodId::Taylor];
-    let scenes = [("free", None), ("spring", None), ("wall", None), ("motor_sine", Some(Stabilization::Projection)), ("four_bars", None)];
+    let scenes = [
+        ("free", None),
+        ("spring", None),
+        ("wall", None),
+        ("motor_sine", Some(Stabilization::Projection)),
+        ("four_bars", None),
+    ];
     for (name, stabilize) in scenes {
         for method in methods {
-            let [fine, odd, coarse] = [0.01, 0.37, 2.0].map(|every| run(&shipped(name, &[]), method, stabilize, every));
+            let [fine, odd, coarse] =
+                [0.01, 0.37, 2.0].map(|every| run(&shipped(name, &[]), method, stabilize, every));
             assert_eq!(fine.stop, None, "{name}, {method}");
             for other in [odd, coarse] {
-                assert_eq!((&fine.last, fine.statistics), (&other.last, other.statistics), "{name}, {method}");
+                assert_eq!(
+                    (&fine.last, fine.statistics),
+                    (&other.last, other.statistics),
+                    "{name}, {method}"
+                );
                 assert_eq!(fine.impacts, other.impacts, "{name}, {method}");
             }
         }

@@ -1,6 +1,8 @@
-//! The README and the chapters below `docs/` are true of the program: tables, links, commands, scenes, and what the tutorial shows.
+//! The README and the chapters below `docs/` are true of the program: tables, links, commands, scenes, and
+//! what the tutorial shows.
 //!
-//! `UPDATE_DOCS=1 cargo test --test documentation` writes `docs/scene-reference.md` and the transcripts of commands anew.
+//! `UPDATE_DOCS=1 cargo test --test documentation` writes `docs/scene-reference.md` and the transcripts of
+//! commands anew.
 #![cfg(feature = "cli")]
 
 #[path = "documentation/pages.rs"]
@@ -21,7 +23,8 @@ use std::collections::BTreeSet;
 /// Longest line of prose, in characters.
 const WIDTH: usize = 110;
 /// From here on a page is written by a program, whose lines are as long as its tables.
-const GENERATED: [&str; 3] = ["<!-- What follows is written by", "<!-- Generated from", "Written by `TABLE=1"];
+const GENERATED: [&str; 3] =
+    ["<!-- What follows is written by", "<!-- Generated from", "Written by `TABLE=1"];
 
 /// Compares a page with what it should be, or writes it.
 fn held(name: &str, wanted: &str) {
@@ -32,9 +35,18 @@ fn held(name: &str, wanted: &str) {
     }
     let found = std::fs::read_to_string(&path).unwrap_or_default();
     for (number, (old, new)) in found.lines().zip(wanted.lines()).enumerate() {
-        assert_eq!(old, new, "{name}, line {}: UPDATE_DOCS=1 cargo test --test documentation writes it anew", number + 1);
+        assert_eq!(
+            old,
+            new,
+            "{name}, line {}: UPDATE_DOCS=1 cargo test --test documentation writes it anew",
+            number + 1
+        );
     }
-    assert_eq!(found.lines().count(), wanted.lines().count(), "{name}: UPDATE_DOCS=1 cargo test --test documentation");
+    assert_eq!(
+        found.lines().count(),
+        wanted.lines().count(),
+        "{name}: UPDATE_DOCS=1 cargo test --test documentation"
+    );
 }
 
 /// Names of the files of a folder with an ending, without it.
@@ -67,15 +79,19 @@ fn every_method_stands_in_the_tables_with_its_order_and_step() {
     let methods = Program::new().run("methods --json").exits(0).object();
     for page in [Page::one("README.md"), Page::one("docs/methods.md")] {
         for method in methods["methods"].as_array().expect("methods") {
-            let (name, order) = (method["name"].as_str().expect("a name"), method["order"].as_u64().expect("an order"));
+            let (name, order) =
+                (method["name"].as_str().expect("a name"), method["order"].as_u64().expect("an order"));
             let step = method["stepping"].as_str().expect("a stepping");
-            let row = page.text.lines().find(|line| line.starts_with("| ") && line.contains(&format!("`{name}`")));
+            let row =
+                page.text.lines().find(|line| line.starts_with("| ") && line.contains(&format!("`{name}`")));
             let row = row.unwrap_or_else(|| panic!("{}: no row of a table for {name}", page.name));
             let cells: Vec<_> = row.split('|').map(str::trim).collect();
-            let position = cells[1].split(", ").position(|cell| cell == format!("`{name}`")).expect("among the names");
+            let position =
+                cells[1].split(", ").position(|cell| cell == format!("`{name}`")).expect("among the names");
             let orders: Vec<_> = cells[2].split(", ").collect();
             let listed = orders.get(position).is_some_and(|given| given.parse() == Ok(order));
-            let up_to = orders.len() == 1 && orders[0].split(" to ").last().and_then(|most| most.parse().ok()) >= Some(order);
+            let up_to = orders.len() == 1
+                && orders[0].split(" to ").last().and_then(|most| most.parse().ok()) >= Some(order);
             assert!(listed || up_to, "{}: {name} has order {order}: {row}", page.name);
             assert_eq!(cells[3], step, "{}: the step of {name}", page.name);
         }
@@ -84,7 +100,9 @@ fn every_method_stands_in_the_tables_with_its_order_and_step() {
 
 #[test]
 fn every_example_and_every_scene_is_listed() {
-    for (folder, ending, page) in [("examples", ".rs", "docs/library.md"), ("examples/scenes", ".json", "docs/scenes.md")] {
+    for (folder, ending, page) in
+        [("examples", ".rs", "docs/library.md"), ("examples/scenes", ".json", "docs/scenes.md")]
+    {
         let text = Page::one(page).text;
         for name in names(folder, ending) {
             assert!(text.contains(&format!("`{name}`")), "{page}: {folder}/{name}{ending} is missing");
@@ -103,10 +121,17 @@ fn every_link_leads_somewhere() {
             let (path, anchor) = page.target(&link);
             assert!(path.exists(), "{}:{line}: {link} does not exist", page.name);
             let outside = page.name.starts_with("docs/")
-                && !path.canonicalize().expect("a path").starts_with(root().join("docs").canonicalize().expect("docs"));
+                && !path
+                    .canonicalize()
+                    .expect("a path")
+                    .starts_with(root().join("docs").canonicalize().expect("docs"));
             assert!(!outside, "{}:{line}: {link} is not among the pages of the book", page.name);
             if let Some(anchor) = anchor {
-                let name = path.strip_prefix(root()).expect("below the package").components().collect::<std::path::PathBuf>();
+                let name = path
+                    .strip_prefix(root())
+                    .expect("below the package")
+                    .components()
+                    .collect::<std::path::PathBuf>();
                 let name = name.to_string_lossy().replace('\\', "/").replace("docs/../", "");
                 let target = Page::one(&name);
                 assert!(target.anchors().contains(&anchor), "{}:{line}: {link}: no such heading", page.name);
@@ -119,17 +144,22 @@ fn every_link_leads_somewhere() {
 
 #[test]
 fn every_page_and_picture_is_used() {
-    let summary: BTreeSet<_> = Page::one("docs/SUMMARY.md").links().into_iter().map(|(_, link)| link).collect();
+    let summary: BTreeSet<_> =
+        Page::one("docs/SUMMARY.md").links().into_iter().map(|(_, link)| link).collect();
     let pages = Page::all();
     for page in &pages {
         if let Some(name) = page.name.strip_prefix("docs/").filter(|name| *name != "SUMMARY.md") {
             assert!(summary.contains(name), "{name} is not in docs/SUMMARY.md");
         }
     }
-    let used: BTreeSet<_> = pages.iter().flat_map(|page| page.links().into_iter().map(|(_, link)| link)).collect();
+    let used: BTreeSet<_> =
+        pages.iter().flat_map(|page| page.links().into_iter().map(|(_, link)| link)).collect();
     for ending in [".png", ".gif", ".svg"] {
         for name in names("docs/pictures", ending) {
-            assert!(used.contains(&format!("pictures/{name}{ending}")), "docs/pictures/{name}{ending} is on no page");
+            assert!(
+                used.contains(&format!("pictures/{name}{ending}")),
+                "docs/pictures/{name}{ending} is on no page"
+            );
         }
     }
 }
@@ -139,10 +169,13 @@ fn lines_are_short() {
     for page in Page::all() {
         let own = GENERATED.iter().filter_map(|mark| page.text.find(mark)).min().unwrap_or(page.text.len());
         let own = page.text[..own].lines().count();
-        let in_prose = page.prose().into_iter().filter(|line| !line.text.starts_with('|') || page.name == "README.md");
+        let in_prose =
+            page.prose().into_iter().filter(|line| !line.text.starts_with('|') || page.name == "README.md");
         let mut lines: Vec<_> = in_prose.map(|line| (line.number, line.text.to_owned())).collect();
         for block in page.blocks().iter().filter(|block| !matches!(block.info.as_str(), "text" | "console")) {
-            lines.extend(block.text.lines().enumerate().map(|(index, line)| (block.line + index, line.to_owned())));
+            lines.extend(
+                block.text.lines().enumerate().map(|(index, line)| (block.line + index, line.to_owned())),
+            );
         }
         for (number, line) in lines.into_iter().filter(|(number, _)| *number <= own) {
             let width = line.chars().count();
@@ -159,11 +192,15 @@ fn every_command_line_is_one_the_program_takes() {
         let mut commands = page.inline_code();
         for block in page.blocks().iter().filter(|block| matches!(block.info.as_str(), "sh" | "console")) {
             let numbered = block.text.lines().enumerate();
-            commands.extend(numbered.map(|(index, line)| (block.line + index, line.trim_start_matches("$ ").to_owned())));
+            commands.extend(
+                numbered.map(|(index, line)| (block.line + index, line.trim_start_matches("$ ").to_owned())),
+            );
         }
         for (line, command) in commands {
             let command = command.split(" #").next().unwrap_or("").trim();
-            let run = command.strip_prefix("cargo run --release -- ").or_else(|| command.strip_prefix("driftless "));
+            let run = command
+                .strip_prefix("cargo run --release -- ")
+                .or_else(|| command.strip_prefix("driftless "));
             let Some(arguments) = run else { continue };
             // Help comes after everything before it has been understood.
             let ran = program.run(&format!("{arguments} --help"));
@@ -178,8 +215,12 @@ fn every_command_line_is_one_the_program_takes() {
 fn every_option_is_told_and_none_that_is_not() {
     let program = Program::new();
     let help = program.run("--help").exits(0).stdout;
-    let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
-    let commands: Vec<_> = commands.filter(|line| !line.starts_with("   ")).filter_map(|line| line.split_whitespace().next()).collect();
+    let commands =
+        help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let commands: Vec<_> = commands
+        .filter(|line| !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next())
+        .collect();
     assert!(commands.len() > 9, "{commands:?}");
     let mut known: BTreeSet<String> = BTreeSet::new();
     let told = Page::one("docs/commands.md").text;
@@ -189,7 +230,11 @@ fn every_option_is_told_and_none_that_is_not() {
         known.extend(help.lines().filter_map(|line| {
             let line = line.trim_start();
             // After a short form, as in `-q, --quiet`.
-            let line = if line.starts_with("--") { line } else { line.split_once(", ").map_or(line, |(_, long)| long) };
+            let line = if line.starts_with("--") {
+                line
+            } else {
+                line.split_once(", ").map_or(line, |(_, long)| long)
+            };
             let name = line.split([' ', '<']).next().unwrap_or("");
             (name.starts_with("--") && name != "--help").then(|| name.to_owned())
         }));
@@ -198,15 +243,30 @@ fn every_option_is_told_and_none_that_is_not() {
         assert!(told.contains(&format!("`{option}")), "docs/commands.md: {option} is missing");
     }
     // Those of other programs.
-    let others =
-        ["--release", "--locked", "--example", "--bench", "--test", "--no-default-features", "--features", "--all-targets", "--help"];
-    let others: BTreeSet<_> =
-        others.into_iter().chain(["--open", "--ignored", "--nocapture", "--doc", "--tool", "--path", "--angles"]).collect();
+    let others = [
+        "--release",
+        "--locked",
+        "--example",
+        "--bench",
+        "--test",
+        "--no-default-features",
+        "--features",
+        "--all-targets",
+        "--help",
+    ];
+    let others: BTreeSet<_> = others
+        .into_iter()
+        .chain(["--open", "--ignored", "--nocapture", "--doc", "--tool", "--path", "--angles"])
+        .collect();
     for page in Page::all() {
         for (line, code) in page.inline_code() {
             for word in code.split_whitespace().filter(|word| word.len() > 2 && word.starts_with("--")) {
                 let word = word.split('=').next().unwrap_or("");
-                assert!(known.contains(word) || others.contains(word), "{}:{line}: there is no option {word}", page.name);
+                assert!(
+                    known.contains(word) || others.contains(word),
+                    "{}:{line}: there is no option {word}",
+                    page.name
+                );
             }
         }
     }
@@ -237,7 +297,9 @@ fn every_file_named_exists() {
     for page in Page::all() {
         for (line, code) in page.inline_code() {
             let path = code.split_whitespace().next().unwrap_or("");
-            let ours = ["src/", "tests/", "examples/", "benches/", "docs/", "fuzz/", ".ci/"].iter().any(|folder| path.starts_with(folder));
+            let ours = ["src/", "tests/", "examples/", "benches/", "docs/", "fuzz/", ".ci/"]
+                .iter()
+                .any(|folder| path.starts_with(folder));
             assert!(!ours || root().join(path).exists(), "{}:{line}: {path} does not exist", page.name);
         }
     }
@@ -246,9 +308,16 @@ fn every_file_named_exists() {
 #[test]
 fn the_rooms_stand_in_the_order_that_imports_follow() {
     let imports = std::fs::read_to_string(root().join(".ci/imports")).expect(".ci/imports");
-    let rooms = imports.lines().find_map(|line| line.strip_prefix("rooms=(")).expect("the rooms").trim_end_matches(')');
+    let rooms = imports
+        .lines()
+        .find_map(|line| line.strip_prefix("rooms=("))
+        .expect("the rooms")
+        .trim_end_matches(')');
     let text = Page::one("docs/architecture.md").text;
-    let rows: Vec<_> =
-        text.lines().filter_map(|line| line.strip_prefix("| `").and_then(|rest| rest.split_once("/` |"))).map(|(room, _)| room).collect();
+    let rows: Vec<_> = text
+        .lines()
+        .filter_map(|line| line.strip_prefix("| `").and_then(|rest| rest.split_once("/` |")))
+        .map(|(room, _)| room)
+        .collect();
     assert_eq!(rows, rooms.split_whitespace().collect::<Vec<_>>(), "docs/architecture.md");
 }

@@ -4,8 +4,9 @@ use driftless::dynamics::OdeSystem;
 use driftless::run::{Action, Change, Direction, Event, EventRecord, Observer, Step};
 use driftless::stepping::composition::Composition;
 use driftless::{
-    Configuration, Custom, Integrator, Level, Limits, Mechanism, MethodId, Motion, Outcome, Plan, Problem, Request, Run, Running, Sample,
-    Scalar, Scene, SceneBuilder, Simulation, Site, Stabilization, State, Statistics, StepError, Time, ground, on,
+    Configuration, Custom, Integrator, Level, Limits, Mechanism, MethodId, Motion, Outcome, Plan, Problem,
+    Request, Run, Running, Sample, Scalar, Scene, SceneBuilder, Simulation, Site, Stabilization, State,
+    Statistics, StepError, Time, ground, on,
 };
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -35,12 +36,21 @@ where
     }
 }
 
-fn record(name: &'static str, direction: Direction, value: impl Fn(&Configuration<f64>) -> f64 + Send + Sync + 'static) -> Box<dyn Event> {
+fn record(
+    name: &'static str,
+    direction: Direction,
+    value: impl Fn(&Configuration<f64>) -> f64 + Send + Sync + 'static,
+) -> Box<dyn Event> {
     Box::new(When(name, direction, value, |_: &Motion| Action::Record))
 }
 
 fn every_method() -> Vec<Request> {
-    let adaptive = |method, rtol| Request { method: Some(method), rtol: Some(rtol), atol: Some(rtol), ..Request::default() };
+    let adaptive = |method, rtol| Request {
+        method: Some(method),
+        rtol: Some(rtol),
+        atol: Some(rtol),
+        ..Request::default()
+    };
     let fixed = |method| Request { method: Some(method), step: Some(0.01), ..Request::default() };
     vec![
         adaptive(MethodId::Dopri5, 1e-9),
@@ -72,7 +82,8 @@ fn ball(height: f64, until: f64) -> Scene {
 fn a_bouncing_ball_meets_the_ground_when_its_closed_form_says() {
     let (height, restitution, gravity) = (1.0_f64, 0.8, 9.81);
     let first = (2.0 * height / gravity).sqrt();
-    let times: Vec<f64> = (0..8).map(|k| (0..k).fold(first, |t, j| t + 2.0 * first * f64::powi(restitution, j + 1))).collect();
+    let times: Vec<f64> =
+        (0..8).map(|k| (0..k).fold(first, |t, j| t + 2.0 * first * f64::powi(restitution, j + 1))).collect();
     for request in every_method() {
         let method = request.method.expect("a method");
         if !method.is_adaptive() {
@@ -85,16 +96,29 @@ fn a_bouncing_ball_meets_the_ground_when_its_closed_form_says() {
             after.omega[2] = after.omega[2].scale(-restitution);
             Action::Change(Change::default().to(after))
         };
-        let event = When("ground", Direction::Falling, move |at: &Configuration<f64>| at.position(&site)[1], bounce);
+        let event =
+            When("ground", Direction::Falling, move |at: &Configuration<f64>| at.position(&site)[1], bounce);
         let outcome = simulation.event(event).run().expect("a run");
         assert_eq!(outcome.stop, None, "{method}");
         assert_eq!(outcome.event_count, 8, "{method}");
         for (found, expected) in outcome.events.iter().zip(&times) {
             assert!((found.t - expected).abs() < 3e-9, "{method}: {} {expected}", found.t);
         }
-        let lost: f64 = (0..8).map(|k| 2.0 * gravity * height * f64::powi(restitution, 2 * k) * (1.0 - restitution * restitution)).sum();
-        assert!((outcome.event_energy + lost).abs() < 1e-7 * lost, "{method}: {} {lost}", outcome.event_energy);
-        assert!(outcome.drift.energy.max < 1e-8, "{method}: the balance drifts by {:e}", outcome.drift.energy.max);
+        let lost: f64 = (0..8)
+            .map(|k| {
+                2.0 * gravity * height * f64::powi(restitution, 2 * k) * (1.0 - restitution * restitution)
+            })
+            .sum();
+        assert!(
+            (outcome.event_energy + lost).abs() < 1e-7 * lost,
+            "{method}: {} {lost}",
+            outcome.event_energy
+        );
+        assert!(
+            outcome.drift.energy.max < 1e-8,
+            "{method}: the balance drifts by {:e}",
+            outcome.drift.energy.max
+        );
     }
 }
 
@@ -131,7 +155,9 @@ fn events_are_located_by_every_method_in_order_and_several_in_a_step() {
         ];
         let outcome = events.into_iter().fold(simulation, Simulation::boxed_event).run().expect("a run");
         assert_eq!(outcome.stop, None, "{method}");
-        let found = |name: &str| outcome.events.iter().filter(|event| event.name == name).map(|event| event.t).collect::<Vec<_>>();
+        let found = |name: &str| {
+            outcome.events.iter().filter(|event| event.name == name).map(|event| event.t).collect::<Vec<_>>()
+        };
         let near = |name: &str, expected: &[f64], bound: f64| {
             let found = found(name);
             assert_eq!(found.len(), expected.len(), "{method}, {name}: {found:?} {expected:?}");
@@ -160,7 +186,12 @@ fn crossings(every: f64, pause_every: Option<u64>) -> (Outcome, Vec<EventRecord>
             after.omega[1] = after.omega[1].scale(0.9);
             Action::Change(Change::default().to(after))
         };
-        vec![Box::new(When("level", Direction::Either, move |at: &Configuration<f64>| at.position(&tip)[1] - 0.2, kick))]
+        vec![Box::new(When(
+            "level",
+            Direction::Either,
+            move |at: &Configuration<f64>| at.position(&tip)[1] - 0.2,
+            kick,
+        ))]
     };
     let request = Request { method: Some(MethodId::Dp8), ..Request::default() };
     let plan = Plan::new(&scene, &mechanism, &request).expect("a plan");
@@ -176,8 +207,10 @@ fn crossings(every: f64, pause_every: Option<u64>) -> (Outcome, Vec<EventRecord>
         if running.go(&mut |_| Ok(()), &mut pause).expect("samples") {
             break;
         }
-        running =
-            Running::resume(Arc::clone(&mechanism), &start, running.snapshot()).expect("the same").with_events(events()).expect("the same");
+        running = Running::resume(Arc::clone(&mechanism), &start, running.snapshot())
+            .expect("the same")
+            .with_events(events())
+            .expect("the same");
     }
     let outcome = running.finish();
     let events = outcome.events.clone();
@@ -190,7 +223,11 @@ fn neither_output_times_nor_pauses_change_events_or_what_they_do() {
     assert!(events.len() >= 4 && outcome.stop.is_none(), "{events:?} {:?}", outcome.stop);
     for (every, pause) in [(0.01, None), (4.0, None), (0.5, Some(1)), (0.01, Some(7))] {
         let (other, found) = crossings(every, pause);
-        assert_eq!((&events, &outcome.last.phi, &outcome.last.omega), (&found, &other.last.phi, &other.last.omega), "{every} {pause:?}");
+        assert_eq!(
+            (&events, &outcome.last.phi, &outcome.last.omega),
+            (&found, &other.last.phi, &other.last.omega),
+            "{every} {pause:?}"
+        );
         assert_eq!(outcome.statistics, other.statistics);
     }
 }
@@ -204,19 +241,33 @@ fn a_spring_that_is_switched_off_leaves_the_motion_it_made_and_takes_its_energy(
         let action = move |_: &Motion| Action::Change(Change::default().switch(&name, false));
         When("off", Direction::Rising, move |at: &Configuration<f64>| at.time() - t, action)
     };
-    let taylor = Request { method: Some(MethodId::Taylor), rtol: Some(1e-14), until: Some(2.0), every: Some(0.5), ..Request::default() };
-    let outcome = Simulation::new(&scene).expect("equations").options(taylor.clone()).event(off(0.7)).run().expect("a run");
+    let taylor = Request {
+        method: Some(MethodId::Taylor),
+        rtol: Some(1e-14),
+        until: Some(2.0),
+        every: Some(0.5),
+        ..Request::default()
+    };
+    let outcome = Simulation::new(&scene)
+        .expect("equations")
+        .options(taylor.clone())
+        .event(off(0.7))
+        .run()
+        .expect("a run");
     // By hand: to 0.7 s with the spring, and from there without.
     let first = Request { until: Some(0.7), every: Some(0.7), ..taylor.clone() };
     let before = Simulation::new(&scene).expect("equations").options(first).run().expect("a run");
     let mut without = scene.clone();
     without.springs.clear();
-    for (start, (phi, omega)) in without.start.iter_mut().zip(before.last.phi.iter().zip(&before.last.omega)) {
+    for (start, (phi, omega)) in without.start.iter_mut().zip(before.last.phi.iter().zip(&before.last.omega))
+    {
         (start.phi, start.omega) = (*phi, *omega);
     }
     let rest = Request { until: Some(1.3), every: Some(1.3), ..taylor };
     let after = Simulation::new(&without).expect("equations").options(rest).run().expect("a run");
-    for (a, b) in outcome.last.phi.iter().chain(&outcome.last.omega).zip(after.last.phi.iter().chain(&after.last.omega)) {
+    for (a, b) in
+        outcome.last.phi.iter().chain(&outcome.last.omega).zip(after.last.phi.iter().chain(&after.last.omega))
+    {
         assert!((a - b).abs() < 1e-11, "{a} {b}");
     }
     let lost = after.last.kinetic + after.last.potential - before.last.kinetic - before.last.potential;
@@ -229,7 +280,12 @@ fn what_an_event_must_not_do_is_refused_with_its_name() {
     let stopped = |request: Request, change: fn(&Motion) -> Change| {
         let action = move |motion: &Motion| Action::Change(change(motion));
         let event = When("kick", Direction::Rising, |at: &Configuration<f64>| at.time() - 1.0, action);
-        let outcome = Simulation::new(&turned()).expect("equations").options(request).event(event).run().expect("a run");
+        let outcome = Simulation::new(&turned())
+            .expect("equations")
+            .options(request)
+            .event(event)
+            .run()
+            .expect("a run");
         outcome.stop.expect("a stop")
     };
     let by = |method| Request { method: Some(method), ..Request::default() };
@@ -250,10 +306,24 @@ fn what_an_event_must_not_do_is_refused_with_its_name() {
 fn a_run_that_an_event_ends_is_no_failure_and_ends_there() {
     for request in every_method() {
         let method = request.method.expect("a method");
-        let event = When("enough", Direction::Rising, |at: &Configuration<f64>| at.angle(0) - 4.0, |_: &Motion| Action::Stop);
-        let outcome = Simulation::new(&turned()).expect("equations").options(request).event(event).run().expect("a run");
+        let event = When(
+            "enough",
+            Direction::Rising,
+            |at: &Configuration<f64>| at.angle(0) - 4.0,
+            |_: &Motion| Action::Stop,
+        );
+        let outcome = Simulation::new(&turned())
+            .expect("equations")
+            .options(request)
+            .event(event)
+            .run()
+            .expect("a run");
         assert_eq!((outcome.stop, outcome.ended_by.as_deref()), (None, Some("enough")), "{method}");
-        assert!((outcome.last.t - 1.95).abs() < 1e-9 && (outcome.last.phi[0] - 4.0).abs() < 1e-9, "{method}: {}", outcome.last.t);
+        assert!(
+            (outcome.last.t - 1.95).abs() < 1e-9 && (outcome.last.phi[0] - 4.0).abs() < 1e-9,
+            "{method}: {}",
+            outcome.last.t
+        );
     }
 }
 
@@ -294,11 +364,20 @@ fn an_observer_sees_every_step_and_sample_and_may_end_the_run() {
             let mut counter = Counter { steps: 0, samples: 0, most_samples, last: 0.0, tip };
             let outcome = simulation.run_observed(&mut counter).expect("a run");
             if most_samples == 4 {
-                assert_eq!((counter.samples, outcome.last.t, outcome.ended_by.as_deref()), (4, 1.5, Some("observer")), "{method}");
+                assert_eq!(
+                    (counter.samples, outcome.last.t, outcome.ended_by.as_deref()),
+                    (4, 1.5, Some("observer")),
+                    "{method}"
+                );
             } else {
                 assert_eq!((counter.samples, outcome.ended_by), (9, None), "{method}");
                 let windows = matches!(method, MethodId::Dopri5 | MethodId::Dop853);
-                assert!(windows || counter.steps == outcome.statistics.steps, "{method}: {} {}", counter.steps, outcome.statistics.steps);
+                assert!(
+                    windows || counter.steps == outcome.statistics.steps,
+                    "{method}: {} {}",
+                    counter.steps,
+                    outcome.statistics.steps
+                );
             }
         }
     }
@@ -314,7 +393,14 @@ fn runs_may_go_to_other_threads() {
     let scene = turned();
     let simulation = Simulation::new(&scene).expect("equations").trust(Level::Auto).until(1.0);
     let elsewhere = std::thread::spawn(move || simulation.run().expect("a run").last.phi);
-    let here = Simulation::new(&scene).expect("equations").trust(Level::Auto).until(1.0).run().expect("a run").last.phi;
+    let here = Simulation::new(&scene)
+        .expect("equations")
+        .trust(Level::Auto)
+        .until(1.0)
+        .run()
+        .expect("a run")
+        .last
+        .phi;
     assert_eq!(elsewhere.join().expect("a result"), here);
 }
 
@@ -345,11 +431,19 @@ impl<P: OdeSystem + ?Sized> Integrator<P> for Rk4 {
         Ok(())
     }
 
-    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError> {
+    fn step(
+        &mut self,
+        problem: &mut P,
+        state: &mut State,
+        until: Time,
+        statistics: &mut Statistics,
+    ) -> Result<Option<usize>, StepError> {
         let left = (until - state.time).hi;
         let h = if left < 1.5 * self.step { left } else { self.step };
         let (start, [k1, k2, k3, k4, y]) = (state.y.clone(), &mut self.stages);
-        let moved = |y: &mut Vec<f64>, k: &[f64], h: f64| y.iter_mut().zip(&start).zip(k).for_each(|((y, start), k)| *y = start + h * k);
+        let moved = |y: &mut Vec<f64>, k: &[f64], h: f64| {
+            y.iter_mut().zip(&start).zip(k).for_each(|((y, start), k)| *y = start + h * k)
+        };
         problem.rhs(state.time, &start, k1);
         moved(y, k1, 0.5 * h);
         problem.rhs(state.time + 0.5 * h, y, k2);
@@ -370,7 +464,8 @@ impl<P: OdeSystem + ?Sized> Integrator<P> for Rk4 {
 #[test]
 fn an_integrator_from_outside_is_driven_like_the_others() {
     for name in ["free", "spring", "motor", "four_bars"] {
-        let scene = driftless::read_scene(format!("examples/scenes/{name}.json").as_ref(), &[]).expect("a scene");
+        let scene =
+            driftless::read_scene(format!("examples/scenes/{name}.json").as_ref(), &[]).expect("a scene");
         let simulation = || Simulation::new(&scene).expect("equations").until(0.5).every(0.1);
         let exact = simulation().method(MethodId::Taylor).tolerance(1e-14, 1e-14).run().expect("a run");
         let run = |step: f64| {
@@ -379,7 +474,12 @@ fn an_integrator_from_outside_is_driven_like_the_others() {
         };
         let error = |outcome: &Outcome| {
             assert_eq!(outcome.stop, None, "{name}");
-            outcome.last.phi.iter().zip(&exact.last.phi).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()))
+            outcome
+                .last
+                .phi
+                .iter()
+                .zip(&exact.last.phi)
+                .fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()))
         };
         let (coarse, fine) = (run(2e-3), run(1e-3));
         let order = (error(&coarse) / error(&fine)).log2();
@@ -387,7 +487,11 @@ fn an_integrator_from_outside_is_driven_like_the_others() {
         // Drift, estimate and counts come with it.
         assert!(fine.drift.energy.max > 0.0 && fine.drift.energy.max < coarse.drift.energy.max, "{name}");
         let estimate = coarse.trust.as_ref().and_then(|trust| trust.error_estimate).expect("an estimate");
-        assert!(estimate > error(&coarse) / 3.0 && estimate < 10.0 * error(&coarse), "{name}: {estimate:e} for {:e}", error(&coarse));
+        assert!(
+            estimate > error(&coarse) / 3.0 && estimate < 10.0 * error(&coarse),
+            "{name}: {estimate:e} for {:e}",
+            error(&coarse)
+        );
         assert_eq!(
             (coarse.statistics.steps, coarse.statistics.evaluations, coarse.plan.method.to_string()),
             (250, 1000, "custom".into()),
@@ -400,7 +504,8 @@ fn an_integrator_from_outside_is_driven_like_the_others() {
 fn a_run_by_an_integrator_from_outside_goes_on_to_the_same_bits() {
     let scene = driftless::read_scene("examples/scenes/spring.json".as_ref(), &[]).expect("a scene");
     let custom = || Custom::new("rk4", || Rk4::boxed(1e-3));
-    let simulation = || Simulation::new(&scene).expect("equations").until(0.5).every(0.1).integrator(custom());
+    let simulation =
+        || Simulation::new(&scene).expect("equations").until(0.5).every(0.1).integrator(custom());
     let whole = simulation().run().expect("a run");
     let (mechanism, start) = (Arc::clone(simulation().mechanism()), simulation().start());
     let mut running = Running::new(simulation().prepare().expect("a run"));
@@ -426,7 +531,12 @@ fn a_run_by_an_integrator_from_outside_goes_on_to_the_same_bits() {
 #[test]
 fn a_trajectory_is_the_motion_at_every_time_by_every_method() {
     let exact = |t: f64| {
-        let simulation = Simulation::new(&turned()).expect("equations").until(t).every(t).method(MethodId::Taylor).tolerance(1e-15, 1e-15);
+        let simulation = Simulation::new(&turned())
+            .expect("equations")
+            .until(t)
+            .every(t)
+            .method(MethodId::Taylor)
+            .tolerance(1e-15, 1e-15);
         let last = simulation.run().expect("a run").last;
         (last.phi, last.omega)
     };
@@ -435,10 +545,15 @@ fn a_trajectory_is_the_motion_at_every_time_by_every_method() {
     for request in every_method() {
         let method = request.method.expect("a method");
         let request = Request { until: Some(2.0), ..request };
-        let trajectory = Simulation::new(&turned()).expect("equations").options(request).trajectory().expect("a run");
+        let trajectory =
+            Simulation::new(&turned()).expect("equations").options(request).trajectory().expect("a run");
         for (t, (phi, omega)) in times.iter().zip(&expected) {
             let (found, rates) = trajectory.at(*t).expect("within the run");
-            let off = found.iter().zip(phi).chain(rates.iter().zip(omega)).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+            let off = found
+                .iter()
+                .zip(phi)
+                .chain(rates.iter().zip(omega))
+                .fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
             assert!(off < 1e-7, "{method} at {t}: {off:e}");
         }
         assert!(trajectory.at(-0.1).is_none() && trajectory.at(2.1).is_none(), "{method}");
@@ -453,7 +568,9 @@ impl Observer for Thirds {
     fn step(&mut self, step: &mut Step) -> ControlFlow<()> {
         let t = step.begin() + (step.end() - step.begin()) / 3.0;
         let motion = step.at(t).clone();
-        let angles = (0..motion.phi.len()).map(|k| motion.unwrapped(k)).chain(motion.omega.iter().map(|omega| omega.hi));
+        let angles = (0..motion.phi.len())
+            .map(|k| motion.unwrapped(k))
+            .chain(motion.omega.iter().map(|omega| omega.hi));
         self.0.push((t, angles.collect()));
         ControlFlow::Continue(())
     }
@@ -463,7 +580,8 @@ impl Observer for Thirds {
 fn every_method_gives_the_motion_inside_its_steps_as_well_as_at_their_ends() {
     let scene = driftless::read_scene("examples/scenes/four_bars.json".as_ref(), &[]).expect("a scene");
     let simulation = || Simulation::new(&scene).expect("equations").until(0.5).every(0.25);
-    let fixed = |method: MethodId| simulation().method(method).step(1.0 / 64.0).stabilize(Stabilization::Projection);
+    let fixed =
+        |method: MethodId| simulation().method(method).step(1.0 / 64.0).stabilize(Stabilization::Projection);
     let tolerant = |method: MethodId| simulation().method(method).tolerance(1e-11, 1e-11);
     for (name, simulation, bound) in [
         ("gauss8", fixed(MethodId::Gauss(4)), 1e-10),
@@ -475,9 +593,17 @@ fn every_method_gives_the_motion_inside_its_steps_as_well_as_at_their_ends() {
         simulation.run_observed(&mut thirds).expect("a run");
         assert!(thirds.0.len() > 8, "{name}: {} steps", thirds.0.len());
         for (t, values) in thirds.0.iter().step_by(thirds.0.len() / 8) {
-            let exact = Simulation::new(&scene).expect("equations").until(*t).every(*t).method(MethodId::Taylor).tolerance(1e-14, 1e-14);
+            let exact = Simulation::new(&scene)
+                .expect("equations")
+                .until(*t)
+                .every(*t)
+                .method(MethodId::Taylor)
+                .tolerance(1e-14, 1e-14);
             let last = exact.run().expect("a run").last;
-            let off = values.iter().zip(last.phi.iter().chain(&last.omega)).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+            let off = values
+                .iter()
+                .zip(last.phi.iter().chain(&last.omega))
+                .fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
             assert!(off < bound, "{name}: {off:e} at {t} s");
         }
     }
@@ -487,7 +613,14 @@ fn every_method_gives_the_motion_inside_its_steps_as_well_as_at_their_ends() {
 fn a_pause_between_two_output_times_of_a_window_changes_no_bit() {
     let scene = driftless::read_scene("examples/scenes/free.json".as_ref(), &[]).expect("a scene");
     for method in [MethodId::Dopri5, MethodId::Dop853] {
-        let simulation = || Simulation::new(&scene).expect("equations").until(20.0).every(10.0).method(method).tolerance(1e-9, 1e-9);
+        let simulation = || {
+            Simulation::new(&scene)
+                .expect("equations")
+                .until(20.0)
+                .every(10.0)
+                .method(method)
+                .tolerance(1e-9, 1e-9)
+        };
         let whole = simulation().run().expect("a run");
         for after in [1, 7, 100] {
             let (mechanism, start) = (Arc::clone(simulation().mechanism()), simulation().start());
@@ -499,17 +632,24 @@ fn a_pause_between_two_output_times_of_a_window_changes_no_bit() {
             });
             assert!(!is_over.expect("samples"), "{method}");
             let text = serde_json::to_string(&running.snapshot()).expect("text");
-            let mut rest = Running::resume(mechanism, &start, serde_json::from_str(&text).expect("a snapshot")).expect("the same");
+            let mut rest =
+                Running::resume(mechanism, &start, serde_json::from_str(&text).expect("a snapshot"))
+                    .expect("the same");
             assert!(rest.go(&mut |_| Ok(()), &mut || false).expect("samples"));
             let rest = rest.finish();
-            assert_eq!((rest.last, rest.statistics), (whole.last.clone(), whole.statistics), "{method} after {after} steps");
+            assert_eq!(
+                (rest.last, rest.statistics),
+                (whole.last.clone(), whole.statistics),
+                "{method} after {after} steps"
+            );
         }
     }
 }
 
 #[test]
 fn a_spring_that_loses_its_length_inside_a_step_is_found_by_every_method() {
-    // A ball that falls 1 m onto the other end of its spring, whose pull is nothing beside its weight: after sqrt(2/g).
+    // A ball that falls 1 m onto the other end of its spring, whose pull is nothing beside its weight: after
+    // sqrt(2/g).
     let text = r#"{"name": "through", "gravity": [0, -9.81], "bars": [{"name": "ball", "mass": 1, "centre": [0, 0], "inertia": 0.1}],
         "springs": [{"name": "thread", "between": [{"body": "ground", "point": [0, 0]}, {"body": "ball", "point": [0, 0]}], "stiffness": 1e-9, "free_length": 0.3, "damping": 0}],
         "start": {"ball": {"phi": 0, "omega": 0, "origin": [0, 1], "velocity": [0, 0]}}, "until": 0.6, "every": 0.6}"#;

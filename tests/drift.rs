@@ -1,6 +1,8 @@
-//! Drift regression: the largest excursion of the energy balance, and its slope, over hundreds of seconds; `long_*` over 1e4 s.
+//! Drift regression: the largest excursion of the energy balance, and its slope, over hundreds of seconds;
+//! `long_*` over 1e4 s.
 //!
-//! Bounds are those the project states (1e-12 of the energy scale) or a small multiple of what was measured, as each test says.
+//! Bounds are those the project states (1e-12 of the energy scale) or a small multiple of what was measured,
+//! as each test says.
 
 use crate::common;
 
@@ -9,11 +11,23 @@ use driftless::run::{MethodId, Outcome, Request, Stabilization};
 use driftless::scene::Scene;
 
 fn gauss16(step: f64, until: f64) -> Request {
-    Request { method: Some(MethodId::Gauss(8)), step: Some(step), until: Some(until), every: Some(0.25), ..Request::default() }
+    Request {
+        method: Some(MethodId::Gauss(8)),
+        step: Some(step),
+        until: Some(until),
+        every: Some(0.25),
+        ..Request::default()
+    }
 }
 
 fn adaptive(method: MethodId, rtol: f64, until: f64) -> Request {
-    Request { method: Some(method), rtol: Some(rtol), until: Some(until), every: Some(0.25), ..Request::default() }
+    Request {
+        method: Some(method),
+        rtol: Some(rtol),
+        until: Some(until),
+        every: Some(0.25),
+        ..Request::default()
+    }
 }
 
 /// Runs to the end, prints the figures and returns them.
@@ -87,7 +101,11 @@ fn explicit_methods_climb_and_say_so() {
         // 1e-9 a step for some 1e4 steps; measured 4.7e-7 and 4.1e-7.
         assert!(energy.max < 1e-6 && energy.max > 1e-11, "{:e}", energy.max);
         let (trend, error) = energy.trend();
-        assert!(energy.slope() > 0.0 && trend.abs() > 3.0 * error, "{method}: {:e} {trend:e} ± {error:e}", energy.slope());
+        assert!(
+            energy.slope() > 0.0 && trend.abs() > 3.0 * error,
+            "{method}: {:e} {trend:e} ± {error:e}",
+            energy.slope()
+        );
     }
 }
 
@@ -103,11 +121,16 @@ fn a_tighter_tolerance_drifts_less() {
 fn a_damped_spring_takes_energy_out_and_the_balance_closes() {
     let mut scene = shipped("spring", &[]);
     scene.springs[0].damping = 0.2;
-    for request in [adaptive(MethodId::Dp8, 1e-11, 60.0), adaptive(MethodId::Dop853, 1e-11, 60.0), gauss16(1.0 / 128.0, 60.0)] {
+    for request in [
+        adaptive(MethodId::Dp8, 1e-11, 60.0),
+        adaptive(MethodId::Dop853, 1e-11, 60.0),
+        gauss16(1.0 / 128.0, 60.0),
+    ] {
         let outcome = finished(&scene, &request);
         assert_eq!(outcome.drift.kind, "energy minus work");
         assert!(outcome.drift.energy.max < 1e-8, "{:e}", outcome.drift.energy.max);
-        let energies: Vec<f64> = outcome.trace.head.iter().map(|sample| sample.kinetic + sample.potential).collect();
+        let energies: Vec<f64> =
+            outcome.trace.head.iter().map(|sample| sample.kinetic + sample.potential).collect();
         assert!(energies.windows(2).all(|pair| pair[1] <= pair[0] + 1e-10), "energy rose");
         assert!(energies[0] - energies[energies.len() - 1] > 0.1, "nothing was damped");
         assert!(outcome.last.work < 0.0);
@@ -124,7 +147,8 @@ fn a_relative_motor_balances() {
     let gauss = finished(&scene, &gauss16(1.0 / 256.0, 60.0));
     assert_no_climb(&gauss, 1e-13);
     for stabilize in Stabilization::ALL {
-        let outcome = finished(&scene, &Request { stabilize: Some(stabilize), ..adaptive(MethodId::Dp8, 1e-11, 20.0) });
+        let outcome =
+            finished(&scene, &Request { stabilize: Some(stabilize), ..adaptive(MethodId::Dp8, 1e-11, 20.0) });
         assert!(outcome.drift.energy.max < 1e-8, "{stabilize}: {:e}", outcome.drift.energy.max);
     }
 }
@@ -133,7 +157,9 @@ fn a_relative_motor_balances() {
 #[test]
 #[ignore = "a minute or two: 1e4 s each"]
 fn long_gauss16_over_ten_thousand_seconds() {
-    for (name, step) in [("gentle", 1.0 / 64.0), ("free", 1.0 / 128.0), ("motor", 1.0 / 128.0), ("motor_sine", 1.0 / 128.0)] {
+    for (name, step) in
+        [("gentle", 1.0 / 64.0), ("free", 1.0 / 128.0), ("motor", 1.0 / 128.0), ("motor_sine", 1.0 / 128.0)]
+    {
         let outcome = finished(&shipped(name, &[]), &gauss16(step, 1e4));
         assert_no_climb(&outcome, 1e-12);
     }

@@ -1,11 +1,12 @@
 //! Estimates of the error against the truth, on random scenes of every kind by every method.
 //!
-//! The truth is the motion by the series in double-double; for scenes with walls, and where that does not reach, the finer of two runs near rounding.  It
-//! counts only where it is itself known to a thirtieth of the error.  Judged is r = estimate/truth of the largest error of an angle up to the end, where
-//! neither has a horizon; truths below 4e-15 rad are rounding, for which an estimate of up to 1e-13 rad is right.
+//! The truth is the motion by the series in double-double; for scenes with walls, and where that does not
+//! reach, the finer of two runs near rounding.  It counts only where it is itself known to a thirtieth of the
+//! error.  Judged is r = estimate/truth of the largest error of an angle up to the end, where neither has a
+//! horizon; truths below 4e-15 rad are rounding, for which an estimate of up to 1e-13 rad is right.
 //!
-//! `.ci/estimates [CASES [SEED]]` runs more cases; with `TABLE=1` it writes `docs/estimates.md` anew.  `SHOW=1` prints every case that is outside, and
-//! `FOUND` names a folder for the scenes.
+//! `.ci/estimates [CASES [SEED]]` runs more cases; with `TABLE=1` it writes `docs/estimates.md` anew.
+//! `SHOW=1` prints every case that is outside, and `FOUND` names a folder for the scenes.
 
 use crate::common;
 use crate::mechanisms;
@@ -63,7 +64,8 @@ fn case(seed: u64) -> Option<Case> {
     let (scene, kinds) = if dice.chance(0.35) { chain(&mut dice) } else { of_any_kind(seed, &mut dice)? };
     let info = dice.one(METHODS);
     let is_default = dice.chance(0.5);
-    let mut request = Request { method: Some(info.id), max_evaluations: Some(MAX_EVALUATIONS), ..Request::default() };
+    let mut request =
+        Request { method: Some(info.id), max_evaluations: Some(MAX_EVALUATIONS), ..Request::default() };
     // A quarter of the default ones is run by the method the program chooses.
     if is_default && dice.chance(0.5) {
         request.method = None;
@@ -83,7 +85,10 @@ fn case(seed: u64) -> Option<Case> {
             request.extended = info.id == MethodId::Taylor && dice.chance(0.15);
         } else {
             let mechanism = Mechanism::new(&scene).ok()?;
-            let usual = Plan::new(&scene, &mechanism, &Request { every: Some(scene.until / 8.0), ..request.clone() }).ok()?.step?;
+            let usual =
+                Plan::new(&scene, &mechanism, &Request { every: Some(scene.until / 8.0), ..request.clone() })
+                    .ok()?
+                    .step?;
             request.step = Some(usual * [0.25, 0.5, 2.0][dice.pick(3)]);
         }
     }
@@ -174,7 +179,13 @@ fn told(mechanism: &Arc<Mechanism>, plan: Plan, start: &Motion, level: Level) ->
 
 /// The largest differences of angles and rates over what they are measured by.
 fn apart(ruler: &DistanceMetric, one: &[Vec<f64>; 2], other: &[Vec<f64>; 2]) -> [f64; 2] {
-    [0, 1].map(|i| one[i].iter().zip(&other[i]).enumerate().fold(0.0, |most: f64, (k, (a, b))| most.max((a - b).abs() * ruler.weight(k))))
+    [0, 1].map(|i| {
+        one[i]
+            .iter()
+            .zip(&other[i])
+            .enumerate()
+            .fold(0.0, |most: f64, (k, (a, b))| most.max((a - b).abs() * ruler.weight(k)))
+    })
 }
 
 /// Angles and rates at some times, and how far they are off.
@@ -188,7 +199,10 @@ fn truth(scene: &Scene, mechanism: &Arc<Mechanism>, start: &Motion, times: &[f64
     {
         let phi = |motion: &Motion| (0..motion.phi.len()).map(|k| motion.unwrapped(k)).collect();
         let omega = |motion: &Motion| motion.omega.iter().map(|omega| omega.hi).collect();
-        return Some((found.motions.iter().map(|motion| [phi(motion), omega(motion)]).collect(), found.accuracy));
+        return Some((
+            found.motions.iter().map(|motion| [phi(motion), omega(motion)]).collect(),
+            found.accuracy,
+        ));
     }
     // Two runs near rounding by methods that find events in ways of their own.
     let every = Some(scene.until / (times.len() - 1) as f64);
@@ -209,12 +223,22 @@ fn truth(scene: &Scene, mechanism: &Arc<Mechanism>, start: &Motion, times: &[f64
         // A mean force has no series.
         (None, Some(other)) => {
             let plan = Plan::new(scene, mechanism, &by(MethodId::Dp8, 3e-14)).ok()?;
-            (told(mechanism, plan, start, Level::Off).ok().filter(|told| told.times.len() == times.len())?, other)
+            (
+                told(mechanism, plan, start, Level::Off)
+                    .ok()
+                    .filter(|told| told.times.len() == times.len())?,
+                other,
+            )
         }
         _ => return None,
     };
     let ruler = DistanceMetric::new(mechanism);
-    let accuracy = one.samples.iter().zip(&other.samples).map(|(one, other)| apart(&ruler, one, other)[0].max(1e-14)).collect();
+    let accuracy = one
+        .samples
+        .iter()
+        .zip(&other.samples)
+        .map(|(one, other)| apart(&ruler, one, other)[0].max(1e-14))
+        .collect();
     Some((one.samples, accuracy))
 }
 
@@ -230,7 +254,9 @@ struct Errors {
 fn judge(case: &Case) -> Verdict {
     let Ok(mechanism) = Mechanism::new(&case.scene) else { return Verdict::Unknown("no mechanism") };
     let (mechanism, start) = (Arc::new(mechanism.clone()), mechanism.start(&case.scene));
-    let Ok(plan) = Plan::new(&case.scene, &mechanism, &case.request) else { return Verdict::Unknown("refused") };
+    let Ok(plan) = Plan::new(&case.scene, &mechanism, &case.request) else {
+        return Verdict::Unknown("refused");
+    };
     let is_own = plan.step.is_none() && !matches!(plan.method, MethodId::Taylor | MethodId::Radau(_));
     let told_by_run = match told(&mechanism, plan.clone(), &start, Level::Auto) {
         Ok(told) => told,
@@ -250,7 +276,9 @@ fn judge(case: &Case) -> Verdict {
         .and_then(|fine| told(&mechanism, fine, &start, Level::Off).ok())
         .filter(|fine| fine.samples.last() == ends.as_ref())
         .unwrap_or(told_by_run);
-    let Some((exact, accuracy)) = truth(&case.scene, &mechanism, &start, &shown.times) else { return Verdict::Unknown("no truth") };
+    let Some((exact, accuracy)) = truth(&case.scene, &mechanism, &start, &shown.times) else {
+        return Verdict::Unknown("no truth");
+    };
     let ruler = DistanceMetric::new(&mechanism);
     let is_sparse = (shown.times.len() as f64) < 0.5 * FINE;
     let mut errors = Errors { is_sparse, times: shown.times.clone(), most: Vec::new(), known: accuracy };
@@ -264,7 +292,8 @@ fn judge(case: &Case) -> Verdict {
 }
 
 impl Errors {
-    /// The times between which the error passes the horizon, if it does, and is known there: rows that are far apart do not tell more.
+    /// The times between which the error passes the horizon, if it does, and is known there: rows that are
+    /// far apart do not tell more.
     fn horizon(&self) -> Result<Option<[f64; 2]>, ()> {
         let Some(row) = self.most.iter().position(|most| most[0] > 1e-3) else { return Ok(None) };
         if self.known[row] * KNOWN > self.most[row][0] {
@@ -294,7 +323,9 @@ impl Errors {
             // A horizon next to the end may lie behind it.
             (Some(_), None) if is_near_end(trust.horizon) => {}
             (None, Some([first, _])) if is_near_end(Some(first)) || last[0] < 2e-3 => {}
-            (Some(told), Some([first, _])) if told < 0.8 * first && self.is_sparse => return Verdict::Unknown("rows far apart"),
+            (Some(told), Some([first, _])) if told < 0.8 * first && self.is_sparse => {
+                return Verdict::Unknown("rows far apart");
+            }
             (Some(_), None) if self.is_sparse => return Verdict::Unknown("rows far apart"),
             (told, truth) => return Verdict::Horizons(told, truth),
         }
@@ -307,7 +338,10 @@ impl Errors {
         if self.is_sparse && estimate > 10.0 * last[0] {
             return Verdict::Unknown("rows far apart");
         }
-        let rate = trust.rate_error.filter(|_| last[1] > (30.0 * known).max(1e-13) && scene.walls.is_empty()).map(|rate| rate / last[1]);
+        let rate = trust
+            .rate_error
+            .filter(|_| last[1] > (30.0 * known).max(1e-13) && scene.walls.is_empty())
+            .map(|rate| rate / last[1]);
         Verdict::Ratio([estimate / last[0], last[0]], rate)
     }
 }
@@ -344,19 +378,28 @@ impl Line {
     }
 
     fn share(of: &[f64], is: impl Fn(f64) -> bool) -> f64 {
-        if of.is_empty() { f64::NAN } else { of.iter().filter(|&&ratio| is(ratio)).count() as f64 / of.len() as f64 }
+        if of.is_empty() {
+            f64::NAN
+        } else {
+            of.iter().filter(|&&ratio| is(ratio)).count() as f64 / of.len() as f64
+        }
     }
 
     /// Shares inside [1/3, 10] and below, and of horizons within 20 %.
     fn shares(&self) -> [f64; 3] {
         let horizons: u64 = self.horizons.iter().sum();
         let inside = Self::share(&self.ratios, |ratio| (1.0 / 3.0..=10.0).contains(&ratio));
-        [inside, Self::share(&self.ratios, |ratio| ratio < 1.0 / 3.0), self.horizons[0] as f64 / horizons as f64]
+        [
+            inside,
+            Self::share(&self.ratios, |ratio| ratio < 1.0 / 3.0),
+            self.horizons[0] as f64 / horizons as f64,
+        ]
     }
 
     fn print(&self, name: &str, to: &mut String) {
         let [inside, below, within] = self.shares();
-        let percent = |share: f64| if share.is_nan() { "–".to_owned() } else { format!("{:.1} %", 100.0 * share) };
+        let percent =
+            |share: f64| if share.is_nan() { "–".to_owned() } else { format!("{:.1} %", 100.0 * share) };
         let horizons: u64 = self.horizons.iter().sum();
         let rates = Self::share(&self.rates, |ratio| (1.0 / 3.0..=10.0).contains(&ratio));
         let [right, wrong] = self.rounding;
@@ -433,12 +476,17 @@ fn estimates_are_near_the_truth() {
     for seed in first..first + cases {
         let Some(case) = case(seed) else { continue };
         if let Ok(path) = std::env::var("FOUND") {
-            std::fs::write(format!("{path}/{seed}.json"), case.scene.to_input().to_string()).expect("a folder");
+            std::fs::write(format!("{path}/{seed}.json"), case.scene.to_input().to_string())
+                .expect("a folder");
         }
         let verdict = judge(&case);
         let method = case.request.method.map_or("chosen".to_owned(), |method| method.to_string());
         table.take(&case, &verdict, &method);
-        let setting = case.request.rtol.or(case.request.step).map_or("default".to_owned(), |setting| format!("{setting:.1e}"));
+        let setting = case
+            .request
+            .rtol
+            .or(case.request.step)
+            .map_or("default".to_owned(), |setting| format!("{setting:.1e}"));
         let told = match &verdict {
             Verdict::Ratio([ratio, truth], rate) if !(1.0 / 3.0..=10.0).contains(ratio) => {
                 format!("r = {ratio:.3e} at {truth:.1e}, rates {rate:?}")
@@ -446,7 +494,9 @@ fn estimates_are_near_the_truth() {
             Verdict::Ratio([ratio, truth], Some(rate)) if !(1.0 / 3.0..=10.0).contains(rate) => {
                 format!("rates r = {rate:.3e}, angles {ratio:.2} at {truth:.1e}")
             }
-            Verdict::Horizons(told, truth) if horizon_class(*told, *truth) > 0 => format!("horizon {told:?} instead of {truth:?}"),
+            Verdict::Horizons(told, truth) if horizon_class(*told, *truth) > 0 => {
+                format!("horizon {told:?} instead of {truth:?}")
+            }
             Verdict::Rounding(false) => "too large at rounding".into(),
             Verdict::Extrapolated(ratio) => format!("extrapolated, r = {ratio:.2e}"),
             Verdict::None(why) => format!("none: {why}"),

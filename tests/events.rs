@@ -1,4 +1,5 @@
-//! Events inside a step: impacts, turn-overs and springs without length are found however long the step is and however shallow the passage.
+//! Events inside a step: impacts, turn-overs and springs without length are found however long the step is
+//! and however shallow the passage.
 
 use crate::common;
 
@@ -38,7 +39,8 @@ fn turning(length: f64, start: [f64; 2], through: [f64; 2], normal: [f64; 2]) ->
     parse_scene(&text, "turning", &[]).expect("a scene")
 }
 
-/// From 0.3 rad up and over to the wall near the lowest point, back and over to its other side: twice half the rate is left.
+/// From 0.3 rad up and over to the wall near the lowest point, back and over to its other side: twice half
+/// the rate is left.
 #[test]
 fn a_tip_that_dips_below_its_wall_for_a_moment_is_stopped_both_times() {
     let edge = 0.999_f64.asin();
@@ -53,13 +55,17 @@ fn a_tip_that_dips_below_its_wall_for_a_moment_is_stopped_both_times() {
                 assert!((strike.t - t).abs() < 1e-11, "{name}, every {every}: {} instead of {t}", strike.t);
             }
             let phi = second + 0.75 * (6.0 - t[1]);
-            assert!((outcome.last.phi[0] - phi).abs() < 1e-11, "{name}, every {every}: {} instead of {phi}", outcome.last.phi[0]);
+            assert!(
+                (outcome.last.phi[0] - phi).abs() < 1e-11,
+                "{name}, every {every}: {} instead of {phi}",
+                outcome.last.phi[0]
+            );
         }
     }
 }
 
-/// A tip that turns at 50 rad/s grazes a wall across its circle at the depths 1e-4 to 1e-12 of its length: it is there ∓acos(1 - depth) from the crown, which
-/// is 2.8e-8 s for the last.
+/// A tip that turns at 50 rad/s grazes a wall across its circle at the depths 1e-4 to 1e-12 of its length: it
+/// is there ∓acos(1 - depth) from the crown, which is 2.8e-8 s for the last.
 #[test]
 fn a_turning_tip_grazes_its_wall_however_shallowly() {
     for name in METHODS {
@@ -73,7 +79,11 @@ fn a_turning_tip_grazes_its_wall_however_shallowly() {
             let t = (2.0 - before) / 50.0;
             // Rounding of the gap over its slope.
             let unsure = 1e-12 + 1e-15 / (50.0 * before);
-            assert!((outcome.impacts[0].t - t).abs() < unsure, "{name} at depth {depth:e}: {} instead of {t}", outcome.impacts[0].t);
+            assert!(
+                (outcome.impacts[0].t - t).abs() < unsure,
+                "{name} at depth {depth:e}: {} instead of {t}",
+                outcome.impacts[0].t
+            );
         }
         let clear = turning(0.6, [-2.0, 50.0], [0.6 * (1.0 + 1e-12), 0.0], [-1.0, 0.0]);
         assert_eq!(run(&clear, &by(name, 0.06)).impact_count, 0, "{name}");
@@ -85,7 +95,14 @@ fn swinging(depth: f64) -> Scene {
     let mut scene = pendulum(1.0, 0.0);
     let angle = depth - 1.0;
     let normal = [-angle.sin(), angle.cos()];
-    scene.walls.push(Wall { name: "wall".into(), bar: 0, point: [1.0, 0.0], through: [0.0, 0.0], normal, restitution: 0.5 });
+    scene.walls.push(Wall {
+        name: "wall".into(),
+        bar: 0,
+        point: [1.0, 0.0],
+        through: [0.0, 0.0],
+        normal,
+        restitution: 0.5,
+    });
     scene
 }
 
@@ -108,13 +125,24 @@ fn a_swing_that_turns_back_at_its_wall_touches_it_or_does_not() {
         while depth >= 0.99 * least {
             let request = Request { rtol: Some(rtol), ..by(name, 1.5 * half) };
             let outcome = run(&swinging(depth), &request);
-            assert_eq!((outcome.stop.as_ref(), outcome.impact_count), (None, 1), "{name} at {rtol:e}, depth {depth:e}");
+            assert_eq!(
+                (outcome.stop.as_ref(), outcome.impact_count),
+                (None, 1),
+                "{name} at {rtol:e}, depth {depth:e}"
+            );
             // omega² = 30 (cos(1 - depth) - cos 1).
             let speed = (30.0 * ((1.0 - depth).cos() - 1f64.cos())).sqrt();
             let seen = -outcome.impacts[0].approach;
-            assert!((seen - speed).abs() < 20.0 * least / speed, "{name} at {rtol:e}, depth {depth:e}: {seen:e} instead of {speed:e} m/s");
+            assert!(
+                (seen - speed).abs() < 20.0 * least / speed,
+                "{name} at {rtol:e}, depth {depth:e}: {seen:e} instead of {speed:e} m/s"
+            );
             let clear = run(&swinging(-depth), &request);
-            assert_eq!((clear.stop.as_ref(), clear.impact_count), (None, 0), "{name} at {rtol:e}, {depth:e} before the wall");
+            assert_eq!(
+                (clear.stop.as_ref(), clear.impact_count),
+                (None, 0),
+                "{name} at {rtol:e}, {depth:e} before the wall"
+            );
             depth *= 0.1;
         }
     }
@@ -140,7 +168,11 @@ fn a_wall_behind_a_driven_bar_is_met_by_every_form() {
     for name in ["dp8", "dp5", "radau9"] {
         for stabilization in [Stabilization::Elimination, Stabilization::Projection] {
             let outcome = of(name, Some(stabilization));
-            assert_eq!((outcome.stop.as_ref(), outcome.impact_count), (None, known.impact_count), "{name} {stabilization:?}");
+            assert_eq!(
+                (outcome.stop.as_ref(), outcome.impact_count),
+                (None, known.impact_count),
+                "{name} {stabilization:?}"
+            );
             for (a, b) in outcome.impacts.iter().zip(&known.impacts) {
                 assert!((a.t - b.t).abs() < 1e-7, "{name} {stabilization:?}: {a:?} {b:?}");
             }
@@ -148,7 +180,8 @@ fn a_wall_behind_a_driven_bar_is_met_by_every_form() {
     }
 }
 
-/// Angles of a bar on a torsion spring wind, and are not wrapped: `t = ∫ dphi/omega` from 0 to π, with omega² = omega_0² - 2 m g l sin(phi)/I.
+/// Angles of a bar on a torsion spring wind, and are not wrapped: `t = ∫ dphi/omega` from 0 to π, with omega²
+/// = omega_0² - 2 m g l sin(phi)/I.
 #[test]
 fn a_bar_on_a_torsion_spring_turns_over_when_it_does() {
     let text = r#"{"name": "winding", "gravity": [0, -9.81], "until": 2, "every": 0.5,
@@ -163,7 +196,9 @@ fn a_bar_on_a_torsion_spring_turns_over_when_it_does() {
         let weight = |k: u32| if k == 0 || k == parts { 1.0 } else { 2.0 + 2.0 * f64::from(k % 2) };
         (0..=parts).map(|k| weight(k) / rate(f64::from(k) * h)).sum::<f64>() * h / 3.0
     };
-    for name in ["taylor", "dp5", "dp8", "dopri5", "dop853", "radau5", "radau9", "gauss8", "gauss16", "rattle6"] {
+    for name in
+        ["taylor", "dp5", "dp8", "dopri5", "dop853", "radau5", "radau9", "gauss8", "gauss16", "rattle6"]
+    {
         let vary: Vec<Vary> = vec!["start.bar.omega=8..10:2".parse().expect("a range")];
         let step = name.starts_with(['g', 'r']).then_some(1e-3).filter(|_| !name.starts_with("radau"));
         let request = Request { method: method(name), until: Some(2.0), step, ..Request::default() };
@@ -184,12 +219,17 @@ fn a_bar_on_a_torsion_spring_turns_over_when_it_does() {
         .expect("all points");
         for (found, omega) in flips.iter().zip([8.0, 10.0]) {
             let loose = if name == "rattle6" { 1e-6 } else { 1e-8 };
-            assert!((found - expected(omega)).abs() < loose, "{name}: {found} instead of {}", expected(omega));
+            assert!(
+                (found - expected(omega)).abs() < loose,
+                "{name}: {found} instead of {}",
+                expected(omega)
+            );
         }
     }
 }
 
-/// A ball without hinges on a spring to the ground: x = L0 + (x0 - L0) cos(w t) + v0/w sin(w t) until the ends meet.
+/// A ball without hinges on a spring to the ground: x = L0 + (x0 - L0) cos(w t) + v0/w sin(w t) until the
+/// ends meet.
 #[test]
 fn a_spring_on_a_free_body_is_watched_for_zero_length() {
     let scene = |aside: f64| {
@@ -212,12 +252,16 @@ fn a_spring_on_a_free_body_is_watched_for_zero_length() {
         assert_eq!(stop.cause, Cause::SpringWithoutLength, "{name}: {stop}");
         assert!(stop.what.contains("`spring`") && (stop.t - t).abs() < 1e-5, "{name}: {stop}, not at {t}");
         let past = run(&scene(0.05), &request(name)).stop;
-        assert!(past.as_ref().is_none_or(|stop| stop.cause != Cause::SpringWithoutLength), "{name}: {past:?}");
+        assert!(
+            past.as_ref().is_none_or(|stop| stop.cause != Cause::SpringWithoutLength),
+            "{name}: {past:?}"
+        );
     }
 }
 
-/// Two bodies that know nothing of each other: a bar meets a wall without restitution and falls from it at once, a ball meets the floor a moment later or before, in
-/// the same step.  Rounding may turn the bar's rate against the wall it has just left, which must not hide the ball's impact.
+/// Two bodies that know nothing of each other: a bar meets a wall without restitution and falls from it at
+/// once, a ball meets the floor a moment later or before, in the same step.  Rounding may turn the bar's rate
+/// against the wall it has just left, which must not hide the ball's impact.
 #[test]
 fn an_impact_is_found_right_after_another_body_has_left_its_wall() {
     let (fall, rest) = (0.25, 0.02);
@@ -243,7 +287,11 @@ fn an_impact_is_found_right_after_another_body_has_left_its_wall() {
             );
             let scene = parse_scene(&text, "two", &[]).expect("a scene");
             let outcome = run(&scene, &Request { method: method(name), ..Request::default() });
-            assert_eq!((outcome.stop.as_ref(), outcome.impact_count), (None, 2), "{name}, ceiling at {at} rad");
+            assert_eq!(
+                (outcome.stop.as_ref(), outcome.impact_count),
+                (None, 2),
+                "{name}, ceiling at {at} rad"
+            );
             let (found, exact) = (outcome.last.velocity[1][1], 9.81 * (0.5 * fall - rest));
             assert!((found - exact).abs() < 1e-9, "{name}, ceiling at {at} rad: {found} instead of {exact}");
         }

@@ -12,7 +12,13 @@ use std::f64::consts::{FRAC_PI_2, PI};
 const EXPLICIT: [MethodId; 4] = [MethodId::Dopri5, MethodId::Dop853, MethodId::Dp5, MethodId::Dp8];
 
 fn request(method: MethodId, rtol: f64, until: f64) -> Request {
-    Request { method: Some(method), rtol: Some(rtol), until: Some(until), every: Some(until / 10.0), ..Request::default() }
+    Request {
+        method: Some(method),
+        rtol: Some(rtol),
+        until: Some(until),
+        every: Some(until / 10.0),
+        ..Request::default()
+    }
 }
 
 /// Runs to the end with the energy within `bound`.
@@ -52,7 +58,13 @@ fn without_gravity_a_bar_turns_steadily() {
         let outcome = assert_sound(&scene, &request(method, 1e-10, 100.0), 1e-12);
         assert!((outcome.last.phi[0] - 301.0).abs() < 1e-10, "{method}: {}", outcome.last.phi[0]);
     }
-    let fixed = Request { method: Some(MethodId::Gauss(8)), step: Some(0.125), until: Some(100.0), every: Some(1.0), ..Request::default() };
+    let fixed = Request {
+        method: Some(MethodId::Gauss(8)),
+        step: Some(0.125),
+        until: Some(100.0),
+        every: Some(1.0),
+        ..Request::default()
+    };
     assert!((assert_sound(&scene, &fixed, 1e-15).last.phi[0] - 301.0).abs() < 1e-13);
     // At rest without gravity nothing has a scale, and nothing moves.
     scene.start[0].omega = 0.0;
@@ -68,7 +80,8 @@ fn gravity_sets_the_clock() {
     let mut fast = slow.clone();
     fast.gravity[0] *= 1e6;
     for method in [MethodId::Dop853, MethodId::Dp8] {
-        let (slow, fast) = (run(&slow, &request(method, 1e-12, 3.0)), run(&fast, &request(method, 1e-12, 3e-3)));
+        let (slow, fast) =
+            (run(&slow, &request(method, 1e-12, 3.0)), run(&fast, &request(method, 1e-12, 3e-3)));
         for k in 0..2 {
             assert!((slow.last.phi[k] - fast.last.phi[k]).abs() < 1e-7, "{method}");
             assert!((slow.last.omega[k] - fast.last.omega[k] / 1e3).abs() < 1e-6, "{method}");
@@ -82,7 +95,8 @@ fn bars_of_very_unequal_mass_and_length() {
         let mut scene = shipped("free", &[]);
         scene.name = format!("ratio-{mass}-{length}");
         let bar = &mut scene.bars[1];
-        (bar.mass, bar.length, bar.centre[0]) = (bar.mass * mass, bar.length * length, bar.centre[0] * length);
+        (bar.mass, bar.length, bar.centre[0]) =
+            (bar.mass * mass, bar.length * length, bar.centre[0] * length);
         bar.inertia *= mass * length * length;
         assert_sound(&scene, &request(MethodId::Dp8, 1e-11, 1.0), 1e-7);
         assert_sound(&scene, &request(MethodId::Dop853, 1e-11, 1.0), 1e-7);
@@ -120,22 +134,31 @@ fn hanging_at_rest_stays_exactly_there() {
         assert_eq!((last.phi, last.omega), (vec![0.0; 2], vec![0.0; 2]));
     }
     for stages in [2, 5, 8] {
-        let fixed =
-            Request { method: Some(MethodId::Gauss(stages)), step: Some(0.1), until: Some(50.0), every: Some(5.0), ..Request::default() };
+        let fixed = Request {
+            method: Some(MethodId::Gauss(stages)),
+            step: Some(0.1),
+            until: Some(50.0),
+            every: Some(5.0),
+            ..Request::default()
+        };
         let last = assert_sound(&scene, &fixed, 1e-300).last;
         assert_eq!((last.phi, last.omega), (vec![0.0; 2], vec![0.0; 2]));
     }
 }
 
 /// Balanced upside down to the last bit of pi: sin(pi) is 1.2e-16, not 0, and the fall begins from there:
-/// delta grows as 1.2e-16 cosh(sqrt(15) t), give or take what rounding the angle in the first steps adds, which are long: no tolerance sees so little.
+/// delta grows as 1.2e-16 cosh(sqrt(15) t), give or take what rounding the angle in the first steps adds,
+/// which are long: no tolerance sees so little.
 #[test]
 fn upside_down_it_falls_as_slowly_as_its_last_bit_says() {
     let outcome = run(&pendulum(PI, 0.0), &request(MethodId::Dp8, 1e-12, 8.0));
     assert_eq!(outcome.stop, None);
     let early = &outcome.trace.head[5];
     let expected = 1.224_646_799_147_353_2e-16 * (15f64.sqrt() * early.t).cosh();
-    println!("{:?} {expected:e}", outcome.trace.head.iter().map(|sample| PI - sample.phi[0]).collect::<Vec<_>>());
+    println!(
+        "{:?} {expected:e}",
+        outcome.trace.head.iter().map(|sample| PI - sample.phi[0]).collect::<Vec<_>>()
+    );
     let fallen = PI - early.phi[0];
     assert!((0.1 * expected..10.0 * expected).contains(&fallen), "{fallen:e} of {expected:e}");
     assert!(outcome.drift.energy.max < 1e-10);
@@ -153,7 +176,8 @@ fn a_million_turns_at_the_start_change_nothing() {
         plain.start[k].phi = start.phi[k].hi;
     }
     for method in EXPLICIT {
-        let (wound, plain) = (run(&wound, &request(method, 1e-9, 2.0)).last, run(&plain, &request(method, 1e-9, 2.0)).last);
+        let (wound, plain) =
+            (run(&wound, &request(method, 1e-9, 2.0)).last, run(&plain, &request(method, 1e-9, 2.0)).last);
         for k in 0..2 {
             let turns = [1e6, -1e6][k] * 2.0 * PI;
             // The winding angle is a double near 6e6 rad: its last place is 1e-9.
@@ -180,17 +204,27 @@ fn a_spring_of_no_length_is_a_typed_stop() {
         assert_eq!((stop.cause, stop.t), (Cause::NotFinite, 0.0), "{stop}");
         assert!(stop.what.contains("bar") && stop.hint.contains("spring"), "{stop}");
     }
-    let fixed = Request { method: Some(MethodId::Gauss(4)), step: Some(0.01), until: Some(1.0), every: Some(0.1), ..Request::default() };
+    let fixed = Request {
+        method: Some(MethodId::Gauss(4)),
+        step: Some(0.01),
+        until: Some(1.0),
+        every: Some(0.1),
+        ..Request::default()
+    };
     let stop = run(&scene, &fixed).stop.expect("a stop");
     assert_eq!((stop.cause, stop.t), (Cause::NotFinite, 0.0), "{stop}");
-    // Passing through the anchor at speed the force flips in no time: through with the energy kept, or a typed stop before it.
+    // Passing through the anchor at speed the force flips in no time: through with the energy kept, or a
+    // typed stop before it.
     scene.start[0] = driftless::scene::Start { phi: 1.0, omega: -8.0 };
     for method in EXPLICIT {
         let outcome = run(&scene, &request(method, 1e-9, 1.0));
         match &outcome.stop {
             None => assert!(outcome.drift.energy.max < 1e-5, "{method}: {:e}", outcome.drift.energy.max),
             Some(stop) => {
-                assert!(matches!(stop.cause, Cause::NotFinite | Cause::StepTooSmall | Cause::SpringWithoutLength), "{stop}");
+                assert!(
+                    matches!(stop.cause, Cause::NotFinite | Cause::StepTooSmall | Cause::SpringWithoutLength),
+                    "{stop}"
+                );
                 assert!(stop.t > 0.1 && stop.t < 0.2, "{stop}");
             }
         }
@@ -217,8 +251,8 @@ fn effort_that_is_used_up_is_a_typed_stop() {
         };
         (Scene { until: 1e4, every: 50.0, ..shipped(name, &[]) }, request)
     };
-    let of_any =
-        ["dopri5", "dop853", "dp5", "dp8", "taylor", "gauss4", "gauss16", "rattle2", "rattle8"].map(|method| named("free", method, None));
+    let of_any = ["dopri5", "dop853", "dp5", "dp8", "taylor", "gauss4", "gauss16", "rattle2", "rattle8"]
+        .map(|method| named("free", method, None));
     let others = [
         named("motor_sine", "dp8", Some(Stabilization::Projection)),
         named("motor_sine", "dp5", Some(Stabilization::Baumgarte)),
@@ -232,15 +266,33 @@ fn effort_that_is_used_up_is_a_typed_stop() {
         let outcome = run(&scene, &request);
         let stop = outcome.stop.unwrap_or_else(|| panic!("{}, {:?} ended", scene.name, request.method));
         assert_eq!(stop.cause, Cause::EffortExhausted, "{stop}");
-        assert!(stop.t > 0.0 && stop.t < 1e4 && stop.hint.contains("--max-evaluations") && stop.what.contains("2000"), "{stop}");
+        assert!(
+            stop.t > 0.0
+                && stop.t < 1e4
+                && stop.hint.contains("--max-evaluations")
+                && stop.what.contains("2000"),
+            "{stop}"
+        );
         // Steps that have begun are finished.
-        assert!((MAX_EVALUATIONS..MAX_EVALUATIONS + 1000).contains(&outcome.statistics.evaluations), "{stop} {:?}", outcome.statistics);
-        let more = run(&scene, &Request { max_evaluations: Some(2 * MAX_EVALUATIONS), ..request }).stop.expect("a stop");
-        assert!(more.t > stop.t || outcome.plan.method == MethodId::Dop853 || outcome.plan.method == MethodId::Dopri5, "{more}");
+        assert!(
+            (MAX_EVALUATIONS..MAX_EVALUATIONS + 1000).contains(&outcome.statistics.evaluations),
+            "{stop} {:?}",
+            outcome.statistics
+        );
+        let more = run(&scene, &Request { max_evaluations: Some(2 * MAX_EVALUATIONS), ..request })
+            .stop
+            .expect("a stop");
+        assert!(
+            more.t > stop.t
+                || outcome.plan.method == MethodId::Dop853
+                || outcome.plan.method == MethodId::Dopri5,
+            "{more}"
+        );
     }
 }
 
-/// Found by fuzzing: a place so far away that the length of its bar is rounded off it.  There is no constraint to blame, and none is.
+/// Found by fuzzing: a place so far away that the length of its bar is rounded off it.  There is no
+/// constraint to blame, and none is.
 #[test]
 fn places_beyond_rounding_are_refused_or_met() {
     for (length, origin) in [(1e-20, 1e25), (1.0, 1e30), (1e-30, 1.0), (1e20, 1e-20), (1e-3, 1e18)] {
@@ -248,7 +300,8 @@ fn places_beyond_rounding_are_refused_or_met() {
             r#"{{"name": "far", "gravity": [9.81, 0], "bars": [{{"name": "bar", "mass": 1, "centre": [{length:e}, 0], "inertia": 1}}],
                "start": {{"bar": {{"phi": 1, "omega": 0, "origin": [{origin:e}, 0], "velocity": [0, 1]}}}}, "until": 1, "every": 1}}"#
         );
-        let scene = driftless::scene::parse_scene(&text, "far.json", &[]).expect("valid as far as single values go");
+        let scene =
+            driftless::scene::parse_scene(&text, "far.json", &[]).expect("valid as far as single values go");
         if let Err(error) = driftless::dynamics::Mechanism::new(&scene) {
             assert!(error.to_string().contains("start"), "{error}");
         }
@@ -278,7 +331,10 @@ fn a_trajectory_of_gigabytes_has_to_be_asked_for() {
     let scene = Scene { until: 1e6, every: 0.01, ..shipped("free", &[]) };
     let mechanism = compile(&scene);
     let refusal = Plan::new(&scene, &mechanism, &Request::default()).expect_err("a refusal");
-    assert!(!refusal.is_usage && refusal.to_string().contains("34 GB") && refusal.to_string().contains("--every"), "{refusal}");
+    assert!(
+        !refusal.is_usage && refusal.to_string().contains("34 GB") && refusal.to_string().contains("--every"),
+        "{refusal}"
+    );
     assert!(Plan::new(&scene, &mechanism, &Request { every: Some(0.01), ..Request::default() }).is_ok());
     assert!(Plan::new(&scene, &mechanism, &Request { every: Some(1e-4), ..Request::default() }).is_err());
 }
@@ -288,8 +344,13 @@ fn a_trajectory_of_gigabytes_has_to_be_asked_for() {
 fn nothing_takes_for_ever() {
     let bouncing = shipped("wall", &["walls.wall.restitution=1", "gravity=[9.81, 0]"]);
     for method in [MethodId::Dp5, MethodId::Dp8, MethodId::Taylor] {
-        let request =
-            Request { until: Some(1e9), every: Some(1e9), max_evaluations: Some(50_000), method: Some(method), ..Request::default() };
+        let request = Request {
+            until: Some(1e9),
+            every: Some(1e9),
+            max_evaluations: Some(50_000),
+            method: Some(method),
+            ..Request::default()
+        };
         let stop = run(&bouncing, &request).stop.expect("a stop");
         assert!(matches!(stop.cause, Cause::EffortExhausted | Cause::RestingContact), "{stop}");
     }
@@ -297,27 +358,39 @@ fn nothing_takes_for_ever() {
     let plan = run(&shipped("free", &[]), &Request { until: Some(1.0), ..Request::default() }).plan;
     assert_eq!(plan.max_evaluations, 110_000_000);
     // And not by the horizon alone: what cannot be reached is said beforehand.
-    let (scene, most) = (shipped("free", &[]), [(MethodId::Dp8, 10_000_000_000), (MethodId::Taylor, 1_000_000_000)]);
+    let (scene, most) =
+        (shipped("free", &[]), [(MethodId::Dp8, 10_000_000_000), (MethodId::Taylor, 1_000_000_000)]);
     for (method, max_evaluations) in most {
-        let request = Request { until: Some(1e9), every: Some(1e9), method: Some(method), ..Request::default() };
+        let request =
+            Request { until: Some(1e9), every: Some(1e9), method: Some(method), ..Request::default() };
         let plan = driftless::run::Plan::new(&scene, &compile(&scene), &request).expect("a plan");
         assert_eq!(plan.max_evaluations, max_evaluations);
-        assert!(plan.notes.iter().any(|note| note.contains("--max-evaluations") && note.contains("may stop")), "{:?}", plan.notes);
+        assert!(
+            plan.notes.iter().any(|note| note.contains("--max-evaluations") && note.contains("may stop")),
+            "{:?}",
+            plan.notes
+        );
     }
 }
 
 #[test]
 fn a_step_far_too_long_is_a_typed_stop() {
     for stages in [2, 8] {
-        let fixed =
-            Request { method: Some(MethodId::Gauss(stages)), step: Some(5.0), until: Some(100.0), every: Some(5.0), ..Request::default() };
+        let fixed = Request {
+            method: Some(MethodId::Gauss(stages)),
+            step: Some(5.0),
+            until: Some(100.0),
+            every: Some(5.0),
+            ..Request::default()
+        };
         let stop = run(&shipped("spinning", &[]), &fixed).stop.expect("a stop");
         assert!(matches!(stop.cause, Cause::NotConverged | Cause::NotFinite), "{stop}");
         assert!(stop.t < 100.0 && stop.hint.contains("step"), "{stop}");
     }
 }
 
-/// A step that is looked at again, because the ends of a spring come near one another in it, may be the last before an output time; the run goes on all the same.
+/// A step that is looked at again, because the ends of a spring come near one another in it, may be the last
+/// before an output time; the run goes on all the same.
 #[test]
 fn a_look_at_a_spring_ends_no_run() {
     let text = r#"{"name": "near", "gravity": [25.9, 0], "bars": [{"name": "bar", "length": 0.92, "width": 0.092, "thickness": 0.01, "density": 575}],
@@ -330,7 +403,11 @@ fn a_look_at_a_spring_ends_no_run() {
         for parts in [4.0, 8.0, 64.0] {
             let step = (!method.is_adaptive()).then_some(scene.until / parts);
             let outcome = run(&scene, &Request { method: Some(method), step, ..Request::default() });
-            assert!(outcome.stop.is_some() || outcome.last.t == scene.until, "{method}, {parts} steps: ended at {} s", outcome.last.t);
+            assert!(
+                outcome.stop.is_some() || outcome.last.t == scene.until,
+                "{method}, {parts} steps: ended at {} s",
+                outcome.last.t
+            );
         }
     }
 }
@@ -344,7 +421,13 @@ fn a_motor_that_turns_often_in_a_step_is_a_typed_stop() {
     for turns in [1.0, 36.0] {
         let step = turns * std::f64::consts::TAU / rate.abs();
         let method = Some(MethodId::Rattle(Composition::Single));
-        let request = Request { method, step: Some(step), until: Some(4.0 * step), every: Some(step), ..Request::default() };
+        let request = Request {
+            method,
+            step: Some(step),
+            until: Some(4.0 * step),
+            every: Some(step),
+            ..Request::default()
+        };
         let outcome = run(&scene, &request);
         let stop = outcome.stop.expect("a stop");
         assert!(stop.cause == Cause::NotConverged && stop.t == 0.0 && stop.hint.contains("step"), "{stop}");
@@ -362,7 +445,10 @@ fn the_output_interval_does_not_matter() {
             outcome.last.phi[1]
         };
         let (dense, usual, sparse) = (at(1e-4), at(0.01), at(1.0));
-        assert!((dense - usual).abs() < 1e-8 && (sparse - usual).abs() < 1e-8, "{method}: {dense} {usual} {sparse}");
+        assert!(
+            (dense - usual).abs() < 1e-8 && (sparse - usual).abs() < 1e-8,
+            "{method}: {dense} {usual} {sparse}"
+        );
     }
     // Windows as short as time can tell apart near the start.
     let short = Request { every: Some(1e-9), ..request(MethodId::Dop853, 1e-9, 1e-6) };
@@ -389,7 +475,11 @@ fn a_thousand_periods_end_where_they_began() {
         ..Request::default()
     };
     let outcome = assert_sound(&pendulum(1.0, 0.0), &fixed, 1e-14);
-    assert!((outcome.last.phi[0] - 1.0).abs() < 1e-11 && outcome.last.omega[0].abs() < 1e-10, "{:?}", outcome.last);
+    assert!(
+        (outcome.last.phi[0] - 1.0).abs() < 1e-11 && outcome.last.omega[0].abs() < 1e-10,
+        "{:?}",
+        outcome.last
+    );
 }
 
 #[test]
@@ -401,25 +491,36 @@ fn every_body_driven_leaves_nothing_to_solve() {
     (scene.start[1].phi, scene.start[1].omega) = (scene.motors[1].law.start, -2.0);
     for stabilize in Stabilization::ALL {
         for method in [MethodId::Dp8, MethodId::Dp5] {
-            let outcome = assert_sound(&scene, &Request { stabilize: Some(stabilize), ..request(method, 1e-10, 3.0) }, 1e-6);
+            let outcome = assert_sound(
+                &scene,
+                &Request { stabilize: Some(stabilize), ..request(method, 1e-10, 3.0) },
+                1e-6,
+            );
             let expected = scene.motors[1].law.angle(3.0.into()).hi;
             assert!((outcome.last.phi[1] - expected).abs() < 1e-8, "{method} {stabilize}");
         }
     }
-    let fixed =
-        Request { method: Some(MethodId::Gauss(8)), step: Some(1.0 / 128.0), until: Some(3.0), every: Some(0.25), ..Request::default() };
+    let fixed = Request {
+        method: Some(MethodId::Gauss(8)),
+        step: Some(1.0 / 128.0),
+        until: Some(3.0),
+        every: Some(0.25),
+        ..Request::default()
+    };
     assert_sound(&scene, &fixed, 1e-13);
 }
 
 #[test]
 fn a_stated_drift_limit_stops_the_run_with_its_time() {
     let limits = Limits { energy: Some(1e-9), constraint: None };
-    let stop = run_limited(&shipped("free", &[]), &request(MethodId::Dp5, 1e-4, 10.0), limits).stop.expect("a stop");
+    let stop =
+        run_limited(&shipped("free", &[]), &request(MethodId::Dp5, 1e-4, 10.0), limits).stop.expect("a stop");
     assert_eq!(stop.cause, Cause::DriftLimit);
     assert!(stop.t > 0.0 && stop.t <= 10.0 && stop.what.contains("limit"), "{stop}");
 }
 
-/// A torsion spring wound up by thousands of turns pulls at a motor that stands still: in a step of hours what is rounded of it is worth several turns.
+/// A torsion spring wound up by thousands of turns pulls at a motor that stands still: in a step of hours
+/// what is rounded of it is worth several turns.
 #[test]
 fn whole_turns_a_motor_lost_are_no_success() {
     let text = r#"{"name": "wound", "gravity": [5e-5, 0],

@@ -1,4 +1,5 @@
-//! Forces from outside the crate: written once over the scalar, they must do in every method what the scene's own parts do.
+//! Forces from outside the crate: written once over the scalar, they must do in every method what the scene's
+//! own parts do.
 
 use driftless::arithmetic::Scalar;
 use driftless::dynamics::constraint::Site;
@@ -17,7 +18,8 @@ fn scene(name: &str) -> Scene {
 
 fn run(scene: &Scene, forces: Vec<UserForce>, request: Request) -> Outcome {
     let mechanism = Arc::new(Mechanism::with_forces(scene, forces).expect("equations"));
-    let plan = Plan::new(scene, &mechanism, &request).unwrap_or_else(|refusal| panic!("{}: {refusal}", scene.name));
+    let plan =
+        Plan::new(scene, &mechanism, &request).unwrap_or_else(|refusal| panic!("{}: {refusal}", scene.name));
     let start = mechanism.start(scene);
     let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a run");
     let outcome = integrate(run.trusted(Level::Off, &start), &mut |_| Ok(())).expect("samples");
@@ -37,7 +39,12 @@ impl Springs {
             Some(bar) => mechanism.site(&scene.bars[bar].name, place.point).expect("a bar"),
             None => Site::ground(place.point),
         };
-        Self(springs.into_iter().map(|spring| (site(spring.between[0]), site(spring.between[1]), spring)).collect())
+        Self(
+            springs
+                .into_iter()
+                .map(|spring| (site(spring.between[0]), site(spring.between[1]), spring))
+                .collect(),
+        )
     }
 }
 
@@ -73,7 +80,9 @@ impl Force for Springs {
 }
 
 fn methods(step: f64) -> Vec<(MethodId, Request)> {
-    let adaptive = |method, rtol| (method, Request { method: Some(method), rtol: Some(rtol), atol: Some(rtol), ..Request::default() });
+    let adaptive = |method, rtol| {
+        (method, Request { method: Some(method), rtol: Some(rtol), atol: Some(rtol), ..Request::default() })
+    };
     let fixed = |method| (method, Request { method: Some(method), step: Some(step), ..Request::default() });
     vec![
         adaptive(MethodId::Dopri5, 1e-10),
@@ -126,7 +135,11 @@ fn springs_from_outside_move_every_scene_as_its_own_do_by_every_method() {
         own.springs.iter_mut().for_each(|spring| spring.damping = damping);
         let mut other = own.clone();
         let springs = UserForce::record(&Springs::of(&mut other)).expect("a force");
-        let reference = run(&own, Vec::new(), Request { method: Some(MethodId::Taylor), rtol: Some(1e-14), ..Request::default() });
+        let reference = run(
+            &own,
+            Vec::new(),
+            Request { method: Some(MethodId::Taylor), rtol: Some(1e-14), ..Request::default() },
+        );
         for (method, request) in methods(1e-3) {
             let is_rattle = matches!(method, MethodId::Rattle(_));
             // Those that the mechanism itself keeps out with springs of its own.
@@ -139,14 +152,18 @@ fn springs_from_outside_move_every_scene_as_its_own_do_by_every_method() {
             let bound = if is_rattle { 3e-7 } else { 3e-8 };
             assert!(off < bound, "{name} with damping {damping} by {method}: {off:e}");
             let drift = from_outside.drift.energy.max;
-            assert!(drift < 1e-8, "{name} with damping {damping} by {method}: the balance drifts by {drift:e}");
+            assert!(
+                drift < 1e-8,
+                "{name} with damping {damping} by {method}: the balance drifts by {drift:e}"
+            );
             covered += 1;
         }
     }
     assert!(covered >= 45, "{covered} pairs of scene and method");
 }
 
-/// A torque of a motor with a PD law, gravity of a point mass, a gust that depends on time, and a winding spring: every kind of input there is.
+/// A torque of a motor with a PD law, gravity of a point mass, a gust that depends on time, and a winding
+/// spring: every kind of input there is.
 struct Everything {
     tip: Site,
     body: usize,
@@ -185,7 +202,12 @@ fn all_methods_agree_on_a_force_of_everything_and_keep_its_balance() {
         let force = Everything { tip: mechanism.site(&bar.name, [bar.length, 0.02]).expect("a site"), body };
         let force = UserForce::record(&force).expect("a force");
         // By another formulation than all others: Radau's Newton with the Jacobian of dual numbers.
-        let radau = Request { method: Some(MethodId::Radau(5)), rtol: Some(1e-13), atol: Some(1e-13), ..Request::default() };
+        let radau = Request {
+            method: Some(MethodId::Radau(5)),
+            rtol: Some(1e-13),
+            atol: Some(1e-13),
+            ..Request::default()
+        };
         let reference = run(&own, vec![force.clone()], radau);
         let without = run(&own, Vec::new(), Request { method: Some(MethodId::Taylor), ..Request::default() });
         assert!(apart(&reference, &without) > 1e-3, "{name} does not feel the force");
@@ -193,7 +215,10 @@ fn all_methods_agree_on_a_force_of_everything_and_keep_its_balance() {
         for (method, request) in methods(1e-3) {
             let mechanism = Mechanism::with_forces(&own, vec![force.clone()]).expect("equations");
             if Plan::new(&own, &mechanism, &request).is_err() {
-                assert!(!matches!(method, MethodId::Taylor | MethodId::Dp8 | MethodId::Radau(_)), "{name} by {method} is refused");
+                assert!(
+                    !matches!(method, MethodId::Taylor | MethodId::Dp8 | MethodId::Radau(_)),
+                    "{name} by {method} is refused"
+                );
                 continue;
             }
             let outcome = run(&own, vec![force.clone()], request);
@@ -217,8 +242,13 @@ fn projection_and_baumgarte_take_forces_too() {
     let reference = run(&own, vec![force.clone()], taylor);
     for stabilize in [Stabilization::None, Stabilization::Baumgarte, Stabilization::Projection] {
         for method in [MethodId::Dp8, MethodId::Taylor] {
-            let request =
-                Request { method: Some(method), rtol: Some(1e-12), atol: Some(1e-12), stabilize: Some(stabilize), ..Request::default() };
+            let request = Request {
+                method: Some(method),
+                rtol: Some(1e-12),
+                atol: Some(1e-12),
+                stabilize: Some(stabilize),
+                ..Request::default()
+            };
             let mechanism = Mechanism::with_forces(&own, vec![force.clone()]).expect("equations");
             if Plan::new(&own, &mechanism, &request).is_err() {
                 continue;
@@ -234,7 +264,8 @@ fn hinges_carry_a_spring_from_outside_as_one_of_the_scene() {
     let own = scene("spring");
     let mut other = own.clone();
     let springs = UserForce::record(&Springs::of(&mut other)).expect("a force");
-    let [own, other] = [Mechanism::new(&own), Mechanism::with_forces(&other, vec![springs])].map(|mechanism| mechanism.expect("equations"));
+    let [own, other] = [Mechanism::new(&own), Mechanism::with_forces(&other, vec![springs])]
+        .map(|mechanism| mechanism.expect("equations"));
     let (phi, omega) = ([0.7, -1.1], [2.0, -3.0]);
     let forces = [own, other].map(|mechanism| {
         let mut kernel = Kernel::<f64>::new(&mechanism);
@@ -254,14 +285,21 @@ fn the_error_estimate_holds_with_a_force_from_outside() {
     let tip = mechanism.site("bar2", [0.6, 0.0]).expect("a site");
     let force = UserForce::record(&Everything { tip, body: 1 }).expect("a force");
     let mechanism = Arc::new(Mechanism::with_forces(&own, vec![force.clone()]).expect("equations"));
-    let request = Request { method: Some(MethodId::Dp8), rtol: Some(1e-8), atol: Some(1e-8), ..Request::default() };
+    let request =
+        Request { method: Some(MethodId::Dp8), rtol: Some(1e-8), atol: Some(1e-8), ..Request::default() };
     let plan = Plan::new(&own, &mechanism, &request).expect("a plan");
     let start = mechanism.start(&own);
-    let run_with_estimate = Run::new(mechanism, plan, Limits::default(), &start).expect("a run").trusted(Level::Auto, &start);
+    let run_with_estimate =
+        Run::new(mechanism, plan, Limits::default(), &start).expect("a run").trusted(Level::Auto, &start);
     let outcome = integrate(run_with_estimate, &mut |_| Ok(())).expect("samples");
-    let exact = run(&own, vec![force], Request { method: Some(MethodId::Taylor), extended: true, ..Request::default() });
+    let exact = run(
+        &own,
+        vec![force],
+        Request { method: Some(MethodId::Taylor), extended: true, ..Request::default() },
+    );
     let estimate = outcome.trust.as_ref().and_then(|trust| trust.error_estimate).expect("an estimate");
-    let error = outcome.last.phi.iter().zip(&exact.last.phi).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+    let error =
+        outcome.last.phi.iter().zip(&exact.last.phi).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
     assert!(estimate > error / 3.0 && estimate < 10.0 * error.max(1e-13), "{estimate:e} for {error:e}");
 }
 
@@ -293,7 +331,10 @@ impl Force for Elsewhere {
 fn what_cannot_be_right_is_refused() {
     assert_eq!(UserForce::record(&Wrong), Err(CompileError::NoPotential("wrong".into())));
     let elsewhere = UserForce::record(&Elsewhere).expect("a force of some mechanism");
-    assert_eq!(Mechanism::with_forces(&scene("free"), vec![elsewhere]).err(), Some(CompileError::ForeignForce("elsewhere".into())));
+    assert_eq!(
+        Mechanism::with_forces(&scene("free"), vec![elsewhere]).err(),
+        Some(CompileError::ForeignForce("elsewhere".into()))
+    );
     let mechanism = Mechanism::new(&scene("free")).expect("equations");
     assert_eq!(mechanism.site("bar9", [0.0; 2]).err(), Some(CompileError::NoSuchBar("bar9".into())));
 }

@@ -1,4 +1,5 @@
-//! The targets of `fuzz/` on inputs of a fixed seed, so that every change meets some; `FUZZ=1000000 cargo test --test reports fuzz::` has more.
+//! The targets of `fuzz/` on inputs of a fixed seed, so that every change meets some; `FUZZ=1000000 cargo
+//! test --test reports fuzz::` has more.
 #![cfg(feature = "cli")]
 
 use crate::extremes;
@@ -87,12 +88,15 @@ fn no_physics_makes_a_wrong_success() {
 /// Evaluations allowed to a run of an extreme scene.
 const MAX_EVALUATIONS: u64 = 20_000;
 
-/// Random scenes with numbers far out, by every method, with an effort of `MAX_EVALUATIONS` evaluations: each ends with exit code 0, 3, 4 or 5, every success stands up to
-/// an independent audit of its first row, its energy and its joints, and the program says the same of a part of them; a part is swept, with a look-out for bars that
-/// turn over, and a part has its error estimated.  `.ci/extremes N SEED` has more; scenes that fail go to the folder that `FOUND` names.
+/// Random scenes with numbers far out, by every method, with an effort of `MAX_EVALUATIONS` evaluations: each
+/// ends with exit code 0, 3, 4 or 5, every success stands up to an independent audit of its first row, its
+/// energy and its joints, and the program says the same of a part of them; a part is swept, with a look-out
+/// for bars that turn over, and a part has its error estimated.  `.ci/extremes N SEED` has more; scenes that
+/// fail go to the folder that `FOUND` names.
 #[test]
 fn random_extreme_scenes_end_as_promised() {
-    let number = |name: &str, usual: u64| std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(usual);
+    let number =
+        |name: &str, usual: u64| std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(usual);
     let (count, seed) = (number("EXTREMES", 600), number("SEED", 1));
     let program = Program::new();
     let mut seen = Seen::default();
@@ -105,7 +109,9 @@ fn random_extreme_scenes_end_as_promised() {
         if index % 100 < 2 {
             seen.shown += 1;
             program.write("random.json", &text);
-            let until = serde_json::from_str::<serde_json::Value>(&text).expect("JSON")["until"].as_f64().expect("a horizon");
+            let until = serde_json::from_str::<serde_json::Value>(&text).expect("JSON")["until"]
+                .as_f64()
+                .expect("a horizon");
             let options = options(&random::request(&mut draw, until, MAX_EVALUATIONS));
             let ran = program.run(&format!("run random.json --force --quiet --no-charts {options}"));
             let code = match ending {
@@ -123,8 +129,18 @@ fn random_extreme_scenes_end_as_promised() {
     }
     seen.tell(count);
     let Seen { failures, endings, .. } = seen;
-    assert!(failures.is_empty(), "{} failures, of which\n{}", failures.len(), failures[..failures.len().min(5)].join("\n"));
-    assert!(count < 100 || [Ending::Done, Ending::Refused].iter().all(|ending| endings.get(ending).is_some_and(|&some| some > count / 20)));
+    assert!(
+        failures.is_empty(),
+        "{} failures, of which\n{}",
+        failures.len(),
+        failures[..failures.len().min(5)].join("\n")
+    );
+    assert!(
+        count < 100
+            || [Ending::Done, Ending::Refused]
+                .iter()
+                .all(|ending| endings.get(ending).is_some_and(|&some| some > count / 20))
+    );
 }
 
 /// A scene that is consistent, in units far from the usual ones.
@@ -155,7 +171,8 @@ impl Seen {
     /// A scene through a run, and at times a sweep and an estimate; nothing where one of them panics.
     fn run(&mut self, index: u64, text: &str, draw: &Draw) -> Option<Ending> {
         let begin = Instant::now();
-        let ending = self.caught(index, text, "run", || targets::simulate(text, &mut draw.clone(), MAX_EVALUATIONS))?;
+        let ending =
+            self.caught(index, text, "run", || targets::simulate(text, &mut draw.clone(), MAX_EVALUATIONS))?;
         *self.endings.entry(ending).or_default() += 1;
         if let Some(scene) = extremes::parsed(text) {
             for kind in extremes::kinds(&scene) {
@@ -163,8 +180,9 @@ impl Seen {
                 *counts = [counts[0] + 1, counts[1] + u64::from(ending == Ending::Done)];
             }
             if matches!(index % 12, 2 | 3 | 5) && ending != Ending::Refused {
-                let swept =
-                    self.caught(index, text, "sweep", || extremes::sweep_of(text, &scene, &mut draw.clone(), MAX_EVALUATIONS / 4))?;
+                let swept = self.caught(index, text, "sweep", || {
+                    extremes::sweep_of(text, &scene, &mut draw.clone(), MAX_EVALUATIONS / 4)
+                })?;
                 let of_all = [swept.points, swept.done, swept.flipped, swept.compared];
                 self.swept.iter_mut().zip(of_all).for_each(|(sum, own)| *sum += own);
             }
@@ -172,8 +190,12 @@ impl Seen {
                 let request = random::request(&mut draw.clone(), scene.until, MAX_EVALUATIONS);
                 // What it costs is bounded by the run's work.
                 let level = if index % 4 == 3 { Level::Full } else { Level::Auto };
-                let given = self.caught(index, text, "trust", || extremes::trust_of(&scene, &request, level))?;
-                self.trusted = [self.trusted[0] + u64::from(given.is_some()), self.trusted[1] + u64::from(given == Some(true))];
+                let given =
+                    self.caught(index, text, "trust", || extremes::trust_of(&scene, &request, level))?;
+                self.trusted = [
+                    self.trusted[0] + u64::from(given.is_some()),
+                    self.trusted[1] + u64::from(given == Some(true)),
+                ];
             }
         }
         self.slowest = self.slowest.max((begin.elapsed(), index));
@@ -184,17 +206,25 @@ impl Seen {
     fn caught<T>(&mut self, index: u64, text: &str, what: &str, work: impl FnOnce() -> T) -> Option<T> {
         if let Some(folder) = std::env::var_os("FOUND") {
             // What never comes back is found here.
-            std::fs::write(Path::new(&folder).join("current.json"), format!("{index} {what} {text}\n")).expect("a folder");
+            std::fs::write(Path::new(&folder).join("current.json"), format!("{index} {what} {text}\n"))
+                .expect("a folder");
         }
         match catch_unwind(AssertUnwindSafe(work)) {
             Ok(found) => Some(found),
             Err(panic) => {
-                let said = panic.downcast_ref::<String>().cloned().or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned()));
+                let said = panic
+                    .downcast_ref::<String>()
+                    .cloned()
+                    .or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned()));
                 let said = said.unwrap_or_default();
                 if let Some(folder) = std::env::var_os("FOUND") {
                     let scene: serde_json::Value = serde_json::from_str(text).expect("JSON");
                     let found = serde_json::json!({"command": what, "what": said, "scene": scene});
-                    std::fs::write(Path::new(&folder).join(format!("{what}-{index}.json")), format!("{found:#}\n")).expect("a folder");
+                    std::fs::write(
+                        Path::new(&folder).join(format!("{what}-{index}.json")),
+                        format!("{found:#}\n"),
+                    )
+                    .expect("a folder");
                 }
                 self.failures.push(format!("{what} of scene {index}: {said}\n  {text}"));
                 None
@@ -209,7 +239,10 @@ impl Seen {
             "{} points swept, {} done, {} with a bar that turns over, {} compared with the rows of a run",
             swept[0], swept[1], swept[2], swept[3]
         );
-        println!("{} runs with an estimate asked for, {} with one given; slowest scene {slowest:?}", trusted[0], trusted[1]);
+        println!(
+            "{} runs with an estimate asked for, {} with one given; slowest scene {slowest:?}",
+            trusted[0], trusted[1]
+        );
         for (kind, [met, done]) in kinds {
             println!("  {kind:28} {met:6} scenes, {done:6} ran to their end");
         }

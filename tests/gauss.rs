@@ -64,9 +64,15 @@ fn gauss(stages: usize, step: f64) -> Gauss {
 }
 
 /// Integrates on to `until`.
-fn integrate<F: OdeSystem + ?Sized>(method: &mut Gauss, problem: &mut F, state: &mut State, until: f64) -> Result<Statistics, StepError> {
+fn integrate<F: OdeSystem + ?Sized>(
+    method: &mut Gauss,
+    problem: &mut F,
+    state: &mut State,
+    until: f64,
+) -> Result<Statistics, StepError> {
     let mut statistics = Statistics::default();
-    let reached = method.advance(problem, state, Time::of(until), &mut statistics, &mut |_, _| Ok(Seen::Kept))?;
+    let reached =
+        method.advance(problem, state, Time::of(until), &mut statistics, &mut |_, _| Ok(Seen::Kept))?;
     assert_eq!(reached, Reached::Until);
     Ok(statistics)
 }
@@ -84,12 +90,20 @@ impl Balance {
 
     fn at(&mut self, form: &mut impl Form, state: &State) -> DoubleDouble {
         form.read(state, &mut self.motion);
-        form.mechanism().energy(&mut self.kernel, &self.motion.phi, &self.motion.omega).total() - self.motion.work
+        form.mechanism().energy(&mut self.kernel, &self.motion.phi, &self.motion.omega).total()
+            - self.motion.work
     }
 }
 
-/// Largest excursion of the balance over its scale, and the slope \[1/s\] of a straight line through it, sampled every `every` steps.
-fn drift<F: OdeSystem + Form>(form: &mut F, method: &mut Gauss, state: &mut State, until: f64, every: usize) -> (f64, f64) {
+/// Largest excursion of the balance over its scale, and the slope \[1/s\] of a straight line through it,
+/// sampled every `every` steps.
+fn drift<F: OdeSystem + Form>(
+    form: &mut F,
+    method: &mut Gauss,
+    state: &mut State,
+    until: f64,
+    every: usize,
+) -> (f64, f64) {
     let mut balance = Balance::new(form.mechanism());
     let scale = form.mechanism().energy_scale;
     let start = balance.at(form, state);
@@ -101,7 +115,9 @@ fn drift<F: OdeSystem + Form>(form: &mut F, method: &mut Gauss, state: &mut Stat
         }
         Ok(Seen::Kept)
     };
-    method.advance(form, state, Time::of(until), &mut Statistics::default(), &mut watch).expect("a finished integrate");
+    method
+        .advance(form, state, Time::of(until), &mut Statistics::default(), &mut watch)
+        .expect("a finished integrate");
     (samples.iter().fold(0.0, |worst: f64, sample| worst.max(sample.1.abs())), slope(&samples))
 }
 
@@ -109,11 +125,14 @@ fn drift<F: OdeSystem + Form>(form: &mut F, method: &mut Gauss, state: &mut Stat
 fn slope(points: &[(f64, f64)]) -> f64 {
     let n = points.len() as f64;
     let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), point| (x + point.0 / n, y + point.1 / n));
-    let (up, down) = points.iter().fold((0.0, 0.0), |(up, down), p| (up + (p.0 - x) * (p.1 - y), down + (p.0 - x) * (p.0 - x)));
+    let (up, down) = points
+        .iter()
+        .fold((0.0, 0.0), |(up, down), p| (up + (p.0 - x) * (p.1 - y), down + (p.0 - x) * (p.0 - x)));
     up / down
 }
 
-/// Order from the errors at 1 s: slope of the mean log error over `starts` on log step, for the six finest steps above rounding.
+/// Order from the errors at 1 s: slope of the mean log error over `starts` on log step, for the six finest
+/// steps above rounding.
 ///
 /// One start will not do: along a sequence of steps its error crosses zero here and there.
 fn measured_order<F: OdeSystem + Form>(form: &mut F, starts: &[State], stages: usize) -> f64 {
@@ -127,7 +146,8 @@ fn measured_order<F: OdeSystem + Form>(form: &mut F, starts: &[State], stages: u
     for steps in (0..36).map(|k| (24.0 * 2f64.powf(f64::from(k) / 6.0)).round() as u32) {
         let error = starts.iter().zip(&references).fold(0.0, |sum, (start, reference)| {
             let state = end(form, start, steps, stages);
-            let part = |i: usize| (state.unknown(i) - reference.unknown(i)).hi / reference.y[i].abs().max(1e-2);
+            let part =
+                |i: usize| (state.unknown(i) - reference.unknown(i)).hi / reference.y[i].abs().max(1e-2);
             sum + (0..state.y.len()).map(|i| part(i) * part(i)).sum::<f64>().sqrt().ln() / starts.len() as f64
         });
         if error > 5e-14f64.ln() {
@@ -151,10 +171,14 @@ fn the_error_falls_with_the_declared_order() {
     let (mut free, mut driven) = (Free2::new(compile(&swing)), Driven2::new(compile(&driven_by_a_sine())));
     let free_starts = starts(&|scene| start_of(&free, scene), &swing);
     let driven_starts = starts(&|scene| start_of(&driven, scene), &driven_by_a_sine());
-    // Orders of 10 and more show their slope below the rounding of doubles only: in double-double, beside the coefficients.
+    // Orders of 10 and more show their slope below the rounding of doubles only: in double-double, beside the
+    // coefficients.
     for stages in 2..=4 {
         let nominal = f64::from(Integrator::<Free2>::order(&gauss(stages, 0.1)));
-        for found in [measured_order(&mut free, &free_starts, stages), measured_order(&mut driven, &driven_starts, stages)] {
+        for found in [
+            measured_order(&mut free, &free_starts, stages),
+            measured_order(&mut driven, &driven_starts, stages),
+        ] {
             println!("s = {stages}: {found:.2}");
             assert!((found - nominal).abs() < 0.35, "s = {stages}: order {found:.2} is not {nominal}");
         }
@@ -166,7 +190,8 @@ fn start_of(form: &impl Form, scene: &Scene) -> State {
     form.state(&form.mechanism().start(scene))
 }
 
-/// Where increments rounded to doubles ended the iteration, this climbed or fell by 2e-21 a second, by how the constants happened to be rounded.
+/// Where increments rounded to doubles ended the iteration, this climbed or fell by 2e-21 a second, by how
+/// the constants happened to be rounded.
 #[test]
 fn a_gentle_swing_does_not_drift() {
     for step in [1.0 / 64.0, 1.0 / 32.0] {
@@ -178,7 +203,8 @@ fn a_gentle_swing_does_not_drift() {
     }
 }
 
-/// With a long step each sweep contracts little, and stages that have not settled drift linearly.  What is left swings with the motion: the method's own error.
+/// With a long step each sweep contracts little, and stages that have not settled drift linearly.  What is
+/// left swings with the motion: the method's own error.
 #[test]
 fn a_long_step_does_not_drift_either() {
     let mut form = Free2::new(compile(&gentle()));
@@ -262,7 +288,9 @@ fn a_changed_state_is_not_predicted_from_its_past() {
         state.y[2] += 1e-3;
         Ok(Seen::Changed)
     };
-    method.advance(&mut form, &mut state, Time::of(1.0 / 128.0), &mut Statistics::default(), &mut jolt).expect("a jolt");
+    method
+        .advance(&mut form, &mut state, Time::of(1.0 / 128.0), &mut Statistics::default(), &mut jolt)
+        .expect("a jolt");
     assert!(state.memory.is_empty());
 
     // A memory of another step, another method or nonsense is not used either.
@@ -280,10 +308,14 @@ fn a_step_far_too_long_is_refused_with_its_time_and_the_unknown_at_fault() {
     let mut form = Free2::new(compile(&free()));
     for step in [0.125, 0.5, 4.0] {
         let mut state = start_of(&form, &free());
-        let stop = integrate(&mut gauss(8, step), &mut form, &mut state, 40.0).expect_err("no step for this scene");
+        let stop =
+            integrate(&mut gauss(8, step), &mut form, &mut state, 40.0).expect_err("no step for this scene");
         assert!(matches!(stop.cause, Cause::NotConverged | Cause::NotFinite), "{stop}");
         assert!(stop.what.contains("bar1") || stop.what.contains("bar2"), "{stop}");
-        assert!(stop.t == state.time.hi && state.y.iter().all(|y| y.is_finite()), "the last accepted state stays");
+        assert!(
+            stop.t == state.time.hi && state.y.iter().all(|y| y.is_finite()),
+            "the last accepted state stays"
+        );
         assert!(stop.hint.contains("halve"), "{stop}");
     }
 }
@@ -314,7 +346,11 @@ fn a_mechanism_at_rest_is_left_alone() {
     let mut state = start_of(&form, &hanging);
     let statistics = integrate(&mut gauss(8, 1.0 / 64.0), &mut form, &mut state, 1.0).expect("rest");
     assert_eq!(state.y, [0.0; 4]);
-    assert_eq!((statistics.steps, statistics.evaluations), (64, 64 * 16), "nothing moves: one sweep a step, and one exact evaluation");
+    assert_eq!(
+        (statistics.steps, statistics.evaluations),
+        (64, 64 * 16),
+        "nothing moves: one sweep a step, and one exact evaluation"
+    );
 }
 
 #[test]
@@ -329,7 +365,10 @@ fn a_remaining_time_that_is_no_whole_step_ends_in_a_shorter_one() {
     assert!((0..4).all(|i| (state.unknown(i) - fine.unknown(i)).hi.abs() < 1e-14));
     // A decimal time whose doubles are a rounding off whole steps takes none.
     let mut state = start_of(&form, &gentle());
-    assert_eq!(integrate(&mut gauss(8, 0.01), &mut form, &mut state, 100.0 * 0.07).expect("an integration").steps, 700);
+    assert_eq!(
+        integrate(&mut gauss(8, 0.01), &mut form, &mut state, 100.0 * 0.07).expect("an integration").steps,
+        700
+    );
     assert_eq!(integrate(&mut gauss(8, 0.01), &mut form, &mut state, 7.0).expect("an integration").steps, 0);
 }
 
@@ -361,7 +400,8 @@ impl OdeSystem for Scaled {
 fn the_unit_of_an_unknown_does_not_matter() {
     let march_in = |unit: f64| {
         let mut state = State::new(&[DoubleDouble::of(1.0), DoubleDouble::of(0.5 * unit)], 0);
-        let statistics = integrate(&mut gauss(8, 0.125), &mut Scaled { unit }, &mut state, 50.0).expect("an integration");
+        let statistics =
+            integrate(&mut gauss(8, 0.125), &mut Scaled { unit }, &mut state, 50.0).expect("an integration");
         (state.unknown(0), state.unknown(1).ldexp(1.0 / unit), statistics)
     };
     let plain = march_in(1.0);
@@ -380,7 +420,10 @@ fn a_stiff_spring_converges_or_is_refused() {
         let mut state = start_of(&form, &scene);
         match integrate(&mut gauss(8, 1.0 / 128.0), &mut form, &mut state, 1.0) {
             Ok(statistics) => {
-                println!("spring x {factor:e}: {:.1} sweeps a step", statistics.evaluations as f64 / statistics.steps as f64 / 8.0)
+                println!(
+                    "spring x {factor:e}: {:.1} sweeps a step",
+                    statistics.evaluations as f64 / statistics.steps as f64 / 8.0
+                )
             }
             Err(stop) => {
                 println!("spring x {factor:e}: {stop}");
@@ -391,7 +434,8 @@ fn a_stiff_spring_converges_or_is_refused() {
     }
 }
 
-/// Two bars under a motor of which the outer one carries a damped spring: drives, springs and dampers at once.
+/// Two bars under a motor of which the outer one carries a damped spring: drives, springs and dampers at
+/// once.
 fn everything() -> Scene {
     let mut scene = driven_by_a_sine();
     scene.springs.push(spring(0.05));
@@ -407,7 +451,8 @@ fn hardware_and_portable_lanes_march_to_the_same_bits() {
             let mut state = start_of(&form, scene);
             let method = gauss(stages, 1.0 / 128.0);
             let statistics =
-                integrate(&mut if portable { method.portable() } else { method }, &mut form, &mut state, 1.0).expect("an integration");
+                integrate(&mut if portable { method.portable() } else { method }, &mut form, &mut state, 1.0)
+                    .expect("an integration");
             (state, statistics)
         };
         assert_eq!(march_in(false), march_in(true), "{}, s = {stages}", scene.name);
@@ -463,7 +508,8 @@ fn lanes_evaluate_what_a_single_point_does() {
         single.each(|t, y, rate| form.rhs(t, y, rate));
         for k in 0..d {
             for lane in 0..8 {
-                let (plain, pair, alone) = (lanes.rate[k].0[lane], exact.rate[k].0[lane], single.rate[k].0[lane]);
+                let (plain, pair, alone) =
+                    (lanes.rate[k].0[lane], exact.rate[k].0[lane], single.rate[k].0[lane]);
                 let scale = single.rate.iter().fold(1.0, |scale: f64, rate| scale.max(rate.0[lane].abs()));
                 assert!(
                     (plain - alone).abs() < 2e-14 * scale && (pair - alone).abs() < 2e-14 * scale,
@@ -492,12 +538,20 @@ fn a_field_without_lanes_marches_all_the_same() {
 
 #[test]
 fn names_and_settings() {
-    for (stages, name) in (2..).zip(["gauss4", "gauss6", "gauss8", "gauss10", "gauss12", "gauss14", "gauss16"]) {
+    for (stages, name) in
+        (2..).zip(["gauss4", "gauss6", "gauss8", "gauss10", "gauss12", "gauss14", "gauss16"])
+    {
         let method = Gauss::named(name, -0.5).expect("a known name");
         assert_eq!((Integrator::<Free2>::name(&method), method.stages(), method.step()), (name, stages, 0.5));
     }
-    assert!(Gauss::named("gauss5", 0.1).is_none() && Gauss::new(1, 0.1).is_none() && Gauss::new(9, 0.1).is_none());
-    assert!(Gauss::new(4, 0.0).is_none() && Gauss::new(4, f64::NAN).is_none() && Gauss::new(4, f64::INFINITY).is_none());
+    assert!(
+        Gauss::named("gauss5", 0.1).is_none() && Gauss::new(1, 0.1).is_none() && Gauss::new(9, 0.1).is_none()
+    );
+    assert!(
+        Gauss::new(4, 0.0).is_none()
+            && Gauss::new(4, f64::NAN).is_none()
+            && Gauss::new(4, f64::INFINITY).is_none()
+    );
 }
 
 #[test]
@@ -511,7 +565,8 @@ fn a_boxed_field_gives_the_same_bits() {
     assert_eq!(plain, boxed);
 }
 
-/// Two point masses of 1 kg on rods of 1 m, g = 9.8 m/s²: the double pendulum of Hairer, McLachlan, Razakarivony (2008).
+/// Two point masses of 1 kg on rods of 1 m, g = 9.8 m/s²: the double pendulum of Hairer, McLachlan,
+/// Razakarivony (2008).
 fn point_masses() -> Scene {
     let mut scene = double_pendulum(Inertia::Slender, [(1.1, 0.0), (0.0, 0.0)]);
     scene.gravity = [9.8, 0.0];
@@ -527,12 +582,22 @@ struct Walk {
     rms: f64,
     /// The mean over its standard error.
     bias: f64,
-    /// Of the rms as a power of time, and its standard error from the scatter over eight parts of the ensemble.
+    /// Of the rms as a power of time, and its standard error from the scatter over eight parts of the
+    /// ensemble.
     exponent: (f64, f64),
 }
 
-/// Prints rms, mean and its standard error over perturbed starts of the energy error over `scale` at doubling times; returns what they are at the last.
-fn ensemble(title: &str, scene: &Scene, scale: f64, method: &Gauss, until: f64, runs: usize, prepare: &dyn Fn(&mut State, f64)) -> Walk {
+/// Prints rms, mean and its standard error over perturbed starts of the energy error over `scale` at doubling
+/// times; returns what they are at the last.
+fn ensemble(
+    title: &str,
+    scene: &Scene,
+    scale: f64,
+    method: &Gauss,
+    until: f64,
+    runs: usize,
+    prepare: &dyn Fn(&mut State, f64),
+) -> Walk {
     const PARTS: usize = 8;
     let mut form = Free2::new(compile(scene));
     let marks: Vec<f64> = (0..7).rev().map(|k| until / 2f64.powi(k)).collect();
@@ -546,7 +611,8 @@ fn ensemble(title: &str, scene: &Scene, scale: f64, method: &Gauss, until: f64, 
         let mut method = method.clone();
         for (mark, errors) in marks.iter().zip(&mut errors) {
             let part = integrate(&mut method, &mut form, &mut state, *mark).expect("an integration");
-            (statistics.steps, statistics.evaluations) = (statistics.steps + part.steps, statistics.evaluations + part.evaluations);
+            (statistics.steps, statistics.evaluations) =
+                (statistics.steps + part.steps, statistics.evaluations + part.evaluations);
             errors.push((balance.at(&mut form, &state) - start).hi / scale);
         }
     }
@@ -555,11 +621,19 @@ fn ensemble(title: &str, scene: &Scene, scale: f64, method: &Gauss, until: f64, 
         let (n, mean) = (values.len() as f64, mean_of(values));
         (values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / (n - 1.0) / n).sqrt()
     };
-    let rms_of = |values: &[f64]| (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt();
+    let rms_of =
+        |values: &[f64]| (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt();
     // Over every so many runs, from one of the first on.
     let exponent = |from: usize, every: usize| {
-        let rms = |errors: &Vec<f64>| rms_of(&errors.iter().copied().skip(from).step_by(every).collect::<Vec<_>>());
-        slope(&marks.iter().zip(&errors).map(|(mark, errors)| (mark.ln(), rms(errors).ln())).collect::<Vec<_>>())
+        let rms =
+            |errors: &Vec<f64>| rms_of(&errors.iter().copied().skip(from).step_by(every).collect::<Vec<_>>());
+        slope(
+            &marks
+                .iter()
+                .zip(&errors)
+                .map(|(mark, errors)| (mark.ln(), rms(errors).ln()))
+                .collect::<Vec<_>>(),
+        )
     };
     let parts: Vec<f64> = (0..PARTS).map(|part| exponent(part, PARTS)).collect();
     let mut walk = Walk { rms: 0.0, bias: 0.0, exponent: (exponent(0, 1), scatter_of(&parts)) };
@@ -568,10 +642,14 @@ fn ensemble(title: &str, scene: &Scene, scale: f64, method: &Gauss, until: f64, 
         println!("{title} {mark:7} s: rms {rms:.2e}, mean {mean:+.1e} ± {scatter:.1e}");
         (walk.rms, walk.bias) = (rms, mean / scatter);
     }
-    let (evaluations, time) =
-        (statistics.evaluations as f64 / statistics.steps as f64, clock.elapsed().as_secs_f64() * 1e6 / statistics.steps as f64);
+    let (evaluations, time) = (
+        statistics.evaluations as f64 / statistics.steps as f64,
+        clock.elapsed().as_secs_f64() * 1e6 / statistics.steps as f64,
+    );
     let (power, error) = walk.exponent;
-    println!("{title}: rms grows as t^({power:.3} ± {error:.3}); {evaluations:.1} evaluations and {time:.2} µs a step");
+    println!(
+        "{title}: rms grows as t^({power:.3} ± {error:.3}); {evaluations:.1} evaluations and {time:.2} µs a step"
+    );
     walk
 }
 
@@ -608,7 +686,9 @@ fn ensembles_follow_the_square_root_law() {
         walk.bias.abs() < 3.0 && (power - 0.5).abs() < 0.05 + 2.0 * error
     };
     // Energy at the start, about -14.4 J, as in the papers.
-    let points = |title: &str, method: &Gauss, runs: usize| ensemble(title, &point_masses(), 14.4, method, 4096.0, runs, &perturb);
+    let points = |title: &str, method: &Gauss, runs: usize| {
+        ensemble(title, &point_masses(), 14.4, method, 4096.0, runs, &perturb)
+    };
     let walk = points("point masses, plain", &gauss(8, 1.0 / 64.0).plain(), 100);
     assert!(walk.rms < 1.8e-15 && walk.bias.abs() < 2.0 && (walk.exponent.0 - 0.5).abs() < 0.05);
     // In pairs rounding shows below the method's own error, with shorter steps.
@@ -622,7 +702,9 @@ fn ensembles_follow_the_square_root_law() {
     });
     assert!(walk.rms < 1e-19 && walks_at_random(&walk));
     let scale = compile(&gentle()).energy_scale;
-    let walk = ensemble("gentle, 1/32", &gentle(), scale, &gauss(8, 1.0 / 32.0), 16_384.0, 8, &|state, k| state.y[0] += 1e-3 * k);
+    let walk = ensemble("gentle, 1/32", &gentle(), scale, &gauss(8, 1.0 / 32.0), 16_384.0, 8, &|state, k| {
+        state.y[0] += 1e-3 * k
+    });
     assert!(walk.rms < 1e-20);
     // E - W of the motor over single runs.
     for (name, scene) in [("motor", driven()), ("motor with a sine", driven_by_a_sine())] {

@@ -1,6 +1,7 @@
 //! The tangent flow against runs from neighbouring starts, and against closed forms.
 //!
-//! `COUNT=300 cargo test --test reports -- growth:: --nocapture` compares more random scenes; `SEED` is the first.
+//! `COUNT=300 cargo test --test reports -- growth:: --nocapture` compares more random scenes; `SEED` is the
+//! first.
 
 use crate::common;
 use crate::mechanisms;
@@ -19,13 +20,29 @@ fn number(name: &str, usual: u64) -> u64 {
 
 fn request(until: f64, every: f64) -> Request {
     let method = Some("taylor".parse().expect("a method"));
-    Request { method, rtol: Some(1e-14), until: Some(until), every: Some(every), max_evaluations: Some(300_000), ..Request::default() }
+    Request {
+        method,
+        rtol: Some(1e-14),
+        until: Some(until),
+        every: Some(every),
+        max_evaluations: Some(300_000),
+        ..Request::default()
+    }
 }
 
 /// The motions at the rows of a run.
-fn motions(scene: &Scene, mechanism: &Arc<Mechanism>, start: &Motion, until: f64, rows: u32) -> Result<Vec<Motion>, String> {
-    let plan = Plan::new(scene, mechanism, &request(until, until / f64::from(rows))).map_err(|refusal| refusal.to_string())?;
-    let mut running = Running::new(Run::new(Arc::clone(mechanism), plan, Limits::default(), start).map_err(|stop| stop.to_string())?);
+fn motions(
+    scene: &Scene,
+    mechanism: &Arc<Mechanism>,
+    start: &Motion,
+    until: f64,
+    rows: u32,
+) -> Result<Vec<Motion>, String> {
+    let plan = Plan::new(scene, mechanism, &request(until, until / f64::from(rows)))
+        .map_err(|refusal| refusal.to_string())?;
+    let mut running = Running::new(
+        Run::new(Arc::clone(mechanism), plan, Limits::default(), start).map_err(|stop| stop.to_string())?,
+    );
     let mut found = Vec::new();
     // Asked after every row, and after every step, too.
     while !running.go(&mut |_| Ok(()), &mut || true).map_err(|error| error.to_string())? {
@@ -55,7 +72,8 @@ fn norm(vector: &[f64]) -> f64 {
     vector.iter().map(|entry| entry * entry).sum::<f64>().sqrt()
 }
 
-/// What a comparison came to: the ratio of the flow's size to that of neighbours, at each time, and how far they are apart as vectors.
+/// What a comparison came to: the ratio of the flow's size to that of neighbours, at each time, and how far
+/// they are apart as vectors.
 struct Compared {
     ratios: Vec<[f64; 2]>,
     lost: Option<String>,
@@ -72,7 +90,8 @@ fn compared(scene: &Scene, until: f64, rows: u32) -> Result<Compared, String> {
     let (ruler, n) = (DistanceMetric::new(&mechanism), mechanism.coordinates());
     let mut ratios = Vec::new();
     let weighted = |column: &[f64]| {
-        let weight = |(i, entry): (usize, &f64)| ruler.weight(i % n) * if i < n { *entry } else { entry / rate };
+        let weight =
+            |(i, entry): (usize, &f64)| ruler.weight(i % n) * if i < n { *entry } else { entry / rate };
         column.iter().enumerate().map(weight).collect::<Vec<f64>>()
     };
     for j in 0..moments[0].columns.len().min(4) {
@@ -93,7 +112,12 @@ fn compared(scene: &Scene, until: f64, rows: u32) -> Result<Compared, String> {
             // Beyond that they are no neighbours, and below it is rounding.
             let size = norm(&seen) * small;
             if std::env::var("SHOW").is_ok() {
-                println!("  column {j} at {:.4} s: told {:.4e}, seen {:.4e}", moment.motion.time.hi, norm(&told), norm(&seen));
+                println!(
+                    "  column {j} at {:.4} s: told {:.4e}, seen {:.4e}",
+                    moment.motion.time.hi,
+                    norm(&told),
+                    norm(&seen)
+                );
             }
             if (1e-11..1e-4).contains(&size) && norm(&told) * small < 1e-3 {
                 let off: Vec<f64> = told.iter().zip(&seen).map(|(a, b)| a - b).collect();
@@ -113,7 +137,9 @@ fn trust(scene: &Scene, until: f64) -> Trust {
     let mechanism = compile(scene);
     let start = mechanism.start(scene);
     let plan = Plan::new(scene, &mechanism, &request(until, until / 64.0)).expect("a plan");
-    let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a beginning").trusted(Level::Full, &start);
+    let run = Run::new(mechanism, plan, Limits::default(), &start)
+        .expect("a beginning")
+        .trusted(Level::Full, &start);
     integrate(run, &mut |_| Ok(())).expect("no observer fails").trust.expect("asked for")
 }
 
@@ -145,14 +171,20 @@ fn growth_is_that_of_runs_from_neighbouring_starts() {
                 let vector = ratios.iter().fold(0.0, |most: f64, ratio| most.max(ratio[1]));
                 all += ratios.len();
                 within += ratios.iter().filter(|ratio| off(ratio) < 3.0).count();
-                println!("{seed}: {} points, ratio {most:.4}, apart {vector:.1e}, {steps} steps, {:?}", ratios.len(), made.kinds);
+                println!(
+                    "{seed}: {} points, ratio {most:.4}, apart {vector:.1e}, {steps} steps, {:?}",
+                    ratios.len(),
+                    made.kinds
+                );
                 if most > 100.0 || most.is_nan() {
                     worst.push(seed);
                 }
             }
         }
     }
-    println!("{within} of {all} within 3, {compared_scenes} scenes compared, {without} without a flow, far off: {worst:?}");
+    println!(
+        "{within} of {all} within 3, {compared_scenes} scenes compared, {without} without a flow, far off: {worst:?}"
+    );
     assert!(within as f64 >= 0.95 * all as f64 && worst.is_empty(), "{within} of {all}, far off: {worst:?}");
     assert!(compared_scenes as u64 * 3 > count, "{compared_scenes} of {count}");
 }
@@ -164,8 +196,13 @@ fn events(scene: &Scene, until: f64) {
     let plan = Plan::new(scene, &mechanism, &request(until, until)).expect("a plan");
     let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a beginning");
     let outcome = integrate(run, &mut |_| Ok(())).expect("no observer fails");
-    outcome.impacts.iter().for_each(|strike| println!("  strike at {} s, {} at {:.3e} m/s", strike.t, strike.wall, strike.approach));
-    outcome.holds.iter().for_each(|hold| println!("  hold from {} s to {:?}, {}", hold.t, hold.until, hold.wall));
+    outcome.impacts.iter().for_each(|strike| {
+        println!("  strike at {} s, {} at {:.3e} m/s", strike.t, strike.wall, strike.approach)
+    });
+    outcome
+        .holds
+        .iter()
+        .for_each(|hold| println!("  hold from {} s to {:?}, {}", hold.t, hold.until, hold.wall));
 }
 
 fn text(scene: &str) -> Scene {
@@ -200,7 +237,8 @@ fn an_oscillators_differences_turn_and_do_not_grow() {
     assert!(trust.lyapunov.is_none() && trust.growth_power.is_some_and(|power| power < 0.1), "{trust:?}");
 }
 
-/// Released at another angle a pendulum has another period T: at its lowest point after N of them dphi = -phi' N dT.
+/// Released at another angle a pendulum has another period T: at its lowest point after N of them dphi =
+/// -phi' N dT.
 #[test]
 fn a_pendulums_differences_grow_with_its_period() {
     let amplitude = 1.2;
@@ -217,10 +255,14 @@ fn a_pendulums_differences_grow_with_its_period() {
     let expected = -end.motion.omega[0].hi * (turns + 0.25) * slope;
     assert!((end.columns[0][0] / expected - 1.0).abs() < 1e-2, "{} {expected}", end.columns[0][0]);
     let trust = trust(&scene, 200.0);
-    assert!(trust.lyapunov.is_none() && trust.growth_power.is_some_and(|power| (power - 1.0).abs() < 0.2), "{trust:?}");
+    assert!(
+        trust.lyapunov.is_none() && trust.growth_power.is_some_and(|power| (power - 1.0).abs() < 0.2),
+        "{trust:?}"
+    );
 }
 
-/// A ball that falls from y with v0 and rebounds: v1² = v0² + 2 g y, t1 = (v0 + v1)/g, and after it y = e v1 (t - t1) - g (t - t1)²/2.
+/// A ball that falls from y with v0 and rebounds: v1² = v0² + 2 g y, t1 = (v0 + v1)/g, and after it y = e v1
+/// (t - t1) - g (t - t1)²/2.
 #[test]
 fn a_bouncing_balls_differences_go_through_the_impact() {
     let scene = text(
@@ -246,11 +288,14 @@ fn a_bouncing_balls_differences_go_through_the_impact() {
     }
 }
 
-/// Scenes on which the flow was wrong by many orders of magnitude: with springs, dampers, fast motors, loops and sliders, and through singular positions.
+/// Scenes on which the flow was wrong by many orders of magnitude: with springs, dampers, fast motors, loops
+/// and sliders, and through singular positions.
 #[test]
 fn growth_is_right_where_differences_are_stiff_or_tied() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/growth");
-    let read = |name: &str| driftless::scene::read_scene(&folder.join(format!("{name}.json")), &[]).expect("a scene");
+    let read = |name: &str| {
+        driftless::scene::read_scene(&folder.join(format!("{name}.json")), &[]).expect("a scene")
+    };
     let cases = [
         (shipped("four_bars", &[]), 10.0),
         (shipped("slider_crank_equal", &[]), 10.0),
@@ -271,7 +316,13 @@ fn growth_is_right_where_differences_are_stiff_or_tied() {
     for (scene, until) in &cases {
         let found = compared(scene, *until, 5).expect("a flow");
         let most = most_off(&found);
-        println!("{}: {} points, {most:.4}, {} steps, {:?}", scene.name, found.ratios.len(), found.steps, found.lost);
+        println!(
+            "{}: {} points, {most:.4}, {} steps, {:?}",
+            scene.name,
+            found.ratios.len(),
+            found.steps,
+            found.lost
+        );
         assert!(most < 1.2, "{}: {most}", scene.name);
         assert!(found.lost.is_some() || found.ratios.len() > 2, "{}", scene.name);
     }
@@ -289,19 +340,28 @@ fn nothing_grows_where_all_is_driven() {
 /// Chaos is told from growth, and one degree of freedom that nothing drives never has an exponent.
 #[test]
 fn only_chaotic_motions_have_an_exponent() {
-    for (name, until) in [("four_bars", 40.0), ("slider_crank_equal", 40.0), ("kite", 20.0), ("gentle", 200.0), ("iftomm_pendulum", 100.0)]
-    {
+    for (name, until) in [
+        ("four_bars", 40.0),
+        ("slider_crank_equal", 40.0),
+        ("kite", 20.0),
+        ("gentle", 200.0),
+        ("iftomm_pendulum", 100.0),
+    ] {
         let trust = trust(&shipped(name, &[]), until);
         assert_eq!(trust.lyapunov, None, "{name}");
         println!("{name}: {:?} {:?}", trust.growth_power, trust.no_growth);
     }
     for (name, until) in [("free", 40.0), ("branch", 40.0)] {
         let trust = trust(&shipped(name, &[]), until);
-        assert!(trust.lyapunov.is_some_and(|found| found.exponent > 0.3) && trust.growth_power.is_none(), "{name}: {trust:?}");
+        assert!(
+            trust.lyapunov.is_some_and(|found| found.exponent > 0.3) && trust.growth_power.is_none(),
+            "{name}: {trust:?}"
+        );
     }
 }
 
-/// A few coordinates under gravity alone have their matrix from Jacobians, and nearly the same as from the series: many starts of two and three bars.
+/// A few coordinates under gravity alone have their matrix from Jacobians, and nearly the same as from the
+/// series: many starts of two and three bars.
 #[test]
 fn the_plain_flow_is_that_of_the_series() {
     let mut dice = mechanisms::Dice::new(3);
@@ -320,19 +380,22 @@ fn the_plain_flow_is_that_of_the_series() {
         let plain = flow(&mechanism, &plan, &start, &[3.0]).expect("a flow");
         let mut whole = Tangent::whole(&mechanism, &start, 3.0).expect("a flow");
         while whole.next() < 3.0 {
-            let motion = motions(&scene, &mechanism, &start, whole.next(), 1).expect("a run").pop().expect("a row");
+            let motion =
+                motions(&scene, &mechanism, &start, whole.next(), 1).expect("a run").pop().expect("a row");
             whole.take(&motion, 0);
         }
         whole.take(&plain.moments[1].motion, 0);
         let (plain, whole) = (&plain.moments[1].columns, whole.columns());
-        let size = |columns: &[Vec<f64>]| norm(&columns.iter().map(|column| norm(column)).collect::<Vec<f64>>());
+        let size =
+            |columns: &[Vec<f64>]| norm(&columns.iter().map(|column| norm(column)).collect::<Vec<f64>>());
         let ratio = size(plain) / size(&whole);
         println!("{turn}: {ratio:.4} at {:.1e}", size(&whole));
         assert!((1.0 / 1.2..1.2).contains(&ratio), "{turn}: {ratio}");
     }
 }
 
-/// What changed numbers come to, against runs with others in their ninth digit: the order of magnitude, and rather too much than too little.
+/// What changed numbers come to, against runs with others in their ninth digit: the order of magnitude, and
+/// rather too much than too little.
 #[test]
 fn input_errors_are_those_of_runs_with_other_numbers() {
     for (name, until) in [("free", 8.0), ("gentle", 60.0), ("spring", 8.0), ("cart_pole", 5.0)] {
@@ -349,11 +412,21 @@ fn input_errors_are_those_of_runs_with_other_numbers() {
             let mut other = scene.clone();
             let mut change = |x: &mut f64| *x *= 1.0 + if dice.chance(0.5) { 1e-9 } else { -1e-9 };
             other.gravity.iter_mut().for_each(&mut change);
-            other.bars.iter_mut().for_each(|bar| [&mut bar.mass, &mut bar.inertia].into_iter().for_each(&mut change));
+            other
+                .bars
+                .iter_mut()
+                .for_each(|bar| [&mut bar.mass, &mut bar.inertia].into_iter().for_each(&mut change));
             other.springs.iter_mut().for_each(|spring| change(&mut spring.stiffness));
-            other.start.iter_mut().for_each(|start| [&mut start.phi, &mut start.omega].into_iter().for_each(&mut change));
+            other
+                .start
+                .iter_mut()
+                .for_each(|start| [&mut start.phi, &mut start.omega].into_iter().for_each(&mut change));
             let ruler = DistanceMetric::new(&compile(&other));
-            let most = plain.iter().zip(last(&other)).map(|(one, other)| ruler.apart(one, &other)).fold(0.0, f64::max);
+            let most = plain
+                .iter()
+                .zip(last(&other))
+                .map(|(one, other)| ruler.apart(one, &other))
+                .fold(0.0, f64::max);
             squares += 0.25 * (most / 1e-9).powi(2);
         }
         let seen = squares.sqrt();
@@ -371,28 +444,40 @@ fn input_errors_belong_to_their_time() {
         let start = mechanism.start(&scene);
         let request = Request { rtol: Some(1e-12), ..request(60.0, every) };
         let plan = Plan::new(&scene, &mechanism, &request).expect("a plan");
-        // By default the flow is followed for a share of the run's work only, which ends before the horizon here.
-        let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a beginning").trusted(Level::Full, &start);
+        // By default the flow is followed for a share of the run's work only, which ends before the horizon
+        // here.
+        let run = Run::new(mechanism, plan, Limits::default(), &start)
+            .expect("a beginning")
+            .trusted(Level::Full, &start);
         let trust = integrate(run, &mut |_| Ok(())).expect("no observer fails").trust.expect("asked for");
         [trust.horizon.expect("chaotic"), trust.input_error.expect("a figure")]
     };
     let [[early, fine], [late, coarse]] = [0.05, 20.0].map(told);
     // At 20 s they would come to 1e-2 rad and more.
-    assert!((early - late).abs() < 3.0 && fine < 1e-3 && coarse < 1e-3, "{fine:e} at {early} s, {coarse:e} at {late} s");
+    assert!(
+        (early - late).abs() < 3.0 && fine < 1e-3 && coarse < 1e-3,
+        "{fine:e} at {early} s, {coarse:e} at {late} s"
+    );
 }
 
-/// Many bodies near rounding: what one variance, carried along by the growth of vectors, tells of a series' rounding.
+/// Many bodies near rounding: what one variance, carried along by the growth of vectors, tells of a series'
+/// rounding.
 #[test]
 fn rounding_of_many_bodies_is_told() {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/growth/chain5.json");
-    for (scene, until) in [(driftless::scene::read_scene(&path, &[]).expect("a scene"), 2.0), (shipped("chain8", &[]), 2.0)] {
+    for (scene, until) in
+        [(driftless::scene::read_scene(&path, &[]).expect("a scene"), 2.0), (shipped("chain8", &[]), 2.0)]
+    {
         let mechanism = compile(&scene);
         let start = mechanism.start(&scene);
         let times: Vec<f64> = (1..=8).map(|k| until * f64::from(k) / 8.0).collect();
-        let exact = reference(&mechanism, &start, &times.iter().map(|&t| Time::from(t)).collect::<Vec<_>>()).expect("a reference").motions;
+        let exact = reference(&mechanism, &start, &times.iter().map(|&t| Time::from(t)).collect::<Vec<_>>())
+            .expect("a reference")
+            .motions;
         let request = Request { rtol: Some(1e-15), ..request(until, until / 8.0) };
         let plan = Plan::new(&scene, &mechanism, &request).expect("a plan");
-        let mut running = Running::new(Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).expect("a run"));
+        let mut running =
+            Running::new(Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).expect("a run"));
         let mut found: Vec<Motion> = Vec::new();
         while !running.go(&mut |_| Ok(()), &mut || true).expect("no observer fails") {
             if running.motion().time.hi > found.last().map_or(0.0, |last| last.time.hi) {
@@ -407,7 +492,8 @@ fn rounding_of_many_bodies_is_told() {
         for (exact, found) in exact.iter().zip(&found) {
             while tangent.next() <= exact.time.hi {
                 let next = tangent.next();
-                let motion = motions(&scene, &mechanism, &start, next, 1).expect("a run").pop().expect("a row");
+                let motion =
+                    motions(&scene, &mechanism, &start, next, 1).expect("a run").pop().expect("a row");
                 tangent.take(&motion, (per_second * next) as u64);
             }
             assert_eq!(exact.time, found.time);

@@ -1,4 +1,5 @@
-//! Identities of the equations of motion on random trees: one to six bodies, branches, off-axis centres and hinges, springs, dampers, motors.
+//! Identities of the equations of motion on random trees: one to six bodies, branches, off-axis centres and
+//! hinges, springs, dampers, motors.
 
 use crate::common;
 use crate::trees;
@@ -15,7 +16,8 @@ use proptest::prelude::*;
 use std::sync::Arc;
 use trees::{any_tree, redundant};
 
-/// Rounding of an evaluation, against the largest number in it; the worst of these trees has a mass matrix of condition 1e4.
+/// Rounding of an evaluation, against the largest number in it; the worst of these trees has a mass matrix of
+/// condition 1e4.
 const ROUNDING: f64 = 1e-11;
 
 /// The scene's equations and a time to look at them.
@@ -23,10 +25,12 @@ fn at_a_time(scene: &Scene) -> (Arc<Mechanism>, Time) {
     (common::compile(scene), Time::from(0.37))
 }
 
-/// A motion at time `t` that fulfils every motor: the independent angles and rates are the scene's, the others follow from the laws.
+/// A motion at time `t` that fulfils every motor: the independent angles and rates are the scene's, the
+/// others follow from the laws.
 fn consistent(scene: &Scene, mechanism: &Arc<Mechanism>, t: Time) -> Motion {
     let free = &mechanism.partition.independent;
-    let mut unknowns: Vec<DoubleDouble> = free.iter().map(|&k| DoubleDouble::from(scene.start[k].phi)).collect();
+    let mut unknowns: Vec<DoubleDouble> =
+        free.iter().map(|&k| DoubleDouble::from(scene.start[k].phi)).collect();
     unknowns.extend(free.iter().map(|&k| DoubleDouble::from(scene.start[k].omega)));
     unknowns.push(DoubleDouble::ZERO);
     let mut state = State::new(&unknowns, free.len());
@@ -47,7 +51,13 @@ fn largest(numbers: impl IntoIterator<Item = f64>) -> f64 {
 /// The f64 kernel after an evaluation at a motion.
 fn evaluate(mechanism: &Mechanism, motion: &Motion) -> Kernel<f64> {
     let mut kernel = Kernel::new(mechanism);
-    kernel.accelerate::<0>(mechanism, motion.time, &plain(&motion.phi), &plain(&motion.omega), Bias::default());
+    kernel.accelerate::<0>(
+        mechanism,
+        motion.time,
+        &plain(&motion.phi),
+        &plain(&motion.omega),
+        Bias::default(),
+    );
     kernel
 }
 
@@ -58,7 +68,8 @@ fn evaluate_exactly(mechanism: &Mechanism, motion: &Motion) -> Kernel<DoubleDoub
     kernel
 }
 
-/// The motion `dt` later to second order in the angles and first in the rates, which is all a central difference sees.
+/// The motion `dt` later to second order in the angles and first in the rates, which is all a central
+/// difference sees.
 fn moved(motion: &Motion, alpha: &[DoubleDouble], power: f64, dt: f64) -> Motion {
     let mut later = motion.clone();
     let dt = DoubleDouble::from(dt);
@@ -107,12 +118,17 @@ fn check_canonical<const WORK: bool>(
 ) -> Result<(), TestCaseError> {
     const DT: f64 = 1e-8;
     let mut form = Canonical::<0, WORK>::new(Arc::clone(mechanism));
-    let (before, after) = (form.state(&moved(motion, alpha, power, -DT)), form.state(&moved(motion, alpha, power, DT)));
+    let (before, after) =
+        (form.state(&moved(motion, alpha, power, -DT)), form.state(&moved(motion, alpha, power, DT)));
     let rate = rate_of(&mut form, motion);
     let scale = largest(rate.iter().copied());
     for (i, &rate) in rate.iter().enumerate().skip(mechanism.partition.count()) {
         let difference = ((after.unknown(i) - before.unknown(i)) / DoubleDouble::from(2.0 * DT)).hi;
-        prop_assert!((difference - rate).abs() < 1e-9 * scale, "{}: {difference} is not {rate}", form.label(i));
+        prop_assert!(
+            (difference - rate).abs() < 1e-9 * scale,
+            "{}: {difference} is not {rate}",
+            form.label(i)
+        );
     }
     for (i, &body) in mechanism.partition.independent.iter().enumerate() {
         prop_assert!((rate[i] - motion.omega[body].hi).abs() < ROUNDING * scale, "{}", form.label(i));
@@ -146,7 +162,8 @@ proptest! {
             0.5 * body.mass * mechanism.centre(k).velocity(&kernel.z, &omega).norm_squared() + 0.5 * body.inertia * omega[k] * omega[k]
         }).sum();
         prop_assert!((energy.kinetic - bodywise).abs() < ROUNDING * largest([bodywise]));
-        // Entry by entry from the velocities that unit rates make; the other triangle is the mirror image by construction.
+        // Entry by entry from the velocities that unit rates make; the other triangle is the mirror image by
+        // construction.
         for i in 0..n {
             for j in i..n {
                 let unit = |k: usize| { let mut rates = vec![0.0; n]; rates[k] = 1.0; rates };

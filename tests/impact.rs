@@ -1,7 +1,8 @@
 //! Walls: located strikes, the motion after them, and the stops where the motors leave no freedom.
 //!
-//! A single bar against a wall has closed forms: it swings to the wall in a quarter period of the pendulum of its amplitude, which the arithmetic-
-//! geometric mean gives to rounding, and rebounds with -e times its rate.
+//! A single bar against a wall has closed forms: it swings to the wall in a quarter period of the pendulum of
+//! its amplitude, which the arithmetic- geometric mean gives to rounding, and rebounds with -e times its
+//! rate.
 
 use crate::common;
 
@@ -30,7 +31,13 @@ fn wall(name: &str, angle: f64, restitution: f64) -> Wall {
 const LOCATED: [MethodId; 2] = [MethodId::Dp8, MethodId::Taylor];
 
 fn by(method: MethodId, until: f64, every: f64, rtol: f64) -> Request {
-    Request { method: Some(method), until: Some(until), every: Some(every), rtol: Some(rtol), ..Request::default() }
+    Request {
+        method: Some(method),
+        until: Some(until),
+        every: Some(every),
+        rtol: Some(rtol),
+        ..Request::default()
+    }
 }
 
 fn energy_drift(outcome: &Outcome) -> f64 {
@@ -41,13 +48,21 @@ fn energy_drift(outcome: &Outcome) -> f64 {
 fn the_first_impact_at_the_very_start_is_case_f() {
     for method in LOCATED {
         for e in [0.0, 0.5, 1.0] {
-            let outcome = run(&shipped("wall", &[&format!("walls.wall.restitution={e}")]), &by(method, 0.005, 0.001, 1e-12));
+            let outcome = run(
+                &shipped("wall", &[&format!("walls.wall.restitution={e}")]),
+                &by(method, 0.005, 0.001, 1e-12),
+            );
             assert_eq!(outcome.stop, None, "e = {e}");
             let first = &outcome.impacts[0];
             // Rates from the hand-written solution of tests/published.rs.
             assert_eq!((first.t, first.wall.as_str()), (0.0, "wall"));
-            assert!((first.impulse - (1.0 + e) * 7.0 / 6.0 * PI * common::MASS * common::LENGTH).abs() < 1e-13);
-            assert!((first.energy_lost - 0.5 * first.impulse * (1.0 - e) * 4.0 * PI * common::LENGTH).abs() < 1e-13);
+            assert!(
+                (first.impulse - (1.0 + e) * 7.0 / 6.0 * PI * common::MASS * common::LENGTH).abs() < 1e-13
+            );
+            assert!(
+                (first.energy_lost - 0.5 * first.impulse * (1.0 - e) * 4.0 * PI * common::LENGTH).abs()
+                    < 1e-13
+            );
             assert!(energy_drift(&outcome) < 1e-11, "{:e}", energy_drift(&outcome));
         }
     }
@@ -64,8 +79,14 @@ fn strikes_come_at_the_quarter_periods_and_an_elastic_wall_keeps_the_energy() {
         let speed = (2.0 * PENDULUM_SQUARED * (1.0 - 1f64.cos())).sqrt();
         for (j, strike) in outcome.impacts.iter().enumerate() {
             let expected = (2 * j + 1) as f64 * quarter;
-            assert!((strike.t - expected).abs() < 1e-9, "strike {j} at {} s instead of {expected} s", strike.t);
-            assert!((strike.approach + speed).abs() < 1e-9 && (strike.impulse - 2.0 * speed / 3.0).abs() < 1e-9);
+            assert!(
+                (strike.t - expected).abs() < 1e-9,
+                "strike {j} at {} s instead of {expected} s",
+                strike.t
+            );
+            assert!(
+                (strike.approach + speed).abs() < 1e-9 && (strike.impulse - 2.0 * speed / 3.0).abs() < 1e-9
+            );
             assert!(strike.energy_lost.abs() < 1e-14);
         }
         assert!(energy_drift(&outcome) < 1e-10, "{:e}", energy_drift(&outcome));
@@ -98,20 +119,30 @@ fn the_state_at_a_strike_lies_on_the_wall_to_rounding() {
         let mut form = Multiplier::<1, false>::new(Arc::clone(&mechanism));
         let mut state: State = form.state(&mechanism.start(&scene));
         let mut method = Dp8::new(Tolerance { relative: 1e-8, absolute: 1e-8 });
-        let reached = method.advance(&mut form, &mut state, Time::from(10.0), &mut Statistics::default(), &mut |_, _| Ok(Seen::Kept));
+        let reached = method.advance(
+            &mut form,
+            &mut state,
+            Time::from(10.0),
+            &mut Statistics::default(),
+            &mut |_, _| Ok(Seen::Kept),
+        );
         assert_eq!(reached, Ok(Reached::Event(0)));
         let gap = mechanism.contacts[0].row.gap(&[driftless::arithmetic::Complex::unit(state.y[0])]);
         assert!(gap.abs() < 1e-14, "{gap:e} m");
     }
 }
 
-/// Without restitution the end slides along the wall, is lifted off by its own weight and thrown back a hundredth of a second later, now pressed.
-/// With c = cos and s = sin of the difference of the angles growing at 6 pi /s, gap = 4.2 t² - 430 t³ …: back after about 0.0098 s.
+/// Without restitution the end slides along the wall, is lifted off by its own weight and thrown back a
+/// hundredth of a second later, now pressed. With c = cos and s = sin of the difference of the angles growing
+/// at 6 pi /s, gap = 4.2 t² - 430 t³ …: back after about 0.0098 s.
 #[test]
 fn case_f_without_restitution_is_held_at_its_second_impact() {
     for method in LOCATED {
         let outcome = run(&shipped("wall", &["walls.wall.restitution=0"]), &by(method, 0.02, 0.001, 1e-12));
-        assert_eq!((outcome.stop.as_ref(), outcome.impact_count, outcome.persistent_contact_count), (None, 2, 1));
+        assert_eq!(
+            (outcome.stop.as_ref(), outcome.impact_count, outcome.persistent_contact_count),
+            (None, 2, 1)
+        );
         let (second, hold) = (&outcome.impacts[1], &outcome.holds[0]);
         assert!((second.t - 0.0098).abs() < 1e-3 && second.t == hold.t, "{second:?} {hold:?}");
     }
@@ -121,7 +152,8 @@ fn case_f_without_restitution_is_held_at_its_second_impact() {
 #[test]
 fn points_that_touch_at_the_same_moment_are_both_struck() {
     for method in LOCATED {
-        // Two equal bars on hinges of their own, mirror images of one another: each must do what one does alone.
+        // Two equal bars on hinges of their own, mirror images of one another: each must do what one does
+        // alone.
         let mut scene = bouncing(0.0, 1.0, 0.5);
         let mut twin = scene.bars[0].clone();
         twin.name = "twin".into();
@@ -130,12 +162,20 @@ fn points_that_touch_at_the_same_moment_are_both_struck() {
         (hinge.name, hinge.between[1].bar) = ("B".into(), Some(1));
         scene.hinges.push(hinge);
         scene.start.push(driftless::scene::Start { phi: -1.0, omega: 0.0 });
-        scene.walls.push(Wall { name: "other".into(), bar: 1, normal: [0.0, -1.0], ..scene.walls[0].clone() });
+        scene.walls.push(Wall {
+            name: "other".into(),
+            bar: 1,
+            normal: [0.0, -1.0],
+            ..scene.walls[0].clone()
+        });
         let outcome = run(&scene, &by(method, 3.0, 0.1, 1e-10));
         let alone = run(&bouncing(0.0, 1.0, 0.5), &by(method, 3.0, 0.1, 1e-10));
         assert_eq!(outcome.stop, None);
         assert_eq!(outcome.impact_count, 2 * alone.impact_count);
-        assert!((outcome.last.phi[0] - alone.last.phi[0]).abs() < 1e-8 && (outcome.last.phi[0] + outcome.last.phi[1]).abs() < 1e-12);
+        assert!(
+            (outcome.last.phi[0] - alone.last.phi[0]).abs() < 1e-8
+                && (outcome.last.phi[0] + outcome.last.phi[1]).abs() < 1e-12
+        );
     }
 }
 
@@ -145,7 +185,8 @@ fn of_two_walls_in_one_step_the_nearer_is_struck() {
     for method in LOCATED {
         for names in [["near", "far"], ["far", "near"]] {
             let mut scene = pendulum(1.0, 0.0);
-            scene.walls = names.map(|name| wall(name, if name == "near" { 0.0 } else { -1e-3 }, 1.0)).to_vec();
+            scene.walls =
+                names.map(|name| wall(name, if name == "near" { 0.0 } else { -1e-3 }, 1.0)).to_vec();
             let outcome = run(&scene, &by(method, 5.0, 0.1, 1e-9));
             assert_eq!(outcome.stop, None, "{names:?}");
             assert!(
@@ -160,15 +201,21 @@ fn of_two_walls_in_one_step_the_nearer_is_struck() {
 #[test]
 fn a_point_pressed_against_its_wall_is_held_there() {
     for method in LOCATED {
-        // The wall stands at 0.5 rad, where gravity presses the bar into it.  Without restitution it rests at the first strike; with it the
-        // strikes come closer and closer to a moment the small-bounce series gives.
+        // The wall stands at 0.5 rad, where gravity presses the bar into it.  Without restitution it rests at
+        // the first strike; with it the strikes come closer and closer to a moment the small-bounce series
+        // gives.
         let plastic = run(&bouncing(0.5, 1.0, 0.0), &by(method, 10.0, 0.01, 1e-10));
-        assert_eq!((plastic.stop.as_ref(), plastic.impact_count, plastic.persistent_contact_count), (None, 1, 1));
+        assert_eq!(
+            (plastic.stop.as_ref(), plastic.impact_count, plastic.persistent_contact_count),
+            (None, 1, 1)
+        );
         assert_eq!(plastic.holds[0].t, plastic.impacts[0].t);
         let lively = run(&bouncing(0.5, 1.0, 0.5), &by(method, 10.0, 0.01, 1e-10));
         assert_eq!((lively.stop.as_ref(), lively.persistent_contact_count), (None, 1));
-        // Under the nearly constant angular acceleration 15 sin 0.5 a rebound at w takes 2 w / (15 sin 0.5), and halves every time.
-        let last = lively.impacts.iter().rev().find(|strike| strike.approach < -1e-4).expect("a small bounce");
+        // Under the nearly constant angular acceleration 15 sin 0.5 a rebound at w takes 2 w / (15 sin 0.5),
+        // and halves every time.
+        let last =
+            lively.impacts.iter().rev().find(|strike| strike.approach < -1e-4).expect("a small bounce");
         let rest = last.t + 2.0 * -last.approach / (PENDULUM_SQUARED * 0.5f64.sin());
         // Bounces of less than 1e-11 m are not resolved: sqrt(8e-11 / 7.2) s before the end of all of them.
         assert!((lively.holds[0].t - rest).abs() < 1e-5, "{:?}, not {rest} s", lively.holds[0]);
@@ -178,7 +225,8 @@ fn a_point_pressed_against_its_wall_is_held_there() {
 #[test]
 fn a_bar_that_comes_to_rest_where_nothing_presses_it_hangs_there() {
     for method in LOCATED {
-        // Plastic wall at the lowest point: after the one strike the bar hangs at rest, in contact without force.
+        // Plastic wall at the lowest point: after the one strike the bar hangs at rest, in contact without
+        // force.
         let outcome = run(&bouncing(0.0, 1.0, 0.0), &by(method, 5.0, 0.1, 1e-12));
         assert_eq!((outcome.stop.as_ref(), outcome.impact_count), (None, 1));
         assert!(outcome.last.phi[0].abs() < 1e-12 && outcome.last.omega[0].abs() < 1e-12);
@@ -209,7 +257,10 @@ fn walls_with_methods_that_cannot_locate_impacts_are_refused() {
     for name in ["gauss16", "gauss4", "rattle4", "dopri5", "dop853"] {
         let request = Request { method: Some(name.parse().expect("a method")), ..Request::default() };
         let refusal = Plan::new(&scene, &mechanism, &request).expect_err(name);
-        assert!(!refusal.is_usage && refusal.what.contains(name) && refusal.what.contains("walls"), "{refusal}");
+        assert!(
+            !refusal.is_usage && refusal.what.contains(name) && refusal.what.contains("walls"),
+            "{refusal}"
+        );
         assert!(refusal.reason.contains("impact") && refusal.alternative.contains("dp8"), "{refusal}");
     }
 }

@@ -1,6 +1,8 @@
-//! What the digits of a scene's numbers come to, against runs from neighbouring scenes by another method, and against closed forms.
+//! What the digits of a scene's numbers come to, against runs from neighbouring scenes by another method, and
+//! against closed forms.
 //!
-//! `COUNT=300 cargo test --test reports -- inputs:: --nocapture` compares more random scenes; `SEED` is the first, `EACH` how many numbers of each.
+//! `COUNT=300 cargo test --test reports -- inputs:: --nocapture` compares more random scenes; `SEED` is the
+//! first, `EACH` how many numbers of each.
 
 use crate::common;
 use crate::mechanisms;
@@ -42,7 +44,8 @@ fn motions(scene: &Scene, method: MethodId, rtol: f64, until: f64) -> Result<Vec
     };
     let plan = Plan::new(scene, &mechanism, &request).map_err(|refusal| refusal.to_string())?;
     let start = mechanism.start(scene);
-    let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).map_err(|stop| stop.to_string())?;
+    let run =
+        Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).map_err(|stop| stop.to_string())?;
     let mut running = Running::new(run);
     let mut found: Vec<Motion> = Vec::new();
     loop {
@@ -83,7 +86,14 @@ enum Judged {
 }
 
 /// Judges what is told of a number by runs with it changed to both sides by what should make 1e-5 rad.
-fn judged(template: &Template, number: &Written, told: &driftless::run::trust::Input, base: &[Motion], until: f64, noise: f64) -> Judged {
+fn judged(
+    template: &Template,
+    number: &Written,
+    told: &driftless::run::trust::Input,
+    base: &[Motion],
+    until: f64,
+    noise: f64,
+) -> Judged {
     let Some(effect) = told.effect else { return Judged::Unknown(told.why.clone().unwrap_or_default()) };
     let slope = effect / number.uncertainty;
     let mut h = (1e-5 / slope).min(1e-3 * number.value.abs());
@@ -109,7 +119,9 @@ fn judged(template: &Template, number: &Written, told: &driftless::run::trust::I
     let sides = [&low, &high].map(|side| apart(&ruler, side, base));
     let expected = 2.0 * h * slope;
     if std::env::var("SHOW").is_ok() {
-        println!("  {told:?}: by {h:e} on both sides {expected:e} expected, {seen:e} seen, {sides:?}, noise {noise:e}");
+        println!(
+            "  {told:?}: by {h:e} on both sides {expected:e} expected, {seen:e} seen, {sides:?}, noise {noise:e}"
+        );
     }
     if seen.max(if told.is_upper_bound { 0.0 } else { expected }) < 100.0 * noise {
         return Judged::Small;
@@ -140,7 +152,11 @@ fn effects_are_those_of_runs_with_a_number_changed() {
         let base = motions(&scene, MethodId::Dp8, 1e-13, found.at);
         let (Some(_), Ok(base)) = (found.total.filter(|_| found.at == until), base) else {
             without += 1;
-            println!("{seed}: none: {:?} {:?}", found.why, found.numbers.first().and_then(|number| number.why.clone()));
+            println!(
+                "{seed}: none: {:?} {:?}",
+                found.why,
+                found.numbers.first().and_then(|number| number.why.clone())
+            );
             continue;
         };
         let ruler = DistanceMetric::new(&compile(&scene));
@@ -175,12 +191,16 @@ fn effects_are_those_of_runs_with_a_number_changed() {
         "{within} of {all} within 3, {small} too small to be seen, {unknown} not told, {unseen} not seen, \
          {scenes} scenes, {without} without, far off: {worst:?}"
     );
-    assert!(f64::from(within) >= 0.95 * f64::from(all) && worst.is_empty(), "{within} of {all}, far off: {worst:?}");
+    assert!(
+        f64::from(within) >= 0.95 * f64::from(all) && worst.is_empty(),
+        "{within} of {all}, far off: {worst:?}"
+    );
     assert!(u64::from(all) >= count && scenes * 2 > count, "{all} numbers of {scenes} scenes");
     assert!(f64::from(unknown) < 0.15 * f64::from(all + small + unknown), "{unknown} not told");
 }
 
-/// Without `--inputs` an order of magnitude is told: what relative changes of all forces and of the start by 2.5 half units in the last place come to.
+/// Without `--inputs` an order of magnitude is told: what relative changes of all forces and of the start by
+/// 2.5 half units in the last place come to.
 #[test]
 fn the_order_of_magnitude_is_that_of_all_numbers() {
     let (count, seed) = (number("COUNT", 60).min(100), number("SEED", 0));
@@ -191,24 +211,37 @@ fn the_order_of_magnitude_is_that_of_all_numbers() {
         let template = template(&made.text);
         let scene = template.scene().expect("a scene");
         let mechanism = compile(&scene);
-        let request = Request { until: Some(until), every: Some(until), max_evaluations: Some(MAX_EVALUATIONS), ..Request::default() };
+        let request = Request {
+            until: Some(until),
+            every: Some(until),
+            max_evaluations: Some(MAX_EVALUATIONS),
+            ..Request::default()
+        };
         let Ok(plan) = Plan::new(&scene, &mechanism, &request) else { continue };
         let start = mechanism.start(&scene);
         let Ok(run) = Run::new(mechanism, plan, Limits::default(), &start) else { continue };
-        let trust = integrate(run.trusted(Level::Auto, &start), &mut |_| Ok(())).expect("no observer fails").trust.expect("asked for");
+        let trust = integrate(run.trusted(Level::Auto, &start), &mut |_| Ok(()))
+            .expect("no observer fails")
+            .trust
+            .expect("asked for");
         let Some(told) = trust.input_error else { continue };
         let mut numbers = template.written_numbers(&[]).expect("a scene");
         for number in &mut numbers {
             number.uncertainty = 2.5 * 1.1e-16 * number.value.abs();
         }
         let found = effects(&template, &numbers, trust.at);
-        if let Some(total) = found.total.filter(|&total| found.at == trust.at && 2 * found.unknown() < numbers.len() && total > 0.0) {
+        if let Some(total) = found
+            .total
+            .filter(|&total| found.at == trust.at && 2 * found.unknown() < numbers.len() && total > 0.0)
+        {
             println!("{seed}: {:.3} {:?}", told / total, made.kinds);
             ratios.push(told / total);
         }
     }
     ratios.sort_by(f64::total_cmp);
-    let share = |most: f64| ratios.iter().filter(|ratio| (1.0 / most..most).contains(*ratio)).count() as f64 / ratios.len() as f64;
+    let share = |most: f64| {
+        ratios.iter().filter(|ratio| (1.0 / most..most).contains(*ratio)).count() as f64 / ratios.len() as f64
+    };
     let [low, middle, high] = [0.05, 0.5, 0.95].map(|part| ratios[(part * ratios.len() as f64) as usize]);
     println!(
         "{} runs: {low:.2} {middle:.2} {high:.2}; within 3 {:.2}, 10 {:.2}, 100 {:.2}",
@@ -223,7 +256,8 @@ fn the_order_of_magnitude_is_that_of_all_numbers() {
 /// The effect told of a number, which must be one side of 1e-3 right.
 #[track_caller]
 fn assert_effect(found: &Inputs, path: &str, expected: f64) {
-    let input = found.numbers.iter().find(|input| input.path == path).unwrap_or_else(|| panic!("{path}: {found:?}"));
+    let input =
+        found.numbers.iter().find(|input| input.path == path).unwrap_or_else(|| panic!("{path}: {found:?}"));
     let effect = input.effect.unwrap_or_else(|| panic!("{input:?}"));
     assert!((effect / expected - 1.0).abs() < 1e-3, "{path}: {effect:e}, not {expected:e}");
 }
@@ -238,7 +272,8 @@ fn largest(until: f64, f: impl Fn(f64) -> f64) -> f64 {
     (0..=LOOKS).map(|k| f(until * f64::from(k) / f64::from(LOOKS)).abs()).fold(0.0, f64::max)
 }
 
-/// phi = f(t sqrt(g/l)): a change of g is d phi = t phi'/2 dg/g, one of l the opposite, and none of the mass.  The motion is by Runge-Kutta here.
+/// phi = f(t sqrt(g/l)): a change of g is d phi = t phi'/2 dg/g, one of l the opposite, and none of the mass.
+/// The motion is by Runge-Kutta here.
 #[test]
 fn a_pendulums_phase_follows_its_length_and_gravity() {
     let text = r#"{"name": "pendulum", "gravity": [0, -9.81], "until": 20, "every": 0.1,
@@ -268,7 +303,8 @@ fn a_pendulums_phase_follows_its_length_and_gravity() {
     assert_eq!(found.unknown(), 0, "{found:?}");
 }
 
-/// x = x0 cos(w t), w² = k/m: of the stiffness dx = x0 t w/2 sin(w t) dk/k, growing as the time, of the mass as much.
+/// x = x0 cos(w t), w² = k/m: of the stiffness dx = x0 t w/2 sin(w t) dk/k, growing as the time, of the mass
+/// as much.
 #[test]
 fn an_oscillators_phase_follows_its_stiffness() {
     let text = r#"{"name": "oscillator", "gravity": [0, 0], "until": 50, "every": 0.5,
@@ -284,12 +320,14 @@ fn an_oscillators_phase_follows_its_stiffness() {
         assert_effect(&found, "springs.spring.stiffness", phase * 0.05 / 18.0);
         assert_effect(&found, "bars.block.mass", phase * 0.005 / 2.0);
         assert_effect(&found, "start.block.origin[0]", 0.05);
-        let squares: f64 = found.numbers.iter().filter_map(|input| input.effect).map(|effect| effect * effect).sum();
+        let squares: f64 =
+            found.numbers.iter().filter_map(|input| input.effect).map(|effect| effect * effect).sum();
         assert_eq!(found.total, Some(squares.sqrt()));
     }
 }
 
-/// A ball that falls from y onto a wall at w and rebounds: v1² = v0² + 2 g (y - w), t1 = (v0 + v1)/g, then w + e v1 (t - t1) - g (t - t1)²/2.
+/// A ball that falls from y onto a wall at w and rebounds: v1² = v0² + 2 g (y - w), t1 = (v0 + v1)/g, then w +
+/// e v1 (t - t1) - g (t - t1)²/2.
 #[test]
 fn a_bouncing_ball_feels_its_wall_and_its_restitution() {
     let text = r#"{"name": "ball", "gravity": [0, -10.0], "until": 0.6, "every": 0.1,
@@ -336,7 +374,8 @@ fn what_can_be_changed_to_one_side_only_is_told_all_the_same() {
     assert_effect(&all_effects(text, 0.6), "walls.floor.restitution", 0.005 * rebound);
 }
 
-/// Effects do not depend on what the run wrote, and where a motion is not known to its end, they go as far as it is.
+/// Effects do not depend on what the run wrote, and where a motion is not known to its end, they go as far as
+/// it is.
 #[test]
 fn effects_end_where_rounding_rules() {
     let template = Template::read("examples/scenes/free.json".as_ref(), &[]).expect("a shipped scene");
@@ -359,26 +398,48 @@ mod command {
     #[test]
     fn a_run_tells_what_every_number_comes_to() {
         let program = Program::with_scenes(&["free", "four_bar_motor"]);
-        let ran = program.run("run free.json --until 3 --no-charts --inputs --set bar1.length=0.6000 --json").exits(0);
+        let ran = program
+            .run("run free.json --until 3 --no-charts --inputs --set bar1.length=0.6000 --json")
+            .exits(0);
         let inputs = &ran.object()["trust"]["inputs"];
         let numbers = inputs["numbers"].as_array().expect("a list");
-        let of = |path: &str| numbers.iter().find(|number| number["path"] == path).unwrap_or_else(|| panic!("{path}: {numbers:?}"));
+        let of = |path: &str| {
+            numbers
+                .iter()
+                .find(|number| number["path"] == path)
+                .unwrap_or_else(|| panic!("{path}: {numbers:?}"))
+        };
         assert_eq!(of("bars.bar1.length")["uncertainty"], 5e-5);
         assert_eq!(of("gravity[0]")["uncertainty"], 0.005);
-        assert!(numbers.iter().all(|number| number["value"] != 0.0 && number["path"] != "until"), "{numbers:?}");
-        let effects: Vec<f64> = numbers.iter().map(|number| number["effect_rad"].as_f64().expect("a figure")).collect();
+        assert!(
+            numbers.iter().all(|number| number["value"] != 0.0 && number["path"] != "until"),
+            "{numbers:?}"
+        );
+        let effects: Vec<f64> =
+            numbers.iter().map(|number| number["effect_rad"].as_f64().expect("a figure")).collect();
         assert!(effects.is_sorted_by(|a, b| a >= b), "{effects:?}");
         let total = effects.iter().map(|effect| effect * effect).sum::<f64>().sqrt();
         assert!((inputs["total_rad"].as_f64().expect("a total") / total - 1.0).abs() < 1e-12);
-        assert_eq!((&inputs["at_s"], &ran.object()["trust"]["input_error"]), (&Value::from(3.0), &inputs["total_rad"]));
-        let kept: Value = serde_json::from_str(&program.read("output/free/taylor-1e-9/run.json")).expect("JSON");
+        assert_eq!(
+            (&inputs["at_s"], &ran.object()["trust"]["input_error"]),
+            (&Value::from(3.0), &inputs["total_rad"])
+        );
+        let kept: Value =
+            serde_json::from_str(&program.read("output/free/taylor-1e-9/run.json")).expect("JSON");
         assert_eq!(&kept["result"]["trust"]["inputs"], inputs);
-        let text =
-            program.run("run free.json --until 3 --no-charts --inputs --force").exits(0).shows(&["last digits as written", "runs, "]);
+        let text = program
+            .run("run free.json --until 3 --no-charts --inputs --force")
+            .exits(0)
+            .shows(&["last digits as written", "runs, "]);
         let places = ["gravity[0]", "start.bar1.phi"].map(|path| text.stdout.find(path).expect(path));
-        assert!(places[0] < places[1] && text.stdout.lines().all(|line| line.chars().count() <= 80), "{}", text.stdout);
+        assert!(
+            places[0] < places[1] && text.stdout.lines().all(|line| line.chars().count() <= 80),
+            "{}",
+            text.stdout
+        );
         // All is driven: no growth, but numbers have effects.
-        let driven = program.run("run four_bar_motor.json --until 1 --no-charts --inputs --json").exits(0).object();
+        let driven =
+            program.run("run four_bar_motor.json --until 1 --no-charts --inputs --json").exits(0).object();
         assert!(driven["trust"]["inputs"]["total_rad"].as_f64().is_some_and(|total| total > 0.0), "{driven}");
         let usual = program.run("run free.json --until 3 --no-charts --force --json").exits(0).object();
         assert!(usual["trust"]["inputs"].is_null());
@@ -396,18 +457,22 @@ mod command {
         let run = "run free.json --method taylor --until 2e4 --every 1 --no-charts --checkpoint-every 0.01 --inputs --set gravity[0]=9.810";
         let folder = "output/free/taylor-1e-9";
         let table = |program: &Program| {
-            let kept: Value = serde_json::from_str(&program.read(&format!("{folder}/run.json"))).expect("JSON");
+            let kept: Value =
+                serde_json::from_str(&program.read(&format!("{folder}/run.json"))).expect("JSON");
             kept["result"]["trust"].clone()
         };
         let whole = Program::with_scenes(&["free"]);
         whole.run(&format!("{run} -q")).exits(0);
         let program = Program::with_scenes(&["free"]);
-        let mut child = program.command(run).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program");
+        let mut child =
+            program.command(run).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program");
         while !program.path(&format!("{folder}/checkpoint.previous")).exists() {
             assert_eq!(child.try_wait().expect("a child"), None, "it ended before its checkpoint");
             std::thread::sleep(Duration::from_millis(2));
         }
-        assert!(Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill").success());
+        assert!(
+            Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill").success()
+        );
         assert_eq!(child.wait().expect("it ends").code(), Some(130));
         program.run(&format!("resume {folder} -q")).exits(0);
         assert!(table(&program)["inputs"]["numbers"].as_array().is_some_and(|numbers| numbers.len() > 5));

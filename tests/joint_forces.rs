@@ -1,4 +1,5 @@
-//! What `inspect` and the table say of forces: hung weights tell every sign, redundant constraints are named, and each column has the unit of what is in it.
+//! What `inspect` and the table say of forces: hung weights tell every sign, redundant constraints are named,
+//! and each column has the unit of what is in it.
 #![cfg(feature = "cli")]
 
 use crate::program;
@@ -48,7 +49,8 @@ const ORDERS: [[&str; 2]; 2] = [["body", "ground"], ["ground", "body"]];
 #[test]
 fn a_weld_holds_a_weight_whichever_body_comes_first() {
     for [second, first] in ORDERS {
-        let found = inspected(&hung(&json!({"welds": [{"name": "W", "between": [place(first), place(second)]}]})));
+        let found =
+            inspected(&hung(&json!({"welds": [{"name": "W", "between": [place(first), place(second)]}]})));
         let sign = if second == "body" { 1.0 } else { -1.0 };
         is_force(&found["hinges"]["W"], [0.0, sign * WEIGHT], second, first);
         assert_eq!(found["hinges"]["W"]["determinate"], true);
@@ -56,7 +58,10 @@ fn a_weld_holds_a_weight_whichever_body_comes_first() {
         let angle = &found["constraints"]["W.angle"];
         is_near(&angle["torque"], 0.5 * WEIGHT);
         is_near(&angle["multiplier"], -0.5 * WEIGHT);
-        assert_eq!((&angle["on"], &angle["unit"], &angle["unit_of_multiplier"]), (&json!("body"), &json!("rad"), &json!("N m")));
+        assert_eq!(
+            (&angle["on"], &angle["unit"], &angle["unit_of_multiplier"]),
+            (&json!("body"), &json!("rad"), &json!("N m"))
+        );
         assert_eq!(found["motors"], json!({}), "a weld is no motor");
     }
 }
@@ -65,7 +70,8 @@ fn a_weld_holds_a_weight_whichever_body_comes_first() {
 fn a_hinge_with_a_lock_does_too() {
     for [second, first] in ORDERS {
         let hinge = json!({"name": "A", "between": [place(first), place(second)]});
-        let found = inspected(&hung(&json!({"hinges": [hinge], "locks": [{"name": "lock", "body": "body"}]})));
+        let found =
+            inspected(&hung(&json!({"hinges": [hinge], "locks": [{"name": "lock", "body": "body"}]})));
         let sign = if second == "body" { 1.0 } else { -1.0 };
         is_force(&found["hinges"]["A"], [0.0, sign * WEIGHT], second, first);
         is_near(&found["constraints"]["lock"]["torque"], 0.5 * WEIGHT);
@@ -107,14 +113,19 @@ fn a_motor_on_a_slider_has_a_force_along_the_rail() {
         is_force(&found["constraints"]["lift"], [0.0, WEIGHT], "body", "ground");
         let program = Program::new();
         program.write("scene.json", &scene.to_string());
-        program.run("inspect scene.json").exits(0).shows(&["force [N]", "multiplier [N]", "C [m]", "multiplier [N m]", "C [rad]"]);
+        program.run("inspect scene.json").exits(0).shows(&[
+            "force [N]",
+            "multiplier [N]",
+            "C [m]",
+            "multiplier [N m]",
+            "C [rad]",
+        ]);
     }
 }
 
 /// A beam on two pins.
 fn beam(gravity: [f64; 2]) -> Value {
-    let pin =
-        |name: &str, x: f64| json!({"name": name, "between": [{"body": "ground", "point": [x, 0]}, {"body": "beam", "point": [x, 0]}]});
+    let pin = |name: &str, x: f64| json!({"name": name, "between": [{"body": "ground", "point": [x, 0]}, {"body": "beam", "point": [x, 0]}]});
     json!({
         "name": "beam", "gravity": gravity,
         "bars": [{"name": "beam", "mass": 2, "centre": [0.5, 0], "inertia": 0.1, "length": 2}],
@@ -129,7 +140,10 @@ fn indeterminate_forces_are_named_and_shared_equally() {
     // Moments give the upward forces; along the beam only their sum is known, and the least are equal.
     is_force(&found["hinges"]["A"], [-3.0, 0.75 * WEIGHT], "beam", "ground");
     is_force(&found["hinges"]["B"], [-3.0, 0.25 * WEIGHT], "beam", "ground");
-    assert_eq!((&found["hinges"]["A"]["determinate"], &found["hinges"]["B"]["determinate"]), (&json!(false), &json!(false)));
+    assert_eq!(
+        (&found["hinges"]["A"]["determinate"], &found["hinges"]["B"]["determinate"]),
+        (&json!(false), &json!(false))
+    );
     let program = Program::new();
     program.write("scene.json", &beam([3.0, -9.81]).to_string());
     program.run("inspect scene.json").exits(0).shows(&["indeterminate", "A, B", "least norm"]);
@@ -141,8 +155,14 @@ fn three_equal_cranks_share_what_they_may() {
     let hinge = |name: String, a: Value, b: Value| json!({"name": name, "between": [a, b]});
     let at = |body: &str, x: f64| json!({"body": body, "point": [x, 0]});
     let cranks = ["left", "middle", "right"];
-    let translations = cranks.iter().enumerate().map(|(i, name)| hinge(format!("A{i}"), at("ground", i as f64), at(name, 0.0)));
-    let tops = cranks.iter().enumerate().map(|(i, name)| hinge(format!("B{i}"), at("coupler", i as f64), at(name, 1.0)));
+    let translations = cranks
+        .iter()
+        .enumerate()
+        .map(|(i, name)| hinge(format!("A{i}"), at("ground", i as f64), at(name, 0.0)));
+    let tops = cranks
+        .iter()
+        .enumerate()
+        .map(|(i, name)| hinge(format!("B{i}"), at("coupler", i as f64), at(name, 1.0)));
     let start = json!({"phi": 1.3, "omega": 0.0});
     let scene = json!({
         "name": "cranks", "gravity": [9.81, 0],
@@ -153,19 +173,30 @@ fn three_equal_cranks_share_what_they_may() {
     });
     let found = inspected(&scene);
     // Newton for the coupler: what hangs on it at the tops is what moves it.
-    let total = |axis: usize| (0..3).map(|i| found["hinges"][format!("B{i}")]["force"][axis].as_f64().expect("a number")).sum::<f64>();
+    let total = |axis: usize| {
+        (0..3)
+            .map(|i| found["hinges"][format!("B{i}")]["force"][axis].as_f64().expect("a number"))
+            .sum::<f64>()
+    };
     let (x, y) = (&found["bodies"]["coupler"]["x"], &found["bodies"]["coupler"]["y"]);
-    assert!((total(0) + x.as_f64().expect("a number") - 9.81).abs() < 1e-9 && (total(1) + y.as_f64().expect("a number")).abs() < 1e-9);
-    // The load that the cranks' rods cannot tell apart: pushes along the rods, of sum and moment zero, (1, -2, 1).
+    assert!(
+        (total(0) + x.as_f64().expect("a number") - 9.81).abs() < 1e-9
+            && (total(1) + y.as_f64().expect("a number")).abs() < 1e-9
+    );
+    // The load that the cranks' rods cannot tell apart: pushes along the rods, of sum and moment zero, (1,
+    // -2, 1).
     let along = |name: String| {
         let force = &found["hinges"][name]["force"];
-        force[0].as_f64().expect("a number") * 1.3_f64.cos() + force[1].as_f64().expect("a number") * 1.3_f64.sin()
+        force[0].as_f64().expect("a number") * 1.3_f64.cos()
+            + force[1].as_f64().expect("a number") * 1.3_f64.sin()
     };
     for letter in ["A", "B"] {
         assert!((0..3).all(|i| found["hinges"][format!("{letter}{i}")]["determinate"] == false), "{found:#}");
     }
     // Least norm: what is found has no part in it.
-    let share = |letter: &str| along(format!("{letter}0")) - 2.0 * along(format!("{letter}1")) + along(format!("{letter}2"));
+    let share = |letter: &str| {
+        along(format!("{letter}0")) - 2.0 * along(format!("{letter}1")) + along(format!("{letter}2"))
+    };
     assert!((share("A") - share("B")).abs() < 1e-9, "{} {}", share("A"), share("B"));
 }
 
@@ -176,14 +207,19 @@ fn forces_of_regular_mechanisms_are_determinate() {
         let found = program.run(&format!("inspect {name}.json --json")).exits(0).object();
         for list in ["hinges", "constraints"] {
             let all = found[list].as_object().expect("an object");
-            assert!(!all.is_empty() && all.values().all(|one| one["determinate"] == true), "{name}: {found:#}");
+            assert!(
+                !all.is_empty() && all.values().all(|one| one["determinate"] == true),
+                "{name}: {found:#}"
+            );
         }
     }
 }
 
 /// Titles of the table of a short run, and its rows.
 fn table(program: &Program, scene: &str, folder: &str) -> (Vec<String>, Vec<Vec<f64>>) {
-    program.run(&format!("run {scene}.json --until 1 --every 0.1 --method dp8 -q --no-charts --trust off")).exits(0);
+    program
+        .run(&format!("run {scene}.json --until 1 --every 0.1 --method dp8 -q --no-charts --trust off"))
+        .exits(0);
     let text = program.read(&format!("output/{scene}/{folder}/trajectory.csv"));
     let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
     let head = lines.next().expect("a header");
@@ -198,7 +234,13 @@ fn columns_are_those_of_what_a_constraint_has() {
         (
             "cart_pole",
             "dp8-1e-9-projection",
-            &["slider.angle.C [rad]", "slider.angle.C' [rad/s]", "slider.angle.torque [N m]", "slider.C [m]", "slider.C' [m/s]"],
+            &[
+                "slider.angle.C [rad]",
+                "slider.angle.C' [rad/s]",
+                "slider.angle.torque [N m]",
+                "slider.C [m]",
+                "slider.C' [m/s]",
+            ],
         ),
         (
             "four_bar_motor",
@@ -235,11 +277,17 @@ fn a_driven_slider_has_the_force_that_moves_it() {
     scene["name"] = json!("pushed");
     program.write("pushed.json", &scene.to_string());
     let (head, rows) = table(&program, "pushed", "dp8-1e-9-projection");
-    let column = |title: &str| head.iter().position(|known| known == title).unwrap_or_else(|| panic!("{title} in {head:?}"));
+    let column = |title: &str| {
+        head.iter().position(|known| known == title).unwrap_or_else(|| panic!("{title} in {head:?}"))
+    };
     let (force, power) = (column("push.force [N]"), column("push.power [W]"));
     for row in rows {
         let t = row[0];
         let expected = -2.0 * 0.1 * 16.0 * (4.0 * t).sin();
-        assert!((row[force] - expected).abs() < 1e-9 && (row[power] - expected * 0.4 * (4.0 * t).cos()).abs() < 1e-9, "{row:?}");
+        assert!(
+            (row[force] - expected).abs() < 1e-9
+                && (row[power] - expected * 0.4 * (4.0 * t).cos()).abs() < 1e-9,
+            "{row:?}"
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! Scenes with loops, sliders, welds, locks, free bodies, loads and starts given in part: read, written and refused.
+//! Scenes with loops, sliders, welds, locks, free bodies, loads and starts given in part: read, written and
+//! refused.
 
 use driftless::scene::{Given, Override, Scene, SceneError, StartValue, Template, parse_scene, schema};
 use proptest::prelude::*;
@@ -91,12 +92,19 @@ fn every_part_is_read() {
     let [track, slot] = &scene.sliders[..] else { panic!("two sliders") };
     assert_eq!((track.point.bar, track.rail.place.bar, track.rail.place.point), (Some(4), None, [0.0, -1.0]));
     assert_eq!((track.rail.direction, track.locked), ([0.6, 0.8], true), "a direction is a unit vector");
-    assert_eq!((slot.point.point, slot.rail.place.bar, slot.locked), ([0.3, 0.0], Some(5), false), "free if nothing is said");
+    assert_eq!(
+        (slot.point.point, slot.rail.place.bar, slot.locked),
+        ([0.3, 0.0], Some(5), false),
+        "free if nothing is said"
+    );
     assert_eq!(scene.welds[0].between.map(|place| place.bar), [Some(1), Some(3)]);
     assert_eq!((scene.locks[0].bar, scene.locks[0].relative_to, scene.locks[0].angle), (2, None, Some(1.25)));
     assert_eq!((scene.locks[1].relative_to, scene.locks[1].angle), (Some(1), None));
     let coil = &scene.torsion_springs[0];
-    assert_eq!((coil.bar, coil.relative_to, coil.stiffness, coil.free_angle, coil.damping), (0, Some(1), 2.0, -0.5, 0.0));
+    assert_eq!(
+        (coil.bar, coil.relative_to, coil.stiffness, coil.free_angle, coil.damping),
+        (0, Some(1), 2.0, -0.5, 0.0)
+    );
     assert_eq!((scene.forces[0].force, scene.forces[0].follows), ([1.0, 2.0], true));
     assert_eq!(scene.forces[0].law.as_ref().map(|law| (law.start, law.sines[0].amplitude)), Some((0.0, 2.0)));
     assert!(!scene.forces[1].follows && scene.forces[1].law.is_none());
@@ -117,7 +125,9 @@ fn what_is_given_of_the_start_is_told_from_what_is_guessed() {
     // Motors and locks tell their own; the rest is 0.
     assert_eq!(start, [(0.5, 2.0), (0.25, 0.0), (1.25, 0.0), (0.5, 0.0), (0.0, 0.0), (0.0, 3.0)]);
     // Relative motors carry a guess on, part by part.
-    let scene = set(&[r#"motors[0]={"name": "turn", "body": "crank", "relative_to": "coupler", "law": {"start": 0.5, "rate": 2}}"#]);
+    let scene = set(&[
+        r#"motors[0]={"name": "turn", "body": "crank", "relative_to": "coupler", "law": {"start": 0.5, "rate": 2}}"#,
+    ]);
     let scene = scene.unwrap_or_else(|error| panic!("{error}"));
     assert_eq!((scene.start[0].phi, scene.start[0].omega), (0.75, 2.0));
     // No bar of a scene with loops must be given.
@@ -154,9 +164,15 @@ fn trees_of_hinges_still_need_every_start() {
     };
     let one = json!({"phi": 0.5, "omega": 1});
     let error = refused(&tree(json!([]), json!({"one": one})));
-    assert_eq!((error.refusal().path.as_str(), error.refusal().problem.as_str()), ("start.two", "is missing"));
+    assert_eq!(
+        (error.refusal().path.as_str(), error.refusal().problem.as_str()),
+        ("start.two", "is missing")
+    );
     let error = refused(&tree(json!([]), json!({"one": one, "two": {"phi": 0}})));
-    assert_eq!((error.refusal().path.as_str(), error.refusal().problem.as_str()), ("start.two.omega", "is missing"));
+    assert_eq!(
+        (error.refusal().path.as_str(), error.refusal().problem.as_str()),
+        ("start.two.omega", "is missing")
+    );
     // A lock with an angle gives the start as a motor does.
     let lock = json!([{"name": "l", "body": "two", "relative_to": "one", "angle": 0.25}]);
     let scene = parsed(&tree(lock.clone(), json!({"one": one}))).unwrap_or_else(|error| panic!("{error}"));
@@ -166,7 +182,8 @@ fn trees_of_hinges_still_need_every_start() {
     let error = refused(&tree(lock, json!({"one": one, "two": {"phi": 0.7, "omega": 1}})));
     assert!(error.to_string().contains("start.two.phi = 0.7: must be 0.75 rad, by lock `l`"), "{error}");
     // One without takes its angle from the start, and the rest may be found.
-    let scene = parsed(&tree(json!([{"name": "l", "body": "two"}]), json!({"one": one}))).unwrap_or_else(|error| panic!("{error}"));
+    let scene = parsed(&tree(json!([{"name": "l", "body": "two"}]), json!({"one": one})))
+        .unwrap_or_else(|error| panic!("{error}"));
     assert!(!scene.has_whole_start() && !scene.given[1].phi);
 }
 
@@ -175,10 +192,25 @@ const REFUSALS: &[(&str, &str, &str, &str)] = &[
     ("[3, 4]", "[0, 0]", "sliders[0].rail.direction", "must be longer than 1e-30"),
     ("\"locked\"", "\"lock\"", "sliders[0].angle", "must be \"free\" or \"locked\""),
     ("\"locked\"", "\"loked\"", "sliders[0].angle", "did you mean \"locked\"?"),
-    ("\"angle\": \"locked\"", "\"angle\": true", "sliders[0].angle", "= true: must be \"free\" or \"locked\""),
+    (
+        "\"angle\": \"locked\"",
+        "\"angle\": true",
+        "sliders[0].angle",
+        "= true: must be \"free\" or \"locked\"",
+    ),
     ("\"rail\": {\"body\": \"disc\"", "\"rail\": {\"body\": \"arm\"", "sliders[1]", "joins `arm` to itself"),
-    ("\"rail\": {\"body\": \"disc\"", "\"rail\": {\"body\": \"disk\"", "sliders[1].rail.body", "did you mean \"disc\"?"),
-    ("\"direction\": [1, 0]", "\"dir\": [1, 0]", "sliders[1].rail.dir", "a rail has the keys body, point, direction"),
+    (
+        "\"rail\": {\"body\": \"disc\"",
+        "\"rail\": {\"body\": \"disk\"",
+        "sliders[1].rail.body",
+        "did you mean \"disc\"?",
+    ),
+    (
+        "\"direction\": [1, 0]",
+        "\"dir\": [1, 0]",
+        "sliders[1].rail.dir",
+        "a rail has the keys body, point, direction",
+    ),
     ("\"name\": \"slot\"", "\"name\": \"track\"", "sliders[1].name", "sliders[0].name is the same"),
     (
         "{\"body\": \"arm\", \"point\": [0, 0]}",
@@ -186,7 +218,12 @@ const REFUSALS: &[(&str, &str, &str, &str)] = &[
         "welds[0].between",
         "joins `coupler` to itself",
     ),
-    ("\"body\": \"rocker\", \"relative_to\"", "\"body\": \"ground\", \"relative_to\"", "locks[0].body", "the ground does not turn"),
+    (
+        "\"body\": \"rocker\", \"relative_to\"",
+        "\"body\": \"ground\", \"relative_to\"",
+        "locks[0].body",
+        "the ground does not turn",
+    ),
     (
         "\"body\": \"arm\", \"relative_to\": \"coupler\"",
         "\"body\": \"arm\", \"relative_to\": \"arm\"",
@@ -195,11 +232,31 @@ const REFUSALS: &[(&str, &str, &str, &str)] = &[
     ),
     ("\"angle\": 1.25", "\"angle\": 1e14", "locks[0].angle", "take off whole turns"),
     ("\"stiffness\": 2", "\"stiffness\": -2", "torsion_springs[0].stiffness", "from 0 to 1e30 N·m/rad"),
-    ("\"free_angle\": -0.5", "\"free_angel\": -0.5", "torsion_springs[0].free_angel", "did you mean `free_angle`?"),
+    (
+        "\"free_angle\": -0.5",
+        "\"free_angel\": -0.5",
+        "torsion_springs[0].free_angel",
+        "did you mean `free_angle`?",
+    ),
     ("\"frame\": \"body\"", "\"frame\": \"bar\"", "forces[0].frame", "must be \"ground\" or \"body\""),
-    ("\"force\": [1, 2]", "\"force\": [1, 2, 3]", "forces[0].force", "two numbers [x, y], each from -1e30 to 1e30 N"),
-    ("\"law\": {\"start\": 0, \"sines\"", "\"law\": {\"sines\"", "forces[0].law.start", "is missing: must be a number from -1e30 to 1e30"),
-    ("\"body\": \"arm\", \"point\": [0.1, 0]", "\"body\": \"ground\", \"point\": [0.1, 0]", "forces[0].body", "moves nothing"),
+    (
+        "\"force\": [1, 2]",
+        "\"force\": [1, 2, 3]",
+        "forces[0].force",
+        "two numbers [x, y], each from -1e30 to 1e30 N",
+    ),
+    (
+        "\"law\": {\"start\": 0, \"sines\"",
+        "\"law\": {\"sines\"",
+        "forces[0].law.start",
+        "is missing: must be a number from -1e30 to 1e30",
+    ),
+    (
+        "\"body\": \"arm\", \"point\": [0.1, 0]",
+        "\"body\": \"ground\", \"point\": [0.1, 0]",
+        "forces[0].body",
+        "moves nothing",
+    ),
     ("\"torque\": 0.5", "\"torque\": \"0.5\"", "torques[0].torque", "without quotes: 0.5"),
     ("\"rate\": -0.1", "\"rate\": 1e31", "torques[0].law.rate", "from -1e30 to 1e30 1/s"),
     ("\"slider\": \"track\"", "\"slider\": \"trak\"", "motors[1].slider", "did you mean \"track\"?"),
@@ -212,9 +269,24 @@ const REFUSALS: &[(&str, &str, &str, &str)] = &[
     ),
     ("\"amplitude\": 0.05", "\"amplitude\": 1e31", "motors[1].law.sines[0].amplitude", "to 1e30 m"),
     ("\"name\": \"travel\"", "\"name\": \"turn\"", "motors[1].name", "motors[0].name is the same"),
-    ("\"body\": \"crank\", \"law\"", "\"body\": \"rocker\", \"law\"", "locks[0]", "(lock `still`) holds an angle that is given already"),
-    ("\"coupler\": {\"phi\": 0.25}", "\"crank\": {\"phi\": 0.25}", "start.crank.phi", "must be 0.5 rad, by the law of motor `turn`"),
-    ("\"coupler\": {\"phi\": 0.25}", "\"rocker\": {\"omega\": 0.25}", "start.rocker.omega", "must be 0.0 rad/s, by lock `still`"),
+    (
+        "\"body\": \"crank\", \"law\"",
+        "\"body\": \"rocker\", \"law\"",
+        "locks[0]",
+        "(lock `still`) holds an angle that is given already",
+    ),
+    (
+        "\"coupler\": {\"phi\": 0.25}",
+        "\"crank\": {\"phi\": 0.25}",
+        "start.crank.phi",
+        "must be 0.5 rad, by the law of motor `turn`",
+    ),
+    (
+        "\"coupler\": {\"phi\": 0.25}",
+        "\"rocker\": {\"omega\": 0.25}",
+        "start.rocker.omega",
+        "must be 0.0 rad/s, by lock `still`",
+    ),
     ("\"phi\": 0.25", "\"origin\": [0, 0]", "start.coupler.origin", "bar `coupler` hangs on the ground"),
     ("\"origin\": [0.06, -0.92]", "\"origin\": [0.06]", "start.disc.origin", "each from -1e30 to 1e30 m"),
     ("\"omega\": 3", "\"omgea\": 3", "start.disc.omgea", "did you mean `omega`?"),
@@ -246,7 +318,10 @@ fn a_free_point_mass_has_no_angle() {
     };
     let error = refused(&scene(json!({})));
     assert_eq!(error.refusal().path, "bars[0]", "{error}");
-    assert!(parsed(&changed("\"inertia\": 0.3", "\"inertia\": 0")).is_ok(), "a slot turns a body without inertia");
+    assert!(
+        parsed(&changed("\"inertia\": 0.3", "\"inertia\": 0")).is_ok(),
+        "a slot turns a body without inertia"
+    );
     assert!(parsed(&scene(json!({"locks": [{"name": "l", "body": "point", "angle": 0}]}))).is_ok());
     let body = scene(json!({})).replace("\"inertia\":0", "\"inertia\":0.5");
     let free = parsed(&body).unwrap_or_else(|error| panic!("{error}"));
@@ -255,7 +330,12 @@ fn a_free_point_mass_has_no_angle() {
 
 #[test]
 fn new_numbers_can_be_set_and_varied() {
-    let scene = set(&["sliders.track.rail.direction=[0, 2]", "forces.push.force[1]=7", "torques.twist.law.rate=1", "locks.still.angle=1"]);
+    let scene = set(&[
+        "sliders.track.rail.direction=[0, 2]",
+        "forces.push.force[1]=7",
+        "torques.twist.law.rate=1",
+        "locks.still.angle=1",
+    ]);
     let scene = scene.unwrap_or_else(|error| panic!("{error}"));
     assert_eq!((scene.sliders[0].rail.direction, scene.forces[0].force), ([0.0, 1.0], [1.0, 7.0]));
     assert_eq!(set(&["start.disc.velocity[0]=2"]).map(|scene| scene.given[5].velocity), Ok(Some([2.0, 0.0])));
@@ -291,8 +371,14 @@ fn the_schema_has_units_and_words() {
     assert_eq!(items("sliders")["angle"]["enum"], json!(["free", "locked"]));
     assert_eq!(items("torsion_springs")["stiffness"]["description"], "Stiffness. [N·m/rad]");
     let motors = &schema["properties"]["motors"]["items"]["oneOf"];
-    assert_eq!(motors[0]["properties"]["law"]["properties"]["rate"]["description"], "Rate; 0 if absent. [rad/s]");
-    assert_eq!(motors[1]["properties"]["law"]["properties"]["rate"]["description"], "Rate; 0 if absent. [m/s]");
+    assert_eq!(
+        motors[0]["properties"]["law"]["properties"]["rate"]["description"],
+        "Rate; 0 if absent. [rad/s]"
+    );
+    assert_eq!(
+        motors[1]["properties"]["law"]["properties"]["rate"]["description"],
+        "Rate; 0 if absent. [m/s]"
+    );
     let start = &schema["properties"]["start"]["additionalProperties"];
     assert_eq!(
         (start["required"].clone(), start["properties"]["velocity"]["description"].clone()),

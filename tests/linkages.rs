@@ -37,7 +37,9 @@ fn finished(scene: &Scene, request: &Request) -> Outcome {
 
 /// Largest violation of any constraint of a run, at both levels.
 fn violations(outcome: &Outcome) -> [f64; 2] {
-    let of = |level: usize| outcome.drift.constraints.iter().map(|(_, monitors)| monitors[level].max).fold(0.0, f64::max);
+    let of = |level: usize| {
+        outcome.drift.constraints.iter().map(|(_, monitors)| monitors[level].max).fold(0.0, f64::max)
+    };
     [of(0), of(1)]
 }
 
@@ -60,7 +62,9 @@ fn andrews_squeezing_mechanism() {
         (steps("rattle8", 1e-4 / 8.0), 1e-9),
     ] {
         let outcome = finished(&scene, &request);
-        let apart = |found: &[f64], expected: &[f64]| found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let apart = |found: &[f64], expected: &[f64]| {
+            found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
         let (error, slip) = (apart(&outcome.last.phi, &angles), apart(&outcome.last.omega, &rates));
         let method = outcome.plan.method;
         assert!(error < most, "{method}: {error:.1e} rad");
@@ -68,7 +72,10 @@ fn andrews_squeezing_mechanism() {
         let [position, velocity] = violations(&outcome);
         let is_kept = outcome.plan.stabilization == Stabilization::Projection;
         // Rates are of the order 1e3 rad/s.
-        assert!(!is_kept || (position < 1e-14 && velocity < 1e-14 * 1e3), "{method}: {position:.1e} m, {velocity:.1e} m/s");
+        assert!(
+            !is_kept || (position < 1e-14 && velocity < 1e-14 * 1e3),
+            "{method}: {position:.1e} m, {velocity:.1e} m/s"
+        );
         assert!(outcome.drift.energy.max < 1e-8, "{method}: {:.1e}", outcome.drift.energy.max);
     }
 }
@@ -88,20 +95,29 @@ fn iftomm_a01_pendulum() {
     }
 }
 
-/// Through twenty positions in which all links lie in line: every method is on the branch, or stops and says so.
+/// Through twenty positions in which all links lie in line: every method is on the branch, or stops and says
+/// so.
 #[test]
 fn iftomm_a02_four_bars_pass_singular_positions() {
     let file = data(include_str!("data/iftomm_a02_fourbar_n2.json"));
     let last = file["reference"]["samples"].as_array().expect("a list").last().expect("a sample").clone();
     let scene = Scene { every: 0.5, ..shipped("four_bars", &[]) };
     let (mut arrived, mut lost) = (Vec::new(), Vec::new());
-    let adaptive = ["taylor", "dp8", "dp5", "dop853", "dopri5"].map(|method| (-14..=-6).map(move |p| by(method, 10_f64.powi(p))));
-    let fixed = ["gauss8", "gauss16", "rattle4", "rattle6"].map(|method| (5..=9).map(move |p| steps(method, 0.5_f64.powi(p))));
+    let adaptive = ["taylor", "dp8", "dp5", "dop853", "dopri5"]
+        .map(|method| (-14..=-6).map(move |p| by(method, 10_f64.powi(p))));
+    let fixed = ["gauss8", "gauss16", "rattle4", "rattle6"]
+        .map(|method| (5..=9).map(move |p| steps(method, 0.5_f64.powi(p))));
     for request in adaptive.into_iter().flatten().chain(fixed.into_iter().flatten()) {
         let outcome = run(&scene, &request);
         let name = format!("{} {:?} {:?}", outcome.plan.method, outcome.plan.step, request.rtol);
         if let Some(stop) = &outcome.stop {
-            let typed = [Cause::BranchLost, Cause::ProjectionFailed, Cause::NotConverged, Cause::StepTooSmall, Cause::EffortExhausted];
+            let typed = [
+                Cause::BranchLost,
+                Cause::ProjectionFailed,
+                Cause::NotConverged,
+                Cause::StepTooSmall,
+                Cause::EffortExhausted,
+            ];
             assert!(typed.contains(&stop.cause), "{name}: {stop}");
             lost.push(name);
             continue;
@@ -111,11 +127,15 @@ fn iftomm_a02_four_bars_pass_singular_positions() {
         let apart = (1..3).map(|k| (outcome.last.phi[k] - phi).abs()).fold(0.0, f64::max);
         // On the other branch of a four-bar nothing is parallel any more.
         let most = request.rtol.map_or(0.1, |rtol| (1e3 * rtol).max(1e-6));
-        assert!(off < most && apart < 1e-6, "{name}: {off:.1e} m from the closed form, links {apart:.1e} rad apart");
+        assert!(
+            off < most && apart < 1e-6,
+            "{name}: {off:.1e} m from the closed form, links {apart:.1e} rad apart"
+        );
         arrived.push((name, off));
     }
     for (method, most) in [("taylor", 1e-8), ("dp8", 3e-8), ("dp5", 3e-8)] {
-        let of_method: Vec<_> = arrived.iter().filter(|(name, _)| name.starts_with(&format!("{method} "))).collect();
+        let of_method: Vec<_> =
+            arrived.iter().filter(|(name, _)| name.starts_with(&format!("{method} "))).collect();
         assert_eq!(of_method.len(), 9, "{method}: {lost:?}");
         let best = of_method.iter().map(|(_, off)| *off).fold(f64::INFINITY, f64::min);
         assert!(best < most, "{method}: {best:.1e}");
@@ -146,7 +166,8 @@ fn forty_four_bars() {
 #[test]
 fn driven_slider_crank() {
     let scene = shipped("slider_crank_driven", &[]);
-    for request in [by("taylor", 1e-10), by("dp8", 1e-10), steps("gauss16", 5e-4), steps("rattle8", 1.25e-4)] {
+    for request in [by("taylor", 1e-10), by("dp8", 1e-10), steps("gauss16", 5e-4), steps("rattle8", 1.25e-4)]
+    {
         let outcome = finished(&scene, &request);
         let (last, name) = (&outcome.last, outcome.plan.method);
         for (what, found, expected, most) in [
@@ -174,11 +195,22 @@ fn slider_crank_under_torque() {
         (steps("rattle8", 1.0 / 1024.0), 1e-6),
     ] {
         let outcome = finished(&scene, &request);
-        let found =
-            [outcome.last.phi[0], outcome.last.omega[0], outcome.last.phi[1], outcome.last.centre[2][0], outcome.last.velocity[2][0]];
-        for (found, key) in found.iter().zip(["crank_angle", "crank_rate", "rod_angle", "slider_x", "slider_velocity"]) {
+        let found = [
+            outcome.last.phi[0],
+            outcome.last.omega[0],
+            outcome.last.phi[1],
+            outcome.last.centre[2][0],
+            outcome.last.velocity[2][0],
+        ];
+        for (found, key) in
+            found.iter().zip(["crank_angle", "crank_rate", "rod_angle", "slider_x", "slider_velocity"])
+        {
             let expected = number(&last[key]);
-            assert!((found - expected).abs() < most * expected.abs().max(1.0), "{}: {key} {found} is not {expected}", outcome.plan.method);
+            assert!(
+                (found - expected).abs() < most * expected.abs().max(1.0),
+                "{}: {key} {found} is not {expected}",
+                outcome.plan.method
+            );
         }
     }
 }
@@ -187,14 +219,25 @@ fn slider_crank_under_torque() {
 #[test]
 fn cart_and_pole() {
     let scene = shipped("cart_pole", &[]);
-    let momentum = |outcome: &Outcome| -> f64 { scene.bars.iter().zip(&outcome.last.velocity).map(|(bar, v)| bar.mass * v[0]).sum() };
-    for request in
-        [by("taylor", 1e-12), by("dp8", 1e-12), by("dop853", 1e-12), steps("gauss16", 1.0 / 128.0), steps("rattle6", 1.0 / 512.0)]
-    {
+    let momentum = |outcome: &Outcome| -> f64 {
+        scene.bars.iter().zip(&outcome.last.velocity).map(|(bar, v)| bar.mass * v[0]).sum()
+    };
+    for request in [
+        by("taylor", 1e-12),
+        by("dp8", 1e-12),
+        by("dop853", 1e-12),
+        steps("gauss16", 1.0 / 128.0),
+        steps("rattle6", 1.0 / 512.0),
+    ] {
         let begun = finished(&Scene { until: scene.every, ..scene.clone() }, &request);
         let outcome = finished(&scene, &request);
         let name = outcome.plan.method;
-        assert!((momentum(&outcome) - momentum(&begun)).abs() < 1e-11, "{name}: {} {}", momentum(&outcome), momentum(&begun));
+        assert!(
+            (momentum(&outcome) - momentum(&begun)).abs() < 1e-11,
+            "{name}: {} {}",
+            momentum(&outcome),
+            momentum(&begun)
+        );
         assert!(outcome.drift.energy.max < 1e-9, "{name}: {:.1e}", outcome.drift.energy.max);
         assert!((outcome.last.centre[0][1]).abs() < 1e-12 && outcome.last.phi[0].abs() < 1e-12, "{name}");
     }
@@ -209,13 +252,24 @@ fn four_bar_with_a_motor() {
         let crank = FRAC_PI_2 + TAU * until;
         let (x, y) = (d - a * crank.cos(), -a * crank.sin());
         let span = x.hypot(y);
-        // Seen from the origin of the rocker, the crank pin is at this angle, and the rocker that much to its right.
+        // Seen from the origin of the rocker, the crank pin is at this angle, and the rocker that much to its
+        // right.
         let rocker = (-y).atan2(-x) - ((c * c + span * span - b * b) / (2.0 * c * span)).acos();
-        for request in [by("taylor", 1e-11), by("dp8", 1e-11), steps("gauss16", until / 1024.0), steps("rattle8", until / 8192.0)] {
+        for request in [
+            by("taylor", 1e-11),
+            by("dp8", 1e-11),
+            steps("gauss16", until / 1024.0),
+            steps("rattle8", until / 8192.0),
+        ] {
             let outcome = finished(&Scene { until, every: until, ..scene.clone() }, &request);
             let off = (outcome.last.phi[2] - rocker + PI).rem_euclid(TAU) - PI;
             assert!(off.abs() < 1e-9, "{}: {off:.1e} rad", outcome.plan.method);
-            assert!(outcome.drift.energy.max < 1e-8, "{}: {:.1e}", outcome.plan.method, outcome.drift.energy.max);
+            assert!(
+                outcome.drift.energy.max < 1e-8,
+                "{}: {:.1e}",
+                outcome.plan.method,
+                outcome.drift.energy.max
+            );
         }
     }
 }
@@ -227,38 +281,56 @@ fn quick_return_mechanism() {
     for until in [0.4, 3.7] {
         let crank = TAU * until;
         let rocker = (0.1 * crank.sin() + 0.25).atan2(0.1 * crank.cos());
-        for request in
-            [by("taylor", 1e-11), by("dp8", 1e-11), by("dop853", 1e-11), steps("gauss16", until / 2048.0), steps("rattle8", until / 8192.0)]
-        {
+        for request in [
+            by("taylor", 1e-11),
+            by("dp8", 1e-11),
+            by("dop853", 1e-11),
+            steps("gauss16", until / 2048.0),
+            steps("rattle8", until / 8192.0),
+        ] {
             let outcome = finished(&Scene { until, every: until, ..scene.clone() }, &request);
             let off = (outcome.last.phi[1] - rocker).abs();
             assert!(off < 1e-9, "{}: {off:.1e} rad", outcome.plan.method);
             let ram = 0.5 * rocker.cos() - (0.2_f64.powi(2) - (0.5 * rocker.sin() - 0.45).powi(2)).sqrt();
             assert!(
-                (outcome.last.centre[3][0] - ram).abs() < 1e-9 && (outcome.last.centre[3][1] - 0.2).abs() < 1e-9,
+                (outcome.last.centre[3][0] - ram).abs() < 1e-9
+                    && (outcome.last.centre[3][1] - 0.2).abs() < 1e-9,
                 "{}",
                 outcome.plan.method
             );
-            assert!(outcome.drift.energy.max < 1e-8, "{}: {:.1e}", outcome.plan.method, outcome.drift.energy.max);
+            assert!(
+                outcome.drift.energy.max < 1e-8,
+                "{}: {:.1e}",
+                outcome.plan.method,
+                outcome.drift.energy.max
+            );
         }
     }
 }
 
-/// A kite folds, and a slider-crank with equal arms turns over the point below its slider: two more singular positions.  Whoever arrives, arrives at the same place.
+/// A kite folds, and a slider-crank with equal arms turns over the point below its slider: two more singular
+/// positions.  Whoever arrives, arrives at the same place.
 #[test]
 fn singular_positions_that_are_no_ladders() {
     for (name, until) in [("kite", 2.0), ("slider_crank_equal", 5.0)] {
         let scene = Scene { until, every: 0.25, ..shipped(name, &[]) };
         let reference = finished(&scene, &by("taylor", 1e-11));
         let mut arrived = 0;
-        let adaptive = ["taylor", "dp8", "dp5", "dop853"].map(|method| (-13..=-8).map(move |p| by(method, 10_f64.powi(p))));
+        let adaptive = ["taylor", "dp8", "dp5", "dop853"]
+            .map(|method| (-13..=-8).map(move |p| by(method, 10_f64.powi(p))));
         for request in adaptive.into_iter().flatten() {
             let outcome = run(&scene, &request);
             if outcome.stop.is_some() {
                 continue;
             }
             arrived += usize::from(outcome.plan.stabilization == Stabilization::Projection);
-            let off = outcome.last.phi.iter().zip(&reference.last.phi).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let off = outcome
+                .last
+                .phi
+                .iter()
+                .zip(&reference.last.phi)
+                .map(|(a, b)| (a - b).abs())
+                .fold(0.0, f64::max);
             assert!(off < 1e-3, "{name}, {} at {:?}: {off:.1e} rad", outcome.plan.method, request.rtol);
         }
         assert!(arrived >= 12, "{name}: {arrived} of 18 arrived");
@@ -280,8 +352,17 @@ fn a_free_body_flies_a_parabola() {
     );
     let (cos, sin) = (0.5_f64.cos(), 0.5_f64.sin());
     let arm = [0.3 * cos - 0.1 * sin, 0.3 * sin + 0.1 * cos];
-    let expected = [1.0 + arm[0] + (3.0 - 7.0 * arm[1]) * 2.0, 2.0 + arm[1] + (4.0 + 7.0 * arm[0]) * 2.0 - 0.5 * 10.0 * 4.0];
-    for request in [by("taylor", 1e-12), by("dp8", 1e-12), by("dop853", 1e-12), steps("gauss16", 0.125), steps("rattle8", 1.0 / 256.0)] {
+    let expected = [
+        1.0 + arm[0] + (3.0 - 7.0 * arm[1]) * 2.0,
+        2.0 + arm[1] + (4.0 + 7.0 * arm[0]) * 2.0 - 0.5 * 10.0 * 4.0,
+    ];
+    for request in [
+        by("taylor", 1e-12),
+        by("dp8", 1e-12),
+        by("dop853", 1e-12),
+        steps("gauss16", 0.125),
+        steps("rattle8", 1.0 / 256.0),
+    ] {
         let outcome = finished(&scene, &request);
         let (last, name) = (&outcome.last, outcome.plan.method);
         assert!((last.phi[0] - 14.5).abs() < 1e-9, "{name}: {}", last.phi[0]);
@@ -291,7 +372,8 @@ fn a_free_body_flies_a_parabola() {
     }
 }
 
-/// A block on an inclined rail, driven along it: the motor's force is what Newton asks for, and its work is what the block gains.
+/// A block on an inclined rail, driven along it: the motor's force is what Newton asks for, and its work is
+/// what the block gains.
 #[test]
 fn a_motor_on_a_slider_pushes_with_the_force_newton_asks_for() {
     let scene = parsed(
@@ -305,18 +387,26 @@ fn a_motor_on_a_slider_pushes_with_the_force_newton_asks_for() {
     let t = 1.25_f64;
     let travel = 0.2 + 0.5 * t + 0.1 * (4.0 * t).sin();
     let force = 3.0 * (-1.6 * (4.0 * t).sin() + 10.0 * 0.6);
-    for request in [by("taylor", 1e-11), by("dp8", 1e-11), steps("gauss16", 1.0 / 64.0), steps("rattle8", 1.0 / 512.0)] {
+    for request in
+        [by("taylor", 1e-11), by("dp8", 1e-11), steps("gauss16", 1.0 / 64.0), steps("rattle8", 1.0 / 512.0)]
+    {
         let outcome = finished(&scene, &request);
         let (last, name) = (&outcome.last, outcome.plan.method);
         assert!((last.centre[0][0] - (1.0 + 0.8 * travel)).abs() < 1e-10, "{name}: {:?}", last.centre[0]);
-        let row = outcome.drift.constraints.iter().position(|(name, _)| name == "push").expect("the motor's row");
-        assert!((last.motors[row][0] - force).abs() < 1e-8, "{name}: {} N is not {force} N", last.motors[row][0]);
+        let row =
+            outcome.drift.constraints.iter().position(|(name, _)| name == "push").expect("the motor's row");
+        assert!(
+            (last.motors[row][0] - force).abs() < 1e-8,
+            "{name}: {} N is not {force} N",
+            last.motors[row][0]
+        );
         // The work is a product of two series, and no step is judged by it.
         assert!(outcome.drift.energy.max < 1e-7, "{name}: {:.1e}", outcome.drift.energy.max);
     }
 }
 
-/// A disc on a torsion spring swings harmonically, through more than a turn; damped, its energy goes where the damper's work says.
+/// A disc on a torsion spring swings harmonically, through more than a turn; damped, its energy goes where
+/// the damper's work says.
 #[test]
 fn a_torsion_pendulum_counts_its_turns() {
     let scene = |damping: f64| {
@@ -328,10 +418,15 @@ fn a_torsion_pendulum_counts_its_turns() {
                 "start": {{"disc": {{"phi": 11, "omega": 0}}}}}}"#
         ))
     };
-    for request in [by("taylor", 1e-12), by("dp8", 1e-12), by("dop853", 1e-12), steps("gauss16", 1.0 / 32.0)] {
+    for request in [by("taylor", 1e-12), by("dp8", 1e-12), by("dop853", 1e-12), steps("gauss16", 1.0 / 32.0)]
+    {
         let (free, damped) = (finished(&scene(0.0), &request), finished(&scene(0.4), &request));
         let name = free.plan.method;
-        assert!((free.last.phi[0] - (1.0 + 10.0 * 6.0_f64.cos())).abs() < 1e-9, "{name}: {}", free.last.phi[0]);
+        assert!(
+            (free.last.phi[0] - (1.0 + 10.0 * 6.0_f64.cos())).abs() < 1e-9,
+            "{name}: {}",
+            free.last.phi[0]
+        );
         // exp(-0.4 t) with the frequency sqrt(4 - 0.16).
         let w = 3.84_f64.sqrt();
         let swing = 10.0 * (-1.2_f64).exp() * ((3.0 * w).cos() + 0.4 / w * (3.0 * w).sin());
@@ -355,7 +450,8 @@ fn forces_and_torques_turn_a_bar_as_their_moments_say() {
     // 0.5 w' = 0.5·2 (1 - t/2) + 0.25.
     let rate = 1.0 + 2.0 * (2.0 - 1.0) + 0.5 * 2.0;
     let angle = 0.3 + 2.0 + (4.0 - 8.0 / 6.0) + 0.25 * 4.0;
-    for request in [by("taylor", 1e-12), by("dp8", 1e-12), by("dop853", 1e-12), steps("gauss16", 1.0 / 32.0)] {
+    for request in [by("taylor", 1e-12), by("dp8", 1e-12), by("dop853", 1e-12), steps("gauss16", 1.0 / 32.0)]
+    {
         let outcome = finished(&scene, &request);
         let name = outcome.plan.method;
         assert!((outcome.last.omega[0] - rate).abs() < 1e-10, "{name}: {}", outcome.last.omega[0]);
@@ -375,7 +471,10 @@ fn welded_halves_swing_as_the_whole() {
                 r#""welds": [{"name": "joint", "between": [{"body": "bar", "point": [0.5, 0]}, {"body": "rest", "point": [0, 0]}]}],"#,
             )
         } else {
-            (r#"{"name": "bar", "mass": 1, "centre": [0.5, 0], "inertia": 0.0833333333333333333, "length": 1}"#, "")
+            (
+                r#"{"name": "bar", "mass": 1, "centre": [0.5, 0], "inertia": 0.0833333333333333333, "length": 1}"#,
+                "",
+            )
         };
         let rest = if halves { r#", "rest": {"phi": 1.2, "omega": 0}"# } else { "" };
         parsed(&format!(
@@ -385,7 +484,9 @@ fn welded_halves_swing_as_the_whole() {
         ))
     };
     let whole = finished(&bars(false), &by("taylor", 1e-13)).last.phi[0];
-    for request in [by("taylor", 1e-12), by("dp8", 1e-12), steps("gauss16", 1.0 / 32.0), steps("rattle8", 1.0 / 256.0)] {
+    for request in
+        [by("taylor", 1e-12), by("dp8", 1e-12), steps("gauss16", 1.0 / 32.0), steps("rattle8", 1.0 / 256.0)]
+    {
         let outcome = finished(&bars(true), &request);
         for phi in &outcome.last.phi {
             assert!((phi - whole).abs() < 1e-9, "{}: {phi} is not {whole}", outcome.plan.method);
@@ -393,7 +494,8 @@ fn welded_halves_swing_as_the_whole() {
     }
 }
 
-/// Two cranks whose lengths differ by a third of a percent: a parallelogram but for that, which passes beside its change points.
+/// Two cranks whose lengths differ by a third of a percent: a parallelogram but for that, which passes beside
+/// its change points.
 const NEAR_PARALLELOGRAM: &str = r#"{
     "name": "near_parallelogram", "gravity": [9.81, 0],
     "bars": [
@@ -415,10 +517,12 @@ const NEAR_PARALLELOGRAM: &str = r#"{
     "until": 1, "every": 0.02
 }"#;
 
-/// Beside a singular position the shifts of both ends of a step come together slowly, which is no reason to stop: the error that is left is that of the method.
+/// Beside a singular position the shifts of both ends of a step come together slowly, which is no reason to
+/// stop: the error that is left is that of the method.
 #[test]
 fn gauss_methods_pass_beside_singular_positions() {
-    let scene = driftless::scene::parse_scene(NEAR_PARALLELOGRAM, "near_parallelogram.json", &[]).expect("a scene");
+    let scene =
+        driftless::scene::parse_scene(NEAR_PARALLELOGRAM, "near_parallelogram.json", &[]).expect("a scene");
     let end = |request: &Request| {
         let outcome = finished(&scene, request);
         assert!(violations(&outcome)[0] < 1e-12, "{}", outcome.plan.method);
@@ -426,9 +530,11 @@ fn gauss_methods_pass_beside_singular_positions() {
     };
     let exact = end(&by("taylor", 1e-13));
     // The step of a method by itself, and half and a quarter of it.
-    for (method, step, most) in
-        [("gauss4", 1.25e-3, [1e-7, 1e-8, 1e-9]), ("gauss6", 1.25e-3, [1e-9, 1e-11, 1e-12]), ("gauss8", 2.5e-3, [1e-7, 1e-11, 1e-12])]
-    {
+    for (method, step, most) in [
+        ("gauss4", 1.25e-3, [1e-7, 1e-8, 1e-9]),
+        ("gauss6", 1.25e-3, [1e-9, 1e-11, 1e-12]),
+        ("gauss8", 2.5e-3, [1e-7, 1e-11, 1e-12]),
+    ] {
         for (part, most) in most.into_iter().enumerate() {
             let found = end(&steps(method, step / f64::from(1 << part)));
             let error = found.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);

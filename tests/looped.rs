@@ -1,7 +1,9 @@
-//! Small mechanisms with loops: the natural solve inside adaptive methods, and the power series in natural coordinates.
+//! Small mechanisms with loops: the natural solve inside adaptive methods, and the power series in natural
+//! coordinates.
 //!
-//! Andrews' squeezing mechanism (W. Giles, 1978; D. Manning, 1981) with the data of the Test Set for IVP Solvers; its end state is from an extrapolation method
-//! of order 16 in quadruple precision with projection, which agrees with the Test Set's own to the digits that hold there.
+//! Andrews' squeezing mechanism (W. Giles, 1978; D. Manning, 1981) with the data of the Test Set for IVP
+//! Solvers; its end state is from an extrapolation method of order 16 in quadruple precision with projection,
+//! which agrees with the Test Set's own to the digits that hold there.
 
 use crate::andrews;
 use crate::common;
@@ -36,18 +38,30 @@ fn looped(mechanism: &Arc<Mechanism>) -> Looped {
     Looped::new(Arc::clone(mechanism)).expect("a small mechanism with loops")
 }
 
-/// A run to a time: the motion there, the steps, and the largest violation of a row after any of them, relative to 0.1 m and to 0.1 m times the fastest rate.
-fn run<P: Form + ?Sized>(problem: &mut P, start: &Motion, method: &mut impl Integrator<P>, until: f64) -> (Motion, Statistics, f64) {
+/// A run to a time: the motion there, the steps, and the largest violation of a row after any of them,
+/// relative to 0.1 m and to 0.1 m times the fastest rate.
+fn run<P: Form + ?Sized>(
+    problem: &mut P,
+    start: &Motion,
+    method: &mut impl Integrator<P>,
+    until: f64,
+) -> (Motion, Statistics, f64) {
     let mut state = problem.state(start);
     let mut statistics = Statistics::default();
     let mechanism = problem.mechanism().clone();
     let mut kernel = Rows::<f64>::new(&mechanism);
     let (mut motion, mut worst) = (Motion::default(), 0.0f64);
-    let reached = method.advance(problem, &mut state, Time::from(until), &mut statistics, &mut |problem: &mut P, state: &mut State| {
-        problem.read(state, &mut motion);
-        worst = worst.max(andrews::violation(&mechanism, &mut kernel, &motion));
-        Ok(Seen::Kept)
-    });
+    let reached = method.advance(
+        problem,
+        &mut state,
+        Time::from(until),
+        &mut statistics,
+        &mut |problem: &mut P, state: &mut State| {
+            problem.read(state, &mut motion);
+            worst = worst.max(andrews::violation(&mechanism, &mut kernel, &motion));
+            Ok(Seen::Kept)
+        },
+    );
     assert_eq!(reached, Ok(Reached::Until));
     let mut end = Motion::default();
     problem.read(&state, &mut end);
@@ -60,10 +74,12 @@ fn distance(a: &Motion, b: &Motion) -> f64 {
     turns.chain(rates).fold(0.0, f64::max)
 }
 
-/// Along a run, where all rows are kept: accelerations of both forms, the same to rounding, and to the bit without the processor's own instructions.
+/// Along a run, where all rows are kept: accelerations of both forms, the same to rounding, and to the bit
+/// without the processor's own instructions.
 #[test]
 fn the_natural_solve_gives_the_accelerations_of_the_angle_form() {
-    for (name, until) in [("andrews", 0.03), ("four_bars", 3.0), ("kite", 0.5), ("slider_crank_torque", 1.0)] {
+    for (name, until) in [("andrews", 0.03), ("four_bars", 3.0), ("kite", 0.5), ("slider_crank_torque", 1.0)]
+    {
         let (mechanism, start) = started(name);
         let Some(mut form) = Looped::new(Arc::clone(&mechanism)) else { panic!("{name} does not fit") };
         let mut portable = looped(&mechanism).portable();
@@ -73,8 +89,12 @@ fn the_natural_solve_gives_the_accelerations_of_the_angle_form() {
         let (mut worst, mut rates) = (0.0f64, vec![vec![0.0; state.y.len()]; 3]);
         let (mut rows, n) = (Rows::<f64>::new(&mechanism), mechanism.bodies.len());
         let mut statistics = Statistics::default();
-        let reached =
-            method.advance(&mut form, &mut state, Time::from(until), &mut statistics, &mut |form: &mut Looped, state: &mut State| {
+        let reached = method.advance(
+            &mut form,
+            &mut state,
+            Time::from(until),
+            &mut statistics,
+            &mut |form: &mut Looped, state: &mut State| {
                 form.rhs(state.time, &state.y, &mut rates[0]);
                 angles.rhs(state.time, &state.y, &mut rates[1]);
                 portable.rhs(state.time, &state.y, &mut rates[2]);
@@ -85,15 +105,20 @@ fn the_natural_solve_gives_the_accelerations_of_the_angle_form() {
                     return Ok(Seen::Kept);
                 }
                 let most = rates[1].iter().fold(1.0f64, |most, rate| most.max(rate.abs()));
-                worst = rates[0].iter().zip(&rates[1]).fold(worst, |worst, (a, b)| worst.max((a - b).abs() / most));
+                worst = rates[0]
+                    .iter()
+                    .zip(&rates[1])
+                    .fold(worst, |worst, (a, b)| worst.max((a - b).abs() / most));
                 Ok(Seen::Kept)
-            });
+            },
+        );
         assert_eq!(reached, Ok(Reached::Until), "{name}");
         assert!(worst < 1e-12, "{name}: {worst:e} after {statistics:?}");
     }
 }
 
-/// From a little off the rows at both levels: both ways back are the shortest, the same to first order, and both end on the rows.
+/// From a little off the rows at both levels: both ways back are the shortest, the same to first order, and
+/// both end on the rows.
 #[test]
 fn projection_in_natural_coordinates_lands_where_that_in_angles_does() {
     for name in ["andrews", "four_bars", "kite", "slider_crank_torque"] {
@@ -107,12 +132,18 @@ fn projection_in_natural_coordinates_lands_where_that_in_angles_does() {
         let mut ends = [angles.state(&start), angles.state(&start)];
         let method = || Projected::new(Dp8::new(both(1e-9)));
         let (mut statistics, until) = (Statistics::default(), Time::from(1e-9));
-        assert_eq!(method().advance(&mut angles, &mut ends[0], until, &mut statistics, &mut |_, _| Ok(Seen::Kept)), Ok(Reached::Until));
         assert_eq!(
-            method().advance(&mut looped(&mechanism), &mut ends[1], until, &mut statistics, &mut |_, _| Ok(Seen::Kept)),
+            method().advance(&mut angles, &mut ends[0], until, &mut statistics, &mut |_, _| Ok(Seen::Kept)),
             Ok(Reached::Until)
         );
-        let moved = (0..2 * n).fold(0.0, |most: f64, i| most.max((ends[0].y[i] - angles.state(&start).y[i]).abs()));
+        assert_eq!(
+            method().advance(&mut looped(&mechanism), &mut ends[1], until, &mut statistics, &mut |_, _| Ok(
+                Seen::Kept
+            )),
+            Ok(Reached::Until)
+        );
+        let moved =
+            (0..2 * n).fold(0.0, |most: f64, i| most.max((ends[0].y[i] - angles.state(&start).y[i]).abs()));
         let apart = (0..2 * n).fold(0.0, |most: f64, i| most.max((ends[0].y[i] - ends[1].y[i]).abs()));
         assert!(moved > 0.1 * off && apart < 1e-3 * off, "{name}: {moved:e} {apart:e}");
         let [first, second] = ends.each_ref().map(|end| end.y[2 * n + 1]);
@@ -130,7 +161,8 @@ fn projection_in_natural_coordinates_lands_where_that_in_angles_does() {
 fn adaptive_methods_take_the_squeezing_mechanism_to_its_known_end() {
     let (mechanism, start) = started("andrews");
     for (tolerance, bound) in [(1e-9, 1e-8), (1e-13, 1e-11)] {
-        let (end, _, residual) = run(&mut looped(&mechanism), &start, &mut Projected::new(Dp8::new(both(tolerance))), 0.03);
+        let (end, _, residual) =
+            run(&mut looped(&mechanism), &start, &mut Projected::new(Dp8::new(both(tolerance))), 0.03);
         assert!(error(&end) < bound, "{tolerance:e}: {:e}", error(&end));
         assert!(residual < 1e-13, "{residual:e}");
         assert!((end.omega[0].hi - reference()[1][0]).abs() < 1e3 * bound);
@@ -174,7 +206,9 @@ fn the_series_is_its_own_dense_output() {
     let (mut from, mut statistics) = (state.clone(), Statistics::default());
     while state.time.hi < 0.02 {
         from.clone_from(&state);
-        taylor.advance(&mut form, &mut state, Time::from(0.03), &mut statistics, &mut |_, _| Ok(Seen::Enough)).expect("a step");
+        taylor
+            .advance(&mut form, &mut state, Time::from(0.03), &mut statistics, &mut |_, _| Ok(Seen::Enough))
+            .expect("a step");
     }
     let middle = from.time + 0.4 * (state.time - from.time).hi;
     let mut inside = State::default();
@@ -191,9 +225,12 @@ fn the_series_is_its_own_dense_output() {
 fn rattle_has_its_order_on_a_mechanism_with_loops() {
     let (mechanism, start) = started("andrews");
     let natural = || Natural::new(Arc::clone(&mechanism)).expect("a natural form");
-    for (composition, coarsest) in
-        [(Composition::Single, 2000.0), (Composition::Suzuki5, 500.0), (Composition::KahanLi9, 300.0), (Composition::KahanLi17, 150.0)]
-    {
+    for (composition, coarsest) in [
+        (Composition::Single, 2000.0),
+        (Composition::Suzuki5, 500.0),
+        (Composition::KahanLi9, 300.0),
+        (Composition::KahanLi17, 150.0),
+    ] {
         let points: Vec<(f64, f64)> = [1.0, 1.5, 2.0, 3.0]
             .iter()
             .map(|finer| {
@@ -204,21 +241,30 @@ fn rattle_has_its_order_on_a_mechanism_with_loops() {
             })
             .collect();
         let order = common::order(&points, 1e-14, 1.0);
-        assert!((order - f64::from(composition.order())).abs() < 0.35, "{composition:?} measured {order}: {points:?}");
+        assert!(
+            (order - f64::from(composition.order())).abs() < 0.35,
+            "{composition:?} measured {order}: {points:?}"
+        );
     }
 }
 
 /// Motors, slots and sliders: the work of the motor is known from p_t, and energy less work keeps.
 #[test]
 fn rattle_keeps_energy_less_work_of_driven_mechanisms() {
-    for (name, until, step) in
-        [("quick_return", 4.0, 1.0 / 1024.0), ("slider_crank_driven", 2.0, 1.0 / 4096.0), ("four_bar_motor", 4.0, 1.0 / 1024.0)]
-    {
+    for (name, until, step) in [
+        ("quick_return", 4.0, 1.0 / 1024.0),
+        ("slider_crank_driven", 2.0, 1.0 / 4096.0),
+        ("four_bar_motor", 4.0, 1.0 / 1024.0),
+    ] {
         let (mechanism, start) = started(name);
-        let Ok(mut natural) = Natural::new(Arc::clone(&mechanism)) else { panic!("{name} has no natural form") };
+        let Ok(mut natural) = Natural::new(Arc::clone(&mechanism)) else {
+            panic!("{name} has no natural form")
+        };
         let mut kernel = Rows::without_rows(&mechanism);
-        let mut balance =
-            |motion: &Motion| (mechanism.energy(&mut kernel, &motion.phi, &motion.omega).total() - motion.work).hi / mechanism.energy_scale;
+        let mut balance = |motion: &Motion| {
+            (mechanism.energy(&mut kernel, &motion.phi, &motion.omega).total() - motion.work).hi
+                / mechanism.energy_scale
+        };
         let before = balance(&start);
         let mut state = natural.state(&start);
         let mut worst = 0.0f64;

@@ -1,4 +1,5 @@
-//! The generator of random scenes that other tests compare motions on: every scene is accepted, and begins as it says.
+//! The generator of random scenes that other tests compare motions on: every scene is accepted, and begins as
+//! it says.
 
 use crate::mechanisms;
 
@@ -46,7 +47,8 @@ fn fault(made: &Generated) -> Option<String> {
     let outcome = outcome.expect("no observer fails");
     let Some(first) = first else { return Some(format!("has no rows: {:?}", outcome.stop)) };
     // Impacts at t = 0 change rates before the first row.
-    let struck = outcome.impacts.iter().any(|strike| strike.t == 0.0) || outcome.holds.iter().any(|hold| hold.t == 0.0);
+    let struck = outcome.impacts.iter().any(|strike| strike.t == 0.0)
+        || outcome.holds.iter().any(|hold| hold.t == 0.0);
     let written: serde_json::Value = serde_json::from_str(&made.text).expect("JSON");
     for (k, bar) in scene.bars.iter().enumerate() {
         let given = &written["start"][&bar.name];
@@ -74,12 +76,16 @@ fn fault(made: &Generated) -> Option<String> {
 fn every_scene_is_read_and_begins_as_it_says() {
     let count = seeds(1000);
     let (mut of_kind, mut faults): (BTreeMap<Kind, u64>, Vec<String>) = (BTreeMap::new(), Vec::new());
-    let (mut missed, mut bodies): (BTreeMap<Kind, u64>, BTreeMap<usize, u64>) = (BTreeMap::new(), BTreeMap::new());
+    let (mut missed, mut bodies): (BTreeMap<Kind, u64>, BTreeMap<usize, u64>) =
+        (BTreeMap::new(), BTreeMap::new());
     for seed in 0..count {
         let made = mechanisms::scene(seed);
         assert_eq!(made.text, mechanisms::scene(seed).text);
         made.kinds.iter().for_each(|&kind| *of_kind.entry(kind).or_default() += 1);
-        made.wanted.iter().filter(|kind| !made.kinds.contains(kind)).for_each(|&kind| *missed.entry(kind).or_default() += 1);
+        made.wanted
+            .iter()
+            .filter(|kind| !made.kinds.contains(kind))
+            .for_each(|&kind| *missed.entry(kind).or_default() += 1);
         *bodies.entry(made.text.matches("\"omega\"").count()).or_default() += 1;
         if let Some(fault) = fault(&made) {
             faults.push(format!("seed {seed} ({:?}) {fault}\n{}", made.kinds, made.text));
@@ -91,6 +97,13 @@ fn every_scene_is_read_and_begins_as_it_says() {
         let [has, misses] = [&of_kind, &missed].map(|map| map.get(&kind).copied().unwrap_or(0));
         println!("{:24} in {has:5}, wanted in vain {misses}", kind.name());
     }
-    assert!(faults.is_empty(), "{} faults, of which\n{}", faults.len(), faults[..faults.len().min(4)].join("\n\n"));
-    assert!(count < 500 || Kind::ALL.iter().all(|kind| of_kind.get(kind).is_some_and(|&some| some > count / 100)));
+    assert!(
+        faults.is_empty(),
+        "{} faults, of which\n{}",
+        faults.len(),
+        faults[..faults.len().min(4)].join("\n\n")
+    );
+    assert!(
+        count < 500 || Kind::ALL.iter().all(|kind| of_kind.get(kind).is_some_and(|&some| some > count / 100))
+    );
 }

@@ -1,7 +1,7 @@
 //! No allocation per step, and memory that does not grow with the horizon: a counting allocator.
 //!
-//! The library forbids `unsafe`; an allocator cannot be written without it, and this one lives in the test alone.  Counts are per thread, so that
-//! tests beside one another do not see each other.
+//! The library forbids `unsafe`; an allocator cannot be written without it, and this one lives in the test
+//! alone.  Counts are per thread, so that tests beside one another do not see each other.
 
 mod common;
 
@@ -40,7 +40,8 @@ fn note(bytes: i64) {
     }
 }
 
-// SAFETY: every call is handed on unchanged to the system's allocator; the counters are plain cells without destructors.
+// SAFETY: every call is handed on unchanged to the system's allocator; the counters are plain cells without
+// destructors.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         note(layout.size() as i64);
@@ -67,12 +68,18 @@ static ALLOCATOR: Counting = Counting;
 const TOLERANCE: Tolerance = Tolerance { relative: 1e-9, absolute: 1e-9 };
 
 /// Allocations of one call of `advance` over `span` \[s\], and its steps.
-fn allocations<P: Form + ?Sized>(method: &mut dyn Integrator<P>, form: &mut P, start: &Motion, span: f64) -> (u64, u64) {
+fn allocations<P: Form + ?Sized>(
+    method: &mut dyn Integrator<P>,
+    form: &mut P,
+    start: &Motion,
+    span: f64,
+) -> (u64, u64) {
     let mut state = form.state(start);
     let mut statistics = Statistics::default();
     // The first call sizes scratch space and the state's memory.
     let mut advance = |until: f64| {
-        let reached = method.advance(form, &mut state, Time::from(until), &mut statistics, &mut |_, _| Ok(Seen::Kept));
+        let reached =
+            method.advance(form, &mut state, Time::from(until), &mut statistics, &mut |_, _| Ok(Seen::Kept));
         assert_eq!(reached, Ok(Reached::Until));
         statistics.steps
     };
@@ -110,7 +117,11 @@ fn steps_of_a_driven_scene_allocate_nothing() {
     check(&mut Projected::new(Dp8::new(TOLERANCE)), &mut plain(), &start);
     check(&mut Dp8::new(TOLERANCE), &mut Baumgarte::new(plain(), 0.1), &start);
     check(&mut Dp8::new(TOLERANCE), &mut Elimination::<2>::new(Arc::clone(&mechanism)), &start);
-    check(&mut Gauss::new(8, 1.0 / 128.0).expect("a method"), &mut Canonical::<2, true>::new(Arc::clone(&mechanism)), &start);
+    check(
+        &mut Gauss::new(8, 1.0 / 128.0).expect("a method"),
+        &mut Canonical::<2, true>::new(Arc::clone(&mechanism)),
+        &start,
+    );
 }
 
 #[test]
@@ -127,7 +138,8 @@ fn steps_of_rattle_allocate_nothing() {
 #[test]
 fn windows_cost_the_same_each() {
     let (mechanism, start) = common::started("gentle");
-    let methods: [Box<dyn Integrator<Multiplier<2, false>>>; 2] = [Box::new(Dopri5::new(TOLERANCE)), Box::new(Dop853::new(TOLERANCE))];
+    let methods: [Box<dyn Integrator<Multiplier<2, false>>>; 2] =
+        [Box::new(Dopri5::new(TOLERANCE)), Box::new(Dop853::new(TOLERANCE))];
     for mut method in methods {
         let mut form = Multiplier::<2, false>::new(Arc::clone(&mechanism));
         let mut state = form.state(&start);
@@ -135,8 +147,13 @@ fn windows_cost_the_same_each() {
         let mut statistics = Statistics::default();
         for row in 1..=200 {
             let count = ALLOCATIONS.get();
-            let reached =
-                method.advance(&mut form, &mut state, Time::from(0.0625 * f64::from(row)), &mut statistics, &mut |_, _| Ok(Seen::Kept));
+            let reached = method.advance(
+                &mut form,
+                &mut state,
+                Time::from(0.0625 * f64::from(row)),
+                &mut statistics,
+                &mut |_, _| Ok(Seen::Kept),
+            );
             assert_eq!(reached, Ok(Reached::Until));
             if row > 1 {
                 most = most.max(ALLOCATIONS.get() - count);

@@ -1,15 +1,18 @@
-//! Whole runs of random scenes of every kind against runs of scenes that describe the same motion otherwise: other order, names and ends of
-//! joints, mirrored, turned, shifted, in other units, back in time, a body cut in two and welded.
+//! Whole runs of random scenes of every kind against runs of scenes that describe the same motion otherwise:
+//! other order, names and ends of joints, mirrored, turned, shifted, in other units, back in time, a body cut
+//! in two and welded.
 //!
-//! `METAMORPHIC=2000 cargo test --test physics -- metamorphic:: --nocapture` runs more scenes per relation; `SEED` is the first, and `FOUND` names a folder
-//! for the scenes of faults.
+//! `METAMORPHIC=2000 cargo test --test physics -- metamorphic:: --nocapture` runs more scenes per relation;
+//! `SEED` is the first, and `FOUND` names a folder for the scenes of faults.
 
 use crate::mechanisms;
 use crate::relations;
 
 use driftless::dynamics::Mechanism;
 use driftless::run::trust::Level;
-use driftless::run::{ImpactRecord, Limits, METHODS, MethodId, Outcome, Plan, Request, Run, Sample, integrate};
+use driftless::run::{
+    ImpactRecord, Limits, METHODS, MethodId, Outcome, Plan, Request, Run, Sample, integrate,
+};
 use driftless::scene::{Scene, parse_scene};
 use mechanisms::{Dice, Generated, Kind, Scales};
 use relations::{Back, Related};
@@ -41,7 +44,8 @@ fn run(scene: &Scene, request: &Request, level: Level) -> Result<Seen, String> {
     let mechanism = Arc::new(Mechanism::new(scene).map_err(|error| error.to_string())?);
     let plan = Plan::new(scene, &mechanism, request).map_err(|refusal| refusal.to_string())?;
     let start = mechanism.start(scene);
-    let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).map_err(|stop| stop.to_string())?;
+    let run =
+        Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).map_err(|stop| stop.to_string())?;
     let mut samples = Vec::new();
     let outcome = integrate(run.trusted(level, &start), &mut |sample| {
         samples.push(sample.clone());
@@ -52,7 +56,8 @@ fn run(scene: &Scene, request: &Request, level: Level) -> Result<Seen, String> {
 
 /// What is asked of a method in a scene of these scales; the same to rounding in other units.
 fn request(method: MethodId, scene: &Scene) -> Request {
-    let mut request = Request { method: Some(method), max_evaluations: Some(MAX_EVALUATIONS), ..Request::default() };
+    let mut request =
+        Request { method: Some(method), max_evaluations: Some(MAX_EVALUATIONS), ..Request::default() };
     match method {
         MethodId::Dp5 | MethodId::Dopri5 | MethodId::Radau(3) => request.rtol = Some(1e-8),
         _ if method.is_adaptive() => request.rtol = Some(1e-10),
@@ -99,13 +104,20 @@ fn motors(scene: &Scene, mechanism: &Mechanism) -> Vec<(String, usize, bool)> {
 fn compare(scene: &Scene, scales: &Scales, first: &Seen, second: &Seen, related: &Related) -> Apart {
     let back = &related.back;
     let mut apart = Apart { most: 0.0, what: String::new() };
-    let allowed = AGREEMENT.max(10.0 * claimed(first).unwrap_or(0.0)).max(10.0 * claimed(second).unwrap_or(0.0));
+    let allowed =
+        AGREEMENT.max(10.0 * claimed(first).unwrap_or(0.0)).max(10.0 * claimed(second).unwrap_or(0.0));
     let strikes: Vec<f64> = first.outcome.impacts.iter().map(|strike| strike.t).collect();
     let driven = motors(scene, &first.mechanism);
     let others = motors(&related.scene, &second.mechanism);
-    let size = |values: &mut dyn Iterator<Item = f64>, least: f64| values.fold(least, |most, value| most.max(value.abs()));
-    let fastest = size(&mut first.samples.iter().flat_map(|sample| sample.omega.iter().copied()), 1.0 / scales.time);
-    let speed = size(&mut first.samples.iter().flat_map(|sample| sample.velocity.iter().flatten().copied()), scales.length / scales.time);
+    let size = |values: &mut dyn Iterator<Item = f64>, least: f64| {
+        values.fold(least, |most, value| most.max(value.abs()))
+    };
+    let fastest =
+        size(&mut first.samples.iter().flat_map(|sample| sample.omega.iter().copied()), 1.0 / scales.time);
+    let speed = size(
+        &mut first.samples.iter().flat_map(|sample| sample.velocity.iter().flatten().copied()),
+        scales.length / scales.time,
+    );
     let energy = size(&mut first.samples.iter().map(|sample| sample.kinetic), scales.force * scales.length)
         .max(size(&mut first.samples.iter().map(|sample| sample.work), 0.0));
     for (a, b) in first.samples.iter().zip(&second.samples) {
@@ -118,7 +130,9 @@ fn compare(scene: &Scene, scales: &Scales, first: &Seen, second: &Seen, related:
         for k in 0..scene.bars.len() {
             let name = &scene.bars[k].name;
             let [phi, omega] = back.angle(k, b);
-            apart.see((phi - a.phi[k]).abs() / allowed, || format!("angle of {name}: {} and {phi} rad at {t} s", a.phi[k]));
+            apart.see((phi - a.phi[k]).abs() / allowed, || {
+                format!("angle of {name}: {} and {phi} rad at {t} s", a.phi[k])
+            });
             let off = (omega - a.omega[k]).abs() / fastest / (RATES * allowed);
             apart.see(off, || format!("rate of {name}: {} and {omega} rad/s at {t} s", a.omega[k]));
             let [centre, velocity] = back.centre(k, b);
@@ -126,21 +140,27 @@ fn compare(scene: &Scene, scales: &Scales, first: &Seen, second: &Seen, related:
                 let off = (centre[i] - a.centre[k][i]).abs() / scales.length / allowed;
                 apart.see(off, || format!("centre of {name}: {:?} and {centre:?} m at {t} s", a.centre[k]));
                 let off = (velocity[i] - a.velocity[k][i]).abs() / speed / (RATES * allowed);
-                apart.see(off, || format!("velocity of {name}: {:?} and {velocity:?} m/s at {t} s", a.velocity[k]));
+                apart.see(off, || {
+                    format!("velocity of {name}: {:?} and {velocity:?} m/s at {t} s", a.velocity[k])
+                });
             }
         }
         let [kinetic, work] = [b.kinetic, b.work].map(|energy| energy / back.energy());
         apart.see((kinetic - a.kinetic).abs() / energy / (RATES * allowed), || {
             format!("kinetic energy: {} and {kinetic} J at {t} s", a.kinetic)
         });
-        apart.see((work - a.work).abs() / energy / (RATES * allowed), || format!("work: {} and {work} J at {t} s", a.work));
+        apart.see((work - a.work).abs() / energy / (RATES * allowed), || {
+            format!("work: {} and {work} J at {t} s", a.work)
+        });
         for (name, row, is_angle) in &driven {
             let Some((_, other, _)) = others.iter().find(|(other, _, _)| other == name) else { continue };
             let units = back.of_motor(*is_angle);
             for i in 0..2 {
                 let value = b.motors[*other][i] / units[i];
-                let natural =
-                    [if *is_angle { scales.force * scales.length } else { scales.force }, scales.force * scales.length / scales.time][i];
+                let natural = [
+                    if *is_angle { scales.force * scales.length } else { scales.force },
+                    scales.force * scales.length / scales.time,
+                ][i];
                 let scale = size(&mut first.samples.iter().map(|sample| sample.motors[*row][i]), natural);
                 let off = (value - a.motors[*row][i]).abs() / scale / (FORCES * allowed);
                 let what = ["torque or force", "power"][i];
@@ -148,12 +168,26 @@ fn compare(scene: &Scene, scales: &Scales, first: &Seen, second: &Seen, related:
             }
         }
     }
-    impacts(scales, [&first.outcome.impacts, &second.outcome.impacts], back, allowed, first.outcome.plan.until, &mut apart);
+    impacts(
+        scales,
+        [&first.outcome.impacts, &second.outcome.impacts],
+        back,
+        allowed,
+        first.outcome.plan.until,
+        &mut apart,
+    );
     apart
 }
 
 /// Compares impacts, as far as the points come fast.
-fn impacts(scales: &Scales, [first, second]: [&[ImpactRecord]; 2], back: &Back, allowed: f64, until: f64, apart: &mut Apart) {
+fn impacts(
+    scales: &Scales,
+    [first, second]: [&[ImpactRecord]; 2],
+    back: &Back,
+    allowed: f64,
+    until: f64,
+    apart: &mut Apart,
+) {
     let speed = scales.length / scales.time;
     let fast = |strikes: &[ImpactRecord], [mass, length, time]: [f64; 3]| -> Vec<ImpactRecord> {
         let in_units = |strike: &ImpactRecord| ImpactRecord {
@@ -168,7 +202,9 @@ fn impacts(scales: &Scales, [first, second]: [&[ImpactRecord]; 2], back: &Back, 
     let (first, second) = (fast(first, [1.0; 3]), fast(second, [back.mass, back.length, back.time]));
     let is_near_end = |strike: &ImpactRecord| until - strike.t < 1e-5 * scales.time;
     if first.len() != second.len() && !first.iter().chain(&second).any(is_near_end) {
-        let times = |strikes: &[ImpactRecord]| strikes.iter().map(|strike| (strike.t, strike.approach)).collect::<Vec<_>>();
+        let times = |strikes: &[ImpactRecord]| {
+            strikes.iter().map(|strike| (strike.t, strike.approach)).collect::<Vec<_>>()
+        };
         apart.see(f64::INFINITY, || format!("impacts: {:?} and {:?}", times(&first), times(&second)));
         return;
     }
@@ -180,14 +216,17 @@ fn impacts(scales: &Scales, [first, second]: [&[ImpactRecord]; 2], back: &Back, 
         apart.see(off, || format!("impulse of {}: {} and {} N·s at {} s", a.wall, a.impulse, b.impulse, a.t));
         let energy = scales.mass * speed * speed + a.energy_lost.abs();
         let off = (a.energy_lost - b.energy_lost).abs() / energy / (FORCES * allowed);
-        apart.see(off, || format!("energy lost at {}: {} and {} J at {} s", a.wall, a.energy_lost, b.energy_lost, a.t));
+        apart.see(off, || {
+            format!("energy lost at {}: {} and {} J at {} s", a.wall, a.energy_lost, b.energy_lost, a.t)
+        });
     }
 }
 
 /// A relation, and what it came to.
 struct Account {
     name: &'static str,
-    /// Pairs of runs compared, stopped alike, refused alike, and those that say more of the motion than of the program.
+    /// Pairs of runs compared, stopped alike, refused alike, and those that say more of the motion than of
+    /// the program.
     compared: u64,
     stopped: u64,
     stops: BTreeMap<String, u64>,
@@ -218,9 +257,12 @@ impl Account {
     fn noted(&self, made: &Generated, method: MethodId, scenes: [&Scene; 2], what: &str) -> String {
         if let Some(folder) = std::env::var_os("FOUND") {
             let scenes = scenes.map(Scene::to_input);
-            let found =
-                json!({"what": what, "relation": self.name, "method": method.info().name, "scene": scenes[0], "related": scenes[1]});
-            let file = std::path::Path::new(&folder).join(format!("{}-{}.json", self.name.replace(' ', "-"), made.seed));
+            let found = json!({"what": what, "relation": self.name, "method": method.info().name, "scene": scenes[0], "related": scenes[1]});
+            let file = std::path::Path::new(&folder).join(format!(
+                "{}-{}.json",
+                self.name.replace(' ', "-"),
+                made.seed
+            ));
             std::fs::write(file, format!("{found:#}\n")).expect("a folder for what is found");
         }
         format!("seed {} by {method} ({:?}): {}", made.seed, made.kinds, what.replace('\n', " "))
@@ -234,7 +276,8 @@ impl Account {
         );
         println!("  stops: {:?}", self.stops);
         println!("  methods: {:?}", self.by_method);
-        let kinds: Vec<String> = self.by_kind.iter().map(|(kind, count)| format!("{} {count}", kind.name())).collect();
+        let kinds: Vec<String> =
+            self.by_kind.iter().map(|(kind, count)| format!("{} {count}", kind.name())).collect();
         println!("  kinds: {}", kinds.join(", "));
         self.lone_stops.iter().for_each(|stop| println!("  ALONE {stop}"));
         self.faults.iter().for_each(|fault| println!("  FAULT {fault}"));
@@ -320,7 +363,11 @@ fn number(name: &str, usual: u64) -> u64 {
 }
 
 /// Scenes whose seeds begin at a relation's own, each with the next method that takes it.
-fn on_random_scenes(name: &'static str, relation: u64, mut relate: impl FnMut(&Generated, &Scene, &mut Dice, MethodId, &mut Account)) {
+fn on_random_scenes(
+    name: &'static str,
+    relation: u64,
+    mut relate: impl FnMut(&Generated, &Scene, &mut Dice, MethodId, &mut Account),
+) {
     let (count, seed) = (number("METAMORPHIC", USUAL), number("SEED", 1));
     let mut account = Account {
         name,
@@ -338,12 +385,15 @@ fn on_random_scenes(name: &'static str, relation: u64, mut relate: impl FnMut(&G
     for index in 0..count {
         let seed = seed.wrapping_mul(1_000_003).wrapping_add(relation * 100_000_007).wrapping_add(index);
         let made = mechanisms::scene(seed);
-        let scene = parse_scene(&made.text, "random.json", &[]).unwrap_or_else(|error| panic!("seed {seed}: {error}"));
+        let scene = parse_scene(&made.text, "random.json", &[])
+            .unwrap_or_else(|error| panic!("seed {seed}: {error}"));
         let mut dice = Dice::new(seed ^ 0x00d1_ce00);
         let walls: Vec<MethodId> = METHODS.iter().map(|info| info.id).filter(|id| takes_walls(*id)).collect();
         let all: Vec<MethodId> = METHODS.iter().map(|info| info.id).collect();
-        let damped = scene.springs.iter().any(|spring| spring.damping > 0.0) || scene.torsion_springs.iter().any(|coil| coil.damping > 0.0);
-        let undamped: Vec<MethodId> = all.iter().copied().filter(|id| !matches!(id, MethodId::Rattle(_))).collect();
+        let damped = scene.springs.iter().any(|spring| spring.damping > 0.0)
+            || scene.torsion_springs.iter().any(|coil| coil.damping > 0.0);
+        let undamped: Vec<MethodId> =
+            all.iter().copied().filter(|id| !matches!(id, MethodId::Rattle(_))).collect();
         let of = if !scene.walls.is_empty() {
             &walls
         } else if damped {
@@ -384,9 +434,16 @@ fn the_order_of_bodies_does_not_matter() {
 fn names_do_not_matter_to_the_last_bit() {
     on_random_scenes("names", 2, |made, scene, _, method, account| {
         let related = relations::renamed(scene);
-        let (first, second) = (run(scene, &request(method, scene), Level::Off), run(&related.scene, &request(method, scene), Level::Off));
+        let (first, second) = (
+            run(scene, &request(method, scene), Level::Off),
+            run(&related.scene, &request(method, scene), Level::Off),
+        );
         if let (Ok(first), Ok(second)) = (&first, &second)
-            && (!first.samples.iter().zip(&second.samples).all(|(a, b)| a.phi == b.phi && a.omega == b.omega && a.motors == b.motors)
+            && (!first
+                .samples
+                .iter()
+                .zip(&second.samples)
+                .all(|(a, b)| a.phi == b.phi && a.omega == b.omega && a.motors == b.motors)
                 || first.samples.len() != second.samples.len())
         {
             account.fault(made, method, [scene, &related.scene], "other numbers by other names");
@@ -468,16 +525,24 @@ fn a_run_goes_back_to_its_start() {
                 account.refused += 1;
                 return;
             }
-            Err(refusal) => return account.fault(made, method, scenes, &format!("cannot go back: {refusal}")),
+            Err(refusal) => {
+                return account.fault(made, method, scenes, &format!("cannot go back: {refusal}"));
+            }
         };
         let (Some(first), Some(last)) = (there.samples.first(), back.samples.last()) else { return };
-        let allowed = AGREEMENT.max(10.0 * claimed(&there).unwrap_or(0.0)).max(10.0 * claimed(&back).unwrap_or(0.0));
+        let allowed =
+            AGREEMENT.max(10.0 * claimed(&there).unwrap_or(0.0)).max(10.0 * claimed(&back).unwrap_or(0.0));
         let off = (0..scene.bars.len()).fold(0.0, |most: f64, k| {
             let way = [0, 1].map(|i| first.centre[k][i] - last.centre[k][i]);
             most.max((first.phi[k] - last.phi[k]).abs()).max(way[0].hypot(way[1]) / made.scales.length)
         });
         // Impacts at the start are not undone by those at the end, which the way back does not reach.
-        let touched = there.outcome.impacts.iter().chain(&back.outcome.impacts).any(|strike| strike.t < 1e-6 * made.scales.time);
+        let touched = there
+            .outcome
+            .impacts
+            .iter()
+            .chain(&back.outcome.impacts)
+            .any(|strike| strike.t < 1e-6 * made.scales.time);
         if !(off <= allowed || touched) {
             let here = relations::shifted(scene, [0.0; 2]);
             let apart = compare(scene, &made.scales, &there, &there, &here);

@@ -8,7 +8,9 @@ use driftless::dynamics::constraint::Site;
 use driftless::dynamics::kernel::{Bias, Kernel};
 use driftless::dynamics::natural::{Natural, NaturalError};
 use driftless::dynamics::{Form, Mechanism, Motion, Time};
-use driftless::scene::{Drive, Force, Given, Hinge, Law, Lock, Place, Rail, Scene, Sine, Slider, Torque, TorsionSpring};
+use driftless::scene::{
+    Drive, Force, Given, Hinge, Law, Lock, Place, Rail, Scene, Sine, Slider, Torque, TorsionSpring,
+};
 use proptest::prelude::*;
 use std::sync::Arc;
 use trees::{Dice, tree};
@@ -36,12 +38,16 @@ impl Posture {
     /// A place of a bar in the world.
     fn at(&self, place: Place) -> C {
         let point = C::new(place.point[0], place.point[1]);
-        place.bar.map_or(point, |bar| self.translations[bar] + self.kernel.z[bar] * (point - self.mechanism.forest.hangs[bar].own))
+        place.bar.map_or(point, |bar| {
+            self.translations[bar] + self.kernel.z[bar] * (point - self.mechanism.forest.hangs[bar].own)
+        })
     }
 
     /// The place of a bar that is at a point of the world.
     fn place(&self, bar: Option<usize>, at: C) -> Place {
-        let point = bar.map_or(at, |bar| self.mechanism.forest.hangs[bar].own + self.kernel.z[bar].conj() * (at - self.translations[bar]));
+        let point = bar.map_or(at, |bar| {
+            self.mechanism.forest.hangs[bar].own + self.kernel.z[bar].conj() * (at - self.translations[bar])
+        });
         Place { bar, point: [point.re, point.im] }
     }
 
@@ -53,13 +59,18 @@ impl Posture {
 
 /// A law that starts at this value.
 fn law(value: f64, dice: &mut Dice) -> Law {
-    let sine = Sine { amplitude: dice.within(0.1, 0.5), frequency: dice.within(1.0, 5.0), phase: dice.within(-3.0, 3.0) };
+    let sine = Sine {
+        amplitude: dice.within(0.1, 0.5),
+        frequency: dice.within(1.0, 5.0),
+        phase: dice.within(-3.0, 3.0),
+    };
     let start = value - sine.amplitude * sine.phase.sin();
     Law { start, rate: dice.within(-2.0, 2.0), acceleration: dice.within(-1.0, 1.0), sines: vec![sine] }
 }
 
-/// A tree with some of everything natural coordinates take: a body hung on nothing, pins, sliders and slots with and without a law of travel, locks, a
-/// motor, constant forces.  All of it fits the posture at the start.
+/// A tree with some of everything natural coordinates take: a body hung on nothing, pins, sliders and slots
+/// with and without a law of travel, locks, a motor, constant forces.  All of it fits the posture at the
+/// start.
 fn mechanism(n: usize, seed: u64) -> Option<Scene> {
     let dice = &mut Dice::new(seed);
     let mut scene = tree(n, false, dice);
@@ -71,7 +82,8 @@ fn mechanism(n: usize, seed: u64) -> Option<Scene> {
         scene.hinges.remove(loose);
     }
     let posture = Posture::new(&scene, |mechanism| mechanism.start(&scene))?;
-    let other = |bar: usize, dice: &mut Dice| Some(dice.pick(n + 1)).filter(|&other| other < n && other != bar);
+    let other =
+        |bar: usize, dice: &mut Dice| Some(dice.pick(n + 1)).filter(|&other| other < n && other != bar);
     for extra in 0..1 + dice.pick(3) {
         let bar = dice.pick(n);
         let base = other(bar, dice);
@@ -87,21 +99,36 @@ fn mechanism(n: usize, seed: u64) -> Option<Scene> {
                 place.point = [place.point[0] - travel * along.re, place.point[1] - travel * along.im];
                 let rail = Rail { place, direction: [along.re, along.im] };
                 if dice.pick(3) == 0 {
-                    scene.drives.push(Drive { name: format!("drive{extra}"), slider: scene.sliders.len(), law: law(travel, dice) });
+                    scene.drives.push(Drive {
+                        name: format!("drive{extra}"),
+                        slider: scene.sliders.len(),
+                        law: law(travel, dice),
+                    });
                 }
                 scene.sliders.push(Slider { name, point, rail, locked: dice.pick(4) == 0 });
             }
             3 => scene.locks.push(Lock { name, bar, relative_to: base, angle: None }),
             _ => {
                 let given = scene.start[bar].phi - base.map_or(0.0, |base| scene.start[base].phi);
-                scene.motors.push(driftless::scene::Motor { name, bar, relative_to: base, law: law(given, dice) });
+                scene.motors.push(driftless::scene::Motor {
+                    name,
+                    bar,
+                    relative_to: base,
+                    law: law(given, dice),
+                });
             }
         }
     }
     if dice.pick(2) == 0 {
         let (bar, point, force) = (dice.pick(n), [0.2, -0.1], [dice.within(-5.0, 5.0), 3.0]);
         scene.forces.push(Force { name: "force".into(), bar, point, force, follows: false, law: None });
-        scene.torques.push(Torque { name: "torque".into(), bar, relative_to: other(bar, dice), torque: dice.within(-2.0, 2.0), law: None });
+        scene.torques.push(Torque {
+            name: "torque".into(),
+            bar,
+            relative_to: other(bar, dice),
+            torque: dice.within(-2.0, 2.0),
+            law: None,
+        });
     }
     Some(scene)
 }
@@ -111,11 +138,14 @@ fn is_sound(mechanism: &Mechanism, motion: &Motion) -> bool {
     let mut kernel = Kernel::<f64>::new(mechanism);
     let (phi, omega) = numbers(motion);
     kernel.accelerate::<0>(mechanism, Time::default(), &phi, &omega, Bias::default());
-    // Of rows that depend on others everywhere each form may leave out another one; light members cost both forms digits.
-    let share = |r: usize| if kernel.is_left_out(r) { 0.0 } else { 1.0 / (kernel.schur_pivot[r] * kernel.scale[r]) };
+    // Of rows that depend on others everywhere each form may leave out another one; light members cost both
+    // forms digits.
+    let share =
+        |r: usize| if kernel.is_left_out(r) { 0.0 } else { 1.0 / (kernel.schur_pivot[r] * kernel.scale[r]) };
     let is_regular = kernel.weakest.share > 1e-3 && (0..mechanism.constraints.len()).all(|r| share(r) > 1e-3);
     kernel.rows_at(mechanism, Time::default(), &phi, &omega);
-    let is_kept = |r: usize| kernel.rows[r].position.abs() < 1e-12 && kernel.row_rate(r, &omega).abs() < 1e-12;
+    let is_kept =
+        |r: usize| kernel.rows[r].position.abs() < 1e-12 && kernel.row_rate(r, &omega).abs() < 1e-12;
     is_regular && (0..mechanism.constraints.len()).all(is_kept)
 }
 
@@ -183,7 +213,8 @@ proptest! {
         }
     }
 
-    /// Newton and Euler against the multipliers of the same hinges where every body hangs on nothing and every hinge is a pin.
+    /// Newton and Euler against the multipliers of the same hinges where every body hangs on nothing and
+    /// every hinge is a pin.
     #[test]
     fn hinge_forces_are_the_multipliers_of_the_hinges_as_pins(n in 2..=5usize, seed in any::<u64>()) {
         let Sound { scene, mechanism, motion, kernel } = sound(n, seed)?;
@@ -221,11 +252,23 @@ fn what_has_no_natural_form_is_refused_by_name() {
         change(&mut scene);
         Natural::new(common::compile(&scene)).expect_err("no natural form")
     };
-    let torsion = TorsionSpring { name: "t".into(), bar: 1, relative_to: None, stiffness: 1.0, free_angle: 0.0, damping: 0.0 };
-    assert_eq!(refused(&|scene| scene.torsion_springs.push(torsion.clone())), NaturalError::Torsion("t".into()));
-    let force = Force { name: "f".into(), bar: 1, point: [0.3, 0.0], force: [1.0, 0.0], follows: true, law: None };
+    let torsion = TorsionSpring {
+        name: "t".into(),
+        bar: 1,
+        relative_to: None,
+        stiffness: 1.0,
+        free_angle: 0.0,
+        damping: 0.0,
+    };
+    assert_eq!(
+        refused(&|scene| scene.torsion_springs.push(torsion.clone())),
+        NaturalError::Torsion("t".into())
+    );
+    let force =
+        Force { name: "f".into(), bar: 1, point: [0.3, 0.0], force: [1.0, 0.0], follows: true, law: None };
     assert_eq!(refused(&|scene| scene.forces.push(force.clone())), NaturalError::Applied("f".into()));
-    let torque = Torque { name: "m".into(), bar: 1, relative_to: None, torque: 1.0, law: Some(Law::constant(2.0)) };
+    let torque =
+        Torque { name: "m".into(), bar: 1, relative_to: None, torque: 1.0, law: Some(Law::constant(2.0)) };
     assert_eq!(refused(&|scene| scene.torques.push(torque.clone())), NaturalError::Applied("m".into()));
 }
 

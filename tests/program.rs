@@ -1,4 +1,5 @@
-//! The program from outside: exit codes, what goes to stdout, stderr and files, and the names scripts rely on.
+//! The program from outside: exit codes, what goes to stdout, stderr and files, and the names scripts rely
+//! on.
 #![cfg(feature = "cli")]
 
 use crate::program;
@@ -35,7 +36,19 @@ fn help_lists_the_commands_and_fits_a_terminal() {
     for command in commands {
         program.run(&format!("{command} --help")).exits(0).shows(&["Usage: driftless"]);
     }
-    let options = ["--method", "--step", "--rtol", "--atol", "--until", "--every", "--stabilize", "--set", "--out", "--json", "--force"];
+    let options = [
+        "--method",
+        "--step",
+        "--rtol",
+        "--atol",
+        "--until",
+        "--every",
+        "--stabilize",
+        "--set",
+        "--out",
+        "--json",
+        "--force",
+    ];
     program.run("run --help").exits(0).shows(&options);
 }
 
@@ -45,7 +58,11 @@ fn methods_as_text_and_as_an_object() {
     program.run("methods").exits(0).shows(&["dopri5", "dp8", "gauss16", "rattle8"]);
     let methods = program.run("methods --json").exits(0).object();
     let list = methods["methods"].as_array().expect("a list");
-    assert!(list.iter().any(|method| method["name"] == "gauss16" && method["order"] == 16 && method["symplectic"] == true));
+    assert!(
+        list.iter().any(|method| method["name"] == "gauss16"
+            && method["order"] == 16
+            && method["symplectic"] == true)
+    );
 }
 
 #[test]
@@ -107,7 +124,11 @@ fn with_json_an_error_is_one_object_on_stdout() {
     ] {
         let ran = program.run(arguments).exits(code);
         let error = &ran.object()["error"];
-        assert_eq!((&error["kind"], &error["exit_code"]), (&Value::from(kind), &Value::from(code)), "{arguments}");
+        assert_eq!(
+            (&error["kind"], &error["exit_code"]),
+            (&Value::from(kind), &Value::from(code)),
+            "{arguments}"
+        );
         let message = error["message"].as_str().expect("a message");
         assert!(!message.is_empty() && ran.stderr.contains(message), "{ran:?}");
     }
@@ -123,7 +144,12 @@ fn scenes_that_are_none_exit_3_with_their_place() {
     let text = std::fs::read_to_string(program::shipped("free")).expect("a scene").replacen("670", "-670", 1);
     program.write("light.json", &text);
     for command in ["check", "inspect", "run"] {
-        program.run(&format!("{command} light.json")).exits(3).says(&["light.json:6:", "density", "-670", "hint"]);
+        program.run(&format!("{command} light.json")).exits(3).says(&[
+            "light.json:6:",
+            "density",
+            "-670",
+            "hint",
+        ]);
     }
     assert_eq!(program.files(), ["light.json"]);
 }
@@ -155,11 +181,17 @@ fn pairings_without_sense_exit_3_with_reason_and_alternative() {
 #[test]
 fn set_changes_the_scene_and_a_wrong_path_is_refused() {
     let program = Program::with_scenes(&["free"]);
-    let energy = |set: &str| program.run(&format!("inspect free.json --json {set}")).exits(0).object()["bodies"]["bar1"]["x"].clone();
+    let energy = |set: &str| {
+        program.run(&format!("inspect free.json --json {set}")).exits(0).object()["bodies"]["bar1"]["x"]
+            .clone()
+    };
     near(&energy("--set gravity[0]=0"), 0.0, 0.0);
     near(&energy("--set gravity[0]=19.62"), 2.0 * 6.2971, 2e-4);
     near(&energy("--set gravity[0]=0 --set gravity[0]=9.81"), 6.2971, 1e-4);
-    program.run("check free.json --set bars.bar3.length=1").exits(3).says(&["--set bars.bar3.length=1", "did you mean"]);
+    program
+        .run("check free.json --set bars.bar3.length=1")
+        .exits(3)
+        .says(&["--set bars.bar3.length=1", "did you mean"]);
 }
 
 // check.
@@ -181,7 +213,12 @@ fn check_says_what_is_active_and_what_is_left_out() {
     assert!(!multiplier["left_out"].to_string().contains("multipliers") && multiplier["why"].is_null());
     assert_eq!(check("wall.json")["method"], "dp8");
     assert_eq!(check("branch.json")["off_axis"], true);
-    program.run("check motor.json").exits(0).shows(&["gauss16", "1 degree: 2 coordinates less 1 constraint", "left out", "elimination"]);
+    program.run("check motor.json").exits(0).shows(&[
+        "gauss16",
+        "1 degree: 2 coordinates less 1 constraint",
+        "left out",
+        "elimination",
+    ]);
     program.run("check motor.json -q").exits(0).stays_silent();
     program.run("check motor.json --stabilize baumgarte").exits(0).shows(&["five mean steps"]);
 }
@@ -201,7 +238,11 @@ fn inspect_gives_the_published_accelerations() {
         let object = program.run(&format!("inspect {scene}.json --json")).exits(0).object();
         assert_eq!(keys(&object["bodies"]), ["bar1", "bar2"]);
         for (number, expected) in expected.into_iter().enumerate() {
-            near(&object["bodies"][["bar1", "bar2"][number / 3]][["x", "y", "phi"][number % 3]], expected, 0.5001e-4);
+            near(
+                &object["bodies"][["bar1", "bar2"][number / 3]][["x", "y", "phi"][number % 3]],
+                expected,
+                0.5001e-4,
+            );
         }
     }
 }
@@ -220,9 +261,16 @@ fn inspect_gives_multiplier_torque_power_and_hinge_forces() {
     for (axis, (name, weight)) in [("x", mass * gravity), ("y", 0.0)].into_iter().enumerate() {
         let acceleration = |bar: &str| motor["bodies"][bar][name].as_f64().expect("a number");
         near(&motor["hinges"]["B"]["force"][axis], mass * acceleration("bar2") - weight, 1e-12);
-        near(&motor["hinges"]["A"]["force"][axis], mass * (acceleration("bar1") + acceleration("bar2")) - 2.0 * weight, 1e-12);
+        near(
+            &motor["hinges"]["A"]["force"][axis],
+            mass * (acceleration("bar1") + acceleration("bar2")) - 2.0 * weight,
+            1e-12,
+        );
     }
-    assert_eq!((&motor["hinges"]["B"]["on"], &motor["hinges"]["B"]["from"]), (&"bar2".into(), &"bar1".into()));
+    assert_eq!(
+        (&motor["hinges"]["B"]["on"], &motor["hinges"]["B"]["from"]),
+        (&"bar2".into(), &"bar1".into())
+    );
     assert_eq!(motor["hinges"]["A"]["from"], "ground");
     let free = program.run("inspect free.json --json").exits(0).object();
     assert!(keys(&free["motors"]).is_empty() && keys(&free["constraints"]).is_empty());
@@ -234,7 +282,10 @@ fn inspect_gives_multiplier_torque_power_and_hinge_forces() {
 fn inspect_gives_the_impact_of_case_f() {
     let program = Program::with_scenes(&["wall"]);
     for e in [0.0, 0.5, 1.0] {
-        let object = program.run(&format!("inspect wall.json --json --set walls.wall.restitution={e}")).exits(0).object();
+        let object = program
+            .run(&format!("inspect wall.json --json --set walls.wall.restitution={e}"))
+            .exits(0)
+            .object();
         let impact = &object["walls"]["wall"]["impact"];
         // By hand: M⁻¹Jᵀ is along (1, -5) and J M⁻¹ Jᵀ = 24/7 l²/(m l²).
         near(&impact["omega_after"]["bar1"], TAU * (1.0 + 0.5 * (1.0 + e)), 1e-12);
@@ -252,7 +303,21 @@ fn run_writes_whole_files_and_one_object() {
     let program = Program::with_scenes(&["motor"]);
     let ran = program.run("run motor.json --until 1 --json --no-charts").exits(0);
     let object = ran.object();
-    has_keys(&object, &["scene", "method", "settings", "until", "steps", "evaluations", "rejected", "wall_s", "final", "energy"]);
+    has_keys(
+        &object,
+        &[
+            "scene",
+            "method",
+            "settings",
+            "until",
+            "steps",
+            "evaluations",
+            "rejected",
+            "wall_s",
+            "final",
+            "energy",
+        ],
+    );
     has_keys(&object, &["constraints", "trust", "files", "stop", "notes", "why", "stabilizer", "impacts"]);
     has_keys(&object["energy"], &["kind", "max_relative", "scale", "slope"]);
     has_keys(&object["constraints"]["motor"], &["position_max", "velocity_max"]);
@@ -270,7 +335,8 @@ fn run_writes_whole_files_and_one_object() {
     let folder = "output/motor/taylor-1e-9-elimination";
     let files = [format!("{folder}/run.json"), format!("{folder}/trajectory.csv")];
     assert_eq!(program.files(), [&["motor.json".to_owned()], &files[..]].concat());
-    let mut listed: Vec<&str> = object["files"].as_array().expect("a list").iter().filter_map(Value::as_str).collect();
+    let mut listed: Vec<&str> =
+        object["files"].as_array().expect("a list").iter().filter_map(Value::as_str).collect();
     listed.sort_unstable();
     assert_eq!(listed, files);
 
@@ -290,7 +356,8 @@ fn the_record_holds_the_scene_and_repeats_bit_for_bit() {
         program
             .run(&format!("run motor.json --until 1 -q --no-charts --out {out} --set motors.motor.law.rate=6 --set start.bar2.omega=6"))
             .exits(0);
-        serde_json::from_str::<Value>(&program.read(&format!("{out}/motor/taylor-1e-9-elimination/run.json"))).expect("JSON")
+        serde_json::from_str::<Value>(&program.read(&format!("{out}/motor/taylor-1e-9-elimination/run.json")))
+            .expect("JSON")
     };
     let (mut one, mut two) = (record("one"), record("two"));
     assert_eq!(one["resolved_scene"]["motors"][0]["law"]["rate"], 6.0);
@@ -302,7 +369,8 @@ fn the_record_holds_the_scene_and_repeats_bit_for_bit() {
     // The resolved scene is a scene, and the same one.
     program.write("again.json", &one["resolved_scene"].to_string());
     program.run("run again.json --until 1 -q --no-charts --out three").exits(0);
-    let three: Value = serde_json::from_str(&program.read("three/motor/taylor-1e-9-elimination/run.json")).expect("JSON");
+    let three: Value =
+        serde_json::from_str(&program.read("three/motor/taylor-1e-9-elimination/run.json")).expect("JSON");
     assert_eq!(three["hashes"], one["hashes"]);
 }
 
@@ -312,15 +380,24 @@ fn a_run_is_not_overwritten_unasked() {
     let trajectory = "o/free/taylor-1e-9/trajectory.csv";
     program.run("run free.json --until 1 --no-charts --out o").exits(0);
     let before = program.read(trajectory);
-    program.run("run free.json --until 2 --no-charts --out o").exits(6).says(&["holds a run already", "--force"]);
+    program
+        .run("run free.json --until 2 --no-charts --out o")
+        .exits(6)
+        .says(&["holds a run already", "--force"]);
     assert_eq!(program.read(trajectory), before);
     program.write("o/free/taylor-1e-9/notes.txt", "mine");
     program.write("o/free/taylor-1e-9/torque_power.png", "of an older run");
     program.write("o/free/taylor-1e-9/.unfinished-abctrajectory.csv", "half");
     program.run("run free.json --until 2 --no-charts --out o --force").exits(0);
-    assert!(program.read(trajectory).starts_with(&before[..1000]) && program.read(trajectory).len() > before.len());
+    assert!(
+        program.read(trajectory).starts_with(&before[..1000])
+            && program.read(trajectory).len() > before.len()
+    );
     let files: Vec<String> = program.files().into_iter().filter(|file| file.starts_with("o/")).collect();
-    assert_eq!(files, ["notes.txt", "run.json", "trajectory.csv"].map(|name| format!("o/free/taylor-1e-9/{name}")));
+    assert_eq!(
+        files,
+        ["notes.txt", "run.json", "trajectory.csv"].map(|name| format!("o/free/taylor-1e-9/{name}"))
+    );
 }
 
 #[test]
@@ -335,8 +412,12 @@ fn a_folder_that_cannot_be_made_exits_6() {
 fn quiet_stays_silent_and_the_rest_is_not() {
     let program = Program::with_scenes(&["free"]);
     program.run("run free.json --until 1 --no-charts -q").exits(0).stays_silent();
-    let ran =
-        program.run("run free.json --until 1 --no-charts --out b").exits(0).shows(&["taylor", "energy drift", "trust", "trajectory.csv"]);
+    let ran = program.run("run free.json --until 1 --no-charts --out b").exits(0).shows(&[
+        "taylor",
+        "energy drift",
+        "trust",
+        "trajectory.csv",
+    ]);
     assert!(ran.stdout.lines().all(|line| line.chars().count() <= 80), "{}", ran.stdout);
     let ran = program.run("run free.json --until 1 --no-charts --out c -v").exits(0);
     ran.says(&["free.json", "trajectory.csv"]);
@@ -347,29 +428,44 @@ fn quiet_stays_silent_and_the_rest_is_not() {
 fn a_stop_exits_4_and_keeps_what_was_reached() {
     let program = Program::with_scenes(&["spinning"]);
     // A step of 2 s against a turn a second: the stages do not converge.
-    let ran = program.run("run spinning.json --method gauss4 --step 2 --until 10 --no-charts --json").exits(4).says(&["stopped at t ="]);
+    let ran = program
+        .run("run spinning.json --method gauss4 --step 2 --until 10 --no-charts --json")
+        .exits(4)
+        .says(&["stopped at t ="]);
     let object = ran.object();
     has_keys(&object["stop"], &["cause", "t", "what", "hint", "step", "method"]);
     assert_eq!((&object["error"]["kind"], &object["error"]["exit_code"]), (&"stopped".into(), &4.into()));
     assert_eq!(program.files().len(), 3, "scene, trajectory and record");
-    program.run("run spinning.json --method gauss4 --step 2 --until 10 --no-charts --force").exits(4).shows(&["stopped"]);
+    program
+        .run("run spinning.json --method gauss4 --step 2 --until 10 --no-charts --force")
+        .exits(4)
+        .shows(&["stopped"]);
 }
 
 #[test]
 fn stated_limits_exit_5() {
     let program = Program::with_scenes(&["free", "motor_sine"]);
-    let ran = program.run("run free.json --rtol 1e-3 --max-energy-drift 1e-9 --no-charts --json").exits(5).says(&["1e-9"]);
+    let ran = program
+        .run("run free.json --rtol 1e-3 --max-energy-drift 1e-9 --no-charts --json")
+        .exits(5)
+        .says(&["1e-9"]);
     let object = ran.object();
     assert_eq!(object["stop"]["cause"], "drift_limit");
     let t = object["final"]["t"].as_f64().expect("a number");
     assert!(t > 0.0 && t < 10.0, "it stopped there, not at the end: {t}");
     let table = program.read("output/free/taylor-1e-3/trajectory.csv");
-    assert!(table.lines().last().is_some_and(|line| line.starts_with(&format!("{t:?},"))), "kept up to the stop");
+    assert!(
+        table.lines().last().is_some_and(|line| line.starts_with(&format!("{t:?},"))),
+        "kept up to the stop"
+    );
     program
         .run("run motor_sine.json --until 10 --method dp5 --rtol 1e-3 --stabilize none --max-constraint-drift 1e-12 --no-charts -q")
         .exits(5)
         .says(&["constraint motor"]);
-    program.run("run motor_sine.json --until 10 --stabilize elimination --max-constraint-drift 0 --no-charts -q").exits(0).stays_silent();
+    program
+        .run("run motor_sine.json --until 10 --stabilize elimination --max-constraint-drift 0 --no-charts -q")
+        .exits(0)
+        .stays_silent();
 }
 
 #[test]
@@ -381,13 +477,21 @@ fn impacts_are_counted_and_lose_what_they_should() {
         assert_eq!(object["stop"], Value::Null);
         // Without any rebound the point stays on the wall for a while.
         has_keys(&object["holds"], &["count", "time_s", "first"]);
-        assert!(e > 0.0 || object["holds"]["count"].as_u64().is_some_and(|count| count >= 1), "{}", object["holds"]);
+        assert!(
+            e > 0.0 || object["holds"]["count"].as_u64().is_some_and(|count| count >= 1),
+            "{}",
+            object["holds"]
+        );
         let impacts = &object["impacts"];
         let lost = impacts["energy_lost_j"].as_f64().expect("a number");
         assert!(impacts["count"].as_u64().is_some_and(|count| count >= 1), "{impacts}");
         assert!(if e == 1.0 { lost.abs() < 1e-12 } else { lost > 0.3 }, "e = {e}: {impacts}");
         near(&impacts["first"][0]["t"], 0.0, 0.0);
-        assert!(object["energy"]["max_relative"].as_f64().is_some_and(|drift| drift < 1e-7), "{}", object["energy"]);
+        assert!(
+            object["energy"]["max_relative"].as_f64().is_some_and(|drift| drift < 1e-7),
+            "{}",
+            object["energy"]
+        );
     }
 }
 
@@ -395,7 +499,9 @@ fn impacts_are_counted_and_lose_what_they_should() {
 fn the_four_stabilizations_have_folders_of_their_own() {
     let program = Program::with_scenes(&["motor_sine"]);
     for kind in ["none", "baumgarte", "projection", "elimination"] {
-        let ran = program.run(&format!("run motor_sine.json --until 2 --method dp8 --stabilize {kind} --no-charts --json")).exits(0);
+        let ran = program
+            .run(&format!("run motor_sine.json --until 2 --method dp8 --stabilize {kind} --no-charts --json"))
+            .exits(0);
         let object = ran.object();
         assert_eq!(object["settings"]["stabilize"], kind);
         assert_eq!(object["settings"]["time_constant"].is_number(), kind == "baumgarte");
@@ -410,7 +516,12 @@ fn a_reader_that_goes_away_is_no_failure() {
     use std::io::Read;
     use std::process::Stdio;
     let program = Program::new();
-    let mut child = program.command("completions zsh").stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program");
+    let mut child = program
+        .command("completions zsh")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program");
     drop(child.stdout.take());
     let mut stderr = String::new();
     child.stderr.take().expect("a pipe").read_to_string(&mut stderr).expect("text");
@@ -439,10 +550,19 @@ fn charts_are_drawn_for_what_the_scene_has() {
     assert_eq!(pictures("a/"), ["angles.png", "energy_drift.png", "mechanism.png"]);
     assert_eq!(
         pictures("b/"),
-        ["angles.png", "constraint_drift.png", "energy_drift.png", "mechanism.gif", "mechanism.png", "torque_power.png"]
+        [
+            "angles.png",
+            "constraint_drift.png",
+            "energy_drift.png",
+            "mechanism.gif",
+            "mechanism.png",
+            "torque_power.png"
+        ]
     );
     assert!(pictures("c/").is_empty());
-    let read = |file: &str| std::fs::read(program.path(&format!("b/motor/taylor-1e-9-elimination/{file}"))).expect("a picture");
+    let read = |file: &str| {
+        std::fs::read(program.path(&format!("b/motor/taylor-1e-9-elimination/{file}"))).expect("a picture")
+    };
     let picture = read("angles.png");
     assert_eq!(&picture[..8], b"\x89PNG\r\n\x1a\n");
     let width = u32::from_be_bytes([picture[16], picture[17], picture[18], picture[19]]);
@@ -453,16 +573,22 @@ fn charts_are_drawn_for_what_the_scene_has() {
 #[test]
 fn several_stabilizations_are_run_one_after_another_and_overlaid() {
     let program = Program::with_scenes(&["motor_sine"]);
-    let ran = program.run("run motor_sine.json --method dp8 --until 1 --stabilize none,projection,elimination --json --out a");
+    let ran = program.run(
+        "run motor_sine.json --method dp8 --until 1 --stabilize none,projection,elimination --json --out a",
+    );
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     let object: serde_json::Value = serde_json::from_str(&ran.stdout).expect("one object");
-    let kinds: Vec<&str> =
-        (object["runs"].as_array().expect("runs").iter()).filter_map(|run| run["settings"]["stabilize"].as_str()).collect();
+    let kinds: Vec<&str> = (object["runs"].as_array().expect("runs").iter())
+        .filter_map(|run| run["settings"]["stabilize"].as_str())
+        .collect();
     assert_eq!(kinds, ["none", "projection", "elimination"]);
     let files = program.files();
     assert!(files.iter().any(|file| file == "a/motor_sine/constraint_drift.png"), "{files:?}");
     for kind in kinds {
-        assert!(files.iter().any(|file| file == &format!("a/motor_sine/dp8-1e-9-{kind}/run.json")), "{kind}: {files:?}");
+        assert!(
+            files.iter().any(|file| file == &format!("a/motor_sine/dp8-1e-9-{kind}/run.json")),
+            "{kind}: {files:?}"
+        );
     }
     // One pairing that makes no sense, and nothing is run.
     program.run("run motor_sine.json --method gauss16 --stabilize elimination,projection --out b").exits(3);
@@ -481,17 +607,30 @@ fn the_program_tells_changes_and_refuses_them_where_asked() {
     for command in ["check", "inspect", "run", "sweep --vary bars.crank.density=2700..2800:2"] {
         let mut words_of = command.split_whitespace();
         let (verb, rest) = (words_of.next().expect("a command"), words_of.collect::<Vec<_>>().join(" "));
-        program.run(&format!("{verb} four_bar_motor.json {rest} --strict")).exits(3).says(&words).says(&["--strict"]);
+        program
+            .run(&format!("{verb} four_bar_motor.json {rest} --strict"))
+            .exits(3)
+            .says(&words)
+            .says(&["--strict"]);
     }
     let error = program.run("check four_bar_motor.json --strict --json").exits(3).object();
     assert_eq!(error["error"]["details"]["changes"][0]["body"], "coupler");
     let object = program.run("check four_bar_motor.json --json").exits(0).object();
-    assert_eq!((object["degrees_of_freedom"].as_u64(), object["assembly"]["changes"][0]["quantity"].as_str()), (Some(0), Some("phi")));
+    assert_eq!(
+        (object["degrees_of_freedom"].as_u64(), object["assembly"]["changes"][0]["quantity"].as_str()),
+        (Some(0), Some("phi"))
+    );
     program.run("run four_bar_motor.json --until 0.02 --no-charts --quiet").exits(0);
     let record = program.files().into_iter().find(|file| file.ends_with("run.json")).expect("a record");
     let record: Value = serde_json::from_str(&program.read(&record)).expect("JSON");
     assert_eq!(record["result"]["assembly"]["changes"][0]["given"].as_f64(), Some(0.43));
     program.run("check kite.json --strict").exits(0).shows(&["1 degree: 3 coordinates less 2 constraints"]);
-    program.run("check four_bar_motor.json --set start.coupler.phi=2.5 --set until=1").exits(3).says(&["error: no start fits", "hint: "]);
-    program.run("check four_bar_motor.json --set start={}").exits(3).says(&["error: the start is ambiguous: `start.", "roughly is enough"]);
+    program
+        .run("check four_bar_motor.json --set start.coupler.phi=2.5 --set until=1")
+        .exits(3)
+        .says(&["error: no start fits", "hint: "]);
+    program
+        .run("check four_bar_motor.json --set start={}")
+        .exits(3)
+        .says(&["error: the start is ambiguous: `start.", "roughly is enough"]);
 }

@@ -1,4 +1,5 @@
-//! Published accelerations, torque and power of the source problem (TU Delft ME41055, homework 4) and its neighbours.
+//! Published accelerations, torque and power of the source problem (TU Delft ME41055, homework 4) and its
+//! neighbours.
 
 use crate::common;
 
@@ -65,7 +66,11 @@ fn case_c_iii_both_hanging_and_turning() {
 
 #[test]
 fn case_d_with_the_spring() {
-    assert_digits(&solve(&with_spring(Inertia::Full)).0, &[2.1063, 0.0, -7.0210, 8.4034, 0.0, -13.9693], 1e-4);
+    assert_digits(
+        &solve(&with_spring(Inertia::Full)).0,
+        &[2.1063, 0.0, -7.0210, 8.4034, 0.0, -13.9693],
+        1e-4,
+    );
 }
 
 #[test]
@@ -78,7 +83,8 @@ fn case_e_with_the_motor() {
     }
 }
 
-/// The source's own formula, power = torque · rate, for both directions: its printed power is that of +2 pi, its printed rate is -2 pi.
+/// The source's own formula, power = torque · rate, for both directions: its printed power is that of +2 pi,
+/// its printed rate is -2 pi.
 #[test]
 fn case_e_the_motor_gives_and_takes_the_same_power() {
     for rate in [ONE_TURN, -ONE_TURN] {
@@ -92,8 +98,9 @@ fn case_e_the_motor_gives_and_takes_the_same_power() {
     }
 }
 
-/// Erratum: the source changes from the full to the slender moment of inertia between cases d and e without a word.  What each case would have
-/// been with the other one; the full one of case e is in the design notes, the slender ones of c i and d are HW1b and HW3a of the same course.
+/// Erratum: the source changes from the full to the slender moment of inertia between cases d and e without a
+/// word.  What each case would have been with the other one; the full one of case e is in the design notes,
+/// the slender ones of c i and d are HW1b and HW3a of the same course.
 #[test]
 fn erratum_the_other_moment_of_inertia() {
     let (found, multiplier, _) = solve(&motor(Inertia::Full, ONE_TURN));
@@ -102,11 +109,15 @@ fn erratum_the_other_moment_of_inertia() {
     assert_digits(&[-multiplier[0] * ONE_TURN], &[1.6754], 1e-4);
     let slender = double_pendulum(Inertia::Slender, [(FRAC_PI_2, 0.0), (FRAC_PI_2, 0.0)]);
     assert_digits(&solve(&slender).0, &[6.3064, 0.0, -21.0214, 10.5107, 0.0, 7.0071], 1e-4);
-    assert_digits(&solve(&with_spring(Inertia::Slender)).0, &[2.1021, 0.0, -7.0071, 8.4086, 0.0, -14.0143], 1e-4);
+    assert_digits(
+        &solve(&with_spring(Inertia::Slender)).0,
+        &[2.1021, 0.0, -7.0071, 8.4086, 0.0, -14.0143],
+        1e-4,
+    );
 }
 
-/// Erratum: the source's text drops bar 1's weight from the right-hand side; its numbers contain it.  Without it the first equation of case c i,
-/// 4/3 + 1/2 with the small width term, would give another pair.
+/// Erratum: the source's text drops bar 1's weight from the right-hand side; its numbers contain it.  Without
+/// it the first equation of case c i, 4/3 + 1/2 with the small width term, would give another pair.
 #[test]
 fn erratum_the_weight_of_bar_1_is_in_the_numbers() {
     let (m, l, g) = (common::MASS, common::LENGTH, 9.81);
@@ -123,9 +134,9 @@ fn erratum_the_weight_of_bar_1_is_in_the_numbers() {
     assert!((found[2] - without_it[0]).abs() > 5.0);
 }
 
-/// Case f, which the source leaves unsolved.  With both bars at pi/2 the coupling is at its largest, M = m l² [4/3 1/2; 1/2 1/3], and the end C has
-/// J = -l (1, 1).  J M⁻¹ Jᵀ = 24/(7 m), J v⁻ = -4 pi l, so rho = -(1+e) (7/6) pi m l and
-/// v⁺ = (2 pi + (1+e) pi, 2 pi - 5 (1+e) pi).
+/// Case f, which the source leaves unsolved.  With both bars at pi/2 the coupling is at its largest, M = m l²
+/// [4/3 1/2; 1/2 1/3], and the end C has J = -l (1, 1).  J M⁻¹ Jᵀ = 24/(7 m), J v⁻ = -4 pi l, so rho = -(1+e)
+/// (7/6) pi m l and v⁺ = (2 pi + (1+e) pi, 2 pi - 5 (1+e) pi).
 #[test]
 fn case_f_the_impact_at_three_restitutions() {
     let (m, l) = (common::MASS, common::LENGTH);
@@ -139,7 +150,11 @@ fn case_f_the_impact_at_three_restitutions() {
         let gain = (1.0 + e) * PI;
         let expected = [2.0 * PI + gain, 2.0 * PI - 5.0 * gain];
         for k in 0..2 {
-            assert!((impact.omega[k] - expected[k]).abs() < 1e-12, "e = {e}: {:?} is not {expected:?}", impact.omega);
+            assert!(
+                (impact.omega[k] - expected[k]).abs() < 1e-12,
+                "e = {e}: {:?} is not {expected:?}",
+                impact.omega
+            );
         }
         let approach = -4.0 * PI * l;
         let rho = -(1.0 + e) * 7.0 / 6.0 * PI * m * l;
@@ -147,17 +162,21 @@ fn case_f_the_impact_at_three_restitutions() {
         assert!((impact.impulse + rho).abs() < 1e-13);
         // The energy an impact takes, from the impulse and from the rates.
         assert!((impact.energy_change + 0.5 * rho * (1.0 - e) * approach).abs() < 1e-13);
-        let kinetic = |v: [f64; 2]| m * l * l * (2.0 / 3.0 * v[0] * v[0] + 0.5 * v[0] * v[1] + v[1] * v[1] / 6.0);
+        let kinetic =
+            |v: [f64; 2]| m * l * l * (2.0 / 3.0 * v[0] * v[0] + 0.5 * v[0] * v[1] + v[1] * v[1] / 6.0);
         assert!((impact.energy_change - (kinetic(expected) - kinetic([2.0 * PI; 2]))).abs() < 1e-13);
         assert!(impact.energy_change <= 1e-14 && impact.motor_work == 0.0);
     }
 }
 
-/// Case g: the hinge forces of the independent coordinates, as printed for the pinned form (HW2b, HW2d corrected, HW3a, HW3b of the course).  The
-/// force at B is the one on bar 2.
+/// Case g: the hinge forces of the independent coordinates, as printed for the pinned form (HW2b, HW2d
+/// corrected, HW3a, HW3b of the course).  The force at B is the one on bar 2.
 #[test]
 fn case_g_hinge_forces() {
-    assert_hinges(&double_pendulum(Inertia::Slender, [(FRAC_PI_2, 0.0), (FRAC_PI_2, 0.0)]), [-0.1690, 0.0, 0.0423, 0.0]);
+    assert_hinges(
+        &double_pendulum(Inertia::Slender, [(FRAC_PI_2, 0.0), (FRAC_PI_2, 0.0)]),
+        [-0.1690, 0.0, 0.0423, 0.0],
+    );
     assert_hinges(&double_pendulum(Inertia::Slender, [(0.0, PI), (0.0, PI)]), [-1.8973, 0.0, -1.1272, 0.0]);
     assert_hinges(&with_spring(Inertia::Slender), [-0.1056, 0.5915, -0.0845, 0.0]);
     assert_hinges(&motor(Inertia::Slender, -ONE_TURN), [-0.7394, -2.8567, -0.1479, -2.1425]);

@@ -1,4 +1,5 @@
-//! Radau IIA on stiff scenes: reference results, what stiffness costs, constraints, impacts, output times, and the same bits again.
+//! Radau IIA on stiff scenes: reference results, what stiffness costs, constraints, impacts, output times,
+//! and the same bits again.
 
 use crate::common;
 
@@ -9,7 +10,8 @@ use driftless::stepping::Cause;
 
 const RADAU: [MethodId; 2] = [MethodId::Radau(3), MethodId::Radau(5)];
 
-/// The pendulum on its spring with another stiffness \[times the source's\] and damping \[N·s/m\], from where the spring has its free length.
+/// The pendulum on its spring with another stiffness \[times the source's\] and damping \[N·s/m\], from where
+/// the spring has its free length.
 fn sprung(factor: f64, damping: f64) -> Scene {
     let mut scene = shipped("spring", &[]);
     (scene.springs[0].stiffness, scene.springs[0].damping) = (7.394_287_5 * factor, damping);
@@ -37,7 +39,9 @@ fn finished(scene: &Scene, request: &Request) -> Outcome {
 fn error(outcome: &Outcome, reference: [f64; 4]) -> f64 {
     let last = &outcome.last;
     let found = [last.phi[0], last.phi[1], last.omega[0], last.omega[1]];
-    found.iter().zip(reference).fold(0.0, |most: f64, (found, expected)| most.max((found - expected).abs() / expected.abs().max(1.0)))
+    found.iter().zip(reference).fold(0.0, |most: f64, (found, expected)| {
+        most.max((found - expected).abs() / expected.abs().max(1.0))
+    })
 }
 
 /// Ends at t = 1 s by quadruple-precision power series of another program.
@@ -46,19 +50,36 @@ fn damped_stiff_springs_and_stiff_dampers_end_where_they_should() {
     let mut overdamped = sprung(1.0, 1e4);
     overdamped.start[0].phi = std::f64::consts::FRAC_PI_2;
     let cases = [
-        ("1e4", sprung(1e4, 66.75), [1.95511613966919, -0.817363854844559, -0.000721351944509091, 5.78719418763749]),
-        ("1e8", sprung(1e8, 6675.0), [1.95519309352313, -0.816910259568464, -7.274967776876e-08, 5.78924947979239]),
+        (
+            "1e4",
+            sprung(1e4, 66.75),
+            [1.95511613966919, -0.817363854844559, -0.000721351944509091, 5.78719418763749],
+        ),
+        (
+            "1e8",
+            sprung(1e8, 6675.0),
+            [1.95519309352313, -0.816910259568464, -7.274967776876e-08, 5.78924947979239],
+        ),
         ("1e12", sprung(1e12, 667_500.0), [1.95519310129054, -0.816910213412392, 0.0, 5.78924968619113]),
-        ("overdamped", overdamped, [1.57025959897675, -0.816185285177676, -0.000803989894191429, 5.78831618540318]),
+        (
+            "overdamped",
+            overdamped,
+            [1.57025959897675, -0.816185285177676, -0.000803989894191429, 5.78831618540318],
+        ),
     ];
     for (name, scene, reference) in cases {
-        for (method, tolerance, bound) in [(RADAU[0], 1e-6, 2e-6), (RADAU[0], 1e-9, 1e-9), (RADAU[1], 1e-6, 2e-6), (RADAU[1], 1e-9, 1e-10)]
+        for (method, tolerance, bound) in
+            [(RADAU[0], 1e-6, 2e-6), (RADAU[0], 1e-9, 1e-9), (RADAU[1], 1e-6, 2e-6), (RADAU[1], 1e-9, 1e-10)]
         {
             let outcome = finished(&scene, &request(method, tolerance));
             let (error, statistics) = (error(&outcome, reference), outcome.statistics);
             println!("{name} {method} {tolerance:e}: {error:.1e}, {statistics:?}");
             assert!(error < bound, "{name} {method} {tolerance:e}: {error:e}");
-            assert!(outcome.drift.energy.max < 100.0 * tolerance, "{name} {method}: {:e}", outcome.drift.energy.max);
+            assert!(
+                outcome.drift.energy.max < 100.0 * tolerance,
+                "{name} {method}: {:e}",
+                outcome.drift.energy.max
+            );
         }
     }
 }
@@ -67,13 +88,17 @@ fn damped_stiff_springs_and_stiff_dampers_end_where_they_should() {
 #[test]
 fn nine_orders_of_stiffness_do_not_cost_twice_the_evaluations() {
     for method in RADAU {
-        let costs: Vec<u64> =
-            (3..=12).map(|power| finished(&damped(10f64.powi(power)), &request(method, 1e-6)).statistics.evaluations).collect();
+        let costs: Vec<u64> = (3..=12)
+            .map(|power| finished(&damped(10f64.powi(power)), &request(method, 1e-6)).statistics.evaluations)
+            .collect();
         println!("{method}: {costs:?}");
         assert!(costs.iter().all(|&cost| cost <= 2 * costs[0]), "{method}: {costs:?}");
     }
     let explicit = run(&damped(1e6), &request(MethodId::Dop853, 1e-6)).statistics.evaluations;
-    assert!(explicit > 10 * finished(&damped(1e6), &request(RADAU[0], 1e-6)).statistics.evaluations, "{explicit}");
+    assert!(
+        explicit > 10 * finished(&damped(1e6), &request(RADAU[0], 1e-6)).statistics.evaluations,
+        "{explicit}"
+    );
 }
 
 #[test]
@@ -92,20 +117,42 @@ fn a_spring_that_swings_is_followed_where_the_tolerance_asks_for_it_and_its_loss
 #[test]
 fn loops_motors_and_every_stabilization_agree_with_the_power_series() {
     for (name, until, kinds) in [
-        ("four_bar_motor", 0.5, &[Stabilization::Projection, Stabilization::None, Stabilization::Baumgarte][..]),
-        ("motor_sine", 1.0, &[Stabilization::Elimination, Stabilization::Projection, Stabilization::Baumgarte]),
+        (
+            "four_bar_motor",
+            0.5,
+            &[Stabilization::Projection, Stabilization::None, Stabilization::Baumgarte][..],
+        ),
+        (
+            "motor_sine",
+            1.0,
+            &[Stabilization::Elimination, Stabilization::Projection, Stabilization::Baumgarte],
+        ),
         ("cart_pole", 1.0, &[Stabilization::Projection]),
     ] {
         let scene = shipped(name, &[]);
-        let ask = |method, rtol, stabilize| Request { until: Some(until), every: Some(until), stabilize, ..request(method, rtol) };
+        let ask = |method, rtol, stabilize| Request {
+            until: Some(until),
+            every: Some(until),
+            stabilize,
+            ..request(method, rtol)
+        };
         let reference = finished(&scene, &ask(MethodId::Taylor, 1e-13, None));
         for method in RADAU {
             for &kind in kinds {
                 let outcome = finished(&scene, &ask(method, 1e-9, Some(kind)));
-                let apart = outcome.last.phi.iter().zip(&reference.last.phi).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+                let apart = outcome
+                    .last
+                    .phi
+                    .iter()
+                    .zip(&reference.last.phi)
+                    .fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
                 assert!(apart < 3e-7, "{name} {method} {kind}: {apart:e}");
                 if kind == Stabilization::Projection {
-                    let kept = outcome.drift.constraints.iter().all(|(_, levels)| levels[0].max < 1e-12 && levels[1].max < 1e-10);
+                    let kept = outcome
+                        .drift
+                        .constraints
+                        .iter()
+                        .all(|(_, levels)| levels[0].max < 1e-12 && levels[1].max < 1e-10);
                     assert!(kept, "{name} {method}: {:?}", outcome.drift.constraints);
                 }
             }
@@ -132,12 +179,21 @@ fn impacts_are_located_inside_its_steps() {
 fn looking_more_often_changes_nothing_of_the_motion() {
     for method in RADAU {
         let scene = damped(1e6);
-        let ends = [1.0, 0.01, 0.01].map(|every| finished(&scene, &Request { every: Some(every), ..request(method, 1e-7) }));
+        let ends = [1.0, 0.01, 0.01]
+            .map(|every| finished(&scene, &Request { every: Some(every), ..request(method, 1e-7) }));
         let [once, often, again] = &ends;
-        assert_eq!((&once.last.phi, &once.last.omega, once.statistics), (&often.last.phi, &often.last.omega, often.statistics), "{method}");
+        assert_eq!(
+            (&once.last.phi, &once.last.omega, once.statistics),
+            (&often.last.phi, &often.last.omega, often.statistics),
+            "{method}"
+        );
         assert_eq!((&often.last, &often.drift), (&again.last, &again.drift), "{method}");
         // In between the polynomial is as good as the tolerance.
-        let half = |every| finished(&scene, &Request { until: Some(0.5), every: Some(every), ..request(method, 1e-7) }).last.phi[1];
+        let half = |every| {
+            finished(&scene, &Request { until: Some(0.5), every: Some(every), ..request(method, 1e-7) })
+                .last
+                .phi[1]
+        };
         let middle = {
             let mut middle = f64::NAN;
             let ask = Request { every: Some(0.5), ..request(method, 1e-7) };

@@ -1,4 +1,5 @@
-//! Natural coordinates against the angle form, and what RATTLE promises: order, constraints, energy, time symmetry, restart.
+//! Natural coordinates against the angle form, and what RATTLE promises: order, constraints, energy, time
+//! symmetry, restart.
 
 use crate::common;
 
@@ -15,7 +16,8 @@ use driftless::stepping::{Cause, Integrator, Reached, Seen, Statistics, StepErro
 use proptest::prelude::*;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-// ---------------------------------------------------------------------------------------------------------------- scenes
+// ----------------------------------------------------------------------------------------------------------------
+// scenes
 
 fn gentle() -> Scene {
     double_pendulum(Inertia::Full, [(0.2, 0.0), (-0.1, 0.0)])
@@ -56,7 +58,9 @@ fn chain() -> Scene {
     let mut scene = free();
     let point = |k: usize| if k == 0 { place(None, [0.0, 0.0]) } else { place(Some(k - 1), [0.5, 0.0]) };
     scene.bars = (0..8).map(|k| bar(k, 0.1, [0.25, 0.0], 0.1 * 0.25 / 12.0)).collect();
-    scene.hinges = (0..8).map(|k| Hinge { name: format!("h{k}"), between: [point(k), place(Some(k), [0.0, 0.0])] }).collect();
+    scene.hinges = (0..8)
+        .map(|k| Hinge { name: format!("h{k}"), between: [point(k), place(Some(k), [0.0, 0.0])] })
+        .collect();
     scene.start = (0..8).map(|k| Start { phi: 0.1 * k as f64, omega: 0.0 }).collect();
     scene
 }
@@ -64,14 +68,25 @@ fn chain() -> Scene {
 /// A trunk with two arms, hinges and centres of mass off the bars' axes, and a spring between the arms.
 fn branch() -> Scene {
     let mut scene = free();
-    scene.bars = vec![bar(0, 0.3, [0.2, 0.05], 0.01), bar(1, 0.1, [0.15, -0.04], 0.002), bar(2, 0.2, [0.25, 0.03], 0.004)];
+    scene.bars = vec![
+        bar(0, 0.3, [0.2, 0.05], 0.01),
+        bar(1, 0.1, [0.15, -0.04], 0.002),
+        bar(2, 0.2, [0.25, 0.03], 0.004),
+    ];
     scene.hinges = vec![
         Hinge { name: "root".into(), between: [place(None, [0.1, 0.2]), place(Some(0), [0.0, 0.02])] },
         Hinge { name: "left".into(), between: [place(Some(0), [0.5, 0.1]), place(Some(1), [0.0, 0.0])] },
         Hinge { name: "right".into(), between: [place(Some(0), [0.4, -0.1]), place(Some(2), [0.02, 0.0])] },
     ];
-    scene.springs = vec![driftless::scene::Spring { between: [place(Some(1), [0.4, 0.0]), place(Some(2), [0.3, 0.0])], ..spring(0.0) }];
-    scene.start = vec![Start { phi: 0.4, omega: 1.0 }, Start { phi: 0.9, omega: 0.0 }, Start { phi: -0.5, omega: -2.0 }];
+    scene.springs = vec![driftless::scene::Spring {
+        between: [place(Some(1), [0.4, 0.0]), place(Some(2), [0.3, 0.0])],
+        ..spring(0.0)
+    }];
+    scene.start = vec![
+        Start { phi: 0.4, omega: 1.0 },
+        Start { phi: 0.9, omega: 0.0 },
+        Start { phi: -0.5, omega: -2.0 },
+    ];
     scene
 }
 
@@ -80,11 +95,13 @@ fn start_with_motors(scene: &mut Scene) {
     for motor in scene.motors.clone() {
         let base = motor.relative_to.map_or(Start { phi: 0.0, omega: 0.0 }, |base| scene.start[base]);
         let rate = motor.law.at::<DoubleDouble>(Time::default()).rate.hi;
-        scene.start[motor.bar] = Start { phi: base.phi + motor.law.angle(Time::default()).hi, omega: base.omega + rate };
+        scene.start[motor.bar] =
+            Start { phi: base.phi + motor.law.angle(Time::default()).hi, omega: base.omega + rate };
     }
 }
 
-// --------------------------------------------------------------------------------------------------------------- helpers
+// ---------------------------------------------------------------------------------------------------------------
+// helpers
 
 /// A scene on its way.
 struct Run {
@@ -101,11 +118,23 @@ impl Run {
         let natural = Natural::new(mechanism.clone()).expect("a scene with a natural form");
         let state = natural.state(&mechanism.start(scene));
         let kernel = Kernel::without_rows(&mechanism);
-        Self { natural, method: Rattle::new(composition, step), state, statistics: Statistics::default(), kernel }
+        Self {
+            natural,
+            method: Rattle::new(composition, step),
+            state,
+            statistics: Statistics::default(),
+            kernel,
+        }
     }
 
     fn to(&mut self, until: f64) -> Result<Reached, StepError> {
-        self.method.advance(&mut self.natural, &mut self.state, Time::from(until), &mut self.statistics, &mut |_, _| Ok(Seen::Kept))
+        self.method.advance(
+            &mut self.natural,
+            &mut self.state,
+            Time::from(until),
+            &mut self.statistics,
+            &mut |_, _| Ok(Seen::Kept),
+        )
     }
 
     fn motion(&mut self) -> Motion {
@@ -159,23 +188,29 @@ fn runge_kutta(scene: &Scene, until: f64, steps: u32) -> Motion {
     motion
 }
 
-/// Slope of log error over log step, by least squares; errors below `floor` are dropped, at least three must be left.
+/// Slope of log error over log step, by least squares; errors below `floor` are dropped, at least three must
+/// be left.
 fn fitted_order(points: &[(f64, f64)], floor: f64) -> f64 {
-    let kept: Vec<(f64, f64)> = points.iter().filter(|(_, error)| *error > floor).map(|&(h, error)| (h.ln(), error.ln())).collect();
+    let kept: Vec<(f64, f64)> =
+        points.iter().filter(|(_, error)| *error > floor).map(|&(h, error)| (h.ln(), error.ln())).collect();
     assert!(kept.len() >= 3, "too few points above the floor: {points:?}");
     let mean = |of: fn(&(f64, f64)) -> f64| kept.iter().map(of).sum::<f64>() / kept.len() as f64;
     let (x, y) = (mean(|p| p.0), mean(|p| p.1));
-    kept.iter().map(|p| (p.0 - x) * (p.1 - y)).sum::<f64>() / kept.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>()
+    kept.iter().map(|p| (p.0 - x) * (p.1 - y)).sum::<f64>()
+        / kept.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>()
 }
 
-// ------------------------------------------------------------------------------------------------------------- equations
+// -------------------------------------------------------------------------------------------------------------
+// equations
 
 /// Numbers in [0, 1) for one random tree.
 fn random_tree(n: usize, mut next: impl FnMut() -> f64) -> (Scene, Time) {
     let mut scene = free();
     let gravity = TAU * next();
     scene.gravity = [9.81 * gravity.cos(), 9.81 * gravity.sin()];
-    scene.bars = (0..n).map(|k| bar(k, 0.2 + next(), [0.5 * next(), 0.4 * next() - 0.2], 0.01 + 0.05 * next())).collect();
+    scene.bars = (0..n)
+        .map(|k| bar(k, 0.2 + next(), [0.5 * next(), 0.4 * next() - 0.2], 0.01 + 0.05 * next()))
+        .collect();
     scene.hinges = (0..n)
         .map(|k| {
             let inner = (next() * (k + 1) as f64) as usize;
@@ -251,7 +286,12 @@ fn a_motion_survives_the_way_into_natural_coordinates_and_back() {
         let mut motion = Motion::default();
         natural.read(&natural.state(&start), &mut motion);
         assert_eq!(motion.unwrapped(0), phi);
-        assert!((motion.phi[0] + DoubleDouble::TAU.scale_by(motion.turns[0] - start.turns[0]) - start.phi[0]).hi.abs() < 1e-30);
+        assert!(
+            (motion.phi[0] + DoubleDouble::TAU.scale_by(motion.turns[0] - start.turns[0]) - start.phi[0])
+                .hi
+                .abs()
+                < 1e-30
+        );
         assert!((motion.omega[0] - start.omega[0]).hi.abs() < 1e-29);
     }
 }
@@ -273,10 +313,18 @@ fn scenes_without_a_natural_form_are_refused_by_name() {
     damped.springs.push(spring(0.1));
     assert_eq!(refused(&damped), NaturalError::Damped("spring".into()));
     let mut walled = free();
-    let wall = Wall { name: "wall".into(), bar: 1, point: [0.6, 0.0], through: [0.0, 0.0], normal: [1.0, 0.0], restitution: 0.5 };
+    let wall = Wall {
+        name: "wall".into(),
+        bar: 1,
+        point: [0.6, 0.0],
+        through: [0.0, 0.0],
+        normal: [1.0, 0.0],
+        restitution: 0.5,
+    };
     walled.walls.push(wall);
     assert_eq!(refused(&walled), NaturalError::Wall("wall".into()));
-    // The first bar has no inertia at all: a point mass in its hinge.  In angles the second one's mass still gives it some.
+    // The first bar has no inertia at all: a point mass in its hinge.  In angles the second one's mass still
+    // gives it some.
     let mut thin = free();
     thin.bars[0] = bar(0, 0.1, [0.0, 0.0], 0.0);
     thin.bars[1].inertia = 0.0;
@@ -284,16 +332,20 @@ fn scenes_without_a_natural_form_are_refused_by_name() {
     assert_eq!(refused(&thin), NaturalError::Singular("bar2".into()));
 }
 
-// ----------------------------------------------------------------------------------------------------------------- order
+// -----------------------------------------------------------------------------------------------------------------
+// order
 
 /// `smooth` coarsens the steps of order 8, whose error would be rounding otherwise.
 fn assert_orders(scene: &Scene, until: f64, smooth: f64) {
     let mut reference = Run::new(scene, Composition::KahanLi17, 1.0 / 1024.0);
     reference.to(until).unwrap();
     let reference = reference.motion();
-    for (composition, coarsest) in
-        [(Composition::Single, 64.0), (Composition::Suzuki5, 32.0), (Composition::KahanLi9, 24.0), (Composition::KahanLi17, 32.0 / smooth)]
-    {
+    for (composition, coarsest) in [
+        (Composition::Single, 64.0),
+        (Composition::Suzuki5, 32.0),
+        (Composition::KahanLi9, 24.0),
+        (Composition::KahanLi17, 32.0 / smooth),
+    ] {
         let points: Vec<(f64, f64)> = [1.0, 1.5, 2.0, 3.0, 4.0]
             .iter()
             .map(|finer| {
@@ -305,7 +357,10 @@ fn assert_orders(scene: &Scene, until: f64, smooth: f64) {
             })
             .collect();
         let order = fitted_order(&points, 1e-13);
-        assert!((order - f64::from(composition.order())).abs() < 0.35, "{composition:?} measured {order}: {points:?}");
+        assert!(
+            (order - f64::from(composition.order())).abs() < 0.35,
+            "{composition:?} measured {order}: {points:?}"
+        );
     }
 }
 
@@ -339,13 +394,19 @@ fn the_solution_is_that_of_a_method_with_nothing_in_common() {
         let (found, other) = (run.motion(), runge_kutta(&scene, 1.0, 10_000));
         assert!(distance(&found, &other) < 2e-11, "{name}: {:e}", distance(&found, &other));
         assert_eq!(found.turns, other.turns);
-        assert!((found.work - other.work).hi.abs() < 2e-11, "{name}: work {:e}", (found.work - other.work).hi);
+        assert!(
+            (found.work - other.work).hi.abs() < 2e-11,
+            "{name}: work {:e}",
+            (found.work - other.work).hi
+        );
     }
 }
 
-// ---------------------------------------------------------------------------------------------------------- long horizon
+// ----------------------------------------------------------------------------------------------------------
+// long horizon
 
-/// Largest excursion of the balance in each tenth of the run, and its mean there; the constraints are checked all along.
+/// Largest excursion of the balance in each tenth of the run, and its mean there; the constraints are checked
+/// all along.
 fn tenths(scene: &Scene, composition: Composition, step: f64, until: f64) -> ([f64; 10], [f64; 10]) {
     let mut run = Run::new(scene, composition, step);
     let start = run.balance();
@@ -367,8 +428,8 @@ fn tenths(scene: &Scene, composition: Composition, step: f64, until: f64) -> ([f
 /// What rounding alone may wander over such a run \[J\]: a walk of 1e-17 a step over 1e4 steps.
 const WALK: f64 = 1e-15;
 
-/// Bound on the excursion, and no climb: the balance oscillates about the same value in both halves, with excursions of one size within
-/// what the whirls of a chaotic scene make of it.
+/// Bound on the excursion, and no climb: the balance oscillates about the same value in both halves, with
+/// excursions of one size within what the whirls of a chaotic scene make of it.
 fn assert_no_drift(name: &str, scene: &Scene, composition: Composition, step: f64, until: f64, bound: f64) {
     let (largest, mean) = tenths(scene, composition, step, until);
     assert!(largest.iter().all(|&largest| largest < bound), "{name} {composition:?}: {largest:?}");
@@ -388,8 +449,8 @@ fn energy_of_the_gentle_scene_does_not_drift() {
     assert_no_drift("gentle", &gentle(), Composition::KahanLi17, 1.0 / 128.0, 400.0, 5e-16);
 }
 
-/// A constant part of 1e-16 in anything a step does shows here as a slope: 6e-19 a second was seen while position and velocity were moved
-/// by changes rounded separately.
+/// A constant part of 1e-16 in anything a step does shows here as a slope: 6e-19 a second was seen while
+/// position and velocity were moved by changes rounded separately.
 #[test]
 fn energy_of_the_gentle_scene_has_no_slope_far_below_rounding() {
     let (_, mean) = tenths(&gentle(), Composition::KahanLi17, 1.0 / 128.0, 1000.0);
@@ -401,10 +462,16 @@ fn energy_of_the_gentle_scene_has_no_slope_far_below_rounding() {
 fn energy_less_work_of_driven_scenes_does_not_drift() {
     // Without the growing drive, which spins the scene up: its energy error grows with its energy.
     let mut steady = relative_motor();
-    steady.motors[0].law =
-        Law { start: 0.4, rate: 0.0, acceleration: 0.0, sines: vec![Sine { amplitude: 0.3, frequency: 1.3, phase: 0.2 }] };
+    steady.motors[0].law = Law {
+        start: 0.4,
+        rate: 0.0,
+        acceleration: 0.0,
+        sines: vec![Sine { amplitude: 0.3, frequency: 1.3, phase: 0.2 }],
+    };
     start_with_motors(&mut steady);
-    for (name, scene) in [("motor", motor(Inertia::Slender, ONE_TURN)), ("motor_sine", motor_sine()), ("relative", steady)] {
+    for (name, scene) in
+        [("motor", motor(Inertia::Slender, ONE_TURN)), ("motor_sine", motor_sine()), ("relative", steady)]
+    {
         assert_no_drift(name, &scene, Composition::Single, 1.0 / 256.0, 200.0, 2e-2);
         assert_no_drift(name, &scene, Composition::Suzuki5, 1.0 / 256.0, 200.0, 2e-5);
         assert_no_drift(name, &scene, Composition::KahanLi9, 1.0 / 256.0, 100.0, 2e-7);
@@ -429,7 +496,8 @@ fn a_motor_is_followed_to_the_last_bit_and_its_turns_counted() {
     }
 }
 
-// ------------------------------------------------------------------------------------------------- symmetry and restart
+// ------------------------------------------------------------------------------------------------- symmetry
+// and restart
 
 #[test]
 fn a_run_back_in_time_arrives_at_the_start() {
@@ -463,7 +531,8 @@ fn a_restart_gives_the_same_bits() {
     }
 }
 
-// -------------------------------------------------------------------------------------------------------------- extremes
+// --------------------------------------------------------------------------------------------------------------
+// extremes
 
 #[test]
 fn a_step_far_too_large_is_a_typed_stop_at_the_last_good_state() {
@@ -492,11 +561,17 @@ fn not_a_number_is_named() {
     let mut scene = free();
     // Both ends in one place at the start: the spring has no direction.
     scene.start[0].phi = 0.0;
-    scene.springs.push(driftless::scene::Spring { between: [place(None, [0.3, 0.0]), place(Some(0), [0.3, 0.0])], ..spring(0.0) });
+    scene.springs.push(driftless::scene::Spring {
+        between: [place(None, [0.3, 0.0]), place(Some(0), [0.3, 0.0])],
+        ..spring(0.0)
+    });
     let error = Run::new(&scene, Composition::Single, 0.01).to(1.0).expect_err("no direction");
     assert_eq!((error.cause, error.t), (Cause::NotFinite, 0.0), "{error}");
     for step in [0.0, f64::NAN, f64::INFINITY] {
-        assert_eq!(Run::new(&free(), Composition::Suzuki5, step).to(1.0).expect_err("no step").cause, Cause::StepTooSmall);
+        assert_eq!(
+            Run::new(&free(), Composition::Suzuki5, step).to(1.0).expect_err("no step").cause,
+            Cause::StepTooSmall
+        );
     }
 }
 

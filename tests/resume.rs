@@ -1,4 +1,5 @@
-//! A run that is taken down and goes on elsewhere comes out as if nothing had been: bit for bit, wherever it paused and how often.
+//! A run that is taken down and goes on elsewhere comes out as if nothing had been: bit for bit, wherever it
+//! paused and how often.
 
 use crate::common;
 #[cfg(feature = "cli")]
@@ -7,7 +8,9 @@ use crate::program;
 use common::shipped;
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::{Form, Mechanism};
-use driftless::run::{Limits, METHODS, MethodId, Outcome, Plan, Request, Run, Running, Sample, Snapshot, Stabilization};
+use driftless::run::{
+    Limits, METHODS, MethodId, Outcome, Plan, Request, Run, Running, Sample, Snapshot, Stabilization,
+};
 use driftless::scene::Scene;
 use driftless::stepping::composition::Composition::Single;
 use driftless::stepping::{Cause, Dp8, Integrator, Reached, Seen, Statistics, Taylor, Tolerance};
@@ -18,7 +21,8 @@ use std::time::Duration;
 fn begun(scene: &Scene, request: &Request) -> Result<Running, String> {
     let mechanism = Arc::new(Mechanism::new(scene).map_err(|error| error.to_string())?);
     let plan = Plan::new(scene, &mechanism, request).map_err(|refusal| refusal.to_string())?;
-    let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &mechanism.start(scene)).map_err(|stop| stop.to_string())?;
+    let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &mechanism.start(scene))
+        .map_err(|stop| stop.to_string())?;
     Ok(Running::new(run))
 }
 
@@ -82,7 +86,14 @@ fn check(scene: &Scene, request: &Request) -> bool {
 
 fn request(method: MethodId, stabilize: Option<Stabilization>) -> Request {
     let (until, every) = (Some(1.0), Some(0.25));
-    Request { method: Some(method), stabilize, until, every, rtol: method.is_adaptive().then_some(1e-8), ..Request::default() }
+    Request {
+        method: Some(method),
+        stabilize,
+        until,
+        every,
+        rtol: method.is_adaptive().then_some(1e-8),
+        ..Request::default()
+    }
 }
 
 #[test]
@@ -147,7 +158,8 @@ fn so_do_impacts_and_points_that_stay_on_their_walls() {
 fn so_do_the_first_orders_in_double_double() {
     for name in ["free", "spring", "motor_sine"] {
         for stabilize in [None, Some(Stabilization::Projection)] {
-            let request = Request { extended: true, rtol: Some(1e-20), ..request(MethodId::Taylor, stabilize) };
+            let request =
+                Request { extended: true, rtol: Some(1e-20), ..request(MethodId::Taylor, stabilize) };
             let has_rows = name == "motor_sine";
             assert!(check(&shipped(name, &[]), &request) || (stabilize.is_some() && !has_rows), "{name}");
         }
@@ -224,7 +236,8 @@ fn the_horizon_can_be_put_off() {
     }
 }
 
-/// Whatever bytes a snapshot is made of, it is refused or integrated; nothing panics, and nothing takes for ever.
+/// Whatever bytes a snapshot is made of, it is refused or integrated; nothing panics, and nothing takes for
+/// ever.
 mod bytes {
     use super::*;
     use proptest::prelude::*;
@@ -233,8 +246,12 @@ mod bytes {
     type Sound = (Scene, Arc<Mechanism>, Vec<u8>);
 
     static SOUND: LazyLock<Vec<Sound>> = LazyLock::new(|| {
-        let methods =
-            [("free", MethodId::Dp8), ("free", MethodId::Taylor), ("wall", MethodId::Dp5), ("motor_sine", MethodId::Rattle(Single))];
+        let methods = [
+            ("free", MethodId::Dp8),
+            ("free", MethodId::Taylor),
+            ("wall", MethodId::Dp5),
+            ("motor_sine", MethodId::Rattle(Single)),
+        ];
         let of = |&(name, method): &(&str, MethodId)| {
             let scene = shipped(name, &[]);
             let mut running = begun(&scene, &request(method, None)).expect("a run");
@@ -285,7 +302,8 @@ mod command {
     use std::time::Duration;
 
     /// A run of about a second, twenty thousand rows.
-    const RUN: &str = "run free.json --method taylor --until 2e4 --every 1 --no-charts --checkpoint-every 0.01";
+    const RUN: &str =
+        "run free.json --method taylor --until 2e4 --every 1 --no-charts --checkpoint-every 0.01";
     const FOLDER: &str = "output/free/taylor-1e-9";
 
     fn started(program: &Program, arguments: &str) -> Child {
@@ -303,7 +321,9 @@ mod command {
     }
 
     fn signal(child: &Child, signal: &str) {
-        assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().expect("kill").success());
+        assert!(
+            Command::new("kill").args([signal, &child.id().to_string()]).status().expect("kill").success()
+        );
     }
 
     fn ended(child: Child) -> Ran {
@@ -314,7 +334,8 @@ mod command {
 
     /// Table and record of a finished run, timings left out.
     fn results(program: &Program, folder: &str, table: &str, record: &str) -> (String, Value) {
-        let mut record: Value = serde_json::from_str(&program.read(&format!("{folder}/{record}"))).expect("JSON");
+        let mut record: Value =
+            serde_json::from_str(&program.read(&format!("{folder}/{record}"))).expect("JSON");
         record.as_object_mut().expect("an object").remove("timings");
         (program.read(&format!("{folder}/{table}")), record)
     }
@@ -326,7 +347,10 @@ mod command {
     fn uninterrupted() -> (String, Value) {
         let program = Program::with_scenes(&["free"]);
         program.run(&format!("{RUN} -q")).exits(0);
-        assert_eq!(program.files(), ["free.json".to_owned(), format!("{FOLDER}/run.json"), format!("{FOLDER}/trajectory.csv")]);
+        assert_eq!(
+            program.files(),
+            ["free.json".to_owned(), format!("{FOLDER}/run.json"), format!("{FOLDER}/trajectory.csv")]
+        );
         run_results(&program)
     }
 
@@ -345,7 +369,8 @@ mod command {
     #[test]
     fn asked_to_end_it_writes_a_checkpoint_and_goes_on_when_resumed() {
         let program = interrupted();
-        let files = ["checkpoint", "checkpoint.previous", ".unfinished-trajectory.csv"].map(|name| format!("{FOLDER}/{name}"));
+        let files = ["checkpoint", "checkpoint.previous", ".unfinished-trajectory.csv"]
+            .map(|name| format!("{FOLDER}/{name}"));
         assert!(files.iter().all(|file| program.path(file).exists()), "{:?}", program.files());
         // Nothing but the folder is needed; a run into it is refused.
         program.run(&format!("{RUN} -q")).exits(6).says(&["interrupted run", "--force"]);
@@ -403,7 +428,8 @@ mod command {
     #[test]
     fn of_several_interrupted_ones_all_are_named() {
         const LONG: &str = "run free.json --method taylor --until 2e4 --every 1 --no-charts";
-        const SWEEP: &str = "sweep free.json --vary bar1.phi=-pi..pi:60 --vary bar2.phi=-pi..pi:60 --until 100 --no-charts";
+        const SWEEP: &str =
+            "sweep free.json --vary bar1.phi=-pi..pi:60 --vary bar2.phi=-pi..pi:60 --until 100 --no-charts";
         let program = Program::with_scenes(&["free"]);
         let sweep = "free/sweep-start.bar1.phi-start.bar2.phi-taylor-1e-9";
         killed_at_once(&program, LONG, "out/a", "free/taylor-1e-9");
@@ -487,7 +513,8 @@ mod command {
     fn a_full_disk_ends_it_and_room_lets_it_go_on() {
         let program = Program::with_scenes(&["free"]);
         // Files may have 4 MiB, which is less than the trajectory's.
-        let limited = format!("trap '' XFSZ; ulimit -f 4096; exec {} {RUN} -q", env!("CARGO_BIN_EXE_driftless"));
+        let limited =
+            format!("trap '' XFSZ; ulimit -f 4096; exec {} {RUN} -q", env!("CARGO_BIN_EXE_driftless"));
         let folder = program.path("");
         let output = Command::new("bash").args(["-c", &limited]).current_dir(&folder).output().expect("bash");
         let text = String::from_utf8(output.stderr).expect("UTF-8");
@@ -512,7 +539,10 @@ mod command {
         const SWEEP: &str = "sweep free.json --vary bar1.phi=-pi..pi:60 --vary bar2.phi=-pi..pi:60 --until 100 --checkpoint-every 0.01";
         const PLACE: &str = "output/free/sweep-start.bar1.phi-start.bar2.phi-taylor-1e-9";
         let of_sweep = |program: &Program| {
-            (results(program, PLACE, "sweep.csv", "sweep.json"), std::fs::read(program.path(&format!("{PLACE}/map.png"))).ok())
+            (
+                results(program, PLACE, "sweep.csv", "sweep.json"),
+                std::fs::read(program.path(&format!("{PLACE}/map.png"))).ok(),
+            )
         };
         let program = Program::with_scenes(&["free"]);
         let mut child = started(&program, SWEEP);

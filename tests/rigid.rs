@@ -1,4 +1,5 @@
-//! Very stiff springs taken for rods, with what their vibration does on average, against the vibration resolved.
+//! Very stiff springs taken for rods, with what their vibration does on average, against the vibration
+//! resolved.
 
 use crate::common;
 
@@ -9,7 +10,8 @@ use driftless::run::{Limits, MethodId, Plan, Request, Run, simulate};
 use driftless::scene::{Given, Scene, Spring, Start};
 use std::sync::Arc;
 
-/// The double pendulum on a spring so many times stiffer than the source's, whose length starts off by what gives it `energy` \[J\].
+/// The double pendulum on a spring so many times stiffer than the source's, whose length starts off by what
+/// gives it `energy` \[J\].
 fn scene(factor: f64, energy: f64, rigid: bool) -> Scene {
     let mut scene = common::free();
     let soft = spring(0.0);
@@ -23,7 +25,13 @@ fn scene(factor: f64, energy: f64, rigid: bool) -> Scene {
 }
 
 fn request(method: MethodId, tolerance: f64) -> Request {
-    Request { method: Some(method), rtol: Some(tolerance), until: Some(2.0), every: Some(0.02), ..Request::default() }
+    Request {
+        method: Some(method),
+        rtol: Some(tolerance),
+        until: Some(2.0),
+        every: Some(0.02),
+        ..Request::default()
+    }
 }
 
 /// Angles of the second bar.
@@ -63,16 +71,19 @@ fn a_spring_that_does_not_vibrate_is_a_rod_to_its_stretch() {
     // Then every method takes it.
     let rod = scene(1e6, 0.0, true);
     let end = |method| {
-        let request = Request { method: Some(method), until: Some(1.0), every: Some(0.01), ..Request::default() };
+        let request =
+            Request { method: Some(method), until: Some(1.0), every: Some(0.01), ..Request::default() };
         *path(&rod, &request).last().expect("a sample")
     };
     let expected = end(MethodId::Taylor);
-    for method in [MethodId::Dp8, MethodId::Dop853, MethodId::Gauss(8), "rattle8".parse().expect("a method")] {
+    for method in [MethodId::Dp8, MethodId::Dop853, MethodId::Gauss(8), "rattle8".parse().expect("a method")]
+    {
         assert!((end(method) - expected).abs() < 1e-7, "{method}: {:e}", end(method) - expected);
     }
 }
 
-/// Two bars in the plane without gravity, tied by a spring between their ends that starts with `energy` \[J\] of stretch and lengthens at `rate` \[m/s\].
+/// Two bars in the plane without gravity, tied by a spring between their ends that starts with `energy` \[J\]
+/// of stretch and lengthens at `rate` \[m/s\].
 fn floating(stiffness: f64, energy: f64, rate: f64, model: &str) -> Scene {
     let unit = |angle: f64| [libm::cos(angle), libm::sin(angle)];
     let (b, c, along) = (unit(0.8), unit(2.0), unit(0.3));
@@ -115,7 +126,8 @@ fn free_bodies_feel_the_mean_force_of_their_spring() {
         elastic.iter().zip(&rigid).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     };
     let errors = [1e6, 1e7, 1e8].map(error);
-    // A rod alone, or one whose start keeps the rate along the spring, is tenths of a radian off at every stiffness.
+    // A rod alone, or one whose start keeps the rate along the spring, is tenths of a radian off at every
+    // stiffness.
     assert!(errors[0] < 1e-2 && errors[2] < 1e-3, "{errors:?}");
     let falls = [errors[0] / errors[1], errors[1] / errors[2]];
     assert!(falls.iter().all(|fall| (2.0..5.0).contains(fall)), "as 1/sqrt(k), by 3.2 each: {errors:?}");
@@ -154,12 +166,19 @@ fn the_model_is_no_better_than_it_says() {
         let scene = floating(stiffness, energy, rate, "rigid");
         let mechanism = Arc::new(Mechanism::new(&scene).expect("a mechanism"));
         let start = mechanism.start(&scene);
-        let plan = Plan::new(&scene, &mechanism, &Request { method: Some(MethodId::Dp8), ..Request::default() }).expect("a plan");
+        let plan =
+            Plan::new(&scene, &mechanism, &Request { method: Some(MethodId::Dp8), ..Request::default() })
+                .expect("a plan");
         let said = plan.model_error.expect("an error of the model");
         assert!(plan.notes.iter().any(|note| note.contains("are a model")), "{:?}", plan.notes);
-        let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a run").trusted(Level::Auto, &start);
-        let trust = driftless::run::integrate(run, &mut |_| Ok(())).expect("an outcome").trust.expect("asked for");
-        assert!(trust.model_error == Some(said) && trust.error_estimate.is_none_or(|estimate| estimate >= said), "{trust:?}");
+        let run =
+            Run::new(mechanism, plan, Limits::default(), &start).expect("a run").trusted(Level::Auto, &start);
+        let trust =
+            driftless::run::integrate(run, &mut |_| Ok(())).expect("an outcome").trust.expect("asked for");
+        assert!(
+            trust.model_error == Some(said) && trust.error_estimate.is_none_or(|estimate| estimate >= said),
+            "{trust:?}"
+        );
         let elastic = whole_path(&floating(stiffness, energy, rate, "elastic"), MethodId::Taylor, 1e-11);
         let rigid = whole_path(&scene, MethodId::Dp8, 1e-9);
         let error = elastic.iter().zip(&rigid).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -169,7 +188,8 @@ fn the_model_is_no_better_than_it_says() {
 
 #[test]
 fn the_energy_with_its_potential_is_kept() {
-    let outcome = simulate(&scene(1e6, 0.35, true), &request(MethodId::Dp8, 1e-12), &mut |_| Ok(())).expect("a run");
+    let outcome =
+        simulate(&scene(1e6, 0.35, true), &request(MethodId::Dp8, 1e-12), &mut |_| Ok(())).expect("a run");
     // Measured 5.4e-12 with steps as long as the tolerance allows.
     assert!(outcome.drift.energy.max < 2e-11, "{:e}", outcome.drift.energy.max);
     assert!(outcome.plan.notes.iter().any(|note| note.contains("of vibration")), "{:?}", outcome.plan.notes);
@@ -183,7 +203,8 @@ fn the_energy_with_its_potential_is_kept() {
 fn what_the_mean_force_is_not_known_for_is_refused() {
     let refusal = |scene: &Scene, method| {
         let mechanism = Mechanism::new(scene).map_err(|error| error.to_string())?;
-        Plan::new(scene, &mechanism, &Request { method, ..Request::default() }).map_err(|refusal| refusal.to_string())
+        Plan::new(scene, &mechanism, &Request { method, ..Request::default() })
+            .map_err(|refusal| refusal.to_string())
     };
     let fast = scene(1e6, 0.35, true);
     assert!(refusal(&fast, None).is_ok());
@@ -195,7 +216,13 @@ fn what_the_mean_force_is_not_known_for_is_refused() {
     assert!(soft.contains("not 100 times as fast"), "{soft}");
     // A damper elsewhere takes the vibration's energy away, too.
     let mut damped = scene(1e6, 0.35, true);
-    damped.springs.push(Spring { name: "damper".into(), rigid: false, damping: 0.1, stiffness: 1.0, ..damped.springs[0].clone() });
+    damped.springs.push(Spring {
+        name: "damper".into(),
+        rigid: false,
+        damping: 0.1,
+        stiffness: 1.0,
+        ..damped.springs[0].clone()
+    });
     let text = refusal(&damped, None).expect_err("a refusal");
     assert!(text.contains("wall or damper"), "{text}");
     let mut two = scene(1e6, 0.35, true);
@@ -211,7 +238,9 @@ fn a_damped_or_slack_spring_is_no_rod() {
     let text = include_str!("../examples/scenes/spring.json");
     let rigid = |fields: &str| {
         let text = text.replace("\"damping\": 0", fields);
-        driftless::scene::parse_scene(&text, "spring.json", &[]).map(|scene| scene.springs[0].rigid).map_err(|error| error.to_string())
+        driftless::scene::parse_scene(&text, "spring.json", &[])
+            .map(|scene| scene.springs[0].rigid)
+            .map_err(|error| error.to_string())
     };
     assert_eq!(rigid("\"model\": \"rigid\""), Ok(true));
     assert_eq!(rigid("\"model\": \"elastic\", \"damping\": 1"), Ok(false));

@@ -1,5 +1,5 @@
-//! A mechanism with all masses, lengths or times multiplied by a number is the same mechanism in other units: every method does the same with it, or refuses
-//! and stops at the same place for the same reason.
+//! A mechanism with all masses, lengths or times multiplied by a number is the same mechanism in other units:
+//! every method does the same with it, or refuses and stops at the same place for the same reason.
 
 #[allow(dead_code)]
 use crate::scaled;
@@ -32,7 +32,11 @@ fn run(scene: &Scene, request: &Request, by: Scale) -> Run {
     let (bars, mut rows, mut energy) = (scene.bars.len(), Vec::new(), Vec::new());
     let result = simulate(&scene, &request, &mut |sample| {
         let at = |(k, x): (usize, &f64)| if k < bars { *x } else { x / by.length };
-        let rates = sample.omega.iter().enumerate().map(|(k, x)| x * by.time / if k < bars { 1.0 } else { by.length });
+        let rates = sample
+            .omega
+            .iter()
+            .enumerate()
+            .map(|(k, x)| x * by.time / if k < bars { 1.0 } else { by.length });
         rows.push((sample.t / by.time, sample.phi.iter().enumerate().map(at).chain(rates).collect()));
         energy.extend([sample.kinetic, sample.work].map(|x| x / by.energy()));
         Ok(())
@@ -51,7 +55,8 @@ fn run(scene: &Scene, request: &Request, by: Scale) -> Run {
     }
 }
 
-/// What tells two runs apart, if anything: `close` for the motion (relative to 1 rad, the rates and the energy), `share` for the number of steps.
+/// What tells two runs apart, if anything: `close` for the motion (relative to 1 rad, the rates and the
+/// energy), `share` for the number of steps.
 fn difference(name: &str, one: &Run, other: &Run, close: f64, share: f64) -> Option<String> {
     if one.end != other.end {
         return Some(format!("`{}` and `{}`", one.end, other.end));
@@ -67,7 +72,10 @@ fn difference(name: &str, one: &Run, other: &Run, close: f64, share: f64) -> Opt
         let apart = row.iter().zip(beside).fold(0.0, |far: f64, (a, b)| far.max((a - b).abs()));
         let is_close = apart <= close * most(row);
         if !is_close {
-            return Some(format!("{apart:.1e} apart at t = {t:.4} s, {} and {} steps", one.steps, other.steps));
+            return Some(format!(
+                "{apart:.1e} apart at t = {t:.4} s, {} and {} steps",
+                one.steps, other.steps
+            ));
         }
     }
     let scale = one.energy.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
@@ -85,22 +93,36 @@ fn difference(name: &str, one: &Run, other: &Run, close: f64, share: f64) -> Opt
 /// Masses, lengths and times multiplied, each by itself.
 fn each(factors: &[f64]) -> Vec<Scale> {
     let one = Scale::ONE;
-    let by = |&factor: &f64| [Scale { mass: factor, ..one }, Scale { length: factor, ..one }, Scale { time: factor, ..one }];
+    let by = |&factor: &f64| {
+        [Scale { mass: factor, ..one }, Scale { length: factor, ..one }, Scale { time: factor, ..one }]
+    };
     factors.iter().flat_map(by).collect()
 }
 
 fn shipped(folder: &str) -> Vec<(String, Scene)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(folder);
-    let mut files: Vec<_> = std::fs::read_dir(folder).expect("a folder").map(|file| file.expect("a file").path()).collect();
+    let mut files: Vec<_> =
+        std::fs::read_dir(folder).expect("a folder").map(|file| file.expect("a file").path()).collect();
     files.sort();
     files
         .into_iter()
-        .map(|path| (path.file_stem().expect("a name").to_string_lossy().into_owned(), read_scene(&path, &[]).expect("a scene")))
+        .map(|path| {
+            (
+                path.file_stem().expect("a name").to_string_lossy().into_owned(),
+                read_scene(&path, &[]).expect("a scene"),
+            )
+        })
         .collect()
 }
 
-/// Every shipped scene of a folder by the methods wanted, over times short enough that neighbouring motions stay neighbours; what differs.
-fn compared(folder: &str, ways: &dyn Fn() -> Vec<(Option<MethodId>, Vec<Scale>)>, close: f64, share: f64) -> Vec<String> {
+/// Every shipped scene of a folder by the methods wanted, over times short enough that neighbouring motions
+/// stay neighbours; what differs.
+fn compared(
+    folder: &str,
+    ways: &dyn Fn() -> Vec<(Option<MethodId>, Vec<Scale>)>,
+    close: f64,
+    share: f64,
+) -> Vec<String> {
     let mut differences = Vec::new();
     for (name, scene) in shipped(folder) {
         for (method, scales) in ways() {
@@ -166,7 +188,8 @@ fn powers_of_ten_change_no_more_than_tolerances_allow() {
     assert!(found.is_empty(), "{}", fails(&found));
 }
 
-/// A double slider of heavy parts and a four-bar with a long crank: what a Gauss method leaves of the multipliers is rounding at every mass.
+/// A double slider of heavy parts and a four-bar with a long crank: what a Gauss method leaves of the
+/// multipliers is rounding at every mass.
 #[test]
 fn gauss_methods_keep_loops_at_every_mass() {
     for name in ["quick_return", "four_bar_motor"] {
@@ -174,7 +197,11 @@ fn gauss_methods_keep_loops_at_every_mass() {
         let scene = read_scene(&path, &[]).expect("a shipped scene");
         for stages in [2, 4, 8] {
             for mass in [1e-6, 1e-3, 1.0, 1e3, 1e6] {
-                let request = Request { method: Some(MethodId::Gauss(stages)), until: Some(scene.until.min(1.0)), ..Request::default() };
+                let request = Request {
+                    method: Some(MethodId::Gauss(stages)),
+                    until: Some(scene.until.min(1.0)),
+                    ..Request::default()
+                };
                 let found = run(&scene, &request, Scale { mass, ..Scale::ONE });
                 assert_eq!(found.stopped, None, "{name} by gauss{} at masses times {mass:e}", 2 * stages);
             }

@@ -77,7 +77,10 @@ fn place(text: &str, byte: usize) -> (usize, usize) {
 
 fn shipped() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes");
-    let mut files: Vec<_> = std::fs::read_dir(folder).expect("folder of scenes").map(|entry| entry.expect("entry").path()).collect();
+    let mut files: Vec<_> = std::fs::read_dir(folder)
+        .expect("folder of scenes")
+        .map(|entry| entry.expect("entry").path())
+        .collect();
     files.retain(|file| file.extension().is_some_and(|end| end == "json"));
     files.sort();
     files
@@ -151,13 +154,22 @@ fn the_good_scene_resolves() {
     assert_eq!(scene.springs[0].damping, 0.0);
     assert_eq!(scene.walls[0].normal, [0.6, 0.8]);
     assert_eq!((scene.start[0].phi, scene.start[0].omega), (0.5, 3.0));
-    assert_eq!((scene.motors[0].relative_to, scene.motors[0].law.acceleration, scene.motors[0].law.sines[0].phase), (None, 0.0, 0.0));
+    assert_eq!(
+        (scene.motors[0].relative_to, scene.motors[0].law.acceleration, scene.motors[0].law.sines[0].phase),
+        (None, 0.0, 0.0)
+    );
 }
 
 /// What to change, into what, the text the error must point at, the path, and a part of the message.
 const REFUSALS: &[(&str, &str, &str, &str, &str)] = &[
     // Kinds and ranges.
-    ("\"density\": 670", "\"density\": -670", "-670", "bars[0].density", "= -670: must be a number from 1e-30 to 1e30 kg/m³"),
+    (
+        "\"density\": 670",
+        "\"density\": -670",
+        "-670",
+        "bars[0].density",
+        "= -670: must be a number from 1e-30 to 1e30 kg/m³",
+    ),
     ("\"density\": 670", "\"density\": 0", "0}", "bars[0].density", "kg/m³"),
     ("\"density\": 670", "\"density\": 1e999", "1e999", "bars[0].density", "= 1e999: must be"),
     ("\"density\": 670", "\"density\": \"670\"", "\"670\"", "bars[0].density", "without quotes: 670"),
@@ -166,8 +178,20 @@ const REFUSALS: &[(&str, &str, &str, &str, &str)] = &[
     ("\"length\": 0.6", "\"length\": -0.6", "-0.6", "bars[0].length", "from 1e-30 to 1e30 m"),
     ("\"length\": 0.6", "\"length\": 1e-31", "1e-31", "bars[0].length", "from 1e-30 to 1e30 m"),
     ("\"density\": 670", "\"density\": 1e-30", "{\"name\": \"bar1\"", "bars[0]", "comes to a mass of"),
-    ("\"inertia\": \"slender\"", "\"inertia\": \"slim\"", "\"slim\"", "bars[1].inertia", "must be \"full\", \"slender\" or a number"),
-    ("\"inertia\": \"slender\"", "\"inertia\": \"slendr\"", "\"slendr\"", "bars[1].inertia", "did you mean \"slender\"?"),
+    (
+        "\"inertia\": \"slender\"",
+        "\"inertia\": \"slim\"",
+        "\"slim\"",
+        "bars[1].inertia",
+        "must be \"full\", \"slender\" or a number",
+    ),
+    (
+        "\"inertia\": \"slender\"",
+        "\"inertia\": \"slendr\"",
+        "\"slendr\"",
+        "bars[1].inertia",
+        "did you mean \"slender\"?",
+    ),
     ("\"inertia\": \"slender\"", "\"inertia\": -1", "-1}", "bars[1].inertia", "kg·m²"),
     ("\"mass\": 0.1", "\"mass\": 0", "0, \"centre\"", "bars[2].mass", "from 1e-30 to 1e30 kg"),
     ("\"mass\": 0.1, ", "", "{\"name\": \"disc\"", "bars[2].mass", "is missing: must be a number"),
@@ -179,9 +203,21 @@ const REFUSALS: &[(&str, &str, &str, &str, &str)] = &[
     ("\"stiffness\": 7", "\"stiffness\": -7", "-7", "springs[0].stiffness", "from 0 to 1e30 N/m"),
     ("\"free_length\": 0.4", "\"free_length\": -0.4", "-0.4", "springs[0].free_length", "from 0 to 1e30 m"),
     ("\"free_length\": 0.4", "\"free_length\": 0.4, \"damping\": -1", "-1}", "springs[0].damping", "N·s/m"),
-    ("\"restitution\": 0.5", "\"restitution\": 1.5", "1.5", "walls[0].restitution", "must be a number from 0 to 1\n"),
+    (
+        "\"restitution\": 0.5",
+        "\"restitution\": 1.5",
+        "1.5",
+        "walls[0].restitution",
+        "must be a number from 0 to 1\n",
+    ),
     ("\"restitution\": 0.5", "\"restitution\": -0.1", "-0.1", "walls[0].restitution", "from 0 to 1"),
-    ("\"normal\": [3, 4]", "\"normal\": [0, 0]", "[0, 0]}, \"restitution\"", "walls[0].line.normal", "must be longer"),
+    (
+        "\"normal\": [3, 4]",
+        "\"normal\": [0, 0]",
+        "[0, 0]}, \"restitution\"",
+        "walls[0].line.normal",
+        "must be longer",
+    ),
     ("\"phi\": 0.25", "\"phi\": 1e15", "1e15", "start.bar2.phi", "take off whole turns"),
     ("\"until\": 10", "\"until\": 0", "0,\n  \"every\"", "until", "from 1e-30 to 1e30 s"),
     ("\"until\": 10", "\"until\": -10", "-10", "until", "from 1e-30 to 1e30 s"),
@@ -198,16 +234,46 @@ const REFUSALS: &[(&str, &str, &str, &str, &str)] = &[
     // Keys and names.
     ("\"density\": 670", "\"densty\": 670", "\"densty\"", "bars[0].densty", "did you mean `density`?"),
     ("\"until\": 10", "\"until\": 10, \"until\": 11", "\"until\": 11", "until", "appears twice"),
-    ("\"phi\": 0.25", "\"phi\": 0.25, \"ph\\u0069\": 1", "\"ph\\u0069\"", "start.bar2.ph\\u0069", "appears twice"),
-    ("\"density\": 670", "\"density\": 670, \"density\": 670", "\"density\": 670}", "bars[0].density", "appears twice"),
+    (
+        "\"phi\": 0.25",
+        "\"phi\": 0.25, \"ph\\u0069\": 1",
+        "\"ph\\u0069\"",
+        "start.bar2.ph\\u0069",
+        "appears twice",
+    ),
+    (
+        "\"density\": 670",
+        "\"density\": 670, \"density\": 670",
+        "\"density\": 670}",
+        "bars[0].density",
+        "appears twice",
+    ),
     ("\"gravity\": [9.81, 0],", "", "{\n", "gravity", "is missing"),
     ("\"rate\": 2", "\"speed\": 2", "\"speed\"", "motors[0].law.speed", "a law has the keys start, rate"),
     ("{\"start\": 0.5, ", "{", "{\"rate\"", "motors[0].law.start", "is missing"),
-    ("\"amplitude\": 0.25", "\"amplitud\": 0.25", "\"amplitud\"", "motors[0].law.sines[0].amplitud", "did you mean `amplitude`?"),
-    ("\"name\": \"bar2\"", "\"name\": \"bar1\"", "\"bar1\", \"length\": 0.5", "bars[1].name", "must be unique; bars[0].name is the same"),
+    (
+        "\"amplitude\": 0.25",
+        "\"amplitud\": 0.25",
+        "\"amplitud\"",
+        "motors[0].law.sines[0].amplitud",
+        "did you mean `amplitude`?",
+    ),
+    (
+        "\"name\": \"bar2\"",
+        "\"name\": \"bar1\"",
+        "\"bar1\", \"length\": 0.5",
+        "bars[1].name",
+        "must be unique; bars[0].name is the same",
+    ),
     ("\"name\": \"bar2\"", "\"name\": \"ground\"", "\"ground\", \"length\"", "bars[1].name", "another name"),
     ("\"name\": \"bar2\"", "\"name\": \"bar 2\"", "\"bar 2\"", "bars[1].name", "for example \"bar_2\""),
-    ("\"name\": \"B\"", "\"name\": \"A\"", "\"A\", \"between\": [{\"body\": \"bar2\"", "hinges[1].name", "hinges[0].name is the same"),
+    (
+        "\"name\": \"B\"",
+        "\"name\": \"A\"",
+        "\"A\", \"between\": [{\"body\": \"bar2\"",
+        "hinges[1].name",
+        "hinges[0].name is the same",
+    ),
     // Bodies that are not there, and hinges that join nothing.
     (
         "\"body\": \"bar2\", \"point\": [0, 0]",
@@ -216,8 +282,20 @@ const REFUSALS: &[(&str, &str, &str, &str, &str)] = &[
         "hinges[1].between[0].body",
         "known bars: bar1, bar2, disc",
     ),
-    ("\"body\": \"bar1\", \"law\"", "\"body\": \"disk\", \"law\"", "\"disk\"", "motors[0].body", "did you mean \"disc\"?"),
-    ("\"body\": \"bar1\", \"law\"", "\"body\": \"ground\", \"law\"", "\"ground\", \"law\"", "motors[0].body", "must be the name of a bar"),
+    (
+        "\"body\": \"bar1\", \"law\"",
+        "\"body\": \"disk\", \"law\"",
+        "\"disk\"",
+        "motors[0].body",
+        "did you mean \"disc\"?",
+    ),
+    (
+        "\"body\": \"bar1\", \"law\"",
+        "\"body\": \"ground\", \"law\"",
+        "\"ground\", \"law\"",
+        "motors[0].body",
+        "must be the name of a bar",
+    ),
     (
         "\"body\": \"bar2\", \"point\": [0.5, 0], \"line\"",
         "\"body\": \"ground\", \"point\": [0.5, 0], \"line\"",
@@ -264,7 +342,13 @@ const REFUSALS: &[(&str, &str, &str, &str, &str)] = &[
         "start.bar2.velocity",
         "is given, but bar `bar2` hangs on the ground",
     ),
-    ("\"phi\": 0.5", "\"phi\": 0.6", "0.6, \"omega\": 3", "start.bar1.phi", "must be 0.5 rad, by the law of motor `motor`"),
+    (
+        "\"phi\": 0.5",
+        "\"phi\": 0.6",
+        "0.6, \"omega\": 3",
+        "start.bar1.phi",
+        "must be 0.5 rad, by the law of motor `motor`",
+    ),
     ("\"omega\": 3", "\"omega\": 2", "2}", "start.bar1.omega", "must be 3.0 rad/s"),
     (
         "\"body\": \"bar1\", \"law\"",
@@ -281,7 +365,13 @@ const REFUSALS: &[(&str, &str, &str, &str, &str)] = &[
         "springs[0]",
         "starts with length 0",
     ),
-    ("\"normal\": [3, 4]", "\"normal\": [-3, -4]", "{\"name\": \"wall\"", "walls[0]", "behind it at the start"),
+    (
+        "\"normal\": [3, 4]",
+        "\"normal\": [-3, -4]",
+        "{\"name\": \"wall\"",
+        "walls[0]",
+        "behind it at the start",
+    ),
     (
         "\"centre\": [0, 0.1], \"inertia\": 0.001",
         "\"centre\": [0, 0], \"inertia\": 0",
@@ -302,7 +392,10 @@ fn every_refusal_names_its_place() {
         assert_eq!(refusal.path, *path, "path of\n{error}");
         assert!(error.to_string().contains(message), "no `{message}` in\n{error}");
         assert!(!refusal.hint.is_empty() && !refusal.allowed.is_empty(), "hint of\n{error}");
-        assert!(error.to_string().starts_with(&format!("good.json:{line}:{column}: {path} ")), "first line of\n{error}");
+        assert!(
+            error.to_string().starts_with(&format!("good.json:{line}:{column}: {path} ")),
+            "first line of\n{error}"
+        );
         assert!(!error.is_io());
     }
 }
@@ -318,17 +411,28 @@ fn a_refusal_reads_like_this() {
     let json = serde_json::to_value(&error).expect("an error serializes");
     let keys = ["file", "set", "line", "column", "path", "value", "problem", "allowed", "hint"];
     assert_eq!(json.as_object().expect("an object").keys().collect::<Vec<_>>(), keys);
-    assert_eq!((&json["line"], &json["column"], &json["value"]), (&Value::from(6), &Value::from(83), &Value::from("-670")));
+    assert_eq!(
+        (&json["line"], &json["column"], &json["value"]),
+        (&Value::from(6), &Value::from(83), &Value::from("-670"))
+    );
 }
 
 #[test]
 fn the_marks_stand_under_the_value_in_long_lines_too() {
     let padding = " ".repeat(500);
-    for text in [changed("\"omega\": 3", "\"omega\": \"x\""), changed("\"omega\": 3", &format!("{padding}\"omega\": \"x\"{padding}"))] {
+    for text in [
+        changed("\"omega\": 3", "\"omega\": \"x\""),
+        changed("\"omega\": 3", &format!("{padding}\"omega\": \"x\"{padding}")),
+    ] {
         let shown = refused(&text).to_string();
         let lines: Vec<Vec<char>> = shown.lines().map(|line| line.chars().collect()).collect();
         assert!(lines[1].len() < 110, "{shown}");
-        let marks: String = lines[1].iter().zip(&lines[2]).filter(|(_, mark)| **mark == '^').map(|(letter, _)| letter).collect();
+        let marks: String = lines[1]
+            .iter()
+            .zip(&lines[2])
+            .filter(|(_, mark)| **mark == '^')
+            .map(|(letter, _)| letter)
+            .collect();
         assert_eq!(marks, "\"x\"", "{shown}");
     }
 }
@@ -343,9 +447,9 @@ fn driven(motors: &str, start: &str) -> String {
 
 #[test]
 fn a_start_that_a_motor_gives_may_be_left_out() {
-    let absolute =
-        r#"{"name": "m", "body": "bar1", "law": {"start": 0.5, "rate": 2, "sines": [{"amplitude": 0.3, "frequency": 4, "phase": 0.7}]}}"#;
-    let relative = r#"{"name": "r", "body": "bar2", "relative_to": "disc", "law": {"start": 0.1, "rate": -1}}"#;
+    let absolute = r#"{"name": "m", "body": "bar1", "law": {"start": 0.5, "rate": 2, "sines": [{"amplitude": 0.3, "frequency": 4, "phase": 0.7}]}}"#;
+    let relative =
+        r#"{"name": "r", "body": "bar2", "relative_to": "disc", "law": {"start": 0.1, "rate": -1}}"#;
     let both = format!("[{absolute}, {relative}]");
     let law = (0.5 + 0.3 * libm::sin(0.7), 2.0 + 0.3 * 4.0 * libm::cos(0.7));
     let disc = r#"{"disc": {"phi": 0.7, "omega": 0.2}}"#;
@@ -358,15 +462,24 @@ fn a_start_that_a_motor_gives_may_be_left_out() {
     let scene = parsed(&driven(&both, bar2)).unwrap_or_else(|error| panic!("{error}"));
     assert!((scene.start[2].phi - 0.7).abs() < 1e-15);
     assert_eq!(parsed(&scene.to_input().to_string()), Ok(scene));
-    let nearly = r#"{"disc": {"phi": 0.7, "omega": 0.2}, "bar2": {"phi": 0.8000000000000003, "omega": -0.8}}"#;
+    let nearly =
+        r#"{"disc": {"phi": 0.7, "omega": 0.2}, "bar2": {"phi": 0.8000000000000003, "omega": -0.8}}"#;
     let scene = parsed(&driven(&both, nearly)).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(scene.start[1].phi, 0.7 + 0.1);
 
     let apart = r#"{"disc": {"phi": 0.7, "omega": 0.2}, "bar2": {"phi": 0.80000000001, "omega": -0.8}}"#;
     let error = refused(&driven(&both, apart));
     assert_eq!(error.refusal().path, "start.bar2.phi", "{error}");
-    assert!(error.refusal().allowed.contains("must be 0.79999999") && error.refusal().hint.contains("leave the bar out"), "{error}");
-    let turned = format!(r#"{{"disc": {{"phi": 0, "omega": 0}}, "bar1": {{"phi": {}, "omega": {}}}}}"#, law.0 + 2.0 * TAU, law.1);
+    assert!(
+        error.refusal().allowed.contains("must be 0.79999999")
+            && error.refusal().hint.contains("leave the bar out"),
+        "{error}"
+    );
+    let turned = format!(
+        r#"{{"disc": {{"phi": 0, "omega": 0}}, "bar1": {{"phi": {}, "omega": {}}}}}"#,
+        law.0 + 2.0 * TAU,
+        law.1
+    );
     assert!(refused(&driven(&both, &turned)).refusal().hint.contains("2 turns off"), "whole turns are told");
     let neither = refused(&driven(&both, "{}"));
     assert_eq!(neither.refusal().path, "start.disc");
@@ -375,9 +488,13 @@ fn a_start_that_a_motor_gives_may_be_left_out() {
 
 #[test]
 fn a_start_on_the_edge_is_no_fault() {
-    let ends = r#"springs.spring.between=[{"body": "ground", "point": [0, 0]}, {"body": "bar1", "point": [0, 0]}]"#;
+    let ends =
+        r#"springs.spring.between=[{"body": "ground", "point": [0, 0]}, {"body": "bar1", "point": [0, 0]}]"#;
     assert!(with(&[ends]).is_err());
-    assert!(with(&[ends, "springs.spring.free_length=0"]).is_ok(), "without a free length the force is zero there");
+    assert!(
+        with(&[ends, "springs.spring.free_length=0"]).is_ok(),
+        "without a free length the force is zero there"
+    );
     assert!(with(&["start.bar2.phi=8.7e12"]).is_ok());
     assert!(with(&["bars.disc.inertia=0"]).is_ok(), "a point mass away from its hinge");
     assert!(with(&[r#"bars.disc.centre=[0, 0]"#]).is_ok(), "a wheel on its hinge");
@@ -389,7 +506,8 @@ fn a_start_on_the_edge_is_no_fault() {
 fn two_motors_may_not_drive_the_same_angle() {
     let law = r#""law": {"start": 0}"#;
     let start = r#"{"disc": {"phi": 0, "omega": 0}}"#;
-    let twice = format!(r#"[{{"name": "a", "body": "bar1", {law}}}, {{"name": "b", "body": "bar1", {law}}}]"#);
+    let twice =
+        format!(r#"[{{"name": "a", "body": "bar1", {law}}}, {{"name": "b", "body": "bar1", {law}}}]"#);
     assert_eq!(refused(&driven(&twice, start)).refusal().path, "motors[1]");
     let round = format!(
         r#"[{{"name": "a", "body": "bar1", {law}}}, {{"name": "b", "body": "bar2", {law}}}, {{"name": "c", "body": "bar2", "relative_to": "bar1", {law}}}]"#
@@ -454,12 +572,16 @@ fn files_that_cannot_be_read_are_told_from_bad_ones() {
     };
     let missing = read_scene(&folder.path().join("none.json"), &[]).expect_err("no such file");
     assert!(missing.is_io() && missing.refusal().line.is_none(), "{missing}");
-    assert!(missing.to_string().contains("none.json: cannot be read") && missing.to_string().contains("hint: "), "{missing}");
+    assert!(
+        missing.to_string().contains("none.json: cannot be read") && missing.to_string().contains("hint: "),
+        "{missing}"
+    );
     assert!(read_scene(folder.path(), &[]).expect_err("a folder").is_io());
 
     let empty = read_scene(&file("empty.json", b""), &[]).expect_err("empty");
     assert!(!empty.is_io() && empty.to_string().contains("the file is empty"), "{empty}");
-    let latin = read_scene(&file("latin.json", b"{\n \"name\": \"\xc3\xa4\xe4\"}"), &[]).expect_err("Latin-1");
+    let latin =
+        read_scene(&file("latin.json", b"{\n \"name\": \"\xc3\xa4\xe4\"}"), &[]).expect_err("Latin-1");
     assert_eq!((latin.refusal().line, latin.refusal().column), (Some(2), Some(12)), "{latin}");
     assert!(!latin.is_io() && latin.to_string().contains("UTF-8"));
     let long = read_scene(&file("long.json", &vec![b' '; (16 << 20) + 1]), &[]).expect_err("long");
@@ -471,7 +593,8 @@ fn files_that_cannot_be_read_are_told_from_bad_ones() {
 #[test]
 fn ten_thousand_bars_are_read_and_one_more_is_not() {
     let chain = |count: usize| {
-        let bars: Vec<_> = (0..count).map(|i| format!(r#"{{"name":"b{i}","mass":1,"centre":[1,0],"inertia":0}}"#)).collect();
+        let bars: Vec<_> =
+            (0..count).map(|i| format!(r#"{{"name":"b{i}","mass":1,"centre":[1,0],"inertia":0}}"#)).collect();
         let hinges: Vec<_> = (0..count)
             .map(|i| {
                 let parent = if i == 0 { "ground".to_owned() } else { format!("b{}", i - 1) };
@@ -488,7 +611,10 @@ fn ten_thousand_bars_are_read_and_one_more_is_not() {
     };
     assert_eq!(parsed(&chain(10_000)).map(|scene| scene.bars.len()), Ok(10_000));
     let error = refused(&chain(10_001));
-    assert!(error.to_string().contains("bars has 10001 elements: must be a list of 1 to 10000 objects"), "{error}");
+    assert!(
+        error.to_string().contains("bars has 10001 elements: must be a list of 1 to 10000 objects"),
+        "{error}"
+    );
     assert!(refused(&chain(0)).to_string().contains("bars has 0 elements"));
 }
 
@@ -499,7 +625,11 @@ fn values_can_be_set_from_outside() {
     assert_eq!(set(&["start.bar2.phi=0.3", "until = 100", "gravity[0]=1.62"]).start[1].phi, 0.3);
     assert_eq!(set(&["gravity[0]=1.62", "gravity=[0, -9.81]"]).gravity, [0.0, -9.81]);
     assert_eq!(set(&["bars[0].length=0.5"]).bars[0].length, set(&["bars.bar1.length=0.5"]).bars[0].length);
-    assert_eq!(set(&["springs.spring.damping=0.2"]).springs[0].damping, 0.2, "a key with a default may be new");
+    assert_eq!(
+        set(&["springs.spring.damping=0.2"]).springs[0].damping,
+        0.2,
+        "a key with a default may be new"
+    );
     assert_eq!(set(&["description=Other words."]).description, "Other words.");
     assert_eq!(set(&["start.bar1.omega=4", "motors.motor.law.rate=3"]).start[0].omega, 4.0);
     assert_eq!(set(&["motors.motor.law.sines[0].phase=0", "until=20"]).until, 20.0);
@@ -521,15 +651,28 @@ fn values_can_be_set_from_outside() {
     ] {
         let error = with(&[option]).expect_err(option);
         let refusal = error.refusal();
-        assert_eq!((refusal.path.as_str(), refusal.line, refusal.column), (path, None, None), "{option}\n{error}");
+        assert_eq!(
+            (refusal.path.as_str(), refusal.line, refusal.column),
+            (path, None, None),
+            "{option}\n{error}"
+        );
         let place = format!("good.json with --set {}=", option.split('=').next().unwrap_or(""));
-        assert!(error.to_string().starts_with(&place) && error.to_string().contains(message), "{option}\n{error}");
+        assert!(
+            error.to_string().starts_with(&place) && error.to_string().contains(message),
+            "{option}\n{error}"
+        );
         assert!(!refusal.hint.is_empty(), "{option}");
     }
     // A fault of the file that an option brings to light stands in the file.
     let error = with(&["motors.motor.law.rate=3"]).expect_err("the start no longer agrees");
-    assert_eq!((error.refusal().path.as_str(), error.refusal().line), ("start.bar1.omega", Some(25)), "{error}");
-    for bad in ["until", "=3", ".until=3", "bars[x].length=1", "bars[0=1", "bars[0]x=1", "bars[-1]=1", "[0]=1"] {
+    assert_eq!(
+        (error.refusal().path.as_str(), error.refusal().line),
+        ("start.bar1.omega", Some(25)),
+        "{error}"
+    );
+    for bad in
+        ["until", "=3", ".until=3", "bars[x].length=1", "bars[0=1", "bars[0]x=1", "bars[-1]=1", "[0]=1"]
+    {
         assert!(bad.parse::<Override>().is_err(), "{bad}");
     }
 }
@@ -541,7 +684,11 @@ fn the_schema_knows_every_key_of_every_shipped_scene() {
         let kinds = schema["oneOf"].as_array().or(schema["anyOf"].as_array());
         if let Some(kinds) = kinds {
             let matching = kinds.iter().filter(|kind| check(value, kind, path).is_ok()).count();
-            return if matching == 1 { Ok(()) } else { Err(format!("{path}: {matching} kinds match {value}")) };
+            return if matching == 1 {
+                Ok(())
+            } else {
+                Err(format!("{path}: {matching} kinds match {value}"))
+            };
         }
         match value {
             Value::Object(members) => {
@@ -549,13 +696,22 @@ fn the_schema_knows_every_key_of_every_shipped_scene() {
                     value.get(key.as_str().expect("a key")).ok_or(format!("{path}: no {key}"))?;
                 }
                 members.iter().try_for_each(|(key, member)| {
-                    let known = schema["properties"].get(key).or(Some(&schema["additionalProperties"]).filter(|any| any.is_object()));
-                    check(member, known.ok_or(format!("{path}.{key} is not in the schema"))?, &format!("{path}.{key}"))
+                    let known = schema["properties"]
+                        .get(key)
+                        .or(Some(&schema["additionalProperties"]).filter(|any| any.is_object()));
+                    check(
+                        member,
+                        known.ok_or(format!("{path}.{key} is not in the schema"))?,
+                        &format!("{path}.{key}"),
+                    )
                 })
             }
-            Value::Array(items) if schema["type"] == "array" => items.iter().try_for_each(|item| check(item, &schema["items"], path)),
+            Value::Array(items) if schema["type"] == "array" => {
+                items.iter().try_for_each(|item| check(item, &schema["items"], path))
+            }
             Value::Number(number) if schema["type"] == "number" => {
-                let (number, least, most) = (number.as_f64(), schema["minimum"].as_f64(), schema["maximum"].as_f64());
+                let (number, least, most) =
+                    (number.as_f64(), schema["minimum"].as_f64(), schema["maximum"].as_f64());
                 if least <= number && number <= most { Ok(()) } else { Err(format!("{path}: {number:?}")) }
             }
             Value::String(_) if schema["type"] == "string" => Ok(()),
@@ -580,13 +736,18 @@ fn the_schema_knows_every_key_of_every_shipped_scene() {
     assert_eq!(schema["additionalProperties"], false);
 }
 
-/// What any text must end in: a scene that reads back the same, or an error with a place inside the text and a hint.
+/// What any text must end in: a scene that reads back the same, or an error with a place inside the text and
+/// a hint.
 fn sound(text: &str, overrides: &[Override]) -> Result<(), TestCaseError> {
     match parse_scene(text, "any.json", overrides) {
-        Ok(scene) => prop_assert_eq!(parse_scene(&scene.to_input().to_string(), "again.json", &[]), Ok(scene)),
+        Ok(scene) => {
+            prop_assert_eq!(parse_scene(&scene.to_input().to_string(), "again.json", &[]), Ok(scene))
+        }
         Err(error) => {
             let refusal = error.refusal();
-            prop_assert!(!refusal.hint.is_empty() && !refusal.allowed.is_empty() && !refusal.problem.is_empty());
+            prop_assert!(
+                !refusal.hint.is_empty() && !refusal.allowed.is_empty() && !refusal.problem.is_empty()
+            );
             prop_assert!(!error.is_io() && error.to_string().lines().count() <= 4, "{}", error);
             if refusal.set.is_none() {
                 let line = refusal.line.expect("a line");

@@ -1,7 +1,9 @@
-//! Singular positions are a matter of geometry: light members and long levers make none, and those there are are passed on the right branch.
+//! Singular positions are a matter of geometry: light members and long levers make none, and those there are
+//! are passed on the right branch.
 //!
-//! Random linkages are checked by the singular values of their loop equations, scaled to unit columns, so that they are known to be regular without the program; their
-//! accelerations by the equations of Newton and Euler for every body by itself, joints as constraints, in double-double.
+//! Random linkages are checked by the singular values of their loop equations, scaled to unit columns, so
+//! that they are known to be regular without the program; their accelerations by the equations of Newton and
+//! Euler for every body by itself, joints as constraints, in double-double.
 
 use crate::common;
 
@@ -87,7 +89,8 @@ fn solve(mut matrix: Vec<Vec<DoubleDouble>>) -> Vec<f64> {
     found
 }
 
-/// Angular accelerations \[rad/s²\] of bodies on hinges and ground rails: m x'' = F + Jᵀ λ for every body by itself.
+/// Angular accelerations \[rad/s²\] of bodies on hinges and ground rails: m x'' = F + Jᵀ λ for every body by
+/// itself.
 fn reference(scene: &Value, phi: &[f64], omega: &[f64]) -> Vec<f64> {
     let bars = scene["bars"].as_array().expect("bars");
     let of = |value: &Value| DoubleDouble::of(value.as_f64().expect("a number"));
@@ -104,7 +107,8 @@ fn reference(scene: &Value, phi: &[f64], omega: &[f64]) -> Vec<f64> {
             let mut row = vec![DoubleDouble::ZERO; n + 1];
             for (end, sign) in ends.iter().zip([DoubleDouble::ONE, -DoubleDouble::ONE]) {
                 let Some(k) = number(&end["body"]) else { continue };
-                let (point, centre, w) = (vector(&end["point"]), vector(&bars[k]["centre"]), DoubleDouble::of(omega[k]));
+                let (point, centre, w) =
+                    (vector(&end["point"]), vector(&bars[k]["centre"]), DoubleDouble::of(omega[k]));
                 let arm = turn(k, [point[0] - centre[0], point[1] - centre[1]]);
                 row[3 * k] += sign * direction[0];
                 row[3 * k + 1] += sign * direction[1];
@@ -153,20 +157,23 @@ enum Kind {
     FiveBar,
 }
 
-/// The least singular value of the loop's equations at these angles, links of length one: how far they are from a singular position.
+/// The least singular value of the loop's equations at these angles, links of length one: how far they are
+/// from a singular position.
 fn regularity(kind: Kind, phi: &[f64]) -> f64 {
     if matches!(kind, Kind::SliderCrank | Kind::Block) {
         return phi[0].cos().hypot(phi[1].cos()) / 2.0_f64.sqrt();
     }
     // Singular values of the 2 × n matrix of unit vectors: (n ± |Σ e^{2 i phi}|) / 2, over their mean.
     let n = phi.len() as f64;
-    let (sin, cos) = phi.iter().fold((0.0, 0.0), |(s, c), phi| (s + (2.0 * phi).sin(), c + (2.0 * phi).cos()));
+    let (sin, cos) =
+        phi.iter().fold((0.0, 0.0), |(s, c), phi| (s + (2.0 * phi).sin(), c + (2.0 * phi).cos()));
     (1.0 - sin.hypot(cos) / n).max(0.0).sqrt()
 }
 
 /// A linkage with light members, a short crank and a long lever, at a regular position.
 fn linkage(random: &mut Random) -> (Kind, Value) {
-    let kind = [Kind::FourBar, Kind::SliderCrank, Kind::Block, Kind::FiveBar][(4.0 * random.next()) as usize % 4];
+    let kind =
+        [Kind::FourBar, Kind::SliderCrank, Kind::Block, Kind::FiveBar][(4.0 * random.next()) as usize % 4];
     let names: &[&str] = match kind {
         Kind::FourBar => &["a", "k", "c"],
         Kind::SliderCrank => &["a", "k"],
@@ -180,7 +187,8 @@ fn linkage(random: &mut Random) -> (Kind, Value) {
         }
     };
     let short = random.ratio();
-    let length: Vec<f64> = (0..names.len()).map(|i| random.between(0.5, 1.5) * if i == 0 { short } else { 1.0 }).collect();
+    let length: Vec<f64> =
+        (0..names.len()).map(|i| random.between(0.5, 1.5) * if i == 0 { short } else { 1.0 }).collect();
     let heavy = (random.next() * names.len() as f64) as usize;
     let mut bars = Vec::new();
     for (i, name) in names.iter().enumerate() {
@@ -188,7 +196,11 @@ fn linkage(random: &mut Random) -> (Kind, Value) {
         // The lever of a body is how far its joint is from its centre, in radii of gyration.
         let radius = random.between(0.2, 0.6) * if random.next() < 0.3 { random.ratio().sqrt() } else { 1.0 };
         let is_block = kind == Kind::Block && i == 2;
-        let centre = if is_block { [0.0, 0.0] } else { [length[i] * random.between(0.2, 0.8), length[i] * random.between(-0.2, 0.2)] };
+        let centre = if is_block {
+            [0.0, 0.0]
+        } else {
+            [length[i] * random.between(0.2, 0.8), length[i] * random.between(-0.2, 0.2)]
+        };
         bars.push(
             json!({"name": name, "mass": mass, "centre": centre, "inertia": mass * (length[i] * radius).powi(2), "length": length[i]}),
         );
@@ -230,7 +242,8 @@ fn linkage(random: &mut Random) -> (Kind, Value) {
     (kind, scene)
 }
 
-/// Accelerations at a position, by the angle form and where it fits by natural coordinates; true if no constraint is left out or called singular.
+/// Accelerations at a position, by the angle form and where it fits by natural coordinates; true if no
+/// constraint is left out or called singular.
 fn accelerations(mechanism: &Arc<Mechanism>, phi: &[f64], omega: &[f64]) -> (Vec<Vec<f64>>, bool) {
     let mut kernel = Kernel::<f64>::new(mechanism);
     kernel.accelerate::<0>(mechanism, Time::default(), phi, omega, Bias::default());
@@ -249,13 +262,23 @@ fn accelerations(mechanism: &Arc<Mechanism>, phi: &[f64], omega: &[f64]) -> (Vec
     (found, is_sound)
 }
 
-/// The largest difference of accelerations, over the largest of those, and of squared rates, of links of that length.
+/// The largest difference of accelerations, over the largest of those, and of squared rates, of links of that
+/// length.
 fn difference(scene: &Value, found: &[f64], expected: &[f64], omega: &[f64]) -> f64 {
-    let lengths = scene["bars"].as_array().expect("bars").iter().map(|bar| bar["length"].as_f64().expect("a length"));
+    let lengths =
+        scene["bars"].as_array().expect("bars").iter().map(|bar| bar["length"].as_f64().expect("a length"));
     let of = |a: &[f64], k: usize, length: f64| a[k].abs() * length;
     let lengths: Vec<f64> = lengths.collect();
-    let most = lengths.iter().enumerate().map(|(k, &length)| of(expected, k, length) + omega[k] * omega[k] * length).fold(0.0, f64::max);
-    let off = lengths.iter().enumerate().map(|(k, &length)| (found[k] - expected[k]).abs() * length).fold(0.0, f64::max);
+    let most = lengths
+        .iter()
+        .enumerate()
+        .map(|(k, &length)| of(expected, k, length) + omega[k] * omega[k] * length)
+        .fold(0.0, f64::max);
+    let off = lengths
+        .iter()
+        .enumerate()
+        .map(|(k, &length)| (found[k] - expected[k]).abs() * length)
+        .fold(0.0, f64::max);
     off / most
 }
 
@@ -281,7 +304,8 @@ fn regular_linkages(wanted: usize, seed: u64) -> Count {
         let expected = reference(&scene, &phi, &omega);
         let (found, is_sound) = accelerations(&mechanism, &phi, &omega);
         // About as long as the fastest link needs for half a turn.
-        let step_size = expected.iter().zip(&omega).fold(1.0, |most: f64, (a, w)| most.max(a.abs().sqrt()).max(w.abs()));
+        let step_size =
+            expected.iter().zip(&omega).fold(1.0, |most: f64, (a, w)| most.max(a.abs().sqrt()).max(w.abs()));
         let until = 1.5 / step_size;
         (scene["until"], scene["every"]) = (until.into(), (until / 16.0).into());
         let scene_run = parsed(&scene.to_string());
@@ -293,7 +317,8 @@ fn regular_linkages(wanted: usize, seed: u64) -> Count {
             outcome
         });
         // The way there may lead through a singular position by itself: that is for another test.
-        let middle = run(&Scene { until: 0.5 * until, every: 0.5 * until, ..scene_run.clone() }, &by("dp8", 1e-9));
+        let middle =
+            run(&Scene { until: 0.5 * until, every: 0.5 * until, ..scene_run.clone() }, &by("dp8", 1e-9));
         if least.min(regularity(kind, &middle.last.phi)) < 0.2 {
             continue;
         }
@@ -308,15 +333,21 @@ fn regular_linkages(wanted: usize, seed: u64) -> Count {
                 count.stopped.push(format!("{kind:?} {stop}\n{scene}"));
             }
             if outcome.drift.energy.max.is_nan() || outcome.drift.energy.max >= 1e-7 {
-                count.apart.push(format!("{kind:?} energy {:.1e} by {}\n{scene}", outcome.drift.energy.max, outcome.plan.method));
+                count.apart.push(format!(
+                    "{kind:?} energy {:.1e} by {}\n{scene}",
+                    outcome.drift.energy.max, outcome.plan.method
+                ));
             }
         }
         let [one, other] = &outcomes;
         if one.stop.is_none() && other.stop.is_none() {
             let length = |k: usize| scene["bars"][k]["length"].as_f64().expect("a length");
-            // Rounding of the other links' angles turns a crank of a millionth of their length by its inverse: of that one it is known where its end is.
+            // Rounding of the other links' angles turns a crank of a millionth of their length by its
+            // inverse: of that one it is known where its end is.
             let weight = |k: usize| if length(k) < 1e-6 { length(k) } else { 1.0 };
-            let off = (0..one.last.phi.len()).map(|k| (one.last.phi[k] - other.last.phi[k]).abs() * weight(k)).fold(0.0, f64::max);
+            let off = (0..one.last.phi.len())
+                .map(|k| (one.last.phi[k] - other.last.phi[k]).abs() * weight(k))
+                .fold(0.0, f64::max);
             if off.is_nan() || off >= 1e-7 {
                 count.apart.push(format!("{kind:?} {off:.1e} rad\n{scene}"));
             }
@@ -346,7 +377,8 @@ fn a_thousand_linkages_with_light_members_and_long_levers_have_no_singular_posit
     assert_regular(&regular_linkages(1000, 2));
 }
 
-/// A four-bar with a coupler of a billionth of the other masses has the accelerations of the limit without its mass, worked out by hand: the coupler is a rod.
+/// A four-bar with a coupler of a billionth of the other masses has the accelerations of the limit without
+/// its mass, worked out by hand: the coupler is a rod.
 #[test]
 fn a_light_coupler_is_a_rod_without_mass() {
     let text = include_str!("data/light_coupler.json");
@@ -363,7 +395,8 @@ fn a_light_coupler_is_a_rod_without_mass() {
     for found in found {
         assert!(difference(&value, &found, &expected, &omega) < 1e-12, "{found:?} {expected:?}");
     }
-    // One equation for the angle of the crank: the energy of crank and rocker, the rocker's angle by the loop.
+    // One equation for the angle of the crank: the energy of crank and rocker, the rocker's angle by the
+    // loop.
     let outcomes = ["taylor", "dp8"].map(|method| run(&scene, &by(method, 1e-11)));
     for outcome in &outcomes {
         assert_eq!(outcome.stop, None);
@@ -372,7 +405,8 @@ fn a_light_coupler_is_a_rod_without_mass() {
     }
 }
 
-/// Two linkages in which a power series saw singular positions that are none, against Dormand and Prince's method, which takes ordinary steps.
+/// Two linkages in which a power series saw singular positions that are none, against Dormand and Prince's
+/// method, which takes ordinary steps.
 #[test]
 fn a_series_does_not_leap_where_nothing_is_singular() {
     for text in [include_str!("data/coupled_plates.json"), include_str!("data/light_sliders.json")] {
@@ -382,24 +416,41 @@ fn a_series_does_not_leap_where_nothing_is_singular() {
         for rtol in [1e-7, 1e-9, 1e-11] {
             let outcome = run(&scene, &by("taylor", rtol));
             assert_eq!(outcome.stop, None, "{rtol:e}");
-            let off = outcome.last.phi.iter().zip(&expected.last.phi).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let off = outcome
+                .last
+                .phi
+                .iter()
+                .zip(&expected.last.phi)
+                .map(|(a, b)| (a - b).abs())
+                .fold(0.0, f64::max);
             assert!(off < 100.0 * rtol, "{rtol:e}: {off:.1e} rad off");
         }
     }
 }
 
-/// A four-bar with two links together as long as the others, on its way to the position with all links in line, and whether it is a parallelogram; `None` where the lengths
-/// do not close.
+/// A four-bar with two links together as long as the others, on its way to the position with all links in
+/// line, and whether it is a parallelogram; `None` where the lengths do not close.
 fn change_point(random: &mut Random) -> Option<(bool, Value)> {
     let (a, k) = (random.between(0.3, 1.0), random.between(0.5, 1.5));
-    // A parallelogram now and then, of which the coupler stays parallel; else the sum of two links is that of the others.
+    // A parallelogram now and then, of which the coupler stays parallel; else the sum of two links is that of
+    // the others.
     let is_parallelogram = random.next() < 0.3;
     let c = if is_parallelogram { a } else { random.between(0.4, 1.4) };
-    let ground = if is_parallelogram { k } else { [a + k - c, c + k - a, a + c - k][(3.0 * random.next()) as usize % 3] };
+    let ground = if is_parallelogram {
+        k
+    } else {
+        [a + k - c, c + k - a, a + c - k][(3.0 * random.next()) as usize % 3]
+    };
     let bar = |name: &str, length: f64, mass: f64| json!({"name": name, "mass": mass, "centre": [0.5 * length, 0.0], "inertia": mass * length * length / 12.0, "length": length});
-    let bars = [bar("a", a, random.between(0.2, 2.0)), bar("k", k, random.between(0.2, 2.0)), bar("c", c, random.between(0.2, 2.0))];
-    let (angle, side) =
-        (random.between(0.6, 2.4) * if random.next() < 0.5 { 1.0 } else { -1.0 }, if random.next() < 0.5 { 1.0 } else { -1.0 });
+    let bars = [
+        bar("a", a, random.between(0.2, 2.0)),
+        bar("k", k, random.between(0.2, 2.0)),
+        bar("c", c, random.between(0.2, 2.0)),
+    ];
+    let (angle, side) = (
+        random.between(0.6, 2.4) * if random.next() < 0.5 { 1.0 } else { -1.0 },
+        if random.next() < 0.5 { 1.0 } else { -1.0 },
+    );
     let (x, y) = (ground - a * angle.cos(), -a * angle.sin());
     let distance = x.hypot(y);
     let bend = ((k * k + distance * distance - c * c) / (2.0 * k * distance)).clamp(-2.0, 2.0).acos();
@@ -413,8 +464,7 @@ fn change_point(random: &mut Random) -> Option<(bool, Value)> {
         {"name": "C", "between": [place("ground", ground), place("c", 0.0)]},
     ]);
     let start = json!({"a": {"phi": angle, "omega": random.between(1.0, 4.0) * -angle.signum()}, "k": {"phi": coupler}, "c": {"phi": end[1].atan2(end[0])}});
-    let scene =
-        json!({"name": "change_point", "gravity": [0.0, 0.0], "bars": bars, "hinges": hinges, "start": start, "until": 4.0, "every": 0.05});
+    let scene = json!({"name": "change_point", "gravity": [0.0, 0.0], "bars": bars, "hinges": hinges, "start": start, "until": 4.0, "every": 0.05});
     (ground > 0.1 && (is_parallelogram || bend.is_finite())).then_some((is_parallelogram, scene))
 }
 
@@ -422,7 +472,10 @@ fn change_point(random: &mut Random) -> Option<(bool, Value)> {
 fn keeps_its_branch(outcome: &Outcome, is_parallelogram: bool, last: &[f64]) -> bool {
     let apart = outcome.drift.constraints.iter().map(|(_, monitors)| monitors[0].max).fold(0.0, f64::max);
     let off = outcome.last.phi.iter().zip(last).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    outcome.drift.energy.max < 1e-5 && apart < 1e-6 && off < 1e-4 && (!is_parallelogram || outcome.last.phi[1].abs() < 1e-5)
+    outcome.drift.energy.max < 1e-5
+        && apart < 1e-6
+        && off < 1e-4
+        && (!is_parallelogram || outcome.last.phi[1].abs() < 1e-5)
 }
 
 fn change_points(wanted: usize, seed: u64) {
@@ -455,7 +508,9 @@ fn change_points(wanted: usize, seed: u64) {
             }
         }
     }
-    println!("{seen} change points, {near} near a singular position: {passed} runs passed, {stopped} stopped");
+    println!(
+        "{seen} change points, {near} near a singular position: {passed} runs passed, {stopped} stopped"
+    );
     assert!(stopped * 20 < passed, "{passed} passed, {stopped} stopped");
 }
 

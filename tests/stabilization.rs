@@ -18,16 +18,26 @@ fn run(scene: &str, request: &Request) -> Outcome {
 }
 
 fn request(method: MethodId, stabilize: Stabilization) -> Request {
-    Request { method: Some(method), stabilize: Some(stabilize), until: Some(3.0), every: Some(0.1), ..Request::default() }
+    Request {
+        method: Some(method),
+        stabilize: Some(stabilize),
+        until: Some(3.0),
+        every: Some(0.1),
+        ..Request::default()
+    }
 }
 
 #[test]
 fn the_same_scene_run_all_four_ways_agrees() {
     for scene in ["motor", "motor_sine"] {
-        let reference = run(scene, &Request { rtol: Some(1e-13), ..request(MethodId::Dp8, Stabilization::Elimination) }).last;
+        let reference =
+            run(scene, &Request { rtol: Some(1e-13), ..request(MethodId::Dp8, Stabilization::Elimination) })
+                .last;
         for method in [MethodId::Dp8, MethodId::Dp5, MethodId::Dop853, MethodId::Dopri5, MethodId::Taylor] {
             for stabilize in Stabilization::ALL {
-                if stabilize == Stabilization::Projection && matches!(method, MethodId::Dop853 | MethodId::Dopri5) {
+                if stabilize == Stabilization::Projection
+                    && matches!(method, MethodId::Dop853 | MethodId::Dopri5)
+                {
                     continue;
                 }
                 if (method, stabilize) == (MethodId::Taylor, Stabilization::Baumgarte) {

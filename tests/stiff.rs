@@ -1,4 +1,5 @@
-//! Gauss methods on stiff scenes: Newton's method where sweeps contract slowly, the published stiff double pendulum, typed stops and refusals, and what is said of stiffness.
+//! Gauss methods on stiff scenes: Newton's method where sweeps contract slowly, the published stiff double
+//! pendulum, typed stops and refusals, and what is said of stiffness.
 
 use crate::common;
 
@@ -9,10 +10,11 @@ use driftless::run::{MethodId, Outcome, Plan, Request};
 use driftless::scene::{Bar, Hinge, Place, Scene, Spring, Start, TorsionSpring};
 use driftless::stepping::Cause;
 
-/// Two point masses of 1 kg on massless rods of 1 m, with the energy C² theta²/2 between them: the stiff double pendulum of M. Antoñana, J. Makazaga,
-/// A. Murua, Numer. Algorithms 78 (2018), section 5.
+/// Two point masses of 1 kg on massless rods of 1 m, with the energy C² theta²/2 between them: the stiff
+/// double pendulum of M. Antoñana, J. Makazaga, A. Murua, Numer. Algorithms 78 (2018), section 5.
 fn stiff_pendulum(c: f64, until: f64) -> Scene {
-    let bar = |name: &str| Bar { name: name.into(), length: 1.0, mass: 1.0, centre: [1.0, 0.0], inertia: 0.0 };
+    let bar =
+        |name: &str| Bar { name: name.into(), length: 1.0, mass: 1.0, centre: [1.0, 0.0], inertia: 0.0 };
     let hinge = |name: &str, inner: Place, outer: usize| Hinge {
         name: name.into(),
         between: [inner, Place { bar: Some(outer), point: [0.0, 0.0] }],
@@ -21,8 +23,14 @@ fn stiff_pendulum(c: f64, until: f64) -> Scene {
         name: "stiff_pendulum".into(),
         gravity: [9.8, 0.0],
         bars: vec![bar("bar1"), bar("bar2")],
-        hinges: vec![hinge("A", Place { bar: None, point: [0.0, 0.0] }, 0), hinge("B", Place { bar: Some(0), point: [1.0, 0.0] }, 1)],
-        start: vec![Start { phi: 1.1, omega: -2.774587705400123 }, Start { phi: 1.0982812520980798, omega: 5.5491836072042 }],
+        hinges: vec![
+            hinge("A", Place { bar: None, point: [0.0, 0.0] }, 0),
+            hinge("B", Place { bar: Some(0), point: [1.0, 0.0] }, 1),
+        ],
+        start: vec![
+            Start { phi: 1.1, omega: -2.774587705400123 },
+            Start { phi: 1.0982812520980798, omega: 5.5491836072042 },
+        ],
         until,
         every: until / 64.0,
         ..Scene::default()
@@ -56,7 +64,10 @@ fn energy_error(c: f64, stages: usize, step: f64, until: f64) -> (f64, Outcome) 
     let mut kernel = driftless::dynamics::kernel::Kernel::without_rows(&mechanism);
     let energy = mechanism.energy(&mut kernel, &start.phi, &start.omega).total().hi;
     let error = outcome.drift.energy.max * mechanism.energy_scale / energy.abs();
-    println!("C = {c}, s = {stages}, h = {step}: {error:.2e} of {energy} J, {:?}, {:?}", outcome.statistics, outcome.wall);
+    println!(
+        "C = {c}, s = {stages}, h = {step}: {error:.2e} of {energy} J, {:?}, {:?}",
+        outcome.statistics, outcome.wall
+    );
     (error, outcome)
 }
 
@@ -88,13 +99,18 @@ fn the_stiff_pendulum_ends_where_it_should() {
     }
 }
 
-/// At 2.24 rad of the fast mode a step sweeps take two to three times the evaluations; at 0.56 they are the method.
+/// At 2.24 rad of the fast mode a step sweeps take two to three times the evaluations; at 0.56 they are the
+/// method.
 #[test]
 fn newtons_method_takes_over_where_sweeps_are_slow_and_says_so() {
     let (_, soft) = energy_error(32.0, 6, STEP, 4.0);
     assert_eq!(soft.statistics.newton_steps, 0, "{:?}", soft.statistics);
     let (error, stiff) = energy_error(128.0, 8, STEP, 4.0);
-    assert!(stiff.statistics.newton_steps > stiff.statistics.steps / 2 && error < 1e-9, "{:?}, {error:e}", stiff.statistics);
+    assert!(
+        stiff.statistics.newton_steps > stiff.statistics.steps / 2 && error < 1e-9,
+        "{:?}, {error:e}",
+        stiff.statistics
+    );
     assert!(stiff.plan.notes.iter().any(|note| note.contains("Newton's method")), "{:?}", stiff.plan.notes);
     let again = run(&stiff_pendulum(128.0, 4.0), &gauss(8, STEP));
     assert_eq!((again.last, again.statistics), (stiff.last, stiff.statistics));
@@ -111,7 +127,8 @@ fn a_step_too_long_for_an_excited_spring_stops_with_its_name_and_the_step_to_tak
     }
 }
 
-/// The pendulum on its spring with another stiffness, at its free length and at rest: next to no energy in it.
+/// The pendulum on its spring with another stiffness, at its free length and at rest: next to no energy in
+/// it.
 fn sprung(factor: f64, until: f64) -> Scene {
     let mut scene = shipped("spring", &[]);
     scene.springs[0].stiffness = 7.394_287_5 * factor;
@@ -133,13 +150,18 @@ fn a_fast_mode_without_energy_may_be_stepped_over() {
     }
 }
 
-/// Steps far too long for an everyday spring: sweeps that "stop falling" far from convergence once returned 1e10 rad with success.
+/// Steps far too long for an everyday spring: sweeps that "stop falling" far from convergence once returned
+/// 1e10 rad with success.
 #[test]
 fn an_iteration_that_ends_far_from_convergence_is_a_stop() {
     for step in [0.25, 0.33, 0.5] {
-        let outcome = run(&shipped("spring", &[]), &Request { until: Some(10.0), every: Some(5.0), ..gauss(2, step) });
+        let outcome =
+            run(&shipped("spring", &[]), &Request { until: Some(10.0), every: Some(5.0), ..gauss(2, step) });
         match &outcome.stop {
-            Some(stop) => assert!(matches!(stop.cause, Cause::NotConverged | Cause::NotFinite | Cause::Unresolved), "{stop}"),
+            Some(stop) => assert!(
+                matches!(stop.cause, Cause::NotConverged | Cause::NotFinite | Cause::Unresolved),
+                "{stop}"
+            ),
             None => assert!(outcome.last.phi.iter().all(|phi| phi.abs() < 100.0), "{:?}", outcome.last.phi),
         }
     }
@@ -154,22 +176,30 @@ fn loops_with_stiff_springs_end_right_or_stop() {
     // From a point of the ground to the end of the second bar, at its free length.
     let (ground, [_, end]) = ([-3.0, -2.0], [0, 1].map(|end| loose.end(1, end).point.position(&z)));
     let length = (end - Complex::new(ground[0], ground[1])).norm_squared().sqrt();
-    let places = [Place { bar: None, point: ground }, Place { bar: Some(1), point: [scene.bars[1].length, 0.0] }];
+    let places =
+        [Place { bar: None, point: ground }, Place { bar: Some(1), point: [scene.bars[1].length, 0.0] }];
     let spring = &shipped("spring", &[]).springs[0];
     scene.springs.push(Spring { between: places, stiffness: 1e7, free_length: length, ..spring.clone() });
     (scene.until, scene.every) = (0.1, 0.1);
     let mechanism = compile(&scene);
     let start = mechanism.start(&scene);
-    let [phi, omega] = [&start.phi, &start.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<_>>());
+    let [phi, omega] =
+        [&start.phi, &start.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<_>>());
     let rate = Stiffness::at(&mechanism, start.time, &phi, &omega).fastest;
-    let reference = run(&scene, &Request { method: Some(MethodId::Taylor), rtol: Some(1e-12), ..Request::default() });
+    let reference =
+        run(&scene, &Request { method: Some(MethodId::Taylor), rtol: Some(1e-12), ..Request::default() });
     assert_eq!(reference.stop, None);
     for radians in [0.5, 3.0, 12.0] {
         let outcome = run(&scene, &gauss(8, (0.1 * rate / radians).ceil().recip() * 0.1));
         match &outcome.stop {
             Some(stop) => assert!(radians > 1.0, "{radians}: {stop}"),
             None => {
-                let apart = outcome.last.phi.iter().zip(&reference.last.phi).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+                let apart = outcome
+                    .last
+                    .phi
+                    .iter()
+                    .zip(&reference.last.phi)
+                    .fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
                 assert!(apart < 1e-4, "{radians} rad a step: {apart:e}, {:?}", outcome.statistics);
             }
         }
@@ -183,12 +213,23 @@ fn a_stiff_spring_is_resolved_and_its_periods_are_told() {
     let ask = |method, until| Request { method: Some(method), until: Some(until), ..Request::default() };
     let plan = Plan::new(&scene, &mechanism, &ask(MethodId::Taylor, 1.0)).expect("a plan");
     let mode = plan.stiffness.expect("a fast mode");
-    assert!((mode.rate / 6.2e4 - 1.0).abs() < 0.05 && (mode.periods / 9.8e3 - 1.0).abs() < 0.05 && mode.spring.is_some(), "{mode:?}");
-    let said = plan.notes.iter().any(|note| note.contains("spring oscillates at 6.") && note.contains("periods until t = 1 s, about"));
+    assert!(
+        (mode.rate / 6.2e4 - 1.0).abs() < 0.05
+            && (mode.periods / 9.8e3 - 1.0).abs() < 0.05
+            && mode.spring.is_some(),
+        "{mode:?}"
+    );
+    let said = plan.notes.iter().any(|note| {
+        note.contains("spring oscillates at 6.") && note.contains("periods until t = 1 s, about")
+    });
     assert!(said, "{:?}", plan.notes);
     // 1e8 rad are 1600 s of it.
-    let refusal = Plan::new(&scene, &mechanism, &ask(MethodId::Taylor, 2000.0)).expect_err("a refusal").to_string();
-    assert!(["periods", "rigid", "--until", "--max-evaluations"].iter().all(|word| refusal.contains(word)), "{refusal}");
+    let refusal =
+        Plan::new(&scene, &mechanism, &ask(MethodId::Taylor, 2000.0)).expect_err("a refusal").to_string();
+    assert!(
+        ["periods", "rigid", "--until", "--max-evaluations"].iter().all(|word| refusal.contains(word)),
+        "{refusal}"
+    );
     let max_evaluations = Request { max_evaluations: Some(1_000_000), ..ask(MethodId::Taylor, 2000.0) };
     assert!(Plan::new(&scene, &mechanism, &max_evaluations).is_ok());
     // A soft spring is not worth a word.
@@ -197,7 +238,8 @@ fn a_stiff_spring_is_resolved_and_its_periods_are_told() {
     assert!(plan.notes.is_empty() && plan.stiffness.is_some(), "{:?}", plan.notes);
 }
 
-/// Stiff and swinging at 1e6 times the source's stiffness: an error of 1e-6 for far fewer evaluations than the everyday method's.
+/// Stiff and swinging at 1e6 times the source's stiffness: an error of 1e-6 for far fewer evaluations than
+/// the everyday method's.
 #[test]
 fn a_stiff_spring_that_swings_is_followed_to_six_digits() {
     let mut scene = sprung(1e6, 0.5);

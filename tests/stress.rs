@@ -25,7 +25,9 @@ fn the_shipped_set_is_whole() {
         let scene = parse_scene(&case.text, &case.origin, &[]).map_err(|error| error.to_string());
         match (&case.expected, scene) {
             (Expected::Refusal, scene) => {
-                let refusal = scene.and_then(|scene| Mechanism::new(&scene).map_err(|error| error.to_string())).expect_err(&case.name);
+                let refusal = scene
+                    .and_then(|scene| Mechanism::new(&scene).map_err(|error| error.to_string()))
+                    .expect_err(&case.name);
                 assert!(refusal.len() > 20, "{}: {refusal}", case.name);
             }
             (expected, scene) => {
@@ -33,7 +35,11 @@ fn the_shipped_set_is_whole() {
                 assert_eq!(scene.name, case.name);
                 assert!(Mechanism::new(&scene).is_ok(), "{}", case.name);
                 if let Expected::End { angles, rates } = expected {
-                    assert!(angles.len() <= scene.bars.len() && (rates.is_empty() || rates.len() == angles.len()), "{}", case.name);
+                    assert!(
+                        angles.len() <= scene.bars.len() && (rates.is_empty() || rates.len() == angles.len()),
+                        "{}",
+                        case.name
+                    );
                 }
             }
         }
@@ -52,12 +58,22 @@ fn no_answer_is_wrong() {
         assert_ne!(cell.verdict, Verdict::Wrong, "{} {cell:?}", line.scene);
         assert!(cell.evaluations < 2 * plan.max_evaluations, "{} {cell:?}", line.scene);
         if let Some(stop) = &cell.stop {
-            assert!(!stop.what.is_empty() && !stop.hint.is_empty() && stop.t.is_finite(), "{} {cell:?}", line.scene);
+            assert!(
+                !stop.what.is_empty() && !stop.hint.is_empty() && stop.t.is_finite(),
+                "{} {cell:?}",
+                line.scene
+            );
         }
     }
-    let right = |name: &str| cells().filter(|(_, cell)| cell.method == name && cell.verdict == Verdict::Right).count();
+    let right = |name: &str| {
+        cells().filter(|(_, cell)| cell.method == name && cell.verdict == Verdict::Right).count()
+    };
     let found = ["dp8", "taylor", "gauss16", "rattle4"].map(right);
-    assert!(found[0] >= 48 && found[1] >= 48 && found[2] >= 32 && found[3] >= 20, "{found:?} of {}", lines.len());
+    assert!(
+        found[0] >= 48 && found[1] >= 48 && found[2] >= 32 && found[3] >= 20,
+        "{found:?} of {}",
+        lines.len()
+    );
 }
 
 #[test]
@@ -78,7 +94,8 @@ fn a_wrong_answer_would_be_seen() {
 fn cells_do_not_depend_on_the_number_of_threads() {
     let cases: Vec<Case> = ["spring_1", "spring_zero_length", "massless_bar", "motor_1"].map(case).into();
     let methods: Vec<MethodId> = ["dp5", "radau5", "gauss8", "rattle2"].map(method).into();
-    let plan = |threads| Stress { cases: cases.clone(), methods: methods.clone(), max_evaluations: 20_000, threads };
+    let plan =
+        |threads| Stress { cases: cases.clone(), methods: methods.clone(), max_evaluations: 20_000, threads };
     assert_eq!(stress(&plan(1), &mut |_| true), stress(&plan(3), &mut |_| true));
 }
 
@@ -96,7 +113,8 @@ fn an_unconfirmed_end_is_a_stop() {
 #[test]
 fn a_scene_without_a_known_end_gets_one() {
     let unknown = Case { expected: Expected::Unknown, ..case("spring_1") };
-    let plan = Stress { cases: vec![unknown], methods: vec![method("dp8")], max_evaluations: 100_000, threads: 1 };
+    let plan =
+        Stress { cases: vec![unknown], methods: vec![method("dp8")], max_evaluations: 100_000, threads: 1 };
     let lines = stress(&plan, &mut |_| true);
     let found = lines[0].cells[0].error.expect("an error");
     let known = cell(&case("spring_1"), method("dp8"), 100_000).error.expect("an error");
@@ -140,6 +158,7 @@ fn steps_too_long_for_a_stiff_spring_stop_or_say_so() {
     let soft = &map.cells[..map.steps];
     assert!(soft[0].error.is_some_and(|error| error < 1e-10), "{:?}", soft[0]);
     // Order 4: halving the step takes the error to a sixteenth.
-    let errors: Vec<f64> = soft.iter().filter_map(|cell| cell.error).filter(|error| (1e-9..1e-3).contains(error)).collect();
+    let errors: Vec<f64> =
+        soft.iter().filter_map(|cell| cell.error).filter(|error| (1e-9..1e-3).contains(error)).collect();
     assert!(errors.windows(2).all(|pair| (8.0..32.0).contains(&(pair[1] / pair[0]))), "{errors:?}");
 }

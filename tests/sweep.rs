@@ -1,4 +1,5 @@
-//! Sweeps: each point is the run it stands for, the table does not depend on the threads, bad points end nothing, flips are where they are.
+//! Sweeps: each point is the run it stands for, the table does not depend on the threads, bad points end
+//! nothing, flips are where they are.
 
 #[cfg(feature = "cli")]
 use crate::program;
@@ -6,7 +7,8 @@ use crate::program;
 use driftless::dynamics::{Mechanism, Time};
 use driftless::run::trust::Level;
 use driftless::run::{
-    Flip, MethodId, Point, PointObserver, Request, Stabilization, Status, Sweep, SweepError, SweepTable, Vary, reference, simulate, sweep,
+    Flip, MethodId, Point, PointObserver, Request, Stabilization, Status, Sweep, SweepError, SweepTable,
+    Vary, reference, simulate, sweep,
 };
 use driftless::scene::Template;
 use driftless::stepping::Cause;
@@ -53,8 +55,16 @@ fn every_point_is_the_run_it_stands_for() {
             let alone = template(scene).filled(plan.variables(), &point.values).expect("a scene");
             let outcome = simulate(&alone, &request, &mut |_| Ok(())).expect("a run");
             assert_eq!(point.status, outcome.stop.clone().map_or(Status::Done, Status::Stopped));
-            assert_eq!((point.t, &point.phi, &point.omega), (outcome.last.t, &outcome.last.phi, &outcome.last.omega), "{scene} {method}");
-            assert_eq!((point.energy, point.steps), (outcome.drift.energy.max, outcome.statistics.steps), "{scene} {method}");
+            assert_eq!(
+                (point.t, &point.phi, &point.omega),
+                (outcome.last.t, &outcome.last.phi, &outcome.last.omega),
+                "{scene} {method}"
+            );
+            assert_eq!(
+                (point.energy, point.steps),
+                (outcome.drift.energy.max, outcome.statistics.steps),
+                "{scene} {method}"
+            );
             let defects = outcome.drift.constraints.first().map(|(_, levels)| [levels[0].max, levels[1].max]);
             assert_eq!(point.constraint, defects);
         }
@@ -69,7 +79,9 @@ fn points_in_lanes_agree_with_single_runs() {
         let alone = template("free").filled(plan.variables(), &point.values).expect("a scene");
         let outcome = simulate(&alone, &request, &mut |_| Ok(())).expect("a run");
         assert_eq!((&point.status, point.t), (&Status::Done, 1.0));
-        for (found, exact) in point.phi.iter().chain(&point.omega).zip(outcome.last.phi.iter().chain(&outcome.last.omega)) {
+        for (found, exact) in
+            point.phi.iter().chain(&point.omega).zip(outcome.last.phi.iter().chain(&outcome.last.omega))
+        {
             assert!((found - exact).abs() < 1e-9, "{point:?}");
         }
         assert!(point.energy < 1e-12, "{point:?}");
@@ -79,7 +91,9 @@ fn points_in_lanes_agree_with_single_runs() {
 /// In lanes and one by one: no point changes, and errors are those against the motion in double-double.
 #[test]
 fn estimates_of_points_are_near_the_truth() {
-    for (scene, method, tolerance, until) in [("free", "taylor", 1e-8, 6.0), ("free", "dp8", 1e-7, 6.0), ("gentle", "taylor", 1e-5, 8.0)] {
+    for (scene, method, tolerance, until) in
+        [("free", "taylor", 1e-8, 6.0), ("free", "dp8", 1e-7, 6.0), ("gentle", "taylor", 1e-5, 8.0)]
+    {
         let request = Request { rtol: Some(tolerance), every: Some(0.5), ..request(method, until) };
         let vary = ["bar1.phi=-2.5..2.5:4", "bar2.phi=0.3..2.9:3"];
         let bare = points(&prepared(scene, &vary, &request), 1);
@@ -91,8 +105,11 @@ fn estimates_of_points_are_near_the_truth() {
             assert_eq!(point, bare, "{scene} by {method}");
             let alone = template(scene).filled(plan.variables(), &point.values).expect("a scene");
             let mechanism = std::sync::Arc::new(Mechanism::new(&alone).expect("equations"));
-            let exact = reference(&mechanism, &mechanism.start(&alone), &[Time::from(until)]).expect("a reference");
-            let off = (0..point.phi.len()).map(|k| (point.phi[k] - exact.motions[0].unwrapped(k)).abs()).fold(0.0, f64::max);
+            let exact =
+                reference(&mechanism, &mechanism.start(&alone), &[Time::from(until)]).expect("a reference");
+            let off = (0..point.phi.len())
+                .map(|k| (point.phi[k] - exact.motions[0].unwrapped(k)).abs())
+                .fold(0.0, f64::max);
             if off > 2e-3 {
                 assert!(trust.is_doubtful(), "{scene} by {method}: {trust:?} for {off:e}");
                 lost += 1;
@@ -111,7 +128,11 @@ fn estimates_of_points_are_near_the_truth() {
 fn the_number_of_threads_and_the_chunks_change_nothing() {
     for (scene, method) in [("free", "taylor"), ("free", "dp5"), ("motor", "taylor")] {
         let vary = if scene == "free" { "bar1.phi=-pi..pi:23" } else { "motor.rate=-8..8:23" };
-        let plan = prepared(scene, &[vary, "bar2.phi=-pi..pi:9"], &Request { every: Some(0.5), ..request(method, 1.5) });
+        let plan = prepared(
+            scene,
+            &[vary, "bar2.phi=-pi..pi:9"],
+            &Request { every: Some(0.5), ..request(method, 1.5) },
+        );
         let one = points(&plan, 1);
         assert_eq!(one.len(), 207);
         assert!(one.iter().enumerate().all(|(number, point)| point.index == number as u64));
@@ -129,21 +150,30 @@ fn bad_points_say_so_and_end_nothing() {
     // A spring of no length, negative stiffness, and a good one between.
     let plan = prepared("spring", &["spring.stiffness=-1..9:3"], &request("dp8", 0.5));
     let found = points(&plan, 2);
-    assert!(matches!(&found[0].status, Status::Refused(reason) if reason.contains("--set springs.spring.stiffness=-1")), "{found:?}");
+    assert!(
+        matches!(&found[0].status, Status::Refused(reason) if reason.contains("--set springs.spring.stiffness=-1")),
+        "{found:?}"
+    );
     assert_eq!((&found[1].status, &found[2].status), (&Status::Done, &Status::Done));
     assert!(found[0].phi.is_empty() && found[1].phi.len() == 2);
-    // A rate beyond what a step can follow stops, its neighbours go on; one out of range is refused although starts need no reading.
+    // A rate beyond what a step can follow stops, its neighbours go on; one out of range is refused although
+    // starts need no reading.
     for method in ["taylor", "dp8"] {
         let found = points(&prepared("free", &["bar1.omega=0..2e30:3"], &request(method, 0.5)), 1);
         assert_eq!(found[0].status, Status::Done);
         assert!(matches!(&found[1].status, Status::Stopped(_)), "{method}: {:?}", found[1]);
-        assert!(matches!(&found[2].status, Status::Refused(reason) if reason.contains("rad/s")), "{:?}", found[2]);
+        assert!(
+            matches!(&found[2].status, Status::Refused(reason) if reason.contains("rad/s")),
+            "{:?}",
+            found[2]
+        );
     }
     let limits = driftless::run::Limits { energy: Some(1e-9), constraint: None };
     for method in ["dp5", "taylor"] {
         let request = Request { rtol: Some(1e-2), ..request(method, 5.0) };
         let found = points(&prepared("free", &["bar1.phi=0..2:2"], &request).with_limits(limits), 1);
-        let stopped = |point: &Point| matches!(&point.status, Status::Stopped(stop) if stop.cause == Cause::DriftLimit);
+        let stopped =
+            |point: &Point| matches!(&point.status, Status::Stopped(stop) if stop.cause == Cause::DriftLimit);
         assert!(stopped(&found[1]), "{method}: {found:?}");
     }
 }
@@ -168,7 +198,8 @@ fn sampled(plan: &Sweep, values: &[f64], request: &Request) -> Option<(f64, usiz
 #[test]
 fn flips_are_those_of_finely_sampled_runs() {
     for method in ["taylor", "dop853", "dp8", "gauss8", "rattle6"] {
-        let request = Request { step: method.starts_with(['g', 'r']).then_some(1e-3), ..request(method, 3.0) };
+        let request =
+            Request { step: method.starts_with(['g', 'r']).then_some(1e-3), ..request(method, 3.0) };
         let plan = prepared("free", &["bar1.phi=0.2..3.1:5", "bar2.phi=-3..3:5"], &request);
         let found = points(&plan, 2);
         let mut flips = 0;
@@ -176,7 +207,10 @@ fn flips_are_those_of_finely_sampled_runs() {
             let fine = sampled(&plan, &point.values, &request);
             assert_eq!(point.flip.is_some(), fine.is_some(), "{method}: {point:?} {fine:?}");
             if let (Some(Flip { t, bar }), Some((after, which))) = (point.flip, fine) {
-                assert!(bar == which && t <= after + 1e-9 && t > after - 1.001e-3, "{method}: {point:?} {fine:?}");
+                assert!(
+                    bar == which && t <= after + 1e-9 && t > after - 1.001e-3,
+                    "{method}: {point:?} {fine:?}"
+                );
                 flips += 1;
             }
         }
@@ -192,11 +226,17 @@ fn a_flip_is_as_accurate_as_its_run() {
     };
     let exact = times("taylor", Some(1e-14), None);
     assert!(exact.iter().any(|t| t.is_finite()), "{exact:?}");
-    for (method, rtol, step) in
-        [("taylor", Some(1e-11), None), ("dp8", Some(1e-11), None), ("dop853", Some(1e-11), None), ("gauss16", None, Some(0.01))]
-    {
+    for (method, rtol, step) in [
+        ("taylor", Some(1e-11), None),
+        ("dp8", Some(1e-11), None),
+        ("dop853", Some(1e-11), None),
+        ("gauss16", None, Some(0.01)),
+    ] {
         for (found, exact) in times(method, rtol, step).iter().zip(&exact) {
-            assert!((found - exact).abs() < 1e-9 || (found.is_nan() && exact.is_nan()), "{method}: {found} {exact}");
+            assert!(
+                (found - exact).abs() < 1e-9 || (found.is_nan() && exact.is_nan()),
+                "{method}: {found} {exact}"
+            );
         }
     }
 }
@@ -215,7 +255,8 @@ fn a_bar_that_starts_upright_turns_over_where_it_falls_outwards() {
     }
 }
 
-/// A bar passes the boundary and comes back within a step, and later steps before the next look hold no passage, or one: the first counts.
+/// A bar passes the boundary and comes back within a step, and later steps before the next look hold no
+/// passage, or one: the first counts.
 #[test]
 fn there_and_back_within_a_step_is_not_forgotten() {
     let light = r#"{"name": "light", "gravity": [0, -9.81],
@@ -232,16 +273,22 @@ fn there_and_back_within_a_step_is_not_forgotten() {
         "torques": [{"name": "torque", "body": "bar", "torque": -6.794,
             "law": {"start": 0.3463, "sines": [{"amplitude": 0.3419, "frequency": 4.23, "phase": -0.2008}]}}],
         "start": {"bar": {"phi": 1.4718, "omega": -5.403}}, "until": 1.48, "every": 0.074}"#;
-    for (text, vary, rtol) in [(light, "upper.phi=0.05..0.05:1", 1e-4), (coil, "bar.omega=-5.4..-5.0:41", 1e-9)] {
+    for (text, vary, rtol) in
+        [(light, "upper.phi=0.05..0.05:1", 1e-4), (coil, "bar.omega=-5.4..-5.0:41", 1e-9)]
+    {
         let template = Template::new(text.into(), "there.json".into(), &[]);
         let flips = |method: &str, rtol: f64| -> Vec<Option<f64>> {
-            let request = Request { rtol: Some(rtol), ..request(method, template.scene().expect("a scene").until) };
-            let plan = Sweep::new(&template, vec![vary.parse().expect("a range")], &request).expect("a sweep");
+            let request =
+                Request { rtol: Some(rtol), ..request(method, template.scene().expect("a scene").until) };
+            let plan =
+                Sweep::new(&template, vec![vary.parse().expect("a range")], &request).expect("a sweep");
             points(&plan, 1).iter().map(|point| point.flip.map(|flip| flip.t)).collect()
         };
         let (found, right) = (flips("taylor", rtol), flips("dp8", 1e-12));
         for (found, right) in found.iter().zip(&right) {
-            let differ = found.zip(*right).map_or(found.is_some() != right.is_some(), |(found, right)| (found - right).abs() > 1e-4);
+            let differ = found
+                .zip(*right)
+                .map_or(found.is_some() != right.is_some(), |(found, right)| (found - right).abs() > 1e-4);
             assert!(!differ, "{found:?} s and not {right:?} s, {vary}");
         }
         assert!(right.iter().any(Option::is_some));
@@ -254,7 +301,9 @@ fn points_of_floating_bodies_are_rows_of_as_many_columns() {
     let text = r#"{"name": "float", "gravity": [0, -9.81], "bars": [{"name": "plate", "mass": 2, "centre": [0.1, 0], "inertia": 0.3}],
         "start": {"plate": {"phi": 1, "omega": 2, "origin": [3, 4], "velocity": [5, 6]}}, "until": 0.5, "every": 0.1}"#;
     let template = Template::new(text.into(), "float.json".into(), &[]);
-    let plan = Sweep::new(&template, vec!["plate.omega=1..2:2".parse().expect("a range")], &Request::default()).expect("a sweep");
+    let plan =
+        Sweep::new(&template, vec!["plate.omega=1..2:2".parse().expect("a range")], &Request::default())
+            .expect("a sweep");
     let mut table = SweepTable::new(&plan, Vec::new()).expect("room");
     sweep(&plan, 1, &mut |point: &Point| Ok(table.write(point)?)).expect("all points");
     let text = String::from_utf8(table.finish().expect("room")).expect("text");
@@ -272,14 +321,18 @@ fn points_end_at_flips_and_are_left_out_where_asked() {
     for method in ["taylor", "dp8"] {
         let request = Request { every: Some(0.1), ..request(method, 5.0) };
         let whole = points(&prepared("free", &["bar1.phi=0.1..3.1:7"], &request), 1);
-        let plan = prepared("free", &["bar1.phi=0.1..3.1:7"], &request).ending_at_flips().without(|values| values[0] > 3.0);
+        let plan = prepared("free", &["bar1.phi=0.1..3.1:7"], &request)
+            .ending_at_flips()
+            .without(|values| values[0] > 3.0);
         let ended = points(&plan, 2);
         assert_eq!(ended[6].status, Status::Skipped);
         assert!(ended.iter().any(|point| point.flip.is_some()));
         for (point, whole) in ended.iter().zip(&whole).take(6) {
             assert_eq!((point.flip, &point.status), (whole.flip, &Status::Done), "{method}");
             match point.flip {
-                Some(flip) => assert!(flip.t <= point.t && point.t < flip.t + 0.1 + 1e-9, "{method}: {point:?}"),
+                Some(flip) => {
+                    assert!(flip.t <= point.t && point.t < flip.t + 0.1 + 1e-9, "{method}: {point:?}")
+                }
                 None => assert_eq!(point.t, 5.0),
             }
         }
@@ -343,8 +396,12 @@ mod command {
         let program = Program::with_scenes(&["free"]);
         let mut tables = Vec::new();
         for threads in [1, 2, 3] {
-            program.run(&format!("sweep free.json {GRID} --threads {threads} -q --force --no-charts")).exits(0).stays_silent();
-            tables.push(program.read("output/free/sweep-start.bar1.phi-start.bar2.phi-taylor-1e-9/sweep.csv"));
+            program
+                .run(&format!("sweep free.json {GRID} --threads {threads} -q --force --no-charts"))
+                .exits(0)
+                .stays_silent();
+            tables
+                .push(program.read("output/free/sweep-start.bar1.phi-start.bar2.phi-taylor-1e-9/sweep.csv"));
         }
         assert!(tables[0] == tables[1] && tables[0] == tables[2]);
         let rows = rows(&tables[0]);
@@ -354,8 +411,13 @@ mod command {
             "start.bar1.phi [rad],start.bar2.phi [rad],t [s],bar1.phi [rad],bar1.omega [rad/s],bar2.phi [rad],bar2.omega [rad/s],\
              energy_drift [1],constraint_drift [rad],constraint_rate_drift [rad/s],steps,flip_time [s],flip_bar,status,cause"
         );
-        assert_eq!((rows[1][0].as_str(), rows[1][1].as_str(), rows[4][0].as_str()), ("-3.141592653589793", "-2.0", "-3.141592653589793"));
-        assert!(rows[1..].iter().all(|row| row.len() == rows[0].len() && row[13] == "done" && row[8].is_empty()));
+        assert_eq!(
+            (rows[1][0].as_str(), rows[1][1].as_str(), rows[4][0].as_str()),
+            ("-3.141592653589793", "-2.0", "-3.141592653589793")
+        );
+        assert!(
+            rows[1..].iter().all(|row| row.len() == rows[0].len() && row[13] == "done" && row[8].is_empty())
+        );
         let energies: Vec<f64> = rows[1..].iter().map(|row| row[7].parse().expect("a number")).collect();
         assert!(energies.iter().all(|&energy| energy < 1e-8), "{energies:?}");
     }
@@ -365,21 +427,28 @@ mod command {
         let program = Program::with_scenes(&["free"]);
         let object = program.run(&format!("sweep free.json {GRID} --json --threads 2")).exits(0).object();
         for key in [
-            "scene", "method", "settings", "until", "vary", "points", "done", "stopped", "refused", "flipped", "steps", "energy", "wall_s",
-            "files",
+            "scene", "method", "settings", "until", "vary", "points", "done", "stopped", "refused",
+            "flipped", "steps", "energy", "wall_s", "files",
         ] {
             assert!(object.get(key).is_some(), "no `{key}` in {object}");
         }
-        assert_eq!((&object["points"], &object["done"], &object["method"]), (&36.into(), &36.into(), &"taylor".into()));
+        assert_eq!(
+            (&object["points"], &object["done"], &object["method"]),
+            (&36.into(), &36.into(), &"taylor".into())
+        );
         assert_eq!(object["vary"][1]["path"], "start.bar2.phi");
         let folder = "output/free/sweep-start.bar1.phi-start.bar2.phi-taylor-1e-9";
-        let expected: Vec<String> = ["map.png", "sweep.csv", "sweep.json"].iter().map(|name| format!("{folder}/{name}")).collect();
+        let expected: Vec<String> =
+            ["map.png", "sweep.csv", "sweep.json"].iter().map(|name| format!("{folder}/{name}")).collect();
         assert_eq!(program.files()[1..], expected);
         let picture = std::fs::read(program.path(&expected[0])).expect("a picture");
         assert!(picture.starts_with(b"\x89PNG") && picture.len() > 5000);
         // A second time only by force, and then without what the first left.
         program.run(&format!("sweep free.json {GRID}")).exits(6).says(&["--force"]);
-        program.run(&format!("sweep free.json {GRID} --no-charts --force")).exits(0).shows(&["36 done", "points a second"]);
+        program
+            .run(&format!("sweep free.json {GRID} --no-charts --force"))
+            .exits(0)
+            .shows(&["36 done", "points a second"]);
         assert_eq!(program.files()[1..], expected[1..]);
     }
 
@@ -392,7 +461,8 @@ mod command {
         assert_eq!(program.files(), ["motor.json"], "nothing was written");
         program.run(&format!("{sweep} --map bar2.phi -q")).exits(0).stays_silent();
         assert!(program.files().iter().any(|file| file.ends_with("/profile.png")), "{:?}", program.files());
-        let table = program.read(program.files().iter().find(|file| file.ends_with("sweep.csv")).expect("a table"));
+        let table =
+            program.read(program.files().iter().find(|file| file.ends_with("sweep.csv")).expect("a table"));
         assert!(rows(&table)[1..].iter().all(|row| row[7] == "0.0" && row[12] == "done"), "{table}");
     }
 
@@ -419,8 +489,15 @@ mod command {
         let ran = program.run("sweep spring.json --vary spring.stiffness=-1..9:3 --until 0.5 --json --no-charts --out there").exits(0);
         let object = ran.object();
         assert_eq!((&object["done"], &object["refused"]), (&2.into(), &1.into()));
-        let table = program.read(program.files().iter().find(|file| file.ends_with("sweep.csv")).expect("a table"));
-        assert!(table.lines().nth(1).is_some_and(|row| row.starts_with("-1.0,,,,,,,,,,,refused,") || row.contains(",refused,")), "{table}");
+        let table =
+            program.read(program.files().iter().find(|file| file.ends_with("sweep.csv")).expect("a table"));
+        assert!(
+            table
+                .lines()
+                .nth(1)
+                .is_some_and(|row| row.starts_with("-1.0,,,,,,,,,,,refused,") || row.contains(",refused,")),
+            "{table}"
+        );
     }
 
     #[test]

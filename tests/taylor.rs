@@ -1,4 +1,5 @@
-//! The power series of the motion: against Dormand–Prince, against itself in double-double, at symmetric releases.
+//! The power series of the motion: against Dormand–Prince, against itself in double-double, at symmetric
+//! releases.
 
 use crate::common;
 
@@ -22,7 +23,9 @@ fn end<M: Integrator<Elimination<0>>>(scene: &Scene, mut method: M, until: f64) 
     let mut problem = Elimination::<0>::new(mechanism.clone());
     let mut state = problem.state(&mechanism.start(scene));
     let mut statistics = Default::default();
-    method.advance(&mut problem, &mut state, Time::from(until), &mut statistics, &mut |_, _| Ok(Seen::Kept)).expect("an end");
+    method
+        .advance(&mut problem, &mut state, Time::from(until), &mut statistics, &mut |_, _| Ok(Seen::Kept))
+        .expect("an end");
     let mut motion = Motion::default();
     problem.read(&state, &mut motion);
     motion
@@ -83,7 +86,10 @@ fn extended(kernel: Kernel, tolerance: f64) -> Taylor<f64> {
 
 /// Scenes whose first orders have a kernel in double-double.
 fn extended_scenes() -> Vec<(&'static str, Scene)> {
-    fast_scenes().into_iter().filter(|(name, _)| ["free", "gentle", "spinning", "sideways", "single"].contains(name)).collect()
+    fast_scenes()
+        .into_iter()
+        .filter(|(name, _)| ["free", "gentle", "spinning", "sideways", "single"].contains(name))
+        .collect()
 }
 
 /// Scenes the fast kernels take.
@@ -163,7 +169,10 @@ fn the_error_falls_with_the_tolerance() {
         let exact = end(&scene, Taylor::reference(), 3.0);
         let error = |tolerance| distance(&exact, &end(&scene, on(Kernel::Fastest, tolerance, 20), 3.0));
         let errors = [error(1e-6), error(1e-9), error(1e-12)];
-        assert!(errors[0] > 1e-9 && errors[0] < 1e-3 && errors[1] < 1e-5 && errors[2] < 1e-9, "{name}: {errors:?}");
+        assert!(
+            errors[0] > 1e-9 && errors[0] < 1e-3 && errors[1] < 1e-5 && errors[2] < 1e-9,
+            "{name}: {errors:?}"
+        );
     }
 }
 
@@ -171,8 +180,10 @@ fn the_error_falls_with_the_tolerance() {
 fn portable_lanes_and_hardware_have_the_same_bits() {
     for (name, scene) in fast_scenes() {
         for order in [16, 20, 24] {
-            let (fast, portable) =
-                (end(&scene, on(Kernel::Fastest, 1e-13, order), 2.0), end(&scene, on(Kernel::Portable, 1e-13, order), 2.0));
+            let (fast, portable) = (
+                end(&scene, on(Kernel::Fastest, 1e-13, order), 2.0),
+                end(&scene, on(Kernel::Portable, 1e-13, order), 2.0),
+            );
             assert_eq!(fast, portable, "{name}, order {order}");
         }
     }
@@ -204,7 +215,8 @@ fn orders_in_double_double_keep_energy_a_thousand_times_closer() {
 
 #[test]
 fn a_symmetric_release_takes_no_step_too_long() {
-    // From rest only every fourth coefficient of the rates is not zero; the first step alone must keep its accuracy.
+    // From rest only every fourth coefficient of the rates is not zero; the first step alone must keep its
+    // accuracy.
     let scene = shipped("free", &[]);
     let mechanism = compile(&scene);
     for kernel in [Kernel::Fastest, Kernel::Series] {
@@ -221,7 +233,11 @@ fn a_symmetric_release_takes_no_step_too_long() {
                 .expect("an end");
             let after_one = end(&scene, on(kernel, 1e-12, order), times[0].hi);
             let exact = end(&scene, Taylor::reference(), times[0].hi);
-            assert!(times[0].hi > 0.01 && distance(&after_one, &exact) < 1e-11, "{:e}", distance(&after_one, &exact));
+            assert!(
+                times[0].hi > 0.01 && distance(&after_one, &exact) < 1e-11,
+                "{:e}",
+                distance(&after_one, &exact)
+            );
         }
     }
 }
@@ -240,15 +256,25 @@ fn a_run_continued_from_a_stored_state_has_the_same_bits() {
     for (name, scene) in fast_scenes() {
         let mechanism = compile(&scene);
         let mut problem = Elimination::<0>::new(mechanism.clone());
-        let integrate = |problem: &mut Elimination<0>, state: &mut State, method: &mut Taylor<f64>, until: f64| {
-            method.advance(problem, state, Time::from(until), &mut Statistics::default(), &mut |_, _| Ok(Seen::Kept)).expect("an end");
-        };
+        let integrate =
+            |problem: &mut Elimination<0>, state: &mut State, method: &mut Taylor<f64>, until: f64| {
+                method
+                    .advance(problem, state, Time::from(until), &mut Statistics::default(), &mut |_, _| {
+                        Ok(Seen::Kept)
+                    })
+                    .expect("an end");
+            };
         let mut method = on(Kernel::Fastest, 1e-15, 20);
         let mut whole = problem.state(&mechanism.start(&scene));
         integrate(&mut problem, &mut whole, &mut method, 3.0);
         let mut stored = whole.clone();
         integrate(&mut problem, &mut whole, &mut method, 7.0);
-        integrate(&mut Elimination::<0>::new(mechanism.clone()), &mut stored, &mut on(Kernel::Fastest, 1e-15, 20), 7.0);
+        integrate(
+            &mut Elimination::<0>::new(mechanism.clone()),
+            &mut stored,
+            &mut on(Kernel::Fastest, 1e-15, 20),
+            7.0,
+        );
         assert_eq!(whole, stored, "{name}");
     }
 }
@@ -259,7 +285,9 @@ fn energy_stays_at_rounding_for_a_thousand_seconds() {
         let scene = shipped(name, &[]);
         let mechanism = compile(&scene);
         let mut kernel = Energies::<DoubleDouble>::without_rows(&mechanism);
-        let mut balance = |motion: &Motion| (mechanism.energy(&mut kernel, &motion.phi, &motion.omega).total() - motion.work).hi;
+        let mut balance = |motion: &Motion| {
+            (mechanism.energy(&mut kernel, &motion.phi, &motion.omega).total() - motion.work).hi
+        };
         let before = balance(&mechanism.start(&scene));
         let after = balance(&end(&scene, on(Kernel::Fastest, 1e-19, 24), 1000.0));
         let drift = (after - before).abs() / mechanism.energy_scale;
@@ -273,17 +301,26 @@ fn numbers_out_of_range_are_a_typed_stop() {
     let mechanism = compile(&scene);
     let mut problem = Elimination::<0>::new(mechanism.clone());
     let mut state = problem.state(&mechanism.start(&scene));
-    let stop =
-        on(Kernel::Fastest, 1e-12, 20)
-            .advance(&mut problem, &mut state, Time::from(1.0), &mut Statistics::default(), &mut |_, _| Ok(Seen::Kept));
+    let stop = on(Kernel::Fastest, 1e-12, 20).advance(
+        &mut problem,
+        &mut state,
+        Time::from(1.0),
+        &mut Statistics::default(),
+        &mut |_, _| Ok(Seen::Kept),
+    );
     assert!(stop.is_err());
 }
 
 /// A run by the program's own loop with rows every `every` \[s\], and its samples.
 fn rows(scene: &Scene, every: f64, until: f64) -> (Outcome, Vec<Sample>) {
     let mechanism = compile(scene);
-    let request =
-        Request { method: Some(MethodId::Taylor), rtol: Some(1e-15), until: Some(until), every: Some(every), ..Request::default() };
+    let request = Request {
+        method: Some(MethodId::Taylor),
+        rtol: Some(1e-15),
+        until: Some(until),
+        every: Some(every),
+        ..Request::default()
+    };
     let plan = Plan::new(scene, &mechanism, &request).expect("a sensible pairing");
     let start = mechanism.start(scene);
     let mut samples = Vec::new();
@@ -317,7 +354,9 @@ fn rows_inside_a_step_are_as_exact_as_its_end() {
         for sample in samples.iter().skip(1).step_by(31) {
             let exact = end(&scene, Taylor::reference(), sample.t);
             for k in 0..sample.phi.len() {
-                let apart = (exact.unwrapped(k) - sample.phi[k]).abs().max((exact.omega[k].hi - sample.omega[k]).abs());
+                let apart = (exact.unwrapped(k) - sample.phi[k])
+                    .abs()
+                    .max((exact.omega[k].hi - sample.omega[k]).abs());
                 assert!(apart < 1e-12, "{name} at {} s: {apart:e}", sample.t);
             }
             assert!((exact.work.hi - sample.work).abs() < 1e-12, "{name}");
@@ -327,8 +366,8 @@ fn rows_inside_a_step_are_as_exact_as_its_end() {
     }
 }
 
-/// A four-bar of uniform slender bars under gravity along +x: crank and coupler from the origin, rocker from (0, 0.9), not yet pinned to
-/// the coupler.
+/// A four-bar of uniform slender bars under gravity along +x: crank and coupler from the origin, rocker from
+/// (0, 0.9), not yet pinned to the coupler.
 struct FourBar {
     length: [f64; 3],
     mass: [f64; 3],
@@ -337,38 +376,50 @@ struct FourBar {
 impl FourBar {
     const GROUND: [f64; 2] = [0.0, 0.9];
 
-    /// Angles of all bars at a crank angle, and their rates at crank rate one, from the triangle of coupler and rocker.
+    /// Angles of all bars at a crank angle, and their rates at crank rate one, from the triangle of coupler
+    /// and rocker.
     fn posture(&self, q: f64) -> ([f64; 3], [f64; 3]) {
         let [a, b, c] = self.length;
         let elbow = [a * q.cos(), a * q.sin()];
         let gap = [Self::GROUND[0] - elbow[0], Self::GROUND[1] - elbow[1]];
         let distance = gap[0].hypot(gap[1]);
-        let coupler = gap[1].atan2(gap[0]) - ((b * b + distance * distance - c * c) / (2.0 * b * distance)).acos();
+        let coupler =
+            gap[1].atan2(gap[0]) - ((b * b + distance * distance - c * c) / (2.0 * b * distance)).acos();
         let tip = [elbow[0] + b * coupler.cos(), elbow[1] + b * coupler.sin()];
         let rocker = (tip[1] - Self::GROUND[1]).atan2(tip[0] - Self::GROUND[0]);
         let across = (rocker - coupler).sin();
-        ([q, coupler, rocker], [1.0, -a * (rocker - q).sin() / (b * across), -a * (coupler - q).sin() / (c * across)])
+        (
+            [q, coupler, rocker],
+            [1.0, -a * (rocker - q).sin() / (b * across), -a * (coupler - q).sin() / (c * across)],
+        )
     }
 
     /// Energy at crank rate one, half the effective inertia, and potential energy.
     fn energies(&self, q: f64) -> (f64, f64) {
         let (phi, rate) = self.posture(q);
-        let arm = |k: usize, share: f64| [share * self.length[k] * phi[k].cos(), share * self.length[k] * phi[k].sin()];
+        let arm = |k: usize, share: f64| {
+            [share * self.length[k] * phi[k].cos(), share * self.length[k] * phi[k].sin()]
+        };
         let turned = |[x, y]: [f64; 2], w: f64| [-y * w, x * w];
         let add = |[x, y]: [f64; 2], [u, v]: [f64; 2]| [x + u, y + v];
         let centre = [arm(0, 0.5), add(arm(0, 1.0), arm(1, 0.5)), add(Self::GROUND, arm(2, 0.5))];
-        let speed =
-            [turned(arm(0, 0.5), rate[0]), add(turned(arm(0, 1.0), rate[0]), turned(arm(1, 0.5), rate[1])), turned(arm(2, 0.5), rate[2])];
+        let speed = [
+            turned(arm(0, 0.5), rate[0]),
+            add(turned(arm(0, 1.0), rate[0]), turned(arm(1, 0.5), rate[1])),
+            turned(arm(2, 0.5), rate[2]),
+        ];
         let mut sums = (0.0, 0.0);
         for k in 0..3 {
             let inertia = self.mass[k] * self.length[k] * self.length[k] / 12.0;
-            sums.0 += 0.5 * self.mass[k] * (speed[k][0].powi(2) + speed[k][1].powi(2)) + 0.5 * inertia * rate[k] * rate[k];
+            sums.0 += 0.5 * self.mass[k] * (speed[k][0].powi(2) + speed[k][1].powi(2))
+                + 0.5 * inertia * rate[k] * rate[k];
             sums.1 -= self.mass[k] * 9.81 * centre[k][0];
         }
         sums
     }
 
-    /// Time from one crank angle to another: the integral of sqrt(T_1/(E - V)) by Gauss's rule of three points on many pieces.
+    /// Time from one crank angle to another: the integral of sqrt(T_1/(E - V)) by Gauss's rule of three
+    /// points on many pieces.
     fn time(&self, from: f64, to: f64, energy: f64) -> f64 {
         let pieces = 4000;
         let width = (to - from) / f64::from(pieces);
@@ -379,7 +430,9 @@ impl FourBar {
         let offset = 0.5 * 0.6_f64.sqrt() * width;
         let piece = |i: i32| {
             let middle = from + (f64::from(i) + 0.5) * width;
-            width * (5.0 * slowness(middle - offset) + 8.0 * slowness(middle) + 5.0 * slowness(middle + offset)) / 18.0
+            width
+                * (5.0 * slowness(middle - offset) + 8.0 * slowness(middle) + 5.0 * slowness(middle + offset))
+                / 18.0
         };
         (0..pieces).map(piece).sum()
     }
@@ -396,8 +449,17 @@ impl FourBar {
         for k in 0..3 {
             let (length, mass) = (self.length[k], self.mass[k]);
             let inertia = mass * length * length / 12.0;
-            scene.bars.push(Bar { name: format!("bar{k}"), length, mass, centre: [0.5 * length, 0.0], inertia });
-            let between = [Place { bar: origin_point[k].0, point: origin_point[k].1 }, Place { bar: Some(k), point: [0.0, 0.0] }];
+            scene.bars.push(Bar {
+                name: format!("bar{k}"),
+                length,
+                mass,
+                centre: [0.5 * length, 0.0],
+                inertia,
+            });
+            let between = [
+                Place { bar: origin_point[k].0, point: origin_point[k].1 },
+                Place { bar: Some(k), point: [0.0, 0.0] },
+            ];
             scene.hinges.push(Hinge { name: format!("hinge{k}"), between });
             scene.start.push(Start { phi: phi[k], omega: rate * rates[k] });
         }
@@ -411,10 +473,19 @@ impl FourBar {
 const FOUR_BAR: FourBar = FourBar { length: [0.3, 1.0, 0.8], mass: [0.5, 1.2, 0.9] };
 
 /// Integrates a mechanism by multipliers.
-fn bordered<M: Integrator<Multiplier<0, true>>>(mechanism: &Arc<Mechanism>, start: &Motion, mut method: M, until: f64) -> Motion {
+fn bordered<M: Integrator<Multiplier<0, true>>>(
+    mechanism: &Arc<Mechanism>,
+    start: &Motion,
+    mut method: M,
+    until: f64,
+) -> Motion {
     let mut form = Multiplier::<0, true>::new(Arc::clone(mechanism));
     let mut state = form.state(start);
-    method.advance(&mut form, &mut state, Time::from(until), &mut Statistics::default(), &mut |_, _| Ok(Seen::Kept)).expect("an end");
+    method
+        .advance(&mut form, &mut state, Time::from(until), &mut Statistics::default(), &mut |_, _| {
+            Ok(Seen::Kept)
+        })
+        .expect("an end");
     let mut motion = Motion::default();
     form.read(&state, &mut motion);
     motion
@@ -426,7 +497,11 @@ fn opening(mechanism: &Mechanism, motion: &Motion) -> [f64; 2] {
     let mut worst = [0.0_f64; 2];
     for row in &mechanism.constraints {
         let mut jacobian = vec![DoubleDouble::default(); z.len()];
-        let here = row.linearise(motion.time, Posture { phi: &motion.phi, z: &z, omega: &motion.omega }, &mut jacobian);
+        let here = row.linearise(
+            motion.time,
+            Posture { phi: &motion.phi, z: &z, omega: &motion.omega },
+            &mut jacobian,
+        );
         let rate = jacobian.iter().zip(&motion.omega).fold(here.drive, |sum, (&g, &w)| sum + g * w);
         worst = [worst[0].max(here.position.hi.abs()), worst[1].max(rate.hi.abs())];
     }
@@ -451,7 +526,10 @@ fn a_closed_loop_keeps_time_with_its_one_degree_of_freedom() {
         assert!((time - until).abs() < 2e-12, "{:e} s off", time - until);
         let (phi, rates) = FOUR_BAR.posture(crank);
         for k in 0..3 {
-            assert!((Complex::unit(phi[k]) - Complex::unit(last.phi[k].hi)).norm_squared().sqrt() < 1e-13, "bar {k}");
+            assert!(
+                (Complex::unit(phi[k]) - Complex::unit(last.phi[k].hi)).norm_squared().sqrt() < 1e-13,
+                "bar {k}"
+            );
             assert!((rates[k] * last.omega[0].hi - last.omega[k].hi).abs() < 1e-12, "bar {k}");
         }
         let [position, velocity] = opening(&mechanism, &last);
@@ -465,9 +543,14 @@ fn a_closed_loop_in_double_double_is_the_limit_of_plain_ones() {
     let reference = bordered(&mechanism, &start, Taylor::reference(), 0.5);
     let other = bordered(&mechanism, &start, Taylor::<DoubleDouble>::with_order(1e-33, 36), 0.5);
     assert!(distance(&reference, &other) < 1e-26, "{:e}", distance(&reference, &other));
-    let error = |tolerance| distance(&reference, &bordered(&mechanism, &start, Taylor::<f64>::with_order(tolerance, 20), 0.5));
+    let error = |tolerance| {
+        distance(&reference, &bordered(&mechanism, &start, Taylor::<f64>::with_order(tolerance, 20), 0.5))
+    };
     let errors = [error(1e-6), error(1e-9), error(1e-12), error(1e-17)];
-    assert!(errors[0] > 1e-9 && errors[0] < 1e-3 && errors[1] < 1e-6 && errors[2] < 1e-9 && errors[3] < 1e-13, "{errors:?}");
+    assert!(
+        errors[0] > 1e-9 && errors[0] < 1e-3 && errors[1] < 1e-6 && errors[2] < 1e-9 && errors[3] < 1e-13,
+        "{errors:?}"
+    );
 }
 
 #[test]
@@ -475,8 +558,11 @@ fn motors_by_multipliers_move_as_eliminated_ones() {
     let mut relative = shipped("motor_sine", &[]);
     relative.motors[0].relative_to = Some(0);
     relative.motors[0].bar = 1;
-    relative.start[1] = Start { phi: relative.start[0].phi + FRAC_PI_2, omega: relative.start[0].omega + ONE_TURN + 1.0 };
-    for (name, scene) in [("motor", shipped("motor", &[])), ("motor_sine", shipped("motor_sine", &[])), ("relative", relative)] {
+    relative.start[1] =
+        Start { phi: relative.start[0].phi + FRAC_PI_2, omega: relative.start[0].omega + ONE_TURN + 1.0 };
+    for (name, scene) in
+        [("motor", shipped("motor", &[])), ("motor_sine", shipped("motor_sine", &[])), ("relative", relative)]
+    {
         let mechanism = compile(&scene);
         let start = mechanism.start(&scene);
         let eliminated = end(&scene, on(Kernel::Series, 1e-17, 24), 1.0);
@@ -492,8 +578,14 @@ fn motors_by_multipliers_move_as_eliminated_ones() {
 #[test]
 fn extended_orders_leave_less_than_a_plain_double() {
     let damped = ["springs.spring.damping=0.3"];
-    let cases: [(&str, &[&str]); 6] =
-        [("free", &[]), ("gentle", &[]), ("spring", &[]), ("spring", &damped), ("motor_sine", &[]), ("branch", &[])];
+    let cases: [(&str, &[&str]); 6] = [
+        ("free", &[]),
+        ("gentle", &[]),
+        ("spring", &[]),
+        ("spring", &damped),
+        ("motor_sine", &[]),
+        ("branch", &[]),
+    ];
     for (name, overrides) in cases {
         let scene = shipped(name, overrides);
         let exact = end(&scene, Taylor::reference(), 1.0);
@@ -552,7 +644,10 @@ fn symmetric_releases_and_equilibria_take_finite_steps() {
                     assert_eq!((&last.phi, &last.omega), (&start.phi, &start.omega), "{name}");
                 }
                 let fastest = last.omega.iter().fold(0.0, |most: f64, omega| most.max(omega.hi.abs()));
-                assert!(!name.starts_with("nearly hanging") || fastest < 1e-299, "{name}, {kernel:?} of order {order}: {fastest:e}");
+                assert!(
+                    !name.starts_with("nearly hanging") || fastest < 1e-299,
+                    "{name}, {kernel:?} of order {order}: {fastest:e}"
+                );
             }
         }
     }
@@ -582,7 +677,9 @@ fn a_march_goes_on_bit_for_bit_from_where_its_last_step_began() {
             (from, inside)
         };
         let finish = |form: &mut Elimination<0>, method: &mut Taylor<f64>, state: &mut State| {
-            method.advance(form, state, horizon, &mut Statistics::default(), &mut |_, _| Ok(Seen::Kept)).expect("an end");
+            method
+                .advance(form, state, horizon, &mut Statistics::default(), &mut |_, _| Ok(Seen::Kept))
+                .expect("an end");
         };
         let mut form = Elimination::<0>::new(mechanism.clone());
         let mut method = on(Kernel::Fastest, 1e-15, 20);
@@ -590,7 +687,8 @@ fn a_march_goes_on_bit_for_bit_from_where_its_last_step_began() {
         let (from, inside) = pass(&mut form, &mut method, &mut whole);
         assert!(from.time < row && inside.time == row && whole.time > row);
         finish(&mut form, &mut method, &mut whole);
-        let (mut form, mut method, mut again) = (Elimination::<0>::new(mechanism.clone()), on(Kernel::Fastest, 1e-15, 20), from);
+        let (mut form, mut method, mut again) =
+            (Elimination::<0>::new(mechanism.clone()), on(Kernel::Fastest, 1e-15, 20), from);
         assert_eq!(pass(&mut form, &mut method, &mut again).1, inside, "{name}");
         finish(&mut form, &mut method, &mut again);
         assert_eq!(again, whole, "{name}");
@@ -603,13 +701,22 @@ fn extended_orders_are_asked_for_by_name_and_of_taylor_only() {
     let mechanism = compile(&scene);
     let request = Request { extended: true, until: Some(20.0), ..Request::default() };
     let plan = Plan::new(&scene, &mechanism, &request).expect("a sensible request");
-    assert_eq!((plan.method, plan.extended, plan.tolerance.map(|t| t.relative)), (MethodId::Taylor, true, Some(1e-20)));
+    assert_eq!(
+        (plan.method, plan.extended, plan.tolerance.map(|t| t.relative)),
+        (MethodId::Taylor, true, Some(1e-20))
+    );
     assert_eq!(plan.folder(&mechanism), "taylor-1e-20-extended");
     let outcome = common::run(&scene, &request);
     assert!(outcome.stop.is_none() && outcome.drift.energy.max < 1e-17, "{:e}", outcome.drift.energy.max);
-    for (method, rtol, what) in [(MethodId::Dp8, None, "--extended"), (MethodId::Taylor, Some(1e-26), "--rtol")] {
-        let refusal = Plan::new(&scene, &mechanism, &Request { method: Some(method), rtol, ..request.clone() }).expect_err("a refusal");
+    for (method, rtol, what) in
+        [(MethodId::Dp8, None, "--extended"), (MethodId::Taylor, Some(1e-26), "--rtol")]
+    {
+        let refusal =
+            Plan::new(&scene, &mechanism, &Request { method: Some(method), rtol, ..request.clone() })
+                .expect_err("a refusal");
         assert!(refusal.is_usage && refusal.what == what, "{refusal}");
     }
-    assert!(Plan::new(&scene, &mechanism, &Request { rtol: Some(1e-20), extended: false, ..request }).is_err());
+    assert!(
+        Plan::new(&scene, &mechanism, &Request { rtol: Some(1e-20), extended: false, ..request }).is_err()
+    );
 }

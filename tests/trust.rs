@@ -48,7 +48,13 @@ fn every_shipped_scene_has_a_reference_that_runs_come_near() {
         // `kite` passes a singular position, `wall` is struck at a moment found in doubles.
         let known_to = if ["kite", "wall"].contains(name) { 1e-12 } else { 1e-20 };
         assert!(found.accuracy.iter().all(|&off| off < known_to), "{name}: {:?}", found.accuracy);
-        let request = Request { method: Some(MethodId::Taylor), rtol: Some(1e-13), until: Some(t), every: Some(t), ..Request::default() };
+        let request = Request {
+            method: Some(MethodId::Taylor),
+            rtol: Some(1e-13),
+            until: Some(t),
+            every: Some(t),
+            ..Request::default()
+        };
         let last = run(&scene, &request).last;
         let exact = &found.motions[1];
         let off = (0..last.phi.len()).map(|k| (last.phi[k] - exact.unwrapped(k)).abs()).fold(0.0, f64::max);
@@ -155,9 +161,13 @@ fn requests() -> Vec<Request> {
     ] {
         requests.extend(tolerances.iter().map(|&rtol| Request { rtol: Some(rtol), ..by(name) }));
     }
-    for (name, shares) in
-        [("gauss4", &[1.0, 0.25][..]), ("gauss8", &[1.0, 0.5]), ("gauss16", &[1.0, 0.5]), ("rattle4", &[0.25]), ("rattle8", &[0.25])]
-    {
+    for (name, shares) in [
+        ("gauss4", &[1.0, 0.25][..]),
+        ("gauss8", &[1.0, 0.5]),
+        ("gauss16", &[1.0, 0.5]),
+        ("rattle4", &[0.25]),
+        ("rattle8", &[0.25]),
+    ] {
         requests.extend(shares.iter().map(|&share| Request { step: Some(share), ..by(name) }));
     }
     requests
@@ -177,8 +187,11 @@ impl Table {
             let step = request.step.map(|share| share * scene.every);
             let request = Request { step, every: Some(scene.every), ..request.clone() };
             let Ok(plan) = Plan::new(scene, &mechanism, &request) else { continue };
-            let label =
-                format!("{name}, {}, {:e}", plan.method, plan.step.unwrap_or_else(|| plan.tolerance.expect("one of both").relative));
+            let label = format!(
+                "{name}, {}, {:e}",
+                plan.method,
+                plan.step.unwrap_or_else(|| plan.tolerance.expect("one of both").relative)
+            );
             if plan.rows as usize + 1 != times.len() {
                 continue;
             }
@@ -208,8 +221,17 @@ impl Table {
             let marks = [1.0, 2.0, 5.0, 10.0, 20.0].into_iter().filter(|&t| t < 0.9 * end);
             for t in marks.chain([end]) {
                 let truth = truth[truth_at(&times, t)][1];
-                let told = trust.record.iter().take_while(|point| point[0] <= t * (1.0 + 1e-9)).last().map_or(0.0, |point| 1.2 * point[1]);
-                let told = if t == end && trust.horizon.is_none() { trust.error_estimate.expect("a figure") } else { told.max(2e-15) };
+                let told = trust
+                    .record
+                    .iter()
+                    .take_while(|point| point[0] <= t * (1.0 + 1e-9))
+                    .last()
+                    .map_or(0.0, |point| 1.2 * point[1]);
+                let told = if t == end && trust.horizon.is_none() {
+                    trust.error_estimate.expect("a figure")
+                } else {
+                    told.max(2e-15)
+                };
                 if (1e-12..1e-2).contains(&truth) && known(t, truth) {
                     self.points.push(Point { class, label: label.clone(), t, told, truth });
                 }
@@ -231,7 +253,8 @@ impl Table {
         }
     }
 
-    /// Prints the table, with all that was missed, and holds it against what it must reach: so large a share inside, and so small a one below.
+    /// Prints the table, with all that was missed, and holds it against what it must reach: so large a share
+    /// inside, and so small a one below.
     fn judge(&self, inside_least: f64, below_most: f64) {
         let mut classes: Vec<&str> = self.points.iter().map(|point| point.class).collect();
         classes.sort_unstable();
@@ -239,15 +262,25 @@ impl Table {
         println!("{:10} {:>6} {:>9} {:>9} {:>8} {:>8}", "class", "cases", "inside", "below", "5 %", "95 %");
         let mut all = [0, 0, 0];
         for class in classes {
-            let mut ratios: Vec<f64> =
-                self.points.iter().filter(|point| point.class == class).map(|point| point.told / point.truth).collect();
+            let mut ratios: Vec<f64> = self
+                .points
+                .iter()
+                .filter(|point| point.class == class)
+                .map(|point| point.told / point.truth)
+                .collect();
             ratios.sort_by(f64::total_cmp);
             let count = ratios.len();
             let inside = ratios.iter().filter(|ratio| (1.0 / 3.0..=10.0).contains(*ratio)).count();
             let below = ratios.iter().filter(|ratio| **ratio < 1.0 / 3.0).count();
             let at = |share: f64| ratios[((count - 1) as f64 * share).round() as usize];
             let percent = |part: usize| 100.0 * part as f64 / count as f64;
-            println!("{class:10} {count:6} {:8.2}% {:8.2}% {:8.2} {:8.2}", percent(inside), percent(below), at(0.05), at(0.95));
+            println!(
+                "{class:10} {count:6} {:8.2}% {:8.2}% {:8.2} {:8.2}",
+                percent(inside),
+                percent(below),
+                at(0.05),
+                at(0.95)
+            );
             all = [all[0] + count, all[1] + inside, all[2] + below];
         }
         let percent = |part: usize| 100.0 * part as f64 / all[0] as f64;
@@ -258,7 +291,8 @@ impl Table {
             }
         }
         self.without.iter().for_each(|without| println!("no figure: {without}"));
-        let chaotic: Vec<&Ending> = self.endings.iter().filter(|ending| ending.is_chaotic && ending.horizons[1].is_some()).collect();
+        let chaotic: Vec<&Ending> =
+            self.endings.iter().filter(|ending| ending.is_chaotic && ending.horizons[1].is_some()).collect();
         let close = |ending: &Ending| match ending.horizons {
             [Some(told), Some(truth)] => (told / truth - 1.0).abs() <= 0.2,
             _ => false,
@@ -266,10 +300,14 @@ impl Table {
         let right = chaotic.iter().filter(|ending| close(ending)).count();
         println!("horizons of chaotic runs within 20 %: {right} of {}", chaotic.len());
         for ending in self.endings.iter().filter(|ending| ending.horizons[1].is_some() && !close(ending)) {
-            println!("horizon missed: {}: told {:?}, truth {:?}", ending.label, ending.horizons[0], ending.horizons[1]);
+            println!(
+                "horizon missed: {}: told {:?}, truth {:?}",
+                ending.label, ending.horizons[0], ending.horizons[1]
+            );
         }
         let lost: Vec<&Ending> = self.endings.iter().filter(|ending| ending.is_lost).collect();
-        let unflagged: Vec<&str> = lost.iter().filter(|ending| !ending.is_flagged).map(|ending| ending.label.as_str()).collect();
+        let unflagged: Vec<&str> =
+            lost.iter().filter(|ending| !ending.is_flagged).map(|ending| ending.label.as_str()).collect();
         println!("lost: {}, of them not flagged: {unflagged:?}", lost.len());
         let share = |part: usize| part as f64 / all[0] as f64;
         assert!(share(all[1]) >= inside_least && share(all[2]) <= below_most, "{all:?}");
@@ -344,7 +382,10 @@ fn a_run_has_the_same_bits_whatever_is_asked_of_its_trust() {
         assert_eq!(off.trust, None, "{name}");
         for other in [auto, full] {
             let trust = other.trust.as_ref().expect("asked for");
-            assert!(trust.error_estimate.is_some_and(|error| error > 0.0 && error < 0.01), "{name}: {trust:?}");
+            assert!(
+                trust.error_estimate.is_some_and(|error| error > 0.0 && error < 0.01),
+                "{name}: {trust:?}"
+            );
             assert_eq!(
                 (&off.last, off.statistics, &off.trace, &off.impacts),
                 (&other.last, other.statistics, &other.trace, &other.impacts),
@@ -374,8 +415,8 @@ fn a_run_that_was_taken_down_has_the_same_figures() {
                 break;
             }
             sittings += 1;
-            running =
-                Running::resume(Arc::clone(&mechanism), &mechanism.start(&scene), running.snapshot()).expect("a snapshot of this run");
+            running = Running::resume(Arc::clone(&mechanism), &mechanism.start(&scene), running.snapshot())
+                .expect("a snapshot of this run");
         }
         let parts = running.finish();
         assert!(sittings > 2, "{name}");
@@ -419,7 +460,10 @@ fn the_tangent_flow_is_symplectic_in_momenta() {
                 let terms = (0..n).map(|k| [a[k] * b[n + k], b[k] * a[n + k]]);
                 terms.fold([0.0, 0.0], |[sum, size], [x, y]| [sum + x - y, size + x.abs() + y.abs()])
             };
-            (0..2 * n).flat_map(|a| (0..a).map(move |b| (a, b))).map(|(a, b)| product(&differences[a], &differences[b])).collect()
+            (0..2 * n)
+                .flat_map(|a| (0..a).map(move |b| (a, b)))
+                .map(|(a, b)| product(&differences[a], &differences[b]))
+                .collect()
         };
         let mut tangent = Tangent::whole(&mechanism, &start, 2.0).expect("a flow");
         let before = products(&start, &tangent.columns());
@@ -444,15 +488,21 @@ fn the_tangent_flow_is_symplectic_in_momenta() {
 fn a_run_past_its_horizon_is_flagged_and_its_exponent_is_told() {
     let scene = shipped("free", &[]);
     for (method, setting) in [("taylor", 1e-15), ("gauss16", 0.005), ("dop853", 1e-9)] {
-        let trust = trusted(&scene, &asked(method, setting, 60.0, 0.01), Level::Auto).trust.expect("asked for");
+        let trust =
+            trusted(&scene, &asked(method, setting, 60.0, 0.01), Level::Auto).trust.expect("asked for");
         assert!(trust.is_past() && trust.lost.is_some_and(|lost| lost > trust.at), "{method}: {trust:?}");
         assert_eq!((trust.horizon, trust.error_estimate), (Some(trust.at), Some(1.2e-3)), "{method}");
         // 1.55 ± 0.02 per s over 1e5 s.
         let found = trust.lyapunov.expect("a chaotic motion");
-        assert!((found.exponent - 1.55).abs() < 0.02 + 3.0 * found.uncertainty && found.uncertainty < 0.5, "{method}: {found:?}");
+        assert!(
+            (found.exponent - 1.55).abs() < 0.02 + 3.0 * found.uncertainty && found.uncertainty < 0.5,
+            "{method}: {found:?}"
+        );
         assert!(trust.input_error.is_some_and(|error| error > 0.0), "{method}");
     }
-    let regular = trusted(&shipped("gentle", &[]), &asked("taylor", 1e-9, 60.0, 0.05), Level::Auto).trust.expect("asked for");
+    let regular = trusted(&shipped("gentle", &[]), &asked("taylor", 1e-9, 60.0, 0.05), Level::Auto)
+        .trust
+        .expect("asked for");
     assert_eq!((regular.horizon, regular.lyapunov, regular.how), (None, None, How::ReferenceSolution));
 }
 
@@ -460,17 +510,23 @@ fn a_run_past_its_horizon_is_flagged_and_its_exponent_is_told() {
 fn what_the_budget_does_not_pay_for_is_carried_on_and_said_to_be() {
     let scene = shipped("gentle", &[]);
     let request = asked("taylor", 1e-9, 20_000.0, 1000.0);
-    let [auto, full] = [Level::Auto, Level::Full].map(|level| trusted(&scene, &request, level).trust.expect("asked for"));
-    assert!(matches!(auto.how, How::Extrapolated(from) if from < 20_000.0 && from == auto.covered), "{auto:?}");
+    let [auto, full] =
+        [Level::Auto, Level::Full].map(|level| trusted(&scene, &request, level).trust.expect("asked for"));
+    assert!(
+        matches!(auto.how, How::Extrapolated(from) if from < 20_000.0 && from == auto.covered),
+        "{auto:?}"
+    );
     assert!(auto.why.is_some() && full.how == How::ReferenceSolution);
     let ratio = auto.error_estimate.expect("a figure") / full.error_estimate.expect("a figure");
     assert!((1.0 / 3.0..10.0).contains(&ratio), "{ratio}");
 }
 
-/// A stiff damped spring costs an implicit method nothing and a series a million steps a second: `full` stops where the run itself would have to.
+/// A stiff damped spring costs an implicit method nothing and a series a million steps a second: `full` stops
+/// where the run itself would have to.
 #[test]
 fn full_trust_takes_no_more_evaluations_than_a_run_may() {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/stress/spring_damped_1e12.json");
+    let path =
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/stress/spring_damped_1e12.json");
     let scene = driftless::scene::read_scene(&path, &[]).expect("a shipped scene");
     let request = Request { max_evaluations: Some(20_000), ..asked("radau5", 1e-6, 1.0, 0.1) };
     let outcome = trusted(&scene, &request, Level::Full);
@@ -479,7 +535,8 @@ fn full_trust_takes_no_more_evaluations_than_a_run_may() {
     assert!(trust.covered < 1.0 && trust.cut().is_some_and(|why| why.contains("expansions")), "{trust:?}");
 }
 
-/// What a run says of itself, but for how long it took: dense methods and fixed steps do not know of output times.
+/// What a run says of itself, but for how long it took: dense methods and fixed steps do not know of output
+/// times.
 #[test]
 fn estimates_depend_neither_on_output_times_nor_on_rests() {
     for (name, method, setting) in [
@@ -492,12 +549,15 @@ fn estimates_depend_neither_on_output_times_nor_on_rests() {
     ] {
         let scene = shipped(name, &[]);
         let at = |every: f64| asked(method, setting, 20.0, every);
-        let [coarse, fine] = [20.0, 0.1].map(|every| trusted(&scene, &at(every), Level::Auto).trust.expect("asked for"));
+        let [coarse, fine] =
+            [20.0, 0.1].map(|every| trusted(&scene, &at(every), Level::Auto).trust.expect("asked for"));
         assert_eq!(coarse, fine, "{name} by {method}");
         let mechanism = compile(&scene);
         let start = mechanism.start(&scene);
         let plan = Plan::new(&scene, &mechanism, &at(1.0)).expect("a plan");
-        let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).expect("a run").trusted(Level::Auto, &start);
+        let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start)
+            .expect("a run")
+            .trusted(Level::Auto, &start);
         let (mut running, mut rests) = (Running::new(run), 0);
         let mut left = 37;
         while !running
@@ -508,7 +568,8 @@ fn estimates_depend_neither_on_output_times_nor_on_rests() {
             .expect("no observer fails")
         {
             (rests, left) = (rests + 1, 37);
-            running = Running::resume(Arc::clone(&mechanism), &start, running.snapshot()).expect("a snapshot of this run");
+            running = Running::resume(Arc::clone(&mechanism), &start, running.snapshot())
+                .expect("a snapshot of this run");
         }
         assert!(rests > 1, "{name} by {method}");
         assert_eq!(running.finish().trust, Some(coarse), "{name} by {method}");
@@ -519,12 +580,19 @@ fn estimates_depend_neither_on_output_times_nor_on_rests() {
 #[test]
 fn horizons_are_right_however_coarse_the_output_is() {
     let scene = shipped("free", &[]);
-    for (method, setting, every, horizon) in
-        [("taylor", 1e-9, 40.0, 11.8), ("taylor", 1e-9, 0.01, 11.8), ("dopri5", 1e-5, 20.0, 3.0), ("dopri5", 1e-5, 40.0, 3.0)]
-    {
-        let trust = trusted(&scene, &asked(method, setting, 40.0, every), Level::Auto).trust.expect("asked for");
+    for (method, setting, every, horizon) in [
+        ("taylor", 1e-9, 40.0, 11.8),
+        ("taylor", 1e-9, 0.01, 11.8),
+        ("dopri5", 1e-5, 20.0, 3.0),
+        ("dopri5", 1e-5, 40.0, 3.0),
+    ] {
+        let trust =
+            trusted(&scene, &asked(method, setting, 40.0, every), Level::Auto).trust.expect("asked for");
         let found = trust.horizon.expect("it is lost long before");
-        assert!((found / horizon - 1.0).abs() < 0.03, "{method}, every {every} s: {found} instead of {horizon}");
+        assert!(
+            (found / horizon - 1.0).abs() < 0.03,
+            "{method}, every {every} s: {found} instead of {horizon}"
+        );
     }
 }
 
@@ -551,7 +619,8 @@ fn told_and_true(scene: &Scene, request: &Request) -> [[f64; 2]; 2] {
     [[trust.error_estimate.expect("a figure"), most[0]], [trust.rate_error.expect("a figure"), most[1]]]
 }
 
-/// Runs near rounding have reference solutions that are finer than that, with any number of bodies, with loops and with sliders.
+/// Runs near rounding have reference solutions that are finer than that, with any number of bodies, with
+/// loops and with sliders.
 #[test]
 fn companions_are_finer_than_the_runs_they_judge() {
     for (name, method, setting, until) in [
@@ -562,9 +631,16 @@ fn companions_are_finer_than_the_runs_they_judge() {
         ("four_bars", "rattle8", 0.002, 0.5),
         ("spring", "gauss12", 0.005, 4.0),
     ] {
-        let [[told, truth], [told_rate, rate]] = told_and_true(&shipped(name, &[]), &asked(method, setting, until, 0.05));
-        assert!(told > truth / 3.0 && told < (10.0 * truth).max(1e-13), "{name} by {method}: {told:e} for {truth:e}");
-        assert!(told_rate > rate / 3.0 && told_rate < (10.0 * rate).max(1e-11), "{name} by {method}, rates: {told_rate:e} for {rate:e}");
+        let [[told, truth], [told_rate, rate]] =
+            told_and_true(&shipped(name, &[]), &asked(method, setting, until, 0.05));
+        assert!(
+            told > truth / 3.0 && told < (10.0 * truth).max(1e-13),
+            "{name} by {method}: {told:e} for {truth:e}"
+        );
+        assert!(
+            told_rate > rate / 3.0 && told_rate < (10.0 * rate).max(1e-11),
+            "{name} by {method}, rates: {told_rate:e} for {rate:e}"
+        );
     }
 }
 
@@ -573,8 +649,17 @@ fn companions_are_finer_than_the_runs_they_judge() {
 fn extended_runs_are_judged_in_double_double() {
     let request = Request { extended: true, ..asked("taylor", 1e-20, 10.0, 0.5) };
     let trust = trusted(&shipped("free", &[]), &request, Level::Auto).trust.expect("asked for");
-    assert!(trust.error_estimator.as_ref().is_some_and(|name| name.contains("in double-double")), "{:?}", trust.error_estimator);
-    assert!(trust.error_estimate.is_some_and(|error| error < 1e-13), "{:?}, {:?}", trust.error_estimate, trust.why);
+    assert!(
+        trust.error_estimator.as_ref().is_some_and(|name| name.contains("in double-double")),
+        "{:?}",
+        trust.error_estimator
+    );
+    assert!(
+        trust.error_estimate.is_some_and(|error| error < 1e-13),
+        "{:?}, {:?}",
+        trust.error_estimate,
+        trust.why
+    );
 }
 
 #[test]
@@ -590,7 +675,8 @@ fn rates_and_torques_have_estimates_of_their_own() {
         let mechanism = compile(&scene);
         let start = mechanism.start(&scene);
         let plan = Plan::new(&scene, &mechanism, &asked("dp8", rtol, 4.0, 0.05)).expect("a plan");
-        let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a run").trusted(Level::Auto, &start);
+        let run =
+            Run::new(mechanism, plan, Limits::default(), &start).expect("a run").trusted(Level::Auto, &start);
         let outcome = integrate(run, &mut |sample| {
             torques.push(sample.motors[0][0]);
             Ok(())
@@ -605,16 +691,24 @@ fn rates_and_torques_have_estimates_of_their_own() {
 
 #[test]
 fn the_reason_for_no_estimate_is_told() {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/stress/spring_damped_1e12.json");
+    let path =
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/stress/spring_damped_1e12.json");
     let scene = driftless::scene::read_scene(&path, &[]).expect("a shipped scene");
     let trust = trusted(&scene, &asked("radau5", 1e-6, 1.0, 0.1), Level::Auto).trust.expect("asked for");
-    assert!(trust.covered < 1.0 && trust.why.as_ref().is_some_and(|why| why.contains("share of the run")), "{:?}", trust.why);
+    assert!(
+        trust.covered < 1.0 && trust.why.as_ref().is_some_and(|why| why.contains("share of the run")),
+        "{:?}",
+        trust.why
+    );
 }
 
 #[test]
 fn what_run_and_companion_share_is_told() {
     let of = |name: &str, method: &str| {
-        trusted(&shipped(name, &[]), &asked(method, 1e-9, 0.5, 0.1), Level::Auto).trust.expect("asked for").shared
+        trusted(&shipped(name, &[]), &asked(method, 1e-9, 0.5, 0.1), Level::Auto)
+            .trust
+            .expect("asked for")
+            .shared
     };
     assert_eq!(of("free", "taylor"), ["compilation"]);
     assert_eq!(of("wall", "dp8"), ["impact law", "compilation"]);
@@ -622,8 +716,9 @@ fn what_run_and_companion_share_is_told() {
     assert_eq!(of("motor", "taylor"), ["elimination of motors", "compilation"]);
 }
 
-/// Of a run by the series at its default settings the reference solution takes little more work than the run itself, and the tangent flow a share of that: beside
-/// what the output of these scenes costs that is about a third (`.ci/cost`).
+/// Of a run by the series at its default settings the reference solution takes little more work than the run
+/// itself, and the tangent flow a share of that: beside what the output of these scenes costs that is about a
+/// third (`.ci/cost`).
 #[test]
 fn companions_take_little_more_work_than_their_runs() {
     for name in SCENES {
@@ -636,9 +731,17 @@ fn companions_take_little_more_work_than_their_runs() {
         let trust = outcome.trust.expect("asked for");
         let [error_estimator, flow, run] = trust.work;
         let units = 1e5;
-        println!("{name}: companion {:.2}, flow {:.2}, run {:.2}", error_estimator / units, flow / units, run / units);
+        println!(
+            "{name}: companion {:.2}, flow {:.2}, run {:.2}",
+            error_estimator / units,
+            flow / units,
+            run / units
+        );
         assert!(error_estimator > flow && run > 0.0, "{name}");
         assert!(flow < 0.5 * run + 2.6 * units, "{name}: the flow took {flow:e} beside {run:e}");
-        assert!(error_estimator - flow < 2.0 * run + 5.0 * units, "{name}: the companion took {error_estimator:e} beside {run:e}");
+        assert!(
+            error_estimator - flow < 2.0 * run + 5.0 * units,
+            "{name}: the companion took {error_estimator:e} beside {run:e}"
+        );
     }
 }

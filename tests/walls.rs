@@ -1,4 +1,5 @@
-//! Walls with sliders, bodies that hang on nothing, and loops: impacts, rest, sliding and release against closed forms.
+//! Walls with sliders, bodies that hang on nothing, and loops: impacts, rest, sliding and release against
+//! closed forms.
 
 use crate::common;
 
@@ -9,7 +10,8 @@ use serde_json::{Value, json};
 
 const G: f64 = 9.81;
 /// Every method that takes walls.
-const METHODS: [MethodId; 5] = [MethodId::Dp5, MethodId::Dp8, MethodId::Taylor, MethodId::Radau(3), MethodId::Radau(5)];
+const METHODS: [MethodId; 5] =
+    [MethodId::Dp5, MethodId::Dp8, MethodId::Taylor, MethodId::Radau(3), MethodId::Radau(5)];
 
 fn read(scene: &Value) -> Scene {
     let mut scene = scene.clone();
@@ -19,7 +21,13 @@ fn read(scene: &Value) -> Scene {
 
 /// A run to its end, and its samples.
 fn seen(scene: &Value, method: MethodId, until: f64, every: f64, rtol: f64) -> (Outcome, Vec<Sample>) {
-    let request = Request { method: Some(method), until: Some(until), every: Some(every), rtol: Some(rtol), ..Request::default() };
+    let request = Request {
+        method: Some(method),
+        until: Some(until),
+        every: Some(every),
+        rtol: Some(rtol),
+        ..Request::default()
+    };
     let scene = read(scene);
     let mechanism = compile(&scene);
     let plan = Plan::new(&scene, &mechanism, &request).expect("a sensible pairing");
@@ -77,7 +85,8 @@ fn a_ball_bounces_to_rest_as_in_the_textbook() {
         for (height, e) in [(10.0, 0.5), (0.5, 0.5), (0.5, 0.0), (2.0, 0.8)] {
             let first = f64::sqrt(2.0 * height / G);
             let rest = first * (1.0 + e) / (1.0 - e);
-            let (outcome, samples) = through(&ball([3.0, height], [0.7, 0.0], e), method, 1.3 * rest, 0.013 * rest);
+            let (outcome, samples) =
+                through(&ball([3.0, height], [0.7, 0.0], e), method, 1.3 * rest, 0.013 * rest);
             assert_eq!((samples[0].phi[2], samples[0].omega[2]), (height, 0.0));
             for sample in &samples {
                 let (y, v) = bouncing(height, e, sample.t);
@@ -96,7 +105,11 @@ fn a_ball_bounces_to_rest_as_in_the_textbook() {
                 close(strike.energy_lost, 0.5 * (1.0 - e * e) * speed * speed, 1e-8 * speed * speed, "loss");
                 t += 2.0 * e.powi(k as i32 + 1) * first;
             }
-            assert_eq!((outcome.persistent_contact_count, outcome.holds[0].until), (1, None), "{method} e = {e}");
+            assert_eq!(
+                (outcome.persistent_contact_count, outcome.holds[0].until),
+                (1, None),
+                "{method} e = {e}"
+            );
             close(outcome.holds[0].t, rest, 1e-4 * rest, "rest");
             close(outcome.impact_loss, G * height, 1e-8 * G * height, "all of the height");
         }
@@ -128,7 +141,8 @@ fn a_cart_meets_its_stops_where_they_are() {
         // A gap of 1e-12 of its distance counts as none.
         close(outcome.impacts[0].t, 1.0, 2e-12, "time");
         close(outcome.last.phi[1], 0.5, 4e-12, "place");
-        let (outcome, _) = through(&cart(2.0, 1.0, &[("right", 3.0, -1.0), ("left", -0.5, 1.0)], 0.5), method, 20.0, 0.1);
+        let (outcome, _) =
+            through(&cart(2.0, 1.0, &[("right", 3.0, -1.0), ("left", -0.5, 1.0)], 0.5), method, 20.0, 0.1);
         // Right at 1 s, left 3.5 m further at half the speed, right again at a quarter.
         let times: Vec<f64> = outcome.impacts.iter().map(|strike| strike.t).collect();
         assert_eq!(times.len(), 2);
@@ -136,7 +150,8 @@ fn a_cart_meets_its_stops_where_they_are() {
         close(times[1], 8.0, 1e-10, "left");
         close(outcome.last.phi[1], -0.5 + 0.25 * 12.0, 1e-10, "place");
         // Elastic stops, two hundred times.
-        let (outcome, _) = through(&cart(0.25, 1.0, &[("right", 1.0, -1.0), ("left", 0.0, 1.0)], 1.0), method, 200.0, 1.0);
+        let (outcome, _) =
+            through(&cart(0.25, 1.0, &[("right", 1.0, -1.0), ("left", 0.0, 1.0)], 1.0), method, 200.0, 1.0);
         assert_eq!(outcome.impact_count, 200);
         close(outcome.last.phi[1], 0.25, 1e-9, "place");
     }
@@ -219,8 +234,12 @@ fn the_block_of_a_slider_crank_meets_a_stop() {
         let psi = -(r * phi.sin() / l).asin();
         let d_psi = -r * phi.cos() / (l * psi.cos());
         let dx = -r * phi.sin() - l * psi.sin() * d_psi;
-        let centre = [-r * phi.sin() - 0.5 * l * psi.sin() * d_psi, r * phi.cos() + 0.5 * l * psi.cos() * d_psi];
-        let inertia = crank_inertia + rod_mass * (centre[0].powi(2) + centre[1].powi(2)) + rod_inertia * d_psi * d_psi + block * dx * dx;
+        let centre =
+            [-r * phi.sin() - 0.5 * l * psi.sin() * d_psi, r * phi.cos() + 0.5 * l * psi.cos() * d_psi];
+        let inertia = crank_inertia
+            + rod_mass * (centre[0].powi(2) + centre[1].powi(2))
+            + rod_inertia * d_psi * d_psi
+            + block * dx * dx;
         let mass = inertia / (dx * dx);
         let (outcome, _) = seen(&scene, method, 2.0, 0.01, rtol);
         assert_eq!(outcome.stop, None, "{method}");
@@ -233,8 +252,12 @@ fn the_block_of_a_slider_crank_meets_a_stop() {
             let psi = -(r * phi.sin() / l).asin();
             let d_psi = -r * phi.cos() / (l * psi.cos());
             let dx = -r * phi.sin() - l * psi.sin() * d_psi;
-            let centre = [-r * phi.sin() - 0.5 * l * psi.sin() * d_psi, r * phi.cos() + 0.5 * l * psi.cos() * d_psi];
-            crank_inertia + rod_mass * (centre[0].powi(2) + centre[1].powi(2)) + rod_inertia * d_psi * d_psi + block * dx * dx
+            let centre =
+                [-r * phi.sin() - 0.5 * l * psi.sin() * d_psi, r * phi.cos() + 0.5 * l * psi.cos() * d_psi];
+            crank_inertia
+                + rod_mass * (centre[0].powi(2) + centre[1].powi(2))
+                + rod_inertia * d_psi * d_psi
+                + block * dx * dx
         };
         let energy = 0.5 * at_start(1.9) * 4.0;
         close(0.5 * mass * strike.approach.powi(2), energy, most, "energy before");
@@ -258,7 +281,8 @@ fn a_ladder_between_two_rails_meets_a_stop() {
         });
         let (outcome, samples) = through(&scene, method, 0.6, 0.01);
         let strike = &outcome.impacts[0];
-        // About the corner the rod swings as a pendulum of inertia I + m half²: the centre is always half away from it.
+        // About the corner the rod swings as a pendulum of inertia I + m half²: the centre is always half
+        // away from it.
         let whole = inertia + m * half * half;
         let phi = 0.8f64.acos();
         let rate = -(0.25 + 2.0 * m * G * half * (1.2f64.sin() - phi.sin()) / whole).sqrt();
@@ -274,7 +298,8 @@ fn a_ladder_between_two_rails_meets_a_stop() {
 fn a_platform_on_redundant_cranks_meets_a_wall() {
     let (r, platform, crank, e) = (0.5, 2.0, 0.1, 0.5);
     for method in METHODS {
-        let bar = |name: &str| json!({"name": name, "mass": 1, "centre": [0, 0], "inertia": crank, "length": r});
+        let bar =
+            |name: &str| json!({"name": name, "mass": 1, "centre": [0, 0], "inertia": crank, "length": r});
         let origin_point = |k: usize| json!({"name": format!("O{k}"), "between": [{"body": "ground", "point": [k, 0]}, {"body": format!("c{k}"), "point": [0, 0]}]});
         let head = |k: usize| json!({"name": format!("P{k}"), "between": [{"body": format!("c{k}"), "point": [r, 0]}, {"body": "platform", "point": [k, 0]}]});
         let scene = json!({
@@ -304,7 +329,10 @@ fn held_points_slide_and_are_lifted() {
         let mut scene = ball([0.0, 0.0], [0.0, 0.0], 0.0);
         scene["walls"][0]["line"]["normal"] = json!([-angle.sin(), angle.cos()]);
         let (outcome, samples) = through(&scene, method, 3.0, 0.1);
-        assert_eq!((outcome.impact_count, outcome.persistent_contact_count, outcome.holds[0].until), (0, 1, None));
+        assert_eq!(
+            (outcome.impact_count, outcome.persistent_contact_count, outcome.holds[0].until),
+            (0, 1, None)
+        );
         for sample in &samples {
             let way = 0.5 * G * angle.sin() * sample.t * sample.t;
             close(sample.phi[1], -way * angle.cos(), 1e-9, "x");
@@ -328,8 +356,7 @@ fn held_points_slide_and_are_lifted() {
 fn a_ball_slides_into_a_corner() {
     for method in METHODS {
         let mut scene = ball([1.0, 0.0], [-1.0, 0.0], 0.0);
-        let wall =
-            json!({"name": "wall", "body": "ball", "point": [0, 0], "line": {"through": [0, 0], "normal": [1, 0]}, "restitution": 0.5});
+        let wall = json!({"name": "wall", "body": "ball", "point": [0, 0], "line": {"through": [0, 0], "normal": [1, 0]}, "restitution": 0.5});
         scene["walls"].as_array_mut().expect("walls").push(wall);
         scene["gravity"] = json!([-1.0, -G]);
         let (outcome, samples) = through(&scene, method, 8.0, 0.05);
@@ -365,7 +392,8 @@ fn units_do_not_matter() {
     let scaled = |m: f64, l: f64, t: f64| {
         let (v, g, i) = (l / t, G * l / (t * t), m * l * l);
         let wall = |name: &str, body: &str, point: [f64; 2], through: [f64; 2], normal: [f64; 2]| json!({"name": name, "body": body, "point": point.map(|x| x * l), "line": {"through": through.map(|x| x * l), "normal": normal}, "restitution": 0.5});
-        // A ball that bounces to rest, a cart that carries a pole between two stops, and a bar on a hinge that falls on a wall.
+        // A ball that bounces to rest, a cart that carries a pole between two stops, and a bar on a hinge
+        // that falls on a wall.
         json!({
             "gravity": [0, -g],
             "bars": [
@@ -399,8 +427,10 @@ fn units_do_not_matter() {
             reference.impact_count,
             reference.persistent_contact_count
         );
-        for (mass, length, time) in
-            [-9i32, -6, -3, 3, 6].into_iter().flat_map(|k| [(k, 0, 0), (0, k, 0), (0, 0, k)]).chain([(9, 0, 0), (-9, -9, -6), (9, 6, 3)])
+        for (mass, length, time) in [-9i32, -6, -3, 3, 6]
+            .into_iter()
+            .flat_map(|k| [(k, 0, 0), (0, k, 0), (0, 0, k)])
+            .chain([(9, 0, 0), (-9, -9, -6), (9, 6, 3)])
         {
             let [m, l, t] = [mass, length, time].map(|k| 10f64.powi(k));
             if time < -6 {
@@ -412,7 +442,12 @@ fn units_do_not_matter() {
             for (sample, plain) in samples.iter().zip(&plain) {
                 let unit = |k: usize| if k < 4 { 1.0 } else { l };
                 for k in 0..sample.phi.len() {
-                    close(sample.phi[k] / unit(k), plain.phi[k], 1e-7, &format!("{what}: coordinate {k} at {} s", plain.t));
+                    close(
+                        sample.phi[k] / unit(k),
+                        plain.phi[k],
+                        1e-7,
+                        &format!("{what}: coordinate {k} at {} s", plain.t),
+                    );
                 }
             }
             for (strike, plain) in outcome.impacts.iter().zip(&reference.impacts).take(10) {

@@ -1,6 +1,8 @@
-//! Work takes part in step-size control, the limits on the energy follow the tolerance, and nothing of the motion before an impact is remembered after it.
+//! Work takes part in step-size control, the limits on the energy follow the tolerance, and nothing of the
+//! motion before an impact is remembered after it.
 //!
-//! References are closed forms: of one driven bar, of a driven Scotch yoke, and of a bar on a torsion spring with a damper between elastic impacts.
+//! References are closed forms: of one driven bar, of a driven Scotch yoke, and of a bar on a torsion spring
+//! with a damper between elastic impacts.
 
 use crate::common;
 use crate::random;
@@ -19,7 +21,9 @@ use driftless::stabilization::{Projected, SymmetricGauss};
 use driftless::stepping::composition::Composition;
 use driftless::stepping::gauss::Gauss;
 use driftless::stepping::rattle::Rattle;
-use driftless::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Integrator, Radau, Seen, Statistics, Taylor, Tolerance};
+use driftless::stepping::{
+    Cause, Dop853, Dopri5, Dp5, Dp8, Integrator, Radau, Seen, Statistics, Taylor, Tolerance,
+};
 use std::sync::Arc;
 use trees::{Dice, tree};
 
@@ -43,7 +47,8 @@ fn finished(scene: &Scene, request: &Request) -> Outcome {
     outcome
 }
 
-/// One bar driven by a sine, and nothing left to integrate but the work: a bar of 1 kg, its centre 0.5 m off the hinge, 0.083 kg·m² about it.
+/// One bar driven by a sine, and nothing left to integrate but the work: a bar of 1 kg, its centre 0.5 m off
+/// the hinge, 0.083 kg·m² about it.
 fn sine_bar() -> Scene {
     scene(
         r#"{"gravity": [0, -9.81], "until": 2, "every": 0.5, "start": {},
@@ -70,12 +75,16 @@ fn the_work_on_one_driven_bar_is_the_change_of_its_energy() {
             let outcome = finished(&scene, &at(method, rtol));
             let off = (outcome.last.work - work).abs();
             assert!(off < 20.0 * rtol, "{method} at {rtol:e}: work off by {off:.1e} J");
-            assert!((outcome.last.motors[0][0] - torque).abs() < 1e-12 * torque.abs().max(1.0) * 10.0, "{method}");
+            assert!(
+                (outcome.last.motors[0][0] - torque).abs() < 1e-12 * torque.abs().max(1.0) * 10.0,
+                "{method}"
+            );
         }
     }
 }
 
-/// A motor turns a crank at 10 rad/s, whose pin carries a yoke of 2 kg to and fro: x = r cos 10 t, and the work is the yoke's kinetic energy.
+/// A motor turns a crank at 10 rad/s, whose pin carries a yoke of 2 kg to and fro: x = r cos 10 t, and the
+/// work is the yoke's kinetic energy.
 #[test]
 fn the_work_on_a_scotch_yoke_is_its_kinetic_energy() {
     let scene = scene(
@@ -106,7 +115,8 @@ fn the_work_on_a_scotch_yoke_is_its_kinetic_energy() {
     }
 }
 
-/// The torsion spring of [`bouncing`]: I phi'' = -k (phi - a) - c phi', a wall at sin phi = -0.4 with elastic impacts.
+/// The torsion spring of [`bouncing`]: I phi'' = -k (phi - a) - c phi', a wall at sin phi = -0.4 with elastic
+/// impacts.
 struct Bounce {
     inertia: f64,
     stiffness: f64,
@@ -135,7 +145,10 @@ impl Bounce {
         loop {
             // The first passage of the wall, on a grid far finer than the oscillation, then by bisection.
             let step = 1e-4;
-            let first = (1..).map(|i| f64::from(i) * step).take_while(|s| s - step < left).find(|&s| self.motion(state, s)[0] < wall);
+            let first = (1..)
+                .map(|i| f64::from(i) * step)
+                .take_while(|s| s - step < left)
+                .find(|&s| self.motion(state, s)[0] < wall);
             let Some(after) = first else { return (self.motion(state, left), impacts) };
             let (mut low, mut high) = (after - step, after);
             for _ in 0..60 {
@@ -171,9 +184,21 @@ fn the_energy_of_a_damped_torsion_spring_is_kept_through_elastic_impacts() {
             // Each of the impacts hands on the error of its time.
             let (last, most) = (&outcome.last, 1000.0 * rtol + 1e-11);
             assert_eq!(outcome.impact_count, impacts, "{method} at {rtol:e}");
-            assert!((last.work - lost).abs() < most, "{method} at {rtol:e}: work {:.1e} J off", last.work - lost);
-            assert!((last.phi[0] - phi).abs() < most, "{method} at {rtol:e}: {:.1e} rad off", last.phi[0] - phi);
-            assert!((last.omega[0] - omega).abs() < 10.0 * most, "{method} at {rtol:e}: {:.1e} rad/s off", last.omega[0] - omega);
+            assert!(
+                (last.work - lost).abs() < most,
+                "{method} at {rtol:e}: work {:.1e} J off",
+                last.work - lost
+            );
+            assert!(
+                (last.phi[0] - phi).abs() < most,
+                "{method} at {rtol:e}: {:.1e} rad off",
+                last.phi[0] - phi
+            );
+            assert!(
+                (last.omega[0] - omega).abs() < 10.0 * most,
+                "{method} at {rtol:e}: {:.1e} rad/s off",
+                last.omega[0] - omega
+            );
         }
     }
 }
@@ -183,14 +208,16 @@ fn the_energy_of_a_damped_torsion_spring_is_kept_through_elastic_impacts() {
 fn the_work_of_fixed_steps_has_the_order_of_the_method() {
     let scene = sine_bar();
     let (work, _) = sine_bar_exact(2.0);
-    for (method, coarsest) in [(MethodId::Gauss(2), 0.1), (MethodId::Gauss(3), 0.25), (MethodId::Gauss(4), 0.5)]
-        .into_iter()
-        .chain([(MethodId::Rattle(Composition::Single), 0.05), (MethodId::Rattle(Composition::Suzuki5), 0.05)])
+    for (method, coarsest) in
+        [(MethodId::Gauss(2), 0.1), (MethodId::Gauss(3), 0.25), (MethodId::Gauss(4), 0.5)].into_iter().chain(
+            [(MethodId::Rattle(Composition::Single), 0.05), (MethodId::Rattle(Composition::Suzuki5), 0.05)],
+        )
     {
         let points: Vec<(f64, f64)> = (0..4)
             .map(|halvings| coarsest / f64::from(1 << halvings))
             .map(|step| {
-                let outcome = run(&scene, &Request { method: Some(method), step: Some(step), ..Request::default() });
+                let outcome =
+                    run(&scene, &Request { method: Some(method), step: Some(step), ..Request::default() });
                 (step, (outcome.last.work - work).abs())
             })
             .collect();
@@ -200,7 +227,8 @@ fn the_work_of_fixed_steps_has_the_order_of_the_method() {
     }
 }
 
-/// A stiff spring in double-double keeps its energy to what is left of rounding there: no constant of it is rounded to a double.
+/// A stiff spring in double-double keeps its energy to what is left of rounding there: no constant of it is
+/// rounded to a double.
 #[test]
 fn extended_series_of_stiff_springs_keep_more_digits_than_plain_ones() {
     let scene = scene(
@@ -214,7 +242,11 @@ fn extended_series_of_stiff_springs_keep_more_digits_than_plain_ones() {
                          "stiffness": 2.0e6, "free_length": 1.1}]}"#,
     );
     let plain = finished(&scene, &at(MethodId::Taylor, 1e-14)).drift.energy.max;
-    let extended = finished(&scene, &Request { method: Some(MethodId::Taylor), extended: true, ..Request::default() }).drift.energy.max;
+    let extended =
+        finished(&scene, &Request { method: Some(MethodId::Taylor), extended: true, ..Request::default() })
+            .drift
+            .energy
+            .max;
     assert!(extended < 0.1 * plain && extended < 1e-18, "extended {extended:.1e}, plain {plain:.1e}");
 }
 
@@ -238,7 +270,8 @@ fn judged(imbalance: f64, rtol: f64, steps: u64) -> Result<(), String> {
     drift.see(&sample, &Limits::default(), steps)
 }
 
-/// Energy that is off by more than errors at the tolerance explain is no success, however far below 1e-2; loose tolerances and many steps have more room.
+/// Energy that is off by more than errors at the tolerance explain is no success, however far below 1e-2;
+/// loose tolerances and many steps have more room.
 #[test]
 fn the_limit_on_the_energy_follows_the_tolerance() {
     for (imbalance, rtol, steps, is_well) in [
@@ -270,8 +303,12 @@ fn honest_runs_of_all_shipped_scenes_keep_the_limits() {
         for method in adaptive() {
             for rtol in [1e-3, 1e-5, 1e-7, 1e-9, 1e-12] {
                 let until = Some(scene.until.min(3.0));
-                let request =
-                    Request { until, every: Some(scene.until.min(3.0) / 10.0), max_evaluations: Some(200_000), ..at(method, rtol) };
+                let request = Request {
+                    until,
+                    every: Some(scene.until.min(3.0) / 10.0),
+                    max_evaluations: Some(200_000),
+                    ..at(method, rtol)
+                };
                 if Plan::new(&scene, &mechanism, &request).is_err() {
                     continue;
                 }
@@ -290,8 +327,15 @@ fn honest_runs_of_all_shipped_scenes_keep_the_limits() {
     println!("nearest to its limit: {closest:.1e} of it");
 }
 
-/// Integrates a method to `t` \[s\], has every rate jump there, and asserts that it goes on as another one that knows nothing but the step proposed.
-fn forgets<P: Form + ?Sized, M: Integrator<P>>(make: impl Fn() -> M, problem: &mut P, start: &Motion, t: f64, is_stepping: bool) {
+/// Integrates a method to `t` \[s\], has every rate jump there, and asserts that it goes on as another one
+/// that knows nothing but the step proposed.
+fn forgets<P: Form + ?Sized, M: Integrator<P>>(
+    make: impl Fn() -> M,
+    problem: &mut P,
+    start: &Motion,
+    t: f64,
+    is_stepping: bool,
+) {
     let mut used = make();
     let mut state = problem.state(start);
     let advance = |method: &mut M, problem: &mut P, state: &mut driftless::dynamics::State, until: f64| {
@@ -314,7 +358,11 @@ fn forgets<P: Form + ?Sized, M: Integrator<P>>(make: impl Fn() -> M, problem: &m
     let mut other = jumped.clone();
     advance(&mut used, problem, &mut jumped, 2.0 * t);
     advance(&mut make(), problem, &mut other, 2.0 * t);
-    assert!(jumped.y == other.y && jumped.low == other.low && jumped.memory == other.memory, "{}", used.name());
+    assert!(
+        jumped.y == other.y && jumped.low == other.low && jumped.memory == other.memory,
+        "{}",
+        used.name()
+    );
 }
 
 #[test]
@@ -346,7 +394,8 @@ fn methods_forget_the_motion_before_a_jump_and_keep_the_step() {
     forgets(|| SymmetricGauss::new(Gauss::new(2, 1e-4).expect("a method")), &mut form, &start, 0.003, false);
 }
 
-/// Random trees, with and without motors, by every adaptive method at every tolerance: none is taken for wrong.
+/// Random trees, with and without motors, by every adaptive method at every tolerance: none is taken for
+/// wrong.
 #[test]
 fn honest_runs_of_random_trees_keep_the_limits() {
     let (mut judged, mut closest) = (0, 0.0_f64);
@@ -363,7 +412,11 @@ fn honest_runs_of_random_trees_keep_the_limits() {
                 }
                 let outcome = run(&scene, &request);
                 let (off, limit) = (outcome.drift.energy_share, outcome.drift.energy_limit());
-                assert!(limit >= 1e-2 || off <= limit, "{seed} {method} {rtol:e}: {off:.1e} of {limit:.1e}: {:?}", outcome.stop);
+                assert!(
+                    limit >= 1e-2 || off <= limit,
+                    "{seed} {method} {rtol:e}: {off:.1e} of {limit:.1e}: {:?}",
+                    outcome.stop
+                );
                 judged += usize::from(limit < 1e-2);
                 closest = if limit < 1e-2 { closest.max(off / limit) } else { closest };
             }
@@ -372,7 +425,8 @@ fn honest_runs_of_random_trees_keep_the_limits() {
     println!("{judged} runs judged by their tolerance, the nearest to its limit at {closest:.1e} of it");
 }
 
-/// Random scenes with numbers far out: runs that fail by their tolerance alone are few, and the motion of those is wrong beyond the tolerance; `WORK=20000` has more.
+/// Random scenes with numbers far out: runs that fail by their tolerance alone are few, and the motion of
+/// those is wrong beyond the tolerance; `WORK=20000` has more.
 #[test]
 fn what_fails_by_its_tolerance_is_wrong() {
     let (mut judged, mut failed, mut harmless) = (0, 0, Vec::new());
@@ -387,10 +441,13 @@ fn what_fails_by_its_tolerance_is_wrong() {
         let rtol = 10f64.powi(-3 - (hash(index + 7) % 10) as i32);
         let integrate = |request: &Request| -> Option<Outcome> {
             let plan = Plan::new(&scene, &mechanism, request).ok()?;
-            let run = driftless::run::Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).ok()?;
+            let run =
+                driftless::run::Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).ok()?;
             driftless::run::integrate(run, &mut |_| Ok(())).ok()
         };
-        let Some(outcome) = integrate(&Request { max_evaluations: Some(20_000), ..at(method, rtol) }) else { continue };
+        let Some(outcome) = integrate(&Request { max_evaluations: Some(20_000), ..at(method, rtol) }) else {
+            continue;
+        };
         let (off, limit) = (outcome.drift.energy_share, outcome.drift.energy_limit());
         judged += usize::from(limit < 1e-2 && outcome.stop.is_none());
         if limit >= 1e-2 || off <= limit || off.is_nan() {
@@ -398,13 +455,22 @@ fn what_fails_by_its_tolerance_is_wrong() {
         }
         failed += 1;
         let t = outcome.last.t;
-        let finer = Request { until: Some(t), every: Some(t), max_evaluations: Some(400_000), ..at(MethodId::Dp8, 1e-13) };
+        let finer = Request {
+            until: Some(t),
+            every: Some(t),
+            max_evaluations: Some(400_000),
+            ..at(MethodId::Dp8, 1e-13)
+        };
         let Some(reference) = integrate(&finer).filter(|reference| reference.stop.is_none()) else {
             println!("{index} {method} {rtol:.0e}: energy {off:.1e}, limit {limit:.1e}, no reference");
             continue;
         };
-        let apart =
-            outcome.last.phi.iter().zip(&reference.last.phi).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs() / b.abs().max(1.0)));
+        let apart = outcome
+            .last
+            .phi
+            .iter()
+            .zip(&reference.last.phi)
+            .fold(0.0, |most: f64, (a, b)| most.max((a - b).abs() / b.abs().max(1.0)));
         let work = (outcome.last.work - reference.last.work).abs() / mechanism.energy_scale;
         println!(
             "{index} {method} {rtol:.0e}: energy {off:.1e}, limit {limit:.1e}, {apart:.1e} rad and work {work:.1e} from the reference"
@@ -413,7 +479,10 @@ fn what_fails_by_its_tolerance_is_wrong() {
             harmless.push(index);
         }
     }
-    println!("{judged} runs judged by their tolerance, {failed} failed by it, {} of these without harm: {harmless:?}", harmless.len());
+    println!(
+        "{judged} runs judged by their tolerance, {failed} failed by it, {} of these without harm: {harmless:?}",
+        harmless.len()
+    );
     assert!(failed * 50 <= judged, "{failed} of {judged}");
 }
 

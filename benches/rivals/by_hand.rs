@@ -62,7 +62,11 @@ impl TwoBars {
     /// The crate `differential-equations` by its Verner 9(8) pair.
     pub fn verner(&self, start: &Motion, until: f64, tolerance: f64) -> Motion {
         let method = ExplicitRungeKutta::rkv988e().rtol(tolerance).atol(tolerance).max_steps(10_000_000);
-        let solution = IVP::ode(self, 0.0, until, unknowns(start)).t_eval([until]).method(method).solve().expect("an end");
+        let solution = IVP::ode(self, 0.0, until, unknowns(start))
+            .t_eval([until])
+            .method(method)
+            .solve()
+            .expect("an end");
         motion(solution.y.last().copied().unwrap_or_default())
     }
 }

@@ -23,7 +23,8 @@ fn both(tolerance: f64) -> Tolerance {
 
 /// Everything that fits a problem.
 pub fn all(problem: &Problem) -> Vec<Candidate<'_>> {
-    let mut all: Vec<Candidate> = [None, Some(16), Some(20), Some(24)].into_iter().map(|order| taylor(problem, order)).collect();
+    let mut all: Vec<Candidate> =
+        [None, Some(16), Some(20), Some(24)].into_iter().map(|order| taylor(problem, order)).collect();
     if Batch::takes(&problem.mechanism) {
         all.extend([16, 20, 24].map(|order| batch(problem, order)));
     }
@@ -32,9 +33,18 @@ pub fn all(problem: &Problem) -> Vec<Candidate<'_>> {
         if problem.mechanism.constraints.is_empty() {
             let hand = TwoBars::of(&problem.mechanism);
             let each = move |integrate: fn(&TwoBars, &Motion, f64, f64) -> Motion| -> Runner {
-                Box::new(move |tolerance| problem.starts.iter().map(|start| integrate(&hand, start, problem.until, tolerance)).collect())
+                Box::new(move |tolerance| {
+                    problem
+                        .starts
+                        .iter()
+                        .map(|start| integrate(&hand, start, problem.until, tolerance))
+                        .collect()
+                })
             };
-            all.push(Candidate { name: "ode_solvers Dop853, by hand".into(), run: each(TwoBars::ode_solvers) });
+            all.push(Candidate {
+                name: "ode_solvers Dop853, by hand".into(),
+                run: each(TwoBars::ode_solvers),
+            });
             all.push(Candidate { name: "differential-equations rkv988e".into(), run: each(TwoBars::verner) });
         }
     }
@@ -53,7 +63,9 @@ pub fn taylor(problem: &Problem, order: Option<usize>) -> Candidate<'_> {
         }
         ends(&mut form, &starts, |form, state| {
             let mut statistics = Default::default();
-            method.advance(form, state, Time::from(problem.until), &mut statistics, &mut |_, _| Ok(Seen::Kept)).is_ok()
+            method
+                .advance(form, state, Time::from(problem.until), &mut statistics, &mut |_, _| Ok(Seen::Kept))
+                .is_ok()
         })
     };
     let name = order.map_or("taylor".into(), |order| format!("taylor, order {order}"));
@@ -65,8 +77,13 @@ pub fn batch(problem: &Problem, order: usize) -> Candidate<'_> {
     let mut form = Elimination::<0>::new(Arc::clone(&problem.mechanism));
     let starts = problem.states();
     let run = move |tolerance: f64| {
-        let mut members: Vec<BatchMember> = starts.iter().map(|start| BatchMember::new(&problem.mechanism, start.clone())).collect();
-        Batch::new(both(tolerance)).with_order(order).integrate(&mut members, Time::from(problem.until), &mut |_, _| Going::On);
+        let mut members: Vec<BatchMember> =
+            starts.iter().map(|start| BatchMember::new(&problem.mechanism, start.clone())).collect();
+        Batch::new(both(tolerance)).with_order(order).integrate(
+            &mut members,
+            Time::from(problem.until),
+            &mut |_, _| Going::On,
+        );
         let states: Vec<State> = members.into_iter().map(|member| member.state).collect();
         ends(&mut form, &states, |_, _| true)
     };
@@ -75,8 +92,10 @@ pub fn batch(problem: &Problem, order: usize) -> Candidate<'_> {
 
 /// `dop853` as the program runs it, one window to the end.
 fn dop853(problem: &Problem) -> Candidate<'_> {
-    let (mut multiplier, mut elimination) =
-        (Multiplier::<2, false>::new(Arc::clone(&problem.mechanism)), Elimination::<2>::new(Arc::clone(&problem.mechanism)));
+    let (mut multiplier, mut elimination) = (
+        Multiplier::<2, false>::new(Arc::clone(&problem.mechanism)),
+        Elimination::<2>::new(Arc::clone(&problem.mechanism)),
+    );
     let run = move |tolerance: f64| {
         let mut method = Dop853::new(both(tolerance));
         let (until, mut statistics) = (Time::from(problem.until), Default::default());
@@ -96,7 +115,11 @@ fn dop853(problem: &Problem) -> Candidate<'_> {
 }
 
 /// The motions at the ends of the integrations.
-fn ends<F: Form>(form: &mut F, starts: &[State], mut integrate: impl FnMut(&mut F, &mut State) -> bool) -> Vec<Motion> {
+fn ends<F: Form>(
+    form: &mut F,
+    starts: &[State],
+    mut integrate: impl FnMut(&mut F, &mut State) -> bool,
+) -> Vec<Motion> {
     starts
         .iter()
         .map(|start| {

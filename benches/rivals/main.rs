@@ -1,9 +1,11 @@
 //! Time at equal true error: this crate beside `ode_solvers` and `differential-equations`, in one process.
 //!
-//! `cargo bench --bench rivals [SCENE…]`: sixteen starts within half a milliradian of the scene's own (a chaotic scene judged by one start is judged by luck);
-//! every candidate walks down a ladder of tolerances until the geometric mean of its errors at the end is below the target; then all are timed in alternating blocks.
-//! Errors are the largest difference in an angle \[rad\] or a rate \[rad/s\] from a double-double run that shares the constants and the starts to the bit;
-//! times are microseconds per simulated second and trajectory, minimum and median of the blocks.
+//! `cargo bench --bench rivals [SCENE…]`: sixteen starts within half a milliradian of the scene's own (a
+//! chaotic scene judged by one start is judged by luck); every candidate walks down a ladder of tolerances
+//! until the geometric mean of its errors at the end is below the target; then all are timed in alternating
+//! blocks. Errors are the largest difference in an angle \[rad\] or a rate \[rad/s\] from a double-double run
+//! that shares the constants and the starts to the bit; times are microseconds per simulated second and
+//! trajectory, minimum and median of the blocks.
 //!
 //! With `--angles` rates are not judged: those of fast bars are ten times and more as far off.
 //!
@@ -34,9 +36,17 @@ fn main() {
         return serve::serve();
     }
     let wanted: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
-    let cases: [(&str, &[f64]); 5] =
-        [("free", &[1e-6, 1e-9]), ("gentle", &[1e-12]), ("motor", &[1e-9]), ("chain3", &[1e-7]), ("chain6", &[1e-8])];
-    println!("{:8} {:>6}  {:36} {:>8} {:>8} {:>9} {:>9}", "scene", "target", "code", "setting", "error", "min us/s", "median");
+    let cases: [(&str, &[f64]); 5] = [
+        ("free", &[1e-6, 1e-9]),
+        ("gentle", &[1e-12]),
+        ("motor", &[1e-9]),
+        ("chain3", &[1e-7]),
+        ("chain6", &[1e-8]),
+    ];
+    println!(
+        "{:8} {:>6}  {:36} {:>8} {:>8} {:>9} {:>9}",
+        "scene", "target", "code", "setting", "error", "min us/s", "median"
+    );
     for (name, targets) in cases {
         if !wanted.is_empty() && !wanted.iter().any(|word| word == name) {
             continue;
@@ -45,7 +55,8 @@ fn main() {
         problem.with_rates = std::env::args().all(|word| word != "--angles");
         let mut candidates = candidates::all(&problem);
         for &target in targets {
-            let settings: Vec<_> = candidates.iter_mut().map(|candidate| setting(candidate, &problem, target)).collect();
+            let settings: Vec<_> =
+                candidates.iter_mut().map(|candidate| setting(candidate, &problem, target)).collect();
             let mut times = vec![Vec::new(); candidates.len()];
             for _ in 0..BLOCKS {
                 for ((candidate, setting), times) in candidates.iter_mut().zip(&settings).zip(&mut times) {
@@ -59,7 +70,10 @@ fn main() {
                 match setting {
                     Some((tolerance, error)) => {
                         let (least, middle) = (times[0], times[times.len() / 2]);
-                        println!("{name:8} {target:6.0e}  {:36} {tolerance:8.1e} {error:8.1e} {least:9.2} {middle:9.2}", candidate.name);
+                        println!(
+                            "{name:8} {target:6.0e}  {:36} {tolerance:8.1e} {error:8.1e} {least:9.2} {middle:9.2}",
+                            candidate.name
+                        );
                     }
                     None => println!("{name:8} {target:6.0e}  {:36} does not reach it", candidate.name),
                 }

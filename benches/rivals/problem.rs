@@ -49,7 +49,8 @@ impl Problem {
 
     /// Geometric mean over the starts of the largest difference in an angle or a rate.
     pub fn error(&self, ends: &[Motion]) -> f64 {
-        let logs: f64 = ends.iter().zip(&self.ends).map(|(end, exact)| self.apart(end, exact).max(1e-18).ln()).sum();
+        let logs: f64 =
+            ends.iter().zip(&self.ends).map(|(end, exact)| self.apart(end, exact).max(1e-18).ln()).sum();
         (logs / ends.len() as f64).exp()
     }
 
@@ -74,7 +75,9 @@ fn exact(mechanism: &Arc<Mechanism>, start: &Motion, until: f64) -> Motion {
     let mut state = problem.state(start);
     let mut statistics = Default::default();
     let mut method = Taylor::reference();
-    method.advance(&mut problem, &mut state, Time::from(until), &mut statistics, &mut |_, _| Ok(Seen::Kept)).expect("an end");
+    method
+        .advance(&mut problem, &mut state, Time::from(until), &mut statistics, &mut |_, _| Ok(Seen::Kept))
+        .expect("an end");
     let mut motion = Motion::default();
     problem.read(&state, &mut motion);
     motion

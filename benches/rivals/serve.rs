@@ -1,4 +1,5 @@
-//! Answers on standard output, one JSON object a line, to requests on standard input, so that a peer in another language can be timed in turn with this crate.
+//! Answers on standard output, one JSON object a line, to requests on standard input, so that a peer in
+//! another language can be timed in turn with this crate.
 //!
 //! ```text
 //! problem SCENE                constants, starts and true ends
@@ -32,7 +33,8 @@ pub fn serve() {
 }
 
 fn describe(problem: &Problem) -> serde_json::Value {
-    let numbers = |motion: &Motion| motion.phi.iter().chain(&motion.omega).map(|x| x.hi).collect::<Vec<f64>>();
+    let numbers =
+        |motion: &Motion| motion.phi.iter().chain(&motion.omega).map(|x| x.hi).collect::<Vec<f64>>();
     let tree = &problem.mechanism.tree;
     let law = problem
         .mechanism

@@ -1,7 +1,9 @@
-//! Runs a target on mutations of its corpus: seeded, on stable, without coverage; inputs of which something new comes are kept for further mutation.
-//!   drive TARGET EXECUTIONS [SEED]    until there are so many in all, of any seed; what was done before counts, however it ended
-//!   drive TARGET FILE                 one input
-//! Findings go to `fuzz/artifacts/TARGET`, counts to `fuzz/artifacts/TARGET.count`; with KEEP=1 small inputs that were new go to `fuzz/corpus/TARGET`.
+//! Runs a target on mutations of its corpus: seeded, on stable, without coverage; inputs of which something
+//! new comes are kept for further mutation.
+//!   drive TARGET EXECUTIONS [SEED]  until there are so many in all, of any seed; what was done before
+//!   counts, however it ended drive TARGET FILE  one input
+//! Findings go to `fuzz/artifacts/TARGET`, counts to `fuzz/artifacts/TARGET.count`; with KEEP=1 small inputs
+//! that were new go to `fuzz/corpus/TARGET`.
 
 use driftless_fuzz::targets::{SCENES, TARGETS};
 use std::collections::HashSet;

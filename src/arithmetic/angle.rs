@@ -1,7 +1,8 @@
 //! Angles kept in [-π, π] beside a count of whole turns.
 //!
-//! A winding angle loses its last digits as it grows, and with them the run its energy: the motor scene drifts 1900 times more without
-//! this.  2π is taken off as a double-double, so wrapping costs no accuracy in a (hi, lo) state and half an ulp in a plain one.
+//! A winding angle loses its last digits as it grows, and with them the run its energy: the motor scene
+//! drifts 1900 times more without this.  2π is taken off as a double-double, so wrapping costs no accuracy in
+//! a (hi, lo) state and half an ulp in a plain one.
 
 use super::sum::nearest;
 use super::{DoubleDouble, Real, Scalar};

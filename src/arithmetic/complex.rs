@@ -58,7 +58,10 @@ impl<T: Scalar> Complex<T> {
     /// Product with a plain complex constant.
     #[inline(always)]
     pub fn turn(self, by: Complex<f64>) -> Self {
-        Self { re: self.re.scale(by.re) - self.im.scale(by.im), im: self.re.scale(by.im) + self.im.scale(by.re) }
+        Self {
+            re: self.re.scale(by.re) - self.im.scale(by.im),
+            im: self.re.scale(by.im) + self.im.scale(by.re),
+        }
     }
 
     /// Dot product of two vectors, `Re(conj(a) b)`.

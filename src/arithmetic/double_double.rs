@@ -1,8 +1,9 @@
 //! Double-double arithmetic: an unevaluated sum `hi + lo`, about 32 decimal digits.
 //!
-//! Source: Y. Hida, X. S. Li, D. H. Bailey, *Library for Double-Double and Quad-Double Arithmetic* (2007), sections 3.2-3.4; the
-//! bounds are those of M. Joldes, J.-M. Muller, V. Popescu, *Tight and rigorous error bounds for basic building blocks of double-word
-//! arithmetic*, ACM TOMS 44 (2017): sums to 3 u², products to 5 u², quotients to 10 u² with u = 2⁻⁵³.
+//! Source: Y. Hida, X. S. Li, D. H. Bailey, *Library for Double-Double and Quad-Double Arithmetic* (2007),
+//! sections 3.2-3.4; the bounds are those of M. Joldes, J.-M. Muller, V. Popescu, *Tight and rigorous error
+//! bounds for basic building blocks of double-word arithmetic*, ACM TOMS 44 (2017): sums to 3 u², products to
+//! 5 u², quotients to 10 u² with u = 2⁻⁵³.
 
 use super::sum::{fast_two_sum, nearest, two_product, two_sum};
 use super::{Real, Scalar, elementary};
@@ -50,7 +51,8 @@ impl DoubleDouble {
         self.hi.is_finite() && self.lo.is_finite()
     }
 
-    /// The angle less whole turns, in [-π, π], and the turns taken off; exact to the last place of the pair for up to 2⁵³ turns.
+    /// The angle less whole turns, in [-π, π], and the turns taken off; exact to the last place of the pair
+    /// for up to 2⁵³ turns.
     pub fn reduced(self) -> (Self, f64) {
         let turns = nearest(self.hi / Self::TAU.hi);
         if turns == 0.0 {
@@ -71,7 +73,8 @@ impl DoubleDouble {
         (self - self * square * sin, Self::ONE - square.ldexp(0.5) + square * square * cos)
     }
 
-    /// The same for an angle in [-π/256, π/256]: powers from the seventh on weigh less than 1e-17 and are summed in plain doubles.
+    /// The same for an angle in [-π/256, π/256]: powers from the seventh on weigh less than 1e-17 and are
+    /// summed in plain doubles.
     #[inline]
     fn sin_cos_tiny(self) -> (Self, Self) {
         let square = self * self;
@@ -343,7 +346,9 @@ mod tests {
         // OEIS A049469 and A049470.
         let (sin, cos) = DoubleDouble::ONE.sin_cos();
         let tenth = DoubleDouble::ONE / DoubleDouble::of(10.0);
-        let digits = |text: &str| text.bytes().rev().fold(DoubleDouble::ZERO, |acc, digit| (acc + f64::from(digit - b'0')) * tenth);
+        let digits = |text: &str| {
+            text.bytes().rev().fold(DoubleDouble::ZERO, |acc, digit| (acc + f64::from(digit - b'0')) * tenth)
+        };
         assert!((sin - digits("84147098480789650665250232163029900")).hi.abs() < 1e-31);
         assert!((cos - digits("54030230586813971740093660744297661")).hi.abs() < 1e-31);
     }

@@ -4,8 +4,9 @@
 //! (a, a') + (b, b') = (a + b, a' + b'),     (a, a') (b, b') = (a b, a b' + a' b),     f(a, a') = (f(a), f'(a) a')
 //! ```
 //!
-//! The equations of motion evaluated on them are their own Jacobian.  With `CLOCK` the last direction is time: laws of time, which are known as functions
-//! and not as expressions, put their rates there ([`Real::moving`]).
+//! The equations of motion evaluated on them are their own Jacobian.  With `CLOCK` the last direction is
+//! time: laws of time, which are known as functions and not as expressions, put their rates there
+//! ([`Real::moving`]).
 //!
 //! Source: A. Griewank, A. Walther, *Evaluating Derivatives*, 2nd ed. (2008), section 3.1 (vector mode).
 
@@ -106,7 +107,9 @@ impl<const D: usize, const CLOCK: bool> Scalar for Dual<D, CLOCK> {
 
     fn atan2(self, x: Self) -> Self {
         let square = x.value * x.value + self.value * self.value;
-        self.join(x, Scalar::atan2(self.value, x.value), |y_rate, x_rate| (x.value * y_rate - self.value * x_rate) / square)
+        self.join(x, Scalar::atan2(self.value, x.value), |y_rate, x_rate| {
+            (x.value * y_rate - self.value * x_rate) / square
+        })
     }
 }
 
@@ -226,7 +229,8 @@ mod tests {
         let dual = formula(Dual::<2, false>::unknown(x, 0), Dual::unknown(y, 1));
         assert!((dual.value - formula(x, y)).abs() < 1e-15);
         let at = |dx: f64, dy: f64| formula(DoubleDouble::sum(x, dx), DoubleDouble::sum(y, dy));
-        let differences = [at(h, 0.0) - at(-h, 0.0), at(0.0, h) - at(0.0, -h)].map(|change| (change.scale(0.5 / h)).hi);
+        let differences =
+            [at(h, 0.0) - at(-h, 0.0), at(0.0, h) - at(0.0, -h)].map(|change| (change.scale(0.5 / h)).hi);
         for (slope, difference) in dual.slope.into_iter().zip(differences) {
             assert!((slope - difference).abs() < 1e-14, "{slope} {difference}");
         }

@@ -1,4 +1,5 @@
-//! Eight doubles as one scalar: the stages of an implicit step, evaluated together by the same formulas as a single number.
+//! Eight doubles as one scalar: the stages of an implicit step, evaluated together by the same formulas as a
+//! single number.
 //!
 //! Each lane has the bits it would have alone: no operation mixes lanes.
 
@@ -67,7 +68,10 @@ impl<L: Lanes> Eight<L> {
     /// `addend - self · factor`, rounded once.
     #[inline(always)]
     pub fn neg_mul_add(self, factor: Self, addend: Self) -> Self {
-        Self([self.0[0].neg_mul_add(factor.0[0], addend.0[0]), self.0[1].neg_mul_add(factor.0[1], addend.0[1])])
+        Self([
+            self.0[0].neg_mul_add(factor.0[0], addend.0[0]),
+            self.0[1].neg_mul_add(factor.0[1], addend.0[1]),
+        ])
     }
 }
 

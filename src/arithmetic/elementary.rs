@@ -7,8 +7,8 @@
 //! atan2(y, x) = a + (y cos a - x sin a) / (x cos a + y sin a),  a = that of the leading parts
 //! ```
 //!
-//! Source: D. H. Bailey's arithmetic as described in Y. Hida, X. S. Li, D. H. Bailey, *Algorithms for quad-double precision floating point
-//! arithmetic*, ARITH-15 (2001), section 4.
+//! Source: D. H. Bailey's arithmetic as described in Y. Hida, X. S. Li, D. H. Bailey, *Algorithms for
+//! quad-double precision floating point arithmetic*, ARITH-15 (2001), section 4.
 
 use super::{DoubleDouble, Scalar};
 
@@ -87,18 +87,24 @@ mod tests {
 
     fn digits(whole: f64, text: &str) -> DoubleDouble {
         let tenth = DoubleDouble::ONE / DoubleDouble::of(10.0);
-        let part = text.bytes().rev().fold(DoubleDouble::ZERO, |sum, digit| (sum + f64::from(digit - b'0')) * tenth);
+        let part =
+            text.bytes().rev().fold(DoubleDouble::ZERO, |sum, digit| (sum + f64::from(digit - b'0')) * tenth);
         part + whole
     }
 
     #[test]
     fn published_constants_have_thirty_digits() {
         // OEIS A001113, A002162, A073744 and A000796.
-        let near = |found: DoubleDouble, expected: DoubleDouble| assert!((found - expected).hi.abs() < 3e-31 * expected.hi, "{found:?}");
+        let near = |found: DoubleDouble, expected: DoubleDouble| {
+            assert!((found - expected).hi.abs() < 3e-31 * expected.hi, "{found:?}")
+        };
         near(exp(DoubleDouble::ONE), digits(2.0, "71828182845904523536028747135266249"));
         near(ln(DoubleDouble::of(2.0)), digits(0.0, "69314718055994530941723212145817656"));
         near(tanh(DoubleDouble::ONE), digits(0.0, "76159415595576488811945828260479359"));
-        near(atan2(DoubleDouble::ZERO, DoubleDouble::of(-1.0)), digits(3.0, "14159265358979323846264338327950288"));
+        near(
+            atan2(DoubleDouble::ZERO, DoubleDouble::of(-1.0)),
+            digits(3.0, "14159265358979323846264338327950288"),
+        );
     }
 
     proptest! {

@@ -1,11 +1,13 @@
 //! Four doubles at once, with the same bits on every machine.
 //!
-//! Plain arrays left to the compiler are not good enough for short dependent chains (1.5 to 3 times slower), so there is an explicit
-//! vector type for AVX with FMA, and a portable one for everything else.  Each operation is exactly rounded and
-//! [`Lanes::mul_add`] is *always* fused: where the processor has no such instruction it is computed in software, slowly but to the same bits.
+//! Plain arrays left to the compiler are not good enough for short dependent chains (1.5 to 3 times slower),
+//! so there is an explicit vector type for AVX with FMA, and a portable one for everything else.  Each
+//! operation is exactly rounded and [`Lanes::mul_add`] is *always* fused: where the processor has no such
+//! instruction it is computed in software, slowly but to the same bits.
 //!
-//! A kernel is written once over [`Lanes`] and compiled twice: it is a piece of [`Code`], which [`run`] enters as compiled for the processor, where that has
-//! AVX and FMA, or as portable code.  `unsafe` is nowhere in the crate but in the file that does so, `lanes/hardware.rs`.
+//! A kernel is written once over [`Lanes`] and compiled twice: it is a piece of [`Code`], which [`run`]
+//! enters as compiled for the processor, where that has AVX and FMA, or as portable code.  `unsafe` is
+//! nowhere in the crate but in the file that does so, `lanes/hardware.rs`.
 
 use super::sum;
 use std::fmt::Debug;
@@ -13,7 +15,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Four doubles; lanes 0-1 and 2-3 are pairs, which are halves of the vector.
 pub trait Lanes: Copy + Debug + 'static {
-    /// True where long kernels are worth unrolling; where each operation is a call, a loop is as fast and compiles in a tenth of the time.
+    /// True where long kernels are worth unrolling; where each operation is a call, a loop is as fast and
+    /// compiles in a tenth of the time.
     const UNROLLED: bool;
 
     /// 0 in every lane.
@@ -77,15 +80,26 @@ pub struct Portable([f64; 4]);
 impl Portable {
     #[inline(always)]
     fn zip(self, other: Self, f: fn(f64, f64) -> f64) -> Self {
-        Self([f(self.0[0], other.0[0]), f(self.0[1], other.0[1]), f(self.0[2], other.0[2]), f(self.0[3], other.0[3])])
+        Self([
+            f(self.0[0], other.0[0]),
+            f(self.0[1], other.0[1]),
+            f(self.0[2], other.0[2]),
+            f(self.0[3], other.0[3]),
+        ])
     }
 }
 
-/// `a b + c` lane by lane; its four calls kept in one place where the processor cannot be counted on to have the instruction.
+/// `a b + c` lane by lane; its four calls kept in one place where the processor cannot be counted on to have
+/// the instruction.
 #[cfg_attr(all(target_arch = "x86_64", not(target_feature = "fma")), inline(never))]
 #[cfg_attr(not(all(target_arch = "x86_64", not(target_feature = "fma"))), inline(always))]
 fn fused(a: [f64; 4], b: [f64; 4], c: [f64; 4]) -> [f64; 4] {
-    [sum::fused(a[0], b[0], c[0]), sum::fused(a[1], b[1], c[1]), sum::fused(a[2], b[2], c[2]), sum::fused(a[3], b[3], c[3])]
+    [
+        sum::fused(a[0], b[0], c[0]),
+        sum::fused(a[1], b[1], c[1]),
+        sum::fused(a[2], b[2], c[2]),
+        sum::fused(a[3], b[3], c[3]),
+    ]
 }
 
 impl Lanes for Portable {
@@ -205,7 +219,8 @@ impl Hardware {
     }
 }
 
-/// Code written once over lanes: its [`Code::run`], and every function below it, is `#[inline(always)]`, so that it is compiled as the place is it is called from.
+/// Code written once over lanes: its [`Code::run`], and every function below it, is `#[inline(always)]`, so
+/// that it is compiled as the place is it is called from.
 pub trait Code {
     /// What comes of it.
     type Output;
@@ -216,7 +231,8 @@ pub trait Code {
 
 static IS_DISABLED: AtomicBool = AtomicBool::new(false);
 
-/// Takes the processor for one without vectors from here on, or for what it is again, in the whole process: for tests that the bits are the same.
+/// Takes the processor for one without vectors from here on, or for what it is again, in the whole process:
+/// for tests that the bits are the same.
 pub fn disable(is_disabled: bool) {
     IS_DISABLED.store(is_disabled, Ordering::Relaxed);
 }
@@ -227,7 +243,8 @@ pub fn hardware() -> Option<Hardware> {
     if IS_DISABLED.load(Ordering::Relaxed) { None } else { Hardware::ask() }
 }
 
-/// Runs code in the processor's vectors where it has them and `is_portable` does not forbid it, else in portable ones: slowly to the same bits.
+/// Runs code in the processor's vectors where it has them and `is_portable` does not forbid it, else in
+/// portable ones: slowly to the same bits.
 #[inline(always)]
 pub fn run<C: Code>(code: C, is_portable: bool) -> C::Output {
     match hardware().filter(|_| !is_portable) {
@@ -298,7 +315,9 @@ mod tests {
         assert_eq!(x.neg_mul_add(x, x).array(), [0.0, -6.0, -6.0, -12.0]);
         let nearly = 1.0 + f64::EPSILON;
         assert_eq!(
-            Portable::splat(nearly).mul_add(Portable::splat(nearly), Portable::splat(-1.0 - 2.0 * f64::EPSILON)).array()[0],
+            Portable::splat(nearly)
+                .mul_add(Portable::splat(nearly), Portable::splat(-1.0 - 2.0 * f64::EPSILON))
+                .array()[0],
             f64::EPSILON.powi(2)
         );
     }

@@ -1,11 +1,13 @@
 //! Numbers: the scalar trait the physics is written over, and the exact building blocks of long sums.
 //!
-//! Every formula of [`dynamics`](crate::dynamics) is written once over [`Scalar`] and evaluated on `f64` (inner loops), on
-//! [`DoubleDouble`] (monitors, references), on [`Dual`] numbers (Jacobians), and on [`Eight`](eight::Eight) lanes and their [`Pairs`](pairs::Pairs) (stages of implicit methods).
+//! Every formula of [`dynamics`](crate::dynamics) is written once over [`Scalar`] and evaluated on `f64`
+//! (inner loops), on [`DoubleDouble`] (monitors, references), on [`Dual`] numbers (Jacobians), and on
+//! [`Eight`](eight::Eight) lanes and their [`Pairs`](pairs::Pairs) (stages of implicit methods).
 //!
-//! Two rules keep the bits the same on every machine: trigonometry comes from pure Rust (the `libm` crate, or our own series
-//! in lanes and in double-double), and a fused multiply-add is written as one wherever it is used ([`sum::fused`], [`lanes`]), never left to the compiler:
-//! it is rounded once by definition, so it makes no difference to the bits whether the processor has the instruction.
+//! Two rules keep the bits the same on every machine: trigonometry comes from pure Rust (the `libm` crate, or
+//! our own series in lanes and in double-double), and a fused multiply-add is written as one wherever it is
+//! used ([`sum::fused`], [`lanes`]), never left to the compiler: it is rounded once by definition, so it
+//! makes no difference to the bits whether the processor has the instruction.
 
 #[doc(hidden)]
 pub mod angle;
@@ -38,7 +40,8 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// A number the equations of motion can be evaluated on.
 ///
-/// No comparison is asked for, so that vectors of lanes can be scalars; what needs an order asks for [`Real`].
+/// No comparison is asked for, so that vectors of lanes can be scalars; what needs an order asks for
+/// [`Real`].
 pub trait Scalar:
     Copy
     + Debug
@@ -122,7 +125,8 @@ pub trait Real: Scalar + PartialOrd {
     /// The number as a double-double, exactly.
     fn double_double(self) -> DoubleDouble;
 
-    /// A number known at one moment only, which changes at `rate` \[1/s\]: for scalars that carry a derivative in time; the others never ask for it.
+    /// A number known at one moment only, which changes at `rate` \[1/s\]: for scalars that carry a
+    /// derivative in time; the others never ask for it.
     #[inline(always)]
     fn moving(self, _rate: impl FnOnce() -> f64) -> Self {
         self

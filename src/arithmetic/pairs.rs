@@ -1,10 +1,12 @@
-//! Eight lanes of high and low parts: a quick double-double whose rounding errors are a few 2⁻¹⁰⁵ of the operands.
+//! Eight lanes of high and low parts: a quick double-double whose rounding errors are a few 2⁻¹⁰⁵ of the
+//! operands.
 //!
-//! Quicker than [`DoubleDouble`] and less exact where leading parts cancel, and its sine and cosine carry about 66
-//! bits: enough for what doubles drop at the last evaluations of an implicit step, not for references.
+//! Quicker than [`DoubleDouble`] and less exact where leading parts cancel, and its sine and cosine carry
+//! about 66 bits: enough for what doubles drop at the last evaluations of an implicit step, not for
+//! references.
 //!
-//! Source: T. J. Dekker, *A floating-point technique for extending the available precision*, Numer. Math. 18 (1971), add2, mul2, div2,
-//! sqrt2, with fused multiply-adds.
+//! Source: T. J. Dekker, *A floating-point technique for extending the available precision*, Numer. Math. 18
+//! (1971), add2, mul2, div2, sqrt2, with fused multiply-adds.
 
 use super::eight::{Eight, Lanewise, Octet};
 use super::lanes::Lanes;
@@ -33,7 +35,9 @@ impl<L: Lanes> Pairs<L> {
         let memory = |x: Self| {
             let (mut high, mut low) = (Octet::default(), Octet::default());
             x.store(&mut high, &mut low);
-            std::array::from_fn::<_, { super::eight::LANES }, _>(|lane| DoubleDouble::sum(high.0[lane], low.0[lane]))
+            std::array::from_fn::<_, { super::eight::LANES }, _>(|lane| {
+                DoubleDouble::sum(high.0[lane], low.0[lane])
+            })
         };
         let (a, b) = (memory(self), memory(other));
         let found = std::array::from_fn::<_, { super::eight::LANES }, _>(|lane| f(a[lane], b[lane]));

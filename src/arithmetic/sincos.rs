@@ -1,18 +1,21 @@
-//! Sine and cosine of four independent angles in lanes, at most one unit in the last place off; and of pairs, to about 66 bits.
+//! Sine and cosine of four independent angles in lanes, at most one unit in the last place off; and of pairs,
+//! to about 66 bits.
 //!
 //! ```text
 //! phi = q π/2 + r + low, |r| <= π/4;   cos r = 1 - r²/2 + r⁴ C(r²),   sin r = r + r³ S(r²)
 //! m = q - 4 [q/4] = -2…2:   cos phi = (1 - |m|) cos r - m (2 - |m|) sin r,   sin phi = (1 - |m|) sin r + m (2 - |m|) cos r
 //! ```
 //!
-//! π/2 is taken off in three parts.  The first product loses nothing: its difference to phi is a multiple of 2⁻⁵² (2⁻⁵³ below 1) less
-//! than 1.  The second is exact as a pair, the third rounds at 2⁻¹⁵⁰.  That serves angles up to [`RANGE`]; a vector with an angle beyond
-//! is handed to `libm`, lane by lane.
+//! π/2 is taken off in three parts.  The first product loses nothing: its difference to phi is a multiple of
+//! 2⁻⁵² (2⁻⁵³ below 1) less than 1.  The second is exact as a pair, the third rounds at 2⁻¹⁵⁰.  That serves
+//! angles up to [`RANGE`]; a vector with an angle beyond is handed to `libm`, lane by lane.
 //!
-//! Both series are Taylor's to r¹⁸ and r¹⁷ (for pairs r²² and r²¹), whose next terms are below 4e-21 and 1e-19 (5e-24 and 2e-25): no
-//! fitted constants, no bias.  Whatever is rounded on the way to the leading terms is kept and joins the correction.
+//! Both series are Taylor's to r¹⁸ and r¹⁷ (for pairs r²² and r²¹), whose next terms are below 4e-21 and
+//! 1e-19 (5e-24 and 2e-25): no fitted constants, no bias.  Whatever is rounded on the way to the leading
+//! terms is kept and joins the correction.
 //!
-//! Source of the reduction: W. J. Cody, W. Waite, *Software Manual for the Elementary Functions* (1980), section 8, with a fused multiply-add.
+//! Source of the reduction: W. J. Cody, W. Waite, *Software Manual for the Elementary Functions* (1980),
+//! section 8, with a fused multiply-add.
 
 use super::lanes::{self, Code, Lanes};
 use super::{Complex, DoubleDouble, Scalar};
@@ -103,9 +106,11 @@ fn series<L: Lanes>(factors: &[f64], z: L, zz: L) -> L {
     odd.mul_add(z, even)
 }
 
-/// Sine and cosine, in this order, of `angle + rest` \[rad\], where `rest` is what the angles leave out: at most half an ulp of them.
+/// Sine and cosine, in this order, of `angle + rest` \[rad\], where `rest` is what the angles leave out: at
+/// most half an ulp of them.
 ///
-/// At most 0.8 units in the last place off for angles up to [`RANGE`], at most 1 beyond; not a number where an angle is not finite.
+/// At most 0.8 units in the last place off for angles up to [`RANGE`], at most 1 beyond; not a number where
+/// an angle is not finite.
 #[inline(always)]
 pub fn sin_cos<L: Lanes>(angle: L, rest: L) -> (L, L) {
     if !angle.are_within(RANGE) {
@@ -233,7 +238,8 @@ mod tests {
     use crate::arithmetic::lanes::Portable;
     use std::f64::consts::{PI, TAU};
 
-    /// Sine and cosine in double-double; quarter turns are taken off in three parts first, which [`DoubleDouble`] does in two.
+    /// Sine and cosine in double-double; quarter turns are taken off in three parts first, which
+    /// [`DoubleDouble`] does in two.
     fn exact(angle: f64, rest: f64) -> (DoubleDouble, DoubleDouble) {
         let q = (angle / FRAC_PI_2).round();
         let r = DoubleDouble::of(angle)
@@ -260,7 +266,8 @@ mod tests {
             let unit = 2f64.powi((exponent - 52).max(-1074));
             let found = found.array()[0];
             worst.0 = worst.0.max((exact - DoubleDouble::of(found)).hi.abs() / unit);
-            worst.1 = worst.1.max((exact - DoubleDouble::sum(pair[0].array()[0], pair[1].array()[0])).hi.abs());
+            worst.1 =
+                worst.1.max((exact - DoubleDouble::sum(pair[0].array()[0], pair[1].array()[0])).hi.abs());
         }
         worst
     }
@@ -270,7 +277,12 @@ mod tests {
         let mut worst = (0f64, 0f64);
         for (angle, rest) in angles {
             let found = errors(angle, rest);
-            assert!(found.0 <= 0.8 && found.1 < 1e-20, "{angle:e} + {rest:e}: {} ulp, pair {:e}", found.0, found.1);
+            assert!(
+                found.0 <= 0.8 && found.1 < 1e-20,
+                "{angle:e} + {rest:e}: {} ulp, pair {:e}",
+                found.0,
+                found.1
+            );
             worst = (worst.0.max(found.0), worst.1.max(found.1));
         }
         worst
@@ -339,13 +351,15 @@ mod tests {
         }
     }
 
-    /// The hardest of all doubles to reduce lies far beyond the range; within it, the continued fraction of π/2 gives the hardest.
+    /// The hardest of all doubles to reduce lies far beyond the range; within it, the continued fraction of
+    /// π/2 gives the hardest.
     #[test]
     fn angles_nearest_to_quarter_turns() {
         // Convergents p/q of π/2 and their multiples: p is the integer nearest to q π/2.
-        for p in
-            [3.0, 11.0, 22.0, 344.0, 355.0, 710.0, 51_819.0, 52_174.0, 103_993.0, 104_348.0, 208_341.0, 312_689.0, 573_204.0, 833_719.0]
-        {
+        for p in [
+            3.0, 11.0, 22.0, 344.0, 355.0, 710.0, 51_819.0, 52_174.0, 103_993.0, 104_348.0, 208_341.0,
+            312_689.0, 573_204.0, 833_719.0,
+        ] {
             for power in 0..30 {
                 let angle = p * 2f64.powi(-power);
                 check([(angle, 0.0), (-angle, 0.0)].into_iter());

@@ -1,7 +1,7 @@
 //! Error-free sums and products: the rounding error of an operation is itself a double.
 //!
-//! Source: T. J. Dekker, *A floating-point technique for extending the available precision*, Numer. Math. 18 (1971);
-//! D. E. Knuth, *The Art of Computer Programming*, vol. 2, section 4.2.2, theorem B.
+//! Source: T. J. Dekker, *A floating-point technique for extending the available precision*, Numer. Math. 18
+//! (1971); D. E. Knuth, *The Art of Computer Programming*, vol. 2, section 4.2.2, theorem B.
 
 /// `a + b = sum + error` exactly, for any order of magnitude (Knuth, six operations).
 #[inline(always)]
@@ -35,7 +35,8 @@ pub fn fused(a: f64, b: f64, c: f64) -> f64 {
     if cfg!(target_arch = "x86") { libm::fma(a, b, c) } else { a.mul_add(b, c) }
 }
 
-/// The nearest whole number, ties to even; two additions where the size allows it, since the baseline processor has no instruction for it.
+/// The nearest whole number, ties to even; two additions where the size allows it, since the baseline
+/// processor has no instruction for it.
 #[inline(always)]
 pub fn nearest(value: f64) -> f64 {
     /// 1.5 · 2⁵²: a sum near it has no bits for a fraction.
@@ -61,7 +62,10 @@ mod tests {
         assert_eq!(fused(a, b, 0.0).to_bits(), 0x3fb5_fe98_9331_476f);
         let (half, less) = (f64::EPSILON / 2.0, 2f64.powi(-90));
         assert_eq!((fused(1.0, half, 1.0), fused(1.0 + f64::EPSILON, half, 1.0)), (1.0, 1.0 + f64::EPSILON));
-        assert_eq!((fused(less, less, 1.0 + f64::EPSILON), fused(-less, less, 1.0)), (1.0 + f64::EPSILON, 1.0));
+        assert_eq!(
+            (fused(less, less, 1.0 + f64::EPSILON), fused(-less, less, 1.0)),
+            (1.0 + f64::EPSILON, 1.0)
+        );
     }
 
     #[test]

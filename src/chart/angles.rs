@@ -39,8 +39,8 @@ pub struct Angles {
 
 /// Draws up to three bars in panels of their own, more of them in one panel.
 ///
-/// Ticks are multiples of π, or turns when a bar winds up.  Where an angle oscillates faster than paper shows, the band between its
-/// extremes is drawn and the caption says so.
+/// Ticks are multiples of π, or turns when a bar winds up.  Where an angle oscillates faster than paper
+/// shows, the band between its extremes is drawn and the caption says so.
 ///
 /// # Errors
 /// [`ChartError`] if the resolution is out of range or drawing fails.
@@ -51,13 +51,21 @@ pub fn angles(chart: &Angles, px_per_pt: f64) -> Result<Picture, ChartError> {
         let finite = || lines.iter().flat_map(|s| &s.angle).copied().filter(|a| a.abs() <= 1e300);
         finite().fold(f64::NEG_INFINITY, f64::max) - finite().fold(f64::INFINITY, f64::min)
     };
-    let groups: Vec<Vec<&AngleSeries>> =
-        if apart { chart.series.iter().map(|s| vec![s]).collect() } else { vec![chart.series.iter().collect()] };
-    let units: Vec<f64> = groups.iter().map(|group| if spread(group) > TURNS_FROM { TAU } else { 1.0 }).collect();
-    let line =
-        |series: &AngleSeries, unit: f64| -> Vec<Point> { chart.time.iter().zip(&series.angle).map(|(&t, &a)| [t, a / unit]).collect() };
-    let lines: Vec<Vec<Vec<Point>>> =
-        groups.iter().zip(&units).map(|(group, &unit)| group.iter().map(|s| line(s, unit)).collect()).collect();
+    let groups: Vec<Vec<&AngleSeries>> = if apart {
+        chart.series.iter().map(|s| vec![s]).collect()
+    } else {
+        vec![chart.series.iter().collect()]
+    };
+    let units: Vec<f64> =
+        groups.iter().map(|group| if spread(group) > TURNS_FROM { TAU } else { 1.0 }).collect();
+    let line = |series: &AngleSeries, unit: f64| -> Vec<Point> {
+        chart.time.iter().zip(&series.angle).map(|(&t, &a)| [t, a / unit]).collect()
+    };
+    let lines: Vec<Vec<Vec<Point>>> = groups
+        .iter()
+        .zip(&units)
+        .map(|(group, &unit)| group.iter().map(|s| line(s, unit)).collect())
+        .collect();
 
     let x = Axis::tight("time [s]", chart.time.iter().copied());
     let ys = || -> Vec<Axis> {
@@ -93,7 +101,8 @@ pub fn angles(chart: &Angles, px_per_pt: f64) -> Result<Picture, ChartError> {
         let mut ends = Vec::new();
         for (i, line) in lines.iter().enumerate() {
             let mark = marks[if apart { k } else { i }];
-            let pieces = panel.trusted(line, mark.colour, if lines.len() > 3 { 1.4 } else { 1.6 }, chart.horizon)?;
+            let pieces =
+                panel.trusted(line, mark.colour, if lines.len() > 3 { 1.4 } else { 1.6 }, chart.horizon)?;
             if let (false, Some(end)) = (apart, pieces.last().and_then(|piece| piece.last())) {
                 ends.push((end[1], labels[i].clone(), mark));
             }

@@ -47,7 +47,9 @@ impl Axis {
 
     /// A linear axis around the data: 6 % of air, ends at ticks.
     pub(crate) fn fit(name: &str, values: impl Iterator<Item = f64>) -> Self {
-        let Some((low, high)) = extremes(values.filter(|&v| usable(v))) else { return Axis::linear(name, 0.0, 1.0) };
+        let Some((low, high)) = extremes(values.filter(|&v| usable(v))) else {
+            return Axis::linear(name, 0.0, 1.0);
+        };
         // Below a few units in the last place a spread is rounding, not data.
         if high - low <= 16.0 * f64::EPSILON * low.abs().max(high.abs()) || high - low < 1e-290 {
             let (from, to) = apart(0.5 * low + 0.5 * high);
@@ -68,26 +70,48 @@ impl Axis {
         let step = ticks::nice_step((to - from).max(1e-290) / 10.0);
         let (below, above) = ((from / step).floor() * step, (to / step).ceil() * step);
         let near = 0.012 * (to - from);
-        Axis::linear(name, if from - below < near { below } else { from }, if above - to < near { above } else { to })
+        Axis::linear(
+            name,
+            if from - below < near { below } else { from },
+            if above - to < near { above } else { to },
+        )
     }
 
     /// Angles in radians, at multiples of π once they leave a quarter turn.
     pub(crate) fn angle(name: &str, values: impl Iterator<Item = f64>) -> Self {
-        let Some((low, high)) = extremes(values.filter(|&v| usable(v))) else { return Axis::linear(name, 0.0, 1.0) };
+        let Some((low, high)) = extremes(values.filter(|&v| usable(v))) else {
+            return Axis::linear(name, 0.0, 1.0);
+        };
         if high - low < 0.75 * PI || high.max(-low) > 1e4 * PI {
             return Axis::fit(name, [low, high].into_iter());
         }
         let air = 0.06 * (high - low);
-        let step = PI * if high - low < 4.0 * PI { 0.25 } else { ticks::nice_step((high - low) / (10.0 * PI)).max(0.5) };
-        Axis { name: name.to_owned(), scale: Scale::Pi, from: ((low - air) / step).floor() * step, to: ((high + air) / step).ceil() * step }
+        let step = PI
+            * if high - low < 4.0 * PI {
+                0.25
+            } else {
+                ticks::nice_step((high - low) / (10.0 * PI)).max(0.5)
+            };
+        Axis {
+            name: name.to_owned(),
+            scale: Scale::Pi,
+            from: ((low - air) / step).floor() * step,
+            to: ((high + air) / step).ceil() * step,
+        }
     }
 
     /// A logarithmic axis over whole decades around the positive data, at least one.
     pub(crate) fn decades(name: &str, values: impl Iterator<Item = f64>) -> Self {
-        let (low, high) = extremes(values.filter(|&v| v > 0.0 && usable(v)).map(f64::log10)).unwrap_or((0.0, 1.0));
+        let (low, high) =
+            extremes(values.filter(|&v| v > 0.0 && usable(v)).map(f64::log10)).unwrap_or((0.0, 1.0));
         // A line on the very edge could be taken for the axis.
         let (low, high) = ((low - 1e-3).floor().max(-320.0), (high + 0.04).ceil());
-        Axis { name: name.to_owned(), scale: Scale::Log, from: ticks::ten(low as i32), to: ticks::ten(high.max(low + 1.0) as i32) }
+        Axis {
+            name: name.to_owned(),
+            scale: Scale::Log,
+            from: ticks::ten(low as i32),
+            to: ticks::ten(high.max(low + 1.0) as i32),
+        }
     }
 
     /// A logarithmic axis that ends where the positive data end, at least a factor of two.

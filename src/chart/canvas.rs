@@ -1,17 +1,22 @@
 //! A drawing backend for plotters with smooth edges.
 //!
-//! The bitmap backend of plotters fills thick lines as one polygon by the even-odd rule (holes where a line crosses itself), rounds
-//! widths and circles to whole pixels and needs fonts of the system.  This one draws with tiny-skia instead.  Plotters speaks in whole
-//! numbers; one of its units is 1/100 pt here, so widths and curves stay fine.
+//! The bitmap backend of plotters fills thick lines as one polygon by the even-odd rule (holes where a line
+//! crosses itself), rounds widths and circles to whole pixels and needs fonts of the system.  This one draws
+//! with tiny-skia instead.  Plotters speaks in whole numbers; one of its units is 1/100 pt here, so widths
+//! and curves stay fine.
 
 use super::ChartError;
 use super::palette::{Colour, WHITE};
 use super::text::{Align, CAP_HEIGHT, Fonts, Lettering, Level, TextBox};
 use plotters::style::FontTransform;
 use plotters::style::text_anchor::{HPos, VPos};
-use plotters_backend::{BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingBackend, DrawingErrorKind};
+use plotters_backend::{
+    BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingBackend, DrawingErrorKind,
+};
 use std::convert::Infallible;
-use tiny_skia::{Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Rect, Stroke, Transform};
+use tiny_skia::{
+    Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Rect, Stroke, Transform,
+};
 
 /// Units of the backend in a point of 1/72 inch.
 pub(crate) const UNITS: f64 = 100.0;
@@ -37,7 +42,8 @@ impl Canvas {
             return Err(ChartError::Resolution { px_per_pt });
         }
         let side = |points: f64| (points * px_per_pt).round().max(1.0) as u32;
-        let mut pixels = Pixmap::new(side(size[0]), side(size[1])).ok_or(ChartError::Resolution { px_per_pt })?;
+        let mut pixels =
+            Pixmap::new(side(size[0]), side(size[1])).ok_or(ChartError::Resolution { px_per_pt })?;
         pixels.fill(Color::WHITE);
         Ok(Canvas { pixels, size, scale: px_per_pt, fonts: Fonts::new()?, texts: Vec::new() })
     }
@@ -49,18 +55,30 @@ impl Canvas {
 
     /// Red, green and blue of each pixel, row by row.
     pub(crate) fn rgb(&self) -> Vec<u8> {
-        self.pixels.data().as_chunks::<4>().0.iter().flat_map(|&[red, green, blue, _]| [red, green, blue]).collect()
+        self.pixels
+            .data()
+            .as_chunks::<4>()
+            .0
+            .iter()
+            .flat_map(|&[red, green, blue, _]| [red, green, blue])
+            .collect()
     }
 
     /// Copies a picture drawn before; sizes must agree.
     pub(crate) fn restore(&mut self, rgb: &[u8]) {
-        for (to, from) in self.pixels.data_mut().as_chunks_mut::<4>().0.iter_mut().zip(rgb.as_chunks::<3>().0) {
+        for (to, from) in self.pixels.data_mut().as_chunks_mut::<4>().0.iter_mut().zip(rgb.as_chunks::<3>().0)
+        {
             to[..3].copy_from_slice(from);
         }
     }
 
     /// Paints a rectangle of pixels, its upper left corner at `at` \[pt\]: `colour` of column and row.
-    pub(crate) fn raster(&mut self, at: [f64; 2], size: (usize, usize), colour: impl Fn(usize, usize) -> Colour) {
+    pub(crate) fn raster(
+        &mut self,
+        at: [f64; 2],
+        size: (usize, usize),
+        colour: impl Fn(usize, usize) -> Colour,
+    ) {
         let (width, height) = (self.pixels.width() as usize, self.pixels.height() as usize);
         let [left, top] = at.map(|points| (points * self.scale).round().max(0.0) as usize);
         let pixels = self.pixels.data_mut().as_chunks_mut::<4>().0;
@@ -97,8 +115,17 @@ impl Canvas {
         };
         let (sin, cos) = (-style.angle).sin_cos();
         let turn = |x: f64, y: f64| [at[0] + cos * x - sin * y, at[1] + sin * x + cos * y];
-        let corners = [turn(left, down), turn(left + width, down), turn(left + width, down - cap), turn(left, down - cap)];
-        self.texts.push(TextBox { text: text.to_owned(), corners, colour: [style.colour.0, style.colour.1, style.colour.2] });
+        let corners = [
+            turn(left, down),
+            turn(left + width, down),
+            turn(left + width, down - cap),
+            turn(left, down - cap),
+        ];
+        self.texts.push(TextBox {
+            text: text.to_owned(),
+            corners,
+            colour: [style.colour.0, style.colour.1, style.colour.2],
+        });
         let Some(outline) = outline else { return };
         let origin = turn(left, down);
         let k = self.scale;
@@ -128,13 +155,24 @@ impl Canvas {
 
     fn fill(&mut self, path: Option<Path>, colour: BackendColor) {
         if let Some(path) = path {
-            self.pixels.fill_path(&path, &backend_paint(colour), FillRule::Winding, Transform::identity(), None);
+            self.pixels.fill_path(
+                &path,
+                &backend_paint(colour),
+                FillRule::Winding,
+                Transform::identity(),
+                None,
+            );
         }
     }
 
     fn stroke(&mut self, path: Option<Path>, colour: BackendColor, width: u32, cap: LineCap) {
         if let Some(path) = path {
-            let stroke = Stroke { width: self.px(f64::from(width)), line_cap: cap, line_join: LineJoin::Round, ..Stroke::default() };
+            let stroke = Stroke {
+                width: self.px(f64::from(width)),
+                line_cap: cap,
+                line_join: LineJoin::Round,
+                ..Stroke::default()
+            };
             self.pixels.stroke_path(&path, &backend_paint(colour), &stroke, Transform::identity(), None);
         }
     }
@@ -144,7 +182,9 @@ impl Canvas {
         let ((x0, y0), (x1, y1)) = (self.place(from), self.place(to));
         let width = self.px(f64::from(width)).round().max(1.0);
         let odd = width % 2.0 == 1.0;
-        let snap = |middle: f32| if odd { middle.floor() - 0.5 * (width - 1.0) } else { middle.round() - 0.5 * width };
+        let snap = |middle: f32| {
+            if odd { middle.floor() - 0.5 * (width - 1.0) } else { middle.round() - 0.5 * width }
+        };
         let rect = if from.1 == to.1 {
             Rect::from_xywh(x0.min(x1), snap(y0), (x1 - x0).abs(), width)
         } else {
@@ -218,17 +258,31 @@ impl DrawingBackend for Canvas {
         self.draw_path([from, to], style)
     }
 
-    fn draw_path<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(&mut self, path: I, style: &S) -> Drawn {
+    fn draw_path<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(
+        &mut self,
+        path: I,
+        style: &S,
+    ) -> Drawn {
         let points: Vec<BackendCoord> = path.into_iter().collect();
         match points[..] {
             [] | [_] => {}
-            [from, to] if from != to && (from.0 == to.0 || from.1 == to.1) => self.rule((from, to), style.color(), style.stroke_width()),
-            _ => self.stroke(self.outline(points, false), style.color(), style.stroke_width(), LineCap::Round),
+            [from, to] if from != to && (from.0 == to.0 || from.1 == to.1) => {
+                self.rule((from, to), style.color(), style.stroke_width())
+            }
+            _ => {
+                self.stroke(self.outline(points, false), style.color(), style.stroke_width(), LineCap::Round)
+            }
         }
         Ok(())
     }
 
-    fn draw_rect<S: BackendStyle>(&mut self, upper_left: BackendCoord, bottom_right: BackendCoord, style: &S, fill: bool) -> Drawn {
+    fn draw_rect<S: BackendStyle>(
+        &mut self,
+        upper_left: BackendCoord,
+        bottom_right: BackendCoord,
+        style: &S,
+        fill: bool,
+    ) -> Drawn {
         let ((left, top), (right, bottom)) = (upper_left, bottom_right);
         let corners = [(left, top), (right, top), (right, bottom), (left, bottom)];
         if fill {
@@ -239,7 +293,13 @@ impl DrawingBackend for Canvas {
         Ok(())
     }
 
-    fn draw_circle<S: BackendStyle>(&mut self, center: BackendCoord, radius: u32, style: &S, fill: bool) -> Drawn {
+    fn draw_circle<S: BackendStyle>(
+        &mut self,
+        center: BackendCoord,
+        radius: u32,
+        style: &S,
+        fill: bool,
+    ) -> Drawn {
         let (x, y) = self.place(center);
         let circle = PathBuilder::from_circle(x, y, self.px(f64::from(radius)));
         if fill {
@@ -250,7 +310,11 @@ impl DrawingBackend for Canvas {
         Ok(())
     }
 
-    fn fill_polygon<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(&mut self, vert: I, style: &S) -> Drawn {
+    fn fill_polygon<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(
+        &mut self,
+        vert: I,
+        style: &S,
+    ) -> Drawn {
         let outline = self.outline(vert, true);
         self.fill(outline, style.color());
         Ok(())
@@ -283,7 +347,11 @@ impl DrawingBackend for Canvas {
     }
 
     /// The height is that of a line: with the height of the capitals plotters sets its captions too tight.
-    fn estimate_text_size<T: BackendTextStyle>(&self, text: &str, style: &T) -> Result<(u32, u32), DrawingErrorKind<Self::ErrorType>> {
+    fn estimate_text_size<T: BackendTextStyle>(
+        &self,
+        text: &str,
+        style: &T,
+    ) -> Result<(u32, u32), DrawingErrorKind<Self::ErrorType>> {
         Ok((self.fonts.width(text, style.size(), false).ceil() as u32, (1.25 * style.size()).ceil() as u32))
     }
 }
@@ -307,7 +375,11 @@ mod tests {
     fn a_thick_line_covers_its_own_crossing() {
         let canvas = drawn([20.0, 20.0], |area| {
             let twice = vec![(200, 200), (1800, 1800), (1800, 200), (200, 1800), (200, 200), (1800, 1800)];
-            area.draw(&PathElement::new(twice, ShapeStyle { color: BLACK.into(), filled: false, stroke_width: 200 })).unwrap();
+            area.draw(&PathElement::new(
+                twice,
+                ShapeStyle { color: BLACK.into(), filled: false, stroke_width: 200 },
+            ))
+            .unwrap();
         });
         assert!(dark(&canvas, 40, 40), "the crossing is covered");
         assert!(dark(&canvas, 20, 20), "a line traced twice does not vanish");

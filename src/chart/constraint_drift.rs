@@ -1,4 +1,5 @@
-//! Constraint drift: how far each constraint is off, at the level of positions and of velocities, side by side; angles and lengths in rows of their own.
+//! Constraint drift: how far each constraint is off, at the level of positions and of velocities, side by
+//! side; angles and lengths in rows of their own.
 
 use super::axis::Axis;
 use super::energy_drift::{DriftSeries, draw, drift_axis, is_zero, label};
@@ -16,7 +17,8 @@ use super::{ChartError, PAGE};
 pub struct ResidualPanel {
     /// Name of the y axis with its unit in brackets, with markup: `|*C*| [rad]`.
     pub name: String,
-    /// A line for each stabilization or each constraint; the same names in the same order in both panels of a row.
+    /// A line for each stabilization or each constraint; the same names in the same order in both panels of a
+    /// row.
     pub series: Vec<DriftSeries>,
 }
 
@@ -27,7 +29,8 @@ pub struct ConstraintDrift {
     pub title: String,
     /// Parts of the caption, with markup; what is drawn is added.
     pub caption: Vec<String>,
-    /// Panels from left to right, position level and velocity level; then those of constraints of another unit, below.
+    /// Panels from left to right, position level and velocity level; then those of constraints of another
+    /// unit, below.
     pub panels: Vec<ResidualPanel>,
     /// Logarithmic time.
     pub log_time: bool,
@@ -53,21 +56,38 @@ pub fn constraint_drift(chart: &ConstraintDrift, px_per_pt: f64) -> Result<Pictu
     let mut caption = chart.caption.clone();
     caption.push("dots: samples, lines: largest so far".to_owned());
     let under = sheet.heading(&chart.title, &caption)?;
-    let lines = |panel: &ResidualPanel| -> Vec<Vec<Point>> { panel.series.iter().map(|s| running_maximum(&s.time, &s.error)).collect() };
+    let lines = |panel: &ResidualPanel| -> Vec<Vec<Point>> {
+        panel.series.iter().map(|s| running_maximum(&s.time, &s.error)).collect()
+    };
     let all: Vec<Vec<Vec<Point>>> = chart.panels.iter().map(lines).collect();
     let axes = chart.panels.iter().zip(&all).map(|(panel, lines)| {
         let times = || lines.iter().flatten().map(|p| p[0]);
-        let x = if chart.log_time { Axis::log_tight("time [s]", times()) } else { Axis::tight("time [s]", times()) };
-        // The lowest samples decide how far down the axis goes, but a few near zero do not stretch it over the page.
+        let x = if chart.log_time {
+            Axis::log_tight("time [s]", times())
+        } else {
+            Axis::tight("time [s]", times())
+        };
+        // The lowest samples decide how far down the axis goes, but a few near zero do not stretch it over
+        // the page.
         let highest = lines.iter().flatten().map(|p| p[1]).filter(|v| v.is_finite()).fold(0.0, f64::max);
-        let starts = lines.iter().filter_map(|line| line.iter().map(|p| p[1]).find(|&v| v > 0.0)).fold(highest, f64::min);
+        let starts = lines
+            .iter()
+            .filter_map(|line| line.iter().map(|p| p[1]).find(|&v| v > 0.0))
+            .fold(highest, f64::min);
         // What is far below the rounding of a double is none of the run's doing.
         let starts = starts.max(NOTHING.min(highest));
-        let samples = panel.series.iter().flat_map(|s| &s.error).map(|e| e.abs()).filter(|&e| e > 0.03 * starts && e <= highest);
+        let samples = panel
+            .series
+            .iter()
+            .flat_map(|s| &s.error)
+            .map(|e| e.abs())
+            .filter(|&e| e > 0.03 * starts && e <= highest);
         (x, drift_axis(&panel.name, samples.chain([starts]), lines.iter().any(|line| is_zero(line))))
     });
     let words: Vec<Vec<String>> = (chart.panels.iter().zip(&all))
-        .map(|(panel, lines)| panel.series.iter().zip(lines).map(|(series, line)| label(&sheet, &series.name, line)).collect())
+        .map(|(panel, lines)| {
+            panel.series.iter().zip(lines).map(|(series, line)| label(&sheet, &series.name, line)).collect()
+        })
         .collect();
     let right = label_room(&sheet, words.iter().flatten().map(String::as_str), true);
     let axes: Vec<(Axis, Axis)> = axes.collect();
@@ -75,7 +95,8 @@ pub fn constraint_drift(chart: &ConstraintDrift, px_per_pt: f64) -> Result<Pictu
     for (k, (panel, (data, lines))) in panels.iter().zip(chart.panels.iter().zip(&all)).enumerate() {
         let marks = marks(data.series.iter().map(|series| series.method.as_str()));
         for (series, mark) in data.series.iter().zip(&marks) {
-            let samples: Vec<Point> = series.time.iter().zip(&series.error).map(|(&t, &e)| [t, e.abs()]).collect();
+            let samples: Vec<Point> =
+                series.time.iter().zip(&series.error).map(|(&t, &e)| [t, e.abs()]).collect();
             // More dots than can be told apart would only fill the panel.
             let step = samples.len().div_ceil(400).max(1);
             let light: Vec<Point> = samples.into_iter().step_by(step).filter(|p| p[1] > 0.0).collect();
@@ -107,14 +128,23 @@ pub fn constraint_drift(chart: &ConstraintDrift, px_per_pt: f64) -> Result<Pictu
 
 /// Says above the lower edge of a panel without end labels whose markers lie on it.
 fn zeros(sheet: &Sheet, panel: &Panel, data: &ResidualPanel, lines: &[Vec<Point>]) -> Result<(), ChartError> {
-    let names: Vec<&str> =
-        data.series.iter().zip(lines).filter(|(_, line)| is_zero(line)).map(|(series, _)| series.name.as_str()).collect();
+    let names: Vec<&str> = data
+        .series
+        .iter()
+        .zip(lines)
+        .filter(|(_, line)| is_zero(line))
+        .map(|(series, _)| series.name.as_str())
+        .collect();
     if names.is_empty() {
         return Ok(());
     }
     let [left, _, right, bottom] = panel.bounds;
     let full = format!("{}: exactly 0", names.join(", "));
-    let words = if sheet.width(&full, NOTE, false) < right - left - 6.0 { full.as_str() } else { "markers: exactly 0" };
+    let words = if sheet.width(&full, NOTE, false) < right - left - 6.0 {
+        full.as_str()
+    } else {
+        "markers: exactly 0"
+    };
     let lettering = Lettering { halo: true, ..note(GREY, Align::Right, Level::Baseline) };
     sheet.words(words, lettering, [right - 3.0, bottom - 6.0])
 }

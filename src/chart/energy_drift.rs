@@ -1,8 +1,8 @@
 //! Energy drift: the largest relative error so far against time, one line a method.
 //!
-//! A running maximum never plunges, so its line can be followed over many decades.  With a logarithmic time axis dashed guides show
-//! the two laws of long runs: rounding errors that cancel grow like √t, a bias grows like t (Brouwer, "On the accumulation of errors
-//! in numerical integration", Astronomical Journal 46, 1937).
+//! A running maximum never plunges, so its line can be followed over many decades.  With a logarithmic time
+//! axis dashed guides show the two laws of long runs: rounding errors that cancel grow like √t, a bias grows
+//! like t (Brouwer, "On the accumulation of errors in numerical integration", Astronomical Journal 46, 1937).
 
 use super::axis::{Axis, Scale};
 use super::file::Picture;
@@ -50,14 +50,21 @@ pub struct EnergyDrift {
 pub fn energy_drift(chart: &EnergyDrift, px_per_pt: f64) -> Result<Picture, ChartError> {
     let sheet = Sheet::new(PAGE, px_per_pt)?;
     let under = sheet.heading(&chart.title, &chart.caption)?;
-    let lines: Vec<Vec<Point>> = chart.series.iter().map(|series| running_maximum(&series.time, &series.error)).collect();
+    let lines: Vec<Vec<Point>> =
+        chart.series.iter().map(|series| running_maximum(&series.time, &series.error)).collect();
     let marks = marks(chart.series.iter().map(|series| series.method.as_str()));
-    let labels: Vec<String> = chart.series.iter().zip(&lines).map(|(series, line)| label(&sheet, &series.name, line)).collect();
+    let labels: Vec<String> =
+        chart.series.iter().zip(&lines).map(|(series, line)| label(&sheet, &series.name, line)).collect();
 
     let times = || lines.iter().flatten().map(|p| p[0]);
-    let x = if chart.log_time { Axis::log_tight("time [s]", times()) } else { Axis::tight("time [s]", times()) };
+    let x =
+        if chart.log_time { Axis::log_tight("time [s]", times()) } else { Axis::tight("time [s]", times()) };
     let name = format!("largest relative error of {}", chart.quantity);
-    let y = with_rounding_unit(drift_axis(&name, lines.iter().flatten().map(|p| p[1]), lines.iter().any(|line| is_zero(line))));
+    let y = with_rounding_unit(drift_axis(
+        &name,
+        lines.iter().flatten().map(|p| p[1]),
+        lines.iter().any(|line| is_zero(line)),
+    ));
     let right = label_room(&sheet, labels.iter().map(String::as_str), false);
     let panels = stacked(&sheet, under, &x, vec![y], right)?;
     let panel = &panels[0];
@@ -110,8 +117,14 @@ pub(crate) fn label(sheet: &Sheet, name: &str, line: &[Point]) -> String {
     shortened(sheet, &format!("{name}{remark}"))
 }
 
-/// Draws a running maximum; exact zeros become dots on the lower edge.  Returns the height of its end \[pt\], if it has any point.
-pub(crate) fn draw(sheet: &Sheet, panel: &Panel, line: &[Point], mark: &Mark) -> Result<Option<f64>, ChartError> {
+/// Draws a running maximum; exact zeros become dots on the lower edge.  Returns the height of its end \[pt\],
+/// if it has any point.
+pub(crate) fn draw(
+    sheet: &Sheet,
+    panel: &Panel,
+    line: &[Point],
+    mark: &Mark,
+) -> Result<Option<f64>, ChartError> {
     let Some(last) = line.last() else { return Ok(None) };
     let infinite = last[1].is_infinite();
     if is_zero(line) {
@@ -132,7 +145,11 @@ pub(crate) fn draw(sheet: &Sheet, panel: &Panel, line: &[Point], mark: &Mark) ->
         }
     }
     let end = pieces.last().and_then(|piece| piece.last()).map_or_else(|| panel.at(*last)[1], |p| p[1]);
-    Ok(Some(if end.is_finite() && !infinite { end.clamp(panel.bounds[1], panel.bounds[3]) } else { panel.bounds[1] }))
+    Ok(Some(if end.is_finite() && !infinite {
+        end.clamp(panel.bounds[1], panel.bounds[3])
+    } else {
+        panel.bounds[1]
+    }))
 }
 
 /// Decades around the drifts; without any, those around the rounding unit.
@@ -164,19 +181,34 @@ fn rounding_unit(sheet: &Sheet, panel: &Panel, occupied: &mut Occupied) -> Resul
     let width = sheet.width(words, NOTE, false);
     let height = panel.at([panel.x.to, f64::EPSILON])[1];
     let right = panel.bounds[2] - 3.0;
-    let places = [-4.0, NOTE + 3.0].into_iter().flat_map(|dy| [0.0, 0.5, 0.25, 0.75, 0.9].map(|share| (dy, share)));
+    let places =
+        [-4.0, NOTE + 3.0].into_iter().flat_map(|dy| [0.0, 0.5, 0.25, 0.75, 0.9].map(|share| (dy, share)));
     let boxed = |(dy, share): (f64, f64)| {
         let right = right - share * (right - panel.bounds[0] - width - 3.0);
         [right - width, height + dy - 0.9 * NOTE, right, height + dy]
     };
     let inside = |b: &[f64; 4]| b[1] > panel.bounds[1] && b[3] < panel.bounds[3] - 1.0;
-    let Some(best) = places.map(boxed).filter(inside).min_by(|a, b| occupied.cost(*a).total_cmp(&occupied.cost(*b))) else { return Ok(()) };
+    let Some(best) =
+        places.map(boxed).filter(inside).min_by(|a, b| occupied.cost(*a).total_cmp(&occupied.cost(*b)))
+    else {
+        return Ok(());
+    };
     occupied.block(best);
-    sheet.words(words, Lettering { halo: true, ..note(GREY, Align::Left, Level::Baseline) }, [best[0], best[3]])
+    sheet.words(
+        words,
+        Lettering { halo: true, ..note(GREY, Align::Left, Level::Baseline) },
+        [best[0], best[3]],
+    )
 }
 
 /// A dashed line of slope `power` where it meets few other lines, with its law written along it.
-fn guide(sheet: &Sheet, panel: &Panel, power: f64, words: &str, occupied: &mut Occupied) -> Result<(), ChartError> {
+fn guide(
+    sheet: &Sheet,
+    panel: &Panel,
+    power: f64,
+    words: &str,
+    occupied: &mut Occupied,
+) -> Result<(), ChartError> {
     if panel.x.scale != Scale::Log {
         return Ok(());
     }
@@ -208,9 +240,11 @@ fn guide(sheet: &Sheet, panel: &Panel, power: f64, words: &str, occupied: &mut O
                 let off = side * 8.0;
                 let centre = [middle[0] + off * angle.sin(), middle[1] + off * angle.cos()];
                 let reach = [0.5 * width * angle.cos() + 3.0, 0.5 * width * angle.sin() + 5.0];
-                let bounds = [centre[0] - reach[0], centre[1] - reach[1], centre[0] + reach[0], centre[1] + reach[1]];
+                let bounds =
+                    [centre[0] - reach[0], centre[1] - reach[1], centre[0] + reach[0], centre[1] + reach[1]];
                 let outside = bounds[0] < left || bounds[1] < top || bounds[2] > right || bounds[3] > bottom;
-                let cost = met as f64 + 3.0 * occupied.cost(bounds) + if outside { 500.0 } else { 0.0 } - 0.02 * length
+                let cost = met as f64 + 3.0 * occupied.cost(bounds) + if outside { 500.0 } else { 0.0 }
+                    - 0.02 * length
                     + if side < 0.0 { 1.0 } else { 0.0 };
                 if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
                     best = Some((cost, piece.clone(), centre));

@@ -27,13 +27,15 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// The picture as a PNG file in memory: 8-bit RGB, size on paper, sRGB, text chunks `Title`, `Description` and `Software`.
+    /// The picture as a PNG file in memory: 8-bit RGB, size on paper, sRGB, text chunks `Title`,
+    /// `Description` and `Software`.
     ///
     /// # Errors
     /// [`ChartError::Png`] if the encoder refuses, for instance a picture without pixels.
     pub fn png_bytes(&self) -> Result<Vec<u8>, ChartError> {
         // A debug build spends seconds on a good compression; its pictures are looked at once.
-        let compression = if cfg!(debug_assertions) { png::Compression::Fast } else { png::Compression::Balanced };
+        let compression =
+            if cfg!(debug_assertions) { png::Compression::Fast } else { png::Compression::Balanced };
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);
         encoder.set_color(png::ColorType::Rgb);
@@ -41,10 +43,17 @@ impl Picture {
         encoder.set_compression(compression);
         encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
         let per_metre = (self.px_per_pt * 72.0 / 0.0254).round() as u32;
-        encoder.set_pixel_dims(Some(png::PixelDimensions { xppu: per_metre, yppu: per_metre, unit: png::Unit::Meter }));
+        encoder.set_pixel_dims(Some(png::PixelDimensions {
+            xppu: per_metre,
+            yppu: per_metre,
+            unit: png::Unit::Meter,
+        }));
         encoder.add_itxt_chunk("Title".to_owned(), self.title.clone())?;
         encoder.add_itxt_chunk("Description".to_owned(), self.description.clone())?;
-        encoder.add_itxt_chunk("Software".to_owned(), concat!("driftless ", env!("CARGO_PKG_VERSION")).to_owned())?;
+        encoder.add_itxt_chunk(
+            "Software".to_owned(),
+            concat!("driftless ", env!("CARGO_PKG_VERSION")).to_owned(),
+        )?;
         let mut writer = encoder.write_header()?;
         writer.write_image_data(&self.rgb)?;
         writer.finish()?;

@@ -5,7 +5,8 @@ use gif::{DisposalMethod, Frame, Repeat};
 use std::borrow::Cow;
 use std::collections::HashMap;
 
-/// Colours besides the transparent one; more of them cannot be told apart in a drawing and make the file larger.
+/// Colours besides the transparent one; more of them cannot be told apart in a drawing and make the file
+/// larger.
 const COLOURS: usize = 63;
 /// Smallest distance between two colours of the palette (Euclidean, red, green, blue from 0 to 255).
 const APART: i32 = 22;
@@ -65,7 +66,8 @@ impl Encoder {
         })
     }
 
-    /// Adds a frame (red, green, blue of each pixel): the rectangle that changed, unchanged pixels in it transparent.
+    /// Adds a frame (red, green, blue of each pixel): the rectangle that changed, unchanged pixels in it
+    /// transparent.
     pub(crate) fn frame(&mut self, rgb: &[u8]) -> Result<(), ChartError> {
         let mut last = ([0; 3], self.index([0; 3]));
         let index = |&colour: &[u8; 3]| {
@@ -85,7 +87,8 @@ impl Encoder {
         }
         // A frame that changes nothing still takes its time.
         let [left, top, right, bottom] = area.unwrap_or([0; 4]);
-        let places = (top..=bottom).flat_map(|y| (left..=right).map(move |x| (x, y))).map(|(x, y)| y * self.width + x);
+        let places =
+            (top..=bottom).flat_map(|y| (left..=right).map(move |x| (x, y))).map(|(x, y)| y * self.width + x);
         let buffer: Vec<u8> = places.map(|k| if changed(k) { now[k] } else { TRANSPARENT }).collect();
         self.gif.write_frame(&Frame {
             delay: self.delay,

@@ -17,7 +17,11 @@ const LEFT: f64 = 58.0;
 /// Room for labels at the ends of lines, at most a third of the page \[pt\].
 pub(crate) fn label_room<'a>(sheet: &Sheet, labels: impl Iterator<Item = &'a str>, markers: bool) -> f64 {
     let widest = labels.map(|label| sheet.width(label, NOTE, false)).fold(0.0, f64::max);
-    if widest == 0.0 { 20.0 } else { (widest + LEADER + if markers { 8.0 } else { 0.0 } + 8.0).clamp(20.0, sheet.size[0] / 3.0) }
+    if widest == 0.0 {
+        20.0
+    } else {
+        (widest + LEADER + if markers { 8.0 } else { 0.0 } + 8.0).clamp(20.0, sheet.size[0] / 3.0)
+    }
 }
 
 /// The words, cut to what [`label_room`] can give them at most.
@@ -33,8 +37,15 @@ pub(crate) fn shortened(sheet: &Sheet, label: &str) -> String {
     format!("{}…", super::text::plain(&cut))
 }
 
-/// Panels above each other with one time axis, frames drawn; `under` is the lowest line of the heading, `right` the room beside them.
-pub(crate) fn stacked<'a>(sheet: &'a Sheet, under: f64, x: &Axis, ys: Vec<Axis>, right: f64) -> Result<Vec<Panel<'a>>, ChartError> {
+/// Panels above each other with one time axis, frames drawn; `under` is the lowest line of the heading,
+/// `right` the room beside them.
+pub(crate) fn stacked<'a>(
+    sheet: &'a Sheet,
+    under: f64,
+    x: &Axis,
+    ys: Vec<Axis>,
+    right: f64,
+) -> Result<Vec<Panel<'a>>, ChartError> {
     let (top, bottom) = (under + AIR, sheet.size[1] - BOTTOM);
     let count = ys.len().max(1) as f64;
     let height = (bottom - top - (count - 1.0) * BETWEEN) / count;
@@ -56,7 +67,12 @@ pub(crate) fn stacked<'a>(sheet: &'a Sheet, under: f64, x: &Axis, ys: Vec<Axis>,
 }
 
 /// Rows of panels side by side, row by row from above, each panel with its own axes, frames drawn.
-pub(crate) fn rows<'a>(sheet: &'a Sheet, under: f64, rows: Vec<Vec<(Axis, Axis)>>, right: f64) -> Result<Vec<Panel<'a>>, ChartError> {
+pub(crate) fn rows<'a>(
+    sheet: &'a Sheet,
+    under: f64,
+    rows: Vec<Vec<(Axis, Axis)>>,
+    right: f64,
+) -> Result<Vec<Panel<'a>>, ChartError> {
     let (top, bottom) = (under + AIR, sheet.size[1]);
     let pitch = (bottom - top) / rows.len().max(1) as f64;
     let height = pitch - BOTTOM;
@@ -68,7 +84,8 @@ pub(crate) fn rows<'a>(sheet: &'a Sheet, under: f64, rows: Vec<Vec<(Axis, Axis)>
     let lefts: Vec<f64> = (0..columns).map(left_of).collect();
     let between = 16.0;
     let width =
-        (sheet.size[0] - EDGE - right - lefts.iter().sum::<f64>() - (columns.max(1) as f64 - 1.0) * between) / columns.max(1) as f64;
+        (sheet.size[0] - EDGE - right - lefts.iter().sum::<f64>() - (columns.max(1) as f64 - 1.0) * between)
+            / columns.max(1) as f64;
     let mut panels = Vec::new();
     for (k, row) in rows.into_iter().enumerate() {
         let top = top + k as f64 * pitch;

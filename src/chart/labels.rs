@@ -19,7 +19,10 @@ impl Occupied {
             let count = (0.5 * length).ceil().clamp(1.0, 500.0);
             self.points.extend((0..count as usize).map(|k| {
                 let share = k as f64 / count;
-                [pair[0][0] + share * (pair[1][0] - pair[0][0]), pair[0][1] + share * (pair[1][1] - pair[0][1])]
+                [
+                    pair[0][0] + share * (pair[1][0] - pair[0][0]),
+                    pair[0][1] + share * (pair[1][1] - pair[0][1]),
+                ]
             }));
         }
         self.points.extend(points.last());
@@ -31,8 +34,14 @@ impl Occupied {
 
     /// How much a box would cover: half a unit a sample, fifty a collision.
     pub(crate) fn cost(&self, [left, top, right, bottom]: [f64; 4]) -> f64 {
-        let covered = self.points.iter().filter(|p| p[0] > left - 1.0 && p[0] < right + 1.0 && p[1] > top - 1.0 && p[1] < bottom + 1.0);
-        let hit = self.boxes.iter().filter(|b| b[0] < right + 1.0 && b[2] > left - 1.0 && b[1] < bottom + 1.0 && b[3] > top - 1.0);
+        let covered = self
+            .points
+            .iter()
+            .filter(|p| p[0] > left - 1.0 && p[0] < right + 1.0 && p[1] > top - 1.0 && p[1] < bottom + 1.0);
+        let hit = self
+            .boxes
+            .iter()
+            .filter(|b| b[0] < right + 1.0 && b[2] > left - 1.0 && b[1] < bottom + 1.0 && b[3] > top - 1.0);
         0.5 * covered.count() as f64 + 50.0 * hit.count() as f64
     }
 
@@ -42,7 +51,8 @@ impl Occupied {
     }
 }
 
-/// Places for labels of equal height beside a panel: in the order wanted, `gap` apart, from `top` to `bottom` as far as there is room.
+/// Places for labels of equal height beside a panel: in the order wanted, `gap` apart, from `top` to `bottom`
+/// as far as there is room.
 pub(crate) fn spread(wanted: &[f64], gap: f64, top: f64, bottom: f64) -> Vec<f64> {
     let mut order: Vec<usize> = (0..wanted.len()).collect();
     order.sort_by(|&a, &b| wanted[a].total_cmp(&wanted[b]));
@@ -53,7 +63,10 @@ pub(crate) fn spread(wanted: &[f64], gap: f64, top: f64, bottom: f64) -> Vec<f64
         let mut group = (wanted[index] - k as f64 * gap, 1);
         while let Some(&(mean, count)) = groups.last().filter(|last| last.0 > group.0) {
             groups.pop();
-            group = ((mean * count as f64 + group.0 * group.1 as f64) / (count + group.1) as f64, count + group.1);
+            group = (
+                (mean * count as f64 + group.0 * group.1 as f64) / (count + group.1) as f64,
+                count + group.1,
+            );
         }
         groups.push(group);
     }
@@ -66,9 +79,16 @@ pub(crate) fn spread(wanted: &[f64], gap: f64, top: f64, bottom: f64) -> Vec<f64
     places
 }
 
-/// The best box of `size` beside a point inside `room`: its upper left corner.  `avoid` are directions in which lines leave the point
-/// \[unit vectors, y downwards\].
-pub(crate) fn place(at: Point, distance: f64, size: [f64; 2], room: [f64; 4], avoid: &[Point], occupied: &Occupied) -> ([f64; 4], f64) {
+/// The best box of `size` beside a point inside `room`: its upper left corner.  `avoid` are directions in
+/// which lines leave the point \[unit vectors, y downwards\].
+pub(crate) fn place(
+    at: Point,
+    distance: f64,
+    size: [f64; 2],
+    room: [f64; 4],
+    avoid: &[Point],
+    occupied: &Occupied,
+) -> ([f64; 4], f64) {
     let mut best = ([0.0; 4], f64::INFINITY);
     for ring in 0..2 {
         for k in 0..16 {
@@ -77,8 +97,14 @@ pub(crate) fn place(at: Point, distance: f64, size: [f64; 2], room: [f64; 4], av
             let far = distance + 6.0 * f64::from(ring);
             // The box touches the circle with the side or corner that faces the point.
             let centre = [at[0] + away * (far + 0.5 * size[0]), at[1] + across * (far + 0.5 * size[1])];
-            let bounds = [centre[0] - 0.5 * size[0], centre[1] - 0.5 * size[1], centre[0] + 0.5 * size[0], centre[1] + 0.5 * size[1]];
-            let outside = [room[0] - bounds[0], room[1] - bounds[1], bounds[2] - room[2], bounds[3] - room[3]];
+            let bounds = [
+                centre[0] - 0.5 * size[0],
+                centre[1] - 0.5 * size[1],
+                centre[0] + 0.5 * size[0],
+                centre[1] + 0.5 * size[1],
+            ];
+            let outside =
+                [room[0] - bounds[0], room[1] - bounds[1], bounds[2] - room[2], bounds[3] - room[3]];
             let overhang = outside.iter().any(|&part| part > 0.0);
             let along: f64 = avoid.iter().map(|d| (d[0] * away + d[1] * across).max(0.0).powi(2)).sum();
             let preference = 0.4 * f64::from(k.min(16 - k)) / 8.0 + 1.5 * f64::from(ring);
@@ -111,10 +137,13 @@ mod tests {
     fn a_label_avoids_lines_and_other_labels() {
         let mut occupied = Occupied::default();
         occupied.line(&[[50.0, 50.0], [100.0, 50.0]]);
-        let (bounds, _) = place([50.0, 50.0], 4.0, [20.0, 8.0], [0.0, 0.0, 100.0, 100.0], &[[1.0, 0.0]], &occupied);
+        let (bounds, _) =
+            place([50.0, 50.0], 4.0, [20.0, 8.0], [0.0, 0.0, 100.0, 100.0], &[[1.0, 0.0]], &occupied);
         assert_eq!(occupied.cost(bounds), 0.0);
         occupied.block(bounds);
         let (other, _) = place([50.0, 50.0], 4.0, [20.0, 8.0], [0.0, 0.0, 100.0, 100.0], &[], &occupied);
-        assert!(other[0] >= bounds[2] || other[2] <= bounds[0] || other[1] >= bounds[3] || other[3] <= bounds[1]);
+        assert!(
+            other[0] >= bounds[2] || other[2] <= bounds[0] || other[1] >= bounds[3] || other[3] <= bounds[1]
+        );
     }
 }

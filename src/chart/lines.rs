@@ -1,7 +1,7 @@
 //! Polylines: cut at the frame, broken where data have no place, dashed, thinned.
 //!
-//! Plotters moves points outside a panel to its border, which bends the line; here lines are clipped (Liang and Barsky, "A new concept
-//! and method for line clipping", ACM Transactions on Graphics 3, 1984).
+//! Plotters moves points outside a panel to its border, which bends the line; here lines are clipped (Liang
+//! and Barsky, "A new concept and method for line clipping", ACM Transactions on Graphics 3, 1984).
 
 /// A place on the page \[pt from the upper left, y downwards\], or in a panel as fractions of its sides.
 pub(crate) type Point = [f64; 2];
@@ -72,7 +72,10 @@ pub(crate) fn dashes(points: &[Point], pattern: &[f64]) -> Vec<Vec<Point>> {
         while length - done > left {
             done += left;
             let share = done / length;
-            let at = [pair[0][0] + share * (pair[1][0] - pair[0][0]), pair[0][1] + share * (pair[1][1] - pair[0][1])];
+            let at = [
+                pair[0][0] + share * (pair[1][0] - pair[0][0]),
+                pair[0][1] + share * (pair[1][1] - pair[0][1]),
+            ];
             if k % 2 == 0 {
                 dash.push(at);
                 out.push(std::mem::take(&mut dash));
@@ -102,8 +105,12 @@ pub(crate) fn running_maximum(time: &[f64], values: &[f64]) -> Vec<Point> {
             continue;
         }
         largest = largest.max(value.abs());
-        // Within a level only its ends are needed, and its first positive time, where a logarithmic axis begins.
-        let level = out.len() >= 2 && out[out.len() - 1][1] == largest && out[out.len() - 2][1] == largest && out[out.len() - 2][0] > 0.0;
+        // Within a level only its ends are needed, and its first positive time, where a logarithmic axis
+        // begins.
+        let level = out.len() >= 2
+            && out[out.len() - 1][1] == largest
+            && out[out.len() - 2][1] == largest
+            && out[out.len() - 2][0] > 0.0;
         match out.last_mut() {
             Some(end) if level => end[0] = t,
             _ => out.push([t, largest]),
@@ -112,7 +119,8 @@ pub(crate) fn running_maximum(time: &[f64], values: &[f64]) -> Vec<Point> {
     out
 }
 
-/// Smallest and largest y in and beside each of `columns` equal parts of 0…1: `(x, low, high)` of those that hold points.
+/// Smallest and largest y in and beside each of `columns` equal parts of 0…1: `(x, low, high)` of those that
+/// hold points.
 pub(crate) fn envelope(points: &[Point], columns: usize) -> Vec<(f64, f64, f64)> {
     let mut range: Vec<Option<(f64, f64)>> = vec![None; columns];
     for [x, y] in points.iter().copied().filter(|[x, y]| (0.0..=1.0).contains(x) && y.is_finite()) {
@@ -182,7 +190,9 @@ mod tests {
 
     #[test]
     fn fast_oscillation_is_dense_and_slow_is_not() {
-        let wave = |turns: f64| (0..4000).map(|k| [k as f64 / 4000.0, (turns * k as f64 / 4000.0).sin()]).collect::<Vec<_>>();
+        let wave = |turns: f64| {
+            (0..4000).map(|k| [k as f64 / 4000.0, (turns * k as f64 / 4000.0).sin()]).collect::<Vec<_>>()
+        };
         assert!(!is_dense(&wave(100.0), 360.0));
         assert!(is_dense(&wave(3000.0), 360.0));
     }

@@ -1,4 +1,5 @@
-//! A value over a rectangle of two others, as colours: nearest cell, no smoothing, a bar that tells the colours' values.
+//! A value over a rectangle of two others, as colours: nearest cell, no smoothing, a bar that tells the
+//! colours' values.
 
 use super::ChartError;
 use super::axis::{Axis, Scale};
@@ -26,7 +27,8 @@ const GAP: f64 = 7.5;
 /// Side of a square of the legend \[pt\].
 const SWATCH: f64 = 8.0;
 
-/// Values below the lower quartile count where they are within this power of the quartiles' ratio, which is taken to be at least `MIDDLE`.
+/// Values below the lower quartile count where they are within this power of the quartiles' ratio, which is
+/// taken to be at least `MIDDLE`.
 const FENCE: f64 = 1.5;
 /// See [`FENCE`].
 const MIDDLE: f64 = 10.0;
@@ -78,7 +80,8 @@ pub struct Map {
     pub log: bool,
     /// Dark colours for large values instead of small ones.
     pub dark_high: bool,
-    /// Ends of the colours; `None`: those of the values, of which a logarithm leaves out the smallest hundredth and what lies decades below the rest.
+    /// Ends of the colours; `None`: those of the values, of which a logarithm leaves out the smallest
+    /// hundredth and what lies decades below the rest.
     pub range: Option<[f64; 2]>,
     /// What [`Cell::Never`], [`Cell::Excluded`] and [`Cell::Failed`] mean, with markup.
     pub words: [String; 3],
@@ -117,8 +120,11 @@ pub fn map(chart: &Map, px_per_pt: f64) -> Result<Picture, ChartError> {
     let panel = if in_pi == [true; 2] { panel.equal_steps() } else { panel };
     let pixels = (size[0] as usize, size[1] as usize);
     let cell = |column: usize, row: usize| {
-        let place = |pixel: usize, pixels: usize, count: usize| (pixel * count / pixels.max(1)).min(count.saturating_sub(1));
-        let (i, j) = (place(column, pixels.0, chart.x.count), place(pixels.1 - 1 - row, pixels.1, chart.y.count));
+        let place = |pixel: usize, pixels: usize, count: usize| {
+            (pixel * count / pixels.max(1)).min(count.saturating_sub(1))
+        };
+        let (i, j) =
+            (place(column, pixels.0, chart.x.count), place(pixels.1 - 1 - row, pixels.1, chart.y.count));
         colours.of_cell(chart.cells.get(i * chart.y.count + j).copied().unwrap_or(Cell::Failed))
     };
     sheet.raster([left, top], pixels, cell)?;
@@ -128,7 +134,11 @@ pub fn map(chart: &Map, px_per_pt: f64) -> Result<Picture, ChartError> {
         let top = top - AIR + 2.0 - SWATCH;
         sheet.polygon(&square(at, top, SWATCH), SPINE)?;
         sheet.polygon(&square(at + 0.5, top + 0.5, SWATCH - 1.0), colour)?;
-        sheet.words(&words, note(GREY, Align::Left, Level::Middle), [at + SWATCH + 4.0, top + 0.5 * SWATCH])?;
+        sheet.words(
+            &words,
+            note(GREY, Align::Left, Level::Middle),
+            [at + SWATCH + 4.0, top + 0.5 * SWATCH],
+        )?;
         at += SWATCH + 4.0 + sheet.width(&words, NOTE, false) + 14.0;
     }
     bar(&sheet, &panel, &colours, px_per_pt)?;
@@ -156,7 +166,12 @@ fn axis(axis: &MapAxis) -> Axis {
         let quarters = (end / (0.25 * PI)).round() * 0.25 * PI;
         if in_pi && (end - quarters).abs() < 1e-9 { quarters } else { end }
     };
-    Axis { scale: if in_pi { Scale::Pi } else { Scale::Linear }, from: whole(from - half), to: whole(to + half), name: name.clone() }
+    Axis {
+        scale: if in_pi { Scale::Pi } else { Scale::Linear },
+        from: whole(from - half),
+        to: whole(to + half),
+        name: name.clone(),
+    }
 }
 
 /// Colours of the cells without a value that occur, and what they mean.
@@ -164,7 +179,11 @@ fn legend(chart: &Map) -> Vec<(Colour, String)> {
     let kinds = [Cell::Never, Cell::Excluded, Cell::Failed];
     let colours = [WHITE, EXCLUDED, FAILED];
     let occurs = |kind: &Cell| chart.cells.iter().any(|cell| told(*cell) == *kind);
-    let shown = kinds.iter().zip(colours).zip(&chart.words).filter(|((kind, _), words)| occurs(kind) && !words.is_empty());
+    let shown = kinds
+        .iter()
+        .zip(colours)
+        .zip(&chart.words)
+        .filter(|((kind, _), words)| occurs(kind) && !words.is_empty());
     shown.map(|((_, colour), words)| (colour, words.clone())).collect()
 }
 
@@ -212,8 +231,14 @@ impl Colours {
             }
         });
         let scale = if chart.log { Scale::Log } else { Scale::Linear };
-        let beyond = [values.iter().any(|&value| value < range[0]), values.iter().any(|&value| value > range[1])];
-        Self { axis: Axis { name: chart.value.clone(), scale, from: range[0], to: range[1] }, dark_high: chart.dark_high, beyond, is_empty }
+        let beyond =
+            [values.iter().any(|&value| value < range[0]), values.iter().any(|&value| value > range[1])];
+        Self {
+            axis: Axis { name: chart.value.clone(), scale, from: range[0], to: range[1] },
+            dark_high: chart.dark_high,
+            beyond,
+            is_empty,
+        }
     }
 
     /// Ticks of a bar so high \[pt\]; those at its ends say where values lie beyond.
@@ -245,7 +270,11 @@ impl Colours {
     fn of_cell(&self, cell: Cell) -> Colour {
         match told(cell) {
             // A logarithm has no place for zero: it is below everything.
-            Cell::Value(value) => self.at(if self.axis.scale == Scale::Log && value <= 0.0 { 0.0 } else { self.axis.fraction(value) }),
+            Cell::Value(value) => self.at(if self.axis.scale == Scale::Log && value <= 0.0 {
+                0.0
+            } else {
+                self.axis.fraction(value)
+            }),
             Cell::Never => WHITE,
             Cell::Excluded => EXCLUDED,
             Cell::Failed => FAILED,
@@ -256,7 +285,11 @@ impl Colours {
 /// The largest of 1, 2, 5 times a power of ten that is not above a positive value.
 fn round_down(value: f64) -> f64 {
     let power = super::ticks::ten(value.log10().floor() as i32);
-    [5.0, 2.0, 1.0].into_iter().map(|factor| factor * power).find(|&round| round <= value * (1.0 + 1e-12)).unwrap_or(value)
+    [5.0, 2.0, 1.0]
+        .into_iter()
+        .map(|factor| factor * power)
+        .find(|&round| round <= value * (1.0 + 1e-12))
+        .unwrap_or(value)
 }
 
 /// The bar right of the map: its colours, ticks and name.
@@ -267,7 +300,9 @@ fn bar(sheet: &Sheet, panel: &Panel, colours: &Colours, px_per_pt: f64) -> Resul
     let [_, top, right, bottom] = panel.bounds;
     let (left, right) = (right + BAR[0], right + BAR[0] + BAR[1]);
     let pixels = [right - left, bottom - top].map(|points| (points * px_per_pt).round().max(1.0) as usize);
-    sheet.raster([left, top], (pixels[0], pixels[1]), |_, row| colours.at(1.0 - (row as f64 + 0.5) / pixels[1] as f64))?;
+    sheet.raster([left, top], (pixels[0], pixels[1]), |_, row| {
+        colours.at(1.0 - (row as f64 + 0.5) / pixels[1] as f64)
+    })?;
     let spine = Pen::new(SPINE, 0.75);
     sheet.line(&[[left, top], [right, top], [right, bottom], [left, bottom], [left, top]], &spine)?;
     let ticks = colours.ticks(bottom - top);
@@ -278,9 +313,14 @@ fn bar(sheet: &Sheet, panel: &Panel, colours: &Colours, px_per_pt: f64) -> Resul
     for tick in &ticks.majors {
         let at = height(tick.value);
         sheet.line(&[[right, at], [right + 4.0, at]], &spine)?;
-        sheet.words(&tick.label, Lettering::new(TICK, INK).at(Align::Left, Level::Middle), [right + GAP, at])?;
+        sheet.words(
+            &tick.label,
+            Lettering::new(TICK, INK).at(Align::Left, Level::Middle),
+            [right + GAP, at],
+        )?;
     }
-    let upright = Lettering { angle: FRAC_PI_2, ..Lettering::new(NAME, INK).at(Align::Centre, Level::Middle) };
+    let upright =
+        Lettering { angle: FRAC_PI_2, ..Lettering::new(NAME, INK).at(Align::Centre, Level::Middle) };
     let at = right + colours.room(sheet, bottom - top) - 0.5 * NAME;
     sheet.words(&ticks.name(&colours.axis.name), upright, [at, 0.5 * (top + bottom)])
 }
@@ -290,9 +330,24 @@ mod tests {
     use super::*;
 
     fn chart(cells: Vec<Cell>) -> Map {
-        let axis = MapAxis { name: "*a* [rad]".into(), from: -1.5 * PI / 2.0, to: 1.5 * PI / 2.0, count: 4, log: false };
+        let axis = MapAxis {
+            name: "*a* [rad]".into(),
+            from: -1.5 * PI / 2.0,
+            to: 1.5 * PI / 2.0,
+            count: 4,
+            log: false,
+        };
         let words = ["never".to_owned(), "left out".to_owned(), "failed".to_owned()];
-        Map { title: "Title".into(), x: axis.clone(), y: axis, cells, value: "time [s]".into(), log: true, words, ..Map::default() }
+        Map {
+            title: "Title".into(),
+            x: axis.clone(),
+            y: axis,
+            cells,
+            value: "time [s]".into(),
+            log: true,
+            words,
+            ..Map::default()
+        }
     }
 
     /// Colour in the middle of a cell.
@@ -308,7 +363,8 @@ mod tests {
     #[test]
     fn every_cell_has_its_place_and_its_colour() {
         let mut cells = vec![Cell::Value(1.0); 16];
-        (cells[1], cells[4], cells[15], cells[14]) = (Cell::Never, Cell::Excluded, Cell::Value(100.0), Cell::Value(f64::NAN));
+        (cells[1], cells[4], cells[15], cells[14]) =
+            (Cell::Never, Cell::Excluded, Cell::Value(100.0), Cell::Value(f64::NAN));
         let picture = map(&chart(cells), 1.0).expect("a picture");
         let parts = |colour: Colour| [colour.0, colour.1, colour.2];
         assert_eq!(colour(&picture, 0, 0), parts(even(0.5 / LEVELS)));
@@ -322,28 +378,42 @@ mod tests {
         }
         for (k, text) in picture.texts.iter().enumerate() {
             let [left, top, right, bottom] = text.bounds();
-            let size = [f64::from(picture.width), f64::from(picture.height)].map(|pixels| pixels / picture.px_per_pt);
-            assert!(left >= 0.0 && top >= 0.0 && right <= size[0] && bottom <= size[1], "{} is cut", text.text);
+            let size = [f64::from(picture.width), f64::from(picture.height)]
+                .map(|pixels| pixels / picture.px_per_pt);
+            assert!(
+                left >= 0.0 && top >= 0.0 && right <= size[0] && bottom <= size[1],
+                "{} is cut",
+                text.text
+            );
             assert!(picture.texts[..k].iter().all(|other| !other.overlaps(text)), "{} is covered", text.text);
         }
     }
 
     #[test]
     fn odd_data_draw_something_sensible() {
-        for cells in [vec![], vec![Cell::Never; 16], vec![Cell::Value(0.0); 16], vec![Cell::Value(-3.0); 16], vec![Cell::Value(1e300); 16]]
-        {
+        for cells in [
+            vec![],
+            vec![Cell::Never; 16],
+            vec![Cell::Value(0.0); 16],
+            vec![Cell::Value(-3.0); 16],
+            vec![Cell::Value(1e300); 16],
+        ] {
             for log in [true, false] {
                 assert!(map(&Map { log, ..chart(cells.clone()) }, 0.5).is_ok(), "{log} {cells:?}");
             }
         }
-        let narrow = Map { x: MapAxis { count: 1, from: 2.0, to: 2.0, name: "x".into(), log: false }, ..chart(vec![Cell::Value(1.0); 4]) };
+        let narrow = Map {
+            x: MapAxis { count: 1, from: 2.0, to: 2.0, name: "x".into(), log: false },
+            ..chart(vec![Cell::Value(1.0); 4])
+        };
         assert!(map(&narrow, 0.5).is_ok());
     }
 
     #[test]
     fn the_bar_says_where_values_are_cut_off() {
         let cells = (0..16).map(|k| Cell::Value(0.5 * f64::from(k))).collect();
-        let picture = map(&Map { range: Some([1.0, 5.0]), log: false, ..chart(cells) }, 1.0).expect("a picture");
+        let picture =
+            map(&Map { range: Some([1.0, 5.0]), log: false, ..chart(cells) }, 1.0).expect("a picture");
         let has = |word: &str| picture.texts.iter().any(|text| text.text == word);
         assert!(has("≤ 1.0") || has("≤ 1"), "{:?}", picture.texts);
         assert!(has("≥ 5.0") || has("≥ 5"), "{:?}", picture.texts);

@@ -73,7 +73,8 @@ impl Outcome {
 /// [`ChartError`] if the resolution is out of range or drawing fails.
 pub fn matrix(chart: &Matrix, px_per_pt: f64) -> Result<Picture, ChartError> {
     let trial = Sheet::new([CELL[0], CELL[1]], px_per_pt)?;
-    let widest = |names: &[String]| names.iter().map(|name| trial.width(name, NOTE, false)).fold(0.0, f64::max);
+    let widest =
+        |names: &[String]| names.iter().map(|name| trial.width(name, NOTE, false)).fold(0.0, f64::max);
     let left = EDGE + widest(&chart.rows) + GAP;
     let size = [chart.columns.len() as f64 * CELL[0], chart.rows.len() as f64 * CELL[1]];
     let legend = legend(chart);
@@ -87,7 +88,11 @@ pub fn matrix(chart: &Matrix, px_per_pt: f64) -> Result<Picture, ChartError> {
     for (colour, words) in &legend {
         sheet.polygon(&square([at, under + AIR - 4.0], [SWATCH; 2]), SPINE)?;
         sheet.polygon(&square([at + 0.5, under + AIR - 3.5], [SWATCH - 1.0; 2]), *colour)?;
-        sheet.words(words, note(GREY, Align::Left, Level::Middle), [at + SWATCH + 4.0, under + AIR - 4.0 + 0.5 * SWATCH])?;
+        sheet.words(
+            words,
+            note(GREY, Align::Left, Level::Middle),
+            [at + SWATCH + 4.0, under + AIR - 4.0 + 0.5 * SWATCH],
+        )?;
         at += SWATCH + 18.0 + sheet.width(words, NOTE, false);
     }
     for (k, name) in chart.columns.iter().enumerate() {
@@ -124,7 +129,10 @@ pub fn matrix(chart: &Matrix, px_per_pt: f64) -> Result<Picture, ChartError> {
 /// The outcomes, in colours and words: `423 right, with its error`.
 fn legend(chart: &Matrix) -> Vec<(Colour, String)> {
     let count = |outcome: Outcome| chart.cells.iter().filter(|cell| cell.0 == outcome).count();
-    Outcome::ALL.iter().map(|&outcome| (outcome.colour(), format!("{} {}", count(outcome), outcome.word()))).collect()
+    Outcome::ALL
+        .iter()
+        .map(|&outcome| (outcome.colour(), format!("{} {}", count(outcome), outcome.word())))
+        .collect()
 }
 
 fn square([x, y]: [f64; 2], [width, height]: [f64; 2]) -> [[f64; 2]; 4] {
@@ -137,8 +145,17 @@ mod tests {
 
     #[test]
     fn every_cell_and_every_name_is_there() {
-        let cells = vec![(Outcome::Right, "1e-9".into()), (Outcome::Wrong, "2e-3".into()), (Outcome::Stopped, String::new())];
-        let chart = Matrix { rows: vec!["spring".into()], columns: ["a", "b", "c"].map(Into::into).into(), cells, ..Matrix::default() };
+        let cells = vec![
+            (Outcome::Right, "1e-9".into()),
+            (Outcome::Wrong, "2e-3".into()),
+            (Outcome::Stopped, String::new()),
+        ];
+        let chart = Matrix {
+            rows: vec!["spring".into()],
+            columns: ["a", "b", "c"].map(Into::into).into(),
+            cells,
+            ..Matrix::default()
+        };
         let picture = matrix(&chart, 2.0).expect("a picture");
         for words in ["spring", "a", "b", "c", "1e-9", "2e-3", "1 wrong", "0 refused"] {
             assert!(picture.texts.iter().any(|text| text.text == words), "{words}");

@@ -23,9 +23,11 @@ pub struct MechanismChart {
     pub sketch: Sketch,
     /// Poses: the last is drawn in full, up to eight before it as pale ghosts, oldest first.
     pub poses: Vec<Pose>,
-    /// Paths of the sketch's points (x, y) \[m\], oldest place first; points that are not numbers break a path.
+    /// Paths of the sketch's points (x, y) \[m\], oldest place first; points that are not numbers break a
+    /// path.
     pub trails: Vec<Vec<[f64; 2]>>,
-    /// The point of the paths from which on they are pale: beyond the horizon up to which they can be trusted.
+    /// The point of the paths from which on they are pale: beyond the horizon up to which they can be
+    /// trusted.
     pub horizon: Option<usize>,
 }
 

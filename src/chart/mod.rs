@@ -1,10 +1,11 @@
 //! Charts: plain data in, pictures out, drawn off-screen.
 //!
-//! Each chart is a struct of plain rows and a function that turns it into a [`Picture`] (or an [`Animation`]).  Nothing is run or
-//! read here.  The pictures are drawn with plotters on a canvas of our own, because its bitmap backend cannot draw smooth lines; fonts are part of the program.
+//! Each chart is a struct of plain rows and a function that turns it into a [`Picture`] (or an
+//! [`Animation`]).  Nothing is run or read here.  The pictures are drawn with plotters on a canvas of our
+//! own, because its bitmap backend cannot draw smooth lines; fonts are part of the program.
 //!
-//! Sizes are points of 1/72 inch; one number, pixels per point, sets the resolution.  Every string may carry a small markup,
-//! `*italic*`, `_{below}`, `^{above}`; [`plain`] protects names that come from outside.
+//! Sizes are points of 1/72 inch; one number, pixels per point, sets the resolution.  Every string may carry
+//! a small markup, `*italic*`, `_{below}`, `^{above}`; [`plain`] protects names that come from outside.
 //!
 //! | chart | data | shows |
 //! | --- | --- | --- |

@@ -32,7 +32,8 @@ pub struct MotionGif {
     pub poses: Vec<Pose>,
     /// Time of each frame \[s\], written into it; may be empty.
     pub time: Vec<f64>,
-    /// Paths of the sketch's points (x, y) \[m\], at equal intervals from the first frame to the last and finer than the frames.
+    /// Paths of the sketch's points (x, y) \[m\], at equal intervals from the first frame to the last and
+    /// finer than the frames.
     pub trails: Vec<Vec<[f64; 2]>>,
     /// Time a frame stays \[1/100 s\]; 4 gives 25 frames a second.
     pub delay: u16,
@@ -76,7 +77,10 @@ pub fn motion_gif(chart: &MotionGif) -> Result<Animation, ChartError> {
     let (x, y) = view.axes();
     let panel = Panel::new(&sheet, bounds, x, y);
     let [left, top, right, bottom] = bounds;
-    sheet.line(&[[left, top], [right, top], [right, bottom], [left, bottom], [left, top]], &Pen::new(GRID, 0.75))?;
+    sheet.line(
+        &[[left, top], [right, top], [right, bottom], [left, bottom], [left, top]],
+        &Pen::new(GRID, 0.75),
+    )?;
     let size = 0.8 * chart.poses.first().map_or(1.0, |pose| symbol_size(pose, view.scale(width)));
     let pencil = Pencil { sheet: &sheet, panel: &panel, view, size };
     let mut occupied = Occupied::default();
@@ -92,13 +96,22 @@ pub fn motion_gif(chart: &MotionGif) -> Result<Animation, ChartError> {
         let is_past = chart.horizon.zip(chart.time.get(k)).is_some_and(|(horizon, &time)| time > horizon);
         for (number, trail) in chart.trails.iter().enumerate() {
             let colour = trail_colour(number);
-            pencil.trail(tail(trail, k, frames), if is_past { pale(colour) } else { colour }, SHADES, &mut occupied)?;
+            pencil.trail(
+                tail(trail, k, frames),
+                if is_past { pale(colour) } else { colour },
+                SHADES,
+                &mut occupied,
+            )?;
         }
         pencil.pose(&chart.sketch, pose, &mut occupied)?;
         if let Some(&time) = chart.time.get(k) {
             let words = Lettering::new(CAPTION, GREY).at(Align::Right, Level::Baseline);
             let past = if is_past { ", beyond trust" } else { "" };
-            sheet.words(&format!("*t* = {} s{past}", decimal(time, 2)), words, [right - 5.0, bottom - 5.0])?;
+            sheet.words(
+                &format!("*t* = {} s{past}", decimal(time, 2)),
+                words,
+                [right - 5.0, bottom - 5.0],
+            )?;
         }
         Ok(sheet.pixels())
     };
@@ -114,7 +127,9 @@ pub fn motion_gif(chart: &MotionGif) -> Result<Animation, ChartError> {
 
 /// The part of a trail seen in frame `k`.
 fn tail(trail: &[[f64; 2]], k: usize, frames: usize) -> &[[f64; 2]] {
-    let place = |frame: usize| (frame as f64 / (frames.max(2) - 1) as f64 * trail.len().saturating_sub(1) as f64).round() as usize;
+    let place = |frame: usize| {
+        (frame as f64 / (frames.max(2) - 1) as f64 * trail.len().saturating_sub(1) as f64).round() as usize
+    };
     let end = (place(k) + 1).min(trail.len());
     &trail[place(k.saturating_sub(TAIL)).min(end)..end]
 }

@@ -1,7 +1,8 @@
 //! Colours, and the colour and shape every method and stabilization keeps in every chart.
 //!
-//! The series colours are those of Okabe and Ito, "Color Universal Design" (2008).  They stay apart for colour-blind readers, but not
-//! far enough to stand alone: a series also has a shape or a direct label.  Words need more contrast than lines; see [`readable`].
+//! The series colours are those of Okabe and Ito, "Color Universal Design" (2008).  They stay apart for
+//! colour-blind readers, but not far enough to stand alone: a series also has a shape or a direct label.
+//! Words need more contrast than lines; see [`readable`].
 
 use plotters::style::RGBColor;
 
@@ -30,7 +31,8 @@ pub(crate) const VERMILLION: Colour = RGBColor(0xD5, 0x5E, 0x00);
 pub(crate) const EXCLUDED: Colour = RGBColor(0xD3, 0xD7, 0xDC);
 pub(crate) const FAILED: Colour = RGBColor(0xF0, 0xAE, 0x7C);
 
-/// Colours from dark (0) to light (1) in even steps of lightness, also to the colour-blind: viridis, by S. van der Walt and N. Smith (2015).
+/// Colours from dark (0) to light (1) in even steps of lightness, also to the colour-blind: viridis, by S.
+/// van der Walt and N. Smith (2015).
 pub(crate) fn even(share: f64) -> Colour {
     const STOPS: [Colour; 10] = [
         RGBColor(0x44, 0x01, 0x54),
@@ -103,7 +105,8 @@ fn fixed(name: &str) -> Option<(Colour, Shape)> {
 pub(crate) fn marks<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<Mark> {
     let names: Vec<&str> = names.into_iter().collect();
     let known: Vec<_> = names.iter().map(|name| fixed(name)).collect();
-    let mut free = FREE.iter().filter(|(colour, _)| !known.iter().flatten().any(|(taken, _)| taken == colour)).cycle();
+    let mut free =
+        FREE.iter().filter(|(colour, _)| !known.iter().flatten().any(|(taken, _)| taken == colour)).cycle();
     let mut marks: Vec<Mark> = Vec::new();
     for known in &known {
         let (colour, shape) = known.or_else(|| free.next().copied()).unwrap_or(FREE[6]);
@@ -115,7 +118,8 @@ pub(crate) fn marks<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<Mark> {
 
 /// `share` of the way from one colour to another.
 pub(crate) fn mix(from: Colour, to: Colour, share: f64) -> Colour {
-    let blend = |a: u8, b: u8| (f64::from(a) + share.clamp(0.0, 1.0) * (f64::from(b) - f64::from(a))).round() as u8;
+    let blend =
+        |a: u8, b: u8| (f64::from(a) + share.clamp(0.0, 1.0) * (f64::from(b) - f64::from(a))).round() as u8;
     RGBColor(blend(from.0, to.0), blend(from.1, to.1), blend(from.2, to.2))
 }
 
@@ -135,7 +139,10 @@ fn luminance(colour: Colour) -> f64 {
 
 /// The colour, darkened until words in it have a contrast of 4.5 on white.
 pub(crate) fn readable(colour: Colour) -> Colour {
-    (0..=20).map(|step| mix(colour, INK, 0.05 * f64::from(step))).find(|&word| contrast(word, WHITE) >= 4.5).unwrap_or(INK)
+    (0..=20)
+        .map(|step| mix(colour, INK, 0.05 * f64::from(step)))
+        .find(|&word| contrast(word, WHITE) >= 4.5)
+        .unwrap_or(INK)
 }
 
 #[cfg(test)]

@@ -79,7 +79,9 @@ fn widest(sheet: &Sheet, ticks: &Ticks) -> f64 {
 /// Half of the last label of a horizontal axis that ends at the right edge \[pt\].
 pub(crate) fn right_room(sheet: &Sheet, axis: &Axis, width: f64) -> f64 {
     let ticks = axis.ticks(most_along(sheet, axis, width));
-    let over = |tick: &super::ticks::Tick| axis.fraction(tick.value) * width + 0.5 * sheet.width(&tick.label, TICK, false) - width;
+    let over = |tick: &super::ticks::Tick| {
+        axis.fraction(tick.value) * width + 0.5 * sheet.width(&tick.label, TICK, false) - width
+    };
     ticks.majors.iter().map(over).fold(0.0, f64::max)
 }
 
@@ -114,7 +116,9 @@ impl<'a> Panel<'a> {
             _ => f64::INFINITY,
         };
         let coarser = step(&self.x, self.x_most).max(step(&self.y, self.y_most)) * (1.0 - 1e-9);
-        let fewer = |axis: &Axis, most: usize| (2..=most).rev().find(|&most| step(axis, most) >= coarser).unwrap_or(2);
+        let fewer = |axis: &Axis, most: usize| {
+            (2..=most).rev().find(|&most| step(axis, most) >= coarser).unwrap_or(2)
+        };
         (self.x_most, self.y_most) = (fewer(&self.x, self.x_most), fewer(&self.y, self.y_most));
         self
     }
@@ -158,14 +162,22 @@ impl<'a> Panel<'a> {
             let x = self.page([self.x.fraction(tick.value), 0.0])[0];
             self.sheet.line(&[[x, bottom], [x, bottom + MAJOR]], &spine)?;
             if written.x {
-                self.sheet.words(&tick.label, Lettering::new(TICK, INK).at(Align::Centre, Level::Top), [x, bottom + MAJOR + GAP])?;
+                self.sheet.words(
+                    &tick.label,
+                    Lettering::new(TICK, INK).at(Align::Centre, Level::Top),
+                    [x, bottom + MAJOR + GAP],
+                )?;
             }
         }
         for tick in &y_ticks.majors {
             let y = self.page([0.0, self.y.fraction(tick.value)])[1];
             self.sheet.line(&[[left - MAJOR, y], [left, y]], &spine)?;
             // The lowest label of a narrow panel would meet the first of the x axis otherwise.
-            self.sheet.words(&tick.label, Lettering::new(TICK, INK).at(Align::Right, Level::Middle), [left - MAJOR - GAP, y])?;
+            self.sheet.words(
+                &tick.label,
+                Lettering::new(TICK, INK).at(Align::Right, Level::Middle),
+                [left - MAJOR - GAP, y],
+            )?;
         }
         self.sheet.line(&[[left, top], [left, bottom]], &spine)?;
         self.sheet.line(&[[left, bottom], [right, bottom]], &spine)?;
@@ -179,8 +191,10 @@ impl<'a> Panel<'a> {
 
     /// Grid lines at the labelled ticks, by the mesh of plotters.
     fn grid(&self) -> Result<(), ChartError> {
-        let ((left, top), (right, bottom)) = (units([self.bounds[0], self.bounds[1]]), units([self.bounds[2], self.bounds[3]]));
-        let coordinates: Cartesian2d<Axis, Axis> = Cartesian2d::new(self.x.clone(), self.y.clone(), (left..right, bottom..top));
+        let ((left, top), (right, bottom)) =
+            (units([self.bounds[0], self.bounds[1]]), units([self.bounds[2], self.bounds[3]]));
+        let coordinates: Cartesian2d<Axis, Axis> =
+            Cartesian2d::new(self.x.clone(), self.y.clone(), (left..right, bottom..top));
         let style = ShapeStyle { color: GRID.to_rgba(), filled: false, stroke_width: 60 };
         let area = self.sheet.area().apply_coord_spec(coordinates);
         Ok(area.draw_mesh(|canvas, line| line.draw(canvas, &style), self.y_most, self.x_most)?)
@@ -192,10 +206,12 @@ impl<'a> Panel<'a> {
         self.bounds[0] - MAJOR - GAP - widest(self.sheet, &ticks) - 8.0 - 0.4 * NAME
     }
 
-    /// Draws a line through data, clipped at the frame and broken where a point has no place; returns its pieces on the page.
+    /// Draws a line through data, clipped at the frame and broken where a point has no place; returns its
+    /// pieces on the page.
     pub(crate) fn series(&self, points: &[Point], pen: &Pen) -> Result<Vec<Vec<Point>>, ChartError> {
         let pieces = clip(points.iter().map(|&point| self.fractions(point)));
-        let pieces: Vec<Vec<Point>> = pieces.into_iter().map(|piece| piece.into_iter().map(|p| self.page(p)).collect()).collect();
+        let pieces: Vec<Vec<Point>> =
+            pieces.into_iter().map(|piece| piece.into_iter().map(|p| self.page(p)).collect()).collect();
         for piece in &pieces {
             self.sheet.line(piece, pen)?;
         }
@@ -209,7 +225,12 @@ impl<'a> Panel<'a> {
     }
 
     /// Draws a line, or the band between its extremes where it oscillates too fast to be followed.
-    pub(crate) fn trace(&self, points: &[Point], colour: Colour, width: f64) -> Result<Vec<Vec<Point>>, ChartError> {
+    pub(crate) fn trace(
+        &self,
+        points: &[Point],
+        colour: Colour,
+        width: f64,
+    ) -> Result<Vec<Vec<Point>>, ChartError> {
         if !self.crowded(points) {
             let pieces = self.series(points, &Pen::new(colour, width))?;
             if pieces.is_empty() {
@@ -221,8 +242,10 @@ impl<'a> Panel<'a> {
         // Each column holds a whole oscillation, so that its extremes are those of the envelope.
         let columns = (turns(&fractions) / 3).min((self.bounds[2] - self.bounds[0]) as usize).max(2);
         let columns = envelope(&fractions, columns);
-        let upper: Vec<Point> = columns.iter().map(|&(x, _, high)| self.page([x, high.clamp(0.0, 1.0)])).collect();
-        let lower: Vec<Point> = columns.iter().map(|&(x, low, _)| self.page([x, low.clamp(0.0, 1.0)])).collect();
+        let upper: Vec<Point> =
+            columns.iter().map(|&(x, _, high)| self.page([x, high.clamp(0.0, 1.0)])).collect();
+        let lower: Vec<Point> =
+            columns.iter().map(|&(x, low, _)| self.page([x, low.clamp(0.0, 1.0)])).collect();
         let around: Vec<Point> = upper.iter().chain(lower.iter().rev()).copied().collect();
         self.sheet.polygon(&around, mix(colour, WHITE, 0.62))?;
         for edge in [&upper, &lower] {
@@ -253,7 +276,9 @@ impl<'a> Panel<'a> {
 
     /// A thin upright line at a time, with words at its top where there is room for them.
     pub(crate) fn horizon(&self, at: Option<f64>, words: Option<&str>) -> Result<(), ChartError> {
-        let Some(share) = at.map(|at| self.x.fraction(at)).filter(|share| (0.0..=1.0).contains(share)) else { return Ok(()) };
+        let Some(share) = at.map(|at| self.x.fraction(at)).filter(|share| (0.0..=1.0).contains(share)) else {
+            return Ok(());
+        };
         let ([x, top], [_, bottom]) = (self.page([share, 1.0]), self.page([share, 0.0]));
         self.sheet.line(&[[x, top], [x, bottom]], &Pen::new(GREY, 0.6))?;
         let Some(words) = words else { return Ok(()) };
@@ -264,7 +289,11 @@ impl<'a> Panel<'a> {
 
     /// Data that make no line, as dots.
     pub(crate) fn dots(&self, points: &[Point], colour: Colour) -> Result<(), ChartError> {
-        for point in points.iter().map(|&point| self.fractions(point)).filter(|p| p.iter().all(|c| (0.0..=1.0).contains(c))) {
+        for point in points
+            .iter()
+            .map(|&point| self.fractions(point))
+            .filter(|p| p.iter().all(|c| (0.0..=1.0).contains(c)))
+        {
             self.sheet.disc(self.page(point), 1.2, colour)?;
         }
         Ok(())
@@ -302,7 +331,13 @@ impl<'a> Panel<'a> {
     }
 
     /// Draws words inside the panel beside a place, where they cover least.
-    pub(crate) fn note_beside(&self, at: Point, words: &str, colour: Colour, occupied: &mut Occupied) -> Result<(), ChartError> {
+    pub(crate) fn note_beside(
+        &self,
+        at: Point,
+        words: &str,
+        colour: Colour,
+        occupied: &mut Occupied,
+    ) -> Result<(), ChartError> {
         let size = [self.sheet.width(words, NOTE, false), 0.8 * NOTE];
         let (bounds, _) = super::labels::place(at, 5.0, size, self.bounds, &[], occupied);
         occupied.block(bounds);

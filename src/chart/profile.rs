@@ -1,4 +1,5 @@
-//! A value over one other: a line through points, with dots where they are few, and grey ones on the upper edge where there is no value.
+//! A value over one other: a line through points, with dots where they are few, and grey ones on the upper
+//! edge where there is no value.
 
 use super::axis::{Axis, Scale};
 use super::file::Picture;
@@ -43,17 +44,29 @@ pub fn profile(chart: &Profile, px_per_pt: f64) -> Result<Picture, ChartError> {
     let (low, high) = x.ends();
     if chart.x_name.contains("[rad]") && high - low > 0.75 * PI && low.abs().max(high) < 1e4 * PI {
         x.scale = Scale::Pi;
-        (x.from, x.to) = chart.x.iter().filter(|x| x.is_finite()).fold((high, low), |(from, to), &x| (x.min(from), x.max(to)));
+        (x.from, x.to) = chart
+            .x
+            .iter()
+            .filter(|x| x.is_finite())
+            .fold((high, low), |(from, to), &x| (x.min(from), x.max(to)));
     }
     let values = || chart.y.iter().copied();
-    let (least, most) = values().filter(|y| y.is_finite()).fold((f64::INFINITY, 0.0_f64), |(low, high), y| (low.min(y), high.max(y)));
+    let (least, most) = values()
+        .filter(|y| y.is_finite())
+        .fold((f64::INFINITY, 0.0_f64), |(low, high), y| (low.min(y), high.max(y)));
     // Within a decade or so a linear axis shows as much and wastes less.
-    let y = if chart.log && most > 20.0 * least { Axis::decades(&chart.y_name, values()) } else { Axis::fit(&chart.y_name, values()) };
+    let y = if chart.log && most > 20.0 * least {
+        Axis::decades(&chart.y_name, values())
+    } else {
+        Axis::fit(&chart.y_name, values())
+    };
     let panels = stacked(&sheet, under, &x, vec![y], 20.0)?;
     let panel = &panels[0];
     let pieces = panel.series(&points, &Pen::new(BLUE, if points.len() > 400 { 1.0 } else { 1.6 }))?;
     if points.len() <= FEW {
-        for place in points.iter().map(|&point| panel.at(point)).filter(|place| place.iter().all(|c| c.is_finite())) {
+        for place in
+            points.iter().map(|&point| panel.at(point)).filter(|place| place.iter().all(|c| c.is_finite()))
+        {
             sheet.disc(place, 2.0, BLUE)?;
         }
     } else {
@@ -65,7 +78,10 @@ pub fn profile(chart: &Profile, px_per_pt: f64) -> Result<Picture, ChartError> {
         let lonely: Vec<Point> = (0..points.len()).filter(|&k| alone(k)).map(|k| points[k]).collect();
         panel.dots(&lonely, BLUE)?;
     }
-    let absent = points.iter().filter(|point| !point[1].is_finite()).map(|point| panel.at([point[0], panel.y.from])[0]);
+    let absent = points
+        .iter()
+        .filter(|point| !point[1].is_finite())
+        .map(|point| panel.at([point[0], panel.y.from])[0]);
     for x in absent.filter(|x| x.is_finite()) {
         sheet.disc([x, panel.bounds[1]], 1.2, GUIDE)?;
     }
@@ -85,9 +101,17 @@ mod tests {
             for log in [false, true] {
                 let x: Vec<f64> = (0..count).map(|k| f64::from(k) * 0.02 - 3.0).collect();
                 let y = x.iter().map(|x| if x.abs() < 1.0 { f64::NAN } else { x * x }).collect();
-                let chart = Profile { x, y, log, x_name: "*φ* [rad]".into(), y_name: "time [s]".into(), ..Profile::default() };
+                let chart = Profile {
+                    x,
+                    y,
+                    log,
+                    x_name: "*φ* [rad]".into(),
+                    y_name: "time [s]".into(),
+                    ..Profile::default()
+                };
                 let picture = profile(&chart, 1.0).expect("a picture");
-                let blue = picture.rgb.as_chunks::<3>().0.iter().any(|&[red, _, blue]| red < 60 && blue > 150);
+                let blue =
+                    picture.rgb.as_chunks::<3>().0.iter().any(|&[red, _, blue]| red < 60 && blue > 150);
                 assert_eq!(blue, count > 0, "{count} {log}");
             }
         }

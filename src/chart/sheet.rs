@@ -1,4 +1,5 @@
-//! A page in points: lines, areas, markers, words and the heading; everything reaches the canvas as an element of plotters.
+//! A page in points: lines, areas, markers, words and the heading; everything reaches the canvas as an
+//! element of plotters.
 
 use super::ChartError;
 use super::canvas::{Canvas, UNITS};
@@ -155,7 +156,11 @@ impl Sheet {
 
     /// A filled disc.
     pub(crate) fn disc(&self, at: Point, radius: f64, colour: Colour) -> Result<(), ChartError> {
-        Ok(self.area.draw(&Circle::new(units(at), (radius * UNITS).round() as i32, style(colour, 1.0, true)))?)
+        Ok(self.area.draw(&Circle::new(
+            units(at),
+            (radius * UNITS).round() as i32,
+            style(colour, 1.0, true),
+        ))?)
     }
 
     /// A disc with a rim inside its radius.
@@ -166,8 +171,9 @@ impl Sheet {
 
     /// A marker with a white rim.
     pub(crate) fn marker(&self, at: Point, shape: Shape, colour: Colour) -> Result<(), ChartError> {
-        let polygon =
-            |corners: &[Point], grow: f64| -> Vec<Point> { corners.iter().map(|c| [at[0] + c[0] * grow, at[1] + c[1] * grow]).collect() };
+        let polygon = |corners: &[Point], grow: f64| -> Vec<Point> {
+            corners.iter().map(|c| [at[0] + c[0] * grow, at[1] + c[1] * grow]).collect()
+        };
         let (corners, rim): (&[Point], f64) = match shape {
             Shape::Disc => {
                 self.disc(at, 3.5, WHITE)?;
@@ -187,7 +193,12 @@ impl Sheet {
     }
 
     /// A rectangle of so many pixels, given its upper left corner and the colour of each column and row.
-    pub(crate) fn raster(&self, at: Point, size: (usize, usize), colour: impl Fn(usize, usize) -> Colour) -> Result<(), ChartError> {
+    pub(crate) fn raster(
+        &self,
+        at: Point,
+        size: (usize, usize),
+        colour: impl Fn(usize, usize) -> Colour,
+    ) -> Result<(), ChartError> {
         Ok(self.area.draw(&Raster { at: units(at), size, colour })?)
     }
 
@@ -257,7 +268,8 @@ impl Sheet {
     }
 }
 
-/// Lines no wider than `room`: parts joined by middle dots, broken at a dot, or between words where one part is too long.
+/// Lines no wider than `room`: parts joined by middle dots, broken at a dot, or between words where one part
+/// is too long.
 fn wrap(parts: &[String], room: f64, width: impl Fn(&str) -> f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     let mut line = String::new();

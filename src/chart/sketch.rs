@@ -3,7 +3,9 @@
 use super::ChartError;
 use super::labels::{Occupied, place};
 use super::lines::{Point, clip};
-use super::palette::{BLUE, Colour, GREEN, GREY, INK, ORANGE, PURPLE, SKY, SPINE, VERMILLION, WHITE, mix, readable};
+use super::palette::{
+    BLUE, Colour, GREEN, GREY, INK, ORANGE, PURPLE, SKY, SPINE, VERMILLION, WHITE, mix, readable,
+};
 use super::panel::Panel;
 use super::sheet::{NAME, Pen, Sheet};
 use super::text::{Align, Lettering, Level};
@@ -54,7 +56,8 @@ pub struct WallSketch {
 pub struct Pose {
     /// Both ends of each bar (x, y) \[m\].
     pub bars: Vec<[[f64; 2]; 2]>,
-    /// Number of the bar, and both ends, of what joins the places of a body that lie off its bar (x, y) \[m\].
+    /// Number of the bar, and both ends, of what joins the places of a body that lie off its bar (x, y)
+    /// \[m\].
     pub arms: Vec<(usize, [[f64; 2]; 2])>,
     /// The sliders.
     pub sliders: Vec<SliderPose>,
@@ -125,7 +128,8 @@ impl Pencil<'_> {
         Ok(())
     }
 
-    /// Rails of the ground from frame to frame, those of bodies a block's length to both sides; and the blocks.
+    /// Rails of the ground from frame to frame, those of bodies a block's length to both sides; and the
+    /// blocks.
     fn sliders(&self, sliders: &[SliderPose], occupied: &mut Occupied) -> Result<(), ChartError> {
         for slider in sliders.iter().filter(|slider| finite(&[slider.at, slider.along])) {
             let length = slider.along[0].hypot(slider.along[1]);
@@ -137,31 +141,43 @@ impl Pencil<'_> {
             let pen = Pen::new(mix(SPINE, WHITE, 0.25), 0.9 * self.size.max(0.7));
             if slider.ground {
                 let reach = self.view.reach() + slider.at[0].hypot(slider.at[1]);
-                let ends = [-reach, reach].map(|s| self.view.fractions([slider.at[0] + s * unit[0], slider.at[1] + s * unit[1]]));
+                let ends = [-reach, reach]
+                    .map(|s| self.view.fractions([slider.at[0] + s * unit[0], slider.at[1] + s * unit[1]]));
                 for piece in clip(ends) {
                     let line = [self.panel.page(piece[0]), self.panel.page(piece[1])];
                     occupied.line(&line);
                     self.sheet.line(&line, &pen)?;
                 }
             }
-            let corner = |along: f64, across: f64| [x + along * dx - across * dy, y + along * dy + across * dx];
+            let corner =
+                |along: f64, across: f64| [x + along * dx - across * dy, y + along * dy + across * dx];
             let (half, wide) = (8.0 * self.size, 4.6 * self.size);
             let block = [corner(-half, -wide), corner(half, -wide), corner(half, wide), corner(-half, wide)];
             self.sheet.polygon(&block, mix(SPINE, WHITE, 0.7))?;
-            self.sheet.line(&[block[0], block[1], block[2], block[3], block[0]], &Pen::new(INK, 0.9 * self.size))?;
+            self.sheet
+                .line(&[block[0], block[1], block[2], block[3], block[0]], &Pen::new(INK, 0.9 * self.size))?;
             occupied.block(around([x, y], half));
         }
         Ok(())
     }
 
-    /// The path of a point, oldest part palest, in `shades` shades; opaque, because translucent pieces would show their joints.
-    pub(crate) fn trail(&self, points: &[[f64; 2]], colour: Colour, shades: usize, occupied: &mut Occupied) -> Result<(), ChartError> {
+    /// The path of a point, oldest part palest, in `shades` shades; opaque, because translucent pieces would
+    /// show their joints.
+    pub(crate) fn trail(
+        &self,
+        points: &[[f64; 2]],
+        colour: Colour,
+        shades: usize,
+        occupied: &mut Occupied,
+    ) -> Result<(), ChartError> {
         let chunk = points.len().div_ceil(shades).max(1);
         for start in (0..points.len()).step_by(chunk) {
             let part = &points[start..(start + chunk + 1).min(points.len())];
             let youth = (start + part.len()) as f64 / points.len() as f64;
             let pen = Pen::new(mix(WHITE, colour, 0.12 + 0.88 * youth), 0.8 + 1.4 * youth);
-            for piece in clip(part.iter().map(|&p| if finite(&[p]) { self.view.fractions(p) } else { [f64::NAN; 2] })) {
+            for piece in
+                clip(part.iter().map(|&p| if finite(&[p]) { self.view.fractions(p) } else { [f64::NAN; 2] }))
+            {
                 let piece: Vec<Point> = piece.into_iter().map(|p| self.panel.page(p)).collect();
                 occupied.line(&piece);
                 self.sheet.line(&piece, &pen)?;
@@ -171,7 +187,14 @@ impl Pencil<'_> {
     }
 
     /// A line with hatching on the side `towards` (unit vector on the page).
-    fn hatched(&self, from: Point, to: Point, towards: Point, every: f64, length: f64) -> Result<(), ChartError> {
+    fn hatched(
+        &self,
+        from: Point,
+        to: Point,
+        towards: Point,
+        every: f64,
+        length: f64,
+    ) -> Result<(), ChartError> {
         let pen = Pen::new(INK, 0.9 * self.size.max(0.7));
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
         let whole = dx.hypot(dy);
@@ -181,7 +204,10 @@ impl Pencil<'_> {
             let origin_point = [from[0] + share * dx, from[1] + share * dy];
             // All strokes lean the same way, as on a technical drawing.
             let along = [-towards[1], towards[0]];
-            let tip = [origin_point[0] + length * (towards[0] + 0.8 * along[0]), origin_point[1] + length * (towards[1] + 0.8 * along[1])];
+            let tip = [
+                origin_point[0] + length * (towards[0] + 0.8 * along[0]),
+                origin_point[1] + length * (towards[1] + 0.8 * along[1]),
+            ];
             self.sheet.line(&[origin_point, tip], &Pen { width: 0.75 * pen.width, ..pen })?;
         }
         self.sheet.line(&[from, to], &Pen { width: 1.3 * self.size.max(0.7), ..pen })
@@ -196,7 +222,8 @@ impl Pencil<'_> {
             }
             let (nx, ny) = (wall.normal[0] / length, wall.normal[1] / length);
             let reach = self.view.reach() + wall.through[0].hypot(wall.through[1]);
-            let ends = [-reach, reach].map(|s| self.view.fractions([wall.through[0] - s * ny, wall.through[1] + s * nx]));
+            let ends = [-reach, reach]
+                .map(|s| self.view.fractions([wall.through[0] - s * ny, wall.through[1] + s * nx]));
             for piece in clip(ends) {
                 let (from, to) = (self.panel.page(piece[0]), self.panel.page(piece[1]));
                 let normal = self.view.direction([nx, ny]);
@@ -208,14 +235,31 @@ impl Pencil<'_> {
     }
 
     /// The mechanism in a pose, without names.
-    pub(crate) fn pose(&self, sketch: &Sketch, pose: &Pose, occupied: &mut Occupied) -> Result<(), ChartError> {
+    pub(crate) fn pose(
+        &self,
+        sketch: &Sketch,
+        pose: &Pose,
+        occupied: &mut Occupied,
+    ) -> Result<(), ChartError> {
         let size = self.size;
-        for (_, &at) in sketch.hinges.iter().zip(&pose.hinges).filter(|(hinge, at)| hinge.ground && finite(&[**at])) {
+        for (_, &at) in
+            sketch.hinges.iter().zip(&pose.hinges).filter(|(hinge, at)| hinge.ground && finite(&[**at]))
+        {
             let [x, y] = self.at(at);
             let (half, height) = (6.5 * size, 10.0 * size);
-            self.sheet.polygon(&[[x, y], [x - half, y - height], [x + half, y - height]], mix(SPINE, WHITE, 0.7))?;
-            self.sheet.line(&[[x - half, y - height], [x, y], [x + half, y - height]], &Pen::new(INK, 0.9 * size))?;
-            self.hatched([x - 1.8 * half, y - height], [x + 1.8 * half, y - height], [0.0, -1.0], 3.6 * size, 4.4 * size)?;
+            self.sheet
+                .polygon(&[[x, y], [x - half, y - height], [x + half, y - height]], mix(SPINE, WHITE, 0.7))?;
+            self.sheet.line(
+                &[[x - half, y - height], [x, y], [x + half, y - height]],
+                &Pen::new(INK, 0.9 * size),
+            )?;
+            self.hatched(
+                [x - 1.8 * half, y - height],
+                [x + 1.8 * half, y - height],
+                [0.0, -1.0],
+                3.6 * size,
+                4.4 * size,
+            )?;
             occupied.block([x - 1.8 * half, y - height - 5.0 * size, x + 1.8 * half + 3.0, y - 2.0]);
         }
         self.sliders(&pose.sliders, occupied)?;
@@ -247,7 +291,12 @@ impl Pencil<'_> {
         Ok(())
     }
 
-    fn spring(&self, spring: &SpringSketch, [from, to]: [Point; 2], occupied: &mut Occupied) -> Result<(), ChartError> {
+    fn spring(
+        &self,
+        spring: &SpringSketch,
+        [from, to]: [Point; 2],
+        occupied: &mut Occupied,
+    ) -> Result<(), ChartError> {
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
         let length = dx.hypot(dy);
         for (k, at) in [from, to].into_iter().enumerate().filter(|(k, _)| spring.ground[*k]) {
@@ -255,17 +304,30 @@ impl Pencil<'_> {
             // The hatching lies on the side the spring does not leave to.
             let up = if away >= 0.0 { -1.0 } else { 1.0 };
             let half = 7.5 * self.size;
-            self.hatched([at[0] - half, at[1]], [at[0] + half, at[1]], [0.0, up], 3.6 * self.size, 4.4 * self.size)?;
+            self.hatched(
+                [at[0] - half, at[1]],
+                [at[0] + half, at[1]],
+                [0.0, up],
+                3.6 * self.size,
+                4.4 * self.size,
+            )?;
             occupied.block([at[0] - half, at[1] - 5.0, at[0] + half, at[1] + 5.0]);
         }
-        let (along, across) = if length > 0.0 { ([dx / length, dy / length], [-dy / length, dx / length]) } else { ([0.0; 2], [0.0; 2]) };
+        let (along, across) = if length > 0.0 {
+            ([dx / length, dy / length], [-dy / length, dx / length])
+        } else {
+            ([0.0; 2], [0.0; 2])
+        };
         let lead = (0.15 * length).min(8.0 * self.size);
         let waves = 11;
         let mut line = vec![from];
         for k in 0..=waves {
             let s = lead + (length - 2.0 * lead) * f64::from(k) / f64::from(waves);
             let swing = if k == 0 || k == waves { 0.0 } else { 4.6 * self.size * f64::from(1 - 2 * (k % 2)) };
-            line.push([from[0] + s * along[0] + swing * across[0], from[1] + s * along[1] + swing * across[1]]);
+            line.push([
+                from[0] + s * along[0] + swing * across[0],
+                from[1] + s * along[1] + swing * across[1],
+            ]);
         }
         line.push(to);
         self.sheet.line(&line, &Pen::new(WHITE, 3.2 * self.size))?;
@@ -285,8 +347,10 @@ impl Pencil<'_> {
         let start = (-bar[1]).atan2(bar[0]);
         let sense = if motor.rate < 0.0 { -1.0 } else { 1.0 };
         let radius = 21.0 * self.size.max(0.75);
-        let on = |angle: f64, radius: f64| [centre[0] + radius * angle.cos(), centre[1] - radius * angle.sin()];
-        let arc: Vec<Point> = (0..=40).map(|k| on(start + sense * (0.3 + 2.1 * f64::from(k) / 40.0), radius)).collect();
+        let on =
+            |angle: f64, radius: f64| [centre[0] + radius * angle.cos(), centre[1] - radius * angle.sin()];
+        let arc: Vec<Point> =
+            (0..=40).map(|k| on(start + sense * (0.3 + 2.1 * f64::from(k) / 40.0), radius)).collect();
         let colour = readable(PURPLE);
         self.sheet.line(&arc, &Pen::new(colour, 1.7 * self.size.max(0.75)))?;
         occupied.line(&arc);
@@ -294,26 +358,43 @@ impl Pencil<'_> {
             let tip = on(start + sense * 2.72, radius);
             let origin_point = start + sense * 2.36;
             self.sheet.polygon(
-                &[tip, on(origin_point, radius + 3.6), on(origin_point + sense * 0.06, radius), on(origin_point, radius - 3.6)],
+                &[
+                    tip,
+                    on(origin_point, radius + 3.6),
+                    on(origin_point + sense * 0.06, radius),
+                    on(origin_point, radius - 3.6),
+                ],
                 colour,
             )?;
         }
         if named {
-            let best =
-                (0..9).map(|k| on(start + sense * (0.4 + 0.25 * f64::from(k)), radius + 9.0)).map(|p| (p, occupied.cost(around(p, 5.0))));
-            let Some((at, _)) = best.filter(|(_, cost)| *cost < 49.0).min_by(|a, b| a.1.total_cmp(&b.1)) else { return Ok(()) };
+            let best = (0..9)
+                .map(|k| on(start + sense * (0.4 + 0.25 * f64::from(k)), radius + 9.0))
+                .map(|p| (p, occupied.cost(around(p, 5.0))));
+            let Some((at, _)) = best.filter(|(_, cost)| *cost < 49.0).min_by(|a, b| a.1.total_cmp(&b.1))
+            else {
+                return Ok(());
+            };
             occupied.block(around(at, 5.0));
-            let lettering = Lettering { halo: true, ..Lettering::new(NAME, colour).at(Align::Centre, Level::Middle) };
+            let lettering =
+                Lettering { halo: true, ..Lettering::new(NAME, colour).at(Align::Centre, Level::Middle) };
             self.sheet.words("*ω*", lettering, at)?;
         }
         Ok(())
     }
 
     /// Names of hinges and points beside them, away from the bars that meet there.
-    pub(crate) fn names(&self, sketch: &Sketch, pose: &Pose, occupied: &mut Occupied) -> Result<(), ChartError> {
+    pub(crate) fn names(
+        &self,
+        sketch: &Sketch,
+        pose: &Pose,
+        occupied: &mut Occupied,
+    ) -> Result<(), ChartError> {
         let hinges = sketch.hinges.iter().map(|hinge| &hinge.name).zip(&pose.hinges);
-        let all: Vec<(&String, &[f64; 2])> =
-            hinges.chain(sketch.points.iter().zip(&pose.points)).filter(|(name, at)| !name.is_empty() && finite(&[**at])).collect();
+        let all: Vec<(&String, &[f64; 2])> = hinges
+            .chain(sketch.points.iter().zip(&pose.points))
+            .filter(|(name, at)| !name.is_empty() && finite(&[**at]))
+            .collect();
         if all.len() >= NAMES {
             return Ok(());
         }
@@ -339,13 +420,15 @@ impl Pencil<'_> {
                 continue;
             }
             occupied.block(bounds);
-            let lettering = Lettering { halo: true, ..Lettering::new(NAME, INK).at(Align::Left, Level::Middle) };
+            let lettering =
+                Lettering { halo: true, ..Lettering::new(NAME, INK).at(Align::Left, Level::Middle) };
             self.sheet.words(name, lettering, [bounds[0], 0.5 * (bounds[1] + bounds[3])])?;
         }
         Ok(())
     }
 
-    /// Arrow of gravity in the emptiest corner, and the directions of x and y where they lie oblique to the page.
+    /// Arrow of gravity in the emptiest corner, and the directions of x and y where they lie oblique to the
+    /// page.
     pub(crate) fn compass(&self, occupied: &mut Occupied) -> Result<(), ChartError> {
         let [left, top, right, bottom] = self.panel.bounds;
         let corner = |occupied: &Occupied, half: f64| {
@@ -382,9 +465,12 @@ impl Pencil<'_> {
 
     fn arrow(&self, from: Point, to: Point, colour: Colour) -> Result<(), ChartError> {
         let length = (to[0] - from[0]).hypot(to[1] - from[1]).max(1e-9);
-        let (along, across) =
-            ([(to[0] - from[0]) / length, (to[1] - from[1]) / length], [-(to[1] - from[1]) / length, (to[0] - from[0]) / length]);
-        let back = |s: f64, w: f64| [to[0] - s * along[0] + w * across[0], to[1] - s * along[1] + w * across[1]];
+        let (along, across) = (
+            [(to[0] - from[0]) / length, (to[1] - from[1]) / length],
+            [-(to[1] - from[1]) / length, (to[0] - from[0]) / length],
+        );
+        let back =
+            |s: f64, w: f64| [to[0] - s * along[0] + w * across[0], to[1] - s * along[1] + w * across[1]];
         self.sheet.line(&[from, back(4.0, 0.0)], &Pen::new(colour, 1.3))?;
         self.sheet.polygon(&[to, back(6.5, 3.0), back(5.0, 0.0), back(6.5, -3.0)], colour)
     }
@@ -396,8 +482,12 @@ fn around([x, y]: Point, half: f64) -> [f64; 4] {
 
 /// Symbols shrink with the bars: 1 while the median bar is longer than 24 pt.
 pub(crate) fn symbol_size(pose: &Pose, pt_per_metre: f64) -> f64 {
-    let mut lengths: Vec<f64> =
-        pose.bars.iter().map(|[a, b]| (b[0] - a[0]).hypot(b[1] - a[1]) * pt_per_metre).filter(|l| l.is_finite()).collect();
+    let mut lengths: Vec<f64> = pose
+        .bars
+        .iter()
+        .map(|[a, b]| (b[0] - a[0]).hypot(b[1] - a[1]) * pt_per_metre)
+        .filter(|l| l.is_finite())
+        .collect();
     lengths.sort_by(f64::total_cmp);
     lengths.get(lengths.len() / 2).map_or(1.0, |median| (median / 24.0).clamp(0.5, 1.0))
 }

@@ -1,7 +1,8 @@
 //! Words: fonts inside the program, a small markup, and outlines to fill.
 //!
-//! Markup: `*italic*`, `_{below}`, `^{above}`; a backslash takes the next character literally ([`plain`] writes them).  A script right
-//! after another is set over it.  A character that DejaVu lacks appears as its empty box.
+//! Markup: `*italic*`, `_{below}`, `^{above}`; a backslash takes the next character literally ([`plain`]
+//! writes them).  A script right after another is set over it.  A character that DejaVu lacks appears as its
+//! empty box.
 
 use super::ChartError;
 use super::palette::Colour;
@@ -47,7 +48,15 @@ pub(crate) struct Lettering {
 
 impl Lettering {
     pub(crate) fn new(size: f64, colour: Colour) -> Self {
-        Lettering { size, bold: false, colour, align: Align::Left, level: Level::Baseline, angle: 0.0, halo: false }
+        Lettering {
+            size,
+            bold: false,
+            colour,
+            align: Align::Left,
+            level: Level::Baseline,
+            angle: 0.0,
+            halo: false,
+        }
     }
 
     pub(crate) fn at(self, align: Align, level: Level) -> Self {
@@ -60,7 +69,8 @@ impl Lettering {
 pub struct TextBox {
     /// The words, with their markup.
     pub text: String,
-    /// Corners of the box from the baseline to the cap height, counter-clockwise on the page \[pt from the upper left, y downwards\].
+    /// Corners of the box from the baseline to the cap height, counter-clockwise on the page \[pt from the
+    /// upper left, y downwards\].
     pub corners: [[f64; 2]; 4],
     /// Colour of the words (red, green, blue).
     pub colour: [u8; 3],
@@ -70,7 +80,9 @@ impl TextBox {
     /// Smallest and largest x and y: `[left, top, right, bottom]` \[pt\].
     #[must_use]
     pub fn bounds(&self) -> [f64; 4] {
-        let fold = |k: usize, pick: fn(f64, f64) -> f64| self.corners.iter().map(|corner| corner[k]).fold(self.corners[0][k], pick);
+        let fold = |k: usize, pick: fn(f64, f64) -> f64| {
+            self.corners.iter().map(|corner| corner[k]).fold(self.corners[0][k], pick)
+        };
         [fold(0, f64::min), fold(1, f64::min), fold(0, f64::max), fold(1, f64::max)]
     }
 
@@ -80,7 +92,9 @@ impl TextBox {
         let parted = |a: &TextBox, b: &TextBox| {
             (0..4).any(|k| {
                 let (from, to) = (a.corners[k], a.corners[(k + 1) % 4]);
-                let side = |p: &[f64; 2]| (to[0] - from[0]) * (p[1] - from[1]) - (to[1] - from[1]) * (p[0] - from[0]);
+                let side = |p: &[f64; 2]| {
+                    (to[0] - from[0]) * (p[1] - from[1]) - (to[1] - from[1]) * (p[0] - from[0])
+                };
                 let inside = side(&a.corners[(k + 2) % 4]).signum();
                 b.corners.iter().all(|p| side(p) * inside <= 0.0)
             })
@@ -164,7 +178,11 @@ pub(crate) struct Fonts {
 impl Fonts {
     pub(crate) fn new() -> Result<Self, ChartError> {
         let face = |bytes: &'static [u8]| FontRef::try_from_slice(bytes).map_err(|_| ChartError::Font);
-        Ok(Fonts { regular: face(dejavu::sans::regular())?, bold: face(dejavu::sans::bold())?, oblique: face(dejavu::sans::oblique())? })
+        Ok(Fonts {
+            regular: face(dejavu::sans::regular())?,
+            bold: face(dejavu::sans::bold())?,
+            oblique: face(dejavu::sans::oblique())?,
+        })
     }
 
     /// Whether the regular face has the character.
@@ -178,16 +196,21 @@ impl Fonts {
         self.walk(text, size, bold, |_, _, _, _, _| ())
     }
 
-    /// Outline with the baseline's left end at the origin, y downwards, and the width, both in units of `size`.
+    /// Outline with the baseline's left end at the origin, y downwards, and the width, both in units of
+    /// `size`.
     pub(crate) fn outline(&self, text: &str, size: f64, bold: bool) -> (Option<Path>, f64) {
         let mut path = PathBuilder::new();
         let width = self.walk(text, size, bold, |font, id, x, rise, scale| {
             let Some(outline) = font.outline(id) else { return };
-            let place = |p: ab_glyph::Point| ((x + f64::from(p.x) * scale) as f32, (-rise - f64::from(p.y) * scale) as f32);
+            let place = |p: ab_glyph::Point| {
+                ((x + f64::from(p.x) * scale) as f32, (-rise - f64::from(p.y) * scale) as f32)
+            };
             let mut last = None;
             for curve in outline.curves {
                 let (from, to) = match curve {
-                    OutlineCurve::Line(a, b) | OutlineCurve::Quad(a, _, b) | OutlineCurve::Cubic(a, _, _, b) => (a, b),
+                    OutlineCurve::Line(a, b)
+                    | OutlineCurve::Quad(a, _, b)
+                    | OutlineCurve::Cubic(a, _, _, b) => (a, b),
                 };
                 if last != Some(from) {
                     if last.is_some() {
@@ -199,7 +222,9 @@ impl Fonts {
                 match curve {
                     OutlineCurve::Line(..) => path.line_to(end.0, end.1),
                     OutlineCurve::Quad(_, c, _) => path.quad_to(place(c).0, place(c).1, end.0, end.1),
-                    OutlineCurve::Cubic(_, c, d, _) => path.cubic_to(place(c).0, place(c).1, place(d).0, place(d).1, end.0, end.1),
+                    OutlineCurve::Cubic(_, c, d, _) => {
+                        path.cubic_to(place(c).0, place(c).1, place(d).0, place(d).1, end.0, end.1)
+                    }
                 }
                 last = Some(to);
             }
@@ -211,7 +236,13 @@ impl Fonts {
     }
 
     /// Visits each glyph with its font, number, x, rise and scale from font units; returns the width.
-    fn walk(&self, text: &str, size: f64, bold: bool, mut visit: impl FnMut(&FontRef, ab_glyph::GlyphId, f64, f64, f64)) -> f64 {
+    fn walk(
+        &self,
+        text: &str,
+        size: f64,
+        bold: bool,
+        mut visit: impl FnMut(&FontRef, ab_glyph::GlyphId, f64, f64, f64),
+    ) -> f64 {
         let (mut x, mut widest) = (0.0, 0.0_f64);
         let mut script_start = 0.0;
         let mut last: Option<(ab_glyph::GlyphId, Script, bool)> = None;
@@ -232,7 +263,9 @@ impl Fonts {
                 Some((before, script, italic)) if script == glyph.script && italic == glyph.italic => {
                     x += f64::from(font.kern_unscaled(before, id)) * scale;
                 }
-                Some((_, script, _)) if script != Script::None && glyph.script != Script::None => x = script_start,
+                Some((_, script, _)) if script != Script::None && glyph.script != Script::None => {
+                    x = script_start
+                }
                 Some((_, script, _)) if script != Script::None => x = widest,
                 _ => {}
             }
@@ -270,7 +303,8 @@ mod tests {
     #[test]
     fn the_fonts_have_every_character_charts_write() {
         let fonts = Fonts::new().unwrap();
-        for c in "✓✗◷−×·√∝µ≤≥°εφωΔπ²³⁻∞|∂\u{2009}…–".chars().chain(' '..='~') {
+        for c in "✓✗◷−×·√∝µ≤≥°εφωΔπ²³⁻∞|∂\u{2009}…–".chars().chain(' '..='~')
+        {
             assert!(fonts.has(c), "{c:?} is missing");
         }
     }

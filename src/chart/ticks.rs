@@ -1,6 +1,7 @@
 //! Places and words of ticks.
 //!
-//! Every tick is an integer times a step, and its label is written from that integer, so there are neither 0.30000000000000004 nor −0.
+//! Every tick is an integer times a step, and its label is written from that integer, so there are neither
+//! 0.30000000000000004 nor −0.
 
 use std::f64::consts::PI;
 
@@ -63,7 +64,8 @@ pub(crate) fn nice_step(rough: f64) -> f64 {
 /// A plain decimal with true minus and thin spaces from five digits on.
 pub(crate) fn decimal(value: f64, decimals: usize) -> String {
     let text = format!("{:.decimals$}", value.abs());
-    let (whole, fraction) = text.split_once('.').map_or((text.as_str(), ""), |(whole, fraction)| (whole, fraction));
+    let (whole, fraction) =
+        text.split_once('.').map_or((text.as_str(), ""), |(whole, fraction)| (whole, fraction));
     let mut out = String::new();
     if value < 0.0 && text.bytes().any(|digit| (b'1'..=b'9').contains(&digit)) {
         out.push('−');
@@ -106,7 +108,11 @@ pub(crate) fn figure(value: f64) -> String {
 fn exact(value: f64, exponent: i32) -> String {
     if value < 1e9 {
         let text = decimal(value, (-exponent).clamp(0, 12) as usize);
-        return if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text };
+        return if text.contains('.') {
+            text.trim_end_matches('0').trim_end_matches('.').to_owned()
+        } else {
+            text
+        };
     }
     let text = format!("{value:e}");
     let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
@@ -134,12 +140,18 @@ pub(crate) fn linear(low: f64, high: f64, most: usize) -> Ticks {
     let shift = if magnitude >= 6 || exponent < -4 { magnitude.div_euclid(3) * 3 } else { 0 };
     let place = exponent - shift;
     let decimals = (-place).max(0) as usize;
-    let label = |index: f64| decimal((index - start) * mantissa * 10_f64.powi(place), if index == start { 0 } else { decimals });
+    let label = |index: f64| {
+        decimal((index - start) * mantissa * 10_f64.powi(place), if index == start { 0 } else { decimals })
+    };
     let count = (last - first) as usize + 1;
-    let majors = (0..count).map(|k| first + k as f64).map(|index| Tick { value: index * step, label: label(index) }).collect();
+    let majors = (0..count)
+        .map(|k| first + k as f64)
+        .map(|index| Tick { value: index * step, label: label(index) })
+        .collect();
     let parts: f64 = if mantissa == 2.0 { 4.0 } else { 5.0 };
     let (from, to) = ((low / step * parts - 1e-6).ceil(), (high / step * parts + 1e-6).floor());
-    let minors = (0..=(to - from) as usize).map(|k| from + k as f64).filter(|index| index.rem_euclid(parts) != 0.0);
+    let minors =
+        (0..=(to - from) as usize).map(|k| from + k as f64).filter(|index| index.rem_euclid(parts) != 0.0);
     let minors = minors.map(|index| index / parts * step).collect();
     Ticks { majors, minors, factor: (shift != 0).then(|| format!("×{}", power(shift))), offset }
 }
@@ -161,8 +173,11 @@ pub(crate) fn pi(low: f64, high: f64, most: usize) -> Ticks {
     };
     let quarter = 0.25 * PI;
     let indices = |step: f64| {
-        let (first, last) = ((low / (quarter * step) - 1e-6).ceil(), (high / (quarter * step) + 1e-6).floor());
-        (0..=(last - first).max(-1.0) as usize).map(move |k| first + k as f64).filter(move |&index| index <= last)
+        let (first, last) =
+            ((low / (quarter * step) - 1e-6).ceil(), (high / (quarter * step) + 1e-6).floor());
+        (0..=(last - first).max(-1.0) as usize)
+            .map(move |k| first + k as f64)
+            .filter(move |&index| index <= last)
     };
     let label = |index: f64| {
         let quarters = (index * step) as i64;
@@ -178,8 +193,10 @@ pub(crate) fn pi(low: f64, high: f64, most: usize) -> Ticks {
             _ => format!("{}π{part}", decimal(number as f64, 0)),
         }
     };
-    let majors: Vec<Tick> = indices(step).map(|index| Tick { value: index * step * quarter, label: label(index) }).collect();
-    let minors = indices(minor).filter(|index| (index * minor).rem_euclid(step).min(step - (index * minor).rem_euclid(step)) > 1e-6);
+    let majors: Vec<Tick> =
+        indices(step).map(|index| Tick { value: index * step * quarter, label: label(index) }).collect();
+    let minors = indices(minor)
+        .filter(|index| (index * minor).rem_euclid(step).min(step - (index * minor).rem_euclid(step)) > 1e-6);
     let minors = minors.map(|index| index * minor * quarter).collect();
     Ticks { majors, minors, factor: None, offset: None }
 }
@@ -192,7 +209,9 @@ pub(crate) fn log(low: f64, high: f64, most: usize) -> Ticks {
     }
     let (first, last) = ((from - 1e-9).ceil() as i32, (to + 1e-9).floor() as i32);
     let inside = |value: &f64| *value >= low * (1.0 - 1e-9) && *value <= high * (1.0 + 1e-9);
-    let between = |factors: &'static [f64]| (first - 1..=last).flat_map(move |k| factors.iter().map(move |factor| factor * ten(k)));
+    let between = |factors: &'static [f64]| {
+        (first - 1..=last).flat_map(move |k| factors.iter().map(move |factor| factor * ten(k)))
+    };
     let short = to - from < 3.05;
     let mut majors: Vec<(f64, f64, i32)> = Vec::new();
     let mut step = 1;
@@ -219,7 +238,8 @@ pub(crate) fn log(low: f64, high: f64, most: usize) -> Ticks {
     } else {
         (first..=last).map(ten).collect()
     };
-    let minors = minors.into_iter().filter(|value| majors.iter().all(|major| major.value != *value)).collect();
+    let minors =
+        minors.into_iter().filter(|value| majors.iter().all(|major| major.value != *value)).collect();
     Ticks { majors, minors, factor: None, offset: None }
 }
 

@@ -18,7 +18,8 @@ pub struct MotorSeries {
     pub name: String,
     /// Times \[s\], ascending.
     pub time: Vec<f64>,
-    /// Torque on the driven bar at these times \[N·m\], or force on the point of the driven slider \[N\]: see [`force_power`].
+    /// Torque on the driven bar at these times \[N·m\], or force on the point of the driven slider \[N\]: see
+    /// [`force_power`].
     pub torque: Vec<f64>,
     /// Power fed in at these times \[W\].
     pub power: Vec<f64>,
@@ -48,15 +49,23 @@ pub fn torque_power(chart: &TorquePower, px_per_pt: f64) -> Result<Picture, Char
     force_power(chart, &[], px_per_pt)
 }
 
-/// The same where some motors, by number, push a slider: what stands for their torques are forces \[N\], in a panel between torques and powers.
+/// The same where some motors, by number, push a slider: what stands for their torques are forces \[N\], in a
+/// panel between torques and powers.
 ///
 /// # Errors
 /// As [`torque_power`].
 pub fn force_power(chart: &TorquePower, sliders: &[usize], px_per_pt: f64) -> Result<Picture, ChartError> {
-    let is_kept = |force: Option<bool>, motor: usize| force.is_none_or(|force| sliders.contains(&motor) == force);
+    let is_kept =
+        |force: Option<bool>, motor: usize| force.is_none_or(|force| sliders.contains(&motor) == force);
     let data = |values: fn(&MotorSeries) -> &Vec<f64>, force: Option<bool>| -> Vec<Vec<Point>> {
         let line = |(k, motor): (usize, &MotorSeries)| {
-            motor.time.iter().zip(values(motor)).filter(|_| is_kept(force, k)).map(|(&t, &v)| [t, v]).collect()
+            motor
+                .time
+                .iter()
+                .zip(values(motor))
+                .filter(|_| is_kept(force, k))
+                .map(|(&t, &v)| [t, v])
+                .collect()
         };
         chart.motors.iter().enumerate().map(line).collect()
     };
@@ -77,7 +86,9 @@ pub fn force_power(chart: &TorquePower, sliders: &[usize], px_per_pt: f64) -> Re
     let powers = rows.iter().flat_map(|row| &row.0);
     let x = Axis::tight("time [s]", powers.flatten().filter(|p| p[1].is_finite()).map(|p| p[0]));
     // Zero belongs to both: its line parts driving from braking.
-    let y = |row: &(Vec<Vec<Point>>, &str, &str)| Axis::fit(row.1, row.0.iter().flatten().map(|p| p[1]).chain(zero(&row.0)));
+    let y = |row: &(Vec<Vec<Point>>, &str, &str)| {
+        Axis::fit(row.1, row.0.iter().flatten().map(|p| p[1]).chain(zero(&row.0)))
+    };
     let mut caption = chart.caption.clone();
     let crowded = {
         // Tried on a page of its own: the caption has to be known before the panels have their places.
@@ -85,7 +96,14 @@ pub fn force_power(chart: &TorquePower, sliders: &[usize], px_per_pt: f64) -> Re
         let panels = stacked(&trial, 40.0, &x, rows.iter().map(y).collect(), 20.0)?;
         panels.iter().zip(&rows).any(|(panel, row)| row.0.iter().any(|line| panel.crowded(line)))
     };
-    caption.push(if crowded { "bands between the extremes, largest magnitudes marked" } else { "largest magnitudes marked" }.to_owned());
+    caption.push(
+        if crowded {
+            "bands between the extremes, largest magnitudes marked"
+        } else {
+            "largest magnitudes marked"
+        }
+        .to_owned(),
+    );
     let under = sheet.heading(&chart.title, &caption)?;
     let right = if several { label_room(&sheet, labels.iter().map(String::as_str), false) } else { 20.0 };
     let panels = stacked(&sheet, under, &x, rows.iter().map(y).collect(), right)?;
@@ -103,7 +121,8 @@ pub fn force_power(chart: &TorquePower, sliders: &[usize], px_per_pt: f64) -> Re
             }
         }
         // Rings of many motors would say less than none.
-        for (motor, line) in lines.iter().enumerate().filter(|(_, line)| lines.len() <= 3 && !line.is_empty()) {
+        for (motor, line) in lines.iter().enumerate().filter(|(_, line)| lines.len() <= 3 && !line.is_empty())
+        {
             peak(&sheet, panel, line, unit, mark(motor).colour, &mut occupied)?;
         }
         panel.horizon(chart.horizon, label.as_deref().filter(|_| k == 0))?;
@@ -122,7 +141,14 @@ fn zero(lines: &[Vec<Point>]) -> Option<f64> {
 }
 
 /// A ring and words at the largest magnitude.
-fn peak(sheet: &Sheet, panel: &Panel, line: &[Point], unit: &str, colour: Colour, occupied: &mut Occupied) -> Result<(), ChartError> {
+fn peak(
+    sheet: &Sheet,
+    panel: &Panel,
+    line: &[Point],
+    unit: &str,
+    colour: Colour,
+    occupied: &mut Occupied,
+) -> Result<(), ChartError> {
     let usable = line.iter().filter(|p| p[1].abs() <= 1e300 && p[0].is_finite());
     let Some(&top) = usable.max_by(|a, b| a[1].abs().total_cmp(&b[1].abs())) else { return Ok(()) };
     if top[1] == 0.0 {
@@ -133,6 +159,7 @@ fn peak(sheet: &Sheet, panel: &Panel, line: &[Point], unit: &str, colour: Colour
     sheet.ring(at, 2.9, colour, 1.3)?;
     occupied.block([at[0] - 4.0, at[1] - 4.0, at[0] + 4.0, at[1] + 4.0]);
     let span = panel.x.to - panel.x.from;
-    let time = if span > 1e3 || !(0.1..1e5).contains(&top[0].abs()) { figure(top[0]) } else { decimal(top[0], 2) };
+    let time =
+        if span > 1e3 || !(0.1..1e5).contains(&top[0].abs()) { figure(top[0]) } else { decimal(top[0], 2) };
     panel.note_beside(at, &format!("{} {unit} at {time} s", figure(top[1])), readable(colour), occupied)
 }

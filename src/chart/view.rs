@@ -1,4 +1,5 @@
-//! How the world lies on the page: gravity points down, a rotation keeps angles counter-clockwise, both scales are equal.
+//! How the world lies on the page: gravity points down, a rotation keeps angles counter-clockwise, both
+//! scales are equal.
 
 use super::axis::Axis;
 use super::lines::Point;
@@ -40,7 +41,11 @@ impl View {
             let pairs = pose.bars.iter().chain(&pose.springs).chain(arms).flatten();
             pairs.chain(&pose.hinges).chain(&pose.points).copied().collect()
         };
-        let all = poses.iter().flat_map(parts).chain(trails.iter().flatten().copied()).filter(|p| p.iter().all(|c| c.abs() <= 1e300));
+        let all = poses
+            .iter()
+            .flat_map(parts)
+            .chain(trails.iter().flatten().copied())
+            .filter(|p| p.iter().all(|c| c.abs() <= 1e300));
         let mut ends: Option<[f64; 4]> = None;
         for [u, h] in all.map(|p| view.rotated(p)) {
             let [a, b, c, d] = ends.unwrap_or([u, u, h, h]);
@@ -105,10 +110,14 @@ impl View {
         self.down[0] != 0.0 && self.down[1] != 0.0
     }
 
-    /// The axes of the panel: coordinates of the world where they lie along its edges, else lengths across and along gravity.
+    /// The axes of the panel: coordinates of the world where they lie along its edges, else lengths across
+    /// and along gravity.
     pub(crate) fn axes(&self) -> (Axis, Axis) {
         if self.oblique() {
-            return (Axis::linear("across [m]", self.u[0], self.u[1]), Axis::linear("height [m]", self.h[0], self.h[1]));
+            return (
+                Axis::linear("across [m]", self.u[0], self.u[1]),
+                Axis::linear("height [m]", self.h[0], self.h[1]),
+            );
         }
         let axis = |direction: [f64; 2], ends: [f64; 2]| {
             let name = if direction[0] != 0.0 { "*x* [m]" } else { "*y* [m]" };

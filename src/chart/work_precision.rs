@@ -1,6 +1,8 @@
-//! Error against run time, or against evaluations: a marker for each setting of each method; lower is more accurate, further left is cheaper.
+//! Error against run time, or against evaluations: a marker for each setting of each method; lower is more
+//! accurate, further left is cheaper.
 //!
-//! Methods that have a setting on the Pareto front, which no other setting beats in both, are drawn in full; the others are thinner and paler.
+//! Methods that have a setting on the Pareto front, which no other setting beats in both, are drawn in full;
+//! the others are thinner and paler.
 
 use super::axis::{Axis, Scale};
 use super::file::Picture;
@@ -63,7 +65,8 @@ pub struct WorkPrecision {
     pub error_name: String,
     /// The methods.
     pub series: Vec<WorkSeries>,
-    /// An error beyond which a result says nothing: such settings have no part in the front, and lie on the upper edge.
+    /// An error beyond which a result says nothing: such settings have no part in the front, and lie on the
+    /// upper edge.
     pub lost: Option<f64>,
     /// An error below which nothing can be said, and why.
     pub floor: Option<(f64, String)>,
@@ -80,7 +83,8 @@ pub fn work_precision(chart: &WorkPrecision, px_per_pt: f64) -> Result<Picture, 
     let sheet = Sheet::new([PAGE[0], PAGE[1] + higher], px_per_pt)?;
     let under = sheet.heading(&chart.title, &chart.caption)?;
     let usable = |p: &&[f64; 2]| p[0] > 0.0 && p[0] <= 1e300 && p[1] >= 0.0 && p[1] <= 1e300;
-    let largest = chart.series.iter().flat_map(|s| &s.points).filter(usable).map(|p| p[0]).fold(0.0, f64::max);
+    let largest =
+        chart.series.iter().flat_map(|s| &s.points).filter(usable).map(|p| p[0]).fold(0.0, f64::max);
     let (name, scale) = match &chart.cost {
         Cost::Time(name) if largest < 0.02 => (format!("{name} [µs]"), 1e6),
         Cost::Time(name) if largest < 20.0 => (format!("{name} [ms]"), 1e3),
@@ -89,8 +93,11 @@ pub fn work_precision(chart: &WorkPrecision, px_per_pt: f64) -> Result<Picture, 
     };
     let lost = chart.lost.filter(|&value| value > 0.0 && value < 1e299);
     let most = lost.map_or(f64::INFINITY, |lost| 10.0 * lost);
-    let points: Vec<Vec<Point>> =
-        chart.series.iter().map(|s| s.points.iter().filter(usable).map(|p| [p[0] * scale, p[1].min(most)]).collect()).collect();
+    let points: Vec<Vec<Point>> = chart
+        .series
+        .iter()
+        .map(|s| s.points.iter().filter(usable).map(|p| [p[0] * scale, p[1].min(most)]).collect())
+        .collect();
     let all: Vec<Point> = points.concat();
 
     let x = roomy(&name, all.iter().map(|p| p[0]));
@@ -116,7 +123,8 @@ pub fn work_precision(chart: &WorkPrecision, px_per_pt: f64) -> Result<Picture, 
     }
     let is_seen = |value: &f64| *value > panel.y.from && *value < panel.y.to;
     let above = lost.filter(is_seen).map(|value| (value, "paths are lost above"));
-    let below = chart.floor.as_ref().filter(|_| floor.is_some()).map(|(value, words)| (*value, words.as_str()));
+    let below =
+        chart.floor.as_ref().filter(|_| floor.is_some()).map(|(value, words)| (*value, words.as_str()));
     let levels: Vec<(f64, &str)> = above.into_iter().chain(below).collect();
     for (value, _) in &levels {
         panel.level(*value)?;
@@ -136,7 +144,14 @@ pub fn work_precision(chart: &WorkPrecision, px_per_pt: f64) -> Result<Picture, 
     for &k in order.iter().rev() {
         let zero = if points[k].iter().all(|p| p[1] == 0.0) { ": exactly 0" } else { "" };
         let label = shortened(&sheet, &format!("{}{zero}", chart.series[k].name));
-        along(&sheet, panel, &points[k].iter().map(at).collect::<Vec<_>>(), &label, readable(marks[k].colour), &mut occupied)?;
+        along(
+            &sheet,
+            panel,
+            &points[k].iter().map(at).collect::<Vec<_>>(),
+            &label,
+            readable(marks[k].colour),
+            &mut occupied,
+        )?;
     }
     for (value, words) in levels {
         let right = panel.bounds[2];
@@ -163,10 +178,19 @@ fn roomy(name: &str, values: impl Iterator<Item = f64>) -> Axis {
     Axis { from: nice(0.85 * tight.from, false), to: nice(1.25 * tight.to, true), scale: Scale::Log, ..tight }
 }
 
-fn curve(sheet: &Sheet, panel: &Panel, points: &[Point], mark: &Mark, pen: Pen, occupied: &mut Occupied) -> Result<(), ChartError> {
+fn curve(
+    sheet: &Sheet,
+    panel: &Panel,
+    points: &[Point],
+    mark: &Mark,
+    pen: Pen,
+    occupied: &mut Occupied,
+) -> Result<(), ChartError> {
     let [left, top, right, bottom] = panel.bounds;
     let pen = pen.dashed(TURNS[mark.turn % TURNS.len()]);
-    for piece in clip(points.iter().map(|p| [(p[0] - left) / (right - left), (bottom - p[1]) / (bottom - top)])) {
+    for piece in
+        clip(points.iter().map(|p| [(p[0] - left) / (right - left), (bottom - p[1]) / (bottom - top)]))
+    {
         let piece: Vec<Point> = piece.into_iter().map(|p| panel.page(p)).collect();
         occupied.line(&piece);
         sheet.line(&piece, &pen)?;
@@ -178,8 +202,16 @@ fn curve(sheet: &Sheet, panel: &Panel, points: &[Point], mark: &Mark, pen: Pen, 
     Ok(())
 }
 
-/// Words beside that point of a line where they cover least, rather its ends than its middle; they may reach over the right edge of the panel.
-fn along(sheet: &Sheet, panel: &Panel, points: &[Point], words: &str, colour: Colour, occupied: &mut Occupied) -> Result<(), ChartError> {
+/// Words beside that point of a line where they cover least, rather its ends than its middle; they may reach
+/// over the right edge of the panel.
+fn along(
+    sheet: &Sheet,
+    panel: &Panel,
+    points: &[Point],
+    words: &str,
+    colour: Colour,
+    occupied: &mut Occupied,
+) -> Result<(), ChartError> {
     let size = [sheet.width(words, NOTE, false), 0.8 * NOTE];
     let [left, top, right, bottom] = panel.bounds;
     let room = [left, top, right + 20.0, bottom - 3.0];

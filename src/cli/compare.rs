@@ -1,4 +1,5 @@
-//! `driftless compare`: every method that fits, at all its settings, against a reference and against the clock.
+//! `driftless compare`: every method that fits, at all its settings, against a reference and against the
+//! clock.
 
 use super::failure::{Exit, Failure};
 use super::flags::CompareFlags;
@@ -24,13 +25,27 @@ pub fn run(flags: &CompareFlags) -> Result<(), Failure> {
     interrupt::listen()?;
     let (scene, mechanism) = super::load(&flags.scene)?;
     let budget = Duration::try_from_secs_f64(flags.budget).ok().filter(|budget| !budget.is_zero());
-    let budget = budget.ok_or_else(|| Failure::new(Exit::Usage, "--budget: not a time above 0\nhint: --budget 60"))?;
-    let asked = Asked { methods: flags.methods.clone(), stabilize: flags.stabilize.clone(), until: flags.until, budget, blocks: BLOCKS };
+    let budget =
+        budget.ok_or_else(|| Failure::new(Exit::Usage, "--budget: not a time above 0\nhint: --budget 60"))?;
+    let asked = Asked {
+        methods: flags.methods.clone(),
+        stabilize: flags.stabilize.clone(),
+        until: flags.until,
+        budget,
+        blocks: BLOCKS,
+    };
     asked.horizon(&scene, &mechanism)?;
     let mut folder = Folder::open(&flags.out.join(&scene.name).join("compare"), flags.force)?;
     let mut progress = Stages::new(&scene.name, flags.scene.tell.quiet);
     let begin = Instant::now();
-    let comparison = compare(&scene, &mechanism, &asked, &|| begin.elapsed(), &mut |stage| progress.see(stage), &interrupt::is_asked);
+    let comparison = compare(
+        &scene,
+        &mechanism,
+        &asked,
+        &|| begin.elapsed(),
+        &mut |stage| progress.see(stage),
+        &interrupt::is_asked,
+    );
     progress.finish();
     let comparison = comparison?;
     keep(&scene, &mechanism, &comparison, &mut folder, flags)?;
@@ -38,7 +53,8 @@ pub fn run(flags: &CompareFlags) -> Result<(), Failure> {
     if comparison.is_whole {
         return Ok(());
     }
-    let message = format!("interrupted; {} of what was measured is in {}", count(&comparison), quoted(folder.path()));
+    let message =
+        format!("interrupted; {} of what was measured is in {}", count(&comparison), quoted(folder.path()));
     Err(Failure::new(Exit::Interrupted, message).told())
 }
 
@@ -52,7 +68,13 @@ fn count(comparison: &Comparison) -> String {
 }
 
 /// Writes table and charts, and the record last.
-fn keep(scene: &Scene, mechanism: &Mechanism, comparison: &Comparison, folder: &mut Folder, flags: &CompareFlags) -> Result<(), Failure> {
+fn keep(
+    scene: &Scene,
+    mechanism: &Mechanism,
+    comparison: &Comparison,
+    folder: &mut Folder,
+    flags: &CompareFlags,
+) -> Result<(), Failure> {
     if flags.force {
         folder.clear(FILES)?;
     }
@@ -70,11 +92,22 @@ fn keep(scene: &Scene, mechanism: &Mechanism, comparison: &Comparison, folder: &
 }
 
 /// Every file a comparison may leave.
-const FILES: &[&str] =
-    &[COMPARISON, COMPARISON_RECORD, "error_against_run_time.png", "energy_drift_against_run_time.png", "error_against_evaluations.png"];
+const FILES: &[&str] = &[
+    COMPARISON,
+    COMPARISON_RECORD,
+    "error_against_run_time.png",
+    "energy_drift_against_run_time.png",
+    "error_against_evaluations.png",
+];
 
 /// Prints the results.
-fn tell(scene: &Scene, mechanism: &Mechanism, comparison: &Comparison, folder: &Folder, flags: &CompareFlags) -> Result<(), Failure> {
+fn tell(
+    scene: &Scene,
+    mechanism: &Mechanism,
+    comparison: &Comparison,
+    folder: &Folder,
+    flags: &CompareFlags,
+) -> Result<(), Failure> {
     if flags.scene.tell.json {
         let mut object = report::compare::object(scene, mechanism, comparison);
         name_files(&mut object, folder);
@@ -83,5 +116,8 @@ fn tell(scene: &Scene, mechanism: &Mechanism, comparison: &Comparison, folder: &
     if flags.scene.tell.quiet {
         return Ok(());
     }
-    print(&(report::compare::text(scene, mechanism, comparison) + &report::result::files(folder.path(), folder.names())))
+    print(
+        &(report::compare::text(scene, mechanism, comparison)
+            + &report::result::files(folder.path(), folder.names())),
+    )
 }

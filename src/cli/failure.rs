@@ -1,4 +1,5 @@
-//! What went wrong, for people on stderr, for scripts as exit code and, with `--json`, as `{"error": …}` on stdout.
+//! What went wrong, for people on stderr, for scripts as exit code and, with `--json`, as `{"error": …}` on
+//! stdout.
 
 use super::output::print_object;
 use crate::dynamics::CompileError;
@@ -68,21 +69,26 @@ impl Failure {
     /// A run or sweep that was asked to end, at a place it calls `reached`; its checkpoint is in `folder`.
     pub(super) fn interrupted(reached: &str, folder: &Path) -> Self {
         let resume = format!("driftless resume {}", quoted(folder));
-        let message = format!("interrupted at {reached}; everything up to there is kept\nhint: `{resume}` goes on");
+        let message =
+            format!("interrupted at {reached}; everything up to there is kept\nhint: `{resume}` goes on");
         let details = json!({"folder": folder.display().to_string(), "resume": resume});
         Self { details, ..Self::new(Exit::Interrupted, message) }
     }
 
     /// The same with a hint at the checkpoint that is left.
     pub(super) fn with_checkpoint(mut self, folder: &Path) -> Self {
-        self.message += &format!("\nhint: `driftless resume {}` goes on from the last checkpoint", quoted(folder));
+        self.message +=
+            &format!("\nhint: `driftless resume {}` goes on from the last checkpoint", quoted(folder));
         self
     }
 
     /// A start that is not as given, where `--strict` asks for that.
     pub(super) fn changed(changes: &[Change]) -> Self {
         let list: Vec<String> = changes.iter().map(Change::to_string).collect();
-        let message = format!("--strict: {}\nhint: give the values used, or leave out what the constraints tell", list.join("; "));
+        let message = format!(
+            "--strict: {}\nhint: give the values used, or leave out what the constraints tell",
+            list.join("; ")
+        );
         Self { details: json!({ "changes": changes }), ..Self::new(Exit::Scene, message) }
     }
 
@@ -125,7 +131,8 @@ impl From<CompileError> for Failure {
 impl From<Refusal> for Failure {
     fn from(refusal: Refusal) -> Self {
         let exit = if refusal.is_usage { Exit::Usage } else { Exit::Scene };
-        let details = json!({"what": refusal.what, "reason": refusal.reason, "alternative": refusal.alternative});
+        let details =
+            json!({"what": refusal.what, "reason": refusal.reason, "alternative": refusal.alternative});
         Self { details, ..Self::new(exit, refusal.to_string()) }
     }
 }
@@ -183,7 +190,9 @@ impl From<SweepError> for Failure {
             SweepError::Scene(error) => error.into(),
             SweepError::Compile(error) => error.into(),
             SweepError::Refused(refusal) => refusal.into(),
-            SweepError::Threads(error) => Self::new(Exit::Other, format!("cannot start the threads: {error}\nhint: --threads 1")),
+            SweepError::Threads(error) => {
+                Self::new(Exit::Other, format!("cannot start the threads: {error}\nhint: --threads 1"))
+            }
             SweepError::Observer(error) => Self::new(Exit::Io, error.to_string()),
         }
     }
@@ -192,7 +201,8 @@ impl From<SweepError> for Failure {
 #[cfg(feature = "charts")]
 impl From<crate::chart::ChartError> for Failure {
     fn from(error: crate::chart::ChartError) -> Self {
-        let exit = if matches!(error, crate::chart::ChartError::Write { .. }) { Exit::Io } else { Exit::Other };
+        let exit =
+            if matches!(error, crate::chart::ChartError::Write { .. }) { Exit::Io } else { Exit::Other };
         Self::new(exit, error.to_string())
     }
 }

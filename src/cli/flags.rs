@@ -67,7 +67,8 @@ pub struct SceneFlags {
     /// Scene file (JSON), - for standard input; `driftless schema` describes it
     #[arg(value_name = "SCENE")]
     pub scene: PathBuf,
-    /// Set a value of the scene, as in walls.wall.restitution=0.5, bar1.phi=pi/2 or start.bar1.omega=-1/3; repeatable
+    /// Set a value of the scene, as in walls.wall.restitution=0.5, bar1.phi=pi/2 or start.bar1.omega=-1/3;
+    /// repeatable
     #[arg(long, value_name = "PATH=VALUE")]
     pub set: Vec<Override>,
     /// Refuse a scene of which something given for the start must change to fit its constraints
@@ -88,11 +89,13 @@ pub struct PlanFlags {
     /// Step of a fixed-step method in seconds, as 0.01 or 1/64
     #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
     pub step: Option<f64>,
-    /// Relative tolerance of an adaptive method [default: 1e-9; over a minute and more 1e-15 for taylor and less over 100 s, 1e-13 for dp8 and dop853]
+    /// Relative tolerance of an adaptive method [default: 1e-9; over a minute and more 1e-15 for taylor and
+    /// less over 100 s, 1e-13 for dp8 and dop853]
     #[arg(long, value_name = "TOL", value_parser = number, allow_hyphen_values = true)]
     pub rtol: Option<f64>,
-    /// Absolute tolerance of an adaptive method: in rad, and in the mechanism's own units of length, time and energy, which are m, s and J where it is of human
-    /// size and powers of 1024 times these elsewhere [default: as --rtol]
+    /// Absolute tolerance of an adaptive method: in rad, and in the mechanism's own units of length, time and
+    /// energy, which are m, s and J where it is of human size and powers of 1024 times these elsewhere
+    /// [default: as --rtol]
     #[arg(long, value_name = "TOL", value_parser = number, allow_hyphen_values = true)]
     pub atol: Option<f64>,
     /// Horizon in seconds [default: the scene's]
@@ -101,20 +104,23 @@ pub struct PlanFlags {
     /// Output interval in seconds [default: the scene's]
     #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
     pub every: Option<f64>,
-    /// How motors' angles are kept; several, joined by commas, are run one after another [default: elimination, or projection with rattle]
+    /// How motors' angles are kept; several, joined by commas, are run one after another [default:
+    /// elimination, or projection with rattle]
     #[arg(long, value_name = "HOW", value_parser = stabilizations(), value_delimiter = ',')]
     pub stabilize: Vec<Stabilization>,
     /// Time constant of Baumgarte's term in seconds [default: five mean steps]
     #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
     pub time_constant: Option<f64>,
-    /// Carry the first orders of taylor's series in double-double: rounding in energy a thousandth of a plain run's, at tolerances down to 1e-25 [default: 1e-20]
+    /// Carry the first orders of taylor's series in double-double: rounding in energy a thousandth of a plain
+    /// run's, at tolerances down to 1e-25 [default: 1e-20]
     #[arg(long)]
     pub extended: bool,
-    /// Evaluations of the equations allowed in a run; one that needs more stops with exit code 4 [default: 1e8, and 1e7 a simulated second, at most 1e10; at most
-    /// 1e9 expansions of taylor's series]
+    /// Evaluations of the equations allowed in a run; one that needs more stops with exit code 4 [default:
+    /// 1e8, and 1e7 a simulated second, at most 1e10; at most 1e9 expansions of taylor's series]
     #[arg(long, alias = "effort", value_name = "N", value_parser = count, allow_hyphen_values = true)]
     pub max_evaluations: Option<u64>,
-    /// What a method is chosen for where none is named [default: the path, and invariants over a minute or more]
+    /// What a method is chosen for where none is named [default: the path, and invariants over a minute or
+    /// more]
     #[arg(long, value_name = "WHAT", value_parser = preferences(), conflicts_with = "method")]
     pub prefer: Option<Prefer>,
 }
@@ -159,16 +165,22 @@ pub struct RunFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub plan: PlanFlags,
-    /// Estimate the error of the result and the time up to which it can be trusted: off, auto (50 ms, and 30 % of what the run takes without its output), full (5 s, and thirty times that, but no more evaluations than --effort)
+    /// Estimate the error of the result and the time up to which it can be trusted: off, auto (50 ms, and 30
+    /// % of what the run takes without its output), full (5 s, and thirty times that, but no more evaluations
+    /// than --effort)
     #[arg(long, value_name = "HOW", value_parser = levels(), default_value = Level::Auto.name(), help_heading = "Trust")]
     pub trust: Level,
-    /// Tell what the last digit of every number comes to, as it is written in the scene or in --set (0.25 is uncertain by 0.005, 670 by 0.5; 0, pi/2 and defaults are exact), in a table: two to four runs for each number
+    /// Tell what the last digit of every number comes to, as it is written in the scene or in --set (0.25 is
+    /// uncertain by 0.005, 670 by 0.5; 0, pi/2 and defaults are exact), in a table: two to four runs for each
+    /// number
     #[arg(long, help_heading = "Trust")]
     pub inputs: bool,
-    /// Stop with exit code 5 where the energy is off by more than this share of its scale [default: what the tolerance explains, 0.01 of the largest energy there has been at most]
+    /// Stop with exit code 5 where the energy is off by more than this share of its scale [default: what the
+    /// tolerance explains, 0.01 of the largest energy there has been at most]
     #[arg(long, value_name = "SHARE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
     pub max_energy_drift: Option<f64>,
-    /// Stop with exit code 5 where a constraint is off by more, in rad or m, or that per second [default: 0.01 rad, or sizes of the mechanism, in position]
+    /// Stop with exit code 5 where a constraint is off by more, in rad or m, or that per second [default:
+    /// 0.01 rad, or sizes of the mechanism, in position]
     #[arg(long, value_name = "SIZE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
     pub max_constraint_drift: Option<f64>,
     /// Folder under which `SCENE/METHOD-SETTING` is made
@@ -196,8 +208,15 @@ pub struct SweepFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub scene: SceneFlags,
-    /// Vary a value, as in bar1.phi=-pi..pi:64 or springs.spring.stiffness=1..10:4; several make a grid, of which the first varies slowest
-    #[arg(long, value_name = "NAME=FROM..TO:COUNT", required = true, allow_hyphen_values = true, help_heading = "Points")]
+    /// Vary a value, as in bar1.phi=-pi..pi:64 or springs.spring.stiffness=1..10:4; several make a grid, of
+    /// which the first varies slowest
+    #[arg(
+        long,
+        value_name = "NAME=FROM..TO:COUNT",
+        required = true,
+        allow_hyphen_values = true,
+        help_heading = "Points"
+    )]
     pub vary: Vec<Vary>,
     /// End each point when a bar first turns over (its angle passes an odd multiple of pi)
     #[arg(long, help_heading = "Points")]
@@ -208,13 +227,17 @@ pub struct SweepFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub plan: PlanFlags,
-    /// Estimate the error of every point and the time up to which it can be trusted, in two more columns: off, auto (in lanes a second sweep at a hundredth of the tolerance: about 2.2 times the work), full (as single runs)
+    /// Estimate the error of every point and the time up to which it can be trusted, in two more columns:
+    /// off, auto (in lanes a second sweep at a hundredth of the tolerance: about 2.2 times the work), full
+    /// (as single runs)
     #[arg(long, value_name = "HOW", value_parser = levels(), default_value = Level::Off.name(), help_heading = "Trust")]
     pub trust: Level,
-    /// Stop a point where its energy is off by more than this share of its scale [default: what the tolerance explains, 0.01 at most]
+    /// Stop a point where its energy is off by more than this share of its scale [default: what the tolerance
+    /// explains, 0.01 at most]
     #[arg(long, value_name = "SHARE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
     pub max_energy_drift: Option<f64>,
-    /// Stop a point where a constraint is off by more, in rad or m, or that per second [default: 0.01 rad, or sizes of the mechanism, in position]
+    /// Stop a point where a constraint is off by more, in rad or m, or that per second [default: 0.01 rad, or
+    /// sizes of the mechanism, in position]
     #[arg(long, value_name = "SIZE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
     pub max_constraint_drift: Option<f64>,
     /// Folder under which `SCENE/sweep-NAMES-METHOD-SETTING` is made
@@ -278,13 +301,15 @@ pub struct CompareFlags {
     /// Methods, joined by commas [default: all]
     #[arg(long, value_name = "METHODS", value_parser = methods(), value_delimiter = ',', help_heading = "Comparison")]
     pub methods: Vec<MethodId>,
-    /// How constraints are kept; several, joined by commas, are compared with one another [default: each method's usual way]
+    /// How constraints are kept; several, joined by commas, are compared with one another [default: each
+    /// method's usual way]
     #[arg(long, value_name = "HOW", value_parser = stabilizations(), value_delimiter = ',', help_heading = "Comparison")]
     pub stabilize: Vec<Stabilization>,
     /// Horizon in seconds [default: the scene's, or what there is time for]
     #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true, help_heading = "Comparison")]
     pub until: Option<f64>,
-    /// Seconds to spend: for the reference, for one run of each setting, and for repetitions that make their times sure
+    /// Seconds to spend: for the reference, for one run of each setting, and for repetitions that make their
+    /// times sure
     #[arg(long, value_name = "S", value_parser = wait, default_value = "90", allow_hyphen_values = true, help_heading = "Comparison")]
     pub budget: f64,
     /// Folder under which `SCENE/compare` is made
@@ -302,7 +327,8 @@ pub struct CompareFlags {
 /// How often checkpoints are written.
 #[derive(Clone, Debug, Args)]
 pub struct CheckpointFlags {
-    /// Seconds of computing between two checkpoints, from which `driftless resume` goes on, after a first one at the start; 0: none but at Ctrl-C and SIGTERM
+    /// Seconds of computing between two checkpoints, from which `driftless resume` goes on, after a first one
+    /// at the start; 0: none but at Ctrl-C and SIGTERM
     #[arg(
         long,
         value_name = "S",
@@ -380,7 +406,8 @@ impl PlanFlags {
         if self.stabilize.is_empty() {
             return vec![self.request(None)];
         }
-        let given = self.stabilize.iter().enumerate().filter(|(i, kind)| !self.stabilize[..*i].contains(kind));
+        let given =
+            self.stabilize.iter().enumerate().filter(|(i, kind)| !self.stabilize[..*i].contains(kind));
         given.map(|(_, &kind)| self.request(Some(kind))).collect()
     }
 
@@ -411,7 +438,8 @@ impl RunFlags {
 /// Parses the command line, of which the first argument is the program's name.
 ///
 /// # Errors
-/// The exit code, where help was asked for (0) or the line makes no sense (2); what there is to say has been said.
+/// The exit code, where help was asked for (0) or the line makes no sense (2); what there is to say has been
+/// said.
 pub fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Flags, ExitCode> {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let words = arguments.iter().map(|argument| argument.to_string_lossy().into_owned()).collect();
@@ -434,7 +462,8 @@ fn methods() -> impl TypedValueParser<Value = MethodId> {
 }
 
 fn stabilizations() -> impl TypedValueParser<Value = Stabilization> {
-    PossibleValuesParser::new(Stabilization::ALL.map(Stabilization::name)).try_map(|name| name.parse::<Stabilization>())
+    PossibleValuesParser::new(Stabilization::ALL.map(Stabilization::name))
+        .try_map(|name| name.parse::<Stabilization>())
 }
 
 fn preferences() -> impl TypedValueParser<Value = Prefer> {
@@ -454,7 +483,11 @@ fn number(text: &str) -> Result<f64, String> {
 /// A whole number from 1 to 1e18, as 50000 or 5e4.
 fn count(text: &str) -> Result<u64, String> {
     let value = number(text)?;
-    if (1.0..=1e18).contains(&value) && value.fract() == 0.0 { Ok(value as u64) } else { Err("a whole number from 1 to 1e18".to_owned()) }
+    if (1.0..=1e18).contains(&value) && value.fract() == 0.0 {
+        Ok(value as u64)
+    } else {
+        Err("a whole number from 1 to 1e18".to_owned())
+    }
 }
 
 /// A time to wait \[s\]: any number that is not negative.
@@ -484,7 +517,11 @@ mod tests {
         assert_eq!(number("1/64"), Ok(0.015625));
         assert_eq!(number("-1e-3"), Ok(-0.001));
         assert_eq!((count("5e4"), count("7")), (Ok(50_000), Ok(7)));
-        assert!(count("0").is_err() && count("1.5").is_err() && count("1e19").is_err() && count("-1").is_err());
-        assert!(number("1/").is_err() && number("ten").is_err() && limit("nan").is_err() && limit("-1").is_err());
+        assert!(
+            count("0").is_err() && count("1.5").is_err() && count("1e19").is_err() && count("-1").is_err()
+        );
+        assert!(
+            number("1/").is_err() && number("ten").is_err() && limit("nan").is_err() && limit("-1").is_err()
+        );
     }
 }

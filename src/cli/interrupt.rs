@@ -9,16 +9,19 @@ use std::time::{Duration, Instant};
 /// Set by Ctrl-C and SIGTERM.
 static IS_ASKED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
-/// From now on Ctrl-C and SIGTERM ask the run to write a checkpoint and end; the second one ends the program at once.
+/// From now on Ctrl-C and SIGTERM ask the run to write a checkpoint and end; the second one ends the program
+/// at once.
 pub fn listen() -> Result<(), Failure> {
     static ONCE: AtomicBool = AtomicBool::new(false);
     if ONCE.swap(true, Ordering::Relaxed) {
         return Ok(());
     }
-    let failed = |error| Failure::new(super::failure::Exit::Other, format!("cannot listen for Ctrl-C: {error}"));
+    let failed =
+        |error| Failure::new(super::failure::Exit::Other, format!("cannot listen for Ctrl-C: {error}"));
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
         // In this order: the first signal finds the flag down.
-        signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&IS_ASKED)).map_err(failed)?;
+        signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&IS_ASKED))
+            .map_err(failed)?;
         signal_hook::flag::register(signal, Arc::clone(&IS_ASKED)).map_err(failed)?;
     }
     Ok(())

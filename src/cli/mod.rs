@@ -63,7 +63,9 @@ fn check(flags: &CheckFlags) -> Result<(), Failure> {
         plans.push(plan);
     }
     if flags.scene.tell.json {
-        return output::print_objects(plans.iter().map(|plan| report::check::object(&scene, &mechanism, plan)).collect());
+        return output::print_objects(
+            plans.iter().map(|plan| report::check::object(&scene, &mechanism, plan)).collect(),
+        );
     }
     let pages: Vec<String> = plans.iter().map(|plan| report::check::text(&scene, &mechanism, plan)).collect();
     if flags.scene.tell.quiet { Ok(()) } else { print(&pages.join("\n")) }
@@ -72,7 +74,11 @@ fn check(flags: &CheckFlags) -> Result<(), Failure> {
 fn inspect(flags: &InspectFlags) -> Result<(), Failure> {
     let (scene, mechanism) = load(&flags.scene)?;
     let inspection = report::inspect::inspect(&scene, &mechanism);
-    if flags.scene.tell.json { print_object(&inspection.object(&scene)) } else { print(&inspection.text(&scene)) }
+    if flags.scene.tell.json {
+        print_object(&inspection.object(&scene))
+    } else {
+        print(&inspection.text(&scene))
+    }
 }
 
 /// Reads and compiles the scene.

@@ -49,7 +49,11 @@ impl Looks {
             return None;
         }
         let now = Instant::now();
-        self.stride = if now.saturating_duration_since(self.looked) < LOOK { (2 * self.stride).min(MOST_CALLS) } else { 1 };
+        self.stride = if now.saturating_duration_since(self.looked) < LOOK {
+            (2 * self.stride).min(MOST_CALLS)
+        } else {
+            1
+        };
         (self.left, self.looked) = (self.stride, now);
         Some(now)
     }
@@ -59,7 +63,8 @@ impl Looks {
 fn bar(scene: &str, length: u64, words: &str, quiet: bool) -> Option<ProgressBar> {
     (!quiet && std::io::stderr().is_terminal()).then(|| {
         let bar = ProgressBar::new(length).with_prefix(scene.chars().take(20).collect::<String>());
-        let style = ProgressStyle::with_template(&format!("{{prefix}} [{{bar:24}}] {{percent:>3}} %  {words}"));
+        let style =
+            ProgressStyle::with_template(&format!("{{prefix}} [{{bar:24}}] {{percent:>3}} %  {words}"));
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
         bar
     })
@@ -82,7 +87,15 @@ impl Points {
     pub fn new(scene: &str, before: u64, count: u64, quiet: bool) -> Self {
         let bar = bar(scene, count, "{msg}", quiet);
         let begin = Instant::now();
-        Self { scene: scene.to_owned(), before, count, begin, next: begin + if bar.is_some() { BAR } else { LINE }, bar, quiet }
+        Self {
+            scene: scene.to_owned(),
+            before,
+            count,
+            begin,
+            next: begin + if bar.is_some() { BAR } else { LINE },
+            bar,
+            quiet,
+        }
     }
 
     /// Takes the number of points finished.
@@ -99,7 +112,11 @@ impl Points {
                 self.next = now + BAR;
             }
             None => {
-                message(&format!("{}: {:.0} %, {words}", self.scene, 100.0 * finished as f64 / self.count as f64));
+                message(&format!(
+                    "{}: {:.0} %, {words}",
+                    self.scene,
+                    100.0 * finished as f64 / self.count as f64
+                ));
                 self.next = now + LINE;
             }
         }

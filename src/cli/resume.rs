@@ -70,12 +70,14 @@ pub fn run(flags: &ResumeFlags) -> Result<(), Failure> {
             run.checkpoints = flags.checkpoints.clone();
             simulate::resume(&run, saved, flags.until, folder, checkpoints)
         }
-        (Command::Sweep(_), Work::Sweep(..)) if flags.until.is_some() => {
-            Err(Failure::new(Exit::Usage, "--until: the points of a sweep have one horizon\nhint: a new sweep"))
-        }
-        (Command::Sweep(_), Work::Sweep(..)) if flags.max_evaluations.is_some() => {
-            Err(Failure::new(Exit::Usage, "--max-evaluations: the points of a sweep have one limit\nhint: a new sweep"))
-        }
+        (Command::Sweep(_), Work::Sweep(..)) if flags.until.is_some() => Err(Failure::new(
+            Exit::Usage,
+            "--until: the points of a sweep have one horizon\nhint: a new sweep",
+        )),
+        (Command::Sweep(_), Work::Sweep(..)) if flags.max_evaluations.is_some() => Err(Failure::new(
+            Exit::Usage,
+            "--max-evaluations: the points of a sweep have one limit\nhint: a new sweep",
+        )),
         (Command::Sweep(mut sweep), Work::Sweep(..)) => {
             sweep.scene.tell = flags.tell.clone();
             sweep.checkpoints = flags.checkpoints.clone();
@@ -95,7 +97,8 @@ fn located(folder: &Path) -> Result<PathBuf, Failure> {
     found.sort();
     // What is being written is not interrupted; where there is nothing else, whoever opens it says so.
     let is_idle: Vec<bool> = found.iter().map(|path| !Folder::is_busy(path)).collect();
-    let idle: Vec<&PathBuf> = found.iter().zip(&is_idle).filter(|(_, is_idle)| **is_idle).map(|(path, _)| path).collect();
+    let idle: Vec<&PathBuf> =
+        found.iter().zip(&is_idle).filter(|(_, is_idle)| **is_idle).map(|(path, _)| path).collect();
     match (&idle[..], found.first()) {
         ([only], _) => Ok((*only).clone()),
         ([], None) => Err(nothing(folder)),

@@ -12,14 +12,25 @@ use crate::run::async_writer::AsyncWriter;
 use crate::run::files::{RECORD, TRAJECTORY};
 use crate::run::table::Table;
 use crate::run::trust::Level;
-use crate::run::{Checkpoints, Folder, Outcome, Plan, Request, ResumeError, Run, RunError, Running, Sample, Stream, wall_clock};
+use crate::run::{
+    Checkpoints, Folder, Outcome, Plan, Request, ResumeError, Run, RunError, Running, Sample, Stream,
+    wall_clock,
+};
 use crate::scene::{Override, Scene, Template, read_text, source_name};
 use std::sync::Arc;
 use std::time::Instant;
 
 /// Every file a run may leave; those of an earlier run in the same folder go with it.
-const FILES: &[&str] =
-    &[TRAJECTORY, RECORD, "mechanism.png", "angles.png", "energy_drift.png", "constraint_drift.png", "torque_power.png", "mechanism.gif"];
+const FILES: &[&str] = &[
+    TRAJECTORY,
+    RECORD,
+    "mechanism.png",
+    "angles.png",
+    "energy_drift.png",
+    "constraint_drift.png",
+    "torque_power.png",
+    "mechanism.gif",
+];
 
 /// A run that has ended.
 struct Done {
@@ -67,7 +78,8 @@ pub fn run(flags: &RunFlags, arguments: &[String]) -> Result<(), Failure> {
     let (scene, mechanism) = super::compile(&flags.scene, &text)?;
     // All plans stand before the first run: a pairing that is refused costs nothing.
     let requests = flags.plan.requests();
-    let mut plans: Vec<Plan> = requests.iter().map(|request| Plan::new(&scene, &mechanism, request)).collect::<Result<_, _>>()?;
+    let mut plans: Vec<Plan> =
+        requests.iter().map(|request| Plan::new(&scene, &mechanism, request)).collect::<Result<_, _>>()?;
     let notes = super::stays(&flags.scene, &text, &scene);
     plans.iter_mut().for_each(|plan| plan.notes.extend(notes.iter().cloned()));
     let folders = folders(&requests, &plans, &mechanism);
@@ -84,7 +96,13 @@ pub fn run(flags: &RunFlags, arguments: &[String]) -> Result<(), Failure> {
 ///
 /// # Errors
 /// As [`run`], or a checkpoint that does not fit.
-pub fn resume(flags: &RunFlags, saved: Saved, until: Option<f64>, folder: Folder, checkpoints: Checkpoints) -> Result<(), Failure> {
+pub fn resume(
+    flags: &RunFlags,
+    saved: Saved,
+    until: Option<f64>,
+    folder: Folder,
+    checkpoints: Checkpoints,
+) -> Result<(), Failure> {
     interrupt::listen()?;
     let Saved { arguments, scene: text, cursor, work, .. } = saved;
     let Work::Run(mut snapshot) = work else { return Err(ResumeError::Misfit.into()) };
@@ -92,20 +110,27 @@ pub fn resume(flags: &RunFlags, saved: Saved, until: Option<f64>, folder: Folder
     if let Some(until) = until
         && !snapshot.extend(until)
     {
-        let step = snapshot.plan().step.map_or(String::new(), |step| format!(", by a whole number of steps of {step} s"));
-        let text = format!("--until: {until} s cannot be the horizon of this run\nhint: one beyond {} s{step}", snapshot.plan().until);
+        let step = snapshot
+            .plan()
+            .step
+            .map_or(String::new(), |step| format!(", by a whole number of steps of {step} s"));
+        let text = format!(
+            "--until: {until} s cannot be the horizon of this run\nhint: one beyond {} s{step}",
+            snapshot.plan().until
+        );
         return Err(Failure::new(Exit::Usage, text));
     }
     flags.scene.remark(&format!("{}; from t = {} s on", report::setting(snapshot.plan()), snapshot.time()));
-    let running = Running::resume(Arc::clone(&mechanism), &mechanism.start(&scene), *snapshot)?.timed(wall_clock);
+    let running =
+        Running::resume(Arc::clone(&mechanism), &mechanism.start(&scene), *snapshot)?.timed(wall_clock);
     let table = Table::going_on(&mechanism, folder.take_up(TRAJECTORY, &cursor)?);
     let task = Task { scene: &scene, mechanism: &mechanism, flags, text: &text, arguments: &arguments };
     let done = vec![task.finish(running, AsyncWriter::new(table), folder, checkpoints)?];
     conclude(&scene, &mechanism, done, flags)
 }
 
-/// A folder for each plan: its usual one, with the stabilization asked for where several of one command would share it, as they do where there is nothing to
-/// stabilize.
+/// A folder for each plan: its usual one, with the stabilization asked for where several of one command would
+/// share it, as they do where there is nothing to stabilize.
 fn folders(requests: &[Request], plans: &[Plan], mechanism: &Mechanism) -> Vec<String> {
     let usual: Vec<String> = plans.iter().map(|plan| plan.folder(mechanism)).collect();
     let is_shared = |name: &String| usual.iter().filter(|other| *other == name).count() > 1;
@@ -129,14 +154,24 @@ impl Task<'_> {
         let start = mechanism.start(scene);
         let run = Run::new(Arc::clone(mechanism), plan, flags.limits(), &start)?.trusted(flags.trust, &start);
         let plan = run.plan();
-        flags.scene.remark(&format!("{}; {}", report::setting(plan), plan.why.as_deref().unwrap_or("as asked for")));
+        flags.scene.remark(&format!(
+            "{}; {}",
+            report::setting(plan),
+            plan.why.as_deref().unwrap_or("as asked for")
+        ));
         for note in &plan.notes {
             flags.scene.remark(note);
         }
         let path = flags.out.join(&scene.name).join(folder);
         let folder = Folder::open(&path, flags.force)?;
-        let table = Table::new(mechanism, folder.begin(TRAJECTORY)?).map_err(|error| folder.failed(TRAJECTORY, error.into()))?;
-        self.finish(Running::new(run.timed(wall_clock)), AsyncWriter::new(table), folder, Checkpoints::none(&path))
+        let table = Table::new(mechanism, folder.begin(TRAJECTORY)?)
+            .map_err(|error| folder.failed(TRAJECTORY, error.into()))?;
+        self.finish(
+            Running::new(run.timed(wall_clock)),
+            AsyncWriter::new(table),
+            folder,
+            Checkpoints::none(&path),
+        )
     }
 
     /// Takes a run to its end.
@@ -148,7 +183,8 @@ impl Task<'_> {
         mut checkpoints: Checkpoints,
     ) -> Result<Done, Failure> {
         let integrated = self.integrate(&mut running, &mut writer, &folder, &mut checkpoints);
-        let done = integrated.and_then(|()| self.publish(self.with_inputs(running.finish())?, writer, &mut folder));
+        let done =
+            integrated.and_then(|()| self.publish(self.with_inputs(running.finish())?, writer, &mut folder));
         let outcome = done.map_err(|failure| {
             let is_left = checkpoints.has_any() && failure.exit != Exit::Interrupted;
             if is_left { failure.with_checkpoint(folder.path()) } else { failure }
@@ -158,7 +194,8 @@ impl Task<'_> {
         Ok(Done { outcome, folder, failure })
     }
 
-    /// Integrates, writes the trajectory as it comes, and a checkpoint before the first step and now and then.
+    /// Integrates, writes the trajectory as it comes, and a checkpoint before the first step and now and
+    /// then.
     fn integrate(
         &self,
         running: &mut Running,
@@ -194,7 +231,10 @@ impl Task<'_> {
             checkpoint_timer.written();
             if interrupt::is_asked() {
                 progress.finish();
-                return Err(Failure::interrupted(&format!("t = {} s of {} s", running.time(), running.plan().until), folder.path()));
+                return Err(Failure::interrupted(
+                    &format!("t = {} s of {} s", running.time(), running.plan().until),
+                    folder.path(),
+                ));
             }
         }
     }
@@ -226,7 +266,12 @@ impl Task<'_> {
             let template = Template::new(self.text.to_owned(), source_name(&flags.scene), &flags.set);
             flags.remark("running neighbouring scenes, for what the digits of the numbers come to");
             let begin = Instant::now();
-            let found = trust.with_inputs(&template, &typed(self.arguments, &flags.set), &outcome.plan, &mut interrupt::is_asked)?;
+            let found = trust.with_inputs(
+                &template,
+                &typed(self.arguments, &flags.set),
+                &outcome.plan,
+                &mut interrupt::is_asked,
+            )?;
             outcome.trust_wall += begin.elapsed();
             outcome.trust = Some(found);
         }
@@ -234,7 +279,12 @@ impl Task<'_> {
     }
 
     /// Gives the trajectory its name, draws, and writes the record.
-    fn publish(&self, outcome: Outcome, writer: AsyncWriter<Stream>, folder: &mut Folder) -> Result<Outcome, Failure> {
+    fn publish(
+        &self,
+        outcome: Outcome,
+        writer: AsyncWriter<Stream>,
+        folder: &mut Folder,
+    ) -> Result<Outcome, Failure> {
         let Self { scene, mechanism, flags, .. } = *self;
         let stream = writer.finish().map_err(|error| folder.failed(TRAJECTORY, error))?;
         if flags.force {
@@ -251,7 +301,13 @@ impl Task<'_> {
 }
 
 #[cfg(feature = "charts")]
-fn draw(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome, folder: &mut Folder, flags: &RunFlags) -> Result<(), Failure> {
+fn draw(
+    scene: &Scene,
+    mechanism: &Mechanism,
+    outcome: &Outcome,
+    folder: &mut Folder,
+    flags: &RunFlags,
+) -> Result<(), Failure> {
     for chart in report::charts::wanted(mechanism, !flags.no_charts, flags.gif) {
         let content = report::charts::draw(chart, scene, mechanism, outcome)?;
         folder.write(chart.file(), &content)?;
@@ -301,7 +357,8 @@ fn tell(scene: &Scene, mechanism: &Mechanism, done: &[Done], flags: &RunFlags) -
         return Ok(());
     }
     let page = |Done { outcome, folder, .. }: &Done| {
-        report::result::text(scene, mechanism, outcome) + &report::result::files(folder.path(), folder.names())
+        report::result::text(scene, mechanism, outcome)
+            + &report::result::files(folder.path(), folder.names())
     };
     print(&done.iter().map(page).collect::<Vec<_>>().join("\n"))
 }

@@ -16,7 +16,8 @@ const TABLE: &str = "stress.csv";
 const RECORD: &str = "stress.json";
 const MATRIX: &str = "matrix.png";
 /// The methods whose stability is drawn, and the files.
-const STABILITY: [(&str, &str); 2] = [("gauss16", "stability_gauss16.png"), ("rattle4", "stability_rattle4.png")];
+const STABILITY: [(&str, &str); 2] =
+    [("gauss16", "stability_gauss16.png"), ("rattle4", "stability_rattle4.png")];
 
 /// Runs the shipped set, or the scenes given.
 ///
@@ -34,12 +35,19 @@ pub fn run(flags: &StressFlags) -> Result<(), Failure> {
     progress.finish();
     publish(&plan, &lines, &mut folder, flags)?;
     if interrupt::is_asked() {
-        let text = format!("interrupted after {} of {} scenes; what they came to is kept", lines.len(), plan.cases.len());
+        let text = format!(
+            "interrupted after {} of {} scenes; what they came to is kept",
+            lines.len(),
+            plan.cases.len()
+        );
         return Err(Failure::new(Exit::Interrupted, text));
     }
-    let wrong = lines.iter().flat_map(|line| &line.cells).filter(|cell| cell.verdict == Verdict::Wrong).count();
+    let wrong =
+        lines.iter().flat_map(|line| &line.cells).filter(|cell| cell.verdict == Verdict::Wrong).count();
     if wrong > 0 {
-        let text = format!("{wrong} wrong answers were given for right\nhint: please report the scenes and methods named");
+        let text = format!(
+            "{wrong} wrong answers were given for right\nhint: please report the scenes and methods named"
+        );
         return Err(Failure::new(Exit::Other, text).told());
     }
     Ok(())
@@ -52,13 +60,25 @@ fn plan(flags: &StressFlags) -> Result<Stress, Failure> {
     } else {
         let case = |path: &std::path::PathBuf| {
             let origin = source_name(path);
-            let name = path.file_stem().map_or_else(|| origin.clone(), |stem| stem.to_string_lossy().into_owned());
-            Ok(Case { name, origin, text: read_text(path)?, tolerance: flags.tolerance, expected: Expected::Unknown })
+            let name =
+                path.file_stem().map_or_else(|| origin.clone(), |stem| stem.to_string_lossy().into_owned());
+            Ok(Case {
+                name,
+                origin,
+                text: read_text(path)?,
+                tolerance: flags.tolerance,
+                expected: Expected::Unknown,
+            })
         };
         flags.scenes.iter().map(case).collect::<Result<_, Failure>>()?
     };
     let methods = if flags.methods.is_empty() { usual.methods } else { flags.methods.clone() };
-    Ok(Stress { cases, methods, max_evaluations: flags.max_evaluations, threads: flags.threads.map_or(0, usize::from) })
+    Ok(Stress {
+        cases,
+        methods,
+        max_evaluations: flags.max_evaluations,
+        threads: flags.threads.map_or(0, usize::from),
+    })
 }
 
 fn publish(plan: &Stress, lines: &[Line], folder: &mut Folder, flags: &StressFlags) -> Result<(), Failure> {

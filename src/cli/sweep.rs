@@ -12,7 +12,8 @@ use crate::report::page::counted;
 use crate::report::sweep::{Curve, NoChart};
 use crate::run::files::{SWEEP, SWEEP_RECORD};
 use crate::run::{
-    Checkpoints, Folder, Limits, Point, PointObserver, Request, ResumeError, Stream, Sweep, SweepError, SweepTable, Totals, sweep_on,
+    Checkpoints, Folder, Limits, Point, PointObserver, Request, ResumeError, Stream, Sweep, SweepError,
+    SweepTable, Totals, sweep_on,
 };
 use crate::scene::{Template, points_that_stay, read_text, source_name};
 
@@ -39,12 +40,17 @@ pub fn run(flags: &SweepFlags, arguments: &[String]) -> Result<(), Failure> {
             counted(axis.count, "value", "values")
         ));
     }
-    flags.scene.remark(&format!("{}; {}", report::setting(plan.plan()), plan.plan().why.as_deref().unwrap_or("as asked for")));
+    flags.scene.remark(&format!(
+        "{}; {}",
+        report::setting(plan.plan()),
+        plan.plan().why.as_deref().unwrap_or("as asked for")
+    ));
     #[cfg(feature = "charts")]
     let curve = curve(&plan, flags)?;
     let path = flags.out.join(&plan.scene().name).join(folder_name(&plan));
     let folder = Folder::open(&path, flags.force)?;
-    let table = SweepTable::new(&plan, folder.begin(SWEEP)?).map_err(|error| folder.failed(SWEEP, error.into()))?;
+    let table =
+        SweepTable::new(&plan, folder.begin(SWEEP)?).map_err(|error| folder.failed(SWEEP, error.into()))?;
     let writer = Writer {
         table,
         progress: Points::new(&plan.scene().name, 0, plan.grid().count(), flags.scene.tell.quiet),
@@ -64,7 +70,12 @@ pub fn run(flags: &SweepFlags, arguments: &[String]) -> Result<(), Failure> {
 ///
 /// # Errors
 /// As [`run`], or a checkpoint that does not fit.
-pub fn resume(flags: &SweepFlags, saved: Saved, folder: Folder, checkpoints: Checkpoints) -> Result<(), Failure> {
+pub fn resume(
+    flags: &SweepFlags,
+    saved: Saved,
+    folder: Folder,
+    checkpoints: Checkpoints,
+) -> Result<(), Failure> {
     interrupt::listen()?;
     let Saved { arguments, scene: text, cursor, work, .. } = saved;
     let Work::Sweep(seen, drawn) = work else { return Err(ResumeError::Misfit.into()) };
@@ -138,14 +149,19 @@ fn publish(plan: &Sweep, writer: Writer, totals: &Totals, flags: &SweepFlags) ->
 fn prepared(flags: &SweepFlags, text: &str) -> Result<Sweep, Failure> {
     let requests = flags.plan.requests();
     let [request]: &[Request; 1] = requests.as_slice().try_into().map_err(|_| {
-        Failure::new(Exit::Usage, "--stabilize: a sweep keeps its constraints in one way\nhint: name one, or sweep several times")
+        Failure::new(
+            Exit::Usage,
+            "--stabilize: a sweep keeps its constraints in one way\nhint: name one, or sweep several times",
+        )
     })?;
     let template = Template::new(text.to_owned(), source_name(&flags.scene.scene), &flags.scene.set);
     let limits = Limits { energy: flags.max_energy_drift, constraint: flags.max_constraint_drift };
     let plan = Sweep::new(&template, flags.vary.clone(), request)?.with_limits(limits).trusted(flags.trust);
     super::settle(&flags.scene, plan.mechanism())?;
     let notes: Vec<String> = (plan.variables().iter().zip(plan.grid().axes()))
-        .filter_map(|(variable, axis)| points_that_stay(plan.scene(), &variable.path, (axis.count == 1).then_some(axis.from)))
+        .filter_map(|(variable, axis)| {
+            points_that_stay(plan.scene(), &variable.path, (axis.count == 1).then_some(axis.from))
+        })
         .collect();
     if !flags.scene.tell.quiet {
         notes.iter().for_each(|note| super::output::message(&format!("note: {note}")));
@@ -157,7 +173,8 @@ fn prepared(flags: &SweepFlags, text: &str) -> Result<Sweep, Failure> {
 
 /// `sweep-start.bar1.phi-taylor-1e-9`.
 fn folder_name(plan: &Sweep) -> String {
-    let names: Vec<String> = plan.variables().iter().map(|variable| variable.path.replace(['[', ']'], "_")).collect();
+    let names: Vec<String> =
+        plan.variables().iter().map(|variable| variable.path.replace(['[', ']'], "_")).collect();
     let mut names = names.join("-");
     names.truncate(LONGEST);
     format!("sweep-{names}-{}", plan.plan().folder(plan.mechanism()))
@@ -183,7 +200,12 @@ impl Writer<'_> {
     fn save(&mut self, seen: &Totals) -> Result<(), Failure> {
         let failed = |error| self.folder.failed(SWEEP, error);
         #[cfg(feature = "charts")]
-        let drawn = self.curve.as_ref().map(postcard::to_stdvec).transpose().map_err(|error| failed(std::io::Error::other(error)))?;
+        let drawn = self
+            .curve
+            .as_ref()
+            .map(postcard::to_stdvec)
+            .transpose()
+            .map_err(|error| failed(std::io::Error::other(error)))?;
         #[cfg(not(feature = "charts"))]
         let drawn = None;
         let stream = self.table.written().map_err(failed)?;
@@ -215,7 +237,10 @@ impl PointObserver for Writer<'_> {
             self.checkpoint_timer.written();
             self.trouble = saved.err();
             if self.trouble.is_none() && interrupt::is_asked() {
-                self.trouble = Some(Failure::interrupted(&format!("point {} of the grid", seen.points()), self.folder.path()));
+                self.trouble = Some(Failure::interrupted(
+                    &format!("point {} of the grid", seen.points()),
+                    self.folder.path(),
+                ));
             }
         }
         if self.trouble.is_some() { Err(std::io::ErrorKind::Interrupted.into()) } else { Ok(()) }
@@ -246,7 +271,9 @@ fn draw(plan: &Sweep, curve: &Curve, folder: &mut Folder, flags: &SweepFlags) ->
             folder.write(name, &content)?;
             flags.scene.remark(&format!("drew {}", folder.path().join(name).display()));
         }
-        Err(reason @ NoChart::Nothing(_)) if !flags.scene.tell.quiet => super::output::message(&format!("no chart: {reason}")),
+        Err(reason @ NoChart::Nothing(_)) if !flags.scene.tell.quiet => {
+            super::output::message(&format!("no chart: {reason}"))
+        }
         Err(_) => {}
     }
     Ok(())

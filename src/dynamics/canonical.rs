@@ -1,4 +1,5 @@
-//! The canonical form: coordinates u and momenta p, in which Gauss methods are symplectic (in (q, w) they are not).
+//! The canonical form: coordinates u and momenta p, in which Gauss methods are symplectic (in (q, w) they are
+//! not).
 //!
 //! ```text
 //! q = S u + s(t),  w = S u' + s',   p = Sᵀ M w:      Sᵀ M S u' = p - Sᵀ M s'
@@ -6,10 +7,12 @@
 //! H = T + V - (M w)·s',     K = H + p_t is a first integral
 //! ```
 //!
-//! Source: H. Goldstein, *Classical Mechanics*, 2nd ed. (1980), sections 8-1 and 8-2, for a time-dependent change of coordinates.
+//! Source: H. Goldstein, *Classical Mechanics*, 2nd ed. (1980), sections 8-1 and 8-2, for a time-dependent
+//! change of coordinates.
 //!
-//! Unknowns: u (f), p (f) \[kg·m²/s\] and, where angles are driven or dampers present, p_t \[J\], started at (M w)·s' so that the work done
-//! is (M w)·s' - p_t at any time, without a quadrature.  Dampers add their generalized force to p' and take their power out of p_t'.
+//! Unknowns: u (f), p (f) \[kg·m²/s\] and, where angles are driven or dampers present, p_t \[J\], started at
+//! (M w)·s' so that the work done is (M w)·s' - p_t at any time, without a quadrature.  Dampers add their
+//! generalized force to p' and take their power out of p_t'.
 
 mod stages;
 
@@ -77,7 +80,8 @@ impl<T: Scalar> Scratch<T> {
     /// Takes the known part of body `k`'s angle.
     #[inline(always)]
     fn drive(&mut self, k: usize, phase: Phase<T>) {
-        (self.drive_rate[k], self.drive_acceleration[k], self.drive[k]) = (phase.rate, phase.acceleration, phase);
+        (self.drive_rate[k], self.drive_acceleration[k], self.drive[k]) =
+            (phase.rate, phase.acceleration, phase);
     }
 
     /// From u and p to unit vectors, twist and all rates: `u_rate`, `omega`.
@@ -93,7 +97,9 @@ impl<T: Scalar> Scratch<T> {
             return;
         }
         let f = u.len();
-        for (k, dependent_angle) in mechanism.partition.bodies[..mechanism.partition.angles].iter().enumerate() {
+        for (k, dependent_angle) in
+            mechanism.partition.bodies[..mechanism.partition.angles].iter().enumerate()
+        {
             self.kernel.z[k] = dependent_angle.unit_vectors(u, &self.drive[k]);
         }
         mechanism.partition.translations(u, &mut self.kernel.z);
@@ -126,7 +132,11 @@ impl<T: Scalar> Scratch<T> {
             torsion.pull(torsion.elastic(y), &mut kernel.load);
         }
         for force in &mechanism.forces {
-            force.pull_by_potential(self.time, Posture { phi: y, z: &kernel.z, omega: &self.omega }, &mut kernel.load);
+            force.pull_by_potential(
+                self.time,
+                Posture { phi: y, z: &kernel.z, omega: &self.omega },
+                &mut kernel.load,
+            );
         }
         if !WORK {
             rate[..n].copy_from_slice(&self.omega[..n]);
@@ -149,7 +159,11 @@ impl<T: Scalar> Scratch<T> {
                 action.pull(factor, &kernel.z, &mut kernel.load);
             }
             for force in &mechanism.forces {
-                force.pull_applied(self.time, Posture { phi: y, z: &kernel.z, omega: &self.omega }, &mut kernel.load);
+                force.pull_applied(
+                    self.time,
+                    Posture { phi: y, z: &kernel.z, omega: &self.omega },
+                    &mut kernel.load,
+                );
             }
             mechanism.partition.gather(&kernel.load, &mut self.pivot);
             for (p, &force) in p_part.iter_mut().zip(&self.pivot) {
@@ -175,7 +189,8 @@ impl<T: Real> Scratch<T> {
 }
 
 impl<const N: usize, const WORK: bool> Canonical<N, WORK> {
-    /// The form of a mechanism; `N` must be its number of bodies or 0, `WORK` true where it has rows or dampers.
+    /// The form of a mechanism; `N` must be its number of bodies or 0, `WORK` true where it has rows or
+    /// dampers.
     pub fn new(mechanism: Arc<Mechanism>) -> Self {
         Self::with_lanes(mechanism, false)
     }
@@ -227,7 +242,13 @@ impl<const N: usize, const WORK: bool> OdeSystem for Canonical<N, WORK> {
     fn stiffness(&mut self, t: Time, y: &[f64]) -> Option<Stiffness> {
         // Leaves the rates of all bodies behind.
         self.rhs(t, y, &mut vec![0.0; y.len()]);
-        let phi: Vec<f64> = self.mechanism.partition.bodies.iter().map(|dependent_angle| dependent_angle.place(t, y).angle).collect();
+        let phi: Vec<f64> = self
+            .mechanism
+            .partition
+            .bodies
+            .iter()
+            .map(|dependent_angle| dependent_angle.place(t, y).angle)
+            .collect();
         Some(Stiffness::at(&self.mechanism, t, &phi, &self.work.omega))
     }
 
@@ -236,14 +257,23 @@ impl<const N: usize, const WORK: bool> OdeSystem for Canonical<N, WORK> {
         let f = partition.count();
         match i {
             i if i < f => self.mechanism.coordinate_name(partition.independent[i]),
-            i if i < 2 * f => format!("momentum along {}", self.mechanism.coordinate_name(partition.independent[i - f])),
+            i if i < 2 * f => {
+                format!("momentum along {}", self.mechanism.coordinate_name(partition.independent[i - f]))
+            }
             _ => "momentum conjugate to time".into(),
         }
     }
 }
 
 /// dy'/dy row by row (d × d); not generic, so that it is compiled once.
-fn slopes(scratch: &mut Scratch<Slopes>, work_integral: bool, mechanism: &Mechanism, t: Time, y: &[f64], y_by_y: &mut [f64]) {
+fn slopes(
+    scratch: &mut Scratch<Slopes>,
+    work_integral: bool,
+    mechanism: &Mechanism,
+    t: Time,
+    y: &[f64],
+    y_by_y: &mut [f64],
+) {
     let d = y.len();
     let (mut point, mut rate) = (vec![Slopes::ZERO; d], vec![Slopes::ZERO; d]);
     if work_integral {
@@ -278,7 +308,8 @@ impl<const N: usize, const WORK: bool> Form for Canonical<N, WORK> {
         let kernel = &mut scratch.kernel;
         self.mechanism.tree.mass_matrix::<DoubleDouble, 0>(&kernel.z, &mut kernel.mass, &mut kernel.twist);
         tree::multiply::<DoubleDouble, 0>(n, &kernel.mass, &motion.omega, &mut scratch.momentum);
-        let mut unknowns: Vec<DoubleDouble> = partition.independent.iter().map(|&body| motion.phi[body]).collect();
+        let mut unknowns: Vec<DoubleDouble> =
+            partition.independent.iter().map(|&body| motion.phi[body]).collect();
         let mut p = vec![DoubleDouble::ZERO; partition.count()];
         partition.gather(&scratch.momentum, &mut p);
         unknowns.extend(p);

@@ -1,4 +1,5 @@
-//! Scene to mechanism: the hinge trees, their constant matrices, the rows, and what the scene does not need left out.
+//! Scene to mechanism: the hinge trees, their constant matrices, the rows, and what the scene does not need
+//! left out.
 
 mod parts;
 
@@ -48,13 +49,15 @@ pub struct Mechanism {
     pub actions: Vec<Action>,
     /// Forces from outside the crate.
     pub forces: Vec<UserForce>,
-    /// Constraint equations: given angles, then points that coincide or stay on lines, then one per contact that is held.
+    /// Constraint equations: given angles, then points that coincide or stay on lines, then one per contact
+    /// that is held.
     pub constraints: Vec<ConstraintEquation>,
     /// How many motors give angles; their rows come first.
     pub motors: usize,
     /// Walls.
     pub contacts: Vec<Contact>,
-    /// The contacts held, by number, in the order of their rows; none as compiled: see [`Mechanism::holding`].
+    /// The contacts held, by number, in the order of their rows; none as compiled: see
+    /// [`Mechanism::holding`].
     pub held: Vec<usize>,
     /// The driven angles solved for: coordinates left when the rows are eliminated.
     pub partition: CoordinatePartition,
@@ -109,10 +112,14 @@ pub enum CompileError {
     #[error("`{0}` gives an angle that the other motors and locks give already")]
     Redundant(String),
     /// Too many rows that act on one another.
-    #[error("{0} constraint rows that act on one another through the bodies they hang on; at most about {DENSE_LIMIT} are taken")]
+    #[error(
+        "{0} constraint rows that act on one another through the bodies they hang on; at most about {DENSE_LIMIT} are taken"
+    )]
     TooMany(usize),
     /// The mass matrix is singular: some body has no inertia about its hinge.
-    #[error("the mass matrix is singular at the start: bar `{0}` and what hangs on it have no inertia about its hinge")]
+    #[error(
+        "the mass matrix is singular at the start: bar `{0}` and what hangs on it have no inertia about its hinge"
+    )]
     Massless(String),
     /// No start closes the rows, or none near what is given.
     #[error(
@@ -142,7 +149,9 @@ pub enum CompileError {
     #[error("the start leaves `{0}` open: no constraint gives it\nhint: add it to the scene")]
     Undetermined(String),
     /// More than one start fits what is given.
-    #[error("the start is ambiguous: `{what}` may be {one:.6} or {other:.6} {unit}\nhint: add it to the scene; roughly is enough")]
+    #[error(
+        "the start is ambiguous: `{what}` may be {one:.6} or {other:.6} {unit}\nhint: add it to the scene; roughly is enough"
+    )]
     Ambiguous {
         /// Where the scene could say which.
         what: String,
@@ -181,7 +190,9 @@ pub enum CompileError {
     #[error("no bar is called `{0}`")]
     NoSuchBar(String),
     /// A point starts behind its wall.
-    #[error("wall `{wall}` has its point {gap:.3e} m behind it at the start\nhint: start elsewhere, move the wall, or turn its normal")]
+    #[error(
+        "wall `{wall}` has its point {gap:.3e} m behind it at the start\nhint: start elsewhere, move the wall, or turn its normal"
+    )]
     BehindWall {
         /// The wall.
         wall: String,
@@ -194,7 +205,8 @@ impl Mechanism {
     /// Compiles a scene.
     ///
     /// # Errors
-    /// What the reader of scenes refuses too (doubled motors), a singular mass matrix, or too many rows that act on one another.
+    /// What the reader of scenes refuses too (doubled motors), a singular mass matrix, or too many rows that
+    /// act on one another.
     pub fn new(scene: &Scene) -> Result<Self, CompileError> {
         Self::with_forces(scene, Vec::new())
     }
@@ -259,11 +271,19 @@ impl Mechanism {
                 let offset = normal.dot(Complex::new(wall.through[0], wall.through[1]));
                 let site = forest.site(&Place { bar: Some(wall.bar), point: wall.point });
                 let row = constraint::line_equation(&wall.name, &site, normal, offset, None, bodies.len());
-                Contact { row, point: site.point, normal, restitution: wall.restitution, length: 1.0, force: 1.0 }
+                Contact {
+                    row,
+                    point: site.point,
+                    normal,
+                    restitution: wall.restitution,
+                    length: 1.0,
+                    force: 1.0,
+                }
             })
             .collect();
         let roots = forest.roots();
-        let ground_energy = bodies.iter().zip(&roots).fold(0.0, |sum, (body, &root)| sum - body.mass * gravity.dot(root));
+        let ground_energy =
+            bodies.iter().zip(&roots).fold(0.0, |sum, (body, &root)| sum - body.mass * gravity.dot(root));
         let mut mechanism = Self {
             ground_energy,
             tree: constants(&bodies, &forest, gravity),
@@ -290,7 +310,11 @@ impl Mechanism {
         .assembled(scene, &kept_angles(scene))?;
         mechanism.vibrates(scene)?;
         mechanism.choose_form();
-        if let Some(recursion) = mechanism.recursion.as_ref().filter(|recursion| recursion.ways.entries() > DENSE_LIMIT * DENSE_LIMIT) {
+        if let Some(recursion) = mechanism
+            .recursion
+            .as_ref()
+            .filter(|recursion| recursion.ways.entries() > DENSE_LIMIT * DENSE_LIMIT)
+        {
             return Err(CompileError::TooMany(recursion.ways.rows()));
         }
         mechanism.check_mass(scene)?;
@@ -301,7 +325,8 @@ impl Mechanism {
         Ok(mechanism)
     }
 
-    /// Finds the vibration of a rigid spring that the start gives energy to, and takes it out of the start: what is left moves along the rod.
+    /// Finds the vibration of a rigid spring that the start gives energy to, and takes it out of the start:
+    /// what is left moves along the rod.
     fn vibrates(&mut self, scene: &Scene) -> Result<(), CompileError> {
         let rigid = || scene.springs.iter().filter(|spring| spring.rigid);
         if rigid().next().is_none() || !self.tree.is_dense() {
@@ -315,15 +340,27 @@ impl Mechanism {
         let scale = self.scale_of_energy(&self.start(scene));
         let started: Vec<Vibration> = rigid()
             .map(|spring| {
-                let span = self.forest.point(&spring.between[0]).minus(&self.forest.point(&spring.between[1]));
-                Vibration { name: spring.name.clone(), span, stiffness: spring.stiffness, action: 0.0, energy: 0.0, frequency: 0.0 }
-                    .started(self, spring.free_length, &z, &omega)
+                let span =
+                    self.forest.point(&spring.between[0]).minus(&self.forest.point(&spring.between[1]));
+                Vibration {
+                    name: spring.name.clone(),
+                    span,
+                    stiffness: spring.stiffness,
+                    action: 0.0,
+                    energy: 0.0,
+                    frequency: 0.0,
+                }
+                .started(self, spring.free_length, &z, &omega)
             })
             .collect();
         self.rigid_rate = started.iter().map(|vibration| vibration.frequency).reduce(f64::min);
         // What rounding puts into a spring is nothing; not a number counts as energy.
-        let most = started.into_iter().reduce(|most, other| if other.energy > most.energy { other } else { most });
-        let Some(vibration) = most.filter(|most| most.energy.is_nan() || most.energy > NO_ENERGY * scale) else { return Ok(()) };
+        let most =
+            started.into_iter().reduce(|most, other| if other.energy > most.energy { other } else { most });
+        let Some(vibration) = most.filter(|most| most.energy.is_nan() || most.energy > NO_ENERGY * scale)
+        else {
+            return Ok(());
+        };
         if self.constraints.len() > 1 || !self.contacts.is_empty() || self.is_damped() {
             return Err(CompileError::NotAlone { spring: vibration.name, energy: vibration.energy });
         }
@@ -332,7 +369,8 @@ impl Mechanism {
         Ok(())
     }
 
-    /// Decides in which form the equations are evaluated, body by body or by the matrices of the tree, by what they cost with these rows.
+    /// Decides in which form the equations are evaluated, body by body or by the matrices of the tree, by
+    /// what they cost with these rows.
     pub(super) fn choose_form(&mut self) {
         let is_dense = self.tree.is_dense();
         let recursion = (!is_dense || self.coordinates() > UNROLLED)
@@ -357,9 +395,14 @@ impl Mechanism {
         self.tree.coordinates
     }
 
-    /// The number of bodies where angles are all there is and matrices are used, as code made for a size asks for; else 0, any number.
+    /// The number of bodies where angles are all there is and matrices are used, as code made for a size asks
+    /// for; else 0, any number.
     pub fn size(&self) -> usize {
-        if self.coordinates() == self.bodies.len() && self.recursion.is_none() { self.bodies.len() } else { 0 }
+        if self.coordinates() == self.bodies.len() && self.recursion.is_none() {
+            self.bodies.len()
+        } else {
+            0
+        }
     }
 
     /// Centre of mass of a body as a point.
@@ -378,7 +421,8 @@ impl Mechanism {
         match k.checked_sub(self.bodies.len()) {
             None => format!("phi of {}", name(k)),
             Some(rest) => {
-                let origin_point = |hang: &super::forest::Hang| hang.origin_point == BodyOrigin::Free(k - rest % 2);
+                let origin_point =
+                    |hang: &super::forest::Hang| hang.origin_point == BodyOrigin::Free(k - rest % 2);
                 let body = self.forest.hangs.iter().position(origin_point).unwrap_or(0);
                 format!("{} of {}", if rest % 2 == 0 { "x" } else { "y" }, name(body))
             }
@@ -421,7 +465,10 @@ impl Mechanism {
     pub fn pinned(&self, name: &str, a: &Site, b: &Site) -> Self {
         let mut mechanism = self.clone();
         let before_contacts = mechanism.standing_rows();
-        mechanism.constraints.splice(before_contacts..before_contacts, constraint::pin_equations(name, a, b, self.bodies.len()));
+        mechanism.constraints.splice(
+            before_contacts..before_contacts,
+            constraint::pin_equations(name, a, b, self.bodies.len()),
+        );
         mechanism.choose_form();
         mechanism
     }
@@ -435,7 +482,10 @@ impl Mechanism {
 
     /// True where anything but gravity and rows acts.
     pub fn is_forced(&self) -> bool {
-        !(self.springs.is_empty() && self.torsions.is_empty() && self.actions.is_empty() && self.forces.is_empty())
+        !(self.springs.is_empty()
+            && self.torsions.is_empty()
+            && self.actions.is_empty()
+            && self.forces.is_empty())
     }
 
     /// True where forces do work that no energy stands for: dampers, applied forces and torques.
@@ -458,14 +508,17 @@ impl Mechanism {
         !self.torsions.is_empty() || self.forces.iter().any(UserForce::counts_turns)
     }
 
-    /// True where row number `row` is that of a motor, on an angle or on a slider; not where it locks an angle.
+    /// True where row number `row` is that of a motor, on an angle or on a slider; not where it locks an
+    /// angle.
     pub fn is_motor(&self, row: usize) -> bool {
         row < self.motors || self.constraints[row].law.is_some() && !self.constraints[row].is_angle()
     }
 
-    /// The unit of what rows measure: `rad`, `m`, or `rad or m` where some measure angles and some lengths; none without rows.
+    /// The unit of what rows measure: `rad`, `m`, or `rad or m` where some measure angles and some lengths;
+    /// none without rows.
     pub fn unit_of_rows(&self) -> Option<&'static str> {
-        let [angles, lengths] = [true, false].map(|kind| self.constraints.iter().any(|row| row.is_angle() == kind));
+        let [angles, lengths] =
+            [true, false].map(|kind| self.constraints.iter().any(|row| row.is_angle() == kind));
         match (angles, lengths) {
             (true, true) => Some("rad or m"),
             (true, false) => Some("rad"),
@@ -479,7 +532,8 @@ impl Mechanism {
         self.constraints.iter().any(|row| !row.is_angle())
     }
 
-    /// True where rows cannot all be eliminated: those of loops and sliders, and given angles whose whole turns matter.
+    /// True where rows cannot all be eliminated: those of loops and sliders, and given angles whose whole
+    /// turns matter.
     pub fn has_multipliers(&self) -> bool {
         self.has_closed_loops() || (self.is_winding() && self.partition.driven())
     }

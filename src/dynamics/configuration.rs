@@ -4,10 +4,11 @@ use super::constraint::Site;
 use super::{CompileError, Mechanism};
 use crate::arithmetic::{Complex, Scalar};
 
-/// Time, angles, rates and points of a mechanism at one moment, over any scalar: plain numbers where an event function is evaluated, symbols where a
-/// [`Force`](super::force::Force) is recorded.
+/// Time, angles, rates and points of a mechanism at one moment, over any scalar: plain numbers where an event
+/// function is evaluated, symbols where a [`Force`](super::force::Force) is recorded.
 ///
-/// Bodies are named by their number in the order of the scene's bars ([`Mechanism::body`]), points by a [`Site`] ([`Mechanism::site`]).
+/// Bodies are named by their number in the order of the scene's bars ([`Mechanism::body`]), points by a
+/// [`Site`] ([`Mechanism::site`]).
 #[derive(Clone, Copy)]
 pub struct Configuration<'a, S>(&'a dyn Source<S>);
 
@@ -40,7 +41,8 @@ impl<'a, S: Scalar> Configuration<'a, S> {
 
     /// Absolute angle of a body from +x, counter-clockwise, with its whole turns \[rad\].
     ///
-    /// A force that uses it makes the mechanism integrate winding angles; [`direction`](Self::direction) does not.
+    /// A force that uses it makes the mechanism integrate winding angles; [`direction`](Self::direction) does
+    /// not.
     pub fn angle(&self, body: usize) -> S {
         self.0.angle(body)
     }
@@ -114,7 +116,10 @@ impl Mechanism {
     /// # Errors
     /// No bar has this name.
     pub fn body(&self, name: &str) -> Result<usize, CompileError> {
-        self.bodies.iter().position(|body| body.name == name).ok_or_else(|| CompileError::NoSuchBar(name.into()))
+        self.bodies
+            .iter()
+            .position(|body| body.name == name)
+            .ok_or_else(|| CompileError::NoSuchBar(name.into()))
     }
 
     /// The point `[x, y]` \[m\] of the bar of this name, in the bar's frame: from its origin, x along it.

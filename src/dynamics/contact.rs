@@ -5,9 +5,10 @@
 //! a_c >= 0,    f_c = -lambda_c >= 0,    a_c f_c = 0          a = a0 - S lambda,  S = G M⁻¹ Gᵀ,  the mechanism's rows always in force
 //! ```
 //!
-//! A wall has no friction, so that a contact that lasts is a row like any other as long as it presses, and does no work.
-//! Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996), chapter 5; the set is found by adding the point that is
-//! pressed hardest and dropping those that would be pulled (C. Lawson, R. Hanson, *Solving Least Squares Problems* (1974), chapter 23).
+//! A wall has no friction, so that a contact that lasts is a row like any other as long as it presses, and
+//! does no work. Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996),
+//! chapter 5; the set is found by adding the point that is pressed hardest and dropping those that would be
+//! pulled (C. Lawson, R. Hanson, *Solving Least Squares Problems* (1974), chapter 23).
 
 pub mod metric;
 pub mod scale;
@@ -20,10 +21,11 @@ use super::{Mechanism, Time};
 use crate::arithmetic::Complex;
 use nalgebra::DVector;
 
-/// Height of a rebound over the length of the contact below which a pressed point stays: ten times the least gap the search for impacts tells from
-/// touching.
+/// Height of a rebound over the length of the contact below which a pressed point stays: ten times the least
+/// gap the search for impacts tells from touching.
 pub const REST_HEIGHT: f64 = 1e-11;
-/// Contact force over the force of the contact below which a point is not pressed; rounding makes forces of this size.
+/// Contact force over the force of the contact below which a point is not pressed; rounding makes forces of
+/// this size.
 const LEAST_PRESSURE: f64 = 4e-12;
 /// |G| over the levers of the point below which it stands at a dead centre: there its wall has no hold on it, and a row would be singular.
 const DEAD_CENTRE: f64 = 1e-5;
@@ -53,15 +55,23 @@ impl Mechanism {
         self.constraints.len() - self.held.len()
     }
 
-    /// Which of the contacts `touching` stay, or `None` where the constraints leave no freedom to keep a point out of its wall.
+    /// Which of the contacts `touching` stay, or `None` where the constraints leave no freedom to keep a
+    /// point out of its wall.
     ///
-    /// Coordinates \[rad, m\] and rates \[rad/s, m/s\].  A point stays where it would rebound to less than [`REST_HEIGHT`] and be pressed.
+    /// Coordinates \[rad, m\] and rates \[rad/s, m/s\].  A point stays where it would rebound to less than
+    /// [`REST_HEIGHT`] and be pressed.
     pub fn staying(&self, touching: &[usize], t: Time, phi: &[f64], omega: &[f64]) -> Option<Vec<usize>> {
         let (metric, z) = (Metric::at(self, t, phi, omega)?, self.elements(phi));
         let at = Posture { phi, z: &z, omega };
         let acceleration = metric.acceleration();
         let met = |&contact: &usize| {
-            Met::new(&self.contacts[contact], &metric, &acceleration, Gradient::of(&self.contacts[contact].row, t, at), omega)
+            Met::new(
+                &self.contacts[contact],
+                &metric,
+                &acceleration,
+                Gradient::of(&self.contacts[contact].row, t, at),
+                omega,
+            )
         };
         let points: Vec<Met> = touching.iter().map(met).collect();
         let mut set: Vec<usize> = Vec::new();
@@ -81,7 +91,10 @@ impl Mechanism {
             let mut hardest: Option<(usize, f64)> = None;
             for (c, point) in points.iter().enumerate().filter(|(c, _)| !set.contains(c)) {
                 let inward = -(point.acceleration + point.free.dot(&change));
-                if point.is_dead || inward <= 0.0 || point.speed * point.speed > 2.0 * REST_HEIGHT * point.contact.length * inward {
+                if point.is_dead
+                    || inward <= 0.0
+                    || point.speed * point.speed > 2.0 * REST_HEIGHT * point.contact.length * inward
+                {
                     continue;
                 }
                 // What the rows in force leave of the point's freedom to give way.
@@ -114,7 +127,8 @@ struct Met<'a> {
     /// What the constraints leave of its freedom, and the size of all of it.
     free: DVector<f64>,
     norm: f64,
-    /// Normal velocity \[m/s\], normal acceleration under the constraints alone and the sum of the magnitudes of its parts \[m/s²\].
+    /// Normal velocity \[m/s\], normal acceleration under the constraints alone and the sum of the magnitudes
+    /// of its parts \[m/s²\].
     speed: f64,
     acceleration: f64,
     size: f64,
@@ -123,7 +137,13 @@ struct Met<'a> {
 }
 
 impl<'a> Met<'a> {
-    fn new(contact: &'a Contact, metric: &Metric, acceleration: &DVector<f64>, gradient: Gradient, omega: &[f64]) -> Self {
+    fn new(
+        contact: &'a Contact,
+        metric: &Metric,
+        acceleration: &DVector<f64>,
+        gradient: Gradient,
+        omega: &[f64],
+    ) -> Self {
         let Gradient { row, along } = gradient;
         let column = metric.column(&along);
         let levers: f64 = contact.point.terms.iter().map(|term| term.1.norm_squared()).sum();
@@ -133,7 +153,8 @@ impl<'a> Met<'a> {
             speed: dot(&along, omega),
             acceleration: parts.sum() + row.convective,
             size: parts.iter().map(|part| part.abs()).sum::<f64>() + row.convective.abs(),
-            is_dead: contact.point.shifts.is_empty() && dot(&along, &along) < DEAD_CENTRE * DEAD_CENTRE * levers,
+            is_dead: contact.point.shifts.is_empty()
+                && dot(&along, &along) < DEAD_CENTRE * DEAD_CENTRE * levers,
             free: metric.free(&column),
             norm: column.norm(),
         }

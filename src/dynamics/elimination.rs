@@ -4,7 +4,8 @@
 //! Sᵀ M S u'' = Sᵀ (b - M s''),      (Gᵀ lambda)_i = b_i - Σ M_ij a_j,      power of all motors = -(b - M a)·s'
 //! ```
 //!
-//! Unknowns: u (f), u' (f), work of motors, dampers and applied forces \[J\].  The rows hold exactly, whatever the method.
+//! Unknowns: u (f), u' (f), work of motors, dampers and applied forces \[J\].  The rows hold exactly,
+//! whatever the method.
 
 use super::constraint::Posture;
 use super::gap::turning;
@@ -69,10 +70,12 @@ impl<const N: usize> Elimination<N> {
         let (u, u_rate, rate) = (&y[..f], &y[f..2 * f], &mut rate[..2 * f + 1]);
         let partition = &mechanism.partition.bodies[..n];
         let kernel = &mut self.kernel;
-        let (drive_rate, drive_acceleration, omega) = (&mut self.drive_rate[..n], &mut self.drive_acceleration[..n], &mut self.omega[..n]);
+        let (drive_rate, drive_acceleration, omega) =
+            (&mut self.drive_rate[..n], &mut self.drive_acceleration[..n], &mut self.omega[..n]);
         for k in 0..angles {
             let placed = partition[k].place(t, u);
-            (kernel.z[k], drive_rate[k], drive_acceleration[k]) = (placed.unit, placed.rate, placed.acceleration);
+            (kernel.z[k], drive_rate[k], drive_acceleration[k]) =
+                (placed.unit, placed.rate, placed.acceleration);
             omega[k] = drive_rate[k] + partition[k].base.map_or(0.0, |base| u_rate[base]);
             self.phi[k] = placed.angle;
         }
@@ -212,9 +215,14 @@ impl<const N: usize> OdeSystem for Elimination<N> {
             let dependent_angle = &partition.bodies[k];
             if k < partition.angles {
                 let placed = dependent_angle.place(time, &y[..partition.count()]);
-                return turning(placed.unit, step_size * placed.rate + dependent_angle.base.map_or(0.0, |base| slope[base]));
+                return turning(
+                    placed.unit,
+                    step_size * placed.rate + dependent_angle.base.map_or(0.0, |base| slope[base]),
+                );
             }
-            dependent_angle.base.map_or([Complex::ZERO; 2], |x| [Complex::new(y[x], y[x + 1]), Complex::new(slope[x], slope[x + 1])])
+            dependent_angle.base.map_or([Complex::ZERO; 2], |x| {
+                [Complex::new(y[x], y[x + 1]), Complex::new(slope[x], slope[x + 1])]
+            })
         })
     }
 
@@ -243,7 +251,8 @@ impl<const N: usize> Form for Elimination<N> {
 
     fn state(&self, motion: &Motion) -> State {
         let partition = &self.mechanism.partition;
-        let mut unknowns: Vec<DoubleDouble> = partition.independent.iter().map(|&body| motion.phi[body]).collect();
+        let mut unknowns: Vec<DoubleDouble> =
+            partition.independent.iter().map(|&body| motion.phi[body]).collect();
         unknowns.extend(partition.coordinate_rates(motion));
         unknowns.push(motion.work);
         let mut state = partition.state(motion, &unknowns);

@@ -1,7 +1,7 @@
 //! Kinetic and potential energy, their sum, and the scale drift is measured against.
 //!
-//! Written over the scalar trait and used in double-double by the monitors: at 1e-15 of the scale an energy evaluated in plain doubles shows
-//! its own rounding.
+//! Written over the scalar trait and used in double-double by the monitors: at 1e-15 of the scale an energy
+//! evaluated in plain doubles shows its own rounding.
 
 use super::constraint::Posture;
 use super::force::action::Kind;
@@ -52,9 +52,13 @@ pub(super) fn moment<T: Real>(t: Time) -> T {
 impl Mechanism {
     /// Magnitudes of the forces from outside at a motion, times `size` \[m\], and of their torques \[J\].
     pub(super) fn forces_at_start(&self, start: &Motion, size: f64) -> f64 {
-        let [phi, omega] = [&start.phi, &start.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<f64>>());
+        let [phi, omega] = [&start.phi, &start.omega]
+            .map(|values| values.iter().map(|value| value.hi).collect::<Vec<f64>>());
         let z = self.elements(&phi);
-        let magnitudes = self.forces.iter().map(|force| force.magnitudes(start.time.hi, Posture { phi: &phi, z: &z, omega: &omega }));
+        let magnitudes = self
+            .forces
+            .iter()
+            .map(|force| force.magnitudes(start.time.hi, Posture { phi: &phi, z: &z, omega: &omega }));
         magnitudes.map(|[force, torque]| force * size + torque).sum()
     }
 
@@ -77,7 +81,8 @@ impl Mechanism {
         motion
     }
 
-    /// Positions and velocities of translational coordinates, from those given for the origin of some bar of each group.
+    /// Positions and velocities of translational coordinates, from those given for the origin of some bar of
+    /// each group.
     pub(super) fn put_translations(&self, scene: &Scene, motion: &mut Motion) {
         let bars = self.bodies.len();
         if bars == self.coordinates() {
@@ -87,7 +92,8 @@ impl Mechanism {
         let mut kernel = Kernel::<DoubleDouble>::without_rows(self);
         kernel.unit_vectors::<0>(self, &motion.phi);
         for x in (bars..self.coordinates()).step_by(2) {
-            let is_carried = |&k: &usize| self.end(k, 0).point.shifts.first().is_some_and(|shift| shift.0 == x);
+            let is_carried =
+                |&k: &usize| self.end(k, 0).point.shifts.first().is_some_and(|shift| shift.0 == x);
             let group: Vec<usize> = (0..bars).filter(is_carried).collect();
             let given = |k: &usize| scene.given.get(*k);
             let origin = group.iter().find_map(|k| Some((*k, given(k)?.origin?)));
@@ -95,20 +101,24 @@ impl Mechanism {
                 // Counted from the origin, wherever that was.
                 kernel.z[x] = Complex::ZERO;
                 let reach = self.end(k, 0).point.position(&kernel.z);
-                (motion.phi[x], motion.phi[x + 1]) = (DoubleDouble::of(at_x) - reach.re, DoubleDouble::of(at_y) - reach.im);
+                (motion.phi[x], motion.phi[x + 1]) =
+                    (DoubleDouble::of(at_x) - reach.re, DoubleDouble::of(at_y) - reach.im);
             }
             let velocity = group.iter().find_map(|k| Some((*k, given(k)?.velocity?)));
             if let Some((k, [v_x, v_y])) = velocity {
                 (motion.omega[x], motion.omega[x + 1]) = (DoubleDouble::ZERO, DoubleDouble::ZERO);
                 let swing = self.end(k, 0).point.velocity(&kernel.z, &motion.omega);
-                (motion.omega[x], motion.omega[x + 1]) = (DoubleDouble::of(v_x) - swing.re, DoubleDouble::of(v_y) - swing.im);
+                (motion.omega[x], motion.omega[x + 1]) =
+                    (DoubleDouble::of(v_x) - swing.re, DoubleDouble::of(v_y) - swing.im);
             }
         }
     }
 
-    /// Energies of a motion in double-double, by the processor's fused multiply-add where it has one; overwrites `kernel`.
+    /// Energies of a motion in double-double, by the processor's fused multiply-add where it has one;
+    /// overwrites `kernel`.
     ///
-    /// The bits are those of [`Mechanism::energy`]: a fused multiply-add is rounded once, whoever computes it.
+    /// The bits are those of [`Mechanism::energy`]: a fused multiply-add is rounded once, whoever computes
+    /// it.
     pub fn exact_energy(&self, kernel: &mut Kernel<DoubleDouble>, motion: &Motion) -> Energy<DoubleDouble> {
         lanes::run(ExactEnergy { mechanism: self, kernel, motion }, false)
     }
@@ -120,9 +130,15 @@ impl Mechanism {
         self.energy_facing::<T, 0>(kernel, phi, omega)
     }
 
-    /// Energies at the elements in `kernel` and the coordinates they stand for; it holds M and its twist afterwards; for `N` bodies (any number where `N` is 0).
+    /// Energies at the elements in `kernel` and the coordinates they stand for; it holds M and its twist
+    /// afterwards; for `N` bodies (any number where `N` is 0).
     #[inline(always)]
-    pub fn energy_facing<T: Real, const N: usize>(&self, kernel: &mut Kernel<T>, phi: &[T], omega: &[T]) -> Energy<T> {
+    pub fn energy_facing<T: Real, const N: usize>(
+        &self,
+        kernel: &mut Kernel<T>,
+        phi: &[T],
+        omega: &[T],
+    ) -> Energy<T> {
         if N == 0 && !kernel.translations[0].is_empty() {
             return self.energy_bodywise(kernel, phi, omega);
         }
@@ -135,7 +151,11 @@ impl Mechanism {
         let elastic = vibration.map_or(springs, |potential| springs + potential);
         Energy {
             kinetic: dot(omega, &kernel.load).scale(0.5),
-            potential: self.other_energy(&kernel.z, phi, self.torsions.iter().fold(elastic, |sum, torsion| sum + torsion.energy(phi))),
+            potential: self.other_energy(
+                &kernel.z,
+                phi,
+                self.torsions.iter().fold(elastic, |sum, torsion| sum + torsion.energy(phi)),
+            ),
         }
     }
 
@@ -150,7 +170,8 @@ impl Mechanism {
         for (k, body) in self.bodies.iter().enumerate() {
             let arm = z[k].turn(body.centre);
             let velocity = velocities[k] + arm.left().times(omega[k]);
-            kinetic += velocity.norm_squared().scale(0.5 * body.mass) + (omega[k] * omega[k]).scale(0.5 * body.inertia);
+            kinetic += velocity.norm_squared().scale(0.5 * body.mass)
+                + (omega[k] * omega[k]).scale(0.5 * body.inertia);
             potential -= gravity.dot(translations[k] + arm).scale(body.mass);
         }
         Energy { kinetic, potential: potential + self.elastic_energy(z, phi) }
@@ -160,7 +181,11 @@ impl Mechanism {
     #[inline(always)]
     fn elastic_energy<T: Real>(&self, z: &[Complex<T>], phi: &[T]) -> T {
         let springs = self.springs.iter().fold(T::ZERO, |sum, spring| sum + spring.energy(z));
-        self.other_energy(z, phi, self.torsions.iter().fold(springs, |sum, torsion| sum + torsion.energy(phi)))
+        self.other_energy(
+            z,
+            phi,
+            self.torsions.iter().fold(springs, |sum, torsion| sum + torsion.energy(phi)),
+        )
     }
 
     /// Adds the potentials of forces from outside \[J\] to a sum.
@@ -213,21 +238,24 @@ impl Mechanism {
         power
     }
 
-    /// Work of gravity from hanging to horizontal, Σ |weight_k|, plus kinetic and spring energy at the start \[J\].  Where all of these are zero, that of gravity on
-    /// free bodies and of applied forces along the size of the mechanism, and of torques over 1 rad; 1 J where these are zero, too.
+    /// Work of gravity from hanging to horizontal, Σ |weight_k|, plus kinetic and spring energy at the start
+    /// \[J\].  Where all of these are zero, that of gravity on free bodies and of applied forces along the
+    /// size of the mechanism, and of torques over 1 rad; 1 J where these are zero, too.
     pub fn scale_of_energy(&self, start: &Motion) -> f64 {
         let mut kernel = Kernel::<DoubleDouble>::without_rows(self);
         let kinetic = self.energy(&mut kernel, &start.phi, &start.omega).kinetic.hi;
         let springs: f64 = self.springs.iter().map(|spring| spring.energy(&kernel.z).hi).sum();
         let torsions: f64 = self.torsions.iter().map(|torsion| torsion.energy(&start.phi).hi).sum();
-        let gravity: f64 = self.tree.weight[..self.bodies.len()].iter().map(|weight| weight.norm_squared().sqrt()).sum();
+        let gravity: f64 =
+            self.tree.weight[..self.bodies.len()].iter().map(|weight| weight.norm_squared().sqrt()).sum();
         let vibration = self.vibration.as_ref().map_or(0.0, |vibration| vibration.energy);
         let scale = gravity + kinetic + springs + torsions + vibration;
         if scale > 0.0 {
             return scale;
         }
         let size = self.size_of_parts();
-        let falling: f64 = self.bodies.iter().map(|body| body.mass * self.gravity.norm_squared().sqrt() * size).sum();
+        let falling: f64 =
+            self.bodies.iter().map(|body| body.mass * self.gravity.norm_squared().sqrt() * size).sum();
         let applied = self.actions.iter().map(|action| match &action.kind {
             Kind::Force { force, .. } => force.norm_squared().sqrt() * size,
             Kind::Torque { torque, .. } => torque.abs(),

@@ -4,8 +4,9 @@
 //! row i holds columns first_i … i:   g_ij = a_ij - Σ_k g_ik l_jk,   l_ij = g_ij / d_j,   d_i = a_ii - Σ_j g_ij l_ij
 //! ```
 //!
-//! Source: A. Jennings, *A compact storage scheme for the solution of symmetric linear simultaneous equations*, Comput. J. 9 (1966); the order of
-//! the rows: E. Cuthill, J. McKee, *Reducing the bandwidth of sparse symmetric matrices*, Proc. 24th ACM Conf. (1969), reversed after A. George.
+//! Source: A. Jennings, *A compact storage scheme for the solution of symmetric linear simultaneous
+//! equations*, Comput. J. 9 (1966); the order of the rows: E. Cuthill, J. McKee, *Reducing the bandwidth of
+//! sparse symmetric matrices*, Proc. 24th ACM Conf. (1969), reversed after A. George.
 
 use super::schur::Weakest;
 use crate::arithmetic::{Real, Scalar};
@@ -54,8 +55,9 @@ impl Envelope {
         matrix[at + j - first] += value;
     }
 
-    /// Replaces a matrix by its factors, and writes the reciprocal pivots: zero for rows left out, whose pivot is less than a share
-    /// [`DROPPED`](super::schur::DROPPED) of their scale.  Tells the row whose pivot is the smallest share.
+    /// Replaces a matrix by its factors, and writes the reciprocal pivots: zero for rows left out, whose
+    /// pivot is less than a share [`DROPPED`](super::schur::DROPPED) of their scale.  Tells the row whose
+    /// pivot is the smallest share.
     #[inline]
     pub fn factor<T: Real>(&self, matrix: &mut [T], pivot: &mut [T], scale: &[f64]) -> Weakest {
         let mut weakest = Weakest::NONE;
@@ -65,7 +67,12 @@ impl Envelope {
 
     /// The same, `reciprocal` telling the reciprocal of a row's pivot, or zero where the row is left out.
     #[inline]
-    pub fn factor_by<T: Real>(&self, matrix: &mut [T], pivot: &mut [T], mut reciprocal: impl FnMut(usize, T) -> T) {
+    pub fn factor_by<T: Real>(
+        &self,
+        matrix: &mut [T],
+        pivot: &mut [T],
+        mut reciprocal: impl FnMut(usize, T) -> T,
+    ) {
         for i in 0..self.rows.len() {
             let (first, here) = self.row(i);
             let (done, row) = matrix.split_at_mut(here.start);
@@ -109,7 +116,8 @@ impl Envelope {
     }
 }
 
-/// An order of rows that keeps the envelope small, where rows are coupled that share one of their groups: for each row its place.
+/// An order of rows that keeps the envelope small, where rows are coupled that share one of their groups: for
+/// each row its place.
 pub fn compact_order(groups: &[Vec<usize>]) -> Vec<usize> {
     let count = groups.iter().flatten().max().map_or(0, |&most| most + 1);
     let mut members = vec![Vec::new(); count];
@@ -118,7 +126,8 @@ pub fn compact_order(groups: &[Vec<usize>]) -> Vec<usize> {
             members[group].push(row);
         }
     }
-    let degree: Vec<usize> = groups.iter().map(|groups| groups.iter().map(|&group| members[group].len()).sum()).collect();
+    let degree: Vec<usize> =
+        groups.iter().map(|groups| groups.iter().map(|&group| members[group].len()).sum()).collect();
     let mut starts: Vec<usize> = (0..groups.len()).collect();
     starts.sort_by_key(|&row| degree[row]);
     let (mut order, mut seen) = (Vec::with_capacity(groups.len()), vec![false; groups.len()]);
@@ -203,7 +212,8 @@ mod tests {
     fn the_order_follows_a_line() {
         let joints = 40;
         let shuffled = |k: usize| (k * 27) % (2 * joints);
-        let groups: Vec<Vec<usize>> = (0..2 * joints).map(|k| vec![shuffled(k) / 2, shuffled(k) / 2 + 1]).collect();
+        let groups: Vec<Vec<usize>> =
+            (0..2 * joints).map(|k| vec![shuffled(k) / 2, shuffled(k) / 2 + 1]).collect();
         let place = compact_order(&groups);
         let mut seen = place.clone();
         seen.sort_unstable();

@@ -1,7 +1,8 @@
 //! The hinges as a forest: which body hangs on which, which hinges close loops, which bodies hang on nothing.
 //!
-//! Breadth first from the ground, then from the first body of every group that is left: the depth is the least there is, and with it the number of
-//! couplings.  Nobody chooses the tree; a hinge between bodies that are connected already becomes a pin.
+//! Breadth first from the ground, then from the first body of every group that is left: the depth is the
+//! least there is, and with it the number of couplings.  Nobody chooses the tree; a hinge between bodies that
+//! are connected already becomes a pin.
 
 use super::constraint::Site;
 use super::point::Point;
@@ -52,8 +53,12 @@ impl Forest {
     /// The forest of a scene's hinges and welds.
     pub fn new(scene: &Scene) -> Self {
         let n = scene.bars.len();
-        let joints: Vec<&[Place; 2]> =
-            scene.hinges.iter().map(|hinge| &hinge.between).chain(scene.welds.iter().map(|weld| &weld.between)).collect();
+        let joints: Vec<&[Place; 2]> = scene
+            .hinges
+            .iter()
+            .map(|hinge| &hinge.between)
+            .chain(scene.welds.iter().map(|weld| &weld.between))
+            .collect();
         let slot = |bar: Option<usize>| bar.map_or(0, |bar| bar + 1);
         let mut at: Vec<Vec<usize>> = vec![Vec::new(); n + 1];
         for (joint, between) in joints.iter().enumerate() {
@@ -126,7 +131,8 @@ impl Forest {
         Site { body: place.bar, point: self.point(place) }
     }
 
-    /// The ground point that each body hangs from, one body on another; the origin where an origin moves freely \[m\].
+    /// The ground point that each body hangs from, one body on another; the origin where an origin moves
+    /// freely \[m\].
     pub fn roots(&self) -> Vec<Complex<f64>> {
         let mut roots = vec![Complex::ZERO; self.hangs.len()];
         for &body in &self.order {
@@ -153,23 +159,37 @@ impl Forest {
 
     /// Writes the velocities of the translational coordinates \[m/s\].
     #[inline(always)]
-    pub fn origin_velocities<T: Scalar>(&self, z: &[Complex<T>], omega: &[T], translations: &mut [Complex<T>]) {
+    pub fn origin_velocities<T: Scalar>(
+        &self,
+        z: &[Complex<T>],
+        omega: &[T],
+        translations: &mut [Complex<T>],
+    ) {
         for &body in &self.order {
             translations[body] = match self.hangs[body].origin_point {
                 BodyOrigin::Ground(_) => Complex::ZERO,
-                BodyOrigin::On(parent, offset) => translations[parent] + z[parent].turn(offset).left().times(omega[parent]),
+                BodyOrigin::On(parent, offset) => {
+                    translations[parent] + z[parent].turn(offset).left().times(omega[parent])
+                }
                 BodyOrigin::Free(x) => Complex::new(omega[x], omega[x + 1]),
             };
         }
     }
 
     /// Writes the accelerations of the translational coordinates \[m/s²\].
-    pub fn origin_accelerations<T: Scalar>(&self, z: &[Complex<T>], omega: &[T], alpha: &[T], translations: &mut [Complex<T>]) {
+    pub fn origin_accelerations<T: Scalar>(
+        &self,
+        z: &[Complex<T>],
+        omega: &[T],
+        alpha: &[T],
+        translations: &mut [Complex<T>],
+    ) {
         for &body in &self.order {
             translations[body] = match self.hangs[body].origin_point {
                 BodyOrigin::Ground(_) => Complex::ZERO,
                 BodyOrigin::On(parent, offset) => {
-                    translations[parent] + turning_acceleration(z[parent].turn(offset), omega[parent], alpha[parent])
+                    translations[parent]
+                        + turning_acceleration(z[parent].turn(offset), omega[parent], alpha[parent])
                 }
                 BodyOrigin::Free(x) => Complex::new(alpha[x], alpha[x + 1]),
             };

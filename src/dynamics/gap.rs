@@ -1,4 +1,5 @@
-//! Gaps of walls, over the length of their contact, along a motion: value, slope, and a bound of the second derivative from bounds of the unknowns' own.
+//! Gaps of walls, over the length of their contact, along a motion: value, slope, and a bound of the second
+//! derivative from bounds of the unknowns' own.
 //!
 //! ```text
 //! g = c + Σ Re(conj(g_k) e^(i phi_k)) + Σ Re(conj(g_f) zeta_f)
@@ -21,20 +22,29 @@ pub fn turning(unit: Complex<f64>, rate: f64) -> Moving {
 }
 
 impl Contact {
-    /// Gap, slope and the magnitude gaps are rounded to, where elements and their derivatives are `element(k)`; `None` for what is no sum of elements.
+    /// Gap, slope and the magnitude gaps are rounded to, where elements and their derivatives are
+    /// `element(k)`; `None` for what is no sum of elements.
     pub fn gap_along(&self, mut element: impl FnMut(usize) -> Moving) -> Option<[f64; 3]> {
         let Measure::Place(place) = &self.row.measure else { return None };
         if !place.bilinear.is_empty() {
             return None;
         }
-        let found = place.linear.iter().fold([place.constant, 0.0, place.constant.abs()], |[gap, slope, size], &(k, g)| {
-            let [here, rate] = element(k);
-            [gap + g.dot(here), slope + g.dot(rate), size + (g.re * here.re).abs() + (g.im * here.im).abs()]
-        });
+        let found = place.linear.iter().fold(
+            [place.constant, 0.0, place.constant.abs()],
+            |[gap, slope, size], &(k, g)| {
+                let [here, rate] = element(k);
+                [
+                    gap + g.dot(here),
+                    slope + g.dot(rate),
+                    size + (g.re * here.re).abs() + (g.im * here.im).abs(),
+                ]
+            },
+        );
         Some(found.map(|x| x / self.length))
     }
 
-    /// A bound of the second derivative of the gap, where those of coordinate k and its square first derivative are at most `most(k)`.
+    /// A bound of the second derivative of the gap, where those of coordinate k and its square first
+    /// derivative are at most `most(k)`.
     pub fn gap_bend(&self, mut most: impl FnMut(usize) -> [f64; 2]) -> f64 {
         let Measure::Place(place) = &self.row.measure else { return f64::INFINITY };
         let bend = place.linear.iter().fold(0.0, |sum, &(k, g)| {
@@ -78,7 +88,9 @@ mod tests {
         let contact = Contact { row, point, normal, restitution: 1.0, length: 0.5, force: 1.0 };
         // Two angles and an origin, each a parabola in t.
         let powers = [[0.3, 2.0, -1.5], [-1.0, -4.0, 0.4], [0.1, 0.5, 2.0], [0.7, -0.3, -1.0]];
-        let at = |k: usize, t: f64| [powers[k][0] + t * (powers[k][1] + t * powers[k][2]), powers[k][1] + 2.0 * t * powers[k][2]];
+        let at = |k: usize, t: f64| {
+            [powers[k][0] + t * (powers[k][1] + t * powers[k][2]), powers[k][1] + 2.0 * t * powers[k][2]]
+        };
         let gap = |t: f64| {
             let element = |k: usize| match k < 2 {
                 true => turning(Complex::unit(at(k, t)[0]), at(k, t)[1]),
@@ -102,7 +114,12 @@ mod tests {
 
     #[test]
     fn no_law_is_faster_than_its_bounds() {
-        let law = Law { start: 0.3, rate: -2.0, acceleration: 0.5, sines: vec![Sine { amplitude: 0.4, frequency: 7.0, phase: 0.1 }] };
+        let law = Law {
+            start: 0.3,
+            rate: -2.0,
+            acceleration: 0.5,
+            sines: vec![Sine { amplitude: 0.4, frequency: 7.0, phase: 0.1 }],
+        };
         let [rate, acceleration] = law.bounds(2.0);
         for step in 0..=200 {
             let [_, v, a] = law.angles::<f64>(crate::dynamics::Time::from(f64::from(step) * 0.01));

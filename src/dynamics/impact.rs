@@ -4,11 +4,13 @@
 //! M (w⁺ - w⁻) + Jᵀ rho + Gᵀ sigma = 0,    J w⁺ = -e J w⁻,    G w⁺ + C_t = 0
 //! ```
 //!
-//! In the coordinates of [`metric`](super::contact::metric): v⁺ = v + (c - Q Qᵀ c) f, v being the velocity nearest to v⁻ that keeps the rows and f what
-//! brings c·v⁺ to -e c·v⁻.  Rows that depend on others get no impulse.
+//! In the coordinates of [`metric`](super::contact::metric): v⁺ = v + (c - Q Qᵀ c) f, v being the velocity
+//! nearest to v⁻ that keeps the rows and f what brings c·v⁺ to -e c·v⁻.  Rows that depend on others get no
+//! impulse.
 //!
-//! The impulse on the point along the wall's normal is -rho, never negative.  Without motors the energy changes by `-rho (1-e) J w⁻ / 2`.
-//! Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996), section 8.2 (Newton's law of impact).
+//! The impulse on the point along the wall's normal is -rho, never negative.  Without motors the energy
+//! changes by `-rho (1-e) J w⁻ / 2`. Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral
+//! Contacts* (1996), section 8.2 (Newton's law of impact).
 
 use super::constraint::{ConstraintEquation, Posture};
 use super::contact::metric::{Gradient, Metric};
@@ -18,10 +20,12 @@ use super::point::Point;
 use super::{Mechanism, Time};
 use crate::arithmetic::Complex;
 
-/// What constraints leave of a point's freedom along its normal, over what it has without them, below which they leave none: rounding leaves as much.
+/// What constraints leave of a point's freedom along its normal, over what it has without them, below which
+/// they leave none: rounding leaves as much.
 pub(super) const NO_FREEDOM: f64 = 1e-11;
 
-/// A gap that counts as touching, over the length of its contact, with what the search for impacts leaves of it.
+/// A gap that counts as touching, over the length of its contact, with what the search for impacts leaves of
+/// it.
 pub const TOUCH: f64 = 2e-12;
 
 /// A wall as the mechanism meets it.
@@ -47,19 +51,19 @@ impl Contact {
         self.row.gap(z) / self.length
     }
 
-    /// True where the point is on its wall, or behind it: by [`TOUCH`] of its length, or by the rounding of the gap at these elements.
+    /// True where the point is on its wall, or behind it: by [`TOUCH`] of its length, or by the rounding of
+    /// the gap at these elements.
     pub fn touches(&self, z: &[Complex<f64>]) -> bool {
         self.gap(z) <= TOUCH.max(4.0 * f64::EPSILON * magnitudes(&self.row, z) / self.length)
     }
 
-    /// The largest velocity the parts of the point have along the normal \[m/s\]: rounding of its normal velocity is a share of it.
+    /// The largest velocity the parts of the point have along the normal \[m/s\]: rounding of its normal
+    /// velocity is a share of it.
     pub fn step_size(&self, omega: &[f64]) -> f64 {
         let turning = self.point.terms.iter().map(|&(k, gamma)| gamma.norm_squared().sqrt() * omega[k].abs());
-        let carried = self
-            .point
-            .shifts
-            .iter()
-            .map(|&(x, share)| share.abs() * ((self.normal.re * omega[x]).abs() + (self.normal.im * omega[x + 1]).abs()));
+        let carried = self.point.shifts.iter().map(|&(x, share)| {
+            share.abs() * ((self.normal.re * omega[x]).abs() + (self.normal.im * omega[x + 1]).abs())
+        });
         turning.chain(carried).fold(0.0, f64::max)
     }
 
@@ -78,7 +82,8 @@ pub struct Impact {
     pub approach: f64,
     /// Impulse on the point along the wall's normal \[N·s\].
     pub impulse: f64,
-    /// Impulses of the rows \[N·m·s or N·s\]: of a contact that is held, positive where it would have to pull.
+    /// Impulses of the rows \[N·m·s or N·s\]: of a contact that is held, positive where it would have to
+    /// pull.
     pub row_impulses: Vec<f64>,
     /// Energy after less energy before \[J\].
     pub energy_change: f64,
@@ -89,7 +94,8 @@ pub struct Impact {
 impl Mechanism {
     /// The jump at contact `contact`, or `None` where the motors leave the point no freedom to rebound.
     ///
-    /// Coordinates \[rad, m\] and rates \[rad/s, m/s\] at the moment of impact; a point that is not approaching keeps its rates.
+    /// Coordinates \[rad, m\] and rates \[rad/s, m/s\] at the moment of impact; a point that is not
+    /// approaching keeps its rates.
     pub fn impact_at(&self, contact: usize, t: Time, phi: &[f64], omega: &[f64]) -> Option<Impact> {
         let Contact { row, restitution, .. } = &self.contacts[contact];
         let metric = Metric::at(self, t, phi, omega)?;
@@ -98,7 +104,14 @@ impl Mechanism {
         let approach = dot(&along, omega);
         if approach >= 0.0 {
             let row_impulses = vec![0.0; self.constraints.len()];
-            return Some(Impact { omega: omega.to_vec(), approach, impulse: 0.0, row_impulses, energy_change: 0.0, motor_work: 0.0 });
+            return Some(Impact {
+                omega: omega.to_vec(),
+                approach,
+                impulse: 0.0,
+                row_impulses,
+                energy_change: 0.0,
+                motor_work: 0.0,
+            });
         }
         let (column, before) = (metric.column(&along), metric.velocity(omega));
         let (free, kept) = (metric.free(&column), metric.kept(&before));
@@ -108,7 +121,8 @@ impl Mechanism {
         let impulse = (-restitution * approach - column.dot(&kept)) / free.norm_squared();
         let change = &kept - &before + &free * impulse;
         let row_impulses = metric.multipliers(&(&column * impulse - &change));
-        let motor_work = row_impulses.iter().zip(&metric.rows).map(|(impulse, row)| impulse * row.row.drive).sum();
+        let motor_work =
+            row_impulses.iter().zip(&metric.rows).map(|(impulse, row)| impulse * row.row.drive).sum();
         let is_finite = impulse.is_finite() && change.iter().chain(&row_impulses).all(|x| x.is_finite());
         is_finite.then(|| Impact {
             approach,

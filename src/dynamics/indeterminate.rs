@@ -5,9 +5,10 @@
 //! F = F_0 + Σ c_i F(mu_i),   c such that |F| is least
 //! ```
 //!
-//! F has the forces of all hinges and welds \[N\], of sliders, driven sliders and rods \[N\], and the torques of motors, locks, welds and locked sliders over the
-//! size of the mechanism \[N\].  What every mu leaves alone is determinate; of the rest the forces of least norm are one choice among many, those of
-//! joints that give equally.
+//! F has the forces of all hinges and welds \[N\], of sliders, driven sliders and rods \[N\], and the torques
+//! of motors, locks, welds and locked sliders over the size of the mechanism \[N\].  What every mu leaves
+//! alone is determinate; of the rest the forces of least norm are one choice among many, those of joints that
+//! give equally.
 
 use super::assembly::svd::{Matrix, dot};
 use super::constraint::Posture;
@@ -37,8 +38,9 @@ pub struct JointForces {
 type Unit = (Vec<f64>, Vec<f64>, Vec<Complex<f64>>);
 
 impl Mechanism {
-    /// The joint forces of an evaluation of the equations at these angles \[rad\] and rates \[rad/s\]: its `load` must hold the accelerations and its
-    /// `multiplier` those of all rows.  Those that redundant or singular rows leave open are the ones of least norm.
+    /// The joint forces of an evaluation of the equations at these angles \[rad\] and rates \[rad/s\]: its
+    /// `load` must hold the accelerations and its `multiplier` those of all rows.  Those that redundant or
+    /// singular rows leave open are the ones of least norm.
     pub fn joint_forces(&self, t: Time, kernel: &Kernel<f64>, phi: &[f64], omega: &[f64]) -> JointForces {
         let (rows, joints) = (self.constraints.len(), self.joints.len());
         let hinges = self.hinge_forces(t, kernel, phi, omega);
@@ -80,8 +82,10 @@ impl Mechanism {
             found.hinges.iter_mut().zip(hinges).for_each(|(force, idle)| *force += idle.times(share));
         }
         let is_left_alone = |size: &dyn Fn(&Unit) -> f64| units.iter().all(|unit| size(unit) < ALONE);
-        found.hinge_is_determinate = (0..joints).map(|j| Some(is_left_alone(&|unit| unit.2[j].norm_squared().sqrt()))).collect();
-        found.row_is_determinate = (0..rows).map(|r| Some(is_left_alone(&|unit| self.as_force(r, unit.1[r]).abs()))).collect();
+        found.hinge_is_determinate =
+            (0..joints).map(|j| Some(is_left_alone(&|unit| unit.2[j].norm_squared().sqrt()))).collect();
+        found.row_is_determinate =
+            (0..rows).map(|r| Some(is_left_alone(&|unit| self.as_force(r, unit.1[r]).abs()))).collect();
         found
     }
 
@@ -91,7 +95,8 @@ impl Mechanism {
         for row in self.joints.iter().filter_map(|joint| joint.row) {
             is_hinge[row..row + 2].fill(true);
         }
-        let others = (0..self.constraints.len()).filter(|&r| !is_hinge[r]).map(|r| self.as_force(r, multipliers[r]));
+        let others =
+            (0..self.constraints.len()).filter(|&r| !is_hinge[r]).map(|r| self.as_force(r, multipliers[r]));
         hinges.iter().flat_map(|force| [force.re, force.im]).chain(others).collect()
     }
 
@@ -102,13 +107,17 @@ impl Mechanism {
 
     /// So many independent mu with Gᵀ mu = 0, or nearest to that.
     fn idle(&self, t: Time, kernel: &Kernel<f64>, phi: &[f64], omega: &[f64], count: usize) -> Vec<Vec<f64>> {
-        let (rows, n, size, angles) = (self.constraints.len(), self.coordinates(), self.size_of_parts(), self.bodies.len());
+        let (rows, n, size, angles) =
+            (self.constraints.len(), self.coordinates(), self.size_of_parts(), self.bodies.len());
         let unit = |row: usize| if self.constraints[row].is_angle() { 1.0 } else { 1.0 / size };
         let mut jacobian = Matrix::zero(rows, n);
         for (r, row) in self.constraints.iter().enumerate() {
             let entries = jacobian.row_mut(r);
             row.differentiate(t, Posture { phi, z: &kernel.z, omega }, entries);
-            entries.iter_mut().enumerate().for_each(|(k, entry)| *entry *= unit(r) * if k < angles { 1.0 } else { size });
+            entries
+                .iter_mut()
+                .enumerate()
+                .for_each(|(k, entry)| *entry *= unit(r) * if k < angles { 1.0 } else { size });
         }
         let range = jacobian.svd().left(rows - count);
         let mut found: Vec<Vec<f64>> = Vec::new();
@@ -124,7 +133,10 @@ impl Mechanism {
             (0..2).for_each(|_| range.iter().for_each(|unit| take_off(rest, unit)));
         }
         while found.len() < count {
-            let Some(mut longest) = rests.iter().max_by(|a, b| dot(a, a).total_cmp(&dot(b, b))).cloned() else { break };
+            let Some(mut longest) = rests.iter().max_by(|a, b| dot(a, a).total_cmp(&dot(b, b))).cloned()
+            else {
+                break;
+            };
             let length = dot(&longest, &longest).sqrt();
             if length <= ALONE {
                 break;

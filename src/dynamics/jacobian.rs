@@ -1,4 +1,5 @@
-//! The Jacobian of the equations of motion: the formulas of [`kernel`](super::kernel) evaluated on dual numbers, four directions at once.
+//! The Jacobian of the equations of motion: the formulas of [`kernel`](super::kernel) evaluated on dual
+//! numbers, four directions at once.
 //!
 //! ```text
 //! a(t, q, w):      A_q = da/dq,  A_w = da/dw,  a_t = da/dt                    rows by multipliers included (index 1)
@@ -27,7 +28,8 @@ pub struct Jacobian {
     omega: Vec<Slopes>,
     /// da/dq and, beside it, da/dw, row by row (n × 2n) \[1/s², 1/s\].
     pub acceleration: Vec<f64>,
-    /// Derivatives of the powers of motors, dampers and applied forces and of the stabilizer, by q and by w (2 × 2n) \[W, W·s\].
+    /// Derivatives of the powers of motors, dampers and applied forces and of the stabilizer, by q and by w
+    /// (2 × 2n) \[W, W·s\].
     pub power: Vec<f64>,
 }
 
@@ -44,7 +46,8 @@ impl Jacobian {
         }
     }
 
-    /// Evaluates it at coordinates `phi` \[rad, m\] and rates `omega` \[rad/s, m/s\]; what cannot be computed comes out non-finite.
+    /// Evaluates it at coordinates `phi` \[rad, m\] and rates `omega` \[rad/s, m/s\]; what cannot be computed
+    /// comes out non-finite.
     pub fn evaluate(&mut self, mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64], bias: Bias) {
         let n = phi.len();
         for first in (0..2 * n).step_by(LANES) {
@@ -72,7 +75,9 @@ impl Jacobian {
         for (i, row) in y_by_y.chunks_exact_mut(dimension).enumerate() {
             match i {
                 i if i < n => row[n + i] = 1.0,
-                i if i < 2 * n => row[..2 * n].copy_from_slice(&self.acceleration[2 * n * (i - n)..2 * n * (i - n + 1)]),
+                i if i < 2 * n => {
+                    row[..2 * n].copy_from_slice(&self.acceleration[2 * n * (i - n)..2 * n * (i - n + 1)])
+                }
                 _ => row[..2 * n].copy_from_slice(&self.power[2 * n * (i - 2 * n)..2 * n * (i - 2 * n + 1)]),
             }
         }
@@ -88,7 +93,10 @@ impl Jacobian {
                     row[f + i] = 1.0;
                     continue;
                 }
-                i if i < 2 * f => &self.acceleration[2 * n * partition.independent[i - f]..2 * n * (partition.independent[i - f] + 1)],
+                i if i < 2 * f => {
+                    &self.acceleration
+                        [2 * n * partition.independent[i - f]..2 * n * (partition.independent[i - f] + 1)]
+                }
                 _ => &self.power[..2 * n],
             };
             for (k, dependent_angle) in partition.bodies.iter().enumerate() {
@@ -102,7 +110,13 @@ impl Jacobian {
 }
 
 /// da/dt at fixed coordinates and rates (n) \[rad/s³, m/s³\]: what laws of time do.
-pub fn acceleration_in_time(mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64], bias: Bias) -> Vec<f64> {
+pub fn acceleration_in_time(
+    mechanism: &Mechanism,
+    t: Time,
+    phi: &[f64],
+    omega: &[f64],
+    bias: Bias,
+) -> Vec<f64> {
     let mut kernel = Kernel::<Dual<1, true>>::new(mechanism);
     let constants = |values: &[f64]| values.iter().map(|&value| Dual::constant(value)).collect::<Vec<_>>();
     kernel.accelerate::<0>(mechanism, t, &constants(phi), &constants(omega), bias);
@@ -118,7 +132,13 @@ mod tests {
     const H: f64 = 1e-8;
 
     /// Accelerations and powers in double-double, at unknowns (q, w) a little off.
-    fn exact(mechanism: &Mechanism, t: Time, y: &[f64], bias: Bias, off: impl Fn(usize) -> f64) -> Vec<DoubleDouble> {
+    fn exact(
+        mechanism: &Mechanism,
+        t: Time,
+        y: &[f64],
+        bias: Bias,
+        off: impl Fn(usize) -> f64,
+    ) -> Vec<DoubleDouble> {
         let n = y.len() / 2;
         let y: Vec<_> = y.iter().enumerate().map(|(k, &y)| DoubleDouble::sum(y, off(k))).collect();
         let mut kernel = Kernel::<DoubleDouble>::new(mechanism);
@@ -143,11 +163,18 @@ mod tests {
         // Entries are sums of terms as large as the largest of them.
         let size = by_unknowns.iter().flatten().fold(1.0, |size: f64, entry| size.max(entry.abs()));
         let assert_near = |found: f64, expected: f64, what: String| {
-            assert!((found - expected).abs() < 1e-12 * size, "{name}, {what}: {found} {expected} of {size:e}");
+            assert!(
+                (found - expected).abs() < 1e-12 * size,
+                "{name}, {what}: {found} {expected} of {size:e}"
+            );
         };
         for (direction, expected) in by_unknowns.iter().enumerate() {
             for (i, &expected) in expected.iter().enumerate() {
-                let found = if i < n { jacobian.acceleration[2 * n * i + direction] } else { jacobian.power[2 * n * (i - n) + direction] };
+                let found = if i < n {
+                    jacobian.acceleration[2 * n * i + direction]
+                } else {
+                    jacobian.power[2 * n * (i - n) + direction]
+                };
                 assert_near(found, expected, format!("{i} by {direction}"));
             }
         }
@@ -160,14 +187,29 @@ mod tests {
 
     #[test]
     fn derivatives_of_every_kind_of_scene_agree_with_differences_in_double_double() {
-        for name in
-            ["spring", "motor_sine", "four_bar_motor", "andrews", "cart_pole", "guided", "quick_return", "branch", "slider_crank_torque"]
-        {
-            let scene = read_scene(format!("examples/scenes/{name}.json").as_ref(), &[]).expect("a valid scene");
+        for name in [
+            "spring",
+            "motor_sine",
+            "four_bar_motor",
+            "andrews",
+            "cart_pole",
+            "guided",
+            "quick_return",
+            "branch",
+            "slider_crank_torque",
+        ] {
+            let scene =
+                read_scene(format!("examples/scenes/{name}.json").as_ref(), &[]).expect("a valid scene");
             let mechanism = Mechanism::new(&scene).expect("equations");
             let start = mechanism.start(&scene);
             // A little off the start: where bars are parallel derivatives vanish by accident.
-            let y: Vec<f64> = start.phi.iter().chain(&start.omega).enumerate().map(|(k, y)| y.hi + 0.01 * (k as f64 + 1.0).sin()).collect();
+            let y: Vec<f64> = start
+                .phi
+                .iter()
+                .chain(&start.omega)
+                .enumerate()
+                .map(|(k, y)| y.hi + 0.01 * (k as f64 + 1.0).sin())
+                .collect();
             for bias in [Bias::default(), Bias { rate: 3.0, position: 7.0 }] {
                 assert_derivatives(&mechanism, 0.3, &y, bias, name);
                 assert_derivatives(&mechanism.body_by_body(), 0.3, &y, bias, name);

@@ -1,11 +1,12 @@
-//! One evaluation of the equations at one moment: unit vectors, mass matrix, load, accelerations and multipliers.
+//! One evaluation of the equations at one moment: unit vectors, mass matrix, load, accelerations and
+//! multipliers.
 //!
 //! ```text
 //! a0 = M⁻¹ b;      rows:  X = M⁻¹ Gᵀ,  S = G X,  S lambda = G a0 + gamma,  a = a0 - X lambda
 //! ```
 //!
-//! A scene without rows never enters the second line.  Mechanisms of many bodies are evaluated without these matrices, by the passes of
-//! [`recursive`](super::recursive); what is found is the same.
+//! A scene without rows never enters the second line.  Mechanisms of many bodies are evaluated without these
+//! matrices, by the passes of [`recursive`](super::recursive); what is found is the same.
 
 mod exact;
 
@@ -30,7 +31,8 @@ pub struct Bias {
 /// Coordinates up to which energies are measured by the couplings.
 const COUPLED: usize = 48;
 
-/// Scratch space of an evaluation for a mechanism of n coordinates and r rows; nothing is allocated after [`Kernel::new`].
+/// Scratch space of an evaluation for a mechanism of n coordinates and r rows; nothing is allocated after
+/// [`Kernel::new`].
 #[derive(Clone, Debug)]
 pub struct Kernel<T> {
     /// Elements: unit vectors, and translational coordinates at the place of their x (n).
@@ -57,7 +59,8 @@ pub struct Kernel<T> {
     metric: Metric,
     /// The row nearest to being left out in the last evaluation.
     pub weakest: Weakest,
-    /// The same in double-double, where doubles have too few digits for light members or long levers; made when first asked for.
+    /// The same in double-double, where doubles have too few digits for light members or long levers; made
+    /// when first asked for.
     exact: Option<Box<Kernel<DoubleDouble>>>,
     /// True where the last evaluation was made there.
     is_exact: bool,
@@ -67,9 +70,11 @@ pub struct Kernel<T> {
     pub multiplier: Vec<T>,
     /// The part of each multiplier that the bias called for (r).
     pub correction: Vec<T>,
-    /// What stands in place of the matrices where the mechanism is evaluated body by body; they are empty then.
+    /// What stands in place of the matrices where the mechanism is evaluated body by body; they are empty
+    /// then.
     pub bodywise: Option<Box<Evaluation<T>>>,
-    /// Stretches of springs \[m\], then of torsion springs \[rad\], where [`Kernel::measure`] has found them; empty otherwise.
+    /// Stretches of springs \[m\], then of torsion springs \[rad\], where [`Kernel::measure`] has found them;
+    /// empty otherwise.
     pub stretch: Vec<T>,
     /// Force and u of a vibration (n each), where there is one.
     pub vibration: [Vec<T>; 2],
@@ -78,11 +83,15 @@ pub struct Kernel<T> {
 }
 
 impl<T: Scalar> Kernel<T> {
-    /// Scratch space with all matrices, whatever the mechanism's own form is; it must have [couplings](tree::Tree::is_dense).
+    /// Scratch space with all matrices, whatever the mechanism's own form is; it must have
+    /// [couplings](tree::Tree::is_dense).
     pub fn dense(mechanism: &Mechanism) -> Self {
         let size = if mechanism.vibration.is_some() { mechanism.coordinates() } else { 0 };
         let vibration = std::array::from_fn(|_| vec![T::ZERO; size]);
-        Self { vibration, ..Self::sized(mechanism.coordinates(), mechanism.row_scales(), mechanism.rank_metric(), true) }
+        Self {
+            vibration,
+            ..Self::sized(mechanism.coordinates(), mechanism.row_scales(), mechanism.rank_metric(), true)
+        }
     }
 
     /// The same for a mechanism whose rows nobody asks about.
@@ -93,7 +102,8 @@ impl<T: Scalar> Kernel<T> {
     /// Scratch space for energies.
     pub fn without_rows(mechanism: &Mechanism) -> Self {
         // They are rounded, and what Gauss methods keep is the energy with these very numbers.
-        let is_dense = mechanism.tree.is_dense() && (mechanism.recursion.is_none() || mechanism.coordinates() <= COUPLED);
+        let is_dense = mechanism.tree.is_dense()
+            && (mechanism.recursion.is_none() || mechanism.coordinates() <= COUPLED);
         let mut kernel = Self::sized(mechanism.coordinates(), Vec::new(), Metric::default(), is_dense);
         if !is_dense {
             kernel.translations = std::array::from_fn(|_| vec![Complex::ZERO; mechanism.bodies.len()]);
@@ -141,13 +151,15 @@ impl<T: Real> Kernel<T> {
     /// Scratch space for a mechanism and its rows, in the form the mechanism is evaluated in.
     pub fn new(mechanism: &Mechanism) -> Self {
         let Some(recursion) = &mechanism.recursion else { return Self::dense(mechanism) };
-        let mut kernel = Self::sized(mechanism.coordinates(), mechanism.row_scales(), mechanism.rank_metric(), false);
+        let mut kernel =
+            Self::sized(mechanism.coordinates(), mechanism.row_scales(), mechanism.rank_metric(), false);
         kernel.bodywise = Some(Box::new(Evaluation::new(recursion, &kernel.scale, kernel.metric.clone())));
         kernel.translations = std::array::from_fn(|_| vec![Complex::ZERO; mechanism.bodies.len()]);
         kernel
     }
 
-    /// M, its twist and the whole load b (velocity terms, gravity, springs, dampers, applied forces) at the elements in `z`.
+    /// M, its twist and the whole load b (velocity terms, gravity, springs, dampers, applied forces) at the
+    /// elements in `z`.
     #[inline(always)]
     pub fn assemble<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
         mechanism.tree.mass_matrix::<T, N>(&self.z, &mut self.mass, &mut self.twist);
@@ -178,13 +190,25 @@ impl<T: Real> Kernel<T> {
 
     /// Accelerations \[rad/s²\] without any row, into `load`.
     #[inline(always)]
-    pub fn accelerate_free<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
+    pub fn accelerate_free<const N: usize>(
+        &mut self,
+        mechanism: &Mechanism,
+        t: Time,
+        phi: &[T],
+        omega: &[T],
+    ) {
         let n = size::<N>(mechanism.tree.coordinates);
         if N == 0
             && let Some(bodywise) = &mut self.bodywise
         {
             bodywise.unit_vectors(phi, &mut self.z);
-            bodywise.inward_pass(mechanism, t, Posture { phi, z: &self.z, omega }, &self.stretch, &mut self.load);
+            bodywise.inward_pass(
+                mechanism,
+                t,
+                Posture { phi, z: &self.z, omega },
+                &self.stretch,
+                &mut self.load,
+            );
             bodywise.outward_pass(&mut self.load);
             return;
         }
@@ -196,7 +220,14 @@ impl<T: Real> Kernel<T> {
 
     /// Accelerations \[rad/s²\] into `load`, multipliers into `multiplier`.
     #[inline(always)]
-    pub fn accelerate<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T], bias: Bias) {
+    pub fn accelerate<const N: usize>(
+        &mut self,
+        mechanism: &Mechanism,
+        t: Time,
+        phi: &[T],
+        omega: &[T],
+        bias: Bias,
+    ) {
         if N == 0 && self.bodywise.is_some() {
             self.accelerate_bodywise(mechanism, t, phi, omega, bias);
         } else {
@@ -226,16 +257,25 @@ impl<T: Real> Kernel<T> {
         bodywise.outward_pass(&mut self.load);
     }
 
-    /// The share of `R` rows (any number where `R` is 0): expects free accelerations in `load` and the factors of M.
+    /// The share of `R` rows (any number where `R` is 0): expects free accelerations in `load` and the
+    /// factors of M.
     #[inline(always)]
-    fn constrain<const N: usize, const R: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T], bias: Bias) {
+    fn constrain<const N: usize, const R: usize>(
+        &mut self,
+        mechanism: &Mechanism,
+        t: Time,
+        phi: &[T],
+        omega: &[T],
+        bias: Bias,
+    ) {
         let (n, rows) = (size::<N>(mechanism.tree.coordinates), size::<R>(mechanism.constraints.len()));
         if let Some(vibration) = &mechanism.vibration {
             self.vibrate::<N>(mechanism, vibration);
         }
         let is_biased = bias != Bias::default();
         let posture = Posture { phi, z: &self.z[..n], omega };
-        let (all, multiplier, correction) = (&mut self.jacobian[..rows * n], &mut self.multiplier[..rows], &mut self.correction[..rows]);
+        let (all, multiplier, correction) =
+            (&mut self.jacobian[..rows * n], &mut self.multiplier[..rows], &mut self.correction[..rows]);
         let load = &mut self.load[..n];
         for r in 0..rows {
             let (row, jacobian) = (&mechanism.constraints[r], &mut all[r * n..(r + 1) * n]);
@@ -243,11 +283,16 @@ impl<T: Real> Kernel<T> {
                 jacobian[k] = T::ZERO;
             }
             // Only a bias asks for C.
-            let here = if is_biased { row.linearise(t, posture, jacobian) } else { row.differentiate(t, posture, jacobian) };
+            let here = if is_biased {
+                row.linearise(t, posture, jacobian)
+            } else {
+                row.differentiate(t, posture, jacobian)
+            };
             multiplier[r] = dot(jacobian, load) + here.convective;
             correction[r] = T::ZERO;
             if is_biased {
-                correction[r] = (dot(jacobian, omega) + here.drive).scale(bias.rate) + here.position.scale(bias.position);
+                correction[r] =
+                    (dot(jacobian, omega) + here.drive).scale(bias.rate) + here.position.scale(bias.position);
                 multiplier[r] += correction[r];
             }
             self.rows[r] = here;
@@ -268,14 +313,21 @@ impl<T: Real> Kernel<T> {
     /// Adds what the mean force of a vibration does to the free accelerations.
     fn vibrate<const N: usize>(&mut self, mechanism: &Mechanism, vibration: &Vibration) {
         let [force, minv_jt] = &mut self.vibration;
-        vibration.push::<T, N>(&mechanism.tree, &self.z, (&self.mass, &self.pivot), &self.twist, [force, minv_jt]);
+        vibration.push::<T, N>(
+            &mechanism.tree,
+            &self.z,
+            (&self.mass, &self.pivot),
+            &self.twist,
+            [force, minv_jt],
+        );
         tree::solve::<T, N>(size::<N>(mechanism.tree.coordinates), &self.mass, &self.pivot, force);
         for (load, &more) in self.load.iter_mut().zip(force.iter()) {
             *load += more;
         }
     }
 
-    /// Power of motors, dampers and applied forces, and power of the bias's share of the multipliers \[W\]; after [`Kernel::accelerate`].
+    /// Power of motors, dampers and applied forces, and power of the bias's share of the multipliers \[W\];
+    /// after [`Kernel::accelerate`].
     #[inline(always)]
     pub fn powers(&self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) -> (T, T) {
         let (mut work, mut stabilizer) = (T::ZERO, T::ZERO);
@@ -327,7 +379,8 @@ impl<T: Real> Kernel<T> {
     /// X = M⁻¹ Gᵀ and the factors of S = G X.
     #[inline(always)]
     fn schur_complement<const N: usize, const R: usize>(&mut self, n: usize, rows: usize) {
-        let (jacobian, minv_jt, schur) = (&self.jacobian[..rows * n], &mut self.minv_jt[..rows * n], &mut self.schur[..rows * rows]);
+        let (jacobian, minv_jt, schur) =
+            (&self.jacobian[..rows * n], &mut self.minv_jt[..rows * n], &mut self.schur[..rows * rows]);
         for r in 0..rows {
             let row = &mut minv_jt[r * n..(r + 1) * n];
             for k in 0..n {
@@ -342,7 +395,14 @@ impl<T: Real> Kernel<T> {
         }
         self.weakest = schur::factor::<T, R>(rows, schur, &mut self.schur_pivot, &self.scale);
         if self.weakest.share < NEAR {
-            self.weakest = schur::look_closer(&self.metric, &self.scale, self.weakest, [jacobian, minv_jt], schur, &mut self.schur_pivot);
+            self.weakest = schur::look_closer(
+                &self.metric,
+                &self.scale,
+                self.weakest,
+                [jacobian, minv_jt],
+                schur,
+                &mut self.schur_pivot,
+            );
         }
     }
 
@@ -353,7 +413,12 @@ impl<T: Real> Kernel<T> {
         }
         match &mut self.bodywise {
             Some(bodywise) => bodywise.solve_rows(&mut self.multiplier),
-            None => tree::solve::<T, 0>(self.multiplier.len(), &self.schur, &self.schur_pivot, &mut self.multiplier),
+            None => tree::solve::<T, 0>(
+                self.multiplier.len(),
+                &self.schur,
+                &self.schur_pivot,
+                &mut self.multiplier,
+            ),
         }
     }
 
@@ -367,7 +432,8 @@ impl<T: Real> Kernel<T> {
         }
         let (n, rows) = (self.z.len(), self.multiplier.len());
         for k in 0..n {
-            self.load[k] = (0..rows).fold(T::ZERO, |sum, r| sum + self.minv_jt[r * n + k] * self.multiplier[r]);
+            self.load[k] =
+                (0..rows).fold(T::ZERO, |sum, r| sum + self.minv_jt[r * n + k] * self.multiplier[r]);
         }
     }
 
@@ -405,17 +471,23 @@ impl<T: Real> Kernel<T> {
 }
 
 impl Kernel<f64> {
-    /// The stretches of all springs for the evaluations that follow, at angles and translational coordinates given with what they leave out \[rad, m\].
+    /// The stretches of all springs for the evaluations that follow, at angles and translational coordinates
+    /// given with what they leave out \[rad, m\].
     ///
-    /// The force of a stiff spring is the difference of two lengths times k: in doubles it is rounded to 1e-16 k L, which is more than all other forces together
-    /// from k = 1e16 m g / L on, and makes implicit methods with long steps pay from 1e8 m g / L.  In double-double nothing of that is left.
+    /// The force of a stiff spring is the difference of two lengths times k: in doubles it is rounded to
+    /// 1e-16 k L, which is more than all other forces together from k = 1e16 m g / L on, and makes implicit
+    /// methods with long steps pay from 1e8 m g / L.  In double-double nothing of that is left.
     pub fn measure(&mut self, mechanism: &Mechanism, phi: &[f64], low: &[f64]) {
         self.stretch.clear();
         for spring in &mechanism.springs {
             let span = &spring.span;
-            let turning = span.terms.iter().map(|&(k, gamma)| Complex::unit(DoubleDouble::sum(phi[k], low[k])).turn(gamma));
+            let turning = span
+                .terms
+                .iter()
+                .map(|&(k, gamma)| Complex::unit(DoubleDouble::sum(phi[k], low[k])).turn(gamma));
             let carried = span.shifts.iter().map(|&(x, share)| {
-                Complex::new(DoubleDouble::sum(phi[x], low[x]), DoubleDouble::sum(phi[x + 1], low[x + 1])).times(DoubleDouble::of(share))
+                Complex::new(DoubleDouble::sum(phi[x], low[x]), DoubleDouble::sum(phi[x + 1], low[x + 1]))
+                    .times(DoubleDouble::of(share))
             });
             let end = turning.chain(carried).fold(Complex::of(span.root), |sum, part| sum + part);
             self.stretch.push(spring.stretch(end).hi);

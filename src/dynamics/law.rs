@@ -1,7 +1,8 @@
 //! A motor's law of time, evaluated so that its phase stays exact over long horizons.
 //!
-//! `start + rate·t` at 1e5 s carries an error of 1e-10 rad in a plain double.  Time is a pair, and whole turns are taken off before any sine: in
-//! double-double for references and monitors, and for the inner loops by one exact product and a quarter turn in three parts,
+//! `start + rate·t` at 1e5 s carries an error of 1e-10 rad in a plain double.  Time is a pair, and whole
+//! turns are taken off before any sine: in double-double for references and monitors, and for the inner loops
+//! by one exact product and a quarter turn in three parts,
 //!
 //! ```text
 //! rate·t + start = q π/2 + x + y,    |x| <= π/4,    π/2 = P1 + P2 + P3,   q P1 and q P2 exact
@@ -35,15 +36,23 @@ impl<T: Real> Phase<T> {
         if sign > 0.0 {
             return self;
         }
-        Self { angle: -self.angle, unit: self.unit.conj(), rate: -self.rate, acceleration: -self.acceleration }
+        Self {
+            angle: -self.angle,
+            unit: self.unit.conj(),
+            rate: -self.rate,
+            acceleration: -self.acceleration,
+        }
     }
 }
 
 impl Law {
     /// The angle \[rad\] in full, turns included.
     pub fn angle(&self, t: Time) -> DoubleDouble {
-        let polynomial = DoubleDouble::of(self.start) + t.scale(self.rate) + (t * t).scale(0.5 * self.acceleration);
-        self.sines.iter().fold(polynomial, |sum, sine| sum + sine.argument(t).sin_cos().0.scale(sine.amplitude))
+        let polynomial =
+            DoubleDouble::of(self.start) + t.scale(self.rate) + (t * t).scale(0.5 * self.acceleration);
+        self.sines
+            .iter()
+            .fold(polynomial, |sum, sine| sum + sine.argument(t).sin_cos().0.scale(sine.amplitude))
     }
 
     /// The same angle for ever \[rad\].
@@ -66,7 +75,12 @@ impl Law {
     pub fn at<T: Real>(&self, t: Time) -> Phase<T> {
         if T::IS_PLAIN && self.acceleration == 0.0 {
             let Phase { angle, unit, rate, acceleration } = self.plain(t);
-            return Phase { angle: T::of(angle), unit: Complex::of(unit), rate: T::of(rate), acceleration: T::of(acceleration) };
+            return Phase {
+                angle: T::of(angle),
+                unit: Complex::of(unit),
+                rate: T::of(rate),
+                acceleration: T::of(acceleration),
+            };
         }
         let ([angle, rate, acceleration], rest, _) = self.exact::<T>(t);
         // What a plain double cannot hold of the angle turns the unit vector by a first-order rotation.
@@ -90,7 +104,8 @@ impl Law {
         (angle, rate, turns)
     }
 
-    /// By double-double: the angle less whole turns and its derivatives, what `T` leaves out of the angle, and the turns.
+    /// By double-double: the angle less whole turns and its derivatives, what `T` leaves out of the angle,
+    /// and the turns.
     fn exact<T: Real>(&self, t: Time) -> ([T; 3], T, f64) {
         let mut angle = DoubleDouble::of(self.start) + t.scale(self.rate);
         let mut rate = T::of(self.rate);
@@ -109,14 +124,23 @@ impl Law {
             acceleration -= sin.scale(sine.amplitude * sine.frequency * sine.frequency);
         }
         let (angle, rest) = T::split(angle + sines.double_double());
-        let derivatives = [angle.moving(|| rate.value()), rate.moving(|| acceleration.value()), acceleration.moving(|| self.jerk(t))];
+        let derivatives = [
+            angle.moving(|| rate.value()),
+            rate.moving(|| acceleration.value()),
+            acceleration.moving(|| self.jerk(t)),
+        ];
         (derivatives, rest, turns)
     }
 
     /// Third derivative \[rad/s³\].
     fn jerk(&self, t: Time) -> f64 {
-        let of =
-            |sine: &Sine| sine.argument(t).reduced().0.sin_cos().1.hi * sine.amplitude * sine.frequency * sine.frequency * sine.frequency;
+        let of = |sine: &Sine| {
+            sine.argument(t).reduced().0.sin_cos().1.hi
+                * sine.amplitude
+                * sine.frequency
+                * sine.frequency
+                * sine.frequency
+        };
         -self.sines.iter().map(of).sum::<f64>()
     }
 
@@ -135,7 +159,12 @@ impl Law {
         }
         let sum_of_sines = self.sum_of_sines(t);
         let whole = base.plus(sum_of_sines.angle);
-        Phase { angle: whole.angle(), unit: whole.unit(), rate: self.rate + sum_of_sines.rate, acceleration: sum_of_sines.acceleration }
+        Phase {
+            angle: whole.angle(),
+            unit: whole.unit(),
+            rate: self.rate + sum_of_sines.rate,
+            acceleration: sum_of_sines.acceleration,
+        }
     }
 
     /// Sum of the sines and its derivatives; the unit vector is left out.
@@ -186,7 +215,8 @@ impl Reduced {
         Self::of(sum, sum_rest + (product_rest(t.hi, rate, product) + t.lo * rate))
     }
 
-    /// An angle and what it leaves out \[rad\], to 1e-18 rad up to 2³² quarter turns and by double-double beyond.
+    /// An angle and what it leaves out \[rad\], to 1e-18 rad up to 2³² quarter turns and by double-double
+    /// beyond.
     #[inline(always)]
     fn of(angle: f64, rest: f64) -> Self {
         /// π/2 in parts of 21, 21 and 53 bits.
@@ -233,18 +263,24 @@ impl Reduced {
         sum + (rest + (self.low + quarter * FRAC_PI_2_REST))
     }
 
-    /// Its unit vector, to 0.8 units in the last place: the polynomials of fdlibm's `k_sin.c` and `k_cos.c` (Sun Microsystems, 1993).
+    /// Its unit vector, to 0.8 units in the last place: the polynomials of fdlibm's `k_sin.c` and `k_cos.c`
+    /// (Sun Microsystems, 1993).
     #[inline(always)]
     fn unit(self) -> Complex<f64> {
         let (x, y) = (self.high, self.low);
         let z = x * x;
         let w = z * z;
-        let r = (8.333_333_333_322_489_46e-3 + z * (-1.984_126_982_985_794_93e-4 + z * 2.755_731_370_707_006_77e-6))
+        let r = (8.333_333_333_322_489_46e-3
+            + z * (-1.984_126_982_985_794_93e-4 + z * 2.755_731_370_707_006_77e-6))
             + z * w * (-2.505_076_025_340_686_34e-8 + z * 1.589_690_995_211_550_10e-10);
         let v = z * x;
         let sin = x - ((z * (0.5 * y - v * r) - y) - v * -1.666_666_666_666_663_24e-1);
-        let r = z * (4.166_666_666_666_660_19e-2 + z * (-1.388_888_888_887_410_96e-3 + z * 2.480_158_728_947_672_94e-5))
-            + w * w * (-2.755_731_435_139_066_33e-7 + z * (2.087_572_321_298_174_83e-9 + z * -1.135_964_755_778_819_48e-11));
+        let r = z
+            * (4.166_666_666_666_660_19e-2
+                + z * (-1.388_888_888_887_410_96e-3 + z * 2.480_158_728_947_672_94e-5))
+            + w * w
+                * (-2.755_731_435_139_066_33e-7
+                    + z * (2.087_572_321_298_174_83e-9 + z * -1.135_964_755_778_819_48e-11));
         let half = 0.5 * z;
         let w = 1.0 - half;
         let cos = w + (((1.0 - w) - half) + (z * r - x * y));
@@ -253,8 +289,9 @@ impl Reduced {
     }
 }
 
-/// a b less its rounded value, to the last bit or the one before (T. J. Dekker, Numer. Math. 18 (1971), with halves cut off instead of rounded):
-/// cheaper than a fused multiply-add where the processor cannot be counted on to have one.
+/// a b less its rounded value, to the last bit or the one before (T. J. Dekker, Numer. Math. 18 (1971), with
+/// halves cut off instead of rounded): cheaper than a fused multiply-add where the processor cannot be
+/// counted on to have one.
 #[inline(always)]
 fn product_rest(a: f64, b: f64, product: f64) -> f64 {
     let half = |x: f64| f64::from_bits(x.to_bits() & !0x7ff_ffff);
@@ -279,7 +316,12 @@ mod tests {
     use proptest::prelude::*;
 
     fn law() -> Law {
-        Law { start: 0.3, rate: 6.25, acceleration: -0.5, sines: vec![Sine { amplitude: 0.2, frequency: 11.0, phase: 0.4 }] }
+        Law {
+            start: 0.3,
+            rate: 6.25,
+            acceleration: -0.5,
+            sines: vec![Sine { amplitude: 0.2, frequency: 11.0, phase: 0.4 }],
+        }
     }
 
     #[test]

@@ -4,8 +4,9 @@
 //! z = exp(i q),   S mu = z·W F + w²,   a_k = (i z_k)·(W F)_k - Σ_j T_kj mu_j        S, T: `natural::columns`
 //! ```
 //!
-//! Pins, lines of the ground and locked angles are linear in z and part of the constant W: what is left is one row a body, and no velocity term but w².
-//! Half the cost of [`Multiplier`] with its factors of M and of the rows' S, whose unknowns and account of work it shares.
+//! Pins, lines of the ground and locked angles are linear in z and part of the constant W: what is left is
+//! one row a body, and no velocity term but w². Half the cost of [`Multiplier`] with its factors of M and of
+//! the rows' S, whose unknowns and account of work it shares.
 //!
 //! Written once over [`Lanes`] and compiled twice, to the same bits.
 
@@ -63,11 +64,16 @@ struct Bench<const B: usize> {
     least: f64,
 }
 
-/// The matrices of a mechanism this form fits: hinged bodies only, with rows other than angles, all of them linear with constant coefficients.
+/// The matrices of a mechanism this form fits: hinged bodies only, with rows other than angles, all of them
+/// linear with constant coefficients.
 pub fn reduced(mechanism: &Mechanism) -> Option<Reduced> {
     let n = mechanism.bodies.len();
     let is_small = mechanism.coordinates() == n && n <= MOST && mechanism.tree.is_dense();
-    if !is_small || !mechanism.has_closed_loops() || !mechanism.contacts.is_empty() || mechanism.vibration.is_some() {
+    if !is_small
+        || !mechanism.has_closed_loops()
+        || !mechanism.contacts.is_empty()
+        || mechanism.vibration.is_some()
+    {
         return None;
     }
     let (linear, guides) = sorted_rows(mechanism);
@@ -75,8 +81,10 @@ pub fn reduced(mechanism: &Mechanism) -> Option<Reduced> {
         return None;
     }
     let reduced = Reduced::new(mechanism, linear).ok()?;
-    // Light members that carry heavy ones: W has entries that cancel everywhere, M in angles only where these are in line.
-    let is_sound = reduced.free.iter().zip(&mechanism.tree.diagonal).all(|(free, diagonal)| free * diagonal < WORST);
+    // Light members that carry heavy ones: W has entries that cancel everywhere, M in angles only where these
+    // are in line.
+    let is_sound =
+        reduced.free.iter().zip(&mechanism.tree.diagonal).all(|(free, diagonal)| free * diagonal < WORST);
     is_sound.then_some(reduced)
 }
 
@@ -89,7 +97,13 @@ impl Looped {
             5..=8 => Room::Several(Box::new(Bench::new(&reduced))),
             _ => Room::Many(Box::new(Bench::new(&reduced))),
         };
-        Some(Self { angles: Multiplier::new(Arc::clone(&mechanism)), mechanism, reduced, room, is_portable: false })
+        Some(Self {
+            angles: Multiplier::new(Arc::clone(&mechanism)),
+            mechanism,
+            reduced,
+            room,
+            is_portable: false,
+        })
     }
 
     /// The same without instructions special to the processor: slowly to the same bits.
@@ -113,8 +127,16 @@ impl<const B: usize> Bench<B> {
         }
     }
 
-    /// Accelerations and unit vectors, by the processor's vectors where it has them; `None` near a singular position.
-    fn run(&mut self, mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64], is_portable: bool) -> Option<(&[f64], &[Complex<f64>])> {
+    /// Accelerations and unit vectors, by the processor's vectors where it has them; `None` near a singular
+    /// position.
+    fn run(
+        &mut self,
+        mechanism: &Mechanism,
+        t: Time,
+        phi: &[f64],
+        omega: &[f64],
+        is_portable: bool,
+    ) -> Option<(&[f64], &[Complex<f64>])> {
         lanes::run(Accelerations { bench: self, mechanism, t, phi, omega }, is_portable);
         (self.least >= NEAR).then(|| (&self.alpha.as_flattened()[..phi.len()], &self.z[..]))
     }
@@ -139,7 +161,13 @@ impl<const B: usize> Code for Accelerations<'_, B> {
 
 /// Accelerations \[rad/s²\] into `alpha`.
 #[inline(always)]
-fn accelerate<L: Lanes, const B: usize>(bench: &mut Bench<B>, mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64]) {
+fn accelerate<L: Lanes, const B: usize>(
+    bench: &mut Bench<B>,
+    mechanism: &Mechanism,
+    t: Time,
+    phi: &[f64],
+    omega: &[f64],
+) {
     let n = phi.len();
     let (mut angles, mut rates) = ([[0.0; 4]; B], [[0.0; 4]; B]);
     angles.as_flattened_mut()[..n].copy_from_slice(phi);
@@ -185,7 +213,14 @@ fn accelerate<L: Lanes, const B: usize>(bench: &mut Bench<B>, mechanism: &Mechan
 
 /// Writes the force \[N·m\] on every unit vector; torques act across it.
 #[inline(always)]
-fn forces(mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64], z: &[Complex<f64>], force: &mut [Complex<f64>]) {
+fn forces(
+    mechanism: &Mechanism,
+    t: Time,
+    phi: &[f64],
+    omega: &[f64],
+    z: &[Complex<f64>],
+    force: &mut [Complex<f64>],
+) {
     force.copy_from_slice(&mechanism.tree.weight);
     for spring in &mechanism.springs {
         spring.span.spread(spring.force(z, omega), |k, pull| force[k] += pull);
@@ -241,7 +276,11 @@ impl OdeSystem for Looped {
     }
 
     fn fine_rate(&mut self, t: Time, y: &[f64], low: &[f64], rate: &mut [f64]) {
-        if self.mechanism.springs.is_empty() { self.rhs(t, y, rate) } else { self.angles.fine_rate(t, y, low, rate) }
+        if self.mechanism.springs.is_empty() {
+            self.rhs(t, y, rate)
+        } else {
+            self.angles.fine_rate(t, y, low, rate)
+        }
     }
 
     fn jacobian(&mut self, t: Time, y: &[f64], jacobian: &mut [f64]) -> bool {

@@ -19,18 +19,23 @@
 //! | gamma | `convective` | what is left of C'' at a = 0 | rad/s², m/s² | rows | [`row`] |
 //! | lambda | `multiplier` | generalized force of a row is `-G_kᵀ lambda_k`; a motor's torque is `-lambda` | N m, N | rows | [`multiplier`] |
 //!
-//! **Everything planar is a sum of unit vectors.**  In a tree of hinged bodies every point is `P = p0 + Σ gamma_k z_k` with complex constants
-//! ([`point`]), so the constant Hermitian matrix `H_ij = Σ_m m_m conj(gamma_mi) gamma_mj` (`A = Re H`, `B = Im H`) is formed once per scene,
-//! and one sine and cosine per body is all the trigonometry there is.  Where many bodies make that matrix dear, the accelerations are found
-//! body by body ([`recursive`]), and those of rows from the factors left behind.
+//! **Everything planar is a sum of unit vectors.**  In a tree of hinged bodies every point is `P = p0 + Σ
+//! gamma_k z_k` with complex constants ([`point`]), so the constant Hermitian matrix `H_ij = Σ_m m_m
+//! conj(gamma_mi) gamma_mj` (`A = Re H`, `B = Im H`) is formed once per scene, and one sine and cosine per
+//! body is all the trigonometry there is.  Where many bodies make that matrix dear, the accelerations are
+//! found body by body ([`recursive`]), and those of rows from the factors left behind.
 //!
-//! **Everything else is a row.**  The hinges make a [`forest`]; those that close a loop, sliders, slots, locks and motors are rows, each a measured angle or a quadratic
-//! function of the elements ([`row`]).  Where rows lose their independence ([`rank`]) they are left out ([`schur`]); the start is found from them ([`assembly`]).
+//! **Everything else is a row.**  The hinges make a [`forest`]; those that close a loop, sliders, slots,
+//! locks and motors are rows, each a measured angle or a quadratic function of the elements ([`row`]).  Where
+//! rows lose their independence ([`rank`]) they are left out ([`schur`]); the start is found from them
+//! ([`assembly`]).
 //!
-//! The same mechanism is integrated in several forms, chosen before the first step:
-//! [`multiplier`] in (q, w) with one multiplier per row, [`looped`] the same with the solve in natural coordinates, [`elimination`] with the driven angles as known functions of
-//! time, [`canonical`] in (q, p), the form in which Gauss methods are symplectic, and [`natural`] in the unit vectors themselves, for RATTLE.
-//! Evaluated on dual numbers the same formulas are their own [`jacobian`], for implicit methods and for [`stiffness`], the fastest mode and its spring.
+//! The same mechanism is integrated in several forms, chosen before the first step: [`multiplier`] in (q, w)
+//! with one multiplier per row, [`looped`] the same with the solve in natural coordinates, [`elimination`]
+//! with the driven angles as known functions of time, [`canonical`] in (q, p), the form in which Gauss
+//! methods are symplectic, and [`natural`] in the unit vectors themselves, for RATTLE. Evaluated on dual
+//! numbers the same formulas are their own [`jacobian`], for implicit methods and for [`stiffness`], the
+//! fastest mode and its spring.
 
 #[doc(hidden)]
 pub mod assembly;
@@ -106,7 +111,8 @@ pub use units::Units;
 use crate::arithmetic::{DoubleDouble, Scalar, angle};
 use natural::Reduced;
 
-/// Time \[s\], as a pair: at 1e6 s a plain double resolves no better than 1e-10 s, and a motor's phase with it.
+/// Time \[s\], as a pair: at 1e6 s a plain double resolves no better than 1e-10 s, and a motor's phase with
+/// it.
 pub type Time = DoubleDouble;
 
 /// What a method integrates: the numbers, and everything else a restart needs to go on bit for bit.
@@ -127,7 +133,8 @@ pub struct State {
 }
 
 impl State {
-    /// A state at time zero from double-double unknowns, of which the first `angles` are angles of any number of turns.
+    /// A state at time zero from double-double unknowns, of which the first `angles` are angles of any number
+    /// of turns.
     pub fn new(unknowns: &[DoubleDouble], angles: usize) -> Self {
         let mut state = Self {
             time: Time::default(),
@@ -144,7 +151,8 @@ impl State {
     /// Puts whole turns back into the angles, and leaves them there from now on.
     pub fn unwind(&mut self) {
         for (i, turns) in self.turns.iter_mut().enumerate() {
-            let angle = DoubleDouble::sum(self.y[i], self.low[i]) + DoubleDouble::TAU.scale(std::mem::take(turns) as f64);
+            let angle = DoubleDouble::sum(self.y[i], self.low[i])
+                + DoubleDouble::TAU.scale(std::mem::take(turns) as f64);
             (self.y[i], self.low[i]) = (angle.hi, angle.lo);
         }
         self.is_winding = true;
@@ -193,10 +201,12 @@ pub trait OdeSystem {
     /// How many of the unknowns, counted from the first, are angles that may be wrapped.
     fn angles(&self) -> usize;
 
-    /// Writes y' at (t, y).  Never fails: what cannot be computed comes out non-finite, and the method stops with [`OdeSystem::label`].
+    /// Writes y' at (t, y).  Never fails: what cannot be computed comes out non-finite, and the method stops
+    /// with [`OdeSystem::label`].
     fn rhs(&mut self, t: Time, y: &[f64], rate: &mut [f64]);
 
-    /// Writes y' at a point given with what it leaves out; fields that can take the forces of stiff springs from there, which plain doubles round.
+    /// Writes y' at a point given with what it leaves out; fields that can take the forces of stiff springs
+    /// from there, which plain doubles round.
     fn fine_rate(&mut self, t: Time, y: &[f64], _low: &[f64], rate: &mut [f64]) {
         self.rhs(t, y, rate);
     }
@@ -211,7 +221,8 @@ pub trait OdeSystem {
         false
     }
 
-    /// Writes y' and what it leaves out at points given with what *they* leave out; nothing where the field cannot.
+    /// Writes y' and what it leaves out at points given with what *they* leave out; nothing where the field
+    /// cannot.
     fn exact_rates(&mut self, _points: &mut Points) {}
 
     /// Writes dy'/dy at (t, y), row by row (d × d); false, and nothing written, where the field has none.
@@ -227,8 +238,9 @@ pub trait OdeSystem {
     /// What unknown `i` is, for messages: `omega of bar2`.
     fn label(&self, i: usize) -> String;
 
-    /// What the absolute tolerance of unknown `i` counts in: 1 for angles, the units of the mechanism for positions and rates (see [`Units`]), its energy scale
-    /// \[J\] for work and other energies.  Energies are quadratures: no rate depends on them.
+    /// What the absolute tolerance of unknown `i` counts in: 1 for angles, the units of the mechanism for
+    /// positions and rates (see [`Units`]), its energy scale \[J\] for work and other energies.  Energies are
+    /// quadratures: no rate depends on them.
     fn unit(&self, _i: usize) -> f64 {
         1.0
     }
@@ -243,7 +255,8 @@ pub trait OdeSystem {
         0
     }
 
-    /// Writes the event functions (gaps over the length, or forces over the force of their contact) at (t, y): an event is a passage from positive to negative.
+    /// Writes the event functions (gaps over the length, or forces over the force of their contact) at (t,
+    /// y): an event is a passage from positive to negative.
     fn gaps(&mut self, _t: Time, _y: &[f64], _gaps: &mut [f64]) {}
 
     /// How many of the first unknowns the event functions depend on.
@@ -251,12 +264,14 @@ pub trait OdeSystem {
         self.dimension()
     }
 
-    /// An event function along a motion, its slope, and the magnitude it is rounded to; `None` for one of which only the value is known.
+    /// An event function along a motion, its slope, and the magnitude it is rounded to; `None` for one of
+    /// which only the value is known.
     fn gap(&self, _event: usize, _along: Along) -> Option<[f64; 3]> {
         None
     }
 
-    /// A bound of its second derivative up to the time `t` \[s\], where derivatives of the unknowns are at most these; none where it is infinite.
+    /// A bound of its second derivative up to the time `t` \[s\], where derivatives of the unknowns are at
+    /// most these; none where it is infinite.
     fn gap_bend(&self, _event: usize, _t: f64, _pace: f64, _first: &[f64], _second: &[f64]) -> f64 {
         f64::INFINITY
     }
@@ -275,7 +290,8 @@ pub struct Along<'a> {
     pub slope: &'a [f64],
 }
 
-/// What the first unknowns of a form are; their rates follow, then the work of motors and dampers where there are any.
+/// What the first unknowns of a form are; their rates follow, then the work of motors and dampers where there
+/// are any.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coordinates {
     /// All of them: rows are kept by multipliers.
@@ -307,7 +323,8 @@ pub trait Form {
     /// Writes the motion a state stands for.
     fn read(&mut self, state: &State, motion: &mut Motion);
 
-    /// Writes what there is to see of a state in plain doubles; cheap enough for every step where a form has its own.
+    /// Writes what there is to see of a state in plain doubles; cheap enough for every step where a form has
+    /// its own.
     fn body_angles(&mut self, state: &State, body_angles: &mut BodyAngles) {
         let mut motion = Motion::default();
         self.read(state, &mut motion);
@@ -352,7 +369,8 @@ impl BodyAngles {
 pub struct Motion {
     /// Time.
     pub time: Time,
-    /// Absolute angles \[rad\], in the order of the scene's bars and in [-π, π] but where turns matter; then positions of translational coordinates \[m\].
+    /// Absolute angles \[rad\], in the order of the scene's bars and in [-π, π] but where turns matter; then
+    /// positions of translational coordinates \[m\].
     pub phi: Vec<DoubleDouble>,
     /// Whole turns to be added to each angle.
     pub turns: Vec<i64>,

@@ -1,7 +1,8 @@
 //! The mechanism in (q, w), with one multiplier per row.
 //!
-//! Unknowns: coordinates (n), rates (n) and, where the scene has rows or forces that do work, the work of motors, dampers and applied forces and
-//! the energy the stabilizer puts in \[J\].  With `WORK = false` neither rows nor accounts exist in the code.
+//! Unknowns: coordinates (n), rates (n) and, where the scene has rows or forces that do work, the work of
+//! motors, dampers and applied forces and the energy the stabilizer puts in \[J\].  With `WORK = false`
+//! neither rows nor accounts exist in the code.
 
 use super::gap::turning;
 use super::jacobian::Jacobian;
@@ -22,7 +23,8 @@ pub struct Multiplier<const N: usize, const WORK: bool> {
 }
 
 impl<const N: usize, const WORK: bool> Multiplier<N, WORK> {
-    /// The form of a mechanism; `N` must be its number of bodies or 0, `WORK` true where it has rows or dampers.
+    /// The form of a mechanism; `N` must be its number of bodies or 0, `WORK` true where it has rows or
+    /// dampers.
     pub fn new(mechanism: Arc<Mechanism>) -> Self {
         debug_assert!(N == 0 || N == mechanism.size());
         debug_assert!(WORK || !mechanism.has_work_integral());
@@ -126,7 +128,9 @@ impl<const N: usize, const WORK: bool> OdeSystem for Multiplier<N, WORK> {
             self.kernel.accelerate::<N>(mechanism, t, &y[..n], &y[n..2 * n], Bias::default());
         }
         // What is held ends where the wall would have to pull.
-        for (&contact, multiplier) in mechanism.held.iter().zip(&self.kernel.multiplier[mechanism.standing_rows()..]) {
+        for (&contact, multiplier) in
+            mechanism.held.iter().zip(&self.kernel.multiplier[mechanism.standing_rows()..])
+        {
             gaps[contact] = mechanism.contacts[contact].pressure(*multiplier);
         }
     }

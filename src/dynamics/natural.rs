@@ -1,4 +1,5 @@
-//! The mechanism in natural coordinates: the unit vectors and translational coordinates themselves, with a *constant* mass matrix.
+//! The mechanism in natural coordinates: the unit vectors and translational coordinates themselves, with a
+//! *constant* mass matrix.
 //!
 //! ```text
 //! D z'' + Σ_k mu_k z_k + Σ_r lambda_r g_r = F(z)            [N m, N]   D = H + diag(I), Hermitian, constant
@@ -8,15 +9,19 @@
 //! W = D⁻¹ less the linear rows (module `reduced`),   S_pq = g_p·W g_q,   S mu = g·W F + convective terms,   z'' = W (F - g mu)
 //! ```
 //!
-//! No sine, no cosine and no velocity term but those of the rows; gravity is a constant force, a force f at a point `Σ gamma_k z_k` acts on
-//! z_k as `conj(gamma_k) f`, a torque tau as `tau i z_k`.  Linear rows are removed once per scene: a closed loop never enters the inner loop.  On the constraints
-//! every row has the slope of its [`ConstraintEquation`] in angles, so its multiplier is the same.  Rows that depend on others get the multiplier zero.
+//! No sine, no cosine and no velocity term but those of the rows; gravity is a constant force, a force f at a
+//! point `Σ gamma_k z_k` acts on z_k as `conj(gamma_k) f`, a torque tau as `tau i z_k`.  Linear rows are
+//! removed once per scene: a closed loop never enters the inner loop.  On the constraints every row has the
+//! slope of its [`ConstraintEquation`] in angles, so its multiplier is the same.  Rows that depend on others
+//! get the multiplier zero.
 //!
-//! Unknowns: z (2n numbers), z' (2n) \[1/s\] and, where there are motors or applied forces, p_t \[J\], the momentum conjugate to time: p_t' = -Σ lambda C_t.
-//! Energy plus p_t, less what the constant forces have done, is a first integral: p_t starts at zero and the work is known without a quadrature.
-//! None of the unknowns is an angle: whole turns are counted by the method as a vector passes the negative x axis.
+//! Unknowns: z (2n numbers), z' (2n) \[1/s\] and, where there are motors or applied forces, p_t \[J\], the
+//! momentum conjugate to time: p_t' = -Σ lambda C_t. Energy plus p_t, less what the constant forces have
+//! done, is a first integral: p_t starts at zero and the work is known without a quadrature. None of the
+//! unknowns is an angle: whole turns are counted by the method as a vector passes the negative x axis.
 //!
-//! Source: J. García de Jalón, E. Bayo, *Kinematic and Dynamic Simulation of Multibody Systems* (1994), chapter 2, for natural coordinates.
+//! Source: J. García de Jalón, E. Bayo, *Kinematic and Dynamic Simulation of Multibody Systems* (1994),
+//! chapter 2, for natural coordinates.
 
 pub mod columns;
 mod guide;
@@ -34,7 +39,8 @@ use super::{Form, Mechanism, Motion, State, Time, schur, tree};
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use std::sync::Arc;
 
-/// The largest number of bodies; every step costs a factorization of a full matrix with a row per body and guide.
+/// The largest number of bodies; every step costs a factorization of a full matrix with a row per body and
+/// guide.
 pub const NATURAL_LIMIT: usize = 256;
 
 /// Why a mechanism has no natural form.
@@ -47,7 +53,9 @@ pub enum NaturalError {
     #[error("torsion spring `{0}`: the natural form has no angles to measure it by")]
     Torsion(String),
     /// Applied forces must be constant.
-    #[error("force or torque `{0}` follows a bar or a law of time: the natural form takes constant ones only")]
+    #[error(
+        "force or torque `{0}` follows a bar or a law of time: the natural form takes constant ones only"
+    )]
     Applied(String),
     /// Impacts are not handled.
     #[error("wall `{0}`: the natural form has no impacts")]
@@ -97,7 +105,8 @@ impl Natural {
     /// The natural form of a mechanism.
     ///
     /// # Errors
-    /// Dampers, torsion springs, applied forces that are not constant, walls, bodies without inertia, or too many bodies.
+    /// Dampers, torsion springs, applied forces that are not constant, walls, bodies without inertia, or too
+    /// many bodies.
     pub fn new(mechanism: Arc<Mechanism>) -> Result<Self, NaturalError> {
         let n = mechanism.bodies.len();
         if n > NATURAL_LIMIT || !mechanism.tree.is_dense() {
@@ -131,7 +140,8 @@ impl Natural {
         let (linear, guides) = sorted_rows(&mechanism);
         let name = |body: usize| mechanism.bodies.get(body).map_or(String::new(), |body| body.name.clone());
         let reduced = Reduced::new(&mechanism, linear).map_err(|body| NaturalError::Singular(name(body)))?;
-        let weight = mechanism.tree.weight.iter().zip(&applied).map(|(&weight, &applied)| weight + applied).collect();
+        let weight =
+            mechanism.tree.weight.iter().zip(&applied).map(|(&weight, &applied)| weight + applied).collect();
         Ok(Self { mechanism, reduced, guides, weight, applied, torques })
     }
 
@@ -157,7 +167,8 @@ impl Natural {
         &self.torques
     }
 
-    /// Number of elements n: bodies, and two for every origin that moves freely, of which the second is not used.
+    /// Number of elements n: bodies, and two for every origin that moves freely, of which the second is not
+    /// used.
     pub fn elements(&self) -> usize {
         self.mechanism.coordinates()
     }
@@ -170,7 +181,11 @@ impl Natural {
     /// What a row in the loop keeps, for messages.
     pub fn row_name(&self, row: usize) -> String {
         let n = self.mechanism.bodies.len();
-        if row < n { format!("unit length of {}", self.mechanism.bodies[row].name) } else { self.guides[row - n].name.clone() }
+        if row < n {
+            format!("unit length of {}", self.mechanism.bodies[row].name)
+        } else {
+            self.guides[row - n].name.clone()
+        }
     }
 
     /// What an element is, for messages.
@@ -207,8 +222,14 @@ impl Natural {
         }
     }
 
-    /// z'' \[1/s², m/s²\] and the multipliers \[N·m, N\] of all rows, in the order of the mechanism's, at elements `z` with rates `rate` \[1/s, m/s\].
-    pub fn accelerations(&self, t: Time, z: &[Complex<f64>], rate: &[Complex<f64>]) -> (Vec<Complex<f64>>, Vec<f64>) {
+    /// z'' \[1/s², m/s²\] and the multipliers \[N·m, N\] of all rows, in the order of the mechanism's, at
+    /// elements `z` with rates `rate` \[1/s, m/s\].
+    pub fn accelerations(
+        &self,
+        t: Time,
+        z: &[Complex<f64>],
+        rate: &[Complex<f64>],
+    ) -> (Vec<Complex<f64>>, Vec<f64>) {
         let (n, bodies, rows) = (z.len(), self.mechanism.bodies.len(), self.rows());
         let mut force = vec![Complex::ZERO; n];
         self.force(z, &mut force);
@@ -224,7 +245,8 @@ impl Natural {
             multiplier[bodies + r] = guide.convective(&demand, z, rate);
         }
         let free = self.reduced.spread(&force);
-        let minv_jt: Vec<Vec<Complex<f64>>> = gradients.iter().map(|gradient| self.reduced.spread(gradient)).collect();
+        let minv_jt: Vec<Vec<Complex<f64>>> =
+            gradients.iter().map(|gradient| self.reduced.spread(gradient)).collect();
         let mut matrix = vec![0.0; rows * rows];
         for p in 0..rows {
             for q in p..rows {
@@ -292,7 +314,11 @@ impl Natural {
 
     /// What constant forces and torques have done since all elements and angles were zero \[J\].
     fn done(&self, z: &[Complex<DoubleDouble>], motion: &Motion) -> DoubleDouble {
-        let forces = self.applied.iter().zip(z).fold(DoubleDouble::ZERO, |sum, (&force, &z)| sum + Complex::of(force).dot(z));
+        let forces = self
+            .applied
+            .iter()
+            .zip(z)
+            .fold(DoubleDouble::ZERO, |sum, (&force, &z)| sum + Complex::of(force).dot(z));
         let whole = |k: usize| motion.phi[k] + DoubleDouble::TAU.scale(motion.turns[k] as f64);
         self.torques.iter().fold(forces, |sum, &Torque { body, base, torque }| {
             let angle = base.map_or(whole(body), |base| whole(body) - whole(base));
@@ -354,7 +380,8 @@ impl Form for Natural {
         state.time = motion.time;
         // An angle within rounding of ±π may come back with the other sign.
         let turn = |(k, &z): (usize, &Complex<DoubleDouble>)| {
-            motion.turns[k].saturating_add(((motion.phi[k] - angle(z)).hi / std::f64::consts::TAU).round() as i64)
+            motion.turns[k]
+                .saturating_add(((motion.phi[k] - angle(z)).hi / std::f64::consts::TAU).round() as i64)
         };
         state.turns = z.iter().take(bodies).enumerate().map(turn).collect();
         state
@@ -374,7 +401,11 @@ impl Form for Natural {
             (motion.phi[x], motion.phi[x + 1]) = (z[x].re, z[x].im);
             (motion.omega[x], motion.omega[x + 1]) = (rate[x].re, rate[x].im);
         }
-        motion.work = if self.has_work_integral() { self.done(&z, motion) - state.unknown(4 * n) } else { DoubleDouble::ZERO };
+        motion.work = if self.has_work_integral() {
+            self.done(&z, motion) - state.unknown(4 * n)
+        } else {
+            DoubleDouble::ZERO
+        };
     }
 }
 

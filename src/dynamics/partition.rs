@@ -4,8 +4,8 @@
 //! q = S u + s(t):   q_i = u_base(i) + Σ ± theta(t)
 //! ```
 //!
-//! Motors connect angles like hinges connect points: within a group of bodies tied to one another one angle is free, or none
-//! where the group is tied to the ground.
+//! Motors connect angles like hinges connect points: within a group of bodies tied to one another one angle
+//! is free, or none where the group is tied to the ground.
 
 use super::compile::CompileError;
 use super::constraint::{ConstraintEquation, Measure};
@@ -23,15 +23,17 @@ pub struct DependentAngle {
 }
 
 impl DependentAngle {
-    /// The known part s(t) of the angle: the sum of the laws, of which a single one keeps its own numbers to the last bit.
+    /// The known part s(t) of the angle: the sum of the laws, of which a single one keeps its own numbers to
+    /// the last bit.
     #[inline]
     pub fn drive<T: Real>(&self, t: Time) -> Phase<T> {
-        let sum = self.laws.iter().map(|(sign, law)| law.at::<T>(t).times(*sign)).reduce(|sum, phase| Phase {
-            angle: angle::difference(sum.angle, -phase.angle),
-            unit: sum.unit * phase.unit,
-            rate: sum.rate + phase.rate,
-            acceleration: sum.acceleration + phase.acceleration,
-        });
+        let sum =
+            self.laws.iter().map(|(sign, law)| law.at::<T>(t).times(*sign)).reduce(|sum, phase| Phase {
+                angle: angle::difference(sum.angle, -phase.angle),
+                unit: sum.unit * phase.unit,
+                rate: sum.rate + phase.rate,
+                acceleration: sum.acceleration + phase.acceleration,
+            });
         sum.unwrap_or(Phase { unit: Complex::new(T::ONE, T::ZERO), ..Phase::default() })
     }
 
@@ -49,7 +51,9 @@ impl DependentAngle {
     #[inline(always)]
     pub fn place<T: Real>(&self, t: Time, u: &[T]) -> Phase<T> {
         match (self.base, &self.laws[..]) {
-            (Some(base), []) => Phase { angle: u[base], unit: Complex::unit(u[base]), rate: T::ZERO, acceleration: T::ZERO },
+            (Some(base), []) => {
+                Phase { angle: u[base], unit: Complex::unit(u[base]), rate: T::ZERO, acceleration: T::ZERO }
+            }
             (None, [(sign, law)]) => law.at::<T>(t).times(*sign),
             _ => self.compose(t, u),
         }
@@ -75,8 +79,13 @@ pub struct CoordinatePartition {
 }
 
 impl CoordinatePartition {
-    /// Walks the given angles outwards from the ground and from the first body of every group left; translational coordinates are coordinates of their own.
-    pub(super) fn new(bodies: usize, coordinates: usize, rows: &[ConstraintEquation]) -> Result<Self, CompileError> {
+    /// Walks the given angles outwards from the ground and from the first body of every group left;
+    /// translational coordinates are coordinates of their own.
+    pub(super) fn new(
+        bodies: usize,
+        coordinates: usize,
+        rows: &[ConstraintEquation],
+    ) -> Result<Self, CompileError> {
         let given: Vec<_> = (rows.iter())
             .filter_map(|row| match (&row.measure, &row.law) {
                 (&Measure::Angle { body, base }, Some(law)) => Some((row, body, base, law)),
@@ -111,14 +120,16 @@ impl CoordinatePartition {
                     let Some(body) = far.filter(|&body| partition[body].is_none()) else {
                         return Err(CompileError::Redundant(row.name.clone()));
                     };
-                    let mut dependent_angle = near.and_then(|near| partition[near].clone()).unwrap_or_default();
+                    let mut dependent_angle =
+                        near.and_then(|near| partition[near].clone()).unwrap_or_default();
                     dependent_angle.laws.push((sign, law.clone()));
                     partition[body] = Some(dependent_angle);
                     front.push(far);
                 }
             }
         }
-        let mut partition: Vec<DependentAngle> = partition.into_iter().map(Option::unwrap_or_default).collect();
+        let mut partition: Vec<DependentAngle> =
+            partition.into_iter().map(Option::unwrap_or_default).collect();
         for origin_point in bodies..coordinates {
             partition.push(DependentAngle { base: Some(independent.len()), laws: Vec::new() });
             independent.push(origin_point);
@@ -234,7 +245,8 @@ impl DependentAngle {
     /// The body's angle, the driven share of its rate, and its turns.
     fn read(&self, state: &State, is_angle: bool) -> (DoubleDouble, DoubleDouble, i64) {
         let turns = |base: usize| if is_angle { state.turns[base] } else { 0 };
-        let (base, turns) = self.base.map_or((DoubleDouble::ZERO, 0), |base| (state.unknown(base), turns(base)));
+        let (base, turns) =
+            self.base.map_or((DoubleDouble::ZERO, 0), |base| (state.unknown(base), turns(base)));
         match (self.base, &self.laws[..]) {
             (Some(_), []) => (base, DoubleDouble::ZERO, turns),
             (None, [(sign, law)]) => {

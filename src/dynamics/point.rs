@@ -1,7 +1,8 @@
 //! A point of the mechanism as a linear functional of its elements: `P = p0 + Σ gamma_k z_k + Σ ± zeta_f`.
 //!
-//! Elements are the bodies' unit vectors z_k and, of bodies that hang on nothing, the positions zeta = x + iy of their translational coordinates.  Everything that
-//! acts at a point (hinge, spring, wall, motor) is built from this list alone:
+//! Elements are the bodies' unit vectors z_k and, of bodies that hang on nothing, the positions zeta = x + iy
+//! of their translational coordinates.  Everything that acts at a point (hinge, spring, wall, motor) is built
+//! from this list alone:
 //!
 //! ```text
 //! P'  = Σ i gamma_k z_k w_k + Σ ± zeta_f'
@@ -46,7 +47,8 @@ impl Point {
 
     /// The vector from `other` to this point.
     pub fn minus(&self, other: &Self) -> Self {
-        let (mut mine, mut others) = (self.terms.iter().copied().peekable(), other.terms.iter().copied().peekable());
+        let (mut mine, mut others) =
+            (self.terms.iter().copied().peekable(), other.terms.iter().copied().peekable());
         let mut terms = Vec::with_capacity(self.terms.len() + other.terms.len());
         // Both lists rise; equal terms cancel exactly.
         while let Some(first) = mine.peek().into_iter().chain(others.peek()).map(|term| term.0).min() {
@@ -80,14 +82,21 @@ impl Point {
     /// P' \[m/s\].
     #[inline(always)]
     pub fn velocity<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
-        let turned = self.terms.iter().fold(Complex::ZERO, |sum, &(k, gamma)| sum + z[k].turn(gamma).left().times(omega[k]));
-        self.shifts.iter().fold(turned, |sum, &(x, share)| sum + Complex::new(omega[x], omega[x + 1]).times(T::of(share)))
+        let turned = self
+            .terms
+            .iter()
+            .fold(Complex::ZERO, |sum, &(k, gamma)| sum + z[k].turn(gamma).left().times(omega[k]));
+        self.shifts
+            .iter()
+            .fold(turned, |sum, &(x, share)| sum + Complex::new(omega[x], omega[x + 1]).times(T::of(share)))
     }
 
     /// P'' at zero angular acceleration \[m/s²\].
     #[inline(always)]
     pub fn convective<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
-        self.terms.iter().fold(Complex::ZERO, |sum, &(k, gamma)| sum - z[k].turn(gamma).times(omega[k] * omega[k]))
+        self.terms
+            .iter()
+            .fold(Complex::ZERO, |sum, &(k, gamma)| sum - z[k].turn(gamma).times(omega[k] * omega[k]))
     }
 
     /// P'' \[m/s²\].
@@ -137,19 +146,25 @@ mod tests {
 
     #[test]
     fn rates_are_the_derivatives_of_the_position() {
-        let point = Point::ground([0.3, -0.2]).along(0, Complex::new(0.6, 0.1)).along(2, Complex::new(0.2, -0.4));
+        let point =
+            Point::ground([0.3, -0.2]).along(0, Complex::new(0.6, 0.1)).along(2, Complex::new(0.2, -0.4));
         let (phi, omega, alpha) = ([0.4, 9.0, -1.1], [1.5, 9.0, -0.7], [0.3, 9.0, 2.0]);
-        let at = |t: f64| -> Vec<Complex<f64>> { (0..3).map(|k| Complex::unit(phi[k] + omega[k] * t + alpha[k] * t * t / 2.0)).collect() };
+        let at = |t: f64| -> Vec<Complex<f64>> {
+            (0..3).map(|k| Complex::unit(phi[k] + omega[k] * t + alpha[k] * t * t / 2.0)).collect()
+        };
         let h = 1e-4;
-        let (before, now, after) = (point.position(&at(-h)), point.position(&at(0.0)), point.position(&at(h)));
+        let (before, now, after) =
+            (point.position(&at(-h)), point.position(&at(0.0)), point.position(&at(h)));
         let first = (after - before).times(0.5 / h) - point.velocity(&at(0.0), &omega);
-        let second = (after + before - now - now).times(1.0 / (h * h)) - point.acceleration(&at(0.0), &omega, &alpha);
+        let second =
+            (after + before - now - now).times(1.0 / (h * h)) - point.acceleration(&at(0.0), &omega, &alpha);
         assert!(first.norm_squared().sqrt() < 1e-7 && second.norm_squared().sqrt() < 1e-6);
     }
 
     #[test]
     fn a_force_does_the_work_its_generalized_force_does() {
-        let point = Point::ground([0.0, 0.0]).along(0, Complex::new(0.6, 0.1)).along(1, Complex::new(0.2, -0.4));
+        let point =
+            Point::ground([0.0, 0.0]).along(0, Complex::new(0.6, 0.1)).along(1, Complex::new(0.2, -0.4));
         let (z, omega) = ([Complex::unit(0.4), Complex::unit(-1.0)], [1.5, -0.7]);
         let force = Complex::new(2.0, -3.0);
         let mut load = [0.0; 2];

@@ -7,7 +7,8 @@
 //! e' = i z w, e'' = i z a - z w² of a unit vector;  e' = zeta', e'' = zeta'' of an origin
 //! ```
 //!
-//! Points on lines of the ground are linear, points on lines of other bodies bilinear; nothing planar needs more.
+//! Points on lines of the ground are linear, points on lines of other bodies bilinear; nothing planar needs
+//! more.
 
 use super::constraint::{Linearised, Posture};
 use super::point::Point;
@@ -31,7 +32,12 @@ impl Quadratic {
     pub fn along(point: &Point, direction: Complex<f64>, angles: usize) -> Self {
         let turning = point.terms.iter().map(|&(k, gamma)| (k, gamma.conj() * direction));
         let carried = point.shifts.iter().map(|&(x, share)| (x, direction.times(share)));
-        Self { angles, constant: direction.dot(point.root), linear: turning.chain(carried).collect(), bilinear: Vec::new() }
+        Self {
+            angles,
+            constant: direction.dot(point.root),
+            linear: turning.chain(carried).collect(),
+            bilinear: Vec::new(),
+        }
     }
 
     /// Re(conj(d z_b) D): how far a vector reaches along a direction d of body b.
@@ -63,7 +69,9 @@ impl Quadratic {
                 false => found.bilinear.push((j, j, Complex::new(share * gamma.norm_squared(), 0.0))),
             }
             let others = terms[place + 1..].iter();
-            found.bilinear.extend(others.map(|&(k, other)| (j, k, (gamma.conj() * other).times(2.0 * share))));
+            found
+                .bilinear
+                .extend(others.map(|&(k, other)| (j, k, (gamma.conj() * other).times(2.0 * share))));
         }
         found.linear.retain(|term| term.1 != Complex::ZERO);
         found
@@ -71,14 +79,16 @@ impl Quadratic {
 
     /// The coordinates it depends on; some may come up more than once.
     pub fn coordinates(&self) -> Vec<usize> {
-        let elements = self.linear.iter().map(|term| term.0).chain(self.bilinear.iter().flat_map(|&(j, k, _)| [j, k]));
+        let elements =
+            self.linear.iter().map(|term| term.0).chain(self.bilinear.iter().flat_map(|&(j, k, _)| [j, k]));
         elements.flat_map(|k| std::iter::once(k).chain((k >= self.angles).then_some(k + 1))).collect()
     }
 
     /// Q at the elements `z`.
     #[inline]
     pub fn value<T: Scalar>(&self, z: &[Complex<T>]) -> T {
-        let linear = self.linear.iter().fold(T::of(self.constant), |sum, &(k, g)| sum + Complex::of(g).dot(z[k]));
+        let linear =
+            self.linear.iter().fold(T::of(self.constant), |sum, &(k, g)| sum + Complex::of(g).dot(z[k]));
         self.bilinear.iter().fold(linear, |sum, &(j, k, h)| sum + z[j].dot(z[k].turn(h)))
     }
 
@@ -116,7 +126,9 @@ impl Quadratic {
                 sum -= gradient.dot(z[k]) * (omega[k] * omega[k]);
             }
         });
-        let rate = |k: usize| if k < self.angles { z[k].left().times(omega[k]) } else { Complex::new(omega[k], omega[k + 1]) };
+        let rate = |k: usize| {
+            if k < self.angles { z[k].left().times(omega[k]) } else { Complex::new(omega[k], omega[k + 1]) }
+        };
         self.bilinear.iter().fold(sum, |sum, &(j, k, h)| sum + rate(j).dot(rate(k).turn(h)).scale(2.0))
     }
 

@@ -4,9 +4,11 @@
 //! A = G D Gᵀ = L P Lᵀ,   share of constraint r:  P_r / Σ_k b_rk d_k,   |g_rk|² <= b_rk          D: d_k = 1 / max_r b_rk / max_j (b_rj d_j)
 //! ```
 //!
-//! Pivots of S = G M⁻¹ Gᵀ are small where constraints lose their independence, and where members are light or levers long.  Those of A know no masses, and D takes out
-//! units and lengths: the bounds b of the entries of G are scaled to one, column by column and row by row.  The share is about the square of the
-//! distance from a singular position.  Pivots are taken in the order of S, so that the constraints that A finds dependent are those that have no pivot in S.
+//! Pivots of S = G M⁻¹ Gᵀ are small where constraints lose their independence, and where members are light or
+//! levers long.  Those of A know no masses, and D takes out units and lengths: the bounds b of the entries of
+//! G are scaled to one, column by column and row by row.  The share is about the square of the distance from
+//! a singular position.  Pivots are taken in the order of S, so that the constraints that A finds dependent
+//! are those that have no pivot in S.
 
 use super::Mechanism;
 use super::constraint::{ConstraintEquation, Measure, Way};
@@ -50,7 +52,8 @@ impl Metric {
     /// Of constraints with these levers in so many columns.
     pub fn new(levers: &[Levers], columns: usize, redundant: usize) -> Self {
         let inverse = |most: f64| if most > 0.0 { 1.0 / most } else { 1.0 };
-        let most = |levers: &Levers, d: &[f64]| levers.iter().fold(0.0, |most: f64, &(k, b)| most.max(b * d[k]));
+        let most =
+            |levers: &Levers, d: &[f64]| levers.iter().fold(0.0, |most: f64, &(k, b)| most.max(b * d[k]));
         let mut d = vec![1.0; columns];
         for _ in 0..ROUNDS {
             let mut largest = vec![0.0_f64; columns];
@@ -118,14 +121,28 @@ impl Verdict {
         self.weakest.share
     }
 
-    /// The weakest constraint where S has been factored with `mass` as its own and these reciprocal pivots and scales; `again` factors it anew, without the constraints that
-    /// are to be left out or, with none, as it was, and tells the least share of a pivot.
+    /// The weakest constraint where S has been factored with `mass` as its own and these reciprocal pivots
+    /// and scales; `again` factors it anew, without the constraints that are to be left out or, with none, as
+    /// it was, and tells the least share of a pivot.
     ///
     /// Where masses do not matter much the position alone makes pivots small, and what was left out stays so.
-    pub fn settle(&self, mass: Weakest, [pivot, scale]: [&[f64]; 2], mut again: impl FnMut(Option<&[bool]>) -> f64) -> Weakest {
-        let is_right = pivot.iter().zip(&self.is_left_out).all(|(&pivot, &is_left_out)| (pivot == 0.0) == is_left_out);
-        let kept = || pivot.iter().zip(scale).filter(|(pivot, _)| **pivot != 0.0).map(|(pivot, scale)| 1.0 / (pivot * scale));
-        let share = if is_right { kept().fold(f64::INFINITY, f64::min) } else { again(Some(&self.is_left_out)) };
+    pub fn settle(
+        &self,
+        mass: Weakest,
+        [pivot, scale]: [&[f64]; 2],
+        mut again: impl FnMut(Option<&[bool]>) -> f64,
+    ) -> Weakest {
+        let is_right =
+            pivot.iter().zip(&self.is_left_out).all(|(&pivot, &is_left_out)| (pivot == 0.0) == is_left_out);
+        let kept = || {
+            pivot
+                .iter()
+                .zip(scale)
+                .filter(|(pivot, _)| **pivot != 0.0)
+                .map(|(pivot, scale)| 1.0 / (pivot * scale))
+        };
+        let share =
+            if is_right { kept().fold(f64::INFINITY, f64::min) } else { again(Some(&self.is_left_out)) };
         let is_delicate = share.is_nan() || share < LOSS * self.kept;
         let is_near = self.weakest.share < WIDE;
         if is_delicate || self.weakest.share >= NEAR {
@@ -143,11 +160,14 @@ impl ConstraintEquation {
     pub fn levers(&self, size: f64) -> Levers {
         let square = size * size;
         if let Some(Way::Span(span, _)) = self.push.as_ref().map(|push| &push.way) {
-            let carried = span.shifts.iter().flat_map(|&(x, share)| [(x, share * share), (x + 1, share * share)]);
+            let carried =
+                span.shifts.iter().flat_map(|&(x, share)| [(x, share * share), (x + 1, share * share)]);
             return span.terms.iter().map(|&(k, gamma)| (k, gamma.norm_squared())).chain(carried).collect();
         }
         let place = match &self.measure {
-            Measure::Angle { body, base } => return std::iter::once(*body).chain(*base).map(|k| (k, 1.0)).collect(),
+            Measure::Angle { body, base } => {
+                return std::iter::once(*body).chain(*base).map(|k| (k, 1.0)).collect();
+            }
             Measure::Place(place) => place,
         };
         let mut levers = Levers::new();

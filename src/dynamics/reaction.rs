@@ -4,9 +4,11 @@
 //! F = Σ over the subtree  m (a_c - g) - applied forces - forces of rows
 //! ```
 //!
-//! No unknowns are added for it; it equals the multipliers of the pinned form.  A hinge that closes a loop carries the force of its own rows.
+//! No unknowns are added for it; it equals the multipliers of the pinned form.  A hinge that closes a loop
+//! carries the force of its own rows.
 //!
-//! Signs: the force of a hinge or weld is the one its first body, in the scene's order, exerts on its second, whichever of the two is the ground.
+//! Signs: the force of a hinge or weld is the one its first body, in the scene's order, exerts on its second,
+//! whichever of the two is the ground.
 
 use super::compile::Joint;
 use super::constraint::Posture;
@@ -17,7 +19,12 @@ use crate::arithmetic::Complex;
 
 impl Mechanism {
     /// Accelerations \[m/s²\] of the centres of mass.
-    pub fn centre_accelerations(&self, z: &[Complex<f64>], omega: &[f64], alpha: &[f64]) -> Vec<Complex<f64>> {
+    pub fn centre_accelerations(
+        &self,
+        z: &[Complex<f64>],
+        omega: &[f64],
+        alpha: &[f64],
+    ) -> Vec<Complex<f64>> {
         let mut found = vec![Complex::ZERO; self.bodies.len()];
         self.forest.origin_accelerations(z, omega, alpha, &mut found);
         for (k, (found, body)) in found.iter_mut().zip(&self.bodies).enumerate() {
@@ -26,9 +33,16 @@ impl Mechanism {
         found
     }
 
-    /// Force \[N\] of the first body of each hinge on the second (in the scene's order), from an evaluation of the equations at these angles
-    /// \[rad\] and rates \[rad/s\]: its `load` must hold the accelerations, its `multiplier` those of all rows.
-    pub fn hinge_forces(&self, t: Time, kernel: &Kernel<f64>, phi: &[f64], omega: &[f64]) -> Vec<Complex<f64>> {
+    /// Force \[N\] of the first body of each hinge on the second (in the scene's order), from an evaluation
+    /// of the equations at these angles \[rad\] and rates \[rad/s\]: its `load` must hold the accelerations,
+    /// its `multiplier` those of all rows.
+    pub fn hinge_forces(
+        &self,
+        t: Time,
+        kernel: &Kernel<f64>,
+        phi: &[f64],
+        omega: &[f64],
+    ) -> Vec<Complex<f64>> {
         let (z, alpha) = (&kernel.z, &kernel.load);
         let mut needed = self.centre_accelerations(z, omega, alpha);
         for (needed, body) in needed.iter_mut().zip(&self.bodies) {
@@ -51,8 +65,14 @@ impl Mechanism {
         self.transmitted(z, &kernel.multiplier, needed)
     }
 
-    /// The forces of the hinges and welds under which each body gets the force \[N\] it needs, less what rows with these multipliers push it with.
-    pub(super) fn transmitted(&self, z: &[Complex<f64>], multipliers: &[f64], mut needed: Vec<Complex<f64>>) -> Vec<Complex<f64>> {
+    /// The forces of the hinges and welds under which each body gets the force \[N\] it needs, less what rows
+    /// with these multipliers push it with.
+    pub(super) fn transmitted(
+        &self,
+        z: &[Complex<f64>],
+        multipliers: &[f64],
+        mut needed: Vec<Complex<f64>>,
+    ) -> Vec<Complex<f64>> {
         for (row, &multiplier) in self.constraints.iter().zip(multipliers) {
             let Some(push) = &row.push else { continue };
             let direction = push.direction(z);

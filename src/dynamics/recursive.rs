@@ -1,7 +1,9 @@
-//! The hinge trees body by body: accelerations in a number of operations proportional to the number of bodies.
+//! The hinge trees body by body: accelerations in a number of operations proportional to the number of
+//! bodies.
 //!
-//! What hangs on a hinge answers an acceleration `a` of the hinge with the force `R = A a + b` on it: a symmetric apparent mass A (2 × 2) and a
-//! force b, whatever the joints beyond are free to do.  Both are found from the outermost bodies inwards; then the accelerations follow outwards.
+//! What hangs on a hinge answers an acceleration `a` of the hinge with the force `R = A a + b` on it: a
+//! symmetric apparent mass A (2 × 2) and a force b, whatever the joints beyond are free to do.  Both are
+//! found from the outermost bodies inwards; then the accelerations follow outwards.
 //!
 //! ```text
 //! u_k = i z_p r_k                           lever of hinge k about the hinge of its parent p: O_k' = O_p' + u_k w_p
@@ -13,17 +15,20 @@
 //! outwards:  alpha_k = (e - h·a_k)/d,   a_j = a_k + u_j alpha_k,   a_ground = 0
 //! ```
 //!
-//! Sums run over the bodies j that hang on k; r is the hinge on the parent and c the centre of mass, both from the body's own hinge in the body's
-//! directions; x·y is the dot product of the plane, and `i x · y` the moment of y with the arm x.  Hinge k accelerates with n_k + g + a_k.
-//! An origin that moves freely takes up no force: `A a = Q - b` there, solved as two more coordinates.
+//! Sums run over the bodies j that hang on k; r is the hinge on the parent and c the centre of mass, both
+//! from the body's own hinge in the body's directions; x·y is the dot product of the plane, and `i x · y` the
+//! moment of y with the arm x.  Hinge k accelerates with n_k + g + a_k. An origin that moves freely takes up
+//! no force: `A a = Q - b` there, solved as two more coordinates.
 //!
-//! Eliminated this way M is L D Lᵀ with D the diagonal of the d and L the inward pass: the e are L⁻¹ of the load, and for two loads P and Q
-//! `Pᵀ M⁻¹ Q = Σ e_P e_Q / d`, of which [`rows`] makes use.
+//! Eliminated this way M is L D Lᵀ with D the diagonal of the d and L the inward pass: the e are L⁻¹ of the
+//! load, and for two loads P and Q `Pᵀ M⁻¹ Q = Σ e_P e_Q / d`, of which [`rows`] makes use.
 //!
-//! Source: R. Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 7.3, the articulated-body algorithm; that its passes are triangular
-//! factors: G. Rodriguez, *Kalman filtering, smoothing, and recursive robot arm forward and inverse dynamics*, IEEE J. Robotics Autom. 3 (1987).
-//! Ours: in the plane, with absolute angles and forces taken at the hinges, a hinge passes on no moment, so that two numbers by two suffice; and the
-//! products with u are formed before the division by d is done, which is what the recursion waits for.
+//! Source: R. Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 7.3, the articulated-body
+//! algorithm; that its passes are triangular factors: G. Rodriguez, *Kalman filtering, smoothing, and
+//! recursive robot arm forward and inverse dynamics*, IEEE J. Robotics Autom. 3 (1987). Ours: in the plane,
+//! with absolute angles and forces taken at the hinges, a hinge passes on no moment, so that two numbers by
+//! two suffice; and the products with u are formed before the division by d is done, which is what the
+//! recursion waits for.
 
 pub mod evaluation;
 pub mod load;
@@ -71,7 +76,8 @@ pub struct Links {
     gravity: Complex<f64>,
     /// Σ m gamma of each body, over all that it carries, itself included \[kg·m\].
     ///
-    /// In double-double: M knows nothing of them, and what sums rounded otherwise leave is no mechanism's motion.
+    /// In double-double: M knows nothing of them, and what sums rounded otherwise leave is no mechanism's
+    /// motion.
     carried: Vec<Complex<DoubleDouble>>,
 }
 
@@ -88,8 +94,17 @@ impl Links {
         }
         let carries_one = |slot: usize| last[slot] != 0 && before[last[slot]] == 0;
         let origin = Complex::ZERO;
-        let ground =
-            Link { body: 0, parent: 0, origin_point: 0, hinge: origin, moment: origin, mass: 0.0, inertia: 1.0, forks: true, alone: false };
+        let ground = Link {
+            body: 0,
+            parent: 0,
+            origin_point: 0,
+            hinge: origin,
+            moment: origin,
+            mass: 0.0,
+            inertia: 1.0,
+            forks: true,
+            alone: false,
+        };
         let (mut links, mut place) = (Vec::with_capacity(n + 1), vec![0; n]);
         let mut front = vec![0usize];
         while let Some(slot) = front.pop() {
@@ -137,7 +152,8 @@ impl Links {
 /// Σ m gamma of each body: of its own mass and of what hangs on it, at their hinges.
 fn carried(links: &[Link]) -> Vec<Complex<DoubleDouble>> {
     let mut mass: Vec<DoubleDouble> = links.iter().map(|link| DoubleDouble::of(link.mass)).collect();
-    let mut carried: Vec<Complex<DoubleDouble>> = links.iter().map(|link| Complex::of(-link.moment.left())).collect();
+    let mut carried: Vec<Complex<DoubleDouble>> =
+        links.iter().map(|link| Complex::of(-link.moment.left())).collect();
     for k in (1..links.len()).rev() {
         let parent = links[k].parent;
         let (beyond, hinge) = (mass[k], Complex::of(links[k].hinge));
@@ -230,8 +246,9 @@ impl<T: Scalar> Outer<T> {
 
 /// Scratch space of an evaluation; nothing is allocated after [`Recursive::new`].
 ///
-/// An evaluation is [`convect`](Self::convect), where there are forces [`burden`](Self::burden), [`fold`](Self::inward_pass), where there are rows what
-/// [`rows`] does, and [`outward_pass`](Self::outward_pass).
+/// An evaluation is [`convect`](Self::convect), where there are forces [`burden`](Self::burden),
+/// [`fold`](Self::inward_pass), where there are rows what [`rows`] does, and
+/// [`outward_pass`](Self::outward_pass).
 #[derive(Clone, Debug)]
 pub struct Recursive<T> {
     /// The ground, then the bodies.
@@ -339,7 +356,8 @@ impl<T: Real> Recursive<T> {
         }
     }
 
-    /// The second outward pass: the accelerations \[rad/s², m/s²\] of all coordinates, or M⁻¹ of the load whose e are in place.
+    /// The second outward pass: the accelerations \[rad/s², m/s²\] of all coordinates, or M⁻¹ of the load
+    /// whose e are in place.
     #[inline]
     pub fn outward_pass(&mut self, links: &Links, alpha: &mut [T]) {
         let all = &links.links[..];

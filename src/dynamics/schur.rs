@@ -4,10 +4,13 @@
 //! S = L D Lᵀ,   share of row r:  D_r / Σ_k |g_rk|²/d_k         about the square of how far the mechanism is from a singular position
 //! ```
 //!
-//! Where a mechanism has all its links in line, rows lose their independence: pivots fall with the square of the distance, and the multipliers of what is
-//! left are rounding divided by it.  Light members and long levers make pivots small as well: below [`NEAR`] the [`rank`](super::rank) of the rows decides, which knows
-//! no masses.  A row whose share there is below [`DROPPED`] is left out, in accelerations and projections alike, and its multiplier is zero.  Against the row's constant scale, because whole rows vanish together: a pivot over the present diagonal would not see it.
-//! Rows that depend on others for ever are left out in the same way.
+//! Where a mechanism has all its links in line, rows lose their independence: pivots fall with the square of
+//! the distance, and the multipliers of what is left are rounding divided by it.  Light members and long
+//! levers make pivots small as well: below [`NEAR`] the [`rank`](super::rank) of the rows decides, which
+//! knows no masses.  A row whose share there is below [`DROPPED`] is left out, in accelerations and
+//! projections alike, and its multiplier is zero.  Against the row's constant scale, because whole rows
+//! vanish together: a pivot over the present diagonal would not see it. Rows that depend on others for ever
+//! are left out in the same way.
 
 use super::Mechanism;
 use super::constraint::{ConstraintEquation, Measure};
@@ -72,23 +75,31 @@ pub fn is_deep<T: Real>(pivot: &[T], diagonal: impl Iterator<Item = f64>) -> boo
 }
 
 impl Measure {
-    /// Σ |g_k|² `free`_k: what S has at most on a row's place without other rows, up to a factor of the number of bodies \[1/kg, 1/(kg·m²)\], where
-    /// element k alone would give way by `free`(k) to a force of one.
+    /// Σ |g_k|² `free`_k: what S has at most on a row's place without other rows, up to a factor of the
+    /// number of bodies \[1/kg, 1/(kg·m²)\], where element k alone would give way by `free`(k) to a force of
+    /// one.
     pub fn scale(&self, free: impl Fn(usize) -> f64) -> f64 {
         match self {
             Self::Angle { body, base } => free(*body) + base.map_or(0.0, free),
             Self::Place(place) => {
                 let linear: f64 = place.linear.iter().map(|&(k, g)| g.norm_squared() * free(k)).sum();
-                // Of the two elements of a product one is a unit vector; an origin is not bounded, so that the other counts alone.
+                // Of the two elements of a product one is a unit vector; an origin is not bounded, so that
+                // the other counts alone.
                 let other = |j: usize, k: usize| if k < place.angles { free(j) } else { 0.0 };
-                linear + place.bilinear.iter().map(|&(j, k, h)| h.norm_squared() * (free(k) + other(j, k))).sum::<f64>()
+                linear
+                    + place
+                        .bilinear
+                        .iter()
+                        .map(|&(j, k, h)| h.norm_squared() * (free(k) + other(j, k)))
+                        .sum::<f64>()
             }
         }
     }
 }
 
 impl ConstraintEquation {
-    /// What pivots of this row are measured against: its measure's scale with the diagonal of M \[1/kg, 1/(kg·m²)\].
+    /// What pivots of this row are measured against: its measure's scale with the diagonal of M \[1/kg,
+    /// 1/(kg·m²)\].
     pub fn scale(&self, tree: &Tree) -> f64 {
         self.measure.scale(|k| 1.0 / tree.diagonal[k])
     }
@@ -101,11 +112,17 @@ impl Mechanism {
     }
 }
 
-/// S = L D Lᵀ in place above the diagonal, from the last row to the first, and the reciprocal pivots: zero for rows left out.
+/// S = L D Lᵀ in place above the diagonal, from the last row to the first, and the reciprocal pivots: zero
+/// for rows left out.
 ///
 /// Solved with [`tree::solve`](super::tree::solve), which then gives these rows no multiplier.
 #[inline(always)]
-pub fn factor<T: Real, const R: usize>(rows: usize, schur: &mut [T], pivot: &mut [T], scale: &[f64]) -> Weakest {
+pub fn factor<T: Real, const R: usize>(
+    rows: usize,
+    schur: &mut [T],
+    pivot: &mut [T],
+    scale: &[f64],
+) -> Weakest {
     let scale = &scale[..size::<R>(rows)];
     let mut weakest = Weakest::NONE;
     factor_by::<T, R>(rows, schur, pivot, |k, pivot| weakest.reciprocal(k, pivot, scale[k]));
@@ -114,7 +131,12 @@ pub fn factor<T: Real, const R: usize>(rows: usize, schur: &mut [T], pivot: &mut
 
 /// The same, `reciprocal` telling the reciprocal of a row's pivot, or zero where the row is left out.
 #[inline(always)]
-pub fn factor_by<T: Real, const R: usize>(rows: usize, schur: &mut [T], pivot: &mut [T], mut reciprocal: impl FnMut(usize, T) -> T) {
+pub fn factor_by<T: Real, const R: usize>(
+    rows: usize,
+    schur: &mut [T],
+    pivot: &mut [T],
+    mut reciprocal: impl FnMut(usize, T) -> T,
+) {
     let r = size::<R>(rows);
     let (schur, pivot) = (&mut schur[..r * r], &mut pivot[..r]);
     for k in (0..r).rev() {
@@ -140,7 +162,8 @@ pub fn product<T: Real>(rows: usize, jacobian: &[T], minv_jt: &[T], schur: &mut 
     }
 }
 
-/// What there is to do where a factored S has small pivots: the rank of the rows is looked at, and S factored again where other rows are to be left out.
+/// What there is to do where a factored S has small pivots: the rank of the rows is looked at, and S factored
+/// again where other rows are to be left out.
 #[cold]
 pub fn look_closer<T: Real>(
     metric: &Metric,
@@ -156,7 +179,9 @@ pub fn look_closer<T: Real>(
         product(rows, jacobian, minv_jt, schur);
         let Some(is_left_out) = is_left_out else { return factor::<T, 0>(rows, schur, pivot, scale).share };
         let mut weakest = Weakest::NONE;
-        factor_by::<T, 0>(rows, schur, pivot, |k, pivot| weakest.reciprocal_kept(k, pivot, scale[k], is_left_out[k]));
+        factor_by::<T, 0>(rows, schur, pivot, |k, pivot| {
+            weakest.reciprocal_kept(k, pivot, scale[k], is_left_out[k])
+        });
         weakest.share
     })
 }

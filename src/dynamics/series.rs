@@ -9,17 +9,20 @@
 //!   w_{m+1} = a_m/(m+1),  z_{m+2} = i (f_m+1 + w_{m+1} z_0)/(m+2),  R_m += H i a_m z_0
 //! ```
 //!
-//! Nothing but Cauchy products: four real ones a body, no sine beyond the first.  Driven angles enter with the known series of their
-//! laws: the coordinates are those of [`elimination`](super::elimination), q = S u + s(t), and the solve is with Sᵀ M_0 S.  What the rows
-//! of driven bodies lack of balance is the motors' torque, whose power is integrated with the rest.  Rows that are not eliminated border
-//! M_0 with their Jacobian (module `rows`).
+//! Nothing but Cauchy products: four real ones a body, no sine beyond the first.  Driven angles enter with
+//! the known series of their laws: the coordinates are those of [`elimination`](super::elimination), q = S u +
+//! s(t), and the solve is with Sᵀ M_0 S.  What the rows of driven bodies lack of balance is the motors'
+//! torque, whose power is integrated with the rest.  Rows that are not eliminated border M_0 with their
+//! Jacobian (module `rows`).
 //!
-//! Loops run over `N` bodies where `N > 0`, so that small sizes are unrolled, to the same bits as `N = 0` for any number.  Mechanisms that are evaluated body by body
-//! are expanded body by body: H u and M_0⁻¹ by passes over the trees ([`recursive`](super::recursive)), rows by their ways to the ground, and Cauchy products component by
-//! component, so that an order costs O(n) beside them.
+//! Loops run over `N` bodies where `N > 0`, so that small sizes are unrolled, to the same bits as `N = 0` for
+//! any number.  Mechanisms that are evaluated body by body are expanded body by body: H u and M_0⁻¹ by passes
+//! over the trees ([`recursive`](super::recursive)), rows by their ways to the ground, and Cauchy products
+//! component by component, so that an order costs O(n) beside them.
 //!
-//! Source: Jorba & Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor methods*, Experimental
-//! Mathematics 14 (2005), for the products; the in-series solve with constant couplings is ours.
+//! Source: Jorba & Zou, *A software package for the numerical integration of ODEs by means of high-order
+//! Taylor methods*, Experimental Mathematics 14 (2005), for the products; the in-series solve with constant
+//! couplings is ours.
 
 mod action;
 mod bodywise;
@@ -51,7 +54,8 @@ use crate::arithmetic::{Complex, DoubleDouble, Real};
 pub struct Series<T> {
     /// Highest power P of the rates.
     order: usize,
-    /// Number of elements n, of which so many are unit vectors; the others are translational coordinates, at the places of their x.
+    /// Number of elements n, of which so many are unit vectors; the others are translational coordinates, at
+    /// the places of their x.
     elements: usize,
     angles: usize,
     partition: CoordinatePartition,
@@ -90,7 +94,8 @@ pub struct Series<T> {
     reduced: Vec<T>,
     pivot: Vec<T>,
     solution: Vec<T>,
-    /// What stands in place of the matrices where the mechanism is evaluated body by body; they are empty then.
+    /// What stands in place of the matrices where the mechanism is evaluated body by body; they are empty
+    /// then.
     bodywise: Option<Box<Bodywise<T>>>,
 }
 
@@ -98,8 +103,11 @@ impl<T: Coefficient> Series<T> {
     /// Room for series of a mechanism in some coordinates up to this power of the rates, at least 2.
     pub fn new(mechanism: &Mechanism, coordinates: Coordinates, order: usize) -> Self {
         let n = mechanism.coordinates();
-        let partition =
-            if coordinates == Coordinates::Independent { mechanism.partition.clone() } else { CoordinatePartition::free(mechanism) };
+        let partition = if coordinates == Coordinates::Independent {
+            mechanism.partition.clone()
+        } else {
+            CoordinatePartition::free(mechanism)
+        };
         let f = partition.count();
         let bodywise = Bodywise::new(mechanism, order).filter(|_| !partition.driven()).map(Box::new);
         let matrix = |size: usize| zeros(if bodywise.is_some() { 0 } else { size });
@@ -146,15 +154,25 @@ impl<T: Coefficient> Series<T> {
         self.partition.count()
     }
 
-    /// Expands the motion through coordinates `u` \[rad\] (leading part and rest) and rates `u_rate` \[rad/s\] at time `t`.
+    /// Expands the motion through coordinates `u` \[rad\] (leading part and rest) and rates `u_rate`
+    /// \[rad/s\] at time `t`.
     pub fn expand(&mut self, mechanism: &Mechanism, t: Time, u: &[T], u_rest: &[T], u_rate: &[T]) {
         self.law_series(mechanism, t);
         T::begin(self, t, u, u_rest, u_rate);
         T::orders(self, mechanism, 0);
     }
 
-    /// Expands a motion whose first powers were found in more digits; they are rounded, and the later ones follow from them.
-    pub fn carry_on(&mut self, mechanism: &Mechanism, t: Time, u: &[T], u_rest: &[T], u_rate: &[T], first: &Series<DoubleDouble>) {
+    /// Expands a motion whose first powers were found in more digits; they are rounded, and the later ones
+    /// follow from them.
+    pub fn carry_on(
+        &mut self,
+        mechanism: &Mechanism,
+        t: Time,
+        u: &[T],
+        u_rest: &[T],
+        u_rate: &[T],
+        first: &Series<DoubleDouble>,
+    ) {
         self.law_series(mechanism, t);
         T::begin(self, t, u, u_rest, u_rate);
         copy_vectors(&mut self.z, &first.z);
@@ -177,13 +195,16 @@ impl<T: Coefficient> Series<T> {
         T::orders(self, mechanism, first.order.min(self.order));
     }
 
-    /// Powers 0, 1, … of the gap of a wall over the length of its contact \[1/s^m\], to that of the unit vectors.
+    /// Powers 0, 1, … of the gap of a wall over the length of its contact \[1/s^m\], to that of the unit
+    /// vectors.
     pub fn gap(&self, contact: &Contact, powers: &mut Vec<f64>) {
         powers.clear();
         // Walls are of the ground, so that the gap is linear.
         let Measure::Place(place) = &contact.row.measure else { return };
         let elements = self.z.chunks_exact(self.elements.max(1));
-        powers.extend(elements.map(|z| place.linear.iter().fold(T::ZERO, |sum, &(k, g)| sum + Complex::of(g).dot(z[k])).value()));
+        powers.extend(elements.map(|z| {
+            place.linear.iter().fold(T::ZERO, |sum, &(k, g)| sum + Complex::of(g).dot(z[k])).value()
+        }));
         if let Some(first) = powers.first_mut() {
             *first += place.constant;
         }
@@ -203,8 +224,8 @@ impl<T: Coefficient> Series<T> {
         self.time = T::split(t).0;
     }
 
-    /// Power `m`, below the order, of the multipliers of the rows in force \[N, N·m over s^m\]: all rows, or all but the motors' where
-    /// these are eliminated.
+    /// Power `m`, below the order, of the multipliers of the rows in force \[N, N·m over s^m\]: all rows, or
+    /// all but the motors' where these are eliminated.
     pub fn multipliers(&self, m: usize) -> &[T] {
         self.rows.multipliers(m)
     }
@@ -241,8 +262,8 @@ impl<T: Coefficient> Series<T> {
         self.rows.begin(t);
     }
 
-    /// The powers from `first` on, by the code for this number of bodies where there is one: in double-double the arithmetic outweighs the
-    /// loops.
+    /// The powers from `first` on, by the code for this number of bodies where there is one: in double-double
+    /// the arithmetic outweighs the loops.
     fn sized_orders(&mut self, mechanism: &Mechanism, first: usize) {
         if !T::IS_PLAIN {
             return self.orders::<0>(mechanism, first);
@@ -359,7 +380,8 @@ impl<T: Coefficient> Series<T> {
         let mut first = 0;
         while first < angles {
             // Of l = 0 only, R is not complete yet.
-            let sums: [T; UNROLLED] = convolve::<N, _, _, _>(n, first, &z[n..], before, |z, rest| z.cross(rest));
+            let sums: [T; UNROLLED] =
+                convolve::<N, _, _, _>(n, first, &z[n..], before, |z, rest| z.cross(rest));
             for i in 0..width::<N>() {
                 let k = first + i;
                 load[k] -= sums[i] + z[k].cross(rest[k]);
@@ -430,10 +452,12 @@ impl<T: Coefficient> Series<T> {
         let omega = &mut self.omega[(m + 1) * n..(m + 2) * n];
         if self.is_tied {
             for (i, dependent_angle) in self.partition.bodies.iter().enumerate() {
-                let (solved, rate) =
-                    dependent_angle.base.map_or((T::ZERO, T::ZERO), |base| (self.solution[base], self.rate[(m + 1) * f + base]));
+                let (solved, rate) = dependent_angle
+                    .base
+                    .map_or((T::ZERO, T::ZERO), |base| (self.solution[base], self.rate[(m + 1) * f + base]));
                 omega[i] = rate + self.drive[(m + 1) * n + i];
-                self.bend[i] = if i < angles { z[i].left().times(solved) } else { Complex::new(solved, T::ZERO) };
+                self.bend[i] =
+                    if i < angles { z[i].left().times(solved) } else { Complex::new(solved, T::ZERO) };
             }
             for x in (angles..n).step_by(2) {
                 self.bend[x].im = self.bend[x + 1].re;
@@ -482,7 +506,8 @@ mod tests {
     use crate::scene::read_scene;
 
     fn mechanism(name: &str) -> (Mechanism, Vec<f64>, Vec<f64>) {
-        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("examples/scenes/{name}.json"));
+        let path =
+            std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("examples/scenes/{name}.json"));
         let scene = read_scene(&path, &[]).expect("a shipped scene");
         let (phi, omega) = scene.start.iter().map(|start| (start.phi, start.omega)).unzip();
         (Mechanism::new(&scene).expect("a valid scene"), phi, omega)
@@ -500,7 +525,10 @@ mod tests {
                 let mut other = series.clone();
                 series.orders::<2>(&mechanism, 0);
                 other.orders::<0>(&mechanism, 0);
-                assert!(series.z == other.z && series.omega == other.omega && series.power == other.power, "{name}");
+                assert!(
+                    series.z == other.z && series.omega == other.omega && series.power == other.power,
+                    "{name}"
+                );
             }
         }
     }
@@ -519,7 +547,10 @@ mod tests {
             extended.carry_on(&mechanism, Time::default(), &phi, &none, &omega, &first);
             for (found, expected) in [(&extended.omega, &plain.omega), (&extended.power, &plain.power)] {
                 let largest = expected.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-                assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9 * largest.max(1e-9)), "{name}");
+                assert!(
+                    found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9 * largest.max(1e-9)),
+                    "{name}"
+                );
             }
             assert_ne!(extended.omega, plain.omega);
         }

@@ -1,12 +1,14 @@
-//! How stiff a mechanism is at a moment: its fastest rate by the spectrum of the Jacobian, and which spring or damper makes it.
+//! How stiff a mechanism is at a moment: its fastest rate by the spectrum of the Jacobian, and which spring
+//! or damper makes it.
 //!
 //! ```text
 //! y = (r q, w), r² = |A_q|:      dy'/dy = [0 r; A_q/r A_w],      fastest = |lambda|, decay = -Re lambda of the largest lambda
 //! a spring along g:  gamma = g (M⁻¹ - X S⁻¹ Xᵀ) gᵀ,      lambda² + c gamma lambda + k gamma = 0,      E = k s²/2 + s'²/(2 gamma)
 //! ```
 //!
-//! gamma is how much a force along the spring accelerates it, with all rows in force; its mode alone decays and swings as the second line says, and E is the energy in it.
-//! Up to sixteen coordinates the eigenvalues are exact; beyond, power iteration finds the largest pair.
+//! gamma is how much a force along the spring accelerates it, with all rows in force; its mode alone decays
+//! and swings as the second line says, and E is the energy in it. Up to sixteen coordinates the eigenvalues
+//! are exact; beyond, power iteration finds the largest pair.
 
 use super::jacobian::Jacobian;
 use super::kernel::{Bias, Kernel, dot};
@@ -29,7 +31,8 @@ const SHARE: f64 = 0.5;
 /// The fast mode of a mechanism at a moment, and how it compares with the rest.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Stiffness {
-    /// Magnitude of the largest eigenvalue of the linearised equations \[rad/s\]; not a number where the equations are not finite.
+    /// Magnitude of the largest eigenvalue of the linearised equations \[rad/s\]; not a number where the
+    /// equations are not finite.
     pub fastest: f64,
     /// Minus its real part \[1/s\]: positive where the mode dies away.
     pub decay: f64,
@@ -46,10 +49,17 @@ pub struct Stiffness {
 impl Stiffness {
     /// Measures it at a time, at angles and positions `phi` \[rad, m\] and rates `omega` \[rad/s, m/s\].
     pub fn at(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Self {
-        let lambda = if phi.len() <= EXACT { spectrum(mechanism, time, phi, omega) } else { largest(mechanism, time, phi, omega) };
+        let lambda = if phi.len() <= EXACT {
+            spectrum(mechanism, time, phi, omega)
+        } else {
+            largest(mechanism, time, phi, omega)
+        };
         let fastest = lambda.norm_squared().sqrt();
-        let mut found = Self { fastest, decay: -lambda.re, slow: slow(mechanism, time, omega), ..Self::default() };
-        if let Some(mode) = fastest_spring(mechanism, time, phi, omega).filter(|mode| mode.rate >= SHARE * fastest) {
+        let mut found =
+            Self { fastest, decay: -lambda.re, slow: slow(mechanism, time, omega), ..Self::default() };
+        if let Some(mode) =
+            fastest_spring(mechanism, time, phi, omega).filter(|mode| mode.rate >= SHARE * fastest)
+        {
             found.culprit = Some(mode.name);
             (found.energy, found.share) = (mode.energy, mode.energy / mechanism.energy_scale);
         }
@@ -58,8 +68,10 @@ impl Stiffness {
 
     /// That of the start of a run, where springs or dampers can make it stiff.
     pub fn at_start(mechanism: &Mechanism, start: &Motion) -> Option<Self> {
-        let has_any = !mechanism.springs.is_empty() || !mechanism.torsions.is_empty() || !mechanism.forces.is_empty();
-        let [phi, omega] = [&start.phi, &start.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<f64>>());
+        let has_any =
+            !mechanism.springs.is_empty() || !mechanism.torsions.is_empty() || !mechanism.forces.is_empty();
+        let [phi, omega] = [&start.phi, &start.omega]
+            .map(|values| values.iter().map(|value| value.hi).collect::<Vec<f64>>());
         has_any.then(|| Self::at(mechanism, start.time, &phi, &omega))
     }
 
@@ -90,12 +102,15 @@ fn spectrum(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Co
     let mut jacobian = Jacobian::new(mechanism);
     jacobian.evaluate(mechanism, time, phi, omega, Bias::default());
     let by = |i: usize, k: usize| jacobian.acceleration[2 * n * i + k];
-    let squares = (0..n).flat_map(|i| (0..n).map(move |k| (i, k))).fold(0.0, |sum: f64, (i, k)| sum + by(i, k) * by(i, k));
+    let squares = (0..n)
+        .flat_map(|i| (0..n).map(move |k| (i, k)))
+        .fold(0.0, |sum: f64, (i, k)| sum + by(i, k) * by(i, k));
     let unknown = Complex::new(f64::NAN, 0.0);
     if !jacobian.acceleration.iter().all(|entry| entry.is_finite()) {
         return unknown;
     }
-    // Rates over r weigh as much as coordinates: without it rounding in the Schur form grows with the stiffness.
+    // Rates over r weigh as much as coordinates: without it rounding in the Schur form grows with the
+    // stiffness.
     let r = if squares > 0.0 { squares.sqrt().sqrt() } else { 1.0 };
     let matrix = DMatrix::from_fn(2 * n, 2 * n, |i, k| match (i < n, k < n) {
         (true, true) => 0.0,
@@ -109,11 +124,16 @@ fn spectrum(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Co
         // Of a mode that grows and one that dies away as fast, rounding is not to choose: the first counts.
         let share = value.norm_squared() / most.norm_squared();
         let is_alike = (share - 1.0).abs() <= ALIKE;
-        if if is_alike { value.re > most.re } else { value.norm_squared() > most.norm_squared() } { value } else { most }
+        if if is_alike { value.re > most.re } else { value.norm_squared() > most.norm_squared() } {
+            value
+        } else {
+            most
+        }
     })
 }
 
-/// The largest eigenvalue or pair, by power iteration with products of the Jacobian and a vector: x'' = b x' + c x fitted to three iterates.
+/// The largest eigenvalue or pair, by power iteration with products of the Jacobian and a vector: x'' = b x' +
+/// c x fitted to three iterates.
 fn largest(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Complex<f64> {
     let n = phi.len();
     let mut kernel = Kernel::<Dual<1, false>>::new(mechanism);
@@ -121,7 +141,13 @@ fn largest(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Com
         let along = |values: &[f64], slopes: &[f64]| -> Vec<Dual<1, false>> {
             values.iter().zip(slopes).map(|(&value, &slope)| Dual { value, slope: [slope] }).collect()
         };
-        kernel.accelerate::<0>(mechanism, time, &along(phi, &x[..n]), &along(omega, &x[n..]), Bias::default());
+        kernel.accelerate::<0>(
+            mechanism,
+            time,
+            &along(phi, &x[..n]),
+            &along(omega, &x[n..]),
+            Bias::default(),
+        );
         x[n..].iter().copied().chain(kernel.load.iter().map(|load| load.slope[0])).collect()
     };
     // No direction is left out, and none is preferred.
@@ -136,8 +162,11 @@ fn largest(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Com
             let (a, b, c) = (dot(&first, &first), dot(&first, &x), dot(&x, &x));
             let (p, q) = (dot(&second, &first), dot(&second, &x));
             let determinant = a * c - b * b;
-            let (trace, product) =
-                if determinant > 1e-12 * a * c { ((p * c - q * b) / determinant, -(q * a - p * b) / determinant) } else { (b / c, 0.0) };
+            let (trace, product) = if determinant > 1e-12 * a * c {
+                ((p * c - q * b) / determinant, -(q * a - p * b) / determinant)
+            } else {
+                (b / c, 0.0)
+            };
             lambda = root(trace, product);
         }
         x = second;
@@ -158,7 +187,8 @@ fn root(trace: f64, product: f64) -> Complex<f64> {
 /// The largest of the bars' own rates, their swinging alone under gravity, and the laws' rates \[rad/s\].
 fn slow(mechanism: &Mechanism, time: Time, omega: &[f64]) -> f64 {
     let angles = mechanism.bodies.len();
-    let swings = (0..angles).map(|k| (mechanism.tree.weight[k].norm_squared().sqrt() / mechanism.tree.diagonal[k]).sqrt());
+    let swings = (0..angles)
+        .map(|k| (mechanism.tree.weight[k].norm_squared().sqrt() / mechanism.tree.diagonal[k]).sqrt());
     let spins = omega[..angles].iter().map(|omega| omega.abs());
     let laws = (mechanism.constraints.iter().filter_map(|row| row.law.as_ref())).flat_map(|law| {
         let rate = law.rates::<f64>(time).0.abs();
@@ -179,7 +209,10 @@ struct Mode {
 /// The fastest of the springs, each by itself.
 fn fastest_spring(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Option<Mode> {
     let n = phi.len();
-    if n > NAMED || !mechanism.tree.is_dense() || (mechanism.springs.is_empty() && mechanism.torsions.is_empty()) {
+    if n > NAMED
+        || !mechanism.tree.is_dense()
+        || (mechanism.springs.is_empty() && mechanism.torsions.is_empty())
+    {
         return None;
     }
     let mut kernel = Kernel::<f64>::dense(mechanism);
@@ -211,7 +244,13 @@ fn fastest_spring(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64])
     for torsion in &mechanism.torsions {
         let mut along = vec![0.0; n];
         torsion.pull(1.0, &mut along);
-        see(&torsion.name, &along, torsion.stiffness, torsion.damping, torsion.between(phi) - torsion.free_angle);
+        see(
+            &torsion.name,
+            &along,
+            torsion.stiffness,
+            torsion.damping,
+            torsion.between(phi) - torsion.free_angle,
+        );
     }
     modes.into_iter().filter(|mode| mode.rate.is_finite()).max_by(|a, b| a.rate.total_cmp(&b.rate))
 }
@@ -226,7 +265,11 @@ fn mobility(kernel: &mut Kernel<f64>, along: &[f64]) -> f64 {
     }
     kernel.solve_rows();
     kernel.multiplier_accelerations();
-    moved.iter().zip(&kernel.load).zip(along).fold(0.0, |sum, ((moved, held), along)| sum + (moved - held) * along)
+    moved
+        .iter()
+        .zip(&kernel.load)
+        .zip(along)
+        .fold(0.0, |sum, ((moved, held), along)| sum + (moved - held) * along)
 }
 
 #[cfg(test)]
@@ -242,11 +285,13 @@ mod tests {
     fn measured(scene: &Scene) -> Stiffness {
         let mechanism = Mechanism::new(scene).expect("equations");
         let start = mechanism.start(scene);
-        let [phi, omega] = [&start.phi, &start.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<_>>());
+        let [phi, omega] =
+            [&start.phi, &start.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<_>>());
         Stiffness::at(&mechanism, start.time, &phi, &omega)
     }
 
-    /// Bar 1 so that the spring has its free length, both at rest; at the source's stiffness the spring is no faster than gravity.
+    /// Bar 1 so that the spring has its free length, both at rest; at the source's stiffness the spring is no
+    /// faster than gravity.
     fn sprung(factor: f64, damping: f64) -> Scene {
         let mut scene = scene("spring", &[]);
         (scene.springs[0].stiffness, scene.springs[0].damping) = (7.394_287_5 * factor, damping);
@@ -263,7 +308,9 @@ mod tests {
             assert!(found.decay.abs() < 1e-3 * found.fastest && !found.is_damped(), "{found:?}");
             assert_eq!(found.culprit.as_deref(), Some("spring"));
             assert!(found.energy < 1e-12 && found.slow > 3.0 && found.slow < 10.0, "{found:?}");
-            assert!((found.periods(1.0) - found.fastest / std::f64::consts::TAU).abs() < 1e-9 * found.fastest);
+            assert!(
+                (found.periods(1.0) - found.fastest / std::f64::consts::TAU).abs() < 1e-9 * found.fastest
+            );
         }
     }
 
@@ -272,7 +319,10 @@ mod tests {
         let found = measured(&sprung(1e8, 6675.0));
         assert!(found.is_damped() && found.culprit.is_some(), "{found:?}");
         let overdamped = measured(&sprung(1.0, 1e4));
-        assert!((overdamped.decay / overdamped.fastest - 1.0).abs() < 1e-6 && overdamped.fastest > 1e4, "{overdamped:?}");
+        assert!(
+            (overdamped.decay / overdamped.fastest - 1.0).abs() < 1e-6 && overdamped.fastest > 1e4,
+            "{overdamped:?}"
+        );
         assert_eq!(overdamped.culprit.as_deref(), Some("spring"));
         let mut stretched = sprung(1e6, 0.0);
         stretched.start[0].phi += 1e-3;
@@ -293,7 +343,8 @@ mod tests {
         for scene in [sprung(1e6, 0.0), sprung(1e6, 667.0), sprung(1.0, 1e4)] {
             let mechanism = Mechanism::new(&scene).expect("equations");
             let phi = [scene.start[0].phi, scene.start[1].phi];
-            let [exact, found] = [spectrum, largest].map(|method| method(&mechanism, Time::default(), &phi, &[0.0, 0.0]));
+            let [exact, found] =
+                [spectrum, largest].map(|method| method(&mechanism, Time::default(), &phi, &[0.0, 0.0]));
             assert!((exact - found).norm_squared() < 1e-6 * exact.norm_squared(), "{exact:?} {found:?}");
         }
     }

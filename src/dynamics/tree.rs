@@ -1,4 +1,5 @@
-//! The hinge trees in absolute angles and, of those that hang on nothing, the positions of their translational coordinates: mass matrix, velocity terms, gravity.
+//! The hinge trees in absolute angles and, of those that hang on nothing, the positions of their
+//! translational coordinates: mass matrix, velocity terms, gravity.
 //!
 //! ```text
 //! p_ij = conj(z_i) H_ij z_j = A cos(q_j-q_i) - B sin(q_j-q_i) + i (A sin(q_j-q_i) + B cos(q_j-q_i))
@@ -6,7 +7,8 @@
 //! origin f, coordinates x and y:  p_if = conj(z_i) H_if,  M_ix = Im p_if, M_iy = Re p_if, M_xx = M_yy = d_f;   b_x + i b_y += w_i² conj(p_if)
 //! ```
 //!
-//! Loops run over `N` bodies where `N > 0`, so that small sizes are unrolled, and over the number at hand where `N = 0`.
+//! Loops run over `N` bodies where `N > 0`, so that small sizes are unrolled, and over the number at hand
+//! where `N = 0`.
 
 use super::force::Spring;
 use crate::arithmetic::{Complex, Scalar};
@@ -24,13 +26,15 @@ pub struct Tree {
     pub coordinates: usize,
     /// Number of bodies.
     pub angles: usize,
-    /// H above the diagonal, row by row (n × n) \[kg·m²; kg·m for an origin, in the column of its x\]; empty for very large trees.
+    /// H above the diagonal, row by row (n × n) \[kg·m²; kg·m for an origin, in the column of its x\]; empty
+    /// for very large trees.
     pub coupling: Vec<Complex<f64>>,
     /// Diagonal d_i = H_ii + I_i \[kg·m²; kg for an origin\].
     pub diagonal: Vec<f64>,
     /// Force of gravity on z_i: conj(Σ_m m_m gamma_mi) g \[N·m; N for an origin, at its x\].
     pub weight: Vec<Complex<f64>>,
-    /// False where every hinge and centre of mass lies on its body's axis: B = 0, and its products are left out.
+    /// False where every hinge and centre of mass lies on its body's axis: B = 0, and its products are left
+    /// out.
     pub off_axis: bool,
 }
 
@@ -40,10 +44,11 @@ impl Tree {
         self.coupling.len() == self.coordinates * self.coordinates
     }
 
-    /// About the fastest rate of small oscillations under gravity and springs between hanging bodies \[rad/s\], for hinges on the bodies' axes.
+    /// About the fastest rate of small oscillations under gravity and springs between hanging bodies
+    /// \[rad/s\], for hinges on the bodies' axes.
     ///
-    /// Stretched, the chain has the least inertia against bending: the trace of M⁻¹ W there is about the square of its fastest rate, and that of M⁻¹ K at most
-    /// k (Σ |gamma_i| (M⁻¹)_ii^(1/2))² for each spring.
+    /// Stretched, the chain has the least inertia against bending: the trace of M⁻¹ W there is about the
+    /// square of its fastest rate, and that of M⁻¹ K at most k (Σ |gamma_i| (M⁻¹)_ii^(1/2))² for each spring.
     pub fn fastest_rate(&self, springs: &[Spring]) -> f64 {
         let n = self.coordinates;
         let mut mass: Vec<f64> = self.coupling.iter().map(|h| h.re).collect();
@@ -59,9 +64,19 @@ impl Tree {
             unit[i]
         };
         let mobility: Vec<f64> = (0..n).map(mobility).collect();
-        let gravity: f64 =
-            self.weight[..self.angles].iter().zip(&mobility).map(|(weight, mobility)| weight.norm_squared().sqrt() * mobility).sum();
-        let moved = |spring: &Spring| spring.span.terms.iter().map(|&(i, gamma)| (gamma.norm_squared() * mobility[i]).sqrt()).sum::<f64>();
+        let gravity: f64 = self.weight[..self.angles]
+            .iter()
+            .zip(&mobility)
+            .map(|(weight, mobility)| weight.norm_squared().sqrt() * mobility)
+            .sum();
+        let moved = |spring: &Spring| {
+            spring
+                .span
+                .terms
+                .iter()
+                .map(|&(i, gamma)| (gamma.norm_squared() * mobility[i]).sqrt())
+                .sum::<f64>()
+        };
         let pulled: f64 = springs.iter().map(|spring| spring.stiffness * moved(spring).powi(2)).sum();
         (gravity + pulled).sqrt()
     }
@@ -108,7 +123,13 @@ impl Tree {
 
     /// Writes the velocity terms and gravity \[N·m\].
     #[inline(always)]
-    pub fn velocity_and_gravity_forces<T: Scalar, const N: usize>(&self, z: &[Complex<T>], omega: &[T], twist: &[T], load: &mut [T]) {
+    pub fn velocity_and_gravity_forces<T: Scalar, const N: usize>(
+        &self,
+        z: &[Complex<T>],
+        omega: &[T],
+        twist: &[T],
+        load: &mut [T],
+    ) {
         let (n, angles) = (size::<N>(self.coordinates), size::<N>(self.angles));
         self.gravity_forces::<T, N>(z, load);
         let (omega, twist, load) = (&omega[..n], &twist[..n * n], &mut load[..n]);
@@ -125,7 +146,13 @@ impl Tree {
 
     /// Writes d(T - V)/dq \[N·m\] without springs, at fixed rates: the force of the canonical form.
     #[inline(always)]
-    pub fn lagrangian_forces<T: Scalar, const N: usize>(&self, z: &[Complex<T>], omega: &[T], twist: &[T], force: &mut [T]) {
+    pub fn lagrangian_forces<T: Scalar, const N: usize>(
+        &self,
+        z: &[Complex<T>],
+        omega: &[T],
+        twist: &[T],
+        force: &mut [T],
+    ) {
         self.gravity_forces::<T, N>(z, force);
         self.velocity_terms::<T, N>(omega, twist, force);
     }
@@ -180,7 +207,8 @@ impl Tree {
     }
 }
 
-/// M = L D Lᵀ with unit upper L, eliminated from the last body (the leaves) to the first, in place above the diagonal.
+/// M = L D Lᵀ with unit upper L, eliminated from the last body (the leaves) to the first, in place above the
+/// diagonal.
 ///
 /// Writes the reciprocal pivots; they come out non-finite or negative where M is not positive definite.
 #[inline(always)]

@@ -1,8 +1,10 @@
-//! The mechanism's own units of length and time: what thresholds that would otherwise have units are multiplied by.
+//! The mechanism's own units of length and time: what thresholds that would otherwise have units are
+//! multiplied by.
 //!
-//! Each is a power of 1024, and 1 for a mechanism of human size: the size of its parts over the unit of length lies within 1/32 and 32, its rate times
-//! the unit of time within 1/4 and 256.  So ordinary mechanisms keep metres and seconds to the last
-//! bit, and the same mechanism a thousand times larger, slower or heavier behaves alike: multiplied by a power of 1024, to the last bit.
+//! Each is a power of 1024, and 1 for a mechanism of human size: the size of its parts over the unit of
+//! length lies within 1/32 and 32, its rate times the unit of time within 1/4 and 256.  So ordinary
+//! mechanisms keep metres and seconds to the last bit, and the same mechanism a thousand times larger, slower
+//! or heavier behaves alike: multiplied by a power of 1024, to the last bit.
 
 use super::{Mechanism, Motion};
 use crate::scene::{Law, Scene};
@@ -43,7 +45,11 @@ impl Units {
         let energy = mechanism.energy_scale;
         let given = (energy / inertia).sqrt();
         let spins = start.omega.iter().take(mechanism.bodies.len()).map(|omega| omega.hi.abs());
-        let rate = spins.chain([given]).chain(laws(scene, length)).filter(|rate| rate.is_finite()).fold(0.0, f64::max);
+        let rate = spins
+            .chain([given])
+            .chain(laws(scene, length))
+            .filter(|rate| rate.is_finite())
+            .fold(0.0, f64::max);
         Self { length: nearest(length), time: 1.0 / nearest(rate / FASTER) }
     }
 
@@ -54,7 +60,8 @@ impl Units {
 }
 
 impl Mechanism {
-    /// The unit of unknown `i` of a form that has so many coordinates, the first ones angles, then as many rates, then energies.
+    /// The unit of unknown `i` of a form that has so many coordinates, the first ones angles, then as many
+    /// rates, then energies.
     pub(super) fn unit_of(&self, i: usize, coordinates: usize, angles: usize) -> f64 {
         match i {
             i if i < coordinates => self.units.coordinate(i, angles),
@@ -71,9 +78,14 @@ fn laws(scene: &Scene, length: f64) -> impl Iterator<Item = f64> {
         sines.max(law.rate.abs() / unit).max((law.acceleration.abs() / unit).sqrt())
     };
     let motors = scene.motors.iter().map(move |motor| of(&motor.law, 1.0));
-    let factors =
-        scene.forces.iter().filter_map(|force| force.law.as_ref()).chain(scene.torques.iter().filter_map(|torque| torque.law.as_ref()));
-    motors.chain(scene.drives.iter().map(move |drive| of(&drive.law, length))).chain(factors.map(move |law| of(law, 1.0)))
+    let factors = scene
+        .forces
+        .iter()
+        .filter_map(|force| force.law.as_ref())
+        .chain(scene.torques.iter().filter_map(|torque| torque.law.as_ref()));
+    motors
+        .chain(scene.drives.iter().map(move |drive| of(&drive.law, length)))
+        .chain(factors.map(move |law| of(law, 1.0)))
 }
 
 #[cfg(test)]
@@ -83,7 +95,10 @@ mod tests {
     #[test]
     fn sizes_of_everyday_keep_their_units() {
         for size in [0.04, 0.6, 1.0, 9.81, 30.0] {
-            assert_eq!((nearest(size), nearest(1024.0 * size), nearest(size / 1024.0)), (1.0, 1024.0, 1.0 / 1024.0));
+            assert_eq!(
+                (nearest(size), nearest(1024.0 * size), nearest(size / 1024.0)),
+                (1.0, 1024.0, 1.0 / 1024.0)
+            );
         }
         assert_eq!([0.0, f64::NAN, f64::INFINITY].map(nearest), [1.0; 3]);
     }

@@ -2,8 +2,9 @@
 
 use crate::arithmetic::Complex;
 use crate::chart::{
-    self, AngleSeries, Angles, ChartError, ConstraintDrift, DriftSeries, EnergyDrift, FILE_RESOLUTION, HingeSketch, MechanismChart,
-    MotionGif, MotorPose, MotorSeries, Pose, ResidualPanel, Sketch, SliderPose, SpringSketch, TorquePower, WallSketch, plain,
+    self, AngleSeries, Angles, ChartError, ConstraintDrift, DriftSeries, EnergyDrift, FILE_RESOLUTION,
+    HingeSketch, MechanismChart, MotionGif, MotorPose, MotorSeries, Pose, ResidualPanel, Sketch, SliderPose,
+    SpringSketch, TorquePower, WallSketch, plain,
 };
 use crate::dynamics::Mechanism;
 use crate::dynamics::compile::Joint;
@@ -34,7 +35,14 @@ pub enum Chart {
 
 impl Chart {
     /// All of them.
-    pub const ALL: [Self; 6] = [Self::Mechanism, Self::Angles, Self::EnergyDrift, Self::ConstraintDrift, Self::TorquePower, Self::Motion];
+    pub const ALL: [Self; 6] = [
+        Self::Mechanism,
+        Self::Angles,
+        Self::EnergyDrift,
+        Self::ConstraintDrift,
+        Self::TorquePower,
+        Self::Motion,
+    ];
 
     /// Name of its file.
     pub fn file(self) -> &'static str {
@@ -49,7 +57,8 @@ impl Chart {
     }
 }
 
-/// The charts a scene has something to show in: none of constraints without constraints, none of torques without motors.
+/// The charts a scene has something to show in: none of constraints without constraints, none of torques
+/// without motors.
 pub fn wanted(mechanism: &Mechanism, pictures: bool, motion: bool) -> Vec<Chart> {
     let driven = mechanism.constraints.iter().any(ConstraintEquation::is_motor);
     let has = |chart: &Chart| match chart {
@@ -65,7 +74,12 @@ pub fn wanted(mechanism: &Mechanism, pictures: bool, motion: bool) -> Vec<Chart>
 ///
 /// # Errors
 /// Drawing or encoding fails.
-pub fn draw(chart: Chart, scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Result<Vec<u8>, ChartError> {
+pub fn draw(
+    chart: Chart,
+    scene: &Scene,
+    mechanism: &Mechanism,
+    outcome: &Outcome,
+) -> Result<Vec<u8>, ChartError> {
     let run = Finished { scene, mechanism, outcome };
     let picture = match chart {
         Chart::Mechanism => chart::mechanism(&run.mechanism_chart(), FILE_RESOLUTION),
@@ -81,7 +95,8 @@ pub fn draw(chart: Chart, scene: &Scene, mechanism: &Mechanism, outcome: &Outcom
     picture?.png_bytes()
 }
 
-/// Draws the constraint drift of several runs of one scene in one chart, a line for each stabilization and constraint; returns the content of its file.
+/// Draws the constraint drift of several runs of one scene in one chart, a line for each stabilization and
+/// constraint; returns the content of its file.
 ///
 /// # Errors
 /// Drawing or encoding fails.
@@ -91,17 +106,19 @@ pub fn overlay(scene: &Scene, mechanism: &Mechanism, outcomes: &[&Outcome]) -> R
         series: (outcomes.iter())
             .flat_map(|outcome| {
                 let kind = outcome.plan.stabilization.to_string();
-                (outcome.drift.constraints.iter().enumerate()).filter(|(r, _)| mechanism.constraints[*r].unit() == unit).map(
-                    move |(r, (constraint, _))| {
+                (outcome.drift.constraints.iter().enumerate())
+                    .filter(|(r, _)| mechanism.constraints[*r].unit() == unit)
+                    .map(move |(r, (constraint, _))| {
                         let several = outcome.drift.constraints.len() > 1;
-                        let name = if several { format!("{kind}, {}", plain(constraint)) } else { kind.clone() };
+                        let name =
+                            if several { format!("{kind}, {}", plain(constraint)) } else { kind.clone() };
                         Finished { scene, mechanism, outcome }.defects(r, level, kind.clone(), name)
-                    },
-                )
+                    })
             })
             .collect(),
     };
-    let mut settings: Vec<String> = outcomes.iter().map(|outcome| plain(&super::setting(&outcome.plan))).collect();
+    let mut settings: Vec<String> =
+        outcomes.iter().map(|outcome| plain(&super::setting(&outcome.plan))).collect();
     settings.dedup();
     let chart = ConstraintDrift {
         title: format!("Constraint drift under {} stabilizations", outcomes.len()),
@@ -156,17 +173,22 @@ impl Finished<'_> {
         caption
     }
 
-    /// The time up to which the path can be trusted \[s\], where that ends before `end`; and what to say about it.
+    /// The time up to which the path can be trusted \[s\], where that ends before `end`; and what to say
+    /// about it.
     fn horizon(&self, end: f64) -> (Option<f64>, Option<String>) {
-        let horizon = self.outcome.trust.as_ref().and_then(|trust| trust.horizon).filter(|&horizon| horizon < end);
+        let horizon =
+            self.outcome.trust.as_ref().and_then(|trust| trust.horizon).filter(|&horizon| horizon < end);
         (horizon, horizon.map(|horizon| format!("pale beyond the trust horizon, {} s", rough(horizon))))
     }
 
-    /// Samples in which single swings can be told apart: of the whole run, or else of its beginning; and what to say about it.
+    /// Samples in which single swings can be told apart: of the whole run, or else of its beginning; and what
+    /// to say about it.
     fn window(&self) -> (Vec<&Sample>, Option<String>) {
         let trace = &self.outcome.trace;
         let whole: Vec<&Sample> = trace.whole.iter().collect();
-        if !is_coarse(&whole) && whole.windows(2).map(|pair| furthest(pair[0], pair[1])).sum::<f64>() <= CROWDED[0] {
+        if !is_coarse(&whole)
+            && whole.windows(2).map(|pair| furthest(pair[0], pair[1])).sum::<f64>() <= CROWDED[0]
+        {
             return (whole, None);
         }
         let mut turned = 0.0;
@@ -224,16 +246,20 @@ impl Finished<'_> {
         if coarse {
             poses.drain(..poses.len().saturating_sub(1));
         }
-        let names: Vec<String> = leaves.iter().map(|&body| plain(&self.mechanism.bodies[body].name)).collect();
+        let names: Vec<String> =
+            leaves.iter().map(|&body| plain(&self.mechanism.bodies[body].name)).collect();
         let title = if coarse || names.is_empty() {
             format!("The mechanism at {} s", figure(self.outcome.last.t))
         } else {
             let (path, end) = if names.len() == 1 { ("Path", "end") } else { ("Paths", "ends") };
             format!("{path} of the {end} of {}", names.join(", "))
         };
-        let more = (!coarse).then(|| format!("last {} s of {} s", rough(span(&path)), figure(self.outcome.last.t)));
+        let more =
+            (!coarse).then(|| format!("last {} s of {} s", rough(span(&path)), figure(self.outcome.last.t)));
         let (horizon, past) = self.horizon(self.outcome.last.t);
-        let trusted = horizon.filter(|_| !coarse).map(|horizon| smoothed(&path).partition_point(|(t, _)| *t <= horizon));
+        let trusted = horizon
+            .filter(|_| !coarse)
+            .map(|horizon| smoothed(&path).partition_point(|(t, _)| *t <= horizon));
         let mut caption = self.caption(more);
         caption.extend(past);
         MechanismChart { title, caption, sketch: self.sketch(), poses, trails, horizon: trusted }
@@ -242,12 +268,10 @@ impl Finished<'_> {
     fn angles(&self) -> Angles {
         let (window, more) = self.window();
         let smooth = smoothed(&window);
-        let series = self
-            .mechanism
-            .bodies
-            .iter()
-            .enumerate()
-            .map(|(k, body)| AngleSeries { name: plain(&body.name), angle: smooth.iter().map(|(_, phi)| phi[k]).collect() });
+        let series = self.mechanism.bodies.iter().enumerate().map(|(k, body)| AngleSeries {
+            name: plain(&body.name),
+            angle: smooth.iter().map(|(_, phi)| phi[k]).collect(),
+        });
         let (horizon, past) = self.horizon(window.last().map_or(0.0, |sample| sample.t));
         let mut caption = self.caption(more);
         caption.extend(past);
@@ -264,7 +288,11 @@ impl Finished<'_> {
         let Outcome { plan, drift, last, .. } = self.outcome;
         let kind = if drift.kind == "energy" { "Energy" } else { "Energy minus work" };
         EnergyDrift {
-            title: format!("{kind} keeps to {} of its scale over {} s", power(drift.energy.max), figure(last.t)),
+            title: format!(
+                "{kind} keeps to {} of its scale over {} s",
+                power(drift.energy.max),
+                figure(last.t)
+            ),
             caption: self.caption(Some(format!("scale {} J", figure(self.mechanism.energy_scale)))),
             quantity: drift.kind.to_owned(),
             series: vec![DriftSeries {
@@ -279,23 +307,37 @@ impl Finished<'_> {
 
     fn constraint_drift(&self) -> ConstraintDrift {
         let Outcome { plan, drift, .. } = self.outcome;
-        let of =
-            |unit: &'static str| (drift.constraints.iter().enumerate()).filter(move |(r, _)| self.mechanism.constraints[*r].unit() == unit);
+        let of = |unit: &'static str| {
+            (drift.constraints.iter().enumerate())
+                .filter(move |(r, _)| self.mechanism.constraints[*r].unit() == unit)
+        };
         let panel = |unit: &'static str, level: usize| ResidualPanel {
             name: defect_name(level, unit),
             series: of(unit)
                 .map(|(r, (constraint, _))| {
-                    let method = if drift.constraints.len() == 1 { plan.stabilization.to_string() } else { constraint.clone() };
+                    let method = if drift.constraints.len() == 1 {
+                        plan.stabilization.to_string()
+                    } else {
+                        constraint.clone()
+                    };
                     self.defects(r, level, method, plain(constraint))
                 })
                 .collect(),
         };
         let units = units(self.mechanism);
-        let most = |unit: &'static str| of(unit).map(|(_, (_, [position, _]))| position.max).fold(0.0, f64::max);
+        let most =
+            |unit: &'static str| of(unit).map(|(_, (_, [position, _]))| position.max).fold(0.0, f64::max);
         let kept = if units.iter().all(|unit| most(unit) == 0.0) {
             "are kept exactly".to_owned()
         } else {
-            format!("keep to {}", units.iter().map(|unit| format!("{} {unit}", power(most(unit)))).collect::<Vec<_>>().join(" and "))
+            format!(
+                "keep to {}",
+                units
+                    .iter()
+                    .map(|unit| format!("{} {unit}", power(most(unit))))
+                    .collect::<Vec<_>>()
+                    .join(" and ")
+            )
         };
         ConstraintDrift {
             title: format!("Constraints {kept} over {} s", figure(self.outcome.last.t)),
@@ -320,13 +362,16 @@ impl Finished<'_> {
     fn torque_power(&self) -> (TorquePower, Vec<usize>) {
         let (window, more) = self.window();
         let driven = self.mechanism.constraints.iter().filter(|row| row.is_motor());
-        let sliders: Vec<usize> = driven.enumerate().filter(|(_, row)| !row.is_angle()).map(|(k, _)| k).collect();
-        let motors = (self.mechanism.constraints.iter().enumerate()).filter(|(_, row)| row.is_motor()).map(|(r, row)| MotorSeries {
-            name: plain(row.name()),
-            time: window.iter().map(|sample| sample.t).collect(),
-            torque: window.iter().map(|sample| sample.motors[r][0]).collect(),
-            power: window.iter().map(|sample| sample.motors[r][1]).collect(),
-        });
+        let sliders: Vec<usize> =
+            driven.enumerate().filter(|(_, row)| !row.is_angle()).map(|(k, _)| k).collect();
+        let motors = (self.mechanism.constraints.iter().enumerate()).filter(|(_, row)| row.is_motor()).map(
+            |(r, row)| MotorSeries {
+                name: plain(row.name()),
+                time: window.iter().map(|sample| sample.t).collect(),
+                torque: window.iter().map(|sample| sample.motors[r][0]).collect(),
+                power: window.iter().map(|sample| sample.motors[r][1]).collect(),
+            },
+        );
         let motors: Vec<MotorSeries> = motors.collect();
         let names: Vec<&str> = motors.iter().map(|motor| motor.name.as_str()).collect();
         let (horizon, past) = self.horizon(window.last().map_or(0.0, |sample| sample.t));
@@ -337,7 +382,15 @@ impl Finished<'_> {
             all if all == motors.len() => "Force",
             _ => "Torque, force",
         };
-        (TorquePower { title: format!("{what} and power of {}", names.join(", ")), caption, motors, horizon }, sliders)
+        (
+            TorquePower {
+                title: format!("{what} and power of {}", names.join(", ")),
+                caption,
+                motors,
+                horizon,
+            },
+            sliders,
+        )
     }
 
     /// The first seconds in their own time; faster or slower where too much or nothing would be seen.
@@ -356,7 +409,11 @@ impl Finished<'_> {
         } else if turned < LIVELY[0] {
             until = all;
         }
-        let frames = if until < shown && turned <= LIVELY[1] { (until / shown * FRAMES as f64).ceil() as usize } else { FRAMES };
+        let frames = if until < shown && turned <= LIVELY[1] {
+            (until / shown * FRAMES as f64).ceil() as usize
+        } else {
+            FRAMES
+        };
         let frames = frames.max(1);
         let time: Vec<f64> = (0..=frames).map(|k| until * k as f64 / frames as f64).collect();
         let leaves = self.leaves();
@@ -386,12 +443,16 @@ impl Finished<'_> {
     /// Up to four bodies that no other hangs on.
     fn leaves(&self) -> Vec<usize> {
         let hangs = &self.mechanism.forest.hangs;
-        (0..hangs.len()).filter(|&k| hangs.iter().all(|hang| hang.origin_point.parent() != Some(k))).take(4).collect()
+        (0..hangs.len())
+            .filter(|&k| hangs.iter().all(|hang| hang.origin_point.parent() != Some(k)))
+            .take(4)
+            .collect()
     }
 
     /// Elements and translational coordinates at these coordinates.
     fn elements(&self, phi: &[f64]) -> (Vec<Complex<f64>>, Vec<Complex<f64>>) {
-        let (mut z, mut translations) = (vec![Complex::ZERO; phi.len()], vec![Complex::ZERO; self.mechanism.bodies.len()]);
+        let (mut z, mut translations) =
+            (vec![Complex::ZERO; phi.len()], vec![Complex::ZERO; self.mechanism.bodies.len()]);
         self.mechanism.tree.unit_vectors::<f64, 0>(phi, &mut z);
         self.mechanism.forest.translations(&z, &mut translations);
         (z, translations)
@@ -405,13 +466,26 @@ impl Finished<'_> {
     }
 
     fn sketch(&self) -> Sketch {
-        let hinges =
-            self.mechanism.joints.iter().map(|joint| HingeSketch { name: plain(&joint.name), ground: joint.between.contains(&None) });
+        let hinges = self
+            .mechanism
+            .joints
+            .iter()
+            .map(|joint| HingeSketch { name: plain(&joint.name), ground: joint.between.contains(&None) });
         Sketch {
             gravity: self.scene.gravity,
             hinges: hinges.collect(),
-            springs: self.scene.springs.iter().map(|spring| SpringSketch { ground: spring.between.map(|end| end.bar.is_none()) }).collect(),
-            walls: self.scene.walls.iter().map(|wall| WallSketch { through: wall.through, normal: wall.normal }).collect(),
+            springs: self
+                .scene
+                .springs
+                .iter()
+                .map(|spring| SpringSketch { ground: spring.between.map(|end| end.bar.is_none()) })
+                .collect(),
+            walls: self
+                .scene
+                .walls
+                .iter()
+                .map(|wall| WallSketch { through: wall.through, normal: wall.normal })
+                .collect(),
             points: Vec::new(),
         }
     }
@@ -440,14 +514,19 @@ impl Finished<'_> {
                 .map(|slider| {
                     let along = Complex::new(slider.rail.direction[0], slider.rail.direction[1]);
                     let along = slider.rail.place.bar.map_or(along, |bar| along * z[bar]);
-                    SliderPose { at: place(&slider.point), along: both(along), ground: slider.rail.place.bar.is_none() }
+                    SliderPose {
+                        at: place(&slider.point),
+                        along: both(along),
+                        ground: slider.rail.place.bar.is_none(),
+                    }
                 })
                 .collect(),
             points: Vec::new(),
         }
     }
 
-    /// What joins the origin of a bar with its hinges and spring ends that lie off it, counted from its origin \[m\].
+    /// What joins the origin of a bar with its hinges and spring ends that lie off it, counted from its
+    /// origin \[m\].
     fn arms(&self) -> impl Iterator<Item = (usize, [Complex<f64>; 2])> {
         let hinges = self.scene.hinges.iter().flat_map(|hinge| hinge.between);
         let springs = self.scene.springs.iter().flat_map(|spring| spring.between);
@@ -462,7 +541,11 @@ impl Finished<'_> {
 }
 
 fn is_long(record: &Excursion) -> bool {
-    record.record.first().zip(record.record.last()).is_some_and(|(first, last)| (last[0] / first[0]).log10() >= DECADES)
+    record
+        .record
+        .first()
+        .zip(record.record.last())
+        .is_some_and(|(first, last)| (last[0] / first[0]).log10() >= DECADES)
 }
 
 /// `1.5·10^{−16}`.

@@ -22,7 +22,8 @@ pub fn form(mechanism: &Mechanism, plan: &Plan) -> &'static str {
 /// What the scene does not need and the equations do not contain.
 fn left_out(mechanism: &Mechanism, plan: &Plan) -> Vec<&'static str> {
     let multipliers = !mechanism.constraints.is_empty()
-        && (matches!(plan.method, MethodId::Rattle(_)) || !matches!(plan.stabilization, Stabilization::Elimination));
+        && (matches!(plan.method, MethodId::Rattle(_))
+            || !matches!(plan.stabilization, Stabilization::Elimination));
     let mut left_out = Vec::new();
     for (needed, what) in [
         (!mechanism.constraints.is_empty(), "motors"),
@@ -82,8 +83,14 @@ fn freedom(page: &mut Page, mechanism: &Mechanism) {
     let (coordinates, rows) = (mechanism.coordinates(), mechanism.constraints.len());
     let less = match (rows, redundant.len()) {
         (0, _) => String::new(),
-        (rows, 0) => format!(": {coordinates} coordinate{} less {rows} constraint{}", plural(coordinates), plural(rows)),
-        (rows, doubled) => format!(": {coordinates} coordinates less {rows} constraints, {doubled} of them redundant"),
+        (rows, 0) => format!(
+            ": {coordinates} coordinate{} less {rows} constraint{}",
+            plural(coordinates),
+            plural(rows)
+        ),
+        (rows, doubled) => {
+            format!(": {coordinates} coordinates less {rows} constraints, {doubled} of them redundant")
+        }
     };
     page.entry("freedom", &format!("{free} degree{}{less}", plural(*free)));
     if !redundant.is_empty() {
@@ -112,18 +119,26 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> String {
             Spring { damping, .. } if *damping != 0.0 => " with a damper",
             _ => "",
         };
-        let each: Vec<String> = scene.springs.iter().map(|spring| format!("{}{}", spring.name, kind(spring))).collect();
+        let each: Vec<String> =
+            scene.springs.iter().map(|spring| format!("{}{}", spring.name, kind(spring))).collect();
         page.entry("springs", &each.join(", "));
     }
     if !scene.walls.is_empty() {
-        let each: Vec<String> = scene.walls.iter().map(|wall| format!("{} (restitution {})", wall.name, wall.restitution)).collect();
+        let each: Vec<String> = scene
+            .walls
+            .iter()
+            .map(|wall| format!("{} (restitution {})", wall.name, wall.restitution))
+            .collect();
         page.entry("walls", &each.join(", "));
     }
     if mechanism.tree.off_axis {
         page.entry("couplings", "off the bars' axes");
     }
     let left_out = left_out(mechanism, plan);
-    page.entry("left out", if left_out.is_empty() { "nothing".to_owned() } else { left_out.join(", ") }.as_str());
+    page.entry(
+        "left out",
+        if left_out.is_empty() { "nothing".to_owned() } else { left_out.join(", ") }.as_str(),
+    );
     page.entry("energy scale", &format!("{} J", figure(mechanism.energy_scale)));
     page.entry("form", form(mechanism, plan));
     describe(&mut page, mechanism, plan);
@@ -147,8 +162,12 @@ pub(super) fn describe(page: &mut Page, mechanism: &Mechanism, plan: &Plan) {
 pub(super) fn stabilization(mechanism: &Mechanism, plan: &Plan) -> String {
     match (plan.stabilization, plan.time_constant) {
         _ if mechanism.constraints.is_empty() => "none needed: the scene has no constraint".into(),
-        _ if matches!(plan.method, MethodId::Rattle(_)) => "by the method itself, positions and velocities".into(),
-        (Stabilization::Baumgarte, Some(constant)) => format!("baumgarte, time constant {} s", figure(constant)),
+        _ if matches!(plan.method, MethodId::Rattle(_)) => {
+            "by the method itself, positions and velocities".into()
+        }
+        (Stabilization::Baumgarte, Some(constant)) => {
+            format!("baumgarte, time constant {} s", figure(constant))
+        }
         (Stabilization::Baumgarte, None) => "baumgarte, time constant five mean steps".into(),
         (other, _) => other.to_string(),
     }

@@ -9,7 +9,8 @@ use crate::run::{Drift, MethodId, Plan, Stabilization};
 use crate::scene::Scene;
 use serde_json::{Value, json};
 
-/// The comparison as one JSON object: `rows`, `reference`, `recommendations`, `notes`; times in seconds.  What was not measured is `null`.
+/// The comparison as one JSON object: `rows`, `reference`, `recommendations`, `notes`; times in seconds.
+/// What was not measured is `null`.
 pub fn object(scene: &Scene, mechanism: &Mechanism, comparison: &Comparison) -> Value {
     let front = comparison.front();
     let truth = &comparison.truth;
@@ -40,9 +41,11 @@ fn row(entry: &Entry, is_on_front: bool) -> Value {
     let (stop, refusal, reached) = match &entry.fate {
         Fate::Done => (None, None, plan.map(|plan| plan.until)),
         Fate::Stopped(stop) => (Some(stop), None, Some(stop.t)),
-        Fate::Refused(refusal) => {
-            (None, Some(json!({"what": refusal.what, "reason": refusal.reason, "alternative": refusal.alternative})), None)
-        }
+        Fate::Refused(refusal) => (
+            None,
+            Some(json!({"what": refusal.what, "reason": refusal.reason, "alternative": refusal.alternative})),
+            None,
+        ),
         Fate::Late(t) => (None, None, Some(*t)),
     };
     json!({
@@ -102,7 +105,11 @@ fn setting(plan: &Plan) -> String {
     match (plan.step, plan.tolerance) {
         (Some(step), _) => format!("{step} s"),
         (None, tolerance) => {
-            format!("{:e}{}", tolerance.unwrap_or_default().relative, if plan.extended { " extended" } else { "" })
+            format!(
+                "{:e}{}",
+                tolerance.unwrap_or_default().relative,
+                if plan.extended { " extended" } else { "" }
+            )
         }
     }
 }
@@ -127,7 +134,10 @@ fn sentence(comparison: &Comparison, advice: &Advice) -> String {
     let target = advice.target;
     if advice.is_blind {
         return match comparison.truth.until > 0.0 {
-            true => format!("For {target:e} nothing can be said: the reference is good to {}.", magnitude(comparison.truth.accuracy)),
+            true => format!(
+                "For {target:e} nothing can be said: the reference is good to {}.",
+                magnitude(comparison.truth.accuracy)
+            ),
             false => format!("For {target:e} nothing can be said: there is no reference."),
         };
     }
@@ -168,7 +178,9 @@ pub fn csv(comparison: &Comparison) -> String {
     for (k, entry) in comparison.entries.iter().enumerate() {
         let found = entry.found.as_ref().filter(|_| entry.fate == Fate::Done);
         let of = |what: &dyn Fn(&Found) -> Option<f64>| number(found.and_then(what));
-        let count = |what: &dyn Fn(&Found) -> u64| entry.found.as_ref().map_or(String::new(), |found| what(found).to_string());
+        let count = |what: &dyn Fn(&Found) -> u64| {
+            entry.found.as_ref().map_or(String::new(), |found| what(found).to_string())
+        };
         let cells = [
             entry.method.info().name.to_owned(),
             entry.plan.as_ref().map_or(String::new(), setting),
@@ -204,7 +216,13 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, comparison: &Comparison) -> St
         page.entry("reference", "none");
     }
     if let Some(horizon) = truth.horizon {
-        page.entry("", &format!("starts an ulp apart part by 1e-3 rad after {} s: beyond it no path means anything", rough(horizon)));
+        page.entry(
+            "",
+            &format!(
+                "starts an ulp apart part by 1e-3 rad after {} s: beyond it no path means anything",
+                rough(horizon)
+            ),
+        );
     }
     for note in &comparison.notes {
         page.entry("note", note);
@@ -277,9 +295,18 @@ fn table(page: &mut Page, mechanism: &Mechanism, comparison: &Comparison, letter
         return;
     }
     page.table(&head, &rows);
-    let extended = if comparison.entries.iter().any(|entry| entry.extended) { "; + first orders in double-double" } else { "" };
+    let extended = if comparison.entries.iter().any(|entry| entry.extended) {
+        "; + first orders in double-double"
+    } else {
+        ""
+    };
     let lost = format!("lost: off by more than {LOST} rad");
-    page.entry("", &format!("* no other is faster and more accurate; +- half the distance of the quartiles; {lost}{extended}"));
+    page.entry(
+        "",
+        &format!(
+            "* no other is faster and more accurate; +- half the distance of the quartiles; {lost}{extended}"
+        ),
+    );
 }
 
 /// `850`, `12.3k`, `4.56M`.
@@ -309,11 +336,14 @@ fn failures(page: &mut Page, comparison: &Comparison, letters: bool) {
     let mut last = None;
     for (_, entry) in sorted(comparison) {
         // All that are finer than one that took too long are one line.
-        let is_again = last.replace((entry.name(), entry.fate.clone())) == Some((entry.name(), Fate::Late(0.0)));
+        let is_again =
+            last.replace((entry.name(), entry.fate.clone())) == Some((entry.name(), Fate::Late(0.0)));
         let why = match &entry.fate {
             Fate::Done => continue,
             Fate::Late(0.0) if is_again => continue,
-            Fate::Stopped(stop) => format!("stopped ({}) at t = {} s: {}", stop.cause.word(), rough(stop.t), stop.what),
+            Fate::Stopped(stop) => {
+                format!("stopped ({}) at t = {} s: {}", stop.cause.word(), rough(stop.t), stop.what)
+            }
             Fate::Refused(refusal) => format!("refused: {}", refusal.reason),
             Fate::Late(0.0) => "and finer ones left out: a coarser one took too long".into(),
             Fate::Late(t) => format!("at t = {} s its share of the time was over", rough(*t)),
@@ -322,7 +352,10 @@ fn failures(page: &mut Page, comparison: &Comparison, letters: bool) {
             (Fate::Refused(_), Some(kind)) => format!(" with {kind}"),
             _ => String::new(),
         };
-        page.entry(std::mem::take(&mut label), &format!("{}{kept}: {why}", short(entry, letters && kept.is_empty())));
+        page.entry(
+            std::mem::take(&mut label),
+            &format!("{}{kept}: {why}", short(entry, letters && kept.is_empty())),
+        );
     }
 }
 
@@ -358,18 +391,32 @@ impl CompareChart {
 /// # Errors
 /// Drawing or encoding fails.
 #[cfg(feature = "charts")]
-pub fn draw(kind: CompareChart, scene: &Scene, mechanism: &Mechanism, comparison: &Comparison) -> Result<Vec<u8>, ChartError> {
+pub fn draw(
+    kind: CompareChart,
+    scene: &Scene,
+    mechanism: &Mechanism,
+    comparison: &Comparison,
+) -> Result<Vec<u8>, ChartError> {
     chart::work_precision(&chart_data(kind, scene, mechanism, comparison), FILE_RESOLUTION)?.png_bytes()
 }
 
 /// The data of one chart.
 #[cfg(feature = "charts")]
-pub fn chart_data(kind: CompareChart, scene: &Scene, mechanism: &Mechanism, comparison: &Comparison) -> WorkPrecision {
+pub fn chart_data(
+    kind: CompareChart,
+    scene: &Scene,
+    mechanism: &Mechanism,
+    comparison: &Comparison,
+) -> WorkPrecision {
     let of_energy = kind == CompareChart::EnergyTime;
     let truth = &comparison.truth;
     let point = |entry: &Entry| {
         let found = entry.found.as_ref().filter(|_| entry.fate == Fate::Done)?;
-        let cost = if kind == CompareChart::ErrorEvaluations { found.statistics.evaluations as f64 } else { entry.median()? };
+        let cost = if kind == CompareChart::ErrorEvaluations {
+            found.statistics.evaluations as f64
+        } else {
+            entry.median()?
+        };
         Some([cost, if of_energy { found.energy } else { entry.error()? }])
     };
     let mut series: Vec<WorkSeries> = Vec::new();
@@ -390,19 +437,29 @@ pub fn chart_data(kind: CompareChart, scene: &Scene, mechanism: &Mechanism, comp
     if of_energy {
         caption.push("largest value on the way, over the energy scale".into());
     } else {
-        caption.push(format!("largest error up to *t* = {} s, against {}", figure(truth.until), plain(&truth.how)));
+        caption.push(format!(
+            "largest error up to *t* = {} s, against {}",
+            figure(truth.until),
+            plain(&truth.how)
+        ));
     }
     if kind != CompareChart::ErrorEvaluations {
         caption.push("medians on one core".into());
     }
     let cost = match kind {
-        CompareChart::ErrorEvaluations => Cost::Count("evaluations of the equations (of taylor: expansions)".into()),
+        CompareChart::ErrorEvaluations => {
+            Cost::Count("evaluations of the equations (of taylor: expansions)".into())
+        }
         _ => Cost::Time(format!("run time of {until}")),
     };
     let (title, error_name) = match kind {
         CompareChart::ErrorTime => ("Error against run time", "largest error of angles [rad]".to_owned()),
-        CompareChart::ErrorEvaluations => ("Error against evaluations", "largest error of angles [rad]".to_owned()),
-        CompareChart::EnergyTime => ("Energy drift against run time", format!("relative drift of {drifting}")),
+        CompareChart::ErrorEvaluations => {
+            ("Error against evaluations", "largest error of angles [rad]".to_owned())
+        }
+        CompareChart::EnergyTime => {
+            ("Energy drift against run time", format!("relative drift of {drifting}"))
+        }
     };
     let lost = if of_energy { None } else { Some(LOST) };
     WorkPrecision { title: title.into(), caption, cost, error_name, series, lost, floor: None }

@@ -15,7 +15,8 @@ pub(super) fn furthest(a: &Sample, b: &Sample) -> f64 {
     a.phi.iter().zip(&b.phi).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max)
 }
 
-/// True where curves through the samples would mislead: a body turns too far from one to the next, or its rates there do not tell how far.
+/// True where curves through the samples would mislead: a body turns too far from one to the next, or its
+/// rates there do not tell how far.
 pub(super) fn is_coarse(samples: &[&Sample]) -> bool {
     let (mut missed, mut told) = (0.0, 0.0);
     for pair in samples.windows(2) {
@@ -39,7 +40,9 @@ pub(super) fn smoothed(samples: &[&Sample]) -> Vec<(f64, Vec<f64>)> {
     let mut smooth = Vec::new();
     for pair in samples.windows(2) {
         let shares = (0..fine).map(|k| k as f64 / fine as f64);
-        smooth.extend(shares.map(|share| (pair[0].t + share * (pair[1].t - pair[0].t), cubic(pair[0], pair[1], share))));
+        smooth.extend(
+            shares.map(|share| (pair[0].t + share * (pair[1].t - pair[0].t), cubic(pair[0], pair[1], share))),
+        );
     }
     smooth.extend(samples.last().map(|last| (last.t, last.phi.clone())));
     smooth
@@ -48,14 +51,23 @@ pub(super) fn smoothed(samples: &[&Sample]) -> Vec<(f64, Vec<f64>)> {
 /// Angles at a share of the way between two samples, from angles and rates at both (Hermite's cubic).
 pub(super) fn cubic(a: &Sample, b: &Sample, share: f64) -> Vec<f64> {
     let (s, rest, span) = (share, 1.0 - share, b.t - a.t);
-    let blend = [rest * rest * (1.0 + 2.0 * s), s * s * (3.0 - 2.0 * s), s * rest * rest * span, -s * s * rest * span];
-    (0..a.phi.len()).map(|k| blend[0] * a.phi[k] + blend[1] * b.phi[k] + blend[2] * a.omega[k] + blend[3] * b.omega[k]).collect()
+    let blend = [
+        rest * rest * (1.0 + 2.0 * s),
+        s * s * (3.0 - 2.0 * s),
+        s * rest * rest * span,
+        -s * s * rest * span,
+    ];
+    (0..a.phi.len())
+        .map(|k| blend[0] * a.phi[k] + blend[1] * b.phi[k] + blend[2] * a.omega[k] + blend[3] * b.omega[k])
+        .collect()
 }
 
 /// Angles and rates at time `t` \[s\], between samples.
 pub(super) fn between(samples: &[Sample], t: f64) -> (Vec<f64>, Vec<f64>) {
     let after = samples.partition_point(|sample| sample.t < t).min(samples.len().saturating_sub(1));
-    let (Some(a), Some(b)) = (samples.get(after.saturating_sub(1)), samples.get(after)) else { return Default::default() };
+    let (Some(a), Some(b)) = (samples.get(after.saturating_sub(1)), samples.get(after)) else {
+        return Default::default();
+    };
     let share = if b.t > a.t { ((t - a.t) / (b.t - a.t)).clamp(0.0, 1.0) } else { 0.0 };
     (cubic(a, b, share), a.omega.iter().zip(&b.omega).map(|(a, b)| a + share * (b - a)).collect())
 }
@@ -72,7 +84,8 @@ mod tests {
     fn small_swings_sampled_too_seldom_are_coarse() {
         let coarse = |per_period: f64| {
             let time = |k: u32| f64::from(k) * std::f64::consts::TAU / per_period;
-            let samples: Vec<Sample> = (0..100).map(|k| sample(time(k), 0.2 * time(k).sin(), 0.2 * time(k).cos())).collect();
+            let samples: Vec<Sample> =
+                (0..100).map(|k| sample(time(k), 0.2 * time(k).sin(), 0.2 * time(k).cos())).collect();
             is_coarse(&samples.iter().collect::<Vec<_>>())
         };
         assert!(coarse(3.3) && coarse(5.0) && !coarse(10.0) && !coarse(100.0));

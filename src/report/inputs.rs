@@ -9,7 +9,8 @@ use std::f64::consts::TAU;
 /// Numbers shown on a page; the rest is summed up.
 const SHOWN: usize = 16;
 
-/// The entry `inputs` of `trust`: effects in rad, or as shares of the longest bar, at most a turn; `null` where they were not asked for.
+/// The entry `inputs` of `trust`: effects in rad, or as shares of the longest bar, at most a turn; `null`
+/// where they were not asked for.
 pub fn object(inputs: Option<&Inputs>) -> Value {
     let Some(inputs) = inputs else { return Value::Null };
     let number = |input: &Input| {
@@ -47,17 +48,32 @@ fn plain(x: f64) -> String {
 
 /// The same on a page.
 pub fn describe(page: &mut Page, trust: &Trust, inputs: &Inputs) {
-    let cost = format!("{}, {}", counted(inputs.runs, "run", "runs"), counted(inputs.evaluations, "evaluation", "evaluations"));
+    let cost = format!(
+        "{}, {}",
+        counted(inputs.runs, "run", "runs"),
+        counted(inputs.evaluations, "evaluation", "evaluations")
+    );
     let at = rough(inputs.at);
     let what = match inputs.total {
-        Some(total) if total < 1.0 => format!("their last digits as written come to about {} rad at {at} s ({cost})", magnitude(total)),
+        Some(total) if total < 1.0 => {
+            format!("their last digits as written come to about {} rad at {at} s ({cost})", magnitude(total))
+        }
         Some(_) => format!("their last digits as written leave no angle certain at {at} s ({cost})"),
-        None if inputs.why.is_none() && inputs.numbers.is_empty() => "the scene has no uncertain number".into(),
+        None if inputs.why.is_none() && inputs.numbers.is_empty() => {
+            "the scene has no uncertain number".into()
+        }
         None => format!("what their last digits come to is not known ({cost})"),
     };
     page.entry("inputs", &what);
     if let Some(why) = &inputs.why {
-        page.entry("", &if inputs.at < trust.at && inputs.at > 0.0 { format!("not known beyond {at} s: {why}") } else { why.clone() });
+        page.entry(
+            "",
+            &if inputs.at < trust.at && inputs.at > 0.0 {
+                format!("not known beyond {at} s: {why}")
+            } else {
+                why.clone()
+            },
+        );
     }
     if inputs.numbers.is_empty() {
         return;
@@ -74,11 +90,19 @@ pub fn describe(page: &mut Page, trust: &Trust, inputs: &Inputs) {
         page.table(&["number", "value", "+-", "effect [rad]"], &rows);
     }
     if known > SHOWN {
-        let rest = inputs.numbers[SHOWN..known].iter().filter_map(|input| input.effect).map(|effect| effect * effect).sum::<f64>().sqrt();
+        let rest = inputs.numbers[SHOWN..known]
+            .iter()
+            .filter_map(|input| input.effect)
+            .map(|effect| effect * effect)
+            .sum::<f64>()
+            .sqrt();
         page.entry("", &format!("and {} more, {} rad together", known - SHOWN, magnitude(bounded(rest))));
     }
     for input in inputs.numbers.iter().skip(known).take(SHOWN) {
-        page.entry("", &format!("{}: not known, {}", input.path, input.why.as_deref().unwrap_or("nothing was compared")));
+        page.entry(
+            "",
+            &format!("{}: not known, {}", input.path, input.why.as_deref().unwrap_or("nothing was compared")),
+        );
     }
     if inputs.unknown() > SHOWN {
         page.entry("", &format!("and {} more of which nothing is known", inputs.unknown() - SHOWN));

@@ -1,4 +1,5 @@
-//! The start of a scene, looked at closely: accelerations, multipliers, motors, hinge forces, energies, impacts.
+//! The start of a scene, looked at closely: accelerations, multipliers, motors, hinge forces, energies,
+//! impacts.
 //!
 //! Signs, whichever body is the ground:
 //!
@@ -13,9 +14,11 @@
 //! | locked slider's `NAME.angle` | torque | the body of its `point`, or of the rail where that is of the ground | the other |
 //! | wall | impulse along the normal | its `body` | the ground |
 //!
-//! Forces are in the directions of the ground, torques counter-clockwise; each body that is named `from` gets the opposite at the same place.  A torque is minus
-//! its constraint's multiplier, a force minus the multiplier along the constraint's direction: the rail's direction for a travel, that turned left by a quarter for a
-//! slider, x and y for `NAME.x` and `NAME.y` of a hinge that closes a loop, on its first body.  A power is what a motor feeds in.
+//! Forces are in the directions of the ground, torques counter-clockwise; each body that is named `from` gets
+//! the opposite at the same place.  A torque is minus its constraint's multiplier, a force minus the
+//! multiplier along the constraint's direction: the rail's direction for a travel, that turned left by a
+//! quarter for a slider, x and y for `NAME.x` and `NAME.y` of a hinge that closes a loop, on its first body.
+//! A power is what a motor feeds in.
 
 use super::page::{Page, figure};
 use crate::arithmetic::DoubleDouble;
@@ -30,7 +33,8 @@ use serde_json::{Map, Value, json};
 pub struct Inspection {
     /// Each body with the acceleration of its centre of mass (x, y) \[m/s²\] and of its angle \[rad/s²\].
     pub bodies: Vec<(String, [f64; 3])>,
-    /// Each constraint with its multiplier \[N·m or N\], its violation \[rad or m\] and the rate of that \[rad/s or m/s\].
+    /// Each constraint with its multiplier \[N·m or N\], its violation \[rad or m\] and the rate of that
+    /// \[rad/s or m/s\].
     pub constraints: Vec<(String, [f64; 3])>,
     /// What each of the constraints exerts, in their order.
     pub reactions: Vec<Reaction>,
@@ -57,7 +61,8 @@ pub struct HingeForce {
     pub on: String,
     /// The body it comes from.
     pub from: String,
-    /// False where redundant constraints leave it open: it is one of those of least norm then.  `None` where that was not examined.
+    /// False where redundant constraints leave it open: it is one of those of least norm then.  `None` where
+    /// that was not examined.
     pub is_determinate: Option<bool>,
 }
 
@@ -123,15 +128,22 @@ pub fn inspect(scene: &Scene, mechanism: &Mechanism) -> Inspection {
         found.bodies.push((body.name.clone(), [centre.re, centre.im, kernel.load[k]]));
     }
     let forces = mechanism.joint_forces(start.time, &kernel, &phi, &omega);
-    let name = |body: Option<usize>| body.map_or("ground", |body| mechanism.bodies[body].name.as_str()).to_owned();
+    let name =
+        |body: Option<usize>| body.map_or("ground", |body| mechanism.bodies[body].name.as_str()).to_owned();
     for (r, row) in mechanism.constraints.iter().enumerate() {
         let (here, multiplier) = (kernel.rows[r], forces.multipliers[r]);
-        found.constraints.push((row.name().to_owned(), [multiplier, here.position, kernel.row_rate(r, &omega)]));
+        found
+            .constraints
+            .push((row.name().to_owned(), [multiplier, here.position, kernel.row_rate(r, &omega)]));
         if mechanism.is_motor(r) {
             found.motors.push((row.name().to_owned(), [-multiplier, multiplier * here.drive]));
         }
         let [on, from] = sides(row).map(name);
-        let force = row.push.as_ref().map(|push| push.direction(&kernel.z).times(-multiplier)).map(|force| [force.re, force.im]);
+        let force = row
+            .push
+            .as_ref()
+            .map(|push| push.direction(&kernel.z).times(-multiplier))
+            .map(|force| [force.re, force.im]);
         found.reactions.push(Reaction {
             unit: row.unit(),
             unit_of_multiplier: row.unit_of_force(),
@@ -145,9 +157,16 @@ pub fn inspect(scene: &Scene, mechanism: &Mechanism) -> Inspection {
     for (j, joint) in mechanism.joints.iter().enumerate() {
         let ([from, on], force) = (joint.between.map(name), forces.hinges[j]);
         let is_determinate = forces.hinge_is_determinate[j];
-        found.hinges.push(HingeForce { name: joint.name.clone(), force: [force.re, force.im], on, from, is_determinate });
+        found.hinges.push(HingeForce {
+            name: joint.name.clone(),
+            force: [force.re, force.im],
+            on,
+            from,
+            is_determinate,
+        });
     }
-    let energy = mechanism.energy(&mut Kernel::<DoubleDouble>::without_rows(mechanism), &start.phi, &start.omega);
+    let energy =
+        mechanism.energy(&mut Kernel::<DoubleDouble>::without_rows(mechanism), &start.phi, &start.omega);
     found.energy = [energy.kinetic.hi, energy.potential.hi];
     found.walls = contacts(mechanism, &start, &phi, omega, &kernel);
     found
@@ -163,15 +182,24 @@ fn sides(row: &ConstraintEquation) -> [Option<usize>; 2] {
 }
 
 /// The walls one after another, each with the rates that the one before left, as a run meets them.
-fn contacts(mechanism: &Mechanism, start: &Motion, phi: &[f64], mut omega: Vec<f64>, kernel: &Kernel<f64>) -> Vec<Contact> {
+fn contacts(
+    mechanism: &Mechanism,
+    start: &Motion,
+    phi: &[f64],
+    mut omega: Vec<f64>,
+    kernel: &Kernel<f64>,
+) -> Vec<Contact> {
     let mut contacts = Vec::new();
     for (number, contact) in mechanism.contacts.iter().enumerate() {
         let gap = contact.row.gap(&kernel.z);
         let mut jacobian = vec![0.0; phi.len()];
         contact.row.differentiate(start.time, Posture { phi, z: &kernel.z, omega: &omega }, &mut jacobian);
         let approach = crate::dynamics::kernel::dot(&jacobian, &omega);
-        let jump =
-            if gap <= TOUCHING * contact.length && approach < 0.0 { mechanism.impact_at(number, start.time, phi, &omega) } else { None };
+        let jump = if gap <= TOUCHING * contact.length && approach < 0.0 {
+            mechanism.impact_at(number, start.time, phi, &omega)
+        } else {
+            None
+        };
         let impact = jump.map(|jump| {
             omega.clone_from(&jump.omega);
             let energy_lost = jump.motor_work - jump.energy_change;
@@ -185,8 +213,11 @@ fn contacts(mechanism: &Mechanism, start: &Motion, phi: &[f64], mut omega: Vec<f
 impl Inspection {
     /// The report as one JSON object.
     pub fn object(&self, scene: &Scene) -> Value {
-        let bodies: Map<String, Value> =
-            self.bodies.iter().map(|(name, [x, y, phi])| (name.clone(), json!({"x": x, "y": y, "phi": phi}))).collect();
+        let bodies: Map<String, Value> = self
+            .bodies
+            .iter()
+            .map(|(name, [x, y, phi])| (name.clone(), json!({"x": x, "y": y, "phi": phi})))
+            .collect();
         let constraints: Map<String, Value> = (self.constraints.iter().zip(&self.reactions))
             .map(|((name, [multiplier, position, velocity]), reaction)| {
                 let mut told = json!({
@@ -227,8 +258,12 @@ impl Inspection {
         let walls: Map<String, Value> = (self.walls.iter())
             .map(|wall| {
                 let impact = wall.impact.as_ref().map(|impact| {
-                    let after: Map<String, Value> =
-                        self.bodies.iter().zip(&impact.omega).map(|((name, _), omega)| (name.clone(), json!(omega))).collect();
+                    let after: Map<String, Value> = self
+                        .bodies
+                        .iter()
+                        .zip(&impact.omega)
+                        .map(|((name, _), omega)| (name.clone(), json!(omega)))
+                        .collect();
                     json!({
                         "impulse": impact.impulse,
                         "energy_lost": impact.energy_lost,
@@ -259,11 +294,22 @@ impl Inspection {
     /// Constraints and motors, those of angles and those of lengths in tables of their own.
     fn describe_constraints(&self, page: &mut Page) {
         for (unit, heads, head_of_motors) in [
-            ("rad", ["name", "multiplier [N m]", "C [rad]", "C' [rad/s]", "torque on"], ["name", "torque [N m]", "power [W]", "on"]),
-            ("m", ["name", "multiplier [N]", "C [m]", "C' [m/s]", "force on"], ["name", "force [N]", "power [W]", "on"]),
+            (
+                "rad",
+                ["name", "multiplier [N m]", "C [rad]", "C' [rad/s]", "torque on"],
+                ["name", "torque [N m]", "power [W]", "on"],
+            ),
+            (
+                "m",
+                ["name", "multiplier [N]", "C [m]", "C' [m/s]", "force on"],
+                ["name", "force [N]", "power [W]", "on"],
+            ),
         ] {
             let cells = |name: &str, values: &[f64], on: &str| -> Vec<String> {
-                std::iter::once(name.to_owned()).chain(values.iter().map(|&x| figure(x))).chain([on.to_owned()]).collect()
+                std::iter::once(name.to_owned())
+                    .chain(values.iter().map(|&x| figure(x)))
+                    .chain([on.to_owned()])
+                    .collect()
             };
             let here = |name: &str| self.reaction(name).filter(|reaction| reaction.unit == unit);
             let rows: Vec<Vec<String>> = (self.constraints.iter().zip(&self.reactions))
@@ -274,8 +320,11 @@ impl Inspection {
                 page.entry("constraints", if unit == "rad" { "of angles" } else { "of places" });
                 page.table(&heads, &rows);
             }
-            let rows: Vec<Vec<String>> =
-                self.motors.iter().filter_map(|(name, values)| Some(cells(name, values, &here(name)?.on))).collect();
+            let rows: Vec<Vec<String>> = self
+                .motors
+                .iter()
+                .filter_map(|(name, values)| Some(cells(name, values, &here(name)?.on)))
+                .collect();
             if !rows.is_empty() {
                 page.entry("motors", "");
                 page.table(&head_of_motors, &rows);
@@ -286,9 +335,14 @@ impl Inspection {
     /// Which forces and torques redundant constraints leave open.
     fn describe_open(&self, page: &mut Page) {
         let known = self.hinges.iter().map(|hinge| (&hinge.name, hinge.is_determinate));
-        let rows = self.constraints.iter().zip(&self.reactions).map(|((name, _), reaction)| (name, reaction.is_determinate));
+        let rows = self
+            .constraints
+            .iter()
+            .zip(&self.reactions)
+            .map(|((name, _), reaction)| (name, reaction.is_determinate));
         let all: Vec<(&String, Option<bool>)> = known.chain(rows).collect();
-        let open: Vec<&str> = all.iter().filter(|(_, known)| *known == Some(false)).map(|(name, _)| name.as_str()).collect();
+        let open: Vec<&str> =
+            all.iter().filter(|(_, known)| *known == Some(false)).map(|(name, _)| name.as_str()).collect();
         if !open.is_empty() {
             let text = format!(
                 "{}: constraints are redundant here, and rigid bodies do not tell how these joints share the load; shown are the forces of least norm",
@@ -306,13 +360,23 @@ impl Inspection {
     /// The report as a page.
     pub fn text(&self, scene: &Scene) -> String {
         let mut page = Page::new(&scene.name, &scene.description);
-        let row = |name: &str, values: &[f64]| std::iter::once(name.to_owned()).chain(values.iter().map(|&x| figure(x))).collect();
+        let row = |name: &str, values: &[f64]| {
+            std::iter::once(name.to_owned()).chain(values.iter().map(|&x| figure(x))).collect()
+        };
         let rows: Vec<Vec<String>> = self.bodies.iter().map(|(name, values)| row(name, values)).collect();
         page.entry("accelerations", "of the centres of mass at the start");
         page.table(&["body", "x [m/s²]", "y [m/s²]", "phi [rad/s²]"], &rows);
         self.describe_constraints(&mut page);
         let rows: Vec<Vec<String>> = (self.hinges.iter())
-            .map(|hinge| vec![hinge.name.clone(), figure(hinge.force[0]), figure(hinge.force[1]), hinge.on.clone(), hinge.from.clone()])
+            .map(|hinge| {
+                vec![
+                    hinge.name.clone(),
+                    figure(hinge.force[0]),
+                    figure(hinge.force[1]),
+                    hinge.on.clone(),
+                    hinge.from.clone(),
+                ]
+            })
             .collect();
         page.entry("hinges", "");
         page.table(&["name", "Fx [N]", "Fy [N]", "on", "from"], &rows);
@@ -320,16 +384,38 @@ impl Inspection {
         let [kinetic, potential] = self.energy;
         page.entry(
             "energy",
-            &format!("kinetic {} J, potential {} J, total {} J", figure(kinetic), figure(potential), figure(kinetic + potential)),
+            &format!(
+                "kinetic {} J, potential {} J, total {} J",
+                figure(kinetic),
+                figure(potential),
+                figure(kinetic + potential)
+            ),
         );
         for wall in &self.walls {
-            page.entry("wall", &format!("{}: gap {} m, approached at {} m/s", wall.name, figure(wall.gap), figure(-wall.approach)));
+            page.entry(
+                "wall",
+                &format!(
+                    "{}: gap {} m, approached at {} m/s",
+                    wall.name,
+                    figure(wall.gap),
+                    figure(-wall.approach)
+                ),
+            );
             if let Some(impact) = &wall.impact {
                 page.entry(
                     "",
-                    &format!("struck: impulse {} N s, {} J lost; rates after:", figure(impact.impulse), figure(impact.energy_lost)),
+                    &format!(
+                        "struck: impulse {} N s, {} J lost; rates after:",
+                        figure(impact.impulse),
+                        figure(impact.energy_lost)
+                    ),
                 );
-                let rows: Vec<Vec<String>> = self.bodies.iter().zip(&impact.omega).map(|((name, _), &omega)| row(name, &[omega])).collect();
+                let rows: Vec<Vec<String>> = self
+                    .bodies
+                    .iter()
+                    .zip(&impact.omega)
+                    .map(|((name, _), &omega)| row(name, &[omega]))
+                    .collect();
                 page.table(&["body", "omega [rad/s]"], &rows);
             }
         }

@@ -1,7 +1,8 @@
-//! Reports: what a scene is, what its start amounts to, how a run went, as one JSON object and as a page of 80 columns.
+//! Reports: what a scene is, what its start amounts to, how a run went, as one JSON object and as a page of
+//! 80 columns.
 //!
-//! Reports read results, they never run anything.  The keys of the JSON objects are what scripts rely on; a number that is not
-//! finite is written as `null`, and a run that met one says so in `stop`.
+//! Reports read results, they never run anything.  The keys of the JSON objects are what scripts rely on; a
+//! number that is not finite is written as `null`, and a run that met one says so in `stop`.
 //!
 //! | report | of | file |
 //! | --- | --- | --- |
@@ -44,7 +45,8 @@ pub mod trust;
 use crate::run::Plan;
 use serde_json::{Value, json};
 
-/// The settings of a plan: `step` \[s\] or `rtol` and `atol`, `stabilize`, `time_constant` \[s\], `extended`, `every` \[s\], `effort` (evaluations allowed); `null` where one does not apply.
+/// The settings of a plan: `step` \[s\] or `rtol` and `atol`, `stabilize`, `time_constant` \[s\], `extended`,
+/// `every` \[s\], `effort` (evaluations allowed); `null` where one does not apply.
 pub fn settings(plan: &Plan) -> Value {
     json!({
         "step": plan.step,
@@ -65,8 +67,13 @@ pub fn setting(plan: &Plan) -> String {
     match (plan.step, plan.tolerance) {
         (Some(step), _) => format!("{}, step {} s", plan.method, page::figure(step)),
         (None, Some(tolerance)) if tolerance.relative != tolerance.absolute => {
-            format!("{}, relative tolerance {:e}, absolute {:e}", plan.method, tolerance.relative, tolerance.absolute)
+            format!(
+                "{}, relative tolerance {:e}, absolute {:e}",
+                plan.method, tolerance.relative, tolerance.absolute
+            )
         }
-        (None, tolerance) => format!("{}, tolerance {:e}", plan.method, tolerance.unwrap_or_default().relative),
+        (None, tolerance) => {
+            format!("{}, tolerance {:e}", plan.method, tolerance.unwrap_or_default().relative)
+        }
     }
 }

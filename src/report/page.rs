@@ -39,7 +39,12 @@ impl Page {
     /// A table under a labelled entry: names left, numbers right; cut into several where it is too wide.
     pub fn table(&mut self, head: &[&str], rows: &[Vec<String>]) {
         let widths: Vec<usize> = (0..head.len())
-            .map(|k| rows.iter().filter_map(|row| row.get(k)).map(|cell| cell.chars().count()).fold(head[k].chars().count(), usize::max))
+            .map(|k| {
+                rows.iter()
+                    .filter_map(|row| row.get(k))
+                    .map(|cell| cell.chars().count())
+                    .fold(head[k].chars().count(), usize::max)
+            })
             .collect();
         let mut from = 1;
         while from < head.len() {
@@ -147,7 +152,10 @@ mod tests {
         ] {
             assert_eq!(figure(x), shown);
         }
-        assert_eq!((magnitude(2.14e-13), rough(10.4609), rough(10_000.0)), ("2.1e-13".into(), "10.5".into(), "10000".into()));
+        assert_eq!(
+            (magnitude(2.14e-13), rough(10.4609), rough(10_000.0)),
+            ("2.1e-13".into(), "10.5".into(), "10000".into())
+        );
     }
 
     #[test]

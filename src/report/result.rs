@@ -12,7 +12,8 @@ use crate::scene::Scene;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
-/// The report as one JSON object; `wall_s` \[s\] is the time from the first output row to the last without the reference solution's, which is `trust_wall_s`.
+/// The report as one JSON object; `wall_s` \[s\] is the time from the first output row to the last without
+/// the reference solution's, which is `trust_wall_s`.
 pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value {
     let Outcome { plan, statistics, drift, .. } = outcome;
     let constraints: Map<String, Value> = (drift.constraints.iter().zip(&mechanism.constraints))
@@ -27,7 +28,8 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value 
             (name.clone(), levels)
         })
         .collect();
-    let stabilizer = (!mechanism.constraints.is_empty()).then(|| json!({"energy_j": drift.stabilizer, "max_j": drift.stabilizer_max}));
+    let stabilizer = (!mechanism.constraints.is_empty())
+        .then(|| json!({"energy_j": drift.stabilizer, "max_j": drift.stabilizer_max}));
     let impacts = (!mechanism.contacts.is_empty())
         .then(|| json!({"count": outcome.impact_count, "energy_lost_j": outcome.impact_loss, "first": outcome.impacts}));
     let holds = (!mechanism.contacts.is_empty())
@@ -73,13 +75,17 @@ fn moment(mechanism: &Mechanism, sample: &Sample) -> Value {
     let bodies: Map<String, Value> = (mechanism.bodies.iter().enumerate())
         .map(|(k, body)| {
             let ([x, y], [vx, vy]) = (sample.centre[k], sample.velocity[k]);
-            (body.name.clone(), json!({"phi": sample.phi[k], "omega": sample.omega[k], "x": x, "y": y, "vx": vx, "vy": vy}))
+            (
+                body.name.clone(),
+                json!({"phi": sample.phi[k], "omega": sample.omega[k], "x": x, "y": y, "vx": vx, "vy": vy}),
+            )
         })
         .collect();
     json!({"t": sample.t, "bodies": bodies})
 }
 
-/// What `run.json` holds: the report, the resolved scene, versions, hashes; what differs from run to run stands in `timings` alone.
+/// What `run.json` holds: the report, the resolved scene, versions, hashes; what differs from run to run
+/// stands in `timings` alone.
 #[cfg(feature = "files")]
 pub fn record(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome, trajectory_sha256: &str) -> Value {
     let plan = &outcome.plan;
@@ -164,24 +170,50 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
     }
     for ((name, [position, velocity]), row) in drift.constraints.iter().zip(&mechanism.constraints) {
         let unit = row.unit();
-        page.entry("constraint", &format!("{name}: {} {unit} and {} {unit}/s at most", magnitude(position.max), magnitude(velocity.max)));
+        page.entry(
+            "constraint",
+            &format!(
+                "{name}: {} {unit} and {} {unit}/s at most",
+                magnitude(position.max),
+                magnitude(velocity.max)
+            ),
+        );
     }
     if let Some(singular) = &drift.singular {
         let (smallest, constraint) = (magnitude(singular.smallest), &singular.constraint);
-        page.entry("singular values", &format!("down to {smallest} of the largest at t = {} s, at {constraint}", figure(singular.t)));
+        page.entry(
+            "singular values",
+            &format!("down to {smallest} of the largest at t = {} s, at {constraint}", figure(singular.t)),
+        );
     }
     if drift.stabilizer_max > 0.0 {
         let (now, most) = (magnitude(drift.stabilizer), magnitude(drift.stabilizer_max));
         page.entry("stabilizer", &format!("put in {now} J, {most} J at most"));
     }
     if !mechanism.contacts.is_empty() {
-        page.entry("impacts", &format!("{}, {} J lost in them", outcome.impact_count, figure(outcome.impact_loss)));
+        page.entry(
+            "impacts",
+            &format!("{}, {} J lost in them", outcome.impact_count, figure(outcome.impact_loss)),
+        );
         if outcome.persistent_contact_count > 0 {
-            let still = outcome.holds.iter().filter(|hold| hold.until.is_none()).map(|hold| hold.wall.as_str()).collect::<Vec<_>>();
-            let still = if still.is_empty() { String::new() } else { format!(", to the end on {}", still.join(", ")) };
+            let still = outcome
+                .holds
+                .iter()
+                .filter(|hold| hold.until.is_none())
+                .map(|hold| hold.wall.as_str())
+                .collect::<Vec<_>>();
+            let still = if still.is_empty() {
+                String::new()
+            } else {
+                format!(", to the end on {}", still.join(", "))
+            };
             page.entry(
                 "stays on walls",
-                &format!("{}, {} s in all{still}", outcome.persistent_contact_count, figure(outcome.persistent_contact_time)),
+                &format!(
+                    "{}, {} s in all{still}",
+                    outcome.persistent_contact_count,
+                    figure(outcome.persistent_contact_time)
+                ),
             );
         }
     }

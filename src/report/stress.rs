@@ -55,17 +55,27 @@ pub fn text(plan: &Stress, lines: &[Line]) -> String {
     page.entry("effort", &format!("{} evaluations a scene and method", plan.max_evaluations));
     page.entry("letters", "+ right, - refused, . stopped, X wrong");
     let head: Vec<char> = (0..plan.methods.len()).map(letter).collect();
-    let row = |name: &str, letters: Vec<char>| vec![name.to_owned(), letters.iter().map(|letter| format!("{letter} ")).collect::<String>()];
+    let row = |name: &str, letters: Vec<char>| {
+        vec![name.to_owned(), letters.iter().map(|letter| format!("{letter} ")).collect::<String>()]
+    };
     let mut rows = vec![row("", head)];
-    rows.extend(lines.iter().map(|line| row(&line.scene, line.cells.iter().map(|cell| mark(cell.verdict)).collect())));
+    rows.extend(
+        lines.iter().map(|line| row(&line.scene, line.cells.iter().map(|cell| mark(cell.verdict)).collect())),
+    );
     page.table(&["scene", ""], &rows);
     let count = |verdict| cells(lines).filter(|cell| cell.verdict == verdict).count();
-    let [right, refused, stopped, wrong] = [Verdict::Right, Verdict::Refused, Verdict::Stopped, Verdict::Wrong].map(count);
+    let [right, refused, stopped, wrong] =
+        [Verdict::Right, Verdict::Refused, Verdict::Stopped, Verdict::Wrong].map(count);
     page.entry("cells", &format!("{right} right, {refused} refused, {stopped} stopped, {wrong} wrong"));
     for line in lines {
         for cell in line.cells.iter().filter(|cell| cell.verdict == Verdict::Wrong) {
-            let off = cell.error.map_or("an answer where there is none".to_owned(), |error| format!("{} off", magnitude(error)));
-            page.entry("wrong", &format!("{} by {}: {off}, tolerance {}", line.scene, cell.method, magnitude(line.tolerance)));
+            let off = cell.error.map_or("an answer where there is none".to_owned(), |error| {
+                format!("{} off", magnitude(error))
+            });
+            page.entry(
+                "wrong",
+                &format!("{} by {}: {off}, tolerance {}", line.scene, cell.method, magnitude(line.tolerance)),
+            );
         }
     }
     page.into_text()
@@ -153,9 +163,19 @@ pub fn stability(map: &StabilityMap) -> Result<Vec<u8>, ChartError> {
     let chart = Map {
         title: format!("Error of {} by stiffness and step", map.method),
         caption: vec!["the double pendulum on its spring, released from the free length, after 0.5 s".into()],
-        x: MapAxis { name: "stiffness [N/m]".into(), from: softest, to: stiffest, count: map.stiffnesses, log: true },
+        x: MapAxis {
+            name: "stiffness [N/m]".into(),
+            from: softest,
+            to: stiffest,
+            count: map.stiffnesses,
+            log: true,
+        },
         y: MapAxis { name: "step [s]".into(), from: shortest, to: longest, count: map.steps, log: true },
-        cells: map.cells.iter().map(|cell| cell.error.map_or(chart::Cell::Failed, chart::Cell::Value)).collect(),
+        cells: map
+            .cells
+            .iter()
+            .map(|cell| cell.error.map_or(chart::Cell::Failed, chart::Cell::Value))
+            .collect(),
         value: "error of the angles [rad]".into(),
         log: true,
         dark_high: false,

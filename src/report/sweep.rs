@@ -51,7 +51,8 @@ pub fn object(sweep: &Sweep, totals: &Totals) -> Value {
     })
 }
 
-/// What `sweep.json` holds: the report, the resolved scene, versions, hashes; what differs from run to run stands in `timings` alone.
+/// What `sweep.json` holds: the report, the resolved scene, versions, hashes; what differs from run to run
+/// stands in `timings` alone.
 pub fn record(sweep: &Sweep, totals: &Totals, table_sha256: &str) -> Value {
     let mut report = object(sweep, totals);
     let mut taken = |key: &str| report.as_object_mut().and_then(|members| members.shift_remove(key));
@@ -75,17 +76,26 @@ pub fn text(sweep: &Sweep, totals: &Totals) -> String {
     page.entry("", sweep.plan().why.as_deref().unwrap_or("as asked for"));
     for (number, (axis, variable)) in sweep.grid().axes().iter().zip(sweep.variables()).enumerate() {
         let unit = if variable.unit.is_empty() { String::new() } else { format!(" {}", variable.unit) };
-        let range =
-            format!("{}: {} to {}{unit}, {}", variable.path, figure(axis.from), figure(axis.to), counted(axis.count, "value", "values"));
+        let range = format!(
+            "{}: {} to {}{unit}, {}",
+            variable.path,
+            figure(axis.from),
+            figure(axis.to),
+            counted(axis.count, "value", "values")
+        );
         page.entry(if number == 0 { "varied" } else { "" }, &range);
     }
     let seconds = totals.wall.as_secs_f64();
     let rate = figure((sweep.grid().count() as f64 / seconds.max(1e-9)).round());
-    let [points, steps] = [counted(sweep.grid().count(), "point", "points"), counted(totals.steps, "step", "steps")];
+    let [points, steps] =
+        [counted(sweep.grid().count(), "point", "points"), counted(totals.steps, "step", "steps")];
     let threads = counted(totals.threads as u64, "thread", "threads");
     page.entry("cost", &format!("{points}, {steps}, {seconds:.3} s on {threads}, {rate} points a second"));
     page.entry("points", &by_status(totals));
-    page.entry("turned over", &format!("{} of {points}, by t = {} s", totals.flipped, figure(sweep.plan().until)));
+    page.entry(
+        "turned over",
+        &format!("{} of {points}, by t = {} s", totals.flipped, figure(sweep.plan().until)),
+    );
     if sweep.trust() != Level::Off {
         let (of, without) = (totals.judged, totals.done - totals.judged.min(totals.done));
         let rest = if without > 0 { format!("; {without} without an estimate") } else { String::new() };
@@ -98,7 +108,10 @@ pub fn text(sweep: &Sweep, totals: &Totals) -> String {
             ),
         );
     }
-    page.entry("energy drift", &format!("{} of its scale at most, in row {}", magnitude(totals.energy.0), totals.energy.1 + 1));
+    page.entry(
+        "energy drift",
+        &format!("{} of its scale at most, in row {}", magnitude(totals.energy.0), totals.energy.1 + 1),
+    );
     if let Some(unit) = sweep.mechanism().unit_of_rows() {
         let [position, velocity] = totals.constraint.map(magnitude);
         page.entry("constraints", &format!("{position} {unit} and {velocity} {} at most", per_second(unit)));
@@ -113,7 +126,12 @@ fn per_second(unit: &str) -> String {
 
 /// `12 done, 3 stopped, 1 refused`.
 fn by_status(totals: &Totals) -> String {
-    let kinds = [(totals.done, "done"), (totals.stopped, "stopped"), (totals.refused, "refused"), (totals.skipped, "skipped")];
+    let kinds = [
+        (totals.done, "done"),
+        (totals.stopped, "stopped"),
+        (totals.refused, "refused"),
+        (totals.skipped, "skipped"),
+    ];
     kinds
         .iter()
         .filter(|(count, word)| *count > 0 || *word == "done")
@@ -195,7 +213,9 @@ impl Curve {
     pub fn fits(&self, sweep: &Sweep, points: u64) -> bool {
         let sizes = [self.seen.len(), self.failed.len()];
         let is_known = self.column.is_none_or(|column| column < results(sweep).len());
-        is_known && self.bars == sweep.mechanism().bodies.len() && sizes.iter().all(|&size| size as u64 == points)
+        is_known
+            && self.bars == sweep.mechanism().bodies.len()
+            && sizes.iter().all(|&size| size as u64 == points)
     }
 
     /// Takes a point.
@@ -216,11 +236,16 @@ impl Curve {
         if is_flip && self.seen.iter().all(|time| time.is_nan()) {
             return Ok(Err(NoChart::Nothing(listed(sweep))));
         }
-        let name = if is_flip { "flip time [s]".to_owned() } else { spaced(&names[self.column.unwrap_or_default()]) };
+        let name = if is_flip {
+            "flip time [s]".to_owned()
+        } else {
+            spaced(&names[self.column.unwrap_or_default()])
+        };
         let bare = name.split(" [").next().unwrap_or_default().to_owned();
         let axes: Vec<MapAxis> = (sweep.grid().axes().iter().zip(sweep.variables()))
             .map(|(axis, variable)| {
-                let unit = if variable.unit.is_empty() { String::new() } else { format!(" [{}]", variable.unit) };
+                let unit =
+                    if variable.unit.is_empty() { String::new() } else { format!(" [{}]", variable.unit) };
                 MapAxis {
                     name: format!("{}{unit}", plain(&variable.path)),
                     from: axis.from,
@@ -230,7 +255,11 @@ impl Curve {
                 }
             })
             .collect();
-        let title = if is_flip { "Time until a bar first turns over".to_owned() } else { format!("{} over the sweep", capital(&bare)) };
+        let title = if is_flip {
+            "Time until a bar first turns over".to_owned()
+        } else {
+            format!("{} over the sweep", capital(&bare))
+        };
         let plan = sweep.plan();
         let mut caption = vec![format!("scene {}", plain(&sweep.scene().name)), plain(&super::setting(plan))];
         caption.push(format!(
@@ -242,24 +271,51 @@ impl Curve {
         let log = is_flip || names[self.column.unwrap_or_default()].contains("drift") || name == "steps";
         let picture = match &axes[..] {
             [x, y] => {
-                let cells = self.seen.iter().zip(&self.failed).map(|(&value, &failed)| match (value.is_nan(), failed) {
-                    (false, _) => Cell::Value(value),
-                    (true, true) => Cell::Failed,
-                    (true, false) => Cell::Never,
+                let cells = self.seen.iter().zip(&self.failed).map(|(&value, &failed)| {
+                    match (value.is_nan(), failed) {
+                        (false, _) => Cell::Value(value),
+                        (true, true) => Cell::Failed,
+                        (true, false) => Cell::Never,
+                    }
                 });
-                let never = if is_flip { format!("not within {} s", figure(plan.until)) } else { "no value".to_owned() };
+                let never = if is_flip {
+                    format!("not within {} s", figure(plan.until))
+                } else {
+                    "no value".to_owned()
+                };
                 let words = [never, "left out".to_owned(), "stopped or refused".to_owned()];
                 let (x, y, cells) = (x.clone(), y.clone(), cells.collect());
-                chart::map(&Map { title, caption, x, y, cells, value: name, log, dark_high: is_flip, range: None, words }, FILE_RESOLUTION)
+                chart::map(
+                    &Map {
+                        title,
+                        caption,
+                        x,
+                        y,
+                        cells,
+                        value: name,
+                        log,
+                        dark_high: is_flip,
+                        range: None,
+                        words,
+                    },
+                    FILE_RESOLUTION,
+                )
             }
             _ => {
                 if self.seen.iter().any(|value| value.is_nan()) {
-                    let without = if is_flip { format!("not within {} s", figure(plan.until)) } else { "no value".to_owned() };
+                    let without = if is_flip {
+                        format!("not within {} s", figure(plan.until))
+                    } else {
+                        "no value".to_owned()
+                    };
                     caption.push(format!("dots on the upper edge: {without}"));
                 }
                 let values = (0..sweep.grid().count()).map(|index| sweep.grid().values(index)[0]).collect();
                 let x_name = axes.first().map(|axis| axis.name.clone()).unwrap_or_default();
-                chart::profile(&Profile { title, caption, x_name, y_name: name, x: values, y: self.seen.clone(), log }, FILE_RESOLUTION)
+                chart::profile(
+                    &Profile { title, caption, x_name, y_name: name, x: values, y: self.seen.clone(), log },
+                    FILE_RESOLUTION,
+                )
             }
         };
         Ok(Ok(picture?.png_bytes()?))
@@ -276,7 +332,11 @@ fn results(sweep: &Sweep) -> Vec<String> {
 
 #[cfg(feature = "charts")]
 fn listed(sweep: &Sweep) -> String {
-    results(sweep).iter().map(|name| name.split(" [").next().unwrap_or_default().to_owned()).collect::<Vec<_>>().join(", ")
+    results(sweep)
+        .iter()
+        .map(|name| name.split(" [").next().unwrap_or_default().to_owned())
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 /// A column's name as the name of an axis.

@@ -6,7 +6,8 @@ use crate::run::Outcome;
 use crate::run::trust::{HORIZON, How, LOST, Trust};
 use serde_json::{Value, json};
 
-/// The entry `trust` of a run's report: errors in rad, or as shares of the longest bar; times in s.  `null` where there is no figure.
+/// The entry `trust` of a run's report: errors in rad, or as shares of the longest bar; times in s.  `null`
+/// where there is no figure.
 pub fn object(trust: Option<&Trust>) -> Value {
     let Some(trust) = trust else {
         return json!({"error_estimate": null, "horizon_s": null, "how": How::None.word(), "why": "not asked for"});
@@ -48,7 +49,11 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
     let Some(trust) = &outcome.trust else {
         return page.entry("trust", "not asked for: --trust auto estimates the error");
     };
-    let what = if mechanism.coordinates() > mechanism.bodies.len() { "rad, and positions to as much of the longest bar" } else { "rad" };
+    let what = if mechanism.coordinates() > mechanism.bodies.len() {
+        "rad, and positions to as much of the longest bar"
+    } else {
+        "rad"
+    };
     let source = match (trust.how, &trust.error_estimator) {
         (How::Extrapolated(from), _) => format!("carried on from t = {} s", rough(from)),
         (_, Some(name)) => format!("estimated beside {name}"),
@@ -56,14 +61,24 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
     };
     match (trust.horizon, trust.error_estimate) {
         (Some(horizon), _) => {
-            let growth = trust.lyapunov.map_or(String::new(), |found| format!("; errors grow tenfold every {} s", rough(found.tenfold())));
-            page.entry("trust", &format!("trusted until {} s ({HORIZON:e} rad, {source}){growth}", rough(horizon)));
+            let growth = trust.lyapunov.map_or(String::new(), |found| {
+                format!("; errors grow tenfold every {} s", rough(found.tenfold()))
+            });
+            page.entry(
+                "trust",
+                &format!("trusted until {} s ({HORIZON:e} rad, {source}){growth}", rough(horizon)),
+            );
             page.entry("", &beyond(mechanism, outcome, horizon));
         }
         (None, Some(error)) => {
             page.entry(
                 "trust",
-                &format!("angles accurate to {} {} {what} at {} s ({source})", how_near(trust), magnitude(error), rough(trust.at)),
+                &format!(
+                    "angles accurate to {} {} {what} at {} s ({source})",
+                    how_near(trust),
+                    magnitude(error),
+                    rough(trust.at)
+                ),
             );
             page.entry("", &format!("no horizon within {} s", rough(trust.at)));
         }
@@ -71,7 +86,10 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
             let why = trust.why.as_deref().unwrap_or("nothing was to be compared");
             page.entry("trust", &format!("no estimate of the error at {} s: {why}", rough(trust.at)));
             if let Some([t, error]) = trust.record.last().filter(|point| point[0] > 0.0) {
-                page.entry("", &format!("typically {} rad at {} s ({source})", magnitude(1.2 * error), rough(*t)));
+                page.entry(
+                    "",
+                    &format!("typically {} rad at {} s ({source})", magnitude(1.2 * error), rough(*t)),
+                );
             }
         }
     }
@@ -79,23 +97,39 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
         page.entry("", &beside);
     }
     if trust.shared.len() > 1 {
-        page.entry("", &format!("not judged, as run and reference solution share them: {}", trust.shared.join(", ")));
+        page.entry(
+            "",
+            &format!("not judged, as run and reference solution share them: {}", trust.shared.join(", ")),
+        );
     }
     if let (Some(why), true) = (trust.cut(), trust.error_estimate.is_some()) {
         page.entry("", why);
     }
     if let Some(error) = trust.model_error {
-        page.entry("model", &format!("springs taken for rods: off by about {} rad, which no reference solution sees", magnitude(error)));
+        page.entry(
+            "model",
+            &format!(
+                "springs taken for rods: off by about {} rad, which no reference solution sees",
+                magnitude(error)
+            ),
+        );
     }
     if let Some(lost) = trust.lost {
         page.entry("", &format!("more than {LOST} rad off from {} s on", rough(lost)));
     }
     if let Some(found) = trust.lyapunov {
         let (exponent, uncertainty) = (rough(found.exponent), magnitude(found.uncertainty));
-        page.entry("lyapunov", &format!("largest exponent {exponent} ± {uncertainty} per s, over {} s", rough(found.until)));
+        page.entry(
+            "lyapunov",
+            &format!("largest exponent {exponent} ± {uncertainty} per s, over {} s", rough(found.until)),
+        );
     }
     if let Some(power) = trust.growth_power {
-        let how = if power < 0.05 { "errors do not grow".into() } else { format!("errors grow about as t^{power:.1}") };
+        let how = if power < 0.05 {
+            "errors do not grow".into()
+        } else {
+            format!("errors grow about as t^{power:.1}")
+        };
         page.entry("growth", &format!("regular motion: {how}"));
     }
     if let Some(why) = &trust.no_growth {
@@ -105,7 +139,9 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
         super::inputs::describe(page, trust, inputs);
     } else if let Some(error) = trust.input_error {
         let what = match error < 1.0 {
-            true => format!("their last digit comes to about {} rad at {} s", magnitude(error), rough(trust.at)),
+            true => {
+                format!("their last digit comes to about {} rad at {} s", magnitude(error), rough(trust.at))
+            }
             false => format!("their last digit leaves no angle certain at {} s", rough(trust.at)),
         };
         page.entry("inputs", &what);
@@ -120,7 +156,8 @@ fn how_near(trust: &Trust) -> &'static str {
 /// The errors of rates and torques, at the same time.
 fn beside(trust: &Trust) -> Option<String> {
     let rate = trust.rate_error?;
-    let torque = trust.torque_error.map_or(String::new(), |torque| format!(", torques to {} N·m", magnitude(torque)));
+    let torque =
+        trust.torque_error.map_or(String::new(), |torque| format!(", torques to {} N·m", magnitude(torque)));
     let at = if trust.horizon.is_some() { "then " } else { "" };
     Some(format!("rates {at}to {} {} rad/s{torque}", how_near(trust), magnitude(rate)))
 }
@@ -130,7 +167,11 @@ fn beyond(mechanism: &Mechanism, outcome: &Outcome, horizon: f64) -> String {
     let drift = &outcome.drift;
     let kept = if drift.kind == "energy" { "Energy" } else { "Energy minus work" };
     let most = drift.constraints.iter().map(|(_, [position, _])| position.max).fold(0.0, f64::max);
-    let rows = if mechanism.constraints.is_empty() { String::new() } else { format!(" and constraints ({})", magnitude(most)) };
+    let rows = if mechanism.constraints.is_empty() {
+        String::new()
+    } else {
+        format!(" and constraints ({})", magnitude(most))
+    };
     let holds = if mechanism.constraints.is_empty() { "still holds" } else { "still hold" };
     format!(
         "After {} s read the path as a typical motion of the scene, not as the motion of this start. {kept} (drift {}){rows} {holds}; use averages and \

@@ -1,4 +1,5 @@
-//! How far the energy balance of a run by an adaptive method may be off before the run counts as wrong: what its tolerance explains.
+//! How far the energy balance of a run by an adaptive method may be off before the run counts as wrong: what
+//! its tolerance explains.
 //!
 //! ```text
 //! limit = min(1e-2, 20 (N + 10) e),   e = (s + a_w) / E   with errors at the tolerance in every unknown:  d_q = atol + rtol |q| + 1e-14,  d_w likewise
@@ -7,10 +8,11 @@
 //! absolute tolerances are in the mechanism's own units of length and time
 //! ```
 //!
-//! E is the largest energy or work there has been, at least the energy scale, and N the number of steps taken.  Every term is a bound on the gradient of the
-//! energy: |p·dw| by the inertia, |dV/dq| of a spring by the energy it can hold.  A step may err by the tolerance, so that N steps may err by N times as much;
-//! twenty times that is no rounding of the law, and something that step-size control does not see.  Never beyond 1e-2: an energy so far off is
-//! wrong at any tolerance.
+//! E is the largest energy or work there has been, at least the energy scale, and N the number of steps
+//! taken.  Every term is a bound on the gradient of the energy: |p·dw| by the inertia, |dV/dq| of a spring by
+//! the energy it can hold.  A step may err by the tolerance, so that N steps may err by N times as much;
+//! twenty times that is no rounding of the law, and something that step-size control does not see.  Never
+//! beyond 1e-2: an energy so far off is wrong at any tolerance.
 
 use super::drift::{ENERGY_DOUBT, ENERGY_MOST};
 use super::methods::Stabilization;
@@ -23,7 +25,8 @@ const GENEROUS: f64 = 20.0;
 const FIRST_STEPS: f64 = 10.0;
 /// The tolerance that rounding leaves of a tighter one.
 const ROUNDING: f64 = 1e-14;
-/// Energy balance beyond which loops and sliders that nothing projects count as torn: at a singular position they may let go at any tolerance, in steps that err by less.
+/// Energy balance beyond which loops and sliders that nothing projects count as torn: at a singular position
+/// they may let go at any tolerance, in steps that err by less.
 const APART: f64 = 1e-4;
 /// Share of the limit from which a result says that it is in doubt.
 const DOUBTFUL: f64 = 0.1;
@@ -41,7 +44,8 @@ pub(super) struct Allowance {
     /// Σ R and Σ |W|, of angles \[sqrt(J), J\] and of positions \[the same over m\].
     rigidity: [f64; 2],
     weight: [f64; 2],
-    /// False where loops and sliders are not put back onto their constraints: what these let go is not the steps' error.
+    /// False where loops and sliders are not put back onto their constraints: what these let go is not the
+    /// steps' error.
     is_kept: bool,
 }
 
@@ -72,7 +76,8 @@ impl Allowance {
             rigidity[0] += stiff * levers;
             rigidity[1] += stiff * spring.span.shifts.len() as f64;
         }
-        rigidity[0] += mechanism.torsions.iter().map(|torsion| 2.0 * (2.0 * torsion.stiffness).sqrt()).sum::<f64>();
+        rigidity[0] +=
+            mechanism.torsions.iter().map(|torsion| 2.0 * (2.0 * torsion.stiffness).sqrt()).sum::<f64>();
         let angles = mechanism.bodies.len();
         for (k, pull) in tree.weight.iter().enumerate() {
             weight[usize::from(k >= angles)] += pull.norm_squared().sqrt();
@@ -93,13 +98,17 @@ impl Allowance {
         let ([relative, absolute], [length, time], largest) = (self.tolerance, self.units, moment.largest);
         let unit = |k: usize| if k < self.angles { 1.0 / time } else { length / time };
         let rates = || self.inertia.iter().zip(moment.omega);
-        let fast: f64 = rates().enumerate().map(|(k, (inertia, omega))| inertia * (absolute * unit(k) + relative * omega.abs())).sum();
+        let fast: f64 = rates()
+            .enumerate()
+            .map(|(k, (inertia, omega))| inertia * (absolute * unit(k) + relative * omega.abs()))
+            .sum();
         let swing: f64 = rates().map(|(inertia, omega)| inertia * omega.abs()).sum();
         // Angles are kept in [-π, π].
         let far = moment.translations.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         let moved = [absolute + relative * std::f64::consts::PI, absolute * length + relative * far];
         let sum = |parts: [f64; 2]| parts[0] * moved[0] + parts[1] * moved[1];
-        let energy = largest.sqrt() * (fast + sum(self.rigidity)) + sum(self.weight) + swing * swing * moved[0];
+        let energy =
+            largest.sqrt() * (fast + sum(self.rigidity)) + sum(self.weight) + swing * swing * moved[0];
         (energy + relative * moment.work.abs()) / largest + absolute
     }
 }

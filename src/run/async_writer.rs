@@ -1,6 +1,8 @@
-//! A trajectory written beside the run, by a thread of its own: where rows are dense, digits, hash and file take longer than the method.
+//! A trajectory written beside the run, by a thread of its own: where rows are dense, digits, hash and file
+//! take longer than the method.
 //!
-//! Rows go over as numbers, many at a time; short runs, and machines that give no thread, write where they are.  The bytes are those of [`Table`].
+//! Rows go over as numbers, many at a time; short runs, and machines that give no thread, write where they
+//! are.  The bytes are those of [`Table`].
 
 use super::sample::Sample;
 use super::table::{Shown, Table, columns};
@@ -16,7 +18,8 @@ const WAITING: usize = 4;
 
 /// Writes samples into a table.
 ///
-/// What the writer fails with is told by a later call: some batches later, at the latest where the table is asked for.
+/// What the writer fails with is told by a later call: some batches later, at the latest where the table is
+/// asked for.
 pub struct AsyncWriter<W: Write + Send + 'static> {
     /// Where no thread has it.
     table: Option<Table<W>>,
@@ -134,7 +137,8 @@ mod tests {
     use std::sync::{Arc, Mutex};
 
     fn mechanism() -> Mechanism {
-        Mechanism::new(&read_scene("examples/scenes/motor.json".as_ref(), &[]).expect("a scene")).expect("equations")
+        Mechanism::new(&read_scene("examples/scenes/motor.json".as_ref(), &[]).expect("a scene"))
+            .expect("equations")
     }
 
     fn sample(i: u32) -> Sample {
@@ -175,7 +179,8 @@ mod tests {
 
     impl Write for Full {
         fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            self.0 = self.0.checked_sub(bytes.len()).ok_or_else(|| io::Error::from(io::ErrorKind::StorageFull))?;
+            self.0 =
+                self.0.checked_sub(bytes.len()).ok_or_else(|| io::Error::from(io::ErrorKind::StorageFull))?;
             Ok(bytes.len())
         }
 
@@ -204,7 +209,9 @@ mod tests {
     #[test]
     fn a_scribe_given_up_leaves_no_writer_behind() {
         let gone = Arc::new(Mutex::new(false));
-        let mut writer = AsyncWriter::new(Table::new(&mechanism(), Full(usize::MAX, Arc::clone(&gone))).expect("a header"));
+        let mut writer = AsyncWriter::new(
+            Table::new(&mechanism(), Full(usize::MAX, Arc::clone(&gone))).expect("a header"),
+        );
         for i in 0..10_000 {
             writer.write(&sample(i)).expect("room");
         }

@@ -1,4 +1,5 @@
-//! From a plan to a driver: the form of the equations a stabilization asks for, the method, and what is measured before the first step.
+//! From a plan to a driver: the form of the equations a stabilization asks for, the method, and what is
+//! measured before the first step.
 
 use super::driver::{Driver, Halt, Watch, boxed};
 use super::impact_monitor::closed;
@@ -49,7 +50,11 @@ fn driver<P: Form + Send + ?Sized + 'static, M: Integrator<P> + Send + 'static>(
 }
 
 /// The form a stabilization integrates in, for `N` bodies.
-fn form<const N: usize>(mechanism: &Arc<Mechanism>, stabilization: Stabilization, time_constant: f64) -> Box<dyn Problem> {
+fn form<const N: usize>(
+    mechanism: &Arc<Mechanism>,
+    stabilization: Stabilization,
+    time_constant: f64,
+) -> Box<dyn Problem> {
     let mechanism = Arc::clone(mechanism);
     if matches!(stabilization, Stabilization::None | Stabilization::Projection)
         && let Some(looped) = Looped::new(Arc::clone(&mechanism))
@@ -58,8 +63,12 @@ fn form<const N: usize>(mechanism: &Arc<Mechanism>, stabilization: Stabilization
     }
     match stabilization {
         Stabilization::Elimination => eliminated::<N>(&mechanism),
-        Stabilization::Baumgarte => Box::new(Baumgarte::new(Multiplier::<N, true>::new(mechanism), time_constant)),
-        Stabilization::None | Stabilization::Projection if mechanism.has_work_integral() => Box::new(Multiplier::<N, true>::new(mechanism)),
+        Stabilization::Baumgarte => {
+            Box::new(Baumgarte::new(Multiplier::<N, true>::new(mechanism), time_constant))
+        }
+        Stabilization::None | Stabilization::Projection if mechanism.has_work_integral() => {
+            Box::new(Multiplier::<N, true>::new(mechanism))
+        }
         Stabilization::None | Stabilization::Projection => Box::new(Multiplier::<N, false>::new(mechanism)),
     }
 }
@@ -80,7 +89,11 @@ fn canonical<const N: usize>(mechanism: &Arc<Mechanism>) -> Box<dyn Problem> {
 }
 
 /// Builds what a plan asks for; Baumgarte's time constant is measured first where none was given.
-pub(super) fn build(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<Box<dyn Driver>, StepError> {
+pub(super) fn build(
+    mechanism: &Arc<Mechanism>,
+    plan: &mut Plan,
+    start: &Motion,
+) -> Result<Box<dyn Driver>, StepError> {
     let mut driver = built(mechanism, plan, start)?;
     driver.guard(closed(plan.tolerance.unwrap_or_default().relative));
     Ok(driver)
@@ -92,7 +105,8 @@ fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<
     let step = plan.step.unwrap_or(0.0);
     if plan.stabilization == Stabilization::Baumgarte && plan.time_constant.is_none() {
         let found = pilot(mechanism, plan, start)?;
-        plan.notes.push(format!("Baumgarte's time constant is {found:.3e} s, five mean steps of a pilot run"));
+        plan.notes
+            .push(format!("Baumgarte's time constant is {found:.3e} s, five mean steps of a pilot run"));
         plan.time_constant = Some(found);
     }
     let projected = plan.stabilization == Stabilization::Projection;
@@ -100,10 +114,17 @@ fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<
     Ok(match plan.method {
         MethodId::Custom => {
             let Some(custom) = &plan.integrator else {
-                return Err(cannot_begin(plan, "the integrator of this run is from outside the crate, and was not given again".into()));
+                return Err(cannot_begin(
+                    plan,
+                    "the integrator of this run is from outside the crate, and was not given again".into(),
+                ));
             };
             let integrator = custom.make();
-            if projected { driver(problem(), Projected::new(integrator), start) } else { driver(problem(), integrator, start) }
+            if projected {
+                driver(problem(), Projected::new(integrator), start)
+            } else {
+                driver(problem(), integrator, start)
+            }
         }
         MethodId::Dopri5 => driver(problem(), Dopri5::new(tolerance), start),
         MethodId::Dop853 => driver(problem(), Dop853::new(tolerance), start),
@@ -112,7 +133,10 @@ fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<
         MethodId::Dp5 => driver(problem(), Dp5::new(tolerance), start),
         MethodId::Dp8 => driver(problem(), Dp8::new(tolerance), start),
         MethodId::Taylor if mechanism.vibration.is_some() => {
-            return Err(cannot_begin(plan, "the mean force of a rigid spring's vibration has no series".into()));
+            return Err(cannot_begin(
+                plan,
+                "the mean force of a rigid spring's vibration has no series".into(),
+            ));
         }
         MethodId::Taylor if plan.in_double_double => {
             let (order, tolerance) = (order_in_double_double(tolerance.relative), tolerance.relative);
@@ -122,40 +146,51 @@ fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<
             let mut taylor = Taylor::new(tolerance);
             taylor.extended = plan.extended;
             match plan.stabilization {
-                Stabilization::None if mechanism.constraints.is_empty() => driver(sized!(n, eliminated(mechanism)), taylor, start),
+                Stabilization::None if mechanism.constraints.is_empty() => {
+                    driver(sized!(n, eliminated(mechanism)), taylor, start)
+                }
                 Stabilization::Projection => driver(problem(), Projected::new(taylor), start),
                 _ => driver(problem(), taylor, start),
             }
         }
         MethodId::Radau(stages) => {
-            let radau = Radau::new(stages, tolerance).ok_or_else(|| cannot_begin(plan, format!("no Radau method has {stages} stages")))?;
+            let radau = Radau::new(stages, tolerance)
+                .ok_or_else(|| cannot_begin(plan, format!("no Radau method has {stages} stages")))?;
             if projected {
                 return Ok(driver(problem(), Projected::new(radau), start));
             }
             driver(problem(), radau, start)
         }
         MethodId::Gauss(stages) => {
-            let gauss = Gauss::new(stages, step)
-                .ok_or_else(|| cannot_begin(plan, format!("no Gauss method has {stages} stages and step {step} s")))?;
+            let gauss = Gauss::new(stages, step).ok_or_else(|| {
+                cannot_begin(plan, format!("no Gauss method has {stages} stages and step {step} s"))
+            })?;
             if projected {
                 return Ok(driver(problem(), SymmetricGauss::new(gauss), start));
             }
             driver(sized!(n, canonical(mechanism)), gauss, start)
         }
         MethodId::Rattle(composition) => {
-            let natural = Natural::new(Arc::clone(mechanism)).map_err(|error| cannot_begin(plan, error.to_string()))?;
+            let natural =
+                Natural::new(Arc::clone(mechanism)).map_err(|error| cannot_begin(plan, error.to_string()))?;
             driver(Box::new(natural), Rattle::new(composition, step), start)
         }
     })
 }
 
-/// The order of a series in double-double that takes the least work at a tolerance: a step costs as its square, and is as long as its root of the tolerance.
+/// The order of a series in double-double that takes the least work at a tolerance: a step costs as its
+/// square, and is as long as its root of the tolerance.
 pub(super) fn order_in_double_double(tolerance: f64) -> usize {
     (-0.5 * libm::log(tolerance)).round().clamp(20.0, 30.0) as usize
 }
 
 /// The series of a mechanism in double-double, from `start`, with its order and tolerance \[rad/s\].
-pub(super) fn exact(mechanism: &Arc<Mechanism>, start: &Motion, order: usize, tolerance: f64) -> Box<dyn Driver> {
+pub(super) fn exact(
+    mechanism: &Arc<Mechanism>,
+    start: &Motion,
+    order: usize,
+    tolerance: f64,
+) -> Box<dyn Driver> {
     let taylor = Taylor::<DoubleDouble>::with_order(tolerance, order);
     match mechanism.has_multipliers() {
         true => driver(form::<0>(mechanism, Stabilization::None, 1.0), taylor, start),
@@ -173,7 +208,14 @@ pub(super) fn tangent_form(mechanism: &Arc<Mechanism>) -> Box<dyn Problem> {
 
 fn cannot_begin(plan: &Plan, what: String) -> StepError {
     let hint = "--method dp8".into();
-    StepError { cause: Cause::Unsuited, method: plan.method.to_string(), t: 0.0, step: plan.step.unwrap_or(0.0), what, hint }
+    StepError {
+        cause: Cause::Unsuited,
+        method: plan.method.to_string(),
+        t: 0.0,
+        step: plan.step.unwrap_or(0.0),
+        what,
+        hint,
+    }
 }
 
 /// Five mean steps of the unstabilized run over its first output intervals (at most twenty) \[s\].

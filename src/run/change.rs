@@ -1,4 +1,5 @@
-//! What events from outside do to a run: it stops, its motion is changed, parts of the scene begin or cease to act.
+//! What events from outside do to a run: it stops, its motion is changed, parts of the scene begin or cease
+//! to act.
 
 use super::build::build;
 use super::contact::ContactDriver;
@@ -10,7 +11,8 @@ use crate::dynamics::{Mechanism, Motion};
 use crate::stepping::{Cause, StepError};
 use std::sync::Arc;
 
-/// Violation of a constraint, angles in rad and lengths in sizes of the mechanism, and its rate in units of the mechanism, up to which a changed motion satisfies it.
+/// Violation of a constraint, angles in rad and lengths in sizes of the mechanism, and its rate in units of
+/// the mechanism, up to which a changed motion satisfies it.
 const SATISFIED: f64 = 1e-8;
 
 impl ContactDriver {
@@ -22,7 +24,11 @@ impl ContactDriver {
     }
 
     /// Lets the event at which the last step was cut short take effect.
-    pub(super) fn act(&mut self, outcome: &mut Outcome, monitor: Option<&mut dyn Monitor>) -> Result<(), StepError> {
+    pub(super) fn act(
+        &mut self,
+        outcome: &mut Outcome,
+        monitor: Option<&mut dyn Monitor>,
+    ) -> Result<(), StepError> {
         let Some(events) = &mut self.events else { return Ok(()) };
         let Some((event, action)) = events.memory.pending.take() else { return Ok(()) };
         let name = events.name(event).to_owned();
@@ -41,7 +47,12 @@ impl ContactDriver {
         }
     }
 
-    fn change(&mut self, event: &str, Change { motion, switches }: Change, outcome: &mut Outcome) -> Result<(), StepError> {
+    fn change(
+        &mut self,
+        event: &str,
+        Change { motion, switches }: Change,
+        outcome: &mut Outcome,
+    ) -> Result<(), StepError> {
         let refused = |contact_driver: &mut Self, what: String, hint: &str| StepError {
             cause: Cause::Unsuited,
             method: outcome.plan.method.to_string(),
@@ -63,7 +74,11 @@ impl ContactDriver {
         if let Some(motion) = motion {
             let n = before.phi.len();
             if (motion.phi.len(), motion.omega.len(), motion.turns.len()) != (n, n, before.turns.len()) {
-                return Err(refused(self, "gives a motion of other coordinates".into(), "change a clone of the motion it is shown"));
+                return Err(refused(
+                    self,
+                    "gives a motion of other coordinates".into(),
+                    "change a clone of the motion it is shown",
+                ));
             }
             (after.phi, after.omega, after.turns) = (motion.phi, motion.omega, motion.turns);
         }
@@ -75,12 +90,22 @@ impl ContactDriver {
         }
         let free = match self.whole.without(&self.off) {
             Ok(free) => Arc::new(free),
-            Err(part) => return Err(refused(self, format!("switches `{part}`"), "name a spring, a torsion spring, a force or a torque")),
+            Err(part) => {
+                return Err(refused(
+                    self,
+                    format!("switches `{part}`"),
+                    "name a spring, a torsion spring, a force or a torque",
+                ));
+            }
         };
         if let Some(what) = broken(&free, &after) {
             return Err(refused(self, what, "change rates along what the constraints allow"));
         }
-        self.mechanism = if self.mechanism.held.is_empty() { Arc::clone(&free) } else { Arc::new(free.holding(&self.mechanism.held)) };
+        self.mechanism = if self.mechanism.held.is_empty() {
+            Arc::clone(&free)
+        } else {
+            Arc::new(free.holding(&self.mechanism.held))
+        };
         self.free = free;
         self.stabilizer += std::mem::take(&mut after.stabilizer);
         let mut plan = outcome.plan.clone();
@@ -100,7 +125,8 @@ impl ContactDriver {
 
 /// The constraint that a motion does not satisfy.
 fn broken(mechanism: &Mechanism, motion: &Motion) -> Option<String> {
-    let [phi, omega] = [&motion.phi, &motion.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<f64>>());
+    let [phi, omega] =
+        [&motion.phi, &motion.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<f64>>());
     if phi.iter().chain(&omega).any(|x| !x.is_finite()) {
         return Some("gives numbers that are not finite".into());
     }
@@ -109,9 +135,14 @@ fn broken(mechanism: &Mechanism, motion: &Motion) -> Option<String> {
     let (size, time) = (mechanism.size_of_parts(), mechanism.units.time);
     mechanism.constraints.iter().enumerate().find_map(|(r, row)| {
         let unit = if row.is_angle() { 1.0 } else { size };
-        let (position, rate) = (kernel.rows[r].position.abs() / unit, kernel.row_rate(r, &omega).abs() / unit * time);
+        let (position, rate) =
+            (kernel.rows[r].position.abs() / unit, kernel.row_rate(r, &omega).abs() / unit * time);
         let step_size = omega.iter().fold(1.0, |most: f64, omega| most.max(omega.abs() * time));
-        (position > SATISFIED || rate > SATISFIED * step_size)
-            .then(|| format!("leaves constraint {} by {position:.1e} at position and {rate:.1e} at velocity level", row.name))
+        (position > SATISFIED || rate > SATISFIED * step_size).then(|| {
+            format!(
+                "leaves constraint {} by {position:.1e} at position and {rate:.1e} at velocity level",
+                row.name
+            )
+        })
     })
 }

@@ -8,8 +8,8 @@
 //! SHA-256 of all before      32 bytes
 //! ```
 //!
-//! A checkpoint is written beside its place, synchronized with the disk and renamed, and the one before it is kept as `checkpoint.previous`: whenever the
-//! machine stops, one of the two is whole.
+//! A checkpoint is written beside its place, synchronized with the disk and renamed, and the one before it is
+//! kept as `checkpoint.previous`: whenever the machine stops, one of the two is whole.
 
 use super::files::{FileError, UNFINISHED, remove};
 use serde::Serialize;
@@ -122,7 +122,11 @@ impl Checkpoints {
         let path = self.folder.join(CHECKPOINT);
         let failed = |source| FileError::File { file: path.clone(), source };
         let bytes = sealed(content).map_err(failed)?;
-        let mut file = tempfile::Builder::new().prefix(UNFINISHED).suffix(CHECKPOINT).tempfile_in(&self.folder).map_err(failed)?;
+        let mut file = tempfile::Builder::new()
+            .prefix(UNFINISHED)
+            .suffix(CHECKPOINT)
+            .tempfile_in(&self.folder)
+            .map_err(failed)?;
         file.write_all(&bytes).and_then(|()| file.as_file().sync_all()).map_err(failed)?;
         if self.has_last {
             fs::rename(&path, self.folder.join(PREVIOUS)).map_err(failed)?;
@@ -155,7 +159,8 @@ fn is_missing(error: &CheckpointError) -> bool {
 }
 
 fn read<T: DeserializeOwned>(file: &Path) -> Result<T, CheckpointError> {
-    let bytes = fs::read(file).map_err(|source| CheckpointError::Unreadable { file: file.to_owned(), source })?;
+    let bytes =
+        fs::read(file).map_err(|source| CheckpointError::Unreadable { file: file.to_owned(), source })?;
     opened(&bytes, file)
 }
 
@@ -186,7 +191,8 @@ pub fn opened<T: DeserializeOwned>(bytes: &[u8], file: &Path) -> Result<T, Check
     let (length, rest) = rest.split_first_chunk::<8>().ok_or_else(|| damaged("it is cut short"))?;
     let found = u32::from_le_bytes(*format);
     if found != FORMAT {
-        // Whatever another format's content looks like, its envelope is this one: a flipped bit is not another version.
+        // Whatever another format's content looks like, its envelope is this one: a flipped bit is not
+        // another version.
         let (body, digest) = bytes.split_at(bytes.len() - DIGEST.min(bytes.len()));
         return Err(if Sha256::digest(body)[..] == *digest {
             CheckpointError::Format { file: file.to_owned(), found }
@@ -220,7 +226,8 @@ mod tests {
     }
 
     fn number(folder: &Path) -> Result<(Option<u64>, bool), CheckpointError> {
-        Checkpoints::load::<Content>(folder).map(|(_, loaded)| (loaded.content.2, loaded.instead_of.is_some()))
+        Checkpoints::load::<Content>(folder)
+            .map(|(_, loaded)| (loaded.content.2, loaded.instead_of.is_some()))
     }
 
     #[test]
@@ -256,7 +263,10 @@ mod tests {
         for bit in 0..8 * bytes.len() {
             let mut bad = bytes.clone();
             bad[bit / 8] ^= 1 << (bit % 8);
-            assert!(matches!(opened::<Content>(&bad, Path::new("x")), Err(CheckpointError::Damaged { .. })), "bit {bit}");
+            assert!(
+                matches!(opened::<Content>(&bad, Path::new("x")), Err(CheckpointError::Damaged { .. })),
+                "bit {bit}"
+            );
         }
     }
 

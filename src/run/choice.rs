@@ -11,9 +11,11 @@
 //! | 7 | invariants asked for, without dampers | `taylor` with its first orders in double-double; `gauss16` where coordinates are many |
 //! | 8 | the path | `taylor`; `dop853` where Baumgarte's term is asked for, or coordinates are many and not taken body by body |
 //!
-//! Everywhere else the series is the faster one at every tolerance measured: a seventh of the time of the classic pairs at 1e-6, a sixteenth at 1e-9.
-//! Over long horizons too: at 1e-15, which leaves rounding as what drifts, `motor` is off by 5.7e-14 of its energy after 5000 s, for a sixtieth of the time
-//! of `gauss16`; with first orders in double-double by 8e-19 for a tenth (`gauss16`: 3e-18), `spring` by 5e-20 for a quarter (2e-21).
+//! Everywhere else the series is the faster one at every tolerance measured: a seventh of the time of the
+//! classic pairs at 1e-6, a sixteenth at 1e-9. Over long horizons too: at 1e-15, which leaves rounding as
+//! what drifts, `motor` is off by 5.7e-14 of its energy after 5000 s, for a sixtieth of the time of
+//! `gauss16`; with first orders in double-double by 8e-19 for a tenth (`gauss16`: 3e-18), `spring` by 5e-20
+//! for a quarter (2e-21).
 
 use super::methods::{MethodId, Stabilization};
 use super::plan::{MANY_COORDINATES, Request, usual};
@@ -24,8 +26,8 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// Runs of at least so many units of time (seconds, where the mechanism is of human size) take a tolerance that leaves rounding as what drifts, where nobody
-/// names one.
+/// Runs of at least so many units of time (seconds, where the mechanism is of human size) take a tolerance
+/// that leaves rounding as what drifts, where nobody names one.
 const LONG: f64 = 60.0;
 /// Steps beyond which a fixed step is not chosen unasked.
 const MANY_STEPS: f64 = 2e7;
@@ -38,11 +40,13 @@ const TIGHT: f64 = 1e-7;
 /// Coordinates beyond which the matrices of a series cost more than the evaluations it saves.
 const FEW_COORDINATES: usize = 12;
 
-/// Tolerance of a series over a long horizon, times the horizon in units of time.  At 1e-9 `free` drifts by 4e-11 of its
-/// energy a second, 0.04 of the tolerance: truncation adds 4e-15 in all, the rounding of a thousand seconds.
+/// Tolerance of a series over a long horizon, times the horizon in units of time.  At 1e-9 `free` drifts by
+/// 4e-11 of its energy a second, 0.04 of the tolerance: truncation adds 4e-15 in all, the rounding of a
+/// thousand seconds.
 const LONG_TOLERANCE: f64 = 1e-13;
 
-/// Why the series is chosen where invariants were asked for: its first orders are then carried in double-double.
+/// Why the series is chosen where invariants were asked for: its first orders are then carried in
+/// double-double.
 const EXTENDED: &str = "invariants were asked for, and with its first orders in double-double its series keeps them best for the time";
 
 /// What matters more.
@@ -94,15 +98,22 @@ pub(super) struct Choice {
     pub why: String,
 }
 
-/// The method for a run to `until` \[s\] of a mechanism so stiff at its start, where the scene's rates go up to `rate` \[rad/s\], and why.
-pub(super) fn choose(mechanism: &Mechanism, request: &Request, stiffness: Option<&Stiffness>, until: f64, rate: f64) -> Choice {
+/// The method for a run to `until` \[s\] of a mechanism so stiff at its start, where the scene's rates go up
+/// to `rate` \[rad/s\], and why.
+pub(super) fn choose(
+    mechanism: &Mechanism,
+    request: &Request,
+    stiffness: Option<&Stiffness>,
+    until: f64,
+    rate: f64,
+) -> Choice {
     let (method, why) = chosen(mechanism, request, stiffness, until, rate);
     let extended = request.extended || why == EXTENDED;
     Choice { method, extended, why: format!("{method}: {why}") }
 }
 
-/// The tolerance of a method for a run to `until` \[s\] where nobody names one.  What truncation leaves adds up: over a long horizon it is kept below rounding,
-/// by the methods for which that costs little.
+/// The tolerance of a method for a run to `until` \[s\] where nobody names one.  What truncation leaves adds
+/// up: over a long horizon it is kept below rounding, by the methods for which that costs little.
 pub(super) fn usual_tolerance(mechanism: &Mechanism, method: MethodId, extended: bool, until: f64) -> f64 {
     match method {
         _ if extended => 1e-20,
@@ -112,10 +123,12 @@ pub(super) fn usual_tolerance(mechanism: &Mechanism, method: MethodId, extended:
     }
 }
 
-/// The power of ten up to 1e-15 at which the truncation of a series up to `until` \[s\] is below its rounding.
+/// The power of ten up to 1e-15 at which the truncation of a series up to `until` \[s\] is below its
+/// rounding.
 fn long_tolerance(mechanism: &Mechanism, until: f64) -> f64 {
     // Past 1e-15 only the lanes are known to get better: elsewhere the last orders of a series are rounding.
-    let decades: &[f64] = if Taylor::has_lanes(mechanism, false) { &[1e-15, 1e-16, 1e-17, 1e-18, 1e-19] } else { &[1e-15] };
+    let decades: &[f64] =
+        if Taylor::has_lanes(mechanism, false) { &[1e-15, 1e-16, 1e-17, 1e-18, 1e-19] } else { &[1e-15] };
     let wanted = LONG_TOLERANCE * mechanism.units.time / until * (1.0 + 1e-9);
     decades.iter().copied().find(|&decade| decade <= wanted).unwrap_or(decades[decades.len() - 1])
 }
@@ -135,15 +148,26 @@ fn is_long(mechanism: &Mechanism, until: f64) -> bool {
     until >= LONG * mechanism.units.time
 }
 
-fn chosen(mechanism: &Mechanism, request: &Request, stiffness: Option<&Stiffness>, until: f64, rate: f64) -> (MethodId, String) {
+fn chosen(
+    mechanism: &Mechanism,
+    request: &Request,
+    stiffness: Option<&Stiffness>,
+    until: f64,
+    rate: f64,
+) -> (MethodId, String) {
     if request.extended {
         return (MethodId::Taylor, "extended orders are those of its series".into());
     }
     let kept = request.stabilize.unwrap_or(usual(mechanism));
-    let (has_rows, is_free, n) = (!mechanism.constraints.is_empty(), mechanism.contacts.is_empty(), mechanism.coordinates());
-    let classic = if has_rows && kept == Stabilization::Projection { MethodId::Dp8 } else { MethodId::Dop853 };
+    let (has_rows, is_free, n) =
+        (!mechanism.constraints.is_empty(), mechanism.contacts.is_empty(), mechanism.coordinates());
+    let classic =
+        if has_rows && kept == Stabilization::Projection { MethodId::Dp8 } else { MethodId::Dop853 };
     let is_kept = kept == Stabilization::None || kept == Stabilization::Projection || !has_rows;
-    let is_expanded = mechanism.recursion.is_some() && mechanism.tree.is_dense() && is_kept && mechanism.vibration.is_none();
+    let is_expanded = mechanism.recursion.is_some()
+        && mechanism.tree.is_dense()
+        && is_kept
+        && mechanism.vibration.is_none();
     if n > MANY_COORDINATES && is_free && request.step.is_none() {
         let method = match (is_expanded, has_rows) {
             (true, _) => MethodId::Taylor,
@@ -166,8 +190,14 @@ fn chosen(mechanism: &Mechanism, request: &Request, stiffness: Option<&Stiffness
     let tolerance = request.rtol.or(request.atol);
     if let Some(damped) = stiffness.filter(|stiffness| stiffness.is_damped() && stiffness.ratio() > STIFF) {
         let stages = if tolerance.unwrap_or_default() >= TIGHT { 3 } else { 5 };
-        let mode = damped.culprit.as_ref().map_or("the fastest mode".to_owned(), |name| format!("the mode of {name}"));
-        return (MethodId::Radau(stages), format!("{mode} is {:.0} times as fast as the rest, and dies away", damped.ratio()));
+        let mode = damped
+            .culprit
+            .as_ref()
+            .map_or("the fastest mode".to_owned(), |name| format!("the mode of {name}"));
+        return (
+            MethodId::Radau(stages),
+            format!("{mode} is {:.0} times as fast as the rest, and dies away", damped.ratio()),
+        );
     }
     if !is_free {
         return (MethodId::Dp8, "the scene has walls, and impacts are located inside its steps".into());
@@ -178,7 +208,10 @@ fn chosen(mechanism: &Mechanism, request: &Request, stiffness: Option<&Stiffness
     let keeps = tolerance.is_none() && !mechanism.is_damped() && is_eliminated && is_bearable;
     if request.prefer == Some(Prefer::Invariants) && keeps {
         return match n > FEW_COORDINATES {
-            true => (MethodId::Gauss(8), "invariants were asked for, and a symplectic method keeps them best".into()),
+            true => (
+                MethodId::Gauss(8),
+                "invariants were asked for, and a symplectic method keeps them best".into(),
+            ),
             false => (MethodId::Taylor, EXTENDED.into()),
         };
     }
@@ -227,12 +260,18 @@ mod tests {
         let chosen = |scene, request| why(scene, &[], request).0;
         assert_eq!(chosen("scenes/free", usual()), "taylor");
         assert_eq!(chosen("scenes/free", Request { until: Some(1000.0), ..usual() }), "taylor");
-        assert_eq!(chosen("scenes/free", Request { until: Some(1000.0), prefer: Some(Prefer::Path), ..usual() }), "taylor");
+        assert_eq!(
+            chosen("scenes/free", Request { until: Some(1000.0), prefer: Some(Prefer::Path), ..usual() }),
+            "taylor"
+        );
         assert_eq!(chosen("scenes/free", Request { prefer: Some(Prefer::Invariants), ..usual() }), "taylor");
         assert_eq!(chosen("scenes/free", Request { step: Some(0.01), ..usual() }), "gauss16");
         assert_eq!(chosen("scenes/free", Request { extended: true, ..usual() }), "taylor");
         assert_eq!(chosen("scenes/motor", usual()), "taylor");
-        assert_eq!(chosen("scenes/motor", Request { stabilize: Some(Stabilization::Baumgarte), ..usual() }), "dop853");
+        assert_eq!(
+            chosen("scenes/motor", Request { stabilize: Some(Stabilization::Baumgarte), ..usual() }),
+            "dop853"
+        );
         assert_eq!(chosen("scenes/wall", usual()), "dp8");
         assert_eq!(chosen("scenes/four_bars", usual()), "taylor");
     }
@@ -241,7 +280,10 @@ mod tests {
     fn stiffness_is_measured_and_told() {
         let (method, told) = why("stress/spring_damped_1e8", &[], Request::default());
         assert!(method == "radau9" && told.contains("spring"), "{method}: {told}");
-        assert_eq!(why("stress/spring_damped_1e8", &[], Request { rtol: Some(1e-5), ..Request::default() }).0, "radau5");
+        assert_eq!(
+            why("stress/spring_damped_1e8", &[], Request { rtol: Some(1e-5), ..Request::default() }).0,
+            "radau5"
+        );
         // The same spring without its damper is resolved, and a soft one decides nothing.
         let (method, told) = why("stress/spring_1e6", &[], Request::default());
         assert!(method == "taylor" && told.contains("undamped"), "{method}: {told}");

@@ -1,8 +1,9 @@
 //! A run at its walls: impacts, points that come to rest there and stay, and their release.
 //!
-//! A point stays where its wall presses it and it does not move along the normal, or would rebound to less than
-//! [`REST_HEIGHT`](crate::dynamics::contact::REST_HEIGHT): bounces that accumulate end so.  What is left of its normal velocity is taken off it and
-//! booked as lost in impacts.  From then on the wall is a row kept by projection, until its force would have to pull.
+//! A point stays where its wall presses it and it does not move along the normal, or would rebound to less
+//! than [`REST_HEIGHT`](crate::dynamics::contact::REST_HEIGHT): bounces that accumulate end so.  What is left
+//! of its normal velocity is taken off it and booked as lost in impacts.  From then on the wall is a row kept
+//! by projection, until its force would have to pull.
 
 use super::build::build;
 use super::driver::{Driver, DriverState, Halt, Pause, Watch};
@@ -57,7 +58,8 @@ const EVENTS_MOST: usize = 10_000;
 const HOLDS_MOST: usize = 1000;
 /// Rounds of impacts at one moment after which what is left of the approach is left to the holds.
 const ROUNDS: usize = 100;
-/// Normal velocity, over those of the point's parts or the hardest approach of the moment, that rounding leaves where an impact took it off.
+/// Normal velocity, over those of the point's parts or the hardest approach of the moment, that rounding
+/// leaves where an impact took it off.
 const NO_SPEED: f64 = 1e-13;
 
 /// A contact that is held.
@@ -203,7 +205,11 @@ impl ContactDriver {
             is_between: self.is_between,
             stabilizer: self.stabilizer,
             off: self.off.clone(),
-            events: self.events.as_ref().map(|events| events.memory.clone()).or_else(|| self.remembered.clone()),
+            events: self
+                .events
+                .as_ref()
+                .map(|events| events.memory.clone())
+                .or_else(|| self.remembered.clone()),
         }
     }
 
@@ -219,7 +225,8 @@ impl ContactDriver {
         contact_state.held.iter().filter_map(|held| held.kept).map(|kept| kept + 1).max().unwrap_or(0)
     }
 
-    /// A course that goes on from a station, which was reached on the way to `horizon`; `None` where it cannot be one of this mechanism and plan.
+    /// A course that goes on from a station, which was reached on the way to `horizon`; `None` where it
+    /// cannot be one of this mechanism and plan.
     pub(super) fn resume(
         mechanism: Arc<Mechanism>,
         plan: &Plan,
@@ -227,8 +234,18 @@ impl ContactDriver {
         contact_state: ContactDriverState,
         horizon: Time,
     ) -> Result<Option<Self>, StepError> {
-        let ContactDriverState { place, reference, contacts, held, holds_in_row, events_in_row, is_between, stabilizer, off, events } =
-            contact_state;
+        let ContactDriverState {
+            place,
+            reference,
+            contacts,
+            held,
+            holds_in_row,
+            events_in_row,
+            is_between,
+            stabilizer,
+            off,
+            events,
+        } = contact_state;
         let whole = mechanism;
         let Ok(mechanism) = whole.without(&off).map(Arc::new) else { return Ok(None) };
         let known = |contact: usize| contact < mechanism.contacts.len();
@@ -252,11 +269,26 @@ impl ContactDriver {
             contact_driver.mechanism = holding;
         }
         contact_driver.sampler.refer(reference);
-        Ok(Some(Self { whole, off, remembered: events, held, holds_in_row, events_in_row, is_between, stabilizer, ..contact_driver }))
+        Ok(Some(Self {
+            whole,
+            off,
+            remembered: events,
+            held,
+            holds_in_row,
+            events_in_row,
+            is_between,
+            stabilizer,
+            ..contact_driver
+        }))
     }
 
     /// Advances to an output time, through impacts and holds; false where it paused on the way.
-    pub(super) fn go(&mut self, until: Time, outcome: &mut Outcome, pause: &mut Pause) -> Result<bool, StepError> {
+    pub(super) fn go(
+        &mut self,
+        until: Time,
+        outcome: &mut Outcome,
+        pause: &mut Pause,
+    ) -> Result<bool, StepError> {
         self.go_watched(until, outcome, None, None, pause)
     }
 
@@ -297,7 +329,9 @@ impl ContactDriver {
                     self.is_between = true;
                     return Ok(false);
                 }
-                Ok(Halt::Contact(contact)) if self.mechanism.held.contains(&contact) => self.settle(None, Some(contact), outcome)?,
+                Ok(Halt::Contact(contact)) if self.mechanism.held.contains(&contact) => {
+                    self.settle(None, Some(contact), outcome)?
+                }
                 Ok(Halt::Contact(contact)) => {
                     let approach = self.impact_at(contact, outcome)?;
                     self.meet_after(Some(contact), approach, outcome)?;
@@ -325,14 +359,20 @@ impl ContactDriver {
     }
 
     /// The same after an impact of a contact, at this approach \[m/s\].
-    fn meet_after(&mut self, struck: Option<usize>, mut hardest: f64, outcome: &mut Outcome) -> Result<(), StepError> {
+    fn meet_after(
+        &mut self,
+        struck: Option<usize>,
+        mut hardest: f64,
+        outcome: &mut Outcome,
+    ) -> Result<(), StepError> {
         for _ in 0..ROUNDS {
             let mut quiet = true;
             for number in 0..self.free.contacts.len() {
                 let posture = self.posture();
                 let contact = &self.free.contacts[number];
                 let approach = -contact.normal.dot(contact.point.velocity(&posture.z, &posture.omega));
-                let is_met = contact.touches(&posture.z) && approach > NO_SPEED * contact.step_size(&posture.omega).max(hardest);
+                let is_met = contact.touches(&posture.z)
+                    && approach > NO_SPEED * contact.step_size(&posture.omega).max(hardest);
                 if is_met && !self.mechanism.held.contains(&number) {
                     hardest = hardest.max(self.impact_at(number, outcome)?);
                     quiet = false;
@@ -345,22 +385,27 @@ impl ContactDriver {
         self.settle(struck, None, outcome)
     }
 
-    /// Lets the impact at a wall take effect, and returns the approach \[m/s\]; points that the others would have to pull are let go.
+    /// Lets the impact at a wall take effect, and returns the approach \[m/s\]; points that the others would
+    /// have to pull are let go.
     fn impact_at(&mut self, contact: usize, outcome: &mut Outcome) -> Result<f64, StepError> {
         let t = self.motion().time;
         let Posture { phi, omega, .. } = self.posture();
         let impact = loop {
             let Some(impact) = self.mechanism.impact_at(contact, t, &phi, &omega) else {
-                let what = format!("the constraints leave a point that meets wall {} no way back", self.name(contact));
+                let what = format!(
+                    "the constraints leave a point that meets wall {} no way back",
+                    self.name(contact)
+                );
                 return Err(self.stopped(
                     &outcome.plan,
                     what,
                     "look for motors that drive it there and change their laws, or end the run before",
                 ));
             };
-            let pulled = (self.mechanism.held.iter().zip(&impact.row_impulses[self.mechanism.standing_rows()..]))
-                .filter(|(_, pull)| **pull > 1e-12 * impact.impulse)
-                .max_by(|a, b| a.1.total_cmp(b.1));
+            let pulled =
+                (self.mechanism.held.iter().zip(&impact.row_impulses[self.mechanism.standing_rows()..]))
+                    .filter(|(_, pull)| **pull > 1e-12 * impact.impulse)
+                    .max_by(|a, b| a.1.total_cmp(b.1));
             match pulled.map(|(&held, _)| held) {
                 Some(pulled) => {
                     let rest = self.mechanism.held.iter().copied().filter(|&held| held != pulled).collect();
@@ -384,14 +429,24 @@ impl ContactDriver {
         let tolerance = outcome.plan.tolerance.unwrap_or_default().relative;
         let after = self.motion();
         if let Err(what) = impact_monitor::check(&self.mechanism, tolerance, &last, &after, &claim) {
-            let (cause, what) = (Cause::ImpactCheckFailed, format!("impact at wall {}: {what}", self.name(contact)));
-            return Err(StepError { cause, ..self.stopped(&outcome.plan, what, "tighten the tolerance, or use --method taylor") });
+            let (cause, what) =
+                (Cause::ImpactCheckFailed, format!("impact at wall {}: {what}", self.name(contact)));
+            return Err(StepError {
+                cause,
+                ..self.stopped(&outcome.plan, what, "tighten the tolerance, or use --method taylor")
+            });
         }
         if let Some(jumps) = &mut self.jumps {
-            jumps.push(Jump { contact: Some(contact), before: last, after, mechanism: Arc::clone(&self.mechanism) });
+            jumps.push(Jump {
+                contact: Some(contact),
+                before: last,
+                after,
+                mechanism: Arc::clone(&self.mechanism),
+            });
         }
         outcome.impact_loss -= change.hi;
-        // A point that hangs at its wall without a force is carried to and fro by rounding: that is taken off it, and is no impact.
+        // A point that hangs at its wall without a force is carried to and fro by rounding: that is taken off
+        // it, and is no impact.
         let contact_speed = self.free.contacts[contact].length / self.free.units.time;
         if -impact.approach <= NO_SPEED * contact_speed {
             return Ok(-impact.approach);
@@ -409,18 +464,30 @@ impl ContactDriver {
         Ok(-impact.approach)
     }
 
-    /// Holds the points that touch and stay, and lets the others go; `struck` touches, wherever a projection has put it, and `released` goes in any case.
-    fn settle(&mut self, struck: Option<usize>, released: Option<usize>, outcome: &mut Outcome) -> Result<(), StepError> {
+    /// Holds the points that touch and stay, and lets the others go; `struck` touches, wherever a projection
+    /// has put it, and `released` goes in any case.
+    fn settle(
+        &mut self,
+        struck: Option<usize>,
+        released: Option<usize>,
+        outcome: &mut Outcome,
+    ) -> Result<(), StepError> {
         let motion = self.motion();
         let Posture { z, phi, omega } = self.posture();
-        let touches =
-            |contact: &usize| Some(*contact) == struck || self.mechanism.held.contains(contact) || self.free.contacts[*contact].touches(&z);
-        let touching: Vec<usize> = (0..self.free.contacts.len()).filter(|contact| Some(*contact) != released && touches(contact)).collect();
+        let touches = |contact: &usize| {
+            Some(*contact) == struck
+                || self.mechanism.held.contains(contact)
+                || self.free.contacts[*contact].touches(&z)
+        };
+        let touching: Vec<usize> = (0..self.free.contacts.len())
+            .filter(|contact| Some(*contact) != released && touches(contact))
+            .collect();
         if touching.is_empty() && self.mechanism.held.is_empty() {
             return Ok(());
         }
         let Some(staying) = self.free.staying(&touching, motion.time, &phi, &omega) else {
-            let what = format!("a point rests on wall {} and the motors leave it no freedom", self.names(&touching));
+            let what =
+                format!("a point rests on wall {} and the motors leave it no freedom", self.names(&touching));
             return Err(self.stopped(&outcome.plan, what, "change the motors' laws, or end the run before"));
         };
         if staying == self.mechanism.held { Ok(()) } else { self.switch(staying, outcome) }
@@ -445,23 +512,37 @@ impl ContactDriver {
         self.driver.follow(&*last);
         self.sampler.hold(Arc::clone(&self.mechanism));
         if let (Some(jumps), Some(before)) = (&mut self.jumps, before) {
-            jumps.push(Jump { contact: None, before, after: motion.clone(), mechanism: Arc::clone(&self.mechanism) });
+            jumps.push(Jump {
+                contact: None,
+                before,
+                after: motion.clone(),
+                mechanism: Arc::clone(&self.mechanism),
+            });
         }
         if self.holds_in_row > HOLDS_MOST {
-            let what = format!("more than {HOLDS_MOST} holds before the next output time at wall {}", self.names(&contacts));
-            return Err(self.stopped(&outcome.plan, what, "shorten the output interval, or loosen the tolerance"));
+            let what = format!(
+                "more than {HOLDS_MOST} holds before the next output time at wall {}",
+                self.names(&contacts)
+            );
+            return Err(self.stopped(
+                &outcome.plan,
+                what,
+                "shorten the output interval, or loosen the tolerance",
+            ));
         }
         Ok(())
     }
 
-    /// Takes off a motion what keeps it from its walls: gaps of rounding, and normal velocities too small to rebound with.
+    /// Takes off a motion what keeps it from its walls: gaps of rounding, and normal velocities too small to
+    /// rebound with.
     fn put_on(&mut self, motion: &mut Motion, outcome: &mut Outcome) -> Result<(), StepError> {
         let before = self.sampler.balance(motion);
         let mut form = Multiplier::<0, true>::new(Arc::clone(&self.mechanism));
         let mut state = form.state(motion);
         let mut kernel = Kernel::new(&self.mechanism);
         if let Err((row, left)) = project(&self.mechanism, &mut kernel, &mut state, 1e-13) {
-            let what = format!("{left:.1e} of constraint {row} is left where a point comes to rest on its wall");
+            let what =
+                format!("{left:.1e} of constraint {row} is left where a point comes to rest on its wall");
             return Err(self.stopped(&outcome.plan, what, "raise the restitution, or end the run before"));
         }
         form.read(&state, motion);
@@ -496,7 +577,10 @@ impl ContactDriver {
             }
             self.held.push(Held { contact, since: t, kept });
         }
-        if !contacts.is_empty() && self.free.standing_rows() > 0 && outcome.plan.stabilization != Stabilization::Projection {
+        if !contacts.is_empty()
+            && self.free.standing_rows() > 0
+            && outcome.plan.stabilization != Stabilization::Projection
+        {
             let note = "while a point stays on its wall, the motors' rows are kept by projection";
             if !outcome.plan.notes.iter().any(|before| before == note) {
                 outcome.plan.notes.push(note.into());
@@ -525,10 +609,15 @@ impl ContactDriver {
     fn posture(&mut self) -> Posture {
         let motion = self.motion();
         let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
-        Posture { z: self.free.elements(&phi), omega: motion.omega.iter().map(|omega| omega.hi).collect(), phi }
+        Posture {
+            z: self.free.elements(&phi),
+            omega: motion.omega.iter().map(|omega| omega.hi).collect(),
+            phi,
+        }
     }
 
-    /// Why the present moment cannot be the first one of a run with walls: its coordinates are not those of the start, or its rates are others without impacts.
+    /// Why the present moment cannot be the first one of a run with walls: its coordinates are not those of
+    /// the start, or its rates are others without impacts.
     pub(super) fn begun_elsewhere(&mut self, start: &Motion, outcome: &Outcome) -> Option<StepError> {
         if self.free.contacts.is_empty() {
             return None;
@@ -537,7 +626,11 @@ impl ContactDriver {
         let first = self.motion();
         let what = impact_monitor::is_start(&self.free, start, &first, keeps_rates).err()?;
         let what = format!("the first sample is not the start: {what}");
-        let stop = self.stopped(&outcome.plan, what, "state the walls and the start so that no point is behind its wall");
+        let stop = self.stopped(
+            &outcome.plan,
+            what,
+            "state the walls and the start so that no point is behind its wall",
+        );
         Some(StepError { cause: Cause::ImpactCheckFailed, ..stop })
     }
 
@@ -551,7 +644,14 @@ impl ContactDriver {
 
     fn stopped(&mut self, plan: &Plan, what: String, hint: &str) -> StepError {
         let t = self.motion().time.hi;
-        StepError { cause: Cause::RestingContact, method: plan.method.to_string(), t, step: 0.0, what, hint: hint.into() }
+        StepError {
+            cause: Cause::RestingContact,
+            method: plan.method.to_string(),
+            t,
+            step: 0.0,
+            what,
+            hint: hint.into(),
+        }
     }
 }
 

@@ -6,13 +6,15 @@ use crate::stepping::{Integrator, Statistics, StepError, shortened};
 use std::fmt;
 use std::sync::Arc;
 
-/// Makes an integrator of any mechanism: it is called for the run, for what is integrated again after impacts, and where a run goes on.
+/// Makes an integrator of any mechanism: it is called for the run, for what is integrated again after
+/// impacts, and where a run goes on.
 type Make = dyn Fn() -> Box<dyn Integrator<dyn Problem> + Send> + Send + Sync;
 
 /// An integrator from outside, as a plan holds it; two are the same where one is a clone of the other.
 ///
-/// It is driven as the crate's own ones: events and impacts, monitors, projection after its steps, the error estimate, pauses.  One that is
-/// [dense](Integrator::is_dense) takes steps as long as it likes; one that is not is asked for steps that end on output times.
+/// It is driven as the crate's own ones: events and impacts, monitors, projection after its steps, the error
+/// estimate, pauses.  One that is [dense](Integrator::is_dense) takes steps as long as it likes; one that is
+/// not is asked for steps that end on output times.
 ///
 /// ```
 /// use driftless::{Custom, OdeSystem, Integrator, Simulation, State, StepError, Statistics, Time, read_scene};
@@ -68,7 +70,10 @@ pub struct Custom {
 
 impl Custom {
     /// Of a name, for messages, and what makes one.
-    pub fn new(name: &str, make: impl Fn() -> Box<dyn Integrator<dyn Problem> + Send> + Send + Sync + 'static) -> Self {
+    pub fn new(
+        name: &str,
+        make: impl Fn() -> Box<dyn Integrator<dyn Problem> + Send> + Send + Sync + 'static,
+    ) -> Self {
         Self { name: name.into(), make: Arc::new(make) }
     }
 
@@ -94,7 +99,12 @@ impl Integrator<dyn Problem> for Outside {
         self.inner.order()
     }
 
-    fn begin(&mut self, problem: &mut (dyn Problem + 'static), state: &mut State, until: Time) -> Result<(), StepError> {
+    fn begin(
+        &mut self,
+        problem: &mut (dyn Problem + 'static),
+        state: &mut State,
+        until: Time,
+    ) -> Result<(), StepError> {
         self.inner.begin(problem, state, until)
     }
 
@@ -125,7 +135,13 @@ impl Integrator<dyn Problem> for Outside {
     }
 
     /// By a shorter step of another one of its kind, where it is not dense.
-    fn interpolate(&mut self, problem: &mut (dyn Problem + 'static), from: &State, time: Time, inside: &mut State) {
+    fn interpolate(
+        &mut self,
+        problem: &mut (dyn Problem + 'static),
+        from: &State,
+        time: Time,
+        inside: &mut State,
+    ) {
         if self.inner.is_dense() {
             return self.inner.interpolate(problem, from, time, inside);
         }

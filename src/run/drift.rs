@@ -1,7 +1,8 @@
-//! Drift as two numbers: the largest excursion, and the slope of the per-interval maximum.  A bound alone hides a climb.
+//! Drift as two numbers: the largest excursion, and the slope of the per-interval maximum.  A bound alone
+//! hides a climb.
 //!
-//! Memory does not grow with the run: the horizon is divided into a fixed number of intervals, and the record for charts
-//! is kept at times that grow by a constant factor.
+//! Memory does not grow with the run: the horizon is divided into a fixed number of intervals, and the record
+//! for charts is kept at times that grow by a constant factor.
 
 use super::allowance::{Allowance, EnergyLimit, Moment};
 use super::plan::Plan;
@@ -31,7 +32,14 @@ pub struct Excursion {
 impl Excursion {
     /// A monitor over a horizon \[s\].
     pub fn new(until: f64) -> Self {
-        Self { max: 0.0, intervals: vec![-1.0; INTERVALS], until, record: Vec::new(), next_record: 0.0, sums: [0.0; 6] }
+        Self {
+            max: 0.0,
+            intervals: vec![-1.0; INTERVALS],
+            until,
+            record: Vec::new(),
+            next_record: 0.0,
+            sums: [0.0; 6],
+        }
     }
 
     /// Takes the quantity at time `t` \[s\].
@@ -49,7 +57,9 @@ impl Excursion {
         } else if let Some(last) = self.record.last_mut().filter(|_| share >= 1.0) {
             *last = [t, self.max];
         }
-        for (sum, term) in self.sums.iter_mut().zip([1.0, share, share * share, value, value * share, value * value]) {
+        for (sum, term) in
+            self.sums.iter_mut().zip([1.0, share, share * share, value, value * share, value * value])
+        {
             *sum += term;
         }
     }
@@ -67,7 +77,8 @@ impl Excursion {
         (self.intervals, self.until) = (intervals, until);
     }
 
-    /// Least-squares slope of the per-interval maximum \[1/s times the quantity's unit\]; zero with fewer than three intervals.
+    /// Least-squares slope of the per-interval maximum \[1/s times the quantity's unit\]; zero with fewer
+    /// than three intervals.
     pub fn slope(&self) -> f64 {
         let seen: Vec<(f64, f64)> = self
             .intervals
@@ -80,13 +91,16 @@ impl Excursion {
             return 0.0;
         }
         let count = seen.len() as f64;
-        let (t_mean, x_mean) = (seen.iter().map(|p| p.0).sum::<f64>() / count, seen.iter().map(|p| p.1).sum::<f64>() / count);
-        let (above, below) =
-            seen.iter().fold((0.0, 0.0), |(a, b), (t, x)| (a + (t - t_mean) * (x - x_mean), b + (t - t_mean) * (t - t_mean)));
+        let (t_mean, x_mean) =
+            (seen.iter().map(|p| p.0).sum::<f64>() / count, seen.iter().map(|p| p.1).sum::<f64>() / count);
+        let (above, below) = seen.iter().fold((0.0, 0.0), |(a, b), (t, x)| {
+            (a + (t - t_mean) * (x - x_mean), b + (t - t_mean) * (t - t_mean))
+        });
         above / below / self.until
     }
 
-    /// Signed least-squares trend and its standard error \[1/s times the quantity's unit\], samples taken as independent.
+    /// Signed least-squares trend and its standard error \[1/s times the quantity's unit\], samples taken as
+    /// independent.
     pub fn trend(&self) -> (f64, f64) {
         let [count, t, tt, x, xt, xx] = self.sums;
         let spread = tt - t * t / count;
@@ -99,12 +113,13 @@ impl Excursion {
     }
 }
 
-/// Where no limit on the energy is stated: the imbalance, over the largest energy or work there has been, beyond which no run is a success; those at a tolerance
-/// have a tighter limit, see [`Drift::energy_limit`].
+/// Where no limit on the energy is stated: the imbalance, over the largest energy or work there has been,
+/// beyond which no run is a success; those at a tolerance have a tighter limit, see [`Drift::energy_limit`].
 pub const ENERGY_MOST: f64 = 1e-2;
 /// And beyond which every result says that it is in doubt.
 pub const ENERGY_DOUBT: f64 = 1e-4;
-/// Where no limit on the constraints is stated: the violation at position level, in rad or sizes of the mechanism, beyond which a run is no success.
+/// Where no limit on the constraints is stated: the violation at position level, in rad or sizes of the
+/// mechanism, beyond which a run is no success.
 pub const POSITION_MOST: f64 = 1e-2;
 
 /// Stated limits; a run that exceeds one stops.
@@ -112,7 +127,8 @@ pub const POSITION_MOST: f64 = 1e-2;
 pub struct Limits {
     /// On the energy imbalance over the energy scale; `None`: [`Drift::energy_limit`].
     pub energy: Option<f64>,
-    /// On every constraint, at position \[rad or m\] and velocity level \[rad/s or m/s\]; `None`: [`POSITION_MOST`].
+    /// On every constraint, at position \[rad or m\] and velocity level \[rad/s or m/s\]; `None`:
+    /// [`POSITION_MOST`].
     pub constraint: Option<f64>,
 }
 
@@ -124,7 +140,8 @@ pub(super) fn larger(a: f64, b: f64) -> f64 {
 /// How near to a singular position a run came at its output times.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Singular {
-    /// The least singular value of the rows' Jacobian over the largest, angles in rad and lengths in sizes of the mechanism.
+    /// The least singular value of the rows' Jacobian over the largest, angles in rad and lengths in sizes of
+    /// the mechanism.
     pub smallest: f64,
     /// When \[s\].
     pub t: f64,
@@ -155,7 +172,8 @@ pub struct Drift {
     /// What its tolerance explains of the imbalance, and the limit that follows from it.
     allowance: Option<Allowance>,
     limit: EnergyLimit,
-    /// What the imbalance is given in \[J\], and violations of each row are measured in: 1 rad, or the size of the mechanism \[m\].
+    /// What the imbalance is given in \[J\], and violations of each row are measured in: 1 rad, or the size
+    /// of the mechanism \[m\].
     scale: f64,
     units: Vec<f64>,
 }
@@ -177,7 +195,11 @@ impl Drift {
             allowance: None,
             limit: EnergyLimit::default(),
             scale: mechanism.energy_scale,
-            units: mechanism.constraints.iter().map(|row| if row.is_angle() { 1.0 } else { mechanism.size_of_parts() }).collect(),
+            units: mechanism
+                .constraints
+                .iter()
+                .map(|row| if row.is_angle() { 1.0 } else { mechanism.size_of_parts() })
+                .collect(),
         }
     }
 
@@ -186,13 +208,15 @@ impl Drift {
         Self { allowance: Allowance::new(mechanism, plan), ..Self::new(mechanism, plan.until) }
     }
 
-    /// The imbalance, over the largest energy or work there has been, beyond which the run is no success where no limit is stated: what errors at the tolerance in
-    /// every step so far explain, twenty times, and never more than [`ENERGY_MOST`].
+    /// The imbalance, over the largest energy or work there has been, beyond which the run is no success
+    /// where no limit is stated: what errors at the tolerance in every step so far explain, twenty times, and
+    /// never more than [`ENERGY_MOST`].
     pub fn energy_limit(&self) -> f64 {
         self.limit.most
     }
 
-    /// The imbalance over the energy scale beyond which loops and sliders that nothing projects count as torn.
+    /// The imbalance over the energy scale beyond which loops and sliders that nothing projects count as
+    /// torn.
     pub(super) fn apart(&self) -> f64 {
         self.limit.apart
     }
@@ -226,7 +250,16 @@ impl Drift {
         self.energy_share = larger(sample.imbalance.abs() * (self.scale / self.largest), self.energy_share);
         if let Some(allowance) = &self.allowance {
             let translations = &sample.phi[sample.centre.len()..];
-            self.limit.see(allowance, &Moment { omega: &sample.omega, translations, work: sample.work, largest: self.largest, steps });
+            self.limit.see(
+                allowance,
+                &Moment {
+                    omega: &sample.omega,
+                    translations,
+                    work: sample.work,
+                    largest: self.largest,
+                    steps,
+                },
+            );
         }
         for ((_, monitors), values) in self.constraints.iter_mut().zip(&sample.constraints) {
             for (monitor, &value) in monitors.iter_mut().zip(values) {
@@ -234,21 +267,34 @@ impl Drift {
             }
         }
         if self.singular.as_ref().map_or(f64::INFINITY, |singular| singular.smallest) > sample.singular {
-            let constraint = self.constraints.get(sample.weakest).map_or_else(String::new, |(name, _)| name.clone());
+            let constraint =
+                self.constraints.get(sample.weakest).map_or_else(String::new, |(name, _)| name.clone());
             self.singular = Some(Singular { smallest: sample.singular, t: sample.t, constraint });
         }
         let beyond = |value: f64, limit: f64| value.is_nan() || value > limit;
-        let (off, limit) = limits.energy.map_or((self.energy_share, self.limit.most), |limit| (self.energy.max, limit));
+        let (off, limit) =
+            limits.energy.map_or((self.energy_share, self.limit.most), |limit| (self.energy.max, limit));
         if beyond(off, limit) {
-            let explained = if limits.energy.is_none() && limit < ENERGY_MOST { " of errors at the tolerance" } else { "" };
+            let explained = if limits.energy.is_none() && limit < ENERGY_MOST {
+                " of errors at the tolerance"
+            } else {
+                ""
+            };
             let limit = if explained.is_empty() { format!("{limit:e}") } else { format!("{limit:.1e}") };
-            return Err(format!("{} is off by {off:.2e} of the scale, the limit{explained} is {limit}", self.kind));
+            return Err(format!(
+                "{} is off by {off:.2e} of the scale, the limit{explained} is {limit}",
+                self.kind
+            ));
         }
         for ((name, [position, velocity]), unit) in self.constraints.iter().zip(&self.units) {
             let (most, levels) = limits.constraint.map_or((POSITION_MOST * unit, 1), |limit| (limit, 2));
-            for (monitor, level) in [(position, "position"), (velocity, "velocity")].into_iter().take(levels) {
+            for (monitor, level) in [(position, "position"), (velocity, "velocity")].into_iter().take(levels)
+            {
                 if beyond(monitor.max, most) {
-                    return Err(format!("constraint {name} is violated by {:.2e} at {level} level, the limit is {most:e}", monitor.max));
+                    return Err(format!(
+                        "constraint {name} is violated by {:.2e} at {level} level, the limit is {most:e}",
+                        monitor.max
+                    ));
                 }
             }
         }

@@ -1,7 +1,8 @@
 //! The loop over steps: a problem, its method and its state, from one output time to the next.
 //!
-//! Every method is taken the same way: a step is made, walls are checked, flips are looked for, monitors are shown the motion, and what lies between steps is read off them.
-//! [`contact`](super::contact) takes a driver through impacts, [`running`](super::running) is the loop over output times.
+//! Every method is taken the same way: a step is made, walls are checked, flips are looked for, monitors are
+//! shown the motion, and what lies between steps is read off them. [`contact`](super::contact) takes a driver
+//! through impacts, [`running`](super::running) is the loop over output times.
 
 use super::flip::{self, FlipDetector};
 use super::inside::{Inside, StepWatcher};
@@ -40,8 +41,15 @@ pub(super) struct Watch<'a> {
 
 /// A problem, its method and its state.
 pub(super) trait Driver: Send {
-    /// To the output time `until`, on the way to `horizon`; what is read then is the motion there.  Pauses after a step where `pause` is true.
-    fn advance(&mut self, until: Time, horizon: Time, watch: Watch, pause: &mut Pause) -> Result<Halt, StepError>;
+    /// To the output time `until`, on the way to `horizon`; what is read then is the motion there.  Pauses
+    /// after a step where `pause` is true.
+    fn advance(
+        &mut self,
+        until: Time,
+        horizon: Time,
+        watch: Watch,
+        pause: &mut Pause,
+    ) -> Result<Halt, StepError>;
     fn read(&mut self, motion: &mut Motion);
     /// Goes on from another motion: of what the method remembers with the step alone.
     fn jump(&mut self, motion: &Motion);
@@ -58,7 +66,8 @@ pub(super) trait Driver: Send {
     fn guard(&mut self, closed: f64);
     /// Everything it needs to go on.
     fn place(&self) -> DriverState;
-    /// Goes on from a place, which was reached on the way to `horizon`; false where it cannot be one of this problem and method.
+    /// Goes on from a place, which was reached on the way to `horizon`; false where it cannot be one of this
+    /// problem and method.
     fn resume(&mut self, place: DriverState, horizon: Time) -> Result<bool, StepError>;
 }
 
@@ -99,14 +108,21 @@ struct StepLoop<P: ?Sized, M> {
     is_cut: bool,
     /// True where the state is the end of the method's last step, so that it goes on from there.
     goes_on: bool,
-    /// True where output times are read off steps as long as the method likes; the steps of others end on them.
+    /// True where output times are read off steps as long as the method likes; the steps of others end on
+    /// them.
     is_dense: bool,
     /// Watches the walls, where there are any.
     guard: Option<WallGuard>,
 }
 
 impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M> {
-    fn advance(&mut self, until: Time, horizon: Time, watch: Watch, pause: &mut Pause) -> Result<Halt, StepError> {
+    fn advance(
+        &mut self,
+        until: Time,
+        horizon: Time,
+        watch: Watch,
+        pause: &mut Pause,
+    ) -> Result<Halt, StepError> {
         let Watch { flips, mut monitor, mut steps } = watch;
         let mut flips = flips.filter(|flips| flips.flip.is_none());
         let is_dense = self.is_dense;
@@ -123,7 +139,8 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
             }
             self.method.save(&mut self.state);
             self.from.clone_from(&self.state);
-            let mut event = self.method.step(&mut self.problem, &mut self.state, target, &mut self.statistics)?;
+            let mut event =
+                self.method.step(&mut self.problem, &mut self.state, target, &mut self.statistics)?;
             self.check_walls()?;
             if let Some(steps) = &mut steps
                 && self.is_cut_by(*steps)
@@ -213,8 +230,12 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
 
     fn resume(&mut self, place: DriverState, horizon: Time) -> Result<bool, StepError> {
         let shape = |state: &State| (state.y.len(), state.low.len(), state.turns.len(), state.is_winding);
-        let alike = |state: &State| shape(state) == shape(&self.state) && state.turns.iter().all(|turns| turns.unsigned_abs() < MOST_TURNS);
-        let steps_back = self.is_dense && place.goes_on && !place.from.y.is_empty() && place.from.time < place.state.time;
+        let alike = |state: &State| {
+            shape(state) == shape(&self.state)
+                && state.turns.iter().all(|turns| turns.unsigned_abs() < MOST_TURNS)
+        };
+        let steps_back =
+            self.is_dense && place.goes_on && !place.from.y.is_empty() && place.from.time < place.state.time;
         let counts = [place.statistics.steps, place.statistics.evaluations, place.statistics.rejected];
         let is_event = |event: usize| event < self.problem.mechanism().contacts.len();
         if counts.iter().any(|&count| count >= MOST_TURNS)
@@ -278,10 +299,14 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
 
     /// Looks whether the last step has passed a wall.
     fn check_walls(&mut self) -> Result<(), StepError> {
-        let Self { problem, method, state, guard: Some(guard), from, inside, .. } = self else { return Ok(()) };
+        let Self { problem, method, state, guard: Some(guard), from, inside, .. } = self else {
+            return Ok(());
+        };
         let (name, mut body_angles) = (Integrator::<P>::name(method), BodyAngles::default());
         problem.body_angles(state, &mut body_angles);
-        let candidate = guard.step(problem.mechanism(), state.time.hi, &body_angles).map_err(|passed| passed.stop(name))?;
+        let candidate = guard
+            .step(problem.mechanism(), state.time.hi, &body_angles)
+            .map_err(|passed| passed.stop(name))?;
         let Some(contact) = candidate.filter(|_| self.is_dense) else { return Ok(()) };
         let (span, mechanism) = (state.time - from.time, problem.mechanism().clone());
         let mut at = |share: f64| {

@@ -1,7 +1,9 @@
-//! Events from outside the crate: conditions on the motion, located on the dense output of every step, and what happens there.
+//! Events from outside the crate: conditions on the motion, located on the dense output of every step, and
+//! what happens there.
 //!
-//! The event functions of a step are interpolated at Chebyshev points, by as high a degree as they ask for, and searched by the same root finding as
-//! walls and flips ([`search`](crate::stepping)); the zero is then polished on the dense output itself.
+//! The event functions of a step are interpolated at Chebyshev points, by as high a degree as they ask for,
+//! and searched by the same root finding as walls and flips ([`search`](crate::stepping)); the zero is then
+//! polished on the dense output itself.
 
 use super::inside::{Inside, StepWatcher};
 use crate::dynamics::configuration::{Configuration, Values};
@@ -96,7 +98,8 @@ pub enum Action {
     Record,
     /// The run ends here; its outcome is kept.
     Stop,
-    /// The motion goes on changed.  Fixed-step methods refuse that: their steps would no longer end on the output times.
+    /// The motion goes on changed.  Fixed-step methods refuse that: their steps would no longer end on the
+    /// output times.
     Change(Change),
 }
 
@@ -110,14 +113,16 @@ pub struct Change {
 }
 
 impl Change {
-    /// Goes on from another motion: positions and rates, which must satisfy the constraints; the change of energy is booked as that of an impact.
+    /// Goes on from another motion: positions and rates, which must satisfy the constraints; the change of
+    /// energy is booked as that of an impact.
     #[must_use]
     pub fn to(mut self, motion: Motion) -> Self {
         self.motion = Some(motion);
         self
     }
 
-    /// Lets a spring, a torsion spring, or an applied force or torque act from now on, or no longer; the energy it stores is booked likewise.
+    /// Lets a spring, a torsion spring, or an applied force or torque act from now on, or no longer; the
+    /// energy it stores is booked likewise.
     #[must_use]
     pub fn switch(mut self, part: &str, on: bool) -> Self {
         self.switches.push((part.into(), on));
@@ -201,13 +206,23 @@ impl EventDetector {
     }
 
     /// Passages in a part of a step, in no order.
-    fn passages(&mut self, inside: &mut dyn Inside, begin: Time, span: f64, depth: u32, all: &mut Vec<Passage>) {
+    fn passages(
+        &mut self,
+        inside: &mut dyn Inside,
+        begin: Time,
+        span: f64,
+        depth: u32,
+        all: &mut Vec<Passage>,
+    ) {
         let mut curves: Vec<Chebyshev> = Vec::new();
         let mut nearest = Vec::new();
         for degree in DEGREES {
-            let nodes: Vec<Vec<f64>> = Chebyshev::nodes(degree).map(|node| self.values(inside.at(begin + node * span))).collect();
+            let nodes: Vec<Vec<f64>> =
+                Chebyshev::nodes(degree).map(|node| self.values(inside.at(begin + node * span))).collect();
             curves = (0..self.events.len())
-                .map(|event| Chebyshev::through(&nodes.iter().map(|values| values[event]).collect::<Vec<_>>()))
+                .map(|event| {
+                    Chebyshev::through(&nodes.iter().map(|values| values[event]).collect::<Vec<_>>())
+                })
                 .collect();
             // From the last node to the first.
             nearest = nodes.into_iter().rev().take(2).collect();
@@ -215,7 +230,8 @@ impl EventDetector {
                 break;
             }
         }
-        let is_resolved = curves.iter().all(|curve| curve.tail() <= RESOLVED * curve.most() || !curve.most().is_finite());
+        let is_resolved =
+            curves.iter().all(|curve| curve.tail() <= RESOLVED * curve.most() || !curve.most().is_finite());
         if !is_resolved && depth < HALVINGS {
             self.passages(inside, begin, 0.5 * span, depth + 1, all);
             return self.passages(inside, begin + 0.5 * span, 0.5 * span, depth + 1, all);
@@ -227,7 +243,11 @@ impl EventDetector {
             if first == 0.0 && *side != 0 && sign(next) == -*side {
                 all.push(Passage { t: begin, event, rises: *side < 0 });
             }
-            *side = if first == 0.0 || self.memory.last == Some((event, begin)) { sign(next) } else { sign(first) };
+            *side = if first == 0.0 || self.memory.last == Some((event, begin)) {
+                sign(next)
+            } else {
+                sign(first)
+            };
             let mut share = 0.0;
             while let Some(zero) = root(curve, 0.0, share, 1.0) {
                 share = zero + SAME;
@@ -247,7 +267,8 @@ impl EventDetector {
         let (begin, end) = inside.span();
         let mut at = |t: Time| self.values(inside.at(t))[event];
         let shift = SAME * (end - begin).hi;
-        let (mut before, mut t) = (if (near - begin).hi > shift { near + -shift } else { near + shift }, near);
+        let (mut before, mut t) =
+            (if (near - begin).hi > shift { near + -shift } else { near + shift }, near);
         let (mut value_before, mut value) = (at(before), at(t));
         for _ in 0..ROUNDS {
             let change = value * (t - before).hi / (value - value_before);
@@ -288,7 +309,10 @@ impl StepWatcher for EventDetector {
                 Direction::Rising => rises,
                 Direction::Falling => !rises,
             };
-            let is_same = self.memory.last.is_some_and(|(last, before)| last == event && (t - before).hi <= SAME * span);
+            let is_same = self
+                .memory
+                .last
+                .is_some_and(|(last, before)| last == event && (t - before).hi <= SAME * span);
             if !counts || is_same {
                 continue;
             }

@@ -1,7 +1,8 @@
-//! What is said of a stiff scene before it is run: which spring is fast, how many of its periods there are to follow, and in about how many steps.
+//! What is said of a stiff scene before it is run: which spring is fast, how many of its periods there are to
+//! follow, and in about how many steps.
 //!
-//! A fast mode that swings is resolved, whatever it takes: its energy acts on the slow motion, and a method that damps it away returns a wrong one, smoothly.
-//! Past 1e8 radians that wants to be asked for.
+//! A fast mode that swings is resolved, whatever it takes: its energy acts on the slow motion, and a method
+//! that damps it away returns a wrong one, smoothly. Past 1e8 radians that wants to be asked for.
 
 use super::methods::MethodId;
 use super::plan::{Refusal, Request};
@@ -34,7 +35,8 @@ pub struct FastMode {
 }
 
 impl FastMode {
-    /// What is `found` of the start, on the way to `until` \[s\] by a method; `step` is that of a fixed-step method \[s\].
+    /// What is `found` of the start, on the way to `until` \[s\] by a method; `step` is that of a fixed-step
+    /// method \[s\].
     pub fn new(found: Stiffness, method: MethodId, step: Option<f64>, until: f64) -> Self {
         let is_damped = found.is_damped();
         let dies = is_damped && matches!(method, MethodId::Radau(_));
@@ -64,12 +66,15 @@ impl FastMode {
         self.spring.as_ref().map_or_else(|| "the fastest mode".into(), |name| format!("spring {name}"))
     }
 
-    /// Refuses to follow very many periods unless that is asked for; Radau methods do not follow them, and fixed steps are what they were asked to be.
+    /// Refuses to follow very many periods unless that is asked for; Radau methods do not follow them, and
+    /// fixed steps are what they were asked to be.
     ///
     /// # Errors
     /// More than 1e8 rad, no effort stated.
     pub fn check(&self, method: MethodId, request: &Request, until: f64) -> Result<(), Refusal> {
-        let is_asked_for = request.max_evaluations.is_some() || !method.is_adaptive() || matches!(method, MethodId::Radau(_));
+        let is_asked_for = request.max_evaluations.is_some()
+            || !method.is_adaptive()
+            || matches!(method, MethodId::Radau(_));
         if is_asked_for || !self.swings() || self.rate * until <= MOST_RADIANS {
             return Ok(());
         }
@@ -90,20 +95,33 @@ impl FastMode {
         }
         let (name, rate, share) = (self.name(), self.rate, self.energy_share);
         if !self.swings() {
-            let cost = if self.steps > 0.0 { format!("; {method} follows it in about {:.1e} steps", self.steps) } else { String::new() };
-            return Some(format!("{name} is stiff, {rate:.1e} rad/s, and dies away at {:.1e} /s{cost}", self.decay));
+            let cost = if self.steps > 0.0 {
+                format!("; {method} follows it in about {:.1e} steps", self.steps)
+            } else {
+                String::new()
+            };
+            return Some(format!(
+                "{name} is stiff, {rate:.1e} rad/s, and dies away at {:.1e} /s{cost}",
+                self.decay
+            ));
         }
-        let swing = format!("{name} oscillates at {rate:.1e} rad/s, {:.1e} periods until t = {until} s", self.periods);
+        let swing = format!(
+            "{name} oscillates at {rate:.1e} rad/s, {:.1e} periods until t = {until} s",
+            self.periods
+        );
         Some(match method {
             MethodId::Radau(_) if share > EXCITED => {
-                format!("{swing}; {method} takes its energy away, {share:.0e} of the scale, wherever its steps are longer than a period")
+                format!(
+                    "{swing}; {method} takes its energy away, {share:.0e} of the scale, wherever its steps are longer than a period"
+                )
             }
             _ => format!("{swing}, about {:.1e} steps; energy in it {share:.0e} of the scale", self.steps),
         })
     }
 }
 
-/// Phase of a fast mode in a step that follows it, about: by stability for the explicit methods at everyday tolerances, by the radius of convergence for the series.
+/// Phase of a fast mode in a step that follows it, about: by stability for the explicit methods at everyday
+/// tolerances, by the radius of convergence for the series.
 pub(super) fn radians_a_step(method: MethodId) -> f64 {
     match method {
         MethodId::Dopri5 | MethodId::Dp5 => 0.5,

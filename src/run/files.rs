@@ -1,10 +1,11 @@
 //! The folder of a run: files appear in it whole or not at all.
 //!
-//! A file is written beside its place under a hidden name and renamed when it is complete; whoever looks into the folder, at any
-//! moment, finds whole files.  `run.json` is written last: where it stands, the run beside it is complete.
+//! A file is written beside its place under a hidden name and renamed when it is complete; whoever looks into
+//! the folder, at any moment, finds whole files.  `run.json` is written last: where it stands, the run beside
+//! it is complete.
 //!
-//! A folder is locked as long as somebody writes into it.  Its table, `.unfinished-trajectory.csv`, outlives its writer where a checkpoint says how
-//! much of it counts ([`checkpoint`]).
+//! A folder is locked as long as somebody writes into it.  Its table, `.unfinished-trajectory.csv`, outlives
+//! its writer where a checkpoint says how much of it counts ([`checkpoint`]).
 
 use super::checkpoint;
 use sha2::digest::common::hazmat::{SerializableState, SerializedState};
@@ -109,10 +110,12 @@ pub struct Cursor {
 const READ_AGAIN: u64 = 1 << 28;
 
 impl Folder {
-    /// Opens the folder for a new run, made where it does not exist, and locks it; what a run that can no longer go on left unfinished is swept out.
+    /// Opens the folder for a new run, made where it does not exist, and locks it; what a run that can no
+    /// longer go on left unfinished is swept out.
     ///
     /// # Errors
-    /// A run is in it, finished or interrupted, and `overwrite` is false; somebody is writing into it; or it cannot be made.
+    /// A run is in it, finished or interrupted, and `overwrite` is false; somebody is writing into it; or it
+    /// cannot be made.
     pub fn open(path: &Path, overwrite: bool) -> Result<Self, FileError> {
         let folder = || path.to_owned();
         fs::create_dir_all(path).map_err(|source| FileError::Folder { folder: folder(), source })?;
@@ -121,7 +124,9 @@ impl Folder {
             return Err(FileError::Interrupted { folder: folder() });
         }
         if !overwrite
-            && [TRAJECTORY, RECORD, SWEEP, SWEEP_RECORD, COMPARISON, COMPARISON_RECORD].iter().any(|name| path.join(name).exists())
+            && [TRAJECTORY, RECORD, SWEEP, SWEEP_RECORD, COMPARISON, COMPARISON_RECORD]
+                .iter()
+                .any(|name| path.join(name).exists())
         {
             return Err(FileError::Occupied { folder: folder() });
         }
@@ -131,7 +136,8 @@ impl Folder {
         Ok(Self { path: folder(), written: Vec::new(), _lock: lock })
     }
 
-    /// Opens the folder of an interrupted run, and locks it; its tables stay, whatever else it was writing is swept out.
+    /// Opens the folder of an interrupted run, and locks it; its tables stay, whatever else it was writing is
+    /// swept out.
     ///
     /// # Errors
     /// Somebody is writing into it, or it is closed.
@@ -199,7 +205,9 @@ impl Folder {
             return Err(altered("it is shorter"));
         }
         let hash = cursor.hash().ok_or_else(|| altered("the hash kept of it is none"))?;
-        if cursor.bytes <= READ_AGAIN && hashed(&mut file, cursor.bytes).map_err(failed)? != hash.clone().finalize() {
+        if cursor.bytes <= READ_AGAIN
+            && hashed(&mut file, cursor.bytes).map_err(failed)? != hash.clone().finalize()
+        {
             return Err(altered("its content has changed"));
         }
         if place != path {
@@ -255,7 +263,10 @@ impl Folder {
     /// # Errors
     /// A file cannot be removed.
     pub fn clear(&self, names: &[&str]) -> Result<(), FileError> {
-        names.iter().filter(|name| !self.written.contains(name)).try_for_each(|name| remove(self.path.join(name)))
+        names
+            .iter()
+            .filter(|name| !self.written.contains(name))
+            .try_for_each(|name| remove(self.path.join(name)))
     }
 
     /// An error about a file of this folder.
@@ -341,12 +352,17 @@ fn hashed(file: &mut File, bytes: u64) -> io::Result<sha2::digest::Output<Sha256
 pub fn quoted(path: &Path) -> String {
     let text = path.display().to_string();
     let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "/._-+=:,@%".contains(letter);
-    if !text.is_empty() && text.chars().all(is_plain) { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
+    if !text.is_empty() && text.chars().all(is_plain) {
+        text
+    } else {
+        format!("'{}'", text.replace('\'', "'\\''"))
+    }
 }
 
 /// Removes what was never finished, but the tables of these names.
 fn sweep_out(folder: &Path, but: &[&str]) -> Result<(), FileError> {
-    let entries = fs::read_dir(folder).map_err(|source| FileError::Folder { folder: folder.to_owned(), source })?;
+    let entries =
+        fs::read_dir(folder).map_err(|source| FileError::Folder { folder: folder.to_owned(), source })?;
     for entry in entries.flatten() {
         let name = entry.file_name();
         if name.to_string_lossy().strip_prefix(UNFINISHED).is_some_and(|name| !but.contains(&name)) {
@@ -359,7 +375,9 @@ fn sweep_out(folder: &Path, but: &[&str]) -> Result<(), FileError> {
 /// Removes a file that may not be there.
 pub(super) fn remove(path: PathBuf) -> Result<(), FileError> {
     match fs::remove_file(&path) {
-        Err(source) if source.kind() != io::ErrorKind::NotFound => Err(FileError::File { file: path, source }),
+        Err(source) if source.kind() != io::ErrorKind::NotFound => {
+            Err(FileError::File { file: path, source })
+        }
         _ => Ok(()),
     }
 }
@@ -378,8 +396,11 @@ mod tests {
     use super::*;
 
     fn names(folder: &Path) -> Vec<String> {
-        let mut names: Vec<String> =
-            fs::read_dir(folder).expect("a folder").flatten().map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+        let mut names: Vec<String> = fs::read_dir(folder)
+            .expect("a folder")
+            .flatten()
+            .map(|entry| entry.file_name().to_string_lossy().into_owned())
+            .collect();
         names.sort();
         names
     }

@@ -1,9 +1,10 @@
 //! Bars that turn over: the first time an angle passes an odd multiple of π.
 //!
-//! Every step in which an angle can come as far as that is looked through: the angles inside it are interpolated until that is resolved, and the passage is
-//! found on the interpolant by the search (`stepping/search.rs`) that finds all events.  Whole turns are counted for it where the mechanism itself does
-//! not, since there they matter (torsion springs).  The passage itself is found by Newton's method on the dense output of the
-//! step, so it is as accurate as the run.
+//! Every step in which an angle can come as far as that is looked through: the angles inside it are
+//! interpolated until that is resolved, and the passage is found on the interpolant by the search
+//! (`stepping/search.rs`) that finds all events.  Whole turns are counted for it where the mechanism itself
+//! does not, since there they matter (torsion springs).  The passage itself is found by Newton's method on
+//! the dense output of the step, so it is as accurate as the run.
 
 use crate::arithmetic::angle;
 use crate::dynamics::{BodyAngles, Form, State};
@@ -41,8 +42,14 @@ impl FlipDetector {
         look(problem, state, &mut self.before);
     }
 
-    /// Takes the state after a step of `span` \[s\], and tells what there is to see at both ends of it where it holds a passage, or may.
-    pub fn step<P: Form + ?Sized>(&mut self, problem: &mut P, state: &State, span: f64) -> Option<[BodyAngles; 2]> {
+    /// Takes the state after a step of `span` \[s\], and tells what there is to see at both ends of it where
+    /// it holds a passage, or may.
+    pub fn step<P: Form + ?Sized>(
+        &mut self,
+        problem: &mut P,
+        state: &State,
+        span: f64,
+    ) -> Option<[BodyAngles; 2]> {
         if self.flip.is_some() {
             return None;
         }
@@ -61,7 +68,8 @@ impl FlipDetector {
     }
 }
 
-/// Angles and rates of the bodies alone, whole turns taken off and counted whatever the mechanism does with them.
+/// Angles and rates of the bodies alone, whole turns taken off and counted whatever the mechanism does with
+/// them.
 pub(super) fn look<P: Form + ?Sized>(problem: &mut P, state: &State, body_angles: &mut BodyAngles) {
     problem.body_angles(state, body_angles);
     let bodies = problem.mechanism().bodies.len();
@@ -73,7 +81,8 @@ pub(super) fn look<P: Form + ?Sized>(problem: &mut P, state: &State, body_angles
     }
 }
 
-/// True where a bar may come to the boundary in a step, if it is at most twice as fast on the way as at the ends.
+/// True where a bar may come to the boundary in a step, if it is at most twice as fast on the way as at the
+/// ends.
 pub(super) fn can_pass(a: &BodyAngles, b: &BodyAngles, span: f64) -> bool {
     (0..a.phi.len()).any(|bar| {
         let (from, to) = (a.omega[bar], b.omega[bar]);
@@ -88,8 +97,14 @@ fn winding(bar: usize, a: &BodyAngles, b: &BodyAngles) -> f64 {
     b.phi[bar] + TAU * (b.turns[bar] - a.turns[bar]) as f64
 }
 
-/// The first passage in a step that begins at `start` \[s\] and takes `span` \[s\]; `at` looks so many seconds after its beginning.
-pub(super) fn search(start: f64, span: f64, [first, last]: &[BodyAngles; 2], at: &mut dyn FnMut(f64) -> BodyAngles) -> Option<Flip> {
+/// The first passage in a step that begins at `start` \[s\] and takes `span` \[s\]; `at` looks so many
+/// seconds after its beginning.
+pub(super) fn search(
+    start: f64,
+    span: f64,
+    [first, last]: &[BodyAngles; 2],
+    at: &mut dyn FnMut(f64) -> BodyAngles,
+) -> Option<Flip> {
     // Later halves wait.
     let mut parts = vec![(0.0, span, first.clone(), last.clone())];
     while let Some((begin, end, a, b)) = parts.pop() {
@@ -109,7 +124,12 @@ pub(super) fn search(start: f64, span: f64, [first, last]: &[BodyAngles; 2], at:
 }
 
 /// The first passage in a part of a step, which begins with `first`.
-fn first_passage(start: f64, [begin, end]: [f64; 2], first: &BodyAngles, at: &mut dyn FnMut(f64) -> BodyAngles) -> Option<Flip> {
+fn first_passage(
+    start: f64,
+    [begin, end]: [f64; 2],
+    first: &BodyAngles,
+    at: &mut dyn FnMut(f64) -> BodyAngles,
+) -> Option<Flip> {
     let span = end - begin;
     let mut angles = vec![Vec::new(); first.phi.len()];
     for degree in DEGREES {
@@ -137,11 +157,21 @@ fn first_passage(start: f64, [begin, end]: [f64; 2], first: &BodyAngles, at: &mu
             }
         }
     }
-    found.map(|(share, bar, side)| Flip { t: start + passage(bar, side, first, begin + share * span, [begin, end], at), bar })
+    found.map(|(share, bar, side)| Flip {
+        t: start + passage(bar, side, first, begin + share * span, [begin, end], at),
+        bar,
+    })
 }
 
 /// The time after the step's beginning at which a bar is on the boundary, near `t` \[s\].
-fn passage(bar: usize, side: f64, first: &BodyAngles, near: f64, [begin, end]: [f64; 2], at: &mut dyn FnMut(f64) -> BodyAngles) -> f64 {
+fn passage(
+    bar: usize,
+    side: f64,
+    first: &BodyAngles,
+    near: f64,
+    [begin, end]: [f64; 2],
+    at: &mut dyn FnMut(f64) -> BodyAngles,
+) -> f64 {
     let mut t = near;
     for _ in 0..ROUNDS {
         let there = at(t);
@@ -173,7 +203,8 @@ mod tests {
     fn search(motion: impl Fn(f64) -> [f64; 2], span: f64) -> Option<Flip> {
         let ends = [0.0, span].map(|t| body_angles(motion(t)[0], motion(t)[1]));
         let suspicious = can_pass(&ends[0], &ends[1], span);
-        suspicious.then(|| super::search(2.0, span, &ends, &mut |t| body_angles(motion(t)[0], motion(t)[1])))?
+        suspicious
+            .then(|| super::search(2.0, span, &ends, &mut |t| body_angles(motion(t)[0], motion(t)[1])))?
     }
 
     #[test]
@@ -196,7 +227,8 @@ mod tests {
             assert_eq!(search(top(PI - height), 1.0), None);
         }
         assert_eq!(search(top(2.0), 1.0), None);
-        let below = search(|t| [-PI - 0.01 + (t - 0.5) * (t - 0.5), 2.0 * (t - 0.5)], 1.0).expect("on the other side");
+        let below = search(|t| [-PI - 0.01 + (t - 0.5) * (t - 0.5), 2.0 * (t - 0.5)], 1.0)
+            .expect("on the other side");
         assert!((below.t - 2.0 - 0.4).abs() < 1e-9, "{below:?}");
         // Twice out and back, and the ends of the step head inwards.
         let wave = |t: f64| [3.0 + 0.2 * (12.0 * t - 1.0).cos(), -2.4 * (12.0 * t - 1.0).sin()];

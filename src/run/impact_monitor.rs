@@ -5,9 +5,10 @@
 //! D = Σ (m |Δv|² + J Δω²) / 2 over the bodies:      impulse (1+e) |v_n⁻| = 2 D,      energy lost = D (1-e) / (1+e)
 //! ```
 //!
-//! The last line is Kelvin's and Carnot's theorem on impulses along one normal; the motors' impulsive work, which is accounted for, is not in it.
-//! Velocities are those of the centres of mass, walked from body to body; the mass matrix, in whose terms impacts are found, is not used.
-//! Source: E. T. Whittaker, *A Treatise on the Analytical Dynamics of Particles and Rigid Bodies*, 4th ed. (1937), sections 106 to 108.
+//! The last line is Kelvin's and Carnot's theorem on impulses along one normal; the motors' impulsive work,
+//! which is accounted for, is not in it. Velocities are those of the centres of mass, walked from body to
+//! body; the mass matrix, in whose terms impacts are found, is not used. Source: E. T. Whittaker, *A Treatise
+//! on the Analytical Dynamics of Particles and Rigid Bodies*, 4th ed. (1937), sections 106 to 108.
 
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::dynamics::constraint::{Measure, Posture};
@@ -34,7 +35,8 @@ pub(super) struct Claim {
     pub energy_lost: f64,
 }
 
-/// The gap that counts as zero over the length of a contact, for a method of this relative tolerance: projections move the end of a step by as much.
+/// The gap that counts as zero over the length of a contact, for a method of this relative tolerance:
+/// projections move the end of a step by as much.
 pub(super) fn closed(tolerance: f64) -> f64 {
     CLOSED.max(100.0 * tolerance)
 }
@@ -52,7 +54,13 @@ pub(super) fn gap_rate(contact: &Contact, angles: usize, phi: &[f64], omega: &[f
 }
 
 /// Whether an impact is what Newton's law of impact makes of the motion before it; else what is wrong.
-pub(super) fn check(mechanism: &Mechanism, tolerance: f64, before: &Motion, after: &Motion, claim: &Claim) -> Result<(), String> {
+pub(super) fn check(
+    mechanism: &Mechanism,
+    tolerance: f64,
+    before: &Motion,
+    after: &Motion,
+    claim: &Claim,
+) -> Result<(), String> {
     unmoved(mechanism, UNMOVED, before, after)?;
     let contact = &mechanism.contacts[claim.contact];
     let phi: Vec<f64> = before.phi.iter().map(|phi| phi.hi).collect();
@@ -61,11 +69,15 @@ pub(super) fn check(mechanism: &Mechanism, tolerance: f64, before: &Motion, afte
         return Err(format!("the point is {:.2e} m from the wall at the impact", gap * contact.length));
     }
     let (here, slips) = (Sides::new(mechanism, before, after), slips(mechanism, before, after));
-    let [approach, departure] = [&before.omega, &after.omega].map(|omega| contact.normal_velocity(&here.z, omega));
+    let [approach, departure] =
+        [&before.omega, &after.omega].map(|omega| contact.normal_velocity(&here.z, omega));
     let step_size = contact.step_size(&before.omega.iter().map(|omega| omega.hi).collect::<Vec<_>>());
     let speed_error = departure + contact.restitution * approach;
     if beyond(speed_error.abs(), AGREES * approach.abs() + 1e-13 * step_size) {
-        return Err(format!("the point leaves at {departure:.6e} m/s after an approach at {:.6e} m/s", -approach));
+        return Err(format!(
+            "the point leaves at {departure:.6e} m/s after an approach at {:.6e} m/s",
+            -approach
+        ));
     }
     let [drift, slip] = slips?;
     if beyond(slip, AGREES.max(2.0 * drift)) {
@@ -88,13 +100,21 @@ pub(super) fn check(mechanism: &Mechanism, tolerance: f64, before: &Motion, afte
     }
     let work = (after.work - before.work).hi;
     if beyond((here.gain - work + lost).abs(), scale) {
-        return Err(format!("kinetic energy changes by {:.6e} J, with {work:.6e} J of the motors and {lost:.6e} J lost", here.gain));
+        return Err(format!(
+            "kinetic energy changes by {:.6e} J, with {work:.6e} J of the motors and {lost:.6e} J lost",
+            here.gain
+        ));
     }
     Ok(())
 }
 
 /// Whether the first moment of a run is its start; else what is not as it was given.
-pub(super) fn is_start(mechanism: &Mechanism, start: &Motion, first: &Motion, keeps_rates: bool) -> Result<(), String> {
+pub(super) fn is_start(
+    mechanism: &Mechanism,
+    start: &Motion,
+    first: &Motion,
+    keeps_rates: bool,
+) -> Result<(), String> {
     unmoved(mechanism, AGREES, start, first)?;
     let angles = mechanism.bodies.len();
     let fastest = |range: &[DoubleDouble]| range.iter().fold(0.0f64, |most, omega| most.max(omega.hi.abs()));
@@ -107,7 +127,12 @@ pub(super) fn is_start(mechanism: &Mechanism, start: &Motion, first: &Motion, ke
         )
     };
     match (0..start.omega.len()).filter(|_| keeps_rates).find(differs) {
-        Some(k) => Err(format!("the rate of {} is {} and not {}", mechanism.coordinate_name(k), first.omega[k].hi, start.omega[k].hi)),
+        Some(k) => Err(format!(
+            "the rate of {} is {} and not {}",
+            mechanism.coordinate_name(k),
+            first.omega[k].hi,
+            start.omega[k].hi
+        )),
         None => Ok(()),
     }
 }
@@ -116,7 +141,8 @@ pub(super) fn is_start(mechanism: &Mechanism, start: &Motion, first: &Motion, ke
 fn unmoved(mechanism: &Mechanism, share: f64, before: &Motion, after: &Motion) -> Result<(), String> {
     let (size, angles) = (mechanism.size_of_parts(), mechanism.bodies.len());
     for (k, (one, other)) in before.phi.iter().zip(&after.phi).enumerate() {
-        let turns = before.turns.get(k).zip(after.turns.get(k)).map_or(0.0, |(one, other)| (other - one) as f64);
+        let turns =
+            before.turns.get(k).zip(after.turns.get(k)).map_or(0.0, |(one, other)| (other - one) as f64);
         let moved = (*other - *one + DoubleDouble::TAU.scale(turns)).hi;
         let unit = if k < angles { 1.0 + one.hi.abs() } else { size + one.hi.abs() };
         if beyond(moved.abs(), share * unit) {
@@ -138,7 +164,9 @@ fn offset(contact: &Contact) -> f64 {
 }
 
 fn elements<T: Scalar>(angles: usize, phi: &[T]) -> Vec<Complex<T>> {
-    let place = |k: usize| if (k - angles).is_multiple_of(2) { Complex::new(phi[k], phi[k + 1]) } else { Complex::ZERO };
+    let place = |k: usize| {
+        if (k - angles).is_multiple_of(2) { Complex::new(phi[k], phi[k + 1]) } else { Complex::ZERO }
+    };
     (0..phi.len()).map(|k| if k < angles { Complex::unit(phi[k]) } else { place(k) }).collect()
 }
 
@@ -166,29 +194,40 @@ impl Sides {
     fn new(mechanism: &Mechanism, before: &Motion, after: &Motion) -> Self {
         let z = elements(mechanism.bodies.len(), &before.phi);
         let velocities = [before, after].map(|motion| centre_velocities(mechanism, &z, &motion.omega));
-        let (mut jump, mut gain, mut exchange, mut energy) = (DoubleDouble::ZERO, DoubleDouble::ZERO, 0.0, 0.0);
+        let (mut jump, mut gain, mut exchange, mut energy) =
+            (DoubleDouble::ZERO, DoubleDouble::ZERO, 0.0, 0.0);
         for (k, body) in mechanism.bodies.iter().enumerate() {
-            let ([v, w], [turn, turned]) = ([velocities[0][k], velocities[1][k]], [before.omega[k], after.omega[k]]);
+            let ([v, w], [turn, turned]) =
+                ([velocities[0][k], velocities[1][k]], [before.omega[k], after.omega[k]]);
             let (change, sum) = (w - v, w + v);
             let (spin, spins) = (turned - turn, turned + turn);
             jump += change.norm_squared().scale(0.5 * body.mass) + (spin * spin).scale(0.5 * body.inertia);
             gain += change.dot(sum).scale(0.5 * body.mass) + (spin * spins).scale(0.5 * body.inertia);
-            energy += 0.5 * (body.mass * (v.norm_squared() + w.norm_squared()).hi + body.inertia * (turn * turn + turned * turned).hi);
+            energy += 0.5
+                * (body.mass * (v.norm_squared() + w.norm_squared()).hi
+                    + body.inertia * (turn * turn + turned * turned).hi);
             let size = |v: Complex<DoubleDouble>| v.norm_squared().hi.sqrt();
-            exchange +=
-                0.5 * (body.mass * size(change) * (size(v) + size(w)) + body.inertia * spin.hi.abs() * (turn.hi.abs() + turned.hi.abs()));
+            exchange += 0.5
+                * (body.mass * size(change) * (size(v) + size(w))
+                    + body.inertia * spin.hi.abs() * (turn.hi.abs() + turned.hi.abs()));
         }
         Self { z, jump: jump.hi, gain: gain.hi, exchange, energy }
     }
 }
 
 /// Velocities of the centres of mass, from body to body \[m/s\].
-fn centre_velocities(mechanism: &Mechanism, z: &[Complex<DoubleDouble>], omega: &[DoubleDouble]) -> Vec<Complex<DoubleDouble>> {
+fn centre_velocities(
+    mechanism: &Mechanism,
+    z: &[Complex<DoubleDouble>],
+    omega: &[DoubleDouble],
+) -> Vec<Complex<DoubleDouble>> {
     let mut translations = vec![Complex::<DoubleDouble>::ZERO; mechanism.bodies.len()];
     for &k in &mechanism.forest.order {
         translations[k] = match mechanism.forest.hangs[k].origin_point {
             BodyOrigin::Ground(_) => Complex::ZERO,
-            BodyOrigin::On(parent, arm) => translations[parent] + z[parent].turn(arm).left().times(omega[parent]),
+            BodyOrigin::On(parent, arm) => {
+                translations[parent] + z[parent].turn(arm).left().times(omega[parent])
+            }
             BodyOrigin::Free(x) => Complex::new(omega[x], omega[x + 1]),
         };
     }
@@ -196,12 +235,16 @@ fn centre_velocities(mechanism: &Mechanism, z: &[Complex<DoubleDouble>], omega: 
     translations.iter().enumerate().map(|(k, &origin_point)| origin_point + arm(k)).collect()
 }
 
-/// The worst rate of the constraints before and after, each over the magnitudes it would be made of if all of the mechanism moved as fast as the fastest of it.
+/// The worst rate of the constraints before and after, each over the magnitudes it would be made of if all of
+/// the mechanism moved as fast as the fastest of it.
 fn slips(mechanism: &Mechanism, before: &Motion, after: &Motion) -> Result<[f64; 2], String> {
     let (angles, length) = (mechanism.bodies.len(), mechanism.size_of_parts());
     let z = elements(angles, &before.phi);
     let fastest = |range: std::ops::Range<usize>| {
-        [before, after].iter().flat_map(|motion| &motion.omega[range.clone()]).fold(0.0f64, |most, omega| most.max(omega.hi.abs()))
+        [before, after]
+            .iter()
+            .flat_map(|motion| &motion.omega[range.clone()])
+            .fold(0.0f64, |most, omega| most.max(omega.hi.abs()))
     };
     let (turning, moving) = (fastest(0..angles), fastest(angles..before.omega.len()));
     // Impacts are solved for with all rates at once, and rounded to those.
@@ -210,13 +253,18 @@ fn slips(mechanism: &Mechanism, before: &Motion, after: &Motion) -> Result<[f64;
     let mut worst = [0.0f64; 2];
     for row in &mechanism.constraints {
         let mut jacobian = vec![DoubleDouble::ZERO; before.phi.len()];
-        let here = row.differentiate(before.time, Posture { phi: &before.phi, z: &z, omega: &before.omega }, &mut jacobian);
+        let here = row.differentiate(
+            before.time,
+            Posture { phi: &before.phi, z: &z, omega: &before.omega },
+            &mut jacobian,
+        );
         let sides = [before, after].map(|motion| {
             let rate = jacobian.iter().zip(&motion.omega).fold(here.drive, |rate, (&g, &w)| rate + g * w);
             rate.hi.abs()
         });
-        let size = (jacobian.iter().enumerate())
-            .fold(here.drive.hi.abs(), |size, (k, g)| size + g.hi.abs() * if k < angles { turning } else { moving });
+        let size = (jacobian.iter().enumerate()).fold(here.drive.hi.abs(), |size, (k, g)| {
+            size + g.hi.abs() * if k < angles { turning } else { moving }
+        });
         for (worst, rate) in worst.iter_mut().zip(sides) {
             if !rate.is_finite() {
                 return Err(format!("the rate of {} is not finite", row.name()));
@@ -243,10 +291,19 @@ mod tests {
     /// The motion after it as the impact code has it, and what it claims.
     fn struck(mechanism: &Mechanism, before: &Motion) -> (Motion, Claim) {
         let plain = |numbers: &[DoubleDouble]| numbers.iter().map(|x| x.hi).collect::<Vec<_>>();
-        let impact = mechanism.impact_at(0, before.time, &plain(&before.phi), &plain(&before.omega)).expect("a rebound");
+        let impact = mechanism
+            .impact_at(0, before.time, &plain(&before.phi), &plain(&before.omega))
+            .expect("a rebound");
         let omega = impact.omega.iter().map(|&omega| DoubleDouble::from(omega)).collect();
         let after = Motion { omega, work: before.work + impact.motor_work, ..before.clone() };
-        (after, Claim { contact: 0, impulse: impact.impulse, energy_lost: impact.motor_work - impact.energy_change })
+        (
+            after,
+            Claim {
+                contact: 0,
+                impulse: impact.impulse,
+                energy_lost: impact.motor_work - impact.energy_change,
+            },
+        )
     }
 
     /// A rod that falls on its lower end, and a cart that carries a driven arm against a stop.
@@ -297,7 +354,10 @@ mod tests {
         let (mechanism, mut before) = met(SCENES[0]);
         before.phi[2] += DoubleDouble::from(1e-3);
         let (after, claim) = struck(&mechanism, &before);
-        assert!(check(&mechanism, 1e-9, &before, &after, &claim).is_err_and(|what| what.contains("from the wall")));
+        assert!(
+            check(&mechanism, 1e-9, &before, &after, &claim)
+                .is_err_and(|what| what.contains("from the wall"))
+        );
         assert!(is_start(&mechanism, &before, &after, false).is_ok());
         assert!(is_start(&mechanism, &before, &after, true).is_err_and(|what| what.contains("rate")));
         let mut elsewhere = before.clone();

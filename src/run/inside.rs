@@ -34,7 +34,8 @@ impl Step<'_> {
         self.0.span().1.hi
     }
 
-    /// The motion at a time inside it \[s\], by the method's dense output, or a shorter step of fixed-step methods and `ode_solvers`.
+    /// The motion at a time inside it \[s\], by the method's dense output, or a shorter step of fixed-step
+    /// methods and `ode_solvers`.
     pub fn at(&mut self, time: f64) -> &Motion {
         self.0.at(Time::from(time))
     }
@@ -111,14 +112,17 @@ pub(super) struct Both<'a, 'b, 'c> {
 impl Both<'_, '_, '_> {
     /// True where anybody looks at steps.
     pub fn is_asked(&self) -> bool {
-        self.events.is_some() || self.observer.as_ref().is_some_and(|watching| watching.observer.wants_steps())
+        self.events.is_some()
+            || self.observer.as_ref().is_some_and(|watching| watching.observer.wants_steps())
     }
 }
 
 impl StepWatcher for Both<'_, '_, '_> {
     fn step(&mut self, inside: &mut dyn Inside) -> Option<Time> {
         let cut = self.events.as_mut().and_then(|events| events.step(inside));
-        let Some(observer) = self.observer.as_mut().filter(|watching| watching.observer.wants_steps()) else { return cut };
+        let Some(observer) = self.observer.as_mut().filter(|watching| watching.observer.wants_steps()) else {
+            return cut;
+        };
         match cut {
             Some(end) => observer.step(&mut Shortened { inside, end }).or(cut),
             None => observer.step(inside),

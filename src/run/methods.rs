@@ -59,8 +59,20 @@ pub struct MethodInfo {
 
 /// Every method there is.
 pub const METHODS: &[MethodInfo] = &[
-    adaptive(MethodId::Dopri5, "dopri5", 5, "everyday runs at 1e-3 to 1e-6 (crate ode_solvers)", "no walls, no projection"),
-    adaptive(MethodId::Dop853, "dop853", 8, "everyday runs at 1e-6 to 1e-12 (crate ode_solvers)", "no walls, no projection"),
+    adaptive(
+        MethodId::Dopri5,
+        "dopri5",
+        5,
+        "everyday runs at 1e-3 to 1e-6 (crate ode_solvers)",
+        "no walls, no projection",
+    ),
+    adaptive(
+        MethodId::Dop853,
+        "dop853",
+        8,
+        "everyday runs at 1e-6 to 1e-12 (crate ode_solvers)",
+        "no walls, no projection",
+    ),
     adaptive(MethodId::Dp5, "dp5", 5, "as dopri5, with impacts and projection after every step", "anything"),
     adaptive(MethodId::Dp8, "dp8", 8, "as dop853, with impacts and projection after every step", "anything"),
     adaptive(
@@ -86,15 +98,33 @@ pub const METHODS: &[MethodInfo] = &[
 ];
 
 /// What there is to say of an integrator from outside.
-const CUSTOM: MethodInfo = adaptive(MethodId::Custom, "custom", 0, "an integrator from outside the crate", "what it asks for itself");
+const CUSTOM: MethodInfo = adaptive(
+    MethodId::Custom,
+    "custom",
+    0,
+    "an integrator from outside the crate",
+    "what it asks for itself",
+);
 
-const fn adaptive(id: MethodId, name: &'static str, order: u32, purpose: &'static str, needs: &'static str) -> MethodInfo {
+const fn adaptive(
+    id: MethodId,
+    name: &'static str,
+    order: u32,
+    purpose: &'static str,
+    needs: &'static str,
+) -> MethodInfo {
     MethodInfo { id, name, order, stepping: Stepping::Adaptive, symplectic: false, purpose, needs }
 }
 
 const fn radau(stages: usize, name: &'static str) -> MethodInfo {
     let purpose = "dampers and damped stiff springs; dissipates the energy of undamped stiff springs";
-    adaptive(MethodId::Radau(stages), name, 2 * stages as u32 - 1, purpose, "matrices: up to about a thousand coordinates")
+    adaptive(
+        MethodId::Radau(stages),
+        name,
+        2 * stages as u32 - 1,
+        purpose,
+        "matrices: up to about a thousand coordinates",
+    )
 }
 
 const fn gauss(stages: usize, name: &'static str) -> MethodInfo {
@@ -191,10 +221,9 @@ impl FromStr for Stabilization {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, String> {
-        Self::ALL
-            .into_iter()
-            .find(|kind| kind.name() == name)
-            .ok_or_else(|| format!("no stabilization `{name}`; there are none, baumgarte, projection, elimination"))
+        Self::ALL.into_iter().find(|kind| kind.name() == name).ok_or_else(|| {
+            format!("no stabilization `{name}`; there are none, baumgarte, projection, elimination")
+        })
     }
 }
 

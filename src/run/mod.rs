@@ -1,10 +1,13 @@
 //! A run: the loop around a method, and what watches it.
 //!
-//! [`plan`] decides, with [`choice`] of the method; a [`driver`] of form and method makes the steps; [`contact`] takes it through impacts and contacts that last;
-//! [`running`] goes from one output time to the next and can pause; [`sample`] reads off what there is to know at each; [`trust`] estimates the error beside it,
-//! [`mod@reference`] is what it is measured against; [`drift`] and [`trace`] keep bounded records of it; [`table`] writes it down, [`files`] keeps whole files only, and
-//! [`checkpoint`] what a run needs to go on after whatever ended it.  [`mod@sweep`] runs a grid of starts and parameters and looks for bars that turn over ([`flip`]);
-//! [`mod@compare`] runs all methods at all settings, and times them; [`mod@stress`] runs stiff and extreme scenes by every method.
+//! [`plan`] decides, with [`choice`] of the method; a [`driver`] of form and method makes the steps;
+//! [`contact`] takes it through impacts and contacts that last; [`running`] goes from one output time to the
+//! next and can pause; [`sample`] reads off what there is to know at each; [`trust`] estimates the error
+//! beside it, [`mod@reference`] is what it is measured against; [`drift`] and [`trace`] keep bounded records
+//! of it; [`table`] writes it down, [`files`] keeps whole files only, and [`checkpoint`] what a run needs to
+//! go on after whatever ended it.  [`mod@sweep`] runs a grid of starts and parameters and looks for bars that
+//! turn over ([`flip`]); [`mod@compare`] runs all methods at all settings, and times them; [`mod@stress`]
+//! runs stiff and extreme scenes by every method.
 
 mod allowance;
 #[doc(hidden)]
@@ -91,7 +94,9 @@ pub use running::{Outcome, ResumeError, Run, RunError, Running, Snapshot, integr
 pub use sample::{Sample, Sampler};
 #[cfg(feature = "files")]
 pub use sweep::table::SweepTable;
-pub use sweep::{Grid, Point, PointObserver, Status, Sweep, SweepError, Totals, Vary, VaryError, sweep, sweep_on};
+pub use sweep::{
+    Grid, Point, PointObserver, Status, Sweep, SweepError, Totals, Vary, VaryError, sweep, sweep_on,
+};
 pub use trace::Trace;
 pub use trajectory::Trajectory;
 pub use trust::Trust;

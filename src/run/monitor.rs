@@ -5,7 +5,8 @@ use crate::stepping::Statistics;
 
 /// Looks at a run while it goes.
 ///
-/// Methods with dense output are read at the time asked for, all others at the end of the first step that reaches it.
+/// Methods with dense output are read at the time asked for, all others at the end of the first step that
+/// reaches it.
 pub(super) trait Monitor {
     /// The time of the next look \[s\]; infinite where there is none.
     fn due(&self) -> f64;

@@ -1,6 +1,7 @@
 //! From a scene and what was asked for to a plan: method, step, stabilization, output times, and why.
 //!
-//! A pairing that makes no sense is refused here, before anything is computed, with the reason and an alternative.
+//! A pairing that makes no sense is refused here, before anything is computed, with the reason and an
+//! alternative.
 
 use super::choice::{Choice, Prefer, choose, least_tolerance, usual_tolerance};
 use super::custom::Custom;
@@ -71,7 +72,8 @@ pub struct Plan {
     pub why: Option<String>,
     /// The fastest mode at the start, of scenes with springs.
     pub stiffness: Option<FastMode>,
-    /// What taking stiff springs for rods may do to an angle \[rad\], about: the model's own error, that of no method.
+    /// What taking stiff springs for rods may do to an angle \[rad\], about: the model's own error, that of
+    /// no method.
     pub model_error: Option<f64>,
     /// What was adjusted or left out, one line each.
     pub notes: Vec<String>,
@@ -94,21 +96,26 @@ pub struct Refusal {
     pub alternative: String,
 }
 
-/// Evaluations allowed where nobody says: so many at once, and so many a simulated second.  A thousand times what everyday scenes take.
+/// Evaluations allowed where nobody says: so many at once, and so many a simulated second.  A thousand times
+/// what everyday scenes take.
 const MAX_EVALUATIONS: (f64, f64) = (1e8, 1e7);
-/// The most of them, whatever the horizon, and the most expansions of a series, each of which takes about as long as ten: some minutes to an hour of computing.
+/// The most of them, whatever the horizon, and the most expansions of a series, each of which takes about as
+/// long as ten: some minutes to an hour of computing.
 const MOST_EVALUATIONS: [f64; 2] = [1e10, 1e9];
 /// Most rows a run may write.
 pub const MAX_ROWS: f64 = 1e9;
 /// Most numbers of a trajectory that a scene asks for by itself: about a gigabyte.
 const MOST_NUMBERS: f64 = 5e7;
-/// How much faster than all else a vibration must be to be taken for its mean force: a turn of it within a hundredth of theirs.
+/// How much faster than all else a vibration must be to be taken for its mean force: a turn of it within a
+/// hundredth of theirs.
 const SEPARATE: f64 = 100.0;
-/// So many coordinates are cheaper body by body, with multipliers, than in the matrices that eliminated coordinates and momenta ask for.
+/// So many coordinates are cheaper body by body, with multipliers, than in the matrices that eliminated
+/// coordinates and momenta ask for.
 pub(super) const MANY_COORDINATES: usize = 48;
 
 impl Plan {
-    /// The same by an integrator from outside; tolerance and step are its own affair, the stabilization is kept.
+    /// The same by an integrator from outside; tolerance and step are its own affair, the stabilization is
+    /// kept.
     #[must_use]
     pub fn integrated_by(mut self, integrator: Custom) -> Self {
         (self.method, self.step, self.why) = (MethodId::Custom, None, None);
@@ -134,7 +141,8 @@ impl Plan {
         let (method, extended, why) = match request.method {
             Some(method) => (method, request.extended, None),
             None => {
-                let Choice { method, extended, why } = choose(mechanism, request, stiffness.as_ref(), until, rate);
+                let Choice { method, extended, why } =
+                    choose(mechanism, request, stiffness.as_ref(), until, rate);
                 (method, extended, Some(why))
             }
         };
@@ -143,7 +151,8 @@ impl Plan {
         check_vibration(mechanism, method, rate, &mut notes)?;
         let (mut step, mut tolerance) = (None, None);
         if method.is_adaptive() {
-            let relative = request.rtol.unwrap_or_else(|| usual_tolerance(mechanism, method, extended, until));
+            let relative =
+                request.rtol.unwrap_or_else(|| usual_tolerance(mechanism, method, extended, until));
             tolerance = Some(Tolerance { relative, absolute: request.atol.unwrap_or(relative) });
         } else {
             step = Some(fixed_step(method, request, rate, until, &mut every, &mut notes)?);
@@ -157,13 +166,24 @@ impl Plan {
         notes.extend(cut_short(method, step, rate, until, max_evaluations));
         let rows = rows(until, every);
         if rows > MAX_ROWS {
-            return Err(usage("--every", format!("{rows:.1e} rows would be written; at most {MAX_ROWS:.0e}"), "a longer output interval"));
+            return Err(usage(
+                "--every",
+                format!("{rows:.1e} rows would be written; at most {MAX_ROWS:.0e}"),
+                "a longer output interval",
+            ));
         }
         let numbers = rows * (5 + 6 * mechanism.bodies.len() + 4 * mechanism.constraints.len()) as f64;
         if request.every.is_none() && numbers > MOST_NUMBERS {
             let what = format!("an output interval of {every} s up to {until} s");
-            let reason = format!("the trajectory would hold {numbers:.1e} numbers, about {:.0} GB", (numbers * 2e-8).ceil());
-            return Err(mismatch(what, &reason, &format!("a longer --every, or --every {every} if that is meant")));
+            let reason = format!(
+                "the trajectory would hold {numbers:.1e} numbers, about {:.0} GB",
+                (numbers * 2e-8).ceil()
+            );
+            return Err(mismatch(
+                what,
+                &reason,
+                &format!("a longer --every, or --every {every} if that is meant"),
+            ));
         }
         Ok(Self {
             method,
@@ -191,7 +211,11 @@ impl Plan {
             method: MethodId::Taylor,
             step: None,
             tolerance: Some(tolerance),
-            stabilization: if mechanism.constraints.is_empty() { Stabilization::None } else { usual(mechanism) },
+            stabilization: if mechanism.constraints.is_empty() {
+                Stabilization::None
+            } else {
+                usual(mechanism)
+            },
             time_constant: None,
             extended: false,
             in_double_double: false,
@@ -207,8 +231,8 @@ impl Plan {
         }
     }
 
-    /// The same to a later horizon \[s\], with the same output times up to the former one; false, and nothing changed, where they would be too many, or fixed
-    /// steps would not end there.
+    /// The same to a later horizon \[s\], with the same output times up to the former one; false, and nothing
+    /// changed, where they would be too many, or fixed steps would not end there.
     pub(super) fn extend(&mut self, until: f64) -> bool {
         let rows = rows(until, self.every);
         let is_whole = self.step.is_none_or(|step| is_whole(until, step));
@@ -225,12 +249,19 @@ impl Plan {
     /// Whether its numbers are such as [`Plan::new`] gives; a plan that was read from a file may hold any.
     pub(super) fn is_sound(&self) -> bool {
         let positive = |value: Option<f64>| value.is_none_or(|value| value > 0.0 && value.is_finite());
-        let tolerances = self.tolerance.is_none_or(|tolerance| positive(Some(tolerance.relative)) && positive(Some(tolerance.absolute)));
+        let tolerances = self
+            .tolerance
+            .is_none_or(|tolerance| positive(Some(tolerance.relative)) && positive(Some(tolerance.absolute)));
         let numbers = [Some(self.until), Some(self.every), self.step, self.time_constant];
         let given = if self.method.is_adaptive() { self.tolerance.is_some() } else { self.step.is_some() }
             && (self.stabilization != Stabilization::Baumgarte || self.time_constant.is_some());
-        let is_known = self.method == MethodId::Custom || super::methods::METHODS.iter().any(|info| info.id == self.method);
-        numbers.into_iter().all(positive) && tolerances && given && is_known && rows(self.until, self.every) == self.rows as f64
+        let is_known = self.method == MethodId::Custom
+            || super::methods::METHODS.iter().any(|info| info.id == self.method);
+        numbers.into_iter().all(positive)
+            && tolerances
+            && given
+            && is_known
+            && rows(self.until, self.every) == self.rows as f64
     }
 
     /// Time of output row `row`: a product, never a repeated sum.
@@ -256,17 +287,29 @@ impl Plan {
         };
         let setting = if self.extended { setting + "-extended" } else { setting };
         let keeps_rows = !mechanism.constraints.is_empty() && !matches!(self.method, MethodId::Rattle(_));
-        if keeps_rows { format!("{}-{setting}-{}", self.method, self.stabilization) } else { format!("{}-{setting}", self.method) }
+        if keeps_rows {
+            format!("{}-{setting}-{}", self.method, self.stabilization)
+        } else {
+            format!("{}-{setting}", self.method)
+        }
     }
 }
 
 /// Evaluations allowed up to a horizon \[s\] where nobody says how many.
 fn usual_max_evaluations(method: MethodId, until: f64) -> u64 {
-    (MAX_EVALUATIONS.0 + MAX_EVALUATIONS.1 * until).min(MOST_EVALUATIONS[usize::from(method == MethodId::Taylor)]) as u64
+    (MAX_EVALUATIONS.0 + MAX_EVALUATIONS.1 * until)
+        .min(MOST_EVALUATIONS[usize::from(method == MethodId::Taylor)]) as u64
 }
 
-/// What there is to say of a horizon \[s\] that lies beyond what the evaluations allowed can reach, where the scene's rates go up to `rate` \[rad/s\].
-fn cut_short(method: MethodId, step: Option<f64>, rate: f64, until: f64, max_evaluations: u64) -> Option<String> {
+/// What there is to say of a horizon \[s\] that lies beyond what the evaluations allowed can reach, where the
+/// scene's rates go up to `rate` \[rad/s\].
+fn cut_short(
+    method: MethodId,
+    step: Option<f64>,
+    rate: f64,
+    until: f64,
+    max_evaluations: u64,
+) -> Option<String> {
     let steps = step.map_or(until * rate / fast::radians_a_step(method), |step| until / step);
     let reached = max_evaluations as f64 / (steps * fast::evaluations_a_step(method)) * until;
     (reached < until).then(|| {
@@ -314,17 +357,30 @@ fn check_numbers(request: &Request) -> Result<(), Refusal> {
     if let (Some(method), true) = (request.method, request.rtol.is_some() || request.atol.is_some())
         && !method.is_adaptive()
     {
-        let reason = "a fixed-step symplectic method takes no tolerance: adapting the step destroys what it is for";
-        return Err(usage(&format!("{method} with a tolerance"), reason.into(), "give --step, or --method dop853 with the tolerance"));
+        let reason =
+            "a fixed-step symplectic method takes no tolerance: adapting the step destroys what it is for";
+        return Err(usage(
+            &format!("{method} with a tolerance"),
+            reason.into(),
+            "give --step, or --method dop853 with the tolerance",
+        ));
     }
     if let (Some(method), Some(_)) = (request.method, request.step)
         && method.is_adaptive()
     {
         let reason = "an adaptive method finds its own step";
-        return Err(usage(&format!("{method} with --step"), reason.into(), "give --rtol, or --method gauss16 with the step"));
+        return Err(usage(
+            &format!("{method} with --step"),
+            reason.into(),
+            "give --rtol, or --method gauss16 with the step",
+        ));
     }
     if request.step.is_some() && (request.rtol.is_some() || request.atol.is_some()) {
-        return Err(usage("--step with a tolerance", "a method takes one or the other".into(), "leave one of them out"));
+        return Err(usage(
+            "--step with a tolerance",
+            "a method takes one or the other".into(),
+            "leave one of them out",
+        ));
     }
     if request.time_constant.is_some() && request.stabilize != Some(Stabilization::Baumgarte) {
         let reason = "it is the time constant of Baumgarte's term, and of nothing else";
@@ -339,7 +395,11 @@ fn check_tolerances(request: &Request, method: MethodId, extended: bool) -> Resu
     for (option, value) in [("--rtol", request.rtol), ("--atol", request.atol)] {
         if let Some(value) = value.filter(|&value| !(least..=0.1).contains(&value)) {
             let by = if extended { format!("{method} --extended") } else { method.to_string() };
-            return Err(usage(option, format!("{value:e} is not within {least:e} to 0.1, what {by} takes"), "1e-9 is a good beginning"));
+            return Err(usage(
+                option,
+                format!("{value:e} is not within {least:e} to 0.1, what {by} takes"),
+                "1e-9 is a good beginning",
+            ));
         }
     }
     Ok(())
@@ -353,10 +413,15 @@ fn mismatch(what: String, reason: &str, alternative: &str) -> Refusal {
     Refusal { is_usage: false, what, reason: reason.into(), alternative: alternative.into() }
 }
 
-/// How the rows of a mechanism are kept where nobody says: given angles are eliminated where they are all there is to keep.
+/// How the rows of a mechanism are kept where nobody says: given angles are eliminated where they are all
+/// there is to keep.
 pub(super) fn usual(mechanism: &Mechanism) -> Stabilization {
     let is_large = mechanism.coordinates() > MANY_COORDINATES;
-    if mechanism.has_multipliers() || is_large { Stabilization::Projection } else { Stabilization::Elimination }
+    if mechanism.has_multipliers() || is_large {
+        Stabilization::Projection
+    } else {
+        Stabilization::Elimination
+    }
 }
 
 /// Very many coordinates are taken body by body or not at all.
@@ -365,13 +430,18 @@ fn check_size(mechanism: &Mechanism, method: MethodId, request: &Request) -> Res
         return Ok(());
     }
     let n = mechanism.coordinates();
-    let reason = format!("its matrices would hold {n} x {n} numbers, and at most {DENSE_LIMIT} coordinates have them");
+    let reason =
+        format!("its matrices would hold {n} x {n} numbers, and at most {DENSE_LIMIT} coordinates have them");
     let alternative = "--method dop853, or dp8 where constraints are to be kept";
     if !matches!(method, MethodId::Dopri5 | MethodId::Dop853 | MethodId::Dp5 | MethodId::Dp8) {
         return Err(mismatch(format!("{method} on {n} coordinates"), &reason, alternative));
     }
     if !mechanism.contacts.is_empty() {
-        return Err(mismatch(format!("walls on {n} coordinates"), &reason.replace("its", "an impact's"), "fewer bodies"));
+        return Err(mismatch(
+            format!("walls on {n} coordinates"),
+            &reason.replace("its", "an impact's"),
+            "fewer bodies",
+        ));
     }
     if !mechanism.constraints.is_empty() && request.stabilize == Some(Stabilization::Elimination) {
         return Err(mismatch(format!("elimination on {n} coordinates"), &reason, "--stabilize projection"));
@@ -379,16 +449,35 @@ fn check_size(mechanism: &Mechanism, method: MethodId, request: &Request) -> Res
     Ok(())
 }
 
-/// The mean force of a vibration is known to the explicit methods, and right where the vibration is much faster than all else.
-fn check_vibration(mechanism: &Mechanism, method: MethodId, rate: f64, notes: &mut Vec<String>) -> Result<(), Refusal> {
+/// The mean force of a vibration is known to the explicit methods, and right where the vibration is much
+/// faster than all else.
+fn check_vibration(
+    mechanism: &Mechanism,
+    method: MethodId,
+    rate: f64,
+    notes: &mut Vec<String>,
+) -> Result<(), Refusal> {
     let Some(Vibration { name, energy, frequency, .. }) = &mechanism.vibration else { return Ok(()) };
-    if !matches!(method, MethodId::Dopri5 | MethodId::Dop853 | MethodId::Dp5 | MethodId::Dp8 | MethodId::Radau(_)) {
+    if !matches!(
+        method,
+        MethodId::Dopri5 | MethodId::Dop853 | MethodId::Dp5 | MethodId::Dp8 | MethodId::Radau(_)
+    ) {
         let reason = "the mean force of its vibration comes from the mass matrix, of which this method knows no derivative";
-        return Err(mismatch(format!("{method} with the rigid spring `{name}`"), reason, "--method dp8, or dop853"));
+        return Err(mismatch(
+            format!("{method} with the rigid spring `{name}`"),
+            reason,
+            "--method dp8, or dop853",
+        ));
     }
     if *frequency < SEPARATE * rate {
-        let reason = format!("it vibrates at {frequency:.3e} rad/s, not {SEPARATE} times as fast as all else, up to {rate:.3e} rad/s");
-        return Err(mismatch(format!("the rigid spring `{name}`"), &reason, "leave its `model` out: it is soft enough to be resolved"));
+        let reason = format!(
+            "it vibrates at {frequency:.3e} rad/s, not {SEPARATE} times as fast as all else, up to {rate:.3e} rad/s"
+        );
+        return Err(mismatch(
+            format!("the rigid spring `{name}`"),
+            &reason,
+            "leave its `model` out: it is soft enough to be resolved",
+        ));
     }
     let share = energy / mechanism.energy_scale;
     notes.push(format!(
@@ -397,8 +486,9 @@ fn check_vibration(mechanism: &Mechanism, method: MethodId, rate: f64, notes: &m
     Ok(())
 }
 
-/// What rods instead of stiff springs may do to an angle \[rad\], about: a vibration acts by its mean up to the first order of slow over fast, a stretch that
-/// does not vibrate is of the second.  What grows in the motion grows with it.
+/// What rods instead of stiff springs may do to an angle \[rad\], about: a vibration acts by its mean up to
+/// the first order of slow over fast, a stretch that does not vibrate is of the second.  What grows in the
+/// motion grows with it.
 fn model_error(mechanism: &Mechanism, rate: f64, notes: &mut Vec<String>) -> Option<f64> {
     let share = rate / mechanism.rigid_rate?;
     let error = if mechanism.vibration.is_some() { 2.0 * share } else { share * share };
@@ -409,11 +499,20 @@ fn model_error(mechanism: &Mechanism, rate: f64, notes: &mut Vec<String>) -> Opt
 }
 
 /// The stabilization of a pairing, or why there is none.
-fn pair(mechanism: &Mechanism, method: MethodId, request: &Request, notes: &mut Vec<String>) -> Result<Stabilization, Refusal> {
+fn pair(
+    mechanism: &Mechanism,
+    method: MethodId,
+    request: &Request,
+    notes: &mut Vec<String>,
+) -> Result<Stabilization, Refusal> {
     check_size(mechanism, method, request)?;
-    if !mechanism.contacts.is_empty() && !matches!(method, MethodId::Dp5 | MethodId::Dp8 | MethodId::Taylor | MethodId::Radau(_)) {
+    if !mechanism.contacts.is_empty()
+        && !matches!(method, MethodId::Dp5 | MethodId::Dp8 | MethodId::Taylor | MethodId::Radau(_))
+    {
         let reason = match method {
-            MethodId::Dopri5 | MethodId::Dop853 => "ode_solvers does not let an impact be located inside its steps",
+            MethodId::Dopri5 | MethodId::Dop853 => {
+                "ode_solvers does not let an impact be located inside its steps"
+            }
             _ => "an impact inside a fixed step cannot be located without changing the step",
         };
         return Err(mismatch(
@@ -424,12 +523,20 @@ fn pair(mechanism: &Mechanism, method: MethodId, request: &Request, notes: &mut 
     }
     if matches!(method, MethodId::Rattle(_)) && mechanism.is_damped() {
         let reason = "RATTLE takes forces that depend on positions only, and a damper's does not";
-        return Err(mismatch(format!("{method} on a scene with dampers"), reason, "--method dop853, or gauss16 for a fixed step"));
+        return Err(mismatch(
+            format!("{method} on a scene with dampers"),
+            reason,
+            "--method dop853, or gauss16 for a fixed step",
+        ));
     }
     if matches!(method, MethodId::Rattle(_))
         && let Err(error) = Natural::new(std::sync::Arc::new(mechanism.clone()))
     {
-        return Err(mismatch(format!("{method} on this scene"), &error.to_string(), "--method dp8, or gauss16 for a fixed step"));
+        return Err(mismatch(
+            format!("{method} on this scene"),
+            &error.to_string(),
+            "--method dp8, or gauss16 for a fixed step",
+        ));
     }
     if mechanism.constraints.is_empty() {
         if request.stabilize.is_some_and(|kind| kind != Stabilization::None) {
@@ -439,10 +546,13 @@ fn pair(mechanism: &Mechanism, method: MethodId, request: &Request, notes: &mut 
     }
     let windowed = matches!(method, MethodId::Dopri5 | MethodId::Dop853);
     let Some(asked) = request.stabilize else {
-        let usual = if matches!(method, MethodId::Rattle(_)) { Stabilization::Projection } else { usual(mechanism) };
+        let usual =
+            if matches!(method, MethodId::Rattle(_)) { Stabilization::Projection } else { usual(mechanism) };
         if windowed && usual == Stabilization::Projection {
             let own = if method == MethodId::Dopri5 { "dp5" } else { "dp8" };
-            notes.push(format!("{method} takes no projection: constraints drift with its tolerance; {own} keeps them"));
+            notes.push(format!(
+                "{method} takes no projection: constraints drift with its tolerance; {own} keeps them"
+            ));
             return Ok(Stabilization::None);
         }
         return Ok(usual);
@@ -459,20 +569,41 @@ fn pair(mechanism: &Mechanism, method: MethodId, request: &Request, notes: &mut 
         (MethodId::Rattle(_), Stabilization::Projection) => Ok(asked),
         (MethodId::Rattle(_), _) => {
             let reason = "RATTLE keeps every row at both levels by its own projection";
-            Err(mismatch(format!("{method} with --stabilize {asked}"), reason, "leave --stabilize out, or --method dp8"))
+            Err(mismatch(
+                format!("{method} with --stabilize {asked}"),
+                reason,
+                "leave --stabilize out, or --method dp8",
+            ))
         }
-        (MethodId::Gauss(_), Stabilization::Projection) if usual(mechanism) == Stabilization::Projection => Ok(asked),
-        (MethodId::Gauss(_), Stabilization::None | Stabilization::Baumgarte) if usual(mechanism) == Stabilization::Projection => {
+        (MethodId::Gauss(_), Stabilization::Projection) if usual(mechanism) == Stabilization::Projection => {
+            Ok(asked)
+        }
+        (MethodId::Gauss(_), Stabilization::None | Stabilization::Baumgarte)
+            if usual(mechanism) == Stabilization::Projection =>
+        {
             let reason = "a Gauss method keeps loops and sliders by symmetric projection, and nothing else keeps its energy";
-            Err(mismatch(format!("{method} with --stabilize {asked}"), reason, "--stabilize projection, or --method dp8"))
+            Err(mismatch(
+                format!("{method} with --stabilize {asked}"),
+                reason,
+                "--stabilize projection, or --method dp8",
+            ))
         }
         (MethodId::Gauss(_), Stabilization::None | Stabilization::Baumgarte | Stabilization::Projection) => {
             let reason = "Gauss methods are symplectic in coordinates and momenta, where a motor's angle is eliminated";
-            Err(mismatch(format!("{method} with --stabilize {asked}"), reason, "--stabilize elimination, or --method dp8"))
+            Err(mismatch(
+                format!("{method} with --stabilize {asked}"),
+                reason,
+                "--stabilize elimination, or --method dp8",
+            ))
         }
         (MethodId::Taylor, Stabilization::Baumgarte) => {
-            let reason = "the series is that of the constrained motion, which has nothing to be pulled back from";
-            Err(mismatch(format!("{method} with --stabilize {asked}"), reason, "--stabilize projection or elimination, or --method dp8"))
+            let reason =
+                "the series is that of the constrained motion, which has nothing to be pulled back from";
+            Err(mismatch(
+                format!("{method} with --stabilize {asked}"),
+                reason,
+                "--stabilize projection or elimination, or --method dp8",
+            ))
         }
         (MethodId::Dopri5 | MethodId::Dop853, Stabilization::Projection) => {
             let own = if method == MethodId::Dopri5 { "dp5" } else { "dp8" };
@@ -506,18 +637,26 @@ fn fixed_step(
         let whole = (until / *every - intervals).abs() <= 1e-9 * intervals;
         if !whole {
             *every = until / (until / *every).ceil();
-            notes.push(format!("the output interval is {every} s, so that the fixed steps end on the horizon"));
+            notes.push(format!(
+                "the output interval is {every} s, so that the fixed steps end on the horizon"
+            ));
         }
         // Halves of the output interval are exact, so that its multiples are met to the last bit.
         let halvings = libm::log2(*every * rate / share).round().max(0.0);
         return Ok(*every / libm::exp2(halvings));
     };
     if asked > until * (1.0 + 1e-9) {
-        return Err(usage("--step", format!("{asked} s is longer than the horizon, {until} s"), "a shorter step"));
+        return Err(usage(
+            "--step",
+            format!("{asked} s is longer than the horizon, {until} s"),
+            "a shorter step",
+        ));
     }
     let step = if is_whole(until, asked) { asked } else { until / (until / asked).ceil() };
     if step != asked {
-        notes.push(format!("the step is {step} s instead of {asked} s, so that whole steps end on the horizon"));
+        notes.push(format!(
+            "the step is {step} s instead of {asked} s, so that whole steps end on the horizon"
+        ));
     }
     let stride = (*every / step).round().max(1.0);
     if (stride * step - *every).abs() > 1e-9 * *every {
@@ -527,7 +666,8 @@ fn fixed_step(
     Ok(step)
 }
 
-/// An upper estimate of the fastest rate of the scene \[rad/s\]: what the energy at the start allows the lightest part, gravity, springs and motors.
+/// An upper estimate of the fastest rate of the scene \[rad/s\]: what the energy at the start allows the
+/// lightest part, gravity, springs and motors.
 fn fastest_rate(scene: &Scene, mechanism: &Mechanism) -> f64 {
     let start = mechanism.start(scene);
     let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
@@ -537,21 +677,37 @@ fn fastest_rate(scene: &Scene, mechanism: &Mechanism) -> f64 {
     kernel.factor::<0>(mechanism, &omega);
     // The mobility of an origin along its way counts as that of a turn at the unit of length.
     let unit = |k: usize| if k < mechanism.bodies.len() { 1.0 } else { mechanism.units.length };
-    let lightest = kernel.pivot.iter().enumerate().fold(0.0, |most: f64, (k, &pivot)| most.max(pivot / (unit(k) * unit(k))));
-    let gravity: f64 = mechanism.tree.weight[..mechanism.bodies.len()].iter().map(|weight| weight.norm_squared().sqrt()).sum();
+    let lightest = kernel
+        .pivot
+        .iter()
+        .enumerate()
+        .fold(0.0, |most: f64, (k, &pivot)| most.max(pivot / (unit(k) * unit(k))));
+    let gravity: f64 = mechanism.tree.weight[..mechanism.bodies.len()]
+        .iter()
+        .map(|weight| weight.norm_squared().sqrt())
+        .sum();
     let available = (energy.total() - mechanism.ground_energy + gravity).max(0.0);
     let springs: f64 = mechanism
         .springs
         .iter()
-        .map(|spring| spring.stiffness * spring.span.terms.iter().map(|term| term.1.norm_squared()).sum::<f64>())
+        .map(|spring| {
+            spring.stiffness * spring.span.terms.iter().map(|term| term.1.norm_squared()).sum::<f64>()
+        })
         .sum();
     let drives: f64 = scene
         .motors
         .iter()
         .map(|motor| {
-            motor.law.rate.abs() + motor.law.sines.iter().map(|sine| sine.frequency.abs() * (1.0 + sine.amplitude.abs())).sum::<f64>()
+            motor.law.rate.abs()
+                + motor
+                    .law
+                    .sines
+                    .iter()
+                    .map(|sine| sine.frequency.abs() * (1.0 + sine.amplitude.abs()))
+                    .sum::<f64>()
         })
         .sum();
     let spinning = omega.iter().fold(0.0, |most: f64, omega| most.max(omega.abs()));
-    (((2.0 * available + gravity + springs) * lightest).sqrt()).max(spinning).max(1e-3 / mechanism.units.time) + drives
+    (((2.0 * available + gravity + springs) * lightest).sqrt()).max(spinning).max(1e-3 / mechanism.units.time)
+        + drives
 }

@@ -1,7 +1,8 @@
 //! The reference motion of a scene: by the power series in double-double, from the bits its runs start from.
 //!
-//! A second motion of lower order tells how far the first is to be believed.  Both share the scene's constants, rounded to doubles as every run has them:
-//! against tables made from exact decimals they differ by what that rounding makes of the motion.
+//! A second motion of lower order tells how far the first is to be believed.  Both share the scene's
+//! constants, rounded to doubles as every run has them: against tables made from exact decimals they differ
+//! by what that rounding makes of the motion.
 //!
 //! Impacts are located in doubles.  Scenes with walls have references of that accuracy, and say so.
 
@@ -27,8 +28,8 @@ const LOCATED_TO: f64 = 1e-14;
 pub struct Reference {
     /// Positions and rates, in double-double.
     pub motions: Vec<Motion>,
-    /// About how far each is off, as far as the second motion tells: the largest difference of an angle \[rad\], a position over the longest bar, or the
-    /// rate of one of them \[1/s\].
+    /// About how far each is off, as far as the second motion tells: the largest difference of an angle
+    /// \[rad\], a position over the longest bar, or the rate of one of them \[1/s\].
     pub accuracy: Vec<f64>,
 }
 
@@ -51,7 +52,8 @@ pub struct Reference {
 /// ```
 ///
 /// # Errors
-/// The stop of the series: a number that is not finite, a time before the start, a singular position it does not get through.
+/// The stop of the series: a number that is not finite, a time before the start, a singular position it does
+/// not get through.
 pub fn reference(mechanism: &Arc<Mechanism>, start: &Motion, times: &[Time]) -> Result<Reference, StepError> {
     let (found, stop) = reference_while(mechanism, start, times, &mut || false)?;
     stop.map_or(Ok(found), Err)
@@ -72,10 +74,16 @@ pub(super) fn reference_while(
         Err(StepError { cause, method: "taylor".into(), t, step: 0.0, what: what.into(), hint: hint.into() })
     };
     if !mechanism.tree.is_dense() {
-        return unsuited("a series takes the matrices of the tree, which are too large here", "compare with dop853 at a tighter tolerance");
+        return unsuited(
+            "a series takes the matrices of the tree, which are too large here",
+            "compare with dop853 at a tighter tolerance",
+        );
     }
     if mechanism.vibration.is_some() {
-        return unsuited("the mean force of a rigid spring's vibration has no series", "compare with dop853 at a tighter tolerance");
+        return unsuited(
+            "the mean force of a rigid spring's vibration has no series",
+            "compare with dop853 at a tighter tolerance",
+        );
     }
     if !std::iter::once(&start.time).chain(times).is_sorted() {
         return unsuited("a time lies behind the one before it", "ask for times in ascending order");
@@ -85,11 +93,13 @@ pub(super) fn reference_while(
         let walks = EXACT.map(|(order, tolerance)| Walk::exact(mechanism, start, order, tolerance, horizon));
         return Ok(side_by_side(mechanism, walks, times, 0.0, pause));
     }
-    let [fine, coarse] = LOCATED.map(|tolerance| Walk::in_doubles(mechanism, start, MethodId::Taylor, tolerance, horizon));
+    let [fine, coarse] =
+        LOCATED.map(|tolerance| Walk::in_doubles(mechanism, start, MethodId::Taylor, tolerance, horizon));
     Ok(side_by_side(mechanism, [fine?, coarse?], times, LOCATED_TO, pause))
 }
 
-/// Two motions of one mechanism, of which the first counts and the second tells how far it is off, `floor` at least: as far as both get, and what stopped them.
+/// Two motions of one mechanism, of which the first counts and the second tells how far it is off, `floor` at
+/// least: as far as both get, and what stopped them.
 pub(super) fn side_by_side(
     mechanism: &Mechanism,
     mut walks: [Walk; 2],
@@ -103,7 +113,9 @@ pub(super) fn side_by_side(
         let [one, other] = &mut walks;
         match one.to(time, pause).and_then(|one| Ok((one, other.to(time, pause)?))) {
             Ok((Some(one), Some(other))) => {
-                found.accuracy.push(ruler.apart(&one, &other).max(ruler.rates_apart(&one, &other)).max(floor));
+                found
+                    .accuracy
+                    .push(ruler.apart(&one, &other).max(ruler.rates_apart(&one, &other)).max(floor));
                 found.motions.push(one);
             }
             Ok(_) => return (found, None),
@@ -122,7 +134,13 @@ pub(super) enum Walk {
 }
 
 impl Walk {
-    fn exact(mechanism: &Arc<Mechanism>, start: &Motion, order: usize, tolerance: f64, horizon: Time) -> Self {
+    fn exact(
+        mechanism: &Arc<Mechanism>,
+        start: &Motion,
+        order: usize,
+        tolerance: f64,
+        horizon: Time,
+    ) -> Self {
         Self::Exact(exact(mechanism, start, order, tolerance), horizon)
     }
 

@@ -1,4 +1,5 @@
-//! The loop: from output time to output time, with limits watched; a run can pause in it, be taken down and go on elsewhere.
+//! The loop: from output time to output time, with limits watched; a run can pause in it, be taken down and
+//! go on elsewhere.
 
 use super::build::build;
 use super::clock::{Clock, still};
@@ -31,7 +32,8 @@ pub struct Run {
     limits: Limits,
     driver: Box<dyn Driver>,
     turns: Turns,
-    /// For runs of an ensemble, which look for bars that turn over and keep no samples: whether they end with the first.
+    /// For runs of an ensemble, which look for bars that turn over and keep no samples: whether they end with
+    /// the first.
     ensemble: Option<bool>,
     error_estimator: Option<ErrorEstimator>,
     events: Vec<Box<dyn Event>>,
@@ -64,7 +66,8 @@ pub struct Outcome {
     pub persistent_contact_count: u64,
     /// Time spent so, summed over the points \[s\].
     pub persistent_contact_time: f64,
-    /// Time spent between the first output time and the last, pauses and the reference solution left out; zero where nobody [times](Run::timed) the run.
+    /// Time spent between the first output time and the last, pauses and the reference solution left out;
+    /// zero where nobody [times](Run::timed) the run.
     pub wall: Duration,
     /// Time the reference solution took.
     pub trust_wall: Duration,
@@ -134,7 +137,12 @@ impl Run {
     ///
     /// # Errors
     /// A method that cannot begin there.
-    pub fn new(mechanism: Arc<Mechanism>, mut plan: Plan, limits: Limits, start: &Motion) -> Result<Self, StepError> {
+    pub fn new(
+        mechanism: Arc<Mechanism>,
+        mut plan: Plan,
+        limits: Limits,
+        start: &Motion,
+    ) -> Result<Self, StepError> {
         let mut driver = build(&mechanism, &mut plan, start)?;
         driver.allow(plan.max_evaluations);
         let turns = Turns::new(&mechanism, &plan, start);
@@ -157,7 +165,8 @@ impl Run {
     /// Nothing of the run itself changes by it, to the last bit.
     #[must_use]
     pub fn trusted(self, level: Level, start: &Motion) -> Self {
-        let error_estimator = (level != Level::Off).then(|| ErrorEstimator::new(&self.mechanism, &self.plan, start, level));
+        let error_estimator =
+            (level != Level::Off).then(|| ErrorEstimator::new(&self.mechanism, &self.plan, start, level));
         Self { error_estimator, ..self }
     }
 
@@ -187,8 +196,13 @@ impl Run {
 /// A scene from its start to its horizon in one call: compiles, plans, integrates.
 ///
 /// # Errors
-/// Whatever keeps it from beginning, and what the observer failed with; a stop on the way is part of the [`Outcome`].
-pub fn simulate(scene: &Scene, request: &Request, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>) -> Result<Outcome, RunError> {
+/// Whatever keeps it from beginning, and what the observer failed with; a stop on the way is part of the
+/// [`Outcome`].
+pub fn simulate(
+    scene: &Scene,
+    request: &Request,
+    observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>,
+) -> Result<Outcome, RunError> {
     let mechanism = Arc::new(Mechanism::new(scene)?);
     let plan = Plan::new(scene, &mechanism, request)?;
     let start = mechanism.start(scene);
@@ -201,7 +215,10 @@ pub fn simulate(scene: &Scene, request: &Request, observer: &mut dyn FnMut(&Samp
 ///
 /// # Errors
 /// What the observer failed with.
-pub fn integrate(run: Run, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>) -> Result<Outcome, RunError> {
+pub fn integrate(
+    run: Run,
+    observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>,
+) -> Result<Outcome, RunError> {
     let mut running = Running::new(run);
     running.go(observer, &mut || false)?;
     Ok(running.finish())
@@ -297,10 +314,12 @@ impl Snapshot {
         self.outcome.plan.max_evaluations = max_evaluations;
     }
 
-    /// The same on the way to a later horizon \[s\]; false, and nothing changed, where that is not later or would write too many rows.
+    /// The same on the way to a later horizon \[s\]; false, and nothing changed, where that is not later or
+    /// would write too many rows.
     ///
-    /// What follows is what a run to that horizon would have come to, but for the slopes of its drift: monitors divide the horizon into intervals, and those
-    /// seen before are taken over as they are.  A dense method that had already cut a step to fit the former horizon keeps that step.
+    /// What follows is what a run to that horizon would have come to, but for the slopes of its drift:
+    /// monitors divide the horizon into intervals, and those seen before are taken over as they are.  A dense
+    /// method that had already cut a step to fit the former horizon keeps that step.
     pub fn extend(&mut self, until: f64) -> bool {
         let is_possible = until > self.outcome.plan.until && self.outcome.plan.extend(until);
         if is_possible {
@@ -316,9 +335,12 @@ impl Snapshot {
     fn fits(&self, mechanism: &Mechanism) -> bool {
         let Outcome { plan, last, drift, trace, holds, .. } = &self.outcome;
         let (n, bars, rows) = (mechanism.coordinates(), mechanism.bodies.len(), mechanism.constraints.len());
-        let sizes =
-            |sample: &Sample| (sample.phi.len(), sample.omega.len(), sample.constraints.len(), sample.motors.len()) == (n, n, rows, rows);
-        let whole = |sample: &Sample| sizes(sample) && (sample.centre.len(), sample.velocity.len()) == (bars, bars);
+        let sizes = |sample: &Sample| {
+            (sample.phi.len(), sample.omega.len(), sample.constraints.len(), sample.motors.len())
+                == (n, n, rows, rows)
+        };
+        let whole =
+            |sample: &Sample| sizes(sample) && (sample.centre.len(), sample.velocity.len()) == (bars, bars);
         plan.is_sound()
             && self.row <= plan.rows
             && self.horizon <= plan.until
@@ -333,7 +355,8 @@ impl Snapshot {
 impl Running {
     /// Begins a run: whatever touches and moves into its wall at the start is struck.
     pub fn new(run: Run) -> Self {
-        let Run { mechanism, plan, limits, driver, turns, ensemble, error_estimator, events, clock, begun } = run;
+        let Run { mechanism, plan, limits, driver, turns, ensemble, error_estimator, events, clock, begun } =
+            run;
         let mut outcome = Outcome::begun(&mechanism, plan);
         let detector = (!events.is_empty()).then(|| EventDetector::new(Arc::clone(&mechanism), events));
         let mut contact_driver = ContactDriver::new(mechanism, driver);
@@ -361,19 +384,28 @@ impl Running {
     ///
     /// # Errors
     /// The snapshot is one of another mechanism, or of a program whose numbers differ.
-    pub fn resume(mechanism: Arc<Mechanism>, start: &Motion, snapshot: Snapshot) -> Result<Self, ResumeError> {
+    pub fn resume(
+        mechanism: Arc<Mechanism>,
+        start: &Motion,
+        snapshot: Snapshot,
+    ) -> Result<Self, ResumeError> {
         if !snapshot.fits(&mechanism) {
             return Err(ResumeError::Misfit);
         }
-        let Snapshot { limits, contact_state, mut outcome, row, resting, horizon, error_estimator } = snapshot;
+        let Snapshot { limits, contact_state, mut outcome, row, resting, horizon, error_estimator } =
+            snapshot;
         outcome.drift.kind = Drift::new(&mechanism, outcome.plan.until).kind;
         let error_estimator = match error_estimator {
-            Some(kept) => Some(ErrorEstimator::resume(&mechanism, &outcome.plan, start, kept, horizon.into())?.ok_or(ResumeError::Misfit)?),
+            Some(kept) => Some(
+                ErrorEstimator::resume(&mechanism, &outcome.plan, start, kept, horizon.into())?
+                    .ok_or(ResumeError::Misfit)?,
+            ),
             None => None,
         };
         let turns = Turns::new(&mechanism, &outcome.plan, start);
         let contact_driver =
-            ContactDriver::resume(mechanism, &outcome.plan, start, contact_state, horizon.into())?.ok_or(ResumeError::Misfit)?;
+            ContactDriver::resume(mechanism, &outcome.plan, start, contact_state, horizon.into())?
+                .ok_or(ResumeError::Misfit)?;
         let begun = (row == 0).then(|| start.clone());
         Ok(Self {
             limits,
@@ -432,20 +464,27 @@ impl Running {
         self.outcome.last.t
     }
 
-    /// Integrates on until it is over (true), or `pause`, asked after every step and every row, wants it to pause (false).
+    /// Integrates on until it is over (true), or `pause`, asked after every step and every row, wants it to
+    /// pause (false).
     ///
-    /// `dopri5` and `dop853` show no steps but the ends of their windows, which are the output times.  Where it paused changes nothing of what follows.
+    /// `dopri5` and `dop853` show no steps but the ends of their windows, which are the output times.  Where
+    /// it paused changes nothing of what follows.
     ///
     /// # Errors
     /// What the observer failed with; the run cannot go on then.
-    pub fn go(&mut self, observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>, pause: &mut Pause) -> Result<bool, RunError> {
+    pub fn go(
+        &mut self,
+        observer: &mut dyn FnMut(&Sample) -> std::io::Result<()>,
+        pause: &mut Pause,
+    ) -> Result<bool, RunError> {
         let (begin, before) = ((self.clock)(), self.outcome.trust_wall);
         let is_over = self.rows(observer, None, pause);
         self.outcome.wall += ((self.clock)() - begin).saturating_sub(self.outcome.trust_wall - before);
         is_over
     }
 
-    /// The same for an [`Observer`], which sees steps and samples and may end the run: its outcome is kept, and says so.
+    /// The same for an [`Observer`], which sees steps and samples and may end the run: its outcome is kept,
+    /// and says so.
     pub fn go_observed(&mut self, observer: &mut dyn Observer, pause: &mut Pause) -> bool {
         let (begin, before) = ((self.clock)(), self.outcome.trust_wall);
         let wants_steps = observer.wants_steps();
@@ -482,8 +521,15 @@ impl Running {
                 Some(stop) => Err(stop),
                 None if self.row == 0 => Ok(true),
                 None => {
-                    let monitor = error_estimator.as_mut().map(|error_estimator| error_estimator as &mut dyn Monitor);
-                    contact_driver.go_watched(outcome.plan.time(self.row), outcome, monitor, steps.as_deref_mut(), pause)
+                    let monitor =
+                        error_estimator.as_mut().map(|error_estimator| error_estimator as &mut dyn Monitor);
+                    contact_driver.go_watched(
+                        outcome.plan.time(self.row),
+                        outcome,
+                        monitor,
+                        steps.as_deref_mut(),
+                        pause,
+                    )
                 }
             };
             if let Some(error_estimator) = error_estimator {
@@ -493,7 +539,8 @@ impl Running {
                 return Ok(false);
             }
             outcome.ended_by = contact_driver.ended_by.take();
-            let (has_closed_loops, steps_made) = (contact_driver.has_closed_loops(), contact_driver.statistics().steps);
+            let (has_closed_loops, steps_made) =
+                (contact_driver.has_closed_loops(), contact_driver.statistics().steps);
             let moved = begun.take().and_then(|begun| contact_driver.begun_elsewhere(&begun, outcome));
             let sample = contact_driver.sample();
             // A stop before any progress leaves the state of the row before.
@@ -511,16 +558,23 @@ impl Running {
                 .or_else(|| (!sample.is_finite()).then(|| not_finite(&outcome.plan, sample.t)))
                 .or_else(|| uncounted(&outcome.plan, sample))
                 .or_else(|| turns.lost(&outcome.plan, sample))
-                .or_else(|| if has_closed_loops { came_apart(&outcome.plan, &outcome.drift, sample) } else { None })
+                .or_else(|| {
+                    if has_closed_loops { came_apart(&outcome.plan, &outcome.drift, sample) } else { None }
+                })
                 .or_else(|| exceeded.err().map(|what| drift_stop(&outcome.plan, sample.t, what)));
             outcome.last.clone_from(sample);
             // A dense method is ahead of what it shows.
             let reached = outcome.last.t;
-            outcome.flip = contact_driver.flips.as_ref().and_then(|flips| flips.flip).filter(|flip| flip.t <= reached);
+            outcome.flip =
+                contact_driver.flips.as_ref().and_then(|flips| flips.flip).filter(|flip| flip.t <= reached);
             self.row += 1;
             let has_flipped = *ensemble == Some(true) && outcome.flip.is_some();
-            self.is_over = outcome.stop.is_some() || outcome.ended_by.is_some() || has_flipped || self.row > outcome.plan.rows;
-            if let Some(error_estimator) = error_estimator.as_mut().filter(|_| self.is_over || self.row == 1) {
+            self.is_over = outcome.stop.is_some()
+                || outcome.ended_by.is_some()
+                || has_flipped
+                || self.row > outcome.plan.rows;
+            if let Some(error_estimator) = error_estimator.as_mut().filter(|_| self.is_over || self.row == 1)
+            {
                 error_estimator.observe(contact_driver.shown(), contact_driver.statistics());
                 outcome.trust_wall += error_estimator.take_wall();
             }
@@ -531,10 +585,13 @@ impl Running {
         Ok(true)
     }
 
-    /// Integrates to the horizon without a look at what there is to see at the output times: all that the method itself costs.  False where it paused or stopped.
+    /// Integrates to the horizon without a look at what there is to see at the output times: all that the
+    /// method itself costs.  False where it paused or stopped.
     pub(super) fn run_unsampled(&mut self, pause: &mut Pause) -> bool {
         let Self { contact_driver, outcome, resting, .. } = self;
-        resting.is_none() && (1..=outcome.plan.rows).all(|row| contact_driver.go(outcome.plan.time(row), outcome, pause) == Ok(true))
+        resting.is_none()
+            && (1..=outcome.plan.rows)
+                .all(|row| contact_driver.go(outcome.plan.time(row), outcome, pause) == Ok(true))
     }
 
     /// The motion at the last output time, to the last digit.
@@ -548,7 +605,9 @@ impl Running {
         self.outcome.statistics = self.contact_driver.statistics();
         let Statistics { steps, newton_steps, .. } = self.outcome.statistics;
         if newton_steps > 0 {
-            let note = format!("{newton_steps} of {steps} steps found their stages by Newton's method: sweeps contract slowly there");
+            let note = format!(
+                "{newton_steps} of {steps} steps found their stages by Newton's method: sweeps contract slowly there"
+            );
             self.outcome.plan.notes.push(note);
         }
         if self.outcome.drift.is_doubtful() {
@@ -559,10 +618,9 @@ impl Running {
                 .notes
                 .push(format!("the energy balance is off by {off:.1e} of its scale, and the motion may be off by more: try {how}"));
         }
-        self.outcome.trust = self
-            .error_estimator
-            .take()
-            .map(|error_estimator| error_estimator.trust(self.outcome.last.t).with_model(self.outcome.plan.model_error));
+        self.outcome.trust = self.error_estimator.take().map(|error_estimator| {
+            error_estimator.trust(self.outcome.last.t).with_model(self.outcome.plan.model_error)
+        });
         self.outcome
     }
 }
@@ -581,14 +639,19 @@ fn advised(stop: StepError, has_closed_loops: bool) -> StepError {
     if stop.cause != Cause::StepTooSmall || !has_closed_loops {
         return stop;
     }
-    let hint = if stop.method == "taylor" { "--method dp8 with --stabilize projection" } else { "--method taylor" };
-    StepError { hint: format!("a singular position of the constraints may be near: {hint}, or another tolerance"), ..stop }
+    let hint =
+        if stop.method == "taylor" { "--method dp8 with --stabilize projection" } else { "--method taylor" };
+    StepError {
+        hint: format!("a singular position of the constraints may be near: {hint}, or another tolerance"),
+        ..stop
+    }
 }
 
-/// Loops and sliders that nothing projects let go at singular positions, and the motion goes on smoothly on another branch: such a run is no success.
+/// Loops and sliders that nothing projects let go at singular positions, and the motion goes on smoothly on
+/// another branch: such a run is no success.
 fn came_apart(plan: &Plan, drift: &Drift, sample: &Sample) -> Option<StepError> {
-    let is_loose =
-        matches!(plan.stabilization, Stabilization::None | Stabilization::Baumgarte) && !matches!(plan.method, MethodId::Rattle(_));
+    let is_loose = matches!(plan.stabilization, Stabilization::None | Stabilization::Baumgarte)
+        && !matches!(plan.method, MethodId::Rattle(_));
     let off = sample.imbalance.abs();
     let weakest = drift.constraints.get(sample.weakest).map_or("", |(name, _)| name);
     (is_loose && off > drift.apart()).then(|| StepError {
@@ -620,13 +683,31 @@ fn uncounted(plan: &Plan, sample: &Sample) -> Option<StepError> {
 fn not_finite(plan: &Plan, t: f64) -> StepError {
     let what = "energies, torques or velocities are beyond the numbers a double holds".into();
     let hint = "look for masses, rates or stiffnesses far out of proportion".into();
-    StepError { cause: Cause::NotFinite, method: plan.method.to_string(), t, step: plan.step.unwrap_or(0.0), what, hint }
+    StepError {
+        cause: Cause::NotFinite,
+        method: plan.method.to_string(),
+        t,
+        step: plan.step.unwrap_or(0.0),
+        what,
+        hint,
+    }
 }
 
 fn drift_stop(plan: &Plan, t: f64, what: String) -> StepError {
     let hint = match plan.step {
-        Some(_) => "shorten the step, or state another limit with --max-energy-drift or --max-constraint-drift",
-        None => "tighten the tolerance, or state another limit with --max-energy-drift or --max-constraint-drift",
+        Some(_) => {
+            "shorten the step, or state another limit with --max-energy-drift or --max-constraint-drift"
+        }
+        None => {
+            "tighten the tolerance, or state another limit with --max-energy-drift or --max-constraint-drift"
+        }
     };
-    StepError { cause: Cause::DriftLimit, method: plan.method.to_string(), t, step: plan.step.unwrap_or(0.0), what, hint: hint.into() }
+    StepError {
+        cause: Cause::DriftLimit,
+        method: plan.method.to_string(),
+        t,
+        step: plan.step.unwrap_or(0.0),
+        what,
+        hint: hint.into(),
+    }
 }

@@ -1,7 +1,7 @@
 //! What there is to know of a moment: positions, energies, constraints, motors.
 //!
-//! Energies and constraints are evaluated in double-double, so that what is reported is the run's drift and not the
-//! rounding of its measurement.
+//! Energies and constraints are evaluated in double-double, so that what is reported is the run's drift and
+//! not the rounding of its measurement.
 
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::dynamics::constraint::Posture;
@@ -38,12 +38,13 @@ pub struct Sample {
     pub imbalance: f64,
     /// Violation of each row, C and C'.
     pub constraints: Vec<[f64; 2]>,
-    /// The least singular value of the rows' Jacobian over the largest where it is small, else not a number; and the row that loses its hold there.
+    /// The least singular value of the rows' Jacobian over the largest where it is small, else not a number;
+    /// and the row that loses its hold there.
     pub singular: f64,
     /// See [`Sample::singular`].
     pub weakest: usize,
-    /// Torque \[N·m\] on the driven body, or force \[N\] along the rail on the point that slides, and power \[W\] of each row that a motor, lock or weld
-    /// keeps at a law; zeros for others.
+    /// Torque \[N·m\] on the driven body, or force \[N\] along the rail on the point that slides, and power
+    /// \[W\] of each row that a motor, lock or weld keeps at a law; zeros for others.
     pub motors: Vec<[f64; 2]>,
 }
 
@@ -78,7 +79,12 @@ impl Sample {
     pub fn is_finite(&self) -> bool {
         let scalars = [self.t, self.kinetic, self.potential, self.work, self.stabilizer, self.imbalance];
         let vectors = [&self.centre, &self.velocity, &self.constraints, &self.motors];
-        scalars.iter().chain(&self.phi).chain(&self.omega).chain(vectors.into_iter().flatten().flatten()).all(|x| x.is_finite())
+        scalars
+            .iter()
+            .chain(&self.phi)
+            .chain(&self.omega)
+            .chain(vectors.into_iter().flatten().flatten())
+            .all(|x| x.is_finite())
     }
 }
 
@@ -132,7 +138,8 @@ impl Sampler {
         self.holding = mechanism;
     }
 
-    /// From here on energies are those of `free`, the same mechanism with other parts that act, and forces those of `holding`.
+    /// From here on energies are those of `free`, the same mechanism with other parts that act, and forces
+    /// those of `holding`.
     pub fn exchange(&mut self, free: Arc<Mechanism>, holding: Arc<Mechanism>) {
         self.mechanism = free;
         self.hold(holding);

@@ -1,8 +1,10 @@
-//! Springs that lose their length on the way: their force has no direction there, and a step can leap over the place without a trace.
+//! Springs that lose their length on the way: their force has no direction there, and a step can leap over
+//! the place without a trace.
 //!
-//! A power series takes sqrt(|D|²) through zero to a negative length, and a fixed step does not see the jump of the force at all; both come out on the other
-//! side with another energy, or nearly the same.  Where the two ends of a spring with a free length can meet, every step is looked at, by the [search](crate::stepping::search) for all events on its
-//! dense output, of the squared length
+//! A power series takes sqrt(|D|²) through zero to a negative length, and a fixed step does not see the jump
+//! of the force at all; both come out on the other side with another energy, or nearly the same.  Where the
+//! two ends of a spring with a free length can meet, every step is looked at, by the
+//! [search](crate::stepping::search) for all events on its dense output, of the squared length
 //!
 //! ```text
 //! g = |D|² - (1e-6 L0)²,     |g''| <= 2 |D'|² + 2 |D| |D''|
@@ -18,7 +20,8 @@ use crate::stepping::{Cause, Integrator, Statistics, StepError};
 
 /// A length below this share of the free length is none.
 const NONE: f64 = 1e-6;
-/// Degrees of the interpolants of a span inside a step, and what the last coefficients may be of the free length.
+/// Degrees of the interpolants of a span inside a step, and what the last coefficients may be of the free
+/// length.
 const DEGREES: [usize; 3] = [8, 16, 32];
 const RESOLVED: f64 = 1e-9;
 
@@ -71,12 +74,21 @@ impl<P: Form + ?Sized> Shrinking<P> {
 }
 
 /// D and D' of a spring of a mechanism \[m, m/s\].
-fn span(mechanism: &Mechanism, number: usize, at: &BodyAngles, z: &mut Vec<Complex<f64>>) -> [Complex<f64>; 2] {
+fn span(
+    mechanism: &Mechanism,
+    number: usize,
+    at: &BodyAngles,
+    z: &mut Vec<Complex<f64>>,
+) -> [Complex<f64>; 2] {
     let (spring, bodies) = (&mechanism.springs[number], mechanism.bodies.len());
     z.clear();
     z.extend(at.phi[..bodies].iter().map(|&phi| Complex::unit(phi)));
-    // The translational coordinates of bodies that hang on nothing are where the first of their coordinates is.
-    z.extend((bodies..at.phi.len()).map(|x| Complex::new(at.phi[x], at.phi.get(x + 1).copied().unwrap_or_default())));
+    // The translational coordinates of bodies that hang on nothing are where the first of their coordinates
+    // is.
+    z.extend(
+        (bodies..at.phi.len())
+            .map(|x| Complex::new(at.phi[x], at.phi.get(x + 1).copied().unwrap_or_default())),
+    );
     [spring.span.position(z), spring.span.velocity(z, &at.omega)]
 }
 
@@ -95,11 +107,17 @@ impl Curve for Length {
         let bend = libm::hypot(x.bend, y.bend);
         let speed = libm::hypot(x.slope, y.slope) + bend * radius;
         let length = libm::hypot(x.value, y.value) + speed * radius;
-        Part { value, slope, bend: 2.0 * (speed * speed + length * bend), rounding: length * (x.rounding + y.rounding) }
+        Part {
+            value,
+            slope,
+            bend: 2.0 * (speed * speed + length * bend),
+            rounding: length * (x.rounding + y.rounding),
+        }
     }
 }
 
-/// True where the ends of a spring may meet in a step, if they are at most twice as fast on the way as at its ends.
+/// True where the ends of a spring may meet in a step, if they are at most twice as fast on the way as at its
+/// ends.
 fn can_meet(a: [Complex<f64>; 2], b: [Complex<f64>; 2], time: f64) -> bool {
     let size = |x: Complex<f64>| x.norm_squared().sqrt();
     let reach = time * (size(a[1]).max(size(b[1])) + size(b[1] - a[1]));
@@ -113,7 +131,8 @@ impl<P: Form + ?Sized> Shrinking<P> {
         let mut first: Option<Approach> = None;
         for place in 0..self.springs.len() {
             let number = self.springs[place];
-            let [a, b] = [&self.before, &self.now].map(|at| span(problem.mechanism(), number, at, &mut self.z));
+            let [a, b] =
+                [&self.before, &self.now].map(|at| span(problem.mechanism(), number, at, &mut self.z));
             let found = if can_meet(a, b, time) { self.searched(problem, number, time) } else { None };
             first = [first, found].into_iter().flatten().min_by(|a, b| a.after.total_cmp(&b.after));
         }
@@ -176,7 +195,13 @@ impl<P: Form + ?Sized> Integrator<P> for Shrinking<P> {
     }
 
     /// A step of the inner method, looked at.
-    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError> {
+    fn step(
+        &mut self,
+        problem: &mut P,
+        state: &mut State,
+        until: Time,
+        statistics: &mut Statistics,
+    ) -> Result<Option<usize>, StepError> {
         if std::mem::take(&mut self.is_stale) {
             problem.body_angles(state, &mut self.before);
         }

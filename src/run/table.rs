@@ -1,7 +1,9 @@
-//! The trajectory as a table: one row an output time, units in the header, digits that read back to the same doubles.
+//! The trajectory as a table: one row an output time, units in the header, digits that read back to the same
+//! doubles.
 //!
-//! Every constraint has its residual and the rate of that.  A motor has its torque on the driven body, or its force on the point that slides, along the
-//! rail, and its power beside them; a lock, a weld or a locked slider the torque it exerts on its body, [`ConstraintEquation`] by row.
+//! Every constraint has its residual and the rate of that.  A motor has its torque on the driven body, or its
+//! force on the point that slides, along the rail, and its power beside them; a lock, a weld or a locked
+//! slider the torque it exerts on its body, [`ConstraintEquation`] by row.
 
 use super::sample::Sample;
 use crate::dynamics::Mechanism;
@@ -26,7 +28,9 @@ pub struct Table<W: Write> {
 pub(super) type Shown = Arc<[usize]>;
 
 fn shown(mechanism: &Mechanism) -> Shown {
-    let count = |(r, row): (usize, &ConstraintEquation)| if mechanism.is_motor(r) { 2 } else { usize::from(row.law.is_some()) };
+    let count = |(r, row): (usize, &ConstraintEquation)| {
+        if mechanism.is_motor(r) { 2 } else { usize::from(row.law.is_some()) }
+    };
     mechanism.constraints.iter().enumerate().map(count).collect()
 }
 
@@ -56,7 +60,9 @@ impl<W: Write> Table<W> {
     pub fn new(mechanism: &Mechanism, writer: W) -> csv::Result<Self> {
         let mut header = vec!["t [s]".to_owned()];
         for body in &mechanism.bodies {
-            for (quantity, unit) in [("phi", "rad"), ("omega", "rad/s"), ("x", "m"), ("y", "m"), ("vx", "m/s"), ("vy", "m/s")] {
+            for (quantity, unit) in
+                [("phi", "rad"), ("omega", "rad/s"), ("x", "m"), ("y", "m"), ("vx", "m/s"), ("vy", "m/s")]
+            {
                 header.push(format!("{}.{quantity} [{unit}]", body.name));
             }
         }
@@ -68,7 +74,11 @@ impl<W: Write> Table<W> {
             let (unit, name) = (row.unit(), row.name());
             header.extend([format!("{name}.C [{unit}]"), format!("{name}.C' [{unit}/s]")]);
             let force = if row.is_angle() { "torque" } else { "force" };
-            header.extend([format!("{name}.{force} [{}]", row.unit_of_force()), format!("{name}.power [W]")].into_iter().take(shown));
+            header.extend(
+                [format!("{name}.{force} [{}]", row.unit_of_force()), format!("{name}.power [W]")]
+                    .into_iter()
+                    .take(shown),
+            );
         }
         let mut titles = csv::Writer::from_writer(Vec::with_capacity(BUFFER + BUFFER / 4));
         titles.write_record(&header)?;
@@ -141,7 +151,8 @@ impl<W: Write> Table<W> {
     }
 }
 
-/// Appends a number and a comma: the shortest digits that read back to the same double, laid out as Rust's `{:?}` does.
+/// Appends a number and a comma: the shortest digits that read back to the same double, laid out as Rust's
+/// `{:?}` does.
 fn put(buffer: &mut Vec<u8>, value: f64) {
     let mut digits = zmij::Buffer::new();
     let text = digits.format(value).as_bytes();
@@ -191,7 +202,21 @@ mod tests {
 
     #[test]
     fn the_bounds_of_the_layouts() {
-        let bounds = [0.0, -0.0, 1e-4, 1e-5, 9.999e-5, 1e15, 1e16, 1e17, 5e-324, f64::MAX, f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
+        let bounds = [
+            0.0,
+            -0.0,
+            1e-4,
+            1e-5,
+            9.999e-5,
+            1e15,
+            1e16,
+            1e17,
+            5e-324,
+            f64::MAX,
+            f64::NAN,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+        ];
         for value in bounds.iter().flat_map(|&x: &f64| [x, -x, x.next_up(), x.next_down()]) {
             assert_eq!(written(value), format!("{value:?}"));
         }

@@ -59,7 +59,8 @@ impl Recorder {
     fn record(&mut self, step: &mut Step, begin: f64, end: f64, depth: u32) {
         let mut curves: Vec<Chebyshev> = Vec::new();
         for degree in DEGREES {
-            let nodes: Vec<Vec<f64>> = Chebyshev::nodes(degree).map(|node| values(step.at(begin + node * (end - begin)))).collect();
+            let nodes: Vec<Vec<f64>> =
+                Chebyshev::nodes(degree).map(|node| values(step.at(begin + node * (end - begin)))).collect();
             let of = |k: usize| nodes.iter().map(|node| node[k]).collect::<Vec<f64>>();
             curves = (0..nodes[0].len()).map(|k| Chebyshev::through(&of(k))).collect();
             if curves.iter().all(is_resolved) {
@@ -81,7 +82,10 @@ fn is_resolved(curve: &Chebyshev) -> bool {
 
 /// Winding angles and positions, then rates.
 fn values(motion: &Motion) -> Vec<f64> {
-    (0..motion.phi.len()).map(|k| motion.unwrapped(k)).chain(motion.omega.iter().map(|omega| omega.hi)).collect()
+    (0..motion.phi.len())
+        .map(|k| motion.unwrapped(k))
+        .chain(motion.omega.iter().map(|omega| omega.hi))
+        .collect()
 }
 
 impl Observer for Recorder {
@@ -99,8 +103,9 @@ impl Observer for Recorder {
 }
 
 impl Trajectory {
-    /// Winding angles of all bodies \[rad\] with the positions of floating ones \[m\], and their rates \[rad/s, m/s\], at a time \[s\] within the run; `None`
-    /// outside of it.  Exact to the dense output of the method; at an impact the motion after it.
+    /// Winding angles of all bodies \[rad\] with the positions of floating ones \[m\], and their rates
+    /// \[rad/s, m/s\], at a time \[s\] within the run; `None` outside of it.  Exact to the dense output of
+    /// the method; at an impact the motion after it.
     pub fn at(&self, t: f64) -> Option<(Vec<f64>, Vec<f64>)> {
         let place = self.pieces.partition_point(|piece| piece.begin <= t).checked_sub(1)?;
         let piece = self.pieces.get(place).filter(|piece| t <= piece.end && t <= self.outcome.last.t)?;

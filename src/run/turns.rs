@@ -1,4 +1,5 @@
-//! Whole turns of given angles: rows measure an angle modulo turns, so that a step too long for what pulls at a motor can lose some.
+//! Whole turns of given angles: rows measure an angle modulo turns, so that a step too long for what pulls at
+//! a motor can lose some.
 
 use super::methods::Stabilization;
 use super::plan::Plan;
@@ -33,12 +34,14 @@ impl Angle {
 }
 
 impl Turns {
-    /// Those of a motion about to start; none where given angles are eliminated, which keep their laws to the last bit.
+    /// Those of a motion about to start; none where given angles are eliminated, which keep their laws to the
+    /// last bit.
     pub fn new(mechanism: &Mechanism, plan: &Plan, start: &Motion) -> Self {
         let rows = mechanism.constraints.iter().filter(|_| plan.stabilization != Stabilization::Elimination);
         let angles = rows.filter_map(|row| {
             let (Measure::Angle { body, base }, Some(law)) = (&row.measure, &row.law) else { return None };
-            let mut angle = Angle { name: row.name().into(), body: *body, base: *base, law: law.clone(), off: 0.0 };
+            let mut angle =
+                Angle { name: row.name().into(), body: *body, base: *base, law: law.clone(), off: 0.0 };
             angle.off = angle.off(start.time, |k| start.unwrapped(k));
             Some(angle)
         });
@@ -53,7 +56,10 @@ impl Turns {
             method: plan.method.to_string(),
             t: sample.t,
             step: plan.step.unwrap_or(0.0),
-            what: format!("constraint {} has lost whole turns: a step was too long for what pulls at it", angle.name),
+            what: format!(
+                "constraint {} has lost whole turns: a step was too long for what pulls at it",
+                angle.name
+            ),
             hint: "a shorter --every with dop853, else a smaller --step or --rtol".into(),
         })
     }
@@ -71,7 +77,8 @@ mod tests {
         let mechanism = Mechanism::new(&scene).expect("equations");
         let start = mechanism.start(&scene);
         for stabilize in Stabilization::ALL {
-            let request = Request { method: Some(MethodId::Dp8), stabilize: Some(stabilize), ..Request::default() };
+            let request =
+                Request { method: Some(MethodId::Dp8), stabilize: Some(stabilize), ..Request::default() };
             let plan = Plan::new(&scene, &mechanism, &request).expect("a sensible pairing");
             let turns = Turns::new(&mechanism, &plan, &start);
             let t = 0.7;

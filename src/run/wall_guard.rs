@@ -1,7 +1,9 @@
-//! Watches that no wall is passed: gaps at the end of every step, and inside it where a cubic through its ends has a minimum near a wall.
+//! Watches that no wall is passed: gaps at the end of every step, and inside it where a cubic through its
+//! ends has a minimum near a wall.
 //!
-//! Such a minimum is looked for on the motion itself, at even distances and then by golden section, to see whether it is behind the wall.  Positions and
-//! rates are all that is looked at; nothing is shared with the search for events, whose misses are to be found.
+//! Such a minimum is looked for on the motion itself, at even distances and then by golden section, to see
+//! whether it is behind the wall.  Positions and rates are all that is looked at; nothing is shared with the
+//! search for events, whose misses are to be found.
 
 use super::impact_monitor::{gap, gap_rate};
 use crate::dynamics::{BodyAngles, Mechanism};
@@ -10,7 +12,8 @@ use crate::stepping::{Cause, StepError};
 /// Parts of a step between which it is looked at, and golden sections after that.
 const PARTS: usize = 16;
 const SECTIONS: usize = 24;
-/// A minimum of the cubic above this share of the largest gap or change of it in the step is far from the wall, whatever the cubic leaves out.
+/// A minimum of the cubic above this share of the largest gap or change of it in the step is far from the
+/// wall, whatever the cubic leaves out.
 const NEAR: f64 = 0.2;
 
 /// Gaps over the lengths of their contacts, and their rates, at the end of the last step.
@@ -38,10 +41,16 @@ impl WallGuard {
     ///
     /// # Errors
     /// A wall that has been passed.
-    pub fn step(&mut self, mechanism: &Mechanism, t: f64, body_angles: &BodyAngles) -> Result<Option<usize>, Box<Passed>> {
+    pub fn step(
+        &mut self,
+        mechanism: &Mechanism,
+        t: f64,
+        body_angles: &BodyAngles,
+    ) -> Result<Option<usize>, Box<Passed>> {
         self.look(mechanism, t, body_angles)?;
         let (h, now) = (t - self.t, gaps(mechanism, body_angles));
-        let candidate = (0..now.len()).find(|&c| !mechanism.held.contains(&c) && dips(&self.gaps[c], &now[c], h));
+        let candidate =
+            (0..now.len()).find(|&c| !mechanism.held.contains(&c) && dips(&self.gaps[c], &now[c], h));
         (self.t, self.gaps) = (t, now);
         Ok(candidate)
     }
@@ -50,7 +59,12 @@ impl WallGuard {
     ///
     /// # Errors
     /// A wall that has been passed.
-    pub fn search(&self, mechanism: &Mechanism, contact: usize, mut at: impl FnMut(f64) -> (f64, BodyAngles)) -> Result<(), Box<Passed>> {
+    pub fn search(
+        &self,
+        mechanism: &Mechanism,
+        contact: usize,
+        mut at: impl FnMut(f64) -> (f64, BodyAngles),
+    ) -> Result<(), Box<Passed>> {
         let mut gap_at = |share: f64| -> Result<f64, Box<Passed>> {
             let (t, body_angles) = at(share);
             self.look(mechanism, t, &body_angles)?;
@@ -91,7 +105,12 @@ impl WallGuard {
             let is_held = mechanism.held.contains(&c);
             let off = if is_held { gap.abs() } else { -gap };
             if off.is_nan() || off > self.closed + rounding {
-                return Err(Box::new(Passed { t, wall: contact.row.name.clone(), gap: gap * contact.length, is_held }));
+                return Err(Box::new(Passed {
+                    t,
+                    wall: contact.row.name.clone(),
+                    gap: gap * contact.length,
+                    is_held,
+                }));
             }
         }
         Ok(())
@@ -101,13 +120,20 @@ impl WallGuard {
 fn gaps(mechanism: &Mechanism, body_angles: &BodyAngles) -> Vec<[f64; 2]> {
     let angles = mechanism.bodies.len();
     (mechanism.contacts.iter())
-        .map(|contact| [gap(contact, angles, &body_angles.phi).0, gap_rate(contact, angles, &body_angles.phi, &body_angles.omega)])
+        .map(|contact| {
+            [
+                gap(contact, angles, &body_angles.phi).0,
+                gap_rate(contact, angles, &body_angles.phi, &body_angles.omega),
+            ]
+        })
         .collect()
 }
 
 /// Whether the cubic of a step of `h` has a minimum inside that is near the wall or behind it.
 fn dips(before: &[f64; 2], after: &[f64; 2], h: f64) -> bool {
-    let size = [before[0].abs(), after[0].abs(), (h * before[1]).abs(), (h * after[1]).abs()].into_iter().fold(0.0, f64::max);
+    let size = [before[0].abs(), after[0].abs(), (h * before[1]).abs(), (h * after[1]).abs()]
+        .into_iter()
+        .fold(0.0, f64::max);
     let value = |i: usize| cubic(before, after, h, i as f64 / PARTS as f64);
     (1..PARTS).any(|i| value(i) < NEAR * size && value(i) <= value(i - 1) && value(i) <= value(i + 1))
 }
@@ -160,7 +186,8 @@ mod tests {
             "walls": [{"name": "floor", "body": "ball", "point": [0, 0], "line": {"through": [0, 0], "normal": [0, 1]}, "restitution": 0.5}],
             "start": {"ball": {"phi": 0, "omega": 0, "origin": [3, 1], "velocity": [0, 0]}}, "until": 1, "every": 1}"#;
         let scene = crate::scene::parse_scene(scene, "test", &[]).expect("a scene");
-        let body_angles = BodyAngles { phi: vec![0.0, 3.0, 1.0], turns: vec![0; 3], omega: vec![0.0, 0.0, -2.0] };
+        let body_angles =
+            BodyAngles { phi: vec![0.0, 3.0, 1.0], turns: vec![0; 3], omega: vec![0.0, 0.0, -2.0] };
         (Mechanism::new(&scene).expect("a mechanism"), body_angles)
     }
 
@@ -170,7 +197,10 @@ mod tests {
         let (guard, held) = (WallGuard::new(1e-9), mechanism.holding(&[0]));
         assert!(guard.look(&mechanism, 0.0, &body_angles).is_ok());
         let stop = guard.look(&held, 0.5, &body_angles).expect_err("it is above").stop("dp8");
-        assert!(stop.what.contains("held at wall floor") && stop.t == 0.5 && stop.cause == Cause::WallPassed, "{stop}");
+        assert!(
+            stop.what.contains("held at wall floor") && stop.t == 0.5 && stop.cause == Cause::WallPassed,
+            "{stop}"
+        );
         body_angles.phi[2] = -1e-6;
         let stop = guard.look(&mechanism, 0.5, &body_angles).expect_err("it is below").stop("dp8");
         assert!(stop.what.contains("1.000e-6 m behind wall floor"), "{stop}");

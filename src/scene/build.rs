@@ -1,4 +1,5 @@
-//! Scenes made in Rust, without a file: the same keys, the same checks and the same messages as for scenes in JSON.
+//! Scenes made in Rust, without a file: the same keys, the same checks and the same messages as for scenes in
+//! JSON.
 
 use super::{Scene, SceneError, parse_scene};
 use serde_json::{Map, Value, json};
@@ -15,8 +16,9 @@ pub fn on(bar: &str, point: [f64; 2]) -> Value {
 
 /// Makes a [`Scene`] part by part.
 ///
-/// Every method takes what its part must have; [`with`](Self::with) sets any other key of the part added last, by its name in scene files.
-/// Nothing is checked before [`build`](Self::build), which refuses what a file with the same content would be refused for.
+/// Every method takes what its part must have; [`with`](Self::with) sets any other key of the part added
+/// last, by its name in scene files. Nothing is checked before [`build`](Self::build), which refuses what a
+/// file with the same content would be refused for.
 ///
 /// ```
 /// use driftless::scene::{SceneBuilder, ground, on};
@@ -73,14 +75,20 @@ impl SceneBuilder {
     #[must_use]
     pub fn bar(self, name: &str, length: f64, mass: f64) -> Self {
         let (centre, inertia) = ([0.5 * length, 0.0], mass * length * length / 12.0);
-        self.add("bars", json!({"name": name, "length": length, "mass": mass, "centre": centre, "inertia": inertia}))
+        self.add(
+            "bars",
+            json!({"name": name, "length": length, "mass": mass, "centre": centre, "inertia": inertia}),
+        )
     }
 
-    /// A rigid body of any mass distribution: mass \[kg\], centre of mass in its frame \[m\], moment of inertia about that \[kg·m²\], and the length it is drawn
-    /// with \[m\].
+    /// A rigid body of any mass distribution: mass \[kg\], centre of mass in its frame \[m\], moment of
+    /// inertia about that \[kg·m²\], and the length it is drawn with \[m\].
     #[must_use]
     pub fn body(self, name: &str, mass: f64, centre: [f64; 2], inertia: f64, length: f64) -> Self {
-        self.add("bars", json!({"name": name, "length": length, "mass": mass, "centre": centre, "inertia": inertia}))
+        self.add(
+            "bars",
+            json!({"name": name, "length": length, "mass": mass, "centre": centre, "inertia": inertia}),
+        )
     }
 
     /// A hinge: two points that coincide.
@@ -109,17 +117,30 @@ impl SceneBuilder {
         self.add("springs", json!({"name": name, "between": [one, other], "stiffness": stiffness}))
     }
 
-    /// A motor that turns a bar: angle at t = 0 \[rad\] and rate \[rad/s\]; other laws by [`with`](Self::with) `"law"`.
+    /// A motor that turns a bar: angle at t = 0 \[rad\] and rate \[rad/s\]; other laws by
+    /// [`with`](Self::with) `"law"`.
     #[must_use]
     pub fn motor(self, name: &str, bar: &str, start: f64, rate: f64) -> Self {
         self.add("motors", json!({"name": name, "body": bar, "law": {"start": start, "rate": rate}}))
     }
 
-    /// A wall that a point of a bar cannot pass: a point of its line \[m\], its normal, and the coefficient of restitution.
+    /// A wall that a point of a bar cannot pass: a point of its line \[m\], its normal, and the coefficient
+    /// of restitution.
     #[must_use]
-    pub fn wall(self, name: &str, bar: &str, point: [f64; 2], through: [f64; 2], normal: [f64; 2], restitution: f64) -> Self {
+    pub fn wall(
+        self,
+        name: &str,
+        bar: &str,
+        point: [f64; 2],
+        through: [f64; 2],
+        normal: [f64; 2],
+        restitution: f64,
+    ) -> Self {
         let line = json!({"through": through, "normal": normal});
-        self.add("walls", json!({"name": name, "body": bar, "point": point, "line": line, "restitution": restitution}))
+        self.add(
+            "walls",
+            json!({"name": name, "body": bar, "point": point, "line": line, "restitution": restitution}),
+        )
     }
 
     /// A part of any kind, by the name of its list and the keys it has in scene files.
@@ -160,7 +181,8 @@ impl SceneBuilder {
     /// Checks the scene.
     ///
     /// # Errors
-    /// What a file with this content is refused for, by its line in the scene as [`text`](Self::text) writes it.
+    /// What a file with this content is refused for, by its line in the scene as [`text`](Self::text) writes
+    /// it.
     pub fn build(&self) -> Result<Scene, SceneError> {
         let name = self.scene.get("name").and_then(Value::as_str).unwrap_or_default();
         parse_scene(&self.text(), &format!("scene {name} as built"), &[])

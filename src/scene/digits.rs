@@ -1,7 +1,8 @@
 //! How exactly a scene states its numbers: by the digits it is written with.
 //!
-//! A number is uncertain by half a unit of its last digit as written: 0.25 by 0.005, 0.250 by 0.0005, 670 by 0.5, 1.5e3 by 50.  Exact are 0, however it is written
-//! (at rest, on an axis, without damping), values such as `pi/2` that a command line may state, defaults, and the times of the output, `until` and `every`.
+//! A number is uncertain by half a unit of its last digit as written: 0.25 by 0.005, 0.250 by 0.0005, 670 by
+//! 0.5, 1.5e3 by 50.  Exact are 0, however it is written (at rest, on an axis, without damping), values such
+//! as `pi/2` that a command line may state, defaults, and the times of the output, `until` and `every`.
 
 use super::error::SceneError;
 use super::locate::{Node, Source, Value, push_index, push_key};
@@ -26,8 +27,9 @@ pub struct Written {
 const OUTPUT: [&str; 2] = ["until", "every"];
 
 impl Template {
-    /// The numbers of the scene that its digits leave uncertain, in the order of its text.  `typed` are the texts `PATH=VALUE` of the overrides as they were
-    /// typed; where one is missing, the shortest digits of its value count.
+    /// The numbers of the scene that its digits leave uncertain, in the order of its text.  `typed` are the
+    /// texts `PATH=VALUE` of the overrides as they were typed; where one is missing, the shortest digits of
+    /// its value count.
     ///
     /// # Errors
     /// As [`parse_scene`](super::parse_scene) where the text is no JSON or an override does not fit it.
@@ -69,7 +71,9 @@ impl Search<'_> {
             }
             Value::Number(value) if !OUTPUT.contains(&path) => {
                 let Ok(unit) = Walk { tree: self.tree }.unit(path) else { return };
-                let Some(uncertainty) = half_unit(self.digits(node)).filter(|half| half.is_finite()) else { return };
+                let Some(uncertainty) = half_unit(self.digits(node)).filter(|half| half.is_finite()) else {
+                    return;
+                };
                 self.found.push(Written { path: path.to_owned(), unit, value: *value, uncertainty });
             }
             _ => {}
@@ -79,7 +83,10 @@ impl Search<'_> {
     /// What a number was written as.
     fn digits(&self, node: &Node) -> &str {
         let (text, digits, is_all) = self.source.text(node.span);
-        let typed = text.checked_sub(1).and_then(|index| self.typed.get(index)).and_then(|typed| typed.split_once('='));
+        let typed = text
+            .checked_sub(1)
+            .and_then(|index| self.typed.get(index))
+            .and_then(|typed| typed.split_once('='));
         typed.filter(|_| is_all).map_or(digits, |(_, value)| value.trim())
     }
 }
@@ -90,10 +97,13 @@ fn half_unit(digits: &str) -> Option<f64> {
         Some((mantissa, exponent)) => (mantissa, exponent.parse::<i64>().ok()?),
         None => (digits, 0),
     };
-    let (whole, decimals) =
-        mantissa.trim_start_matches(['+', '-']).split_once('.').unwrap_or((mantissa.trim_start_matches(['+', '-']), ""));
+    let (whole, decimals) = mantissa
+        .trim_start_matches(['+', '-'])
+        .split_once('.')
+        .unwrap_or((mantissa.trim_start_matches(['+', '-']), ""));
     let mut all = whole.bytes().chain(decimals.bytes());
-    if whole.is_empty() || !all.clone().all(|digit| digit.is_ascii_digit()) || all.all(|digit| digit == b'0') {
+    if whole.is_empty() || !all.clone().all(|digit| digit.is_ascii_digit()) || all.all(|digit| digit == b'0')
+    {
         return None;
     }
     // Read as a decimal number, it is the nearest double.
@@ -126,20 +136,32 @@ mod tests {
 
     #[test]
     fn numbers_stand_with_their_paths_and_digits_also_those_of_overrides() {
-        let typed = ["bar1.length=0.650".to_owned(), "bar2.phi=pi/2".to_owned(), "gravity=[9.80, 0]".to_owned()];
-        let overrides: Vec<Override> = typed.iter().map(|set| set.parse().expect("a path and a value")).collect();
-        let template = Template::read("examples/scenes/free.json".as_ref(), &overrides).expect("a shipped scene");
+        let typed =
+            ["bar1.length=0.650".to_owned(), "bar2.phi=pi/2".to_owned(), "gravity=[9.80, 0]".to_owned()];
+        let overrides: Vec<Override> =
+            typed.iter().map(|set| set.parse().expect("a path and a value")).collect();
+        let template =
+            Template::read("examples/scenes/free.json".as_ref(), &overrides).expect("a shipped scene");
         let found = template.written_numbers(&typed).expect("a scene");
-        let of = |path: &str| found.iter().find(|number| number.path == path).map(|number| (number.value, number.uncertainty));
+        let of = |path: &str| {
+            found.iter().find(|number| number.path == path).map(|number| (number.value, number.uncertainty))
+        };
         assert_eq!(of("bars.bar1.length"), Some((0.65, 0.0005)));
         assert_eq!(of("bars.bar2.density"), Some((670.0, 0.5)));
         assert_eq!(of("hinges.B.between[0].point[0]"), Some((0.6, 0.05)));
         assert_eq!(of("start.bar1.phi"), Some((std::f64::consts::FRAC_PI_2, 5e-17)));
         // Inside a list that was set, trailing zeros are not known.
         assert_eq!(of("gravity[0]"), Some((9.8, 0.05)));
-        assert_eq!((of("start.bar2.phi"), of("start.bar1.omega"), of("until"), of("gravity[1]")), (None, None, None, None));
-        assert!(found.iter().all(|number| template.variable(&number.path).is_ok_and(|variable| variable.path == number.path)));
+        assert_eq!(
+            (of("start.bar2.phi"), of("start.bar1.omega"), of("until"), of("gravity[1]")),
+            (None, None, None, None)
+        );
+        assert!(found.iter().all(|number| {
+            template.variable(&number.path).is_ok_and(|variable| variable.path == number.path)
+        }));
         let untyped = template.written_numbers(&[]).expect("a scene");
-        assert!(untyped.iter().any(|number| number.path == "bars.bar1.length" && number.uncertainty == 0.005));
+        assert!(
+            untyped.iter().any(|number| number.path == "bars.bar1.length" && number.uncertainty == 0.005)
+        );
     }
 }

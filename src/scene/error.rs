@@ -74,11 +74,14 @@ impl SceneError {
     /// A file that cannot be read.
     pub(super) fn unreadable(file: &str, error: &std::io::Error) -> Self {
         let hint = match error.kind() {
-            std::io::ErrorKind::NotFound => "check the path; the scenes that come with the program are in examples/scenes/",
+            std::io::ErrorKind::NotFound => {
+                "check the path; the scenes that come with the program are in examples/scenes/"
+            }
             std::io::ErrorKind::PermissionDenied => "check who may read the file",
             _ => "give the path of a JSON file",
         };
-        let mut refused = Self::whole_file(file, &format!("cannot be read ({error})"), "must be a readable file", hint);
+        let mut refused =
+            Self::whole_file(file, &format!("cannot be read ({error})"), "must be a readable file", hint);
         refused.0.io = true;
         refused
     }
@@ -130,7 +133,8 @@ impl fmt::Display for SceneError {
 }
 
 impl Excerpt {
-    /// The line at byte `start`, cut to a window where it is long, with marks up to byte `end` or the end of the line.
+    /// The line at byte `start`, cut to a window where it is long, with marks up to byte `end` or the end of
+    /// the line.
     pub(super) fn of(text: &str, start: usize, end: usize) -> Self {
         let (line, column) = position(text, start);
         let whole = text.split('\n').nth(line - 1).unwrap_or("").trim_end_matches('\r');

@@ -1,8 +1,9 @@
 //! Where in a JSON text a value stands.
 //!
-//! `serde_json` judges the syntax; one pass over the text it has accepted then builds a tree of values that remember their bytes, and
-//! finds what `serde_json` lets pass: a key written twice (it keeps the last), a lone surrogate, a tower of brackets.  A value of a
-//! `--set` option is a text of its own, so that a scene may be put together from several of them.
+//! `serde_json` judges the syntax; one pass over the text it has accepted then builds a tree of values that
+//! remember their bytes, and finds what `serde_json` lets pass: a key written twice (it keeps the last), a
+//! lone surrogate, a tower of brackets.  A value of a `--set` option is a text of its own, so that a scene
+//! may be put together from several of them.
 
 use super::error::{Excerpt, Refusal, SceneError};
 use serde::de::IgnoredAny;
@@ -131,7 +132,11 @@ impl Source {
     pub fn text(&self, span: Span) -> (usize, &str, bool) {
         let Span { text, start, end } = span;
         let json = &self.texts[text as usize].json;
-        (text as usize, json.get(start as usize..end as usize).unwrap_or(""), (start, end as usize) == (0, json.len()))
+        (
+            text as usize,
+            json.get(start as usize..end as usize).unwrap_or(""),
+            (start, end as usize) == (0, json.len()),
+        )
     }
 
     /// "line 3, column 7", or the option.
@@ -154,7 +159,8 @@ impl Source {
     fn syntax(&self, text: usize, error: &serde_json::Error) -> SceneError {
         let json = &self.texts[text].json;
         // serde_json counts bytes, and names the offending one; column 0 is the line break itself.
-        let line_start = json.split_inclusive('\n').take(error.line().saturating_sub(1)).map(str::len).sum::<usize>();
+        let line_start =
+            json.split_inclusive('\n').take(error.line().saturating_sub(1)).map(str::len).sum::<usize>();
         let mut at = (line_start + error.column()).saturating_sub(1).min(json.len());
         while !json.is_char_boundary(at) {
             at -= 1;
@@ -183,7 +189,9 @@ fn syntax_hint(json: &str, at: usize, error: &serde_json::Error) -> &'static str
     let before = json[..at].trim_end();
     if error.is_eof() {
         "the file ends too early: close every bracket, brace and quote"
-    } else if before.ends_with(',') && rest.starts_with([']', '}']) || error.to_string().starts_with("trailing comma") {
+    } else if before.ends_with(',') && rest.starts_with([']', '}'])
+        || error.to_string().starts_with("trailing comma")
+    {
         "remove the comma before the closing bracket"
     } else if rest.starts_with("//") || rest.starts_with("/*") || rest.starts_with('#') {
         "JSON has no comments; use \"description\""
@@ -263,11 +271,19 @@ impl Locator<'_> {
                 Some(b',') => self.at += 1,
                 Some(b'"') => {
                     let (key, span) = self.string()?;
-                    let written = self.source.written(self.span(span.start as usize + 1, span.end as usize - 1));
+                    let written =
+                        self.source.written(self.span(span.start as usize + 1, span.end as usize - 1));
                     push_key(&mut self.path, &written);
                     if let Some(first) = twice(&members, &mut seen, &key) {
-                        let hint = format!("it stands first at {}; remove one of the two", self.source.place(first));
-                        return Err(self.source.refusal(span, &self.path, "appears twice", "each key may appear once in an object", &hint));
+                        let hint =
+                            format!("it stands first at {}; remove one of the two", self.source.place(first));
+                        return Err(self.source.refusal(
+                            span,
+                            &self.path,
+                            "appears twice",
+                            "each key may appear once in an object",
+                            &hint,
+                        ));
                     }
                     self.skip_space();
                     self.at += 1;
@@ -334,9 +350,14 @@ impl Locator<'_> {
         }
         let span = self.span(start, self.at);
         let written = self.json.get(start..self.at).unwrap_or("");
-        let number = written
-            .parse()
-            .map_err(|_| self.source.refused_value(span, &self.path, "must be a JSON value", "compare with a file in examples/scenes/"))?;
+        let number = written.parse().map_err(|_| {
+            self.source.refused_value(
+                span,
+                &self.path,
+                "must be a JSON value",
+                "compare with a file in examples/scenes/",
+            )
+        })?;
         Ok(Value::Number(number))
     }
 

@@ -1,7 +1,8 @@
 //! A scene: bars, joints, springs, forces, motors and walls as plain data in SI units, checked and resolved.
 //!
-//! [`read`] turns JSON into a [`Scene`] or refuses it with one precise error.  What stands here is already *resolved*: a uniform bar
-//! has become mass, centre and inertia; names have become indices.  Angles are absolute, from +x, counter-clockwise, in radians.
+//! [`read`] turns JSON into a [`Scene`] or refuses it with one precise error.  What stands here is already
+//! *resolved*: a uniform bar has become mass, centre and inertia; names have become indices.  Angles are
+//! absolute, from +x, counter-clockwise, in radians.
 
 mod build;
 mod digits;
@@ -52,7 +53,8 @@ pub struct Scene {
     pub gravity: [f64; 2],
     /// Bodies, at least one.
     pub bars: Vec<Bar>,
-    /// Hinges; those that close a loop and bars that hang on nothing are told apart when the scene is compiled.
+    /// Hinges; those that close a loop and bars that hang on nothing are told apart when the scene is
+    /// compiled.
     pub hinges: Vec<Hinge>,
     /// Points that slide along lines.
     pub sliders: Vec<Slider>,
@@ -76,7 +78,8 @@ pub struct Scene {
     pub walls: Vec<Wall>,
     /// Angle and rate of each bar at t = 0, in the order of `bars`; agrees with the motors.
     pub start: Vec<Start>,
-    /// What the scene says of it, the rest of which is found when the scene is compiled; of bars beyond the list's end, angle and rate.
+    /// What the scene says of it, the rest of which is found when the scene is compiled; of bars beyond the
+    /// list's end, angle and rate.
     pub given: Vec<Given>,
     /// Horizon \[s\], positive.
     pub until: f64,
@@ -251,8 +254,8 @@ pub struct Motor {
     pub law: Law,
 }
 
-/// `start + rate·t + acceleration·t²/2 + Σ amplitude·sin(frequency·t + phase)` in the unit u of what it gives: \[rad\] of a motor on an angle,
-/// \[m\] of one on a slider, \[1\] of a force or a torque.
+/// `start + rate·t + acceleration·t²/2 + Σ amplitude·sin(frequency·t + phase)` in the unit u of what it
+/// gives: \[rad\] of a motor on an angle, \[m\] of one on a slider, \[1\] of a force or a torque.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Law {
     /// Value at t = 0 without the sines \[u\].

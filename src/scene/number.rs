@@ -2,7 +2,8 @@
 
 use std::f64::consts::PI;
 
-/// A finite number: a decimal (`0.1`, `1e-3`), a multiple of pi (`pi`, `-0.5pi`, `2*pi`), or a fraction of two such (`1/64`, `pi/2`).
+/// A finite number: a decimal (`0.1`, `1e-3`), a multiple of pi (`pi`, `-0.5pi`, `2*pi`), or a fraction of
+/// two such (`1/64`, `pi/2`).
 ///
 /// ```
 /// use driftless::scene::number;
@@ -15,7 +16,9 @@ pub fn number(text: &str) -> Option<f64> {
         match part.strip_suffix("pi").or_else(|| part.strip_suffix('π')) {
             None => part.parse::<f64>().ok(),
             Some(sign @ ("" | "+" | "-")) => Some(if sign == "-" { -PI } else { PI }),
-            Some(multiple) => multiple.trim_end_matches('*').trim_end().parse::<f64>().ok().map(|multiple| multiple * PI),
+            Some(multiple) => {
+                multiple.trim_end_matches('*').trim_end().parse::<f64>().ok().map(|multiple| multiple * PI)
+            }
         }
     };
     let value = match text.split_once('/') {

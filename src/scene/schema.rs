@@ -5,8 +5,8 @@ use serde_json::{Map, Value, json};
 
 /// The JSON Schema (draft 2020-12) of scene files, with units, ranges and examples.
 ///
-/// What a schema cannot say (names that exist, hinges that form a tree, a start that agrees with its motor) is left to
-/// [`read_scene`](super::read_scene).
+/// What a schema cannot say (names that exist, hinges that form a tree, a start that agrees with its motor)
+/// is left to [`read_scene`](super::read_scene).
 pub fn schema() -> Value {
     let mut schema = object(&SCENE);
     if let Value::Object(members) = &mut schema {
@@ -28,7 +28,8 @@ fn object(table: &Table) -> Value {
         }
         properties.insert(field.name.to_owned(), property);
     }
-    let required: Vec<_> = table.fields.iter().filter(|field| field.required).map(|field| field.name).collect();
+    let required: Vec<_> =
+        table.fields.iter().filter(|field| field.required).map(|field| field.name).collect();
     json!({
         "title": table.title,
         "description": table.about,
@@ -41,7 +42,9 @@ fn object(table: &Table) -> Value {
 
 fn described(about: &str, shape: &Shape) -> String {
     match shape {
-        Shape::Number(quantity) | Shape::Pair(quantity) | Shape::Inertia(quantity) if !quantity.unit.is_empty() => {
+        Shape::Number(quantity) | Shape::Pair(quantity) | Shape::Inertia(quantity)
+            if !quantity.unit.is_empty() =>
+        {
             format!("{about} [{}]", quantity.unit)
         }
         _ => about.to_owned(),
@@ -51,9 +54,13 @@ fn described(about: &str, shape: &Shape) -> String {
 fn shape(of: &Shape) -> Value {
     match of {
         Shape::Number(quantity) => number(quantity),
-        Shape::Pair(quantity) => json!({"type": "array", "items": number(quantity), "minItems": 2, "maxItems": 2}),
+        Shape::Pair(quantity) => {
+            json!({"type": "array", "items": number(quantity), "minItems": 2, "maxItems": 2})
+        }
         Shape::Name => json!({"type": "string", "pattern": format!("^[A-Za-z0-9_-]{{1,{LONGEST_NAME}}}$")}),
-        Shape::FolderName => json!({"type": "string", "pattern": format!("^[A-Za-z0-9_][A-Za-z0-9_-]{{0,{}}}$", LONGEST_NAME - 1)}),
+        Shape::FolderName => {
+            json!({"type": "string", "pattern": format!("^[A-Za-z0-9_][A-Za-z0-9_-]{{0,{}}}$", LONGEST_NAME - 1)})
+        }
         Shape::Text => json!({"type": "string", "maxLength": LONGEST_TEXT}),
         Shape::Word(words) => json!({"enum": words}),
         Shape::SliderName => shape(&Shape::Name),

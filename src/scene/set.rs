@@ -9,9 +9,10 @@ use std::str::FromStr;
 
 /// One value of a scene set from outside, as `PATH=VALUE`.
 ///
-/// A path is made of keys (`until`), indices (`gravity[0]`, `bars[1].length`) and, in a list, names (`bars.bar2.length`,
-/// `motors.motor.law.rate`), or the short form of one (`bar1.phi`, `motor.rate`).  What holds the value must exist already, but for the start of a bar and
-/// the law of a force; a key may be new (`springs.spring.damping`).  Numbers may be written as [`number`] takes them.
+/// A path is made of keys (`until`), indices (`gravity[0]`, `bars[1].length`) and, in a list, names
+/// (`bars.bar2.length`, `motors.motor.law.rate`), or the short form of one (`bar1.phi`, `motor.rate`).  What
+/// holds the value must exist already, but for the start of a bar and the law of a force; a key may be new
+/// (`springs.spring.damping`).  Numbers may be written as [`number`] takes them.
 ///
 /// ```
 /// let set: driftless::scene::Override = "walls.wall.restitution=0.5".parse().expect("a path and a value");
@@ -37,13 +38,15 @@ pub struct OverrideError {
 impl FromStr for Override {
     type Err = OverrideError;
 
-    /// The value is read as JSON, or else taken as text; text such as `pi/2` counts as a number where a number is meant.
+    /// The value is read as JSON, or else taken as text; text such as `pi/2` counts as a number where a
+    /// number is meant.
     fn from_str(given: &str) -> Result<Self, OverrideError> {
         let fail = || OverrideError { given: given.to_owned() };
         let (path, value) = given.split_once('=').ok_or_else(fail)?;
         let path = path.trim().to_owned();
         steps(&path).ok_or_else(fail)?;
-        let value = serde_json::from_str(value).unwrap_or_else(|_| serde_json::Value::String(value.to_owned()));
+        let value =
+            serde_json::from_str(value).unwrap_or_else(|_| serde_json::Value::String(value.to_owned()));
         Ok(Self { path, value })
     }
 }
@@ -94,7 +97,13 @@ pub(super) fn put(source: &Source, tree: &mut Node, set: &Override, value: Node)
     let path = match whole(&set.path, tree) {
         Ok(path) => path,
         Err(hint) if hint.starts_with(SEVERAL) => {
-            return Err(source.refusal(value.span, &set.path, "is ambiguous", "must mean one value of the scene", &hint));
+            return Err(source.refusal(
+                value.span,
+                &set.path,
+                "is ambiguous",
+                "must mean one value of the scene",
+                &hint,
+            ));
         }
         // The walk along the path says what is wrong with it.
         Err(_) => set.path.clone(),
@@ -114,7 +123,9 @@ pub(super) const SEVERAL: &str = "several things are called";
 /// Puts `value` into `tree` at a whole path.
 fn place(source: &Source, tree: &mut Node, path: &str, value: Node) -> Result<(), SceneError> {
     let span = value.span;
-    let refused = |path: &str, problem: &str, allowed: &str, hint: &str| source.refusal(span, path, problem, allowed, hint);
+    let refused = |path: &str, problem: &str, allowed: &str, hint: &str| {
+        source.refusal(span, path, problem, allowed, hint)
+    };
     let Some(steps) = steps(path) else {
         let hint = "for example walls.wall.restitution, bars[1].length, gravity[0]";
         return Err(refused(path, "is not a path", "must be keys, names and [indices] joined by dots", hint));
@@ -136,7 +147,11 @@ fn place(source: &Source, tree: &mut Node, path: &str, value: Node) -> Result<()
                         return Ok(());
                     }
                     None if may_be_added(&steps[..=number], &bars) => {
-                        members.push(Member { key: (*key).to_owned(), span, node: Node { span, value: Value::Object(Vec::new()) } });
+                        members.push(Member {
+                            key: (*key).to_owned(),
+                            span,
+                            node: Node { span, value: Value::Object(Vec::new()) },
+                        });
                         let Some(added) = members.last_mut() else { return Ok(()) };
                         at = &mut added.node;
                     }
@@ -146,7 +161,12 @@ fn place(source: &Source, tree: &mut Node, path: &str, value: Node) -> Result<()
                             _ => members.iter().map(|member| member.key.as_str()).collect(),
                         };
                         let hint = hint(key, &known);
-                        return Err(refused(&path, "does not exist", "what holds the value must be in the scene", &hint));
+                        return Err(refused(
+                            &path,
+                            "does not exist",
+                            "what holds the value must be in the scene",
+                            &hint,
+                        ));
                     }
                 }
             }
@@ -154,8 +174,17 @@ fn place(source: &Source, tree: &mut Node, path: &str, value: Node) -> Result<()
                 let known: Vec<&str> = nodes.iter().filter_map(name).collect();
                 let Some(index) = nodes.iter().position(|node| name(node) == Some(key)) else {
                     push_key(&mut path, key);
-                    let hint = if known.is_empty() { "use an index, as in gravity[0]".to_owned() } else { hint(key, &known) };
-                    return Err(refused(&path, "does not exist", &format!("{holder} must have an element of that name"), &hint));
+                    let hint = if known.is_empty() {
+                        "use an index, as in gravity[0]".to_owned()
+                    } else {
+                        hint(key, &known)
+                    };
+                    return Err(refused(
+                        &path,
+                        "does not exist",
+                        &format!("{holder} must have an element of that name"),
+                        &hint,
+                    ));
                 };
                 push_index(&mut path, index);
                 at = &mut nodes[index];
@@ -165,12 +194,22 @@ fn place(source: &Source, tree: &mut Node, path: &str, value: Node) -> Result<()
                 let count = nodes.len();
                 let Some(node) = nodes.get_mut(*index) else {
                     let hint = "indices count from 0; an element cannot be added";
-                    return Err(refused(&path, "does not exist", &format!("{holder} has {count} elements"), hint));
+                    return Err(refused(
+                        &path,
+                        "does not exist",
+                        &format!("{holder} has {count} elements"),
+                        hint,
+                    ));
                 };
                 at = node;
             }
             (Step::Index(_), _) => {
-                return Err(refused(&path, "is not a list", "only lists have indices", "use a key, as in start.bar1.phi"));
+                return Err(refused(
+                    &path,
+                    "is not a list",
+                    "only lists have indices",
+                    "use a key, as in start.bar1.phi",
+                ));
             }
             (Step::Key(key), _) => {
                 let allowed = format!("it has no `{key}` to set");
@@ -182,7 +221,8 @@ fn place(source: &Source, tree: &mut Node, path: &str, value: Node) -> Result<()
     Ok(())
 }
 
-/// Objects that a scene may do without and that a path may begin: the start, that of a bar, the law of a force or torque.
+/// Objects that a scene may do without and that a path may begin: the start, that of a bar, the law of a
+/// force or torque.
 fn may_be_added(steps: &[Step], bars: &[String]) -> bool {
     match steps {
         [Step::Key("start")] => true,

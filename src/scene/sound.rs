@@ -1,6 +1,7 @@
 //! Whether a scene put together by hand makes sense: numbers of bars that exist, numbers that are finite.
 //!
-//! Scenes that were read are sound; this guards the equations against scenes whose fields were changed afterwards or filled in by a program.
+//! Scenes that were read are sound; this guards the equations against scenes whose fields were changed
+//! afterwards or filled in by a program.
 
 use super::{Law, Place, Scene};
 
@@ -33,18 +34,34 @@ impl Scene {
             ("sliders", self.sliders.iter().map(|part| vec![part.point.bar, part.rail.place.bar]).collect()),
             ("locks", self.locks.iter().map(|part| vec![Some(part.bar), part.relative_to]).collect()),
             ("springs", self.springs.iter().map(|part| pair(&part.between)).collect()),
-            ("torsion_springs", self.torsion_springs.iter().map(|part| vec![Some(part.bar), part.relative_to]).collect()),
+            (
+                "torsion_springs",
+                self.torsion_springs.iter().map(|part| vec![Some(part.bar), part.relative_to]).collect(),
+            ),
             ("forces", self.forces.iter().map(|part| vec![Some(part.bar)]).collect()),
             ("torques", self.torques.iter().map(|part| vec![Some(part.bar), part.relative_to]).collect()),
             ("motors", self.motors.iter().map(|part| vec![Some(part.bar), part.relative_to]).collect()),
             ("walls", self.walls.iter().map(|part| vec![Some(part.bar)]).collect()),
         ];
         let own = |(i, between): (usize, Vec<Option<usize>>)| (between[0] == between[1]).then_some(i);
-        let joined = self.hinges.iter().map(|part| pair(&part.between)).chain(self.welds.iter().map(|part| pair(&part.between)));
-        let to_itself = || joined.enumerate().find_map(own).map(|i| format!("hinges and welds: number {i} joins a body to itself"));
+        let joined = self
+            .hinges
+            .iter()
+            .map(|part| pair(&part.between))
+            .chain(self.welds.iter().map(|part| pair(&part.between)));
+        let to_itself = || {
+            joined
+                .enumerate()
+                .find_map(own)
+                .map(|i| format!("hinges and welds: number {i} joins a body to itself"))
+        };
         let drives = || {
             let wrong = self.drives.iter().position(|drive| drive.slider >= self.sliders.len())?;
-            Some(format!("drives[{wrong}]: slider number {} of {}", self.drives[wrong].slider, self.sliders.len()))
+            Some(format!(
+                "drives[{wrong}]: slider number {} of {}",
+                self.drives[wrong].slider,
+                self.sliders.len()
+            ))
         };
         lists.into_iter().find_map(|(list, of)| all(list, of)).or_else(to_itself).or_else(drives)
     }
@@ -52,7 +69,9 @@ impl Scene {
     /// A number that is not finite, or out of its range.
     fn faulty_number(&self) -> Option<String> {
         let finite = |numbers: &[f64]| numbers.iter().all(|number| number.is_finite());
-        let wrong = |list: &str, at: Option<usize>| at.map(|i| format!("{list}[{i}]: a number is not finite or out of its range"));
+        let wrong = |list: &str, at: Option<usize>| {
+            at.map(|i| format!("{list}[{i}]: a number is not finite or out of its range"))
+        };
         if !finite(&self.gravity) {
             return Some("gravity: a number is not finite".into());
         }
@@ -62,7 +81,9 @@ impl Scene {
             wrong(
                 "bars",
                 self.bars.iter().position(|bar| {
-                    !finite(&[bar.length, bar.mass, bar.centre[0], bar.centre[1], bar.inertia]) || bar.mass <= 0.0 || bar.inertia < 0.0
+                    !finite(&[bar.length, bar.mass, bar.centre[0], bar.centre[1], bar.inertia])
+                        || bar.mass <= 0.0
+                        || bar.inertia < 0.0
                 }),
             ),
             wrong("start", self.start.iter().position(|start| !finite(&[start.phi, start.omega]))),
@@ -70,19 +91,25 @@ impl Scene {
             wrong("welds", self.welds.iter().position(|part| !part.between.iter().all(place))),
             wrong(
                 "sliders",
-                self.sliders.iter().position(|part| !place(&part.point) || !place(&part.rail.place) || !unit(part.rail.direction)),
+                self.sliders.iter().position(|part| {
+                    !place(&part.point) || !place(&part.rail.place) || !unit(part.rail.direction)
+                }),
             ),
             wrong(
                 "springs",
                 self.springs.iter().position(|part| {
                     let numbers = [part.stiffness, part.free_length, part.damping];
-                    !part.between.iter().all(place) || !finite(&numbers) || numbers.iter().any(|&number| number < 0.0)
+                    !part.between.iter().all(place)
+                        || !finite(&numbers)
+                        || numbers.iter().any(|&number| number < 0.0)
                 }),
             ),
             wrong(
                 "torsion_springs",
                 self.torsion_springs.iter().position(|part| {
-                    !finite(&[part.stiffness, part.free_angle, part.damping]) || part.stiffness < 0.0 || part.damping < 0.0
+                    !finite(&[part.stiffness, part.free_angle, part.damping])
+                        || part.stiffness < 0.0
+                        || part.damping < 0.0
                 }),
             ),
             wrong("forces", self.forces.iter().position(|part| !finite(&part.point) || !finite(&part.force))),
@@ -90,7 +117,10 @@ impl Scene {
             wrong(
                 "walls",
                 self.walls.iter().position(|part| {
-                    !finite(&part.point) || !finite(&part.through) || !unit(part.normal) || !(0.0..=1.0).contains(&part.restitution)
+                    !finite(&part.point)
+                        || !finite(&part.through)
+                        || !unit(part.normal)
+                        || !(0.0..=1.0).contains(&part.restitution)
                 }),
             ),
         ];

@@ -1,8 +1,9 @@
 //! A scene some of whose numbers are left open, to be filled in again and again.
 //!
-//! A number is named by its path as in `--set`, or in short by the name of the bar, joint, spring, force, motor or wall it belongs to: `bar1.phi` is
-//! `start.bar1.phi`, `motor.rate` is `motors.motor.law.rate`, `spring.stiffness` is `springs.spring.stiffness`.  A path is judged against the tables of `format.rs` and the scene's own text
-//! once; values are judged when they are filled in.
+//! A number is named by its path as in `--set`, or in short by the name of the bar, joint, spring, force,
+//! motor or wall it belongs to: `bar1.phi` is `start.bar1.phi`, `motor.rate` is `motors.motor.law.rate`,
+//! `spring.stiffness` is `springs.spring.stiffness`.  A path is judged against the tables of `format.rs` and
+//! the scene's own text once; values are judged when they are filled in.
 
 use super::Scene;
 use super::error::SceneError;
@@ -27,7 +28,8 @@ pub struct Variable {
     pub path: String,
     /// Its unit: `rad`; empty for a pure number.
     pub unit: &'static str,
-    /// Where a start is varied that nothing else in the scene has a say in: the number of the bar.  Such a value can be put into a scene that was read before.
+    /// Where a start is varied that nothing else in the scene has a say in: the number of the bar.  Such a
+    /// value can be put into a scene that was read before.
     pub start: Option<(usize, StartValue)>,
 }
 
@@ -41,8 +43,19 @@ pub enum StartValue {
 }
 
 /// The lists whose elements can be meant by their name alone, and what their paths begin with.
-const LISTS: [&str; 11] =
-    ["bars", "hinges", "sliders", "welds", "locks", "springs", "torsion_springs", "forces", "torques", "motors", "walls"];
+const LISTS: [&str; 11] = [
+    "bars",
+    "hinges",
+    "sliders",
+    "welds",
+    "locks",
+    "springs",
+    "torsion_springs",
+    "forces",
+    "torques",
+    "motors",
+    "walls",
+];
 
 impl Template {
     /// Reads the text of the scene file `path`.
@@ -71,7 +84,10 @@ impl Template {
     /// # Errors
     /// As [`parse_scene`]: a value out of its range, or one that does not go with the rest of the scene.
     pub fn filled(&self, variables: &[Variable], values: &[f64]) -> Result<Scene, SceneError> {
-        let filled = variables.iter().zip(values).map(|(variable, &value)| Override { path: variable.path.clone(), value: value.into() });
+        let filled = variables
+            .iter()
+            .zip(values)
+            .map(|(variable, &value)| Override { path: variable.path.clone(), value: value.into() });
         let overrides: Vec<Override> = self.overrides.iter().cloned().chain(filled).collect();
         parse_scene(&self.text, &self.source, &overrides)
     }
@@ -88,11 +104,18 @@ impl Template {
     pub fn variable(&self, name: &str) -> Result<Variable, SceneError> {
         let (_, tree) = put_together(&self.text, &self.source, &self.overrides)?;
         let refused = |problem: String, allowed: &str, hint: String| {
-            SceneError::whole_file(&self.source, &format!("has no number {name} to vary: {problem}"), allowed, &hint)
+            SceneError::whole_file(
+                &self.source,
+                &format!("has no number {name} to vary: {problem}"),
+                allowed,
+                &hint,
+            )
         };
         let allowed = "must be a path to a number, as start.bar1.phi or springs.spring.stiffness";
-        let path = whole(name, &tree).map_err(|hint| refused("nothing has that name".into(), allowed, hint))?;
-        let unit = Walk { tree: &tree }.unit(&path).map_err(|(problem, hint)| refused(problem, allowed, hint))?;
+        let path =
+            whole(name, &tree).map_err(|hint| refused("nothing has that name".into(), allowed, hint))?;
+        let unit =
+            Walk { tree: &tree }.unit(&path).map_err(|(problem, hint)| refused(problem, allowed, hint))?;
         let start = self.start_of(&path)?;
         Ok(Variable { path, unit, start })
     }
@@ -101,7 +124,9 @@ impl Template {
     fn start_of(&self, path: &str) -> Result<Option<(usize, StartValue)>, SceneError> {
         let scene = self.scene()?;
         let mut parts = path.split('.');
-        let (Some("start"), Some(bar), Some(value), None) = (parts.next(), parts.next(), parts.next(), parts.next()) else {
+        let (Some("start"), Some(bar), Some(value), None) =
+            (parts.next(), parts.next(), parts.next(), parts.next())
+        else {
             return Ok(None);
         };
         let value = match value {
@@ -109,7 +134,10 @@ impl Template {
             "omega" => StartValue::Omega,
             _ => return Ok(None),
         };
-        let alone = scene.motors.is_empty() && scene.locks.is_empty() && scene.springs.is_empty() && scene.walls.is_empty();
+        let alone = scene.motors.is_empty()
+            && scene.locks.is_empty()
+            && scene.springs.is_empty()
+            && scene.walls.is_empty();
         let alone = alone && scene.has_whole_start();
         Ok(scene.bars.iter().position(|known| known.name == bar).filter(|_| alone).map(|bar| (bar, value)))
     }
@@ -132,7 +160,9 @@ pub(super) fn whole(short: &str, tree: &Node) -> Result<String, String> {
         known.extend(nodes.iter().filter_map(name));
         if nodes.iter().any(|node| name(node) == Some(first)) {
             found.push(match list {
-                "bars" if START.field(rest.split('[').next().unwrap_or("")).is_some() => format!("start.{first}.{rest}"),
+                "bars" if START.field(rest.split('[').next().unwrap_or("")).is_some() => {
+                    format!("start.{first}.{rest}")
+                }
                 "motors" if LAW.field(rest).is_some() => format!("motors.{first}.law.{rest}"),
                 _ => format!("{list}.{first}.{rest}"),
             });
@@ -163,9 +193,12 @@ pub(super) struct Walk<'a> {
 impl Walk<'_> {
     /// The unit of the number at the end of a path; else what is wrong and a hint.
     pub fn unit(&self, path: &str) -> Result<&'static str, (String, String)> {
-        let steps = steps(path).ok_or_else(|| ("it is not a path".to_owned(), "keys, names and [indices] joined by dots".to_owned()))?;
+        let steps = steps(path).ok_or_else(|| {
+            ("it is not a path".to_owned(), "keys, names and [indices] joined by dots".to_owned())
+        })?;
         let mut steps = steps.into_iter().peekable();
-        let (mut table, mut node, mut walked): (&'static Table, Option<&Node>, String) = (&SCENE, Some(self.tree), String::new());
+        let (mut table, mut node, mut walked): (&'static Table, Option<&Node>, String) =
+            (&SCENE, Some(self.tree), String::new());
         loop {
             let Some(Step::Key(key)) = steps.next() else { return Err(no_number(&walked, table)) };
             let Some(field) = table.field(key) else {
@@ -174,7 +207,8 @@ impl Walk<'_> {
             };
             push_key(&mut walked, key);
             node = node.and_then(|node| member(node, key));
-            // What holds a number must be in the scene, as for an override; the number itself may be left to its default.
+            // What holds a number must be in the scene, as for an override; the number itself may be left to
+            // its default.
             if node.is_none() && steps.peek().is_some() {
                 return Err((
                     format!("{walked} is not in the scene"),
@@ -185,7 +219,11 @@ impl Walk<'_> {
                 (Shape::Number(quantity) | Shape::Inertia(quantity), None) => return Ok(quantity.unit),
                 (Shape::Pair(quantity), Some(Step::Index(0 | 1))) => {
                     steps.next();
-                    return if steps.next().is_none() { Ok(quantity.unit) } else { Err(no_number(&walked, table)) };
+                    return if steps.next().is_none() {
+                        Ok(quantity.unit)
+                    } else {
+                        Err(no_number(&walked, table))
+                    };
                 }
                 (Shape::Object(inner), Some(_)) => table = inner,
                 (Shape::ByBar(inner), Some(Step::Key(bar))) => {
@@ -196,7 +234,8 @@ impl Walk<'_> {
                 (Shape::List { of, .. }, Some(step)) => {
                     node = element(node, step, &mut walked)?;
                     steps.next();
-                    table = kind(of, |key| node.is_some_and(|node| member(node, key).is_some())).unwrap_or(table);
+                    table =
+                        kind(of, |key| node.is_some_and(|node| member(node, key).is_some())).unwrap_or(table);
                 }
                 (Shape::Between, Some(step)) => {
                     node = element(node, step, &mut walked)?;
@@ -217,15 +256,23 @@ fn no_number(walked: &str, table: &Table) -> (String, String) {
 fn example(walked: &str, field: &Field) -> (String, String) {
     let hint = match &field.shape {
         Shape::Pair(_) => format!("{walked}[0] or {walked}[1]"),
-        Shape::Object(table) | Shape::ByBar(table) => format!("go on, in the end with one of {}", table.keys()),
-        Shape::List { of, .. } => format!("go on with the name of one, then one of {}", of.first().unwrap_or(&&UNIFORM_BAR).keys()),
+        Shape::Object(table) | Shape::ByBar(table) => {
+            format!("go on, in the end with one of {}", table.keys())
+        }
+        Shape::List { of, .. } => {
+            format!("go on with the name of one, then one of {}", of.first().unwrap_or(&&UNIFORM_BAR).keys())
+        }
         shape => format!("it {}", shape.allowed()),
     };
     (format!("{walked} is not a single number"), hint)
 }
 
 /// An element of a list by name or index.
-fn element<'a>(node: Option<&'a Node>, step: &Step, walked: &mut String) -> Result<Option<&'a Node>, (String, String)> {
+fn element<'a>(
+    node: Option<&'a Node>,
+    step: &Step,
+    walked: &mut String,
+) -> Result<Option<&'a Node>, (String, String)> {
     let Some(Value::List(nodes)) = node.map(|node| &node.value) else { return Ok(None) };
     let names: Vec<&str> = nodes.iter().filter_map(name).collect();
     let found = match step {
@@ -234,7 +281,9 @@ fn element<'a>(node: Option<&'a Node>, step: &Step, walked: &mut String) -> Resu
     };
     if found.is_none() {
         let (what, hint) = match step {
-            Step::Index(index) => (format!("[{index}]"), format!("indices count from 0; there are {}", nodes.len())),
+            Step::Index(index) => {
+                (format!("[{index}]"), format!("indices count from 0; there are {}", nodes.len()))
+            }
             Step::Key(key) => (format!(" `{key}`"), hint(key, &names)),
         };
         return Err((format!("{walked} has no{what}"), hint));
@@ -247,13 +296,19 @@ fn element<'a>(node: Option<&'a Node>, step: &Step, walked: &mut String) -> Resu
 }
 
 /// The start of a bar.
-fn element_by_key<'a>(node: Option<&'a Node>, bar: &str, walked: &mut String) -> Result<Option<&'a Node>, (String, String)> {
+fn element_by_key<'a>(
+    node: Option<&'a Node>,
+    bar: &str,
+    walked: &mut String,
+) -> Result<Option<&'a Node>, (String, String)> {
     let Some(Value::Object(members)) = node.map(|node| &node.value) else { return Ok(None) };
     let Some(found) = members.iter().find(|member| member.key == bar) else {
         let known: Vec<&str> = members.iter().map(|member| member.key.as_str()).collect();
         let hint = match nearest(bar, known.iter().copied()) {
             Some(near) => format!("did you mean `{near}`?"),
-            None => format!("there are: {}; a bar that a motor drives starts as its law says", listed(&known)),
+            None => {
+                format!("there are: {}; a bar that a motor drives starts as its law says", listed(&known))
+            }
         };
         return Err((format!("{walked} has no `{bar}`"), hint));
     };
@@ -280,7 +335,12 @@ mod tests {
             ("free", "until", "until", "s"),
             ("free", "B.between[0].point[0]", "hinges.B.between[0].point[0]", "m"),
             ("spring", "spring.damping", "springs.spring.damping", "N·s/m"),
-            ("motor_sine", "motors.motor.law.sines[0].frequency", "motors.motor.law.sines[0].frequency", "rad/s"),
+            (
+                "motor_sine",
+                "motors.motor.law.sines[0].frequency",
+                "motors.motor.law.sines[0].frequency",
+                "rad/s",
+            ),
             ("motor", "motor.rate", "motors.motor.law.rate", "rad/s"),
             ("wall", "walls.wall.restitution", "walls.wall.restitution", ""),
         ] {
@@ -313,7 +373,10 @@ mod tests {
     #[test]
     fn values_filled_in_are_those_of_an_override() {
         let template = template("free");
-        let variables = [template.variable("bar1.phi").expect("there"), template.variable("bar2.density").expect("there")];
+        let variables = [
+            template.variable("bar1.phi").expect("there"),
+            template.variable("bar2.density").expect("there"),
+        ];
         let scene = template.filled(&variables, &[0.1, 700.0]).expect("a scene");
         assert_eq!(scene.start[0].phi, 0.1);
         assert_eq!(scene.bars[1].mass, 700.0 * 0.6 * 0.05 * 0.003);

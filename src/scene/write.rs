@@ -7,15 +7,19 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 impl Scene {
-    /// The scene in the input format, every bar by its mass and every default written out; it reads back to the same scene, bit for bit.
+    /// The scene in the input format, every bar by its mass and every default written out; it reads back to
+    /// the same scene, bit for bit.
     pub fn to_input(&self) -> Value {
         let body = |bar: Option<usize>| bar.map_or(GROUND, |bar| self.bars[bar].name.as_str());
         let place = |place: &Place| json!({"body": body(place.bar), "point": place.point});
         let bars: Vec<_> = (self.bars.iter())
             .map(|bar| json!({"name": bar.name, "mass": bar.mass, "centre": bar.centre, "inertia": bar.inertia, "length": bar.length}))
             .collect();
-        let hinges: Vec<_> =
-            self.hinges.iter().map(|hinge| json!({"name": hinge.name, "between": hinge.between.each_ref().map(place)})).collect();
+        let hinges: Vec<_> = self
+            .hinges
+            .iter()
+            .map(|hinge| json!({"name": hinge.name, "between": hinge.between.each_ref().map(place)}))
+            .collect();
         let sliders: Vec<_> = (self.sliders.iter())
             .map(|Slider { name, point, rail, locked }| {
                 json!({
@@ -26,8 +30,11 @@ impl Scene {
                 })
             })
             .collect();
-        let welds: Vec<_> =
-            self.welds.iter().map(|weld| json!({"name": weld.name, "between": weld.between.each_ref().map(place)})).collect();
+        let welds: Vec<_> = self
+            .welds
+            .iter()
+            .map(|weld| json!({"name": weld.name, "between": weld.between.each_ref().map(place)}))
+            .collect();
         let locks: Vec<_> = (self.locks.iter())
             .map(|lock| {
                 let said = json!({"name": lock.name, "body": body(Some(lock.bar)), "relative_to": body(lock.relative_to)});

@@ -4,10 +4,12 @@
 //! C'' + (2/T) C' + (1/T²) C = 0         one time constant T
 //! ```
 //!
-//! Source: J. Baumgarte, *Stabilization of constraints and integrals of motion in dynamical systems*, Comput. Methods Appl. Mech. Eng. 1 (1972).
+//! Source: J. Baumgarte, *Stabilization of constraints and integrals of motion in dynamical systems*, Comput.
+//! Methods Appl. Mech. Eng. 1 (1972).
 //!
-//! It is not free: an explicit method must resolve T, so T far below the step multiplies the steps, and T far above it leaves
-//! the violation standing.  The energy it moves is an unknown of its own and appears in reports.
+//! It is not free: an explicit method must resolve T, so T far below the step multiplies the steps, and T far
+//! above it leaves the violation standing.  The energy it moves is an unknown of its own and appears in
+//! reports.
 
 use crate::dynamics::kernel::Bias;
 use crate::dynamics::multiplier::Multiplier;

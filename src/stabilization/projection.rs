@@ -1,12 +1,14 @@
-//! Projection: after every accepted step the state is put back onto the constraints, position first, then velocity.
+//! Projection: after every accepted step the state is put back onto the constraints, position first, then
+//! velocity.
 //!
 //! ```text
 //! position:  S dl = C,              q -= M⁻¹ Gᵀ dl      repeated until C stops falling
 //! velocity:  S dm = G w + C_t,      w -= M⁻¹ Gᵀ dm      with G, S and C_t at the new position and the new time
 //! ```
 //!
-//! The shortest way in the metric of the mass matrix; small mechanisms with loops go it in natural coordinates (module `natural`).  Source: E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), section VII.2
-//! (algorithm 2.1); E. Eich, SIAM J. Numer. Anal. 30 (1993).
+//! The shortest way in the metric of the mass matrix; small mechanisms with loops go it in natural
+//! coordinates (module `natural`).  Source: E. Hairer, G. Wanner, *Solving Ordinary Differential Equations
+//! II*, 2nd ed. (1996), section VII.2 (algorithm 2.1); E. Eich, SIAM J. Numer. Anal. 30 (1993).
 
 mod natural;
 
@@ -27,8 +29,8 @@ pub struct Projected<M> {
     /// Energy less work after the last step, and whether that ended near a singular position.
     balance: Option<f64>,
     near: bool,
-    /// Largest violation left that counts as converged, at both levels, in the units of the mechanism, relative to levers and
-    /// speeds where these are larger.
+    /// Largest violation left that counts as converged, at both levels, in the units of the mechanism,
+    /// relative to levers and speeds where these are larger.
     pub tolerance: f64,
 }
 
@@ -65,8 +67,9 @@ impl<M> Projected<M> {
         let lost = lost / mechanism.energy_scale;
         if (was_near || self.near) && (lost > LOST || lost.is_nan()) {
             let row = mechanism.constraints[projector.kernel.weakest.row].name();
-            let what =
-                format!("energy changed by {lost:.1e} of its scale where constraint {row} loses its hold: the motion left its branch");
+            let what = format!(
+                "energy changed by {lost:.1e} of its scale where constraint {row} loses its hold: the motion left its branch"
+            );
             return Err(stop(Cause::BranchLost, state, what, past_singular(name)));
         }
         Ok(landing.has_moved)
@@ -94,7 +97,13 @@ where
     }
 
     /// A step of the inner method, put back onto the constraints.
-    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError> {
+    fn step(
+        &mut self,
+        problem: &mut P,
+        state: &mut State,
+        until: Time,
+        statistics: &mut Statistics,
+    ) -> Result<Option<usize>, StepError> {
         let event = self.inner.step(problem, state, until, statistics)?;
         if self.project_back(problem.mechanism(), state)? {
             self.inner.changed(state);
@@ -124,7 +133,8 @@ where
         self.inner.reset(state);
     }
 
-    /// The balance after the last step, if any, and what there is to know of its end; then what the inner method knows.
+    /// The balance after the last step, if any, and what there is to know of its end; then what the inner
+    /// method knows.
     fn internal_state(&self) -> Vec<f64> {
         let own = [f64::from(self.balance.is_some()), self.balance.unwrap_or_default(), f64::from(self.near)];
         own.into_iter().chain(self.inner.internal_state()).collect()
@@ -137,7 +147,8 @@ where
         self.inner.restore_internal_state(rest)
     }
 
-    /// Inside a step the constraints are kept as well as at its end; where they cannot be, the state is the step's own.
+    /// Inside a step the constraints are kept as well as at its end; where they cannot be, the state is the
+    /// step's own.
     fn interpolate(&mut self, problem: &mut P, from: &State, time: Time, inside: &mut State) {
         self.inner.interpolate(problem, from, time, inside);
         if let Some(projector) = &mut self.projector {
@@ -167,14 +178,17 @@ fn past_singular(method: &str) -> &'static str {
     }
 }
 
-/// Turns up to this \[rad\] are made without new sines, and without new factors of M and S: these change by as little.
+/// Turns up to this \[rad\] are made without new sines, and without new factors of M and S: these change by
+/// as little.
 const SMALL: f64 = 1e-8;
 /// Violation, relative to levers and speeds, that a row left out may have.
 const LEFT_OUT: f64 = 1e-6;
-/// Changes up to this, relative to the rates where they are above one, are rounding: what is known of the rates at the state stays true.
+/// Changes up to this, relative to the rates where they are above one, are rounding: what is known of the
+/// rates at the state stays true.
 const ROUNDING: f64 = 1e-14;
 
-/// Change of energy less work, or of energy by projection, in a step near a singular position, over the energy scale: more is another branch.
+/// Change of energy less work, or of energy by projection, in a step near a singular position, over the
+/// energy scale: more is another branch.
 const LOST: f64 = 1e-3;
 
 /// Projects the states of one form: in natural coordinates where it is solved in these, else in angles.
@@ -191,7 +205,12 @@ impl Projector {
         Self { kernel: Kernel::new(mechanism), natural }
     }
 
-    fn project(&mut self, mechanism: &Mechanism, state: &mut State, tolerance: f64) -> Result<Landing, (String, f64)> {
+    fn project(
+        &mut self,
+        mechanism: &Mechanism,
+        state: &mut State,
+        tolerance: f64,
+    ) -> Result<Landing, (String, f64)> {
         match self.project_naturally(mechanism, state) {
             Some(landing) => Ok(landing),
             None => project(mechanism, &mut self.kernel, state, tolerance),
@@ -203,8 +222,9 @@ impl Projector {
         let Self { kernel, natural: Some(natural) } = self else { return None };
         let n = mechanism.coordinates();
         natural.unit_vectors(state, &mut kernel.z);
-        let energy =
-            |kernel: &mut Kernel<f64>, state: &State| mechanism.energy_facing::<f64, 0>(kernel, &state.y[..n], &state.y[n..2 * n]).total();
+        let energy = |kernel: &mut Kernel<f64>, state: &State| {
+            mechanism.energy_facing::<f64, 0>(kernel, &state.y[..n], &state.y[n..2 * n]).total()
+        };
         let energy_before = energy(kernel, state);
         let balance = energy_before - state.y[2 * n] - state.y[2 * n + 1];
         let [turn, change] = natural.land(state, &mut kernel.z)?;
@@ -214,8 +234,15 @@ impl Projector {
             energy_change = energy(kernel, state) - energy_before;
             state.y[2 * n + 1] += energy_change;
         }
-        let fastest = state.y[n..2 * n].iter().fold(1.0 / mechanism.units.time, |most: f64, omega| most.max(omega.abs()));
-        Some(Landing { has_moved: turn.max(change / fastest) > ROUNDING, balance, energy_change, is_near: false })
+        let fastest = state.y[n..2 * n]
+            .iter()
+            .fold(1.0 / mechanism.units.time, |most: f64, omega| most.max(omega.abs()));
+        Some(Landing {
+            has_moved: turn.max(change / fastest) > ROUNDING,
+            balance,
+            energy_change,
+            is_near: false,
+        })
     }
 }
 
@@ -236,7 +263,12 @@ pub struct Landing {
 ///
 /// # Errors
 /// Name of the worst row and its violation where it cannot be brought below `tolerance`.
-pub fn project(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &mut State, tolerance: f64) -> Result<Landing, (String, f64)> {
+pub fn project(
+    mechanism: &Mechanism,
+    kernel: &mut Kernel<f64>,
+    state: &mut State,
+    tolerance: f64,
+) -> Result<Landing, (String, f64)> {
     match mechanism.size() {
         1 => project_sized::<1>(mechanism, kernel, state, tolerance),
         2 => project_sized::<2>(mechanism, kernel, state, tolerance),
@@ -301,16 +333,21 @@ fn project_sized<const N: usize>(
         kernel.solve_rows();
         let change = shift(mechanism, kernel, state, n, -1.0);
         let rates = state.y[n..2 * n].iter().enumerate();
-        let most = rates.fold(1.0 / mechanism.units.time, |most: f64, (k, omega)| most.max(omega.abs() / size(mechanism, k)));
+        let most = rates.fold(1.0 / mechanism.units.time, |most: f64, (k, omega)| {
+            most.max(omega.abs() / size(mechanism, k))
+        });
         (moved, far) = (true, largest(far, change / most));
         let omega = &state.y[n..2 * n];
-        check(mechanism, kernel, tolerance, |r| (kernel.row_rate(r, omega), step_size(mechanism, kernel, omega, r)))?;
+        check(mechanism, kernel, tolerance, |r| {
+            (kernel.row_rate(r, omega), step_size(mechanism, kernel, omega, r))
+        })?;
     }
     let balance = energy_before - state.y[2 * n] - state.y[2 * n + 1];
     let mut energy_change = 0.0;
     if moved {
         state.wrap();
-        energy_change = mechanism.energy_facing::<f64, N>(kernel, &state.y[..n], &state.y[n..2 * n]).total() - energy_before;
+        energy_change = mechanism.energy_facing::<f64, N>(kernel, &state.y[..n], &state.y[n..2 * n]).total()
+            - energy_before;
         state.y[2 * n + 1] += energy_change;
     }
     Ok(Landing { has_moved: far > ROUNDING, balance, energy_change, is_near: kernel.weakest.is_near })
@@ -326,13 +363,20 @@ pub(super) fn unit(mechanism: &Mechanism, r: usize) -> f64 {
     if mechanism.constraints[r].is_angle() { 1.0 } else { mechanism.units.length }
 }
 
-/// Adds M⁻¹ Gᵀ times what is in `multiplier`, with a sign, to the unknowns `from`…, and leaves it in `load`; returns its largest entry, those of positions over
-/// the unit of length.
-pub(super) fn shift(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &mut State, from: usize, sign: f64) -> f64 {
+/// Adds M⁻¹ Gᵀ times what is in `multiplier`, with a sign, to the unknowns `from`…, and leaves it in `load`;
+/// returns its largest entry, those of positions over the unit of length.
+pub(super) fn shift(
+    mechanism: &Mechanism,
+    kernel: &mut Kernel<f64>,
+    state: &mut State,
+    from: usize,
+    sign: f64,
+) -> f64 {
     kernel.multiplier_accelerations();
     let mut largest_change = 0.0;
     for (k, &change) in kernel.load.iter().enumerate() {
-        (state.y[from + k], state.low[from + k]) = two_sum(state.y[from + k], state.low[from + k] + sign * change);
+        (state.y[from + k], state.low[from + k]) =
+            two_sum(state.y[from + k], state.low[from + k] + sign * change);
         largest_change = largest(largest_change, change.abs() / size(mechanism, k));
     }
     largest_change
@@ -343,7 +387,8 @@ fn lever(mechanism: &Mechanism, kernel: &Kernel<f64>, r: usize) -> f64 {
     kernel.fold_gradient(r, unit(mechanism, r), |most: f64, k, g| most.max(g.abs() * size(mechanism, k)))
 }
 
-/// The largest part of the rate of row `r`, or its unit over that of time: a row's rate is a sum of G_k w_k, and no smaller than their rounding.
+/// The largest part of the rate of row `r`, or its unit over that of time: a row's rate is a sum of G_k w_k,
+/// and no smaller than their rounding.
 fn step_size(mechanism: &Mechanism, kernel: &Kernel<f64>, omega: &[f64], r: usize) -> f64 {
     let least = kernel.rows[r].drive.abs().max(unit(mechanism, r) / mechanism.units.time);
     kernel.fold_gradient(r, least, |most, k, g| most.max((g * omega[k]).abs()))
@@ -353,13 +398,21 @@ fn step_size(mechanism: &Mechanism, kernel: &Kernel<f64>, omega: &[f64], r: usiz
 ///
 /// # Errors
 /// Name of the first row that is not, and its violation.
-pub(super) fn is_kept(mechanism: &Mechanism, kernel: &Kernel<f64>, omega: &[f64], tolerance: f64) -> Result<(), (String, f64)> {
+pub(super) fn is_kept(
+    mechanism: &Mechanism,
+    kernel: &Kernel<f64>,
+    omega: &[f64],
+    tolerance: f64,
+) -> Result<(), (String, f64)> {
     check(mechanism, kernel, tolerance, |r| (kernel.rows[r].position, lever(mechanism, kernel, r)))?;
-    check(mechanism, kernel, tolerance, |r| (kernel.row_rate(r, omega), step_size(mechanism, kernel, omega, r)))
+    check(mechanism, kernel, tolerance, |r| {
+        (kernel.row_rate(r, omega), step_size(mechanism, kernel, omega, r))
+    })
 }
 
-/// The worst row must be below tolerance, each measured against its own size.  Near a singular position rounding grows with the inverse of the distance, of
-/// which the share of the weakest row is about the square; rows left out there are not projected, and come back once it is past.
+/// The worst row must be below tolerance, each measured against its own size.  Near a singular position
+/// rounding grows with the inverse of the distance, of which the share of the weakest row is about the
+/// square; rows left out there are not projected, and come back once it is past.
 fn check(
     mechanism: &Mechanism,
     kernel: &Kernel<f64>,

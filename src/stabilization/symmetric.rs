@@ -1,16 +1,18 @@
-//! Symmetric projection: Gauss methods on scenes with closed loops, sliders and other rows that cannot be eliminated.
+//! Symmetric projection: Gauss methods on scenes with closed loops, sliders and other rows that cannot be
+//! eliminated.
 //!
 //! ```text
 //! start = y0 + D(y0) mu,     end = Gauss(start),     y1 = end + D(y1) mu,     C(y1) = 0, C'(y1) = 0
 //! D mu: q += M⁻¹ Gᵀ mu_q,  w += M⁻¹ Gᵀ mu_w
 //! ```
 //!
-//! The same mu at both ends, so that the step run backwards is its own inverse: a reversible mechanism keeps its energy over long times, which one
-//! projection at the end of each step would spoil.  What starts off the constraints by mu arrives off them by mu, so that a step that is
-//! off by nu beyond it wants mu + (nu - mu)/2; the last step's mu is the first guess.
+//! The same mu at both ends, so that the step run backwards is its own inverse: a reversible mechanism keeps
+//! its energy over long times, which one projection at the end of each step would spoil.  What starts off the
+//! constraints by mu arrives off them by mu, so that a step that is off by nu beyond it wants mu + (nu -
+//! mu)/2; the last step's mu is the first guess.
 //!
-//! Source: E. Hairer, *Symmetric projection methods for differential equations on manifolds*, BIT 40 (2000); E. Hairer, C. Lubich, G. Wanner,
-//! *Geometric Numerical Integration*, 2nd ed. (2006), section V.4.1.
+//! Source: E. Hairer, *Symmetric projection methods for differential equations on manifolds*, BIT 40 (2000);
+//! E. Hairer, C. Lubich, G. Wanner, *Geometric Numerical Integration*, 2nd ed. (2006), section V.4.1.
 
 use super::projection::{self, is_kept};
 use crate::dynamics::kernel::Kernel;
@@ -25,8 +27,8 @@ const ROUNDS: usize = 60;
 const SWEEPS: usize = 60;
 /// Rounds in which nothing is gained before no more is expected.
 const STALLED: usize = 3;
-/// Largest violation, relative to levers and speeds, and largest change by the multipliers' mismatch, relative to turns and speeds, that count as
-/// converged.
+/// Largest violation, relative to levers and speeds, and largest change by the multipliers' mismatch,
+/// relative to turns and speeds, that count as converged.
 const TOLERANCE: f64 = 1e-12;
 
 /// A Gauss method with symmetric projection; its problem must be in coordinates and rates, as
@@ -49,7 +51,15 @@ pub struct SymmetricGauss {
 impl SymmetricGauss {
     /// Projects the steps of a Gauss method.
     pub fn new(inner: Gauss) -> Self {
-        Self { inner, kernel: None, trial: State::default(), best: State::default(), mu: Vec::new(), nu: Vec::new(), spare: None }
+        Self {
+            inner,
+            kernel: None,
+            trial: State::default(),
+            best: State::default(),
+            mu: Vec::new(),
+            nu: Vec::new(),
+            spare: None,
+        }
     }
 
     /// One step of `h` \[s\], between states shifted alike.
@@ -91,8 +101,8 @@ impl SymmetricGauss {
             for (mu, nu) in mu.iter_mut().zip(nu.iter()) {
                 *mu += 0.5 * (nu - *mu);
             }
-            // Rounds contract by about the step, near singular positions more slowly: what no longer falls is rounding, which grows there with the
-            // inverse of the distance, as in the projection itself.
+            // Rounds contract by about the step, near singular positions more slowly: what no longer falls is
+            // rounding, which grows there with the inverse of the distance, as in the projection itself.
             if mismatch == 0.0 || mismatch >= 0.5 * last || mismatch.is_nan() {
                 let near = kernel.weakest.share.clamp(DROPPED, 1.0).sqrt();
                 is_closed = mismatch <= TOLERANCE / near;
@@ -104,7 +114,9 @@ impl SymmetricGauss {
             }
         }
         if !is_closed {
-            return Err(stop(format!("the shifts of both ends differ by {last:.1e} of the motion and do not come closer")));
+            return Err(stop(format!(
+                "the shifts of both ends differ by {last:.1e} of the motion and do not come closer"
+            )));
         }
         state.clone_from(best);
         state.wrap();
@@ -120,15 +132,21 @@ fn unit_vectors(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &State) 
     kernel.linearise_at::<0>(mechanism, state.time, &state.y[..n], &state.y[n..2 * n]);
 }
 
-/// The largest entry of D (mu - nu), with the directions of the state faced last: of coordinates over their units, or over their sizes where these are larger,
-/// of rates over the units of rates or the fastest.
+/// The largest entry of D (mu - nu), with the directions of the state faced last: of coordinates over their
+/// units, or over their sizes where these are larger, of rates over the units of rates or the fastest.
 fn mismatch(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &State, mu: &[f64], nu: &[f64]) -> f64 {
     let (n, r) = (kernel.z.len(), kernel.rows.len());
     let size = |k: usize| projection::size(mechanism, k);
-    let fastest = (0..n).fold(1.0 / mechanism.units.time, |most, k| (state.y[n + k] / size(k)).abs().max(most));
+    let fastest =
+        (0..n).fold(1.0 / mechanism.units.time, |most, k| (state.y[n + k] / size(k)).abs().max(most));
     let mut most = 0.0_f64;
     for level in [0, r] {
-        kernel.multiplier.iter_mut().zip(&mu[level..]).zip(&nu[level..]).for_each(|((change, mu), nu)| *change = mu - nu);
+        kernel
+            .multiplier
+            .iter_mut()
+            .zip(&mu[level..])
+            .zip(&nu[level..])
+            .for_each(|((change, mu), nu)| *change = mu - nu);
         kernel.multiplier_accelerations();
         for (k, change) in kernel.load.iter().enumerate() {
             let whole = if level == 0 { size(k).max(state.y[k].abs()) } else { size(k) * fastest };
@@ -148,8 +166,15 @@ fn shift(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &mut State, mu:
     }
 }
 
-/// Finds nu such that `end` + D nu, written to `landed`, keeps all rows, with D taken there; starts from the nu given.
-fn land(mechanism: &Mechanism, kernel: &mut Kernel<f64>, end: &State, landed: &mut State, nu: &mut [f64]) -> Result<(), (String, f64)> {
+/// Finds nu such that `end` + D nu, written to `landed`, keeps all rows, with D taken there; starts from the
+/// nu given.
+fn land(
+    mechanism: &Mechanism,
+    kernel: &mut Kernel<f64>,
+    end: &State,
+    landed: &mut State,
+    nu: &mut [f64],
+) -> Result<(), (String, f64)> {
     let (n, r) = (mechanism.coordinates(), mechanism.constraints.len());
     landed.clone_from(end);
     unit_vectors(mechanism, kernel, landed);
@@ -161,9 +186,14 @@ fn land(mechanism: &Mechanism, kernel: &mut Kernel<f64>, end: &State, landed: &m
         let mut worst = 0.0_f64;
         for level in [0, r] {
             for row in 0..r {
-                let left = if level == 0 { kernel.rows[row].position } else { kernel.row_rate(row, &landed.y[n..2 * n]) };
+                let left = if level == 0 {
+                    kernel.rows[row].position
+                } else {
+                    kernel.row_rate(row, &landed.y[n..2 * n])
+                };
                 kernel.multiplier[row] = left;
-                let left = left.abs() / projection::unit(mechanism, row) * if level == 0 { 1.0 } else { mechanism.units.time };
+                let left = left.abs() / projection::unit(mechanism, row)
+                    * if level == 0 { 1.0 } else { mechanism.units.time };
                 worst = if left.is_nan() { f64::NAN } else { worst.max(left) };
             }
             kernel.solve_rows();
@@ -174,8 +204,13 @@ fn land(mechanism: &Mechanism, kernel: &mut Kernel<f64>, end: &State, landed: &m
             }
         }
         stalled += usize::from(worst >= 0.95 * last);
-        // Sweeps contract slowly where a step ends far from where it began; below the tolerance what no longer falls is rounding.
-        if worst <= 1e-16 || (worst >= 0.5 * last && worst <= TOLERANCE) || stalled == STALLED || worst.is_nan() {
+        // Sweeps contract slowly where a step ends far from where it began; below the tolerance what no
+        // longer falls is rounding.
+        if worst <= 1e-16
+            || (worst >= 0.5 * last && worst <= TOLERANCE)
+            || stalled == STALLED
+            || worst.is_nan()
+        {
             break;
         }
         last = worst;
@@ -200,7 +235,13 @@ impl<P: OdeSystem + Form + ?Sized> Integrator<P> for SymmetricGauss {
     }
 
     /// A whole step; see [`Gauss`].  The state's memory is that of the Gauss method, then mu.
-    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError> {
+    fn step(
+        &mut self,
+        problem: &mut P,
+        state: &mut State,
+        until: Time,
+        statistics: &mut Statistics,
+    ) -> Result<Option<usize>, StepError> {
         let h = self.inner.step().copysign((until - state.time).hi);
         statistics.check(Integrator::<P>::name(self), state.time.hi, h)?;
         self.shifted(problem, state, h, statistics)?;

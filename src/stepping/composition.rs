@@ -1,15 +1,17 @@
-//! Symmetric compositions: steps of a time-symmetric method of order 2, forwards and backwards, that together have order 4, 6 or 8.
+//! Symmetric compositions: steps of a time-symmetric method of order 2, forwards and backwards, that together
+//! have order 4, 6 or 8.
 //!
 //! ```text
 //! Psi_h = Phi_{g_s h} ∘ ... ∘ Phi_{g_2 h} ∘ Phi_{g_1 h},    g_{s+1-i} = g_i,    Σ g_i = 1
 //! order 4: Σ g_i³ = 0;   orders 6 and 8 ask for 2 and 4 conditions more
 //! ```
 //!
-//! What is symplectic and time-symmetric stays so.  Source of the idea: H. Yoshida, *Construction of higher order symplectic integrators*,
-//! Phys. Lett. A 150 (1990).  Coefficients: M. Suzuki, *Fractal decomposition of exponential operators*, Phys. Lett. A 146 (1990), his
-//! fivefold rule; W. Kahan, R.-C. Li, *Composition constants for raising the orders of unconventional schemes for ordinary differential
-//! equations*, Math. Comp. 66 (1997), `s9odr6a` and `s17odr8a`.  Their 26 digits fulfil the conditions of the test below to 3e-26; here
-//! they are as doubles.
+//! What is symplectic and time-symmetric stays so.  Source of the idea: H. Yoshida, *Construction of higher
+//! order symplectic integrators*, Phys. Lett. A 150 (1990).  Coefficients: M. Suzuki, *Fractal decomposition
+//! of exponential operators*, Phys. Lett. A 146 (1990), his fivefold rule; W. Kahan, R.-C. Li, *Composition
+//! constants for raising the orders of unconventional schemes for ordinary differential equations*, Math.
+//! Comp. 66 (1997), `s9odr6a` and `s17odr8a`.  Their 26 digits fulfil the conditions of the test below to
+//! 3e-26; here they are as doubles.
 
 use crate::arithmetic::DoubleDouble;
 
@@ -30,7 +32,8 @@ pub enum Composition {
 /// 1/(4 - 4^(1/3)), twice.
 const SUZUKI_5: [f64; 2] = [0.414_490_771_794_375_74, 0.414_490_771_794_375_74];
 
-const KAHAN_LI_9: [f64; 4] = [0.392_161_444_007_314_1, 0.332_599_136_789_359_44, -0.706_246_172_557_639_3, 0.082_213_596_293_550_8];
+const KAHAN_LI_9: [f64; 4] =
+    [0.392_161_444_007_314_1, 0.332_599_136_789_359_44, -0.706_246_172_557_639_3, 0.082_213_596_293_550_8];
 
 const KAHAN_LI_17: [f64; 8] = [
     0.130_202_483_088_890_08,
@@ -62,7 +65,8 @@ impl Composition {
         2 * self.half().len() + 1
     }
 
-    /// The coefficients before the middle one, which is 1 less the sum of all others; those behind it are their mirror image.
+    /// The coefficients before the middle one, which is 1 less the sum of all others; those behind it are
+    /// their mirror image.
     fn half(self) -> &'static [f64] {
         match self {
             Self::Single => &[],
@@ -74,8 +78,8 @@ impl Composition {
 
     /// The substeps of a step `step` \[s\].
     ///
-    /// Rounded to half units in the last place of `step`, so that they add up to it exactly: if they did not, a driven scene would be
-    /// pushed by the difference in every step, always in the same direction.
+    /// Rounded to half units in the last place of `step`, so that they add up to it exactly: if they did not,
+    /// a driven scene would be pushed by the difference in every step, always in the same direction.
     pub fn substeps(self, step: f64) -> Vec<f64> {
         let grain = 0.5 * (step.abs().next_up() - step.abs());
         let mut substeps: Vec<f64> = self.half().iter().map(|g| (g * step / grain).round() * grain).collect();
@@ -115,18 +119,23 @@ mod tests {
         (1..=n).map(|k| k as f64).product()
     }
 
-    /// A symmetric method of order 2 is the flow of h Y1 + h³ Y3 + h⁵ Y5 + ... with generators that do not commute.  Returns by how much
-    /// the composition of these exponentials misses exp(h Y1), grade by grade.
+    /// A symmetric method of order 2 is the flow of h Y1 + h³ Y3 + h⁵ Y5 + ... with generators that do not
+    /// commute.  Returns by how much the composition of these exponentials misses exp(h Y1), grade by grade.
     fn defects(composition: Composition, highest: usize) -> Vec<f64> {
         let words = words(highest);
-        let mut product: Series = words.iter().map(|word| (word.clone(), f64::from(u8::from(word.is_empty())))).collect();
+        let mut product: Series =
+            words.iter().map(|word| (word.clone(), f64::from(u8::from(word.is_empty())))).collect();
         for g in composition.substeps(1.0) {
             let flow = |word: &[usize]| g.powi(word.iter().sum::<usize>() as i32) / factorial(word.len());
-            product = words.iter().map(|w| (w.clone(), (0..=w.len()).map(|cut| product[&w[..cut]] * flow(&w[cut..])).sum())).collect();
+            product = words
+                .iter()
+                .map(|w| (w.clone(), (0..=w.len()).map(|cut| product[&w[..cut]] * flow(&w[cut..])).sum()))
+                .collect();
         }
         let mut worst = vec![0.0f64; highest + 1];
         for (word, found) in product {
-            let exact = if word.iter().all(|&generator| generator == 1) { 1.0 / factorial(word.len()) } else { 0.0 };
+            let exact =
+                if word.iter().all(|&generator| generator == 1) { 1.0 / factorial(word.len()) } else { 0.0 };
             let grade: usize = word.iter().sum();
             worst[grade] = worst[grade].max((found - exact).abs());
         }

@@ -1,10 +1,12 @@
 //! `dp8`: Dormand–Prince 8(5,3), our own stepper.
 //!
-//! Order 8, twelve stages and the rate at the new state; adaptive, explicit; keeps nothing by itself.  Choose it from 1e-6 to 1e-12 where projection after
-//! every step or located impacts are needed; otherwise `dop853` gives the same.
+//! Order 8, twelve stages and the rate at the new state; adaptive, explicit; keeps nothing by itself.  Choose
+//! it from 1e-6 to 1e-12 where projection after every step or located impacts are needed; otherwise `dop853`
+//! gives the same.
 //!
-//! Source: P. J. Prince, J. R. Dormand, *High order embedded Runge-Kutta formulae*, J. Comp. Appl. Math. 7 (1981); coefficients, error estimate and interpolation of
-//! order 7 as in Hairer, Nørsett, Wanner I, sections II.5 and II.6 (DOP853).
+//! Source: P. J. Prince, J. R. Dormand, *High order embedded Runge-Kutta formulae*, J. Comp. Appl. Math. 7
+//! (1981); coefficients, error estimate and interpolation of order 7 as in Hairer, Nørsett, Wanner I,
+//! sections II.5 and II.6 (DOP853).
 
 use super::explicit::{Explicit, NESTED, Pair, Row};
 
@@ -29,7 +31,12 @@ const A: [Row; 11] = [
         (3, 0.170_828_608_729_473_871_279_604_482_2),
         (4, 0.125_467_687_566_822_425_016_691_814_1),
     ],
-    &[(0, 0.037_109_375), (3, 0.170_252_211_019_544_039_314_978_060_3), (4, 0.060_216_538_980_455_960_685_021_939_73), (5, -0.017_578_125)],
+    &[
+        (0, 0.037_109_375),
+        (3, 0.170_252_211_019_544_039_314_978_060_3),
+        (4, 0.060_216_538_980_455_960_685_021_939_73),
+        (5, -0.017_578_125),
+    ],
     &[
         (0, 0.037_092_000_118_504_792_710_877_931_98),
         (3, 0.170_383_925_712_239_993_810_214_054_7),

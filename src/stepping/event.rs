@@ -1,9 +1,13 @@
-//! Events inside a step: found on its dense output by [`search`](super::search), then landed on by steps that end there.
+//! Events inside a step: found on its dense output by [`search`](super::search), then landed on by steps that
+//! end there.
 //!
-//! The step is repeated to end on the event, so that the state there has the accuracy of a step and not of its interpolation.  Where the dense output comes
-//! so near to zero that it does not know the side, the step is repeated to end at the minimum, and what is looked at then has the accuracy of a step, too.
+//! The step is repeated to end on the event, so that the state there has the accuracy of a step and not of
+//! its interpolation.  Where the dense output comes so near to zero that it does not know the side, the step
+//! is repeated to end at the minimum, and what is looked at then has the accuracy of a step, too.
 
-use super::search::{Chebyshev, Crossing, Curve, Part, ROUNDING, TOUCH, crossing, doubtful, root, shift, value};
+use super::search::{
+    Chebyshev, Crossing, Curve, Part, ROUNDING, TOUCH, crossing, doubtful, root, shift, value,
+};
 use super::{Statistics, finest};
 use crate::dynamics::{Along, OdeSystem, State};
 use std::cell::RefCell;
@@ -59,7 +63,9 @@ impl Dense {
     fn bounds(&self, centre: f64, radius: f64, first: &mut [f64], second: &mut [f64]) {
         let mut room = [0.0; WIDEST];
         let local = &mut room[..self.width];
-        for (powers, (first, second)) in self.powers.chunks_exact(self.width).zip(first.iter_mut().zip(second)) {
+        for (powers, (first, second)) in
+            self.powers.chunks_exact(self.width).zip(first.iter_mut().zip(second))
+        {
             local.copy_from_slice(powers);
             shift(local, centre);
             let terms = |skip: usize| local.iter().enumerate().skip(skip).rev();
@@ -183,7 +189,8 @@ impl<F: OdeSystem + ?Sized> Curve for Gap<'_, F> {
 }
 
 impl Search {
-    /// Looks through the step just made, and makes it anew to end on the first event in it, or where more is to be seen.
+    /// Looks through the step just made, and makes it anew to end on the first event in it, or where more is
+    /// to be seen.
     pub fn meet<F: OdeSystem + ?Sized, S: Stride<F>>(
         &mut self,
         field: &mut F,
@@ -217,7 +224,8 @@ impl Search {
         if h == whole { Met::Whole } else { Met::Short(h) }
     }
 
-    /// The first that is to be seen inside the step just made; minima that may be on either side of zero where these are `asked` for.
+    /// The first that is to be seen inside the step just made; minima that may be on either side of zero
+    /// where these are `asked` for.
     fn first<F: OdeSystem + ?Sized, S: Stride<F>>(
         &mut self,
         field: &mut F,
@@ -251,7 +259,13 @@ impl Search {
     }
 
     /// The first of the events whose functions are known by their values alone, or what was found before.
-    fn opaquely<F: OdeSystem + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, mut found: Found) -> Found {
+    fn opaquely<F: OdeSystem + ?Sized>(
+        &mut self,
+        field: &mut F,
+        state: &State,
+        h: f64,
+        mut found: Found,
+    ) -> Found {
         let Self { dense, room, gaps, values, opaque, .. } = self;
         gaps.resize(field.events(), 0.0);
         values.resize(opaque.len(), Vec::new());
@@ -282,7 +296,8 @@ impl Search {
         found
     }
 
-    /// Repeats the step so that it ends where the event function is zero to rounding; returns its length, `None` where it cannot be made.
+    /// Repeats the step so that it ends where the event function is zero to rounding; returns its length,
+    /// `None` where it cannot be made.
     fn land<F: OdeSystem + ?Sized, S: Stride<F>>(
         &mut self,
         field: &mut F,
@@ -349,8 +364,16 @@ impl Search {
     }
 }
 
-/// What comes first: that which was found, or what this event function, off by `zone` at most, has to say; minima up to `begin` are none.
-fn earlier(found: Found, event: usize, curve: &impl Curve, zone: f64, off: impl Fn(f64) -> f64, begin: f64) -> Found {
+/// What comes first: that which was found, or what this event function, off by `zone` at most, has to say;
+/// minima up to `begin` are none.
+fn earlier(
+    found: Found,
+    event: usize,
+    curve: &impl Curve,
+    zone: f64,
+    off: impl Fn(f64) -> f64,
+    begin: f64,
+) -> Found {
     let end = found.share();
     // Below, it is known as well as zero is.
     let zone = if zone < 0.1 * TOUCH { 0.0 } else { zone };
@@ -360,7 +383,11 @@ fn earlier(found: Found, event: usize, curve: &impl Curve, zone: f64, off: impl 
     }
     let crosses = crossing(curve, end);
     let passes = if let Crossing::At(share) = crosses { Some(share) } else { None };
-    let near = if zone > 0.0 { doubtful(curve, zone, |share| zone * off(share), [begin, end], passes) } else { None };
+    let near = if zone > 0.0 {
+        doubtful(curve, zone, |share| zone * off(share), [begin, end], passes)
+    } else {
+        None
+    };
     match (crosses, near) {
         (Crossing::Inside(share), near) if near.is_none_or(|near| share <= near) => Found::Inside(share),
         (_, Some(near)) => Found::Near(near),
@@ -375,7 +402,11 @@ mod tests {
 
     #[test]
     fn derivatives_of_a_dense_output_keep_to_their_bounds() {
-        let dense = Dense { powers: vec![0.3, -1.0, 0.7, 2.0, -0.4, 1.0, 0.0, -3.0, 0.0, 0.5], width: 5, off: vec![0.0; 2] };
+        let dense = Dense {
+            powers: vec![0.3, -1.0, 0.7, 2.0, -0.4, 1.0, 0.0, -3.0, 0.0, 0.5],
+            width: 5,
+            off: vec![0.0; 2],
+        };
         let (mut y, mut slope, mut before) = ([0.0; 2], [0.0; 2], [0.0; 2]);
         for (centre, radius) in [(0.5, 0.5), (0.3, 0.1), (0.9, 0.01)] {
             let (mut first, mut second) = ([0.0; 2], [0.0; 2]);
@@ -386,11 +417,17 @@ mod tests {
                 dense.at(t - h, &mut y, &mut before);
                 dense.at(t + h, &mut y, &mut slope);
                 for i in 0..2 {
-                    most[i] = [most[i][0].max(slope[i].abs()), most[i][1].max(((slope[i] - before[i]) / (2.0 * h)).abs())];
+                    most[i] = [
+                        most[i][0].max(slope[i].abs()),
+                        most[i][1].max(((slope[i] - before[i]) / (2.0 * h)).abs()),
+                    ];
                 }
             }
             for i in 0..2 {
-                assert!(most[i][0] <= first[i] + 1e-4 && most[i][1] <= second[i] + 1e-4, "{most:?} {first:?} {second:?}");
+                assert!(
+                    most[i][0] <= first[i] + 1e-4 && most[i][1] <= second[i] + 1e-4,
+                    "{most:?} {first:?} {second:?}"
+                );
                 assert!(radius > 0.1 || first[i] < 1.2 * most[i][0] + 0.1, "{most:?} {first:?}");
             }
         }

@@ -5,11 +5,13 @@
 //! h⁺ = h · clamp(0.9 err^(-1/p), 1/3, 6)
 //! ```
 //!
-//! Steps are as long as the tolerance allows, and output times are read off the pair's interpolation; the step proposed before one that was cut short is kept.  The update is
-//! compensated: what rounding drops from y is carried in the state's low part.  Events are bracketed on the interpolated solution and
-//! the step is then repeated to end on the event, so the state there has the accuracy of a step.
+//! Steps are as long as the tolerance allows, and output times are read off the pair's interpolation; the
+//! step proposed before one that was cut short is kept.  The update is compensated: what rounding drops from
+//! y is carried in the state's low part.  Events are bracketed on the interpolated solution and the step is
+//! then repeated to end on the event, so the state there has the accuracy of a step.
 //!
-//! Source: E. Hairer, S. P. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sections II.4-II.6.
+//! Source: E. Hairer, S. P. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993),
+//! sections II.4-II.6.
 
 use super::event::{Dense, Met, Search, Stride};
 use super::{Cause, Integrator, Statistics, StepError};
@@ -40,14 +42,16 @@ pub trait Pair {
     /// b_i.
     const B: Row;
 
-    /// Squared error over squared tolerance, averaged over the components; `k` holds the stages row by row and the rate at the new state last.
+    /// Squared error over squared tolerance, averaged over the components; `k` holds the stages row by row
+    /// and the rate at the new state last.
     fn error(h: f64, k: &[f64], scale: &[f64]) -> f64;
 
-    /// Writes the extra stages by calling `rate(c, a)`, where the stage is `y + h Σ a k` at `t + c h`; the rate at the new state is
-    /// stage number `STAGES`, the extra ones follow.
+    /// Writes the extra stages by calling `rate(c, a)`, where the stage is `y + h Σ a k` at `t + c h`; the
+    /// rate at the new state is stage number `STAGES`, the extra ones follow.
     fn extra_stages(rate: &mut dyn FnMut(usize, f64, Row));
 
-    /// Coefficients of the interpolation, of an unknown that changes by `change`: at the share s of the step it is y + s (c_1 + (1-s) (c_2 + s (c_3 + …))).
+    /// Coefficients of the interpolation, of an unknown that changes by `change`: at the share s of the step
+    /// it is y + s (c_1 + (1-s) (c_2 + s (c_3 + …))).
     fn interpolate(h: f64, change: f64, k: &dyn Fn(usize) -> f64) -> [f64; NESTED];
 }
 
@@ -135,7 +139,13 @@ impl<P: Pair> Explicit<P> {
     }
 
     /// Stages 2… and the new state of a step of `h` from `state`; stage 1 is in place.
-    fn attempt<F: OdeSystem + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, statistics: &mut Statistics) {
+    fn attempt<F: OdeSystem + ?Sized>(
+        &mut self,
+        field: &mut F,
+        state: &State,
+        h: f64,
+        statistics: &mut Statistics,
+    ) {
         let n = state.y.len();
         self.has_extra = false;
         for (i, row) in P::A.iter().enumerate() {
@@ -158,13 +168,21 @@ impl<P: Pair> Explicit<P> {
     }
 
     /// A first step from the size of the rate and its change (Hairer, Nørsett, Wanner, page 169).
-    fn first_step<F: OdeSystem + ?Sized>(&mut self, field: &mut F, state: &State, span: f64, statistics: &mut Statistics) -> f64 {
+    fn first_step<F: OdeSystem + ?Sized>(
+        &mut self,
+        field: &mut F,
+        state: &State,
+        span: f64,
+        statistics: &mut Statistics,
+    ) -> f64 {
         let n = state.y.len();
         super::scales(self.tolerance, &state.y, &self.units, &mut self.scale);
         // What nothing is known of begins with a millionth of the unit of time.
         let unit = field.time_unit();
         let short = 1e-6 * unit;
-        let norm = |x: &dyn Fn(usize) -> f64, scale: &[f64]| ((0..n).map(|i| (x(i) / scale[i]).powi(2)).sum::<f64>() / n as f64).sqrt();
+        let norm = |x: &dyn Fn(usize) -> f64, scale: &[f64]| {
+            ((0..n).map(|i| (x(i) / scale[i]).powi(2)).sum::<f64>() / n as f64).sqrt()
+        };
         let (d0, d1) = (norm(&|i| state.y[i], &self.scale), norm(&|i| self.k[i], &self.scale));
         let guess = if d0 < 1e-5 || d1 * unit < 1e-5 { short } else { 0.01 * d0 / d1 };
         let guess = guess.min(span);
@@ -176,14 +194,23 @@ impl<P: Pair> Explicit<P> {
         statistics.evaluations += 1;
         let d2 = norm(&|i| rest[i] - first[i], &self.scale) / guess;
         let steepest = (d1 * unit).max(d2 * unit * unit);
-        let second =
-            if steepest <= 1e-15 { (1e-3 * guess).max(short) } else { unit * libm::pow(0.01 / steepest, 1.0 / f64::from(P::ORDER)) };
+        let second = if steepest <= 1e-15 {
+            (1e-3 * guess).max(short)
+        } else {
+            unit * libm::pow(0.01 / steepest, 1.0 / f64::from(P::ORDER))
+        };
         let first = (100.0 * guess).min(second).min(span);
         if first.is_finite() { first } else { span.min(short) }
     }
 
     /// The stages an interpolation of the step just made asks for beside its own.
-    fn evaluate_extra_stages<F: OdeSystem + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, statistics: &mut Statistics) {
+    fn evaluate_extra_stages<F: OdeSystem + ?Sized>(
+        &mut self,
+        field: &mut F,
+        state: &State,
+        h: f64,
+        statistics: &mut Statistics,
+    ) {
         let n = state.y.len();
         self.has_extra = true;
         let (k, stage) = (&mut self.k, &mut self.stage);
@@ -194,9 +221,16 @@ impl<P: Pair> Explicit<P> {
         });
     }
 
-    /// Writes the end of a step of `h` from the beginning of the last one, where that is within the tolerance: for where the interpolation is not, as in long steps
-    /// on the way out of an unstable equilibrium.
-    fn step_inside<F: OdeSystem + ?Sized>(&mut self, field: &mut F, from: &State, h: f64, inside: &mut State) {
+    /// Writes the end of a step of `h` from the beginning of the last one, where that is within the
+    /// tolerance: for where the interpolation is not, as in long steps on the way out of an unstable
+    /// equilibrium.
+    fn step_inside<F: OdeSystem + ?Sized>(
+        &mut self,
+        field: &mut F,
+        from: &State,
+        h: f64,
+        inside: &mut State,
+    ) {
         let n = from.y.len();
         let mut shorter = self.shorter.take().unwrap_or_else(|| Box::new(Self::new(self.tolerance)));
         shorter.resize(n);
@@ -214,9 +248,10 @@ impl<P: Pair> Explicit<P> {
     /// The component that asks most of the step, or the first that is not finite.
     fn culprit<F: OdeSystem + ?Sized>(&self, field: &F, n: usize) -> String {
         let last = &self.k[P::STAGES * n..(P::STAGES + 1) * n];
-        let worst = (0..n)
-            .find(|&i| !(self.next[i].is_finite() && last[i].is_finite()))
-            .or_else(|| (0..n).max_by(|&a, &b| (last[a] / self.scale[a]).abs().total_cmp(&(last[b] / self.scale[b]).abs())));
+        let worst = (0..n).find(|&i| !(self.next[i].is_finite() && last[i].is_finite())).or_else(|| {
+            (0..n)
+                .max_by(|&a, &b| (last[a] / self.scale[a]).abs().total_cmp(&(last[b] / self.scale[b]).abs()))
+        });
         worst.map_or_else(String::new, |i| field.label(i))
     }
 
@@ -252,7 +287,8 @@ fn sum_up(row: Row, k: &[f64], out: &mut [f64]) {
     }
 }
 
-/// The same for `D` unknowns, side by side: one after another the sums of small systems wait for their own additions.
+/// The same for `D` unknowns, side by side: one after another the sums of small systems wait for their own
+/// additions.
 fn sum_up_sized<const D: usize>(row: Row, k: &[f64], out: &mut [f64]) {
     let mut sums = [0.0; D];
     for &(j, a) in row {
@@ -264,7 +300,8 @@ fn sum_up_sized<const D: usize>(row: Row, k: &[f64], out: &mut [f64]) {
     out.copy_from_slice(&sums);
 }
 
-/// The largest value of what the last coefficient is that of: a polynomial that is zero, and smallest by far, at both ends of the step.
+/// The largest value of what the last coefficient is that of: a polynomial that is zero, and smallest by far,
+/// at both ends of the step.
 fn highest<P: Pair>() -> f64 {
     let (low, high) = (P::DEGREE / 2, P::DEGREE.div_ceil(2));
     let [s, t] = [low, high].map(|power| power as f64 / P::DEGREE as f64);
@@ -289,7 +326,14 @@ fn expand(nested: &[f64], powers: &mut [f64]) {
 }
 
 impl<P: Pair, F: OdeSystem + ?Sized> Stride<F> for Explicit<P> {
-    fn dense(&mut self, field: &mut F, state: &State, h: f64, dense: &mut Dense, statistics: &mut Statistics) {
+    fn dense(
+        &mut self,
+        field: &mut F,
+        state: &State,
+        h: f64,
+        dense: &mut Dense,
+        statistics: &mut Statistics,
+    ) {
         self.evaluate_extra_stages(field, state, h, statistics);
         let n = state.y.len();
         dense.begin(field.watched(), P::DEGREE + 1, state);
@@ -352,7 +396,13 @@ impl<P: Pair, F: OdeSystem + ?Sized> Integrator<F> for Explicit<P> {
         Ok(())
     }
 
-    fn step(&mut self, field: &mut F, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError> {
+    fn step(
+        &mut self,
+        field: &mut F,
+        state: &mut State,
+        until: Time,
+        statistics: &mut Statistics,
+    ) -> Result<Option<usize>, StepError> {
         let n = state.y.len();
         let left = (until - state.time).hi;
         match std::mem::replace(&mut self.rate, Rate::First) {
@@ -391,7 +441,13 @@ impl<P: Pair, F: OdeSystem + ?Sized> Integrator<F> for Explicit<P> {
                 (wanted, is_rejected) = (h * factor.min(0.9), true);
                 if wanted < super::finest(state, field.time_unit()) {
                     let what = format!("{} asks for ever smaller steps", self.culprit(field, n));
-                    return Err(Self::stop(Cause::StepTooSmall, state, h, what, "loosen the tolerance, or take --method taylor or radau9"));
+                    return Err(Self::stop(
+                        Cause::StepTooSmall,
+                        state,
+                        h,
+                        what,
+                        "loosen the tolerance, or take --method taylor or radau9",
+                    ));
                 }
                 continue;
             }
@@ -491,7 +547,10 @@ pub(super) mod checks {
             k.push(rate(t + h));
             P::extra_stages(&mut |_, c, _: Row| k.push(rate(t + c * h)));
             let mut powers = [0.0; NESTED];
-            super::expand(&P::interpolate(h, exact(t + h), &|stage| k[stage])[..P::DEGREE], &mut powers[..P::DEGREE]);
+            super::expand(
+                &P::interpolate(h, exact(t + h), &|stage| k[stage])[..P::DEGREE],
+                &mut powers[..P::DEGREE],
+            );
             for theta in [0.1, 0.5, 0.8, 1.0] {
                 let found = powers.iter().rev().fold(0.0, |sum, power| (sum + power) * theta);
                 assert!((found - exact(t + theta * h)).abs() < tolerance, "power {m} at {theta}: {found}");

@@ -1,4 +1,5 @@
-//! Factors of small dense matrices, real or complex, for the Newton iterations of implicit methods; nothing is allocated after the first of a size.
+//! Factors of small dense matrices, real or complex, for the Newton iterations of implicit methods; nothing
+//! is allocated after the first of a size.
 //!
 //! ```text
 //! P A = L U,   rows exchanged so that |l| <= 1
@@ -155,8 +156,12 @@ mod tests {
         // Without an exchange of rows the first pivot would be zero.
         let matrix = [1.0, 2.0, -1.0, 3.0, 0.5, 4.0, -2.0, 1.0, 7.0];
         let x = [1.0, -2.0, 0.5].map(|re| Complex { re, im: 0.25 * re + 1.0 });
-        for factor in [Complex { re: 1.0, im: 0.0 }, Complex { re: 0.3, im: -0.8 }, Complex { re: 1e9, im: 2e9 }] {
-            let mut product: Vec<_> = (0..3).map(|i| (0..3).fold(x[i], |sum, j| sum - factor.times(matrix[3 * i + j]) * x[j])).collect();
+        for factor in
+            [Complex { re: 1.0, im: 0.0 }, Complex { re: 0.3, im: -0.8 }, Complex { re: 1e9, im: 2e9 }]
+        {
+            let mut product: Vec<_> = (0..3)
+                .map(|i| (0..3).fold(x[i], |sum, j| sum - factor.times(matrix[3 * i + j]) * x[j]))
+                .collect();
             let mut factors = Factors::default();
             factors.of_shifted(factor, &matrix, 3);
             factors.solve(&mut product);
@@ -166,7 +171,8 @@ mod tests {
         }
         let mut factors = Factors::default();
         factors.of_shifted(1.0, &matrix, 3);
-        let mut product: Vec<f64> = (0..3).map(|i| (0..3).fold(x[i].re, |sum, j| sum - matrix[3 * i + j] * x[j].re)).collect();
+        let mut product: Vec<f64> =
+            (0..3).map(|i| (0..3).fold(x[i].re, |sum, j| sum - matrix[3 * i + j] * x[j].re)).collect();
         factors.solve(&mut product);
         assert!(product.iter().zip(x).all(|(found, expected)| (found - expected.re).abs() < 1e-14));
     }

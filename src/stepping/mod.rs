@@ -1,8 +1,8 @@
 //! Methods: how a state is integrated from one time to another.
 //!
-//! A method is configuration and scratch space; the [`State`] belongs to the caller and holds everything a restart needs.  The
-//! problem is a type parameter: Dormand–Prince, Radau and Gauss are `Integrator<F: OdeSystem>`, RATTLE is `Integrator<Natural>`, so a wrong pairing does
-//! not compile.
+//! A method is configuration and scratch space; the [`State`] belongs to the caller and holds everything a
+//! restart needs.  The problem is a type parameter: Dormand–Prince, Radau and Gauss are `Integrator<F:
+//! OdeSystem>`, RATTLE is `Integrator<Natural>`, so a wrong pairing does not compile.
 
 #[doc(hidden)]
 pub mod composition;
@@ -55,7 +55,14 @@ pub struct Statistics {
 impl Default for Statistics {
     /// Nothing done, and no bound on what may be.
     fn default() -> Self {
-        Self { steps: 0, evaluations: 0, rejected: 0, jacobians: 0, newton_steps: 0, max_evaluations: u64::MAX }
+        Self {
+            steps: 0,
+            evaluations: 0,
+            rejected: 0,
+            jacobians: 0,
+            newton_steps: 0,
+            max_evaluations: u64::MAX,
+        }
     }
 }
 
@@ -101,7 +108,8 @@ pub enum Seen {
     Kept,
     /// It changed the unknowns (projection): what the method knows of the rate there is stale.
     Changed,
-    /// Nothing, and it is enough for now: the method stops here, with all it needs to go on in the state's memory.
+    /// Nothing, and it is enough for now: the method stops here, with all it needs to go on in the state's
+    /// memory.
     Enough,
     /// It changed the unknowns, and that is enough for now.
     ChangedEnough,
@@ -124,9 +132,10 @@ pub type Watch<'a, P> = dyn FnMut(&mut P, &mut State) -> Result<Seen, StepError>
 
 /// Integrates a problem `P`, one accepted step after the other.
 ///
-/// The contract: [`begin`](Integrator::begin) takes up a state, [`step`](Integrator::step) makes one accepted step from it, [`interpolate`](Integrator::interpolate) is the solution
-/// inside that step, and [`save`](Integrator::save) leaves in the state what `begin` needs to go on to the same bits.  A method has no loop of its own over steps:
-/// that is [`advance`](Integrator::advance), or the caller's.
+/// The contract: [`begin`](Integrator::begin) takes up a state, [`step`](Integrator::step) makes one accepted
+/// step from it, [`interpolate`](Integrator::interpolate) is the solution inside that step, and
+/// [`save`](Integrator::save) leaves in the state what `begin` needs to go on to the same bits.  A method has
+/// no loop of its own over steps: that is [`advance`](Integrator::advance), or the caller's.
 pub trait Integrator<P: ?Sized> {
     /// Name in reports: which code made a result.
     fn name(&self) -> &'static str;
@@ -134,34 +143,46 @@ pub trait Integrator<P: ?Sized> {
     /// Order of the error of one run in the step.
     fn order(&self) -> u32;
 
-    /// Takes up a state, on the way to `until` \[s\]: what was remembered of the steps before is in its memory.  Called before the first step, and wherever
-    /// the state is not the end of the step made last.
+    /// Takes up a state, on the way to `until` \[s\]: what was remembered of the steps before is in its
+    /// memory.  Called before the first step, and wherever the state is not the end of the step made last.
     ///
     /// # Errors
     /// The method cannot integrate this problem, or not in this direction.
     fn begin(&mut self, problem: &mut P, state: &mut State, until: Time) -> Result<(), StepError>;
 
-    /// Makes one accepted step from the state taken up, or from the end of the last one, and not beyond `until` \[s\], which lies ahead; the number of the event
-    /// located at its end, if there is one.  The state is then the one just before that takes effect.
+    /// Makes one accepted step from the state taken up, or from the end of the last one, and not beyond
+    /// `until` \[s\], which lies ahead; the number of the event located at its end, if there is one.  The
+    /// state is then the one just before that takes effect.
     ///
     /// # Errors
     /// A typed stop with time, step, culprit and suggestion; the state is unchanged.
-    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError>;
+    fn step(
+        &mut self,
+        problem: &mut P,
+        state: &mut State,
+        until: Time,
+        statistics: &mut Statistics,
+    ) -> Result<Option<usize>, StepError>;
 
-    /// True where no step is left before `until`: adaptive methods land on it, fixed-step methods take the whole number of steps nearest to it.
+    /// True where no step is left before `until`: adaptive methods land on it, fixed-step methods take the
+    /// whole number of steps nearest to it.
     fn is_at(&self, state: &State, until: Time) -> bool {
         (until - state.time).hi <= 0.0
     }
 
-    /// Called where the unknowns of the state were changed a little after a step (projection): what the method knows of the rate there is stale.
+    /// Called where the unknowns of the state were changed a little after a step (projection): what the
+    /// method knows of the rate there is stale.
     fn changed(&mut self, _state: &mut State) {}
 
-    /// Leaves in the state's memory all that [`begin`](Integrator::begin) needs to go on as if nothing had been between.
+    /// Leaves in the state's memory all that [`begin`](Integrator::begin) needs to go on as if nothing had
+    /// been between.
     fn save(&self, _state: &mut State) {}
 
-    /// Integrates `state` to `until` \[s\], or to the first event before it: the loop over steps for all methods.
+    /// Integrates `state` to `until` \[s\], or to the first event before it: the loop over steps for all
+    /// methods.
     ///
-    /// The same call from the same state gives the same bits, and where a watcher had enough on the way, so does calling again from there.
+    /// The same call from the same state gives the same bits, and where a watcher had enough on the way, so
+    /// does calling again from there.
     ///
     /// # Errors
     /// A typed stop; the state is then the last accepted one.
@@ -191,19 +212,23 @@ pub trait Integrator<P: ?Sized> {
         Ok(Reached::Until)
     }
 
-    /// True where output times are read off its steps by [`Integrator::interpolate`]; the steps of all others end on output times.
+    /// True where output times are read off its steps by [`Integrator::interpolate`]; the steps of all others
+    /// end on output times.
     fn is_dense(&self) -> bool {
         false
     }
 
-    /// Writes the state at `time` \[s\] inside the last step, which began at `from`, to the accuracy of the step.
+    /// Writes the state at `time` \[s\] inside the last step, which began at `from`, to the accuracy of the
+    /// step.
     ///
-    /// Nothing of the method or of the integration changes by it.  Methods that have no polynomial of that accuracy make a shorter step from
-    /// `from`.  What writes nothing, as here, is given such a step by a run, where it is not [dense](Integrator::is_dense).
+    /// Nothing of the method or of the integration changes by it.  Methods that have no polynomial of that
+    /// accuracy make a shorter step from `from`.  What writes nothing, as here, is given such a step by a
+    /// run, where it is not [dense](Integrator::is_dense).
     fn interpolate(&mut self, _problem: &mut P, _from: &State, _time: Time, _inside: &mut State) {}
 
-    /// Called where the state was changed from outside at once: an impact, or a contact that begins or ends.  Forgets all that depends on the motion before it:
-    /// predictors, Jacobians, rates, the history of errors.  Of the state's memory only the step remains, as a proposal.
+    /// Called where the state was changed from outside at once: an impact, or a contact that begins or ends.
+    /// Forgets all that depends on the motion before it: predictors, Jacobians, rates, the history of errors.
+    /// Of the state's memory only the step remains, as a proposal.
     fn reset(&mut self, state: &mut State) {
         state.memory.clear();
     }
@@ -219,7 +244,8 @@ pub trait Integrator<P: ?Sized> {
     }
 }
 
-/// The state at `time` \[s\], by as short a step of `method` from `from`, of which nothing but the motion is known; where that fails, what it came to.
+/// The state at `time` \[s\], by as short a step of `method` from `from`, of which nothing but the motion is
+/// known; where that fails, what it came to.
 pub(crate) fn shortened<P: ?Sized, M: Integrator<P> + ?Sized>(
     method: &mut M,
     problem: &mut P,
@@ -264,7 +290,8 @@ pub enum Cause {
     RestingContact,
     /// A point was found behind a wall, or away from the wall it is held at: an impact was missed.
     WallPassed,
-    /// An impact was not what the law of impact makes of the motion before it, or the first sample is not the start.
+    /// An impact was not what the law of impact makes of the motion before it, or the first sample is not the
+    /// start.
     ImpactCheckFailed,
     /// The method does not fit the mechanism.
     Unsuited,
@@ -324,7 +351,8 @@ fn scales(tolerance: Tolerance, y: &[f64], units: &[f64], scale: &mut [f64]) {
     }
 }
 
-/// The step \[s\] of a method that wants `wanted` with `left` to go, and whether it goes all the way: two halves rather than a step and a sliver.
+/// The step \[s\] of a method that wants `wanted` with `left` to go, and whether it goes all the way: two
+/// halves rather than a step and a sliver.
 fn reach(wanted: f64, left: f64) -> (f64, bool) {
     if wanted >= left * (1.0 - 1e-12) {
         return (left, true);

@@ -1,8 +1,10 @@
 //! Radau IIA collocation: `radau5` with three stages and `radau9` with five, of order 2s - 1.
 //!
-//! Implicit, adaptive, stiffly accurate and L-stable: fast modes that are damped cost it nothing once they have died away, and its steps follow the slow motion.
-//! To choose for dampers and damped stiff springs.  *Not* for stiff springs that swing: it eats their energy wherever its steps are longer than their
-//! periods, and where they are not the explicit methods are cheaper.  It asks for a field with a [Jacobian](OdeSystem::jacobian).
+//! Implicit, adaptive, stiffly accurate and L-stable: fast modes that are damped cost it nothing once they
+//! have died away, and its steps follow the slow motion. To choose for dampers and damped stiff springs.
+//! *Not* for stiff springs that swing: it eats their energy wherever its steps are longer than their periods,
+//! and where they are not the explicit methods are cheaper.  It asks for a field with a
+//! [Jacobian](OdeSystem::jacobian).
 //!
 //! ```text
 //! z_i = h Σ_j a_ij f(t + c_j h, y + z_j),      y1 = y + z_s
@@ -10,12 +12,13 @@
 //! err = h mu_0 (1 - h mu_0 J)^-1 (f(y) + Σ e_i z_i / h)            a formula of order s; filtered once more after a rejection
 //! ```
 //!
-//! Starting values are those of the last step's polynomial, which is also the solution inside a step.  The Jacobian is kept while the iteration contracts by a thousand,
-//! its factors while the step would grow by less than a fifth; the step follows from the last two errors (K. Gustafsson, ACM TOMS 20 (1994)).
-//! All of that is in the state's memory, the Jacobian by the point it was taken at.
+//! Starting values are those of the last step's polynomial, which is also the solution inside a step.  The
+//! Jacobian is kept while the iteration contracts by a thousand, its factors while the step would grow by
+//! less than a fifth; the step follows from the last two errors (K. Gustafsson, ACM TOMS 20 (1994)). All of
+//! that is in the state's memory, the Jacobian by the point it was taken at.
 //!
-//! Source: E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), section IV.8; the same, *Stiff differential equations solved by
-//! Radau methods*, J. Comput. Appl. Math. 111 (1999).
+//! Source: E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), section IV.8;
+//! the same, *Stiff differential equations solved by Radau methods*, J. Comput. Appl. Math. 111 (1999).
 
 mod newton;
 mod tableau;
@@ -102,7 +105,8 @@ struct Control {
 }
 
 impl Control {
-    /// Proposes the next step after an accepted one of `h` \[s\] with its error, the quotient that asks for, and the contraction of its iteration.
+    /// Proposes the next step after an accepted one of `h` \[s\] with its error, the quotient that asks for,
+    /// and the contraction of its iteration.
     fn accept(&mut self, h: f64, error: f64, exponent: f64, mut quotient: f64, theta: f64, is_hard: bool) {
         if self.accepted > 0.0 {
             let predicted = (self.accepted / h) * libm::pow(error * error / self.error, exponent) / SAFE;
@@ -124,7 +128,13 @@ const CONTROLS: usize = 7;
 impl Radau {
     /// The method of three or five stages; `None` for any other number.
     pub fn new(stages: usize, tolerance: Tolerance) -> Option<Self> {
-        Some(Self { tolerance, tableau: Tableau::new(stages)?, work: Work::default(), control: Control::default(), is_hard: true })
+        Some(Self {
+            tolerance,
+            tableau: Tableau::new(stages)?,
+            work: Work::default(),
+            control: Control::default(),
+            is_hard: true,
+        })
     }
 
     fn id(&self) -> &'static str {
@@ -135,13 +145,15 @@ impl Radau {
         StepError { cause, method: self.id().into(), t: state.time.hi, step, what, hint: hint.into() }
     }
 
-    /// Takes back what the state carries; false where it carries nothing of the kind, or a proposed step alone.
+    /// Takes back what the state carries; false where it carries nothing of the kind, or a proposed step
+    /// alone.
     fn recall(&mut self, state: &State, control: &mut Control) -> bool {
         let (d, s) = (state.y.len(), self.tableau.stages());
         if let [wanted] = state.memory[..] {
             control.wanted = wanted;
         }
-        let (Some((numbers, rest)), true) = (state.memory.split_first_chunk::<CONTROLS>(), state.memory.len() == CONTROLS + (s + 1) * d)
+        let (Some((numbers, rest)), true) =
+            (state.memory.split_first_chunk::<CONTROLS>(), state.memory.len() == CONTROLS + (s + 1) * d)
         else {
             return false;
         };
@@ -168,13 +180,23 @@ impl Radau {
 
     /// A first step from the sizes of unknowns and rates; the error estimate corrects it.
     fn first_step(&self, state: &State, span: f64, short: f64) -> f64 {
-        let norm = |x: &[f64]| x.iter().zip(&self.work.scale).map(|(x, scale)| (x / scale) * (x / scale)).sum::<f64>().sqrt();
+        let norm = |x: &[f64]| {
+            x.iter().zip(&self.work.scale).map(|(x, scale)| (x / scale) * (x / scale)).sum::<f64>().sqrt()
+        };
         let guess = 0.01 * norm(&state.y) / norm(&self.work.start);
         if guess.is_finite() && guess > 0.0 { guess.min(span) } else { span.min(short) }
     }
 
-    /// The new state, and the error over the tolerance; filtered once more where the step is a hard one, just rejected or the first.
-    fn estimate<F: OdeSystem + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, is_hard: bool, statistics: &mut Statistics) -> f64 {
+    /// The new state, and the error over the tolerance; filtered once more where the step is a hard one, just
+    /// rejected or the first.
+    fn estimate<F: OdeSystem + ?Sized>(
+        &mut self,
+        field: &mut F,
+        state: &State,
+        h: f64,
+        is_hard: bool,
+        statistics: &mut Statistics,
+    ) -> f64 {
         let Self { tableau, work, .. } = self;
         let (s, d) = (tableau.stages(), state.y.len());
         let fade = h * tableau.real.value;
@@ -226,7 +248,9 @@ impl Radau {
             let share = (self.work.error[k] / self.work.scale[k]).abs();
             if share.is_nan() { f64::INFINITY } else { share }
         };
-        (0..self.work.scale.len()).max_by(|&a, &b| share(a).total_cmp(&share(b))).map_or_else(String::new, |k| field.label(k))
+        (0..self.work.scale.len())
+            .max_by(|&a, &b| share(a).total_cmp(&share(b)))
+            .map_or_else(String::new, |k| field.label(k))
     }
 
     fn resize(&mut self, d: usize) {
@@ -254,13 +278,15 @@ impl Radau {
 }
 
 impl<F: OdeSystem + ?Sized> Stride<F> for Radau {
-    /// Its powers, and what it may be off: it has not the slope of the solution at the start, but at the stages.
+    /// Its powers, and what it may be off: it has not the slope of the solution at the start, but at the
+    /// stages.
     fn dense(&mut self, field: &mut F, state: &State, h: f64, dense: &mut Dense, _tally: &mut Statistics) {
         let (s, d) = (self.tableau.stages(), state.y.len());
         dense.begin(field.watched(), s + 1, state);
         for (k, (powers, off)) in dense.each().enumerate() {
             for (m, power) in powers[1..].iter_mut().enumerate() {
-                *power = (0..s).fold(0.0, |sum, j| sum + self.tableau.powers[j * s + m] * self.work.z[j * d + k]);
+                *power =
+                    (0..s).fold(0.0, |sum, j| sum + self.tableau.powers[j * s + m] * self.work.z[j * d + k]);
             }
             *off = self.tableau.off * (h * self.work.start[k] - powers[1]).abs();
         }
@@ -276,7 +302,8 @@ impl<F: OdeSystem + ?Sized> Stride<F> for Radau {
         self.predict(h, length, true);
         self.factor(h, state.y.len());
         let mut contraction = 1.0;
-        let has_converged = matches!(self.solve(field, state, h, &mut contraction, statistics), Solved::Converged(..));
+        let has_converged =
+            matches!(self.solve(field, state, h, &mut contraction, statistics), Solved::Converged(..));
         self.close(state);
         field.rhs(state.time + h, &self.work.next, &mut self.work.next_rate);
         statistics.evaluations += 1;
@@ -312,7 +339,13 @@ impl<F: OdeSystem + ?Sized> Integrator<F> for Radau {
         Ok(())
     }
 
-    fn step(&mut self, field: &mut F, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError> {
+    fn step(
+        &mut self,
+        field: &mut F,
+        state: &mut State,
+        until: Time,
+        statistics: &mut Statistics,
+    ) -> Result<Option<usize>, StepError> {
         let (d, left) = (state.y.len(), (until - state.time).hi);
         field.fine_rate(state.time, &state.y, &state.low, &mut self.work.start);
         statistics.evaluations += 1;
@@ -329,8 +362,11 @@ impl<F: OdeSystem + ?Sized> Integrator<F> for Radau {
                 let hint = "loosen the tolerance: forces of stiff springs have a rounding of their own";
                 return Err(self.stop(Cause::StepTooSmall, state, h, what, hint));
             }
-            let is_fresh = control.keeps == 0.0 && !(self.work.place.0 == state.time && self.work.place.1 == state.y);
-            if (is_fresh || self.work.jacobian.is_empty()) && !self.differentiate(field, is_fresh.then_some(&*state), statistics) {
+            let is_fresh =
+                control.keeps == 0.0 && !(self.work.place.0 == state.time && self.work.place.1 == state.y);
+            if (is_fresh || self.work.jacobian.is_empty())
+                && !self.differentiate(field, is_fresh.then_some(&*state), statistics)
+            {
                 let what = "this form of the equations has no Jacobian".into();
                 return Err(self.stop(Cause::Unsuited, state, h, what, "use dp8"));
             }
@@ -348,7 +384,11 @@ impl<F: OdeSystem + ?Sized> Integrator<F> for Radau {
                 }
                 Solved::NotFinite => (f64::NAN, 0),
             };
-            let error = if sweeps > 0 { self.estimate(field, state, h, self.is_hard, statistics).max(1e-10) } else { f64::NAN };
+            let error = if sweeps > 0 {
+                self.estimate(field, state, h, self.is_hard, statistics).max(1e-10)
+            } else {
+                f64::NAN
+            };
             if !error.is_finite() {
                 cuts += 1;
                 statistics.rejected += 1;
@@ -361,13 +401,17 @@ impl<F: OdeSystem + ?Sized> Integrator<F> for Radau {
                 continue;
             }
             cuts = 0;
-            let (exponent, most) = (1.0 / (self.tableau.stages() as f64 + 1.0), if self.tableau.stages() == 3 { 7.0 } else { 12.0 });
+            let (exponent, most) = (
+                1.0 / (self.tableau.stages() as f64 + 1.0),
+                if self.tableau.stages() == 3 { 7.0 } else { 12.0 },
+            );
             let factor = SAFE.min(SAFE * (1.0 + 2.0 * most) / (sweeps as f64 + 2.0 * most));
             let quotient = (libm::pow(error, exponent) / factor).clamp(QUOTIENT[0], QUOTIENT[1]);
             if error >= 1.0 {
                 statistics.rejected += 1;
                 let is_first = control.accepted == 0.0;
-                (self.is_hard, control.wanted, control.keeps) = (true, if is_first { 0.1 * h } else { h / quotient }, 0.0);
+                (self.is_hard, control.wanted, control.keeps) =
+                    (true, if is_first { 0.1 * h } else { h / quotient }, 0.0);
                 continue;
             }
             let (h, event, lands) = match self.meet(field, state, h, statistics) {
@@ -466,7 +510,10 @@ mod tests {
             scales(radau.tolerance, &state.y, &[1.0], &mut radau.work.scale);
             radau.differentiate(&mut Bernoulli, Some(&state), &mut statistics);
             // Goes on from where the iteration before gave up.
-            assert!((0..5).any(|_| radau.repeat(&mut Bernoulli, &state, h, &mut statistics)), "step {step} of {count}");
+            assert!(
+                (0..5).any(|_| radau.repeat(&mut Bernoulli, &state, h, &mut statistics)),
+                "step {step} of {count}"
+            );
             state.y.copy_from_slice(&radau.work.next);
             state.low.copy_from_slice(&radau.work.next_low);
             state.time = Time::of(f64::from(step) * h);
@@ -484,7 +531,8 @@ mod tests {
         }
     }
 
-    /// A linear system whose fast mode dies at once: the method follows the slow one with long steps, and its estimate sees no more.
+    /// A linear system whose fast mode dies at once: the method follows the slow one with long steps, and its
+    /// estimate sees no more.
     #[test]
     fn what_has_died_away_costs_nothing() {
         struct Fast;
@@ -507,10 +555,14 @@ mod tests {
             }
         }
         for stages in [3, 5] {
-            let mut radau = Radau::new(stages, Tolerance { relative: 1e-8, absolute: 1e-8 }).expect("a method");
+            let mut radau =
+                Radau::new(stages, Tolerance { relative: 1e-8, absolute: 1e-8 }).expect("a method");
             let mut state = State { y: vec![1.0, 3.0], low: vec![0.0; 2], ..State::default() };
             let mut statistics = Statistics::default();
-            let reached = radau.advance(&mut Fast, &mut state, Time::of(2.0), &mut statistics, &mut |_, _| Ok(super::super::Seen::Kept));
+            let reached =
+                radau.advance(&mut Fast, &mut state, Time::of(2.0), &mut statistics, &mut |_, _| {
+                    Ok(super::super::Seen::Kept)
+                });
             assert_eq!(reached, Ok(crate::stepping::Reached::Until));
             let exact = (-2.0_f64).exp();
             assert!(state.y.iter().all(|y| (y - exact).abs() < 1e-7), "{:?}", state.y);

@@ -1,9 +1,10 @@
 //! RATTLE, order 2, and its symmetric compositions of order 4, 6 and 8; fixed step.
 //!
-//! Keeps: every constraint at position and velocity level to rounding; symplectic and time-symmetric, so energy (with motors: energy less
-//! work) oscillates with an amplitude of the method's order and has no drift.  Choose it for long horizons of constrained or driven scenes
-//! where a cheap step counts; for few bodies and the last digits Gauss and Taylor are better.  Asks for the [`Natural`] form: forces that
-//! depend on positions only.
+//! Keeps: every constraint at position and velocity level to rounding; symplectic and time-symmetric, so
+//! energy (with motors: energy less work) oscillates with an amplitude of the method's order and has no
+//! drift.  Choose it for long horizons of constrained or driven scenes where a cheap step counts; for few
+//! bodies and the last digits Gauss and Taylor are better.  Asks for the [`Natural`] form: forces that depend
+//! on positions only.
 //!
 //! ```text
 //! v½ = v0 + h/2 W (F(z0) - g(z0,t0) mu),     z1 = z0 + h v½,     C(z1, t1) = 0             gives mu
@@ -11,17 +12,19 @@
 //! p_t -= h/2 (mu·C_t(z0,t0) + mu'·C_t(z1,t1))                                              driven scenes
 //! ```
 //!
-//! W has the linear rows in it, and both levels are put back onto them at the beginning of every substep: what rounding leaves of them is never
-//! seen by the other rows, and pins would drift in time.  Mechanisms pass singular positions as long as the step lands far enough from them
-//! (module `newton`); where a row cannot be kept to 1e-10, the method stops and names it.
+//! W has the linear rows in it, and both levels are put back onto them at the beginning of every substep:
+//! what rounding leaves of them is never seen by the other rows, and pins would drift in time.  Mechanisms
+//! pass singular positions as long as the step lands far enough from them (module `newton`); where a row
+//! cannot be kept to 1e-10, the method stops and names it.
 //!
-//! Source: H. C. Andersen, *Rattle: a "velocity" version of the Shake algorithm*, J. Comput. Phys. 52 (1983); B. Leimkuhler, R. D. Skeel,
-//! *Symplectic numerical integrators in constrained Hamiltonian systems*, J. Comput. Phys. 112 (1994), for its symplecticity; E. Hairer, C.
-//! Lubich, G. Wanner, *Geometric Numerical Integration*, 2nd ed. (2006), section VII.1.4.  p_t makes time a coordinate, so that a driven
-//! scene is one without drive. Compositions: [`composition`](super::composition).
+//! Source: H. C. Andersen, *Rattle: a "velocity" version of the Shake algorithm*, J. Comput. Phys. 52 (1983);
+//! B. Leimkuhler, R. D. Skeel, *Symplectic numerical integrators in constrained Hamiltonian systems*, J.
+//! Comput. Phys. 112 (1994), for its symplecticity; E. Hairer, C. Lubich, G. Wanner, *Geometric Numerical
+//! Integration*, 2nd ed. (2006), section VII.1.4.  p_t makes time a coordinate, so that a driven scene is one
+//! without drive. Compositions: [`composition`](super::composition).
 //!
-//! Rounding: positions, velocities, p_t and time are pairs, and the last Newton iteration forms C(z1, t1) from them.  What is left is the
-//! rounding of h W F, 1e-16 of a *kick*, not of the state.
+//! Rounding: positions, velocities, p_t and time are pairs, and the last Newton iteration forms C(z1, t1)
+//! from them.  What is left is the rounding of h W F, 1e-16 of a *kick*, not of the state.
 
 mod newton;
 mod substep;
@@ -75,7 +78,8 @@ impl Rattle {
     }
 }
 
-/// Calls a method for the numbers of bodies compiled in, and whether there are guides or translational coordinates: `by_bodies!(problem, state, receiver.method(arguments))`.
+/// Calls a method for the numbers of bodies compiled in, and whether there are guides or translational
+/// coordinates: `by_bodies!(problem, state, receiver.method(arguments))`.
 macro_rules! by_bodies {
     ($problem:expr, $state:expr, $object:ident $(. $part:ident)+ ($($argument:expr),*)) => {{
         let turns = $state.turns.len();
@@ -153,7 +157,8 @@ impl Integrator<Natural> for Rattle {
 }
 
 impl Rattle {
-    /// All substeps of a step, for `N` bodies (any number where `N` is 0), with guides or translational coordinates where `GUIDED`.
+    /// All substeps of a step, for `N` bodies (any number where `N` is 0), with guides or translational
+    /// coordinates where `GUIDED`.
     fn substeps<const N: usize, const GUIDED: bool>(
         &mut self,
         natural: &Natural,
@@ -182,11 +187,16 @@ impl Rattle {
 
     fn explain(&self, natural: &Natural, t: f64, failure: Failure) -> StepError {
         let (cause, what) = match failure {
-            Failure::NotFinite(element) => (Cause::NotFinite, format!("the force on {} is not finite", natural.element_name(element))),
-            Failure::NotConverged(row) => (Cause::NotConverged, format!("no multiplier found that keeps the {}", natural.row_name(row))),
-            Failure::TooFar(row) => {
-                (Cause::NotConverged, format!("a quarter turn or more in one substep of the {}", natural.row_name(row)))
+            Failure::NotFinite(element) => {
+                (Cause::NotFinite, format!("the force on {} is not finite", natural.element_name(element)))
             }
+            Failure::NotConverged(row) => {
+                (Cause::NotConverged, format!("no multiplier found that keeps the {}", natural.row_name(row)))
+            }
+            Failure::TooFar(row) => (
+                Cause::NotConverged,
+                format!("a quarter turn or more in one substep of the {}", natural.row_name(row)),
+            ),
         };
         let hint = match cause {
             Cause::NotFinite => "check springs that can shrink to length zero".into(),

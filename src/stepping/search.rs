@@ -7,12 +7,14 @@
 //! else                            both halves, the earlier one first
 //! ```
 //!
-//! An event function is a [`Curve`]: a power series ([`Powers`]), a function of a motion whose unknowns are polynomials (`event`, and whatever else watches a
-//! motion), or a Chebyshev interpolant ([`Chebyshev`]) where nothing bounds it.  Where all that is left of a part is rounding, there is nothing to be told
-//! apart, and signs at the ends decide.
+//! An event function is a [`Curve`]: a power series ([`Powers`]), a function of a motion whose unknowns are
+//! polynomials (`event`, and whatever else watches a motion), or a Chebyshev interpolant ([`Chebyshev`])
+//! where nothing bounds it.  Where all that is left of a part is rounding, there is nothing to be told apart,
+//! and signs at the ends decide.
 //!
-//! Two zeros as close together as 1e-9 of the step are found.  Source: R. E. Moore, *Methods and Applications of Interval Analysis* (1979),
-//! chapter 5, for exclusion by bounds; Newton's method inside a bracket after W. Press et al., *Numerical Recipes*, 3rd ed. (2007), section 9.4.
+//! Two zeros as close together as 1e-9 of the step are found.  Source: R. E. Moore, *Methods and Applications
+//! of Interval Analysis* (1979), chapter 5, for exclusion by bounds; Newton's method inside a bracket after
+//! W. Press et al., *Numerical Recipes*, 3rd ed. (2007), section 9.4.
 
 /// A value that counts as zero at the step's start: it must open before it can close.
 pub const TOUCH: f64 = 1e-12;
@@ -43,7 +45,8 @@ pub struct Part {
     pub value: f64,
     /// Slope there.
     pub slope: f64,
-    /// Bound of the second derivative; more exactly the slope is off by no more than this times the distance from the middle.
+    /// Bound of the second derivative; more exactly the slope is off by no more than this times the distance
+    /// from the middle.
     pub bend: f64,
     /// What rounding may do to values.
     pub rounding: f64,
@@ -94,15 +97,23 @@ pub fn crossing(curve: &impl Curve, end: f64) -> Crossing {
     let is_below = first <= -TOUCH;
     let sinks = root(curve, if is_below { first - 0.1 * TOUCH } else { -TOUCH }, 0.0, end);
     match (opens, sinks) {
-        (open, Some(sink)) if open.is_none_or(|open| sink < open) => Crossing::Inside(if is_below { 0.0 } else { sink }),
+        (open, Some(sink)) if open.is_none_or(|open| sink < open) => {
+            Crossing::Inside(if is_below { 0.0 } else { sink })
+        }
         (Some(open), _) => root(curve, 0.0, open, end).map_or(Crossing::Nothing, Crossing::At),
         (None, _) => Crossing::Nothing,
     }
 }
 
-/// The first minimum in (begin, end], and before a passage at `passes` that does not lead to it, whose value is not known to be on either side of zero: where
-/// values are `off(t) <= zone` from the truth.
-pub fn doubtful(curve: &impl Curve, zone: f64, off: impl Fn(f64) -> f64, [begin, end]: [f64; 2], passes: Option<f64>) -> Option<f64> {
+/// The first minimum in (begin, end], and before a passage at `passes` that does not lead to it, whose value
+/// is not known to be on either side of zero: where values are `off(t) <= zone` from the truth.
+pub fn doubtful(
+    curve: &impl Curve,
+    zone: f64,
+    off: impl Fn(f64) -> f64,
+    [begin, end]: [f64; 2],
+    passes: Option<f64>,
+) -> Option<f64> {
     let known = begin;
     let mut begin = 0.0;
     for _ in 0..DIPS {
@@ -167,7 +178,8 @@ fn search(curve: &impl Curve, level: f64, from: f64, to: f64) -> (Option<f64>, u
     (None, seen)
 }
 
-/// The zero between two places at which the signs differ: Newton's method, and bisection where it would leave the bracket.
+/// The zero between two places at which the signs differ: Newton's method, and bisection where it would leave
+/// the bracket.
 fn bracketed(curve: &impl Curve, level: f64, mut low: f64, mut high: f64, falls: bool) -> f64 {
     let mut t = 0.5 * (low + high);
     for _ in 0..100 {
@@ -193,8 +205,8 @@ fn bracketed(curve: &impl Curve, level: f64, mut low: f64, mut high: f64, falls:
 
 /// A power series about zero, for the search up to `end`.
 ///
-/// The bound of its second derivative is a sum of magnitudes, and far too large where high powers cancel: on small parts it is that of the powers a_k about
-/// their middle, `Σ k |a_k| r^(k-2)`.
+/// The bound of its second derivative is a sum of magnitudes, and far too large where high powers cancel: on
+/// small parts it is that of the powers a_k about their middle, `Σ k |a_k| r^(k-2)`.
 #[derive(Clone, Copy, Debug)]
 pub struct Powers<'a> {
     /// a_0, a_1, …
@@ -218,7 +230,12 @@ impl Curve for Powers<'_> {
         let steeper = |sum: f64, (m, a): (usize, &f64)| sum * radius + m as f64 * a.abs();
         let bend = local.iter().enumerate().skip(2).rev().fold(0.0, steeper);
         let rounding = ROUNDING * size(self.powers, centre + radius);
-        Part { value: local.first().copied().unwrap_or(0.0), slope: local.get(1).copied().unwrap_or(0.0), bend, rounding }
+        Part {
+            value: local.first().copied().unwrap_or(0.0),
+            slope: local.get(1).copied().unwrap_or(0.0),
+            bend,
+            rounding,
+        }
     }
 }
 
@@ -249,8 +266,8 @@ fn bend(powers: &[f64], t: f64) -> f64 {
 
 /// A function on \[0, 1\] known by its values alone: its interpolant `Σ c_k T_k(2t - 1)`.
 ///
-/// Its bound is |T_k''| <= k² (k² - 1)/3, which the fall of the c_k keeps small.  Source: L. N. Trefethen, *Approximation Theory and Approximation Practice*
-/// (2013), chapters 2, 3 and 8.
+/// Its bound is |T_k''| <= k² (k² - 1)/3, which the fall of the c_k keeps small.  Source: L. N. Trefethen,
+/// *Approximation Theory and Approximation Practice* (2013), chapters 2, 3 and 8.
 #[derive(Clone, Debug)]
 pub struct Chebyshev {
     coefficients: Vec<f64>,
@@ -267,8 +284,14 @@ impl Chebyshev {
     pub fn through(values: &[f64]) -> Self {
         let degree = values.len().max(2) - 1;
         let end = |k: usize| if k == 0 || k == degree { 0.5 } else { 1.0 };
-        let wave: Vec<f64> = (0..2 * degree).map(|m| libm::cos(std::f64::consts::PI * m as f64 / degree as f64)).collect();
-        let sum = |k: usize| values.iter().enumerate().fold(0.0, |sum, (j, value)| sum + end(j) * value * wave[(j * k) % (2 * degree)]);
+        let wave: Vec<f64> =
+            (0..2 * degree).map(|m| libm::cos(std::f64::consts::PI * m as f64 / degree as f64)).collect();
+        let sum = |k: usize| {
+            values
+                .iter()
+                .enumerate()
+                .fold(0.0, |sum, (j, value)| sum + end(j) * value * wave[(j * k) % (2 * degree)])
+        };
         let coefficients: Vec<f64> = (0..=degree).map(|k| 2.0 / degree as f64 * end(k) * sum(k)).collect();
         let steep = |(k, c): (usize, &f64)| 4.0 * (k * k * (k * k - k.min(1))) as f64 / 3.0 * c.abs();
         let bend = coefficients.iter().enumerate().map(steep).sum();

@@ -1,28 +1,31 @@
 //! `taylor`: the power series of the motion, with adaptive step.
 //!
-//! Order 16 to 30, adaptive, explicit; keeps nothing by itself, but errs so little that energy stays near rounding.  To choose for the
-//! most accurate path, and for speed below about 1e-8.  It asks for a form in angles and rates:
-//! [`Elimination`](crate::dynamics::elimination::Elimination), or [`Multiplier`](crate::dynamics::multiplier::Multiplier), whose rows are
-//! solved for with every order.  In double-double it makes references of 1e-25 and better.
+//! Order 16 to 30, adaptive, explicit; keeps nothing by itself, but errs so little that energy stays near
+//! rounding.  To choose for the most accurate path, and for speed below about 1e-8.  It asks for a form in
+//! angles and rates: [`Elimination`](crate::dynamics::elimination::Elimination), or
+//! [`Multiplier`](crate::dynamics::multiplier::Multiplier), whose rows are solved for with every order.  In
+//! double-double it makes references of 1e-25 and better.
 //!
 //! ```text
 //! u(t+h) = u + Σ w_m h^(m+1)/(m+1),    w(t+h) = Σ w_m h^m,    m = 0…P
 //! h = tolerance^(1/(P+1)) min over the last five powers k of |w_k|^(-1/k)
 //! ```
 //!
-//! **Trap**: released from rest a symmetric scene has only every fourth power, and a step from the last one or two is far too long; five
-//! powers in a row cannot all vanish by symmetry.  Only the increments are rounded: they are added to a (high, low) state, whose low part
-//! turns the unit vectors at the next start.
+//! **Trap**: released from rest a symmetric scene has only every fourth power, and a step from the last one
+//! or two is far too long; five powers in a row cannot all vanish by symmetry.  Only the increments are
+//! rounded: they are added to a (high, low) state, whose low part turns the unit vectors at the next start.
 //!
-//! Small mechanisms with loops are expanded in unit vectors (module `looped`) and put back onto all rows at the end of every step; near singular
-//! positions the series of any mechanism takes over (module `singular`).
+//! Small mechanisms with loops are expanded in unit vectors (module `looped`) and put back onto all rows at
+//! the end of every step; near singular positions the series of any mechanism takes over (module `singular`).
 //!
-//! The series is the dense output: [`Integrator::interpolate`] sums it at any time in the step, so that steps need not end on output times.  It is
-//! the event finder, too: gaps of walls are polynomials of the step (module `search`), and the state is brought onto their first zero.
-//! With [`Taylor::extended`] the first powers are found in double-double, and the later ones go on from them.
+//! The series is the dense output: [`Integrator::interpolate`] sums it at any time in the step, so that steps
+//! need not end on output times.  It is the event finder, too: gaps of walls are polynomials of the step
+//! (module `search`), and the state is brought onto their first zero. With [`Taylor::extended`] the first
+//! powers are found in double-double, and the later ones go on from them.
 //!
-//! Source: À. Jorba, M. Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor methods*,
-//! Experimental Mathematics 14 (2005), section 3.2, for steps from the last powers; their two are five here.
+//! Source: À. Jorba, M. Zou, *A software package for the numerical integration of ODEs by means of high-order
+//! Taylor methods*, Experimental Mathematics 14 (2005), section 3.2, for steps from the last powers; their
+//! two are five here.
 
 pub mod batch;
 mod bodies;
@@ -72,16 +75,16 @@ pub enum Kernel {
 /// The method on numbers of type `T`: `f64`, or `DoubleDouble` for references.
 #[derive(Clone, Debug)]
 pub struct Taylor<T> {
-    /// First term left out of a rate in a step, in the units of the mechanism (rad/s where it is of human size: see
-    /// [`Units`](crate::dynamics::Units)); those of the angles are smaller by the step over the order.
+    /// First term left out of a rate in a step, in the units of the mechanism (rad/s where it is of human
+    /// size: see [`Units`](crate::dynamics::Units)); those of the angles are smaller by the step over the
+    /// order.
     pub tolerance: f64,
     /// Highest power of the rates.
     pub order: usize,
     /// Which code expands the motion.
     pub kernel: Kernel,
-    /// Carries the first powers in double-double: what is rounded are later ones only, which weigh less than a thousandth.  Of use with
-    /// tolerances
-    /// below 1e-18; no effect on double-double itself.
+    /// Carries the first powers in double-double: what is rounded are later ones only, which weigh less than
+    /// a thousandth.  Of use with tolerances below 1e-18; no effect on double-double itself.
     pub extended: bool,
     fast: Option<Fast>,
     expansion: Option<Expansion<T>>,
@@ -126,7 +129,8 @@ impl Taylor<f64> {
         Self::with_order(tolerance, order)
     }
 
-    /// True where free motions of the mechanism are expanded in lanes, or their first orders in double-double where `extended`.
+    /// True where free motions of the mechanism are expanded in lanes, or their first orders in double-double
+    /// where `extended`.
     pub fn has_lanes(mechanism: &Mechanism, extended: bool) -> bool {
         mechanism.contacts.is_empty() && Fast::new(mechanism, 1.0, 24, false, extended).is_some()
     }
@@ -155,7 +159,13 @@ impl<T: Coefficient, P: OdeSystem + Form + ?Sized> Integrator<P> for Taylor<T> {
         Ok(())
     }
 
-    fn step(&mut self, problem: &mut P, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError> {
+    fn step(
+        &mut self,
+        problem: &mut P,
+        state: &mut State,
+        until: Time,
+        statistics: &mut Statistics,
+    ) -> Result<Option<usize>, StepError> {
         let left = until - state.time;
         statistics.check("taylor", state.time.hi, 0.0)?;
         statistics.evaluations += 1;
@@ -165,14 +175,28 @@ impl<T: Coefficient, P: OdeSystem + Form + ?Sized> Integrator<P> for Taylor<T> {
         let hint = "look for a spring of length zero or a position without inertia";
         if wanted.is_nan() {
             let lost = problem.label(problem.angles() + self.expansion.as_ref().map_or(0, Expansion::lost));
-            return Err(stop(Cause::NotFinite, state, 0.0, format!("the series of {lost} is not finite"), hint));
+            return Err(stop(
+                Cause::NotFinite,
+                state,
+                0.0,
+                format!("the series of {lost} is not finite"),
+                hint,
+            ));
         }
         if wanted < super::finest(state, problem.time_unit()) {
-            if self.by_series && self.expansion.as_ref().is_some_and(|expansion| singular::is_near(problem, expansion)) {
+            if self.by_series
+                && self.expansion.as_ref().is_some_and(|expansion| singular::is_near(problem, expansion))
+            {
                 let what = "the constraints are dependent here, and no way through the singular position is confirmed".into();
                 return Err(stop(Cause::BranchLost, state, wanted, what, singular::HINT));
             }
-            return Err(stop(Cause::StepTooSmall, state, wanted, "the series converges in ever smaller circles".into(), hint));
+            return Err(stop(
+                Cause::StepTooSmall,
+                state,
+                wanted,
+                "the series converges in ever smaller circles".into(),
+                hint,
+            ));
         }
         let mut event = None;
         if self.by_series {
@@ -215,18 +239,30 @@ impl<T: Coefficient> Taylor<T> {
     fn choose<P: OdeSystem + Form + ?Sized>(&mut self, problem: &P, state: &State) -> Result<(), StepError> {
         let (mechanism, coordinates) = (problem.mechanism(), problem.coordinates());
         if coordinates == Coordinates::Other {
-            let hint = "integrate the mechanism in angles and rates, by multipliers or with the motors eliminated";
-            return Err(stop(Cause::Unsuited, state, 0.0, "the unknowns are not those a series is expanded in".into(), hint));
+            let hint =
+                "integrate the mechanism in angles and rates, by multipliers or with the motors eliminated";
+            return Err(stop(
+                Cause::Unsuited,
+                state,
+                0.0,
+                "the unknowns are not those a series is expanded in".into(),
+                hint,
+            ));
         }
         let is_portable = self.kernel == Kernel::Portable;
         let (tolerance, order, extended) = (self.tolerance, self.order, self.extended);
         let is_plain = T::IS_PLAIN && self.kernel != Kernel::Series;
         // The lanes know neither walls nor rows that are not eliminated.
-        let is_simple = mechanism.contacts.is_empty() && (mechanism.constraints.is_empty() || coordinates == Coordinates::Independent);
+        let is_simple = mechanism.contacts.is_empty()
+            && (mechanism.constraints.is_empty() || coordinates == Coordinates::Independent);
         let is_looped = mechanism.has_closed_loops() && coordinates == Coordinates::All && !extended;
         if !is_plain || !(is_simple || is_looped) {
             self.fast = None;
-        } else if !self.fast.as_ref().is_some_and(|fast| fast.is_for(mechanism, tolerance, order, is_portable, extended)) {
+        } else if !self
+            .fast
+            .as_ref()
+            .is_some_and(|fast| fast.is_for(mechanism, tolerance, order, is_portable, extended))
+        {
             self.fast = match is_looped {
                 true => {
                     let of = |reduced: &_| Fast::of_looped(mechanism, reduced, tolerance, order, is_portable);
@@ -240,7 +276,11 @@ impl<T: Coefficient> Taylor<T> {
         }
         if self.fast.is_some() && !is_looped {
             self.expansion = None;
-        } else if !self.expansion.as_ref().is_some_and(|expansion| expansion.is_for(mechanism, coordinates, order, extended)) {
+        } else if !self
+            .expansion
+            .as_ref()
+            .is_some_and(|expansion| expansion.is_for(mechanism, coordinates, order, extended))
+        {
             self.expansion = Some(Expansion::new(mechanism, coordinates, order, extended));
             self.singular_passage = None;
         }
@@ -254,8 +294,9 @@ impl<T: Coefficient> Taylor<T> {
         // What a wall sees of the motion are the unit vectors.
         let mut wanted = expansion.wanted(self.tolerance, problem.events() > 0);
         if !problem.mechanism().constraints.is_empty() && singular::is_near(problem, expansion) {
-            let singular_passage =
-                self.singular_passage.get_or_insert_with(|| SingularPassage::new(problem.mechanism(), problem.coordinates(), expansion));
+            let singular_passage = self.singular_passage.get_or_insert_with(|| {
+                SingularPassage::new(problem.mechanism(), problem.coordinates(), expansion)
+            });
             if let Some(through) = singular_passage.length(problem, expansion, state, wanted) {
                 let whole = through.min(left);
                 expansion.sum_to_smallest(whole);
@@ -270,7 +311,12 @@ impl<T: Coefficient> Taylor<T> {
     }
 
     /// Of the step `h` \[s\] what comes before its first event, and which event that is.
-    fn meet<P: OdeSystem + Form + ?Sized>(&mut self, problem: &mut P, state: &State, h: f64) -> Result<(f64, Option<usize>), StepError> {
+    fn meet<P: OdeSystem + Form + ?Sized>(
+        &mut self,
+        problem: &mut P,
+        state: &State,
+        h: f64,
+    ) -> Result<(f64, Option<usize>), StepError> {
         let Self { expansion: Some(expansion), powers, .. } = self else { return Ok((h, None)) };
         let (mut first, mut event) = (h, None);
         for contact in 0..problem.events() {
@@ -278,7 +324,9 @@ impl<T: Coefficient> Taylor<T> {
             match search::crossing(&Powers { powers, end: first }, first) {
                 Crossing::Nothing => {}
                 Crossing::At(t) => (first, event) = (t, Some(contact)),
-                Crossing::Inside(t) if t > super::finest(state, problem.time_unit()) => (first, event) = (t, None),
+                Crossing::Inside(t) if t > super::finest(state, problem.time_unit()) => {
+                    (first, event) = (t, None)
+                }
                 Crossing::Inside(_) => {
                     return Err(super::at_rest("taylor", state, h));
                 }
@@ -291,7 +339,14 @@ impl<T: Coefficient> Taylor<T> {
     }
 
     /// The moment of an event near `t` \[s\], at which the event function of the *state* is zero to rounding.
-    fn land<P: OdeSystem + Form + ?Sized>(&mut self, problem: &mut P, state: &State, event: usize, t: f64, h: f64) -> f64 {
+    fn land<P: OdeSystem + Form + ?Sized>(
+        &mut self,
+        problem: &mut P,
+        state: &State,
+        event: usize,
+        t: f64,
+        h: f64,
+    ) -> f64 {
         let Self { expansion: Some(expansion), powers, gaps, inside, .. } = self else { return t };
         trace(problem, expansion, event, powers);
         gaps.resize(problem.events(), 0.0);
@@ -311,8 +366,14 @@ impl<T: Coefficient> Taylor<T> {
     }
 }
 
-/// Powers of an event function along the series: the gap of a wall over its contact's length, or the force on a point held there over its contact's force.
-fn trace<T: Coefficient, P: Form + ?Sized>(problem: &P, expansion: &Expansion<T>, contact: usize, powers: &mut Vec<f64>) {
+/// Powers of an event function along the series: the gap of a wall over its contact's length, or the force on
+/// a point held there over its contact's force.
+fn trace<T: Coefficient, P: Form + ?Sized>(
+    problem: &P,
+    expansion: &Expansion<T>,
+    contact: usize,
+    powers: &mut Vec<f64>,
+) {
     let mechanism = problem.mechanism();
     let series = expansion.series();
     match mechanism.held.iter().position(|&held| held == contact) {
@@ -320,7 +381,13 @@ fn trace<T: Coefficient, P: Form + ?Sized>(problem: &P, expansion: &Expansion<T>
         Some(place) => {
             // The rows of the contacts that are held are the last ones.
             let from_end = mechanism.held.len() - place;
-            let force = |m| series.multipliers(m).iter().nth_back(from_end - 1).map_or(f64::NAN, |multiplier| -multiplier.value());
+            let force = |m| {
+                series
+                    .multipliers(m)
+                    .iter()
+                    .nth_back(from_end - 1)
+                    .map_or(f64::NAN, |multiplier| -multiplier.value())
+            };
             powers.clear();
             powers.extend((0..series.order()).map(|m| force(m) / mechanism.contacts[contact].force));
         }

@@ -1,13 +1,17 @@
 //! `dopri5` and `dop853`: the Dormand–Prince methods of the crate `ode_solvers`, integrated in windows.
 //!
-//! The only file that knows the crate.  It owns its loop and keeps every row: a window, from where it began to the time asked for, is integrated at once,
-//! and its steps are handed out one by one.  A state in the middle of a window remembers where that began, so that it is integrated again where a run goes on.
-//! Its ways, and what is done about them:
+//! The only file that knows the crate.  It owns its loop and keeps every row: a window, from where it began
+//! to the time asked for, is integrated at once, and its steps are handed out one by one.  A state in the
+//! middle of a window remembers where that began, so that it is integrated again where a run goes on. Its
+//! ways, and what is done about them:
 //!
-//! - Dense output hands out times and states that do not belong together: `Sparse` rows are used, and only the last one counts.
-//! - The twelfth stage of `Dop853` is given the time of the step's start instead of its end (0.6.2), which spoils the order where the
-//!   equations depend on time: time rides along as an unknown, and the crate's own is ignored.
-//! - 100 000 steps by default: the budget is ours.  A rate that is not finite comes back as a step-size underflow: it is looked for first.
+//! - Dense output hands out times and states that do not belong together: `Sparse` rows are used, and only
+//!   the last one counts.
+//! - The twelfth stage of `Dop853` is given the time of the step's start instead of its end (0.6.2), which
+//!   spoils the order where the equations depend on time: time rides along as an unknown, and the crate's own
+//!   is ignored.
+//! - 100 000 steps by default: the budget is ours.  A rate that is not finite comes back as a step-size
+//!   underflow: it is looked for first.
 //! - Fixed-size vectors are 3 to 4 times faster than dynamic ones: chosen here by length.
 //! - What is between two rows is a shorter step from the first of them.
 //! - Rows cannot be changed while a window lasts: no projection, no walls.  `dp5` and `dp8` are for those.
@@ -37,7 +41,8 @@ pub struct Dop853 {
     rows: Rows,
 }
 
-/// Most numbers among the rows of one call of the crate, which keeps them all: after so many a window is begun anew.
+/// Most numbers among the rows of one call of the crate, which keeps them all: after so many a window is
+/// begun anew.
 const MOST_KEPT: usize = 1 << 22;
 /// And at least so many rows.
 const LEAST_KEPT: usize = 64;
@@ -56,7 +61,8 @@ impl Dop853 {
     }
 }
 
-/// The field as the crate calls it: unknowns of the field, then the time since the window's start, all over their units.
+/// The field as the crate calls it: unknowns of the field, then the time since the window's start, all over
+/// their units.
 struct Window<'a, F: ?Sized> {
     field: RefCell<&'a mut F>,
     start: Time,
@@ -73,7 +79,11 @@ impl<F: OdeSystem + ?Sized> Window<'_, F> {
     fn rate(&self, y: &[f64], rate: &mut [f64]) {
         let mut unknowns = self.y.borrow_mut();
         unknowns.iter_mut().zip(y).zip(self.unit).for_each(|((unknown, y), unit)| *unknown = y * unit);
-        self.field.borrow_mut().rhs(self.start + DoubleDouble::of(y[self.n] * self.time_unit), &unknowns, &mut rate[..self.n]);
+        self.field.borrow_mut().rhs(
+            self.start + DoubleDouble::of(y[self.n] * self.time_unit),
+            &unknowns,
+            &mut rate[..self.n],
+        );
         rate.iter_mut().zip(self.unit).for_each(|(rate, unit)| *rate = *rate * self.time_unit / unit);
         rate[self.n] = 1.0;
     }
@@ -147,7 +157,8 @@ macro_rules! by_length {
     };
 }
 
-/// A stepper of the crate, and what it evaluates in every attempt at a step, and again in every accepted one; it does not count a rejection before the first acceptance.
+/// A stepper of the crate, and what it evaluates in every attempt at a step, and again in every accepted one;
+/// it does not count a rejection before the first acceptance.
 struct Stepper {
     name: &'static str,
     attempt: u64,
@@ -184,7 +195,8 @@ impl Rows {
         self.after.clear();
     }
 
-    /// What a state in the middle of a window remembers: the step passed on, the row it is, and where the window began.
+    /// What a state in the middle of a window remembers: the step passed on, the row it is, and where the
+    /// window began.
     fn remember(&self, memory: &mut Vec<f64>) {
         let Self { start, until, .. } = self;
         let first = start.memory.first().copied().unwrap_or_default();
@@ -193,14 +205,16 @@ impl Rows {
         memory.extend(start.y.iter().copied().chain(start.turns.iter().map(|&turns| turns as f64)));
     }
 
-    /// The beginning of the window that a state on the way to `until` is in the middle of, and which of its rows it is.
+    /// The beginning of the window that a state on the way to `until` is in the middle of, and which of its
+    /// rows it is.
     fn recall(state: &State, until: Time) -> Option<(State, usize)> {
         let (&[_, row, first, time, low, end, end_low], rest) = state.memory.split_first_chunk()?;
         let (y, turns) = rest.split_at_checked(state.y.len())?;
         if [end, end_low] != [until.hi, until.lo] || turns.len() != state.turns.len() {
             return None;
         }
-        let mut start = State { time: Time { hi: time, lo: low }, y: y.to_vec(), memory: vec![first], ..state.clone() };
+        let mut start =
+            State { time: Time { hi: time, lo: low }, y: y.to_vec(), memory: vec![first], ..state.clone() };
         start.low.fill(0.0);
         start.turns = turns.iter().map(|&turns| turns as i64).collect();
         Some((start, row as usize))
@@ -287,24 +301,49 @@ fn part<F: OdeSystem + ?Sized>(
     let (n, name) = (state.y.len(), stepper.name);
     let span = (until - state.time).hi;
     statistics.check(name, state.time.hi, state.memory.first().copied().unwrap_or(0.0))?;
-    let stop = |cause, t: f64, step, what: String, hint: &str| StepError { cause, method: name.into(), t, step, what, hint: hint.into() };
+    let stop = |cause, t: f64, step, what: String, hint: &str| StepError {
+        cause,
+        method: name.into(),
+        t,
+        step,
+        what,
+        hint: hint.into(),
+    };
     let mut rate = vec![0.0; n];
     field.rhs(state.time, &state.y, &mut rate);
     statistics.evaluations += 1;
     if let Some(i) = rate.iter().position(|rate| !rate.is_finite()) {
         let hint = "look for a spring of length zero or a position without inertia";
-        return Err(stop(Cause::NotFinite, state.time.hi, 0.0, format!("the rate of {} is not finite", field.label(i)), hint));
+        return Err(stop(
+            Cause::NotFinite,
+            state.time.hi,
+            0.0,
+            format!("the rate of {} is not finite", field.label(i)),
+            hint,
+        ));
     }
     let (mut unit, time_unit) = (Vec::new(), field.time_unit());
     super::units(field, n, &mut unit);
     let mut y: Vec<f64> = state.y.iter().zip(&unit).map(|(y, unit)| y / unit).collect();
     y.push(0.0);
     let first = state.memory.first().map_or(0.0, |&h| h.min(span)) / time_unit;
-    let most = statistics.max_evaluations.saturating_sub(statistics.evaluations).div_ceil(stepper.attempt).min(u64::from(u32::MAX)) as u32;
+    let most = statistics
+        .max_evaluations
+        .saturating_sub(statistics.evaluations)
+        .div_ceil(stepper.attempt)
+        .min(u64::from(u32::MAX)) as u32;
     let most_rows = (MOST_KEPT / (n + 2)).max(LEAST_KEPT);
     let (times, rows, outcome) = {
         let room = RefCell::new(vec![0.0; n]);
-        let window = Window { field: RefCell::new(field), start: state.time, n, unit: &unit, time_unit, y: room, rows: most_rows };
+        let window = Window {
+            field: RefCell::new(field),
+            start: state.time,
+            n,
+            unit: &unit,
+            time_unit,
+            y: room,
+            rows: most_rows,
+        };
         integrate(window, &y, span / time_unit, first, most)
     };
     let reached_time = |x: f64| state.time.hi + x * time_unit;
@@ -312,7 +351,9 @@ fn part<F: OdeSystem + ?Sized>(
         Ok(stats) => {
             statistics.evaluations += u64::from(stats.num_eval);
             let begun = if first == 0.0 { 3 } else { 1 };
-            let attempts = (u64::from(stats.num_eval) - begun - stepper.accepted * u64::from(stats.accepted_steps)) / stepper.attempt;
+            let attempts =
+                (u64::from(stats.num_eval) - begun - stepper.accepted * u64::from(stats.accepted_steps))
+                    / stepper.attempt;
             statistics.rejected += attempts - u64::from(stats.accepted_steps);
         }
         Err(IntegrationError::MaxNumStepReached { x, .. }) => {
@@ -321,7 +362,13 @@ fn part<F: OdeSystem + ?Sized>(
         }
         Err(IntegrationError::StepSizeUnderflow { x } | IntegrationError::StiffnessDetected { x }) => {
             let what = "the step fell below the resolution of time, or a rate became not finite".into();
-            return Err(stop(Cause::StepTooSmall, reached_time(x), 0.0, what, "loosen the tolerance, or take --method taylor or radau9"));
+            return Err(stop(
+                Cause::StepTooSmall,
+                reached_time(x),
+                0.0,
+                what,
+                "loosen the tolerance, or take --method taylor or radau9",
+            ));
         }
     }
     let last = rows.rchunks(n + 1).next().unwrap_or_default();
@@ -371,7 +418,9 @@ impl Dopri5 {
     const STEPPER: Stepper = Stepper { name: "dopri5", attempt: 6, accepted: 0 };
 
     /// The crate's method as it is called.
-    fn call<F: OdeSystem + ?Sized>(&self) -> impl FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome + use<F> {
+    fn call<F: OdeSystem + ?Sized>(
+        &self,
+    ) -> impl FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome + use<F> {
         let tolerance = self.tolerance;
         move |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| -> Outcome {
             let settings = (tolerance, (0.04, 0.2, 10.0), first, most);
@@ -394,7 +443,13 @@ impl<F: OdeSystem + ?Sized> Integrator<F> for Dopri5 {
         begin(&mut self.rows, &Self::STEPPER, &mut integrate, field, state, until)
     }
 
-    fn step(&mut self, field: &mut F, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError> {
+    fn step(
+        &mut self,
+        field: &mut F,
+        state: &mut State,
+        until: Time,
+        statistics: &mut Statistics,
+    ) -> Result<Option<usize>, StepError> {
         let mut integrate = self.call();
         step(&mut self.rows, &Self::STEPPER, &mut integrate, field, state, until, statistics)
     }
@@ -420,7 +475,9 @@ impl Dop853 {
     const STEPPER: Stepper = Stepper { name: "dop853", attempt: 11, accepted: 1 };
 
     /// The crate's method as it is called.
-    fn call<F: OdeSystem + ?Sized>(&self) -> impl FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome + use<F> {
+    fn call<F: OdeSystem + ?Sized>(
+        &self,
+    ) -> impl FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome + use<F> {
         let tolerance = self.tolerance;
         move |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| -> Outcome {
             let settings = (tolerance, (0.0, 1.0 / 3.0, 6.0), first, most);
@@ -443,7 +500,13 @@ impl<F: OdeSystem + ?Sized> Integrator<F> for Dop853 {
         begin(&mut self.rows, &Self::STEPPER, &mut integrate, field, state, until)
     }
 
-    fn step(&mut self, field: &mut F, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError> {
+    fn step(
+        &mut self,
+        field: &mut F,
+        state: &mut State,
+        until: Time,
+        statistics: &mut Statistics,
+    ) -> Result<Option<usize>, StepError> {
         let mut integrate = self.call();
         step(&mut self.rows, &Self::STEPPER, &mut integrate, field, state, until, statistics)
     }

@@ -1,4 +1,5 @@
-//! The auditor against closed forms and published references: what it says is to be believed before it judges.
+//! The auditor against closed forms and published references: what it says is to be believed before it
+//! judges.
 
 use super::double_double::Dd;
 use super::reader::{Joint, Measure, Scene};
@@ -10,7 +11,8 @@ use serde_json::{Value, json};
 fn record(scene: &Value) -> Record {
     let scene = Scene::read(&scene.to_string());
     let rows = (scene.until / scene.every).round() as usize;
-    let times: Vec<f64> = (0..=rows).map(|row| if row == rows { scene.until } else { scene.every * row as f64 }).collect();
+    let times: Vec<f64> =
+        (0..=rows).map(|row| if row == rows { scene.until } else { scene.every * row as f64 }).collect();
     let start = start(scene, None).expect("a start");
     assert!(start.is_complete && start.correction[0] < 1e-11, "{:?}", start.correction);
     Record::new(start, &times, 1_000_000).expect("a motion")
@@ -64,8 +66,10 @@ fn a_pendulum_swings_as_elliptic_functions_do() {
 /// Published slider-crank under a torque, through its dead centres.
 #[test]
 fn a_slider_crank_runs_as_published() {
-    let data: Value = serde_json::from_str(include_str!("../data/slider_crank_rigid_torque.json")).expect("JSON");
-    let mut crank: Value = serde_json::from_str(include_str!("../../examples/scenes/slider_crank_torque.json")).expect("JSON");
+    let data: Value =
+        serde_json::from_str(include_str!("../data/slider_crank_rigid_torque.json")).expect("JSON");
+    let mut crank: Value =
+        serde_json::from_str(include_str!("../../examples/scenes/slider_crank_torque.json")).expect("JSON");
     (crank["until"], crank["every"]) = (json!(2), json!(0.25));
     (crank["start"]["rod"]["omega"], crank["start"]["block"]["omega"]) = (json!(0), json!(0));
     let record = record(&crank);
@@ -82,7 +86,8 @@ fn a_slider_crank_runs_as_published() {
 #[test]
 fn seven_bodies_squeeze_as_published() {
     let data: Value = serde_json::from_str(include_str!("../data/andrews_squeezer.json")).expect("JSON");
-    let mut andrews: Value = serde_json::from_str(include_str!("../../examples/scenes/andrews.json")).expect("JSON");
+    let mut andrews: Value =
+        serde_json::from_str(include_str!("../../examples/scenes/andrews.json")).expect("JSON");
     andrews["every"] = json!(0.03);
     let record = record(&andrews);
     let end = &record.looks[1];
@@ -121,7 +126,10 @@ fn a_ball_bounces_and_comes_to_rest() {
     let mut speed = 9.81 * fall;
     for impact in &record.impacts[..12] {
         assert!((impact.t - t).abs() < 1e-14 && (impact.approach + speed).abs() < 1e-13, "{impact:?} {t}");
-        assert!((impact.impulse - 3.0 * speed).abs() < 1e-13 && (impact.energy_lost - 0.75 * speed * speed).abs() < 1e-12);
+        assert!(
+            (impact.impulse - 3.0 * speed).abs() < 1e-13
+                && (impact.energy_lost - 0.75 * speed * speed).abs() < 1e-12
+        );
         speed *= 0.5;
         t += 2.0 * speed / 9.81;
     }
@@ -132,7 +140,8 @@ fn a_ball_bounces_and_comes_to_rest() {
     near("y", end.state.q[1], 0.0);
 }
 
-/// The end of a rod meets a wall: impulse (1 + e) v / (1/m + r²/I), r the lever about the centre; and a hinged bar against a stop.
+/// The end of a rod meets a wall: impulse (1 + e) v / (1/m + r²/I), r the lever about the centre; and a
+/// hinged bar against a stop.
 #[test]
 fn a_rod_turns_by_an_impact() {
     let bars = json!([{"name": "b", "mass": 2, "centre": [0.5, 0], "inertia": 0.3}]);
@@ -143,7 +152,10 @@ fn a_rod_turns_by_an_impact() {
     let lever = 0.5 * 0.6f64.cos();
     let impulse = 1.25 * 2.0 / (0.5 + lever * lever / 0.3);
     let [impact] = &record.impacts[..] else { panic!("{:?}", record.impacts) };
-    assert!((impact.t - (1.5 - 0.6f64.sin()) / 2.0).abs() < 1e-15 && (impact.impulse - impulse).abs() < 1e-14, "{impact:?}");
+    assert!(
+        (impact.t - (1.5 - 0.6f64.sin()) / 2.0).abs() < 1e-15 && (impact.impulse - impulse).abs() < 1e-14,
+        "{impact:?}"
+    );
     let end = record.looks.last().expect("an end");
     near("omega", end.state.v[2], impulse * lever / 0.3);
     near("vy", end.state.v[1], -2.0 + impulse / 2.0);
@@ -152,23 +164,31 @@ fn a_rod_turns_by_an_impact() {
     let line = json!({"through": [0, 1], "normal": [0, -1]});
     let walls = json!([{"name": "stop", "body": "b", "point": [1, 0], "line": line, "restitution": 0.25}]);
     let joints = json!({"walls": walls, "hinges": [hinged("b", json!([0, 0.5]))]});
-    let record = self::record(&scene([0.0, 0.0], bars, json!({"b": {"phi": 0, "omega": 2}}), 1.0, 1.0, joints));
+    let record =
+        self::record(&scene([0.0, 0.0], bars, json!({"b": {"phi": 0, "omega": 2}}), 1.0, 1.0, joints));
     let angle = 0.5f64.asin();
-    assert!((record.impacts[0].impulse - 1.25 * 2.0 * 0.8 / angle.cos()).abs() < 1e-14, "{:?}", record.impacts);
+    assert!(
+        (record.impacts[0].impulse - 1.25 * 2.0 * 0.8 / angle.cos()).abs() < 1e-14,
+        "{:?}",
+        record.impacts
+    );
     near("omega", record.looks[1].state.v[2], -0.5);
     near("phi", record.looks[1].state.q[2], angle - 0.5 * (1.0 - angle / 2.0));
 }
 
-/// x = e^(-γt) (A cos ωt + B sin ωt) of a block on a rail; the rail carries its weight and, off its line, its moment.
+/// x = e^(-γt) (A cos ωt + B sin ωt) of a block on a rail; the rail carries its weight and, off its line, its
+/// moment.
 #[test]
 fn a_damped_block_swings_on_its_spring() {
     let bars = json!([{"name": "b", "mass": 2, "centre": [0, 0], "inertia": 0.1, "length": 1}]);
     let rail = json!({"body": "ground", "point": [0, 0], "direction": [1, 0]});
-    let sliders = json!([{"name": "s", "point": {"body": "b", "point": [0, 0]}, "rail": rail, "angle": "locked"}]);
+    let sliders =
+        json!([{"name": "s", "point": {"body": "b", "point": [0, 0]}, "rail": rail, "angle": "locked"}]);
     let ends = json!([{"body": "b", "point": [0, 0]}, {"body": "ground", "point": [-3, 0]}]);
     let springs = json!([{"name": "k", "between": ends, "stiffness": 50, "free_length": 3, "damping": 2}]);
     let start = json!({"b": {"phi": 0, "omega": 0, "origin": [0.5, 0], "velocity": [1, 0]}});
-    let record = record(&scene([0.0, -9.81], bars, start, 3.0, 0.5, json!({"sliders": sliders, "springs": springs})));
+    let record =
+        record(&scene([0.0, -9.81], bars, start, 3.0, 0.5, json!({"sliders": sliders, "springs": springs})));
     let (gamma, rate): (f64, f64) = (0.5, (25.0f64 - 0.25).sqrt());
     for look in &record.looks {
         let t = look.state.t.hi;
@@ -179,11 +199,16 @@ fn a_damped_block_swings_on_its_spring() {
     }
     // What the damper took: energy at the start less energy now.
     let end = record.looks.last().expect("an end");
-    near("work", end.state.work, (end.energy[0] + end.energy[1] - record.looks[0].energy[0] - record.looks[0].energy[1]).hi);
+    near(
+        "work",
+        end.state.work,
+        (end.energy[0] + end.energy[1] - record.looks[0].energy[0] - record.looks[0].energy[1]).hi,
+    );
     assert!(end.state.work.hi < -1.0);
 }
 
-/// A crank turned at 3 rad/s in a yoke: x = r cos ωt, torque m r² ω² sin ωt cos ωt; the slot's rail moves with the yoke.
+/// A crank turned at 3 rad/s in a yoke: x = r cos ωt, torque m r² ω² sin ωt cos ωt; the slot's rail moves
+/// with the yoke.
 #[test]
 fn a_scotch_yoke_goes_as_the_cosine() {
     let bars = json!([
@@ -240,7 +265,8 @@ fn a_bead_leaves_a_turning_rail() {
 fn two_discs_swing_against_each_other() {
     let disc = |name: &str, inertia: f64| json!({"name": name, "mass": 1, "centre": [0, 0], "inertia": inertia, "length": 1});
     let bars = json!([disc("a", 0.5), disc("b", 0.25)]);
-    let placed = |phi: f64, omega: f64| json!({"phi": phi, "omega": omega, "origin": [0, 0], "velocity": [0, 0]});
+    let placed =
+        |phi: f64, omega: f64| json!({"phi": phi, "omega": omega, "origin": [0, 0], "velocity": [0, 0]});
     let turns = 4.0 * std::f64::consts::PI;
     let coils = json!([{"name": "k", "body": "b", "relative_to": "a", "stiffness": 3, "free_angle": turns}]);
     let law = json!({"start": 0.5, "rate": 0.25, "sines": [{"amplitude": 2, "frequency": 5, "phase": 0.7}]});
@@ -255,7 +281,8 @@ fn two_discs_swing_against_each_other() {
     ));
     // With u the angle between them: u'' = 6 (torque(t) - 3 (u - turns)), a forced oscillator of rate √18.
     let rate = 18f64.sqrt();
-    let forced = |t: f64| turns + 6.0 * 2.0 * ((0.5 + 0.25 * t) / 18.0 + 2.0 * (5.0 * t + 0.7).sin() / (18.0 - 25.0));
+    let forced =
+        |t: f64| turns + 6.0 * 2.0 * ((0.5 + 0.25 * t) / 18.0 + 2.0 * (5.0 * t + 0.7).sin() / (18.0 - 25.0));
     let forced_rate = 12.0 * (0.25 / 18.0 + 10.0 * 0.7f64.cos() / (18.0 - 25.0));
     for look in &record.looks {
         let t = look.state.t.hi;
@@ -283,7 +310,8 @@ fn a_force_turns_with_its_body() {
     }
 }
 
-/// A point that slides down a slope under its own weight leaves nothing to guess: it stays, and is let go where a force lifts it.
+/// A point that slides down a slope under its own weight leaves nothing to guess: it stays, and is let go
+/// where a force lifts it.
 #[test]
 fn a_point_stays_until_it_is_lifted() {
     let bars = json!([{"name": "b", "mass": 2, "centre": [0, 0], "inertia": 0.1, "length": 1}]);
@@ -292,7 +320,8 @@ fn a_point_stays_until_it_is_lifted() {
     let law = json!({"start": 0, "rate": 1});
     let forces = json!([{"name": "lift", "body": "b", "point": [0, 0], "force": [1, 40], "law": law}]);
     let start = json!({"b": {"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [0, 0]}});
-    let record = record(&scene([0.0, -10.0], bars, start, 1.0, 0.25, json!({"walls": walls, "forces": forces})));
+    let record =
+        record(&scene([0.0, -10.0], bars, start, 1.0, 0.25, json!({"walls": walls, "forces": forces})));
     let [stay] = &record.stays[..] else { panic!("{:?}", record.stays) };
     // 40 t = 20 at half a second; then y'' = 20 (t - 1/2).
     assert!((stay.until.expect("an end") - 0.5).abs() < 1e-12);
@@ -317,11 +346,16 @@ fn rows_are_derivatives() {
     });
     let scene = Scene::read(&scene([0.0, 0.0], bars, json!({}), 1.0, 1.0, others).to_string());
     let model = super::model::Model::new(scene);
-    let (q, v, a) = ([0.3, -0.4, 1.1, 0.7, 0.2, -2.0], [1.0, -2.0, 0.7, 0.3, 0.9, -1.5], [0.4, 0.2, -0.9, 1.3, -0.7, 0.6]);
+    let (q, v, a) = (
+        [0.3, -0.4, 1.1, 0.7, 0.2, -2.0],
+        [1.0, -2.0, 0.7, 0.3, 0.9, -1.5],
+        [0.4, 0.2, -0.9, 1.3, -0.7, 0.6],
+    );
     let of = |f: &dyn Fn(usize) -> f64| (0..6).map(|i| Dd::from(f(i))).collect::<Vec<_>>();
     let at = |t: f64| {
-        let exact =
-            |i: usize, p: [f64; 3]| Dd::from(p[0]) + Dd::from(p[1]).scale(t) + Dd::from(p[2]).scale(t).scale(0.5 * t + i as f64 * 0.0);
+        let exact = |i: usize, p: [f64; 3]| {
+            Dd::from(p[0]) + Dd::from(p[1]).scale(t) + Dd::from(p[2]).scale(t).scale(0.5 * t + i as f64 * 0.0)
+        };
         let state = super::model::State {
             t: Dd::from(t),
             q: (0..6).map(|i| exact(i, [q[i], v[i], a[i]])).collect(),

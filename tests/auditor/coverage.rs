@@ -21,15 +21,23 @@ impl Summary {
         );
         let at = |kind: Kind, method: &'static str| self.methods.get(&(kind, method)).copied().unwrap_or(0);
         let names: Vec<&'static str> = METHODS.iter().map(|info| info.name).collect();
-        let _ = writeln!(text, "Compared pairs by kind and method:\n\n| no. | kind | {} |", names.join(" | "));
+        let _ =
+            writeln!(text, "Compared pairs by kind and method:\n\n| no. | kind | {} |", names.join(" | "));
         let _ = writeln!(text, "|{}", " --- |".repeat(names.len() + 2));
         for (number, &kind) in kinds.iter().enumerate() {
             let counts: Vec<String> = names.iter().map(|name| at(kind, name).to_string()).collect();
             let _ = writeln!(text, "| {} | {} | {} |", number + 1, kind.name(), counts.join(" | "));
         }
         let both = |a: Kind, b: Kind| self.kinds.get(&(a.min(b), a.max(b))).copied().unwrap_or(0);
-        let _ = writeln!(text, "\nCompared pairs by two kinds, numbered as above; on the diagonal those of one:\n\n```text");
-        let _ = writeln!(text, "    {}", (1..=kinds.len()).map(|number| format!("{number:5}")).collect::<String>());
+        let _ = writeln!(
+            text,
+            "\nCompared pairs by two kinds, numbered as above; on the diagonal those of one:\n\n```text"
+        );
+        let _ = writeln!(
+            text,
+            "    {}",
+            (1..=kinds.len()).map(|number| format!("{number:5}")).collect::<String>()
+        );
         for (number, &a) in kinds.iter().enumerate() {
             let row: String = kinds[..=number].iter().map(|&b| format!("{:5}", both(a, b))).collect();
             let _ = writeln!(text, "{:4}{row}", number + 1);
@@ -41,9 +49,17 @@ impl Summary {
                 never.push(format!("{} with {}", b.name(), a.name()));
             }
         }
-        let _ = writeln!(text, "Pairs of kinds that never met: {}.", if never.is_empty() { "none".into() } else { never.join(", ") });
+        let _ = writeln!(
+            text,
+            "Pairs of kinds that never met: {}.",
+            if never.is_empty() { "none".into() } else { never.join(", ") }
+        );
         let possible = kinds.len() * (kinds.len() + 1) / 2 * names.len();
-        let _ = writeln!(text, "\nOf {possible} triples of two kinds and a method {} were compared.", self.triples.len());
+        let _ = writeln!(
+            text,
+            "\nOf {possible} triples of two kinds and a method {} were compared.",
+            self.triples.len()
+        );
         text
     }
 }

@@ -1,7 +1,8 @@
 //! Numbers of 106 bits as unevaluated sums of two doubles.
 //!
-//! Source: T. J. Dekker, *A floating-point technique for extending the available precision*, Numer. Math. 18 (1971), with its splitting into halves
-//! instead of a fused multiply-add; Y. Hida, X. S. Li, D. H. Bailey, *Library for double-double and quad-double arithmetic* (2007).
+//! Source: T. J. Dekker, *A floating-point technique for extending the available precision*, Numer. Math. 18
+//! (1971), with its splitting into halves instead of a fused multiply-add; Y. Hida, X. S. Li, D. H. Bailey,
+//! *Library for double-double and quad-double arithmetic* (2007).
 
 use std::cmp::Ordering;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -46,7 +47,8 @@ fn two_product(a: f64, b: f64) -> Dd {
 }
 
 /// π/2 as a sum of three doubles.
-const HALF_PI: [f64; 3] = [std::f64::consts::FRAC_PI_2, 6.123_233_995_736_766e-17, -1.497_384_904_859_169_8e-33];
+const HALF_PI: [f64; 3] =
+    [std::f64::consts::FRAC_PI_2, 6.123_233_995_736_766e-17, -1.497_384_904_859_169_8e-33];
 
 /// 1/n! for n up to 24.
 static INVERSE_FACTORIALS: LazyLock<[Dd; 25]> = LazyLock::new(|| {
@@ -174,7 +176,9 @@ impl SubAssign for Dd {
 
 impl PartialOrd for Dd {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        self.hi.partial_cmp(&other.hi).map(|order| order.then(self.lo.partial_cmp(&other.lo).unwrap_or(Ordering::Equal)))
+        self.hi
+            .partial_cmp(&other.hi)
+            .map(|order| order.then(self.lo.partial_cmp(&other.lo).unwrap_or(Ordering::Equal)))
     }
 }
 

@@ -1,6 +1,8 @@
-//! Constrained linear systems: `M x = f + Gᵀ λ`, `G x = c`, with M diagonal and any of its entries zero, by elimination with full pivoting.
+//! Constrained linear systems: `M x = f + Gᵀ λ`, `G x = c`, with M diagonal and any of its entries zero, by
+//! elimination with full pivoting.
 //!
-//! Rows of G that depend on the others are dropped (their λ is 0), and every λ that this leaves open is marked.
+//! Rows of G that depend on the others are dropped (their λ is 0), and every λ that this leaves open is
+//! marked.
 
 use super::double_double::Dd;
 
@@ -28,7 +30,8 @@ pub fn row_times(row: &Row, x: &[Dd]) -> Dd {
 
 /// Solves the system.
 pub fn solve(mass: &[Dd], rows: &[Row], f: &[Dd], c: &[Dd]) -> Solution {
-    // Coordinates with mass are eliminated by hand: x = (f + Gᵀ λ) / m.  What is left has one unknown for each coordinate without mass and each λ.
+    // Coordinates with mass are eliminated by hand: x = (f + Gᵀ λ) / m.  What is left has one unknown for
+    // each coordinate without mass and each λ.
     let massless: Vec<usize> = (0..mass.len()).filter(|&k| mass[k].hi == 0.0).collect();
     let place = |k: usize| massless.iter().position(|&z| z == k);
     let (zeros, size) = (massless.len(), massless.len() + rows.len());
@@ -66,7 +69,13 @@ pub fn solve(mass: &[Dd], rows: &[Row], f: &[Dd], c: &[Dd]) -> Solution {
         .collect();
     massless.iter().enumerate().for_each(|(z, &k)| x[k] = reduced.unknowns[z]);
     let is_loose = reduced.is_open[..zeros].contains(&true);
-    Solution { x, multipliers, is_open: reduced.is_open[zeros..].to_vec(), least_pivot: reduced.least_pivot, is_loose }
+    Solution {
+        x,
+        multipliers,
+        is_open: reduced.is_open[zeros..].to_vec(),
+        least_pivot: reduced.least_pivot,
+        is_loose,
+    }
 }
 
 struct Eliminated {
@@ -75,13 +84,17 @@ struct Eliminated {
     least_pivot: f64,
 }
 
-/// Solves a symmetric system; unknowns that nothing determines are zero and marked, with those that depend on them.
+/// Solves a symmetric system; unknowns that nothing determines are zero and marked, with those that depend on
+/// them.
 fn eliminate(mut a: Vec<Vec<Dd>>, mut b: Vec<Dd>) -> Eliminated {
     let n = b.len();
-    // Powers of two bring the largest entry of every row and column near one, so that pivots can be compared whatever the units.
+    // Powers of two bring the largest entry of every row and column near one, so that pivots can be compared
+    // whatever the units.
     let mut scale = vec![1.0; n];
     for _ in 0..4 {
-        let most: Vec<f64> = (0..n).map(|i| (0..n).map(|j| a[i][j].hi.abs() * scale[i] * scale[j]).fold(0.0, f64::max)).collect();
+        let most: Vec<f64> = (0..n)
+            .map(|i| (0..n).map(|j| a[i][j].hi.abs() * scale[i] * scale[j]).fold(0.0, f64::max))
+            .collect();
         for i in (0..n).filter(|&i| most[i] > 0.0) {
             scale[i] *= (-0.5 * most[i].log2()).round().exp2();
         }
@@ -157,14 +170,21 @@ fn eliminate(mut a: Vec<Vec<Dd>>, mut b: Vec<Dd>) -> Eliminated {
 mod tests {
     use super::*;
 
-    /// Two masses on a rod, one row given twice and another at right angles, a coordinate without mass that follows the first.
+    /// Two masses on a rod, one row given twice and another at right angles, a coordinate without mass that
+    /// follows the first.
     #[test]
     fn redundant_rows_and_coordinates_without_mass() {
         let of = |value: f64| Dd::from(value);
         let mass = [of(1.0), of(3.0), of(0.0)];
-        let rows = vec![vec![(0, of(1.0)), (1, of(-1.0))], vec![(0, of(2.0)), (1, of(-2.0))], vec![(2, of(1.0)), (0, of(-1.0))]];
+        let rows = vec![
+            vec![(0, of(1.0)), (1, of(-1.0))],
+            vec![(0, of(2.0)), (1, of(-2.0))],
+            vec![(2, of(1.0)), (0, of(-1.0))],
+        ];
         let solved = solve(&mass, &rows, &[of(8.0), of(0.0), of(0.0)], &[of(0.0); 3]);
-        let near = |found: Dd, expected: f64| assert!((found.hi - expected).abs() < 1e-28 && !solved.is_loose, "{found:?}");
+        let near = |found: Dd, expected: f64| {
+            assert!((found.hi - expected).abs() < 1e-28 && !solved.is_loose, "{found:?}")
+        };
         near(solved.x[0], 2.0);
         near(solved.x[1], 2.0);
         near(solved.x[2], 2.0);

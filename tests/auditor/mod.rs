@@ -1,7 +1,8 @@
 //! An independent simulator of scenes, and the comparison of motions with it.
 //!
-//! It shares no physics with `src`: bodies have three coordinates each, every joint is an equation with its own multiplier, scenes are read from plain
-//! JSON, and all arithmetic is in a double-double of its own.  It is written to be read beside a textbook, not for speed.
+//! It shares no physics with `src`: bodies have three coordinates each, every joint is an equation with its
+//! own multiplier, scenes are read from plain JSON, and all arithmetic is in a double-double of its own.  It
+//! is written to be read beside a textbook, not for speed.
 //!
 //! | file | holds |
 //! | --- | --- |

@@ -4,7 +4,8 @@
 //! M a = f + Gᵀ λ,     G a = -γ,     C = measure(q) - target(t),   C' = G v - target',   γ = what is left of C'' where a = 0
 //! ```
 //!
-//! λ of a point's equation is a force on the first body listed, of an angle's a torque on the body whose angle it is.
+//! λ of a point's equation is a force on the first body listed, of an angle's a torque on the body whose
+//! angle it is.
 
 use super::double_double::{Dd, Vec2};
 use super::linear::{self, Row, Solution};
@@ -80,14 +81,23 @@ pub struct Accelerations {
 impl Model {
     pub fn new(scene: Scene) -> Self {
         let mass = scene.bodies.iter().flat_map(|body| [body.mass, body.mass, body.inertia]).collect();
-        let targets = scene.joints.iter().map(|joint| if let Target::Law(law) = &joint.target { law.clone() } else { Law::default() });
+        let targets = scene
+            .joints
+            .iter()
+            .map(|joint| if let Target::Law(law) = &joint.target { law.clone() } else { Law::default() });
         Self { targets: targets.collect(), mass, scene }
     }
 
     fn spot(&self, place: &Place, pose: &Pose) -> Spot {
         let state = pose.state;
         let Some(k) = place.body else {
-            return Spot { body: None, at: place.point, velocity: Vec2::default(), arm: Vec2::default(), bend: Vec2::default() };
+            return Spot {
+                body: None,
+                at: place.point,
+                velocity: Vec2::default(),
+                arm: Vec2::default(),
+                bend: Vec2::default(),
+            };
         };
         let [x, y] = [0, 1].map(|i| state.q[3 * k + i]);
         let [vx, vy, omega] = [0, 1, 2].map(|i| state.v[3 * k + i]);
@@ -105,7 +115,8 @@ impl Model {
                 let mut row = Row::new();
                 a.push(&mut row, *axis);
                 b.push(&mut row, Vec2::default() - *axis);
-                let [off, rate, bend] = [a.at - b.at, a.velocity - b.velocity, a.bend - b.bend].map(|difference| axis.dot(difference));
+                let [off, rate, bend] = [a.at - b.at, a.velocity - b.velocity, a.bend - b.bend]
+                    .map(|difference| axis.dot(difference));
                 Equation { off, rate, row, bend }
             }
             Measure::Along { point, rail, direction } => {
@@ -120,11 +131,13 @@ impl Model {
                     row.push((3 * k + 2, along.left().dot(span)));
                 }
                 let rate = along.dot(speed) + omega * along.left().dot(span);
-                let bend = along.dot(a.bend - b.bend) + (omega * along.left().dot(speed)).scale(2.0) - omega * omega * along.dot(span);
+                let bend = along.dot(a.bend - b.bend) + (omega * along.left().dot(speed)).scale(2.0)
+                    - omega * omega * along.dot(span);
                 Equation { off: along.dot(span), rate, row, bend }
             }
             Measure::Angle { body, base } => {
-                let mut equation = Equation { off: Dd::ZERO, rate: Dd::ZERO, row: Row::new(), bend: Dd::ZERO };
+                let mut equation =
+                    Equation { off: Dd::ZERO, rate: Dd::ZERO, row: Row::new(), bend: Dd::ZERO };
                 for (k, sign) in body.iter().map(|k| (k, Dd::ONE)).chain(base.iter().map(|k| (k, -Dd::ONE))) {
                     equation.off += sign * state.q[3 * k + 2];
                     equation.rate += sign * state.v[3 * k + 2];
@@ -186,7 +199,8 @@ impl Model {
             let [a, b] = spring.places.each_ref().map(|place| self.spot(place, pose));
             let span = a.at - b.at;
             let length = span.length();
-            // A spring without free length pulls along its span however short; a damper has a direction only where there is one.
+            // A spring without free length pulls along its span however short; a damper has a direction only
+            // where there is one.
             let unit = if length.hi > 0.0 { span.times(Dd::ONE / length) } else { Vec2::default() };
             let lengthening = unit.dot(a.velocity - b.velocity);
             let damping = spring.damping * lengthening;
@@ -208,7 +222,8 @@ impl Model {
             match push {
                 Push::Force { place, force, turns, law } => {
                     let spot = self.spot(place, pose);
-                    let force = if *turns { force.turned(pose.turn(place.body)) } else { *force }.times(factor(law));
+                    let force =
+                        if *turns { force.turned(pose.turn(place.body)) } else { *force }.times(factor(law));
                     spot.press(&mut f, force);
                     power += force.dot(spot.velocity);
                 }
@@ -222,7 +237,8 @@ impl Model {
         (f, power)
     }
 
-    /// Accelerations, with the points of the walls `held` kept on them; their multipliers come after those of the joints.
+    /// Accelerations, with the points of the walls `held` kept on them; their multipliers come after those of
+    /// the joints.
     pub fn accelerations(&self, state: &State, held: &[usize]) -> Accelerations {
         let pose = Pose::new(state);
         let (f, mut power) = self.forces(&pose);
@@ -231,19 +247,25 @@ impl Model {
         let right: Vec<Dd> = equations.iter().map(|equation| -equation.bend).collect();
         let rows: Vec<Row> = equations.into_iter().map(|equation| equation.row).collect();
         let solution = linear::solve(&self.mass, &rows, &f, &right);
-        let motor_power: Vec<Dd> =
-            self.targets.iter().zip(&solution.multipliers).map(|(law, &lambda)| law.at(state.t)[1] * lambda).collect();
+        let motor_power: Vec<Dd> = self
+            .targets
+            .iter()
+            .zip(&solution.multipliers)
+            .map(|(law, &lambda)| law.at(state.t)[1] * lambda)
+            .collect();
         power = motor_power.iter().fold(power, |sum, &one| sum + one);
         Accelerations { solution, power, motor_power }
     }
 
     /// Kinetic energy, and potential energy of gravity and springs \[J\].
     pub fn energy(&self, state: &State) -> [Dd; 2] {
-        let kinetic = (0..self.mass.len()).fold(Dd::ZERO, |sum, i| sum + (self.mass[i] * state.v[i] * state.v[i]).scale(0.5));
+        let kinetic = (0..self.mass.len())
+            .fold(Dd::ZERO, |sum, i| sum + (self.mass[i] * state.v[i] * state.v[i]).scale(0.5));
         let pose = Pose::new(state);
         let mut potential = Dd::ZERO;
         for (k, body) in self.scene.bodies.iter().enumerate() {
-            potential -= body.mass * (self.scene.gravity.x * state.q[3 * k] + self.scene.gravity.y * state.q[3 * k + 1]);
+            potential -= body.mass
+                * (self.scene.gravity.x * state.q[3 * k] + self.scene.gravity.y * state.q[3 * k + 1]);
         }
         for spring in &self.scene.springs {
             let [a, b] = spring.places.each_ref().map(|place| self.spot(place, &pose).at);
@@ -251,7 +273,9 @@ impl Model {
             potential += (spring.stiffness * stretch * stretch).scale(0.5);
         }
         for coil in &self.scene.coils {
-            let twist = state.q[3 * coil.body + 2] - coil.base.map_or(Dd::ZERO, |k| state.q[3 * k + 2]) - coil.free_angle;
+            let twist = state.q[3 * coil.body + 2]
+                - coil.base.map_or(Dd::ZERO, |k| state.q[3 * k + 2])
+                - coil.free_angle;
             potential += (coil.stiffness * twist * twist).scale(0.5);
         }
         [kinetic, potential]

@@ -5,8 +5,9 @@
 //! T_{j,k+1} = T_{j,k} + (T_{j,k} - T_{j-1,k}) / ((n_j / n_{j-k})² - 1)
 //! ```
 //!
-//! The numbers are rational, so that any precision can be had.  After every step the state goes back onto its constraints.
-//! Source: E. Hairer, S. P. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I* (1993), section II.9.
+//! The numbers are rational, so that any precision can be had.  After every step the state goes back onto its
+//! constraints. Source: E. Hairer, S. P. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*
+//! (1993), section II.9.
 
 use super::double_double::Dd;
 use super::model::{Model, State};
@@ -53,7 +54,15 @@ impl<'a> Integrator<'a> {
     }
 
     /// The midpoint rule with n substeps.
-    fn midpoint(&mut self, t: Dd, y: &[Dd], f: &[Dd], step: Dd, n: usize, held: &[usize]) -> Result<Vec<Dd>, Lost> {
+    fn midpoint(
+        &mut self,
+        t: Dd,
+        y: &[Dd],
+        f: &[Dd],
+        step: Dd,
+        n: usize,
+        held: &[usize],
+    ) -> Result<Vec<Dd>, Lost> {
         let h = step / Dd::from(n as f64);
         let mut before = y.to_vec();
         let mut now: Vec<Dd> = y.iter().zip(f).map(|(&y, &f)| y + h * f).collect();
@@ -66,7 +75,13 @@ impl<'a> Integrator<'a> {
     }
 
     /// One step: the state after it and the number of rows it took; `None` where it does not converge.
-    fn attempt(&mut self, state: &State, f: &[Dd], step: Dd, held: &[usize]) -> Result<Option<(State, usize)>, Lost> {
+    fn attempt(
+        &mut self,
+        state: &State,
+        f: &[Dd],
+        step: Dd,
+        held: &[usize],
+    ) -> Result<Option<(State, usize)>, Lost> {
         let y = packed(state);
         let mut table: Vec<Vec<Dd>> = Vec::new();
         for j in 0..MOST_ROWS {
@@ -74,9 +89,14 @@ impl<'a> Integrator<'a> {
             let mut line = vec![self.midpoint(state.t, &y, f, step, n, held)?];
             for k in 0..j {
                 let ratio = n as f64 / (2 * (j - k)) as f64;
-                let divisor = Dd::ONE / (Dd::from(n as f64 * n as f64) / Dd::from((4 * (j - k) * (j - k)) as f64) - Dd::ONE);
+                let divisor = Dd::ONE
+                    / (Dd::from(n as f64 * n as f64) / Dd::from((4 * (j - k) * (j - k)) as f64) - Dd::ONE);
                 debug_assert!(ratio > 1.0);
-                let next = line[k].iter().zip(&table[k]).map(|(&fine, &coarse)| fine + (fine - coarse) * divisor).collect();
+                let next = line[k]
+                    .iter()
+                    .zip(&table[k])
+                    .map(|(&fine, &coarse)| fine + (fine - coarse) * divisor)
+                    .collect();
                 line.push(next);
             }
             if j >= 3 {
@@ -90,11 +110,13 @@ impl<'a> Integrator<'a> {
         Ok(None)
     }
 
-    /// The largest difference over its scale: lengths over the size, rates by what they come to within the step.
+    /// The largest difference over its scale: lengths over the size, rates by what they come to within the
+    /// step.
     fn error(&self, one: &[Dd], other: &[Dd], step: Dd) -> f64 {
         let n = self.model.mass.len();
         let size = self.model.scene.size;
-        let energy = (0..n).map(|i| self.model.mass[i].hi * one[n + i].hi * one[n + i].hi).sum::<f64>() + one[2 * n].hi.abs();
+        let energy = (0..n).map(|i| self.model.mass[i].hi * one[n + i].hi * one[n + i].hi).sum::<f64>()
+            + one[2 * n].hi.abs();
         let one_error = |i: usize| {
             let unit = if i % 3 == 2 { 1.0 } else { size };
             let difference = (one[i] - other[i]).hi.abs();
@@ -104,7 +126,9 @@ impl<'a> Integrator<'a> {
                 _ => difference / (energy + f64::MIN_POSITIVE),
             }
         };
-        (0..=2 * n).map(one_error).fold(0.0, |most, one| if one.is_nan() { f64::INFINITY } else { one.max(most) })
+        (0..=2 * n)
+            .map(one_error)
+            .fold(0.0, |most, one| if one.is_nan() { f64::INFINITY } else { one.max(most) })
     }
 
     /// One step of at most `most` \[s\].

@@ -41,8 +41,11 @@ pub fn pairs(count: usize, first: u64) -> Vec<Pair> {
         }
     };
     std::thread::scope(|scope| {
-        let handles: Vec<_> =
-            (0..threads).map(|_| std::thread::Builder::new().stack_size(16 << 20).spawn_scoped(scope, work).expect("a thread")).collect();
+        let handles: Vec<_> = (0..threads)
+            .map(|_| {
+                std::thread::Builder::new().stack_size(16 << 20).spawn_scoped(scope, work).expect("a thread")
+            })
+            .collect();
         handles.into_iter().for_each(|handle| handle.join().expect("no panic"));
     });
     // The same pairs whatever the number of threads.
@@ -89,7 +92,8 @@ fn scene_pairs(made: &Generated) -> Vec<Pair> {
 
 /// A method with a random tolerance, and at times a stabilization.
 fn request(method: MethodId, dice: &mut Dice) -> Request {
-    let mut request = Request { method: Some(method), max_evaluations: Some(MAX_EVALUATIONS), ..Request::default() };
+    let mut request =
+        Request { method: Some(method), max_evaluations: Some(MAX_EVALUATIONS), ..Request::default() };
     if method.is_adaptive() && dice.chance(0.7) {
         request.rtol = Some(dice.one(&[1e-5, 1e-6, 1e-7, 1e-8, 1e-10, 1e-11, 1e-12]));
     }
@@ -192,6 +196,12 @@ pub fn total_of(counts: &BTreeMap<String, (usize, u64)>) -> usize {
 
 /// Numbers in a reason say nothing of its kind.
 fn digitless(text: &str) -> String {
-    let word = |word: &str| if word.starts_with(|letter: char| letter.is_ascii_digit()) { "…".to_owned() } else { word.to_owned() };
+    let word = |word: &str| {
+        if word.starts_with(|letter: char| letter.is_ascii_digit()) {
+            "…".to_owned()
+        } else {
+            word.to_owned()
+        }
+    };
     text.split(' ').map(word).collect::<Vec<_>>().join(" ")
 }

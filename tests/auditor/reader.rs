@@ -154,15 +154,25 @@ fn name(value: &Value) -> String {
 
 fn law(value: &Value) -> Option<Law> {
     let law = value.get("law")?;
-    let sines = list(law, "sines").map(|sine| ["amplitude", "frequency", "phase"].map(|key| exact(sine, key))).collect();
-    Some(Law { start: exact(law, "start"), rate: exact(law, "rate"), acceleration: exact(law, "acceleration"), sines })
+    let sines = list(law, "sines")
+        .map(|sine| ["amplitude", "frequency", "phase"].map(|key| exact(sine, key)))
+        .collect();
+    Some(Law {
+        start: exact(law, "start"),
+        rate: exact(law, "rate"),
+        acceleration: exact(law, "acceleration"),
+        sines,
+    })
 }
 
 impl Law {
     /// Value, rate and acceleration.
     pub fn at(&self, t: Dd) -> [Dd; 3] {
-        let mut found =
-            [self.start + self.rate * t + (self.acceleration * t * t).scale(0.5), self.rate + self.acceleration * t, self.acceleration];
+        let mut found = [
+            self.start + self.rate * t + (self.acceleration * t * t).scale(0.5),
+            self.rate + self.acceleration * t,
+            self.acceleration,
+        ];
         for &[amplitude, frequency, phase] in &self.sines {
             let (sine, cosine) = (frequency * t + phase).sin_cos();
             found[0] += amplitude * sine;
@@ -188,7 +198,8 @@ impl Scene {
         };
         let places = |value: &Value| [place(&value["between"][0]), place(&value["between"][1])];
         let mut joints = Vec::new();
-        let mut add = |name: String, kind, measure, target| joints.push(Joint { name, kind, measure, target });
+        let mut add =
+            |name: String, kind, measure, target| joints.push(Joint { name, kind, measure, target });
         let axes = [("x", [1.0, 0.0]), ("y", [0.0, 1.0])];
         for hinge in list(&json, "hinges") {
             for (letter, axis) in axes {
@@ -206,7 +217,8 @@ impl Scene {
             add(format!("{}.angle", name(weld)), "weld", measure, Target::AsAtStart);
         }
         for slider in list(&json, "sliders") {
-            let (point, rail, direction) = (place(&slider["point"]), place(&slider["rail"]), unit(&slider["rail"]["direction"]));
+            let (point, rail, direction) =
+                (place(&slider["point"]), place(&slider["rail"]), unit(&slider["rail"]["direction"]));
             let measure = Measure::Along { point, rail, direction: direction.left() };
             add(name(slider), "slider", measure, Target::Law(Law::default()));
             if slider["angle"] == "locked" {
@@ -250,7 +262,12 @@ impl Scene {
             .collect();
         scene.pushes.extend(list(&json, "forces").map(|force| {
             let turns = force["frame"] == "body";
-            Push::Force { place: place(force), force: Vec2::of(pair(&force["force"])), turns, law: law(force) }
+            Push::Force {
+                place: place(force),
+                force: Vec2::of(pair(&force["force"])),
+                turns,
+                law: law(force),
+            }
         }));
         scene.pushes.extend(list(&json, "torques").map(|torque| {
             let (body, base) = (index(&torque["body"]).expect("a bar"), index(&torque["relative_to"]));
@@ -278,11 +295,18 @@ impl Scene {
             body.centre.length().hi.max(gyration)
         });
         let levers = self.joints.iter().flat_map(|joint| match &joint.measure {
-            Measure::Difference { places: [a, b], .. } | Measure::Along { point: a, rail: b, .. } => vec![*a, *b],
+            Measure::Difference { places: [a, b], .. } | Measure::Along { point: a, rail: b, .. } => {
+                vec![*a, *b]
+            }
             Measure::Angle { .. } => Vec::new(),
         });
-        let others = self.walls.iter().map(|wall| wall.place).chain(self.springs.iter().flat_map(|spring| spring.places));
-        let levers = levers.chain(others).filter(|place| place.body.is_some()).map(|place| place.point.length().hi);
+        let others = self
+            .walls
+            .iter()
+            .map(|wall| wall.place)
+            .chain(self.springs.iter().flat_map(|spring| spring.places));
+        let levers =
+            levers.chain(others).filter(|place| place.body.is_some()).map(|place| place.point.length().hi);
         let most = bodies.chain(levers).fold(0.0, f64::max);
         if most > 0.0 { most } else { 1.0 }
     }

@@ -1,4 +1,5 @@
-//! The auditor's motion of a scene at its output times, with all that the program reports of it, and how far its start determines it.
+//! The auditor's motion of a scene at its output times, with all that the program reports of it, and how far
+//! its start determines it.
 
 use super::double_double::Dd;
 use super::model::{Model, State};
@@ -53,7 +54,8 @@ pub struct Scales {
     pub impulse: f64,
 }
 
-/// Of a neighbouring motion, the largest difference of a quantity over its scale, over the largest difference of positions; at least 1.
+/// Of a neighbouring motion, the largest difference of a quantity over its scale, over the largest difference
+/// of positions; at least 1.
 #[derive(Clone, Copy, Debug)]
 pub struct Response {
     pub rate: f64,
@@ -72,19 +74,25 @@ impl Record {
         let scales = Scales::of(&model, &looks, &contact_driver.impacts);
         let (impacts, stays, doubt) = (contact_driver.impacts, contact_driver.stays, contact_driver.doubt);
         let mut evaluations = contact_driver.integrator.evaluations;
-        let (growth, response) = match march(&model, changed(&model, &state, scales)?, times, most_evaluations) {
-            Ok((other, contact_driver)) => {
-                evaluations += contact_driver.integrator.evaluations;
-                (growth(&looks, &other, scales), Response::of(&model, &looks, &other, scales))
-            }
-            // A neighbour that cannot be followed tells that this one is on an edge.
-            Err(_) => (vec![f64::INFINITY; looks.len()], Response { rate: 1.0, force: 1.0, energy: 1.0 }),
-        };
+        let (growth, response) =
+            match march(&model, changed(&model, &state, scales)?, times, most_evaluations) {
+                Ok((other, contact_driver)) => {
+                    evaluations += contact_driver.integrator.evaluations;
+                    (growth(&looks, &other, scales), Response::of(&model, &looks, &other, scales))
+                }
+                // A neighbour that cannot be followed tells that this one is on an edge.
+                Err(_) => (vec![f64::INFINITY; looks.len()], Response { rate: 1.0, force: 1.0, energy: 1.0 }),
+            };
         Ok(Self { model, looks, impacts, stays, doubt, growth, response, evaluations, scales })
     }
 }
 
-fn march<'a>(model: &'a Model, state: State, times: &[f64], most: u64) -> Result<(Vec<Look>, ContactDriver<'a>), Lost> {
+fn march<'a>(
+    model: &'a Model,
+    state: State,
+    times: &[f64],
+    most: u64,
+) -> Result<(Vec<Look>, ContactDriver<'a>), Lost> {
     let mut contact_driver = ContactDriver::new(model, state, most)?;
     let mut looks = vec![look(&contact_driver)];
     for &t in times.iter().filter(|&&t| t > 0.0) {
@@ -122,7 +130,8 @@ fn changed(model: &Model, state: &State, scales: Scales) -> Result<State, Lost> 
         changed.v[i] += Dd::from(CHANGE * unit * scales.rate * share(78.233));
     }
     project(model, &mut changed, &[])?;
-    let behind = (0..model.scene.walls.len()).any(|wall| model.gap(wall, &changed).off.hi < 1e-9 * scales.length);
+    let behind =
+        (0..model.scene.walls.len()).any(|wall| model.gap(wall, &changed).off.hi < 1e-9 * scales.length);
     // A start on a wall stays as it is.
     Ok(if behind { state.clone() } else { changed })
 }
@@ -158,7 +167,12 @@ impl Response {
             }
             for (r, joint) in model.scene.joints.iter().enumerate().filter(|_| a.is_held == b.is_held) {
                 if !a.is_open[r] {
-                    see(2, a.multipliers[r], b.multipliers[r], if joint.is_angle() { scales.torque } else { scales.force });
+                    see(
+                        2,
+                        a.multipliers[r],
+                        b.multipliers[r],
+                        if joint.is_angle() { scales.torque } else { scales.force },
+                    );
                 }
             }
             see(3, a.energy[0], b.energy[0], scales.energy);
@@ -183,7 +197,12 @@ impl Scales {
                 let [ax, ay, alpha] = [0, 1, 2].map(|i| look.acceleration[3 * k + i].hi);
                 let [vx, vy, omega] = [0, 1, 2].map(|i| look.state.v[3 * k + i].hi);
                 let (speed, pull) = (vx.hypot(vy), ax.hypot(ay));
-                scales.rate = scales.rate.max(omega.abs()).max(speed / length).max(alpha.abs().sqrt()).max((pull / length).sqrt());
+                scales.rate = scales
+                    .rate
+                    .max(omega.abs())
+                    .max(speed / length)
+                    .max(alpha.abs().sqrt())
+                    .max((pull / length).sqrt());
                 scales.force = scales.force.max(model.mass[3 * k].hi * pull);
                 scales.torque = scales.torque.max(model.mass[3 * k + 2].hi * alpha.abs());
                 scales.impulse = scales.impulse.max(model.mass[3 * k].hi * speed);

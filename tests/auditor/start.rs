@@ -23,8 +23,10 @@ pub fn project(model: &Model, state: &mut State, held: &[usize]) -> Result<(), L
     let mut before = f64::INFINITY;
     for round in 0.. {
         let equations = equations(state);
-        let most = equations.iter().fold(0.0, |most: f64, equation| most.max(equation.off.hi.abs())) / model.scene.size.min(1.0);
-        // Redundant equations that contradict each other by the rounding of the scene's numbers do not close further.
+        let most = equations.iter().fold(0.0, |most: f64, equation| most.max(equation.off.hi.abs()))
+            / model.scene.size.min(1.0);
+        // Redundant equations that contradict each other by the rounding of the scene's numbers do not close
+        // further.
         if most < CLOSED || (most < 1e-12 && most >= 0.5 * before) {
             break;
         }
@@ -55,7 +57,8 @@ pub struct Start {
     pub is_complete: bool,
 }
 
-/// Reads the start off a scene; what is not given is taken from `guess`: angles, rates, centres and their velocities, if there is one.
+/// Reads the start off a scene; what is not given is taken from `guess`: angles, rates, centres and their
+/// velocities, if there is one.
 pub fn start(scene: Scene, guess: Option<&State>) -> Result<Start, Lost> {
     let n = scene.bodies.len();
     let mut state = State { t: Dd::ZERO, q: vec![Dd::ZERO; 3 * n], v: vec![Dd::ZERO; 3 * n], work: Dd::ZERO };
@@ -73,7 +76,9 @@ pub fn start(scene: Scene, guess: Option<&State>) -> Result<Start, Lost> {
     // Where nothing but a guess was off, the angles kept are those found.
     if guess.is_some() {
         let measures = model.measures(&state);
-        for (target, (joint, measure)) in model.targets.iter_mut().zip(model.scene.joints.iter().zip(&measures)) {
+        for (target, (joint, measure)) in
+            model.targets.iter_mut().zip(model.scene.joints.iter().zip(&measures))
+        {
             if matches!(joint.target, Target::AsAtStart) {
                 target.start = *measure;
             }
@@ -91,7 +96,9 @@ fn angles(scene: &Scene, state: &mut State, guess: Option<&State>) -> Result<boo
     let mut omega: Vec<Option<Dd>> = scene.bodies.iter().map(|body| body.given.omega.map(Dd::from)).collect();
     for _ in 0..n {
         for joint in &scene.joints {
-            let (Measure::Angle { body: Some(body), base }, target) = (&joint.measure, &joint.target) else { continue };
+            let (Measure::Angle { body: Some(body), base }, target) = (&joint.measure, &joint.target) else {
+                continue;
+            };
             let law = if let Target::Law(law) = target { Some(law.at(Dd::ZERO)) } else { None };
             let known = |of: &[Option<Dd>], base: &Option<usize>| base.map_or(Some(Dd::ZERO), |k| of[k]);
             match (law, phi[*body], known(&phi, base)) {
@@ -169,7 +176,11 @@ fn places(scene: &Scene, state: &mut State, guess: Option<&State>) -> Result<boo
                 }
             }
             // Another body of the group may be the one that is given.
-            _ if scene.bodies[k + 1..].iter().any(|other| other.given.origin.is_some()) && guess.is_none() => continue,
+            _ if scene.bodies[k + 1..].iter().any(|other| other.given.origin.is_some())
+                && guess.is_none() =>
+            {
+                continue;
+            }
             (None, Some(guess)) => {
                 is_complete = false;
                 for i in 3 * k..3 * k + 2 {

@@ -1,7 +1,8 @@
 //! The program's motion against the auditor's.
 //!
-//! A disagreement is a difference beyond ten times the error that the run claims, or 1e-6 of the quantity's scale, whichever is larger, that the run does
-//! not report itself by a stop, a note of doubt, or a trust horizon before it.
+//! A disagreement is a difference beyond ten times the error that the run claims, or 1e-6 of the quantity's
+//! scale, whichever is larger, that the run does not report itself by a stop, a note of doubt, or a trust
+//! horizon before it.
 
 use super::reader::Measure;
 use super::record::{Look, Record};
@@ -27,7 +28,8 @@ pub struct Ran {
     pub mechanism: Arc<Mechanism>,
     pub samples: Vec<Sample>,
     pub outcome: Outcome,
-    /// At each sample, the force of each hinge or weld, of its first body on its second, and the multiplier of each row.
+    /// At each sample, the force of each hinge or weld, of its first body on its second, and the multiplier
+    /// of each row.
     pub forces: Vec<(Vec<[f64; 2]>, Vec<f64>)>,
 }
 
@@ -37,7 +39,8 @@ pub fn run(text: &str, request: &Request) -> Result<Ran, String> {
     let mechanism = Arc::new(Mechanism::new(&scene).map_err(|error| format!("compiler: {error}"))?);
     let plan = Plan::new(&scene, &mechanism, request).map_err(|refusal| format!("plan: {refusal}"))?;
     let start = mechanism.start(&scene);
-    let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).map_err(|error| format!("start: {error}"))?;
+    let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start)
+        .map_err(|error| format!("start: {error}"))?;
     let mut samples = Vec::new();
     let outcome = integrate(run.trusted(Level::Full, &start), &mut |sample| {
         samples.push(sample.clone());
@@ -82,7 +85,10 @@ pub struct Difference {
 impl fmt::Display for Difference {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Self { what, t, run, auditor, error, allowed } = self;
-        write!(f, "{what} at t = {t}: run {run:.12e}, auditor {auditor:.12e}, {error:.1e} of its scale, allowed {allowed:.1e}")
+        write!(
+            f,
+            "{what} at t = {t}: run {run:.12e}, auditor {auditor:.12e}, {error:.1e} of its scale, allowed {allowed:.1e}"
+        )
     }
 }
 
@@ -106,8 +112,15 @@ pub fn compare(record: &Record, ran: &Ran) -> Verdict {
     let error = claimed.unwrap_or(0.0);
     let error = error.max(looseness(record) / CLAIMED);
     let claimed_rate = trust.as_ref().and_then(|trust| trust.rate_error).unwrap_or(0.0) / record.scales.rate;
-    let mut judge =
-        Judge { record, ran, allowed: ALLOWED.max(CLAIMED * error), claimed: error, claimed_rate, worst: 0.0, found: Vec::new() };
+    let mut judge = Judge {
+        record,
+        ran,
+        allowed: ALLOWED.max(CLAIMED * error),
+        claimed: error,
+        claimed_rate,
+        worst: 0.0,
+        found: Vec::new(),
+    };
     let doubt = record.doubt.as_ref().map_or(f64::INFINITY, |(t, _)| *t);
     let chaos = record
         .looks
@@ -118,7 +131,11 @@ pub fn compare(record: &Record, ran: &Ran) -> Verdict {
     let until = doubt.min(chaos).min(horizon);
     let mut compared = 0;
     for (sample, (forces, multipliers)) in ran.samples.iter().zip(&ran.forces) {
-        let Some(look) = record.looks.iter().find(|look| (look.state.t.hi - sample.t).abs() < 1e-12 * (1.0 + sample.t)) else { continue };
+        let Some(look) =
+            record.looks.iter().find(|look| (look.state.t.hi - sample.t).abs() < 1e-12 * (1.0 + sample.t))
+        else {
+            continue;
+        };
         if sample.t >= until || stop.as_ref().is_some_and(|stop| sample.t >= stop.t) {
             break;
         }
@@ -136,7 +153,11 @@ pub fn compare(record: &Record, ran: &Ran) -> Verdict {
     if judge.found.is_empty() {
         return match compared {
             0 | 1 if until.is_finite() => {
-                let why = record.doubt.as_ref().filter(|_| doubt == until).map_or("the motion is too sensitive", |(_, why)| why);
+                let why = record
+                    .doubt
+                    .as_ref()
+                    .filter(|_| doubt == until)
+                    .map_or("the motion is too sensitive", |(_, why)| why);
                 Verdict::Unclear(why.into())
             }
             _ => Verdict::Agrees(judge.worst),
@@ -145,19 +166,28 @@ pub fn compare(record: &Record, ran: &Ran) -> Verdict {
     if drift.is_doubtful() {
         return Verdict::Reported("a note of doubt".into());
     }
-    if claimed.is_none() && horizon.is_infinite() && judge.found.iter().all(|difference| difference.error < 1e-2) {
+    if claimed.is_none()
+        && horizon.is_infinite()
+        && judge.found.iter().all(|difference| difference.error < 1e-2)
+    {
         return Verdict::Reported("no estimate".into());
     }
     judge.found.sort_by(|a, b| (b.error / b.allowed).total_cmp(&(a.error / a.allowed)));
     Verdict::Differs(judge.found)
 }
 
-/// What a rod in the place of a very stiff spring may differ from the spring, which is what the auditor moves: some periods of its vibration.
+/// What a rod in the place of a very stiff spring may differ from the spring, which is what the auditor
+/// moves: some periods of its vibration.
 fn looseness(record: &Record) -> f64 {
-    let rigid = record.model.scene.springs.iter().filter(|spring| spring.is_rigid).map(|spring| spring.stiffness.hi);
+    let rigid =
+        record.model.scene.springs.iter().filter(|spring| spring.is_rigid).map(|spring| spring.stiffness.hi);
     let softest = rigid.fold(f64::INFINITY, f64::min);
     let mass: f64 = record.model.scene.bodies.iter().map(|body| body.mass.hi).sum();
-    if softest.is_finite() { 30.0 * std::f64::consts::TAU * (mass / softest).sqrt() * record.scales.rate } else { 0.0 }
+    if softest.is_finite() {
+        30.0 * std::f64::consts::TAU * (mass / softest).sqrt() * record.scales.rate
+    } else {
+        0.0
+    }
 }
 
 impl Judge<'_> {
@@ -166,13 +196,21 @@ impl Judge<'_> {
         self.within(what, t, [run, auditor], scale, self.allowed);
     }
 
-    /// The same for a quantity that differs so many times as much as positions do, and as rates do where those are claimed to be worse.
+    /// The same for a quantity that differs so many times as much as positions do, and as rates do where
+    /// those are claimed to be worse.
     fn response(&mut self, what: impl Fn() -> String, t: f64, pair: [f64; 2], scale: f64, response: f64) {
         let claimed = self.claimed.max(self.claimed_rate / self.record.response.rate);
         self.within(what, t, pair, scale, self.allowed.max(CLAIMED * claimed * response));
     }
 
-    fn within(&mut self, what: impl Fn() -> String, t: f64, [run, auditor]: [f64; 2], scale: f64, allowed: f64) {
+    fn within(
+        &mut self,
+        what: impl Fn() -> String,
+        t: f64,
+        [run, auditor]: [f64; 2],
+        scale: f64,
+        allowed: f64,
+    ) {
         let error = (run - auditor).abs() / scale;
         self.worst = self.worst.max(error / allowed);
         if error.is_nan() || error > allowed {
@@ -187,7 +225,8 @@ impl Judge<'_> {
     }
 
     fn moment(&mut self, look: &Look, sample: &Sample) {
-        let (model, scales, response, t) = (&self.record.model, self.record.scales, self.record.response, sample.t);
+        let (model, scales, response, t) =
+            (&self.record.model, self.record.scales, self.record.response, sample.t);
         let (first, first_sample) = (&self.record.looks[0], &self.ran.samples[0]);
         let at_impact = self.is_at_impact(t);
         for (k, body) in model.scene.bodies.iter().enumerate() {
@@ -200,21 +239,52 @@ impl Judge<'_> {
             self.number(|| name("y"), t, sample.centre[k][1], y, scales.length);
             if !at_impact {
                 self.response(|| name("omega"), t, [sample.omega[k], omega], scales.rate, response.rate);
-                self.response(|| name("vx"), t, [sample.velocity[k][0], vx], scales.rate * scales.length, response.rate);
-                self.response(|| name("vy"), t, [sample.velocity[k][1], vy], scales.rate * scales.length, response.rate);
+                self.response(
+                    || name("vx"),
+                    t,
+                    [sample.velocity[k][0], vx],
+                    scales.rate * scales.length,
+                    response.rate,
+                );
+                self.response(
+                    || name("vy"),
+                    t,
+                    [sample.velocity[k][1], vy],
+                    scales.rate * scales.length,
+                    response.rate,
+                );
             }
         }
         if !at_impact {
-            self.response(|| "kinetic energy".into(), t, [sample.kinetic, look.energy[0].hi], scales.energy, response.energy);
+            self.response(
+                || "kinetic energy".into(),
+                t,
+                [sample.kinetic, look.energy[0].hi],
+                scales.energy,
+                response.energy,
+            );
             let potential = (look.energy[1] - first.energy[1]).hi;
             let gained = sample.potential - first_sample.potential;
-            self.response(|| "potential energy".into(), t, [gained, potential], scales.energy, response.energy);
-            // No estimate covers the work: what a run claims of it is its tolerance, and the imbalance of energy and work that it reports.
+            self.response(
+                || "potential energy".into(),
+                t,
+                [gained, potential],
+                scales.energy,
+                response.energy,
+            );
+            // No estimate covers the work: what a run claims of it is its tolerance, and the imbalance of
+            // energy and work that it reports.
             let Outcome { plan, drift, .. } = &self.ran.outcome;
             let tolerance = plan.tolerance.map_or(0.0, |tolerance| tolerance.relative);
             let reported = drift.energy.max * self.ran.mechanism.energy_scale / scales.energy;
             let rough = ((CLAIMED * tolerance).max(MEASURED * reported) / self.allowed).max(1.0);
-            self.response(|| "work".into(), t, [sample.work, look.state.work.hi], rough * scales.energy, response.energy);
+            self.response(
+                || "work".into(),
+                t,
+                [sample.work, look.state.work.hi],
+                rough * scales.energy,
+                response.energy,
+            );
         }
     }
 
@@ -224,34 +294,71 @@ impl Judge<'_> {
         for (joint, force) in ran.mechanism.joints.iter().zip(hinges) {
             for (axis, letter) in ["x", "y"].iter().enumerate() {
                 let name = format!("{}.{letter}", joint.name);
-                let Some(place) = record.model.scene.joints.iter().position(|own| own.name == name) else { continue };
+                let Some(place) = record.model.scene.joints.iter().position(|own| own.name == name) else {
+                    continue;
+                };
                 if !look.is_open[place] {
                     // The equation's multiplier acts on the first body, the force reported on the second.
-                    self.response(|| format!("force of {name}"), t, [force[axis], -look.multipliers[place].hi], scales.force, response);
+                    self.response(
+                        || format!("force of {name}"),
+                        t,
+                        [force[axis], -look.multipliers[place].hi],
+                        scales.force,
+                        response,
+                    );
                 }
             }
         }
         for (r, row) in ran.mechanism.constraints.iter().enumerate() {
-            let own = record.model.scene.joints.iter().position(|own| own.name == row.name() && !matches!(own.kind, "hinge"));
-            let Some((place, joint)) = own.map(|place| (place, &record.model.scene.joints[place])) else { continue };
+            let own = record
+                .model
+                .scene
+                .joints
+                .iter()
+                .position(|own| own.name == row.name() && !matches!(own.kind, "hinge"));
+            let Some((place, joint)) = own.map(|place| (place, &record.model.scene.joints[place])) else {
+                continue;
+            };
             if look.is_open[place] || (joint.kind == "weld" && !joint.is_angle()) {
                 continue;
             }
             // Torques are those on the body; where the ground comes in its place, on the other.
             let sign = if let Measure::Angle { body: None, .. } = joint.measure { -1.0 } else { 1.0 };
-            let (force, scale) = (sign * look.multipliers[place].hi, if joint.is_angle() { scales.torque } else { scales.force });
-            self.response(|| format!("force or torque of {}", joint.name), t, [-multipliers[r], force], scale, response);
+            let (force, scale) = (
+                sign * look.multipliers[place].hi,
+                if joint.is_angle() { scales.torque } else { scales.force },
+            );
+            self.response(
+                || format!("force or torque of {}", joint.name),
+                t,
+                [-multipliers[r], force],
+                scale,
+                response,
+            );
             if joint.kind.ends_with("motor") {
-                self.response(|| format!("torque of {}", joint.name), t, [sample.motors[r][0], force], scale, response);
+                self.response(
+                    || format!("torque of {}", joint.name),
+                    t,
+                    [sample.motors[r][0], force],
+                    scale,
+                    response,
+                );
                 let power = look.motor_power[place].hi;
                 let speed = if joint.is_angle() { scales.rate } else { scales.rate * scales.length };
-                self.response(|| format!("power of {}", joint.name), t, [sample.motors[r][1], power], scale * speed, response);
+                self.response(
+                    || format!("power of {}", joint.name),
+                    t,
+                    [sample.motors[r][1], power],
+                    scale * speed,
+                    response,
+                );
             }
         }
     }
 
-    /// Impacts up to a time, each against one of the other's at the same wall: in their order, or by their times, whichever fits better.  In a chatter they follow
-    /// each other more closely than either tells their times.
+    /// Impacts up to a time, each against one of the other's at the same wall: in their order, or by their
+    /// times, whichever fits better.  In a chatter they follow each other more closely than either tells
+    /// their times.
     fn impacts(&mut self, until: f64) {
         let before = self.worst;
         let [by_order, by_time] = [Self::by_order, Self::by_time].map(|pair| {
@@ -276,16 +383,20 @@ impl Judge<'_> {
     fn by_order(&self) -> Vec<Option<usize>> {
         let (impacts, strikes) = (&self.record.impacts, &self.ran.outcome.impacts);
         let place = |own: usize| (0..own).filter(|&other| impacts[other].wall == impacts[own].wall).count();
-        (0..impacts.len()).map(|own| (0..strikes.len()).filter(|&strike| self.is_same_wall(own, strike)).nth(place(own))).collect()
+        (0..impacts.len())
+            .map(|own| (0..strikes.len()).filter(|&strike| self.is_same_wall(own, strike)).nth(place(own)))
+            .collect()
     }
 
     /// The same with the nearest in time, hard impacts first.
     fn by_time(&self) -> Vec<Option<usize>> {
         let (impacts, strikes) = (&self.record.impacts, &self.ran.outcome.impacts);
         let (mut is_taken, mut partners) = (vec![false; strikes.len()], vec![None; impacts.len()]);
-        let (hard, soft): (Vec<usize>, Vec<usize>) = (0..impacts.len()).partition(|&own| -impacts[own].approach > self.least_approach());
+        let (hard, soft): (Vec<usize>, Vec<usize>) =
+            (0..impacts.len()).partition(|&own| -impacts[own].approach > self.least_approach());
         for own in hard.into_iter().chain(soft) {
-            let free = (0..strikes.len()).filter(|&strike| !is_taken[strike] && self.is_same_wall(own, strike));
+            let free =
+                (0..strikes.len()).filter(|&strike| !is_taken[strike] && self.is_same_wall(own, strike));
             let away = |strike: &usize| (strikes[*strike].t - impacts[own].t).abs();
             partners[own] = free.min_by(|a, b| away(a).total_cmp(&away(b)));
             partners[own].into_iter().for_each(|strike| is_taken[strike] = true);
@@ -299,10 +410,12 @@ impl Judge<'_> {
         1e-3 * self.record.impacts.iter().fold(fastest, |most: f64, impact| most.max(-impact.approach))
     }
 
-    /// Compares impacts that are partners; neither may have one by itself, unless so near the end that the other's may come after it.
+    /// Compares impacts that are partners; neither may have one by itself, unless so near the end that the
+    /// other's may come after it.
     fn compare_impacts(&mut self, until: f64, partners: &[Option<usize>]) {
         let (record, ran, scales) = (self.record, self.ran, self.record.scales);
-        let (least, unit) = (self.least_approach(), |approach: f64| 1.0 / scales.rate + scales.length / approach.abs());
+        let (least, unit) =
+            (self.least_approach(), |approach: f64| 1.0 / scales.rate + scales.length / approach.abs());
         let is_due = |t: f64, approach: f64, allowed: f64| t < until - allowed * unit(approach);
         for (own, partner) in record.impacts.iter().zip(partners) {
             if -own.approach <= least || !is_due(own.t, own.approach, self.allowed) {
@@ -315,13 +428,40 @@ impl Judge<'_> {
             };
             self.number(|| format!("time of impact at {wall}"), own.t, strike.t, own.t, unit(own.approach));
             let (response, speed) = (record.response.rate, scales.rate * scales.length);
-            self.response(|| format!("impulse at {wall}"), own.t, [strike.impulse, own.impulse], scales.impulse, response);
-            self.response(|| format!("approach at {wall}"), own.t, [strike.approach, own.approach], speed, response);
-            self.response(|| format!("energy lost at {wall}"), own.t, [strike.energy_lost, own.energy_lost], scales.energy, response);
+            self.response(
+                || format!("impulse at {wall}"),
+                own.t,
+                [strike.impulse, own.impulse],
+                scales.impulse,
+                response,
+            );
+            self.response(
+                || format!("approach at {wall}"),
+                own.t,
+                [strike.approach, own.approach],
+                speed,
+                response,
+            );
+            self.response(
+                || format!("energy lost at {wall}"),
+                own.t,
+                [strike.energy_lost, own.energy_lost],
+                scales.energy,
+                response,
+            );
         }
         for (i, strike) in ran.outcome.impacts.iter().enumerate() {
-            if !partners.contains(&Some(i)) && -strike.approach > 2.0 * least && is_due(strike.t, strike.approach, self.allowed) {
-                self.number(|| format!("impact at {} that is none", strike.wall), strike.t, strike.t, f64::NAN, 1.0);
+            if !partners.contains(&Some(i))
+                && -strike.approach > 2.0 * least
+                && is_due(strike.t, strike.approach, self.allowed)
+            {
+                self.number(
+                    || format!("impact at {} that is none", strike.wall),
+                    strike.t,
+                    strike.t,
+                    f64::NAN,
+                    1.0,
+                );
             }
         }
     }

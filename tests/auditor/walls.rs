@@ -1,7 +1,8 @@
 //! Walls: impacts by Newton's law, points that come to rest and stay, and their release.
 //!
-//! A step is halved until a polynomial of degree five through both its ends follows the motion to [`FINE`] of the size; gaps and forces are then looked at
-//! at many points of it, and what is found is located by integrating parts of the step anew.
+//! A step is halved until a polynomial of degree five through both its ends follows the motion to [`FINE`] of
+//! the size; gaps and forces are then looked at at many points of it, and what is found is located by
+//! integrating parts of the step anew.
 //!
 //! ```text
 //! M Δv = Gᵀ Λ + Jᵀ ρ + Hᵀ η,   G Δv = 0,   J v⁺ = -e J v⁻,   0 <= η  ⟂  H v⁺ >= 0       H: points that stay on their walls
@@ -201,7 +202,10 @@ impl<'a> ContactDriver<'a> {
                 }
                 let least = gap(from).off.hi;
                 if least.abs() < 30.0 * FINE * size && !(touches && low == 0.0) {
-                    self.doubt.get_or_insert((arc.before.t.hi, format!("{} is grazed", model.scene.walls[wall].name)));
+                    self.doubt.get_or_insert((
+                        arc.before.t.hi,
+                        format!("{} is grazed", model.scene.walls[wall].name),
+                    ));
                 }
                 if least < 0.0 {
                     (is_behind, high) = (true, from);
@@ -258,14 +262,19 @@ impl<'a> ContactDriver<'a> {
         let model = self.model();
         let size = model.scene.size;
         let touching: Vec<usize> = (0..model.scene.walls.len())
-            .filter(|wall| self.held.contains(wall) || model.gap(*wall, &self.state).off.hi.abs() < TOUCH * size)
+            .filter(|wall| {
+                self.held.contains(wall) || model.gap(*wall, &self.state).off.hi.abs() < TOUCH * size
+            })
             .collect();
         for round in 0..100 {
             let moving = |wall: usize| model.gap(wall, &self.state).rate;
             // An impact leaves rounding of its own.
             let least = 1e-22 * (size + self.state.v.iter().fold(0.0, |most: f64, v| most.max(v.hi.abs())));
-            let striking: Vec<usize> =
-                touching.iter().copied().filter(|wall| !self.held.contains(wall) && moving(*wall).hi < -least).collect();
+            let striking: Vec<usize> = touching
+                .iter()
+                .copied()
+                .filter(|wall| !self.held.contains(wall) && moving(*wall).hi < -least)
+                .collect();
             let Some(&wall) = striking.first() else { break };
             if striking.len() > 1 || round > 0 {
                 self.doubts("two points strike at once".into());
@@ -307,15 +316,17 @@ impl<'a> ContactDriver<'a> {
             let small = 1e-20 * jump.multipliers[joints].hi.abs();
             let presses = jump.multipliers[joints + 1..].iter().all(|eta| eta.hi >= -small);
             let leaves = self.held.iter().filter(|held| !set.contains(held));
-            let opens =
-                { leaves }.all(|&held| linear::row_times(&model.gap(held, &self.state).row, &jump.x).hi >= -1e-20 * gap.rate.hi.abs());
+            let opens = { leaves }.all(|&held| {
+                linear::row_times(&model.gap(held, &self.state).row, &jump.x).hi >= -1e-20 * gap.rate.hi.abs()
+            });
             if !presses || !opens {
                 continue;
             }
             let [before, _] = model.energy(&self.state);
             let (t, impulse) = (self.state.t.hi, jump.multipliers[joints].hi);
             let drives = model.targets.iter().zip(&jump.multipliers);
-            let motor_work = drives.fold(Dd::ZERO, |sum, (law, &lambda)| sum + law.at(self.state.t)[1] * lambda);
+            let motor_work =
+                drives.fold(Dd::ZERO, |sum, (law, &lambda)| sum + law.at(self.state.t)[1] * lambda);
             self.state.v.iter_mut().zip(&jump.x).for_each(|(v, &dv)| *v += dv);
             self.state.work += motor_work;
             let [after, _] = model.energy(&self.state);
@@ -340,7 +351,10 @@ impl<'a> ContactDriver<'a> {
             let free = model.accelerations(&self.state, &others).solution;
             let inward = -(linear::row_times(&gap.row, &free.x) + gap.bend).hi;
             let rate = gap.rate.hi;
-            if self.held.contains(&wall) || rate.abs() < 1e-22 || (inward > 0.0 && rate * rate < 2.0 * inward * REST * model.scene.size) {
+            if self.held.contains(&wall)
+                || rate.abs() < 1e-22
+                || (inward > 0.0 && rate * rate < 2.0 * inward * REST * model.scene.size)
+            {
                 candidates.push(wall);
             }
         }
@@ -380,7 +394,9 @@ impl<'a> ContactDriver<'a> {
 /// All subsets, the largest first.
 fn subsets(of: &[usize]) -> Vec<Vec<usize>> {
     let mut all: Vec<Vec<usize>> = (0..1usize << of.len())
-        .map(|bits| of.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, &wall)| wall).collect())
+        .map(|bits| {
+            of.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, &wall)| wall).collect()
+        })
         .collect();
     all.sort_by_key(|set| std::cmp::Reverse(set.len()));
     all
@@ -403,7 +419,8 @@ impl Arc {
         state.t = self.before.t + step * x;
         let inverse = Dd::ONE / step;
         for i in 0..n {
-            let (p0, v0, c) = (self.before.q[i], self.before.v[i] * step, (self.a0[i] * step * step).scale(0.5));
+            let (p0, v0, c) =
+                (self.before.q[i], self.before.v[i] * step, (self.a0[i] * step * step).scale(0.5));
             let (p1, v1, a1) = (self.after.q[i], self.after.v[i] * step, self.a1[i] * step * step);
             // What the three higher coefficients must bring about at the end.
             let (d, dv, da) = (p1 - p0 - v0 - c, v1 - v0 - c.scale(2.0), a1 - c.scale(2.0));
@@ -411,7 +428,9 @@ impl Arc {
             let quartic = -d.scale(15.0) + dv.scale(7.0) - da;
             let quintic = d.scale(6.0) - dv.scale(3.0) + da.scale(0.5);
             state.q[i] = p0 + x * (v0 + x * (c + x * (cubic + x * (quartic + x * quintic))));
-            let rate = v0 + x * (c.scale(2.0) + x * (cubic.scale(3.0) + x * (quartic.scale(4.0) + x * quintic.scale(5.0))));
+            let rate = v0
+                + x * (c.scale(2.0)
+                    + x * (cubic.scale(3.0) + x * (quartic.scale(4.0) + x * quintic.scale(5.0))));
             state.v[i] = rate * inverse;
         }
         state

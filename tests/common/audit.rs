@@ -1,15 +1,18 @@
-//! An independent look at a run that says it succeeded: energies and joints from the scene and the rows of the table alone.
+//! An independent look at a run that says it succeeded: energies and joints from the scene and the rows of
+//! the table alone.
 
 use driftless::dynamics::Mechanism;
 use driftless::run::{Outcome, Sample};
 use driftless::scene::{Given, Law, Place, Scene, Sine, Slider};
 
-/// What the program promises of a success without stated limits, with a little room for the rounding of this audit.
+/// What the program promises of a success without stated limits, with a little room for the rounding of this
+/// audit.
 const ENERGY: f64 = 1.1e-2;
 const POSITION: f64 = 1.1e-2;
 
 fn law(law: &Law, t: f64) -> f64 {
-    let sines: f64 = law.sines.iter().map(|sine| sine.amplitude * (sine.frequency * t + sine.phase).sin()).sum();
+    let sines: f64 =
+        law.sines.iter().map(|sine| sine.amplitude * (sine.frequency * t + sine.phase).sin()).sum();
     law.start + law.rate * t + 0.5 * law.acceleration * t * t + sines
 }
 
@@ -59,8 +62,9 @@ impl Auditor<'_> {
             let own = 0.5 * spring.stiffness * stretch * stretch;
             potential += own;
             // Positions carry rounding, and stiff springs make energy of it.
-            let rest =
-                1e-15 * (length(a) + length(b) + self.size) * (1.0 + sample.phi.iter().fold(0.0, |most: f64, phi| most.max(phi.abs())));
+            let rest = 1e-15
+                * (length(a) + length(b) + self.size)
+                * (1.0 + sample.phi.iter().fold(0.0, |most: f64, phi| most.max(phi.abs())));
             terms += own + 1e13 * spring.stiffness * rest * (stretch.abs() + rest);
         }
         for spring in &scene.torsion_springs {
@@ -102,7 +106,8 @@ impl Auditor<'_> {
             let off = (travel - law(&drive.law, sample.t)).abs() - rest - 1e-14 * sizes(&drive.law, sample.t);
             see(off.max(0.0) / self.size, &drive.name);
         }
-        // A rod that vibrates has its length on average, which the energy of its start tells; one that does not has it always.
+        // A rod that vibrates has its length on average, which the energy of its start tells; one that does
+        // not has it always.
         for rod in scene.springs.iter().filter(|spring| spring.rigid) {
             let [a, b] = [0, 1].map(|end| self.at(&rod.between[end], sample));
             let off = (length([b[0] - a[0], b[1] - a[1]]) - rod.free_length).abs();
@@ -121,7 +126,8 @@ impl Auditor<'_> {
         }
         for wall in &scene.walls {
             let point = self.at(&Place { bar: Some(wall.bar), point: wall.point }, sample);
-            let gap = (point[0] - wall.through[0]) * wall.normal[0] + (point[1] - wall.through[1]) * wall.normal[1];
+            let gap =
+                (point[0] - wall.through[0]) * wall.normal[0] + (point[1] - wall.through[1]) * wall.normal[1];
             see((-gap - rest - 1e-14 * length(wall.through)).max(0.0) / self.size, &wall.name);
         }
         worst
@@ -137,27 +143,41 @@ impl Auditor<'_> {
         [along[0] * span[0] + along[1] * span[1], along[0] * span[1] - along[1] * span[0]]
     }
 
-    /// What the first row says otherwise than the scene, of whose start nothing had to be changed; `struck` where impacts changed its rates.
+    /// What the first row says otherwise than the scene, of whose start nothing had to be changed; `struck`
+    /// where impacts changed its rates.
     fn start(&self, first: &Sample, struck: bool, until: f64) -> Option<String> {
         let scene = self.scene;
-        // The fastest turn there is, the fastest way over the size of the scene, and the horizon: rates that are zero are so to the rounding of these.
+        // The fastest turn there is, the fastest way over the size of the scene, and the horizon: rates that
+        // are zero are so to the rounding of these.
         let of_way = |velocity: &[f64; 2]| length(*velocity) / self.size;
         let turns = first.omega.iter().map(|omega| omega.abs()).take(scene.bars.len());
         let fastest = first.velocity.iter().map(of_way).chain(turns).fold(1.0 / until, f64::max);
-        let differ = |a: f64, b: f64, size: f64| (a - b).abs() > 1e-10 * (size + a.abs() + b.abs()) || a.is_nan();
+        let differ =
+            |a: f64, b: f64, size: f64| (a - b).abs() > 1e-10 * (size + a.abs() + b.abs()) || a.is_nan();
         for (k, bar) in scene.bars.iter().enumerate() {
             let given = scene.given.get(k).copied().unwrap_or(Given::ANGLE_AND_RATE);
             let (start, name) = (scene.start[k], &bar.name);
             if given.phi && differ(first.phi[k], start.phi, 1.0) {
-                return Some(format!("the first row has {name} at {} rad, the scene at {} rad", first.phi[k], start.phi));
+                return Some(format!(
+                    "the first row has {name} at {} rad, the scene at {} rad",
+                    first.phi[k], start.phi
+                ));
             }
             if given.omega && !struck && differ(first.omega[k], start.omega, fastest) {
-                return Some(format!("the first row has {name} at {} rad/s, the scene at {} rad/s", first.omega[k], start.omega));
+                return Some(format!(
+                    "the first row has {name} at {} rad/s, the scene at {} rad/s",
+                    first.omega[k], start.omega
+                ));
             }
             let at = self.at(&Place { bar: Some(k), point: [0.0, 0.0] }, first);
             let turned = self.size * (1.0 + 1e-5 * first.phi[k].abs());
-            if let Some(origin) = given.origin.filter(|origin| (0..2).any(|i| differ(at[i], origin[i], turned + length(*origin)))) {
-                return Some(format!("the first row has the origin of {name} at {at:?} m, the scene at {origin:?} m"));
+            if let Some(origin) = given
+                .origin
+                .filter(|origin| (0..2).any(|i| differ(at[i], origin[i], turned + length(*origin))))
+            {
+                return Some(format!(
+                    "the first row has the origin of {name} at {at:?} m, the scene at {origin:?} m"
+                ));
             }
         }
         None
@@ -165,8 +185,15 @@ impl Auditor<'_> {
 }
 
 /// Whether a success may be called one.
-pub fn audit(scene: &Scene, mechanism: &Mechanism, samples: &[Sample], outcome: &Outcome) -> Result<(), String> {
-    let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return Err("there are no rows".into()) };
+pub fn audit(
+    scene: &Scene,
+    mechanism: &Mechanism,
+    samples: &[Sample],
+    outcome: &Outcome,
+) -> Result<(), String> {
+    let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
+        return Err("there are no rows".into());
+    };
     // Fixed steps end on the horizon to rounding.
     if (last.t - outcome.plan.until).abs() > 1e-9 * outcome.plan.until
         || samples.windows(2).any(|pair| pair[1].t <= pair[0].t)
@@ -177,11 +204,18 @@ pub fn audit(scene: &Scene, mechanism: &Mechanism, samples: &[Sample], outcome: 
     if samples.len() as u64 != outcome.plan.rows + 1 || samples.iter().any(|sample| !sample.is_finite()) {
         return Err("rows are missing, or hold what is no number".into());
     }
-    let arms = scene.hinges.iter().map(|hinge| &hinge.between).chain(scene.welds.iter().map(|weld| &weld.between)).flatten();
+    let arms = scene
+        .hinges
+        .iter()
+        .map(|hinge| &hinge.between)
+        .chain(scene.welds.iter().map(|weld| &weld.between))
+        .flatten();
     let places = (arms.chain(scene.springs.iter().flat_map(|spring| &spring.between)))
         .chain(scene.sliders.iter().flat_map(|slider| [&slider.point, &slider.rail.place]));
-    let size =
-        places.map(|place| length(place.point)).chain(scene.bars.iter().map(|bar| bar.length.max(length(bar.centre)))).fold(0.0, f64::max);
+    let size = places
+        .map(|place| length(place.point))
+        .chain(scene.bars.iter().map(|bar| bar.length.max(length(bar.centre))))
+        .fold(0.0, f64::max);
     let auditor = Auditor { scene, size: if size > 0.0 { size } else { 1.0 } };
     let struck = outcome.impact_count + outcome.persistent_contact_count > 0;
     let is_changed = !mechanism.assembly.changes.is_empty();
@@ -203,7 +237,8 @@ pub fn audit(scene: &Scene, mechanism: &Mechanism, samples: &[Sample], outcome: 
         } else {
             !(off <= room && -off <= room + outcome.impact_loss.abs())
         };
-        // What a rod's vibration holds is no energy of the places of bodies, and what motors do in an impact is work nobody can see from outside.
+        // What a rod's vibration holds is no energy of the places of bodies, and what motors do in an impact
+        // is work nobody can see from outside.
         let is_seen = mechanism.vibration.is_none() && !(outcome.impact_count > 0 && has_motors);
         if is_off && terms.is_finite() && is_seen {
             return Err(format!("the energy is off by {off:e} J of {largest:e} J at t = {} s", sample.t));

@@ -1,4 +1,5 @@
-//! An equation with a closed solution: nonlinear, and dependent on time, so that a stage at a wrong time costs the order.
+//! An equation with a closed solution: nonlinear, and dependent on time, so that a stage at a wrong time
+//! costs the order.
 
 use driftless::dynamics::{OdeSystem, Time};
 

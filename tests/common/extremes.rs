@@ -1,9 +1,13 @@
-//! What is asked of random scenes beside a run: sweeps that look for bars that turn over, and estimates of the error.
+//! What is asked of random scenes beside a run: sweeps that look for bars that turn over, and estimates of
+//! the error.
 
 use super::random::{self, Draw};
 use driftless::dynamics::Mechanism;
 use driftless::run::trust::{How, Level};
-use driftless::run::{Limits, Outcome, Plan, Point, Request, Run, Sample, Status, Sweep, SweepTable, Totals, Vary, integrate, sweep};
+use driftless::run::{
+    Limits, Outcome, Plan, Point, Request, Run, Sample, Status, Sweep, SweepTable, Totals, Vary, integrate,
+    sweep,
+};
 use driftless::scene::{Scene, Template, parse_scene};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -15,8 +19,12 @@ const ROWS: f64 = 64.0;
 pub fn kinds(scene: &Scene) -> Vec<&'static str> {
     let hung = scene.given.iter().all(|given| given.origin.is_none());
     let rail_on_bar = |on: bool| scene.sliders.iter().any(|slider| slider.rail.place.bar.is_some() == on);
-    let grounded =
-        |on: bool| scene.springs.iter().any(|spring| !spring.rigid && spring.between.iter().any(|place| place.bar.is_none()) == on);
+    let grounded = |on: bool| {
+        scene
+            .springs
+            .iter()
+            .any(|spring| !spring.rigid && spring.between.iter().any(|place| place.bar.is_none()) == on)
+    };
     let relative = |on: bool, list: &[Option<usize>]| list.iter().any(|base| base.is_some() == on);
     let locks: Vec<_> = scene.locks.iter().map(|lock| lock.relative_to).collect();
     let coils: Vec<_> = scene.torsion_springs.iter().map(|coil| coil.relative_to).collect();
@@ -95,7 +103,8 @@ pub fn sweep_of(text: &str, scene: &Scene, draw: &mut Draw, max_evaluations: u64
     };
     let mut request = random::request(draw, scene.until, max_evaluations);
     if draw.chance(50) {
-        (request.method, request.rtol, request.step, request.stabilize, request.time_constant) = (None, Some(1e-8), None, None, None);
+        (request.method, request.rtol, request.step, request.stabilize, request.time_constant) =
+            (None, Some(1e-8), None, None, None);
     }
     request.atol = None;
     let Ok(plan) = Sweep::new(&template, vec![vary], &request) else { return found };
@@ -114,13 +123,17 @@ pub fn sweep_of(text: &str, scene: &Scene, draw: &mut Draw, max_evaluations: u64
         found.points += 1;
         found.done += u64::from(point.status == Status::Done);
         found.flipped += u64::from(point.flip.is_some());
-        let finite = [point.t, point.energy].iter().chain(&point.phi).chain(&point.omega).all(|x| x.is_finite());
+        let finite =
+            [point.t, point.energy].iter().chain(&point.phi).chain(&point.omega).all(|x| x.is_finite());
         if point.status != Status::Done {
             continue;
         }
         assert!(finite, "a point that is done holds what is no number: {point:?}; {request:?}");
         if let Some(flip) = point.flip {
-            assert!(flip.t >= 0.0 && flip.t <= point.t && flip.bar < scene.bars.len(), "a flip out of place: {point:?}; {request:?}");
+            assert!(
+                flip.t >= 0.0 && flip.t <= point.t && flip.bar < scene.bars.len(),
+                "a flip out of place: {point:?}; {request:?}"
+            );
         }
         found.compared += u64::from(agrees(&template, &plan, point, &request));
     }
@@ -142,19 +155,25 @@ fn agrees(template: &Template, plan: &Sweep, point: &Point, request: &Request) -
     };
     let Some((samples, outcome)) = run(&scene, &request, Level::Off) else { return false };
     let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return false };
-    let is_same = |sample: &Sample| (0..scene.bars.len()).all(|k| (sample.phi[k] - point.phi[k]).abs() < 1e-4);
+    let is_same =
+        |sample: &Sample| (0..scene.bars.len()).all(|k| (sample.phi[k] - point.phi[k]).abs() < 1e-4);
     let is_over = (last.t - point.t).abs() <= 1e-9 * last.t;
     if outcome.stop.is_some() || (is_over && !is_same(last)) {
         return false;
     }
-    // Angles so near the boundary that the last digit decides, and those that are there at the start, tell nothing.
+    // Angles so near the boundary that the last digit decides, and those that are there at the start, tell
+    // nothing.
     let side = |phi: f64| ((phi + PI) / TAU).floor();
     let is_clear = |phi: f64| (phi + PI - TAU * ((phi + PI) / TAU).round()).abs() > 1e-3 + 1e-12 * phi.abs();
     if (0..scene.bars.len()).any(|k| !is_clear(first.phi[k])) {
         return false;
     }
     for pair in samples.windows(2) {
-        let passed = |k: &usize| side(pair[0].phi[*k]) != side(pair[1].phi[*k]) && is_clear(pair[0].phi[*k]) && is_clear(pair[1].phi[*k]);
+        let passed = |k: &usize| {
+            side(pair[0].phi[*k]) != side(pair[1].phi[*k])
+                && is_clear(pair[0].phi[*k])
+                && is_clear(pair[1].phi[*k])
+        };
         let Some(bar) = (0..scene.bars.len()).find(passed) else { continue };
         // A fixed step may be so long that the motion between its ends is off by a good part of it.
         let slack = if plan.plan().step.is_some() { 2.0 * every } else { 0.0 };
@@ -163,17 +182,28 @@ fn agrees(template: &Template, plan: &Sweep, point: &Point, request: &Request) -
         assert!(
             is_seen,
             "{} turns over between {} and {} s ({} and {} rad), but the point has {:?}; {:?} {request:?}",
-            scene.bars[bar].name, pair[0].t, pair[1].t, pair[0].phi[bar], pair[1].phi[bar], point.flip, point.values
+            scene.bars[bar].name,
+            pair[0].t,
+            pair[1].t,
+            pair[0].phi[bar],
+            pair[1].phi[bar],
+            point.flip,
+            point.values
         );
         return true;
     }
     // Nothing passes from row to row; what goes there and back between two comes near at both.
     if let Some(flip) = point.flip.filter(|flip| flip.t < last.t * (1.0 - 1e-9)) {
-        let near = |sample: &Sample| (sample.phi[flip.bar] + PI - TAU * ((sample.phi[flip.bar] + PI) / TAU).round()).abs();
+        let near = |sample: &Sample| {
+            (sample.phi[flip.bar] + PI - TAU * ((sample.phi[flip.bar] + PI) / TAU).round()).abs()
+        };
         let fastest = samples.iter().fold(0.0, |most: f64, sample| most.max(sample.omega[flip.bar].abs()));
         let around = samples.windows(2).find(|pair| pair[0].t <= flip.t && flip.t <= pair[1].t);
         let distance = around.map_or(0.0, |pair| near(&pair[0]).min(near(&pair[1])));
-        assert!(distance <= 4.0 * fastest * every + 2e-3, "{point:?} flips where the rows are {distance} rad away; {request:?}");
+        assert!(
+            distance <= 4.0 * fastest * every + 2e-3,
+            "{point:?} flips where the rows are {distance} rad away; {request:?}"
+        );
     }
     true
 }
@@ -189,18 +219,30 @@ pub fn trust_of(scene: &Scene, request: &Request, level: Level) -> Option<bool> 
     // Rows may hold what is no number where the run says so and stops.
     if outcome.stop.is_none() {
         let same = |a: &Sample, b: &Sample| a.phi == b.phi && a.omega == b.omega && a.t == b.t;
-        assert!(plain.len() == rows.len() && plain.iter().zip(&rows).all(|(a, b)| same(a, b)), "an estimate changes the run: {request:?}");
+        assert!(
+            plain.len() == rows.len() && plain.iter().zip(&rows).all(|(a, b)| same(a, b)),
+            "an estimate changes the run: {request:?}"
+        );
     }
     let trust = trusted.trust.expect("an estimate was asked for");
     let end = trusted.last.t;
     let is_finite = |value: Option<f64>| value.is_none_or(|value| value.is_finite() && value >= 0.0);
     assert!(
-        is_finite(trust.error_estimate) && is_finite(trust.horizon) && is_finite(trust.lost) && is_finite(trust.input_error),
+        is_finite(trust.error_estimate)
+            && is_finite(trust.horizon)
+            && is_finite(trust.lost)
+            && is_finite(trust.input_error),
         "{trust:?}"
     );
-    assert!(trust.covered <= end * (1.0 + 1e-9) && trust.at <= end * (1.0 + 1e-9), "it looks beyond {end} s: {trust:?}");
+    assert!(
+        trust.covered <= end * (1.0 + 1e-9) && trust.at <= end * (1.0 + 1e-9),
+        "it looks beyond {end} s: {trust:?}"
+    );
     assert!(trust.horizon.is_none_or(|horizon| horizon <= end * (1.0 + 1e-9)), "{trust:?}");
-    assert!(trust.error_estimate.is_some() || trust.why.is_some() || end == 0.0, "no estimate and no reason: {trust:?} {request:?}");
+    assert!(
+        trust.error_estimate.is_some() || trust.why.is_some() || end == 0.0,
+        "no estimate and no reason: {trust:?} {request:?}"
+    );
     assert!((trust.how == How::None) == trust.error_estimate.is_none(), "{trust:?}");
     assert!(trust.record.iter().all(|[t, error]| t.is_finite() && error.is_finite()), "{trust:?}");
     Some(trust.error_estimate.is_some())

@@ -40,8 +40,17 @@ pub fn double_pendulum(inertia: Inertia, start: [(f64, f64); 2]) -> Scene {
         gravity: [9.81, 0.0],
         bars: vec![bar("bar1"), bar("bar2")],
         hinges: vec![
-            Hinge { name: "A".into(), between: [Place { bar: None, point: [0.0, 0.0] }, Place { bar: Some(0), point: [0.0, 0.0] }] },
-            Hinge { name: "B".into(), between: [Place { bar: Some(0), point: [LENGTH, 0.0] }, Place { bar: Some(1), point: [0.0, 0.0] }] },
+            Hinge {
+                name: "A".into(),
+                between: [Place { bar: None, point: [0.0, 0.0] }, Place { bar: Some(0), point: [0.0, 0.0] }],
+            },
+            Hinge {
+                name: "B".into(),
+                between: [
+                    Place { bar: Some(0), point: [LENGTH, 0.0] },
+                    Place { bar: Some(1), point: [0.0, 0.0] },
+                ],
+            },
         ],
         start: start.iter().map(|&(phi, omega)| Start { phi, omega }).collect(),
         until: 10.0,
@@ -59,7 +68,10 @@ pub fn free() -> Scene {
 pub fn spring(damping: f64) -> Spring {
     Spring {
         name: "spring".into(),
-        between: [Place { bar: None, point: [-LENGTH / 2.0, 0.0] }, Place { bar: Some(0), point: [2.0 * LENGTH / 3.0, 0.0] }],
+        between: [
+            Place { bar: None, point: [-LENGTH / 2.0, 0.0] },
+            Place { bar: Some(0), point: [2.0 * LENGTH / 3.0, 0.0] },
+        ],
         stiffness: 7.394_287_5,
         free_length: 0.4,
         damping,
@@ -103,20 +115,32 @@ pub fn run_limited(scene: &Scene, request: &Request, limits: Limits) -> Outcome 
 }
 
 /// A run from another motion than the scene's start.
-pub fn run_from(scene: &Scene, mechanism: &Arc<Mechanism>, request: &Request, limits: Limits, start: &Motion) -> Outcome {
+pub fn run_from(
+    scene: &Scene,
+    mechanism: &Arc<Mechanism>,
+    request: &Request,
+    limits: Limits,
+    start: &Motion,
+) -> Outcome {
     let plan = Plan::new(scene, mechanism, request).expect("a sensible pairing");
     let run = Run::new(Arc::clone(mechanism), plan, limits, start).expect("a beginning");
     integrate(run, &mut |_| Ok(())).expect("no observer fails")
 }
 
-/// A single uniform slender bar of length 1 m and mass 1 kg on a ground hinge, hanging down at phi = 0 under 10 m/s²: a physical pendulum
-/// with squared frequency 15 /s².
+/// A single uniform slender bar of length 1 m and mass 1 kg on a ground hinge, hanging down at phi = 0 under
+/// 10 m/s²: a physical pendulum with squared frequency 15 /s².
 pub fn pendulum(phi: f64, omega: f64) -> Scene {
     Scene {
         name: "pendulum".into(),
         description: String::new(),
         gravity: [10.0, 0.0],
-        bars: vec![Bar { name: "bar".into(), length: 1.0, mass: 1.0, centre: [0.5, 0.0], inertia: 1.0 / 12.0 }],
+        bars: vec![Bar {
+            name: "bar".into(),
+            length: 1.0,
+            mass: 1.0,
+            centre: [0.5, 0.0],
+            inertia: 1.0 / 12.0,
+        }],
         hinges: vec![Hinge {
             name: "A".into(),
             between: [Place { bar: None, point: [0.0, 0.0] }, Place { bar: Some(0), point: [0.0, 0.0] }],
@@ -131,7 +155,8 @@ pub fn pendulum(phi: f64, omega: f64) -> Scene {
 /// Squared frequency of small swings of [`pendulum`] \[1/s²\].
 pub const PENDULUM_SQUARED: f64 = 15.0;
 
-/// A quarter of the period of [`pendulum`] from rest at `amplitude` \[s\]: K(sin(amplitude/2)) / omega_0 by the arithmetic-geometric mean.
+/// A quarter of the period of [`pendulum`] from rest at `amplitude` \[s\]: K(sin(amplitude/2)) / omega_0 by
+/// the arithmetic-geometric mean.
 pub fn quarter_period(amplitude: f64) -> f64 {
     let (mut a, mut g) = (1.0, (amplitude / 2.0).cos());
     while (a - g).abs() > 1e-15 {
@@ -140,18 +165,24 @@ pub fn quarter_period(amplitude: f64) -> f64 {
     FRAC_PI_2 / (0.5 * (a + g)) / PENDULUM_SQUARED.sqrt()
 }
 
-/// Least-squares slope of log error on log step; points outside (floor, ceiling) are dropped, and at least three must be left.
+/// Least-squares slope of log error on log step; points outside (floor, ceiling) are dropped, and at least
+/// three must be left.
 pub fn order(points: &[(f64, f64)], floor: f64, ceiling: f64) -> f64 {
-    let kept: Vec<(f64, f64)> =
-        points.iter().filter(|(_, error)| *error > floor && *error < ceiling).map(|(h, error)| (h.ln(), error.ln())).collect();
+    let kept: Vec<(f64, f64)> = points
+        .iter()
+        .filter(|(_, error)| *error > floor && *error < ceiling)
+        .map(|(h, error)| (h.ln(), error.ln()))
+        .collect();
     assert!(kept.len() >= 3, "too few points above round-off: {points:?}");
     let count = kept.len() as f64;
     let (x, y) = kept.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / count, y + p.1 / count));
-    let (above, below) = kept.iter().fold((0.0, 0.0), |(a, b), p| (a + (p.0 - x) * (p.1 - y), b + (p.0 - x) * (p.0 - x)));
+    let (above, below) =
+        kept.iter().fold((0.0, 0.0), |(a, b), p| (a + (p.0 - x) * (p.1 - y), b + (p.0 - x) * (p.0 - x)));
     above / below
 }
 
-/// Integrates a problem from one output time to the next, `every` \[s\] apart, and asserts that nothing stops it.
+/// Integrates a problem from one output time to the next, `every` \[s\] apart, and asserts that nothing stops
+/// it.
 pub fn go<P: ?Sized>(
     method: &mut impl Integrator<P>,
     problem: &mut P,

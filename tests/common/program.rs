@@ -54,8 +54,15 @@ impl Program {
     pub fn run(&self, arguments: &str) -> Ran {
         let output = self.command(arguments).output().expect("the program");
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
-        let ran = Ran { code: output.status.code().unwrap_or(-1), stdout: text(output.stdout), stderr: text(output.stderr) };
-        assert!(!ran.stderr.contains("panicked") && !ran.stderr.contains("RUST_BACKTRACE"), "{arguments}: {ran:?}");
+        let ran = Ran {
+            code: output.status.code().unwrap_or(-1),
+            stdout: text(output.stdout),
+            stderr: text(output.stderr),
+        };
+        assert!(
+            !ran.stderr.contains("panicked") && !ran.stderr.contains("RUST_BACKTRACE"),
+            "{arguments}: {ran:?}"
+        );
         ran
     }
 
@@ -68,7 +75,11 @@ impl Program {
                 } else {
                     let path = entry.path();
                     let path = path.strip_prefix(root).expect("below").components();
-                    found.push(path.map(|part| part.as_os_str().to_string_lossy().into_owned()).collect::<Vec<_>>().join("/"));
+                    found.push(
+                        path.map(|part| part.as_os_str().to_string_lossy().into_owned())
+                            .collect::<Vec<_>>()
+                            .join("/"),
+                    );
                 }
             }
         }
@@ -89,7 +100,8 @@ impl Ran {
     /// Stdout as one JSON object and nothing else.
     #[track_caller]
     pub fn object(&self) -> Value {
-        let value: Value = serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("{error}: {self:#?}"));
+        let value: Value =
+            serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("{error}: {self:#?}"));
         assert!(value.is_object(), "{self:#?}");
         value
     }

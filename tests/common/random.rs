@@ -31,7 +31,11 @@ impl<'a> Draw<'a> {
 
     /// One of 0 … n - 1.
     pub fn below(&mut self, n: usize) -> usize {
-        if n <= 256 { usize::from(self.byte()) % n.max(1) } else { (usize::from(self.byte()) << 8 | usize::from(self.byte())) % n }
+        if n <= 256 {
+            usize::from(self.byte()) % n.max(1)
+        } else {
+            (usize::from(self.byte()) << 8 | usize::from(self.byte())) % n
+        }
     }
 
     /// True in about `percent` of a hundred cases.
@@ -105,11 +109,16 @@ fn place(draw: &mut Draw, spread: Spread, bar: Option<usize>, length: f64) -> Va
     json!({"body": bar.map_or("ground".into(), |k| format!("bar{k}")), "point": point})
 }
 
-/// The text of a scene that is valid as far as single values go; what does not fit together is refused by the reader or the compiler.
+/// The text of a scene that is valid as far as single values go; what does not fit together is refused by the
+/// reader or the compiler.
 pub fn scene(draw: &mut Draw) -> String {
     let spread = Spread(*draw.one(&[0.5, 0.5, 1.0, 3.0, 6.0, 25.0]));
     let length = spread.size(draw, 0.6);
-    let gravity = if draw.chance(80) { [spread.size(draw, 9.81), 0.0] } else { [spread.signed(draw, 9.81), spread.signed(draw, 9.81)] };
+    let gravity = if draw.chance(80) {
+        [spread.size(draw, 9.81), 0.0]
+    } else {
+        [spread.signed(draw, 9.81), spread.signed(draw, 9.81)]
+    };
     let pull = gravity[0].abs().max(gravity[1].abs()).max(1e-30);
     let rate = (pull / length).sqrt();
     let n = *draw.one(&[1, 1, 2, 2, 2, 3, 3, 4, 5, 6]);
@@ -136,7 +145,8 @@ pub fn scene(draw: &mut Draw) -> String {
         if is_loose && draw.chance(50) {
             continue;
         }
-        let parent = if k == 0 { None } else { [None, Some(k - 1), Some(k - 1), Some(draw.below(k))][draw.below(4)] };
+        let parent =
+            if k == 0 { None } else { [None, Some(k - 1), Some(k - 1), Some(draw.below(k))][draw.below(4)] };
         let there = place(draw, spread, parent, parent.map_or(0.0, |parent| lengths[parent]));
         hinges.push(json!({"name": format!("h{k}"), "between": [there, {"body": format!("bar{k}"), "point": [0, 0]}]}));
     }
@@ -174,9 +184,11 @@ pub fn scene(draw: &mut Draw) -> String {
         let is_rigid = draw.chance(12);
         let damping = if !is_rigid && draw.chance(30) { spread.size(draw, mass * rate) } else { 0.0 };
         let is_damper = damping > 0.0 && draw.chance(20);
-        let stiffness = if is_damper { 0.0 } else { spread.size(draw, if is_rigid { 1e6 } else { 5.0 } * stiffness) };
+        let stiffness =
+            if is_damper { 0.0 } else { spread.size(draw, if is_rigid { 1e6 } else { 5.0 } * stiffness) };
         let free = if !is_rigid && draw.chance(15) { 0.0 } else { spread.size(draw, length) };
-        let mut made = json!({"between": ends(draw), "stiffness": stiffness, "free_length": free, "damping": damping});
+        let mut made =
+            json!({"between": ends(draw), "stiffness": stiffness, "free_length": free, "damping": damping});
         if is_rigid {
             made["model"] = json!("rigid");
         }
@@ -284,7 +296,8 @@ pub fn request(draw: &mut Draw, until: f64, max_evaluations: u64) -> Request {
     if draw.chance(30) {
         request.stabilize = Some(*draw.one(&Stabilization::ALL));
     }
-    request.time_constant = (request.stabilize == Some(Stabilization::Baumgarte) && draw.chance(30)).then_some(1e-3 * until);
+    request.time_constant =
+        (request.stabilize == Some(Stabilization::Baumgarte) && draw.chance(30)).then_some(1e-3 * until);
     request.extended = draw.chance(3);
     request
 }

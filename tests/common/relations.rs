@@ -12,7 +12,8 @@ pub struct Related {
     pub back: Back,
 }
 
-/// How a motion of the related scene reads as one of the first: scales are taken off first, then shift, turn and mirror.
+/// How a motion of the related scene reads as one of the first: scales are taken off first, then shift, turn
+/// and mirror.
 #[derive(Clone, Debug)]
 pub struct Back {
     /// The number in the related scene of each body of the first.
@@ -26,14 +27,24 @@ pub struct Back {
     pub mass: f64,
     pub length: f64,
     pub time: f64,
-    /// A body that was cut in two, the number of its other part, and the share of the mass that is left with the first.
+    /// A body that was cut in two, the number of its other part, and the share of the mass that is left with
+    /// the first.
     pub cut: Option<(usize, usize, f64)>,
 }
 
 impl Back {
     fn same(scene: &Scene) -> Self {
         let bodies = (0..scene.bars.len()).collect();
-        Self { bodies, mirrored: false, turn: 0.0, shift: [0.0; 2], mass: 1.0, length: 1.0, time: 1.0, cut: None }
+        Self {
+            bodies,
+            mirrored: false,
+            turn: 0.0,
+            shift: [0.0; 2],
+            mass: 1.0,
+            length: 1.0,
+            time: 1.0,
+            cut: None,
+        }
     }
 
     /// Angle and rate of a body of the first scene.
@@ -47,7 +58,9 @@ impl Back {
     pub fn centre(&self, body: usize, sample: &Sample) -> [[f64; 2]; 2] {
         let k = self.bodies[body];
         let whole = |vectors: &[[f64; 2]]| match self.cut {
-            Some((whole, part, share)) if whole == body => [0, 1].map(|i| share * vectors[k][i] + (1.0 - share) * vectors[part][i]),
+            Some((whole, part, share)) if whole == body => {
+                [0, 1].map(|i| share * vectors[k][i] + (1.0 - share) * vectors[part][i])
+            }
             _ => vectors[k],
         };
         let [x, y] = whole(&sample.centre);
@@ -65,7 +78,8 @@ impl Back {
         self.mass * self.length * self.length / (self.time * self.time)
     }
 
-    /// What torque and power of a motor on an angle, or force and power of one on a slider, are to be divided by.
+    /// What torque and power of a motor on an angle, or force and power of one on a slider, are to be divided
+    /// by.
     pub fn of_motor(&self, is_angle: bool) -> [f64; 2] {
         let (energy, sign) = (self.energy(), if self.mirrored { -1.0 } else { 1.0 });
         [if is_angle { sign * energy } else { energy / self.length }, energy / self.time]
@@ -170,7 +184,8 @@ fn negated(law: &mut Law) {
     law.sines.iter_mut().for_each(|sine| sine.amplitude = -sine.amplitude);
 }
 
-/// Seen in a mirror: x becomes -x, an angle phi becomes pi - phi, and y changes its sign in the frames of bodies.
+/// Seen in a mirror: x becomes -x, an angle phi becomes pi - phi, and y changes its sign in the frames of
+/// bodies.
 pub fn mirrored(scene: &Scene) -> Related {
     let mut scene = with_all_given(scene);
     let back = Back { mirrored: true, ..Back::same(&scene) };
@@ -185,7 +200,8 @@ pub fn mirrored(scene: &Scene) -> Related {
         let direction = &mut slider.rail.direction;
         if slider.rail.place.bar.is_some() { in_body(direction) } else { in_world(direction) }
     }
-    let angle = |relative_to: Option<usize>, angle: f64| if relative_to.is_some() { -angle } else { PI - angle };
+    let angle =
+        |relative_to: Option<usize>, angle: f64| if relative_to.is_some() { -angle } else { PI - angle };
     for lock in &mut scene.locks {
         lock.angle = lock.angle.map(|own| angle(lock.relative_to, own));
     }
@@ -224,7 +240,10 @@ pub fn turned(scene: &Scene, turn: f64) -> Related {
     let back = Back { turn, ..Back::same(&scene) };
     let rotate = |vector: &mut [f64; 2]| *vector = rotated(*vector, turn);
     rotate(&mut scene.gravity);
-    places(&mut scene).into_iter().filter(|place| place.bar.is_none()).for_each(|place| rotate(&mut place.point));
+    places(&mut scene)
+        .into_iter()
+        .filter(|place| place.bar.is_none())
+        .for_each(|place| rotate(&mut place.point));
     for slider in scene.sliders.iter_mut().filter(|slider| slider.rail.place.bar.is_none()) {
         rotate(&mut slider.rail.direction);
     }
@@ -257,7 +276,10 @@ pub fn shifted(scene: &Scene, shift: [f64; 2]) -> Related {
     let mut scene = with_all_given(scene);
     let back = Back { shift, ..Back::same(&scene) };
     let move_it = |point: &mut [f64; 2]| *point = [point[0] + shift[0], point[1] + shift[1]];
-    places(&mut scene).into_iter().filter(|place| place.bar.is_none()).for_each(|place| move_it(&mut place.point));
+    places(&mut scene)
+        .into_iter()
+        .filter(|place| place.bar.is_none())
+        .for_each(|place| move_it(&mut place.point));
     scene.walls.iter_mut().for_each(|wall| move_it(&mut wall.through));
     for given in &mut scene.given {
         given.origin.iter_mut().for_each(move_it);
@@ -276,7 +298,11 @@ pub fn scaled(scene: &Scene, [mass, length, time]: [f64; 3]) -> Related {
         law.rate *= size / time;
         law.acceleration *= size / (time * time);
         for sine in &mut law.sines {
-            *sine = Sine { amplitude: sine.amplitude * size, frequency: sine.frequency / time, phase: sine.phase };
+            *sine = Sine {
+                amplitude: sine.amplitude * size,
+                frequency: sine.frequency / time,
+                phase: sine.phase,
+            };
         }
     };
     scene.gravity.iter_mut().for_each(|g| *g *= length / (time * time));
@@ -321,7 +347,8 @@ pub fn scaled(scene: &Scene, [mass, length, time]: [f64; 3]) -> Related {
     Related { scene, back }
 }
 
-/// One body made of two that are welded, with what was joined to the one now joined to either; `None` where no body can be split.
+/// One body made of two that are welded, with what was joined to the one now joined to either; `None` where
+/// no body can be split.
 pub fn split(scene: &Scene, dice: &mut Dice) -> Option<Related> {
     let mut scene = with_all_given(scene);
     let (whole, part) = (dice.pick(scene.bars.len()), scene.bars.len());
@@ -374,7 +401,11 @@ fn backwards_in_time(law: &mut Law, until: f64) {
     law.start += law.rate * until + 0.5 * law.acceleration * until * until;
     law.rate = -(law.rate + law.acceleration * until);
     for sine in &mut law.sines {
-        *sine = Sine { amplitude: sine.amplitude, frequency: -sine.frequency, phase: sine.phase + sine.frequency * until };
+        *sine = Sine {
+            amplitude: sine.amplitude,
+            frequency: -sine.frequency,
+            phase: sine.phase + sine.frequency * until,
+        };
     }
 }
 
@@ -395,8 +426,16 @@ pub fn backwards(scene: &Scene, end: &Sample) -> Scene {
     let until = end.t;
     scene.motors.iter_mut().for_each(|motor| backwards_in_time(&mut motor.law, until));
     scene.drives.iter_mut().for_each(|drive| backwards_in_time(&mut drive.law, until));
-    scene.forces.iter_mut().filter_map(|force| force.law.as_mut()).for_each(|law| backwards_in_time(law, until));
-    scene.torques.iter_mut().filter_map(|torque| torque.law.as_mut()).for_each(|law| backwards_in_time(law, until));
+    scene
+        .forces
+        .iter_mut()
+        .filter_map(|force| force.law.as_mut())
+        .for_each(|law| backwards_in_time(law, until));
+    scene
+        .torques
+        .iter_mut()
+        .filter_map(|torque| torque.law.as_mut())
+        .for_each(|law| backwards_in_time(law, until));
     scene
 }
 

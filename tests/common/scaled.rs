@@ -1,4 +1,5 @@
-//! A scene in other units: all masses, lengths or times multiplied by a number, every quantity by its dimension.
+//! A scene in other units: all masses, lengths or times multiplied by a number, every quantity by its
+//! dimension.
 
 use driftless::scene::{Law, Place, Scene};
 
@@ -41,7 +42,8 @@ fn law(law: &mut Law, unit: f64, time: f64) {
 pub fn scaled(scene: &Scene, by: Scale) -> Scene {
     let mut scene = scene.clone();
     let times = |values: &mut [f64], factor: f64| values.iter_mut().for_each(|value| *value *= factor);
-    let places = |places: &mut [Place]| places.iter_mut().for_each(|place| times(&mut place.point, by.length));
+    let places =
+        |places: &mut [Place]| places.iter_mut().for_each(|place| times(&mut place.point, by.length));
     times(&mut scene.gravity, by.length / (by.time * by.time));
     for bar in &mut scene.bars {
         bar.length *= by.length;

@@ -1,4 +1,5 @@
-//! What is fuzzed: each target takes a string of bytes, does with it what the program would, and panics where a promise is broken.
+//! What is fuzzed: each target takes a string of bytes, does with it what the program would, and panics where
+//! a promise is broken.
 
 use super::audit::audit;
 use super::random::{self, Draw};
@@ -18,7 +19,8 @@ use std::cell::RefCell;
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
-/// A target by its name; it returns what kind of thing came of its input, so that a driver without coverage can tell new kinds from old.
+/// A target by its name; it returns what kind of thing came of its input, so that a driver without coverage
+/// can tell new kinds from old.
 pub type Target = fn(&[u8]) -> u64;
 
 /// All of them.
@@ -32,8 +34,13 @@ pub const TARGETS: [(&str, Target); 5] = [
 
 /// The shipped scenes.
 pub static SCENES: LazyLock<Vec<String>> = LazyLock::new(|| {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(if cfg!(test) { "examples/scenes" } else { "../examples/scenes" });
-    let mut files: Vec<_> = std::fs::read_dir(folder).expect("scenes").flatten().map(|entry| entry.path()).collect();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(if cfg!(test) {
+        "examples/scenes"
+    } else {
+        "../examples/scenes"
+    });
+    let mut files: Vec<_> =
+        std::fs::read_dir(folder).expect("scenes").flatten().map(|entry| entry.path()).collect();
     files.sort();
     files.iter().map(|file| std::fs::read_to_string(file).expect("a scene")).collect()
 });
@@ -44,10 +51,13 @@ const FEW: usize = 12;
 /// FNV-1a over what a message says, its numbers and names left out.
 fn kind(message: &str) -> u64 {
     let words = message.split(|letter: char| !letter.is_ascii_lowercase()).filter(|word| word.len() > 2);
-    words.flat_map(str::bytes).fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+    words
+        .flat_map(str::bytes)
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// What kind of a refusal a scene's is; what the text says itself is left out, or every other text would be of a kind of its own.
+/// What kind of a refusal a scene's is; what the text says itself is left out, or every other text would be
+/// of a kind of its own.
 fn kind_of(refusal: &Refusal) -> u64 {
     let depth = refusal.path.bytes().filter(|&byte| byte == b'.' || byte == b'[').count() as u64;
     let words = refusal.problem.split(['`', '"', '=']).next().unwrap_or_default();
@@ -86,8 +96,9 @@ pub fn scene_text(bytes: &[u8]) -> u64 {
 
 /// A shipped scene of which some values, keys and elements were changed.
 pub fn scene_tree(bytes: &[u8]) -> u64 {
-    static TREES: LazyLock<Vec<Value>> =
-        LazyLock::new(|| SCENES.iter().map(|text| serde_json::from_str(text).expect("a shipped scene")).collect());
+    static TREES: LazyLock<Vec<Value>> = LazyLock::new(|| {
+        SCENES.iter().map(|text| serde_json::from_str(text).expect("a shipped scene")).collect()
+    });
     let mut draw = Draw::new(bytes);
     let mut tree = draw.one(&TREES).clone();
     for _ in 0..1 + draw.below(4) {
@@ -96,8 +107,23 @@ pub fn scene_tree(bytes: &[u8]) -> u64 {
     judge(&tree.to_string())
 }
 
-const WORDS: &[&str] =
-    &["ground", "bar1", "bar2", "A", "slider", "", "..", "../up", "full", "locked", "body", "con", "ä", "a/b", "bar1\u{0}"];
+const WORDS: &[&str] = &[
+    "ground",
+    "bar1",
+    "bar2",
+    "A",
+    "slider",
+    "",
+    "..",
+    "../up",
+    "full",
+    "locked",
+    "body",
+    "con",
+    "ä",
+    "a/b",
+    "bar1\u{0}",
+];
 const NUMBERS: &[f64] = &[
     0.0,
     -0.0,
@@ -160,7 +186,9 @@ fn change(node: &mut Value, draw: &mut Draw) {
                 3 => json!(draw.byte()),
                 4 => json!(f64::from_bits(draw.word())),
                 5 => other.as_f64().map_or(json!(true), |value| json!(-value)),
-                6 => other.as_f64().map_or(json!({}), |value| json!(value * 10f64.powi(i32::from(draw.byte()) - 128))),
+                6 => other
+                    .as_f64()
+                    .map_or(json!({}), |value| json!(value * 10f64.powi(i32::from(draw.byte()) - 128))),
                 _ => json!(*draw.one(NUMBERS)),
             }
         }
@@ -174,13 +202,18 @@ type Sound = (Scene, Arc<Mechanism>, Vec<u8>);
 static CHECKPOINTS: LazyLock<Vec<Sound>> = LazyLock::new(|| {
     let methods = ["dp8", "taylor", "dp5", "rattle6", "gauss8", "dop853", "taylor"];
     let of = |(name, method): (&str, &str)| {
-        let text = SCENES.iter().find(|text| text.contains(&format!("\"name\": \"{name}\""))).expect("a shipped scene");
+        let text = SCENES
+            .iter()
+            .find(|text| text.contains(&format!("\"name\": \"{name}\"")))
+            .expect("a shipped scene");
         let scene = parse_scene(text, name, &[]).expect("a scene");
         let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
         let method = method.parse::<MethodId>().expect("a method");
-        let request = Request { method: Some(method), until: Some(1.0), every: Some(0.125), ..Request::default() };
+        let request =
+            Request { method: Some(method), until: Some(1.0), every: Some(0.125), ..Request::default() };
         let plan = Plan::new(&scene, &mechanism, &request).expect("a plan");
-        let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &mechanism.start(&scene)).expect("a run");
+        let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &mechanism.start(&scene))
+            .expect("a run");
         let mut running = Running::new(run);
         let mut calls = 0;
         let is_over = running.go(&mut |_| Ok(()), &mut || {
@@ -195,7 +228,8 @@ static CHECKPOINTS: LazyLock<Vec<Sound>> = LazyLock::new(|| {
     names.into_iter().zip(methods).map(of).collect()
 });
 
-/// A sound checkpoint with some bytes changed, with its checksum wrong or made right: it is refused, or the run goes on.
+/// A sound checkpoint with some bytes changed, with its checksum wrong or made right: it is refused, or the
+/// run goes on.
 pub fn checkpoint(bytes: &[u8]) -> u64 {
     const DIGEST: usize = 32;
     const HEAD: usize = 33;
@@ -209,7 +243,8 @@ pub fn checkpoint(bytes: &[u8]) -> u64 {
         _ => {}
     }
     for _ in 0..1 + draw.below(4) {
-        // Most of it are samples for charts: the beginning, where plan and state are, is changed as often as all the rest.
+        // Most of it are samples for charts: the beginning, where plan and state are, is changed as often as
+        // all the rest.
         let reach = if draw.chance(60) { changed.len().min(600) } else { changed.len() };
         let place = draw.below(reach.max(1));
         let byte = if draw.chance(20) { *draw.one(&[0, 1, 0x7f, 0x80, 0xff]) } else { draw.byte() };
@@ -230,7 +265,8 @@ pub fn checkpoint(bytes: &[u8]) -> u64 {
         Err(error) => return kind(&error.to_string()),
     };
     // Mostly a few steps, at times many.
-    let (max_evaluations, most) = *draw.one(&[(150, 2), (150, 2), (150, 2), (150, 2), (150, 2), (150, 2), (500, 4), (2000, 10)]);
+    let (max_evaluations, most) =
+        *draw.one(&[(150, 2), (150, 2), (150, 2), (150, 2), (150, 2), (150, 2), (500, 4), (2000, 10)]);
     snapshot.allow(max_evaluations);
     match Running::resume(Arc::clone(mechanism), &mechanism.start(scene), snapshot) {
         Err(error) => kind(&error.to_string()),
@@ -248,8 +284,20 @@ pub fn checkpoint(bytes: &[u8]) -> u64 {
     }
 }
 
-const COMMANDS: &[&str] =
-    &["run", "run", "run", "check", "sweep", "inspect", "compare", "stress", "resume", "methods", "schema", "completions"];
+const COMMANDS: &[&str] = &[
+    "run",
+    "run",
+    "run",
+    "check",
+    "sweep",
+    "inspect",
+    "compare",
+    "stress",
+    "resume",
+    "methods",
+    "schema",
+    "completions",
+];
 /// Options with values that suit them; none where they take none.
 const OPTIONS: &[(&str, &str)] = &[
     ("--method", "dp8"),
@@ -321,7 +369,8 @@ struct Tried {
 }
 
 static FREE: LazyLock<Tried> = LazyLock::new(|| {
-    let text = SCENES.iter().find(|text| text.contains("\"name\": \"free\"")).expect("a shipped scene").clone();
+    let text =
+        SCENES.iter().find(|text| text.contains("\"name\": \"free\"")).expect("a shipped scene").clone();
     let scene = parse_scene(&text, "free", &[]).expect("a scene");
     let mechanism = Mechanism::new(&scene).expect("equations");
     Tried { text, scene, mechanism }
@@ -336,7 +385,8 @@ fn flags(words: &[String]) -> Result<Flags, clap::Error> {
     Flags::from_arg_matches(&matches)
 }
 
-/// What kind of an error a command line's is, and the option it is about; one nobody knows counts as any other.
+/// What kind of an error a command line's is, and the option it is about; one nobody knows counts as any
+/// other.
 fn kinds(error: &clap::Error) -> u64 {
     let said = error.to_string();
     assert!(!said.is_empty());
@@ -347,7 +397,8 @@ fn kinds(error: &clap::Error) -> u64 {
     kind(&error.kind().to_string()) ^ option.rotate_left(1)
 }
 
-/// Words of a command line, known ones and others: flags, or a message; and the texts of options by themselves.
+/// Words of a command line, known ones and others: flags, or a message; and the texts of options by
+/// themselves.
 pub fn command_line(bytes: &[u8]) -> u64 {
     let mut draw = Draw::new(bytes);
     let is_compared = draw.chance(5);
@@ -376,7 +427,10 @@ pub fn command_line(bytes: &[u8]) -> u64 {
     let mut sets = Vec::new();
     for word in words.iter().chain([&rest]) {
         if let Ok(vary) = word.parse::<Vary>() {
-            assert!(vary.count > 0 && (0..vary.count.min(5)).all(|index| vary.value(index).is_finite()), "{vary:?}");
+            assert!(
+                vary.count > 0 && (0..vary.count.min(5)).all(|index| vary.value(index).is_finite()),
+                "{vary:?}"
+            );
         }
         sets.extend(word.parse::<Override>());
     }
@@ -387,7 +441,9 @@ pub fn command_line(bytes: &[u8]) -> u64 {
     let read = flags(&words);
     if is_compared {
         // As the program does, which makes its parser anew.
-        let said = |read: &Result<Flags, clap::Error>| read.as_ref().map_or_else(clap::Error::to_string, |flags| format!("{flags:?}"));
+        let said = |read: &Result<Flags, clap::Error>| {
+            read.as_ref().map_or_else(clap::Error::to_string, |flags| format!("{flags:?}"))
+        };
         assert_eq!(said(&read), said(&Flags::try_parse_from(&words)));
     }
     match read {
@@ -401,7 +457,10 @@ pub fn command_line(bytes: &[u8]) -> u64 {
             let mut kinds = 4;
             for request in requests {
                 match Plan::new(&FREE.scene, &FREE.mechanism, &request) {
-                    Ok(plan) => assert!(plan.until > 0.0 && plan.every > 0.0 && plan.rows > 0 && plan.max_evaluations > 0, "{plan:?}"),
+                    Ok(plan) => assert!(
+                        plan.until > 0.0 && plan.every > 0.0 && plan.rows > 0 && plan.max_evaluations > 0,
+                        "{plan:?}"
+                    ),
                     Err(refusal) => kinds ^= kind(&refusal.reason),
                 }
             }
@@ -461,7 +520,10 @@ pub fn simulate(text: &str, draw: &mut Draw, max_evaluations: u64) -> Ending {
         }
         None => {
             let (rows, report) = (String::from_utf8(rows).expect("text"), report());
-            assert!(!rows.contains("NaN") && !rows.contains("inf"), "the table holds what is no number: {request:?}");
+            assert!(
+                !rows.contains("NaN") && !rows.contains("inf"),
+                "the table holds what is no number: {request:?}"
+            );
             assert!(all_finite(&report), "the report holds what is no number: {request:?} {report}");
             if let Err(fault) = audit(&scene, &mechanism, &samples, &outcome) {
                 panic!("wrong success: {fault}; {request:?}");

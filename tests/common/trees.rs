@@ -1,4 +1,5 @@
-//! Random trees of bodies, and their equations of motion derived another way: three coordinates a body, every hinge a pin, one dense solve.
+//! Random trees of bodies, and their equations of motion derived another way: three coordinates a body, every
+//! hinge a pin, one dense solve.
 #![allow(dead_code)]
 
 use driftless::arithmetic::Complex;
@@ -43,7 +44,8 @@ impl Dice {
     }
 }
 
-/// A tree of `n` bodies with off-axis centres and hinges, up to two springs with or without dampers, and with motors where asked for.
+/// A tree of `n` bodies with off-axis centres and hinges, up to two springs with or without dampers, and with
+/// motors where asked for.
 pub fn tree(n: usize, motors: bool, dice: &mut Dice) -> Scene {
     let backwards = dice.flip();
     // Bodies may stand in the scene in the order of the tree or against it.
@@ -55,8 +57,15 @@ pub fn tree(n: usize, motors: bool, dice: &mut Dice) -> Scene {
         let parent = if parent == k { None } else { Some(number(parent)) };
         parents[bar] = parent;
         let name = format!("bar{bar}");
-        bars[bar] = Some(Bar { name, length: 0.5, mass: dice.within(0.2, 2.0), centre: dice.point(0.4), inertia: dice.within(0.02, 0.1) });
-        let mut between = [Place { bar: parent, point: dice.point(0.5) }, Place { bar: Some(bar), point: dice.point(0.3) }];
+        bars[bar] = Some(Bar {
+            name,
+            length: 0.5,
+            mass: dice.within(0.2, 2.0),
+            centre: dice.point(0.4),
+            inertia: dice.within(0.02, 0.1),
+        });
+        let mut between =
+            [Place { bar: parent, point: dice.point(0.5) }, Place { bar: Some(bar), point: dice.point(0.3) }];
         if dice.flip() {
             between.reverse();
         }
@@ -65,7 +74,9 @@ pub fn tree(n: usize, motors: bool, dice: &mut Dice) -> Scene {
     let springs = (0..dice.pick(3))
         .map(|s| {
             let on = dice.pick(n);
-            let other = (dice.pick(n) + 1..).find(|&other| other != on + 1).map(|other| if other > n { None } else { Some(other - 1) });
+            let other = (dice.pick(n) + 1..)
+                .find(|&other| other != on + 1)
+                .map(|other| if other > n { None } else { Some(other - 1) });
             Spring {
                 name: format!("spring{s}"),
                 between: [
@@ -82,11 +93,21 @@ pub fn tree(n: usize, motors: bool, dice: &mut Dice) -> Scene {
     let mut driven = Vec::new();
     if motors {
         for (bar, &parent) in parents.iter().enumerate() {
-            // At most one motor a body, measured from the ground or from what carries it: never a contradiction; at least one.
+            // At most one motor a body, measured from the ground or from what carries it: never a
+            // contradiction; at least one.
             if dice.pick(3) == 0 || (bar + 1 == n && driven.is_empty()) {
-                let sine = Sine { amplitude: dice.within(0.1, 0.5), frequency: dice.within(1.0, 5.0), phase: dice.within(-3.0, 3.0) };
+                let sine = Sine {
+                    amplitude: dice.within(0.1, 0.5),
+                    frequency: dice.within(1.0, 5.0),
+                    phase: dice.within(-3.0, 3.0),
+                };
                 let sines = if dice.flip() { vec![sine] } else { vec![] };
-                let law = Law { start: dice.within(-3.0, 3.0), rate: dice.within(-4.0, 4.0), acceleration: dice.within(-1.0, 1.0), sines };
+                let law = Law {
+                    start: dice.within(-3.0, 3.0),
+                    rate: dice.within(-4.0, 4.0),
+                    acceleration: dice.within(-1.0, 1.0),
+                    sines,
+                };
                 let relative_to = if dice.flip() { parent } else { None };
                 driven.push(Motor { name: format!("motor{bar}"), bar, relative_to, law });
             }
@@ -122,7 +143,8 @@ pub struct Redundant {
     pub hinges: Vec<C>,
     /// Multipliers of the motors \[N·m\].
     pub motors: Vec<f64>,
-    /// Kinetic and potential energy \[J\], the latter zero where all centres lie level with the origin and springs are unstretched.
+    /// Kinetic and potential energy \[J\], the latter zero where all centres lie level with the origin and
+    /// springs are unstretched.
     pub kinetic: f64,
     pub potential: f64,
 }
@@ -192,7 +214,8 @@ pub fn redundant(scene: &Scene, t: f64, phi: &[f64], omega: &[f64]) -> Redundant
         }
         right[3 * k] += bar.mass * gravity.re;
         right[3 * k + 1] += bar.mass * gravity.im;
-        kinetic += 0.5 * bar.mass * frames.velocity[k].norm_squared() + 0.5 * bar.inertia * omega[k] * omega[k];
+        kinetic +=
+            0.5 * bar.mass * frames.velocity[k].norm_squared() + 0.5 * bar.inertia * omega[k] * omega[k];
         potential -= bar.mass * gravity.dot(frames.centre[k]);
     }
     for spring in &scene.springs {
@@ -233,7 +256,8 @@ pub fn redundant(scene: &Scene, t: f64, phi: &[f64], omega: &[f64]) -> Redundant
         if let Some(base) = motor.relative_to {
             border(row, 3 * base + 2, -1.0);
         }
-        let swing = |sine: &Sine| sine.amplitude * sine.frequency.powi(2) * (sine.frequency * t + sine.phase).sin();
+        let swing =
+            |sine: &Sine| sine.amplitude * sine.frequency.powi(2) * (sine.frequency * t + sine.phase).sin();
         right[row] = motor.law.acceleration - motor.law.sines.iter().map(swing).sum::<f64>();
     }
     let solution = matrix.lu().solve(&right).expect("a regular scene");

@@ -32,7 +32,8 @@ pub struct Line<'a> {
 
 impl Page {
     fn read(name: &str) -> Self {
-        let text = std::fs::read_to_string(root().join(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let text =
+            std::fs::read_to_string(root().join(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
         Self { name: name.to_owned(), text }
     }
 
@@ -109,7 +110,11 @@ impl Page {
             (heading.len() < line.text.len() && heading.starts_with(' ')).then(|| slug(heading.trim()))
         });
         let slugs: Vec<_> = headings.collect();
-        let anchor = |(index, slug): (usize, &String)| match slugs[..index].iter().filter(|before| *before == slug).count() {
+        let anchor = |(index, slug): (usize, &String)| match slugs[..index]
+            .iter()
+            .filter(|before| *before == slug)
+            .count()
+        {
             0 => slug.clone(),
             same => format!("{slug}-{same}"),
         };
@@ -120,7 +125,12 @@ impl Page {
     pub fn inline_code(&self) -> Vec<(usize, String)> {
         let mut pieces = Vec::new();
         for line in self.prose() {
-            assert!(line.text.matches('`').count() % 2 == 0, "{}:{}: code goes on in the next line", self.name, line.number);
+            assert!(
+                line.text.matches('`').count() % 2 == 0,
+                "{}:{}: code goes on in the next line",
+                self.name,
+                line.number
+            );
             pieces.extend(line.text.split('`').skip(1).step_by(2).map(|code| (line.number, code.to_owned())));
         }
         pieces
@@ -128,7 +138,8 @@ impl Page {
 
     /// The file a link of this page leads to, and the anchor in it.
     pub fn target(&self, link: &str) -> (PathBuf, Option<String>) {
-        let (file, anchor) = link.split_once('#').map_or((link, None), |(file, anchor)| (file, Some(anchor.to_owned())));
+        let (file, anchor) =
+            link.split_once('#').map_or((link, None), |(file, anchor)| (file, Some(anchor.to_owned())));
         let folder = root().join(&self.name).parent().expect("a folder").to_path_buf();
         (if file.is_empty() { root().join(&self.name) } else { folder.join(file) }, anchor)
     }

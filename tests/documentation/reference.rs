@@ -54,7 +54,12 @@ fn collect<'a>(schema: &'a Value, kinds: &mut Vec<Kind<'a>>) {
         schema.get(key).into_iter().for_each(|value| collect(value, kinds));
     }
     for key in ["oneOf", "anyOf"] {
-        schema.get(key).and_then(Value::as_array).into_iter().flatten().for_each(|value| collect(value, kinds));
+        schema
+            .get(key)
+            .and_then(Value::as_array)
+            .into_iter()
+            .flatten()
+            .for_each(|value| collect(value, kinds));
     }
 }
 
@@ -62,10 +67,12 @@ fn section(kind: &Kind, kinds: &[Kind], page: &mut String) {
     writeln!(page, "\n## {}\n", capital(kind.title)).expect("text");
     wrapped(kind.schema["description"].as_str().unwrap_or(""), page);
     page.push_str("\n| key | type | unit | meaning |\n| --- | --- | --- | --- |\n");
-    let required: Vec<_> = kind.schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
+    let required: Vec<_> =
+        kind.schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
     for (name, value) in kind.schema["properties"].as_object().into_iter().flatten() {
         let (about, unit) = unit(value["description"].as_str().unwrap_or(""));
-        let key = if required.contains(&name.as_str()) { format!("**`{name}`**") } else { format!("`{name}`") };
+        let key =
+            if required.contains(&name.as_str()) { format!("**`{name}`**") } else { format!("`{name}`") };
         writeln!(page, "| {key} | {} | {unit} | {about} |", shape(value, kinds)).expect("text");
     }
     if kind.title != "a scene" {
@@ -109,13 +116,19 @@ fn shape(schema: &Value, kinds: &[Kind]) -> String {
 fn range(schema: &Value) -> String {
     let (least, most) = (schema["minimum"].as_f64(), schema["maximum"].as_f64());
     match (least, most) {
-        (Some(least), Some(most)) if (least, most) != (-1e30, 1e30) => format!(", {} to {}", short(least), short(most)),
+        (Some(least), Some(most)) if (least, most) != (-1e30, 1e30) => {
+            format!(", {} to {}", short(least), short(most))
+        }
         _ => String::new(),
     }
 }
 
 fn short(number: f64) -> String {
-    if number == 0.0 || (1e-3..1e6).contains(&number.abs()) { format!("{number}") } else { format!("{number:e}") }
+    if number == 0.0 || (1e-3..1e6).contains(&number.abs()) {
+        format!("{number}")
+    } else {
+        format!("{number:e}")
+    }
 }
 
 /// A description without its unit, and the unit.
@@ -128,10 +141,13 @@ fn unit(described: &str) -> (&str, &str) {
 
 /// An element with its required keys, made of their examples.
 fn example(schema: &Value) -> String {
-    let required: Vec<_> = schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
+    let required: Vec<_> =
+        schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
     let all = schema["properties"].as_object().into_iter().flatten();
     let members: Vec<_> = all
-        .filter(|(name, value)| (required.is_empty() || required.contains(&name.as_str())) && !value["examples"].is_null())
+        .filter(|(name, value)| {
+            (required.is_empty() || required.contains(&name.as_str())) && !value["examples"].is_null()
+        })
         .map(|(name, value)| format!("\"{name}\": {}", spaced(&value["examples"][0])))
         .collect();
     format!("{{{}}}", members.join(", "))
@@ -142,7 +158,8 @@ fn spaced(value: &Value) -> String {
     match value {
         Value::Array(items) => format!("[{}]", items.iter().map(spaced).collect::<Vec<_>>().join(", ")),
         Value::Object(members) => {
-            let members: Vec<_> = members.iter().map(|(name, value)| format!("\"{name}\": {}", spaced(value))).collect();
+            let members: Vec<_> =
+                members.iter().map(|(name, value)| format!("\"{name}\": {}", spaced(value))).collect();
             format!("{{{}}}", members.join(", "))
         }
         other => other.to_string(),
@@ -151,7 +168,10 @@ fn spaced(value: &Value) -> String {
 
 fn capital(title: &str) -> String {
     let mut letters = title.chars();
-    letters.next().map(|first| first.to_uppercase().collect::<String>() + letters.as_str()).unwrap_or_default()
+    letters
+        .next()
+        .map(|first| first.to_uppercase().collect::<String>() + letters.as_str())
+        .unwrap_or_default()
 }
 
 /// The anchor of a heading.

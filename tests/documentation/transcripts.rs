@@ -1,7 +1,8 @@
 //! Commands shown with what they print: run again, and compared line by line.
 //!
-//! In a block ```` ```console ```` each line that begins with `$ ` is a command, what follows is what it prints, messages
-//! first.  Blocks ```` ```json NAME ```` of the same page are files of the folder the commands run in.  Durations are not compared.
+//! In a block ```` ```console ```` each line that begins with `$ ` is a command, what follows is what it
+//! prints, messages first.  Blocks ```` ```json NAME ```` of the same page are files of the folder the
+//! commands run in.  Durations are not compared.
 
 use super::pages::{Page, root};
 use super::program::Program;
@@ -59,12 +60,15 @@ fn replayed(block: &str, program: &Program) -> String {
         let end = begins.get(number + 1).copied().unwrap_or(shown.len());
         push(&mut text, shown[begin]);
         let command = shown[begin].trim_start_matches("$ ");
-        let arguments = command.strip_prefix("driftless ").unwrap_or_else(|| panic!("not a command of the program: {command}"));
+        let arguments = command
+            .strip_prefix("driftless ")
+            .unwrap_or_else(|| panic!("not a command of the program: {command}"));
         let ran = program.run(arguments);
         let printed = ran.stderr + &ran.stdout;
         let printed: Vec<&str> = printed.lines().map(str::trim_end).collect();
         let before = &shown[begin + 1..end];
-        let same = before.len() == printed.len() && before.iter().zip(&printed).all(|(old, new)| masked(old) == masked(new));
+        let same = before.len() == printed.len()
+            && before.iter().zip(&printed).all(|(old, new)| masked(old) == masked(new));
         (if same { before } else { &printed[..] }).iter().for_each(|line| push(&mut text, line));
     }
     text

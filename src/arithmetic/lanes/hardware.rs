@@ -1,9 +1,12 @@
-//! The one place of the crate with `unsafe` in it: instructions special to the processor, and the door to code compiled for them.
+//! The one place of the crate with `unsafe` in it: instructions special to the processor, and the door to
+//! code compiled for them.
 //!
-//! [`Hardware`] is the proof that the processor has them: it is made only after it was asked.  What is `unsafe` here rests on this alone:
+//! [`Hardware`] is the proof that the processor has them: it is made only after it was asked.  What is
+//! `unsafe` here rests on this alone:
 //!
 //! - [`Hardware::run`] enters a function compiled for AVX and FMA;
-//! - the operations of [`Avx`] are such instructions.  Values of it are made and used below `run`, or by somebody who holds a `Hardware`.
+//! - the operations of [`Avx`] are such instructions.  Values of it are made and used below `run`, or by
+//!   somebody who holds a `Hardware`.
 
 #![allow(unsafe_code)]
 
@@ -47,7 +50,8 @@ fn compiled<C: Code>(code: C) -> C::Output {
 /// A trait's methods cannot carry `#[target_feature]`, so each is entered here.
 macro_rules! instruction {
     ($call:expr) => {{
-        // SAFETY: values of `Avx` are made and used by code that runs below `Hardware::run`, or whose owner holds a `Hardware`.
+        // SAFETY: values of `Avx` are made and used by code that runs below `Hardware::run`, or whose owner
+        // holds a `Hardware`.
         unsafe { $call }
     }};
 }
@@ -138,7 +142,9 @@ impl Lanes for Avx {
 
     #[inline(always)]
     fn are_within(self, bound: f64) -> bool {
-        instruction!(_mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LE_OQ>(self.abs().0, _mm256_set1_pd(bound))) == 0b1111)
+        instruction!(
+            _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LE_OQ>(self.abs().0, _mm256_set1_pd(bound))) == 0b1111
+        )
     }
 
     #[inline(always)]

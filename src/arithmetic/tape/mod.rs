@@ -1,10 +1,12 @@
-//! Formulas as lists of operations: recorded once from code written over [`Scalar`], evaluated on any scalar and as power series.
+//! Formulas as lists of operations: recorded once from code written over [`Scalar`], evaluated on any scalar
+//! and as power series.
 //!
-//! Code that is generic over the scalar cannot branch on values, so what one run of it does on [`Symbol`]s is what every run does.  The
-//! list is a straight line: an operation refers to those before it by number.  Equal operations are recorded once, constants are folded, and
-//! what no result depends on is left out.
+//! Code that is generic over the scalar cannot branch on values, so what one run of it does on [`Symbol`]s is
+//! what every run does.  The list is a straight line: an operation refers to those before it by number.
+//! Equal operations are recorded once, constants are folded, and what no result depends on is left out.
 //!
-//! Source: A. Griewank, A. Walther, *Evaluating Derivatives*, 2nd ed. (2008), chapters 2 (evaluation procedures) and 13 (Taylor arithmetic).
+//! Source: A. Griewank, A. Walther, *Evaluating Derivatives*, 2nd ed. (2008), chapters 2 (evaluation
+//! procedures) and 13 (Taylor arithmetic).
 
 mod series;
 mod symbol;
@@ -57,7 +59,9 @@ impl Operation {
     fn operands(&self) -> [Option<Slot>; 3] {
         match *self {
             Self::Input(_) | Self::Constant(_) | Self::Beside => [None; 3],
-            Self::Add(a, b) | Self::Subtract(a, b) | Self::Multiply(a, b) | Self::Divide(a, b) => [Some(a), Some(b), None],
+            Self::Add(a, b) | Self::Subtract(a, b) | Self::Multiply(a, b) | Self::Divide(a, b) => {
+                [Some(a), Some(b), None]
+            }
             Self::Negate(a)
             | Self::Scale(a, _)
             | Self::Root(a)
@@ -113,7 +117,11 @@ impl Tape {
                 is_needed[i - 1] = true;
             }
             if is_needed[i] {
-                operations[i].operands().into_iter().flatten().for_each(|operand| is_needed[operand as usize] = true);
+                operations[i]
+                    .operands()
+                    .into_iter()
+                    .flatten()
+                    .for_each(|operand| is_needed[operand as usize] = true);
             }
             if operations[i].has_two_results() && is_needed[i] {
                 is_needed[i + 1] = true;
@@ -141,7 +149,9 @@ impl Tape {
 
     /// The numbers of the inputs it asks for.
     pub fn inputs(&self) -> impl Iterator<Item = u32> + '_ {
-        self.operations.iter().filter_map(|operation| if let Operation::Input(input) = operation { Some(*input) } else { None })
+        self.operations
+            .iter()
+            .filter_map(|operation| if let Operation::Input(input) = operation { Some(*input) } else { None })
     }
 
     /// The numbers of the inputs that these results depend on.

@@ -9,7 +9,8 @@
 //! c = atan2(y, x):  m r_0 c_m = Σ_{j=1..m} j (y_j x_{m-j} - x_j y_{m-j}) - Σ_{j=1..m-1} j c_j r_{m-j},  r = x² + y²
 //! ```
 //!
-//! Source: A. Jorba, M. Zou, Experimental Mathematics 14 (2005) 99, proposition 2.1; A. Griewank, A. Walther, *Evaluating Derivatives*, table 13.2.
+//! Source: A. Jorba, M. Zou, Experimental Mathematics 14 (2005) 99, proposition 2.1; A. Griewank, A. Walther,
+//! *Evaluating Derivatives*, table 13.2.
 
 use super::{Operation, Slot, Tape};
 use crate::arithmetic::{DoubleDouble, Real};
@@ -36,7 +37,9 @@ impl<T: Real> TapeSeries<T> {
     /// The first powers from a series in more digits.
     pub fn take(&mut self, other: &TapeSeries<DoubleDouble>) {
         let count = self.stride.min(other.stride);
-        for (to, from) in self.powers.chunks_exact_mut(self.stride).zip(other.powers.chunks_exact(other.stride)) {
+        for (to, from) in
+            self.powers.chunks_exact_mut(self.stride).zip(other.powers.chunks_exact(other.stride))
+        {
             for (to, from) in to.iter_mut().zip(&from[..count]) {
                 *to = T::split(*from).0;
             }
@@ -59,11 +62,16 @@ impl<T: Real> TapeSeries<T> {
                 Operation::Multiply(a, b) => sum(0..=m, |j| of(a)[j] * of(b)[m - j]),
                 Operation::Divide(a, b) => (of(a)[m] - sum(1..=m, |j| of(b)[j] * own[m - j])) / of(b)[0],
                 Operation::Root(a) if m == 0 => of(a)[0].sqrt(),
-                Operation::Root(a) => (of(a)[m] - sum(1..=m - 1, |j| own[j] * own[m - j])) / (own[0] + own[0]),
+                Operation::Root(a) => {
+                    (of(a)[m] - sum(1..=m - 1, |j| own[j] * own[m - j])) / (own[0] + own[0])
+                }
                 Operation::Exponential(a) if m == 0 => of(a)[0].exp(),
                 Operation::Exponential(a) => over(sum(1..=m, |j| (of(a)[j] * own[m - j]).scale(j as f64)), m),
                 Operation::Logarithm(a) if m == 0 => of(a)[0].ln(),
-                Operation::Logarithm(a) => (of(a)[m] - over(sum(1..=m - 1, |j| (own[j] * of(a)[m - j]).scale(j as f64)), m)) / of(a)[0],
+                Operation::Logarithm(a) => {
+                    (of(a)[m] - over(sum(1..=m - 1, |j| (own[j] * of(a)[m - j]).scale(j as f64)), m))
+                        / of(a)[0]
+                }
                 Operation::Sine(a) => {
                     let cosine = &mut after[..self.stride];
                     let (sin, cos) = match m {
@@ -88,7 +96,8 @@ impl<T: Real> TapeSeries<T> {
                 }
                 Operation::Angle(y, x, _) if m == 0 => of(y)[0].atan2(of(x)[0]),
                 Operation::Angle(y, x, square) => {
-                    let turning = sum(1..=m, |j| (of(y)[j] * of(x)[m - j] - of(x)[j] * of(y)[m - j]).scale(j as f64));
+                    let turning =
+                        sum(1..=m, |j| (of(y)[j] * of(x)[m - j] - of(x)[j] * of(y)[m - j]).scale(j as f64));
                     let known = sum(1..=m - 1, |j| (own[j] * of(square)[m - j]).scale(j as f64));
                     over((turning - known) / of(square)[0], m)
                 }

@@ -8,7 +8,8 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// A value on the tape that is being recorded, or a constant.
 ///
-/// Symbols live as long as the recording they were made in ([`Symbol::record`]); used outside of one they are NaN.
+/// Symbols live as long as the recording they were made in ([`Symbol::record`]); used outside of one they are
+/// NaN.
 #[derive(Clone, Copy, Debug)]
 pub struct Symbol {
     slot: Option<Slot>,
@@ -71,7 +72,8 @@ impl Recording {
 }
 
 impl Symbol {
-    /// Records what `formula` does: for each list of results a tape of what they depend on, with their numbers on it.
+    /// Records what `formula` does: for each list of results a tape of what they depend on, with their
+    /// numbers on it.
     pub fn record<const N: usize>(formula: impl FnOnce() -> [Vec<Symbol>; N]) -> [(Tape, Vec<Slot>); N] {
         let before = RECORDING.with(|recording| recording.replace(Some(Recording::default())));
         let results = formula();
@@ -85,12 +87,14 @@ impl Symbol {
         Self::push(Operation::Input(number))
     }
 
-    /// Derivatives of a result by inputs: the sums of these weights by the numbers of the inputs, in the order in which they were first asked for.
+    /// Derivatives of a result by inputs: the sums of these weights by the numbers of the inputs, in the
+    /// order in which they were first asked for.
     ///
     /// By the reverse mode: one pass backwards over the operations, whatever the number of inputs.
     pub fn gradient(self) -> Vec<(u32, Symbol)> {
         let Some(result) = self.slot else { return Vec::new() };
-        let operations = RECORDING.with(|recording| recording.borrow().as_ref().map(|recording| recording.operations.clone()));
+        let operations = RECORDING
+            .with(|recording| recording.borrow().as_ref().map(|recording| recording.operations.clone()));
         let Some(operations) = operations else { return Vec::new() };
         let mut weights = vec![Self::ZERO; operations.len()];
         weights[result as usize] = Self::ONE;
@@ -149,7 +153,8 @@ impl Symbol {
     }
 
     fn push(operation: Operation) -> Self {
-        let slot = RECORDING.with(|recording| recording.borrow_mut().as_mut().map(|recording| recording.push(operation)));
+        let slot = RECORDING
+            .with(|recording| recording.borrow_mut().as_mut().map(|recording| recording.push(operation)));
         Self { slot, value: f64::NAN }
     }
 
@@ -193,7 +198,8 @@ impl Scalar for Symbol {
     }
 
     fn sqrt(self) -> Self {
-        self.constant().map_or_else(|| Self::push(Operation::Root(self.slot())), |value| Self::of(value.sqrt()))
+        self.constant()
+            .map_or_else(|| Self::push(Operation::Root(self.slot())), |value| Self::of(value.sqrt()))
     }
 
     fn sin_cos(self) -> (Self, Self) {
@@ -206,15 +212,24 @@ impl Scalar for Symbol {
     }
 
     fn exp(self) -> Self {
-        self.constant().map_or_else(|| Self::push(Operation::Exponential(self.slot())), |value| Self::of(Scalar::exp(value)))
+        self.constant().map_or_else(
+            || Self::push(Operation::Exponential(self.slot())),
+            |value| Self::of(Scalar::exp(value)),
+        )
     }
 
     fn ln(self) -> Self {
-        self.constant().map_or_else(|| Self::push(Operation::Logarithm(self.slot())), |value| Self::of(Scalar::ln(value)))
+        self.constant().map_or_else(
+            || Self::push(Operation::Logarithm(self.slot())),
+            |value| Self::of(Scalar::ln(value)),
+        )
     }
 
     fn tanh(self) -> Self {
-        self.constant().map_or_else(|| Self::push(Operation::HyperbolicTangent(self.slot())), |value| Self::of(Scalar::tanh(value)))
+        self.constant().map_or_else(
+            || Self::push(Operation::HyperbolicTangent(self.slot())),
+            |value| Self::of(Scalar::tanh(value)),
+        )
     }
 
     fn atan2(self, x: Self) -> Self {

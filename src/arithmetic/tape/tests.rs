@@ -6,7 +6,9 @@ fn formula<S: Scalar>(x: S, y: S) -> S {
     let (sin, cos) = (x * y).sin_cos();
     let angle = (sin + S::of(0.3)).atan2(cos - y.powi(3));
     let root = (x.powi(2) + y.exp()).sqrt();
-    (angle * root - (x / y).ln().scale(0.7)) * (x - y).tanh() + (-x).exp().powf(0.4) + S::of(2.0) / (x + x.tan())
+    (angle * root - (x / y).ln().scale(0.7)) * (x - y).tanh()
+        + (-x).exp().powf(0.4)
+        + S::of(2.0) / (x + x.tan())
 }
 
 fn recorded() -> (Tape, Slot, Vec<(u32, Slot)>) {
@@ -43,7 +45,9 @@ fn the_gradient_is_the_derivative_of_dual_numbers_and_of_differences() {
     assert_eq!(gradient.len(), 2);
     for &(input, slot) in &gradient {
         let off = |by: f64| {
-            let at = std::array::from_fn(|k| DoubleDouble::sum([1.2, 0.9][k], if k == input as usize { by } else { 0.0 }));
+            let at = std::array::from_fn(|k| {
+                DoubleDouble::sum([1.2, 0.9][k], if k == input as usize { by } else { 0.0 })
+            });
             evaluated(&tape, at)[value as usize]
         };
         let difference = (off(1e-10) - off(-1e-10)).scale(0.5e10).hi;
@@ -59,10 +63,14 @@ fn series_agree_with_differences_of_values_along_a_path() {
     let path = [[1.2, 0.9], [0.3, -0.2], [-0.1, 0.0], [0.0, 0.4]];
     let mut series = TapeSeries::<DoubleDouble>::new(&tape, 12);
     for m in 0..=12 {
-        series.advance(&tape, m, |input| DoubleDouble::of(path.get(m).map_or(0.0, |power| power[input as usize])));
+        series.advance(&tape, m, |input| {
+            DoubleDouble::of(path.get(m).map_or(0.0, |power| power[input as usize]))
+        });
     }
     let t = DoubleDouble::of(1e-2);
-    let at = [0, 1].map(|k| path.iter().rev().fold(DoubleDouble::ZERO, |sum, power| sum * t + DoubleDouble::of(power[k])));
+    let at = [0, 1].map(|k| {
+        path.iter().rev().fold(DoubleDouble::ZERO, |sum, power| sum * t + DoubleDouble::of(power[k]))
+    });
     let direct = evaluated(&tape, at)[value as usize];
     let summed = series.of(value).iter().rev().fold(DoubleDouble::ZERO, |sum, &power| sum * t + power);
     assert!((direct - summed).hi.abs() < 1e-22, "{:e}", (direct - summed).hi);
@@ -93,6 +101,10 @@ fn lanes_have_the_bits_of_plain_numbers() {
     for lane in 0..LANES {
         let plain = formula(at(lane)[0], at(lane)[1]);
         // Sine and cosine of lanes are rounded by a series of their own.
-        assert!((found.0[lane] - plain).abs() < 1e-14 * plain.abs().max(1.0), "{lane}: {} {plain}", found.0[lane]);
+        assert!(
+            (found.0[lane] - plain).abs() < 1e-14 * plain.abs().max(1.0),
+            "{lane}: {} {plain}",
+            found.0[lane]
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! The start of a mechanism that is more than a tree of hinges on the ground: what the scene gives of it is kept, the rest is found from the rows.
+//! The start of a mechanism that is more than a tree of hinges on the ground: what the scene gives of it is
+//! kept, the rest is found from the rows.
 //!
 //! ```text
 //! all that is given fits:      it stays to the last bit, and the shortest way from the guesses closes the rows
@@ -6,8 +7,8 @@
 //! everything is given:         all of it changes as little as may be
 //! ```
 //!
-//! Positions first, then rates.  Nothing is guessed twice: what the rows leave open must be given, and where other guesses lead to another start the
-//! scene has to say which.
+//! Positions first, then rates.  Nothing is guessed twice: what the rows leave open must be given, and where
+//! other guesses lead to another start the scene has to say which.
 
 mod newton;
 mod rank;
@@ -27,7 +28,8 @@ use newton::{Aim, Goal, KEPT, Problem};
 use serde::Serialize;
 use svd::{Matrix, independent};
 
-/// What counts as no change, relative to 1 rad (and rad/s), the size of the mechanism, or the value where that is larger.
+/// What counts as no change, relative to 1 rad (and rad/s), the size of the mechanism, or the value where
+/// that is larger.
 const SAME: f64 = 1e-12;
 /// What is given may be off by this and still be taken as a rough guess \[rad, or sizes of the mechanism\].
 const REACH: f64 = 0.5;
@@ -35,7 +37,8 @@ const REACH: f64 = 0.5;
 const DISTINCT: f64 = 1e-4;
 /// What is left of a measured row, once those before it are taken off, counts as zero below this.
 const DEPENDENT: f64 = 1e-9;
-/// Up to so many coordinates redundant rows are told from singular ones, and rounding is spread over all that is given.
+/// Up to so many coordinates redundant rows are told from singular ones, and rounding is spread over all that
+/// is given.
 const DENSE: usize = 100;
 
 /// How the start was found, and the degrees of freedom that are left.
@@ -51,8 +54,9 @@ pub struct Assembly {
     pub redundant: Vec<String>,
     /// Rows that follow from those before them at the start alone: a singular position.
     pub singular: Vec<String>,
-    /// The least singular value of the rows' Jacobian at the start that is not zero over the largest, angles in rad and lengths in sizes of the mechanism;
-    /// 1 without rows, and not a number where it was not formed.
+    /// The least singular value of the rows' Jacobian at the start that is not zero over the largest, angles
+    /// in rad and lengths in sizes of the mechanism; 1 without rows, and not a number where it was not
+    /// formed.
     pub conditioning: f64,
 }
 
@@ -120,10 +124,12 @@ impl Mechanism {
             }
         }
         let mut assembly = problem.rank(&found.q);
-        let omega = problem.find_rates(scene, &given, &found.q, !assembly.singular.is_empty(), &mut changes)?;
+        let omega =
+            problem.find_rates(scene, &given, &found.q, !assembly.singular.is_empty(), &mut changes)?;
         let mut start = Motion::default();
         for (k, &q) in found.q.iter().enumerate() {
-            let (phi, turns) = if self.is_winding() || k >= self.bodies.len() { (q, 0.0) } else { q.reduced() };
+            let (phi, turns) =
+                if self.is_winding() || k >= self.bodies.len() { (q, 0.0) } else { q.reduced() };
             start.phi.push(phi);
             start.turns.push(turns as i64);
         }
@@ -139,7 +145,8 @@ impl Mechanism {
         Ok(self)
     }
 
-    /// Springs need a direction, and points must be before their walls; the reader of scenes sees to it where it knows the start.
+    /// Springs need a direction, and points must be before their walls; the reader of scenes sees to it where
+    /// it knows the start.
     fn check_start(&self, scene: &Scene) -> Result<(), CompileError> {
         let (start, size) = (self.start(scene), self.size_of_parts());
         let mut z = vec![Complex::ZERO; self.coordinates()];
@@ -163,7 +170,10 @@ impl Mechanism {
     pub(crate) fn size_of_parts(&self) -> f64 {
         let length = |x: &Complex<f64>| x.norm_squared().sqrt();
         let bodies = self.bodies.iter().flat_map(|body| body.ends.iter().chain([&body.centre]).map(length));
-        let levers = self.constraints.iter().map(|row| if row.is_angle() { 0.0 } else { newton::lever(&row.measure, 0.0) });
+        let levers = self
+            .constraints
+            .iter()
+            .map(|row| if row.is_angle() { 0.0 } else { newton::lever(&row.measure, 0.0) });
         let size = bodies.chain(levers).fold(0.0, f64::max);
         if size > 0.0 { size } else { 1.0 }
     }
@@ -187,7 +197,12 @@ impl<'a> Problem<'a> {
             Measure::Angle { body, base } => given(*body).phi && base.is_none_or(|base| given(base).phi),
             Measure::Place(_) => true,
         };
-        let active = mechanism.constraints.iter().enumerate().map(|(i, row)| !kept.contains(&i) || is_known(&row.measure)).collect();
+        let active = mechanism
+            .constraints
+            .iter()
+            .enumerate()
+            .map(|(i, row)| !kept.contains(&i) || is_known(&row.measure))
+            .collect();
         Problem { mechanism, active, size, unit, lever, aims }
     }
 
@@ -210,10 +225,13 @@ impl<'a> Problem<'a> {
             _ if guess.len() <= 60 => 8,
             _ => 2,
         };
-        let others: Vec<Found> = (1..=others).filter_map(|k| self.attempt(&self.other_guess(&guess, &missing, k), &missing).ok()).collect();
+        let others: Vec<Found> = (1..=others)
+            .filter_map(|k| self.attempt(&self.other_guess(&guess, &missing, k), &missing).ok())
+            .collect();
         let impossible = |(row, left): (usize, f64)| {
             // Without rows it is the places given that rounding keeps from being met.
-            let (row, unit) = self.mechanism.constraints.get(row).map_or(("start", "m"), |row| (&row.name, row.unit()));
+            let (row, unit) =
+                self.mechanism.constraints.get(row).map_or(("start", "m"), |row| (&row.name, row.unit()));
             CompileError::Impossible { row: row.into(), left, unit }
         };
         let (best, others) = match first {
@@ -225,7 +243,8 @@ impl<'a> Problem<'a> {
         };
         let mut all = vec![best];
         all.extend(others);
-        let nearest = (1..all.len()).fold(0, |best, k| if all[k].change < all[best].change * (1.0 - 1e-6) - SAME { k } else { best });
+        let nearest = (1..all.len())
+            .fold(0, |best, k| if all[k].change < all[best].change * (1.0 - 1e-6) - SAME { k } else { best });
         let mut best = all.swap_remove(nearest);
         if best.change > REACH {
             let mut held = guess.clone();
@@ -299,7 +318,11 @@ impl<'a> Problem<'a> {
                 (q, held) = (trial, kept);
             }
         }
-        let change = self.measured(&q).zip(&self.aims).map(|(used, aim)| self.share(aim, used - aim.given).abs()).fold(0.0, f64::max);
+        let change = self
+            .measured(&q)
+            .zip(&self.aims)
+            .map(|(used, aim)| self.share(aim, used - aim.given).abs())
+            .fold(0.0, f64::max);
         Ok(Found { q, change, held })
     }
 
@@ -336,11 +359,19 @@ impl<'a> Problem<'a> {
     }
 
     /// Refuses a start of which neither rows nor what is given fix a coordinate, or its rate.
-    fn check_open(&self, q: &[DoubleDouble], rows: &[bool], aims: &[Aim], missing: &[usize], what: &str) -> Result<(), CompileError> {
+    fn check_open(
+        &self,
+        q: &[DoubleDouble],
+        rows: &[bool],
+        aims: &[Aim],
+        missing: &[usize],
+        what: &str,
+    ) -> Result<(), CompileError> {
         let mut matrix = self.jacobian(q, rows);
         self.add_aims(&mut matrix, aims, q);
         let open = matrix.svd().open(q.len(), DEPENDENT);
-        match missing.iter().copied().max_by(|&a, &b| open[a].total_cmp(&open[b])).filter(|&k| open[k] > 1e-6) {
+        match missing.iter().copied().max_by(|&a, &b| open[a].total_cmp(&open[b])).filter(|&k| open[k] > 1e-6)
+        {
             Some(k) => Err(CompileError::Undetermined(self.place(k, what))),
             None => Ok(()),
         }
@@ -353,10 +384,19 @@ impl<'a> Problem<'a> {
             let apart = other.q[k] - best.q[k];
             if k < bodies { apart.reduced().0.hi.abs() } else { apart.hi.abs() / self.size }
         };
-        let Some(k) = (0..best.q.len()).max_by(|a, b| apart(a).total_cmp(&apart(b))).filter(|k| apart(k) > DISTINCT) else { return Ok(()) };
+        let Some(k) =
+            (0..best.q.len()).max_by(|a, b| apart(a).total_cmp(&apart(b))).filter(|k| apart(k) > DISTINCT)
+        else {
+            return Ok(());
+        };
         let shown = |q: &DoubleDouble| if k < bodies { q.reduced().0.hi } else { q.hi };
         let unit = if k < bodies { "rad" } else { "m" };
-        Err(CompileError::Ambiguous { what: self.place(k, "phi"), one: shown(&best.q[k]), other: shown(&other.q[k]), unit })
+        Err(CompileError::Ambiguous {
+            what: self.place(k, "phi"),
+            one: shown(&best.q[k]),
+            other: shown(&other.q[k]),
+            unit,
+        })
     }
 
     /// Where a scene gives a coordinate or, where `what` is `omega`, its rate: `start.bar1.phi`.
@@ -372,10 +412,19 @@ impl<'a> Problem<'a> {
 
     /// What of the positions is not as given.
     fn changes(&self, q: &[DoubleDouble], aims: &[Aim]) -> Vec<Change> {
-        aims.iter().zip(self.measured(q)).filter_map(|(aim, used)| self.change(aim, used, ["phi", "origin"], ["rad", "m"])).collect()
+        aims.iter()
+            .zip(self.measured(q))
+            .filter_map(|(aim, used)| self.change(aim, used, ["phi", "origin"], ["rad", "m"]))
+            .collect()
     }
 
-    fn change(&self, aim: &Aim, used: f64, [turn, shift]: [&str; 2], [of_turn, of_shift]: [&'static str; 2]) -> Option<Change> {
+    fn change(
+        &self,
+        aim: &Aim,
+        used: f64,
+        [turn, shift]: [&str; 2],
+        [of_turn, of_shift]: [&'static str; 2],
+    ) -> Option<Change> {
         let is_angle = aim.goal == Goal::Coordinate(aim.bar);
         let scale = if is_angle { 1.0 } else { self.size };
         if (used - aim.given).abs() <= SAME * scale.max(aim.given.abs()) {
@@ -385,9 +434,16 @@ impl<'a> Problem<'a> {
             Goal::Coordinate(k) => self.mechanism.forest.hangs[aim.bar].origin_point == BodyOrigin::Free(k),
             Goal::Origin(axis) => axis.re == 1.0,
         };
-        let quantity = if is_angle { turn.to_owned() } else { format!("{shift}.{}", if is_x { "x" } else { "y" }) };
+        let quantity =
+            if is_angle { turn.to_owned() } else { format!("{shift}.{}", if is_x { "x" } else { "y" }) };
         let body = self.mechanism.bodies[aim.bar].name.clone();
-        Some(Change { body, quantity, given: aim.given, used, unit: if is_angle { of_turn } else { of_shift } })
+        Some(Change {
+            body,
+            quantity,
+            given: aim.given,
+            used,
+            unit: if is_angle { of_turn } else { of_shift },
+        })
     }
 
     /// Rates that keep the rows; adds what is not as given to `changes`.
@@ -423,8 +479,10 @@ impl<'a> Problem<'a> {
             let slips = self.slips(q, &omega);
             let measured = |i: &usize| slips[*i].abs() / self.lever[*i];
             let worst = (0..slips.len()).max_by(|a, b| measured(a).total_cmp(&measured(b))).unwrap_or(0);
-            let unit = |row: &super::constraint::ConstraintEquation| if row.is_angle() { "rad/s" } else { "m/s" };
-            let (row, unit) = self.mechanism.constraints.get(worst).map_or(("start", "m/s"), |row| (&row.name, unit(row)));
+            let unit =
+                |row: &super::constraint::ConstraintEquation| if row.is_angle() { "rad/s" } else { "m/s" };
+            let (row, unit) =
+                self.mechanism.constraints.get(worst).map_or(("start", "m/s"), |row| (&row.name, unit(row)));
             let left = slips.get(worst).map_or(0.0, |slip| slip.abs());
             return Err(CompileError::ImpossibleRates { row: row.into(), left, unit });
         }
@@ -453,7 +511,9 @@ impl<'a> Problem<'a> {
     /// What of the rates is not as given.
     fn rate_changes(&self, aims: &[Aim], q: &[DoubleDouble], omega: &[DoubleDouble]) -> Vec<Change> {
         let z = self.unit_vectors::<DoubleDouble>(q).1;
-        let change = |aim: &Aim| self.change(aim, self.aim_rate(aim, &z, omega).hi, ["omega", "velocity"], ["rad/s", "m/s"]);
+        let change = |aim: &Aim| {
+            self.change(aim, self.aim_rate(aim, &z, omega).hi, ["omega", "velocity"], ["rad/s", "m/s"])
+        };
         aims.iter().filter_map(change).collect()
     }
 }
@@ -461,8 +521,14 @@ impl<'a> Problem<'a> {
 /// The aims at the origin of a bar, or at its velocity.
 fn of_origin(mechanism: &Mechanism, bar: usize, [x, y]: [f64; 2]) -> [Aim; 2] {
     match mechanism.forest.hangs[bar].origin_point {
-        BodyOrigin::Free(k) => [(k, x), (k + 1, y)].map(|(k, given)| Aim { bar, goal: Goal::Coordinate(k), given }),
-        _ => [(Complex::new(1.0, 0.0), x), (Complex::new(0.0, 1.0), y)].map(|(axis, given)| Aim { bar, goal: Goal::Origin(axis), given }),
+        BodyOrigin::Free(k) => {
+            [(k, x), (k + 1, y)].map(|(k, given)| Aim { bar, goal: Goal::Coordinate(k), given })
+        }
+        _ => [(Complex::new(1.0, 0.0), x), (Complex::new(0.0, 1.0), y)].map(|(axis, given)| Aim {
+            bar,
+            goal: Goal::Origin(axis),
+            given,
+        }),
     }
 }
 

@@ -1,12 +1,14 @@
-//! Positions and rates that satisfy the rows: damped Gauss–Newton steps, each the shortest there is, finished in double-double.
+//! Positions and rates that satisfy the rows: damped Gauss–Newton steps, each the shortest there is, finished
+//! in double-double.
 //!
 //! ```text
 //! position:  G dq = -C,             q += dq, halved until C shrinks
 //! rates:     G dw = -(G w + C_t),   once
 //! ```
 //!
-//! Coordinates that are held are left out of dq.  Angles are measured in radians and lengths in the size of the mechanism, rows in their largest lever.
-//! Source: P. Deuflhard, *Newton Methods for Nonlinear Problems* (2004), section 4.4.
+//! Coordinates that are held are left out of dq.  Angles are measured in radians and lengths in the size of
+//! the mechanism, rows in their largest lever. Source: P. Deuflhard, *Newton Methods for Nonlinear Problems*
+//! (2004), section 4.4.
 
 use super::svd::{Matrix, dot};
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
@@ -64,14 +66,23 @@ impl Problem<'_> {
     /// Elements at these coordinates.
     pub fn unit_vectors<T: Real>(&self, q: &[DoubleDouble]) -> (Vec<T>, Vec<Complex<T>>) {
         let angles = self.mechanism.bodies.len();
-        let phi: Vec<T> = q.iter().enumerate().map(|(k, &q)| T::split(if k < angles { q.reduced().0 } else { q }).0).collect();
+        let phi: Vec<T> = q
+            .iter()
+            .enumerate()
+            .map(|(k, &q)| T::split(if k < angles { q.reduced().0 } else { q }).0)
+            .collect();
         let mut z = vec![Complex::ZERO; self.coordinates()];
         self.mechanism.tree.unit_vectors::<T, 0>(&phi, &mut z);
         (phi, z)
     }
 
     /// Shows the rows at t = 0 with their gradients, one after another; returns the elements.
-    fn visit<T: Real>(&self, q: &[DoubleDouble], omega: &[T], mut see: impl FnMut(usize, Linearised<T>, &[T])) -> Vec<Complex<T>> {
+    fn visit<T: Real>(
+        &self,
+        q: &[DoubleDouble],
+        omega: &[T],
+        mut see: impl FnMut(usize, Linearised<T>, &[T]),
+    ) -> Vec<Complex<T>> {
         let (phi, z) = self.unit_vectors::<T>(q);
         let mut gradient = vec![T::ZERO; self.coordinates()];
         for (i, row) in self.mechanism.constraints.iter().enumerate() {
@@ -84,7 +95,8 @@ impl Problem<'_> {
 
     /// Coordinates that no held aim takes.
     pub fn columns(&self, held: &[bool]) -> Vec<usize> {
-        let taken = |k: usize| self.aims.iter().zip(held).any(|(aim, &held)| held && aim.goal == Goal::Coordinate(k));
+        let taken =
+            |k: usize| self.aims.iter().zip(held).any(|(aim, &held)| held && aim.goal == Goal::Coordinate(k));
         (0..self.coordinates()).filter(|&k| !taken(k)).collect()
     }
 
@@ -135,14 +147,24 @@ impl Problem<'_> {
     pub fn aim_rate(&self, aim: &Aim, z: &[Complex<DoubleDouble>], omega: &[DoubleDouble]) -> DoubleDouble {
         match aim.goal {
             Goal::Coordinate(k) => omega[k],
-            Goal::Origin(axis) => Complex::of(axis).dot(self.mechanism.end(aim.bar, 0).point.velocity(z, omega)),
+            Goal::Origin(axis) => {
+                Complex::of(axis).dot(self.mechanism.end(aim.bar, 0).point.velocity(z, omega))
+            }
         }
     }
 
-    /// Measured violations of the rows that count and of held origins, and their Jacobian in the free columns.
-    fn equations<T: Real>(&self, q: &[DoubleDouble], rows: &[bool], held: &[bool], columns: &[usize]) -> (Vec<f64>, Matrix) {
+    /// Measured violations of the rows that count and of held origins, and their Jacobian in the free
+    /// columns.
+    fn equations<T: Real>(
+        &self,
+        q: &[DoubleDouble],
+        rows: &[bool],
+        held: &[bool],
+        columns: &[usize],
+    ) -> (Vec<f64>, Matrix) {
         let n = self.coordinates();
-        let (mut left, mut matrix) = (Vec::new(), Matrix { rows: 0, columns: columns.len(), entries: Vec::new() });
+        let (mut left, mut matrix) =
+            (Vec::new(), Matrix { rows: 0, columns: columns.len(), entries: Vec::new() });
         let (mut plain, mut full) = (vec![0.0; n], vec![0.0; n]);
         let z = self.visit::<T>(q, &vec![T::ZERO; n], |i, here, gradient| {
             if rows[i] {
@@ -152,7 +174,9 @@ impl Problem<'_> {
                 matrix.push(&full, columns);
             }
         });
-        for (aim, _) in self.aims.iter().zip(held).filter(|(aim, held)| **held && matches!(aim.goal, Goal::Origin(_))) {
+        for (aim, _) in
+            self.aims.iter().zip(held).filter(|(aim, held)| **held && matches!(aim.goal, Goal::Origin(_)))
+        {
             let (value, gradient) = self.aim(aim, q, &z);
             left.push((value - T::of(aim.given)).value() / self.size);
             matrix.push(&gradient, columns);
@@ -189,7 +213,8 @@ impl Problem<'_> {
         largest(&left)
     }
 
-    /// Slides along the rows to the start that is nearest to `target`, `q - target = -Gᵀ mu`: the steps to the rows are short, but not their sum.
+    /// Slides along the rows to the start that is nearest to `target`, `q - target = -Gᵀ mu`: the steps to
+    /// the rows are short, but not their sum.
     pub fn nearest(&self, q: &mut Vec<DoubleDouble>, target: &[DoubleDouble]) {
         let none = vec![false; self.aims.len()];
         let columns = self.columns(&none);
@@ -197,12 +222,19 @@ impl Problem<'_> {
         let mut before = f64::INFINITY;
         for _ in 0..50 {
             let (left, matrix) = self.equations::<f64>(&trial, &self.active, &none, &columns);
-            let away: Vec<f64> = (target.iter().zip(&trial)).zip(&self.unit).map(|((&target, &q), unit)| (target - q).hi / unit).collect();
-            let sum: Vec<f64> = left.iter().enumerate().map(|(i, left)| left + dot(matrix.row(i), &away)).collect();
+            let away: Vec<f64> = (target.iter().zip(&trial))
+                .zip(&self.unit)
+                .map(|((&target, &q), unit)| (target - q).hi / unit)
+                .collect();
+            let sum: Vec<f64> =
+                left.iter().enumerate().map(|(i, left)| left + dot(matrix.row(i), &away)).collect();
             let mut step = matrix.solver(NOISE).solve(&sum);
             step.iter_mut().zip(&self.unit).for_each(|(step, unit)| *step *= unit);
             let next = moved(target, &step, &columns, 1.0);
-            let moves: Vec<f64> = (next.iter().zip(&trial)).zip(&self.unit).map(|((&next, &q), unit)| (next - q).hi / unit).collect();
+            let moves: Vec<f64> = (next.iter().zip(&trial))
+                .zip(&self.unit)
+                .map(|((&next, &q), unit)| (next - q).hi / unit)
+                .collect();
             let change = largest(&moves);
             if change.is_nan() || change > before {
                 break;
@@ -250,11 +282,16 @@ impl Problem<'_> {
         (worst.0, worst.1)
     }
 
-    /// Changes the rates that are not held, as little as may be, so that all rows keep; returns what is left, measured, relative to the rates.
+    /// Changes the rates that are not held, as little as may be, so that all rows keep; returns what is left,
+    /// measured, relative to the rates.
     pub fn rates(&self, q: &[DoubleDouble], omega: &mut [DoubleDouble], aims: &[Aim], held: &[bool]) -> f64 {
         let columns = Problem { aims: aims.to_vec(), ..self.clone() }.columns(held);
-        let rates =
-            |omega: &[DoubleDouble]| omega.iter().zip(&self.unit).fold(0.0, |most: f64, (omega, unit)| most.max((omega.hi / unit).abs()));
+        let rates = |omega: &[DoubleDouble]| {
+            omega
+                .iter()
+                .zip(&self.unit)
+                .fold(0.0, |most: f64, (omega, unit)| most.max((omega.hi / unit).abs()))
+        };
         let guessed = rates(omega);
         let mut matrix = Matrix { rows: 0, columns: columns.len(), entries: Vec::new() };
         let mut full = vec![0.0; self.coordinates()];
@@ -262,13 +299,22 @@ impl Problem<'_> {
             self.measure(gradient, self.lever[i], &mut full);
             matrix.push(&full, &columns);
         });
-        let origins = || aims.iter().zip(held).filter(|(aim, held)| **held && matches!(aim.goal, Goal::Origin(_))).map(|(aim, _)| aim);
+        let origins = || {
+            aims.iter()
+                .zip(held)
+                .filter(|(aim, held)| **held && matches!(aim.goal, Goal::Origin(_)))
+                .map(|(aim, _)| aim)
+        };
         origins().for_each(|aim| matrix.push(&self.aim(aim, q, &z).1, &columns));
         let solver = matrix.solver(NOISE);
         let left = |omega: &[DoubleDouble]| {
-            let mut left: Vec<f64> = self.slips(q, omega).iter().zip(&self.lever).map(|(slip, lever)| slip / lever).collect();
+            let mut left: Vec<f64> =
+                self.slips(q, omega).iter().zip(&self.lever).map(|(slip, lever)| slip / lever).collect();
             let z = self.unit_vectors::<DoubleDouble>(q).1;
-            left.extend(origins().map(|aim| (self.aim_rate(aim, &z, omega) - DoubleDouble::of(aim.given)).hi / self.size));
+            left.extend(
+                origins()
+                    .map(|aim| (self.aim_rate(aim, &z, omega) - DoubleDouble::of(aim.given)).hi / self.size),
+            );
             left
         };
         let mut now = left(omega);
@@ -299,10 +345,12 @@ impl Problem<'_> {
     }
 }
 
-/// The largest lever of a row \[m\], translational coordinates counted with the size of the mechanism; 1 rad for an angle.
+/// The largest lever of a row \[m\], translational coordinates counted with the size of the mechanism; 1 rad
+/// for an angle.
 pub fn lever(measure: &Measure, size: f64) -> f64 {
     let Measure::Place(place) = measure else { return 1.0 };
-    let length = |k: usize, g: &Complex<f64>| g.norm_squared().sqrt() * if k < place.angles { 1.0 } else { size };
+    let length =
+        |k: usize, g: &Complex<f64>| g.norm_squared().sqrt() * if k < place.angles { 1.0 } else { size };
     let linear = place.linear.iter().map(|(k, g)| length(*k, g));
     let bilinear = place.bilinear.iter().map(|(_, k, h)| length(*k, h));
     let most = linear.chain(bilinear).fold(0.0, f64::max);

@@ -5,9 +5,11 @@ use super::svd::{Matrix, independent};
 use super::{Assembly, DENSE, DEPENDENT, shuffled};
 use crate::arithmetic::{DoubleDouble, Scalar};
 
-/// As [`DEPENDENT`], near a singular position, where rows that are met to [`KEPT`] leave angles open by its square root.
+/// As [`DEPENDENT`], near a singular position, where rows that are met to [`KEPT`] leave angles open by its
+/// square root.
 const NEARLY: f64 = 1e-5;
-/// Rows squared times coordinates up to which the rows' rank is formed; beyond, they are taken to be independent.
+/// Rows squared times coordinates up to which the rows' rank is formed; beyond, they are taken to be
+/// independent.
 const LARGEST: usize = 1 << 28;
 
 impl Problem<'_> {
@@ -16,7 +18,11 @@ impl Problem<'_> {
         let rows = self.mechanism.constraints.len();
         let every = vec![true; rows];
         if (rows * rows).saturating_mul(q.len()) > LARGEST {
-            return Assembly { degrees_of_freedom: q.len() - rows, conditioning: f64::NAN, ..Assembly::default() };
+            return Assembly {
+                degrees_of_freedom: q.len() - rows,
+                conditioning: f64::NAN,
+                ..Assembly::default()
+            };
         }
         let here = self.jacobian(q, &every);
         let conditioning = if rows == 0 {
@@ -31,14 +37,22 @@ impl Problem<'_> {
         let mut redundant = dependent.clone();
         if count(&dependent) > 0 && q.len() <= DENSE {
             // Motors may be anywhere.
-            let steady: Vec<bool> =
-                self.mechanism.constraints.iter().zip(&self.active).map(|(row, &active)| active && !row.is_motor()).collect();
+            let steady: Vec<bool> = self
+                .mechanism
+                .constraints
+                .iter()
+                .zip(&self.active)
+                .map(|(row, &active)| active && !row.is_motor())
+                .collect();
             let none = vec![false; self.aims.len()];
             for k in 1..=12 {
                 // Farther and farther: close to a singular position the nearest start may be that position.
                 let spread = 0.08 * k as f64;
-                let mut near: Vec<DoubleDouble> =
-                    q.iter().enumerate().map(|(j, &q)| q + DoubleDouble::of(spread * self.unit[j] * shuffled(k, j))).collect();
+                let mut near: Vec<DoubleDouble> = q
+                    .iter()
+                    .enumerate()
+                    .map(|(j, &q)| q + DoubleDouble::of(spread * self.unit[j] * shuffled(k, j)))
+                    .collect();
                 if self.position(&mut near, &steady, &none) < KEPT {
                     let there = self::dependent(&self.jacobian(&near, &every), NEARLY);
                     if count(&there) < count(&redundant) {

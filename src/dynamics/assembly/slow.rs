@@ -1,11 +1,12 @@
-//! The start of a mechanism whose rigid spring vibrates: the vibration goes along M⁻¹ Gᵀ, and what is left of the start without it moves along the rod.
+//! The start of a mechanism whose rigid spring vibrates: the vibration goes along M⁻¹ Gᵀ, and what is left of
+//! the start without it moves along the rod.
 //!
 //! ```text
 //! q = q0 - M⁻¹ Gᵀ s⁻¹ g(q0),      w = w0 - M⁻¹ Gᵀ s⁻¹ (G w0),      s = G M⁻¹ Gᵀ
 //! ```
 //!
-//! The shortest way in the metric of the mass matrix, not in angles: energy and momentum of the vibration are those of the motion taken out, and the motion left
-//! has all the rest of both.
+//! The shortest way in the metric of the mass matrix, not in angles: energy and momentum of the vibration are
+//! those of the motion taken out, and the motion left has all the rest of both.
 
 use super::newton::Problem;
 use crate::arithmetic::{DoubleDouble, Scalar};
@@ -21,7 +22,8 @@ fn given(scene: &Scene, bar: usize) -> Given {
 }
 
 impl Mechanism {
-    /// The start with all that the scene gives, where springs need not have their free lengths; what it does not give is as the rows have it.
+    /// The start with all that the scene gives, where springs need not have their free lengths; what it does
+    /// not give is as the rows have it.
     pub(in crate::dynamics) fn start_with_vibration(&self, scene: &Scene) -> Motion {
         let (mut motion, written) = (self.start(scene), self.start_as_given(scene));
         for bar in 0..self.bodies.len() {

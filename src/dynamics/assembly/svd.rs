@@ -1,7 +1,8 @@
 //! Singular values of small dense matrices, by rotating pairs of columns until all are orthogonal.
 //!
-//! Square roots are the only functions it asks for, so that its bits are the same on every machine.  Source: M. R. Hestenes, J. SIAM 6 (1958); J. Demmel,
-//! K. Veselić, SIAM J. Matrix Anal. Appl. 13 (1992), on its accuracy.
+//! Square roots are the only functions it asks for, so that its bits are the same on every machine.  Source:
+//! M. R. Hestenes, J. SIAM 6 (1958); J. Demmel, K. Veselić, SIAM J. Matrix Anal. Appl. 13 (1992), on its
+//! accuracy.
 
 /// A matrix row by row.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -42,7 +43,8 @@ impl Matrix {
     pub fn svd(&self) -> Svd {
         let (upright, mut long) = self.long();
         let few = long.len();
-        let mut short: Vec<Vec<f64>> = (0..few).map(|i| (0..few).map(|k| if i == k { 1.0 } else { 0.0 }).collect()).collect();
+        let mut short: Vec<Vec<f64>> =
+            (0..few).map(|i| (0..few).map(|k| if i == k { 1.0 } else { 0.0 }).collect()).collect();
         orthogonalise(&mut long, dot, |i, j, cos, sin| rotate(&mut short, i, j, cos, sin));
         let triples = (long.into_iter().zip(short))
             .filter_map(|(mut long, short)| {
@@ -57,24 +59,32 @@ impl Matrix {
         Svd { triples }
     }
 
-    /// Its singular values alone, those that are not exactly zero, in no order: for a third of the time, and in other last digits.
+    /// Its singular values alone, those that are not exactly zero, in no order: for a third of the time, and
+    /// in other last digits.
     pub fn values(&self) -> Vec<f64> {
         let (_, mut long) = self.long();
         orthogonalise(&mut long, fast_dot, |_, _, _, _| {});
         long.iter().map(|long| fast_dot(long, long).sqrt()).filter(|&sigma| sigma != 0.0).collect()
     }
 
-    /// The vectors along the longer side, which are to be rotated until they are orthogonal, and whether these are the columns.
+    /// The vectors along the longer side, which are to be rotated until they are orthogonal, and whether
+    /// these are the columns.
     fn long(&self) -> (bool, Vec<Vec<f64>>) {
         let upright = self.columns <= self.rows;
         let (few, many) = if upright { (self.columns, self.rows) } else { (self.rows, self.columns) };
-        let entry = |i: usize, k: usize| self.entries[if upright { k * self.columns + i } else { i * self.columns + k }];
+        let entry = |i: usize, k: usize| {
+            self.entries[if upright { k * self.columns + i } else { i * self.columns + k }]
+        };
         (upright, (0..few).map(|i| (0..many).map(|k| entry(i, k)).collect()).collect())
     }
 }
 
 /// Rotates pairs of vectors until all are orthogonal, and tells every rotation.
-fn orthogonalise(long: &mut [Vec<f64>], dot: fn(&[f64], &[f64]) -> f64, mut each: impl FnMut(usize, usize, f64, f64)) {
+fn orthogonalise(
+    long: &mut [Vec<f64>],
+    dot: fn(&[f64], &[f64]) -> f64,
+    mut each: impl FnMut(usize, usize, f64, f64),
+) {
     let few = long.len();
     let mut squares: Vec<f64> = long.iter().map(|long| dot(long, long)).collect();
     for _ in 0..SWEEPS {
@@ -115,7 +125,11 @@ const SMALL: usize = 100;
 impl Matrix {
     /// Prepares solutions.
     pub fn solver(&self, share: f64) -> Solver<'_> {
-        if self.rows.min(self.columns) <= SMALL { Solver::Small(self.svd(), self.columns, share) } else { self.squared() }
+        if self.rows.min(self.columns) <= SMALL {
+            Solver::Small(self.svd(), self.columns, share)
+        } else {
+            self.squared()
+        }
     }
 
     fn squared(&self) -> Solver<'_> {
@@ -140,8 +154,11 @@ impl Matrix {
         for i in 0..few {
             for j in 0..=i {
                 let sum = square.entries[i * few + j] - dot(&square.row(i)[..j], &square.row(j)[..j]);
-                square.entries[i * few + j] =
-                    if i == j { (sum + 1e-14 * most).max(1e-14 * most).sqrt() } else { sum / square.entries[j * few + j] };
+                square.entries[i * few + j] = if i == j {
+                    (sum + 1e-14 * most).max(1e-14 * most).sqrt()
+                } else {
+                    sum / square.entries[j * few + j]
+                };
             }
         }
         Solver::Large(self, square)
@@ -200,7 +217,8 @@ impl Svd {
         sum
     }
 
-    /// The shortest x for which A x is nearest to `b`; singular values below `share` of the largest count as zero.
+    /// The shortest x for which A x is nearest to `b`; singular values below `share` of the largest count as
+    /// zero.
     pub fn solve(&self, b: &[f64], columns: usize, share: f64) -> Vec<f64> {
         let least = share * self.largest();
         let mut x = vec![0.0; columns];
@@ -211,7 +229,8 @@ impl Svd {
         x
     }
 
-    /// How much of each column's direction the rows leave open: 0 where they fix it, 1 where they do not touch it; singular values below `least` count as zero.
+    /// How much of each column's direction the rows leave open: 0 where they fix it, 1 where they do not
+    /// touch it; singular values below `least` count as zero.
     pub fn open(&self, columns: usize, least: f64) -> Vec<f64> {
         let mut open = vec![1.0; columns];
         for (_, _, v) in self.triples.iter().filter(|triple| triple.0 > least) {
@@ -221,7 +240,8 @@ impl Svd {
     }
 }
 
-/// Which of the rows, from the first on, are no combination of those before; what is left of a row counts as zero below `least`.
+/// Which of the rows, from the first on, are no combination of those before; what is left of a row counts as
+/// zero below `least`.
 pub fn independent(matrix: &Matrix, least: f64) -> Vec<bool> {
     let mut basis: Vec<Vec<f64>> = Vec::new();
     (0..matrix.rows)
@@ -320,11 +340,15 @@ mod tests {
     fn values_alone_are_those_of_the_vectors() {
         for (rows, columns) in [(4, 4), (3, 9), (7, 3), (1, 5)] {
             let a = matrix(rows, columns);
-            let (mut alone, mut whole) = (a.values(), a.svd().triples.iter().map(|triple| triple.0).collect::<Vec<_>>());
+            let (mut alone, mut whole) =
+                (a.values(), a.svd().triples.iter().map(|triple| triple.0).collect::<Vec<_>>());
             alone.sort_by(f64::total_cmp);
             whole.sort_by(f64::total_cmp);
             assert_eq!(alone.len(), rows.min(columns));
-            assert!(alone.iter().zip(&whole).all(|(a, b)| (a - b).abs() < 1e-14 * b.max(1.0)), "{alone:?} {whole:?}");
+            assert!(
+                alone.iter().zip(&whole).all(|(a, b)| (a - b).abs() < 1e-14 * b.max(1.0)),
+                "{alone:?} {whole:?}"
+            );
         }
     }
 

@@ -1,4 +1,5 @@
-//! What there is to watch of the rows while a mechanism moves: how near to a singular position it is, and multipliers where rows depend on one another.
+//! What there is to watch of the rows while a mechanism moves: how near to a singular position it is, and
+//! multipliers where rows depend on one another.
 
 use super::svd::Matrix;
 use crate::dynamics::Mechanism;
@@ -10,13 +11,15 @@ const MOST: usize = 64;
 const ZERO: f64 = 1e-9;
 
 impl Mechanism {
-    /// The least singular value of the rows' Jacobian over the largest, angles in rad and lengths in sizes of the mechanism, after an evaluation of the
-    /// equations; zeros of redundant rows are not counted.  Not a number where there are no rows, or too many for singular values.
+    /// The least singular value of the rows' Jacobian over the largest, angles in rad and lengths in sizes of
+    /// the mechanism, after an evaluation of the equations; zeros of redundant rows are not counted.  Not a
+    /// number where there are no rows, or too many for singular values.
     pub fn conditioning(&self, kernel: &Kernel<f64>) -> f64 {
         let Some(jacobian) = self.measured(kernel) else { return f64::NAN };
         let mut values = jacobian.values();
         values.sort_by(f64::total_cmp);
-        let independent = (jacobian.rows - self.assembly.redundant.len().min(jacobian.rows)).min(jacobian.columns);
+        let independent =
+            (jacobian.rows - self.assembly.redundant.len().min(jacobian.rows)).min(jacobian.columns);
         match values.len().checked_sub(independent).and_then(|first| values.get(first)) {
             Some(least) => least / values.last().unwrap_or(&f64::NAN),
             // Those that are exactly zero are not listed.
@@ -24,15 +27,18 @@ impl Mechanism {
         }
     }
 
-    /// Makes the multipliers of an evaluation those of least norm: where rows depend on one another, others have the same effect.
+    /// Makes the multipliers of an evaluation those of least norm: where rows depend on one another, others
+    /// have the same effect.
     pub fn spread_multipliers(&self, kernel: &mut Kernel<f64>) {
         if self.assembly.redundant.is_empty() {
             return;
         }
         let Some(jacobian) = self.measured(kernel) else { return };
         let size = self.size_of_parts();
-        let unit: Vec<f64> = self.constraints.iter().map(|row| if row.is_angle() { 1.0 } else { size }).collect();
-        let measured: Vec<f64> = kernel.multiplier.iter().zip(&unit).map(|(multiplier, unit)| multiplier * unit).collect();
+        let unit: Vec<f64> =
+            self.constraints.iter().map(|row| if row.is_angle() { 1.0 } else { size }).collect();
+        let measured: Vec<f64> =
+            kernel.multiplier.iter().zip(&unit).map(|(multiplier, unit)| multiplier * unit).collect();
         let least = jacobian.svd().in_range(&measured, ZERO);
         for (multiplier, (least, unit)) in kernel.multiplier.iter_mut().zip(least.iter().zip(&unit)) {
             *multiplier = least / unit;
@@ -65,7 +71,13 @@ mod tests {
 
     /// One bar on three equal cranks, upright and at rest under gravity across.
     fn three_cranks(phi: f64) -> Mechanism {
-        let bar = |name: &str, length: f64| Bar { name: name.into(), length, mass: 1.0, centre: [0.5 * length, 0.0], inertia: 0.1 };
+        let bar = |name: &str, length: f64| Bar {
+            name: name.into(),
+            length,
+            mass: 1.0,
+            centre: [0.5 * length, 0.0],
+            inertia: 0.1,
+        };
         let hinge = |name: String, a: (Option<usize>, f64), b: (usize, f64)| Hinge {
             name,
             between: [Place { bar: a.0, point: [a.1, 0.0] }, Place { bar: Some(b.0), point: [b.1, 0.0] }],
@@ -77,7 +89,12 @@ mod tests {
             gravity: [9.81, 0.0],
             bars: vec![bar("left", 1.0), bar("middle", 1.0), bar("right", 1.0), bar("coupler", 2.0)],
             hinges: translations.chain(tops).collect(),
-            start: vec![Start { phi, omega: 0.0 }, Start { phi, omega: 0.0 }, Start { phi, omega: 0.0 }, Start { phi: 0.0, omega: 0.0 }],
+            start: vec![
+                Start { phi, omega: 0.0 },
+                Start { phi, omega: 0.0 },
+                Start { phi, omega: 0.0 },
+                Start { phi: 0.0, omega: 0.0 },
+            ],
             until: 1.0,
             every: 0.1,
             ..Scene::default()
@@ -99,7 +116,9 @@ mod tests {
         let mut kernel = evaluated(&mechanism, phi);
         let (before, jacobian) = (kernel.multiplier.clone(), kernel.jacobian.clone());
         mechanism.spread_multipliers(&mut kernel);
-        let effect = |multiplier: &[f64], k: usize| -> f64 { multiplier.iter().enumerate().map(|(r, m)| jacobian[r * 4 + k] * m).sum() };
+        let effect = |multiplier: &[f64], k: usize| -> f64 {
+            multiplier.iter().enumerate().map(|(r, m)| jacobian[r * 4 + k] * m).sum()
+        };
         let norm = |multiplier: &[f64]| multiplier.iter().map(|m| m * m).sum::<f64>();
         for k in 0..4 {
             assert!((effect(&before, k) - effect(&kernel.multiplier, k)).abs() < 1e-12);

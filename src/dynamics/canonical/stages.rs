@@ -1,7 +1,7 @@
 //! The canonical form at eight points at once, one a lane.
 //!
-//! The formulas are those of a single point, evaluated on [`Eight`] and, where what doubles drop is wanted too, on [`Pairs`].  What depends on time alone
-//! is formed once for each set of times, in double-double.
+//! The formulas are those of a single point, evaluated on [`Eight`] and, where what doubles drop is wanted
+//! too, on [`Pairs`].  What depends on time alone is formed once for each set of times, in double-double.
 
 use super::Scratch;
 use crate::arithmetic::eight::{Eight, LANES, Lanewise, Octet};
@@ -66,7 +66,12 @@ impl<T: Lanewise> Bench<T> {
             T::load(&Octet(parts.map(|part| part.hi)), &Octet(parts.map(|part| part.lo)))
         };
         let unit = Complex::new(lanes(|phase| phase.unit.re), lanes(|phase| phase.unit.im));
-        let phase = Phase { angle: T::ZERO, unit, rate: lanes(|phase| phase.rate), acceleration: lanes(|phase| phase.acceleration) };
+        let phase = Phase {
+            angle: T::ZERO,
+            unit,
+            rate: lanes(|phase| phase.rate),
+            acceleration: lanes(|phase| phase.acceleration),
+        };
         self.scratch.drive(k, phase);
     }
 
@@ -77,7 +82,8 @@ impl<T: Lanewise> Bench<T> {
 
     /// Takes what applied force `a` is multiplied by at all points.
     fn multiply(&mut self, a: usize, factors: &[DoubleDouble; LANES]) {
-        self.scratch.factor[a] = T::load(&Octet(factors.map(|factor| factor.hi)), &Octet(factors.map(|factor| factor.lo)));
+        self.scratch.factor[a] =
+            T::load(&Octet(factors.map(|factor| factor.hi)), &Octet(factors.map(|factor| factor.lo)));
     }
 }
 
@@ -87,7 +93,11 @@ impl<L: Lanes> Both<L> {
     }
 
     #[inline(always)]
-    fn rates<const N: usize, const WORK: bool, const EXACT: bool>(&mut self, mechanism: &Mechanism, points: &mut Points) {
+    fn rates<const N: usize, const WORK: bool, const EXACT: bool>(
+        &mut self,
+        mechanism: &Mechanism,
+        points: &mut Points,
+    ) {
         if EXACT {
             self.exact.rates::<N, WORK>(mechanism, points);
         } else {
@@ -111,7 +121,11 @@ impl<L: Lanes> Both<L> {
     }
 }
 
-struct Rates<'a, const N: usize, const WORK: bool, const EXACT: bool>(&'a mut Both<Vector>, &'a Mechanism, &'a mut Points);
+struct Rates<'a, const N: usize, const WORK: bool, const EXACT: bool>(
+    &'a mut Both<Vector>,
+    &'a Mechanism,
+    &'a mut Points,
+);
 
 impl<const N: usize, const WORK: bool, const EXACT: bool> Code for Rates<'_, N, WORK, EXACT> {
     type Output = ();
@@ -143,7 +157,8 @@ impl Stages {
         Self { time, room }
     }
 
-    /// The rates at all points; with `exact`, what doubles leave out of points and rates too.  `work_integral`: the form carries p_t.
+    /// The rates at all points; with `exact`, what doubles leave out of points and rates too.
+    /// `work_integral`: the form carries p_t.
     ///
     /// Not generic, so that it is compiled once and not with every program that integrates a mechanism.
     pub fn rates(&mut self, work_integral: bool, exact: bool, mechanism: &Mechanism, points: &mut Points) {

@@ -9,20 +9,26 @@ use crate::dynamics::forest::Forest;
 use crate::dynamics::law::Law;
 use crate::scene::{Place, Scene, Slider};
 
-/// Motors, locks, and the angles that welds and locked sliders keep; those not given are what they are at the start.
+/// Motors, locks, and the angles that welds and locked sliders keep; those not given are what they are at the
+/// start.
 pub(super) fn given_angles(scene: &Scene) -> Vec<ConstraintEquation> {
-    let motors = scene.motors.iter().map(|motor| constraint::angle_equation(&motor.name, motor.bar, motor.relative_to, motor.law.clone()));
+    let motors = scene.motors.iter().map(|motor| {
+        constraint::angle_equation(&motor.name, motor.bar, motor.relative_to, motor.law.clone())
+    });
     let phi = |bar: Option<usize>| bar.map_or(0.0, |bar| scene.start[bar].phi);
     let keep = |name: &str, a: Option<usize>, b: Option<usize>, angle: Option<f64>| {
         let (body, base) = if let Some(a) = a { (a, b) } else { (b?, None) };
         let angle = angle.unwrap_or_else(|| phi(Some(body)) - phi(base));
         Some(constraint::angle_equation(name, body, base, Law::constant(angle)))
     };
-    let locks = scene.locks.iter().filter_map(|lock| keep(&lock.name, Some(lock.bar), lock.relative_to, lock.angle));
-    let welds =
-        (scene.welds.iter()).filter_map(|weld| keep(&format!("{}.angle", weld.name), weld.between[1].bar, weld.between[0].bar, None));
-    let sliders = (scene.sliders.iter().filter(|slider| slider.locked))
-        .filter_map(|slider| keep(&format!("{}.angle", slider.name), slider.point.bar, slider.rail.place.bar, None));
+    let locks =
+        scene.locks.iter().filter_map(|lock| keep(&lock.name, Some(lock.bar), lock.relative_to, lock.angle));
+    let welds = (scene.welds.iter()).filter_map(|weld| {
+        keep(&format!("{}.angle", weld.name), weld.between[1].bar, weld.between[0].bar, None)
+    });
+    let sliders = (scene.sliders.iter().filter(|slider| slider.locked)).filter_map(|slider| {
+        keep(&format!("{}.angle", slider.name), slider.point.bar, slider.rail.place.bar, None)
+    });
     motors.chain(locks).chain(welds).chain(sliders).collect()
 }
 
@@ -48,7 +54,12 @@ pub(super) fn joints(scene: &Scene, forest: &Forest, rows: &mut Vec<ConstraintEq
         let at = (inner.bar, inner.bar.map_or(point, |bar| point - forest.hangs[bar].own));
         let row = outer.is_none().then_some(rows.len());
         if outer.is_none() {
-            rows.extend(constraint::pin_equations(name, &forest.site(&between[0]), &forest.site(&between[1]), scene.bars.len()));
+            rows.extend(constraint::pin_equations(
+                name,
+                &forest.site(&between[0]),
+                &forest.site(&between[1]),
+                scene.bars.len(),
+            ));
         }
         joints.push(Joint { name: name.clone(), at, outer, row, between: [between[0].bar, between[1].bar] });
     }
@@ -69,11 +80,25 @@ fn rail(slider: &Slider) -> Complex<f64> {
     Complex::new(slider.rail.direction[0], slider.rail.direction[1])
 }
 
-fn on_rail(forest: &Forest, name: &str, slider: &Slider, direction: Complex<f64>, law: Option<Law>) -> ConstraintEquation {
-    let (site, origin_point, angles) = (forest.site(&slider.point), forest.site(&slider.rail.place), forest.hangs.len());
+fn on_rail(
+    forest: &Forest,
+    name: &str,
+    slider: &Slider,
+    direction: Complex<f64>,
+    law: Option<Law>,
+) -> ConstraintEquation {
+    let (site, origin_point, angles) =
+        (forest.site(&slider.point), forest.site(&slider.rail.place), forest.hangs.len());
     match slider.rail.place.bar {
         Some(body) => constraint::slot_equation(name, &site, body, &origin_point, direction, law, angles),
-        None => constraint::line_equation(name, &site, direction, direction.dot(origin_point.point.root), law, angles),
+        None => constraint::line_equation(
+            name,
+            &site,
+            direction,
+            direction.dot(origin_point.point.root),
+            law,
+            angles,
+        ),
     }
 }
 

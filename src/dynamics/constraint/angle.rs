@@ -4,14 +4,20 @@
 //! C = q_a - q_b - theta(t),   G_a = 1, G_b = -1,   C_t = -theta',   gamma = -theta''
 //! ```
 //!
-//! C is taken modulo whole turns.  The multiplier is minus the torque on body a; the motor's power is torque · theta'.
+//! C is taken modulo whole turns.  The multiplier is minus the torque on body a; the motor's power is torque
+//! · theta'.
 
 use super::{ConstraintEquation, Measure};
 use crate::dynamics::law::Law;
 
 /// Keeps the angle of `body`, measured from `base` or from +x, at a law of time.
 pub fn angle_equation(name: &str, body: usize, base: Option<usize>, law: Law) -> ConstraintEquation {
-    ConstraintEquation { name: name.into(), measure: Measure::Angle { body, base }, law: Some(law), push: None }
+    ConstraintEquation {
+        name: name.into(),
+        measure: Measure::Angle { body, base },
+        law: Some(law),
+        push: None,
+    }
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! A point on a line of the ground with unit normal n: a wall while it holds or pushes, a slider, its travel where n lies along the line.
+//! A point on a line of the ground with unit normal n: a wall while it holds or pushes, a slider, its travel
+//! where n lies along the line.
 //!
 //! ```text
 //! C = Re(conj(n) P) - s(t),   G_k = Re(conj(n) i gamma_k z_k),   C_t = -s',   gamma = Re(conj(n) Pi) - s''
@@ -11,8 +12,16 @@ use crate::arithmetic::Complex;
 use crate::dynamics::law::Law;
 use crate::dynamics::quadratic::Quadratic;
 
-/// Keeps a point at the distance `offset` \[m\] from the origin along the unit vector `normal`, and the law's travel \[m\] further.
-pub fn line_equation(name: &str, site: &Site, normal: Complex<f64>, offset: f64, law: Option<Law>, angles: usize) -> ConstraintEquation {
+/// Keeps a point at the distance `offset` \[m\] from the origin along the unit vector `normal`, and the law's
+/// travel \[m\] further.
+pub fn line_equation(
+    name: &str,
+    site: &Site,
+    normal: Complex<f64>,
+    offset: f64,
+    law: Option<Law>,
+    angles: usize,
+) -> ConstraintEquation {
     let mut place = Quadratic::along(&site.point, normal, angles);
     place.constant -= offset;
     ConstraintEquation {

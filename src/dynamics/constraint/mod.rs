@@ -1,10 +1,11 @@
 //! Constraint equations, one file a kind.
 //!
-//! A row knows its violation C, its Jacobian G, its drive C_t and what is left of C'' at zero acceleration.  Sign rule everywhere:
-//! `M a + Gᵀ lambda = b`, `G a = -gamma`, `C' = G w + C_t`.
+//! A row knows its violation C, its Jacobian G, its drive C_t and what is left of C'' at zero acceleration.
+//! Sign rule everywhere: `M a + Gᵀ lambda = b`, `G a = -gamma`, `C' = G w + C_t`.
 //!
-//! Whatever its kind, a row measures either an angle or a [`Quadratic`] function of unit vectors and translational coordinates, and keeps it at zero or at a law of
-//! time.  All that evaluates, projects or expands rows does so for these two measures, so that a new kind is a new function that makes one.
+//! Whatever its kind, a row measures either an angle or a [`Quadratic`] function of unit vectors and
+//! translational coordinates, and keeps it at zero or at a law of time.  All that evaluates, projects or
+//! expands rows does so for these two measures, so that a new kind is a new function that makes one.
 
 pub mod angle;
 pub mod line;
@@ -172,7 +173,8 @@ impl ConstraintEquation {
             Measure::Angle { body, base } => {
                 let given = base.map_or(at.phi[*body], |base| difference(at.phi[*body], at.phi[base]));
                 turn(*body, *base, jacobian);
-                let [theta, rate, acceleration] = self.law.as_ref().map_or([T::ZERO; 3], |law| law.angles::<T>(t));
+                let [theta, rate, acceleration] =
+                    self.law.as_ref().map_or([T::ZERO; 3], |law| law.angles::<T>(t));
                 Linearised { position: difference(given, theta), drive: -rate, convective: -acceleration }
             }
             Measure::Place(place) => {
@@ -234,7 +236,12 @@ pub(super) mod tests {
 
     /// A law with everything in it.
     pub fn law() -> Law {
-        Law { start: 0.1, rate: 2.0, acceleration: 0.3, sines: vec![Sine { amplitude: 0.2, frequency: 3.0, phase: 0.5 }] }
+        Law {
+            start: 0.1,
+            rate: 2.0,
+            acceleration: 0.3,
+            sines: vec![Sine { amplitude: 0.2, frequency: 3.0, phase: 0.5 }],
+        }
     }
 
     /// A point of body 0, one of body 1 which hangs on it, and an origin that moves freely, carried with body 1.
@@ -259,9 +266,11 @@ pub(super) mod tests {
     /// Coordinates, elements and rates of two bodies and an origin in uniformly accelerated motion.
     pub fn posture(t: f64) -> (Vec<DoubleDouble>, Vec<Complex<DoubleDouble>>, Vec<DoubleDouble>) {
         let (of, t) = (DoubleDouble::of, DoubleDouble::of(t));
-        let phi: Vec<_> = (0..4).map(|k| of(START[k]) + t.scale(RATE[k]) + (t * t).scale(0.5 * ACCELERATION[k])).collect();
+        let phi: Vec<_> =
+            (0..4).map(|k| of(START[k]) + t.scale(RATE[k]) + (t * t).scale(0.5 * ACCELERATION[k])).collect();
         let omega = (0..4).map(|k| of(RATE[k]) + t.scale(ACCELERATION[k])).collect();
-        let z = vec![Complex::unit(phi[0]), Complex::unit(phi[1]), Complex::new(phi[2], phi[3]), Complex::ZERO];
+        let z =
+            vec![Complex::unit(phi[0]), Complex::unit(phi[1]), Complex::new(phi[2], phi[3]), Complex::ZERO];
         (phi, z, omega)
     }
 
@@ -270,9 +279,17 @@ pub(super) mod tests {
         let at = |t: f64| {
             let (phi, z, omega) = posture(t);
             let mut jacobian = [DoubleDouble::ZERO; 4];
-            let here = row.linearise(DoubleDouble::of(t), Posture { phi: &phi, z: &z, omega: &omega }, &mut jacobian);
+            let here = row.linearise(
+                DoubleDouble::of(t),
+                Posture { phi: &phi, z: &z, omega: &omega },
+                &mut jacobian,
+            );
             let mut again = [DoubleDouble::ZERO; 4];
-            let rest = row.differentiate(DoubleDouble::of(t), Posture { phi: &phi, z: &z, omega: &omega }, &mut again);
+            let rest = row.differentiate(
+                DoubleDouble::of(t),
+                Posture { phi: &phi, z: &z, omega: &omega },
+                &mut again,
+            );
             assert_eq!((jacobian, here.drive, here.convective), (again, rest.drive, rest.convective));
             (here, jacobian, omega)
         };

@@ -4,7 +4,8 @@
 //! C = (|D|² - L²) / 2L,  D = P_a - P_b,   G_k = Re(conj(D) i gamma_k z_k) / L,   C_t = 0,   gamma = (Re(conj(D) Pi_D) + |D'|²) / L
 //! ```
 //!
-//! Near the distance kept C is what the distance is off.  The force on the first point is -lambda D/L, on the second lambda D/L.
+//! Near the distance kept C is what the distance is off.  The force on the first point is -lambda D/L, on the
+//! second lambda D/L.
 
 use super::{ConstraintEquation, Measure, Push, Site, Way};
 use crate::dynamics::quadratic::Quadratic;

@@ -1,4 +1,5 @@
-//! A point on a line of a moving body b, with unit normal nu = n z_b, n in the body's frame: a slot, or the travel along it where n lies along the line.
+//! A point on a line of a moving body b, with unit normal nu = n z_b, n in the body's frame: a slot, or the
+//! travel along it where n lies along the line.
 //!
 //! ```text
 //! C = Re(conj(nu) D) - s(t),  D = P - P_b on the line
@@ -6,14 +7,16 @@
 //! C_t = -s',   gamma = Re(conj(nu) Pi_D) + 2 w_b Re(conj(i nu) D') - w_b² Re(conj(nu) D) - s''
 //! ```
 //!
-//! As a function of the elements it is bilinear.  The force on the point is -lambda nu, on the body lambda nu at the same place.
+//! As a function of the elements it is bilinear.  The force on the point is -lambda nu, on the body lambda nu
+//! at the same place.
 
 use super::{ConstraintEquation, Measure, Push, Site, Way};
 use crate::arithmetic::Complex;
 use crate::dynamics::law::Law;
 use crate::dynamics::quadratic::Quadratic;
 
-/// Keeps a point at a distance, the law's or none, from the point `origin_point` of body `rail` along the unit vector `normal` of that body's frame.
+/// Keeps a point at a distance, the law's or none, from the point `origin_point` of body `rail` along the
+/// unit vector `normal` of that body's frame.
 pub fn slot_equation(
     name: &str,
     site: &Site,
@@ -25,7 +28,12 @@ pub fn slot_equation(
 ) -> ConstraintEquation {
     ConstraintEquation {
         name: name.into(),
-        measure: Measure::Place(Quadratic::along_body(&site.point.minus(&origin_point.point), rail, normal, angles)),
+        measure: Measure::Place(Quadratic::along_body(
+            &site.point.minus(&origin_point.point),
+            rail,
+            normal,
+            angles,
+        )),
         law,
         push: Some(Push { on: site.body, from: Some(rail), way: Way::Body(rail, normal) }),
     }
@@ -51,10 +59,12 @@ mod tests {
         let row = slot_equation("slot", &point, 0, &origin_point, normal, None, 2);
         let (phi, z, omega) = posture(0.3);
         let mut jacobian = vec![Default::default(); 4];
-        let here = row.linearise(Default::default(), Posture { phi: &phi, z: &z, omega: &omega }, &mut jacobian);
+        let here =
+            row.linearise(Default::default(), Posture { phi: &phi, z: &z, omega: &omega }, &mut jacobian);
         let (nu, span) = (z[0].turn(normal), point.point.minus(&origin_point.point));
         let turned = omega[0] * nu.left().dot(span.velocity(&z, &omega));
-        let expected = nu.dot(span.convective(&z, &omega)) + turned.scale(2.0) - omega[0] * omega[0] * nu.dot(span.position(&z));
+        let expected = nu.dot(span.convective(&z, &omega)) + turned.scale(2.0)
+            - omega[0] * omega[0] * nu.dot(span.position(&z));
         assert!((here.convective - expected).hi.abs() < 1e-15);
     }
 }

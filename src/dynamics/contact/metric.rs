@@ -6,9 +6,10 @@
 //! least v with Cᵀ v = b:  Q R⁻ᵀ b             what the rows leave of c:  c - Q Qᵀ c
 //! ```
 //!
-//! Masses, lengths and times of any unit come out the same, but for rounding, and no matrix is squared.  Rows that say nothing new are left out by
-//! their geometry alone, masses aside: see `new_rows`.  Source: Å. Björck, *Numerical Methods for Least Squares Problems* (1996), sections 2.4.5
-//! (orthogonalized twice) and 2.7.3.
+//! Masses, lengths and times of any unit come out the same, but for rounding, and no matrix is squared.  Rows
+//! that say nothing new are left out by their geometry alone, masses aside: see `new_rows`.  Source: Å.
+//! Björck, *Numerical Methods for Least Squares Problems* (1996), sections 2.4.5 (orthogonalized twice) and
+//! 2.7.3.
 
 use crate::dynamics::constraint::{ConstraintEquation, Linearised, Measure, Posture};
 use crate::dynamics::kernel::Kernel;
@@ -54,7 +55,10 @@ impl Metric {
         let counting = new_rows(mechanism, &rows);
         let mut metric = Self { lower, scale, load: kernel.load, rows, counting, basis: Basis::new(n) };
         let counting = std::mem::take(&mut metric.counting);
-        metric.counting = counting.into_iter().filter(|&r| metric.basis.push(&metric.column(&metric.rows[r].along))).collect();
+        metric.counting = counting
+            .into_iter()
+            .filter(|&r| metric.basis.push(&metric.column(&metric.rows[r].along)))
+            .collect();
         Some(metric)
     }
 
@@ -115,19 +119,23 @@ impl Gradient {
     }
 }
 
-/// The rows that say something new, those that say most first: angles in rad, lengths in sizes of the mechanism, each row over the most it could say.
+/// The rows that say something new, those that say most first: angles in rad, lengths in sizes of the
+/// mechanism, each row over the most it could say.
 fn new_rows(mechanism: &Mechanism, rows: &[Gradient]) -> Vec<usize> {
     let (size, angles) = (mechanism.size_of_parts(), mechanism.bodies.len());
     let scaled = |(row, gradient): (&ConstraintEquation, &Gradient)| {
-        let along = DVector::from_fn(gradient.along.len(), |k, _| gradient.along[k] * if k < angles { 1.0 } else { size });
+        let along = DVector::from_fn(gradient.along.len(), |k, _| {
+            gradient.along[k] * if k < angles { 1.0 } else { size }
+        });
         let most = along.norm().max(reach(&row.measure, size));
         along / most
     };
     let mut left: Vec<DVector<f64>> = mechanism.constraints.iter().zip(rows).map(scaled).collect();
     let (mut found, mut basis) = (Vec::new(), Basis::new(mechanism.coordinates()));
     while found.len() < left.len() {
-        let most =
-            (0..left.len()).filter(|r| !found.contains(r)).max_by(|&a, &b| left[a].norm_squared().total_cmp(&left[b].norm_squared()));
+        let most = (0..left.len())
+            .filter(|r| !found.contains(r))
+            .max_by(|&a, &b| left[a].norm_squared().total_cmp(&left[b].norm_squared()));
         let Some(most) = most.filter(|&r| left[r].norm() > NEW) else { break };
         found.push(most);
         basis.push(&left[most]);
@@ -138,7 +146,8 @@ fn new_rows(mechanism: &Mechanism, rows: &[Gradient]) -> Vec<usize> {
     found
 }
 
-/// The most a row changes by where one element moves by rad or the size of the mechanism, products with translational coordinates aside.
+/// The most a row changes by where one element moves by rad or the size of the mechanism, products with
+/// translational coordinates aside.
 fn reach(measure: &Measure, size: f64) -> f64 {
     let Measure::Place(place) = measure else { return 1.0 };
     let unit = |k: usize| if k < place.angles { 1.0 } else { size };

@@ -1,13 +1,15 @@
-//! The length and the force that gaps and contact forces are divided by, so that no threshold on them has a unit.
+//! The length and the force that gaps and contact forces are divided by, so that no threshold on them has a
+//! unit.
 //!
 //! ```text
 //! length = Σ |gamma_k| + |gap at the start|              levers of the point, and how far it is from its wall
 //! force  = E / length + |g| Σ m + Σ |F|,                 E: kinetic and elastic energy at the start, torques, inertia times the square of driven rates
 //! ```
 //!
-//! A point without levers that starts on its wall takes the largest length of the other contacts, else the size of the bodies, else the height its speed
-//! takes it to, else 1 m.  A body far from the origin has its gap rounded to the size of its coordinates; the length is no less than what makes that
-//! rounding [`ROUNDED`] of it.
+//! A point without levers that starts on its wall takes the largest length of the other contacts, else the
+//! size of the bodies, else the height its speed takes it to, else 1 m.  A body far from the origin has its
+//! gap rounded to the size of its coordinates; the length is no less than what makes that rounding
+//! [`ROUNDED`] of it.
 
 use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::compile::Body;
@@ -28,7 +30,8 @@ impl Mechanism {
         self.tree.unit_vectors::<DoubleDouble, 0>(&start.phi, &mut z);
         let z: Vec<Complex<f64>> = z.iter().map(|z| Complex::new(z.re.hi, z.im.hi)).collect();
         let omega: Vec<f64> = start.omega.iter().map(|omega| omega.hi).collect();
-        let own: Vec<f64> = self.contacts.iter().map(|contact| levers(&contact.point) + contact.row.gap(&z).abs()).collect();
+        let own: Vec<f64> =
+            self.contacts.iter().map(|contact| levers(&contact.point) + contact.row.gap(&z).abs()).collect();
         let others = own.iter().copied().fold(0.0, f64::max);
         let gravity = self.gravity.norm_squared().sqrt();
         let energy = self.energy_of_start(start);
@@ -37,7 +40,10 @@ impl Mechanism {
         for (contact, own) in self.contacts.iter_mut().zip(own) {
             let speed = contact.normal.dot(contact.point.velocity(&z, &omega));
             let thrown = speed * speed / gravity;
-            let length = [own, others, size(&self.bodies), thrown, 1.0].into_iter().find(|x| x.is_finite() && *x > 0.0).unwrap_or(1.0);
+            let length = [own, others, size(&self.bodies), thrown, 1.0]
+                .into_iter()
+                .find(|x| x.is_finite() && *x > 0.0)
+                .unwrap_or(1.0);
             let rounding = f64::EPSILON * magnitudes(&contact.row, &z);
             contact.length = power_of_two(length.max(rounding / ROUNDED));
             let force = energy / contact.length
@@ -85,7 +91,11 @@ fn driven(rows: &[ConstraintEquation], mass: f64, length: f64) -> f64 {
             rate += (sine.amplitude * sine.frequency).abs();
             acceleration += (sine.amplitude * sine.frequency * sine.frequency).abs();
         }
-        if row.is_angle() { mass * length * (acceleration + rate * rate) } else { mass * (acceleration + rate * rate / length) }
+        if row.is_angle() {
+            mass * length * (acceleration + rate * rate)
+        } else {
+            mass * (acceleration + rate * rate / length)
+        }
     };
     rows.iter().map(force).sum()
 }

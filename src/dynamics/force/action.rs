@@ -96,7 +96,8 @@ mod tests {
 
     #[test]
     fn the_power_is_that_of_the_generalized_forces() {
-        let point = Point::ground([0.1, 0.2]).along(0, Complex::new(0.6, 0.0)).along(1, Complex::new(0.2, -0.4));
+        let point =
+            Point::ground([0.1, 0.2]).along(0, Complex::new(0.6, 0.0)).along(1, Complex::new(0.2, -0.4));
         let (z, omega) = ([Complex::unit(0.4), Complex::unit(-1.0)], [1.5, -0.7]);
         let force = Complex::new(2.0, -3.0);
         for kind in [

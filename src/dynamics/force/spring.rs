@@ -4,8 +4,8 @@
 //! D = P_a - P_b, L = |D|:   F on a = -(k (L - L0) + c L') D / L,   V = k (L - L0)² / 2
 //! ```
 //!
-//! A spring of free length zero without damper needs no length: F = -k D.  A length of zero with L0 > 0 has no direction; its force comes out as not
-//! a number and the method stops with the time.
+//! A spring of free length zero without damper needs no length: F = -k D.  A length of zero with L0 > 0 has
+//! no direction; its force comes out as not a number and the method stops with the time.
 
 use crate::arithmetic::{Complex, Scalar};
 use crate::dynamics::point::Point;
@@ -78,7 +78,8 @@ impl Spring {
     #[inline(always)]
     pub fn energy<T: Scalar>(&self, z: &[Complex<T>]) -> T {
         let square = self.span.position(z).norm_squared();
-        let stretch = if self.free_length == 0.0 { square.sqrt() } else { square.sqrt() - T::of(self.free_length) };
+        let stretch =
+            if self.free_length == 0.0 { square.sqrt() } else { square.sqrt() - T::of(self.free_length) };
         (stretch * stretch).scale(0.5 * self.stiffness)
     }
 

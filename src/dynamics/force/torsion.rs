@@ -74,12 +74,21 @@ mod tests {
 
     #[test]
     fn the_torque_is_minus_the_gradient_of_the_energy_and_the_damper_takes_energy_out() {
-        let torsion = Torsion { name: "t".into(), body: 1, base: Some(0), stiffness: 3.0, free_angle: 0.2, damping: 0.5 };
+        let torsion = Torsion {
+            name: "t".into(),
+            body: 1,
+            base: Some(0),
+            stiffness: 3.0,
+            free_angle: 0.2,
+            damping: 0.5,
+        };
         let (phi, omega, h) = ([0.4, 9.0], [1.0, -2.0], 1e-4);
         let mut load = [0.0; 2];
         torsion.pull(torsion.elastic(&phi), &mut load);
         for k in 0..2 {
-            let energy = |by: f64| torsion.energy(&std::array::from_fn::<f64, 2, _>(|i| phi[i] + if i == k { by } else { 0.0 }));
+            let energy = |by: f64| {
+                torsion.energy(&std::array::from_fn::<f64, 2, _>(|i| phi[i] + if i == k { by } else { 0.0 }))
+            };
             assert!((load[k] + (energy(h) - energy(-h)) / (2.0 * h)).abs() < 1e-9);
         }
         assert!(torsion.drag(&omega) * torsion.between(&omega) < 0.0);

@@ -1,8 +1,8 @@
 //! Forces from outside the crate, written once and exact in every method.
 //!
-//! A [`Force`] is run once, on symbols; what it does is kept as a [`Tape`], which the equations evaluate on plain numbers, on double-double, on
-//! dual numbers (Jacobians, growth of errors), on lanes (stages of Gauss methods) and as power series.  The potential is differentiated on
-//! the tape:
+//! A [`Force`] is run once, on symbols; what it does is kept as a [`Tape`], which the equations evaluate on
+//! plain numbers, on double-double, on dual numbers (Jacobians, growth of errors), on lanes (stages of Gauss
+//! methods) and as power series.  The potential is differentiated on the tape:
 //!
 //! ```text
 //! F_P = -∂V/∂P  at every point it depends on,   torque = -∂V/∂q - (-sin q ∂V/∂cos q + cos q ∂V/∂sin q)  on every body
@@ -18,8 +18,8 @@ use std::cell::RefCell;
 
 /// A force or torque that acts on a mechanism, beside those a scene knows.
 ///
-/// Written over the scalar trait, it works in every method that takes forces of its kind; it cannot branch on values.  RATTLE takes
-/// potentials of positions and directions only.
+/// Written over the scalar trait, it works in every method that takes forces of its kind; it cannot branch on
+/// values.  RATTLE takes potentials of positions and directions only.
 ///
 /// ```
 /// use driftless::arithmetic::Scalar;
@@ -56,8 +56,8 @@ pub trait Force {
     /// Name in messages and reports.
     fn name(&self) -> &str;
 
-    /// Potential energy \[J\]; its gradient acts on the mechanism, and the energy balance keeps it.  It must depend
-    /// on neither time nor rates.
+    /// Potential energy \[J\]; its gradient acts on the mechanism, and the energy balance keeps it.  It must
+    /// depend on neither time nor rates.
     fn potential<S: Scalar>(&self, _at: &Configuration<S>) -> S {
         S::ZERO
     }
@@ -81,7 +81,8 @@ impl<S: Scalar> Loads<S> {
         }
     }
 
-    /// Adds a torque \[N·m\] on a body; the opposite one on another body or the ground is for the caller to add.
+    /// Adds a torque \[N·m\] on a body; the opposite one on another body or the ground is for the caller to
+    /// add.
     pub fn torque(&mut self, body: usize, torque: S) {
         self.torques.push((body, torque));
     }
@@ -200,8 +201,12 @@ impl Recorded {
             Input::X(site) => (site, [share, Symbol::ZERO]),
             Input::Y(site) => (site, [Symbol::ZERO, share]),
             Input::Angle(body) => return self.torques.push((body, share)),
-            Input::Cosine(body) => return self.torques.push((body, -(share * recorder.input(Input::Sine(body))))),
-            Input::Sine(body) => return self.torques.push((body, share * recorder.input(Input::Cosine(body)))),
+            Input::Cosine(body) => {
+                return self.torques.push((body, -(share * recorder.input(Input::Sine(body)))));
+            }
+            Input::Sine(body) => {
+                return self.torques.push((body, share * recorder.input(Input::Cosine(body))));
+            }
             _ => return,
         };
         match self.forces.iter_mut().find(|(site, _)| *site == place) {
@@ -211,7 +216,11 @@ impl Recorded {
     }
 
     fn symbols(&self) -> Vec<Symbol> {
-        self.forces.iter().flat_map(|force| force.1).chain(self.torques.iter().map(|torque| torque.1)).collect()
+        self.forces
+            .iter()
+            .flat_map(|force| force.1)
+            .chain(self.torques.iter().map(|torque| torque.1))
+            .collect()
     }
 
     /// Of results and their tape: forces, torques, and the power if there is one more.
@@ -220,7 +229,12 @@ impl Recorded {
         let (torques, power) = rest.split_at(self.torques.len());
         Part {
             tape,
-            forces: self.forces.iter().zip(forces.chunks_exact(2)).map(|(force, slots)| (force.0, [slots[0], slots[1]])).collect(),
+            forces: self
+                .forces
+                .iter()
+                .zip(forces.chunks_exact(2))
+                .map(|(force, slots)| (force.0, [slots[0], slots[1]]))
+                .collect(),
             torques: self.torques.iter().zip(torques).map(|(torque, &slot)| (torque.0, slot)).collect(),
             power: power.first().copied(),
         }
@@ -296,9 +310,12 @@ impl UserForce {
     /// True where what is applied depends on rates, as drag does.
     pub fn depends_on_rates(&self) -> bool {
         let Part { tape, forces, torques, .. } = &self.parts[1];
-        let acting: Vec<Slot> = forces.iter().flat_map(|force| force.1).chain(torques.iter().map(|torque| torque.1)).collect();
+        let acting: Vec<Slot> =
+            forces.iter().flat_map(|force| force.1).chain(torques.iter().map(|torque| torque.1)).collect();
         let mut needed = tape.inputs_of(&acting).into_iter();
-        needed.any(|number| matches!(self.inputs[number as usize], Input::Rate(_) | Input::XRate(_) | Input::YRate(_)))
+        needed.any(|number| {
+            matches!(self.inputs[number as usize], Input::Rate(_) | Input::XRate(_) | Input::YRate(_))
+        })
     }
 
     /// True for a potential of positions and directions alone.
@@ -342,7 +359,8 @@ impl UserForce {
         then(&slots)
     }
 
-    /// Calls `force` with every site and the force \[N\] there, and `torque` with every body and the torque \[N·m\] on it.
+    /// Calls `force` with every site and the force \[N\] there, and `torque` with every body and the torque
+    /// \[N·m\] on it.
     #[inline]
     fn each<T: Scalar>(
         &self,
@@ -387,7 +405,8 @@ impl UserForce {
         self.pull_part(&self.parts[1], time, at, load);
     }
 
-    /// Calls `force` with every element and the force \[N·m, N\] on it; torques act across their unit vectors.
+    /// Calls `force` with every element and the force \[N·m, N\] on it; torques act across their unit
+    /// vectors.
     pub fn spread<T: Scalar>(&self, time: T, at: Posture<T>, force: impl FnMut(usize, Complex<T>)) {
         let force = std::cell::RefCell::new(force);
         let torque = |body: usize, torque| (force.borrow_mut())(body, at.z[body].left().times(torque));
@@ -399,7 +418,13 @@ impl UserForce {
     /// Calls `force` with the body and the force \[N\] at every point it acts at.
     pub fn forces(&self, time: f64, at: Posture<f64>, mut force: impl FnMut(usize, Complex<f64>)) {
         for part in &self.parts {
-            self.each(part, time, at, |site, pull| site.body.into_iter().for_each(|body| force(body, pull)), |_, _| {});
+            self.each(
+                part,
+                time,
+                at,
+                |site, pull| site.body.into_iter().for_each(|body| force(body, pull)),
+                |_, _| {},
+            );
         }
     }
 
@@ -407,7 +432,13 @@ impl UserForce {
     pub fn magnitudes(&self, time: f64, at: Posture<f64>) -> [f64; 2] {
         let [mut force, mut torque] = [0.0; 2];
         for part in &self.parts {
-            self.each(part, time, at, |_, pull| force += pull.norm_squared().sqrt(), |_, more| torque += more.abs());
+            self.each(
+                part,
+                time,
+                at,
+                |_, pull| force += pull.norm_squared().sqrt(),
+                |_, more| torque += more.abs(),
+            );
         }
         [force, torque]
     }

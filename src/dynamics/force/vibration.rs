@@ -1,4 +1,5 @@
-//! What the fast vibration of a very stiff spring does to the slow motion, where the spring is taken for a rod.
+//! What the fast vibration of a very stiff spring does to the slow motion, where the spring is taken for a
+//! rod.
 //!
 //! ```text
 //! g = |D| - L,  G = dg/dq,  s = G M⁻¹ Gᵀ:      omega = sqrt(k s),   J = E_fast / omega stays as it is
@@ -6,8 +7,9 @@
 //! E_fast = k g0²/2 + g0'²/(2 s0) at the start as the scene gives it
 //! ```
 //!
-//! The energy of a fast vibration over its frequency is an adiabatic invariant, and what is left for the slow motion is a potential.  The error falls as
-//! 1/omega.  Source: F. A. Bornemann, C. Schütte, "Homogenization of Hamiltonian systems with a strong constraining potential", Physica D 102 (1997) 57–77.
+//! The energy of a fast vibration over its frequency is an adiabatic invariant, and what is left for the slow
+//! motion is a potential.  The error falls as 1/omega.  Source: F. A. Bornemann, C. Schütte, "Homogenization
+//! of Hamiltonian systems with a strong constraining potential", Physica D 102 (1997) 57–77.
 
 use crate::arithmetic::{Complex, Scalar};
 use crate::dynamics::Mechanism;
@@ -59,7 +61,8 @@ impl Vibration {
         Found { along, length, inertia: dot(slope, minv_jt) }
     }
 
-    /// Writes the generalized forces \[N·m, N\] to `force`; `factors` are those of M, `twist` is the one beside it, `minv_jt` takes u.
+    /// Writes the generalized forces \[N·m, N\] to `force`; `factors` are those of M, `twist` is the one
+    /// beside it, `minv_jt` takes u.
     #[inline]
     pub fn push<T: Scalar, const N: usize>(
         &self,
@@ -107,7 +110,13 @@ impl Vibration {
     }
 
     /// The vibration with the energy that a start off the free length \[m\] gives it.
-    pub(in crate::dynamics) fn started(mut self, mechanism: &Mechanism, free_length: f64, z: &[Complex<f64>], omega: &[f64]) -> Self {
+    pub(in crate::dynamics) fn started(
+        mut self,
+        mechanism: &Mechanism,
+        free_length: f64,
+        z: &[Complex<f64>],
+        omega: &[f64],
+    ) -> Self {
         let n = mechanism.coordinates();
         let (mut mass, mut twist) = (vec![0.0; n * n], vec![0.0; n * n]);
         mechanism.tree.mass_matrix::<f64, 0>(z, &mut mass, &mut twist);
@@ -126,7 +135,8 @@ mod tests {
     use super::*;
 
     fn vibration() -> Vibration {
-        let span = Point::ground([0.3, 0.1]).along(0, Complex::new(0.4, 0.0)).along(1, Complex::new(0.2, 0.1));
+        let span =
+            Point::ground([0.3, 0.1]).along(0, Complex::new(0.4, 0.0)).along(1, Complex::new(0.2, 0.1));
         Vibration { name: "s".into(), span, stiffness: 7e6, action: 0.03, energy: 0.0, frequency: 0.0 }
     }
 

@@ -1,7 +1,9 @@
-//! What light members and long levers ask for beyond doubles, and the rank of the constraints, which knows no masses.
+//! What light members and long levers ask for beyond doubles, and the rank of the constraints, which knows no
+//! masses.
 //!
-//! A body of a billionth of the others' mass gives way a billion times more easily: S = G M⁻¹ Gᵀ is the sum of what is left of it and of numbers a billion times larger, and
-//! its pivots have lost nine digits.  In double-double they are evaluated anew, and rounded.
+//! A body of a billionth of the others' mass gives way a billion times more easily: S = G M⁻¹ Gᵀ is the sum
+//! of what is left of it and of numbers a billion times larger, and its pivots have lost nine digits.  In
+//! double-double they are evaluated anew, and rounded.
 
 use super::{Bias, Kernel};
 use crate::arithmetic::{DoubleDouble, Real};
@@ -11,18 +13,31 @@ impl<T: Real> Kernel<T> {
     /// True where doubles have too few digits for S, or with it for M.
     #[inline(always)]
     pub(super) fn is_delicate(&self, mechanism: &Mechanism) -> bool {
-        let is_deep = || self.bodywise.is_none() && schur::is_deep(&self.pivot, mechanism.tree.diagonal.iter().copied());
+        let is_deep = || {
+            self.bodywise.is_none() && schur::is_deep(&self.pivot, mechanism.tree.diagonal.iter().copied())
+        };
         T::IS_PLAIN && !mechanism.constraints.is_empty() && (self.weakest.is_delicate || is_deep())
     }
 
     /// Writes accelerations and multipliers of the evaluation in double-double.
     #[cold]
-    pub(super) fn accelerate_exactly(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T], bias: Bias) {
+    pub(super) fn accelerate_exactly(
+        &mut self,
+        mechanism: &Mechanism,
+        t: Time,
+        phi: &[T],
+        omega: &[T],
+        bias: Bias,
+    ) {
         let exact = self.exact.get_or_insert_with(|| Box::new(Kernel::new(mechanism)));
         let wide = |x: &[T]| -> Vec<DoubleDouble> { x.iter().map(|x| x.double_double()).collect() };
         exact.stretch = wide(&self.stretch);
         exact.accelerate::<0>(mechanism, t, &wide(phi), &wide(omega), bias);
-        let pairs = [(&mut self.load, &exact.load), (&mut self.multiplier, &exact.multiplier), (&mut self.correction, &exact.correction)];
+        let pairs = [
+            (&mut self.load, &exact.load),
+            (&mut self.multiplier, &exact.multiplier),
+            (&mut self.correction, &exact.correction),
+        ];
         for (rounded, exact) in pairs {
             round(rounded, exact);
         }
@@ -61,7 +76,8 @@ impl<T: Real> Kernel<T> {
         round(&mut self.load, &exact.load);
     }
 
-    /// The least share of a constraint at other coordinates than the last, which knows no masses ([`rank`](crate::dynamics::rank)); and all of [`Kernel::rows_at`].
+    /// The least share of a constraint at other coordinates than the last, which knows no masses
+    /// ([`rank`](crate::dynamics::rank)); and all of [`Kernel::rows_at`].
     pub fn independence_at(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) -> f64 {
         self.unit_vectors::<0>(mechanism, phi);
         self.rows_at(mechanism, t, phi, omega);

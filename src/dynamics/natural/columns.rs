@@ -1,4 +1,5 @@
-//! The natural form of a few bodies in lanes, one a body: what depends on the posture, and the solve with one row a body.
+//! The natural form of a few bodies in lanes, one a body: what depends on the posture, and the solve with one
+//! row a body.
 //!
 //! ```text
 //! u_j = W_·j z_j   (column j),    S_kj = z_k·u_kj,    T_kj = (i z_k)·u_kj
@@ -83,7 +84,8 @@ pub fn solve<L: Lanes, const B: usize>(schur: &mut [Row<B>], scale: &[f64], righ
     least
 }
 
-/// S⁻¹ in place by Gauss–Jordan; rows and columns of bodies left out are zero.  Returns the least share of a pivot.
+/// S⁻¹ in place by Gauss–Jordan; rows and columns of bodies left out are zero.  Returns the least share of a
+/// pivot.
 #[inline(always)]
 pub fn invert<L: Lanes, const B: usize>(schur: &mut [Row<B>], scale: &[f64]) -> f64 {
     let n = schur.len();

@@ -1,4 +1,5 @@
-//! Rows that stay in the loop of the natural form: driven ones, and those that are not linear in the elements.
+//! Rows that stay in the loop of the natural form: driven ones, and those that are not linear in the
+//! elements.
 //!
 //! ```text
 //! angle:  C = Im(conj(u) z_a conj(z_b)),  u = exp(i theta(t))      gradients i u z_b and -i conj(u) z_a;  i u from the ground
@@ -64,7 +65,12 @@ impl Guide {
         match &self.measure {
             Measure::Angle { .. } => {
                 let phase = law.at::<T>(t);
-                Demand { unit: phase.unit, travel: T::ZERO, rate: phase.rate, acceleration: phase.acceleration }
+                Demand {
+                    unit: phase.unit,
+                    travel: T::ZERO,
+                    rate: phase.rate,
+                    acceleration: phase.acceleration,
+                }
             }
             Measure::Place(_) => {
                 let (rate, acceleration) = law.rates::<T>(t);
@@ -112,7 +118,9 @@ impl Guide {
     fn turned<T: Scalar>(&self, demand: &Demand<T>, z: &[Complex<T>], x: &[Complex<T>]) -> Complex<T> {
         match &self.measure {
             Measure::Angle { body, base: None } => demand.unit.conj() * x[*body],
-            Measure::Angle { body, base: Some(base) } => demand.unit.conj() * (x[*body] * z[*base].conj() + z[*body] * x[*base].conj()),
+            Measure::Angle { body, base: Some(base) } => {
+                demand.unit.conj() * (x[*body] * z[*base].conj() + z[*body] * x[*base].conj())
+            }
             Measure::Place(_) => Complex::ZERO,
         }
     }
@@ -123,7 +131,9 @@ impl Guide {
         match &self.measure {
             Measure::Angle { body, base: Some(base) } => (demand.unit.conj() * x[*body] * x[*base].conj()).im,
             Measure::Angle { base: None, .. } => T::ZERO,
-            Measure::Place(place) => place.bilinear.iter().fold(T::ZERO, |sum, &(j, k, h)| sum + x[j].dot(x[k].turn(h))),
+            Measure::Place(place) => {
+                place.bilinear.iter().fold(T::ZERO, |sum, &(j, k, h)| sum + x[j].dot(x[k].turn(h)))
+            }
         }
     }
 
@@ -154,7 +164,9 @@ impl Guide {
             Measure::Angle { .. } => {
                 let first = Complex::new(0.0, -demand.rate);
                 let second = Complex::new(-demand.rate * demand.rate, -demand.acceleration);
-                cross + (first * self.turned(demand, z, rate)).times(2.0).im + (second * self.mismatch(demand, z)).im
+                cross
+                    + (first * self.turned(demand, z, rate)).times(2.0).im
+                    + (second * self.mismatch(demand, z)).im
             }
             Measure::Place(_) => cross - demand.acceleration,
         }

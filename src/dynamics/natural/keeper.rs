@@ -5,7 +5,8 @@
 //! unit lengths:  x -= V S⁻¹ (|z|² - 1)/2,   v -= V S⁻¹ z·v                  V_j = W_·j z_j,  S_kj = z_k·V_kj,  which leaves the linear rows kept
 //! ```
 //!
-//! The shortest way in the metric of the mass matrix, as that of the angle form to first order; with one set of factors for both levels.
+//! The shortest way in the metric of the mass matrix, as that of the angle form to first order; with one set
+//! of factors for both levels.
 
 use super::columns::{self, Columns};
 use super::reduced::{self, Reduced};
@@ -84,7 +85,8 @@ impl<const B: usize> Keeper<B> {
         columns::invert::<L, B>(&mut self.schur, &self.columns.scale)
     }
 
-    /// Elements onto the linear rows, then onto the unit lengths, with the S of the position at hand: one iteration, unless they were far off.
+    /// Elements onto the linear rows, then onto the unit lengths, with the S of the position at hand: one
+    /// iteration, unless they were far off.
     #[inline(always)]
     pub fn project_back<L: Lanes>(&mut self, z: &mut [Row<B>; 2]) -> Moved<B> {
         let mut moved = self.onto_rows::<L>(z, |row| row.constant);
@@ -130,7 +132,10 @@ impl<const B: usize> Keeper<B> {
     fn onto_rows<L: Lanes>(&self, x: &[Row<B>; 2], constant: impl Fn(&Linear<B>) -> f64) -> [[L; B]; 2] {
         let mut change = [[L::ZERO; B]; 2];
         for row in &self.rows {
-            let far = row.terms.iter().fold(constant(row), |far, &(k, g)| far + (g.re * at(&x[0], k) + g.im * at(&x[1], k)));
+            let far = row
+                .terms
+                .iter()
+                .fold(constant(row), |far, &(k, g)| far + (g.re * at(&x[0], k) + g.im * at(&x[1], k)));
             add::<L, B>(&mut change, &row.back, far);
         }
         change

@@ -1,16 +1,18 @@
-//! The constant part of the natural form: the inverse of the mass matrix, with the linear rows removed from it once per scene.
+//! The constant part of the natural form: the inverse of the mass matrix, with the linear rows removed from
+//! it once per scene.
 //!
 //! ```text
 //! D x + Cᵀ lambda = y,  C x = 0:    x = W y,  lambda = Rᵀ y
 //! R = D⁻¹ Cᵀ (C D⁻¹ Cᵀ)⁻¹,          W = D⁻¹ - R C D⁻¹,       x - R (C x + c)  puts the rows back, by the shortest way in the metric of D
 //! ```
 //!
-//! Rows are orthonormalised in the metric of D⁻¹ one after another; one of which less than [`DEPENDENT`] is left depends on those before it and
-//! is left out, its multiplier zero.  All of it is formed in double-double and rounded once: a rounded W is the exact inverse of some mass
-//! matrix 1e-16 away, so it shifts energies by 1e-16 of themselves but makes none.  W is symmetric to the last bit.
+//! Rows are orthonormalised in the metric of D⁻¹ one after another; one of which less than [`DEPENDENT`] is
+//! left depends on those before it and is left out, its multiplier zero.  All of it is formed in
+//! double-double and rounded once: a rounded W is the exact inverse of some mass matrix 1e-16 away, so it
+//! shifts energies by 1e-16 of themselves but makes none.  W is symmetric to the last bit.
 //!
-//! Source of the elimination: E. Eich-Soellner, C. Führer, *Numerical Methods in Multibody Dynamics* (1998), section 1.4; that linear rows may be
-//! removed once for all is special to natural coordinates.
+//! Source of the elimination: E. Eich-Soellner, C. Führer, *Numerical Methods in Multibody Dynamics* (1998),
+//! section 1.4; that linear rows may be removed once for all is special to natural coordinates.
 
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::dynamics::Mechanism;
@@ -58,7 +60,10 @@ impl Reduced {
         let n = mechanism.coordinates();
         let inverse = invert(mechanism)?;
         let spread = |x: &[Complex<DoubleDouble>]| -> Vec<Complex<DoubleDouble>> {
-            inverse.chunks(n).map(|row| row.iter().zip(x).fold(Complex::ZERO, |sum, (&w, &x)| sum + w * x)).collect()
+            inverse
+                .chunks(n)
+                .map(|row| row.iter().zip(x).fold(Complex::ZERO, |sum, (&w, &x)| sum + w * x))
+                .collect()
         };
         // Orthonormal rows q as D⁻¹ q, and how the rows are made of them: C = T Q.
         let mut rows = Vec::new();
@@ -89,7 +94,9 @@ impl Reduced {
                 continue;
             }
             let length = square.sqrt();
-            let unit = |x: &[Complex<DoubleDouble>]| x.iter().map(|x| x.times(DoubleDouble::ONE / length)).collect::<Vec<_>>();
+            let unit = |x: &[Complex<DoubleDouble>]| {
+                x.iter().map(|x| x.times(DoubleDouble::ONE / length)).collect::<Vec<_>>()
+            };
             share.push(length);
             basis.push(unit(&rest));
             spreads.push(unit(&minv_jt));
@@ -176,7 +183,8 @@ impl Reduced {
         }
     }
 
-    /// Writes the multipliers of the linear rows at what is left of the forces, F - g mu, into their places among all rows.
+    /// Writes the multipliers of the linear rows at what is left of the forces, F - g mu, into their places
+    /// among all rows.
     pub fn multipliers(&self, rest: &[Complex<f64>], all: &mut [f64]) {
         for (row, back) in self.rows.iter().zip(self.back.chunks(self.elements)) {
             all[row.row] = back.iter().zip(rest).map(|(back, rest)| back.dot(*rest)).sum();
@@ -194,7 +202,8 @@ fn dot(a: &[Complex<DoubleDouble>], b: &[Complex<DoubleDouble>]) -> DoubleDouble
     a.iter().zip(b).fold(DoubleDouble::ZERO, |sum, (a, b)| sum + a.dot(*b))
 }
 
-/// D⁻¹ from D = L P Lᴴ (n × n); the places beside translational coordinates, which no element takes, are zero.  The error is the body whose pivot vanishes.
+/// D⁻¹ from D = L P Lᴴ (n × n); the places beside translational coordinates, which no element takes, are
+/// zero.  The error is the body whose pivot vanishes.
 fn invert(mechanism: &Mechanism) -> Result<Vec<Complex<DoubleDouble>>, usize> {
     let tree = &mechanism.tree;
     let n = tree.coordinates;

@@ -1,4 +1,5 @@
-//! One evaluation of the equations body by body, in place of the dense matrices of [`Kernel`](crate::dynamics::kernel::Kernel).
+//! One evaluation of the equations body by body, in place of the dense matrices of
+//! [`Kernel`](crate::dynamics::kernel::Kernel).
 
 use super::load::{Order, Passes};
 use super::rows::{Rows, Ways};
@@ -36,7 +37,8 @@ impl Recursion {
 
     /// True where this form takes clearly less time than the matrices, by the operations of both.
     ///
-    /// The weights are nanoseconds of `benches/chains.rs` on the machine of `benches/RESULTS.md`; of other machines they are wrong alike.
+    /// The weights are nanoseconds of `benches/chains.rs` on the machine of `benches/RESULTS.md`; of other
+    /// machines they are wrong alike.
     pub fn pays(&self) -> bool {
         let (n, r) = (self.links.coordinates() as f64, self.ways.rows() as f64);
         let matrices = n * (24.0 + n * (2.0 + 0.25 * n)) + 1.7 * r * (n * n + 0.5 * r * n + r * r / 6.0);
@@ -56,7 +58,8 @@ pub struct Evaluation<T> {
 }
 
 impl<T: Real> Evaluation<T> {
-    /// Scratch space for these constants and the [scales](ConstraintEquation::scale) of their rows, and what their rank is measured with.
+    /// Scratch space for these constants and the [scales](ConstraintEquation::scale) of their rows, and what
+    /// their rank is measured with.
     pub fn new(recursion: &Arc<Recursion>, scales: &[f64], metric: Metric) -> Self {
         Self {
             trees: Recursive::new(&recursion.links),
@@ -87,9 +90,17 @@ impl<T: Real> Evaluation<T> {
         self.trees.pivots(pivots);
     }
 
-    /// The factors of M, and what is left of all forces, springs by their stretches where these are known; overwrites `load`.
+    /// The factors of M, and what is left of all forces, springs by their stretches where these are known;
+    /// overwrites `load`.
     #[inline]
-    pub fn inward_pass(&mut self, mechanism: &Mechanism, t: Time, at: Posture<T>, stretch: &[T], load: &mut [T]) {
+    pub fn inward_pass(
+        &mut self,
+        mechanism: &Mechanism,
+        t: Time,
+        at: Posture<T>,
+        stretch: &[T],
+        load: &mut [T],
+    ) {
         self.trees.convect(&self.recursion.links, at.z, at.omega);
         if mechanism.is_forced() {
             load.fill(T::ZERO);
@@ -105,7 +116,8 @@ impl<T: Real> Evaluation<T> {
         self.trees.outward_pass(&self.recursion.links, alpha);
     }
 
-    /// The multipliers and the bias's share of them after [`fold`](Self::inward_pass), the rows as they are, and what they leave of all forces; the weakest row.
+    /// The multipliers and the bias's share of them after [`fold`](Self::inward_pass), the rows as they are,
+    /// and what they leave of all forces; the weakest row.
     #[inline]
     pub fn constrain(
         &mut self,
@@ -120,11 +132,13 @@ impl<T: Real> Evaluation<T> {
         for (r, row) in mechanism.constraints.iter().enumerate() {
             let jacobian = &mut self.jacobian[..];
             // Only a bias asks for C.
-            let here = if is_biased { row.linearise(t, at, jacobian) } else { row.differentiate(t, at, jacobian) };
+            let here =
+                if is_biased { row.linearise(t, at, jacobian) } else { row.differentiate(t, at, jacobian) };
             self.rows.take(ways, r, jacobian);
             (multiplier[r], correction[r]) = (here.convective, T::ZERO);
             if is_biased {
-                correction[r] = (self.rows.along(ways, r, at.omega) + here.drive).scale(bias.rate) + here.position.scale(bias.position);
+                correction[r] = (self.rows.along(ways, r, at.omega) + here.drive).scale(bias.rate)
+                    + here.position.scale(bias.position);
                 multiplier[r] += correction[r];
             }
             rows[r] = here;
@@ -137,7 +151,8 @@ impl<T: Real> Evaluation<T> {
         weakest
     }
 
-    /// Replaces the convective terms of all rows by their multipliers, after [`factor_constraints`](Self::factor_constraints), and takes these off the load.
+    /// Replaces the convective terms of all rows by their multipliers, after
+    /// [`factor_constraints`](Self::factor_constraints), and takes these off the load.
     #[inline]
     pub fn settle(&mut self, multiplier: &mut [T]) {
         let ways = &self.recursion.ways;

@@ -6,9 +6,10 @@
 //!                                  outwards  alpha_k = e_k/d - s_k·a_p - b_k alpha_p,         a_k = a_p + u_k alpha_p
 //! ```
 //!
-//! p is what body k hangs on, and j what hangs on it; c_k = Σ m gamma_k over all bodies that k carries: conj(c_k) A_k is the part of the bodies between k and the ground,
-//! and conj(r_j) G_j that of those beyond hinge j.  As u_k alpha_p = r_k (i z_p alpha_p), the a are the A of what alpha adds to x.  With b formed beforehand, what one body
-//! waits for of the next is one product and one sum.
+//! p is what body k hangs on, and j what hangs on it; c_k = Σ m gamma_k over all bodies that k carries:
+//! conj(c_k) A_k is the part of the bodies between k and the ground, and conj(r_j) G_j that of those beyond
+//! hinge j.  As u_k alpha_p = r_k (i z_p alpha_p), the a are the A of what alpha adds to x.  With b formed
+//! beforehand, what one body waits for of the next is one product and one sum.
 
 use super::{Links, Recursive};
 use crate::arithmetic::{Complex, Real};
@@ -149,12 +150,14 @@ impl<T: Real> Passes<T> {
         }
     }
 
-    /// The accelerations \[rad/s², m/s²\] of what is left in the joints; their A are added to that of what is known.
+    /// The accelerations \[rad/s², m/s²\] of what is left in the joints; their A are added to that of what is
+    /// known.
     #[inline]
     pub fn outward_pass(&mut self, links: &Links, trees: &Recursive<T>, alpha: &mut [T]) {
         let all = &links.links[..];
         let n = all.len();
-        let (braces, joints, inner, forks) = (&self.braces[..n], &trees.joints[..], &mut self.inner[..n], &mut self.forks[..n]);
+        let (braces, joints, inner, forks) =
+            (&self.braces[..n], &trees.joints[..], &mut self.inner[..n], &mut self.forks[..n]);
         let (mut a, mut turn) = (Complex::ZERO, T::ZERO);
         for k in 1..n {
             let (link, brace) = (&all[k], &braces[k]);

@@ -1,12 +1,14 @@
-//! Constraint equations of hinge trees: what each row's force asks of the hinges on its way to the ground, and S = G M⁻¹ Gᵀ from that.
+//! Constraint equations of hinge trees: what each row's force asks of the hinges on its way to the ground,
+//! and S = G M⁻¹ Gᵀ from that.
 //!
 //! ```text
 //! M = L D Lᵀ,  e_r = L⁻¹ G_rᵀ:     S_rs = Σ e_r e_s / d      over the coordinates on both rows' ways
 //! S lambda = Σ e_r e_0 / d + gamma_r,   e = e_0 - Σ lambda_r e_r,   then one outward pass
 //! ```
 //!
-//! The inward pass of a row runs over the bodies between its points and the ground alone, so S couples two rows only where both hang on one
-//! branch: S is kept in its envelope, the rows in an order that keeps it small.
+//! The inward pass of a row runs over the bodies between its points and the ground alone, so S couples two
+//! rows only where both hang on one branch: S is kept in its envelope, the rows in an order that keeps it
+//! small.
 
 use super::{Links, Recursive};
 use crate::arithmetic::{Complex, Real};
@@ -103,25 +105,31 @@ impl Ways {
             }
         }
         let begin = self.steps.len();
-        let (inwards, translations): (Vec<usize>, Vec<usize>) = (on_way.into_iter().rev().collect(), translations.into_iter().collect());
+        let (inwards, translations): (Vec<usize>, Vec<usize>) =
+            (on_way.into_iter().rev().collect(), translations.into_iter().collect());
         let mut branches = translations.clone();
         for (at, &link) in inwards.iter().enumerate() {
             let here = &links.links[link];
             let onto = match (here.origin_point, here.parent) {
                 (0, 0) => 0,
                 (0, parent) => inwards[at..].iter().position(|&link| link == parent).unwrap_or(0),
-                (origin_point, _) => translations.iter().position(|&x| x == origin_point).map_or(0, |f| inwards.len() + 2 * f - at),
+                (origin_point, _) => translations
+                    .iter()
+                    .position(|&x| x == origin_point)
+                    .map_or(0, |f| inwards.len() + 2 * f - at),
             };
             if (here.origin_point, here.parent) == (0, 0) {
                 branches.push(here.body);
             }
             self.steps.push(Step { coordinate: here.body, link, onto });
         }
-        self.steps.extend(translations.iter().flat_map(|&x| [(x, 1), (x + 1, 0)]).map(|(coordinate, onto)| Step {
-            coordinate,
-            link: 0,
-            onto,
-        }));
+        self.steps.extend(
+            translations.iter().flat_map(|&x| [(x, 1), (x + 1, 0)]).map(|(coordinate, onto)| Step {
+                coordinate,
+                link: 0,
+                onto,
+            }),
+        );
         debug_assert_eq!(self.steps.len(), begin + inwards.len() + 2 * translations.len());
         self.first.push(self.steps.len());
         branches
@@ -195,7 +203,8 @@ pub struct Rows<T> {
 }
 
 impl<T: Real> Rows<T> {
-    /// Scratch space for the rows of these ways, with their [scales](crate::dynamics::row::ConstraintEquation::scale).
+    /// Scratch space for the rows of these ways, with their
+    /// [scales](crate::dynamics::row::ConstraintEquation::scale).
     pub fn new(ways: &Ways, scales: &[f64], metric: Metric) -> Self {
         let mut scale = vec![0.0; ways.rows()];
         for (&place, &of_row) in ways.place.iter().zip(scales) {
@@ -235,7 +244,8 @@ impl<T: Real> Rows<T> {
         self.gradient(ways, row).fold(T::ZERO, |sum, (k, g)| sum + g * v[k])
     }
 
-    /// The inward passes of all rows and the factors of S, after [`take`](Self::take) for every row and [`Recursive::inward_pass`]; the weakest row.
+    /// The inward passes of all rows and the factors of S, after [`take`](Self::take) for every row and
+    /// [`Recursive::inward_pass`]; the weakest row.
     #[inline]
     pub fn factor_constraints(&mut self, ways: &Ways, trees: &Recursive<T>) -> Weakest {
         for row in 0..ways.rows() {
@@ -249,7 +259,8 @@ impl<T: Real> Rows<T> {
         Weakest { row: ways.order.get(weakest.row).copied().unwrap_or(0), ..weakest }
     }
 
-    /// What there is to do where pivots are small, see [`schur::look_closer`](crate::dynamics::schur::look_closer).
+    /// What there is to do where pivots are small, see
+    /// [`schur::look_closer`](crate::dynamics::schur::look_closer).
     #[cold]
     fn look_closer(&mut self, ways: &Ways, trees: &Recursive<T>, mass: Weakest) -> Weakest {
         let verdict = self.judge(ways);
@@ -257,9 +268,13 @@ impl<T: Real> Rows<T> {
         let Self { schur, excess, scale, pivot, .. } = self;
         verdict.settle(mass, [&before, scale], |is_left_out| {
             ways.cross(schur, excess, |coordinate| trees.joints[coordinate].pivot);
-            let Some(is_left_out) = is_left_out else { return ways.envelope.factor(schur, pivot, scale).share };
+            let Some(is_left_out) = is_left_out else {
+                return ways.envelope.factor(schur, pivot, scale).share;
+            };
             let mut weakest = Weakest::NONE;
-            ways.envelope.factor_by(schur, pivot, |i, pivot| weakest.reciprocal_kept(i, pivot, scale[i], is_left_out[i]));
+            ways.envelope.factor_by(schur, pivot, |i, pivot| {
+                weakest.reciprocal_kept(i, pivot, scale[i], is_left_out[i])
+            });
             weakest.share
         })
     }
@@ -290,7 +305,10 @@ impl<T: Real> Rows<T> {
                 excess[k] = gradient[k] - force.re - torque;
                 // The x of an origin hands the force over to its y.
                 if step.onto != 0 {
-                    passed[k + 1] = (Complex::new(force.im, T::ZERO), trees.joints[step.coordinate].moment.re * excess[k]);
+                    passed[k + 1] = (
+                        Complex::new(force.im, T::ZERO),
+                        trees.joints[step.coordinate].moment.re * excess[k],
+                    );
                 }
                 continue;
             }

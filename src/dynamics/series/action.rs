@@ -29,7 +29,12 @@ impl<T: Real> ActionSeries<T> {
     pub fn new(action: &Action, order: usize) -> Self {
         let is_force = matches!(action.kind, Kind::Force { .. });
         let vectors = || vec![Complex::ZERO; if is_force { order + 1 } else { 0 }];
-        Self { factor: zeros(order + 1), force: vectors(), velocity: vectors(), rate: zeros(if is_force { 0 } else { order + 1 }) }
+        Self {
+            factor: zeros(order + 1),
+            force: vectors(),
+            velocity: vectors(),
+            rate: zeros(if is_force { 0 } else { order + 1 }),
+        }
     }
 
     /// The law's series about time `t`.
@@ -46,7 +51,15 @@ impl<T: Real> ActionSeries<T> {
 
     /// Takes power m of the force off the elements' balance, and adds that of a torque to `load`.
     #[inline(always)]
-    pub fn act(&mut self, action: &Action, m: usize, z: &[Complex<T>], n: usize, rest: &mut [Complex<T>], load: &mut [T]) {
+    pub fn act(
+        &mut self,
+        action: &Action,
+        m: usize,
+        z: &[Complex<T>],
+        n: usize,
+        rest: &mut [Complex<T>],
+        load: &mut [T],
+    ) {
         match &action.kind {
             Kind::Force { point, force, follows } => {
                 self.force[m] = if *follows {
@@ -71,7 +84,9 @@ impl<T: Real> ActionSeries<T> {
     /// Power m of its power \[W/s^m\], from power m of all rates.
     pub fn power(&mut self, action: &Action, m: usize, omega: &[T]) -> T {
         match &action.kind {
-            Kind::Force { .. } => product(&self.force[..=m], &self.velocity[..=m], |force, velocity| force.dot(velocity)),
+            Kind::Force { .. } => {
+                product(&self.force[..=m], &self.velocity[..=m], |force, velocity| force.dot(velocity))
+            }
             Kind::Torque { torque, base } => {
                 self.rate[m] = base.map_or(omega[action.body], |base| omega[action.body] - omega[base]);
                 product(&self.factor[..=m], &self.rate[..=m], |factor, rate| factor * rate).scale(*torque)
@@ -87,11 +102,13 @@ impl<T: Real> ActionSeries<T> {
     }
 }
 
-/// Power m of the torque of a torsion spring on its body \[N·m/s^m\], from the angles at the start and the series of the rates.
+/// Power m of the torque of a torsion spring on its body \[N·m/s^m\], from the angles at the start and the
+/// series of the rates.
 #[inline(always)]
 pub fn twist<T: Real>(torsion: &Torsion, m: usize, phi: &[T], omega: &[T], n: usize) -> T {
     let rate = |m: usize| torsion.between(&omega[m * n..(m + 1) * n]);
-    let elastic = if m == 0 { torsion.elastic(phi) } else { -(rate(m - 1) / T::of(m as f64)).scale(torsion.stiffness) };
+    let elastic =
+        if m == 0 { torsion.elastic(phi) } else { -(rate(m - 1) / T::of(m as f64)).scale(torsion.stiffness) };
     elastic - rate(m).scale(torsion.damping)
 }
 

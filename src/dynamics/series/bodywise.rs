@@ -1,7 +1,8 @@
 //! What a series of many bodies has in place of matrices, and its Cauchy products.
 //!
-//! Both products of an order are sums of products component by component: w_j z_{k-j} with (w, w) for w, and z_l × R_{m-l} with R turned to the right, as
-//! (R_y, -R_x), whose two sums are added up at the end.  So neighbouring bodies are neighbouring lanes, whatever their number.
+//! Both products of an order are sums of products component by component: w_j z_{k-j} with (w, w) for w, and
+//! z_l × R_{m-l} with R turned to the right, as (R_y, -R_x), whose two sums are added up at the end.  So
+//! neighbouring bodies are neighbouring lanes, whatever their number.
 
 use super::{Coefficient, Series};
 use crate::arithmetic::lanes::{self, Code, Lanes};
@@ -125,7 +126,9 @@ fn turn<T: Real>(across: &mut [Complex<T>], rest: &[Complex<T>]) {
 pub fn products<T: Real>(n: usize, a: &[Complex<T>], b: &[Complex<T>], sums: &mut [Complex<T>]) {
     for (k, sum) in sums.iter_mut().enumerate() {
         let (a, b) = (a[k.min(a.len())..].iter().step_by(n), b[k.min(b.len())..].iter().step_by(n).rev());
-        *sum = a.zip(b).fold(Complex::ZERO, |sum, (a, b)| Complex::new(sum.re + a.re * b.re, sum.im + a.im * b.im));
+        *sum = a
+            .zip(b)
+            .fold(Complex::ZERO, |sum, (a, b)| Complex::new(sum.re + a.re * b.re, sum.im + a.im * b.im));
     }
 }
 
@@ -172,7 +175,13 @@ impl Code for Products<'_> {
 
 /// The elements of one block.
 #[inline(always)]
-fn block<L: Lanes>(n: usize, first: usize, a: &[Complex<f64>], b: &[Complex<f64>], sums: &mut [Complex<f64>]) {
+fn block<L: Lanes>(
+    n: usize,
+    first: usize,
+    a: &[Complex<f64>],
+    b: &[Complex<f64>],
+    sums: &mut [Complex<f64>],
+) {
     let mut sum = [L::ZERO; BLOCK / 2];
     for (a, b) in a.chunks_exact(n).zip(b.chunks_exact(n).rev()) {
         let (a, b) = (&a[first..first + BLOCK], &b[first..first + BLOCK]);

@@ -12,7 +12,8 @@ pub trait Coefficient: Real {
     /// The powers from `first` on.
     fn orders(series: &mut Series<Self>, mechanism: &Mechanism, first: usize);
 
-    /// Writes `Σ_j a_j b_{m-j}` component by component, over series of `n` elements with m+1 powers each, for as many elements as there are sums.
+    /// Writes `Σ_j a_j b_{m-j}` component by component, over series of `n` elements with m+1 powers each, for
+    /// as many elements as there are sums.
     fn products(n: usize, a: &[Complex<Self>], b: &[Complex<Self>], sums: &mut [Complex<Self>]);
 }
 

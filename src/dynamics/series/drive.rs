@@ -4,13 +4,15 @@ use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::Time;
 use crate::dynamics::law::Law;
 
-/// Adds `sign` times the powers 0, 1, … of a law's rate about time `t` to a series of stride `stride` from `first`.
+/// Adds `sign` times the powers 0, 1, … of a law's rate about time `t` to a series of stride `stride` from
+/// `first`.
 pub fn add<T: Real>(law: &Law, sign: f64, t: Time, series: &mut [T], first: usize, stride: usize) {
     series[first] += law.at::<T>(t).rate.scale(sign);
     series[first + stride] += T::of(law.acceleration).scale(sign);
     for sine in &law.sines {
         let (sin, cos) = T::split((t.scale(sine.frequency) + sine.phase).reduced().0).0.sin_cos();
-        // The m-th derivative of A f cos is A f^(m+1) cos, -sin, -cos, sin; power 0 is in the law's rate already.
+        // The m-th derivative of A f cos is A f^(m+1) cos, -sin, -cos, sin; power 0 is in the law's rate
+        // already.
         let turns = [cos, -sin, -cos, sin];
         let mut factor = T::of(sine.amplitude).scale(sign * sine.frequency);
         for (m, power) in series[first..].iter_mut().step_by(stride).enumerate().skip(1) {

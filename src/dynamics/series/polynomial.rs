@@ -6,17 +6,26 @@ use crate::dynamics::tree::size;
 /// The largest number of bodies whose loops are unrolled.
 pub const UNROLLED: usize = 6;
 
-/// How many bodies are worked on at once: all of them where their number `N` is known, else one after another.
+/// How many bodies are worked on at once: all of them where their number `N` is known, else one after
+/// another.
 #[inline(always)]
 pub const fn width<const N: usize>() -> usize {
     if N == 0 { 1 } else { N }
 }
 
-/// `Σ_{j=0..m} term(a_j, b_{m-j})` over series of `n` bodies with m+1 powers each, for the [`width`] bodies from `first` on.
+/// `Σ_{j=0..m} term(a_j, b_{m-j})` over series of `n` bodies with m+1 powers each, for the [`width`] bodies
+/// from `first` on.
 ///
-/// From the middle outwards in two chains, so that the newest coefficients come last and nothing waits for them.
+/// From the middle outwards in two chains, so that the newest coefficients come last and nothing waits for
+/// them.
 #[inline(always)]
-pub fn convolve<const N: usize, A, B, S>(n: usize, first: usize, a: &[A], b: &[B], term: impl Fn(A, B) -> S) -> [S; UNROLLED]
+pub fn convolve<const N: usize, A, B, S>(
+    n: usize,
+    first: usize,
+    a: &[A],
+    b: &[B],
+    term: impl Fn(A, B) -> S,
+) -> [S; UNROLLED]
 where
     A: Copy,
     B: Copy,
@@ -64,8 +73,8 @@ impl<T: Real> Fractions<T> {
         Self((0..=most).map(|k| T::ONE / T::of(k.max(1) as f64)).collect())
     }
 
-    /// x/k.  A fraction that is rounded once and used in every step is a drift: in plain doubles low orders, which carry the weight, are
-    /// divided.
+    /// x/k.  A fraction that is rounded once and used in every step is a drift: in plain doubles low orders,
+    /// which carry the weight, are divided.
     #[inline(always)]
     pub fn over(&self, x: T, k: usize) -> T {
         if T::IS_PLAIN && k < 13 { x / T::of(k as f64) } else { x * self.0[k] }

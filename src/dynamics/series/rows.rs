@@ -7,7 +7,8 @@
 //! M_0 a_m + Jᵀ lambda_m = load_m:   S = J M_0⁻¹ Jᵀ,   S lambda_m = J M_0⁻¹ load_m - (J a)_m
 //! ```
 //!
-//! S is factored once a step; where the mechanism is evaluated body by body, in its envelope.  The products of earlier multipliers with later powers of z enter through the loads like those of any force.
+//! S is factored once a step; where the mechanism is evaluated body by body, in its envelope.  The products
+//! of earlier multipliers with later powers of z enter through the loads like those of any force.
 
 use super::drive;
 use super::polynomial::{copy, zeros};
@@ -76,8 +77,8 @@ impl<T: Real> Kind<T> {
 }
 
 impl<T: Real> RowSeries<T> {
-    /// Room for the rows that `partition` do not fulfil already: all but the motors' where these are eliminated.
-    /// Without matrices where `is_dense` is false.
+    /// Room for the rows that `partition` do not fulfil already: all but the motors' where these are
+    /// eliminated. Without matrices where `is_dense` is false.
     pub fn new(mechanism: &Mechanism, partition: &CoordinatePartition, order: usize, is_dense: bool) -> Self {
         let kind = |row: &ConstraintEquation| match (&row.measure, &row.law) {
             (Measure::Angle { .. }, _) if partition.driven() => None,
@@ -85,15 +86,18 @@ impl<T: Real> RowSeries<T> {
                 let law = law.clone().unwrap_or_else(|| Law::constant(0.0));
                 Some(Kind::Angle { body, base, law, drive: zeros(order + 1), speed: zeros(order + 1) })
             }
-            (Measure::Place(place), law) => {
-                Some(Kind::Place { place: place.clone(), law: law.clone(), drive: zeros(if law.is_some() { order + 1 } else { 0 }) })
-            }
+            (Measure::Place(place), law) => Some(Kind::Place {
+                place: place.clone(),
+                law: law.clone(),
+                drive: zeros(if law.is_some() { order + 1 } else { 0 }),
+            }),
         };
         let in_force = || mechanism.constraints.iter().filter(|row| !(row.is_angle() && partition.driven()));
         let scale = in_force().map(|row| row.scale(&mechanism.tree)).collect();
         let size = mechanism.size_of_parts();
         let base = |(k, b): (usize, f64)| partition.bodies[k].base.map(|base| (base, b));
-        let levers: Vec<Levers> = in_force().map(|row| row.levers(size).into_iter().filter_map(base).collect()).collect();
+        let levers: Vec<Levers> =
+            in_force().map(|row| row.levers(size).into_iter().filter_map(base).collect()).collect();
         let metric = Metric::new(&levers, partition.count(), mechanism.assembly.redundant.len());
         let kinds: Vec<Kind<T>> = mechanism.constraints.iter().filter_map(kind).collect();
         let (r, f) = (kinds.len(), partition.count());
@@ -163,7 +167,14 @@ impl<T: Real> RowSeries<T> {
         self.weakest = schur::factor::<T, 0>(r, &mut self.schur, &mut self.pivot, &self.scale);
         if self.weakest.share < NEAR {
             let rows = [&self.jacobian[..], &self.minv_jt[..]];
-            self.weakest = schur::look_closer(&self.metric, &self.scale, self.weakest, rows, &mut self.schur, &mut self.pivot);
+            self.weakest = schur::look_closer(
+                &self.metric,
+                &self.scale,
+                self.weakest,
+                rows,
+                &mut self.schur,
+                &mut self.pivot,
+            );
         }
     }
 
@@ -178,7 +189,8 @@ impl<T: Real> RowSeries<T> {
         self.weakest = evaluation.factor_constraints();
     }
 
-    /// What is known of power m of every row's second derivative, less that of its law: where its multipliers will be.
+    /// What is known of power m of every row's second derivative, less that of its law: where its multipliers
+    /// will be.
     pub fn known(&mut self, m: usize, z: &[Complex<T>], bend: &[Complex<T>]) -> &mut [T] {
         let r = self.kinds.len();
         let multiplier = &mut self.multiplier[m * r..(m + 1) * r];
@@ -188,7 +200,8 @@ impl<T: Real> RowSeries<T> {
         multiplier
     }
 
-    /// Multipliers of power m from the free accelerations of the coordinates, which become the constrained ones.
+    /// Multipliers of power m from the free accelerations of the coordinates, which become the constrained
+    /// ones.
     pub fn solve(&mut self, m: usize, z: &[Complex<T>], bend: &[Complex<T>], solution: &mut [T]) {
         let (r, f) = (self.kinds.len(), self.coordinates);
         let multiplier = &mut self.multiplier[m * r..(m + 1) * r];
@@ -213,7 +226,8 @@ impl<T: Real> RowSeries<T> {
         }
     }
 
-    /// Adds what the multipliers below power m put on the elements as these turn to `rest`: only gradients that are not constant.
+    /// Adds what the multipliers below power m put on the elements as these turn to `rest`: only gradients
+    /// that are not constant.
     pub fn geometric_terms(&self, m: usize, z: &[Complex<T>], n: usize, rest: &mut [Complex<T>]) {
         let r = self.kinds.len();
         for (i, kind) in self.kinds.iter().enumerate() {
@@ -254,7 +268,8 @@ impl<T: Real> RowSeries<T> {
     }
 }
 
-/// Power m of a row's second derivative without the accelerations of power m: `bend` is what e'' has without them.
+/// Power m of a row's second derivative without the accelerations of power m: `bend` is what e'' has without
+/// them.
 fn bent<T: Real>(place: &Quadratic, m: usize, z: &[Complex<T>], bend: &[Complex<T>]) -> T {
     let n = bend.len();
     let mut sum = T::ZERO;

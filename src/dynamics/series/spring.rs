@@ -67,7 +67,8 @@ impl<T: Real> SpringSeries<T> {
             } else {
                 let known = &self.inverse_length[..m];
                 let falling = known.iter().rev().zip(&square[1..]).enumerate();
-                let sum = falling.fold(T::ZERO, |sum, (j, (&s, &q))| sum + (q * s).scale(0.5 * (j + 1) as f64 - m as f64));
+                let sum = falling
+                    .fold(T::ZERO, |sum, (j, (&s, &q))| sum + (q * s).scale(0.5 * (j + 1) as f64 - m as f64));
                 sum / square[0].scale(m as f64)
             };
             let stretched = product(span, &self.inverse_length[..=m], |span, s| span.times(s));
@@ -89,7 +90,8 @@ impl<T: Real> SpringSeries<T> {
             }
             self.closing[m] = closing;
             self.strain_rate[m] = product(&self.closing[..=m], &self.inverse_square[..=m], |a, b| a * b);
-            force += product(span, &self.strain_rate[..=m], |span, rate| span.times(rate)).times(T::of(-spring.damping));
+            force += product(span, &self.strain_rate[..=m], |span, rate| span.times(rate))
+                .times(T::of(-spring.damping));
         }
         force
     }

@@ -61,7 +61,9 @@ impl<T: Real> UserSeries<T> {
         for (part, series) in force.parts.iter().zip(&mut self.0) {
             series.advance(&part.tape, m, |number| at.power(force, force.inputs[number as usize], m));
             for &(site, [x, y]) in &part.forces {
-                force.sites[site].point.spread(Complex::new(series.of(x)[m], series.of(y)[m]), |k, force| rest[k] -= force);
+                force.sites[site]
+                    .point
+                    .spread(Complex::new(series.of(x)[m], series.of(y)[m]), |k, force| rest[k] -= force);
             }
             for &(body, torque) in &part.torques {
                 load[body] += series.of(torque)[m];

@@ -2,7 +2,8 @@
 
 use super::super::methods::{MethodInfo, Stepping};
 
-/// Tolerances of an adaptive method, from coarse to fine; `extended` ones are those of series whose first orders are in double-double.
+/// Tolerances of an adaptive method, from coarse to fine; `extended` ones are those of series whose first
+/// orders are in double-double.
 pub(super) fn tolerances(info: &MethodInfo, extended: bool) -> &'static [f64] {
     const EXTENDED: &[f64] = &[1e-16, 1e-18, 1e-20, 1e-22];
     const ALL: &[f64] = &[1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13, 1e-14, 1e-15];
@@ -14,9 +15,11 @@ pub(super) fn tolerances(info: &MethodInfo, extended: bool) -> &'static [f64] {
     }
 }
 
-/// Steps \[s\] of a fixed-step method, from coarse to fine: whole parts of `every` \[s\] around `usual` \[s\], which suits the scene.
+/// Steps \[s\] of a fixed-step method, from coarse to fine: whole parts of `every` \[s\] around `usual`
+/// \[s\], which suits the scene.
 ///
-/// The parts are such that steps have few digits where `every` has: 10, 16, 25, 40 and 64 times powers of ten, or 10, 20 and 50 times those, and small ones.
+/// The parts are such that steps have few digits where `every` has: 10, 16, 25, 40 and 64 times powers of
+/// ten, or 10, 20 and 50 times those, and small ones.
 pub(super) fn steps(info: &MethodInfo, usual: f64, every: f64) -> Vec<f64> {
     debug_assert!(info.stepping == Stepping::Fixed);
     const SMALL: &[f64] = &[1.0, 2.0, 4.0, 8.0];
@@ -38,12 +41,15 @@ pub(super) fn steps(info: &MethodInfo, usual: f64, every: f64) -> Vec<f64> {
         .collect()
 }
 
-/// The interval at which runs to `until` \[s\] are looked at: whole parts of it, `least` at least, and of one digit where that is possible.
+/// The interval at which runs to `until` \[s\] are looked at: whole parts of it, `least` at least, and of one
+/// digit where that is possible.
 pub(super) fn interval(until: f64, least: f64) -> f64 {
     let largest = until / least;
     let decade = largest.log10().floor() as i32;
     // One or two: the parts of these that steps are have few digits.
-    let fine = (decade - 1..=decade).rev().flat_map(|decade| [2.0, 1.0].map(|digit| tidy(digit * 10_f64.powi(decade))));
+    let fine = (decade - 1..=decade)
+        .rev()
+        .flat_map(|decade| [2.0, 1.0].map(|digit| tidy(digit * 10_f64.powi(decade))));
     let is_part = |every: &f64| (until / every - (until / every).round()).abs() < 1e-9;
     fine.filter(|every| *every <= largest * (1.0 + 1e-9)).find(is_part).unwrap_or(until / least.ceil())
 }
@@ -51,7 +57,13 @@ pub(super) fn interval(until: f64, least: f64) -> f64 {
 /// The largest number with one digit, 1, 2 or 5, up to this one.
 pub(super) fn round_down(x: f64) -> f64 {
     let power = 10_f64.powi(x.log10().floor() as i32);
-    tidy([5.0, 2.0, 1.0].into_iter().map(|digit| digit * power).find(|&y| y <= x * (1.0 + 1e-9)).unwrap_or(power))
+    tidy(
+        [5.0, 2.0, 1.0]
+            .into_iter()
+            .map(|digit| digit * power)
+            .find(|&y| y <= x * (1.0 + 1e-9))
+            .unwrap_or(power),
+    )
 }
 
 /// The same number without the dust of a division, where that is all there is to it.
@@ -69,7 +81,11 @@ mod tests {
     fn steps_are_round_whole_parts_around_the_usual_one() {
         for info in METHODS.iter().filter(|info| info.stepping == Stepping::Fixed) {
             let found = steps(info, 0.005, 0.2);
-            assert!(found.len() >= 6 && found.windows(2).all(|pair| pair[1] < pair[0]), "{}: {found:?}", info.name);
+            assert!(
+                found.len() >= 6 && found.windows(2).all(|pair| pair[1] < pair[0]),
+                "{}: {found:?}",
+                info.name
+            );
             for step in &found {
                 assert!(format!("{step}").len() <= 10, "{}: {step}", info.name);
                 assert!((0.2 / step - (0.2 / step).round()).abs() < 1e-9);
@@ -80,7 +96,9 @@ mod tests {
 
     #[test]
     fn intervals_are_whole_parts_of_the_horizon() {
-        for (until, least, every) in [(10.0, 40.0, 0.2), (500.0, 200.0, 2.0), (1.0, 32.0, 0.02), (0.3, 32.0, 0.002)] {
+        for (until, least, every) in
+            [(10.0, 40.0, 0.2), (500.0, 200.0, 2.0), (1.0, 32.0, 0.02), (0.3, 32.0, 0.002)]
+        {
             assert_eq!(interval(until, least), every, "{until}");
         }
         let odd = interval(std::f64::consts::PI, 40.0);

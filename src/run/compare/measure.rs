@@ -13,7 +13,8 @@ use std::sync::Arc;
 /// What a run was found to be.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
-    /// Largest distance from the reference as far as that reaches: of an angle \[rad\], or a place over the mechanism's size.  Not a number where there is no reference.
+    /// Largest distance from the reference as far as that reaches: of an angle \[rad\], or a place over the
+    /// mechanism's size.  Not a number where there is no reference.
     pub error: f64,
     /// The same of rates \[rad/s\].
     pub rate_error: f64,
@@ -21,7 +22,8 @@ pub struct Found {
     pub errors: Vec<[f64; 2]>,
     /// Largest drift of energy, or energy minus work, over the energy scale.
     pub energy: f64,
-    /// Largest violation of any constraint, at position \[rad or m\] and velocity level \[rad/s or m/s\], where there are any.
+    /// Largest violation of any constraint, at position \[rad or m\] and velocity level \[rad/s or m/s\],
+    /// where there are any.
     pub constraint: Option<[f64; 2]>,
     /// Counts.
     pub statistics: Statistics,
@@ -84,7 +86,8 @@ pub(super) fn measure(
         }
     }
     let outcome = running.finish();
-    let levels = outcome.drift.constraints.iter().map(|(_, [position, velocity])| [position.max, velocity.max]);
+    let levels =
+        outcome.drift.constraints.iter().map(|(_, [position, velocity])| [position.max, velocity.max]);
     found.constraint = levels.reduce(|a, b| [0, 1].map(|level| larger(a[level], b[level])));
     found.energy = outcome.drift.energy.max;
     found.statistics = outcome.statistics;
@@ -99,9 +102,11 @@ fn largest(most: f64, value: f64) -> f64 {
     if value.is_nan() { f64::INFINITY } else { most.max(value) }
 }
 
-/// Mean time of a run \[s\] over as many repetitions as fill a quantum \[s\], without looking at anything on the way; `None` where it was given up.
+/// Mean time of a run \[s\] over as many repetitions as fill a quantum \[s\], without looking at anything on
+/// the way; `None` where it was given up.
 ///
-/// A run shorter than that is made once before the clock is looked at, so that the caches hold what is its own.
+/// A run shorter than that is made once before the clock is looked at, so that the caches hold what is its
+/// own.
 pub(super) fn time(
     mechanism: &Arc<Mechanism>,
     start: &Motion,
@@ -111,7 +116,8 @@ pub(super) fn time(
     is_over: &dyn Fn() -> bool,
 ) -> Option<f64> {
     let once = || {
-        let mut running = Running::new(Run::new(Arc::clone(mechanism), plan.clone(), Limits::default(), start).ok()?);
+        let mut running =
+            Running::new(Run::new(Arc::clone(mechanism), plan.clone(), Limits::default(), start).ok()?);
         let begin = (room.clock)();
         running.run_unsampled(&mut || is_over()).then(|| (room.clock)().saturating_sub(begin).as_secs_f64())
     };

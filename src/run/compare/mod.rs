@@ -1,4 +1,5 @@
-//! Methods compared on one scene: true error, drift and evaluations of each method at each of its settings, against the time it takes.
+//! Methods compared on one scene: true error, drift and evaluations of each method at each of its settings,
+//! against the time it takes.
 //!
 //! ```text
 //! together    two runs from starts an ulp apart: until when a path means anything
@@ -7,8 +8,9 @@
 //! time        each setting again and again, unwatched                 round by round, so that noise hits all alike
 //! ```
 //!
-//! Settings go from coarse to fine, and end where finer ones bring nothing more.  What a method refuses or where it stops is an entry like
-//! any other.  Nothing but times, and what is left out or cut short for want of time, depends on the machine.
+//! Settings go from coarse to fine, and end where finer ones bring nothing more.  What a method refuses or
+//! where it stops is an entry like any other.  Nothing but times, and what is left out or cut short for want
+//! of time, depends on the machine.
 
 mod ladder;
 mod measure;
@@ -31,15 +33,18 @@ use std::time::Duration;
 
 /// Time a block of repeated short runs fills \[s\].
 const QUANTUM: f64 = 0.01;
-/// Shares of the budget for the common life of two near runs, for the reference, and up to which settings are measured.
+/// Shares of the budget for the common life of two near runs, for the reference, and up to which settings are
+/// measured.
 const SHARES: [f64; 3] = [0.05, 0.25, 0.6];
-/// Output times on the way to where errors are measured, at least, and most of all: methods that are not dense cut their steps there, so that they are few.
+/// Output times on the way to where errors are measured, at least, and most of all: methods that are not
+/// dense cut their steps there, so that they are few.
 const LOOKS: f64 = 8.0;
 const MOST_LOOKS: f64 = 1e6;
-/// A finer setting whose error is above this share of the best so far brings nothing, once errors are below the second number \[rad\]; below the third
-/// there is nothing to be gained.
+/// A finer setting whose error is above this share of the best so far brings nothing, once errors are below
+/// the second number \[rad\]; below the third there is nothing to be gained.
 const NO_BETTER: [f64; 3] = [0.5, 1e-4, 1e-13];
-/// Settings of a method, and how many times the time of `dp8` at 1e-9 one of them takes, in the mean; to guess what a horizon costs.
+/// Settings of a method, and how many times the time of `dp8` at 1e-9 one of them takes, in the mean; to
+/// guess what a horizon costs.
 const GUESS: [f64; 2] = [8.0, 8.0];
 
 /// Output times of the run that tells what a horizon costs.
@@ -56,7 +61,8 @@ pub struct Asked {
     pub until: Option<f64>,
     /// Time for all of it.
     pub budget: Duration,
-    /// Blocks of repeated runs that tell the time of each setting, as far as there is time; 9 make a sure median.
+    /// Blocks of repeated runs that tell the time of each setting, as far as there is time; 9 make a sure
+    /// median.
     pub blocks: usize,
 }
 
@@ -80,7 +86,8 @@ pub enum Fate {
     Stopped(StepError),
     /// The method is not for this scene, or not with this stabilization.
     Refused(Refusal),
-    /// It had come to this time \[s\] when its share of the budget was used up; 0 where it was not begun, since a coarser one took too long.
+    /// It had come to this time \[s\] when its share of the budget was used up; 0 where it was not begun,
+    /// since a coarser one took too long.
     Late(f64),
 }
 
@@ -139,7 +146,11 @@ impl Entry {
 
     /// Distance between the quartiles of that time \[s\]; `None` with fewer than two blocks.
     pub fn spread(&self) -> Option<f64> {
-        if self.blocks.len() < 2 { None } else { Some(quantile(&self.blocks, 0.75)? - quantile(&self.blocks, 0.25)?) }
+        if self.blocks.len() < 2 {
+            None
+        } else {
+            Some(quantile(&self.blocks, 0.75)? - quantile(&self.blocks, 0.25)?)
+        }
     }
 
     /// The error of a run that came to its end \[rad\].
@@ -205,7 +216,14 @@ impl Task<'_> {
     fn run(&self, mut until: f64, see: &mut dyn FnMut(&Stage)) -> Comparison {
         let mut notes = Vec::new();
         see(&self.stage("how long paths mean anything"));
-        let near = together(self.mechanism, self.start, self.scene.every.min(until), until, self.room(SHARES[0]), self.is_over);
+        let near = together(
+            self.mechanism,
+            self.start,
+            self.scene.every.min(until),
+            until,
+            self.room(SHARES[0]),
+            self.is_over,
+        );
         if let Some(stop) = &near.stop {
             notes.push(format!("runs in doubles for the horizon stopped at t = {} s: {}", stop.t, stop.what));
         }
@@ -214,7 +232,8 @@ impl Task<'_> {
         if self.asked.until.is_none()
             && let Some(possible) = self.possible(until, lines)
         {
-            until = if near.horizon.is_some() { possible.max(ladder::round_down(measured)) } else { possible };
+            until =
+                if near.horizon.is_some() { possible.max(ladder::round_down(measured)) } else { possible };
             notes.push(format!(
                 "the horizon is {until} s, which all methods can be taken to in the time given; --until or --budget change that"
             ));
@@ -223,14 +242,16 @@ impl Task<'_> {
         let looks = (LOOKS * until / measured.max(f64::MIN_POSITIVE)).clamp(LOOKS, MOST_LOOKS);
         let every = ladder::interval(until, looks);
         see(&self.stage("reference"));
-        let mut truth = Truth::new(self.mechanism, self.start, every, measured, self.room(SHARES[1]), self.is_over);
+        let mut truth =
+            Truth::new(self.mechanism, self.start, every, measured, self.room(SHARES[1]), self.is_over);
         truth.horizon = near.horizon.filter(|&horizon| horizon < until);
         if let Some(why) = &truth.why {
             notes.push(format!("errors are measured up to t = {:.4} s: {why}", truth.until));
         } else if truth.until < until && truth.horizon.is_none() {
             notes.push(format!("errors are measured up to t = {:.4} s: no time for more", truth.until));
         }
-        let mut comparison = Comparison { until, truth, entries: Vec::new(), notes, is_whole: false, wall: Duration::ZERO };
+        let mut comparison =
+            Comparison { until, truth, entries: Vec::new(), notes, is_whole: false, wall: Duration::ZERO };
         let steps = |method: MethodId, usual: f64| ladder::steps(method.info(), usual, every);
         let mut lines = self.lines_of(steps, &mut comparison.entries, until);
         for request in lines.iter_mut().flat_map(|line| &mut line.rungs) {
@@ -243,7 +264,12 @@ impl Task<'_> {
     }
 
     /// The methods and stabilizations asked for, with their settings; what is refused is an entry.
-    fn lines_of(&self, steps: impl Fn(MethodId, f64) -> Vec<f64>, entries: &mut Vec<Entry>, until: f64) -> Vec<Line> {
+    fn lines_of(
+        &self,
+        steps: impl Fn(MethodId, f64) -> Vec<f64>,
+        entries: &mut Vec<Entry>,
+        until: f64,
+    ) -> Vec<Line> {
         let mut lines: Vec<Line> = Vec::new();
         let all: Vec<MethodId> = METHODS.iter().map(|info| info.id).collect();
         let methods = if self.asked.methods.is_empty() { &all } else { &self.asked.methods };
@@ -252,15 +278,32 @@ impl Task<'_> {
             false => self.asked.stabilize.iter().copied().map(Some).collect(),
         };
         let mut seen = Vec::new();
-        for (&method, &stabilize) in methods.iter().flat_map(|method| kinds.iter().map(move |kind| (method, kind))) {
+        for (&method, &stabilize) in
+            methods.iter().flat_map(|method| kinds.iter().map(move |kind| (method, kind)))
+        {
             let is_twice = seen.contains(&(method, stabilize));
             seen.push((method, stabilize));
-            for extended in [false, true].into_iter().filter(|&extended| !is_twice && (!extended || method == MethodId::Taylor)) {
-                let request = Request { method: Some(method), stabilize, extended, until: Some(until), ..Request::default() };
+            for extended in [false, true]
+                .into_iter()
+                .filter(|&extended| !is_twice && (!extended || method == MethodId::Taylor))
+            {
+                let request = Request {
+                    method: Some(method),
+                    stabilize,
+                    extended,
+                    until: Some(until),
+                    ..Request::default()
+                };
                 let plan = match Plan::new(self.scene, self.mechanism, &request) {
                     Ok(plan) => plan,
                     Err(refusal) => {
-                        entries.push(Entry::without(method, extended, stabilize, None, Fate::Refused(refusal)));
+                        entries.push(Entry::without(
+                            method,
+                            extended,
+                            stabilize,
+                            None,
+                            Fate::Refused(refusal),
+                        ));
                         continue;
                     }
                 };
@@ -271,22 +314,45 @@ impl Task<'_> {
                 }
                 let at = |rtol: Option<f64>, step: Option<f64>| Request { rtol, step, ..request.clone() };
                 let mut rungs: Vec<Request> = match plan.step {
-                    Some(usual) => steps(method, usual).into_iter().map(|step| at(None, Some(step))).collect(),
-                    None => ladder::tolerances(method.info(), extended).iter().map(|&rtol| at(Some(rtol), None)).collect(),
+                    Some(usual) => {
+                        steps(method, usual).into_iter().map(|step| at(None, Some(step))).collect()
+                    }
+                    None => ladder::tolerances(method.info(), extended)
+                        .iter()
+                        .map(|&rtol| at(Some(rtol), None))
+                        .collect(),
                 };
                 rungs.reverse();
-                lines.push(Line { method, extended, stabilize, rungs, best: f64::INFINITY, idle: 0, last: 0.0, evaluations: 0 });
+                lines.push(Line {
+                    method,
+                    extended,
+                    stabilize,
+                    rungs,
+                    best: f64::INFINITY,
+                    idle: 0,
+                    last: 0.0,
+                    evaluations: 0,
+                });
             }
         }
         lines
     }
 
-    /// A horizon up to which there is probably time to take all methods \[s\], where that is less than `until` \[s\].
+    /// A horizon up to which there is probably time to take all methods \[s\], where that is less than
+    /// `until` \[s\].
     fn possible(&self, until: f64, lines: usize) -> Option<f64> {
-        let method =
-            if self.mechanism.tree.is_dense() || !self.mechanism.constraints.is_empty() { MethodId::Dp8 } else { MethodId::Dop853 };
+        let method = if self.mechanism.tree.is_dense() || !self.mechanism.constraints.is_empty() {
+            MethodId::Dp8
+        } else {
+            MethodId::Dop853
+        };
         // How far it is, is told by the last output time.
-        let request = Request { method: Some(method), until: Some(until), every: Some(until / PARTS), ..Request::default() };
+        let request = Request {
+            method: Some(method),
+            until: Some(until),
+            every: Some(until / PARTS),
+            ..Request::default()
+        };
         let plan = Plan::new(self.scene, self.mechanism, &request).ok()?;
         let begin = (self.clock)();
         let room = Room { clock: self.clock, seconds: 0.1 };
@@ -329,7 +395,8 @@ impl Task<'_> {
         let plan = match Plan::new(self.scene, self.mechanism, request) {
             Ok(plan) => plan,
             Err(refusal) => {
-                let refused = Entry::without(line.method, line.extended, line.stabilize, None, Fate::Refused(refusal));
+                let refused =
+                    Entry::without(line.method, line.extended, line.stabilize, None, Fate::Refused(refusal));
                 return (Some(refused), false);
             }
         };
@@ -357,7 +424,8 @@ impl Task<'_> {
                 line.judge(&found);
                 entry.fate = Fate::Done;
                 let room = Room { clock: self.clock, seconds: QUANTUM };
-                let block = measure::time(self.mechanism, self.start, &plan, Some(line.last), room, self.is_over);
+                let block =
+                    measure::time(self.mechanism, self.start, &plan, Some(line.last), room, self.is_over);
                 entry.blocks.extend(block);
                 entry.found = Some(found);
                 entry.plan = Some(plan);
@@ -366,7 +434,8 @@ impl Task<'_> {
         (Some(entry), false)
     }
 
-    /// Times all settings again, in turn and in another order each time, as long as there is time; true where it came to its end.
+    /// Times all settings again, in turn and in another order each time, as long as there is time; true where
+    /// it came to its end.
     fn repeat(&self, comparison: &mut Comparison, see: &mut dyn FnMut(&Stage)) -> bool {
         let (blocks, count) = (self.asked.blocks, comparison.entries.len());
         for round in 1..blocks {
@@ -376,22 +445,38 @@ impl Task<'_> {
                 if (self.is_over)() {
                     return false;
                 }
-                let Some(block) = comparison.entries[number].median().map(|median| median.max(QUANTUM)) else { continue };
+                let Some(block) = comparison.entries[number].median().map(|median| median.max(QUANTUM))
+                else {
+                    continue;
+                };
                 let left = self.asked.budget.saturating_sub(self.spent());
                 if block > left.as_secs_f64() {
                     continue;
                 }
-                let costs = comparison.entries.iter().filter_map(Entry::median).map(|median| median.max(QUANTUM)).sum::<f64>();
+                let costs = comparison
+                    .entries
+                    .iter()
+                    .filter_map(Entry::median)
+                    .map(|median| median.max(QUANTUM))
+                    .sum::<f64>();
                 let rest = ((blocks - round) as f64 - k as f64 / count as f64) * costs;
                 let mut stage = self.stage("timing");
                 stage.left = stage.left.min(Duration::from_secs_f64(rest));
-                stage.share = self.spent().as_secs_f64() / (self.spent() + stage.left).as_secs_f64().max(1e-9);
+                stage.share =
+                    self.spent().as_secs_f64() / (self.spent() + stage.left).as_secs_f64().max(1e-9);
                 see(&stage);
                 let entry = &mut comparison.entries[number];
                 let Some(plan) = &entry.plan else { continue };
                 let room = Room { clock: self.clock, seconds: QUANTUM };
                 let before = entry.blocks.last().copied();
-                entry.blocks.extend(measure::time(self.mechanism, self.start, plan, before, room, self.is_over));
+                entry.blocks.extend(measure::time(
+                    self.mechanism,
+                    self.start,
+                    plan,
+                    before,
+                    room,
+                    self.is_over,
+                ));
             }
         }
         !(self.is_over)()
@@ -418,11 +503,14 @@ impl Line {
         name(self.method, self.extended, self.stabilize)
     }
 
-    /// Ends the line where finer settings bring nothing: twice in a row the error, or where there is none to be had the drift, is no better.
+    /// Ends the line where finer settings bring nothing: twice in a row the error, or where there is none to
+    /// be had the drift, is no better.
     fn judge(&mut self, found: &Found) {
         let figure = if found.error.is_finite() { found.error } else { found.energy };
-        // A setting that takes no more evaluations than the one before has made the same steps, and says nothing.
-        let has_worked = found.statistics.evaluations > std::mem::replace(&mut self.evaluations, found.statistics.evaluations);
+        // A setting that takes no more evaluations than the one before has made the same steps, and says
+        // nothing.
+        let has_worked = found.statistics.evaluations
+            > std::mem::replace(&mut self.evaluations, found.statistics.evaluations);
         let is_idle = has_worked && figure > NO_BETTER[0] * self.best && self.best < NO_BETTER[1];
         self.idle = if is_idle { self.idle + 1 } else { 0 };
         self.best = self.best.min(figure);
@@ -433,7 +521,13 @@ impl Line {
 }
 
 impl Entry {
-    fn without(method: MethodId, extended: bool, stabilization: Option<Stabilization>, plan: Option<Plan>, fate: Fate) -> Self {
+    fn without(
+        method: MethodId,
+        extended: bool,
+        stabilization: Option<Stabilization>,
+        plan: Option<Plan>,
+        fate: Fate,
+    ) -> Self {
         Self { method, extended, plan, stabilization, fate, found: None, blocks: Vec::new() }
     }
 
@@ -456,7 +550,10 @@ mod tests {
     #[test]
     fn quantiles_lie_between_the_values() {
         let values = [4.0, 1.0, 3.0, 2.0];
-        assert_eq!([0.0, 0.5, 0.75, 1.0].map(|share| quantile(&values, share)), [Some(1.0), Some(2.5), Some(3.25), Some(4.0)]);
+        assert_eq!(
+            [0.0, 0.5, 0.75, 1.0].map(|share| quantile(&values, share)),
+            [Some(1.0), Some(2.5), Some(3.25), Some(4.0)]
+        );
         assert_eq!((quantile(&[], 0.5), quantile(&[7.0], 0.25)), (None, Some(7.0)));
     }
 
@@ -475,7 +572,14 @@ mod tests {
         let mut statistics = crate::stepping::Statistics::default();
         let mut goes_on = |error: f64| {
             statistics.evaluations += 10;
-            let found = Found { error, rate_error: error, errors: Vec::new(), energy: 1e-9, constraint: None, statistics };
+            let found = Found {
+                error,
+                rate_error: error,
+                errors: Vec::new(),
+                energy: 1e-9,
+                constraint: None,
+                statistics,
+            };
             line.judge(&found);
             !line.rungs.is_empty()
         };

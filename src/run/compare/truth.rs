@@ -1,4 +1,5 @@
-//! What the runs are held against: the reference motion, how far it means anything, and the distance of a run from it.
+//! What the runs are held against: the reference motion, how far it means anything, and the distance of a run
+//! from it.
 
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::{Mechanism, Motion, Time};
@@ -65,8 +66,8 @@ impl Truth {
         self.marks.iter().map(|&row| self.motions[row].time.hi)
     }
 
-    /// How far a motion is off: angles \[rad\] or places over the mechanism's size, and rates; and whether its time is one of [`Truth::marks`].
-    /// `None` where there is no reference at its time.
+    /// How far a motion is off: angles \[rad\] or places over the mechanism's size, and rates; and whether
+    /// its time is one of [`Truth::marks`]. `None` where there is no reference at its time.
     pub fn error(&self, motion: &Motion) -> Option<([f64; 2], bool)> {
         let row = (motion.time.hi / self.every).round() as usize;
         let known = self.motions.get(row.wrapping_sub(1))?;
@@ -74,7 +75,8 @@ impl Truth {
         if late.abs() > SAME_TIME * self.every {
             return None;
         }
-        // Fixed steps meet the times of the reference to rounding; what the motion does in that time is no error.
+        // Fixed steps meet the times of the reference to rounding; what the motion does in that time is no
+        // error.
         let there;
         let known = if late == 0.0 {
             known
@@ -88,11 +90,22 @@ impl Truth {
             there = moved;
             &there
         };
-        Some(([self.ruler.apart(motion, known), self.ruler.rates_apart(motion, known)], self.marks.contains(&(row - 1))))
+        Some((
+            [self.ruler.apart(motion, known), self.ruler.rates_apart(motion, known)],
+            self.marks.contains(&(row - 1)),
+        ))
     }
 
-    /// The reference of a mechanism every so often \[s\], as far as `until` \[s\] and what time there is for it.
-    pub(super) fn new(mechanism: &Arc<Mechanism>, start: &Motion, every: f64, until: f64, room: Room, is_over: &dyn Fn() -> bool) -> Self {
+    /// The reference of a mechanism every so often \[s\], as far as `until` \[s\] and what time there is for
+    /// it.
+    pub(super) fn new(
+        mechanism: &Arc<Mechanism>,
+        start: &Motion,
+        every: f64,
+        until: f64,
+        room: Room,
+        is_over: &dyn Fn() -> bool,
+    ) -> Self {
         let count = (until / every * (1.0 + 1e-12)).floor() as usize;
         if count == 0 {
             return Self { why: Some("paths part at once".to_owned()), ..Self::none(mechanism) };
@@ -101,13 +114,15 @@ impl Truth {
         let mut pause = room.runs_out(is_over);
         let is_plain = is_in_doubles(mechanism);
         let found = if is_plain {
-            let walk = |tolerance| Walk::in_doubles(mechanism, start, MethodId::Dp8, tolerance, times[count - 1]);
+            let walk =
+                |tolerance| Walk::in_doubles(mechanism, start, MethodId::Dp8, tolerance, times[count - 1]);
             let [fine, coarse] = FINE.map(walk);
             fine.and_then(|fine| Ok(side_by_side(mechanism, [fine, coarse?], &times, 0.0, &mut pause)))
         } else {
             reference_while(mechanism, start, &times, &mut pause)
         };
-        let (Reference { mut motions, accuracy }, stop) = found.unwrap_or_else(|stop| (Reference::default(), Some(stop)));
+        let (Reference { mut motions, accuracy }, stop) =
+            found.unwrap_or_else(|stop| (Reference::default(), Some(stop)));
         let mut why = stop.map(|stop| format!("the reference stopped at t = {:.4} s: {}", stop.t, stop.what));
         if why.is_none() && motions.len() < count {
             why = Some("the reference takes too long for more".to_owned());
@@ -118,7 +133,8 @@ impl Truth {
             motions.truncate(sound);
         }
         let mut kernel = Kernel::<f64>::new(mechanism);
-        let accelerations = motions.iter().map(|motion| acceleration(mechanism, &mut kernel, motion)).collect();
+        let accelerations =
+            motions.iter().map(|motion| acceleration(mechanism, &mut kernel, motion)).collect();
         let count = motions.len();
         let marks = (1..=MARKS.min(count)).map(|mark| mark * count / MARKS.min(count) - 1).collect();
         let how = if is_plain {
@@ -167,7 +183,13 @@ fn is_in_doubles(mechanism: &Mechanism) -> bool {
 /// Accelerations of all coordinates at a motion.
 fn acceleration(mechanism: &Mechanism, kernel: &mut Kernel<f64>, motion: &Motion) -> Vec<f64> {
     let plain = |x: &[Time]| x.iter().map(|x| x.hi).collect::<Vec<f64>>();
-    kernel.accelerate::<0>(mechanism, motion.time, &plain(&motion.phi), &plain(&motion.omega), Bias::default());
+    kernel.accelerate::<0>(
+        mechanism,
+        motion.time,
+        &plain(&motion.phi),
+        &plain(&motion.omega),
+        Bias::default(),
+    );
     kernel.load.clone()
 }
 
@@ -190,7 +212,8 @@ pub(super) fn together(
     room: Room,
     is_over: &dyn Fn() -> bool,
 ) -> Together {
-    let (method, tolerance) = if is_in_doubles(mechanism) { (MethodId::Dp8, 1e-13) } else { (MethodId::Taylor, 1e-15) };
+    let (method, tolerance) =
+        if is_in_doubles(mechanism) { (MethodId::Dp8, 1e-13) } else { (MethodId::Taylor, 1e-15) };
     let mut near = start.clone();
     for phi in &mut near.phi {
         *phi += Time::from(f64::EPSILON * phi.hi.abs().max(0.5));

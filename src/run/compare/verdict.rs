@@ -8,11 +8,13 @@ pub const TARGETS: [f64; 4] = [1e-3, 1e-6, 1e-9, 1e-12];
 /// A path that is off by more has nothing to do with the scene's \[rad\].
 pub const LOST: f64 = 0.1;
 
-/// The numbers of the points that no other beats in both coordinates, from the least first one on; points with a coordinate that is not finite are none.
+/// The numbers of the points that no other beats in both coordinates, from the least first one on; points
+/// with a coordinate that is not finite are none.
 ///
 /// Of several at one place the first counts.
 pub fn front(points: &[[f64; 2]]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..points.len()).filter(|&i| points[i].iter().all(|x| x.is_finite())).collect();
+    let mut order: Vec<usize> =
+        (0..points.len()).filter(|&i| points[i].iter().all(|x| x.is_finite())).collect();
     order.sort_by(|&a, &b| points[a][0].total_cmp(&points[b][0]).then(points[a][1].total_cmp(&points[b][1])));
     let mut least = f64::INFINITY;
     order.retain(|&i| {
@@ -39,7 +41,8 @@ pub struct Advice {
 }
 
 impl Comparison {
-    /// Numbers of the entries that no other beats in both run time and error, fastest first; lost paths are none.
+    /// Numbers of the entries that no other beats in both run time and error, fastest first; lost paths are
+    /// none.
     pub fn front(&self) -> Vec<usize> {
         let error = |entry: &Entry| entry.error().filter(|&error| error <= LOST);
         let point = |entry: &Entry| [entry.median().unwrap_or(f64::NAN), error(entry).unwrap_or(f64::NAN)];
@@ -61,9 +64,15 @@ impl Comparison {
         let reached = || finished().filter(|(.., error)| *error <= target && !is_blind);
         let fastest = |found: &(usize, f64, f64), other: &(usize, f64, f64)| found.1.total_cmp(&other.1);
         let entry = reached().min_by(fastest).map(|found| found.0);
-        let is_other = |found: &(usize, f64, f64)| entry.is_some_and(|entry| self.entries[found.0].method != self.entries[entry].method);
+        let is_other = |found: &(usize, f64, f64)| {
+            entry.is_some_and(|entry| self.entries[found.0].method != self.entries[entry].method)
+        };
         let next = reached().filter(is_other).min_by(fastest).map(|found| found.0);
-        let nearest = if entry.is_none() { finished().min_by(|a, b| a.2.total_cmp(&b.2)).map(|found| found.0) } else { None };
+        let nearest = if entry.is_none() {
+            finished().min_by(|a, b| a.2.total_cmp(&b.2)).map(|found| found.0)
+        } else {
+            None
+        };
         Advice { target, entry, next, nearest, is_blind }
     }
 }
@@ -78,14 +87,30 @@ mod tests {
 
     #[test]
     fn the_front_holds_what_nothing_beats() {
-        let points = [[5.0, 0.0], [2.0, 1e-2], [1.0, 1e-3], [3.0, 1e-8], [3.0, 1e-9], [4.0, 1e-9], [0.5, f64::NAN], [f64::INFINITY, 0.0]];
+        let points = [
+            [5.0, 0.0],
+            [2.0, 1e-2],
+            [1.0, 1e-3],
+            [3.0, 1e-8],
+            [3.0, 1e-9],
+            [4.0, 1e-9],
+            [0.5, f64::NAN],
+            [f64::INFINITY, 0.0],
+        ];
         assert_eq!(front(&points), [2, 4, 0]);
         assert!(front(&[]).is_empty());
     }
 
     /// A run of `method` with this error and run time \[s\].
     fn entry(method: MethodId, error: f64, seconds: f64) -> Entry {
-        let found = Found { error, rate_error: 0.0, errors: Vec::new(), energy: 0.0, constraint: None, statistics: Default::default() };
+        let found = Found {
+            error,
+            rate_error: 0.0,
+            errors: Vec::new(),
+            energy: 0.0,
+            constraint: None,
+            statistics: Default::default(),
+        };
         Entry {
             found: Some(found),
             blocks: vec![seconds, 0.9 * seconds, 3.0 * seconds],
@@ -96,7 +121,8 @@ mod tests {
     fn compared(entries: Vec<Entry>, accuracy: f64) -> Comparison {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/scenes/free.json");
         let scene = read_scene(path.as_ref(), &[]).expect("a shipped scene");
-        let truth = Truth { until: 1.0, accuracy, ..Truth::none(&Mechanism::new(&scene).expect("equations")) };
+        let truth =
+            Truth { until: 1.0, accuracy, ..Truth::none(&Mechanism::new(&scene).expect("equations")) };
         Comparison { until: 1.0, truth, entries, notes: Vec::new(), is_whole: true, wall: Default::default() }
     }
 

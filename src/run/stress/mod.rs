@@ -1,7 +1,8 @@
 //! Stress: stiff and extreme scenes by every method, and what becomes of them.
 //!
-//! A cell of the matrix is one scene by one method, asked for one thing: the end of the motion, to the scene's tolerance.  What a user would do is done: the
-//! method begins with its usual setting, and where the estimate of its error, or else a finer run, does not confirm the tolerance, the setting is refined a few
+//! A cell of the matrix is one scene by one method, asked for one thing: the end of the motion, to the
+//! scene's tolerance.  What a user would do is done: the method begins with its usual setting, and where the
+//! estimate of its error, or else a finer run, does not confirm the tolerance, the setting is refined a few
 //! times.  It ends in one of four ways.
 //!
 //! | verdict | what it means |
@@ -40,7 +41,8 @@ const FINER: (f64, f64) = (1e-2, 0.5);
 const EXPANSIONS: u64 = 20_000;
 /// Share of the tolerance below which a run's own estimate is enough.
 const SURE: f64 = 1e-3;
-/// The error of the finer of two runs over their difference, at most: methods of higher order leave less, steps across a corner of the force as much.
+/// The error of the finer of two runs over their difference, at most: methods of higher order leave less,
+/// steps across a corner of the force as much.
 const MARGIN: f64 = 3.0;
 /// Least tolerance of a refinement.
 const LEAST: f64 = 1e-13;
@@ -63,7 +65,8 @@ pub struct Case {
 /// What is known of a case.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Expected {
-    /// The last bodies' angles \[rad\] and rates \[rad/s\] at the horizon; no rates where they say too little.
+    /// The last bodies' angles \[rad\] and rates \[rad/s\] at the horizon; no rates where they say too
+    /// little.
     End {
         /// Angles \[rad\].
         angles: Vec<f64>,
@@ -76,7 +79,8 @@ pub enum Expected {
     Refusal,
     /// That it cannot go on beyond a certain time, for want of what is named.
     Stop(String),
-    /// Nothing yet: [`stress`] looks for the end by the power series in double-double; where it finds none, an end that a finer run confirms counts.
+    /// Nothing yet: [`stress`] looks for the end by the power series in double-double; where it finds none,
+    /// an end that a finer run confirms counts.
     Unknown,
 }
 
@@ -146,7 +150,12 @@ pub struct Stress {
 impl Default for Stress {
     /// The shipped set by every method.
     fn default() -> Self {
-        Self { cases: shipped(), methods: METHODS.iter().map(|info| info.id).collect(), max_evaluations: MAX_EVALUATIONS, threads: 0 }
+        Self {
+            cases: shipped(),
+            methods: METHODS.iter().map(|info| info.id).collect(),
+            max_evaluations: MAX_EVALUATIONS,
+            threads: 0,
+        }
     }
 }
 
@@ -157,7 +166,8 @@ impl Stress {
     }
 }
 
-/// Runs every cell; `finished`, told how many there are, may end it with false.  The cells are the same whatever the number of threads.
+/// Runs every cell; `finished`, told how many there are, may end it with false.  The cells are the same
+/// whatever the number of threads.
 ///
 /// Where it was ended, lines that are not whole are left out.
 pub fn stress(plan: &Stress, finished: &mut dyn FnMut(usize) -> bool) -> Vec<Line> {
@@ -173,7 +183,10 @@ pub fn stress(plan: &Stress, finished: &mut dyn FnMut(usize) -> bool) -> Vec<Lin
             scope.spawn(move || {
                 while !is_over.load(Ordering::Relaxed) {
                     let index = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(case) = cases.get(index / plan.methods.len().max(1)).filter(|_| index < count) else { break };
+                    let Some(case) = cases.get(index / plan.methods.len().max(1)).filter(|_| index < count)
+                    else {
+                        break;
+                    };
                     let cell = cell(case, plan.methods[index % plan.methods.len()], plan.max_evaluations);
                     if send.send((index, cell)).is_err() {
                         break;
@@ -203,19 +216,34 @@ fn known(case: &Case) -> Case {
     let end = || {
         let (scene, mechanism) = prepared(case).ok()?;
         let start = mechanism.start(&scene);
-        let request =
-            Request { method: Some(MethodId::Taylor), every: Some(scene.until), max_evaluations: Some(EXPANSIONS), ..Request::default() };
+        let request = Request {
+            method: Some(MethodId::Taylor),
+            every: Some(scene.until),
+            max_evaluations: Some(EXPANSIONS),
+            ..Request::default()
+        };
         let plan = Plan::new(&scene, &mechanism, &request).ok()?;
-        let trial = integrate(Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).ok()?, &mut |_| Ok(())).ok()?;
-        let found = reference(&mechanism, &start, &[trial.stop.is_none().then_some(scene.until)?.into()]).ok()?;
+        let trial =
+            integrate(Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).ok()?, &mut |_| {
+                Ok(())
+            })
+            .ok()?;
+        let found =
+            reference(&mechanism, &start, &[trial.stop.is_none().then_some(scene.until)?.into()]).ok()?;
         // What it is off must be nothing beside the tolerance.
         let is_known = found.accuracy.iter().all(|&accuracy| accuracy <= 1e-3 * case.tolerance);
         let motion = found.motions.last().filter(|_| is_known)?;
         let bodies = mechanism.bodies.len();
-        let angles = (0..bodies).map(|k| (motion.phi[k] + DoubleDouble::TAU.scale(motion.turns[k] as f64)).hi).collect();
+        let angles = (0..bodies)
+            .map(|k| (motion.phi[k] + DoubleDouble::TAU.scale(motion.turns[k] as f64)).hi)
+            .collect();
         Some(Expected::End { angles, rates: motion.omega[..bodies].iter().map(|omega| omega.hi).collect() })
     };
-    let expected = if case.expected == Expected::Unknown { end().unwrap_or(Expected::Unknown) } else { case.expected.clone() };
+    let expected = if case.expected == Expected::Unknown {
+        end().unwrap_or(Expected::Unknown)
+    } else {
+        case.expected.clone()
+    };
     Case { expected, ..case.clone() }
 }
 
@@ -234,7 +262,9 @@ pub fn cell(case: &Case, method: MethodId, max_evaluations: u64) -> Cell {
         refusal: None,
     };
     let refusal = match prepared(case) {
-        Ok((scene, mechanism)) => Trial { case, scene: &scene, mechanism: &mechanism, method, max_evaluations }.run(&mut cell).err(),
+        Ok((scene, mechanism)) => {
+            Trial { case, scene: &scene, mechanism: &mechanism, method, max_evaluations }.run(&mut cell).err()
+        }
         Err(refusal) => Some(refusal),
     };
     cell.refusal = refusal;
@@ -301,12 +331,14 @@ impl Trial<'_> {
         let mut before: Option<End> = None;
         for refinement in 0..=REFINEMENTS {
             let request = self.request(refinement, cell)?;
-            let plan = Plan::new(self.scene, self.mechanism, &request).map_err(|refusal| refusal.to_string())?;
+            let plan =
+                Plan::new(self.scene, self.mechanism, &request).map_err(|refusal| refusal.to_string())?;
             cell.setting = Some(setting(&plan));
             let start = self.mechanism.start(self.scene);
             cell.runs += 1;
             let outcome = match Run::new(Arc::clone(self.mechanism), plan, Limits::default(), &start) {
-                Ok(run) => integrate(run.trusted(Level::Auto, &start), &mut |_| Ok(())).map_err(|error| error.to_string())?,
+                Ok(run) => integrate(run.trusted(Level::Auto, &start), &mut |_| Ok(()))
+                    .map_err(|error| error.to_string())?,
                 Err(stop) => {
                     cell.stop = Some(stop);
                     return Ok(());
@@ -317,8 +349,10 @@ impl Trial<'_> {
             cell.stop = outcome.stop.clone();
             if let Some(stop) = &outcome.stop {
                 // A finer setting may mend what is no matter of effort.
-                if matches!(stop.cause, Cause::NotConverged | Cause::ProjectionFailed | Cause::DriftLimit | Cause::BranchLost)
-                    && self.is_left(cell)
+                if matches!(
+                    stop.cause,
+                    Cause::NotConverged | Cause::ProjectionFailed | Cause::DriftLimit | Cause::BranchLost
+                ) && self.is_left(cell)
                 {
                     before = None;
                     continue;
@@ -327,9 +361,12 @@ impl Trial<'_> {
             }
             let end = self.end(&outcome);
             self.score(&outcome, &end, cell);
-            // What a run knows is the error of its angles, and it knows the more the smoother its motion: where that is not far below what is asked for, and
-            // for the rates, a finer run has its say.
-            let known = outcome.trust.as_ref().filter(|trust| trust.how == How::ReferenceSolution && trust.at >= self.scene.until);
+            // What a run knows is the error of its angles, and it knows the more the smoother its motion:
+            // where that is not far below what is asked for, and for the rates, a finer run has its say.
+            let known = outcome
+                .trust
+                .as_ref()
+                .filter(|trust| trust.how == How::ReferenceSolution && trust.at >= self.scene.until);
             let known = known.and_then(|trust| trust.error_estimate);
             let finer = before.as_ref().map(|before| MARGIN * end.apart(before));
             cell.estimate = match (known, finer) {
@@ -361,7 +398,12 @@ impl Trial<'_> {
     fn request(&self, refinement: u32, cell: &Cell) -> Result<Request, String> {
         let horizon = self.scene.until;
         let max_evaluations = Some(self.max_evaluations.saturating_sub(cell.evaluations).max(1));
-        let request = Request { method: Some(self.method), every: Some(horizon / 100.0), max_evaluations, ..Request::default() };
+        let request = Request {
+            method: Some(self.method),
+            every: Some(horizon / 100.0),
+            max_evaluations,
+            ..Request::default()
+        };
         if self.method.is_adaptive() {
             let tolerance = (Tolerance::default().relative * FINER.0.powi(refinement as i32)).max(LEAST);
             return Ok(Request { rtol: Some(tolerance), ..request });
@@ -388,7 +430,9 @@ impl Trial<'_> {
     /// What the end is off, where that is known.
     fn score(&self, outcome: &Outcome, end: &End, cell: &mut Cell) {
         cell.error = match &self.case.expected {
-            Expected::End { angles, rates } => Some(end.apart(&End { angles: angles.clone(), rates: rates.clone() })),
+            Expected::End { angles, rates } => {
+                Some(end.apart(&End { angles: angles.clone(), rates: rates.clone() }))
+            }
             Expected::Energy | Expected::Stop(_) => Some(outcome.drift.energy.max),
             Expected::Refusal | Expected::Unknown => None,
         };

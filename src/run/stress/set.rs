@@ -1,8 +1,9 @@
 //! The shipped set of stiff and extreme scenes, and where each ends.
 //!
-//! Ends were computed with 113 bits by two orders of a power series that agree to 1e-16, from the very doubles of the scene files, or by the series with its
-//! first orders in double-double, checked by `dp8` to 1e-10 and better.  Those at stiffness 1e12 are of the spring at rest, 4e-12 away from the true motion, and that of
-//! the parallelogram is of its one degree of freedom.
+//! Ends were computed with 113 bits by two orders of a power series that agree to 1e-16, from the very
+//! doubles of the scene files, or by the series with its first orders in double-double, checked by `dp8` to
+//! 1e-10 and better.  Those at stiffness 1e12 are of the spring at rest, 4e-12 away from the true motion, and
+//! that of the parallelogram is of its one degree of freedom.
 
 use super::{Case, Expected};
 
@@ -11,7 +12,8 @@ struct Entry(&'static str, &'static str, f64, End);
 
 /// What is expected, as constants.
 enum End {
-    /// Angles \[rad\] and, unless they say too little where vibrations are fast, rates \[rad/s\] of the last bodies.
+    /// Angles \[rad\] and, unless they say too little where vibrations are fast, rates \[rad/s\] of the last
+    /// bodies.
     At(&'static [f64], &'static [f64]),
     Energy,
     Refusal,

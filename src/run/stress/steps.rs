@@ -51,9 +51,11 @@ pub struct StabilityMap {
 /// Error below which an end is right \[rad\].
 const RIGHT: f64 = 1e-4;
 
-/// Runs a fixed-step method with every step at every stiffness; `finished` may end it with false, and gets the cells done and all there are.
+/// Runs a fixed-step method with every step at every stiffness; `finished` may end it with false, and gets
+/// the cells done and all there are.
 ///
-/// The scene is that of the source's spring, released from its free length.  A run that comes to its end is compared with the power series at 1e-13.
+/// The scene is that of the source's spring, released from its free length.  A run that comes to its end is
+/// compared with the power series at 1e-13.
 pub fn stability(method: MethodId, finished: &mut dyn FnMut(usize, usize) -> bool) -> Option<StabilityMap> {
     let mut scene = parse_scene(SCENE, "spring_1.json", &[]).ok()?;
     (scene.until, scene.every) = (UNTIL, UNTIL);
@@ -67,7 +69,12 @@ pub fn stability(method: MethodId, finished: &mut dyn FnMut(usize, usize) -> boo
         let exact = End::of(&run(&scene, &mechanism, &exact)?.last, 2);
         for halvings in HALVINGS.rev() {
             let step = UNTIL / libm::exp2(f64::from(halvings));
-            let request = Request { method: Some(method), step: Some(step), max_evaluations: Some(MAX_EVALUATIONS), ..Request::default() };
+            let request = Request {
+                method: Some(method),
+                step: Some(step),
+                max_evaluations: Some(MAX_EVALUATIONS),
+                ..Request::default()
+            };
             let outcome = run(&scene, &mechanism, &request)?;
             let end = End { rates: Vec::new(), ..End::of(&outcome.last, 2) };
             let error = outcome.stop.is_none().then(|| end.apart(&exact));
@@ -87,5 +94,9 @@ pub fn stability(method: MethodId, finished: &mut dyn FnMut(usize, usize) -> boo
 
 fn run(scene: &Scene, mechanism: &Arc<Mechanism>, request: &Request) -> Option<Outcome> {
     let plan = Plan::new(scene, mechanism, request).ok()?;
-    integrate(Run::new(Arc::clone(mechanism), plan, Limits::default(), &mechanism.start(scene)).ok()?, &mut |_| Ok(())).ok()
+    integrate(
+        Run::new(Arc::clone(mechanism), plan, Limits::default(), &mechanism.start(scene)).ok()?,
+        &mut |_| Ok(()),
+    )
+    .ok()
 }

@@ -40,10 +40,18 @@ impl FromStr for Vary {
         let (name, range) = given.split_once('=').ok_or_else(|| fail("there is no ="))?;
         let (ends, count) = range.rsplit_once(':').ok_or_else(|| fail("there is no :COUNT"))?;
         let (from, to) = ends.split_once("..").ok_or_else(|| fail("there is no .. between two numbers"))?;
-        let end = |text: &str| number(text).ok_or_else(|| fail(&format!("`{text}` is not a number; write 0.1, 1e-3, 1/64, pi/2 or 0.5pi")));
+        let end = |text: &str| {
+            number(text).ok_or_else(|| {
+                fail(&format!("`{text}` is not a number; write 0.1, 1e-3, 1/64, pi/2 or 0.5pi"))
+            })
+        };
         let (from, to) = (end(from)?, end(to)?);
-        let count =
-            count.trim().parse().ok().filter(|&count: &u64| count > 0).ok_or_else(|| fail("COUNT must be a whole number from 1"))?;
+        let count = count
+            .trim()
+            .parse()
+            .ok()
+            .filter(|&count: &u64| count > 0)
+            .ok_or_else(|| fail("COUNT must be a whole number from 1"))?;
         if name.trim().is_empty() {
             return Err(fail("there is no NAME"));
         }
@@ -78,7 +86,8 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// The grid of these axes; `None` where it has more points than 2⁶⁴ - 1.  It takes no memory for its points.
+    /// The grid of these axes; `None` where it has more points than 2⁶⁴ - 1.  It takes no memory for its
+    /// points.
     pub fn new(axes: Vec<Vary>) -> Option<Self> {
         let count = axes.iter().try_fold(1_u64, |count, axis| count.checked_mul(axis.count))?;
         Some(Self { axes, count })
@@ -147,7 +156,10 @@ mod tests {
         assert_eq!((vary.value(0), vary.value(256), vary.value(512)), (-PI, 0.0, PI));
         assert!((0..513).all(|i| vary.value(i) == -vary.value(512 - i)));
         let tenths: Vary = "a=0..1:11".parse().expect("a range");
-        assert_eq!((0..11).map(|i| tenths.value(i)).collect::<Vec<_>>(), [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]);
+        assert_eq!(
+            (0..11).map(|i| tenths.value(i)).collect::<Vec<_>>(),
+            [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]
+        );
     }
 
     #[test]
@@ -157,7 +169,10 @@ mod tests {
         let points: Vec<Vec<f64>> = (0..grid.count()).map(|index| grid.values(index)).collect();
         assert_eq!(points, [[0.0, 0.0], [0.0, 1.0], [0.0, 2.0], [1.0, 0.0], [1.0, 1.0], [1.0, 2.0]]);
         let many = || axis("a=0..1:1000000");
-        assert_eq!(Grid::new(vec![many(), many(), many()]).map(|grid| grid.count()), Some(1_000_000_000_000_000_000));
+        assert_eq!(
+            Grid::new(vec![many(), many(), many()]).map(|grid| grid.count()),
+            Some(1_000_000_000_000_000_000)
+        );
         assert_eq!(Grid::new(vec![many(); 4]), None);
     }
 }

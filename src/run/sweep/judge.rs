@@ -1,7 +1,10 @@
-//! How far the points of a sweep may be trusted: in lanes by a second integration at a hundredth of the tolerance beside the first.
+//! How far the points of a sweep may be trusted: in lanes by a second integration at a hundredth of the
+//! tolerance beside the first.
 //!
-//! The second integration has an order of its own, so that steps that end at the same output times have other errors.  Both are compared at the output times and where
-//! a point ends, and the horizon is interpolated between these.  Beside an integration at 1e-9 both together cost 2.2 times as much (32 points of `free`, counted instructions).
+//! The second integration has an order of its own, so that steps that end at the same output times have other
+//! errors.  Both are compared at the output times and where a point ends, and the horizon is interpolated
+//! between these.  Beside an integration at 1e-9 both together cost 2.2 times as much (32 points of `free`,
+//! counted instructions).
 
 use super::point::Ready;
 use crate::arithmetic::{DoubleDouble, Scalar};
@@ -22,7 +25,8 @@ const ORDER: usize = 24;
 /// How far a point may be trusted.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PointTrust {
-    /// The largest error of an angle \[rad\] up to the end, or up to the horizon; `None` where it is not known.
+    /// The largest error of an angle \[rad\] up to the end, or up to the horizon; `None` where it is not
+    /// known.
     pub error: Option<f64>,
     /// The first time it passes 1e-3 rad \[s\].
     pub horizon: Option<f64>,
@@ -69,7 +73,11 @@ impl<'a> Judge<'a> {
             member.statistics.max_evaluations = ready.plan.max_evaluations.saturating_mul(2);
             member
         };
-        Self { batch, members: ready.iter().map(member).collect(), known: vec![Known::default(); ready.len()] }
+        Self {
+            batch,
+            members: ready.iter().map(member).collect(),
+            known: vec![Known::default(); ready.len()],
+        }
     }
 
     /// Goes on to an output time, and compares all points: at their ends, where these come before it.

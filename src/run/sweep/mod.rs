@@ -1,8 +1,10 @@
 //! Sweeps: many runs of one scene over a grid of starts and parameters.
 //!
-//! Every point is a run of its own, with the same result whichever thread integrates it and whoever its neighbours are, so that what comes out does not
-//! depend on the number of threads.  Points are handed out in chunks, of which a bounded number is under way; results are shown in the order of the
-//! grid, and memory does not grow with it.  A point that cannot be run, or stops, says so in its own result and ends nothing else.
+//! Every point is a run of its own, with the same result whichever thread integrates it and whoever its
+//! neighbours are, so that what comes out does not depend on the number of threads.  Points are handed out in
+//! chunks, of which a bounded number is under way; results are shown in the order of the grid, and memory
+//! does not grow with it.  A point that cannot be run, or stops, says so in its own result and ends nothing
+//! else.
 //!
 //! ```
 //! use driftless::run::{Request, Sweep, Vary, sweep};
@@ -127,7 +129,8 @@ pub struct Totals {
     pub skipped: u64,
     /// Points in which a bar turned over.
     pub flipped: u64,
-    /// Points done whose error was estimated, and those of them that are in doubt: see [`PointTrust::is_doubtful`].
+    /// Points done whose error was estimated, and those of them that are in doubt: see
+    /// [`PointTrust::is_doubtful`].
     pub judged: u64,
     /// See `judged`.
     pub doubtful: u64,
@@ -135,7 +138,8 @@ pub struct Totals {
     pub steps: u64,
     /// Largest energy drift among those done, over the energy scale, and the point's number.
     pub energy: (f64, u64),
-    /// Largest violation of a constraint among those done, at position \[rad or m\] and velocity level, whichever point.
+    /// Largest violation of a constraint among those done, at position \[rad or m\] and velocity level,
+    /// whichever point.
     pub constraint: [f64; 2],
     /// Threads used.
     pub threads: usize,
@@ -146,18 +150,24 @@ pub struct Totals {
 impl Sweep {
     /// Prepares a sweep over the grid of `vary`, the first of which varies slowest.
     ///
-    /// Without a method of its own a request gets `taylor` where points can be integrated several at a time, else the one a single run would get; without an
-    /// output interval, drift is looked at eight times on the way.
+    /// Without a method of its own a request gets `taylor` where points can be integrated several at a time,
+    /// else the one a single run would get; without an output interval, drift is looked at eight times on the
+    /// way.
     ///
     /// # Errors
-    /// A scene that is none as it stands, a value it does not have, a request that makes no sense for it, or more than 1e9 points.
+    /// A scene that is none as it stands, a value it does not have, a request that makes no sense for it, or
+    /// more than 1e9 points.
     pub fn new(template: &Template, vary: Vec<Vary>, request: &Request) -> Result<Self, SweepError> {
         let scene = template.scene()?;
         let mechanism = Arc::new(Mechanism::new(&scene)?);
-        let variables = vary.iter().map(|vary| template.variable(&vary.name)).collect::<Result<Vec<_>, _>>()?;
+        let variables =
+            vary.iter().map(|vary| template.variable(&vary.name)).collect::<Result<Vec<_>, _>>()?;
         let grid = grid(vary, &variables)?;
         let mut request = request.clone();
-        let in_lanes = request.method.is_none() && request.step.is_none() && !request.extended && Batch::takes(&mechanism);
+        let in_lanes = request.method.is_none()
+            && request.step.is_none()
+            && !request.extended
+            && Batch::takes(&mechanism);
         if in_lanes {
             request.method = Some(MethodId::Taylor);
         }
@@ -197,13 +207,15 @@ impl Sweep {
         Self { skips: Some(Box::new(skips)), ..self }
     }
 
-    /// The same, where a point is refused of which something given for the start must change to fit its constraints.
+    /// The same, where a point is refused of which something given for the start must change to fit its
+    /// constraints.
     pub fn strictly(self) -> Self {
         Self { is_strict: true, ..self }
     }
 
-    /// The same with an estimate of the error of every point: in lanes by a second sweep at a hundredth of the tolerance, compared at the output times, else
-    /// (and with [`Level::Full`] always) as single runs have it.  No point changes by it.
+    /// The same with an estimate of the error of every point: in lanes by a second sweep at a hundredth of
+    /// the tolerance, compared at the output times, else (and with [`Level::Full`] always) as single runs
+    /// have it.  No point changes by it.
     pub fn trusted(self, trust: Level) -> Self {
         Self { trust, ..self }
     }
@@ -213,7 +225,8 @@ impl Sweep {
         self.trust
     }
 
-    /// The same with points that end when a bar turns over, at the end of that step or at the next output time.
+    /// The same with points that end when a bar turns over, at the end of that step or at the next output
+    /// time.
     pub fn ending_at_flips(self) -> Self {
         Self { ends_at_flips: true, ..self }
     }
@@ -257,14 +270,22 @@ impl Sweep {
 }
 
 fn grid(vary: Vec<Vary>, variables: &[Variable]) -> Result<Grid, Refusal> {
-    let refused =
-        |what: String, reason: String, alternative: &str| Refusal { is_usage: true, what, reason, alternative: alternative.into() };
+    let refused = |what: String, reason: String, alternative: &str| Refusal {
+        is_usage: true,
+        what,
+        reason,
+        alternative: alternative.into(),
+    };
     if vary.is_empty() {
         return Err(refused("a sweep".into(), "nothing is varied".into(), "--vary bar1.phi=-pi..pi:64"));
     }
     for (k, variable) in variables.iter().enumerate() {
         if variables[..k].iter().any(|before| before.path == variable.path) {
-            return Err(refused(format!("--vary {}", variable.path), "it is varied twice".into(), "leave one of the two out"));
+            return Err(refused(
+                format!("--vary {}", variable.path),
+                "it is varied twice".into(),
+                "leave one of the two out",
+            ));
         }
     }
     let counts = vary.iter().map(|vary| vary.count.to_string()).collect::<Vec<_>>().join(" × ");
@@ -310,7 +331,8 @@ impl Shared<'_> {
     }
 }
 
-/// Runs all points of a sweep on so many threads (0: as many as there are processors) and shows them to `observer` in the order of the grid.
+/// Runs all points of a sweep on so many threads (0: as many as there are processors) and shows them to
+/// `observer` in the order of the grid.
 ///
 /// Without the feature `threads` there is one.
 ///
@@ -324,7 +346,12 @@ pub fn sweep(sweep: &Sweep, threads: usize, observer: &mut dyn PointObserver) ->
 ///
 /// # Errors
 /// As [`sweep`].
-pub fn sweep_on(sweep: &Sweep, threads: usize, seen: Totals, observer: &mut dyn PointObserver) -> Result<Totals, SweepError> {
+pub fn sweep_on(
+    sweep: &Sweep,
+    threads: usize,
+    seen: Totals,
+    observer: &mut dyn PointObserver,
+) -> Result<Totals, SweepError> {
     let begin = Instant::now();
     let available = || std::thread::available_parallelism().map_or(1, usize::from);
     let threads = if cfg!(not(feature = "threads")) {
@@ -335,8 +362,15 @@ pub fn sweep_on(sweep: &Sweep, threads: usize, seen: Totals, observer: &mut dyn 
         threads
     };
     let first = seen.points().min(sweep.grid.count());
-    let shared = Shared { sweep, chunk: sweep.chunk(threads), first, finished: AtomicU64::new(first), is_over: AtomicBool::new(false) };
-    let mut sweep_observer = SweepObserver { observer, begin, before: seen.wall, totals: Totals { threads, ..seen } };
+    let shared = Shared {
+        sweep,
+        chunk: sweep.chunk(threads),
+        first,
+        finished: AtomicU64::new(first),
+        is_over: AtomicBool::new(false),
+    };
+    let mut sweep_observer =
+        SweepObserver { observer, begin, before: seen.wall, totals: Totals { threads, ..seen } };
     #[cfg(feature = "threads")]
     threads::integrate(&shared, threads, &mut sweep_observer)?;
     #[cfg(not(feature = "threads"))]

@@ -51,7 +51,8 @@ pub struct Point {
     pub omega: Vec<f64>,
     /// Largest drift of energy, or energy minus work, over the energy scale.
     pub energy: f64,
-    /// Largest violation of any constraint, at position \[rad or m\] and velocity level \[rad/s or m/s\], where there are any.
+    /// Largest violation of any constraint, at position \[rad or m\] and velocity level \[rad/s or m/s\],
+    /// where there are any.
     pub constraint: Option<[f64; 2]>,
     /// Steps taken.
     pub steps: u64,
@@ -74,11 +75,20 @@ pub(super) struct Ready {
 impl Sweep {
     /// Runs one point; the same as in a whole sweep.
     pub fn point(&self, index: u64) -> Option<Point> {
-        if index < self.grid.count() { self.integrate(index..index + 1, &|| (), &|| false).pop() } else { None }
+        if index < self.grid.count() {
+            self.integrate(index..index + 1, &|| (), &|| false).pop()
+        } else {
+            None
+        }
     }
 
     /// Runs points; tells of each that is `finished`, and gives up where all `is_over`.
-    pub(super) fn integrate(&self, points: Range<u64>, finished: &dyn Fn(), is_over: &dyn Fn() -> bool) -> Vec<Point> {
+    pub(super) fn integrate(
+        &self,
+        points: Range<u64>,
+        finished: &dyn Fn(),
+        is_over: &dyn Fn() -> bool,
+    ) -> Vec<Point> {
         let mut found = Vec::with_capacity((points.end - points.start) as usize);
         let mut in_lanes = Vec::new();
         for index in points {
@@ -160,7 +170,8 @@ impl Sweep {
             let plan = if self.plan.method.is_adaptive() {
                 self.plan.clone()
             } else {
-                Plan::new(&scene, &self.mechanism, &timed(&self.request, &scene)).map_err(|refusal| refusal.to_string())?
+                Plan::new(&scene, &self.mechanism, &timed(&self.request, &scene))
+                    .map_err(|refusal| refusal.to_string())?
             };
             return Ok((Arc::clone(&self.mechanism), plan, start, scale));
         }
@@ -169,7 +180,8 @@ impl Sweep {
         if let (true, Some(change)) = (self.is_strict, mechanism.assembly.changes.first()) {
             return Err(change.to_string());
         }
-        let plan = Plan::new(&scene, &mechanism, &timed(&self.request, &scene)).map_err(|refusal| refusal.to_string())?;
+        let plan = Plan::new(&scene, &mechanism, &timed(&self.request, &scene))
+            .map_err(|refusal| refusal.to_string())?;
         let (start, scale) = (mechanism.start(&scene), mechanism.energy_scale);
         Ok((mechanism, plan, start, scale))
     }
@@ -177,8 +189,11 @@ impl Sweep {
     /// Runs a point as a single run would; one that is given up is not worth a look.
     fn single(&self, ready: Ready, is_over: &dyn Fn() -> bool) -> Point {
         let Ready { mut point, mechanism, plan, start, scale } = ready;
-        let mechanism =
-            if scale == mechanism.energy_scale { mechanism } else { Arc::new(Mechanism { energy_scale: scale, ..(*mechanism).clone() }) };
+        let mechanism = if scale == mechanism.energy_scale {
+            mechanism
+        } else {
+            Arc::new(Mechanism { energy_scale: scale, ..(*mechanism).clone() })
+        };
         let mut running = match Run::new(mechanism, plan, self.limits, &start) {
             Ok(run) => Running::new(run.of_ensemble(self.ends_at_flips).trusted(self.trust, &start)),
             Err(stop) => {
@@ -189,7 +204,11 @@ impl Sweep {
         let outcome = running.go(&mut |_| Ok(()), &mut || is_over()).map(|_| running.finish());
         match outcome {
             Ok(outcome) => {
-                let levels = outcome.drift.constraints.iter().map(|(_, [position, velocity])| [position.max, velocity.max]);
+                let levels = outcome
+                    .drift
+                    .constraints
+                    .iter()
+                    .map(|(_, [position, velocity])| [position.max, velocity.max]);
                 point.t = outcome.last.t;
                 point.phi = outcome.last.phi;
                 point.omega = outcome.last.omega;
@@ -237,7 +256,11 @@ impl Sweep {
                 if lane.point.flip.is_none() {
                     lane.look(bodies, passage);
                 }
-                if (self.ends_at_flips && lane.point.flip.is_some()) || is_over() { Going::Enough } else { Going::On }
+                if (self.ends_at_flips && lane.point.flip.is_some()) || is_over() {
+                    Going::Enough
+                } else {
+                    Going::On
+                }
             });
             if is_over() {
                 return found;
@@ -333,7 +356,13 @@ impl Lane {
         point.omega = motion.omega.iter().map(|omega| omega.hi).collect();
         point.steps = member.statistics.steps;
         if let Some(allowance) = &self.allowance {
-            let moment = Moment { omega: &point.omega, translations: &[], work: 0.0, largest: self.scale, steps: point.steps };
+            let moment = Moment {
+                omega: &point.omega,
+                translations: &[],
+                work: 0.0,
+                largest: self.scale,
+                steps: point.steps,
+            };
             self.limit.see(allowance, &moment);
         }
         let limit = stated.unwrap_or(self.limit.most);
@@ -347,15 +376,18 @@ impl Lane {
         };
         let stopped = match &member.stopped {
             Some(stopped) => Some(stopped.clone()),
-            None if point.energy.is_nan() => {
-                Some(stop(Cause::NotFinite, "the energy is not finite".into(), "look for rates far out of proportion"))
-            }
+            None if point.energy.is_nan() => Some(stop(
+                Cause::NotFinite,
+                "the energy is not finite".into(),
+                "look for rates far out of proportion",
+            )),
             None if state.turns.iter().any(|turns| turns.unsigned_abs() > MOST_TURNS) => {
                 let what = "a body has turned more often than doubles can count".into();
                 Some(stop(Cause::NotFinite, what, "look for rates far out of proportion"))
             }
             None if point.energy > limit => {
-                let what = format!("energy is off by {:.2e} of the scale, the limit is {limit:.1e}", point.energy);
+                let what =
+                    format!("energy is off by {:.2e} of the scale, the limit is {limit:.1e}", point.energy);
                 Some(stop(Cause::DriftLimit, what, "tighten the tolerance"))
             }
             None => None,

@@ -1,4 +1,5 @@
-//! The points of a sweep as a table: one row a point, units in the header, digits that read back to the same doubles.
+//! The points of a sweep as a table: one row a point, units in the header, digits that read back to the same
+//! doubles.
 
 use super::{Point, Status, Sweep};
 use crate::run::trust::Level;
@@ -14,8 +15,10 @@ pub struct SweepTable<W: Write> {
 
 /// The columns of a sweep's table: what is varied, then what came of it.
 pub fn columns(sweep: &Sweep) -> Vec<String> {
-    let with_unit = |name: &str, unit: &str| if unit.is_empty() { name.to_owned() } else { format!("{name} [{unit}]") };
-    let mut columns: Vec<String> = sweep.variables().iter().map(|variable| with_unit(&variable.path, variable.unit)).collect();
+    let with_unit =
+        |name: &str, unit: &str| if unit.is_empty() { name.to_owned() } else { format!("{name} [{unit}]") };
+    let mut columns: Vec<String> =
+        sweep.variables().iter().map(|variable| with_unit(&variable.path, variable.unit)).collect();
     columns.push("t [s]".to_owned());
     for body in &sweep.mechanism().bodies {
         columns.extend([format!("{}.phi [rad]", body.name), format!("{}.omega [rad/s]", body.name)]);
@@ -24,7 +27,10 @@ pub fn columns(sweep: &Sweep) -> Vec<String> {
     columns.push("energy_drift [1]".to_owned());
     columns.extend([
         format!("constraint_drift [{unit}]"),
-        format!("constraint_rate_drift [{}]", unit.split(" or ").map(|unit| format!("{unit}/s")).collect::<Vec<_>>().join(" or ")),
+        format!(
+            "constraint_rate_drift [{}]",
+            unit.split(" or ").map(|unit| format!("{unit}/s")).collect::<Vec<_>>().join(" or ")
+        ),
     ]);
     if sweep.trust() != Level::Off {
         columns.extend(["error_estimate [rad]", "horizon [s]"].map(str::to_owned));
@@ -33,7 +39,8 @@ pub fn columns(sweep: &Sweep) -> Vec<String> {
     columns
 }
 
-/// The numbers of a point's row, in the order of [`columns`] up to the flip time; not a number where there is none.
+/// The numbers of a point's row, in the order of [`columns`] up to the flip time; not a number where there is
+/// none.
 pub fn numbers(point: &Point, bars: usize, is_judged: bool) -> Vec<f64> {
     let mut numbers = point.values.clone();
     if point.phi.is_empty() {
@@ -70,7 +77,12 @@ impl<W: Write> SweepTable<W> {
     pub fn going_on(sweep: &Sweep, writer: W) -> Self {
         let bars = sweep.mechanism().bodies.iter().map(|body| body.name.clone()).collect();
         let is_judged = sweep.trust() != Level::Off;
-        Self { writer: csv::Writer::from_writer(writer), bars, is_judged, fields: vec![String::new(); columns(sweep).len()] }
+        Self {
+            writer: csv::Writer::from_writer(writer),
+            bars,
+            is_judged,
+            fields: vec![String::new(); columns(sweep).len()],
+        }
     }
 
     /// The writer, once it has every row.

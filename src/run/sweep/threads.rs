@@ -6,7 +6,8 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
-/// Chunks a thread that are under way or waiting to be seen: one slow chunk does not hold the others up at once, and memory stays bounded.
+/// Chunks a thread that are under way or waiting to be seen: one slow chunk does not hold the others up at
+/// once, and memory stays bounded.
 const AHEAD: u64 = 16;
 /// Longest time without telling how far it is.
 const TICK: Duration = Duration::from_millis(100);
@@ -29,8 +30,15 @@ impl Drop for PanicNotifier {
 }
 
 /// Integrates all chunks and shows them in order.
-pub(super) fn integrate(shared: &Shared, threads: usize, sweep_observer: &mut SweepObserver) -> Result<(), SweepError> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| SweepError::Threads(error.to_string()))?;
+pub(super) fn integrate(
+    shared: &Shared,
+    threads: usize,
+    sweep_observer: &mut SweepObserver,
+) -> Result<(), SweepError> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|error| SweepError::Threads(error.to_string()))?;
     let (send, receive) = channel::<Finished>();
     pool.in_place_scope(|scope| {
         let (chunks, ahead) = (shared.chunks(), AHEAD * threads as u64);

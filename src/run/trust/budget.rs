@@ -1,7 +1,9 @@
-//! What a reference solution may cost: a share of the run's work, counted and not clocked, so that the figures are the same on every machine.
+//! What a reference solution may cost: a share of the run's work, counted and not clocked, so that the
+//! figures are the same on every machine.
 //!
-//! Work is measured in nanoseconds of the machine the constants were taken on.  They need to be right within a factor of two or so; what the reference solution
-//! really costs beside runs of the shipped scenes is what `.ci/cost` counts.
+//! Work is measured in nanoseconds of the machine the constants were taken on.  They need to be right within
+//! a factor of two or so; what the reference solution really costs beside runs of the shipped scenes is what
+//! `.ci/cost` counts.
 
 use crate::dynamics::Mechanism;
 use crate::run::build::order_in_double_double;
@@ -11,19 +13,23 @@ use crate::stepping::{Statistics, Taylor};
 
 /// Largest share of the run's work that its reference solution may take.
 pub const SHARE: f64 = 0.3;
-/// Work that is free: what nobody notices at the end of a run, and of runs of fixed steps or near rounding, whose reference solutions cost most beside them.
+/// Work that is free: what nobody notices at the end of a run, and of runs of fixed steps or near rounding,
+/// whose reference solutions cost most beside them.
 pub const GRACE: [f64; 2] = [20e6, 50e6];
-/// Share and work free of charge of a reference solution in double-double, where the run is not near rounding.
+/// Share and work free of charge of a reference solution in double-double, where the run is not near
+/// rounding.
 pub const DOUBLE_DOUBLE: [f64; 2] = [0.05, 100e3];
 /// The same of the tangent flow from Jacobians, and from series on dual numbers.
 pub const FLOW: [[f64; 2]; 2] = [[0.5, 200e3], [0.15, 120e3]];
 
-/// The same where the estimate is to be had at all costs: thirty times the run's work, and five seconds that nobody asks after.
+/// The same where the estimate is to be had at all costs: thirty times the run's work, and five seconds that
+/// nobody asks after.
 pub const FULL_SHARE: f64 = 30.0;
 /// See [`FULL_SHARE`].
 pub const FULL_GRACE: f64 = 5e9;
 
-/// A step of the series in double-double over one of the series in doubles of the same order, by counted instructions.
+/// A step of the series in double-double over one of the series in doubles of the same order, by counted
+/// instructions.
 const WIDE: f64 = 8.0;
 
 /// Prices of a mechanism's parts.
@@ -41,7 +47,10 @@ impl Prices {
     /// Those of a mechanism, for the plans of a reference solution and of its run.
     pub fn new(mechanism: &Mechanism, error_estimator: &Plan, run: &Plan) -> Self {
         let (n, rows) = (mechanism.coordinates() as f64, mechanism.constraints.len() as f64);
-        let forces = (mechanism.springs.len() + mechanism.torsions.len() + mechanism.actions.len() + mechanism.forces.len()) as f64;
+        let forces = (mechanism.springs.len()
+            + mechanism.torsions.len()
+            + mechanism.actions.len()
+            + mechanism.forces.len()) as f64;
         let goes_bodywise = mechanism.recursion.is_some();
         let matrices = if goes_bodywise { 7.0 * n } else { 4.0 * n * n };
         let evaluation = 15.0 + 20.0 * n + matrices + 60.0 * rows + 20.0 * forces;
@@ -78,6 +87,7 @@ impl Prices {
 
     /// The work of a run so far, its output left out: estimates do not depend on that.
     pub fn run(&self, method: MethodId, statistics: Statistics) -> f64 {
-        statistics.evaluations as f64 * if method == MethodId::Taylor { self.series[1] } else { self.evaluation }
+        statistics.evaluations as f64
+            * if method == MethodId::Taylor { self.series[1] } else { self.evaluation }
     }
 }

@@ -4,7 +4,8 @@ use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Mechanism, Motion};
 use crate::run::drift::larger;
 
-/// Measures distances: angles as they are \[rad\], positions of translational coordinates over the mechanism's size.
+/// Measures distances: angles as they are \[rad\], positions of translational coordinates over the
+/// mechanism's size.
 #[derive(Clone, Copy, Debug)]
 pub struct DistanceMetric {
     /// How many coordinates are angles; the others are positions.
@@ -16,7 +17,11 @@ pub struct DistanceMetric {
 impl DistanceMetric {
     /// The ruler of a mechanism.
     pub fn new(mechanism: &Mechanism) -> Self {
-        let bars = mechanism.bodies.iter().map(|body| (body.ends[1] - body.ends[0]).norm_squared().sqrt()).fold(0.0, f64::max);
+        let bars = mechanism
+            .bodies
+            .iter()
+            .map(|body| (body.ends[1] - body.ends[0]).norm_squared().sqrt())
+            .fold(0.0, f64::max);
         let arms = mechanism.bodies.iter().map(|body| body.centre.norm_squared().sqrt()).fold(0.0, f64::max);
         let size = if bars > 0.0 { bars } else { arms };
         Self { angles: mechanism.bodies.len(), size: if size > 0.0 { size } else { 1.0 } }
@@ -27,7 +32,8 @@ impl DistanceMetric {
         if k < self.angles { 1.0 } else { 1.0 / self.size }
     }
 
-    /// The largest difference of a coordinate, whole turns counted: an angle \[rad\], or a position over the size.  Not a number where one of them is not.
+    /// The largest difference of a coordinate, whole turns counted: an angle \[rad\], or a position over the
+    /// size.  Not a number where one of them is not.
     pub fn apart(&self, one: &Motion, other: &Motion) -> f64 {
         let difference = |k: usize| {
             let turns = one.turns[k].wrapping_sub(other.turns[k]) as f64;
@@ -47,7 +53,9 @@ impl DistanceMetric {
     }
 
     fn largest(&self, differences: impl Iterator<Item = f64>) -> f64 {
-        differences.enumerate().fold(0.0, |most, (k, difference)| larger(most, difference.abs() * self.weight(k)))
+        differences
+            .enumerate()
+            .fold(0.0, |most, (k, difference)| larger(most, difference.abs() * self.weight(k)))
     }
 }
 

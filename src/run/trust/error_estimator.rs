@@ -1,6 +1,7 @@
 //! The reference solution of a run: the same motion by a finer series, looked at together with the run.
 //!
-//! Looks are a mean step of the reference solution apart, a half of it in the beginning and near the horizon: neither output times nor rests have a say in when they are.
+//! Looks are a mean step of the reference solution apart, a half of it in the beginning and near the horizon:
+//! neither output times nor rests have a say in when they are.
 
 use super::budget::{DOUBLE_DOUBLE, FLOW, FULL_GRACE, FULL_SHARE, GRACE, Prices, SHARE};
 use super::finer;
@@ -26,7 +27,8 @@ const NEAR: f64 = 0.03 * HORIZON;
 const ENOUGH: f64 = 2000.0;
 /// The first look, in units of time of the mechanism.
 const FIRST: f64 = 1e-3;
-/// The time to the next look over the reference solution's mean step: in the beginning, usually, near the horizon, and where the run is lost.
+/// The time to the next look over the reference solution's mean step: in the beginning, usually, near the
+/// horizon, and where the run is lost.
 const GAPS: [f64; 4] = [0.5, 1.0, 0.5, 4.0];
 /// Looks that belong to the beginning.
 const BEGINNING: u64 = 128;
@@ -83,7 +85,8 @@ struct Torques {
 impl Torques {
     /// `None` where there are no motors, or walls that may hold on to a point.
     fn new(mechanism: &Mechanism) -> Option<Self> {
-        let has_motors = mechanism.contacts.is_empty() && mechanism.constraints.iter().any(|row| row.law.is_some());
+        let has_motors =
+            mechanism.contacts.is_empty() && mechanism.constraints.iter().any(|row| row.law.is_some());
         has_motors.then(|| Self { kernel: Kernel::new(mechanism), of: [Vec::new(), Vec::new()] })
     }
 
@@ -91,15 +94,19 @@ impl Torques {
     fn apart(&mut self, mechanism: &Mechanism, motions: [&Motion; 2]) -> [f64; 2] {
         let Self { kernel, of } = self;
         for (torques, motion) in of.iter_mut().zip(motions) {
-            let [phi, omega] = [&motion.phi, &motion.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<_>>());
+            let [phi, omega] = [&motion.phi, &motion.omega]
+                .map(|values| values.iter().map(|value| value.hi).collect::<Vec<_>>());
             kernel.accelerate::<0>(mechanism, motion.time, &phi, &omega, Bias::default());
             mechanism.spread_multipliers(kernel);
             torques.clear();
-            let motors = mechanism.constraints.iter().zip(&kernel.multiplier).filter(|(row, _)| row.law.is_some());
+            let motors =
+                mechanism.constraints.iter().zip(&kernel.multiplier).filter(|(row, _)| row.law.is_some());
             torques.extend(motors.map(|(_, &torque)| torque));
         }
         let [one, other] = of;
-        one.iter().zip(other).fold([0.0; 2], |[apart, most], (a, b)| [apart.max((*a - *b).abs()), most.max(b.abs())])
+        one.iter()
+            .zip(other)
+            .fold([0.0; 2], |[apart, most], (a, b)| [apart.max((*a - *b).abs()), most.max(b.abs())])
     }
 }
 
@@ -126,16 +133,26 @@ impl ErrorEstimator {
         let finer::Finer { plan: mut series, name } = finer::first(mechanism, plan, level);
         let prices = Prices::new(mechanism, &series, plan);
         let mut measured = Measured::new(level, name, shared(mechanism, plan, &series));
-        let mut reference_run = ReferenceRun::new(mechanism, &mut series, start).map_err(|why| measured.why = Some(why)).ok();
+        let mut reference_run =
+            ReferenceRun::new(mechanism, &mut series, start).map_err(|why| measured.why = Some(why)).ok();
         if let Some(reference_run) = &mut reference_run {
             measured.no_growth = reference_run.no_growth.take();
-            measured.nature = reference_run.tangent.as_ref().map_or(Nature::default(), |tangent| Nature::new(mechanism, tangent));
+            measured.nature = reference_run
+                .tangent
+                .as_ref()
+                .map_or(Nature::default(), |tangent| Nature::new(mechanism, tangent));
         }
         measured.is_bound = finer::is_bound(&series, plan);
         Self::with(mechanism, plan, prices, measured, reference_run)
     }
 
-    fn with(mechanism: &Arc<Mechanism>, run: &Plan, prices: Prices, measured: Measured, reference_run: Option<ReferenceRun>) -> Self {
+    fn with(
+        mechanism: &Arc<Mechanism>,
+        run: &Plan,
+        prices: Prices,
+        measured: Measured,
+        reference_run: Option<ReferenceRun>,
+    ) -> Self {
         Self {
             mechanism: Arc::clone(mechanism),
             metric: DistanceMetric::new(mechanism),
@@ -162,14 +179,19 @@ impl ErrorEstimator {
         let Some(reference_run) = reference_run else {
             return Ok(Some(Self::with(mechanism, plan, Prices::new(mechanism, plan, plan), measured, None)));
         };
-        let Some(reference_run) = ReferenceRun::resume(mechanism, start, reference_run, horizon)? else { return Ok(None) };
+        let Some(reference_run) = ReferenceRun::resume(mechanism, start, reference_run, horizon)? else {
+            return Ok(None);
+        };
         let prices = Prices::new(mechanism, reference_run.plan(), plan);
         Ok(Some(Self::with(mechanism, plan, prices, measured, Some(reference_run))))
     }
 
     /// All that the rest of it depends on.
     pub(in crate::run) fn kept(&self) -> Kept {
-        Kept { measured: self.measured.clone(), reference_run: self.reference_run.as_ref().map(ReferenceRun::kept) }
+        Kept {
+            measured: self.measured.clone(),
+            reference_run: self.reference_run.as_ref().map(ReferenceRun::kept),
+        }
     }
 
     /// The time spent since this was last asked for.
@@ -184,9 +206,12 @@ impl ErrorEstimator {
         let whole = match self.measured.level {
             Level::Auto => GRACE[usize::from(self.run.step.is_some() || is_near)] + SHARE * run,
             // No more evaluations than the run is allowed itself.
-            Level::Off | Level::Full => (FULL_GRACE + FULL_SHARE * run).min(self.run.max_evaluations as f64 * self.prices.series[0]),
+            Level::Off | Level::Full => {
+                (FULL_GRACE + FULL_SHARE * run).min(self.run.max_evaluations as f64 * self.prices.series[0])
+            }
         };
-        let is_wide = self.reference_run.as_ref().is_some_and(|reference_run| reference_run.plan().in_double_double);
+        let is_wide =
+            self.reference_run.as_ref().is_some_and(|reference_run| reference_run.plan().in_double_double);
         if !is_wide || self.measured.level == Level::Full {
             return whole;
         }
@@ -196,12 +221,16 @@ impl ErrorEstimator {
         }
     }
 
-    /// Ends the tangent flow where it has cost its share; where the reference solution's own rounding counts it is needed to the end.
+    /// Ends the tangent flow where it has cost its share; where the reference solution's own rounding counts
+    /// it is needed to the end.
     fn stint(&mut self) {
         let Self { reference_run: Some(reference_run), measured, .. } = self else { return };
         let Some(tangent) = &reference_run.tangent else { return };
         let [share, grace] = FLOW[usize::from(!tangent.is_plain())];
-        if measured.level == Level::Auto && !reference_run.is_rounded && measured.flow > share * measured.run + grace {
+        if measured.level == Level::Auto
+            && !reference_run.is_rounded
+            && measured.flow > share * measured.run + grace
+        {
             measured.stop_growth(reference_run.end_flow().as_ref());
         }
     }
@@ -221,7 +250,9 @@ impl ErrorEstimator {
         }
         let Err(stop) = gone else { return Ok(()) };
         let is_dear = reference_run.plan().in_double_double;
-        if let Some(finer::Finer { mut plan, name }) = is_dear.then(|| finer::second(&self.mechanism, &self.run)).flatten() {
+        if let Some(finer::Finer { mut plan, name }) =
+            is_dear.then(|| finer::second(&self.mechanism, &self.run)).flatten()
+        {
             let from = reference_run.motion.time.hi;
             (plan.until, plan.every) = (reference_run.plan().until, reference_run.plan().every);
             self.prices = Prices::new(&self.mechanism, &plan, &self.run);
@@ -241,14 +272,18 @@ impl ErrorEstimator {
 
     /// Looks at the run.
     fn look(&mut self, motion: &Motion, statistics: Statistics) {
-        let Some(until) = self.reference_run.as_ref().map(|reference_run| reference_run.plan().until) else { return };
+        let Some(until) = self.reference_run.as_ref().map(|reference_run| reference_run.plan().until) else {
+            return;
+        };
         let t = motion.time.hi;
         if self.measured.seen > 0 && t <= self.measured.until {
             return;
         }
         // The last step of a fixed-step run may end beyond the horizon by rounding.
         let horizon = Time::from(until);
-        if let Err(why) = self.accompany(if motion.time > horizon { horizon } else { motion.time }, statistics) {
+        if let Err(why) =
+            self.accompany(if motion.time > horizon { horizon } else { motion.time }, statistics)
+        {
             return self.end(&why);
         }
         self.measured.run = self.prices.run(self.run.method, statistics);
@@ -267,20 +302,30 @@ impl ErrorEstimator {
             None if measured.seen < BEGINNING => first,
             None => usual,
         };
-        let due = if t > 0.0 { t + share * reference_run.mean_step(t) } else { FIRST * self.mechanism.units.time };
+        let due =
+            if t > 0.0 { t + share * reference_run.mean_step(t) } else { FIRST * self.mechanism.units.time };
         measured.due = due.max(t.next_up());
     }
 
     /// Measures how far the run and its reference solution are apart.
     fn measure(&mut self, motion: &Motion) {
-        let Self { mechanism, metric, measured, reference_run: Some(reference_run), torques, .. } = self else { return };
-        let rounding = reference_run.tangent.as_ref().filter(|_| reference_run.is_rounded).map_or(0.0, Tangent::rounding);
+        let Self { mechanism, metric, measured, reference_run: Some(reference_run), torques, .. } = self
+        else {
+            return;
+        };
+        let rounding = reference_run
+            .tangent
+            .as_ref()
+            .filter(|_| reference_run.is_rounded)
+            .map_or(0.0, Tangent::rounding);
         let apart = metric.apart(motion, &reference_run.motion);
         // It is there for differences that are small by chance.
         let angle = apart.hypot(rounding.min(MOST_ROUNDING * apart.max(measured.error)));
         // Between an impact of the one and that of the other rates differ by all of it.
-        let rate = (self.events == reference_run.events()).then(|| metric.rates_apart(motion, &reference_run.motion));
-        let torque = torques.as_mut().map(|torques| torques.apart(mechanism, [motion, &reference_run.motion]));
+        let rate = (self.events == reference_run.events())
+            .then(|| metric.rates_apart(motion, &reference_run.motion));
+        let torque =
+            torques.as_mut().map(|torques| torques.apart(mechanism, [motion, &reference_run.motion]));
         if !angle.is_finite() || rate.is_some_and(|rate| !rate.is_finite()) {
             return self.end("what small differences come to is beyond all numbers");
         }
@@ -290,7 +335,8 @@ impl ErrorEstimator {
         let t = motion.time.hi;
         if measured.take(t, Apart { angle, rate, torque: torque.map(|[apart, _]| apart) }) {
             let at = measured.horizon.unwrap_or(t);
-            measured.input_error = reference_run.tangent.as_ref().map(|tangent| LAST_DIGIT * tangent.reach(at));
+            measured.input_error =
+                reference_run.tangent.as_ref().map(|tangent| LAST_DIGIT * tangent.reach(at));
         }
         if angle > LOST {
             measured.lost = Some(t);

@@ -11,11 +11,13 @@ use crate::stepping::{Taylor, Tolerance};
 const FINER: f64 = 100.0;
 /// From which tolerance of a run on its rounding counts.
 const NEAR_ROUNDING: f64 = 1e-10;
-/// Tolerance \[rad/s\] of reference solutions in doubles: of runs that are not near rounding, at most, and of all others.  Below 1e-15 the last orders of a series in
-/// doubles are rounding, and its steps come out too long for modes that are fast, and for chains of bodies.
+/// Tolerance \[rad/s\] of reference solutions in doubles: of runs that are not near rounding, at most, and of
+/// all others.  Below 1e-15 the last orders of a series in doubles are rounding, and its steps come out too
+/// long for modes that are fast, and for chains of bodies.
 const FINE: f64 = 1e-14;
 const FINEST: f64 = 1e-15;
-/// Tolerance \[rad/s\] with the first orders in double-double, of reference solutions all in double-double, and of those of runs with extended orders.
+/// Tolerance \[rad/s\] with the first orders in double-double, of reference solutions all in double-double,
+/// and of those of runs with extended orders.
 const EXTENDED: f64 = 1e-20;
 const BEYOND: f64 = 1e-22;
 /// The same where only the growth of small differences is asked for.
@@ -49,11 +51,12 @@ pub(super) fn first(mechanism: &Mechanism, run: &Plan, level: Level) -> Finer {
         return stepwise(mechanism, run, finer.filter(|_| !finds_impacts_likewise).unwrap_or(FINE).max(FINE));
     }
     let is_near = is_near_rounding(run);
-    // Impacts are located in doubles.
-    // A series whose steps are those of the run shares their errors; with loops and sliders these are in what no step is judged by.
+    // Impacts are located in doubles. A series whose steps are those of the run shares their errors; with
+    // loops and sliders these are in what no step is judged by.
     let is_alike = run.method == MethodId::Taylor && mechanism.has_multipliers();
     let may_extend = mechanism.contacts.is_empty() && (is_near || is_alike || level == Level::Full);
-    let has_lanes = may_extend && !run.extended && !mechanism.has_multipliers() && Taylor::has_lanes(mechanism, true);
+    let has_lanes =
+        may_extend && !run.extended && !mechanism.has_multipliers() && Taylor::has_lanes(mechanism, true);
     if may_extend && !has_lanes {
         let tolerance = if run.extended { BEYOND } else { EXTENDED };
         // There it is the other form that counts, not the digits.
@@ -71,14 +74,16 @@ fn in_doubles(mechanism: &Mechanism, run: &Plan) -> Finer {
     let finer = tolerance(run).filter(|_| !is_near_rounding(run)).map(|tolerance| tolerance / FINER);
     let tolerance = match finer {
         Some(finer) if run.method == MethodId::Taylor => finer.max(FINEST),
-        // Steps that end at every output time are often far better than their tolerance, and a finer series costs little.
+        // Steps that end at every output time are often far better than their tolerance, and a finer series
+        // costs little.
         Some(finer) => finer.min(FINE),
         None => FINEST,
     };
     series(mechanism, run, tolerance, [false; 2])
 }
 
-/// The one that goes on where double-double would cost too much; `None` where it would be coarser than the run.
+/// The one that goes on where double-double would cost too much; `None` where it would be coarser than the
+/// run.
 pub(super) fn second(mechanism: &Mechanism, run: &Plan) -> Option<Finer> {
     if !run.extended {
         return Some(in_doubles(mechanism, run));
@@ -87,7 +92,8 @@ pub(super) fn second(mechanism: &Mechanism, run: &Plan) -> Option<Finer> {
     has_lanes.then(|| series(mechanism, run, BEYOND, [true, false]))
 }
 
-/// For runs of neighbouring scenes, which share no impacts with the run: the first series in doubles at so many times its tolerance, up to a time \[s\].
+/// For runs of neighbouring scenes, which share no impacts with the run: the first series in doubles at so
+/// many times its tolerance, up to a time \[s\].
 pub(super) fn neighbour(mechanism: &Mechanism, until: f64, coarser: f64) -> Plan {
     let has_series = mechanism.vibration.is_none() && mechanism.tree.is_dense();
     let tolerance = Tolerance { relative: coarser * FINE, absolute: coarser * FINE };
@@ -107,7 +113,12 @@ fn stepwise(mechanism: &Mechanism, run: &Plan, tolerance: f64) -> Finer {
     Finer { name: format!("dp8 at {:.0e}", tolerance.relative), plan }
 }
 
-fn series(mechanism: &Mechanism, run: &Plan, tolerance: f64, [extended, in_double_double]: [bool; 2]) -> Finer {
+fn series(
+    mechanism: &Mechanism,
+    run: &Plan,
+    tolerance: f64,
+    [extended, in_double_double]: [bool; 2],
+) -> Finer {
     let tolerance = Tolerance { relative: tolerance, absolute: tolerance };
     let mut plan = Plan::of_series(mechanism, tolerance, run.until);
     (plan.extended, plan.in_double_double) = (extended, in_double_double);
@@ -122,7 +133,9 @@ fn series(mechanism: &Mechanism, run: &Plan, tolerance: f64, [extended, in_doubl
 /// Whether a reference solution may be no finer than its run.
 pub(super) fn is_bound(series: &Plan, run: &Plan) -> bool {
     let tolerance = tolerance(run).unwrap_or_default();
-    is_rounded(series) || (series.method != MethodId::Taylor && (run.method == MethodId::Taylor || tolerance < NEAR_ROUNDING))
+    is_rounded(series)
+        || (series.method != MethodId::Taylor
+            && (run.method == MethodId::Taylor || tolerance < NEAR_ROUNDING))
 }
 
 /// Whether a reference solution's own rounding counts.

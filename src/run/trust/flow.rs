@@ -45,12 +45,19 @@ pub fn flow(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion, times: &[f6
     let begin = contact_driver.motion();
     let mut tangent = Tangent::new(contact_driver.holding(), &begin, plan.until)?;
     contact_driver.jumps = Some(Vec::new());
-    let moment = |motion: Motion, tangent: &Tangent| Moment { motion, columns: tangent.columns(), growth: tangent.growth() };
-    let mut flow = Flow { moments: vec![moment(begin, &tangent)], rate: tangent.rate(), steps: 0, lost: None };
+    let moment = |motion: Motion, tangent: &Tangent| Moment {
+        motion,
+        columns: tangent.columns(),
+        growth: tangent.growth(),
+    };
+    let mut flow =
+        Flow { moments: vec![moment(begin, &tangent)], rate: tangent.rate(), steps: 0, lost: None };
     for &time in times {
         loop {
             let next = tangent.next_within(time);
-            contact_driver.go(Time::from(next), &mut outcome, &mut || false).map_err(|stop| format!("at {} s: {}", stop.t, stop.what))?;
+            contact_driver
+                .go(Time::from(next), &mut outcome, &mut || false)
+                .map_err(|stop| format!("at {} s: {}", stop.t, stop.what))?;
             tangent.jump(&std::mem::take(contact_driver.jumps.get_or_insert_default()));
             tangent.take(&contact_driver.motion(), 0);
             flow.steps += 1;
@@ -63,7 +70,9 @@ pub fn flow(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion, times: &[f6
             }
         }
         // The last motion asked for may be one before the end of a step.
-        contact_driver.go(Time::from(time), &mut outcome, &mut || false).map_err(|stop| format!("at {} s: {}", stop.t, stop.what))?;
+        contact_driver
+            .go(Time::from(time), &mut outcome, &mut || false)
+            .map_err(|stop| format!("at {} s: {}", stop.t, stop.what))?;
         flow.moments.push(moment(contact_driver.motion(), &tangent));
     }
     Ok(flow)

@@ -1,16 +1,20 @@
 //! Whether small differences grow exponentially or as a power of time.
 //!
-//! Exponential growth, and with it an exponent, is told where two halves of the time agree on it: about the same rate in both, in the second more than any power up
-//! to the third would give, and a straight line against time fits better than one against its logarithm.  Motions of one degree of freedom that
-//! nothing drives are regular whatever they look like for a while: their paths cannot cross in the plane of their states.
+//! Exponential growth, and with it an exponent, is told where two halves of the time agree on it: about the
+//! same rate in both, in the second more than any power up to the third would give, and a straight line
+//! against time fits better than one against its logarithm.  Motions of one degree of freedom that nothing
+//! drives are regular whatever they look like for a while: their paths cannot cross in the plane of their
+//! states.
 //!
-//! Source: M. Sandri, *Numerical calculation of Lyapunov exponents*, The Mathematica Journal 6 (1996), for exponents from growth; the test is ours.
+//! Source: M. Sandri, *Numerical calculation of Lyapunov exponents*, The Mathematica Journal 6 (1996), for
+//! exponents from growth; the test is ours.
 
 use super::{Lyapunov, Tangent};
 use crate::dynamics::Mechanism;
 use serde::{Deserialize, Serialize};
 
-/// Growth \[ln\] within the second half of the time from which on a motion may be chaotic: that of the third power is 2.1, and sizes vary by as much again.
+/// Growth \[ln\] within the second half of the time from which on a motion may be chaotic: that of the third
+/// power is 2.1, and sizes vary by as much again.
 const CHAOTIC: f64 = 4.0;
 /// How far the rates of both halves may be apart.
 const ALIKE: f64 = 4.0;
@@ -42,7 +46,8 @@ pub(super) struct Growth {
 impl Nature {
     /// Of a mechanism whose flow has begun.
     pub fn new(mechanism: &Mechanism, tangent: &Tangent) -> Self {
-        let moves = mechanism.constraints.iter().filter_map(|row| row.law.as_ref()).any(|law| !law.is_constant());
+        let moves =
+            mechanism.constraints.iter().filter_map(|row| row.law.as_ref()).any(|law| !law.is_constant());
         let pushes = mechanism.actions.iter().any(|action| action.law.is_some());
         Self { is_planar: tangent.freedom() <= 1 && !moves && !pushes, rate: tangent.rate() }
     }
@@ -50,19 +55,28 @@ impl Nature {
     /// The growth that a history of times \[s\] and logarithms shows.
     pub fn judge(self, history: &[[f64; 2]]) -> Growth {
         let mut growth = Growth::default();
-        let (Some(&[begin, first]), Some(&[end, last])) = (history.first(), history.last()) else { return growth };
+        let (Some(&[begin, first]), Some(&[end, last])) = (history.first(), history.last()) else {
+            return growth;
+        };
         if history.len() < 2 * BLOCKS || !last.is_finite() {
             return growth;
         }
         let at = |share: f64| interpolated(history, begin + share * (end - begin));
         let [early, late] = [at(0.5) - first, last - at(0.5)];
         let [line, power] = [|t: f64| t, |t: f64| libm::log(t)].map(|scale| {
-            fit(history.iter().filter(|point| point[0] - begin >= 0.1 * (end - begin)).map(|point| [scale(point[0] - begin), point[1]]))
+            fit(history
+                .iter()
+                .filter(|point| point[0] - begin >= 0.1 * (end - begin))
+                .map(|point| [scale(point[0] - begin), point[1]]))
         });
-        let grows = late >= CHAOTIC && late <= ALIKE * early && early <= ALIKE * late && line.rest < power.rest;
+        let grows =
+            late >= CHAOTIC && late <= ALIKE * early && early <= ALIKE * late && line.rest < power.rest;
         if grows && !self.is_planar {
             growth.lyapunov = Some(exponent(history, at));
-        } else if self.rate * (end - begin) >= SHORT && power.slope < REGULAR && (self.is_planar || late < CHAOTIC) {
+        } else if self.rate * (end - begin) >= SHORT
+            && power.slope < REGULAR
+            && (self.is_planar || late < CHAOTIC)
+        {
             // Where growth is slow both lines fit.
             let is_steady = power.slope < 0.5 || power.rest <= line.rest;
             growth.power = (is_steady && power.slope.is_finite()).then_some(power.slope.max(0.0));
@@ -96,11 +110,13 @@ fn interpolated(history: &[[f64; 2]], t: f64) -> f64 {
     g0 + (g1 - g0) * ((t - t0) / (t1 - t0)).clamp(0.0, 1.0)
 }
 
-/// The largest exponent \[1/s\], its standard error and the time it is of \[s\], from the growth `at` shares of that time.
+/// The largest exponent \[1/s\], its standard error and the time it is of \[s\], from the growth `at` shares
+/// of that time.
 fn exponent(history: &[[f64; 2]], at: impl Fn(f64) -> f64) -> Lyapunov {
     let span = history[history.len() - 1][0] - history[0][0];
     let share = |k: usize| k as f64 / BLOCKS as f64;
-    let rates: Vec<f64> = (0..BLOCKS).map(|k| (at(share(k + 1)) - at(share(k))) / (span * share(1))).collect();
+    let rates: Vec<f64> =
+        (0..BLOCKS).map(|k| (at(share(k + 1)) - at(share(k))) / (span * share(1))).collect();
     let exponent = (at(1.0) - at(0.0)) / span;
     let spread = rates.iter().map(|rate| (rate - exponent).powi(2)).sum::<f64>() / (BLOCKS - 1) as f64;
     Lyapunov { exponent, uncertainty: (spread / BLOCKS as f64).sqrt(), until: history[history.len() - 1][0] }
@@ -118,10 +134,17 @@ mod tests {
     #[test]
     fn exponents_are_told_of_exponential_growth_and_powers_of_all_other() {
         let chaotic = judged(|t| 1.5 * t + libm::sin(t));
-        assert!(chaotic.power.is_none() && chaotic.lyapunov.is_some_and(|found| (found.exponent - 1.5).abs() < 0.05), "{chaotic:?}");
+        assert!(
+            chaotic.power.is_none()
+                && chaotic.lyapunov.is_some_and(|found| (found.exponent - 1.5).abs() < 0.05),
+            "{chaotic:?}"
+        );
         for power in [0.0, 1.0, 2.0] {
             let found = judged(|t| power * libm::log(1.0 + 3.0 * t) + 0.5 * libm::sin(2.0 * t));
-            assert!(found.lyapunov.is_none() && found.power.is_some_and(|found| (found - power).abs() < 0.2), "{found:?}");
+            assert!(
+                found.lyapunov.is_none() && found.power.is_some_and(|found| (found - power).abs() < 0.2),
+                "{found:?}"
+            );
         }
         // Away from a place of unsteady rest, once; and towards one of steady rest.
         assert_eq!(judged(|t| 8.0 * (0.5 * t).min(1.0)).lyapunov, None);

@@ -5,10 +5,11 @@
 //! total       = root of the sum of the squares of all effects                          x  angles, and positions over the longest bar
 //! ```
 //!
-//! x(t; p ± h) are runs from neighbouring scenes by the series in doubles, at the tolerance of a reference solution.  They go through whatever the scene has: impacts,
-//! constraints that change with p, starts that are found.  h is chosen for each number so that the difference is far above the rounding of such runs, which two runs of the
-//! scene itself tell, and small enough to be proportional to h, which the two sides tell.  The effect is that of u *in proportion*: u itself may be
-//! so large that the motion becomes another.
+//! x(t; p ± h) are runs from neighbouring scenes by the series in doubles, at the tolerance of a reference
+//! solution.  They go through whatever the scene has: impacts, constraints that change with p, starts that
+//! are found.  h is chosen for each number so that the difference is far above the rounding of such runs,
+//! which two runs of the scene itself tell, and small enough to be proportional to h, which the two sides
+//! tell.  The effect is that of u *in proportion*: u itself may be so large that the motion becomes another.
 //!
 //! Where one side is refused (a restitution of 1), h / 2 on the other takes its place.
 
@@ -33,9 +34,11 @@ const COARSER: f64 = 2.0;
 /// Rounding \[rad\] up to which a difference can be told, and the least there is.
 const MOST_NOISE: f64 = 1e-4;
 const LEAST_NOISE: f64 = 1e-15;
-/// Differences \[rad\] so small may be rounding whatever two runs of the scene tell: where its motion is a polynomial they are the same.
+/// Differences \[rad\] so small may be rounding whatever two runs of the scene tell: where its motion is a
+/// polynomial they are the same.
 const ROUNDING: f64 = 1e-10;
-/// The difference aimed at \[rad\]: so many times the rounding, within these bounds; and how far from it may be taken.
+/// The difference aimed at \[rad\]: so many times the rounding, within these bounds; and how far from it may
+/// be taken.
 const ABOVE_NOISE: f64 = 1e3;
 const DIFFERENCE: [f64; 2] = [1e-7, 1e-3];
 const WINDOW: [f64; 2] = [1e-2, 10.0];
@@ -60,7 +63,8 @@ pub struct Input {
     pub value: f64,
     /// Half a unit of the last digit it is written with.
     pub uncertainty: f64,
-    /// What that comes to, in proportion: the largest change of an angle \[rad\], or of a position over the longest bar.  May be any size.
+    /// What that comes to, in proportion: the largest change of an angle \[rad\], or of a position over the
+    /// longest bar.  May be any size.
     pub effect: Option<f64>,
     /// True where the effect is lost in rounding, so that it is at most so large.
     pub is_upper_bound: bool,
@@ -71,7 +75,8 @@ pub struct Input {
 /// The same for all numbers of a scene, the largest effect first, and those of which nothing is known last.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Inputs {
-    /// Effects are the largest up to this time \[s\]: the end of the run, or the horizon, or as far as the runs compared are known.
+    /// Effects are the largest up to this time \[s\]: the end of the run, or the horizon, or as far as the
+    /// runs compared are known.
     pub at: f64,
     /// Root of the sum of the squares of the effects known \[rad\].
     pub total: Option<f64>,
@@ -86,9 +91,17 @@ pub struct Inputs {
 }
 
 impl Inputs {
-    /// The effects of these numbers of a scene up to `until` \[s\], on runs of at most so many evaluations each; `reach` \[rad\] is about what a relative change
-    /// of 1 in all of them comes to, where that is known.
-    pub fn of(template: &Template, numbers: &[Written], until: f64, max_evaluations: u64, reach: Option<f64>, pause: &mut Pause) -> Self {
+    /// The effects of these numbers of a scene up to `until` \[s\], on runs of at most so many evaluations
+    /// each; `reach` \[rad\] is about what a relative change of 1 in all of them comes to, where that is
+    /// known.
+    pub fn of(
+        template: &Template,
+        numbers: &[Written],
+        until: f64,
+        max_evaluations: u64,
+        reach: Option<f64>,
+        pause: &mut Pause,
+    ) -> Self {
         let mut inputs = Self { at: until, ..Self::default() };
         let mut found = Vec::new();
         match Neighbours::new(template, until, max_evaluations, reach, &mut inputs, pause) {
@@ -116,7 +129,13 @@ impl Trust {
     ///
     /// # Errors
     /// As [`Template::written_numbers`].
-    pub fn with_inputs(mut self, template: &Template, typed: &[String], plan: &Plan, pause: &mut Pause) -> Result<Self, SceneError> {
+    pub fn with_inputs(
+        mut self,
+        template: &Template,
+        typed: &[String],
+        plan: &Plan,
+        pause: &mut Pause,
+    ) -> Result<Self, SceneError> {
         let numbers = template.written_numbers(typed)?;
         let reach = self.input_error.map(|error| error / LAST_DIGIT);
         let inputs = Inputs::of(template, &numbers, self.at, plan.max_evaluations, reach, pause);
@@ -183,7 +202,12 @@ impl<'a, 'b> Neighbours<'a, 'b> {
     }
 
     /// Takes the scene's own motions as far as they are known.
-    fn keep(&mut self, mut motions: Vec<Motion>, others: &[Motion], stop: Option<String>) -> Result<(), String> {
+    fn keep(
+        &mut self,
+        mut motions: Vec<Motion>,
+        others: &[Motion],
+        stop: Option<String>,
+    ) -> Result<(), String> {
         let mut kept = 0;
         for (one, other) in motions.iter().zip(others) {
             let apart = self.metric.apart(one, other);
@@ -193,7 +217,9 @@ impl<'a, 'b> Neighbours<'a, 'b> {
             (self.noise, kept) = (self.noise.max(apart), kept + 1);
         }
         if kept < self.times.len() {
-            let why = stop.unwrap_or_else(|| format!("rounding alone moves runs in doubles by more than {MOST_NOISE:e} rad from then on"));
+            let why = stop.unwrap_or_else(|| {
+                format!("rounding alone moves runs in doubles by more than {MOST_NOISE:e} rad from then on")
+            });
             let last = kept.saturating_sub(1);
             if last == 0 {
                 return Err(why);
@@ -207,10 +233,16 @@ impl<'a, 'b> Neighbours<'a, 'b> {
     }
 
     /// The motions of a scene at the times, as far as it goes, and why it goes no further.
-    fn go(&mut self, mechanism: &Arc<Mechanism>, scene: &Scene, coarser: f64) -> (Vec<Motion>, Option<String>) {
+    fn go(
+        &mut self,
+        mechanism: &Arc<Mechanism>,
+        scene: &Scene,
+        coarser: f64,
+    ) -> (Vec<Motion>, Option<String>) {
         let Some(&until) = self.times.last() else { return (Vec::new(), None) };
         let mut motions = Vec::new();
-        let mut plan = Plan { max_evaluations: self.max_evaluations, ..neighbour(mechanism, until.hi, coarser) };
+        let mut plan =
+            Plan { max_evaluations: self.max_evaluations, ..neighbour(mechanism, until.hi, coarser) };
         let mut outcome = Outcome::begun(mechanism, plan.clone());
         let mut driver = match build(mechanism, &mut plan, &mechanism.start(scene)) {
             Ok(driver) => driver,
@@ -238,9 +270,17 @@ impl<'a, 'b> Neighbours<'a, 'b> {
 
     fn input(&mut self, number: &Written) -> Input {
         let Written { path, unit, value, uncertainty } = number;
-        let mut input = Input { path: path.clone(), unit: (*unit).into(), value: *value, uncertainty: *uncertainty, ..Input::default() };
+        let mut input = Input {
+            path: path.clone(),
+            unit: (*unit).into(),
+            value: *value,
+            uncertainty: *uncertainty,
+            ..Input::default()
+        };
         match self.slope(number) {
-            Ok((slope, is_upper_bound)) => (input.effect, input.is_upper_bound) = (Some(slope * uncertainty), is_upper_bound),
+            Ok((slope, is_upper_bound)) => {
+                (input.effect, input.is_upper_bound) = (Some(slope * uncertainty), is_upper_bound)
+            }
             Err(why) => input.why = Some(why),
         }
         input
@@ -302,9 +342,14 @@ impl<'a, 'b> Neighbours<'a, 'b> {
             };
             let span = (main.change - other.change).abs();
             if is_rounding {
-                return Ok((if difference == 0.0 { 0.0 } else { self.noise.max(difference) / span }, difference > 0.0));
+                return Ok((
+                    if difference == 0.0 { 0.0 } else { self.noise.max(difference) / span },
+                    difference > 0.0,
+                ));
             }
-            let share = self.apart(&other.motions, &self.motions) / other.change.abs() / (difference / main.change.abs());
+            let share = self.apart(&other.motions, &self.motions)
+                / other.change.abs()
+                / (difference / main.change.abs());
             if (1.0 / PROPORTION..PROPORTION).contains(&share) {
                 return Ok((self.apart(&main.motions, &other.motions) / span, false));
             }

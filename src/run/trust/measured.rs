@@ -18,8 +18,8 @@ const ROUNDED: f64 = 2.2e-16;
 /// What the last digit of the scene's numbers moves them by, in units of their size; fitted.
 pub(super) const LAST_DIGIT: f64 = 2.5 * 1.1e-16;
 
-/// How far a run and its reference solution are apart at one time: an angle \[rad\], a rate \[rad/s\], and the torque of a motor \[N·m\], each the largest.  `None`
-/// where it is not to be told there.
+/// How far a run and its reference solution are apart at one time: an angle \[rad\], a rate \[rad/s\], and
+/// the torque of a motor \[N·m\], each the largest.  `None` where it is not to be told there.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Apart {
     pub angle: f64,
@@ -42,7 +42,8 @@ pub(super) struct Measured {
     pub error: f64,
     pub rate: f64,
     pub torque: Option<f64>,
-    /// The largest angle \[rad\], whole turns counted, or position over the longest bar, the largest rate \[rad/s\] and torque \[N·m\] seen: what their rounding is measured against.
+    /// The largest angle \[rad\], whole turns counted, or position over the longest bar, the largest rate
+    /// \[rad/s\] and torque \[N·m\] seen: what their rounding is measured against.
     pub farthest: f64,
     pub fastest: f64,
     pub strongest: f64,
@@ -59,12 +60,14 @@ pub(super) struct Measured {
     pub input_error: Option<f64>,
     /// Why it went no further.
     pub why: Option<String>,
-    /// Growth of small differences against time, once the reference solution has ended, and of which kind it may be.
+    /// Growth of small differences against time, once the reference solution has ended, and of which kind it
+    /// may be.
     pub history: Vec<[f64; 2]>,
     pub nature: Nature,
     /// Why nothing is known of it, or not from some time on.
     pub no_growth: Option<String>,
-    /// The time \[s\] up to which it was followed where that would have cost too much, and what the last digit of the inputs had come to.
+    /// The time \[s\] up to which it was followed where that would have cost too much, and what the last
+    /// digit of the inputs had come to.
     stopped: Option<[f64; 2]>,
     /// Work spent, and of it that of the tangent flow.
     pub spent: f64,
@@ -116,10 +119,12 @@ impl Measured {
         let passes = apart.angle > HORIZON && self.horizon.is_none();
         if passes {
             self.horizon = Some(crossing([self.until, self.error], [t, apart.angle]));
-            // Of the look before, or of this one where it was the first: brought to where the error is that of the horizon.
+            // Of the look before, or of this one where it was the first: brought to where the error is that
+            // of the horizon.
             let share = HORIZON / apart.angle;
             let larger = |before: f64, now: Option<f64>| now.map_or(before, |now| before.max(now * share));
-            let torque = self.torque.or(apart.torque).map(|_| larger(self.torque.unwrap_or_default(), apart.torque));
+            let torque =
+                self.torque.or(apart.torque).map(|_| larger(self.torque.unwrap_or_default(), apart.torque));
             self.beside = Some((larger(self.rate, apart.rate), torque));
         }
         (self.until, self.error) = (t, self.error.max(apart.angle));
@@ -148,12 +153,15 @@ impl Measured {
         (self.history, self.stopped) = (tangent.history(), Some([t, LAST_DIGIT * tangent.reach(t)]));
     }
 
-    /// What the last digit of the inputs comes to at a time \[s\]: beyond what was followed it grows as the error of the run does, which is a small
-    /// difference, too.  That goes where growth is known to be exponential, and else from the second half of the way on: in the beginning an error tells nothing
-    /// of how it grows.
+    /// What the last digit of the inputs comes to at a time \[s\]: beyond what was followed it grows as the
+    /// error of the run does, which is a small difference, too.  That goes where growth is known to be
+    /// exponential, and else from the second half of the way on: in the beginning an error tells nothing of
+    /// how it grows.
     fn inputs_at(&self, t: f64, is_chaotic: bool) -> Option<f64> {
         let [until, reach] = self.stopped.filter(|[until, _]| is_chaotic || *until >= 0.5 * t)?;
-        let error = |t: f64| self.record.iter().take_while(|look| look[0] <= t).last().map_or(LEAST, |look| look[1].max(LEAST));
+        let error = |t: f64| {
+            self.record.iter().take_while(|look| look[0] <= t).last().map_or(LEAST, |look| look[1].max(LEAST))
+        };
         let grown = if t >= self.until { self.error } else { error(t) };
         (t <= self.until).then(|| reach * (grown / error(until)).max(1.0))
     }
@@ -195,18 +203,24 @@ impl Measured {
         if self.until > t {
             self.cut(t);
         }
-        let Growth { lyapunov, power: found } = if self.no_growth.is_some() { Growth::default() } else { self.nature.judge(&self.history) };
+        let Growth { lyapunov, power: found } =
+            if self.no_growth.is_some() { Growth::default() } else { self.nature.judge(&self.history) };
         // A power shows over most of the run only: in the beginning it is that of one oscillation.
         let growth_power = found.filter(|_| self.stopped.is_none_or(|[followed, _]| followed >= 0.5 * t));
         if let (Some([followed, _]), None, None) = (self.stopped, lyapunov, growth_power) {
             let why = || {
-                let seconds = if followed >= 0.01 { format!("{followed:.2}") } else { format!("{followed:.1e}") };
-                format!("it was followed to t = {seconds} s only, more would have taken too large a share of the run (see --trust full)")
+                let seconds =
+                    if followed >= 0.01 { format!("{followed:.2}") } else { format!("{followed:.1e}") };
+                format!(
+                    "it was followed to t = {seconds} s only, more would have taken too large a share of the run (see --trust full)"
+                )
             };
             self.no_growth.get_or_insert_with(why);
         }
-        let input_error = self.input_error.or_else(|| self.inputs_at(self.horizon.unwrap_or(t), lyapunov.is_some()));
-        let Self { name, shared, until, error, mut record, horizon, lost, why, history, no_growth, .. } = self;
+        let input_error =
+            self.input_error.or_else(|| self.inputs_at(self.horizon.unwrap_or(t), lyapunov.is_some()));
+        let Self { name, shared, until, error, mut record, horizon, lost, why, history, no_growth, .. } =
+            self;
         if record.last().is_some_and(|last| last[0] < until) {
             record.push([until, error]);
         }
@@ -266,8 +280,8 @@ impl Measured {
     }
 }
 
-/// The time at which the error passes the horizon between two looks, `[t, E]` each: it grows exponentially from one to the other, or as the square of the
-/// time from nothing.
+/// The time at which the error passes the horizon between two looks, `[t, E]` each: it grows exponentially
+/// from one to the other, or as the square of the time from nothing.
 pub(in crate::run) fn crossing([t0, e0]: [f64; 2], [t1, e1]: [f64; 2]) -> f64 {
     if e0 <= 0.0 {
         return t0 + (t1 - t0) * (HORIZON / e1).sqrt();
@@ -275,7 +289,8 @@ pub(in crate::run) fn crossing([t0, e0]: [f64; 2], [t1, e1]: [f64; 2]) -> f64 {
     t0 + (t1 - t0) * (libm::log(HORIZON / e0) / libm::log(e1 / e0))
 }
 
-/// The power of time with which the error of a regular motion grew over the last three quarters of the logarithm of time; `None` where it is not known to be regular.
+/// The power of time with which the error of a regular motion grew over the last three quarters of the
+/// logarithm of time; `None` where it is not known to be regular.
 fn power(record: &[[f64; 2]], history: &[[f64; 2]]) -> Option<f64> {
     let (last, end) = (history.last()?, record.last()?);
     let half = history.iter().rev().find(|point| point[0] <= 0.5 * last[0])?;
@@ -284,14 +299,17 @@ fn power(record: &[[f64; 2]], history: &[[f64; 2]]) -> Option<f64> {
     }
     let first = record.iter().find(|point| point[0] > 0.0)?;
     let from = first[0] * libm::pow(end[0] / first[0], 0.25);
-    let points: Vec<[f64; 2]> =
-        record.iter().filter(|point| point[0] >= from && point[1] > 0.0).map(|point| point.map(libm::log)).collect();
+    let points: Vec<[f64; 2]> = record
+        .iter()
+        .filter(|point| point[0] >= from && point[1] > 0.0)
+        .map(|point| point.map(libm::log))
+        .collect();
     let count = points.len() as f64;
     let mean = |k: usize| points.iter().map(|point| point[k]).sum::<f64>() / count;
     let (x, y) = (mean(0), mean(1));
-    let (above, below) = points
-        .iter()
-        .fold((0.0, 0.0), |(above, below), point| (above + (point[0] - x) * (point[1] - y), below + (point[0] - x) * (point[0] - x)));
+    let (above, below) = points.iter().fold((0.0, 0.0), |(above, below), point| {
+        (above + (point[0] - x) * (point[1] - y), below + (point[0] - x) * (point[0] - x))
+    });
     let slope = if below > 0.0 { above / below } else { POWERS[1] };
     Some(slope.clamp(POWERS[0], POWERS[1]))
 }

@@ -1,24 +1,28 @@
-//! How far a run may be trusted: its error estimated while it goes, and the time from which its path is no longer that of its start.
+//! How far a run may be trusted: its error estimated while it goes, and the time from which its path is no
+//! longer that of its start.
 //!
-//! Beside the run goes a *reference solution*: the same mechanism from the same bits by [`taylor`](crate::stepping::taylor) at 1e-14 or a
-//! hundredth of the run's tolerance, or in double-double where the run is near rounding (module `finer`).  Both are looked at at times of the reference solution's own,
-//! which depend neither on output times nor on rests:
+//! Beside the run goes a *reference solution*: the same mechanism from the same bits by
+//! [`taylor`](crate::stepping::taylor) at 1e-14 or a hundredth of the run's tolerance, or in double-double
+//! where the run is near rounding (module `finer`).  Both are looked at at times of the reference solution's
+//! own, which depend neither on output times nor on rests:
 //!
 //! ```text
 //! E(t) = max over the looks up to t of sqrt(d² + R²)      d  largest difference of an angle [rad], or of a position over the longest bar
 //!                                                          R  the reference solution's own rounding where it is in doubles, carried along by the tangent flow
 //! ```
 //!
-//! d is exact whatever the motion does, R matters near rounding only.  The *error estimate* is 1.2 E, the *horizon* the first time E passes
-//! [`HORIZON`], and beyond [`LOST`] nothing is measured any more.  The tangent flow tells besides how small
-//! differences grow, exponentially or as a power of time (module `growth`), and what the last digit
-//! of the inputs as doubles comes to, about; what every number comes to by the digits it is written with, runs of neighbouring scenes tell (module [`inputs`]).
+//! d is exact whatever the motion does, R matters near rounding only.  The *error estimate* is 1.2 E, the
+//! *horizon* the first time E passes [`HORIZON`], and beyond [`LOST`] nothing is measured any more.  The
+//! tangent flow tells besides how small differences grow, exponentially or as a power of time (module
+//! `growth`), and what the last digit of the inputs as doubles comes to, about; what every number comes to by
+//! the digits it is written with, runs of neighbouring scenes tell (module [`inputs`]).
 //!
-//! What the reference solution may cost is counted in work, not in seconds: the same run has the same figures on every machine ([`budget`]).  Where it is used
-//! up, a regular motion's error is carried on by the power law it followed so far, and said to be *extrapolated*.
+//! What the reference solution may cost is counted in work, not in seconds: the same run has the same figures
+//! on every machine ([`budget`]).  Where it is used up, a regular motion's error is carried on by the power
+//! law it followed so far, and said to be *extrapolated*.
 //!
-//! Source of the constants of R: fitted on random starts of double pendulums with springs and motors against references in double-double; the table of
-//! `tests/trust.rs` is their test.
+//! Source of the constants of R: fitted on random starts of double pendulums with springs and motors against
+//! references in double-double; the table of `tests/trust.rs` is their test.
 
 pub mod budget;
 mod distance;
@@ -61,7 +65,8 @@ pub enum Level {
     /// At most [`budget::SHARE`] of the run's work.
     #[default]
     Auto,
-    /// With a reference solution in double-double, up to [`budget::FULL_SHARE`] times the run's work and no more evaluations than it is allowed.
+    /// With a reference solution in double-double, up to [`budget::FULL_SHARE`] times the run's work and no
+    /// more evaluations than it is allowed.
     Full,
 }
 
@@ -89,7 +94,10 @@ impl FromStr for Level {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, String> {
-        Self::ALL.into_iter().find(|level| level.name() == name).ok_or_else(|| format!("no level `{name}`; there are off, auto, full"))
+        Self::ALL
+            .into_iter()
+            .find(|level| level.name() == name)
+            .ok_or_else(|| format!("no level `{name}`; there are off, auto, full"))
     }
 }
 
@@ -139,13 +147,15 @@ impl Lyapunov {
 pub struct Trust {
     /// Where the estimate comes from.
     pub how: How,
-    /// The largest error of an angle \[rad\], or of a position over the longest bar, up to `at`, as estimated.
+    /// The largest error of an angle \[rad\], or of a position over the longest bar, up to `at`, as
+    /// estimated.
     pub error_estimate: Option<f64>,
     /// The largest error of a rate up to `at` \[rad/s\], or of a velocity over the longest bar \[1/s\].
     pub rate_error: Option<f64>,
     /// The largest error of a motor's torque up to `at` \[N·m\], or of its force \[N\].
     pub torque_error: Option<f64>,
-    /// True where the reference solution is hardly finer than the run, so that the error is at most what is estimated.
+    /// True where the reference solution is hardly finer than the run, so that the error is at most what is
+    /// estimated.
     pub is_upper_bound: bool,
     /// The end of the run, or the horizon where that comes first \[s\].
     pub at: f64,
@@ -161,12 +171,13 @@ pub struct Trust {
     /// Why nothing is known of the growth of small differences, or not from some time on.
     #[serde(default)]
     pub no_growth: Option<String>,
-    /// What changes of the scene's numbers by about a last digit of a double come to at `at` \[rad\], or, with `inputs`, of their last digits as written; no
-    /// error of the method.
+    /// What changes of the scene's numbers by about a last digit of a double come to at `at` \[rad\], or,
+    /// with `inputs`, of their last digits as written; no error of the method.
     pub input_error: Option<f64>,
     /// What the digits of every number of the scene come to, where that was asked for (module [`inputs`]).
     pub inputs: Option<Inputs>,
-    /// What the model is off by whatever the method does, where springs are taken for rods \[rad\]; the estimate is no smaller.
+    /// What the model is off by whatever the method does, where springs are taken for rods \[rad\]; the
+    /// estimate is no smaller.
     pub model_error: Option<f64>,
     /// The reference solution, in words.
     pub error_estimator: Option<String>,
@@ -178,7 +189,8 @@ pub struct Trust {
     pub why: Option<String>,
     /// Times \[s\] and estimates \[rad\] up to there, thinned out.
     pub record: Vec<[f64; 2]>,
-    /// Work of the reference solution, of that the tangent flow's, and the work of the run beside it, as counted by the prices of [`budget`] \[ns\].
+    /// Work of the reference solution, of that the tangent flow's, and the work of the run beside it, as
+    /// counted by the prices of [`budget`] \[ns\].
     #[serde(default)]
     pub work: [f64; 3],
 }
@@ -198,7 +210,8 @@ impl Trust {
         self.why.as_deref().filter(|why| why.starts_with(CUT))
     }
 
-    /// True where the end of the run lies beyond its horizon: the angles there are those of a typical motion at most.
+    /// True where the end of the run lies beyond its horizon: the angles there are those of a typical motion
+    /// at most.
     pub fn is_past(&self) -> bool {
         self.horizon.is_some()
     }

@@ -63,7 +63,11 @@ pub(super) struct WorkBudget<'a> {
     pub flow: &'a mut f64,
 }
 
-fn contact_driver(mechanism: &Arc<Mechanism>, series: &mut Plan, start: &Motion) -> Result<(ContactDriver, Outcome), String> {
+fn contact_driver(
+    mechanism: &Arc<Mechanism>,
+    series: &mut Plan,
+    start: &Motion,
+) -> Result<(ContactDriver, Outcome), String> {
     let driver = build(mechanism, series, start).map_err(|stop| stop.what)?;
     let mut outcome = Outcome::begun(mechanism, series.clone());
     let mut contact_driver = ContactDriver::new(Arc::clone(mechanism), driver);
@@ -79,7 +83,9 @@ impl ReferenceRun {
     pub(super) fn new(mechanism: &Arc<Mechanism>, series: &mut Plan, start: &Motion) -> Result<Self, String> {
         let (mut contact_driver, outcome) = contact_driver(mechanism, series, start)?;
         let begun = match series.method {
-            MethodId::Taylor => Tangent::new(&Arc::clone(contact_driver.holding()), &contact_driver.motion(), series.until),
+            MethodId::Taylor => {
+                Tangent::new(&Arc::clone(contact_driver.holding()), &contact_driver.motion(), series.until)
+            }
             _ => Err("the reference solution is no series".into()),
         };
         let (tangent, no_growth) = match begun {
@@ -88,7 +94,16 @@ impl ReferenceRun {
         };
         contact_driver.jumps = tangent.is_some().then(Vec::new);
         let (is_rounded, begun) = (is_rounded(series), start.time.hi);
-        Ok(Self { contact_driver, outcome, motion: start.clone(), tangent, no_growth, is_rounded, begun, last: Statistics::default() })
+        Ok(Self {
+            contact_driver,
+            outcome,
+            motion: start.clone(),
+            tangent,
+            no_growth,
+            is_rounded,
+            begun,
+            last: Statistics::default(),
+        })
     }
 
     /// Goes on by another series from where it is.
@@ -99,7 +114,8 @@ impl ReferenceRun {
         let motion = self.motion.clone();
         (self.contact_driver, self.outcome) = contact_driver(mechanism, &mut series, &motion)?;
         self.contact_driver.jumps = self.tangent.is_some().then(Vec::new);
-        (self.is_rounded, self.begun, self.last) = (is_rounded(&series), motion.time.hi, Statistics::default());
+        (self.is_rounded, self.begun, self.last) =
+            (is_rounded(&series), motion.time.hi, Statistics::default());
         Ok(())
     }
 
@@ -113,7 +129,8 @@ impl ReferenceRun {
         }
     }
 
-    /// Goes on from what was kept, which was reached on the way to `horizon`; `None` where it cannot be of this mechanism.
+    /// Goes on from what was kept, which was reached on the way to `horizon`; `None` where it cannot be of
+    /// this mechanism.
     pub(super) fn resume(
         mechanism: &Arc<Mechanism>,
         start: &Motion,
@@ -121,7 +138,9 @@ impl ReferenceRun {
         horizon: Time,
     ) -> Result<Option<Self>, StepError> {
         let SavedReferenceRun { contact_state, outcome, path, begun, last } = kept;
-        let Some(mut contact_driver) = ContactDriver::resume(Arc::clone(mechanism), &outcome.plan, start, contact_state, horizon)? else {
+        let Some(mut contact_driver) =
+            ContactDriver::resume(Arc::clone(mechanism), &outcome.plan, start, contact_state, horizon)?
+        else {
             return Ok(None);
         };
         let tangent = match path {
@@ -158,7 +177,8 @@ impl ReferenceRun {
         self.outcome.impact_count + self.outcome.persistent_contact_count
     }
 
-    /// The mean length of its steps \[s\], of those up to `t` \[s\]; where they end at every look it has no say in when these are.
+    /// The mean length of its steps \[s\], of those up to `t` \[s\]; where they end at every look it has no
+    /// say in when these are.
     pub(super) fn mean_step(&self, t: f64) -> f64 {
         if self.plan().method != MethodId::Taylor {
             return self.plan().until / STEPS;
@@ -166,7 +186,8 @@ impl ReferenceRun {
         (t - self.begun) / self.last.steps.max(1) as f64
     }
 
-    /// To a time, with the motion there in `motion`; what it cost is added to what was spent, which must not pass the budget.
+    /// To a time, with the motion there in `motion`; what it cost is added to what was spent, which must not
+    /// pass the budget.
     ///
     /// # Errors
     /// Why the reference solution stopped, or `None` where the budget was used up.
@@ -192,8 +213,9 @@ impl ReferenceRun {
             left == 0
         };
         let arrived = self.contact_driver.go(until, &mut self.outcome, &mut is_spent);
-        if !arrived.map_err(|stop| Some(format!("the reference solution stopped at t = {} s: {}", stop.t, stop.what)))?
-            || *purse.spent > purse.budget
+        if !arrived.map_err(|stop| {
+            Some(format!("the reference solution stopped at t = {} s: {}", stop.t, stop.what))
+        })? || *purse.spent > purse.budget
         {
             return Err(None);
         }

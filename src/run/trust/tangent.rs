@@ -8,10 +8,13 @@
 //! s <- Phi s + h (σ a)                                       what a relative change of every force by 1, of random sign, and of the start comes to
 //! ```
 //!
-//! The motion is that of the reference solution at the flow's own times, the ends of its steps.  Up to three coordinates that nothing ties carry the whole matrix,
-//! few degrees of freedom a basis of the directions tangent to the constraints, more of them vectors of random directions, whose growth stands for that of the matrix.
+//! The motion is that of the reference solution at the flow's own times, the ends of its steps.  Up to three
+//! coordinates that nothing ties carry the whole matrix, few degrees of freedom a basis of the directions
+//! tangent to the constraints, more of them vectors of random directions, whose growth stands for that of the
+//! matrix.
 //!
-//! Where neighbours do not go the same way there is no such flow: where a wall is grazed, and in singular positions.  From there on it is absent.
+//! Where neighbours do not go the same way there is no such flow: where a wall is grazed, and in singular
+//! positions.  From there on it is absent.
 
 mod beside;
 mod gauss;
@@ -39,7 +42,8 @@ const VECTORS: usize = 3;
 const INPUTS: [usize; 2] = [4, 1];
 /// The longest step over the slowest of the rates it is measured by.
 const LONGEST: f64 = 10.0;
-/// Of half a unit in the last place of 1, what a step of the series leaves: its state is a pair, and so are its constants.
+/// Of half a unit in the last place of 1, what a step of the series leaves: its state is a pair, and so are
+/// its constants.
 const ROUNDED: f64 = 0.1 * 1.1e-16;
 /// The shortest step, over the time of the fastest rate.
 const SHORTEST: f64 = 1e-7;
@@ -77,7 +81,8 @@ pub(super) struct Path {
     /// Columns of Phi(t, 0) over exp(log), those of rates times `rate`; or the vectors.
     columns: Vec<Vec<f64>>,
     log: f64,
-    /// True where the columns are those of the whole matrix, and where the step's own comes from Jacobians (module `gauss`).
+    /// True where the columns are those of the whole matrix, and where the step's own comes from Jacobians
+    /// (module `gauss`).
     is_whole: bool,
     is_plain: bool,
     /// Accelerations by coordinates and rates at the nodes so far, one after the other.
@@ -126,9 +131,21 @@ impl Tangent {
             return Err("the motors leave no freedom: neighbouring motions are the same".into());
         }
         let is_whole = (is_exact || f <= WHOLE) && tangent.ground.is_none() && mechanism.contacts.is_empty();
-        let is_plain = is_whole && !is_exact && mechanism.constraints.is_empty() && !mechanism.is_forced() && gauss::is_slow(mechanism);
+        let is_plain = is_whole
+            && !is_exact
+            && mechanism.constraints.is_empty()
+            && !mechanism.is_forced()
+            && gauss::is_slow(mechanism);
         let count = if is_whole || freedom <= WHOLE { 2 * freedom } else { VECTORS };
-        tangent.path = Path { freedom, is_whole, is_plain, held: mechanism.held.clone(), stride: 1, state, ..Path::default() };
+        tangent.path = Path {
+            freedom,
+            is_whole,
+            is_plain,
+            held: mechanism.held.clone(),
+            stride: 1,
+            state,
+            ..Path::default()
+        };
         tangent.path.rate = tangent.fastest(until);
         tangent.path.covariance = vec![0.0; if is_whole { 4 * f * f } else { 1 }];
         let mut dice = Dice(1);
@@ -163,14 +180,17 @@ impl Tangent {
         let metric = DistanceMetric::new(mechanism);
         let coordinates = problem.coordinates();
         let weights: Vec<f64> = match coordinates {
-            Coordinates::Independent => mechanism.partition.independent.iter().map(|&k| metric.weight(k)).collect(),
+            Coordinates::Independent => {
+                mechanism.partition.independent.iter().map(|&k| metric.weight(k)).collect()
+            }
             _ => (0..mechanism.coordinates()).map(|k| metric.weight(k)).collect(),
         };
         if weights.is_empty() {
             return Err("the motors leave no freedom: neighbouring motions are the same".into());
         }
         let rates = vec![0.0; problem.dimension()];
-        let ground = (coordinates == Coordinates::All && !mechanism.constraints.is_empty()).then(|| Ground::new(mechanism));
+        let ground = (coordinates == Coordinates::All && !mechanism.constraints.is_empty())
+            .then(|| Ground::new(mechanism));
         let mechanism = Arc::clone(mechanism);
         Ok(Self {
             mechanism,
@@ -194,7 +214,11 @@ impl Tangent {
         if !path.held.iter().all(is_known) {
             return None;
         }
-        let holding = if path.held.is_empty() { Arc::clone(mechanism) } else { Arc::new(mechanism.holding(&path.held)) };
+        let holding = if path.held.is_empty() {
+            Arc::clone(mechanism)
+        } else {
+            Arc::new(mechanism.holding(&path.held))
+        };
         let mut tangent = Self::bare(&holding).ok()?;
         let (f, dimension) = (tangent.weights.len(), tangent.problem.dimension());
         let count = path.columns.len();
@@ -233,7 +257,8 @@ impl Tangent {
         (state.time + share * step).hi
     }
 
-    /// The same, or `until`, where that comes before: the flow of a plain mechanism has no shorter steps than those under way.
+    /// The same, or `until`, where that comes before: the flow of a plain mechanism has no shorter steps than
+    /// those under way.
     pub(super) fn next_within(&mut self, until: f64) -> f64 {
         let Path { state, step, nodes, is_plain, .. } = &mut self.path;
         if *is_plain && nodes.is_empty() {
@@ -247,7 +272,8 @@ impl Tangent {
         self.path.lost.as_deref()
     }
 
-    /// Takes the motion at [`Tangent::next`], to which `steps` steps in doubles have led so far (none where their rounding does not count).
+    /// Takes the motion at [`Tangent::next`], to which `steps` steps in doubles have led so far (none where
+    /// their rounding does not count).
     pub fn take(&mut self, motion: &Motion, steps: u64) {
         if self.path.is_plain && !self.take_node(motion) {
             return;
@@ -257,7 +283,11 @@ impl Tangent {
         self.path.steps = steps;
         match self.path.is_plain {
             // The last node is near enough to the end for what else is asked of it.
-            true => self.step(self.path.step, State { time: self.path.state.time + self.path.step, ..state }, taken),
+            true => self.step(
+                self.path.step,
+                State { time: self.path.state.time + self.path.step, ..state },
+                taken,
+            ),
             false => self.advance(motion.time, Some(state), taken),
         }
     }
@@ -296,27 +326,33 @@ impl Tangent {
         problem.rhs(path.state.time, &path.state.y, rates);
     }
 
-    /// What taking a motion costs in evaluations of the equations, about, by counted instructions; of a Jacobian four columns come to five.
+    /// What taking a motion costs in evaluations of the equations, about, by counted instructions; of a
+    /// Jacobian four columns come to five.
     pub fn evaluations(&self) -> u64 {
         if self.path.is_plain {
             return 1 + 5 * self.path.columns.len().div_ceil(4) as u64;
         }
-        // Of the prices of `budget`: the series at this order, and the columns beside it, which are worked on by vectors.
+        // Of the prices of `budget`: the series at this order, and the columns beside it, which are worked on
+        // by vectors.
         let (n, rows) = (self.mechanism.coordinates() as f64, self.mechanism.constraints.len() as f64);
-        let forces =
-            (self.mechanism.springs.len() + self.mechanism.torsions.len() + self.mechanism.actions.len() + self.mechanism.forces.len())
-                as f64;
+        let forces = (self.mechanism.springs.len()
+            + self.mechanism.torsions.len()
+            + self.mechanism.actions.len()
+            + self.mechanism.forces.len()) as f64;
         let series = 700.0 + 400.0 * n + 150.0 * n * n + 700.0 * (rows + forces);
         let evaluation = 15.0 + 20.0 * n + 4.0 * n * n + 60.0 * rows + 20.0 * forces;
         (0.2 * series * (1.0 + 0.75 * self.seeds.len() as f64) / evaluation) as u64
     }
 
-    /// Phi(t, 0) column by column, in all coordinates and rates as they are \[rad, m, rad/s, m/s\]; of a basis or of vectors only, where there is no matrix.
+    /// Phi(t, 0) column by column, in all coordinates and rates as they are \[rad, m, rad/s, m/s\]; of a
+    /// basis or of vectors only, where there is no matrix.
     pub fn columns(&self) -> Vec<Vec<f64>> {
         let f = self.weights.len();
         let grown = libm::exp(self.path.log);
         let size = |j: usize| if self.path.is_whole && j >= f { grown / self.path.rate } else { grown };
-        let scaled = |(j, column): (usize, &Vec<f64>)| self.spread(column).into_iter().map(|entry| entry * size(j)).collect();
+        let scaled = |(j, column): (usize, &Vec<f64>)| {
+            self.spread(column).into_iter().map(|entry| entry * size(j)).collect()
+        };
         self.path.columns.iter().enumerate().map(scaled).collect()
     }
 
@@ -341,7 +377,9 @@ impl Tangent {
         for (j, seed) in seeds.iter_mut().enumerate() {
             match path.is_whole {
                 true => seed.copy_from_slice(&unit(j, f, path.rate)),
-                false => seed.copy_from_slice(path.columns.get(j).unwrap_or_else(|| &path.inputs[j - path.columns.len()])),
+                false => seed.copy_from_slice(
+                    path.columns.get(j).unwrap_or_else(|| &path.inputs[j - path.columns.len()]),
+                ),
             }
         }
         let (mut reach, mut is_near, mut rest) = (LONGEST / path.rate, false, &seeds[..]);
@@ -432,7 +470,10 @@ impl Tangent {
 
     /// Puts the columns back onto the constraints.
     fn keep(&mut self) {
-        let Self { mechanism, ground: Some(ground), path: Path { state, columns, inputs, .. }, .. } = self else { return };
+        let Self { mechanism, ground: Some(ground), path: Path { state, columns, inputs, .. }, .. } = self
+        else {
+            return;
+        };
         ground.stand(mechanism, state);
         ground.keep(mechanism, state, columns.iter_mut().chain(inputs));
     }
@@ -448,7 +489,9 @@ impl Tangent {
                 column[f + i] += dice.sign() * size * rates[f + i];
             }
         }
-        let Self { mechanism, ground: Some(ground), path: Path { state, inputs, .. }, .. } = self else { return };
+        let Self { mechanism, ground: Some(ground), path: Path { state, inputs, .. }, .. } = self else {
+            return;
+        };
         ground.keep(mechanism, state, inputs.iter_mut());
     }
 

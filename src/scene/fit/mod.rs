@@ -1,5 +1,6 @@
-//! Whether the parts of a scene fit together: the motors and locks leave each angle one master, the start agrees with their laws, every
-//! coordinate has an equation, and nothing begins where its force or its side is undefined.
+//! Whether the parts of a scene fit together: the motors and locks leave each angle one master, the start
+//! agrees with their laws, every coordinate has an equation, and nothing begins where its force or its side
+//! is undefined.
 
 mod posture;
 mod start;
@@ -24,13 +25,21 @@ pub(super) struct Places<'a> {
 }
 
 /// The scene with its start, where its parts fit together.
-pub(super) fn fitted(scene: Scene, places: &Places, given: &[Option<GivenStart>]) -> Result<Scene, SceneError> {
+pub(super) fn fitted(
+    scene: Scene,
+    places: &Places,
+    given: &[Option<GivenStart>],
+) -> Result<Scene, SceneError> {
     let hanging = Hanging::of(&scene);
     let whole = hanging.has_whole_start(&scene);
     if let Some(bar) = if whole { hanging.turns_nothing(&scene.bars) } else { turns_alone(&scene) } {
         let problem = format!("(bar `{}`) is a point mass on its own hinge", scene.bars[bar].name);
         let hint = "give it an inertia, or a centre away from its hinge";
-        return Err(places.bars[bar].refuse(&problem, "turning a bar must move some mass, else its angle has no equation", hint));
+        return Err(places.bars[bar].refuse(
+            &problem,
+            "turning a bar must move some mass, else its angle has no equation",
+            hint,
+        ));
     }
     for (bar, entry) in given.iter().enumerate().filter(|(bar, _)| hanging.hung[body(Some(*bar))]) {
         for key in ["origin", "velocity"] {
@@ -51,8 +60,9 @@ pub(super) fn fitted(scene: Scene, places: &Places, given: &[Option<GivenStart>]
 }
 
 impl Scene {
-    /// True where the start is known from angles and rates alone, all of which must be given or follow from motors and locks: trees of
-    /// hinges on the ground whose only constraints are angles, no rigid spring among them.  In every other scene a part of the start can be found from the rest.
+    /// True where the start is known from angles and rates alone, all of which must be given or follow from
+    /// motors and locks: trees of hinges on the ground whose only constraints are angles, no rigid spring
+    /// among them.  In every other scene a part of the start can be found from the rest.
     pub fn has_whole_start(&self) -> bool {
         Hanging::of(self).has_whole_start(self)
     }
@@ -80,8 +90,12 @@ struct Hang {
 impl Hanging {
     fn of(scene: &Scene) -> Self {
         let bars = scene.bars.len();
-        let joints: Vec<&[Place; 2]> =
-            scene.hinges.iter().map(|hinge| &hinge.between).chain(scene.welds.iter().map(|weld| &weld.between)).collect();
+        let joints: Vec<&[Place; 2]> = scene
+            .hinges
+            .iter()
+            .map(|hinge| &hinge.between)
+            .chain(scene.welds.iter().map(|weld| &weld.between))
+            .collect();
         let mut groups = Groups::of(bars + 1);
         let mut looped = false;
         let mut at_body: Vec<Vec<usize>> = vec![Vec::new(); bars + 1];

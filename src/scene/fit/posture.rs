@@ -15,7 +15,8 @@ pub(super) struct Posture {
 impl Hanging {
     /// Where everything is at `start`.
     pub fn posture(&self, start: &[Start]) -> Posture {
-        let bars = start.iter().map(|start| ([0.0; 2], [libm::cos(start.phi), libm::sin(start.phi)], 0.0)).collect();
+        let bars =
+            start.iter().map(|start| ([0.0; 2], [libm::cos(start.phi), libm::sin(start.phi)], 0.0)).collect();
         let mut posture = Posture { bars };
         for Hang { bar, from, own } in &self.order {
             let (hinge, way) = posture.at(*from);
@@ -28,7 +29,8 @@ impl Hanging {
 }
 
 impl Posture {
-    /// Position \[m\] of a place, and the sum of the lengths that lead there \[m\], which scales its rounding error.
+    /// Position \[m\] of a place, and the sum of the lengths that lead there \[m\], which scales its rounding
+    /// error.
     fn at(&self, place: Place) -> ([f64; 2], f64) {
         let [x, y] = place.point;
         let size = x.abs() + y.abs();
@@ -44,8 +46,10 @@ pub(super) fn springs(posture: &Posture, springs: &[Spring], places: &[At]) -> R
         let ((from, way_from), (to, way_to)) = (posture.at(*a), posture.at(*b));
         let length = libm::hypot(to[0] - from[0], to[1] - from[1]);
         if *free_length > 0.0 && length <= SAME * (way_from + way_to) {
-            let problem = format!("(spring `{name}`) starts with length 0 and has the free length {free_length} m");
-            let hint = "its force has no direction there; start elsewhere, move an end, or set free_length to 0";
+            let problem =
+                format!("(spring `{name}`) starts with length 0 and has the free length {free_length} m");
+            let hint =
+                "its force has no direction there; start elsewhere, move an end, or set free_length to 0";
             return Err(at.refuse(&problem, "such a spring must start with a positive length", hint));
         }
     }
@@ -59,8 +63,15 @@ pub(super) fn walls(posture: &Posture, walls: &[Wall], places: &[At]) -> Result<
         let gap = (position[0] - through[0]) * normal[0] + (position[1] - through[1]) * normal[1];
         if gap < -SAME * (way + through[0].abs() + through[1].abs()) {
             let problem = format!("(wall `{name}`) has its point {} m behind it at the start", about(-gap));
-            let hint = format!("start elsewhere, move the wall, or turn its normal to [{}, {}]", -normal[0], -normal[1]);
-            return Err(at.refuse(&problem, "the point must start on the side the normal shows, or on the wall", &hint));
+            let hint = format!(
+                "start elsewhere, move the wall, or turn its normal to [{}, {}]",
+                -normal[0], -normal[1]
+            );
+            return Err(at.refuse(
+                &problem,
+                "the point must start on the side the normal shows, or on the wall",
+                &hint,
+            ));
         }
     }
     Ok(())

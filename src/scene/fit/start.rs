@@ -30,7 +30,13 @@ impl<'a> AngleConstraint<'a> {
         });
         let locks = scene.locks.iter().filter_map(|lock| {
             let law = Start { phi: lock.angle?, omega: 0.0 };
-            Some(Self { kind: "lock", name: &lock.name, base: body(lock.relative_to), bar: body(Some(lock.bar)), law })
+            Some(Self {
+                kind: "lock",
+                name: &lock.name,
+                base: body(lock.relative_to),
+                bar: body(Some(lock.bar)),
+                law,
+            })
         });
         motors.chain(locks).collect()
     }
@@ -86,8 +92,11 @@ impl<'a> AngleConstraints<'a> {
             for &number in &self.at_body[here] {
                 let angle_constraint = &self.all[number];
                 let law = part(&angle_constraint.law);
-                let (to, there) =
-                    if here == angle_constraint.base { (angle_constraint.bar, known + law) } else { (angle_constraint.base, known - law) };
+                let (to, there) = if here == angle_constraint.base {
+                    (angle_constraint.bar, known + law)
+                } else {
+                    (angle_constraint.base, known - law)
+                };
                 if start[to].is_none() {
                     start[to] = Some(there);
                     open.push(to);
@@ -96,8 +105,8 @@ impl<'a> AngleConstraints<'a> {
         }
     }
 
-    /// `part` of the start of every bar.  In a group of tied bars all follow from one: a bar that no tie turns if it is given, else the first
-    /// that is.
+    /// `part` of the start of every bar.  In a group of tied bars all follow from one: a bar that no tie
+    /// turns if it is given, else the first that is.
     fn resolved(&self, bars: usize, part: Part, given: &dyn Fn(usize) -> Option<f64>) -> Vec<f64> {
         let mut start = vec![None; bars + 1];
         start[0] = Some(0.0);
@@ -136,8 +145,9 @@ impl GivenStart<'_> {
     }
 }
 
-/// Angle and rate of each bar at t = 0, and what of it the file gives: as given, or by the law of a motor or the angle of a lock, or 0 where
-/// the rest may be found later; an empty second list where it may not (`whole`).
+/// Angle and rate of each bar at t = 0, and what of it the file gives: as given, or by the law of a motor or
+/// the angle of a lock, or 0 where the rest may be found later; an empty second list where it may not
+/// (`whole`).
 pub(super) fn starts(
     scene: &Scene,
     places: &Places,
@@ -147,7 +157,8 @@ pub(super) fn starts(
     let place = |number: usize| match number.checked_sub(scene.motors.len()) {
         None => &places.motors[number],
         Some(lock) => {
-            let with_angle = scene.locks.iter().enumerate().filter(|(_, lock)| lock.angle.is_some()).nth(lock);
+            let with_angle =
+                scene.locks.iter().enumerate().filter(|(_, lock)| lock.angle.is_some()).nth(lock);
             &places.locks[with_angle.map_or(0, |(number, _)| number)]
         }
     };
@@ -171,7 +182,11 @@ pub(super) fn starts(
         let angle_constraint @ AngleConstraint { kind, name, .. } = &angle_constraints.all[by];
         if !ANGLE.holds(exact.phi) || !RATE.holds(exact.omega) {
             let bar = &scene.bars[bar].name;
-            let problem = format!("({kind} `{name}`) starts bar `{bar}` at {} rad, {} rad/s", about(exact.phi), about(exact.omega));
+            let problem = format!(
+                "({kind} `{name}`) starts bar `{bar}` at {} rad, {} rad/s",
+                about(exact.phi),
+                about(exact.omega)
+            );
             let allowed = format!("a start must be {ANGLE} and {RATE}");
             return Err(place(by).refuse(&problem, &allowed, "take off whole turns, and check the rates"));
         }
@@ -191,12 +206,17 @@ pub(super) fn starts(
 fn said(given: &Option<GivenStart>) -> Given {
     match given {
         None => Given { phi: false, omega: false, origin: None, velocity: None },
-        Some(given) => Given { phi: given.phi.is_some(), omega: given.omega.is_some(), origin: given.origin, velocity: given.velocity },
+        Some(given) => Given {
+            phi: given.phi.is_some(),
+            omega: given.omega.is_some(),
+            origin: given.origin,
+            velocity: given.velocity,
+        },
     }
 }
 
-/// True for each bar whose start must be written so that all starts read back to the same bits, where all are known: of bars that motors
-/// and locks tie to each other only the one that the others were computed from.
+/// True for each bar whose start must be written so that all starts read back to the same bits, where all are
+/// known: of bars that motors and locks tie to each other only the one that the others were computed from.
 pub(in crate::scene) fn written_starts(scene: &Scene) -> Vec<bool> {
     let start = &scene.start;
     let mut written = vec![true; start.len()];
@@ -224,7 +244,9 @@ fn missing_start(root: &At, bar: &str, tied: bool) -> SceneError {
             "its motors and locks only tie it to other bars; add \"start\": {{\"{bar}\": {{\"phi\": 0, \"omega\": 0}}}} or that of one of those"
         )
     } else {
-        format!("add \"start\": {{\"{bar}\": {{\"phi\": 0, \"omega\": 0}}}}; only bars that a motor drives or a lock holds may be left out")
+        format!(
+            "add \"start\": {{\"{bar}\": {{\"phi\": 0, \"omega\": 0}}}}; only bars that a motor drives or a lock holds may be left out"
+        )
     };
     root.missing("start", bar, "must be {\"phi\": angle in rad, \"omega\": rate in rad/s}", &hint)
 }
@@ -237,12 +259,16 @@ fn agrees(
     unit: &str,
     angle_constraint: &AngleConstraint,
 ) -> Result<(), SceneError> {
-    let Some(given) = given.filter(|given| (given - exact).abs() > SAME * exact.abs().max(1.0)) else { return Ok(()) };
+    let Some(given) = given.filter(|given| (given - exact).abs() > SAME * exact.abs().max(1.0)) else {
+        return Ok(());
+    };
     let by = if angle_constraint.kind == "motor" { "the law of motor" } else { "lock" };
     let allowed = format!("must be {exact:?} {unit}, by {by} `{}`", angle_constraint.name);
     let turns = (given - exact) / std::f64::consts::TAU;
     let hint = if unit == "rad" && turns.abs() >= 0.5 && (turns - turns.round()).abs() < 1e-9 {
-        format!("leave it out, or write {exact:?}; angles are not taken modulo a turn, and this one is {turns:.0} turns off")
+        format!(
+            "leave it out, or write {exact:?}; angles are not taken modulo a turn, and this one is {turns:.0} turns off"
+        )
     } else {
         format!("leave the bar out of \"start\", or write {exact:?}")
     };

@@ -1,5 +1,5 @@
-//! The format of scene files as tables: what the reader accepts, what its refusals say is allowed, and what the JSON Schema states all
-//! come from here, so that they cannot part.
+//! The format of scene files as tables: what the reader accepts, what its refusals say is allowed, and what
+//! the JSON Schema states all come from here, so that they cannot part.
 
 mod tables;
 
@@ -115,11 +115,16 @@ const fn optional(name: &'static str, shape: Shape, example: &'static str, about
     Field { name, about, shape, required: false, example }
 }
 
-/// Of the kinds of a list the one that an object with these keys is of: the last that has one of them as a key of its own that it must
-/// have, else the first.
+/// Of the kinds of a list the one that an object with these keys is of: the last that has one of them as a
+/// key of its own that it must have, else the first.
 pub(super) fn kind(of: &[&'static Table], has: impl Fn(&str) -> bool) -> Option<&'static Table> {
     let [first, others @ ..] = of else { return None };
-    let own = |table: &Table| table.fields.iter().any(|field| field.required && first.field(field.name).is_none() && has(field.name));
+    let own = |table: &Table| {
+        table
+            .fields
+            .iter()
+            .any(|field| field.required && first.field(field.name).is_none() && has(field.name))
+    };
     Some(others.iter().rfind(|table| own(table)).unwrap_or(first))
 }
 
@@ -149,18 +154,27 @@ impl Shape {
             Self::Number(quantity) => format!("must be a number {quantity}"),
             Self::Pair(quantity) => format!("must be two numbers [x, y], each {quantity}"),
             Self::Name => format!("must be a name: 1 to {LONGEST_NAME} letters, digits, - or _"),
-            Self::FolderName => format!("must be a name: 1 to {LONGEST_NAME} letters, digits, - or _, not starting with -"),
+            Self::FolderName => {
+                format!("must be a name: 1 to {LONGEST_NAME} letters, digits, - or _, not starting with -")
+            }
             Self::Text => format!("must be text on one line, at most {LONGEST_TEXT} characters"),
             Self::Body { ground: true } => "must be the name of a bar, or \"ground\"".to_owned(),
             Self::Body { ground: false } => "must be the name of a bar".to_owned(),
             Self::SliderName => "must be the name of a slider".to_owned(),
-            Self::Word(words) => format!("must be {}", words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(" or ")),
+            Self::Word(words) => format!(
+                "must be {}",
+                words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(" or ")
+            ),
             Self::Inertia(quantity) => format!("must be \"full\", \"slender\" or a number {quantity}"),
             Self::Between => "must be a list of two places, each {\"body\": …, \"point\": [x, y]}".to_owned(),
             Self::Object(table) => format!("must be an object with the keys {}", table.keys()),
             Self::List { least: 0, most: usize::MAX, .. } => "must be a list of objects [{…}, …]".to_owned(),
-            Self::List { least, most: usize::MAX, .. } => format!("must be a list of at least {least} objects [{{…}}, …]"),
-            Self::List { least, most, .. } => format!("must be a list of {least} to {most} objects [{{…}}, …]"),
+            Self::List { least, most: usize::MAX, .. } => {
+                format!("must be a list of at least {least} objects [{{…}}, …]")
+            }
+            Self::List { least, most, .. } => {
+                format!("must be a list of {least} to {most} objects [{{…}}, …]")
+            }
             Self::ByBar(table) => format!("must be an object of {{bar name: {{{}}}}}", table.keys()),
         }
     }

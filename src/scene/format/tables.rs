@@ -1,27 +1,50 @@
 //! The tables themselves: one for each kind of object of a scene file.
 
-use super::{ANGLE, Field, INERTIA, MASS, MOST_BARS, Quantity, RATE, Shape, Table, not_negative, optional, positive, required, signed};
+use super::{
+    ANGLE, Field, INERTIA, MASS, MOST_BARS, Quantity, RATE, Shape, Table, not_negative, optional, positive,
+    required, signed,
+};
 
 /// The whole scene.
 pub(in crate::scene) static SCENE: Table = Table {
     title: "a scene",
     about: "A planar mechanism of bars, joints, springs, forces, motors and walls, in SI units; angles are absolute, from +x, counter-clockwise.",
     fields: &[
-        required("name", Shape::FolderName, "\"free\"", "Name of the scene, and of the folder its results go to."),
+        required(
+            "name",
+            Shape::FolderName,
+            "\"free\"",
+            "Name of the scene, and of the folder its results go to.",
+        ),
         optional("description", Shape::Text, "\"Two bars fall.\"", "One sentence for reports and charts."),
         required("gravity", Shape::Pair(signed("m/s²")), "[9.81, 0]", "Gravitational acceleration (x, y)."),
-        required("bars", Shape::List { of: &[&UNIFORM_BAR, &OUTRIGHT_BAR], least: 1, most: MOST_BARS }, "[…]", "The bodies."),
+        required(
+            "bars",
+            Shape::List { of: &[&UNIFORM_BAR, &OUTRIGHT_BAR], least: 1, most: MOST_BARS },
+            "[…]",
+            "The bodies.",
+        ),
         optional(
             "hinges",
             any_number_of(&[&HINGE]),
             "[…]",
             "Where bodies turn on each other or on the ground, in chains, trees and loops; none if absent.",
         ),
-        optional("sliders", any_number_of(&[&SLIDER]), "[…]", "Points that slide along lines; none if absent."),
+        optional(
+            "sliders",
+            any_number_of(&[&SLIDER]),
+            "[…]",
+            "Points that slide along lines; none if absent.",
+        ),
         optional("welds", any_number_of(&[&WELD]), "[…]", "Bodies that are one; none if absent."),
         optional("locks", any_number_of(&[&LOCK]), "[…]", "Angles that stay as they are; none if absent."),
         optional("springs", any_number_of(&[&SPRING]), "[…]", "Springs and dampers; none if absent."),
-        optional("torsion_springs", any_number_of(&[&TORSION_SPRING]), "[…]", "Springs and dampers between angles; none if absent."),
+        optional(
+            "torsion_springs",
+            any_number_of(&[&TORSION_SPRING]),
+            "[…]",
+            "Springs and dampers between angles; none if absent.",
+        ),
         optional("forces", any_number_of(&[&FORCE]), "[…]", "Forces at points; none if absent."),
         optional("torques", any_number_of(&[&TORQUE]), "[…]", "Torques on bodies; none if absent."),
         optional(
@@ -71,7 +94,12 @@ pub(in crate::scene) static OUTRIGHT_BAR: Table = Table {
         required("name", Shape::Name, "\"bar1\"", BAR_NAME),
         required("mass", Shape::Number(MASS), "0.0603", "Mass."),
         required("centre", Shape::Pair(signed("m")), "[0.3, 0]", "Centre of mass in the body's frame."),
-        required("inertia", Shape::Number(INERTIA), "0.0018", "Moment of inertia about the centre of mass; 0 for a point mass."),
+        required(
+            "inertia",
+            Shape::Number(INERTIA),
+            "0.0018",
+            "Moment of inertia about the centre of mass; 0 for a point mass.",
+        ),
         optional(
             "length",
             Shape::Number(not_negative("m")),
@@ -104,7 +132,12 @@ pub(in crate::scene) static SLIDER: Table = Table {
     title: "a slider",
     about: "A point of a body that slides along a line of the ground or of another body.",
     fields: &[
-        required("name", Shape::Name, "\"slider\"", "Name, unique among sliders; it also names the constraints."),
+        required(
+            "name",
+            Shape::Name,
+            "\"slider\"",
+            "Name, unique among sliders; it also names the constraints.",
+        ),
         required(
             "point",
             Shape::Object(&PLACE),
@@ -132,7 +165,12 @@ pub(in crate::scene) static RAIL: Table = Table {
     about: "A line of a bar or of the ground.",
     fields: &[
         required("body", Shape::Body { ground: true }, "\"ground\"", "Name of a bar, or \"ground\"."),
-        required("point", Shape::Pair(signed("m")), "[0, 0]", "A point of the line, in the bar's frame, or in the world's for the ground."),
+        required(
+            "point",
+            Shape::Pair(signed("m")),
+            "[0, 0]",
+            "A point of the line, in the bar's frame, or in the world's for the ground.",
+        ),
         required(
             "direction",
             Shape::Pair(signed("")),
@@ -172,7 +210,12 @@ pub(in crate::scene) static PLACE: Table = Table {
     about: "A point of a bar or of the ground.",
     fields: &[
         required("body", Shape::Body { ground: true }, "\"bar1\"", "Name of a bar, or \"ground\"."),
-        required("point", Shape::Pair(signed("m")), "[0.6, 0]", "Coordinates in the bar's frame, or in the world's for the ground."),
+        required(
+            "point",
+            Shape::Pair(signed("m")),
+            "[0.6, 0]",
+            "Coordinates in the bar's frame, or in the world's for the ground.",
+        ),
     ],
 };
 
@@ -185,7 +228,12 @@ pub(in crate::scene) static SPRING: Table = Table {
         required("between", Shape::Between, PLACES, "Its two ends, on different bodies."),
         required("stiffness", Shape::Number(not_negative("N/m")), "7.4", "Stiffness."),
         required("free_length", Shape::Number(not_negative("m")), "0.4", "Length without force."),
-        optional("damping", Shape::Number(not_negative("N·s/m")), "0.1", "Damping along the spring; 0 if absent."),
+        optional(
+            "damping",
+            Shape::Number(not_negative("N·s/m")),
+            "0.1",
+            "Damping along the spring; 0 if absent.",
+        ),
         optional(
             "model",
             Shape::Word(&["elastic", "rigid"]),
@@ -224,7 +272,12 @@ pub(in crate::scene) static FORCE: Table = Table {
             "\"body\"",
             "Whose x and y the force has: the \"ground\"'s, or those of the \"body\", with which it turns; \"ground\" if absent.",
         ),
-        optional("law", Shape::Object(&FACTOR_LAW), "{\"start\": 0, \"sines\": [{\"amplitude\": 1, \"frequency\": 5}]}", FACTOR),
+        optional(
+            "law",
+            Shape::Object(&FACTOR_LAW),
+            "{\"start\": 0, \"sines\": [{\"amplitude\": 1, \"frequency\": 5}]}",
+            FACTOR,
+        ),
     ],
 };
 
@@ -235,9 +288,19 @@ pub(in crate::scene) static TORQUE: Table = Table {
     fields: &[
         required("name", Shape::Name, "\"torque\"", "Name, unique among torques."),
         required("body", Shape::Body { ground: false }, "\"bar1\"", "The bar."),
-        optional("relative_to", Shape::Body { ground: true }, "\"bar2\"", "The bar that takes the opposite torque; the ground if absent."),
+        optional(
+            "relative_to",
+            Shape::Body { ground: true },
+            "\"bar2\"",
+            "The bar that takes the opposite torque; the ground if absent.",
+        ),
         required("torque", Shape::Number(signed("N·m")), "0.033", "The torque."),
-        optional("law", Shape::Object(&FACTOR_LAW), "{\"start\": 0, \"sines\": [{\"amplitude\": 1, \"frequency\": 5}]}", FACTOR),
+        optional(
+            "law",
+            Shape::Object(&FACTOR_LAW),
+            "{\"start\": 0, \"sines\": [{\"amplitude\": 1, \"frequency\": 5}]}",
+            FACTOR,
+        ),
     ],
 };
 
@@ -248,10 +311,20 @@ pub(in crate::scene) static MOTOR: Table = Table {
     title: "a motor",
     about: "The angle of a bar, absolute or relative to another bar, as a function of time.",
     fields: &[
-        required("name", Shape::Name, "\"motor\"", "Name, unique among motors; it also names the constraint."),
+        required(
+            "name",
+            Shape::Name,
+            "\"motor\"",
+            "Name, unique among motors; it also names the constraint.",
+        ),
         required("body", Shape::Body { ground: false }, "\"bar1\"", "The driven bar."),
         optional("relative_to", Shape::Body { ground: true }, "\"bar2\"", MEASURED_FROM),
-        required("law", Shape::Object(&LAW), "{\"start\": 0, \"rate\": 1}", "The angle as a function of time."),
+        required(
+            "law",
+            Shape::Object(&LAW),
+            "{\"start\": 0, \"rate\": 1}",
+            "The angle as a function of time.",
+        ),
     ],
 };
 
@@ -260,18 +333,30 @@ pub(in crate::scene) static DRIVE: Table = Table {
     title: "a motor on a slider",
     about: "The travel of a slider along its rail as a function of time.",
     fields: &[
-        required("name", Shape::Name, "\"motor\"", "Name, unique among motors; it also names the constraint."),
+        required(
+            "name",
+            Shape::Name,
+            "\"motor\"",
+            "Name, unique among motors; it also names the constraint.",
+        ),
         required("slider", Shape::SliderName, "\"slider\"", "The driven slider."),
-        required("law", Shape::Object(&TRAVEL_LAW), "{\"start\": 0, \"rate\": 0.1}", "The travel as a function of time."),
+        required(
+            "law",
+            Shape::Object(&TRAVEL_LAW),
+            "{\"start\": 0, \"rate\": 0.1}",
+            "The travel as a function of time.",
+        ),
     ],
 };
 
 /// The law of a motor.
 pub(in crate::scene) static LAW: Table = Table { title: "a law", about: SUM, fields: &ANGLE_TERMS };
 /// The law of a motor on a slider.
-pub(in crate::scene) static TRAVEL_LAW: Table = Table { title: "a law of travel", about: SUM, fields: &TRAVEL_TERMS };
+pub(in crate::scene) static TRAVEL_LAW: Table =
+    Table { title: "a law of travel", about: SUM, fields: &TRAVEL_TERMS };
 /// The law of a force or a torque.
-pub(in crate::scene) static FACTOR_LAW: Table = Table { title: "a law without unit", about: SUM, fields: &FACTOR_TERMS };
+pub(in crate::scene) static FACTOR_LAW: Table =
+    Table { title: "a law without unit", about: SUM, fields: &FACTOR_TERMS };
 
 const SUM: &str = "start + rate·t + acceleration·t²/2 + the sum of amplitude·sin(frequency·t + phase).";
 
@@ -291,7 +376,11 @@ static FACTOR_TERMS: [Field; 4] = terms(
     &[&FACTOR_SINE],
 );
 
-const fn terms(start: Field, [rate, acceleration]: [Quantity; 2], sine: &'static [&'static Table]) -> [Field; 4] {
+const fn terms(
+    start: Field,
+    [rate, acceleration]: [Quantity; 2],
+    sine: &'static [&'static Table],
+) -> [Field; 4] {
     [
         start,
         optional("rate", Shape::Number(rate), "3", "Rate; 0 if absent."),
@@ -343,7 +432,12 @@ pub(in crate::scene) static LINE: Table = Table {
     about: "A line of the ground.",
     fields: &[
         required("through", Shape::Pair(signed("m")), "[0, 0]", "A point of the line."),
-        required("normal", Shape::Pair(signed("")), "[1, 0]", "Normal, of any length but zero, towards the side the point may be on."),
+        required(
+            "normal",
+            Shape::Pair(signed("")),
+            "[1, 0]",
+            "Normal, of any length but zero, towards the side the point may be on.",
+        ),
     ],
 };
 

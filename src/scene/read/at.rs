@@ -1,4 +1,5 @@
-//! A value of the tree with its path, judged against the tables of `format`: what it must be, and the refusal where it is not.
+//! A value of the tree with its path, judged against the tables of `format`: what it must be, and the refusal
+//! where it is not.
 
 use crate::scene::error::SceneError;
 use crate::scene::format::{Field, LONGEST_NAME, LONGEST_TEXT, Quantity, Shape, Table, about};
@@ -31,7 +32,9 @@ impl<'a> At<'a> {
     /// An error about `keys` missing from this object.
     pub fn missing(&self, key: &str, within: &str, allowed: &str, hint: &str) -> SceneError {
         let holder = match &self.node.value {
-            Value::Object(members) => members.iter().find(|member| member.key == key).map(|member| self.member(member)),
+            Value::Object(members) => {
+                members.iter().find(|member| member.key == key).map(|member| self.member(member))
+            }
             _ => None,
         };
         let mut path = self.path.clone();
@@ -71,16 +74,26 @@ impl<'a> At<'a> {
         let Value::Object(members) = &self.node.value else {
             let allowed = format!("must be an object, {}, with the keys {}", table.title, table.keys());
             if self.path.is_empty() {
-                return Err(self.refuse("the file is not a JSON object", &allowed, "compare with a file in examples/scenes/"));
+                return Err(self.refuse(
+                    "the file is not a JSON object",
+                    &allowed,
+                    "compare with a file in examples/scenes/",
+                ));
             }
             return Err(self.refuse_value(&allowed, table.about));
         };
         for member in members {
             if table.field(&member.key).is_none() {
                 let names = table.fields.iter().map(|field| field.name);
-                let hint = nearest(&member.key, names).map_or(table.about.to_owned(), |near| format!("did you mean `{near}`?"));
+                let hint = nearest(&member.key, names)
+                    .map_or(table.about.to_owned(), |near| format!("did you mean `{near}`?"));
                 let allowed = format!("{} has the keys {}", table.title, table.keys());
-                return Err(self.member(member).refuse_key(member.span, "is not a known key", &allowed, &hint));
+                return Err(self.member(member).refuse_key(
+                    member.span,
+                    "is not a known key",
+                    &allowed,
+                    &hint,
+                ));
             }
         }
         Ok(Fields { at: self.clone(), members, table })
@@ -89,14 +102,19 @@ impl<'a> At<'a> {
     /// The elements of this list, which is the field `name` of `table`.
     pub fn items(&self, name: &str, table: &'static Table) -> Result<Vec<At<'a>>, SceneError> {
         let shape = table.field(name).map(|field| &field.shape);
-        let (least, most) = if let Some(Shape::List { least, most, .. }) = shape { (*least, *most) } else { (0, usize::MAX) };
+        let (least, most) =
+            if let Some(Shape::List { least, most, .. }) = shape { (*least, *most) } else { (0, usize::MAX) };
         let allowed = || shape.map_or(String::new(), Shape::allowed);
         match &self.node.value {
             Value::List(nodes) if (least..=most).contains(&nodes.len()) => {
                 Ok(nodes.iter().enumerate().map(|(number, node)| self.item(node, number)).collect())
             }
             Value::List(nodes) => {
-                let hint = if nodes.len() < least { "compare with examples/scenes/free.json" } else { "split the scene" };
+                let hint = if nodes.len() < least {
+                    "compare with examples/scenes/free.json"
+                } else {
+                    "split the scene"
+                };
                 Err(self.refuse(&format!("has {} elements", nodes.len()), &allowed(), hint))
             }
             _ => Err(self.refuse_value(&allowed(), "even a single one stands in square brackets")),
@@ -107,11 +125,13 @@ impl<'a> At<'a> {
         let allowed = || field.shape.allowed();
         match &self.node.value {
             Value::Number(number) if quantity.holds(*number) => Ok(*number),
-            Value::Number(_) if quantity.unit == "rad" => {
-                Err(self.refuse_value(&allowed(), "beyond that the last place of the angle is coarser than 1e-3 rad; take off whole turns"))
-            }
+            Value::Number(_) if quantity.unit == "rad" => Err(self.refuse_value(
+                &allowed(),
+                "beyond that the last place of the angle is coarser than 1e-3 rad; take off whole turns",
+            )),
             Value::Text(text) if text.trim().parse::<f64>().is_ok_and(f64::is_finite) => {
-                Err(self.refuse_value(&allowed(), &format!("write it without quotes: {}", clipped(text.trim()))))
+                Err(self
+                    .refuse_value(&allowed(), &format!("write it without quotes: {}", clipped(text.trim()))))
             }
             _ => Err(self.refuse_value(&allowed(), &self.formula().unwrap_or_else(|| field.for_example()))),
         }
@@ -176,8 +196,13 @@ impl<'a> Fields<'a> {
     pub fn pair(&self, name: &str) -> Result<[f64; 2], SceneError> {
         let at = self.required(name)?;
         match (self.table.field(name), &at.node.value) {
-            (Some(field @ Field { shape: Shape::Pair(quantity), .. }), Value::List(nodes)) if nodes.len() == 2 => {
-                Ok([at.item(&nodes[0], 0).coordinate(field, quantity)?, at.item(&nodes[1], 1).coordinate(field, quantity)?])
+            (Some(field @ Field { shape: Shape::Pair(quantity), .. }), Value::List(nodes))
+                if nodes.len() == 2 =>
+            {
+                Ok([
+                    at.item(&nodes[0], 0).coordinate(field, quantity)?,
+                    at.item(&nodes[1], 1).coordinate(field, quantity)?,
+                ])
             }
             (Some(field), _) => Err(at.refuse_value(&field.shape.allowed(), &field.for_example())),
             (None, _) => Err(at.refuse_value("must be a pair the format knows", self.table.about)),
@@ -208,7 +233,9 @@ impl<'a> Fields<'a> {
 
     /// One of a few words, by its number; the first where there is no such key.
     pub fn word_or_first(&self, name: &str) -> Result<usize, SceneError> {
-        let (Some(at), Some(Field { shape: shape @ Shape::Word(words), .. })) = (self.optional(name), self.table.field(name)) else {
+        let (Some(at), Some(Field { shape: shape @ Shape::Word(words), .. })) =
+            (self.optional(name), self.table.field(name))
+        else {
             return Ok(0);
         };
         let said = if let Value::Text(said) = &at.node.value { said } else { "" };
@@ -224,7 +251,11 @@ impl<'a> Fields<'a> {
     pub fn text_or_empty(&self, name: &str) -> Result<String, SceneError> {
         let Some(at) = self.optional(name) else { return Ok(String::new()) };
         match &at.node.value {
-            Value::Text(text) if text.chars().count() <= LONGEST_TEXT && !text.chars().any(char::is_control) => Ok(text.clone()),
+            Value::Text(text)
+                if text.chars().count() <= LONGEST_TEXT && !text.chars().any(char::is_control) =>
+            {
+                Ok(text.clone())
+            }
             _ => Err(at.refuse_value(&Shape::Text.allowed(), "one sentence is enough")),
         }
     }
@@ -236,9 +267,17 @@ impl<'a> Fields<'a> {
         match &at.node.value {
             Value::Text(text) if is_name(text) && !(folder && text.starts_with('-')) => Ok(text.clone()),
             Value::Text(text) => {
-                let mended: String =
-                    text.trim().chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).take(LONGEST_NAME).collect();
-                let hint = if is_name(&mended) { format!("for example \"{mended}\"") } else { "for example \"bar1\"".to_owned() };
+                let mended: String = text
+                    .trim()
+                    .chars()
+                    .map(|c| if c.is_ascii_alphanumeric() { c } else { '_' })
+                    .take(LONGEST_NAME)
+                    .collect();
+                let hint = if is_name(&mended) {
+                    format!("for example \"{mended}\"")
+                } else {
+                    "for example \"bar1\"".to_owned()
+                };
                 Err(at.refuse_value(&shape.allowed(), &hint))
             }
             _ => Err(at.refuse_value(&shape.allowed(), "names stand in double quotes")),
@@ -251,13 +290,17 @@ impl At<'_> {
     fn coordinate(&self, field: &Field, quantity: &Quantity) -> Result<f64, SceneError> {
         match self.node.value {
             Value::Number(number) if quantity.holds(number) => Ok(number),
-            _ => Err(self.refuse_value(&Shape::Number(*quantity).allowed(), &self.formula().unwrap_or_else(|| field.for_example()))),
+            _ => Err(self.refuse_value(
+                &Shape::Number(*quantity).allowed(),
+                &self.formula().unwrap_or_else(|| field.for_example()),
+            )),
         }
     }
 }
 
 fn is_name(text: &str) -> bool {
-    (1..=LONGEST_NAME).contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_')
+    (1..=LONGEST_NAME).contains(&text.len())
+        && text.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_')
 }
 
 /// The first dozen of some words.
@@ -267,7 +310,10 @@ pub(in crate::scene) fn listed(words: &[&str]) -> String {
 }
 
 /// The known word within a third of its letters of `wanted`.
-pub(in crate::scene) fn nearest<'a>(wanted: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub(in crate::scene) fn nearest<'a>(
+    wanted: &str,
+    known: impl IntoIterator<Item = &'a str>,
+) -> Option<&'a str> {
     let wanted: String = wanted.chars().take(LONGEST_NAME).flat_map(char::to_lowercase).collect();
     let letters = wanted.chars().count();
     let far = (letters / 3).max(1);

@@ -8,7 +8,11 @@ use crate::scene::locate::Value;
 
 /// A bar.
 pub(super) fn bar(fields: &Fields, name: String) -> Result<Bar, SceneError> {
-    if std::ptr::eq(fields.table, &OUTRIGHT_BAR) { outright_bar(fields, name) } else { uniform_bar(fields, name) }
+    if std::ptr::eq(fields.table, &OUTRIGHT_BAR) {
+        outright_bar(fields, name)
+    } else {
+        uniform_bar(fields, name)
+    }
 }
 
 fn uniform_bar(fields: &Fields, name: String) -> Result<Bar, SceneError> {
@@ -30,7 +34,12 @@ fn uniform_bar(fields: &Fields, name: String) -> Result<Bar, SceneError> {
                 };
                 return Err(at.refuse_value(&Shape::Inertia(INERTIA).allowed(), &hint));
             }
-            _ => return Err(at.refuse_value(&Shape::Inertia(INERTIA).allowed(), "\"full\" is m(l² + w²)/12, \"slender\" is m l²/12")),
+            _ => {
+                return Err(at.refuse_value(
+                    &Shape::Inertia(INERTIA).allowed(),
+                    "\"full\" is m(l² + w²)/12, \"slender\" is m l²/12",
+                ));
+            }
         },
     };
     fields.at.comes_to("an inertia", inertia, &INERTIA)?;

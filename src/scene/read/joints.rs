@@ -40,6 +40,7 @@ pub(super) fn wall(fields: &Fields, name: String, known: &Bars) -> Result<Wall, 
     let point = fields.pair("point")?;
     let line = fields.required("line")?.object(&LINE)?;
     let through = line.pair("through")?;
-    let normal = line.direction("normal", "[1, 0] for a wall the point must stay right of, [0, 1] for a floor")?;
+    let normal =
+        line.direction("normal", "[1, 0] for a wall the point must stay right of, [0, 1] for a floor")?;
     Ok(Wall { name, bar, point, through, normal, restitution: fields.number("restitution")? })
 }

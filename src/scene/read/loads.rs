@@ -9,12 +9,17 @@ use crate::scene::{Drive, Force, Law, Motor, Sine, Slider, Spring, Torque, Torsi
 
 /// A spring.
 pub(super) fn spring(fields: &Fields, name: String, known: &Bars) -> Result<Spring, SceneError> {
-    let (stiffness, free_length, damping) = (fields.number("stiffness")?, fields.number("free_length")?, fields.number_or("damping", 0.0)?);
+    let (stiffness, free_length, damping) =
+        (fields.number("stiffness")?, fields.number("free_length")?, fields.number_or("damping", 0.0)?);
     let rigid = fields.word_or_first("model")? == 1;
     let elastic = "leave `model` out, or write \"elastic\"";
     if rigid && (stiffness == 0.0 || free_length == 0.0) {
         let at = fields.required(if stiffness == 0.0 { "stiffness" } else { "free_length" })?;
-        return Err(at.refuse("is 0", "must be above 0 for a spring of model \"rigid\", a rod of its free length", elastic));
+        return Err(at.refuse(
+            "is 0",
+            "must be above 0 for a spring of model \"rigid\", a rod of its free length",
+            elastic,
+        ));
     }
     if rigid && damping != 0.0 {
         let at = fields.required("damping")?;
@@ -28,8 +33,13 @@ pub(super) fn spring(fields: &Fields, name: String, known: &Bars) -> Result<Spri
 }
 
 /// A torsion spring.
-pub(super) fn torsion_spring(fields: &Fields, name: String, known: &Bars) -> Result<TorsionSpring, SceneError> {
-    let bar = known.bar(fields, "a torsion spring turns a bar; name the ground, if anything, in `relative_to`")?;
+pub(super) fn torsion_spring(
+    fields: &Fields,
+    name: String,
+    known: &Bars,
+) -> Result<TorsionSpring, SceneError> {
+    let bar =
+        known.bar(fields, "a torsion spring turns a bar; name the ground, if anything, in `relative_to`")?;
     Ok(TorsionSpring {
         name,
         bar,
@@ -54,11 +64,18 @@ pub(super) fn force(fields: &Fields, name: String, known: &Bars) -> Result<Force
 
 /// A torque.
 pub(super) fn torque(fields: &Fields, name: String, known: &Bars) -> Result<Torque, SceneError> {
-    let bar = known.bar(fields, "a torque on the ground moves nothing; name the ground, if anything, in `relative_to`")?;
+    let bar = known.bar(
+        fields,
+        "a torque on the ground moves nothing; name the ground, if anything, in `relative_to`",
+    )?;
     Ok(Torque {
         name,
         bar,
-        relative_to: known.relative_to(fields, bar, "leave it out where the ground takes the opposite torque")?,
+        relative_to: known.relative_to(
+            fields,
+            bar,
+            "leave it out where the ground takes the opposite torque",
+        )?,
         torque: fields.number("torque")?,
         law: fields.optional("law").map(|_| law(fields)).transpose()?,
     })
@@ -71,11 +88,21 @@ pub(super) enum AnyMotor<'a> {
 }
 
 /// A motor, or a motor on a slider.
-pub(super) fn motor<'a>(fields: &Fields<'a>, name: String, known: &Bars, sliders: &[Slider]) -> Result<AnyMotor<'a>, SceneError> {
+pub(super) fn motor<'a>(
+    fields: &Fields<'a>,
+    name: String,
+    known: &Bars,
+    sliders: &[Slider],
+) -> Result<AnyMotor<'a>, SceneError> {
     if std::ptr::eq(fields.table, &DRIVE) {
-        return Ok(AnyMotor::Travel(Drive { name, slider: slider(&fields.required("slider")?, sliders)?, law: law(fields)? }));
+        return Ok(AnyMotor::Travel(Drive {
+            name,
+            slider: slider(&fields.required("slider")?, sliders)?,
+            law: law(fields)?,
+        }));
     }
-    let bar = known.bar(fields, "a motor turns a bar; to hold a bar still give its law a start and no rate")?;
+    let bar =
+        known.bar(fields, "a motor turns a bar; to hold a bar still give its law a start and no rate")?;
     let relative_to = known.relative_to(fields, bar, "leave it out for an angle from +x")?;
     Ok(AnyMotor::Angle(Motor { name, bar, relative_to, law: law(fields)? }, fields.at.clone()))
 }
@@ -87,7 +114,9 @@ fn slider(at: &At, sliders: &[Slider]) -> Result<usize, SceneError> {
         let names: Vec<&str> = sliders.iter().map(|slider| slider.name.as_str()).collect();
         let hint = match nearest(wanted, names.iter().copied()) {
             Some(near) => format!("did you mean \"{near}\"? known sliders: {}", listed(&names)),
-            None if names.is_empty() => "the scene has no sliders; a motor on an angle has a `body`".to_owned(),
+            None if names.is_empty() => {
+                "the scene has no sliders; a motor on an angle has a `body`".to_owned()
+            }
             None => format!("known sliders: {}", listed(&names)),
         };
         at.refuse_value(&Shape::SliderName.allowed(), &hint)
@@ -101,7 +130,9 @@ fn law(fields: &Fields) -> Result<Law, SceneError> {
     };
     let law = fields.required("law")?.object(table)?;
     let mut sines = Vec::new();
-    if let (Some(list), Some(Field { shape: Shape::List { of: [sine], .. }, .. })) = (law.optional("sines"), table.field("sines")) {
+    if let (Some(list), Some(Field { shape: Shape::List { of: [sine], .. }, .. })) =
+        (law.optional("sines"), table.field("sines"))
+    {
         for at in list.items("sines", table)? {
             let sine = at.object(sine)?;
             sines.push(Sine {
@@ -111,5 +142,10 @@ fn law(fields: &Fields) -> Result<Law, SceneError> {
             });
         }
     }
-    Ok(Law { start: law.number("start")?, rate: law.number_or("rate", 0.0)?, acceleration: law.number_or("acceleration", 0.0)?, sines })
+    Ok(Law {
+        start: law.number("start")?,
+        rate: law.number_or("rate", 0.0)?,
+        acceleration: law.number_or("acceleration", 0.0)?,
+        sines,
+    })
 }

@@ -1,7 +1,7 @@
 //! JSON to [`Scene`], or one precise refusal.
 //!
-//! Every value is judged where it stands, against the tables of `format`; then the parts against each other in `fit`.
-//! The first fault found is the one reported.
+//! Every value is judged where it stands, against the tables of `format`; then the parts against each other
+//! in `fit`. The first fault found is the one reported.
 
 mod at;
 mod bars;
@@ -27,8 +27,8 @@ use std::path::Path;
 /// Reads the scene in the file `path`, with `overrides` put in from left to right before anything is judged.
 ///
 /// # Errors
-/// The file cannot be read ([`SceneError::is_io`]), or what it says is no scene: the error names line, column, field, value, what is
-/// allowed, and a hint.
+/// The file cannot be read ([`SceneError::is_io`]), or what it says is no scene: the error names line,
+/// column, field, value, what is allowed, and a hint.
 pub fn read_scene(path: &Path, overrides: &[Override]) -> Result<Scene, SceneError> {
     parse_scene(&read_text(path)?, &source_name(path), overrides)
 }
@@ -84,7 +84,11 @@ pub fn parse_scene(text: &str, source: &str, overrides: &[Override]) -> Result<S
 }
 
 /// The tree of a scene's text with overrides put in, not judged yet.
-pub(super) fn put_together(text: &str, source: &str, overrides: &[Override]) -> Result<(Source, Node), SceneError> {
+pub(super) fn put_together(
+    text: &str,
+    source: &str,
+    overrides: &[Override],
+) -> Result<(Source, Node), SceneError> {
     let mut texts = vec![Text { set: None, json: without_mark(text).to_owned() }];
     texts.extend(overrides.iter().map(Override::text));
     let source = Source { file: source.to_owned(), texts };
@@ -111,8 +115,10 @@ fn scene(root: &At) -> Result<Scene, SceneError> {
     let (sliders, _) = named(&fields, "sliders", |fields, name| joints::slider(fields, name, &known))?;
     let (welds, _) = named(&fields, "welds", |fields, name| joints::weld(fields, name, &known))?;
     let (locks, lock_places) = named(&fields, "locks", |fields, name| joints::lock(fields, name, &known))?;
-    let (springs, spring_places) = named(&fields, "springs", |fields, name| loads::spring(fields, name, &known))?;
-    let (torsion_springs, _) = named(&fields, "torsion_springs", |fields, name| loads::torsion_spring(fields, name, &known))?;
+    let (springs, spring_places) =
+        named(&fields, "springs", |fields, name| loads::spring(fields, name, &known))?;
+    let (torsion_springs, _) =
+        named(&fields, "torsion_springs", |fields, name| loads::torsion_spring(fields, name, &known))?;
     let (forces, _) = named(&fields, "forces", |fields, name| loads::force(fields, name, &known))?;
     let (torques, _) = named(&fields, "torques", |fields, name| loads::torque(fields, name, &known))?;
     let (any, _) = named(&fields, "motors", |fields, name| loads::motor(fields, name, &known, &sliders))?;
@@ -139,8 +145,14 @@ fn scene(root: &At) -> Result<Scene, SceneError> {
         every,
         ..Scene::default()
     };
-    let places =
-        fit::Places { root, bars: &bar_places, locks: &lock_places, springs: &spring_places, motors: &motor_places, walls: &wall_places };
+    let places = fit::Places {
+        root,
+        bars: &bar_places,
+        locks: &lock_places,
+        springs: &spring_places,
+        motors: &motor_places,
+        walls: &wall_places,
+    };
     fit::fitted(Scene { bars, ..scene }, &places, &given)
 }
 

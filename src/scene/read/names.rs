@@ -19,13 +19,19 @@ pub(super) fn named<'a, T>(
         Some(field) if field.required => scene.required(list)?.items(list, scene.table)?,
         _ => scene.optional(list).map_or(Ok(Vec::new()), |at| at.items(list, scene.table))?,
     };
-    let kinds: &[&'static Table] = if let Some(Field { shape: Shape::List { of, .. }, .. }) = scene.table.field(list) { of } else { &[] };
+    let kinds: &[&'static Table] =
+        if let Some(Field { shape: Shape::List { of, .. }, .. }) = scene.table.field(list) {
+            of
+        } else {
+            &[]
+        };
     for at in &places {
         let fields = at.object(kind(kinds, |key| at.has(key)).unwrap_or(scene.table))?;
         let name = fields.name("name")?;
         let name_at = fields.required("name")?;
         if name == GROUND && list == "bars" {
-            return Err(name_at.refuse_value("must be another name: `ground` is what does not move", "name it `base`"));
+            return Err(name_at
+                .refuse_value("must be another name: `ground` is what does not move", "name it `base`"));
         }
         names.admit(&name, &name_at)?;
         read.push(one(&fields, name)?);
@@ -41,7 +47,9 @@ impl Names {
     fn admit(&mut self, name: &str, at: &At) -> Result<(), SceneError> {
         match self.0.insert(name.to_owned(), at.path.clone()) {
             None => Ok(()),
-            Some(first) => Err(at.refuse_value(&format!("must be unique; {first} is the same"), "rename one of the two")),
+            Some(first) => {
+                Err(at.refuse_value(&format!("must be unique; {first} is the same"), "rename one of the two"))
+            }
         }
     }
 }
@@ -54,7 +62,10 @@ pub(super) struct Bars<'a> {
 
 impl<'a> Bars<'a> {
     pub fn of(bars: &'a [Bar]) -> Self {
-        Self { bars, numbers: bars.iter().enumerate().map(|(number, bar)| (bar.name.as_str(), number)).collect() }
+        Self {
+            bars,
+            numbers: bars.iter().enumerate().map(|(number, bar)| (bar.name.as_str(), number)).collect(),
+        }
     }
 
     /// The bar of that name.
@@ -70,9 +81,9 @@ impl<'a> Bars<'a> {
         if name == GROUND {
             return Ok(None);
         }
-        self.number(name)
-            .map(Some)
-            .ok_or_else(|| at.refuse_value("names no body; must be the name of a bar, or \"ground\"", &self.hint(name)))
+        self.number(name).map(Some).ok_or_else(|| {
+            at.refuse_value("names no body; must be the name of a bar, or \"ground\"", &self.hint(name))
+        })
     }
 
     /// The bar that the field `body` names; `hint` says why it cannot be the ground.
@@ -84,7 +95,8 @@ impl<'a> Bars<'a> {
         }
     }
 
-    /// The bar, other than `bar`, that the field `relative_to` names; `None` for the ground, or where there is no such field.
+    /// The bar, other than `bar`, that the field `relative_to` names; `None` for the ground, or where there
+    /// is no such field.
     pub fn relative_to(&self, fields: &Fields, bar: usize, hint: &str) -> Result<Option<usize>, SceneError> {
         let Some(at) = fields.optional("relative_to") else { return Ok(None) };
         match self.body(&at)? {
@@ -112,7 +124,10 @@ impl<'a> Bars<'a> {
     pub fn between(&self, fields: &Fields, what: &str) -> Result<[Place; 2], SceneError> {
         let at = fields.required("between")?;
         let Value::List(nodes) = &at.node.value else {
-            return Err(at.refuse_value(&Shape::Between.allowed(), "for example {\"body\": \"ground\", \"point\": [0, 0]} for one of them"));
+            return Err(at.refuse_value(
+                &Shape::Between.allowed(),
+                "for example {\"body\": \"ground\", \"point\": [0, 0]} for one of them",
+            ));
         };
         let [first, second] = nodes.as_slice() else {
             let hint = format!("a {what} joins exactly two bodies; this list has {}", nodes.len());
@@ -124,7 +139,13 @@ impl<'a> Bars<'a> {
     }
 
     /// Refuses a `what` at `at` that would join a body to itself.
-    pub fn on_two_bodies(&self, at: &At, one: Option<usize>, other: Option<usize>, what: &str) -> Result<(), SceneError> {
+    pub fn on_two_bodies(
+        &self,
+        at: &At,
+        one: Option<usize>,
+        other: Option<usize>,
+        what: &str,
+    ) -> Result<(), SceneError> {
         if one != other {
             return Ok(());
         }

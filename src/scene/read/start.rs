@@ -21,16 +21,27 @@ pub(in crate::scene) struct GivenStart<'a> {
 }
 
 /// The starts that the file gives, one for each bar.
-pub(super) fn starts<'a>(scene: &Fields<'a>, known: &Bars) -> Result<Vec<Option<GivenStart<'a>>>, SceneError> {
+pub(super) fn starts<'a>(
+    scene: &Fields<'a>,
+    known: &Bars,
+) -> Result<Vec<Option<GivenStart<'a>>>, SceneError> {
     let mut given: Vec<Option<GivenStart>> = known.bars.iter().map(|_| None).collect();
     let Some(at) = scene.optional("start") else { return Ok(given) };
     let Value::Object(members) = &at.node.value else {
-        return Err(at.refuse_value(&Shape::ByBar(&START).allowed(), "for example \"start\": {\"bar1\": {\"phi\": 0, \"omega\": 0}}"));
+        return Err(at.refuse_value(
+            &Shape::ByBar(&START).allowed(),
+            "for example \"start\": {\"bar1\": {\"phi\": 0, \"omega\": 0}}",
+        ));
     };
     for member in members {
         let at: At = at.member(member);
         let Some(bar) = known.number(&member.key) else {
-            return Err(at.refuse_key(member.span, "names no bar", "must be the name of a bar", &known.hint(&member.key)));
+            return Err(at.refuse_key(
+                member.span,
+                "names no bar",
+                "must be the name of a bar",
+                &known.hint(&member.key),
+            ));
         };
         let fields = at.object(&START)?;
         given[bar] = Some(GivenStart {

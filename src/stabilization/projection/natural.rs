@@ -1,5 +1,5 @@
-//! The projection of a few bodies with loops in natural coordinates: linear rows by constant matrices, then the unit lengths, both levels with one set of factors
-//! ([`keeper`](crate::dynamics::natural::keeper)).
+//! The projection of a few bodies with loops in natural coordinates: linear rows by constant matrices, then
+//! the unit lengths, both levels with one set of factors ([`keeper`](crate::dynamics::natural::keeper)).
 //!
 //! ```text
 //! z -> z - dz:   q -= atan(z × dz / (1 - z·dz));        v = i z w at the new place,  v -> v - dv:   w -= z × dv
@@ -59,8 +59,9 @@ impl Natural {
         }
     }
 
-    /// Brings the state faced last onto all rows and writes its new elements; tells the largest turn \[rad\] and the largest change of a rate \[rad/s\].
-    /// `None`, and nothing done, near a singular position, where the angle form knows what to leave out.
+    /// Brings the state faced last onto all rows and writes its new elements; tells the largest turn \[rad\]
+    /// and the largest change of a rate \[rad/s\]. `None`, and nothing done, near a singular position, where
+    /// the angle form knows what to leave out.
     pub fn land(&mut self, state: &mut State, z: &mut [Complex<f64>]) -> Option<[f64; 2]> {
         match self {
             Self::Few(bench) => lanes::run(Land { bench, state, z }, false),
@@ -140,7 +141,10 @@ impl<const B: usize> Code for Land<'_, B> {
         for (i, change) in changes[..n].iter_mut().enumerate() {
             let (from, away) = (elements[i], vector(&moved.change, i));
             *change = [-arc(from.cross(away), 1.0 - from.dot(away)), -vector(z, i).cross(vector(&slowed, i))];
-            (most, fastest) = ([most[0].max(change[0].abs()), most[1].max(change[1].abs())], fastest.max(state.y[n + i].abs()));
+            (most, fastest) = (
+                [most[0].max(change[0].abs()), most[1].max(change[1].abs())],
+                fastest.max(state.y[n + i].abs()),
+            );
         }
         // What is at rounding already is left alone.
         if most[0] <= f64::EPSILON && most[1] <= f64::EPSILON * fastest {
@@ -159,5 +163,9 @@ impl<const B: usize> Code for Land<'_, B> {
 #[inline(always)]
 fn arc(sin: f64, cos: f64) -> f64 {
     let square = sin * sin;
-    if square <= SMALL * SMALL && cos > 0.0 { sin * (1.0 + square * (1.0 / 6.0)) } else { libm::atan2(sin, cos) }
+    if square <= SMALL * SMALL && cos > 0.0 {
+        sin * (1.0 + square * (1.0 / 6.0))
+    } else {
+        libm::atan2(sin, cos)
+    }
 }

@@ -28,7 +28,8 @@ pub(super) struct Scratch {
     /// Largest change of each unknown in the last iteration, and the least so far (d, d).
     change: Vec<f64>,
     least: Vec<f64>,
-    /// The largest change of the last iteration in plain doubles, and the largest magnitude among the stages then (d, d): what convergence is judged by.
+    /// The largest change of the last iteration in plain doubles, and the largest magnitude among the stages
+    /// then (d, d): what convergence is judged by.
     pub rest: Vec<f64>,
     pub size: Vec<f64>,
     /// The sum of all increments (d).
@@ -37,7 +38,8 @@ pub(super) struct Scratch {
     pub judged: usize,
     /// True where the field has been found to have no Jacobian.
     is_sweeping: bool,
-    /// Steps by Newton's method before iterations are tried again, this one counted; zero where it was made by iterations.
+    /// Steps by Newton's method before iterations are tried again, this one counted; zero where it was made
+    /// by iterations.
     newton_left: f64,
 }
 
@@ -167,7 +169,9 @@ impl Step<'_> {
         }
         let stages = &mut scratch.points.y;
         let known = match state.memory.split_first() {
-            Some((&step, last)) if step == scratch.step && last.len() >= s * state.y.len() => &last[..s * state.y.len()],
+            Some((&step, last)) if step == scratch.step && last.len() >= s * state.y.len() => {
+                &last[..s * state.y.len()]
+            }
             _ => &[],
         };
         for (stage, &y) in stages.iter_mut().zip(&state.y) {
@@ -183,9 +187,15 @@ impl Step<'_> {
         }
     }
 
-    /// Sweeps the stages until no unknown's change falls any further; false where that takes so long that Newton's method is to be used, for which all is ready then.
+    /// Sweeps the stages until no unknown's change falls any further; false where that takes so long that
+    /// Newton's method is to be used, for which all is ready then.
     #[inline(always)]
-    fn iteration<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, statistics: &mut Statistics) -> bool {
+    fn iteration<L: Lanes>(
+        &mut self,
+        problem: &mut dyn Rates,
+        state: &State,
+        statistics: &mut Statistics,
+    ) -> bool {
         self.scratch.least.fill(f64::INFINITY);
         let mut idle = 0;
         let mut sizes = [f64::NAN; 5];
@@ -195,10 +205,12 @@ impl Step<'_> {
             statistics.evaluations += self.tableau.nodes.len() as u64;
             self.restage::<L>(state);
             idle = if self.scratch.falls() { 0 } else { idle + 1 };
-            let is_over = idle == IDLE_SWEEPS || self.scratch.is_within(if self.exact > 0 { NEARLY } else { 0.0 });
+            let is_over =
+                idle == IDLE_SWEEPS || self.scratch.is_within(if self.exact > 0 { NEARLY } else { 0.0 });
             sizes[iteration % 5] = self.scratch.size_of_change();
             let (now, before) = (sizes[iteration % 5], sizes[(iteration + 1) % 5]);
-            // Over four iterations, because coordinates and momenta take turns, and well above rounding; the first iterations are still finding their direction.
+            // Over four iterations, because coordinates and momenta take turns, and well above rounding; the
+            // first iterations are still finding their direction.
             let contraction = (now / before).sqrt().sqrt();
             let is_slow = now > NOISE && (is_over || iteration >= EARLY && contraction > self.slow);
             if is_slow && !self.scratch.is_sweeping && self.differentiate(problem, state, statistics) {
@@ -211,8 +223,9 @@ impl Step<'_> {
         true
     }
 
-    /// Evaluations that carry what doubles leave out, at stages that are pairs, until these have settled or their changes fall no further.  A rest of the
-    /// iteration would have the direction of time in it, and drift.
+    /// Evaluations that carry what doubles leave out, at stages that are pairs, until these have settled or
+    /// their changes fall no further.  A rest of the iteration would have the direction of time in it, and
+    /// drift.
     #[inline(always)]
     fn refine<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, statistics: &mut Statistics) {
         self.restage_exactly::<L>(state);
@@ -239,10 +252,16 @@ impl Step<'_> {
         self.predict::<Portable>(state);
         let (s, d) = (self.tableau.nodes.len(), state.y.len());
         let scratch = &mut *self.scratch;
-        let middle: Vec<f64> = scratch.points.y.iter().map(|y| 0.5 * (y.0[lane((s - 1) / 2, s)] + y.0[lane(s / 2, s)])).collect();
+        let middle: Vec<f64> = scratch
+            .points
+            .y
+            .iter()
+            .map(|y| 0.5 * (y.0[lane((s - 1) / 2, s)] + y.0[lane(s / 2, s)]))
+            .collect();
         let newton = self.newton.get_or_insert_with(|| Box::new(Newton::new(self.tableau)));
         newton.jacobian.resize(d * d, 0.0);
-        scratch.is_sweeping = !problem.jacobian(state.time + 0.5 * scratch.step, &middle, &mut newton.jacobian);
+        scratch.is_sweeping =
+            !problem.jacobian(state.time + 0.5 * scratch.step, &middle, &mut newton.jacobian);
         if scratch.is_sweeping {
             return false;
         }
@@ -251,7 +270,8 @@ impl Step<'_> {
         true
     }
 
-    /// All of a step but its acceptance by Newton's method, from the predicted stages and the factors in place.
+    /// All of a step but its acceptance by Newton's method, from the predicted stages and the factors in
+    /// place.
     #[inline(always)]
     fn solve<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, statistics: &mut Statistics) {
         let (s, d) = (self.tableau.nodes.len(), state.y.len());
@@ -279,9 +299,16 @@ impl Step<'_> {
         }
     }
 
-    /// Newton iterations until no unknown's change falls any further; with `LOW` on stages that are pairs, where the field has such rates.
+    /// Newton iterations until no unknown's change falls any further; with `LOW` on stages that are pairs,
+    /// where the field has such rates.
     #[inline(always)]
-    fn iterate<L: Lanes, const LOW: bool>(&mut self, problem: &mut dyn Rates, state: &State, statistics: &mut Statistics, most: usize) {
+    fn iterate<L: Lanes, const LOW: bool>(
+        &mut self,
+        problem: &mut dyn Rates,
+        state: &State,
+        statistics: &mut Statistics,
+        most: usize,
+    ) {
         let (s, d) = (self.tableau.nodes.len(), state.y.len());
         self.scratch.least.fill(f64::INFINITY);
         let mut idle = 0;
@@ -298,7 +325,8 @@ impl Step<'_> {
                 let at = lane(i, s);
                 newton.correction.extend((0..d).map(|k| {
                     let (span, points) = (scratch.span.0[at], &scratch.points);
-                    let rest = fused(span, points.rate[k].0[at], -scratch.increment[k].0[at]) - scratch.increment_low[k].0[at];
+                    let rest = fused(span, points.rate[k].0[at], -scratch.increment[k].0[at])
+                        - scratch.increment_low[k].0[at];
                     if LOW { fused(span, points.rate_low[k].0[at], rest) } else { rest }
                 }));
             }
@@ -341,8 +369,11 @@ impl Step<'_> {
         let Scratch { span, points, increment, increment_low, .. } = &mut *self.scratch;
         let span = span.halves::<L>();
         for (k, left) in increment_low.iter_mut().enumerate() {
-            let (rate, low, product) = (points.rate[k].halves::<L>(), points.rate_low[k].halves::<L>(), increment[k].halves::<L>());
-            let rest = |half: usize| span[half].mul_add(low[half], span[half].mul_add(rate[half], product[half].neg()));
+            let (rate, low, product) =
+                (points.rate[k].halves::<L>(), points.rate_low[k].halves::<L>(), increment[k].halves::<L>());
+            let rest = |half: usize| {
+                span[half].mul_add(low[half], span[half].mul_add(rate[half], product[half].neg()))
+            };
             *left = Octet::of([rest(0), rest(1)]);
         }
     }
@@ -376,9 +407,12 @@ impl Step<'_> {
         let scratch = &mut *self.scratch;
         let (even, odd) = (self.tableau.even.map(L::of), self.tableau.odd.map(L::of));
         for k in 0..state.y.len() {
-            let ([first, second], [first_low, second_low]) = (scratch.increment[k].halves::<L>(), scratch.increment_low[k].halves::<L>());
-            let ((sums, sums_low), (differences, differences_low)) = (first.two_sum(second), first.two_sum(second.neg()));
-            let (sums_low, differences_low) = (sums_low.add(first_low.add(second_low)), differences_low.add(first_low.sub(second_low)));
+            let ([first, second], [first_low, second_low]) =
+                (scratch.increment[k].halves::<L>(), scratch.increment_low[k].halves::<L>());
+            let ((sums, sums_low), (differences, differences_low)) =
+                (first.two_sum(second), first.two_sum(second.neg()));
+            let (sums_low, differences_low) =
+                (sums_low.add(first_low.add(second_low)), differences_low.add(first_low.sub(second_low)));
             let (up, up_low) = combine(&even, sums.array(), sums_low.array());
             let (across, across_low) = combine(&odd, differences.array(), differences_low.array());
             let (total, total_low) = sum_of(sums, sums_low);
@@ -387,8 +421,12 @@ impl Step<'_> {
             let (middle, across) = ((L::splat(middle), L::splat(rest)), (across, across_low));
             let (first, first_low) = shifted(middle, across, (up, up_low));
             let (second, second_low) = shifted(middle, across, (up.neg(), up_low.neg()));
-            let (before, low_before) = (scratch.points.y[k].halves::<L>(), scratch.points.low[k].halves::<L>());
-            let change = [first.sub(before[0]).add(first_low.sub(low_before[0])), second.sub(before[1]).add(second_low.sub(low_before[1]))];
+            let (before, low_before) =
+                (scratch.points.y[k].halves::<L>(), scratch.points.low[k].halves::<L>());
+            let change = [
+                first.sub(before[0]).add(first_low.sub(low_before[0])),
+                second.sub(before[1]).add(second_low.sub(low_before[1])),
+            ];
             scratch.change[k] = largest(change);
             scratch.points.y[k] = Octet::of([first, second]);
             scratch.points.low[k] = Octet::of([first_low, second_low]);
@@ -438,13 +476,16 @@ impl Scratch {
         state.wrap();
         state.memory.clear();
         state.memory.push(self.step);
-        state.memory.extend(self.increment.iter().flat_map(|increment| (0..s).map(|i| increment.0[lane(i, s)])));
+        state
+            .memory
+            .extend(self.increment.iter().flat_map(|increment| (0..s).map(|i| increment.0[lane(i, s)])));
         if self.newton_left > 0.0 {
             state.memory.push(self.newton_left);
         }
     }
 
-    /// True where some unknown changed less than ever before in this step; no change at all may be an accident and is not counted.
+    /// True where some unknown changed less than ever before in this step; no change at all may be an
+    /// accident and is not counted.
     fn falls(&mut self) -> bool {
         let mut falls = false;
         for (&change, least) in self.change.iter().zip(&mut self.least) {
@@ -458,14 +499,17 @@ impl Scratch {
 
     /// True where no unknown moved by more than this share of its size.
     fn is_within(&self, share: f64) -> bool {
-        self.change.iter().zip(&self.points.y).all(|(&change, stage)| change == 0.0 || change <= share * stage.size())
+        self.change
+            .iter()
+            .zip(&self.points.y)
+            .all(|(&change, stage)| change == 0.0 || change <= share * stage.size())
     }
 
     /// The largest change of the last iteration among the unknowns that tell; not a number where one is.
     fn size_of_change(&self) -> f64 {
-        self.change[..self.judged]
-            .iter()
-            .fold(0.0, |size: f64, &change| if change.is_nan() || size.is_nan() { f64::NAN } else { size.max(change) })
+        self.change[..self.judged].iter().fold(0.0, |size: f64, &change| {
+            if change.is_nan() || size.is_nan() { f64::NAN } else { size.max(change) }
+        })
     }
 
     /// Keeps what convergence is judged by.

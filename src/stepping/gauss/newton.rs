@@ -5,11 +5,14 @@
 //! A = Σ mu_k r_k l_k,  l_k r_k = 1:    dK = Σ r_k (1 - h mu_k J)^-1 l_k R/(h b)                   pairs of complex modes share their factors
 //! ```
 //!
-//! The residual is that of the iterations, at the end in pairs of doubles, so that what is solved for is the same to the last bit but one; the update takes the last correction along,
-//! because a rest of the residual would act on fast modes h rho times.
+//! The residual is that of the iterations, at the end in pairs of doubles, so that what is solved for is the
+//! same to the last bit but one; the update takes the last correction along, because a rest of the residual
+//! would act on fast modes h rho times.
 //!
-//! Source: E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), section IV.8 (the transformation of the linear systems); M. Antoñana, J. Makazaga,
-//! A. Murua, *Efficient implementation of symplectic implicit Runge–Kutta schemes with simplified Newton iterations*, Numer. Algorithms 78 (2018).
+//! Source: E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), section IV.8
+//! (the transformation of the linear systems); M. Antoñana, J. Makazaga, A. Murua, *Efficient implementation
+//! of symplectic implicit Runge–Kutta schemes with simplified Newton iterations*, Numer. Algorithms 78
+//! (2018).
 
 use super::tableau::{Tableau, lane};
 use crate::arithmetic::Complex;
@@ -27,11 +30,13 @@ struct Mode {
     weight: f64,
 }
 
-/// What Newton's method needs beside the scratch space of the iterations; made when the first step asks for it.
+/// What Newton's method needs beside the scratch space of the iterations; made when the first step asks for
+/// it.
 #[derive(Clone, Debug)]
 pub(super) struct Newton {
     modes: Vec<Mode>,
-    /// The collocation polynomial of one step carried on over the next, from increments to increments (s × s).
+    /// The collocation polynomial of one step carried on over the next, from increments to increments (s ×
+    /// s).
     forecast: Vec<f64>,
     /// J (d × d).
     pub jacobian: Vec<f64>,
@@ -61,7 +66,8 @@ impl Newton {
         let a: Vec<f64> = (0..s * s).map(|at| tableau.entry(at / s, at % s)).collect();
         let transposed: Vec<f64> = (0..s * s).map(|at| a[at % s * s + at / s]).collect();
         let modes = values(tableau).into_iter().map(|value| {
-            // A little off, so that the matrix is not singular; inverse iteration gains as many digits a round.
+            // A little off, so that the matrix is not singular; inverse iteration gains as many digits a
+            // round.
             let off = value.times(1.0 + 1e-7);
             let vector = |matrix: &[f64]| {
                 let mut factors = Factors::default();
@@ -120,12 +126,17 @@ impl Newton {
         let mut solved = vec![0.0; s * d];
         for (factors, mode) in self.factors.iter().zip(&self.modes) {
             for k in 0..d {
-                self.wide[k] = mode.left.iter().enumerate().fold(Complex::ZERO, |sum, (i, l)| sum + l.times(self.correction[i * d + k]));
+                self.wide[k] = mode
+                    .left
+                    .iter()
+                    .enumerate()
+                    .fold(Complex::ZERO, |sum, (i, l)| sum + l.times(self.correction[i * d + k]));
             }
             factors.solve(&mut self.wide);
             for (i, right) in mode.right.iter().enumerate() {
                 for k in 0..d {
-                    solved[i * d + k] += mode.weight * spans[i] * (right.re * self.wide[k].re - right.im * self.wide[k].im);
+                    solved[i * d + k] +=
+                        mode.weight * spans[i] * (right.re * self.wide[k].re - right.im * self.wide[k].im);
                 }
             }
         }
@@ -145,8 +156,13 @@ mod tests {
             assert_eq!(newton.modes.len(), s.div_ceil(2));
             for i in 0..s {
                 for j in 0..s {
-                    let entry: f64 = newton.modes.iter().map(|mode| mode.weight * (mode.value * mode.right[i] * mode.left[j]).re).sum();
-                    // The vectors of eight stages are far from orthogonal; for an iteration that corrects itself this is plenty.
+                    let entry: f64 = newton
+                        .modes
+                        .iter()
+                        .map(|mode| mode.weight * (mode.value * mode.right[i] * mode.left[j]).re)
+                        .sum();
+                    // The vectors of eight stages are far from orthogonal; for an iteration that corrects
+                    // itself this is plenty.
                     let off = (entry - tableau.entry(i, j)).abs();
                     assert!(off < 1e-8, "{i}, {j} of s = {s}: {off:e}");
                 }

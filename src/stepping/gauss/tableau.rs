@@ -6,20 +6,23 @@
 //! mu_ij = a_ij/b_j = 1/2 + sigma_ij,      nu_ij = (1/b_j) ∫_1^(1+c_i) l_j
 //! ```
 //!
-//! Symplectic is `mu_ij + mu_ji = 1`, symmetric in time is `mu_ij = mu_(s+1-j)(s+1-i)`.  With i' = s+1-i the mirror image of stage i, both
-//! together say that sigma splits into a part that acts on `L_j + L_j'` and is odd in i, and one that acts on `L_j - L_j'` and is even in
-//! i, and that one is minus the transpose of the other.  So one matrix of half the size is all there is to round, and both properties
-//! hold exactly, whatever its entries:
+//! Symplectic is `mu_ij + mu_ji = 1`, symmetric in time is `mu_ij = mu_(s+1-j)(s+1-i)`.  With i' = s+1-i the
+//! mirror image of stage i, both together say that sigma splits into a part that acts on `L_j + L_j'` and is
+//! odd in i, and one that acts on `L_j - L_j'` and is even in i, and that one is minus the transpose of the
+//! other.  So one matrix of half the size is all there is to round, and both properties hold exactly,
+//! whatever its entries:
 //!
 //! ```text
 //! Σ_j sigma_ij L_j = ± Σ_j eta_ij (L_j + L_j') - Σ_j eta_ji (L_j - L_j')      (j <= s/2; + for i <= s/2, - for its mirror image)
 //! eta_ij = (sigma_ij + sigma_ij')/2,    eta_ij = sigma_ij where j = j'
 //! ```
 //!
-//! Stages lie in lanes: the first half in the first vector, their mirror images in the same order in the second.
+//! Stages lie in lanes: the first half in the first vector, their mirror images in the same order in the
+//! second.
 //!
-//! Source: E. Hairer, C. Lubich, G. Wanner, *Geometric Numerical Integration*, 2nd ed. (2006), sections II.1.3 (Gauss), IV.2 (theorem 2.2),
-//! V.2 (symmetry); nodes and weights: M. Abramowitz, I. Stegun, *Handbook of Mathematical Functions* (1964), 25.4.29.
+//! Source: E. Hairer, C. Lubich, G. Wanner, *Geometric Numerical Integration*, 2nd ed. (2006), sections
+//! II.1.3 (Gauss), IV.2 (theorem 2.2), V.2 (symmetry); nodes and weights: M. Abramowitz, I. Stegun, *Handbook
+//! of Mathematical Functions* (1964), 25.4.29.
 
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::{DoubleDouble, Scalar};
@@ -35,7 +38,8 @@ pub(super) struct Tableau {
     pub even: [[f64; 4]; 4],
     /// -etaᵀ, column by column: factors of `L_j - L_j'`.
     pub odd: [[f64; 4]; 4],
-    /// nu, one column a stage, its rows in lanes: the collocation polynomial of one step carried on over the next.
+    /// nu, one column a stage, its rows in lanes: the collocation polynomial of one step carried on over the
+    /// next.
     pub forecast: Vec<Octet>,
 }
 
@@ -52,10 +56,13 @@ impl Tableau {
         let mut forecast = vec![Octet::default(); stages];
         for j in 0..stages {
             for i in 0..stages {
-                forecast[j].0[lane(i, stages)] = (integral(&nodes, &weights, j, DoubleDouble::ONE, nodes[i]) / weights[j]).hi;
+                forecast[j].0[lane(i, stages)] =
+                    (integral(&nodes, &weights, j, DoubleDouble::ONE, nodes[i]) / weights[j]).hi;
             }
         }
-        let sigma = |i: usize, j: usize| integral(&nodes, &weights, j, DoubleDouble::ZERO, nodes[i]) / weights[j] - DoubleDouble::of(0.5);
+        let sigma = |i: usize, j: usize| {
+            integral(&nodes, &weights, j, DoubleDouble::ZERO, nodes[i]) / weights[j] - DoubleDouble::of(0.5)
+        };
         // The stage in the middle is its own image: nothing moves it but the odd part.
         for i in 0..stages / 2 {
             for j in 0..stages.div_ceil(2) {
@@ -94,7 +101,8 @@ fn quadrature(stages: usize) -> (Vec<DoubleDouble>, Vec<DoubleDouble>) {
         }
         let (_, slope) = legendre(stages, x);
         let weight = DoubleDouble::ONE / ((DoubleDouble::ONE - x * x) * slope * slope);
-        (nodes[i], nodes[stages - 1 - i]) = ((DoubleDouble::ONE - x).ldexp(0.5), (DoubleDouble::ONE + x).ldexp(0.5));
+        (nodes[i], nodes[stages - 1 - i]) =
+            ((DoubleDouble::ONE - x).ldexp(0.5), (DoubleDouble::ONE + x).ldexp(0.5));
         (weights[i], weights[stages - 1 - i]) = (weight, weight);
     }
     (nodes, weights)
@@ -111,8 +119,18 @@ fn legendre(s: usize, x: DoubleDouble) -> (DoubleDouble, DoubleDouble) {
 }
 
 /// The integral of l_j from `from` to `from + length`.
-fn integral(nodes: &[DoubleDouble], weights: &[DoubleDouble], j: usize, from: DoubleDouble, length: DoubleDouble) -> DoubleDouble {
-    length * nodes.iter().zip(weights).fold(DoubleDouble::ZERO, |sum, (&c, &b)| sum + b * lagrange(nodes, j, from + length * c))
+fn integral(
+    nodes: &[DoubleDouble],
+    weights: &[DoubleDouble],
+    j: usize,
+    from: DoubleDouble,
+    length: DoubleDouble,
+) -> DoubleDouble {
+    length
+        * nodes
+            .iter()
+            .zip(weights)
+            .fold(DoubleDouble::ZERO, |sum, (&c, &b)| sum + b * lagrange(nodes, j, from + length * c))
 }
 
 /// l_j at `x`.
@@ -146,8 +164,13 @@ mod tests {
     fn weights_integrate_every_power_up_to_twice_the_stages() {
         for s in 2..=8 {
             let tableau = Tableau::new(s);
-            let quadrature =
-                |k: usize| tableau.nodes.iter().zip(&tableau.weights).fold(DoubleDouble::ZERO, |sum, (&c, &b)| sum + b * power(c, k - 1));
+            let quadrature = |k: usize| {
+                tableau
+                    .nodes
+                    .iter()
+                    .zip(&tableau.weights)
+                    .fold(DoubleDouble::ZERO, |sum, (&c, &b)| sum + b * power(c, k - 1))
+            };
             for k in 1..=2 * s {
                 assert!((quadrature(k) - reciprocal(k)).hi.abs() < TINY, "B({k}) of s = {s}");
             }
@@ -162,7 +185,9 @@ mod tests {
             let tableau = Tableau::new(s);
             for i in 0..s {
                 for k in 1..=s {
-                    let sum = (0..s).fold(DoubleDouble::ZERO, |sum, j| sum + a(&tableau, i, j) * power(tableau.nodes[j], k - 1));
+                    let sum = (0..s).fold(DoubleDouble::ZERO, |sum, j| {
+                        sum + a(&tableau, i, j) * power(tableau.nodes[j], k - 1)
+                    });
                     let exact = power(tableau.nodes[i], k) * reciprocal(k);
                     assert!((sum - exact).hi.abs() < TINY, "C({k}), row {i} of s = {s} (k = 1: row sum)");
                 }
@@ -188,7 +213,10 @@ mod tests {
     fn stored(tableau: &Tableau, s: usize, i: usize, j: usize) -> DoubleDouble {
         let (row, column) = (lane(i, s) % 4, lane(j, s) % 4);
         let sign = |mirrored: bool| if mirrored { -1.0 } else { 1.0 };
-        let (even, odd) = (tableau.even[column][row] * sign(lane(i, s) > 3), tableau.odd[column][row] * sign(lane(j, s) > 3));
+        let (even, odd) = (
+            tableau.even[column][row] * sign(lane(i, s) > 3),
+            tableau.odd[column][row] * sign(lane(j, s) > 3),
+        );
         DoubleDouble::sum(even, odd)
     }
 
@@ -198,13 +226,21 @@ mod tests {
             let tableau = Tableau::new(s);
             for i in 0..s {
                 for j in 0..s {
-                    let (sigma, mirror) = (stored(&tableau, s, i, j), stored(&tableau, s, s - 1 - j, s - 1 - i));
+                    let (sigma, mirror) =
+                        (stored(&tableau, s, i, j), stored(&tableau, s, s - 1 - j, s - 1 - i));
                     if i != j {
-                        assert_eq!(sigma, -stored(&tableau, s, j, i), "mu_ij + mu_ji = 1 at {i}, {j} of s = {s}");
+                        assert_eq!(
+                            sigma,
+                            -stored(&tableau, s, j, i),
+                            "mu_ij + mu_ji = 1 at {i}, {j} of s = {s}"
+                        );
                     }
                     assert_eq!(sigma, mirror, "at {i}, {j} of s = {s}");
                     let mu = a(&tableau, i, j) / tableau.weights[j];
-                    assert!((DoubleDouble::of(0.5) + sigma - mu).hi.abs() < 1.2e-16, "mu at {i}, {j} of s = {s}");
+                    assert!(
+                        (DoubleDouble::of(0.5) + sigma - mu).hi.abs() < 1.2e-16,
+                        "mu at {i}, {j} of s = {s}"
+                    );
                 }
                 assert_eq!(stored(&tableau, s, i, i), DoubleDouble::ZERO, "mu_ii = 1/2");
             }
@@ -218,10 +254,16 @@ mod tests {
             for i in 0..s {
                 for k in 1..=s {
                     let sum = (0..s).fold(0.0, |sum, j| {
-                        sum + tableau.forecast[j].0[lane(i, s)] * (tableau.weights[j] * power(tableau.nodes[j], k - 1)).hi
+                        sum + tableau.forecast[j].0[lane(i, s)]
+                            * (tableau.weights[j] * power(tableau.nodes[j], k - 1)).hi
                     });
-                    let exact = ((power(DoubleDouble::ONE + tableau.nodes[i], k) - DoubleDouble::ONE) * reciprocal(k)).hi;
-                    assert!((sum - exact).abs() < 1e-10 * exact, "degree {k}, row {i} of s = {s}: {sum} for {exact}");
+                    let exact = ((power(DoubleDouble::ONE + tableau.nodes[i], k) - DoubleDouble::ONE)
+                        * reciprocal(k))
+                    .hi;
+                    assert!(
+                        (sum - exact).abs() < 1e-10 * exact,
+                        "degree {k}, row {i} of s = {s}: {sum} for {exact}"
+                    );
                 }
             }
         }
@@ -238,7 +280,8 @@ mod tests {
     /// (q, p)' of two equal slender bars in units of their mass, length and g, in double-double.
     fn rate(tree: &Tree, y: &[DoubleDouble; 4]) -> [DoubleDouble; 4] {
         let z = [Complex::unit(y[0]), Complex::unit(y[1])];
-        let (mut mass, mut twist, mut pivot) = ([DoubleDouble::ZERO; 4], [DoubleDouble::ZERO; 4], [DoubleDouble::ZERO; 2]);
+        let (mut mass, mut twist, mut pivot) =
+            ([DoubleDouble::ZERO; 4], [DoubleDouble::ZERO; 4], [DoubleDouble::ZERO; 2]);
         let (mut omega, mut force) = ([y[2], y[3]], [DoubleDouble::ZERO; 2]);
         tree.mass_matrix::<DoubleDouble, 2>(&z, &mut mass, &mut twist);
         tree::factor::<DoubleDouble, 2>(2, &mut mass, &mut pivot);
@@ -251,7 +294,8 @@ mod tests {
     fn simulate(tree: &Tree, stages: usize, steps: usize) -> [DoubleDouble; 4] {
         let tableau = Tableau::new(stages);
         let h = reciprocal(steps);
-        let matrix: Vec<DoubleDouble> = (0..stages * stages).map(|k| h * a(&tableau, k / stages, k % stages)).collect();
+        let matrix: Vec<DoubleDouble> =
+            (0..stages * stages).map(|k| h * a(&tableau, k / stages, k % stages)).collect();
         let mut y = [0.5, 0.2, 0.2, -0.1].map(DoubleDouble::of);
         for _ in 0..steps {
             let mut rates = vec![rate(tree, &y); stages];
@@ -270,7 +314,14 @@ mod tests {
     fn the_order_shows_below_the_rounding_of_doubles() {
         let weight = vec![Complex::new(1.5, 0.0), Complex::new(0.5, 0.0)];
         let coupling = vec![Complex::ZERO, Complex::new(0.5, 0.0), Complex::ZERO, Complex::ZERO];
-        let tree = Tree { coordinates: 2, angles: 2, coupling, diagonal: vec![4.0 / 3.0, 1.0 / 3.0], weight, off_axis: false };
+        let tree = Tree {
+            coordinates: 2,
+            angles: 2,
+            coupling,
+            diagonal: vec![4.0 / 3.0, 1.0 / 3.0],
+            weight,
+            off_axis: false,
+        };
         let exact = simulate(&tree, 8, 100);
         for stages in 2..=8 {
             let error = |steps: usize| {
@@ -282,7 +333,10 @@ mod tests {
             let (coarse, fine) = (error(steps), error(2 * steps));
             let order = (coarse / fine).log2();
             println!("s = {stages}: {order:.2} from {coarse:.1e} to {fine:.1e}");
-            assert!((order - 2.0 * stages as f64).abs() < 0.35, "s = {stages}: order {order:.2} from {coarse:e} to {fine:e}");
+            assert!(
+                (order - 2.0 * stages as f64).abs() < 0.35,
+                "s = {stages}: order {order:.2} from {coarse:e} to {fine:e}"
+            );
         }
     }
 }

@@ -50,7 +50,8 @@ impl Radau {
         work.factored = h;
     }
 
-    /// Starting values from the polynomial of the last step, of `length`, or from that of the step just made, `from_start`, which is to be repeated.
+    /// Starting values from the polynomial of the last step, of `length`, or from that of the step just made,
+    /// `from_start`, which is to be repeated.
     pub(super) fn predict(&mut self, h: f64, length: f64, from_start: bool) {
         let Self { tableau, work, .. } = self;
         let (s, d) = (tableau.stages(), work.stage.len());
@@ -66,7 +67,8 @@ impl Radau {
             tableau.lagrange(if from_start { share } else { 1.0 + share }, &mut work.weights);
             for k in 0..d {
                 let base = if from_start { 0.0 } else { polynomial[(s - 1) * d + k] };
-                work.z[i * d + k] = (0..s).fold(-base, |sum, j| sum + work.weights[j] * polynomial[j * d + k]);
+                work.z[i * d + k] =
+                    (0..s).fold(-base, |sum, j| sum + work.weights[j] * polynomial[j * d + k]);
             }
         }
     }
@@ -105,7 +107,11 @@ impl Radau {
                 ratio_before = ratio;
                 let converges = theta < DIVERGING;
                 if !converges {
-                    return if size <= enough * 1e-2 { Solved::Converged(theta, sweep) } else { Solved::Slow(0.5) };
+                    return if size <= enough * 1e-2 {
+                        Solved::Converged(theta, sweep)
+                    } else {
+                        Solved::Slow(0.5)
+                    };
                 }
                 *contraction = theta / (1.0 - theta);
             }
@@ -125,7 +131,13 @@ impl Radau {
     }
 
     /// h A F - Z into `change`.
-    fn residual<F: OdeSystem + ?Sized>(&mut self, field: &mut F, state: &State, h: f64, statistics: &mut Statistics) {
+    fn residual<F: OdeSystem + ?Sized>(
+        &mut self,
+        field: &mut F,
+        state: &State,
+        h: f64,
+        statistics: &mut Statistics,
+    ) {
         let Self { tableau, work, .. } = self;
         let (s, d) = (tableau.stages(), state.y.len());
         for (i, rates) in work.rates.chunks_exact_mut(d).enumerate() {
@@ -150,7 +162,8 @@ impl Radau {
         let Work { change, rates: corrections, mode, wide, real, pairs, .. } = work;
         // The rates have served; their room takes the sum over the modes.
         for k in 0..d {
-            mode[k] = tableau.real.left.iter().enumerate().fold(0.0, |sum, (i, l)| sum + l * change[i * d + k]);
+            mode[k] =
+                tableau.real.left.iter().enumerate().fold(0.0, |sum, (i, l)| sum + l * change[i * d + k]);
         }
         real.solve(mode);
         for (i, right) in tableau.real.right.iter().enumerate() {
@@ -160,7 +173,11 @@ impl Radau {
         }
         for (factors, pair) in pairs.iter().zip(tableau.pairs) {
             for k in 0..d {
-                wide[k] = pair.left.iter().enumerate().fold(Complex::ZERO, |sum, (i, &l)| sum + l.times(change[i * d + k]));
+                wide[k] = pair
+                    .left
+                    .iter()
+                    .enumerate()
+                    .fold(Complex::ZERO, |sum, (i, &l)| sum + l.times(change[i * d + k]));
             }
             factors.solve(wide);
             for (i, right) in pair.right.iter().enumerate() {

@@ -6,8 +6,9 @@
 //! estimate: y1^ - y1 = mu_0 (h f(y) + Σ e_i z_i),   of order s, mu_0 the real mode's value
 //! ```
 //!
-//! Source: E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), sections IV.5 (table 5.6) and IV.8 (8.3, 8.15-8.19).
-//! Nodes and modes were computed to sixty digits; the rest follows from them in double-double.
+//! Source: E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), sections IV.5
+//! (table 5.6) and IV.8 (8.3, 8.15-8.19). Nodes and modes were computed to sixty digits; the rest follows
+//! from them in double-double.
 
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 
@@ -39,7 +40,8 @@ pub(super) struct Tableau {
     barycentric: Vec<f64>,
     /// Powers 1…s of the l_j that are zero at 0, row by row (s × s).
     pub powers: Vec<f64>,
-    /// What a wrong slope at the start of a step, h times that, is within it at most: max |∫ Π (1 - x/c_i)|, and as much again.
+    /// What a wrong slope at the start of a step, h times that, is within it at most: max |∫ Π (1 - x/c_i)|,
+    /// and as much again.
     pub off: f64,
 }
 
@@ -61,7 +63,11 @@ const REAL_THREE: Mode<f64> = Mode {
 
 const PAIRS_THREE: [Mode<Complex<f64>>; 1] = [Mode {
     value: z(0.16255558520216132, 0.1849493244071408),
-    right: &[z(-0.1412552950209542, -0.030029194105147424), z(0.20412935229379994, 0.3829421127572619), z(1.0, 0.0)],
+    right: &[
+        z(-0.1412552950209542, -0.030029194105147424),
+        z(0.20412935229379994, 0.3829421127572619),
+        z(1.0, 0.0),
+    ],
     left: &[
         z(-2.0893592957759526, 0.2514363174728934),
         z(-0.16384141038053118, -1.2859634749278026),
@@ -80,7 +86,13 @@ const NODES_FIVE: [DoubleDouble; 5] = [
 const REAL_FIVE: Mode<f64> = Mode {
     value: 0.15906584442746913,
     right: &[0.013576867344947943, 0.0016179004017190875, 0.07915785334744721, 0.41225608268046143, 1.0],
-    left: &[27.697693775684087, 12.783337911304406, 3.20848938671343, -0.9514904122489162, 0.7415504960259897],
+    left: &[
+        27.697693775684087,
+        12.783337911304406,
+        3.20848938671343,
+        -0.9514904122489162,
+        0.7415504960259897,
+    ],
 };
 
 const PAIRS_FIVE: [Mode<Complex<f64>>; 2] = [
@@ -132,7 +144,9 @@ impl Tableau {
             let at = |k: usize| if k == 0 { DoubleDouble::ZERO } else { nodes[k - 1] };
             at(j) - at(k)
         };
-        let product = |j: usize| (0..=stages).filter(|&k| k != j).fold(DoubleDouble::ONE, |product, k| product * difference(j, k));
+        let product = |j: usize| {
+            (0..=stages).filter(|&k| k != j).fold(DoubleDouble::ONE, |product, k| product * difference(j, k))
+        };
         Some(Self {
             nodes,
             a: matrix(nodes).iter().map(|entry| entry.hi).collect(),
@@ -150,11 +164,13 @@ impl Tableau {
         self.nodes.len()
     }
 
-    /// Writes l_j(theta), j = 1…s, of the polynomial through 0 at 0 and z_j at c_j: `Σ l_j z_j` at the share `theta` of the step.
+    /// Writes l_j(theta), j = 1…s, of the polynomial through 0 at 0 and z_j at c_j: `Σ l_j z_j` at the share
+    /// `theta` of the step.
     pub fn lagrange(&self, theta: f64, weights: &mut [f64]) {
         for (j, weight) in weights.iter_mut().enumerate() {
             let others = self.nodes.iter().enumerate().filter(|&(k, _)| k != j);
-            *weight = others.fold(self.barycentric[j + 1] * theta, |product, (_, node)| product * (theta - node.hi));
+            *weight = others
+                .fold(self.barycentric[j + 1] * theta, |product, (_, node)| product * (theta - node.hi));
         }
     }
 }
@@ -166,11 +182,10 @@ fn matrix(nodes: &[DoubleDouble]) -> Vec<DoubleDouble> {
     for j in 0..s {
         let coefficients = lagrange_coefficients(nodes, j);
         for i in 0..s {
-            let integral = coefficients
-                .iter()
-                .enumerate()
-                .rev()
-                .fold(DoubleDouble::ZERO, |sum, (k, &coefficient)| sum * nodes[i] + coefficient / DoubleDouble::of((k + 1) as f64));
+            let integral =
+                coefficients.iter().enumerate().rev().fold(DoubleDouble::ZERO, |sum, (k, &coefficient)| {
+                    sum * nodes[i] + coefficient / DoubleDouble::of((k + 1) as f64)
+                });
             a[i * s + j] = integral * nodes[i];
         }
     }
@@ -195,12 +210,15 @@ fn lagrange_coefficients(nodes: &[DoubleDouble], j: usize) -> Vec<DoubleDouble> 
 fn powers(nodes: &[DoubleDouble]) -> Vec<f64> {
     let mut with_zero = vec![DoubleDouble::ZERO];
     with_zero.extend_from_slice(nodes);
-    (1..=nodes.len()).flat_map(|j| lagrange_coefficients(&with_zero, j).into_iter().skip(1).map(|power| power.hi)).collect()
+    (1..=nodes.len())
+        .flat_map(|j| lagrange_coefficients(&with_zero, j).into_iter().skip(1).map(|power| power.hi))
+        .collect()
 }
 
 /// e: what the quadrature of order s with the weight mu_0 at 0 has more than the method, in terms of z.
 ///
-/// z interpolated by a polynomial that is zero at 0 has slopes z'(c_i), so that Σ (b^_i - b_i) h f_i = Σ (b^_i - b_i) z'(c_i).
+/// z interpolated by a polynomial that is zero at 0 has slopes z'(c_i), so that Σ (b^_i - b_i) h f_i = Σ
+/// (b^_i - b_i) z'(c_i).
 fn estimate(nodes: &[DoubleDouble], real: DoubleDouble) -> Vec<DoubleDouble> {
     let s = nodes.len();
     // Σ_i (b^_i - b_i) c_i^(k-1) = -mu_0 for k = 1 and 0 beyond: b^ - b = -mu_0 l_i(0).
@@ -210,7 +228,9 @@ fn estimate(nodes: &[DoubleDouble], real: DoubleDouble) -> Vec<DoubleDouble> {
     (1..=s)
         .map(|j| {
             let coefficients = lagrange_coefficients(&with_zero, j);
-            let slope = |x: DoubleDouble| (1..=s).rev().fold(DoubleDouble::ZERO, |sum, k| sum * x + coefficients[k].scale(k as f64));
+            let slope = |x: DoubleDouble| {
+                (1..=s).rev().fold(DoubleDouble::ZERO, |sum, k| sum * x + coefficients[k].scale(k as f64))
+            };
             (0..s).fold(DoubleDouble::ZERO, |sum, i| sum + surplus[i] * slope(nodes[i])) / real
         })
         .collect()
@@ -267,7 +287,11 @@ mod tests {
         assert!(tableau.a.iter().zip(published).all(|(a, published)| (a - published).abs() < 1e-15));
         // e times 1/mu_0 is (8.19)'s (-13 - 7√6, -13 + 7√6, -1)/3.
         let weights = [-(13.0 + 7.0 * root) / 3.0, (-13.0 + 7.0 * root) / 3.0, -1.0 / 3.0];
-        assert!(tableau.estimate.iter().zip(weights).all(|(e, weight)| (e - weight).abs() < 1e-14), "{:?}", tableau.estimate);
+        assert!(
+            tableau.estimate.iter().zip(weights).all(|(e, weight)| (e - weight).abs() < 1e-14),
+            "{:?}",
+            tableau.estimate
+        );
         assert!((tableau.real.value - 0.274_888_829_595_677_4).abs() < 1e-16);
         assert!(Tableau::new(4).is_none());
     }
@@ -276,8 +300,12 @@ mod tests {
     fn the_modes_are_those_of_the_matrix() {
         for s in [3, 5] {
             let tableau = Tableau::new(s).expect("a method");
-            let modes = std::iter::once((z(tableau.real.value, 0.0), widen(tableau.real.right), widen(tableau.real.left)))
-                .chain(tableau.pairs.iter().map(|mode| (mode.value, mode.right.to_vec(), mode.left.to_vec())));
+            let modes = std::iter::once((
+                z(tableau.real.value, 0.0),
+                widen(tableau.real.right),
+                widen(tableau.real.left),
+            ))
+            .chain(tableau.pairs.iter().map(|mode| (mode.value, mode.right.to_vec(), mode.left.to_vec())));
             for (value, right, left) in modes {
                 let one = right.iter().zip(&left).fold(z(0.0, 0.0), |sum, (&r, &l)| sum + r * l);
                 assert!((one - z(1.0, 0.0)).norm_squared() < 1e-26);
@@ -302,12 +330,22 @@ mod tests {
             let mut weights = vec![0.0; s];
             for power in 1..=s {
                 tableau.lagrange(1.7, &mut weights);
-                let sum: f64 = weights.iter().zip(tableau.nodes).map(|(weight, node)| weight * node.hi.powi(power as i32)).sum();
+                let sum: f64 = weights
+                    .iter()
+                    .zip(tableau.nodes)
+                    .map(|(weight, node)| weight * node.hi.powi(power as i32))
+                    .sum();
                 assert!((sum - 1.7_f64.powi(power as i32)).abs() < 1e-11, "power {power} of s = {s}: {sum}");
-                // z = t^power of y' = power t^(power-1): f(0) = 1 for power one, else 0; the estimate vanishes.
+                // z = t^power of y' = power t^(power-1): f(0) = 1 for power one, else 0; the estimate
+                // vanishes.
                 let rest = if power == 1 { 1.0 } else { 0.0 };
-                let error: f64 =
-                    tableau.estimate.iter().zip(tableau.nodes).map(|(e, node)| e * node.hi.powi(power as i32)).sum::<f64>() + rest;
+                let error: f64 = tableau
+                    .estimate
+                    .iter()
+                    .zip(tableau.nodes)
+                    .map(|(e, node)| e * node.hi.powi(power as i32))
+                    .sum::<f64>()
+                    + rest;
                 assert!(error.abs() < 1e-13, "power {power} of s = {s}: {error}");
             }
         }

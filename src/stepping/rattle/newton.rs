@@ -1,14 +1,16 @@
 //! The linear solves of RATTLE's iterations.
 //!
-//! In ordinary positions the Newton matrix is close to S, which is positive definite: it is factored once a substep, without exchanges.  Near a singular
-//! position its weak value changes sign across the point, and iterations with a frozen matrix diverge: there the true matrix of every iteration is factored
-//! with full pivoting, and rows whose pivot is lost get no change.
+//! In ordinary positions the Newton matrix is close to S, which is positive definite: it is factored once a
+//! substep, without exchanges.  Near a singular position its weak value changes sign across the point, and
+//! iterations with a frozen matrix diverge: there the true matrix of every iteration is factored with full
+//! pivoting, and rows whose pivot is lost get no change.
 
 use crate::dynamics::tree::size;
 
 /// Pivot, against the rows' scale, below which the matrix is factored with exchanges.
 const WEAK: f64 = 1e-4;
-/// Pivot, against the rows' scale, below which a row is lost: it depends on others for ever, or at this position.
+/// Pivot, against the rows' scale, below which a row is lost: it depends on others for ever, or at this
+/// position.
 const LOST: f64 = 1e-11;
 
 /// A matrix with a row and column per row in the loop, then its factors.
@@ -44,7 +46,8 @@ impl Matrix {
     pub fn factor<const R: usize>(&mut self) -> bool {
         self.is_exchanged = false;
         let rows = size::<R>(self.pivot.len());
-        let (matrix, pivot, weight) = (&mut self.entries[..rows * rows], &mut self.pivot[..rows], &self.weight[..rows]);
+        let (matrix, pivot, weight) =
+            (&mut self.entries[..rows * rows], &mut self.pivot[..rows], &self.weight[..rows]);
         let mut is_sound = true;
         for k in 0..rows {
             let diagonal = matrix[k * rows + k];

@@ -11,7 +11,8 @@ use std::f64::consts::FRAC_PI_2;
 /// Newton iterations before a step is given up; an ordinary step takes three or four.
 const SWEEPS: usize = 30;
 
-/// What plain iterations may leave of the multipliers, against the forces: the last iteration is made with pairs and takes the rest.
+/// What plain iterations may leave of the multipliers, against the forces: the last iteration is made with
+/// pairs and takes the rest.
 const LEFT_OVER: f64 = 1e-13;
 
 /// Largest change, against the forces, at which a solve that has stopped improving counts as solved.
@@ -83,7 +84,8 @@ pub struct Work {
     /// Largest force, and largest inertia \[N·m, kg·m²\].
     strength: f64,
     inertia: f64,
-    /// What changes of the multipliers are measured against: the force, or what moves a vector by an ulp in one substep \[N·m\].
+    /// What changes of the multipliers are measured against: the force, or what moves a vector by an ulp in
+    /// one substep \[N·m\].
     scale: f64,
 }
 
@@ -94,7 +96,14 @@ impl Work {
         for pairs in [&mut self.z, &mut self.v, &mut self.predicted] {
             pairs.resize(n, Complex::ZERO);
         }
-        let plain = [&mut self.ahead, &mut self.here, &mut self.force, &mut self.free, &mut self.acceleration, &mut self.change_back];
+        let plain = [
+            &mut self.ahead,
+            &mut self.here,
+            &mut self.force,
+            &mut self.free,
+            &mut self.acceleration,
+            &mut self.change_back,
+        ];
         for plain in plain {
             plain.resize(n, Complex::ZERO);
         }
@@ -107,13 +116,16 @@ impl Work {
         self.drive.resize(guides, 0.0);
         natural.scales(&mut self.scales);
         self.length = natural.mechanism().units.length;
-        let of = |guide: &Guide| if matches!(guide.measure, Measure::Angle { .. }) { 1.0 } else { self.length };
+        let of =
+            |guide: &Guide| if matches!(guide.measure, Measure::Angle { .. }) { 1.0 } else { self.length };
         self.unit.clear();
         self.unit.resize(rows - guides, 1.0);
         self.unit.extend(natural.guides().iter().map(of));
         self.newton.resize(&self.scales);
         self.schur.resize(rows * rows, 0.0);
-        for column in [&mut self.multiplier, &mut self.guess, &mut self.pivot, &mut self.offset, &mut self.change] {
+        for column in
+            [&mut self.multiplier, &mut self.guess, &mut self.pivot, &mut self.offset, &mut self.change]
+        {
             column.resize(rows, 0.0);
         }
     }
@@ -139,10 +151,16 @@ impl Work {
         }
     }
 
-    /// Hands the state back; `memory` keeps the multipliers, from which the next step's Newton iterations start.
+    /// Hands the state back; `memory` keeps the multipliers, from which the next step's Newton iterations
+    /// start.
     pub fn store(&self, state: &mut State) {
         let n = self.z.len();
-        let unknowns = self.z.iter().chain(&self.v).flat_map(|x| [x.re, x.im]).chain((state.y.len() > 4 * n).then_some(self.work_integral));
+        let unknowns = self
+            .z
+            .iter()
+            .chain(&self.v)
+            .flat_map(|x| [x.re, x.im])
+            .chain((state.y.len() > 4 * n).then_some(self.work_integral));
         for ((y, low), unknown) in state.y.iter_mut().zip(&mut state.low).zip(unknowns) {
             (*y, *low) = (unknown.hi, unknown.lo);
         }
@@ -153,7 +171,12 @@ impl Work {
 
     /// One step of RATTLE from the state at hand to time `end`, `h` \[s\] later.
     #[inline]
-    pub fn substep<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural, h: f64, end: Time) -> Result<(), Failure> {
+    pub fn substep<const N: usize, const GUIDED: bool>(
+        &mut self,
+        natural: &Natural,
+        h: f64,
+        end: Time,
+    ) -> Result<(), Failure> {
         self.predict::<N, GUIDED>(natural, h, end);
         self.solve_position::<N, GUIDED>(natural, h)?;
         self.kick::<N, true>(h);
@@ -176,18 +199,22 @@ impl Work {
     /// What the guides ask for at time `t`.
     #[inline(always)]
     fn ask(&mut self, natural: &Natural, t: Time) {
-        for ((demand, plain), guide) in self.demand.iter_mut().zip(&mut self.plain_demand).zip(natural.guides()) {
+        for ((demand, plain), guide) in
+            self.demand.iter_mut().zip(&mut self.plain_demand).zip(natural.guides())
+        {
             *demand = guide.demand(t);
             *plain = demand.plain();
         }
     }
 
-    /// z0 + h v0, and by how much it violates the constraints at time `end`: in plain doubles, since the last iteration takes the rest.
+    /// z0 + h v0, and by how much it violates the constraints at time `end`: in plain doubles, since the last
+    /// iteration takes the rest.
     #[inline(always)]
     fn predict<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural, h: f64, end: Time) {
         let (n, bodies) = (size::<N>(self.z.len()), self.bodies::<N, GUIDED>());
         natural.reduced().project_rates_back(&mut self.v, &mut self.change_back);
-        let (z, v, predicted, ahead) = (&self.z[..n], &self.v[..n], &mut self.predicted[..n], &mut self.ahead[..n]);
+        let (z, v, predicted, ahead) =
+            (&self.z[..n], &self.v[..n], &mut self.predicted[..n], &mut self.ahead[..n]);
         let offset = &mut self.offset;
         for k in 0..n {
             predicted[k] = Complex::new(z[k].re + v[k].re.scale(h), z[k].im + v[k].im.scale(h));
@@ -209,10 +236,14 @@ impl Work {
         self.scale = self.strength.max(f64::EPSILON * self.inertia * (2.0 / (h * h)));
     }
 
-    /// Finds mu such that z0 + h v0 + h²/2 a(mu) keeps the constraints: by iterations with the matrix of the first and, where these do not converge, with that
-    /// of each.
+    /// Finds mu such that z0 + h v0 + h²/2 a(mu) keeps the constraints: by iterations with the matrix of the
+    /// first and, where these do not converge, with that of each.
     #[inline(always)]
-    fn solve_position<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural, h: f64) -> Result<(), Failure> {
+    fn solve_position<const N: usize, const GUIDED: bool>(
+        &mut self,
+        natural: &Natural,
+        h: f64,
+    ) -> Result<(), Failure> {
         self.guess.copy_from_slice(&self.multiplier);
         match self.iteration::<N, GUIDED, false>(natural, h) {
             Ok(()) => Ok(()),
@@ -226,7 +257,11 @@ impl Work {
 
     /// The iterations, with exchanges where `EXCHANGED`.
     #[inline(always)]
-    fn iteration<const N: usize, const GUIDED: bool, const EXCHANGED: bool>(&mut self, natural: &Natural, h: f64) -> Result<(), Failure> {
+    fn iteration<const N: usize, const GUIDED: bool, const EXCHANGED: bool>(
+        &mut self,
+        natural: &Natural,
+        h: f64,
+    ) -> Result<(), Failure> {
         let push = 0.5 * h * h;
         let mut last = f64::INFINITY;
         for iteration in 0..SWEEPS {
@@ -282,7 +317,10 @@ impl Work {
 
     /// The element whose force is not finite.
     fn lost(&self) -> Option<Failure> {
-        self.free.iter().position(|free| !(free.re.is_finite() && free.im.is_finite())).map(Failure::NotFinite)
+        self.free
+            .iter()
+            .position(|free| !(free.re.is_finite() && free.im.is_finite()))
+            .map(Failure::NotFinite)
     }
 
     /// W (F - g mu) from the columns W g at hand.
@@ -308,13 +346,15 @@ impl Work {
         let rows = rows::<N, GUIDED>(self.change.len());
         let (change, offset) = (&mut self.change[..rows], &self.offset[..rows]);
         for k in 0..bodies {
-            change[k] = offset[k] + (ahead[k].dot(acceleration[k]) + 0.5 * push * acceleration[k].norm_squared());
+            change[k] =
+                offset[k] + (ahead[k].dot(acceleration[k]) + 0.5 * push * acceleration[k].norm_squared());
         }
         if GUIDED {
             for (r, guide) in natural.guides().iter().enumerate() {
                 let demand = &self.plain_demand[r];
                 let linear = guide.slip(demand, ahead, acceleration);
-                change[bodies + r] = offset[bodies + r] + (linear + push * guide.square(demand, acceleration));
+                change[bodies + r] =
+                    offset[bodies + r] + (linear + push * guide.square(demand, acceleration));
             }
         }
     }
@@ -339,17 +379,20 @@ impl Work {
     fn guide_gradients(&mut self, natural: &Natural) {
         let n = self.here.len();
         self.gradient.fill(Complex::ZERO);
-        for ((guide, demand), gradient) in natural.guides().iter().zip(&self.plain_demand).zip(self.gradient.chunks_mut(n)) {
+        for ((guide, demand), gradient) in
+            natural.guides().iter().zip(&self.plain_demand).zip(self.gradient.chunks_mut(n))
+        {
             guide.gradient(demand, &self.here, gradient);
         }
     }
 
-    /// v += h/2 a and, where `DRIFT`, the predicted end with it by h times the very same change: with h²/2 instead, rounded on its own, the
-    /// two would disagree by a constant part of 1e-16, and the energy drift.
+    /// v += h/2 a and, where `DRIFT`, the predicted end with it by h times the very same change: with h²/2
+    /// instead, rounded on its own, the two would disagree by a constant part of 1e-16, and the energy drift.
     #[inline(always)]
     fn kick<const N: usize, const DRIFT: bool>(&mut self, h: f64) {
         let n = size::<N>(self.z.len());
-        let (v, predicted, acceleration) = (&mut self.v[..n], &mut self.predicted[..n], &self.acceleration[..n]);
+        let (v, predicted, acceleration) =
+            (&mut self.v[..n], &mut self.predicted[..n], &self.acceleration[..n]);
         for k in 0..n {
             let change = acceleration[k].times(0.5 * h);
             v[k] = Complex::new(v[k].re + change.re, v[k].im + change.im);
@@ -370,10 +413,15 @@ impl Work {
         }
     }
 
-    /// One more iteration, with the constraints formed from pairs.  Sweeps in plain doubles leave lengths wrong by some 1e-22 with a preferred
-    /// sign, and a length that is always too short is a steady loss of energy.
+    /// One more iteration, with the constraints formed from pairs.  Sweeps in plain doubles leave lengths
+    /// wrong by some 1e-22 with a preferred sign, and a length that is always too short is a steady loss of
+    /// energy.
     #[inline(always)]
-    fn settle<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural, h: f64) -> Result<(), Failure> {
+    fn settle<const N: usize, const GUIDED: bool>(
+        &mut self,
+        natural: &Natural,
+        h: f64,
+    ) -> Result<(), Failure> {
         let (n, bodies) = (size::<N>(self.z.len()), self.bodies::<N, GUIDED>());
         let rows = rows::<N, GUIDED>(self.change.len());
         let (predicted, change) = (&self.predicted[..n], &mut self.change[..rows]);
@@ -409,11 +457,13 @@ impl Work {
         Ok(())
     }
 
-    /// Arrives at `predicted`, `h` \[s\] later, and counts turns; refuses the root on the far side of the circle.
+    /// Arrives at `predicted`, `h` \[s\] later, and counts turns; refuses the root on the far side of the
+    /// circle.
     #[inline(always)]
     fn turn<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural, h: f64) -> Result<(), Failure> {
         let (n, bodies) = (size::<N>(self.z.len()), self.bodies::<N, GUIDED>());
-        let (z, predicted, here, turns) = (&mut self.z[..n], &self.predicted[..n], &mut self.here[..n], &mut self.turns[..bodies]);
+        let (z, predicted, here, turns) =
+            (&mut self.z[..n], &self.predicted[..n], &mut self.here[..n], &mut self.turns[..bodies]);
         for k in 0..bodies {
             let (before, after) = (z[k], predicted[k]);
             (z[k], here[k]) = (after, plain(after));
@@ -436,7 +486,8 @@ impl Work {
             for (r, guide) in natural.guides().iter().enumerate() {
                 let demand = &self.plain_demand[r];
                 // Whole turns that an angle is asked to make within a substep are seen by nobody.
-                let leaps = matches!(guide.measure, Measure::Angle { .. }) && (demand.rate * h).abs() >= FRAC_PI_2;
+                let leaps =
+                    matches!(guide.measure, Measure::Angle { .. }) && (demand.rate * h).abs() >= FRAC_PI_2;
                 if leaps || guide.mismatch(demand, here).re <= 0.0 {
                     return Err(Failure::TooFar(bodies + r));
                 }
@@ -474,7 +525,9 @@ impl Work {
             for (r, guide) in natural.guides().iter().enumerate() {
                 self.drive[r] = guide.drive(&self.plain_demand[r], &self.here);
                 let gradient = &self.gradient[r * n..(r + 1) * n];
-                for (minv_jt, w) in self.minv_jt[(bodies + r) * n..(bodies + r + 1) * n].iter_mut().zip(natural.reduced().inverse.chunks(n))
+                for (minv_jt, w) in self.minv_jt[(bodies + r) * n..(bodies + r + 1) * n]
+                    .iter_mut()
+                    .zip(natural.reduced().inverse.chunks(n))
                 {
                     *minv_jt = w.iter().zip(gradient).fold(Complex::ZERO, |sum, (w, &g)| sum + times(w, g));
                 }
@@ -484,7 +537,11 @@ impl Work {
 
     /// Finds mu' such that v½ + h/2 a(mu') keeps the constraints' rates.
     #[inline(always)]
-    fn solve_velocity<const N: usize, const GUIDED: bool>(&mut self, natural: &Natural, h: f64) -> Result<(), Failure> {
+    fn solve_velocity<const N: usize, const GUIDED: bool>(
+        &mut self,
+        natural: &Natural,
+        h: f64,
+    ) -> Result<(), Failure> {
         let (n, bodies) = (size::<N>(self.z.len()), self.bodies::<N, GUIDED>());
         let rows = rows::<N, GUIDED>(self.change.len());
         project(n, bodies, rows, &self.here, &self.gradient, &self.minv_jt, &mut self.schur[..rows * rows]);
@@ -492,10 +549,12 @@ impl Work {
         if let Some(failure) = self.lost() {
             return Err(failure);
         }
-        // z1·v½ = h/2 |v½|², because both ends of the step lie on the circle; but not to the last bit where linear rows were put back on the way.
+        // z1·v½ = h/2 |v½|², because both ends of the step lie on the circle; but not to the last bit where
+        // linear rows were put back on the way.
         let is_direct = natural.reduced().rows.is_empty();
         for k in 0..bodies {
-            let swing = if is_direct { plain(v[k]).norm_squared() } else { z[k].dot(v[k]).value() * (2.0 / h) };
+            let swing =
+                if is_direct { plain(v[k]).norm_squared() } else { z[k].dot(v[k]).value() * (2.0 / h) };
             self.multiplier[k] = here[k].dot(free[k]) + swing;
         }
         if GUIDED {
@@ -539,7 +598,8 @@ fn project(
     for p in bodies..rows {
         let gradient = &gradient[(p - bodies) * n..(p - bodies + 1) * n];
         for q in 0..rows {
-            matrix[p * rows + q] = gradient.iter().zip(&minv_jt[q * n..(q + 1) * n]).map(|(g, minv_jt)| g.dot(*minv_jt)).sum();
+            matrix[p * rows + q] =
+                gradient.iter().zip(&minv_jt[q * n..(q + 1) * n]).map(|(g, minv_jt)| g.dot(*minv_jt)).sum();
         }
     }
 }

@@ -31,7 +31,9 @@ fn the_first_of_several_zeros_is_found() {
 
 #[test]
 fn where_rounding_is_all_there_is_signs_tell_and_few_parts_are_looked_at() {
-    for (roots, level, falls) in [(vec![0.5; 12], 0.0, None), (vec![0.5; 11], 0.0, Some(0.5)), (vec![0.5; 12], -1e-9, Some(f64::NAN))] {
+    for (roots, level, falls) in
+        [(vec![0.5; 12], 0.0, None), (vec![0.5; 11], 0.0, Some(0.5)), (vec![0.5; 12], -1e-9, Some(f64::NAN))]
+    {
         let powers = through(&roots, if roots.len() % 2 == 0 { 1.0 } else { -1.0 });
         let (found, parts) = search(&Powers { powers: &powers, end: 1.0 }, level, 0.0, 1.0);
         assert!(parts < 1000, "{} roots: {parts} parts", roots.len());
@@ -46,7 +48,8 @@ fn where_rounding_is_all_there_is_signs_tell_and_few_parts_are_looked_at() {
         assert!(found.is_none() && parts < 1000);
     }
     // Noise about a level.
-    let powers: Vec<f64> = (0..21).map(|m| if m == 0 { 1e-12 } else { 1e-17 * f64::from(m % 3 - 1) }).collect();
+    let powers: Vec<f64> =
+        (0..21).map(|m| if m == 0 { 1e-12 } else { 1e-17 * f64::from(m % 3 - 1) }).collect();
     let (_, parts) = search(&Powers { powers: &powers, end: 1.0 }, 1e-12, 0.0, 1.0);
     assert!(parts < 1000, "{parts}");
 }
@@ -146,6 +149,8 @@ fn a_minimum_whose_side_is_unknown_is_told() {
         assert_eq!(found.is_none(), is_known, "{height}: {found:?}");
         assert!(found.is_none_or(|t| (t - 0.6).abs() < 1e-9), "{found:?}");
         // Known well enough where the dip is, and nowhere else.
-        assert!(height == 0.0 || doubtful(&curve, 1e-6, |t| 1e-6 * (t - 0.6).abs(), [0.0, 1.0], passes).is_none());
+        assert!(
+            height == 0.0 || doubtful(&curve, 1e-6, |t| 1e-6 * (t - 0.6).abs(), [0.0, 1.0], passes).is_none()
+        );
     }
 }

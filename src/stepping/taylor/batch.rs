@@ -1,8 +1,9 @@
 //! Many trajectories at once, one a lane: ensembles of up to four free bodies.
 //!
-//! The equation of `bodies` with the lanes over trajectories instead of bodies.  Nothing ever crosses from lane to lane, so that
-//! a trajectory has the same bits whoever its neighbours are; every lane has its own step, its own time, its own
-//! constants of the mechanism, and takes in the next trajectory as soon as its last one has ended.
+//! The equation of `bodies` with the lanes over trajectories instead of bodies.  Nothing ever crosses from
+//! lane to lane, so that a trajectory has the same bits whoever its neighbours are; every lane has its own
+//! step, its own time, its own constants of the mechanism, and takes in the next trajectory as soon as its
+//! last one has ended.
 
 use super::step_size::{self, StepSize};
 use super::terms::{add_to, over};
@@ -16,7 +17,8 @@ use crate::stepping::{Cause, Statistics, StepError, Tolerance};
 const MOST: usize = 24;
 /// Lanes of a vector.
 const WIDTH: usize = 4;
-/// Vectors integrated in step with each other: while one waits for its newest coefficients, the other keeps the multipliers busy.
+/// Vectors integrated in step with each other: while one waits for its newest coefficients, the other keeps
+/// the multipliers busy.
 const TEAMS: usize = 2;
 /// Largest number of bodies.
 const BODIES: usize = 4;
@@ -24,7 +26,8 @@ const BODIES: usize = 4;
 /// One number a trajectory.
 type Quad = [f64; WIDTH];
 
-/// One trajectory: its mechanism, its state in the form of [`Elimination`](crate::dynamics::elimination::Elimination), and how it went.
+/// One trajectory: its mechanism, its state in the form of
+/// [`Elimination`](crate::dynamics::elimination::Elimination), and how it went.
 #[derive(Clone, Debug)]
 pub struct BatchMember<'a> {
     /// What is integrated.
@@ -59,13 +62,15 @@ pub struct Passage<'a> {
     pub from: Time,
     /// Its length \[s\].
     pub step: f64,
-    /// Whole turns of each body's angle at its end less those at its start: how often it passed ±π, counter-clockwise counted positive.
+    /// Whole turns of each body's angle at its end less those at its start: how often it passed ±π,
+    /// counter-clockwise counted positive.
     pub turned: [i64; BODIES],
     series: &'a dyn Fn(usize, f64) -> (f64, f64),
 }
 
 impl Passage<'_> {
-    /// Angle \[rad\] and rate \[rad/s\] of a body `after` \[s\] from the step's start, the angle continued from that at the start in [-π, π].
+    /// Angle \[rad\] and rate \[rad/s\] of a body `after` \[s\] from the step's start, the angle continued
+    /// from that at the start in [-π, π].
     pub fn at(&self, body: usize, after: f64) -> (f64, f64) {
         (self.series)(body, after)
     }
@@ -103,7 +108,8 @@ impl Batch {
         self.order
     }
 
-    /// True for what it can integrate: one to four bodies with hinges and centres of mass on their axes, neither springs nor motors nor walls.
+    /// True for what it can integrate: one to four bodies with hinges and centres of mass on their axes,
+    /// neither springs nor motors nor walls.
     pub fn takes(mechanism: &Mechanism) -> bool {
         let tree = &mechanism.tree;
         (1..=BODIES).contains(&tree.coordinates)
@@ -113,10 +119,17 @@ impl Batch {
             && mechanism.contacts.is_empty()
     }
 
-    /// Integrates all trajectories to `until`; `watch` is shown every step with the trajectory's index and may end that one.
+    /// Integrates all trajectories to `until`; `watch` is shown every step with the trajectory's index and
+    /// may end that one.
     ///
-    /// All mechanisms must be such as [`Batch::takes`], of the same number of bodies; any other is stopped as unsuited.  The result of each does not depend on the others.
-    pub fn integrate(&self, members: &mut [BatchMember], until: Time, watch: &mut dyn FnMut(usize, &Passage) -> Going) {
+    /// All mechanisms must be such as [`Batch::takes`], of the same number of bodies; any other is stopped as
+    /// unsuited.  The result of each does not depend on the others.
+    pub fn integrate(
+        &self,
+        members: &mut [BatchMember],
+        until: Time,
+        watch: &mut dyn FnMut(usize, &Passage) -> Going,
+    ) {
         let Some(bodies) = members.first().map(|first| first.mechanism.tree.coordinates) else { return };
         match bodies {
             1 => lanes::run(Integration::<1> { batch: self, members, until, watch }, self.is_portable),
@@ -189,7 +202,9 @@ impl LaneSlot {
     /// Why the step just expanded cannot be taken, where it cannot.
     fn failure(&self, statistics: &Statistics) -> Result<(), StepError> {
         let hint = "look for a position without inertia";
-        let stop = |cause, what: &str| stop(cause, &State { time: self.time, ..State::default() }, self.taken, what.into(), hint);
+        let stop = |cause, what: &str| {
+            stop(cause, &State { time: self.time, ..State::default() }, self.taken, what.into(), hint)
+        };
         if self.wanted.is_nan() {
             Err(stop(Cause::NotFinite, "the series is not finite"))
         } else if self.wanted < 1e-14 * self.time.hi.abs().max(1e-3 * self.unit) {
@@ -238,7 +253,8 @@ impl<const N: usize> Team<N> {
         }
     }
 
-    /// Angle and rate of a body `after` \[s\] from the start of the step last expanded, where it was at `start`.
+    /// Angle and rate of a body `after` \[s\] from the start of the step last expanded, where it was at
+    /// `start`.
     fn at(&self, order: usize, lane: usize, body: usize, start: f64, after: f64) -> (f64, f64) {
         if after == 0.0 {
             return (start, self.powers[0].v[body][lane]);
@@ -272,7 +288,14 @@ fn integrate<L: Lanes, const N: usize>(
         powers: [power; MOST + 1],
     };
     let mut teams = Box::new([team.clone(), team]);
-    let empty = LaneSlot { member: None, step_size: StepSize::new(1.0, order, 0.0), time: until, unit: 1.0, wanted: 0.0, taken: 0.0 };
+    let empty = LaneSlot {
+        member: None,
+        step_size: StepSize::new(1.0, order, 0.0),
+        time: until,
+        unit: 1.0,
+        wanted: 0.0,
+        taken: 0.0,
+    };
     let mut slots: [LaneSlot; WIDTH * TEAMS] = std::array::from_fn(|_| empty.clone());
     let mut waiting = 0;
     loop {
@@ -286,8 +309,10 @@ fn integrate<L: Lanes, const N: usize>(
                         let member = &members[index];
                         team.slot(lane, member);
                         let longest = order as f64 / 3.0 / member.mechanism.tree.fastest_rate(&[]);
-                        (slot.step_size, slot.time) =
-                            (StepSize::new(batch.tolerance, order, longest).over(member.mechanism.units.time), member.state.time);
+                        (slot.step_size, slot.time) = (
+                            StepSize::new(batch.tolerance, order, longest).over(member.mechanism.units.time),
+                            member.state.time,
+                        );
                         slot.unit = member.mechanism.units.time;
                     }
                     None => team.park(lane),
@@ -352,7 +377,8 @@ fn next<const N: usize>(members: &mut [BatchMember], waiting: &mut usize, until:
         let member = &mut members[index];
         if !Batch::takes(member.mechanism) || member.mechanism.tree.coordinates != N {
             let what = "the batch takes free mechanisms of one size".into();
-            member.stopped = Some(stop(Cause::Unsuited, &member.state, 0.0, what, "integrate it by `taylor`"));
+            member.stopped =
+                Some(stop(Cause::Unsuited, &member.state, 0.0, what, "integrate it by `taylor`"));
         } else if member.state.time < until {
             return Some(index);
         }
@@ -367,7 +393,8 @@ fn expand<L: Lanes, const N: usize>(teams: &mut [Team<N>; TEAMS], order: usize) 
     for (team, f) in teams.iter_mut().zip(&mut products) {
         for i in 0..N {
             let (s, c) = sincos::sin_cos::<L>(L::of(team.high[0][i]), L::of(team.low[0][i]));
-            (team.powers[0].c[i], team.powers[0].s[i], team.powers[0].v[i]) = (c.array(), s.array(), team.high[1][i]);
+            (team.powers[0].c[i], team.powers[0].s[i], team.powers[0].v[i]) =
+                (c.array(), s.array(), team.high[1][i]);
             let v = L::of(team.high[1][i]);
             (f[0][i], f[1][i]) = (v.mul(c), v.mul(s));
         }
@@ -398,7 +425,8 @@ fn raise<L: Lanes, const N: usize>(team: &mut Team<N>, f: &mut [[L; N]; 2], k: u
         let past = &team.powers[1..=k];
         for (early, late) in past.iter().zip(past.iter().rev()) {
             for b in 0..count {
-                let (c, s, v) = (L::of(late.c[first + b]), L::of(late.s[first + b]), L::of(early.v[first + b]));
+                let (c, s, v) =
+                    (L::of(late.c[first + b]), L::of(late.s[first + b]), L::of(early.v[first + b]));
                 let [x, y, load_x, load_y] = &mut sums[b];
                 (*x, *y) = (v.mul_add(c, *x), v.mul_add(s, *y));
                 *load_x = c.mul_add(L::of(early.px[first + b]), *load_x);
@@ -411,12 +439,14 @@ fn raise<L: Lanes, const N: usize>(team: &mut Team<N>, f: &mut [[L; N]; 2], k: u
             let (start, next, this) = (&team.powers[0], &team.powers[k + 1], &team.powers[k]);
             let v0 = L::of(start.v[i]);
             (gx[i], gy[i]) = (v0.mul_add(L::of(next.c[i]), x), v0.mul_add(L::of(next.s[i]), y));
-            let weights = L::of(this.s[i]).neg_mul_add(L::of(team.weight[i][0]), L::of(this.c[i]).mul(L::of(team.weight[i][1])));
+            let weights = L::of(this.s[i])
+                .neg_mul_add(L::of(team.weight[i][0]), L::of(this.c[i]).mul(L::of(team.weight[i][1])));
             torque[i] = weights.sub(load_x.add(load_y));
         }
     }
     for i in 0..N {
-        let (ax, ay) = (mass_terms::<L, N>(&team.coupling[i], &gx, i), mass_terms::<L, N>(&team.coupling[i], &gy, i));
+        let (ax, ay) =
+            (mass_terms::<L, N>(&team.coupling[i], &gx, i), mass_terms::<L, N>(&team.coupling[i], &gy, i));
         let inner = L::of(team.powers[0].c[i]).mul_add(ax, L::of(team.powers[0].s[i]).mul(ay));
         torque[i] = order.neg_mul_add(inner, torque[i]);
     }
@@ -428,8 +458,12 @@ fn raise<L: Lanes, const N: usize>(team: &mut Team<N>, f: &mut [[L; N]; 2], k: u
             residual[i] = L::of(team.diagonal[i]).neg_mul_add(x[i], residual[i]);
             for j in 0..N {
                 if j != i {
-                    let (ci, si, cj, sj) =
-                        (L::of(team.powers[0].c[i]), L::of(team.powers[0].s[i]), L::of(team.powers[0].c[j]), L::of(team.powers[0].s[j]));
+                    let (ci, si, cj, sj) = (
+                        L::of(team.powers[0].c[i]),
+                        L::of(team.powers[0].s[i]),
+                        L::of(team.powers[0].c[j]),
+                        L::of(team.powers[0].s[j]),
+                    );
                     let mass = L::of(team.coupling[i][j]).mul(ci.mul_add(cj, si.mul(sj)));
                     residual[i] = mass.neg_mul_add(x[j], residual[i]);
                 }
@@ -443,10 +477,14 @@ fn raise<L: Lanes, const N: usize>(team: &mut Team<N>, f: &mut [[L; N]; 2], k: u
     for i in 0..N {
         let v = over(x[i], k + 1);
         team.powers[k + 1].v[i] = v.array();
-        (f[0][i], f[1][i]) = (v.mul_add(L::of(team.powers[0].c[i]), gx[i]), v.mul_add(L::of(team.powers[0].s[i]), gy[i]));
+        (f[0][i], f[1][i]) =
+            (v.mul_add(L::of(team.powers[0].c[i]), gx[i]), v.mul_add(L::of(team.powers[0].s[i]), gy[i]));
     }
     for i in 0..N {
-        let (ax, ay) = (mass_terms::<L, N>(&team.coupling[i], &f[0], i), mass_terms::<L, N>(&team.coupling[i], &f[1], i));
+        let (ax, ay) = (
+            mass_terms::<L, N>(&team.coupling[i], &f[0], i),
+            mass_terms::<L, N>(&team.coupling[i], &f[1], i),
+        );
         (team.powers[k + 1].px[i], team.powers[k + 1].py[i]) = (ax.mul(order).array(), ay.mul(order).array());
     }
 }
@@ -486,8 +524,12 @@ fn invert<L: Lanes, const N: usize>(team: &mut Team<N>) {
         mass[i][i] = L::of(team.diagonal[i]);
         for j in 0..N {
             if j != i {
-                let (ci, si, cj, sj) =
-                    (L::of(team.powers[0].c[i]), L::of(team.powers[0].s[i]), L::of(team.powers[0].c[j]), L::of(team.powers[0].s[j]));
+                let (ci, si, cj, sj) = (
+                    L::of(team.powers[0].c[i]),
+                    L::of(team.powers[0].s[i]),
+                    L::of(team.powers[0].c[j]),
+                    L::of(team.powers[0].s[j]),
+                );
                 mass[i][j] = L::of(team.coupling[i][j]).mul(ci.mul_add(cj, si.mul(sj)));
             }
         }

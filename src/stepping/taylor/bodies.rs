@@ -1,7 +1,8 @@
 //! A few bodies without motors, one lane a body.
 //!
-//! The equation of [`pair`](super::pair) for n bodies, with dense A: per order four Cauchy products a body, two orders in one pass.  M_0⁻¹ and its products with A
-//! are formed once a step, so that an order waits for two sums over the bodies, one after the other:
+//! The equation of [`pair`](super::pair) for n bodies, with dense A: per order four Cauchy products a body,
+//! two orders in one pass.  M_0⁻¹ and its products with A are formed once a step, so that an order waits for
+//! two sums over the bodies, one after the other:
 //!
 //! ```text
 //! e_{k+1} = left(f_k)/(k+1),    g = Σ_{j=0..k} v_j e_{k+1-j}                   f_{k+1} without its newest term
@@ -9,11 +10,14 @@
 //! v_{k+1} = M_0⁻¹ r - C g_x - S g_y,    C = M_0⁻¹ c_0 A,  S = M_0⁻¹ s_0 A,    f_{k+1} = g + v_{k+1} e_0
 //! ```
 //!
-//! What springs and dampers add to P is made in [`springs`](super::springs); without them there is no trace of it in the code.
+//! What springs and dampers add to P is made in [`springs`](super::springs); without them there is no trace
+//! of it in the code.
 //!
-//! Scene constants enter as in `pair`: fractions of low orders in two terms, and the solutions of the first orders refined.
+//! Scene constants enter as in `pair`: fractions of low orders in two terms, and the solutions of the first
+//! orders refined.
 //!
-//! Wins over the series of any mechanism (whole runs by `taylor`): 1.5 times on `spring` at 1e-9, 1.7 at 1e-14.
+//! Wins over the series of any mechanism (whole runs by `taylor`): 1.5 times on `spring` at 1e-9, 1.7 at
+//! 1e-14.
 
 use super::direction;
 use super::springs::Springs;
@@ -34,7 +38,8 @@ pub struct Bodies<const B: usize, const S: usize> {
     /// Highest power of the rates, an even number.
     order: usize,
     step_size: StepSize,
-    /// About the fastest rate of small oscillations without springs \[rad/s\], and the longest step wherever the springs are \[s\].
+    /// About the fastest rate of small oscillations without springs \[rad/s\], and the longest step wherever
+    /// the springs are \[s\].
     rate: f64,
     longest: f64,
     /// Column j of A: A_ij over i, zero on the diagonal \[kg·m²\].
@@ -88,7 +93,8 @@ struct Sums<L, const B: usize> {
 }
 
 impl<const B: usize, const S: usize> Bodies<B, S> {
-    /// The constants, where this form fits: up to 4 B bodies on their axes, as many springs as fill `S` vectors, no rows, and an even order.
+    /// The constants, where this form fits: up to 4 B bodies on their axes, as many springs as fill `S`
+    /// vectors, no rows, and an even order.
     pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize) -> Option<Self> {
         let tree = &mechanism.tree;
         let n = tree.coordinates;
@@ -117,7 +123,8 @@ impl<const B: usize, const S: usize> Bodies<B, S> {
         Some(Self {
             count: n,
             order,
-            step_size: StepSize::new(tolerance, order, if S == 0 { longest } else { f64::INFINITY }).over(mechanism.units.time),
+            step_size: StepSize::new(tolerance, order, if S == 0 { longest } else { f64::INFINITY })
+                .over(mechanism.units.time),
             rate,
             longest,
             coupling,
@@ -149,7 +156,8 @@ fn apply<'a, L: Lanes, const B: usize>(columns: impl Iterator<Item = &'a Row<B>>
     sum
 }
 
-/// The sums of order k, k even, and those of order k+1 as far as they are known before it: without the term of v_{k+1} and e_1.
+/// The sums of order k, k even, and those of order k+1 as far as they are known before it: without the term
+/// of v_{k+1} and e_1.
 #[inline(always)]
 fn sums<L: Lanes, const B: usize>(scratch: &Scratch<B>, k: usize) -> [Sums<L, B>; 2] {
     let zero = [L::splat(0.0); B];
@@ -200,7 +208,8 @@ fn order<L: Lanes, const B: usize>(
     let [c, s]: [[L; B]; 2] = [load(&scratch.e[k][0]), load(&scratch.e[k][1])];
     for b in 0..B {
         (g[0][b], g[1][b]) = (start.v[b].mul_add(e[0][b], g[0][b]), start.v[b].mul_add(e[1][b], g[1][b]));
-        r[b] = s[b].neg_mul_add(start.weight[0][b], c[b].mul_add(start.weight[1][b], L::splat(0.0).sub(r[b])));
+        r[b] =
+            s[b].neg_mul_add(start.weight[0][b], c[b].mul_add(start.weight[1][b], L::splat(0.0).sub(r[b])));
     }
     let (mut px, mut py) = ([L::splat(0.0); B], [L::splat(0.0); B]);
     if let Some(pull) = pull {
@@ -233,14 +242,21 @@ fn order<L: Lanes, const B: usize>(
 
 /// M_0⁻¹ r/(k+1) - C g_x - S g_y.
 #[inline(always)]
-fn solved<L: Lanes, const B: usize>(columns: &[Column<B>], k: usize, mut r: [L; B], g: [[L; B]; 2]) -> [L; B] {
+fn solved<L: Lanes, const B: usize>(
+    columns: &[Column<B>],
+    k: usize,
+    mut r: [L; B],
+    g: [[L; B]; 2],
+) -> [L; B] {
     for b in 0..B {
         r[b] = over(r[b], k + 1);
     }
     let (r, gx, gy) = (store(r), store(g[0]), store(g[1]));
     let zero = [L::splat(0.0); B];
     let (mut direct, mut swung) = (zero, [zero; 2]);
-    for (((column, &r), &x), &y) in columns.iter().zip(r.as_flattened()).zip(gx.as_flattened()).zip(gy.as_flattened()) {
+    for (((column, &r), &x), &y) in
+        columns.iter().zip(r.as_flattened()).zip(gx.as_flattened()).zip(gy.as_flattened())
+    {
         let (r, x, y) = (L::splat(r), L::splat(x), L::splat(y));
         for b in 0..B {
             direct[b] = L::of(column.inverse[b]).mul_add(r, direct[b]);
@@ -263,7 +279,8 @@ fn refined<L: Lanes, const B: usize>(
     mut r: [L; B],
     g: [[L; B]; 2],
 ) -> [L; B] {
-    let (ax, ay): ([L; B], [L; B]) = (apply(coupling.iter(), &store(g[0])), apply(coupling.iter(), &store(g[1])));
+    let (ax, ay): ([L; B], [L; B]) =
+        (apply(coupling.iter(), &store(g[0])), apply(coupling.iter(), &store(g[1])));
     for b in 0..B {
         let inner = start.e[0][b].mul_add(ax[b], start.e[1][b].mul(ay[b]));
         r[b] = L::splat((k + 1) as f64).neg_mul_add(inner, r[b]);
@@ -282,9 +299,26 @@ fn refined<L: Lanes, const B: usize>(
 
 /// One step of at most `left` \[s\]; returns the step wanted and the step taken.
 #[inline(always)]
-pub fn step<L: Lanes, const B: usize, const S: usize>(bodies: &mut Bodies<B, S>, state: &mut State, left: f64) -> (f64, f64) {
+pub fn step<L: Lanes, const B: usize, const S: usize>(
+    bodies: &mut Bodies<B, S>,
+    state: &mut State,
+    left: f64,
+) -> (f64, f64) {
     begin::<L, B, S>(bodies, state);
-    let Bodies { order: last, step_size, rate, longest, coupling, diagonal, weight, columns, springs, energy, scratch, .. } = bodies;
+    let Bodies {
+        order: last,
+        step_size,
+        rate,
+        longest,
+        coupling,
+        diagonal,
+        weight,
+        columns,
+        springs,
+        energy,
+        scratch,
+        ..
+    } = bodies;
     let last = *last;
     let start: Start<L, B> = Start {
         e: [load(&scratch.e[0][0]), load(&scratch.e[0][1])],
@@ -353,7 +387,11 @@ fn begin<L: Lanes, const B: usize, const S: usize>(bodies: &mut Bodies<B, S>, st
         let (a_low, b_low) = (state.low[first], state.low[second]);
         let (angles, rests) = (L::of([a, a, b, b]), L::of([a_low, a_low, b_low, b_low]));
         // Springs ask for what the unit vectors leave out.
-        let unit = if S == 0 { Wide::of(direction::unit(angles, rests)) } else { wide::unit(Wide { hi: angles, lo: rests }) };
+        let unit = if S == 0 {
+            Wide::of(direction::unit(angles, rests))
+        } else {
+            wide::unit(Wide { hi: angles, lo: rests })
+        };
         let ([ca, sa, cb, sb], [ca_low, sa_low, cb_low, sb_low]) = (unit.hi.array(), unit.lo.array());
         pairs[first] = [ca, sa, ca_low, sa_low];
         pairs[second] = [cb, sb, cb_low, sb_low];
@@ -396,7 +434,8 @@ fn unit<L: Lanes, const B: usize>(j: usize) -> [L; B] {
     load(&unit)
 }
 
-/// The inverse of the positive definite matrix in its place, by Gauss–Jordan: column p turned into that of the unit matrix, p = 0, 1, ….
+/// The inverse of the positive definite matrix in its place, by Gauss–Jordan: column p turned into that of
+/// the unit matrix, p = 0, 1, ….
 #[inline(always)]
 fn invert<L: Lanes, const B: usize>(columns: &mut [Column<B>]) {
     for p in 0..columns.len() {
@@ -435,7 +474,11 @@ pub fn go<L: Lanes, const B: usize, const S: usize>(bodies: &Bodies<B, S>, state
         }
     }
     for b in 0..B {
-        let angle = angles[0][b].mul_add(step, angles[1][b]).mul_add(step, L::of(scratch.v[0][0][b])).mul(step).array();
+        let angle = angles[0][b]
+            .mul_add(step, angles[1][b])
+            .mul_add(step, L::of(scratch.v[0][0][b]))
+            .mul(step)
+            .array();
         let rate = rates[0][b].mul_add(step, rates[1][b]).mul(step).array();
         for lane in 0..4 {
             let i = 4 * b + lane;
@@ -448,7 +491,8 @@ pub fn go<L: Lanes, const B: usize, const S: usize>(bodies: &Bodies<B, S>, state
     }
     let power = bodies.springs.power(bodies.order);
     if !power.is_empty() {
-        let work = power.iter().enumerate().rev().fold(0.0, |sum, (m, &power)| sum * h + power / (m + 1) as f64);
+        let work =
+            power.iter().enumerate().rev().fold(0.0, |sum, (m, &power)| sum * h + power / (m + 1) as f64);
         add(state, 2 * n, work * h);
     }
 }

@@ -5,8 +5,9 @@
 //! cos phi = (1 - |q|) cos r - q (2 - |q|) sin r,    sin phi = (1 - |q|) sin r + q (2 - |q|) cos r,    q = -2…2
 //! ```
 //!
-//! Both series are the Taylor series to r¹⁸ and r¹⁷, whose next terms are below 3e-21 and 1e-19: no fitted constants, no bias.  Whatever is rounded on
-//! the way to the leading terms is kept and joins the correction, and with it what the leading part leaves out of the angle.
+//! Both series are the Taylor series to r¹⁸ and r¹⁷, whose next terms are below 3e-21 and 1e-19: no fitted
+//! constants, no bias.  Whatever is rounded on the way to the leading terms is kept and joins the correction,
+//! and with it what the leading part leaves out of the angle.
 
 use crate::arithmetic::lanes::Lanes;
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
@@ -28,7 +29,12 @@ const FACTORS: [[f64; 4]; 8] = {
     factors
 };
 /// What 1/24 and -1/6 leave out.
-const FIRST_REST: [f64; 4] = [2.312_964_634_635_743e-18, -9.251_858_538_542_97e-18, 2.312_964_634_635_743e-18, -9.251_858_538_542_97e-18];
+const FIRST_REST: [f64; 4] = [
+    2.312_964_634_635_743e-18,
+    -9.251_858_538_542_97e-18,
+    2.312_964_634_635_743e-18,
+    -9.251_858_538_542_97e-18,
+];
 
 const COS: [f64; 4] = [1.0, 0.0, 1.0, 0.0];
 const SIN: [f64; 4] = [0.0, 1.0, 0.0, 1.0];
@@ -101,7 +107,15 @@ mod tests {
 
     #[test]
     fn the_ends_of_the_range_and_not_a_number() {
-        for angle in [0.0, 1e-300, FRAC_PI_2, -FRAC_PI_2, std::f64::consts::PI, -std::f64::consts::PI, 3.0 * FRAC_PI_2 / 2.0] {
+        for angle in [
+            0.0,
+            1e-300,
+            FRAC_PI_2,
+            -FRAC_PI_2,
+            std::f64::consts::PI,
+            -std::f64::consts::PI,
+            3.0 * FRAC_PI_2 / 2.0,
+        ] {
             assert!(unit(Portable::splat(angle), Portable::splat(0.0)).array()[0].abs() <= 1.0);
         }
         assert_eq!(unit(Portable::splat(0.0), Portable::splat(0.0)).array(), [1.0, 0.0, 1.0, 0.0]);

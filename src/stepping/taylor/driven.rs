@@ -1,15 +1,17 @@
-//! Two bodies, one of them driven from the ground at a constant rate, in four lanes: one unknown angle and one Cauchy product.
+//! Two bodies, one of them driven from the ground at a constant rate, in four lanes: one unknown angle and
+//! one Cauchy product.
 //!
-//! Body 1 turns at w.  With e and v the unit vector and rate of body 2, W its weight, A = A12, and u = exp(i (phi_2 - phi_1)), which is e as body 1 sees
-//! it, f_1'·e is w² Im u, and the rates need no product at all:
+//! Body 1 turns at w.  With e and v the unit vector and rate of body 2, W its weight, A = A12, and u = exp(i
+//! (phi_2 - phi_1)), which is e as body 1 sees it, f_1'·e is w² Im u, and the rates need no product at all:
 //!
 //! ```text
 //! d v' = e × W - A w² Im u,    e' = left(v e),    u' = left((v - w) u)
 //! d (k+1) v_{k+1} = e_k × W - A w² Im u_k,    (k+1) E_{k+1} = left(Σ_j m_j E_{k-j})
 //! ```
 //!
-//! with lanes E = `[e, u]` and m = `[v, v, v-w, v-w]`, where w counts for j = 0 only.  The motor's torque is what changes the angular momentum beside gravity,
-//! so that its work over a step needs no product of series either, only the integral of Im u:
+//! with lanes E = `[e, u]` and m = `[v, v, v-w, v-w]`, where w counts for j = 0 only.  The motor's torque is
+//! what changes the angular momentum beside gravity, so that its work over a step needs no product of series
+//! either, only the integral of Im u:
 //!
 //! ```text
 //! work = w A (Δ(Re u (w + v)) - w² ∫ Im u dt) - Δe_1·W_1,    e_1 = e conj(u)
@@ -17,7 +19,8 @@
 //!
 //! Scene constants enter in two terms, as in [`pair`](super::pair).
 //!
-//! Wins over the series of any mechanism (whole runs by `taylor`): 3.1 times on `motor` at 1e-9, 3.9 at 1e-14.
+//! Wins over the series of any mechanism (whole runs by `taylor`): 3.1 times on `motor` at 1e-9, 3.9 at
+//! 1e-14.
 
 use super::direction;
 use super::step_size::{self, StepSize};
@@ -43,7 +46,8 @@ pub struct Driven {
     load: [[[f64; 4]; 2]; MOST + 1],
     /// Fastest rate: small oscillations, and the motor \[rad/s\].
     rate: f64,
-    /// What an error of the unit vectors comes to in the work, over the energy scale and the unit of time: a part \[1/s\], and a part times the free body's rate.
+    /// What an error of the unit vectors comes to in the work, over the energy scale and the unit of time: a
+    /// part \[1/s\], and a part times the free body's rate.
     share: [f64; 2],
 }
 
@@ -92,10 +96,13 @@ impl Default for Scratch {
 }
 
 impl Driven {
-    /// The constants, where this form fits: two bodies on their axes, one driven from the ground by a law without acceleration and sines, no springs.
+    /// The constants, where this form fits: two bodies on their axes, one driven from the ground by a law
+    /// without acceleration and sines, no springs.
     pub fn new(mechanism: &Mechanism) -> Option<Self> {
         let tree = &mechanism.tree;
-        let [ConstraintEquation { measure: Measure::Angle { body, base }, law: Some(law), .. }] = &mechanism.constraints[..] else {
+        let [ConstraintEquation { measure: Measure::Angle { body, base }, law: Some(law), .. }] =
+            &mechanism.constraints[..]
+        else {
             return None;
         };
         let is_steady = law.acceleration == 0.0 && law.sines.is_empty();
@@ -105,7 +112,12 @@ impl Driven {
         let (driven, free) = (*body, 1 - *body);
         let (a, d, w) = (tree.coupling[1].re, tree.diagonal[free], law.rate);
         let pull = tree.weight[free];
-        let lanes = [DoubleDouble::of(pull.im), DoubleDouble::of(-pull.re), DoubleDouble::ZERO, DoubleDouble::product(w, w).scale(-a)];
+        let lanes = [
+            DoubleDouble::of(pull.im),
+            DoubleDouble::of(-pull.re),
+            DoubleDouble::ZERO,
+            DoubleDouble::product(w, w).scale(-a),
+        ];
         let mut load = [[[0.0; 4]; 2]; MOST + 1];
         for (k, load) in load.iter_mut().enumerate().skip(1) {
             let lanes = lanes.map(|lane| lane / DoubleDouble::product(d, k as f64));
@@ -114,8 +126,8 @@ impl Driven {
         let stiffness = pull.norm_squared().sqrt() + a.abs() * w * w;
         let rate = (stiffness / d).sqrt().max(w.abs());
         let (swing, weight) = ((w * a).abs() / mechanism.energy_scale, tree.weight[driven]);
-        let share =
-            [swing * w.abs() + weight.norm_squared().sqrt() / mechanism.energy_scale, swing].map(|share| share / mechanism.units.time);
+        let share = [swing * w.abs() + weight.norm_squared().sqrt() / mechanism.energy_scale, swing]
+            .map(|share| share / mechanism.units.time);
         Some(Self { law: law.clone(), coupling: a, weight, load, rate, share })
     }
 
@@ -125,7 +137,8 @@ impl Driven {
     }
 }
 
-/// What orders k and k+1 need of the coefficients up to E_k and v_k: both at once, so that each v is loaded for two products.
+/// What orders k and k+1 need of the coefficients up to E_k and v_k: both at once, so that each v is loaded
+/// for two products.
 #[inline(always)]
 fn older<L: Lanes>(scratch: &Scratch, k: usize) -> [L; 2] {
     // From the middle outwards in two chains, the newest coefficients last.
@@ -152,10 +165,21 @@ struct Newest<L> {
 
 /// Order k: from the newest coefficients to the next ones, which are also written.
 #[inline(always)]
-fn order<L: Lanes>(driven: &Driven, start: Newest<L>, scratch: &mut Scratch, older: L, newest: Newest<L>, k: usize) -> Newest<L> {
+fn order<L: Lanes>(
+    driven: &Driven,
+    start: Newest<L>,
+    scratch: &mut Scratch,
+    older: L,
+    newest: Newest<L>,
+    k: usize,
+) -> Newest<L> {
     let [load, load_rest] = driven.load[k + 1];
     // Low parts join before the rounding; in high orders they are too small to matter.
-    let loads = if k < 12 { newest.e.mul_add(L::of(load), newest.e.mul(L::of(load_rest))) } else { newest.e.mul(L::of(load)) };
+    let loads = if k < 12 {
+        newest.e.mul_add(L::of(load), newest.e.mul(L::of(load_rest)))
+    } else {
+        newest.e.mul(L::of(load))
+    };
     let pairs = loads.add(loads.swap_pairs());
     let v = pairs.add(pairs.swap_halves());
     let sum = start.v.mul_add(newest.e, older);
@@ -168,7 +192,13 @@ fn order<L: Lanes>(driven: &Driven, start: Newest<L>, scratch: &mut Scratch, old
 
 /// Two orders, the first of them even.
 #[inline(always)]
-fn two_orders<L: Lanes>(driven: &Driven, start: Newest<L>, scratch: &mut Scratch, newest: Newest<L>, k: usize) -> Newest<L> {
+fn two_orders<L: Lanes>(
+    driven: &Driven,
+    start: Newest<L>,
+    scratch: &mut Scratch,
+    newest: Newest<L>,
+    k: usize,
+) -> Newest<L> {
     let [first, second] = older(scratch, k);
     let newest = order(driven, start, scratch, first, newest, k);
     order(driven, start, scratch, second, newest, k + 1)
@@ -195,7 +225,8 @@ fn expand<L: Lanes, const P: usize>(driven: &Driven, start: Newest<L>, scratch: 
     let _ = newest;
 }
 
-/// Expands to order P and takes one step of at most `left` \[s\] from time `t`; returns the step wanted, and leaves `flow` alone where it is useless.
+/// Expands to order P and takes one step of at most `left` \[s\] from time `t`; returns the step wanted, and
+/// leaves `flow` alone where it is useless.
 #[inline(always)]
 pub fn step<L: Lanes, const P: usize>(
     driven: &Driven,
@@ -207,8 +238,10 @@ pub fn step<L: Lanes, const P: usize>(
 ) -> (f64, f64) {
     let w = driven.law.rate;
     let [phi, v, _] = flow.high;
-    let (psi, _) = (DoubleDouble::sum(phi, flow.low[0]) - DoubleDouble::of(driven.law.start) - t.scale(w)).reduced();
-    let e = direction::unit(L::of([phi, phi, psi.hi, psi.hi]), L::of([flow.low[0], flow.low[0], psi.lo, psi.lo]));
+    let (psi, _) =
+        (DoubleDouble::sum(phi, flow.low[0]) - DoubleDouble::of(driven.law.start) - t.scale(w)).reduced();
+    let e =
+        direction::unit(L::of([phi, phi, psi.hi, psi.hi]), L::of([flow.low[0], flow.low[0], psi.lo, psi.lo]));
     let start = Newest { e, v: L::of([v, v, v - w, v - w]) };
     scratch.e[0] = e.array();
     expand::<L, P>(driven, start, scratch);
@@ -244,7 +277,8 @@ pub fn go<L: Lanes, const P: usize>(driven: &Driven, scratch: &Scratch, flow: &m
         (c_moved * x + s_moved * y) + (c_new * x_moved + s_new * y_moved),
         (s_moved * x - c_moved * y) + (s_new * x_moved - c_new * y_moved),
     ];
-    // Every factor here is exact or differs from step to step, so that no rounding acts for ever with one sign.
+    // Every factor here is exact or differs from step to step, so that no rounding acts for ever with one
+    // sign.
     let pull = x_moved * (w + v + rate) + x * rate - w * (w * swept);
     let work = w * (driven.coupling * pull) - (turned[0] * driven.weight.re + turned[1] * driven.weight.im);
     for (i, increment) in [angle + h * flow.low[1], rate, work].into_iter().enumerate() {
@@ -253,7 +287,8 @@ pub fn go<L: Lanes, const P: usize>(driven: &Driven, scratch: &Scratch, flow: &m
     }
 }
 
-/// Increments over `h` \[s\]: of E; and `[mean of v less v_0, increment of v, –, mean of E's last lane less its start]`.
+/// Increments over `h` \[s\]: of E; and `[mean of v less v_0, increment of v, –, mean of E's last lane less
+/// its start]`.
 #[inline(always)]
 fn increments<L: Lanes, const P: usize>(scratch: &Scratch, h: f64) -> ([f64; 4], [f64; 4]) {
     let square = L::splat(h * h);

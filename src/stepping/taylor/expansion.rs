@@ -6,7 +6,8 @@ use crate::dynamics::series::polynomial::{integral, tail};
 use crate::dynamics::series::{Coefficient, Series};
 use crate::dynamics::{Coordinates, Mechanism, State, Time};
 
-/// Largest share of a motion that its last powers may have, however small it is: beyond, the powers left out are the larger ones.
+/// Largest share of a motion that its last powers may have, however small it is: beyond, the powers left out
+/// are the larger ones.
 const SHARE: f64 = 1e-3;
 /// The step where every power but the first vanishes, in units of time.
 const LONGEST: f64 = 1e9;
@@ -19,9 +20,11 @@ pub struct Expansion<T> {
     series: Series<T>,
     /// The first powers in double-double, where the rest goes on from these.
     first: Option<Box<Series<DoubleDouble>>>,
-    /// All powers in double-double, where doubles have too few digits for light members or long levers; made when first asked for.
+    /// All powers in double-double, where doubles have too few digits for light members or long levers; made
+    /// when first asked for.
     whole: Option<Box<Series<DoubleDouble>>>,
-    /// Powers of the rates that are summed: all, or those before noise takes over in a step through a singular position.
+    /// Powers of the rates that are summed: all, or those before noise takes over in a step through a
+    /// singular position.
     summed: usize,
     u: [Vec<T>; 3],
     exact: [Vec<DoubleDouble>; 3],
@@ -45,8 +48,15 @@ impl<T: Coefficient> Expansion<T> {
     }
 
     /// True where it was made for all these.
-    pub fn is_for(&self, mechanism: &Mechanism, coordinates: Coordinates, order: usize, extended: bool) -> bool {
-        (self.series.order(), self.coordinates, self.first.is_some()) == (order, coordinates, extended && T::IS_PLAIN)
+    pub fn is_for(
+        &self,
+        mechanism: &Mechanism,
+        coordinates: Coordinates,
+        order: usize,
+        extended: bool,
+    ) -> bool {
+        (self.series.order(), self.coordinates, self.first.is_some())
+            == (order, coordinates, extended && T::IS_PLAIN)
             && self.mechanism == *mechanism
     }
 
@@ -83,7 +93,8 @@ impl<T: Coefficient> Expansion<T> {
     #[cold]
     fn expand_wholly(&mut self, mechanism: &Mechanism, state: &State) {
         let (f, order) = (self.series.coordinates(), self.series.order());
-        let whole = self.whole.get_or_insert_with(|| Box::new(Series::new(mechanism, self.coordinates, order)));
+        let whole =
+            self.whole.get_or_insert_with(|| Box::new(Series::new(mechanism, self.coordinates, order)));
         let [exact, none, exact_rate] = &mut self.exact;
         for i in 0..f {
             (exact[i], exact_rate[i]) = (state.unknown(i), state.unknown(f + i));
@@ -93,17 +104,21 @@ impl<T: Coefficient> Expansion<T> {
         self.series.carry_on(mechanism, state.time, u, rest, rate, whole);
     }
 
-    /// The step at which the last powers fall below the tolerance \[s\], those of the unit vectors too where `with_vectors`; not a number
-    /// where one
-    /// of them is.
+    /// The step at which the last powers fall below the tolerance \[s\], those of the unit vectors too where
+    /// `with_vectors`; not a number where one of them is.
     pub fn wanted(&self, tolerance: f64, with_vectors: bool) -> f64 {
         let (order, f) = (self.series.order(), self.series.coordinates());
         let units = self.mechanism.units;
-        let angles = if self.coordinates == Coordinates::All { self.mechanism.bodies.len() } else { self.mechanism.partition.turning() };
+        let angles = if self.coordinates == Coordinates::All {
+            self.mechanism.bodies.len()
+        } else {
+            self.mechanism.partition.turning()
+        };
         let largest = |k: usize| {
             let rates = &self.series.rate[k * f..(k + 1) * f];
             let turning = rates[..angles].iter().fold(0.0, |most, rate| larger(most, rate.value()));
-            rates[angles..].iter().fold(turning, |most, rate| larger(most, rate.value() / units.length)) * units.time
+            rates[angles..].iter().fold(turning, |most, rate| larger(most, rate.value() / units.length))
+                * units.time
         };
         let last: [f64; JUDGES] = std::array::from_fn(|i| largest(order - i));
         if last[0].is_nan() {
@@ -118,7 +133,9 @@ impl<T: Coefficient> Expansion<T> {
             let n = self.mechanism.coordinates();
             for k in order + 2 - JUDGES..=order + 1 {
                 let vectors = &self.series.z[k * n..(k + 1) * n];
-                let of = |vectors: &[Complex<T>]| vectors.iter().fold(0.0, |most, z| larger(larger(most, z.re.value()), z.im.value()));
+                let of = |vectors: &[Complex<T>]| {
+                    vectors.iter().fold(0.0, |most, z| larger(larger(most, z.re.value()), z.im.value()))
+                };
                 let (turning, sliding) = vectors.split_at(self.mechanism.bodies.len());
                 let size = larger(of(turning), of(sliding) / units.length);
                 least = least.min(minus_log2(size) / k as f64);
@@ -126,11 +143,15 @@ impl<T: Coefficient> Expansion<T> {
         }
         let step = libm::exp2(least + libm::log2(tolerance) / (order + 1) as f64).min(LONGEST * units.time);
         let beginning = largest(0).max(largest(1) * step);
-        if tolerance < 0.1 * SHARE * beginning || last == [0.0; JUDGES] { step } else { self.shortened(&last, largest, step) }
+        if tolerance < 0.1 * SHARE * beginning || last == [0.0; JUDGES] {
+            step
+        } else {
+            self.shortened(&last, largest, step)
+        }
     }
 
-    /// The same of the work over the energy scale: the power of motors, dampers and applied forces may fall more slowly than the rates, and where all is driven
-    /// there are no rates.
+    /// The same of the work over the energy scale: the power of motors, dampers and applied forces may fall
+    /// more slowly than the rates, and where all is driven there are no rates.
     fn work_allows(&self) -> f64 {
         let (order, scale) = (self.series.order(), self.mechanism.energy_scale);
         (order + 1 - JUDGES..=order).fold(f64::INFINITY, |least, k| {
@@ -150,7 +171,9 @@ impl<T: Coefficient> Expansion<T> {
                 size = size.max(largest(k) * power);
                 power *= step;
             }
-            let most = |(i, &last): (usize, &f64)| libm::exp2((minus_log2(last) - minus_log2(SHARE * size)) / (order - i) as f64);
+            let most = |(i, &last): (usize, &f64)| {
+                libm::exp2((minus_log2(last) - minus_log2(SHARE * size)) / (order - i) as f64)
+            };
             let least = last.iter().enumerate().map(most).fold(f64::INFINITY, f64::min);
             if size == 0.0 || least >= 0.95 * step {
                 break;
@@ -174,21 +197,25 @@ impl<T: Coefficient> Expansion<T> {
     /// The smallest power at `h` \[s\] over the largest.
     pub fn smallest(&self, h: f64) -> f64 {
         let sizes = (0..=self.series.order()).map(|m| self.size(m, h));
-        let (least, most) = sizes.fold((f64::INFINITY, 0.0), |(least, most): (f64, f64), size| (least.min(size), larger(most, size)));
+        let (least, most) = sizes.fold((f64::INFINITY, 0.0), |(least, most): (f64, f64), size| {
+            (least.min(size), larger(most, size))
+        });
         least / most
     }
 
     /// The largest share of power `m` in a rate at `h` \[s\].
     fn size(&self, m: usize, h: f64) -> f64 {
         let f = self.series.coordinates();
-        let largest = self.series.rate[m * f..(m + 1) * f].iter().fold(0.0, |most, rate| larger(most, rate.value()));
+        let largest =
+            self.series.rate[m * f..(m + 1) * f].iter().fold(0.0, |most, rate| larger(most, rate.value()));
         largest * libm::pow(h, m as f64)
     }
 
     /// Takes a state from where the series was expanded on by `h` \[s\].
     pub fn go(&self, state: &mut State, h: Time) {
         let (f, series) = (self.series.coordinates(), &self.series);
-        let (rates, powers) = (&series.rate[..self.summed * f], &series.power[..self.summed.min(series.power.len())]);
+        let (rates, powers) =
+            (&series.rate[..self.summed * f], &series.power[..self.summed.min(series.power.len())]);
         let step = T::split(h).0;
         // Powers of the rates that are in `first` already, and powers of the work.
         let known = if self.first.is_some() { LEADING + 1 } else { 0 };
@@ -237,5 +264,9 @@ pub(super) fn larger(most: f64, value: f64) -> f64 {
 
 /// -log2 from the bits of a positive double, within 0.09; so large for zero that it never counts.
 pub(super) fn minus_log2(size: f64) -> f64 {
-    if size == 0.0 { 1e9 } else { (1_f64.to_bits() as i64 - size.to_bits() as i64) as f64 / (1_u64 << 52) as f64 }
+    if size == 0.0 {
+        1e9
+    } else {
+        (1_f64.to_bits() as i64 - size.to_bits() as i64) as f64 / (1_u64 << 52) as f64
+    }
 }

@@ -1,8 +1,9 @@
 //! Two bodies as in [`pair`](super::pair), with the first orders in double-double.
 //!
-//! A step's terms fall like tolerance^(k/P), so that the rounding of a few low orders is all the drift there is: with orders up to [`LEADING`], unit vectors, M_0⁻¹
-//! and the sums in two parts, what is left is that of terms a few thousand times smaller.  The recurrence is that of `bodies`, without look-ahead,
-//! and hands over to the orders of `pair`:
+//! A step's terms fall like tolerance^(k/P), so that the rounding of a few low orders is all the drift there
+//! is: with orders up to [`LEADING`], unit vectors, M_0⁻¹ and the sums in two parts, what is left is that of
+//! terms a few thousand times smaller.  The recurrence is that of `bodies`, without look-ahead, and hands
+//! over to the orders of `pair`:
 //!
 //! ```text
 //! e_{k+1} = left(f_k)/(k+1),   g = Σ_{j=0..k} v_j e_{k+1-j}
@@ -33,9 +34,16 @@ fn part<L: Lanes>(signs: [f64; 4], k: usize) -> Wide<L> {
     Wide::from(signs.map(|sign| sign * r), signs.map(|sign| sign * rest))
 }
 
-/// Expands to order P and takes one step of at most `left` \[s\]; returns the step wanted, and leaves `flow` alone where it is useless.
+/// Expands to order P and takes one step of at most `left` \[s\]; returns the step wanted, and leaves `flow`
+/// alone where it is useless.
 #[inline(always)]
-pub fn step<L: Lanes, const P: usize>(pair: &Pair, step_size: &StepSize, scratch: &mut Scratch, flow: &mut Flow, left: f64) -> (f64, f64) {
+pub fn step<L: Lanes, const P: usize>(
+    pair: &Pair,
+    step_size: &StepSize,
+    scratch: &mut Scratch,
+    flow: &mut Flow,
+    left: f64,
+) -> (f64, f64) {
     let twice = |[_, a, _, b]: [f64; 4]| [a, a, b, b];
     let angles = |[a, _, b, _]: [f64; 4]| [a, a, b, b];
     let zero = Wide::of(L::splat(0.0));

@@ -49,8 +49,8 @@ enum Form {
     ManyLooped(Box<Looped<4>>),
 }
 
-/// One step of a state by at most so many seconds, without the processor's vectors where the last is true: the step wanted and the step taken, or `None` where
-/// the series of any mechanism must take over.
+/// One step of a state by at most so many seconds, without the processor's vectors where the last is true:
+/// the step wanted and the step taken, or `None` where the series of any mechanism must take over.
 type Step = fn(&mut Form, &mut State, f64, bool) -> Option<(f64, f64)>;
 
 /// From the last step's start on by so many seconds, likewise.
@@ -198,8 +198,15 @@ fn any_go<L: Lanes>(form: &mut Form, state: &mut State, h: f64) {
 
 impl Fast {
     /// The kernel, where there is one; `is_extended`: with the first orders in double-double.
-    pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize, is_portable: bool, is_extended: bool) -> Option<Self> {
-        let settings = || Settings { mechanism: mechanism.clone(), tolerance, order, is_portable, is_extended };
+    pub fn new(
+        mechanism: &Mechanism,
+        tolerance: f64,
+        order: usize,
+        is_portable: bool,
+        is_extended: bool,
+    ) -> Option<Self> {
+        let settings =
+            || Settings { mechanism: mechanism.clone(), tolerance, order, is_portable, is_extended };
         let step_size = |longest| StepSize::new(tolerance, order, longest).over(mechanism.units.time);
         let form = if is_extended {
             let pair = Pair::new(mechanism).filter(|_| order == EXTENDED)?;
@@ -226,7 +233,9 @@ impl Fast {
 
     /// The smallest form that has room for all bodies and springs.
     fn bodies(mechanism: &Mechanism, tolerance: f64, order: usize) -> Option<Form> {
-        fn of<const B: usize, const S: usize>((mechanism, tolerance, order): (&Mechanism, f64, usize)) -> Option<Box<Bodies<B, S>>> {
+        fn of<const B: usize, const S: usize>(
+            (mechanism, tolerance, order): (&Mechanism, f64, usize),
+        ) -> Option<Box<Bodies<B, S>>> {
             Bodies::new(mechanism, tolerance, order).map(Box::new)
         }
         let wanted = (mechanism, tolerance, order);
@@ -234,15 +243,23 @@ impl Fast {
         free.or_else(|| of(wanted).map(Form::FewSprung)).or_else(|| of(wanted).map(Form::SeveralSprung))
     }
 
-    /// The kernel of a mechanism with loops, where there is one: it sums the best of all orders up to the one asked for, or to 20 where that is higher.
-    pub fn of_looped(mechanism: &Mechanism, reduced: &Reduced, tolerance: f64, order: usize, is_portable: bool) -> Option<Self> {
+    /// The kernel of a mechanism with loops, where there is one: it sums the best of all orders up to the one
+    /// asked for, or to 20 where that is higher.
+    pub fn of_looped(
+        mechanism: &Mechanism,
+        reduced: &Reduced,
+        tolerance: f64,
+        order: usize,
+        is_portable: bool,
+    ) -> Option<Self> {
         let highest = order.max(LOOPED);
         let form = match mechanism.bodies.len() {
             0..=4 => Form::FewLooped(Box::new(Looped::new(mechanism, reduced, tolerance, highest)?)),
             5..=8 => Form::SeveralLooped(Box::new(Looped::new(mechanism, reduced, tolerance, highest)?)),
             _ => Form::ManyLooped(Box::new(Looped::new(mechanism, reduced, tolerance, highest)?)),
         };
-        let settings = Settings { mechanism: mechanism.clone(), tolerance, order, is_portable, is_extended: false };
+        let settings =
+            Settings { mechanism: mechanism.clone(), tolerance, order, is_portable, is_extended: false };
         Some(Self::of_any(settings, form))
     }
 
@@ -253,13 +270,22 @@ impl Fast {
     }
 
     /// True where it was made for all these.
-    pub fn is_for(&self, mechanism: &Mechanism, tolerance: f64, order: usize, is_portable: bool, is_extended: bool) -> bool {
+    pub fn is_for(
+        &self,
+        mechanism: &Mechanism,
+        tolerance: f64,
+        order: usize,
+        is_portable: bool,
+        is_extended: bool,
+    ) -> bool {
         let made = &self.settings;
-        (made.tolerance, made.order, made.is_portable, made.is_extended) == (tolerance, order, is_portable, is_extended)
+        (made.tolerance, made.order, made.is_portable, made.is_extended)
+            == (tolerance, order, is_portable, is_extended)
             && made.mechanism == *mechanism
     }
 
-    /// One step of at most `left` \[s\] from the state's unknowns, which are then the new ones; returns the step wanted and the step taken.
+    /// One step of at most `left` \[s\] from the state's unknowns, which are then the new ones; returns the
+    /// step wanted and the step taken.
     #[inline]
     pub fn step(&mut self, state: &mut State, left: f64) -> Option<(f64, f64)> {
         (self.step)(&mut self.form, state, left, self.settings.is_portable)

@@ -6,13 +6,16 @@
 //! mu_m = S⁻¹ q_m + Uᵀ f_m,    (m+1)(m+2) z_{m+2} = P f_m - U q_m,    V_j = W_·j z_j,  U = V S⁻¹,  P = W - U Vᵀ
 //! ```
 //!
-//! Three Cauchy products a body and order, no sine beyond the first, and one stage of constant matrices between one order and the next: the S of the step's start is
-//! inverted, not factored.  At the step's end the linear rows and the lengths are put back at both levels, with W and the S of the new
-//! position; without that the pins would drift by a digit or two.
+//! Three Cauchy products a body and order, no sine beyond the first, and one stage of constant matrices
+//! between one order and the next: the S of the step's start is inverted, not factored.  At the step's end
+//! the linear rows and the lengths are put back at both levels, with W and the S of the new position; without
+//! that the pins would drift by a digit or two.
 //!
-//! **Best order**: of the orders at hand that is summed which allows the longest step, each judged by its last four coefficients.
+//! **Best order**: of the orders at hand that is summed which allows the longest step, each judged by its
+//! last four coefficients.
 //!
-//! Wins over the series of any mechanism (whole runs by `taylor`): 3.0 times on `andrews` at 1e-9, 3.1 at 1e-14, 1.8 on `kite`.
+//! Wins over the series of any mechanism (whole runs by `taylor`): 3.0 times on `andrews` at 1e-9, 3.1 at
+//! 1e-14, 1.8 on `kite`.
 
 mod spring;
 
@@ -66,7 +69,8 @@ pub struct Looped<const B: usize> {
 }
 
 impl<const B: usize> Looped<B> {
-    /// The constants of a mechanism with these matrices, where this form fits: up to 4 B bodies, constant forces, springs without dampers.
+    /// The constants of a mechanism with these matrices, where this form fits: up to 4 B bodies, constant
+    /// forces, springs without dampers.
     pub fn new(mechanism: &Mechanism, reduced: &Reduced, tolerance: f64, order: usize) -> Option<Self> {
         let n = mechanism.bodies.len();
         let is_plain = mechanism.torsions.is_empty()
@@ -80,7 +84,9 @@ impl<const B: usize> Looped<B> {
         let mut torque = [[0.0; 4]; B];
         for action in &mechanism.actions {
             match &action.kind {
-                Kind::Force { point, force, follows: false } => point.spread(*force, |k, force| applied[k] += force),
+                Kind::Force { point, force, follows: false } => {
+                    point.spread(*force, |k, force| applied[k] += force)
+                }
                 Kind::Force { .. } => return None,
                 Kind::Torque { torque: value, base } => {
                     torque[action.body / 4][action.body % 4] += value;
@@ -92,7 +98,8 @@ impl<const B: usize> Looped<B> {
         }
         let mut weight = [[[0.0; 4]; B]; 2];
         for (i, (&gravity, &applied)) in mechanism.tree.weight.iter().zip(&applied).enumerate() {
-            (weight[0][i / 4][i % 4], weight[1][i / 4][i % 4]) = (gravity.re + applied.re, gravity.im + applied.im);
+            (weight[0][i / 4][i % 4], weight[1][i / 4][i % 4]) =
+                (gravity.re + applied.re, gravity.im + applied.im);
         }
         let zero = [[0.0; 4]; B];
         Some(Self {
@@ -122,7 +129,8 @@ fn begin<L: Lanes, const B: usize>(looped: &mut Looped<B>, state: &State) -> f64
     let n = looped.count;
     let (mut angle, mut rest, mut rate) = ([[0.0; 4]; B], [[0.0; 4]; B], [[0.0; 4]; B]);
     for i in 0..n {
-        (angle[i / 4][i % 4], rest[i / 4][i % 4], rate[i / 4][i % 4]) = (state.y[i], state.low[i], state.y[n + i]);
+        (angle[i / 4][i % 4], rest[i / 4][i % 4], rate[i / 4][i % 4]) =
+            (state.y[i], state.low[i], state.y[n + i]);
     }
     for b in 0..B {
         let (s, c) = sincos::sin_cos(L::of(angle[b]), L::of(rest[b]));
@@ -184,7 +192,8 @@ fn forces<L: Lanes, const B: usize>(looped: &mut Looped<B>, m: usize) -> [[L; B]
         force[0][b] = L::of(z[m][1][b]).mul(torque).neg();
         force[1][b] = L::of(z[m][0][b]).mul(torque);
         if m == 0 {
-            (force[0][b], force[1][b]) = (force[0][b].add(L::of(weight[0][b])), force[1][b].add(L::of(weight[1][b])));
+            (force[0][b], force[1][b]) =
+                (force[0][b].add(L::of(weight[0][b])), force[1][b].add(L::of(weight[1][b])));
         }
     }
     if springs.is_empty() {
@@ -241,11 +250,14 @@ fn order<L: Lanes, const B: usize>(looped: &mut Looped<B>, m: usize) {
         let (x, y, q) = (L::splat(at(&fx, j)), L::splat(at(&fy, j)), L::splat(at(&qs, j)));
         for b in 0..B {
             multiplier[0][b] = L::of(across[j][0][b]).mul_add(x, multiplier[0][b]);
-            multiplier[1][b] = L::of(across[j][1][b]).mul_add(y, L::of(schur[j][b]).mul_add(q, multiplier[1][b]));
+            multiplier[1][b] =
+                L::of(across[j][1][b]).mul_add(y, L::of(schur[j][b]).mul_add(q, multiplier[1][b]));
             turned[0][b] = L::of(projected[j][0][b]).mul_add(x, turned[0][b]);
-            turned[1][b] = L::of(projected[j][1][b]).mul_add(y, L::of(spread[j][0][b]).neg_mul_add(q, turned[1][b]));
+            turned[1][b] =
+                L::of(projected[j][1][b]).mul_add(y, L::of(spread[j][0][b]).neg_mul_add(q, turned[1][b]));
             turned[2][b] = L::of(projected[j][2][b]).mul_add(x, turned[2][b]);
-            turned[3][b] = L::of(projected[j][3][b]).mul_add(y, L::of(spread[j][1][b]).neg_mul_add(q, turned[3][b]));
+            turned[3][b] =
+                L::of(projected[j][3][b]).mul_add(y, L::of(spread[j][1][b]).neg_mul_add(q, turned[3][b]));
         }
     }
     let scale = L::splat(1.0 / ((m + 1) * (m + 2)) as f64);
@@ -258,7 +270,11 @@ fn order<L: Lanes, const B: usize>(looped: &mut Looped<B>, m: usize) {
 
 /// One step of at most `left` \[s\]; the step wanted and the step taken, or `None` near a singular position.
 #[inline(always)]
-pub fn step<L: Lanes, const B: usize>(looped: &mut Looped<B>, state: &mut State, left: f64) -> Option<(f64, f64)> {
+pub fn step<L: Lanes, const B: usize>(
+    looped: &mut Looped<B>,
+    state: &mut State,
+    left: f64,
+) -> Option<(f64, f64)> {
     let least = begin::<L, B>(looped, state);
     if least < NEAR {
         return None;
@@ -278,7 +294,8 @@ pub fn step<L: Lanes, const B: usize>(looped: &mut Looped<B>, state: &mut State,
     Some((wanted, h))
 }
 
-/// The longest step any order allows \[s\], and the power of z that order ends with; not a number where a coefficient is not.
+/// The longest step any order allows \[s\], and the power of z that order ends with; not a number where a
+/// coefficient is not.
 #[inline(always)]
 fn step_size<L: Lanes, const B: usize>(looped: &Looped<B>) -> (f64, usize) {
     let mut roots = [f64::INFINITY; JUDGES];
@@ -349,7 +366,8 @@ pub fn go<L: Lanes, const B: usize>(looped: &mut Looped<B>, state: &mut State, h
         let mut turn = libm::atan2(from.cross(to), from.dot(to));
         if from.dot(between) <= 0.0 || between.dot(to) <= 0.0 {
             // More than half a turn may have been made.
-            let halves = libm::atan2(from.cross(between), from.dot(between)) + libm::atan2(between.cross(to), between.dot(to));
+            let halves = libm::atan2(from.cross(between), from.dot(between))
+                + libm::atan2(between.cross(to), between.dot(to));
             turn += TAU * libm::round((halves - turn) / TAU);
         }
         work += turn * at(&looped.torque, i) + looped.applied[i].dot(to - from);

@@ -1,14 +1,16 @@
 //! One or two bodies without springs and motors, in four lanes: `[c1, s1, c2, s2]` and `[v1, v1, v2, v2]`.
 //!
-//! With v = phi', e = (cos phi, sin phi) and f = v e, the equation of body i reads, with A = A12, d_i the diagonal and W_i the weights,
+//! With v = phi', e = (cos phi, sin phi) and f = v e, the equation of body i reads, with A = A12, d_i the
+//! diagonal and W_i the weights,
 //!
 //! ```text
 //! e' = left(f),    d_i v_i' + A e_i·f_j' = e_i × W_i
 //! (k+1) e_{k+1} = left(f_k),   f_k = Σ v_j e_{k-j},   (k+1) M_0 v_{k+1} = e_k × W - A Σ_{m=1..k+1} m e_{k+1-m}·f_{j,m} without v_{k+1}
 //! ```
 //!
-//! No second derivatives of sines and no angle differences; two Cauchy products share one operand.  M_0⁻¹ is formed once a step.  What the newest coefficient
-//! v_k adds to each order is kept apart (*look-ahead*), so that two orders overlap:
+//! No second derivatives of sines and no angle differences; two Cauchy products share one operand.  M_0⁻¹ is
+//! formed once a step.  What the newest coefficient v_k adds to each order is kept apart (*look-ahead*), so
+//! that two orders overlap:
 //!
 //! ```text
 //! f_k = g_k + v_k e_0,    B = Σ_{j=1..k-1} v_j e_{k+1-j},    g_{k+1} = B + v_k e_1 + v_0 e_{k+1}
@@ -16,11 +18,12 @@
 //! (k+1) v_{k+1} = M_0⁻¹ (e_k × W - A X) + M_0⁻¹ T_k (v_2, v_1)_k,    T_k = ± A sin(phi_1 - phi_2) (k v_0 - (k+2) v_{j,0})
 //! ```
 //!
-//! **A constant rounded once and used in every step is a drift**, since its error has the same sign for ever.  So the determinant takes its constant part in two
-//! terms, the fractions of low orders are in two terms, and the first order's solution is refined.
+//! **A constant rounded once and used in every step is a drift**, since its error has the same sign for ever.
+//! So the determinant takes its constant part in two terms, the fractions of low orders are in two terms, and
+//! the first order's solution is refined.
 //!
-//! Wins over the series of any mechanism (whole runs by `taylor`, start of the program included): 1.6 times on `free` at 1e-9 and 1.7 at
-//! 1e-14, 1.4 and 1.7 on `gentle`.
+//! Wins over the series of any mechanism (whole runs by `taylor`, start of the program included): 1.6 times
+//! on `free` at 1e-9 and 1.7 at 1e-14, 1.4 and 1.7 on `gentle`.
 
 use super::direction;
 use super::step_size::{self, StepSize};
@@ -101,16 +104,25 @@ impl Default for Scratch {
 }
 
 impl Pair {
-    /// The constants, where this form fits: one or two bodies, all hinges and centres of mass on the bars' axes, neither springs nor rows nor walls.
+    /// The constants, where this form fits: one or two bodies, all hinges and centres of mass on the bars'
+    /// axes, neither springs nor rows nor walls.
     ///
     /// One body has a second one beside it that feels nothing and stays where it is.
     pub fn new(mechanism: &Mechanism) -> Option<Self> {
         let tree = &mechanism.tree;
-        if !(1..=2).contains(&tree.coordinates) || tree.off_axis || !mechanism.is_plain() || !mechanism.constraints.is_empty() {
+        if !(1..=2).contains(&tree.coordinates)
+            || tree.off_axis
+            || !mechanism.is_plain()
+            || !mechanism.constraints.is_empty()
+        {
             return None;
         }
         let is_single = tree.coordinates == 1;
-        let second = if is_single { (1.0, 0.0, Complex::ZERO) } else { (tree.diagonal[1], tree.coupling[1].re, tree.weight[1]) };
+        let second = if is_single {
+            (1.0, 0.0, Complex::ZERO)
+        } else {
+            (tree.diagonal[1], tree.coupling[1].re, tree.weight[1])
+        };
         let (d, w) = ([tree.diagonal[0], second.0], [tree.weight[0], second.2]);
         let a = second.1;
         let product = two_product(d[0], d[1]);
@@ -120,7 +132,8 @@ impl Pair {
         Some(Self { is_single, weight, coupling: a, diagonal: d, product, rate })
     }
 
-    /// The longest step in which the terms left out still fall: a third of the order in the time of the fastest oscillation \[s\].
+    /// The longest step in which the terms left out still fall: a third of the order in the time of the
+    /// fastest oscillation \[s\].
     pub fn longest(&self, order: usize) -> f64 {
         order as f64 / 3.0 / self.rate
     }
@@ -196,7 +209,8 @@ struct Sums<L> {
     x: L,
 }
 
-/// What orders k and k+1 need of the coefficients before v_k: both at once, so that each is loaded for two products.
+/// What orders k and k+1 need of the coefficients before v_k: both at once, so that each is loaded for two
+/// products.
 ///
 /// The terms with j = 1 and the last j are left out: they come last, since they are the newest.
 #[inline(always)]
@@ -226,7 +240,13 @@ fn total<L: Lanes>(chains: [Sums<L>; 2]) -> Sums<L> {
 
 /// Order k: from v_k, e_k, g_k to the next ones; writes e_{k+1}, v_{k+1} and -A k (f_2, f_1)_k.
 #[inline(always)]
-fn order<L: Lanes>(s: &Start<L>, scratch: &mut Scratch, older: Sums<L>, newest: Newest<L>, k: usize) -> Newest<L> {
+fn order<L: Lanes>(
+    s: &Start<L>,
+    scratch: &mut Scratch,
+    older: Sums<L>,
+    newest: Newest<L>,
+    k: usize,
+) -> Newest<L> {
     let Sums { mut b, mut x } = older;
     let Newest { v, e, g } = newest;
     if k >= 3 {
@@ -267,7 +287,11 @@ fn two_orders<L: Lanes>(start: &Start<L>, scratch: &mut Scratch, newest: Newest<
 
 /// Orders FROM to P-1 from the newest coefficients, those of order FROM; both even.
 #[inline(always)]
-pub fn expand<L: Lanes, const P: usize, const FROM: usize>(start: &Start<L>, scratch: &mut Scratch, mut newest: Newest<L>) {
+pub fn expand<L: Lanes, const P: usize, const FROM: usize>(
+    start: &Start<L>,
+    scratch: &mut Scratch,
+    mut newest: Newest<L>,
+) {
     if !L::UNROLLED {
         for k in (FROM..P).step_by(2) {
             newest = two_orders(start, scratch, newest, k);
@@ -301,11 +325,21 @@ pub fn wanted<L: Lanes, const P: usize>(step_size: &StepSize, scratch: &Scratch)
     step_size.step::<P>(&largest)
 }
 
-/// Expands to order P and takes one step of at most `left` \[s\]; returns the step wanted, and leaves `flow` alone where it is useless.
+/// Expands to order P and takes one step of at most `left` \[s\]; returns the step wanted, and leaves `flow`
+/// alone where it is useless.
 #[inline(always)]
-pub fn step<L: Lanes, const P: usize>(pair: &Pair, step_size: &StepSize, scratch: &mut Scratch, flow: &mut Flow, left: f64) -> (f64, f64) {
+pub fn step<L: Lanes, const P: usize>(
+    pair: &Pair,
+    step_size: &StepSize,
+    scratch: &mut Scratch,
+    flow: &mut Flow,
+    left: f64,
+) -> (f64, f64) {
     let [phi1, v1, phi2, v2] = flow.high;
-    let e0 = direction::unit(L::of([phi1, phi1, phi2, phi2]), L::of([flow.low[0], flow.low[0], flow.low[2], flow.low[2]]));
+    let e0 = direction::unit(
+        L::of([phi1, phi1, phi2, phi2]),
+        L::of([flow.low[0], flow.low[0], flow.low[2], flow.low[2]]),
+    );
     let v0 = L::of([v1, v1, v2, v2]);
     let coupling = L::splat(pair.coupling);
     // M_0, whose cos(phi1 - phi2) is in all lanes.
@@ -319,10 +353,12 @@ pub fn step<L: Lanes, const P: usize>(pair: &Pair, step_size: &StepSize, scratch
     let g1 = v0.mul(e1);
     let load = pair_sum(coupling.neg_mul_add(e0.mul(g1.swap_halves()), start.weight.mul(e0)));
     let mut first = inverse[1].mul_add(load.swap_halves(), inverse[0].mul(load));
-    // The first order's solution is rounded, not merely computed: one step with the residual, whose sums and products are exact up to the last.
+    // The first order's solution is rounded, not merely computed: one step with the residual, whose sums and
+    // products are exact up to the last.
     let (diagonal, crossed) = (L::of([d1, d1, d2, d2]), first.swap_halves());
     let (on, off) = (diagonal.mul(first), m.mul(crossed));
-    let dropped = diagonal.mul_add(first, L::splat(0.0).sub(on)).add(m.mul_add(crossed, L::splat(0.0).sub(off)));
+    let dropped =
+        diagonal.mul_add(first, L::splat(0.0).sub(on)).add(m.mul_add(crossed, L::splat(0.0).sub(off)));
     let rest = load.sub(on);
     let back = rest.sub(load);
     let lost = load.sub(rest.sub(back)).sub(on.add(back));
@@ -356,7 +392,8 @@ pub fn go<L: Lanes, const P: usize>(scratch: &Scratch, flow: &mut Flow, h: f64) 
     (flow.high, flow.low) = (high.array(), low.array());
 }
 
-/// Increments `[phi1, v1, phi2, v2]` over `h` \[s\]: even and odd powers in two Horner chains; and what the rates' low parts move the angles by.
+/// Increments `[phi1, v1, phi2, v2]` over `h` \[s\]: even and odd powers in two Horner chains; and what the
+/// rates' low parts move the angles by.
 #[inline(always)]
 fn increment<L: Lanes, const P: usize>(scratch: &Scratch, rates: L, low: L, h: f64) -> (L, L) {
     let square = L::splat(h * h);

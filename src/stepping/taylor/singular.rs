@@ -1,13 +1,17 @@
-//! Singular positions: where all links lie in line the constraints lose their independence, and a step must not end near it.
+//! Singular positions: where all links lie in line the constraints lose their independence, and a step must
+//! not end near it.
 //!
-//! Off the constraints the equations have a pole at the distance d of the singular position, and rounding off the constraints grows as 1/d: a step size rule
-//! that heeds the pole ends ever closer to it, until noise sends the motion out on another branch, smoothly.  So a step that begins near such
-//! a position goes through: the share of the weakest constraint ([`rank`](crate::dynamics::rank)), which knows no masses, is followed along the low powers of the
-//! series to its minimum and on to where it is what it was, and the step ends there.  The series itself is that of a smooth motion; its late powers are
-//! noise times d^-k, so that it is summed to its smallest power only.
+//! Off the constraints the equations have a pole at the distance d of the singular position, and rounding off
+//! the constraints grows as 1/d: a step size rule that heeds the pole ends ever closer to it, until noise
+//! sends the motion out on another branch, smoothly.  So a step that begins near such a position goes
+//! through: the share of the weakest constraint ([`rank`](crate::dynamics::rank)), which knows no masses, is
+//! followed along the low powers of the series to its minimum and on to where it is what it was, and the step
+//! ends there.  The series itself is that of a smooth motion; its late powers are noise times d^-k, so that
+//! it is summed to its smallest power only.
 //!
-//! Such a step is longer than the powers allow by themselves, so it is made only where it is confirmed: at its end the constraints and the energy balance hold, and
-//! the series about its end leads back to its start.  Else the step is as any, and what the projection finds at its end is told.
+//! Such a step is longer than the powers allow by themselves, so it is made only where it is confirmed: at
+//! its end the constraints and the energy balance hold, and the series about its end leads back to its start.
+//! Else the step is as any, and what the projection finds at its end is told.
 
 use super::expansion::Expansion;
 use crate::arithmetic::DoubleDouble;
@@ -21,12 +25,14 @@ const LOW: usize = 8;
 /// Points it is looked for at, and the longest way over the step wanted.
 const POINTS: usize = 96;
 const LONGEST: f64 = 12.0;
-/// On a way through a singular position the share falls below this part of what it was; elsewhere it is small for other reasons, and the step is as any.
+/// On a way through a singular position the share falls below this part of what it was; elsewhere it is small
+/// for other reasons, and the step is as any.
 const FALL: f64 = 0.1;
 /// Largest share of the motion that the smallest power in such a step may have.
 const NOISE: f64 = 1e-6;
-/// Largest difference between the start and where the way back leads, over the tolerance; and the limits of that \[rad\]: a passage a little off is better than steps that end
-/// at the singular position, and none is worth more than this.
+/// Largest difference between the start and where the way back leads, over the tolerance; and the limits of
+/// that \[rad\]: a passage a little off is better than steps that end at the singular position, and none is
+/// worth more than this.
 const ASTRAY: f64 = 1e3;
 const LIMITS: [f64; 2] = [1e-6, 1e-4];
 
@@ -49,15 +55,24 @@ impl<T: Coefficient> SingularPassage<T> {
         Self { kernel: Kernel::new(mechanism), back, end: State::default() }
     }
 
-    /// How long a step must be to go through a singular position and come out as far from it as it is now; `None` where there is none ahead.
-    pub fn length<P: Form + ?Sized>(&mut self, problem: &P, expansion: &Expansion<T>, state: &State, wanted: f64) -> Option<f64> {
+    /// How long a step must be to go through a singular position and come out as far from it as it is now;
+    /// `None` where there is none ahead.
+    pub fn length<P: Form + ?Sized>(
+        &mut self,
+        problem: &P,
+        expansion: &Expansion<T>,
+        state: &State,
+        wanted: f64,
+    ) -> Option<f64> {
         let mechanism = problem.mechanism();
         let (series, n) = (expansion.series(), mechanism.coordinates());
         let kernel = &mut self.kernel;
         let mut phi = vec![0.0; n];
         let mut share = |h: f64| {
             for (i, phi) in phi.iter_mut().enumerate() {
-                let rates = (0..LOW.min(series.order())).rev().map(|m| series.rate[m * n + i].value() / (m + 1) as f64);
+                let rates = (0..LOW.min(series.order()))
+                    .rev()
+                    .map(|m| series.rate[m * n + i].value() / (m + 1) as f64);
                 *phi = state.y[i] + h * rates.fold(0.0, |sum, rate| sum * h + rate);
             }
             kernel.independence_at(mechanism, state.time, &phi, &state.y[n..2 * n])
@@ -82,8 +97,16 @@ impl<T: Coefficient> SingularPassage<T> {
         None
     }
 
-    /// True where a step of `h` \[s\], as it is summed, keeps the constraints and the energy balance, and the series about its end leads back.
-    pub fn is_confirmed<P: Form + ?Sized>(&mut self, problem: &P, expansion: &Expansion<T>, state: &State, h: f64, tolerance: f64) -> bool {
+    /// True where a step of `h` \[s\], as it is summed, keeps the constraints and the energy balance, and the
+    /// series about its end leads back.
+    pub fn is_confirmed<P: Form + ?Sized>(
+        &mut self,
+        problem: &P,
+        expansion: &Expansion<T>,
+        state: &State,
+        h: f64,
+        tolerance: f64,
+    ) -> bool {
         let Self { kernel, back, end } = self;
         let mechanism = problem.mechanism();
         let n = mechanism.coordinates();
@@ -113,7 +136,8 @@ impl<T: Coefficient> SingularPassage<T> {
             let size = if i < n { 1.0 } else { fastest };
             let off = (start.unknown(i) - state.unknown(i)).hi;
             // A turn may lie between the two.
-            let off = if i < mechanism.bodies.len() { libm::remainder(off, std::f64::consts::TAU) } else { off };
+            let off =
+                if i < mechanism.bodies.len() { libm::remainder(off, std::f64::consts::TAU) } else { off };
             off.abs() <= limit * size
         })
     }

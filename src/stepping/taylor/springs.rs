@@ -9,9 +9,9 @@
 //! power of the dampers = -Σ_{j=0..m} c a_j h_{m+1-j}
 //! ```
 //!
-//! κ_0 = -k (L - L0)/L takes the stretch L - L0 from spans in double-double: the difference of two lengths, rounded, times a stiff k would outweigh
-//! all other rounding.  A spring of free length zero without damper has no use for its length, and lanes without a spring have none: their q is zero
-//! but for q_0 = 1.
+//! κ_0 = -k (L - L0)/L takes the stretch L - L0 from spans in double-double: the difference of two lengths,
+//! rounded, times a stiff k would outweigh all other rounding.  A spring of free length zero without damper
+//! has no use for its length, and lanes without a spring have none: their q is zero but for q_0 = 1.
 
 use super::terms::over;
 use super::wide::Wide;
@@ -61,7 +61,8 @@ struct Scratch<const S: usize> {
 }
 
 impl<const B: usize, const S: usize> Springs<B, S> {
-    /// The constants, where this form fits: springs in `S` vectors between points of bodies that hang on the ground.
+    /// The constants, where this form fits: springs in `S` vectors between points of bodies that hang on the
+    /// ground.
     pub fn new(mechanism: &Mechanism) -> Option<Self> {
         let (n, springs) = (mechanism.bodies.len(), &mechanism.springs);
         if springs.len() > room(S) || (S > 0 && springs.is_empty()) || mechanism.coordinates() != n {
@@ -74,7 +75,9 @@ impl<const B: usize, const S: usize> Springs<B, S> {
             }
             row
         };
-        let gamma = |body: usize| [row(&|i| springs[i].span.gamma(body).re), row(&|i| springs[i].span.gamma(body).im)];
+        let gamma = |body: usize| {
+            [row(&|i| springs[i].span.gamma(body).re), row(&|i| springs[i].span.gamma(body).im)]
+        };
         let mut spread = vec![[[[0.0; 4]; B]; 2]; springs.len()];
         for (spread, spring) in spread.iter_mut().zip(springs) {
             for &(body, gamma) in &spring.span.terms {
@@ -137,24 +140,32 @@ impl<const B: usize, const S: usize> Springs<B, S> {
             scratch.square[0][v] = size.array();
             scratch.inverse[v] = L::ONE.div(size).array();
             scratch.reciprocal[0][v] = L::ONE.div(length).array();
-            scratch.factor[0][v] = L::ZERO.sub(L::of(stiffness[v])).mul(relative.mul_add(measured, rest)).array();
+            scratch.factor[0][v] =
+                L::ZERO.sub(L::of(stiffness[v])).mul(relative.mul_add(measured, rest)).array();
         }
     }
 
-    /// About the square of the fastest rate the springs cause where the step begins \[rad²/s²\], from cos and sin of the bodies' angles and M⁻¹ times a vector:
-    /// k J·M⁻¹ J for the pull along the spring, J_b = (gamma_b e_b) × D/L, and at most |κ_0| |gamma|² M⁻¹ for its turning.
+    /// About the square of the fastest rate the springs cause where the step begins \[rad²/s²\], from cos and
+    /// sin of the bodies' angles and M⁻¹ times a vector: k J·M⁻¹ J for the pull along the spring, J_b =
+    /// (gamma_b e_b) × D/L, and at most |κ_0| |gamma|² M⁻¹ for its turning.
     pub fn rate_squared(&self, e: &[Row<B>; 2], solve: impl Fn(&Row<B>) -> Row<B>) -> f64 {
         let Self { stiffness, measured, most, scratch, .. } = self;
         let of_spring = |(i, gamma): (usize, &[Row<B>; 2])| {
             let [stiffness, measured, most] = [stiffness, measured, most].map(|row| at(row, i));
-            let [x, y, reciprocal, factor] = [&scratch.x, &scratch.y, &scratch.reciprocal, &scratch.factor].map(|rows| at(&rows[0], i));
+            let [x, y, reciprocal, factor] =
+                [&scratch.x, &scratch.y, &scratch.reciprocal, &scratch.factor].map(|rows| at(&rows[0], i));
             let mut lever = [[0.0; 4]; B];
             for (b, lever) in lever.as_flattened_mut().iter_mut().enumerate() {
                 let [c, s, re, im] = [&e[0], &e[1], &gamma[0], &gamma[1]].map(|row| at(row, b));
                 *lever = ((re * c - im * s) * y - (re * s + im * c) * x) * reciprocal;
             }
             let moved = solve(&lever);
-            let along: f64 = lever.as_flattened().iter().zip(moved.as_flattened()).map(|(lever, moved)| lever * moved).sum();
+            let along: f64 = lever
+                .as_flattened()
+                .iter()
+                .zip(moved.as_flattened())
+                .map(|(lever, moved)| lever * moved)
+                .sum();
             let slack = if stiffness > 0.0 { factor.abs() / stiffness } else { 0.0 };
             measured * stiffness * along + slack * most
         };
@@ -176,14 +187,16 @@ impl<const B: usize, const S: usize> Springs<B, S> {
         }
         (scratch.x[m], scratch.y[m]) = (store(x), store(y));
         let within = half_square::<L, S>(&scratch.x[1..m], &scratch.y[1..m]);
-        let [without, falling] = products::<L, S>(&scratch.strain[..m - 1], &scratch.square[1..m], &scratch.reciprocal[1..m]);
+        let [without, falling] =
+            products::<L, S>(&scratch.strain[..m - 1], &scratch.square[1..m], &scratch.reciprocal[1..m]);
         for v in 0..S {
             let (along, across) = (L::of(scratch.x[0][v]), L::of(scratch.y[0][v]));
             let half_sum = along.mul_add(x[v], across.mul_add(y[v], within[v])).mul(L::of(measured[v]));
             let square = half_sum.add(half_sum);
             let half = half_sum.mul(L::splat(m as f64));
             let strain = half.sub(without[v]).mul(L::of(scratch.inverse[v]));
-            let reciprocal = over(L::ZERO.sub(strain.mul_add(L::of(scratch.reciprocal[0][v]), falling[v])), m);
+            let reciprocal =
+                over(L::ZERO.sub(strain.mul_add(L::of(scratch.reciprocal[0][v]), falling[v])), m);
             (scratch.square[m][v], scratch.half[m][v]) = (square.array(), half.array());
             (scratch.strain[m - 1][v], scratch.reciprocal[m][v]) = (strain.array(), reciprocal.array());
             // One factor after the other: their product would be a constant rounded once.
@@ -195,7 +208,8 @@ impl<const B: usize, const S: usize> Springs<B, S> {
         }
     }
 
-    /// What the forces of power m add to power m+1 of P, from that power of the bodies' unit vectors; `None` without springs.
+    /// What the forces of power m add to power m+1 of P, from that power of the bodies' unit vectors; `None`
+    /// without springs.
     #[inline(always)]
     pub fn pull<L: Lanes>(&mut self, m: usize, e: &[Row<B>; 2]) -> Option<[[L; B]; 2]> {
         if S == 0 {
@@ -234,7 +248,8 @@ impl<const B: usize, const S: usize> Springs<B, S> {
     }
 }
 
-/// Σ a_j b_{last-j} and Σ a_j c_{last-j}, from the middle outwards in two chains each, so that the newest coefficients come last and nothing waits for them.
+/// Σ a_j b_{last-j} and Σ a_j c_{last-j}, from the middle outwards in two chains each, so that the newest
+/// coefficients come last and nothing waits for them.
 #[inline(always)]
 fn products<L: Lanes, const S: usize>(a: &[Row<S>], b: &[Row<S>], c: &[Row<S>]) -> [[L; S]; 2] {
     let mut inner = [[L::ZERO; S]; 2];

@@ -4,8 +4,8 @@
 //! h = tolerance^(1/(P+1)) min_k |v_k|^(-1/k),   k = P-4…P,   v_k over the unit of rates
 //! ```
 //!
-//! which puts the first term left out of a rate at the tolerance.  The logarithm taken straight from the bits of a double is piecewise linear, its error
-//! at most 0.09, and that is divided by k.
+//! which puts the first term left out of a rate at the tolerance.  The logarithm taken straight from the bits
+//! of a double is piecewise linear, its error at most 0.09, and that is divided by k.
 
 use super::JUDGES;
 
@@ -79,8 +79,10 @@ mod tests {
     fn the_step_is_that_of_the_formula_within_two_percent() {
         for (scale, growth) in [(1.0, 20.0), (1e-12, 3.0), (1e6, 0.5)] {
             let size = |k: i32| scale * f64::powi(growth, k);
-            let exact = (16..=20).map(|k| size(k).powf(-1.0 / f64::from(k))).fold(f64::INFINITY, f64::min) * 1e-13_f64.powf(1.0 / 21.0);
-            let found = StepSize::new(1e-13, 20, 1e9).step::<20>(&[size(20), size(19), size(18), size(17), size(16)]);
+            let exact = (16..=20).map(|k| size(k).powf(-1.0 / f64::from(k))).fold(f64::INFINITY, f64::min)
+                * 1e-13_f64.powf(1.0 / 21.0);
+            let found =
+                StepSize::new(1e-13, 20, 1e9).step::<20>(&[size(20), size(19), size(18), size(17), size(16)]);
             assert!((found / exact - 1.0).abs() < 0.02, "{found} {exact}");
         }
     }

@@ -1,7 +1,8 @@
 //! Fractions of small whole numbers that are not a drift, and what else the kernels share.
 //!
-//! A double such as 1/3 has an error of one sign; multiplied into every step it adds up.  So a fraction of a low order is in two terms, and what the double
-//! leaves out joins *before* the rounding, since afterwards it is below half a unit in the last place and changes nothing.
+//! A double such as 1/3 has an error of one sign; multiplied into every step it adds up.  So a fraction of a
+//! low order is in two terms, and what the double leaves out joins *before* the rounding, since afterwards it
+//! is below half a unit in the last place and changes nothing.
 
 use crate::arithmetic::lanes::Lanes;
 
@@ -61,7 +62,11 @@ pub fn less_over<L: Lanes>(a: L, x: L, k: usize) -> L {
 pub fn left_over<L: Lanes>(x: L, k: usize) -> L {
     let (r, rest) = reciprocal(k);
     let (swapped, r) = (x.swap_pairs(), L::of([-r, r, -r, r]));
-    if rest == 0.0 { swapped.mul(r) } else { swapped.mul_add(r, swapped.mul(L::of([-rest, rest, -rest, rest]))) }
+    if rest == 0.0 {
+        swapped.mul(r)
+    } else {
+        swapped.mul_add(r, swapped.mul(L::of([-rest, rest, -rest, rest])))
+    }
 }
 
 /// `[x/k, x, …]` likewise.

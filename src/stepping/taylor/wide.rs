@@ -1,6 +1,7 @@
 //! Double-double in lanes: four unevaluated sums `hi + lo`.
 //!
-//! The operations are those of [`DoubleDouble`], less care for the last place: each is good to about 1e-31 of its larger operand.
+//! The operations are those of [`DoubleDouble`], less care for the last place: each is good to about 1e-31 of
+//! its larger operand.
 
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::{DoubleDouble, Scalar};
@@ -126,7 +127,8 @@ static CIRCLE: LazyLock<[[f64; 4]; PARTS]> = LazyLock::new(|| {
 });
 
 /// A 256th of a turn.
-const PART: DoubleDouble = DoubleDouble { hi: DoubleDouble::TAU.hi / PARTS as f64, lo: DoubleDouble::TAU.lo / PARTS as f64 };
+const PART: DoubleDouble =
+    DoubleDouble { hi: DoubleDouble::TAU.hi / PARTS as f64, lo: DoubleDouble::TAU.lo / PARTS as f64 };
 
 /// Coefficients of (cos r - 1)/r² and (sin r - r)/r³ in powers of r², and what the first ones leave out.
 const COEFFICIENTS: [[f64; 4]; 5] = {
@@ -156,10 +158,16 @@ pub fn unit<L: Lanes>(angle: Wide<L>) -> Wide<L> {
     let r = angle.add(Wide::from([PART.hi; 4], [PART.lo; 4]).scale(k).minus());
     // [1, r] + r² [1, r] q.
     let z = r.mul(r);
-    let base =
-        Wide { hi: r.hi.mul_add(L::of([0.0, 1.0, 0.0, 1.0]), L::of([1.0, 0.0, 1.0, 0.0])), lo: r.lo.mul(L::of([0.0, 1.0, 0.0, 1.0])) };
+    let base = Wide {
+        hi: r.hi.mul_add(L::of([0.0, 1.0, 0.0, 1.0]), L::of([1.0, 0.0, 1.0, 0.0])),
+        lo: r.lo.mul(L::of([0.0, 1.0, 0.0, 1.0])),
+    };
     let [first, second, third, fourth, fifth] = COEFFICIENTS;
-    let tail = L::of(fifth).mul_add(z.hi, L::of(fourth)).mul_add(z.hi, L::of(third)).mul_add(z.hi, L::of(second)).mul(z.hi);
+    let tail = L::of(fifth)
+        .mul_add(z.hi, L::of(fourth))
+        .mul_add(z.hi, L::of(third))
+        .mul_add(z.hi, L::of(second))
+        .mul(z.hi);
     let q = Wide::from(first, [0.0, SIXTH_REST, 0.0, SIXTH_REST]).add(Wide::of(tail));
     let turned = base.add(z.mul(base).mul(q));
     let (cosine, sine) = (

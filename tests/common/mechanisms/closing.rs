@@ -26,7 +26,9 @@ impl Model {
         if self.takes(Kind::Lock, 0.04) && self.try_hard(basis, |model, basis| model.lock(basis, false)) {
             self.kinds.insert(Kind::Lock);
         }
-        if self.takes(Kind::RelativeLock, 0.04) && self.try_hard(basis, |model, basis| model.lock(basis, true)) {
+        if self.takes(Kind::RelativeLock, 0.04)
+            && self.try_hard(basis, |model, basis| model.lock(basis, true))
+        {
             self.kinds.insert(Kind::RelativeLock);
         }
         self.is_coupled |= !self.sliders.is_empty();
@@ -96,14 +98,23 @@ impl Model {
         self.focus.extend(between.iter().filter_map(|place| place.bar));
         let stiffness = self.scales.force / self.scales.length * self.dice.size(1e5, 1e8);
         let name = format!("rod{}", self.springs.len());
-        self.springs.push(Spring { name, between, stiffness, free_length: length, damping: 0.0, rigid: true });
+        self.springs.push(Spring {
+            name,
+            between,
+            stiffness,
+            free_length: length,
+            damping: 0.0,
+            rigid: true,
+        });
         true
     }
 
     fn lock(&mut self, basis: &mut Basis, relative: bool) -> bool {
         let bar = self.some_body();
         let relative_to = if relative { self.another(bar, 0.0) } else { None };
-        if relative != relative_to.is_some() || !Self::takes_rows(basis, &[self.angle(Some(bar), relative_to)]) {
+        if relative != relative_to.is_some()
+            || !Self::takes_rows(basis, &[self.angle(Some(bar), relative_to)])
+        {
             return false;
         }
         self.focus.push(bar);
@@ -121,7 +132,8 @@ impl Model {
         let there = match b {
             Some(b) => self.spot(b),
             None => {
-                let (at, direction, far) = (self.at(&here), self.dice.direction(), self.scales.length * self.dice.within(0.5, 1.4));
+                let (at, direction, far) =
+                    (self.at(&here), self.dice.direction(), self.scales.length * self.dice.within(0.5, 1.4));
                 Place { bar: None, point: [at[0] + far * direction[0], at[1] + far * direction[1]] }
             }
         };
@@ -129,14 +141,22 @@ impl Model {
     }
 
     pub(super) fn wants_motor(&self) -> bool {
-        let motors = [Kind::Motor, Kind::RelativeMotor, Kind::SliderMotor, Kind::FullyDriven, Kind::SineLaw, Kind::AcceleratedLaw];
+        let motors = [
+            Kind::Motor,
+            Kind::RelativeMotor,
+            Kind::SliderMotor,
+            Kind::FullyDriven,
+            Kind::SineLaw,
+            Kind::AcceleratedLaw,
+        ];
         motors.into_iter().any(|kind| self.wants(kind))
     }
 
     /// Motors whose laws agree with the start.
     pub(super) fn drive(&mut self, basis: &mut Basis) {
         let laws = self.wants(Kind::SineLaw) || self.wants(Kind::AcceleratedLaw);
-        let named = self.wants(Kind::Motor) || self.wants(Kind::RelativeMotor) || self.wants(Kind::SliderMotor);
+        let named =
+            self.wants(Kind::Motor) || self.wants(Kind::RelativeMotor) || self.wants(Kind::SliderMotor);
         if self.takes(Kind::Motor, if laws && !named { 1.0 } else { 0.08 }) {
             self.drive_one(basis, 0);
         }
@@ -182,7 +202,10 @@ impl Model {
             let relative_to = if way == 1 { self.another(bar, 0.0) } else { None };
             if (way == 1) == relative_to.is_some() && basis.add(&[self.angle(Some(bar), relative_to)]) {
                 let (own, base) = (self.start[bar], relative_to.map(|base| self.start[base]));
-                let at = [own.phi - base.map_or(0.0, |base| base.phi), own.omega - base.map_or(0.0, |base| base.omega)];
+                let at = [
+                    own.phi - base.map_or(0.0, |base| base.phi),
+                    own.omega - base.map_or(0.0, |base| base.omega),
+                ];
                 let law = self.law_through(at, 1.0);
                 let name = format!("motor{}", self.motors.len());
                 self.motors.push(Motor { name, bar, relative_to, law });
@@ -193,7 +216,8 @@ impl Model {
         }
     }
 
-    /// A law with this value and rate at t = 0, in units of `size`; it does not go far where bodies are coupled.
+    /// A law with this value and rate at t = 0, in units of `size`; it does not go far where bodies are
+    /// coupled.
     fn law_through(&mut self, [value, rate]: [f64; 2], size: f64) -> Law {
         let time = self.scales.time;
         let mut law = Law { start: value, rate, acceleration: 0.0, sines: Vec::new() };
@@ -204,7 +228,11 @@ impl Model {
                 Sine { amplitude: size * self.dice.signed(0.1, 0.5), frequency, phase }
             } else if rate == 0.0 {
                 // At the end of its swing it is at rest, to rounding.
-                Sine { amplitude: size * self.dice.signed(0.05, 0.2), frequency, phase: std::f64::consts::FRAC_PI_2 }
+                Sine {
+                    amplitude: size * self.dice.signed(0.05, 0.2),
+                    frequency,
+                    phase: std::f64::consts::FRAC_PI_2,
+                }
             } else {
                 Sine { amplitude: rate / (frequency * phase.cos()), frequency, phase }
             };

@@ -60,7 +60,10 @@ impl Model {
             rows.push(self.pin(&hinge.between));
         }
         for weld in &self.welds {
-            rows.push([self.pin(&weld.between), vec![self.angle(weld.between[1].bar, weld.between[0].bar)]].concat());
+            rows.push(
+                [self.pin(&weld.between), vec![self.angle(weld.between[1].bar, weld.between[0].bar)]]
+                    .concat(),
+            );
         }
         for slider in &self.sliders {
             rows.push(self.slide(slider));
@@ -165,7 +168,8 @@ impl Model {
             return;
         }
         let slow = if self.is_coupled && self.wants_motor() { 0.15 } else { 1.0 };
-        let mut rates: Vec<f64> = (0..3 * n).map(|_| slow * self.dice.signed(0.2, 1.8) / self.scales.time).collect();
+        let mut rates: Vec<f64> =
+            (0..3 * n).map(|_| slow * self.dice.signed(0.2, 1.8) / self.scales.time).collect();
         for _ in 0..3 {
             basis.reduce(&mut rates);
         }

@@ -105,7 +105,12 @@ impl Kind {
         let free = |kind| {
             matches!(
                 kind,
-                Self::FloatingBody | Self::FloatingGroup | Self::PlasticWall | Self::Wall | Self::ElasticWall | Self::TouchingWall
+                Self::FloatingBody
+                    | Self::FloatingGroup
+                    | Self::PlasticWall
+                    | Self::Wall
+                    | Self::ElasticWall
+                    | Self::TouchingWall
             )
         };
         self != other && !(driven(self) && free(other)) && !(free(self) && driven(other))

@@ -30,7 +30,14 @@ impl Model {
         if is_damper && let Some(between) = self.apart(0.5) {
             let damping = self.scales.mass / self.scales.time * self.dice.size(0.1, 1.0);
             let free_length = if self.dice.chance(0.5) { 0.0 } else { self.scales.length };
-            self.add_spring(Spring { name: String::new(), between, stiffness: 0.0, free_length, damping, rigid: false });
+            self.add_spring(Spring {
+                name: String::new(),
+                between,
+                stiffness: 0.0,
+                free_length,
+                damping,
+                rigid: false,
+            });
             self.kinds.insert(Kind::DamperAlone);
         }
     }
@@ -48,7 +55,8 @@ impl Model {
         let length = norm(minus(self.at(&between[0]), self.at(&between[1])));
         let free_length = if zero { 0.0 } else { length * self.dice.within(0.4, 1.3) };
         let stiffness = self.scales.force / self.scales.length * self.dice.size(1.0, 20.0);
-        let damping = if damped { self.scales.mass / self.scales.time * self.dice.size(0.1, 1.0) } else { 0.0 };
+        let damping =
+            if damped { self.scales.mass / self.scales.time * self.dice.size(0.1, 1.0) } else { 0.0 };
         let is_grounded = between.iter().any(|place| place.bar.is_none());
         self.kinds.insert(if is_grounded { Kind::Spring } else { Kind::BodySpring });
         if zero {
@@ -57,7 +65,14 @@ impl Model {
         if damped {
             self.kinds.insert(Kind::Damper);
         }
-        self.add_spring(Spring { name: String::new(), between, stiffness, free_length, damping, rigid: false });
+        self.add_spring(Spring {
+            name: String::new(),
+            between,
+            stiffness,
+            free_length,
+            damping,
+            rigid: false,
+        });
     }
 
     fn add_spring(&mut self, spring: Spring) {
@@ -72,7 +87,8 @@ impl Model {
             let is_so = is_damped && self.dice.chance(0.5);
             self.coil(true, is_so);
         }
-        if self.takes(Kind::TorsionSpring, 0.08) || (is_damped && !self.kinds.contains(&Kind::TorsionDamper)) {
+        if self.takes(Kind::TorsionSpring, 0.08) || (is_damped && !self.kinds.contains(&Kind::TorsionDamper))
+        {
             self.coil(false, is_damped);
         }
     }
@@ -88,7 +104,11 @@ impl Model {
         let free_angle = angle + self.dice.within(-1.5, 1.5);
         let name = format!("coil{}", self.torsion_springs.len());
         self.torsion_springs.push(TorsionSpring { name, bar, relative_to, stiffness, free_angle, damping });
-        self.kinds.insert(if relative_to.is_some() { Kind::RelativeTorsionSpring } else { Kind::TorsionSpring });
+        self.kinds.insert(if relative_to.is_some() {
+            Kind::RelativeTorsionSpring
+        } else {
+            Kind::TorsionSpring
+        });
         if damped {
             self.kinds.insert(Kind::TorsionDamper);
         }
@@ -150,7 +170,8 @@ impl Model {
     /// A factor of about one as a function of time.
     fn factor(&mut self) -> Law {
         let time = self.scales.time;
-        let mut law = Law { start: self.dice.within(-1.0, 1.0), rate: 0.0, acceleration: 0.0, sines: Vec::new() };
+        let mut law =
+            Law { start: self.dice.within(-1.0, 1.0), rate: 0.0, acceleration: 0.0, sines: Vec::new() };
         if self.dice.chance(0.4) {
             law.rate = self.dice.signed(0.1, 0.5) / time;
         }
@@ -159,7 +180,11 @@ impl Model {
         }
         for _ in 0..self.dice.one(&[0, 1, 1, 2]) {
             let frequency = self.dice.size(0.5, 4.0) / time;
-            law.sines.push(Sine { amplitude: self.dice.signed(0.3, 1.2), frequency, phase: self.dice.within(-3.0, 3.0) });
+            law.sines.push(Sine {
+                amplitude: self.dice.signed(0.3, 1.2),
+                frequency,
+                phase: self.dice.within(-3.0, 3.0),
+            });
         }
         law
     }
@@ -167,7 +192,11 @@ impl Model {
     /// Walls in the way of points that move, or are about to.
     pub(super) fn wall(&mut self) {
         let touching = self.takes(Kind::TouchingWall, 0.02);
-        let kinds = [(Kind::PlasticWall, 0.0), (Kind::Wall, self.dice.one(&[0.3, 0.5, 0.9])), (Kind::ElasticWall, 1.0)];
+        let kinds = [
+            (Kind::PlasticWall, 0.0),
+            (Kind::Wall, self.dice.one(&[0.3, 0.5, 0.9])),
+            (Kind::ElasticWall, 1.0),
+        ];
         let mut some = false;
         for (kind, restitution) in kinds {
             if self.takes(kind, 0.05) {
@@ -195,7 +224,11 @@ impl Model {
         let speed = norm(velocity);
         let is_moving = speed > 0.05 * size / time;
         let ahead = [0, 1].map(|i| velocity[i] * time + 0.3 * self.gravity[i] * time * time);
-        let way = if is_moving || norm(ahead) > 0.05 * size { ahead } else { self.dice.direction().map(|x| x * size) };
+        let way = if is_moving || norm(ahead) > 0.05 * size {
+            ahead
+        } else {
+            self.dice.direction().map(|x| x * size)
+        };
         let turn: f64 = self.dice.within(-0.9, 0.9);
         let (s, c) = turn.sin_cos();
         let heading = way.map(|x| x / norm(way));
@@ -203,7 +236,8 @@ impl Model {
         let gap = if touching { 0.0 } else { size * self.dice.size(0.02, 0.4) };
         let normal = towards.map(|x| -x);
         let along = size * self.dice.within(-1.0, 1.0);
-        let through = [at[0] + gap * towards[0] - along * towards[1], at[1] + gap * towards[1] + along * towards[0]];
+        let through =
+            [at[0] + gap * towards[0] - along * towards[1], at[1] + gap * towards[1] + along * towards[0]];
         debug_assert!(dot(minus(at, through), normal) >= -1e-12 * size);
         let name = format!("wall{}", self.walls.len());
         self.walls.push(Wall { name, bar, point: place.point, through, normal, restitution });

@@ -1,10 +1,12 @@
 //! Random scenes of every kind that the reader accepts, each with a start that satisfies all its constraints.
 //!
-//! A configuration is chosen first (angles, positions), the joints are derived from it, and the rates are taken from the null space of the
-//! constraint Jacobian, formed here in maximal coordinates (x, y, phi of every body) with nothing of the crate but the plain data of a scene.
-//! The laws of motors are chosen so that their values and rates at t = 0 are those of the start.
+//! A configuration is chosen first (angles, positions), the joints are derived from it, and the rates are
+//! taken from the null space of the constraint Jacobian, formed here in maximal coordinates (x, y, phi of
+//! every body) with nothing of the crate but the plain data of a scene. The laws of motors are chosen so that
+//! their values and rates at t = 0 are those of the start.
 //!
-//! Two or three [`Kind`]s are chosen to be present first, so that every pair of kinds meets; the rest is filled at random.
+//! Two or three [`Kind`]s are chosen to be present first, so that every pair of kinds meets; the rest is
+//! filled at random.
 #![allow(dead_code)]
 
 mod closing;
@@ -18,7 +20,10 @@ mod write;
 pub use dice::Dice;
 pub use kind::Kind;
 
-use driftless::scene::{Bar, Drive, Force, Given, Hinge, Lock, Motor, Place, Slider, Spring, Start, Torque, TorsionSpring, Wall, Weld};
+use driftless::scene::{
+    Bar, Drive, Force, Given, Hinge, Lock, Motor, Place, Slider, Spring, Start, Torque, TorsionSpring, Wall,
+    Weld,
+};
 use std::collections::BTreeSet;
 
 /// A random scene.
@@ -180,7 +185,14 @@ impl Model {
             return None;
         }
         let freedom = basis.freedom();
-        Some(Generated { seed, text: self.text(), kinds: self.kinds, wanted: self.wanted, scales: self.scales, freedom })
+        Some(Generated {
+            seed,
+            text: self.text(),
+            kinds: self.kinds,
+            wanted: self.wanted,
+            scales: self.scales,
+            freedom,
+        })
     }
 
     fn wants(&self, kind: Kind) -> bool {

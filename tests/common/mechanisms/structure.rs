@@ -53,11 +53,16 @@ impl Model {
         let needs = |kind| match kind {
             Kind::Loop => 3,
             Kind::SharedHinge | Kind::FloatingGroup | Kind::RelativeLock | Kind::RigidSpring => 2,
-            Kind::BodySpring | Kind::RelativeTorsionSpring | Kind::RelativeTorque | Kind::RelativeMotor | Kind::Lock => 2,
+            Kind::BodySpring
+            | Kind::RelativeTorsionSpring
+            | Kind::RelativeTorque
+            | Kind::RelativeMotor
+            | Kind::Lock => 2,
             _ => 1,
         };
         let least = self.wanted.iter().map(|&kind| needs(kind)).max().unwrap_or(1);
-        let count = (joints.len() + usize::from(self.wants(Kind::FloatingGroup))).max(least) + self.dice.one(&[0, 0, 0, 1, 1, 2]);
+        let count = (joints.len() + usize::from(self.wants(Kind::FloatingGroup))).max(least)
+            + self.dice.one(&[0, 0, 0, 1, 1, 2]);
         while joints.len() < count.max(1) {
             let joint = self.dice.one(&[
                 Joint::Hinge,
@@ -82,7 +87,8 @@ impl Model {
         joints
     }
 
-    /// A bar; it may be a point mass only where it is `hung` on the ground by hinges, which give it an inertia.
+    /// A bar; it may be a point mass only where it is `hung` on the ground by hinges, which give it an
+    /// inertia.
     fn add_bar(&mut self, hung: bool) {
         let k = self.bars.len();
         let length = self.scales.length * self.dice.size(0.6, 1.5);
@@ -98,8 +104,19 @@ impl Model {
         if !is_off_axis && !is_point && self.dice.chance(0.5) {
             let (width, thickness) = (length * self.dice.size(0.05, 0.3), length * self.dice.size(0.01, 0.1));
             let inertia = self.dice.one(&[None, Some("full"), Some("slender")]);
-            self.uniform.push(Some(Uniform { width, thickness, density: mass / (length * width * thickness), inertia }));
-            self.bars.push(Bar { name, length, mass, centre: [0.5 * length, 0.0], inertia: mass * length * length / 12.0 });
+            self.uniform.push(Some(Uniform {
+                width,
+                thickness,
+                density: mass / (length * width * thickness),
+                inertia,
+            }));
+            self.bars.push(Bar {
+                name,
+                length,
+                mass,
+                centre: [0.5 * length, 0.0],
+                inertia: mass * length * length / 12.0,
+            });
         } else {
             let aside = if is_off_axis { self.dice.signed(0.05, 0.3) } else { 0.0 };
             let along = self.dice.within(0.25, 0.75);
@@ -135,7 +152,11 @@ impl Model {
             Some(bar) => self.spot(bar),
             None => {
                 let size = self.scales.length;
-                let point = if self.dice.chance(0.4) { [0.0; 2] } else { [0, 1].map(|_| size * self.dice.within(-1.5, 1.5)) };
+                let point = if self.dice.chance(0.4) {
+                    [0.0; 2]
+                } else {
+                    [0, 1].map(|_| size * self.dice.within(-1.5, 1.5))
+                };
                 Place { bar: None, point }
             }
         }
@@ -146,7 +167,11 @@ impl Model {
         let (last, length) = (self.bars.len() - 1, self.bars[self.bars.len() - 1].length);
         // A point mass must move when its body turns.
         let is_plain = self.bars[last].inertia == 0.0 || self.dice.chance(0.7);
-        if is_plain { [0.0; 2] } else { [length * self.dice.within(-0.1, 0.3), length * self.dice.within(-0.2, 0.2)] }
+        if is_plain {
+            [0.0; 2]
+        } else {
+            [length * self.dice.within(-0.1, 0.3), length * self.dice.within(-0.2, 0.2)]
+        }
     }
 
     /// Moves the last body so that its point is at a place of the world.
@@ -215,12 +240,16 @@ impl Model {
             point = self.spot_of(parent);
             let origin_point = self.own_point();
             place = Place { bar: Some(last), point: origin_point };
-            self.bring([origin_point[0] + travel * direction[0], origin_point[1] + travel * direction[1]], self.at(&point));
+            self.bring(
+                [origin_point[0] + travel * direction[0], origin_point[1] + travel * direction[1]],
+                self.at(&point),
+            );
         } else {
             let own = self.own_point();
             point = Place { bar: Some(last), point: own };
             place = self.spot_of(parent);
-            let (origin_point, along) = (self.at(&place), parent.map_or(direction, |bar| self.turned(bar, direction)));
+            let (origin_point, along) =
+                (self.at(&place), parent.map_or(direction, |bar| self.turned(bar, direction)));
             self.bring(own, [origin_point[0] + travel * along[0], origin_point[1] + travel * along[1]]);
         }
         let locked = self.takes(Kind::LockedSlider, 0.25);
@@ -228,7 +257,11 @@ impl Model {
     }
 
     pub(super) fn add_slider(&mut self, slider: Slider) {
-        self.kinds.insert(if slider.rail.place.bar.is_some() { Kind::BodySlider } else { Kind::GroundSlider });
+        self.kinds.insert(if slider.rail.place.bar.is_some() {
+            Kind::BodySlider
+        } else {
+            Kind::GroundSlider
+        });
         if slider.locked {
             self.kinds.insert(Kind::LockedSlider);
         }

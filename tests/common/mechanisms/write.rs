@@ -14,7 +14,9 @@ fn law(law: &Law) -> Value {
         made.insert("acceleration".into(), json!(law.acceleration));
     }
     if !law.sines.is_empty() {
-        let sines = law.sines.iter().map(|sine| json!({"amplitude": sine.amplitude, "frequency": sine.frequency, "phase": sine.phase}));
+        let sines = law.sines.iter().map(
+            |sine| json!({"amplitude": sine.amplitude, "frequency": sine.frequency, "phase": sine.phase}),
+        );
         made.insert("sines".into(), sines.collect());
     }
     Value::Object(made)
@@ -29,7 +31,9 @@ fn bar(bar: &Bar, uniform: &Option<Uniform>) -> Value {
             }
             made
         }
-        None => json!({"name": bar.name, "mass": bar.mass, "centre": bar.centre, "inertia": bar.inertia, "length": bar.length}),
+        None => {
+            json!({"name": bar.name, "mass": bar.mass, "centre": bar.centre, "inertia": bar.inertia, "length": bar.length})
+        }
     }
 }
 
@@ -51,7 +55,12 @@ impl Model {
         let mut hung = vec![false; self.bars.len()];
         let is_hung = |hung: &[bool], place: &Place| place.bar.is_none_or(|bar| hung[bar]);
         for _ in 0..self.bars.len() {
-            for between in self.hinges.iter().map(|hinge| &hinge.between).chain(self.welds.iter().map(|weld| &weld.between)) {
+            for between in self
+                .hinges
+                .iter()
+                .map(|hinge| &hinge.between)
+                .chain(self.welds.iter().map(|weld| &weld.between))
+            {
                 if between.iter().any(|place| is_hung(&hung, place)) {
                     between.iter().filter_map(|place| place.bar).for_each(|bar| hung[bar] = true);
                 }
@@ -115,7 +124,8 @@ impl Model {
         scene.insert("forces".into(), forces.collect());
         let mut torques = Vec::new();
         for torque in self.torques.clone() {
-            let mut made = json!({"name": torque.name, "body": self.name(Some(torque.bar)), "torque": torque.torque});
+            let mut made =
+                json!({"name": torque.name, "body": self.name(Some(torque.bar)), "torque": torque.torque});
             if let Some(factor) = &torque.law {
                 made["law"] = law(factor);
             }
@@ -124,7 +134,8 @@ impl Model {
         scene.insert("torques".into(), json!(torques));
         let mut motors = Vec::new();
         for motor in self.motors.clone() {
-            let made = json!({"name": motor.name, "body": self.name(Some(motor.bar)), "law": law(&motor.law)});
+            let made =
+                json!({"name": motor.name, "body": self.name(Some(motor.bar)), "law": law(&motor.law)});
             motors.push(self.relative(made, motor.relative_to));
         }
         let drives = self.drives.iter();
@@ -145,11 +156,16 @@ impl Model {
         scene.insert("gravity".into(), json!(self.gravity));
         let order = self.dice.order(self.bars.len());
         scene.insert("bars".into(), order.iter().map(|&k| bar(&self.bars[k], &self.uniform[k])).collect());
-        let hinges = self.hinges.iter().map(|hinge| json!({"name": hinge.name, "between": self.both(&hinge.between)}));
+        let hinges =
+            self.hinges.iter().map(|hinge| json!({"name": hinge.name, "between": self.both(&hinge.between)}));
         scene.insert("hinges".into(), hinges.collect());
         let length = if self.dice.chance(0.5) { 1.0 } else { self.dice.size(0.1, 10.0) };
-        scene.insert("sliders".into(), self.sliders.iter().map(|slider| self.slider(slider, length)).collect());
-        let welds = self.welds.iter().map(|weld| json!({"name": weld.name, "between": self.both(&weld.between)}));
+        scene.insert(
+            "sliders".into(),
+            self.sliders.iter().map(|slider| self.slider(slider, length)).collect(),
+        );
+        let welds =
+            self.welds.iter().map(|weld| json!({"name": weld.name, "between": self.both(&weld.between)}));
         scene.insert("welds".into(), welds.collect());
         let mut locks = Vec::new();
         for lock in self.locks.clone() {

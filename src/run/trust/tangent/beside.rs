@@ -5,13 +5,15 @@
 //! r = min over the last powers k and the columns of max((|w_0'|/|w_k'|)^(1/k), (|w_1'|/|w_k'|)^(1/(k-1))),     h = r tolerance^(1/(P+1))
 //! ```
 //!
-//! Near singular positions the radius is that of the lower powers, and the sums end with the smallest one.  The same recurrence that expands the motion is its own derivative, multipliers included, to rounding.
+//! Near singular positions the radius is that of the lower powers, and the sums end with the smallest one.
+//! The same recurrence that expands the motion is its own derivative, multipliers included, to rounding.
 
 use crate::arithmetic::{DoubleDouble, Dual, Scalar};
 use crate::dynamics::series::Series;
 use crate::dynamics::{Coordinates, Mechanism, State};
 
-/// Highest powers P of the rates, and the first term left out of a column with each, over the column: errors multiply over the steps.
+/// Highest powers P of the rates, and the first term left out of a column with each, over the column: errors
+/// multiply over the steps.
 pub const ORDERS: [usize; 3] = [10, 8, 7];
 const TOLERANCES: [f64; 3] = [1e-7, 1e-5, 1e-4];
 /// Powers the step is taken from.
@@ -27,8 +29,9 @@ pub trait Beside: Send {
     /// Expands the motion through a state, and the columns from `first` on, that many as it has room for.
     fn expand(&mut self, mechanism: &Mechanism, state: &State, columns: &[Vec<f64>]);
 
-    /// How far the series of the columns carry \[s\], infinite where they end; not a number where one of them is none.  Where `is_near` a singular
-    /// position, which the motion goes through smoothly, the powers that rounding has spoiled are left out.
+    /// How far the series of the columns carry \[s\], infinite where they end; not a number where one of them
+    /// is none.  Where `is_near` a singular position, which the motion goes through smoothly, the powers that
+    /// rounding has spoiled are left out.
     fn reach(&mut self, weights: &[f64], is_near: bool) -> f64;
 
     /// Takes the columns on by `h` \[s\].
@@ -45,7 +48,12 @@ pub trait Beside: Send {
 }
 
 /// Room for this many columns with powers up to `order`, one of [`ORDERS`], six in a series at most.
-pub fn room(mechanism: &Mechanism, coordinates: Coordinates, order: usize, mut columns: usize) -> Vec<(usize, Box<dyn Beside>)> {
+pub fn room(
+    mechanism: &Mechanism,
+    coordinates: Coordinates,
+    order: usize,
+    mut columns: usize,
+) -> Vec<(usize, Box<dyn Beside>)> {
     let mut groups = Vec::new();
     while columns > 0 {
         let count = columns.min(6);
@@ -76,7 +84,13 @@ impl<const D: usize> Expanded<D> {
     fn new(mechanism: &Mechanism, coordinates: Coordinates, order: usize) -> Self {
         let series = Series::new(mechanism, coordinates, order);
         let f = series.coordinates();
-        Self { count: 0, order, summed: order + 1, series, unknowns: std::array::from_fn(|_| vec![Dual::ZERO; f]) }
+        Self {
+            count: 0,
+            order,
+            summed: order + 1,
+            series,
+            unknowns: std::array::from_fn(|_| vec![Dual::ZERO; f]),
+        }
     }
 
     /// Power `m` of the rates.
@@ -106,7 +120,8 @@ impl<const D: usize> Expanded<D> {
 
     /// Size of power `m` in column `j`.
     fn size(&self, m: usize, j: usize, weights: &[f64]) -> f64 {
-        let squares = self.power(m).iter().zip(weights).map(|(rate, weight)| (rate.slope[j] * weight).powi(2));
+        let squares =
+            self.power(m).iter().zip(weights).map(|(rate, weight)| (rate.slope[j] * weight).powi(2));
         squares.sum::<f64>().sqrt()
     }
 }
@@ -128,7 +143,11 @@ impl<const D: usize> Beside for Expanded<D> {
     fn reach(&mut self, weights: &[f64], is_near: bool) -> f64 {
         let order = self.order;
         self.summed = order + 1;
-        let tolerance = ORDERS.iter().zip(TOLERANCES).find(|(known, _)| **known == order).map_or(TOLERANCES[0], |(_, tolerance)| tolerance);
+        let tolerance = ORDERS
+            .iter()
+            .zip(TOLERANCES)
+            .find(|(known, _)| **known == order)
+            .map_or(TOLERANCES[0], |(_, tolerance)| tolerance);
         let reach = self.radius(weights, order) * libm::pow(tolerance, 1.0 / (order + 1) as f64);
         if !is_near {
             return reach;
@@ -144,7 +163,8 @@ impl<const D: usize> Beside for Expanded<D> {
             };
             (0..self.count).map(of).fold(0.0, f64::max)
         };
-        let (last, noise) = (2..=order).map(|m| (m, share(m))).fold((2, f64::INFINITY), |a, b| if b.1 < a.1 { b } else { a });
+        let (last, noise) =
+            (2..=order).map(|m| (m, share(m))).fold((2, f64::INFINITY), |a, b| if b.1 < a.1 { b } else { a });
         self.summed = last + 1;
         if noise < NOISE { low } else { f64::NAN }
     }
@@ -183,7 +203,9 @@ impl<const D: usize> Beside for Expanded<D> {
     }
 
     fn pull(&self, weights: &[f64]) -> f64 {
-        let positions = |j: usize| self.unknowns[0].iter().zip(weights).map(|(u, weight)| (u.slope[j] * weight).powi(2)).sum::<f64>();
+        let positions = |j: usize| {
+            self.unknowns[0].iter().zip(weights).map(|(u, weight)| (u.slope[j] * weight).powi(2)).sum::<f64>()
+        };
         let share = |j: usize| self.size(1, j, weights) / positions(j).sqrt();
         (0..self.count).map(share).filter(|share| share.is_finite()).fold(0.0, f64::max)
     }

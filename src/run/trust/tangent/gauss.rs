@@ -5,10 +5,13 @@
 //! Phi (dq, dw) = (dq + h dw + h² Σ_i b_i (1 - c_i) K_i,  dw + h Σ_i b_i K_i)
 //! ```
 //!
-//! Order 8, A-stable, symplectic: of a conservative motion it is wrong in phase only, and cheaper than a series on dual numbers.  Phases must be right for long: where
-//! differences grow as the time, those that lag behind the motion grow into others.  With order 6 at the same cost a pendulum's were off by 3 % after 200 periods.
+//! Order 8, A-stable, symplectic: of a conservative motion it is wrong in phase only, and cheaper than a
+//! series on dual numbers.  Phases must be right for long: where differences grow as the time, those that lag
+//! behind the motion grow into others.  With order 6 at the same cost a pendulum's were off by 3 % after 200
+//! periods.
 //!
-//! Source: E. Hairer, C. Lubich, G. Wanner, *Geometric Numerical Integration*, 2nd ed. (2006), section II.1.3.
+//! Source: E. Hairer, C. Lubich, G. Wanner, *Geometric Numerical Integration*, 2nd ed. (2006), section
+//! II.1.3.
 
 use crate::dynamics::Mechanism;
 use crate::dynamics::tree::{self, Tree};
@@ -19,10 +22,12 @@ pub const STAGES: usize = 4;
 /// Step over the fastest rate.
 const SPAN: f64 = 0.55;
 
-/// Diagonal of M over its pivots, with all links in line, beyond which a motion has moments much faster than all before: where heavy members jerk light ones straight.
+/// Diagonal of M over its pivots, with all links in line, beyond which a motion has moments much faster than
+/// all before: where heavy members jerk light ones straight.
 const LIGHT: f64 = 30.0;
 
-/// True of a mechanism whose rates change no faster than they are: a step is chosen by those of the step before.
+/// True of a mechanism whose rates change no faster than they are: a step is chosen by those of the step
+/// before.
 pub fn is_slow(mechanism: &Mechanism) -> bool {
     let Tree { coordinates: n, coupling, diagonal, .. } = &mechanism.tree;
     let mut mass: Vec<f64> = coupling.iter().map(|h| h.norm_squared().sqrt()).collect();
@@ -47,12 +52,15 @@ pub struct Gauss {
 impl Gauss {
     pub fn new() -> Self {
         let [nodes, weights, coupling] = collocation(STAGES);
-        let entry = |k: usize| (0..STAGES).map(|j| coupling[k / STAGES * STAGES + j] * coupling[j * STAGES + k % STAGES]).sum();
+        let entry = |k: usize| {
+            (0..STAGES).map(|j| coupling[k / STAGES * STAGES + j] * coupling[j * STAGES + k % STAGES]).sum()
+        };
         let square = (0..STAGES * STAGES).map(entry).collect();
         Self { nodes, weights, coupling: [coupling, square], system: Vec::new(), next: 0.0 }
     }
 
-    /// Writes the columns of Phi, those of rates times `rate`, from y'' by y at the nodes, one after the other: matrices B and C of `f` × 2f, row by row.
+    /// Writes the columns of Phi, those of rates times `rate`, from y'' by y at the nodes, one after the
+    /// other: matrices B and C of `f` × 2f, row by row.
     ///
     /// False where there is no such matrix.
     pub fn step(&mut self, f: usize, h: f64, rate: f64, pull: &[f64], columns: &mut [Vec<f64>]) -> bool {
@@ -67,7 +75,8 @@ impl Gauss {
                 let (turn, drag) = pull[(i * f + row) * n..][..n].split_at(f);
                 for k in 0..f {
                     for j in 0..STAGES {
-                        line[j * f + k] = -h * (h * aa[i * STAGES + j] * turn[k] + a[i * STAGES + j] * drag[k]);
+                        line[j * f + k] =
+                            -h * (h * aa[i * STAGES + j] * turn[k] + a[i * STAGES + j] * drag[k]);
                     }
                     line[size + k] = turn[k];
                     line[size + f + k] = (drag[k] + h * nodes[i] * turn[k]) * rate;
@@ -91,7 +100,8 @@ impl Gauss {
     }
 }
 
-/// Solves in place, with the largest pivots: rows below are eliminated first, then those above from the last one up.
+/// Solves in place, with the largest pivots: rows below are eliminated first, then those above from the last
+/// one up.
 fn eliminate(size: usize, width: usize, system: &mut [f64]) -> bool {
     for p in 0..size {
         let mut best = p;
@@ -132,7 +142,8 @@ pub fn reach(f: usize, weights: &[f64], pull: &[f64], rates: &[f64]) -> f64 {
     for i in 0..f {
         for j in 0..f {
             let weight = weights[i] / weights[j];
-            let (turn, drag) = ((pull[i * 2 * f + j] * weight).abs(), (pull[i * 2 * f + f + j] * weight).abs());
+            let (turn, drag) =
+                ((pull[i * 2 * f + j] * weight).abs(), (pull[i * 2 * f + f + j] * weight).abs());
             fastest = fastest.max(turn.sqrt()).max(drag);
         }
     }

@@ -5,7 +5,8 @@
 //! rates:      S y = G dw + (G w + C_t)'dq,  dw -= M⁻¹ Gᵀ y           (…)'dq: along dq, on dual numbers
 //! ```
 //!
-//! The least change in the metric of the mass matrix, as in [`projection`](crate::stabilization::projection), whose derivative this is on the constraints.
+//! The least change in the metric of the mass matrix, as in [`projection`](crate::stabilization::projection),
+//! whose derivative this is on the constraints.
 
 use crate::arithmetic::{Complex, Dual, Scalar};
 use crate::dynamics::constraint::Posture;
@@ -28,7 +29,13 @@ impl Ground {
     pub fn new(mechanism: &Mechanism) -> Self {
         let n = mechanism.coordinates();
         let room = || vec![Number::ZERO; n];
-        Self { kernel: Kernel::new(mechanism), phi: room(), omega: room(), z: vec![Complex::ZERO; n], gradient: room() }
+        Self {
+            kernel: Kernel::new(mechanism),
+            phi: room(),
+            omega: room(),
+            z: vec![Complex::ZERO; n],
+            gradient: room(),
+        }
     }
 
     /// Takes a state on the constraints, and tells how many of them are independent there.
@@ -39,11 +46,17 @@ impl Ground {
     }
 
     /// Makes columns tangent at the state taken last.
-    pub fn keep<'a>(&mut self, mechanism: &Mechanism, state: &State, columns: impl Iterator<Item = &'a mut Vec<f64>>) {
+    pub fn keep<'a>(
+        &mut self,
+        mechanism: &Mechanism,
+        state: &State,
+        columns: impl Iterator<Item = &'a mut Vec<f64>>,
+    ) {
         let n = mechanism.coordinates();
         for column in columns {
             for r in 0..mechanism.constraints.len() {
-                self.kernel.multiplier[r] = self.kernel.fold_gradient(r, 0.0, |sum, k, g| sum + g * column[k]);
+                self.kernel.multiplier[r] =
+                    self.kernel.fold_gradient(r, 0.0, |sum, k, g| sum + g * column[k]);
             }
             self.shift(&mut column[..n]);
             self.rates(mechanism, state, column);

@@ -5,7 +5,8 @@
 //! dq⁺ = dq - q'⁺ dt,      dw⁺ = dI(dt, dq, dw) - a⁺ dt                     a⁺ with what is held from then on
 //! ```
 //!
-//! Source: P. C. Müller, *Calculation of Lyapunov exponents for dynamic systems with discontinuities*, Chaos, Solitons & Fractals 5 (1995).
+//! Source: P. C. Müller, *Calculation of Lyapunov exponents for dynamic systems with discontinuities*, Chaos,
+//! Solitons & Fractals 5 (1995).
 
 use super::Tangent;
 use crate::dynamics::constraint::Posture;
@@ -28,7 +29,8 @@ struct Side {
 
 impl Side {
     fn new(mechanism: &Mechanism, motion: &Motion) -> Self {
-        let [phi, omega] = [&motion.phi, &motion.omega].map(|all| all.iter().map(|x| x.hi).collect::<Vec<_>>());
+        let [phi, omega] =
+            [&motion.phi, &motion.omega].map(|all| all.iter().map(|x| x.hi).collect::<Vec<_>>());
         let mut kernel = Kernel::<f64>::new(mechanism);
         kernel.accelerate::<0>(mechanism, motion.time, &phi, &omega, Bias::default());
         Self { acceleration: kernel.load, phi, omega }
@@ -51,7 +53,8 @@ impl Tangent {
             return;
         }
         let n = self.mechanism.coordinates();
-        let mut all: Vec<Vec<f64>> = self.path.columns.iter().chain(&self.path.inputs).map(|column| self.spread(column)).collect();
+        let mut all: Vec<Vec<f64>> =
+            self.path.columns.iter().chain(&self.path.inputs).map(|column| self.spread(column)).collect();
         if let Err(why) = cross(&self.mechanism, jumps, &mut all) {
             return self.lose(&why);
         }
@@ -80,14 +83,18 @@ impl Tangent {
     }
 }
 
-/// Takes columns of all coordinates and rates through what happens at one moment to a mechanism with the contacts held before it.
+/// Takes columns of all coordinates and rates through what happens at one moment to a mechanism with the
+/// contacts held before it.
 ///
-/// What is held or let go with an impact comes earlier or later with it; what is held is put on its wall afterwards.
+/// What is held or let go with an impact comes earlier or later with it; what is held is put on its wall
+/// afterwards.
 ///
 /// # Errors
 /// Why neighbours do not go the same way.
 fn cross(mechanism: &Mechanism, jumps: &[Jump], columns: &mut [Vec<f64>]) -> Result<(), String> {
-    let Some((contact, struck)) = jumps.iter().find_map(|jump| Some((jump.contact?, jump))) else { return Ok(()) };
+    let Some((contact, struck)) = jumps.iter().find_map(|jump| Some((jump.contact?, jump))) else {
+        return Ok(());
+    };
     let n = mechanism.coordinates();
     let here = Side::new(mechanism, &struck.before);
     let there = jumps.last().map(|last| Side::new(&last.mechanism, &last.after));
@@ -95,7 +102,11 @@ fn cross(mechanism: &Mechanism, jumps: &[Jump], columns: &mut [Vec<f64>]) -> Res
     let touched = &mechanism.contacts[contact];
     let mut gradient = vec![0.0; n];
     let z = mechanism.elements(&here.phi);
-    touched.row.linearise(struck.before.time, Posture { phi: &here.phi, z: &z, omega: &here.omega }, &mut gradient);
+    touched.row.linearise(
+        struck.before.time,
+        Posture { phi: &here.phi, z: &z, omega: &here.omega },
+        &mut gradient,
+    );
     let approach = dot(&gradient, &here.omega);
     if approach >= -GRAZED * touched.step_size(&here.omega) {
         return Err("a point grazes a wall, which neighbouring motions may miss".into());
@@ -122,15 +133,20 @@ fn cross(mechanism: &Mechanism, jumps: &[Jump], columns: &mut [Vec<f64>]) -> Res
 /// The derivative of an impact, along a column and `late` \[s\], by differences.
 fn impact_at(jump: &Jump, contact: usize, late: f64, column: &mut [f64]) -> Result<(), String> {
     let n = column.len() / 2;
-    let [phi, omega] = [&jump.before.phi, &jump.before.omega].map(|all| all.iter().map(|x| x.hi).collect::<Vec<_>>());
-    let size = |of: &[f64], from: &[f64]| of.iter().zip(from).fold(0.0, |most: f64, (x, y)| most.max(x.abs() / (1.0 + y.abs())));
+    let [phi, omega] =
+        [&jump.before.phi, &jump.before.omega].map(|all| all.iter().map(|x| x.hi).collect::<Vec<_>>());
+    let size = |of: &[f64], from: &[f64]| {
+        of.iter().zip(from).fold(0.0, |most: f64, (x, y)| most.max(x.abs() / (1.0 + y.abs())))
+    };
     let most = size(&column[..n], &phi).max(size(&column[n..], &omega));
     if most == 0.0 {
         return Ok(());
     }
     let small = DIFFERENCE / most;
     let beside = |sign: f64| {
-        let moved = |from: &[f64], by: &[f64]| from.iter().zip(by).map(|(x, y)| x + sign * small * y).collect::<Vec<_>>();
+        let moved = |from: &[f64], by: &[f64]| {
+            from.iter().zip(by).map(|(x, y)| x + sign * small * y).collect::<Vec<_>>()
+        };
         let t = jump.before.time + sign * small * late;
         jump.mechanism.impact_at(contact, t, &moved(&phi, &column[..n]), &moved(&omega, &column[n..]))
     };

@@ -10,13 +10,16 @@ impl Tangent {
     pub fn rounding(&self) -> f64 {
         let (f, Path { covariance, columns, .. }) = (self.weights.len(), &self.path);
         if !self.path.is_whole {
-            let share = |i: usize| columns.iter().map(|column| (column[i] * self.weights[i]).powi(2)).sum::<f64>();
-            return (covariance.first().copied().unwrap_or(0.0) * (0..f).map(share).fold(0.0, f64::max)).sqrt();
+            let share =
+                |i: usize| columns.iter().map(|column| (column[i] * self.weights[i]).powi(2)).sum::<f64>();
+            return (covariance.first().copied().unwrap_or(0.0) * (0..f).map(share).fold(0.0, f64::max))
+                .sqrt();
         }
         (0..f).map(|i| covariance[i * 2 * f + i].sqrt() * self.weights[i]).fold(0.0, f64::max)
     }
 
-    /// What a relative change of 1 in every force and number of the start comes to in a position at most, up to a time \[s\].
+    /// What a relative change of 1 in every force and number of the start comes to in a position at most, up
+    /// to a time \[s\].
     pub fn reach(&self, t: f64) -> f64 {
         let Path { growth, reach, .. } = &self.path;
         match growth.iter().position(|point| point[0] >= t) {
@@ -71,7 +74,9 @@ impl Tangent {
 
     fn square(&self, column: &[f64]) -> f64 {
         let f = self.weights.len();
-        let square = |i: usize| (column[i] * self.weights[i]).powi(2) + (column[f + i] * self.weights[i] / self.path.rate).powi(2);
+        let square = |i: usize| {
+            (column[i] * self.weights[i]).powi(2) + (column[f + i] * self.weights[i] / self.path.rate).powi(2)
+        };
         (0..f).map(square).sum()
     }
 
@@ -79,7 +84,11 @@ impl Tangent {
     pub(super) fn normalise(&mut self) -> bool {
         let norm = self.norm(&self.path.columns);
         if !(norm > 0.0 && norm.is_finite()) {
-            self.lose(if norm == 0.0 { "neighbouring motions have become the same" } else { "small differences are beyond all numbers" });
+            self.lose(if norm == 0.0 {
+                "neighbouring motions have become the same"
+            } else {
+                "small differences are beyond all numbers"
+            });
             return false;
         }
         self.path.columns.iter_mut().flatten().for_each(|entry| *entry /= norm);
@@ -97,7 +106,8 @@ impl Tangent {
         let f = self.weights.len();
         let Path { inputs, input_log, .. } = &self.path;
         let square = |column: &Vec<f64>| (0..f).map(|i| (column[i] * self.weights[i]).powi(2)).sum::<f64>();
-        let moved = (inputs.iter().map(square).sum::<f64>() / inputs.len() as f64).sqrt() * libm::exp(input_log.min(700.0));
+        let moved = (inputs.iter().map(square).sum::<f64>() / inputs.len() as f64).sqrt()
+            * libm::exp(input_log.min(700.0));
         self.path.reach = self.path.reach.max(moved);
         self.path.seen += 1;
         if !self.path.seen.is_multiple_of(self.path.stride) {

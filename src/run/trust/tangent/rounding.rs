@@ -2,11 +2,13 @@
 
 use super::{Path, ROUNDED, Tangent};
 
-/// The same of mechanisms without a matrix, whose series keep no pairs; fitted on chains of five and eight bars.
+/// The same of mechanisms without a matrix, whose series keep no pairs; fitted on chains of five and eight
+/// bars.
 const COARSE: f64 = 8.0 * ROUNDED;
 
 impl Tangent {
-    /// The covariance after a step of `h` \[s\], in which the series took `taken` steps; the columns of the step's own matrix are in `seeds`.
+    /// The covariance after a step of `h` \[s\], in which the series took `taken` steps; the columns of the
+    /// step's own matrix are in `seeds`.
     pub(super) fn round(&mut self, h: f64, taken: f64) {
         let f = self.weights.len();
         let n = 2 * f;
@@ -41,7 +43,8 @@ impl Tangent {
         }
     }
 
-    /// The same where there is no matrix: one variance of all positions, and rates over the fastest one, which grows as the columns, whose size was `before`.
+    /// The same where there is no matrix: one variance of all positions, and rates over the fastest one,
+    /// which grows as the columns, whose size was `before`.
     pub(super) fn scatter(&mut self, h: f64, taken: f64, before: f64) {
         let f = self.weights.len();
         let each = if taken > 0.0 { h / taken } else { 0.0 };
@@ -49,8 +52,10 @@ impl Tangent {
         let mut added = 0.0;
         for i in 0..f {
             let acceleration = self.rates[f + i].abs();
-            let [turn, push] = left(COARSE, each, self.path.state.y[f + i], rate * rate / self.weights[i], acceleration);
-            added += self.weights[i].powi(2) * (turn + (0.35 * COARSE / self.weights[i]).powi(2) + push / (rate * rate));
+            let [turn, push] =
+                left(COARSE, each, self.path.state.y[f + i], rate * rate / self.weights[i], acceleration);
+            added += self.weights[i].powi(2)
+                * (turn + (0.35 * COARSE / self.weights[i]).powi(2) + push / (rate * rate));
         }
         let grown = self.norm(&self.path.columns) / before;
         self.path.covariance[0] = self.path.covariance[0] * grown * grown + taken * added;

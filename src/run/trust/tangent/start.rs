@@ -15,7 +15,8 @@ impl Tangent {
             ground.keep(mechanism, &path.state, columns.iter_mut());
         }
         let mut squared = 0.0_f64;
-        for (count, mut series) in beside::room(mechanism, self.coordinates, beside::ORDERS[0], columns.len()) {
+        for (count, mut series) in beside::room(mechanism, self.coordinates, beside::ORDERS[0], columns.len())
+        {
             let some: Vec<Vec<f64>> = columns.drain(..count).collect();
             series.expand(mechanism, &path.state, &some);
             squared = squared.max(series.pull(weights));
@@ -40,7 +41,8 @@ impl Tangent {
         let f = self.weights.len();
         let Self { mechanism, ground, path, weights, .. } = self;
         let size = |i: usize| if i < f { 1.0 / weights[i] } else { path.rate / weights[i - f] };
-        let mut basis: Vec<Vec<f64>> = (0..count).map(|_| (0..2 * f).map(|i| dice.normal() * size(i)).collect()).collect();
+        let mut basis: Vec<Vec<f64>> =
+            (0..count).map(|_| (0..2 * f).map(|i| dice.normal() * size(i)).collect()).collect();
         if let Some(ground) = ground {
             ground.keep(mechanism, &path.state, basis.iter_mut());
         }
@@ -63,7 +65,8 @@ impl Tangent {
     pub(super) fn changes(&mut self, count: usize, dice: &mut Dice) -> Vec<Vec<f64>> {
         let f = self.weights.len();
         let Self { mechanism, ground, path, .. } = self;
-        let mut columns: Vec<Vec<f64>> = (0..count).map(|_| path.state.y[..2 * f].iter().map(|y| dice.sign() * y).collect()).collect();
+        let mut columns: Vec<Vec<f64>> =
+            (0..count).map(|_| path.state.y[..2 * f].iter().map(|y| dice.sign() * y).collect()).collect();
         if let Some(ground) = ground {
             ground.keep(mechanism, &path.state, columns.iter_mut());
         }
@@ -77,7 +80,11 @@ impl Tangent {
             return column.to_vec();
         }
         let partition = &self.mechanism.partition.bodies;
-        let half = |from: usize| partition.iter().map(move |dependent_angle| dependent_angle.base.map_or(0.0, |base| column[from + base]));
+        let half = |from: usize| {
+            partition
+                .iter()
+                .map(move |dependent_angle| dependent_angle.base.map_or(0.0, |base| column[from + base]))
+        };
         half(0).chain(half(f)).collect()
     }
 }

@@ -13,7 +13,8 @@ use crate::dynamics::point::Point;
 /// Room for a scalar series, and for lanes that read beyond its end.
 const LENGTH: usize = MOST + 8;
 
-/// A spring and its series: D, |D|² with its powers' numbers, 1/|D|; `backwards` ones run from the end, so that products are of neighbours.
+/// A spring and its series: D, |D|² with its powers' numbers, 1/|D|; `backwards` ones run from the end, so
+/// that products are of neighbours.
 #[derive(Clone, Debug)]
 pub struct Spring {
     /// D.
