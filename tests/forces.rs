@@ -339,9 +339,12 @@ fn what_cannot_be_right_is_refused() {
     assert_eq!(mechanism.site("bar9", [0.0; 2]).err(), Some(CompileError::NoSuchBar("bar9".into())));
 }
 
+/// Spoils a scene.
+type Edit = fn(&mut Scene);
+
 /// Fields that a program may get wrong, one at a time.
 fn spoilt() -> Vec<(&'static str, Scene)> {
-    let edits: [(&str, fn(&mut Scene)); 12] = [
+    let edits: [(&str, Edit); 12] = [
         ("bars", |scene| scene.bars.clear()),
         ("start", |scene| scene.start.truncate(1)),
         ("hinges", |scene| scene.hinges[1].between[1].bar = Some(9)),
@@ -355,7 +358,7 @@ fn spoilt() -> Vec<(&'static str, Scene)> {
         ("springs", |scene| scene.springs[0].stiffness = -1.0),
         ("springs", |scene| scene.springs[0].between[1].point[0] = f64::NAN),
     ];
-    let spoil = |(what, edit): (&'static str, fn(&mut Scene))| {
+    let spoil = |(what, edit): (&'static str, Edit)| {
         let mut spoilt = scene("spring");
         edit(&mut spoilt);
         (what, spoilt)
