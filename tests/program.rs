@@ -207,14 +207,14 @@ fn check_says_what_is_active_and_what_is_left_out() {
         assert!(left_out.contains(what), "{left_out}");
     }
     let motor = check("motor.json");
-    assert_eq!((&motor["method"], &motor["degrees_of_freedom"]), (&"gauss16".into(), &1.into()));
-    assert!(motor["why"].as_str().is_some_and(|why| why.contains("symplectic")));
+    assert_eq!((&motor["method"], &motor["degrees_of_freedom"]), (&"taylor".into(), &1.into()));
+    assert!(motor["why"].as_str().is_some_and(|why| why.contains("rounding")));
     let multiplier = check("motor.json --method dp8 --stabilize none");
     assert!(!multiplier["left_out"].to_string().contains("multipliers") && multiplier["why"].is_null());
     assert_eq!(check("wall.json")["method"], "dp8");
     assert_eq!(check("branch.json")["off_axis"], true);
     program.run("check motor.json").exits(0).shows(&[
-        "gauss16",
+        "taylor",
         "1 degree: 2 coordinates less 1 constraint",
         "left out",
         "elimination",

@@ -303,7 +303,7 @@ mod command {
 
     /// A run of about a second, twenty thousand rows.
     const RUN: &str =
-        "run free.json --method taylor --until 2e4 --every 1 --no-charts --checkpoint-every 0.01";
+        "run free.json --method taylor --rtol 1e-9 --until 2e4 --every 1 --no-charts --checkpoint-every 0.01";
     const FOLDER: &str = "output/free/taylor-1e-9";
 
     fn started(program: &Program, arguments: &str) -> Child {
@@ -416,7 +416,7 @@ mod command {
 
     #[test]
     fn killed_before_its_first_step_it_goes_on_from_any_folder_above() {
-        const LONG: &str = "run free.json --method taylor --until 2e4 --every 1 --no-charts";
+        const LONG: &str = "run free.json --method taylor --rtol 1e-9 --until 2e4 --every 1 --no-charts";
         let program = Program::with_scenes(&["free"]);
         killed_at_once(&program, LONG, "output", "free/taylor-1e-9");
         std::fs::remove_file(program.path("free.json")).expect("removed");
@@ -427,9 +427,8 @@ mod command {
 
     #[test]
     fn of_several_interrupted_ones_all_are_named() {
-        const LONG: &str = "run free.json --method taylor --until 2e4 --every 1 --no-charts";
-        const SWEEP: &str =
-            "sweep free.json --vary bar1.phi=-pi..pi:60 --vary bar2.phi=-pi..pi:60 --until 100 --no-charts";
+        const LONG: &str = "run free.json --method taylor --rtol 1e-9 --until 2e4 --every 1 --no-charts";
+        const SWEEP: &str = "sweep free.json --vary bar1.phi=-pi..pi:60 --vary bar2.phi=-pi..pi:60 --rtol 1e-9 --until 100 --no-charts";
         let program = Program::with_scenes(&["free"]);
         let sweep = "free/sweep-start.bar1.phi-start.bar2.phi-taylor-1e-9";
         killed_at_once(&program, LONG, "out/a", "free/taylor-1e-9");
@@ -536,7 +535,7 @@ mod command {
 
     #[test]
     fn sweeps_go_on_too() {
-        const SWEEP: &str = "sweep free.json --vary bar1.phi=-pi..pi:60 --vary bar2.phi=-pi..pi:60 --until 100 --checkpoint-every 0.01";
+        const SWEEP: &str = "sweep free.json --vary bar1.phi=-pi..pi:60 --vary bar2.phi=-pi..pi:60 --rtol 1e-9 --until 100 --checkpoint-every 0.01";
         const PLACE: &str = "output/free/sweep-start.bar1.phi-start.bar2.phi-taylor-1e-9";
         let of_sweep = |program: &Program| {
             (
