@@ -43,7 +43,7 @@ use std::sync::Arc;
 /// let scene = read_scene("examples/scenes/free.json".as_ref(), &[])?;
 /// let simulation = Simulation::new(&scene)?;
 /// let drag = Drag { at: simulation.site("bar2", [0.6, 0.0])?, factor: 0.02 };
-/// let outcome = simulation.force(&drag)?.until(3.0).every(0.1).method(MethodId::Taylor).run()?;
+/// let outcome = simulation.force(&drag)?.until(3.0).method(MethodId::Taylor).tolerance(1e-14, 1e-14).run()?;
 /// // The energy that the drag has taken is accounted for to the last digits.
 /// assert!(outcome.last.work < -0.01 && outcome.drift.energy.max < 1e-12);
 /// # Ok(())

@@ -30,7 +30,7 @@ pub fn on(bar: &str, point: [f64; 2]) -> Value {
 ///     .bar("lower", 0.6, 0.5)
 ///     .hinge("A", ground([0.0, 0.0]), on("upper", [0.0, 0.0]))
 ///     .hinge("B", on("upper", [0.6, 0.0]), on("lower", [0.0, 0.0]))
-///     .spring("s", on("lower", [0.6, 0.0]), ground([1.0, 0.0]), 8.0)
+///     .spring("s", on("lower", [0.6, 0.0]), ground([1.0, 0.0]), 8.0, 0.5)
 ///     .with("damping", 0.1)
 ///     .start("upper", 0.0, 0.0)
 ///     .start("lower", 1.0, 0.0)
@@ -111,10 +111,13 @@ impl SceneBuilder {
         self.add("sliders", json!({"name": name, "point": point, "rail": rail}))
     }
 
-    /// A linear spring of this stiffness \[N/m\]; `free_length` and `damping` by [`with`](Self::with).
+    /// A linear spring of this stiffness \[N/m\] and free length \[m\]; `damping` by [`with`](Self::with).
     #[must_use]
-    pub fn spring(self, name: &str, one: Value, other: Value, stiffness: f64) -> Self {
-        self.add("springs", json!({"name": name, "between": [one, other], "stiffness": stiffness}))
+    pub fn spring(self, name: &str, one: Value, other: Value, stiffness: f64, free_length: f64) -> Self {
+        let part = json!({
+            "name": name, "between": [one, other], "stiffness": stiffness, "free_length": free_length
+        });
+        self.add("springs", part)
     }
 
     /// A motor that turns a bar: angle at t = 0 \[rad\] and rate \[rad/s\]; other laws by
@@ -205,5 +208,46 @@ impl SceneBuilder {
         }
         self.last = Some((list, None));
         self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_of_part_is_what_a_scene_file_says_with_the_same_keys() {
+        let scene = SceneBuilder::new("all")
+            .description("Every kind of part.")
+            .gravity([0.0, -9.81])
+            .bar("crank", 0.2, 0.3)
+            .bar("rod", 0.6, 0.4)
+            .body("block", 0.5, [0.0, 0.0], 0.01, 0.1)
+            .bar("plate", 0.3, 0.2)
+            .bar("free", 0.3, 0.2)
+            .hinge("A", ground([0.0, 0.0]), on("crank", [0.0, 0.0]))
+            .hinge("B", on("crank", [0.2, 0.0]), on("rod", [0.0, 0.0]))
+            .hinge("C", on("rod", [0.6, 0.0]), on("block", [0.0, 0.0]))
+            .slider("guide", on("block", [0.0, 0.0]), ground([0.0, 0.0]), [1.0, 0.0])
+            .with("angle", "locked")
+            .weld("W", on("rod", [0.3, 0.0]), on("plate", [0.0, 0.0]))
+            .spring("s", on("block", [0.0, 0.0]), ground([1.5, 0.0]), 20.0, 0.5)
+            .with("damping", 0.3)
+            .motor("m", "crank", 0.3, 5.0)
+            .wall("floor", "free", [0.3, 0.0], [0.0, -3.0], [0.0, 1.0], 0.5)
+            .part("torques", json!({"name": "t", "body": "free", "torque": 0.1}))
+            .start("free", 0.1, 0.0)
+            .with("origin", vec![3.0, 0.0])
+            .with("velocity", vec![0.0, 0.0])
+            .until(1.0, 0.1)
+            .build()
+            .expect("a scene");
+        let counts = [scene.bars.len(), scene.hinges.len(), scene.sliders.len(), scene.welds.len()];
+        assert_eq!(counts, [5, 3, 1, 1]);
+        let counts = [scene.springs.len(), scene.motors.len(), scene.walls.len(), scene.torques.len()];
+        assert_eq!(counts, [1, 1, 1, 1]);
+        assert_eq!((scene.springs[0].damping, scene.sliders[0].locked, scene.until), (0.3, true, 1.0));
+        let inertia = scene.bars[0].inertia - 0.3 * 0.2 * 0.2 / 12.0;
+        assert!(inertia.abs() < 1e-18 && scene.fault().is_none());
     }
 }
