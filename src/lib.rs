@@ -28,7 +28,7 @@
 //! | a scene | [`read_scene`], [`SceneBuilder`], [`Scene`] |
 //! | a run | [`Simulation`], [`Outcome`], [`Trajectory`]; step by step [`Run`], [`Running`], [`Snapshot`] |
 //! | something of your own | [`Force`], [`Event`], [`Observer`], [`Integrator`] |
-//! | many runs | [`Sweep`], [`compare`](run::compare) |
+//! | many runs | [`Sweep`], [`compare`] |
 //! | what went wrong | [`Error`] |
 //!
 //! # The rooms, in reading order

@@ -13,10 +13,10 @@
 //! | z | `z` | elements: unit vectors exp(i q), and translational coordinates x + iy at the place of their x | 1, m | n | [`forest`] |
 //! | M | `mass` | mass matrix, `M_ij = Re(conj(z_i) H_ij z_j)` | kg m² | n × n | [`tree`] |
 //! | b | `load` | velocity terms, gravity, springs, dampers, applied forces | N m | n | [`tree`], [`force`] |
-//! | C | `position` | a constraint's violation | rad, m | rows | [`row`] |
-//! | G | `jacobian` | dC/dq | 1, m | rows × n | [`row`] |
-//! | C_t | `drive` | dC/dt at fixed q; C' = G w + C_t | rad/s, m/s | rows | [`row`] |
-//! | gamma | `convective` | what is left of C'' at a = 0 | rad/s², m/s² | rows | [`row`] |
+//! | C | `position` | a constraint's violation | rad, m | rows | [`constraint`] |
+//! | G | `jacobian` | dC/dq | 1, m | rows × n | [`constraint`] |
+//! | C_t | `drive` | dC/dt at fixed q; C' = G w + C_t | rad/s, m/s | rows | [`constraint`] |
+//! | gamma | `convective` | what is left of C'' at a = 0 | rad/s², m/s² | rows | [`constraint`] |
 //! | lambda | `multiplier` | generalized force of a row is `-G_kᵀ lambda_k`; a motor's torque is `-lambda` | N m, N | rows | [`multiplier`] |
 //!
 //! **Everything planar is a sum of unit vectors.**  In a tree of hinged bodies every point is `P = p0 + Σ
@@ -26,7 +26,7 @@
 //! found body by body ([`recursive`]), and those of rows from the factors left behind.
 //!
 //! **Everything else is a row.**  The hinges make a [`forest`]; those that close a loop, sliders, slots,
-//! locks and motors are rows, each a measured angle or a quadratic function of the elements ([`row`]).  Where
+//! locks and motors are rows, each a measured angle or a quadratic function of the elements ([`constraint`]).  Where
 //! rows lose their independence ([`rank`]) they are left out ([`schur`]); the start is found from them
 //! ([`assembly`]).
 //!

@@ -31,7 +31,7 @@
 //!   happen to be rounded: 2e-21 of the energy per second on `gentle` at 2⁻⁵ s, up or down.
 //!
 //! The stages lie in lanes: a iteration is one evaluation of the field on vectors of eight
-//! ([`OdeSystem::rhss`]).
+//! ([`OdeSystem::rates`]).
 //!
 //! Source: M. Antoñana, J. Makazaga, A. Murua, *Reducing and monitoring round-off error propagation for
 //! symplectic implicit Runge–Kutta schemes*, Numer. Algorithms 76 (2017) 861–880, sections 3 and 4; E.
