@@ -12,6 +12,8 @@ const NO_DRIFT: f64 = 1e-13;
 const NO_ERROR: f64 = 1e-9;
 /// How many times faster a setting must be; two is what is aimed at, the rest is the noise of short runs.
 const FASTER: f64 = 2.5;
+/// Runs that are over sooner leave nothing to be gained.
+const SOON: Duration = Duration::from_millis(1);
 /// Runs of the program's choice that take longer are left to `compare`.
 const LONGEST: Duration = Duration::from_millis(250);
 /// Runs to that horizon \[s\] have a path that is known.
@@ -80,7 +82,7 @@ fn beaten(scene: &driftless::Scene, until: f64) -> Option<Vec<String>> {
             ..horizon(request)
         };
         let Some((other, least)) = timed(scene, &request, 1) else { continue };
-        let is_faster = least.as_secs_f64() * FASTER < time.as_secs_f64();
+        let is_faster = time > SOON && least.as_secs_f64() * FASTER < time.as_secs_f64();
         let drifts_less = other.drift.energy.max <= chosen.drift.energy.max.max(NO_DRIFT);
         if is_faster && drifts_less && error(&other) <= error(&chosen).max(NO_ERROR) {
             found.push(format!(
@@ -105,6 +107,7 @@ fn no_choice_is_beaten_by_another_setting() {
         .collect();
     scenes.sort();
     let mut covered = 0;
+    let mut all = Vec::new();
     for path in scenes.iter().filter(|path| path.extension().is_some_and(|extension| extension == "json")) {
         let scene = read_scene(path, &[]).expect("a valid scene");
         for until in [SHORT, 20.0, 150.0] {
@@ -119,9 +122,12 @@ fn no_choice_is_beaten_by_another_setting() {
                 !last.is_empty()
             });
             covered += usize::from(is_measured);
-            assert!(!is_beaten, "{}", last.join("\n"));
+            if is_beaten {
+                all.append(&mut last);
+            }
         }
     }
+    assert!(all.is_empty(), "{}", all.join("\n"));
     assert!(covered >= 45, "{covered} scenes and horizons");
 }
 
