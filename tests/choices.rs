@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 const NO_DRIFT: f64 = 1e-13;
 const NO_ERROR: f64 = 1e-9;
 /// How many times faster a setting must be; two is what is aimed at, the rest is the noise of short runs.
-const FASTER: f64 = 2.5;
+const FASTER: f64 = 3.0;
 /// Runs that are over sooner leave nothing to be gained.
 const SOON: Duration = Duration::from_millis(1);
 /// Runs of the program's choice that take longer are left to `compare`.
