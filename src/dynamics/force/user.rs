@@ -24,7 +24,7 @@ use std::cell::RefCell;
 /// ```
 /// use driftless::arithmetic::Scalar;
 /// use driftless::dynamics::force::{Force, Loads};
-/// use driftless::dynamics::row::Site;
+/// use driftless::Site;
 /// use driftless::dynamics::Configuration;
 ///
 /// /// Drag against the square of the speed, and a Duffing spring from the same point to the ground.
