@@ -33,6 +33,7 @@ mod drift;
 mod events;
 mod extremes;
 mod forces;
+mod formulas;
 mod gauss;
 mod identities;
 mod impact;

@@ -20,10 +20,14 @@ use crate::scene::{Override, Scene, Template, read_text, source_name};
 use std::sync::Arc;
 use std::time::Instant;
 
+/// The table of a run's events.
+const EVENTS: &str = "events.csv";
+
 /// Every file a run may leave; those of an earlier run in the same folder go with it.
 const FILES: &[&str] = &[
     TRAJECTORY,
     RECORD,
+    EVENTS,
     "mechanism.png",
     "angles.png",
     "energy_drift.png",
@@ -293,6 +297,9 @@ impl Task<'_> {
         }
         let hash = folder.keep(stream)?;
         flags.scene.remark(&format!("wrote {}", folder.path().join(TRAJECTORY).display()));
+        if report::events::has_any(mechanism) {
+            folder.write(EVENTS, report::events::table(mechanism, &outcome).as_bytes())?;
+        }
         draw(scene, mechanism, &outcome, folder, flags)?;
         let text = format!("{:#}\n", report::result::record(scene, mechanism, &outcome, &hash));
         folder.write(RECORD, text.as_bytes())?;

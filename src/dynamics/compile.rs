@@ -3,8 +3,11 @@
 
 mod parts;
 
+use super::Motion;
 use super::assembly::Assembly;
+use super::configuration::{Configuration, Values};
 use super::constraint::{self, ConstraintEquation, Site};
+use super::force::formula::Formulas;
 use super::force::{Action, Spring, Torsion, UserForce, Vibration};
 use super::forest::{BodyOrigin, Forest};
 use super::impact::Contact;
@@ -49,6 +52,11 @@ pub struct Mechanism {
     pub actions: Vec<Action>,
     /// Forces from outside the crate.
     pub forces: Vec<UserForce>,
+    /// The scene's formulas, and where they are recorded with other parameters or on other branches: the
+    /// first of `forces` are its laws, in their order.
+    pub(crate) laws: Option<Laws>,
+    /// The mechanism with the parts that do not act at the start, and their names; where there are any.
+    pub(crate) whole: Option<(Arc<Mechanism>, Vec<String>)>,
     /// Constraint equations: given angles, then points that coincide or stay on lines, then one per contact
     /// that is held.
     pub constraints: Vec<ConstraintEquation>,
@@ -73,6 +81,17 @@ pub struct Mechanism {
     pub assembly: Assembly,
     /// The constants of the recursive form, where that is the one evaluated.
     pub recursion: Option<Arc<Recursion>>,
+}
+
+/// Formulas of a scene with the parameters and on the branches they are recorded with.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Laws {
+    /// The formulas.
+    pub formulas: Arc<Formulas>,
+    /// Values of the parameters.
+    pub parameters: Vec<f64>,
+    /// Which conditions are positive.
+    pub modes: Vec<bool>,
 }
 
 /// A body of the mechanism.
@@ -234,6 +253,16 @@ impl Mechanism {
             })
             .collect();
         let gravity = Complex::new(scene.gravity[0], scene.gravity[1]);
+        let mut forces = forces;
+        let laws = match Formulas::of(scene, &forest)? {
+            None => None,
+            Some(formulas) => {
+                let (parameters, modes) =
+                    (formulas.parameters.clone(), vec![false; formulas.conditions.len()]);
+                forces.splice(0..0, formulas.record(&parameters, &modes)?);
+                Some(Laws { formulas: Arc::new(formulas), parameters, modes })
+            }
+        };
         let mut rows = given_angles(scene);
         let partition = CoordinatePartition::new(bodies.len(), n, &rows)?;
         let joints = joints(scene, &forest, &mut rows);
@@ -289,6 +318,8 @@ impl Mechanism {
             tree: constants(&bodies, &forest, gravity),
             actions: actions(scene, &forest),
             forces,
+            laws,
+            whole: None,
             bodies,
             forest,
             joints,
@@ -319,10 +350,46 @@ impl Mechanism {
         }
         mechanism.check_mass(scene)?;
         let start = mechanism.start(scene);
+        if let Some(laws) = mechanism.laws.clone() {
+            let modes = mechanism.seen(&start, |at| laws.formulas.modes(at, &laws.parameters));
+            mechanism = mechanism.on_branch(laws.parameters, modes)?;
+        }
         mechanism.energy_scale = mechanism.scale_of_energy(&start);
         mechanism.scale_contacts(&start);
         mechanism.units = Units::new(&mechanism, scene, &start);
+        if scene.inactive.is_empty() {
+            return Ok(mechanism);
+        }
+        let unknown =
+            |part| CompileError::Unsound(format!("inactive: no part that can be switched is `{part}`"));
+        let mut acting = mechanism.without(&scene.inactive).map_err(unknown)?;
+        acting.whole = Some((Arc::new(mechanism), scene.inactive.clone()));
+        Ok(acting)
+    }
+
+    /// The mechanism with its laws recorded anew, with these parameters and on these branches.
+    ///
+    /// # Errors
+    /// A potential that depends on time or rates on this branch.
+    pub(crate) fn on_branch(&self, parameters: Vec<f64>, modes: Vec<bool>) -> Result<Self, CompileError> {
+        let mut mechanism = self.clone();
+        if let Some(laws) = &mut mechanism.laws {
+            if (&laws.parameters, &laws.modes) != (&parameters, &modes) {
+                let recorded = laws.formulas.record(&parameters, &modes)?;
+                mechanism.forces.splice(..recorded.len(), recorded);
+                (laws.parameters, laws.modes) = (parameters, modes);
+            }
+        }
         Ok(mechanism)
+    }
+
+    /// Calls `then` with the configuration of a motion.
+    pub(crate) fn seen<R>(&self, motion: &Motion, then: impl FnOnce(&Configuration<f64>) -> R) -> R {
+        let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
+        let omega: Vec<f64> = motion.omega.iter().map(|omega| omega.hi).collect();
+        let z = self.elements(&phi);
+        let phi: Vec<f64> = (0..phi.len()).map(|k| motion.unwrapped(k)).collect();
+        then(&Configuration::new(&Values { time: motion.time.hi, phi: &phi, z: &z, omega: &omega }))
     }
 
     /// Finds the vibration of a rigid spring that the start gives energy to, and takes it out of the start:
@@ -471,6 +538,17 @@ impl Mechanism {
         );
         mechanism.choose_form();
         mechanism
+    }
+
+    /// Names of the scene's events.
+    pub fn event_names(&self) -> Vec<&str> {
+        let events = self.laws.as_ref().map_or(&[][..], |laws| &laws.formulas.events);
+        events.iter().map(|event| event.name.as_str()).collect()
+    }
+
+    /// True where laws have corners or events change what acts, so that steps end where a switch is.
+    pub fn is_switched(&self) -> bool {
+        self.laws.as_ref().is_some_and(|laws| laws.formulas.switches())
     }
 
     /// True where the scene has a damper, or a force from outside that depends on rates.

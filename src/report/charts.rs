@@ -13,7 +13,7 @@ use crate::report::curves::{between, furthest, is_coarse, smoothed, span};
 use crate::report::page::{figure, magnitude, rough};
 use crate::run::drift::Excursion;
 use crate::run::{Outcome, Sample};
-use crate::scene::{Place, Scene};
+use crate::scene::{Load, Place, Scene};
 use std::f64::consts::TAU;
 
 /// A chart of a run.
@@ -474,11 +474,8 @@ impl Finished<'_> {
         Sketch {
             gravity: self.scene.gravity,
             hinges: hinges.collect(),
-            springs: self
-                .scene
-                .springs
-                .iter()
-                .map(|spring| SpringSketch { ground: spring.between.map(|end| end.bar.is_none()) })
+            springs: (self.springs())
+                .map(|between| SpringSketch { ground: between.map(|end| end.bar.is_none()) })
                 .collect(),
             walls: self
                 .scene
@@ -507,7 +504,7 @@ impl Finished<'_> {
         Pose {
             bars: (bodies.iter().enumerate()).map(|(k, body)| body.ends.map(|end| on(k, end))).collect(),
             hinges: self.mechanism.joints.iter().map(at).collect(),
-            springs: self.scene.springs.iter().map(|spring| spring.between.each_ref().map(place)).collect(),
+            springs: self.springs().map(|between| between.each_ref().map(place)).collect(),
             motors: motors.collect(),
             arms: self.arms().map(|(bar, [from, to])| (bar, [on(bar, from), on(bar, to)])).collect(),
             sliders: (self.scene.sliders.iter())
@@ -525,12 +522,20 @@ impl Finished<'_> {
         }
     }
 
+    /// The ends of all springs, those by formulas last.
+    fn springs(&self) -> impl Iterator<Item = [Place; 2]> {
+        let laws = self.scene.laws.iter().filter_map(|law| match &law.load {
+            Load::Spring { between, .. } => Some(*between),
+            _ => None,
+        });
+        self.scene.springs.iter().map(|spring| spring.between).chain(laws)
+    }
+
     /// What joins the origin of a bar with its hinges and spring ends that lie off it, counted from its
     /// origin \[m\].
     fn arms(&self) -> impl Iterator<Item = (usize, [Complex<f64>; 2])> {
         let hinges = self.scene.hinges.iter().flat_map(|hinge| hinge.between);
-        let springs = self.scene.springs.iter().flat_map(|spring| spring.between);
-        hinges.chain(springs).filter_map(|place| {
+        hinges.chain(self.springs().flatten()).filter_map(|place| {
             let bar = place.bar?;
             let (length, [x, y]) = (self.scene.bars[bar].length, place.point);
             let is_off = y.abs() > 1e-3 * length || x < -1e-3 * length || x > 1.001 * length;

@@ -4,7 +4,7 @@ use super::page::{Page, figure};
 use crate::dynamics::Mechanism;
 use crate::dynamics::assembly::Assembly;
 use crate::run::{MethodId, Plan, Stabilization};
-use crate::scene::{Scene, Spring};
+use crate::scene::{Load, LoadLaw, Scene, Spring};
 use serde_json::{Value, json};
 
 /// The form of the equations that a plan integrates in.
@@ -20,7 +20,9 @@ pub fn form(mechanism: &Mechanism, plan: &Plan) -> &'static str {
 }
 
 /// What the scene does not need and the equations do not contain.
-fn left_out(mechanism: &Mechanism, plan: &Plan) -> Vec<&'static str> {
+fn left_out(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Vec<&'static str> {
+    let is_spring = |law: &LoadLaw| matches!(law.load, Load::Spring { .. });
+    let has_spring_law = scene.laws.iter().any(is_spring);
     let multipliers = !mechanism.constraints.is_empty()
         && (matches!(plan.method, MethodId::Rattle(_))
             || !matches!(plan.stabilization, Stabilization::Elimination));
@@ -29,7 +31,7 @@ fn left_out(mechanism: &Mechanism, plan: &Plan) -> Vec<&'static str> {
         (!mechanism.constraints.is_empty(), "motors"),
         (multipliers, "the solve for multipliers"),
         (plan.stabilization == Stabilization::Projection, "projection"),
-        (!mechanism.springs.is_empty(), "springs"),
+        (!mechanism.springs.is_empty() || has_spring_law, "springs"),
         (mechanism.is_damped(), "dampers"),
         (!mechanism.contacts.is_empty(), "impacts"),
         (mechanism.tree.off_axis, "off-axis couplings"),
@@ -45,7 +47,7 @@ fn left_out(mechanism: &Mechanism, plan: &Plan) -> Vec<&'static str> {
 /// The report as one JSON object.
 pub fn object(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Value {
     let names = |names: Vec<&str>| json!(names);
-    json!({
+    let mut object = json!({
         "scene": scene.name,
         "description": scene.description,
         "bodies": names(scene.bars.iter().map(|bar| bar.name.as_str()).collect()),
@@ -58,7 +60,7 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Value {
         "dampers": names(scene.springs.iter().filter(|spring| spring.damping != 0.0).map(|spring| spring.name.as_str()).collect()),
         "walls": names(scene.walls.iter().map(|wall| wall.name.as_str()).collect()),
         "off_axis": mechanism.tree.off_axis,
-        "left_out": left_out(mechanism, plan),
+        "left_out": left_out(scene, mechanism, plan),
         "energy_scale": mechanism.energy_scale,
         "form": form(mechanism, plan),
         "method": plan.method.info().name,
@@ -68,7 +70,13 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Value {
         "rows": plan.rows,
         "stiffness": plan.stiffness,
         "notes": plan.notes,
-    })
+    });
+    if !(scene.laws.is_empty() && scene.events.is_empty()) {
+        object["formulas"] = names(scene.laws.iter().map(|law| law.name.as_str()).collect());
+        object["events"] = names(scene.events.iter().map(|event| event.name.as_str()).collect());
+        object["switches"] = json!(mechanism.is_switched());
+    }
+    object
 }
 
 /// How the start was found, as one JSON object.
@@ -123,6 +131,18 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> String {
             scene.springs.iter().map(|spring| format!("{}{}", spring.name, kind(spring))).collect();
         page.entry("springs", &each.join(", "));
     }
+    if !scene.parameters.is_empty() {
+        page.entry("parameters", &list(&scene.parameters, |parameter| &parameter.name));
+    }
+    if !scene.laws.is_empty() {
+        page.entry("formulas", &list(&scene.laws, |law| &law.name));
+    }
+    if mechanism.is_switched() {
+        page.entry("", "with corners or parts that switch: steps end at every switch");
+    }
+    if !scene.events.is_empty() {
+        page.entry("events", &list(&scene.events, |event| &event.name));
+    }
     if !scene.walls.is_empty() {
         let each: Vec<String> = scene
             .walls
@@ -134,7 +154,7 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> String {
     if mechanism.tree.off_axis {
         page.entry("couplings", "off the bars' axes");
     }
-    let left_out = left_out(mechanism, plan);
+    let left_out = left_out(scene, mechanism, plan);
     page.entry(
         "left out",
         if left_out.is_empty() { "nothing".to_owned() } else { left_out.join(", ") }.as_str(),

@@ -25,6 +25,7 @@ pub mod check;
 pub mod compare;
 #[cfg(feature = "charts")]
 mod curves;
+pub mod events;
 mod inputs;
 #[doc(hidden)]
 pub mod inspect;

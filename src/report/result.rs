@@ -35,7 +35,7 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value 
     let holds = (!mechanism.contacts.is_empty())
         .then(|| json!({"count": outcome.persistent_contact_count, "time_s": outcome.persistent_contact_time, "first": outcome.holds}));
     let (trend, trend_error) = drift.energy.trend();
-    json!({
+    let mut object = json!({
         "scene": scene.name,
         "method": plan.method.info().name,
         "why": plan.why,
@@ -67,7 +67,11 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value 
         "stiffness": plan.stiffness,
         "notes": plan.notes,
         "stop": outcome.stop,
-    })
+    });
+    if let (Value::Object(members), Some(events)) = (&mut object, super::events::object(mechanism, outcome)) {
+        members.insert("events".to_owned(), events);
+    }
+    object
 }
 
 /// Angles, rates, centres of mass of all bodies at one moment.
@@ -217,6 +221,7 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
             );
         }
     }
+    super::events::describe(&mut page, mechanism, outcome);
     super::trust::describe(&mut page, mechanism, outcome);
     page.into_text()
 }

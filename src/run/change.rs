@@ -6,6 +6,7 @@ use super::contact::ContactDriver;
 use super::event::{Action, Change};
 use super::monitor::Monitor;
 use super::running::Outcome;
+use crate::dynamics::compile::Laws;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::{Mechanism, Motion};
 use crate::stepping::{Cause, StepError};
@@ -32,14 +33,26 @@ impl ContactDriver {
         let Some(events) = &mut self.events else { return Ok(()) };
         let Some((event, action)) = events.memory.pending.take() else { return Ok(()) };
         let name = events.name(event).to_owned();
+        let is_from_outside = events.is_from_outside(event);
         match action {
             Action::Record => Ok(()),
+            Action::Slide => Err(StepError {
+                cause: Cause::Sliding,
+                method: outcome.plan.method.to_string(),
+                t: self.motion().time.hi,
+                step: 0.0,
+                what: format!(
+                    "a formula of `{name}` changes its branch here, and on both branches the motion is driven back"
+                ),
+                hint: "sliding along such a surface is not integrated: let the law pass zero smoothly, as tanh(x/0.01) instead of sign(x)"
+                    .into(),
+            }),
             Action::Stop => {
                 self.ended_by = Some(name);
                 Ok(())
             }
             Action::Change(change) => {
-                if let Some(monitor) = monitor {
+                if let Some(monitor) = monitor.filter(|_| is_from_outside) {
                     monitor.end(&format!("event `{name}` changed the run, which nothing beside it follows"));
                 }
                 self.change(&name, change, outcome)
@@ -50,7 +63,7 @@ impl ContactDriver {
     fn change(
         &mut self,
         event: &str,
-        Change { motion, switches }: Change,
+        Change { motion, switches, parameters, flips }: Change,
         outcome: &mut Outcome,
     ) -> Result<(), StepError> {
         let refused = |contact_driver: &mut Self, what: String, hint: &str| StepError {
@@ -88,6 +101,26 @@ impl ContactDriver {
                 self.off.push(part);
             }
         }
+        if let Some(Laws { formulas, parameters: known, modes }) = &self.whole.laws {
+            let mut modes = modes.clone();
+            let moved = after.phi != before.phi || after.omega != before.omega;
+            let next = parameters.unwrap_or_else(|| known.clone());
+            if moved || next != *known {
+                modes = self.whole.seen(&after, |at| formulas.modes(at, &next));
+            } else if let Some(mode) = flips.and_then(|number| modes.get_mut(number)) {
+                *mode = !*mode;
+            }
+            match self.whole.on_branch(next, modes) {
+                Ok(whole) => self.whole = Arc::new(whole),
+                Err(error) => {
+                    return Err(refused(self, format!("cannot go on: {error}"), "look at that formula"));
+                }
+            }
+            if let Some(events) = &mut self.events {
+                events.exchange(Arc::clone(&self.whole));
+            }
+        }
+        self.changes += 1;
         let free = match self.whole.without(&self.off) {
             Ok(free) => Arc::new(free),
             Err(part) => {

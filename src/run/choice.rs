@@ -211,7 +211,11 @@ fn chosen(
     let is_eliminated = !has_rows || kept == Stabilization::Elimination;
     let fastest = stiffness.map_or(rate, |stiffness| stiffness.fastest.max(rate));
     let is_bearable = until * fastest / STEP <= MANY_STEPS;
-    let keeps = tolerance.is_none() && !mechanism.is_damped() && is_eliminated && is_bearable;
+    let keeps = tolerance.is_none()
+        && !mechanism.is_damped()
+        && !mechanism.is_switched()
+        && is_eliminated
+        && is_bearable;
     if request.prefer == Some(Prefer::Invariants) && keeps {
         return match n > FEW_COORDINATES {
             true => (

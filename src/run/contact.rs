@@ -98,6 +98,8 @@ pub(super) struct ContactDriverState {
     stabilizer: f64,
     /// Parts that do not act at the moment.
     off: Vec<String>,
+    /// Parameters of the scene's laws, and the branches they are on.
+    laws: Option<(Vec<f64>, Vec<bool>)>,
     /// What the detector of events remembers, where there is one.
     events: Option<Memory>,
 }
@@ -127,6 +129,8 @@ pub(super) struct ContactDriver {
     pub(super) events: Option<EventDetector>,
     /// What such a detector remembered, until there is one again.
     remembered: Option<Memory>,
+    /// How often an event has changed the motion, the parts that act or the branches of laws.
+    pub(super) changes: u64,
     /// The event that has ended the run.
     pub(super) ended_by: Option<String>,
     /// Energy stabilizers put in before the present driver \[J\].
@@ -138,14 +142,16 @@ pub(super) struct ContactDriver {
 impl ContactDriver {
     /// A run's beginning: whatever touches and moves into its wall is struck, and what is pressed is held.
     pub(super) fn new(mechanism: Arc<Mechanism>, driver: Box<dyn Driver>) -> Self {
+        let (whole, off) = mechanism.whole.clone().unwrap_or_else(|| (Arc::clone(&mechanism), Vec::new()));
         Self {
             sampler: Sampler::new(Arc::clone(&mechanism)),
-            whole: Arc::clone(&mechanism),
-            off: Vec::new(),
+            events: EventDetector::of_scene(&whole),
+            whole,
+            off,
             free: Arc::clone(&mechanism),
             mechanism,
             driver,
-            events: None,
+            changes: 0,
             remembered: None,
             ended_by: None,
             shown: Motion::default(),
@@ -162,6 +168,17 @@ impl ContactDriver {
     /// The mechanism with the contacts held at the moment.
     pub(super) fn holding(&self) -> &Arc<Mechanism> {
         &self.mechanism
+    }
+
+    /// The mechanism with the parts that act and on the branches its laws are on, without holds; `compiled`
+    /// where nothing was switched.
+    pub(super) fn acting(&self, compiled: &Arc<Mechanism>) -> Arc<Mechanism> {
+        if self.whole.laws.is_none() && self.off.is_empty() {
+            return Arc::clone(compiled);
+        }
+        let mut acting = Mechanism::clone(&self.free);
+        acting.whole = Some((Arc::clone(&self.whole), self.off.clone()));
+        Arc::new(acting)
     }
 
     /// The mechanism with all its parts and no holds.
@@ -205,6 +222,7 @@ impl ContactDriver {
             is_between: self.is_between,
             stabilizer: self.stabilizer,
             off: self.off.clone(),
+            laws: self.whole.laws.as_ref().map(|laws| (laws.parameters.clone(), laws.modes.clone())),
             events: self
                 .events
                 .as_ref()
@@ -244,9 +262,18 @@ impl ContactDriver {
             is_between,
             stabilizer,
             off,
+            laws,
             events,
         } = contact_state;
-        let whole = mechanism;
+        let mut whole = mechanism.whole.clone().map_or(mechanism, |(whole, _)| whole);
+        if let Some((parameters, modes)) = laws {
+            let sizes = whole.laws.as_ref().map(|laws| (laws.parameters.len(), laws.modes.len()));
+            if sizes != Some((parameters.len(), modes.len())) {
+                return Ok(None);
+            }
+            let Ok(branch) = whole.on_branch(parameters, modes) else { return Ok(None) };
+            whole = Arc::new(branch);
+        }
         let Ok(mechanism) = whole.without(&off).map(Arc::new) else { return Ok(None) };
         let known = |contact: usize| contact < mechanism.contacts.len();
         let once = contacts.iter().enumerate().all(|(i, contact)| !contacts[..i].contains(contact));
@@ -269,6 +296,10 @@ impl ContactDriver {
             contact_driver.mechanism = holding;
         }
         contact_driver.sampler.refer(reference);
+        if let (Some(detector), Some(memory)) = (&mut contact_driver.events, &events) {
+            detector.exchange(Arc::clone(&whole));
+            detector.restore(memory.clone());
+        }
         Ok(Some(Self {
             whole,
             off,

@@ -6,8 +6,10 @@
 //! polished on the dense output itself.
 
 use super::inside::{Inside, StepWatcher};
-use crate::dynamics::configuration::{Configuration, Values};
+use crate::dynamics::compile::Laws;
+use crate::dynamics::configuration::Configuration;
 use crate::dynamics::{Mechanism, Motion, Time};
+use crate::scene::Crossing;
 use crate::stepping::search::{Chebyshev, Curve, root};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -21,6 +23,8 @@ const HALVINGS: u32 = 4;
 const ROUNDS: usize = 6;
 /// Share of a step within which the event that began it does not happen again.
 const SAME: f64 = 1e-9;
+/// Share of the largest value within a step up to which a condition is at its zero where the step begins.
+const NO_VALUE: f64 = 1e-12;
 /// Events kept; more are counted.
 const KEPT: usize = 100_000;
 
@@ -98,6 +102,9 @@ pub enum Action {
     Record,
     /// The run ends here; its outcome is kept.
     Stop,
+    /// It cannot go on: the motion is driven back onto a condition of the scene's laws from both sides.
+    #[doc(hidden)]
+    Slide,
     /// The motion goes on changed.  Fixed-step methods refuse that: their steps would no longer end on the
     /// output times.
     Change(Change),
@@ -110,6 +117,10 @@ pub struct Change {
     pub(super) motion: Option<Motion>,
     /// Springs, torsion springs and forces by name, and whether they act from now on.
     pub(super) switches: Vec<(String, bool)>,
+    /// Values of the scene's parameters from now on, where they change.
+    pub(super) parameters: Option<Vec<f64>>,
+    /// The condition of the scene's laws that changes its sign.
+    pub(super) flips: Option<usize>,
 }
 
 impl Change {
@@ -152,11 +163,16 @@ pub(super) struct Memory {
     last: Option<(usize, Time)>,
     /// What is to be done at the end of the step.
     pub pending: Option<(usize, Action)>,
+    /// Conditions that changed sign last, and when.
+    flipped: Vec<(usize, Time)>,
 }
 
-/// Looks for the events of a run.
+/// Looks for the events of a run: those of the scene, those from outside, then the zeros of the conditions
+/// that choose the branches of the scene's laws.
 pub(super) struct EventDetector {
     events: Vec<Box<dyn Event>>,
+    /// The scene's formulas on their present branches.
+    laws: Option<Laws>,
     mechanism: Arc<Mechanism>,
     pub memory: Memory,
     /// Events since somebody last took them.
@@ -172,16 +188,53 @@ struct Passage {
 }
 
 impl EventDetector {
+    /// One for a mechanism with all its parts, with events from outside.
     pub fn new(mechanism: Arc<Mechanism>, events: Vec<Box<dyn Event>>) -> Self {
-        let memory = Memory { sides: vec![0; events.len()], ..Memory::default() };
-        Self { events, mechanism, memory, found: Vec::new(), count: 0 }
+        let laws = mechanism.laws.clone();
+        let mut detector =
+            Self { events, laws, mechanism, memory: Memory::default(), found: Vec::new(), count: 0 };
+        detector.memory.sides = vec![0; detector.functions()];
+        detector
+    }
+
+    /// One for what the scene itself asks for; `None` where that is nothing.
+    pub fn of_scene(mechanism: &Arc<Mechanism>) -> Option<Self> {
+        let detector = Self::new(Arc::clone(mechanism), Vec::new());
+        (detector.functions() > 0).then_some(detector)
+    }
+
+    /// How many events are the scene's.
+    fn of_the_scene(&self) -> usize {
+        self.laws.as_ref().map_or(0, |laws| laws.formulas.events.len())
+    }
+
+    /// The first number of a condition.
+    fn conditions_from(&self) -> usize {
+        self.of_the_scene() + self.events.len()
+    }
+
+    /// How many functions there are.
+    fn functions(&self) -> usize {
+        self.conditions_from() + self.laws.as_ref().map_or(0, |laws| laws.modes.len())
+    }
+
+    /// True for an event that is not the scene's own.
+    pub fn is_from_outside(&self, event: usize) -> bool {
+        (self.of_the_scene()..self.conditions_from()).contains(&event)
+    }
+
+    /// Goes on with the laws of a mechanism on their present branches.
+    pub fn exchange(&mut self, mechanism: Arc<Mechanism>) {
+        self.laws.clone_from(&mechanism.laws);
+        self.mechanism = mechanism;
     }
 
     /// Goes on with what another one remembered; false where that was one of other events.
     pub fn restore(&mut self, memory: Memory) -> bool {
-        let fits = memory.sides.len() == self.events.len()
-            && memory.last.is_none_or(|(event, _)| event < self.events.len())
-            && memory.pending.as_ref().is_none_or(|(event, _)| *event < self.events.len());
+        let functions = self.functions();
+        let fits = memory.sides.len() == functions
+            && memory.last.is_none_or(|(event, _)| event < functions)
+            && memory.pending.as_ref().is_none_or(|(event, _)| *event < functions);
         if fits {
             self.memory = memory;
         }
@@ -190,7 +243,61 @@ impl EventDetector {
 
     /// The name of an event.
     pub fn name(&self, event: usize) -> &str {
-        self.events[event].name()
+        let scene = self.of_the_scene();
+        match &self.laws {
+            Some(laws) if event < scene => &laws.formulas.events[event].name,
+            Some(laws) if event >= self.conditions_from() => {
+                &laws.formulas.conditions[event - self.conditions_from()]
+            }
+            _ => self.events[event - scene].name(),
+        }
+    }
+
+    /// Which passages of an event count; of a condition those that leave its present side.
+    fn counts(&self, event: usize, rises: bool) -> bool {
+        let direction = match &self.laws {
+            Some(laws) if event < self.of_the_scene() => match laws.formulas.events[event].direction {
+                Crossing::Either => Direction::Either,
+                Crossing::Rising => Direction::Rising,
+                Crossing::Falling => Direction::Falling,
+            },
+            Some(laws) if event >= self.conditions_from() => {
+                return laws.modes[event - self.conditions_from()] != rises;
+            }
+            _ => self.events[event - self.of_the_scene()].direction(),
+        };
+        match direction {
+            Direction::Either => true,
+            Direction::Rising => rises,
+            Direction::Falling => !rises,
+        }
+    }
+
+    /// What happens at an event.
+    fn action(&mut self, event: usize, motion: &Motion) -> Action {
+        let (scene, conditions) = (self.of_the_scene(), self.conditions_from());
+        let Self { events, mechanism, laws, .. } = self;
+        match laws {
+            Some(_) if event >= conditions => {
+                Action::Change(Change { flips: Some(event - conditions), ..Change::default() })
+            }
+            Some(laws) if event < scene => {
+                let said = &laws.formulas.events[event];
+                let after = mechanism.seen(motion, |at| laws.formulas.set_by(event, at, &laws.parameters));
+                let all = |parts: &[String], on: bool| parts.iter().map(|part| (part.clone(), on)).collect();
+                let switches: Vec<(String, bool)> = [all(&said.off, false), all(&said.on, true)]
+                    .into_iter()
+                    .flat_map(|all: Vec<_>| all)
+                    .collect();
+                let parameters = (after != laws.parameters).then_some(after);
+                match (said.stop, switches.is_empty() && parameters.is_none()) {
+                    (true, _) => Action::Stop,
+                    (false, true) => Action::Record,
+                    (false, false) => Action::Change(Change { switches, parameters, ..Change::default() }),
+                }
+            }
+            _ => mechanism.seen(motion, |at| events[event - scene].action(at, motion)),
+        }
     }
 
     /// Moves what was found to a list, which keeps so many; returns how many there were.
@@ -202,7 +309,17 @@ impl EventDetector {
 
     /// Values of all event functions at a motion.
     fn values(&self, motion: &Motion) -> Vec<f64> {
-        with(&self.mechanism, motion, |at| self.events.iter().map(|event| event.value(at)).collect())
+        self.mechanism.seen(motion, |at| {
+            let from_outside = self.events.iter().map(|event| event.value(at));
+            let Some(Laws { formulas, parameters, modes }) = &self.laws else {
+                return from_outside.collect();
+            };
+            (0..formulas.events.len())
+                .map(|event| formulas.event_value(event, at, parameters))
+                .chain(from_outside)
+                .chain(formulas.condition_values(at, parameters, modes))
+                .collect()
+        })
     }
 
     /// Passages in a part of a step, in no order.
@@ -219,7 +336,7 @@ impl EventDetector {
         for degree in DEGREES {
             let nodes: Vec<Vec<f64>> =
                 Chebyshev::nodes(degree).map(|node| self.values(inside.at(begin + node * span))).collect();
-            curves = (0..self.events.len())
+            curves = (0..self.functions())
                 .map(|event| {
                     Chebyshev::through(&nodes.iter().map(|values| values[event]).collect::<Vec<_>>())
                 })
@@ -239,8 +356,17 @@ impl EventDetector {
         for (event, curve) in curves.iter().enumerate() {
             let sign = |value: f64| if value > 0.0 { 1 } else { -i8::from(value < 0.0) };
             let [first, next] = [nearest[0][event], nearest[1][event]];
+            let condition = event.checked_sub(self.conditions_from());
+            let mode = condition.zip(self.laws.as_ref()).map(|(number, laws)| laws.modes[number]);
+            if let Some(mode) = mode {
+                // It lies on the side its laws are recorded for, and leaves it at once where it turns away.
+                let is_at_zero = first.abs() <= NO_VALUE * curve.most();
+                if is_at_zero && sign(next) == if mode { -1 } else { 1 } {
+                    all.push(Passage { t: begin, event, rises: !mode });
+                }
+            }
             let side = &mut self.memory.sides[event];
-            if first == 0.0 && *side != 0 && sign(next) == -*side {
+            if mode.is_none() && first == 0.0 && *side != 0 && sign(next) == -*side {
                 all.push(Passage { t: begin, event, rises: *side < 0 });
             }
             *side = if first == 0.0 || self.memory.last == Some((event, begin)) {
@@ -297,37 +423,40 @@ impl StepWatcher for EventDetector {
     fn step(&mut self, inside: &mut dyn Inside) -> Option<Time> {
         let (begin, end) = inside.span();
         let span = (end - begin).hi;
-        if span <= 0.0 || self.events.is_empty() {
+        if span <= 0.0 || self.functions() == 0 {
             return None;
         }
         let mut passages = Vec::new();
         self.passages(inside, begin, span, 0, &mut passages);
         passages.sort_by(|a, b| (a.t - b.t).hi.total_cmp(&0.0).then(a.event.cmp(&b.event)));
         for Passage { t, event, rises } in passages {
-            let counts = match self.events[event].direction() {
-                Direction::Either => true,
-                Direction::Rising => rises,
-                Direction::Falling => !rises,
-            };
+            let is_condition = event >= self.conditions_from();
             let is_same = self
                 .memory
                 .last
                 .is_some_and(|(last, before)| last == event && (t - before).hi <= SAME * span);
-            if !counts || is_same {
+            if !self.counts(event, rises) || is_same && !is_condition {
                 continue;
             }
-            let t = self.polished(inside, event, t);
+            let t = if t > begin { self.polished(inside, event, t) } else { t };
             let motion = inside.at(t).clone();
             self.memory.last = Some((event, t));
+            if is_condition {
+                self.memory.flipped.retain(|(_, before)| (t - *before).hi <= SAME * span);
+                let slides = self.memory.flipped.iter().any(|(flipped, _)| *flipped == event);
+                self.memory.flipped.push((event, t));
+                let action = if slides { Action::Slide } else { self.action(event, &motion) };
+                self.memory.pending = Some((event, action));
+                return Some(t);
+            }
             self.count += 1;
             self.found.push(EventRecord {
-                name: self.events[event].name().into(),
+                name: self.name(event).into(),
                 t: t.hi,
                 phi: (0..motion.phi.len()).map(|k| motion.unwrapped(k)).collect(),
                 omega: motion.omega.iter().map(|omega| omega.hi).collect(),
             });
-            let Self { events, mechanism, .. } = self;
-            let action = with(mechanism, &motion, |at| events[event].action(at, &motion));
+            let action = self.action(event, &motion);
             if action != Action::Record {
                 self.memory.pending = Some((event, action));
                 return Some(t);
@@ -335,13 +464,4 @@ impl StepWatcher for EventDetector {
         }
         None
     }
-}
-
-/// Calls `then` with the configuration of a motion.
-fn with<R>(mechanism: &Mechanism, motion: &Motion, then: impl FnOnce(&Configuration<f64>) -> R) -> R {
-    let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
-    let omega: Vec<f64> = motion.omega.iter().map(|omega| omega.hi).collect();
-    let z = mechanism.elements(&phi);
-    let phi: Vec<f64> = (0..phi.len()).map(|k| motion.unwrapped(k)).collect();
-    then(&Configuration::new(&Values { time: motion.time.hi, phi: &phi, z: &z, omega: &omega }))
 }

@@ -358,9 +358,10 @@ impl Running {
         let Run { mechanism, plan, limits, driver, turns, ensemble, error_estimator, events, clock, begun } =
             run;
         let mut outcome = Outcome::begun(&mechanism, plan);
-        let detector = (!events.is_empty()).then(|| EventDetector::new(Arc::clone(&mechanism), events));
         let mut contact_driver = ContactDriver::new(mechanism, driver);
-        contact_driver.events = detector;
+        if !events.is_empty() {
+            contact_driver.events = Some(EventDetector::new(Arc::clone(contact_driver.whole()), events));
+        }
         contact_driver.flips = ensemble.map(|_| FlipDetector::default());
         // The reference of the energy is what impacts at the start leave.
         let resting = contact_driver.meet(&mut outcome).err();

@@ -74,6 +74,12 @@ impl Span {
     pub fn first(self) -> Self {
         Self { end: self.end.min(self.start + 1), ..self }
     }
+
+    /// The value in quotes without them, as long as no escapes are in it: bytes `from` to `to` of that.
+    fn inside(self, from: usize, to: usize) -> Self {
+        let at = |byte: usize| (self.start + 1).saturating_add(byte as u32).min(self.end.saturating_sub(1));
+        Self { start: at(from).max(self.start), end: at(to.max(from + 1)).max(self.start + 1), ..self }
+    }
 }
 
 impl Source {
@@ -126,6 +132,15 @@ impl Source {
     pub fn written(&self, span: Span) -> String {
         let json = &self.texts[span.text as usize].json;
         clipped(json.get(span.start as usize..span.end as usize).unwrap_or(""))
+    }
+
+    /// Bytes `from` to `to` of the text that stands in quotes at `span`; all of it where escapes are in it.
+    pub fn inside(&self, span: Span, from: usize, to: usize) -> Span {
+        let json = &self.texts[span.text as usize].json;
+        let is_plain = json
+            .get(span.start as usize..span.end as usize)
+            .is_some_and(|text| text.starts_with('"') && !text.contains('\\'));
+        if is_plain { span.inside(from, to) } else { span }
     }
 
     /// The number of the text of `span`, its bytes as written, and whether they are all of that text.

@@ -9,6 +9,8 @@ mod digits;
 mod error;
 mod fit;
 mod format;
+pub mod formula;
+mod law;
 mod locate;
 mod number;
 #[doc(hidden)]
@@ -23,6 +25,7 @@ mod write;
 pub use build::{SceneBuilder, ground, on};
 pub use digits::Written;
 pub use error::{Refusal, SceneError};
+pub use law::{Bound, Crossing, Load, LoadLaw, Meaning, NamedPoint, Names, Parameter, SceneEvent, Signal};
 pub use number::number;
 pub use read::{parse_scene, read_scene, read_text, source_name};
 pub use schema::schema;
@@ -76,6 +79,24 @@ pub struct Scene {
     pub drives: Vec<Drive>,
     /// Walls a point cannot pass.
     pub walls: Vec<Wall>,
+    /// Numbers with names, for formulas.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub parameters: Vec<Parameter>,
+    /// Places with names, for formulas.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub points: Vec<NamedPoint>,
+    /// Formulas with names, each of those before it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub signals: Vec<Signal>,
+    /// Forces, torques and springs by formulas.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub laws: Vec<LoadLaw>,
+    /// Events.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub events: Vec<SceneEvent>,
+    /// Parts that do not act until an event switches them on, by name.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub inactive: Vec<String>,
     /// Angle and rate of each bar at t = 0, in the order of `bars`; agrees with the motors.
     pub start: Vec<Start>,
     /// What the scene says of it, the rest of which is found when the scene is compiled; of bars beyond the

@@ -1,6 +1,7 @@
 //! The JSON Schema of scene files, from the same tables that the reader uses.
 
 use super::format::{LONGEST_NAME, LONGEST_TEXT, PLACE, Quantity, SCENE, Shape, Table};
+use super::formula::LONGEST;
 use serde_json::{Map, Value, json};
 
 /// The JSON Schema (draft 2020-12) of scene files, with units, ranges and examples.
@@ -42,7 +43,12 @@ fn object(table: &Table) -> Value {
 
 fn described(about: &str, shape: &Shape) -> String {
     match shape {
-        Shape::Number(quantity) | Shape::Pair(quantity) | Shape::Inertia(quantity)
+        Shape::Number(quantity)
+        | Shape::Pair(quantity)
+        | Shape::Inertia(quantity)
+        | Shape::LawNumber(quantity)
+        | Shape::LawPair(quantity)
+        | Shape::Formula(quantity)
             if !quantity.unit.is_empty() =>
         {
             format!("{about} [{}]", quantity.unit)
@@ -53,10 +59,19 @@ fn described(about: &str, shape: &Shape) -> String {
 
 fn shape(of: &Shape) -> Value {
     match of {
-        Shape::Number(quantity) => number(quantity),
-        Shape::Pair(quantity) => {
+        Shape::Number(quantity) | Shape::LawNumber(quantity) => number(quantity),
+        Shape::Pair(quantity) | Shape::LawPair(quantity) => {
             json!({"type": "array", "items": number(quantity), "minItems": 2, "maxItems": 2})
         }
+        Shape::Formula(_) => formula(),
+        Shape::Parameters => {
+            let number = json!({"anyOf": [{"type": "number"}, formula()]});
+            json!({"type": "object", "propertyNames": identifier(), "additionalProperties": number})
+        }
+        Shape::Signals => {
+            json!({"type": "object", "propertyNames": identifier(), "additionalProperties": formula()})
+        }
+        Shape::Names => json!({"type": "array", "items": shape(&Shape::Name)}),
         Shape::Name => json!({"type": "string", "pattern": format!("^[A-Za-z0-9_-]{{1,{LONGEST_NAME}}}$")}),
         Shape::FolderName => {
             json!({"type": "string", "pattern": format!("^[A-Za-z0-9_][A-Za-z0-9_-]{{0,{}}}$", LONGEST_NAME - 1)})
@@ -85,6 +100,15 @@ fn shape(of: &Shape) -> Value {
     }
 }
 
+/// A number, or a formula that comes to one.
 fn number(quantity: &Quantity) -> Value {
-    json!({"type": "number", "minimum": quantity.least, "maximum": quantity.most})
+    json!({"anyOf": [{"type": "number", "minimum": quantity.least, "maximum": quantity.most}, formula()]})
+}
+
+fn formula() -> Value {
+    json!({"type": "string", "minLength": 1, "maxLength": LONGEST})
+}
+
+fn identifier() -> Value {
+    json!({"type": "string", "pattern": format!("^[A-Za-z_][A-Za-z0-9_]{{0,{}}}$", LONGEST_NAME - 1)})
 }

@@ -43,7 +43,7 @@ pub enum StartValue {
 }
 
 /// The lists whose elements can be meant by their name alone, and what their paths begin with.
-const LISTS: [&str; 11] = [
+const LISTS: [&str; 14] = [
     "bars",
     "hinges",
     "sliders",
@@ -55,6 +55,9 @@ const LISTS: [&str; 11] = [
     "torques",
     "motors",
     "walls",
+    "points",
+    "potentials",
+    "events",
 ];
 
 impl Template {
@@ -137,7 +140,8 @@ impl Template {
         let alone = scene.motors.is_empty()
             && scene.locks.is_empty()
             && scene.springs.is_empty()
-            && scene.walls.is_empty();
+            && scene.walls.is_empty()
+            && scene.laws.is_empty();
         let alone = alone && scene.has_whole_start();
         Ok(scene.bars.iter().position(|known| known.name == bar).filter(|_| alone).map(|bar| (bar, value)))
     }
@@ -150,6 +154,9 @@ pub(super) fn whole(short: &str, tree: &Node) -> Result<String, String> {
         return Ok(short.to_owned());
     }
     let rest = short[first.len()..].trim_start_matches('.');
+    if rest.is_empty() && member(tree, "parameters").and_then(|all| member(all, first)).is_some() {
+        return Ok(format!("parameters.{first}"));
+    }
     if rest.is_empty() {
         return Err("go on with a key, as in bar1.phi".to_owned());
     }
@@ -216,8 +223,15 @@ impl Walk<'_> {
                 ));
             }
             match (&field.shape, steps.peek()) {
-                (Shape::Number(quantity) | Shape::Inertia(quantity), None) => return Ok(quantity.unit),
-                (Shape::Pair(quantity), Some(Step::Index(0 | 1))) => {
+                (Shape::Number(quantity) | Shape::LawNumber(quantity) | Shape::Inertia(quantity), None) => {
+                    return Ok(quantity.unit);
+                }
+                (Shape::Parameters, Some(Step::Key(name))) => {
+                    element_by_key(node, name, &mut walked)?;
+                    steps.next();
+                    return if steps.next().is_none() { Ok("") } else { Err(no_number(&walked, table)) };
+                }
+                (Shape::Pair(quantity) | Shape::LawPair(quantity), Some(Step::Index(0 | 1))) => {
                     steps.next();
                     return if steps.next().is_none() {
                         Ok(quantity.unit)
@@ -255,7 +269,7 @@ fn no_number(walked: &str, table: &Table) -> (String, String) {
 /// What is wrong with a path that ends too early or too late at a field.
 fn example(walked: &str, field: &Field) -> (String, String) {
     let hint = match &field.shape {
-        Shape::Pair(_) => format!("{walked}[0] or {walked}[1]"),
+        Shape::Pair(_) | Shape::LawPair(_) => format!("{walked}[0] or {walked}[1]"),
         Shape::Object(table) | Shape::ByBar(table) => {
             format!("go on, in the end with one of {}", table.keys())
         }

@@ -2,7 +2,7 @@
 
 use super::fit::written_starts;
 use super::format::GROUND;
-use super::{Force, Given, Place, Scene, Slider, Torque};
+use super::{Force, Given, Load, LoadLaw, NamedPoint, Place, Scene, SceneEvent, Slider, Torque};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
@@ -93,7 +93,7 @@ impl Scene {
                 })
             })
             .collect();
-        json!({
+        let mut said = json!({
             "name": self.name,
             "description": self.description,
             "gravity": self.gravity,
@@ -111,7 +111,62 @@ impl Scene {
             "start": self.start_as_given(),
             "until": self.until,
             "every": self.every,
-        })
+        });
+        self.add_formulas(&mut said, &place, &body);
+        said
+    }
+
+    /// Adds what is said in formulas, where there is any.
+    fn add_formulas<'a>(
+        &'a self,
+        said: &mut Value,
+        place: &impl Fn(&'a Place) -> Value,
+        body: &impl Fn(Option<usize>) -> &'a str,
+    ) {
+        let Value::Object(scene) = said else { return };
+        let mut put = |key: &str, value: Value, is_any: bool| {
+            if is_any {
+                scene.insert(key.to_owned(), value);
+            }
+        };
+        let parameters: Map<String, Value> =
+            self.parameters.iter().map(|one| (one.name.clone(), json!(one.value))).collect();
+        put("parameters", Value::Object(parameters), !self.parameters.is_empty());
+        let points: Vec<Value> = (self.points.iter())
+            .map(|NamedPoint { name, place }| json!({"name": name, "body": body(place.bar), "point": place.point}))
+            .collect();
+        put("points", points.into(), !self.points.is_empty());
+        let signals: Map<String, Value> =
+            self.signals.iter().map(|one| (one.name.clone(), json!(one.formula))).collect();
+        put("signals", Value::Object(signals), !self.signals.is_empty());
+        put("events", self.events.iter().map(event).collect::<Vec<_>>().into(), !self.events.is_empty());
+        put("inactive", json!(self.inactive), !self.inactive.is_empty());
+        for LoadLaw { name, load } in &self.laws {
+            let (list, law) = match load {
+                Load::Force { bar, point, force, follows } => {
+                    let frame = if *follows { "body" } else { "ground" };
+                    let law = json!({"name": name, "body": body(Some(*bar)), "point": point, "force": force, "frame": frame});
+                    ("forces", law)
+                }
+                Load::Torque { bar, relative_to, torque } => {
+                    let law = json!({"name": name, "body": body(Some(*bar)), "relative_to": body(*relative_to), "torque": torque});
+                    ("torques", law)
+                }
+                Load::Spring { between, potential, tension } => {
+                    let law = json!({"name": name, "between": between.each_ref().map(place)});
+                    ("springs", with(with(law, "potential", potential), "tension", tension))
+                }
+                Load::TorsionSpring { bar, relative_to, potential, torque } => {
+                    let law =
+                        json!({"name": name, "body": body(Some(*bar)), "relative_to": body(*relative_to)});
+                    ("torsion_springs", with(with(law, "potential", potential), "torque", torque))
+                }
+                Load::Potential { energy } => ("potentials", json!({"name": name, "energy": energy})),
+            };
+            if let Value::Array(all) = scene.entry(list).or_insert_with(|| json!([])) {
+                all.push(law);
+            }
+        }
     }
 
     /// What of the start must be written so that all of it reads back to the same bits, by bar name.
@@ -129,6 +184,17 @@ impl Scene {
         });
         entries.filter(|(_, entry)| *entry != json!({})).collect()
     }
+}
+
+/// An event, with what is not its default.
+fn event(event: &SceneEvent) -> Value {
+    let SceneEvent { name, when, direction, stop, on, off, set } = event;
+    let set: Map<String, Value> = set.iter().map(|(name, formula)| (name.clone(), json!(formula))).collect();
+    let said = json!({"name": name, "when": when, "direction": direction});
+    let said = with(said, "action", &stop.then_some("stop"));
+    let said =
+        with(with(said, "on", &(!on.is_empty()).then_some(on)), "off", &(!off.is_empty()).then_some(off));
+    with(said, "set", &(!set.is_empty()).then_some(set))
 }
 
 /// An object with one key more, where that has a value.

@@ -286,6 +286,8 @@ pub enum Cause {
     BranchLost,
     /// A spring with a free length lost its length, and its force its direction.
     SpringWithoutLength,
+    /// A law with corners drives the motion back onto a corner from both sides.
+    Sliding,
     /// A point came to rest on a wall, and it could not be held there or the motors leave it no freedom.
     RestingContact,
     /// A point was found behind a wall, or away from the wall it is held at: an impact was missed.
@@ -311,6 +313,7 @@ impl Cause {
             Self::ProjectionFailed => "projection_failed",
             Self::BranchLost => "branch_lost",
             Self::SpringWithoutLength => "spring_without_length",
+            Self::Sliding => "sliding",
             Self::RestingContact => "resting_contact",
             Self::WallPassed => "wall_passed",
             Self::ImpactCheckFailed => "impact_check_failed",

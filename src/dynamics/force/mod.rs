@@ -1,6 +1,7 @@
 //! Applied forces, one file a kind.
 
 pub mod action;
+pub(crate) mod formula;
 pub mod spring;
 pub mod torsion;
 pub mod user;

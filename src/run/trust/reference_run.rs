@@ -112,6 +112,7 @@ impl ReferenceRun {
     /// Why it cannot.
     pub(super) fn change(&mut self, mechanism: &Arc<Mechanism>, mut series: Plan) -> Result<(), String> {
         let motion = self.motion.clone();
+        let mechanism = &self.contact_driver.acting(mechanism);
         (self.contact_driver, self.outcome) = contact_driver(mechanism, &mut series, &motion)?;
         self.contact_driver.jumps = self.tangent.is_some().then(Vec::new);
         (self.is_rounded, self.begun, self.last) =
@@ -220,6 +221,10 @@ impl ReferenceRun {
             return Err(None);
         }
         self.contact_driver.look(&mut self.motion);
+        if self.tangent.is_some() && self.contact_driver.changes > 0 {
+            self.no_growth = Some("an event switched a law or a part, which is not followed".into());
+            self.end_flow();
+        }
         if let (Some(tangent), Some(jumps)) = (&mut self.tangent, &mut self.contact_driver.jumps) {
             tangent.jump(&std::mem::take(jumps));
         }

@@ -35,6 +35,18 @@ pub(super) enum Shape {
     Number(Quantity),
     /// Two numbers, x and y.
     Pair(Quantity),
+    /// A number, or a formula of time and state.
+    LawNumber(Quantity),
+    /// Two of them, x and y.
+    LawPair(Quantity),
+    /// A formula of time and state.
+    Formula(Quantity),
+    /// Numbers by name, or formulas of one another.
+    Parameters,
+    /// Formulas of time and state by name.
+    Signals,
+    /// Names of parts.
+    Names,
     /// A name: 1 to 64 letters, digits, `-`, `_`.
     Name,
     /// The name of the scene, which also names a folder.
@@ -153,6 +165,13 @@ impl Shape {
         match self {
             Self::Number(quantity) => format!("must be a number {quantity}"),
             Self::Pair(quantity) => format!("must be two numbers [x, y], each {quantity}"),
+            Self::LawNumber(quantity) => format!("must be a number {quantity}, or a formula"),
+            Self::LawPair(quantity) => format!("must be two numbers [x, y], each {quantity}, or formulas"),
+            Self::Formula(quantity) if quantity.unit.is_empty() => "must be a formula in quotes".to_owned(),
+            Self::Formula(quantity) => format!("must be a formula in quotes that comes to {}", quantity.unit),
+            Self::Parameters => "must be {name: number, or formula of other parameters in quotes}".to_owned(),
+            Self::Signals => "must be {name: formula in quotes}".to_owned(),
+            Self::Names => "must be a list of names of parts".to_owned(),
             Self::Name => format!("must be a name: 1 to {LONGEST_NAME} letters, digits, - or _"),
             Self::FolderName => {
                 format!("must be a name: 1 to {LONGEST_NAME} letters, digits, - or _, not starting with -")

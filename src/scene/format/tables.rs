@@ -38,10 +38,33 @@ pub(in crate::scene) static SCENE: Table = Table {
         ),
         optional("welds", any_number_of(&[&WELD]), "[…]", "Bodies that are one; none if absent."),
         optional("locks", any_number_of(&[&LOCK]), "[…]", "Angles that stay as they are; none if absent."),
-        optional("springs", any_number_of(&[&SPRING]), "[…]", "Springs and dampers; none if absent."),
+        optional(
+            "parameters",
+            Shape::Parameters,
+            "{\"l\": 0.6, \"half\": \"l/2\"}",
+            "Numbers by name, for formulas in the place of any number of the scene; none if absent.",
+        ),
+        optional(
+            "points",
+            any_number_of(&[&NAMED_POINT]),
+            "[…]",
+            "Points by name, for formulas: `tip` makes tip.x, tip.y, tip.vx, tip.vy known; none if absent.",
+        ),
+        optional(
+            "signals",
+            Shape::Signals,
+            "{\"speed\": \"sqrt(tip.vx^2 + tip.vy^2)\"}",
+            "Formulas of time and state by name, each may use those before it; none if absent.",
+        ),
+        optional(
+            "springs",
+            any_number_of(&[&SPRING, &SPRING_BY_TENSION, &SPRING_BY_POTENTIAL]),
+            "[…]",
+            "Springs and dampers; none if absent.",
+        ),
         optional(
             "torsion_springs",
-            any_number_of(&[&TORSION_SPRING]),
+            any_number_of(&[&TORSION_SPRING, &TORSION_SPRING_BY_TORQUE, &TORSION_SPRING_BY_POTENTIAL]),
             "[…]",
             "Springs and dampers between angles; none if absent.",
         ),
@@ -54,6 +77,24 @@ pub(in crate::scene) static SCENE: Table = Table {
             "Prescribed angles, and prescribed travels of sliders; none if absent.",
         ),
         optional("walls", any_number_of(&[&WALL]), "[…]", "Lines that points cannot pass; none if absent."),
+        optional(
+            "potentials",
+            any_number_of(&[&POTENTIAL]),
+            "[…]",
+            "Potential energies as formulas of angles and positions; none if absent.",
+        ),
+        optional(
+            "events",
+            any_number_of(&[&EVENT]),
+            "[…]",
+            "What is recorded, stops the run or switches parts where a formula is zero; none if absent.",
+        ),
+        optional(
+            "inactive",
+            Shape::Names,
+            "[\"latch\"]",
+            "Springs, torsion springs, forces, torques and potentials that do not act until an event switches them on; none if absent.",
+        ),
         optional(
             "start",
             Shape::ByBar(&START),
@@ -243,6 +284,125 @@ pub(in crate::scene) static SPRING: Table = Table {
     ],
 };
 
+/// A spring by the force it exerts.
+pub(in crate::scene) static SPRING_BY_TENSION: Table = Table {
+    title: "a spring with a law of its force",
+    about: "A spring or damper whose force is a formula, in which `length` and `rate` are its own.",
+    fields: &[
+        required("name", Shape::Name, "\"spring\"", "Name, unique among springs."),
+        required("between", Shape::Between, PLACES, "Its two ends, on different bodies."),
+        required("tension", Shape::Formula(signed("N")), "\"k*(length - l0) + 0.1*rate\"", TENSION),
+    ],
+};
+
+const TENSION: &str =
+    "Force that pulls the ends together, negative where it pushes; its work is accounted for.";
+
+/// A spring by its energy.
+pub(in crate::scene) static SPRING_BY_POTENTIAL: Table = Table {
+    title: "a spring with a law of its energy",
+    about: "A spring whose energy is a formula of its `length`; what a formula of `tension` adds does work.",
+    fields: &[
+        required("name", Shape::Name, "\"spring\"", "Name, unique among springs."),
+        required("between", Shape::Between, PLACES, "Its two ends, on different bodies."),
+        required("potential", Shape::Formula(signed("J")), "\"k*(length - l0)^2/2\"", "Energy stored."),
+        optional("tension", Shape::Formula(signed("N")), "\"0.1*rate\"", "Force beside; none if absent."),
+    ],
+};
+
+/// A torsion spring by the torque it exerts.
+pub(in crate::scene) static TORSION_SPRING_BY_TORQUE: Table = Table {
+    title: "a torsion spring with a law of its torque",
+    about: "A torsion spring or damper whose torque is a formula, in which `angle` and `rate` are its own.",
+    fields: &[
+        required("name", Shape::Name, "\"coil\"", "Name, unique among torsion springs."),
+        required("body", Shape::Body { ground: false }, "\"bar1\"", "The bar."),
+        optional("relative_to", Shape::Body { ground: true }, "\"bar2\"", MEASURED_FROM),
+        required("torque", Shape::Formula(signed("N·m")), "\"k*angle^3 + 0.01*rate\"", TURNS_BACK),
+    ],
+};
+
+const TURNS_BACK: &str = "Torque that turns the bar back, against growing angles; its work is accounted for.";
+
+/// A torsion spring by its energy.
+pub(in crate::scene) static TORSION_SPRING_BY_POTENTIAL: Table = Table {
+    title: "a torsion spring with a law of its energy",
+    about: "A torsion spring whose energy is a formula of its `angle`; what a formula of `torque` adds does work.",
+    fields: &[
+        required("name", Shape::Name, "\"coil\"", "Name, unique among torsion springs."),
+        required("body", Shape::Body { ground: false }, "\"bar1\"", "The bar."),
+        optional("relative_to", Shape::Body { ground: true }, "\"bar2\"", MEASURED_FROM),
+        required("potential", Shape::Formula(signed("J")), "\"k*angle^4/4\"", "Energy stored."),
+        optional("torque", Shape::Formula(signed("N·m")), "\"0.01*rate\"", "Torque beside; none if absent."),
+    ],
+};
+
+/// A point with a name.
+pub(in crate::scene) static NAMED_POINT: Table = Table {
+    title: "a point with a name",
+    about: "A point of a bar or of the ground that formulas can speak of.",
+    fields: &[
+        required("name", Shape::Name, "\"tip\"", "Name, unique among points."),
+        required("body", Shape::Body { ground: true }, "\"bar1\"", "Name of a bar, or \"ground\"."),
+        required(
+            "point",
+            Shape::Pair(signed("m")),
+            "[0.6, 0]",
+            "Coordinates in the bar's frame, or in the world's for the ground.",
+        ),
+    ],
+};
+
+/// A potential.
+pub(in crate::scene) static POTENTIAL: Table = Table {
+    title: "a potential",
+    about: "A potential energy as a formula of angles and positions; its gradient acts on the bars.",
+    fields: &[
+        required("name", Shape::Name, "\"field\"", "Name, unique among potentials."),
+        required("energy", Shape::Formula(signed("J")), "\"-G*m1*m2/distance\"", "The energy."),
+    ],
+};
+
+/// An event.
+pub(in crate::scene) static EVENT: Table = Table {
+    title: "an event",
+    about: "Where a formula of time and state passes zero; it is recorded, and may end the run or switch parts.",
+    fields: &[
+        required("name", Shape::Name, "\"upright\"", "Name, unique among events."),
+        required(
+            "when",
+            Shape::Formula(signed("")),
+            "\"bar1.sin\"",
+            "The event function: its zeros are the event.",
+        ),
+        optional(
+            "direction",
+            Shape::Word(&["either", "rising", "falling"]),
+            "\"rising\"",
+            "Which zeros count: \"rising\" from negative to positive, \"falling\" the others; \"either\" if absent.",
+        ),
+        optional(
+            "action",
+            Shape::Word(&["record", "stop"]),
+            "\"stop\"",
+            "\"stop\" ends the run there; \"record\" if absent.",
+        ),
+        optional("on", Shape::Names, "[\"latch\"]", "Parts that act from then on; none if absent."),
+        optional(
+            "off",
+            Shape::Names,
+            "[\"motor_torque\"]",
+            "Parts that act no longer from then on; none if absent.",
+        ),
+        optional(
+            "set",
+            Shape::Signals,
+            "{\"gain\": \"2*gain\"}",
+            "Parameters that have another value in formulas of time and state from then on; none if absent.",
+        ),
+    ],
+};
+
 /// A torsion spring.
 pub(in crate::scene) static TORSION_SPRING: Table = Table {
     title: "a torsion spring",
@@ -265,7 +425,12 @@ pub(in crate::scene) static FORCE: Table = Table {
         required("name", Shape::Name, "\"push\"", "Name, unique among forces."),
         required("body", Shape::Body { ground: false }, "\"bar1\"", "The bar."),
         required("point", Shape::Pair(signed("m")), "[0.6, 0]", "The point of the bar, in its frame."),
-        required("force", Shape::Pair(signed("N")), "[0, 1.5]", "The force."),
+        required(
+            "force",
+            Shape::LawPair(signed("N")),
+            "[0, 1.5]",
+            "The force; its components may be formulas.",
+        ),
         optional(
             "frame",
             Shape::Word(&["ground", "body"]),
@@ -294,7 +459,7 @@ pub(in crate::scene) static TORQUE: Table = Table {
             "\"bar2\"",
             "The bar that takes the opposite torque; the ground if absent.",
         ),
-        required("torque", Shape::Number(signed("N·m")), "0.033", "The torque."),
+        required("torque", Shape::LawNumber(signed("N·m")), "0.033", "The torque; it may be a formula."),
         optional(
             "law",
             Shape::Object(&FACTOR_LAW),

@@ -4,7 +4,6 @@
 use crate::scene::error::SceneError;
 use crate::scene::format::{Field, LONGEST_NAME, LONGEST_TEXT, Quantity, Shape, Table, about};
 use crate::scene::locate::{Member, Node, Source, Span, Value, clipped, push_index, push_key};
-use crate::scene::number;
 
 /// A value with its path.
 #[derive(Clone)]
@@ -53,6 +52,19 @@ impl<'a> At<'a> {
 
     pub fn has(&self, key: &str) -> bool {
         matches!(&self.node.value, Value::Object(members) if members.iter().any(|member| member.key == key))
+    }
+
+    /// The value of the member of this object of that name.
+    pub fn child(&self, key: &str) -> Option<At<'a>> {
+        let Value::Object(members) = &self.node.value else { return None };
+        members.iter().find(|member| member.key == key).map(|member| self.member(member))
+    }
+
+    /// The element of this list of that name.
+    pub fn named(&self, name: &str) -> Option<At<'a>> {
+        let Value::List(nodes) = &self.node.value else { return None };
+        let number = nodes.iter().position(|node| crate::scene::set::name(node) == Some(name))?;
+        Some(self.item(&nodes[number], number))
     }
 
     /// The value of a member of this object.
@@ -133,18 +145,8 @@ impl<'a> At<'a> {
                 Err(self
                     .refuse_value(&allowed(), &format!("write it without quotes: {}", clipped(text.trim()))))
             }
-            _ => Err(self.refuse_value(&allowed(), &self.formula().unwrap_or_else(|| field.for_example()))),
+            _ => Err(self.refuse_value(&allowed(), &field.for_example())),
         }
-    }
-
-    /// The hint at a text such as `pi/2` where a number must stand.
-    fn formula(&self) -> Option<String> {
-        let Value::Text(text) = &self.node.value else { return None };
-        Some(format!(
-            "a scene file holds plain numbers: write {}; `--set` and `--vary` take {} as it is",
-            number(text)?,
-            clipped(text.trim())
-        ))
     }
 
     /// Refuses this object where what follows from it is out of range.
@@ -184,7 +186,9 @@ impl<'a> Fields<'a> {
     pub fn number(&self, name: &str) -> Result<f64, SceneError> {
         let at = self.required(name)?;
         match self.table.field(name) {
-            Some(field @ Field { shape: Shape::Number(quantity), .. }) => at.number(field, quantity),
+            Some(field @ Field { shape: Shape::Number(quantity) | Shape::LawNumber(quantity), .. }) => {
+                at.number(field, quantity)
+            }
             _ => Err(at.refuse_value("must be a number the format knows", self.table.about)),
         }
     }
@@ -196,14 +200,13 @@ impl<'a> Fields<'a> {
     pub fn pair(&self, name: &str) -> Result<[f64; 2], SceneError> {
         let at = self.required(name)?;
         match (self.table.field(name), &at.node.value) {
-            (Some(field @ Field { shape: Shape::Pair(quantity), .. }), Value::List(nodes))
-                if nodes.len() == 2 =>
-            {
-                Ok([
-                    at.item(&nodes[0], 0).coordinate(field, quantity)?,
-                    at.item(&nodes[1], 1).coordinate(field, quantity)?,
-                ])
-            }
+            (
+                Some(field @ Field { shape: Shape::Pair(quantity) | Shape::LawPair(quantity), .. }),
+                Value::List(nodes),
+            ) if nodes.len() == 2 => Ok([
+                at.item(&nodes[0], 0).coordinate(field, quantity)?,
+                at.item(&nodes[1], 1).coordinate(field, quantity)?,
+            ]),
             (Some(field), _) => Err(at.refuse_value(&field.shape.allowed(), &field.for_example())),
             (None, _) => Err(at.refuse_value("must be a pair the format knows", self.table.about)),
         }
@@ -290,10 +293,7 @@ impl At<'_> {
     fn coordinate(&self, field: &Field, quantity: &Quantity) -> Result<f64, SceneError> {
         match self.node.value {
             Value::Number(number) if quantity.holds(number) => Ok(number),
-            _ => Err(self.refuse_value(
-                &Shape::Number(*quantity).allowed(),
-                &self.formula().unwrap_or_else(|| field.for_example()),
-            )),
+            _ => Err(self.refuse_value(&Shape::Number(*quantity).allowed(), &field.for_example())),
         }
     }
 }

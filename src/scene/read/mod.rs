@@ -6,8 +6,10 @@
 mod at;
 mod bars;
 mod joints;
+mod laws;
 mod loads;
 mod names;
+mod resolve;
 mod start;
 
 pub(super) use at::{At, Fields, listed, nearest};
@@ -19,8 +21,10 @@ use super::format::{LONGEST_FILE, SCENE, plain};
 use super::locate::{Node, Source, Text};
 use super::set::{Override, put};
 use super::{Drive, Motor, Scene};
+use laws::Either;
 use loads::AnyMotor;
 use names::{Bars, named};
+use resolve::Known;
 use std::io::Read;
 use std::path::Path;
 
@@ -79,8 +83,9 @@ pub fn parse_scene(text: &str, source: &str, overrides: &[Override]) -> Result<S
         let hint = "a scene of 10 000 bars fits well into this; is this the right file?";
         return Err(SceneError::whole_file(source, "is too long", "must be at most 16 MiB", hint));
     }
-    let (source, tree) = put_together(text, source, overrides)?;
-    scene(&At { source: &source, node: &tree, path: String::new() })
+    let (source, mut tree) = put_together(text, source, overrides)?;
+    let parameters = resolve::resolve(&source, &mut tree)?;
+    scene(&At { source: &source, node: &tree, path: String::new() }, &parameters)
 }
 
 /// The tree of a scene's text with overrides put in, not judged yet.
@@ -104,7 +109,7 @@ fn without_mark(text: &str) -> &str {
     text.strip_prefix('\u{feff}').unwrap_or(text)
 }
 
-fn scene(root: &At) -> Result<Scene, SceneError> {
+fn scene(root: &At, parameters: &[Known]) -> Result<Scene, SceneError> {
     let fields = root.object(&SCENE)?;
     let name = fields.name("name")?;
     let description = fields.text_or_empty("description")?;
@@ -115,12 +120,23 @@ fn scene(root: &At) -> Result<Scene, SceneError> {
     let (sliders, _) = named(&fields, "sliders", |fields, name| joints::slider(fields, name, &known))?;
     let (welds, _) = named(&fields, "welds", |fields, name| joints::weld(fields, name, &known))?;
     let (locks, lock_places) = named(&fields, "locks", |fields, name| joints::lock(fields, name, &known))?;
+    let (points, _) = named(&fields, "points", |fields, name| laws::point(fields, name, &known))?;
     let (springs, spring_places) =
-        named(&fields, "springs", |fields, name| loads::spring(fields, name, &known))?;
+        named(&fields, "springs", |fields, name| laws::spring(fields, name, &known))?;
+    let is_plain = |(spring, at): (&Either<_>, _)| matches!(spring, Either::Plain(_)).then_some(at);
+    let spring_places: Vec<At> = springs.iter().zip(spring_places).filter_map(is_plain).collect();
     let (torsion_springs, _) =
-        named(&fields, "torsion_springs", |fields, name| loads::torsion_spring(fields, name, &known))?;
-    let (forces, _) = named(&fields, "forces", |fields, name| loads::force(fields, name, &known))?;
-    let (torques, _) = named(&fields, "torques", |fields, name| loads::torque(fields, name, &known))?;
+        named(&fields, "torsion_springs", |fields, name| laws::torsion_spring(fields, name, &known))?;
+    let (forces, _) = named(&fields, "forces", |fields, name| laws::force(fields, name, &known))?;
+    let (torques, _) = named(&fields, "torques", |fields, name| laws::torque(fields, name, &known))?;
+    let (potentials, _) = named(&fields, "potentials", laws::potential)?;
+    let (events, _) = named(&fields, "events", laws::event)?;
+    let mut laws = Vec::new();
+    let springs = laws::split(springs, &mut laws);
+    let torsion_springs = laws::split(torsion_springs, &mut laws);
+    let forces = laws::split(forces, &mut laws);
+    let torques = laws::split(torques, &mut laws);
+    laws.extend(potentials);
     let (any, _) = named(&fields, "motors", |fields, name| loads::motor(fields, name, &known, &sliders))?;
     let (motors, motor_places, drives) = sorted(any);
     let (walls, wall_places) = named(&fields, "walls", |fields, name| joints::wall(fields, name, &known))?;
@@ -141,6 +157,12 @@ fn scene(root: &At) -> Result<Scene, SceneError> {
         motors,
         drives,
         walls,
+        parameters: parameters.iter().map(Into::into).collect(),
+        points,
+        signals: laws::signals(&fields, parameters)?,
+        laws,
+        events,
+        inactive: fields.optional("inactive").map_or(Ok(Vec::new()), |at| laws::names(&at))?,
         until,
         every,
         ..Scene::default()
@@ -153,7 +175,9 @@ fn scene(root: &At) -> Result<Scene, SceneError> {
         motors: &motor_places,
         walls: &wall_places,
     };
-    fit::fitted(Scene { bars, ..scene }, &places, &given)
+    let scene = Scene { bars, ..scene };
+    laws::check(root, &scene, parameters)?;
+    fit::fitted(scene, &places, &given)
 }
 
 /// The motors on angles with their places, and those on sliders.

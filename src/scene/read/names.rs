@@ -116,7 +116,11 @@ impl<'a> Bars<'a> {
 
     /// A place.
     pub fn place(&self, at: &At) -> Result<Place, SceneError> {
-        let fields = at.object(&PLACE)?;
+        self.place_of(&at.object(&PLACE)?)
+    }
+
+    /// The place that an object has among its fields.
+    pub fn place_of(&self, fields: &Fields) -> Result<Place, SceneError> {
         Ok(Place { bar: self.body(&fields.required("body")?)?, point: fields.pair("point")? })
     }
 

@@ -1,0 +1,406 @@
+//! Laws of a scene that are formulas of time and state: recorded like forces from outside.
+//!
+//! A formula with corners (`abs`, `sign`, `min`, `max`, `if`) is recorded on the branches that its conditions
+//! choose, the *modes*; a run that meets a zero of a condition ends its step there and records the laws anew
+//! on the other branch, so that no method ever steps across a corner.
+
+use super::{Force, Loads, UserForce};
+use crate::arithmetic::Scalar;
+use crate::dynamics::constraint::Site;
+use crate::dynamics::forest::Forest;
+use crate::dynamics::{CompileError, Configuration};
+use crate::scene::formula::Formula;
+use crate::scene::{Bound, Crossing, Load, Meaning, Names, Place, Scene};
+
+/// What a name in a formula stands for, with the points of the mechanism.
+#[derive(Clone, Debug, PartialEq)]
+enum Quantity {
+    Time,
+    Parameter(usize),
+    Signal(usize),
+    Angle(usize),
+    Rate(usize),
+    Cosine(usize),
+    Sine(usize),
+    X(Site),
+    Y(Site),
+    XRate(Site),
+    YRate(Site),
+    Length([Site; 2]),
+    LengthRate([Site; 2]),
+    RelativeAngle(usize, Option<usize>),
+    RelativeRate(usize, Option<usize>),
+}
+
+/// From the first point to the second: the vector, its length, and its rate of change.
+fn span<S: Scalar>(at: &Configuration<S>, [a, b]: &[Site; 2]) -> ([S; 2], S) {
+    let [from, to] = [at.position(a), at.position(b)];
+    let vector = [to[0] - from[0], to[1] - from[1]];
+    (vector, (vector[0] * vector[0] + vector[1] * vector[1]).sqrt())
+}
+
+impl Quantity {
+    fn of(meaning: Meaning, forest: &Forest) -> Self {
+        let site = |place: Place| forest.site(&place);
+        match meaning {
+            Meaning::Time => Self::Time,
+            Meaning::Parameter(number) => Self::Parameter(number),
+            Meaning::Signal(number) => Self::Signal(number),
+            Meaning::Angle(bar) => Self::Angle(bar),
+            Meaning::Rate(bar) => Self::Rate(bar),
+            Meaning::Cosine(bar) => Self::Cosine(bar),
+            Meaning::Sine(bar) => Self::Sine(bar),
+            Meaning::X(place) => Self::X(site(place)),
+            Meaning::Y(place) => Self::Y(site(place)),
+            Meaning::XRate(place) => Self::XRate(site(place)),
+            Meaning::YRate(place) => Self::YRate(site(place)),
+            Meaning::Length(places) => Self::Length(places.map(site)),
+            Meaning::LengthRate(places) => Self::LengthRate(places.map(site)),
+            Meaning::RelativeAngle(bar, base) => Self::RelativeAngle(bar, base),
+            Meaning::RelativeRate(bar, base) => Self::RelativeRate(bar, base),
+        }
+    }
+
+    fn value<S: Scalar>(&self, at: &Configuration<S>, parameters: &[f64], signals: &[S]) -> S {
+        match self {
+            Self::Time => at.time(),
+            Self::Parameter(number) => S::of(parameters[*number]),
+            Self::Signal(number) => signals[*number],
+            Self::Angle(body) => at.angle(*body),
+            Self::Rate(body) => at.rate(*body),
+            Self::Cosine(body) => at.direction(*body)[0],
+            Self::Sine(body) => at.direction(*body)[1],
+            Self::X(site) => at.position(site)[0],
+            Self::Y(site) => at.position(site)[1],
+            Self::XRate(site) => at.velocity(site)[0],
+            Self::YRate(site) => at.velocity(site)[1],
+            Self::Length(sites) => span(at, sites).1,
+            Self::LengthRate(sites) => {
+                let (vector, length) = span(at, sites);
+                let [from, to] = sites.each_ref().map(|site| at.velocity(site));
+                (vector[0] * (to[0] - from[0]) + vector[1] * (to[1] - from[1])) / length
+            }
+            Self::RelativeAngle(body, base) => base.iter().fold(at.angle(*body), |a, &b| a - at.angle(b)),
+            Self::RelativeRate(body, base) => base.iter().fold(at.rate(*body), |a, &b| a - at.rate(b)),
+        }
+    }
+}
+
+/// A formula that can be evaluated on a mechanism.
+#[derive(Clone, Debug, PartialEq)]
+struct Expression {
+    formula: Formula,
+    quantities: Vec<Quantity>,
+    /// The number of its first condition among all.
+    first: usize,
+}
+
+impl Expression {
+    fn values<S: Scalar>(&self, at: &Configuration<S>, parameters: &[f64], signals: &[S]) -> Vec<S> {
+        self.quantities.iter().map(|quantity| quantity.value(at, parameters, signals)).collect()
+    }
+
+    fn modes<'a>(&self, modes: &'a [bool]) -> &'a [bool] {
+        modes.get(self.first..self.first + self.formula.conditions()).unwrap_or(&[])
+    }
+}
+
+/// Where a law acts.
+#[derive(Clone, Debug, PartialEq)]
+enum Acts {
+    Point { site: Site, follows: bool, force: [Expression; 2] },
+    Torque { body: usize, base: Option<usize>, torque: Expression },
+    Span { sites: [Site; 2], tension: Expression },
+    Nowhere,
+}
+
+/// One law.
+#[derive(Clone, Debug, PartialEq)]
+struct Law {
+    name: String,
+    potential: Option<Expression>,
+    place: Acts,
+}
+
+/// An event of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct FormulaEvent {
+    /// Name.
+    pub name: String,
+    when: Expression,
+    /// Which zeros count.
+    pub direction: Crossing,
+    /// True where the run ends there.
+    pub stop: bool,
+    /// Parts that act from then on.
+    pub on: Vec<String>,
+    /// Parts that act no longer.
+    pub off: Vec<String>,
+    set: Vec<(usize, Expression)>,
+}
+
+/// All formulas of a scene.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Formulas {
+    /// Values of the parameters at the start.
+    pub parameters: Vec<f64>,
+    signals: Vec<Expression>,
+    laws: Vec<Law>,
+    /// Events.
+    pub events: Vec<FormulaEvent>,
+    /// What each condition is part of, for messages.
+    pub conditions: Vec<String>,
+}
+
+/// Collects expressions and numbers their conditions.
+struct Binder<'a> {
+    forest: &'a Forest,
+    conditions: Vec<String>,
+}
+
+impl Binder<'_> {
+    fn expression(&mut self, names: &Names, text: &str, owner: &str) -> Result<Expression, CompileError> {
+        let bound = names.bind(text);
+        let (Bound { formula, meanings }, _) =
+            bound.map_err(|error| CompileError::Unsound(format!("formula of `{owner}`: {error}")))?;
+        let first = self.conditions.len();
+        self.conditions.extend(std::iter::repeat_n(owner.to_owned(), formula.conditions()));
+        let quantities = meanings.into_iter().map(|meaning| Quantity::of(meaning, self.forest)).collect();
+        Ok(Expression { formula, quantities, first })
+    }
+}
+
+impl Formulas {
+    /// Those of a scene; `None` where it has none.
+    pub fn of(scene: &Scene, forest: &Forest) -> Result<Option<Self>, CompileError> {
+        if scene.laws.is_empty() && scene.events.is_empty() {
+            return Ok(None);
+        }
+        let mut names = Names::of(scene);
+        let mut binder = Binder { forest, conditions: Vec::new() };
+        let mut signals = Vec::new();
+        for signal in &scene.signals {
+            let expression = binder.expression(&names, &signal.formula, &signal.name)?;
+            if let Ok((bound, _)) = names.bind(&signal.formula) {
+                names.signal(&signal.name, &bound, None);
+            }
+            signals.push(expression);
+        }
+        let mut laws = Vec::new();
+        for law in &scene.laws {
+            let names = names.within(&law.load);
+            let mut expression = |text: &str| binder.expression(&names, text, &law.name);
+            let (potential, place) = match &law.load {
+                Load::Force { bar, point, force: [x, y], follows } => {
+                    let site = forest.site(&Place { bar: Some(*bar), point: *point });
+                    let force = [expression(x)?, expression(y)?];
+                    (None, Acts::Point { site, follows: *follows, force })
+                }
+                Load::Torque { bar, relative_to, torque } => {
+                    let torque = expression(torque)?;
+                    (None, Acts::Torque { body: *bar, base: *relative_to, torque })
+                }
+                Load::Spring { between, potential, tension } => {
+                    let sites = between.each_ref().map(|place| forest.site(place));
+                    let potential = potential.as_deref().map(&mut expression).transpose()?;
+                    let place = match tension {
+                        Some(tension) => Acts::Span { sites, tension: expression(tension)? },
+                        None => Acts::Nowhere,
+                    };
+                    (potential, place)
+                }
+                Load::TorsionSpring { bar, relative_to, potential, torque } => {
+                    let potential = potential.as_deref().map(&mut expression).transpose()?;
+                    let place = match torque {
+                        Some(torque) => Acts::Torque {
+                            body: *bar,
+                            base: *relative_to,
+                            torque: expression(&format!("-({torque})"))?,
+                        },
+                        None => Acts::Nowhere,
+                    };
+                    (potential, place)
+                }
+                Load::Potential { energy } => (Some(expression(energy)?), Acts::Nowhere),
+            };
+            laws.push(Law { name: law.name.clone(), potential, place });
+        }
+        let conditions = std::mem::take(&mut binder.conditions);
+        let parameter = |name: &String| scene.parameters.iter().position(|known| known.name == *name);
+        let mut events = Vec::new();
+        for event in &scene.events {
+            let mut set = Vec::new();
+            for (name, text) in &event.set {
+                let number = parameter(name)
+                    .ok_or_else(|| CompileError::Unsound(format!("event `{}` sets {name}", event.name)))?;
+                set.push((number, binder.expression(&names, text, &event.name)?));
+            }
+            events.push(FormulaEvent {
+                name: event.name.clone(),
+                when: binder.expression(&names, &event.when, &event.name)?,
+                direction: event.direction,
+                stop: event.stop,
+                on: event.on.clone(),
+                off: event.off.clone(),
+                set,
+            });
+        }
+        let parameters = scene.parameters.iter().map(|parameter| parameter.value).collect();
+        Ok(Some(Self { parameters, signals, laws, events, conditions }))
+    }
+
+    /// True where it has conditions, or events that change something.
+    pub fn switches(&self) -> bool {
+        let changes =
+            |event: &FormulaEvent| !(event.on.is_empty() && event.off.is_empty() && event.set.is_empty());
+        !self.conditions.is_empty() || self.events.iter().any(changes)
+    }
+
+    /// The signals on the branches that `modes` say.
+    fn signals<S: Scalar>(&self, at: &Configuration<S>, parameters: &[f64], modes: &[bool]) -> Vec<S> {
+        let mut signals = Vec::with_capacity(self.signals.len());
+        for signal in &self.signals {
+            let values = signal.values(at, parameters, &signals);
+            signals.push(signal.formula.evaluate(&values, signal.modes(modes)));
+        }
+        signals
+    }
+
+    /// Records its laws on the branches that `modes` say.
+    ///
+    /// # Errors
+    /// A potential that depends on time or rates.
+    pub fn record(&self, parameters: &[f64], modes: &[bool]) -> Result<Vec<UserForce>, CompileError> {
+        let record = |law| UserForce::record(&Recorded { law, formulas: self, parameters, modes });
+        self.laws.iter().map(record).collect()
+    }
+
+    /// The values of all conditions, on the branches that `modes` say.
+    pub fn condition_values(&self, at: &Configuration<f64>, parameters: &[f64], modes: &[bool]) -> Vec<f64> {
+        let mut all = Vec::with_capacity(self.conditions.len());
+        if self.conditions.is_empty() {
+            return all;
+        }
+        let signals = self.signals(at, parameters, modes);
+        let laws = self.laws.iter().flat_map(Law::expressions);
+        for expression in self.signals.iter().chain(laws) {
+            if expression.formula.conditions() > 0 {
+                let values = expression.values(at, parameters, &signals);
+                expression.formula.condition_values(&values, expression.modes(modes), &mut all);
+            }
+        }
+        all
+    }
+
+    /// The modes at a configuration, by the signs of the conditions there.
+    pub fn modes(&self, at: &Configuration<f64>, parameters: &[f64]) -> Vec<bool> {
+        let mut modes = vec![false; self.conditions.len()];
+        // A condition may contain what earlier ones choose.
+        for _ in 0..=modes.len() {
+            let next: Vec<bool> =
+                self.condition_values(at, parameters, &modes).iter().map(|value| *value > 0.0).collect();
+            if next == modes {
+                break;
+            }
+            modes = next;
+        }
+        modes
+    }
+
+    fn value(&self, expression: &Expression, at: &Configuration<f64>, parameters: &[f64]) -> f64 {
+        let mut signals = Vec::with_capacity(self.signals.len());
+        for signal in &self.signals {
+            let values = signal.values(at, parameters, &signals);
+            signals.push(signal.formula.value(&values));
+        }
+        expression.formula.value(&expression.values(at, parameters, &signals))
+    }
+
+    /// The event function of event number `event`.
+    pub fn event_value(&self, event: usize, at: &Configuration<f64>, parameters: &[f64]) -> f64 {
+        self.value(&self.events[event].when, at, parameters)
+    }
+
+    /// The parameters after an event.
+    pub fn set_by(&self, event: usize, at: &Configuration<f64>, parameters: &[f64]) -> Vec<f64> {
+        let mut next = parameters.to_vec();
+        for (number, expression) in &self.events[event].set {
+            next[*number] = self.value(expression, at, parameters);
+        }
+        next
+    }
+}
+
+impl Law {
+    /// Its formulas in the order in which they were bound.
+    fn expressions(&self) -> impl Iterator<Item = &Expression> {
+        let acting: Vec<&Expression> = match &self.place {
+            Acts::Point { force: [x, y], .. } => vec![x, y],
+            Acts::Torque { torque, .. } => vec![torque],
+            Acts::Span { tension, .. } => vec![tension],
+            Acts::Nowhere => Vec::new(),
+        };
+        self.potential.iter().chain(acting)
+    }
+}
+
+/// A law on the branches of some modes, as it is recorded.
+struct Recorded<'a> {
+    law: &'a Law,
+    formulas: &'a Formulas,
+    parameters: &'a [f64],
+    modes: &'a [bool],
+}
+
+impl Recorded<'_> {
+    fn evaluate<S: Scalar>(&self, expression: &Expression, at: &Configuration<S>, signals: &[S]) -> S {
+        let values = expression.values(at, self.parameters, signals);
+        expression.formula.evaluate(&values, expression.modes(self.modes))
+    }
+}
+
+impl Force for Recorded<'_> {
+    fn name(&self) -> &str {
+        &self.law.name
+    }
+
+    fn potential<S: Scalar>(&self, at: &Configuration<S>) -> S {
+        let Some(potential) = &self.law.potential else { return S::ZERO };
+        self.evaluate(potential, at, &self.formulas.signals(at, self.parameters, self.modes))
+    }
+
+    fn apply<S: Scalar>(&self, at: &Configuration<S>, loads: &mut Loads<S>) {
+        if self.law.place == Acts::Nowhere {
+            return;
+        }
+        let signals = self.formulas.signals(at, self.parameters, self.modes);
+        let of = |expression: &Expression| self.evaluate(expression, at, &signals);
+        match &self.law.place {
+            Acts::Point { site, follows, force } => {
+                let [x, y] = force.each_ref().map(of);
+                match site.body.filter(|_| *follows) {
+                    Some(body) => {
+                        let [c, s] = at.direction(body);
+                        loads.force(site, [c * x - s * y, s * x + c * y]);
+                    }
+                    None => loads.force(site, [x, y]),
+                }
+            }
+            Acts::Torque { body, base, torque } => {
+                let torque = of(torque);
+                loads.torque(*body, torque);
+                if let Some(base) = base {
+                    loads.torque(*base, -torque);
+                }
+            }
+            Acts::Span { sites, tension } => {
+                let (vector, length) = span(at, sites);
+                let pull = of(tension) / length;
+                let force = [vector[0] * pull, vector[1] * pull];
+                loads.force(&sites[0], force);
+                loads.force(&sites[1], [-force[0], -force[1]]);
+            }
+            Acts::Nowhere => {}
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! The events of a run: a table of their own, and what the record and the page say of them.
+
+use super::page::{Page, counted, figure};
+use crate::dynamics::Mechanism;
+use crate::run::Outcome;
+use serde_json::{Value, json};
+use std::fmt::Write;
+
+/// Events that the record names; the table has all that were kept.
+const NAMED: usize = 100;
+
+/// True where a scene has events.
+pub fn has_any(mechanism: &Mechanism) -> bool {
+    !mechanism.event_names().is_empty()
+}
+
+/// All events as a table: name, time, angles and rates of all bodies, translational coordinates.
+pub fn table(mechanism: &Mechanism, outcome: &Outcome) -> String {
+    let n = mechanism.bodies.len();
+    let mut text = "event,t [s]".to_owned();
+    for body in &mechanism.bodies {
+        let _ = write!(text, ",{0}.phi [rad],{0}.omega [rad/s]", body.name);
+    }
+    for k in n..mechanism.coordinates() {
+        let _ = write!(text, ",{} [m],{} [m/s]", mechanism.coordinate_name(k), mechanism.rate_name(k));
+    }
+    text.push('\n');
+    for event in &outcome.events {
+        let _ = write!(text, "{},{:?}", event.name, event.t);
+        for (phi, omega) in event.phi.iter().zip(&event.omega) {
+            let _ = write!(text, ",{phi:?},{omega:?}");
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// What the record says; nothing for a scene without events.
+pub(super) fn object(mechanism: &Mechanism, outcome: &Outcome) -> Option<Value> {
+    let first: Vec<Value> =
+        outcome.events.iter().take(NAMED).map(|event| json!({"name": event.name, "t": event.t})).collect();
+    has_any(mechanism).then(|| {
+        json!({
+            "count": outcome.event_count,
+            "energy_j": outcome.event_energy,
+            "ended_by": outcome.ended_by,
+            "first": first,
+        })
+    })
+}
+
+/// What the page says.
+pub(super) fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
+    let names = mechanism.event_names();
+    for (number, name) in names.iter().enumerate().take(10) {
+        let times: Vec<&f64> =
+            outcome.events.iter().filter(|event| event.name == *name).map(|event| &event.t).collect();
+        let when = match times[..] {
+            [] => "never".to_owned(),
+            [only] => format!("at t = {} s", figure(*only)),
+            [first, .., last] => {
+                let count = counted(times.len() as u64, "time", "times");
+                format!("{count}, t = {} s to {} s", figure(*first), figure(*last))
+            }
+        };
+        page.entry(if number == 0 { "events" } else { "" }, &format!("{name}: {when}"));
+    }
+    if let Some(event) = &outcome.ended_by {
+        page.entry("ended by", &format!("{event}, before the horizon of {} s", figure(outcome.plan.until)));
+    }
+    if outcome.event_energy != 0.0 {
+        page.entry("", &format!("{} J put in at events", figure(outcome.event_energy)));
+    }
+}

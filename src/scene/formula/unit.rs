@@ -1,0 +1,170 @@
+//! Units behind numbers, and the dimensions that formulas are checked with.
+
+use std::fmt;
+
+/// Exponents of metre, kilogram and second; a radian counts as 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dimension([f64; 3]);
+
+/// Exponents nearer to one another than this are the same: they come from sums and products of a few.
+const SAME: f64 = 1e-9;
+
+impl Dimension {
+    /// That of a pure number.
+    pub const NONE: Self = Self([0.0; 3]);
+
+    /// True where both are the same.
+    pub fn is(self, other: Self) -> bool {
+        self.0.iter().zip(other.0).all(|(a, b)| (a - b).abs() < SAME)
+    }
+
+    /// That of a product with a power of another.
+    pub(super) fn times(self, other: Self, power: f64) -> Self {
+        Self([0, 1, 2].map(|k| self.0[k] + power * other.0[k]))
+    }
+
+    /// That of a power.
+    pub(super) fn power(self, power: f64) -> Self {
+        Self(self.0.map(|exponent| exponent * power))
+    }
+
+    /// That of a unit of the format, as `N·s/m` or `kg·m²`; of an empty text that of a pure number.
+    pub fn of(unit: &str) -> Self {
+        let mut all = Self::NONE;
+        for (number, part) in unit.split('/').enumerate() {
+            let side = if number == 0 { 1.0 } else { -1.0 };
+            for factor in part.split('·').filter(|factor| !factor.is_empty() && *factor != "1") {
+                let (name, power) = match (factor.strip_suffix('²'), factor.strip_suffix('³')) {
+                    (Some(name), _) => (name, 2.0),
+                    (_, Some(name)) => (name, 3.0),
+                    _ => (factor, 1.0),
+                };
+                if let Some(unit) = find(name) {
+                    all = all.times(unit.dimension, side * power);
+                }
+            }
+        }
+        all
+    }
+}
+
+impl fmt::Display for Dimension {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.is(Self::NONE) {
+            return write!(f, "a pure number");
+        }
+        let known = UNITS.iter().filter(|unit| unit.above == 1.0 && unit.below == 1.0 && unit.name != "rpm");
+        if let Some(unit) = known.into_iter().find(|unit| unit.dimension.is(*self) && unit.name != "Hz") {
+            return write!(f, "{}", unit.name);
+        }
+        let mut first = true;
+        for (name, exponent) in
+            ["m", "kg", "s"].iter().zip(self.0).filter(|(_, exponent)| exponent.abs() > SAME)
+        {
+            let dot = if std::mem::take(&mut first) { "" } else { "·" };
+            write!(f, "{dot}{name}")?;
+            if (exponent - 1.0).abs() > SAME {
+                write!(f, "^{}", (exponent * 1e6).round() / 1e6)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What does not go together.
+pub(super) enum Mismatch {
+    /// A sum or comparison.
+    Sum(Dimension, Dimension),
+    /// An argument or exponent.
+    Pure(Dimension),
+}
+
+impl fmt::Display for Mismatch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Sum(a, b) => write!(f, "puts {a} and {b} together"),
+            Self::Pure(a) => write!(f, "takes a pure number, not {a}"),
+        }
+    }
+}
+
+/// A unit: a number of it is multiplied by `above` and divided by `below`, both exact or nearly so, so that
+/// `5 mm` is the double nearest to 0.005.
+pub(super) struct Unit {
+    pub name: &'static str,
+    pub above: f64,
+    pub below: f64,
+    pub dimension: Dimension,
+}
+
+const fn unit(name: &'static str, above: f64, below: f64, dimension: [f64; 3]) -> Unit {
+    Unit { name, above, below, dimension: Dimension(dimension) }
+}
+
+const LENGTH: [f64; 3] = [1.0, 0.0, 0.0];
+const MASS: [f64; 3] = [0.0, 1.0, 0.0];
+const TIME: [f64; 3] = [0.0, 0.0, 1.0];
+const FREQUENCY: [f64; 3] = [0.0, 0.0, -1.0];
+const FORCE: [f64; 3] = [1.0, 1.0, -2.0];
+const ENERGY: [f64; 3] = [2.0, 1.0, -2.0];
+const POWER: [f64; 3] = [2.0, 1.0, -3.0];
+const PURE: [f64; 3] = [0.0; 3];
+const PI: f64 = std::f64::consts::PI;
+
+/// The units.
+pub(super) static UNITS: [Unit; 27] = [
+    unit("m", 1.0, 1.0, LENGTH),
+    unit("mm", 1.0, 1e3, LENGTH),
+    unit("cm", 1.0, 1e2, LENGTH),
+    unit("km", 1e3, 1.0, LENGTH),
+    unit("in", 0.0254, 1.0, LENGTH),
+    unit("ft", 0.3048, 1.0, LENGTH),
+    unit("kg", 1.0, 1.0, MASS),
+    unit("g", 1.0, 1e3, MASS),
+    unit("lb", 0.453_592_37, 1.0, MASS),
+    unit("s", 1.0, 1.0, TIME),
+    unit("ms", 1.0, 1e3, TIME),
+    unit("us", 1.0, 1e6, TIME),
+    unit("min", 60.0, 1.0, TIME),
+    unit("h", 3600.0, 1.0, TIME),
+    unit("rad", 1.0, 1.0, PURE),
+    unit("deg", PI, 180.0, PURE),
+    unit("turn", 2.0 * PI, 1.0, PURE),
+    unit("rpm", PI, 30.0, FREQUENCY),
+    unit("Hz", 1.0, 1.0, FREQUENCY),
+    unit("N", 1.0, 1.0, FORCE),
+    unit("mN", 1.0, 1e3, FORCE),
+    unit("kN", 1e3, 1.0, FORCE),
+    unit("J", 1.0, 1.0, ENERGY),
+    unit("kJ", 1e3, 1.0, ENERGY),
+    unit("W", 1.0, 1.0, POWER),
+    unit("kW", 1e3, 1.0, POWER),
+    unit("lbf", 4.448_221_615_260_5, 1.0, FORCE),
+];
+
+/// The unit of a name.
+pub(super) fn find(name: &str) -> Option<&'static Unit> {
+    UNITS.iter().find(|unit| unit.name == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_of_the_format_have_their_dimensions() {
+        for (unit, [m, kg, s]) in [
+            ("N·s/m", [0.0, 1.0, -1.0]),
+            ("kg·m²", [2.0, 1.0, 0.0]),
+            ("kg/m³", [-3.0, 1.0, 0.0]),
+            ("N·m·s/rad", [2.0, 1.0, -1.0]),
+            ("rad/s²", [0.0, 0.0, -2.0]),
+            ("1/s", [0.0, 0.0, -1.0]),
+            ("", [0.0; 3]),
+        ] {
+            assert!(Dimension::of(unit).is(Dimension([m, kg, s])), "{unit}");
+        }
+        assert_eq!(Dimension::of("N/m").to_string(), "kg·s^-2");
+        assert_eq!(Dimension::of("N").to_string(), "N");
+    }
+}

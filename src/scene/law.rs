@@ -1,0 +1,319 @@
+//! What a scene says in formulas: parameters, points, signals, laws of forces, and events.
+//!
+//! Texts are kept as they were written; [`Names`] says what the names in them stand for.
+
+use super::formula::unit::Dimension;
+use super::formula::{Formula, FormulaError};
+use super::{Place, Scene};
+use serde::Serialize;
+use std::collections::HashMap;
+
+/// A number with a name.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Parameter {
+    /// Name, unique among parameters and signals.
+    pub name: String,
+    /// Value, in SI units.
+    pub value: f64,
+}
+
+/// A place with a name: `tip` makes `tip.x`, `tip.y`, `tip.vx` and `tip.vy` known to formulas.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NamedPoint {
+    /// Name, unique among points.
+    pub name: String,
+    /// The place.
+    pub place: Place,
+}
+
+/// A formula with a name, for others to use.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Signal {
+    /// Name, unique among parameters and signals.
+    pub name: String,
+    /// The formula.
+    pub formula: String,
+}
+
+/// A force, torque or spring whose law is a formula of time and state.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LoadLaw {
+    /// Name, unique among the parts of its kind.
+    pub name: String,
+    /// Where it acts and by what law.
+    pub load: Load,
+}
+
+/// Where a [`LoadLaw`] acts, and its formulas.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub enum Load {
+    /// A force at a point of a bar.
+    Force {
+        /// The bar.
+        bar: usize,
+        /// The point of the bar, in its frame \[m\].
+        point: [f64; 2],
+        /// The force, x and y \[N\].
+        force: [String; 2],
+        /// True where its directions are those of the bar.
+        follows: bool,
+    },
+    /// A torque on a bar, and its opposite on another.
+    Torque {
+        /// The bar.
+        bar: usize,
+        /// The bar that takes the opposite torque; `None`: the ground.
+        relative_to: Option<usize>,
+        /// The torque \[N·m\].
+        torque: String,
+    },
+    /// A spring: formulas may use `length` and `rate`.
+    Spring {
+        /// Its two ends.
+        between: [Place; 2],
+        /// Energy stored \[J\].
+        potential: Option<String>,
+        /// Force that pulls the ends together \[N\], beside that of the potential.
+        tension: Option<String>,
+    },
+    /// A torsion spring: formulas may use `angle` and `rate`.
+    TorsionSpring {
+        /// The bar.
+        bar: usize,
+        /// The bar its angle is measured from; `None`: from +x.
+        relative_to: Option<usize>,
+        /// Energy stored \[J\].
+        potential: Option<String>,
+        /// Torque that turns the bar back, against its angle \[N·m\], beside that of the potential.
+        torque: Option<String>,
+    },
+    /// A potential energy of angles and positions.
+    Potential {
+        /// The energy \[J\].
+        energy: String,
+    },
+}
+
+/// Which passages of an event function count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Crossing {
+    /// Both.
+    Either,
+    /// From negative to positive.
+    Rising,
+    /// From positive to negative.
+    Falling,
+}
+
+/// A condition on the motion, and what happens where it comes true.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SceneEvent {
+    /// Name, unique among events.
+    pub name: String,
+    /// The event function: its zeros are the event.
+    pub when: String,
+    /// Which of them count.
+    pub direction: Crossing,
+    /// True where the run ends there.
+    pub stop: bool,
+    /// Parts that act from then on, by name.
+    pub on: Vec<String>,
+    /// Parts that act no longer from then on.
+    pub off: Vec<String>,
+    /// Parameters of laws that have another value from then on, and the formulas of it.
+    pub set: Vec<(String, String)>,
+}
+
+/// What a name in a formula stands for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Meaning {
+    /// Time \[s\].
+    Time,
+    /// Parameter number k.
+    Parameter(usize),
+    /// Signal number k.
+    Signal(usize),
+    /// Angle of a bar \[rad\].
+    Angle(usize),
+    /// Its rate \[rad/s\].
+    Rate(usize),
+    /// Its cosine.
+    Cosine(usize),
+    /// Its sine.
+    Sine(usize),
+    /// First coordinate of a place \[m\].
+    X(Place),
+    /// Second coordinate \[m\].
+    Y(Place),
+    /// Velocities \[m/s\].
+    XRate(Place),
+    /// Velocities \[m/s\].
+    YRate(Place),
+    /// Distance of two places \[m\].
+    Length([Place; 2]),
+    /// Its rate \[m/s\].
+    LengthRate([Place; 2]),
+    /// Angle of a bar from another's \[rad\].
+    RelativeAngle(usize, Option<usize>),
+    /// Its rate \[rad/s\].
+    RelativeRate(usize, Option<usize>),
+}
+
+impl Meaning {
+    /// Its unit, as the format writes units.
+    fn unit(self) -> &'static str {
+        match self {
+            Self::Time => "s",
+            Self::X(_) | Self::Y(_) | Self::Length(_) => "m",
+            Self::XRate(_) | Self::YRate(_) | Self::LengthRate(_) => "m/s",
+            Self::Rate(_) | Self::RelativeRate(..) => "rad/s",
+            _ => "",
+        }
+    }
+}
+
+/// A formula whose names have found what they stand for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bound {
+    /// The formula.
+    pub formula: Formula,
+    /// What its names stand for, in their order.
+    pub meanings: Vec<Meaning>,
+}
+
+/// The names that the formulas of a scene know.
+#[derive(Clone, Debug, Default)]
+pub struct Names {
+    known: HashMap<String, (Meaning, Option<Dimension>)>,
+    /// For every signal what of time and rates is in it.
+    changing: Vec<Option<String>>,
+    /// In the order in which messages list them.
+    order: Vec<String>,
+}
+
+impl Names {
+    /// Those of a scene: time, bars, points, springs and parameters; signals are added one by one.
+    pub fn of(scene: &Scene) -> Self {
+        let mut names = Self::default();
+        names.add("t".into(), Meaning::Time);
+        for (number, parameter) in scene.parameters.iter().enumerate() {
+            names.insert(parameter.name.clone(), Meaning::Parameter(number), None);
+        }
+        for (bar, name) in scene.bars.iter().map(|bar| &bar.name).enumerate() {
+            names.add(format!("{name}.phi"), Meaning::Angle(bar));
+            names.add(format!("{name}.omega"), Meaning::Rate(bar));
+            names.add(format!("{name}.cos"), Meaning::Cosine(bar));
+            names.add(format!("{name}.sin"), Meaning::Sine(bar));
+        }
+        for NamedPoint { name, place } in &scene.points {
+            names.add(format!("{name}.x"), Meaning::X(*place));
+            names.add(format!("{name}.y"), Meaning::Y(*place));
+            names.add(format!("{name}.vx"), Meaning::XRate(*place));
+            names.add(format!("{name}.vy"), Meaning::YRate(*place));
+        }
+        let springs = scene.springs.iter().map(|spring| (&spring.name, spring.between));
+        let laws = scene.laws.iter().filter_map(|law| match &law.load {
+            Load::Spring { between, .. } => Some((&law.name, *between)),
+            _ => None,
+        });
+        for (name, between) in springs.chain(laws) {
+            names.add(format!("{name}.length"), Meaning::Length(between));
+            names.add(format!("{name}.rate"), Meaning::LengthRate(between));
+        }
+        names
+    }
+
+    fn add(&mut self, name: String, meaning: Meaning) {
+        self.insert(name, meaning, Some(Dimension::of(meaning.unit())));
+    }
+
+    fn insert(&mut self, name: String, meaning: Meaning, dimension: Option<Dimension>) {
+        if self.known.insert(name.clone(), (meaning, dimension)).is_none() {
+            self.order.push(name);
+        }
+    }
+
+    /// Adds the dimension of a parameter.
+    pub(super) fn set_dimension(&mut self, name: &str, dimension: Option<Dimension>) {
+        if let Some(known) = self.known.get_mut(name) {
+            known.1 = dimension;
+        }
+    }
+
+    /// Adds the next signal.
+    pub fn signal(&mut self, name: &str, bound: &Bound, dimension: Option<Dimension>) {
+        let number = self.changing.len();
+        self.changing.push(self.changing(bound).map(|what| format!("{name}, which depends on {what}")));
+        self.insert(name.to_owned(), Meaning::Signal(number), dimension);
+    }
+
+    /// The name in a formula that depends on time or rates, if any.
+    pub fn changing(&self, bound: &Bound) -> Option<String> {
+        bound.formula.names().zip(&bound.meanings).find_map(|(name, meaning)| match meaning {
+            Meaning::Signal(number) => self.changing[*number].clone(),
+            Meaning::Time
+            | Meaning::Rate(_)
+            | Meaning::XRate(_)
+            | Meaning::YRate(_)
+            | Meaning::LengthRate(_)
+            | Meaning::RelativeRate(..) => Some(name.to_owned()),
+            _ => None,
+        })
+    }
+
+    /// The same with the names that the formulas of a spring have beside.
+    #[must_use]
+    pub fn within(&self, load: &Load) -> Self {
+        let mut names = self.clone();
+        match *load {
+            Load::Spring { between, .. } => {
+                names.add("length".into(), Meaning::Length(between));
+                names.add("rate".into(), Meaning::LengthRate(between));
+            }
+            Load::TorsionSpring { bar, relative_to, .. } => {
+                names.add("angle".into(), Meaning::RelativeAngle(bar, relative_to));
+                names.add("rate".into(), Meaning::RelativeRate(bar, relative_to));
+            }
+            _ => {}
+        }
+        names
+    }
+
+    /// Reads a formula, finds what its names stand for, and checks its dimensions.
+    ///
+    /// # Errors
+    /// It is none, has a name that nothing has, or puts together what has different units.
+    pub fn bind(&self, text: &str) -> Result<(Bound, Option<Dimension>), FormulaError> {
+        let formula = Formula::parse(text)?;
+        let mut meanings = Vec::new();
+        let mut dimensions = Vec::new();
+        for name in formula.names() {
+            let Some((meaning, dimension)) = self.known.get(name) else {
+                let known: Vec<&str> = self.order.iter().map(String::as_str).collect();
+                return Err(formula.unknown(name, &known));
+            };
+            meanings.push(*meaning);
+            dimensions.push(*dimension);
+        }
+        let dimension = formula.dimension(&dimensions)?;
+        Ok((Bound { formula, meanings }, dimension))
+    }
+}
+
+impl Load {
+    /// Its formulas.
+    pub fn formulas(&self) -> Vec<&str> {
+        match self {
+            Self::Force { force: [x, y], .. } => vec![x, y],
+            Self::Torque { torque, .. } => vec![torque],
+            Self::Spring { potential, tension, .. } => {
+                potential.iter().chain(tension).map(String::as_str).collect()
+            }
+            Self::TorsionSpring { potential, torque, .. } => {
+                potential.iter().chain(torque).map(String::as_str).collect()
+            }
+            Self::Potential { energy } => vec![energy],
+        }
+    }
+}

@@ -1,0 +1,373 @@
+//! Formulas of time and state: points, signals, laws of forces and springs, potentials and events.
+
+use super::at::{At, Fields, listed, nearest};
+use super::names::Bars;
+use super::resolve::{Known, check_name, fits, refused};
+use crate::scene::error::SceneError;
+use crate::scene::format::{Field, Quantity, SCENE, Shape};
+use crate::scene::law::{Crossing, Load, LoadLaw, NamedPoint, Names, SceneEvent, Signal};
+use crate::scene::locate::Value;
+use crate::scene::{Force, Scene, Spring, Torque, TorsionSpring};
+
+/// Signals at most.
+const MOST: usize = 1000;
+
+/// A part as the format has always known it, or one whose law is a formula.
+pub(super) enum Either<T> {
+    Plain(T),
+    Law(LoadLaw),
+}
+
+/// The plain parts of a list, and its laws at the end of `laws`.
+pub(super) fn split<T>(all: Vec<Either<T>>, laws: &mut Vec<LoadLaw>) -> Vec<T> {
+    let mut plain = Vec::new();
+    for one in all {
+        match one {
+            Either::Plain(part) => plain.push(part),
+            Either::Law(law) => laws.push(law),
+        }
+    }
+    plain
+}
+
+/// The text of a formula that must be there.
+fn formula(fields: &Fields, name: &str) -> Result<String, SceneError> {
+    let at = fields.required(name)?;
+    match (&at.node.value, fields.table.field(name)) {
+        (Value::Text(text), _) => Ok(text.clone()),
+        (Value::Number(number), _) => Ok(plain(*number)),
+        (_, Some(field)) => Err(at.refuse_value(&field.shape.allowed(), &field.for_example())),
+        (_, None) => Err(at.refuse_value("must be a formula", fields.table.about)),
+    }
+}
+
+fn formula_if_any(fields: &Fields, name: &str) -> Result<Option<String>, SceneError> {
+    fields.optional(name).map(|_| formula(fields, name)).transpose()
+}
+
+/// A number as a formula.
+fn plain(number: f64) -> String {
+    format!("{number:?}")
+}
+
+fn is_formula(at: &At) -> bool {
+    match &at.node.value {
+        Value::Text(text) => text.trim().parse::<f64>().is_err(),
+        Value::List(nodes) => {
+            nodes.iter().enumerate().any(|(number, node)| is_formula(&at.item(node, number)))
+        }
+        _ => false,
+    }
+}
+
+/// Refuses a `law` of time beside a formula.
+fn without_law(fields: &Fields) -> Result<(), SceneError> {
+    match fields.optional("law") {
+        None => Ok(()),
+        Some(at) => Err(at.refuse(
+            "stands beside a formula",
+            "must be left out where the force or torque is a formula",
+            "multiply the formula by it: formulas may use t",
+        )),
+    }
+}
+
+/// A force, or one by formulas.
+pub(super) fn force(fields: &Fields, name: String, known: &Bars) -> Result<Either<Force>, SceneError> {
+    let at = fields.required("force")?;
+    let Value::List(nodes) = &at.node.value else {
+        return super::loads::force(fields, name, known).map(Either::Plain);
+    };
+    if nodes.len() != 2 || !is_formula(&at) {
+        return super::loads::force(fields, name, known).map(Either::Plain);
+    }
+    without_law(fields)?;
+    let mut texts = Vec::new();
+    for (number, node) in nodes.iter().enumerate() {
+        let item = at.item(node, number);
+        match &node.value {
+            Value::Text(text) => texts.push(text.clone()),
+            Value::Number(number) => texts.push(plain(*number)),
+            _ => return Err(item.refuse_value("must be a number or a formula", "for example \"-c*tip.vx\"")),
+        }
+    }
+    let [x, y] = [texts[0].clone(), texts[1].clone()];
+    let load = Load::Force {
+        bar: known.bar(fields, "a force on the ground moves nothing")?,
+        point: fields.pair("point")?,
+        force: [x, y],
+        follows: fields.word_or_first("frame")? == 1,
+    };
+    Ok(Either::Law(LoadLaw { name, load }))
+}
+
+/// A torque, or one by a formula.
+pub(super) fn torque(fields: &Fields, name: String, known: &Bars) -> Result<Either<Torque>, SceneError> {
+    if !is_formula(&fields.required("torque")?) {
+        return super::loads::torque(fields, name, known).map(Either::Plain);
+    }
+    without_law(fields)?;
+    let hint = "a torque on the ground moves nothing; name the ground, if anything, in `relative_to`";
+    let bar = known.bar(fields, hint)?;
+    let relative_to =
+        known.relative_to(fields, bar, "leave it out where the ground takes the opposite torque")?;
+    let load = Load::Torque { bar, relative_to, torque: formula(fields, "torque")? };
+    Ok(Either::Law(LoadLaw { name, load }))
+}
+
+/// A spring, or one by formulas.
+pub(super) fn spring(fields: &Fields, name: String, known: &Bars) -> Result<Either<Spring>, SceneError> {
+    if fields.table.field("stiffness").is_some() {
+        return super::loads::spring(fields, name, known).map(Either::Plain);
+    }
+    let load = Load::Spring {
+        between: known.between(fields, "spring")?,
+        potential: formula_if_any(fields, "potential")?,
+        tension: formula_if_any(fields, "tension")?,
+    };
+    Ok(Either::Law(LoadLaw { name, load }))
+}
+
+/// A torsion spring, or one by formulas.
+pub(super) fn torsion_spring(
+    fields: &Fields,
+    name: String,
+    known: &Bars,
+) -> Result<Either<TorsionSpring>, SceneError> {
+    if fields.table.field("stiffness").is_some() {
+        return super::loads::torsion_spring(fields, name, known).map(Either::Plain);
+    }
+    let hint = "a torsion spring turns a bar; name the ground, if anything, in `relative_to`";
+    let bar = known.bar(fields, hint)?;
+    let load = Load::TorsionSpring {
+        bar,
+        relative_to: known.relative_to(fields, bar, "leave it out for an angle from +x")?,
+        potential: formula_if_any(fields, "potential")?,
+        torque: formula_if_any(fields, "torque")?,
+    };
+    Ok(Either::Law(LoadLaw { name, load }))
+}
+
+/// A point with a name.
+pub(super) fn point(fields: &Fields, name: String, known: &Bars) -> Result<NamedPoint, SceneError> {
+    let at = fields.required("name")?;
+    check_name(at.source, &name, at.node.span, &at.path, &[])?;
+    Ok(NamedPoint { name, place: known.place_of(fields)? })
+}
+
+/// A potential.
+pub(super) fn potential(fields: &Fields, name: String) -> Result<LoadLaw, SceneError> {
+    Ok(LoadLaw { name, load: Load::Potential { energy: formula(fields, "energy")? } })
+}
+
+/// An event.
+pub(super) fn event(fields: &Fields, name: String) -> Result<SceneEvent, SceneError> {
+    let direction = match fields.word_or_first("direction")? {
+        0 => Crossing::Either,
+        1 => Crossing::Rising,
+        _ => Crossing::Falling,
+    };
+    let set = match fields.optional("set") {
+        None => Vec::new(),
+        Some(at) => pairs(&at)?,
+    };
+    Ok(SceneEvent {
+        name,
+        when: formula(fields, "when")?,
+        direction,
+        stop: fields.word_or_first("action")? == 1,
+        on: fields.optional("on").map_or(Ok(Vec::new()), |at| names(&at))?,
+        off: fields.optional("off").map_or(Ok(Vec::new()), |at| names(&at))?,
+        set,
+    })
+}
+
+/// A list of names.
+pub(super) fn names(at: &At) -> Result<Vec<String>, SceneError> {
+    let hint = "for example [\"latch\"]";
+    let Value::List(nodes) = &at.node.value else {
+        return Err(at.refuse_value(&Shape::Names.allowed(), hint));
+    };
+    let name = |(number, node)| match &at.item(node, number).node.value {
+        Value::Text(name) => Ok(name.clone()),
+        _ => Err(at.item(node, number).refuse_value("must be the name of a part", hint)),
+    };
+    nodes.iter().enumerate().map(name).collect()
+}
+
+/// Formulas by name.
+fn pairs(at: &At) -> Result<Vec<(String, String)>, SceneError> {
+    let hint = "for example {\"speed\": \"sqrt(tip.vx^2 + tip.vy^2)\"}";
+    let Value::Object(members) = &at.node.value else {
+        return Err(at.refuse_value(&Shape::Signals.allowed(), hint));
+    };
+    let mut all = Vec::new();
+    for member in members {
+        match &member.node.value {
+            Value::Text(text) => all.push((member.key.clone(), text.clone())),
+            Value::Number(number) => all.push((member.key.clone(), plain(*number))),
+            _ => return Err(at.member(member).refuse_value("must be a formula", hint)),
+        }
+    }
+    Ok(all)
+}
+
+/// The signals of a scene.
+pub(super) fn signals(fields: &Fields, taken: &[Known]) -> Result<Vec<Signal>, SceneError> {
+    let Some(at) = fields.optional("signals") else { return Ok(Vec::new()) };
+    let all = pairs(&at)?;
+    if all.len() > MOST {
+        return Err(at.refuse(
+            &format!("has {} entries", all.len()),
+            &format!("must be at most {MOST}"),
+            "merge some",
+        ));
+    }
+    if let Value::Object(members) = &at.node.value {
+        let mut names: Vec<&str> = taken.iter().map(|known| known.name.as_str()).collect();
+        for member in members {
+            let one = at.member(member);
+            check_name(at.source, &member.key, member.span, &one.path, &names)?;
+            names.push(&member.key);
+        }
+    }
+    Ok(all.into_iter().map(|(name, formula)| Signal { name, formula }).collect())
+}
+
+/// Judges every formula of a scene where it stands: its names, its dimensions; and the parts that events name.
+pub(super) fn check(root: &At, scene: &Scene, parameters: &[Known]) -> Result<(), SceneError> {
+    if scene.laws.is_empty()
+        && scene.events.is_empty()
+        && scene.signals.is_empty()
+        && scene.inactive.is_empty()
+    {
+        return Ok(());
+    }
+    let mut names = Names::of(scene);
+    for known in parameters {
+        names.set_dimension(&known.name, known.dimension);
+    }
+    for signal in &scene.signals {
+        let at = root.child("signals").and_then(|at| at.child(&signal.name));
+        let (bound, dimension) = match (names.bind(&signal.formula), at) {
+            (Ok(found), _) => found,
+            (Err(error), Some(at)) => {
+                return Err(refused(at.source, at.node.span, &at.path, "must be a formula", &error));
+            }
+            (Err(error), None) => return Err(root.refuse(&error.problem, "must be a formula", &error.hint)),
+        };
+        names.signal(&signal.name, &bound, dimension);
+    }
+    for law in &scene.laws {
+        let names = names.within(&law.load);
+        let (list, keys): (&str, &[&str]) = match law.load {
+            Load::Force { .. } => ("forces", &["force"]),
+            Load::Torque { .. } => ("torques", &["torque"]),
+            Load::Spring { .. } => ("springs", &["potential", "tension"]),
+            Load::TorsionSpring { .. } => ("torsion_springs", &["potential", "torque"]),
+            Load::Potential { .. } => ("potentials", &["energy"]),
+        };
+        let Some(part) = root.child(list).and_then(|at| at.named(&law.name)) else { continue };
+        for key in keys {
+            let Some(at) = part.child(key) else { continue };
+            let quantity = quantity_of(list, key, &part);
+            match &at.node.value {
+                Value::List(nodes) => {
+                    for (number, node) in nodes.iter().enumerate() {
+                        judge(&at.item(node, number), &names, quantity.as_ref(), *key == "potential")?;
+                    }
+                }
+                _ => judge(&at, &names, quantity.as_ref(), matches!(*key, "potential" | "energy"))?,
+            }
+        }
+    }
+    let parts = Parts::of(scene);
+    for event in &scene.events {
+        let Some(at) = root.child("events").and_then(|at| at.named(&event.name)) else { continue };
+        if let Some(when) = at.child("when") {
+            judge(&when, &names, None, false)?;
+        }
+        for key in ["on", "off"] {
+            at.child(key).map_or(Ok(()), |list| parts.check(&list))?;
+        }
+        let Some(set) = at.child("set") else { continue };
+        for (name, _) in &event.set {
+            let Some(value) = set.child(name) else { continue };
+            let known: Vec<&str> = parameters.iter().map(|known| known.name.as_str()).collect();
+            if !known.contains(&name.as_str()) {
+                let hint = nearest(name, known.iter().copied())
+                    .map_or(format!("there are: {}", listed(&known)), |near| {
+                        format!("did you mean `{near}`?")
+                    });
+                return Err(value.refuse("is no parameter", "must be a parameter of the scene", &hint));
+            }
+            judge(&value, &names, None, false)?;
+        }
+    }
+    root.child("inactive").map_or(Ok(()), |list| parts.check(&list))
+}
+
+/// What the field of a part must come to.
+fn quantity_of(list: &str, key: &str, part: &At) -> Option<Quantity> {
+    let Some(Field { shape: Shape::List { of, .. }, .. }) = SCENE.field(list) else { return None };
+    let table = crate::scene::format::kind(of, |key| part.has(key))?;
+    match table.field(key).map(|field| &field.shape) {
+        Some(Shape::Formula(quantity) | Shape::LawNumber(quantity) | Shape::LawPair(quantity)) => {
+            Some(*quantity)
+        }
+        _ => None,
+    }
+}
+
+/// Judges one formula.
+fn judge(at: &At, names: &Names, quantity: Option<&Quantity>, is_potential: bool) -> Result<(), SceneError> {
+    let Value::Text(text) = &at.node.value else { return Ok(()) };
+    let allowed =
+        quantity.map_or("must be a formula".to_owned(), |quantity| Shape::Formula(*quantity).allowed());
+    let refused = |error| refused(at.source, at.node.span, &at.path, &allowed, &error);
+    let (bound, dimension) = names.bind(text).map_err(refused)?;
+    if let Some(quantity) = quantity {
+        fits(&bound.formula, dimension, quantity).map_err(refused)?;
+    }
+    if is_potential && let Some(name) = names.changing(&bound) {
+        let problem = format!("depends on {name}");
+        let allowed = "a potential is a formula of angles and positions";
+        let hint = "what depends on time or rates does work: give it as a force, a torque or a tension";
+        return Err(at.refuse(&problem, allowed, hint));
+    }
+    Ok(())
+}
+
+/// What events can switch.
+struct Parts<'a>(Vec<&'a str>);
+
+impl<'a> Parts<'a> {
+    fn of(scene: &'a Scene) -> Self {
+        let names = (scene.springs.iter().filter(|spring| !spring.rigid).map(|part| &part.name))
+            .chain(scene.torsion_springs.iter().map(|part| &part.name))
+            .chain(scene.forces.iter().map(|part| &part.name))
+            .chain(scene.torques.iter().map(|part| &part.name))
+            .chain(scene.laws.iter().map(|part| &part.name));
+        Self(names.map(String::as_str).collect())
+    }
+
+    /// Refuses a list with a name that none has.
+    fn check(&self, list: &At) -> Result<(), SceneError> {
+        let Value::List(nodes) = &list.node.value else { return Ok(()) };
+        for (number, node) in nodes.iter().enumerate() {
+            let at = list.item(node, number);
+            let Value::Text(name) = &node.value else { continue };
+            if self.0.contains(&name.as_str()) {
+                continue;
+            }
+            let hint = match nearest(name, self.0.iter().copied()) {
+                Some(near) => format!("did you mean \"{near}\"?"),
+                None if self.0.is_empty() => "the scene has none".to_owned(),
+                None => format!("there are: {}", listed(&self.0)),
+            };
+            let allowed = "must be the name of a spring, torsion spring, force, torque or potential";
+            return Err(at.refuse_value(allowed, &hint));
+        }
+        Ok(())
+    }
+}

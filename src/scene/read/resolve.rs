@@ -1,0 +1,326 @@
+//! Formulas in the place of numbers: `"length": "2*l"`, with the scene's parameters.
+//!
+//! Before a scene is judged, every number that is written as a formula of parameters becomes that number; a
+//! formula of time and state, where the format takes one, stays a text for the reader of loads and events.
+
+use crate::scene::Parameter;
+use crate::scene::error::SceneError;
+use crate::scene::format::{Quantity, SCENE, Shape, Table, about, kind};
+use crate::scene::formula::unit::Dimension;
+use crate::scene::formula::{FUNCTIONS, Formula, FormulaError};
+use crate::scene::locate::{Node, Source, Span, Value, push_index, push_key};
+
+/// Names that formulas give a meaning of their own.
+const RESERVED: [&str; 5] = ["t", "pi", "length", "rate", "angle"];
+/// Parameters at most.
+const MOST: usize = 1000;
+
+/// A parameter with what is known of it beside its value.
+pub(super) struct Known {
+    pub name: String,
+    pub value: f64,
+    pub dimension: Option<Dimension>,
+}
+
+impl From<&Known> for Parameter {
+    fn from(known: &Known) -> Self {
+        Self { name: known.name.clone(), value: known.value }
+    }
+}
+
+/// Puts numbers in the place of formulas of parameters; returns the parameters.
+///
+/// # Errors
+/// A formula that is none, a name that nothing has, a dimension that does not fit, a cycle.
+pub(super) fn resolve(source: &Source, tree: &mut Node) -> Result<Vec<Known>, SceneError> {
+    let parameters = parameters(source, tree)?;
+    Resolver { source, parameters: &parameters }.members(tree, &SCENE, "")?;
+    Ok(parameters)
+}
+
+/// Refuses a name that formulas cannot use.
+pub(super) fn check_name(
+    source: &Source,
+    name: &str,
+    span: Span,
+    path: &str,
+    taken: &[&str],
+) -> Result<(), SceneError> {
+    let mut bytes = name.bytes();
+    let is_plain = bytes.next().is_some_and(|byte| byte.is_ascii_alphabetic() || byte == b'_')
+        && bytes.all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
+        && name.len() <= crate::scene::format::LONGEST_NAME;
+    let allowed = "must be a name: a letter, then letters, digits or _";
+    if !is_plain {
+        return Err(source.refusal(span, path, "is no name for formulas", allowed, "for example \"k\""));
+    }
+    if RESERVED.contains(&name) || FUNCTIONS.iter().any(|function| function.0 == name) {
+        let hint = "t is time, length, rate and angle are those of the spring a formula belongs to";
+        return Err(source.refusal(span, path, "has a meaning of its own in formulas", allowed, hint));
+    }
+    if taken.contains(&name) {
+        return Err(source.refusal(
+            span,
+            path,
+            "is a name that is taken",
+            "names must be different",
+            "rename one",
+        ));
+    }
+    Ok(())
+}
+
+/// An error about a formula in the text at `span`, with the bytes at fault marked.
+pub(super) fn refused(
+    source: &Source,
+    span: Span,
+    path: &str,
+    allowed: &str,
+    error: &FormulaError,
+) -> SceneError {
+    let place = source.inside(span, error.bytes.0, error.bytes.1);
+    let problem = format!("= {}: {}", source.written(span), error.problem);
+    source.refusal(place, path, &problem, allowed, &error.hint)
+}
+
+/// The parameters, in the order of the text.
+fn parameters(source: &Source, tree: &Node) -> Result<Vec<Known>, SceneError> {
+    let Value::Object(members) = &tree.value else { return Ok(Vec::new()) };
+    let Some(holder) = members.iter().find(|member| member.key == "parameters") else {
+        return Ok(Vec::new());
+    };
+    let Value::Object(members) = &holder.node.value else { return Ok(Vec::new()) };
+    let allowed = Shape::Parameters.allowed();
+    if members.len() > MOST {
+        let problem = format!("has {} entries", members.len());
+        return Err(source.refusal(holder.span, "parameters", &problem, &allowed, "compute the rest before"));
+    }
+    let mut formulas = Vec::new();
+    let mut names: Vec<&str> = Vec::new();
+    for member in members {
+        let mut path = "parameters".to_owned();
+        push_key(&mut path, &member.key);
+        check_name(source, &member.key, member.span, &path, &names)?;
+        let span = member.node.span;
+        let formula = match &member.node.value {
+            Value::Number(number) if number.is_finite() => Err(*number),
+            Value::Text(text) => {
+                Ok(Formula::parse(text).map_err(|error| refused(source, span, &path, &allowed, &error))?)
+            }
+            _ => {
+                return Err(source.refused_value(
+                    span,
+                    &path,
+                    &allowed,
+                    "for example 0.6 or \"15*m*g/(2*l)\"",
+                ));
+            }
+        };
+        formulas.push((path, span, formula));
+        names.push(&member.key);
+    }
+    let mut order = Order { source, names: &names, formulas: &formulas, known: Vec::new(), open: Vec::new() };
+    order.known.resize_with(names.len(), || None);
+    (0..names.len()).try_for_each(|number| order.settle(number))?;
+    let found = order.known.into_iter().flatten();
+    Ok(names
+        .iter()
+        .zip(found)
+        .map(|(name, (value, dimension))| Known { name: (*name).to_owned(), value, dimension })
+        .collect())
+}
+
+type Pending = (String, Span, Result<Formula, f64>);
+
+/// Evaluates parameters after those they are made of.
+struct Order<'a> {
+    source: &'a Source,
+    names: &'a [&'a str],
+    formulas: &'a [Pending],
+    known: Vec<Option<(f64, Option<Dimension>)>>,
+    /// Those that wait for others.
+    open: Vec<usize>,
+}
+
+impl Order<'_> {
+    fn settle(&mut self, number: usize) -> Result<(), SceneError> {
+        if self.known[number].is_some() {
+            return Ok(());
+        }
+        let (path, span, formula) = &self.formulas[number];
+        let formula = match formula {
+            Err(value) => {
+                self.known[number] = Some((*value, None));
+                return Ok(());
+            }
+            Ok(formula) => formula,
+        };
+        let allowed = Shape::Parameters.allowed();
+        let refused = |error: &FormulaError| refused(self.source, *span, path, &allowed, error);
+        if self.open.contains(&number) || self.open.len() >= crate::scene::formula::DEEPEST {
+            let chain: Vec<&str> = self.open.iter().chain([&number]).map(|&one| self.names[one]).collect();
+            let problem = format!("is made of itself: {}", chain.join(" of "));
+            return Err(self.source.refusal(*span, path, &problem, &allowed, "give one of them as a number"));
+        }
+        let mut parts = Vec::new();
+        for name in formula.names() {
+            let part = self.names.iter().position(|known| *known == name);
+            parts.push(part.ok_or_else(|| refused(&formula.unknown(name, self.names)))?);
+        }
+        self.open.push(number);
+        parts.iter().try_for_each(|&part| self.settle(part))?;
+        self.open.pop();
+        let found: Vec<_> = parts.iter().filter_map(|&part| self.known[part]).collect();
+        let (values, dimensions): (Vec<f64>, Vec<_>) = found.into_iter().unzip();
+        let refused = |error: &FormulaError| {
+            self::refused(self.source, *span, path, &Shape::Parameters.allowed(), error)
+        };
+        let dimension = formula.dimension(&dimensions).map_err(|error| refused(&error))?;
+        let value = formula.value(&values);
+        if !value.is_finite() {
+            let problem = format!("comes to {value}");
+            return Err(self.source.refusal(*span, path, &problem, &allowed, "look for a division by zero"));
+        }
+        self.known[number] = Some((value, dimension));
+        Ok(())
+    }
+}
+
+struct Resolver<'a> {
+    source: &'a Source,
+    parameters: &'a [Known],
+}
+
+impl Resolver<'_> {
+    /// All members of an object.
+    fn members(&self, node: &mut Node, table: &'static Table, path: &str) -> Result<(), SceneError> {
+        let Value::Object(members) = &mut node.value else { return Ok(()) };
+        for member in members {
+            if let Some(field) = table.field(&member.key) {
+                let mut inner = path.to_owned();
+                push_key(&mut inner, &member.key);
+                self.visit(&mut member.node, &field.shape, &inner)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn visit(&self, node: &mut Node, shape: &Shape, path: &str) -> Result<(), SceneError> {
+        let each = |nodes: &mut [Node], one: &dyn Fn(&mut Node, &str) -> Result<(), SceneError>| {
+            nodes.iter_mut().enumerate().try_for_each(|(number, node)| {
+                let mut inner = path.to_owned();
+                push_index(&mut inner, number);
+                one(node, &inner)
+            })
+        };
+        match (shape, &mut node.value) {
+            (Shape::Number(quantity), Value::Text(_)) => self.number(node, quantity, shape, path, false),
+            (Shape::LawNumber(quantity), Value::Text(_)) => self.number(node, quantity, shape, path, true),
+            (Shape::Inertia(quantity), Value::Text(text)) if text != "full" && text != "slender" => {
+                // A word that is nearly one of the two is left to the reader, who knows what was meant.
+                if Formula::parse(text).is_ok_and(|formula| self.knows(&formula)) {
+                    return self.number(node, quantity, shape, path, false);
+                }
+                Ok(())
+            }
+            (Shape::Pair(quantity), Value::List(nodes)) => {
+                each(nodes, &|node, path| self.number(node, quantity, &Shape::Number(*quantity), path, false))
+            }
+            (Shape::LawPair(quantity), Value::List(nodes)) => each(nodes, &|node, path| {
+                self.number(node, quantity, &Shape::LawNumber(*quantity), path, true)
+            }),
+            (Shape::Object(table), _) => self.members(node, table, path),
+            (Shape::Between, Value::List(nodes)) => {
+                each(nodes, &|node, path| self.members(node, &crate::scene::format::PLACE, path))
+            }
+            (Shape::List { of, .. }, Value::List(nodes)) => each(nodes, &|node, path| {
+                let Value::Object(members) = &node.value else { return Ok(()) };
+                let has = |key: &str| members.iter().any(|member| member.key == key);
+                kind(of, has).map_or(Ok(()), |table| self.members(node, table, path))
+            }),
+            (Shape::ByBar(table), Value::Object(members)) => members.iter_mut().try_for_each(|member| {
+                let mut inner = path.to_owned();
+                push_key(&mut inner, &member.key);
+                self.members(&mut member.node, table, &inner)
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    fn find(&self, name: &str) -> Option<&Known> {
+        self.parameters.iter().find(|known| known.name == name)
+    }
+
+    /// True where a formula has no names but those of parameters.
+    fn knows(&self, formula: &Formula) -> bool {
+        formula.names().all(|name| self.find(name).is_some())
+    }
+
+    /// Puts the number in the place of its formula.
+    fn number(
+        &self,
+        node: &mut Node,
+        quantity: &Quantity,
+        shape: &Shape,
+        path: &str,
+        may_be_law: bool,
+    ) -> Result<(), SceneError> {
+        let Value::Text(text) = &node.value else { return Ok(()) };
+        // A quoted number is left to the reader, who says so.
+        if text.trim().parse::<f64>().is_ok() {
+            return Ok(());
+        }
+        let refused = |error: &FormulaError| refused(self.source, node.span, path, &shape.allowed(), error);
+        let formula = Formula::parse(text).map_err(|error| refused(&error))?;
+        if may_be_law && !self.knows(&formula) {
+            return Ok(());
+        }
+        let mut values = Vec::new();
+        let mut dimensions = Vec::new();
+        for name in formula.names() {
+            let known = self.find(name).ok_or_else(|| {
+                let names: Vec<&str> = self.parameters.iter().map(|known| known.name.as_str()).collect();
+                let mut error = formula.unknown(name, &names);
+                if names.is_empty() {
+                    error.hint =
+                        "\"parameters\": {…} gives numbers names; numbers depend on these alone".into();
+                }
+                refused(&error)
+            })?;
+            values.push(known.value);
+            dimensions.push(known.dimension);
+        }
+        let dimension = formula.dimension(&dimensions).map_err(|error| refused(&error))?;
+        fits(&formula, dimension, quantity).map_err(|error| refused(&error))?;
+        let value = formula.value(&values);
+        if !quantity.holds(value) {
+            let problem = format!("= {} comes to {}", self.source.written(node.span), about(value));
+            let hint = "look at the parameters it is made of";
+            return Err(self.source.refusal(node.span, path, &problem, &shape.allowed(), hint));
+        }
+        node.value = Value::Number(value);
+        Ok(())
+    }
+}
+
+/// Refuses a formula of another dimension than its field has.
+pub(super) fn fits(
+    formula: &Formula,
+    dimension: Option<Dimension>,
+    quantity: &Quantity,
+) -> Result<(), FormulaError> {
+    let wanted = Dimension::of(quantity.unit);
+    match dimension {
+        Some(found) if !found.is(wanted) => {
+            let unit = if quantity.unit.is_empty() { "a pure number" } else { quantity.unit };
+            Err(FormulaError::new(
+                formula.text(),
+                0,
+                formula.text().len(),
+                format!("is {found}, not {unit}"),
+                "numbers without a unit fit anything".into(),
+            ))
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,356 @@
+//! Scenes with formulas: against closed forms and against the scene's own parts.
+
+use driftless::Level;
+use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, integrate};
+use driftless::scene::formula::Formula;
+use driftless::scene::{Scene, parse_scene, read_scene};
+use driftless::{Mechanism, Simulation};
+use proptest::prelude::*;
+use std::sync::Arc;
+
+fn value(text: &str) -> f64 {
+    Formula::parse(text).unwrap_or_else(|error| panic!("{text}: {error}")).value(&[])
+}
+
+fn scene(text: &str) -> Scene {
+    parse_scene(text, "test", &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn refused(text: &str) -> String {
+    parse_scene(text, "test", &[]).expect_err("no scene").to_string()
+}
+
+fn run(scene: &Scene, request: &Request) -> Outcome {
+    let mechanism = Arc::new(Mechanism::new(scene).unwrap_or_else(|error| panic!("{}: {error}", scene.name)));
+    let plan =
+        Plan::new(scene, &mechanism, request).unwrap_or_else(|refusal| panic!("{}: {refusal}", scene.name));
+    let start = mechanism.start(scene);
+    let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a run");
+    integrate(run.trusted(Level::Auto, &start), &mut |_| Ok(())).expect("samples")
+}
+
+fn adaptive(method: MethodId, rtol: f64) -> Request {
+    Request { method: Some(method), rtol: Some(rtol), atol: Some(rtol), ..Request::default() }
+}
+
+fn methods() -> Vec<Request> {
+    vec![
+        adaptive(MethodId::Dopri5, 1e-10),
+        adaptive(MethodId::Dop853, 1e-11),
+        adaptive(MethodId::Dp5, 1e-10),
+        adaptive(MethodId::Dp8, 1e-12),
+        adaptive(MethodId::Taylor, 1e-13),
+        adaptive(MethodId::Radau(3), 1e-9),
+        adaptive(MethodId::Radau(5), 1e-11),
+    ]
+}
+
+/// A bar on its centre without gravity, of moment of inertia 1.5 kg·m², with more of a scene.
+fn rotor(start: [f64; 2], until: f64, more: &str) -> String {
+    format!(
+        r#"{{"name": "rotor", "gravity": [0, 0], "bars": [{{"name": "bar", "mass": 1, "centre": [0, 0], "inertia": 1.5}}],
+        "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "bar", "point": [0, 0]}}]}}],
+        "start": {{"bar": {{"phi": {}, "omega": {}}}}}, "until": {until}, "every": {until}, {more}}}"#,
+        start[0], start[1]
+    )
+}
+
+#[test]
+fn operators_bind_as_in_mathematics() {
+    for (text, expected) in [
+        ("-2^2", -4.0),
+        ("2^3^2", 512.0),
+        ("2^-2", 0.25),
+        ("1 - 2 - 3", -4.0),
+        ("8/4/2", 1.0),
+        ("2*-3", -6.0),
+        ("(-2)^3", -8.0),
+        ("(-2)^(4/2)", 4.0),
+        ("1.5e2 + .5", 150.5),
+        ("sqrt(16) + pow(2, 3)", 12.0),
+        ("cos(pi)", -1.0),
+        ("log(exp(2)) + tanh(0) + tan(0) + sin(0)", 2.0),
+        ("5 mm", 0.005),
+        ("180 deg - pi", 0.0),
+        ("2 N*s/m + 1", 3.0),
+        ("3 m/s^2*2", 6.0),
+        ("60 rpm/(2*pi)", 1.0),
+        ("abs(-3) + sign(-2) + min(1, 2) + max(1, 2)", 5.0),
+        ("if(1 < 2, 10, 20) + if(1 > 2, 1, 2)", 12.0),
+    ] {
+        assert!((value(text) - expected).abs() < 1e-14, "{text} = {}", value(text));
+    }
+    assert_eq!(Formula::parse("a*b.c - a").expect("a formula").value(&[3.0, 5.0]), 12.0);
+}
+
+#[test]
+fn refusals_of_formulas_point_at_the_place() {
+    let message = |text: &str| Formula::parse(text).expect_err("no formula").to_string();
+    assert_eq!(
+        message("2*sinn(x)"),
+        "column 3: unknown function sinn\n  | 2*sinn(x)\n  |   ^^^^\n  hint: did you mean sin?"
+    );
+    for (text, begins) in [
+        ("", "column 1: the formula ends too early"),
+        ("1 +", "column 4: the formula ends too early"),
+        ("(1 + 2", "column 1: this parenthesis is never closed"),
+        ("1)", "column 2: this parenthesis closes nothing"),
+        ("30 dge", "column 4: dge is no unit"),
+        ("x y", "column 3: an operator is missing here"),
+        ("a < b", "column 3: a comparison outside of `if`"),
+        ("atan2(1)", "column 1: atan2 takes 2 arguments, not 1"),
+        ("sin(1, 2)", "column 1: sin takes 1 argument, not 2"),
+        ("1e999", "column 1: this number is too large"),
+        ("ä + 1", "column 1: a number, a name or ( is missing here"),
+        ("x..y", "column 1: a part of this name is empty"),
+        (&"(".repeat(500), "column 65: nested too deeply"),
+        (&"1+".repeat(5000), "column 1: the formula is too long"),
+    ] {
+        assert!(message(text).starts_with(begins), "{text}: {}", message(text));
+    }
+}
+
+#[test]
+fn one_parameter_moves_a_bar_and_its_hinge() {
+    let with = |parameters: &str, length: &str| {
+        format!(
+            r#"{{"name": "two", "gravity": [9.81, 0], {parameters}
+            "bars": [{{"name": "a", "length": {length}, "width": 0.05, "thickness": 0.003, "density": 670}},
+                     {{"name": "b", "length": {length}, "width": 0.05, "thickness": 0.003, "density": 670}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "a", "point": [0, 0]}}]}},
+                       {{"name": "B", "between": [{{"body": "a", "point": [{length}, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+            "start": {{"a": {{"phi": 1, "omega": 0}}, "b": {{"phi": 1, "omega": 0}}}}, "until": 1, "every": 1}}"#
+        )
+    };
+    let text = with(r#""parameters": {"l": 0.6, "twice": "2*l"},"#, r#""l""#);
+    assert_eq!(scene(&text), Scene { parameters: scene(&text).parameters, ..scene(&with("", "0.6")) });
+    for set in ["l=0.75", "parameters.l=0.75", "l=3/4"] {
+        let moved = parse_scene(&text, "test", &[set.parse().expect("an override")]).expect("a scene");
+        assert_eq!((moved.bars[1].length, moved.hinges[1].between[0].point), (0.75, [0.75, 0.0]), "{set}");
+        assert_eq!(moved.parameters[1].value, 1.5);
+    }
+    // What is written out reads back to the same.
+    let again = parse_scene(&scene(&text).to_input().to_string(), "again", &[]).expect("a scene");
+    assert_eq!(again, scene(&text));
+}
+
+#[test]
+fn refusals_in_scenes_name_the_place() {
+    let base = |parameters: &str, torque: &str| {
+        rotor(
+            [1.0, 0.0],
+            1.0,
+            &format!(
+                r#""parameters": {{{parameters}}}, "torques": [{{"name": "T", "body": "bar", "torque": {torque}}}]"#
+            ),
+        )
+    };
+    for (parameters, torque, says) in [
+        (r#""k": "2*q""#, "1", "unknown name q"),
+        (r#""a": "b", "b": "a""#, "1", "is made of itself: a of b of a"),
+        (r#""t": 1"#, "1", "has a meaning of its own"),
+        (r#""k": 1"#, r#""-k*bar.phy""#, "did you mean bar.phi?"),
+        (r#""k": "2 mm""#, r#""k""#, "is m, not N·m"),
+        (r#""k": 1"#, r#""-k*bar.phi + 2 m""#, "is m, not N·m"),
+        (r#""k": 1"#, r#""sin(2 s)""#, "takes a pure number, not s"),
+        (r#""k": 1"#, r#""t + 2 m""#, "puts s and m together"),
+        (r#""k": 1"#, r#""(""#, "ends too early"),
+    ] {
+        let message = refused(&base(parameters, torque));
+        assert!(message.contains(says) && message.contains('^'), "{message}");
+    }
+    let with = |more: &str| refused(&rotor([1.0, 0.0], 1.0, more));
+    let law = with(r#""torques": [{"name": "T", "body": "bar", "torque": "-bar.phi", "law": {"start": 1}}]"#);
+    assert!(law.contains("stands beside a formula"), "{law}");
+    let potential = with(r#""potentials": [{"name": "V", "energy": "0.5*bar.omega^2"}]"#);
+    assert!(potential.contains("depends on bar.omega"), "{potential}");
+    let through = with(r#""signals": {"s": "t^2"}, "potentials": [{"name": "V", "energy": "2*s"}]"#);
+    assert!(through.contains("depends on s, which depends on t"), "{through}");
+    let part = with(r#""events": [{"name": "E", "when": "bar.phi", "off": ["sprnig"]}]"#);
+    assert!(part.contains("events[0].off[0]"), "{part}");
+}
+
+#[test]
+fn a_spring_as_a_formula_is_the_scenes_own_in_every_method() {
+    let mut own = read_scene("examples/scenes/spring.json".as_ref(), &[]).expect("a scene");
+    (own.until, own.every) = (1.0, 1.0);
+    let mut input = own.to_input();
+    let spring = &input["springs"][0];
+    let (k, free) = (&spring["stiffness"], &spring["free_length"]);
+    let between = spring["between"].clone();
+    let texts =
+        [("potential", format!("{k}*(length - {free})^2/2")), ("tension", format!("{k}*(length - {free})"))];
+    let reference = run(&own, &adaptive(MethodId::Taylor, 1e-14));
+    for (key, text) in texts {
+        input["springs"] = serde_json::json!([{"name": "spring", "between": between, key: text}]);
+        let other = scene(&input.to_string());
+        let fixed =
+            Request { method: Some(MethodId::Gauss(8)), step: Some(1.0 / 512.0), ..Request::default() };
+        for request in methods().iter().chain([&fixed]) {
+            let outcome = run(&other, request);
+            assert!(outcome.stop.is_none(), "{:?}: {:?}", request.method, outcome.stop);
+            for (a, b) in reference.last.phi.iter().zip(&outcome.last.phi) {
+                assert!((a - b).abs() < 3e-8, "{key} by {:?}: {a} and {b}", request.method);
+            }
+            assert!(outcome.drift.energy.max < 1e-8, "{:?}: {:e}", request.method, outcome.drift.energy.max);
+        }
+    }
+}
+
+/// A torque of constant size towards the middle: parabolas, a quarter of a period √(2 φ₀ J/k).
+#[test]
+fn a_switching_torque_moves_along_parabolas() {
+    let (phi, k, inertia, until) = (0.7_f64, 2.0, 1.5, 20.0);
+    let quarter = (2.0 * phi * inertia / k).sqrt();
+    let phase = (until / quarter) % 4.0;
+    let (whole, rest) = (phase.floor(), phase.fract());
+    let side = if whole == 0.0 || whole == 3.0 { 1.0 } else { -1.0 };
+    let from_turn = if whole == 0.0 || whole == 2.0 { rest } else { 1.0 - rest };
+    let expected = side * phi * (1.0 - from_turn * from_turn);
+    let text = rotor(
+        [phi, 0.0],
+        until,
+        r#""parameters": {"k": 2}, "torques": [{"name": "bang", "body": "bar", "torque": "-k*sign(bar.phi)"}]"#,
+    );
+    for request in methods() {
+        let outcome = run(&scene(&text), &request);
+        assert!(outcome.stop.is_none(), "{:?}", outcome.stop);
+        let error = (outcome.last.phi[0] - expected).abs();
+        assert!(error < 1e-9, "{:?}: {error:e}", request.method);
+        let trust = outcome.trust.expect("an estimate");
+        assert!(trust.error_estimate.is_some_and(|estimate| estimate < 1e-8), "{:?}", request.method);
+    }
+    let gauss = Request { method: Some(MethodId::Gauss(8)), step: Some(0.01), ..Request::default() };
+    let scene = scene(&text);
+    let mechanism = Mechanism::new(&scene).expect("equations");
+    let refusal = Plan::new(&scene, &mechanism, &gauss).expect_err("refused").to_string();
+    assert!(refusal.contains("laws or parts switch"), "{refusal}");
+}
+
+/// Dry friction as a formula sticks, and sticking slides along its corner: refused by name, at the time where it
+/// sticks.  Without a spring: ω = ω₀ - bt/J until J ω₀/b.
+#[test]
+fn sliding_along_a_corner_is_named() {
+    let text = rotor(
+        [0.0, 2.0],
+        10.0,
+        r#""torques": [{"name": "dry", "body": "bar", "torque": "-0.5*sign(bar.omega)"}]"#,
+    );
+    for request in methods() {
+        let stop = run(&scene(&text), &request).stop.expect("a stop");
+        assert_eq!(stop.cause.word(), "sliding", "{stop:?}");
+        assert!((stop.t - 6.0).abs() < 1e-9 && stop.what.contains("dry"), "{stop:?}");
+    }
+}
+
+/// Events: a spring ceases to act when the rotor passes zero, then it turns at a constant rate √(k/J) φ₀.
+#[test]
+fn events_switch_parts_and_set_parameters() {
+    let text = rotor(
+        [0.5, 0.0],
+        10.0,
+        r#""parameters": {"k": 6}, "torsion_springs": [{"name": "coil", "body": "bar", "potential": "k*angle^2/2"}],
+        "events": [{"name": "middle", "when": "bar.phi", "off": ["coil"]},
+                   {"name": "turn", "when": "bar.phi + pi", "action": "stop"}]"#,
+    );
+    let rate = (6.0_f64 / 1.5).sqrt();
+    let release = std::f64::consts::FRAC_PI_2 / rate;
+    let end = release + std::f64::consts::PI / (0.5 * rate);
+    for request in methods() {
+        let outcome = run(&scene(&text), &request);
+        assert_eq!(outcome.ended_by.as_deref(), Some("turn"), "{:?} {:?}", request.method, outcome.stop);
+        let times: Vec<f64> = outcome.events.iter().map(|event| event.t).collect();
+        assert!((times[0] - release).abs() < 1e-8 && (times[1] - end).abs() < 1e-7, "{times:?}");
+        assert!(outcome.drift.energy.max < 1e-8);
+    }
+    // The stiffness is a quarter from the first passage on: the second half of the swing takes twice as long.
+    let text = rotor(
+        [0.5, 0.0],
+        3.0 * release,
+        r#""parameters": {"k": 6}, "torsion_springs": [{"name": "coil", "body": "bar", "torque": "k*angle"}],
+        "events": [{"name": "middle", "when": "bar.phi", "direction": "falling", "set": {"k": "k/4"}}]"#,
+    );
+    for request in methods() {
+        let outcome = run(&scene(&text), &request);
+        assert!((outcome.last.phi[0] + 1.0).abs() < 1e-7, "{:?}: {}", request.method, outcome.last.phi[0]);
+    }
+    // A part that is inactive at first: free until the event, then a swing about it.
+    let text = rotor(
+        [0.0, 1.0],
+        1.0 + std::f64::consts::FRAC_PI_2 / 2.0,
+        r#""torsion_springs": [{"name": "latch", "body": "bar", "stiffness": 6, "free_angle": 1}], "inactive": ["latch"],
+        "events": [{"name": "there", "when": "bar.phi - 1", "on": ["latch"]}]"#,
+    );
+    for request in methods() {
+        let outcome = run(&scene(&text), &request);
+        assert!((outcome.last.phi[0] - 1.5).abs() < 1e-8, "{:?}: {}", request.method, outcome.last.phi[0]);
+    }
+}
+
+/// Pauses and samples change no bit where laws switch.
+#[test]
+fn switching_runs_end_in_the_same_bits_however_sampled_and_resumed() {
+    let text = rotor(
+        [0.7, 0.1],
+        8.0,
+        r#""parameters": {"k": 2}, "signals": {"lag": "bar.phi + 0.1*bar.omega"},
+        "torques": [{"name": "bang", "body": "bar", "torque": "-k*sign(lag) - 0.1*abs(bar.phi)"}],
+        "events": [{"name": "soft", "when": "t - 3", "set": {"k": "k/2"}}]"#,
+    );
+    for request in [
+        adaptive(MethodId::Taylor, 1e-12),
+        adaptive(MethodId::Dp8, 1e-11),
+        adaptive(MethodId::Radau(5), 1e-10),
+    ] {
+        let whole = run(&scene(&text), &request);
+        assert!(whole.stop.is_none(), "{:?}", whole.stop);
+        let fine = Scene { every: 0.01, ..scene(&text) };
+        assert_eq!(whole.last.phi, run(&fine, &request).last.phi, "{:?}", request.method);
+        let mechanism = Arc::new(Mechanism::new(&fine).expect("equations"));
+        let start = mechanism.start(&fine);
+        let plan = Plan::new(&fine, &mechanism, &request).expect("a plan");
+        let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).expect("a run");
+        let mut running = driftless::run::Running::new(run);
+        let mut count = 0;
+        loop {
+            let mut pauses = || {
+                count += 1;
+                count % 7 == 0
+            };
+            if running.go(&mut |_: &driftless::Sample| Ok(()), &mut pauses).expect("samples") {
+                break;
+            }
+            let snapshot = serde_json::to_string(&running.snapshot()).expect("JSON");
+            let snapshot = serde_json::from_str(&snapshot).expect("a snapshot");
+            running =
+                driftless::run::Running::resume(Arc::clone(&mechanism), &start, snapshot).expect("resumed");
+        }
+        assert_eq!(running.finish().last.phi, whole.last.phi, "{:?}", request.method);
+    }
+}
+
+#[test]
+fn a_simulation_takes_scenes_with_formulas() {
+    let text = rotor(
+        [0.3, 0.0],
+        1.0,
+        r#""torques": [{"name": "PD", "body": "bar", "torque": "-4*bar.phi - 0.5*bar.omega"}]"#,
+    );
+    let outcome = Simulation::new(&scene(&text)).expect("equations").run().expect("a run");
+    // J φ'' + c φ' + k φ = 0.
+    let (decay, rate): (f64, f64) = (0.5 / 3.0, (4.0_f64 / 1.5 - (0.5_f64 / 3.0).powi(2)).sqrt());
+    let expected = 0.3 * (-decay).exp() * (rate.cos() + decay / rate * rate.sin());
+    assert!((outcome.last.phi[0] - expected).abs() < 1e-8);
+}
+
+proptest! {
+    #[test]
+    fn no_text_makes_the_parser_panic(text in ".{0,200}", bytes in "[-+*/^()., a-z0-9<>=]{0,200}") {
+        for text in [&text, &bytes] {
+            match Formula::parse(text) {
+                Ok(formula) => drop(formula.value(&vec![0.5; formula.names().count()])),
+                Err(error) => drop(error.to_string()),
+            }
+        }
+    }
+}
