@@ -95,11 +95,29 @@ fn a_scene_is_read_from_standard_input() {
 }
 
 #[test]
-fn formulas_in_a_scene_file_get_a_hint() {
+fn formulas_stand_in_scene_files_and_options() {
     let program = Program::with_scenes(&["free"]);
-    let scene = program.read("free.json").replacen("\"phi\": 1.5707963267948966", "\"phi\": \"pi/2\"", 1);
-    program.write("free.json", &scene);
-    program.run("check free.json").exits(3).says(&["\"pi/2\"", "write 1.5707963267948966", "--set"]);
+    let text = program.read("free.json");
+    let scene = text.replacen("\"phi\": 1.5707963267948966", "\"phi\": \"pi/2\"", 1);
+    assert_ne!(text, scene);
+    program.write("formula.json", &scene);
+    program.run("run free.json --until 1 --every 0.5 -q --no-charts --out one").exits(0);
+    program.run("run formula.json --until 1 --every 0.5 -q --no-charts --out two").exits(0);
+    let table = |out: &str| program.read(&format!("{out}/free/taylor-1e-9/trajectory.csv"));
+    assert_eq!(table("one"), table("two"));
+    let scene = text.replacen("\"phi\": 1.5707963267948966", "\"phi\": \"pi/tow\"", 1);
+    program.write("formula.json", &scene);
+    program.run("check formula.json").exits(3).says(&["unknown name tow", "^^^", "hint:"]);
+    // A parameter of the scene is set and varied by its name, and moves all that is made of it.
+    let scene = text.replace("\"length\": 0.6", "\"length\": \"l\"").replacen(
+        '{',
+        "{\"parameters\": {\"l\": 0.6},",
+        1,
+    );
+    program.write("formula.json", &scene);
+    program.run("run formula.json --set l=3/5 --until 1 --every 0.5 -q --no-charts --out three").exits(0);
+    assert_eq!(table("one"), table("three"));
+    program.run("sweep formula.json --vary l=0.5..0.7:3 --until 1 -q --no-charts --out swept").exits(0);
 }
 
 #[test]

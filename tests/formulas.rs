@@ -343,6 +343,70 @@ fn a_simulation_takes_scenes_with_formulas() {
     assert!((outcome.last.phi[0] - expected).abs() < 1e-8);
 }
 
+/// A PID controller: J e‴ + 9 e″ + 16.5 e′ + 9 e = 0 has the roots -1, -2 and -3.
+#[test]
+fn an_integral_is_a_further_unknown_in_every_method() {
+    let text = rotor(
+        [1.5, 0.0],
+        2.0,
+        r#""parameters": {"aim": 0.5}, "integrals": {"sum": "aim - bar.phi"},
+        "torques": [{"name": "PID", "body": "bar", "torque": "16.5*(aim - bar.phi) + 9*sum - 9*bar.omega"}]"#,
+    );
+    let expected = |t: f64| -2.5 * (-t).exp() + 8.0 * (-2.0 * t).exp() - 4.5 * (-3.0 * t).exp();
+    let gauss = Request { method: Some(MethodId::Gauss(8)), step: Some(1.0 / 64.0), ..Request::default() };
+    for request in methods().iter().chain([&gauss]) {
+        let outcome = run(&scene(&text), request);
+        let error = (outcome.last.phi[0] - 0.5 - expected(2.0)).abs();
+        assert!(error < 1e-9, "{:?}: {error:e}", request.method);
+        assert!(outcome.drift.energy.max < 1e-8, "{:?}: {:e}", request.method, outcome.drift.energy.max);
+    }
+    let again = parse_scene(&scene(&text).to_input().to_string(), "again", &[]).expect("a scene");
+    assert_eq!(again, scene(&text));
+}
+
+#[test]
+fn a_motors_law_may_be_a_formula_of_time() {
+    let motor = |law: &str| {
+        let more =
+            format!(r#""parameters": {{"w": 3}}, "motors": [{{"name": "M", "body": "bar", "law": {law}}}]"#);
+        rotor([0.0, 0.0], 1.0, &more).replace(r#""start": {"bar": {"phi": 0, "omega": 0}}, "#, "")
+    };
+    let sines = r#"{"start": 0.5, "rate": 2, "acceleration": -1, "sines": [{"amplitude": 0.2, "frequency": 3, "phase": 0}]}"#;
+    assert_eq!(scene(&motor(r#""0.5 + 2*t - t^2/2 + 0.2*sin(w*t)""#)), scene(&motor(sines)));
+    let refusal = refused(&motor(r#""exp(2*t)""#));
+    assert!(refusal.contains("a law of time is a sum of sines and a parabola"), "{refusal}");
+    let refusal = refused(&motor(r#""2 m*t""#));
+    assert!(refusal.contains("not rad"), "{refusal}");
+}
+
+/// A torque by a table of x² (3 - 2x) up to 1, constant beyond: every piece is a polynomial, every knot a step's end.
+#[test]
+fn a_table_of_time_acts_as_its_spline() {
+    let points = [0.0, 0.3, 0.7, 1.0].map(|x: f64| format!("[{x}, {}]", x * x * (3.0 - 2.0 * x))).join(", ");
+    let text = rotor(
+        [0.0, 0.0],
+        2.0,
+        &format!(
+            r#""tables": {{"ramp": [{points}]}}, "torques": [{{"name": "T", "body": "bar", "torque": "ramp(t)"}}]"#
+        ),
+    );
+    for request in methods() {
+        let outcome = run(&scene(&text), &request);
+        assert!(
+            (outcome.last.phi[0] - (0.15 / 1.5 + 1.0 / 3.0 + 0.5 / 1.5)).abs() < 1e-9,
+            "{:?}",
+            request.method
+        );
+        assert!((outcome.last.omega[0] - 1.5 / 1.5).abs() < 1e-9, "{:?}", request.method);
+    }
+    assert_eq!(
+        parse_scene(&scene(&text).to_input().to_string(), "again", &[]).expect("a scene"),
+        scene(&text)
+    );
+    let wrong = refused(&text.replace("[0.3, ", "[0.8, "));
+    assert!(wrong.contains("tables.ramp[2]") && wrong.contains("sort the points"), "{wrong}");
+}
+
 proptest! {
     #[test]
     fn no_text_makes_the_parser_panic(text in ".{0,200}", bytes in "[-+*/^()., a-z0-9<>=]{0,200}") {

@@ -369,7 +369,8 @@ fn the_schema_has_units_and_words() {
     let schema = schema();
     let items = |list: &str| schema["properties"][list]["items"]["properties"].clone();
     assert_eq!(items("sliders")["angle"]["enum"], json!(["free", "locked"]));
-    assert_eq!(items("torsion_springs")["stiffness"]["description"], "Stiffness. [N·m/rad]");
+    let coils = &schema["properties"]["torsion_springs"]["items"]["oneOf"];
+    assert_eq!(coils[0]["properties"]["stiffness"]["description"], "Stiffness. [N·m/rad]");
     let motors = &schema["properties"]["motors"]["items"]["oneOf"];
     assert_eq!(
         motors[0]["properties"]["law"]["properties"]["rate"]["description"],

@@ -34,6 +34,8 @@ const UNROLLED: usize = 6;
 pub struct Mechanism {
     /// Bodies in the order of the scene's bars.
     pub bodies: Vec<Body>,
+    /// How many of the last bodies are the rotors of integrals, which are shown as numbers only.
+    pub integrals: usize,
     /// How they hang.
     pub forest: Forest,
     /// Hinges and welds in the order of the scene.
@@ -320,6 +322,7 @@ impl Mechanism {
             forces,
             laws,
             whole: None,
+            integrals: scene.bars.len() - scene.own_bars(),
             bodies,
             forest,
             joints,
@@ -538,6 +541,23 @@ impl Mechanism {
         );
         mechanism.choose_form();
         mechanism
+    }
+
+    /// The bodies of the scene itself: the rotors of integrals come after them.
+    pub fn own_bodies(&self) -> &[Body] {
+        &self.bodies[..self.bodies.len() - self.integrals]
+    }
+
+    /// The hinges and welds of the scene itself.
+    pub fn own_joints(&self) -> impl Iterator<Item = &Joint> {
+        let own = self.own_bodies().len();
+        self.joints.iter().filter(move |joint| joint.outer.is_none_or(|body| body < own))
+    }
+
+    /// Names of the scene's integrals, and the coordinates whose rates they are.
+    pub fn integrals(&self) -> impl Iterator<Item = (&str, usize)> {
+        let own = self.own_bodies().len();
+        self.bodies.iter().enumerate().skip(own).map(|(k, rotor)| (rotor.name.as_str(), k))
     }
 
     /// Names of the scene's events.

@@ -268,7 +268,7 @@ impl Finished<'_> {
     fn angles(&self) -> Angles {
         let (window, more) = self.window();
         let smooth = smoothed(&window);
-        let series = self.mechanism.bodies.iter().enumerate().map(|(k, body)| AngleSeries {
+        let series = self.mechanism.own_bodies().iter().enumerate().map(|(k, body)| AngleSeries {
             name: plain(&body.name),
             angle: smooth.iter().map(|(_, phi)| phi[k]).collect(),
         });
@@ -468,8 +468,7 @@ impl Finished<'_> {
     fn sketch(&self) -> Sketch {
         let hinges = self
             .mechanism
-            .joints
-            .iter()
+            .own_joints()
             .map(|joint| HingeSketch { name: plain(&joint.name), ground: joint.between.contains(&None) });
         Sketch {
             gravity: self.scene.gravity,
@@ -502,8 +501,10 @@ impl Finished<'_> {
             Some(MotorPose { at: at(joint), angle: phi[motor.bar], rate: omega[motor.bar] })
         });
         Pose {
-            bars: (bodies.iter().enumerate()).map(|(k, body)| body.ends.map(|end| on(k, end))).collect(),
-            hinges: self.mechanism.joints.iter().map(at).collect(),
+            bars: (self.mechanism.own_bodies().iter().enumerate())
+                .map(|(k, body)| body.ends.map(|end| on(k, end)))
+                .collect(),
+            hinges: self.mechanism.own_joints().map(at).collect(),
             springs: self.springs().map(|between| between.each_ref().map(place)).collect(),
             motors: motors.collect(),
             arms: self.arms().map(|(bar, [from, to])| (bar, [on(bar, from), on(bar, to)])).collect(),

@@ -50,11 +50,11 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Value {
     let mut object = json!({
         "scene": scene.name,
         "description": scene.description,
-        "bodies": names(scene.bars.iter().map(|bar| bar.name.as_str()).collect()),
-        "degrees_of_freedom": mechanism.assembly.degrees_of_freedom,
+        "bodies": names(scene.bars[..scene.own_bars()].iter().map(|bar| bar.name.as_str()).collect()),
+        "degrees_of_freedom": mechanism.assembly.degrees_of_freedom - mechanism.integrals,
         "constraints": names(mechanism.constraints.iter().map(|row| row.name()).collect()),
         "assembly": assembly(mechanism),
-        "hinges": names(scene.hinges.iter().map(|hinge| hinge.name.as_str()).collect()),
+        "hinges": names(scene.hinges[..scene.own_hinges()].iter().map(|hinge| hinge.name.as_str()).collect()),
         "motors": names(scene.motors.iter().map(|motor| motor.name.as_str()).collect()),
         "springs": names(scene.springs.iter().map(|spring| spring.name.as_str()).collect()),
         "dampers": names(scene.springs.iter().filter(|spring| spring.damping != 0.0).map(|spring| spring.name.as_str()).collect()),
@@ -72,7 +72,7 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Value {
         "notes": plan.notes,
     });
     if !(scene.laws.is_empty() && scene.events.is_empty()) {
-        object["formulas"] = names(scene.laws.iter().map(|law| law.name.as_str()).collect());
+        object["formulas"] = names(scene.acting_laws().map(|law| law.name.as_str()).collect());
         object["events"] = names(scene.events.iter().map(|event| event.name.as_str()).collect());
         object["switches"] = json!(mechanism.is_switched());
     }
@@ -88,7 +88,9 @@ pub(super) fn assembly(mechanism: &Mechanism) -> Value {
 /// Degrees of freedom, rows that say nothing new, and what of the start is not as given.
 fn freedom(page: &mut Page, mechanism: &Mechanism) {
     let Assembly { changes, redundant, singular, degrees_of_freedom: free, .. } = &mechanism.assembly;
-    let (coordinates, rows) = (mechanism.coordinates(), mechanism.constraints.len());
+    let free = &(free - mechanism.integrals);
+    let coordinates = mechanism.coordinates() - mechanism.integrals;
+    let rows = mechanism.constraints.len();
     let less = match (rows, redundant.len()) {
         (0, _) => String::new(),
         (rows, 0) => format!(
@@ -115,9 +117,9 @@ fn freedom(page: &mut Page, mechanism: &Mechanism) {
 /// The report as a page.
 pub fn text(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> String {
     let mut page = Page::new(&scene.name, &scene.description);
-    page.entry("bodies", &list(&scene.bars, |bar| &bar.name));
+    page.entry("bodies", &list(&scene.bars[..scene.own_bars()], |bar| &bar.name));
     freedom(&mut page, mechanism);
-    page.entry("hinges", &list(&scene.hinges, |hinge| &hinge.name));
+    page.entry("hinges", &list(&scene.hinges[..scene.own_hinges()], |hinge| &hinge.name));
     if !scene.motors.is_empty() {
         page.entry("motors", &list(&scene.motors, |motor| &motor.name));
     }
@@ -134,8 +136,12 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> String {
     if !scene.parameters.is_empty() {
         page.entry("parameters", &list(&scene.parameters, |parameter| &parameter.name));
     }
-    if !scene.laws.is_empty() {
-        page.entry("formulas", &list(&scene.laws, |law| &law.name));
+    let laws: Vec<&LoadLaw> = scene.acting_laws().collect();
+    if !laws.is_empty() {
+        page.entry("formulas", &list(&laws, |law| &law.name));
+    }
+    if !scene.integrals.is_empty() {
+        page.entry("integrals", &list(&scene.integrals, |integral| &integral.name));
     }
     if mechanism.is_switched() {
         page.entry("", "with corners or parts that switch: steps end at every switch");

@@ -22,6 +22,7 @@
 
 use super::page::{Page, figure};
 use crate::arithmetic::DoubleDouble;
+use crate::dynamics::compile::Joint;
 use crate::dynamics::constraint::{ConstraintEquation, Measure, Posture};
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::{Mechanism, Motion};
@@ -124,7 +125,7 @@ pub fn inspect(scene: &Scene, mechanism: &Mechanism) -> Inspection {
     mechanism.spread_multipliers(&mut kernel);
     let mut found = Inspection { energy_scale: mechanism.energy_scale, ..Inspection::default() };
     let centres = mechanism.centre_accelerations(&kernel.z, &omega, &kernel.load);
-    for (k, (body, centre)) in mechanism.bodies.iter().zip(centres).enumerate() {
+    for (k, (body, centre)) in mechanism.own_bodies().iter().zip(centres).enumerate() {
         found.bodies.push((body.name.clone(), [centre.re, centre.im, kernel.load[k]]));
     }
     let forces = mechanism.joint_forces(start.time, &kernel, &phi, &omega);
@@ -154,7 +155,8 @@ pub fn inspect(scene: &Scene, mechanism: &Mechanism) -> Inspection {
             is_determinate: forces.row_is_determinate[r],
         });
     }
-    for (j, joint) in mechanism.joints.iter().enumerate() {
+    let is_rotor = |joint: &Joint| joint.outer.is_some_and(|body| body >= mechanism.own_bodies().len());
+    for (j, joint) in mechanism.joints.iter().enumerate().filter(|(_, joint)| !is_rotor(joint)) {
         let ([from, on], force) = (joint.between.map(name), forces.hinges[j]);
         let is_determinate = forces.hinge_is_determinate[j];
         found.hinges.push(HingeForce {

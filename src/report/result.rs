@@ -76,7 +76,7 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value 
 
 /// Angles, rates, centres of mass of all bodies at one moment.
 fn moment(mechanism: &Mechanism, sample: &Sample) -> Value {
-    let bodies: Map<String, Value> = (mechanism.bodies.iter().enumerate())
+    let bodies: Map<String, Value> = (mechanism.own_bodies().iter().enumerate())
         .map(|(k, body)| {
             let ([x, y], [vx, vy]) = (sample.centre[k], sample.velocity[k]);
             (
@@ -85,7 +85,11 @@ fn moment(mechanism: &Mechanism, sample: &Sample) -> Value {
             )
         })
         .collect();
-    json!({"t": sample.t, "bodies": bodies})
+    let mut moment = json!({"t": sample.t, "bodies": bodies});
+    for (name, k) in mechanism.integrals() {
+        moment["integrals"][name] = json!(sample.omega[k]);
+    }
+    moment
 }
 
 /// What `run.json` holds: the report, the resolved scene, versions, hashes; what differs from run to run
@@ -152,7 +156,7 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
         page.entry("stopped", &format!("at t = {} s: {}", figure(stop.t), stop.what));
     }
     page.entry("final state", &format!("t = {} s", figure(last.t)));
-    let rows: Vec<Vec<String>> = (mechanism.bodies.iter().enumerate())
+    let rows: Vec<Vec<String>> = (mechanism.own_bodies().iter().enumerate())
         .map(|(k, body)| {
             let ([x, y], [vx, vy]) = (last.centre[k], last.velocity[k]);
             let numbers = [last.phi[k], last.omega[k], x, y, vx, vy];
@@ -160,6 +164,10 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
         })
         .collect();
     page.table(&["body", "phi [rad]", "omega [rad/s]", "x [m]", "y [m]", "vx [m/s]", "vy [m/s]"], &rows);
+    for (number, (name, k)) in mechanism.integrals().enumerate() {
+        let label = if number == 0 { "integrals" } else { "" };
+        page.entry(label, &format!("{name} = {}", figure(last.omega[k])));
+    }
     page.entry(
         "energy drift",
         &format!(

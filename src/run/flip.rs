@@ -72,7 +72,7 @@ impl FlipDetector {
 /// them.
 pub(super) fn look<P: Form + ?Sized>(problem: &mut P, state: &State, body_angles: &mut BodyAngles) {
     problem.body_angles(state, body_angles);
-    let bodies = problem.mechanism().bodies.len();
+    let bodies = problem.mechanism().own_bodies().len();
     body_angles.phi.truncate(bodies);
     body_angles.omega.truncate(bodies);
     body_angles.turns.resize(bodies, 0);

@@ -688,6 +688,8 @@ fn fastest_rate(scene: &Scene, mechanism: &Mechanism) -> f64 {
         .pivot
         .iter()
         .enumerate()
+        // The rotors of integrals take no energy from the others.
+        .filter(|(k, _)| !(mechanism.own_bodies().len()..mechanism.bodies.len()).contains(k))
         .fold(0.0, |most: f64, (k, &pivot)| most.max(pivot / (unit(k) * unit(k))));
     let gravity: f64 = mechanism.tree.weight[..mechanism.bodies.len()]
         .iter()

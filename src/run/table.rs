@@ -24,32 +24,43 @@ pub struct Table<W: Write> {
     shown: Shown,
 }
 
-/// What the table shows of each constraint's force: nothing, a torque or force, or its power too.
-pub(super) type Shown = Arc<[usize]>;
+/// What the table shows.
+#[derive(Clone)]
+pub(super) struct Shown {
+    /// Bodies; of the rotors of integrals after them the rate alone.
+    bodies: usize,
+    /// Of each constraint's force nothing, a torque or force, or its power too.
+    forces: Arc<[usize]>,
+}
 
 fn shown(mechanism: &Mechanism) -> Shown {
     let count = |(r, row): (usize, &ConstraintEquation)| {
         if mechanism.is_motor(r) { 2 } else { usize::from(row.law.is_some()) }
     };
-    mechanism.constraints.iter().enumerate().map(count).collect()
+    let forces = mechanism.constraints.iter().enumerate().map(count).collect();
+    Shown { bodies: mechanism.own_bodies().len(), forces }
 }
 
 /// Appends the numbers of a row.
-pub(super) fn columns(sample: &Sample, shown: &[usize], numbers: &mut Vec<f64>) {
+pub(super) fn columns(sample: &Sample, shown: &Shown, numbers: &mut Vec<f64>) {
     numbers.push(sample.t);
-    for k in 0..sample.centre.len() {
+    for k in 0..shown.bodies {
         let ([x, y], [vx, vy]) = (sample.centre[k], sample.velocity[k]);
         numbers.extend([sample.phi[k], sample.omega[k], x, y, vx, vy]);
     }
+    numbers.extend(&sample.omega[shown.bodies..sample.centre.len()]);
     numbers.extend([sample.kinetic, sample.potential, sample.work, sample.imbalance]);
-    for ((constraint, motor), &shown) in sample.constraints.iter().zip(&sample.motors).zip(shown) {
+    for ((constraint, motor), &shown) in
+        sample.constraints.iter().zip(&sample.motors).zip(shown.forces.iter())
+    {
         numbers.extend(constraint.iter().chain(&motor[..shown]));
     }
 }
 
 /// How many numbers that are.
-fn width(mechanism: &Mechanism, shown: &[usize]) -> usize {
-    1 + 6 * mechanism.bodies.len() + 4 + 2 * mechanism.constraints.len() + shown.iter().sum::<usize>()
+fn width(mechanism: &Mechanism, shown: &Shown) -> usize {
+    let forces = shown.forces.iter().sum::<usize>();
+    1 + 6 * shown.bodies + mechanism.integrals + 4 + 2 * mechanism.constraints.len() + forces
 }
 
 impl<W: Write> Table<W> {
@@ -59,18 +70,19 @@ impl<W: Write> Table<W> {
     /// What the writer says.
     pub fn new(mechanism: &Mechanism, writer: W) -> csv::Result<Self> {
         let mut header = vec!["t [s]".to_owned()];
-        for body in &mechanism.bodies {
+        for body in mechanism.own_bodies() {
             for (quantity, unit) in
                 [("phi", "rad"), ("omega", "rad/s"), ("x", "m"), ("y", "m"), ("vx", "m/s"), ("vy", "m/s")]
             {
                 header.push(format!("{}.{quantity} [{unit}]", body.name));
             }
         }
+        header.extend(mechanism.integrals().map(|(name, _)| name.to_owned()));
         for (quantity, unit) in [("kinetic", "J"), ("potential", "J"), ("work", "J"), ("imbalance", "1")] {
             header.push(format!("{quantity} [{unit}]"));
         }
         let shown = shown(mechanism);
-        for (row, &shown) in mechanism.constraints.iter().zip(shown.iter()) {
+        for (row, &shown) in mechanism.constraints.iter().zip(shown.forces.iter()) {
             let (unit, name) = (row.unit(), row.name());
             header.extend([format!("{name}.C [{unit}]"), format!("{name}.C' [{unit}/s]")]);
             let force = if row.is_angle() { "torque" } else { "force" };
@@ -96,7 +108,7 @@ impl<W: Write> Table<W> {
 
     /// What it shows of each constraint's force.
     pub(super) fn shown(&self) -> Shown {
-        Arc::clone(&self.shown)
+        self.shown.clone()
     }
 
     /// The writer, once it has every row.

@@ -3,7 +3,7 @@
 //! Texts are kept as they were written; [`Names`] says what the names in them stand for.
 
 use super::formula::unit::Dimension;
-use super::formula::{Formula, FormulaError};
+use super::formula::{Formula, FormulaError, Interpolant};
 use super::{Place, Scene};
 use serde::Serialize;
 use std::collections::HashMap;
@@ -26,6 +26,15 @@ pub struct NamedPoint {
     pub place: Place,
 }
 
+/// A function given by points, interpolated smoothly.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PointTable {
+    /// Name, as formulas call it.
+    pub name: String,
+    /// Points (x, y) with ascending x.
+    pub points: Vec<[f64; 2]>,
+}
+
 /// A formula with a name, for others to use.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Signal {
@@ -33,6 +42,26 @@ pub struct Signal {
     pub name: String,
     /// The formula.
     pub formula: String,
+}
+
+/// An integral over time of a formula, as a controller has one, for other formulas to use.
+///
+/// It is carried as the rate of a rotor of its own, on which nothing but a torque of `INERTIA` times the formula
+/// acts, so that every method integrates it with its own accuracy.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Integral {
+    /// Name, unique among parameters, signals and integrals; also that of its rotor.
+    pub name: String,
+    /// What is integrated, from 0 on.
+    pub formula: String,
+    /// The number of its rotor among the bars; those of integrals are the last.
+    pub bar: usize,
+}
+
+impl Integral {
+    /// Mass and moment of inertia of the rotor, a power of two so small that its energy counts nothing
+    /// \[kg, kg·m²\].
+    pub const INERTIA: f64 = 1.0 / (1_u64 << 60) as f64;
 }
 
 /// A force, torque or spring whose law is a formula of time and state.
@@ -186,6 +215,8 @@ pub struct Bound {
 #[derive(Clone, Debug, Default)]
 pub struct Names {
     known: HashMap<String, (Meaning, Option<Dimension>)>,
+    /// Tables, as functions.
+    tables: Vec<Interpolant>,
     /// For every signal what of time and rates is in it.
     changing: Vec<Option<String>>,
     /// In the order in which messages list them.
@@ -195,12 +226,16 @@ pub struct Names {
 impl Names {
     /// Those of a scene: time, bars, points, springs and parameters; signals are added one by one.
     pub fn of(scene: &Scene) -> Self {
-        let mut names = Self::default();
+        let tables = scene.tables.iter().map(|table| Interpolant::new(&table.name, &table.points));
+        let mut names = Self { tables: tables.collect(), ..Self::default() };
         names.add("t".into(), Meaning::Time);
         for (number, parameter) in scene.parameters.iter().enumerate() {
             names.insert(parameter.name.clone(), Meaning::Parameter(number), None);
         }
-        for (bar, name) in scene.bars.iter().map(|bar| &bar.name).enumerate() {
+        for integral in &scene.integrals {
+            names.insert(integral.name.clone(), Meaning::Rate(integral.bar), None);
+        }
+        for (bar, name) in scene.bars[..scene.own_bars()].iter().map(|bar| &bar.name).enumerate() {
             names.add(format!("{name}.phi"), Meaning::Angle(bar));
             names.add(format!("{name}.omega"), Meaning::Rate(bar));
             names.add(format!("{name}.cos"), Meaning::Cosine(bar));
@@ -285,7 +320,7 @@ impl Names {
     /// # Errors
     /// It is none, has a name that nothing has, or puts together what has different units.
     pub fn bind(&self, text: &str) -> Result<(Bound, Option<Dimension>), FormulaError> {
-        let formula = Formula::parse(text)?;
+        let formula = Formula::parse_with(text, &self.tables)?;
         let mut meanings = Vec::new();
         let mut dimensions = Vec::new();
         for name in formula.names() {

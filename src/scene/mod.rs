@@ -25,7 +25,10 @@ mod write;
 pub use build::{SceneBuilder, ground, on};
 pub use digits::Written;
 pub use error::{Refusal, SceneError};
-pub use law::{Bound, Crossing, Load, LoadLaw, Meaning, NamedPoint, Names, Parameter, SceneEvent, Signal};
+pub use law::{
+    Bound, Crossing, Integral, Load, LoadLaw, Meaning, NamedPoint, Names, Parameter, PointTable, SceneEvent,
+    Signal,
+};
 pub use number::number;
 pub use read::{parse_scene, read_scene, read_text, source_name};
 pub use schema::schema;
@@ -85,9 +88,15 @@ pub struct Scene {
     /// Places with names, for formulas.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub points: Vec<NamedPoint>,
+    /// Functions given by points.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tables: Vec<PointTable>,
     /// Formulas with names, each of those before it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub signals: Vec<Signal>,
+    /// Integrals of formulas over time.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub integrals: Vec<Integral>,
     /// Forces, torques and springs by formulas.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub laws: Vec<LoadLaw>,
@@ -106,6 +115,39 @@ pub struct Scene {
     pub until: f64,
     /// Output interval \[s\], positive, at most the horizon.
     pub every: f64,
+}
+
+impl Scene {
+    /// How many of the bars the scene names itself; the rest are the rotors of its integrals.
+    pub fn own_bars(&self) -> usize {
+        self.integrals.first().map_or(self.bars.len(), |integral| integral.bar.min(self.bars.len()))
+    }
+
+    /// How many of the hinges the scene names itself.
+    pub fn own_hinges(&self) -> usize {
+        self.hinges.len() - (self.bars.len() - self.own_bars()).min(self.hinges.len())
+    }
+
+    /// The laws that the scene names itself: not those of the rotors of integrals.
+    pub fn acting_laws(&self) -> impl Iterator<Item = &LoadLaw> {
+        let own = self.own_bars();
+        self.laws.iter().filter(move |law| !matches!(law.load, Load::Torque { bar, .. } if bar >= own))
+    }
+
+    /// Adds the rotors of the integrals with their hinges, torques and starts.
+    fn with_rotors(mut self) -> Self {
+        for Integral { name, formula, bar } in self.integrals.clone() {
+            let place = |bar| Place { bar, point: [0.0, 0.0] };
+            let (mass, inertia) = (Integral::INERTIA, Integral::INERTIA);
+            self.bars.push(Bar { name: name.clone(), length: 0.0, mass, centre: [0.0, 0.0], inertia });
+            self.hinges.push(Hinge { name: name.clone(), between: [place(None), place(Some(bar))] });
+            self.start.push(Start { phi: 0.0, omega: 0.0 });
+            self.given.push(Given::ANGLE_AND_RATE);
+            let torque = format!("{:?}*({formula})", Integral::INERTIA);
+            self.laws.push(LoadLaw { name, load: Load::Torque { bar, relative_to: None, torque } });
+        }
+        self
+    }
 }
 
 /// A rigid body.  Its frame has the origin at one end and its x axis along the bar.

@@ -1,7 +1,7 @@
 //! The JSON Schema of scene files, from the same tables that the reader uses.
 
 use super::format::{LONGEST_NAME, LONGEST_TEXT, PLACE, Quantity, SCENE, Shape, Table};
-use super::formula::LONGEST;
+use super::formula::{LONGEST, POINTS};
 use serde_json::{Map, Value, json};
 
 /// The JSON Schema (draft 2020-12) of scene files, with units, ranges and examples.
@@ -71,6 +71,12 @@ fn shape(of: &Shape) -> Value {
         Shape::Signals => {
             json!({"type": "object", "propertyNames": identifier(), "additionalProperties": formula()})
         }
+        Shape::Tables => {
+            let [least, most] = POINTS;
+            let point = json!({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2});
+            let points = json!({"type": "array", "items": point, "minItems": least, "maxItems": most});
+            json!({"type": "object", "propertyNames": identifier(), "additionalProperties": points})
+        }
         Shape::Names => json!({"type": "array", "items": shape(&Shape::Name)}),
         Shape::Name => json!({"type": "string", "pattern": format!("^[A-Za-z0-9_-]{{1,{LONGEST_NAME}}}$")}),
         Shape::FolderName => {
@@ -83,6 +89,11 @@ fn shape(of: &Shape) -> Value {
         Shape::Inertia(quantity) => json!({"anyOf": [{"enum": ["full", "slender"]}, number(quantity)]}),
         Shape::Between => json!({"type": "array", "items": object(&PLACE), "minItems": 2, "maxItems": 2}),
         Shape::Object(table) => object(table),
+        Shape::Law(table, _) => {
+            let mut law = object(table);
+            law["type"] = json!(["object", "string"]);
+            law
+        }
         Shape::List { of: tables, least, most } => {
             let kinds: Vec<_> = tables.iter().map(|table| object(table)).collect();
             let items = if let [one] = kinds.as_slice() { one.clone() } else { json!({"oneOf": kinds}) };
@@ -102,7 +113,10 @@ fn shape(of: &Shape) -> Value {
 
 /// A number, or a formula that comes to one.
 fn number(quantity: &Quantity) -> Value {
-    json!({"anyOf": [{"type": "number", "minimum": quantity.least, "maximum": quantity.most}, formula()]})
+    let mut number =
+        json!({"type": ["number", "string"], "minimum": quantity.least, "maximum": quantity.most});
+    number["maxLength"] = json!(LONGEST);
+    number
 }
 
 fn formula() -> Value {

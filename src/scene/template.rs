@@ -239,7 +239,7 @@ impl Walk<'_> {
                         Err(no_number(&walked, table))
                     };
                 }
-                (Shape::Object(inner), Some(_)) => table = inner,
+                (Shape::Object(inner) | Shape::Law(inner, _), Some(_)) => table = inner,
                 (Shape::ByBar(inner), Some(Step::Key(bar))) => {
                     node = element_by_key(node, bar, &mut walked)?;
                     steps.next();
@@ -270,7 +270,7 @@ fn no_number(walked: &str, table: &Table) -> (String, String) {
 fn example(walked: &str, field: &Field) -> (String, String) {
     let hint = match &field.shape {
         Shape::Pair(_) | Shape::LawPair(_) => format!("{walked}[0] or {walked}[1]"),
-        Shape::Object(table) | Shape::ByBar(table) => {
+        Shape::Object(table) | Shape::Law(table, _) | Shape::ByBar(table) => {
             format!("go on, in the end with one of {}", table.keys())
         }
         Shape::List { of, .. } => {

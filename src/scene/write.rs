@@ -12,11 +12,10 @@ impl Scene {
     pub fn to_input(&self) -> Value {
         let body = |bar: Option<usize>| bar.map_or(GROUND, |bar| self.bars[bar].name.as_str());
         let place = |place: &Place| json!({"body": body(place.bar), "point": place.point});
-        let bars: Vec<_> = (self.bars.iter())
+        let bars: Vec<_> = (self.bars[..self.own_bars()].iter())
             .map(|bar| json!({"name": bar.name, "mass": bar.mass, "centre": bar.centre, "inertia": bar.inertia, "length": bar.length}))
             .collect();
-        let hinges: Vec<_> = self
-            .hinges
+        let hinges: Vec<_> = self.hinges[..self.own_hinges()]
             .iter()
             .map(|hinge| json!({"name": hinge.name, "between": hinge.between.each_ref().map(place)}))
             .collect();
@@ -136,12 +135,18 @@ impl Scene {
             .map(|NamedPoint { name, place }| json!({"name": name, "body": body(place.bar), "point": place.point}))
             .collect();
         put("points", points.into(), !self.points.is_empty());
+        let tables: Map<String, Value> =
+            self.tables.iter().map(|one| (one.name.clone(), json!(one.points))).collect();
+        put("tables", Value::Object(tables), !self.tables.is_empty());
         let signals: Map<String, Value> =
             self.signals.iter().map(|one| (one.name.clone(), json!(one.formula))).collect();
         put("signals", Value::Object(signals), !self.signals.is_empty());
+        let integrals: Map<String, Value> =
+            self.integrals.iter().map(|one| (one.name.clone(), json!(one.formula))).collect();
+        put("integrals", Value::Object(integrals), !self.integrals.is_empty());
         put("events", self.events.iter().map(event).collect::<Vec<_>>().into(), !self.events.is_empty());
         put("inactive", json!(self.inactive), !self.inactive.is_empty());
-        for LoadLaw { name, load } in &self.laws {
+        for LoadLaw { name, load } in self.acting_laws() {
             let (list, law) = match load {
                 Load::Force { bar, point, force, follows } => {
                     let frame = if *follows { "body" } else { "ground" };
@@ -171,7 +176,7 @@ impl Scene {
 
     /// What of the start must be written so that all of it reads back to the same bits, by bar name.
     fn start_as_given(&self) -> Map<String, Value> {
-        let starts = self.bars.iter().zip(&self.start);
+        let starts = self.bars[..self.own_bars()].iter().zip(&self.start);
         if self.has_whole_start() {
             let written = starts.zip(written_starts(self)).filter(|(_, written)| *written);
             return written.map(|((bar, start), _)| (bar.name.clone(), json!(start))).collect();

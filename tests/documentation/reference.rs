@@ -1,6 +1,6 @@
 //! The scene reference as a page, generated from the JSON Schema that the program prints.
 
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::fmt::Write;
 
 const HEAD: &str = "# Scene reference
@@ -13,6 +13,7 @@ The same description as JSON Schema, for editors: `driftless schema`.
 - Units are SI; angles are in radians, absolute, measured from +x, counter-clockwise.
 - Unknown keys are refused.  A key in **bold** is required.
 - A *name* has 1 to 64 letters, digits, `_` and `-`.
+- Every number may be written as a [formula](formulas.md) of parameters, in quotes.
 - A *number* without a stated range lies between -1e30 and 1e30.
 ";
 
@@ -80,6 +81,11 @@ fn section(kind: &Kind, kinds: &[Kind], page: &mut String) {
     }
 }
 
+/// The type, or the first of several: every number may also be a formula.
+fn kind(schema: &Value) -> Option<&str> {
+    schema["type"].as_str().or_else(|| schema["type"][0].as_str())
+}
+
 /// A type in words.
 fn shape(schema: &Value, kinds: &[Kind]) -> String {
     if let Some(words) = schema["enum"].as_array() {
@@ -90,15 +96,16 @@ fn shape(schema: &Value, kinds: &[Kind]) -> String {
             return parts.iter().map(|part| shape(part, kinds)).collect::<Vec<_>>().join(", or ");
         }
     }
-    match schema["type"].as_str() {
+    match kind(schema) {
         Some("number") => format!("number{}", range(schema)),
         Some("string") if !schema["pattern"].is_null() => "name".to_owned(),
         Some("string") if schema["maxLength"] == 64 => "name of a body".to_owned(),
+        Some("string") if schema["maxLength"] == 4096 => "formula".to_owned(),
         Some("string") => format!("text of at most {} characters", schema["maxLength"]),
         Some("array") => {
             let items = &schema["items"];
             let pair = schema["minItems"] == 2 && schema["maxItems"] == 2;
-            match items["type"].as_str() {
+            match kind(items) {
                 Some("number") if pair => format!("two numbers{}", range(items)),
                 _ if pair => format!("two of {}", shape(items, kinds)),
                 _ => format!("list of {}", shape(items, kinds)),
@@ -106,7 +113,14 @@ fn shape(schema: &Value, kinds: &[Kind]) -> String {
         }
         Some("object") => match kinds.iter().find(|kind| kind.is(schema)) {
             Some(kind) => format!("[{}](#{})", kind.title, kind.anchor),
-            None => format!("object: name of a body to {}", shape(&schema["additionalProperties"], kinds)),
+            None => {
+                let key = if schema["propertyNames"]["pattern"] == json!("^[A-Za-z0-9_-]{1,64}$") {
+                    "name of a body"
+                } else {
+                    "name"
+                };
+                format!("object: {key} to {}", shape(&schema["additionalProperties"], kinds))
+            }
         },
         other => panic!("the reference does not know how to tell {other:?}: {schema}"),
     }

@@ -10,6 +10,8 @@ use crate::run::drift::larger;
 pub struct DistanceMetric {
     /// How many coordinates are angles; the others are positions.
     angles: usize,
+    /// The first of the coordinates that are not shown: rotors of integrals, which weigh nothing.
+    shown: usize,
     /// The longest bar \[m\], or the farthest centre of mass where none has a length.
     size: f64,
 }
@@ -24,12 +26,17 @@ impl DistanceMetric {
             .fold(0.0, f64::max);
         let arms = mechanism.bodies.iter().map(|body| body.centre.norm_squared().sqrt()).fold(0.0, f64::max);
         let size = if bars > 0.0 { bars } else { arms };
-        Self { angles: mechanism.bodies.len(), size: if size > 0.0 { size } else { 1.0 } }
+        let (angles, shown) = (mechanism.bodies.len(), mechanism.own_bodies().len());
+        Self { angles, shown, size: if size > 0.0 { size } else { 1.0 } }
     }
 
     /// What a difference in coordinate `k` weighs: 1, or one over the size \[1/m\].
     pub fn weight(&self, k: usize) -> f64 {
-        if k < self.angles { 1.0 } else { 1.0 / self.size }
+        match k {
+            k if k < self.shown => 1.0,
+            k if k < self.angles => 0.0,
+            _ => 1.0 / self.size,
+        }
     }
 
     /// The largest difference of a coordinate, whole turns counted: an angle \[rad\], or a position over the

@@ -45,6 +45,8 @@ pub(super) enum Shape {
     Parameters,
     /// Formulas of time and state by name.
     Signals,
+    /// Lists of points by name.
+    Tables,
     /// Names of parts.
     Names,
     /// A name: 1 to 64 letters, digits, `-`, `_`.
@@ -65,6 +67,8 @@ pub(super) enum Shape {
     Between,
     /// An object.
     Object(&'static Table),
+    /// An object, or a formula of time that comes to this unit.
+    Law(&'static Table, Quantity),
     /// So many objects, each of one of these kinds.
     List { of: &'static [&'static Table], least: usize, most: usize },
     /// One object of this kind for each bar name.
@@ -171,6 +175,10 @@ impl Shape {
             Self::Formula(quantity) => format!("must be a formula in quotes that comes to {}", quantity.unit),
             Self::Parameters => "must be {name: number, or formula of other parameters in quotes}".to_owned(),
             Self::Signals => "must be {name: formula in quotes}".to_owned(),
+            Self::Tables => {
+                let [least, most] = super::formula::POINTS;
+                format!("must be {{name: list of {least} to {most} points [x, y], x ascending}}")
+            }
             Self::Names => "must be a list of names of parts".to_owned(),
             Self::Name => format!("must be a name: 1 to {LONGEST_NAME} letters, digits, - or _"),
             Self::FolderName => {
@@ -187,6 +195,9 @@ impl Shape {
             Self::Inertia(quantity) => format!("must be \"full\", \"slender\" or a number {quantity}"),
             Self::Between => "must be a list of two places, each {\"body\": …, \"point\": [x, y]}".to_owned(),
             Self::Object(table) => format!("must be an object with the keys {}", table.keys()),
+            Self::Law(table, _) => {
+                format!("must be an object with the keys {}, or a formula of t in quotes", table.keys())
+            }
             Self::List { least: 0, most: usize::MAX, .. } => "must be a list of objects [{…}, …]".to_owned(),
             Self::List { least, most: usize::MAX, .. } => {
                 format!("must be a list of at least {least} objects [{{…}}, …]")

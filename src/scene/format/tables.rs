@@ -51,10 +51,22 @@ pub(in crate::scene) static SCENE: Table = Table {
             "Points by name, for formulas: `tip` makes tip.x, tip.y, tip.vx, tip.vy known; none if absent.",
         ),
         optional(
+            "tables",
+            Shape::Tables,
+            "{\"gust\": [[0, 0], [1, 2.5], [3, 0]]}",
+            "Functions by name, smooth through points (x, y), for formulas as gust(t); none if absent.",
+        ),
+        optional(
             "signals",
             Shape::Signals,
             "{\"speed\": \"sqrt(tip.vx^2 + tip.vy^2)\"}",
             "Formulas of time and state by name, each may use those before it; none if absent.",
+        ),
+        optional(
+            "integrals",
+            Shape::Signals,
+            "{\"sum\": \"aim - bar1.phi\"}",
+            "Integrals of formulas over time by name, from 0 on, for other formulas, as those of controllers; none if absent.",
         ),
         optional(
             "springs",
@@ -439,7 +451,7 @@ pub(in crate::scene) static FORCE: Table = Table {
         ),
         optional(
             "law",
-            Shape::Object(&FACTOR_LAW),
+            Shape::Law(&FACTOR_LAW, signed("")),
             "{\"start\": 0, \"sines\": [{\"amplitude\": 1, \"frequency\": 5}]}",
             FACTOR,
         ),
@@ -462,7 +474,7 @@ pub(in crate::scene) static TORQUE: Table = Table {
         required("torque", Shape::LawNumber(signed("N·m")), "0.033", "The torque; it may be a formula."),
         optional(
             "law",
-            Shape::Object(&FACTOR_LAW),
+            Shape::Law(&FACTOR_LAW, signed("")),
             "{\"start\": 0, \"sines\": [{\"amplitude\": 1, \"frequency\": 5}]}",
             FACTOR,
         ),
@@ -486,7 +498,7 @@ pub(in crate::scene) static MOTOR: Table = Table {
         optional("relative_to", Shape::Body { ground: true }, "\"bar2\"", MEASURED_FROM),
         required(
             "law",
-            Shape::Object(&LAW),
+            Shape::Law(&LAW, ANGLE),
             "{\"start\": 0, \"rate\": 1}",
             "The angle as a function of time.",
         ),
@@ -507,7 +519,7 @@ pub(in crate::scene) static DRIVE: Table = Table {
         required("slider", Shape::SliderName, "\"slider\"", "The driven slider."),
         required(
             "law",
-            Shape::Object(&TRAVEL_LAW),
+            Shape::Law(&TRAVEL_LAW, signed("m")),
             "{\"start\": 0, \"rate\": 0.1}",
             "The travel as a function of time.",
         ),

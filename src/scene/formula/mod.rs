@@ -10,10 +10,13 @@
 
 mod error;
 mod parse;
+mod table;
 pub mod unit;
+mod wave;
 
 pub use error::FormulaError;
 pub(crate) use error::meant;
+pub use table::{Interpolant, POINTS};
 use unit::{Dimension, Mismatch};
 
 use crate::arithmetic::Scalar;
@@ -116,7 +119,15 @@ impl Formula {
     /// # Errors
     /// The text is none; the error has the column.
     pub fn parse(text: &str) -> Result<Self, FormulaError> {
-        parse::parse(text)
+        parse::parse(text, &[])
+    }
+
+    /// The same with tables as functions.
+    ///
+    /// # Errors
+    /// As [`Formula::parse`].
+    pub fn parse_with(text: &str, tables: &[Interpolant]) -> Result<Self, FormulaError> {
+        parse::parse(text, tables)
     }
 
     /// Its text.
@@ -304,7 +315,7 @@ impl Formula {
 
     fn misfit(&self, node: usize, mismatch: &Mismatch) -> FormulaError {
         let (start, end) = self.places[node];
-        let hint = "numbers without a unit fit anything; units are written behind numbers, as 5 mm or 30 deg";
+        let hint = "numbers without a unit fit anything, as in sin(1*t); units stand behind numbers, as 5 mm or 30 deg";
         FormulaError::new(&self.text, start as usize, end as usize, mismatch.to_string(), hint.into())
     }
 }

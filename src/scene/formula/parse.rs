@@ -1,7 +1,7 @@
 //! From a text to a formula: by precedence, on bytes.
 
 use super::unit::{Dimension, find};
-use super::{DEEPEST, FUNCTIONS, Formula, FormulaError, LONGEST, Node, meant};
+use super::{DEEPEST, FUNCTIONS, Formula, FormulaError, Interpolant, LONGEST, Node, meant};
 
 /// How strongly a sign binds: more than `*`, less than `^`.
 const SIGN: u8 = 5;
@@ -11,9 +11,10 @@ struct Parser<'a> {
     at: usize,
     depth: usize,
     formula: Formula,
+    tables: &'a [Interpolant],
 }
 
-pub(super) fn parse(text: &str) -> Result<Formula, FormulaError> {
+pub(super) fn parse(text: &str, tables: &[Interpolant]) -> Result<Formula, FormulaError> {
     let formula = Formula {
         text: text.to_owned(),
         nodes: Vec::new(),
@@ -23,7 +24,7 @@ pub(super) fn parse(text: &str) -> Result<Formula, FormulaError> {
         names: Vec::new(),
         conditions: Vec::new(),
     };
-    let mut parser = Parser { text, at: 0, depth: 0, formula };
+    let mut parser = Parser { text, at: 0, depth: 0, formula, tables };
     if text.len() > LONGEST {
         return Err(parser.error(0, 1, "the formula is too long", &format!("at most {LONGEST} bytes")));
     }
@@ -275,8 +276,11 @@ impl Parser<'_> {
     }
 
     fn call(&mut self, name: String, start: usize, end: usize) -> Result<usize, FormulaError> {
-        let Some(&(_, takes)) = FUNCTIONS.iter().find(|known| known.0 == name) else {
-            let hint = meant(&name, &FUNCTIONS.map(|known| known.0));
+        let table = self.tables.iter().find(|table| table.name == name);
+        let known = FUNCTIONS.iter().find(|known| known.0 == name).map(|known| known.1);
+        let Some(takes) = known.or(table.map(|_| 1)) else {
+            let tables = self.tables.iter().map(|table| table.name.as_str());
+            let hint = meant(&name, &tables.chain(FUNCTIONS.map(|known| known.0)).collect::<Vec<_>>());
             return Err(self.error(start, end, &format!("unknown function {name}"), &hint));
         };
         let open = self.at;
@@ -295,6 +299,9 @@ impl Parser<'_> {
             let problem =
                 format!("{name} takes {takes} argument{}, not {given}", if takes == 1 { "" } else { "s" });
             return Err(self.error(start, end, &problem, "arguments are separated by commas"));
+        }
+        if let Some(table) = table {
+            return Ok(table.emit(&mut self.formula, arguments[0], (start, end)));
         }
         let first = arguments[0];
         let last = arguments[takes - 1];

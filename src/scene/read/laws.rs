@@ -5,9 +5,10 @@ use super::names::Bars;
 use super::resolve::{Known, check_name, fits, refused};
 use crate::scene::error::SceneError;
 use crate::scene::format::{Field, Quantity, SCENE, Shape};
-use crate::scene::law::{Crossing, Load, LoadLaw, NamedPoint, Names, SceneEvent, Signal};
+use crate::scene::formula::POINTS;
+use crate::scene::law::{Crossing, Integral, Load, LoadLaw, NamedPoint, Names, SceneEvent, Signal};
 use crate::scene::locate::Value;
-use crate::scene::{Force, Scene, Spring, Torque, TorsionSpring};
+use crate::scene::{Force, PointTable, Scene, Spring, Torque, TorsionSpring};
 
 /// Signals at most.
 const MOST: usize = 1000;
@@ -212,6 +213,46 @@ fn pairs(at: &At) -> Result<Vec<(String, String)>, SceneError> {
     Ok(all)
 }
 
+/// The tables of a scene.
+pub(super) fn tables(fields: &Fields) -> Result<Vec<PointTable>, SceneError> {
+    let Some(at) = fields.optional("tables") else { return Ok(Vec::new()) };
+    let refused =
+        |at: &At| at.refuse_value(&Shape::Tables.allowed(), "for example {\"gust\": [[0, 0], [1, 2.5]]}");
+    let Value::Object(members) = &at.node.value else { return Err(refused(&at)) };
+    let mut tables: Vec<PointTable> = Vec::new();
+    for member in members {
+        let list = at.member(member);
+        let taken: Vec<&str> = tables.iter().map(|table| table.name.as_str()).collect();
+        check_name(at.source, &member.key, member.span, &list.path, &taken)?;
+        let Value::List(nodes) = &member.node.value else { return Err(refused(&list)) };
+        let [least, most] = POINTS;
+        if !(least..=most).contains(&nodes.len()) {
+            let problem = format!("has {} points", nodes.len());
+            return Err(list.refuse(&problem, &Shape::Tables.allowed(), "thin it out, or write a formula"));
+        }
+        let mut points: Vec<[f64; 2]> = Vec::new();
+        for (number, node) in nodes.iter().enumerate() {
+            let item = list.item(node, number);
+            let Value::List(pair) = &node.value else { return Err(refused(&item)) };
+            let point = match pair.as_slice() {
+                [x, y] => match (&x.value, &y.value) {
+                    (Value::Number(x), Value::Number(y)) if x.is_finite() && y.is_finite() => [*x, *y],
+                    _ => return Err(refused(&item)),
+                },
+                _ => return Err(refused(&item)),
+            };
+            if points.last().is_some_and(|last| point[0] <= last[0]) {
+                return Err(
+                    item.refuse_value("must have a larger x than the point before", "sort the points")
+                );
+            }
+            points.push(point);
+        }
+        tables.push(PointTable { name: member.key.clone(), points });
+    }
+    Ok(tables)
+}
+
 /// The signals of a scene.
 pub(super) fn signals(fields: &Fields, taken: &[Known]) -> Result<Vec<Signal>, SceneError> {
     let Some(at) = fields.optional("signals") else { return Ok(Vec::new()) };
@@ -234,13 +275,33 @@ pub(super) fn signals(fields: &Fields, taken: &[Known]) -> Result<Vec<Signal>, S
     Ok(all.into_iter().map(|(name, formula)| Signal { name, formula }).collect())
 }
 
+/// The integrals of a scene of so many bars.
+pub(super) fn integrals(
+    fields: &Fields,
+    parameters: &[Known],
+    signals: &[Signal],
+    bars: &Bars,
+) -> Result<Vec<Integral>, SceneError> {
+    let Some(at) = fields.optional("integrals") else { return Ok(Vec::new()) };
+    let mut taken: Vec<&str> = parameters.iter().map(|known| known.name.as_str()).collect();
+    taken.extend(signals.iter().map(|signal| signal.name.as_str()));
+    taken.extend(bars.bars.iter().map(|bar| bar.name.as_str()));
+    let all = pairs(&at)?;
+    if let Value::Object(members) = &at.node.value {
+        for member in members {
+            check_name(at.source, &member.key, member.span, &at.member(member).path, &taken)?;
+            taken.push(&member.key);
+        }
+    }
+    let first = bars.bars.len();
+    let integral = |(number, (name, formula))| Integral { name, formula, bar: first + number };
+    Ok(all.into_iter().enumerate().map(integral).collect())
+}
+
 /// Judges every formula of a scene where it stands: its names, its dimensions; and the parts that events name.
 pub(super) fn check(root: &At, scene: &Scene, parameters: &[Known]) -> Result<(), SceneError> {
-    if scene.laws.is_empty()
-        && scene.events.is_empty()
-        && scene.signals.is_empty()
-        && scene.inactive.is_empty()
-    {
+    let is_plain = scene.laws.is_empty() && scene.signals.is_empty() && scene.integrals.is_empty();
+    if is_plain && scene.events.is_empty() && scene.inactive.is_empty() {
         return Ok(());
     }
     let mut names = Names::of(scene);
@@ -280,6 +341,11 @@ pub(super) fn check(root: &At, scene: &Scene, parameters: &[Known]) -> Result<()
                 _ => judge(&at, &names, quantity.as_ref(), matches!(*key, "potential" | "energy"))?,
             }
         }
+    }
+    for integral in &scene.integrals {
+        root.child("integrals")
+            .and_then(|at| at.child(&integral.name))
+            .map_or(Ok(()), |at| judge(&at, &names, None, false))?;
     }
     let parts = Parts::of(scene);
     for event in &scene.events {

@@ -125,7 +125,7 @@ fn slider(at: &At, sliders: &[Slider]) -> Result<usize, SceneError> {
 
 /// The field `law`, in the units that its table says.
 fn law(fields: &Fields) -> Result<Law, SceneError> {
-    let Some(Field { shape: Shape::Object(table), .. }) = fields.table.field("law") else {
+    let Some(Field { shape: Shape::Law(table, _), .. }) = fields.table.field("law") else {
         return Err(fields.at.refuse("has no law", "must be of a kind that has one", fields.table.about));
     };
     let law = fields.required("law")?.object(table)?;

@@ -131,6 +131,8 @@ fn scene(root: &At, parameters: &[Known]) -> Result<Scene, SceneError> {
     let (torques, _) = named(&fields, "torques", |fields, name| laws::torque(fields, name, &known))?;
     let (potentials, _) = named(&fields, "potentials", laws::potential)?;
     let (events, _) = named(&fields, "events", laws::event)?;
+    let signals = laws::signals(&fields, parameters)?;
+    let integrals = laws::integrals(&fields, parameters, &signals, &known)?;
     let mut laws = Vec::new();
     let springs = laws::split(springs, &mut laws);
     let torsion_springs = laws::split(torsion_springs, &mut laws);
@@ -159,7 +161,9 @@ fn scene(root: &At, parameters: &[Known]) -> Result<Scene, SceneError> {
         walls,
         parameters: parameters.iter().map(Into::into).collect(),
         points,
-        signals: laws::signals(&fields, parameters)?,
+        tables: laws::tables(&fields)?,
+        signals,
+        integrals,
         laws,
         events,
         inactive: fields.optional("inactive").map_or(Ok(Vec::new()), |at| laws::names(&at))?,
@@ -177,7 +181,7 @@ fn scene(root: &At, parameters: &[Known]) -> Result<Scene, SceneError> {
     };
     let scene = Scene { bars, ..scene };
     laws::check(root, &scene, parameters)?;
-    fit::fitted(scene, &places, &given)
+    fit::fitted(scene, &places, &given).map(Scene::with_rotors)
 }
 
 /// The motors on angles with their places, and those on sliders.

@@ -3,12 +3,12 @@
 //! Before a scene is judged, every number that is written as a formula of parameters becomes that number; a
 //! formula of time and state, where the format takes one, stays a text for the reader of loads and events.
 
-use crate::scene::Parameter;
 use crate::scene::error::SceneError;
 use crate::scene::format::{Quantity, SCENE, Shape, Table, about, kind};
 use crate::scene::formula::unit::Dimension;
-use crate::scene::formula::{FUNCTIONS, Formula, FormulaError};
-use crate::scene::locate::{Node, Source, Span, Value, push_index, push_key};
+use crate::scene::formula::{FUNCTIONS, Formula, FormulaError, Interpolant, POINTS};
+use crate::scene::locate::{Member, Node, Source, Span, Value, push_index, push_key};
+use crate::scene::{Law, Parameter, Sine};
 
 /// Names that formulas give a meaning of their own.
 const RESERVED: [&str; 5] = ["t", "pi", "length", "rate", "angle"];
@@ -33,8 +33,9 @@ impl From<&Known> for Parameter {
 /// # Errors
 /// A formula that is none, a name that nothing has, a dimension that does not fit, a cycle.
 pub(super) fn resolve(source: &Source, tree: &mut Node) -> Result<Vec<Known>, SceneError> {
-    let parameters = parameters(source, tree)?;
-    Resolver { source, parameters: &parameters }.members(tree, &SCENE, "")?;
+    let tables = tables(tree);
+    let parameters = parameters(source, tree, &tables)?;
+    Resolver { source, parameters: &parameters, tables: &tables }.members(tree, &SCENE, "")?;
     Ok(parameters)
 }
 
@@ -80,11 +81,38 @@ pub(super) fn refused(
 ) -> SceneError {
     let place = source.inside(span, error.bytes.0, error.bytes.1);
     let problem = format!("= {}: {}", source.written(span), error.problem);
-    source.refusal(place, path, &problem, allowed, &error.hint)
+    source.refusal(place, path, &problem, allowed, &error.hint).with_value(source.written(span))
+}
+
+/// The tables, as far as they are well formed; the reader refuses the others.
+fn tables(tree: &Node) -> Vec<Interpolant> {
+    let member = |node: &Node, key: &str| match &node.value {
+        Value::Object(members) => members.iter().position(|member| member.key == key),
+        _ => None,
+    };
+    let (Some(holder), Value::Object(members)) = (member(tree, "tables"), &tree.value) else {
+        return Vec::new();
+    };
+    let Value::Object(tables) = &members[holder].node.value else { return Vec::new() };
+    let point = |node: &Node| match &node.value {
+        Value::List(pair) => match pair.as_slice() {
+            [Node { value: Value::Number(x), .. }, Node { value: Value::Number(y), .. }] => Some([*x, *y]),
+            _ => None,
+        },
+        _ => None,
+    };
+    let table = |member: &Member| match &member.node.value {
+        Value::List(nodes) => {
+            let points: Option<Vec<[f64; 2]>> = nodes.iter().take(POINTS[1]).map(point).collect();
+            points.map(|points| Interpolant::new(&member.key, &points))
+        }
+        _ => None,
+    };
+    tables.iter().filter_map(table).collect()
 }
 
 /// The parameters, in the order of the text.
-fn parameters(source: &Source, tree: &Node) -> Result<Vec<Known>, SceneError> {
+fn parameters(source: &Source, tree: &Node, tables: &[Interpolant]) -> Result<Vec<Known>, SceneError> {
     let Value::Object(members) = &tree.value else { return Ok(Vec::new()) };
     let Some(holder) = members.iter().find(|member| member.key == "parameters") else {
         return Ok(Vec::new());
@@ -105,7 +133,8 @@ fn parameters(source: &Source, tree: &Node) -> Result<Vec<Known>, SceneError> {
         let formula = match &member.node.value {
             Value::Number(number) if number.is_finite() => Err(*number),
             Value::Text(text) => {
-                Ok(Formula::parse(text).map_err(|error| refused(source, span, &path, &allowed, &error))?)
+                let formula = Formula::parse_with(text, tables);
+                Ok(formula.map_err(|error| refused(source, span, &path, &allowed, &error))?)
             }
             _ => {
                 return Err(source.refused_value(
@@ -189,6 +218,7 @@ impl Order<'_> {
 struct Resolver<'a> {
     source: &'a Source,
     parameters: &'a [Known],
+    tables: &'a [Interpolant],
 }
 
 impl Resolver<'_> {
@@ -218,7 +248,7 @@ impl Resolver<'_> {
             (Shape::LawNumber(quantity), Value::Text(_)) => self.number(node, quantity, shape, path, true),
             (Shape::Inertia(quantity), Value::Text(text)) if text != "full" && text != "slender" => {
                 // A word that is nearly one of the two is left to the reader, who knows what was meant.
-                if Formula::parse(text).is_ok_and(|formula| self.knows(&formula)) {
+                if Formula::parse_with(text, self.tables).is_ok_and(|formula| self.knows(&formula)) {
                     return self.number(node, quantity, shape, path, false);
                 }
                 Ok(())
@@ -229,7 +259,12 @@ impl Resolver<'_> {
             (Shape::LawPair(quantity), Value::List(nodes)) => each(nodes, &|node, path| {
                 self.number(node, quantity, &Shape::LawNumber(*quantity), path, true)
             }),
-            (Shape::Object(table), _) => self.members(node, table, path),
+            (Shape::Law(table, quantity), Value::Text(text)) => {
+                let law = self.law(text, node.span, quantity, shape, path)?;
+                node.value = law_object(node.span, &law);
+                self.members(node, table, path)
+            }
+            (Shape::Object(table) | Shape::Law(table, _), _) => self.members(node, table, path),
             (Shape::Between, Value::List(nodes)) => {
                 each(nodes, &|node, path| self.members(node, &crate::scene::format::PLACE, path))
             }
@@ -245,6 +280,40 @@ impl Resolver<'_> {
             }),
             _ => Ok(()),
         }
+    }
+
+    /// The law of time that a formula is.
+    fn law(
+        &self,
+        text: &str,
+        span: Span,
+        quantity: &Quantity,
+        shape: &Shape,
+        path: &str,
+    ) -> Result<Law, SceneError> {
+        let refused = |error: FormulaError| refused(self.source, span, path, &shape.allowed(), &error);
+        let formula = Formula::parse(text).map_err(refused)?;
+        let (mut values, mut dimensions) = (Vec::new(), Vec::new());
+        for name in formula.names() {
+            match self.find(name) {
+                Some(known) => {
+                    values.push(Some(known.value));
+                    dimensions.push(known.dimension);
+                }
+                None if name == "t" => {
+                    values.push(None);
+                    dimensions.push(Some(Dimension::of("s")));
+                }
+                None => {
+                    let mut known = vec!["t"];
+                    known.extend(self.parameters.iter().map(|known| known.name.as_str()));
+                    return Err(refused(formula.unknown(name, &known)));
+                }
+            }
+        }
+        let dimension = formula.dimension(&dimensions).map_err(refused)?;
+        fits(&formula, dimension, quantity).map_err(refused)?;
+        formula.law(&values).map_err(refused)
     }
 
     fn find(&self, name: &str) -> Option<&Known> {
@@ -271,7 +340,7 @@ impl Resolver<'_> {
             return Ok(());
         }
         let refused = |error: &FormulaError| refused(self.source, node.span, path, &shape.allowed(), error);
-        let formula = Formula::parse(text).map_err(|error| refused(&error))?;
+        let formula = Formula::parse_with(text, self.tables).map_err(|error| refused(&error))?;
         if may_be_law && !self.knows(&formula) {
             return Ok(());
         }
@@ -301,6 +370,27 @@ impl Resolver<'_> {
         node.value = Value::Number(value);
         Ok(())
     }
+}
+
+/// A law as the object that could stand in its formula's place.
+fn law_object(span: Span, law: &Law) -> Value {
+    let number = |value: f64| Node { span, value: Value::Number(value) };
+    let member = |key: &str, node: Node| Member { key: key.to_owned(), span, node };
+    let sine = |sine: &Sine| {
+        let members = vec![
+            member("amplitude", number(sine.amplitude)),
+            member("frequency", number(sine.frequency)),
+            member("phase", number(sine.phase)),
+        ];
+        Node { span, value: Value::Object(members) }
+    };
+    let sines = Node { span, value: Value::List(law.sines.iter().map(sine).collect()) };
+    Value::Object(vec![
+        member("start", number(law.start)),
+        member("rate", number(law.rate)),
+        member("acceleration", number(law.acceleration)),
+        member("sines", sines),
+    ])
 }
 
 /// Refuses a formula of another dimension than its field has.
