@@ -10,7 +10,7 @@ use crate::dynamics::compile::Laws;
 use crate::dynamics::configuration::Configuration;
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::scene::Crossing;
-use crate::stepping::search::{Chebyshev, Curve, root};
+use crate::stepping::search::{Chebyshev, Curve, Interpolants, interpolated, root};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -331,31 +331,19 @@ impl EventDetector {
         depth: u32,
         all: &mut Vec<Passage>,
     ) {
-        let mut curves: Vec<Chebyshev> = Vec::new();
-        let mut nearest = Vec::new();
-        for degree in DEGREES {
-            let nodes: Vec<Vec<f64>> =
-                Chebyshev::nodes(degree).map(|node| self.values(inside.at(begin + node * span))).collect();
-            curves = (0..self.functions())
-                .map(|event| {
-                    Chebyshev::through(&nodes.iter().map(|values| values[event]).collect::<Vec<_>>())
-                })
-                .collect();
-            // From the last node to the first.
-            nearest = nodes.into_iter().rev().take(2).collect();
-            if curves.iter().all(|curve| curve.tail() <= RESOLVED * curve.most()) {
-                break;
-            }
-        }
-        let is_resolved =
-            curves.iter().all(|curve| curve.tail() <= RESOLVED * curve.most() || !curve.most().is_finite());
+        let at = |share: f64, row: &mut Vec<f64>| row.extend(self.values(inside.at(begin + share * span)));
+        let is_enough = |curve: &Chebyshev| curve.tail() <= RESOLVED * curve.most();
+        let Interpolants { curves, values, .. } = interpolated(&DEGREES, at, is_enough);
+        let is_resolved = curves.iter().all(|curve| is_enough(curve) || !curve.most().is_finite());
         if !is_resolved && depth < HALVINGS {
             self.passages(inside, begin, 0.5 * span, depth + 1, all);
             return self.passages(inside, begin + 0.5 * span, 0.5 * span, depth + 1, all);
         }
         for (event, curve) in curves.iter().enumerate() {
             let sign = |value: f64| if value > 0.0 { 1 } else { -i8::from(value < 0.0) };
-            let [first, next] = [nearest[0][event], nearest[1][event]];
+            // From the last node to the first.
+            let nodes = &values[event];
+            let [first, next] = [nodes[nodes.len() - 1], nodes[nodes.len() - 2]];
             let condition = event.checked_sub(self.conditions_from());
             let mode = condition.zip(self.laws.as_ref()).map(|(number, laws)| laws.modes[number]);
             if let Some(mode) = mode {

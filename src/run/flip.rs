@@ -8,7 +8,7 @@
 
 use crate::arithmetic::angle;
 use crate::dynamics::{BodyAngles, Form, State};
-use crate::stepping::search::{Chebyshev, Crossing, crossing};
+use crate::stepping::search::{Chebyshev, Crossing, crossing, interpolated};
 use std::f64::consts::{PI, TAU};
 
 /// The first passage of a bar.
@@ -131,17 +131,11 @@ fn first_passage(
     at: &mut dyn FnMut(f64) -> BodyAngles,
 ) -> Option<Flip> {
     let span = end - begin;
-    let mut angles = vec![Vec::new(); first.phi.len()];
-    for degree in DEGREES {
-        angles.iter_mut().for_each(Vec::clear);
-        for node in Chebyshev::nodes(degree) {
-            let there = at(begin + node * span);
-            angles.iter_mut().enumerate().for_each(|(bar, angles)| angles.push(winding(bar, first, &there)));
-        }
-        if angles.iter().all(|angles| Chebyshev::through(angles).tail() < RESOLVED) {
-            break;
-        }
-    }
+    let angles_at = |share: f64, row: &mut Vec<f64>| {
+        let there = at(begin + share * span);
+        row.extend((0..first.phi.len()).map(|bar| winding(bar, first, &there)));
+    };
+    let angles = interpolated(&DEGREES, angles_at, |angle| angle.tail() < RESOLVED).values;
     let mut found: Option<(f64, usize, f64)> = None;
     for (bar, angles) in angles.iter().enumerate() {
         for side in [1.0, -1.0] {

@@ -15,7 +15,7 @@
 use crate::arithmetic::Complex;
 use crate::dynamics::force::Spring;
 use crate::dynamics::{BodyAngles, Form, Mechanism, State, Time};
-use crate::stepping::search::{Chebyshev, Crossing, Curve, Part, crossing};
+use crate::stepping::search::{Chebyshev, Crossing, Curve, Part, crossing, interpolated};
 use crate::stepping::{Cause, Integrator, Statistics, StepError};
 
 /// A length below this share of the free length is none.
@@ -93,7 +93,7 @@ fn span(
 }
 
 /// |D|² less what counts as none, over the free length: D's components over it.
-struct Length([Chebyshev; 2]);
+struct Length(Vec<Chebyshev>);
 
 impl Curve for Length {
     fn at(&self, t: f64) -> [f64; 2] {
@@ -144,21 +144,13 @@ impl<P: Form + ?Sized> Shrinking<P> {
         let Self { method, from, z, .. } = self;
         let (mut inside, mut at) = (from.clone(), BodyAngles::default());
         let free = problem.mechanism().springs[number].free_length;
-        let mut spans = [Vec::new(), Vec::new()];
-        for degree in DEGREES {
-            spans.iter_mut().for_each(Vec::clear);
-            for share in Chebyshev::nodes(degree) {
-                method.interpolate(problem, from, from.time + share * time, &mut inside);
-                problem.body_angles(&inside, &mut at);
-                let [here, _] = span(problem.mechanism(), number, &at, z);
-                spans[0].push(here.re / free);
-                spans[1].push(here.im / free);
-            }
-            if spans.iter().all(|values| Chebyshev::through(values).tail() < RESOLVED) {
-                break;
-            }
-        }
-        let length = Length(spans.map(|values| Chebyshev::through(&values)));
+        let span_at = |share: f64, row: &mut Vec<f64>| {
+            method.interpolate(problem, from, from.time + share * time, &mut inside);
+            problem.body_angles(&inside, &mut at);
+            let [here, _] = span(problem.mechanism(), number, &at, z);
+            row.extend([here.re / free, here.im / free]);
+        };
+        let length = Length(interpolated(&DEGREES, span_at, |part| part.tail() < RESOLVED).curves);
         match crossing(&length, 1.0) {
             Crossing::At(share) => Some(Approach { spring: number, after: share * time }),
             Crossing::Inside(_) => Some(Approach { spring: number, after: 0.0 }),

@@ -4,7 +4,7 @@ use super::inside::{Observer, Step};
 use super::running::Outcome;
 use super::sample::Sample;
 use crate::dynamics::Motion;
-use crate::stepping::search::{Chebyshev, Curve};
+use crate::stepping::search::{Chebyshev, Curve, Interpolants, interpolated};
 use std::ops::ControlFlow;
 
 /// Degrees of the interpolants, and what their last coefficients may be over their largest value.
@@ -57,17 +57,9 @@ impl Recorder {
     }
 
     fn record(&mut self, step: &mut Step, begin: f64, end: f64, depth: u32) {
-        let mut curves: Vec<Chebyshev> = Vec::new();
-        for degree in DEGREES {
-            let nodes: Vec<Vec<f64>> =
-                Chebyshev::nodes(degree).map(|node| values(step.at(begin + node * (end - begin)))).collect();
-            let of = |k: usize| nodes.iter().map(|node| node[k]).collect::<Vec<f64>>();
-            curves = (0..nodes[0].len()).map(|k| Chebyshev::through(&of(k))).collect();
-            if curves.iter().all(is_resolved) {
-                break;
-            }
-        }
-        if depth < HALVINGS && !curves.iter().all(is_resolved) {
+        let at = |share: f64, row: &mut Vec<f64>| row.extend(values(step.at(begin + share * (end - begin))));
+        let Interpolants { curves, is_resolved, .. } = interpolated(&DEGREES, at, is_enough);
+        if depth < HALVINGS && !is_resolved {
             let middle = 0.5 * (begin + end);
             self.record(step, begin, middle, depth + 1);
             return self.record(step, middle, end, depth + 1);
@@ -76,7 +68,7 @@ impl Recorder {
     }
 }
 
-fn is_resolved(curve: &Chebyshev) -> bool {
+fn is_enough(curve: &Chebyshev) -> bool {
     curve.tail() <= RESOLVED * curve.most() || !curve.most().is_finite()
 }
 

@@ -6,7 +6,7 @@
 //! is repeated to end at the minimum, and what is looked at then has the accuracy of a step, too.
 
 use super::search::{
-    Chebyshev, Crossing, Curve, Part, ROUNDING, TOUCH, crossing, doubtful, root, shift, value,
+    Chebyshev, Crossing, Curve, Part, ROUNDING, TOUCH, crossing, doubtful, interpolated, root, shift, value,
 };
 use super::{Statistics, finest};
 use crate::dynamics::{Along, OdeSystem, State};
@@ -149,7 +149,6 @@ pub(super) struct Search {
     dense: Dense,
     room: RefCell<[Vec<f64>; 2]>,
     gaps: Vec<f64>,
-    values: Vec<Vec<f64>>,
     opaque: Vec<usize>,
 }
 
@@ -266,32 +265,21 @@ impl Search {
         h: f64,
         mut found: Found,
     ) -> Found {
-        let Self { dense, room, gaps, values, opaque, .. } = self;
+        let Self { dense, room, gaps, opaque, .. } = self;
         gaps.resize(field.events(), 0.0);
-        values.resize(opaque.len(), Vec::new());
         let [y, slope] = room.get_mut();
-        for degree in DEGREES {
-            values.iter_mut().for_each(Vec::clear);
-            for share in Chebyshev::nodes(degree) {
-                dense.at(share, y, slope);
-                field.gaps(state.time + share * h, y, gaps);
-                for (values, &event) in values.iter_mut().zip(&*opaque) {
-                    values.push(gaps[event]);
-                }
-            }
-            let mut pending = 0;
-            for (values, &event) in values.iter().zip(&*opaque) {
-                let curve = Chebyshev::through(values);
-                let tail = curve.tail();
-                if tail <= RESOLVED * curve.most() || Some(&degree) == DEGREES.last() {
-                    found = earlier(found, event, &curve, 0.0, |_| 0.0, 0.0);
-                } else if curve.least() <= 10.0 * tail {
-                    pending += 1;
-                }
-            }
-            if pending == 0 {
-                break;
-            }
+        let at = |share: f64, row: &mut Vec<f64>| {
+            dense.at(share, y, slope);
+            field.gaps(state.time + share * h, y, gaps);
+            row.extend(opaque.iter().map(|&event| gaps[event]));
+        };
+        // What stays that far from zero need not be known better.
+        let is_enough = |curve: &Chebyshev| {
+            curve.tail() <= RESOLVED * curve.most() || curve.least() > 10.0 * curve.tail()
+        };
+        let curves = interpolated(&DEGREES, at, is_enough).curves;
+        for (curve, &event) in curves.iter().zip(&*opaque) {
+            found = earlier(found, event, curve, 0.0, |_| 0.0, 0.0);
         }
         found
     }

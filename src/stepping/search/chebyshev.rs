@@ -1,0 +1,108 @@
+//! Functions known by their values alone: Chebyshev interpolants, of as high a degree as they need.
+
+use super::{Curve, Part, ROUNDING};
+
+/// Interpolants of several functions on \[0, 1\], all of one degree.
+#[derive(Clone, Debug, Default)]
+pub struct Interpolants {
+    /// Function by function.
+    pub curves: Vec<Chebyshev>,
+    /// Their values at the [nodes](Chebyshev::nodes), function by function.
+    pub values: Vec<Vec<f64>>,
+    /// True where the last degree was enough.
+    pub is_resolved: bool,
+}
+
+/// Interpolates functions by one of the `degrees` after the other, until a degree is enough for each of them.
+///
+/// `at` appends the value of each function at a place in \[0, 1\].
+pub fn interpolated(
+    degrees: &[usize],
+    mut at: impl FnMut(f64, &mut Vec<f64>),
+    is_enough: impl Fn(&Chebyshev) -> bool,
+) -> Interpolants {
+    let (mut found, mut row) = (Interpolants::default(), Vec::new());
+    for &degree in degrees {
+        found.values.iter_mut().for_each(Vec::clear);
+        for node in Chebyshev::nodes(degree) {
+            row.clear();
+            at(node, &mut row);
+            found.values.resize(row.len(), Vec::new());
+            found.values.iter_mut().zip(&row).for_each(|(values, value)| values.push(*value));
+        }
+        found.curves = found.values.iter().map(|values| Chebyshev::through(values)).collect();
+        found.is_resolved = found.curves.iter().all(&is_enough);
+        if found.is_resolved {
+            break;
+        }
+    }
+    found
+}
+
+/// A function on \[0, 1\] known by its values alone: its interpolant `Σ c_k T_k(2t - 1)`.
+///
+/// Its bound is |T_k''| <= k² (k² - 1)/3, which the fall of the c_k keeps small.  Source: L. N. Trefethen,
+/// *Approximation Theory and Approximation Practice* (2013), chapters 2, 3 and 8.
+#[derive(Clone, Debug)]
+pub struct Chebyshev {
+    coefficients: Vec<f64>,
+    bend: f64,
+}
+
+impl Chebyshev {
+    /// The places of `degree + 1` values, from 1 to 0.
+    pub fn nodes(degree: usize) -> impl Iterator<Item = f64> {
+        (0..=degree).map(move |j| 0.5 + 0.5 * libm::cos(std::f64::consts::PI * j as f64 / degree as f64))
+    }
+
+    /// The interpolant of values at the nodes, two at least.
+    pub fn through(values: &[f64]) -> Self {
+        let degree = values.len().max(2) - 1;
+        let end = |k: usize| if k == 0 || k == degree { 0.5 } else { 1.0 };
+        let wave: Vec<f64> =
+            (0..2 * degree).map(|m| libm::cos(std::f64::consts::PI * m as f64 / degree as f64)).collect();
+        let sum = |k: usize| {
+            values
+                .iter()
+                .enumerate()
+                .fold(0.0, |sum, (j, value)| sum + end(j) * value * wave[(j * k) % (2 * degree)])
+        };
+        let coefficients: Vec<f64> = (0..=degree).map(|k| 2.0 / degree as f64 * end(k) * sum(k)).collect();
+        let steep = |(k, c): (usize, &f64)| 4.0 * (k * k * (k * k - k.min(1))) as f64 / 3.0 * c.abs();
+        let bend = coefficients.iter().enumerate().map(steep).sum();
+        Self { coefficients, bend }
+    }
+
+    /// What the last coefficients say it may be off.
+    pub fn tail(&self) -> f64 {
+        self.coefficients.iter().rev().take(3).fold(0.0, |most, c| f64::max(most, c.abs()))
+    }
+
+    /// The least magnitude it can have.
+    pub fn least(&self) -> f64 {
+        self.coefficients.iter().skip(1).fold(self.coefficients[0].abs(), |left, c| left - c.abs())
+    }
+
+    /// The largest magnitude it can have.
+    pub fn most(&self) -> f64 {
+        self.coefficients.iter().fold(0.0, |sum, c| sum + c.abs())
+    }
+}
+
+impl Curve for Chebyshev {
+    fn at(&self, t: f64) -> [f64; 2] {
+        let x = 2.0 * t - 1.0;
+        // Clenshaw's recurrence, and its derivative.
+        let ([mut b, mut before], [mut slope, mut slope_before]) = ([0.0; 2], [0.0; 2]);
+        for &c in self.coefficients.iter().skip(1).rev() {
+            (slope, slope_before) = (2.0 * b + 2.0 * x * slope - slope_before, slope);
+            (b, before) = (c + 2.0 * x * b - before, b);
+        }
+        [self.coefficients[0] + x * b - before, 2.0 * (b + x * slope - slope_before)]
+    }
+
+    fn about(&self, centre: f64, _radius: f64) -> Part {
+        let [value, slope] = self.at(centre);
+        Part { value, slope, bend: self.bend, rounding: ROUNDING * self.most() }
+    }
+}
