@@ -57,6 +57,8 @@ pub struct Mechanism {
     /// The scene's formulas, and where they are recorded with other parameters or on other branches: the
     /// first of `forces` are its laws, in their order.
     pub(crate) laws: Option<Laws>,
+    /// True where parts or branches that do not act at the moment do work: it is integrated all along.
+    pub(crate) keeps_work: bool,
     /// The mechanism with the parts that do not act at the start, and their names; where there are any.
     pub(crate) whole: Option<(Arc<Mechanism>, Vec<String>)>,
     /// Constraint equations: given angles, then points that coincide or stay on lines, then one per contact
@@ -265,6 +267,7 @@ impl Mechanism {
                 Some(Laws { formulas: Arc::new(formulas), parameters, modes })
             }
         };
+        let keeps_work = laws.as_ref().is_some_and(|laws| laws.formulas.applies());
         let mut rows = given_angles(scene);
         let partition = CoordinatePartition::new(bodies.len(), n, &rows)?;
         let joints = joints(scene, &forest, &mut rows);
@@ -321,6 +324,7 @@ impl Mechanism {
             actions: actions(scene, &forest),
             forces,
             laws,
+            keeps_work,
             whole: None,
             integrals: scene.bars.len() - scene.own_bars(),
             bodies,
@@ -522,6 +526,7 @@ impl Mechanism {
             return Err(unknown.clone());
         }
         let mut mechanism = self.clone();
+        mechanism.keeps_work |= self.is_worked_on();
         mechanism.springs.retain(|part| !parts.contains(&part.name));
         mechanism.torsions.retain(|part| !parts.contains(&part.name));
         mechanism.actions.retain(|part| !parts.contains(&part.name));
@@ -588,7 +593,10 @@ impl Mechanism {
 
     /// True where forces do work that no energy stands for: dampers, applied forces and torques.
     pub fn is_worked_on(&self) -> bool {
-        self.is_damped() || !self.actions.is_empty() || self.forces.iter().any(UserForce::does_work)
+        self.keeps_work
+            || self.is_damped()
+            || !self.actions.is_empty()
+            || self.forces.iter().any(UserForce::does_work)
     }
 
     /// True where motors, dampers or applied forces do work, so that a form must integrate it.

@@ -249,6 +249,11 @@ impl Formulas {
         Ok(Some(Self { parameters, signals, laws, events, conditions }))
     }
 
+    /// True where a law applies forces beside potentials, on whatever branch.
+    pub fn applies(&self) -> bool {
+        self.laws.iter().any(|law| law.place != Acts::Nowhere)
+    }
+
     /// True where it has conditions, or events that change something.
     pub fn switches(&self) -> bool {
         let changes =

@@ -139,6 +139,8 @@ impl Truth {
         let marks = (1..=MARKS.min(count)).map(|mark| mark * count / MARKS.min(count) - 1).collect();
         let how = if is_plain {
             format!("dp8 at tolerance {:e}", FINE[0])
+        } else if mechanism.is_switched() {
+            "taylor at tolerance 1e-16, through its switches".to_owned()
         } else if mechanism.contacts.is_empty() {
             "taylor of order 30 in double-double".to_owned()
         } else {

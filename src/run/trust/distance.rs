@@ -10,7 +10,7 @@ use crate::run::drift::larger;
 pub struct DistanceMetric {
     /// How many coordinates are angles; the others are positions.
     angles: usize,
-    /// The first of the coordinates that are not shown: rotors of integrals, which weigh nothing.
+    /// The first of the coordinates that are not shown: rotors of integrals, whose differences do not count.
     shown: usize,
     /// The longest bar \[m\], or the farthest centre of mass where none has a length.
     size: f64,
@@ -32,11 +32,7 @@ impl DistanceMetric {
 
     /// What a difference in coordinate `k` weighs: 1, or one over the size \[1/m\].
     pub fn weight(&self, k: usize) -> f64 {
-        match k {
-            k if k < self.shown => 1.0,
-            k if k < self.angles => 0.0,
-            _ => 1.0 / self.size,
-        }
+        if k < self.angles { 1.0 } else { 1.0 / self.size }
     }
 
     /// The largest difference of a coordinate, whole turns counted: an angle \[rad\], or a position over the
@@ -62,6 +58,7 @@ impl DistanceMetric {
     fn largest(&self, differences: impl Iterator<Item = f64>) -> f64 {
         differences
             .enumerate()
+            .filter(|(k, _)| *k < self.shown || *k >= self.angles)
             .fold(0.0, |most, (k, difference)| larger(most, difference.abs() * self.weight(k)))
     }
 }
