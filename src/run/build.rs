@@ -1,11 +1,10 @@
 //! From a plan to a driver: the form of the equations a stabilization asks for, the method, and what is
 //! measured before the first step.
 
-use super::driver::{Driver, Halt, Watch, boxed};
+use super::driver::{Driver, Halt, Watch, driver};
 use super::impact_monitor::closed;
 use super::methods::{MethodId, Stabilization};
 use super::plan::Plan;
-use super::shrink::{Shrinking, shrinking};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::elimination::Elimination;
@@ -16,7 +15,7 @@ use crate::dynamics::{Form, Mechanism, Motion, OdeSystem};
 use crate::stabilization::{Baumgarte, Projected, SymmetricGauss};
 use crate::stepping::gauss::Gauss;
 use crate::stepping::rattle::Rattle;
-use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Integrator, Radau, StepError, Taylor};
+use crate::stepping::{Cause, Dop853, Dopri5, Dp5, Dp8, Radau, StepError, Taylor};
 use std::sync::Arc;
 
 /// A mechanism in some form, as a first-order system.
@@ -36,17 +35,6 @@ macro_rules! sized {
             _ => $function::<0>($($argument),*),
         }
     };
-}
-
-fn driver<P: Form + Send + ?Sized + 'static, M: Integrator<P> + Send + 'static>(
-    problem: Box<P>,
-    method: M,
-    start: &Motion,
-) -> Box<dyn Driver> {
-    match shrinking(problem.mechanism()) {
-        springs if springs.is_empty() => boxed(problem, method, start),
-        springs => boxed(problem, Shrinking::new(Box::new(method), springs), start),
-    }
 }
 
 /// The form a stabilization integrates in, for `N` bodies.

@@ -7,6 +7,7 @@
 use super::flip::{self, FlipDetector};
 use super::inside::{Inside, StepWatcher};
 use super::monitor::Monitor;
+use super::shrink::SpringGuard;
 use super::wall_guard::WallGuard;
 use crate::arithmetic::Scalar;
 use crate::dynamics::{BodyAngles, Form, Motion, State, Time};
@@ -113,6 +114,8 @@ struct StepLoop<P: ?Sized, M> {
     is_dense: bool,
     /// Watches the walls, where there are any.
     guard: Option<WallGuard>,
+    /// Watches the springs, where any can lose its length.
+    springs: Option<SpringGuard>,
 }
 
 impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M> {
@@ -141,6 +144,7 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
             self.from.clone_from(&self.state);
             let mut event =
                 self.method.step(&mut self.problem, &mut self.state, target, &mut self.statistics)?;
+            self.check_springs()?;
             self.check_walls()?;
             if let Some(steps) = &mut steps
                 && self.is_cut_by(*steps)
@@ -261,16 +265,18 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
 impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
     /// Makes everything ready for a step from the present state.
     fn begin(&mut self, target: Time, flips: Option<&mut FlipDetector>) -> Result<(), StepError> {
-        let Self { problem, method, state, guard, .. } = self;
+        let Self { problem, method, state, guard, springs, .. } = self;
         if !std::mem::replace(&mut self.goes_on, self.is_dense) {
             method.begin(problem, state, target)?;
         }
         if let Some(flips) = flips {
             flips.begin(&mut **problem, state);
         }
+        if let Some(springs) = springs {
+            problem.body_angles(state, &mut springs.before);
+        }
         if let Some(guard) = guard {
-            let mut body_angles = BodyAngles::default();
-            problem.body_angles(state, &mut body_angles);
+            let body_angles = seen(&mut **problem, state);
             guard.begin(problem.mechanism(), state.time.hi, &body_angles);
         }
         Ok(())
@@ -297,13 +303,28 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
         true
     }
 
+    /// Looks whether a spring has lost its length in the last step, which is then taken back.
+    fn check_springs(&mut self) -> Result<(), StepError> {
+        let Self { problem, method, state, springs: Some(springs), from, inside, .. } = self else {
+            return Ok(());
+        };
+        let span = (state.time - from.time).hi;
+        problem.body_angles(state, &mut springs.now);
+        let mut at = |seconds: f64| {
+            method.interpolate(problem, from, from.time + seconds, inside);
+            seen(&mut **problem, inside)
+        };
+        let Some(lost) = springs.step(span, &mut at) else { return Ok(()) };
+        state.clone_from(from);
+        Err(lost.stop(Integrator::<P>::name(method), from.time.hi, span))
+    }
+
     /// Looks whether the last step has passed a wall.
     fn check_walls(&mut self) -> Result<(), StepError> {
         let Self { problem, method, state, guard: Some(guard), from, inside, .. } = self else {
             return Ok(());
         };
-        let (name, mut body_angles) = (Integrator::<P>::name(method), BodyAngles::default());
-        problem.body_angles(state, &mut body_angles);
+        let (name, body_angles) = (Integrator::<P>::name(method), seen(&mut **problem, state));
         let candidate = guard
             .step(problem.mechanism(), state.time.hi, &body_angles)
             .map_err(|passed| passed.stop(name))?;
@@ -311,9 +332,7 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
         let (span, mechanism) = (state.time - from.time, problem.mechanism().clone());
         let mut at = |share: f64| {
             method.interpolate(problem, from, from.time + span.scale(share), inside);
-            let mut body_angles = BodyAngles::default();
-            problem.body_angles(inside, &mut body_angles);
-            (inside.time.hi, body_angles)
+            (inside.time.hi, seen(&mut **problem, inside))
         };
         guard.search(&mechanism, contact, &mut at).map_err(|passed| passed.stop(name))
     }
@@ -368,12 +387,13 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Inside for StepLoop<P, M>
 }
 
 /// The loop for a problem in some form and a method, from a motion on.
-pub(super) fn boxed<P: Form + Send + ?Sized + 'static, M: Integrator<P> + Send + 'static>(
+pub(super) fn driver<P: Form + Send + ?Sized + 'static, M: Integrator<P> + Send + 'static>(
     problem: Box<P>,
     method: M,
     start: &Motion,
 ) -> Box<dyn Driver> {
     let (state, is_dense) = (problem.state(start), method.is_dense());
+    let springs = SpringGuard::new(problem.mechanism());
     let idle = State::default;
     Box::new(StepLoop {
         problem,
@@ -389,5 +409,13 @@ pub(super) fn boxed<P: Form + Send + ?Sized + 'static, M: Integrator<P> + Send +
         goes_on: false,
         is_dense,
         guard: None,
+        springs,
     })
+}
+
+/// What there is to see of a state.
+fn seen<P: Form + ?Sized>(problem: &mut P, state: &State) -> BodyAngles {
+    let mut body_angles = BodyAngles::default();
+    problem.body_angles(state, &mut body_angles);
+    body_angles
 }
