@@ -107,9 +107,9 @@ pub(super) trait Stride<F: OdeSystem + ?Sized> {
     }
 }
 
-/// What a step holds, as shares of it.
+/// What a step holds first, as shares of it, or after so long \[s\].
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Found {
+pub(super) enum Found {
     Nothing,
     /// Event number, and where it is.
     At(usize, f64),
@@ -120,10 +120,20 @@ enum Found {
 }
 
 impl Found {
-    fn share(self) -> f64 {
+    /// Where it is; the end of the `whole` where it is nothing.
+    pub fn end(self, whole: f64) -> f64 {
         match self {
-            Self::Nothing => 1.0,
-            Self::At(_, share) | Self::Near(share) | Self::Inside(share) => share,
+            Self::Nothing => whole,
+            Self::At(_, end) | Self::Near(end) | Self::Inside(end) => end,
+        }
+    }
+
+    /// What comes first: that which was found, or what an event function known to rounding has to say.
+    pub fn or_earlier(self, event: usize, curve: &impl Curve, whole: f64) -> Self {
+        match crossing(curve, self.end(whole)) {
+            Crossing::At(at) => Self::At(event, at),
+            Crossing::Inside(at) => Self::Inside(at),
+            Crossing::Nothing => self,
         }
     }
 }
@@ -201,7 +211,7 @@ impl Search {
         let mut h = whole;
         for round in 0..=ROUNDS {
             let found = self.first(field, step, state, h, round < ROUNDS, statistics);
-            let shorter = found.share() * h;
+            let shorter = found.end(1.0) * h;
             match found {
                 Found::Nothing => break,
                 Found::At(event, _) => {
@@ -279,7 +289,7 @@ impl Search {
         };
         let curves = interpolated(&DEGREES, at, is_enough).curves;
         for (curve, &event) in curves.iter().zip(&*opaque) {
-            found = earlier(found, event, curve, 0.0, |_| 0.0, 0.0);
+            found = found.or_earlier(event, curve, 1.0);
         }
         found
     }
@@ -362,25 +372,24 @@ fn earlier(
     off: impl Fn(f64) -> f64,
     begin: f64,
 ) -> Found {
-    let end = found.share();
+    let end = found.end(1.0);
     // Below, it is known as well as zero is.
-    let zone = if zone < 0.1 * TOUCH { 0.0 } else { zone };
+    if zone < 0.1 * TOUCH {
+        return found.or_earlier(event, curve, 1.0);
+    }
     // Most steps end here.
-    if zone > 0.0 && curve.at(0.0)[0] > zone && root(curve, zone, 0.0, end).is_none() {
+    if curve.at(0.0)[0] > zone && root(curve, zone, 0.0, end).is_none() {
         return found;
     }
-    let crosses = crossing(curve, end);
-    let passes = if let Crossing::At(share) = crosses { Some(share) } else { None };
-    let near = if zone > 0.0 {
-        doubtful(curve, zone, |share| zone * off(share), [begin, end], passes)
-    } else {
-        None
+    let crosses = found.or_earlier(event, curve, 1.0);
+    let passes = match crosses {
+        Found::At(by, share) if by == event => Some(share),
+        _ => None,
     };
-    match (crosses, near) {
-        (Crossing::Inside(share), near) if near.is_none_or(|near| share <= near) => Found::Inside(share),
+    match (crosses, doubtful(curve, zone, |share| zone * off(share), [begin, end], passes)) {
+        (Found::Inside(share), Some(near)) if near < share => Found::Near(near),
+        (Found::Inside(_), _) | (_, None) => crosses,
         (_, Some(near)) => Found::Near(near),
-        (Crossing::At(share), None) => Found::At(event, share),
-        (Crossing::Nothing | Crossing::Inside(_), None) => found,
     }
 }
 

@@ -46,7 +46,8 @@ pub use self::batch::Batch;
 use self::expansion::Expansion;
 use self::fast::Fast;
 use self::singular::SingularPassage;
-use super::search::{self, Crossing, Powers};
+use super::event::Found;
+use super::search::{self, Powers};
 use super::{Cause, Integrator, Statistics, StepError, Tolerance};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics;
@@ -318,24 +319,19 @@ impl<T: Coefficient> Taylor<T> {
         h: f64,
     ) -> Result<(f64, Option<usize>), StepError> {
         let Self { expansion: Some(expansion), powers, .. } = self else { return Ok((h, None)) };
-        let (mut first, mut event) = (h, None);
+        let mut found = Found::Nothing;
         for contact in 0..problem.events() {
             trace(problem, expansion, contact, powers);
-            match search::crossing(&Powers { powers, end: first }, first) {
-                Crossing::Nothing => {}
-                Crossing::At(t) => (first, event) = (t, Some(contact)),
-                Crossing::Inside(t) if t > super::finest(state, problem.time_unit()) => {
-                    (first, event) = (t, None)
-                }
-                Crossing::Inside(_) => {
-                    return Err(super::at_rest("taylor", state, h));
-                }
+            let curve = Powers { powers, end: found.end(h) };
+            found = found.or_earlier(contact, &curve, h);
+        }
+        match found {
+            Found::At(event, t) => Ok((self.land(problem, state, event, t, h), Some(event))),
+            Found::Inside(t) if t <= super::finest(state, problem.time_unit()) => {
+                Err(super::at_rest("taylor", state, h))
             }
+            found => Ok((found.end(h), None)),
         }
-        if let Some(event) = event {
-            first = self.land(problem, state, event, first, h);
-        }
-        Ok((first, event))
     }
 
     /// The moment of an event near `t` \[s\], at which the event function of the *state* is zero to rounding.
