@@ -24,21 +24,21 @@ use crate::dynamics::{OdeSystem, State, Time};
 use nalgebra::{DVector, SVector};
 use ode_solvers::dop_shared::{IntegrationError, OutputType, Stats, System};
 use std::cell::RefCell;
+use std::marker::PhantomData;
 
 /// Dormand–Prince 5(4) of `ode_solvers`: everyday runs at 1e-3…1e-6.
-#[derive(Clone, Debug)]
-pub struct Dopri5 {
-    /// Tolerance of a step.
-    pub tolerance: Tolerance,
-    rows: Rows,
-}
+pub type Dopri5 = Windows<Fifth>;
 
 /// Dormand–Prince 8(5,3) of `ode_solvers`: everyday runs at 1e-6…1e-12.
+pub type Dop853 = Windows<Eighth>;
+
+/// A method of the crate.
 #[derive(Clone, Debug)]
-pub struct Dop853 {
+pub struct Windows<M> {
     /// Tolerance of a step.
     pub tolerance: Tolerance,
     rows: Rows,
+    method: PhantomData<M>,
 }
 
 /// Most numbers among the rows of one call of the crate, which keeps them all: after so many a window is
@@ -47,23 +47,16 @@ const MOST_KEPT: usize = 1 << 22;
 /// And at least so many rows.
 const LEAST_KEPT: usize = 64;
 
-impl Dopri5 {
+impl<M> Windows<M> {
     /// The method at a tolerance.
     pub fn new(tolerance: Tolerance) -> Self {
-        Self { tolerance, rows: Rows::default() }
-    }
-}
-
-impl Dop853 {
-    /// The method at a tolerance.
-    pub fn new(tolerance: Tolerance) -> Self {
-        Self { tolerance, rows: Rows::default() }
+        Self { tolerance, rows: Rows::default(), method: PhantomData }
     }
 }
 
 /// The field as the crate calls it: unknowns of the field, then the time since the window's start, all over
 /// their units.
-struct Window<'a, F: ?Sized> {
+pub struct Window<'a, F: ?Sized> {
     field: RefCell<&'a mut F>,
     start: Time,
     n: usize,
@@ -116,7 +109,7 @@ impl<F: OdeSystem + ?Sized> System<f64, DVector<f64>> for Window<'_, F> {
 }
 
 /// A window's outcome in plain numbers: the rows' times, the rows, counts.
-type Outcome = (Vec<f64>, Vec<f64>, Result<Stats, IntegrationError>);
+pub type Outcome = (Vec<f64>, Vec<f64>, Result<Stats, IntegrationError>);
 
 /// `integrate!(Stepper, vector)` integrates one window.
 macro_rules! integrate {
@@ -159,7 +152,7 @@ macro_rules! by_length {
 
 /// A stepper of the crate, and what it evaluates in every attempt at a step, and again in every accepted one;
 /// it does not count a rejection before the first acceptance.
-struct Stepper {
+pub struct Stepper {
     name: &'static str,
     attempt: u64,
     accepted: u64,
@@ -414,90 +407,80 @@ fn shorter<F: OdeSystem + ?Sized>(
     }
 }
 
-impl Dopri5 {
+/// Which method of the crate.
+pub trait Method {
+    /// Its numbers.
+    #[doc(hidden)]
+    const STEPPER: Stepper;
+    /// Its order.
+    const ORDER: u32;
+
+    /// The crate's method as it is called.
+    #[doc(hidden)]
+    fn integrate<F: OdeSystem + ?Sized>(
+        tolerance: Tolerance,
+        window: Window<F>,
+        y: &[f64],
+        span: f64,
+        first: f64,
+        most: u32,
+    ) -> Outcome;
+}
+
+/// 5(4).
+#[derive(Clone, Copy, Debug)]
+pub struct Fifth;
+
+/// 8(5,3).
+#[derive(Clone, Copy, Debug)]
+pub struct Eighth;
+
+impl Method for Fifth {
     const STEPPER: Stepper = Stepper { name: "dopri5", attempt: 6, accepted: 0 };
+    const ORDER: u32 = 5;
 
-    /// The crate's method as it is called.
-    fn call<F: OdeSystem + ?Sized>(
-        &self,
-    ) -> impl FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome + use<F> {
-        let tolerance = self.tolerance;
-        move |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| -> Outcome {
-            let settings = (tolerance, (0.04, 0.2, 10.0), first, most);
-            by_length!(ode_solvers::Dopri5<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
-        }
+    fn integrate<F: OdeSystem + ?Sized>(
+        tolerance: Tolerance,
+        window: Window<F>,
+        y: &[f64],
+        span: f64,
+        first: f64,
+        most: u32,
+    ) -> Outcome {
+        let settings = (tolerance, (0.04, 0.2, 10.0), first, most);
+        by_length!(ode_solvers::Dopri5<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
     }
 }
 
-impl<F: OdeSystem + ?Sized> Integrator<F> for Dopri5 {
-    fn name(&self) -> &'static str {
-        "dopri5"
-    }
-
-    fn order(&self) -> u32 {
-        5
-    }
-
-    fn begin(&mut self, field: &mut F, state: &mut State, until: Time) -> Result<(), StepError> {
-        let mut integrate = self.call();
-        begin(&mut self.rows, &Self::STEPPER, &mut integrate, field, state, until)
-    }
-
-    fn step(
-        &mut self,
-        field: &mut F,
-        state: &mut State,
-        until: Time,
-        statistics: &mut Statistics,
-    ) -> Result<Option<usize>, StepError> {
-        let mut integrate = self.call();
-        step(&mut self.rows, &Self::STEPPER, &mut integrate, field, state, until, statistics)
-    }
-
-    fn changed(&mut self, state: &mut State) {
-        state.memory.truncate(1);
-        self.rows.clear();
-    }
-
-    /// What it remembers beyond a window is the step found.
-    fn reset(&mut self, state: &mut State) {
-        state.memory.truncate(1);
-        self.rows.clear();
-    }
-
-    fn interpolate(&mut self, field: &mut F, from: &State, time: Time, inside: &mut State) {
-        let mut integrate = self.call();
-        shorter(&Self::STEPPER, &mut integrate, field, from, time, inside);
-    }
-}
-
-impl Dop853 {
+impl Method for Eighth {
     const STEPPER: Stepper = Stepper { name: "dop853", attempt: 11, accepted: 1 };
+    const ORDER: u32 = 8;
 
-    /// The crate's method as it is called.
-    fn call<F: OdeSystem + ?Sized>(
-        &self,
-    ) -> impl FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome + use<F> {
-        let tolerance = self.tolerance;
-        move |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| -> Outcome {
-            let settings = (tolerance, (0.0, 1.0 / 3.0, 6.0), first, most);
-            by_length!(ode_solvers::Dop853<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
-        }
+    fn integrate<F: OdeSystem + ?Sized>(
+        tolerance: Tolerance,
+        window: Window<F>,
+        y: &[f64],
+        span: f64,
+        first: f64,
+        most: u32,
+    ) -> Outcome {
+        let settings = (tolerance, (0.0, 1.0 / 3.0, 6.0), first, most);
+        by_length!(ode_solvers::Dop853<f64, _, _>, window, y, span, settings; 2 3 4 5 6 7 8 9 10 11 12 13)
     }
 }
 
-impl<F: OdeSystem + ?Sized> Integrator<F> for Dop853 {
+impl<M: Method, F: OdeSystem + ?Sized> Integrator<F> for Windows<M> {
     fn name(&self) -> &'static str {
-        "dop853"
+        M::STEPPER.name
     }
 
     fn order(&self) -> u32 {
-        8
+        M::ORDER
     }
 
     fn begin(&mut self, field: &mut F, state: &mut State, until: Time) -> Result<(), StepError> {
-        let mut integrate = self.call();
-        begin(&mut self.rows, &Self::STEPPER, &mut integrate, field, state, until)
+        let mut integrate = called::<M, F>(self.tolerance);
+        begin(&mut self.rows, &M::STEPPER, &mut integrate, field, state, until)
     }
 
     fn step(
@@ -507,8 +490,8 @@ impl<F: OdeSystem + ?Sized> Integrator<F> for Dop853 {
         until: Time,
         statistics: &mut Statistics,
     ) -> Result<Option<usize>, StepError> {
-        let mut integrate = self.call();
-        step(&mut self.rows, &Self::STEPPER, &mut integrate, field, state, until, statistics)
+        let mut integrate = called::<M, F>(self.tolerance);
+        step(&mut self.rows, &M::STEPPER, &mut integrate, field, state, until, statistics)
     }
 
     fn changed(&mut self, state: &mut State) {
@@ -523,7 +506,16 @@ impl<F: OdeSystem + ?Sized> Integrator<F> for Dop853 {
     }
 
     fn interpolate(&mut self, field: &mut F, from: &State, time: Time, inside: &mut State) {
-        let mut integrate = self.call();
-        shorter(&Self::STEPPER, &mut integrate, field, from, time, inside);
+        let mut integrate = called::<M, F>(self.tolerance);
+        shorter(&M::STEPPER, &mut integrate, field, from, time, inside);
+    }
+}
+
+/// A method of the crate at a tolerance.
+fn called<M: Method, F: OdeSystem + ?Sized>(
+    tolerance: Tolerance,
+) -> impl FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome {
+    move |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| {
+        M::integrate(tolerance, window, y, span, first, most)
     }
 }
