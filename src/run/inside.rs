@@ -3,6 +3,7 @@
 use super::event::EventDetector;
 use super::sample::Sample;
 use crate::dynamics::{Motion, Time};
+use std::cell::RefCell;
 use std::ops::ControlFlow;
 
 /// An accepted step and the motion inside it.
@@ -143,5 +144,14 @@ impl Inside for Shortened<'_> {
 
     fn at(&mut self, time: Time) -> &Motion {
         self.inside.at(if time > self.end { self.end } else { time })
+    }
+}
+
+/// The steps of an observer, who is lent out for samples as well.
+pub(super) struct StepsOf<'a, 'b>(pub &'a RefCell<&'b mut dyn Observer>);
+
+impl Observer for StepsOf<'_, '_> {
+    fn step(&mut self, step: &mut Step) -> ControlFlow<()> {
+        self.0.borrow_mut().step(step)
     }
 }

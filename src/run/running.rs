@@ -1,29 +1,31 @@
 //! The loop: from output time to output time, with limits watched; a run can pause in it, be taken down and
 //! go on elsewhere.
 
+mod outcome;
+mod snapshot;
+mod stops;
+
+pub use self::outcome::{Outcome, RunError};
+pub use self::snapshot::{ResumeError, Snapshot};
+use self::stops::{advised, came_apart, drift_stop, not_finite, uncounted};
 use super::build::build;
 use super::clock::{Clock, still};
-use super::contact::{ContactDriver, ContactDriverState, ImpactRecord, PersistentContact};
-use super::custom::Custom;
+use super::contact::ContactDriver;
 use super::drift::{Drift, Limits};
-use super::driver::{Driver, MOST_TURNS, Pause};
-use super::event::{Event, EventDetector, EventRecord};
-use super::flip::{Flip, FlipDetector};
-use super::inside::{Observer, ObserverAdapter, Step};
-use super::methods::{MethodId, Stabilization};
+use super::driver::{Driver, Pause};
+use super::event::{Event, EventDetector};
+use super::flip::FlipDetector;
+use super::inside::{Observer, ObserverAdapter, StepsOf};
 use super::monitor::Monitor;
-use super::plan::{Plan, Refusal, Request};
+use super::plan::{Plan, Request};
 use super::sample::Sample;
-use super::trace::Trace;
-use super::trust::{ErrorEstimator, Kept, Level, Trust};
+use super::trust::{ErrorEstimator, Level};
 use super::turns::Turns;
-use crate::dynamics::{CompileError, Mechanism, Motion};
+use crate::dynamics::{Mechanism, Motion};
 use crate::scene::Scene;
-use crate::stepping::{Cause, Statistics, StepError};
+use crate::stepping::{Statistics, StepError};
 use std::cell::{Cell, RefCell};
-use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::time::Duration;
 
 /// A run about to begin.
 pub struct Run {
@@ -39,97 +41,6 @@ pub struct Run {
     events: Vec<Box<dyn Event>>,
     clock: Clock,
     begun: Motion,
-}
-
-/// How a run ended, or how it stands.
-#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Outcome {
-    /// The plan as carried out.
-    pub plan: Plan,
-    /// The last sample.
-    pub last: Sample,
-    /// Counts.
-    pub statistics: Statistics,
-    /// Drift.
-    pub drift: Drift,
-    /// Samples for charts.
-    pub trace: Trace,
-    /// The first impacts.
-    pub impacts: Vec<ImpactRecord>,
-    /// Number of impacts.
-    pub impact_count: u64,
-    /// Energy lost in them and where points came to rest \[J\].
-    pub impact_loss: f64,
-    /// The first times a point stayed on its wall.
-    pub holds: Vec<PersistentContact>,
-    /// Number of such times.
-    pub persistent_contact_count: u64,
-    /// Time spent so, summed over the points \[s\].
-    pub persistent_contact_time: f64,
-    /// Time spent between the first output time and the last, pauses and the reference solution left out;
-    /// zero where nobody [times](Run::timed) the run.
-    pub wall: Duration,
-    /// Time the reference solution took.
-    pub trust_wall: Duration,
-    /// How far it may be trusted, where that was asked for: see [`Run::trusted`].
-    pub trust: Option<Trust>,
-    /// The first time a bar turned over, where the run is one of an ensemble.
-    pub flip: Option<Flip>,
-    /// Events from outside that happened, the first hundred thousand.
-    pub events: Vec<EventRecord>,
-    /// Their number.
-    pub event_count: u64,
-    /// Energy that events have put into the mechanism \[J\].
-    pub event_energy: f64,
-    /// The event that ended it, or `observer`; a run ended so is no failure.
-    pub ended_by: Option<String>,
-    /// Why it ended before its horizon.
-    pub stop: Option<StepError>,
-}
-
-impl Outcome {
-    /// That of a run that has not gone anywhere yet.
-    pub(super) fn begun(mechanism: &Mechanism, plan: Plan) -> Self {
-        Self {
-            last: Sample::default(),
-            statistics: Statistics::default(),
-            drift: Drift::of_plan(mechanism, &plan),
-            trace: Trace::default(),
-            impacts: Vec::new(),
-            impact_count: 0,
-            impact_loss: 0.0,
-            holds: Vec::new(),
-            persistent_contact_count: 0,
-            persistent_contact_time: 0.0,
-            wall: Duration::ZERO,
-            trust_wall: Duration::ZERO,
-            trust: None,
-            flip: None,
-            events: Vec::new(),
-            event_count: 0,
-            event_energy: 0.0,
-            ended_by: None,
-            stop: None,
-            plan,
-        }
-    }
-}
-
-/// What ends a run without an outcome.
-#[derive(Debug, thiserror::Error)]
-pub enum RunError {
-    /// The scene has no equations.
-    #[error("{0}")]
-    Compile(#[from] CompileError),
-    /// The request makes no sense for the scene.
-    #[error("{0}")]
-    Refused(#[from] Refusal),
-    /// The method could not begin.
-    #[error("{0}")]
-    Step(#[from] StepError),
-    /// An observer failed to write.
-    #[error("{0}")]
-    Observer(#[from] std::io::Error),
 }
 
 impl Run {
@@ -267,89 +178,6 @@ pub struct Running {
     /// The start, until the first sample has been compared with it.
     begun: Option<Motion>,
     clock: Clock,
-}
-
-/// All that the rest of a run depends on, beside its mechanism: what a checkpoint holds.
-#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Snapshot {
-    limits: Limits,
-    contact_state: ContactDriverState,
-    outcome: Outcome,
-    row: u64,
-    resting: Option<StepError>,
-    /// The horizon on the way to which the station was reached \[s\].
-    horizon: f64,
-    error_estimator: Option<Kept>,
-}
-
-/// Why a run cannot go on from a snapshot.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ResumeError {
-    /// It is one of another mechanism, or not sound.
-    #[error("the snapshot does not fit the scene")]
-    Misfit,
-    /// The method cannot begin there.
-    #[error("{0}")]
-    Step(#[from] StepError),
-}
-
-impl Snapshot {
-    /// The plan as it is carried out.
-    pub fn plan(&self) -> &Plan {
-        &self.outcome.plan
-    }
-
-    /// The last output time reached \[s\].
-    pub fn time(&self) -> f64 {
-        self.outcome.last.t
-    }
-
-    /// Goes on by an integrator from outside, which snapshots in files do not hold.
-    pub fn integrated_by(&mut self, integrator: Custom) {
-        self.outcome.plan.integrator = Some(integrator);
-    }
-
-    /// Bounds the evaluations of the whole run anew, those made so far counted in.
-    pub fn allow(&mut self, max_evaluations: u64) {
-        self.outcome.plan.max_evaluations = max_evaluations;
-    }
-
-    /// The same on the way to a later horizon \[s\]; false, and nothing changed, where that is not later or
-    /// would write too many rows.
-    ///
-    /// What follows is what a run to that horizon would have come to, but for the slopes of its drift:
-    /// monitors divide the horizon into intervals, and those seen before are taken over as they are.  A dense
-    /// method that had already cut a step to fit the former horizon keeps that step.
-    pub fn extend(&mut self, until: f64) -> bool {
-        let is_possible = until > self.outcome.plan.until && self.outcome.plan.extend(until);
-        if is_possible {
-            self.outcome.drift.extend(until);
-            if let Some(error_estimator) = &mut self.error_estimator {
-                error_estimator.extend(until);
-            }
-        }
-        is_possible
-    }
-
-    /// Whether its parts go together, and with a mechanism.
-    fn fits(&self, mechanism: &Mechanism) -> bool {
-        let Outcome { plan, last, drift, trace, holds, .. } = &self.outcome;
-        let (n, bars, rows) = (mechanism.coordinates(), mechanism.bodies.len(), mechanism.constraints.len());
-        let sizes = |sample: &Sample| {
-            (sample.phi.len(), sample.omega.len(), sample.constraints.len(), sample.motors.len())
-                == (n, n, rows, rows)
-        };
-        let whole =
-            |sample: &Sample| sizes(sample) && (sample.centre.len(), sample.velocity.len()) == (bars, bars);
-        plan.is_sound()
-            && self.row <= plan.rows
-            && self.horizon <= plan.until
-            && (self.row == 0 || whole(last))
-            && trace.samples().all(sizes)
-            && drift.fits(mechanism)
-            && self.error_estimator.as_ref().is_none_or(Kept::is_sound)
-            && ContactDriver::names_holds(&self.contact_state) <= holds.len()
-    }
 }
 
 impl Running {
@@ -623,92 +451,5 @@ impl Running {
             error_estimator.trust(self.outcome.last.t).with_model(self.outcome.plan.model_error)
         });
         self.outcome
-    }
-}
-
-/// The steps of an observer, who is lent out for samples as well.
-struct StepsOf<'a, 'b>(&'a RefCell<&'b mut dyn Observer>);
-
-impl Observer for StepsOf<'_, '_> {
-    fn step(&mut self, step: &mut Step) -> ControlFlow<()> {
-        self.0.borrow_mut().step(step)
-    }
-}
-
-/// Steps that shrink where loops and sliders are have another cause than a stiff spring.
-fn advised(stop: StepError, has_closed_loops: bool) -> StepError {
-    if stop.cause != Cause::StepTooSmall || !has_closed_loops {
-        return stop;
-    }
-    let hint =
-        if stop.method == "taylor" { "--method dp8 with --stabilize projection" } else { "--method taylor" };
-    StepError {
-        hint: format!("a singular position of the constraints may be near: {hint}, or another tolerance"),
-        ..stop
-    }
-}
-
-/// Loops and sliders that nothing projects let go at singular positions, and the motion goes on smoothly on
-/// another branch: such a run is no success.
-fn came_apart(plan: &Plan, drift: &Drift, sample: &Sample) -> Option<StepError> {
-    let is_loose = matches!(plan.stabilization, Stabilization::None | Stabilization::Baumgarte)
-        && !matches!(plan.method, MethodId::Rattle(_));
-    let off = sample.imbalance.abs();
-    let weakest = drift.constraints.get(sample.weakest).map_or("", |(name, _)| name);
-    (is_loose && off > drift.apart()).then(|| StepError {
-        cause: Cause::BranchLost,
-        method: plan.method.to_string(),
-        t: sample.t,
-        step: plan.step.unwrap_or(0.0),
-        what: match drift.singular {
-            Some(_) => format!("the energy balance is off by {off:.1e} of its scale: constraint {weakest} or its like has let go"),
-            None => format!("the energy balance is off by {off:.1e} of its scale, and nothing puts loops and sliders back"),
-        },
-        hint: "--method dp8 or taylor with --stabilize projection, or a tighter tolerance".into(),
-    })
-}
-
-/// Doubles do not count further turns: the angle shown would be another one.
-fn uncounted(plan: &Plan, sample: &Sample) -> Option<StepError> {
-    let angles = &sample.phi[..sample.centre.len()];
-    angles.iter().any(|phi| phi.abs() > MOST_TURNS as f64 * std::f64::consts::TAU).then(|| StepError {
-        cause: Cause::NotFinite,
-        method: plan.method.to_string(),
-        t: sample.t,
-        step: plan.step.unwrap_or(0.0),
-        what: "a body has turned more often than doubles can count".into(),
-        hint: "look for rates far out of proportion, or shorten the horizon".into(),
-    })
-}
-
-fn not_finite(plan: &Plan, t: f64) -> StepError {
-    let what = "energies, torques or velocities are beyond the numbers a double holds".into();
-    let hint = "look for masses, rates or stiffnesses far out of proportion".into();
-    StepError {
-        cause: Cause::NotFinite,
-        method: plan.method.to_string(),
-        t,
-        step: plan.step.unwrap_or(0.0),
-        what,
-        hint,
-    }
-}
-
-fn drift_stop(plan: &Plan, t: f64, what: String) -> StepError {
-    let hint = match plan.step {
-        Some(_) => {
-            "shorten the step, or state another limit with --max-energy-drift or --max-constraint-drift"
-        }
-        None => {
-            "tighten the tolerance, or state another limit with --max-energy-drift or --max-constraint-drift"
-        }
-    };
-    StepError {
-        cause: Cause::DriftLimit,
-        method: plan.method.to_string(),
-        t,
-        step: plan.step.unwrap_or(0.0),
-        what,
-        hint: hint.into(),
     }
 }

@@ -1,0 +1,86 @@
+//! Why a run ends before its horizon, beside the stops of its method.
+
+use super::super::drift::Drift;
+use super::super::driver::MOST_TURNS;
+use super::super::methods::{MethodId, Stabilization};
+use super::super::plan::Plan;
+use super::super::sample::Sample;
+use crate::stepping::{Cause, StepError};
+
+/// Steps that shrink where loops and sliders are have another cause than a stiff spring.
+pub(super) fn advised(stop: StepError, has_closed_loops: bool) -> StepError {
+    if stop.cause != Cause::StepTooSmall || !has_closed_loops {
+        return stop;
+    }
+    let hint =
+        if stop.method == "taylor" { "--method dp8 with --stabilize projection" } else { "--method taylor" };
+    StepError {
+        hint: format!("a singular position of the constraints may be near: {hint}, or another tolerance"),
+        ..stop
+    }
+}
+
+/// Loops and sliders that nothing projects let go at singular positions, and the motion goes on smoothly on
+/// another branch: such a run is no success.
+pub(super) fn came_apart(plan: &Plan, drift: &Drift, sample: &Sample) -> Option<StepError> {
+    let is_loose = matches!(plan.stabilization, Stabilization::None | Stabilization::Baumgarte)
+        && !matches!(plan.method, MethodId::Rattle(_));
+    let off = sample.imbalance.abs();
+    let weakest = drift.constraints.get(sample.weakest).map_or("", |(name, _)| name);
+    (is_loose && off > drift.apart()).then(|| StepError {
+        cause: Cause::BranchLost,
+        method: plan.method.to_string(),
+        t: sample.t,
+        step: plan.step.unwrap_or(0.0),
+        what: match drift.singular {
+            Some(_) => format!("the energy balance is off by {off:.1e} of its scale: constraint {weakest} or its like has let go"),
+            None => format!("the energy balance is off by {off:.1e} of its scale, and nothing puts loops and sliders back"),
+        },
+        hint: "--method dp8 or taylor with --stabilize projection, or a tighter tolerance".into(),
+    })
+}
+
+/// Doubles do not count further turns: the angle shown would be another one.
+pub(super) fn uncounted(plan: &Plan, sample: &Sample) -> Option<StepError> {
+    let angles = &sample.phi[..sample.centre.len()];
+    angles.iter().any(|phi| phi.abs() > MOST_TURNS as f64 * std::f64::consts::TAU).then(|| StepError {
+        cause: Cause::NotFinite,
+        method: plan.method.to_string(),
+        t: sample.t,
+        step: plan.step.unwrap_or(0.0),
+        what: "a body has turned more often than doubles can count".into(),
+        hint: "look for rates far out of proportion, or shorten the horizon".into(),
+    })
+}
+
+pub(super) fn not_finite(plan: &Plan, t: f64) -> StepError {
+    let what = "energies, torques or velocities are beyond the numbers a double holds".into();
+    let hint = "look for masses, rates or stiffnesses far out of proportion".into();
+    StepError {
+        cause: Cause::NotFinite,
+        method: plan.method.to_string(),
+        t,
+        step: plan.step.unwrap_or(0.0),
+        what,
+        hint,
+    }
+}
+
+pub(super) fn drift_stop(plan: &Plan, t: f64, what: String) -> StepError {
+    let hint = match plan.step {
+        Some(_) => {
+            "shorten the step, or state another limit with --max-energy-drift or --max-constraint-drift"
+        }
+        None => {
+            "tighten the tolerance, or state another limit with --max-energy-drift or --max-constraint-drift"
+        }
+    };
+    StepError {
+        cause: Cause::DriftLimit,
+        method: plan.method.to_string(),
+        t,
+        step: plan.step.unwrap_or(0.0),
+        what,
+        hint: hint.into(),
+    }
+}
