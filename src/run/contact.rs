@@ -5,22 +5,20 @@
 //! of its normal velocity is taken off it and booked as lost in impacts.  From then on the wall is a row kept
 //! by projection, until its force would have to pull.
 
+mod impacts;
 use super::build::build;
 use super::driver::{Driver, DriverState, Halt, Pause, Watch};
 use super::event::{EventDetector, Memory};
 use super::flip::FlipDetector;
-use super::impact_monitor::{self, Claim};
+use super::impact_monitor;
 use super::inside::{Both, ObserverAdapter, StepWatcher};
 use super::methods::Stabilization;
 use super::monitor::{Monitor, lent};
 use super::plan::Plan;
 use super::running::Outcome;
 use super::sample::{Sample, Sampler};
-use crate::arithmetic::{Complex, DoubleDouble};
-use crate::dynamics::kernel::Kernel;
-use crate::dynamics::multiplier::Multiplier;
-use crate::dynamics::{Form, Mechanism, Motion, Time};
-use crate::stabilization::projection::project;
+use crate::arithmetic::DoubleDouble;
+use crate::dynamics::{Mechanism, Motion, Time};
 use crate::stepping::{Cause, Statistics, StepError};
 use std::sync::Arc;
 
@@ -384,246 +382,6 @@ impl ContactDriver {
         Err(self.stopped(&outcome.plan, what, "shorten the output interval, or lower the restitution"))
     }
 
-    /// Strikes every point that touches a wall and moves into it, then holds those that stay.
-    pub(super) fn meet(&mut self, outcome: &mut Outcome) -> Result<(), StepError> {
-        self.meet_after(None, 0.0, outcome)
-    }
-
-    /// The same after an impact of a contact, at this approach \[m/s\].
-    fn meet_after(
-        &mut self,
-        struck: Option<usize>,
-        mut hardest: f64,
-        outcome: &mut Outcome,
-    ) -> Result<(), StepError> {
-        for _ in 0..ROUNDS {
-            let mut quiet = true;
-            for number in 0..self.free.contacts.len() {
-                let posture = self.posture();
-                let contact = &self.free.contacts[number];
-                let approach = -contact.normal.dot(contact.point.velocity(&posture.z, &posture.omega));
-                let is_met = contact.touches(&posture.z)
-                    && approach > NO_SPEED * contact.step_size(&posture.omega).max(hardest);
-                if is_met && !self.mechanism.held.contains(&number) {
-                    hardest = hardest.max(self.impact_at(number, outcome)?);
-                    quiet = false;
-                }
-            }
-            if quiet {
-                break;
-            }
-        }
-        self.settle(struck, None, outcome)
-    }
-
-    /// Lets the impact at a wall take effect, and returns the approach \[m/s\]; points that the others would
-    /// have to pull are let go.
-    fn impact_at(&mut self, contact: usize, outcome: &mut Outcome) -> Result<f64, StepError> {
-        let t = self.motion().time;
-        let Posture { phi, omega, .. } = self.posture();
-        let impact = loop {
-            let Some(impact) = self.mechanism.impact_at(contact, t, &phi, &omega) else {
-                let what = format!(
-                    "the constraints leave a point that meets wall {} no way back",
-                    self.name(contact)
-                );
-                return Err(self.stopped(
-                    &outcome.plan,
-                    what,
-                    "look for motors that drive it there and change their laws, or end the run before",
-                ));
-            };
-            let pulled =
-                (self.mechanism.held.iter().zip(&impact.row_impulses[self.mechanism.standing_rows()..]))
-                    .filter(|(_, pull)| **pull > 1e-12 * impact.impulse)
-                    .max_by(|a, b| a.1.total_cmp(b.1));
-            match pulled.map(|(&held, _)| held) {
-                Some(pulled) => {
-                    let rest = self.mechanism.held.iter().copied().filter(|&held| held != pulled).collect();
-                    self.switch(rest, outcome)?;
-                }
-                None => break impact,
-            }
-        };
-        if impact.approach >= 0.0 {
-            return Ok(0.0);
-        }
-        // Letting others go may have moved it by rounding.
-        let last = self.motion();
-        let (mut motion, before) = (last.clone(), self.sampler.balance(&last));
-        motion.omega = impact.omega.iter().map(|&omega| DoubleDouble::from(omega)).collect();
-        motion.work = motion.work + impact.motor_work;
-        self.driver.jump(&motion);
-        let change = self.sampler.balance(&motion) - before;
-        self.sampler.shift(change);
-        let claim = Claim { contact, impulse: impact.impulse, energy_lost: -change.hi };
-        let tolerance = outcome.plan.tolerance.unwrap_or_default().relative;
-        let after = self.motion();
-        if let Err(what) = impact_monitor::check(&self.mechanism, tolerance, &last, &after, &claim) {
-            let (cause, what) =
-                (Cause::ImpactCheckFailed, format!("impact at wall {}: {what}", self.name(contact)));
-            return Err(StepError {
-                cause,
-                ..self.stopped(&outcome.plan, what, "tighten the tolerance, or use --method taylor")
-            });
-        }
-        if let Some(jumps) = &mut self.jumps {
-            jumps.push(Jump {
-                contact: Some(contact),
-                before: last,
-                after,
-                mechanism: Arc::clone(&self.mechanism),
-            });
-        }
-        outcome.impact_loss -= change.hi;
-        // A point that hangs at its wall without a force is carried to and fro by rounding: that is taken off
-        // it, and is no impact.
-        let contact_speed = self.free.contacts[contact].length / self.free.units.time;
-        if -impact.approach <= NO_SPEED * contact_speed {
-            return Ok(-impact.approach);
-        }
-        outcome.impact_count += 1;
-        if outcome.impacts.len() < KEPT {
-            outcome.impacts.push(ImpactRecord {
-                t: motion.time.hi,
-                wall: self.name(contact).into(),
-                impulse: impact.impulse,
-                approach: impact.approach,
-                energy_lost: -change.hi,
-            });
-        }
-        Ok(-impact.approach)
-    }
-
-    /// Holds the points that touch and stay, and lets the others go; `struck` touches, wherever a projection
-    /// has put it, and `released` goes in any case.
-    fn settle(
-        &mut self,
-        struck: Option<usize>,
-        released: Option<usize>,
-        outcome: &mut Outcome,
-    ) -> Result<(), StepError> {
-        let motion = self.motion();
-        let Posture { z, phi, omega } = self.posture();
-        let touches = |contact: &usize| {
-            Some(*contact) == struck
-                || self.mechanism.held.contains(contact)
-                || self.free.contacts[*contact].touches(&z)
-        };
-        let touching: Vec<usize> = (0..self.free.contacts.len())
-            .filter(|contact| Some(*contact) != released && touches(contact))
-            .collect();
-        if touching.is_empty() && self.mechanism.held.is_empty() {
-            return Ok(());
-        }
-        let Some(staying) = self.free.staying(&touching, motion.time, &phi, &omega) else {
-            let what =
-                format!("a point rests on wall {} and the motors leave it no freedom", self.names(&touching));
-            return Err(self.stopped(&outcome.plan, what, "change the motors' laws, or end the run before"));
-        };
-        if staying == self.mechanism.held { Ok(()) } else { self.switch(staying, outcome) }
-    }
-
-    /// Goes on with these contacts held.
-    fn switch(&mut self, contacts: Vec<usize>, outcome: &mut Outcome) -> Result<(), StepError> {
-        let mut motion = self.motion();
-        let before = self.jumps.is_some().then(|| motion.clone());
-        self.stabilizer += std::mem::take(&mut motion.stabilizer);
-        self.record(&contacts, motion.time.hi, outcome);
-        let mut plan = outcome.plan.clone();
-        if contacts.is_empty() {
-            self.mechanism = Arc::clone(&self.free);
-        } else {
-            self.mechanism = Arc::new(self.free.holding(&contacts));
-            plan.stabilization = Stabilization::Projection;
-            self.put_on(&mut motion, outcome)?;
-        }
-        let next = build(&self.mechanism, &mut plan, &motion)?;
-        let last = std::mem::replace(&mut self.driver, next);
-        self.driver.follow(&*last);
-        self.sampler.hold(Arc::clone(&self.mechanism));
-        if let (Some(jumps), Some(before)) = (&mut self.jumps, before) {
-            jumps.push(Jump {
-                contact: None,
-                before,
-                after: motion.clone(),
-                mechanism: Arc::clone(&self.mechanism),
-            });
-        }
-        if self.holds_in_row > HOLDS_MOST {
-            let what = format!(
-                "more than {HOLDS_MOST} holds before the next output time at wall {}",
-                self.names(&contacts)
-            );
-            return Err(self.stopped(
-                &outcome.plan,
-                what,
-                "shorten the output interval, or loosen the tolerance",
-            ));
-        }
-        Ok(())
-    }
-
-    /// Takes off a motion what keeps it from its walls: gaps of rounding, and normal velocities too small to
-    /// rebound with.
-    fn put_on(&mut self, motion: &mut Motion, outcome: &mut Outcome) -> Result<(), StepError> {
-        let before = self.sampler.balance(motion);
-        let mut form = Multiplier::<0, true>::new(Arc::clone(&self.mechanism));
-        let mut state = form.state(motion);
-        let mut kernel = Kernel::new(&self.mechanism);
-        if let Err((row, left)) = project(&self.mechanism, &mut kernel, &mut state, 1e-13) {
-            let what =
-                format!("{left:.1e} of constraint {row} is left where a point comes to rest on its wall");
-            return Err(self.stopped(&outcome.plan, what, "raise the restitution, or end the run before"));
-        }
-        form.read(&state, motion);
-        motion.stabilizer = 0.0;
-        let change = self.sampler.balance(motion) - before;
-        self.sampler.shift(change);
-        outcome.impact_loss -= change.hi;
-        Ok(())
-    }
-
-    /// Books the holds that end and those that begin.
-    fn record(&mut self, contacts: &[usize], t: f64, outcome: &mut Outcome) {
-        self.held.retain(|held| {
-            let stays = contacts.contains(&held.contact);
-            if !stays {
-                outcome.persistent_contact_time += t - held.since;
-                if let Some(kept) = held.kept {
-                    outcome.holds[kept].until = Some(t);
-                }
-            }
-            stays
-        });
-        for &contact in contacts {
-            if self.held.iter().any(|held| held.contact == contact) {
-                continue;
-            }
-            self.holds_in_row += 1;
-            outcome.persistent_contact_count += 1;
-            let kept = (outcome.holds.len() < KEPT).then_some(outcome.holds.len());
-            if kept.is_some() {
-                outcome.holds.push(PersistentContact { t, wall: self.name(contact).into(), until: None });
-            }
-            self.held.push(Held { contact, since: t, kept });
-        }
-        if !contacts.is_empty()
-            && self.free.standing_rows() > 0
-            && outcome.plan.stabilization != Stabilization::Projection
-        {
-            let note = "while a point stays on its wall, the motors' rows are kept by projection";
-            if !outcome.plan.notes.iter().any(|before| before == note) {
-                outcome.plan.notes.push(note.into());
-            }
-        }
-    }
-
-    /// Books the time of the holds that last to the end of the run, `t` \[s\].
-    pub(super) fn end(&mut self, t: f64, outcome: &mut Outcome) {
-        outcome.persistent_contact_time += self.held.iter().map(|held| t - held.since).sum::<f64>();
-    }
-
     /// The present motion.
     pub(super) fn motion(&mut self) -> Motion {
         let mut motion = Motion::default();
@@ -634,17 +392,6 @@ impl ContactDriver {
     /// The same into a motion that is there already.
     pub(super) fn look(&mut self, motion: &mut Motion) {
         self.driver.read(motion);
-    }
-
-    /// The present motion in doubles.
-    fn posture(&mut self) -> Posture {
-        let motion = self.motion();
-        let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
-        Posture {
-            z: self.free.elements(&phi),
-            omega: motion.omega.iter().map(|omega| omega.hi).collect(),
-            phi,
-        }
     }
 
     /// Why the present moment cannot be the first one of a run with walls: its coordinates are not those of
@@ -684,11 +431,4 @@ impl ContactDriver {
             hint: hint.into(),
         }
     }
-}
-
-/// Elements, coordinates \[rad, m\] and rates \[rad/s, m/s\] as doubles.
-struct Posture {
-    z: Vec<Complex<f64>>,
-    phi: Vec<f64>,
-    omega: Vec<f64>,
 }
