@@ -13,7 +13,13 @@
 //! Source: E. Hairer, S. P. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993),
 //! sections II.4-II.6.
 
-use super::event::{Dense, Met, Search, Stride};
+#[cfg(test)]
+pub(super) mod checks;
+mod dense;
+mod stages;
+use self::dense::{highest, nest};
+use self::stages::{combine, sum_up};
+use super::event::{Met, Search, Stride};
 use super::{Cause, Integrator, Statistics, StepError};
 use crate::arithmetic::sum::{fast_two_sum, two_sum};
 use crate::arithmetic::{DoubleDouble, Scalar};
@@ -260,113 +266,6 @@ impl<P: Pair> Explicit<P> {
     }
 }
 
-/// `out = y + h Σ a_j k_j`.
-#[inline]
-fn combine(y: &[f64], h: f64, row: Row, k: &[f64], out: &mut [f64]) {
-    sum_up(row, k, out);
-    for (out, y) in out.iter_mut().zip(y) {
-        *out = y + h * *out;
-    }
-}
-
-/// `out = Σ a_j k_j`.
-#[inline]
-fn sum_up(row: Row, k: &[f64], out: &mut [f64]) {
-    match out.len() {
-        2 => sum_up_sized::<2>(row, k, out),
-        3 => sum_up_sized::<3>(row, k, out),
-        4 => sum_up_sized::<4>(row, k, out),
-        5 => sum_up_sized::<5>(row, k, out),
-        6 => sum_up_sized::<6>(row, k, out),
-        8 => sum_up_sized::<8>(row, k, out),
-        n => {
-            for (i, out) in out.iter_mut().enumerate() {
-                *out = row.iter().fold(0.0, |sum, &(j, a)| sum + a * k[j * n + i]);
-            }
-        }
-    }
-}
-
-/// The same for `D` unknowns, side by side: one after another the sums of small systems wait for their own
-/// additions.
-fn sum_up_sized<const D: usize>(row: Row, k: &[f64], out: &mut [f64]) {
-    let mut sums = [0.0; D];
-    for &(j, a) in row {
-        let k = &k[j * D..(j + 1) * D];
-        for i in 0..D {
-            sums[i] += a * k[i];
-        }
-    }
-    out.copy_from_slice(&sums);
-}
-
-/// The largest value of what the last coefficient is that of: a polynomial that is zero, and smallest by far,
-/// at both ends of the step.
-fn highest<P: Pair>() -> f64 {
-    let (low, high) = (P::DEGREE / 2, P::DEGREE.div_ceil(2));
-    let [s, t] = [low, high].map(|power| power as f64 / P::DEGREE as f64);
-    libm::pow(s, low as f64) * libm::pow(t, high as f64)
-}
-
-/// `c_1 + (1-s) (c_2 + s (c_3 + …))`.
-fn nest(nested: &[f64], s: f64) -> f64 {
-    nested.iter().enumerate().rev().fold(0.0, |sum, (m, c)| c + if m % 2 == 0 { 1.0 - s } else { s } * sum)
-}
-
-/// Powers of `s (c_1 + (1-s) (c_2 + s (c_3 + …)))` after the constant one.
-fn expand(nested: &[f64], powers: &mut [f64]) {
-    powers.fill(0.0);
-    for (m, c) in nested.iter().enumerate().rev() {
-        // c + (1-s) p, or c + s p.
-        for k in (1..powers.len()).rev() {
-            powers[k] = if m % 2 == 0 { powers[k] - powers[k - 1] } else { powers[k - 1] };
-        }
-        powers[0] = if m % 2 == 0 { powers[0] } else { 0.0 } + c;
-    }
-}
-
-impl<P: Pair, F: OdeSystem + ?Sized> Stride<F> for Explicit<P> {
-    fn dense(
-        &mut self,
-        field: &mut F,
-        state: &State,
-        h: f64,
-        dense: &mut Dense,
-        statistics: &mut Statistics,
-    ) {
-        self.evaluate_extra_stages(field, state, h, statistics);
-        let n = state.y.len();
-        dense.begin(field.watched(), P::DEGREE + 1, state);
-        let most = highest::<P>();
-        for (i, (powers, off)) in dense.each().enumerate() {
-            let change = (self.next[i] - state.y[i]) + (self.next_low[i] - state.low[i]);
-            let nested = P::interpolate(h, change, &|stage| self.k[stage * n + i]);
-            expand(&nested[..P::DEGREE], &mut powers[1..]);
-            *off = most * nested[P::DEGREE - 1].abs();
-        }
-    }
-
-    /// As s² (1-s)² over its largest value.
-    fn off(share: f64) -> f64 {
-        let bell = 4.0 * share * (1.0 - share);
-        bell * bell
-    }
-
-    fn repeat(&mut self, field: &mut F, state: &State, h: f64, statistics: &mut Statistics) -> bool {
-        self.attempt(field, state, h, statistics);
-        true
-    }
-
-    fn end(&self) -> (&[f64], &[f64]) {
-        let n = self.next.len();
-        (&self.next, &self.k[P::STAGES * n..(P::STAGES + 1) * n])
-    }
-
-    fn search(&mut self) -> &mut Search {
-        &mut self.search
-    }
-}
-
 impl<P: Pair, F: OdeSystem + ?Sized> Integrator<F> for Explicit<P> {
     fn name(&self) -> &'static str {
         P::NAME
@@ -515,46 +414,5 @@ impl<P: Pair, F: OdeSystem + ?Sized> Integrator<F> for Explicit<P> {
             self.step_inside(field, from, (time - from.time).hi, inside);
         }
         inside.wrap();
-    }
-}
-
-/// What every tableau must fulfil.
-#[cfg(test)]
-pub(super) mod checks {
-    use super::{NESTED, Pair, Row};
-
-    pub fn rows_sum_to_nodes<P: Pair>(tolerance: f64) {
-        for (row, c) in P::A.iter().zip(&P::C[1..]) {
-            assert!((row.iter().map(|entry| entry.1).sum::<f64>() - c).abs() < tolerance);
-        }
-    }
-
-    /// Σ b c^(k-1) = 1/k.
-    pub fn quadrature<P: Pair>(order: i32, tolerance: f64) {
-        for k in 1..=order {
-            let sum: f64 = P::B.iter().map(|&(i, b)| b * P::C[i].powi(k - 1)).sum();
-            assert!((sum - 1.0 / f64::from(k)).abs() < tolerance, "order {k}: {sum}");
-        }
-    }
-
-    /// y' = t^(m-1) is interpolated exactly up to m = order.
-    pub fn interpolation<P: Pair>(order: i32, tolerance: f64) {
-        for m in 1..=order {
-            let (t, h) = (0.3f64, 0.7);
-            let rate = |t: f64| t.powi(m - 1);
-            let exact = |at: f64| (at.powi(m) - t.powi(m)) / f64::from(m);
-            let mut k: Vec<f64> = P::C.iter().map(|c| rate(t + c * h)).collect();
-            k.push(rate(t + h));
-            P::extra_stages(&mut |_, c, _: Row| k.push(rate(t + c * h)));
-            let mut powers = [0.0; NESTED];
-            super::expand(
-                &P::interpolate(h, exact(t + h), &|stage| k[stage])[..P::DEGREE],
-                &mut powers[..P::DEGREE],
-            );
-            for theta in [0.1, 0.5, 0.8, 1.0] {
-                let found = powers.iter().rev().fold(0.0, |sum, power| (sum + power) * theta);
-                assert!((found - exact(t + theta * h)).abs() < tolerance, "power {m} at {theta}: {found}");
-            }
-        }
     }
 }

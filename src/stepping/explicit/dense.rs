@@ -1,0 +1,73 @@
+//! The dense output of a step, for the search for events in it.
+
+use super::super::Statistics;
+use super::super::event::{Dense, Search, Stride};
+use super::{Explicit, Pair};
+use crate::dynamics::{OdeSystem, State};
+
+/// The largest value of what the last coefficient is that of: a polynomial that is zero, and smallest by far,
+/// at both ends of the step.
+pub(super) fn highest<P: Pair>() -> f64 {
+    let (low, high) = (P::DEGREE / 2, P::DEGREE.div_ceil(2));
+    let [s, t] = [low, high].map(|power| power as f64 / P::DEGREE as f64);
+    libm::pow(s, low as f64) * libm::pow(t, high as f64)
+}
+
+/// `c_1 + (1-s) (c_2 + s (c_3 + …))`.
+pub(super) fn nest(nested: &[f64], s: f64) -> f64 {
+    nested.iter().enumerate().rev().fold(0.0, |sum, (m, c)| c + if m % 2 == 0 { 1.0 - s } else { s } * sum)
+}
+
+/// Powers of `s (c_1 + (1-s) (c_2 + s (c_3 + …)))` after the constant one.
+pub(super) fn expand(nested: &[f64], powers: &mut [f64]) {
+    powers.fill(0.0);
+    for (m, c) in nested.iter().enumerate().rev() {
+        // c + (1-s) p, or c + s p.
+        for k in (1..powers.len()).rev() {
+            powers[k] = if m % 2 == 0 { powers[k] - powers[k - 1] } else { powers[k - 1] };
+        }
+        powers[0] = if m % 2 == 0 { powers[0] } else { 0.0 } + c;
+    }
+}
+
+impl<P: Pair, F: OdeSystem + ?Sized> Stride<F> for Explicit<P> {
+    fn dense(
+        &mut self,
+        field: &mut F,
+        state: &State,
+        h: f64,
+        dense: &mut Dense,
+        statistics: &mut Statistics,
+    ) {
+        self.evaluate_extra_stages(field, state, h, statistics);
+        let n = state.y.len();
+        dense.begin(field.watched(), P::DEGREE + 1, state);
+        let most = highest::<P>();
+        for (i, (powers, off)) in dense.each().enumerate() {
+            let change = (self.next[i] - state.y[i]) + (self.next_low[i] - state.low[i]);
+            let nested = P::interpolate(h, change, &|stage| self.k[stage * n + i]);
+            expand(&nested[..P::DEGREE], &mut powers[1..]);
+            *off = most * nested[P::DEGREE - 1].abs();
+        }
+    }
+
+    /// As s² (1-s)² over its largest value.
+    fn off(share: f64) -> f64 {
+        let bell = 4.0 * share * (1.0 - share);
+        bell * bell
+    }
+
+    fn repeat(&mut self, field: &mut F, state: &State, h: f64, statistics: &mut Statistics) -> bool {
+        self.attempt(field, state, h, statistics);
+        true
+    }
+
+    fn end(&self) -> (&[f64], &[f64]) {
+        let n = self.next.len();
+        (&self.next, &self.k[P::STAGES * n..(P::STAGES + 1) * n])
+    }
+
+    fn search(&mut self) -> &mut Search {
+        &mut self.search
+    }
+}
