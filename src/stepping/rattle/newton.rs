@@ -5,6 +5,7 @@
 //! iterations with a frozen matrix diverge: there the true matrix of every iteration is factored with full
 //! pivoting, and rows whose pivot is lost get no change.
 
+use crate::arithmetic::Complex;
 use crate::dynamics::tree::size;
 
 /// Pivot, against the rows' scale, below which the matrix is factored with exchanges.
@@ -144,6 +145,31 @@ fn substitute(rows: usize, factors: &[f64], pivot: &[f64], load: &mut [f64]) {
             load[i] -= factors[i * rows + k] * load[k];
         }
         load[i] *= pivot[i];
+    }
+}
+
+/// Gradients of the rows, the bodies' at `here`, against columns, into a matrix.
+#[inline(always)]
+pub fn project(
+    n: usize,
+    bodies: usize,
+    rows: usize,
+    here: &[Complex<f64>],
+    gradient: &[Complex<f64>],
+    minv_jt: &[Complex<f64>],
+    matrix: &mut [f64],
+) {
+    for p in 0..bodies {
+        for q in 0..rows {
+            matrix[p * rows + q] = here[p].dot(minv_jt[q * n + p]);
+        }
+    }
+    for p in bodies..rows {
+        let gradient = &gradient[(p - bodies) * n..(p - bodies + 1) * n];
+        for q in 0..rows {
+            matrix[p * rows + q] =
+                gradient.iter().zip(&minv_jt[q * n..(q + 1) * n]).map(|(g, minv_jt)| g.dot(*minv_jt)).sum();
+        }
     }
 }
 
