@@ -1,8 +1,8 @@
 //! The loop over steps: a problem, its method and its state, from one output time to the next.
 //!
-//! Every method is taken the same way: a step is made, walls are checked, flips are looked for, monitors are
-//! shown the motion, and what lies between steps is read off them. [`contact`](super::contact) takes a driver
-//! through impacts, [`running`](super::running) is the loop over output times.
+//! Every method is taken the same way: a step is made, springs and walls are checked, flips are looked for,
+//! monitors are shown the motion, and what lies between steps is read off them. [`contact`](super::contact)
+//! takes a driver through impacts, [`running`](super::running) is the loop over output times.
 
 use super::flip::{self, FlipDetector};
 use super::inside::{Inside, StepWatcher};

@@ -270,19 +270,6 @@ impl Running {
         if self.contact_driver.watch_for(detector) { Ok(self) } else { Err(ResumeError::Misfit) }
     }
 
-    /// All that the rest of the run depends on.
-    pub fn snapshot(&self) -> Snapshot {
-        Snapshot {
-            limits: self.limits,
-            contact_state: self.contact_driver.contact_state(),
-            outcome: self.outcome.clone(),
-            row: self.row,
-            resting: self.resting.clone(),
-            horizon: self.outcome.plan.until,
-            error_estimator: self.error_estimator.as_ref().map(ErrorEstimator::kept),
-        }
-    }
-
     /// The plan as it is carried out.
     pub fn plan(&self) -> &Plan {
         &self.outcome.plan

@@ -5,8 +5,8 @@ use super::super::custom::Custom;
 use super::super::drift::Limits;
 use super::super::plan::Plan;
 use super::super::sample::Sample;
-use super::super::trust::Kept;
-use super::Outcome;
+use super::super::trust::{ErrorEstimator, Kept};
+use super::{Outcome, Running};
 use crate::dynamics::Mechanism;
 use crate::stepping::StepError;
 
@@ -32,6 +32,21 @@ pub enum ResumeError {
     /// The method cannot begin there.
     #[error("{0}")]
     Step(#[from] StepError),
+}
+
+impl Running {
+    /// All that the rest of the run depends on.
+    pub fn snapshot(&self) -> Snapshot {
+        Snapshot {
+            limits: self.limits,
+            contact_state: self.contact_driver.contact_state(),
+            outcome: self.outcome.clone(),
+            row: self.row,
+            resting: self.resting.clone(),
+            horizon: self.outcome.plan.until,
+            error_estimator: self.error_estimator.as_ref().map(ErrorEstimator::kept),
+        }
+    }
 }
 
 impl Snapshot {
