@@ -16,7 +16,7 @@ use super::Mechanism;
 use super::constraint::{ConstraintEquation, Measure};
 use super::kernel::dot;
 use super::rank::Metric;
-use super::tree::{Tree, size};
+use super::tree::{self, Tree, size};
 use crate::arithmetic::Real;
 
 /// Share below which a row is left out.
@@ -125,30 +125,8 @@ pub fn factor<T: Real, const R: usize>(
 ) -> Weakest {
     let scale = &scale[..size::<R>(rows)];
     let mut weakest = Weakest::NONE;
-    factor_by::<T, R>(rows, schur, pivot, |k, pivot| weakest.reciprocal(k, pivot, scale[k]));
+    tree::factor_by::<T, R>(rows, schur, pivot, |k, pivot| weakest.reciprocal(k, pivot, scale[k]));
     weakest
-}
-
-/// The same, `reciprocal` telling the reciprocal of a row's pivot, or zero where the row is left out.
-#[inline(always)]
-pub fn factor_by<T: Real, const R: usize>(
-    rows: usize,
-    schur: &mut [T],
-    pivot: &mut [T],
-    mut reciprocal: impl FnMut(usize, T) -> T,
-) {
-    let r = size::<R>(rows);
-    let (schur, pivot) = (&mut schur[..r * r], &mut pivot[..r]);
-    for k in (0..r).rev() {
-        pivot[k] = reciprocal(k, schur[k * r + k]);
-        for i in 0..k {
-            let l = schur[i * r + k] * pivot[k];
-            for j in 0..=i {
-                let full = schur[j * r + k];
-                schur[j * r + i] -= l * full;
-            }
-        }
-    }
 }
 
 /// S of rows J and M⁻¹ Jᵀ (each r × n), above and on its diagonal.
@@ -179,7 +157,7 @@ pub fn look_closer<T: Real>(
         product(rows, jacobian, minv_jt, schur);
         let Some(is_left_out) = is_left_out else { return factor::<T, 0>(rows, schur, pivot, scale).share };
         let mut weakest = Weakest::NONE;
-        factor_by::<T, 0>(rows, schur, pivot, |k, pivot| {
+        tree::factor_by::<T, 0>(rows, schur, pivot, |k, pivot| {
             weakest.reciprocal_kept(k, pivot, scale[k], is_left_out[k])
         });
         weakest.share
@@ -189,7 +167,6 @@ pub fn look_closer<T: Real>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::tree;
 
     #[test]
     fn a_row_that_depends_on_others_gets_no_multiplier_and_changes_nothing() {

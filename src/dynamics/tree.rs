@@ -213,15 +213,27 @@ impl Tree {
 /// Writes the reciprocal pivots; they come out non-finite or negative where M is not positive definite.
 #[inline(always)]
 pub fn factor<T: Scalar, const N: usize>(bodies: usize, mass: &mut [T], pivot: &mut [T]) {
-    let n = size::<N>(bodies);
-    let (mass, pivot) = (&mut mass[..n * n], &mut pivot[..n]);
+    factor_by::<T, N>(bodies, mass, pivot, |_, pivot| T::ONE / pivot);
+}
+
+/// The same of any symmetric matrix, `reciprocal` telling the reciprocal of a row's pivot, or zero where the
+/// row is left out.
+#[inline(always)]
+pub fn factor_by<T: Scalar, const N: usize>(
+    rows: usize,
+    matrix: &mut [T],
+    pivot: &mut [T],
+    mut reciprocal: impl FnMut(usize, T) -> T,
+) {
+    let n = size::<N>(rows);
+    let (matrix, pivot) = (&mut matrix[..n * n], &mut pivot[..n]);
     for k in (0..n).rev() {
-        pivot[k] = T::ONE / mass[k * n + k];
+        pivot[k] = reciprocal(k, matrix[k * n + k]);
         for i in 0..k {
-            let l = mass[i * n + k] * pivot[k];
+            let l = matrix[i * n + k] * pivot[k];
             for j in 0..=i {
-                let full = mass[j * n + k];
-                mass[j * n + i] -= l * full;
+                let full = matrix[j * n + k];
+                matrix[j * n + i] -= l * full;
             }
         }
     }

@@ -130,20 +130,24 @@ impl<T: Entry> Factors<T> {
         for k in 0..d {
             x.swap(k, self.exchange[k]);
         }
-        for i in 1..d {
-            let mut sum = x[i];
-            for j in 0..i {
-                sum = sum - self.entries[i * d + j] * x[j];
-            }
-            x[i] = sum;
+        substitute(d, &self.entries, &self.pivot, x);
+    }
+}
+
+/// Solves L U x = load in place, with reciprocal pivots.
+#[inline(always)]
+pub fn substitute<T: Entry>(rows: usize, factors: &[T], pivot: &[T], load: &mut [T]) {
+    let (factors, pivot, load) = (&factors[..rows * rows], &pivot[..rows], &mut load[..rows]);
+    for i in 1..rows {
+        for k in 0..i {
+            load[i] = load[i] - factors[i * rows + k] * load[k];
         }
-        for i in (0..d).rev() {
-            let mut sum = x[i];
-            for j in i + 1..d {
-                sum = sum - self.entries[i * d + j] * x[j];
-            }
-            x[i] = sum * self.pivot[i];
+    }
+    for i in (0..rows).rev() {
+        for k in i + 1..rows {
+            load[i] = load[i] - factors[i * rows + k] * load[k];
         }
+        load[i] = load[i] * pivot[i];
     }
 }
 

@@ -5,6 +5,7 @@
 //! iterations with a frozen matrix diverge: there the true matrix of every iteration is factored with full
 //! pivoting, and rows whose pivot is lost get no change.
 
+use super::super::linear::substitute;
 use crate::arithmetic::Complex;
 use crate::dynamics::tree::size;
 
@@ -128,23 +129,6 @@ impl Matrix {
         for (&x, &[_, column]) in x.iter().zip(&self.order) {
             load[column] = x * self.weight[column];
         }
-    }
-}
-
-/// Solves L U x = load in place, with reciprocal pivots.
-#[inline(always)]
-fn substitute(rows: usize, factors: &[f64], pivot: &[f64], load: &mut [f64]) {
-    let (factors, pivot, load) = (&factors[..rows * rows], &pivot[..rows], &mut load[..rows]);
-    for i in 1..rows {
-        for k in 0..i {
-            load[i] -= factors[i * rows + k] * load[k];
-        }
-    }
-    for i in (0..rows).rev() {
-        for k in i + 1..rows {
-            load[i] -= factors[i * rows + k] * load[k];
-        }
-        load[i] *= pivot[i];
     }
 }
 
