@@ -4,9 +4,7 @@
 //! (a, a') + (b, b') = (a + b, a' + b'),     (a, a') (b, b') = (a b, a b' + a' b),     f(a, a') = (f(a), f'(a) a')
 //! ```
 //!
-//! The equations of motion evaluated on them are their own Jacobian.  With `CLOCK` the last direction is
-//! time: laws of time, which are known as functions and not as expressions, put their rates there
-//! ([`Real::moving`]).
+//! The equations of motion evaluated on them are their own Jacobian.
 //!
 //! Source: A. Griewank, A. Walther, *Evaluating Derivatives*, 2nd ed. (2008), section 3.1 (vector mode).
 
@@ -16,14 +14,14 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// A value with its derivatives in `D` directions.
 #[derive(Clone, Copy, Debug)]
-pub struct Dual<const D: usize, const CLOCK: bool> {
+pub struct Dual<const D: usize> {
     /// The value.
     pub value: f64,
     /// Its derivatives.
     pub slope: [f64; D],
 }
 
-impl<const D: usize, const CLOCK: bool> Dual<D, CLOCK> {
+impl<const D: usize> Dual<D> {
     /// A constant.
     #[inline(always)]
     pub fn constant(value: f64) -> Self {
@@ -59,13 +57,13 @@ impl<const D: usize, const CLOCK: bool> Dual<D, CLOCK> {
     }
 }
 
-impl<const D: usize, const CLOCK: bool> Default for Dual<D, CLOCK> {
+impl<const D: usize> Default for Dual<D> {
     fn default() -> Self {
         Self::ZERO
     }
 }
 
-impl<const D: usize, const CLOCK: bool> Scalar for Dual<D, CLOCK> {
+impl<const D: usize> Scalar for Dual<D> {
     const ZERO: Self = Self { value: 0.0, slope: [0.0; D] };
     const ONE: Self = Self { value: 1.0, slope: [0.0; D] };
 
@@ -113,7 +111,7 @@ impl<const D: usize, const CLOCK: bool> Scalar for Dual<D, CLOCK> {
     }
 }
 
-impl<const D: usize, const CLOCK: bool> Real for Dual<D, CLOCK> {
+impl<const D: usize> Real for Dual<D> {
     const IS_PLAIN: bool = false;
 
     #[inline(always)]
@@ -130,30 +128,22 @@ impl<const D: usize, const CLOCK: bool> Real for Dual<D, CLOCK> {
     fn double_double(self) -> DoubleDouble {
         DoubleDouble::of(self.value)
     }
-
-    #[inline(always)]
-    fn moving(mut self, rate: impl FnOnce() -> f64) -> Self {
-        if let (true, Some(slope)) = (CLOCK, self.slope.last_mut()) {
-            *slope = rate();
-        }
-        self
-    }
 }
 
 /// Numbers are compared by their values.
-impl<const D: usize, const CLOCK: bool> PartialEq for Dual<D, CLOCK> {
+impl<const D: usize> PartialEq for Dual<D> {
     fn eq(&self, other: &Self) -> bool {
         self.value == other.value
     }
 }
 
-impl<const D: usize, const CLOCK: bool> PartialOrd for Dual<D, CLOCK> {
+impl<const D: usize> PartialOrd for Dual<D> {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         self.value.partial_cmp(&other.value)
     }
 }
 
-impl<const D: usize, const CLOCK: bool> Add for Dual<D, CLOCK> {
+impl<const D: usize> Add for Dual<D> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -161,7 +151,7 @@ impl<const D: usize, const CLOCK: bool> Add for Dual<D, CLOCK> {
     }
 }
 
-impl<const D: usize, const CLOCK: bool> Sub for Dual<D, CLOCK> {
+impl<const D: usize> Sub for Dual<D> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
@@ -169,7 +159,7 @@ impl<const D: usize, const CLOCK: bool> Sub for Dual<D, CLOCK> {
     }
 }
 
-impl<const D: usize, const CLOCK: bool> Mul for Dual<D, CLOCK> {
+impl<const D: usize> Mul for Dual<D> {
     type Output = Self;
     // The product rule is a sum.
     #[allow(clippy::suspicious_arithmetic_impl)]
@@ -179,7 +169,7 @@ impl<const D: usize, const CLOCK: bool> Mul for Dual<D, CLOCK> {
     }
 }
 
-impl<const D: usize, const CLOCK: bool> Div for Dual<D, CLOCK> {
+impl<const D: usize> Div for Dual<D> {
     type Output = Self;
     #[inline(always)]
     fn div(self, other: Self) -> Self {
@@ -188,7 +178,7 @@ impl<const D: usize, const CLOCK: bool> Div for Dual<D, CLOCK> {
     }
 }
 
-impl<const D: usize, const CLOCK: bool> Neg for Dual<D, CLOCK> {
+impl<const D: usize> Neg for Dual<D> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -196,14 +186,14 @@ impl<const D: usize, const CLOCK: bool> Neg for Dual<D, CLOCK> {
     }
 }
 
-impl<const D: usize, const CLOCK: bool> AddAssign for Dual<D, CLOCK> {
+impl<const D: usize> AddAssign for Dual<D> {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
 
-impl<const D: usize, const CLOCK: bool> SubAssign for Dual<D, CLOCK> {
+impl<const D: usize> SubAssign for Dual<D> {
     #[inline(always)]
     fn sub_assign(&mut self, other: Self) {
         *self = *self - other;
@@ -226,7 +216,7 @@ mod tests {
     #[test]
     fn derivatives_agree_with_differences_in_double_double() {
         let (x, y, h) = (0.7, 1.3, 1e-9);
-        let dual = formula(Dual::<2, false>::unknown(x, 0), Dual::unknown(y, 1));
+        let dual = formula(Dual::<2>::unknown(x, 0), Dual::unknown(y, 1));
         assert!((dual.value - formula(x, y)).abs() < 1e-15);
         let at = |dx: f64, dy: f64| formula(DoubleDouble::sum(x, dx), DoubleDouble::sum(y, dy));
         let differences =
@@ -237,9 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn only_clocks_take_rates() {
-        assert_eq!(Dual::<2, true>::constant(3.0).moving(|| 5.0).slope, [0.0, 5.0]);
-        assert_eq!(Dual::<2, false>::constant(3.0).moving(|| 5.0).slope, [0.0, 0.0]);
-        assert_eq!(Dual::<1, false>::unknown(3.0, 1).slope, [0.0]);
+    fn an_unknown_beyond_the_directions_is_a_constant() {
+        assert_eq!(Dual::<1>::unknown(3.0, 1).slope, [0.0]);
     }
 }

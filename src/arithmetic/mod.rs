@@ -125,13 +125,6 @@ pub trait Real: Scalar + PartialOrd {
     /// The number as a double-double, exactly.
     fn double_double(self) -> DoubleDouble;
 
-    /// A number known at one moment only, which changes at `rate` \[1/s\]: for scalars that carry a
-    /// derivative in time; the others never ask for it.
-    #[inline(always)]
-    fn moving(self, _rate: impl FnOnce() -> f64) -> Self {
-        self
-    }
-
     /// Magnitude.
     fn abs(self) -> Self {
         if self < Self::ZERO { -self } else { self }

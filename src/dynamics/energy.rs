@@ -43,10 +43,10 @@ impl Code for ExactEnergy<'_> {
     }
 }
 
-/// A time as a number of some kind, which changes with it.
+/// A time as a number of some kind.
 #[inline(always)]
 pub(super) fn moment<T: Real>(t: Time) -> T {
-    T::split(t).0.moving(|| 1.0)
+    T::split(t).0
 }
 
 impl Mechanism {

@@ -18,7 +18,7 @@ use crate::arithmetic::{Dual, Scalar};
 pub const LANES: usize = 4;
 
 /// A dual number of the Jacobian's width.
-pub type Slopes = Dual<LANES, false>;
+pub type Slopes = Dual<LANES>;
 
 /// Evaluates the Jacobian of a mechanism; nothing is allocated after [`Jacobian::new`].
 #[derive(Clone, Debug)]
@@ -109,20 +109,6 @@ impl Jacobian {
     }
 }
 
-/// da/dt at fixed coordinates and rates (n) \[rad/s³, m/s³\]: what laws of time do.
-pub fn acceleration_in_time(
-    mechanism: &Mechanism,
-    t: Time,
-    phi: &[f64],
-    omega: &[f64],
-    bias: Bias,
-) -> Vec<f64> {
-    let mut kernel = Kernel::<Dual<1, true>>::new(mechanism);
-    let constants = |values: &[f64]| values.iter().map(|&value| Dual::constant(value)).collect::<Vec<_>>();
-    kernel.accelerate::<0>(mechanism, t, &constants(phi), &constants(omega), bias);
-    kernel.load.iter().map(|load| load.slope[0]).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -177,11 +163,6 @@ mod tests {
                 };
                 assert_near(found, expected, format!("{i} by {direction}"));
             }
-        }
-        let [plus, minus] = [H, -H].map(|h| exact(mechanism, t + h, y, bias, |_| 0.0));
-        let expected = difference(plus, minus);
-        for (i, found) in acceleration_in_time(mechanism, t, &y[..n], &y[n..], bias).into_iter().enumerate() {
-            assert_near(found, expected[i], format!("{i} by time"));
         }
     }
 

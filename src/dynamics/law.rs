@@ -124,30 +124,13 @@ impl Law {
             acceleration -= sin.scale(sine.amplitude * sine.frequency * sine.frequency);
         }
         let (angle, rest) = T::split(angle + sines.double_double());
-        let derivatives = [
-            angle.moving(|| rate.value()),
-            rate.moving(|| acceleration.value()),
-            acceleration.moving(|| self.jerk(t)),
-        ];
-        (derivatives, rest, turns)
-    }
-
-    /// Third derivative \[rad/s³\].
-    fn jerk(&self, t: Time) -> f64 {
-        let of = |sine: &Sine| {
-            sine.argument(t).reduced().0.sin_cos().1.hi
-                * sine.amplitude
-                * sine.frequency
-                * sine.frequency
-                * sine.frequency
-        };
-        -self.sines.iter().map(of).sum::<f64>()
+        ([angle, rate, acceleration], rest, turns)
     }
 
     /// The angle \[rad\], turns included, as near as the scalar holds it.
     #[inline(always)]
     pub fn value<T: Real>(&self, t: Time) -> T {
-        T::split(self.angle(t)).0.moving(|| self.rates::<f64>(t).0)
+        T::split(self.angle(t)).0
     }
 
     /// The same in plain doubles, for a law without acceleration.

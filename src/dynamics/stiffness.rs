@@ -136,9 +136,9 @@ fn spectrum(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Co
 /// c x fitted to three iterates.
 fn largest(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Complex<f64> {
     let n = phi.len();
-    let mut kernel = Kernel::<Dual<1, false>>::new(mechanism);
+    let mut kernel = Kernel::<Dual<1>>::new(mechanism);
     let mut product = |x: &[f64]| -> Vec<f64> {
-        let along = |values: &[f64], slopes: &[f64]| -> Vec<Dual<1, false>> {
+        let along = |values: &[f64], slopes: &[f64]| -> Vec<Dual<1>> {
             values.iter().zip(slopes).map(|(&value, &slope)| Dual { value, slope: [slope] }).collect()
         };
         kernel.accelerate::<0>(

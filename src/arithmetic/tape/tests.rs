@@ -41,7 +41,7 @@ fn a_tape_evaluates_to_what_the_code_evaluates_to() {
 fn the_gradient_is_the_derivative_of_dual_numbers_and_of_differences() {
     let (tape, value, gradient) = recorded();
     let slots = evaluated(&tape, [1.2, 0.9]);
-    let dual = formula(Dual::<2, false>::unknown(1.2, 0), Dual::unknown(0.9, 1));
+    let dual = formula(Dual::<2>::unknown(1.2, 0), Dual::unknown(0.9, 1));
     assert_eq!(gradient.len(), 2);
     for &(input, slot) in &gradient {
         let off = |by: f64| {

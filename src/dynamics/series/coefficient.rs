@@ -39,4 +39,4 @@ macro_rules! coefficient {
 coefficient!(f64, bodywise::products_in_lanes, Series::sized_orders);
 coefficient!(DoubleDouble, bodywise::products, Series::sized_orders);
 // The series of a motion with those of small differences beside it: one size of code is enough of each.
-coefficient!(Dual<D, false>, bodywise::products, Series::orders::<0>, const D);
+coefficient!(Dual<D>, bodywise::products, Series::orders::<0>, const D);

@@ -76,8 +76,8 @@ struct Expanded<const D: usize> {
     order: usize,
     /// Powers of the rates that are summed.
     summed: usize,
-    series: Series<Dual<D, false>>,
-    unknowns: [Vec<Dual<D, false>>; 3],
+    series: Series<Dual<D>>,
+    unknowns: [Vec<Dual<D>>; 3],
 }
 
 impl<const D: usize> Expanded<D> {
@@ -94,7 +94,7 @@ impl<const D: usize> Expanded<D> {
     }
 
     /// Power `m` of the rates.
-    fn power(&self, m: usize) -> &[Dual<D, false>] {
+    fn power(&self, m: usize) -> &[Dual<D>] {
         let f = self.series.coordinates();
         &self.series.rate[m * f..(m + 1) * f]
     }

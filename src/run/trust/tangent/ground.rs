@@ -13,7 +13,7 @@ use crate::dynamics::constraint::Posture;
 use crate::dynamics::kernel::{Kernel, dot};
 use crate::dynamics::{Mechanism, State};
 
-type Number = Dual<1, false>;
+type Number = Dual<1>;
 
 /// What columns are put back with.
 pub struct Ground {
