@@ -76,6 +76,11 @@ fn no_checkpoint_makes_a_run_panic() {
 }
 
 #[test]
+fn formulas_agree_with_themselves_in_every_arithmetic_and_method() {
+    run("formula");
+}
+
+#[test]
 fn no_command_line_makes_the_parser_panic() {
     run("command_line");
 }

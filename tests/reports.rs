@@ -9,6 +9,8 @@ mod common;
 #[path = "common/extremes.rs"]
 #[allow(dead_code)]
 mod extremes;
+#[path = "common/formulas.rs"]
+mod formulas;
 #[path = "common/mechanisms/mod.rs"]
 mod mechanisms;
 #[path = "common/program.rs"]

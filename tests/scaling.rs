@@ -104,14 +104,15 @@ fn shipped(folder: &str) -> Vec<(String, Scene)> {
     let mut files: Vec<_> =
         std::fs::read_dir(folder).expect("a folder").map(|file| file.expect("a file").path()).collect();
     files.sort();
+    let read = |path: std::path::PathBuf| {
+        let name = path.file_stem().expect("a name").to_string_lossy().into_owned();
+        (name, read_scene(&path, &[]).expect("a scene"))
+    };
+    // Texts of formulas are not scaled.
     files
         .into_iter()
-        .map(|path| {
-            (
-                path.file_stem().expect("a name").to_string_lossy().into_owned(),
-                read_scene(&path, &[]).expect("a scene"),
-            )
-        })
+        .map(read)
+        .filter(|(_, scene)| scene.laws.is_empty() && scene.events.is_empty())
         .collect()
 }
 

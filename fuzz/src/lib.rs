@@ -2,6 +2,8 @@
 
 #[path = "../../tests/common/audit.rs"]
 mod audit;
+#[path = "../../tests/common/formulas.rs"]
+mod formulas;
 #[path = "../../tests/common/random.rs"]
 pub mod random;
 #[path = "../../tests/common/targets.rs"]

@@ -2,6 +2,7 @@
 //! a promise is broken.
 
 use super::audit::audit;
+use super::formulas;
 use super::random::{self, Draw};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, FromArgMatches, Parser};
@@ -12,6 +13,7 @@ use driftless::report;
 use driftless::run::checkpoint::{opened, sealed};
 use driftless::run::table::Table;
 use driftless::run::{Limits, MethodId, Plan, Request, Run, Running, Sample, Snapshot, Vary};
+use driftless::scene::formula::Formula;
 use driftless::scene::{Override, Refusal, Scene, parse_scene};
 use driftless::stepping::Cause;
 use serde_json::{Value, json};
@@ -24,7 +26,8 @@ use std::sync::{Arc, LazyLock};
 pub type Target = fn(&[u8]) -> u64;
 
 /// All of them.
-pub const TARGETS: [(&str, Target); 5] = [
+pub const TARGETS: [(&str, Target); 6] = [
+    ("formula", formula),
     ("scene_text", scene_text),
     ("scene_tree", scene_tree),
     ("checkpoint", checkpoint),
@@ -562,4 +565,24 @@ pub fn physics(bytes: &[u8]) -> u64 {
         Ending::Stopped(cause) => kind(cause),
         Ending::Drifted => 7,
     }
+}
+
+/// A text as a formula, and a random formula as value, derivative, torque or potential by two methods.
+pub fn formula(bytes: &[u8]) -> u64 {
+    let mut draw = Draw::new(bytes);
+    let (depth, corners, potential) = (draw.below(4), draw.chance(40), draw.chance(30));
+    let text = formulas::expression(&mut draw, depth, corners, potential);
+    formulas::is_consistent(&text);
+    let moved = u64::from(formulas::moves_alike(&text, potential));
+    let noise = String::from_utf8_lossy(draw.rest()).into_owned();
+    let told = match Formula::parse(&noise) {
+        Ok(formula) => {
+            let count = formula.names().count();
+            let _ = (formula.value(&vec![0.5; count]), formula.dimension(&vec![None; count]));
+            let _ = formula.law(&vec![None; count]);
+            2
+        }
+        Err(error) => kind(&error.to_string()),
+    };
+    told.wrapping_add(moved)
 }
