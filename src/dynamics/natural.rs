@@ -157,16 +157,6 @@ impl Natural {
         &self.guides
     }
 
-    /// Gravity and constant forces on every element \[N·m, N\].
-    pub fn weight(&self) -> &[Complex<f64>] {
-        &self.weight
-    }
-
-    /// Constant torques.
-    pub fn torques(&self) -> &[Torque] {
-        &self.torques
-    }
-
     /// Number of elements n: bodies, and two for every origin that moves freely, of which the second is not
     /// used.
     pub fn elements(&self) -> usize {

@@ -144,10 +144,4 @@ impl Quadratic {
         self.slopes(at.z, |k, slope| jacobian[k] += slope);
         Linearised { position: T::ZERO, drive: T::ZERO, convective: self.convective(at.z, at.omega) }
     }
-
-    /// The largest |dQ/de_k| there can be: what violations and pivots are measured against \[m\].
-    pub fn scale(&self) -> f64 {
-        let linear = self.linear.iter().map(|term| term.1.norm_squared());
-        linear.chain(self.bilinear.iter().map(|term| term.2.norm_squared())).fold(0.0, f64::max).sqrt()
-    }
 }

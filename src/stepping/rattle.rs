@@ -66,16 +66,6 @@ impl Rattle {
         }
         Self { composition, step, substeps, ends, work: Work::default(), spare: None, is_stale: false }
     }
-
-    /// The step \[s\].
-    pub fn step(&self) -> f64 {
-        self.step
-    }
-
-    /// The composition.
-    pub fn composition(&self) -> Composition {
-        self.composition
-    }
 }
 
 /// Calls a method for the numbers of bodies compiled in, and whether there are guides or translational

@@ -104,11 +104,6 @@ impl Batch {
         Self { is_portable: kernel != Kernel::Fastest, ..self }
     }
 
-    /// Highest power of the rates.
-    pub fn order(&self) -> usize {
-        self.order
-    }
-
     /// True for what it can integrate: one to four bodies with hinges and centres of mass on their axes,
     /// neither springs nor motors nor walls.
     pub fn takes(mechanism: &Mechanism) -> bool {
