@@ -69,7 +69,8 @@ fn shape(of: &Shape) -> Value {
             json!({"type": "object", "propertyNames": identifier(), "additionalProperties": number})
         }
         Shape::Signals => {
-            json!({"type": "object", "propertyNames": identifier(), "additionalProperties": formula()})
+            let number = json!({"type": ["number", "string"], "maxLength": LONGEST});
+            json!({"type": "object", "propertyNames": identifier(), "additionalProperties": number})
         }
         Shape::Tables => {
             let [least, most] = POINTS;
