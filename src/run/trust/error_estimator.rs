@@ -1,7 +1,7 @@
 //! The reference solution of a run: the same motion by a finer series, looked at together with the run.
 //!
-//! Looks are two mean steps of the reference solution apart, half of one in the beginning and near the
-//! horizon: neither output times nor rests have a say in when they are.
+//! Looks are two mean steps of the reference solution apart, one in the beginning and near the horizon:
+//! neither output times nor rests have a say in when they are.
 
 use super::budget::{DOUBLE_DOUBLE, FLOW, FULL_GRACE, FULL_SHARE, GRACE, Prices, SHARE};
 use super::finer;
@@ -29,9 +29,9 @@ const ENOUGH: f64 = 2000.0;
 const FIRST: f64 = 1e-3;
 /// The time to the next look over the reference solution's mean step: in the beginning, usually, near the
 /// horizon, and where the run is lost.
-const GAPS: [f64; 4] = [0.5, 2.0, 0.5, 4.0];
+const GAPS: [f64; 4] = [1.0, 2.0, 1.0, 4.0];
 /// Looks that belong to the beginning.
-const BEGINNING: u64 = 128;
+const BEGINNING: u64 = 64;
 /// The reference solution's own rounding over what was measured, at most.
 const MOST_ROUNDING: f64 = 2.0;
 /// Steps of a reference solution in which it errs by its tolerance, about.

@@ -2,7 +2,7 @@
 
 use super::growth::{Growth, Nature};
 use super::tangent::Tangent;
-use super::{CAUTION, HORIZON, How, LEAST, LOST, Level, Lyapunov, Trust};
+use super::{CAUTION, HORIZON, How, LEAST, LOST, Level, Trust};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -20,8 +20,6 @@ const ABOVE_ROUNDING: f64 = 5.0;
 
 /// What errors of a regular motion grow by while the time doubles, at most.
 const POWER: f64 = 14.0;
-/// An exponent that errors show over its standard error, at least.
-const SURE: f64 = 3.0;
 /// Steps of the flow before which the response to changed inputs is that of the start.
 const BEGINNING: usize = 8;
 
@@ -190,8 +188,7 @@ impl Measured {
         let most = libm::exp((self.nature.rate().max(self.fastest) * (t - until)).clamp(0.0, 500.0));
         let by_error = (self.error_at(t) / self.error_at(until)).clamp(1.0, most);
         let by_time = (t / until).max(1.0);
-        let by_power = (by_error / by_time).clamp(by_time, by_time * by_time.sqrt());
-        Some(reach * if self.is_regular(t) { by_power } else { by_error })
+        Some(reach * if self.is_regular(t) { (by_error / by_time).max(by_time) } else { by_error })
     }
 
     /// The growth that errors show from the time the flow ended: they are small differences, too.
@@ -250,8 +247,7 @@ impl Measured {
         let is_long = |followed: f64| followed >= if self.is_regular(t) { 0.2 * t } else { 0.5 * t };
         let growth_power = found.filter(|_| self.stopped.is_none_or(|[followed, _]| is_long(followed)));
         if let (Some([followed, _]), None) = (self.stopped, lyapunov) {
-            let is_sure = |found: &Lyapunov| found.exponent >= SURE * found.uncertainty;
-            lyapunov = self.growth_of_errors(followed).lyapunov.filter(is_sure);
+            lyapunov = self.growth_of_errors(followed).lyapunov;
         }
         if let (Some([followed, _]), None, None) = (self.stopped, lyapunov, growth_power) {
             let why = || {

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Steps that are taken for granted where the reference solution has to end one at every look.
-const STEPS: f64 = 512.0;
+const STEPS: f64 = 256.0;
 
 /// Steps by which the length of those of a series before counts in the next.
 const PRIOR: f64 = 8.0;

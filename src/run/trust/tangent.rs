@@ -367,7 +367,7 @@ impl Tangent {
             + self.mechanism.forces.len()) as f64;
         let series = 700.0 + 400.0 * n + 150.0 * n * n + 700.0 * (rows + forces);
         let evaluation = 15.0 + 20.0 * n + 4.0 * n * n + 60.0 * rows + 20.0 * forces;
-        (0.3 * series * (1.0 + 0.75 * self.seeds.len() as f64) / evaluation) as u64
+        (0.2 * series * (1.0 + 0.75 * self.seeds.len() as f64) / evaluation) as u64
     }
 
     /// Phi(t, 0) column by column, in all coordinates and rates as they are \[rad, m, rad/s, m/s\]; of a
