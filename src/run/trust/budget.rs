@@ -18,10 +18,9 @@ pub const SHARE: f64 = 0.3;
 pub const GRACE: [f64; 2] = [20e6, 50e6];
 /// Share and work free of charge of a reference solution in double-double, where the run is not near
 /// rounding.
-pub const DOUBLE_DOUBLE: [f64; 2] = [0.03, 40e3];
-/// The same of the tangent flow from Jacobians, and from series on dual numbers, as a share of the work the
-/// run will have taken.
-pub const FLOW: [[f64; 2]; 2] = [[0.3, 140e3], [0.08, 60e3]];
+pub const DOUBLE_DOUBLE: [f64; 2] = [0.05, 100e3];
+/// The same of the tangent flow from Jacobians, and from series on dual numbers.
+pub const FLOW: [[f64; 2]; 2] = [[0.5, 200e3], [0.15, 120e3]];
 
 /// The same where the estimate is to be had at all costs: thirty times the run's work, and five seconds that
 /// nobody asks after.

@@ -1,6 +1,6 @@
 //! The reference solution of a run: the same motion by a finer series, looked at together with the run.
 //!
-//! Looks are two mean steps of the reference solution apart, one in the beginning and near the horizon:
+//! Looks are a mean step of the reference solution apart, a half of it in the beginning and near the horizon:
 //! neither output times nor rests have a say in when they are.
 
 use super::budget::{DOUBLE_DOUBLE, FLOW, FULL_GRACE, FULL_SHARE, GRACE, Prices, SHARE};
@@ -29,13 +29,11 @@ const ENOUGH: f64 = 2000.0;
 const FIRST: f64 = 1e-3;
 /// The time to the next look over the reference solution's mean step: in the beginning, usually, near the
 /// horizon, and where the run is lost.
-const GAPS: [f64; 4] = [1.0, 2.0, 1.0, 4.0];
+const GAPS: [f64; 4] = [0.5, 1.0, 0.5, 4.0];
 /// Looks that belong to the beginning.
-const BEGINNING: u64 = 64;
+const BEGINNING: u64 = 128;
 /// The reference solution's own rounding over what was measured, at most.
 const MOST_ROUNDING: f64 = 2.0;
-/// Steps of a reference solution in which it errs by its tolerance, about.
-const STEPS_OF_A_UNIT: f64 = 16.0;
 /// Share of the budget for double-double, after which doubles go on, of runs near rounding.
 const NEAR_ROUNDING: f64 = 0.5;
 
@@ -135,9 +133,8 @@ impl ErrorEstimator {
         let finer::Finer { plan: mut series, name } = finer::first(mechanism, plan, level);
         let prices = Prices::new(mechanism, &series, plan);
         let mut measured = Measured::new(level, name, shared(mechanism, plan, &series));
-        let mut reference_run = ReferenceRun::new(mechanism, &mut series, start, level)
-            .map_err(|why| measured.why = Some(why))
-            .ok();
+        let mut reference_run =
+            ReferenceRun::new(mechanism, &mut series, start).map_err(|why| measured.why = Some(why)).ok();
         if let Some(reference_run) = &mut reference_run {
             measured.no_growth = reference_run.no_growth.take();
             measured.nature = reference_run
@@ -230,11 +227,9 @@ impl ErrorEstimator {
         let Self { reference_run: Some(reference_run), measured, .. } = self else { return };
         let Some(tangent) = &reference_run.tangent else { return };
         let [share, grace] = FLOW[usize::from(!tangent.is_plain())];
-        // It is the first part of the way that tells most: later on differences grow as errors do.
-        let way = reference_run.plan().until / reference_run.motion.time.hi.max(f64::MIN_POSITIVE);
         if measured.level == Level::Auto
             && !reference_run.is_rounded
-            && measured.flow > share * measured.run * way.max(1.0) + grace
+            && measured.flow > share * measured.run + grace
         {
             measured.stop_growth(reference_run.end_flow().as_ref());
         }
@@ -343,32 +338,13 @@ impl ErrorEstimator {
             measured.input_error =
                 reference_run.tangent.as_ref().map(|tangent| LAST_DIGIT * tangent.reach(at));
         }
-        if angle <= LOST {
-            self.coarsen();
-        } else {
+        if angle > LOST {
             measured.lost = Some(t);
             if reference_run.tangent.is_none() {
                 self.end("");
             } else {
                 self.ease();
             }
-        }
-    }
-
-    /// Goes on by a coarser series where the error has outgrown the one there is.
-    fn coarsen(&mut self) {
-        let Self { mechanism, run, prices, measured, reference_run: Some(reference_run), .. } = self else {
-            return;
-        };
-        let units = reference_run.steps() / STEPS_OF_A_UNIT;
-        let Some(plan) = finer::coarser(mechanism, reference_run.plan(), run, measured.error, units)
-            .filter(|_| reference_run.is_free())
-        else {
-            return;
-        };
-        *prices = Prices::new(mechanism, &plan, run);
-        if let Err(why) = reference_run.change(mechanism, plan) {
-            self.end(&why);
         }
     }
 

@@ -23,11 +23,6 @@ const BEYOND: f64 = 1e-22;
 /// The same where only the growth of small differences is asked for.
 const COARSE: f64 = 1e-8;
 
-/// Share of an error that the reference solution measuring it may leave out, and how much coarser another must
-/// be to be worth its beginning.
-const SEEN: f64 = 0.03;
-const WORTH: f64 = 20.0;
-
 /// A reference solution's plan, and what it is in words.
 pub(super) struct Finer {
     pub plan: Plan,
@@ -104,27 +99,6 @@ pub(super) fn neighbour(mechanism: &Mechanism, until: f64, coarser: f64) -> Plan
     let tolerance = Tolerance { relative: coarser * FINE, absolute: coarser * FINE };
     let method = if has_series { MethodId::Taylor } else { MethodId::Dp8 };
     Plan { method, ..Plan::of_series(mechanism, tolerance, until) }
-}
-
-/// A coarser one that goes on where a series in doubles is far finer than the error it measures \[rad\], of
-/// which it may leave a share of [`SEEN`] in so many units of time; `None` where there is none worth a change.
-pub(super) fn coarser(
-    mechanism: &Mechanism,
-    series: &Plan,
-    run: &Plan,
-    error: f64,
-    units: f64,
-) -> Option<Plan> {
-    let is_plain = series.method == MethodId::Taylor && !series.extended && !series.in_double_double;
-    if !is_plain || is_near_rounding(run) {
-        return None;
-    }
-    let enough = (SEEN * error / units.max(1.0)).min(COARSE);
-    let now = series.tolerance.unwrap_or_default().relative;
-    (enough >= WORTH * now).then(|| {
-        let plan = self::series(mechanism, run, enough, [false; 2]).plan;
-        Plan { until: series.until, every: series.every, ..plan }
-    })
 }
 
 /// What is still near a motion where no more is asked of it.

@@ -52,11 +52,6 @@ impl Nature {
         Self { is_planar: tangent.freedom() <= 1 && !moves && !pushes, rate: tangent.rate() }
     }
 
-    /// About the fastest rate \[rad/s\].
-    pub fn rate(self) -> f64 {
-        self.rate
-    }
-
     /// The growth that a history of times \[s\] and logarithms shows.
     pub fn judge(self, history: &[[f64; 2]]) -> Growth {
         let mut growth = Growth::default();

@@ -13,16 +13,6 @@ const REGULAR: f64 = 2.0;
 /// Powers of time with which the error of a regular motion grows.
 const POWERS: [f64; 2] = [1.0, 2.0];
 
-/// Share of the way before which errors tell nothing of how they grow, and from how many times rounding on
-/// they do.
-const EARLY: f64 = 0.1;
-const ABOVE_ROUNDING: f64 = 5.0;
-
-/// What errors of a regular motion grow by while the time doubles, at most.
-const POWER: f64 = 14.0;
-/// Steps of the flow before which the response to changed inputs is that of the start.
-const BEGINNING: usize = 8;
-
 /// What a number loses where it is written as a double, as a share of it.
 const ROUNDED: f64 = 2.2e-16;
 /// What the last digit of the scene's numbers moves them by, in units of their size; fitted.
@@ -163,44 +153,17 @@ impl Measured {
         (self.history, self.stopped) = (tangent.history(), Some([t, LAST_DIGIT * tangent.reach(t)]));
     }
 
-    /// E at a time \[s\], and at least rounding.
-    fn error_at(&self, t: f64) -> f64 {
-        let seen = self.record.iter().take_while(|look| look[0] <= t).last();
-        let error = if t >= self.until { self.error } else { seen.map_or(LEAST, |look| look[1]) };
-        error.max(LEAST)
-    }
-
-    /// True where the error grew up to a time \[s\] as a power of time may.
-    fn is_regular(&self, t: f64) -> bool {
-        t <= self.until && self.error_at(t) <= POWER * self.error_at(0.5 * t)
-    }
-
-    /// What the last digit of the inputs comes to at a time \[s\], where it was followed for a part of the
-    /// way only: beyond that it grows as the error of the run does, which is a small difference, too.  Steps
-    /// that err all in one direction let the error of a regular motion grow by one more power of time, which
-    /// rounding of the inputs does not.
-    fn inputs_at(&self, t: f64) -> Option<f64> {
-        let [until, reach] = self.stopped?;
-        if t > self.until || self.history.len() < BEGINNING {
-            return None;
-        }
-        // Through a singular position errors leap.
-        let most = libm::exp((self.nature.rate().max(self.fastest) * (t - until)).clamp(0.0, 500.0));
-        let by_error = (self.error_at(t) / self.error_at(until)).clamp(1.0, most);
-        let by_time = (t / until).max(1.0);
-        Some(reach * if self.is_regular(t) { (by_error / by_time).max(by_time) } else { by_error })
-    }
-
-    /// The growth that errors show from the time the flow ended: they are small differences, too.
-    fn growth_of_errors(&self, from: f64) -> Growth {
-        let begin = from.max(EARLY * self.until);
-        let errors: Vec<[f64; 2]> = self
-            .record
-            .iter()
-            .filter(|look| look[0] >= begin && look[1] > ABOVE_ROUNDING * LEAST)
-            .map(|&[t, error]| [t, libm::log(error)])
-            .collect();
-        self.nature.judge(&errors)
+    /// What the last digit of the inputs comes to at a time \[s\]: beyond what was followed it grows as the
+    /// error of the run does, which is a small difference, too.  That goes where growth is known to be
+    /// exponential, and else from the second half of the way on: in the beginning an error tells nothing of
+    /// how it grows.
+    fn inputs_at(&self, t: f64, is_chaotic: bool) -> Option<f64> {
+        let [until, reach] = self.stopped.filter(|[until, _]| is_chaotic || *until >= 0.5 * t)?;
+        let error = |t: f64| {
+            self.record.iter().take_while(|look| look[0] <= t).last().map_or(LEAST, |look| look[1].max(LEAST))
+        };
+        let grown = if t >= self.until { self.error } else { error(t) };
+        (t <= self.until).then(|| reach * (grown / error(until)).max(1.0))
     }
 
     /// Keeps the estimate of this time.
@@ -240,15 +203,10 @@ impl Measured {
         if self.until > t {
             self.cut(t);
         }
-        let Growth { mut lyapunov, power: found } =
+        let Growth { lyapunov, power: found } =
             if self.no_growth.is_some() { Growth::default() } else { self.nature.judge(&self.history) };
-        // A power shows over most of the run only, as in the beginning it is that of one oscillation, or
-        // over a part of one whose error goes on by a power.
-        let is_long = |followed: f64| followed >= if self.is_regular(t) { 0.2 * t } else { 0.5 * t };
-        let growth_power = found.filter(|_| self.stopped.is_none_or(|[followed, _]| is_long(followed)));
-        if let (Some([followed, _]), None) = (self.stopped, lyapunov) {
-            lyapunov = self.growth_of_errors(followed).lyapunov;
-        }
+        // A power shows over most of the run only: in the beginning it is that of one oscillation.
+        let growth_power = found.filter(|_| self.stopped.is_none_or(|[followed, _]| followed >= 0.5 * t));
         if let (Some([followed, _]), None, None) = (self.stopped, lyapunov, growth_power) {
             let why = || {
                 let seconds =
@@ -259,7 +217,8 @@ impl Measured {
             };
             self.no_growth.get_or_insert_with(why);
         }
-        let input_error = self.input_error.or_else(|| self.inputs_at(self.horizon.unwrap_or(t)));
+        let input_error =
+            self.input_error.or_else(|| self.inputs_at(self.horizon.unwrap_or(t), lyapunov.is_some()));
         let Self { name, shared, until, error, mut record, horizon, lost, why, history, no_growth, .. } =
             self;
         if record.last().is_some_and(|last| last[0] < until) {

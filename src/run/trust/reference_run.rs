@@ -1,6 +1,5 @@
 //! A reference solution under way: the series, and the tangent flow along it.
 
-use super::Level;
 use super::budget::Prices;
 use super::finer::is_rounded;
 use super::tangent::{Path, Tangent};
@@ -17,9 +16,6 @@ use std::sync::Arc;
 /// Steps that are taken for granted where the reference solution has to end one at every look.
 const STEPS: f64 = 256.0;
 
-/// Steps by which the length of those of a series before counts in the next.
-const PRIOR: f64 = 8.0;
-
 /// A reference solution under way.
 pub(super) struct ReferenceRun {
     contact_driver: ContactDriver,
@@ -32,8 +28,6 @@ pub(super) struct ReferenceRun {
     pub is_rounded: bool,
     /// The time at which the series began \[s\].
     begun: f64,
-    /// What [`PRIOR`] steps before that would have come to, as long as those since then go \[s\].
-    prior: f64,
     last: Statistics,
 }
 
@@ -44,7 +38,6 @@ pub(super) struct SavedReferenceRun {
     outcome: Outcome,
     path: Option<Path>,
     begun: f64,
-    prior: f64,
     last: Statistics,
 }
 
@@ -87,29 +80,20 @@ impl ReferenceRun {
     ///
     /// # Errors
     /// Why there can be none.
-    pub(super) fn new(
-        mechanism: &Arc<Mechanism>,
-        series: &mut Plan,
-        start: &Motion,
-        level: Level,
-    ) -> Result<Self, String> {
+    pub(super) fn new(mechanism: &Arc<Mechanism>, series: &mut Plan, start: &Motion) -> Result<Self, String> {
         let (mut contact_driver, outcome) = contact_driver(mechanism, series, start)?;
-        let is_rounded = is_rounded(series);
-        // A covariance of rounding takes more than one vector.
-        let flow = if level == Level::Full || is_rounded { Tangent::new } else { Tangent::of_one_vector };
-        let begun = match mechanism.vibration {
-            None => {
-                let begin = contact_driver.motion();
-                flow(contact_driver.holding(), &begin, series.until)
+        let begun = match series.method {
+            MethodId::Taylor => {
+                Tangent::new(&Arc::clone(contact_driver.holding()), &contact_driver.motion(), series.until)
             }
-            Some(_) => Err("the mean force of a vibration has no series".into()),
+            _ => Err("the reference solution is no series".into()),
         };
         let (tangent, no_growth) = match begun {
             Ok(tangent) => (Some(tangent), None),
             Err(why) => (None, Some(why)),
         };
         contact_driver.jumps = tangent.is_some().then(Vec::new);
-        let begun = start.time.hi;
+        let (is_rounded, begun) = (is_rounded(series), start.time.hi);
         Ok(Self {
             contact_driver,
             outcome,
@@ -118,7 +102,6 @@ impl ReferenceRun {
             no_growth,
             is_rounded,
             begun,
-            prior: 0.0,
             last: Statistics::default(),
         })
     }
@@ -130,11 +113,7 @@ impl ReferenceRun {
     pub(super) fn change(&mut self, mechanism: &Arc<Mechanism>, mut series: Plan) -> Result<(), String> {
         let motion = self.motion.clone();
         let mechanism = &self.contact_driver.acting(mechanism);
-        self.prior = PRIOR * self.mean_step(motion.time.hi);
-        let Outcome { impact_count, persistent_contact_count, .. } = self.outcome;
         (self.contact_driver, self.outcome) = contact_driver(mechanism, &mut series, &motion)?;
-        self.outcome.impact_count += impact_count;
-        self.outcome.persistent_contact_count += persistent_contact_count;
         self.contact_driver.jumps = self.tangent.is_some().then(Vec::new);
         (self.is_rounded, self.begun, self.last) =
             (is_rounded(&series), motion.time.hi, Statistics::default());
@@ -147,7 +126,6 @@ impl ReferenceRun {
             outcome: self.outcome.clone(),
             path: self.tangent.as_ref().map(|tangent| tangent.path().clone()),
             begun: self.begun,
-            prior: self.prior,
             last: self.last,
         }
     }
@@ -160,7 +138,7 @@ impl ReferenceRun {
         kept: SavedReferenceRun,
         horizon: Time,
     ) -> Result<Option<Self>, StepError> {
-        let SavedReferenceRun { contact_state, outcome, path, begun, prior, last } = kept;
+        let SavedReferenceRun { contact_state, outcome, path, begun, last } = kept;
         let Some(mut contact_driver) =
             ContactDriver::resume(Arc::clone(mechanism), &outcome.plan, start, contact_state, horizon)?
         else {
@@ -176,17 +154,7 @@ impl ReferenceRun {
         contact_driver.jumps = tangent.is_some().then(Vec::new);
         let is_rounded = is_rounded(&outcome.plan);
         let motion = contact_driver.motion();
-        Ok(Some(Self {
-            contact_driver,
-            outcome,
-            motion,
-            tangent,
-            no_growth: None,
-            is_rounded,
-            begun,
-            prior,
-            last,
-        }))
+        Ok(Some(Self { contact_driver, outcome, motion, tangent, no_growth: None, is_rounded, begun, last }))
     }
 
     /// Ends the tangent flow.
@@ -205,21 +173,9 @@ impl ReferenceRun {
         self.contact_driver.statistics().evaluations
     }
 
-    /// True where no contact is held.
-    pub(super) fn is_free(&self) -> bool {
-        self.contact_driver.holding().held.is_empty()
-    }
-
     /// Impacts and lasting contacts so far.
     pub(super) fn events(&self) -> u64 {
         self.outcome.impact_count + self.outcome.persistent_contact_count
-    }
-
-    /// How many steps its series would have taken since the start, at those it takes now.
-    pub(super) fn steps(&self) -> f64 {
-        let t = self.motion.time.hi;
-        let step = self.mean_step(t);
-        if step > 0.0 { t / step } else { 0.0 }
     }
 
     /// The mean length of its steps \[s\], of those up to `t` \[s\]; where they end at every look it has no
@@ -228,8 +184,7 @@ impl ReferenceRun {
         if self.plan().method != MethodId::Taylor {
             return self.plan().until / STEPS;
         }
-        let [span, steps] = [t - self.begun, self.last.steps as f64];
-        if self.prior > 0.0 { (span + self.prior) / (steps + PRIOR) } else { span / steps.max(1.0) }
+        (t - self.begun) / self.last.steps.max(1) as f64
     }
 
     /// To a time, with the motion there in `motion`; what it cost is added to what was spent, which must not

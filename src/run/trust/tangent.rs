@@ -48,14 +48,6 @@ const ROUNDED: f64 = 0.1 * 1.1e-16;
 /// The shortest step, over the time of the fastest rate.
 const SHORTEST: f64 = 1e-7;
 
-/// How much of the flow is carried.
-#[derive(Clone, Copy, PartialEq)]
-enum Detail {
-    OneVector,
-    Usual,
-    Exact,
-}
-
 /// The flow, on the way.
 pub struct Tangent {
     /// The mechanism with the contacts held at the moment, and its unknowns.
@@ -118,7 +110,7 @@ impl Tangent {
     /// # Errors
     /// Why there is none: all is driven, or the matrices would be too large.
     pub fn new(mechanism: &Arc<Mechanism>, motion: &Motion, until: f64) -> Result<Self, String> {
-        Self::of(mechanism, motion, until, Detail::Usual)
+        Self::of(mechanism, motion, until, false)
     }
 
     /// The same with the whole matrix, and by the series, whatever that costs.
@@ -126,20 +118,10 @@ impl Tangent {
     /// # Errors
     /// See [`Tangent::new`].
     pub fn whole(mechanism: &Arc<Mechanism>, motion: &Motion, until: f64) -> Result<Self, String> {
-        Self::of(mechanism, motion, until, Detail::Exact)
+        Self::of(mechanism, motion, until, true)
     }
 
-    /// The same of one vector, which is enough for how differences grow: a random direction has a share in
-    /// the one that grows most.
-    ///
-    /// # Errors
-    /// See [`Tangent::new`].
-    pub fn of_one_vector(mechanism: &Arc<Mechanism>, motion: &Motion, until: f64) -> Result<Self, String> {
-        Self::of(mechanism, motion, until, Detail::OneVector)
-    }
-
-    fn of(mechanism: &Arc<Mechanism>, motion: &Motion, until: f64, detail: Detail) -> Result<Self, String> {
-        let is_exact = detail == Detail::Exact;
+    fn of(mechanism: &Arc<Mechanism>, motion: &Motion, until: f64, is_exact: bool) -> Result<Self, String> {
         let mut tangent = Self::bare(mechanism)?;
         let f = tangent.weights.len();
         let state = tangent.problem.state(motion);
@@ -148,20 +130,13 @@ impl Tangent {
         if freedom == 0 {
             return Err("the motors leave no freedom: neighbouring motions are the same".into());
         }
-        let may_be_whole =
-            (is_exact || f <= WHOLE) && tangent.ground.is_none() && mechanism.contacts.is_empty();
-        let is_plain = may_be_whole
+        let is_whole = (is_exact || f <= WHOLE) && tangent.ground.is_none() && mechanism.contacts.is_empty();
+        let is_plain = is_whole
             && !is_exact
             && mechanism.constraints.is_empty()
             && !mechanism.is_forced()
             && gauss::is_slow(mechanism);
-        let is_alone = detail == Detail::OneVector && !is_plain;
-        let is_whole = may_be_whole && !is_alone;
-        let count = match (is_alone, is_whole || freedom <= WHOLE) {
-            (true, _) => 1,
-            (false, true) => 2 * freedom,
-            (false, false) => VECTORS,
-        };
+        let count = if is_whole || freedom <= WHOLE { 2 * freedom } else { VECTORS };
         tangent.path = Path {
             freedom,
             is_whole,
@@ -179,8 +154,7 @@ impl Tangent {
             false => tangent.basis(count, &mut dice),
         };
         // The more directions there are, the less each of them must be known.
-        let is_few = is_whole || freedom <= WHOLE && !is_alone;
-        tangent.path.order = match (is_exact || tangent.ground.is_some() && !is_alone, is_few) {
+        tangent.path.order = match (is_exact || tangent.ground.is_some(), is_whole || freedom <= WHOLE) {
             (true, true) => beside::ORDERS[0],
             (true, false) | (false, true) => beside::ORDERS[1],
             (false, false) => beside::ORDERS[2],
