@@ -380,12 +380,12 @@ impl Mechanism {
     /// A potential that depends on time or rates on this branch.
     pub(crate) fn on_branch(&self, parameters: Vec<f64>, modes: Vec<bool>) -> Result<Self, CompileError> {
         let mut mechanism = self.clone();
-        if let Some(laws) = &mut mechanism.laws {
-            if (&laws.parameters, &laws.modes) != (&parameters, &modes) {
-                let recorded = laws.formulas.record(&parameters, &modes)?;
-                mechanism.forces.splice(..recorded.len(), recorded);
-                (laws.parameters, laws.modes) = (parameters, modes);
-            }
+        if let Some(laws) = &mut mechanism.laws
+            && (&laws.parameters, &laws.modes) != (&parameters, &modes)
+        {
+            let recorded = laws.formulas.record(&parameters, &modes)?;
+            mechanism.forces.splice(..recorded.len(), recorded);
+            (laws.parameters, laws.modes) = (parameters, modes);
         }
         Ok(mechanism)
     }
@@ -569,6 +569,11 @@ impl Mechanism {
     pub fn event_names(&self) -> Vec<&str> {
         let events = self.laws.as_ref().map_or(&[][..], |laws| &laws.formulas.events);
         events.iter().map(|event| event.name.as_str()).collect()
+    }
+
+    /// True where a law may be flat to the last digit at one place and not at another.
+    pub fn may_be_flat(&self) -> bool {
+        self.forces.iter().any(UserForce::may_be_flat)
     }
 
     /// True where laws have corners or events change what acts, so that steps end where a switch is.

@@ -29,6 +29,7 @@
 
 pub mod batch;
 mod bodies;
+mod confirm;
 mod direction;
 mod driven;
 mod expansion;
@@ -201,6 +202,9 @@ impl<T: Coefficient, P: OdeSystem + Form + ?Sized> Integrator<P> for Taylor<T> {
         }
         let mut event = None;
         if self.by_series {
+            if problem.mechanism().may_be_flat() {
+                h = self.confirmed(problem, state, h);
+            }
             if problem.events() > 0 {
                 (h, event) = self.meet(problem, state, h)?;
             }

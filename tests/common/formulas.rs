@@ -123,6 +123,7 @@ pub fn moves_alike(text: &str, potential: bool) -> bool {
     };
     let apart = (a[0] - b[0]).abs().max((a[1] - b[1]).abs());
     assert!(apart < 1e-7 * (1.0 + a[1].abs()), "{text}: {a:?} and {b:?}");
-    assert!(a[2].max(b[2]) < 1e-7, "{text}: drift {:e} and {:e}", a[2], b[2]);
+    // Of the energy at the start, which a law that feeds the motion leaves far below.
+    assert!(a[2].max(b[2]) < 1e-7 * (1.0 + a[1] * a[1]), "{text}: drift {:e} and {:e}", a[2], b[2]);
     true
 }

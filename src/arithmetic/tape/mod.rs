@@ -142,6 +142,16 @@ impl Tape {
         self.operations.len()
     }
 
+    /// True where it has exponentials, hyperbolic tangents or quotients.
+    pub fn may_be_flat(&self) -> bool {
+        self.operations.iter().any(|operation| {
+            matches!(
+                operation,
+                Operation::Exponential(_) | Operation::HyperbolicTangent(_) | Operation::Divide(..)
+            )
+        })
+    }
+
     /// True for a formula without results.
     pub fn is_empty(&self) -> bool {
         self.operations.is_empty()

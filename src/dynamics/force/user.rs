@@ -302,6 +302,11 @@ impl UserForce {
         parts.iter().flat_map(|part| part.tape.inputs()).any(|number| kind(self.inputs[number as usize]))
     }
 
+    /// True where it has exponentials, hyperbolic tangents or quotients, which may be flat to the last digit.
+    pub fn may_be_flat(&self) -> bool {
+        self.parts.iter().any(|part| part.tape.may_be_flat())
+    }
+
     /// True where whole turns matter to it.
     pub fn counts_turns(&self) -> bool {
         self.asks_for(&self.parts, |input| matches!(input, Input::Angle(_)))

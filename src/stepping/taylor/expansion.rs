@@ -211,6 +211,19 @@ impl<T: Coefficient> Expansion<T> {
         largest * libm::pow(h, m as f64)
     }
 
+    /// Acceleration of coordinate `i` by the series `h` \[s\] after its start \[rad/s², m/s²\].
+    pub fn acceleration(&self, i: usize, h: f64) -> f64 {
+        let f = self.series.coordinates();
+        let known = if self.first.is_some() { LEADING + 1 } else { 1 };
+        let later = (known..self.summed).rev();
+        let sum = later.fold(0.0, |sum, m| sum * h + m as f64 * self.series.rate[m * f + i].value());
+        let sum = sum * libm::pow(h, known as f64 - 1.0);
+        let first = self.first.as_ref().map_or(0.0, |first| {
+            (1..=LEADING).rev().fold(0.0, |sum, m| sum * h + m as f64 * first.rate[m * f + i].hi)
+        });
+        sum + first
+    }
+
     /// Takes a state from where the series was expanded on by `h` \[s\].
     pub fn go(&self, state: &mut State, h: Time) {
         let (f, series) = (self.series.coordinates(), &self.series);

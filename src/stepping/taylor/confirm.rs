@@ -1,0 +1,55 @@
+//! Whether a step of the series agrees with the equations inside it.
+//!
+//! Laws with exponentials, hyperbolic tangents or quotients may be flat to the last digit where a step begins and
+//! change within it: the powers that would say so are lost in rounding, and the step wanted is longer than the
+//! circle in which the series converges.  The accelerations of the series are therefore compared with those of
+//! the equations at a few times inside the step, which is shortened until they agree.  (Griewank & Walther,
+//! *Evaluating Derivatives*, 2nd ed. (2008), section 13.2, on the defect of a Taylor polynomial.)
+
+use super::Taylor;
+use crate::dynamics::series::Coefficient;
+use crate::dynamics::{Form, OdeSystem, State};
+
+/// Times inside a step, in shares of it; not equally spaced, so that they do not beat with a period.
+const SHARES: [f64; 4] = [0.23, 0.52, 0.79, 1.0];
+/// Share of the largest acceleration that rounding may leave.
+const ROUNDING: f64 = 1e-9;
+/// Differences in accelerations that a step's tolerance stands for, over the step.
+const ALLOWED: f64 = 1e3;
+/// Shortenings at most; each by a third.
+const MOST: usize = 40;
+
+impl<T: Coefficient> Taylor<T> {
+    /// Of the step `h` \[s\] as much as the equations confirm.
+    pub(super) fn confirmed<P: OdeSystem + Form + ?Sized>(
+        &mut self,
+        problem: &mut P,
+        state: &State,
+        mut h: f64,
+    ) -> f64 {
+        let Self { expansion: Some(expansion), inside, tolerance, .. } = self else { return h };
+        let f = expansion.series().coordinates();
+        let mut rates = vec![0.0; state.y.len()];
+        for _ in 0..MOST {
+            let agrees = SHARES.iter().all(|share| {
+                let t = share * h;
+                inside.clone_from(state);
+                expansion.go(inside, t.into());
+                inside.time = state.time + t;
+                inside.wrap();
+                problem.rhs(inside.time, &inside.y, &mut rates);
+                let accelerations = &rates[f..2 * f];
+                let largest = accelerations.iter().fold(0.0, |most: f64, a| most.max(a.abs()));
+                let allowed = ALLOWED * *tolerance / h + ROUNDING * largest;
+                // Where the equations have no finite answer the step is not judged.
+                let differs = |(i, a): (usize, &f64)| (expansion.acceleration(i, t) - a).abs() > allowed;
+                !largest.is_finite() || !accelerations.iter().enumerate().any(differs)
+            });
+            if agrees {
+                break;
+            }
+            h *= 2.0 / 3.0;
+        }
+        h
+    }
+}
