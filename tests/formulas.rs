@@ -243,6 +243,36 @@ fn sliding_along_a_corner_is_named() {
     }
 }
 
+/// An impact turns the rate round without passing zero: dry friction of constant size brakes before and after.
+#[test]
+fn a_switch_that_an_impact_jumps_across_is_seen() {
+    let text = rotor(
+        [0.0, 2.0],
+        2.0,
+        r#""torques": [{"name": "dry", "body": "bar", "torque": "-0.3*sign(bar.omega)"}],
+        "walls": [{"name": "w", "body": "bar", "point": [0.5, 0], "line": {"through": [0, 0.25], "normal": [0, -1]}, "restitution": 0.5}]"#,
+    );
+    let (wall, braking) = (std::f64::consts::FRAC_PI_6, 0.2);
+    let speed = (4.0 - 2.0 * braking * wall).sqrt();
+    let after = 2.0 - (2.0 - speed) / braking;
+    let expected = wall - 0.5 * speed * after + 0.5 * braking * after * after;
+    for request in methods() {
+        if matches!(request.method, Some(MethodId::Dopri5 | MethodId::Dop853)) {
+            continue;
+        }
+        let outcome = run(&scene(&text), &request);
+        assert!(
+            outcome.stop.is_none() && outcome.impact_count == 1,
+            "{:?}: {:?}",
+            request.method,
+            outcome.stop
+        );
+        let error = (outcome.last.phi[0] - expected).abs();
+        assert!(error < 1e-8, "{:?}: {} and {expected}", request.method, outcome.last.phi[0]);
+        assert!(outcome.drift.energy.max < 1e-8, "{:?}: {:e}", request.method, outcome.drift.energy.max);
+    }
+}
+
 /// Events: a spring ceases to act when the rotor passes zero, then it turns at a constant rate √(k/J) φ₀.
 #[test]
 fn events_switch_parts_and_set_parameters() {

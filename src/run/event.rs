@@ -348,8 +348,10 @@ impl EventDetector {
             let mode = condition.zip(self.laws.as_ref()).map(|(number, laws)| laws.modes[number]);
             if let Some(mode) = mode {
                 // It lies on the side its laws are recorded for, and leaves it at once where it turns away.
-                let is_at_zero = first.abs() <= NO_VALUE * curve.most();
-                if is_at_zero && sign(next) == if mode { -1 } else { 1 } {
+                // An impact may have carried it across.
+                let other = if mode { -1 } else { 1 };
+                let is_there = first.abs() <= NO_VALUE * curve.most() || sign(first) == other;
+                if is_there && sign(next) == other {
                     all.push(Passage { t: begin, event, rises: !mode });
                 }
             }
