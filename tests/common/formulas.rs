@@ -76,7 +76,7 @@ pub fn is_consistent(text: &str) {
         let slope = formula.evaluate(&duals, &bits).slope[0];
         let shifted = |by: f64| {
             let mut shifted = exact.clone();
-            shifted[k] = shifted[k] + DoubleDouble::of(by);
+            shifted[k] += DoubleDouble::of(by);
             formula.evaluate(&shifted, &bits)
         };
         let h = 1e-8;
