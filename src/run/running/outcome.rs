@@ -38,11 +38,11 @@ pub struct Outcome {
     /// Time spent so, summed over the points \[s\].
     pub persistent_contact_time: f64,
     /// Time spent between the first output time and the last, pauses and the reference solution left out;
-    /// zero where nobody [times](Run::timed) the run.
+    /// zero where nobody [times](crate::run::Run::timed) the run.
     pub wall: Duration,
     /// Time the reference solution took.
     pub trust_wall: Duration,
-    /// How far it may be trusted, where that was asked for: see [`Run::trusted`].
+    /// How far it may be trusted, where that was asked for: see [`Run::trusted`](crate::run::Run::trusted).
     pub trust: Option<Trust>,
     /// The first time a bar turned over, where the run is one of an ensemble.
     pub flip: Option<Flip>,
