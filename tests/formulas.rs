@@ -12,7 +12,7 @@ fn value(text: &str) -> f64 {
     Formula::parse(text).unwrap_or_else(|error| panic!("{text}: {error}")).value(&[])
 }
 
-fn scene(text: &str) -> Scene {
+pub fn scene(text: &str) -> Scene {
     parse_scene(text, "test", &[]).unwrap_or_else(|error| panic!("{error}"))
 }
 
@@ -20,7 +20,7 @@ fn refused(text: &str) -> String {
     parse_scene(text, "test", &[]).expect_err("no scene").to_string()
 }
 
-fn run(scene: &Scene, request: &Request) -> Outcome {
+pub fn run(scene: &Scene, request: &Request) -> Outcome {
     let mechanism = Arc::new(Mechanism::new(scene).unwrap_or_else(|error| panic!("{}: {error}", scene.name)));
     let plan =
         Plan::new(scene, &mechanism, request).unwrap_or_else(|refusal| panic!("{}: {refusal}", scene.name));
@@ -29,11 +29,11 @@ fn run(scene: &Scene, request: &Request) -> Outcome {
     integrate(run.trusted(Level::Auto, &start), &mut |_| Ok(())).expect("samples")
 }
 
-fn adaptive(method: MethodId, rtol: f64) -> Request {
+pub fn adaptive(method: MethodId, rtol: f64) -> Request {
     Request { method: Some(method), rtol: Some(rtol), atol: Some(rtol), ..Request::default() }
 }
 
-fn methods() -> Vec<Request> {
+pub fn methods() -> Vec<Request> {
     vec![
         adaptive(MethodId::Dopri5, 1e-10),
         adaptive(MethodId::Dop853, 1e-11),
@@ -46,7 +46,7 @@ fn methods() -> Vec<Request> {
 }
 
 /// A bar on its centre without gravity, of moment of inertia 1.5 kg·m², with more of a scene.
-fn rotor(start: [f64; 2], until: f64, more: &str) -> String {
+pub fn rotor(start: [f64; 2], until: f64, more: &str) -> String {
     format!(
         r#"{{"name": "rotor", "gravity": [0, 0], "bars": [{{"name": "bar", "mass": 1, "centre": [0, 0], "inertia": 1.5}}],
         "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "bar", "point": [0, 0]}}]}}],

@@ -37,6 +37,7 @@ mod formulas;
 mod gauss;
 mod identities;
 mod impact;
+mod laws;
 mod linkage_scenes;
 mod linkages;
 mod looped;
