@@ -573,7 +573,7 @@ impl Mechanism {
 
     /// True where a law may be flat to the last digit at one place and not at another.
     pub fn may_be_flat(&self) -> bool {
-        self.forces.iter().any(UserForce::may_be_flat)
+        self.forces.iter().any(|force| force.may_be_flat)
     }
 
     /// True where laws have corners or events change what acts, so that steps end where a switch is.

@@ -1,4 +1,4 @@
-//! What events from outside do to a run: it stops, its motion is changed, parts of the scene begin or cease
+//! What events do to a run: it stops, its motion is changed, parts of the scene begin or cease
 //! to act.
 
 use super::build::build;
@@ -34,9 +34,9 @@ impl ContactDriver {
         let Some((event, action)) = events.memory.pending.take() else { return Ok(()) };
         let name = events.name(event).to_owned();
         let is_from_outside = events.is_from_outside(event);
-        match action {
-            Action::Record => Ok(()),
-            Action::Slide => Err(StepError {
+        if std::mem::take(&mut events.memory.slides) {
+            let hint = "sliding along such a surface is not integrated: let the law pass zero smoothly, as tanh(x/0.01) instead of sign(x)";
+            return Err(StepError {
                 cause: Cause::Sliding,
                 method: outcome.plan.method.to_string(),
                 t: self.motion().time.hi,
@@ -44,9 +44,11 @@ impl ContactDriver {
                 what: format!(
                     "a formula of `{name}` changes its branch here, and on both branches the motion is driven back"
                 ),
-                hint: "sliding along such a surface is not integrated: let the law pass zero smoothly, as tanh(x/0.01) instead of sign(x)"
-                    .into(),
-            }),
+                hint: hint.into(),
+            });
+        }
+        match action {
+            Action::Record => Ok(()),
             Action::Stop => {
                 self.ended_by = Some(name);
                 Ok(())

@@ -1,5 +1,5 @@
-//! Events from outside the crate: conditions on the motion, located on the dense output of every step, and
-//! what happens there.
+//! Events of scenes and from outside the crate: conditions on the motion, located on the dense output of every
+//! step, and what happens there.
 //!
 //! The event functions of a step are interpolated at Chebyshev points, by as high a degree as they ask for,
 //! and searched by the same root finding as walls and flips ([`search`](crate::stepping)); the zero is then
@@ -9,7 +9,7 @@ use super::inside::{Inside, StepWatcher};
 use crate::dynamics::compile::Laws;
 use crate::dynamics::configuration::Configuration;
 use crate::dynamics::{Mechanism, Motion, Time};
-use crate::scene::Crossing;
+pub use crate::scene::Direction;
 use crate::stepping::search::{Chebyshev, Curve, Interpolants, interpolated, root};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -82,18 +82,6 @@ pub trait Event: Send + Sync {
     }
 }
 
-/// Passages of an event function through zero.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Direction {
-    /// Both.
-    #[default]
-    Either,
-    /// From negative to positive.
-    Rising,
-    /// From positive to negative.
-    Falling,
-}
-
 /// What happens at an event.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum Action {
@@ -102,9 +90,6 @@ pub enum Action {
     Record,
     /// The run ends here; its outcome is kept.
     Stop,
-    /// It cannot go on: the motion is driven back onto a condition of the scene's laws from both sides.
-    #[doc(hidden)]
-    Slide,
     /// The motion goes on changed.  Fixed-step methods refuse that: their steps would no longer end on the
     /// output times.
     Change(Change),
@@ -165,6 +150,8 @@ pub(super) struct Memory {
     pub pending: Option<(usize, Action)>,
     /// Conditions that changed sign last, and when.
     flipped: Vec<(usize, Time)>,
+    /// True where what is to be done cannot be: the motion is driven back onto that condition from both sides.
+    pub slides: bool,
 }
 
 /// Looks for the events of a run: those of the scene, those from outside, then the zeros of the conditions
@@ -178,6 +165,13 @@ pub(super) struct EventDetector {
     /// Events since somebody last took them.
     found: Vec<EventRecord>,
     count: u64,
+}
+
+/// What a function belongs to: an event or condition by its number, with the scene's laws.
+enum Owner<'a> {
+    Scene(&'a Laws, usize),
+    Outside(usize),
+    Condition(&'a Laws, usize),
 }
 
 /// A passage of an event function.
@@ -208,19 +202,25 @@ impl EventDetector {
         self.laws.as_ref().map_or(0, |laws| laws.formulas.events.len())
     }
 
-    /// The first number of a condition.
-    fn conditions_from(&self) -> usize {
-        self.of_the_scene() + self.events.len()
-    }
-
     /// How many functions there are.
     fn functions(&self) -> usize {
-        self.conditions_from() + self.laws.as_ref().map_or(0, |laws| laws.modes.len())
+        let conditions = self.laws.as_ref().map_or(0, |laws| laws.modes.len());
+        self.of_the_scene() + self.events.len() + conditions
+    }
+
+    /// What a function belongs to.
+    fn owner(&self, function: usize) -> Owner<'_> {
+        let (scene, conditions) = (self.of_the_scene(), self.of_the_scene() + self.events.len());
+        match &self.laws {
+            Some(laws) if function < scene => Owner::Scene(laws, function),
+            Some(laws) if function >= conditions => Owner::Condition(laws, function - conditions),
+            _ => Owner::Outside(function - scene),
+        }
     }
 
     /// True for an event that is not the scene's own.
     pub fn is_from_outside(&self, event: usize) -> bool {
-        (self.of_the_scene()..self.conditions_from()).contains(&event)
+        matches!(self.owner(event), Owner::Outside(_))
     }
 
     /// Goes on with the laws of a mechanism on their present branches.
@@ -243,28 +243,19 @@ impl EventDetector {
 
     /// The name of an event.
     pub fn name(&self, event: usize) -> &str {
-        let scene = self.of_the_scene();
-        match &self.laws {
-            Some(laws) if event < scene => &laws.formulas.events[event].name,
-            Some(laws) if event >= self.conditions_from() => {
-                &laws.formulas.conditions[event - self.conditions_from()]
-            }
-            _ => self.events[event - scene].name(),
+        match self.owner(event) {
+            Owner::Scene(laws, number) => &laws.formulas.events[number].name,
+            Owner::Condition(laws, number) => &laws.formulas.conditions[number],
+            Owner::Outside(number) => self.events[number].name(),
         }
     }
 
     /// Which passages of an event count; of a condition those that leave its present side.
     fn counts(&self, event: usize, rises: bool) -> bool {
-        let direction = match &self.laws {
-            Some(laws) if event < self.of_the_scene() => match laws.formulas.events[event].direction {
-                Crossing::Either => Direction::Either,
-                Crossing::Rising => Direction::Rising,
-                Crossing::Falling => Direction::Falling,
-            },
-            Some(laws) if event >= self.conditions_from() => {
-                return laws.modes[event - self.conditions_from()] != rises;
-            }
-            _ => self.events[event - self.of_the_scene()].direction(),
+        let direction = match self.owner(event) {
+            Owner::Scene(laws, number) => laws.formulas.events[number].direction,
+            Owner::Condition(laws, number) => return laws.modes[number] != rises,
+            Owner::Outside(number) => self.events[number].direction(),
         };
         match direction {
             Direction::Either => true,
@@ -275,28 +266,29 @@ impl EventDetector {
 
     /// What happens at an event.
     fn action(&mut self, event: usize, motion: &Motion) -> Action {
-        let (scene, conditions) = (self.of_the_scene(), self.conditions_from());
-        let Self { events, mechanism, laws, .. } = self;
-        match laws {
-            Some(_) if event >= conditions => {
-                Action::Change(Change { flips: Some(event - conditions), ..Change::default() })
+        match self.owner(event) {
+            Owner::Condition(_, number) => {
+                Action::Change(Change { flips: Some(number), ..Change::default() })
             }
-            Some(laws) if event < scene => {
-                let said = &laws.formulas.events[event];
-                let after = mechanism.seen(motion, |at| laws.formulas.set_by(event, at, &laws.parameters));
-                let all = |parts: &[String], on: bool| parts.iter().map(|part| (part.clone(), on)).collect();
-                let switches: Vec<(String, bool)> = [all(&said.off, false), all(&said.on, true)]
-                    .into_iter()
-                    .flat_map(|all: Vec<_>| all)
-                    .collect();
-                let parameters = (after != laws.parameters).then_some(after);
-                match (said.stop, switches.is_empty() && parameters.is_none()) {
-                    (true, _) => Action::Stop,
-                    (false, true) => Action::Record,
-                    (false, false) => Action::Change(Change { switches, parameters, ..Change::default() }),
+            Owner::Scene(laws, number) => {
+                let said = &laws.formulas.events[number];
+                if said.stop {
+                    return Action::Stop;
                 }
+                let after =
+                    self.mechanism.seen(motion, |at| laws.formulas.set_by(number, at, &laws.parameters));
+                let off = said.off.iter().map(|part| (part.clone(), false));
+                let switches: Vec<_> = off.chain(said.on.iter().map(|part| (part.clone(), true))).collect();
+                let parameters = (after != laws.parameters).then_some(after);
+                if switches.is_empty() && parameters.is_none() {
+                    return Action::Record;
+                }
+                Action::Change(Change { switches, parameters, ..Change::default() })
             }
-            _ => mechanism.seen(motion, |at| events[event - scene].action(at, motion)),
+            Owner::Outside(number) => {
+                let Self { events, mechanism, .. } = self;
+                mechanism.seen(motion, |at| events[number].action(at, motion))
+            }
         }
     }
 
@@ -344,8 +336,10 @@ impl EventDetector {
             // From the last node to the first.
             let nodes = &values[event];
             let [first, next] = [nodes[nodes.len() - 1], nodes[nodes.len() - 2]];
-            let condition = event.checked_sub(self.conditions_from());
-            let mode = condition.zip(self.laws.as_ref()).map(|(number, laws)| laws.modes[number]);
+            let mode = match self.owner(event) {
+                Owner::Condition(laws, number) => Some(laws.modes[number]),
+                _ => None,
+            };
             if let Some(mode) = mode {
                 // It lies on the side its laws are recorded for, and leaves it at once where it turns away.
                 // An impact may have carried it across.
@@ -420,7 +414,7 @@ impl StepWatcher for EventDetector {
         self.passages(inside, begin, span, 0, &mut passages);
         passages.sort_by(|a, b| (a.t - b.t).hi.total_cmp(&0.0).then(a.event.cmp(&b.event)));
         for Passage { t, event, rises } in passages {
-            let is_condition = event >= self.conditions_from();
+            let is_condition = matches!(self.owner(event), Owner::Condition(..));
             let is_same = self
                 .memory
                 .last
@@ -433,10 +427,9 @@ impl StepWatcher for EventDetector {
             self.memory.last = Some((event, t));
             if is_condition {
                 self.memory.flipped.retain(|(_, before)| (t - *before).hi <= SAME * span);
-                let slides = self.memory.flipped.iter().any(|(flipped, _)| *flipped == event);
+                self.memory.slides = self.memory.flipped.iter().any(|(flipped, _)| *flipped == event);
                 self.memory.flipped.push((event, t));
-                let action = if slides { Action::Slide } else { self.action(event, &motion) };
-                self.memory.pending = Some((event, action));
+                self.memory.pending = Some((event, self.action(event, &motion)));
                 return Some(t);
             }
             self.count += 1;

@@ -123,11 +123,12 @@ pub enum Load {
     },
 }
 
-/// Which passages of an event function count.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+/// Passages of an event function through zero.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Crossing {
+pub enum Direction {
     /// Both.
+    #[default]
     Either,
     /// From negative to positive.
     Rising,
@@ -143,7 +144,7 @@ pub struct SceneEvent {
     /// The event function: its zeros are the event.
     pub when: String,
     /// Which of them count.
-    pub direction: Crossing,
+    pub direction: Direction,
     /// True where the run ends there.
     pub stop: bool,
     /// Parts that act from then on, by name.
@@ -154,9 +155,9 @@ pub struct SceneEvent {
     pub set: Vec<(String, String)>,
 }
 
-/// What a name in a formula stands for.
+/// What a name in a formula stands for; `P` is what points are given by.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Meaning {
+pub enum Meaning<P = Place> {
     /// Time \[s\].
     Time,
     /// Parameter number k.
@@ -172,17 +173,17 @@ pub enum Meaning {
     /// Its sine.
     Sine(usize),
     /// First coordinate of a place \[m\].
-    X(Place),
+    X(P),
     /// Second coordinate \[m\].
-    Y(Place),
+    Y(P),
     /// Velocities \[m/s\].
-    XRate(Place),
+    XRate(P),
     /// Velocities \[m/s\].
-    YRate(Place),
+    YRate(P),
     /// Distance of two places \[m\].
-    Length([Place; 2]),
+    Length([P; 2]),
     /// Its rate \[m/s\].
-    LengthRate([Place; 2]),
+    LengthRate([P; 2]),
     /// Angle of a bar from another's \[rad\].
     RelativeAngle(usize, Option<usize>),
     /// Its rate \[rad/s\].
@@ -198,6 +199,27 @@ impl Meaning {
             Self::XRate(_) | Self::YRate(_) | Self::LengthRate(_) => "m/s",
             Self::Rate(_) | Self::RelativeRate(..) => "rad/s",
             _ => "",
+        }
+    }
+
+    /// The same with points given otherwise.
+    pub fn with_points<P>(self, point: impl Fn(Place) -> P) -> Meaning<P> {
+        match self {
+            Self::Time => Meaning::Time,
+            Self::Parameter(number) => Meaning::Parameter(number),
+            Self::Signal(number) => Meaning::Signal(number),
+            Self::Angle(bar) => Meaning::Angle(bar),
+            Self::Rate(bar) => Meaning::Rate(bar),
+            Self::Cosine(bar) => Meaning::Cosine(bar),
+            Self::Sine(bar) => Meaning::Sine(bar),
+            Self::X(place) => Meaning::X(point(place)),
+            Self::Y(place) => Meaning::Y(point(place)),
+            Self::XRate(place) => Meaning::XRate(point(place)),
+            Self::YRate(place) => Meaning::YRate(point(place)),
+            Self::Length(places) => Meaning::Length(places.map(point)),
+            Self::LengthRate(places) => Meaning::LengthRate(places.map(point)),
+            Self::RelativeAngle(bar, base) => Meaning::RelativeAngle(bar, base),
+            Self::RelativeRate(bar, base) => Meaning::RelativeRate(bar, base),
         }
     }
 }
@@ -297,22 +319,39 @@ impl Names {
         })
     }
 
-    /// The same with the names that the formulas of a spring have beside.
-    #[must_use]
-    pub fn within(&self, load: &Load) -> Self {
-        let mut names = self.clone();
-        match *load {
+    /// The same with the names that the formulas of a load have beside.
+    pub fn within(&self, load: &Load) -> Scope<'_> {
+        let own = match *load {
             Load::Spring { between, .. } => {
-                names.add("length".into(), Meaning::Length(between));
-                names.add("rate".into(), Meaning::LengthRate(between));
+                vec![("length", Meaning::Length(between)), ("rate", Meaning::LengthRate(between))]
             }
-            Load::TorsionSpring { bar, relative_to, .. } => {
-                names.add("angle".into(), Meaning::RelativeAngle(bar, relative_to));
-                names.add("rate".into(), Meaning::RelativeRate(bar, relative_to));
-            }
-            _ => {}
-        }
-        names
+            Load::TorsionSpring { bar, relative_to, .. } => vec![
+                ("angle", Meaning::RelativeAngle(bar, relative_to)),
+                ("rate", Meaning::RelativeRate(bar, relative_to)),
+            ],
+            _ => Vec::new(),
+        };
+        Scope { names: self, own }
+    }
+
+    /// Names without any beside.
+    pub fn alone(&self) -> Scope<'_> {
+        Scope { names: self, own: Vec::new() }
+    }
+}
+
+/// The names of a scene, and those that one formula has beside.
+#[derive(Clone, Debug)]
+pub struct Scope<'a> {
+    names: &'a Names,
+    own: Vec<(&'static str, Meaning)>,
+}
+
+impl Scope<'_> {
+    fn find(&self, name: &str) -> Option<(Meaning, Option<Dimension>)> {
+        let own = self.own.iter().find(|own| own.0 == name);
+        own.map(|own| (own.1, Some(Dimension::of(own.1.unit()))))
+            .or_else(|| self.names.known.get(name).copied())
     }
 
     /// Reads a formula, finds what its names stand for, and checks its dimensions.
@@ -320,35 +359,19 @@ impl Names {
     /// # Errors
     /// It is none, has a name that nothing has, or puts together what has different units.
     pub fn bind(&self, text: &str) -> Result<(Bound, Option<Dimension>), FormulaError> {
-        let formula = Formula::parse_with(text, &self.tables)?;
+        let formula = Formula::parse_with(text, &self.names.tables)?;
         let mut meanings = Vec::new();
         let mut dimensions = Vec::new();
         for name in formula.names() {
-            let Some((meaning, dimension)) = self.known.get(name) else {
-                let known: Vec<&str> = self.order.iter().map(String::as_str).collect();
-                return Err(formula.unknown(name, &known));
+            let Some((meaning, dimension)) = self.find(name) else {
+                let known =
+                    self.names.order.iter().map(String::as_str).chain(self.own.iter().map(|own| own.0));
+                return Err(formula.unknown(name, &known.collect::<Vec<_>>()));
             };
-            meanings.push(*meaning);
-            dimensions.push(*dimension);
+            meanings.push(meaning);
+            dimensions.push(dimension);
         }
         let dimension = formula.dimension(&dimensions)?;
         Ok((Bound { formula, meanings }, dimension))
-    }
-}
-
-impl Load {
-    /// Its formulas.
-    pub fn formulas(&self) -> Vec<&str> {
-        match self {
-            Self::Force { force: [x, y], .. } => vec![x, y],
-            Self::Torque { torque, .. } => vec![torque],
-            Self::Spring { potential, tension, .. } => {
-                potential.iter().chain(tension).map(String::as_str).collect()
-            }
-            Self::TorsionSpring { potential, torque, .. } => {
-                potential.iter().chain(torque).map(String::as_str).collect()
-            }
-            Self::Potential { energy } => vec![energy],
-        }
     }
 }

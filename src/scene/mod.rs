@@ -26,8 +26,8 @@ pub use build::{SceneBuilder, ground, on};
 pub use digits::Written;
 pub use error::{Refusal, SceneError};
 pub use law::{
-    Bound, Crossing, Integral, Load, LoadLaw, Meaning, NamedPoint, Names, Parameter, PointTable, SceneEvent,
-    Signal,
+    Bound, Direction, Integral, Load, LoadLaw, Meaning, NamedPoint, Names, Parameter, PointTable, SceneEvent,
+    Scope, Signal,
 };
 pub use number::number;
 pub use read::{parse_scene, read_scene, read_text, source_name};

@@ -175,6 +175,9 @@ fn step<F: OdeSystem + ?Sized>(
     statistics: &mut Statistics,
 ) -> Result<Option<usize>, StepError> {
     if !rows.has_more(until) {
+        if let Some(failure) = rows.failure.take().filter(|_| rows.until == until) {
+            return Err(failure);
+        }
         rows.clear();
         part(rows, stepper, integrate, field, state, until, statistics)?;
     }
@@ -243,6 +246,7 @@ fn part<F: OdeSystem + ?Sized>(
         integrate(window, &y, span / time_unit, first, most)
     };
     let reached_time = |x: f64| state.time.hi + x * time_unit;
+    kept.failure = None;
     match outcome {
         Ok(stats) => {
             statistics.evaluations += u64::from(stats.num_eval);
@@ -258,13 +262,15 @@ fn part<F: OdeSystem + ?Sized>(
         }
         Err(IntegrationError::StepSizeUnderflow { x } | IntegrationError::StiffnessDetected { x }) => {
             let what = "the step fell below the resolution of time, or a rate became not finite".into();
-            return Err(stop(
-                Cause::StepTooSmall,
-                reached_time(x),
-                0.0,
-                what,
-                "loosen the tolerance, or take --method taylor or radau9",
-            ));
+            let hint = "loosen the tolerance, or take --method taylor or radau9";
+            let failure = stop(Cause::StepTooSmall, reached_time(x), 0.0, what, hint);
+            let steps = times.len().saturating_sub(1);
+            if steps == 0 || rows.len() != times.len() * (n + 1) || !rows.iter().all(|y| y.is_finite()) {
+                return Err(failure);
+            }
+            // What the crate does not tell: at least its accepted steps were evaluated.
+            statistics.evaluations += (stepper.attempt + stepper.accepted) * steps as u64;
+            kept.failure = Some(failure);
         }
     }
     let last = rows.rchunks(n + 1).next().unwrap_or_default();
@@ -304,7 +310,8 @@ fn shorter<F: OdeSystem + ?Sized>(
     inside.memory.clear();
     inside.memory.push((time - from.time).hi);
     let mut rows = Rows::default();
-    if part(&mut rows, stepper, integrate, field, inside, time, &mut Statistics::default()).is_ok() {
+    let outcome = part(&mut rows, stepper, integrate, field, inside, time, &mut Statistics::default());
+    if outcome.is_ok() && rows.failure.is_none() {
         rows.last = rows.after.len() - 1;
         rows.hand_out(inside);
     }

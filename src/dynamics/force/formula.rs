@@ -10,57 +10,16 @@ use crate::dynamics::constraint::Site;
 use crate::dynamics::forest::Forest;
 use crate::dynamics::{CompileError, Configuration};
 use crate::scene::formula::Formula;
-use crate::scene::{Bound, Crossing, Load, Meaning, Names, Place, Scene};
+use crate::scene::{Bound, Direction, Load, Meaning, Names, Place, Scene, Scope};
 
-/// What a name in a formula stands for, with the points of the mechanism.
-#[derive(Clone, Debug, PartialEq)]
-enum Quantity {
-    Time,
-    Parameter(usize),
-    Signal(usize),
-    Angle(usize),
-    Rate(usize),
-    Cosine(usize),
-    Sine(usize),
-    X(Site),
-    Y(Site),
-    XRate(Site),
-    YRate(Site),
-    Length([Site; 2]),
-    LengthRate([Site; 2]),
-    RelativeAngle(usize, Option<usize>),
-    RelativeRate(usize, Option<usize>),
-}
-
-/// From the first point to the second: the vector, its length, and its rate of change.
+/// From the first point to the second: the vector and its length.
 fn span<S: Scalar>(at: &Configuration<S>, [a, b]: &[Site; 2]) -> ([S; 2], S) {
     let [from, to] = [at.position(a), at.position(b)];
     let vector = [to[0] - from[0], to[1] - from[1]];
     (vector, (vector[0] * vector[0] + vector[1] * vector[1]).sqrt())
 }
 
-impl Quantity {
-    fn of(meaning: Meaning, forest: &Forest) -> Self {
-        let site = |place: Place| forest.site(&place);
-        match meaning {
-            Meaning::Time => Self::Time,
-            Meaning::Parameter(number) => Self::Parameter(number),
-            Meaning::Signal(number) => Self::Signal(number),
-            Meaning::Angle(bar) => Self::Angle(bar),
-            Meaning::Rate(bar) => Self::Rate(bar),
-            Meaning::Cosine(bar) => Self::Cosine(bar),
-            Meaning::Sine(bar) => Self::Sine(bar),
-            Meaning::X(place) => Self::X(site(place)),
-            Meaning::Y(place) => Self::Y(site(place)),
-            Meaning::XRate(place) => Self::XRate(site(place)),
-            Meaning::YRate(place) => Self::YRate(site(place)),
-            Meaning::Length(places) => Self::Length(places.map(site)),
-            Meaning::LengthRate(places) => Self::LengthRate(places.map(site)),
-            Meaning::RelativeAngle(bar, base) => Self::RelativeAngle(bar, base),
-            Meaning::RelativeRate(bar, base) => Self::RelativeRate(bar, base),
-        }
-    }
-
+impl Meaning<Site> {
     fn value<S: Scalar>(&self, at: &Configuration<S>, parameters: &[f64], signals: &[S]) -> S {
         match self {
             Self::Time => at.time(),
@@ -90,14 +49,14 @@ impl Quantity {
 #[derive(Clone, Debug, PartialEq)]
 struct Expression {
     formula: Formula,
-    quantities: Vec<Quantity>,
+    meanings: Vec<Meaning<Site>>,
     /// The number of its first condition among all.
     first: usize,
 }
 
 impl Expression {
     fn values<S: Scalar>(&self, at: &Configuration<S>, parameters: &[f64], signals: &[S]) -> Vec<S> {
-        self.quantities.iter().map(|quantity| quantity.value(at, parameters, signals)).collect()
+        self.meanings.iter().map(|meaning| meaning.value(at, parameters, signals)).collect()
     }
 
     fn modes<'a>(&self, modes: &'a [bool]) -> &'a [bool] {
@@ -129,7 +88,7 @@ pub(crate) struct FormulaEvent {
     pub name: String,
     when: Expression,
     /// Which zeros count.
-    pub direction: Crossing,
+    pub direction: Direction,
     /// True where the run ends there.
     pub stop: bool,
     /// Parts that act from then on.
@@ -159,14 +118,23 @@ struct Binder<'a> {
 }
 
 impl Binder<'_> {
-    fn expression(&mut self, names: &Names, text: &str, owner: &str) -> Result<Expression, CompileError> {
-        let bound = names.bind(text);
-        let (Bound { formula, meanings }, _) =
-            bound.map_err(|error| CompileError::Unsound(format!("formula of `{owner}`: {error}")))?;
+    fn bind(scope: &Scope, text: &str, owner: &str) -> Result<Bound, CompileError> {
+        let unsound = |error| CompileError::Unsound(format!("formula of `{owner}`: {error}"));
+        scope.bind(text).map(|(bound, _)| bound).map_err(unsound)
+    }
+
+    /// Numbers the conditions of a formula and finds its points.
+    fn placed(&mut self, Bound { formula, meanings }: Bound, owner: &str) -> Expression {
         let first = self.conditions.len();
         self.conditions.extend(std::iter::repeat_n(owner.to_owned(), formula.conditions()));
-        let quantities = meanings.into_iter().map(|meaning| Quantity::of(meaning, self.forest)).collect();
-        Ok(Expression { formula, quantities, first })
+        let site = |place| self.forest.site(&place);
+        let meanings = meanings.into_iter().map(|meaning| meaning.with_points(site)).collect();
+        Expression { formula, meanings, first }
+    }
+
+    fn expression(&mut self, scope: &Scope, text: &str, owner: &str) -> Result<Expression, CompileError> {
+        let bound = Self::bind(scope, text, owner)?;
+        Ok(self.placed(bound, owner))
     }
 }
 
@@ -180,16 +148,14 @@ impl Formulas {
         let mut binder = Binder { forest, conditions: Vec::new() };
         let mut signals = Vec::new();
         for signal in &scene.signals {
-            let expression = binder.expression(&names, &signal.formula, &signal.name)?;
-            if let Ok((bound, _)) = names.bind(&signal.formula) {
-                names.signal(&signal.name, &bound, None);
-            }
-            signals.push(expression);
+            let bound = Binder::bind(&names.alone(), &signal.formula, &signal.name)?;
+            names.signal(&signal.name, &bound, None);
+            signals.push(binder.placed(bound, &signal.name));
         }
         let mut laws = Vec::new();
         for law in &scene.laws {
-            let names = names.within(&law.load);
-            let mut expression = |text: &str| binder.expression(&names, text, &law.name);
+            let scope = names.within(&law.load);
+            let mut expression = |text: &str| binder.expression(&scope, text, &law.name);
             let (potential, place) = match &law.load {
                 Load::Force { bar, point, force: [x, y], follows } => {
                     let site = forest.site(&Place { bar: Some(*bar), point: *point });
@@ -233,11 +199,11 @@ impl Formulas {
             for (name, text) in &event.set {
                 let number = parameter(name)
                     .ok_or_else(|| CompileError::Unsound(format!("event `{}` sets {name}", event.name)))?;
-                set.push((number, binder.expression(&names, text, &event.name)?));
+                set.push((number, binder.expression(&names.alone(), text, &event.name)?));
             }
             events.push(FormulaEvent {
                 name: event.name.clone(),
-                when: binder.expression(&names, &event.when, &event.name)?,
+                when: binder.expression(&names.alone(), &event.when, &event.name)?,
                 direction: event.direction,
                 stop: event.stop,
                 on: event.on.clone(),

@@ -123,6 +123,8 @@ pub struct UserForce {
     pub(in crate::dynamics) sites: Vec<Site>,
     /// What its potential does, and what it applies beside.
     pub(in crate::dynamics) parts: [Part; 2],
+    /// True where it has exponentials, hyperbolic tangents or quotients, which may be flat to the last digit.
+    pub(in crate::dynamics) may_be_flat: bool,
     /// Potential energy \[J\].
     potential: Option<(Tape, Slot)>,
 }
@@ -283,9 +285,11 @@ impl UserForce {
         if let Some(refused) = refused {
             return Err(refused);
         }
+        let parts = [conservative.part(by_potential), applied.part(beside)];
         Ok(Self {
             name: force.name().into(),
-            parts: [conservative.part(by_potential), applied.part(beside)],
+            may_be_flat: parts.iter().any(|part| part.tape.may_be_flat()),
+            parts,
             potential: energy.1.first().map(|&slot| (energy.0, slot)),
             inputs: recorder.inputs.into_inner(),
             sites: recorder.sites.into_inner(),
@@ -300,11 +304,6 @@ impl UserForce {
     /// True where a part asks for an input of this kind.
     fn asks_for(&self, parts: &[Part], kind: impl Fn(Input) -> bool) -> bool {
         parts.iter().flat_map(|part| part.tape.inputs()).any(|number| kind(self.inputs[number as usize]))
-    }
-
-    /// True where it has exponentials, hyperbolic tangents or quotients, which may be flat to the last digit.
-    pub fn may_be_flat(&self) -> bool {
-        self.parts.iter().any(|part| part.tape.may_be_flat())
     }
 
     /// True where whole turns matter to it.

@@ -1,14 +1,19 @@
 //! Formulas of time and state: points, signals, laws of forces and springs, potentials and events.
 
 use super::at::{At, Fields, listed, nearest};
+use super::loads;
 use super::names::Bars;
 use super::resolve::{Known, check_name, fits, refused};
 use crate::scene::error::SceneError;
 use crate::scene::format::{Field, Quantity, SCENE, Shape};
 use crate::scene::formula::POINTS;
-use crate::scene::law::{Crossing, Integral, Load, LoadLaw, NamedPoint, Names, SceneEvent, Signal};
-use crate::scene::locate::Value;
-use crate::scene::{Force, PointTable, Scene, Spring, Torque, TorsionSpring};
+use crate::scene::formula::unit::Dimension;
+use crate::scene::law::{
+    Bound, Direction, Integral, Load, LoadLaw, NamedPoint, Names, PointTable, SceneEvent, Scope, Signal,
+};
+use crate::scene::locate::{Member, Node, Value};
+use crate::scene::set::hint;
+use crate::scene::{Force, Scene, Spring, Torque, TorsionSpring};
 
 /// Signals at most.
 const MOST: usize = 1000;
@@ -31,32 +36,32 @@ pub(super) fn split<T>(all: Vec<Either<T>>, laws: &mut Vec<LoadLaw>) -> Vec<T> {
     plain
 }
 
+/// A text, or a number as one.
+fn written(node: &Node) -> Option<String> {
+    match &node.value {
+        Value::Text(text) => Some(text.clone()),
+        Value::Number(number) => Some(format!("{number:?}")),
+        _ => None,
+    }
+}
+
 /// The text of a formula that must be there.
 fn formula(fields: &Fields, name: &str) -> Result<String, SceneError> {
     let at = fields.required(name)?;
-    match (&at.node.value, fields.table.field(name)) {
-        (Value::Text(text), _) => Ok(text.clone()),
-        (Value::Number(number), _) => Ok(plain(*number)),
-        (_, Some(field)) => Err(at.refuse_value(&field.shape.allowed(), &field.for_example())),
-        (_, None) => Err(at.refuse_value("must be a formula", fields.table.about)),
-    }
+    written(at.node).ok_or_else(|| match fields.table.field(name) {
+        Some(field) => at.refuse_value(&field.shape.allowed(), &field.for_example()),
+        None => at.refuse_value("must be a formula", fields.table.about),
+    })
 }
 
 fn formula_if_any(fields: &Fields, name: &str) -> Result<Option<String>, SceneError> {
     fields.optional(name).map(|_| formula(fields, name)).transpose()
 }
 
-/// A number as a formula.
-fn plain(number: f64) -> String {
-    format!("{number:?}")
-}
-
-fn is_formula(at: &At) -> bool {
-    match &at.node.value {
+fn is_formula(node: &Node) -> bool {
+    match &node.value {
         Value::Text(text) => text.trim().parse::<f64>().is_err(),
-        Value::List(nodes) => {
-            nodes.iter().enumerate().any(|(number, node)| is_formula(&at.item(node, number)))
-        }
+        Value::List(nodes) => nodes.iter().any(is_formula),
         _ => false,
     }
 }
@@ -76,27 +81,23 @@ fn without_law(fields: &Fields) -> Result<(), SceneError> {
 /// A force, or one by formulas.
 pub(super) fn force(fields: &Fields, name: String, known: &Bars) -> Result<Either<Force>, SceneError> {
     let at = fields.required("force")?;
-    let Value::List(nodes) = &at.node.value else {
-        return super::loads::force(fields, name, known).map(Either::Plain);
+    let nodes = match &at.node.value {
+        Value::List(nodes) if nodes.len() == 2 && is_formula(at.node) => nodes,
+        _ => return loads::force(fields, name, known).map(Either::Plain),
     };
-    if nodes.len() != 2 || !is_formula(&at) {
-        return super::loads::force(fields, name, known).map(Either::Plain);
-    }
     without_law(fields)?;
-    let mut texts = Vec::new();
-    for (number, node) in nodes.iter().enumerate() {
-        let item = at.item(node, number);
-        match &node.value {
-            Value::Text(text) => texts.push(text.clone()),
-            Value::Number(number) => texts.push(plain(*number)),
-            _ => return Err(item.refuse_value("must be a number or a formula", "for example \"-c*tip.vx\"")),
-        }
-    }
-    let [x, y] = [texts[0].clone(), texts[1].clone()];
+    let component = |number: usize| {
+        let refused = || {
+            at.item(&nodes[number], number)
+                .refuse_value("must be a number or a formula", "for example \"-c*tip.vx\"")
+        };
+        written(&nodes[number]).ok_or_else(refused)
+    };
+    let force = [component(0)?, component(1)?];
     let load = Load::Force {
         bar: known.bar(fields, "a force on the ground moves nothing")?,
         point: fields.pair("point")?,
-        force: [x, y],
+        force,
         follows: fields.word_or_first("frame")? == 1,
     };
     Ok(Either::Law(LoadLaw { name, load }))
@@ -104,14 +105,11 @@ pub(super) fn force(fields: &Fields, name: String, known: &Bars) -> Result<Eithe
 
 /// A torque, or one by a formula.
 pub(super) fn torque(fields: &Fields, name: String, known: &Bars) -> Result<Either<Torque>, SceneError> {
-    if !is_formula(&fields.required("torque")?) {
-        return super::loads::torque(fields, name, known).map(Either::Plain);
+    if !is_formula(fields.required("torque")?.node) {
+        return loads::torque(fields, name, known).map(Either::Plain);
     }
     without_law(fields)?;
-    let hint = "a torque on the ground moves nothing; name the ground, if anything, in `relative_to`";
-    let bar = known.bar(fields, hint)?;
-    let relative_to =
-        known.relative_to(fields, bar, "leave it out where the ground takes the opposite torque")?;
+    let (bar, relative_to) = loads::torque_bodies(fields, known)?;
     let load = Load::Torque { bar, relative_to, torque: formula(fields, "torque")? };
     Ok(Either::Law(LoadLaw { name, load }))
 }
@@ -119,7 +117,7 @@ pub(super) fn torque(fields: &Fields, name: String, known: &Bars) -> Result<Eith
 /// A spring, or one by formulas.
 pub(super) fn spring(fields: &Fields, name: String, known: &Bars) -> Result<Either<Spring>, SceneError> {
     if fields.table.field("stiffness").is_some() {
-        return super::loads::spring(fields, name, known).map(Either::Plain);
+        return loads::spring(fields, name, known).map(Either::Plain);
     }
     let load = Load::Spring {
         between: known.between(fields, "spring")?,
@@ -136,13 +134,12 @@ pub(super) fn torsion_spring(
     known: &Bars,
 ) -> Result<Either<TorsionSpring>, SceneError> {
     if fields.table.field("stiffness").is_some() {
-        return super::loads::torsion_spring(fields, name, known).map(Either::Plain);
+        return loads::torsion_spring(fields, name, known).map(Either::Plain);
     }
-    let hint = "a torsion spring turns a bar; name the ground, if anything, in `relative_to`";
-    let bar = known.bar(fields, hint)?;
+    let (bar, relative_to) = loads::coil_bodies(fields, known)?;
     let load = Load::TorsionSpring {
         bar,
-        relative_to: known.relative_to(fields, bar, "leave it out for an angle from +x")?,
+        relative_to,
         potential: formula_if_any(fields, "potential")?,
         torque: formula_if_any(fields, "torque")?,
     };
@@ -164,9 +161,9 @@ pub(super) fn potential(fields: &Fields, name: String) -> Result<LoadLaw, SceneE
 /// An event.
 pub(super) fn event(fields: &Fields, name: String) -> Result<SceneEvent, SceneError> {
     let direction = match fields.word_or_first("direction")? {
-        0 => Crossing::Either,
-        1 => Crossing::Rising,
-        _ => Crossing::Falling,
+        0 => Direction::Either,
+        1 => Direction::Rising,
+        _ => Direction::Falling,
     };
     let set = match fields.optional("set") {
         None => Vec::new(),
@@ -197,25 +194,31 @@ pub(super) fn names(at: &At) -> Result<Vec<String>, SceneError> {
 }
 
 /// Formulas by name.
-fn pairs(at: &At) -> Result<Vec<(String, String)>, SceneError> {
+fn pairs<'a>(at: &At<'a>) -> Result<Vec<(String, String)>, SceneError> {
     let hint = "for example {\"speed\": \"sqrt(tip.vx^2 + tip.vy^2)\"}";
     let Value::Object(members) = &at.node.value else {
         return Err(at.refuse_value(&Shape::Signals.allowed(), hint));
     };
-    let mut all = Vec::new();
+    let pair = |member: &Member| {
+        let refused = || at.member(member).refuse_value("must be a formula", hint);
+        Ok((member.key.clone(), written(&member.node).ok_or_else(refused)?))
+    };
+    members.iter().map(pair).collect()
+}
+
+/// Refuses a key of an object that is no name for formulas, or is taken.
+fn check_keys<'a>(at: &At<'a>, mut taken: Vec<&'a str>) -> Result<(), SceneError> {
+    let Value::Object(members) = &at.node.value else { return Ok(()) };
     for member in members {
-        match &member.node.value {
-            Value::Text(text) => all.push((member.key.clone(), text.clone())),
-            Value::Number(number) => all.push((member.key.clone(), plain(*number))),
-            _ => return Err(at.member(member).refuse_value("must be a formula", hint)),
-        }
+        check_name(at.source, &member.key, member.span, &at.member(member).path, &taken)?;
+        taken.push(&member.key);
     }
-    Ok(all)
+    Ok(())
 }
 
 /// The tables of a scene.
-pub(super) fn tables(fields: &Fields) -> Result<Vec<PointTable>, SceneError> {
-    let Some(at) = fields.optional("tables") else { return Ok(Vec::new()) };
+pub(super) fn tables(root: &At) -> Result<Vec<PointTable>, SceneError> {
+    let Some(at) = root.child("tables") else { return Ok(Vec::new()) };
     let refused =
         |at: &At| at.refuse_value(&Shape::Tables.allowed(), "for example {\"gust\": [[0, 0], [1, 2.5]]}");
     let Value::Object(members) = &at.node.value else { return Err(refused(&at)) };
@@ -264,14 +267,7 @@ pub(super) fn signals(fields: &Fields, taken: &[Known]) -> Result<Vec<Signal>, S
             "merge some",
         ));
     }
-    if let Value::Object(members) = &at.node.value {
-        let mut names: Vec<&str> = taken.iter().map(|known| known.name.as_str()).collect();
-        for member in members {
-            let one = at.member(member);
-            check_name(at.source, &member.key, member.span, &one.path, &names)?;
-            names.push(&member.key);
-        }
-    }
+    check_keys(&at, taken.iter().map(|known| known.name.as_str()).collect())?;
     Ok(all.into_iter().map(|(name, formula)| Signal { name, formula }).collect())
 }
 
@@ -287,19 +283,14 @@ pub(super) fn integrals(
     taken.extend(signals.iter().map(|signal| signal.name.as_str()));
     taken.extend(bars.bars.iter().map(|bar| bar.name.as_str()));
     let all = pairs(&at)?;
-    if let Value::Object(members) = &at.node.value {
-        for member in members {
-            check_name(at.source, &member.key, member.span, &at.member(member).path, &taken)?;
-            taken.push(&member.key);
-        }
-    }
+    check_keys(&at, taken)?;
     let first = bars.bars.len();
     let integral = |(number, (name, formula))| Integral { name, formula, bar: first + number };
     Ok(all.into_iter().enumerate().map(integral).collect())
 }
 
 /// Judges every formula of a scene where it stands: its names, its dimensions; and the parts that events name.
-pub(super) fn check(root: &At, scene: &Scene, parameters: &[Known]) -> Result<(), SceneError> {
+pub(super) fn check<'a>(root: &At<'a>, scene: &Scene, parameters: &[Known]) -> Result<(), SceneError> {
     let is_plain = scene.laws.is_empty() && scene.signals.is_empty() && scene.integrals.is_empty();
     if is_plain && scene.events.is_empty() && scene.inactive.is_empty() {
         return Ok(());
@@ -308,19 +299,15 @@ pub(super) fn check(root: &At, scene: &Scene, parameters: &[Known]) -> Result<()
     for known in parameters {
         names.set_dimension(&known.name, known.dimension);
     }
+    // What was read stands in the file.
+    let found = |at: Option<At<'a>>| at.unwrap_or_else(|| root.clone());
     for signal in &scene.signals {
-        let at = root.child("signals").and_then(|at| at.child(&signal.name));
-        let (bound, dimension) = match (names.bind(&signal.formula), at) {
-            (Ok(found), _) => found,
-            (Err(error), Some(at)) => {
-                return Err(refused(at.source, at.node.span, &at.path, "must be a formula", &error));
-            }
-            (Err(error), None) => return Err(root.refuse(&error.problem, "must be a formula", &error.hint)),
-        };
+        let at = found(root.child("signals").and_then(|at| at.child(&signal.name)));
+        let (bound, dimension) = judge(&at, &signal.formula, &names.alone(), None)?;
         names.signal(&signal.name, &bound, dimension);
     }
     for law in &scene.laws {
-        let names = names.within(&law.load);
+        let scope = names.within(&law.load);
         let (list, keys): (&str, &[&str]) = match law.load {
             Load::Force { .. } => ("forces", &["force"]),
             Load::Torque { .. } => ("torques", &["torque"]),
@@ -328,46 +315,43 @@ pub(super) fn check(root: &At, scene: &Scene, parameters: &[Known]) -> Result<()
             Load::TorsionSpring { .. } => ("torsion_springs", &["potential", "torque"]),
             Load::Potential { .. } => ("potentials", &["energy"]),
         };
-        let Some(part) = root.child(list).and_then(|at| at.named(&law.name)) else { continue };
+        let part = found(root.child(list).and_then(|at| at.named(&law.name)));
         for key in keys {
             let Some(at) = part.child(key) else { continue };
+            let formulas = match &at.node.value {
+                Value::List(nodes) => nodes.iter().enumerate().map(|(i, node)| at.item(node, i)).collect(),
+                _ => vec![at],
+            };
             let quantity = quantity_of(list, key, &part);
-            match &at.node.value {
-                Value::List(nodes) => {
-                    for (number, node) in nodes.iter().enumerate() {
-                        judge(&at.item(node, number), &names, quantity.as_ref(), *key == "potential")?;
-                    }
+            for at in &formulas {
+                let Value::Text(text) = &at.node.value else { continue };
+                let (bound, _) = judge(at, text, &scope, quantity.as_ref())?;
+                if matches!(*key, "potential" | "energy") {
+                    is_of_place(at, &names, &bound)?;
                 }
-                _ => judge(&at, &names, quantity.as_ref(), matches!(*key, "potential" | "energy"))?,
             }
         }
     }
+    let scope = names.alone();
     for integral in &scene.integrals {
-        root.child("integrals")
-            .and_then(|at| at.child(&integral.name))
-            .map_or(Ok(()), |at| judge(&at, &names, None, false))?;
+        let at = found(root.child("integrals").and_then(|at| at.child(&integral.name)));
+        judge(&at, &integral.formula, &scope, None)?;
     }
     let parts = Parts::of(scene);
     for event in &scene.events {
-        let Some(at) = root.child("events").and_then(|at| at.named(&event.name)) else { continue };
-        if let Some(when) = at.child("when") {
-            judge(&when, &names, None, false)?;
-        }
+        let at = found(root.child("events").and_then(|at| at.named(&event.name)));
+        judge(&found(at.child("when")), &event.when, &scope, None)?;
         for key in ["on", "off"] {
             at.child(key).map_or(Ok(()), |list| parts.check(&list))?;
         }
-        let Some(set) = at.child("set") else { continue };
-        for (name, _) in &event.set {
-            let Some(value) = set.child(name) else { continue };
+        for (name, text) in &event.set {
+            let value = found(at.child("set").and_then(|set| set.child(name)));
             let known: Vec<&str> = parameters.iter().map(|known| known.name.as_str()).collect();
             if !known.contains(&name.as_str()) {
-                let hint = nearest(name, known.iter().copied())
-                    .map_or(format!("there are: {}", listed(&known)), |near| {
-                        format!("did you mean `{near}`?")
-                    });
+                let hint = hint(name, &known);
                 return Err(value.refuse("is no parameter", "must be a parameter of the scene", &hint));
             }
-            judge(&value, &names, None, false)?;
+            judge(&value, text, &scope, None)?;
         }
     }
     root.child("inactive").map_or(Ok(()), |list| parts.check(&list))
@@ -385,23 +369,30 @@ fn quantity_of(list: &str, key: &str, part: &At) -> Option<Quantity> {
     }
 }
 
-/// Judges one formula.
-fn judge(at: &At, names: &Names, quantity: Option<&Quantity>, is_potential: bool) -> Result<(), SceneError> {
-    let Value::Text(text) = &at.node.value else { return Ok(()) };
+/// Judges one formula that stands at `at`: its names, and its dimension where that of the field is known.
+fn judge(
+    at: &At,
+    text: &str,
+    scope: &Scope,
+    quantity: Option<&Quantity>,
+) -> Result<(Bound, Option<Dimension>), SceneError> {
     let allowed =
         quantity.map_or("must be a formula".to_owned(), |quantity| Shape::Formula(*quantity).allowed());
     let refused = |error| refused(at.source, at.node.span, &at.path, &allowed, &error);
-    let (bound, dimension) = names.bind(text).map_err(refused)?;
+    let (bound, dimension) = scope.bind(text).map_err(refused)?;
     if let Some(quantity) = quantity {
         fits(&bound.formula, dimension, quantity).map_err(refused)?;
     }
-    if is_potential && let Some(name) = names.changing(&bound) {
-        let problem = format!("depends on {name}");
-        let allowed = "a potential is a formula of angles and positions";
-        let hint = "what depends on time or rates does work: give it as a force, a torque or a tension";
-        return Err(at.refuse(&problem, allowed, hint));
-    }
-    Ok(())
+    Ok((bound, dimension))
+}
+
+/// Refuses a potential that depends on time or rates.
+fn is_of_place(at: &At, names: &Names, bound: &Bound) -> Result<(), SceneError> {
+    let Some(name) = names.changing(bound) else { return Ok(()) };
+    let problem = format!("depends on {name}");
+    let allowed = "a potential is a formula of angles and positions";
+    let hint = "what depends on time or rates does work: give it as a force, a torque or a tension";
+    Err(at.refuse(&problem, allowed, hint))
 }
 
 /// What events can switch.

@@ -38,16 +38,29 @@ pub(super) fn torsion_spring(
     name: String,
     known: &Bars,
 ) -> Result<TorsionSpring, SceneError> {
-    let bar =
-        known.bar(fields, "a torsion spring turns a bar; name the ground, if anything, in `relative_to`")?;
+    let (bar, relative_to) = coil_bodies(fields, known)?;
     Ok(TorsionSpring {
         name,
         bar,
-        relative_to: known.relative_to(fields, bar, "leave it out for an angle from +x")?,
+        relative_to,
         stiffness: fields.number("stiffness")?,
         free_angle: fields.number("free_angle")?,
         damping: fields.number_or("damping", 0.0)?,
     })
+}
+
+/// The bar that a torsion spring turns, and the one its angle is measured from.
+pub(super) fn coil_bodies(fields: &Fields, known: &Bars) -> Result<(usize, Option<usize>), SceneError> {
+    let hint = "a torsion spring turns a bar; name the ground, if anything, in `relative_to`";
+    let bar = known.bar(fields, hint)?;
+    Ok((bar, known.relative_to(fields, bar, "leave it out for an angle from +x")?))
+}
+
+/// The bar that a torque acts on, and the one that takes its opposite.
+pub(super) fn torque_bodies(fields: &Fields, known: &Bars) -> Result<(usize, Option<usize>), SceneError> {
+    let hint = "a torque on the ground moves nothing; name the ground, if anything, in `relative_to`";
+    let bar = known.bar(fields, hint)?;
+    Ok((bar, known.relative_to(fields, bar, "leave it out where the ground takes the opposite torque")?))
 }
 
 /// A force.
@@ -64,18 +77,11 @@ pub(super) fn force(fields: &Fields, name: String, known: &Bars) -> Result<Force
 
 /// A torque.
 pub(super) fn torque(fields: &Fields, name: String, known: &Bars) -> Result<Torque, SceneError> {
-    let bar = known.bar(
-        fields,
-        "a torque on the ground moves nothing; name the ground, if anything, in `relative_to`",
-    )?;
+    let (bar, relative_to) = torque_bodies(fields, known)?;
     Ok(Torque {
         name,
         bar,
-        relative_to: known.relative_to(
-            fields,
-            bar,
-            "leave it out where the ground takes the opposite torque",
-        )?,
+        relative_to,
         torque: fields.number("torque")?,
         law: fields.optional("law").map(|_| law(fields)).transpose()?,
     })

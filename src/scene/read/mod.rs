@@ -24,7 +24,7 @@ use super::{Drive, Motor, Scene};
 use laws::Either;
 use loads::AnyMotor;
 use names::{Bars, named};
-use resolve::Known;
+use resolve::Resolved;
 use std::io::Read;
 use std::path::Path;
 
@@ -84,8 +84,8 @@ pub fn parse_scene(text: &str, source: &str, overrides: &[Override]) -> Result<S
         return Err(SceneError::whole_file(source, "is too long", "must be at most 16 MiB", hint));
     }
     let (source, mut tree) = put_together(text, source, overrides)?;
-    let parameters = resolve::resolve(&source, &mut tree)?;
-    scene(&At { source: &source, node: &tree, path: String::new() }, &parameters)
+    let resolved = resolve::resolve(&source, &mut tree)?;
+    scene(&At { source: &source, node: &tree, path: String::new() }, resolved)
 }
 
 /// The tree of a scene's text with overrides put in, not judged yet.
@@ -109,7 +109,7 @@ fn without_mark(text: &str) -> &str {
     text.strip_prefix('\u{feff}').unwrap_or(text)
 }
 
-fn scene(root: &At, parameters: &[Known]) -> Result<Scene, SceneError> {
+fn scene(root: &At, Resolved { parameters, tables }: Resolved) -> Result<Scene, SceneError> {
     let fields = root.object(&SCENE)?;
     let name = fields.name("name")?;
     let description = fields.text_or_empty("description")?;
@@ -131,8 +131,8 @@ fn scene(root: &At, parameters: &[Known]) -> Result<Scene, SceneError> {
     let (torques, _) = named(&fields, "torques", |fields, name| laws::torque(fields, name, &known))?;
     let (potentials, _) = named(&fields, "potentials", laws::potential)?;
     let (events, _) = named(&fields, "events", laws::event)?;
-    let signals = laws::signals(&fields, parameters)?;
-    let integrals = laws::integrals(&fields, parameters, &signals, &known)?;
+    let signals = laws::signals(&fields, &parameters)?;
+    let integrals = laws::integrals(&fields, &parameters, &signals, &known)?;
     let mut laws = Vec::new();
     let springs = laws::split(springs, &mut laws);
     let torsion_springs = laws::split(torsion_springs, &mut laws);
@@ -161,7 +161,7 @@ fn scene(root: &At, parameters: &[Known]) -> Result<Scene, SceneError> {
         walls,
         parameters: parameters.iter().map(Into::into).collect(),
         points,
-        tables: laws::tables(&fields)?,
+        tables,
         signals,
         integrals,
         laws,
@@ -180,7 +180,7 @@ fn scene(root: &At, parameters: &[Known]) -> Result<Scene, SceneError> {
         walls: &wall_places,
     };
     let scene = Scene { bars, ..scene };
-    laws::check(root, &scene, parameters)?;
+    laws::check(root, &scene, &parameters)?;
     fit::fitted(scene, &places, &given).map(Scene::with_rotors)
 }
 

@@ -3,12 +3,14 @@
 //! Before a scene is judged, every number that is written as a formula of parameters becomes that number; a
 //! formula of time and state, where the format takes one, stays a text for the reader of loads and events.
 
+use super::at::At;
+use super::laws;
 use crate::scene::error::SceneError;
 use crate::scene::format::{Quantity, SCENE, Shape, Table, about, kind};
 use crate::scene::formula::unit::Dimension;
-use crate::scene::formula::{FUNCTIONS, Formula, FormulaError, Interpolant, POINTS};
+use crate::scene::formula::{DEEPEST, FUNCTIONS, Formula, FormulaError, Interpolant};
 use crate::scene::locate::{Member, Node, Source, Span, Value, push_index, push_key};
-use crate::scene::{Law, Parameter, Sine};
+use crate::scene::{Law, Parameter, PointTable, Sine};
 
 /// Names that formulas give a meaning of their own.
 const RESERVED: [&str; 5] = ["t", "pi", "length", "rate", "angle"];
@@ -28,15 +30,22 @@ impl From<&Known> for Parameter {
     }
 }
 
-/// Puts numbers in the place of formulas of parameters; returns the parameters.
+/// What formulas are made of.
+pub(super) struct Resolved {
+    pub parameters: Vec<Known>,
+    pub tables: Vec<PointTable>,
+}
+
+/// Puts numbers in the place of formulas of parameters; returns the parameters, and the tables they may use.
 ///
 /// # Errors
 /// A formula that is none, a name that nothing has, a dimension that does not fit, a cycle.
-pub(super) fn resolve(source: &Source, tree: &mut Node) -> Result<Vec<Known>, SceneError> {
-    let tables = tables(tree);
-    let parameters = parameters(source, tree, &tables)?;
-    Resolver { source, parameters: &parameters, tables: &tables }.members(tree, &SCENE, "")?;
-    Ok(parameters)
+pub(super) fn resolve(source: &Source, tree: &mut Node) -> Result<Resolved, SceneError> {
+    let tables = laws::tables(&At { source, node: tree, path: String::new() })?;
+    let functions: Vec<_> = tables.iter().map(|table| Interpolant::new(&table.name, &table.points)).collect();
+    let parameters = parameters(source, tree, &functions)?;
+    Resolver { source, parameters: &parameters, tables: &functions }.members(tree, &SCENE, "")?;
+    Ok(Resolved { parameters, tables })
 }
 
 /// Refuses a name that formulas cannot use.
@@ -84,33 +93,6 @@ pub(super) fn refused(
     source.refusal(place, path, &problem, allowed, &error.hint).with_value(source.written(span))
 }
 
-/// The tables, as far as they are well formed; the reader refuses the others.
-fn tables(tree: &Node) -> Vec<Interpolant> {
-    let member = |node: &Node, key: &str| match &node.value {
-        Value::Object(members) => members.iter().position(|member| member.key == key),
-        _ => None,
-    };
-    let (Some(holder), Value::Object(members)) = (member(tree, "tables"), &tree.value) else {
-        return Vec::new();
-    };
-    let Value::Object(tables) = &members[holder].node.value else { return Vec::new() };
-    let point = |node: &Node| match &node.value {
-        Value::List(pair) => match pair.as_slice() {
-            [Node { value: Value::Number(x), .. }, Node { value: Value::Number(y), .. }] => Some([*x, *y]),
-            _ => None,
-        },
-        _ => None,
-    };
-    let table = |member: &Member| match &member.node.value {
-        Value::List(nodes) => {
-            let points: Option<Vec<[f64; 2]>> = nodes.iter().take(POINTS[1]).map(point).collect();
-            points.map(|points| Interpolant::new(&member.key, &points))
-        }
-        _ => None,
-    };
-    tables.iter().filter_map(table).collect()
-}
-
 /// The parameters, in the order of the text.
 fn parameters(source: &Source, tree: &Node, tables: &[Interpolant]) -> Result<Vec<Known>, SceneError> {
     let Value::Object(members) = &tree.value else { return Ok(Vec::new()) };
@@ -123,49 +105,40 @@ fn parameters(source: &Source, tree: &Node, tables: &[Interpolant]) -> Result<Ve
         let problem = format!("has {} entries", members.len());
         return Err(source.refusal(holder.span, "parameters", &problem, &allowed, "compute the rest before"));
     }
-    let mut formulas = Vec::new();
-    let mut names: Vec<&str> = Vec::new();
+    let mut order =
+        Order { source, names: Vec::new(), formulas: Vec::new(), known: Vec::new(), open: Vec::new() };
     for member in members {
         let mut path = "parameters".to_owned();
         push_key(&mut path, &member.key);
-        check_name(source, &member.key, member.span, &path, &names)?;
+        check_name(source, &member.key, member.span, &path, &order.names)?;
         let span = member.node.span;
-        let formula = match &member.node.value {
-            Value::Number(number) if number.is_finite() => Err(*number),
+        let (formula, known) = match &member.node.value {
+            Value::Number(number) if number.is_finite() => (None, Some((*number, None))),
             Value::Text(text) => {
                 let formula = Formula::parse_with(text, tables);
-                Ok(formula.map_err(|error| refused(source, span, &path, &allowed, &error))?)
+                (Some(formula.map_err(|error| refused(source, span, &path, &allowed, &error))?), None)
             }
             _ => {
-                return Err(source.refused_value(
-                    span,
-                    &path,
-                    &allowed,
-                    "for example 0.6 or \"15*m*g/(2*l)\"",
-                ));
+                let hint = "for example 0.6 or \"15*m*g/(2*l)\"";
+                return Err(source.refused_value(span, &path, &allowed, hint));
             }
         };
-        formulas.push((path, span, formula));
-        names.push(&member.key);
+        order.formulas.push((path, span, formula));
+        order.known.push(known);
+        order.names.push(&member.key);
     }
-    let mut order = Order { source, names: &names, formulas: &formulas, known: Vec::new(), open: Vec::new() };
-    order.known.resize_with(names.len(), || None);
-    (0..names.len()).try_for_each(|number| order.settle(number))?;
-    let found = order.known.into_iter().flatten();
-    Ok(names
-        .iter()
-        .zip(found)
-        .map(|(name, (value, dimension))| Known { name: (*name).to_owned(), value, dimension })
-        .collect())
+    (0..order.names.len()).try_for_each(|number| order.settle(number))?;
+    let Order { names, known, .. } = order;
+    let parameter = |(name, (value, dimension)): (&str, _)| Known { name: name.to_owned(), value, dimension };
+    Ok(names.into_iter().zip(known.into_iter().flatten()).map(parameter).collect())
 }
-
-type Pending = (String, Span, Result<Formula, f64>);
 
 /// Evaluates parameters after those they are made of.
 struct Order<'a> {
     source: &'a Source,
-    names: &'a [&'a str],
-    formulas: &'a [Pending],
+    names: Vec<&'a str>,
+    /// Path, place and formula of each; none of a number.
+    formulas: Vec<(String, Span, Option<Formula>)>,
     known: Vec<Option<(f64, Option<Dimension>)>>,
     /// Those that wait for others.
     open: Vec<usize>,
@@ -176,44 +149,39 @@ impl Order<'_> {
         if self.known[number].is_some() {
             return Ok(());
         }
-        let (path, span, formula) = &self.formulas[number];
-        let formula = match formula {
-            Err(value) => {
-                self.known[number] = Some((*value, None));
-                return Ok(());
-            }
-            Ok(formula) => formula,
-        };
-        let allowed = Shape::Parameters.allowed();
-        let refused = |error: &FormulaError| refused(self.source, *span, path, &allowed, error);
-        if self.open.contains(&number) || self.open.len() >= crate::scene::formula::DEEPEST {
+        let (path, span, formula) = self.formulas[number].clone();
+        let Some(formula) = formula else { return Ok(()) };
+        let (source, allowed) = (self.source, Shape::Parameters.allowed());
+        let refused = |error: FormulaError| refused(source, span, &path, &allowed, &error);
+        if self.open.contains(&number) || self.open.len() >= DEEPEST {
             let chain: Vec<&str> = self.open.iter().chain([&number]).map(|&one| self.names[one]).collect();
             let problem = format!("is made of itself: {}", chain.join(" of "));
-            return Err(self.source.refusal(*span, path, &problem, &allowed, "give one of them as a number"));
+            return Err(source.refusal(span, &path, &problem, &allowed, "give one of them as a number"));
         }
-        let mut parts = Vec::new();
-        for name in formula.names() {
-            let part = self.names.iter().position(|known| *known == name);
-            parts.push(part.ok_or_else(|| refused(&formula.unknown(name, self.names)))?);
-        }
+        let part = |name| self.names.iter().position(|known| *known == name);
+        let unknown = |name| refused(formula.unknown(name, &self.names));
+        let parts: Vec<usize> =
+            formula.names().map(|name| part(name).ok_or_else(|| unknown(name))).collect::<Result<_, _>>()?;
         self.open.push(number);
         parts.iter().try_for_each(|&part| self.settle(part))?;
         self.open.pop();
-        let found: Vec<_> = parts.iter().filter_map(|&part| self.known[part]).collect();
-        let (values, dimensions): (Vec<f64>, Vec<_>) = found.into_iter().unzip();
-        let refused = |error: &FormulaError| {
-            self::refused(self.source, *span, path, &Shape::Parameters.allowed(), error)
-        };
-        let dimension = formula.dimension(&dimensions).map_err(|error| refused(&error))?;
+        let (values, dimensions): (Vec<f64>, Vec<_>) =
+            parts.iter().filter_map(|&part| self.known[part]).unzip();
+        let dimension = formula.dimension(&dimensions).map_err(refused)?;
         let value = formula.value(&values);
         if !value.is_finite() {
             let problem = format!("comes to {value}");
-            return Err(self.source.refusal(*span, path, &problem, &allowed, "look for a division by zero"));
+            return Err(source.refusal(span, &path, &problem, &allowed, "look for a division by zero"));
         }
         self.known[number] = Some((value, dimension));
         Ok(())
     }
 }
+
+/// The value of a name, where it has one, and its dimension.
+type Argument = (Option<f64>, Option<Dimension>);
+/// Those of several.
+type Arguments = (Vec<Option<f64>>, Vec<Option<Dimension>>);
 
 struct Resolver<'a> {
     source: &'a Source,
@@ -244,21 +212,22 @@ impl Resolver<'_> {
             })
         };
         match (shape, &mut node.value) {
-            (Shape::Number(quantity), Value::Text(_)) => self.number(node, quantity, shape, path, false),
-            (Shape::LawNumber(quantity), Value::Text(_)) => self.number(node, quantity, shape, path, true),
+            (Shape::Number(quantity) | Shape::LawNumber(quantity), Value::Text(_)) => {
+                self.number(node, quantity, shape, path)
+            }
             (Shape::Inertia(quantity), Value::Text(text)) if text != "full" && text != "slender" => {
                 // A word that is nearly one of the two is left to the reader, who knows what was meant.
                 if Formula::parse_with(text, self.tables).is_ok_and(|formula| self.knows(&formula)) {
-                    return self.number(node, quantity, shape, path, false);
+                    return self.number(node, quantity, shape, path);
                 }
                 Ok(())
             }
             (Shape::Pair(quantity), Value::List(nodes)) => {
-                each(nodes, &|node, path| self.number(node, quantity, &Shape::Number(*quantity), path, false))
+                each(nodes, &|node, path| self.visit(node, &Shape::Number(*quantity), path))
             }
-            (Shape::LawPair(quantity), Value::List(nodes)) => each(nodes, &|node, path| {
-                self.number(node, quantity, &Shape::LawNumber(*quantity), path, true)
-            }),
+            (Shape::LawPair(quantity), Value::List(nodes)) => {
+                each(nodes, &|node, path| self.visit(node, &Shape::LawNumber(*quantity), path))
+            }
             (Shape::Law(table, quantity), Value::Text(text)) => {
                 let law = self.law(text, node.span, quantity, shape, path)?;
                 node.value = law_object(node.span, &law);
@@ -293,24 +262,8 @@ impl Resolver<'_> {
     ) -> Result<Law, SceneError> {
         let refused = |error: FormulaError| refused(self.source, span, path, &shape.allowed(), &error);
         let formula = Formula::parse(text).map_err(refused)?;
-        let (mut values, mut dimensions) = (Vec::new(), Vec::new());
-        for name in formula.names() {
-            match self.find(name) {
-                Some(known) => {
-                    values.push(Some(known.value));
-                    dimensions.push(known.dimension);
-                }
-                None if name == "t" => {
-                    values.push(None);
-                    dimensions.push(Some(Dimension::of("s")));
-                }
-                None => {
-                    let mut known = vec!["t"];
-                    known.extend(self.parameters.iter().map(|known| known.name.as_str()));
-                    return Err(refused(formula.unknown(name, &known)));
-                }
-            }
-        }
+        let time = (None, Some(Dimension::of("s")));
+        let (values, dimensions) = self.arguments(&formula, &[("t", time)]).map_err(refused)?;
         let dimension = formula.dimension(&dimensions).map_err(refused)?;
         fits(&formula, dimension, quantity).map_err(refused)?;
         formula.law(&values).map_err(refused)
@@ -325,6 +278,26 @@ impl Resolver<'_> {
         formula.names().all(|name| self.find(name).is_some())
     }
 
+    /// Values and dimensions of the names of a formula, which are parameters or stand in `beside`.
+    fn arguments(&self, formula: &Formula, beside: &[(&str, Argument)]) -> Result<Arguments, FormulaError> {
+        let argument = |name: &str| {
+            let parameter = self.find(name).map(|known| (Some(known.value), known.dimension));
+            let other = || beside.iter().find(|known| known.0 == name).map(|known| known.1);
+            parameter.or_else(other).ok_or_else(|| {
+                let names = beside.iter().map(|known| known.0);
+                let known: Vec<&str> =
+                    names.chain(self.parameters.iter().map(|known| known.name.as_str())).collect();
+                let mut error = formula.unknown(name, &known);
+                if known.is_empty() {
+                    error.hint =
+                        "\"parameters\": {…} gives numbers names; numbers depend on these alone".into();
+                }
+                error
+            })
+        };
+        formula.names().map(argument).collect()
+    }
+
     /// Puts the number in the place of its formula.
     fn number(
         &self,
@@ -332,35 +305,21 @@ impl Resolver<'_> {
         quantity: &Quantity,
         shape: &Shape,
         path: &str,
-        may_be_law: bool,
     ) -> Result<(), SceneError> {
         let Value::Text(text) = &node.value else { return Ok(()) };
         // A quoted number is left to the reader, who says so.
         if text.trim().parse::<f64>().is_ok() {
             return Ok(());
         }
-        let refused = |error: &FormulaError| refused(self.source, node.span, path, &shape.allowed(), error);
-        let formula = Formula::parse_with(text, self.tables).map_err(|error| refused(&error))?;
-        if may_be_law && !self.knows(&formula) {
+        let refused = |error: FormulaError| refused(self.source, node.span, path, &shape.allowed(), &error);
+        let formula = Formula::parse_with(text, self.tables).map_err(refused)?;
+        if matches!(shape, Shape::LawNumber(_)) && !self.knows(&formula) {
             return Ok(());
         }
-        let mut values = Vec::new();
-        let mut dimensions = Vec::new();
-        for name in formula.names() {
-            let known = self.find(name).ok_or_else(|| {
-                let names: Vec<&str> = self.parameters.iter().map(|known| known.name.as_str()).collect();
-                let mut error = formula.unknown(name, &names);
-                if names.is_empty() {
-                    error.hint =
-                        "\"parameters\": {…} gives numbers names; numbers depend on these alone".into();
-                }
-                refused(&error)
-            })?;
-            values.push(known.value);
-            dimensions.push(known.dimension);
-        }
-        let dimension = formula.dimension(&dimensions).map_err(|error| refused(&error))?;
-        fits(&formula, dimension, quantity).map_err(|error| refused(&error))?;
+        let (values, dimensions) = self.arguments(&formula, &[]).map_err(refused)?;
+        let dimension = formula.dimension(&dimensions).map_err(refused)?;
+        fits(&formula, dimension, quantity).map_err(refused)?;
+        let values: Vec<f64> = values.into_iter().flatten().collect();
         let value = formula.value(&values);
         if !quantity.holds(value) {
             let problem = format!("= {} comes to {}", self.source.written(node.span), about(value));

@@ -18,6 +18,9 @@ pub struct Rows {
     pub(super) last: usize,
     /// The step passed on to the next window \[s\].
     pub(super) next: f64,
+    /// Why the window ends with them, where it failed: told once all are handed out, since whoever looks at
+    /// them may change the motion before.
+    pub(super) failure: Option<StepError>,
 }
 
 impl Rows {
@@ -29,6 +32,7 @@ impl Rows {
     /// Forgets them.
     pub(super) fn clear(&mut self) {
         self.after.clear();
+        self.failure = None;
     }
 
     /// What a state in the middle of a window remembers: the step passed on, the row it is, and where the
@@ -67,7 +71,7 @@ impl Rows {
         let is_end = is_last && after >= (self.until - self.start.time).hi * (1.0 - 1e-12);
         state.time = if is_end { self.until } else { self.start.time + after };
         state.wrap();
-        if is_last {
+        if is_last && self.failure.is_none() {
             state.memory.clear();
             state.memory.push(self.next);
         } else {
