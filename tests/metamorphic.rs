@@ -191,6 +191,7 @@ fn impacts(
     let speed = scales.length / scales.time;
     let fast = |strikes: &[ImpactRecord], [mass, length, time]: [f64; 3]| -> Vec<ImpactRecord> {
         let in_units = |strike: &ImpactRecord| ImpactRecord {
+            friction_impulse: strike.friction_impulse / (mass * length / time),
             t: strike.t / time,
             wall: strike.wall.clone(),
             impulse: strike.impulse / (mass * length / time),

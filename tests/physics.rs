@@ -34,6 +34,7 @@ mod events;
 mod extremes;
 mod forces;
 mod formulas;
+mod friction;
 mod gauss;
 mod identities;
 mod impact;

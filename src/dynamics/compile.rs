@@ -10,6 +10,7 @@ use super::constraint::{self, ConstraintEquation, Site};
 use super::force::formula::Formulas;
 use super::force::{Action, Spring, Torsion, UserForce, Vibration};
 use super::forest::{BodyOrigin, Forest};
+use super::friction::{Friction, Mode, frictions};
 use super::impact::Contact;
 use super::kernel::Kernel;
 use super::partition::CoordinatePartition;
@@ -19,6 +20,7 @@ use super::tree::Tree;
 use super::units::Units;
 use crate::arithmetic::Complex;
 use crate::scene::{Place, Scene};
+pub(super) use parts::travel_along;
 use parts::{actions, given_angles, joints, kept_angles, slide, travel};
 use std::sync::Arc;
 
@@ -71,6 +73,10 @@ pub struct Mechanism {
     /// The contacts held, by number, in the order of their rows; none as compiled: see
     /// [`Mechanism::holding`].
     pub held: Vec<usize>,
+    /// Places with dry friction.
+    pub frictions: Vec<Friction>,
+    /// What each of them does; all are open as compiled: see [`Mechanism::moving`].
+    pub modes: Vec<Mode>,
     /// The driven angles solved for: coordinates left when the rows are eliminated.
     pub partition: CoordinatePartition,
     /// Gravity \[m/s²\].
@@ -271,6 +277,7 @@ impl Mechanism {
         let mut rows = given_angles(scene);
         let partition = CoordinatePartition::new(bodies.len(), n, &rows)?;
         let joints = joints(scene, &forest, &mut rows);
+        let frictions = frictions(scene, &forest, &joints);
         scene.sliders.iter().for_each(|slider| rows.push(slide(&forest, slider)));
         for drive in &scene.drives {
             rows.push(travel(&forest, &drive.name, &scene.sliders[drive.slider], drive.law.clone()));
@@ -324,7 +331,7 @@ impl Mechanism {
             actions: actions(scene, &forest),
             forces,
             laws,
-            keeps_work,
+            keeps_work: keeps_work || !frictions.is_empty(),
             whole: None,
             integrals: scene.bars.len() - scene.own_bars(),
             bodies,
@@ -338,6 +345,8 @@ impl Mechanism {
             motors: scene.motors.len(),
             contacts,
             held: Vec::new(),
+            modes: vec![Mode::Open; frictions.len()],
+            frictions,
             partition,
             gravity,
             energy_scale: 1.0,
@@ -435,7 +444,8 @@ impl Mechanism {
         else {
             return Ok(());
         };
-        if self.constraints.len() > 1 || !self.contacts.is_empty() || self.is_damped() {
+        let is_alone = self.constraints.len() <= 1 && self.contacts.is_empty() && self.frictions.is_empty();
+        if !is_alone || self.is_damped() {
             return Err(CompileError::NotAlone { spring: vibration.name, energy: vibration.energy });
         }
         self.settle_vibration(scene, given);
@@ -447,7 +457,7 @@ impl Mechanism {
     /// what they cost with these rows.
     pub(super) fn choose_form(&mut self) {
         let is_dense = self.tree.is_dense();
-        let recursion = (!is_dense || self.coordinates() > UNROLLED)
+        let recursion = (!is_dense || self.coordinates() > UNROLLED && self.frictions.is_empty())
             .then(|| Recursion::new(&self.bodies, &self.forest, &self.constraints, self.gravity))
             .filter(|recursion| !is_dense || recursion.pays() && self.vibration.is_none());
         self.recursion = recursion.map(Arc::new);
@@ -576,14 +586,22 @@ impl Mechanism {
         self.forces.iter().any(|force| force.may_be_flat)
     }
 
-    /// True where laws have corners or events change what acts, so that steps end where a switch is.
+    /// True where laws have corners, places stick and slide or events change what acts, so that steps end
+    /// where a switch is.
     pub fn is_switched(&self) -> bool {
-        self.laws.as_ref().is_some_and(|laws| laws.formulas.switches())
+        !self.frictions.is_empty() || self.laws.as_ref().is_some_and(|laws| laws.formulas.switches())
+    }
+
+    /// True where the motion has a power series: the mean force of a vibration and dry friction have none, and
+    /// it takes the matrices of the tree.
+    pub fn has_series(&self) -> bool {
+        self.vibration.is_none() && self.frictions.is_empty() && self.tree.is_dense()
     }
 
     /// True where the scene has a damper, or a force from outside that depends on rates.
     pub fn is_damped(&self) -> bool {
         self.forces.iter().any(UserForce::depends_on_rates)
+            || !self.frictions.is_empty()
             || self.springs.iter().any(|spring| spring.damping != 0.0)
             || self.torsions.iter().any(|torsion| torsion.damping != 0.0)
     }

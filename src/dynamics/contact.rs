@@ -5,8 +5,8 @@
 //! a_c >= 0,    f_c = -lambda_c >= 0,    a_c f_c = 0          a = a0 - S lambda,  S = G M⁻¹ Gᵀ,  the mechanism's rows always in force
 //! ```
 //!
-//! A wall has no friction, so that a contact that lasts is a row like any other as long as it presses, and
-//! does no work. Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996),
+//! A contact that lasts is a row like any other as long as it presses, and does no work; what dry friction
+//! changes of that is found by [`friction`](super::friction). Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996),
 //! chapter 5; the set is found by adding the point that is pressed hardest and dropping those that would be
 //! pulled (C. Lawson, R. Hanson, *Solving Least Squares Problems* (1974), chapter 23).
 
@@ -15,6 +15,7 @@ pub mod scale;
 
 use self::metric::{Basis, Gradient, Metric};
 use super::constraint::Posture;
+use super::friction::Mode;
 use super::impact::{Contact, NO_FREEDOM};
 use super::kernel::dot;
 use super::{Mechanism, Time};
@@ -35,12 +36,7 @@ impl Mechanism {
     ///
     /// Nothing is renumbered: the event function of a contact that is held is its force instead of its gap.
     pub fn holding(&self, contacts: &[usize]) -> Self {
-        let mut mechanism = self.clone();
-        mechanism.constraints.truncate(self.standing_rows());
-        mechanism.constraints.extend(contacts.iter().map(|&contact| self.contacts[contact].row.clone()));
-        mechanism.held = contacts.to_vec();
-        mechanism.choose_form();
-        mechanism
+        self.moving(contacts, &vec![Mode::Open; self.frictions.len()])
     }
 
     /// The elements at these coordinates \[rad, m\].
@@ -52,7 +48,7 @@ impl Mechanism {
 
     /// Rows that are in force whatever touches.
     pub fn standing_rows(&self) -> usize {
-        self.constraints.len() - self.held.len()
+        self.constraints.len() - self.held.len() - self.sticking()
     }
 
     /// Which of the contacts `touching` stay, or `None` where the constraints leave no freedom to keep a

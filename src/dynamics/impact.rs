@@ -8,13 +8,15 @@
 //! nearest to v⁻ that keeps the rows and f what brings c·v⁺ to -e c·v⁻.  Rows that depend on others get no
 //! impulse.
 //!
-//! The impulse on the point along the wall's normal is -rho, never negative.  Without motors the energy
+//! The impulse on the point along the wall's normal is -rho, never negative.  With dry friction at the wall it
+//! follows with that of friction from Routh's method, see [`Shock`].  Without motors and friction the energy
 //! changes by `-rho (1-e) J w⁻ / 2`. Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral
 //! Contacts* (1996), section 8.2 (Newton's law of impact).
 
 use super::constraint::{ConstraintEquation, Posture};
 use super::contact::metric::{Gradient, Metric};
 use super::contact::scale::magnitudes;
+use super::friction::impact::Shock;
 use super::kernel::dot;
 use super::point::Point;
 use super::{Mechanism, Time};
@@ -82,6 +84,8 @@ pub struct Impact {
     pub approach: f64,
     /// Impulse on the point along the wall's normal \[N·s\].
     pub impulse: f64,
+    /// Impulse of friction on the point along the wall, the normal turned clockwise \[N·s\].
+    pub tangential: f64,
     /// Impulses of the rows \[N·m·s or N·s\]: of a contact that is held, positive where it would have to
     /// pull.
     pub row_impulses: Vec<f64>,
@@ -108,6 +112,7 @@ impl Mechanism {
                 omega: omega.to_vec(),
                 approach,
                 impulse: 0.0,
+                tangential: 0.0,
                 row_impulses,
                 energy_change: 0.0,
                 motor_work: 0.0,
@@ -118,15 +123,32 @@ impl Mechanism {
         if free.norm() <= NO_FREEDOM * column.norm() {
             return None;
         }
-        let impulse = (-restitution * approach - column.dot(&kept)) / free.norm_squared();
-        let change = &kept - &before + &free * impulse;
-        let row_impulses = metric.multipliers(&(&column * impulse - &change));
+        let mut impulse = (-restitution * approach - column.dot(&kept)) / free.norm_squared();
+        let (mut push, mut change) = (&column * impulse, &kept - &before + &free * impulse);
+        let mut tangential = 0.0;
+        if let Some(friction) = self.friction_at(contact) {
+            let along = Gradient::of(&friction.tangent, t, Posture { phi, z: &z, omega }).along;
+            let across = metric.column(&along);
+            let free_across = metric.free(&across);
+            let shock = Shock {
+                response: [free.norm_squared(), free.dot(&free_across), free_across.norm_squared()],
+                velocity: [column.dot(&kept), across.dot(&kept)],
+                restitution: *restitution,
+                coefficients: [friction.kinetic, friction.stiction],
+                is_newton: friction.is_newton,
+            };
+            [impulse, tangential] = shock.impulses()?;
+            push = &column * impulse + &across * tangential;
+            change = &kept - &before + &free * impulse + &free_across * tangential;
+        }
+        let row_impulses = metric.multipliers(&(&push - &change));
         let motor_work =
             row_impulses.iter().zip(&metric.rows).map(|(impulse, row)| impulse * row.row.drive).sum();
         let is_finite = impulse.is_finite() && change.iter().chain(&row_impulses).all(|x| x.is_finite());
         is_finite.then(|| Impact {
             approach,
             impulse,
+            tangential,
             row_impulses,
             energy_change: change.dot(&before) + 0.5 * change.norm_squared(),
             motor_work,

@@ -28,8 +28,8 @@ pub struct Jacobian {
     omega: Vec<Slopes>,
     /// da/dq and, beside it, da/dw, row by row (n × 2n) \[1/s², 1/s\].
     pub acceleration: Vec<f64>,
-    /// Derivatives of the powers of motors, dampers and applied forces and of the stabilizer, by q and by w
-    /// (2 × 2n) \[W, W·s\].
+    /// Derivatives of the powers of motors, dampers and applied forces, of the stabilizer and of dry friction,
+    /// by q and by w (3 × 2n) \[W, W·s\].
     pub power: Vec<f64>,
 }
 
@@ -42,7 +42,7 @@ impl Jacobian {
             phi: vec![Slopes::ZERO; n],
             omega: vec![Slopes::ZERO; n],
             acceleration: vec![0.0; 2 * n * n],
-            power: vec![0.0; 4 * n],
+            power: vec![0.0; 6 * n],
         }
     }
 
@@ -64,6 +64,9 @@ impl Jacobian {
                 }
                 self.power[first + lane] = work.slope[lane];
                 self.power[2 * n + first + lane] = stabilizer.slope[lane];
+                if !mechanism.frictions.is_empty() {
+                    self.power[4 * n + first + lane] = self.kernel.friction_power(&self.omega).slope[lane];
+                }
             }
         }
     }

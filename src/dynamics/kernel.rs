@@ -70,6 +70,13 @@ pub struct Kernel<T> {
     pub multiplier: Vec<T>,
     /// The part of each multiplier that the bias called for (r).
     pub correction: Vec<T>,
+    /// tau of the places that slide \[N·m, N\] (f), and their rows D (f × n).
+    pub friction: Vec<T>,
+    /// See [`Kernel::friction`].
+    pub friction_rows: Vec<T>,
+    /// The determinant of the equations of friction: 1 without it; where it is not positive, no tau follows
+    /// from the state continuously.
+    pub regularity: f64,
     /// What stands in place of the matrices where the mechanism is evaluated body by body; they are empty
     /// then.
     pub bodywise: Option<Box<Evaluation<T>>>,
@@ -133,6 +140,9 @@ impl<T: Scalar> Kernel<T> {
             rows: vec![idle; rows],
             multiplier: vec![T::ZERO; rows],
             correction: vec![T::ZERO; rows],
+            friction: Vec::new(),
+            friction_rows: Vec::new(),
+            regularity: 1.0,
             bodywise: None,
             stretch: Vec::new(),
             vibration: Default::default(),
@@ -237,6 +247,9 @@ impl<T: Real> Kernel<T> {
                 2 => self.constrain::<N, 2>(mechanism, t, phi, omega, bias),
                 _ => self.constrain::<N, 0>(mechanism, t, phi, omega, bias),
             }
+            if !mechanism.frictions.is_empty() {
+                self.slide(mechanism, t, phi, omega);
+            }
         }
         self.is_exact = self.is_delicate(mechanism);
         if self.is_exact {
@@ -339,6 +352,9 @@ impl<T: Real> Kernel<T> {
             let speed = self.row_speed(r, omega);
             work -= (self.multiplier[r] - self.correction[r]) * speed;
             stabilizer -= self.correction[r] * speed;
+        }
+        if !self.friction.is_empty() {
+            work -= self.friction_power(omega);
         }
         (work + mechanism.force_power(t, Posture { phi, z: &self.z, omega }), stabilizer)
     }

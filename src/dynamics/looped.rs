@@ -73,6 +73,7 @@ pub fn reduced(mechanism: &Mechanism) -> Option<Reduced> {
         || !mechanism.has_closed_loops()
         || !mechanism.contacts.is_empty()
         || mechanism.vibration.is_some()
+        || !mechanism.frictions.is_empty()
     {
         return None;
     }

@@ -60,6 +60,8 @@ pub mod force;
 #[doc(hidden)]
 pub mod forest;
 #[doc(hidden)]
+pub mod friction;
+#[doc(hidden)]
 pub mod gap;
 #[doc(hidden)]
 pub mod impact;
@@ -380,6 +382,9 @@ pub struct Motion {
     pub work: DoubleDouble,
     /// Energy a stabilizer has put in since t = 0 \[J\], negative where it took some out.
     pub stabilizer: f64,
+    /// Energy lost in dry friction since t = 0 \[J\]; the work has it as well, with its sign.
+    #[serde(default)]
+    pub friction: f64,
 }
 
 impl Motion {

@@ -1,7 +1,8 @@
 //! The mechanism in (q, w), with one multiplier per row.
 //!
 //! Unknowns: coordinates (n), rates (n) and, where the scene has rows or forces that do work, the work of
-//! motors, dampers and applied forces and the energy the stabilizer puts in \[J\].  With `WORK = false`
+//! motors, dampers and applied forces and the energy the stabilizer puts in \[J\], then the energy lost in dry
+//! friction where there is any.  With `WORK = false`
 //! neither rows nor accounts exist in the code.
 
 use super::gap::turning;
@@ -32,6 +33,11 @@ impl<const N: usize, const WORK: bool> Multiplier<N, WORK> {
         Self { mechanism, kernel, jacobian: None }
     }
 
+    /// True where friction has an account of its own.
+    fn has_friction(&self) -> bool {
+        !self.mechanism.frictions.is_empty()
+    }
+
     /// y' with a stabilizer's bias in every row.
     #[inline(always)]
     pub fn biased_rate(&mut self, t: Time, y: &[f64], rate: &mut [f64], bias: Bias) {
@@ -48,6 +54,9 @@ impl<const N: usize, const WORK: bool> Multiplier<N, WORK> {
         }
         if WORK {
             (rate[2 * n], rate[2 * n + 1]) = self.kernel.powers(&self.mechanism, t, phi, omega);
+            if let Some(lost) = rate.get_mut(2 * n + 2) {
+                *lost = self.kernel.friction_power(omega);
+            }
         }
     }
 
@@ -69,7 +78,7 @@ impl<const N: usize, const WORK: bool> Multiplier<N, WORK> {
 
 impl<const N: usize, const WORK: bool> OdeSystem for Multiplier<N, WORK> {
     fn dimension(&self) -> usize {
-        2 * self.mechanism.coordinates() + if WORK { 2 } else { 0 }
+        2 * self.mechanism.coordinates() + if WORK { 2 + usize::from(self.has_friction()) } else { 0 }
     }
 
     fn angles(&self) -> usize {
@@ -101,6 +110,7 @@ impl<const N: usize, const WORK: bool> OdeSystem for Multiplier<N, WORK> {
             i if i < n => self.mechanism.coordinate_name(i),
             i if i < 2 * n => self.mechanism.rate_name(i - n),
             i if i == 2 * n => "work of motors and forces".into(),
+            i if i == 2 * n + 2 => "energy lost in friction".into(),
             _ => "energy put in by the stabilizer".into(),
         }
     }
@@ -171,6 +181,9 @@ impl<const N: usize, const WORK: bool> Form for Multiplier<N, WORK> {
         let mut unknowns: Vec<DoubleDouble> = motion.phi.iter().chain(&motion.omega).copied().collect();
         if WORK {
             unknowns.extend([motion.work, DoubleDouble::from(motion.stabilizer)]);
+            if self.has_friction() {
+                unknowns.push(DoubleDouble::from(motion.friction));
+            }
         }
         let mut state = State::new(&unknowns, self.mechanism.bodies.len());
         state.time = motion.time;
@@ -195,6 +208,7 @@ impl<const N: usize, const WORK: bool> Form for Multiplier<N, WORK> {
         if WORK {
             motion.work = state.unknown(2 * n);
             motion.stabilizer = state.y[2 * n + 1];
+            motion.friction = state.y.get(2 * n + 2).copied().unwrap_or_default();
         }
     }
 

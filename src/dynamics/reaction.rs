@@ -11,20 +11,35 @@
 //! whichever of the two is the ground.
 
 use super::compile::Joint;
-use super::constraint::Posture;
+use super::constraint::{ConstraintEquation, Posture};
+use super::energy::moment;
 use super::forest::turning_acceleration;
 use super::kernel::Kernel;
 use super::{Mechanism, Time};
-use crate::arithmetic::Complex;
+use crate::arithmetic::{Complex, Real, Scalar};
+
+impl ConstraintEquation {
+    /// Adds what bodies need against the force of this row with this multiplier.
+    pub(super) fn add_force<T: Scalar>(&self, z: &[Complex<T>], multiplier: T, needed: &mut [Complex<T>]) {
+        let Some(push) = &self.push else { return };
+        let force = push.direction(z).times(multiplier);
+        if let Some(body) = push.on {
+            needed[body] += force;
+        }
+        if let Some(body) = push.from {
+            needed[body] -= force;
+        }
+    }
+}
 
 impl Mechanism {
     /// Accelerations \[m/s²\] of the centres of mass.
-    pub fn centre_accelerations(
+    pub fn centre_accelerations<T: Scalar>(
         &self,
-        z: &[Complex<f64>],
-        omega: &[f64],
-        alpha: &[f64],
-    ) -> Vec<Complex<f64>> {
+        z: &[Complex<T>],
+        omega: &[T],
+        alpha: &[T],
+    ) -> Vec<Complex<T>> {
         let mut found = vec![Complex::ZERO; self.bodies.len()];
         self.forest.origin_accelerations(z, omega, alpha, &mut found);
         for (k, (found, body)) in found.iter_mut().zip(&self.bodies).enumerate() {
@@ -43,10 +58,25 @@ impl Mechanism {
         phi: &[f64],
         omega: &[f64],
     ) -> Vec<Complex<f64>> {
-        let (z, alpha) = (&kernel.z, &kernel.load);
+        let mut needed = self.needed_forces(t, &kernel.z, phi, omega, &kernel.load);
+        for ((friction, _), &tau) in self.sliding().zip(&kernel.friction) {
+            friction.tangent.add_force(&kernel.z, tau, &mut needed);
+        }
+        self.transmitted(&kernel.z, &kernel.multiplier, needed)
+    }
+
+    /// The force \[N\] that every body needs from its joints and constraints at these accelerations.
+    pub(super) fn needed_forces<T: Real>(
+        &self,
+        t: Time,
+        z: &[Complex<T>],
+        phi: &[T],
+        omega: &[T],
+        alpha: &[T],
+    ) -> Vec<Complex<T>> {
         let mut needed = self.centre_accelerations(z, omega, alpha);
         for (needed, body) in needed.iter_mut().zip(&self.bodies) {
-            *needed = (*needed - self.gravity).times(body.mass);
+            *needed = (*needed - Complex::of(self.gravity)).times(T::of(body.mass));
         }
         for spring in &self.springs {
             let force = spring.force(z, omega);
@@ -60,27 +90,30 @@ impl Mechanism {
             needed[action.body] -= action.force(action.factor(t), z);
         }
         for user in &self.forces {
-            user.forces(t.hi, Posture { phi, z, omega }, |body, force| needed[body] -= force);
+            user.forces(moment(t), Posture { phi, z, omega }, |body, force| needed[body] -= force);
         }
-        self.transmitted(z, &kernel.multiplier, needed)
+        needed
+    }
+
+    /// The share of accelerations in [`Mechanism::needed_forces`].
+    pub(super) fn inertia_forces<T: Real>(&self, z: &[Complex<T>], alpha: &[T]) -> Vec<Complex<T>> {
+        let mut needed = self.centre_accelerations(z, &vec![T::ZERO; alpha.len()], alpha);
+        for (needed, body) in needed.iter_mut().zip(&self.bodies) {
+            *needed = needed.times(T::of(body.mass));
+        }
+        needed
     }
 
     /// The forces of the hinges and welds under which each body gets the force \[N\] it needs, less what rows
     /// with these multipliers push it with.
-    pub(super) fn transmitted(
+    pub(super) fn transmitted<T: Scalar>(
         &self,
-        z: &[Complex<f64>],
-        multipliers: &[f64],
-        mut needed: Vec<Complex<f64>>,
-    ) -> Vec<Complex<f64>> {
+        z: &[Complex<T>],
+        multipliers: &[T],
+        mut needed: Vec<Complex<T>>,
+    ) -> Vec<Complex<T>> {
         for (row, &multiplier) in self.constraints.iter().zip(multipliers) {
-            let Some(push) = &row.push else { continue };
-            let direction = push.direction(z);
-            for (body, sign) in [(push.on, 1.0), (push.from, -1.0)] {
-                if let Some(body) = body {
-                    needed[body] += direction.times(sign * multiplier);
-                }
-            }
+            row.add_force(z, multiplier, &mut needed);
         }
         let mut carried = needed;
         for &body in self.forest.order.iter().rev() {

@@ -76,6 +76,9 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Value {
         object["events"] = names(scene.events.iter().map(|event| event.name.as_str()).collect());
         object["switches"] = json!(mechanism.is_switched());
     }
+    if !scene.frictions.is_empty() {
+        object["friction"] = json!(super::friction::listed(scene));
+    }
     object
 }
 
@@ -143,7 +146,7 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> String {
     if !scene.integrals.is_empty() {
         page.entry("integrals", &list(&scene.integrals, |integral| &integral.name));
     }
-    if mechanism.is_switched() {
+    if mechanism.is_switched() && mechanism.frictions.is_empty() {
         page.entry("", "with corners or parts that switch: steps end at every switch");
     }
     if !scene.events.is_empty() {
@@ -156,6 +159,10 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> String {
             .map(|wall| format!("{} (restitution {})", wall.name, wall.restitution))
             .collect();
         page.entry("walls", &each.join(", "));
+    }
+    if !scene.frictions.is_empty() {
+        page.entry("dry friction", &super::friction::listed(scene).join(", "));
+        page.entry("", "steps end where parts begin to stick or to slide");
     }
     if mechanism.tree.off_axis {
         page.entry("couplings", "off the bars' axes");

@@ -49,6 +49,9 @@ pub struct Inspection {
     pub energy_scale: f64,
     /// Each wall with what happens there at the start.
     pub walls: Vec<Contact>,
+    /// Places with dry friction: what they do, whether it is a torque \[N·m\] or a force \[N\], it and the force
+    /// \[N\] that presses them.
+    pub frictions: Vec<(String, &'static str, bool, [f64; 2])>,
 }
 
 /// What a hinge carries.
@@ -118,6 +121,8 @@ const TOUCHING: f64 = 1e-12;
 /// Looks at the start of a scene.
 pub fn inspect(scene: &Scene, mechanism: &Mechanism) -> Inspection {
     let start = mechanism.start(scene);
+    let moving = mechanism.moving_at_start(&start);
+    let mechanism = moving.as_ref().unwrap_or(mechanism);
     let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
     let omega: Vec<f64> = start.omega.iter().map(|omega| omega.hi).collect();
     let mut kernel = Kernel::<f64>::new(mechanism);
@@ -170,6 +175,10 @@ pub fn inspect(scene: &Scene, mechanism: &Mechanism) -> Inspection {
     let energy =
         mechanism.energy(&mut Kernel::<DoubleDouble>::without_rows(mechanism), &start.phi, &start.omega);
     found.energy = [energy.kinetic.hi, energy.potential.hi];
+    let frictions = kernel.friction_forces(mechanism, start.time, &phi, &omega);
+    for ((friction, mode), force) in mechanism.frictions.iter().zip(&mechanism.modes).zip(frictions) {
+        found.frictions.push((friction.name.clone(), mode.word(), friction.tangent.is_angle(), force));
+    }
     found.walls = contacts(mechanism, &start, &phi, omega, &kernel);
     found
 }
@@ -277,7 +286,7 @@ impl Inspection {
             })
             .collect();
         let [kinetic, potential] = self.energy;
-        json!({
+        let mut said = json!({
             "scene": scene.name,
             "bodies": bodies,
             "constraints": constraints,
@@ -285,7 +294,19 @@ impl Inspection {
             "hinges": hinges,
             "energy": {"kinetic": kinetic, "potential": potential, "total": kinetic + potential, "scale": self.energy_scale},
             "walls": walls,
-        })
+        });
+        if !self.frictions.is_empty() {
+            let places: Map<String, Value> = (self.frictions.iter())
+                .map(|(name, mode, is_torque, [friction, pressing])| {
+                    let unit = if *is_torque { "N m" } else { "N" };
+                    let told =
+                        json!({"mode": mode, "friction": -friction, "unit": unit, "pressed_by": pressing});
+                    (name.clone(), told)
+                })
+                .collect();
+            said["friction"] = Value::Object(places);
+        }
+        said
     }
 
     /// What the constraint of that name exerts.
@@ -393,6 +414,11 @@ impl Inspection {
                 figure(kinetic + potential)
             ),
         );
+        for (name, mode, is_torque, [friction, pressing]) in &self.frictions {
+            let (friction, unit) = (figure(-friction), if *is_torque { "N m" } else { "N" });
+            let said = format!("{name} {mode}: {friction} {unit}, pressed by {} N", figure(*pressing));
+            page.entry("dry friction", &said);
+        }
         for wall in &self.walls {
             page.entry(
                 "wall",

@@ -26,6 +26,7 @@ pub mod compare;
 #[cfg(feature = "charts")]
 mod curves;
 pub mod events;
+mod friction;
 mod inputs;
 #[doc(hidden)]
 pub mod inspect;

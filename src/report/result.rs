@@ -71,6 +71,11 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value 
     if let (Value::Object(members), Some(events)) = (&mut object, super::events::object(mechanism, outcome)) {
         members.insert("events".to_owned(), events);
     }
+    if let (Value::Object(members), Some(friction)) =
+        (&mut object, super::friction::object(mechanism, outcome))
+    {
+        members.insert("friction".to_owned(), friction);
+    }
     object
 }
 
@@ -229,6 +234,7 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
             );
         }
     }
+    super::friction::describe(&mut page, mechanism, outcome);
     super::events::describe(&mut page, mechanism, outcome);
     super::trust::describe(&mut page, mechanism, outcome);
     page.into_text()

@@ -2,7 +2,7 @@
 //! to act.
 
 use super::build::build;
-use super::contact::ContactDriver;
+use super::contact::{ContactDriver, in_modes};
 use super::event::{Action, Change};
 use super::monitor::Monitor;
 use super::running::Outcome;
@@ -32,6 +32,9 @@ impl ContactDriver {
     ) -> Result<(), StepError> {
         let Some(events) = &mut self.events else { return Ok(()) };
         let Some((event, action)) = events.memory.pending.take() else { return Ok(()) };
+        if let Some(function) = events.friction_function(event) {
+            return self.friction_event(function, outcome);
+        }
         let name = events.name(event).to_owned();
         let is_from_outside = events.is_from_outside(event);
         if std::mem::take(&mut events.memory.slides) {
@@ -136,15 +139,14 @@ impl ContactDriver {
         if let Some(what) = broken(&free, &after) {
             return Err(refused(self, what, "change rates along what the constraints allow"));
         }
-        self.mechanism = if self.mechanism.held.is_empty() {
-            Arc::clone(&free)
-        } else {
-            Arc::new(free.holding(&self.mechanism.held))
-        };
+        self.mechanism = in_modes(&free, &self.mechanism.held, &self.mechanism.modes);
+        if let Some(events) = &mut self.events {
+            events.watch_friction(&self.mechanism);
+        }
         self.free = free;
         self.stabilizer += std::mem::take(&mut after.stabilizer);
         let mut plan = outcome.plan.clone();
-        if !self.mechanism.held.is_empty() {
+        if self.mechanism.constraints.len() > self.free.constraints.len() {
             plan.stabilization = super::methods::Stabilization::Projection;
         }
         let next = build(&self.mechanism, &mut plan, &after)?;

@@ -3,13 +3,14 @@
 //! | asked | what decides | method |
 //! | --- | --- | --- |
 //! | 1 | extended orders | `taylor` has them |
-//! | 2 | more coordinates than matrices pay for | `taylor`, body by body; `dop853`, `dp8` with rows, where there are no matrices at all |
-//! | 3 | a rigid spring that vibrates | `dp8`, `dop853`: its mean force is known to them |
-//! | 4 | walls | `dp8` locates impacts, `taylor` over long horizons; `radau9` where a damped mode is stiff |
-//! | 5 | a fixed step | `gauss16`, the most accurate of those |
-//! | 6 | a mode much faster than the rest that dies away | `radau5`, `radau9` below 1e-7 |
-//! | 7 | invariants asked for, without dampers | `taylor` with its first orders in double-double; `gauss16` where coordinates are many |
-//! | 8 | the path | `taylor`; `dop853` where Baumgarte's term is asked for, or coordinates are many and not taken body by body |
+//! | 2 | dry friction | `radau9`: long steps with a dense output as accurate; `dp8` where matrices do not pay |
+//! | 3 | more coordinates than matrices pay for | `taylor`, body by body; `dop853`, `dp8` with rows, where there are no matrices at all |
+//! | 4 | a rigid spring that vibrates | `dp8`, `dop853`: its mean force is known to them |
+//! | 5 | walls | `dp8` locates impacts, `taylor` over long horizons; `radau9` where a damped mode is stiff |
+//! | 6 | a fixed step | `gauss16`, the most accurate of those |
+//! | 7 | a mode much faster than the rest that dies away | `radau5`, `radau9` below 1e-7 |
+//! | 8 | invariants asked for, without dampers | `taylor` with its first orders in double-double; `gauss16` where coordinates are many |
+//! | 9 | the path | `taylor`; `dop853` where Baumgarte's term is asked for, or coordinates are many and not taken body by body |
 //!
 //! Everywhere else the series is the faster one at every tolerance measured: a seventh of the time of the
 //! classic pairs at 1e-6, a sixteenth at 1e-9. Over long horizons too: at 1e-15, which leaves rounding as
@@ -164,10 +165,14 @@ fn chosen(
     let classic =
         if has_rows && kept == Stabilization::Projection { MethodId::Dp8 } else { MethodId::Dop853 };
     let is_kept = kept == Stabilization::None || kept == Stabilization::Projection || !has_rows;
-    let is_expanded = mechanism.recursion.is_some()
-        && mechanism.tree.is_dense()
-        && is_kept
-        && mechanism.vibration.is_none();
+    let is_expanded = mechanism.recursion.is_some() && is_kept && mechanism.has_series();
+    if !mechanism.frictions.is_empty() && request.step.is_none() {
+        let method = if n > MANY_COORDINATES { MethodId::Dp8 } else { MethodId::Radau(5) };
+        return (
+            method,
+            "the scene has dry friction, whose transitions are located on its dense output".into(),
+        );
+    }
     if n > MANY_COORDINATES && is_free && request.step.is_none() {
         let method = match (is_expanded, has_rows) {
             (true, _) => MethodId::Taylor,

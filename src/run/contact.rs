@@ -18,8 +18,10 @@ use super::plan::Plan;
 use super::running::Outcome;
 use super::sample::{Sample, Sampler};
 use crate::arithmetic::DoubleDouble;
+use crate::dynamics::friction::Mode;
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::stepping::{Cause, Statistics, StepError};
+pub(super) use impacts::in_modes;
 use std::sync::Arc;
 
 /// One impact of a run.
@@ -31,6 +33,8 @@ pub struct ImpactRecord {
     pub wall: String,
     /// Impulse on the point along the wall's normal \[N·s\].
     pub impulse: f64,
+    /// Impulse of friction on the point along the wall, the normal turned clockwise \[N·s\].
+    pub friction_impulse: f64,
     /// Normal velocity before it \[m/s\].
     pub approach: f64,
     /// Energy lost \[J\].
@@ -89,6 +93,8 @@ pub(super) struct ContactDriverState {
     reference: Option<DoubleDouble>,
     /// Contacts held, in the order of their rows.
     contacts: Vec<usize>,
+    /// Modes of the places with friction.
+    modes: Vec<Mode>,
     held: Vec<Held>,
     holds_in_row: usize,
     events_in_row: usize,
@@ -214,6 +220,7 @@ impl ContactDriver {
             place: self.driver.place(),
             reference: self.sampler.reference(),
             contacts: self.mechanism.held.clone(),
+            modes: self.mechanism.modes.clone(),
             held: self.held.clone(),
             holds_in_row: self.holds_in_row,
             events_in_row: self.events_in_row,
@@ -231,6 +238,7 @@ impl ContactDriver {
 
     /// Looks for these events from now on; false where what is remembered of events is of others.
     pub(super) fn watch_for(&mut self, mut detector: EventDetector) -> bool {
+        detector.watch_friction(&self.mechanism);
         let fits = self.remembered.take().is_none_or(|memory| detector.restore(memory));
         self.events = Some(detector);
         fits
@@ -254,6 +262,7 @@ impl ContactDriver {
             place,
             reference,
             contacts,
+            modes,
             held,
             holds_in_row,
             events_in_row,
@@ -275,13 +284,14 @@ impl ContactDriver {
         let Ok(mechanism) = whole.without(&off).map(Arc::new) else { return Ok(None) };
         let known = |contact: usize| contact < mechanism.contacts.len();
         let once = contacts.iter().enumerate().all(|(i, contact)| !contacts[..i].contains(contact));
-        if !once || !contacts.iter().copied().chain(held.iter().map(|held| held.contact)).all(known) {
+        let fits = modes.len() == mechanism.frictions.len();
+        if !once || !fits || !contacts.iter().copied().chain(held.iter().map(|held| held.contact)).all(known)
+        {
             return Ok(None);
         }
         let mut plan = plan.clone();
-        let mut holding = Arc::clone(&mechanism);
-        if !contacts.is_empty() {
-            holding = Arc::new(mechanism.holding(&contacts));
+        let holding = in_modes(&mechanism, &contacts, &modes);
+        if holding.constraints.len() > mechanism.constraints.len() {
             plan.stabilization = Stabilization::Projection;
         }
         let mut contact_driver = Self::new(Arc::clone(&mechanism), build(&holding, &mut plan, start)?);
@@ -289,11 +299,15 @@ impl ContactDriver {
             return Ok(None);
         }
         contact_driver.driver.allow(plan.max_evaluations);
-        if !contacts.is_empty() {
+        if !Arc::ptr_eq(&holding, &mechanism) {
             contact_driver.sampler.hold(Arc::clone(&holding));
             contact_driver.mechanism = holding;
         }
         contact_driver.sampler.refer(reference);
+        let acting = Arc::clone(&contact_driver.mechanism);
+        if let Some(events) = &mut contact_driver.events {
+            events.watch_friction(&acting);
+        }
         if let (Some(detector), Some(memory)) = (&mut contact_driver.events, &events) {
             detector.exchange(Arc::clone(&whole));
             detector.restore(memory.clone());
@@ -332,6 +346,9 @@ impl ContactDriver {
     ) -> Result<bool, StepError> {
         if !std::mem::take(&mut self.is_between) {
             (self.holds_in_row, self.events_in_row) = (0, 0);
+        }
+        if let Some(events) = &mut self.events {
+            events.suit(outcome.plan.tolerance.map(|tolerance| tolerance.relative));
         }
         while self.events_in_row < EVENTS_MOST {
             if let Some(monitor) = &mut monitor {

@@ -5,6 +5,7 @@
 //! and searched by the same root finding as walls and flips ([`search`](crate::stepping)); the zero is then
 //! polished on the dense output itself.
 
+use super::friction::FrictionWatch;
 use super::inside::{Inside, StepWatcher};
 use crate::dynamics::compile::Laws;
 use crate::dynamics::configuration::Configuration;
@@ -14,9 +15,11 @@ use crate::stepping::search::{Chebyshev, Curve, Interpolants, interpolated, root
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Degrees of the interpolants, and what the last coefficients may be over the largest value.
+/// Degrees of the interpolants, and what the last coefficients may be over the largest value: so much, or this
+/// share of the relative tolerance, by which the dense output of a step is not smooth itself.
 const DEGREES: [usize; 3] = [8, 16, 32];
 const RESOLVED: f64 = 1e-11;
+const SHARE: f64 = 0.1;
 /// Halvings of a step whose event functions no interpolant resolves.
 const HALVINGS: u32 = 4;
 /// Steps of the secant method at most.
@@ -161,7 +164,11 @@ pub(super) struct EventDetector {
     /// The scene's formulas on their present branches.
     laws: Option<Laws>,
     mechanism: Arc<Mechanism>,
+    /// Where places stick and slide.
+    pub friction: Option<FrictionWatch>,
     pub memory: Memory,
+    /// What the last coefficients of an interpolant may be over its largest value.
+    resolved: f64,
     /// Events since somebody last took them.
     found: Vec<EventRecord>,
     count: u64,
@@ -172,6 +179,7 @@ enum Owner<'a> {
     Scene(&'a Laws, usize),
     Outside(usize),
     Condition(&'a Laws, usize),
+    Friction(&'a FrictionWatch, usize),
 }
 
 /// A passage of an event function.
@@ -185,8 +193,10 @@ impl EventDetector {
     /// One for a mechanism with all its parts, with events from outside.
     pub fn new(mechanism: Arc<Mechanism>, events: Vec<Box<dyn Event>>) -> Self {
         let laws = mechanism.laws.clone();
+        let friction = FrictionWatch::new(&mechanism);
+        let (memory, found) = (Memory::default(), Vec::new());
         let mut detector =
-            Self { events, laws, mechanism, memory: Memory::default(), found: Vec::new(), count: 0 };
+            Self { events, laws, mechanism, friction, memory, resolved: RESOLVED, found, count: 0 };
         detector.memory.sides = vec![0; detector.functions()];
         detector
     }
@@ -202,15 +212,38 @@ impl EventDetector {
         self.laws.as_ref().map_or(0, |laws| laws.formulas.events.len())
     }
 
-    /// How many functions there are.
-    fn functions(&self) -> usize {
+    /// How many belong to the scene's events, those from outside and the conditions of laws.
+    fn before_friction(&self) -> usize {
         let conditions = self.laws.as_ref().map_or(0, |laws| laws.modes.len());
         self.of_the_scene() + self.events.len() + conditions
+    }
+
+    /// How many functions there are.
+    fn functions(&self) -> usize {
+        self.before_friction() + self.friction.as_ref().map_or(0, FrictionWatch::functions)
+    }
+
+    /// The number of an event's function among those of friction, where it is one.
+    pub fn friction_function(&self, event: usize) -> Option<usize> {
+        event.checked_sub(self.before_friction())
+    }
+
+    /// Looks at the steps of a method of this relative tolerance from now on.
+    pub fn suit(&mut self, tolerance: Option<f64>) {
+        self.resolved = RESOLVED.max(SHARE * tolerance.unwrap_or_default());
+    }
+
+    /// Goes on with the places with friction in the modes of a mechanism.
+    pub fn watch_friction(&mut self, mechanism: &Arc<Mechanism>) {
+        self.friction = FrictionWatch::new(mechanism);
     }
 
     /// What a function belongs to.
     fn owner(&self, function: usize) -> Owner<'_> {
         let (scene, conditions) = (self.of_the_scene(), self.of_the_scene() + self.events.len());
+        if let (Some(watch), Some(number)) = (&self.friction, self.friction_function(function)) {
+            return Owner::Friction(watch, number);
+        }
         match &self.laws {
             Some(laws) if function < scene => Owner::Scene(laws, function),
             Some(laws) if function >= conditions => Owner::Condition(laws, function - conditions),
@@ -246,6 +279,7 @@ impl EventDetector {
         match self.owner(event) {
             Owner::Scene(laws, number) => &laws.formulas.events[number].name,
             Owner::Condition(laws, number) => &laws.formulas.conditions[number],
+            Owner::Friction(watch, number) => watch.place(number).map_or("friction", |place| &place.name),
             Owner::Outside(number) => self.events[number].name(),
         }
     }
@@ -255,6 +289,7 @@ impl EventDetector {
         let direction = match self.owner(event) {
             Owner::Scene(laws, number) => laws.formulas.events[number].direction,
             Owner::Condition(laws, number) => return laws.modes[number] != rises,
+            Owner::Friction(..) => return !rises,
             Owner::Outside(number) => self.events[number].direction(),
         };
         match direction {
@@ -285,6 +320,7 @@ impl EventDetector {
                 }
                 Action::Change(Change { switches, parameters, ..Change::default() })
             }
+            Owner::Friction(..) => Action::Record,
             Owner::Outside(number) => {
                 let Self { events, mechanism, .. } = self;
                 mechanism.seen(motion, |at| events[number].action(at, motion))
@@ -301,7 +337,7 @@ impl EventDetector {
 
     /// Values of all event functions at a motion.
     fn values(&self, motion: &Motion) -> Vec<f64> {
-        self.mechanism.seen(motion, |at| {
+        let mut values: Vec<f64> = self.mechanism.seen(motion, |at| {
             let from_outside = self.events.iter().map(|event| event.value(at));
             let Some(Laws { formulas, parameters, modes }) = &self.laws else {
                 return from_outside.collect();
@@ -311,7 +347,9 @@ impl EventDetector {
                 .chain(from_outside)
                 .chain(formulas.condition_values(at, parameters, modes))
                 .collect()
-        })
+        });
+        values.extend(self.friction.iter().flat_map(|watch| watch.values(motion)));
+        values
     }
 
     /// Passages in a part of a step, in no order.
@@ -324,7 +362,7 @@ impl EventDetector {
         all: &mut Vec<Passage>,
     ) {
         let at = |share: f64, row: &mut Vec<f64>| row.extend(self.values(inside.at(begin + share * span)));
-        let is_enough = |curve: &Chebyshev| curve.tail() <= RESOLVED * curve.most();
+        let is_enough = |curve: &Chebyshev| curve.tail() <= self.resolved * curve.most();
         let Interpolants { curves, values, .. } = interpolated(&DEGREES, at, is_enough);
         let is_resolved = curves.iter().all(|curve| is_enough(curve) || !curve.most().is_finite());
         if !is_resolved && depth < HALVINGS {
@@ -338,6 +376,7 @@ impl EventDetector {
             let [first, next] = [nodes[nodes.len() - 1], nodes[nodes.len() - 2]];
             let mode = match self.owner(event) {
                 Owner::Condition(laws, number) => Some(laws.modes[number]),
+                Owner::Friction(..) => Some(true),
                 _ => None,
             };
             if let Some(mode) = mode {
@@ -414,7 +453,8 @@ impl StepWatcher for EventDetector {
         self.passages(inside, begin, span, 0, &mut passages);
         passages.sort_by(|a, b| (a.t - b.t).hi.total_cmp(&0.0).then(a.event.cmp(&b.event)));
         for Passage { t, event, rises } in passages {
-            let is_condition = matches!(self.owner(event), Owner::Condition(..));
+            let is_friction = matches!(self.owner(event), Owner::Friction(..));
+            let is_condition = is_friction || matches!(self.owner(event), Owner::Condition(..));
             let is_same = self
                 .memory
                 .last
@@ -427,8 +467,10 @@ impl StepWatcher for EventDetector {
             self.memory.last = Some((event, t));
             if is_condition {
                 self.memory.flipped.retain(|(_, before)| (t - *before).hi <= SAME * span);
-                self.memory.slides = self.memory.flipped.iter().any(|(flipped, _)| *flipped == event);
-                self.memory.flipped.push((event, t));
+                if !is_friction {
+                    self.memory.slides = self.memory.flipped.iter().any(|(flipped, _)| *flipped == event);
+                    self.memory.flipped.push((event, t));
+                }
                 self.memory.pending = Some((event, self.action(event, &motion)));
                 return Some(t);
             }

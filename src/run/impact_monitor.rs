@@ -5,6 +5,9 @@
 //! D = Σ (m |Δv|² + J Δω²) / 2 over the bodies:      impulse (1+e) |v_n⁻| = 2 D,      energy lost = D (1-e) / (1+e)
 //! ```
 //!
+//! With dry friction at the wall, p_t being its impulse: `p_n Δv_n + p_t Δv_t = 2 D`, energy lost
+//! `-(p_n Σv_n + p_t Σv_t) / 2`, sums over both sides.
+//!
 //! The last line is Kelvin's and Carnot's theorem on impulses along one normal; the motors' impulsive work,
 //! which is accounted for, is not in it. Velocities are those of the centres of mass, walked from body to
 //! body; the mass matrix, in whose terms impacts are found, is not used. Source: E. T. Whittaker, *A Treatise
@@ -31,6 +34,8 @@ pub(super) struct Claim {
     pub contact: usize,
     /// Impulse along the normal \[N·s\].
     pub impulse: f64,
+    /// Impulse of friction along the wall, the normal turned clockwise \[N·s\].
+    pub tangential: f64,
     /// Energy lost \[J\].
     pub energy_lost: f64,
 }
@@ -72,7 +77,11 @@ pub(super) fn check(
     let [approach, departure] =
         [&before.omega, &after.omega].map(|omega| contact.normal_velocity(&here.z, omega));
     let step_size = contact.step_size(&before.omega.iter().map(|omega| omega.hi).collect::<Vec<_>>());
+    let friction = mechanism.friction_at(claim.contact);
+    let is_poisson = friction.is_some_and(|friction| !friction.is_newton);
     let speed_error = departure + contact.restitution * approach;
+    // With friction the impulse is known to Poisson's law, not the velocity.
+    let speed_error = if is_poisson { departure.min(0.0) } else { speed_error };
     if beyond(speed_error.abs(), AGREES * approach.abs() + 1e-13 * step_size) {
         return Err(format!(
             "the point leaves at {departure:.6e} m/s after an approach at {:.6e} m/s",
@@ -86,15 +95,30 @@ pub(super) fn check(
     // What constraints had drifted apart by is put right with the impact.
     let scale = here.exchange * (AGREES + 10.0 * drift) + 64.0 * f64::EPSILON * here.energy;
     let (e, jump) = (contact.restitution, here.jump);
-    let work_error = claim.impulse * (departure - approach) - 2.0 * jump;
+    let [slid, slides] =
+        [&before.omega, &after.omega].map(|omega| contact.tangential_velocity(&here.z, omega));
+    let tangential = claim.tangential;
+    if beyond(
+        tangential.abs(),
+        friction.map_or(0.0, |friction| friction.stiction * claim.impulse * (1.0 + AGREES)),
+    ) {
+        return Err(format!("friction gives {tangential:.6e} N s to {:.6e} N s of the wall", claim.impulse));
+    }
+    let work_error = claim.impulse * (departure - approach) + tangential * (slides - slid) - 2.0 * jump;
     if beyond(work_error.abs(), scale) {
         return Err(format!(
             "the impulse is {:.6e} N s, and momenta change as by {:.6e} N s",
             claim.impulse,
-            2.0 * jump / (departure - approach)
+            (2.0 * jump - tangential * (slides - slid)) / (departure - approach)
         ));
     }
-    let lost = jump * (1.0 - e) / (1.0 + e);
+    let lost = match friction {
+        None => jump * (1.0 - e) / (1.0 + e),
+        Some(_) => -0.5 * (claim.impulse * (departure + approach) + tangential * (slides + slid)),
+    };
+    if is_poisson && beyond(-lost, scale) {
+        return Err(format!("{:.6e} J are gained", -lost));
+    }
     if beyond((claim.energy_lost - lost).abs(), scale) {
         return Err(format!("{:.6e} J are lost, and restitution {e} loses {lost:.6e} J", claim.energy_lost));
     }
@@ -174,6 +198,11 @@ impl Contact {
     /// Velocity of the point along the normal \[m/s\].
     fn normal_velocity(&self, z: &[Complex<DoubleDouble>], omega: &[DoubleDouble]) -> f64 {
         Complex::<DoubleDouble>::of(self.normal).dot(self.point.velocity(z, omega)).hi
+    }
+
+    /// The same along the wall, the normal turned clockwise.
+    fn tangential_velocity(&self, z: &[Complex<DoubleDouble>], omega: &[DoubleDouble]) -> f64 {
+        Complex::<DoubleDouble>::of(-self.normal.left()).dot(self.point.velocity(z, omega)).hi
     }
 }
 
@@ -301,6 +330,7 @@ mod tests {
             Claim {
                 contact: 0,
                 impulse: impact.impulse,
+                tangential: impact.tangential,
                 energy_lost: impact.motor_work - impact.energy_change,
             },
         )

@@ -64,14 +64,14 @@ pub const METHODS: &[MethodInfo] = &[
         "dopri5",
         5,
         "everyday runs at 1e-3 to 1e-6 (crate ode_solvers)",
-        "no walls, no projection",
+        "no walls, no dry friction, no projection",
     ),
     adaptive(
         MethodId::Dop853,
         "dop853",
         8,
         "everyday runs at 1e-6 to 1e-12 (crate ode_solvers)",
-        "no walls, no projection",
+        "no walls, no dry friction, no projection",
     ),
     adaptive(MethodId::Dp5, "dp5", 5, "as dopri5, with impacts and projection after every step", "anything"),
     adaptive(MethodId::Dp8, "dp8", 8, "as dop853, with impacts and projection after every step", "anything"),
@@ -80,7 +80,7 @@ pub const METHODS: &[MethodInfo] = &[
         "taylor",
         24,
         "the most accurate path, below 1e-8 (power series, order 16 to 24)",
-        "anything but Baumgarte's term",
+        "no dry friction, no Baumgarte's term",
     ),
     radau(3, "radau5"),
     radau(5, "radau9"),
@@ -135,7 +135,7 @@ const fn gauss(stages: usize, name: &'static str) -> MethodInfo {
         stepping: Stepping::Fixed,
         symplectic: true,
         purpose: "long horizons: energy stays at rounding",
-        needs: "no walls",
+        needs: "no walls, no dry friction",
     }
 }
 
@@ -147,7 +147,7 @@ const fn rattle(composition: Composition, order: u32, name: &'static str) -> Met
         stepping: Stepping::Fixed,
         symplectic: true,
         purpose: "long horizons in unit vectors, constraints kept at both levels",
-        needs: "no walls, no dampers",
+        needs: "no walls, no dry friction, no dampers",
     }
 }
 

@@ -41,6 +41,8 @@ pub mod fast;
 pub mod files;
 #[doc(hidden)]
 pub mod flip;
+#[doc(hidden)]
+pub mod friction;
 mod impact_monitor;
 #[doc(hidden)]
 pub mod inside;
@@ -86,6 +88,7 @@ pub use fast::FastMode;
 #[cfg(feature = "files")]
 pub use files::{Cursor, FileError, Folder, Stream};
 pub use flip::Flip;
+pub use friction::FrictionRecord;
 pub use inside::{Observer, Step};
 pub use methods::{METHODS, MethodId, MethodInfo, Stabilization};
 pub use plan::{Plan, Refusal, Request};

@@ -417,7 +417,7 @@ fn mismatch(what: String, reason: &str, alternative: &str) -> Refusal {
 /// there is to keep.
 pub(super) fn usual(mechanism: &Mechanism) -> Stabilization {
     let is_large = mechanism.coordinates() > MANY_COORDINATES;
-    if mechanism.has_multipliers() || is_large {
+    if mechanism.has_multipliers() || is_large || !mechanism.frictions.is_empty() {
         Stabilization::Projection
     } else {
         Stabilization::Elimination
@@ -498,6 +498,37 @@ fn model_error(mechanism: &Mechanism, rate: f64, notes: &mut Vec<String>) -> Opt
     Some(error)
 }
 
+/// Dry friction takes methods that end their steps at its transitions and keep by projection what sticks.
+fn check_friction(mechanism: &Mechanism, method: MethodId, request: &Request) -> Result<(), Refusal> {
+    let Some(friction) = mechanism.frictions.first() else { return Ok(()) };
+    let place = || format!("dry friction ({} {})", friction.kind(), friction.name);
+    if !matches!(method, MethodId::Dp5 | MethodId::Dp8 | MethodId::Radau(_) | MethodId::Custom) {
+        let reason = match method {
+            MethodId::Taylor => "its forces are found with the accelerations, and have no power series",
+            MethodId::Dopri5 | MethodId::Dop853 => {
+                "ode_solvers does not let what sticks be kept by projection"
+            }
+            _ => "a transition inside a fixed step cannot be located without changing the step",
+        };
+        let alternative = "--method dp8, dp5 at loose tolerances, or radau9 where it is stiff";
+        return Err(mismatch(format!("{method} on a scene with {}", place()), reason, alternative));
+    }
+    if matches!(request.stabilize, Some(Stabilization::Baumgarte | Stabilization::Elimination)) {
+        let reason = "friction follows from the multipliers, which this one changes or leaves out";
+        return Err(mismatch(format!("{} with it", place()), reason, "--stabilize projection"));
+    }
+    if !mechanism.assembly.redundant.is_empty() {
+        let reason = "constraints are redundant, so that the forces in the joints, and friction with them, are not determined";
+        let alternative = "leave out a constraint that others imply already";
+        return Err(mismatch(format!("{} here", place()), reason, alternative));
+    }
+    if !mechanism.tree.is_dense() {
+        let reason = format!("it takes matrices, and at most {DENSE_LIMIT} coordinates have them");
+        return Err(mismatch(format!("{} here", place()), &reason, "fewer bodies"));
+    }
+    Ok(())
+}
+
 /// The stabilization of a pairing, or why there is none.
 fn pair(
     mechanism: &Mechanism,
@@ -521,6 +552,7 @@ fn pair(
             "--method dp8, taylor for more digits, or dp5 at loose tolerances",
         ));
     }
+    check_friction(mechanism, method, request)?;
     if mechanism.is_switched() && !method.is_adaptive() {
         return Err(mismatch(
             format!("{method} on a scene whose laws or parts switch"),

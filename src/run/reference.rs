@@ -22,6 +22,9 @@ const EXACT: [(usize, f64); 2] = [(30, 1e-36), (28, 1e-33)];
 /// Tolerances of both where there are walls \[rad/s\], and what an impact located in doubles leaves at least.
 const LOCATED: [f64; 2] = [1e-16, 1e-15];
 const LOCATED_TO: f64 = 1e-14;
+/// The same where there is no series.
+const STEPPED: [f64; 2] = [1e-14, 1e-13];
+const STEPPED_TO: f64 = 1e-13;
 
 /// A motion at the times asked for.
 #[derive(Clone, Debug, Default)]
@@ -93,9 +96,13 @@ pub(super) fn reference_while(
         let walks = EXACT.map(|(order, tolerance)| Walk::exact(mechanism, start, order, tolerance, horizon));
         return Ok(side_by_side(mechanism, walks, times, 0.0, pause));
     }
+    let (method, tolerances, floor) = match mechanism.has_series() {
+        true => (MethodId::Taylor, LOCATED, LOCATED_TO),
+        false => (MethodId::Dp8, STEPPED, STEPPED_TO),
+    };
     let [fine, coarse] =
-        LOCATED.map(|tolerance| Walk::in_doubles(mechanism, start, MethodId::Taylor, tolerance, horizon));
-    Ok(side_by_side(mechanism, [fine?, coarse?], times, LOCATED_TO, pause))
+        tolerances.map(|tolerance| Walk::in_doubles(mechanism, start, method, tolerance, horizon));
+    Ok(side_by_side(mechanism, [fine?, coarse?], times, floor, pause))
 }
 
 /// Two motions of one mechanism, of which the first counts and the second tells how far it is off, `floor` at

@@ -34,6 +34,8 @@ pub struct Sample {
     pub work: f64,
     /// Energy the stabilizer has put in \[J\].
     pub stabilizer: f64,
+    /// Energy lost in dry friction since the start \[J\], which the work has as well.
+    pub friction: f64,
     /// (Energy - energy at the start - work - energy of impacts) / energy scale.
     pub imbalance: f64,
     /// Violation of each row, C and C'.
@@ -66,7 +68,8 @@ impl Clone for Sample {
 impl Sample {
     /// Copies all but positions and velocities of the centres, which follow from the angles.
     pub(super) fn thin_from(&mut self, other: &Self) {
-        let Self { t, kinetic, potential, work, stabilizer, imbalance, .. } = *other;
+        let Self { t, kinetic, potential, work, stabilizer, friction, imbalance, .. } = *other;
+        self.friction = friction;
         (self.t, self.kinetic, self.potential) = (t, kinetic, potential);
         (self.work, self.stabilizer, self.imbalance) = (work, stabilizer, imbalance);
         self.phi.clone_from(&other.phi);
@@ -191,6 +194,7 @@ impl Sampler {
         sample.potential = potential.hi;
         sample.work = motion.work.hi;
         sample.stabilizer = motion.stabilizer;
+        sample.friction = motion.friction;
         sample.imbalance = (balance - reference).hi / mechanism.energy_scale;
         let both = |vector: Complex<f64>| [vector.re, vector.im];
         for k in 0..mechanism.coordinates() {

@@ -29,6 +29,8 @@ pub struct Table<W: Write> {
 pub(super) struct Shown {
     /// Bodies; of the rotors of integrals after them the rate alone.
     bodies: usize,
+    /// True where energy is lost in dry friction.
+    friction: bool,
     /// Of each constraint's force nothing, a torque or force, or its power too.
     forces: Arc<[usize]>,
 }
@@ -38,7 +40,7 @@ fn shown(mechanism: &Mechanism) -> Shown {
         if mechanism.is_motor(r) { 2 } else { usize::from(row.law.is_some()) }
     };
     let forces = mechanism.constraints.iter().enumerate().map(count).collect();
-    Shown { bodies: mechanism.own_bodies().len(), forces }
+    Shown { bodies: mechanism.own_bodies().len(), friction: !mechanism.frictions.is_empty(), forces }
 }
 
 /// Appends the numbers of a row.
@@ -50,17 +52,19 @@ pub(super) fn columns(sample: &Sample, shown: &Shown, numbers: &mut Vec<f64>) {
     }
     numbers.extend(&sample.omega[shown.bodies..sample.centre.len()]);
     numbers.extend([sample.kinetic, sample.potential, sample.work, sample.imbalance]);
-    for ((constraint, motor), &shown) in
+    for ((constraint, motor), &count) in
         sample.constraints.iter().zip(&sample.motors).zip(shown.forces.iter())
     {
-        numbers.extend(constraint.iter().chain(&motor[..shown]));
+        numbers.extend(constraint.iter().chain(&motor[..count]));
     }
+    numbers.extend(shown.friction.then_some(sample.friction));
 }
 
 /// How many numbers that are.
 fn width(mechanism: &Mechanism, shown: &Shown) -> usize {
     let forces = shown.forces.iter().sum::<usize>();
-    1 + 6 * shown.bodies + mechanism.integrals + 4 + 2 * mechanism.constraints.len() + forces
+    let others = mechanism.integrals + usize::from(shown.friction);
+    1 + 6 * shown.bodies + others + 4 + 2 * mechanism.constraints.len() + forces
 }
 
 impl<W: Write> Table<W> {
@@ -92,6 +96,7 @@ impl<W: Write> Table<W> {
                     .take(shown),
             );
         }
+        header.extend(shown.friction.then(|| "friction [J]".to_owned()));
         let mut titles = csv::Writer::from_writer(Vec::with_capacity(BUFFER + BUFFER / 4));
         titles.write_record(&header)?;
         let buffer = titles.into_inner().map_err(|error| error.into_error())?;

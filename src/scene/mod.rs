@@ -10,6 +10,7 @@ mod error;
 mod fit;
 mod format;
 pub mod formula;
+mod friction;
 mod law;
 mod locate;
 mod number;
@@ -25,6 +26,7 @@ mod write;
 pub use build::{SceneBuilder, ground, on};
 pub use digits::Written;
 pub use error::{Refusal, SceneError};
+pub use friction::{Friction, FrictionPlace};
 pub use law::{
     Bound, Direction, Integral, Load, LoadLaw, Meaning, NamedPoint, Names, Parameter, PointTable, SceneEvent,
     Scope, Signal,
@@ -82,6 +84,9 @@ pub struct Scene {
     pub drives: Vec<Drive>,
     /// Walls a point cannot pass.
     pub walls: Vec<Wall>,
+    /// Dry friction of hinges, sliders and walls, each of them once at most.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub frictions: Vec<Friction>,
     /// Numbers with names, for formulas.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<Parameter>,

@@ -3,7 +3,7 @@
 //! Scenes that were read are sound; this guards the equations against scenes whose fields were changed
 //! afterwards or filled in by a program.
 
-use super::{Law, Place, Scene};
+use super::{Friction, FrictionPlace, Law, Place, Scene};
 
 impl Scene {
     /// The first thing that makes no sense, if any: the path of a field, and what is wrong with it.
@@ -15,7 +15,10 @@ impl Scene {
         if self.start.len() != bars {
             return Some(format!("start: {} entries for {bars} bars", self.start.len()));
         }
-        self.faulty_number().or_else(|| self.faulty_body(bars)).or_else(|| self.faulty_law())
+        self.faulty_number()
+            .or_else(|| self.faulty_body(bars))
+            .or_else(|| self.faulty_law())
+            .or_else(|| self.faulty_friction())
     }
 
     /// A bar, slider or list that is not there.
@@ -125,6 +128,26 @@ impl Scene {
             ),
         ];
         found.into_iter().flatten().next()
+    }
+
+    /// Friction of a part that is not there or has it already, or with a number out of its range.
+    fn faulty_friction(&self) -> Option<String> {
+        let is_wrong = |(i, friction): (usize, &Friction)| {
+            let Friction { at, kinetic, stiction } = friction;
+            let is_there = match at {
+                FrictionPlace::Hinge { hinge, radius } => {
+                    *hinge < self.hinges.len() && *radius > 0.0 && radius.is_finite()
+                }
+                FrictionPlace::Slider(slider) => *slider < self.sliders.len(),
+                FrictionPlace::Wall { wall, .. } => *wall < self.walls.len(),
+            };
+            let same = |other: &Friction| other.at.part() == at.part();
+            let sound =
+                (0.0..f64::INFINITY).contains(kinetic) && (*kinetic..f64::INFINITY).contains(stiction);
+            !is_there || !sound || self.frictions[..i].iter().any(same)
+        };
+        let wrong = self.frictions.iter().enumerate().position(is_wrong)?;
+        Some(format!("frictions[{wrong}]: no such part, twice the same one, or a number out of its range"))
     }
 
     /// A law with a number that is not finite.

@@ -2,7 +2,11 @@
 
 use super::fit::written_starts;
 use super::format::GROUND;
-use super::{Force, Given, Load, LoadLaw, NamedPoint, Place, Scene, SceneEvent, Slider, Torque};
+use super::friction::Part;
+use super::{
+    Force, Friction, FrictionPlace, Given, Load, LoadLaw, NamedPoint, Place, Scene, SceneEvent, Slider,
+    Torque,
+};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
@@ -17,16 +21,21 @@ impl Scene {
             .collect();
         let hinges: Vec<_> = self.hinges[..self.own_hinges()]
             .iter()
-            .map(|hinge| json!({"name": hinge.name, "between": hinge.between.each_ref().map(place)}))
+            .enumerate()
+            .map(|(i, hinge)| {
+                let said = json!({"name": hinge.name, "between": hinge.between.each_ref().map(place)});
+                with(said, "friction", &self.friction((Part::Hinge, i)))
+            })
             .collect();
-        let sliders: Vec<_> = (self.sliders.iter())
-            .map(|Slider { name, point, rail, locked }| {
-                json!({
+        let sliders: Vec<_> = (self.sliders.iter().enumerate())
+            .map(|(i, Slider { name, point, rail, locked })| {
+                let said = json!({
                     "name": name,
                     "point": place(point),
                     "rail": {"body": body(rail.place.bar), "point": rail.place.point, "direction": rail.direction},
                     "angle": if *locked { "locked" } else { "free" },
-                })
+                });
+                with(said, "friction", &self.friction((Part::Slider, i)))
             })
             .collect();
         let welds: Vec<_> = self
@@ -81,15 +90,16 @@ impl Scene {
             .map(|motor| json!({"name": motor.name, "body": body(Some(motor.bar)), "relative_to": body(motor.relative_to), "law": motor.law}))
             .chain(self.drives.iter().map(|drive| json!({"name": drive.name, "slider": self.sliders[drive.slider].name, "law": drive.law})))
             .collect();
-        let walls: Vec<_> = (self.walls.iter())
-            .map(|wall| {
-                json!({
+        let walls: Vec<_> = (self.walls.iter().enumerate())
+            .map(|(i, wall)| {
+                let said = json!({
                     "name": wall.name,
                     "body": body(Some(wall.bar)),
                     "point": wall.point,
                     "line": {"through": wall.through, "normal": wall.normal},
                     "restitution": wall.restitution,
-                })
+                });
+                with(said, "friction", &self.friction((Part::Wall, i)))
             })
             .collect();
         let mut said = json!({
@@ -203,6 +213,23 @@ fn event(event: &SceneEvent) -> Value {
 }
 
 /// An object with one key more, where that has a value.
+impl Scene {
+    /// The friction of a part, as the input says it.
+    fn friction(&self, part: (Part, usize)) -> Option<Value> {
+        let Friction { at, kinetic, stiction } =
+            self.frictions.iter().find(|friction| friction.at.part() == part)?;
+        let mut said = json!({"kinetic": kinetic, "static": stiction});
+        match at {
+            FrictionPlace::Hinge { radius, .. } => said["radius"] = json!(radius),
+            FrictionPlace::Wall { is_newton, .. } => {
+                said["impact"] = json!(if *is_newton { "newton" } else { "poisson" });
+            }
+            FrictionPlace::Slider(_) => {}
+        }
+        Some(said)
+    }
+}
+
 fn with(mut object: Value, key: &str, value: &Option<impl Serialize>) -> Value {
     if let (Value::Object(members), Some(value)) = (&mut object, value) {
         members.insert(key.to_owned(), json!(value));

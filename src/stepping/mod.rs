@@ -288,6 +288,8 @@ pub enum Cause {
     SpringWithoutLength,
     /// A law with corners drives the motion back onto a corner from both sides.
     Sliding,
+    /// No motion, or more than one, fits the laws of dry friction: Painlevé's paradox.
+    Friction,
     /// A point came to rest on a wall, and it could not be held there or the motors leave it no freedom.
     RestingContact,
     /// A point was found behind a wall, or away from the wall it is held at: an impact was missed.
@@ -314,6 +316,7 @@ impl Cause {
             Self::BranchLost => "branch_lost",
             Self::SpringWithoutLength => "spring_without_length",
             Self::Sliding => "sliding",
+            Self::Friction => "friction",
             Self::RestingContact => "resting_contact",
             Self::WallPassed => "wall_passed",
             Self::ImpactCheckFailed => "impact_check_failed",

@@ -3,7 +3,7 @@
 
 use crate::mechanisms::Dice;
 use driftless::run::Sample;
-use driftless::scene::{Bar, Given, Law, Place, Scene, Sine, Start, Weld};
+use driftless::scene::{Bar, FrictionPlace, Given, Law, Place, Scene, Sine, Start, Weld};
 use std::f64::consts::PI;
 
 /// A scene that has the same motion as another, seen otherwise.
@@ -336,6 +336,11 @@ pub fn scaled(scene: &Scene, [mass, length, time]: [f64; 3]) -> Related {
     for wall in &mut scene.walls {
         point(&mut wall.point);
         point(&mut wall.through);
+    }
+    for friction in &mut scene.frictions {
+        if let FrictionPlace::Hinge { radius, .. } = &mut friction.at {
+            *radius *= length;
+        }
     }
     scene.start.iter_mut().for_each(|start| start.omega /= time);
     for given in &mut scene.given {

@@ -1,7 +1,7 @@
 //! A scene in other units: all masses, lengths or times multiplied by a number, every quantity by its
 //! dimension.
 
-use driftless::scene::{Law, Place, Scene};
+use driftless::scene::{FrictionPlace, Law, Place, Scene};
 
 /// What masses, lengths and times are multiplied by.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,6 +81,11 @@ pub fn scaled(scene: &Scene, by: Scale) -> Scene {
     for wall in &mut scene.walls {
         times(&mut wall.point, by.length);
         times(&mut wall.through, by.length);
+    }
+    for friction in &mut scene.frictions {
+        if let FrictionPlace::Hinge { radius, .. } = &mut friction.at {
+            *radius *= by.length;
+        }
     }
     scene.start.iter_mut().for_each(|start| start.omega /= by.time);
     for given in &mut scene.given {

@@ -76,6 +76,11 @@ pub(super) fn travel(forest: &Forest, name: &str, slider: &Slider, law: Law) -> 
     on_rail(forest, name, slider, rail(slider), Some(law))
 }
 
+/// The row of the travel of a slider without a law.
+pub(in crate::dynamics) fn travel_along(forest: &Forest, slider: &Slider) -> ConstraintEquation {
+    on_rail(forest, &slider.name, slider, rail(slider), None)
+}
+
 fn rail(slider: &Slider) -> Complex<f64> {
     Complex::new(slider.rail.direction[0], slider.rail.direction[1])
 }

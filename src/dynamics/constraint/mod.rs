@@ -24,7 +24,7 @@ use super::law::Law;
 use super::point::Point;
 use super::quadratic::Quadratic;
 use crate::arithmetic::angle::difference;
-use crate::arithmetic::{Complex, Real};
+use crate::arithmetic::{Complex, Real, Scalar};
 
 /// Coordinates, elements and rates at one moment.
 #[derive(Clone, Copy, Debug)]
@@ -102,11 +102,11 @@ pub enum Way {
 
 impl Push {
     /// Its direction at the elements `z`.
-    pub fn direction(&self, z: &[Complex<f64>]) -> Complex<f64> {
+    pub fn direction<T: Scalar>(&self, z: &[Complex<T>]) -> Complex<T> {
         match &self.way {
-            Way::Ground(direction) => *direction,
+            Way::Ground(direction) => Complex::of(*direction),
             Way::Body(body, direction) => z[*body].turn(*direction),
-            Way::Span(span, length) => span.position(z).times(length.recip()),
+            Way::Span(span, length) => span.position(z).times(T::of(length.recip())),
         }
     }
 }

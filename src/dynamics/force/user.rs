@@ -420,7 +420,7 @@ impl UserForce {
     }
 
     /// Calls `force` with the body and the force \[N\] at every point it acts at.
-    pub fn forces(&self, time: f64, at: Posture<f64>, mut force: impl FnMut(usize, Complex<f64>)) {
+    pub fn forces<T: Scalar>(&self, time: T, at: Posture<T>, mut force: impl FnMut(usize, Complex<T>)) {
         for part in &self.parts {
             self.each(
                 part,

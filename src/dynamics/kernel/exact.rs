@@ -41,6 +41,8 @@ impl<T: Real> Kernel<T> {
         for (rounded, exact) in pairs {
             round(rounded, exact);
         }
+        round(&mut self.friction, &exact.friction);
+        self.regularity = exact.regularity;
     }
 
     /// The factors in double-double, where those in doubles have too few digits.

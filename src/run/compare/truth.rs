@@ -179,7 +179,7 @@ impl<'a> Room<'a> {
 
 /// True where there is no series in double-double, or where it would take too long.
 fn is_in_doubles(mechanism: &Mechanism) -> bool {
-    mechanism.coordinates() > MANY_COORDINATES || mechanism.vibration.is_some()
+    mechanism.coordinates() > MANY_COORDINATES || !mechanism.has_series()
 }
 
 /// Accelerations of all coordinates at a motion.

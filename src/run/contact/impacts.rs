@@ -7,9 +7,11 @@ use super::super::methods::Stabilization;
 use super::super::running::Outcome;
 use super::{ContactDriver, HOLDS_MOST, Held, ImpactRecord, Jump, KEPT, NO_SPEED, PersistentContact, ROUNDS};
 use crate::arithmetic::{Complex, DoubleDouble};
+use crate::dynamics::friction::{Friction, Mode, Normal, Transition};
+use crate::dynamics::impact::{Contact, Impact};
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::multiplier::Multiplier;
-use crate::dynamics::{Form, Motion};
+use crate::dynamics::{Form, Mechanism, Motion};
 use crate::stabilization::projection::project;
 use crate::stepping::{Cause, StepError};
 use std::sync::Arc;
@@ -52,8 +54,14 @@ impl ContactDriver {
     pub(super) fn impact_at(&mut self, contact: usize, outcome: &mut Outcome) -> Result<f64, StepError> {
         let t = self.motion().time;
         let Posture { phi, omega, .. } = self.posture();
-        let impact = loop {
-            let Some(impact) = self.mechanism.impact_at(contact, t, &phi, &omega) else {
+        let (impact, striking) = loop {
+            // Friction in hinges and sliders takes no part in impacts.
+            let modes = vec![Mode::Open; self.free.frictions.len()];
+            let striking = match modes == self.mechanism.modes {
+                true => Arc::clone(&self.mechanism),
+                false => in_modes(&self.free, &self.mechanism.held, &modes),
+            };
+            let Some(impact) = striking.impact_at(contact, t, &phi, &omega) else {
                 let what = format!(
                     "the constraints leave a point that meets wall {} no way back",
                     self.name(contact)
@@ -64,21 +72,27 @@ impl ContactDriver {
                     "look for motors that drive it there and change their laws, or end the run before",
                 ));
             };
-            let pulled =
-                (self.mechanism.held.iter().zip(&impact.row_impulses[self.mechanism.standing_rows()..]))
-                    .filter(|(_, pull)| **pull > 1e-12 * impact.impulse)
-                    .max_by(|a, b| a.1.total_cmp(b.1));
+            let pulled = (striking.held.iter().zip(&impact.row_impulses[striking.standing_rows()..]))
+                .filter(|(_, pull)| **pull > 1e-12 * impact.impulse)
+                .max_by(|a, b| a.1.total_cmp(b.1));
             match pulled.map(|(&held, _)| held) {
                 Some(pulled) => {
                     let rest = self.mechanism.held.iter().copied().filter(|&held| held != pulled).collect();
-                    self.switch(rest, outcome)?;
+                    let open = |(friction, &mode): (&Friction, &Mode)| match friction.normal {
+                        Normal::Contact(contact) if contact == pulled => Mode::Open,
+                        _ => mode,
+                    };
+                    let modes =
+                        self.mechanism.frictions.iter().zip(&self.mechanism.modes).map(open).collect();
+                    self.switch(rest, modes, outcome)?;
                 }
-                None => break impact,
+                None => break (impact, striking),
             }
         };
         if impact.approach >= 0.0 {
             return Ok(0.0);
         }
+        self.check_single(contact, &impact, &striking, outcome)?;
         // Letting others go may have moved it by rounding.
         let last = self.motion();
         let (mut motion, before) = (last.clone(), self.sampler.balance(&last));
@@ -87,10 +101,11 @@ impl ContactDriver {
         self.driver.jump(&motion);
         let change = self.sampler.balance(&motion) - before;
         self.sampler.shift(change);
-        let claim = Claim { contact, impulse: impact.impulse, energy_lost: -change.hi };
+        let Impact { impulse, tangential, .. } = impact;
+        let claim = Claim { contact, impulse, tangential, energy_lost: -change.hi };
         let tolerance = outcome.plan.tolerance.unwrap_or_default().relative;
         let after = self.motion();
-        if let Err(what) = impact_monitor::check(&self.mechanism, tolerance, &last, &after, &claim) {
+        if let Err(what) = impact_monitor::check(&striking, tolerance, &last, &after, &claim) {
             let (cause, what) =
                 (Cause::ImpactCheckFailed, format!("impact at wall {}: {what}", self.name(contact)));
             return Err(StepError {
@@ -119,11 +134,34 @@ impl ContactDriver {
                 t: motion.time.hi,
                 wall: self.name(contact).into(),
                 impulse: impact.impulse,
+                friction_impulse: impact.tangential,
                 approach: impact.approach,
                 energy_lost: -change.hi,
             });
         }
         Ok(-impact.approach)
+    }
+
+    /// Impulses at several walls with friction at once do not follow from the laws of impact.
+    fn check_single(
+        &mut self,
+        contact: usize,
+        impact: &Impact,
+        striking: &Mechanism,
+        outcome: &Outcome,
+    ) -> Result<(), StepError> {
+        let pressed = striking.held.iter().zip(&impact.row_impulses[striking.standing_rows()..]);
+        let mut pressed = pressed.filter(|(_, impulse)| -**impulse > 1e-9 * impact.impulse);
+        let Some((&held, _)) = pressed.find(|(held, _)| striking.friction_at(**held).is_some()) else {
+            return Ok(());
+        };
+        let what = format!(
+            "an impact at wall {} presses a point on wall {}, which has dry friction: impulses at several walls are not determined",
+            self.name(contact),
+            self.name(held)
+        );
+        let hint = "leave friction out where points rest, or end the run before";
+        Err(StepError { cause: Cause::Friction, ..self.stopped(&outcome.plan, what, hint) })
     }
 
     /// Holds the points that touch and stay, and lets the others go; `struck` touches, wherever a projection
@@ -132,6 +170,17 @@ impl ContactDriver {
         &mut self,
         struck: Option<usize>,
         released: Option<usize>,
+        outcome: &mut Outcome,
+    ) -> Result<(), StepError> {
+        self.settle_at(struck, released, Transition::default(), outcome)
+    }
+
+    /// The same where a place with friction begins to stick or to slide.
+    pub(in crate::run) fn settle_at(
+        &mut self,
+        struck: Option<usize>,
+        released: Option<usize>,
+        transition: Transition,
         outcome: &mut Outcome,
     ) -> Result<(), StepError> {
         let motion = self.motion();
@@ -144,7 +193,7 @@ impl ContactDriver {
         let touching: Vec<usize> = (0..self.free.contacts.len())
             .filter(|contact| Some(*contact) != released && touches(contact))
             .collect();
-        if touching.is_empty() && self.mechanism.held.is_empty() {
+        if touching.is_empty() && self.mechanism.held.is_empty() && self.free.frictions.is_empty() {
             return Ok(());
         }
         let Some(staying) = self.free.staying(&touching, motion.time, &phi, &omega) else {
@@ -152,22 +201,38 @@ impl ContactDriver {
                 format!("a point rests on wall {} and the motors leave it no freedom", self.names(&touching));
             return Err(self.stopped(&outcome.plan, what, "change the motors' laws, or end the run before"));
         };
-        if staying == self.mechanism.held { Ok(()) } else { self.switch(staying, outcome) }
+        let still: Vec<usize> = (touching.iter().copied())
+            .filter(|&contact| {
+                let Contact { normal, point, .. } = &self.free.contacts[contact];
+                let size = self.free.contacts[contact].step_size(&omega);
+                staying.contains(&contact) || normal.dot(point.velocity(&z, &omega)).abs() <= NO_SPEED * size
+            })
+            .collect();
+        let (staying, modes) = self.friction_modes(staying, &still, transition, outcome)?;
+        let is_same = staying == self.mechanism.held && modes == self.mechanism.modes;
+        if is_same { Ok(()) } else { self.switch(staying, modes, outcome) }
     }
 
-    /// Goes on with these contacts held.
-    pub(super) fn switch(&mut self, contacts: Vec<usize>, outcome: &mut Outcome) -> Result<(), StepError> {
+    /// Goes on with these contacts held, and the places with friction in these modes.
+    pub(super) fn switch(
+        &mut self,
+        contacts: Vec<usize>,
+        modes: Vec<Mode>,
+        outcome: &mut Outcome,
+    ) -> Result<(), StepError> {
         let mut motion = self.motion();
         let before = self.jumps.is_some().then(|| motion.clone());
         self.stabilizer += std::mem::take(&mut motion.stabilizer);
         self.record(&contacts, motion.time.hi, outcome);
+        self.record_modes(&modes, motion.time.hi, outcome);
         let mut plan = outcome.plan.clone();
-        if contacts.is_empty() {
-            self.mechanism = Arc::clone(&self.free);
-        } else {
-            self.mechanism = Arc::new(self.free.holding(&contacts));
+        self.mechanism = in_modes(&self.free, &contacts, &modes);
+        if self.mechanism.constraints.len() > self.free.constraints.len() {
             plan.stabilization = Stabilization::Projection;
             self.put_on(&mut motion, outcome)?;
+        }
+        if let Some(events) = &mut self.events {
+            events.watch_friction(&self.mechanism);
         }
         let next = build(&self.mechanism, &mut plan, &motion)?;
         let last = std::mem::replace(&mut self.driver, next);
@@ -265,6 +330,14 @@ impl ContactDriver {
             phi,
         }
     }
+}
+
+/// The mechanism with these contacts held and in these modes; itself where that changes nothing.
+pub(in crate::run) fn in_modes(free: &Arc<Mechanism>, contacts: &[usize], modes: &[Mode]) -> Arc<Mechanism> {
+    if contacts.is_empty() && modes.iter().all(|mode| *mode == Mode::Open) {
+        return Arc::clone(free);
+    }
+    Arc::new(free.moving(contacts, modes))
 }
 
 /// Elements, coordinates \[rad, m\] and rates \[rad/s, m/s\] as doubles.

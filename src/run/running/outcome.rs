@@ -4,6 +4,7 @@ use super::super::contact::{ImpactRecord, PersistentContact};
 use super::super::drift::Drift;
 use super::super::event::EventRecord;
 use super::super::flip::Flip;
+use super::super::friction::FrictionRecord;
 use super::super::plan::{Plan, Refusal};
 use super::super::sample::Sample;
 use super::super::trace::Trace;
@@ -52,6 +53,10 @@ pub struct Outcome {
     pub event_count: u64,
     /// Energy that events have put into the mechanism \[J\].
     pub event_energy: f64,
+    /// The first times a place with dry friction began to stick or to slide.
+    pub frictions: Vec<FrictionRecord>,
+    /// Their number.
+    pub friction_count: u64,
     /// The event that ended it, or `observer`; a run ended so is no failure.
     pub ended_by: Option<String>,
     /// Why it ended before its horizon.
@@ -79,6 +84,8 @@ impl Outcome {
             events: Vec::new(),
             event_count: 0,
             event_energy: 0.0,
+            frictions: Vec::new(),
+            friction_count: 0,
             ended_by: None,
             stop: None,
             plan,

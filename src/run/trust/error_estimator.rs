@@ -83,10 +83,10 @@ struct Torques {
 }
 
 impl Torques {
-    /// `None` where there are no motors, or walls that may hold on to a point.
+    /// `None` where there are no motors, or torques depend on what holds a point or switches at the moment.
     fn new(mechanism: &Mechanism) -> Option<Self> {
-        let has_motors =
-            mechanism.contacts.is_empty() && mechanism.constraints.iter().any(|row| row.law.is_some());
+        let is_smooth = mechanism.contacts.is_empty() && !mechanism.is_switched();
+        let has_motors = is_smooth && mechanism.constraints.iter().any(|row| row.law.is_some());
         has_motors.then(|| Self { kernel: Kernel::new(mechanism), of: [Vec::new(), Vec::new()] })
     }
 
@@ -120,6 +120,7 @@ fn shared(mechanism: &Mechanism, run: &Plan, error_estimator: &Plan) -> Vec<Stri
     let words = [
         (has_walls, "impact law"),
         (has_walls && finds_likewise, "contact detection"),
+        (!mechanism.frictions.is_empty(), "laws of friction"),
         (leaps, "leaps through singular positions"),
         (eliminated(run) && eliminated(error_estimator), "elimination of motors"),
         (true, "compilation"),

@@ -45,7 +45,7 @@ fn tolerance(plan: &Plan) -> Option<f64> {
 /// The first reference solution of a run.
 pub(super) fn first(mechanism: &Mechanism, run: &Plan, level: Level) -> Finer {
     let finer = tolerance(run).map(|tolerance| tolerance / FINER);
-    let has_series = mechanism.vibration.is_none() && mechanism.tree.is_dense();
+    let has_series = mechanism.has_series();
     let finds_impacts_likewise = run.method == MethodId::Taylor && !mechanism.contacts.is_empty();
     if !has_series || finds_impacts_likewise {
         return stepwise(mechanism, run, finer.filter(|_| !finds_impacts_likewise).unwrap_or(FINE).max(FINE));
@@ -95,9 +95,8 @@ pub(super) fn second(mechanism: &Mechanism, run: &Plan) -> Option<Finer> {
 /// For runs of neighbouring scenes, which share no impacts with the run: the first series in doubles at so
 /// many times its tolerance, up to a time \[s\].
 pub(super) fn neighbour(mechanism: &Mechanism, until: f64, coarser: f64) -> Plan {
-    let has_series = mechanism.vibration.is_none() && mechanism.tree.is_dense();
     let tolerance = Tolerance { relative: coarser * FINE, absolute: coarser * FINE };
-    let method = if has_series { MethodId::Taylor } else { MethodId::Dp8 };
+    let method = if mechanism.has_series() { MethodId::Taylor } else { MethodId::Dp8 };
     Plan { method, ..Plan::of_series(mechanism, tolerance, until) }
 }
 
@@ -119,6 +118,9 @@ fn series(
     tolerance: f64,
     [extended, in_double_double]: [bool; 2],
 ) -> Finer {
+    if !mechanism.has_series() {
+        return stepwise(mechanism, run, tolerance.max(FINE));
+    }
     let tolerance = Tolerance { relative: tolerance, absolute: tolerance };
     let mut plan = Plan::of_series(mechanism, tolerance, run.until);
     (plan.extended, plan.in_double_double) = (extended, in_double_double);

@@ -175,6 +175,59 @@ pub(in crate::scene) static HINGE: Table = Table {
     fields: &[
         required("name", Shape::Name, "\"A\"", "Name, unique among hinges."),
         required("between", Shape::Between, PLACES, "The two places."),
+        optional(
+            "friction",
+            Shape::Object(&HINGE_FRICTION),
+            "{\"radius\": 0.01, \"kinetic\": 0.2}",
+            "Dry friction; none if absent.",
+        ),
+    ],
+};
+
+const KINETIC: Field = required(
+    "kinetic",
+    Shape::Number(not_negative("")),
+    "0.2",
+    "Coefficient of friction while the two slide on each other.",
+);
+const STATIC: Field = optional(
+    "static",
+    Shape::Number(not_negative("")),
+    "0.3",
+    "Coefficient of friction while they stick, at least the kinetic one; the same if absent.",
+);
+
+/// Dry friction of a hinge.
+pub(in crate::scene) static HINGE_FRICTION: Table = Table {
+    title: "friction of a hinge",
+    about: "Coulomb friction: a torque of the coefficient times the radius times the force that the hinge carries.",
+    fields: &[
+        required("radius", Shape::Number(positive("m")), "0.01", "Radius at which it acts."),
+        KINETIC,
+        STATIC,
+    ],
+};
+
+/// Dry friction of a slider.
+pub(in crate::scene) static SLIDER_FRICTION: Table = Table {
+    title: "friction of a slider",
+    about: "Coulomb friction: a force along the rail of the coefficient times the force across it.",
+    fields: &[KINETIC, STATIC],
+};
+
+/// Dry friction at a wall.
+pub(in crate::scene) static WALL_FRICTION: Table = Table {
+    title: "friction at a wall",
+    about: "Coulomb friction: a force along the wall of the coefficient times its pressure, in impacts too.",
+    fields: &[
+        KINETIC,
+        STATIC,
+        optional(
+            "impact",
+            Shape::Word(&["poisson", "newton"]),
+            "\"newton\"",
+            "What restitution multiplies in an impact: \"poisson\", the impulse of compression; \"newton\", the normal velocity; \"poisson\" if absent.",
+        ),
     ],
 };
 
@@ -208,6 +261,12 @@ pub(in crate::scene) static SLIDER: Table = Table {
             Shape::Word(&["free", "locked"]),
             "\"locked\"",
             "Whether the two bodies may turn on each other, or keep the angle between them that they have at the start; \"free\" if absent.",
+        ),
+        optional(
+            "friction",
+            Shape::Object(&SLIDER_FRICTION),
+            "{\"kinetic\": 0.2}",
+            "Dry friction; none if absent.",
         ),
     ],
 };
@@ -599,6 +658,12 @@ pub(in crate::scene) static WALL: Table = Table {
             Shape::Number(Quantity { least: 0.0, most: 1.0, unit: "" }),
             "0.5",
             "The normal velocity after an impact is -restitution times the one before: 0 plastic, 1 elastic.",
+        ),
+        optional(
+            "friction",
+            Shape::Object(&WALL_FRICTION),
+            "{\"kinetic\": 0.2}",
+            "Dry friction; none if absent.",
         ),
     ],
 };

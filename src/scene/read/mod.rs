@@ -5,6 +5,7 @@
 
 mod at;
 mod bars;
+mod friction;
 mod joints;
 mod laws;
 mod loads;
@@ -116,8 +117,10 @@ fn scene(root: &At, Resolved { parameters, tables }: Resolved) -> Result<Scene, 
     let gravity = fields.pair("gravity")?;
     let (bars, bar_places) = named(&fields, "bars", bars::bar)?;
     let known = Bars::of(&bars);
-    let (hinges, _) = named(&fields, "hinges", |fields, name| joints::hinge(fields, name, &known))?;
-    let (sliders, _) = named(&fields, "sliders", |fields, name| joints::slider(fields, name, &known))?;
+    let (hinges, hinge_places) =
+        named(&fields, "hinges", |fields, name| joints::hinge(fields, name, &known))?;
+    let (sliders, slider_places) =
+        named(&fields, "sliders", |fields, name| joints::slider(fields, name, &known))?;
     let (welds, _) = named(&fields, "welds", |fields, name| joints::weld(fields, name, &known))?;
     let (locks, lock_places) = named(&fields, "locks", |fields, name| joints::lock(fields, name, &known))?;
     let (points, _) = named(&fields, "points", |fields, name| laws::point(fields, name, &known))?;
@@ -159,6 +162,7 @@ fn scene(root: &At, Resolved { parameters, tables }: Resolved) -> Result<Scene, 
         motors,
         drives,
         walls,
+        frictions: friction::all(&hinge_places, &slider_places, &wall_places)?,
         parameters: parameters.iter().map(Into::into).collect(),
         points,
         tables,

@@ -1,0 +1,143 @@
+//! Impulses of one impact with dry friction: Routh's method.
+//!
+//! ```text
+//! dv_n = a_nn dp_n + a_nt dp_t,    dv_t = a_nt dp_n + a_tt dp_t      along the growing normal impulse p_n
+//! slides   dp_t = -sign(v_t) mu dp_n          until v_t = 0
+//! sticks   dp_t = -a_nt / a_tt dp_n           where that is at most mu0 dp_n, else it slides as a_nt drives it
+//! ends     Poisson: p_n = (1+e) p_c, v_n(p_c) = 0      Newton: v_n = -e v_n⁻
+//! ```
+//!
+//! Both laws agree where the point slides one way all along.  Poisson's never gains energy; Newton's may,
+//! where sliding ends or turns within the impact.
+//!
+//! Source: E. J. Routh, *Dynamics of a System of Rigid Bodies*, 7th ed. (1905), section 187 ff.; Y. Wang,
+//! M. Mason, *Two-dimensional rigid-body collisions with friction*, J. Appl. Mech. 59 (1992).
+
+/// What an impact is decided by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shock {
+    /// a_nn, a_nt, a_tt: velocities that unit impulses make \[1/kg\].
+    pub response: [f64; 3],
+    /// v_n and v_t before it \[m/s\]; v_n is negative.
+    pub velocity: [f64; 2],
+    /// e.
+    pub restitution: f64,
+    /// mu and mu0.
+    pub coefficients: [f64; 2],
+    /// True for Newton's law of impact, else Poisson's.
+    pub is_newton: bool,
+}
+
+/// Share of a velocity that rounding leaves of one that ended.
+const NO_SPEED: f64 = 1e-14;
+
+impl Shock {
+    /// Normal and tangential impulse \[N·s\]; `None` where nothing ends it.
+    pub fn impulses(&self) -> Option<[f64; 2]> {
+        let [a_nn, a_nt, a_tt] = self.response;
+        let [kinetic, stiction] = self.coefficients;
+        let [mut v_n, mut v_t] = self.velocity;
+        let rebound = -self.restitution * v_n;
+        let still = NO_SPEED * (v_n.abs() + v_t.abs());
+        let [mut p_n, mut p_t] = [0.0; 2];
+        // The normal impulse at which it ends, known to Poisson from the end of compression on.
+        let mut end = None;
+        for _ in 0..8 {
+            let ratio = if v_t.abs() > still {
+                -v_t.signum() * kinetic
+            } else if a_tt == 0.0 || a_nt.abs() <= stiction * a_tt {
+                v_t = 0.0;
+                if a_tt == 0.0 { 0.0 } else { -a_nt / a_tt }
+            } else {
+                -a_nt.signum() * kinetic
+            };
+            let (n_rate, t_rate) = (a_nn + a_nt * ratio, a_nt + a_tt * ratio);
+            // To the end of sliding, of compression, or of the impact.
+            let stops = if v_t != 0.0 && v_t * t_rate < 0.0 { -v_t / t_rate } else { f64::INFINITY };
+            let ends = match end {
+                Some(end) => end - p_n,
+                None if self.is_newton => (rebound - v_n) / n_rate,
+                None => -v_n / n_rate,
+            };
+            let ends = if ends >= 0.0 { ends } else { f64::INFINITY };
+            let share = stops.min(ends);
+            if !share.is_finite() {
+                return None;
+            }
+            (p_n, p_t) = (p_n + share, p_t + ratio * share);
+            (v_n, v_t) = (v_n + n_rate * share, v_t + t_rate * share);
+            if stops <= ends {
+                v_t = 0.0;
+            }
+            if ends <= stops {
+                if end.is_some() || self.is_newton {
+                    return Some([p_n, p_t]);
+                }
+                end = Some((1.0 + self.restitution) * p_n);
+            }
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A rod of unit mass and length that meets the floor with its lower end at an angle.
+    fn rod(angle: f64, velocity: [f64; 2], mu: f64, e: f64) -> Shock {
+        let (sin, cos) = libm::sincos(angle);
+        let (x, y) = (0.5 * cos, 0.5 * sin);
+        let inertia = 1.0 / 12.0;
+        // The point is at (-x, -y) from the centre: v_P = v + w (y, -x).
+        let response = [1.0 + x * x / inertia, -x * y / inertia, 1.0 + y * y / inertia];
+        Shock { response, velocity, restitution: e, coefficients: [mu; 2], is_newton: false }
+    }
+
+    /// Impulses by small steps of the normal impulse, without any case.
+    fn by_steps(shock: &Shock) -> [f64; 2] {
+        let [a_nn, a_nt, a_tt] = shock.response;
+        let [mut v_n, mut v_t] = shock.velocity;
+        let (mu, step) = (shock.coefficients[0], 1e-6);
+        let [mut p_n, mut p_t] = [0.0; 2];
+        let mut end = f64::INFINITY;
+        while p_n < end {
+            // The tangential impulse that would stop it, as far as friction reaches.
+            let wanted = -(v_t + a_nt * step) / a_tt;
+            let dp_t = wanted.clamp(-mu * step, mu * step);
+            (p_n, p_t) = (p_n + step, p_t + dp_t);
+            (v_n, v_t) = (v_n + a_nn * step + a_nt * dp_t, v_t + a_nt * step + a_tt * dp_t);
+            if end.is_infinite() && v_n >= 0.0 {
+                end = (1.0 + shock.restitution) * p_n;
+            }
+        }
+        [p_n, p_t]
+    }
+
+    #[test]
+    fn impulses_are_those_of_small_steps() {
+        let mut covered = [0; 3];
+        for angle in [0.3, 0.7, 1.2, 1.5, 2.0, 2.6] {
+            for v_t in [-2.0, -0.3, 0.0, 0.3, 2.0] {
+                for mu in [0.05, 0.3, 1.0] {
+                    for e in [0.0, 0.5, 1.0] {
+                        let shock = rod(angle, [-1.0, v_t], mu, e);
+                        let found = shock.impulses().expect("an end");
+                        let expected = by_steps(&shock);
+                        for (found, expected) in found.iter().zip(expected) {
+                            assert!((found - expected).abs() < 1e-5, "{shock:?}: {found} {expected}");
+                        }
+                        let [p_n, p_t] = found;
+                        let [_, a_nt, a_tt] = shock.response;
+                        let after = v_t + a_nt * p_n + a_tt * p_t;
+                        covered[if after.abs() < 1e-12 { 0 } else { usize::from(after * v_t > 0.0) + 1 }] +=
+                            1;
+                        assert!(p_t.abs() <= mu * p_n * (1.0 + 1e-12));
+                    }
+                }
+            }
+        }
+        println!("ends sticking {}, turned {}, slides on {}", covered[0], covered[1], covered[2]);
+        assert!(covered.iter().all(|&count| count > 5), "{covered:?}");
+    }
+}

@@ -1,0 +1,176 @@
+//! Dry friction in a run: when places begin and cease to stick, and what is counted of it.
+//!
+//! The event functions of the places are watched beside those of the scene: the relative velocity of what
+//! slides, and `(mu0 N)² - tau²` of what sticks.  Steps end at their zeros, and there the modes of all places
+//! are found anew, see [`modes`](crate::dynamics::friction::modes).
+
+use super::contact::ContactDriver;
+use super::running::Outcome;
+use crate::arithmetic::Complex;
+use crate::dynamics::friction::modes::Modes;
+use crate::dynamics::friction::{Friction, Mode, Moment, Paradox, Transition};
+use crate::dynamics::kernel::{Bias, Kernel, dot};
+use crate::dynamics::{Mechanism, Motion};
+use crate::stepping::{Cause, StepError};
+use serde::{Deserialize, Serialize};
+use std::cell::RefCell;
+use std::sync::Arc;
+
+/// Transitions kept by name; the rest are counted.
+const KEPT: usize = 1000;
+
+/// A place with friction began to stick or to slide.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FrictionRecord {
+    /// Time \[s\].
+    pub t: f64,
+    /// Name of the hinge, slider or wall.
+    pub name: String,
+    /// What it does from then on: `sticks`, `slides` or `apart`.
+    pub mode: String,
+}
+
+/// The event functions of a mechanism's places with friction, in their present modes.
+pub(super) struct FrictionWatch {
+    mechanism: Arc<Mechanism>,
+    kernel: RefCell<Kernel<f64>>,
+}
+
+impl FrictionWatch {
+    /// Those of a mechanism; `None` where it has no friction.
+    pub fn new(mechanism: &Arc<Mechanism>) -> Option<Self> {
+        let kernel = || RefCell::new(Kernel::new(mechanism));
+        (!mechanism.frictions.is_empty()).then(|| Self { mechanism: Arc::clone(mechanism), kernel: kernel() })
+    }
+
+    /// How many there are: one a place, and the regularity of their equations.
+    pub fn functions(&self) -> usize {
+        self.mechanism.frictions.len() + 1
+    }
+
+    /// The place a function is of; `None` for the regularity.
+    pub fn place(&self, function: usize) -> Option<&Friction> {
+        self.mechanism.frictions.get(function)
+    }
+
+    /// Their values at a motion: positive as long as the modes hold.
+    pub fn values(&self, motion: &Motion) -> Vec<f64> {
+        let mechanism = &*self.mechanism;
+        let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
+        let omega: Vec<f64> = motion.omega.iter().map(|omega| omega.hi).collect();
+        let (kernel, n) = (&mut *self.kernel.borrow_mut(), phi.len());
+        kernel.accelerate::<0>(mechanism, motion.time, &phi, &omega, Bias::default());
+        let is_sticking = mechanism.sticking() > 0;
+        let forces = if is_sticking {
+            kernel.friction_forces(mechanism, motion.time, &phi, &omega)
+        } else {
+            Vec::new()
+        };
+        let mut rows = kernel.friction_rows.chunks_exact(n);
+        let of_place = |(number, (friction, mode)): (usize, (&Friction, &Mode))| match mode {
+            Mode::Open => 1.0,
+            Mode::Slip(sign) => sign * rows.next().map_or(0.0, |row| dot(row, &omega)),
+            Mode::Stick(_) => {
+                let [tau, pressing] = forces[number];
+                let most = friction.stiction * pressing;
+                most * most - tau * tau
+            }
+        };
+        let places = mechanism.frictions.iter().zip(&mechanism.modes).enumerate();
+        let mut values: Vec<f64> = places.map(of_place).collect();
+        values.push(kernel.regularity);
+        values
+    }
+
+    /// What happens to the modes at the zero of a function, at a motion.
+    fn transition(&self, function: usize, motion: &Motion) -> Option<Transition> {
+        let mode = self.mechanism.modes.get(function)?;
+        Some(match mode {
+            Mode::Stick(_) => {
+                self.values(motion);
+                let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
+                let omega: Vec<f64> = motion.omega.iter().map(|omega| omega.hi).collect();
+                let kernel = self.kernel.borrow();
+                let forces = kernel.friction_forces(&self.mechanism, motion.time, &phi, &omega);
+                let sign = if forces[function][0] < 0.0 { -1.0 } else { 1.0 };
+                Transition { arrived: None, breaks: Some((function, sign)) }
+            }
+            _ => Transition { arrived: Some(function), breaks: None },
+        })
+    }
+}
+
+impl ContactDriver {
+    /// Lets the zero of an event function of friction take effect.
+    pub(super) fn friction_event(&mut self, function: usize, outcome: &mut Outcome) -> Result<(), StepError> {
+        let motion = self.motion();
+        let watch = self.events.as_ref().and_then(|events| events.friction.as_ref());
+        let Some(transition) = watch.and_then(|watch| watch.transition(function, &motion)) else {
+            let what = "friction no longer follows from the motion: Painlevé's paradox, the surfaces jam";
+            return Err(self.paradox(outcome, what.into()));
+        };
+        self.settle_at(None, None, transition, outcome)
+    }
+
+    /// The contacts held and the modes of the places with friction from the present moment on.
+    pub(super) fn friction_modes(
+        &mut self,
+        staying: Vec<usize>,
+        touching: &[usize],
+        transition: Transition,
+        outcome: &Outcome,
+    ) -> Result<Modes, StepError> {
+        if self.free.frictions.is_empty() {
+            return Ok((staying, Vec::new()));
+        }
+        let motion = self.motion();
+        let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
+        let omega: Vec<f64> = motion.omega.iter().map(|omega| omega.hi).collect();
+        let z: Vec<Complex<f64>> = self.free.elements(&phi);
+        let at = Moment { t: motion.time, phi: &phi, z: &z, omega: &omega };
+        let found = self.free.modes_at(at, &self.mechanism.modes, [&staying, touching], transition);
+        found.map_err(|paradox| {
+            let places: Vec<&str> =
+                self.free.frictions.iter().map(|friction| friction.name.as_str()).collect();
+            let places = places.join(", ");
+            let what = match paradox {
+                Paradox::Inconsistent => {
+                    format!("no forces of friction fit the motion at {places}: Painlevé's inconsistent case")
+                }
+                Paradox::Indeterminate => {
+                    format!("more than one motion fits friction at {places}: Painlevé's indeterminate case")
+                }
+                Paradox::TooMany(count) => {
+                    format!("{count} places with friction are at rest at once, more than are taken")
+                }
+            };
+            self.paradox(outcome, what)
+        })
+    }
+
+    fn paradox(&mut self, outcome: &Outcome, what: String) -> StepError {
+        StepError {
+            cause: Cause::Friction,
+            method: outcome.plan.method.to_string(),
+            t: self.motion().time.hi,
+            step: 0.0,
+            what,
+            hint: "lower the coefficient, or put a spring and a damper where the bodies touch".into(),
+        }
+    }
+
+    /// Counts the places that begin to stick, to slide, or are apart.
+    pub(super) fn record_modes(&self, modes: &[Mode], t: f64, outcome: &mut Outcome) {
+        for (number, (mode, before)) in modes.iter().zip(&self.mechanism.modes).enumerate() {
+            let mode = mode.word();
+            if mode == before.word() {
+                continue;
+            }
+            outcome.friction_count += 1;
+            if outcome.frictions.len() < KEPT {
+                let name = self.free.frictions[number].name.clone();
+                outcome.frictions.push(FrictionRecord { t, name, mode: mode.into() });
+            }
+        }
+    }
+}

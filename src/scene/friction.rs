@@ -1,0 +1,55 @@
+//! Dry friction of hinges, sliders and walls.
+
+use serde::Serialize;
+
+/// Dry friction by Coulomb's law.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Friction {
+    /// Where it acts.
+    pub at: FrictionPlace,
+    /// Coefficient while the two slide on each other, not negative.
+    pub kinetic: f64,
+    /// Coefficient while they stick, at least the kinetic one.
+    pub stiction: f64,
+}
+
+/// What has friction, by its number in the scene's list.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub enum FrictionPlace {
+    /// A hinge: friction acts at this radius \[m\] of it.
+    Hinge {
+        /// The hinge.
+        hinge: usize,
+        /// The radius, positive.
+        radius: f64,
+    },
+    /// A slider.
+    Slider(usize),
+    /// A wall.
+    Wall {
+        /// The wall.
+        wall: usize,
+        /// True where restitution multiplies the normal velocity (Newton), not the impulse of compression
+        /// (Poisson).
+        is_newton: bool,
+    },
+}
+
+/// A kind of part that may have friction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    Hinge,
+    Slider,
+    Wall,
+}
+
+impl FrictionPlace {
+    /// The part by its kind and number.
+    pub(super) fn part(self) -> (Part, usize) {
+        match self {
+            Self::Hinge { hinge, .. } => (Part::Hinge, hinge),
+            Self::Slider(slider) => (Part::Slider, slider),
+            Self::Wall { wall, .. } => (Part::Wall, wall),
+        }
+    }
+}
