@@ -294,21 +294,21 @@ fn painleves_paradox_is_named() {
 }
 
 /// A mechanism in absolute coordinates (x, y, phi of every centre), its joints by multipliers.
-struct Absolute {
-    mass: Vec<[f64; 2]>,
-    pins: Vec<Pin>,
-    rails: Vec<Rail>,
+pub struct Absolute {
+    pub mass: Vec<[f64; 2]>,
+    pub pins: Vec<Pin>,
+    pub rails: Vec<Rail>,
 }
 
 /// A point of one body on a point of another or of the ground, with mu r.
-struct Pin {
+pub struct Pin {
     bodies: [Option<usize>; 2],
     points: [Vector2<f64>; 2],
     friction: f64,
 }
 
 /// A point of a body on a line of another, with mu.
-struct Rail {
+pub struct Rail {
     body: usize,
     point: Vector2<f64>,
     rail: usize,
@@ -428,27 +428,34 @@ impl Absolute {
         (DVector::from_element(3 * n, f64::NAN), power)
     }
 
-    /// Coordinates, rates and the energy lost after steps of the classical Runge–Kutta method.
+    /// One step of the classical Runge–Kutta method, with the energy lost in it.
+    pub fn step(&self, q: &DVector<f64>, v: &DVector<f64>, h: f64) -> (DVector<f64>, DVector<f64>, f64) {
+        let (a1, p1) = self.accelerations(q, v);
+        let (q2, v2) = (q + v * (0.5 * h), v + &a1 * (0.5 * h));
+        let (a2, p2) = self.accelerations(&q2, &v2);
+        let (q3, v3) = (q + &v2 * (0.5 * h), v + &a2 * (0.5 * h));
+        let (a3, p3) = self.accelerations(&q3, &v3);
+        let (q4, v4) = (q + &v3 * h, v + &a3 * h);
+        let (a4, p4) = self.accelerations(&q4, &v4);
+        (
+            q + (v + &v2 * 2.0 + &v3 * 2.0 + &v4) * (h / 6.0),
+            v + (a1 + a2 * 2.0 + a3 * 2.0 + a4) * (h / 6.0),
+            h / 6.0 * (p1 + 2.0 * p2 + 2.0 * p3 + p4),
+        )
+    }
+
+    /// Coordinates, rates and the energy lost after so many steps.
     fn end(&self, q: &[f64], v: &[f64], until: f64, steps: usize) -> (DVector<f64>, DVector<f64>, f64) {
         let (mut q, mut v, mut lost) = (DVector::from_row_slice(q), DVector::from_row_slice(v), 0.0);
-        let h = until / steps as f64;
         for _ in 0..steps {
-            let (a1, p1) = self.accelerations(&q, &v);
-            let (q2, v2) = (&q + &v * (0.5 * h), &v + &a1 * (0.5 * h));
-            let (a2, p2) = self.accelerations(&q2, &v2);
-            let (q3, v3) = (&q + &v2 * (0.5 * h), &v + &a2 * (0.5 * h));
-            let (a3, p3) = self.accelerations(&q3, &v3);
-            let (q4, v4) = (&q + &v3 * h, &v + &a3 * h);
-            let (a4, p4) = self.accelerations(&q4, &v4);
-            q += (&v + &v2 * 2.0 + &v3 * 2.0 + &v4) * (h / 6.0);
-            v += (a1 + a2 * 2.0 + a3 * 2.0 + a4) * (h / 6.0);
-            lost += h / 6.0 * (p1 + 2.0 * p2 + 2.0 * p3 + p4);
+            let (next_q, next_v, more) = self.step(&q, &v, until / steps as f64);
+            (q, v, lost) = (next_q, next_v, lost + more);
         }
         (q, v, lost)
     }
 }
 
-fn pin(bodies: [Option<usize>; 2], points: [[f64; 2]; 2], friction: f64) -> Pin {
+pub fn pin(bodies: [Option<usize>; 2], points: [[f64; 2]; 2], friction: f64) -> Pin {
     Pin { bodies, points: points.map(|p| Vector2::new(p[0], p[1])), friction }
 }
 

@@ -49,6 +49,7 @@ mod radau;
 #[path = "mechanisms.rs"]
 mod random_mechanisms;
 mod rattle;
+mod release;
 mod restart;
 mod rigid;
 mod scaling;

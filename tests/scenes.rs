@@ -94,7 +94,7 @@ fn read_shipped(name: &str) -> Scene {
 #[test]
 fn every_shipped_scene_reads() {
     let files = shipped();
-    assert_eq!(files.len(), 34);
+    assert_eq!(files.len(), 35);
     for file in files {
         match read_scene(&file, &[]) {
             Ok(scene) => {

@@ -6,7 +6,7 @@ mod parts;
 use super::Motion;
 use super::assembly::Assembly;
 use super::configuration::{Configuration, Values};
-use super::constraint::{self, ConstraintEquation, Site};
+use super::constraint::{self, ConstraintEquation, Measure, Site};
 use super::force::formula::Formulas;
 use super::force::{Action, Spring, Torsion, UserForce, Vibration};
 use super::forest::{BodyOrigin, Forest};
@@ -15,6 +15,7 @@ use super::impact::Contact;
 use super::kernel::Kernel;
 use super::partition::CoordinatePartition;
 use super::point::Point;
+use super::quadratic::Quadratic;
 use super::recursive::Recursion;
 use super::tree::Tree;
 use super::units::Units;
@@ -459,7 +460,8 @@ impl Mechanism {
         let is_dense = self.tree.is_dense();
         let recursion = (!is_dense || self.coordinates() > UNROLLED && self.frictions.is_empty())
             .then(|| Recursion::new(&self.bodies, &self.forest, &self.constraints, self.gravity))
-            .filter(|recursion| !is_dense || recursion.pays() && self.vibration.is_none());
+            .filter(|recursion| !is_dense || recursion.pays() && self.vibration.is_none())
+            .filter(|_| !self.has_released());
         self.recursion = recursion.map(Arc::new);
     }
 
@@ -522,7 +524,8 @@ impl Mechanism {
         }
     }
 
-    /// The mechanism without some of its springs, torsion springs, applied forces and torques, by name.
+    /// The mechanism without some of its springs, torsion springs, applied forces, torques and motors, and with
+    /// some of its hinges released, by name; these must be closed by rows.
     ///
     /// # Errors
     /// A name that none of them has.
@@ -530,7 +533,9 @@ impl Mechanism {
         let names = (self.springs.iter().map(|part| &part.name))
             .chain(self.torsions.iter().map(|part| &part.name))
             .chain(self.actions.iter().map(|part| &part.name))
-            .chain(self.forces.iter().map(|part| &part.name));
+            .chain(self.forces.iter().map(|part| &part.name))
+            .chain(self.joints.iter().filter(|joint| joint.outer.is_none()).map(|joint| &joint.name))
+            .chain(self.switched_motors().map(|r| &self.constraints[r].name));
         let names: Vec<&String> = names.collect();
         if let Some(unknown) = parts.iter().find(|part| !names.contains(part)) {
             return Err(unknown.clone());
@@ -541,7 +546,44 @@ impl Mechanism {
         mechanism.torsions.retain(|part| !parts.contains(&part.name));
         mechanism.actions.retain(|part| !parts.contains(&part.name));
         mechanism.forces.retain(|part| !parts.contains(&part.name));
+        mechanism.release(|name| parts.contains(name));
         Ok(mechanism)
+    }
+
+    /// True where a joint was released, so that rows constrain nothing.
+    pub fn has_released(&self) -> bool {
+        self.constraints.iter().any(|row| row.coordinates().is_empty())
+    }
+
+    /// Releases motors, and joints that are closed by rows: the rows stay in their places, and constrain
+    /// nothing any more.
+    fn release(&mut self, is_released: impl Fn(&String) -> bool) {
+        let motors: Vec<usize> =
+            self.switched_motors().filter(|&r| is_released(&self.constraints[r].name)).collect();
+        let joints = self.joints.iter_mut().filter(|joint| is_released(&joint.name));
+        let pins = joints.filter_map(|joint| joint.row.take()).flat_map(|row| [row, row + 1]);
+        let rows: Vec<usize> = motors.into_iter().chain(pins).collect();
+        for r in rows {
+            let angles = self.bodies.len();
+            let row = &mut self.constraints[r];
+            row.measure = Measure::Place(Quadratic { angles, ..Quadratic::default() });
+            (row.law, row.push) = (None, None);
+            // As those that depend on others, they say nothing of the position.
+            self.assembly.redundant.push(row.name.clone());
+            self.recursion = None;
+        }
+    }
+
+    /// The rows of motors that an event of the scene switches off; those of others may be eliminated.
+    fn switched_motors(&self) -> impl Iterator<Item = usize> {
+        let is_switched = |r: &usize| self.is_motor(*r) && self.may_be_off(&self.constraints[*r].name);
+        (0..self.constraints.len()).filter(is_switched)
+    }
+
+    /// True where an event of the scene switches the part of that name off.
+    pub fn may_be_off(&self, name: &str) -> bool {
+        let events = self.laws.as_ref().map_or(&[][..], |laws| &laws.formulas.events);
+        events.iter().any(|event| event.off.iter().any(|part| part == name))
     }
 
     /// The mechanism with two of its points pinned to one another by two more rows: a closed loop.
@@ -664,7 +706,9 @@ impl Mechanism {
     /// True where rows cannot all be eliminated: those of loops and sliders, and given angles whose whole
     /// turns matter.
     pub fn has_multipliers(&self) -> bool {
-        self.has_closed_loops() || (self.is_winding() && self.partition.driven())
+        self.has_closed_loops()
+            || (self.is_winding() && self.partition.driven())
+            || self.constraints.iter().any(|row| self.may_be_off(&row.name))
     }
 
     /// The mass matrix at the start must be positive definite.

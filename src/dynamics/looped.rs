@@ -74,6 +74,7 @@ pub fn reduced(mechanism: &Mechanism) -> Option<Reduced> {
         || !mechanism.contacts.is_empty()
         || mechanism.vibration.is_some()
         || !mechanism.frictions.is_empty()
+        || mechanism.has_released()
     {
         return None;
     }

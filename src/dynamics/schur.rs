@@ -48,7 +48,7 @@ impl Weakest {
         if share < self.share {
             *self = Self { share, row, is_delicate: false, is_near: false };
         }
-        if share < DROPPED { T::ZERO } else { T::ONE / pivot }
+        if share < DROPPED || scale == 0.0 { T::ZERO } else { T::ONE / pivot }
     }
 
     /// The same where it is known whether the row is left out.

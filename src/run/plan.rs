@@ -599,6 +599,8 @@ fn pair(
     if asked == Stabilization::Elimination && mechanism.has_multipliers() {
         let reason = if mechanism.has_closed_loops() {
             "closed loops and sliders have no independent coordinates to be left with"
+        } else if mechanism.constraints.iter().any(|row| mechanism.may_be_off(&row.name)) {
+            "an event switches a motor off, whose angle is a coordinate from then on"
         } else {
             "a torsion spring counts the turns of an angle, which elimination takes modulo whole ones"
         };

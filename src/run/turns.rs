@@ -37,7 +37,9 @@ impl Turns {
     /// Those of a motion about to start; none where given angles are eliminated, which keep their laws to the
     /// last bit.
     pub fn new(mechanism: &Mechanism, plan: &Plan, start: &Motion) -> Self {
-        let rows = mechanism.constraints.iter().filter(|_| plan.stabilization != Stabilization::Elimination);
+        let is_kept = plan.stabilization != Stabilization::Elimination;
+        // A motor that may be switched off has no law any more then.
+        let rows = mechanism.constraints.iter().filter(|row| is_kept && !mechanism.may_be_off(&row.name));
         let angles = rows.filter_map(|row| {
             let (Measure::Angle { body, base }, Some(law)) = (&row.measure, &row.law) else { return None };
             let mut angle =

@@ -139,6 +139,11 @@ impl Scene {
         self.laws.iter().filter(move |law| !matches!(law.load, Load::Torque { bar, .. } if bar >= own))
     }
 
+    /// True where an event releases the hinge of that name.
+    pub fn is_released(&self, hinge: &str) -> bool {
+        self.events.iter().any(|event| event.off.iter().any(|part| part == hinge))
+    }
+
     /// Adds the rotors of the integrals with their hinges, torques and starts.
     fn with_rotors(mut self) -> Self {
         for Integral { name, formula, bar } in self.integrals.clone() {

@@ -104,7 +104,9 @@ struct Found {
 impl Mechanism {
     /// The mechanism with its start; `kept` are the rows whose angles are those of the start.
     pub(super) fn assembled(mut self, scene: &Scene, kept: &[usize]) -> Result<Self, CompileError> {
-        if scene.has_whole_start() {
+        // What an event releases is closed by rows, and hangs on nothing by itself.
+        let is_released = scene.hinges.iter().any(|hinge| scene.is_released(&hinge.name));
+        if scene.has_whole_start() && !is_released {
             self.assembly = Assembly {
                 degrees_of_freedom: self.partition.count(),
                 conditioning: if self.constraints.is_empty() { 1.0 } else { f64::NAN },

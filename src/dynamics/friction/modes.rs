@@ -159,6 +159,12 @@ impl Mechanism {
             {
                 return vec![Mode::Open];
             }
+            if let Normal::Joint(joint) = friction.normal
+                && self.joints[joint].outer.is_none()
+                && self.joints[joint].row.is_none()
+            {
+                return vec![Mode::Open];
+            }
             if let Some((_, sign)) = breaks.filter(|(place, _)| *place == number) {
                 return vec![Mode::Slip(sign)];
             }

@@ -341,9 +341,8 @@ pub(super) fn check<'a>(root: &At<'a>, scene: &Scene, parameters: &[Known]) -> R
     for event in &scene.events {
         let at = found(root.child("events").and_then(|at| at.named(&event.name)));
         judge(&found(at.child("when")), &event.when, &scope, None)?;
-        for key in ["on", "off"] {
-            at.child(key).map_or(Ok(()), |list| parts.check(&list))?;
-        }
+        at.child("on").map_or(Ok(()), |list| parts.check(&list))?;
+        at.child("off").map_or(Ok(()), |list| parts.with_joints(scene).check(&list))?;
         for (name, text) in &event.set {
             let value = found(at.child("set").and_then(|set| set.child(name)));
             let known: Vec<&str> = parameters.iter().map(|known| known.name.as_str()).collect();
@@ -395,8 +394,8 @@ fn is_of_place(at: &At, names: &Names, bound: &Bound) -> Result<(), SceneError> 
     Err(at.refuse(&problem, allowed, hint))
 }
 
-/// What events can switch.
-struct Parts<'a>(Vec<&'a str>);
+/// What events can switch, and what that is in words.
+struct Parts<'a>(Vec<&'a str>, &'static str);
 
 impl<'a> Parts<'a> {
     fn of(scene: &'a Scene) -> Self {
@@ -405,7 +404,17 @@ impl<'a> Parts<'a> {
             .chain(scene.forces.iter().map(|part| &part.name))
             .chain(scene.torques.iter().map(|part| &part.name))
             .chain(scene.laws.iter().map(|part| &part.name));
-        Self(names.map(String::as_str).collect())
+        Self(names.map(String::as_str).collect(), "a spring, torsion spring, force, torque or potential")
+    }
+
+    /// The same with hinges and motors, which events can release but not put back.
+    fn with_joints(&self, scene: &'a Scene) -> Self {
+        let joints = (scene.hinges.iter().map(|part| &part.name))
+            .chain(scene.motors.iter().map(|part| &part.name))
+            .chain(scene.drives.iter().map(|part| &part.name))
+            .map(String::as_str);
+        let names = self.0.iter().copied().chain(joints).collect();
+        Self(names, "a hinge, motor, spring, torsion spring, force, torque or potential")
     }
 
     /// Refuses a list with a name that none has.
@@ -422,8 +431,7 @@ impl<'a> Parts<'a> {
                 None if self.0.is_empty() => "the scene has none".to_owned(),
                 None => format!("there are: {}", listed(&self.0)),
             };
-            let allowed = "must be the name of a spring, torsion spring, force, torque or potential";
-            return Err(at.refuse_value(allowed, &hint));
+            return Err(at.refuse_value(&format!("must be the name of {}", self.1), &hint));
         }
         Ok(())
     }
