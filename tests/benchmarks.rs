@@ -31,7 +31,7 @@ fn check(case: &Value) {
         scene.springs.push(spring(0.0));
     }
     if let Some(rate) = case["motor"].as_f64() {
-        let law = Law { start: start[0][0], rate, acceleration: 0.0, sines: vec![] };
+        let law = Law { start: start[0][0], rate, acceleration: 0.0, sines: vec![], profile: None };
         scene.motors.push(Motor { name: "motor".into(), bar: 0, relative_to: None, law });
     }
     if let Some(line) = case["guide"].as_object() {

@@ -310,7 +310,7 @@ fn a_motor_drags_an_end_along_a_floor() {
             name: "motor".into(),
             bar: 0,
             relative_to: None,
-            law: Law { start, rate: 0.0, acceleration: 0.0, sines },
+            law: Law { start, rate: 0.0, acceleration: 0.0, sines, profile: None },
         });
         for stabilize in [
             Stabilization::Elimination,
@@ -363,7 +363,7 @@ fn the_account_of_work_goes_through_holds_and_releases() {
         let rate = 0.4 * 14.0;
         let mut scene = on_a_floor(1.5 * LENGTH, [0.4, other], [rate, -0.4f64.sin() * rate / other.sin()]);
         let sines = vec![Sine { amplitude: 0.4, frequency: 14.0, phase: 0.0 }];
-        let law = Law { start: 0.4, rate: 0.0, acceleration: 0.0, sines };
+        let law = Law { start: 0.4, rate: 0.0, acceleration: 0.0, sines, profile: None };
         scene.motors.push(Motor { name: "motor".into(), bar: 0, relative_to: None, law });
         scene.walls[0].restitution = 0.3;
         let mut finals = Vec::new();
@@ -438,7 +438,7 @@ fn a_motor_that_leaves_no_freedom_is_a_typed_stop() {
     for method in LOCATED {
         // At rest on the wall, driven into it with growing speed.
         let mut scene = against(0.5, 0.5, 0.5);
-        let law = Law { start: 0.5, rate: 0.0, acceleration: -1.0, sines: vec![] };
+        let law = Law { start: 0.5, rate: 0.0, acceleration: -1.0, sines: vec![], profile: None };
         scene.motors.push(Motor { name: "motor".into(), bar: 0, relative_to: None, law });
         let stop = run(&scene, &by(method, 5.0, 0.1, 1e-10)).stop.expect("a stop");
         assert_eq!((stop.cause, stop.t), (Cause::RestingContact, 0.0));

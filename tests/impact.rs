@@ -241,7 +241,7 @@ fn a_motor_that_drives_a_point_into_a_wall_ends_in_a_typed_stop() {
             name: "motor".into(),
             bar: 0,
             relative_to: None,
-            law: Law { start: 1.0, rate: -1.0, acceleration: 0.0, sines: vec![] },
+            law: Law { start: 1.0, rate: -1.0, acceleration: 0.0, sines: vec![], profile: None },
         });
         scene.start[0].omega = -1.0;
         let stop = run(&scene, &by(method, 5.0, 0.1, 1e-10)).stop.expect("a stop");

@@ -65,7 +65,13 @@ fn law(value: f64, dice: &mut Dice) -> Law {
         phase: dice.within(-3.0, 3.0),
     };
     let start = value - sine.amplitude * sine.phase.sin();
-    Law { start, rate: dice.within(-2.0, 2.0), acceleration: dice.within(-1.0, 1.0), sines: vec![sine] }
+    Law {
+        start,
+        rate: dice.within(-2.0, 2.0),
+        acceleration: dice.within(-1.0, 1.0),
+        sines: vec![sine],
+        profile: None,
+    }
 }
 
 /// A tree with some of everything natural coordinates take: a body hung on nothing, pins, sliders and slots

@@ -44,6 +44,7 @@ mod linkages;
 mod looped;
 mod metamorphic;
 mod natural;
+mod profiles;
 mod published;
 mod radau;
 #[path = "mechanisms.rs"]

@@ -39,7 +39,7 @@ fn motor_sine() -> Scene {
 fn relative_motor() -> Scene {
     let mut scene = double_pendulum(Inertia::Full, [(0.8, 0.5), (0.0, 0.0)]);
     let sines = vec![Sine { amplitude: 0.6, frequency: 3.0, phase: 0.2 }];
-    let law = Law { start: 0.4, rate: -0.5, acceleration: 0.2, sines };
+    let law = Law { start: 0.4, rate: -0.5, acceleration: 0.2, sines, profile: None };
     scene.motors.push(Motor { name: "elbow".into(), bar: 1, relative_to: Some(0), law });
     start_with_motors(&mut scene);
     scene
@@ -228,7 +228,13 @@ fn random_tree(n: usize, mut next: impl FnMut() -> f64) -> (Scene, Time) {
         .filter_map(|bar| {
             let (chosen, base) = (next() > 0.6, (next() * (bar + 1) as f64) as usize);
             let sines = vec![Sine { amplitude: next(), frequency: 5.0 * next(), phase: next() }];
-            let law = Law { start: next(), rate: 4.0 * next() - 2.0, acceleration: next() - 0.5, sines };
+            let law = Law {
+                start: next(),
+                rate: 4.0 * next() - 2.0,
+                acceleration: next() - 0.5,
+                sines,
+                profile: None,
+            };
             chosen.then(|| Motor { name: format!("m{bar}"), bar, relative_to: base.checked_sub(1), law })
         })
         .collect();
@@ -467,6 +473,7 @@ fn energy_less_work_of_driven_scenes_does_not_drift() {
         rate: 0.0,
         acceleration: 0.0,
         sines: vec![Sine { amplitude: 0.3, frequency: 1.3, phase: 0.2 }],
+        profile: None,
     };
     start_with_motors(&mut steady);
     for (name, scene) in
@@ -490,7 +497,7 @@ fn a_motor_is_followed_to_the_last_bit_and_its_turns_counted() {
     let mut run = Run::new(&motor(Inertia::Slender, ONE_TURN), Composition::Suzuki5, 1.0 / 128.0);
     for seconds in [1.0, 10.25, 100.5] {
         run.to(seconds).unwrap();
-        let law = Law { start: FRAC_PI_2, rate: ONE_TURN, acceleration: 0.0, sines: vec![] };
+        let law = Law { start: FRAC_PI_2, rate: ONE_TURN, acceleration: 0.0, sines: vec![], profile: None };
         assert_eq!(run.motion().unwrapped(0), law.angle(run.state.time).hi);
         assert_eq!(run.motion().omega[0].hi, ONE_TURN);
     }

@@ -395,7 +395,16 @@ impl Mechanism {
         {
             let recorded = laws.formulas.record(&parameters, &modes)?;
             mechanism.forces.splice(..recorded.len(), recorded);
+            for (motor, profile) in laws.formulas.profiles(&parameters, &modes) {
+                let row = mechanism.constraints.iter_mut().find(|row| row.name == motor);
+                if let Some(law) = row.and_then(|row| row.law.as_mut()) {
+                    law.profile = Some(profile);
+                }
+            }
             (laws.parameters, laws.modes) = (parameters, modes);
+            if laws.formulas.drives() {
+                mechanism.partition = mechanism.partition.renewed(&mechanism.constraints)?;
+            }
         }
         Ok(mechanism)
     }

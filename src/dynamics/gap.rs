@@ -61,8 +61,11 @@ impl Contact {
 }
 
 impl Law {
-    /// Bounds of its first and second derivative up to the time `t` \[rad/s, rad/s²\].
+    /// Bounds of its first and second derivative up to the time `t` \[rad/s, rad/s²\]; a profile has none.
     pub fn bounds(&self, t: f64) -> [f64; 2] {
+        if self.profile.is_some() {
+            return [f64::INFINITY; 2];
+        }
         let start = [self.rate.abs() + self.acceleration.abs() * t.abs(), self.acceleration.abs()];
         self.sines.iter().fold(start, |[rate, acceleration], sine| {
             let swing = (sine.amplitude * sine.frequency).abs();
@@ -119,6 +122,7 @@ mod tests {
             rate: -2.0,
             acceleration: 0.5,
             sines: vec![Sine { amplitude: 0.4, frequency: 7.0, phase: 0.1 }],
+            profile: None,
         };
         let [rate, acceleration] = law.bounds(2.0);
         for step in 0..=200 {

@@ -50,14 +50,16 @@ impl Law {
     pub fn angle(&self, t: Time) -> DoubleDouble {
         let polynomial =
             DoubleDouble::of(self.start) + t.scale(self.rate) + (t * t).scale(0.5 * self.acceleration);
-        self.sines
+        let sum = self
+            .sines
             .iter()
-            .fold(polynomial, |sum, sine| sum + sine.argument(t).sin_cos().0.scale(sine.amplitude))
+            .fold(polynomial, |sum, sine| sum + sine.argument(t).sin_cos().0.scale(sine.amplitude));
+        self.profile.iter().fold(sum, |sum, profile| sum + profile.at(t)[0])
     }
 
     /// The same angle for ever \[rad\].
     pub fn constant(start: f64) -> Self {
-        Self { start, rate: 0.0, acceleration: 0.0, sines: Vec::new() }
+        Self { start, ..Self::default() }
     }
 
     /// True where nothing moves.
@@ -67,13 +69,19 @@ impl Law {
 
     /// True where the rate never changes.
     pub fn is_steady(&self) -> bool {
-        self.acceleration == 0.0 && self.sines.is_empty()
+        self.acceleration == 0.0 && self.sines.is_empty() && self.profile.is_none()
+    }
+
+    /// True where it is evaluated in plain doubles without loss.
+    #[inline(always)]
+    fn is_plain(&self) -> bool {
+        self.acceleration == 0.0 && self.profile.is_none()
     }
 
     /// The angle less whole turns, its unit vector and derivatives.
     #[inline(always)]
     pub fn at<T: Real>(&self, t: Time) -> Phase<T> {
-        if T::IS_PLAIN && self.acceleration == 0.0 {
+        if T::IS_PLAIN && self.is_plain() {
             let Phase { angle, unit, rate, acceleration } = self.plain(t);
             return Phase {
                 angle: T::of(angle),
@@ -91,7 +99,7 @@ impl Law {
     /// The angle less whole turns and its derivatives, without the unit vector.
     #[inline(always)]
     pub fn angles<T: Real>(&self, t: Time) -> [T; 3] {
-        if T::IS_PLAIN && self.acceleration == 0.0 {
+        if T::IS_PLAIN && self.is_plain() {
             let phase = self.plain(t);
             return [phase.angle, phase.rate, phase.acceleration].map(T::of);
         }
@@ -114,6 +122,12 @@ impl Law {
             angle += (t * t).scale(0.5 * self.acceleration);
             rate += T::split(t.scale(self.acceleration)).0;
             acceleration = T::of(self.acceleration);
+        }
+        if let Some(profile) = &self.profile {
+            let [more, more_rate, more_acceleration] = profile.at(t);
+            angle += more;
+            rate += T::split(more_rate).0;
+            acceleration += T::split(more_acceleration).0;
         }
         let (angle, turns) = angle.reduced();
         let mut sines = T::ZERO;
@@ -169,7 +183,7 @@ impl Law {
         if self.is_steady() {
             return (T::of(self.rate), T::ZERO);
         }
-        if T::IS_PLAIN && self.acceleration == 0.0 {
+        if T::IS_PLAIN && self.is_plain() {
             let sum_of_sines = self.sum_of_sines(t);
             return (T::of(self.rate + sum_of_sines.rate), T::of(sum_of_sines.acceleration));
         }
@@ -304,6 +318,7 @@ mod tests {
             rate: 6.25,
             acceleration: -0.5,
             sines: vec![Sine { amplitude: 0.2, frequency: 11.0, phase: 0.4 }],
+            profile: None,
         }
     }
 
@@ -329,7 +344,7 @@ mod tests {
         ) {
             let t = Time::sum(hi, part * f64::EPSILON * hi.abs());
             let sines = vec![Sine { amplitude, frequency: 0.7 * rate + 1.0, phase: start }];
-            let law = Law { start, rate, acceleration: 0.0, sines: if amplitude == 0.0 { Vec::new() } else { sines } };
+            let law = Law { start, rate, acceleration: 0.0, sines: if amplitude == 0.0 { Vec::new() } else { sines }, profile: None };
             let exact = law.at::<DoubleDouble>(t);
             let plain = law.at::<f64>(t);
             // The sine itself is rounded.

@@ -76,6 +76,8 @@ pub struct CoordinatePartition {
     pub bodies: Vec<DependentAngle>,
     /// The body whose angle each independent coordinate is, or the coordinate of an origin.
     pub independent: Vec<usize>,
+    /// How many rows it was made of, the first ones.
+    given: usize,
 }
 
 impl CoordinatePartition {
@@ -134,14 +136,19 @@ impl CoordinatePartition {
             partition.push(DependentAngle { base: Some(independent.len()), laws: Vec::new() });
             independent.push(origin_point);
         }
-        Ok(Self { angles: bodies, bodies: partition, independent })
+        Ok(Self { angles: bodies, bodies: partition, independent, given: rows.len() })
     }
 
     /// Every angle and origin a coordinate of its own.
     pub fn free(mechanism: &Mechanism) -> Self {
         let n = mechanism.coordinates();
         let bodies = (0..n).map(|i| DependentAngle { base: Some(i), laws: Vec::new() }).collect();
-        Self { angles: mechanism.bodies.len(), bodies, independent: (0..n).collect() }
+        Self { angles: mechanism.bodies.len(), bodies, independent: (0..n).collect(), given: 0 }
+    }
+
+    /// The same with the laws that these rows have now.
+    pub(super) fn renewed(&self, rows: &[ConstraintEquation]) -> Result<Self, CompileError> {
+        Self::new(self.angles, self.bodies.len(), &rows[..self.given])
     }
 
     /// How many of the independent coordinates are angles; they come first.

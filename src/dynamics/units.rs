@@ -7,7 +7,7 @@
 //! or heavier behaves alike: multiplied by a power of 1024, to the last bit.
 
 use super::{Mechanism, Motion};
-use crate::scene::{Law, Scene};
+use crate::scene::{Law, Profile, Scene};
 use serde::Serialize;
 
 /// Units of a mechanism, powers of 1024.
@@ -75,7 +75,9 @@ impl Mechanism {
 fn laws(scene: &Scene, length: f64) -> impl Iterator<Item = f64> {
     let of = |law: &Law, unit: f64| {
         let sines = law.sines.iter().map(|sine| sine.frequency.abs()).fold(0.0, f64::max);
-        sines.max(law.rate.abs() / unit).max((law.acceleration.abs() / unit).sqrt())
+        let [rate, acceleration] = law.profile.as_ref().map_or([0.0; 2], Profile::peaks);
+        let rate = rate.max(law.rate.abs());
+        sines.max(rate / unit).max((acceleration.max(law.acceleration.abs()) / unit).sqrt())
     };
     let motors = scene.motors.iter().map(move |motor| of(&motor.law, 1.0));
     let factors = scene

@@ -137,7 +137,11 @@ impl ContactDriver {
             }
         };
         if let Some(what) = broken(&free, &after) {
-            return Err(refused(self, what, "change rates along what the constraints allow"));
+            let hint = match self.free.laws.as_ref().is_some_and(|laws| laws.formulas.drives()) {
+                true => "the law of a motor must keep its value and its rate through its corners",
+                false => "change rates along what the constraints allow",
+            };
+            return Err(refused(self, what, hint));
         }
         self.mechanism = in_modes(&free, &self.mechanism.held, &self.mechanism.modes);
         if let Some(events) = &mut self.events {

@@ -28,6 +28,8 @@ const ROUNDS: usize = 6;
 const SAME: f64 = 1e-9;
 /// Share of the largest value within a step up to which a condition is at its zero where the step begins.
 const NO_VALUE: f64 = 1e-12;
+/// Steps of this share of the time are rounding.
+const INSTANT: f64 = 8.0 * f64::EPSILON;
 /// Events kept; more are counted.
 const KEPT: usize = 100_000;
 
@@ -379,6 +381,10 @@ impl EventDetector {
                 Owner::Friction(..) => Some(true),
                 _ => None,
             };
+            // Within the rounding of time a condition is on both sides.
+            if mode.is_some() && span <= INSTANT * begin.hi.abs() {
+                continue;
+            }
             if let Some(mode) = mode {
                 // It lies on the side its laws are recorded for, and leaves it at once where it turns away.
                 // An impact may have carried it across.

@@ -742,6 +742,7 @@ fn fastest_rate(scene: &Scene, mechanism: &Mechanism) -> f64 {
         .iter()
         .map(|motor| {
             motor.law.rate.abs()
+                + motor.law.profile.as_ref().map_or(0.0, |profile| profile.peaks()[0])
                 + motor
                     .law
                     .sines

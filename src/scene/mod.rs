@@ -14,6 +14,7 @@ mod friction;
 mod law;
 mod locate;
 mod number;
+mod profile;
 #[doc(hidden)]
 pub mod read;
 mod schema;
@@ -32,6 +33,7 @@ pub use law::{
     Scope, Signal,
 };
 pub use number::number;
+pub use profile::Profile;
 pub use read::{parse_scene, read_scene, read_text, source_name};
 pub use schema::schema;
 pub use set::{Override, OverrideError};
@@ -329,7 +331,7 @@ pub struct Motor {
 
 /// `start + rate·t + acceleration·t²/2 + Σ amplitude·sin(frequency·t + phase)` in the unit u of what it
 /// gives: \[rad\] of a motor on an angle, \[m\] of one on a slider, \[1\] of a force or a torque.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Law {
     /// Value at t = 0 without the sines \[u\].
     pub start: f64,
@@ -339,6 +341,8 @@ pub struct Law {
     pub acceleration: f64,
     /// Sines on top.
     pub sines: Vec<Sine>,
+    /// Any other formula of time, of which the law is the sum with the rest; motors alone have one.
+    pub profile: Option<Profile>,
 }
 
 /// One sine of a [`Law`].

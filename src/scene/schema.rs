@@ -75,8 +75,10 @@ fn shape(of: &Shape) -> Value {
         Shape::Tables => {
             let [least, most] = POINTS;
             let point = json!({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2});
+            let text = json!({"type": "string", "minLength": 1, "maxLength": LONGEST_TEXT});
+            let columns = json!({"type": "object", "properties": {"file": text, "x": text, "y": text}, "required": ["file", "x", "y"], "additionalProperties": false});
             let points = json!({"type": "array", "items": point, "minItems": least, "maxItems": most});
-            json!({"type": "object", "propertyNames": identifier(), "additionalProperties": points})
+            json!({"type": "object", "propertyNames": identifier(), "additionalProperties": {"anyOf": [points, text, columns]}})
         }
         Shape::Names => json!({"type": "array", "items": shape(&Shape::Name)}),
         Shape::Name => json!({"type": "string", "pattern": format!("^[A-Za-z0-9_-]{{1,{LONGEST_NAME}}}$")}),

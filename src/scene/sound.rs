@@ -154,7 +154,9 @@ impl Scene {
     fn faulty_law(&self) -> Option<String> {
         let is_wrong = |law: &Law| {
             let sines = law.sines.iter().flat_map(|sine| [sine.amplitude, sine.frequency, sine.phase]);
-            [law.start, law.rate, law.acceleration].into_iter().chain(sines).any(|number| !number.is_finite())
+            let profile = law.profile.iter().flat_map(|profile| profile.at(0.0));
+            let mut numbers = [law.start, law.rate, law.acceleration].into_iter().chain(sines).chain(profile);
+            numbers.any(|number| !number.is_finite())
         };
         let laws = (self.motors.iter().map(|part| (&part.name, Some(&part.law))))
             .chain(self.drives.iter().map(|part| (&part.name, Some(&part.law))))

@@ -4,10 +4,10 @@ use super::fit::written_starts;
 use super::format::GROUND;
 use super::friction::Part;
 use super::{
-    Force, Friction, FrictionPlace, Given, Load, LoadLaw, NamedPoint, Place, Scene, SceneEvent, Slider,
+    Force, Friction, FrictionPlace, Given, Law, Load, LoadLaw, NamedPoint, Place, Scene, SceneEvent, Slider,
     Torque,
 };
-use serde::Serialize;
+use serde::ser::{Serialize, SerializeStruct, Serializer};
 use serde_json::{Map, Value, json};
 
 impl Scene {
@@ -235,4 +235,19 @@ fn with(mut object: Value, key: &str, value: &Option<impl Serialize>) -> Value {
         members.insert(key.to_owned(), json!(value));
     }
     object
+}
+
+impl Serialize for Law {
+    /// As a scene has it: the object of its terms, or the formula it is.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        if let Some(profile) = &self.profile {
+            return serializer.serialize_str(profile.text());
+        }
+        let mut terms = serializer.serialize_struct("Law", 4)?;
+        terms.serialize_field("start", &self.start)?;
+        terms.serialize_field("rate", &self.rate)?;
+        terms.serialize_field("acceleration", &self.acceleration)?;
+        terms.serialize_field("sines", &self.sines)?;
+        terms.end()
+    }
 }

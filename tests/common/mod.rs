@@ -82,7 +82,7 @@ pub fn spring(damping: f64) -> Spring {
 /// Case e with motor rate `rate` \[rad/s\].
 pub fn motor(inertia: Inertia, rate: f64) -> Scene {
     let mut scene = double_pendulum(inertia, [(FRAC_PI_2, rate), (FRAC_PI_2, rate)]);
-    let law = Law { start: FRAC_PI_2, rate, acceleration: 0.0, sines: vec![] };
+    let law = Law { start: FRAC_PI_2, rate, acceleration: 0.0, sines: vec![], profile: None };
     scene.motors.push(Motor { name: "motor".into(), bar: 0, relative_to: None, law });
     scene
 }

@@ -107,6 +107,7 @@ pub fn tree(n: usize, motors: bool, dice: &mut Dice) -> Scene {
                     rate: dice.within(-4.0, 4.0),
                     acceleration: dice.within(-1.0, 1.0),
                     sines,
+                    profile: None,
                 };
                 let relative_to = if dice.flip() { parent } else { None };
                 driven.push(Motor { name: format!("motor{bar}"), bar, relative_to, law });

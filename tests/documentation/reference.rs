@@ -113,6 +113,13 @@ fn shape(schema: &Value, kinds: &[Kind]) -> String {
         }
         Some("object") => match kinds.iter().find(|kind| kind.is(schema)) {
             Some(kind) => format!("[{}](#{})", kind.title, kind.anchor),
+            None if schema["additionalProperties"] == json!(false) => {
+                let keys = schema["properties"].as_object().into_iter().flatten();
+                format!(
+                    "object with {}",
+                    keys.map(|(key, _)| format!("`{key}`")).collect::<Vec<_>>().join(", ")
+                )
+            }
             None => {
                 let key = if schema["propertyNames"]["pattern"] == json!("^[A-Za-z0-9_-]{1,64}$") {
                     "name of a body"

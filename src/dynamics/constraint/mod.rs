@@ -241,6 +241,7 @@ pub(super) mod tests {
             rate: 2.0,
             acceleration: 0.3,
             sines: vec![Sine { amplitude: 0.2, frequency: 3.0, phase: 0.5 }],
+            profile: None,
         }
     }
 

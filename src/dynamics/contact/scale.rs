@@ -19,6 +19,7 @@ use crate::dynamics::force::action::Kind;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::point::Point;
 use crate::dynamics::{Mechanism, Motion};
+use crate::scene::Profile;
 
 /// Rounding of a gap over the length of its contact, at most, at the start.
 pub const ROUNDED: f64 = 1e-13;
@@ -86,7 +87,8 @@ fn size(bodies: &[Body]) -> f64 {
 fn driven(rows: &[ConstraintEquation], mass: f64, length: f64) -> f64 {
     let force = |row: &ConstraintEquation| {
         let Some(law) = &row.law else { return 0.0 };
-        let (mut rate, mut acceleration) = (law.rate.abs(), law.acceleration.abs());
+        let peaks = law.profile.as_ref().map_or([0.0; 2], Profile::peaks);
+        let (mut rate, mut acceleration) = (law.rate.abs() + peaks[0], law.acceleration.abs() + peaks[1]);
         for sine in &law.sines {
             rate += (sine.amplitude * sine.frequency).abs();
             acceleration += (sine.amplitude * sine.frequency * sine.frequency).abs();

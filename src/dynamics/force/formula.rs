@@ -10,7 +10,7 @@ use crate::dynamics::constraint::Site;
 use crate::dynamics::forest::Forest;
 use crate::dynamics::{CompileError, Configuration};
 use crate::scene::formula::Formula;
-use crate::scene::{Bound, Direction, Load, Meaning, Names, Place, Scene, Scope};
+use crate::scene::{Bound, Direction, Load, Meaning, Names, Place, Profile, Scene, Scope};
 
 /// From the first point to the second: the vector and its length.
 fn span<S: Scalar>(at: &Configuration<S>, [a, b]: &[Site; 2]) -> ([S; 2], S) {
@@ -105,6 +105,8 @@ pub(crate) struct Formulas {
     pub parameters: Vec<f64>,
     signals: Vec<Expression>,
     laws: Vec<Law>,
+    /// Laws of motors that are formulas, by the names of these.
+    profiles: Vec<(String, Expression)>,
     /// Events.
     pub events: Vec<FormulaEvent>,
     /// What each condition is part of, for messages.
@@ -141,7 +143,10 @@ impl Binder<'_> {
 impl Formulas {
     /// Those of a scene; `None` where it has none.
     pub fn of(scene: &Scene, forest: &Forest) -> Result<Option<Self>, CompileError> {
-        if scene.laws.is_empty() && scene.events.is_empty() {
+        let motors = (scene.motors.iter().map(|motor| (&motor.name, &motor.law)))
+            .chain(scene.drives.iter().map(|drive| (&drive.name, &drive.law)));
+        let motors: Vec<_> = motors.filter_map(|(name, law)| Some((name, law.profile.as_ref()?))).collect();
+        if scene.laws.is_empty() && scene.events.is_empty() && motors.is_empty() {
             return Ok(None);
         }
         let mut names = Names::of(scene);
@@ -191,6 +196,10 @@ impl Formulas {
             };
             laws.push(Law { name: law.name.clone(), potential, place });
         }
+        let mut profiles = Vec::new();
+        for (name, profile) in motors {
+            profiles.push((name.clone(), binder.expression(&names.alone(), profile.text(), name)?));
+        }
         let conditions = std::mem::take(&mut binder.conditions);
         let parameter = |name: &String| scene.parameters.iter().position(|known| known.name == *name);
         let mut events = Vec::new();
@@ -212,7 +221,7 @@ impl Formulas {
             });
         }
         let parameters = scene.parameters.iter().map(|parameter| parameter.value).collect();
-        Ok(Some(Self { parameters, signals, laws, events, conditions }))
+        Ok(Some(Self { parameters, signals, laws, profiles, events, conditions }))
     }
 
     /// True where a law applies forces beside potentials, on whatever branch.
@@ -246,6 +255,23 @@ impl Formulas {
         self.laws.iter().map(record).collect()
     }
 
+    /// True where laws of motors are formulas.
+    pub fn drives(&self) -> bool {
+        !self.profiles.is_empty()
+    }
+
+    /// The laws of motors on the same branches, with the names of these.
+    pub fn profiles(&self, parameters: &[f64], modes: &[bool]) -> impl Iterator<Item = (&str, Profile)> {
+        self.profiles.iter().map(move |(name, expression)| {
+            let value = |meaning: &Meaning<Site>| match meaning {
+                Meaning::Parameter(number) => Some(parameters[*number]),
+                _ => None,
+            };
+            let values: Vec<Option<f64>> = expression.meanings.iter().map(value).collect();
+            (name.as_str(), Profile::on_branch(&expression.formula, &values, expression.modes(modes)))
+        })
+    }
+
     /// The values of all conditions, on the branches that `modes` say.
     pub fn condition_values(&self, at: &Configuration<f64>, parameters: &[f64], modes: &[bool]) -> Vec<f64> {
         let mut all = Vec::with_capacity(self.conditions.len());
@@ -254,7 +280,8 @@ impl Formulas {
         }
         let signals = self.signals(at, parameters, modes);
         let laws = self.laws.iter().flat_map(Law::expressions);
-        for expression in self.signals.iter().chain(laws) {
+        let profiles = self.profiles.iter().map(|profile| &profile.1);
+        for expression in self.signals.iter().chain(laws).chain(profiles) {
             if expression.formula.conditions() > 0 {
                 let values = expression.values(at, parameters, &signals);
                 expression.formula.condition_values(&values, expression.modes(modes), &mut all);

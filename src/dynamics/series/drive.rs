@@ -8,6 +8,14 @@ use crate::dynamics::law::Law;
 /// `first`.
 pub fn add<T: Real>(law: &Law, sign: f64, t: Time, series: &mut [T], first: usize, stride: usize) {
     series[first] += law.at::<T>(t).rate.scale(sign);
+    if let Some(profile) = &law.profile {
+        // Power m of the rate is m + 1 times power m + 1 of the law; power 0 is there already.
+        let order = (series.len() - first).div_ceil(stride);
+        let powers = profile.series::<T>(t, order);
+        for (m, power) in series[first..].iter_mut().step_by(stride).enumerate().skip(1) {
+            *power += powers[m + 1].scale(sign * (m + 1) as f64);
+        }
+    }
     series[first + stride] += T::of(law.acceleration).scale(sign);
     for sine in &law.sines {
         let (sin, cos) = T::split((t.scale(sine.frequency) + sine.phase).reduced().0).0.sin_cos();

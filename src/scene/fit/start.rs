@@ -283,6 +283,10 @@ impl Law {
             start.phi += sine.amplitude * libm::sin(sine.phase);
             start.omega += sine.amplitude * sine.frequency * libm::cos(sine.phase);
         }
+        if let Some(profile) = &self.profile {
+            let [phi, omega, _] = profile.at(0.0);
+            start = Start { phi: start.phi + phi, omega: start.omega + omega };
+        }
         start
     }
 }

@@ -177,7 +177,7 @@ impl Shape {
             Self::Signals => "must be {name: formula in quotes}".to_owned(),
             Self::Tables => {
                 let [least, most] = super::formula::POINTS;
-                format!("must be {{name: list of {least} to {most} points [x, y], x ascending}}")
+                format!("must be {{name: list of {least} to {most} points [x, y], x ascending, or CSV file}}")
             }
             Self::Names => "must be a list of names of parts".to_owned(),
             Self::Name => format!("must be a name: 1 to {LONGEST_NAME} letters, digits, - or _"),

@@ -54,7 +54,7 @@ pub(in crate::scene) static SCENE: Table = Table {
             "tables",
             Shape::Tables,
             "{\"gust\": [[0, 0], [1, 2.5], [3, 0]]}",
-            "Functions by name, smooth through points (x, y), for formulas as gust(t); none if absent.",
+            "Functions by name, smooth through points (x, y), for formulas as gust(t): the points, a CSV file of two columns as \"gust.csv\", or two of its columns as {\"file\": \"log.csv\", \"x\": \"time\", \"y\": \"wind\"}; none if absent.",
         ),
         optional(
             "signals",

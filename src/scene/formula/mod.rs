@@ -168,6 +168,16 @@ impl Formula {
         self.run(values, |number, _| bits.get(number).copied().unwrap_or(false))
     }
 
+    /// The branches that hold at these values, by the signs of the conditions there.
+    pub fn modes(&self, values: &[f64]) -> Vec<bool> {
+        let mut modes = vec![false; self.conditions.len()];
+        self.run(values, |number, condition| {
+            modes[number] = condition > 0.0;
+            modes[number]
+        });
+        modes
+    }
+
     /// The values of its conditions on the same branches.
     pub fn condition_values<S: Scalar>(&self, values: &[S], bits: &[bool], all: &mut Vec<S>) {
         if self.conditions.is_empty() {

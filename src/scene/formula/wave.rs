@@ -116,7 +116,7 @@ impl Wave {
         };
         let [start, rate, square] = self.powers;
         let moving = self.waves.iter().filter(|wave| wave.1 != [0.0; 2]);
-        Law { start, rate, acceleration: 2.0 * square, sines: moving.map(sine).collect() }
+        Law { start, rate, acceleration: 2.0 * square, sines: moving.map(sine).collect(), profile: None }
     }
 }
 
@@ -172,16 +172,17 @@ impl Formula {
                 Some(wave) => waves.push(wave),
                 None => {
                     let (start, end) = self.places[number];
-                    let problem = "a law of time is a sum of sines and a parabola";
-                    let hint = "for example \"0.5 + 3*t + 0.2*sin(5*t)\", with t only in sines of a + b*t, squared at most";
+                    let problem = "the factor of a force or torque is a sum of sines and a parabola";
+                    let hint = "write the force or torque itself as a formula, which may be any";
                     let (start, end) = (start as usize, end as usize);
                     return Err(FormulaError::new(&self.text, start, end, problem.into(), hint.into()));
                 }
             }
         }
-        Ok(waves
-            .last()
-            .map_or(Law { start: 0.0, rate: 0.0, acceleration: 0.0, sines: Vec::new() }, Wave::law))
+        Ok(waves.last().map_or(
+            Law { start: 0.0, rate: 0.0, acceleration: 0.0, sines: Vec::new(), profile: None },
+            Wave::law,
+        ))
     }
 }
 

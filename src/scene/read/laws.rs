@@ -6,10 +6,9 @@ use super::names::Bars;
 use super::resolve::{Known, check_name, fits, refused};
 use crate::scene::error::SceneError;
 use crate::scene::format::{Field, Quantity, SCENE, Shape};
-use crate::scene::formula::POINTS;
 use crate::scene::formula::unit::Dimension;
 use crate::scene::law::{
-    Bound, Direction, Integral, Load, LoadLaw, NamedPoint, Names, PointTable, SceneEvent, Scope, Signal,
+    Bound, Direction, Integral, Load, LoadLaw, NamedPoint, Names, SceneEvent, Scope, Signal,
 };
 use crate::scene::locate::{Member, Node, Value};
 use crate::scene::set::hint;
@@ -214,46 +213,6 @@ fn check_keys<'a>(at: &At<'a>, mut taken: Vec<&'a str>) -> Result<(), SceneError
         taken.push(&member.key);
     }
     Ok(())
-}
-
-/// The tables of a scene.
-pub(super) fn tables(root: &At) -> Result<Vec<PointTable>, SceneError> {
-    let Some(at) = root.child("tables") else { return Ok(Vec::new()) };
-    let refused =
-        |at: &At| at.refuse_value(&Shape::Tables.allowed(), "for example {\"gust\": [[0, 0], [1, 2.5]]}");
-    let Value::Object(members) = &at.node.value else { return Err(refused(&at)) };
-    let mut tables: Vec<PointTable> = Vec::new();
-    for member in members {
-        let list = at.member(member);
-        let taken: Vec<&str> = tables.iter().map(|table| table.name.as_str()).collect();
-        check_name(at.source, &member.key, member.span, &list.path, &taken)?;
-        let Value::List(nodes) = &member.node.value else { return Err(refused(&list)) };
-        let [least, most] = POINTS;
-        if !(least..=most).contains(&nodes.len()) {
-            let problem = format!("has {} points", nodes.len());
-            return Err(list.refuse(&problem, &Shape::Tables.allowed(), "thin it out, or write a formula"));
-        }
-        let mut points: Vec<[f64; 2]> = Vec::new();
-        for (number, node) in nodes.iter().enumerate() {
-            let item = list.item(node, number);
-            let Value::List(pair) = &node.value else { return Err(refused(&item)) };
-            let point = match pair.as_slice() {
-                [x, y] => match (&x.value, &y.value) {
-                    (Value::Number(x), Value::Number(y)) if x.is_finite() && y.is_finite() => [*x, *y],
-                    _ => return Err(refused(&item)),
-                },
-                _ => return Err(refused(&item)),
-            };
-            if points.last().is_some_and(|last| point[0] <= last[0]) {
-                return Err(
-                    item.refuse_value("must have a larger x than the point before", "sort the points")
-                );
-            }
-            points.push(point);
-        }
-        tables.push(PointTable { name: member.key.clone(), points });
-    }
-    Ok(tables)
 }
 
 /// The signals of a scene.

@@ -2,6 +2,7 @@
 
 use super::at::{At, Fields, listed, nearest};
 use super::names::Bars;
+use super::resolve::Constants;
 use crate::scene::error::SceneError;
 use crate::scene::format::{DRIVE, Field, Shape};
 use crate::scene::locate::Value;
@@ -99,18 +100,22 @@ pub(super) fn motor<'a>(
     name: String,
     known: &Bars,
     sliders: &[Slider],
+    constants: &Constants,
 ) -> Result<AnyMotor<'a>, SceneError> {
     if std::ptr::eq(fields.table, &DRIVE) {
         return Ok(AnyMotor::Travel(Drive {
             name,
             slider: slider(&fields.required("slider")?, sliders)?,
-            law: law(fields)?,
+            law: motor_law(fields, constants)?,
         }));
     }
     let bar =
         known.bar(fields, "a motor turns a bar; to hold a bar still give its law a start and no rate")?;
     let relative_to = known.relative_to(fields, bar, "leave it out for an angle from +x")?;
-    Ok(AnyMotor::Angle(Motor { name, bar, relative_to, law: law(fields)? }, fields.at.clone()))
+    Ok(AnyMotor::Angle(
+        Motor { name, bar, relative_to, law: motor_law(fields, constants)? },
+        fields.at.clone(),
+    ))
 }
 
 /// The slider named at `at`.
@@ -127,6 +132,18 @@ fn slider(at: &At, sliders: &[Slider]) -> Result<usize, SceneError> {
         };
         at.refuse_value(&Shape::SliderName.allowed(), &hint)
     })
+}
+
+/// The law of a motor: a sum, or a formula that is none.
+fn motor_law(fields: &Fields, constants: &Constants) -> Result<Law, SceneError> {
+    let at = fields.required("law")?;
+    let Value::Text(text) = &at.node.value else { return law(fields) };
+    let profile = constants.profile(text);
+    if profile.as_ref().is_some_and(|profile| profile.at(0.0).iter().all(|value| value.is_finite())) {
+        return Ok(Law { profile, ..Law::default() });
+    }
+    let allowed = "must have a finite value, rate and acceleration at t = 0";
+    Err(at.refuse_value(allowed, "the start of the motion follows from them"))
 }
 
 /// The field `law`, in the units that its table says.
@@ -153,5 +170,6 @@ fn law(fields: &Fields) -> Result<Law, SceneError> {
         rate: law.number_or("rate", 0.0)?,
         acceleration: law.number_or("acceleration", 0.0)?,
         sines,
+        profile: None,
     })
 }

@@ -12,6 +12,7 @@ mod loads;
 mod names;
 mod resolve;
 mod start;
+mod tables;
 
 pub(super) use at::{At, Fields, listed, nearest};
 pub(super) use start::GivenStart;
@@ -25,7 +26,7 @@ use super::{Drive, Motor, Scene};
 use laws::Either;
 use loads::AnyMotor;
 use names::{Bars, named};
-use resolve::Resolved;
+use resolve::{Constants, Resolved};
 use std::io::Read;
 use std::path::Path;
 
@@ -142,7 +143,9 @@ fn scene(root: &At, Resolved { parameters, tables }: Resolved) -> Result<Scene, 
     let forces = laws::split(forces, &mut laws);
     let torques = laws::split(torques, &mut laws);
     laws.extend(potentials);
-    let (any, _) = named(&fields, "motors", |fields, name| loads::motor(fields, name, &known, &sliders))?;
+    let constants = Constants::new(&parameters, &tables);
+    let (any, _) =
+        named(&fields, "motors", |fields, name| loads::motor(fields, name, &known, &sliders, &constants))?;
     let (motors, motor_places, drives) = sorted(any);
     let (walls, wall_places) = named(&fields, "walls", |fields, name| joints::wall(fields, name, &known))?;
     let given = start::starts(&fields, &known)?;

@@ -4,13 +4,13 @@
 //! formula of time and state, where the format takes one, stays a text for the reader of loads and events.
 
 use super::at::At;
-use super::laws;
+use super::tables;
 use crate::scene::error::SceneError;
-use crate::scene::format::{Quantity, SCENE, Shape, Table, about, kind};
+use crate::scene::format::{FACTOR_LAW, Quantity, SCENE, Shape, Table, about, kind};
 use crate::scene::formula::unit::Dimension;
 use crate::scene::formula::{DEEPEST, FUNCTIONS, Formula, FormulaError, Interpolant};
 use crate::scene::locate::{Member, Node, Source, Span, Value, push_index, push_key};
-use crate::scene::{Law, Parameter, PointTable, Sine};
+use crate::scene::{Law, Parameter, PointTable, Profile, Sine};
 
 /// Names that formulas give a meaning of their own.
 const RESERVED: [&str; 5] = ["t", "pi", "length", "rate", "angle"];
@@ -36,12 +36,35 @@ pub(super) struct Resolved {
     pub tables: Vec<PointTable>,
 }
 
+/// What formulas of time may use beside it: parameters and tables.
+pub(super) struct Constants<'a> {
+    parameters: &'a [Known],
+    tables: Vec<Interpolant>,
+}
+
+impl<'a> Constants<'a> {
+    pub fn new(parameters: &'a [Known], tables: &[PointTable]) -> Self {
+        let tables = tables.iter().map(|table| Interpolant::new(&table.name, &table.points)).collect();
+        Self { parameters, tables }
+    }
+
+    /// The law of a formula that was judged; `None` where it is none.
+    pub fn profile(&self, text: &str) -> Option<Profile> {
+        let formula = Formula::parse_with(text, &self.tables).ok()?;
+        let value = |name: &str| {
+            let known = self.parameters.iter().find(|known| known.name == name);
+            known.map(|known| known.value)
+        };
+        Some(Profile::new(&formula, &formula.names().map(value).collect::<Vec<_>>()))
+    }
+}
+
 /// Puts numbers in the place of formulas of parameters; returns the parameters, and the tables they may use.
 ///
 /// # Errors
 /// A formula that is none, a name that nothing has, a dimension that does not fit, a cycle.
 pub(super) fn resolve(source: &Source, tree: &mut Node) -> Result<Resolved, SceneError> {
-    let tables = laws::tables(&At { source, node: tree, path: String::new() })?;
+    let tables = tables::tables(&At { source, node: tree, path: String::new() })?;
     let functions: Vec<_> = tables.iter().map(|table| Interpolant::new(&table.name, &table.points)).collect();
     let parameters = parameters(source, tree, &functions)?;
     Resolver { source, parameters: &parameters, tables: &functions }.members(tree, &SCENE, "")?;
@@ -228,10 +251,12 @@ impl Resolver<'_> {
             (Shape::LawPair(quantity), Value::List(nodes)) => {
                 each(nodes, &|node, path| self.visit(node, &Shape::LawNumber(*quantity), path))
             }
-            (Shape::Law(table, quantity), Value::Text(text)) => {
-                let law = self.law(text, node.span, quantity, shape, path)?;
-                node.value = law_object(node.span, &law);
-                self.members(node, table, path)
+            (Shape::Law(_, quantity), Value::Text(text)) => {
+                // What is no sum is left to the reader of motors.
+                if let Some(law) = self.law(text, node.span, quantity, shape, path)? {
+                    node.value = law_object(node.span, &law);
+                }
+                Ok(())
             }
             (Shape::Object(table) | Shape::Law(table, _), _) => self.members(node, table, path),
             (Shape::Between, Value::List(nodes)) => {
@@ -251,7 +276,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// The law of time that a formula is.
+    /// The law of time that a formula is; `None` for one of a motor that is no sum.
     fn law(
         &self,
         text: &str,
@@ -259,14 +284,18 @@ impl Resolver<'_> {
         quantity: &Quantity,
         shape: &Shape,
         path: &str,
-    ) -> Result<Law, SceneError> {
+    ) -> Result<Option<Law>, SceneError> {
         let refused = |error: FormulaError| refused(self.source, span, path, &shape.allowed(), &error);
-        let formula = Formula::parse(text).map_err(refused)?;
+        let formula = Formula::parse_with(text, self.tables).map_err(refused)?;
         let time = (None, Some(Dimension::of("s")));
         let (values, dimensions) = self.arguments(&formula, &[("t", time)]).map_err(refused)?;
         let dimension = formula.dimension(&dimensions).map_err(refused)?;
         fits(&formula, dimension, quantity).map_err(refused)?;
-        formula.law(&values).map_err(refused)
+        let is_motor = !matches!(shape, Shape::Law(table, _) if std::ptr::eq(*table, &FACTOR_LAW));
+        match formula.law(&values) {
+            Err(_) if is_motor => Ok(None),
+            law => law.map(Some).map_err(refused),
+        }
     }
 
     fn find(&self, name: &str) -> Option<&Known> {

@@ -105,8 +105,12 @@ impl Driven {
         else {
             return None;
         };
-        let is_steady = law.acceleration == 0.0 && law.sines.is_empty();
-        if tree.coordinates != 2 || tree.off_axis || !mechanism.is_plain() || base.is_some() || !is_steady {
+        if tree.coordinates != 2
+            || tree.off_axis
+            || !mechanism.is_plain()
+            || base.is_some()
+            || !law.is_steady()
+        {
             return None;
         }
         let (driven, free) = (*body, 1 - *body);

@@ -220,7 +220,7 @@ impl Model {
     /// coupled.
     fn law_through(&mut self, [value, rate]: [f64; 2], size: f64) -> Law {
         let time = self.scales.time;
-        let mut law = Law { start: value, rate, acceleration: 0.0, sines: Vec::new() };
+        let mut law = Law { start: value, rate, acceleration: 0.0, sines: Vec::new(), profile: None };
         let has_sine = self.takes(Kind::SineLaw, 0.25) || self.is_coupled;
         if has_sine {
             let (frequency, phase) = (self.dice.size(0.8, 3.0) / time, self.dice.within(-1.0, 1.0));

@@ -170,8 +170,13 @@ impl Model {
     /// A factor of about one as a function of time.
     fn factor(&mut self) -> Law {
         let time = self.scales.time;
-        let mut law =
-            Law { start: self.dice.within(-1.0, 1.0), rate: 0.0, acceleration: 0.0, sines: Vec::new() };
+        let mut law = Law {
+            start: self.dice.within(-1.0, 1.0),
+            rate: 0.0,
+            acceleration: 0.0,
+            sines: Vec::new(),
+            profile: None,
+        };
         if self.dice.chance(0.4) {
             law.rate = self.dice.signed(0.1, 0.5) / time;
         }

@@ -1,0 +1,123 @@
+//! Laws of motors that are no sum of sines and a parabola: any formula of time, recorded with its first two
+//! derivatives.
+//!
+//! A formula with corners, or with tables, is recorded on the branches that hold at one time; a run that meets
+//! a zero of one of its conditions records it anew, as it does with laws of forces.
+
+use super::formula::Formula;
+use crate::arithmetic::tape::{Slot, Symbol, Tape, TapeSeries};
+use crate::arithmetic::{DoubleDouble, Real, Scalar};
+use std::sync::Arc;
+
+/// Times at which the pace of a law is looked at, an eighth of a second apart.
+const LOOKS: usize = 65;
+
+/// A formula of time, on the branches of one time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Profile {
+    text: String,
+    tape: Arc<Tape>,
+    /// The law and its first two derivatives.
+    results: [Slot; 3],
+    /// The largest rate and acceleration in the first seconds, roughly \[u/s, u/s²\].
+    peaks: [f64; 2],
+}
+
+impl Profile {
+    /// The law of a formula on the branches that hold at t = 0; `values` are those of its names, `None` for t.
+    pub(crate) fn new(formula: &Formula, values: &[Option<f64>]) -> Self {
+        let at = |t: f64| values.iter().map(|value| value.unwrap_or(t)).collect::<Vec<f64>>();
+        let modes = formula.modes(&at(0.0));
+        Self::on_branch(formula, values, &modes)
+    }
+
+    /// The same on the branches where the conditions whose `modes` are set are positive.
+    pub(crate) fn on_branch(formula: &Formula, values: &[Option<f64>], modes: &[bool]) -> Self {
+        let [(tape, results)] = Symbol::record(|| {
+            let slope = |of: Symbol| of.gradient().first().map_or(Symbol::ZERO, |part| part.1);
+            let t = Symbol::input(0);
+            let values: Vec<Symbol> = values.iter().map(|value| value.map_or(t, Symbol::of)).collect();
+            let law = formula.evaluate(&values, modes);
+            let rate = slope(law);
+            [vec![law, rate, slope(rate)]]
+        });
+        let looks = (0..LOOKS).map(|look| {
+            let t = look as f64 / 8.0;
+            formula.value(&values.iter().map(|value| value.unwrap_or(t)).collect::<Vec<f64>>())
+        });
+        let looks: Vec<f64> = looks.collect();
+        let most = |values: &mut dyn Iterator<Item = f64>| {
+            values.map(f64::abs).filter(|value| value.is_finite()).fold(0.0, f64::max)
+        };
+        let peaks = [
+            8.0 * most(&mut looks.windows(2).map(|pair| pair[1] - pair[0])),
+            64.0 * most(&mut looks.windows(3).map(|three| three[0] - 2.0 * three[1] + three[2])),
+        ];
+        let results = [results[0], results[1], results[2]];
+        Self { text: formula.text().to_owned(), tape: Arc::new(tape), results, peaks }
+    }
+
+    /// Its formula.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The largest rate and acceleration in the first eight seconds, as seen at 65 times \[u/s, u/s²\].
+    pub fn peaks(&self) -> [f64; 2] {
+        self.peaks
+    }
+
+    /// The law and its first two derivatives at a time \[u, u/s, u/s²\].
+    pub fn at<S: Scalar>(&self, t: S) -> [S; 3] {
+        let mut slots = vec![S::ZERO; self.tape.len()];
+        self.tape.evaluate(|_| t, &mut slots);
+        self.results.map(|result| slots[result as usize])
+    }
+
+    /// Powers 0 … `order` of the law about a time \[u/s^m\].
+    pub fn series<T: Real>(&self, t: DoubleDouble, order: usize) -> Vec<T> {
+        let mut series = TapeSeries::<T>::new(&self.tape, order);
+        for m in 0..=order {
+            let power = match m {
+                0 => T::split(t).0,
+                1 => T::ONE,
+                _ => T::ZERO,
+            };
+            series.advance(&self.tape, m, |_| power);
+        }
+        series.of(self.results[0]).to_vec()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn derivatives_and_series_are_those_of_the_formula() {
+        let formula = Formula::parse("a*tanh(2*t) + exp(-t)*sin(3*t^2)").expect("a formula");
+        let values: Vec<Option<f64>> = formula.names().map(|name| (name == "a").then_some(1.5)).collect();
+        let profile = Profile::new(&formula, &values);
+        let (t, h) = (0.7_f64, 1e-4);
+        let exact = |t: f64| 1.5 * (2.0 * t).tanh() + (-t).exp() * (3.0 * t * t).sin();
+        let [value, rate, acceleration] = profile.at(t);
+        assert!((value - exact(t)).abs() < 1e-15);
+        assert!((rate - (exact(t + h) - exact(t - h)) / (2.0 * h)).abs() < 1e-6);
+        assert!((acceleration - (exact(t + h) - 2.0 * exact(t) + exact(t - h)) / (h * h)).abs() < 1e-5);
+        let powers = profile.series::<f64>(DoubleDouble::of(t), 30);
+        let sum = powers.iter().rev().fold(0.0, |sum, power| sum * 0.1 + power);
+        assert!((sum - exact(t + 0.1)).abs() < 1e-14, "{sum} {}", exact(t + 0.1));
+        assert!((powers[1] - rate).abs() < 1e-13 && (2.0 * powers[2] - acceleration).abs() < 1e-12);
+        let far = profile.at(DoubleDouble::of(0.7))[0];
+        assert!((far.hi - exact(0.7)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn corners_are_recorded_on_the_branch_of_the_start() {
+        let formula = Formula::parse("if(t < 2, t^3, 8 + 12*(t - 2))").expect("a formula");
+        let profile = Profile::new(&formula, &[None]);
+        assert_eq!(profile.at(3.0), [27.0, 27.0, 18.0]);
+        let late = Profile::on_branch(&formula, &[None], &formula.modes(&[3.0]));
+        assert_eq!(late.at(3.0), [20.0, 12.0, 0.0]);
+    }
+}
