@@ -215,3 +215,58 @@ fn no_hint_speaks_of_the_library() {
         }
     }
 }
+
+// Outputs.
+
+#[test]
+fn outputs_are_columns_of_runs_and_sweeps_and_moments() {
+    let program = Program::with_scenes(&["crank_rocker", "latch"]);
+    let run =
+        program.run("run crank_rocker.json --json --no-charts --every 0.01 --output work=O.force*pen.y");
+    let outputs = run.exits(0).object()["outputs"].clone();
+    let peak = |name: &str| outputs[name]["max"]["value"].as_f64().expect("a number");
+    assert!(peak("work") > 0.1 * peak("O") && peak("work") < 0.28 * peak("O"), "{outputs:#}");
+    assert_eq!(outputs["work"]["unit"], "J");
+
+    // A run of the sweep has the extremes of the run itself.
+    program
+        .run("sweep crank_rocker.json --vary speed=20..40:3 --every 0.01 --map max:O --out swept --quiet")
+        .exits(0);
+    let table = program.read("swept/crank_rocker/sweep-parameters.speed-taylor-1e-9-projection/sweep.csv");
+    let mut lines = table.lines().filter(|line| !line.starts_with('#'));
+    let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
+    let column = header.iter().position(|name| *name == "max:O [N]").expect("the column");
+    let swept: Vec<f64> = lines
+        .map(|line| line.split(',').nth(column).and_then(|cell| cell.parse().ok()).expect("a number"))
+        .collect();
+    assert_eq!(swept.len(), 3);
+    let alone = program
+        .run("run crank_rocker.json --json --no-charts --set speed=30 --out alone --trust off")
+        .exits(0)
+        .object();
+    assert_eq!(alone["outputs"]["O"]["max"]["value"].as_f64(), Some(swept[1]));
+    program
+        .run("sweep crank_rocker.json --vary speed=20..40:3 --map max:Q --out wrong")
+        .exits(2)
+        .says(&["max:Q", "max:O"]);
+
+    // What is asked for and does not exist is refused with what there is.
+    program.run("run crank_rocker.json --output Q.force").exits(2).says(&["--output Q.force", "O.force"]);
+}
+
+#[test]
+fn a_moment_is_that_of_the_run() {
+    let program = Program::with_scenes(&["crank_rocker", "latch"]);
+    let run =
+        program.run("run crank_rocker.json --json --no-charts --until 0.3 --trust off").exits(0).object();
+    let moment = program.run("inspect crank_rocker.json --json --at 0.3").exits(0).object();
+    assert_eq!(moment["t"], 0.3);
+    for name in ["O", "torque", "pen_speed"] {
+        let (a, b) = (&run["outputs"][name]["final"], &moment["outputs"][name]["value"]);
+        let (a, b) = (a.as_f64().expect("a number"), b.as_f64().expect("a number"));
+        assert!((a - b).abs() < 1e-9 * b.abs(), "{name}: {a} {b}");
+    }
+    program.run("inspect crank_rocker.json --at 0.3").exits(0).shows(&["0.3 s", "torque"]);
+    program.run("inspect crank_rocker.json --at -1").exits(2).says(&["--at"]);
+    program.run("inspect crank_rocker.json --at lunch").exits(2).says(&["--at lunch", "event"]);
+}

@@ -44,6 +44,7 @@ mod linkages;
 mod looped;
 mod metamorphic;
 mod natural;
+mod outputs;
 mod profiles;
 mod published;
 mod radau;

@@ -94,7 +94,7 @@ fn read_shipped(name: &str) -> Scene {
 #[test]
 fn every_shipped_scene_reads() {
     let files = shipped();
-    assert_eq!(files.len(), 35);
+    assert_eq!(files.len(), 36);
     for file in files {
         match read_scene(&file, &[]) {
             Ok(scene) => {

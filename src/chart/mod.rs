@@ -14,6 +14,7 @@
 //! | [`energy_drift()`] | [`EnergyDrift`] | largest relative energy error so far |
 //! | [`constraint_drift()`] | [`ConstraintDrift`] | defects of constraints, positions beside velocities |
 //! | [`torque_power()`] | [`TorquePower`] | torque above power of motors |
+//! | [`outputs()`] | [`OutputsChart`] | outputs by unit, their extremes marked |
 //! | [`work_precision()`] | [`WorkPrecision`] | error against run time or evaluations |
 //! | [`map()`] | [`Map`] | a value over two others, as colours |
 //! | [`matrix()`] | [`Matrix`] | outcomes by row and column, as colours and words |
@@ -34,6 +35,7 @@ mod map;
 mod matrix;
 mod mechanism;
 mod motion;
+mod outputs;
 mod palette;
 mod panel;
 mod profile;
@@ -53,6 +55,7 @@ pub use map::{Cell, Map, MapAxis, map};
 pub use matrix::{Matrix, Outcome, matrix};
 pub use mechanism::{MechanismChart, mechanism};
 pub use motion::{Animation, MotionGif, motion_gif};
+pub use outputs::{OutputSeries, OutputsChart, outputs};
 pub use profile::{Profile, profile};
 pub use sketch::{HingeSketch, MotorPose, Pose, Sketch, SliderPose, SpringSketch, WallSketch};
 pub use text::{TextBox, plain, unmarked};

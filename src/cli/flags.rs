@@ -34,7 +34,7 @@ pub struct Flags {
 pub enum Command {
     /// Validate a scene and say what is active, what is left out, and which method would run it
     Check(CheckFlags),
-    /// Show accelerations, multipliers, motors, hinge forces and energy at the start
+    /// Show accelerations, multipliers, motors, hinge forces and energy at the start or a later time
     Inspect(InspectFlags),
     /// Run a scene and write its trajectory, record and charts
     Run(Box<RunFlags>),
@@ -71,6 +71,9 @@ pub struct SceneFlags {
     /// repeatable
     #[arg(long, value_name = "PATH=VALUE")]
     pub set: Vec<Override>,
+    /// Output beside those of the scene, as A.force, motor.torque, tip.x or work=motor.power/2; repeatable
+    #[arg(long, value_name = "[NAME=]FORMULA", allow_hyphen_values = true)]
+    pub output: Vec<String>,
     /// Refuse a scene of which something given for the start must change to fit its constraints
     #[arg(long)]
     pub strict: bool,
@@ -80,7 +83,7 @@ pub struct SceneFlags {
 }
 
 /// How to run it.
-#[derive(Debug, Args)]
+#[derive(Debug, Default, PartialEq, Args)]
 #[command(next_help_heading = "Integration")]
 pub struct PlanFlags {
     /// Method; left out, one that suits the scene
@@ -154,6 +157,13 @@ pub struct InspectFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub scene: SceneFlags,
+    /// Time in seconds, or the name of an event of the scene, which is then run up to there [default: the
+    /// start]
+    #[arg(long, value_name = "S|EVENT", allow_hyphen_values = true)]
+    pub at: Option<String>,
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub plan: PlanFlags,
 }
 
 /// `driftless run`.

@@ -7,6 +7,7 @@ mod compare;
 pub mod failure;
 #[doc(hidden)]
 pub mod flags;
+mod inspect;
 mod interrupt;
 mod output;
 mod progress;
@@ -24,7 +25,8 @@ use crate::report::page::counted;
 use crate::run::{Plan, Run};
 use crate::scene::{self, Override, Scene, Template};
 use clap::CommandFactory;
-use flags::{CheckFlags, Command, InspectFlags, SceneFlags};
+use failure::Exit;
+use flags::{CheckFlags, Command, SceneFlags};
 use output::{print, print_object};
 use std::sync::Arc;
 
@@ -35,7 +37,7 @@ use std::sync::Arc;
 pub fn run(flags: &Flags) -> Result<(), Failure> {
     match &flags.command {
         Command::Check(flags) => check(flags),
-        Command::Inspect(flags) => inspect(flags),
+        Command::Inspect(flags) => inspect::run(flags),
         Command::Run(given) => simulate::run(given, &flags.arguments),
         Command::Sweep(given) => sweep::run(given, &flags.arguments),
         Command::Compare(flags) => compare::run(flags),
@@ -71,16 +73,6 @@ fn check(flags: &CheckFlags) -> Result<(), Failure> {
     if flags.scene.tell.quiet { Ok(()) } else { print(&pages.join("\n")) }
 }
 
-fn inspect(flags: &InspectFlags) -> Result<(), Failure> {
-    let (scene, mechanism) = load(&flags.scene)?;
-    let inspection = report::inspect::inspect(&scene, &mechanism);
-    if flags.scene.tell.json {
-        print_object(&inspection.object(&scene))
-    } else {
-        print(&inspection.text(&scene))
-    }
-}
-
 /// Reads and compiles the scene.
 fn load(flags: &SceneFlags) -> Result<(Scene, Arc<Mechanism>), Failure> {
     compile(flags, &scene::read_text(&flags.scene)?)
@@ -89,6 +81,7 @@ fn load(flags: &SceneFlags) -> Result<(Scene, Arc<Mechanism>), Failure> {
 /// Compiles the scene of this text.
 fn compile(flags: &SceneFlags, text: &str) -> Result<(Scene, Arc<Mechanism>), Failure> {
     let scene = scene::parse_scene(text, &scene::source_name(&flags.scene), &flags.set)?;
+    let scene = with_outputs(scene, &flags.output)?;
     flags.remark(&format!(
         "read {}: scene {}, {}",
         scene::source_name(&flags.scene),
@@ -104,6 +97,22 @@ fn compile(flags: &SceneFlags, text: &str) -> Result<(Scene, Arc<Mechanism>), Fa
         stays(flags, text, &scene).iter().for_each(|note| output::message(&format!("note: {note}")));
     }
     Ok((scene, mechanism))
+}
+
+/// The scene with the outputs of the command line beside its own.
+fn with_outputs(mut scene: Scene, outputs: &[String]) -> Result<Scene, Failure> {
+    let names = scene::OutputNames::of(&scene);
+    for text in outputs {
+        let output = scene::Output::parse(text);
+        if let Err(error) = names.bind(&output) {
+            let text = format!("--output {text}: {}\nhint: {}", error.problem, error.hint);
+            return Err(Failure::new(Exit::Usage, text));
+        }
+        if scene.outputs.iter().all(|known| known.name != output.name) {
+            scene.outputs.push(output);
+        }
+    }
+    Ok(scene)
 }
 
 /// What lengths that are set leave where it is.

@@ -33,6 +33,7 @@ const FILES: &[&str] = &[
     "energy_drift.png",
     "constraint_drift.png",
     "torque_power.png",
+    "outputs.png",
     "mechanism.gif",
 ];
 

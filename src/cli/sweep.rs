@@ -155,6 +155,8 @@ fn prepared(flags: &SweepFlags, text: &str) -> Result<Sweep, Failure> {
         )
     })?;
     let template = Template::new(text.to_owned(), source_name(&flags.scene.scene), &flags.scene.set);
+    let outputs = super::with_outputs(template.scene()?, &flags.scene.output)?.outputs;
+    let template = template.with_outputs(outputs);
     let limits = Limits { energy: flags.max_energy_drift, constraint: flags.max_constraint_drift };
     let plan = Sweep::new(&template, flags.vary.clone(), request)?.with_limits(limits).trusted(flags.trust);
     super::settle(&flags.scene, plan.mechanism())?;

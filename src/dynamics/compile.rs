@@ -13,6 +13,7 @@ use super::forest::{BodyOrigin, Forest};
 use super::friction::{Friction, Mode, frictions};
 use super::impact::Contact;
 use super::kernel::Kernel;
+use super::output::Outputs;
 use super::partition::CoordinatePartition;
 use super::point::Point;
 use super::quadratic::Quadratic;
@@ -60,6 +61,8 @@ pub struct Mechanism {
     /// The scene's formulas, and where they are recorded with other parameters or on other branches: the
     /// first of `forces` are its laws, in their order.
     pub(crate) laws: Option<Laws>,
+    /// What its runs write beside their own columns.
+    pub(crate) outputs: Option<Arc<Outputs>>,
     /// True where parts or branches that do not act at the moment do work: it is integrated all along.
     pub(crate) keeps_work: bool,
     /// The mechanism with the parts that do not act at the start, and their names; where there are any.
@@ -332,6 +335,7 @@ impl Mechanism {
             actions: actions(scene, &forest),
             forces,
             laws,
+            outputs: Outputs::of(scene, &forest)?.map(Arc::new),
             keeps_work: keeps_work || !frictions.is_empty(),
             whole: None,
             integrals: scene.bars.len() - scene.own_bars(),

@@ -79,6 +79,7 @@ pub mod looped;
 pub mod multiplier;
 #[doc(hidden)]
 pub mod natural;
+pub(crate) mod output;
 #[doc(hidden)]
 pub mod partition;
 #[doc(hidden)]

@@ -3,8 +3,8 @@
 use crate::arithmetic::Complex;
 use crate::chart::{
     self, AngleSeries, Angles, ChartError, ConstraintDrift, DriftSeries, EnergyDrift, FILE_RESOLUTION,
-    HingeSketch, MechanismChart, MotionGif, MotorPose, MotorSeries, Pose, ResidualPanel, Sketch, SliderPose,
-    SpringSketch, TorquePower, WallSketch, plain,
+    HingeSketch, MechanismChart, MotionGif, MotorPose, MotorSeries, OutputSeries, OutputsChart, Pose,
+    ResidualPanel, Sketch, SliderPose, SpringSketch, TorquePower, WallSketch, plain,
 };
 use crate::dynamics::Mechanism;
 use crate::dynamics::compile::Joint;
@@ -13,7 +13,7 @@ use crate::report::curves::{between, furthest, is_coarse, smoothed, span};
 use crate::report::page::{figure, magnitude, rough};
 use crate::run::drift::Excursion;
 use crate::run::{Outcome, Sample};
-use crate::scene::{Load, Place, Scene};
+use crate::scene::{Load, NamedPoint, Place, Scene};
 use std::f64::consts::TAU;
 
 /// A chart of a run.
@@ -29,18 +29,21 @@ pub enum Chart {
     ConstraintDrift,
     /// Torque and power of the motors against time.
     TorquePower,
+    /// Outputs against time.
+    Outputs,
     /// The mechanism in motion.
     Motion,
 }
 
 impl Chart {
     /// All of them.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Mechanism,
         Self::Angles,
         Self::EnergyDrift,
         Self::ConstraintDrift,
         Self::TorquePower,
+        Self::Outputs,
         Self::Motion,
     ];
 
@@ -52,6 +55,7 @@ impl Chart {
             Self::EnergyDrift => "energy_drift.png",
             Self::ConstraintDrift => "constraint_drift.png",
             Self::TorquePower => "torque_power.png",
+            Self::Outputs => "outputs.png",
             Self::Motion => "mechanism.gif",
         }
     }
@@ -65,6 +69,7 @@ pub fn wanted(mechanism: &Mechanism, pictures: bool, motion: bool) -> Vec<Chart>
         Chart::Mechanism | Chart::Angles | Chart::EnergyDrift => pictures,
         Chart::ConstraintDrift => pictures && !mechanism.constraints.is_empty(),
         Chart::TorquePower => pictures && driven,
+        Chart::Outputs => pictures && mechanism.outputs.is_some(),
         Chart::Motion => motion,
     };
     Chart::ALL.into_iter().filter(has).collect()
@@ -90,6 +95,7 @@ pub fn draw(
             let (chart, sliders) = run.torque_power();
             chart::force_power(&chart, &sliders, FILE_RESOLUTION)
         }
+        Chart::Outputs => chart::outputs(&run.outputs(), FILE_RESOLUTION),
         Chart::Motion => return Ok(chart::motion_gif(&run.motion())?.bytes),
     };
     picture?.png_bytes()
@@ -224,13 +230,13 @@ impl Finished<'_> {
     fn mechanism_chart(&self) -> MechanismChart {
         let path = self.path();
         let coarse = is_coarse(&path);
-        let leaves = self.leaves();
-        let place = |body: usize, phi: &[f64]| self.tip(body, phi);
+        let traced = self.traced();
         let trails = if coarse {
             Vec::new()
         } else {
             let smooth = smoothed(&path);
-            leaves.iter().map(|&body| smooth.iter().map(|(_, phi)| place(body, phi)).collect()).collect()
+            let trail = |place: &Place| smooth.iter().map(|(_, phi)| self.place(place, phi)).collect();
+            traced.iter().map(trail).collect()
         };
         let mut poses: Vec<Pose> = Vec::new();
         let (mut turned, mut after) = (0.0, None);
@@ -246,13 +252,18 @@ impl Finished<'_> {
         if coarse {
             poses.drain(..poses.len().saturating_sub(1));
         }
-        let names: Vec<String> =
-            leaves.iter().map(|&body| plain(&self.mechanism.bodies[body].name)).collect();
-        let title = if coarse || names.is_empty() {
+        let names = |all: &mut dyn Iterator<Item = &String>| {
+            all.take(traced.len()).map(|name| plain(name)).collect::<Vec<_>>().join(", ")
+        };
+        let several = traced.len() > 1;
+        let title = if coarse || traced.is_empty() {
             format!("The mechanism at {} s", figure(self.outcome.last.t))
+        } else if self.points().next().is_some() {
+            let names = names(&mut self.points().map(|point| &point.name));
+            format!("{} of {names}", if several { "Paths" } else { "Path" })
         } else {
-            let (path, end) = if names.len() == 1 { ("Path", "end") } else { ("Paths", "ends") };
-            format!("{path} of the {end} of {}", names.join(", "))
+            let names = names(&mut self.leaves().into_iter().map(|body| &self.mechanism.bodies[body].name));
+            format!("{} of {names}", if several { "Paths of the ends" } else { "Path of the end" })
         };
         let more =
             (!coarse).then(|| format!("last {} s of {} s", rough(span(&path)), figure(self.outcome.last.t)));
@@ -393,6 +404,26 @@ impl Finished<'_> {
         )
     }
 
+    /// The outputs over the whole run.
+    fn outputs(&self) -> OutputsChart {
+        let whole = &self.outcome.trace.whole;
+        let heads = self.mechanism.outputs.iter().flat_map(|outputs| outputs.heads());
+        let outputs = heads.enumerate().map(|(k, (name, unit))| OutputSeries {
+            name: plain(name),
+            unit: unit.replace(' ', "·"),
+            time: whole.iter().map(|sample| sample.t).collect(),
+            value: whole.iter().map(|sample| sample.outputs.get(k).copied().unwrap_or(f64::NAN)).collect(),
+            extremes: self.outcome.extremes.get(k).map_or(Vec::new(), |one| vec![one.min, one.max]),
+        });
+        let (horizon, past) = self.horizon(self.outcome.last.t);
+        OutputsChart {
+            title: format!("Outputs over {} s", figure(self.outcome.last.t)),
+            caption: self.caption(past),
+            outputs: outputs.collect(),
+            horizon,
+        }
+    }
+
     /// The first seconds in their own time; faster or slower where too much or nothing would be seen.
     fn motion(&self) -> MotionGif {
         let head = &self.outcome.trace.head;
@@ -416,13 +447,13 @@ impl Finished<'_> {
         };
         let frames = frames.max(1);
         let time: Vec<f64> = (0..=frames).map(|k| until * k as f64 / frames as f64).collect();
-        let leaves = self.leaves();
-        let trails = leaves.iter().map(|&body| {
-            let place = |k: usize| {
+        let traced = self.traced();
+        let trails = traced.iter().map(|place| {
+            let at = |k: usize| {
                 let (phi, _) = between(head, until * k as f64 / (4 * frames) as f64);
-                self.tip(body, &phi)
+                self.place(place, &phi)
             };
-            (0..=4 * frames).map(place).collect()
+            (0..=4 * frames).map(at).collect()
         });
         MotionGif {
             title: plain(&self.scene.name),
@@ -449,6 +480,25 @@ impl Finished<'_> {
             .collect()
     }
 
+    /// The scene's points on bodies.
+    fn points(&self) -> impl Iterator<Item = &NamedPoint> {
+        self.scene.points.iter().filter(|point| point.place.bar.is_some())
+    }
+
+    /// Up to four places whose paths are drawn: the scene's points, and where it has none the far ends of
+    /// bars that no other hangs on.
+    fn traced(&self) -> Vec<Place> {
+        let points: Vec<Place> = self.points().map(|point| point.place).take(4).collect();
+        if !points.is_empty() {
+            return points;
+        }
+        let tip = |bar: usize| {
+            let tip = self.mechanism.bodies[bar].ends;
+            Place { bar: Some(bar), point: [(tip[1] - tip[0]).re, (tip[1] - tip[0]).im] }
+        };
+        self.leaves().into_iter().map(tip).collect()
+    }
+
     /// Elements and translational coordinates at these coordinates.
     fn elements(&self, phi: &[f64]) -> (Vec<Complex<f64>>, Vec<Complex<f64>>) {
         let (mut z, mut translations) =
@@ -458,11 +508,18 @@ impl Finished<'_> {
         (z, translations)
     }
 
-    /// The far end of a bar (x, y) \[m\].
-    fn tip(&self, body: usize, phi: &[f64]) -> [f64; 2] {
+    /// Where a place is (x, y) \[m\].
+    fn place(&self, place: &Place, phi: &[f64]) -> [f64; 2] {
         let (z, translations) = self.elements(phi);
-        let tip = translations[body] + self.mechanism.bodies[body].ends[1] * z[body];
-        [tip.re, tip.im]
+        self.on(place, &z, &translations)
+    }
+
+    /// The same from the elements and translational coordinates.
+    fn on(&self, place: &Place, z: &[Complex<f64>], translations: &[Complex<f64>]) -> [f64; 2] {
+        let Some(bar) = place.bar else { return place.point };
+        let offset = self.mechanism.bodies[bar].ends[0] + Complex::new(place.point[0], place.point[1]);
+        let at = translations[bar] + offset * z[bar];
+        [at.re, at.im]
     }
 
     fn sketch(&self) -> Sketch {
@@ -482,19 +539,15 @@ impl Finished<'_> {
                 .iter()
                 .map(|wall| WallSketch { through: wall.through, normal: wall.normal })
                 .collect(),
-            points: Vec::new(),
+            points: self.points().map(|point| plain(&point.name)).collect(),
         }
     }
 
     fn pose(&self, phi: &[f64], omega: &[f64]) -> Pose {
         let (z, translations) = self.elements(phi);
         let both = |point: Complex<f64>| [point.re, point.im];
-        let bodies = &self.mechanism.bodies;
         let on = |body: usize, offset: Complex<f64>| both(translations[body] + offset * z[body]);
-        let place = |place: &Place| match place.bar {
-            None => place.point,
-            Some(bar) => on(bar, bodies[bar].ends[0] + Complex::new(place.point[0], place.point[1])),
-        };
+        let place = |place: &Place| self.on(place, &z, &translations);
         let at = |joint: &Joint| joint.at.0.map_or(both(joint.at.1), |body| on(body, joint.at.1));
         let motors = self.scene.motors.iter().filter_map(|motor| {
             let joint = self.mechanism.joints.iter().find(|joint| joint.outer == Some(motor.bar))?;
@@ -519,7 +572,7 @@ impl Finished<'_> {
                     }
                 })
                 .collect(),
-            points: Vec::new(),
+            points: self.points().map(|point| place(&point.place)).collect(),
         }
     }
 
@@ -532,11 +585,12 @@ impl Finished<'_> {
         self.scene.springs.iter().map(|spring| spring.between).chain(laws)
     }
 
-    /// What joins the origin of a bar with its hinges and spring ends that lie off it, counted from its
+    /// What joins the origin of a bar with its hinges, spring ends and points that lie off it, counted from its
     /// origin \[m\].
     fn arms(&self) -> impl Iterator<Item = (usize, [Complex<f64>; 2])> {
         let hinges = self.scene.hinges.iter().flat_map(|hinge| hinge.between);
-        hinges.chain(self.springs().flatten()).filter_map(|place| {
+        let points = self.points().map(|point| point.place);
+        hinges.chain(self.springs().flatten()).chain(points).filter_map(|place| {
             let bar = place.bar?;
             let (length, [x, y]) = (self.scene.bars[bar].length, place.point);
             let is_off = y.abs() > 1e-3 * length || x < -1e-3 * length || x > 1.001 * length;

@@ -1,4 +1,4 @@
-//! The start of a scene, looked at closely: accelerations, multipliers, motors, hinge forces, energies,
+//! A moment of a motion, the start of a scene or a later one, looked at closely: accelerations, multipliers, motors, hinge forces, energies,
 //! impacts.
 //!
 //! Signs, whichever body is the ground:
@@ -25,13 +25,16 @@ use crate::arithmetic::DoubleDouble;
 use crate::dynamics::compile::Joint;
 use crate::dynamics::constraint::{ConstraintEquation, Measure, Posture};
 use crate::dynamics::kernel::{Bias, Kernel};
+use crate::dynamics::output::Moment;
 use crate::dynamics::{Mechanism, Motion};
 use crate::scene::Scene;
 use serde_json::{Map, Value, json};
 
-/// What there is to know of a scene's start.
+/// What there is to know of a moment.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Inspection {
+    /// Time \[s\].
+    pub t: f64,
     /// Each body with the acceleration of its centre of mass (x, y) \[m/s²\] and of its angle \[rad/s²\].
     pub bodies: Vec<(String, [f64; 3])>,
     /// Each constraint with its multiplier \[N·m or N\], its violation \[rad or m\] and the rate of that
@@ -52,6 +55,8 @@ pub struct Inspection {
     /// Places with dry friction: what they do, whether it is a torque \[N·m\] or a force \[N\], it and the force
     /// \[N\] that presses them.
     pub frictions: Vec<(String, &'static str, bool, [f64; 2])>,
+    /// Name, unit and value of each of the scene's outputs.
+    pub outputs: Vec<(String, String, f64)>,
 }
 
 /// What a hinge carries.
@@ -89,7 +94,7 @@ pub struct Reaction {
     pub is_determinate: Option<bool>,
 }
 
-/// A wall at the start.
+/// A wall.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Contact {
     /// Name of the wall.
@@ -122,13 +127,19 @@ const TOUCHING: f64 = 1e-12;
 pub fn inspect(scene: &Scene, mechanism: &Mechanism) -> Inspection {
     let start = mechanism.start(scene);
     let moving = mechanism.moving_at_start(&start);
-    let mechanism = moving.as_ref().unwrap_or(mechanism);
+    inspect_at(moving.as_ref().unwrap_or(mechanism), &start)
+}
+
+/// Looks at a moment of a motion; the mechanism is the one of that moment, as
+/// [`Running::mechanism`](crate::run::Running::mechanism) gives it.
+pub fn inspect_at(mechanism: &Mechanism, start: &Motion) -> Inspection {
     let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
     let omega: Vec<f64> = start.omega.iter().map(|omega| omega.hi).collect();
     let mut kernel = Kernel::<f64>::new(mechanism);
     kernel.accelerate::<0>(mechanism, start.time, &phi, &omega, Bias::default());
     mechanism.spread_multipliers(&mut kernel);
-    let mut found = Inspection { energy_scale: mechanism.energy_scale, ..Inspection::default() };
+    let (t, energy_scale) = (start.time.hi, mechanism.energy_scale);
+    let mut found = Inspection { t, energy_scale, ..Inspection::default() };
     let centres = mechanism.centre_accelerations(&kernel.z, &omega, &kernel.load);
     for (k, (body, centre)) in mechanism.own_bodies().iter().zip(centres).enumerate() {
         found.bodies.push((body.name.clone(), [centre.re, centre.im, kernel.load[k]]));
@@ -179,7 +190,15 @@ pub fn inspect(scene: &Scene, mechanism: &Mechanism) -> Inspection {
     for ((friction, mode), force) in mechanism.frictions.iter().zip(&mechanism.modes).zip(frictions) {
         found.frictions.push((friction.name.clone(), mode.word(), friction.tangent.is_angle(), force));
     }
-    found.walls = contacts(mechanism, &start, &phi, omega, &kernel);
+    if let Some(outputs) = &mechanism.outputs {
+        let winding: Vec<f64> = (0..phi.len()).map(|k| start.unwrapped(k)).collect();
+        let (time, phi, winding, omega) = (start.time, &phi[..], &winding[..], &omega[..]);
+        let mut values = Vec::new();
+        outputs.evaluate(&Moment { mechanism, time, phi, winding, omega, kernel: &kernel }, &mut values);
+        let named = outputs.heads().zip(values);
+        found.outputs = named.map(|((name, unit), value)| (name.into(), unit.into(), value)).collect();
+    }
+    found.walls = contacts(mechanism, start, &phi, omega, &kernel);
     found
 }
 
@@ -206,7 +225,8 @@ fn contacts(
         let mut jacobian = vec![0.0; phi.len()];
         contact.row.differentiate(start.time, Posture { phi, z: &kernel.z, omega: &omega }, &mut jacobian);
         let approach = crate::dynamics::kernel::dot(&jacobian, &omega);
-        let jump = if gap <= TOUCHING * contact.length && approach < 0.0 {
+        let is_held = mechanism.held.contains(&number);
+        let jump = if gap <= TOUCHING * contact.length && approach < 0.0 && !is_held {
             mechanism.impact_at(number, start.time, phi, &omega)
         } else {
             None
@@ -288,6 +308,7 @@ impl Inspection {
         let [kinetic, potential] = self.energy;
         let mut said = json!({
             "scene": scene.name,
+            "t": self.t,
             "bodies": bodies,
             "constraints": constraints,
             "motors": motors,
@@ -295,6 +316,12 @@ impl Inspection {
             "energy": {"kinetic": kinetic, "potential": potential, "total": kinetic + potential, "scale": self.energy_scale},
             "walls": walls,
         });
+        if !self.outputs.is_empty() {
+            let outputs = self.outputs.iter();
+            let told =
+                outputs.map(|(name, unit, value)| (name.clone(), json!({"value": value, "unit": unit})));
+            said["outputs"] = Value::Object(told.collect());
+        }
         if !self.frictions.is_empty() {
             let places: Map<String, Value> = (self.frictions.iter())
                 .map(|(name, mode, is_torque, [friction, pressing])| {
@@ -387,7 +414,8 @@ impl Inspection {
             std::iter::once(name.to_owned()).chain(values.iter().map(|&x| figure(x))).collect()
         };
         let rows: Vec<Vec<String>> = self.bodies.iter().map(|(name, values)| row(name, values)).collect();
-        page.entry("accelerations", "of the centres of mass at the start");
+        let when = if self.t == 0.0 { "the start".to_owned() } else { format!("t = {} s", figure(self.t)) };
+        page.entry("accelerations", &format!("of the centres of mass at {when}"));
         page.table(&["body", "x [m/s²]", "y [m/s²]", "phi [rad/s²]"], &rows);
         self.describe_constraints(&mut page);
         let rows: Vec<Vec<String>> = (self.hinges.iter())
@@ -414,6 +442,13 @@ impl Inspection {
                 figure(kinetic + potential)
             ),
         );
+        let rows: Vec<Vec<String>> = (self.outputs.iter())
+            .map(|(name, unit, value)| vec![name.clone(), figure(*value), unit.clone()])
+            .collect();
+        if !rows.is_empty() {
+            page.entry("outputs", "");
+            page.table(&["name", "value", "unit"], &rows);
+        }
         for (name, mode, is_torque, [friction, pressing]) in &self.frictions {
             let (friction, unit) = (figure(-friction), if *is_torque { "N m" } else { "N" });
             let said = format!("{name} {mode}: {friction} {unit}, pressed by {} N", figure(*pressing));

@@ -32,6 +32,7 @@ mod inputs;
 pub mod inspect;
 #[doc(hidden)]
 pub mod methods;
+mod outputs;
 #[doc(hidden)]
 pub mod page;
 #[doc(hidden)]

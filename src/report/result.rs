@@ -76,6 +76,10 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value 
     {
         members.insert("friction".to_owned(), friction);
     }
+    if let (Value::Object(members), Some(outputs)) = (&mut object, super::outputs::object(mechanism, outcome))
+    {
+        members.insert("outputs".to_owned(), outputs);
+    }
     object
 }
 
@@ -234,6 +238,7 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
             );
         }
     }
+    super::outputs::describe(&mut page, mechanism, outcome);
     super::friction::describe(&mut page, mechanism, outcome);
     super::events::describe(&mut page, mechanism, outcome);
     super::trust::describe(&mut page, mechanism, outcome);

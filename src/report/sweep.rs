@@ -6,7 +6,7 @@ use crate::chart::{self, Cell, ChartError, FILE_RESOLUTION, Map, MapAxis, Profil
 use crate::run::files::sha256;
 use crate::run::sweep::table::columns;
 #[cfg(feature = "charts")]
-use crate::run::sweep::table::numbers;
+use crate::run::sweep::table::{numbers, outputs};
 use crate::run::trust::{HORIZON, Level};
 #[cfg(feature = "charts")]
 use crate::run::{Point, Status};
@@ -152,6 +152,7 @@ pub struct Curve {
     column: Option<usize>,
     bars: usize,
     is_judged: bool,
+    outputs: usize,
     /// The numbers of all points so far; not a number where there is none.
     seen: Vec<f64>,
     failed: Vec<bool>,
@@ -204,6 +205,7 @@ impl Curve {
             column,
             bars: sweep.mechanism().bodies.len(),
             is_judged: sweep.trust() != Level::Off,
+            outputs: outputs(sweep).count(),
             seen: Vec::new(),
             failed: Vec::new(),
         })
@@ -220,7 +222,7 @@ impl Curve {
 
     /// Takes a point.
     pub fn see(&mut self, point: &Point) {
-        let numbers = numbers(point, self.bars, self.is_judged);
+        let numbers = numbers(point, self.bars, self.is_judged, self.outputs);
         let column = self.column.map_or(numbers.len() - 1, |column| column + point.values.len());
         self.seen.push(numbers[column]);
         self.failed.push(matches!(point.status, Status::Stopped(_) | Status::Refused(_)));
@@ -258,7 +260,7 @@ impl Curve {
         let title = if is_flip {
             "Time until a bar first turns over".to_owned()
         } else {
-            format!("{} over the sweep", capital(&bare))
+            format!("{} over the sweep", statistic(&bare))
         };
         let plan = sweep.plan();
         let mut caption = vec![format!("scene {}", plain(&sweep.scene().name)), plain(&super::setting(plan))];
@@ -343,6 +345,19 @@ fn listed(sweep: &Sweep) -> String {
 #[cfg(feature = "charts")]
 fn spaced(name: &str) -> String {
     if name.contains("drift") { name.replace('_', " ").replace(" [1]", "") } else { plain(name) }
+}
+
+/// A column in words: `max:O` is the largest O.
+#[cfg(feature = "charts")]
+fn statistic(column: &str) -> String {
+    let of = |(kind, name)| match kind {
+        "min" => Some(format!("Least {name}")),
+        "max" => Some(format!("Largest {name}")),
+        "mean" => Some(format!("Mean {name}")),
+        "rms" => Some(format!("Rms of {name}")),
+        _ => None,
+    };
+    column.split_once(':').and_then(of).unwrap_or_else(|| capital(column))
 }
 
 #[cfg(feature = "charts")]

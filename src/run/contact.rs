@@ -9,9 +9,10 @@ mod impacts;
 use super::build::build;
 use super::driver::{Driver, DriverState, Halt, Pause, Watch};
 use super::event::{EventDetector, Memory};
+use super::extremes::{ExtremesDetector, ExtremesMemory};
 use super::flip::FlipDetector;
 use super::impact_monitor;
-use super::inside::{Both, ObserverAdapter, StepWatcher};
+use super::inside::{ObserverAdapter, StepWatcher, Watchers};
 use super::methods::Stabilization;
 use super::monitor::{Monitor, lent};
 use super::plan::Plan;
@@ -106,6 +107,8 @@ pub(super) struct ContactDriverState {
     laws: Option<(Vec<f64>, Vec<bool>)>,
     /// What the detector of events remembers, where there is one.
     events: Option<Memory>,
+    /// What is known of the extremes of outputs, where there are any.
+    extremes: Option<ExtremesMemory>,
 }
 
 /// A driver on its way through impacts and holds.
@@ -133,6 +136,8 @@ pub(super) struct ContactDriver {
     pub(super) events: Option<EventDetector>,
     /// What such a detector remembered, until there is one again.
     remembered: Option<Memory>,
+    /// Looks for the extremes of outputs, where there are any.
+    pub(super) extremes: Option<ExtremesDetector>,
     /// How often an event has changed the motion, the parts that act or the branches of laws.
     pub(super) changes: u64,
     /// The event that has ended the run.
@@ -155,6 +160,7 @@ impl ContactDriver {
             free: Arc::clone(&mechanism),
             mechanism,
             driver,
+            extremes: None,
             changes: 0,
             remembered: None,
             ended_by: None,
@@ -233,6 +239,7 @@ impl ContactDriver {
                 .as_ref()
                 .map(|events| events.memory.clone())
                 .or_else(|| self.remembered.clone()),
+            extremes: self.extremes.as_ref().map(|extremes| extremes.memory.clone()),
         }
     }
 
@@ -271,6 +278,7 @@ impl ContactDriver {
             off,
             laws,
             events,
+            extremes,
         } = contact_state;
         let mut whole = mechanism.whole.clone().map_or(mechanism, |(whole, _)| whole);
         if let Some((parameters, modes)) = laws {
@@ -312,9 +320,19 @@ impl ContactDriver {
             detector.exchange(Arc::clone(&whole));
             detector.restore(memory.clone());
         }
+        let mut looking =
+            extremes.is_some().then(|| ExtremesDetector::new(&contact_driver.mechanism)).flatten();
+        let fits = match (&mut looking, extremes) {
+            (Some(looking), Some(memory)) => looking.restore(memory),
+            (_, memory) => memory.is_none(),
+        };
+        if !fits {
+            return Ok(None);
+        }
         Ok(Some(Self {
             whole,
             off,
+            extremes: looking,
             remembered: events,
             held,
             holds_in_row,
@@ -355,8 +373,15 @@ impl ContactDriver {
                 monitor.count_events(outcome.impact_count + outcome.persistent_contact_count);
             }
             let horizon = outcome.plan.time(outcome.plan.rows);
-            let mut both = Both { events: self.events.as_mut(), observer: observer.as_deref_mut() };
-            let steps = both.is_asked().then_some(&mut both as &mut dyn StepWatcher);
+            if let Some(extremes) = &mut self.extremes {
+                extremes.hold(&self.mechanism);
+            }
+            let mut watchers = Watchers {
+                events: self.events.as_mut(),
+                extremes: self.extremes.as_mut(),
+                observer: observer.as_deref_mut(),
+            };
+            let steps = watchers.is_asked().then_some(&mut watchers as &mut dyn StepWatcher);
             let watch = Watch { flips: self.flips.as_mut(), monitor: lent(&mut monitor), steps };
             let halt = self.driver.advance(until, horizon, watch, pause);
             self.record_events(outcome);

@@ -1,6 +1,7 @@
 //! The inside of accepted steps, for what watches a run: events, observers, trajectories.
 
 use super::event::EventDetector;
+use super::extremes::ExtremesDetector;
 use super::sample::Sample;
 use crate::dynamics::{Motion, Time};
 use std::cell::RefCell;
@@ -104,23 +105,31 @@ impl StepWatcher for ObserverAdapter<'_, '_> {
     }
 }
 
-/// The events of a run and an observer, one after the other.
-pub(super) struct Both<'a, 'b, 'c> {
+/// The events of a run, the extremes of its outputs and an observer, one after the other.
+pub(super) struct Watchers<'a, 'b, 'c> {
     pub events: Option<&'a mut EventDetector>,
+    pub extremes: Option<&'a mut ExtremesDetector>,
     pub observer: Option<&'a mut ObserverAdapter<'b, 'c>>,
 }
 
-impl Both<'_, '_, '_> {
+impl Watchers<'_, '_, '_> {
     /// True where anybody looks at steps.
     pub fn is_asked(&self) -> bool {
         self.events.is_some()
+            || self.extremes.is_some()
             || self.observer.as_ref().is_some_and(|watching| watching.observer.wants_steps())
     }
 }
 
-impl StepWatcher for Both<'_, '_, '_> {
+impl StepWatcher for Watchers<'_, '_, '_> {
     fn step(&mut self, inside: &mut dyn Inside) -> Option<Time> {
         let cut = self.events.as_mut().and_then(|events| events.step(inside));
+        if let Some(extremes) = &mut self.extremes {
+            match cut {
+                Some(end) => extremes.step(&mut Shortened { inside, end }),
+                None => extremes.step(inside),
+            };
+        }
         let Some(observer) = self.observer.as_mut().filter(|watching| watching.observer.wants_steps()) else {
             return cut;
         };

@@ -35,6 +35,8 @@ pub mod driver;
 #[doc(hidden)]
 pub mod event;
 #[doc(hidden)]
+pub mod extremes;
+#[doc(hidden)]
 pub mod fast;
 #[doc(hidden)]
 #[cfg(feature = "files")]
@@ -84,6 +86,7 @@ pub use custom::Custom;
 pub use drift::{Drift, Limits};
 pub use driver::Pause;
 pub use event::{Action, Change, Direction, Event, EventRecord};
+pub use extremes::Extremes;
 pub use fast::FastMode;
 #[cfg(feature = "files")]
 pub use files::{Cursor, FileError, Folder, Stream};

@@ -14,6 +14,7 @@ use super::contact::ContactDriver;
 use super::drift::{Drift, Limits};
 use super::driver::{Driver, Pause};
 use super::event::{Event, EventDetector};
+use super::extremes::ExtremesDetector;
 use super::flip::FlipDetector;
 use super::inside::{Observer, ObserverAdapter, StepsOf};
 use super::monitor::Monitor;
@@ -190,6 +191,7 @@ impl Running {
         if !events.is_empty() {
             contact_driver.events = Some(EventDetector::new(Arc::clone(contact_driver.whole()), events));
         }
+        contact_driver.extremes = ExtremesDetector::new(contact_driver.holding());
         contact_driver.flips = ensemble.map(|_| FlipDetector::default());
         // The reference of the energy is what impacts at the start leave.
         let resting = contact_driver.meet(&mut outcome).err();
@@ -405,6 +407,7 @@ impl Running {
     /// method itself costs.  False where it paused or stopped.
     pub(super) fn run_unsampled(&mut self, pause: &mut Pause) -> bool {
         let Self { contact_driver, outcome, resting, .. } = self;
+        contact_driver.extremes = None;
         resting.is_none()
             && (1..=outcome.plan.rows)
                 .all(|row| contact_driver.go(outcome.plan.time(row), outcome, pause) == Ok(true))
@@ -415,10 +418,18 @@ impl Running {
         self.contact_driver.shown()
     }
 
+    /// The mechanism at that time: with the contacts that are held, on the branches its laws are on, with the
+    /// parts that act.
+    pub fn mechanism(&self) -> &Arc<Mechanism> {
+        self.contact_driver.holding()
+    }
+
     /// How it ended.
     pub fn finish(mut self) -> Outcome {
         self.contact_driver.end(self.outcome.last.t, &mut self.outcome);
         self.outcome.statistics = self.contact_driver.statistics();
+        self.outcome.extremes =
+            self.contact_driver.extremes.as_ref().map_or_else(Vec::new, ExtremesDetector::extremes);
         let Statistics { steps, newton_steps, .. } = self.outcome.statistics;
         if newton_steps > 0 {
             let note = format!(

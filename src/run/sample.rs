@@ -7,6 +7,7 @@ use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::dynamics::constraint::Posture;
 use crate::dynamics::energy::Energy;
 use crate::dynamics::kernel::{Bias, Kernel};
+use crate::dynamics::output::Moment;
 use crate::dynamics::{Mechanism, Motion};
 use std::sync::Arc;
 
@@ -48,6 +49,8 @@ pub struct Sample {
     /// Torque \[N·m\] on the driven body, or force \[N\] along the rail on the point that slides, and power
     /// \[W\] of each row that a motor, lock or weld keeps at a law; zeros for others.
     pub motors: Vec<[f64; 2]>,
+    /// Values of the scene's outputs, in their order.
+    pub outputs: Vec<f64>,
 }
 
 impl Clone for Sample {
@@ -76,6 +79,7 @@ impl Sample {
         self.omega.clone_from(&other.omega);
         self.constraints.clone_from(&other.constraints);
         self.motors.clone_from(&other.motors);
+        self.outputs.clone_from(&other.outputs);
     }
 
     /// False where any number of it is not finite; nothing after that means anything.
@@ -179,7 +183,7 @@ impl Sampler {
         for k in 0..mechanism.coordinates() {
             (self.phi[k], self.omega[k]) = (motion.phi[k].hi, motion.omega[k].hi);
         }
-        if self.holding.constraints.is_empty() {
+        if self.holding.constraints.is_empty() && mechanism.outputs.is_none() {
             self.plain.unit_vectors::<0>(mechanism, &self.phi);
         } else {
             self.plain.accelerate::<0>(&self.holding, motion.time, &self.phi, &self.omega, Bias::default());
@@ -217,6 +221,18 @@ impl Sampler {
             sample.constraints[r] = [here.position.hi, rate.hi];
             let force = -self.plain.multiplier[r];
             sample.motors[r] = if row.law.is_some() { [force, -force * here.drive.hi] } else { [0.0, 0.0] };
+        }
+        if let Some(outputs) = &mechanism.outputs {
+            let moment = Moment {
+                mechanism: &self.holding,
+                time: motion.time,
+                phi: &self.phi,
+                winding: &sample.phi,
+                omega: &self.omega,
+                kernel: &self.plain,
+            };
+            sample.outputs.clear();
+            outputs.evaluate(&moment, &mut sample.outputs);
         }
         sample
     }

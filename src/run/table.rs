@@ -58,12 +58,14 @@ pub(super) fn columns(sample: &Sample, shown: &Shown, numbers: &mut Vec<f64>) {
         numbers.extend(constraint.iter().chain(&motor[..count]));
     }
     numbers.extend(shown.friction.then_some(sample.friction));
+    numbers.extend(&sample.outputs);
 }
 
 /// How many numbers that are.
 fn width(mechanism: &Mechanism, shown: &Shown) -> usize {
     let forces = shown.forces.iter().sum::<usize>();
-    let others = mechanism.integrals + usize::from(shown.friction);
+    let outputs = mechanism.outputs.as_ref().map_or(0, |outputs| outputs.heads().count());
+    let others = mechanism.integrals + usize::from(shown.friction) + outputs;
     1 + 6 * shown.bodies + others + 4 + 2 * mechanism.constraints.len() + forces
 }
 
@@ -97,6 +99,8 @@ impl<W: Write> Table<W> {
             );
         }
         header.extend(shown.friction.then(|| "friction [J]".to_owned()));
+        let outputs = mechanism.outputs.iter().flat_map(|outputs| outputs.heads());
+        header.extend(outputs.map(|(name, unit)| format!("{name} [{unit}]")));
         let mut titles = csv::Writer::from_writer(Vec::with_capacity(BUFFER + BUFFER / 4));
         titles.write_record(&header)?;
         let buffer = titles.into_inner().map_err(|error| error.into_error())?;

@@ -191,6 +191,14 @@ pub enum Meaning<P = Place> {
 }
 
 impl Meaning {
+    /// Its unit, as the format writes units; `rad` for angles.
+    pub(super) fn unit_in_words(self) -> &'static str {
+        match self {
+            Self::Angle(_) | Self::RelativeAngle(..) => "rad",
+            _ => self.unit(),
+        }
+    }
+
     /// Its unit, as the format writes units.
     fn unit(self) -> &'static str {
         match self {
@@ -281,7 +289,34 @@ impl Names {
         names
     }
 
-    fn add(&mut self, name: String, meaning: Meaning) {
+    /// The same with the signals of a scene that was judged.
+    pub(super) fn with_signals(scene: &Scene) -> Self {
+        let mut names = Self::of(scene);
+        for signal in &scene.signals {
+            if let Ok((bound, dimension)) = names.alone().bind(&signal.formula) {
+                names.signal(&signal.name, &bound, dimension);
+            }
+        }
+        names
+    }
+
+    /// What a name stands for, and its dimension where that is known.
+    pub(super) fn find(&self, name: &str) -> Option<(Meaning, Option<Dimension>)> {
+        self.known.get(name).copied()
+    }
+
+    /// All names, in the order in which messages list them.
+    pub(super) fn listed(&self) -> impl Iterator<Item = &str> {
+        self.order.iter().map(String::as_str)
+    }
+
+    /// Tables, as functions.
+    pub(super) fn tables(&self) -> &[Interpolant] {
+        &self.tables
+    }
+
+    /// Adds a name.
+    pub(super) fn add(&mut self, name: String, meaning: Meaning) {
         self.insert(name, meaning, Some(Dimension::of(meaning.unit())));
     }
 
@@ -350,8 +385,7 @@ pub struct Scope<'a> {
 impl Scope<'_> {
     fn find(&self, name: &str) -> Option<(Meaning, Option<Dimension>)> {
         let own = self.own.iter().find(|own| own.0 == name);
-        own.map(|own| (own.1, Some(Dimension::of(own.1.unit()))))
-            .or_else(|| self.names.known.get(name).copied())
+        own.map(|own| (own.1, Some(Dimension::of(own.1.unit())))).or_else(|| self.names.find(name))
     }
 
     /// Reads a formula, finds what its names stand for, and checks its dimensions.

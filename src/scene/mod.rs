@@ -14,6 +14,7 @@ mod friction;
 mod law;
 mod locate;
 mod number;
+mod output;
 mod profile;
 #[doc(hidden)]
 pub mod read;
@@ -33,6 +34,7 @@ pub use law::{
     Scope, Signal,
 };
 pub use number::number;
+pub use output::{BoundOutput, Component, Output, OutputNames, Quantity, Source};
 pub use profile::Profile;
 pub use read::{parse_scene, read_scene, read_text, source_name};
 pub use schema::schema;
@@ -110,6 +112,9 @@ pub struct Scene {
     /// Events.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub events: Vec<SceneEvent>,
+    /// What a run writes beside its own columns.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub outputs: Vec<Output>,
     /// Parts that do not act until an event switches them on, by name.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub inactive: Vec<String>,

@@ -72,6 +72,10 @@ fn shape(of: &Shape) -> Value {
             let number = json!({"type": ["number", "string"], "maxLength": LONGEST});
             json!({"type": "object", "propertyNames": identifier(), "additionalProperties": number})
         }
+        Shape::Outputs => {
+            let list = json!({"type": "array", "items": formula()});
+            json!({"anyOf": [{"type": "object", "additionalProperties": formula()}, list]})
+        }
         Shape::Tables => {
             let [least, most] = POINTS;
             let point = json!({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2});

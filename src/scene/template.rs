@@ -5,12 +5,12 @@
 //! `spring.stiffness` is `springs.spring.stiffness`.  A path is judged against the tables of `format.rs` and
 //! the scene's own text once; values are judged when they are filled in.
 
-use super::Scene;
 use super::error::SceneError;
 use super::format::{Field, LAW, SCENE, START, Shape, Table, UNIFORM_BAR, kind};
 use super::locate::{Node, Value, push_index, push_key};
 use super::read::{listed, nearest, parse_scene, put_together, read_text, source_name};
 use super::set::{Override, SEVERAL, Step, hint, name, steps};
+use super::{Output, Scene};
 use std::path::Path;
 
 /// The text of a scene, and the overrides it is always read with.
@@ -19,6 +19,7 @@ pub struct Template {
     text: String,
     source: String,
     overrides: Vec<Override>,
+    outputs: Vec<Output>,
 }
 
 /// A number of a scene that can be varied.
@@ -71,7 +72,13 @@ impl Template {
 
     /// Takes the text of a scene; `source` is the name of its file in messages.
     pub fn new(text: String, source: String, overrides: &[Override]) -> Self {
-        Self { text, source, overrides: overrides.to_vec() }
+        Self { text, source, overrides: overrides.to_vec(), outputs: Vec::new() }
+    }
+
+    /// The same with outputs beside those of the scene.
+    #[must_use]
+    pub fn with_outputs(self, outputs: Vec<Output>) -> Self {
+        Self { outputs, ..self }
     }
 
     /// The scene as it stands.
@@ -79,7 +86,16 @@ impl Template {
     /// # Errors
     /// As [`parse_scene`].
     pub fn scene(&self) -> Result<Scene, SceneError> {
-        parse_scene(&self.text, &self.source, &self.overrides)
+        self.parsed(&self.overrides)
+    }
+
+    fn parsed(&self, overrides: &[Override]) -> Result<Scene, SceneError> {
+        let mut scene = parse_scene(&self.text, &self.source, overrides)?;
+        let more =
+            self.outputs.iter().filter(|output| scene.outputs.iter().all(|known| known.name != output.name));
+        let more: Vec<Output> = more.cloned().collect();
+        scene.outputs.extend(more);
+        Ok(scene)
     }
 
     /// The scene with these values of these variables.
@@ -92,7 +108,7 @@ impl Template {
             .zip(values)
             .map(|(variable, &value)| Override { path: variable.path.clone(), value: value.into() });
         let overrides: Vec<Override> = self.overrides.iter().cloned().chain(filled).collect();
-        parse_scene(&self.text, &self.source, &overrides)
+        self.parsed(&overrides)
     }
 
     /// Its text, the name of its file, and its overrides.

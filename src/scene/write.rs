@@ -155,6 +155,9 @@ impl Scene {
             self.integrals.iter().map(|one| (one.name.clone(), json!(one.formula))).collect();
         put("integrals", Value::Object(integrals), !self.integrals.is_empty());
         put("events", self.events.iter().map(event).collect::<Vec<_>>().into(), !self.events.is_empty());
+        let outputs: Map<String, Value> =
+            self.outputs.iter().map(|one| (one.name.clone(), json!(one.formula))).collect();
+        put("outputs", Value::Object(outputs), !self.outputs.is_empty());
         put("inactive", json!(self.inactive), !self.inactive.is_empty());
         for LoadLaw { name, load } in self.acting_laws() {
             let (list, law) = match load {

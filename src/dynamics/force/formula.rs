@@ -20,7 +20,12 @@ fn span<S: Scalar>(at: &Configuration<S>, [a, b]: &[Site; 2]) -> ([S; 2], S) {
 }
 
 impl Meaning<Site> {
-    fn value<S: Scalar>(&self, at: &Configuration<S>, parameters: &[f64], signals: &[S]) -> S {
+    pub(in crate::dynamics) fn value<S: Scalar>(
+        &self,
+        at: &Configuration<S>,
+        parameters: &[f64],
+        signals: &[S],
+    ) -> S {
         match self {
             Self::Time => at.time(),
             Self::Parameter(number) => S::of(parameters[*number]),

@@ -3,6 +3,7 @@
 use super::super::contact::{ImpactRecord, PersistentContact};
 use super::super::drift::Drift;
 use super::super::event::EventRecord;
+use super::super::extremes::Extremes;
 use super::super::flip::Flip;
 use super::super::friction::FrictionRecord;
 use super::super::plan::{Plan, Refusal};
@@ -57,6 +58,8 @@ pub struct Outcome {
     pub frictions: Vec<FrictionRecord>,
     /// Their number.
     pub friction_count: u64,
+    /// Extremes and means of the scene's outputs, in their order; empty before the run is finished.
+    pub extremes: Vec<Extremes>,
     /// The event that ended it, or `observer`; a run ended so is no failure.
     pub ended_by: Option<String>,
     /// Why it ended before its horizon.
@@ -86,6 +89,7 @@ impl Outcome {
             event_energy: 0.0,
             frictions: Vec::new(),
             friction_count: 0,
+            extremes: Vec::new(),
             ended_by: None,
             stop: None,
             plan,

@@ -60,6 +60,8 @@ pub struct Point {
     pub flip: Option<Flip>,
     /// How far it may be trusted, where that was asked for.
     pub trust: Option<PointTrust>,
+    /// Least and largest value, mean and rms of each of the scene's outputs.
+    pub extremes: Vec<[f64; 4]>,
 }
 
 /// A point ready to run.
@@ -115,6 +117,7 @@ impl Sweep {
             && self.trust != Level::Full
             && ready.plan.method == MethodId::Taylor
             && !ready.plan.extended
+            && ready.mechanism.outputs.is_none()
             && Batch::takes(&ready.mechanism)
     }
 
@@ -133,6 +136,7 @@ impl Sweep {
             steps: 0,
             flip: None,
             trust: None,
+            extremes: Vec::new(),
         };
         if self.skips.as_ref().is_some_and(|skips| skips(&point.values)) {
             point.status = Status::Skipped;
@@ -217,6 +221,8 @@ impl Sweep {
                 point.steps = outcome.statistics.steps;
                 point.flip = outcome.flip;
                 point.trust = outcome.trust.as_ref().map(PointTrust::from);
+                let extremes = outcome.extremes.iter();
+                point.extremes = extremes.map(|one| [one.min[0], one.max[0], one.mean, one.rms]).collect();
                 point.status = outcome.stop.map_or(Status::Done, Status::Stopped);
             }
             Err(error) => point.status = Status::Refused(error.to_string()),

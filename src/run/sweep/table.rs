@@ -10,6 +10,7 @@ pub struct SweepTable<W: Write> {
     writer: csv::Writer<W>,
     bars: Vec<String>,
     is_judged: bool,
+    outputs: usize,
     fields: Vec<String>,
 }
 
@@ -35,16 +36,25 @@ pub fn columns(sweep: &Sweep) -> Vec<String> {
     if sweep.trust() != Level::Off {
         columns.extend(["error_estimate [rad]", "horizon [s]"].map(str::to_owned));
     }
+    for (name, unit) in outputs(sweep) {
+        columns.extend(["min", "max", "mean", "rms"].map(|what| format!("{what}:{name} [{unit}]")));
+    }
     columns.extend(["steps", "flip_time [s]", "flip_bar", "status", "cause"].map(str::to_owned));
     columns
 }
 
+/// Names and units of the outputs of a sweep's scene.
+pub fn outputs(sweep: &Sweep) -> impl Iterator<Item = (&str, &str)> {
+    sweep.mechanism().outputs.iter().flat_map(|outputs| outputs.heads())
+}
+
 /// The numbers of a point's row, in the order of [`columns`] up to the flip time; not a number where there is
 /// none.
-pub fn numbers(point: &Point, bars: usize, is_judged: bool) -> Vec<f64> {
+pub fn numbers(point: &Point, bars: usize, is_judged: bool, outputs: usize) -> Vec<f64> {
     let mut numbers = point.values.clone();
     if point.phi.is_empty() {
-        numbers.resize(numbers.len() + 2 * bars + if is_judged { 7 } else { 5 }, f64::NAN);
+        let others = if is_judged { 7 } else { 5 };
+        numbers.resize(numbers.len() + 2 * bars + 4 * outputs + others, f64::NAN);
         return numbers;
     }
     numbers.push(point.t);
@@ -57,6 +67,9 @@ pub fn numbers(point: &Point, bars: usize, is_judged: bool) -> Vec<f64> {
     if is_judged {
         let trust = point.trust.clone().unwrap_or_default();
         numbers.extend([trust.error, trust.horizon].map(|number| number.unwrap_or(f64::NAN)));
+    }
+    for k in 0..outputs {
+        numbers.extend(point.extremes.get(k).copied().unwrap_or([f64::NAN; 4]));
     }
     numbers.extend([point.steps as f64, point.flip.map_or(f64::NAN, |flip| flip.t)]);
     numbers
@@ -81,6 +94,7 @@ impl<W: Write> SweepTable<W> {
             writer: csv::Writer::from_writer(writer),
             bars,
             is_judged,
+            outputs: outputs(sweep).count(),
             fields: vec![String::new(); columns(sweep).len()],
         }
     }
@@ -99,7 +113,7 @@ impl<W: Write> SweepTable<W> {
     /// # Errors
     /// What the writer says.
     pub fn write(&mut self, point: &Point) -> csv::Result<()> {
-        let numbers = numbers(point, self.bars.len(), self.is_judged);
+        let numbers = numbers(point, self.bars.len(), self.is_judged, self.outputs);
         let steps = numbers.len() - 2;
         self.fields.iter_mut().for_each(String::clear);
         for (column, (field, number)) in self.fields.iter_mut().zip(&numbers).enumerate() {

@@ -47,6 +47,8 @@ pub(super) enum Shape {
     Signals,
     /// Lists of points by name.
     Tables,
+    /// Formulas of outputs by name, or a list of them.
+    Outputs,
     /// Names of parts.
     Names,
     /// A name: 1 to 64 letters, digits, `-`, `_`.
@@ -179,6 +181,7 @@ impl Shape {
                 let [least, most] = super::formula::POINTS;
                 format!("must be {{name: list of {least} to {most} points [x, y], x ascending, or CSV file}}")
             }
+            Self::Outputs => "must be {name: formula in quotes}, or a list of formulas in quotes".to_owned(),
             Self::Names => "must be a list of names of parts".to_owned(),
             Self::Name => format!("must be a name: 1 to {LONGEST_NAME} letters, digits, - or _"),
             Self::FolderName => {

@@ -102,6 +102,12 @@ pub(in crate::scene) static SCENE: Table = Table {
             "What is recorded, stops the run or switches parts where a formula is zero; none if absent.",
         ),
         optional(
+            "outputs",
+            Shape::Outputs,
+            "{\"bearing\": \"A.force\", \"pen\": \"tip.x\"}",
+            "Columns of the trajectory beside those of every run, as formulas of the state and of what parts carry, by name; or a list of formulas, which then are their own names; none if absent.",
+        ),
+        optional(
             "inactive",
             Shape::Names,
             "[\"latch\"]",

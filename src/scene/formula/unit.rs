@@ -28,6 +28,38 @@ impl Dimension {
         Self(self.0.map(|exponent| exponent * power))
     }
 
+    /// It as the unit of a column: `N`, `m/s²`, `kg m²/s`; a pure number is `1`.
+    pub fn unit(self) -> String {
+        let known = ["m", "kg", "s", "N", "J", "W"].into_iter().filter_map(find);
+        if let Some(unit) = known.into_iter().find(|unit| unit.dimension.is(self)) {
+            return unit.name.to_owned();
+        }
+        let side = |sign: f64| {
+            let part = |(name, exponent): (&str, f64)| {
+                let exponent = (sign * exponent * 1e6).round() / 1e6;
+                let power = match exponent {
+                    1.0 => String::new(),
+                    2.0 => "²".to_owned(),
+                    3.0 => "³".to_owned(),
+                    _ => format!("^{exponent}"),
+                };
+                (exponent > SAME).then(|| format!("{name}{power}"))
+            };
+            ["kg", "m", "s"]
+                .into_iter()
+                .zip([self.0[1], self.0[0], self.0[2]])
+                .filter_map(part)
+                .collect::<Vec<_>>()
+        };
+        let (above, below) = (side(1.0), side(-1.0));
+        let above = if above.is_empty() { "1".to_owned() } else { above.join(" ") };
+        match &below[..] {
+            [] => above,
+            [one] => format!("{above}/{one}"),
+            _ => format!("{above}/({})", below.join(" ")),
+        }
+    }
+
     /// That of a unit of the format, as `N·s/m` or `kg·m²`; of an empty text that of a pure number.
     pub fn of(unit: &str) -> Self {
         let mut all = Self::NONE;
@@ -166,5 +198,9 @@ mod tests {
         }
         assert_eq!(Dimension::of("N/m").to_string(), "kg·s^-2");
         assert_eq!(Dimension::of("N").to_string(), "N");
+        for unit in ["N", "m/s", "1/s²", "kg m²/s", "kg/s²", "1", "J"] {
+            assert_eq!(Dimension::of(&unit.replace(' ', "·")).unit(), unit);
+        }
+        assert_eq!(Dimension::of("N/m²").unit(), "kg/(m s²)");
     }
 }

@@ -10,6 +10,7 @@ mod joints;
 mod laws;
 mod loads;
 mod names;
+mod outputs;
 mod resolve;
 mod start;
 mod tables;
@@ -173,6 +174,7 @@ fn scene(root: &At, Resolved { parameters, tables }: Resolved) -> Result<Scene, 
         integrals,
         laws,
         events,
+        outputs: outputs::outputs(&fields)?,
         inactive: fields.optional("inactive").map_or(Ok(Vec::new()), |at| laws::names(&at))?,
         until,
         every,
@@ -188,6 +190,7 @@ fn scene(root: &At, Resolved { parameters, tables }: Resolved) -> Result<Scene, 
     };
     let scene = Scene { bars, ..scene };
     laws::check(root, &scene, &parameters)?;
+    outputs::check(root, &scene)?;
     fit::fitted(scene, &places, &given).map(Scene::with_rotors)
 }
 

@@ -78,6 +78,12 @@ impl Chebyshev {
         self.coefficients.iter().rev().take(3).fold(0.0, |most, c| f64::max(most, c.abs()))
     }
 
+    /// Its integral from 0 to 1.
+    pub fn integral(&self) -> f64 {
+        let even = self.coefficients.iter().enumerate().step_by(2);
+        even.fold(0.0, |sum, (k, c)| sum + c / (1.0 - (k * k) as f64))
+    }
+
     /// The least magnitude it can have.
     pub fn least(&self) -> f64 {
         self.coefficients.iter().skip(1).fold(self.coefficients[0].abs(), |left, c| left - c.abs())

@@ -1,0 +1,139 @@
+//! Outputs against time, a panel for each unit, their extremes over the whole run marked.
+
+use super::axis::Axis;
+use super::file::Picture;
+use super::grid::{label_room, shortened, stacked};
+use super::labels::Occupied;
+use super::lines::Point;
+use super::palette::{WHITE, marks, readable};
+use super::sheet::Sheet;
+use super::ticks::figure;
+use super::{ChartError, PAGE};
+
+/// One output.
+#[derive(Clone, Debug, Default)]
+pub struct OutputSeries {
+    /// Name, with markup.
+    pub name: String,
+    /// Unit; outputs of one unit share a panel.
+    pub unit: String,
+    /// Times \[s\], ascending.
+    pub time: Vec<f64>,
+    /// Its values at these times.
+    pub value: Vec<f64>,
+    /// Values and times of its least and its largest value over the whole run.
+    pub extremes: Vec<[f64; 2]>,
+}
+
+/// Several outputs.
+#[derive(Clone, Debug, Default)]
+pub struct OutputsChart {
+    /// Title, with markup.
+    pub title: String,
+    /// Parts of the caption, with markup; what is drawn is added.
+    pub caption: Vec<String>,
+    /// The outputs.
+    pub outputs: Vec<OutputSeries>,
+    /// The time from which on the curves are pale: the horizon up to which they can be trusted \[s\].
+    pub horizon: Option<f64>,
+}
+
+/// An output and what is drawn of it.
+type Line<'a> = (&'a OutputSeries, Vec<Point>);
+
+/// Height of the page beyond its panels, and of each of these \[pt\].
+const HEIGHTS: [f64; 2] = [80.0, 110.0];
+/// Panels at most: outputs of further units are left to the table.
+const PANELS: usize = 6;
+/// Outputs in a panel that have their extremes ringed; of more, only the largest is.
+const RINGED: usize = 3;
+
+/// Draws every output, with rings at the extremes, or only at the largest one of a panel of many, and a figure there.
+///
+/// # Errors
+/// [`ChartError`] if the resolution is out of range or drawing fails.
+pub fn outputs(chart: &OutputsChart, px_per_pt: f64) -> Result<Picture, ChartError> {
+    let mut units: Vec<&str> = Vec::new();
+    for output in &chart.outputs {
+        if !units.contains(&output.unit.as_str()) {
+            units.push(&output.unit);
+        }
+    }
+    let left_out = units.len().saturating_sub(PANELS);
+    units.truncate(PANELS);
+    let line = |output: &OutputSeries| -> Vec<Point> {
+        let points = output.time.iter().zip(&output.value).map(|(&t, &v)| [t, v]);
+        let mut points: Vec<Point> = points.chain(output.extremes.iter().map(|&[v, t]| [t, v])).collect();
+        points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        points
+    };
+    let rows: Vec<(&str, Vec<Line>)> = units
+        .iter()
+        .map(|unit| {
+            let of_unit = chart.outputs.iter().filter(|output| output.unit == *unit);
+            (*unit, of_unit.map(|output| (output, line(output))).collect())
+        })
+        .collect();
+    let size = [PAGE[0], HEIGHTS[0] + HEIGHTS[1] * rows.len().max(2) as f64];
+    let sheet = Sheet::new(size, px_per_pt)?;
+    let marks = marks(chart.outputs.iter().map(|output| output.name.as_str()));
+    let mark = |output: &OutputSeries| {
+        let number = chart.outputs.iter().position(|other| std::ptr::eq(other, output));
+        marks[number.unwrap_or_default()]
+    };
+    let labels: Vec<String> = chart.outputs.iter().map(|output| shortened(&sheet, &output.name)).collect();
+    let x = Axis::tight("time [s]", rows.iter().flat_map(|row| &row.1).flat_map(|one| &one.1).map(|p| p[0]));
+    let y = |(unit, lines): &(&str, Vec<Line>)| {
+        let name = match &lines[..] {
+            [(output, _)] => format!("{} [{unit}]", shortened(&sheet, &output.name)),
+            _ => format!("[{unit}]"),
+        };
+        Axis::fit(&name, lines.iter().flat_map(|one| &one.1).map(|p| p[1]))
+    };
+    let mut caption = chart.caption.clone();
+    caption.push("extremes of the whole run marked".to_owned());
+    if left_out > 0 {
+        caption.push(format!("{left_out} more units in the table"));
+    }
+    let under = sheet.heading(&chart.title, &caption)?;
+    let several = rows.iter().any(|row| row.1.len() > 1);
+    let right = if several { label_room(&sheet, labels.iter().map(String::as_str), false) } else { 20.0 };
+    let panels = stacked(&sheet, under, &x, rows.iter().map(y).collect(), right)?;
+    let label = chart.horizon.map(|horizon| format!("{} s", figure(horizon)));
+    for (k, (panel, (unit, lines))) in panels.iter().zip(&rows).enumerate() {
+        let (mut occupied, mut ends) = (Occupied::default(), Vec::new());
+        for (output, line) in lines {
+            let pieces = panel.trusted(line, mark(output).colour, 1.6, chart.horizon)?;
+            pieces.iter().for_each(|piece| occupied.line(piece));
+            if let Some(end) = pieces.last().and_then(|piece| piece.last()) {
+                ends.push((end[1], shortened(&sheet, &output.name), mark(output)));
+            }
+        }
+        let largest = |output: &OutputSeries| output.extremes.iter().map(|e| e[0].abs()).fold(0.0, f64::max);
+        let most = lines.iter().map(|one| largest(one.0)).fold(0.0, f64::max);
+        for (output, _) in lines.iter().filter(|one| lines.len() <= RINGED || largest(one.0) == most) {
+            let colour = mark(output).colour;
+            let ringed = |e: &&[f64; 2]| e[0].is_finite() && (lines.len() <= RINGED || e[0].abs() == most);
+            for &[value, t] in output.extremes.iter().filter(ringed) {
+                let at = panel.at([t, value]);
+                sheet.disc(at, 3.4, WHITE)?;
+                sheet.ring(at, 2.4, colour, 1.2)?;
+                occupied.block([at[0] - 3.4, at[1] - 3.4, at[0] + 3.4, at[1] + 3.4]);
+            }
+            let peak = output.extremes.iter().max_by(|a, b| a[0].abs().total_cmp(&b[0].abs()));
+            if let Some(&[value, t]) = peak.filter(|peak| peak[0].is_finite()) {
+                let said = if *unit == "1" { figure(value) } else { format!("{} {unit}", figure(value)) };
+                let note = format!("{said} at {} s", figure(t));
+                panel.note_beside(panel.at([t, value]), &note, readable(colour), &mut occupied)?;
+            }
+        }
+        panel.horizon(chart.horizon, label.as_deref().filter(|_| k == 0))?;
+        if lines.iter().flat_map(|one| &one.1).all(|p| !p[1].is_finite()) {
+            panel.empty("no data")?;
+        }
+        if lines.len() > 1 {
+            panel.end_labels(&ends, false)?;
+        }
+    }
+    Ok(sheet.picture(&chart.title, &caption))
+}

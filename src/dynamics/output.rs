@@ -1,0 +1,247 @@
+//! The outputs of a scene, evaluated: formulas of the state and of what parts carry.
+
+use super::compile::CompileError;
+use super::configuration::{Configuration, Values};
+use super::constraint::{ConstraintEquation, Posture, Site};
+use super::forest::{Forest, turning_acceleration};
+use super::kernel::Kernel;
+use super::{Mechanism, Time};
+use crate::arithmetic::Complex;
+use crate::scene::formula::Formula;
+use crate::scene::{BoundOutput, Component, Meaning, OutputNames, Quantity, Scene, Source};
+
+/// A formula with what its names stand for.
+#[derive(Clone, Debug, PartialEq)]
+struct Expression {
+    formula: Formula,
+    sources: Vec<Source<Site>>,
+}
+
+/// An output.
+#[derive(Clone, Debug, PartialEq)]
+struct Output {
+    name: String,
+    unit: String,
+    expression: Expression,
+}
+
+/// The outputs of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Outputs {
+    list: Vec<Output>,
+    signals: Vec<Expression>,
+    parameters: Vec<f64>,
+    /// True where joint forces are among them.
+    needs_forces: bool,
+}
+
+/// A moment of a motion: an evaluation of the equations there, with all multipliers.
+pub(crate) struct Moment<'a> {
+    /// The mechanism with the contacts that are held and the modes of friction.
+    pub mechanism: &'a Mechanism,
+    /// Time \[s\].
+    pub time: Time,
+    /// Coordinates \[rad, m\].
+    pub phi: &'a [f64],
+    /// The angles with their whole turns \[rad\].
+    pub winding: &'a [f64],
+    /// Rates \[rad/s, m/s\].
+    pub omega: &'a [f64],
+    /// After [`Kernel::accelerate`] and [`Mechanism::spread_multipliers`].
+    pub kernel: &'a Kernel<f64>,
+}
+
+/// Joint forces and multipliers at a moment.
+struct Forces {
+    joints: Vec<Complex<f64>>,
+    multipliers: Vec<f64>,
+    /// Friction and the force that presses, place by place; empty where there are none.
+    frictions: Vec<[f64; 2]>,
+}
+
+impl Outputs {
+    /// Those of a scene; `None` where it has none.
+    pub fn of(scene: &Scene, forest: &Forest) -> Result<Option<Self>, CompileError> {
+        if scene.outputs.is_empty() {
+            return Ok(None);
+        }
+        let names = OutputNames::of(scene);
+        let unsound = |error| CompileError::Unsound(format!("outputs: {error}"));
+        let place = |BoundOutput { formula, sources, .. }| {
+            let site = |place| forest.site(&place);
+            let placed = |source| match source {
+                Source::State(meaning) => Source::State(Meaning::with_points(meaning, site)),
+                Source::Carried(quantity) => Source::Carried(Quantity::with_points(quantity, site)),
+            };
+            Expression { formula, sources: sources.into_iter().map(placed).collect() }
+        };
+        let mut signals = Vec::new();
+        for signal in &scene.signals {
+            signals.push(place(names.bind_signal(&signal.name, &signal.formula).map_err(unsound)?));
+        }
+        let mut list = Vec::new();
+        for output in &scene.outputs {
+            let bound = names.bind(output).map_err(unsound)?;
+            let (name, unit) = (bound.name.clone(), bound.unit.clone());
+            list.push(Output { name, unit, expression: place(bound) });
+        }
+        let is_state = |source: &Source<Site>| {
+            use Quantity::{Acceleration, AngularAcceleration, Gap, Tension, Torsion, Travel};
+            let Source::Carried(quantity) = source else { return true };
+            matches!(
+                quantity,
+                AngularAcceleration(_) | Acceleration(..) | Travel(..) | Gap(..) | Tension(..) | Torsion(_)
+            )
+        };
+        let needs_forces = !list.iter().flat_map(|output| &output.expression.sources).all(is_state);
+        let parameters = scene.parameters.iter().map(|parameter| parameter.value).collect();
+        Ok(Some(Self { list, signals, parameters, needs_forces }))
+    }
+
+    /// Names and units, in order.
+    pub fn heads(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.list.iter().map(|output| (output.name.as_str(), output.unit.as_str()))
+    }
+
+    /// Appends their values at a moment.
+    pub fn evaluate(&self, at: &Moment, values: &mut Vec<f64>) {
+        let Moment { mechanism, time, kernel, .. } = *at;
+        let forces = self.needs_forces.then(|| Forces::at(at));
+        let seen = Values { time: time.hi, phi: at.winding, z: &kernel.z, omega: at.omega };
+        let configuration = Configuration::new(&seen);
+        let parameters = mechanism.laws.as_ref().map_or(&self.parameters, |laws| &laws.parameters);
+        let mut signals = Vec::with_capacity(self.signals.len());
+        let value = |expression: &Expression, signals: &[f64]| {
+            let source = |source: &Source<Site>| match source {
+                Source::State(meaning) => meaning.value(&configuration, parameters, signals),
+                Source::Carried(quantity) => quantity.value(at, &configuration, forces.as_ref()),
+            };
+            expression.formula.value(&expression.sources.iter().map(source).collect::<Vec<f64>>())
+        };
+        for signal in &self.signals {
+            signals.push(value(signal, &signals));
+        }
+        values.extend(self.list.iter().map(|output| value(&output.expression, &signals)));
+    }
+}
+
+impl Forces {
+    fn at(&Moment { mechanism, time, phi, omega, kernel, .. }: &Moment) -> Self {
+        let found = mechanism.joint_forces(time, kernel, phi, omega);
+        let frictions = match mechanism.frictions.is_empty() {
+            true => Vec::new(),
+            false => kernel.friction_forces(mechanism, time, phi, omega),
+        };
+        Self { joints: found.hinges, multipliers: found.multipliers, frictions }
+    }
+}
+
+impl Component {
+    fn of(self, vector: Complex<f64>) -> f64 {
+        match self {
+            Self::X => vector.re,
+            Self::Y => vector.im,
+            Self::Magnitude => vector.norm_squared().sqrt(),
+        }
+    }
+}
+
+impl Quantity<Site> {
+    fn value(&self, at: &Moment, seen: &Configuration<f64>, forces: Option<&Forces>) -> f64 {
+        let Moment { mechanism, time, omega, kernel, .. } = *at;
+        let (z, alpha) = (&kernel.z, &kernel.load);
+        let row = |is_it: &dyn Fn(&ConstraintEquation) -> bool| {
+            let number = mechanism.constraints[..mechanism.standing_rows()].iter().position(is_it)?;
+            Some((&mechanism.constraints[number], forces?.multipliers[number]))
+        };
+        let given = |name: &str| row(&|row| row.name == name && row.law.is_some());
+        match self {
+            Self::AngularAcceleration(body) => alpha[*body],
+            Self::Acceleration(body, [x, y], component) => {
+                let centre = mechanism.centre_accelerations(z, omega, alpha)[*body];
+                let arm = z[*body].turn(Complex::new(*x, *y));
+                component.of(centre + turning_acceleration(arm, omega[*body], alpha[*body]))
+            }
+            Self::Joint(name, component) => {
+                let joint = mechanism.joints.iter().position(|joint| joint.name == *name);
+                joint.zip(forces).map_or(0.0, |(joint, forces)| component.of(forces.joints[joint]))
+            }
+            Self::Multiplier(name) => given(name).map_or(0.0, |(_, multiplier)| -multiplier),
+            Self::Power(name) => given(name).map_or(0.0, |(row, multiplier)| {
+                let rate = row.law.as_ref().map_or(0.0, |law| law.rates::<f64>(time).0);
+                -multiplier * rate
+            }),
+            Self::Push(name, component) => {
+                let found = row(&|row| row.name == *name && row.law.is_none() && !row.is_angle());
+                found.map_or(0.0, |(row, multiplier)| {
+                    let push = row.push.as_ref().map(|push| push.direction(z).times(-multiplier));
+                    push.map_or(0.0, |push| component.of(push))
+                })
+            }
+            Self::Tension(name, ends) => tension(at, seen, name, ends, row),
+            Self::Torsion(name) => {
+                let torsion = mechanism.torsions.iter().find(|torsion| torsion.name == *name);
+                torsion.map_or(0.0, |torsion| torsion.torque(at.winding, omega))
+            }
+            Self::Travel([point, origin], body, direction, is_rate) => {
+                let direction = Complex::new(direction[0], direction[1]);
+                let along = body.map_or(direction, |body| z[body].turn(direction));
+                let apart = |[a, b]: [[f64; 2]; 2]| Complex::new(a[0] - b[0], a[1] - b[1]);
+                let span = apart([seen.position(point), seen.position(origin)]);
+                if !is_rate {
+                    return along.dot(span);
+                }
+                let turning = body.map_or(0.0, |body| omega[body] * along.left().dot(span));
+                along.dot(apart([seen.velocity(point), seen.velocity(origin)])) + turning
+            }
+            Self::Gap(point, through, normal) => {
+                let [x, y] = seen.position(point);
+                normal[0] * (x - through[0]) + normal[1] * (y - through[1])
+            }
+            Self::Wall(name) => {
+                let wall = mechanism.contacts.iter().position(|contact| contact.row.name == *name);
+                let place = wall.and_then(|wall| mechanism.held.iter().position(|&held| held == wall));
+                let row = place.map(|place| mechanism.standing_rows() + place);
+                row.zip(forces).map_or(0.0, |(row, forces)| -forces.multipliers[row])
+            }
+            Self::Friction(name) => {
+                let place = mechanism.frictions.iter().position(|friction| friction.name == *name);
+                place.zip(forces).map_or(0.0, |(place, forces)| -forces.frictions[place][0])
+            }
+        }
+    }
+}
+
+/// What a spring pulls its ends together with: its own force, that of its law, or that of its rod.
+fn tension<'a>(
+    at: &Moment<'a>,
+    seen: &Configuration<f64>,
+    name: &str,
+    ends: &[Site; 2],
+    row: impl Fn(&dyn Fn(&ConstraintEquation) -> bool) -> Option<(&'a ConstraintEquation, f64)>,
+) -> f64 {
+    let Moment { mechanism, time, omega, kernel, .. } = *at;
+    let [from, to] = ends.each_ref().map(|end| seen.position(end));
+    let span = Complex::new(to[0] - from[0], to[1] - from[1]);
+    let length = span.norm_squared().sqrt();
+    let along = |force: Complex<f64>| if length > 0.0 { force.dot(span) / length } else { 0.0 };
+    if let Some(spring) = mechanism.springs.iter().find(|spring| spring.name == name) {
+        return along(spring.force(&kernel.z, omega));
+    }
+    if let Some(law) = mechanism.forces.iter().find(|force| force.name == name) {
+        let posture = Posture { phi: at.winding, z: &kernel.z, omega };
+        let mut pulls = [Complex::ZERO; 2];
+        law.forces(time.hi, posture, |body, force| {
+            if let Some(end) = ends.iter().position(|end| end.body == Some(body)) {
+                pulls[end] += force;
+            }
+        });
+        return if ends[0].body.is_some() { along(pulls[0]) } else { -along(pulls[1]) };
+    }
+    let rod = row(&|row| row.name == name && row.law.is_none() && !row.is_angle());
+    rod.map_or(0.0, |(row, multiplier)| {
+        let force =
+            row.push.as_ref().map_or(Complex::ZERO, |push| push.direction(&kernel.z).times(-multiplier));
+        along(force)
+    })
+}

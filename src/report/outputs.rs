@@ -1,0 +1,52 @@
+//! What the record and the page say of a scene's outputs.
+
+use super::page::{Page, figure};
+use crate::dynamics::Mechanism;
+use crate::run::{Extremes, Outcome};
+use serde_json::{Map, Value, json};
+
+/// True where forces are those of least norm among what rigid bodies leave open.
+fn is_open(mechanism: &Mechanism) -> bool {
+    !mechanism.assembly.redundant.is_empty()
+}
+
+/// What the record of a run says; nothing for a scene without outputs.
+pub(super) fn object(mechanism: &Mechanism, outcome: &Outcome) -> Option<Value> {
+    let outputs = mechanism.outputs.as_ref()?;
+    let of = |(k, (name, unit)): (usize, (&str, &str))| {
+        let mut told = json!({"unit": unit, "final": outcome.last.outputs.get(k)});
+        if let Some(Extremes { min, max, mean, rms, .. }) = outcome.extremes.get(k) {
+            told["min"] = json!({"value": min[0], "t": min[1]});
+            told["max"] = json!({"value": max[0], "t": max[1]});
+            told["mean"] = json!(mean);
+            told["rms"] = json!(rms);
+        }
+        if is_open(mechanism) {
+            told["least_norm"] = json!(true);
+        }
+        (name.to_owned(), told)
+    };
+    Some(Value::Object(outputs.heads().enumerate().map(of).collect::<Map<String, Value>>()))
+}
+
+/// What the page of a run says.
+pub(super) fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
+    if outcome.extremes.is_empty() {
+        return;
+    }
+    page.entry("outputs", "over the whole run, between its rows as well");
+    let rows: Vec<Vec<String>> = (outcome.extremes.iter())
+        .map(|Extremes { name, unit, min, max, mean, rms }| {
+            let head = format!("{name} [{unit}]");
+            let numbers = [min[0], min[1], max[0], max[1], *mean, *rms];
+            std::iter::once(head).chain(numbers.into_iter().map(figure)).collect()
+        })
+        .collect();
+    page.table(&["output", "least", "at t [s]", "largest", "at t [s]", "mean", "rms"], &rows);
+    if is_open(mechanism) {
+        page.entry(
+            "",
+            "constraints are redundant: forces that rigid bodies leave open are those of least norm",
+        );
+    }
+}

@@ -1,0 +1,223 @@
+//! Extremes and means of the scene's outputs over a whole run, located between its rows on the dense output of
+//! every step.
+//!
+//! The outputs are interpolated at Chebyshev points of every step, by as high a degree as they ask for; the
+//! zeros of the interpolants' slopes are the extremes, their integrals the means.
+
+use super::inside::{Inside, StepWatcher};
+use crate::arithmetic::DoubleDouble;
+use crate::dynamics::kernel::{Bias, Kernel};
+use crate::dynamics::output::Moment;
+use crate::dynamics::{Mechanism, Motion, Time};
+use crate::stepping::search::{Chebyshev, Curve, Interpolants, interpolated};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Degrees of the interpolants, and what the last coefficients may be over the largest value.
+const DEGREES: [usize; 3] = [8, 16, 32];
+const RESOLVED: f64 = 1e-10;
+/// Halvings of a step that no interpolant resolves: an output may have corners.
+const HALVINGS: u32 = 6;
+/// Halvings of the bracket of an extreme.
+const ROUNDS: usize = 48;
+
+/// What an output came to over a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Extremes {
+    /// Its name.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// The least value, and when it was taken \[s\].
+    pub min: [f64; 2],
+    /// The largest value, and when \[s\].
+    pub max: [f64; 2],
+    /// Mean over time.
+    pub mean: f64,
+    /// Root of the mean square over time.
+    pub rms: f64,
+}
+
+impl Extremes {
+    /// The value of the largest magnitude, and when it was taken \[s\].
+    pub fn peak(&self) -> [f64; 2] {
+        if self.min[0].abs() > self.max[0].abs() { self.min } else { self.max }
+    }
+}
+
+/// What is known of one output so far.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Found {
+    min: [f64; 2],
+    max: [f64; 2],
+    integral: DoubleDouble,
+    square: DoubleDouble,
+}
+
+impl Default for Found {
+    fn default() -> Self {
+        Self {
+            min: [f64::INFINITY, 0.0],
+            max: [f64::NEG_INFINITY, 0.0],
+            integral: DoubleDouble::default(),
+            square: DoubleDouble::default(),
+        }
+    }
+}
+
+impl Found {
+    fn see(&mut self, value: f64, t: f64) {
+        if value < self.min[0] {
+            self.min = [value, t];
+        }
+        if value > self.max[0] {
+            self.max = [value, t];
+        }
+    }
+}
+
+/// What is remembered between steps.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct ExtremesMemory {
+    /// Time looked at \[s\].
+    span: DoubleDouble,
+    found: Vec<Found>,
+}
+
+/// Looks at the outputs of every step.
+pub(super) struct ExtremesDetector {
+    mechanism: Arc<Mechanism>,
+    kernel: Kernel<f64>,
+    coordinates: [Vec<f64>; 3],
+    pub memory: ExtremesMemory,
+}
+
+impl ExtremesDetector {
+    /// One for a mechanism; `None` where its scene has no outputs.
+    pub fn new(mechanism: &Arc<Mechanism>) -> Option<Self> {
+        let count = mechanism.outputs.as_ref()?.heads().count();
+        Some(Self {
+            kernel: Kernel::new(mechanism),
+            mechanism: Arc::clone(mechanism),
+            coordinates: Default::default(),
+            memory: ExtremesMemory { found: vec![Found::default(); count], ..ExtremesMemory::default() },
+        })
+    }
+
+    /// From here on the outputs are those of this mechanism: the same with other contacts held, or other parts
+    /// that act.
+    pub fn hold(&mut self, mechanism: &Arc<Mechanism>) {
+        if !Arc::ptr_eq(mechanism, &self.mechanism) {
+            self.kernel = Kernel::new(mechanism);
+            self.mechanism = Arc::clone(mechanism);
+        }
+    }
+
+    /// Takes what a run before remembered; false where it is of other outputs.
+    pub fn restore(&mut self, memory: ExtremesMemory) -> bool {
+        let fits = memory.found.len() == self.memory.found.len();
+        if fits {
+            self.memory = memory;
+        }
+        fits
+    }
+
+    /// What the outputs came to; nothing before the first step.
+    pub fn extremes(&self) -> Vec<Extremes> {
+        let span = self.memory.span.hi;
+        let Some(outputs) = self.mechanism.outputs.as_ref().filter(|_| span > 0.0) else { return Vec::new() };
+        let extremes = |((name, unit), found): ((&str, &str), &Found)| Extremes {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            min: found.min,
+            max: found.max,
+            mean: found.integral.hi / span,
+            rms: (found.square.hi / span).max(0.0).sqrt(),
+        };
+        outputs.heads().zip(&self.memory.found).map(extremes).collect()
+    }
+
+    /// Appends the outputs at a motion.
+    fn values(&mut self, motion: &Motion, values: &mut Vec<f64>) {
+        let Self { mechanism, kernel, coordinates: [phi, winding, omega], .. } = self;
+        for (to, from) in [(&mut *phi, &motion.phi), (&mut *omega, &motion.omega)] {
+            to.clear();
+            to.extend(from.iter().map(|value| value.hi));
+        }
+        winding.clear();
+        winding.extend((0..phi.len()).map(|k| motion.unwrapped(k)));
+        kernel.accelerate::<0>(mechanism, motion.time, phi, omega, Bias::default());
+        mechanism.spread_multipliers(kernel);
+        let Some(outputs) = &mechanism.outputs else { return };
+        outputs.evaluate(&Moment { mechanism, time: motion.time, phi, winding, omega, kernel }, values);
+    }
+
+    fn look(&mut self, inside: &mut dyn Inside, begin: Time, span: f64, depth: u32) {
+        let at = |share: f64, row: &mut Vec<f64>| self.values(inside.at(begin + share * span), row);
+        let is_enough = |curve: &Chebyshev| curve.tail() <= RESOLVED * curve.most();
+        let Interpolants { curves, values, is_resolved } = interpolated(&DEGREES, at, is_enough);
+        if !is_resolved && depth < HALVINGS {
+            self.look(inside, begin, 0.5 * span, depth + 1);
+            return self.look(inside, begin + 0.5 * span, 0.5 * span, depth + 1);
+        }
+        let Some(degree) = values.first().map(|values| values.len() - 1) else { return };
+        let nodes: Vec<f64> = Chebyshev::nodes(degree).collect();
+        self.memory.span += DoubleDouble::from(span);
+        let mut row = Vec::new();
+        for (k, (curve, values)) in curves.iter().zip(&values).enumerate() {
+            let squares: Vec<f64> = values.iter().map(|value| value * value).collect();
+            let found = &mut self.memory.found[k];
+            found.integral += DoubleDouble::product(curve.integral(), span);
+            found.square += DoubleDouble::product(Chebyshev::through(&squares).integral(), span);
+            for (value, node) in values.iter().zip(&nodes) {
+                found.see(*value, (begin + node * span).hi);
+            }
+            for share in turns(curve, values, &nodes, [found.min[0], found.max[0]]) {
+                let t = begin + share * span;
+                row.clear();
+                self.values(inside.at(t), &mut row);
+                self.memory.found[k].see(row[k], t.hi);
+            }
+        }
+    }
+}
+
+/// Where a curve turns round next to a node that may be beside a new extreme.
+fn turns(curve: &Chebyshev, values: &[f64], nodes: &[f64], [least, most]: [f64; 2]) -> Vec<f64> {
+    let mut turns = Vec::new();
+    for i in 1..values.len() {
+        // Nodes go from 1 to 0.
+        let (mut low, mut high) = (nodes[i], nodes[i - 1]);
+        let (first, last) = (curve.at(low)[1], curve.at(high)[1]);
+        if first == 0.0 || last == 0.0 || (first > 0.0) == (last > 0.0) {
+            continue;
+        }
+        // It cannot rise further between the nodes than its slopes at them carry it.
+        let reach = (high - low) * first.abs().max(last.abs());
+        let is_near = if first > 0.0 {
+            values[i].max(values[i - 1]) + reach >= most
+        } else {
+            values[i].min(values[i - 1]) - reach <= least
+        };
+        if !is_near {
+            continue;
+        }
+        for _ in 0..ROUNDS {
+            let middle = 0.5 * (low + high);
+            if (curve.at(middle)[1] > 0.0) == (first > 0.0) { low = middle } else { high = middle }
+        }
+        turns.push(0.5 * (low + high));
+    }
+    turns
+}
+
+impl StepWatcher for ExtremesDetector {
+    fn step(&mut self, inside: &mut dyn Inside) -> Option<Time> {
+        let (begin, end) = inside.span();
+        let span = (end - begin).hi;
+        if span > 0.0 {
+            self.look(inside, begin, span, 0);
+        }
+        None
+    }
+}

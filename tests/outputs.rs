@@ -1,0 +1,535 @@
+//! Outputs by name, and their extremes over a run: against the Newton–Euler balance of every body, against
+//! inverse dynamics of another formulation, and against closed forms.
+
+use crate::formulas::{adaptive, run, scene};
+use driftless::dynamics::Mechanism;
+use driftless::run::{
+    Extremes, Limits, MethodId, Plan, Request, Run, Running, Sample, Stabilization, integrate,
+};
+use driftless::scene::{Output, Place, Scene, parse_scene, read_scene};
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
+use std::sync::Arc;
+
+fn with(mut scene: Scene, outputs: &[&str]) -> Scene {
+    scene.outputs.extend(outputs.iter().map(|text| Output::parse(text)));
+    scene
+}
+
+fn found<'a>(extremes: &'a [Extremes], name: &str) -> &'a Extremes {
+    extremes.iter().find(|one| one.name == name).unwrap_or_else(|| panic!("no output {name}"))
+}
+
+fn example(name: &str) -> Scene {
+    read_scene(format!("examples/scenes/{name}.json").as_ref(), &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// What acts on the bodies of a scene at a moment.
+struct Balance<'a> {
+    scene: &'a Scene,
+    sample: &'a Sample,
+    force: Vec<[f64; 2]>,
+    torque: Vec<f64>,
+    /// Sum of all magnitudes.
+    size: f64,
+}
+
+impl Balance<'_> {
+    fn value(&self, name: &str) -> f64 {
+        let number = self.scene.outputs.iter().position(|output| output.name == name);
+        self.sample.outputs[number.unwrap_or_else(|| panic!("no output {name}"))]
+    }
+
+    fn position(&self, place: &Place) -> [f64; 2] {
+        let Some(bar) = place.bar else { return place.point };
+        let (s, c) = self.sample.phi[bar].sin_cos();
+        let centre = self.scene.bars[bar].centre;
+        let [x, y] = [place.point[0] - centre[0], place.point[1] - centre[1]];
+        let [x0, y0] = self.sample.centre[bar];
+        [x0 + c * x - s * y, y0 + s * x + c * y]
+    }
+
+    fn push(&mut self, bar: Option<usize>, at: [f64; 2], [x, y]: [f64; 2]) {
+        let Some(bar) = bar else { return };
+        let [x0, y0] = self.sample.centre[bar];
+        self.force[bar][0] += x;
+        self.force[bar][1] += y;
+        self.torque[bar] += (at[0] - x0) * y - (at[1] - y0) * x;
+        self.size += x.abs() + y.abs();
+    }
+
+    fn turn(&mut self, bar: Option<usize>, torque: f64) {
+        let Some(bar) = bar else { return };
+        self.torque[bar] += torque;
+        self.size += torque.abs();
+    }
+
+    /// A force on the second of two places, and its opposite on the first.
+    fn between(&mut self, [first, second]: [Option<usize>; 2], at: [f64; 2], [x, y]: [f64; 2]) {
+        self.push(second, at, [x, y]);
+        self.push(first, at, [-x, -y]);
+    }
+
+    fn joints(&mut self) {
+        let scene = self.scene;
+        for hinge in &scene.hinges[..scene.own_hinges()] {
+            let at = self.position(&hinge.between[0]);
+            let force = ["fx", "fy"].map(|axis| self.value(&format!("{}.{axis}", hinge.name)));
+            let size = self.value(&format!("{}.force", hinge.name));
+            assert!((size - force[0].hypot(force[1])).abs() <= 1e-15 * size);
+            self.between([hinge.between[0].bar, hinge.between[1].bar], at, force);
+        }
+        for slider in &scene.sliders {
+            let at = self.position(&slider.point);
+            let (on, from) = (slider.point.bar, slider.rail.place.bar);
+            let force = ["fx", "fy"].map(|axis| self.value(&format!("{}.{axis}", slider.name)));
+            self.between([from, on], at, force);
+            if slider.locked {
+                let torque = self.value(&format!("{}.torque", slider.name));
+                let [on, from] = if on.is_none() { [from, on] } else { [on, from] };
+                self.turn(on, torque);
+                self.turn(from, -torque);
+            }
+            for drive in scene.drives.iter().filter(|drive| scene.sliders[drive.slider].name == slider.name) {
+                let force = self.value(&format!("{}.force", drive.name));
+                let [x, y] = slider.rail.direction;
+                let (s, c) = from.map_or((0.0, 1.0), |bar| self.sample.phi[bar].sin_cos());
+                self.between([from, on], at, [force * (c * x - s * y), force * (s * x + c * y)]);
+            }
+        }
+        for weld in &scene.welds {
+            let at = self.position(&weld.between[0]);
+            let force = ["fx", "fy"].map(|axis| self.value(&format!("{}.{axis}", weld.name)));
+            let [first, second] = [weld.between[0].bar, weld.between[1].bar];
+            self.between([first, second], at, force);
+            let torque = self.value(&format!("{}.torque", weld.name));
+            let [on, from] = if second.is_none() { [first, second] } else { [second, first] };
+            self.turn(on, torque);
+            self.turn(from, -torque);
+        }
+        let motors = scene.motors.iter().map(|motor| (&motor.name, motor.bar, motor.relative_to));
+        for (name, bar, base) in
+            motors.chain(scene.locks.iter().map(|lock| (&lock.name, lock.bar, lock.relative_to)))
+        {
+            let torque = self.value(&format!("{name}.torque"));
+            self.turn(Some(bar), torque);
+            self.turn(base, -torque);
+        }
+    }
+
+    fn loads(&mut self) {
+        let (scene, t) = (self.scene, self.sample.t);
+        for spring in &scene.springs {
+            let [a, b] = spring.between.each_ref().map(|place| self.position(place));
+            let [x, y] = [b[0] - a[0], b[1] - a[1]];
+            let length = x.hypot(y);
+            let [tension, told, rate] = ["force", "length", "rate"]
+                .map(|quantity| self.value(&format!("{}.{quantity}", spring.name)));
+            assert!((told - length).abs() < 1e-14 * (1.0 + length));
+            if !spring.rigid {
+                let law = spring.stiffness * (length - spring.free_length) + spring.damping * rate;
+                assert!((tension - law).abs() < 1e-12 * (1.0 + spring.stiffness * length), "{tension} {law}");
+            }
+            let pull = [tension * x / length, tension * y / length];
+            self.push(spring.between[0].bar, a, pull);
+            self.push(spring.between[1].bar, b, [-pull[0], -pull[1]]);
+        }
+        for spring in &scene.torsion_springs {
+            let [torque, angle, rate] = ["torque", "angle", "rate"]
+                .map(|quantity| self.value(&format!("{}.{quantity}", spring.name)));
+            let law = -spring.stiffness * (angle - spring.free_angle) - spring.damping * rate;
+            assert!((torque - law).abs() < 1e-12 * (1.0 + law.abs()), "{torque} {law}");
+            self.turn(Some(spring.bar), torque);
+            self.turn(spring.relative_to, -torque);
+        }
+        let factor =
+            |law: &Option<driftless::scene::Law>| law.as_ref().map_or(1.0, |law| law.value::<f64>(t.into()));
+        for force in &scene.forces {
+            let at = self.position(&Place { bar: Some(force.bar), point: force.point });
+            let (s, c) = if force.follows { self.sample.phi[force.bar].sin_cos() } else { (0.0, 1.0) };
+            let ([x, y], factor) = (force.force, factor(&force.law));
+            self.push(Some(force.bar), at, [factor * (c * x - s * y), factor * (s * x + c * y)]);
+        }
+        for torque in &scene.torques {
+            let value = torque.torque * factor(&torque.law);
+            self.turn(Some(torque.bar), value);
+            self.turn(torque.relative_to, -value);
+        }
+        for wall in &scene.walls {
+            let force = self.value(&format!("{}.force", wall.name));
+            let at = self.position(&Place { bar: Some(wall.bar), point: wall.point });
+            let [x, y] = wall.normal;
+            let gap = x * (at[0] - wall.through[0]) + y * (at[1] - wall.through[1]);
+            assert!((self.value(&format!("{}.gap", wall.name)) - gap).abs() < 1e-13 * (1.0 + gap.abs()));
+            self.push(Some(wall.bar), at, [force * x, force * y]);
+        }
+    }
+
+    /// The largest rest of m a = F and I alpha = M, over the size of the forces.
+    fn rest(mut self) -> f64 {
+        self.joints();
+        self.loads();
+        let scene = self.scene;
+        let mut most = 0.0_f64;
+        for (k, bar) in scene.bars[..scene.own_bars()].iter().enumerate() {
+            let [ax, ay, alpha] =
+                ["ax", "ay", "alpha"].map(|quantity| self.value(&format!("{}.{quantity}", bar.name)));
+            let needed = [bar.mass * (ax - scene.gravity[0]), bar.mass * (ay - scene.gravity[1])];
+            self.size += needed[0].abs() + needed[1].abs() + (bar.inertia * alpha).abs();
+            let rests = [
+                needed[0] - self.force[k][0],
+                needed[1] - self.force[k][1],
+                bar.inertia * alpha - self.torque[k],
+            ];
+            most = rests.iter().fold(most, |most, rest| most.max(rest.abs()));
+        }
+        most / self.size.max(f64::MIN_POSITIVE)
+    }
+}
+
+/// Every quantity that the balance asks for.
+fn all_outputs(scene: &Scene) -> Vec<String> {
+    let mut all = Vec::new();
+    let mut add = |name: &String, quantities: &[&str]| {
+        all.extend(quantities.iter().map(|quantity| format!("{name}.{quantity}")));
+    };
+    scene.bars[..scene.own_bars()].iter().for_each(|bar| add(&bar.name, &["ax", "ay", "alpha"]));
+    scene.hinges[..scene.own_hinges()].iter().for_each(|hinge| add(&hinge.name, &["fx", "fy", "force"]));
+    for slider in &scene.sliders {
+        add(&slider.name, if slider.locked { &["fx", "fy", "torque"] } else { &["fx", "fy"] });
+    }
+    scene.welds.iter().for_each(|weld| add(&weld.name, &["fx", "fy", "torque"]));
+    scene.motors.iter().for_each(|motor| add(&motor.name, &["torque"]));
+    scene.locks.iter().for_each(|lock| add(&lock.name, &["torque"]));
+    scene.drives.iter().for_each(|drive| add(&drive.name, &["force"]));
+    scene.springs.iter().for_each(|spring| add(&spring.name, &["force", "length", "rate"]));
+    scene.torsion_springs.iter().for_each(|spring| add(&spring.name, &["torque", "angle", "rate"]));
+    scene.walls.iter().for_each(|wall| add(&wall.name, &["force", "gap"]));
+    all
+}
+
+fn assert_balanced(scene: Scene) -> usize {
+    let outputs = all_outputs(&scene);
+    let names: Vec<&str> = outputs.iter().map(String::as_str).collect();
+    let until = scene.until.min(1.0);
+    let scene = with(scene, &names);
+    let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
+    let request = Request { until: Some(until), every: Some(until / 4.0), ..Request::default() };
+    let plan = Plan::new(&scene, &mechanism, &request).expect("a plan");
+    let start = mechanism.start(&scene);
+    let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a run");
+    let mut looked = 0;
+    integrate(run, &mut |sample| {
+        let (force, torque) = (vec![[0.0; 2]; scene.bars.len()], vec![0.0; scene.bars.len()]);
+        let rest = Balance { scene: &scene, sample, force, torque, size: 0.0 }.rest();
+        assert!(rest < 1e-12, "{} at {} s: {rest:e}", scene.name, sample.t);
+        looked += 1;
+        Ok(())
+    })
+    .expect("samples");
+    looked
+}
+
+#[test]
+fn forces_balance_the_accelerations_of_every_body_of_every_example() {
+    let mut covered = Vec::new();
+    for entry in std::fs::read_dir("examples/scenes").expect("a folder") {
+        let path = entry.expect("an entry").path();
+        let Ok(scene) = read_scene(&path, &[]) else { continue };
+        // Loads by formulas and friction are no outputs.
+        let is_said = scene.laws.is_empty() && scene.frictions.is_empty();
+        let is_rigid = scene.springs.iter().any(|spring| spring.rigid);
+        if is_said && !is_rigid && scene.events.is_empty() {
+            assert!(assert_balanced(scene.clone()) >= 2, "{}", scene.name);
+            covered.push(scene.name);
+        }
+    }
+    println!("balanced: {}", covered.join(", "));
+    assert!(covered.len() >= 20, "{covered:?}");
+}
+
+/// Loops of redundant constraints, welds, locks, slots on moving bars, a driven cart, a rigid spring.
+#[test]
+fn forces_balance_in_parts_that_the_examples_have_not() {
+    let bar = |name: &str| {
+        format!(r#"{{"name": "{name}", "mass": 1.5, "centre": [0.4, 0.1], "inertia": 0.2, "length": 1}}"#)
+    };
+    let place = |body: &str, x: f64, y: f64| format!(r#"{{"body": "{body}", "point": [{x}, {y}]}}"#);
+    let hinge = |name: &str, a: String, b: String| format!(r#"{{"name": "{name}", "between": [{a}, {b}]}}"#);
+    let ground = |x: f64, y: f64| place("ground", x, y);
+    let scenes = [
+        // A parallelogram with a third crank: one constraint too many.
+        format!(
+            r#""bars": [{}, {}, {}, {}], "hinges": [{}, {}, {}, {}, {}, {}],
+            "start": {{"a": {{"phi": 1, "omega": 1}}, "b": {{"phi": 1, "omega": 1}}, "c": {{"phi": 1, "omega": 1}}, "r": {{"phi": 0, "omega": 0}}}}"#,
+            bar("a"),
+            bar("b"),
+            bar("c"),
+            bar("r"),
+            hinge("A", ground(0.0, 0.0), place("a", 0.0, 0.0)),
+            hinge("B", ground(1.0, 0.0), place("b", 0.0, 0.0)),
+            hinge("C", ground(0.5, 0.0), place("c", 0.0, 0.0)),
+            hinge("P", place("a", 1.0, 0.0), place("r", 0.0, 0.0)),
+            hinge("Q", place("b", 1.0, 0.0), place("r", 1.0, 0.0)),
+            hinge("R", place("c", 1.0, 0.0), place("r", 0.5, 0.0)),
+        ),
+        // A weld, a lock, a torsion spring, a torque between two bars, a force that follows.
+        format!(
+            r#""bars": [{}, {}, {}], "hinges": [{}, {}], "welds": [{}], "locks": [{{"name": "L", "body": "c", "relative_to": "a"}}],
+            "torsion_springs": [{{"name": "T", "body": "a", "stiffness": 3, "free_angle": 0.2, "damping": 0.1}}],
+            "torques": [{{"name": "M", "body": "c", "relative_to": "b", "torque": 0.7}}],
+            "forces": [{{"name": "F", "body": "b", "point": [0.3, 0.2], "force": [1, -2], "frame": "body"}}],
+            "start": {{"a": {{"phi": 1, "omega": 1}}, "b": {{"phi": 0.3}}, "c": {{"phi": -0.5}}}}"#,
+            bar("a"),
+            bar("b"),
+            bar("c"),
+            hinge("A", ground(0.0, 0.0), place("a", 0.0, 0.0)),
+            hinge("C", place("b", 1.0, 0.0), place("c", 0.0, 0.0)),
+            hinge("W", place("a", 1.0, 0.0), place("b", 0.0, 0.0)),
+        ),
+        // A slot on a turning bar, a driven cart, and a rod.
+        format!(
+            r#""bars": [{}, {}, {}], "hinges": [{}, {}],
+            "sliders": [{{"name": "S", "point": {}, "rail": {{"body": "a", "point": [0.2, 0.1], "direction": [1, 0]}}}},
+                        {{"name": "R", "point": {}, "rail": {{"body": "ground", "point": [0, 0], "direction": [1, 0]}}, "angle": "locked"}}],
+            "motors": [{{"name": "D", "slider": "R", "law": {{"start": 1.5, "rate": 0.2, "sines": [{{"amplitude": 0.1, "frequency": 3}}]}}}}],
+            "springs": [{{"name": "K", "between": [{}, {}], "stiffness": 8, "free_length": 0.5, "damping": 0.3}}],
+            "start": {{"a": {{"phi": 0.8, "omega": 0.5}}, "b": {{"phi": 1.6}}, "c": {{"phi": 0}}}}"#,
+            bar("a"),
+            bar("b"),
+            bar("c"),
+            hinge("A", ground(0.0, 0.0), place("a", 0.0, 0.0)),
+            hinge("B", place("c", 0.0, 0.0), place("b", 0.0, 0.0)),
+            place("b", 1.0, 0.0),
+            place("c", 0.0, 0.0),
+            place("a", 0.9, 0.0),
+            place("c", 0.1, 0.2),
+        ),
+    ];
+    for (number, text) in scenes.into_iter().enumerate() {
+        let text =
+            format!(r#"{{"name": "s{number}", "gravity": [0, -9.81], {text}, "until": 0.5, "every": 0.1}}"#);
+        assert_eq!(assert_balanced(scene(&text)), 5, "{number}");
+    }
+}
+
+/// The forces of a four-bar whose crank turns steadily: positions by circles, derivatives of the closed loop, and
+/// nine equations for eight hinge forces and a torque.
+fn four_bar(scene: &Scene, t: f64) -> [f64; 5] {
+    let [a, b, c, d] = [0.3, 0.9, 0.7, 1.0];
+    let theta = 0.5 * PI + TAU * t;
+    let unit = |angle: f64| [angle.cos(), angle.sin()];
+    let [cx, cy] = unit(theta).map(|x| a * x);
+    // Where circles about A and C meet, above.
+    let [ux, uy] = [d - cx, -cy];
+    let span = ux.hypot(uy);
+    let along = (b * b - c * c + span * span) / (2.0 * span);
+    let up = (b * b - along * along).sqrt();
+    let meeting = [cx + (along * ux - up * uy) / span, cy + (along * uy + up * ux) / span];
+    let beta = (meeting[1] - cy).atan2(meeting[0] - cx);
+    let gamma = meeting[1].atan2(meeting[0] - d);
+    let angles = [theta, beta, gamma];
+    let lengths = [a, b, -c];
+    // a e^(i theta) + b e^(i beta) - c e^(i gamma) = d, differentiated once and twice.
+    let solve = |known: [f64; 2]| {
+        let m = [[-b * beta.sin(), c * gamma.sin()], [b * beta.cos(), -c * gamma.cos()]];
+        let det = m[0][0] * m[1][1] - m[0][1] * m[1][0];
+        [(known[0] * m[1][1] - m[0][1] * known[1]) / det, (m[0][0] * known[1] - m[1][0] * known[0]) / det]
+    };
+    let [wb, wc] = solve([a * TAU * theta.sin(), -a * TAU * theta.cos()]);
+    let rates = [TAU, wb, wc];
+    let pull =
+        |axis: usize| (0..3).map(|k| lengths[k] * rates[k] * rates[k] * unit(angles[k])[axis]).sum::<f64>();
+    let [ab, ac] = solve([pull(0), pull(1)]);
+    let alphas = [0.0, ab, ac];
+    let arm = |k: usize, s: f64| unit(angles[k]).map(|x| s * x);
+    let turned = |k: usize, s: f64| {
+        let ([x, y], w, alpha) = (arm(k, s), rates[k], alphas[k]);
+        [-alpha * y - w * w * x, alpha * x - w * w * y]
+    };
+    let half = |k: usize| scene.bars[k].centre[0];
+    let at_a = turned(0, a);
+    let centres = [turned(0, half(0)), turned(1, half(1)), turned(2, half(2))];
+    let accelerations = [centres[0], [centres[1][0] + at_a[0], centres[1][1] + at_a[1]], centres[2]];
+    // Unknowns: O on crank, A on coupler, B on rocker, C on rocker (x, y each), torque.
+    let (mut m, mut right) = (DMatrix::zeros(9, 9), DVector::zeros(9));
+    let ends = [[(0, 1.0, 0.0), (2, -1.0, a)], [(2, 1.0, 0.0), (4, -1.0, b)], [(6, 1.0, 0.0), (4, 1.0, c)]];
+    for (k, ends) in ends.iter().enumerate() {
+        for &(force, sign, s) in ends {
+            let [x, y] = arm(k, s - half(k));
+            m[(3 * k, force)] += sign;
+            m[(3 * k + 1, force + 1)] += sign;
+            m[(3 * k + 2, force)] -= sign * y;
+            m[(3 * k + 2, force + 1)] += sign * x;
+        }
+        let bar = &scene.bars[k];
+        right[3 * k] = bar.mass * accelerations[k][0];
+        right[3 * k + 1] = bar.mass * (accelerations[k][1] + 9.81);
+        right[3 * k + 2] = bar.inertia * alphas[k];
+    }
+    m[(2, 8)] = 1.0;
+    let f = m.lu().solve(&right).expect("a regular system");
+    [f[0].hypot(f[1]), f[2].hypot(f[3]), f[4].hypot(f[5]), f[6].hypot(f[7]), f[8]]
+}
+
+#[test]
+fn peaks_of_a_crank_rocker_are_those_of_inverse_dynamics() {
+    let names = ["O.force", "A.force", "B.force", "C.force", "motor.torque"];
+    let scene = with(example("four_bar_motor"), &names);
+    // Peaks on a fine grid, and between its points by a parabola.
+    let n = 20_000;
+    let grid: Vec<[f64; 5]> = (0..=n).map(|i| four_bar(&scene, f64::from(i) / f64::from(n))).collect();
+    for request in [
+        adaptive(MethodId::Taylor, 1e-13),
+        adaptive(MethodId::Dp8, 1e-12),
+        Request { stabilize: Some(Stabilization::Projection), ..adaptive(MethodId::Radau(5), 1e-11) },
+    ] {
+        let request = Request { until: Some(1.0), every: Some(1.0), ..request };
+        let outcome = run(&scene, &request);
+        for (k, name) in names.iter().enumerate() {
+            let extremes = found(&outcome.extremes, name);
+            for (sign, [value, t]) in [(1.0, extremes.max), (-1.0, extremes.min)] {
+                let best =
+                    (0..=n as usize).max_by(|&i, &j| (sign * grid[i][k]).total_cmp(&(sign * grid[j][k])));
+                let i = best.expect("a grid").clamp(1, n as usize - 1);
+                let [y0, y1, y2] = [grid[i - 1][k], grid[i][k], grid[i + 1][k]];
+                let shift = 0.5 * (y0 - y2) / (y0 - 2.0 * y1 + y2);
+                let peak = y1 - 0.25 * (y0 - y2) * shift;
+                assert!((value - peak).abs() < 1e-7 * (1.0 + peak.abs()), "{name}: {value} {peak}");
+                // The turn of a steady crank begins and ends alike.
+                let off = (t - (i as f64 + shift) / f64::from(n)).rem_euclid(1.0);
+                assert!(off.min(1.0 - off) < 1e-5, "{name}: {t} {off}");
+            }
+            let mean = grid[1..].iter().map(|row| row[k]).sum::<f64>() / f64::from(n);
+            let square = grid[1..].iter().map(|row| row[k] * row[k]).sum::<f64>() / f64::from(n);
+            assert!(
+                (extremes.mean - mean).abs() < 1e-8 * (1.0 + mean.abs()),
+                "{name}: {} {mean}",
+                extremes.mean
+            );
+            assert!((extremes.rms - square.sqrt()).abs() < 1e-8 * square.sqrt(), "{name}: {}", extremes.rms);
+        }
+    }
+}
+
+/// A bar of moment 0.5 kg·m² about its hinge turns to and fro as A sin w t: its torque is known at every time.
+fn swinging(every: f64) -> Scene {
+    scene(&format!(
+        r#"{{"name": "swing", "gravity": [0, 0], "bars": [{{"name": "bar", "mass": 2, "centre": [0.5, 0], "inertia": 0}}],
+        "hinges": [{{"name": "O", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "bar", "point": [0, 0]}}]}}],
+        "motors": [{{"name": "M", "body": "bar", "law": "0.3*sin(2*pi*t)"}}],
+        "points": [{{"name": "tip", "body": "bar", "point": [1.5, 0]}}],
+        "parameters": {{"radius": 1.5}}, "signals": {{"speed": "sqrt(tip.vx^2 + tip.vy^2)"}},
+        "outputs": {{"torque": "M.torque", "power": "M.power", "speed": "speed", "along": "tip.ax*bar.cos + tip.ay*bar.sin",
+                     "lever": "M.torque/radius", "pull": "-(O.fx*bar.cos + O.fy*bar.sin)"}},
+        "until": 3, "every": {every}}}"#
+    ))
+}
+
+#[test]
+fn extremes_and_means_are_located_between_rows() {
+    let outcome = run(&swinging(3.0), &adaptive(MethodId::Taylor, 1e-14));
+    let (inertia, w, amplitude) = (0.5, TAU, 0.3);
+    let torque = found(&outcome.extremes, "torque");
+    let peak = inertia * amplitude * w * w;
+    assert!((torque.max[0] - peak).abs() < 1e-12 && (torque.min[0] + peak).abs() < 1e-12, "{torque:?}");
+    assert!(
+        (torque.max[1].fract() - 0.75).abs() < 1e-7 && (torque.min[1].fract() - 0.25).abs() < 1e-7,
+        "{torque:?}"
+    );
+    assert!(torque.mean.abs() < 1e-12 && (torque.rms - peak * FRAC_1_SQRT_2).abs() < 1e-10, "{torque:?}");
+    assert_eq!(torque.unit, "N m");
+    let speed = found(&outcome.extremes, "speed");
+    // Where it comes down to zero it has a corner.
+    assert!((speed.max[0] - 1.5 * amplitude * w).abs() < 1e-12 && speed.min[0] < 1e-4, "{speed:?}");
+    assert_eq!(speed.unit, "m/s");
+    // The mean of |cos| is 2/π; it has corners.
+    assert!((speed.mean - 1.5 * amplitude * w * 2.0 / PI).abs() < 1e-4, "{speed:?}");
+    let power = found(&outcome.extremes, "power");
+    assert!((power.max[0] - 0.5 * peak * amplitude * w).abs() < 1e-11, "{power:?}");
+    // Towards the hinge, 1.5 m and 0.5 m from it.
+    let square = (amplitude * w).powi(2);
+    let [along, pull] = ["along", "pull"].map(|name| found(&outcome.extremes, name));
+    assert!((along.min[0] + 1.5 * square).abs() < 1e-11 && along.max[0].abs() < 1e-9, "{along:?}");
+    assert!((pull.max[0] - 2.0 * 0.5 * square).abs() < 1e-11, "{pull:?}");
+    // A plain number may have any dimension.
+    assert_eq!(found(&outcome.extremes, "lever").unit, "?");
+}
+
+#[test]
+fn extremes_do_not_depend_on_rows_or_pauses() {
+    for method in [MethodId::Dp8, MethodId::Taylor, MethodId::Radau(5)] {
+        let scene = with(example("four_bar_motor"), &["O.force", "motor.torque", "coupler.ay"]);
+        let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
+        let start = mechanism.start(&scene);
+        let running = |every: f64| {
+            let request = Request { until: Some(2.0), every: Some(every), ..adaptive(method, 1e-10) };
+            let plan = Plan::new(&scene, &mechanism, &request).expect("a plan");
+            Running::new(Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).expect("a run"))
+        };
+        let whole = |every: f64| {
+            let mut running = running(every);
+            running.go(&mut |_| Ok(()), &mut || false).expect("rows");
+            running.finish().extremes
+        };
+        let (coarse, fine) = (whole(2.0), whole(0.01));
+        assert_eq!(coarse, fine, "{method}");
+        let (mut first, mut steps) = (running(0.01), 0);
+        let is_over = first.go(&mut |_| Ok(()), &mut || {
+            steps += 1;
+            steps > 40
+        });
+        assert!(!is_over.expect("rows"));
+        let mut rest = Running::resume(Arc::clone(&mechanism), &start, first.snapshot()).expect("a rest");
+        rest.go(&mut |_| Ok(()), &mut || false).expect("rows");
+        assert_eq!(rest.finish().extremes, fine, "{method}");
+    }
+}
+
+#[test]
+fn walls_and_dry_friction_have_their_forces() {
+    let scene = with(example("sliding_ball"), &["floor.force", "floor.friction", "floor.gap"]);
+    let outcome = run(&scene, &adaptive(MethodId::Radau(5), 1e-10));
+    // At rest on the floor in the end: its weight, and no friction.
+    let weight = 2.0 * 9.81;
+    assert!((outcome.last.outputs[0] - weight).abs() < 1e-11, "{:?}", outcome.last.outputs);
+    assert!(outcome.last.outputs[1].abs() < 1e-11 && outcome.last.outputs[2].abs() < 1e-12);
+    let friction = found(&outcome.extremes, "floor.friction");
+    assert!((friction.min[0] + 0.2 * weight).abs() < 1e-11 && friction.max[0].abs() < 1e-11, "{friction:?}");
+}
+
+#[test]
+fn outputs_are_read_written_and_refused_by_name() {
+    let text = |outputs: &str| {
+        format!(
+            r#"{{"name": "o", "gravity": [0, -9.81], "bars": [{{"name": "bar", "mass": 2, "centre": [0.5, 0], "inertia": 0.1}}],
+            "hinges": [{{"name": "O", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "bar", "point": [0, 0]}}]}}],
+            "start": {{"bar": {{"phi": 0, "omega": 0}}}}, "until": 1, "every": 1, "outputs": {outputs}}}"#
+        )
+    };
+    let list = scene(&text(r#"["O.force", "bar.x*2"]"#));
+    assert_eq!(
+        list.outputs.iter().map(|output| output.name.as_str()).collect::<Vec<_>>(),
+        ["O.force", "bar.x*2"]
+    );
+    assert_eq!(
+        parse_scene(&list.to_input().to_string(), "again", &[]).expect("a scene").outputs,
+        list.outputs
+    );
+    // A bar let go at the horizontal: the hinge carries m g (1 - m c²/I).
+    let outcome = run(&list, &adaptive(MethodId::Taylor, 1e-12));
+    assert_eq!(found(&outcome.extremes, "O.force").unit, "N");
+    let first = 2.0 * 9.81 * (1.0 - 2.0 * 0.25 / 0.6);
+    assert!(found(&outcome.extremes, "O.force").min[0] <= first + 1e-12);
+    for (outputs, part) in [
+        (r#"["O.forse"]"#, "unknown name O.forse"),
+        (r#"{"a": "O.force + bar.phi*1 m"}"#, "puts N and m together"),
+        (r#"{"a": 3}"#, "must be a formula in quotes"),
+        (r#"["O.fx", "O.fx"]"#, "is there twice"),
+        (r#"{"a,b": "O.fx"}"#, "has a name that no column can have"),
+        (r#"3"#, "must be {name: formula in quotes}, or a list"),
+    ] {
+        let error = parse_scene(&text(outputs), "test", &[]).expect_err("no scene").to_string();
+        assert!(error.contains(part) && error.contains("outputs"), "{outputs}: {error}");
+    }
+}
