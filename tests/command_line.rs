@@ -270,3 +270,25 @@ fn a_moment_is_that_of_the_run() {
     program.run("inspect crank_rocker.json --at -1").exits(2).says(&["--at"]);
     program.run("inspect crank_rocker.json --at lunch").exits(2).says(&["--at lunch", "event"]);
 }
+
+#[test]
+fn kinematics_leaves_a_table_charts_and_a_record() {
+    let program = Program::with_scenes(&["crank_rocker", "free"]);
+    let object = program.run("kinematics crank_rocker.json --positions 36 --json").exits(0).object();
+    assert_eq!(object["positions"], 37);
+    assert_eq!(object["drive"]["closes"], true);
+    assert_eq!(object["assemblies"], 2);
+    assert_eq!(object["dead_centres"].as_array().map(Vec::len), Some(4));
+    let folder = "output/crank_rocker/kinematics-motor";
+    let table = program.read(&format!("{folder}/kinematics.csv"));
+    assert!(table.starts_with("motor [rad],t [s],crank.phi [rad],crank.omega [rad/s],crank.alpha [rad/s²],"));
+    assert_eq!(table.lines().count(), 38);
+    assert_eq!(record(&program, &format!("{folder}/kinematics.json"))["positions"], 37);
+    // What is there is not overwritten unasked.
+    program.run("kinematics crank_rocker.json").exits(6).says(&["--force"]);
+    let swung = program.run("kinematics crank_rocker.json --drive rocker=0..3 --no-charts").exits(0);
+    swung.shows(&["limit", "in line at A", "rocker"]);
+    program.run("kinematics free.json").exits(2).says(&["no motor", "--drive bar1"]);
+    program.run("kinematics free.json --drive bar1").exits(3).says(&["leaves 1 degree", "hint: "]);
+    program.run("kinematics crank_rocker.json --drive rocker=3..0").exits(2).says(&["--drive", "FROM"]);
+}

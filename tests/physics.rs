@@ -38,6 +38,7 @@ mod friction;
 mod gauss;
 mod identities;
 mod impact;
+mod kinematics;
 mod laws;
 mod linkage_scenes;
 mod linkages;

@@ -17,7 +17,7 @@ pub struct OutputSeries {
     pub name: String,
     /// Unit; outputs of one unit share a panel.
     pub unit: String,
-    /// Times \[s\], ascending.
+    /// Times \[s\], or what else the chart is drawn over, ascending.
     pub time: Vec<f64>,
     /// Its values at these times.
     pub value: Vec<f64>,
@@ -34,6 +34,8 @@ pub struct OutputsChart {
     pub caption: Vec<String>,
     /// The outputs.
     pub outputs: Vec<OutputSeries>,
+    /// Name and unit of what it is drawn over; time in seconds where there is none.
+    pub over: Option<[String; 2]>,
     /// The time from which on the curves are pale: the horizon up to which they can be trusted \[s\].
     pub horizon: Option<f64>,
 }
@@ -82,7 +84,11 @@ pub fn outputs(chart: &OutputsChart, px_per_pt: f64) -> Result<Picture, ChartErr
         marks[number.unwrap_or_default()]
     };
     let labels: Vec<String> = chart.outputs.iter().map(|output| shortened(&sheet, &output.name)).collect();
-    let x = Axis::tight("time [s]", rows.iter().flat_map(|row| &row.1).flat_map(|one| &one.1).map(|p| p[0]));
+    let [over, over_unit] = chart.over.clone().unwrap_or_else(|| ["time".to_owned(), "s".to_owned()]);
+    let x = Axis::tight(
+        &format!("{over} [{over_unit}]"),
+        rows.iter().flat_map(|row| &row.1).flat_map(|one| &one.1).map(|p| p[0]),
+    );
     let y = |(unit, lines): &(&str, Vec<Line>)| {
         let name = match &lines[..] {
             [(output, _)] => format!("{} [{unit}]", shortened(&sheet, &output.name)),
@@ -91,7 +97,8 @@ pub fn outputs(chart: &OutputsChart, px_per_pt: f64) -> Result<Picture, ChartErr
         Axis::fit(&name, lines.iter().flat_map(|one| &one.1).map(|p| p[1]))
     };
     let mut caption = chart.caption.clone();
-    caption.push("extremes of the whole run marked".to_owned());
+    caption
+        .push(format!("extremes of the whole {} marked", if chart.over.is_some() { "range" } else { "run" }));
     if left_out > 0 {
         caption.push(format!("{left_out} more units in the table"));
     }
@@ -123,7 +130,7 @@ pub fn outputs(chart: &OutputsChart, px_per_pt: f64) -> Result<Picture, ChartErr
             let peak = output.extremes.iter().max_by(|a, b| a[0].abs().total_cmp(&b[0].abs()));
             if let Some(&[value, t]) = peak.filter(|peak| peak[0].is_finite()) {
                 let said = if *unit == "1" { figure(value) } else { format!("{} {unit}", figure(value)) };
-                let note = format!("{said} at {} s", figure(t));
+                let note = format!("{said} at {} {over_unit}", figure(t));
                 panel.note_beside(panel.at([t, value]), &note, readable(colour), &mut occupied)?;
             }
         }

@@ -2,6 +2,7 @@
 
 use super::failure::{Exit, Failure};
 use super::output::{message, print};
+use crate::run::kinematics::Drive;
 use crate::run::stress::MAX_EVALUATIONS;
 use crate::run::trust::Level;
 use crate::run::{Limits, METHODS, MethodId, Prefer, Request, Stabilization, Vary};
@@ -40,6 +41,8 @@ pub enum Command {
     Run(Box<RunFlags>),
     /// Run a scene over a grid of starts and parameters, one row of a table a point
     Sweep(Box<SweepFlags>),
+    /// Move a mechanism through the range of its drive: positions, loads, limits, without integrating
+    Kinematics(KinematicsFlags),
     /// Run a scene with every method at all its settings: error, drift and run time, and what to choose
     Compare(Box<CompareFlags>),
     /// Go on with an interrupted run or sweep: it ends as if nothing had been, byte for byte
@@ -302,6 +305,34 @@ pub struct StressFlags {
     pub tell: TellFlags,
 }
 
+/// `driftless kinematics`.
+#[derive(Debug, Args)]
+pub struct KinematicsFlags {
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub scene: SceneFlags,
+    /// What is driven, and from where to where in rad or m: a motor, a body or a slider, as crank,
+    /// crank=0..2pi or slider=-0.1..0.1 [default: the first motor, one turn from the start]
+    #[arg(long, value_name = "NAME[=FROM..TO]", value_parser = clap::value_parser!(Drive), allow_hyphen_values = true)]
+    pub drive: Option<Drive>,
+    /// Rate of the drive in rad/s or m/s [default: that of the motor at the start, 1 elsewhere]
+    #[arg(long, value_name = "RATE", value_parser = number, allow_hyphen_values = true)]
+    pub rate: Option<f64>,
+    /// Positions at equal distances over the range; one more stands at its end
+    #[arg(long, value_name = "N", default_value_t = 360, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    pub positions: u32,
+    /// Folder under which `SCENE/kinematics-DRIVE` is made
+    #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
+    pub out: PathBuf,
+    /// Overwrite what is in the folder
+    #[arg(long, help_heading = "Files")]
+    pub force: bool,
+    /// Draw no PNG charts
+    #[cfg(feature = "charts")]
+    #[arg(long, help_heading = "Files")]
+    pub no_charts: bool,
+}
+
 /// `driftless compare`.
 #[derive(Debug, Args)]
 pub struct CompareFlags {
@@ -390,6 +421,7 @@ impl Flags {
         match &self.command {
             Command::Check(flags) => flags.scene.tell.json,
             Command::Inspect(flags) => flags.scene.tell.json,
+            Command::Kinematics(flags) => flags.scene.tell.json,
             Command::Run(flags) => flags.scene.tell.json,
             Command::Sweep(flags) => flags.scene.tell.json,
             Command::Compare(flags) => flags.scene.tell.json,

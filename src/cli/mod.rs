@@ -9,6 +9,7 @@ pub mod failure;
 pub mod flags;
 mod inspect;
 mod interrupt;
+mod kinematics;
 mod output;
 mod progress;
 mod resume;
@@ -40,6 +41,7 @@ pub fn run(flags: &Flags) -> Result<(), Failure> {
         Command::Inspect(flags) => inspect::run(flags),
         Command::Run(given) => simulate::run(given, &flags.arguments),
         Command::Sweep(given) => sweep::run(given, &flags.arguments),
+        Command::Kinematics(flags) => kinematics::run(flags),
         Command::Compare(flags) => compare::run(flags),
         Command::Resume(flags) => resume::run(flags),
         Command::Stress(flags) => stress::run(flags),

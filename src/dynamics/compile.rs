@@ -599,6 +599,25 @@ impl Mechanism {
         events.iter().any(|event| event.off.iter().any(|part| part == name))
     }
 
+    /// Elements and translational coordinates of all bodies at these coordinates.
+    pub(crate) fn pose(&self, phi: &[f64]) -> (Vec<Complex<f64>>, Vec<Complex<f64>>) {
+        let z = self.elements(phi);
+        let mut translations = vec![Complex::ZERO; self.bodies.len()];
+        self.forest.translations(&z, &mut translations);
+        (z, translations)
+    }
+
+    /// Where a place of the scene is, from these \[m\].
+    pub(crate) fn place(
+        &self,
+        place: &Place,
+        z: &[Complex<f64>],
+        translations: &[Complex<f64>],
+    ) -> Complex<f64> {
+        let at = Complex::new(place.point[0], place.point[1]);
+        place.bar.map_or(at, |bar| translations[bar] + (self.bodies[bar].ends[0] + at) * z[bar])
+    }
+
     /// The mechanism with two of its points pinned to one another by two more rows: a closed loop.
     ///
     /// The loop must be closed at the start, and not be one that the rows there are close already.

@@ -1,19 +1,18 @@
 //! A run in pictures: which charts it has, and what they show.
 
-use crate::arithmetic::Complex;
+use super::drawing::Drawing;
 use crate::chart::{
     self, AngleSeries, Angles, ChartError, ConstraintDrift, DriftSeries, EnergyDrift, FILE_RESOLUTION,
-    HingeSketch, MechanismChart, MotionGif, MotorPose, MotorSeries, OutputSeries, OutputsChart, Pose,
-    ResidualPanel, Sketch, SliderPose, SpringSketch, TorquePower, WallSketch, plain,
+    MechanismChart, MotionGif, MotorSeries, OutputSeries, OutputsChart, Pose, ResidualPanel, TorquePower,
+    plain,
 };
 use crate::dynamics::Mechanism;
-use crate::dynamics::compile::Joint;
 use crate::dynamics::constraint::ConstraintEquation;
 use crate::report::curves::{between, furthest, is_coarse, smoothed, span};
 use crate::report::page::{figure, magnitude, rough};
 use crate::run::drift::Excursion;
 use crate::run::{Outcome, Sample};
-use crate::scene::{Load, NamedPoint, Place, Scene};
+use crate::scene::{Place, Scene};
 use std::f64::consts::TAU;
 
 /// A chart of a run.
@@ -169,6 +168,10 @@ struct Finished<'a> {
 }
 
 impl Finished<'_> {
+    fn drawing(&self) -> Drawing<'_> {
+        Drawing { scene: self.scene, mechanism: self.mechanism }
+    }
+
     fn caption(&self, more: Option<String>) -> Vec<String> {
         let plan = &self.outcome.plan;
         let mut caption = vec![format!("scene {}", plain(&self.scene.name)), plain(&super::setting(plan))];
@@ -230,12 +233,13 @@ impl Finished<'_> {
     fn mechanism_chart(&self) -> MechanismChart {
         let path = self.path();
         let coarse = is_coarse(&path);
-        let traced = self.traced();
+        let drawing = self.drawing();
+        let traced = drawing.traced();
         let trails = if coarse {
             Vec::new()
         } else {
             let smooth = smoothed(&path);
-            let trail = |place: &Place| smooth.iter().map(|(_, phi)| self.place(place, phi)).collect();
+            let trail = |place: &Place| smooth.iter().map(|(_, phi)| drawing.place(place, phi)).collect();
             traced.iter().map(trail).collect()
         };
         let mut poses: Vec<Pose> = Vec::new();
@@ -244,7 +248,7 @@ impl Finished<'_> {
             turned += after.map_or(GHOST, |after| furthest(sample, after));
             after = Some(*sample);
             if turned >= GHOST && poses.len() <= GHOSTS {
-                poses.push(self.pose(&sample.phi, &sample.omega));
+                poses.push(self.drawing().pose(&sample.phi, &sample.omega));
                 turned = 0.0;
             }
         }
@@ -252,19 +256,8 @@ impl Finished<'_> {
         if coarse {
             poses.drain(..poses.len().saturating_sub(1));
         }
-        let names = |all: &mut dyn Iterator<Item = &String>| {
-            all.take(traced.len()).map(|name| plain(name)).collect::<Vec<_>>().join(", ")
-        };
-        let several = traced.len() > 1;
-        let title = if coarse || traced.is_empty() {
-            format!("The mechanism at {} s", figure(self.outcome.last.t))
-        } else if self.points().next().is_some() {
-            let names = names(&mut self.points().map(|point| &point.name));
-            format!("{} of {names}", if several { "Paths" } else { "Path" })
-        } else {
-            let names = names(&mut self.leaves().into_iter().map(|body| &self.mechanism.bodies[body].name));
-            format!("{} of {names}", if several { "Paths of the ends" } else { "Path of the end" })
-        };
+        let title = (drawing.title().filter(|_| !coarse))
+            .unwrap_or_else(|| format!("The mechanism at {} s", figure(self.outcome.last.t)));
         let more =
             (!coarse).then(|| format!("last {} s of {} s", rough(span(&path)), figure(self.outcome.last.t)));
         let (horizon, past) = self.horizon(self.outcome.last.t);
@@ -273,7 +266,7 @@ impl Finished<'_> {
             .map(|horizon| smoothed(&path).partition_point(|(t, _)| *t <= horizon));
         let mut caption = self.caption(more);
         caption.extend(past);
-        MechanismChart { title, caption, sketch: self.sketch(), poses, trails, horizon: trusted }
+        MechanismChart { title, caption, sketch: self.drawing().sketch(), poses, trails, horizon: trusted }
     }
 
     fn angles(&self) -> Angles {
@@ -417,6 +410,7 @@ impl Finished<'_> {
         });
         let (horizon, past) = self.horizon(self.outcome.last.t);
         OutputsChart {
+            over: None,
             title: format!("Outputs over {} s", figure(self.outcome.last.t)),
             caption: self.caption(past),
             outputs: outputs.collect(),
@@ -447,21 +441,22 @@ impl Finished<'_> {
         };
         let frames = frames.max(1);
         let time: Vec<f64> = (0..=frames).map(|k| until * k as f64 / frames as f64).collect();
-        let traced = self.traced();
+        let drawing = self.drawing();
+        let traced = drawing.traced();
         let trails = traced.iter().map(|place| {
             let at = |k: usize| {
                 let (phi, _) = between(head, until * k as f64 / (4 * frames) as f64);
-                self.place(place, &phi)
+                drawing.place(place, &phi)
             };
             (0..=4 * frames).map(at).collect()
         });
         MotionGif {
             title: plain(&self.scene.name),
-            sketch: self.sketch(),
+            sketch: self.drawing().sketch(),
             poses: (time.iter())
                 .map(|&t| {
                     let (phi, omega) = between(head, t);
-                    self.pose(&phi, &omega)
+                    self.drawing().pose(&phi, &omega)
                 })
                 .collect(),
             trails: trails.collect(),
@@ -469,134 +464,6 @@ impl Finished<'_> {
             delay: DELAY,
             horizon: self.horizon(until).0,
         }
-    }
-
-    /// Up to four bodies that no other hangs on.
-    fn leaves(&self) -> Vec<usize> {
-        let hangs = &self.mechanism.forest.hangs;
-        (0..hangs.len())
-            .filter(|&k| hangs.iter().all(|hang| hang.origin_point.parent() != Some(k)))
-            .take(4)
-            .collect()
-    }
-
-    /// The scene's points on bodies.
-    fn points(&self) -> impl Iterator<Item = &NamedPoint> {
-        self.scene.points.iter().filter(|point| point.place.bar.is_some())
-    }
-
-    /// Up to four places whose paths are drawn: the scene's points, and where it has none the far ends of
-    /// bars that no other hangs on.
-    fn traced(&self) -> Vec<Place> {
-        let points: Vec<Place> = self.points().map(|point| point.place).take(4).collect();
-        if !points.is_empty() {
-            return points;
-        }
-        let tip = |bar: usize| {
-            let tip = self.mechanism.bodies[bar].ends;
-            Place { bar: Some(bar), point: [(tip[1] - tip[0]).re, (tip[1] - tip[0]).im] }
-        };
-        self.leaves().into_iter().map(tip).collect()
-    }
-
-    /// Elements and translational coordinates at these coordinates.
-    fn elements(&self, phi: &[f64]) -> (Vec<Complex<f64>>, Vec<Complex<f64>>) {
-        let (mut z, mut translations) =
-            (vec![Complex::ZERO; phi.len()], vec![Complex::ZERO; self.mechanism.bodies.len()]);
-        self.mechanism.tree.unit_vectors::<f64, 0>(phi, &mut z);
-        self.mechanism.forest.translations(&z, &mut translations);
-        (z, translations)
-    }
-
-    /// Where a place is (x, y) \[m\].
-    fn place(&self, place: &Place, phi: &[f64]) -> [f64; 2] {
-        let (z, translations) = self.elements(phi);
-        self.on(place, &z, &translations)
-    }
-
-    /// The same from the elements and translational coordinates.
-    fn on(&self, place: &Place, z: &[Complex<f64>], translations: &[Complex<f64>]) -> [f64; 2] {
-        let Some(bar) = place.bar else { return place.point };
-        let offset = self.mechanism.bodies[bar].ends[0] + Complex::new(place.point[0], place.point[1]);
-        let at = translations[bar] + offset * z[bar];
-        [at.re, at.im]
-    }
-
-    fn sketch(&self) -> Sketch {
-        let hinges = self
-            .mechanism
-            .own_joints()
-            .map(|joint| HingeSketch { name: plain(&joint.name), ground: joint.between.contains(&None) });
-        Sketch {
-            gravity: self.scene.gravity,
-            hinges: hinges.collect(),
-            springs: (self.springs())
-                .map(|between| SpringSketch { ground: between.map(|end| end.bar.is_none()) })
-                .collect(),
-            walls: self
-                .scene
-                .walls
-                .iter()
-                .map(|wall| WallSketch { through: wall.through, normal: wall.normal })
-                .collect(),
-            points: self.points().map(|point| plain(&point.name)).collect(),
-        }
-    }
-
-    fn pose(&self, phi: &[f64], omega: &[f64]) -> Pose {
-        let (z, translations) = self.elements(phi);
-        let both = |point: Complex<f64>| [point.re, point.im];
-        let on = |body: usize, offset: Complex<f64>| both(translations[body] + offset * z[body]);
-        let place = |place: &Place| self.on(place, &z, &translations);
-        let at = |joint: &Joint| joint.at.0.map_or(both(joint.at.1), |body| on(body, joint.at.1));
-        let motors = self.scene.motors.iter().filter_map(|motor| {
-            let joint = self.mechanism.joints.iter().find(|joint| joint.outer == Some(motor.bar))?;
-            Some(MotorPose { at: at(joint), angle: phi[motor.bar], rate: omega[motor.bar] })
-        });
-        Pose {
-            bars: (self.mechanism.own_bodies().iter().enumerate())
-                .map(|(k, body)| body.ends.map(|end| on(k, end)))
-                .collect(),
-            hinges: self.mechanism.own_joints().map(at).collect(),
-            springs: self.springs().map(|between| between.each_ref().map(place)).collect(),
-            motors: motors.collect(),
-            arms: self.arms().map(|(bar, [from, to])| (bar, [on(bar, from), on(bar, to)])).collect(),
-            sliders: (self.scene.sliders.iter())
-                .map(|slider| {
-                    let along = Complex::new(slider.rail.direction[0], slider.rail.direction[1]);
-                    let along = slider.rail.place.bar.map_or(along, |bar| along * z[bar]);
-                    SliderPose {
-                        at: place(&slider.point),
-                        along: both(along),
-                        ground: slider.rail.place.bar.is_none(),
-                    }
-                })
-                .collect(),
-            points: self.points().map(|point| place(&point.place)).collect(),
-        }
-    }
-
-    /// The ends of all springs, those by formulas last.
-    fn springs(&self) -> impl Iterator<Item = [Place; 2]> {
-        let laws = self.scene.laws.iter().filter_map(|law| match &law.load {
-            Load::Spring { between, .. } => Some(*between),
-            _ => None,
-        });
-        self.scene.springs.iter().map(|spring| spring.between).chain(laws)
-    }
-
-    /// What joins the origin of a bar with its hinges, spring ends and points that lie off it, counted from its
-    /// origin \[m\].
-    fn arms(&self) -> impl Iterator<Item = (usize, [Complex<f64>; 2])> {
-        let hinges = self.scene.hinges.iter().flat_map(|hinge| hinge.between);
-        let points = self.points().map(|point| point.place);
-        hinges.chain(self.springs().flatten()).chain(points).filter_map(|place| {
-            let bar = place.bar?;
-            let (length, [x, y]) = (self.scene.bars[bar].length, place.point);
-            let is_off = y.abs() > 1e-3 * length || x < -1e-3 * length || x > 1.001 * length;
-            let origin = self.mechanism.bodies[bar].ends[0];
-            is_off.then(|| (bar, [origin, origin + Complex::new(x, y)]))
-        })
     }
 }
 

@@ -10,6 +10,7 @@
 //! | [`inspect`] | the scene's start | `inspect.rs` |
 //! | [`result`] | a run | `result.rs` |
 //! | `sweep` | a sweep, with its chart | `sweep.rs`, with the feature `files` |
+//! | [`kinematics`] | a mechanism moved through the range of its drive | `kinematics.rs` |
 //! | [`stress`] | stiff and extreme scenes by every method | `stress.rs` |
 //! | [`compare`] | methods compared, with charts | `compare.rs` |
 //! | [`trust`] | how far a run may be trusted | `trust.rs` |
@@ -25,11 +26,14 @@ pub mod check;
 pub mod compare;
 #[cfg(feature = "charts")]
 mod curves;
+#[cfg(feature = "charts")]
+mod drawing;
 pub mod events;
 mod friction;
 mod inputs;
 #[doc(hidden)]
 pub mod inspect;
+pub mod kinematics;
 #[doc(hidden)]
 pub mod methods;
 mod outputs;

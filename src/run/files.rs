@@ -28,6 +28,24 @@ pub const SWEEP_RECORD: &str = "sweep.json";
 pub const COMPARISON: &str = "compare.csv";
 /// Settings, figures and advice of a comparison.
 pub const COMPARISON_RECORD: &str = "compare.json";
+/// The positions of a mechanism moved through the range of its drive.
+pub const KINEMATICS: &str = "kinematics.csv";
+/// Limits, extremes and all else of it.
+pub const KINEMATICS_RECORD: &str = "kinematics.json";
+/// The equilibria of a scene and their modes.
+pub const MODES_RECORD: &str = "modes.json";
+/// The files by which a folder that holds results is known.
+const RESULTS: [&str; 9] = [
+    TRAJECTORY,
+    RECORD,
+    SWEEP,
+    SWEEP_RECORD,
+    COMPARISON,
+    COMPARISON_RECORD,
+    KINEMATICS,
+    KINEMATICS_RECORD,
+    MODES_RECORD,
+];
 /// How names of unfinished files begin.
 pub(super) const UNFINISHED: &str = ".unfinished-";
 
@@ -123,11 +141,7 @@ impl Folder {
         if !overwrite && checkpoint::is_in(path) {
             return Err(FileError::Interrupted { folder: folder() });
         }
-        if !overwrite
-            && [TRAJECTORY, RECORD, SWEEP, SWEEP_RECORD, COMPARISON, COMPARISON_RECORD]
-                .iter()
-                .any(|name| path.join(name).exists())
-        {
+        if !overwrite && RESULTS.iter().any(|name| path.join(name).exists()) {
             return Err(FileError::Occupied { folder: folder() });
         }
         // Without their table the checkpoints are of no use.

@@ -48,6 +48,7 @@ pub mod friction;
 mod impact_monitor;
 #[doc(hidden)]
 pub mod inside;
+pub mod kinematics;
 #[doc(hidden)]
 pub mod methods;
 mod monitor;
@@ -93,6 +94,7 @@ pub use files::{Cursor, FileError, Folder, Stream};
 pub use flip::Flip;
 pub use friction::FrictionRecord;
 pub use inside::{Observer, Step};
+pub use kinematics::{Kinematics, kinematics};
 pub use methods::{METHODS, MethodId, MethodInfo, Stabilization};
 pub use plan::{Plan, Refusal, Request};
 pub use reference::{Reference, reference};

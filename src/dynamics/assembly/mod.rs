@@ -147,6 +147,32 @@ impl Mechanism {
         Ok(self)
     }
 
+    /// Other positions that close all rows at the start's time, of which that of the motors is one: angles and
+    /// translational coordinates of each, found from so many guesses of a fixed set.
+    pub(crate) fn other_assemblies(&self, scene: &Scene, guesses: usize) -> Vec<Vec<f64>> {
+        let start: Vec<DoubleDouble> = self.start(scene).phi;
+        let given = |_: usize| Given { phi: false, omega: false, origin: None, velocity: None };
+        let problem = Problem { aims: Vec::new(), ..Problem::new(self, scene, &[], &given) };
+        let all: Vec<usize> = (0..start.len()).collect();
+        let mut found = vec![Found { q: start.clone(), change: 0.0, held: Vec::new() }];
+        for k in 1..=guesses {
+            let mut q = problem.other_guess(&start, &all, k);
+            if problem.closes(&mut q, &[]) {
+                let other = Found { q, change: 0.0, held: Vec::new() };
+                if found.iter().all(|known| problem.check_same(known, &other).is_err()) {
+                    found.push(other);
+                }
+            }
+        }
+        let plain = |found: Found| {
+            let of = |(k, q): (usize, DoubleDouble)| {
+                if k < self.bodies.len() { q.reduced().0.hi } else { q.hi }
+            };
+            found.q.into_iter().enumerate().map(of).collect()
+        };
+        found.into_iter().skip(1).map(plain).collect()
+    }
+
     /// Springs need a direction, and points must be before their walls; the reader of scenes sees to it where
     /// it knows the start.
     fn check_start(&self, scene: &Scene) -> Result<(), CompileError> {

@@ -1,0 +1,258 @@
+//! Positions, velocities, accelerations and loads of a mechanism that a drive moves through its range, found
+//! without integrating: at every value of the drive the constraints are solved.
+//!
+//! ```text
+//! C(q, t) = 0,   drive(q) = start + rate t                  by projection from q + q' h + q'' h²/2
+//! G q' = -C_t,   G q'' = -(C_t)' - G' q'                    multipliers, and with them forces, from the same solve
+//! limit:         q' without bound, 1/q'² -> 0 in proportion to what is left of the drive's range
+//! dead centre:   the rate of another body passes zero
+//! change point:  det G changes its sign: two ways of motion cross, and the one that goes straight on is taken
+//! ```
+//!
+//! Source: E. J. Haug, *Computer Aided Kinematics and Dynamics of Mechanical Systems* (1989), sections 3.6 and
+//! 3.7; the law at a limit is that of a fold, q - q* ~ |t - t*|^(1/2).
+
+mod drive;
+mod transmission;
+mod walk;
+
+pub use drive::{Drive, KinematicsError};
+pub use transmission::Transmission;
+
+use crate::dynamics::Mechanism;
+use crate::scene::Scene;
+use drive::Driven;
+use serde::Serialize;
+use std::sync::Arc;
+use walk::{IN_LINE, Walk};
+
+/// Relative width at which a searched time is taken for found.
+const FOUND: f64 = 1e-13;
+/// A rate below this share of the largest one stands still all along.
+const STILL: f64 = 1e-11;
+/// Guesses from which other assemblies are looked for.
+const ATTEMPTS: usize = 96;
+
+/// What there is to know of one value of the drive.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Position {
+    /// The drive's angle \[rad\] or travel \[m\].
+    pub drive: f64,
+    /// Time at the drive's rate, zero at the scene's start \[s\].
+    pub t: f64,
+    /// Winding angles \[rad\], then translational coordinates \[m\].
+    pub phi: Vec<f64>,
+    /// Rates \[rad/s, m/s\].
+    pub omega: Vec<f64>,
+    /// Accelerations \[rad/s², m/s²\].
+    pub alpha: Vec<f64>,
+    /// Torque \[N·m\] or force \[N\] of the drive.
+    pub force: f64,
+    /// Transmission angles in their order \[rad\].
+    pub transmission: Vec<f64>,
+    /// Values of the scene's outputs, in their order.
+    pub outputs: Vec<f64>,
+}
+
+/// An end of the drive's range.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Limit {
+    /// The drive's value there \[rad or m\].
+    pub drive: f64,
+    /// Hinges at which two bodies stand in line there.
+    pub in_line: Vec<String>,
+    /// True where rates grow without bound as at a fold; else the way on was lost for another reason.
+    pub is_fold: bool,
+}
+
+/// A value of the drive at which another body turns back.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DeadCentre {
+    /// The drive's value \[rad or m\].
+    pub drive: f64,
+    /// The body or coordinate.
+    pub name: String,
+    /// Its angle \[rad\] or place \[m\] there: the end of its own range.
+    pub value: f64,
+    /// Hinges at which two bodies stand in line there.
+    pub in_line: Vec<String>,
+}
+
+/// Least and largest value of a column over the range, with the drive's values.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Range {
+    /// Name of the output or the transmission angle.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Least value, and where.
+    pub min: [f64; 2],
+    /// Largest value, and where.
+    pub max: [f64; 2],
+}
+
+/// A mechanism moved through the range of its drive.
+#[derive(Clone, Debug)]
+pub struct Kinematics {
+    /// The scene with the drive.
+    pub scene: Scene,
+    /// Its mechanism.
+    pub mechanism: Arc<Mechanism>,
+    /// Name of the drive.
+    pub drive: String,
+    /// Name of the motor that moves it, and of its column.
+    pub motor: String,
+    /// Its unit: `rad` or `m`.
+    pub unit: &'static str,
+    /// Its rate \[rad/s or m/s\].
+    pub rate: f64,
+    /// True where it goes round once.
+    pub is_turn: bool,
+    /// True where after one turn everything is where it was.
+    pub is_closed: bool,
+    /// The positions, in ascending order of the drive.
+    pub positions: Vec<Position>,
+    /// Ends of the range that were met within what was asked for.
+    pub limits: Vec<Limit>,
+    /// Where other bodies turn back.
+    pub dead_centres: Vec<DeadCentre>,
+    /// Values of the drive at which ways of motion cross.
+    pub change_points: Vec<f64>,
+    /// The transmission angles.
+    pub transmissions: Vec<Transmission>,
+    /// Extremes of the drive's force, the outputs and the transmission angles.
+    pub ranges: Vec<Range>,
+    /// Angles and positions of other assemblies at the drive's value at the start.
+    pub branches: Vec<Vec<f64>>,
+    /// What of the scene has no part in this.
+    pub left_out: Vec<&'static str>,
+}
+
+/// Moves a scene through the range of its drive, in `count` positions at equal distances and one more at the
+/// end.
+///
+/// # Errors
+/// There is nothing to drive, or more moves than the drive gives; the scene with the drive does not compile.
+pub fn kinematics(scene: &Scene, drive: &Drive, count: usize) -> Result<Kinematics, KinematicsError> {
+    let Driven { scene, mechanism, start, row, name, label, unit, rate, range, is_turn } =
+        Driven::new(scene, drive)?;
+    let transmissions = transmission::of(&scene, &name);
+    let lines = transmission::lines(&scene);
+    let walk = Walk::at_start(&mechanism, &scene, row, [start, rate], [&transmissions, &lines])?;
+    let count = count.max(1);
+    let value = |k: usize| range[0] + (range[1] - range[0]) * (k as f64 / count as f64);
+    let time = |value: f64| (value - start) / rate;
+    // The positions on either side of the start, each from there outwards.
+    let mut limits = Vec::new();
+    let mut sides: Vec<Vec<Walk>> = Vec::new();
+    for is_below in [true, false] {
+        let mut side: Vec<Walk> = Vec::new();
+        let mut values: Vec<f64> = (0..=count).map(value).filter(|v| (*v < start) == is_below).collect();
+        if is_below {
+            values.reverse();
+        }
+        let mut here = walk.clone();
+        for value in values {
+            match here.go(time(value)) {
+                Ok(()) => side.push(here.clone()),
+                Err(limit) => {
+                    limits.push(limit);
+                    break;
+                }
+            }
+        }
+        sides.push(side);
+    }
+    let [below, above]: [Vec<Walk>; 2] = sides.try_into().unwrap_or_default();
+    let walks: Vec<Walk> = below.into_iter().rev().chain(above).collect();
+    let mut found = Kinematics {
+        branches: mechanism.other_assemblies(&scene, ATTEMPTS),
+        left_out: drive::left_out(&scene),
+        is_closed: is_turn && walks.first().zip(walks.last()).is_some_and(|(a, b)| a.is_as(b)),
+        dead_centres: Vec::new(),
+        change_points: Vec::new(),
+        ranges: Vec::new(),
+        positions: walks.iter().map(Walk::position).collect(),
+        drive: label,
+        motor: name,
+        scene,
+        mechanism,
+        unit,
+        rate,
+        is_turn,
+        limits,
+        transmissions,
+    };
+    found.search(&walks);
+    Ok(found)
+}
+
+impl Kinematics {
+    /// Looks between positions for dead centres, change points and extremes.
+    fn search(&mut self, walks: &[Walk]) {
+        let coordinates = self.mechanism.coordinates();
+        let own = self.mechanism.own_bodies().len();
+        let shown: Vec<usize> = (0..own).chain(self.mechanism.bodies.len()..coordinates).collect();
+        let fastest = |k: usize| walks.iter().map(|walk| walk.omega(k).abs()).fold(0.0, f64::max);
+        let most = shown.iter().map(|&k| fastest(k)).fold(0.0, f64::max);
+        let moving: Vec<usize> = shown.into_iter().filter(|&k| fastest(k) > STILL * most).collect();
+        for pair in walks.windows(2) {
+            for &k in &moving {
+                let (before, after) = (pair[0].omega(k), pair[1].omega(k));
+                let turns_back = before * after < 0.0 || after == 0.0;
+                if let Some(found) =
+                    turns_back.then(|| pair[0].root(&pair[1], |walk| walk.omega(k))).flatten()
+                {
+                    self.dead_centres.push(DeadCentre {
+                        drive: found.drive(),
+                        name: self.name(k),
+                        value: found.position().phi[k],
+                        in_line: found.in_line(IN_LINE),
+                    });
+                }
+            }
+            if let [Some(before), Some(after)] = [pair[0].orientation(), pair[1].orientation()]
+                && before * after < 0.0
+            {
+                let sign = |walk: &Walk| walk.orientation().unwrap_or(0.0);
+                self.change_points.extend(pair[0].root(&pair[1], sign).map(|found| found.drive()));
+            }
+        }
+        let outputs = self.mechanism.outputs.clone();
+        let heads: Vec<(String, String)> =
+            std::iter::once((self.name_of_force(), self.unit_of_force().to_owned()))
+                .chain(outputs.iter().flat_map(|outputs| {
+                    outputs.heads().map(|(name, unit)| (name.to_owned(), unit.to_owned())).collect::<Vec<_>>()
+                }))
+                .chain(self.transmissions.iter().map(|one| (one.name(), "rad".to_owned())))
+                .collect();
+        self.ranges = heads
+            .into_iter()
+            .enumerate()
+            .filter_map(|(column, (name, unit))| {
+                let [min, max] =
+                    [1.0, -1.0].map(|sign| walk::least(walks, &|walk| sign * walk.column(column)));
+                let (min, max) = (min?, max?);
+                Some(Range { name, unit, min, max: [-max[0], max[1]] })
+            })
+            .collect();
+    }
+
+    /// Name of a coordinate: the body, or what slides.
+    fn name(&self, k: usize) -> String {
+        self.mechanism
+            .bodies
+            .get(k)
+            .map_or_else(|| self.mechanism.coordinate_name(k), |body| body.name.clone())
+    }
+
+    /// Name of the column of the drive's force.
+    pub fn name_of_force(&self) -> String {
+        format!("{}.{}", self.motor, if self.unit == "rad" { "torque" } else { "force" })
+    }
+
+    /// `N m` or `N`.
+    pub fn unit_of_force(&self) -> &'static str {
+        if self.unit == "rad" { "N m" } else { "N" }
+    }
+}

@@ -1,0 +1,304 @@
+//! Kinematics against closed forms that share nothing with the solver: circles that meet, statics of three
+//! bodies as nine equations, power, limits and dead centres by the law of cosines.
+
+use driftless::dynamics::Mechanism;
+use driftless::run::kinematics::{Drive, Kinematics, KinematicsError, Position, kinematics};
+use driftless::scene::{Output, Scene, parse_scene, read_scene};
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+fn example(name: &str) -> Scene {
+    read_scene(format!("examples/scenes/{name}.json").as_ref(), &[]).expect("a shipped scene")
+}
+
+fn drive(text: &str) -> Drive {
+    text.parse().expect("a drive")
+}
+
+fn over(scene: &Scene, text: &str, count: usize) -> Kinematics {
+    kinematics(scene, &drive(text), count).unwrap_or_else(|error| panic!("{text}: {error}"))
+}
+
+/// Lengths of the crank-rocker: crank, coupler, rocker, ground.
+const A: f64 = 0.1;
+const B: f64 = 0.3;
+const C: f64 = 0.25;
+const D: f64 = 0.32;
+
+/// Angles of coupler and rocker from that of the crank, where the circles about A and C meet above.
+fn closed(crank: f64) -> [f64; 2] {
+    let (x, y) = (A * crank.cos(), A * crank.sin());
+    let (dx, dy) = (D - x, -y);
+    let distance = dx.hypot(dy);
+    let along = (B * B - C * C + distance * distance) / (2.0 * distance);
+    let up = (B * B - along * along).sqrt();
+    let (bx, by) = (x + (along * dx - up * dy) / distance, y + (along * dy + up * dx) / distance);
+    [(by - y).atan2(bx - x), by.atan2(bx - D)]
+}
+
+/// The same with first and second derivatives by the crank's angle, from the loop's equations.
+fn derived(crank: f64) -> [[f64; 3]; 2] {
+    let [f, r] = closed(crank);
+    let det = B * C * (f - r).sin();
+    // A e^(i crank) + B e^(i f) = D + C e^(i r), differentiated once and twice.
+    let solve =
+        |x: f64, y: f64| [-C * (x * r.cos() + y * r.sin()) / det, -B * (x * f.cos() + y * f.sin()) / det];
+    let [df, dr] = solve(A * crank.sin(), -A * crank.cos());
+    let [ddf, ddr] = solve(
+        A * crank.cos() + B * f.cos() * df * df - C * r.cos() * dr * dr,
+        A * crank.sin() + B * f.sin() * df * df - C * r.sin() * dr * dr,
+    );
+    [[f, df, ddf], [r, dr, ddr]]
+}
+
+#[test]
+fn positions_rates_and_accelerations_are_those_of_circles_that_meet() {
+    let scene = example("crank_rocker");
+    let found = over(&scene, "motor", 720);
+    assert!(found.is_turn && found.is_closed && found.limits.is_empty() && found.change_points.is_empty());
+    assert_eq!(found.positions.len(), 721);
+    assert_eq!(found.branches.len(), 1, "{:?}", found.branches);
+    let w = 10.0 * PI;
+    for Position { drive, phi, omega, alpha, .. } in &found.positions {
+        for (k, [value, first, second]) in derived(*drive).into_iter().enumerate() {
+            assert!((phi[k + 1] - value).abs() < 1e-12, "{drive}: {phi:?} {value}");
+            assert!((omega[k + 1] - w * first).abs() < 1e-11 * w, "{drive}: {omega:?} {first}");
+            assert!((alpha[k + 1] - w * w * second).abs() < 1e-10 * w * w, "{drive}: {alpha:?} {second}");
+        }
+    }
+    // The other assembly is the mirror image.
+    let (start, other) = (&found.positions[0].phi, &found.branches[0]);
+    assert!((start[1] + other[1]).abs() < 1e-12 && (start[2] + other[2]).abs() < 1e-12);
+}
+
+#[test]
+fn limits_and_dead_centres_are_where_the_law_of_cosines_has_them() {
+    let scene = example("crank_rocker");
+    // Where crank and coupler are in line.
+    let folded = |length: f64| PI - ((C * C + D * D - length * length) / (2.0 * C * D)).acos();
+    let ends = [folded(A + B).min(folded(B - A)), folded(A + B).max(folded(B - A))];
+    let turned = over(&scene, "motor", 100);
+    let mut of_rocker: Vec<f64> =
+        turned.dead_centres.iter().filter(|at| at.name == "rocker").map(|at| at.value).collect();
+    of_rocker.sort_by(f64::total_cmp);
+    assert_eq!(of_rocker.len(), 2);
+    for (found, end) in of_rocker.iter().zip(ends) {
+        assert!((found - end).abs() < 1e-12, "{found} {end}");
+    }
+    for at in turned.dead_centres.iter().filter(|at| at.name == "rocker") {
+        assert_eq!(at.in_line, ["A"]);
+    }
+    // The rocker as the drive cannot pass them.
+    let swung = over(&scene, "rocker=0..3", 300);
+    let limits: Vec<f64> = swung.limits.iter().map(|limit| limit.drive).collect();
+    assert_eq!(limits.len(), 2);
+    for (limit, end) in limits.iter().zip(ends) {
+        assert!((limit - end).abs() < 1e-12, "{limit} {end}");
+    }
+    assert!(swung.limits.iter().all(|limit| limit.is_fold && limit.in_line == ["A"]), "{:?}", swung.limits);
+    assert!(swung.positions.iter().all(|at| at.drive > ends[0] && at.drive < ends[1]));
+    // A motor at the rocker does not depend on how fast it goes, nor the limits on how many positions.
+    let slowly =
+        kinematics(&scene, &Drive { rate: Some(1e-3), ..drive("rocker=0..3") }, 7).expect("kinematics");
+    for (slow, limit) in slowly.limits.iter().zip(&limits) {
+        assert!((slow.drive - limit).abs() < 1e-11, "{slow:?} {limit}");
+    }
+    // Least transmission angle: where the diagonal is shortest.
+    let least = ((B * B + C * C - (D - A) * (D - A)) / (2.0 * B * C)).acos();
+    let range =
+        turned.ranges.iter().find(|range| range.name == "transmission.B").expect("a transmission angle");
+    assert!((range.min[0] - least).abs() < 1e-12 && (range.max[0] - FRAC_PI_2).abs() < 1e-6, "{range:?}");
+}
+
+/// Torque and the forces at O, A, B and C on crank, coupler and rocker, from the nine equations of three bodies.
+fn balanced(crank: f64, w: f64, gravity: f64) -> [f64; 5] {
+    let bodies = [A, B, C].map(|length| {
+        let mass = length * 0.02 * 0.01 * 7850.0;
+        (length, mass, mass * (length * length + 0.02 * 0.02) / 12.0)
+    });
+    let [[f, df, ddf], [r, dr, ddr]] = derived(crank);
+    let motions = [[crank, w, 0.0], [f, df * w, ddf * w * w], [r, dr * w, ddr * w * w]];
+    // Acceleration of a point at a distance along a body from its origin, which is at (origin).
+    let swing = |[phi, rate, pull]: [f64; 3], length: f64| {
+        [
+            length * (-pull * phi.sin() - rate * rate * phi.cos()),
+            length * (pull * phi.cos() - rate * rate * phi.sin()),
+        ]
+    };
+    let end = swing(motions[0], A);
+    let centre = |k: usize| {
+        let own = swing(motions[k], bodies[k].0 / 2.0);
+        if k == 1 { [own[0] + end[0], own[1] + end[1]] } else { own }
+    };
+    // Unknowns: O, A, B, C as forces of the first body on the next, and the torque.
+    let (mut m, mut b) = (DMatrix::<f64>::zeros(9, 9), DVector::<f64>::zeros(9));
+    for k in 0..3 {
+        let (length, mass, inertia) = bodies[k];
+        let [phi, _, pull] = motions[k];
+        let half = [0.5 * length * phi.cos(), 0.5 * length * phi.sin()];
+        let a = centre(k);
+        // (unknown, sign, arm): crank has O at its origin and -A at its end; coupler A and -B; rocker C and B.
+        let forces = match k {
+            0 => [(0, 1.0, -1.0), (2, -1.0, 1.0)],
+            1 => [(2, 1.0, -1.0), (4, -1.0, 1.0)],
+            _ => [(6, 1.0, -1.0), (4, 1.0, 1.0)],
+        };
+        for (column, sign, arm) in forces {
+            m[(3 * k, column)] += sign;
+            m[(3 * k + 1, column + 1)] += sign;
+            m[(3 * k + 2, column)] -= sign * arm * half[1];
+            m[(3 * k + 2, column + 1)] += sign * arm * half[0];
+        }
+        b[3 * k] = mass * a[0];
+        b[3 * k + 1] = mass * (a[1] - gravity);
+        b[3 * k + 2] = inertia * pull;
+    }
+    m[(2, 8)] = 1.0;
+    let x = m.lu().solve(&b).expect("regular");
+    [x[8], x[0].hypot(x[1]), x[2].hypot(x[3]), x[4].hypot(x[5]), x[6].hypot(x[7])]
+}
+
+#[test]
+fn loads_are_those_of_nine_equations_at_speed_and_at_rest() {
+    let mut scene = example("crank_rocker");
+    scene.outputs.retain(|output| ["O", "A", "B", "C"].contains(&output.name.as_str()));
+    for rate in [10.0 * PI, 1.0, 1e-4] {
+        let found =
+            kinematics(&scene, &Drive { rate: Some(rate), ..drive("motor") }, 180).expect("kinematics");
+        let names: Vec<String> = found.ranges.iter().map(|range| range.name.clone()).collect();
+        assert_eq!(names[..5], ["motor.torque", "O", "A", "B", "C"]);
+        let mut peaks = [0.0_f64; 5];
+        for at in &found.positions {
+            let expected = balanced(at.drive, rate, -9.81);
+            let scale = expected[1..].iter().copied().fold(0.0, f64::max);
+            assert!((at.force - expected[0]).abs() < 1e-11 * scale, "{} {expected:?}", at.force);
+            for (value, expected) in at.outputs.iter().zip(&expected[1..]) {
+                assert!((value - expected).abs() < 1e-11 * scale, "{rate}: {value} {expected}");
+            }
+            peaks.iter_mut().zip(expected).for_each(|(peak, value)| *peak = peak.max(value));
+        }
+        for (range, peak) in found.ranges.iter().zip(peaks) {
+            assert!(range.max[0] >= peak - 1e-12 && range.max[0] < peak * 1.002, "{range:?} {peak}");
+            let there = balanced(range.max[1], rate, -9.81);
+            assert!(there.iter().any(|value| (value - range.max[0]).abs() < 1e-9 * peak), "{range:?}");
+        }
+    }
+}
+
+#[test]
+fn a_slider_crank_goes_as_far_as_crank_and_rod_reach() {
+    // Its own start is a dead centre of the block.
+    let set = ["motors.motor.law.start=1".parse().expect("an override")];
+    let scene = read_scene("examples/scenes/slider_crank_driven.json".as_ref(), &set).expect("a scene");
+    let lengths = [scene.bars[0].length, scene.bars[1].length];
+    let slider = scene.sliders[0].name.clone();
+    let found = over(&scene, &format!("{slider}=0..10"), 400);
+    let ends: Vec<f64> = found.limits.iter().map(|limit| limit.drive).collect();
+    let reach = [lengths[1] - lengths[0], lengths[0] + lengths[1]];
+    assert!(ends.iter().any(|end| (end - reach[1]).abs() < 1e-12), "{ends:?} {reach:?}");
+    assert_eq!(found.unit, "m");
+    // And back: where the motor turns, the block turns back there.
+    let turned = over(&scene, "motor", 360);
+    assert!(turned.is_closed);
+    for at in &turned.positions {
+        let rod = (-lengths[0] / lengths[1] * at.drive.sin()).asin();
+        assert!((at.phi[1] - rod).abs() < 1e-12, "{} {}", at.phi[1], rod);
+    }
+}
+
+#[test]
+fn ways_of_motion_that_cross_are_passed_straight_and_named() {
+    let found = over(&example("kite"), "crank", 359);
+    assert_eq!(found.change_points.len(), 2, "{:?}", found.change_points);
+    for (point, expected) in found.change_points.iter().zip([PI, TAU]) {
+        assert!((point - expected).abs() < 1e-6, "{point}");
+    }
+    // With rows of the same crank and another count of positions it is the same way.
+    let other = over(&example("kite"), "crank", 97);
+    let last = |found: &Kinematics| found.positions.last().map(|at| at.phi.clone()).expect("positions");
+    for (a, b) in last(&found).iter().zip(last(&other)) {
+        assert!((a - b).abs() < 1e-9, "{a} {b}");
+    }
+}
+
+#[test]
+fn andrews_mechanism_goes_round_on_its_branch() {
+    let scene = example("andrews");
+    let found = over(&scene, "OF", 4096);
+    assert!(found.is_closed && found.limits.is_empty() && found.change_points.is_empty());
+    assert_eq!(found.positions.len(), 4097);
+    // Every position keeps every loop: tips of the bars that meet coincide.
+    let mechanism = Mechanism::new(&scene).expect("equations");
+    assert_eq!(mechanism.coordinates(), found.positions[0].phi.len());
+    let place =
+        |at: &Position, place: &driftless::scene::Place, fixed: &dyn Fn(usize) -> [f64; 2]| match place.bar {
+            None => place.point,
+            Some(bar) => {
+                let ([x, y], [u, v], (s, c)) = (fixed(bar), place.point, at.phi[bar].sin_cos());
+                [x + c * u - s * v, y + s * u + c * v]
+            }
+        };
+    for at in found.positions.iter().step_by(37) {
+        // Origins outwards from the ground, by the first hinge that reaches a bar.
+        let mut origins = vec![None::<[f64; 2]>; scene.bars.len()];
+        for _ in 0..scene.bars.len() {
+            for hinge in &scene.hinges {
+                for [from, to] in [hinge.between, [hinge.between[1], hinge.between[0]]] {
+                    let Some(bar) = to.bar.filter(|&bar| origins[bar].is_none()) else { continue };
+                    if from.bar.is_none_or(|bar| origins[bar].is_some()) {
+                        let known = |bar: usize| origins[bar].unwrap_or_default();
+                        let [x, y] = place(at, &from, &known);
+                        let zero = |_: usize| [0.0; 2];
+                        let [u, v] = place(at, &to, &zero);
+                        origins[bar] = Some([x - u, y - v]);
+                    }
+                }
+            }
+        }
+        let known = |bar: usize| origins[bar].unwrap_or_default();
+        for hinge in &scene.hinges {
+            let [a, b] = hinge.between.map(|end| place(at, &end, &known));
+            assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 1e-15, "{}: {a:?} {b:?}", hinge.name);
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_driven_is_refused_by_name() {
+    let of = |name: &str, text: &str| kinematics(&example(name), &drive(text), 10).expect_err("refused");
+    assert!(matches!(of("free", "bar1"), KinematicsError::Free { left: 1, .. }));
+    assert!(matches!(of("crank_rocker", "crnk"), KinematicsError::Unknown { .. }));
+    let none = kinematics(&example("free"), &Drive::default(), 10).expect_err("refused");
+    assert!(matches!(none, KinematicsError::NoDrive(_)));
+    let slider = example("slider_crank_driven").sliders[0].name.clone();
+    assert!(matches!(of("slider_crank_driven", &slider), KinematicsError::NoRange(_)));
+    for text in ["", "=1..2", "crank=1", "crank=2..1", "crank=a..b", "crank=0..inf"] {
+        assert!(text.parse::<Drive>().is_err(), "{text}");
+    }
+    assert_eq!(drive("crank.phi=-pi..pi/2"), drive("crank=-pi..0.5pi"));
+    // An output that is not asked for is none.
+    let mut scene = example("crank_rocker");
+    scene.outputs = vec![Output { name: "x".to_owned(), formula: "pen.x".to_owned() }];
+    assert_eq!(over(&scene, "motor", 4).positions[0].outputs.len(), 1);
+}
+
+#[test]
+fn the_rate_of_a_turn_follows_the_motor_and_other_motors_follow_time() {
+    let scene = parse_scene(
+        r#"{"name": "two", "gravity": [0, 0], "bars": [{"name": "a", "mass": 1, "centre": [0.5, 0], "inertia": 0.1}, {"name": "b", "mass": 1, "centre": [0.5, 0], "inertia": 0.1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]},
+                   {"name": "B", "between": [{"body": "a", "point": [1, 0]}, {"body": "b", "point": [0, 0]}]}],
+        "motors": [{"name": "M", "body": "a", "law": {"start": 0.3, "rate": 2}}, {"name": "N", "body": "b", "law": "0.5*sin(3*t)"}],
+        "until": 1, "every": 0.1}"#,
+        "two.json",
+        &[],
+    )
+    .expect("a scene");
+    let found = over(&scene, "M", 50);
+    assert_eq!(found.rate, 2.0);
+    for at in &found.positions {
+        let t = (at.drive - 0.3) / 2.0;
+        assert!((at.t - t).abs() < 1e-14 && (at.phi[1] - 0.5 * (3.0 * t).sin()).abs() < 1e-14, "{at:?}");
+        assert!((at.omega[1] - 1.5 * (3.0 * t).cos()).abs() < 1e-13, "{at:?}");
+    }
+}
