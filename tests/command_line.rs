@@ -292,3 +292,20 @@ fn kinematics_leaves_a_table_charts_and_a_record() {
     program.run("kinematics free.json --drive bar1").exits(3).says(&["leaves 1 degree", "hint: "]);
     program.run("kinematics crank_rocker.json --drive rocker=3..0").exits(2).says(&["--drive", "FROM"]);
 }
+
+#[test]
+fn modes_leave_a_record_and_charts() {
+    let program = Program::with_scenes(&["free", "motor"]);
+    let object = program.run("modes free.json --json --gif").exits(0).object();
+    assert_eq!(object["degrees_of_freedom"], 2);
+    let equilibria = object["equilibria"].as_array().expect("a list");
+    assert_eq!(equilibria.len(), 4);
+    assert_eq!(equilibria[0]["stability"], "stable");
+    assert_eq!(equilibria[0]["modes"].as_array().map(Vec::len), Some(2));
+    for name in ["modes.json", "mode1.png", "mode2.png", "mode1.gif", "mode2.gif"] {
+        assert!(program.files().contains(&format!("output/free/modes/{name}")), "{name}");
+    }
+    program.run("modes free.json").exits(6).says(&["--force"]);
+    program.run("modes free.json --force --no-charts").exits(0).shows(&["equilibrium", "period", "unstable"]);
+    program.run("modes motor.json").exits(3).says(&["moves with time", "hint: "]);
+}

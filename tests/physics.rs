@@ -44,6 +44,7 @@ mod linkage_scenes;
 mod linkages;
 mod looped;
 mod metamorphic;
+mod modes;
 mod natural;
 mod outputs;
 mod profiles;

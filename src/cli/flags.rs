@@ -43,6 +43,8 @@ pub enum Command {
     Sweep(Box<SweepFlags>),
     /// Move a mechanism through the range of its drive: positions, loads, limits, without integrating
     Kinematics(KinematicsFlags),
+    /// Find equilibria, their stability, and the modes of small vibrations about them
+    Modes(ModesFlags),
     /// Run a scene with every method at all its settings: error, drift and run time, and what to choose
     Compare(Box<CompareFlags>),
     /// Go on with an interrupted run or sweep: it ends as if nothing had been, byte for byte
@@ -333,6 +335,31 @@ pub struct KinematicsFlags {
     pub no_charts: bool,
 }
 
+/// `driftless modes`.
+#[derive(Debug, Args)]
+pub struct ModesFlags {
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub scene: SceneFlags,
+    /// Positions from which equilibria are looked for, beside the scene's start
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(0..=1_000_000))]
+    pub starts: u32,
+    /// Folder under which `SCENE/modes` is made
+    #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
+    pub out: PathBuf,
+    /// Overwrite what is in the folder
+    #[arg(long, help_heading = "Files")]
+    pub force: bool,
+    /// Draw no PNG charts
+    #[cfg(feature = "charts")]
+    #[arg(long, help_heading = "Files")]
+    pub no_charts: bool,
+    /// Draw animated GIFs of the modes
+    #[cfg(feature = "charts")]
+    #[arg(long, help_heading = "Files")]
+    pub gif: bool,
+}
+
 /// `driftless compare`.
 #[derive(Debug, Args)]
 pub struct CompareFlags {
@@ -422,6 +449,7 @@ impl Flags {
             Command::Check(flags) => flags.scene.tell.json,
             Command::Inspect(flags) => flags.scene.tell.json,
             Command::Kinematics(flags) => flags.scene.tell.json,
+            Command::Modes(flags) => flags.scene.tell.json,
             Command::Run(flags) => flags.scene.tell.json,
             Command::Sweep(flags) => flags.scene.tell.json,
             Command::Compare(flags) => flags.scene.tell.json,

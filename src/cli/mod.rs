@@ -10,6 +10,7 @@ pub mod flags;
 mod inspect;
 mod interrupt;
 mod kinematics;
+mod modes;
 mod output;
 mod progress;
 mod resume;
@@ -42,6 +43,7 @@ pub fn run(flags: &Flags) -> Result<(), Failure> {
         Command::Run(given) => simulate::run(given, &flags.arguments),
         Command::Sweep(given) => sweep::run(given, &flags.arguments),
         Command::Kinematics(flags) => kinematics::run(flags),
+        Command::Modes(flags) => modes::run(flags),
         Command::Compare(flags) => compare::run(flags),
         Command::Resume(flags) => resume::run(flags),
         Command::Stress(flags) => stress::run(flags),

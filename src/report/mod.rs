@@ -11,6 +11,7 @@
 //! | [`result`] | a run | `result.rs` |
 //! | `sweep` | a sweep, with its chart | `sweep.rs`, with the feature `files` |
 //! | [`kinematics`] | a mechanism moved through the range of its drive | `kinematics.rs` |
+//! | [`modes`] | equilibria and modes | `modes.rs` |
 //! | [`stress`] | stiff and extreme scenes by every method | `stress.rs` |
 //! | [`compare`] | methods compared, with charts | `compare.rs` |
 //! | [`trust`] | how far a run may be trusted | `trust.rs` |
@@ -36,6 +37,7 @@ pub mod inspect;
 pub mod kinematics;
 #[doc(hidden)]
 pub mod methods;
+pub mod modes;
 mod outputs;
 #[doc(hidden)]
 pub mod page;

@@ -16,6 +16,7 @@ mod drive;
 mod transmission;
 mod walk;
 
+pub(super) use drive::left_out;
 pub use drive::{Drive, KinematicsError};
 pub use transmission::Transmission;
 
@@ -167,7 +168,7 @@ pub fn kinematics(scene: &Scene, drive: &Drive, count: usize) -> Result<Kinemati
     let walks: Vec<Walk> = below.into_iter().rev().chain(above).collect();
     let mut found = Kinematics {
         branches: mechanism.other_assemblies(&scene, ATTEMPTS),
-        left_out: drive::left_out(&scene),
+        left_out: left_out(&scene),
         is_closed: is_turn && walks.first().zip(walks.last()).is_some_and(|(a, b)| a.is_as(b)),
         dead_centres: Vec::new(),
         change_points: Vec::new(),

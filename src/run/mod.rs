@@ -51,6 +51,7 @@ pub mod inside;
 pub mod kinematics;
 #[doc(hidden)]
 pub mod methods;
+pub mod modes;
 mod monitor;
 #[doc(hidden)]
 pub mod plan;
@@ -96,6 +97,7 @@ pub use friction::FrictionRecord;
 pub use inside::{Observer, Step};
 pub use kinematics::{Kinematics, kinematics};
 pub use methods::{METHODS, MethodId, MethodInfo, Stabilization};
+pub use modes::{Modes, modes};
 pub use plan::{Plan, Refusal, Request};
 pub use reference::{Reference, reference};
 pub use running::{Outcome, ResumeError, Run, RunError, Running, Snapshot, integrate, simulate};

@@ -359,7 +359,7 @@ pub(super) fn size(mechanism: &Mechanism, k: usize) -> f64 {
 }
 
 /// The unit of row `r` \[rad, m\].
-pub(super) fn unit(mechanism: &Mechanism, r: usize) -> f64 {
+pub(crate) fn unit(mechanism: &Mechanism, r: usize) -> f64 {
     if mechanism.constraints[r].is_angle() { 1.0 } else { mechanism.units.length }
 }
 

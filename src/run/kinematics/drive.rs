@@ -107,7 +107,7 @@ pub(super) struct Driven {
 }
 
 /// What of a scene has no part in its kinematics.
-pub(super) fn left_out(scene: &Scene) -> Vec<&'static str> {
+pub(in crate::run) fn left_out(scene: &Scene) -> Vec<&'static str> {
     [
         (!scene.walls.is_empty(), "walls"),
         (!scene.frictions.is_empty(), "dry friction"),

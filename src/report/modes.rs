@@ -1,0 +1,184 @@
+//! Equilibria and modes, as a page, a JSON object and charts.
+
+#[cfg(feature = "charts")]
+use super::drawing::Drawing;
+use super::page::{Page, counted, figure};
+#[cfg(feature = "charts")]
+use crate::chart::{self, ChartError, FILE_RESOLUTION, MechanismChart, MotionGif, plain};
+use crate::run::Modes;
+use crate::run::modes::{Equilibrium, Mode, Stability};
+use serde_json::{Map, Value, json};
+use std::f64::consts::TAU;
+
+/// Modes that the page lists of one equilibrium; the record has all.
+const LISTED: usize = 12;
+/// Equilibria that it lists, beside the one next to the start.
+const TOLD: usize = 6;
+#[cfg(feature = "charts")]
+const DRAWN: [&str; 4] = ["mode1.png", "mode2.png", "mode3.png", "mode4.png"];
+#[cfg(feature = "charts")]
+const ANIMATED: [&str; 4] = ["mode1.gif", "mode2.gif", "mode3.gif", "mode4.gif"];
+/// Amplitude of what is drawn \[rad, or sizes of the mechanism\].
+#[cfg(feature = "charts")]
+const AMPLITUDE: f64 = 0.3;
+/// Frames of one period.
+#[cfg(feature = "charts")]
+const FRAMES: usize = 48;
+
+/// One object: `equilibria`, each with its coordinates, stability and modes; `degrees_of_freedom`, `starts`.
+pub fn object(found: &Modes) -> Value {
+    let named = |values: Vec<Value>| -> Value {
+        let names = (0..values.len()).map(|k| found.mechanism.coordinate_name(k));
+        names.zip(values).collect::<Map<String, Value>>().into()
+    };
+    let mode = |mode: &Mode| {
+        json!({
+            "eigenvalue": mode.eigenvalue,
+            "frequency": mode.frequency,
+            "hertz": mode.eigenvalue[1] / TAU,
+            "damping_ratio": mode.damping_ratio,
+            "shape": named(mode.shape.iter().map(|shape| json!(shape)).collect()),
+        })
+    };
+    let equilibrium = |one: &Equilibrium| {
+        json!({
+            "coordinates": named(one.phi.iter().map(|phi| json!(phi)).collect()),
+            "potential": one.potential,
+            "stability": one.stability,
+            "from_start": one.from_start,
+            "is_family": one.is_family,
+            "modes": one.modes.iter().map(mode).collect::<Vec<_>>(),
+        })
+    };
+    json!({
+        "scene": found.scene.name,
+        "degrees_of_freedom": found.degrees_of_freedom,
+        "starts": {"tried": found.starts[0], "settled": found.starts[1]},
+        "equilibria": found.equilibria.iter().map(equilibrium).collect::<Vec<_>>(),
+        "left_out": found.left_out,
+    })
+}
+
+fn words(one: &Equilibrium) -> String {
+    let stability = match one.stability {
+        Stability::AsymptoticallyStable => "stable, disturbances die away",
+        Stability::Stable => "stable to first order, without damping",
+        Stability::Unstable => "unstable",
+        Stability::Undecided => "ways of motion cross here, and no linearization holds",
+    };
+    let family = if one.is_family { "; neighbours are equilibria too" } else { "" };
+    format!("{stability}{family}")
+}
+
+/// The page.
+pub fn text(found: &Modes) -> String {
+    let mut page = Page::new(&found.scene.name, &found.scene.description);
+    page.entry("freedom", &counted(found.degrees_of_freedom as u64, "degree", "degrees"));
+    page.entry(
+        "search",
+        &format!(
+            "{} of {} starts settled, at {}",
+            found.starts[1],
+            found.starts[0],
+            counted(found.equilibria.len() as u64, "equilibrium", "equilibria")
+        ),
+    );
+    let is_told = |k: usize, one: &Equilibrium| k < TOLD || one.from_start;
+    for (k, one) in found.equilibria.iter().enumerate().filter(|(k, one)| is_told(*k, one)) {
+        let start = if one.from_start { ", next to the start" } else { "" };
+        page.entry("equilibrium", &format!("{}: {}{start}", k + 1, words(one)));
+        let places: Vec<String> = (one.phi.iter().enumerate())
+            .map(|(k, phi)| {
+                format!("{} {}", found.mechanism.coordinate_name(k), figure((phi * 1e12).round() / 1e12))
+            })
+            .collect();
+        page.entry("", &places.join(", "));
+        page.entry("", &format!("potential energy {} J", figure(one.potential)));
+        let rows: Vec<Vec<String>> = (one.modes.iter().take(LISTED).enumerate())
+            .map(|(k, mode)| {
+                let [re, im] = mode.eigenvalue;
+                let numbers = [im / TAU, TAU / im, mode.damping_ratio, re, im];
+                let told =
+                    numbers.into_iter().map(|x| if x.is_finite() { figure(x) } else { "-".to_owned() });
+                std::iter::once((k + 1).to_string()).chain(told).collect()
+            })
+            .collect();
+        page.table(&["mode", "f [Hz]", "period [s]", "damping ratio", "Re [1/s]", "Im [rad/s]"], &rows);
+        if one.modes.len() > LISTED {
+            page.entry("", &format!("{} more modes in the record", one.modes.len() - LISTED));
+        }
+    }
+    let untold = found.equilibria.iter().enumerate().filter(|(k, one)| !is_told(*k, one)).count();
+    if untold > 0 {
+        page.entry("more", &format!("{} in the record", counted(untold as u64, "equilibrium", "equilibria")));
+    }
+    if found.equilibria.is_empty() {
+        page.entry(
+            "",
+            "no equilibrium was found: forces of the scene may have none, or it moves away for ever",
+        );
+    }
+    if !found.left_out.is_empty() {
+        page.entry("left out", &found.left_out.join(", "));
+    }
+    page.into_text()
+}
+
+/// The first modes of the equilibrium found from the start, or else of the lowest: names of files and their
+/// content, animations where wanted.
+///
+/// # Errors
+/// Drawing or encoding fails.
+#[cfg(feature = "charts")]
+pub fn charts(found: &Modes, motion: bool) -> Result<Vec<(&'static str, Vec<u8>)>, ChartError> {
+    let first = found.equilibria.iter().find(|one| one.from_start).or(found.equilibria.first());
+    let Some(one) = first else { return Ok(Vec::new()) };
+    let drawing = Drawing { scene: &found.scene, mechanism: &found.mechanism };
+    let still = vec![0.0; one.phi.len()];
+    let mut all = Vec::new();
+    for (k, mode) in one.modes.iter().enumerate().take(DRAWN.len()) {
+        let at = |phase: f64| found.displaced(one, mode, phase, AMPLITUDE);
+        let pose = |phase: f64| drawing.pose(&at(phase), &still);
+        let traced = drawing.traced();
+        let trails: Vec<Vec<[f64; 2]>> = traced
+            .iter()
+            .map(|place| {
+                (0..=4 * FRAMES)
+                    .map(|j| drawing.place(place, &at(TAU * j as f64 / (4 * FRAMES) as f64)))
+                    .collect()
+            })
+            .collect();
+        let rate = if mode.eigenvalue[1] > 0.0 {
+            format!("{} Hz", figure(mode.eigenvalue[1] / TAU))
+        } else {
+            format!("{} 1/s", figure(mode.eigenvalue[0]))
+        };
+        let title = format!("Mode {} at {rate}", k + 1);
+        let chart = MechanismChart {
+            title: title.clone(),
+            caption: vec![
+                format!("scene {}", plain(&found.scene.name)),
+                format!("damping ratio {}", figure(mode.damping_ratio)),
+                "drawn at its largest, pale at rest and on the other side".to_owned(),
+            ],
+            sketch: drawing.sketch(),
+            poses: vec![pose(TAU / 2.0), drawing.pose(&one.phi, &still), pose(0.0)],
+            trails: Vec::new(),
+            horizon: None,
+        };
+        all.push((DRAWN[k], chart::mechanism(&chart, FILE_RESOLUTION)?.png_bytes()?));
+        if motion {
+            let gif = MotionGif {
+                title,
+                sketch: drawing.sketch(),
+                poses: (0..FRAMES).map(|j| pose(TAU * j as f64 / FRAMES as f64)).collect(),
+                time: Vec::new(),
+                trails,
+                delay: 4,
+                horizon: None,
+            };
+            all.push((ANIMATED[k], chart::motion_gif(&gif)?.bytes));
+        }
+    }
+    Ok(all)
+}

@@ -1,0 +1,303 @@
+//! Equilibria and modes against closed forms, and against runs of a period.
+
+use driftless::arithmetic::{DoubleDouble, Scalar};
+use driftless::dynamics::{Mechanism, Motion};
+use driftless::run::modes::{Equilibrium, Modes, ModesError, Stability, modes};
+use driftless::run::{Limits, MethodId, Plan, Request, Run, Running};
+use driftless::scene::{Scene, parse_scene, read_scene};
+use std::f64::consts::{PI, TAU};
+use std::fmt::Write;
+use std::sync::Arc;
+
+fn example(name: &str) -> Scene {
+    read_scene(format!("examples/scenes/{name}.json").as_ref(), &[]).expect("a shipped scene")
+}
+
+fn parsed(text: &str) -> Scene {
+    parse_scene(text, "scene.json", &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn found(scene: &Scene, starts: usize) -> Modes {
+    let mechanism = Arc::new(Mechanism::new(scene).expect("equations"));
+    modes(scene, &mechanism, starts).unwrap_or_else(|error| panic!("{}: {error}", scene.name))
+}
+
+fn lowest(found: &Modes) -> &Equilibrium {
+    found.equilibria.first().expect("an equilibrium")
+}
+
+#[test]
+fn a_double_pendulum_has_four_with_the_roots_of_a_quadratic() {
+    let scene = example("free");
+    let found = found(&scene, 64);
+    assert_eq!((found.degrees_of_freedom, found.equilibria.len()), (2, 4));
+    let [first, second] = [&scene.bars[0], &scene.bars[1]];
+    let g = scene.gravity[0].hypot(scene.gravity[1]);
+    let down = scene.gravity[1].atan2(scene.gravity[0]);
+    let l = first.length;
+    let (c1, c2) = (first.centre[0], second.centre[0]);
+    let (m1, m2) = (first.mass, second.mass);
+    for one in &found.equilibria {
+        // Along gravity or against it.
+        let side: Vec<f64> = one.phi.iter().map(|phi| (phi - down).cos().round()).collect();
+        for (phi, side) in one.phi.iter().zip(&side) {
+            assert!(((phi - down).cos() - side).abs() < 1e-14 && (phi - down).sin().abs() < 1e-13, "{one:?}");
+        }
+        let mass = [
+            [first.inertia + m1 * c1 * c1 + m2 * l * l, m2 * l * c2 * side[0] * side[1]],
+            [m2 * l * c2 * side[0] * side[1], second.inertia + m2 * c2 * c2],
+        ];
+        let stiffness = [(m1 * c1 + m2 * l) * g * side[0], m2 * c2 * g * side[1]];
+        // det(K - x M) = 0, x = -s².
+        let a = mass[0][0] * mass[1][1] - mass[0][1] * mass[1][0];
+        let b = -(stiffness[0] * mass[1][1] + stiffness[1] * mass[0][0]);
+        let c = stiffness[0] * stiffness[1];
+        let root = (b * b - 4.0 * a * c).sqrt();
+        for square in [(-b - root) / (2.0 * a), (-b + root) / (2.0 * a)] {
+            let near = |mode: &&driftless::run::modes::Mode| {
+                (mode.frequency - square.abs().sqrt()).abs() < 1e-12 * square.abs().sqrt()
+            };
+            let of: Vec<_> = one.modes.iter().filter(near).collect();
+            assert_eq!(of.len(), if square > 0.0 { 1 } else { 2 }, "{square} {one:?}");
+            assert!(of.iter().all(|mode| (mode.eigenvalue[1] != 0.0) == (square > 0.0)));
+        }
+        let is_lowest = side == [1.0, 1.0];
+        assert_eq!(one.stability, if is_lowest { Stability::Stable } else { Stability::Unstable });
+    }
+    assert!((lowest(&found).phi[0] - down).abs() < 1e-12 && lowest(&found).from_start);
+}
+
+/// A hanging chain of uniform bars, 1 m long in all.
+fn chain(n: usize) -> Scene {
+    let l = 1.0 / n as f64;
+    let (mut bars, mut hinges, mut start) = (String::new(), String::new(), String::new());
+    for k in 0..n {
+        let comma = if k == 0 { "" } else { "," };
+        let _ = write!(
+            bars,
+            r#"{comma}{{"name": "b{k}", "mass": {l}, "centre": [{}, 0], "inertia": {}, "length": {l}}}"#,
+            l / 2.0,
+            l * l * l / 12.0
+        );
+        let to = if k == 0 {
+            r#"{"body": "ground", "point": [0, 0]}"#.to_owned()
+        } else {
+            format!(r#"{{"body": "b{}", "point": [{l}, 0]}}"#, k - 1)
+        };
+        let _ = write!(
+            hinges,
+            r#"{comma}{{"name": "h{k}", "between": [{to}, {{"body": "b{k}", "point": [0, 0]}}]}}"#
+        );
+        let _ = write!(start, r#"{comma}"b{k}": {{"phi": {}, "omega": 0}}"#, -1.4 - 0.01 * k as f64);
+    }
+    parsed(&format!(
+        r#"{{"name": "chain", "gravity": [0, -9.81], "bars": [{bars}], "hinges": [{hinges}], "start": {{{start}}}, "until": 1, "every": 1}}"#
+    ))
+}
+
+#[test]
+fn a_chain_tends_to_the_zeros_of_bessels_function() {
+    let zeros = [2.404_825_557_695_773, 5.520_078_110_286_311, 8.653_727_912_911_013];
+    let error = |n: usize| {
+        let all = found(&chain(n), 0);
+        let one = lowest(&all);
+        assert_eq!(one.stability, Stability::Stable);
+        assert_eq!(one.modes.len(), n);
+        [0, 1, 2].map(|k| {
+            let expected = 0.5 * zeros[k] * 9.81_f64.sqrt();
+            (one.modes[k].frequency - expected) / expected
+        })
+    };
+    let errors = [16, 32, 64].map(error);
+    let extrapolated = |k: usize, i: usize| (4.0 * errors[i + 1][k] - errors[i][k]) / 3.0;
+    for k in 0..3 {
+        let orders = [0, 1].map(|i| (errors[i][k] / errors[i + 1][k]).log2());
+        assert!((orders[1] - 2.0).abs() < 0.2, "mode {k}: {errors:?} {orders:?}");
+        // Extrapolated, of order 4.
+        let limits = [extrapolated(k, 0), extrapolated(k, 1)];
+        assert!((limits[0] / limits[1]).log2() > 3.0, "mode {k}: {limits:?}");
+        assert!(limits[1].abs() < 3e-4, "mode {k}: {limits:?}");
+    }
+}
+
+#[test]
+fn dampers_give_the_roots_of_their_quadratic() {
+    let (inertia, weight, stiffness) = (0.2 + 2.0 * 0.25, 2.0 * 9.81 * 0.5, 3.0);
+    for damping in [0.4, 2.0, 40.0] {
+        let scene = parsed(&format!(
+            r#"{{"name": "swing", "gravity": [0, -9.81],
+            "bars": [{{"name": "bar", "mass": 2, "centre": [0.5, 0], "inertia": 0.2}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "bar", "point": [0, 0]}}]}}],
+            "torsion_springs": [{{"name": "T", "body": "bar", "stiffness": {stiffness}, "free_angle": {}, "damping": {damping}}}],
+            "start": {{"bar": {{"phi": -1, "omega": 0}}}}, "until": 1, "every": 1}}"#,
+            -PI / 2.0
+        ));
+        let all = found(&scene, 16);
+        let one = lowest(&all);
+        assert!((one.phi[0] + PI / 2.0).abs() < 1e-12);
+        assert_eq!(one.stability, Stability::AsymptoticallyStable);
+        let (b, c) = (damping / inertia, (weight + stiffness) / inertia);
+        let root = b * b - 4.0 * c;
+        if root < 0.0 {
+            let mode = &one.modes[0];
+            assert_eq!(one.modes.len(), 1);
+            assert!((mode.eigenvalue[0] + b / 2.0).abs() < 1e-12 * b, "{mode:?}");
+            assert!((mode.eigenvalue[1] - (-root).sqrt() / 2.0).abs() < 1e-12 * c, "{mode:?}");
+            assert!((mode.damping_ratio - b / (2.0 * c.sqrt())).abs() < 1e-12);
+        } else {
+            let slow = (-b + root.sqrt()) / 2.0;
+            assert!((one.modes[0].eigenvalue[0] - slow).abs() < 1e-11 * b, "{one:?}");
+            assert!((one.modes[1].eigenvalue[0] - (-b - slow)).abs() < 1e-11 * b, "{one:?}");
+        }
+    }
+}
+
+#[test]
+fn a_four_bar_swings_about_the_least_of_its_potential() {
+    // The crank-rocker without its motor: the angles of a closed loop and their rates by the crank's.
+    let text = std::fs::read_to_string("examples/scenes/crank_rocker.json").expect("a shipped scene");
+    let mut scene: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let keys = scene.as_object_mut().expect("an object");
+    keys.retain(|key, _| !["motors", "outputs", "parameters"].contains(&key.as_str()));
+    scene["start"]["crank"] = serde_json::json!({"phi": 0.3, "omega": 0});
+    let all = found(&parsed(&scene.to_string()), 200);
+    assert_eq!(all.degrees_of_freedom, 1);
+    let lengths = [0.1, 0.3, 0.25];
+    let closed = |crank: f64, side: f64| {
+        let (x, y) = (0.1 * crank.cos(), 0.1 * crank.sin());
+        let (dx, dy) = (0.32 - x, -y);
+        let distance = dx.hypot(dy);
+        let along = (0.09 - 0.0625 + distance * distance) / (2.0 * distance);
+        let up = side * (0.09 - along * along).sqrt();
+        let (bx, by) = (x + (along * dx - up * dy) / distance, y + (along * dy + up * dx) / distance);
+        [crank, (by - y).atan2(bx - x), by.atan2(bx - 0.32)]
+    };
+    let mass = |k: usize| lengths[k] * 0.02 * 0.01 * 7850.0;
+    let potential = |[crank, coupler, rocker]: [f64; 3]| {
+        9.81 * (mass(0) * 0.05 * crank.sin()
+            + mass(1) * (0.1 * crank.sin() + 0.15 * coupler.sin())
+            + mass(2) * 0.125 * rocker.sin())
+    };
+    assert!(all.equilibria.len() >= 4, "{}", all.equilibria.len());
+    for one in &all.equilibria {
+        let side = (one.phi[1] - closed(one.phi[0], 1.0)[1]).sin().abs() < 1e-9;
+        let side = if side { 1.0 } else { -1.0 };
+        let h = 1e-4;
+        let at = |x: f64| closed(one.phi[0] + x, side);
+        let v = |x: f64| potential(at(x));
+        let slope = (v(-2.0 * h) - 8.0 * v(-h) + 8.0 * v(h) - v(2.0 * h)) / (12.0 * h);
+        assert!(slope.abs() < 1e-9, "{one:?} {slope}");
+        let bend = (-v(-2.0 * h) + 16.0 * v(-h) - 30.0 * v(0.0) + 16.0 * v(h) - v(2.0 * h)) / (12.0 * h * h);
+        let rate =
+            |k: usize| (at(-2.0 * h)[k] - 8.0 * at(-h)[k] + 8.0 * at(h)[k] - at(2.0 * h)[k]) / (12.0 * h);
+        let rates = [1.0, rate(1), rate(2)];
+        let about = |k: usize| mass(k) * (lengths[k] * lengths[k] + 4e-4) / 12.0;
+        let (coupler, crank) = (at(0.0)[1], at(0.0)[0]);
+        let centre = [
+            -0.1 * crank.sin() - 0.15 * coupler.sin() * rates[1],
+            0.1 * crank.cos() + 0.15 * coupler.cos() * rates[1],
+        ];
+        let inertia = about(0)
+            + mass(0) * 0.0025
+            + about(1) * rates[1] * rates[1]
+            + mass(1) * (centre[0] * centre[0] + centre[1] * centre[1])
+            + (about(2) + mass(2) * 0.015_625) * rates[2] * rates[2];
+        let expected = (bend / inertia).abs().sqrt();
+        assert!((one.modes[0].frequency - expected).abs() < 1e-6 * expected, "{one:?} {expected}");
+        assert_eq!(one.stability == Stability::Stable, bend > 0.0);
+    }
+}
+
+/// The motion of small vibrations in a mode comes back after a period, and a decayed one where damping says.
+fn comes_back(scene: &Scene, within: f64) -> usize {
+    let all = found(scene, 24);
+    let mut count = 0;
+    for one in all.equilibria.iter().filter(|one| one.stability != Stability::Unstable) {
+        for mode in one.modes.iter().filter(|mode| {
+            mode.eigenvalue[1] > 1e-3 * mode.frequency && mode.shape.iter().all(|shape| shape[1].abs() < 1e-6)
+        }) {
+            let share = 1e-5;
+            let phi = all.displaced(one, mode, 0.0, share);
+            let start = Motion {
+                phi: phi.iter().map(|&phi| DoubleDouble::of(phi)).collect(),
+                turns: vec![0; phi.len()],
+                omega: vec![DoubleDouble::ZERO; phi.len()],
+                ..Motion::default()
+            };
+            let request = Request {
+                method: Some(MethodId::Dp8),
+                until: Some(TAU / mode.eigenvalue[1]),
+                every: Some(TAU / mode.eigenvalue[1]),
+                rtol: Some(1e-13),
+                atol: Some(1e-15),
+                ..Request::default()
+            };
+            let plan = Plan::new(scene, &all.mechanism, &request).expect("a plan");
+            let run = Run::new(Arc::clone(&all.mechanism), plan, Limits::default(), &start).expect("a run");
+            let mut running = Running::new(run);
+            running.go(&mut |_| Ok(()), &mut || false).expect("an end");
+            let decay = (TAU * mode.eigenvalue[0] / mode.eigenvalue[1]).exp();
+            for (k, (end, rest)) in running.finish().last.phi.iter().zip(&one.phi).enumerate() {
+                let apart = end - rest - TAU * ((end - rest) / TAU).round();
+                let begun = phi[k] - rest - TAU * ((phi[k] - rest) / TAU).round();
+                assert!(
+                    (apart - decay * begun).abs() < within * share,
+                    "{} {k}: {apart:e} {begun:e} {mode:?}",
+                    scene.name
+                );
+            }
+            count += 1;
+        }
+    }
+    count
+}
+
+#[test]
+fn small_vibrations_of_the_examples_come_back_after_their_period() {
+    let mut count = 0;
+    for name in [
+        "free",
+        "spring",
+        "hanging",
+        "andrews",
+        "four_bars",
+        "slider_crank_torque",
+        "one_sided_spring",
+        "parameters",
+        "gentle",
+        "guided",
+    ] {
+        let scene = example(name);
+        let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
+        if let Err(error) = modes(&scene, &mechanism, 0) {
+            println!("{name}: {error}");
+            continue;
+        }
+        let of = comes_back(&scene, 1e-3);
+        println!("{name}: {of} modes");
+        count += of;
+    }
+    assert!(count >= 12, "{count}");
+}
+
+#[test]
+fn what_has_no_equilibrium_says_why() {
+    let of = |name: &str| {
+        let scene = example(name);
+        let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
+        modes(&scene, &mechanism, 8)
+    };
+    assert!(matches!(of("motor"), Err(ModesError::Moving(_))));
+    assert!(matches!(of("duffing"), Err(ModesError::Forced)));
+    assert!(matches!(of("pid"), Err(ModesError::Integrals)));
+    let mut held = example("crank_rocker");
+    held.motors[0].law = driftless::scene::Law::default();
+    let mechanism = Arc::new(Mechanism::new(&held).expect("equations"));
+    assert!(matches!(modes(&held, &mechanism, 8), Err(ModesError::Rigid)));
+    // Two bodies that attract one another find no rest.
+    assert!(of("kepler").expect("a search").equilibria.is_empty());
+    // A cart may stand anywhere: one of a family, not dozens.
+    let cart = of("cart_pole").expect("a search");
+    assert_eq!(cart.equilibria.len(), 2);
+    assert!(cart.equilibria.iter().all(|one| one.is_family));
+}
