@@ -307,5 +307,12 @@ fn modes_leave_a_record_and_charts() {
     }
     program.run("modes free.json").exits(6).says(&["--force"]);
     program.run("modes free.json --force --no-charts").exits(0).shows(&["equilibrium", "period", "unstable"]);
-    program.run("modes motor.json").exits(3).says(&["moves with time", "hint: "]);
+    let driven = program.run("modes motor.json --starts 0 --json --gif").exits(0).object();
+    assert_eq!(driven["period"], 1.0);
+    assert_eq!(driven["periodic_motions"][0]["multipliers"].as_array().map(Vec::len), Some(2));
+    for name in ["modes.json", "motion.png", "motion.gif", "multipliers.png"] {
+        assert!(program.files().contains(&format!("output/motor/modes/{name}")), "{name}");
+    }
+    program.run("modes motor.json --period 0.7").exits(3).says(&["no period", "motor", "hint: "]);
+    program.run("modes motor.json --period -1").exits(2).says(&["above 0"]);
 }

@@ -47,6 +47,7 @@ mod metamorphic;
 mod modes;
 mod natural;
 mod outputs;
+mod periodic;
 mod profiles;
 mod published;
 mod radau;

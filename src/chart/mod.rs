@@ -17,6 +17,7 @@
 //! | [`outputs()`] | [`OutputsChart`] | outputs by unit, their extremes marked |
 //! | [`work_precision()`] | [`WorkPrecision`] | error against run time or evaluations |
 //! | [`map()`] | [`Map`] | a value over two others, as colours |
+//! | [`multipliers()`] | [`Multipliers`] | Floquet multipliers and the unit circle |
 //! | [`matrix()`] | [`Matrix`] | outcomes by row and column, as colours and words |
 //! | [`profile()`] | [`Profile`] | a value over one other |
 //! | [`motion_gif()`] | [`MotionGif`] | the mechanism in motion |
@@ -35,6 +36,7 @@ mod map;
 mod matrix;
 mod mechanism;
 mod motion;
+mod multipliers;
 mod outputs;
 mod palette;
 mod panel;
@@ -55,6 +57,7 @@ pub use map::{Cell, Map, MapAxis, map};
 pub use matrix::{Matrix, Outcome, matrix};
 pub use mechanism::{MechanismChart, mechanism};
 pub use motion::{Animation, MotionGif, motion_gif};
+pub use multipliers::{Multipliers, multipliers};
 pub use outputs::{OutputSeries, OutputsChart, outputs};
 pub use profile::{Profile, profile};
 pub use sketch::{HingeSketch, MotorPose, Pose, Sketch, SliderPose, SpringSketch, WallSketch};

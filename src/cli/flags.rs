@@ -43,7 +43,7 @@ pub enum Command {
     Sweep(Box<SweepFlags>),
     /// Move a mechanism through the range of its drive: positions, loads, limits, without integrating
     Kinematics(KinematicsFlags),
-    /// Find equilibria, their stability, and the modes of small vibrations about them
+    /// Find equilibria with modes, or periodic motions with Floquet multipliers, and their stability
     Modes(ModesFlags),
     /// Run a scene with every method at all its settings: error, drift and run time, and what to choose
     Compare(Box<CompareFlags>),
@@ -341,9 +341,12 @@ pub struct ModesFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub scene: SceneFlags,
-    /// Positions from which equilibria are looked for, beside the scene's start
+    /// Positions from which equilibria or periodic motions are looked for, beside the scene's start
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(0..=1_000_000))]
     pub starts: u32,
+    /// Look for motions of this period [s]; by default that of motors at a constant rate and of sines
+    #[arg(long, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
+    pub period: Option<f64>,
     /// Folder under which `SCENE/modes` is made
     #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
     pub out: PathBuf,
@@ -354,7 +357,7 @@ pub struct ModesFlags {
     #[cfg(feature = "charts")]
     #[arg(long, help_heading = "Files")]
     pub no_charts: bool,
-    /// Draw animated GIFs of the modes
+    /// Draw animated GIFs of the modes or of the periodic motion
     #[cfg(feature = "charts")]
     #[arg(long, help_heading = "Files")]
     pub gif: bool,
@@ -570,6 +573,12 @@ fn wait(text: &str) -> Result<f64, String> {
 fn limit(text: &str) -> Result<f64, String> {
     let value = number(text)?;
     if value >= 0.0 { Ok(value) } else { Err("a limit is a number from 0 up".to_owned()) }
+}
+
+/// A number above zero.
+fn positive(text: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    if value > 0.0 && value.is_finite() { Ok(value) } else { Err("a number above 0".to_owned()) }
 }
 
 #[cfg(test)]

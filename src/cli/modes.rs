@@ -1,14 +1,14 @@
-//! `driftless modes`: equilibria, their stability and modes.
+//! `driftless modes`: equilibria and their modes, or periodic motions and their multipliers.
 
 use super::failure::{Exit, Failure};
 use super::flags::ModesFlags;
 use super::load;
 use super::output::{name_files, print, print_object};
-use crate::report::modes as report;
 use crate::report::result::files;
+use crate::report::{modes as at_rest, periodic as in_motion};
 use crate::run::Folder;
 use crate::run::files::MODES_RECORD;
-use crate::run::modes::{ModesError, modes};
+use crate::run::modes::{Modes, ModesError, PeriodicMotions, modes, periodic};
 
 /// Every file it may leave.
 const FILES: &[&str] = &[
@@ -21,7 +21,16 @@ const FILES: &[&str] = &[
     "mode2.gif",
     "mode3.gif",
     "mode4.gif",
+    "motion.png",
+    "motion.gif",
+    "multipliers.png",
 ];
+
+/// What was found.
+enum Found {
+    Rest(Modes),
+    Motion(PeriodicMotions),
+}
 
 impl From<ModesError> for Failure {
     fn from(error: ModesError) -> Self {
@@ -29,24 +38,39 @@ impl From<ModesError> for Failure {
     }
 }
 
-/// Looks for the equilibria of a scene.
+/// Looks for the equilibria of a scene, or for its periodic motions where something drives it.
 ///
 /// # Errors
 /// The scene, or files.
 pub fn run(flags: &ModesFlags) -> Result<(), Failure> {
     let (scene, mechanism) = load(&flags.scene)?;
-    let found = modes(&scene, &mechanism, flags.starts as usize)?;
+    let starts = flags.starts as usize;
+    let resting = if flags.period.is_none() { Some(modes(&scene, &mechanism, starts)) } else { None };
+    let found = match resting {
+        Some(Ok(found)) => Found::Rest(found),
+        Some(Err(error)) if !matches!(error, ModesError::Moving(_) | ModesError::Forced) => {
+            return Err(error.into());
+        }
+        _ => Found::Motion(periodic(&scene, &mechanism, starts, flags.period)?),
+    };
     let mut folder = Folder::open(&flags.out.join(&scene.name).join("modes"), flags.force)?;
     if flags.force {
         folder.clear(FILES)?;
     }
     #[cfg(feature = "charts")]
     if !flags.no_charts {
-        for (name, content) in report::charts(&found, flags.gif)? {
+        let charts = match &found {
+            Found::Rest(found) => at_rest::charts(found, flags.gif)?,
+            Found::Motion(found) => in_motion::charts(found, flags.gif)?,
+        };
+        for (name, content) in charts {
             folder.write(name, &content)?;
         }
     }
-    let mut object = report::object(&found);
+    let (mut object, text) = match &found {
+        Found::Rest(found) => (at_rest::object(found), at_rest::text(found)),
+        Found::Motion(found) => (in_motion::object(found), in_motion::text(found)),
+    };
     folder.write(MODES_RECORD, format!("{object:#}\n").as_bytes())?;
     name_files(&mut object, &folder);
     if flags.scene.tell.json {
@@ -55,5 +79,5 @@ pub fn run(flags: &ModesFlags) -> Result<(), Failure> {
     if flags.scene.tell.quiet {
         return Ok(());
     }
-    print(&(report::text(&found) + &files(folder.path(), folder.names())))
+    print(&(text + &files(folder.path(), folder.names())))
 }

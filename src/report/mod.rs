@@ -12,6 +12,7 @@
 //! | `sweep` | a sweep, with its chart | `sweep.rs`, with the feature `files` |
 //! | [`kinematics`] | a mechanism moved through the range of its drive | `kinematics.rs` |
 //! | [`modes`] | equilibria and modes | `modes.rs` |
+//! | [`periodic`] | periodic motions and their multipliers | `periodic.rs` |
 //! | [`stress`] | stiff and extreme scenes by every method | `stress.rs` |
 //! | [`compare`] | methods compared, with charts | `compare.rs` |
 //! | [`trust`] | how far a run may be trusted | `trust.rs` |
@@ -41,6 +42,7 @@ pub mod modes;
 mod outputs;
 #[doc(hidden)]
 pub mod page;
+pub mod periodic;
 #[doc(hidden)]
 pub mod result;
 #[doc(hidden)]

@@ -1,0 +1,174 @@
+//! Periodic motions with their Floquet multipliers, as a page, a JSON object and charts.
+
+#[cfg(feature = "charts")]
+use super::drawing::Drawing;
+use super::page::{Page, counted, figure};
+#[cfg(feature = "charts")]
+use crate::chart::{self, ChartError, FILE_RESOLUTION, MechanismChart, MotionGif, Multipliers, plain};
+use crate::run::modes::{PeriodicMotion, PeriodicMotions, Stability};
+use serde_json::{Map, Value, json};
+use std::f64::consts::TAU;
+
+/// Multipliers that the page lists of one motion, and motions that it tells; the record has all.
+const LISTED: usize = 12;
+const TOLD: usize = 4;
+/// Frames of one period, poses of a chart, and places of a path.
+#[cfg(feature = "charts")]
+const FRAMES: usize = 60;
+#[cfg(feature = "charts")]
+const POSES: usize = 8;
+#[cfg(feature = "charts")]
+const PLACES: usize = 240;
+
+/// One object: `period`, `periodic_motions`, each with its start, stability and multipliers.
+pub fn object(found: &PeriodicMotions) -> Value {
+    let named = |values: &[f64]| -> Value {
+        let names = (0..values.len()).map(|k| found.mechanism.coordinate_name(k));
+        names.zip(values.iter().map(|value| json!(value))).collect::<Map<String, Value>>().into()
+    };
+    let motion = |one: &PeriodicMotion| {
+        json!({
+            "coordinates": named(&one.phi),
+            "rates": named(&one.omega),
+            "turns": one.turns,
+            "residual": one.residual,
+            "stability": one.stability,
+            "from_start": one.from_start,
+            "is_family": one.is_family,
+            "multipliers": one.multipliers,
+        })
+    };
+    json!({
+        "scene": found.scene.name,
+        "degrees_of_freedom": found.degrees_of_freedom,
+        "period": found.period,
+        "starts": {"tried": found.starts[0], "settled": found.starts[1]},
+        "periodic_motions": found.motions.iter().map(motion).collect::<Vec<_>>(),
+        "left_out": found.left_out,
+    })
+}
+
+/// What becomes of a small disturbance, in words.
+fn words(one: &PeriodicMotion) -> String {
+    let stability = match one.stability {
+        Stability::AsymptoticallyStable => "stable, disturbances die away",
+        Stability::Unstable => "unstable",
+        _ => "stable to first order",
+    };
+    let family = if one.is_family { "; neighbours may be periodic too" } else { "" };
+    format!("{stability}{family}")
+}
+
+/// The page.
+pub fn text(found: &PeriodicMotions) -> String {
+    let mut page = Page::new(&found.scene.name, &found.scene.description);
+    page.entry("freedom", &counted(found.degrees_of_freedom as u64, "degree", "degrees"));
+    page.entry("period", &format!("{} s", figure(found.period)));
+    page.entry(
+        "search",
+        &format!(
+            "{} of {} starts settled, at {}",
+            found.starts[1],
+            found.starts[0],
+            counted(found.motions.len() as u64, "periodic motion", "periodic motions")
+        ),
+    );
+    let is_told = |k: usize, one: &PeriodicMotion| k < TOLD || one.from_start;
+    for (k, one) in found.motions.iter().enumerate().filter(|(k, one)| is_told(*k, one)) {
+        let start = if one.from_start { ", next to the start" } else { "" };
+        page.entry("motion", &format!("{}: {}{start}", k + 1, words(one)));
+        let name = |k: usize| found.mechanism.coordinate_name(k);
+        let rounded = |x: f64| figure((x * 1e12).round() / 1e12);
+        let places = one.phi.iter().zip(&one.omega).enumerate();
+        let places: Vec<String> = places
+            .map(|(k, (phi, omega))| format!("{} {} at {}", name(k), rounded(*phi), rounded(*omega)))
+            .collect();
+        page.entry("", &format!("begins at {}", places.join(", ")));
+        page.entry("", &format!("closes to {:.1e}", one.residual));
+        let rows: Vec<Vec<String>> = (one.multipliers.iter().take(LISTED).enumerate())
+            .map(|(k, [re, im])| {
+                let size = re.hypot(*im);
+                // Beyond nine digits there is nothing but rounding.
+                let rounded = |x: f64| (x * 1e9).round() / 1e9;
+                let growth = rounded(libm::log(size)) / found.period;
+                let numbers = [*re, *im, rounded(size), growth, libm::atan2(*im, *re) / TAU];
+                let told =
+                    numbers.into_iter().map(|x| if x.is_finite() { figure(x) } else { "-".to_owned() });
+                std::iter::once((k + 1).to_string()).chain(told).collect()
+            })
+            .collect();
+        page.table(&["multiplier", "Re", "Im", "magnitude", "growth [1/s]", "turns a period"], &rows);
+        if one.multipliers.len() > LISTED {
+            page.entry("", &format!("{} more multipliers in the record", one.multipliers.len() - LISTED));
+        }
+    }
+    let untold = found.motions.iter().enumerate().filter(|(k, one)| !is_told(*k, one)).count();
+    if untold > 0 {
+        page.entry("more", &format!("{} in the record", counted(untold as u64, "motion", "motions")));
+    }
+    if found.motions.is_empty() {
+        page.entry(
+            "",
+            "no periodic motion was found: more --starts, or a multiple of the --period, may find one",
+        );
+    }
+    if !found.left_out.is_empty() {
+        page.entry("left out", &found.left_out.join(", "));
+    }
+    page.into_text()
+}
+
+/// The motion next to the start, or else the most stable one, over a period, and its multipliers: names of
+/// files and their content, an animation where wanted.
+///
+/// # Errors
+/// Drawing or encoding fails.
+#[cfg(feature = "charts")]
+pub fn charts(found: &PeriodicMotions, motion: bool) -> Result<Vec<(&'static str, Vec<u8>)>, ChartError> {
+    let first = found.motions.iter().find(|one| one.from_start).or(found.motions.first());
+    let Some(one) = first else { return Ok(Vec::new()) };
+    let drawing = Drawing { scene: &found.scene, mechanism: &found.mechanism };
+    let mut states = found.course(one, PLACES).unwrap_or_default();
+    states.extend(states.first().cloned());
+    let pose = |[phi, omega]: &[Vec<f64>; 2]| drawing.pose(phi, omega);
+    let trails: Vec<Vec<[f64; 2]>> = (drawing.traced().iter())
+        .map(|place| states.iter().map(|[phi, _]| drawing.place(place, phi)).collect())
+        .collect();
+    let caption = vec![
+        format!("scene {}", plain(&found.scene.name)),
+        format!("period {} s", figure(found.period)),
+        words(one),
+    ];
+    let every = |count: usize| states.iter().take(PLACES).step_by(PLACES / count);
+    let mut poses: Vec<_> = every(POSES).map(pose).collect();
+    // The start is the one drawn in full.
+    poses.rotate_left(1);
+    let title = "Periodic motion".to_owned();
+    let picture = MechanismChart {
+        title: title.clone(),
+        caption: caption.clone(),
+        sketch: drawing.sketch(),
+        poses,
+        trails: trails.clone(),
+        horizon: None,
+    };
+    let plane =
+        Multipliers { title: "Floquet multipliers".to_owned(), caption, values: one.multipliers.clone() };
+    let mut all = vec![
+        ("motion.png", chart::mechanism(&picture, FILE_RESOLUTION)?.png_bytes()?),
+        ("multipliers.png", chart::multipliers(&plane, FILE_RESOLUTION)?.png_bytes()?),
+    ];
+    if motion {
+        let gif = MotionGif {
+            title,
+            sketch: drawing.sketch(),
+            poses: every(FRAMES).map(pose).collect(),
+            time: (0..FRAMES).map(|k| found.period * k as f64 / FRAMES as f64).collect(),
+            trails,
+            delay: 4,
+            horizon: None,
+        };
+        all.push(("motion.gif", chart::motion_gif(&gif)?.bytes));
+    }
+    Ok(all)
+}

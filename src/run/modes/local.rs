@@ -1,0 +1,118 @@
+//! Local coordinates of a mechanism's motions: along the directions that the constraints leave.
+
+use super::{DEPENDENT, DISTINCT, KEPT};
+use crate::arithmetic::Scalar;
+use crate::dynamics::kernel::{Bias, Kernel};
+use crate::dynamics::{Mechanism, State, Time};
+use crate::stabilization::projection::{project, unit as row_unit};
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::{PI, TAU};
+
+/// Scratch space for positions on the constraints.
+pub(super) struct Local<'a> {
+    pub(super) mechanism: &'a Mechanism,
+    pub(super) kernel: Kernel<f64>,
+    /// Units of the coordinates \[rad, m\].
+    pub(super) unit: Vec<f64>,
+    /// The least singular value of the rows that is not zero over the largest, where the last tangent was
+    /// taken.
+    pub(super) conditioning: f64,
+}
+
+impl<'a> Local<'a> {
+    pub(super) fn new(mechanism: &'a Mechanism) -> Self {
+        let bodies = mechanism.bodies.len();
+        let unit = |k: usize| if k < bodies { 1.0 } else { mechanism.units.length };
+        Self {
+            mechanism,
+            kernel: Kernel::new(mechanism),
+            unit: (0..mechanism.coordinates()).map(unit).collect(),
+            conditioning: 1.0,
+        }
+    }
+
+    /// Accelerations at rest at a time, measured in the coordinates' units.
+    pub(super) fn pull(&mut self, phi: &[f64], t: f64) -> DVector<f64> {
+        let still = vec![0.0; phi.len()];
+        self.kernel.accelerate::<0>(self.mechanism, Time::of(t), phi, &still, Bias::default());
+        DVector::from_iterator(phi.len(), self.kernel.load.iter().zip(&self.unit).map(|(a, unit)| a / unit))
+    }
+
+    pub(super) fn depends_on_time(&mut self, phi: &[f64]) -> bool {
+        let now = self.pull(phi, 0.0);
+        [0.37, 1.9].iter().any(|&t| {
+            let then = self.pull(phi, t);
+            (&then - &now).amax() > 1e-9 * now.amax().max(then.amax())
+        })
+    }
+
+    /// Directions that the constraints leave, orthonormal, one a column.
+    pub(super) fn tangent(&mut self, phi: &[f64]) -> DMatrix<f64> {
+        let n = phi.len();
+        let rows = self.mechanism.constraints.len();
+        self.pull(phi, 0.0);
+        let mut jacobian = DMatrix::<f64>::zeros(rows.max(n), n);
+        for r in 0..rows {
+            // Not by its own length: a row that vanishes leaves a direction more.
+            let (unit, size) = (&self.unit, row_unit(self.mechanism, r));
+            self.kernel.fold_gradient(r, (), |(), k, g| jacobian[(r, k)] = g * unit[k] / size);
+        }
+        let svd = jacobian.svd(false, true);
+        let (values, right) = (svd.singular_values, svd.v_t.unwrap_or_else(|| DMatrix::identity(n, n)));
+        // All rows may vanish at once: then their levers are what is small against.
+        let largest = values.amax().max(self.mechanism.size_of_parts() / self.mechanism.units.length);
+        let free: Vec<usize> = (0..n).filter(|&k| values[k] <= DEPENDENT * largest).collect();
+        let held = values.iter().copied().filter(|&value| value > DEPENDENT * largest);
+        self.conditioning = held.fold(largest, f64::min) / largest;
+        DMatrix::from_fn(n, free.len(), |i, j| right[(free[j], i)])
+    }
+
+    /// Coordinates on the constraints next to these, at t = 0.
+    pub(super) fn projected(&mut self, phi: &[f64]) -> Option<Vec<f64>> {
+        let [phi, _] = self.projected_moving(&[phi.to_vec(), vec![0.0; phi.len()]])?;
+        Some(phi)
+    }
+
+    /// Coordinates and rates on the constraints next to these, at t = 0.
+    pub(super) fn projected_moving(&mut self, [phi, omega]: &[Vec<f64>; 2]) -> Option<[Vec<f64>; 2]> {
+        let n = phi.len();
+        if self.mechanism.constraints.is_empty() {
+            return Some([phi.clone(), omega.clone()]);
+        }
+        let mut unknowns: Vec<Time> = phi.iter().chain(omega).map(|&x| Time::of(x)).collect();
+        unknowns.resize(2 * n + 3, Time::default());
+        let mut state = State::new(&unknowns, self.mechanism.bodies.len());
+        project(self.mechanism, &mut self.kernel, &mut state, KEPT).ok()?;
+        let turned = |k: usize| state.turns.get(k).map_or(0.0, |&turns| TAU * turns as f64);
+        let phi = (0..n).map(|k| state.unknown(k).hi + turned(k)).collect();
+        Some([phi, (n..2 * n).map(|k| state.unknown(k).hi).collect()])
+    }
+
+    /// A position moved along the constraints.
+    pub(super) fn moved(&self, phi: &[f64], tangent: &DMatrix<f64>, y: &DVector<f64>) -> Vec<f64> {
+        (tangent * y).iter().zip(phi).zip(&self.unit).map(|((y, phi), unit)| phi + y * unit).collect()
+    }
+
+    /// True where two positions are the same but for whole turns.
+    pub(super) fn is_same(&self, a: &[f64], b: &[f64]) -> bool {
+        let bodies = self.mechanism.bodies.len();
+        a.iter().zip(b).zip(&self.unit).enumerate().all(|(k, ((a, b), unit))| {
+            let apart = (a - b) / unit;
+            let apart = if k < bodies { apart - TAU * (apart / TAU).round() } else { apart };
+            apart.abs() < DISTINCT
+        })
+    }
+
+    /// Coordinates with their angles in (-π, π].
+    pub(super) fn wrapped(&self, phi: &[f64]) -> Vec<f64> {
+        let wrapped = |(k, phi): (usize, &f64)| {
+            if k >= self.mechanism.bodies.len() {
+                return *phi;
+            }
+            let angle = phi - TAU * (phi / TAU).round();
+            // Upside down is π, on whichever side rounding has it.
+            if angle < -PI + 1e-9 { angle + TAU } else { angle }
+        };
+        phi.iter().enumerate().map(wrapped).collect()
+    }
+}

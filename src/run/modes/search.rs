@@ -1,0 +1,210 @@
+//! The search for equilibria, and the linearization about them.
+
+use super::local::Local;
+use super::{CROSSING, Equilibrium, ITERATIONS, LONGEST, Mode, ROUNDING, STILL, Stability};
+use crate::dynamics::jacobian::Jacobian;
+use crate::dynamics::kernel::Bias;
+use crate::dynamics::{Mechanism, Time};
+use nalgebra::{Complex, DMatrix, DVector};
+
+/// A search for equilibria.
+pub(super) struct Search<'a> {
+    pub(super) local: Local<'a>,
+    jacobian: Jacobian,
+}
+
+impl<'a> Search<'a> {
+    pub(super) fn new(mechanism: &'a Mechanism) -> Self {
+        Self { local: Local::new(mechanism), jacobian: Jacobian::new(mechanism) }
+    }
+
+    /// T' A_q T and T' A_w T.
+    fn linear(&mut self, phi: &[f64], tangent: &DMatrix<f64>) -> [DMatrix<f64>; 2] {
+        let n = phi.len();
+        let still = vec![0.0; n];
+        self.jacobian.evaluate(self.local.mechanism, Time::default(), phi, &still, Bias::default());
+        [0, n].map(|first| {
+            let unit = &self.local.unit;
+            let all = DMatrix::from_fn(n, n, |i, j| {
+                self.jacobian.acceleration[2 * n * i + first + j] * unit[j] / unit[i]
+            });
+            tangent.transpose() * all * tangent
+        })
+    }
+
+    /// Where a position slides to along its accelerations, as long as its potential energy falls.
+    pub(super) fn relaxed(&mut self, phi: &[f64]) -> Option<Vec<f64>> {
+        let mut phi = self.local.projected(phi)?;
+        let (mut here, mut length) = (self.potential(&phi), LONGEST);
+        for _ in 0..ITERATIONS {
+            let tangent = self.local.tangent(&phi);
+            let mut y = tangent.transpose() * self.local.pull(&phi, 0.0);
+            let pull = y.amax();
+            if pull == 0.0 {
+                break;
+            }
+            y *= length / pull;
+            let there = self.local.moved(&phi, &tangent, &y);
+            match self.local.projected(&there).map(|there| (self.potential(&there), there)) {
+                Some((potential, there)) if potential < here => {
+                    (phi, here, length) = (there, potential, 1.5 * length)
+                }
+                _ => length *= 0.3,
+            }
+            if length < 1e-4 {
+                break;
+            }
+        }
+        Some(phi)
+    }
+
+    /// The equilibrium that is reached from a position, if one is.
+    pub(super) fn settle(&mut self, phi: &[f64]) -> Option<Vec<f64>> {
+        let mut phi = self.local.projected(phi)?;
+        let mut tangent = self.local.tangent(&phi);
+        let mut left = tangent.transpose() * self.local.pull(&phi, 0.0);
+        let mut damping = 0.0;
+        for _ in 0..ITERATIONS {
+            let [slope, _] = self.linear(&phi, &tangent);
+            let scale = slope.amax();
+            if left.amax() <= STILL * scale.max(f64::MIN_POSITIVE) {
+                // Once more: Newton's method squares what is left.
+                let last = slope.lu().solve(&-&left).map(|y| self.local.moved(&phi, &tangent, &y));
+                return last.and_then(|there| self.local.projected(&there)).or(Some(phi));
+            }
+            // Levenberg and Marquardt: Newton's step, shortened where it does not help.
+            let squares = slope.transpose() * &slope;
+            let mut step = None;
+            for _ in 0..12 {
+                let shifted = &squares
+                    + DMatrix::identity(squares.nrows(), squares.nrows()) * (damping * scale * scale);
+                let Some(mut y) = shifted.lu().solve(&(slope.transpose() * -&left)) else {
+                    damping = f64::max(10.0 * damping, 1e-6);
+                    continue;
+                };
+                let longest = y.amax();
+                if longest > LONGEST {
+                    y *= LONGEST / longest;
+                }
+                let moved = self.local.moved(&phi, &tangent, &y);
+                if let Some(there) = self.local.projected(&moved) {
+                    let frame = self.local.tangent(&there);
+                    if frame.ncols() == tangent.ncols() {
+                        let rest = frame.transpose() * self.local.pull(&there, 0.0);
+                        if rest.norm() < left.norm() {
+                            step = Some((there, frame, rest));
+                            break;
+                        }
+                    }
+                }
+                damping = f64::max(10.0 * damping, 1e-6);
+            }
+            let Some(taken) = step else {
+                return (left.amax() <= 100.0 * STILL * scale).then_some(phi);
+            };
+            (phi, tangent, left) = taken;
+            damping = if damping < 1e-9 { 0.0 } else { 0.1 * damping };
+        }
+        None
+    }
+
+    /// Stability and modes of an equilibrium.
+    pub(super) fn linearize(&mut self, phi: Vec<f64>, from_start: bool, freedom: usize) -> Equilibrium {
+        let tangent = self.local.tangent(&phi);
+        let f = tangent.ncols();
+        let is_singular = f != freedom || self.local.conditioning < CROSSING;
+        let [stiffness, damping] = self.linear(&phi, &tangent);
+        let mut system = DMatrix::<f64>::zeros(2 * f, 2 * f);
+        system.view_mut((0, f), (f, f)).fill_with_identity();
+        system.view_mut((f, 0), (f, f)).copy_from(&stiffness);
+        system.view_mut((f, f), (f, f)).copy_from(&damping);
+        let values = eigenvalues(&stiffness, &damping, system);
+        let largest = values.iter().map(|value| value.norm()).fold(0.0, f64::max);
+        let is_family = values.iter().any(|value| value.norm() <= ROUNDING.sqrt() * 1e-2 * largest);
+        let growth = values.iter().map(|value| value.re).fold(f64::NEG_INFINITY, f64::max);
+        let stability = if is_singular {
+            Stability::Undecided
+        } else if growth > ROUNDING * largest {
+            Stability::Unstable
+        } else if growth < -ROUNDING * largest {
+            Stability::AsymptoticallyStable
+        } else {
+            Stability::Stable
+        };
+        let mut listed: Vec<Complex<f64>> =
+            values.into_iter().filter(|value| value.im >= -1e-3 * ROUNDING * largest).collect();
+        listed.sort_by(|a, b| a.norm().total_cmp(&b.norm()).then(a.re.total_cmp(&b.re)));
+        let modes = listed.into_iter().map(|value| {
+            let frequency = value.norm();
+            Mode {
+                eigenvalue: [value.re, value.im],
+                frequency,
+                damping_ratio: if frequency > 0.0 { -value.re / frequency } else { 0.0 },
+                shape: self.shape(value, &stiffness, &damping, &tangent),
+            }
+        });
+        let modes = if is_singular { Vec::new() } else { modes.collect() };
+        let potential = self.potential(&phi);
+        Equilibrium {
+            potential,
+            phi: self.local.wrapped(&phi),
+            stability,
+            modes,
+            from_start,
+            is_family: is_family && !is_singular,
+        }
+    }
+
+    fn potential(&mut self, phi: &[f64]) -> f64 {
+        self.local.kernel.unit_vectors::<0>(self.local.mechanism, phi);
+        self.local
+            .mechanism
+            .energy_facing::<f64, 0>(&mut self.local.kernel, phi, &vec![0.0; phi.len()])
+            .potential
+    }
+
+    /// The shape of a mode in the coordinates.
+    fn shape(
+        &self,
+        value: Complex<f64>,
+        stiffness: &DMatrix<f64>,
+        damping: &DMatrix<f64>,
+        tangent: &DMatrix<f64>,
+    ) -> Vec<[f64; 2]> {
+        let f = stiffness.nrows();
+        let matrix = DMatrix::from_fn(f, f, |i, j| {
+            let own = if i == j { value * value } else { Complex::new(0.0, 0.0) };
+            own - value * damping[(i, j)] - stiffness[(i, j)]
+        });
+        let svd = matrix.svd(false, true);
+        let least = (0..f).min_by(|&a, &b| svd.singular_values[a].total_cmp(&svd.singular_values[b]));
+        let (Some(least), Some(right)) = (least, svd.v_t) else { return Vec::new() };
+        let y = DVector::from_fn(f, |i, _| right[(least, i)].conj());
+        let q = tangent.map(|x| Complex::new(x, 0.0)) * y;
+        let largest =
+            q.iter().copied().max_by(|a, b| a.norm().total_cmp(&b.norm())).unwrap_or(Complex::new(1.0, 0.0));
+        q.iter()
+            .zip(&self.local.unit)
+            .map(|(q, unit)| {
+                let share = q / largest * *unit;
+                [share.re, share.im]
+            })
+            .collect()
+    }
+}
+
+/// Eigenvalues of the linearized motion.  Without damping they are the square roots of those of the stiffness,
+/// which then have all digits of a problem half the size.
+fn eigenvalues(stiffness: &DMatrix<f64>, damping: &DMatrix<f64>, system: DMatrix<f64>) -> Vec<Complex<f64>> {
+    if damping.amax() == 0.0 {
+        let squares = stiffness.clone().complex_eigenvalues();
+        let root = |square: &Complex<f64>| {
+            // Real where rounding made a pair of two that are equal.
+            let real = square.im.abs() <= 1e-9 * square.norm();
+            let root = if real { Complex::new(square.re, 0.0).sqrt() } else { square.sqrt() };
+            [root, -root]
+        };
+        return squares.iter().flat_map(root).collect();
+    }
+    system.complex_eigenvalues().iter().copied().collect()
+}

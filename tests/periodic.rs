@@ -1,0 +1,212 @@
+//! Periodic motions and Floquet multipliers against closed forms, and against equations written out here.
+
+use driftless::dynamics::Mechanism;
+use driftless::run::modes::{ModesError, PeriodicMotion, PeriodicMotions, Stability, periodic};
+use driftless::scene::{Scene, parse_scene, read_scene};
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+fn example(name: &str) -> Scene {
+    read_scene(format!("examples/scenes/{name}.json").as_ref(), &[]).expect("a shipped scene")
+}
+
+fn parsed(text: &str) -> Scene {
+    parse_scene(text, "scene.json", &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn found(scene: &Scene, starts: usize, period: Option<f64>) -> Result<PeriodicMotions, ModesError> {
+    let mechanism = Arc::new(Mechanism::new(scene).expect("equations"));
+    periodic(scene, &mechanism, starts, period)
+}
+
+/// A bar on the end of one that a motor turns at 5 rad/s, with a torsion spring between them.
+fn arm(gravity: f64, stiffness: f64, damping: f64, phi: f64) -> Scene {
+    parsed(&format!(
+        r#"{{"name": "arm", "gravity": [{gravity}, 0],
+        "bars": [{{"name": "one", "mass": 1, "centre": [0.2, 0], "inertia": 0.02, "length": 0.4}},
+                 {{"name": "two", "mass": 2, "centre": [0.3, 0], "inertia": 0.05, "length": 0.6}}],
+        "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "one", "point": [0, 0]}}]}},
+                   {{"name": "B", "between": [{{"body": "one", "point": [0.4, 0]}}, {{"body": "two", "point": [0, 0]}}]}}],
+        "motors": [{{"name": "motor", "body": "one", "law": {{"start": 0.3, "rate": 5}}}}],
+        "torsion_springs": [{{"name": "T", "body": "two", "relative_to": "one", "stiffness": {stiffness}, "free_angle": 0, "damping": {damping}}}],
+        "start": {{"two": {{"phi": {phi}, "omega": 5}}}}, "until": 1, "every": 1}}"#
+    ))
+}
+
+const INERTIA: f64 = 0.05 + 2.0 * 0.09;
+const LEVER: f64 = 2.0 * 0.3;
+
+/// The difference of a multiplier and the nearest of the expected ones, real and imaginary parts.
+fn off(one: &PeriodicMotion, expected: &[[f64; 2]]) -> f64 {
+    assert_eq!(one.multipliers.len(), expected.len());
+    let apart = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+    expected
+        .iter()
+        .map(|want| one.multipliers.iter().map(|have| apart(want, have)).fold(f64::INFINITY, f64::min))
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn a_bar_on_a_turning_bar_has_the_multipliers_of_its_closed_form() {
+    let period = TAU / 5.0;
+    for (stiffness, damping, is_inward) in
+        [(0.0, 0.0, false), (0.0, 0.0, true), (1.5, 0.3, false), (0.2, 12.0, false), (0.0, 0.7, true)]
+    {
+        let phi = if is_inward { 0.29 + PI } else { 0.4 };
+        let found = found(&arm(0.0, stiffness, damping, phi), 0, None).expect("a search");
+        assert!((found.period - period).abs() < 1e-14);
+        let one = found.motions.iter().find(|one| one.from_start).expect("a motion from the start");
+        // J s² + d s + k + m c l Ω² cos = 0, μ = exp(s T).
+        let side = if is_inward { -1.0 } else { 1.0 };
+        assert!(((one.phi[1] - one.phi[0]).cos() - side).abs() < 1e-12, "{one:?}");
+        assert_eq!(one.turns, [1, 1]);
+        let (b, c) = (damping / INERTIA, (stiffness + LEVER * 0.4 * 25.0 * side) / INERTIA);
+        let square = b * b - 4.0 * c;
+        let expected = if square < 0.0 {
+            let (size, angle) = ((-b * period / 2.0).exp(), (-square).sqrt() * period / 2.0);
+            [[size * angle.cos(), size * angle.sin()], [size * angle.cos(), -size * angle.sin()]]
+        } else {
+            [1.0, -1.0].map(|sign| [(0.5 * (-b + sign * square.sqrt()) * period).exp(), 0.0])
+        };
+        let largest = expected[0][0].hypot(expected[0][1]).max(1.0);
+        assert!(off(one, &expected) < 1e-8 * largest, "{one:?} {expected:?}");
+        let stability = match (side < 0.0, damping > 0.0) {
+            (true, _) => Stability::Unstable,
+            (false, true) => Stability::AsymptoticallyStable,
+            (false, false) => Stability::Stable,
+        };
+        assert_eq!(one.stability, stability);
+    }
+}
+
+/// A state of angle and rate after a time with the derivative by its start: the classical method of Runge and
+/// Kutta on x' = w, w' = f(t, x, w) and its variational equations.
+fn flown(
+    acceleration: &dyn Fn(f64, f64, f64) -> [f64; 3],
+    start: [f64; 2],
+    period: f64,
+) -> ([f64; 2], [[f64; 2]; 2]) {
+    let steps = 40_000;
+    let h = period / f64::from(steps);
+    let slope = |t: f64, y: [f64; 6]| {
+        let [a, by_x, by_w] = acceleration(t, y[0], y[1]);
+        [y[1], a, y[4], y[5], by_x * y[2] + by_w * y[4], by_x * y[3] + by_w * y[5]]
+    };
+    let along = |y: [f64; 6], k: [f64; 6], h: f64| std::array::from_fn(|i| y[i] + h * k[i]);
+    let mut y = [start[0], start[1], 1.0, 0.0, 0.0, 1.0];
+    for n in 0..steps {
+        let t = f64::from(n) * h;
+        let k1 = slope(t, y);
+        let k2 = slope(t + h / 2.0, along(y, k1, h / 2.0));
+        let k3 = slope(t + h / 2.0, along(y, k2, h / 2.0));
+        let k4 = slope(t + h, along(y, k3, h));
+        y = std::array::from_fn(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
+    }
+    ([y[0], y[1]], [[y[2], y[3]], [y[4], y[5]]])
+}
+
+/// Every motion found closes in equations written out here, with the same multipliers; how many there were.
+fn closes(found: &PeriodicMotions, body: usize, acceleration: &dyn Fn(f64, f64, f64) -> [f64; 3]) -> usize {
+    for one in &found.motions {
+        let start = [one.phi[body], one.omega[body]];
+        let (end, [[a, b], [c, d]]) = flown(acceleration, start, found.period);
+        let largest = [a, b, c, d].iter().fold(1.0, |most: f64, x| most.max(x.abs()));
+        let turns = ((end[0] - start[0]) / TAU).round();
+        assert!((end[0] - start[0] - TAU * turns).abs() < 1e-9 * largest, "{one:?} {end:?}");
+        assert!((end[1] - start[1]).abs() < 1e-8 * largest, "{one:?} {end:?}");
+        let (trace, det) = (a + d, a * d - b * c);
+        let square = trace * trace / 4.0 - det;
+        let expected = if square < 0.0 {
+            [1.0, -1.0].map(|sign| [trace / 2.0, sign * (-square).sqrt()])
+        } else {
+            [1.0, -1.0].map(|sign| [trace / 2.0 + sign * square.sqrt(), 0.0])
+        };
+        // Near a double root only half the digits are left.
+        let within = (1e-8 * largest / square.abs().sqrt()).max(1e-8) * largest;
+        assert!(off(one, &expected) < within, "{one:?} {expected:?}");
+    }
+    found.motions.len()
+}
+
+#[test]
+fn an_arm_under_gravity_closes_in_equations_of_its_own() {
+    let found = found(&arm(9.81, 0.0, 0.0, 0.4), 48, None).expect("a search");
+    let acceleration = |t: f64, x: f64, _: f64| {
+        let crank = 0.3 + 5.0 * t;
+        let pull = LEVER * 0.4 * 25.0;
+        [
+            -(pull * (x - crank).sin() + LEVER * 9.81 * x.sin()) / INERTIA,
+            -(pull * (x - crank).cos() + LEVER * 9.81 * x.cos()) / INERTIA,
+            0.0,
+        ]
+    };
+    let count = closes(&found, 1, &acceleration);
+    println!("{count} motions");
+    assert!(count >= 2);
+}
+
+#[test]
+fn a_driven_oscillator_closes_in_equations_of_its_own() {
+    let found = found(&example("duffing"), 48, Some(TAU / 1.2)).expect("a search");
+    let acceleration =
+        |t: f64, x: f64, w: f64| [x - x * x * x - 0.2 * w + 0.3 * (1.2 * t).cos(), 1.0 - 3.0 * x * x, -0.2];
+    let count = closes(&found, 0, &acceleration);
+    assert_eq!(count, 2);
+    // x(t) -> -x(t + T/2) makes one of the other.
+    let [one, other] = [0, 1].map(|k| &found.motions[k]);
+    let half = &found.course(one, 2).expect("a course")[1];
+    assert!((half[0][0] + other.phi[0]).abs() < 1e-8 && (half[1][0] + other.omega[0]).abs() < 1e-8);
+    for one in &found.motions {
+        // Liouville: the product of the multipliers is what damping leaves.
+        let product: f64 = one.multipliers.iter().map(|[re, im]| re.hypot(*im)).product();
+        assert!((product - (-0.2 * found.period).exp()).abs() < 1e-7, "{one:?}");
+    }
+}
+
+#[test]
+fn multipliers_of_a_loop_with_a_bar_hung_on_it_come_in_reciprocal_pairs() {
+    let mut text = std::fs::read_to_string("examples/scenes/four_bar_motor.json").expect("a scene");
+    let [bars, hinges] =
+        ["\"bars\": [", "\"hinges\": ["].map(|key| text.find(key).expect("a list") + key.len());
+    text.insert_str(
+        hinges,
+        r#"{"name": "P", "between": [{"body": "coupler", "point": [0.1, 0.05]}, {"body": "swing", "point": [0, 0]}]},"#,
+    );
+    text.insert_str(
+        bars,
+        r#"{"name": "swing", "mass": 0.3, "centre": [0.05, 0], "inertia": 0.0004, "length": 0.1},"#,
+    );
+    let start = text.find("\"start\": {").expect("a start") + "\"start\": {".len();
+    text.insert_str(start, r#""swing": {"phi": -1.3, "omega": 0},"#);
+    let found = found(&parsed(&text), 32, None).expect("a search");
+    assert_eq!(found.degrees_of_freedom, 1);
+    println!("{} motions of {} starts", found.motions.len(), found.starts[0]);
+    assert!(!found.motions.is_empty());
+    for one in &found.motions {
+        let [[a, b], [c, d]] = [one.multipliers[0], one.multipliers[1]];
+        let product = [a * c - b * d, a * d + b * c];
+        assert!((product[0] - 1.0).abs() < 1e-6 && product[1].abs() < 1e-6, "{one:?}");
+        // Where it is at the end of a run of three periods that shares only the equations.
+        let course = found.course(one, 8).expect("a course");
+        assert_eq!(course.len(), 8);
+        assert_eq!(course[0][0], one.phi);
+    }
+}
+
+#[test]
+fn what_has_no_period_says_why() {
+    let of = |name: &str, period: Option<f64>| found(&example(name), 0, period);
+    assert!(matches!(of("motor_sine", None), Err(ModesError::PeriodUnknown(_))));
+    assert!(matches!(of("motor_sine", Some(1.0)), Err(ModesError::NotPeriodic { .. })));
+    assert!(matches!(of("duffing", None), Err(ModesError::PeriodUnknown(_))));
+    assert!(matches!(of("duffing", Some(5.0)), Err(ModesError::NotPeriodic { .. })));
+    assert!(matches!(of("stick_slip", None), Err(ModesError::Friction)));
+    assert!(matches!(of("pid", Some(1.0)), Err(ModesError::Integrals)));
+    let Err(ModesError::Driven(period)) = of("crank_rocker", None) else { panic!("it is driven") };
+    assert!((period - 0.2).abs() < 1e-12);
+    // A motor that swings twice while another turns once: the longer period is that of both.
+    let mut both = arm(9.81, 0.0, 0.0, 0.4);
+    both.motors[0].law.sines = vec![driftless::scene::Sine { amplitude: 0.1, frequency: 7.5, phase: 0.4 }];
+    let period = found(&both, 0, None).expect("a search").period;
+    assert!((period - 4.0 * PI / 5.0).abs() < 1e-12, "{period}");
+}
