@@ -10,7 +10,7 @@ use driftless::dynamics::constraint::Posture;
 use driftless::dynamics::{CompileError, Mechanism};
 use driftless::scene::{Scene, parse_scene};
 use serde_json::{Value, json};
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// The shipped scene with these keys replaced.
 fn with(name: &str, changes: Value) -> Scene {
@@ -190,14 +190,21 @@ fn impossible_starts_name_the_row() {
         {"name": "C", "between": [{"body": "ground", "point": [3, 0]}, {"body": "rocker", "point": [0, 0]}]}
     ], "start": {}}),
     );
-    let CompileError::Impossible { row, left, unit } = refused(&short) else {
+    let CompileError::Impossible { row, left, unit, closest } = refused(&short) else {
         panic!("{:?}", refused(&short))
     };
+    assert!(closest.apart.is_none() && closest.guesses[1] == 0 && closest.guesses[0] > 20, "{closest:?}");
     assert!(["B.x", "B.y", "C.x", "C.y"].contains(&row.as_str()) && unit == "m", "{row}");
     assert!((0.3..2.0).contains(&left), "the loop stays open: {left}");
     // What is given is too far from any start to be a rough guess.
     let far = with("four_bar_motor", json!({"start": {"coupler": {"phi": 2.5}, "rocker": {"phi": -1}}}));
-    assert!(matches!(refused(&far), CompileError::Impossible { .. }), "{:?}", refused(&far));
+    let CompileError::Impossible { closest, .. } = refused(&far) else { panic!("{:?}", refused(&far)) };
+    // What it names instead is a start, and reads as one.
+    assert!(closest.apart.is_some_and(|apart| apart > 1.0) && closest.guesses[1] > 0, "{closest:?}");
+    let instead: Value = serde_json::from_str(&format!("{{{}}}", closest.written)).expect("JSON");
+    let mechanism = compiled(&with("four_bar_motor", instead));
+    let apart = |change: &driftless::dynamics::assembly::Change| (change.used - change.given).abs();
+    assert!(mechanism.assembly.changes.iter().all(|change| apart(change) < 1e-4));
     // A motor at a dead centre of its slider: the travel cannot grow at any rate of the crank.
     let drive = json!([{"name": "push", "slider": "slider", "law": {"start": 1.5, "rate": 1}}]);
     let dead = with(
@@ -213,9 +220,16 @@ fn impossible_starts_name_the_row() {
 #[test]
 fn what_nothing_gives_is_asked_for() {
     let open = |name: &str, start: Value| match refused(&with(name, json!({"start": start}))) {
-        CompileError::Undetermined(what) => what,
+        CompileError::Undetermined(what) => what.join(" "),
         error => panic!("{error:?}"),
     };
+    // All of it at once.
+    let all = open("cart_pole", json!({}));
+    let mut names: Vec<&str> = all.split(' ').collect();
+    names.sort_unstable();
+    assert_eq!(names, ["start.cart.origin", "start.cart.phi", "start.pole.phi"]);
+    let words = refused(&with("cart_pole", json!({"start": {}}))).to_string();
+    assert!(names.iter().all(|name| words.contains(name)) && words.contains("add them"), "{words}");
     assert_eq!(open("cart_pole", json!({"cart": {"phi": 0, "origin": [0, 0]}})), "start.pole.phi");
     assert_eq!(open("cart_pole", json!({"cart": {"phi": 0}, "pole": {"phi": 1}})), "start.cart.origin");
     // A locked slider keeps the angle of the start, which somebody has to say.
@@ -286,7 +300,7 @@ fn a_third_leg_is_redundant_and_a_straight_line_is_singular() {
     // Folded, one more row says nothing new, but only there.
     let open = refused(&table(all(0.0)));
     assert!(
-        matches!(&open, CompileError::Undetermined(what) if what.ends_with(".omega")),
+        matches!(&open, CompileError::Undetermined(what) if what[0].ends_with(".omega")),
         "where rank is lost rates must be given: {open:?}"
     );
     let bar = |omega: f64| json!({"phi": 0, "omega": omega});
@@ -358,4 +372,79 @@ fn springs_and_walls_are_looked_at_where_the_start_is_found() {
         refused(&with("four_bar_motor", json!({"springs": ends}))),
         CompileError::SpringWithoutLength("s".into())
     );
+}
+
+/// One leg of Theo Jansen's walker, its crank at an angle: bars, hinges and motor, and a start.
+fn leg(start: Value) -> Scene {
+    let thin = |name: &str, length: f64| json!({"name": name, "length": length, "width": 0.02, "thickness": 0.01, "density": 1200});
+    let plate = |name: &str, centre: [f64; 2], length: f64| json!({"name": name, "mass": 0.3, "centre": centre, "inertia": 0.01, "length": length});
+    let at = |body: &str, x: f64, y: f64| json!({"body": body, "point": [x, y]});
+    let hinge = |name: &str, a: Value, b: Value| json!({"name": name, "between": [a, b]});
+    let scene = json!({
+        "name": "leg", "gravity": [0, -9.81],
+        "bars": [thin("m", 0.15), thin("j", 0.5), thin("k", 0.619), plate("upper", [0.25, 0.12], 0.415), thin("c", 0.393), thin("f", 0.394), plate("foot", [0.2, 0.2], 0.367)],
+        "hinges": [
+            hinge("O", at("ground", 0.0, 0.0), at("m", 0.0, 0.0)),
+            hinge("B1", at("ground", -0.38, -0.078), at("upper", 0.0, 0.0)),
+            hinge("B2", at("ground", -0.38, -0.078), at("c", 0.0, 0.0)),
+            hinge("Pj", at("m", 0.15, 0.0), at("j", 0.0, 0.0)),
+            hinge("Pk", at("m", 0.15, 0.0), at("k", 0.0, 0.0)),
+            hinge("J", at("j", 0.5, 0.0), at("upper", 0.415, 0.0)),
+            hinge("K1", at("k", 0.619, 0.0), at("c", 0.393, 0.0)),
+            hinge("F1", at("upper", 0.08, 0.393), at("f", 0.0, 0.0)),
+            hinge("F2", at("f", 0.394, 0.0), at("foot", 0.0, 0.0)),
+            hinge("K2", at("k", 0.619, 0.0), at("foot", 0.367, 0.0)),
+        ],
+        "motors": [{"name": "motor", "body": "m", "law": {"start": 0, "rate": 6}}],
+        "start": start, "until": 1, "every": 0.1
+    });
+    parse_scene(&scene.to_string(), "leg.json", &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn a_walkers_leg_is_found_from_guesses_far_off() {
+    let base = leg(json!({"k": {"phi": 4.0}, "upper": {"phi": 1.3}, "foot": {"phi": -1.15}}));
+    let known: Vec<f64> = found(&compiled(&base), &base).iter().map(|bar| bar.0).collect();
+    let names = ["m", "j", "k", "upper", "c", "f", "foot"];
+    let apart = |a: f64, b: f64| (a - b - TAU * ((a - b) / TAU).round()).abs();
+    // Whether the one that is meant is found; another one only where it is nearer to what is given.
+    let is_found = |given: &[(usize, f64)]| {
+        let start: serde_json::Map<String, Value> =
+            given.iter().map(|&(body, phi)| (names[body].to_owned(), json!({"phi": phi}))).collect();
+        let scene = leg(Value::Object(start));
+        let mechanism = match Mechanism::new(&scene) {
+            Ok(mechanism) => mechanism,
+            Err(CompileError::Ambiguous { .. }) => return false,
+            Err(error) => panic!("{given:?}: {error}"),
+        };
+        let bars = found(&mechanism, &scene);
+        let is_meant = (1..7).all(|body| apart(bars[body].0, known[body]) < 1e-9);
+        let most = |off: &dyn Fn(&(usize, f64)) -> f64| {
+            given.iter().map(off).fold(0.0, |sum: f64, off| sum + off * off).sqrt()
+        };
+        let [nearest, meant] =
+            [most(&|&(body, phi)| apart(bars[body].0, phi)), most(&|&(body, phi)| apart(known[body], phi))];
+        assert!(is_meant || nearest < meant, "{given:?}: {nearest} {meant}");
+        is_meant
+    };
+    // One of three angles is 0.7 rad off: it is found, but where two lie as near.
+    let mut single = 0;
+    let three = [2, 3, 6].map(|body| (body, known[body]));
+    for off in [-0.7, 0.7] {
+        for k in 0..3 {
+            let mut given = three;
+            given[k].1 += off;
+            let is_found = is_found(&given);
+            println!("{} off by {off}: {is_found}", names[given[k].0]);
+            single += usize::from(is_found);
+        }
+    }
+    let all = |k: u32, most: f64| -> Vec<(usize, f64)> {
+        let off = |body: usize| (f64::from(k) * 0.618_034 + body as f64 * 0.754_878).fract() * 2.0 - 1.0;
+        (1..7).map(|body| (body, known[body] + most * off(body))).collect()
+    };
+    let count = |most: f64| (0..100).filter(|&k| is_found(&all(k, most))).count();
+    let counts = [0.2, 0.35, 0.7].map(count);
+    println!("of 100 starts off by up to 0.2, 0.35, 0.7 rad in all angles {counts:?} are found");
+    assert!(counts[0] == 100 && counts[1] >= 70 && counts[2] >= 35 && single >= 3, "{counts:?}");
 }

@@ -294,6 +294,19 @@ fn kinematics_leaves_a_table_charts_and_a_record() {
 }
 
 #[test]
+fn a_start_is_drawn_and_so_is_what_comes_closest() {
+    let program = Program::with_scenes(&["four_bar_motor"]);
+    program.run("check four_bar_motor.json --chart start.png").exits(0).says(&["drawn in start.png"]);
+    program
+        .run("check four_bar_motor.json --set bars.coupler.length=0.9 --set hinges.C.between[0].point[0]=3 --chart open.png")
+        .exits(3)
+        .says(&["no start fits", "closest: \"start\": {\"coupler\"", "none of", "drawn in open.png"]);
+    for name in ["start.png", "open.png"] {
+        assert!(program.files().contains(&name.to_owned()), "{name}");
+    }
+}
+
+#[test]
 fn modes_leave_a_record_and_charts() {
     let program = Program::with_scenes(&["free", "motor"]);
     let object = program.run("modes free.json --json --gif").exits(0).object();

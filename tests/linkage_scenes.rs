@@ -173,6 +173,11 @@ fn trees_of_hinges_still_need_every_start() {
         (error.refusal().path.as_str(), error.refusal().problem.as_str()),
         ("start.two.omega", "is missing")
     );
+    // All that is missing is named at once.
+    let error = refused(&tree(json!([]), json!({"one": {"phi": 0.5}})));
+    assert_eq!(error.refusal().path, "start.one.omega");
+    let hint = &error.refusal().hint;
+    assert!(hint.contains(r#""start": {"one": {"omega": 0}, "two": {"phi": 0, "omega": 0}}"#), "{hint}");
     // A lock with an angle gives the start as a motor does.
     let lock = json!([{"name": "l", "body": "two", "relative_to": "one", "angle": 0.25}]);
     let scene = parsed(&tree(lock.clone(), json!({"one": one}))).unwrap_or_else(|error| panic!("{error}"));
@@ -428,5 +433,45 @@ proptest! {
         prop_assert_eq!(read.given[1].phi, flags[4]);
         prop_assert!((read.start[5].phi - (read.start[3].phi + numbers[7])).abs() < 1e-13);
         prop_assert_eq!(parsed(&read.to_input().to_string()), Ok(read));
+    }
+}
+
+#[test]
+fn what_is_likely_not_meant_is_told() {
+    let scene = |length: f64, point: [f64; 2], phi: f64| {
+        parsed(
+            &json!({
+                "name": "doubtful", "gravity": [0, -9.81],
+                "bars": [
+                    {"name": "one", "mass": 1, "centre": [length / 2.0, 0], "inertia": 0.1, "length": length},
+                    {"name": "two", "mass": 1, "centre": [0.3, 0], "inertia": 0.1, "length": 0.6}
+                ],
+                "hinges": [
+                    {"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "one", "point": [0, 0]}]},
+                    {"name": "B", "between": [{"body": "one", "point": point}, {"body": "two", "point": [0, 0]}]}
+                ],
+                "start": {"one": {"phi": phi, "omega": 0}, "two": {"phi": 0, "omega": 0}},
+                "until": 1, "every": 1
+            })
+            .to_string(),
+        )
+        .unwrap_or_else(|error| panic!("{error}"))
+    };
+    assert!(scene(0.6, [0.6, 0.0], 1.5).doubts().is_empty());
+    for (doubtful, words) in [
+        (scene(0.6, [0.6, 0.0], 90.0), ["start.one.phi is 90 rad", "90*pi/180"]),
+        (scene(600.0, [600.0, 0.0], 1.5), ["bar one is 600 m long", "600 mm are 0.6"]),
+        (scene(0.6, [0.7, 0.0], 1.5), ["hinges.B.between[0].point = [0.7, 0] lies off bar one", "[0.6, 0]"]),
+        (scene(0.6, [0.3, 0.9], 1.5), ["hinges.B.between[0].point = [0.3, 0.9]", "off bar one"]),
+    ] {
+        let doubts = doubtful.doubts();
+        assert!(doubts.len() == 1 && words.iter().all(|word| doubts[0].contains(word)), "{doubts:?}");
+    }
+    // Nothing of what is shipped is doubtful.
+    for file in std::fs::read_dir("examples/scenes").expect("a folder").flatten() {
+        if file.path().extension().is_some_and(|end| end == "json") {
+            let scene = driftless::scene::read_scene(&file.path(), &[]).expect("a shipped scene");
+            assert!(scene.doubts().is_empty(), "{:?}: {:?}", file.path(), scene.doubts());
+        }
     }
 }

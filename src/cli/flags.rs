@@ -142,6 +142,10 @@ pub struct CheckFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub plan: PlanFlags,
+    /// Draw the start as PNG, or the closest configuration where what is given fits none
+    #[cfg(feature = "charts")]
+    #[arg(long, value_name = "FILE", help_heading = "Files")]
+    pub chart: Option<PathBuf>,
 }
 
 const SIGNS: &str = "\

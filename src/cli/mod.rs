@@ -2,6 +2,7 @@
 //!
 //! Data go to stdout or into files, progress and messages to stderr.  Exit codes are in [`failure::Exit`].
 
+mod check;
 mod compare;
 #[doc(hidden)]
 pub mod failure;
@@ -24,11 +25,10 @@ pub use flags::{Flags, parse};
 use crate::dynamics::Mechanism;
 use crate::report;
 use crate::report::page::counted;
-use crate::run::{Plan, Run};
 use crate::scene::{self, Override, Scene, Template};
 use clap::CommandFactory;
 use failure::Exit;
-use flags::{CheckFlags, Command, SceneFlags};
+use flags::{Command, SceneFlags};
 use output::{print, print_object};
 use std::sync::Arc;
 
@@ -38,7 +38,7 @@ use std::sync::Arc;
 /// Anything that keeps it from being done, with its exit code.
 pub fn run(flags: &Flags) -> Result<(), Failure> {
     match &flags.command {
-        Command::Check(flags) => check(flags),
+        Command::Check(flags) => check::run(flags),
         Command::Inspect(flags) => inspect::run(flags),
         Command::Run(given) => simulate::run(given, &flags.arguments),
         Command::Sweep(given) => sweep::run(given, &flags.arguments),
@@ -56,25 +56,6 @@ pub fn run(flags: &Flags) -> Result<(), Failure> {
             print(&String::from_utf8_lossy(&script))
         }
     }
-}
-
-fn check(flags: &CheckFlags) -> Result<(), Failure> {
-    let (scene, mechanism) = load(&flags.scene)?;
-    let mut plans = Vec::new();
-    for request in flags.plan.requests() {
-        let plan = Plan::new(&scene, &mechanism, &request)?;
-        // That the method can begin is part of the check; measuring Baumgarte's time constant is not.
-        let trial = Plan { time_constant: plan.time_constant.or(Some(1.0)), ..plan.clone() };
-        Run::new(Arc::clone(&mechanism), trial, Default::default(), &mechanism.start(&scene))?;
-        plans.push(plan);
-    }
-    if flags.scene.tell.json {
-        return output::print_objects(
-            plans.iter().map(|plan| report::check::object(&scene, &mechanism, plan)).collect(),
-        );
-    }
-    let pages: Vec<String> = plans.iter().map(|plan| report::check::text(&scene, &mechanism, plan)).collect();
-    if flags.scene.tell.quiet { Ok(()) } else { print(&pages.join("\n")) }
 }
 
 /// Reads and compiles the scene.
@@ -98,7 +79,8 @@ fn compile(flags: &SceneFlags, text: &str) -> Result<(Scene, Arc<Mechanism>), Fa
     let mechanism = Arc::new(Mechanism::new(&scene)?);
     settle(flags, &mechanism)?;
     if !flags.tell.quiet {
-        stays(flags, text, &scene).iter().for_each(|note| output::message(&format!("note: {note}")));
+        let doubts = scene.doubts().into_iter();
+        doubts.chain(stays(flags, text, &scene)).for_each(|note| output::message(&format!("note: {note}")));
     }
     Ok((scene, mechanism))
 }

@@ -4,7 +4,7 @@
 mod parts;
 
 use super::Motion;
-use super::assembly::Assembly;
+use super::assembly::{Assembly, Closest};
 use super::configuration::{Configuration, Values};
 use super::constraint::{self, ConstraintEquation, Measure, Site};
 use super::force::formula::Formulas;
@@ -156,7 +156,7 @@ pub enum CompileError {
     Massless(String),
     /// No start closes the rows, or none near what is given.
     #[error(
-        "no start fits: constraint `{row}` is off by {left:.3e} {unit} at the nearest\nhint: check lengths and places, and whether what `start` gives can be reached"
+        "no start fits: constraint `{row}` is off by {left:.3e} {unit} at the nearest\n{closest}\nhint: check lengths and places, and whether what `start` gives can be reached; `driftless check SCENE --chart FILE` draws the closest"
     )]
     Impossible {
         /// The row that is off most.
@@ -165,6 +165,8 @@ pub enum CompileError {
         left: f64,
         /// `rad` or `m`.
         unit: &'static str,
+        /// What comes closest.
+        closest: Box<Closest>,
     },
     /// No rates keep the rows at the start.
     #[error(
@@ -178,12 +180,12 @@ pub enum CompileError {
         /// `rad/s` or `m/s`.
         unit: &'static str,
     },
-    /// A coordinate that neither the rows nor the scene give.
-    #[error("the start leaves `{0}` open: no constraint gives it\nhint: add it to the scene")]
-    Undetermined(String),
+    /// Coordinates, or rates, that neither the rows nor the scene give: as many as have to be added.
+    #[error("the start leaves {} open: no constraint gives {}\nhint: add {} to the scene", quoted(.0), them(.0), them(.0))]
+    Undetermined(Vec<String>),
     /// More than one start fits what is given.
     #[error(
-        "the start is ambiguous: `{what}` may be {one:.6} or {other:.6} {unit}\nhint: add it to the scene; roughly is enough"
+        "the start is ambiguous: `{what}` may be {one:.6} or {other:.6} {unit}, and {count} configurations are found that fit\nhint: {advice}"
     )]
     Ambiguous {
         /// Where the scene could say which.
@@ -194,6 +196,10 @@ pub enum CompileError {
         other: f64,
         /// `rad` or `m`.
         unit: &'static str,
+        /// Configurations that were found.
+        count: usize,
+        /// What to give, so that the first of them is told from all others.
+        advice: String,
     },
     /// A spring with a free length starts without a direction.
     #[error(
@@ -234,6 +240,19 @@ pub enum CompileError {
     },
 }
 
+/// Names in backticks, with commas and an `and`.
+pub(super) fn quoted(names: &[String]) -> String {
+    let all: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+    match all.split_last() {
+        Some((last, before)) if !before.is_empty() => format!("{} and {last}", before.join(", ")),
+        _ => all.join(""),
+    }
+}
+
+fn them(names: &[String]) -> &'static str {
+    if names.len() == 1 { "it" } else { "them" }
+}
+
 impl Mechanism {
     /// Compiles a scene.
     ///
@@ -249,6 +268,36 @@ impl Mechanism {
     /// # Errors
     /// Those of [`Mechanism::new`], and forces on bodies that are not there.
     pub fn with_forces(scene: &Scene, forces: Vec<UserForce>) -> Result<Self, CompileError> {
+        let mut mechanism = Self::unassembled(scene, forces)?.assembled(scene, &kept_angles(scene))?;
+        mechanism.vibrates(scene)?;
+        mechanism.choose_form();
+        if let Some(recursion) = mechanism
+            .recursion
+            .as_ref()
+            .filter(|recursion| recursion.ways.entries() > DENSE_LIMIT * DENSE_LIMIT)
+        {
+            return Err(CompileError::TooMany(recursion.ways.rows()));
+        }
+        mechanism.check_mass(scene)?;
+        let start = mechanism.start(scene);
+        if let Some(laws) = mechanism.laws.clone() {
+            let modes = mechanism.seen(&start, |at| laws.formulas.modes(at, &laws.parameters));
+            mechanism = mechanism.on_branch(laws.parameters, modes)?;
+        }
+        mechanism.energy_scale = mechanism.scale_of_energy(&start);
+        mechanism.scale_contacts(&start);
+        mechanism.units = Units::new(&mechanism, scene, &start);
+        if scene.inactive.is_empty() {
+            return Ok(mechanism);
+        }
+        let unknown =
+            |part| CompileError::Unsound(format!("inactive: no part that can be switched is `{part}`"));
+        let mut acting = mechanism.without(&scene.inactive).map_err(unknown)?;
+        acting.whole = Some((Arc::new(mechanism), scene.inactive.clone()));
+        Ok(acting)
+    }
+    /// A scene's bodies and joints without a start: all that drawing it in a given position takes.
+    pub(crate) fn unassembled(scene: &Scene, forces: Vec<UserForce>) -> Result<Self, CompileError> {
         if let Some(fault) = scene.fault() {
             return Err(CompileError::Unsound(fault));
         }
@@ -329,7 +378,7 @@ impl Mechanism {
         let roots = forest.roots();
         let ground_energy =
             bodies.iter().zip(&roots).fold(0.0, |sum, (body, &root)| sum - body.mass * gravity.dot(root));
-        let mut mechanism = Self {
+        Ok(Self {
             ground_energy,
             tree: constants(&bodies, &forest, gravity),
             actions: actions(scene, &forest),
@@ -358,34 +407,7 @@ impl Mechanism {
             units: Units::default(),
             assembly: Assembly::default(),
             recursion: None,
-        }
-        .assembled(scene, &kept_angles(scene))?;
-        mechanism.vibrates(scene)?;
-        mechanism.choose_form();
-        if let Some(recursion) = mechanism
-            .recursion
-            .as_ref()
-            .filter(|recursion| recursion.ways.entries() > DENSE_LIMIT * DENSE_LIMIT)
-        {
-            return Err(CompileError::TooMany(recursion.ways.rows()));
-        }
-        mechanism.check_mass(scene)?;
-        let start = mechanism.start(scene);
-        if let Some(laws) = mechanism.laws.clone() {
-            let modes = mechanism.seen(&start, |at| laws.formulas.modes(at, &laws.parameters));
-            mechanism = mechanism.on_branch(laws.parameters, modes)?;
-        }
-        mechanism.energy_scale = mechanism.scale_of_energy(&start);
-        mechanism.scale_contacts(&start);
-        mechanism.units = Units::new(&mechanism, scene, &start);
-        if scene.inactive.is_empty() {
-            return Ok(mechanism);
-        }
-        let unknown =
-            |part| CompileError::Unsound(format!("inactive: no part that can be switched is `{part}`"));
-        let mut acting = mechanism.without(&scene.inactive).map_err(unknown)?;
-        acting.whole = Some((Arc::new(mechanism), scene.inactive.clone()));
-        Ok(acting)
+        })
     }
 
     /// The mechanism with its laws recorded anew, with these parameters and on these branches.

@@ -13,6 +13,7 @@
 //! | [`kinematics`] | a mechanism moved through the range of its drive | `kinematics.rs` |
 //! | [`modes`] | equilibria and modes | `modes.rs` |
 //! | [`periodic`] | periodic motions and their multipliers | `periodic.rs` |
+//! | `start` | the start of a scene, in a picture | `start.rs`, with the feature `charts` |
 //! | [`stress`] | stiff and extreme scenes by every method | `stress.rs` |
 //! | [`compare`] | methods compared, with charts | `compare.rs` |
 //! | [`trust`] | how far a run may be trusted | `trust.rs` |
@@ -45,6 +46,9 @@ pub mod page;
 pub mod periodic;
 #[doc(hidden)]
 pub mod result;
+#[doc(hidden)]
+#[cfg(feature = "charts")]
+pub mod start;
 #[doc(hidden)]
 pub mod stress;
 #[doc(hidden)]

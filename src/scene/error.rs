@@ -56,6 +56,12 @@ pub(super) struct Excerpt {
 }
 
 impl SceneError {
+    /// The same with another hint.
+    pub(super) fn with_hint(mut self, hint: String) -> Self {
+        self.0.hint = hint;
+        self
+    }
+
     /// What the scene was refused for.
     pub fn refusal(&self) -> &Refusal {
         &self.0

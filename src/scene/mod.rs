@@ -15,6 +15,7 @@ mod law;
 mod locate;
 mod number;
 mod output;
+mod plausible;
 mod profile;
 #[doc(hidden)]
 pub mod read;

@@ -43,7 +43,7 @@ pub fn points_that_stay(scene: &Scene, path: &str, length: Option<f64>) -> Optio
 }
 
 /// Every place of the scene that lies on something, with its path.
-fn places(scene: &Scene) -> Vec<(String, Place)> {
+pub(super) fn places(scene: &Scene) -> Vec<(String, Place)> {
     let pairs = (scene.hinges.iter().map(|hinge| ("hinges", &hinge.name, &hinge.between)))
         .chain(scene.welds.iter().map(|weld| ("welds", &weld.name, &weld.between)))
         .chain(scene.springs.iter().map(|spring| ("springs", &spring.name, &spring.between)));

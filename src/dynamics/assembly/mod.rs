@@ -10,6 +10,7 @@
 //! Positions first, then rates.  Nothing is guessed twice: what the rows leave open must be given, and where
 //! other guesses lead to another start the scene has to say which.
 
+mod failure;
 mod newton;
 mod rank;
 mod slow;
@@ -24,6 +25,7 @@ use super::partition::CoordinatePartition;
 use super::{Mechanism, Motion};
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::scene::{Given, Scene};
+pub use failure::Closest;
 use newton::{Aim, Goal, KEPT, Problem};
 use serde::Serialize;
 use svd::{Matrix, independent};
@@ -32,7 +34,13 @@ use svd::{Matrix, independent};
 /// that is larger.
 const SAME: f64 = 1e-12;
 /// What is given may be off by this and still be taken as a rough guess \[rad, or sizes of the mechanism\].
-const REACH: f64 = 0.5;
+const REACH: f64 = 1.0;
+/// Beyond this the search begins elsewhere as well \[rad, or sizes of the mechanism\].
+const ROUGH: f64 = 0.1;
+/// How far off, as shares of half a turn or twice the size of the mechanism.
+const SPREADS: [f64; 4] = [0.1, 0.2, 0.4, 1.0];
+/// A start is the nearest where all others are farther from what is given by this factor.
+const CLEARLY: f64 = 1.25;
 /// Two starts that differ by less are the same \[rad, or sizes of the mechanism\].
 const DISTINCT: f64 = 1e-4;
 /// What is left of a measured row, once those before it are taken off, counts as zero below this.
@@ -97,8 +105,12 @@ struct Found {
     q: Vec<DoubleDouble>,
     /// The largest change of what is given, measured.
     change: f64,
+    /// The root of the sum of their squares: by which starts are compared.
+    distance: f64,
     /// The aims kept as given.
     held: Vec<bool>,
+    /// True where neighbours close the rows as well, as none of what is given could be kept.
+    is_of_family: bool,
 }
 
 impl Mechanism {
@@ -154,12 +166,18 @@ impl Mechanism {
         let given = |_: usize| Given { phi: false, omega: false, origin: None, velocity: None };
         let problem = Problem { aims: Vec::new(), ..Problem::new(self, scene, &[], &given) };
         let all: Vec<usize> = (0..start.len()).collect();
-        let mut found = vec![Found { q: start.clone(), change: 0.0, held: Vec::new() }];
+        let mut found = vec![Found {
+            q: start.clone(),
+            change: 0.0,
+            distance: 0.0,
+            held: Vec::new(),
+            is_of_family: false,
+        }];
         for k in 1..=guesses {
             let mut q = problem.other_guess(&start, &all, k);
             if problem.closes(&mut q, &[]) {
-                let other = Found { q, change: 0.0, held: Vec::new() };
-                if found.iter().all(|known| problem.check_same(known, &other).is_err()) {
+                let other = Found { q, change: 0.0, distance: 0.0, held: Vec::new(), is_of_family: false };
+                if found.iter().all(|known| problem.differs(known, &other).is_some()) {
                     found.push(other);
                 }
             }
@@ -247,43 +265,49 @@ impl<'a> Problem<'a> {
         if let (Ok(found), false) = (&first, missing.is_empty()) {
             self.check_open(&found.q, &self.active, &self.held(found), &missing, "phi")?;
         }
-        let others = match missing.len() {
-            0 => 0,
-            _ if guess.len() <= 20 => 24,
-            _ if guess.len() <= 60 => 8,
-            _ => 2,
-        };
-        let others: Vec<Found> = (1..=others)
-            .filter_map(|k| self.attempt(&self.other_guess(&guess, &missing, k), &missing).ok())
-            .collect();
-        let impossible = |(row, left): (usize, f64)| {
-            // Without rows it is the places given that rounding keeps from being met.
-            let (row, unit) =
-                self.mechanism.constraints.get(row).map_or(("start", "m"), |row| (&row.name, row.unit()));
-            CompileError::Impossible { row: row.into(), left, unit }
-        };
-        let (best, others) = match first {
-            Ok(found) => (found, others),
-            Err(worst) => {
-                let mut others = others.into_iter();
-                (others.next().ok_or_else(|| impossible(worst))?, others.collect())
+        let others = if missing.is_empty() { 0 } else { self.guesses() };
+        let mut tried: Vec<Result<Found, Vec<DoubleDouble>>> = vec![first];
+        tried.extend((1..=others).map(|k| self.attempt(&self.other_guess(&guess, &missing, k), &missing)));
+        if !tried.iter().flatten().any(|found| found.change <= ROUGH) {
+            // What is given may lead nowhere, or not to what is next to it: from elsewhere.
+            let every: Vec<usize> = (0..guess.len()).collect();
+            let begin = |k: usize| {
+                let mut other = self.other_guess(&guess, &every, k);
+                let share = SPREADS[k % SPREADS.len()];
+                other.iter_mut().zip(&guess).for_each(|(q, guess)| *q = *guess + (*q - *guess).scale(share));
+                other
+            };
+            // Of a family of positions the one next to the guesses is among those before.
+            let is_single = |one: &Result<Found, _>| !one.as_ref().is_ok_and(|found| found.is_of_family);
+            let more = (1..=self.guesses()).map(|k| self.near(begin(k), &guess, &missing));
+            tried.extend(more.filter(is_single));
+        }
+        let count = [tried.len(), tried.iter().flatten().count()];
+        let (mut all, mut open) = (Vec::new(), Vec::new());
+        for one in tried {
+            match one {
+                Ok(found) => all.push(found),
+                Err(q) => open.push(q),
             }
-        };
-        let mut all = vec![best];
-        all.extend(others);
-        let nearest = (1..all.len())
-            .fold(0, |best, k| if all[k].change < all[best].change * (1.0 - 1e-6) - SAME { k } else { best });
+        }
+        if all.is_empty() {
+            return Err(self.impossible(open, count));
+        }
+        let nearest = (1..all.len()).fold(0, |best, k| {
+            if all[k].distance < all[best].distance * (1.0 - 1e-6) - SAME { k } else { best }
+        });
         let mut best = all.swap_remove(nearest);
         if best.change > REACH {
-            let mut held = guess.clone();
-            self.position(&mut held, &self.active, &vec![true; self.aims.len()]);
-            return Err(impossible(self.worst(&held)));
+            return Err(self.far(&guess, &best, count));
         }
         if !missing.is_empty() {
             self.check_open(&best.q, &self.active, &self.held(&best), &missing, "phi")?;
         }
-        for other in all.iter().filter(|other| other.change <= (2.0 * best.change).max(DISTINCT)) {
-            self.check_same(&best, other)?;
+        // Where all is given, the nearest is what is meant.
+        if !missing.is_empty() {
+            let single = all.iter().filter(|other| !other.is_of_family);
+            let rivals = single.filter(|other| other.distance <= (CLEARLY * best.distance).max(DISTINCT));
+            self.check_alone(&best, rivals.collect())?;
         }
         for &k in missing.iter().filter(|&&k| k < self.mechanism.bodies.len()) {
             // The turn next to the guess.
@@ -291,6 +315,15 @@ impl<'a> Problem<'a> {
             best.q[k] -= DoubleDouble::TAU.scale(turns);
         }
         Ok(best)
+    }
+
+    /// Other guesses that are tried.
+    fn guesses(&self) -> usize {
+        match self.coordinates() {
+            0..=20 => 24,
+            21..=60 => 8,
+            _ => 2,
+        }
     }
 
     /// The aims kept as given.
@@ -317,8 +350,8 @@ impl<'a> Problem<'a> {
         other
     }
 
-    /// From a guess to a start that closes the rows; else the worst row and what is left of it.
-    fn attempt(&self, guess: &[DoubleDouble], missing: &[usize]) -> Result<Found, (usize, f64)> {
+    /// From a guess to a start that closes the rows; else how far it came.
+    fn attempt(&self, guess: &[DoubleDouble], missing: &[usize]) -> Result<Found, Vec<DoubleDouble>> {
         let (all, none) = (vec![true; self.aims.len()], vec![false; self.aims.len()]);
         let mut q = guess.to_vec();
         if self.closes(&mut q, &all) {
@@ -326,13 +359,25 @@ impl<'a> Problem<'a> {
             if self.finish(&mut q, &self.active, &all) > 1e-20 && q.len() <= DENSE {
                 self.finish(&mut q, &self.active, &none);
             }
-            return Ok(Found { q, change: 0.0, held: all });
+            return Ok(Found { q, change: 0.0, distance: 0.0, held: all, is_of_family: false });
         }
+        self.near(q, guess, missing)
+    }
+
+    /// From a position to a start that closes the rows and is as near to a guess as may be.
+    fn near(
+        &self,
+        mut q: Vec<DoubleDouble>,
+        guess: &[DoubleDouble],
+        missing: &[usize],
+    ) -> Result<Found, Vec<DoubleDouble>> {
+        let none = vec![false; self.aims.len()];
         if !self.closes(&mut q, &none) {
-            return Err(self.worst(&q));
+            return Err(q);
         }
-        let mut held = none;
+        let (mut held, mut is_of_family) = (none, false);
         if missing.is_empty() {
+            self.to_turns_of(&mut q, guess);
             self.nearest(&mut q, guess);
         } else {
             let kept = self.kept(&self.aims, &q, &self.active);
@@ -344,14 +389,25 @@ impl<'a> Problem<'a> {
             }
             if self.closes(&mut trial, &kept) {
                 (q, held) = (trial, kept);
+            } else {
+                is_of_family = kept.contains(&true);
             }
+            self.to_turns_of(&mut q, guess);
         }
-        let change = self
-            .measured(&q)
-            .zip(&self.aims)
-            .map(|(used, aim)| self.share(aim, used - aim.given).abs())
-            .fold(0.0, f64::max);
-        Ok(Found { q, change, held })
+        let measured = self.measured(&q).zip(&self.aims);
+        let off: Vec<f64> = measured.map(|(used, aim)| self.share(aim, used - aim.given).abs()).collect();
+        let distance = off.iter().fold(0.0, |sum, off| sum + off * off).sqrt();
+        Ok(Found { q, change: off.into_iter().fold(0.0, f64::max), distance, held, is_of_family })
+    }
+
+    /// Angles on the turn next to a guess.
+    fn to_turns_of(&self, q: &mut [DoubleDouble], guess: &[DoubleDouble]) {
+        if self.mechanism.is_winding() {
+            return;
+        }
+        for (q, guess) in q.iter_mut().zip(guess).take(self.mechanism.bodies.len()) {
+            *q -= DoubleDouble::TAU.scale(((*q - *guess).hi / std::f64::consts::TAU).round());
+        }
     }
 
     /// Closes the rows as far as double-double goes, with these aims held.
@@ -384,47 +440,6 @@ impl<'a> Problem<'a> {
     /// A change of an aim, measured.
     fn share(&self, aim: &Aim, change: f64) -> f64 {
         change / if aim.goal == Goal::Coordinate(aim.bar) { 1.0 } else { self.size }
-    }
-
-    /// Refuses a start of which neither rows nor what is given fix a coordinate, or its rate.
-    fn check_open(
-        &self,
-        q: &[DoubleDouble],
-        rows: &[bool],
-        aims: &[Aim],
-        missing: &[usize],
-        what: &str,
-    ) -> Result<(), CompileError> {
-        let mut matrix = self.jacobian(q, rows);
-        self.add_aims(&mut matrix, aims, q);
-        let open = matrix.svd().open(q.len(), DEPENDENT);
-        match missing.iter().copied().max_by(|&a, &b| open[a].total_cmp(&open[b])).filter(|&k| open[k] > 1e-6)
-        {
-            Some(k) => Err(CompileError::Undetermined(self.place(k, what))),
-            None => Ok(()),
-        }
-    }
-
-    /// Refuses a second start as near to what is given as the first.
-    fn check_same(&self, best: &Found, other: &Found) -> Result<(), CompileError> {
-        let bodies = self.mechanism.bodies.len();
-        let apart = |&k: &usize| {
-            let apart = other.q[k] - best.q[k];
-            if k < bodies { apart.reduced().0.hi.abs() } else { apart.hi.abs() / self.size }
-        };
-        let Some(k) =
-            (0..best.q.len()).max_by(|a, b| apart(a).total_cmp(&apart(b))).filter(|k| apart(k) > DISTINCT)
-        else {
-            return Ok(());
-        };
-        let shown = |q: &DoubleDouble| if k < bodies { q.reduced().0.hi } else { q.hi };
-        let unit = if k < bodies { "rad" } else { "m" };
-        Err(CompileError::Ambiguous {
-            what: self.place(k, "phi"),
-            one: shown(&best.q[k]),
-            other: shown(&other.q[k]),
-            unit,
-        })
     }
 
     /// Where a scene gives a coordinate or, where `what` is `omega`, its rate: `start.bar1.phi`.

@@ -122,20 +122,40 @@ impl<'a> AngleConstraints<'a> {
         start.into_iter().skip(1).map(|value| value.unwrap_or(0.0)).collect()
     }
 
-    /// Refuses a start of which nothing tells a part.
+    /// Refuses a start of which nothing tells a part; the hint names all such parts.
     fn known_whole(&self, scene: &Scene, root: &At, given: &[Option<GivenStart>]) -> Result<(), SceneError> {
+        let mut first = None;
+        let mut entries = Vec::new();
         for group in &self.groups {
-            let entries = || group.iter().filter_map(|&bar| given[bar].as_ref());
-            if entries().any(GivenStart::is_whole) {
+            let of = |&bar: &usize| given[bar].as_ref().map(|given| (bar, given));
+            if group.iter().filter_map(of).any(|(_, given)| given.is_whole()) {
                 continue;
             }
-            if let Some(entry) = entries().next() {
-                entry.fields.required(if entry.phi.is_none() { "phi" } else { "omega" })?;
-            }
+            let begun = group.iter().find_map(of);
             let free = group.iter().copied().min_by_key(|&bar| self.driven(bar)).unwrap_or(group[0]);
-            return Err(missing_start(root, &scene.bars[free].name, group.len() > 1));
+            let name = &scene.bars[begun.map_or(free, |(bar, _)| bar)].name;
+            let is_open =
+                |value: fn(&GivenStart) -> Option<f64>| begun.is_none_or(|(_, given)| value(given).is_none());
+            let open = [("phi", is_open(|given| given.phi)), ("omega", is_open(|given| given.omega))];
+            let keys: Vec<&str> = open.iter().filter(|(_, is_open)| *is_open).map(|(key, _)| *key).collect();
+            let values: Vec<String> = keys.iter().map(|key| format!("\"{key}\": 0")).collect();
+            entries.push(format!("\"{name}\": {{{}}}", values.join(", ")));
+            if first.is_none() {
+                first = Some(match begun {
+                    Some((_, given)) => given.fields.required(keys[0]).err(),
+                    None => Some(missing_start(root, name, group.len() > 1)),
+                });
+            }
         }
-        Ok(())
+        match first.flatten() {
+            Some(error) if entries.len() > 1 => Err(error.with_hint(format!(
+                "{} bars have no whole start; add \"start\": {{{}}}, with values for 0; only bars that a motor drives or a lock holds may be left out",
+                entries.len(),
+                entries.join(", ")
+            ))),
+            Some(error) => Err(error),
+            None => Ok(()),
+        }
     }
 }
 
