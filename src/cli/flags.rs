@@ -348,7 +348,7 @@ pub struct ModesFlags {
     /// Positions from which equilibria or periodic motions are looked for, beside the scene's start
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(0..=1_000_000))]
     pub starts: u32,
-    /// Look for motions of this period [s]; by default that of motors at a constant rate and of sines
+    /// Look for motions of this period in seconds; by default that of motors at a constant rate and of sines
     #[arg(long, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
     pub period: Option<f64>,
     /// Folder under which `SCENE/modes` is made
