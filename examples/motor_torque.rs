@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     })?;
     println!("largest torque {:.3} N m at {:.2} s; work done {:.4} J", peak[1], peak[0], outcome.last.work);
     let mechanism = Mechanism::new(&scene)?;
-    std::fs::write("output/motor_torque.png", draw(Chart::TorquePower, &scene, &mechanism, &outcome)?)?;
-    std::fs::write("output/motor_mechanism.png", draw(Chart::Mechanism, &scene, &mechanism, &outcome)?)?;
+    draw(Chart::TorquePower, &scene, &mechanism, &outcome)?.write("output/motor_torque.png".as_ref())?;
+    draw(Chart::Mechanism, &scene, &mechanism, &outcome)?.write("output/motor_mechanism.png".as_ref())?;
     Ok(())
 }

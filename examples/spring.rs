@@ -2,8 +2,9 @@
 //!
 //! `cargo run --example spring` writes `output/spring_mechanism.png` and `output/spring.gif`.
 
+use driftless::chart::motion_gif;
 use driftless::dynamics::Mechanism;
-use driftless::report::charts::{Chart, draw};
+use driftless::report::charts::{Chart, draw, motion};
 use driftless::run::{MethodId, Request, simulate};
 use driftless::scene::read_scene;
 
@@ -15,7 +16,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let outcome = simulate(&scene, &request, &mut |_| Ok(()))?;
     println!("energy drifted by {:.1e} of its scale", outcome.drift.energy.max);
     let mechanism = Mechanism::new(&scene)?;
-    std::fs::write("output/spring_mechanism.png", draw(Chart::Mechanism, &scene, &mechanism, &outcome)?)?;
-    std::fs::write("output/spring.gif", draw(Chart::Motion, &scene, &mechanism, &outcome)?)?;
+    draw(Chart::Mechanism, &scene, &mechanism, &outcome)?.write("output/spring_mechanism.png".as_ref())?;
+    motion_gif(&motion(&scene, &mechanism, &outcome))?.write("output/spring.gif".as_ref())?;
     Ok(())
 }

@@ -14,9 +14,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let outcome = simulate(&scene, &request, &mut |_| Ok(()))?;
     println!("{} steps, {} evaluations", outcome.statistics.steps, outcome.statistics.evaluations);
     println!("energy drifted by {:.1e} of its scale", outcome.drift.energy.max);
-    std::fs::write(
-        "output/free_angles.png",
-        draw(Chart::Angles, &scene, &Mechanism::new(&scene)?, &outcome)?,
-    )?;
+    draw(Chart::Angles, &scene, &Mechanism::new(&scene)?, &outcome)?
+        .write("output/free_angles.png".as_ref())?;
     Ok(())
 }

@@ -19,10 +19,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             first.impulse, first.energy_lost, outcome.impact_count, outcome.last.t, outcome.drift.energy.max
         );
         if restitution == 0.5 {
-            std::fs::write(
-                "output/wall.png",
-                draw(Chart::Mechanism, &scene, &Mechanism::new(&scene)?, &outcome)?,
-            )?;
+            draw(Chart::Mechanism, &scene, &Mechanism::new(&scene)?, &outcome)?
+                .write("output/wall.png".as_ref())?;
         }
     }
     Ok(())

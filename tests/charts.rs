@@ -73,6 +73,7 @@ fn pendulum() -> MechanismChart {
         sketch: sketch(),
         poses: vec![pose([0.4, 0.2], 1.0), pose([0.7, -0.3], 1.0)],
         trails: vec![trail],
+        names: words(&["C"]),
         horizon: None,
     }
 }
@@ -135,6 +136,7 @@ fn gallery() -> Vec<(&'static str, Picture)> {
         caption: words(&["scene chain"]),
         time: time.clone(),
         series: (0..count).map(|k| AngleSeries { name: format!("bar {k}"), angle: wave(k) }).collect(),
+        travels: Vec::new(),
         horizon: None,
     };
     let energy = |log_time: bool| EnergyDrift {
@@ -563,6 +565,183 @@ fn the_animation_runs_for_ever_and_repeats_only_what_changes() {
     }
     assert_eq!((count, first), (12, 420 * 432));
     assert_eq!(decoder.repeat(), gif::Repeat::Infinite);
+}
+
+#[test]
+fn the_animated_png_draws_again_only_what_changes_and_comes_back_to_it() {
+    let poses: Vec<Pose> = [0.3, 1.1, 0.3].map(|t: f64| pose([t.cos(), 2.0 * t.sin()], 1.0)).into();
+    let animation =
+        motion_apng(&MotionGif { sketch: sketch(), poses, delay: 4, ..MotionGif::default() }).unwrap();
+    let (wide, high) = (animation.width as usize, animation.height as usize);
+    assert_eq!((wide % 2, high % 2), (0, 0), "films want even numbers");
+    let mut reader = png::Decoder::new(std::io::Cursor::new(&animation.bytes)).read_info().unwrap();
+    let control = reader.info().animation_control.unwrap();
+    assert_eq!((control.num_frames, control.num_plays), (3, 0));
+    let (mut page, mut pages) = (vec![0; 3 * wide * high], Vec::new());
+    let mut buffer = page.clone();
+    for k in 0..3 {
+        reader.next_frame(&mut buffer).unwrap();
+        let frame = *reader.info().frame_control().unwrap();
+        assert_eq!((frame.delay_num, frame.delay_den), (4, 100));
+        let [left, top, w, h] =
+            [frame.x_offset, frame.y_offset, frame.width, frame.height].map(|x| x as usize);
+        assert!((k == 0) == (w * h == wide * high), "only a part is drawn again");
+        for row in 0..h {
+            let to = 3 * ((top + row) * wide + left);
+            page[to..to + 3 * w].copy_from_slice(&buffer[3 * row * w..3 * (row + 1) * w]);
+        }
+        pages.push(page.clone());
+    }
+    assert!(pages[0] == pages[2] && pages[0] != pages[1]);
+}
+
+/// The words of a picture without markup, in their order.
+fn said(picture: &Picture) -> Vec<String> {
+    picture.texts.iter().map(|text| unmarked(&text.text)).filter(|text| !text.trim().is_empty()).collect()
+}
+
+#[test]
+fn an_svg_file_has_the_page_the_words_and_the_lines() {
+    for (name, picture) in gallery() {
+        let text = String::from_utf8(picture.bytes(Format::Svg).unwrap()).unwrap();
+        let document = roxmltree::Document::parse(&text).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let root = document.root_element();
+        let page: Vec<f64> =
+            root.attribute("viewBox").unwrap().split(' ').map(|x| x.parse().unwrap()).collect();
+        let pixels = [page[2], page[3]].map(|side| (side * picture.px_per_pt).round() as u32);
+        for (side, pixels) in [picture.width, picture.height].iter().zip(pixels) {
+            assert!(side.abs_diff(pixels) <= 1, "{name}: {side} and {pixels}");
+        }
+        let labels = document.descendants().filter_map(|node| node.attribute("aria-label"));
+        assert_eq!(labels.map(str::to_owned).collect::<Vec<_>>(), said(&picture), "{name}");
+        let title = root.children().find(|node| node.has_tag_name("title")).and_then(|node| node.text());
+        assert_eq!(title.unwrap_or_default(), picture.title, "{name}");
+        // Every number of every path lies on the page, or not far off it.
+        for path in document.descendants().filter_map(|node| node.attribute("d")) {
+            let numbers = path.split(|c: char| c.is_ascii_alphabetic() || c == ' ').filter(|x| !x.is_empty());
+            for number in numbers.map(|x| x.parse::<f64>().unwrap_or_else(|_| panic!("{name}: {x}"))) {
+                assert!((-60.0..=page[2].max(page[3]) + 60.0).contains(&number), "{name}: {number}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_pdf_file_has_one_page_whose_content_can_be_read() {
+    use std::io::Read;
+    let at = |bytes: &[u8], what: &[u8]| bytes.windows(what.len()).position(|part| part == what);
+    for (name, picture) in gallery() {
+        let file = picture.bytes(Format::Pdf).unwrap();
+        assert!(file.starts_with(b"%PDF-1.") && file.ends_with(b"%%EOF"), "{name}");
+        let text = String::from_utf8_lossy(&file).into_owned();
+        // The table of objects is where the end of the file says, and names places where objects begin.
+        let table: usize = text.rsplit("startxref").next().unwrap().lines().nth(1).unwrap().parse().unwrap();
+        assert!(file[table..].starts_with(b"xref"), "{name}");
+        let entries = String::from_utf8_lossy(&file[table..]).into_owned();
+        let places = entries.lines().filter(|line| line.trim_end().ends_with(" n"));
+        for place in places.map(|line| line[..10].parse::<usize>().unwrap()) {
+            let begin = String::from_utf8_lossy(&file[place..place + 12]).into_owned();
+            assert!(begin.contains(" 0 obj"), "{name}: {begin}");
+        }
+        let page = text.split("/MediaBox [").nth(1).unwrap().split(']').next().unwrap();
+        let page: Vec<f64> = page.split_whitespace().map(|x| x.parse().unwrap()).collect();
+        assert!((page[2] * picture.px_per_pt - f64::from(picture.width)).abs() < 1.0, "{name}: {page:?}");
+        // The last stream is the content.
+        let last = text.matches("stream\n").count();
+        assert!(last > 0, "{name}");
+        let mut rest = &file[..];
+        let mut content = Vec::new();
+        while let Some(begin) = at(rest, b"\nstream\n") {
+            let data = &rest[begin + 8..];
+            let end = at(data, b"\nendstream").unwrap();
+            content.clear();
+            flate2::read::ZlibDecoder::new(&data[..end]).read_to_end(&mut content).unwrap();
+            rest = &data[end..];
+        }
+        let content = String::from_utf8(content).unwrap();
+        let count = |operator: &str| {
+            content.lines().filter(|line| line.split(' ').any(|word| word == operator)).count()
+        };
+        assert!(count("f") >= said(&picture).len(), "{name}: every word is filled");
+        assert_eq!(count("q"), count("Q"), "{name}");
+    }
+}
+
+#[test]
+fn a_file_name_without_a_known_format_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = mechanism(&pendulum(), 1.0).unwrap();
+    for name in ["start.jpg", "start"] {
+        let error = picture.write(&folder.path().join(name)).unwrap_err().to_string();
+        assert!(error.contains(name) && error.contains(".png, .svg or .pdf"), "{error}");
+    }
+    picture.write(&folder.path().join("start.SVG")).unwrap();
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn a_wall_keeps_its_hatching_where_earlier_poses_cross_it() {
+    let mut chart = pendulum();
+    chart.sketch.walls = vec![WallSketch { through: [0.3, 0.0], normal: [-1.0, 0.0] }];
+    let dark = |chart: &MechanismChart| {
+        let picture = mechanism(chart, 2.0).unwrap();
+        let ink = |p: &&[u8; 3]| p.iter().all(|&part| part < 70);
+        picture.rgb.as_chunks::<3>().0.iter().filter(ink).count()
+    };
+    let with = dark(&chart);
+    // The same view without the earlier pose; what it covered would be missing.
+    let ghost = chart.poses.remove(0);
+    chart.trails.push(ghost.bars.iter().flatten().copied().chain(ghost.hinges).collect());
+    chart.trails[1].truncate(0);
+    let without = dark(&chart);
+    assert!(with as f64 > 0.97 * without as f64, "{with} of {without} dark pixels");
+}
+
+#[test]
+fn bars_that_wind_up_do_not_flatten_the_others() {
+    let time = times(400, 0.01);
+    let swing = |k: usize| AngleSeries {
+        name: format!("bar{k}"),
+        angle: time.iter().map(|t| (3.0 * t + k as f64).sin()).collect(),
+    };
+    let mut series: Vec<AngleSeries> = (0..4).map(swing).collect();
+    series.push(AngleSeries { name: "crank".to_owned(), angle: time.iter().map(|t| 50.0 * t).collect() });
+    let travels =
+        vec![AngleSeries { name: "cart".to_owned(), angle: time.iter().map(|t| 0.1 * t.cos()).collect() }];
+    let chart = Angles { time: time.clone(), series, travels, ..Angles::default() };
+    let picture = angles(&chart, 1.0).unwrap();
+    assert_eq!(picture.panels.len(), 3);
+    for words in ["angle [rad]", "crank [turns]", "cart [m]"] {
+        assert!(said(&picture).contains(&words.to_owned()), "{words}: {:?}", said(&picture));
+    }
+}
+
+#[test]
+fn settings_below_the_floor_are_not_told_apart() {
+    let series = |method: &str, points: Vec<[f64; 2]>| WorkSeries {
+        method: method.to_owned(),
+        name: method.to_owned(),
+        points,
+    };
+    let chart = WorkPrecision {
+        series: vec![
+            series("taylor", vec![[1.0, 1e-8], [2.0, 3e-16]]),
+            series("gauss16", vec![[300.0, 1e-16]]),
+        ],
+        floor: Some((1e-15, "rounding".to_owned())),
+        ..WorkPrecision::default()
+    };
+    // The slow method stands at the right edge; the pale band of the front does not reach there.
+    let band = |chart: &WorkPrecision| {
+        let picture = work_precision(chart, 1.0).unwrap();
+        let [left, _, right, _] = picture.panels[0];
+        let middle = (0.5 * (left + right)) as usize;
+        let wide = picture.width as usize;
+        let pale = |p: &[u8; 3]| p[0] > 240 && p[2] < 215 && p[0] > p[2] + 30;
+        (0..picture.height as usize).any(|y| pale(&picture.rgb.as_chunks::<3>().0[y * wide + middle]))
+    };
+    assert!(!band(&chart));
+    assert!(band(&WorkPrecision { floor: None, ..chart }));
 }
 
 #[test]

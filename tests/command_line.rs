@@ -307,6 +307,47 @@ fn a_start_is_drawn_and_so_is_what_comes_closest() {
 }
 
 #[test]
+fn charts_come_in_the_formats_and_of_the_columns_and_window_asked_for() {
+    let program = Program::with_scenes(&["slider_crank_driven", "motor"]);
+    program
+        .run("run slider_crank_driven.json --chart-format svg,pdf --chart block.x,motor.torque --window 0.02..0.06 --gif --apng --out o -q")
+        .exits(0);
+    let files = program.files();
+    let of = |ending: &str| files.iter().filter(|file| file.ends_with(ending)).count();
+    // mechanism, angles, energy_drift, constraint_drift, torque_power, columns
+    assert_eq!([".svg", ".pdf", ".png", ".gif", ".apng"].map(of), [6, 6, 0, 1, 1], "{files:?}");
+    let read = |name: &str| {
+        let file = files.iter().find(|file| file.ends_with(name)).expect("a chart");
+        std::fs::read_to_string(program.path(file)).expect("text")
+    };
+    let columns = read("columns.svg");
+    for words in ["block.x [m]", "motor.torque [N·m]", "0.02 s to 0.06 s of 0.1 s"] {
+        assert!(columns.contains(words), "{words}");
+    }
+    for words in ["slider [m]", "at a constant angle: block", "crank [rad]"] {
+        assert!(read("angles.svg").contains(words), "{words}");
+    }
+    // A second run leaves nothing of the first.
+    program.run("run slider_crank_driven.json --no-charts --out o --force -q").exits(0);
+    let left = program.files().into_iter().filter(|file| file.starts_with("o/") && !file.ends_with(".json"));
+    assert_eq!(left.filter(|file| !file.ends_with(".csv")).count(), 0);
+    // What is kept exactly has no chart of its drift.
+    let ran = program.run("run motor.json --until 1 --out e").exits(0);
+    assert!(ran.stdout.contains("motor: 0 rad and 0 rad/s at most"), "{}", ran.stdout);
+    assert!(!program.files().iter().any(|file| file.starts_with("e/") && file.contains("constraint_drift")));
+    for (flags, words) in [
+        ("--chart bar1.q", vec!["no column `bar1.q`", "did you mean `bar1."]),
+        ("--chart-format bmp", vec!["bmp", "svg"]),
+        ("--window 2..1", vec!["FROM..TO"]),
+        ("--window 600..700", vec!["0 rows", "the run ends at 500 s"]),
+        ("--window 1.001..1.002", vec!["rows of the trajectory", "--every 1.00e-5"]),
+    ] {
+        program.run(&format!("run motor.json {flags} --out f")).exits(2).says(&words);
+    }
+    assert!(!program.files().iter().any(|file| file.starts_with("f/")));
+}
+
+#[test]
 fn modes_leave_a_record_and_charts() {
     let program = Program::with_scenes(&["free", "motor"]);
     let object = program.run("modes free.json --json --gif").exits(0).object();

@@ -550,14 +550,7 @@ fn charts_are_drawn_for_what_the_scene_has() {
     assert_eq!(pictures("a/"), ["angles.png", "energy_drift.png", "mechanism.png"]);
     assert_eq!(
         pictures("b/"),
-        [
-            "angles.png",
-            "constraint_drift.png",
-            "energy_drift.png",
-            "mechanism.gif",
-            "mechanism.png",
-            "torque_power.png"
-        ]
+        ["angles.png", "energy_drift.png", "mechanism.gif", "mechanism.png", "torque_power.png"]
     );
     assert!(pictures("c/").is_empty());
     let read = |file: &str| {

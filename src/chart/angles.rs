@@ -10,6 +10,12 @@ use super::ticks::figure;
 use super::{ChartError, PAGE};
 use std::f64::consts::{PI, TAU};
 
+/// Bars that have panels of their own.
+const APART: usize = 3;
+/// How many times further a bar goes than the one that goes least, or than half a turn, if it winds up.
+const RAMP: f64 = 8.0;
+/// What a third and each further panel adds to the height of the page \[pt\].
+const HIGHER: f64 = 80.0;
 /// From this spread on angles are told in turns \[rad\].
 const TURNS_FROM: f64 = 40.0 * PI;
 
@@ -22,7 +28,7 @@ pub struct AngleSeries {
     pub angle: Vec<f64>,
 }
 
-/// Angles of bars.
+/// Angles of bars, and travels of sliders.
 #[derive(Clone, Debug, Default)]
 pub struct Angles {
     /// Title, with markup.
@@ -33,54 +39,88 @@ pub struct Angles {
     pub time: Vec<f64>,
     /// The bars.
     pub series: Vec<AngleSeries>,
-    /// The time from which on the angles are pale: the horizon up to which they can be trusted \[s\].
+    /// Sliders, with their travels \[m\] in place of angles.
+    pub travels: Vec<AngleSeries>,
+    /// The time from which on the curves are pale: the horizon up to which they can be trusted \[s\].
     pub horizon: Option<f64>,
 }
 
-/// Draws up to three bars in panels of their own, more of them in one panel.
+/// What one panel shows.
+struct Group<'a> {
+    series: Vec<&'a AngleSeries>,
+    /// What its values are divided by, and the unit that makes.
+    scale: f64,
+    unit: &'static str,
+    /// Name of its axis where it shows several.
+    name: &'static str,
+}
+
+impl Group<'_> {
+    fn axis(&self, lines: &[Vec<Point>]) -> Axis {
+        let name = match &self.series[..] {
+            [only] => format!("{} [{}]", only.name, self.unit),
+            _ => format!("{} [{}]", self.name, self.unit),
+        };
+        let values = lines.iter().flatten().map(|p| p[1]);
+        if self.unit == "rad" { Axis::angle(&name, values) } else { Axis::fit(&name, values) }
+    }
+}
+
+/// Largest less least of all values.
+fn spread(series: &[&AngleSeries]) -> f64 {
+    let finite = || series.iter().flat_map(|s| &s.angle).copied().filter(|a| a.abs() <= 1e300);
+    finite().fold(f64::NEG_INFINITY, f64::max) - finite().fold(f64::INFINITY, f64::min)
+}
+
+/// Up to three bars have panels of their own; of more, those that wind up do not flatten those that swing.
+fn groups(chart: &Angles) -> Vec<Group<'_>> {
+    let mut panels: Vec<Vec<&AngleSeries>> = match chart.series.len() {
+        0 => Vec::new(),
+        1..=APART => chart.series.iter().map(|series| vec![series]).collect(),
+        _ => {
+            let mut spreads: Vec<f64> = chart.series.iter().map(|series| spread(&[series])).collect();
+            spreads.sort_by(f64::total_cmp);
+            let least = spreads[0].max(PI);
+            let (winding, swinging): (Vec<_>, Vec<_>) =
+                chart.series.iter().partition(|series| spread(&[series]) > RAMP * least);
+            [swinging, winding].into_iter().filter(|group| !group.is_empty()).collect()
+        }
+    };
+    if panels.is_empty() && chart.travels.is_empty() {
+        panels.push(Vec::new());
+    }
+    let angles = panels.into_iter().map(|series| {
+        let (scale, unit) = if spread(&series) > TURNS_FROM { (TAU, "turns") } else { (1.0, "rad") };
+        Group { series, scale, unit, name: "angle" }
+    });
+    let mut groups: Vec<Group> = angles.collect();
+    if !chart.travels.is_empty() {
+        groups.push(Group { series: chart.travels.iter().collect(), scale: 1.0, unit: "m", name: "travel" });
+    }
+    groups
+}
+
+/// Draws up to three bars in panels of their own, more of them in one panel, or two where some wind up; and
+/// travels below.
 ///
-/// Ticks are multiples of π, or turns when a bar winds up.  Where an angle oscillates faster than paper
+/// Ticks are multiples of π, or turns when a bar winds up.  Where a curve oscillates faster than paper
 /// shows, the band between its extremes is drawn and the caption says so.
 ///
 /// # Errors
 /// [`ChartError`] if the resolution is out of range or drawing fails.
 pub fn angles(chart: &Angles, px_per_pt: f64) -> Result<Picture, ChartError> {
-    let apart = (1..=3).contains(&chart.series.len());
-    let size = [PAGE[0], if chart.series.len() == 3 { 380.0 } else { PAGE[1] }];
-    let spread = |lines: &[&AngleSeries]| {
-        let finite = || lines.iter().flat_map(|s| &s.angle).copied().filter(|a| a.abs() <= 1e300);
-        finite().fold(f64::NEG_INFINITY, f64::max) - finite().fold(f64::INFINITY, f64::min)
-    };
-    let groups: Vec<Vec<&AngleSeries>> = if apart {
-        chart.series.iter().map(|s| vec![s]).collect()
-    } else {
-        vec![chart.series.iter().collect()]
-    };
-    let units: Vec<f64> =
-        groups.iter().map(|group| if spread(group) > TURNS_FROM { TAU } else { 1.0 }).collect();
-    let line = |series: &AngleSeries, unit: f64| -> Vec<Point> {
-        chart.time.iter().zip(&series.angle).map(|(&t, &a)| [t, a / unit]).collect()
-    };
-    let lines: Vec<Vec<Vec<Point>>> = groups
-        .iter()
-        .zip(&units)
-        .map(|(group, &unit)| group.iter().map(|s| line(s, unit)).collect())
+    let groups = groups(chart);
+    let size = [PAGE[0], PAGE[1] + HIGHER * groups.len().saturating_sub(2) as f64];
+    let lines: Vec<Vec<Vec<Point>>> = (groups.iter())
+        .map(|group| {
+            let line = |series: &&AngleSeries| {
+                chart.time.iter().zip(&series.angle).map(|(&t, &a)| [t, a / group.scale]).collect()
+            };
+            group.series.iter().map(line).collect()
+        })
         .collect();
-
     let x = Axis::tight("time [s]", chart.time.iter().copied());
-    let ys = || -> Vec<Axis> {
-        let name = |k: usize| if apart { groups[k][0].name.clone() } else { "angle".to_owned() };
-        let values = |k: usize| lines[k].iter().flatten().map(|p| p[1]);
-        (0..groups.len())
-            .map(|k| {
-                if units[k] == 1.0 {
-                    Axis::angle(&format!("{} [rad]", name(k)), values(k))
-                } else {
-                    Axis::fit(&format!("{} [turns]", name(k)), values(k))
-                }
-            })
-            .collect()
-    };
+    let ys = || groups.iter().zip(&lines).map(|(group, lines)| group.axis(lines)).collect::<Vec<Axis>>();
     let mut caption = chart.caption.clone();
     let crowded = {
         let trial = Sheet::new(size, 0.5)?;
@@ -88,23 +128,25 @@ pub fn angles(chart: &Angles, px_per_pt: f64) -> Result<Picture, ChartError> {
         panels.iter().zip(&lines).any(|(panel, lines)| lines.iter().any(|line| panel.crowded(line)))
     };
     if crowded {
-        caption.push("bands between the extremes where the angle oscillates too fast to be drawn".to_owned());
+        caption.push("bands between the extremes of what oscillates too fast to be drawn".to_owned());
     }
     let sheet = Sheet::new(size, px_per_pt)?;
     let under = sheet.heading(&chart.title, &caption)?;
-    let labels: Vec<String> = chart.series.iter().map(|series| shortened(&sheet, &series.name)).collect();
-    let right = if apart { 20.0 } else { label_room(&sheet, labels.iter().map(String::as_str), false) };
-    let marks = marks(chart.series.iter().map(|series| series.name.as_str()));
+    let shared = groups.iter().filter(|group| group.series.len() > 1);
+    let labels: Vec<String> =
+        shared.flat_map(|group| &group.series).map(|series| shortened(&sheet, &series.name)).collect();
+    let right = label_room(&sheet, labels.iter().map(String::as_str), false);
+    let names = groups.iter().flat_map(|group| &group.series).map(|series| series.name.as_str());
+    let mut marks = marks(names).into_iter();
     let panels = stacked(&sheet, under, &x, ys(), right)?;
     let label = chart.horizon.map(|horizon| format!("{} s", figure(horizon)));
-    for (k, (panel, lines)) in panels.iter().zip(&lines).enumerate() {
+    for (k, (panel, (group, lines))) in panels.iter().zip(groups.iter().zip(&lines)).enumerate() {
         let mut ends = Vec::new();
-        for (i, line) in lines.iter().enumerate() {
-            let mark = marks[if apart { k } else { i }];
-            let pieces =
-                panel.trusted(line, mark.colour, if lines.len() > 3 { 1.4 } else { 1.6 }, chart.horizon)?;
-            if let (false, Some(end)) = (apart, pieces.last().and_then(|piece| piece.last())) {
-                ends.push((end[1], labels[i].clone(), mark));
+        for (line, (series, mark)) in lines.iter().zip(group.series.iter().zip(marks.by_ref())) {
+            let width = if lines.len() > APART { 1.4 } else { 1.6 };
+            let pieces = panel.trusted(line, mark.colour, width, chart.horizon)?;
+            if let (true, Some(end)) = (lines.len() > 1, pieces.last().and_then(|piece| piece.last())) {
+                ends.push((end[1], shortened(&sheet, &series.name), mark));
             }
         }
         if lines.iter().flatten().all(|p| !p[1].is_finite() || !p[0].is_finite()) {

@@ -6,8 +6,9 @@
 //! and curves stay fine.
 
 use super::ChartError;
+use super::mark::{Drawing, Mark, scaled};
 use super::palette::{Colour, WHITE};
-use super::text::{Align, CAP_HEIGHT, Fonts, Lettering, Level, TextBox};
+use super::text::{Align, CAP_HEIGHT, Fonts, Lettering, Level, TextBox, unmarked};
 use plotters::style::FontTransform;
 use plotters::style::text_anchor::{HPos, VPos};
 use plotters_backend::{
@@ -24,11 +25,13 @@ pub(crate) const UNITS: f64 = 100.0;
 /// White rim of words that lie on lines \[pt\].
 const HALO: f64 = 1.2;
 
-/// A page of pixels.
+/// Least distance of two points of a line \[pt\]: nearer ones add joints, not shape.
+const NEAR: f64 = 1.0 / 16.0;
+
+/// A page: its marks, and the same as pixels.
 pub(crate) struct Canvas {
     pixels: Pixmap,
-    /// Width and height \[pt\].
-    size: [f64; 2],
+    drawing: Drawing,
     /// Pixels per point.
     scale: f64,
     fonts: Fonts,
@@ -45,7 +48,8 @@ impl Canvas {
         let mut pixels =
             Pixmap::new(side(size[0]), side(size[1])).ok_or(ChartError::Resolution { px_per_pt })?;
         pixels.fill(Color::WHITE);
-        Ok(Canvas { pixels, size, scale: px_per_pt, fonts: Fonts::new()?, texts: Vec::new() })
+        let drawing = Drawing { size, marks: Vec::new() };
+        Ok(Canvas { pixels, drawing, scale: px_per_pt, fonts: Fonts::new()?, texts: Vec::new() })
     }
 
     /// Width and height \[px\].
@@ -64,8 +68,10 @@ impl Canvas {
             .collect()
     }
 
-    /// Copies a picture drawn before; sizes must agree.
+    /// Copies pixels painted before, and forgets what was drawn; sizes must agree.
     pub(crate) fn restore(&mut self, rgb: &[u8]) {
+        self.drawing.marks.clear();
+        self.texts.clear();
         for (to, from) in self.pixels.data_mut().as_chunks_mut::<4>().0.iter_mut().zip(rgb.as_chunks::<3>().0)
         {
             to[..3].copy_from_slice(from);
@@ -79,20 +85,27 @@ impl Canvas {
         size: (usize, usize),
         colour: impl Fn(usize, usize) -> Colour,
     ) {
-        let (width, height) = (self.pixels.width() as usize, self.pixels.height() as usize);
-        let [left, top] = at.map(|points| (points * self.scale).round().max(0.0) as usize);
-        let pixels = self.pixels.data_mut().as_chunks_mut::<4>().0;
-        for row in 0..size.1.min(height.saturating_sub(top)) {
-            for column in 0..size.0.min(width.saturating_sub(left)) {
-                let Colour { 0: red, 1: green, 2: blue } = colour(column, row);
-                pixels[(top + row) * width + left + column] = [red, green, blue, 255];
-            }
-        }
+        let places = (0..size.1).flat_map(|row| (0..size.0).map(move |column| (column, row)));
+        let rgb = places.flat_map(|(column, row)| {
+            let Colour { 0: red, 1: green, 2: blue } = colour(column, row);
+            [red, green, blue]
+        });
+        self.add(Mark::Raster {
+            at,
+            size: [size.0 as f64 / self.scale, size.1 as f64 / self.scale],
+            pixels: [size.0, size.1],
+            rgb: rgb.collect(),
+        });
     }
 
     /// The words drawn so far.
     pub(crate) fn texts(&self) -> &[TextBox] {
         &self.texts
+    }
+
+    /// What was drawn so far.
+    pub(crate) fn drawing(&self) -> &Drawing {
+        &self.drawing
     }
 
     pub(crate) fn fonts(&self) -> &Fonts {
@@ -126,99 +139,131 @@ impl Canvas {
             corners,
             colour: [style.colour.0, style.colour.1, style.colour.2],
         });
-        let Some(outline) = outline else { return };
-        let origin = turn(left, down);
-        let k = self.scale;
-        let place = Transform::from_row(
-            (k * cos) as f32,
-            (k * sin) as f32,
-            (-k * sin) as f32,
-            (k * cos) as f32,
-            (k * origin[0]) as f32,
-            (k * origin[1]) as f32,
-        );
-        if style.halo {
-            let rim = Stroke { width: 2.0 * HALO as f32, line_join: LineJoin::Round, ..Stroke::default() };
-            self.pixels.stroke_path(&outline, &paint(WHITE, 1.0), &rim, place, None);
-        }
-        self.pixels.fill_path(&outline, &paint(style.colour, 1.0), FillRule::Winding, place, None);
-    }
-
-    /// Pixels from backend units.
-    fn px(&self, units: f64) -> f32 {
-        (units / UNITS * self.scale) as f32
-    }
-
-    fn place(&self, (x, y): BackendCoord) -> (f32, f32) {
-        (self.px(f64::from(x)), self.px(f64::from(y)))
-    }
-
-    fn fill(&mut self, path: Option<Path>, colour: BackendColor) {
-        if let Some(path) = path {
-            self.pixels.fill_path(
-                &path,
-                &backend_paint(colour),
-                FillRule::Winding,
-                Transform::identity(),
-                None,
-            );
+        let [x, y] = turn(left, down).map(|c| c as f32);
+        let place = Transform::from_row(cos as f32, sin as f32, -sin as f32, cos as f32, x, y);
+        if let Some(path) = outline.and_then(|outline| outline.transform(place)) {
+            let halo = if style.halo { HALO } else { 0.0 };
+            self.add(Mark::Words { text: unmarked(text), path, colour: style.colour, halo });
         }
     }
 
-    fn stroke(&mut self, path: Option<Path>, colour: BackendColor, width: u32, cap: LineCap) {
-        if let Some(path) = path {
-            let stroke = Stroke {
-                width: self.px(f64::from(width)),
-                line_cap: cap,
-                line_join: LineJoin::Round,
-                ..Stroke::default()
-            };
-            self.pixels.stroke_path(&path, &backend_paint(colour), &stroke, Transform::identity(), None);
+    /// Takes a mark, and paints it.
+    fn add(&mut self, mark: Mark) {
+        self.paint(&mark);
+        self.drawing.marks.push(mark);
+    }
+
+    fn paint(&mut self, mark: &Mark) {
+        let whole = Transform::identity();
+        let stroke = |width: f64, round: bool| Stroke {
+            width: (width * self.scale) as f32,
+            line_cap: if round { LineCap::Round } else { LineCap::Butt },
+            line_join: LineJoin::Round,
+            ..Stroke::default()
+        };
+        match mark {
+            Mark::Fill { path, colour, opacity } => {
+                if let Some(path) = scaled(path, self.scale) {
+                    self.pixels.fill_path(&path, &paint(*colour, *opacity), FillRule::Winding, whole, None);
+                }
+            }
+            Mark::Stroke { path, colour, opacity, width, round } => {
+                if let Some(path) = scaled(path, self.scale) {
+                    let stroke = stroke(*width, *round);
+                    self.pixels.stroke_path(&path, &paint(*colour, *opacity), &stroke, whole, None);
+                }
+            }
+            Mark::Rule { from, to, colour, opacity, width } => {
+                if let Some(rect) = self.rule(*from, *to, *width) {
+                    let path = PathBuilder::from_rect(rect);
+                    self.pixels.fill_path(&path, &paint(*colour, *opacity), FillRule::Winding, whole, None);
+                }
+            }
+            Mark::Words { path, colour, halo, .. } => {
+                let Some(path) = scaled(path, self.scale) else { return };
+                if *halo > 0.0 {
+                    let rim = stroke(2.0 * halo, false);
+                    self.pixels.stroke_path(&path, &paint(WHITE, 1.0), &rim, whole, None);
+                }
+                self.pixels.fill_path(&path, &paint(*colour, 1.0), FillRule::Winding, whole, None);
+            }
+            Mark::Raster { at, pixels, rgb, .. } => self.blit(*at, *pixels, rgb),
         }
     }
 
-    /// A horizontal or vertical line: whole pixels and flat ends keep grids crisp.
-    fn rule(&mut self, (from, to): (BackendCoord, BackendCoord), colour: BackendColor, width: u32) {
-        let ((x0, y0), (x1, y1)) = (self.place(from), self.place(to));
-        let width = self.px(f64::from(width)).round().max(1.0);
+    /// Copies pixels, their upper left corner at `at` \[pt\].
+    fn blit(&mut self, at: [f64; 2], [wide, high]: [usize; 2], rgb: &[u8]) {
+        let (width, height) = (self.pixels.width() as usize, self.pixels.height() as usize);
+        let [left, top] = at.map(|points| (points * self.scale).round().max(0.0) as usize);
+        let to = self.pixels.data_mut().as_chunks_mut::<4>().0;
+        let from = rgb.as_chunks::<3>().0;
+        for row in 0..high.min(height.saturating_sub(top)) {
+            for column in 0..wide.min(width.saturating_sub(left)) {
+                let [red, green, blue] = from[row * wide + column];
+                to[(top + row) * width + left + column] = [red, green, blue, 255];
+            }
+        }
+    }
+
+    /// The whole pixels of a horizontal or vertical line, which keep grids crisp.
+    fn rule(&self, from: [f64; 2], to: [f64; 2], width: f64) -> Option<Rect> {
+        let ([x0, y0], [x1, y1]) =
+            (from.map(|c| (c * self.scale) as f32), to.map(|c| (c * self.scale) as f32));
+        let width = ((width * self.scale) as f32).round().max(1.0);
         let odd = width % 2.0 == 1.0;
         let snap = |middle: f32| {
             if odd { middle.floor() - 0.5 * (width - 1.0) } else { middle.round() - 0.5 * width }
         };
-        let rect = if from.1 == to.1 {
+        if from[1] == to[1] {
             Rect::from_xywh(x0.min(x1), snap(y0), (x1 - x0).abs(), width)
         } else {
             Rect::from_xywh(snap(x0), y0.min(y1), width, (y1 - y0).abs())
-        };
-        self.fill(rect.map(PathBuilder::from_rect), colour);
+        }
     }
 
-    fn outline(&self, points: impl IntoIterator<Item = BackendCoord>, closed: bool) -> Option<Path> {
-        let mut path = PathBuilder::new();
-        let mut last: Option<(f32, f32)> = None;
-        let mut skipped = None;
-        for point in points {
-            let (x, y) = self.place(point);
-            match last {
-                None => path.move_to(x, y),
-                // Points nearer than a quarter of a pixel add joints, not shape.
-                Some((a, b)) if (x - a).hypot(y - b) < 0.25 => {
-                    skipped = Some((x, y));
-                    continue;
-                }
-                Some(_) => path.line_to(x, y),
-            }
-            skipped = None;
-            last = Some((x, y));
+    fn fill(&mut self, path: Option<Path>, colour: BackendColor) {
+        if let Some(path) = path {
+            let (colour, opacity) = backend_colour(colour);
+            self.add(Mark::Fill { path, colour, opacity });
         }
-        if let Some((x, y)) = skipped {
-            path.line_to(x, y);
-        }
-        if closed {
-            path.close();
-        }
-        path.finish()
     }
+
+    fn stroke(&mut self, path: Option<Path>, colour: BackendColor, width: u32, round: bool) {
+        if let Some(path) = path {
+            let (colour, opacity) = backend_colour(colour);
+            self.add(Mark::Stroke { path, colour, opacity, width: f64::from(width) / UNITS, round });
+        }
+    }
+}
+
+/// Points from backend units.
+fn points((x, y): BackendCoord) -> [f64; 2] {
+    [f64::from(x) / UNITS, f64::from(y) / UNITS]
+}
+
+fn outline(corners: impl IntoIterator<Item = BackendCoord>, closed: bool) -> Option<Path> {
+    let mut path = PathBuilder::new();
+    let mut last: Option<[f64; 2]> = None;
+    let mut skipped = None;
+    for [x, y] in corners.into_iter().map(points) {
+        match last {
+            None => path.move_to(x as f32, y as f32),
+            Some([a, b]) if (x - a).hypot(y - b) < NEAR => {
+                skipped = Some([x, y]);
+                continue;
+            }
+            Some(_) => path.line_to(x as f32, y as f32),
+        }
+        skipped = None;
+        last = Some([x, y]);
+    }
+    if let Some([x, y]) = skipped {
+        path.line_to(x as f32, y as f32);
+    }
+    if closed {
+        path.close();
+    }
+    path.finish()
 }
 
 fn paint(colour: Colour, alpha: f64) -> Paint<'static> {
@@ -227,8 +272,9 @@ fn paint(colour: Colour, alpha: f64) -> Paint<'static> {
     paint
 }
 
-fn backend_paint(colour: BackendColor) -> Paint<'static> {
-    paint(plotters::style::RGBColor(colour.rgb.0, colour.rgb.1, colour.rgb.2), colour.alpha)
+fn backend_colour(colour: BackendColor) -> (Colour, f64) {
+    let (red, green, blue) = colour.rgb;
+    (plotters::style::RGBColor(red, green, blue), colour.alpha)
 }
 
 type Drawn = Result<(), DrawingErrorKind<Infallible>>;
@@ -237,7 +283,8 @@ impl DrawingBackend for Canvas {
     type ErrorType = Infallible;
 
     fn get_size(&self) -> (u32, u32) {
-        ((self.size[0] * UNITS).round() as u32, (self.size[1] * UNITS).round() as u32)
+        let [width, height] = self.drawing.size.map(|side| (side * UNITS).round() as u32);
+        (width, height)
     }
 
     fn ensure_prepared(&mut self) -> Drawn {
@@ -249,8 +296,9 @@ impl DrawingBackend for Canvas {
     }
 
     fn draw_pixel(&mut self, point: BackendCoord, color: BackendColor) -> Drawn {
-        let (x, y) = self.place(point);
-        self.fill(Rect::from_xywh(x.floor(), y.floor(), 1.0, 1.0).map(PathBuilder::from_rect), color);
+        let pixel = points(point).map(|c| ((c * self.scale).floor() / self.scale) as f32);
+        let side = (1.0 / self.scale) as f32;
+        self.fill(Rect::from_xywh(pixel[0], pixel[1], side, side).map(PathBuilder::from_rect), color);
         Ok(())
     }
 
@@ -263,15 +311,15 @@ impl DrawingBackend for Canvas {
         path: I,
         style: &S,
     ) -> Drawn {
-        let points: Vec<BackendCoord> = path.into_iter().collect();
-        match points[..] {
+        let corners: Vec<BackendCoord> = path.into_iter().collect();
+        match corners[..] {
             [] | [_] => {}
             [from, to] if from != to && (from.0 == to.0 || from.1 == to.1) => {
-                self.rule((from, to), style.color(), style.stroke_width())
+                let (colour, opacity) = backend_colour(style.color());
+                let width = f64::from(style.stroke_width()) / UNITS;
+                self.add(Mark::Rule { from: points(from), to: points(to), colour, opacity, width });
             }
-            _ => {
-                self.stroke(self.outline(points, false), style.color(), style.stroke_width(), LineCap::Round)
-            }
+            _ => self.stroke(outline(corners, false), style.color(), style.stroke_width(), true),
         }
         Ok(())
     }
@@ -286,9 +334,9 @@ impl DrawingBackend for Canvas {
         let ((left, top), (right, bottom)) = (upper_left, bottom_right);
         let corners = [(left, top), (right, top), (right, bottom), (left, bottom)];
         if fill {
-            self.fill(self.outline(corners, true), style.color());
+            self.fill(outline(corners, true), style.color());
         } else {
-            self.stroke(self.outline(corners, true), style.color(), style.stroke_width(), LineCap::Butt);
+            self.stroke(outline(corners, true), style.color(), style.stroke_width(), false);
         }
         Ok(())
     }
@@ -300,12 +348,12 @@ impl DrawingBackend for Canvas {
         style: &S,
         fill: bool,
     ) -> Drawn {
-        let (x, y) = self.place(center);
-        let circle = PathBuilder::from_circle(x, y, self.px(f64::from(radius)));
+        let [x, y] = points(center).map(|c| c as f32);
+        let circle = PathBuilder::from_circle(x, y, (f64::from(radius) / UNITS) as f32);
         if fill {
             self.fill(circle, style.color());
         } else {
-            self.stroke(circle, style.color(), style.stroke_width(), LineCap::Butt);
+            self.stroke(circle, style.color(), style.stroke_width(), false);
         }
         Ok(())
     }
@@ -315,8 +363,7 @@ impl DrawingBackend for Canvas {
         vert: I,
         style: &S,
     ) -> Drawn {
-        let outline = self.outline(vert, true);
-        self.fill(outline, style.color());
+        self.fill(outline(vert, true), style.color());
         Ok(())
     }
 

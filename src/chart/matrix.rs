@@ -163,6 +163,20 @@ mod tests {
     }
 
     #[test]
+    fn outcomes_stay_apart_when_colours_are_few() {
+        let apart = |a: Colour, b: Colour| {
+            let parts = [(a.0, b.0), (a.1, b.1), (a.2, b.2)];
+            parts.iter().map(|&(a, b)| (f64::from(a) - f64::from(b)).powi(2)).sum::<f64>().sqrt()
+        };
+        for (k, a) in Outcome::ALL.iter().enumerate() {
+            for b in &Outcome::ALL[..k] {
+                // A palette of 16 colours takes together what is nearer than about 40.
+                assert!(apart(a.colour(), b.colour()) > 50.0, "{a:?} and {b:?}");
+            }
+        }
+    }
+
+    #[test]
     fn an_empty_table_is_a_picture() {
         assert!(matrix(&Matrix::default(), 1.0).is_ok());
     }

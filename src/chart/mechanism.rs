@@ -1,5 +1,6 @@
 //! A mechanism in its pose, with the paths of chosen points.
 
+use super::annotations::legend;
 use super::file::Picture;
 use super::grid::AIR;
 use super::labels::Occupied;
@@ -11,6 +12,8 @@ use super::{ChartError, PAGE};
 
 /// Most earlier poses drawn.
 const GHOSTS: usize = 8;
+/// Height of the legend \[pt\].
+const LEGEND: f64 = 14.0;
 
 /// A mechanism and where it has been.
 #[derive(Clone, Debug, Default)]
@@ -26,6 +29,8 @@ pub struct MechanismChart {
     /// Paths of the sketch's points (x, y) \[m\], oldest place first; points that are not numbers break a
     /// path.
     pub trails: Vec<Vec<[f64; 2]>>,
+    /// Names of the paths, with markup, for a legend where there are several.
+    pub names: Vec<String>,
     /// The point of the paths from which on they are pale: beyond the horizon up to which they can be
     /// trusted.
     pub horizon: Option<usize>,
@@ -38,7 +43,9 @@ pub struct MechanismChart {
 pub fn mechanism(chart: &MechanismChart, px_per_pt: f64) -> Result<Picture, ChartError> {
     let ghosts = chart.poses.len().saturating_sub(GHOSTS + 1);
     let poses = &chart.poses[ghosts..];
-    let under = Sheet::new(PAGE, 0.5)?.heading(&chart.title, &chart.caption)?;
+    let has_legend = chart.trails.len() > 1 && chart.names.len() == chart.trails.len();
+    let told = Sheet::new(PAGE, 0.5)?.heading(&chart.title, &chart.caption)?;
+    let under = told + if has_legend { LEGEND } else { 0.0 };
     let view = View::around(&chart.sketch, poses, &chart.trails);
     let right = 20.0;
     let fitted = |left: f64| {
@@ -53,6 +60,9 @@ pub fn mechanism(chart: &MechanismChart, px_per_pt: f64) -> Result<Picture, Char
 
     let sheet = Sheet::new([PAGE[0], under + AIR + height + 44.0], px_per_pt)?;
     sheet.heading(&chart.title, &chart.caption)?;
+    if has_legend {
+        legend(&sheet, &chart.names, [EDGE, told + 0.8 * LEGEND])?;
+    }
     let (x, y) = view.axes();
     let top = under + AIR;
     let panel = Panel::new(&sheet, [left, top, left + width, top + height], x, y).equal_steps();
@@ -61,11 +71,12 @@ pub fn mechanism(chart: &MechanismChart, px_per_pt: f64) -> Result<Picture, Char
     let mut occupied = Occupied::default();
     let size = poses.last().map_or(1.0, |pose| symbol_size(pose, view.scale(width)));
     let pencil = Pencil { sheet: &sheet, panel: &panel, view, size };
-    pencil.walls(&chart.sketch.walls, &mut occupied)?;
     if let Some((last, before)) = poses.split_last() {
         for (k, pose) in before.iter().enumerate() {
             pencil.ghost(pose, 1.0 - k as f64 / before.len() as f64)?;
         }
+        // Over the ghosts, or they would erase the hatching.
+        pencil.walls(&chart.sketch.walls, &mut occupied)?;
         for (k, trail) in chart.trails.iter().enumerate() {
             let trusted = chart.horizon.map_or(trail.len(), |horizon| horizon.min(trail.len()));
             pencil.trail(&trail[trusted.saturating_sub(1)..], pale(trail_colour(k)), 160, &mut occupied)?;
@@ -73,6 +84,7 @@ pub fn mechanism(chart: &MechanismChart, px_per_pt: f64) -> Result<Picture, Char
         }
         pencil.pose(&chart.sketch, last, &mut occupied)?;
         pencil.compass(&mut occupied)?;
+        pencil.scale_bar(&mut occupied)?;
         pencil.names(&chart.sketch, last, &mut occupied)?;
     } else {
         panel.empty("no data")?;

@@ -2,7 +2,8 @@
 //!
 //! Each chart is a struct of plain rows and a function that turns it into a [`Picture`] (or an
 //! [`Animation`]).  Nothing is run or read here.  The pictures are drawn with plotters on a canvas of our
-//! own, because its bitmap backend cannot draw smooth lines; fonts are part of the program.
+//! own, because its bitmap backend cannot draw smooth lines; fonts are part of the program.  What is drawn is
+//! kept as lines, so that every chart can become a PNG, an SVG or a PDF file ([`Format`]).
 //!
 //! Sizes are points of 1/72 inch; one number, pixels per point, sets the resolution.  Every string may carry
 //! a small markup, `*italic*`, `_{below}`, `^{above}`; [`plain`] protects names that come from outside.
@@ -20,9 +21,11 @@
 //! | [`multipliers()`] | [`Multipliers`] | Floquet multipliers and the unit circle |
 //! | [`matrix()`] | [`Matrix`] | outcomes by row and column, as colours and words |
 //! | [`profile()`] | [`Profile`] | a value over one other |
-//! | [`motion_gif()`] | [`MotionGif`] | the mechanism in motion |
+//! | [`motion_gif()`], [`motion_apng()`] | [`MotionGif`] | the mechanism in motion |
 
 mod angles;
+mod annotations;
+mod apng;
 mod axis;
 mod canvas;
 mod constraint_drift;
@@ -33,6 +36,7 @@ mod grid;
 mod labels;
 mod lines;
 mod map;
+mod mark;
 mod matrix;
 mod mechanism;
 mod motion;
@@ -40,9 +44,11 @@ mod multipliers;
 mod outputs;
 mod palette;
 mod panel;
+mod pdf;
 mod profile;
 mod sheet;
 mod sketch;
+mod svg;
 mod text;
 mod ticks;
 mod torque_power;
@@ -52,11 +58,11 @@ mod work_precision;
 pub use angles::{AngleSeries, Angles, angles};
 pub use constraint_drift::{ConstraintDrift, ResidualPanel, constraint_drift};
 pub use energy_drift::{DriftSeries, EnergyDrift, energy_drift};
-pub use file::Picture;
+pub use file::{Format, Picture};
 pub use map::{Cell, Map, MapAxis, map};
 pub use matrix::{Matrix, Outcome, matrix};
 pub use mechanism::{MechanismChart, mechanism};
-pub use motion::{Animation, MotionGif, motion_gif};
+pub use motion::{Animation, MotionGif, motion_apng, motion_gif};
 pub use multipliers::{Multipliers, multipliers};
 pub use outputs::{OutputSeries, OutputsChart, outputs};
 pub use profile::{Profile, profile};
@@ -82,6 +88,12 @@ pub enum ChartError {
     Resolution {
         /// What was asked for.
         px_per_pt: f64,
+    },
+    /// The file's name tells no format.
+    #[error("{}: a chart's file ends in .png, .svg or .pdf", path.display())]
+    Format {
+        /// The file.
+        path: PathBuf,
     },
     /// A font inside the program cannot be read.
     #[error("a font inside the program is damaged")]

@@ -1,6 +1,7 @@
-//! The mechanism in motion, as an animated GIF.
+//! The mechanism in motion, as an animated GIF or PNG.
 
 use super::ChartError;
+use super::apng;
 use super::file::write_whole;
 use super::gif::Encoder;
 use super::labels::Occupied;
@@ -13,9 +14,10 @@ use super::ticks::decimal;
 use super::view::View;
 use std::path::Path;
 
-/// 420 × 432 px at two pixels a point.
+/// Width and height \[pt\], and pixels per point in each format; films need even numbers of pixels.
 const SIZE: [f64; 2] = [210.0, 216.0];
-const PX_PER_PT: f64 = 2.0;
+const GIF: f64 = 2.0;
+const APNG: f64 = 5.0;
 /// Length of the fading trail \[frames\].
 const TAIL: usize = 50;
 /// Few colours keep the file small.
@@ -50,12 +52,12 @@ pub struct Animation {
     pub height: u32,
     /// Number of frames.
     pub frames: usize,
-    /// The GIF file.
+    /// The file.
     pub bytes: Vec<u8>,
 }
 
 impl Animation {
-    /// Writes the GIF file, replacing an older one at once.
+    /// Writes the file, replacing an older one at once.
     ///
     /// # Errors
     /// [`ChartError::Write`] if the folder does not exist or cannot be written.
@@ -69,7 +71,47 @@ impl Animation {
 /// # Errors
 /// [`ChartError`] if drawing or encoding fails.  An animation without poses has one empty frame.
 pub fn motion_gif(chart: &MotionGif) -> Result<Animation, ChartError> {
-    let sheet = Sheet::new(SIZE, PX_PER_PT)?;
+    let frames = chart.poses.len().max(1);
+    animated(chart, GIF, |[width, height], draw| {
+        // Colours are chosen from a part of the frames, so that all of them never lie in memory together.
+        let samples =
+            (0..frames).step_by(frames.div_ceil(24)).map(&mut *draw).collect::<Result<Vec<_>, _>>()?;
+        let mut encoder = Encoder::new(width, height, chart.delay.max(2), &samples)?;
+        for k in 0..frames {
+            encoder.frame(&draw(k)?)?;
+        }
+        encoder.finish()
+    })
+}
+
+/// Draws 1050 × 1080 px frames into an endless animated PNG (W3C, "Portable Network Graphics, third edition",
+/// 2025), in all their colours.
+///
+/// # Errors
+/// As [`motion_gif`].
+pub fn motion_apng(chart: &MotionGif) -> Result<Animation, ChartError> {
+    let frames = chart.poses.len().max(1);
+    animated(chart, APNG, |[width, height], draw| {
+        let mut bytes = Vec::new();
+        let mut encoder = apng::Encoder::new(&mut bytes, [width, height], frames as u32, chart.delay.max(2))?;
+        for k in 0..frames {
+            encoder.frame(&draw(k)?)?;
+        }
+        encoder.finish()?;
+        Ok(bytes)
+    })
+}
+
+/// Pixels of a frame, by its number.
+type Draw<'a> = dyn FnMut(usize) -> Result<Vec<u8>, ChartError> + 'a;
+
+/// Draws frame after frame for an encoder.
+fn animated(
+    chart: &MotionGif,
+    px_per_pt: f64,
+    encode: impl FnOnce([u32; 2], &mut Draw) -> Result<Vec<u8>, ChartError>,
+) -> Result<Animation, ChartError> {
+    let sheet = Sheet::new(SIZE, px_per_pt)?;
     let under = sheet.heading(&chart.title, &[])?;
     let bounds = [EDGE, under + 8.0, SIZE[0] - EDGE, SIZE[1] - EDGE];
     let (width, height) = (bounds[2] - bounds[0], bounds[3] - bounds[1]);
@@ -86,10 +128,10 @@ pub fn motion_gif(chart: &MotionGif) -> Result<Animation, ChartError> {
     let mut occupied = Occupied::default();
     pencil.walls(&chart.sketch.walls, &mut occupied)?;
     pencil.compass(&mut occupied)?;
+    pencil.scale_bar(&mut occupied)?;
     let background = sheet.pixels();
-
     let frames = chart.poses.len().max(1);
-    let draw = |k: usize| -> Result<Vec<u8>, ChartError> {
+    let mut draw = |k: usize| -> Result<Vec<u8>, ChartError> {
         sheet.restore(&background);
         let Some(pose) = chart.poses.get(k) else { return Ok(sheet.pixels()) };
         let mut occupied = Occupied::default();
@@ -115,14 +157,9 @@ pub fn motion_gif(chart: &MotionGif) -> Result<Animation, ChartError> {
         }
         Ok(sheet.pixels())
     };
-    let (pixels_wide, pixels_high) = sheet.dimensions();
-    // Colours are chosen from a part of the frames, so that all of them never lie in memory together.
-    let samples = (0..frames).step_by(frames.div_ceil(24)).map(draw).collect::<Result<Vec<_>, _>>()?;
-    let mut encoder = Encoder::new(pixels_wide, pixels_high, chart.delay.max(2), &samples)?;
-    for k in 0..frames {
-        encoder.frame(&draw(k)?)?;
-    }
-    Ok(Animation { width: pixels_wide, height: pixels_high, frames, bytes: encoder.finish()? })
+    let (width, height) = sheet.dimensions();
+    let bytes = encode([width, height], &mut draw)?;
+    Ok(Animation { width, height, frames, bytes })
 }
 
 /// The part of a trail seen in frame `k`.

@@ -29,7 +29,7 @@ pub(crate) const VERMILLION: Colour = RGBColor(0xD5, 0x5E, 0x00);
 
 /// Places of a map that were left out, and those where something failed.
 pub(crate) const EXCLUDED: Colour = RGBColor(0xD3, 0xD7, 0xDC);
-pub(crate) const FAILED: Colour = RGBColor(0xF0, 0xAE, 0x7C);
+pub(crate) const FAILED: Colour = RGBColor(0xDE, 0x95, 0xBE);
 
 /// Colours from dark (0) to light (1) in even steps of lightness, also to the colour-blind: viridis, by S.
 /// van der Walt and N. Smith (2015).
@@ -67,7 +67,7 @@ pub(crate) enum Shape {
 pub(crate) struct Mark {
     pub colour: Colour,
     pub shape: Shape,
-    /// 0 for the first series of this colour, 1 for the second, …; chooses the dashes.
+    /// 0 for the first series of this family of colours, 1 for the second, …; chooses the dashes.
     pub turn: usize,
 }
 
@@ -101,19 +101,34 @@ fn fixed(name: &str) -> Option<(Colour, Shape)> {
     FIXED.iter().find(|(word, ..)| name.starts_with(word)).map(|&(_, colour, shape)| (colour, shape))
 }
 
-/// A mark for each name: known methods and stabilizations keep theirs, other names take what is left.
+/// The shade of number `turn` among `count` series of one colour: itself and a darker one, or from light to
+/// dark where there are more.
+fn shade(colour: Colour, turn: usize, count: usize) -> Colour {
+    let place = match count {
+        0 | 1 => 0.0,
+        2 => -0.5 * turn as f64,
+        _ => 0.5 - 1.2 * turn as f64 / (count - 1) as f64,
+    };
+    if place > 0.0 { mix(colour, WHITE, place) } else { mix(colour, INK, -place) }
+}
+
+/// A mark for each name: known methods and stabilizations keep theirs, in shades where they share a colour;
+/// other names take what is left.
 pub(crate) fn marks<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<Mark> {
     let names: Vec<&str> = names.into_iter().collect();
     let known: Vec<_> = names.iter().map(|name| fixed(name)).collect();
     let mut free =
         FREE.iter().filter(|(colour, _)| !known.iter().flatten().any(|(taken, _)| taken == colour)).cycle();
-    let mut marks: Vec<Mark> = Vec::new();
+    let mut chosen: Vec<(Colour, Shape)> = Vec::new();
     for known in &known {
-        let (colour, shape) = known.or_else(|| free.next().copied()).unwrap_or(FREE[6]);
-        let turn = marks.iter().filter(|mark| mark.colour == colour).count();
-        marks.push(Mark { colour, shape, turn });
+        chosen.push(known.or_else(|| free.next().copied()).unwrap_or(FREE[6]));
     }
-    marks
+    let of = |colour: Colour, all: &[(Colour, Shape)]| all.iter().filter(|other| other.0 == colour).count();
+    let mark = |(k, &(colour, shape)): (usize, &(Colour, Shape))| {
+        let turn = of(colour, &chosen[..k]);
+        Mark { colour: shade(colour, turn, of(colour, &chosen)), shape, turn }
+    };
+    chosen.iter().enumerate().map(mark).collect()
 }
 
 /// `share` of the way from one colour to another.
@@ -159,6 +174,13 @@ mod tests {
     }
 
     #[test]
+    fn methods_of_one_family_are_told_apart_by_their_shades() {
+        let names = ["gauss4", "gauss6", "gauss8", "gauss10", "gauss12", "gauss14", "gauss16"];
+        let lights: Vec<f64> = marks(names).iter().map(|mark| luminance(mark.colour)).collect();
+        assert!(lights.windows(2).all(|pair| pair[1] < 0.9 * pair[0]), "{lights:?}");
+    }
+
+    #[test]
     fn colours_of_a_map_grow_lighter_all_the_way() {
         let steps: Vec<f64> = (0..=48).map(|k| luminance(even(f64::from(k) / 48.0))).collect();
         assert!(steps.windows(2).all(|pair| pair[1] > pair[0]), "{steps:?}");
@@ -168,7 +190,7 @@ mod tests {
     fn methods_keep_their_colour_and_others_never_take_it() {
         let marks = marks(["taylor", "shoulder", "taylor, extended", "elbow"]);
         assert_eq!((marks[0].colour, marks[0].turn), (VERMILLION, 0));
-        assert_eq!((marks[2].colour, marks[2].turn), (VERMILLION, 1));
+        assert_eq!((marks[2].colour, marks[2].turn), (shade(VERMILLION, 1, 2), 1));
         assert_eq!((marks[1].colour, marks[3].colour), (BLUE, GREEN));
     }
 }

@@ -264,6 +264,7 @@ impl Sheet {
             description: unmarked(&caption.join(" · ")),
             texts: canvas.texts().to_vec(),
             panels: self.panels.borrow().clone(),
+            drawing: canvas.drawing().clone(),
         }
     }
 }

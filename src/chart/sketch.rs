@@ -1,10 +1,10 @@
 //! The drawing of a mechanism in a pose: bars, hinges, ground, springs, motors, walls, trails.
 
 use super::ChartError;
-use super::labels::{Occupied, place};
+use super::labels::Occupied;
 use super::lines::{Point, clip};
 use super::palette::{
-    BLUE, Colour, GREEN, GREY, INK, ORANGE, PURPLE, SKY, SPINE, VERMILLION, WHITE, mix, readable,
+    BLUE, Colour, GREEN, INK, ORANGE, PURPLE, SKY, SPINE, VERMILLION, WHITE, mix, readable,
 };
 use super::panel::Panel;
 use super::sheet::{NAME, Pen, Sheet};
@@ -94,7 +94,7 @@ pub struct MotorPose {
 }
 
 /// From this many names on none is written.
-const NAMES: usize = 7;
+pub(crate) const NAMES: usize = 7;
 
 /// Draws in a panel through a view of the world.
 pub(crate) struct Pencil<'a> {
@@ -109,12 +109,12 @@ pub(crate) fn trail_colour(k: usize) -> Colour {
     [VERMILLION, BLUE, PURPLE, GREEN][k % 4]
 }
 
-fn finite(points: &[[f64; 2]]) -> bool {
+pub(crate) fn finite(points: &[[f64; 2]]) -> bool {
     points.iter().flatten().all(|c| c.abs() <= 1e300)
 }
 
 impl Pencil<'_> {
-    fn at(&self, point: [f64; 2]) -> Point {
+    pub(crate) fn at(&self, point: [f64; 2]) -> Point {
         self.panel.page(self.view.fractions(point))
     }
 
@@ -382,101 +382,9 @@ impl Pencil<'_> {
         }
         Ok(())
     }
-
-    /// Names of hinges and points beside them, away from the bars that meet there.
-    pub(crate) fn names(
-        &self,
-        sketch: &Sketch,
-        pose: &Pose,
-        occupied: &mut Occupied,
-    ) -> Result<(), ChartError> {
-        let hinges = sketch.hinges.iter().map(|hinge| &hinge.name).zip(&pose.hinges);
-        let all: Vec<(&String, &[f64; 2])> = hinges
-            .chain(sketch.points.iter().zip(&pose.points))
-            .filter(|(name, at)| !name.is_empty() && finite(&[**at]))
-            .collect();
-        if all.len() >= NAMES {
-            return Ok(());
-        }
-        for &(_, &at) in &all {
-            occupied.block(around(self.at(at), 3.5));
-        }
-        for (name, &at) in all {
-            let here = self.at(at);
-            let mut avoid = Vec::new();
-            for bar in &pose.bars {
-                let ends = bar.map(|end| self.at(end));
-                for (near, far) in [(ends[0], ends[1]), (ends[1], ends[0])] {
-                    let length = (far[0] - near[0]).hypot(far[1] - near[1]);
-                    if (near[0] - here[0]).hypot(near[1] - here[1]) < 1.0 && length > 0.0 {
-                        avoid.push([(far[0] - near[0]) / length, (far[1] - near[1]) / length]);
-                    }
-                }
-            }
-            let size = [self.sheet.width(name, NAME, false), 0.75 * NAME];
-            let (bounds, cost) = place(here, 5.5, size, self.panel.bounds, &avoid, occupied);
-            // A name that would lie on another one is worse than none.
-            if cost > 49.0 {
-                continue;
-            }
-            occupied.block(bounds);
-            let lettering =
-                Lettering { halo: true, ..Lettering::new(NAME, INK).at(Align::Left, Level::Middle) };
-            self.sheet.words(name, lettering, [bounds[0], 0.5 * (bounds[1] + bounds[3])])?;
-        }
-        Ok(())
-    }
-
-    /// Arrow of gravity in the emptiest corner, and the directions of x and y where they lie oblique to the
-    /// page.
-    pub(crate) fn compass(&self, occupied: &mut Occupied) -> Result<(), ChartError> {
-        let [left, top, right, bottom] = self.panel.bounds;
-        let corner = |occupied: &Occupied, half: f64| {
-            let inset = half + 6.0;
-            let corners = [
-                [right - inset, top + inset],
-                [left + inset, top + inset],
-                [right - inset, bottom - inset],
-                [left + inset, bottom - inset],
-            ];
-            let costs = corners.map(|at| occupied.cost(around(at, half)));
-            let best = (0..4).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(0);
-            corners[best]
-        };
-        if self.view.falls() {
-            let [x, y] = corner(occupied, 16.0);
-            occupied.block(around([x, y], 16.0));
-            self.arrow([x + 6.0, y - 13.0], [x + 6.0, y + 14.0], GREY)?;
-            let lettering = Lettering::new(NAME + 1.0, GREY).at(Align::Centre, Level::Middle);
-            self.sheet.words("*g*", lettering, [x - 5.0, y - 2.0])?;
-        }
-        if self.view.oblique() {
-            let centre = corner(occupied, 20.0);
-            occupied.block(around(centre, 20.0));
-            for (axis, name) in [([1.0, 0.0], "*x*"), ([0.0, 1.0], "*y*")] {
-                let d = self.view.direction(axis);
-                self.arrow(centre, [centre[0] + 15.0 * d[0], centre[1] + 15.0 * d[1]], GREY)?;
-                let lettering = Lettering::new(NAME - 1.0, GREY).at(Align::Centre, Level::Middle);
-                self.sheet.words(name, lettering, [centre[0] + 21.0 * d[0], centre[1] + 21.0 * d[1]])?;
-            }
-        }
-        Ok(())
-    }
-
-    fn arrow(&self, from: Point, to: Point, colour: Colour) -> Result<(), ChartError> {
-        let length = (to[0] - from[0]).hypot(to[1] - from[1]).max(1e-9);
-        let (along, across) = (
-            [(to[0] - from[0]) / length, (to[1] - from[1]) / length],
-            [-(to[1] - from[1]) / length, (to[0] - from[0]) / length],
-        );
-        let back =
-            |s: f64, w: f64| [to[0] - s * along[0] + w * across[0], to[1] - s * along[1] + w * across[1]];
-        self.sheet.line(&[from, back(4.0, 0.0)], &Pen::new(colour, 1.3))?;
-        self.sheet.polygon(&[to, back(6.5, 3.0), back(5.0, 0.0), back(6.5, -3.0)], colour)
-    }
 }
 
-fn around([x, y]: Point, half: f64) -> [f64; 4] {
+pub(crate) fn around([x, y]: Point, half: f64) -> [f64; 4] {
     [x - half, y - half, x + half, y + half]
 }
 

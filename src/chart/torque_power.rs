@@ -1,4 +1,4 @@
-//! Torque or force and power of motors against time, above each other, the largest magnitudes marked.
+//! Torque or force and power of motors against time, above each other, the largest magnitudes of what is drawn marked.
 
 use super::axis::Axis;
 use super::file::Picture;
@@ -98,9 +98,9 @@ pub fn force_power(chart: &TorquePower, sliders: &[usize], px_per_pt: f64) -> Re
     };
     caption.push(
         if crowded {
-            "bands between the extremes, largest magnitudes marked"
+            "bands between the extremes, largest magnitudes of what is drawn marked"
         } else {
-            "largest magnitudes marked"
+            "largest magnitudes of what is drawn marked"
         }
         .to_owned(),
     );

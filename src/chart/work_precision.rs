@@ -112,7 +112,9 @@ pub fn work_precision(chart: &WorkPrecision, px_per_pt: f64) -> Result<Picture, 
 
     let mut occupied = Occupied::default();
     let kept: Vec<Point> = all.iter().filter(|p| lost.is_none_or(|lost| p[1] <= lost)).copied().collect();
-    let best: Vec<Point> = front(&kept).into_iter().map(|number| kept[number]).collect();
+    // What is below the floor is not better than what is at it.
+    let told: Vec<Point> = kept.iter().map(|p| [p[0], p[1].max(floor.unwrap_or(0.0))]).collect();
+    let best: Vec<Point> = front(&told).into_iter().map(|number| kept[number]).collect();
     let band: Vec<Point> = best.iter().map(at).collect();
     sheet.line(&band, &Pen::new(mix(ORANGE, WHITE, 0.72), FRONT))?;
     for side in [-4.0, 0.0, 4.0] {

@@ -80,11 +80,10 @@ fn keep(
     }
     folder.write(COMPARISON, report::compare::csv(comparison).as_bytes())?;
     #[cfg(feature = "charts")]
-    if !flags.no_charts {
+    if !flags.charts.no_charts {
         for chart in report::compare::CompareChart::ALL {
-            let content = report::compare::draw(chart, scene, mechanism, comparison)?;
-            folder.write(chart.file(), &content)?;
-            flags.scene.remark(&format!("drew {}", folder.path().join(chart.file()).display()));
+            let picture = report::compare::draw(chart, scene, mechanism, comparison)?;
+            flags.charts.keep(folder, chart.name(), &picture)?;
         }
     }
     let record = format!("{:#}\n", report::compare::object(scene, mechanism, comparison));

@@ -1,5 +1,7 @@
 //! The command line: one table that is parser, help and completions.
 
+#[cfg(feature = "charts")]
+use super::charts::{ChartFlags, MotionFlags};
 use super::failure::{Exit, Failure};
 use super::output::{message, print};
 use crate::run::kinematics::Drive;
@@ -211,14 +213,30 @@ pub struct RunFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub checkpoints: CheckpointFlags,
-    /// Draw no PNG charts
+    #[allow(missing_docs)]
     #[cfg(feature = "charts")]
-    #[arg(long, help_heading = "Files")]
-    pub no_charts: bool,
-    /// Draw an animated GIF of the mechanism
+    #[command(flatten)]
+    pub charts: ChartFlags,
+    #[allow(missing_docs)]
     #[cfg(feature = "charts")]
-    #[arg(long, help_heading = "Files")]
-    pub gif: bool,
+    #[command(flatten)]
+    pub motion: MotionFlags,
+    /// Draw these columns of the trajectory, joined by commas, as in bar1.x,bar2.omega; an output is drawn
+    /// without
+    #[cfg(feature = "charts")]
+    #[arg(
+        long,
+        value_name = "COLUMNS",
+        value_delimiter = ',',
+        conflicts_with = "no_charts",
+        help_heading = "Files"
+    )]
+    pub chart: Vec<String>,
+    /// Show this part of the run in charts and animations, in seconds [default: of charts all of it or as
+    /// much as can be told apart, of animations the beginning]
+    #[cfg(feature = "charts")]
+    #[arg(long, value_name = "FROM..TO", value_parser = window, allow_hyphen_values = true, help_heading = "Files")]
+    pub window: Option<[f64; 2]>,
 }
 
 /// `driftless sweep`.
@@ -268,10 +286,10 @@ pub struct SweepFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub checkpoints: CheckpointFlags,
-    /// Draw no PNG chart
+    #[allow(missing_docs)]
     #[cfg(feature = "charts")]
-    #[arg(long, help_heading = "Files")]
-    pub no_charts: bool,
+    #[command(flatten)]
+    pub charts: ChartFlags,
     /// Column of the table to draw over one or two varied values [default: flip_time]
     #[cfg(feature = "charts")]
     #[arg(long, value_name = "COLUMN", conflicts_with = "no_charts", help_heading = "Files")]
@@ -302,10 +320,10 @@ pub struct StressFlags {
     /// Overwrite what is in the folder
     #[arg(long)]
     pub force: bool,
-    /// Draw no PNG chart
+    #[allow(missing_docs)]
     #[cfg(feature = "charts")]
-    #[arg(long)]
-    pub no_charts: bool,
+    #[command(flatten)]
+    pub charts: ChartFlags,
     #[allow(missing_docs)]
     #[command(flatten)]
     pub tell: TellFlags,
@@ -333,10 +351,10 @@ pub struct KinematicsFlags {
     /// Overwrite what is in the folder
     #[arg(long, help_heading = "Files")]
     pub force: bool,
-    /// Draw no PNG charts
+    #[allow(missing_docs)]
     #[cfg(feature = "charts")]
-    #[arg(long, help_heading = "Files")]
-    pub no_charts: bool,
+    #[command(flatten)]
+    pub charts: ChartFlags,
 }
 
 /// `driftless modes`.
@@ -357,14 +375,14 @@ pub struct ModesFlags {
     /// Overwrite what is in the folder
     #[arg(long, help_heading = "Files")]
     pub force: bool,
-    /// Draw no PNG charts
+    #[allow(missing_docs)]
     #[cfg(feature = "charts")]
-    #[arg(long, help_heading = "Files")]
-    pub no_charts: bool,
-    /// Draw animated GIFs of the modes or of the periodic motion
+    #[command(flatten)]
+    pub charts: ChartFlags,
+    #[allow(missing_docs)]
     #[cfg(feature = "charts")]
-    #[arg(long, help_heading = "Files")]
-    pub gif: bool,
+    #[command(flatten)]
+    pub motion: MotionFlags,
 }
 
 /// `driftless compare`.
@@ -393,10 +411,10 @@ pub struct CompareFlags {
     /// Overwrite the comparison that is in the folder
     #[arg(long, help_heading = "Files")]
     pub force: bool,
-    /// Draw no PNG charts
+    #[allow(missing_docs)]
     #[cfg(feature = "charts")]
-    #[arg(long, help_heading = "Files")]
-    pub no_charts: bool,
+    #[command(flatten)]
+    pub charts: ChartFlags,
 }
 
 /// How often checkpoints are written.
@@ -532,6 +550,16 @@ pub fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Flags, Exi
         let failure = Failure::new(Exit::Usage, text.strip_prefix("error: ").unwrap_or(text));
         failure.tell(arguments.iter().any(|argument| argument == "--json"))
     })
+}
+
+#[cfg(feature = "charts")]
+fn window(text: &str) -> Result<[f64; 2], String> {
+    let both = text.split_once("..").and_then(|(from, to)| {
+        let [from, to] = [from, to].map(|number| scene::number(number.trim()));
+        Some([from?, to?])
+    });
+    both.filter(|[from, to]| from < to && (to - from).is_finite() && *from >= 0.0)
+        .ok_or_else(|| "must be FROM..TO with 0 <= FROM < TO, as 10..12.5".to_owned())
 }
 
 fn methods() -> impl TypedValueParser<Value = MethodId> {

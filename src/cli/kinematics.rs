@@ -40,9 +40,9 @@ pub fn run(flags: &KinematicsFlags) -> Result<(), Failure> {
     }
     folder.write(KINEMATICS, report::table(&found).as_bytes())?;
     #[cfg(feature = "charts")]
-    if !flags.no_charts {
-        for (name, content) in report::charts(&found)? {
-            folder.write(name, &content)?;
+    if !flags.charts.no_charts {
+        for (name, picture) in report::charts(&found)? {
+            flags.charts.keep(&mut folder, name, &picture)?;
         }
     }
     let mut object = report::object(&found);

@@ -2,6 +2,8 @@
 //!
 //! Data go to stdout or into files, progress and messages to stderr.  Exit codes are in [`failure::Exit`].
 
+#[cfg(feature = "charts")]
+mod charts;
 mod check;
 mod compare;
 #[doc(hidden)]

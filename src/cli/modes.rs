@@ -58,13 +58,16 @@ pub fn run(flags: &ModesFlags) -> Result<(), Failure> {
         folder.clear(FILES)?;
     }
     #[cfg(feature = "charts")]
-    if !flags.no_charts {
-        let charts = match &found {
-            Found::Rest(found) => at_rest::charts(found, flags.gif)?,
-            Found::Motion(found) => in_motion::charts(found, flags.gif)?,
+    if !flags.charts.no_charts {
+        let (pictures, motions) = match &found {
+            Found::Rest(found) => at_rest::charts(found)?,
+            Found::Motion(found) => in_motion::charts(found)?,
         };
-        for (name, content) in charts {
-            folder.write(name, &content)?;
+        for (name, picture) in pictures {
+            flags.charts.keep(&mut folder, name, &picture)?;
+        }
+        for (name, motion) in motions {
+            flags.motion.keep(&mut folder, name, &motion)?;
         }
     }
     let (mut object, text) = match &found {

@@ -34,6 +34,7 @@ const FILES: &[&str] = &[
     "constraint_drift.png",
     "torque_power.png",
     "outputs.png",
+    "columns.png",
     "mechanism.gif",
 ];
 
@@ -81,6 +82,9 @@ pub fn run(flags: &RunFlags, arguments: &[String]) -> Result<(), Failure> {
     }
     let text = read_text(&flags.scene.scene)?;
     let (scene, mechanism) = super::compile(&flags.scene, &text)?;
+    #[cfg(feature = "charts")]
+    report::charts::Columns::find(&mechanism, &flags.chart)
+        .map_err(|error| Failure::new(Exit::Usage, format!("--chart: {error}")))?;
     // All plans stand before the first run: a pairing that is refused costs nothing.
     let requests = flags.plan.requests();
     let mut plans: Vec<Plan> =
@@ -153,12 +157,36 @@ fn conclude(scene: &Scene, mechanism: &Mechanism, done: Vec<Done>, flags: &RunFl
 }
 
 impl Task<'_> {
+    /// The window charts show; it has to hold rows.
+    #[cfg(feature = "charts")]
+    fn window(&self, plan: &Plan) -> Result<Option<[f64; 2]>, Failure> {
+        let Some([from, to]) = self.flags.window else { return Ok(None) };
+        let rows = ((to.min(plan.until) / plan.every).floor() - (from / plan.every).ceil() + 1.0).max(0.0);
+        if rows >= 2.0 {
+            return Ok(Some([from, to]));
+        }
+        let hint = if from >= plan.until {
+            format!("the run ends at {} s", plan.until)
+        } else {
+            format!("--every {} gives it 100 rows", report::page::rough((to - from) / 100.0))
+        };
+        let text = format!("--window {from}..{to}: {rows} rows of the trajectory lie in it\nhint: {hint}");
+        Err(Failure::new(Exit::Usage, text))
+    }
+
+    /// None without charts.
+    #[cfg(not(feature = "charts"))]
+    fn window(&self, _: &Plan) -> Result<Option<[f64; 2]>, Failure> {
+        Ok(None)
+    }
+
     /// Runs one plan in a folder of its own.
     fn run(&self, plan: Plan, folder: &str) -> Result<Done, Failure> {
         let Self { scene, mechanism, flags, .. } = *self;
         let start = mechanism.start(scene);
         let run = Run::new(Arc::clone(mechanism), plan, flags.limits(), &start)?.trusted(flags.trust, &start);
         let plan = run.plan();
+        let window = self.window(plan)?;
         flags.scene.remark(&format!(
             "{}; {}",
             report::setting(plan),
@@ -172,7 +200,7 @@ impl Task<'_> {
         let table = Table::new(mechanism, folder.begin(TRAJECTORY)?)
             .map_err(|error| folder.failed(TRAJECTORY, error.into()))?;
         self.finish(
-            Running::new(run.timed(wall_clock)),
+            Running::new(run.timed(wall_clock)).windowed(window),
             AsyncWriter::new(table),
             folder,
             Checkpoints::none(&path),
@@ -316,10 +344,18 @@ fn draw(
     folder: &mut Folder,
     flags: &RunFlags,
 ) -> Result<(), Failure> {
-    for chart in report::charts::wanted(mechanism, !flags.no_charts, flags.gif) {
-        let content = report::charts::draw(chart, scene, mechanism, outcome)?;
-        folder.write(chart.file(), &content)?;
-        flags.scene.remark(&format!("drew {}", folder.path().join(chart.file()).display()));
+    if !flags.charts.no_charts {
+        for chart in report::charts::wanted(mechanism, outcome) {
+            let picture = report::charts::draw(chart, scene, mechanism, outcome)?;
+            flags.charts.keep(folder, chart.name(), &picture)?;
+        }
+        if !flags.chart.is_empty() {
+            let picture = report::charts::columns(scene, mechanism, outcome, &flags.chart)?;
+            flags.charts.keep(folder, "columns", &picture)?;
+        }
+    }
+    if flags.motion.has_any() {
+        flags.motion.keep(folder, "mechanism", &report::charts::motion(scene, mechanism, outcome))?;
     }
     Ok(())
 }
@@ -327,15 +363,16 @@ fn draw(
 /// Constraint drift of several runs in one chart, beside their folders.
 #[cfg(feature = "charts")]
 fn overlay(scene: &Scene, mechanism: &Mechanism, done: &[Done], flags: &RunFlags) -> Result<(), Failure> {
-    if done.len() < 2 || mechanism.constraints.is_empty() || flags.no_charts {
+    if done.len() < 2 || mechanism.constraints.is_empty() || flags.charts.no_charts {
         return Ok(());
     }
     let outcomes: Vec<&Outcome> = done.iter().map(|done| &done.outcome).collect();
-    let content = report::charts::overlay(scene, mechanism, &outcomes)?;
+    if !report::charts::drifts(&outcomes) {
+        return Ok(());
+    }
+    let picture = report::charts::overlay(scene, mechanism, &outcomes)?;
     let mut folder = Folder::shared(&flags.out.join(&scene.name))?;
-    folder.write("constraint_drift.png", &content)?;
-    flags.scene.remark(&format!("drew {}", folder.path().join("constraint_drift.png").display()));
-    Ok(())
+    flags.charts.keep(&mut folder, "constraint_drift", &picture)
 }
 
 #[cfg(not(feature = "charts"))]

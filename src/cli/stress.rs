@@ -11,13 +11,14 @@ use crate::run::stress::{Case, Expected, Line, Stress, Verdict, stress};
 use crate::scene::{read_text, source_name};
 
 /// The files it may leave; those of an earlier one in the same folder go with it.
-const FILES: &[&str] = &[TABLE, RECORD, MATRIX, STABILITY[0].1, STABILITY[1].1];
+const FILES: &[&str] = &[TABLE, RECORD, "matrix.png", "stability_gauss16.png", "stability_rattle4.png"];
 const TABLE: &str = "stress.csv";
 const RECORD: &str = "stress.json";
-const MATRIX: &str = "matrix.png";
+#[cfg(feature = "charts")]
+const MATRIX: &str = "matrix";
 /// The methods whose stability is drawn, and the files.
-const STABILITY: [(&str, &str); 2] =
-    [("gauss16", "stability_gauss16.png"), ("rattle4", "stability_rattle4.png")];
+#[cfg(feature = "charts")]
+const STABILITY: [(&str, &str); 2] = [("gauss16", "stability_gauss16"), ("rattle4", "stability_rattle4")];
 
 /// Runs the shipped set, or the scenes given.
 ///
@@ -104,10 +105,10 @@ fn publish(plan: &Stress, lines: &[Line], folder: &mut Folder, flags: &StressFla
 #[cfg(feature = "charts")]
 fn draw(plan: &Stress, lines: &[Line], folder: &mut Folder, flags: &StressFlags) -> Result<(), Failure> {
     use crate::run::stress::stability;
-    if flags.no_charts {
+    if flags.charts.no_charts {
         return Ok(());
     }
-    folder.write(MATRIX, &report::stress::matrix(plan, lines)?)?;
+    flags.charts.keep(folder, MATRIX, &report::stress::matrix(plan, lines)?)?;
     for (name, file) in STABILITY {
         let Some(method) = plan.methods.iter().find(|method| method.info().name == name) else { continue };
         let mut progress: Option<Points> = None;
@@ -120,7 +121,7 @@ fn draw(plan: &Stress, lines: &[Line], folder: &mut Folder, flags: &StressFlags)
             bar.finish();
         }
         if let Some(map) = map {
-            folder.write(file, &report::stress::stability(&map)?)?;
+            flags.charts.keep(folder, file, &report::stress::stability(&map)?)?;
         }
     }
     Ok(())

@@ -252,7 +252,7 @@ impl PointObserver for Writer<'_> {
 /// The chart, where there can be one; a column that was asked for must be there.
 #[cfg(feature = "charts")]
 fn curve(plan: &Sweep, flags: &SweepFlags) -> Result<Option<Curve>, Failure> {
-    if flags.no_charts {
+    if flags.charts.no_charts {
         return Ok(None);
     }
     match Curve::new(plan, flags.map.as_deref()) {
@@ -267,12 +267,9 @@ fn curve(plan: &Sweep, flags: &SweepFlags) -> Result<Option<Curve>, Failure> {
 
 #[cfg(feature = "charts")]
 fn draw(plan: &Sweep, curve: &Curve, folder: &mut Folder, flags: &SweepFlags) -> Result<(), Failure> {
-    let name = if plan.grid().axes().len() == 2 { "map.png" } else { "profile.png" };
+    let name = if plan.grid().axes().len() == 2 { "map" } else { "profile" };
     match curve.draw(plan)? {
-        Ok(content) => {
-            folder.write(name, &content)?;
-            flags.scene.remark(&format!("drew {}", folder.path().join(name).display()));
-        }
+        Ok(picture) => flags.charts.keep(folder, name, &picture)?,
         Err(reason @ NoChart::Nothing(_)) if !flags.scene.tell.quiet => {
             super::output::message(&format!("no chart: {reason}"))
         }

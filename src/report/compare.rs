@@ -2,8 +2,10 @@
 
 use super::page::{Page, figure, magnitude, rough};
 #[cfg(feature = "charts")]
-use crate::chart::{self, ChartError, Cost, FILE_RESOLUTION, WorkPrecision, WorkSeries, plain};
+use crate::chart::{self, ChartError, Cost, FILE_RESOLUTION, Picture, WorkPrecision, WorkSeries, plain};
 use crate::dynamics::Mechanism;
+#[cfg(feature = "charts")]
+use crate::run::compare::ROUNDING;
 use crate::run::compare::{Advice, Comparison, Entry, Fate, Found, LOST};
 use crate::run::{Drift, MethodId, Plan, Stabilization};
 use crate::scene::Scene;
@@ -376,28 +378,28 @@ impl CompareChart {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::ErrorTime, Self::EnergyTime, Self::ErrorEvaluations];
 
-    /// Name of its file.
-    pub fn file(self) -> &'static str {
+    /// Name of its file, without the ending.
+    pub fn name(self) -> &'static str {
         match self {
-            Self::ErrorTime => "error_against_run_time.png",
-            Self::EnergyTime => "energy_drift_against_run_time.png",
-            Self::ErrorEvaluations => "error_against_evaluations.png",
+            Self::ErrorTime => "error_against_run_time",
+            Self::EnergyTime => "energy_drift_against_run_time",
+            Self::ErrorEvaluations => "error_against_evaluations",
         }
     }
 }
 
-/// Draws one chart; returns the content of its file.
+/// Draws one chart.
 ///
 /// # Errors
-/// Drawing or encoding fails.
+/// Drawing fails.
 #[cfg(feature = "charts")]
 pub fn draw(
     kind: CompareChart,
     scene: &Scene,
     mechanism: &Mechanism,
     comparison: &Comparison,
-) -> Result<Vec<u8>, ChartError> {
-    chart::work_precision(&chart_data(kind, scene, mechanism, comparison), FILE_RESOLUTION)?.png_bytes()
+) -> Result<Picture, ChartError> {
+    chart::work_precision(&chart_data(kind, scene, mechanism, comparison), FILE_RESOLUTION)
 }
 
 /// The data of one chart.
@@ -462,5 +464,12 @@ pub fn chart_data(
         }
     };
     let lost = if of_energy { None } else { Some(LOST) };
-    WorkPrecision { title: title.into(), caption, cost, error_name, series, lost, floor: None }
+    let floor = if of_energy {
+        Some((ROUNDING, "rounding".to_owned()))
+    } else {
+        let accuracy = truth.accuracy.max(ROUNDING);
+        let words = if truth.accuracy > ROUNDING { "accuracy of the reference" } else { "rounding" };
+        Some((accuracy, words.to_owned()))
+    };
+    WorkPrecision { title: title.into(), caption, cost, error_name, series, lost, floor }
 }

@@ -4,7 +4,7 @@ use crate::arithmetic::Complex;
 use crate::chart::{HingeSketch, MotorPose, Pose, Sketch, SliderPose, SpringSketch, WallSketch, plain};
 use crate::dynamics::Mechanism;
 use crate::dynamics::compile::Joint;
-use crate::scene::{Load, NamedPoint, Place, Scene};
+use crate::scene::{Load, NamedPoint, Place, Scene, Slider};
 
 /// A mechanism to draw.
 #[derive(Clone, Copy)]
@@ -18,21 +18,24 @@ pub(super) struct Drawing<'a> {
 impl<'a> Drawing<'a> {
     /// What the paths are of; none where there are none.
     pub fn title(&self) -> Option<String> {
-        let traced = self.traced().len();
-        let names = |all: &mut dyn Iterator<Item = &String>| {
-            all.take(traced).map(|name| plain(name)).collect::<Vec<_>>().join(", ")
+        let names = self.names();
+        let kind = match (names.len(), self.points().next().is_some()) {
+            (0, _) => return None,
+            (1, true) => "Path",
+            (_, true) => "Paths",
+            (1, false) => "Path of the end",
+            (_, false) => "Paths of the ends",
         };
-        let several = traced > 1;
-        if traced == 0 {
-            None
-        } else if self.points().next().is_some() {
-            let names = names(&mut self.points().map(|point| &point.name));
-            Some(format!("{} of {names}", if several { "Paths" } else { "Path" }))
-        } else {
-            let leaves = self.leaves();
-            let names = names(&mut leaves.iter().map(|&body| &self.mechanism.bodies[body].name));
-            Some(format!("{} of {names}", if several { "Paths of the ends" } else { "Path of the end" }))
+        Some(format!("{kind} of {}", names.join(", ")))
+    }
+
+    /// Names of the points whose paths are drawn, or of the bodies whose ends they are, with markup.
+    pub fn names(&self) -> Vec<String> {
+        let traced = self.traced().len();
+        if self.points().next().is_some() {
+            return self.points().take(traced).map(|point| plain(&point.name)).collect();
         }
+        self.leaves().iter().take(traced).map(|&body| plain(&self.mechanism.bodies[body].name)).collect()
     }
 
     /// Up to four bodies that no other hangs on.
@@ -68,6 +71,17 @@ impl<'a> Drawing<'a> {
         let (z, translations) = self.mechanism.pose(phi);
         let at = self.mechanism.place(place, &z, &translations);
         [at.re, at.im]
+    }
+
+    /// How far a slider is along its rail, from the rail's point \[m\].
+    pub fn travel(&self, slider: &Slider, phi: &[f64]) -> f64 {
+        let (z, translations) = self.mechanism.pose(phi);
+        let [point, origin] =
+            [&slider.point, &slider.rail.place].map(|place| self.mechanism.place(place, &z, &translations));
+        let along = Complex::new(slider.rail.direction[0], slider.rail.direction[1]);
+        let along = slider.rail.place.bar.map_or(along, |bar| along * z[bar]);
+        let apart = point - origin;
+        (apart.re * along.re + apart.im * along.im) / along.re.hypot(along.im)
     }
 
     pub fn sketch(&self) -> Sketch {
@@ -145,5 +159,32 @@ impl<'a> Drawing<'a> {
             let origin = self.mechanism.bodies[bar].ends[0];
             is_off.then(|| (bar, [origin, origin + Complex::new(x, y)]))
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::read_scene;
+
+    #[test]
+    fn the_travel_of_a_slider_is_that_of_the_closed_form() {
+        let scene = read_scene("examples/scenes/slider_crank_driven.json".as_ref(), &[]).expect("shipped");
+        let mechanism = Mechanism::new(&scene).expect("a mechanism");
+        let drawing = Drawing { scene: &scene, mechanism: &mechanism };
+        for crank in [0.0_f64, 0.4, 1.7, 4.0] {
+            let rod = -(0.5 * crank.sin()).asin();
+            let phi = vec![crank, rod, 0.0];
+            let there = 0.15 * crank.cos() + (0.09 - (0.15 * crank.sin()).powi(2)).sqrt();
+            let travel = drawing.travel(&scene.sliders[0], &mechanism_phi(&mechanism, &phi));
+            assert!((travel - there).abs() < 1e-15, "{travel} and {there}");
+        }
+    }
+
+    /// The angles with whatever further coordinates a mechanism has, at zero.
+    fn mechanism_phi(mechanism: &Mechanism, phi: &[f64]) -> Vec<f64> {
+        let mut all = vec![0.0; mechanism.coordinates()];
+        all[..phi.len()].copy_from_slice(phi);
+        all
     }
 }

@@ -5,7 +5,7 @@ use super::drawing::Drawing;
 use super::page::{Page, counted, figure};
 #[cfg(feature = "charts")]
 use crate::chart::{
-    self, ChartError, FILE_RESOLUTION, MechanismChart, OutputSeries, OutputsChart, Pose, plain,
+    self, ChartError, FILE_RESOLUTION, MechanismChart, OutputSeries, OutputsChart, Picture, Pose, plain,
 };
 use crate::run::Kinematics;
 use crate::run::kinematics::{DeadCentre, Limit, Position, Range};
@@ -186,7 +186,7 @@ pub fn table(found: &Kinematics) -> String {
 /// # Errors
 /// Drawing or encoding fails.
 #[cfg(feature = "charts")]
-pub fn charts(found: &Kinematics) -> Result<Vec<(&'static str, Vec<u8>)>, ChartError> {
+pub fn charts(found: &Kinematics) -> Result<Vec<(&'static str, Picture)>, ChartError> {
     let drawing = Drawing { scene: &found.scene, mechanism: &found.mechanism };
     let mut caption = vec![format!("scene {}", plain(&found.scene.name))];
     if let (Some(first), Some(last)) = (found.positions.first(), found.positions.last()) {
@@ -201,6 +201,7 @@ pub fn charts(found: &Kinematics) -> Result<Vec<(&'static str, Vec<u8>)>, ChartE
         sketch: drawing.sketch(),
         poses: poses(found, &drawing),
         trails: traced.iter().map(trail).collect(),
+        names: drawing.names(),
         horizon: None,
     };
     let drives: Vec<f64> = found.positions.iter().map(|at| at.drive).collect();
@@ -227,8 +228,8 @@ pub fn charts(found: &Kinematics) -> Result<Vec<(&'static str, Vec<u8>)>, ChartE
         horizon: None,
     };
     Ok(vec![
-        ("mechanism.png", chart::mechanism(&mechanism, FILE_RESOLUTION)?.png_bytes()?),
-        ("kinematics.png", chart::outputs(&outputs, FILE_RESOLUTION)?.png_bytes()?),
+        ("mechanism", chart::mechanism(&mechanism, FILE_RESOLUTION)?),
+        ("kinematics", chart::outputs(&outputs, FILE_RESOLUTION)?),
     ])
 }
 

@@ -4,7 +4,7 @@
 use super::drawing::Drawing;
 use super::page::{Page, counted, figure};
 #[cfg(feature = "charts")]
-use crate::chart::{self, ChartError, FILE_RESOLUTION, MechanismChart, MotionGif, plain};
+use crate::chart::{self, ChartError, FILE_RESOLUTION, MechanismChart, MotionGif, Picture, plain};
 use crate::run::Modes;
 use crate::run::modes::{Equilibrium, Mode, Stability};
 use serde_json::{Map, Value, json};
@@ -15,9 +15,10 @@ const LISTED: usize = 12;
 /// Equilibria that it lists, beside the one next to the start.
 const TOLD: usize = 6;
 #[cfg(feature = "charts")]
-const DRAWN: [&str; 4] = ["mode1.png", "mode2.png", "mode3.png", "mode4.png"];
+const DRAWN: [&str; 4] = ["mode1", "mode2", "mode3", "mode4"];
+/// Names of pictures and of motions, and what they show.
 #[cfg(feature = "charts")]
-const ANIMATED: [&str; 4] = ["mode1.gif", "mode2.gif", "mode3.gif", "mode4.gif"];
+pub type Charts = (Vec<(&'static str, Picture)>, Vec<(&'static str, MotionGif)>);
 /// Amplitude of what is drawn \[rad, or sizes of the mechanism\].
 #[cfg(feature = "charts")]
 const AMPLITUDE: f64 = 0.3;
@@ -130,12 +131,12 @@ pub fn text(found: &Modes) -> String {
 /// # Errors
 /// Drawing or encoding fails.
 #[cfg(feature = "charts")]
-pub fn charts(found: &Modes, motion: bool) -> Result<Vec<(&'static str, Vec<u8>)>, ChartError> {
+pub fn charts(found: &Modes) -> Result<Charts, ChartError> {
     let first = found.equilibria.iter().find(|one| one.from_start).or(found.equilibria.first());
-    let Some(one) = first else { return Ok(Vec::new()) };
+    let Some(one) = first else { return Ok(Default::default()) };
     let drawing = Drawing { scene: &found.scene, mechanism: &found.mechanism };
     let still = vec![0.0; one.phi.len()];
-    let mut all = Vec::new();
+    let (mut pictures, mut motions) = (Vec::new(), Vec::new());
     for (k, mode) in one.modes.iter().enumerate().take(DRAWN.len()) {
         let at = |phase: f64| found.displaced(one, mode, phase, AMPLITUDE);
         let pose = |phase: f64| drawing.pose(&at(phase), &still);
@@ -164,21 +165,20 @@ pub fn charts(found: &Modes, motion: bool) -> Result<Vec<(&'static str, Vec<u8>)
             sketch: drawing.sketch(),
             poses: vec![pose(TAU / 2.0), drawing.pose(&one.phi, &still), pose(0.0)],
             trails: Vec::new(),
+            names: Vec::new(),
             horizon: None,
         };
-        all.push((DRAWN[k], chart::mechanism(&chart, FILE_RESOLUTION)?.png_bytes()?));
-        if motion {
-            let gif = MotionGif {
-                title,
-                sketch: drawing.sketch(),
-                poses: (0..FRAMES).map(|j| pose(TAU * j as f64 / FRAMES as f64)).collect(),
-                time: Vec::new(),
-                trails,
-                delay: 4,
-                horizon: None,
-            };
-            all.push((ANIMATED[k], chart::motion_gif(&gif)?.bytes));
-        }
+        pictures.push((DRAWN[k], chart::mechanism(&chart, FILE_RESOLUTION)?));
+        let motion = MotionGif {
+            title,
+            sketch: drawing.sketch(),
+            poses: (0..FRAMES).map(|j| pose(TAU * j as f64 / FRAMES as f64)).collect(),
+            time: Vec::new(),
+            trails,
+            delay: 4,
+            horizon: None,
+        };
+        motions.push((DRAWN[k], motion));
     }
-    Ok(all)
+    Ok((pictures, motions))
 }

@@ -2,6 +2,8 @@
 
 #[cfg(feature = "charts")]
 use super::drawing::Drawing;
+#[cfg(feature = "charts")]
+use super::modes::Charts;
 use super::page::{Page, counted, figure};
 #[cfg(feature = "charts")]
 use crate::chart::{self, ChartError, FILE_RESOLUTION, MechanismChart, MotionGif, Multipliers, plain};
@@ -118,15 +120,14 @@ pub fn text(found: &PeriodicMotions) -> String {
     page.into_text()
 }
 
-/// The motion next to the start, or else the most stable one, over a period, and its multipliers: names of
-/// files and their content, an animation where wanted.
+/// The motion next to the start, or else the most stable one, over a period, and its multipliers.
 ///
 /// # Errors
 /// Drawing or encoding fails.
 #[cfg(feature = "charts")]
-pub fn charts(found: &PeriodicMotions, motion: bool) -> Result<Vec<(&'static str, Vec<u8>)>, ChartError> {
+pub fn charts(found: &PeriodicMotions) -> Result<Charts, ChartError> {
     let first = found.motions.iter().find(|one| one.from_start).or(found.motions.first());
-    let Some(one) = first else { return Ok(Vec::new()) };
+    let Some(one) = first else { return Ok(Default::default()) };
     let drawing = Drawing { scene: &found.scene, mechanism: &found.mechanism };
     let mut states = found.course(one, PLACES).unwrap_or_default();
     states.extend(states.first().cloned());
@@ -150,25 +151,23 @@ pub fn charts(found: &PeriodicMotions, motion: bool) -> Result<Vec<(&'static str
         sketch: drawing.sketch(),
         poses,
         trails: trails.clone(),
+        names: drawing.names(),
         horizon: None,
     };
     let plane =
         Multipliers { title: "Floquet multipliers".to_owned(), caption, values: one.multipliers.clone() };
-    let mut all = vec![
-        ("motion.png", chart::mechanism(&picture, FILE_RESOLUTION)?.png_bytes()?),
-        ("multipliers.png", chart::multipliers(&plane, FILE_RESOLUTION)?.png_bytes()?),
+    let pictures = vec![
+        ("motion", chart::mechanism(&picture, FILE_RESOLUTION)?),
+        ("multipliers", chart::multipliers(&plane, FILE_RESOLUTION)?),
     ];
-    if motion {
-        let gif = MotionGif {
-            title,
-            sketch: drawing.sketch(),
-            poses: every(FRAMES).map(pose).collect(),
-            time: (0..FRAMES).map(|k| found.period * k as f64 / FRAMES as f64).collect(),
-            trails,
-            delay: 4,
-            horizon: None,
-        };
-        all.push(("motion.gif", chart::motion_gif(&gif)?.bytes));
-    }
-    Ok(all)
+    let motion = MotionGif {
+        title,
+        sketch: drawing.sketch(),
+        poses: every(FRAMES).map(pose).collect(),
+        time: (0..FRAMES).map(|k| found.period * k as f64 / FRAMES as f64).collect(),
+        trails,
+        delay: 4,
+        horizon: None,
+    };
+    Ok((pictures, vec![("motion", motion)]))
 }

@@ -10,6 +10,7 @@ use crate::run::files::sha256;
 use crate::run::{Outcome, Sample};
 use crate::scene::Scene;
 use serde_json::{Map, Value, json};
+use std::borrow::Cow;
 use std::path::Path;
 
 /// The report as one JSON object; `wall_s` \[s\] is the time from the first output row to the last without
@@ -139,7 +140,7 @@ pub(super) fn target() -> String {
 }
 
 /// The files written, as the last entry of the page.
-pub fn files(folder: &Path, names: &[&str]) -> String {
+pub fn files(folder: &Path, names: &[Cow<'static, str>]) -> String {
     let mut page = Page::default();
     page.entry("files", &format!("{}:", folder.display()));
     page.entry("", &names.join(", "));

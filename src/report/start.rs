@@ -53,6 +53,7 @@ fn drawn(
         sketch: drawing.sketch(),
         poses: vec![drawing.pose(phi, omega)],
         trails: Vec::new(),
+        names: Vec::new(),
         horizon: None,
     };
     chart::mechanism(&chart, FILE_RESOLUTION)

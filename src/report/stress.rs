@@ -2,7 +2,7 @@
 
 use super::page::{Page, magnitude};
 #[cfg(feature = "charts")]
-use crate::chart::{self, ChartError, FILE_RESOLUTION, Map, MapAxis, Matrix, plain};
+use crate::chart::{self, ChartError, FILE_RESOLUTION, Map, MapAxis, Matrix, Picture, plain};
 #[cfg(feature = "charts")]
 use crate::run::stress::StabilityMap;
 use crate::run::stress::{Cell, Line, Stress, Verdict};
@@ -111,12 +111,12 @@ fn word(verdict: Verdict) -> &'static str {
     }
 }
 
-/// The chart of the matrix; returns the content of its file.
+/// The chart of the matrix.
 ///
 /// # Errors
-/// Drawing or encoding fails.
+/// Drawing fails.
 #[cfg(feature = "charts")]
-pub fn matrix(plan: &Stress, lines: &[Line]) -> Result<Vec<u8>, ChartError> {
+pub fn matrix(plan: &Stress, lines: &[Line]) -> Result<Picture, ChartError> {
     let outcome = |cell: &Cell| match cell.verdict {
         Verdict::Right => chart::Outcome::Right,
         Verdict::Refused => chart::Outcome::Refused,
@@ -139,7 +139,7 @@ pub fn matrix(plan: &Stress, lines: &[Line]) -> Result<Vec<u8>, ChartError> {
         columns: names(plan).iter().map(|name| plain(name)).collect(),
         cells: cells(lines).map(|cell| (outcome(cell), said(cell))).collect(),
     };
-    chart::matrix(&chart, FILE_RESOLUTION)?.png_bytes()
+    chart::matrix(&chart, FILE_RESOLUTION)
 }
 
 /// `3e-9`, or 0.
@@ -148,12 +148,12 @@ fn short(error: f64) -> String {
     if error == 0.0 { "0".into() } else { format!("{error:.0e}") }
 }
 
-/// The chart of steps and stiffnesses; returns the content of its file.
+/// The chart of steps and stiffnesses.
 ///
 /// # Errors
-/// Drawing or encoding fails.
+/// Drawing fails.
 #[cfg(feature = "charts")]
-pub fn stability(map: &StabilityMap) -> Result<Vec<u8>, ChartError> {
+pub fn stability(map: &StabilityMap) -> Result<Picture, ChartError> {
     let ends = |value: fn(&crate::run::stress::Stability) -> f64| {
         let of = |cell: Option<&crate::run::stress::Stability>| cell.map_or(1.0, value);
         [of(map.cells.first()), of(map.cells.last())]
@@ -182,5 +182,5 @@ pub fn stability(map: &StabilityMap) -> Result<Vec<u8>, ChartError> {
         range: Some([1e-12, 1.0]),
         words: [String::new(), String::new(), "stopped".into()],
     };
-    chart::map(&chart, FILE_RESOLUTION)?.png_bytes()
+    chart::map(&chart, FILE_RESOLUTION)
 }

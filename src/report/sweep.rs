@@ -2,7 +2,7 @@
 
 use super::page::{Page, counted, figure, magnitude};
 #[cfg(feature = "charts")]
-use crate::chart::{self, Cell, ChartError, FILE_RESOLUTION, Map, MapAxis, Profile, plain};
+use crate::chart::{self, Cell, ChartError, FILE_RESOLUTION, Map, MapAxis, Picture, Profile, plain};
 use crate::run::files::sha256;
 use crate::run::sweep::table::columns;
 #[cfg(feature = "charts")]
@@ -232,7 +232,7 @@ impl Curve {
     ///
     /// # Errors
     /// Drawing or encoding fails; `Ok` with the reason where there is nothing to show.
-    pub fn draw(&self, sweep: &Sweep) -> Result<Result<Vec<u8>, NoChart>, ChartError> {
+    pub fn draw(&self, sweep: &Sweep) -> Result<Result<Picture, NoChart>, ChartError> {
         let names = results(sweep);
         let is_flip = self.column.is_none_or(|column| column + 1 == names.len());
         if is_flip && self.seen.iter().all(|time| time.is_nan()) {
@@ -320,7 +320,7 @@ impl Curve {
                 )
             }
         };
-        Ok(Ok(picture?.png_bytes()?))
+        Ok(Ok(picture?))
     }
 }
 

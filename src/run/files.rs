@@ -10,6 +10,7 @@
 use super::checkpoint;
 use sha2::digest::common::hazmat::{SerializableState, SerializedState};
 use sha2::{Digest, Sha256};
+use std::borrow::Cow;
 use std::cell::Cell;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -100,7 +101,7 @@ pub enum FileError {
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
-    written: Vec<&'static str>,
+    written: Vec<Cow<'static, str>>,
     /// Holds the lock; `None` where the file system knows no locks.
     _lock: Option<File>,
 }
@@ -181,13 +182,13 @@ impl Folder {
     }
 
     /// Names of the files written, in the order of their completion.
-    pub fn names(&self) -> &[&'static str] {
+    pub fn names(&self) -> &[Cow<'static, str>] {
         &self.written
     }
 
     /// Their paths.
     pub fn files(&self) -> Vec<PathBuf> {
-        self.written.iter().map(|name| self.path.join(name)).collect()
+        self.written.iter().map(|name| self.path.join(&**name)).collect()
     }
 
     /// Begins a table.
@@ -247,7 +248,7 @@ impl Folder {
             stream.file.sync_all().map_err(failed)?;
         }
         fs::rename(&stream.path, self.path.join(name)).map_err(failed)?;
-        self.written.push(name);
+        self.written.push(name.into());
         Ok(hexadecimal(std::mem::take(&mut stream.hash)))
     }
 
@@ -255,31 +256,38 @@ impl Folder {
     ///
     /// # Errors
     /// The folder cannot be written.
-    pub fn write(&mut self, name: &'static str, content: &[u8]) -> Result<(), FileError> {
+    pub fn write(&mut self, name: impl Into<Cow<'static, str>>, content: &[u8]) -> Result<(), FileError> {
+        let name = name.into();
         let mut builder = tempfile::Builder::new();
-        builder.prefix(UNFINISHED).suffix(name);
+        builder.prefix(UNFINISHED).suffix(&*name);
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt;
             // Temporary files are private; a result is as readable as the user's other files.
             builder.permissions(fs::Permissions::from_mode(0o666));
         }
-        let failed = |source| self.failed(name, source);
+        let failed = |source| self.failed(&name, source);
         let mut file: NamedTempFile = builder.tempfile_in(&self.path).map_err(failed)?;
         file.write_all(content).map_err(failed)?;
-        file.persist(self.path.join(name)).map_err(|error| failed(error.error))?;
+        file.persist(self.path.join(&*name)).map_err(|error| failed(error.error))?;
         self.written.push(name);
         Ok(())
     }
 
-    /// Removes what an earlier run left under these names.
+    /// Removes what an earlier run left under these names, charts in all their formats.
     ///
     /// # Errors
     /// A file cannot be removed.
     pub fn clear(&self, names: &[&str]) -> Result<(), FileError> {
+        let others = |name: &str| match name.rsplit_once('.') {
+            Some((stem, "png")) => vec![format!("{stem}.svg"), format!("{stem}.pdf")],
+            Some((stem, "gif")) => vec![format!("{stem}.apng")],
+            _ => Vec::new(),
+        };
         names
             .iter()
-            .filter(|name| !self.written.contains(name))
+            .flat_map(|name| others(name).into_iter().chain([(*name).to_owned()]))
+            .filter(|name| !self.written.iter().any(|written| written == name))
             .try_for_each(|name| remove(self.path.join(name)))
     }
 

@@ -263,6 +263,13 @@ impl Running {
         self
     }
 
+    /// With samples of a window of time for charts \[s\].
+    #[must_use]
+    pub fn windowed(mut self, window: Option<[f64; 2]>) -> Self {
+        self.outcome.trace.window = window;
+        self
+    }
+
     /// Goes on looking for the events that the run before the snapshot looked for.
     ///
     /// # Errors

@@ -6,6 +6,7 @@
 //! slider the torque it exerts on its body, [`ConstraintEquation`] by row.
 
 use super::sample::Sample;
+use crate::arithmetic::Complex;
 use crate::dynamics::Mechanism;
 use crate::dynamics::constraint::ConstraintEquation;
 use std::io::{self, Write};
@@ -61,6 +62,61 @@ pub(super) fn columns(sample: &Sample, shown: &Shown, numbers: &mut Vec<f64>) {
     numbers.extend(&sample.outputs);
 }
 
+/// The names of the columns, with their units in brackets.
+pub fn header(mechanism: &Mechanism) -> Vec<String> {
+    let mut header = vec!["t [s]".to_owned()];
+    for body in mechanism.own_bodies() {
+        for (quantity, unit) in
+            [("phi", "rad"), ("omega", "rad/s"), ("x", "m"), ("y", "m"), ("vx", "m/s"), ("vy", "m/s")]
+        {
+            header.push(format!("{}.{quantity} [{unit}]", body.name));
+        }
+    }
+    header.extend(mechanism.integrals().map(|(name, _)| name.to_owned()));
+    for (quantity, unit) in [("kinetic", "J"), ("potential", "J"), ("work", "J"), ("imbalance", "1")] {
+        header.push(format!("{quantity} [{unit}]"));
+    }
+    let shown = shown(mechanism);
+    for (row, &shown) in mechanism.constraints.iter().zip(shown.forces.iter()) {
+        let (unit, name) = (row.unit(), row.name());
+        header.extend([format!("{name}.C [{unit}]"), format!("{name}.C' [{unit}/s]")]);
+        let force = if row.is_angle() { "torque" } else { "force" };
+        header.extend(
+            [format!("{name}.{force} [{}]", row.unit_of_force()), format!("{name}.power [W]")]
+                .into_iter()
+                .take(shown),
+        );
+    }
+    header.extend(shown.friction.then(|| "friction [J]".to_owned()));
+    let outputs = mechanism.outputs.iter().flat_map(|outputs| outputs.heads());
+    header.extend(outputs.map(|(name, unit)| format!("{name} [{unit}]")));
+    debug_assert_eq!(header.len(), width(mechanism, &shown));
+    header
+}
+
+/// The numbers of the row of a sample, also of one in a [`Trace`](super::Trace).
+pub fn row(mechanism: &Mechanism, sample: &Sample) -> Vec<f64> {
+    let mut numbers = Vec::new();
+    columns(&placed(mechanism, sample), &shown(mechanism), &mut numbers);
+    numbers
+}
+
+/// A sample with the positions and velocities of the centres that follow from its angles and rates.
+fn placed(mechanism: &Mechanism, sample: &Sample) -> Sample {
+    let (z, translations) = mechanism.pose(&sample.phi);
+    let mut velocities = vec![Complex::ZERO; mechanism.bodies.len()];
+    mechanism.forest.origin_velocities(&z, &sample.omega, &mut velocities);
+    let arms: Vec<Complex<f64>> =
+        mechanism.bodies.iter().zip(&z).map(|(body, z)| z.turn(body.centre)).collect();
+    let both = |vector: Complex<f64>| [vector.re, vector.im];
+    let rates = velocities.iter().zip(&arms).zip(&sample.omega);
+    Sample {
+        centre: translations.iter().zip(&arms).map(|(&at, &arm)| both(at + arm)).collect(),
+        velocity: rates.map(|((&of, arm), &omega)| both(of + arm.left().times(omega))).collect(),
+        ..sample.clone()
+    }
+}
+
 /// How many numbers that are.
 fn width(mechanism: &Mechanism, shown: &Shown) -> usize {
     let forces = shown.forces.iter().sum::<usize>();
@@ -75,36 +131,10 @@ impl<W: Write> Table<W> {
     /// # Errors
     /// What the writer says.
     pub fn new(mechanism: &Mechanism, writer: W) -> csv::Result<Self> {
-        let mut header = vec!["t [s]".to_owned()];
-        for body in mechanism.own_bodies() {
-            for (quantity, unit) in
-                [("phi", "rad"), ("omega", "rad/s"), ("x", "m"), ("y", "m"), ("vx", "m/s"), ("vy", "m/s")]
-            {
-                header.push(format!("{}.{quantity} [{unit}]", body.name));
-            }
-        }
-        header.extend(mechanism.integrals().map(|(name, _)| name.to_owned()));
-        for (quantity, unit) in [("kinetic", "J"), ("potential", "J"), ("work", "J"), ("imbalance", "1")] {
-            header.push(format!("{quantity} [{unit}]"));
-        }
-        let shown = shown(mechanism);
-        for (row, &shown) in mechanism.constraints.iter().zip(shown.forces.iter()) {
-            let (unit, name) = (row.unit(), row.name());
-            header.extend([format!("{name}.C [{unit}]"), format!("{name}.C' [{unit}/s]")]);
-            let force = if row.is_angle() { "torque" } else { "force" };
-            header.extend(
-                [format!("{name}.{force} [{}]", row.unit_of_force()), format!("{name}.power [W]")]
-                    .into_iter()
-                    .take(shown),
-            );
-        }
-        header.extend(shown.friction.then(|| "friction [J]".to_owned()));
-        let outputs = mechanism.outputs.iter().flat_map(|outputs| outputs.heads());
-        header.extend(outputs.map(|(name, unit)| format!("{name} [{unit}]")));
+        let (header, shown) = (header(mechanism), shown(mechanism));
         let mut titles = csv::Writer::from_writer(Vec::with_capacity(BUFFER + BUFFER / 4));
         titles.write_record(&header)?;
         let buffer = titles.into_inner().map_err(|error| error.into_error())?;
-        debug_assert_eq!(header.len(), width(mechanism, &shown));
         Ok(Self { writer, buffer, width: header.len(), row: Vec::new(), shown })
     }
 

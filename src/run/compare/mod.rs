@@ -19,7 +19,7 @@ mod verdict;
 
 pub use measure::Found;
 pub use truth::Truth;
-pub use verdict::{Advice, LOST, TARGETS, front};
+pub use verdict::{Advice, LOST, ROUNDING, TARGETS, front};
 
 use self::measure::Ended;
 use self::truth::{Room, together};

@@ -8,6 +8,9 @@ pub const TARGETS: [f64; 4] = [1e-3, 1e-6, 1e-9, 1e-12];
 /// A path that is off by more has nothing to do with the scene's \[rad\].
 pub const LOST: f64 = 0.1;
 
+/// Errors below which settings are not told apart: a few roundings of a turn, or of the energy scale.
+pub const ROUNDING: f64 = 1e-15;
+
 /// The numbers of the points that no other beats in both coordinates, from the least first one on; points
 /// with a coordinate that is not finite are none.
 ///
@@ -44,7 +47,9 @@ impl Comparison {
     /// Numbers of the entries that no other beats in both run time and error, fastest first; lost paths are
     /// none.
     pub fn front(&self) -> Vec<usize> {
-        let error = |entry: &Entry| entry.error().filter(|&error| error <= LOST);
+        let floor = self.truth.accuracy.max(ROUNDING);
+        let error =
+            |entry: &Entry| entry.error().filter(|&error| error <= LOST).map(|error| error.max(floor));
         let point = |entry: &Entry| [entry.median().unwrap_or(f64::NAN), error(entry).unwrap_or(f64::NAN)];
         front(&self.entries.iter().map(point).collect::<Vec<_>>())
     }

@@ -1,0 +1,310 @@
+//! A run in pictures: which charts it has, and what they show.
+
+mod columns;
+mod drift;
+mod motion;
+mod outputs;
+
+pub use columns::Columns;
+pub use drift::{drifts, overlay};
+
+use crate::chart::{
+    self, AngleSeries, Angles, ChartError, FILE_RESOLUTION, MechanismChart, MotionGif, Picture, Pose, plain,
+};
+use crate::dynamics::Mechanism;
+use crate::dynamics::constraint::ConstraintEquation;
+use crate::report::curves::{furthest, is_coarse, smoothed, span};
+use crate::report::drawing::Drawing;
+use crate::report::page::{figure, rough};
+use crate::run::{Outcome, Sample};
+use crate::scene::{Place, Scene};
+use std::f64::consts::TAU;
+
+/// A chart of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Chart {
+    /// The mechanism at the end, and the way there.
+    Mechanism,
+    /// Angles against time.
+    Angles,
+    /// Energy drift against time.
+    EnergyDrift,
+    /// Constraint drift against time.
+    ConstraintDrift,
+    /// Torque and power of the motors against time.
+    TorquePower,
+    /// Outputs against time.
+    Outputs,
+}
+
+impl Chart {
+    /// All of them.
+    pub const ALL: [Self; 6] = [
+        Self::Mechanism,
+        Self::Angles,
+        Self::EnergyDrift,
+        Self::ConstraintDrift,
+        Self::TorquePower,
+        Self::Outputs,
+    ];
+
+    /// Name of its file, without the ending.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Mechanism => "mechanism",
+            Self::Angles => "angles",
+            Self::EnergyDrift => "energy_drift",
+            Self::ConstraintDrift => "constraint_drift",
+            Self::TorquePower => "torque_power",
+            Self::Outputs => "outputs",
+        }
+    }
+}
+
+/// The charts a run has something to show in: none of constraints that are kept exactly, none of torques
+/// without motors.
+pub fn wanted(mechanism: &Mechanism, outcome: &Outcome) -> Vec<Chart> {
+    let driven = mechanism.constraints.iter().any(ConstraintEquation::is_motor);
+    let has = |chart: &Chart| match chart {
+        Chart::Mechanism | Chart::Angles | Chart::EnergyDrift => true,
+        Chart::ConstraintDrift => drifts(&[outcome]),
+        Chart::TorquePower => driven,
+        Chart::Outputs => mechanism.outputs.is_some(),
+    };
+    Chart::ALL.into_iter().filter(has).collect()
+}
+
+/// Draws one chart.
+///
+/// # Errors
+/// Drawing fails.
+pub fn draw(
+    chart: Chart,
+    scene: &Scene,
+    mechanism: &Mechanism,
+    outcome: &Outcome,
+) -> Result<Picture, ChartError> {
+    let run = Finished { scene, mechanism, outcome };
+    match chart {
+        Chart::Mechanism => chart::mechanism(&run.mechanism_chart(), FILE_RESOLUTION),
+        Chart::Angles => chart::angles(&run.angles(), FILE_RESOLUTION),
+        Chart::EnergyDrift => chart::energy_drift(&run.energy_drift(), FILE_RESOLUTION),
+        Chart::ConstraintDrift => chart::constraint_drift(&run.constraint_drift(), FILE_RESOLUTION),
+        Chart::TorquePower => {
+            let (chart, sliders) = run.torque_power();
+            chart::force_power(&chart, &sliders, FILE_RESOLUTION)
+        }
+        Chart::Outputs => chart::outputs(&run.outputs(), FILE_RESOLUTION),
+    }
+}
+
+/// Draws the columns of the trajectory that are named, as far as [`Columns::find`] knows them.
+///
+/// # Errors
+/// Drawing fails.
+pub fn columns(
+    scene: &Scene,
+    mechanism: &Mechanism,
+    outcome: &Outcome,
+    names: &[String],
+) -> Result<Picture, ChartError> {
+    chart::outputs(&Finished { scene, mechanism, outcome }.columns(names), FILE_RESOLUTION)
+}
+
+/// The mechanism in motion.
+pub fn motion(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> MotionGif {
+    Finished { scene, mechanism, outcome }.motion()
+}
+
+/// Most it may turn in a window of time that shows single swings \[rad\], and how much is shown instead.
+const CROWDED: [f64; 2] = [40.0 * TAU, 12.0 * TAU];
+/// How far the fastest body turns along the path shown \[rad\].
+const PATH: f64 = 4.0 * TAU;
+/// An angle that changes by less is called constant \[rad\].
+const STILL: f64 = 1e-9;
+/// How far it turns between ghosts \[rad\].
+const GHOST: f64 = 0.4;
+/// Ghosts shown.
+const GHOSTS: usize = 5;
+
+/// Largest value less the least.
+fn spread(values: &[f64]) -> f64 {
+    let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+    values.iter().copied().fold(f64::NEG_INFINITY, f64::max) - least
+}
+
+/// A run and all that belongs to it.
+struct Finished<'a> {
+    scene: &'a Scene,
+    mechanism: &'a Mechanism,
+    outcome: &'a Outcome,
+}
+
+impl Finished<'_> {
+    fn drawing(&self) -> Drawing<'_> {
+        Drawing { scene: self.scene, mechanism: self.mechanism }
+    }
+
+    fn caption(&self, more: Option<String>) -> Vec<String> {
+        let plan = &self.outcome.plan;
+        let mut caption =
+            vec![format!("scene {}", plain(&self.scene.name)), plain(&crate::report::setting(plan))];
+        if !self.mechanism.constraints.is_empty() {
+            caption.push(plain(&crate::report::check::stabilization(self.mechanism, plan)));
+        }
+        caption.extend(more);
+        caption
+    }
+
+    /// The time up to which the path can be trusted \[s\], where that ends before `end`; and what to say
+    /// about it.
+    fn horizon(&self, end: f64) -> (Option<f64>, Option<String>) {
+        let horizon =
+            self.outcome.trust.as_ref().and_then(|trust| trust.horizon).filter(|&horizon| horizon < end);
+        (horizon, horizon.map(|horizon| format!("pale beyond the trust horizon, {} s", rough(horizon))))
+    }
+
+    /// Samples in which single swings can be told apart: of the whole run, or else of its beginning; and what
+    /// to say about it.
+    fn window(&self) -> (Vec<&Sample>, Option<String>) {
+        let trace = &self.outcome.trace;
+        if trace.window.is_some() {
+            return (trace.part.iter().collect(), Some(self.chosen_window()));
+        }
+        let whole: Vec<&Sample> = trace.whole.iter().collect();
+        if !is_coarse(&whole)
+            && whole.windows(2).map(|pair| furthest(pair[0], pair[1])).sum::<f64>() <= CROWDED[0]
+        {
+            return (whole, None);
+        }
+        let mut turned = 0.0;
+        let mut window: Vec<&Sample> = Vec::new();
+        for sample in &trace.head {
+            turned += window.last().map_or(0.0, |before| furthest(before, sample));
+            if turned > CROWDED[1] && window.len() > 1 {
+                break;
+            }
+            window.push(sample);
+        }
+        let span = span(&window);
+        (window, Some(format!("first {} s of {} s", rough(span), figure(self.outcome.last.t))))
+    }
+
+    /// `10 s to 12 s of 500 s`.
+    fn chosen_window(&self) -> String {
+        let [from, to] = self.outcome.trace.window.unwrap_or_default();
+        format!("{} s to {} s of {} s", figure(from), figure(to), figure(self.outcome.last.t))
+    }
+
+    /// All samples of the window asked for, or the last ones, as far back as the fastest body turns by
+    /// `PATH`.
+    fn path(&self) -> Vec<&Sample> {
+        if self.outcome.trace.window.is_some() {
+            return self.outcome.trace.part.iter().collect();
+        }
+        let mut turned = 0.0;
+        let mut path: Vec<&Sample> = Vec::new();
+        for sample in self.outcome.trace.tail.iter().rev() {
+            if let Some(after) = path.last() {
+                turned += furthest(sample, after);
+            }
+            if turned > PATH {
+                break;
+            }
+            path.push(sample);
+        }
+        path.reverse();
+        path
+    }
+
+    fn mechanism_chart(&self) -> MechanismChart {
+        let path = self.path();
+        let coarse = is_coarse(&path);
+        let drawing = self.drawing();
+        let traced = drawing.traced();
+        let trails = if coarse {
+            Vec::new()
+        } else {
+            let smooth = smoothed(&path);
+            let trail = |place: &Place| smooth.iter().map(|(_, phi)| drawing.place(place, phi)).collect();
+            traced.iter().map(trail).collect()
+        };
+        let mut poses: Vec<Pose> = Vec::new();
+        let (mut turned, mut after) = (0.0, None);
+        for sample in path.iter().rev() {
+            turned += after.map_or(GHOST, |after| furthest(sample, after));
+            after = Some(*sample);
+            if turned >= GHOST && poses.len() <= GHOSTS {
+                poses.push(self.drawing().pose(&sample.phi, &sample.omega));
+                turned = 0.0;
+            }
+        }
+        poses.reverse();
+        if coarse {
+            poses.drain(..poses.len().saturating_sub(1));
+        }
+        let end = path.last().map_or(self.outcome.last.t, |sample| sample.t);
+        let title = (drawing.title().filter(|_| !coarse))
+            .unwrap_or_else(|| format!("The mechanism at {} s", figure(end)));
+        let more = match self.outcome.trace.window {
+            Some(_) => Some(self.chosen_window()),
+            None => (!coarse)
+                .then(|| format!("last {} s of {} s", rough(span(&path)), figure(self.outcome.last.t))),
+        };
+        let (horizon, past) = self.horizon(end);
+        let trusted = horizon
+            .filter(|_| !coarse)
+            .map(|horizon| smoothed(&path).partition_point(|(t, _)| *t <= horizon));
+        let mut caption = self.caption(more);
+        caption.extend(past);
+        MechanismChart {
+            title,
+            caption,
+            sketch: self.drawing().sketch(),
+            poses,
+            names: if coarse { Vec::new() } else { drawing.names() },
+            trails,
+            horizon: trusted,
+        }
+    }
+
+    fn angles(&self) -> Angles {
+        let (window, more) = self.window();
+        let smooth = smoothed(&window);
+        let series = self.mechanism.own_bodies().iter().enumerate().map(|(k, body)| AngleSeries {
+            name: plain(&body.name),
+            angle: smooth.iter().map(|(_, phi)| phi[k]).collect(),
+        });
+        let (moving, still): (Vec<_>, Vec<_>) = series.partition(|series| spread(&series.angle) > STILL);
+        let drawing = self.drawing();
+        let travels = self.scene.sliders.iter().map(|slider| AngleSeries {
+            name: plain(&slider.name),
+            angle: smooth.iter().map(|(_, phi)| drawing.travel(slider, phi)).collect(),
+        });
+        let (horizon, past) = self.horizon(window.last().map_or(0.0, |sample| sample.t));
+        let mut caption = self.caption(more);
+        caption.extend(past);
+        let travels: Vec<AngleSeries> = travels.collect();
+        // A body that keeps its angle is told in a line where others move.
+        let series = if moving.is_empty() && travels.is_empty() {
+            still
+        } else {
+            let names: Vec<&str> = still.iter().map(|series| series.name.as_str()).collect();
+            caption.extend((!names.is_empty()).then(|| format!("at a constant angle: {}", names.join(", "))));
+            moving
+        };
+        let title = match (series.is_empty(), travels.is_empty()) {
+            (true, false) => "Travel of the sliders",
+            (false, false) => "Angles of the bars, travel of the sliders",
+            _ => "Angles of the bars",
+        };
+        Angles {
+            title: title.to_owned(),
+            caption,
+            time: smooth.iter().map(|(t, _)| *t).collect(),
+            series,
+            travels,
+            horizon,
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! Torques, outputs and columns against time.
+
+use super::Finished;
+use crate::chart::{MotorSeries, OutputSeries, OutputsChart, TorquePower, plain};
+use crate::report::page::figure;
+
+impl Finished<'_> {
+    /// The motors, and which of them push sliders.
+    pub fn torque_power(&self) -> (TorquePower, Vec<usize>) {
+        let (window, more) = self.window();
+        let driven = self.mechanism.constraints.iter().filter(|row| row.is_motor());
+        let sliders: Vec<usize> =
+            driven.enumerate().filter(|(_, row)| !row.is_angle()).map(|(k, _)| k).collect();
+        let motors = (self.mechanism.constraints.iter().enumerate()).filter(|(_, row)| row.is_motor()).map(
+            |(r, row)| MotorSeries {
+                name: plain(row.name()),
+                time: window.iter().map(|sample| sample.t).collect(),
+                torque: window.iter().map(|sample| sample.motors[r][0]).collect(),
+                power: window.iter().map(|sample| sample.motors[r][1]).collect(),
+            },
+        );
+        let motors: Vec<MotorSeries> = motors.collect();
+        let names: Vec<&str> = motors.iter().map(|motor| motor.name.as_str()).collect();
+        let (horizon, past) = self.horizon(window.last().map_or(0.0, |sample| sample.t));
+        let mut caption = self.caption(more);
+        caption.extend(past);
+        let what = match sliders.len() {
+            0 => "Torque",
+            all if all == motors.len() => "Force",
+            _ => "Torque, force",
+        };
+        (
+            TorquePower {
+                title: format!("{what} and power of {}", names.join(", ")),
+                caption,
+                motors,
+                horizon,
+            },
+            sliders,
+        )
+    }
+
+    /// The outputs over the whole run.
+    pub fn outputs(&self) -> OutputsChart {
+        let trace = &self.outcome.trace;
+        let (whole, more) = match trace.window {
+            Some(_) => (&trace.part, Some(self.chosen_window())),
+            None => (&trace.whole, None),
+        };
+        let heads = self.mechanism.outputs.iter().flat_map(|outputs| outputs.heads());
+        let outputs = heads.enumerate().map(|(k, (name, unit))| OutputSeries {
+            name: plain(name),
+            unit: unit.replace(' ', "·"),
+            time: whole.iter().map(|sample| sample.t).collect(),
+            value: whole.iter().map(|sample| sample.outputs.get(k).copied().unwrap_or(f64::NAN)).collect(),
+            extremes: self.outcome.extremes.get(k).map_or(Vec::new(), |one| vec![one.min, one.max]),
+        });
+        let (horizon, past) = self.horizon(whole.last().map_or(0.0, |sample| sample.t));
+        OutputsChart {
+            over: None,
+            title: format!("Outputs over {} s", figure(self.outcome.last.t)),
+            caption: self.caption(more).into_iter().chain(past).collect(),
+            outputs: outputs.collect(),
+            horizon,
+        }
+    }
+}
