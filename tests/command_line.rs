@@ -348,6 +348,66 @@ fn charts_come_in_the_formats_and_of_the_columns_and_window_asked_for() {
 }
 
 #[test]
+fn parts_of_a_sweep_join_to_its_very_bytes() {
+    const PLACE: &str = "free/sweep-start.bar1.phi-start.bar2.phi-taylor-1e-9";
+    const SWEEP: &str = "sweep free.json --vary bar1.phi=-pi..pi:13 --vary bar2.phi=-pi..pi:11 --until 6 --output bar1.omega -q";
+    let program = Program::with_scenes(&["free"]);
+    program.run(&format!("{SWEEP} --out one")).exits(0);
+    // More parts than fit evenly, on other numbers of threads, in any order.
+    for (number, threads) in [(5, 1), (1, 2), (3, 3), (4, 1), (2, 2)] {
+        program.run(&format!("{SWEEP} --out parts --threads {threads} --shard {number}/5")).exits(0);
+    }
+    let merged = program.run(&format!("merge parts/{PLACE} --json")).exits(0).object();
+    assert_eq!((merged["points"].as_u64(), merged["done"].as_u64()), (Some(143), Some(143)));
+    let bytes = |path: String| std::fs::read(program.path(&path)).expect(&path);
+    let mut files = vec!["sweep.csv"];
+    files.extend(cfg!(feature = "charts").then_some("map.png"));
+    for file in files {
+        assert!(bytes(format!("one/{PLACE}/{file}")) == bytes(format!("parts/{PLACE}/{file}")), "{file}");
+    }
+    let [mut one, mut parts] =
+        ["one", "parts"].map(|out| record(&program, &format!("{out}/{PLACE}/sweep.json")));
+    for record in [&mut one, &mut parts] {
+        assert!(record["timings"]["wall_s"].is_number());
+        record["timings"] = Value::Null;
+    }
+    assert_eq!(one.to_string(), parts.to_string());
+
+    let shard = |number: u64| format!("parts/{PLACE}/shard-{number}-of-5");
+    // Again only where it is wanted, into another folder, from parts named one by one.
+    program.run(&format!("merge parts/{PLACE}")).exits(6).says(&["--force"]);
+    let named: Vec<String> = (1..=5).map(shard).collect();
+    program.run(&format!("merge {} --out again -q", named.join(" "))).exits(0).stays_silent();
+    assert!(bytes("again/sweep.csv".into()) == bytes(format!("one/{PLACE}/sweep.csv")));
+    program
+        .run(&format!("merge {} {} {} --out few", named[0], named[3], named[2]))
+        .exits(6)
+        .says(&["parts 2, 5 of 5 missing", "--shard 2/5"]);
+    program.run(&format!("merge {} --out few", named[0])).exits(6).says(&["parts 2, 3, 4, 5 of 5 missing"]);
+    program.run("merge one --out few").exits(6).says(&["one holds no part of a sweep", "--shard"]);
+    // A part of another grid, of another number of parts, a copy, an altered table.
+    program.run(&format!("{} --out other --shard 2/5", SWEEP.replace(":13", ":12"))).exits(0);
+    let other = format!("other/{PLACE}/shard-2-of-5");
+    program.run(&format!("merge {} {other} --out few", named[0])).exits(6).says(&["another sweep", "grid"]);
+    program.run(&format!("{SWEEP} --out other --shard 2/4")).exits(0);
+    let other = format!("other/{PLACE}/shard-2-of-4");
+    program
+        .run(&format!("merge {} {other} --out few", named[0]))
+        .exits(6)
+        .says(&["one of 4 parts instead of 5"]);
+    program.run(&format!("{SWEEP} --out twin --shard 1/5")).exits(0);
+    program
+        .run(&format!("merge parts/{PLACE} twin/{PLACE} --out few"))
+        .exits(6)
+        .says(&["part 1/5 is there twice"]);
+    let table = program.read(&format!("{}/sweep.csv", named[1]));
+    program.write(&format!("{}/sweep.csv", named[1]), &table.replacen('7', "8", 1));
+    program.run(&format!("merge parts/{PLACE} --out few")).exits(6).says(&["shard-2-of-5", "has changed"]);
+    program.run(&format!("{SWEEP} --shard 6/5")).exits(2).says(&["I/N", "3/8"]);
+    assert!(!program.path("few/sweep.csv").exists(), "nothing half is left");
+}
+
+#[test]
 fn modes_leave_a_record_and_charts() {
     let program = Program::with_scenes(&["free", "motor"]);
     let object = program.run("modes free.json --json --gif").exits(0).object();

@@ -556,5 +556,18 @@ mod command {
         let whole = Program::with_scenes(&["free"]);
         whole.run(&format!("{SWEEP} --threads 1 -q")).exits(0);
         assert!(of_sweep(&program) == of_sweep(&whole));
+
+        // So does a part of one, and the parts together are the whole.
+        let parts = Program::with_scenes(&["free"]);
+        let first = format!("{PLACE}/shard-1-of-2");
+        let mut child = started(&parts, &format!("{SWEEP} --shard 1/2"));
+        await_checkpoint(&parts.path(&first), &mut child);
+        signal(&child, "-KILL");
+        ended(child);
+        parts.run(&format!("{SWEEP} --shard 2/2 -q")).exits(0);
+        parts.run(&format!("merge {PLACE}")).exits(6).says(&["not finished", "driftless resume"]);
+        parts.run(&format!("resume {first} -q")).exits(0);
+        parts.run(&format!("merge {PLACE} -q")).exits(0);
+        assert!(of_sweep(&parts) == of_sweep(&whole));
     }
 }

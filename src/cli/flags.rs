@@ -7,7 +7,7 @@ use super::output::{message, print};
 use crate::run::kinematics::Drive;
 use crate::run::stress::MAX_EVALUATIONS;
 use crate::run::trust::Level;
-use crate::run::{Limits, METHODS, MethodId, Prefer, Request, Stabilization, Vary};
+use crate::run::{Limits, METHODS, MethodId, Prefer, Request, Shard, Stabilization, Vary};
 use crate::scene::{self, Override};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::error::ErrorKind;
@@ -51,6 +51,8 @@ pub enum Command {
     Compare(Box<CompareFlags>),
     /// Go on with an interrupted run or sweep: it ends as if nothing had been, byte for byte
     Resume(ResumeFlags),
+    /// Join the parts of a sweep: the same table, chart and record as of one process, byte for byte
+    Merge(MergeFlags),
     /// Run stiff and extreme scenes by every method: each ends right, refused or stopped, and none wrong
     Stress(StressFlags),
     /// List the methods
@@ -69,7 +71,7 @@ pub enum Command {
 }
 
 /// Which scene, and how to talk about it.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub struct SceneFlags {
     /// Scene file (JSON), - for standard input; `driftless schema` describes it
     #[arg(value_name = "SCENE")]
@@ -90,7 +92,7 @@ pub struct SceneFlags {
 }
 
 /// How to run it.
-#[derive(Debug, Default, PartialEq, Args)]
+#[derive(Clone, Debug, Default, PartialEq, Args)]
 #[command(next_help_heading = "Integration")]
 pub struct PlanFlags {
     /// Method; left out, one that suits the scene
@@ -240,7 +242,7 @@ pub struct RunFlags {
 }
 
 /// `driftless sweep`.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub struct SweepFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
@@ -261,6 +263,9 @@ pub struct SweepFlags {
     /// Threads [default: all processors]; the table is the same whatever their number
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Points")]
     pub threads: Option<u16>,
+    /// Run part I of N alone, into a folder shard-I-of-N of the sweep's own; `driftless merge` joins them
+    #[arg(long, value_name = "I/N", value_parser = clap::value_parser!(Shard), help_heading = "Points")]
+    pub shard: Option<Shard>,
     #[allow(missing_docs)]
     #[command(flatten)]
     pub plan: PlanFlags,
@@ -467,6 +472,23 @@ pub struct ResumeFlags {
     pub tell: TellFlags,
 }
 
+/// `driftless merge`.
+#[derive(Debug, Args)]
+pub struct MergeFlags {
+    /// Folders of parts, or one that holds them all
+    #[arg(value_name = "DIR", required = true)]
+    pub folders: Vec<PathBuf>,
+    /// Folder of the whole sweep [default: the one above the parts]
+    #[arg(long, value_name = "DIR", help_heading = "Files")]
+    pub out: Option<PathBuf>,
+    /// Overwrite the sweep that is in the folder
+    #[arg(long, help_heading = "Files")]
+    pub force: bool,
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub tell: TellFlags,
+}
+
 impl Flags {
     /// True where stdout is to hold one JSON object.
     pub fn is_json(&self) -> bool {
@@ -479,6 +501,7 @@ impl Flags {
             Command::Sweep(flags) => flags.scene.tell.json,
             Command::Compare(flags) => flags.scene.tell.json,
             Command::Resume(flags) => flags.tell.json,
+            Command::Merge(flags) => flags.tell.json,
             Command::Stress(flags) => flags.tell.json,
             Command::Methods { json } => *json,
             Command::Schema | Command::Completions { .. } => false,

@@ -13,6 +13,7 @@ pub mod flags;
 mod inspect;
 mod interrupt;
 mod kinematics;
+mod merge;
 mod modes;
 mod output;
 mod progress;
@@ -48,6 +49,7 @@ pub fn run(flags: &Flags) -> Result<(), Failure> {
         Command::Modes(flags) => modes::run(flags),
         Command::Compare(flags) => compare::run(flags),
         Command::Resume(flags) => resume::run(flags),
+        Command::Merge(flags) => merge::run(flags),
         Command::Stress(flags) => stress::run(flags),
         Command::Methods { json: true } => print_object(&report::methods::object()),
         Command::Methods { json: false } => print(&report::methods::text()),

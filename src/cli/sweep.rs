@@ -10,15 +10,17 @@ use crate::report;
 use crate::report::page::counted;
 #[cfg(feature = "charts")]
 use crate::report::sweep::{Curve, NoChart};
-use crate::run::files::{SWEEP, SWEEP_RECORD};
+use crate::run::checkpoint::sealed;
+use crate::run::files::{PART, SWEEP, SWEEP_RECORD};
 use crate::run::{
     Checkpoints, Folder, Limits, Point, PointObserver, Request, ResumeError, Stream, Sweep, SweepError,
     SweepTable, Totals, sweep_on,
 };
 use crate::scene::{Template, points_that_stay, read_text, source_name};
+use serde::{Deserialize, Serialize};
 
 /// Every file a sweep may leave; those of an earlier one in the same folder go with it.
-const FILES: &[&str] = &[SWEEP, SWEEP_RECORD, "map.png", "profile.png"];
+pub const FILES: &[&str] = &[SWEEP, SWEEP_RECORD, PART, "map.png", "profile.png"];
 /// Longest name of a folder that is made of what is varied.
 const LONGEST: usize = 120;
 
@@ -47,13 +49,14 @@ pub fn run(flags: &SweepFlags, arguments: &[String]) -> Result<(), Failure> {
     ));
     #[cfg(feature = "charts")]
     let curve = curve(&plan, flags)?;
-    let path = flags.out.join(&plan.scene().name).join(folder_name(&plan));
+    let whole = flags.out.join(&plan.scene().name).join(folder_name(&plan));
+    let path = plan.shard().map_or(whole.clone(), |shard| whole.join(shard.folder()));
     let folder = Folder::open(&path, flags.force)?;
     let table =
         SweepTable::new(&plan, folder.begin(SWEEP)?).map_err(|error| folder.failed(SWEEP, error.into()))?;
     let writer = Writer {
         table,
-        progress: Points::new(&plan.scene().name, 0, plan.grid().count(), flags.scene.tell.quiet),
+        progress: Points::new(&plan.scene().name, 0, plan.count(), flags.scene.tell.quiet),
         checkpoint_timer: CheckpointTimer::new(flags.checkpoints.checkpoint_every),
         checkpoints: Checkpoints::none(&path),
         text: &text,
@@ -80,7 +83,7 @@ pub fn resume(
     let Saved { arguments, scene: text, cursor, work, .. } = saved;
     let Work::Sweep(seen, drawn) = work else { return Err(ResumeError::Misfit.into()) };
     let plan = prepared(flags, &text)?;
-    if seen.points() > plan.grid().count() {
+    if seen.points() > plan.count() {
         return Err(ResumeError::Misfit.into());
     }
     flags.scene.remark(&format!("{}; from point {} on", report::setting(plan.plan()), seen.points()));
@@ -94,7 +97,7 @@ pub fn resume(
     drop(drawn);
     let writer = Writer {
         table: SweepTable::going_on(&plan, folder.take_up(SWEEP, &cursor)?),
-        progress: Points::new(&plan.scene().name, seen.points(), plan.grid().count(), flags.scene.tell.quiet),
+        progress: Points::new(&plan.scene().name, seen.points(), plan.count(), flags.scene.tell.quiet),
         checkpoint_timer: CheckpointTimer::new(flags.checkpoints.checkpoint_every),
         checkpoints,
         text: &text,
@@ -120,33 +123,92 @@ fn finish(plan: &Sweep, mut writer: Writer, seen: Totals, flags: &SweepFlags) ->
         (None, error) => error.into(),
     });
     let (has_checkpoint, path) = (writer.checkpoints.has_any(), writer.folder.path().to_owned());
-    totals.and_then(|totals| publish(plan, writer, &totals, flags)).map_err(|failure| {
+    totals.and_then(|totals| publish(plan, writer, totals, flags)).map_err(|failure| {
         let is_left = has_checkpoint && failure.exit != Exit::Interrupted;
         if is_left { failure.with_checkpoint(&path) } else { failure }
     })
 }
 
-/// Gives the table its name, draws, writes the record, and says what came of it.
-fn publish(plan: &Sweep, writer: Writer, totals: &Totals, flags: &SweepFlags) -> Result<(), Failure> {
-    let Writer { table, mut folder, mut checkpoints, .. } = writer;
+/// What joins a part of a sweep to the others.
+#[derive(Serialize, Deserialize)]
+pub struct Part {
+    /// The version that ran it.
+    pub version: String,
+    /// The command line, and the text of the scene it names.
+    pub arguments: Vec<String>,
+    pub scene: String,
+    pub table_sha256: String,
+    pub totals: Totals,
+    /// The chart of its points.
+    pub drawn: Option<Vec<u8>>,
+}
+
+/// A whole sweep, or a part of one, but for its table and record.
+pub struct Swept<'a> {
+    pub plan: &'a Sweep,
+    pub totals: Totals,
+    #[cfg(feature = "charts")]
+    pub curve: Option<Curve>,
+}
+
+/// Gives the table its name and publishes the rest; of a part, what joins it to the others.
+fn publish(plan: &Sweep, writer: Writer, totals: Totals, flags: &SweepFlags) -> Result<(), Failure> {
+    let drawn = writer.drawn()?;
+    let Writer { table, mut folder, mut checkpoints, text, arguments, .. } = writer;
     let stream = table.finish().map_err(|error| folder.failed(SWEEP, error))?;
     if flags.force {
         // Nothing of an older sweep may stand beside the new table.
         folder.clear(&FILES[1..])?;
     }
     let hash = folder.keep(stream)?;
-    #[cfg(feature = "charts")]
-    if let Some(curve) = &writer.curve {
-        draw(plan, curve, &mut folder, flags)?;
+    if plan.shard().is_some() {
+        let part = Part {
+            version: env!("CARGO_PKG_VERSION").into(),
+            arguments: arguments.to_vec(),
+            scene: text.to_owned(),
+            table_sha256: hash.clone(),
+            totals: totals.clone(),
+            drawn,
+        };
+        let bytes = sealed(&part).map_err(|error| folder.failed(PART, error))?;
+        folder.write(PART, &bytes)?;
     }
-    let text = format!("{:#}\n", report::sweep::record(plan, totals, &hash));
-    folder.write(SWEEP_RECORD, text.as_bytes())?;
+    let swept = Swept {
+        plan,
+        totals,
+        #[cfg(feature = "charts")]
+        curve: writer.curve,
+    };
+    swept.publish(&mut folder, &hash, flags)?;
     checkpoints.remove()?;
-    tell(plan, totals, &folder, flags)
+    tell(plan, &swept.totals, &folder, flags)
+}
+
+impl Swept<'_> {
+    /// Draws, and writes the record.
+    ///
+    /// # Errors
+    /// The chart, or the folder.
+    pub fn publish(
+        &self,
+        folder: &mut Folder,
+        table_sha256: &str,
+        _flags: &SweepFlags,
+    ) -> Result<(), Failure> {
+        #[cfg(feature = "charts")]
+        if let (Some(curve), None) = (&self.curve, self.plan.shard()) {
+            draw(self.plan, curve, folder, _flags)?;
+        }
+        let text = format!("{:#}\n", report::sweep::record(self.plan, &self.totals, table_sha256));
+        Ok(folder.write(SWEEP_RECORD, text.as_bytes())?)
+    }
 }
 
 /// The sweep asked for.
-fn prepared(flags: &SweepFlags, text: &str) -> Result<Sweep, Failure> {
+///
+/// # Errors
+/// The scene, or what is varied.
+pub fn prepared(flags: &SweepFlags, text: &str) -> Result<Sweep, Failure> {
     let requests = flags.plan.requests();
     let [request]: &[Request; 1] = requests.as_slice().try_into().map_err(|_| {
         Failure::new(
@@ -158,7 +220,10 @@ fn prepared(flags: &SweepFlags, text: &str) -> Result<Sweep, Failure> {
     let outputs = super::with_outputs(template.scene()?, &flags.scene.output)?.outputs;
     let template = template.with_outputs(outputs);
     let limits = Limits { energy: flags.max_energy_drift, constraint: flags.max_constraint_drift };
-    let plan = Sweep::new(&template, flags.vary.clone(), request)?.with_limits(limits).trusted(flags.trust);
+    let plan = Sweep::new(&template, flags.vary.clone(), request)?
+        .with_limits(limits)
+        .trusted(flags.trust)
+        .sharded(flags.shard);
     super::settle(&flags.scene, plan.mechanism())?;
     let notes: Vec<String> = (plan.variables().iter().zip(plan.grid().axes()))
         .filter_map(|(variable, axis)| {
@@ -199,17 +264,18 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
+    /// The chart so far, as bytes.
+    fn drawn(&self) -> Result<Option<Vec<u8>>, Failure> {
+        #[cfg(feature = "charts")]
+        let drawn = self.curve.as_ref().map(postcard::to_stdvec).transpose();
+        #[cfg(not(feature = "charts"))]
+        let drawn = Ok::<_, postcard::Error>(None);
+        drawn.map_err(|error| self.folder.failed(SWEEP, std::io::Error::other(error)).into())
+    }
+
     fn save(&mut self, seen: &Totals) -> Result<(), Failure> {
         let failed = |error| self.folder.failed(SWEEP, error);
-        #[cfg(feature = "charts")]
-        let drawn = self
-            .curve
-            .as_ref()
-            .map(postcard::to_stdvec)
-            .transpose()
-            .map_err(|error| failed(std::io::Error::other(error)))?;
-        #[cfg(not(feature = "charts"))]
-        let drawn = None;
+        let drawn = self.drawn()?;
         let stream = self.table.written().map_err(failed)?;
         self.checkpoints.save(&Saved {
             version: env!("CARGO_PKG_VERSION").into(),
@@ -279,7 +345,10 @@ fn draw(plan: &Sweep, curve: &Curve, folder: &mut Folder, flags: &SweepFlags) ->
 }
 
 /// Prints the totals.
-fn tell(plan: &Sweep, totals: &Totals, folder: &Folder, flags: &SweepFlags) -> Result<(), Failure> {
+///
+/// # Errors
+/// Nobody reads them.
+pub fn tell(plan: &Sweep, totals: &Totals, folder: &Folder, flags: &SweepFlags) -> Result<(), Failure> {
     if flags.scene.tell.json {
         let mut object = report::sweep::object(plan, totals);
         name_files(&mut object, folder);

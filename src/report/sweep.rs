@@ -22,7 +22,7 @@ pub fn object(sweep: &Sweep, totals: &Totals) -> Value {
         )
         .collect();
     let plan = sweep.plan();
-    json!({
+    let mut object = json!({
         "scene": sweep.scene().name,
         "method": plan.method.info().name,
         "why": plan.why,
@@ -48,7 +48,13 @@ pub fn object(sweep: &Sweep, totals: &Totals) -> Value {
         "notes": plan.notes,
         "threads": totals.threads,
         "wall_s": totals.wall.as_secs_f64(),
-    })
+    });
+    if let Some(shard) = sweep.shard() {
+        let range = sweep.range();
+        object["shard"] =
+            json!({"number": shard.number(), "of": shard.of(), "from": range.start, "to": range.end});
+    }
+    object
 }
 
 /// What `sweep.json` holds: the report, the resolved scene, versions, hashes; what differs from run to run
@@ -85,10 +91,14 @@ pub fn text(sweep: &Sweep, totals: &Totals) -> String {
         );
         page.entry(if number == 0 { "varied" } else { "" }, &range);
     }
+    if let Some(shard) = sweep.shard() {
+        let range = sweep.range();
+        let of = sweep.grid().count();
+        page.entry("part", &format!("{shard}: points {} to {} of {of}", range.start + 1, range.end));
+    }
     let seconds = totals.wall.as_secs_f64();
-    let rate = figure((sweep.grid().count() as f64 / seconds.max(1e-9)).round());
-    let [points, steps] =
-        [counted(sweep.grid().count(), "point", "points"), counted(totals.steps, "step", "steps")];
+    let rate = figure((sweep.count() as f64 / seconds.max(1e-9)).round());
+    let [points, steps] = [counted(sweep.count(), "point", "points"), counted(totals.steps, "step", "steps")];
     let threads = counted(totals.threads as u64, "thread", "threads");
     page.entry("cost", &format!("{points}, {steps}, {seconds:.3} s on {threads}, {rate} points a second"));
     page.entry("points", &by_status(totals));
@@ -218,6 +228,12 @@ impl Curve {
         is_known
             && self.bars == sweep.mechanism().bodies.len()
             && sizes.iter().all(|&size| size as u64 == points)
+    }
+
+    /// With the points of the part that follows.
+    pub fn join(&mut self, next: &Self) {
+        self.seen.extend(&next.seen);
+        self.failed.extend(&next.failed);
     }
 
     /// Takes a point.

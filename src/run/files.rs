@@ -25,6 +25,8 @@ pub const RECORD: &str = "run.json";
 pub const SWEEP: &str = "sweep.csv";
 /// Settings and totals of a sweep.
 pub const SWEEP_RECORD: &str = "sweep.json";
+/// What joins a part of a sweep to the others.
+pub const PART: &str = "part";
 /// The settings of a comparison, a row each.
 pub const COMPARISON: &str = "compare.csv";
 /// Settings, figures and advice of a comparison.
@@ -409,7 +411,7 @@ pub fn sha256(text: &str) -> String {
     hexadecimal(Sha256::new_with_prefix(text.as_bytes()))
 }
 
-fn hexadecimal(hash: Sha256) -> String {
+pub(crate) fn hexadecimal(hash: Sha256) -> String {
     hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 

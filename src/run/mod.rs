@@ -105,7 +105,7 @@ pub use sample::{Sample, Sampler};
 #[cfg(feature = "files")]
 pub use sweep::table::SweepTable;
 pub use sweep::{
-    Grid, Point, PointObserver, Status, Sweep, SweepError, Totals, Vary, VaryError, sweep, sweep_on,
+    Grid, Point, PointObserver, Shard, Status, Sweep, SweepError, Totals, Vary, VaryError, sweep, sweep_on,
 };
 pub use trace::Trace;
 pub use trajectory::Trajectory;

@@ -27,6 +27,7 @@
 mod grid;
 mod judge;
 mod point;
+mod shard;
 #[cfg(feature = "files")]
 pub mod table;
 #[cfg(feature = "threads")]
@@ -35,6 +36,7 @@ mod threads;
 pub use grid::{Grid, Vary, VaryError};
 pub use judge::PointTrust;
 pub use point::{Point, Status};
+pub use shard::Shard;
 
 use super::drift::Limits;
 use super::methods::MethodId;
@@ -43,6 +45,7 @@ use super::trust::Level;
 use crate::dynamics::{CompileError, Mechanism};
 use crate::scene::{Scene, SceneError, Template, Variable};
 use crate::stepping::taylor::batch::Batch;
+use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -69,6 +72,7 @@ pub struct Sweep {
     ends_at_flips: bool,
     is_strict: bool,
     trust: Level,
+    shard: Option<Shard>,
     /// True where only starts are varied in which nothing else has a say: all points share one mechanism.
     shares: bool,
 }
@@ -193,6 +197,7 @@ impl Sweep {
             ends_at_flips: false,
             is_strict: false,
             trust: Level::Off,
+            shard: None,
             shares,
         })
     }
@@ -218,6 +223,28 @@ impl Sweep {
     /// have it.  No point changes by it.
     pub fn trusted(self, trust: Level) -> Self {
         Self { trust, ..self }
+    }
+
+    /// One of several parts of it; the points keep their numbers and values.
+    pub fn sharded(self, shard: Option<Shard>) -> Self {
+        Self { shard, ..self }
+    }
+
+    /// The part of it that this is.
+    pub fn shard(&self) -> Option<Shard> {
+        self.shard
+    }
+
+    /// The points to be run: all of the grid, or those of a part.
+    pub fn range(&self) -> Range<u64> {
+        let count = self.grid.count();
+        self.shard.map_or(0..count, |shard| shard.range(count))
+    }
+
+    /// How many points that are.
+    pub fn count(&self) -> u64 {
+        let range = self.range();
+        range.end - range.start
     }
 
     /// How much is spent on trust.
@@ -265,7 +292,7 @@ impl Sweep {
 
     /// Points integrated as one task: enough to fill lanes, few enough to spread over the threads.
     fn chunk(&self, threads: usize) -> u64 {
-        (self.grid.count() / (16 * threads as u64)).clamp(1, CHUNK)
+        (self.count() / (16 * threads as u64)).clamp(1, CHUNK)
     }
 }
 
@@ -308,8 +335,8 @@ fn timed(request: &Request, scene: &Scene) -> Request {
 struct Shared<'a> {
     sweep: &'a Sweep,
     chunk: u64,
-    /// The first point that was not seen before.
-    first: u64,
+    /// The points that were not seen before.
+    rest: Range<u64>,
     finished: AtomicU64,
     /// Set where nobody wants the rest.
     is_over: AtomicBool,
@@ -317,13 +344,13 @@ struct Shared<'a> {
 
 impl Shared<'_> {
     fn chunks(&self) -> u64 {
-        (self.sweep.grid.count() - self.first).div_ceil(self.chunk)
+        (self.rest.end - self.rest.start).div_ceil(self.chunk)
     }
 
     /// The points of a chunk; fewer where nobody wants them any more.
     fn integrate(&self, chunk: u64) -> Vec<Point> {
-        let first = self.first + chunk * self.chunk;
-        let last = (first + self.chunk).min(self.sweep.grid.count());
+        let first = self.rest.start + chunk * self.chunk;
+        let last = (first + self.chunk).min(self.rest.end);
         let finished = || {
             self.finished.fetch_add(1, Ordering::Relaxed);
         };
@@ -361,12 +388,12 @@ pub fn sweep_on(
     } else {
         threads
     };
-    let first = seen.points().min(sweep.grid.count());
+    let (range, before) = (sweep.range(), seen.points().min(sweep.count()));
     let shared = Shared {
         sweep,
         chunk: sweep.chunk(threads),
-        first,
-        finished: AtomicU64::new(first),
+        rest: range.start + before..range.end,
+        finished: AtomicU64::new(before),
         is_over: AtomicBool::new(false),
     };
     let mut sweep_observer =
@@ -407,6 +434,26 @@ impl Totals {
     /// Points seen.
     pub fn points(&self) -> u64 {
         [self.done, self.stopped, self.refused, self.skipped].into_iter().fold(0, u64::saturating_add)
+    }
+
+    /// With those of the points that follow; times add up, and of threads the most counts.
+    pub fn join(&mut self, next: &Self) {
+        self.done += next.done;
+        self.stopped += next.stopped;
+        self.refused += next.refused;
+        self.skipped += next.skipped;
+        self.flipped += next.flipped;
+        self.judged += next.judged;
+        self.doubtful += next.doubtful;
+        self.steps += next.steps;
+        if next.energy.0 > self.energy.0 {
+            self.energy = next.energy;
+        }
+        for (most, level) in self.constraint.iter_mut().zip(next.constraint) {
+            *most = most.max(level);
+        }
+        self.threads = self.threads.max(next.threads);
+        self.wall += next.wall;
     }
 
     fn take(&mut self, point: &Point) {
