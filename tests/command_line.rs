@@ -408,6 +408,27 @@ fn parts_of_a_sweep_join_to_its_very_bytes() {
 }
 
 #[test]
+fn rows_of_points_that_cannot_be_run_have_their_words_in_the_right_columns() {
+    let program = Program::with_scenes(&["free"]);
+    for more in ["", " --trust auto", " --output bar1.omega"] {
+        program
+            .run(&format!("sweep free.json --vary bar1.length=-1..1:3 --until 1 --out o --force -q{more}"))
+            .exits(0);
+        let files = program.files();
+        let file = files.iter().find(|file| file.ends_with("sweep.csv")).expect("a table");
+        let mut table = csv::Reader::from_path(program.path(file)).expect("a table");
+        let heads = table.headers().expect("a header").clone();
+        let column = |name: &str| heads.iter().position(|head| head == name).expect(name);
+        let (status, cause, bar) = (column("status"), column("cause"), column("flip_bar"));
+        let rows: Vec<csv::StringRecord> = table.records().collect::<Result<_, _>>().expect("rows as wide");
+        assert_eq!([&rows[0][status], &rows[1][status], &rows[2][status]], ["refused", "refused", "done"]);
+        assert!(
+            rows[0][cause].contains("bars[0].length") && rows[0][bar].is_empty() && rows[2][cause].is_empty()
+        );
+    }
+}
+
+#[test]
 fn modes_leave_a_record_and_charts() {
     let program = Program::with_scenes(&["free", "motor"]);
     let object = program.run("modes free.json --json --gif").exits(0).object();

@@ -175,6 +175,9 @@ pub enum NoChart {
     /// The table has no such column, or it holds words.
     #[error("the table has no column of numbers `{0}`; there are: {1}")]
     Column(String, String),
+    /// A list of points has no order.
+    #[error("the points are a list; a chart shows a grid")]
+    Listed,
     /// A chart shows one or two varied values.
     #[error("{0} values are varied; a chart shows one or two")]
     Dimensions(usize),
@@ -193,6 +196,9 @@ impl Curve {
     /// # Errors
     /// There can be no such chart.
     pub fn new(sweep: &Sweep, column: Option<&str>) -> Result<Self, NoChart> {
+        if sweep.grid().is_listed() {
+            return Err(NoChart::Listed);
+        }
         let axes = sweep.grid().axes().len();
         if axes > 2 {
             return Err(NoChart::Dimensions(axes));

@@ -5,7 +5,7 @@
 //! are.  The bytes are those of [`Table`].
 
 use super::sample::Sample;
-use super::table::{Shown, Table, columns};
+use super::table::{Shown, Table};
 use std::io::{self, Write};
 use std::panic::resume_unwind;
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
@@ -76,7 +76,7 @@ impl<W: Write + Send + 'static> AsyncWriter<W> {
     /// # Errors
     /// What the writer said of earlier rows.
     pub fn write(&mut self, sample: &Sample) -> io::Result<()> {
-        columns(sample, &self.shown, &mut self.numbers);
+        self.shown.append(sample, &mut self.numbers);
         if self.numbers.len() < BATCH { Ok(()) } else { self.hand_over() }
     }
 

@@ -108,5 +108,6 @@ pub use sweep::{
     Grid, Point, PointObserver, Shard, Status, Sweep, SweepError, Totals, Vary, VaryError, sweep, sweep_on,
 };
 pub use trace::Trace;
+pub use trajectory::Recorder;
 pub use trajectory::Trajectory;
 pub use trust::Trust;

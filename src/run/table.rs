@@ -25,9 +25,9 @@ pub struct Table<W: Write> {
     shown: Shown,
 }
 
-/// What the table shows.
-#[derive(Clone)]
-pub(super) struct Shown {
+/// What the table shows of a sample.
+#[derive(Clone, Debug)]
+pub struct Shown {
     /// Bodies; of the rotors of integrals after them the rate alone.
     bodies: usize,
     /// True where energy is lost in dry friction.
@@ -36,30 +36,33 @@ pub(super) struct Shown {
     forces: Arc<[usize]>,
 }
 
-fn shown(mechanism: &Mechanism) -> Shown {
-    let count = |(r, row): (usize, &ConstraintEquation)| {
-        if mechanism.is_motor(r) { 2 } else { usize::from(row.law.is_some()) }
-    };
-    let forces = mechanism.constraints.iter().enumerate().map(count).collect();
-    Shown { bodies: mechanism.own_bodies().len(), friction: !mechanism.frictions.is_empty(), forces }
-}
+impl Shown {
+    /// Of the samples of a mechanism.
+    pub fn new(mechanism: &Mechanism) -> Self {
+        let count = |(r, row): (usize, &ConstraintEquation)| {
+            if mechanism.is_motor(r) { 2 } else { usize::from(row.law.is_some()) }
+        };
+        let forces = mechanism.constraints.iter().enumerate().map(count).collect();
+        Self { bodies: mechanism.own_bodies().len(), friction: !mechanism.frictions.is_empty(), forces }
+    }
 
-/// Appends the numbers of a row.
-pub(super) fn columns(sample: &Sample, shown: &Shown, numbers: &mut Vec<f64>) {
-    numbers.push(sample.t);
-    for k in 0..shown.bodies {
-        let ([x, y], [vx, vy]) = (sample.centre[k], sample.velocity[k]);
-        numbers.extend([sample.phi[k], sample.omega[k], x, y, vx, vy]);
+    /// Appends the numbers of a row, in the order of [`header`].
+    pub fn append(&self, sample: &Sample, numbers: &mut Vec<f64>) {
+        numbers.push(sample.t);
+        for k in 0..self.bodies {
+            let ([x, y], [vx, vy]) = (sample.centre[k], sample.velocity[k]);
+            numbers.extend([sample.phi[k], sample.omega[k], x, y, vx, vy]);
+        }
+        numbers.extend(&sample.omega[self.bodies..sample.centre.len()]);
+        numbers.extend([sample.kinetic, sample.potential, sample.work, sample.imbalance]);
+        for ((constraint, motor), &count) in
+            sample.constraints.iter().zip(&sample.motors).zip(self.forces.iter())
+        {
+            numbers.extend(constraint.iter().chain(&motor[..count]));
+        }
+        numbers.extend(self.friction.then_some(sample.friction));
+        numbers.extend(&sample.outputs);
     }
-    numbers.extend(&sample.omega[shown.bodies..sample.centre.len()]);
-    numbers.extend([sample.kinetic, sample.potential, sample.work, sample.imbalance]);
-    for ((constraint, motor), &count) in
-        sample.constraints.iter().zip(&sample.motors).zip(shown.forces.iter())
-    {
-        numbers.extend(constraint.iter().chain(&motor[..count]));
-    }
-    numbers.extend(shown.friction.then_some(sample.friction));
-    numbers.extend(&sample.outputs);
 }
 
 /// The names of the columns, with their units in brackets.
@@ -76,7 +79,7 @@ pub fn header(mechanism: &Mechanism) -> Vec<String> {
     for (quantity, unit) in [("kinetic", "J"), ("potential", "J"), ("work", "J"), ("imbalance", "1")] {
         header.push(format!("{quantity} [{unit}]"));
     }
-    let shown = shown(mechanism);
+    let shown = Shown::new(mechanism);
     for (row, &shown) in mechanism.constraints.iter().zip(shown.forces.iter()) {
         let (unit, name) = (row.unit(), row.name());
         header.extend([format!("{name}.C [{unit}]"), format!("{name}.C' [{unit}/s]")]);
@@ -97,7 +100,7 @@ pub fn header(mechanism: &Mechanism) -> Vec<String> {
 /// The numbers of the row of a sample, also of one in a [`Trace`](super::Trace).
 pub fn row(mechanism: &Mechanism, sample: &Sample) -> Vec<f64> {
     let mut numbers = Vec::new();
-    columns(&placed(mechanism, sample), &shown(mechanism), &mut numbers);
+    Shown::new(mechanism).append(&placed(mechanism, sample), &mut numbers);
     numbers
 }
 
@@ -131,7 +134,7 @@ impl<W: Write> Table<W> {
     /// # Errors
     /// What the writer says.
     pub fn new(mechanism: &Mechanism, writer: W) -> csv::Result<Self> {
-        let (header, shown) = (header(mechanism), shown(mechanism));
+        let (header, shown) = (header(mechanism), Shown::new(mechanism));
         let mut titles = csv::Writer::from_writer(Vec::with_capacity(BUFFER + BUFFER / 4));
         titles.write_record(&header)?;
         let buffer = titles.into_inner().map_err(|error| error.into_error())?;
@@ -140,7 +143,7 @@ impl<W: Write> Table<W> {
 
     /// Goes on with a table whose header and first rows were written before.
     pub fn going_on(mechanism: &Mechanism, writer: W) -> Self {
-        let shown = shown(mechanism);
+        let shown = Shown::new(mechanism);
         let width = width(mechanism, &shown);
         Self { writer, buffer: Vec::with_capacity(BUFFER + BUFFER / 4), width, row: Vec::new(), shown }
     }
@@ -167,7 +170,7 @@ impl<W: Write> Table<W> {
     /// What the writer says.
     pub fn write(&mut self, sample: &Sample) -> io::Result<()> {
         let mut row = std::mem::take(&mut self.row);
-        columns(sample, &self.shown, &mut row);
+        self.shown.append(sample, &mut row);
         let written = self.lines(&row);
         row.clear();
         self.row = row;

@@ -45,13 +45,14 @@ struct Piece {
     curves: Vec<Chebyshev>,
 }
 
-/// Keeps the motion of a run.
-#[derive(Default)]
-pub(crate) struct Recorder {
+/// Keeps the motion of a run: an [`Observer`] of its steps.
+#[derive(Debug, Default)]
+pub struct Recorder {
     pieces: Vec<Piece>,
 }
 
 impl Recorder {
+    /// The motion it has seen, and how the run ended.
     pub fn into_trajectory(self, outcome: Outcome) -> Trajectory {
         Trajectory { outcome, pieces: self.pieces }
     }

@@ -1,7 +1,8 @@
-//! The grid of a sweep: named values, each from one end to the other in equal steps.
+//! The points of a sweep: a grid of named values, each from one end to the other in equal steps, or a list.
 
 use crate::scene::number;
 use std::str::FromStr;
+use std::sync::Arc;
 
 /// A value that is varied: `bar1.phi=-pi..pi:512`.
 ///
@@ -78,11 +79,13 @@ impl Vary {
     }
 }
 
-/// Points of several values varied at once, numbered so that the first varies slowest.
+/// Points of several values varied at once: a grid, numbered so that the first varies slowest, or a list.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     axes: Vec<Vary>,
     count: u64,
+    /// The values of all points of a list, point by point.
+    listed: Option<Arc<[f64]>>,
 }
 
 impl Grid {
@@ -90,7 +93,29 @@ impl Grid {
     /// points.
     pub fn new(axes: Vec<Vary>) -> Option<Self> {
         let count = axes.iter().try_fold(1_u64, |count, axis| count.checked_mul(axis.count))?;
-        Some(Self { axes, count })
+        Some(Self { axes, count, listed: None })
+    }
+
+    /// The points of a list, all values of one after those of the other; its axes tell between what values
+    /// they lie.  `None` where there are no names, or the list does not hold as many values for each.
+    pub fn listed(names: Vec<String>, values: Vec<f64>) -> Option<Self> {
+        let width = names.len();
+        if width == 0 || !values.len().is_multiple_of(width) {
+            return None;
+        }
+        let count = (values.len() / width) as u64;
+        let axis = |(k, name): (usize, String)| {
+            let of = || values.iter().skip(k).step_by(width).copied();
+            let (from, to) = (of().fold(f64::INFINITY, f64::min), of().fold(f64::NEG_INFINITY, f64::max));
+            Vary { name, from, to, count }
+        };
+        let axes = names.into_iter().enumerate().map(axis).collect();
+        Some(Self { axes, count, listed: Some(values.into()) })
+    }
+
+    /// Whether it is a list.
+    pub fn is_listed(&self) -> bool {
+        self.listed.is_some()
     }
 
     /// What is varied, slowest first.
@@ -105,6 +130,10 @@ impl Grid {
 
     /// The values of point number `index`, slowest first.
     pub fn values(&self, index: u64) -> Vec<f64> {
+        if let Some(values) = &self.listed {
+            let begin = index as usize * self.axes.len();
+            return values[begin..begin + self.axes.len()].to_vec();
+        }
         let mut rest = index;
         let mut values: Vec<f64> = (self.axes.iter().rev())
             .map(|axis| {
@@ -160,6 +189,15 @@ mod tests {
             (0..11).map(|i| tenths.value(i)).collect::<Vec<_>>(),
             [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]
         );
+    }
+
+    #[test]
+    fn a_list_has_its_points_and_their_ranges() {
+        let names = || vec!["a".to_owned(), "b".to_owned()];
+        let list = Grid::listed(names(), vec![1.0, 5.0, -2.0, 7.0, 0.5, 6.0]).expect("three points");
+        assert_eq!((list.count(), list.values(1)), (3, vec![-2.0, 7.0]));
+        assert_eq!((list.axes()[0].from, list.axes()[0].to, list.axes()[1].to), (-2.0, 1.0, 7.0));
+        assert!(Grid::listed(names(), vec![1.0]).is_none() && Grid::listed(Vec::new(), Vec::new()).is_none());
     }
 
     #[test]

@@ -162,11 +162,48 @@ impl Sweep {
     /// A scene that is none as it stands, a value it does not have, a request that makes no sense for it, or
     /// more than 1e9 points.
     pub fn new(template: &Template, vary: Vec<Vary>, request: &Request) -> Result<Self, SweepError> {
+        let names: Vec<String> = vary.iter().map(|vary| vary.name.clone()).collect();
+        Self::over(template, &names, request, |variables| grid(vary, variables))
+    }
+
+    /// The same over a list of points: for each all values of `names`, one point after the other.
+    ///
+    /// # Errors
+    /// As [`Sweep::new`], or a list that is empty, holds numbers that are not finite, or not as many for each
+    /// point.
+    pub fn listed(
+        template: &Template,
+        names: &[String],
+        values: Vec<f64>,
+        request: &Request,
+    ) -> Result<Self, SweepError> {
+        Self::over(template, names, request, |variables| {
+            let refused = |reason: &str| Refusal {
+                is_usage: true,
+                what: "a list of points".into(),
+                reason: reason.into(),
+                alternative: "a finite number of each value for every point".into(),
+            };
+            distinct(variables)?;
+            if values.iter().any(|value| !value.is_finite()) {
+                return Err(refused("a value is not finite"));
+            }
+            let grid = Grid::listed(names.to_vec(), values);
+            let grid = grid.ok_or_else(|| refused("it does not hold as many values for each point"))?;
+            if grid.count() == 0 { Err(refused("it has no points")) } else { Ok(grid) }
+        })
+    }
+
+    fn over(
+        template: &Template,
+        names: &[String],
+        request: &Request,
+        grid: impl FnOnce(&[Variable]) -> Result<Grid, Refusal>,
+    ) -> Result<Self, SweepError> {
         let scene = template.scene()?;
         let mechanism = Arc::new(Mechanism::new(&scene)?);
-        let variables =
-            vary.iter().map(|vary| template.variable(&vary.name)).collect::<Result<Vec<_>, _>>()?;
-        let grid = grid(vary, &variables)?;
+        let variables = names.iter().map(|name| template.variable(name)).collect::<Result<Vec<_>, _>>()?;
+        let grid = grid(&variables)?;
         let mut request = request.clone();
         let in_lanes = request.method.is_none()
             && request.step.is_none()
@@ -306,15 +343,7 @@ fn grid(vary: Vec<Vary>, variables: &[Variable]) -> Result<Grid, Refusal> {
     if vary.is_empty() {
         return Err(refused("a sweep".into(), "nothing is varied".into(), "--vary bar1.phi=-pi..pi:64"));
     }
-    for (k, variable) in variables.iter().enumerate() {
-        if variables[..k].iter().any(|before| before.path == variable.path) {
-            return Err(refused(
-                format!("--vary {}", variable.path),
-                "it is varied twice".into(),
-                "leave one of the two out",
-            ));
-        }
-    }
+    distinct(variables)?;
     let counts = vary.iter().map(|vary| vary.count.to_string()).collect::<Vec<_>>().join(" × ");
     Grid::new(vary).filter(|grid| grid.count() as f64 <= MAX_ROWS).ok_or_else(|| {
         refused(
@@ -322,6 +351,22 @@ fn grid(vary: Vec<Vary>, variables: &[Variable]) -> Result<Grid, Refusal> {
             format!("{counts} points are more than the {MAX_ROWS:.0e} a sweep may have"),
             "smaller counts, or several sweeps",
         )
+    })
+}
+
+/// Whether nothing is varied twice.
+fn distinct(variables: &[Variable]) -> Result<(), Refusal> {
+    let twice = variables
+        .iter()
+        .enumerate()
+        .find(|(k, variable)| variables[..*k].iter().any(|before| before.path == variable.path));
+    twice.map_or(Ok(()), |(_, variable)| {
+        Err(Refusal {
+            is_usage: true,
+            what: format!("--vary {}", variable.path),
+            reason: "it is varied twice".into(),
+            alternative: "leave one of the two out".into(),
+        })
     })
 }
 

@@ -53,7 +53,8 @@ pub fn outputs(sweep: &Sweep) -> impl Iterator<Item = (&str, &str)> {
 pub fn numbers(point: &Point, bars: usize, is_judged: bool, outputs: usize) -> Vec<f64> {
     let mut numbers = point.values.clone();
     if point.phi.is_empty() {
-        let others = if is_judged { 7 } else { 5 };
+        // Time, three drifts, steps and flip time; of a judged point two more.
+        let others = if is_judged { 8 } else { 6 };
         numbers.resize(numbers.len() + 2 * bars + 4 * outputs + others, f64::NAN);
         return numbers;
     }

@@ -10,7 +10,7 @@ use std::time::Duration;
 /// once, and memory stays bounded.
 const AHEAD: u64 = 16;
 /// Longest time without telling how far it is.
-const TICK: Duration = Duration::from_millis(100);
+const TICK: Duration = Duration::from_millis(40);
 
 /// A finished chunk; none where its thread panicked.
 type Finished = (u64, Option<Vec<Point>>);

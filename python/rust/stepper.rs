@@ -1,0 +1,61 @@
+//! A run that is stepped from outside, row by row.
+
+use crate::errors::refused;
+use crate::run::begun;
+use crate::scene::Scene;
+use driftless::run::Running;
+use driftless::run::table::Shown;
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::sync::{Mutex, PoisonError};
+
+/// An iterator over the rows of a run, integrated as they are asked for.
+#[pyclass(frozen, module = "pydriftless._core")]
+pub struct Stepper {
+    shown: Shown,
+    running: Mutex<Option<Running>>,
+}
+
+/// Begins a run that is stepped from outside.
+#[pyfunction]
+#[pyo3(signature = (scene, **options))]
+pub fn stream(
+    py: Python<'_>,
+    scene: &Bound<'_, Scene>,
+    options: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Stepper> {
+    let options = options.cloned().unwrap_or_else(|| PyDict::new(py));
+    let running = begun(py, scene.get(), &options)?;
+    Ok(Stepper { shown: Shown::new(&scene.get().mechanism), running: Mutex::new(Some(running)) })
+}
+
+#[pymethods]
+impl Stepper {
+    fn __iter__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    /// The next row; a stop before the horizon is an error after the last one.
+    fn __next__<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
+        let (row, stop) = py.detach(|| {
+            let mut lock = self.running.lock().unwrap_or_else(PoisonError::into_inner);
+            let Some(running) = &mut *lock else { return (Vec::new(), None) };
+            let row = std::cell::RefCell::new(Vec::new());
+            let mut see = |sample: &driftless::Sample| {
+                row.borrow_mut().clear();
+                self.shown.append(sample, &mut row.borrow_mut());
+                Ok(())
+            };
+            let gone = running.go(&mut see, &mut || !row.borrow().is_empty());
+            let is_over = !matches!(gone, Ok(false));
+            let stop = if is_over { lock.take().and_then(|running| running.finish().stop) } else { None };
+            (row.into_inner(), stop)
+        });
+        py.check_signals()?;
+        match stop {
+            Some(stop) if row.is_empty() => Err(refused(py, &stop.to_string())),
+            _ => Ok((!row.is_empty()).then(|| PyArray1::from_vec(py, row))),
+        }
+    }
+}

@@ -1,0 +1,234 @@
+"""What a run came to."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from functools import cached_property
+from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import _core
+from ._report import Picture
+
+if TYPE_CHECKING:
+    from ._scene import Scene
+
+
+class Columns(Mapping[str, np.ndarray]):
+    """Columns of one part: ``run["bar2"].phi`` is ``run["bar2.phi"]``."""
+
+    def __init__(self, columns: dict[str, np.ndarray]) -> None:
+        self._columns = columns
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        try:
+            return self.__dict__["_columns"][name]
+        except KeyError:
+            raise AttributeError(f"there is no {name!r}; there are {', '.join(self._columns)}") from None
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self._columns[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        return len(self._columns)
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._columns]
+
+    def __repr__(self) -> str:
+        return f"<Columns: {', '.join(self._columns)}>"
+
+
+class Run:
+    """A run and its trajectory, in the manner of ``scipy.integrate``.
+
+    All columns are views of one block of numbers.
+
+    Attributes
+    ----------
+    rows : numpy.ndarray
+        The trajectory, shape (rows, columns).
+    columns : list of str
+        Names of its columns without their units.
+    units : dict
+        Units by the names of the columns.
+    t : numpy.ndarray
+        Output times [s].
+    success : bool
+        Whether it came to its horizon.
+    message : str
+        How it ended.
+    report : dict
+        What ``run.json`` of the program holds.
+    """
+
+    def __init__(self, raw: _core.Raw, scene: Scene, options: dict[str, Any]) -> None:
+        self._raw = raw
+        self._options = options
+        self.scene = scene
+        self.rows: np.ndarray = raw.rows
+        heads = [head.partition(" [") for head in scene.columns]
+        self.columns: list[str] = [name for name, _, _ in heads]
+        self.units: dict[str, str] = {name: unit.rstrip("]") for name, _, unit in heads}
+
+    @property
+    def t(self) -> np.ndarray:
+        return self.rows[:, 0]
+
+    @property
+    def success(self) -> bool:
+        return self._raw.stop is None
+
+    @property
+    def message(self) -> str:
+        if self._raw.stop is not None:
+            return self._raw.stop
+        by = {None: "the horizon was reached", "observer": "ended by the callback"}
+        return by.get(self._raw.ended_by, f"ended by the event {self._raw.ended_by}")
+
+    @cached_property
+    def report(self) -> dict[str, Any]:
+        return json.loads(self._raw.report())
+
+    @property
+    def energy_drift(self) -> float:
+        """Largest energy drift over the energy scale."""
+        return self.report["result"]["energy"]["max_relative"]
+
+    @property
+    def trust(self) -> SimpleNamespace:
+        """The error estimate: ``horizon`` and ``error`` among what ``report["result"]["trust"]`` has."""
+        found = self.report["result"]["trust"] or {}
+        return SimpleNamespace(
+            **{**found, "horizon": found.get("horizon_s"), "error": found.get("error_estimate")}
+        )
+
+    @property
+    def motors(self) -> dict[str, Columns]:
+        """Torques [N m] or forces [N] and powers [W] of the motors."""
+        names = [name[: -len(".power")] for name in self.columns if name.endswith(".power")]
+        return {name: self[name] for name in names}
+
+    def __getitem__(self, name: str) -> Any:
+        if name in self.units:
+            return self.rows[:, self.columns.index(name)]
+        part = {
+            column[len(name) + 1 :]: self.rows[:, k]
+            for k, column in enumerate(self.columns)
+            if column.startswith(name + ".")
+        }
+        if not part:
+            raise KeyError(f"there is no column or part {name!r}; there are {', '.join(self.columns)}")
+        return Columns(part)
+
+    def __call__(self, t: Any) -> SimpleNamespace:
+        """Angles and rates at times within the run, by the dense output of its method.
+
+        Returns
+        -------
+        namespace
+            ``phi`` and ``omega``, arrays of the shape of ``t`` by the name of each body; of a body that
+            floats positions and velocities as well, by ``"ball.x"`` and ``"ball.y"``.
+        """
+        times = np.asarray(t, dtype=float)
+        numbers = self._dense.at(np.atleast_1d(times).ravel())
+        names = [_coordinate(name) for name in self._raw.coordinates()]
+        shaped = [numbers[:, k].reshape(times.shape)[()] for k in range(numbers.shape[1])]
+        return SimpleNamespace(
+            phi=dict(zip(names, shaped[: len(names)])), omega=dict(zip(names, shaped[len(names) :]))
+        )
+
+    @cached_property
+    def _dense(self) -> Any:
+        try:
+            self._raw.at(np.empty(0))
+            return self._raw
+        except ValueError:
+            return _core.run(self.scene._core, None, True, **{**self._options, "trust": "off"})
+
+    @property
+    def charts(self) -> list[str]:
+        """Names of the charts it has."""
+        return self._raw.charts()
+
+    def chart(self, name: str = "mechanism", format: str = "png") -> Picture:
+        """A chart of the program: one of ``charts``, as png, svg or pdf; the motion as gif or apng."""
+        return Picture(self._raw.chart(name, format), format)
+
+    def animation(self, format: str = "gif") -> Picture:
+        """The mechanism in motion, as gif or apng."""
+        return self.chart("mechanism", format)
+
+    def to_pandas(self) -> Any:
+        """The trajectory as a ``pandas.DataFrame`` over time; ``attrs["units"]`` has the units."""
+        import pandas as pd
+
+        frame = pd.DataFrame(self.rows[:, 1:], index=pd.Index(self.t, name="t"), columns=self.columns[1:], copy=False)
+        frame.attrs["units"] = self.units
+        return frame
+
+    def to_xarray(self) -> Any:
+        """The trajectory as an ``xarray.Dataset`` over time, with units."""
+        import xarray as xr
+
+        variables = {
+            name: ("t", self.rows[:, k], {"units": self.units[name]})
+            for k, name in enumerate(self.columns)
+            if k > 0
+        }
+        return xr.Dataset(variables, coords={"t": ("t", self.t, {"units": "s"})}, attrs={"scene": self.scene.name})
+
+    def plot(self, *names: str, ax: Any = None) -> Any:
+        """Draw columns against time with matplotlib; by default all angles.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        import matplotlib.pyplot as plt
+
+        names = names or tuple(name for name in self.columns if name.endswith(".phi"))
+        ax = ax if ax is not None else plt.subplots()[1]
+        for name in names:
+            ax.plot(self.t, self[name], label=name)
+        units = {self.units[name] for name in names}
+        ax.set_xlabel("time [s]")
+        ax.set_ylabel(f"[{units.pop()}]" if len(units) == 1 else "")
+        ax.legend()
+        return ax
+
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, Any]:
+        return {"text/plain": repr(self), **self.chart()._repr_mimebundle_()}
+
+    def __repr__(self) -> str:
+        method = self.report["result"]["method"]
+        end = self.t[-1] if len(self.t) else 0.0
+        return f"<Run of {self.scene.name!r} by {method}: {len(self.t)} rows to {end} s; {self.message}>"
+
+
+def _coordinate(name: str) -> str:
+    """``phi of bar`` is ``bar``, ``x of ball`` is ``ball.x``."""
+    kind, _, body = name.partition(" of ")
+    return body if kind == "phi" else f"{body}.{kind}"
+
+
+def resume(checkpoint: bytes | str | Path, callback: Callable[[float, np.ndarray], Any] | None = None) -> Run:
+    """Go on with an interrupted run: it ends as if nothing had been, bit for bit.
+
+    Parameters
+    ----------
+    checkpoint : bytes or path
+        That of :class:`Interrupted`, or a file it was written to.
+    """
+    from ._scene import Scene
+
+    content = checkpoint if isinstance(checkpoint, bytes) else Path(checkpoint).read_bytes()
+    raw = _core.resume(content, callback)
+    return Run(raw, Scene(*raw.scene.parts()), {})

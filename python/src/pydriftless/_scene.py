@@ -1,0 +1,300 @@
+"""Scenes: read, changed, run."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import _core
+from ._report import Report, command, flags
+from ._run import Run
+from ._sweep import Sweep, swept
+
+
+class Scene:
+    """A mechanism with its start, compiled into equations of motion.
+
+    Scenes do not change; :meth:`with_` makes another one.  They can be pickled.
+
+    Parameters
+    ----------
+    text : str
+        The scene as JSON.
+    source : str
+        What messages call it.
+    set : sequence of str
+        Values that replace those of the text, as ``"motor.rate=3.0"``.
+    outputs : sequence of str
+        Formulas that become columns, as ``"A.force"`` or ``"half=M.power/2"``.
+
+    Raises
+    ------
+    SceneRefused
+        With ``line``, ``column``, ``path``, ``value``, ``allowed`` and ``hint``.
+    """
+
+    def __init__(
+        self, text: str, source: str = "<text>", set: Sequence[str] = (), outputs: Sequence[str] = ()
+    ) -> None:
+        self._core = _core.Scene(text, source, list(set), list(outputs))
+
+    @classmethod
+    def from_dict(cls, scene: Mapping[str, Any], source: str = "<dict>") -> Scene:
+        """A scene from a dict of the same form as a file."""
+        return cls(json.dumps(scene), source)
+
+    @property
+    def name(self) -> str:
+        """The scene's name."""
+        return self._core.name
+
+    @property
+    def description(self) -> str:
+        """The scene's description."""
+        return self._core.description
+
+    @property
+    def columns(self) -> list[str]:
+        """Names of the columns of its trajectories, with their units."""
+        return self._core.columns()
+
+    def to_dict(self) -> dict[str, Any]:
+        """The scene as a dict, with everything replaced that was set."""
+        return json.loads(self._core.json())
+
+    def with_(self, values: Mapping[str, Any], /) -> Scene:
+        """The scene with other values.
+
+        Parameters
+        ----------
+        values : mapping
+            Values by their paths or short names: ``{"motor.rate": 3.0, "bars[0].mass": 2}``.
+        """
+        text, source, before, outputs = self._core.parts()
+        return Scene(text, source, [*before, *(f"{path}={_word(value)}" for path, value in values.items())], outputs)
+
+    def with_outputs(self, *outputs: str) -> Scene:
+        """The scene with further columns: ``scene.with_outputs("A.force", "half=M.power/2")``."""
+        text, source, before, others = self._core.parts()
+        return Scene(text, source, before, [*others, *outputs])
+
+    def run(
+        self,
+        *,
+        until: float | None = None,
+        every: float | None = None,
+        method: str | None = None,
+        rtol: float | None = None,
+        atol: float | None = None,
+        step: float | None = None,
+        stabilize: str | None = None,
+        time_constant: float | None = None,
+        extended: bool = False,
+        prefer: str | None = None,
+        max_evaluations: float | None = None,
+        max_energy_drift: float | None = None,
+        max_constraint_drift: float | None = None,
+        trust: str = "auto",
+        dense: bool = False,
+        callback: Callable[[float, np.ndarray], Any] | None = None,
+        progress: bool = False,
+    ) -> Run:
+        """Integrate the scene to its horizon.
+
+        What is not said is decided as by the program.  The global lock is released; Ctrl-C raises
+        :class:`Interrupted`, a ``KeyboardInterrupt`` whose ``checkpoint`` :func:`resume` goes on from.
+
+        Parameters
+        ----------
+        until, every : float
+            Horizon and output interval [s]; by default the scene's.
+        method : str
+            Such as ``"taylor"``, ``"dp8"``, ``"radau9"``, ``"gauss16"``, ``"rattle4"``.
+        rtol, atol : float
+            Tolerances of an adaptive method.
+        step : float
+            Step of a fixed-step method [s].
+        stabilize : {"elimination", "projection", "baumgarte", "none"}
+            How constraints are kept.
+        trust : {"auto", "full", "off"}
+            How much the error estimate may cost.
+        dense : bool
+            Keep the motion between the rows for ``run(t)``; without it ``run(t)`` integrates once more.
+        callback : callable
+            Called with the time and the row at every row; ``False`` ends the run.
+        progress : bool
+            Show a bar, where tqdm is installed.
+
+        Returns
+        -------
+        Run
+            A stop before the horizon is no exception: see ``success`` and ``message``.
+
+        Raises
+        ------
+        RequestRefused
+            The request makes no sense for the scene; ``hint`` says what does.
+        """
+        options = {
+            "until": until,
+            "every": every,
+            "method": method,
+            "rtol": rtol,
+            "atol": atol,
+            "step": step,
+            "stabilize": stabilize,
+            "time_constant": time_constant,
+            "extended": extended,
+            "prefer": prefer,
+            "max_evaluations": max_evaluations,
+            "max_energy_drift": max_energy_drift,
+            "max_constraint_drift": max_constraint_drift,
+            "trust": trust,
+        }
+        bar = _bar(progress, until if until is not None else self.to_dict().get("until"))
+        if bar is None:
+            return Run(_core.run(self._core, callback, dense, **options), self, options)
+
+        def tell(t: float, row: np.ndarray) -> Any:
+            bar.update(t - bar.n)
+            return callback(t, row) if callback is not None else None
+
+        with bar:
+            return Run(_core.run(self._core, tell, dense, **options), self, options)
+
+    def stream(self, **options: Any) -> Iterator[np.ndarray]:
+        """The rows of a run as an iterator, integrated as they are asked for.
+
+        Takes the options of :meth:`run`; a stop before the horizon is an exception after the last row.
+        """
+        return _core.stream(self._core, **{"trust": "off", **options})
+
+    def sweep(
+        self,
+        vary: Mapping[str, Any],
+        *,
+        client: Any = None,
+        parts: int | None = None,
+        to: str | os.PathLike[str] | None = None,
+        chunk: int = 100_000,
+        threads: int = 0,
+        to_flip: bool = False,
+        shard: tuple[int, int] | None = None,
+        progress: bool = False,
+        **options: Any,
+    ) -> Sweep:
+        """Run the scene over a grid or a list of points.
+
+        Parameters
+        ----------
+        vary : mapping
+            For a grid ``(from, to, count)`` by name, of which the first varies slowest; for a list arrays of
+            one length by name.
+        client : object with ``submit``
+            Runs the parts elsewhere: a Dask client, an executor of ``concurrent.futures`` or of
+            ``mpi4py.futures``.  The result is the same to the last bit.
+        parts : int
+            Parts for the client; by default four for each of its workers.
+        to : path
+            Write the rows to a ``.csv`` or ``.parquet`` file, ``chunk`` points at a time, instead of keeping
+            them.
+        threads : int
+            Threads; 0 for all processors.
+        to_flip : bool
+            End each point when a bar first turns over.
+        shard : (int, int)
+            Part I of N alone.
+        **options
+            Those of :meth:`run`; ``trust`` is ``"off"`` by default.
+        """
+        return swept(
+            self,
+            vary,
+            client=client,
+            parts=parts,
+            to=to,
+            chunk=chunk,
+            threads=threads,
+            to_flip=to_flip,
+            shard=shard,
+            progress=progress,
+            options=options,
+        )
+
+    def check(self, **options: Any) -> Report:
+        """What is active, what is left out, and which method would run it."""
+        return self._command("check", options, writes=False)
+
+    def inspect(self, at: float | str | None = None, **options: Any) -> Report:
+        """Accelerations, forces, motors and energy at the start, a time [s] or an event."""
+        return self._command("inspect", {"at": at, **options}, writes=False)
+
+    def kinematics(self, drive: str | None = None, **options: Any) -> Report:
+        """The mechanism moved through the range of a drive without integrating."""
+        return self._command("kinematics", {"drive": drive, **options}, writes=True)
+
+    def modes(self, **options: Any) -> Report:
+        """Equilibria and small vibrations, or periodic motions and their multipliers."""
+        return self._command("modes", options, writes=True)
+
+    def compare(self, **options: Any) -> Report:
+        """Error, drift and run time of every method at all its settings."""
+        return self._command("compare", options, writes=True)
+
+    def _command(self, name: str, options: dict[str, Any], writes: bool) -> Report:
+        text, source, before, outputs = self._core.parts()
+        is_file = Path(source).is_file()
+        arguments = [source if is_file else "-", *(f"--set={value}" for value in before), *flags(options)]
+        if name in ("inspect", "kinematics"):
+            arguments += [f"--output={output}" for output in outputs]
+        return command(name, arguments, None if is_file else text, writes)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Scene, self._core.parts()
+
+    def __repr__(self) -> str:
+        return f"<Scene {self.name!r}: {self.description}>" if self.description else f"<Scene {self.name!r}>"
+
+
+def load(path: str | os.PathLike[str], set: Mapping[str, Any] | None = None) -> Scene:
+    """Read a scene file.
+
+    Parameters
+    ----------
+    path : path
+        The file (JSON).
+    set : mapping
+        Values that replace those of the file, as for :meth:`Scene.with_`.
+    """
+    scene = Scene(Path(path).read_text(encoding="utf-8"), os.fspath(path))
+    return scene.with_(set) if set else scene
+
+
+def loads(text: str, set: Mapping[str, Any] | None = None) -> Scene:
+    """Read a scene from its text."""
+    scene = Scene(text)
+    return scene.with_(set) if set else scene
+
+
+def _word(value: Any) -> str:
+    """A value as the program's ``--set`` takes it."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, np.generic):
+        value = value.item()
+    return json.dumps(value.tolist() if isinstance(value, np.ndarray) else value)
+
+
+def _bar(wanted: bool, total: float | None) -> Any:
+    if not wanted:
+        return None
+    try:
+        from tqdm.auto import tqdm
+    except ImportError:
+        return None
+    return tqdm(total=total, unit="s", bar_format="{l_bar}{bar}| {n:.4g}/{total:.4g} s [{elapsed}]")

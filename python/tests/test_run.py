@@ -1,0 +1,246 @@
+"""Runs: the program's numbers bit for bit, SciPy's habits, interruption."""
+
+import math
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import pydriftless as dl
+from conftest import record, table
+
+
+@pytest.mark.parametrize(
+    "name, options",
+    [
+        ("free", {"method": "taylor"}),
+        ("motor", {"method": "dp8", "stabilize": "projection", "rtol": 1e-10}),
+        ("four_bar_motor", {}),
+        ("wall", {}),
+        ("spring", {"method": "gauss8", "step": 0.01}),
+        ("friction_pendulum", {}),
+    ],
+)
+def test_numbers_are_those_of_the_program(scenes, program, tmp_path, name, options):
+    flags = [word for key, value in options.items() for word in (f"--{key}", value)]
+    code, _, said = program("run", scenes / f"{name}.json", "--until", 2, "--no-charts", "--out", tmp_path, *flags)
+    assert code == 0, said
+    (path,) = tmp_path.rglob("trajectory.csv")
+    header, rows = table(path)
+    run = dl.load(scenes / f"{name}.json").run(until=2, **options)
+    assert run.success and run.message == "the horizon was reached"
+    assert run.scene.columns == header
+    # Shortest digits that read back to the same doubles: equal as words is equal as bits.
+    assert np.array_equal(run.rows, np.array(rows, dtype=float))
+    theirs, ours = record(path.parent / "run.json"), run.report
+    for key in ("timings", "hashes"):
+        theirs.pop(key), ours.pop(key)
+    assert ours == theirs
+
+
+def test_columns_are_views_of_one_block(free):
+    run = free.run(until=3)
+    assert np.shares_memory(run.t, run.rows) and np.shares_memory(run["bar2"].phi, run.rows)
+    assert np.array_equal(run["bar2"].phi, run["bar2.phi"])
+    assert run.units["bar2.omega"] == "rad/s" and set(run["bar1"]) == {"phi", "omega", "x", "y", "vx", "vy"}
+    with pytest.raises(KeyError, match="bar3"):
+        run["bar3"]
+    with pytest.raises(AttributeError, match="there are phi"):
+        run["bar2"].psi
+
+
+def test_a_pendulum_swings_by_its_closed_form():
+    scene = (
+        dl.Builder("pendulum", gravity=(0, -9.81))
+        .bar("bar", mass=1, centre=(0.5, 0), inertia=1 / 12, length=1)
+        .hinge("A", dl.ground(0, 0), dl.on("bar", 0, 0))
+        .start("bar", phi=-math.pi / 2 + 1.0, omega=0)
+        .build(until=20, every=0.01)
+    )
+    run = scene.run(rtol=1e-13)
+    # Period by the arithmetic-geometric mean; the frequency of small swings is sqrt(3 g / 2 l).
+    a, b = 1.0, math.cos(0.5)
+    for _ in range(8):
+        a, b = (a + b) / 2, math.sqrt(a * b)
+    period = 2 * math.pi / math.sqrt(1.5 * 9.81) / a
+    at = run(np.array([0.0, period, 7 * period]))
+    assert at.phi["bar"] == pytest.approx(-math.pi / 2 + 1.0, abs=1e-9)
+    assert np.max(np.abs(at.omega["bar"])) < 1e-8
+    assert run(period / 2).phi["bar"] == pytest.approx(-math.pi / 2 - 1.0, abs=1e-9)
+    assert set(at.phi) == {"bar"}
+    with pytest.raises(ValueError, match="outside"):
+        run(21.0)
+
+
+def test_dense_output_kept_or_made_later_is_the_same(scenes):
+    scene = dl.load(scenes / "motor.json")
+    times = np.linspace(0, 2, 37)
+    kept, later = (scene.run(until=2, dense=dense)(times) for dense in (True, False))
+    assert np.array_equal(kept.phi["bar2"], later.phi["bar2"])
+    rows = scene.run(until=2)
+    assert np.allclose(rows(rows.t).phi["bar2"], rows["bar2.phi"], rtol=0, atol=1e-12)
+
+
+def test_a_stop_is_no_exception(scenes):
+    run = dl.load(scenes / "free.json").run(until=50, max_evaluations=200)
+    assert not run.success and "evaluations" in run.message
+    assert 0 < run.t[-1] < 50
+
+
+def test_refusals_say_where_and_what_to_do(scenes):
+    with pytest.raises(dl.SceneRefused) as refused:
+        dl.loads('{"name": "x",\n "gravity": [0, -9.81],\n "bars": [{"name": "a", "mass": -1}]}')
+    assert refused.value.line == 3 and "mass" in refused.value.path and refused.value.hint
+    with pytest.raises(dl.RequestRefused) as refused:
+        dl.load(scenes / "drag.json").run(method="rattle4", step=0.01)
+    assert refused.value.hint
+    with pytest.raises(dl.RequestRefused, match='method = "euler"'):
+        dl.load(scenes / "free.json").run(method="euler")
+    with pytest.raises(dl.SceneRefused):
+        dl.load(scenes / "free.json").with_({"bar1.mass": -2.0})
+    with pytest.raises(dl.DriftlessError):
+        dl.load(scenes / "free.json").with_({"bar1.colour": 3.0})
+    with pytest.raises(TypeError):
+        dl.load(scenes / "free.json").run(untill=3)
+
+
+def test_other_values_make_another_scene(scenes):
+    motor = dl.load(scenes / "motor.json")
+    fast = motor.with_({"motor.rate": 3.0}).with_({"bar1.length": 0.5, "gravity": [0, -1.62]})
+    assert motor.to_dict() != fast.to_dict() and fast.to_dict()["gravity"] == [0, -1.62]
+    assert dl.load(scenes / "motor.json", set={"motor.rate": np.float64(3)}).run(until=1)["bar1.omega"] == pytest.approx(3.0)
+    forces = motor.with_outputs("A.force", "half=motor.power/2").run(until=1)
+    assert forces["half"] == pytest.approx(0.5 * forces["motor.power"], rel=1e-12, abs=1e-15)
+    assert list(motor.run(until=1).motors) == ["motor"]
+
+
+def test_scenes_pickle(scenes):
+    scene = dl.load(scenes / "motor.json").with_({"motor.rate": 3.0}).with_outputs("A.force")
+    again = pickle.loads(pickle.dumps(scene))
+    assert np.array_equal(again.run(until=1).rows, scene.run(until=1).rows)
+
+
+def test_a_callback_sees_every_row_and_can_end_the_run(free):
+    seen = []
+    run = free.run(until=1, every=0.1, callback=lambda t, row: seen.append((t, row.copy())))
+    assert [t for t, _ in seen] == list(run.t)
+    assert np.array_equal(np.array([row for _, row in seen]), run.rows)
+    ended = free.run(until=1, every=0.1, callback=lambda t, row: t < 0.45)
+    assert ended.t[-1] == pytest.approx(0.5) and ended.success and "callback" in ended.message
+
+    def fails(t, row):
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        free.run(until=1, callback=fails)
+
+
+def test_a_stream_gives_the_rows_of_the_run(free):
+    rows = free.stream(until=2, every=0.1)
+    first = next(rows)
+    assert first[0] == 0.0
+    run = free.run(until=2, every=0.1, trust="off")
+    assert np.array_equal(np.array([first, *rows]), run.rows)
+
+
+def test_the_lock_is_released(free):
+    counted = 0
+    done = threading.Event()
+
+    def count():
+        nonlocal counted
+        while not done.is_set():
+            counted += 1
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=count)
+    thread.start()
+    begin = time.perf_counter()
+    free.run(until=300, method="gauss8", step=0.001, trust="off")
+    spent = time.perf_counter() - begin
+    done.set()
+    thread.join()
+    assert counted > 20 * spent, (counted, spent)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals")
+def test_an_interrupted_run_goes_on_from_its_checkpoint(tmp_path, scenes):
+    code = f"""
+import pydriftless as dl, signal, sys, time
+scene = dl.load({str(scenes / "free.json")!r})
+begun = []
+try:
+    print("going", flush=True)
+    scene.run(until=20000, method="gauss8", step=0.001, every=100, trust="off")
+except KeyboardInterrupt as stop:
+    assert isinstance(stop, dl.Interrupted)
+    open({str(tmp_path / "saved")!r}, "wb").write(stop.checkpoint)
+    print(time.time(), flush=True)
+"""
+    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    assert child.stdout.readline() == "going\n"
+    time.sleep(0.5)
+    sent = time.time()
+    child.send_signal(signal.SIGINT)
+    out, _ = child.communicate(timeout=60)
+    assert float(out) - sent < 1.0
+    scene = dl.load(scenes / "free.json")
+    run = dl.resume(tmp_path / "saved", callback=lambda t, row: t < 300)
+    whole = scene.run(until=20000, method="gauss8", step=0.001, every=100, trust="off", callback=lambda t, row: t < 300)
+    count = min(len(run.t), len(whole.t))
+    assert count >= 3 and np.array_equal(run.rows[:count], whole.rows[:count])
+    with pytest.raises(dl.RequestRefused):
+        dl.resume(b"nonsense")
+
+
+def test_commands_of_the_program(scenes):
+    crank = dl.load(scenes / "crank_rocker.json")
+    assert crank.check()["scene"] == "crank_rocker"
+    found = crank.kinematics(positions=36)
+    assert len(found.pictures) == 2 and found.pictures["mechanism"].data.startswith(b"\x89PNG")
+    assert "degrees_of_freedom" in dl.load(scenes / "free.json").modes(starts=0)
+    at = dl.load(scenes / "free.json").with_({"bar1.phi": 0.1}).inspect(at=0.5)
+    assert isinstance(at, dict) and at
+    with pytest.raises(dl.DriftlessError):
+        crank.kinematics(drive="nobody")
+
+
+def test_charts(scenes):
+    run = dl.load(scenes / "motor.json").run(until=2)
+    assert run.charts == ["mechanism", "angles", "energy_drift", "torque_power"]
+    assert run.chart("angles", "svg").data.startswith(b"<svg")
+    assert run.animation().data.startswith(b"GIF89a")
+    assert "image/png" in run._repr_mimebundle_()
+    with pytest.raises(ValueError):
+        run.chart("flowers")
+
+
+def test_frames_and_datasets(free):
+    run = free.run(until=1, every=0.1)
+    pd = pytest.importorskip("pandas")
+    frame = run.to_pandas()
+    assert isinstance(frame, pd.DataFrame) and frame.attrs["units"]["bar1.phi"] == "rad"
+    assert np.array_equal(frame["bar2.phi"].to_numpy(), run["bar2.phi"])
+    pytest.importorskip("xarray")
+    data = run.to_xarray()
+    assert data["bar2.omega"].attrs["units"] == "rad/s" and np.array_equal(data["t"], run.t)
+
+
+def test_plot(free):
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    axes = free.run(until=1).plot()
+    assert axes.get_xlabel() == "time [s]" and axes.get_ylabel() == "[rad]" and len(axes.lines) == 2
+
+
+def test_the_program_comes_along(program, tmp_path, scenes):
+    code, out, _ = program("--version")
+    assert code == 0 and out.split() == ["driftless", dl.__version__]
+    assert program("run", "nothing.json")[0] == 6
+    assert program("run", scenes / "free.json", "--rtol", "x")[0] == 2
