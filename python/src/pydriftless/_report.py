@@ -44,7 +44,7 @@ class Picture:
         return {kind: self.data.decode() if self.format == "svg" else self.data}
 
 
-class Report(dict):
+class Report(dict[str, Any]):
     """The JSON report of a command as a dict.
 
     Attributes

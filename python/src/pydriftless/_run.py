@@ -80,7 +80,8 @@ class Run:
 
     @property
     def t(self) -> np.ndarray:
-        return self.rows[:, 0]
+        times: np.ndarray = self.rows[:, 0]
+        return times
 
     @property
     def success(self) -> bool:
@@ -95,12 +96,13 @@ class Run:
 
     @cached_property
     def report(self) -> dict[str, Any]:
-        return json.loads(self._raw.report())
+        report: dict[str, Any] = json.loads(self._raw.report())
+        return report
 
     @property
     def energy_drift(self) -> float:
         """Largest energy drift over the energy scale."""
-        return self.report["result"]["energy"]["max_relative"]
+        return float(self.report["result"]["energy"]["max_relative"])
 
     @property
     def trust(self) -> SimpleNamespace:

@@ -65,7 +65,8 @@ class Scene:
 
     def to_dict(self) -> dict[str, Any]:
         """The scene as a dict, with everything replaced that was set."""
-        return json.loads(self._core.json())
+        scene: dict[str, Any] = json.loads(self._core.json())
+        return scene
 
     def with_(self, values: Mapping[str, Any], /) -> Scene:
         """The scene with other values.

@@ -6,7 +6,7 @@ import csv
 import json
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -122,6 +122,7 @@ def swept(
     axes, listed = _points(vary)
     total = len(listed[1]) if listed else int(np.prod([axis[3] for axis in axes], dtype=object))
     plan = {"axes": axes, "listed": listed, "to_flip": to_flip, "threads": threads, "options": options}
+    found: Iterable[Any]
     if shard is not None:
         found = [_part(scene, plan, shard)]
     elif client is not None:
@@ -180,7 +181,8 @@ def _submitted(scene: Scene, plan: dict[str, Any], client: Any, parts: int, tota
     plan = {**plan, "threads": plan["threads"] or 1}
     futures = []
     for number in range(1, parts + 1):
-        mine, shard = plan, (number, parts)
+        mine: dict[str, Any] = plan
+        shard: tuple[int, int] | None = (number, parts)
         if plan["listed"] is not None:
             names, values = plan["listed"]
             begin, end = total * (number - 1) // parts, total * number // parts
@@ -220,7 +222,7 @@ def _joined(found: list[Any]) -> Sweep:
     return sweep
 
 
-def _written(found: Iterator[Any], to: Any) -> Sweep:
+def _written(found: Iterable[Any], to: Any) -> Sweep:
     """The parts as a file, one after the other; the numbers are not kept."""
     path = os.fspath(to)
     if not path.endswith((".csv", ".parquet")):
