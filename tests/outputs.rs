@@ -412,6 +412,60 @@ fn peaks_of_a_crank_rocker_are_those_of_inverse_dynamics() {
     }
 }
 
+/// A block of 2 kg pushed up a rail by a crank and a rod that weigh nothing to speak of, slowly.
+fn lifted(rate: f64) -> Scene {
+    scene(&format!(
+        r#"{{"name": "lifted", "gravity": [-9.81, 0],
+        "bars": [
+            {{"name": "crank", "mass": 1e-9, "centre": [0.075, 0], "inertia": 1e-12, "length": 0.15}},
+            {{"name": "rod", "mass": 1e-9, "centre": [0.15, 0], "inertia": 1e-12, "length": 0.3}},
+            {{"name": "block", "mass": 2, "centre": [0, 0], "inertia": 1, "length": 0.05}}],
+        "hinges": [
+            {{"name": "O", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "crank", "point": [0, 0]}}]}},
+            {{"name": "A", "between": [{{"body": "crank", "point": [0.15, 0]}}, {{"body": "rod", "point": [0, 0]}}]}},
+            {{"name": "B", "between": [{{"body": "rod", "point": [0.3, 0]}}, {{"body": "block", "point": [0, 0]}}]}}],
+        "sliders": [{{"name": "rail", "point": {{"body": "block", "point": [0, 0]}}, "rail": {{"body": "ground", "point": [0, 0], "direction": [1, 0]}}, "angle": "locked"}}],
+        "motors": [{{"name": "motor", "body": "crank", "law": {{"start": 0, "rate": {rate}}}}}],
+        "outputs": ["O.force", "A.force", "B.force", "rail.force", "motor.torque"],
+        "start": {{"rod": {{"phi": 0}}, "block": {{"phi": 0}}}}, "until": {}, "every": {}}}"#,
+        TAU / rate,
+        TAU / rate,
+    ))
+}
+
+/// As the speed goes to zero the peaks are those of statics, and what is left falls with its square: a weight W on a
+/// rod at the angle β to the rail presses it by W / cos β and the rail by W tan β.
+#[test]
+fn peaks_of_a_slow_slider_crank_are_those_of_statics() {
+    let (r, l, weight) = (0.15, 0.3, 2.0 * 9.81);
+    let sin = r / l;
+    let cos = f64::sqrt(1.0 - sin * sin);
+    // Torque by virtual work: W dx/dφ with x = r cos φ + √(l² - r² sin² φ), largest by a golden search.
+    let torque = |phi: f64| {
+        let root = (l * l - (r * phi.sin()).powi(2)).sqrt();
+        weight * (r * phi.sin() + r * r * phi.sin() * phi.cos() / root)
+    };
+    let most = (0..=200_000).map(|k| torque(PI * f64::from(k) / 200_000.0)).fold(0.0, f64::max);
+    let statics = [weight / cos, weight / cos, weight / cos, weight * sin / cos, most];
+    let errors = |rate: f64| -> Vec<f64> {
+        let scene = lifted(rate);
+        let outcome = run(&scene, &adaptive(MethodId::Taylor, 1e-12));
+        let names = ["O.force", "A.force", "B.force", "rail.force", "motor.torque"];
+        let peaks = names.iter().map(|name| found(&outcome.extremes, name).peak()[0].abs());
+        peaks.zip(statics).map(|(peak, known)| (peak - known).abs() / known).collect()
+    };
+    let slow = [0.8, 0.4, 0.2].map(errors);
+    for k in 0..statics.len() {
+        assert!(slow[2][k] < 2e-3, "output {k}: {:?}", slow.map(|errors| errors[k]));
+        for pair in slow.windows(2) {
+            let order = (pair[0][k] / pair[1][k]).log2();
+            // Where the static torque W x'(φ) is largest, x'' and with it the inertia of the block vanish.
+            let expected = if k == 4 { 4.0 } else { 2.0 };
+            assert!((order - expected).abs() < 0.1, "output {k} falls with order {order}");
+        }
+    }
+}
+
 /// A bar of moment 0.5 kg·m² about its hinge turns to and fro as A sin w t: its torque is known at every time.
 fn swinging(every: f64) -> Scene {
     scene(&format!(

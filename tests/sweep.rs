@@ -7,8 +7,8 @@ use crate::program;
 use driftless::dynamics::{Mechanism, Time};
 use driftless::run::trust::Level;
 use driftless::run::{
-    Flip, MethodId, Point, PointObserver, Request, Stabilization, Status, Sweep, SweepError, SweepTable,
-    Vary, reference, simulate, sweep,
+    Flip, MethodId, Point, PointObserver, Request, Shard, Stabilization, Status, Sweep, SweepError,
+    SweepTable, Vary, reference, simulate, sweep,
 };
 use driftless::scene::Template;
 use driftless::stepping::Cause;
@@ -142,6 +142,32 @@ fn the_number_of_threads_and_the_chunks_change_nothing() {
         }
         assert_eq!(plan.point(100).as_ref(), Some(&one[100]), "by itself");
         assert_eq!(plan.point(207), None);
+    }
+}
+
+#[test]
+fn a_list_of_the_points_of_a_grid_is_the_grid() {
+    let names = ["bar1.phi", "spring.stiffness"].map(str::to_owned);
+    let request = request("taylor", 2.0);
+    let grid = prepared("spring", &["bar1.phi=0.5..2:4", "spring.stiffness=5..10:3"], &request);
+    let values: Vec<f64> = (0..grid.count()).flat_map(|index| grid.grid().values(index)).collect();
+    let list = Sweep::listed(&template("spring"), &names, values.clone(), &request).expect("a list");
+    assert_eq!(points(&list, 2), points(&grid, 1));
+    // The parts of either are the whole.
+    let part = |number| {
+        let list = Sweep::listed(&template("spring"), &names, values.clone(), &request).expect("a list");
+        points(&list.sharded(Shard::new(number, 5)), 1)
+    };
+    assert_eq!((1..=5).flat_map(part).collect::<Vec<_>>(), points(&grid, 2));
+    for (names, values, why) in [
+        (&names[..], vec![0.5], "as many"),
+        (&names[..], vec![], "no points"),
+        (&names[..], vec![0.5, f64::NAN], "finite"),
+        (&[names[0].clone(), "start.bar1.phi".to_owned()][..], vec![0.5, 0.5], "twice"),
+        (&["bar7.phi".to_owned()][..], vec![0.5], "bar7"),
+    ] {
+        let refused = Sweep::listed(&template("spring"), names, values, &request).err().expect(why);
+        assert!(refused.to_string().contains(why), "{refused}");
     }
 }
 

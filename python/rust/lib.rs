@@ -4,6 +4,7 @@
 //! global lock is released while anything is integrated.
 
 mod errors;
+mod event;
 mod request;
 mod run;
 mod scene;
@@ -38,5 +39,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<scene::Scene>()?;
     module.add_class::<run::Raw>()?;
     module.add_class::<stepper::Stepper>()?;
+    module.add_class::<event::Moment>()?;
     errors::add(module)
 }

@@ -1,13 +1,14 @@
 //! Runs: integrated without the global lock, looked at now and then for Ctrl-C.
 
 use crate::errors::{Interrupted, of_plan, of_run, refused};
+use crate::event::{Failed, events};
 use crate::request::asked;
 use crate::scene::Scene;
 use driftless::report::charts::{Chart, draw, motion};
 use driftless::report::result::record;
 use driftless::run::checkpoint::{opened, sealed};
 use driftless::run::table::Shown;
-use driftless::run::{Observer, Plan, Recorder, Run, Running, Sample, Snapshot, Step, wall_clock};
+use driftless::run::{Event, Observer, Plan, Recorder, Run, Running, Sample, Snapshot, Step, wall_clock};
 use driftless::{Level, Outcome, Trajectory, chart};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
@@ -16,7 +17,7 @@ use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Longest time of computing between two looks for Ctrl-C.
@@ -48,6 +49,9 @@ struct Watch<'a> {
     callback: Option<&'a Py<PyAny>>,
     failed: Option<PyErr>,
 }
+
+/// An event as Python describes it: name, function, direction, whether it ends the run.
+type Described = (String, Py<PyAny>, i8, bool);
 
 impl Observer for Watch<'_> {
     fn wants_steps(&self) -> bool {
@@ -81,21 +85,29 @@ impl Observer for Watch<'_> {
 
 /// Integrates a scene to its horizon.
 #[pyfunction]
-#[pyo3(signature = (scene, callback, dense, **options))]
+#[pyo3(signature = (scene, callback, dense, described, **options))]
 pub fn run(
     py: Python<'_>,
     scene: Py<Scene>,
     callback: Option<Py<PyAny>>,
     dense: bool,
+    described: Vec<Described>,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Raw> {
     let options = options.cloned().unwrap_or_else(|| PyDict::new(py));
-    let running = begun(py, scene.get(), &options)?;
-    carry(py, scene, running, Vec::new(), callback.as_ref(), dense)
+    let failed = Failed::default();
+    let events = events(described, &scene.get().mechanism, &failed);
+    let running = begun(py, scene.get(), &options, events)?;
+    carry(py, scene, running, Vec::new(), callback.as_ref(), dense, &failed)
 }
 
 /// Plans a run and begins it.
-pub fn begun(py: Python<'_>, scene: &Scene, options: &Bound<'_, PyDict>) -> PyResult<Running> {
+pub fn begun(
+    py: Python<'_>,
+    scene: &Scene,
+    options: &Bound<'_, PyDict>,
+    events: Vec<Box<dyn Event>>,
+) -> PyResult<Running> {
     let asked = asked(py, options, Level::Auto)?;
     let mechanism = &scene.mechanism;
     let begun = py.detach(|| {
@@ -103,7 +115,7 @@ pub fn begun(py: Python<'_>, scene: &Scene, options: &Bound<'_, PyDict>) -> PyRe
         let start = mechanism.start(&scene.scene);
         let run = Run::new(Arc::clone(mechanism), plan, asked.limits, &start)
             .map_err(|e| Refused::Run(e.into()))?;
-        Ok(Running::new(run.trusted(asked.trust, &start).timed(wall_clock)))
+        Ok(Running::new(run.trusted(asked.trust, &start).with_events(events).timed(wall_clock)))
     });
     begun.map_err(|error| match error {
         Refused::Plan(error) => of_plan(py, &error),
@@ -118,8 +130,13 @@ enum Refused {
 
 /// Goes on with an interrupted run.
 #[pyfunction]
-#[pyo3(signature = (checkpoint, callback=None))]
-pub fn resume(py: Python<'_>, checkpoint: &[u8], callback: Option<Py<PyAny>>) -> PyResult<Raw> {
+#[pyo3(signature = (checkpoint, callback=None, described=Vec::new()))]
+pub fn resume(
+    py: Python<'_>,
+    checkpoint: &[u8],
+    callback: Option<Py<PyAny>>,
+    described: Vec<Described>,
+) -> PyResult<Raw> {
     let failed = |error: String| refused(py, &error);
     let saved: Saved =
         opened(checkpoint, Path::new("the checkpoint")).map_err(|error| failed(error.to_string()))?;
@@ -132,7 +149,14 @@ pub fn resume(py: Python<'_>, checkpoint: &[u8], callback: Option<Py<PyAny>>) ->
     let running = Running::resume(mechanism, &start, *saved.snapshot)
         .map_err(|error| failed(error.to_string()))?
         .timed(wall_clock);
-    carry(py, Py::new(py, scene)?, running, saved.numbers, callback.as_ref(), false)
+    let failure = Failed::default();
+    let running = if described.is_empty() {
+        running
+    } else {
+        let events = events(described, &scene.mechanism, &failure);
+        running.with_events(events).map_err(|error| failed(error.to_string()))?
+    };
+    carry(py, Py::new(py, scene)?, running, saved.numbers, callback.as_ref(), false, &failure)
 }
 
 /// Takes a run to its end.
@@ -143,6 +167,7 @@ fn carry(
     numbers: Vec<f64>,
     callback: Option<&Py<PyAny>>,
     dense: bool,
+    failed: &Failed,
 ) -> PyResult<Raw> {
     let shown = Shown::new(&scene.get().mechanism);
     let recorder = dense.then(Recorder::default);
@@ -153,14 +178,15 @@ fn carry(
             running.go_observed(&mut watch, &mut || {
                 asked += 1;
                 // A look at the clock costs more than a short step.
-                let is_due = asked.is_multiple_of(16) && begin.elapsed() >= LOOK;
+                let is_due = asked.is_multiple_of(16) && (begin.elapsed() >= LOOK || has_failed(failed));
                 if is_due {
                     begin = Instant::now();
                 }
                 is_due
             })
         });
-        if let Some(error) = watch.failed.take() {
+        let failure = failed.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some(error) = watch.failed.take().or(failure) {
             return Err(error);
         }
         if is_over {
@@ -183,6 +209,10 @@ fn carry(
         None => (outcome, None),
     };
     Ok(Raw { scene, outcome, rows, trajectory })
+}
+
+fn has_failed(failed: &Failed) -> bool {
+    failed.lock().unwrap_or_else(PoisonError::into_inner).is_some()
 }
 
 /// The interruption with what the run goes on from.
@@ -260,6 +290,25 @@ impl Raw {
         }
         let width = numbers.len() / times.len().max(1);
         PyArray1::from_vec(py, numbers).reshape([times.len(), width])
+    }
+
+    /// Events in their order.
+    fn events<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let names = self.coordinates();
+        let dict = |record: &driftless::EventRecord| {
+            let dict = PyDict::new(py);
+            dict.set_item("name", &record.name)?;
+            dict.set_item("t", record.t)?;
+            for (key, values) in [("phi", &record.phi), ("omega", &record.omega)] {
+                let of = PyDict::new(py);
+                for (name, value) in names.iter().zip(values) {
+                    of.set_item(name.strip_prefix("phi of ").unwrap_or(name), value)?;
+                }
+                dict.set_item(key, of)?;
+            }
+            PyResult::Ok(dict)
+        };
+        self.outcome.events.iter().map(dict).collect()
     }
 
     /// Names of what [`Raw::at`] tells angles or positions of.

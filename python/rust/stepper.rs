@@ -26,7 +26,7 @@ pub fn stream(
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Stepper> {
     let options = options.cloned().unwrap_or_else(|| PyDict::new(py));
-    let running = begun(py, scene.get(), &options)?;
+    let running = begun(py, scene.get(), &options, Vec::new())?;
     Ok(Stepper { shown: Shown::new(&scene.get().mechanism), running: Mutex::new(Some(running)) })
 }
 

@@ -149,6 +149,24 @@ def test_a_stream_gives_the_rows_of_the_run(free):
     assert np.array_equal(np.array([first, *rows]), run.rows)
 
 
+def test_events_in_python_are_located_and_can_end_the_run(scenes):
+    motor = dl.load(scenes / "motor.json")
+    # The motor turns the first bar at one turn a second from a quarter on: it passes whole turns every second.
+    whole = dl.Event("whole", lambda at: math.cos(at.phi("bar1")), direction=1)
+    length = motor.to_dict()["bars"][0]["length"]
+    low = dl.Event("low", lambda at: at.position("bar1", (length, 0))[0] - 0.5 * length, stop=True)
+    run = motor.run(until=4, method="dp8", rtol=1e-12, events=[whole])
+    assert [event["name"] for event in run.events] == ["whole"] * 4
+    at = np.array([event["phi"]["bar1"] for event in run.events])
+    assert np.max(np.abs(np.cos(at))) < 1e-9
+    ended = motor.run(until=4, events=[low])
+    assert ended.success and "event low" in ended.message and len(ended.events) == 1
+    assert math.cos(ended.events[0]["phi"]["bar1"]) == pytest.approx(0.5, abs=1e-9)
+
+    with pytest.raises(KeyError, match="bar9"):
+        motor.run(until=4, events=[dl.Event("odd", lambda at: at.phi("bar9"))])
+
+
 def test_the_lock_is_released(free):
     counted = 0
     done = threading.Event()

@@ -9,7 +9,7 @@ use super::text::{Align, Lettering, Level};
 use std::f64::consts::FRAC_PI_2;
 
 /// Width and height of a cell, and the em of its word \[pt\].
-const CELL: [f64; 2] = [27.0, 11.5];
+const CELL: [f64; 2] = [31.0, 11.5];
 const WORD: f64 = 7.0;
 /// Side of a square of the legend \[pt\].
 const SWATCH: f64 = 8.0;

@@ -11,7 +11,7 @@ Units are SI throughout, angles in radians, absolute, from +x, counter-clockwise
 from ._builder import Builder, ground, on
 from ._core import DriftlessError, Interrupted, RequestRefused, SceneRefused, __version__
 from ._report import Picture, Report
-from ._run import Columns, Run, resume
+from ._run import Columns, Event, Run, resume
 from ._scene import Scene, load, loads
 from ._sweep import Sweep
 
@@ -19,6 +19,7 @@ __all__ = [
     "Builder",
     "Columns",
     "DriftlessError",
+    "Event",
     "Interrupted",
     "Picture",
     "Report",

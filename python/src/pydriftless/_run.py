@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from types import SimpleNamespace
@@ -25,8 +26,9 @@ class Columns(Mapping[str, np.ndarray]):
         self._columns = columns
 
     def __getattr__(self, name: str) -> np.ndarray:
+        columns: dict[str, np.ndarray] = self.__dict__["_columns"]
         try:
-            return self.__dict__["_columns"][name]
+            return columns[name]
         except KeyError:
             raise AttributeError(f"there is no {name!r}; there are {', '.join(self._columns)}") from None
 
@@ -69,8 +71,11 @@ class Run:
         What ``run.json`` of the program holds.
     """
 
-    def __init__(self, raw: _core.Raw, scene: Scene, options: dict[str, Any]) -> None:
+    def __init__(
+        self, raw: _core.Raw, scene: Scene, options: dict[str, Any], described: list[Any] | None = None
+    ) -> None:
         self._raw = raw
+        self._described = described or []
         self._options = options
         self.scene = scene
         self.rows: np.ndarray = raw.rows
@@ -113,6 +118,11 @@ class Run:
         )
 
     @property
+    def events(self) -> list[dict[str, Any]]:
+        """Events in their order: ``name``, ``t``, ``phi`` and ``omega``."""
+        return self._raw.events()
+
+    @property
     def motors(self) -> dict[str, Columns]:
         """Torques [N m] or forces [N] and powers [W] of the motors."""
         names = [name[: -len(".power")] for name in self.columns if name.endswith(".power")]
@@ -153,7 +163,7 @@ class Run:
             self._raw.at(np.empty(0))
             return self._raw
         except ValueError:
-            return _core.run(self.scene._core, None, True, **{**self._options, "trust": "off"})
+            return _core.run(self.scene._core, None, True, self._described, **{**self._options, "trust": "off"})
 
     @property
     def charts(self) -> list[str]:
@@ -215,22 +225,56 @@ class Run:
         return f"<Run of {self.scene.name!r} by {method}: {len(self.t)} rows to {end} s; {self.message}>"
 
 
+@dataclass(frozen=True)
+class Event:
+    """An event written in Python: slow, but located as exactly as all others.
+
+    Attributes
+    ----------
+    name : str
+        Its name in ``run.events``.
+    function : callable
+        A smooth function of a moment, whose zero is the event: ``lambda at: at.phi("bar2") - 1``.  A moment
+        has ``t``, ``phi(body)``, ``omega(body)``, ``position(body, point)`` and ``velocity(body, point)``.
+    direction : int
+        1 for zeros that are passed upwards, -1 downwards, 0 for both.
+    stop : bool
+        Whether the run ends there.
+    """
+
+    name: str
+    function: Callable[[_core.Moment], float]
+    direction: int = 0
+    stop: bool = False
+
+    def described(self) -> tuple[str, Callable[[_core.Moment], float], int, bool]:
+        """As the native part takes it."""
+        return self.name, self.function, self.direction, self.stop
+
+
 def _coordinate(name: str) -> str:
     """``phi of bar`` is ``bar``, ``x of ball`` is ``ball.x``."""
     kind, _, body = name.partition(" of ")
     return body if kind == "phi" else f"{body}.{kind}"
 
 
-def resume(checkpoint: bytes | str | Path, callback: Callable[[float, np.ndarray], Any] | None = None) -> Run:
+def resume(
+    checkpoint: bytes | str | Path,
+    callback: Callable[[float, np.ndarray], Any] | None = None,
+    events: Sequence[Event] = (),
+) -> Run:
     """Go on with an interrupted run: it ends as if nothing had been, bit for bit.
 
     Parameters
     ----------
     checkpoint : bytes or path
         That of :class:`Interrupted`, or a file it was written to.
+    callback, events
+        As for :meth:`Scene.run`; the events have to be those of the run before.
     """
     from ._scene import Scene
 
     content = checkpoint if isinstance(checkpoint, bytes) else Path(checkpoint).read_bytes()
-    raw = _core.resume(content, callback)
-    return Run(raw, Scene(*raw.scene.parts()), {})
+    described = [event.described() for event in events]
+    raw = _core.resume(content, callback, described)
+    return Run(raw, Scene(*raw.scene.parts()), {}, described)

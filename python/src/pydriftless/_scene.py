@@ -12,7 +12,7 @@ import numpy as np
 
 from . import _core
 from ._report import Report, command, flags
-from ._run import Run
+from ._run import Event, Run
 from ._sweep import Sweep, swept
 
 
@@ -103,6 +103,7 @@ class Scene:
         trust: str = "auto",
         dense: bool = False,
         callback: Callable[[float, np.ndarray], Any] | None = None,
+        events: Sequence[Event] = (),
         progress: bool = False,
     ) -> Run:
         """Integrate the scene to its horizon.
@@ -128,6 +129,8 @@ class Scene:
             Keep the motion between the rows for ``run(t)``; without it ``run(t)`` integrates once more.
         callback : callable
             Called with the time and the row at every row; ``False`` ends the run.
+        events : sequence of Event
+            Events beside those of the scene.
         progress : bool
             Show a bar, where tqdm is installed.
 
@@ -157,16 +160,17 @@ class Scene:
             "max_constraint_drift": max_constraint_drift,
             "trust": trust,
         }
+        described = [event.described() for event in events]
         bar = _bar(progress, until if until is not None else self.to_dict().get("until"))
         if bar is None:
-            return Run(_core.run(self._core, callback, dense, **options), self, options)
+            return Run(_core.run(self._core, callback, dense, described, **options), self, options, described)
 
         def tell(t: float, row: np.ndarray) -> Any:
             bar.update(t - bar.n)
             return callback(t, row) if callback is not None else None
 
         with bar:
-            return Run(_core.run(self._core, tell, dense, **options), self, options)
+            return Run(_core.run(self._core, tell, dense, described, **options), self, options, described)
 
     def stream(self, **options: Any) -> Iterator[np.ndarray]:
         """The rows of a run as an iterator, integrated as they are asked for.
