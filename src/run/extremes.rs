@@ -16,6 +16,8 @@ use std::sync::Arc;
 /// Degrees of the interpolants, and what the last coefficients may be over the largest value.
 const DEGREES: [usize; 3] = [8, 16, 32];
 const RESOLVED: f64 = 1e-10;
+/// What an output may be beside its interpolant, over the largest value, for a step to be passed over.
+const MARGIN: f64 = 1e-6;
 /// Halvings of a step that no interpolant resolves: an output may have corners.
 const HALVINGS: u32 = 6;
 /// Halvings of the bracket of an extreme.
@@ -155,24 +157,28 @@ impl ExtremesDetector {
     fn look(&mut self, inside: &mut dyn Inside, begin: Time, span: f64, depth: u32) {
         let at = |share: f64, row: &mut Vec<f64>| self.values(inside.at(begin + share * span), row);
         let is_enough = |curve: &Chebyshev| curve.tail() <= RESOLVED * curve.most();
-        let Interpolants { curves, values, is_resolved } = interpolated(&DEGREES, at, is_enough);
+        let Interpolants { curves, nodes, values, is_resolved } = interpolated(&DEGREES, at, is_enough);
         if !is_resolved && depth < HALVINGS {
             self.look(inside, begin, 0.5 * span, depth + 1);
             return self.look(inside, begin + 0.5 * span, 0.5 * span, depth + 1);
         }
-        let Some(degree) = values.first().map(|values| values.len() - 1) else { return };
-        let nodes: Vec<f64> = Chebyshev::nodes(degree).collect();
         self.memory.span += DoubleDouble::from(span);
         let mut row = Vec::new();
         for (k, (curve, values)) in curves.iter().zip(&values).enumerate() {
             let squares: Vec<f64> = values.iter().map(|value| value * value).collect();
             let found = &mut self.memory.found[k];
             found.integral += DoubleDouble::product(curve.integral(), span);
-            found.square += DoubleDouble::product(Chebyshev::through(&squares).integral(), span);
-            for (value, node) in values.iter().zip(&nodes) {
+            found.square += DoubleDouble::product(nodes.through(&squares).integral(), span);
+            for (value, node) in values.iter().zip(&nodes.places) {
                 found.see(*value, (begin + node * span).hi);
             }
-            for share in turns(curve, values, &nodes, [found.min[0], found.max[0]]) {
+            let known = [found.min[0], found.max[0]];
+            // Most steps of a long run hold no new extreme, and their coefficients tell.
+            let ([lowest, highest], margin) = (curve.range(), MARGIN * curve.most());
+            if is_resolved && lowest - margin > known[0] && highest + margin < known[1] {
+                continue;
+            }
+            for share in turns(curve, values, &nodes.places, known) {
                 let t = begin + share * span;
                 row.clear();
                 self.values(inside.at(t), &mut row);
@@ -185,10 +191,11 @@ impl ExtremesDetector {
 /// Where a curve turns round next to a node that may be beside a new extreme.
 fn turns(curve: &Chebyshev, values: &[f64], nodes: &[f64], [least, most]: [f64; 2]) -> Vec<f64> {
     let mut turns = Vec::new();
+    let slopes: Vec<f64> = nodes.iter().map(|&node| curve.at(node)[1]).collect();
     for i in 1..values.len() {
         // Nodes go from 1 to 0.
         let (mut low, mut high) = (nodes[i], nodes[i - 1]);
-        let (first, last) = (curve.at(low)[1], curve.at(high)[1]);
+        let (first, last) = (slopes[i], slopes[i - 1]);
         if first == 0.0 || last == 0.0 || (first > 0.0) == (last > 0.0) {
             continue;
         }

@@ -7,15 +7,53 @@ use super::{Curve, Part, ROUNDING};
 pub struct Interpolants {
     /// Function by function.
     pub curves: Vec<Chebyshev>,
-    /// Their values at the [nodes](Chebyshev::nodes), function by function.
+    /// Where their values were taken.
+    pub nodes: Nodes,
+    /// Their values there, function by function.
     pub values: Vec<Vec<f64>>,
     /// True where the last degree was enough.
     pub is_resolved: bool,
 }
 
+/// The places of the values of an interpolant of one degree, from 1 to 0, and the cosines it takes.
+#[derive(Clone, Debug, Default)]
+pub struct Nodes {
+    /// The places.
+    pub places: Vec<f64>,
+    /// cos(π m / degree).
+    wave: Vec<f64>,
+}
+
+impl Nodes {
+    /// Those of a degree, at least 1.
+    pub fn new(degree: usize) -> Self {
+        let degree = degree.max(1);
+        let cosine = |m: usize| libm::cos(std::f64::consts::PI * m as f64 / degree as f64);
+        let wave: Vec<f64> = (0..2 * degree).map(cosine).collect();
+        Self { places: wave[..=degree].iter().map(|cosine| 0.5 + 0.5 * cosine).collect(), wave }
+    }
+
+    /// The interpolant of values at these places.
+    pub fn through(&self, values: &[f64]) -> Chebyshev {
+        let degree = self.places.len() - 1;
+        let end = |k: usize| if k == 0 || k == degree { 0.5 } else { 1.0 };
+        let sum = |k: usize| {
+            values
+                .iter()
+                .enumerate()
+                .fold(0.0, |sum, (j, value)| sum + end(j) * value * self.wave[(j * k) % (2 * degree)])
+        };
+        let coefficients: Vec<f64> = (0..=degree).map(|k| 2.0 / degree as f64 * end(k) * sum(k)).collect();
+        let steep = |(k, c): (usize, &f64)| 4.0 * (k * k * (k * k - k.min(1))) as f64 / 3.0 * c.abs();
+        let bend = coefficients.iter().enumerate().map(steep).sum();
+        Chebyshev { coefficients, bend }
+    }
+}
+
 /// Interpolates functions by one of the `degrees` after the other, until a degree is enough for each of them.
 ///
-/// `at` appends the value of each function at a place in \[0, 1\].
+/// `at` appends the value of each function at a place in \[0, 1\]; it is asked once about a place, of which each
+/// degree that is twice the one before has every other already.
 pub fn interpolated(
     degrees: &[usize],
     mut at: impl FnMut(f64, &mut Vec<f64>),
@@ -23,14 +61,20 @@ pub fn interpolated(
 ) -> Interpolants {
     let (mut found, mut row) = (Interpolants::default(), Vec::new());
     for &degree in degrees {
-        found.values.iter_mut().for_each(Vec::clear);
-        for node in Chebyshev::nodes(degree) {
+        let before = std::mem::take(&mut found.values);
+        let is_nested = before.first().is_some_and(|values| 2 * (values.len() - 1) == degree);
+        found.nodes = Nodes::new(degree);
+        for (j, &node) in found.nodes.places.iter().enumerate() {
             row.clear();
-            at(node, &mut row);
+            if is_nested && j % 2 == 0 {
+                row.extend(before.iter().map(|values| values[j / 2]));
+            } else {
+                at(node, &mut row);
+            }
             found.values.resize(row.len(), Vec::new());
             found.values.iter_mut().zip(&row).for_each(|(values, value)| values.push(*value));
         }
-        found.curves = found.values.iter().map(|values| Chebyshev::through(values)).collect();
+        found.curves = found.values.iter().map(|values| found.nodes.through(values)).collect();
         found.is_resolved = found.curves.iter().all(&is_enough);
         if found.is_resolved {
             break;
@@ -50,27 +94,15 @@ pub struct Chebyshev {
 }
 
 impl Chebyshev {
-    /// The places of `degree + 1` values, from 1 to 0.
-    pub fn nodes(degree: usize) -> impl Iterator<Item = f64> {
-        (0..=degree).map(move |j| 0.5 + 0.5 * libm::cos(std::f64::consts::PI * j as f64 / degree as f64))
-    }
-
     /// The interpolant of values at the nodes, two at least.
     pub fn through(values: &[f64]) -> Self {
-        let degree = values.len().max(2) - 1;
-        let end = |k: usize| if k == 0 || k == degree { 0.5 } else { 1.0 };
-        let wave: Vec<f64> =
-            (0..2 * degree).map(|m| libm::cos(std::f64::consts::PI * m as f64 / degree as f64)).collect();
-        let sum = |k: usize| {
-            values
-                .iter()
-                .enumerate()
-                .fold(0.0, |sum, (j, value)| sum + end(j) * value * wave[(j * k) % (2 * degree)])
-        };
-        let coefficients: Vec<f64> = (0..=degree).map(|k| 2.0 / degree as f64 * end(k) * sum(k)).collect();
-        let steep = |(k, c): (usize, &f64)| 4.0 * (k * k * (k * k - k.min(1))) as f64 / 3.0 * c.abs();
-        let bend = coefficients.iter().enumerate().map(steep).sum();
-        Self { coefficients, bend }
+        Nodes::new(values.len().max(2) - 1).through(values)
+    }
+
+    /// The least and the largest value it can have.
+    pub fn range(&self) -> [f64; 2] {
+        let swing: f64 = self.coefficients.iter().skip(1).map(|c| c.abs()).sum();
+        [self.coefficients[0] - swing, self.coefficients[0] + swing]
     }
 
     /// What the last coefficients say it may be off.
