@@ -47,9 +47,7 @@ impl ChartFlags {
     /// # Errors
     /// The chart cannot be encoded or written.
     pub fn keep(&self, folder: &mut Folder, name: &str, picture: &Picture) -> Result<(), Failure> {
-        let mut formats = self.chart_format.clone();
-        formats.dedup();
-        for format in formats {
+        for format in Format::ALL.into_iter().filter(|format| self.chart_format.contains(format)) {
             folder.write(format!("{name}.{}", format.extension()), &picture.bytes(format)?)?;
         }
         Ok(())
