@@ -108,7 +108,7 @@ pub(crate) fn place(
             let overhang = outside.iter().any(|&part| part > 0.0);
             let along: f64 = avoid.iter().map(|d| (d[0] * away + d[1] * across).max(0.0).powi(2)).sum();
             let preference = 0.4 * f64::from(k.min(16 - k)) / 8.0 + 1.5 * f64::from(ring);
-            let cost = preference + 4.0 * along + occupied.cost(bounds) + if overhang { 50.0 } else { 0.0 };
+            let cost = preference + 4.0 * along + occupied.cost(bounds) + if overhang { 500.0 } else { 0.0 };
             if cost < best.1 {
                 best = (bounds, cost);
             }

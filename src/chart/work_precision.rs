@@ -22,6 +22,8 @@ const LINE: f64 = 1.6;
 /// The width of lines that have no part in the front \[pt\], and how far they are mixed towards white.
 const OTHER: f64 = 1.0;
 const PALE: f64 = 0.45;
+/// Share of the least error from which on a floor is shown.
+const NEAR: f64 = 1e-2;
 /// Lines beyond which a page is a little higher \[pt\].
 const CROWD: usize = 6;
 const HIGHER: f64 = 60.0;
@@ -101,7 +103,10 @@ pub fn work_precision(chart: &WorkPrecision, px_per_pt: f64) -> Result<Picture, 
     let all: Vec<Point> = points.concat();
 
     let x = roomy(&name, all.iter().map(|p| p[0]));
-    let floor = chart.floor.as_ref().map(|floor| floor.0).filter(|&value| value > 0.0 && value.is_finite());
+    // A floor far below all data would only stretch the page.
+    let lowest = all.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
+    let floor =
+        chart.floor.as_ref().map(|floor| floor.0).filter(|&value| value > NEAR * lowest && value.is_finite());
     let mut y = Axis::decades(&chart.error_name, all.iter().map(|p| p[1]).chain(floor));
     // Whatever is lost lies on the edge itself.
     y.to = y.to.min(most.max(10.0 * y.from));

@@ -464,8 +464,9 @@ pub fn chart_data(
         }
     };
     let lost = if of_energy { None } else { Some(LOST) };
+    // Energies are measured in double-double: there is no such floor among doubles.
     let floor = if of_energy {
-        Some((ROUNDING, "rounding".to_owned()))
+        None
     } else {
         let accuracy = truth.accuracy.max(ROUNDING);
         let words = if truth.accuracy > ROUNDING { "accuracy of the reference" } else { "rounding" };
