@@ -412,7 +412,7 @@ fn peaks_of_a_crank_rocker_are_those_of_inverse_dynamics() {
     }
 }
 
-/// A block of 2 kg pushed up a rail by a crank and a rod that weigh nothing to speak of, slowly.
+/// A block of 2 kg pushed up a rail by a crank and a rod of negligible mass, slowly.
 fn lifted(rate: f64) -> Scene {
     scene(&format!(
         r#"{{"name": "lifted", "gravity": [-9.81, 0],

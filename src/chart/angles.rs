@@ -28,6 +28,14 @@ pub struct AngleSeries {
     pub angle: Vec<f64>,
 }
 
+impl AngleSeries {
+    /// Largest less least of its values.
+    #[must_use]
+    pub fn spread(&self) -> f64 {
+        spread(&[self])
+    }
+}
+
 /// Angles of bars, and travels of sliders.
 #[derive(Clone, Debug, Default)]
 pub struct Angles {
@@ -78,11 +86,11 @@ fn groups(chart: &Angles) -> Vec<Group<'_>> {
         0 => Vec::new(),
         1..=APART => chart.series.iter().map(|series| vec![series]).collect(),
         _ => {
-            let mut spreads: Vec<f64> = chart.series.iter().map(|series| spread(&[series])).collect();
+            let mut spreads: Vec<f64> = chart.series.iter().map(AngleSeries::spread).collect();
             spreads.sort_by(f64::total_cmp);
             let least = spreads[0].max(PI);
             let (winding, swinging): (Vec<_>, Vec<_>) =
-                chart.series.iter().partition(|series| spread(&[series]) > RAMP * least);
+                chart.series.iter().partition(|series| series.spread() > RAMP * least);
             [swinging, winding].into_iter().filter(|group| !group.is_empty()).collect()
         }
     };

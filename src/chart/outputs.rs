@@ -97,8 +97,10 @@ pub fn outputs(chart: &OutputsChart, px_per_pt: f64) -> Result<Picture, ChartErr
         Axis::fit(&name, lines.iter().flat_map(|one| &one.1).map(|p| p[1]))
     };
     let mut caption = chart.caption.clone();
-    caption
-        .push(format!("extremes of the whole {} marked", if chart.over.is_some() { "range" } else { "run" }));
+    if chart.outputs.iter().any(|output| !output.extremes.is_empty()) {
+        let whole = if chart.over.is_some() { "range" } else { "run" };
+        caption.push(format!("extremes of the whole {whole} marked"));
+    }
     if left_out > 0 {
         caption.push(format!("{left_out} more units in the table"));
     }

@@ -31,26 +31,11 @@ pub(crate) fn svg(drawing: &Drawing, title: &str, description: &str) -> Result<S
             }
             Mark::Stroke { path, colour, opacity, width, round } => {
                 let cap = if *round { " stroke-linecap=\"round\"" } else { "" };
-                let (opacity, width) = (alpha("stroke", *opacity), short(*width as f32));
-                let stroke = hex(*colour);
-                line(
-                    &mut out,
-                    format_args!(
-                        "<path stroke=\"{stroke}\" stroke-width=\"{width}\"{opacity}{cap} d=\"{}\"/>",
-                        d(path)
-                    ),
-                );
+                stroke(&mut out, *colour, *width, *opacity, cap, &d(path));
             }
             Mark::Rule { from, to, colour, opacity, width } => {
                 let [x0, y0, x1, y1] = [from[0], from[1], to[0], to[1]].map(|c| short(c as f32));
-                let (opacity, width) = (alpha("stroke", *opacity), short(*width as f32));
-                let stroke = hex(*colour);
-                line(
-                    &mut out,
-                    format_args!(
-                        "<path stroke=\"{stroke}\" stroke-width=\"{width}\"{opacity} d=\"M{x0} {y0}L{x1} {y1}\"/>"
-                    ),
-                );
+                stroke(&mut out, *colour, *width, *opacity, "", &format!("M{x0} {y0}L{x1} {y1}"));
             }
             Mark::Words { text, path, colour, halo } => {
                 let rim = if *halo > 0.0 {
@@ -89,6 +74,11 @@ fn line(out: &mut String, words: std::fmt::Arguments) {
     // Writing into a string cannot fail.
     let _ = out.write_fmt(words);
     out.push('\n');
+}
+
+fn stroke(out: &mut String, colour: Colour, width: f64, opacity: f64, cap: &str, d: &str) {
+    let (colour, width, opacity) = (hex(colour), short(width as f32), alpha("stroke", opacity));
+    line(out, format_args!("<path stroke=\"{colour}\" stroke-width=\"{width}\"{opacity}{cap} d=\"{d}\"/>"));
 }
 
 fn hex(colour: Colour) -> String {

@@ -1,6 +1,7 @@
 //! Which charts are drawn, and their files.
 
 use super::failure::Failure;
+use super::flags::TellFlags;
 use crate::chart::{Format, MotionGif, Picture, motion_apng, motion_gif};
 use crate::run::Folder;
 use clap::Args;
@@ -46,9 +47,15 @@ impl ChartFlags {
     ///
     /// # Errors
     /// The chart cannot be encoded or written.
-    pub fn keep(&self, folder: &mut Folder, name: &str, picture: &Picture) -> Result<(), Failure> {
+    pub fn keep(
+        &self,
+        folder: &mut Folder,
+        name: &str,
+        picture: &Picture,
+        tell: &TellFlags,
+    ) -> Result<(), Failure> {
         for format in Format::ALL.into_iter().filter(|format| self.chart_format.contains(format)) {
-            folder.write(format!("{name}.{}", format.extension()), &picture.bytes(format)?)?;
+            write(folder, format!("{name}.{}", format.extension()), &picture.bytes(format)?, tell)?;
         }
         Ok(())
     }
@@ -64,13 +71,26 @@ impl MotionFlags {
     ///
     /// # Errors
     /// The motion cannot be drawn, encoded or written.
-    pub fn keep(&self, folder: &mut Folder, name: &str, motion: &MotionGif) -> Result<(), Failure> {
+    pub fn keep(
+        &self,
+        folder: &mut Folder,
+        name: &str,
+        motion: &MotionGif,
+        tell: &TellFlags,
+    ) -> Result<(), Failure> {
         if self.gif {
-            folder.write(format!("{name}.gif"), &motion_gif(motion)?.bytes)?;
+            write(folder, format!("{name}.gif"), &motion_gif(motion)?.bytes, tell)?;
         }
         if self.apng {
-            folder.write(format!("{name}.apng"), &motion_apng(motion)?.bytes)?;
+            write(folder, format!("{name}.apng"), &motion_apng(motion)?.bytes, tell)?;
         }
         Ok(())
     }
+}
+
+fn write(folder: &mut Folder, name: String, content: &[u8], tell: &TellFlags) -> Result<(), Failure> {
+    let path = folder.path().join(&name);
+    folder.write(name, content)?;
+    tell.remark(&format!("drew {}", path.display()));
+    Ok(())
 }

@@ -83,7 +83,7 @@ fn keep(
     if !flags.charts.no_charts {
         for chart in report::compare::CompareChart::ALL {
             let picture = report::compare::draw(chart, scene, mechanism, comparison)?;
-            flags.charts.keep(folder, chart.name(), &picture)?;
+            flags.charts.keep(folder, chart.name(), &picture, &flags.scene.tell)?;
         }
     }
     let record = format!("{:#}\n", report::compare::object(scene, mechanism, comparison));

@@ -146,7 +146,7 @@ pub struct CheckFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub plan: PlanFlags,
-    /// Draw the start as PNG, or the closest configuration where what is given fits none
+    /// Draw the start as a PNG, SVG or PDF file, or the closest configuration where what is given fits none
     #[cfg(feature = "charts")]
     #[arg(long, value_name = "FILE", help_heading = "Files")]
     pub chart: Option<PathBuf>,
@@ -512,7 +512,14 @@ impl Flags {
 impl SceneFlags {
     /// Says something on stderr where that is wanted.
     pub(super) fn remark(&self, text: &str) {
-        if self.tell.verbose {
+        self.tell.remark(text);
+    }
+}
+
+impl TellFlags {
+    /// Says something on stderr where that is wanted.
+    pub(super) fn remark(&self, text: &str) {
+        if self.verbose {
             message(text);
         }
     }
@@ -577,11 +584,8 @@ pub fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Flags, Exi
 
 #[cfg(feature = "charts")]
 fn window(text: &str) -> Result<[f64; 2], String> {
-    let both = text.split_once("..").and_then(|(from, to)| {
-        let [from, to] = [from, to].map(|number| scene::number(number.trim()));
-        Some([from?, to?])
-    });
-    both.filter(|[from, to]| from < to && (to - from).is_finite() && *from >= 0.0)
+    scene::range(text)
+        .filter(|[from, _]| *from >= 0.0)
         .ok_or_else(|| "must be FROM..TO with 0 <= FROM < TO, as 10..12.5".to_owned())
 }
 

@@ -42,7 +42,7 @@ pub fn run(flags: &KinematicsFlags) -> Result<(), Failure> {
     #[cfg(feature = "charts")]
     if !flags.charts.no_charts {
         for (name, picture) in report::charts(&found)? {
-            flags.charts.keep(&mut folder, name, &picture)?;
+            flags.charts.keep(&mut folder, name, &picture, &flags.scene.tell)?;
         }
     }
     let mut object = report::object(&found);

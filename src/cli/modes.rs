@@ -64,10 +64,10 @@ pub fn run(flags: &ModesFlags) -> Result<(), Failure> {
             Found::Motion(found) => in_motion::charts(found)?,
         };
         for (name, picture) in pictures {
-            flags.charts.keep(&mut folder, name, &picture)?;
+            flags.charts.keep(&mut folder, name, &picture, &flags.scene.tell)?;
         }
         for (name, motion) in motions {
-            flags.motion.keep(&mut folder, name, &motion)?;
+            flags.motion.keep(&mut folder, name, &motion, &flags.scene.tell)?;
         }
     }
     let (mut object, text) = match &found {

@@ -83,8 +83,7 @@ pub fn run(flags: &RunFlags, arguments: &[String]) -> Result<(), Failure> {
     let text = read_text(&flags.scene.scene)?;
     let (scene, mechanism) = super::compile(&flags.scene, &text)?;
     #[cfg(feature = "charts")]
-    report::charts::Columns::find(&mechanism, &flags.chart)
-        .map_err(|error| Failure::new(Exit::Usage, format!("--chart: {error}")))?;
+    chosen(&mechanism, flags)?;
     // All plans stand before the first run: a pairing that is refused costs nothing.
     let requests = flags.plan.requests();
     let mut plans: Vec<Plan> =
@@ -336,6 +335,13 @@ impl Task<'_> {
     }
 }
 
+/// The columns to be drawn.
+#[cfg(feature = "charts")]
+fn chosen(mechanism: &Mechanism, flags: &RunFlags) -> Result<report::charts::Columns, Failure> {
+    report::charts::Columns::find(mechanism, &flags.chart)
+        .map_err(|error| Failure::new(Exit::Usage, format!("--chart: {error}")))
+}
+
 #[cfg(feature = "charts")]
 fn draw(
     scene: &Scene,
@@ -344,18 +350,21 @@ fn draw(
     folder: &mut Folder,
     flags: &RunFlags,
 ) -> Result<(), Failure> {
+    let tell = &flags.scene.tell;
     if !flags.charts.no_charts {
         for chart in report::charts::wanted(mechanism, outcome) {
             let picture = report::charts::draw(chart, scene, mechanism, outcome)?;
-            flags.charts.keep(folder, chart.name(), &picture)?;
+            flags.charts.keep(folder, chart.name(), &picture, tell)?;
         }
         if !flags.chart.is_empty() {
-            let picture = report::charts::columns(scene, mechanism, outcome, &flags.chart)?;
-            flags.charts.keep(folder, "columns", &picture)?;
+            let columns = chosen(mechanism, flags)?;
+            let picture = report::charts::columns(scene, mechanism, outcome, &columns)?;
+            flags.charts.keep(folder, "columns", &picture, tell)?;
         }
     }
     if flags.motion.has_any() {
-        flags.motion.keep(folder, "mechanism", &report::charts::motion(scene, mechanism, outcome))?;
+        let motion = report::charts::motion(scene, mechanism, outcome);
+        flags.motion.keep(folder, "mechanism", &motion, tell)?;
     }
     Ok(())
 }
@@ -363,16 +372,13 @@ fn draw(
 /// Constraint drift of several runs in one chart, beside their folders.
 #[cfg(feature = "charts")]
 fn overlay(scene: &Scene, mechanism: &Mechanism, done: &[Done], flags: &RunFlags) -> Result<(), Failure> {
-    if done.len() < 2 || mechanism.constraints.is_empty() || flags.charts.no_charts {
-        return Ok(());
-    }
     let outcomes: Vec<&Outcome> = done.iter().map(|done| &done.outcome).collect();
-    if !report::charts::drifts(&outcomes) {
+    if done.len() < 2 || flags.charts.no_charts || !report::charts::drifts(&outcomes) {
         return Ok(());
     }
     let picture = report::charts::overlay(scene, mechanism, &outcomes)?;
     let mut folder = Folder::shared(&flags.out.join(&scene.name))?;
-    flags.charts.keep(&mut folder, "constraint_drift", &picture)
+    flags.charts.keep(&mut folder, "constraint_drift", &picture, &flags.scene.tell)
 }
 
 #[cfg(not(feature = "charts"))]

@@ -108,7 +108,7 @@ fn draw(plan: &Stress, lines: &[Line], folder: &mut Folder, flags: &StressFlags)
     if flags.charts.no_charts {
         return Ok(());
     }
-    flags.charts.keep(folder, MATRIX, &report::stress::matrix(plan, lines)?)?;
+    flags.charts.keep(folder, MATRIX, &report::stress::matrix(plan, lines)?, &flags.tell)?;
     for (name, file) in STABILITY {
         let Some(method) = plan.methods.iter().find(|method| method.info().name == name) else { continue };
         let mut progress: Option<Points> = None;
@@ -121,7 +121,7 @@ fn draw(plan: &Stress, lines: &[Line], folder: &mut Folder, flags: &StressFlags)
             bar.finish();
         }
         if let Some(map) = map {
-            flags.charts.keep(folder, file, &report::stress::stability(&map)?)?;
+            flags.charts.keep(folder, file, &report::stress::stability(&map)?, &flags.tell)?;
         }
     }
     Ok(())

@@ -335,7 +335,7 @@ fn curve(plan: &Sweep, flags: &SweepFlags) -> Result<Option<Curve>, Failure> {
 fn draw(plan: &Sweep, curve: &Curve, folder: &mut Folder, flags: &SweepFlags) -> Result<(), Failure> {
     let name = if plan.grid().axes().len() == 2 { "map" } else { "profile" };
     match curve.draw(plan)? {
-        Ok(picture) => flags.charts.keep(folder, name, &picture)?,
+        Ok(picture) => flags.charts.keep(folder, name, &picture, &flags.scene.tell)?,
         Err(reason @ NoChart::Nothing(_)) if !flags.scene.tell.quiet => {
             super::output::message(&format!("no chart: {reason}"))
         }

@@ -78,9 +78,7 @@ impl<'a> Drawing<'a> {
         let (z, translations) = self.mechanism.pose(phi);
         let [point, origin] =
             [&slider.point, &slider.rail.place].map(|place| self.mechanism.place(place, &z, &translations));
-        let along = Complex::new(slider.rail.direction[0], slider.rail.direction[1]);
-        let along = slider.rail.place.bar.map_or(along, |bar| along * z[bar]);
-        let apart = point - origin;
+        let (along, apart) = (along(slider, &z), point - origin);
         (apart.re * along.re + apart.im * along.im) / along.re.hypot(along.im)
     }
 
@@ -124,14 +122,10 @@ impl<'a> Drawing<'a> {
             motors: motors.collect(),
             arms: self.arms().map(|(bar, [from, to])| (bar, [on(bar, from), on(bar, to)])).collect(),
             sliders: (self.scene.sliders.iter())
-                .map(|slider| {
-                    let along = Complex::new(slider.rail.direction[0], slider.rail.direction[1]);
-                    let along = slider.rail.place.bar.map_or(along, |bar| along * z[bar]);
-                    SliderPose {
-                        at: place(&slider.point),
-                        along: both(along),
-                        ground: slider.rail.place.bar.is_none(),
-                    }
+                .map(|slider| SliderPose {
+                    at: place(&slider.point),
+                    along: both(along(slider, &z)),
+                    ground: slider.rail.place.bar.is_none(),
                 })
                 .collect(),
             points: self.points().map(|point| place(&point.place)).collect(),
@@ -160,6 +154,12 @@ impl<'a> Drawing<'a> {
             is_off.then(|| (bar, [origin, origin + Complex::new(x, y)]))
         })
     }
+}
+
+/// The direction of a slider's rail, of any length.
+fn along(slider: &Slider, z: &[Complex<f64>]) -> Complex<f64> {
+    let along = Complex::new(slider.rail.direction[0], slider.rail.direction[1]);
+    slider.rail.place.bar.map_or(along, |bar| along * z[bar])
 }
 
 #[cfg(test)]

@@ -250,10 +250,10 @@ impl Curve {
         self.failed.push(matches!(point.status, Status::Stopped(_) | Status::Refused(_)));
     }
 
-    /// Draws what was seen; returns the content of its file.
+    /// Draws what was seen.
     ///
     /// # Errors
-    /// Drawing or encoding fails; `Ok` with the reason where there is nothing to show.
+    /// Drawing fails; `Ok` with the reason where there is nothing to show.
     pub fn draw(&self, sweep: &Sweep) -> Result<Result<Picture, NoChart>, ChartError> {
         let names = results(sweep);
         let is_flip = self.column.is_none_or(|column| column + 1 == names.len());

@@ -34,9 +34,11 @@ pub use law::{
     Bound, Direction, Integral, Load, LoadLaw, Meaning, NamedPoint, Names, Parameter, PointTable, SceneEvent,
     Scope, Signal,
 };
-pub use number::number;
+pub use number::{number, range};
 pub use output::{BoundOutput, Component, Output, OutputNames, Quantity, Source};
 pub use profile::Profile;
+#[cfg(feature = "charts")]
+pub(crate) use read::{listed, nearest};
 pub use read::{parse_scene, read_scene, read_text, source_name};
 pub use schema::schema;
 pub use set::{Override, OverrideError};

@@ -27,3 +27,16 @@ pub fn number(text: &str) -> Option<f64> {
     };
     value.is_finite().then_some(value)
 }
+
+/// Two numbers in ascending order, as in `0..2pi`.
+///
+/// ```
+/// use driftless::scene::range;
+/// assert_eq!(range("-1/2 .. 3"), Some([-0.5, 3.0]));
+/// assert_eq!((range("3..1"), range("1"), range("1..x")), (None, None, None));
+/// ```
+pub fn range(text: &str) -> Option<[f64; 2]> {
+    let (from, to) = text.split_once("..")?;
+    let [from, to] = [number(from.trim())?, number(to.trim())?];
+    (from < to && (to - from).is_finite()).then_some([from, to])
+}

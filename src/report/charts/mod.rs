@@ -98,7 +98,7 @@ pub fn draw(
     }
 }
 
-/// Draws the columns of the trajectory that are named, as far as [`Columns::find`] knows them.
+/// Draws columns of the trajectory.
 ///
 /// # Errors
 /// Drawing fails.
@@ -106,9 +106,9 @@ pub fn columns(
     scene: &Scene,
     mechanism: &Mechanism,
     outcome: &Outcome,
-    names: &[String],
+    columns: &Columns,
 ) -> Result<Picture, ChartError> {
-    chart::outputs(&Finished { scene, mechanism, outcome }.columns(names), FILE_RESOLUTION)
+    chart::outputs(&Finished { scene, mechanism, outcome }.columns(columns), FILE_RESOLUTION)
 }
 
 /// The mechanism in motion.
@@ -126,12 +126,6 @@ const STILL: f64 = 1e-9;
 const GHOST: f64 = 0.4;
 /// Ghosts shown.
 const GHOSTS: usize = 5;
-
-/// Largest value less the least.
-fn spread(values: &[f64]) -> f64 {
-    let least = values.iter().copied().fold(f64::INFINITY, f64::min);
-    values.iter().copied().fold(f64::NEG_INFINITY, f64::max) - least
-}
 
 /// A run and all that belongs to it.
 struct Finished<'a> {
@@ -275,7 +269,7 @@ impl Finished<'_> {
             name: plain(&body.name),
             angle: smooth.iter().map(|(_, phi)| phi[k]).collect(),
         });
-        let (moving, still): (Vec<_>, Vec<_>) = series.partition(|series| spread(&series.angle) > STILL);
+        let (moving, still): (Vec<_>, Vec<_>) = series.partition(|series| series.spread() > STILL);
         let drawing = self.drawing();
         let travels = self.scene.sliders.iter().map(|slider| AngleSeries {
             name: plain(&slider.name),

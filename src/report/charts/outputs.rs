@@ -47,20 +47,32 @@ impl Finished<'_> {
             Some(_) => (&trace.part, Some(self.chosen_window())),
             None => (&trace.whole, None),
         };
+        // What lies outside of the window would stretch the chart to it.
+        let [from, to] = trace.window.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        let seen = |extreme: &[f64; 2]| (from..=to).contains(&extreme[1]);
         let heads = self.mechanism.outputs.iter().flat_map(|outputs| outputs.heads());
         let outputs = heads.enumerate().map(|(k, (name, unit))| OutputSeries {
             name: plain(name),
             unit: unit.replace(' ', "·"),
             time: whole.iter().map(|sample| sample.t).collect(),
             value: whole.iter().map(|sample| sample.outputs.get(k).copied().unwrap_or(f64::NAN)).collect(),
-            extremes: self.outcome.extremes.get(k).map_or(Vec::new(), |one| vec![one.min, one.max]),
+            extremes: (self.outcome.extremes.get(k).into_iter())
+                .flat_map(|one| [one.min, one.max])
+                .filter(seen)
+                .collect(),
         });
-        let (horizon, past) = self.horizon(whole.last().map_or(0.0, |sample| sample.t));
+        self.over_time("Outputs", outputs.collect(), more)
+    }
+
+    /// The chart of series of the run.
+    pub fn over_time(&self, what: &str, outputs: Vec<OutputSeries>, more: Option<String>) -> OutputsChart {
+        let end = outputs.iter().filter_map(|output| output.time.last()).copied().fold(0.0, f64::max);
+        let (horizon, past) = self.horizon(end);
         OutputsChart {
             over: None,
-            title: format!("Outputs over {} s", figure(self.outcome.last.t)),
+            title: format!("{what} over {} s", figure(self.outcome.last.t)),
             caption: self.caption(more).into_iter().chain(past).collect(),
-            outputs: outputs.collect(),
+            outputs,
             horizon,
         }
     }

@@ -27,11 +27,7 @@ impl FromStr for Drive {
         let (name, range) = match text.split_once('=') {
             None => (text, None),
             Some((name, range)) => {
-                let both = range.split_once("..").and_then(|(from, to)| {
-                    let [from, to] = [from, to].map(|number| scene::number(number.trim()));
-                    Some([from?, to?])
-                });
-                let both = both.filter(|[from, to]| from < to && (to - from).is_finite());
+                let both = scene::range(range);
                 (name, Some(both.ok_or("must be NAME or NAME=FROM..TO with FROM below TO, as crank=0..2pi")?))
             }
         };

@@ -304,16 +304,13 @@ fn is_name(text: &str) -> bool {
 }
 
 /// The first dozen of some words.
-pub(in crate::scene) fn listed(words: &[&str]) -> String {
+pub(crate) fn listed(words: &[&str]) -> String {
     let more = if words.len() > 12 { format!(", … ({} in all)", words.len()) } else { String::new() };
     words.iter().take(12).map(|word| clipped(word)).collect::<Vec<_>>().join(", ") + &more
 }
 
 /// The known word within a third of its letters of `wanted`.
-pub(in crate::scene) fn nearest<'a>(
-    wanted: &str,
-    known: impl IntoIterator<Item = &'a str>,
-) -> Option<&'a str> {
+pub(crate) fn nearest<'a>(wanted: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let wanted: String = wanted.chars().take(LONGEST_NAME).flat_map(char::to_lowercase).collect();
     let letters = wanted.chars().count();
     let far = (letters / 3).max(1);

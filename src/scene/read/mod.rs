@@ -15,7 +15,8 @@ mod resolve;
 mod start;
 mod tables;
 
-pub(super) use at::{At, Fields, listed, nearest};
+pub(super) use at::{At, Fields};
+pub(crate) use at::{listed, nearest};
 pub(super) use start::GivenStart;
 
 use super::error::SceneError;
