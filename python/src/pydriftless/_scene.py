@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from . import _core
+from ._progress import progress_bar
 from ._report import Report, command, flags
 from ._run import Event, Run
 from ._sweep import Sweep, swept
@@ -161,7 +162,12 @@ class Scene:
             "trust": trust,
         }
         described = [event.described() for event in events]
-        bar = _bar(progress, until if until is not None else self.to_dict().get("until"))
+        bar = progress_bar(
+            progress,
+            until if until is not None else self.to_dict().get("until"),
+            unit="s",
+            bar_format="{l_bar}{bar}| {n:.4g}/{total:.4g} s [{elapsed}]",
+        )
         if bar is None:
             return Run(_core.run(self._core, callback, dense, described, **options), self, options, described)
 
@@ -293,13 +299,3 @@ def _word(value: Any) -> str:
     if isinstance(value, np.generic):
         value = value.item()
     return json.dumps(value.tolist() if isinstance(value, np.ndarray) else value)
-
-
-def _bar(wanted: bool, total: float | None) -> Any:
-    if not wanted:
-        return None
-    try:
-        from tqdm.auto import tqdm
-    except ImportError:
-        return None
-    return tqdm(total=total, unit="s", bar_format="{l_bar}{bar}| {n:.4g}/{total:.4g} s [{elapsed}]")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _core
+from ._progress import progress_bar
 
 if TYPE_CHECKING:
     from ._scene import Scene
@@ -124,13 +125,14 @@ def swept(
     plan = {"axes": axes, "listed": listed, "to_flip": to_flip, "threads": threads, "options": options}
     found: Iterable[Any]
     if shard is not None:
-        found = [_part(scene, plan, shard)]
+        found = [_part(scene, *_share(plan, shard))]
     elif client is not None:
         found = _submitted(scene, plan, client, parts or 4 * _workers(client), total, progress)
     elif to is not None:
-        found = (_part(scene, plan, (k + 1, -(-total // chunk))) for k in range(-(-total // chunk)))
+        count = -(-total // chunk)
+        found = (_part(scene, *_share(plan, (number, count))) for number in range(1, count + 1))
     else:
-        found = [_part(scene, plan, None, _bar(progress, total))]
+        found = [_part(scene, plan, None, 0, progress_bar(progress, total, unit=" points"))]
     sweep = _written(found, to) if to is not None else _joined(list(found))
     if shard is None and not listed and to is None:
         sweep.grid = tuple(axis[3] for axis in axes)
@@ -154,16 +156,18 @@ def _points(vary: Mapping[str, Any]) -> tuple[list[tuple[str, float, float, int]
     return [], (list(vary), np.column_stack(arrays))
 
 
-def _part(scene: Scene, plan: dict[str, Any], shard: tuple[int, int] | None, bar: Any = None) -> Any:
-    """One part of a sweep, wherever it runs."""
+def _share(plan: dict[str, Any], shard: tuple[int, int] | None) -> tuple[dict[str, Any], Any, int]:
+    """A part of a plan, which of a list takes its own points along only, and the number of its first point."""
+    if plan["listed"] is None or shard is None:
+        return plan, shard, 0
+    (number, of), (names, values) = shard, plan["listed"]
+    begin, end = len(values) * (number - 1) // of, len(values) * number // of
+    return {**plan, "listed": (names, values[begin:end])}, None, begin
+
+
+def _part(scene: Scene, plan: dict[str, Any], shard: tuple[int, int] | None, first: int, bar: Any = None) -> Any:
+    """What :func:`_share` gave, wherever it runs."""
     listed = plan["listed"]
-    if listed is not None and shard is not None:
-        # A part of a list takes its own points along, not all of them.
-        (number, of), (names, values) = shard, listed
-        begin, end = len(values) * (number - 1) // of, len(values) * number // of
-        listed, shard, first = (names, values[begin:end]), None, begin
-    else:
-        first = 0
     if listed is not None and len(listed[1]) == 0:
         return None
     update = (lambda points: bar.update(points - bar.n)) if bar is not None else None
@@ -179,23 +183,11 @@ def _submitted(scene: Scene, plan: dict[str, Any], client: Any, parts: int, tota
     """All parts by a client, in the order of the points."""
     parts = max(1, min(parts, total))
     plan = {**plan, "threads": plan["threads"] or 1}
-    futures = []
-    for number in range(1, parts + 1):
-        mine: dict[str, Any] = plan
-        shard: tuple[int, int] | None = (number, parts)
-        if plan["listed"] is not None:
-            names, values = plan["listed"]
-            begin, end = total * (number - 1) // parts, total * number // parts
-            mine, shard = {**plan, "listed": (names, values[begin:end])}, None
-        futures.append(client.submit(_part, scene, mine, shard))
-    bar = _bar(progress, total)
+    futures = [client.submit(_part, scene, *_share(plan, (number, parts))) for number in range(1, parts + 1)]
+    bar = progress_bar(progress, total, unit=" points")
     found = []
     for number, future in enumerate(futures, start=1):
-        part = future.result()
-        if part is not None and plan["listed"] is not None:
-            first = total * (number - 1) // parts
-            part = (*part[:4], [(first + index, cause) for index, cause in part[4]], part[5])
-        found.append(part)
+        found.append(future.result())
         if bar is not None:
             bar.update(total * number // parts - bar.n)
     if bar is not None:
@@ -290,13 +282,3 @@ class _Parquet:
     def __exit__(self, *_: object) -> None:
         if self._writer is not None:
             self._writer.close()
-
-
-def _bar(wanted: bool, total: int) -> Any:
-    if not wanted:
-        return None
-    try:
-        from tqdm.auto import tqdm
-    except ImportError:
-        return None
-    return tqdm(total=total, unit=" points")
