@@ -7,13 +7,17 @@
 //! A folder is locked as long as somebody writes into it.  Its table, `.unfinished-trajectory.csv`, outlives
 //! its writer where a checkpoint says how much of it counts ([`checkpoint`]).
 
+mod stream;
+
+pub use stream::{Cursor, Stream};
+
+use self::stream::hashed;
 use super::checkpoint;
-use sha2::digest::common::hazmat::{SerializableState, SerializedState};
 use sha2::{Digest, Sha256};
 use std::borrow::Cow;
 use std::cell::Cell;
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
@@ -106,25 +110,6 @@ pub struct Folder {
     written: Vec<Cow<'static, str>>,
     /// Holds the lock; `None` where the file system knows no locks.
     _lock: Option<File>,
-}
-
-/// A table being written; dropped unfinished it leaves nothing behind, unless a checkpoint refers to it.
-#[derive(Debug)]
-pub struct Stream {
-    file: File,
-    path: PathBuf,
-    name: &'static str,
-    hash: Sha256,
-    bytes: u64,
-    lasts: Cell<bool>,
-}
-
-/// How far a table was written: so much of it counts.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Cursor {
-    bytes: u64,
-    /// The state of its SHA-256 there.
-    hash: Vec<u8>,
 }
 
 /// Tables up to this length \[bytes\] are read again where they are taken up; it takes less than a second.
@@ -299,51 +284,6 @@ impl Folder {
     }
 }
 
-impl Stream {
-    /// How far it is, once that much has reached the disk.
-    ///
-    /// # Errors
-    /// The disk does not take it.
-    pub fn cursor(&self) -> io::Result<Cursor> {
-        self.file.sync_data()?;
-        Ok(Cursor { bytes: self.bytes, hash: self.hash.serialize().to_vec() })
-    }
-
-    /// Outlives its writer from now on: a checkpoint refers to it.
-    pub fn outlive(&self) {
-        self.lasts.set(true);
-    }
-}
-
-impl Cursor {
-    fn hash(&self) -> Option<Sha256> {
-        let state = SerializedState::<Sha256>::try_from(self.hash.as_slice()).ok()?;
-        Sha256::deserialize(&state).ok()
-    }
-}
-
-impl Drop for Stream {
-    fn drop(&mut self) {
-        if !self.lasts.get() {
-            // Where that fails, the next run sweeps it out.
-            let _ = fs::remove_file(&self.path);
-        }
-    }
-}
-
-impl Write for Stream {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let count = self.file.write(bytes)?;
-        self.hash.update(&bytes[..count]);
-        self.bytes += count as u64;
-        Ok(count)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.file.flush()
-    }
-}
-
 /// The lock of a folder, released when the file is closed, whatever ends its holder.
 fn lock(folder: &Path) -> Result<Option<File>, FileError> {
     // Elsewhere than on Unix a folder cannot be opened; a file in it is locked instead.
@@ -353,33 +293,6 @@ fn lock(folder: &Path) -> Result<Option<File>, FileError> {
         Ok(()) => Ok(Some(file)),
         Err(TryLockError::WouldBlock) => Err(FileError::Busy { folder: folder.to_owned() }),
         Err(TryLockError::Error(_)) => Ok(None),
-    }
-}
-
-/// SHA-256 of the first bytes of a file.
-fn hashed(file: &mut File, bytes: u64) -> io::Result<sha2::digest::Output<Sha256>> {
-    file.rewind()?;
-    let (mut hash, mut left, mut buffer) = (Sha256::new(), bytes, vec![0; 1 << 16]);
-    while left > 0 {
-        let most = left.min(buffer.len() as u64) as usize;
-        let count = file.read(&mut buffer[..most])?;
-        if count == 0 {
-            return Err(io::ErrorKind::UnexpectedEof.into());
-        }
-        hash.update(&buffer[..count]);
-        left -= count as u64;
-    }
-    Ok(hash.finalize())
-}
-
-/// A path as a shell takes it.
-pub fn quoted(path: &Path) -> String {
-    let text = path.display().to_string();
-    let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "/._-+=:,@%".contains(letter);
-    if !text.is_empty() && text.chars().all(is_plain) {
-        text
-    } else {
-        format!("'{}'", text.replace('\'', "'\\''"))
     }
 }
 
@@ -394,6 +307,17 @@ fn sweep_out(folder: &Path, but: &[&str]) -> Result<(), FileError> {
         }
     }
     Ok(())
+}
+
+/// A path as a shell takes it.
+pub fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "/._-+=:,@%".contains(letter);
+    if !text.is_empty() && text.chars().all(is_plain) {
+        text
+    } else {
+        format!("'{}'", text.replace('\'', "'\\''"))
+    }
 }
 
 /// Removes a file that may not be there.

@@ -10,9 +10,11 @@
 //! Positions first, then rates.  Nothing is guessed twice: what the rows leave open must be given, and where
 //! other guesses lead to another start the scene has to say which.
 
+mod change;
 mod failure;
 mod newton;
 mod rank;
+mod rates;
 mod slow;
 pub(in crate::dynamics) mod svd;
 mod watch;
@@ -25,9 +27,9 @@ use super::partition::CoordinatePartition;
 use super::{Mechanism, Motion};
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::scene::{Given, Scene};
+pub use change::Change;
 pub use failure::Closest;
-use newton::{Aim, Goal, KEPT, Problem};
-use serde::Serialize;
+use newton::{Aim, Goal, KEPT, Problem, of_origin};
 use svd::{Matrix, independent};
 
 /// What counts as no change, relative to 1 rad (and rad/s), the size of the mechanism, or the value where
@@ -75,28 +77,6 @@ impl PartialEq for Assembly {
         rest(self) == rest(other)
             && (&self.start, &self.changes) == (&other.start, &other.changes)
             && (&self.redundant, &self.singular) == (&other.redundant, &other.singular)
-    }
-}
-
-/// A number of the start that is not what the scene gives.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Change {
-    /// The bar.
-    pub body: String,
-    /// `phi`, `omega`, `origin.x`, …
-    pub quantity: String,
-    /// As given.
-    pub given: f64,
-    /// As used.
-    pub used: f64,
-    /// Its unit.
-    pub unit: &'static str,
-}
-
-impl std::fmt::Display for Change {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { body, quantity, given, used, unit } = self;
-        write!(f, "{quantity} of {body} is {used:?} {unit} at the start instead of {given:?} {unit}")
     }
 }
 
@@ -451,127 +431,6 @@ impl<'a> Problem<'a> {
         let x = k - (k - bodies.len()) % 2;
         let root = hangs.iter().position(|hang| hang.origin_point == BodyOrigin::Free(x)).unwrap_or(0);
         format!("start.{}.{}", bodies[root].name, if what == "phi" { "origin" } else { "velocity" })
-    }
-
-    /// What of the positions is not as given.
-    fn changes(&self, q: &[DoubleDouble], aims: &[Aim]) -> Vec<Change> {
-        aims.iter()
-            .zip(self.measured(q))
-            .filter_map(|(aim, used)| self.change(aim, used, ["phi", "origin"], ["rad", "m"]))
-            .collect()
-    }
-
-    fn change(
-        &self,
-        aim: &Aim,
-        used: f64,
-        [turn, shift]: [&str; 2],
-        [of_turn, of_shift]: [&'static str; 2],
-    ) -> Option<Change> {
-        let is_angle = aim.goal == Goal::Coordinate(aim.bar);
-        let scale = if is_angle { 1.0 } else { self.size };
-        if (used - aim.given).abs() <= SAME * scale.max(aim.given.abs()) {
-            return None;
-        }
-        let is_x = match aim.goal {
-            Goal::Coordinate(k) => self.mechanism.forest.hangs[aim.bar].origin_point == BodyOrigin::Free(k),
-            Goal::Origin(axis) => axis.re == 1.0,
-        };
-        let quantity =
-            if is_angle { turn.to_owned() } else { format!("{shift}.{}", if is_x { "x" } else { "y" }) };
-        let body = self.mechanism.bodies[aim.bar].name.clone();
-        Some(Change {
-            body,
-            quantity,
-            given: aim.given,
-            used,
-            unit: if is_angle { of_turn } else { of_shift },
-        })
-    }
-
-    /// Rates that keep the rows; adds what is not as given to `changes`.
-    fn find_rates(
-        &self,
-        scene: &Scene,
-        given: &dyn Fn(usize) -> Given,
-        q: &[DoubleDouble],
-        is_singular: bool,
-        changes: &mut Vec<Change>,
-    ) -> Result<Vec<DoubleDouble>, CompileError> {
-        let aims = self.rate_aims(scene, given);
-        let mut guess = vec![DoubleDouble::ZERO; q.len()];
-        for aim in &aims {
-            if let Goal::Coordinate(k) = aim.goal {
-                guess[k] = DoubleDouble::of(aim.given);
-            }
-        }
-        let every = vec![true; self.mechanism.constraints.len()];
-        let (all, none) = (vec![true; aims.len()], vec![false; aims.len()]);
-        let missing = Problem { aims: aims.clone(), ..self.clone() }.columns(&all);
-        let mut ways = vec![all];
-        if !missing.is_empty() {
-            ways.push(self.kept(&aims, q, &every));
-        }
-        ways.push(none);
-        let mut omega = guess.clone();
-        let keeps = ways.iter().any(|held| {
-            omega.clone_from(&guess);
-            self.rates(q, &mut omega, &aims, held) < 10.0 * KEPT
-        });
-        if !keeps {
-            let slips = self.slips(q, &omega);
-            let measured = |i: &usize| slips[*i].abs() / self.lever[*i];
-            let worst = (0..slips.len()).max_by(|a, b| measured(a).total_cmp(&measured(b))).unwrap_or(0);
-            let unit =
-                |row: &super::constraint::ConstraintEquation| if row.is_angle() { "rad/s" } else { "m/s" };
-            let (row, unit) =
-                self.mechanism.constraints.get(worst).map_or(("start", "m/s"), |row| (&row.name, unit(row)));
-            let left = slips.get(worst).map_or(0.0, |slip| slip.abs());
-            return Err(CompileError::ImpossibleRates { row: row.into(), left, unit });
-        }
-        if is_singular && !missing.is_empty() && omega.iter().any(|omega| omega.hi != 0.0) {
-            // Rows of lost rank would take any rates for these.
-            self.check_open(q, &every, &aims, &missing, "omega")?;
-        }
-        changes.extend(self.rate_changes(&aims, q, &omega));
-        Ok(omega)
-    }
-
-    /// The rates that the scene gives.
-    fn rate_aims(&self, scene: &Scene, given: &dyn Fn(usize) -> Given) -> Vec<Aim> {
-        let mut aims = Vec::new();
-        for (bar, start) in scene.start.iter().enumerate() {
-            if given(bar).omega {
-                aims.push(Aim { bar, goal: Goal::Coordinate(bar), given: start.omega });
-            }
-            if let Some(velocity) = given(bar).velocity {
-                aims.extend(of_origin(self.mechanism, bar, velocity));
-            }
-        }
-        aims
-    }
-
-    /// What of the rates is not as given.
-    fn rate_changes(&self, aims: &[Aim], q: &[DoubleDouble], omega: &[DoubleDouble]) -> Vec<Change> {
-        let z = self.unit_vectors::<DoubleDouble>(q).1;
-        let change = |aim: &Aim| {
-            self.change(aim, self.aim_rate(aim, &z, omega).hi, ["omega", "velocity"], ["rad/s", "m/s"])
-        };
-        aims.iter().filter_map(change).collect()
-    }
-}
-
-/// The aims at the origin of a bar, or at its velocity.
-fn of_origin(mechanism: &Mechanism, bar: usize, [x, y]: [f64; 2]) -> [Aim; 2] {
-    match mechanism.forest.hangs[bar].origin_point {
-        BodyOrigin::Free(k) => {
-            [(k, x), (k + 1, y)].map(|(k, given)| Aim { bar, goal: Goal::Coordinate(k), given })
-        }
-        _ => [(Complex::new(1.0, 0.0), x), (Complex::new(0.0, 1.0), y)].map(|(axis, given)| Aim {
-            bar,
-            goal: Goal::Origin(axis),
-            given,
-        }),
     }
 }
 

@@ -13,6 +13,7 @@
 use super::svd::{Matrix, dot};
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
 use crate::dynamics::constraint::{Linearised, Measure, Posture};
+use crate::dynamics::forest::BodyOrigin;
 use crate::dynamics::{Mechanism, Time};
 
 /// Singular values below this share of the largest move nothing.
@@ -378,4 +379,18 @@ fn largest(values: &[f64]) -> f64 {
 
 fn squares(values: &[f64]) -> f64 {
     values.iter().map(|value| value * value).sum()
+}
+
+/// The aims at the origin of a bar, or at its velocity.
+pub(super) fn of_origin(mechanism: &Mechanism, bar: usize, [x, y]: [f64; 2]) -> [Aim; 2] {
+    match mechanism.forest.hangs[bar].origin_point {
+        BodyOrigin::Free(k) => {
+            [(k, x), (k + 1, y)].map(|(k, given)| Aim { bar, goal: Goal::Coordinate(k), given })
+        }
+        _ => [(Complex::new(1.0, 0.0), x), (Complex::new(0.0, 1.0), y)].map(|(axis, given)| Aim {
+            bar,
+            goal: Goal::Origin(axis),
+            given,
+        }),
+    }
 }

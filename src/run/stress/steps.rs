@@ -1,6 +1,7 @@
 //! Stability: one fixed-step method on a spring of any stiffness with any step.
 
-use super::{End, Verdict};
+use super::Verdict;
+use super::trial::End;
 use crate::dynamics::Mechanism;
 use crate::run::methods::MethodId;
 use crate::run::plan::{Plan, Request};

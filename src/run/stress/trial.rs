@@ -1,0 +1,193 @@
+//! One cell of the matrix: a scene by a method at settings that are refined until its end is confirmed.
+
+use super::{Case, Cell, Expected};
+use crate::dynamics::Mechanism;
+use crate::run::drift::larger;
+use crate::run::methods::MethodId;
+use crate::run::plan::{Plan, Request};
+use crate::run::running::{Outcome, Run, integrate};
+use crate::run::trust::{How, Level};
+use crate::run::{Limits, Sample};
+use crate::scene::Scene;
+use crate::stepping::{Cause, StepError, Tolerance};
+use std::sync::Arc;
+
+/// How often a setting is refined.
+const REFINEMENTS: u32 = 3;
+/// By how much, of a tolerance and of a step.
+const FINER: (f64, f64) = (1e-2, 0.5);
+/// Steps of the power series up to which an end is looked for in double-double.
+pub(super) const EXPANSIONS: u64 = 20_000;
+/// Share of the tolerance below which a run's own estimate is enough.
+const SURE: f64 = 1e-3;
+/// The error of the finer of two runs over their difference, at most: methods of higher order leave less,
+/// steps across a corner of the force as much.
+const MARGIN: f64 = 3.0;
+/// Least tolerance of a refinement.
+const LEAST: f64 = 1e-13;
+
+/// A cell under way.
+pub(super) struct Trial<'a> {
+    pub(super) case: &'a Case,
+    pub(super) scene: &'a Scene,
+    pub(super) mechanism: &'a Arc<Mechanism>,
+    pub(super) method: MethodId,
+    pub(super) max_evaluations: u64,
+}
+
+/// Angles and rates at the end of a run.
+#[derive(Clone, Debug)]
+pub(super) struct End {
+    pub(super) angles: Vec<f64>,
+    pub(super) rates: Vec<f64>,
+}
+
+impl End {
+    pub(super) fn of(sample: &Sample, bodies: usize) -> Self {
+        let last = |values: &[f64], count: usize| values[count.saturating_sub(bodies)..count].to_vec();
+        let count = sample.centre.len();
+        Self { angles: last(&sample.phi, count), rates: last(&sample.omega, count) }
+    }
+
+    /// The largest difference; rates count over 1 rad/s or themselves, and not at all where `other` has none.
+    pub(super) fn apart(&self, other: &Self) -> f64 {
+        let angles = self.angles.iter().zip(&other.angles).map(|(a, b)| (a - b).abs());
+        let rates = self.rates.iter().zip(&other.rates).map(|(a, b)| (a - b).abs() / b.abs().max(1.0));
+        angles.chain(rates).fold(0.0, larger)
+    }
+}
+
+impl Trial<'_> {
+    /// Runs it until its end is confirmed, or is not to be had.
+    pub(super) fn run(&self, cell: &mut Cell) -> Result<(), String> {
+        let mut before: Option<End> = None;
+        for refinement in 0..=REFINEMENTS {
+            let request = self.request(refinement, cell)?;
+            let plan =
+                Plan::new(self.scene, self.mechanism, &request).map_err(|refusal| refusal.to_string())?;
+            cell.setting = Some(setting(&plan));
+            let start = self.mechanism.start(self.scene);
+            cell.runs += 1;
+            let outcome = match Run::new(Arc::clone(self.mechanism), plan, Limits::default(), &start) {
+                Ok(run) => integrate(run.trusted(Level::Auto, &start), &mut |_| Ok(()))
+                    .map_err(|error| error.to_string())?,
+                Err(stop) => {
+                    cell.stop = Some(stop);
+                    return Ok(());
+                }
+            };
+            cell.evaluations += outcome.statistics.evaluations;
+            cell.energy = Some(outcome.drift.energy.max);
+            cell.stop = outcome.stop.clone();
+            if let Some(stop) = &outcome.stop {
+                // A finer setting may mend what is no matter of effort.
+                if matches!(
+                    stop.cause,
+                    Cause::NotConverged | Cause::ProjectionFailed | Cause::DriftLimit | Cause::BranchLost
+                ) && self.is_left(cell)
+                {
+                    before = None;
+                    continue;
+                }
+                return Ok(());
+            }
+            let end = self.end(&outcome);
+            self.score(&outcome, &end, cell);
+            // What a run knows is the error of its angles, and it knows the more the smoother its motion:
+            // where that is not far below what is asked for, and for the rates, a finer run has its say.
+            let known = outcome
+                .trust
+                .as_ref()
+                .filter(|trust| trust.how == How::ReferenceSolution && trust.at >= self.scene.until);
+            let known = known.and_then(|trust| trust.error_estimate);
+            let finer = before.as_ref().map(|before| MARGIN * end.apart(before));
+            cell.estimate = match (known, finer) {
+                (Some(known), None) if known > SURE * self.case.tolerance => None,
+                (Some(known), finer) => Some(finer.map_or(known, |finer| finer.max(known))),
+                (None, finer) => finer,
+            };
+            let is_no_matter_of_ends = matches!(self.case.expected, Expected::Energy | Expected::Stop(_));
+            if is_no_matter_of_ends || cell.estimate.is_some_and(|estimate| estimate <= self.case.tolerance) {
+                return Ok(());
+            }
+            before = Some(end);
+            if !self.is_left(cell) {
+                break;
+            }
+        }
+        if cell.stop.is_none() {
+            cell.stop = Some(self.unconfirmed(cell));
+        }
+        Ok(())
+    }
+
+    /// True while there is effort for another run.
+    fn is_left(&self, cell: &Cell) -> bool {
+        cell.evaluations < self.max_evaluations
+    }
+
+    /// The request of a refinement.
+    fn request(&self, refinement: u32, cell: &Cell) -> Result<Request, String> {
+        let horizon = self.scene.until;
+        let max_evaluations = Some(self.max_evaluations.saturating_sub(cell.evaluations).max(1));
+        let request = Request {
+            method: Some(self.method),
+            every: Some(horizon / 100.0),
+            max_evaluations,
+            ..Request::default()
+        };
+        if self.method.is_adaptive() {
+            let tolerance = (Tolerance::default().relative * FINER.0.powi(refinement as i32)).max(LEAST);
+            return Ok(Request { rtol: Some(tolerance), ..request });
+        }
+        let usual = Plan::new(self.scene, self.mechanism, &request).map_err(|refusal| refusal.to_string())?;
+        let step = usual.step.map(|step| step * FINER.1.powi(refinement as i32));
+        Ok(Request { step, ..request })
+    }
+
+    fn end(&self, outcome: &Outcome) -> End {
+        let bodies = match &self.case.expected {
+            Expected::End { angles, .. } => angles.len(),
+            _ => self.mechanism.bodies.len(),
+        };
+        let mut end = End::of(&outcome.last, bodies);
+        if let Expected::End { rates, .. } = &self.case.expected
+            && rates.is_empty()
+        {
+            end.rates.clear();
+        }
+        end
+    }
+
+    /// What the end is off, where that is known.
+    fn score(&self, outcome: &Outcome, end: &End, cell: &mut Cell) {
+        cell.error = match &self.case.expected {
+            Expected::End { angles, rates } => {
+                Some(end.apart(&End { angles: angles.clone(), rates: rates.clone() }))
+            }
+            Expected::Energy | Expected::Stop(_) => Some(outcome.drift.energy.max),
+            Expected::Refusal | Expected::Unknown => None,
+        };
+    }
+
+    /// The stop of a run whose end nothing confirms.
+    fn unconfirmed(&self, cell: &Cell) -> StepError {
+        let off = cell.estimate.map_or("unknown".to_owned(), |estimate| format!("about {estimate:.1e}"));
+        StepError {
+            cause: Cause::DriftLimit,
+            method: cell.method.to_owned(),
+            t: self.scene.until,
+            step: 0.0,
+            what: format!("the error of the end is {off}, and {:.0e} was asked for", self.case.tolerance),
+            hint: "allow more with --max-evaluations, or take a method of higher order".into(),
+        }
+    }
+}
+
+/// A setting in words of the command line.
+fn setting(plan: &Plan) -> String {
+    match (plan.step, plan.tolerance) {
+        (Some(step), _) => format!("--step {step:e}"),
+        (None, tolerance) => format!("--rtol {:e}", tolerance.unwrap_or_default().relative),
+    }
+}
