@@ -160,16 +160,19 @@ fn of_any_kind(seed: u64, dice: &mut Dice) -> Option<(Scene, Vec<&'static str>)>
 
 /// A run's samples as `[t, angles…]` and rates, and what it says of itself.
 struct Told {
-    times: Vec<f64>,
+    times: Vec<Time>,
     samples: Vec<[Vec<f64>; 2]>,
     trust: Option<Trust>,
 }
 
 fn told(mechanism: &Arc<Mechanism>, plan: Plan, start: &Motion, level: Level) -> Result<Told, &'static str> {
-    let run = Run::new(Arc::clone(mechanism), plan, Limits::default(), start).map_err(|_| "cannot begin")?;
+    let run = Run::new(Arc::clone(mechanism), plan.clone(), Limits::default(), start)
+        .map_err(|_| "cannot begin")?;
     let (mut times, mut samples) = (Vec::new(), Vec::new());
     let outcome = integrate(run.trusted(level, start), &mut |sample| {
-        times.push(sample.t);
+        // Rows are at times that doubles round.
+        let time = plan.time(times.len() as u64);
+        times.push(if time.hi == sample.t { time } else { Time::from(sample.t) });
         samples.push([sample.phi.clone(), sample.omega.clone()]);
         Ok(())
     });
@@ -192,10 +195,9 @@ fn apart(ruler: &DistanceMetric, one: &[Vec<f64>; 2], other: &[Vec<f64>; 2]) -> 
 type Known = (Vec<[Vec<f64>; 2]>, Vec<f64>);
 
 /// The truth at these times.
-fn truth(scene: &Scene, mechanism: &Arc<Mechanism>, start: &Motion, times: &[f64]) -> Option<Known> {
-    let at: Vec<Time> = times.iter().map(|&t| Time::from(t)).collect();
+fn truth(scene: &Scene, mechanism: &Arc<Mechanism>, start: &Motion, times: &[Time]) -> Option<Known> {
     if scene.walls.is_empty()
-        && let Ok(found) = reference(mechanism, start, &at)
+        && let Ok(found) = reference(mechanism, start, times)
     {
         let phi = |motion: &Motion| (0..motion.phi.len()).map(|k| motion.unwrapped(k)).collect();
         let omega = |motion: &Motion| motion.omega.iter().map(|omega| omega.hi).collect();
@@ -281,7 +283,12 @@ fn judge(case: &Case) -> Verdict {
     };
     let ruler = DistanceMetric::new(&mechanism);
     let is_sparse = (shown.times.len() as f64) < 0.5 * FINE;
-    let mut errors = Errors { is_sparse, times: shown.times.clone(), most: Vec::new(), known: accuracy };
+    let mut errors = Errors {
+        is_sparse,
+        times: shown.times.iter().map(|t| t.hi).collect(),
+        most: Vec::new(),
+        known: accuracy,
+    };
     let mut most = [0.0_f64; 2];
     for (sample, exact) in shown.samples.iter().zip(&exact) {
         let now = apart(&ruler, sample, exact);

@@ -32,8 +32,8 @@ const FIRST: f64 = 1e-3;
 const GAPS: [f64; 4] = [0.5, 1.0, 0.5, 4.0];
 /// Looks that belong to the beginning.
 const BEGINNING: u64 = 128;
-/// The reference solution's own rounding over what was measured, at most.
-const MOST_ROUNDING: f64 = 2.0;
+/// What the reference solution is off by itself over what was measured, at most.
+const MOST_OWN_ERROR: f64 = 2.0;
 /// Share of the budget for double-double, after which doubles go on, of runs near rounding.
 const NEAR_ROUNDING: f64 = 0.5;
 
@@ -320,8 +320,9 @@ impl ErrorEstimator {
             .filter(|_| reference_run.is_rounded)
             .map_or(0.0, Tangent::rounding);
         let apart = metric.apart(motion, &reference_run.motion);
+        let own = rounding.hypot(reference_run.own_error(motion.time.hi));
         // It is there for differences that are small by chance.
-        let angle = apart.hypot(rounding.min(MOST_ROUNDING * apart.max(measured.error)));
+        let angle = apart.hypot(own.min(MOST_OWN_ERROR * apart.max(measured.error)));
         // Between an impact of the one and that of the other rates differ by all of it.
         let rate = (self.events == reference_run.events())
             .then(|| metric.rates_apart(motion, &reference_run.motion));

@@ -140,6 +140,16 @@ pub(super) fn is_bound(series: &Plan, run: &Plan) -> bool {
             && (run.method == MethodId::Taylor || tolerance < NEAR_ROUNDING))
 }
 
+/// What a reference solution in doubles may be off by in each second \[rad/s\], where that may be as much as a
+/// run is: where it is as fine as doubles allow.
+pub(super) fn own_error(series: &Plan) -> f64 {
+    let is_finest = series.method == MethodId::Taylor
+        && !series.extended
+        && !series.in_double_double
+        && tolerance(series).is_some_and(|tolerance| tolerance <= FINE);
+    if is_finest { FINE } else { 0.0 }
+}
+
 /// Whether a reference solution's own rounding counts.
 pub(super) fn is_rounded(series: &Plan) -> bool {
     series.method == MethodId::Taylor

@@ -1,7 +1,7 @@
 //! A reference solution under way: the series, and the tangent flow along it.
 
 use super::budget::Prices;
-use super::finer::is_rounded;
+use super::finer::{is_rounded, own_error};
 use super::tangent::{Path, Tangent};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::build::build;
@@ -176,6 +176,11 @@ impl ReferenceRun {
     /// Impacts and lasting contacts so far.
     pub(super) fn events(&self) -> u64 {
         self.outcome.impact_count + self.outcome.persistent_contact_count
+    }
+
+    /// What its motion at `t` \[s\] may be off by itself \[rad\], where that may be as much as the run is.
+    pub(super) fn own_error(&self, t: f64) -> f64 {
+        own_error(self.plan()) * (t - self.begun)
     }
 
     /// The mean length of its steps \[s\], of those up to `t` \[s\]; where they end at every look it has no
