@@ -284,6 +284,9 @@ fn kinematics_leaves_a_table_charts_and_a_record() {
     assert!(table.starts_with("motor [rad],t [s],crank.phi [rad],crank.omega [rad/s],crank.alpha [rad/s²],"));
     assert_eq!(table.lines().count(), 38);
     assert_eq!(record(&program, &format!("{folder}/kinematics.json"))["positions"], 37);
+    program.run("kinematics crank_rocker.json --drive crank=-1..1 --chart-format svg --out s -q").exits(0);
+    let chart = program.read("s/crank_rocker/kinematics-crank/kinematics.svg");
+    assert!(chart.contains("N·m") && chart.contains("from −1 to 1 rad"), "signs and units as in other charts");
     // What is there is not overwritten unasked.
     program.run("kinematics crank_rocker.json").exits(6).says(&["--force"]);
     let swung = program.run("kinematics crank_rocker.json --drive rocker=0..3 --no-charts").exits(0);
@@ -308,7 +311,7 @@ fn a_start_is_drawn_and_so_is_what_comes_closest() {
 
 #[test]
 fn charts_come_in_the_formats_and_of_the_columns_and_window_asked_for() {
-    let program = Program::with_scenes(&["slider_crank_driven", "motor"]);
+    let program = Program::with_scenes(&["slider_crank_driven", "motor", "hanging", "kepler", "cart_pole"]);
     program
         .run("run slider_crank_driven.json --chart-format svg,pdf --chart block.x,motor.torque --window 0.02..0.06 --gif --apng --out o -q")
         .exits(0);
@@ -335,6 +338,25 @@ fn charts_come_in_the_formats_and_of_the_columns_and_window_asked_for() {
     let ran = program.run("run motor.json --until 1 --out e").exits(0);
     assert!(ran.stdout.contains("motor: 0 rad and 0 rad/s at most"), "{}", ran.stdout);
     assert!(!program.files().iter().any(|file| file.starts_with("e/") && file.contains("constraint_drift")));
+    // Nor what does not move; what moves without turning is drawn by its positions.
+    program
+        .run("run hanging.json --until 1 --out h -v")
+        .exits(0)
+        .says(&["no chart of angles: nothing moves"]);
+    assert!(!program.files().iter().any(|file| file.starts_with("h/") && file.contains("angles")));
+    for scene in ["kepler", "cart_pole"] {
+        program.run(&format!("run {scene}.json --until 1 --chart-format svg --out p -q")).exits(0);
+    }
+    let chart = |scene: &str, name: &str| {
+        let all = program.files();
+        let is_it = |file: &&String| file.starts_with(&format!("p/{scene}/")) && file.ends_with(name);
+        std::fs::read_to_string(program.path(all.iter().find(is_it).expect("a chart"))).expect("text")
+    };
+    for words in ["Positions of the bars", "position [m]", "planet.x", "at a constant angle: sun, planet"] {
+        assert!(chart("kepler", "angles.svg").contains(words), "{words}");
+    }
+    let drift = chart("cart_pole", "constraint_drift.svg");
+    assert!(drift.contains("kept exactly: slider.angle") && !drift.contains("[rad]"), "no empty panels");
     for (flags, words) in [
         ("--chart bar1.q", vec!["no column `bar1.q`", "did you mean `bar1."]),
         ("--chart-format bmp", vec!["bmp", "svg"]),

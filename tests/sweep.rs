@@ -13,6 +13,8 @@ use driftless::run::{
 use driftless::scene::Template;
 use driftless::stepping::Cause;
 use std::f64::consts::PI;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 fn template(name: &str) -> Template {
     Template::read(format!("examples/scenes/{name}.json").as_ref(), &[]).expect("a shipped scene")
@@ -387,6 +389,48 @@ fn an_observer_can_end_a_huge_sweep() {
         let error = sweep(&plan, threads, &mut fussy).expect_err("the observer's");
         assert!(matches!(error, SweepError::Observer(_)) && fussy.seen == 5, "{error}");
     }
+}
+
+#[test]
+fn a_range_of_points_is_that_part_of_all_in_lanes_or_not() {
+    for method in [None, Some("dp8")] {
+        let request =
+            Request { until: Some(2.0), ..method.map_or(Request::default(), |name| request(name, 2.0)) };
+        let plan = || prepared("free", &["bar1.phi=-3..3:40"], &request);
+        let all = points(&plan(), 2);
+        assert_eq!(points(&plan().within(7..31), 2), all[7..31]);
+        assert_eq!(points(&plan().within(30..1000), 1), all[30..]);
+        assert!(points(&plan().within(50..60), 1).is_empty());
+        let second = plan().sharded(Shard::new(2, 4)).within(5..12);
+        assert_eq!(points(&second, 1), all[10..12], "of a part, what is in both");
+    }
+}
+
+#[test]
+fn one_flag_ends_all_sweeps_that_are_given_it() {
+    let flag = Arc::new(AtomicBool::new(false));
+    let ended = || {
+        let request = Request { every: Some(1e5), ..request("gauss8", 1e5) };
+        let plan = prepared("free", &["bar1.phi=-3..3:1000"], &request).stopped_by(Arc::clone(&flag));
+        sweep(&plan, 2, &mut |_: &Point| Ok(()))
+    };
+    std::thread::scope(|scope| {
+        let sweeps = [scope.spawn(ended), scope.spawn(ended)];
+        std::thread::sleep(std::time::Duration::from_millis(100));
+        flag.store(true, Ordering::Relaxed);
+        for sweep in sweeps {
+            let ended = sweep.join().expect("no panic");
+            let is_interrupted = |error: &std::io::Error| error.kind() == std::io::ErrorKind::Interrupted;
+            assert!(matches!(&ended, Err(SweepError::Observer(error)) if is_interrupted(error)), "{ended:?}");
+        }
+    });
+}
+
+#[test]
+fn runs_and_sweeps_move_between_threads() {
+    fn is_send<T: Send>() {}
+    is_send::<driftless::run::Running>();
+    is_send::<Sweep>();
 }
 
 #[test]

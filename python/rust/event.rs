@@ -49,6 +49,16 @@ impl Moment {
         Ok(self.body(body)?.rate)
     }
 
+    /// Cosine of its angle.
+    fn cos(&self, body: &str) -> PyResult<f64> {
+        Ok(self.body(body)?.direction[0])
+    }
+
+    /// Sine of its angle.
+    fn sin(&self, body: &str) -> PyResult<f64> {
+        Ok(self.body(body)?.direction[1])
+    }
+
     /// Where a point of a body is, given in its own axes from its origin \[m\].
     #[pyo3(signature = (body, point=[0.0, 0.0]))]
     fn position(&self, body: &str, point: [f64; 2]) -> PyResult<(f64, f64)> {

@@ -8,7 +8,9 @@ use driftless::report::charts::{Chart, draw, motion};
 use driftless::report::result::record;
 use driftless::run::checkpoint::{opened, sealed};
 use driftless::run::table::Shown;
+use driftless::run::methods::MethodId;
 use driftless::run::{Event, Observer, Plan, Recorder, Run, Running, Sample, Snapshot, Step, wall_clock};
+use driftless::stepping::interruption;
 use driftless::{Level, Outcome, Trajectory, chart};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
@@ -17,6 +19,7 @@ use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -172,28 +175,34 @@ fn carry(
     let shown = Shown::new(&scene.get().mechanism);
     let recorder = dense.then(Recorder::default);
     let mut watch = Watch { shown, numbers, recorder, callback, failed: None };
+    // The windows of these are integrated in one call each, which cannot pause.
+    let is_windowed = matches!(running.plan().method, MethodId::Dopri5 | MethodId::Dop853);
     loop {
-        let is_over = py.detach(|| {
-            let (mut begin, mut asked) = (Instant::now(), 0_u32);
-            running.go_observed(&mut watch, &mut || {
-                asked += 1;
-                // A look at the clock costs more than a short step.
-                let is_due = asked.is_multiple_of(16) && (begin.elapsed() >= LOOK || has_failed(failed));
-                if is_due {
-                    begin = Instant::now();
-                }
-                is_due
-            })
-        });
+        let looked = if is_windowed {
+            go_beside(py, &mut running, &mut watch, failed)
+        } else {
+            let is_over = py.detach(|| {
+                let (mut begin, mut asked) = (Instant::now(), 0_u32);
+                running.go_observed(&mut watch, &mut || {
+                    asked += 1;
+                    // A look at the clock costs more than a short step.
+                    let is_due = asked.is_multiple_of(16) && (begin.elapsed() >= LOOK || has_failed(failed));
+                    if is_due {
+                        begin = Instant::now();
+                    }
+                    is_due
+                })
+            });
+            if is_over { Ok(true) } else { py.check_signals().map(|()| false) }
+        };
         let failure = failed.lock().unwrap_or_else(PoisonError::into_inner).take();
         if let Some(error) = watch.failed.take().or(failure) {
             return Err(error);
         }
-        if is_over {
-            break;
-        }
-        if let Err(error) = py.check_signals() {
-            return Err(interrupted(py, &scene, &running, watch.numbers, error));
+        match looked {
+            Ok(true) => break,
+            Ok(false) => {}
+            Err(error) => return Err(interrupted(py, &scene, &running, watch.numbers, error)),
         }
     }
     let Watch { numbers, recorder, .. } = watch;
@@ -209,6 +218,35 @@ fn carry(
         None => (outcome, None),
     };
     Ok(Raw { scene, outcome, rows, trajectory })
+}
+
+/// Takes a run on, on a thread of its own, while this one looks for Ctrl-C; true where it is over.
+fn go_beside(py: Python<'_>, running: &mut Running, watch: &mut Watch, failed: &Failed) -> PyResult<bool> {
+    let (waiting, is_done) = (std::thread::current(), AtomicBool::new(false));
+    std::thread::scope(|scope| {
+        let worker = scope.spawn(|| {
+            let is_over = running
+                .go_observed(watch, &mut || interruption::is_asked() || has_failed(failed));
+            is_done.store(true, Ordering::Release);
+            waiting.unpark();
+            is_over
+        });
+        let mut signal = None;
+        while !is_done.load(Ordering::Acquire) && !worker.is_finished() {
+            py.detach(|| std::thread::park_timeout(LOOK));
+            if let Err(error) = py.check_signals() {
+                interruption::flag().store(true, Ordering::Relaxed);
+                signal = Some(error);
+            }
+        }
+        let is_over = py.detach(|| worker.join());
+        interruption::flag().store(false, Ordering::Relaxed);
+        match (signal, is_over) {
+            (_, Err(panic)) => std::panic::resume_unwind(panic),
+            (Some(error), Ok(false)) => Err(error),
+            (_, Ok(is_over)) => Ok(is_over),
+        }
+    })
 }
 
 fn has_failed(failed: &Failed) -> bool {

@@ -218,6 +218,32 @@ except KeyboardInterrupt as stop:
         dl.resume(b"nonsense")
 
 
+@pytest.mark.parametrize("method", ["dop853", "dopri5"])
+def test_methods_of_one_long_call_are_interrupted_and_go_on(tmp_path, scenes, method):
+    # One output interval is integrated in one call, which takes seconds.
+    options = {"method": method, "until": 4000, "every": 2000, "rtol": 1e-10, "trust": "off"}
+    code = f"""
+import pydriftless as dl, signal, time
+signal.signal(signal.SIGINT, signal.default_int_handler)
+scene = dl.load({str(scenes / "gentle.json")!r})
+try:
+    print("going", flush=True)
+    scene.run(**{options!r})
+except KeyboardInterrupt as stop:
+    open({str(tmp_path / "saved")!r}, "wb").write(stop.checkpoint)
+    print(time.time(), flush=True)
+"""
+    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    assert child.stdout.readline() == "going\n"
+    time.sleep(0.2)
+    sent = time.time()
+    child.send_signal(signal.SIGINT)
+    out, _ = child.communicate(timeout=60)
+    assert float(out) - sent < 1.0
+    run, whole = dl.resume(tmp_path / "saved"), dl.load(scenes / "gentle.json").run(**options)
+    assert np.array_equal(run.rows, whole.rows) and run.report["result"] == whole.report["result"]
+
+
 def test_commands_of_the_program(scenes):
     crank = dl.load(scenes / "crank_rocker.json")
     assert crank.check()["scene"] == "crank_rocker"

@@ -108,3 +108,38 @@ def test_dask_gives_the_same_bytes_when_a_worker_is_killed(free):
 
             threading.Timer(0.05, kill).start()
             same(whole, free.sweep(grid, until=20, client=client, parts=40))
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_a_file_that_was_begun_is_gone_on_with(free, tmp_path, monkeypatch, ending):
+    if ending == "parquet":
+        pytest.importorskip("pyarrow")
+    from pydriftless import _sweep
+
+    whole, begun = tmp_path / f"whole.{ending}", tmp_path / f"begun.{ending}"
+    free.sweep(GRID, until=2, to=whole, chunk=7)
+    count, real = 0, _sweep._part
+
+    def failing(*arguments):
+        nonlocal count
+        count += 1
+        if count == 3:
+            raise KeyboardInterrupt
+        return real(*arguments)
+
+    monkeypatch.setattr(_sweep, "_part", failing)
+    with pytest.raises(KeyboardInterrupt):
+        free.sweep(GRID, until=2, to=begun, chunk=7, resume=True)
+    if ending == "csv":
+        with open(begun, "a") as file:
+            file.write("half a li")
+    with pytest.raises(ValueError, match="another sweep"):
+        free.sweep(GRID, until=1, to=begun, chunk=7, resume=True)
+    free.sweep(GRID, until=2, to=begun, chunk=7, resume=True)
+    if ending == "csv":
+        assert begun.read_bytes() == whole.read_bytes()
+    else:
+        import pyarrow.parquet as pq
+
+        assert pq.read_table(begun).equals(pq.read_table(whole))
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([whole.name, begun.name])

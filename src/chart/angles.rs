@@ -36,7 +36,7 @@ impl AngleSeries {
     }
 }
 
-/// Angles of bars, and travels of sliders.
+/// Angles of bars, travels of sliders and positions of bodies on floating bases.
 #[derive(Clone, Debug, Default)]
 pub struct Angles {
     /// Title, with markup.
@@ -49,6 +49,8 @@ pub struct Angles {
     pub series: Vec<AngleSeries>,
     /// Sliders, with their travels \[m\] in place of angles.
     pub travels: Vec<AngleSeries>,
+    /// Coordinates of bodies on floating bases \[m\] in place of angles.
+    pub positions: Vec<AngleSeries>,
     /// The time from which on the curves are pale: the horizon up to which they can be trusted \[s\].
     pub horizon: Option<f64>,
 }
@@ -94,7 +96,8 @@ fn groups(chart: &Angles) -> Vec<Group<'_>> {
             [swinging, winding].into_iter().filter(|group| !group.is_empty()).collect()
         }
     };
-    if panels.is_empty() && chart.travels.is_empty() {
+    let lengths = [("travel", &chart.travels), ("position", &chart.positions)];
+    if panels.is_empty() && lengths.iter().all(|(_, series)| series.is_empty()) {
         panels.push(Vec::new());
     }
     let angles = panels.into_iter().map(|series| {
@@ -102,8 +105,8 @@ fn groups(chart: &Angles) -> Vec<Group<'_>> {
         Group { series, scale, unit, name: "angle" }
     });
     let mut groups: Vec<Group> = angles.collect();
-    if !chart.travels.is_empty() {
-        groups.push(Group { series: chart.travels.iter().collect(), scale: 1.0, unit: "m", name: "travel" });
+    for (name, series) in lengths.into_iter().filter(|(_, series)| !series.is_empty()) {
+        groups.push(Group { series: series.iter().collect(), scale: 1.0, unit: "m", name });
     }
     groups
 }

@@ -2,12 +2,10 @@
 
 use super::failure::Failure;
 use super::progress::Looks;
+use crate::stepping::interruption;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
-
-/// Set by Ctrl-C and SIGTERM.
-static IS_ASKED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
 /// From now on Ctrl-C and SIGTERM ask the run to write a checkpoint and end; the second one ends the program
 /// at once.
@@ -20,16 +18,16 @@ pub fn listen() -> Result<(), Failure> {
         |error| Failure::new(super::failure::Exit::Other, format!("cannot listen for Ctrl-C: {error}"));
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
         // In this order: the first signal finds the flag down.
-        signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&IS_ASKED))
+        signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(interruption::flag()))
             .map_err(failed)?;
-        signal_hook::flag::register(signal, Arc::clone(&IS_ASKED)).map_err(failed)?;
+        signal_hook::flag::register(signal, Arc::clone(interruption::flag())).map_err(failed)?;
     }
     Ok(())
 }
 
 /// True where the run has been asked to end.
 pub fn is_asked() -> bool {
-    IS_ASKED.load(Ordering::Relaxed)
+    interruption::is_asked()
 }
 
 /// Says when a checkpoint is due.  Its time runs forwards only, whatever becomes of the clock on the wall.

@@ -38,7 +38,7 @@ pub fn run(flags: &KinematicsFlags) -> Result<(), Failure> {
     if flags.force {
         folder.clear(FILES)?;
     }
-    folder.write(KINEMATICS, report::table(&found).as_bytes())?;
+    folder.write(KINEMATICS, &report::table(&found))?;
     #[cfg(feature = "charts")]
     if !flags.charts.no_charts {
         for (name, picture) in report::charts(&found)? {

@@ -352,7 +352,11 @@ fn draw(
 ) -> Result<(), Failure> {
     let tell = &flags.scene.tell;
     if !flags.charts.no_charts {
-        for chart in report::charts::wanted(mechanism, outcome) {
+        let wanted = report::charts::wanted(mechanism, outcome);
+        if !wanted.contains(&report::charts::Chart::Angles) {
+            tell.remark("no chart of angles: nothing moves");
+        }
+        for chart in wanted {
             let picture = report::charts::draw(chart, scene, mechanism, outcome)?;
             flags.charts.keep(folder, chart.name(), &picture, tell)?;
         }

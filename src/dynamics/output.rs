@@ -110,13 +110,15 @@ impl Outputs {
         let seen = Values { time: time.hi, phi: at.winding, z: &kernel.z, omega: at.omega };
         let configuration = Configuration::new(&seen);
         let parameters = mechanism.laws.as_ref().map_or(&self.parameters, |laws| &laws.parameters);
-        let mut signals = Vec::with_capacity(self.signals.len());
-        let value = |expression: &Expression, signals: &[f64]| {
+        let (mut signals, mut sources) = (Vec::with_capacity(self.signals.len()), Vec::new());
+        let mut value = |expression: &Expression, signals: &[f64]| {
             let source = |source: &Source<Site>| match source {
                 Source::State(meaning) => meaning.value(&configuration, parameters, signals),
                 Source::Carried(quantity) => quantity.value(at, &configuration, forces.as_ref()),
             };
-            expression.formula.value(&expression.sources.iter().map(source).collect::<Vec<f64>>())
+            sources.clear();
+            sources.extend(expression.sources.iter().map(source));
+            expression.formula.value(&sources)
         };
         for signal in &self.signals {
             signals.push(value(signal, &signals));

@@ -38,13 +38,39 @@ impl<'a> Drawing<'a> {
         self.leaves().iter().take(traced).map(|&body| plain(&self.mechanism.bodies[body].name)).collect()
     }
 
-    /// Up to four bodies that no other hangs on.
+    /// Up to four bodies that no other hangs on, of which the far ends move and are not that of another among
+    /// them.
     pub fn leaves(&self) -> Vec<usize> {
         let hangs = &self.mechanism.forest.hangs;
-        (0..hangs.len())
-            .filter(|&k| hangs.iter().all(|hang| hang.origin_point.parent() != Some(k)))
-            .take(4)
-            .collect()
+        let mut leaves: Vec<usize> = Vec::new();
+        for k in 0..self.mechanism.own_bodies().len() {
+            let has_path =
+                !self.is_joined(k, None) && leaves.iter().all(|&leaf| !self.is_joined(k, Some(leaf)));
+            if has_path && hangs.iter().all(|hang| hang.origin_point.parent() != Some(k)) {
+                leaves.push(k);
+            }
+        }
+        leaves.truncate(4);
+        leaves
+    }
+
+    /// Whether a hinge joins the far end of a bar with the far end of another, or with the ground.
+    fn is_joined(&self, bar: usize, other: Option<usize>) -> bool {
+        let is_end = |place: &Place, bar: Option<usize>| {
+            let Some(bar) = bar else { return place.bar.is_none() };
+            let ([x, y], [end_x, end_y]) = (place.point, self.far_end(bar).point);
+            place.bar == Some(bar) && (x - end_x).hypot(y - end_y) < 1e-9 * end_x.hypot(end_y)
+        };
+        self.scene.hinges.iter().any(|hinge| {
+            let [a, b] = &hinge.between;
+            is_end(a, Some(bar)) && is_end(b, other) || is_end(b, Some(bar)) && is_end(a, other)
+        })
+    }
+
+    /// The far end of a bar.
+    fn far_end(&self, bar: usize) -> Place {
+        let [origin, end] = self.mechanism.bodies[bar].ends;
+        Place { bar: Some(bar), point: [(end - origin).re, (end - origin).im] }
     }
 
     /// The scene's points on bodies.
@@ -59,11 +85,7 @@ impl<'a> Drawing<'a> {
         if !points.is_empty() {
             return points;
         }
-        let tip = |bar: usize| {
-            let tip = self.mechanism.bodies[bar].ends;
-            Place { bar: Some(bar), point: [(tip[1] - tip[0]).re, (tip[1] - tip[0]).im] }
-        };
-        self.leaves().into_iter().map(tip).collect()
+        self.leaves().into_iter().map(|bar| self.far_end(bar)).collect()
     }
 
     /// Where a place is (x, y) \[m\].
@@ -179,6 +201,20 @@ mod tests {
             let travel = drawing.travel(&scene.sliders[0], &mechanism_phi(&mechanism, &phi));
             assert!((travel - there).abs() < 1e-15, "{travel} and {there}");
         }
+    }
+
+    #[test]
+    fn ends_that_hinges_join_have_one_path_and_those_on_the_ground_none() {
+        let traced = |name: &str| {
+            let path = format!("examples/scenes/{name}.json");
+            let scene = read_scene(path.as_ref(), &[]).expect("shipped");
+            let mechanism = Mechanism::new(&scene).expect("a mechanism");
+            Drawing { scene: &scene, mechanism: &mechanism }.names()
+        };
+        assert_eq!(traced("andrews"), ["FE", "BED"], "GE and HE end at the end of FE");
+        assert_eq!(traced("four_bar_motor"), ["coupler"], "where the rocker ends as well");
+        assert_eq!(traced("pid"), ["arm"], "and no body that only carries an integral");
+        assert_eq!(traced("branch"), ["bar2", "plate"]);
     }
 
     /// The angles with whatever further coordinates a mechanism has, at zero.

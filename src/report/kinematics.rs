@@ -8,8 +8,13 @@ use crate::chart::{
     self, ChartError, FILE_RESOLUTION, MechanismChart, OutputSeries, OutputsChart, Picture, Pose, plain,
 };
 use crate::run::Kinematics;
-use crate::run::kinematics::{DeadCentre, Limit, Position, Range};
+#[cfg(feature = "files")]
+use crate::run::kinematics::Position;
+use crate::run::kinematics::{DeadCentre, Limit, Range};
+#[cfg(feature = "files")]
+use crate::run::table::put_number;
 use serde_json::{Value, json};
+#[cfg(feature = "files")]
 use std::fmt::Write;
 
 /// Other assemblies that are listed; more are counted.
@@ -145,7 +150,8 @@ fn lined(in_line: &[String]) -> String {
 
 /// All positions as a table: drive, time, coordinates with rates and accelerations, force of the drive,
 /// outputs, transmission angles.
-pub fn table(found: &Kinematics) -> String {
+#[cfg(feature = "files")]
+pub fn table(found: &Kinematics) -> Vec<u8> {
     let unit = found.unit;
     let mut text = format!("{} [{unit}],t [s]", found.drive);
     let (names, bodies) = (names(found), found.mechanism.own_bodies().len());
@@ -167,16 +173,16 @@ pub fn table(found: &Kinematics) -> String {
         let _ = write!(text, ",{} [rad]", one.name());
     }
     text.push('\n');
+    let mut text = text.into_bytes();
     for Position { drive, t, phi, omega, alpha, force, transmission, outputs } in &found.positions {
-        let _ = write!(text, "{drive:?},{t:?}");
-        for k in (0..names.len()).map(index) {
-            let _ = write!(text, ",{:?},{:?},{:?}", phi[k], omega[k], alpha[k]);
-        }
-        let _ = write!(text, ",{force:?}");
-        for value in outputs.iter().chain(transmission) {
-            let _ = write!(text, ",{value:?}");
-        }
-        text.push('\n');
+        let mut put = |value: &f64| put_number(&mut text, *value);
+        [drive, t].into_iter().for_each(&mut put);
+        (0..names.len())
+            .map(index)
+            .for_each(|k| [&phi[k], &omega[k], &alpha[k]].into_iter().for_each(&mut put));
+        std::iter::once(force).chain(outputs).chain(transmission).for_each(&mut put);
+        text.pop();
+        text.push(b'\n');
     }
     text
 }
@@ -190,7 +196,7 @@ pub fn charts(found: &Kinematics) -> Result<Vec<(&'static str, Picture)>, ChartE
     let drawing = Drawing { scene: &found.scene, mechanism: &found.mechanism };
     let mut caption = vec![format!("scene {}", plain(&found.scene.name))];
     if let (Some(first), Some(last)) = (found.positions.first(), found.positions.last()) {
-        let [from, to] = [first, last].map(|at| figure(at.drive));
+        let [from, to] = [first, last].map(|at| figure(at.drive).replace('-', "−"));
         caption.push(format!("{} from {from} to {to} {}", plain(&found.drive), found.unit));
     }
     let traced = drawing.traced();
@@ -205,19 +211,12 @@ pub fn charts(found: &Kinematics) -> Result<Vec<(&'static str, Picture)>, ChartE
         horizon: None,
     };
     let drives: Vec<f64> = found.positions.iter().map(|at| at.drive).collect();
-    let count = found.mechanism.outputs.as_ref().map_or(0, |outputs| outputs.heads().count());
     let outputs =
         found.ranges.iter().enumerate().map(|(column, Range { name, unit, min, max })| OutputSeries {
             name: plain(name),
-            unit: plain(unit),
+            unit: unit.replace(' ', "·"),
             time: drives.clone(),
-            value: (found.positions.iter())
-                .map(|at| match column {
-                    0 => at.force,
-                    k if k <= count => at.outputs[k - 1],
-                    k => at.transmission[k - 1 - count],
-                })
-                .collect(),
+            value: found.positions.iter().map(|at| at.column(column)).collect(),
             extremes: vec![*min, *max],
         });
     let outputs = OutputsChart {

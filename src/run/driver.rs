@@ -144,6 +144,13 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
             self.from.clone_from(&self.state);
             let mut event =
                 self.method.step(&mut self.problem, &mut self.state, target, &mut self.statistics)?;
+            if event.is_none() && self.state.time <= self.from.time {
+                // Interrupted: nothing was done.
+                if pause() {
+                    return Ok(Halt::Pause);
+                }
+                continue;
+            }
             self.check_springs()?;
             self.check_walls()?;
             if let Some(steps) = &mut steps
@@ -262,7 +269,24 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
     }
 }
 
+/// How a method writes the state inside its last step.
+type Interpolate<P, M> = fn(&mut M, &mut P, &State, Time, &mut State);
+
 impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
+    /// The motion at a time in the last step.
+    fn observe(&mut self, time: Time, interpolate: Interpolate<P, M>) -> &Motion {
+        let Self { problem, method, state, from, inside, observed, .. } = self;
+        if time >= state.time {
+            problem.read(state, observed);
+        } else if time <= from.time {
+            problem.read(from, observed);
+        } else {
+            interpolate(method, problem, from, time, inside);
+            problem.read(inside, observed);
+        }
+        observed
+    }
+
     /// Makes everything ready for a step from the present state.
     fn begin(&mut self, target: Time, flips: Option<&mut FlipDetector>) -> Result<(), StepError> {
         let Self { problem, method, state, guard, springs, .. } = self;
@@ -373,16 +397,11 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Inside for StepLoop<P, M>
     }
 
     fn at(&mut self, time: Time) -> &Motion {
-        if time >= self.state.time {
-            self.problem.read(&self.state, &mut self.observed);
-        } else if time <= self.from.time {
-            self.problem.read(&self.from, &mut self.observed);
-        } else {
-            let Self { problem, method, from, inside, observed, .. } = self;
-            method.interpolate(problem, from, time, inside);
-            problem.read(inside, observed);
-        }
-        &self.observed
+        self.observe(time, M::interpolate)
+    }
+
+    fn roughly_at(&mut self, time: Time) -> &Motion {
+        self.observe(time, M::interpolate_roughly)
     }
 }
 

@@ -2,22 +2,26 @@
 //! every step.
 //!
 //! The outputs are interpolated at Chebyshev points of every step, by as high a degree as they ask for; the
-//! zeros of the interpolants' slopes are the extremes, their integrals the means.
+//! zeros of the interpolants' slopes are the extremes, their integrals the means.  Where all of them lie well
+//! between the extremes known so far, as in most steps of a long run, the lowest degree serves, and the
+//! cheapest interpolation of the motion.
 
 use super::inside::{Inside, StepWatcher};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::output::Moment;
 use crate::dynamics::{Mechanism, Motion, Time};
-use crate::stepping::search::{Chebyshev, Curve, Interpolants, interpolated};
+use crate::stepping::search::{Chebyshev, Curve, Interpolants, Nodes, interpolated};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Degrees of the interpolants, and what the last coefficients may be over the largest value.
 const DEGREES: [usize; 3] = [8, 16, 32];
 const RESOLVED: f64 = 1e-10;
-/// What an output may be beside its interpolant, over the largest value, for a step to be passed over.
+/// What an output may be beside its interpolant, over the largest value, for a step to be passed over, and
+/// what the last coefficients may be there.
 const MARGIN: f64 = 1e-6;
+const PASSED: f64 = 1e-8;
 /// Halvings of a step that no interpolant resolves: an output may have corners.
 const HALVINGS: u32 = 6;
 /// Halvings of the bracket of an extreme.
@@ -68,6 +72,20 @@ impl Default for Found {
 }
 
 impl Found {
+    /// True where a curve that is known well enough stays well between the extremes.
+    fn holds(&self, curve: &Chebyshev) -> bool {
+        let ([lowest, highest], size) = (curve.range(), curve.most());
+        let margin = MARGIN * size;
+        curve.tail() <= PASSED * size && lowest - margin > self.min[0] && highest + margin < self.max[0]
+    }
+
+    /// Adds the integrals over a step of an interpolant and of its square.
+    fn sum_up(&mut self, curve: &Chebyshev, nodes: &Nodes, values: &[f64], span: f64) {
+        self.integral += DoubleDouble::product(curve.integral(), span);
+        let square = nodes.integral(values.iter().map(|value| value * value));
+        self.square += DoubleDouble::product(square, span);
+    }
+
     fn see(&mut self, value: f64, t: f64) {
         if value < self.min[0] {
             self.min = [value, t];
@@ -154,9 +172,25 @@ impl ExtremesDetector {
         outputs.evaluate(&Moment { mechanism, time: motion.time, phi, winding, omega, kernel }, values);
     }
 
+    /// True where no output comes near a new extreme, as the interpolants of a low degree tell, of which the
+    /// means are taken then.
+    fn passes(&mut self, inside: &mut dyn Inside, begin: Time, span: f64) -> bool {
+        let at = |share: f64, row: &mut Vec<f64>| self.values(inside.roughly_at(begin + share * span), row);
+        let Interpolants { curves, nodes, values, .. } = interpolated(&DEGREES[..1], at, |_, _| true);
+        let found = &mut self.memory.found;
+        if !curves.iter().zip(&*found).all(|(curve, found)| found.holds(curve)) {
+            return false;
+        }
+        self.memory.span += DoubleDouble::from(span);
+        found.iter_mut().zip(curves.iter().zip(&values)).for_each(|(found, (curve, values))| {
+            found.sum_up(curve, nodes, values, span);
+        });
+        true
+    }
+
     fn look(&mut self, inside: &mut dyn Inside, begin: Time, span: f64, depth: u32) {
         let at = |share: f64, row: &mut Vec<f64>| self.values(inside.at(begin + share * span), row);
-        let is_enough = |curve: &Chebyshev| curve.tail() <= RESOLVED * curve.most();
+        let is_enough = |_: usize, curve: &Chebyshev| curve.tail() <= RESOLVED * curve.most();
         let Interpolants { curves, nodes, values, is_resolved } = interpolated(&DEGREES, at, is_enough);
         if !is_resolved && depth < HALVINGS {
             self.look(inside, begin, 0.5 * span, depth + 1);
@@ -165,19 +199,15 @@ impl ExtremesDetector {
         self.memory.span += DoubleDouble::from(span);
         let mut row = Vec::new();
         for (k, (curve, values)) in curves.iter().zip(&values).enumerate() {
-            let squares: Vec<f64> = values.iter().map(|value| value * value).collect();
             let found = &mut self.memory.found[k];
-            found.integral += DoubleDouble::product(curve.integral(), span);
-            found.square += DoubleDouble::product(nodes.through(&squares).integral(), span);
+            found.sum_up(curve, nodes, values, span);
             for (value, node) in values.iter().zip(&nodes.places) {
                 found.see(*value, (begin + node * span).hi);
             }
-            let known = [found.min[0], found.max[0]];
-            // Most steps of a long run hold no new extreme, and their coefficients tell.
-            let ([lowest, highest], margin) = (curve.range(), MARGIN * curve.most());
-            if is_resolved && lowest - margin > known[0] && highest + margin < known[1] {
+            if found.holds(curve) {
                 continue;
             }
+            let known = [found.min[0], found.max[0]];
             for share in turns(curve, values, &nodes.places, known) {
                 let t = begin + share * span;
                 row.clear();
@@ -222,7 +252,7 @@ impl StepWatcher for ExtremesDetector {
     fn step(&mut self, inside: &mut dyn Inside) -> Option<Time> {
         let (begin, end) = inside.span();
         let span = (end - begin).hi;
-        if span > 0.0 {
+        if span > 0.0 && !self.passes(inside, begin, span) {
             self.look(inside, begin, span, 0);
         }
         None

@@ -14,6 +14,9 @@ pub(super) trait Inside {
 
     /// The motion at a time inside it; times outside count as the nearer end.
     fn at(&mut self, time: Time) -> &Motion;
+
+    /// The same to nearly its accuracy, where that is cheaper.
+    fn roughly_at(&mut self, time: Time) -> &Motion;
 }
 
 /// Shown every accepted step; may cut it short.
@@ -153,6 +156,10 @@ impl Inside for Shortened<'_> {
 
     fn at(&mut self, time: Time) -> &Motion {
         self.inside.at(if time > self.end { self.end } else { time })
+    }
+
+    fn roughly_at(&mut self, time: Time) -> &Motion {
+        self.inside.roughly_at(if time > self.end { self.end } else { time })
     }
 }
 

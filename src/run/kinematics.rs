@@ -25,7 +25,7 @@ use crate::scene::Scene;
 use drive::Driven;
 use serde::Serialize;
 use std::sync::Arc;
-use walk::{IN_LINE, Walk};
+use walk::{IN_LINE, Solved, Walk};
 
 /// Relative width at which a searched time is taken for found.
 const FOUND: f64 = 1e-13;
@@ -53,6 +53,17 @@ pub struct Position {
     pub transmission: Vec<f64>,
     /// Values of the scene's outputs, in their order.
     pub outputs: Vec<f64>,
+}
+
+impl Position {
+    /// A column of what is over the drive: its force, then outputs, then transmission angles.
+    pub(crate) fn column(&self, column: usize) -> f64 {
+        match column.checked_sub(1) {
+            None => self.force,
+            Some(k) if k < self.outputs.len() => self.outputs[k],
+            Some(k) => self.transmission[k - self.outputs.len()],
+        }
+    }
 }
 
 /// An end of the drive's range.
@@ -145,35 +156,34 @@ pub fn kinematics(scene: &Scene, drive: &Drive, count: usize) -> Result<Kinemati
     let time = |value: f64| (value - start) / rate;
     // The positions on either side of the start, each from there outwards.
     let mut limits = Vec::new();
-    let mut sides: Vec<Vec<Walk>> = Vec::new();
-    for is_below in [true, false] {
-        let mut side: Vec<Walk> = Vec::new();
+    let mut sides: [Vec<Solved>; 2] = Default::default();
+    let mut here = walk.clone();
+    for (side, is_below) in sides.iter_mut().zip([true, false]) {
         let mut values: Vec<f64> = (0..=count).map(value).filter(|v| (*v < start) == is_below).collect();
         if is_below {
             values.reverse();
         }
-        let mut here = walk.clone();
+        here.clone_from(&walk);
         for value in values {
             match here.go(time(value)) {
-                Ok(()) => side.push(here.clone()),
+                Ok(()) => side.push(here.solved()),
                 Err(limit) => {
                     limits.push(limit);
                     break;
                 }
             }
         }
-        sides.push(side);
     }
-    let [below, above]: [Vec<Walk>; 2] = sides.try_into().unwrap_or_default();
-    let walks: Vec<Walk> = below.into_iter().rev().chain(above).collect();
+    let [below, above] = sides;
+    let all: Vec<Solved> = below.into_iter().rev().chain(above).collect();
     let mut found = Kinematics {
         branches: mechanism.other_assemblies(&scene, ATTEMPTS),
         left_out: left_out(&scene),
-        is_closed: is_turn && walks.first().zip(walks.last()).is_some_and(|(a, b)| a.is_as(b)),
+        is_closed: is_turn && all.first().zip(all.last()).is_some_and(|(a, b)| a.is_as(b, &mechanism)),
         dead_centres: Vec::new(),
         change_points: Vec::new(),
         ranges: Vec::new(),
-        positions: walks.iter().map(Walk::position).collect(),
+        positions: Vec::new(),
         drive: label,
         motor: name,
         scene,
@@ -184,39 +194,37 @@ pub fn kinematics(scene: &Scene, drive: &Drive, count: usize) -> Result<Kinemati
         limits,
         transmissions,
     };
-    found.search(&walks);
+    found.search(&all, &mut here);
+    found.positions = all.into_iter().map(|one| one.position).collect();
     Ok(found)
 }
 
 impl Kinematics {
     /// Looks between positions for dead centres, change points and extremes.
-    fn search(&mut self, walks: &[Walk]) {
+    fn search(&mut self, all: &[Solved], walk: &mut Walk) {
         let coordinates = self.mechanism.coordinates();
         let own = self.mechanism.own_bodies().len();
         let shown: Vec<usize> = (0..own).chain(self.mechanism.bodies.len()..coordinates).collect();
-        let fastest = |k: usize| walks.iter().map(|walk| walk.omega(k).abs()).fold(0.0, f64::max);
+        let fastest = |k: usize| all.iter().map(|one| one.position.omega[k].abs()).fold(0.0, f64::max);
         let most = shown.iter().map(|&k| fastest(k)).fold(0.0, f64::max);
         let moving: Vec<usize> = shown.into_iter().filter(|&k| fastest(k) > STILL * most).collect();
-        for pair in walks.windows(2) {
+        for [before, after] in all.windows(2).filter_map(|pair| <&[Solved; 2]>::try_from(pair).ok()) {
             for &k in &moving {
-                let (before, after) = (pair[0].omega(k), pair[1].omega(k));
-                let turns_back = before * after < 0.0 || after == 0.0;
-                if let Some(found) =
-                    turns_back.then(|| pair[0].root(&pair[1], |walk| walk.omega(k))).flatten()
+                let rates = [before, after].map(|one| one.position.omega[k]);
+                if (rates[0] * rates[1] < 0.0 || rates[1] == 0.0)
+                    && let Some(found) = walk.root([before, after], |walk| walk.omega(k))
                 {
                     self.dead_centres.push(DeadCentre {
-                        drive: found.drive(),
+                        drive: found.drive,
                         name: self.name(k),
-                        value: found.position().phi[k],
-                        in_line: found.in_line(IN_LINE),
+                        value: found.phi[k],
+                        in_line: walk.in_line(IN_LINE),
                     });
                 }
             }
-            if let [Some(before), Some(after)] = [pair[0].orientation(), pair[1].orientation()]
-                && before * after < 0.0
-            {
+            if before.orientation.zip(after.orientation).is_some_and(|(before, after)| before * after < 0.0) {
                 let sign = |walk: &Walk| walk.orientation().unwrap_or(0.0);
-                self.change_points.extend(pair[0].root(&pair[1], sign).map(|found| found.drive()));
+                self.change_points.extend(walk.root([before, after], sign).map(|found| found.drive));
             }
         }
         let outputs = self.mechanism.outputs.clone();
@@ -231,8 +239,7 @@ impl Kinematics {
             .into_iter()
             .enumerate()
             .filter_map(|(column, (name, unit))| {
-                let [min, max] =
-                    [1.0, -1.0].map(|sign| walk::least(walks, &|walk| sign * walk.column(column)));
+                let [min, max] = [1.0, -1.0].map(|sign| walk.least(all, column, sign));
                 let (min, max) = (min?, max?);
                 Some(Range { name, unit, min, max: [-max[0], max[1]] })
             })

@@ -182,7 +182,7 @@ impl<W: Write> Table<W> {
         for row in numbers.chunks_exact(self.width) {
             let buffer = &mut self.buffer;
             for &value in row {
-                put(buffer, value);
+                put_number(buffer, value);
             }
             if let Some(last) = buffer.last_mut() {
                 *last = b'\n';
@@ -207,7 +207,7 @@ impl<W: Write> Table<W> {
 
 /// Appends a number and a comma: the shortest digits that read back to the same double, laid out as Rust's
 /// `{:?}` does.
-fn put(buffer: &mut Vec<u8>, value: f64) {
+pub(crate) fn put_number(buffer: &mut Vec<u8>, value: f64) {
     let mut digits = zmij::Buffer::new();
     let text = digits.format(value).as_bytes();
     let size = value.abs();
@@ -236,7 +236,7 @@ mod tests {
 
     fn written(value: f64) -> String {
         let mut buffer = Vec::new();
-        put(&mut buffer, value);
+        put_number(&mut buffer, value);
         assert_eq!(buffer.pop(), Some(b','));
         String::from_utf8(buffer).expect("ASCII")
     }

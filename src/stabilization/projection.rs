@@ -156,6 +156,11 @@ where
             let _ = projector.project(problem.mechanism(), inside, self.tolerance);
         }
     }
+
+    /// Without projection.
+    fn interpolate_roughly(&mut self, problem: &mut P, from: &State, time: Time, inside: &mut State) {
+        self.inner.interpolate_roughly(problem, from, time, inside);
+    }
 }
 
 /// What to try where constraints cannot be met.

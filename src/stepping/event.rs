@@ -284,7 +284,7 @@ impl Search {
             row.extend(opaque.iter().map(|&event| gaps[event]));
         };
         // What stays that far from zero need not be known better.
-        let is_enough = |curve: &Chebyshev| {
+        let is_enough = |_: usize, curve: &Chebyshev| {
             curve.tail() <= RESOLVED * curve.most() || curve.least() > 10.0 * curve.tail()
         };
         let curves = interpolated(&DEGREES, at, is_enough).curves;

@@ -98,6 +98,8 @@ pub struct Explicit<P> {
     /// Length of the last step \[s\], and whether the stages of its interpolation are there.
     length: f64,
     has_extra: bool,
+    /// Coefficients of that interpolation, for each unknown, where it was asked for.
+    nested: Vec<[f64; NESTED]>,
     /// What makes shorter steps where the interpolation is too coarse.
     shorter: Option<Box<Self>>,
     pair: PhantomData<P>,
@@ -132,6 +134,7 @@ impl<P: Pair> Explicit<P> {
             rate: Rate::Unknown,
             length: 0.0,
             has_extra: false,
+            nested: Vec::new(),
             shorter: None,
             pair: PhantomData,
         }
@@ -154,6 +157,7 @@ impl<P: Pair> Explicit<P> {
     ) {
         let n = state.y.len();
         self.has_extra = false;
+        self.nested.clear();
         for (i, row) in P::A.iter().enumerate() {
             combine(&state.y, h, row, &self.k, &mut self.stage);
             let (_, rest) = self.k.split_at_mut((i + 1) * n);
@@ -225,6 +229,38 @@ impl<P: Pair> Explicit<P> {
             field.rhs(state.time + c * h, stage, &mut k[number * n..(number + 1) * n]);
             statistics.evaluations += 1;
         });
+    }
+
+    /// Writes the interpolation of the step just made, whose stages beside those of the step are evaluated the
+    /// first time; returns what it may be off, over the tolerance.
+    fn interpolate_last<F: OdeSystem + ?Sized>(
+        &mut self,
+        field: &mut F,
+        from: &State,
+        time: Time,
+        inside: &mut State,
+    ) -> f64 {
+        let n = from.y.len();
+        if !self.has_extra {
+            self.evaluate_extra_stages(field, from, self.length, &mut Statistics::default());
+        }
+        if self.nested.is_empty() {
+            for i in 0..n {
+                let change = (self.next[i] - from.y[i]) + (self.next_low[i] - from.low[i]);
+                self.nested.push(P::interpolate(self.length, change, &|stage| self.k[stage * n + i]));
+            }
+        }
+        inside.clone_from(from);
+        inside.memory.clear();
+        inside.time = time;
+        let share = (time - from.time).hi / self.length;
+        let (most, mut off) = (highest::<P>() * <Self as Stride<F>>::off(share), 0.0_f64);
+        for (i, nested) in self.nested.iter().enumerate() {
+            let change = share * nest(&nested[..P::DEGREE], share);
+            (inside.y[i], inside.low[i]) = two_sum(from.y[i], change + from.low[i]);
+            off = off.max(most * nested[P::DEGREE - 1].abs() / self.scale[i]);
+        }
+        off
     }
 
     /// Writes the end of a step of `h` from the beginning of the last one, where that is within the
@@ -392,27 +428,18 @@ impl<P: Pair, F: OdeSystem + ?Sized> Integrator<F> for Explicit<P> {
         true
     }
 
-    /// By the pair's own interpolation, whose stages beside those of the step are evaluated the first time.
+    /// By the pair's own interpolation, or a shorter step where that is too coarse.
     fn interpolate(&mut self, field: &mut F, from: &State, time: Time, inside: &mut State) {
-        let n = from.y.len();
-        if !self.has_extra {
-            self.evaluate_extra_stages(field, from, self.length, &mut Statistics::default());
-        }
-        inside.clone_from(from);
-        inside.memory.clear();
-        inside.time = time;
-        let share = (time - from.time).hi / self.length;
-        let (most, mut off) = (highest::<P>() * <Self as Stride<F>>::off(share), 0.0_f64);
-        for i in 0..n {
-            let change = (self.next[i] - from.y[i]) + (self.next_low[i] - from.low[i]);
-            let nested = P::interpolate(self.length, change, &|stage| self.k[stage * n + i]);
-            let change = share * nest(&nested[..P::DEGREE], share);
-            (inside.y[i], inside.low[i]) = two_sum(from.y[i], change + from.low[i]);
-            off = off.max(most * nested[P::DEGREE - 1].abs() / self.scale[i]);
-        }
+        let off = self.interpolate_last(field, from, time, inside);
         if off > 1.0 {
             self.step_inside(field, from, (time - from.time).hi, inside);
         }
+        inside.wrap();
+    }
+
+    /// By the pair's own interpolation alone.
+    fn interpolate_roughly(&mut self, field: &mut F, from: &State, time: Time, inside: &mut State) {
+        self.interpolate_last(field, from, time, inside);
         inside.wrap();
     }
 }

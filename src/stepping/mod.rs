@@ -15,6 +15,8 @@ mod event;
 pub mod explicit;
 #[doc(hidden)]
 pub mod gauss;
+#[doc(hidden)]
+pub mod interruption;
 mod linear;
 #[doc(hidden)]
 pub mod radau;
@@ -225,6 +227,13 @@ pub trait Integrator<P: ?Sized> {
     /// accuracy make a shorter step from `from`.  What writes nothing, as here, is given such a step by a
     /// run, where it is not [dense](Integrator::is_dense).
     fn interpolate(&mut self, _problem: &mut P, _from: &State, _time: Time, _inside: &mut State) {}
+
+    /// The same where a cheaper polynomial of nearly that accuracy serves, and constraints need not be kept as
+    /// well as at the step's end.
+    #[doc(hidden)]
+    fn interpolate_roughly(&mut self, problem: &mut P, from: &State, time: Time, inside: &mut State) {
+        self.interpolate(problem, from, time, inside);
+    }
 
     /// Called where the state was changed from outside at once: an impact, or a contact that begins or ends.
     /// Forgets all that depends on the motion before it: predictors, Jacobians, rates, the history of errors.

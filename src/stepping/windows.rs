@@ -21,7 +21,7 @@
 mod rows;
 
 use self::rows::{Rows, begin};
-use super::{Cause, Integrator, Statistics, StepError, Tolerance};
+use super::{Cause, Integrator, Statistics, StepError, Tolerance, interruption};
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{OdeSystem, State, Time};
 use nalgebra::{DVector, SVector};
@@ -84,10 +84,10 @@ impl<F: OdeSystem + ?Sized> Window<'_, F> {
         rate[self.n] = 1.0;
     }
 
-    /// Counts a row; true where it was the last that may be kept.
+    /// Counts a row; true where it was the last that may be kept, or nobody waits for more.
     fn is_full(&mut self) -> bool {
         self.rows = self.rows.saturating_sub(1);
-        self.rows == 0
+        self.rows == 0 || interruption::is_asked()
     }
 }
 
@@ -164,7 +164,7 @@ pub struct Stepper {
 /// What integrates one window: it, the unknowns, its length \[s\], the first step \[s\], and most steps.
 type Integrate<'a, F> = dyn FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome + 'a;
 
-/// The next step of a window, or the first of a new one.
+/// The next step of a window, or the first of a new one; nothing where that was interrupted.
 fn step<F: OdeSystem + ?Sized>(
     rows: &mut Rows,
     stepper: &Stepper,
@@ -178,8 +178,16 @@ fn step<F: OdeSystem + ?Sized>(
         if let Some(failure) = rows.failure.take().filter(|_| rows.until == until) {
             return Err(failure);
         }
-        rows.clear();
-        part(rows, stepper, integrate, field, state, until, statistics)?;
+        if Rows::recall(state, until).is_some() {
+            // It was interrupted while it was integrated again.
+            begin(rows, stepper, integrate, field, state, until)?;
+        } else {
+            rows.clear();
+            part(rows, stepper, integrate, field, state, until, statistics)?;
+        }
+        if !rows.has_more(until) {
+            return Ok(None);
+        }
     }
     rows.last += 1;
     rows.hand_out(state);
@@ -187,7 +195,8 @@ fn step<F: OdeSystem + ?Sized>(
     Ok(None)
 }
 
-/// One call of the crate: to `until`, or to where its rows are as many as may be kept.
+/// One call of the crate: to `until`, or to where its rows are as many as may be kept.  Where it is
+/// interrupted there are no rows, and nothing is counted.
 fn part<F: OdeSystem + ?Sized>(
     kept: &mut Rows,
     stepper: &Stepper,
@@ -208,6 +217,7 @@ fn part<F: OdeSystem + ?Sized>(
         what,
         hint: hint.into(),
     };
+    let before = *statistics;
     let mut rate = vec![0.0; n];
     field.rhs(state.time, &state.y, &mut rate);
     statistics.evaluations += 1;
@@ -247,6 +257,11 @@ fn part<F: OdeSystem + ?Sized>(
     };
     let reached_time = |x: f64| state.time.hi + x * time_unit;
     kept.failure = None;
+    if interruption::is_asked() {
+        *statistics = before;
+        kept.clear();
+        return Ok(());
+    }
     match outcome {
         Ok(stats) => {
             statistics.evaluations += u64::from(stats.num_eval);
@@ -311,7 +326,7 @@ fn shorter<F: OdeSystem + ?Sized>(
     inside.memory.push((time - from.time).hi);
     let mut rows = Rows::default();
     let outcome = part(&mut rows, stepper, integrate, field, inside, time, &mut Statistics::default());
-    if outcome.is_ok() && rows.failure.is_none() {
+    if outcome.is_ok() && rows.failure.is_none() && !rows.after.is_empty() {
         rows.last = rows.after.len() - 1;
         rows.hand_out(inside);
     }

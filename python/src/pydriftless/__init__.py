@@ -14,6 +14,7 @@ from ._report import Picture, Report
 from ._run import Columns, Event, Run, resume
 from ._scene import Scene, load, loads
 from ._sweep import Sweep
+from ._trace import State, Symbol, where
 
 __all__ = [
     "Builder",
@@ -27,11 +28,14 @@ __all__ = [
     "Run",
     "Scene",
     "SceneRefused",
+    "State",
     "Sweep",
+    "Symbol",
     "__version__",
     "ground",
     "load",
     "loads",
     "on",
     "resume",
+    "where",
 ]

@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 
 from . import _core
+from ._force import with_part
 from ._progress import progress_bar
 from ._report import Report, command, flags
 from ._run import Event, Run
 from ._sweep import Sweep, swept
+from ._trace import State
 
 
 class Scene:
@@ -84,6 +86,52 @@ class Scene:
         """The scene with further columns: ``scene.with_outputs("A.force", "half=M.power/2")``."""
         text, source, before, others = self._core.parts()
         return Scene(text, source, before, [*others, *outputs])
+
+    def with_force(
+        self, name: str, place: Mapping[str, Any], force: Callable[[State], tuple[Any, Any]]
+    ) -> Scene:
+        """The scene with a force written in Python.
+
+        The function is called once, with symbols; what it computes becomes a formula of the scene, with the
+        formula's speed and exactness in every method, in sweeps and after pickling.  It may use arithmetic,
+        numpy's functions and :func:`where`; it cannot ask for numbers or call what needs them.
+
+        Parameters
+        ----------
+        name : str
+            Name of the force.
+        place : dict
+            Where it acts: ``on("bar2", 0.6, 0)``.
+        force : callable
+            From the state to both components [N].
+
+        Examples
+        --------
+        >>> def drag(at):
+        ...     vx, vy = at.velocity("bar2", (0.6, 0))
+        ...     speed = np.hypot(vx, vy)
+        ...     return -0.01 * speed * vx, -0.01 * speed * vy
+        >>> scene.with_force("drag", on("bar2", 0.6, 0), drag)  # doctest: +SKIP
+        """
+        return with_part(self, "forces", name, force, place, "force")
+
+    def with_torque(self, name: str, body: str, torque: Callable[[State], Any]) -> Scene:
+        """The scene with a torque on a body [N·m]; see :meth:`with_force`."""
+        return with_part(self, "torques", name, torque, {"body": body}, "torque")
+
+    def with_spring(
+        self,
+        name: str,
+        first: Mapping[str, Any],
+        second: Mapping[str, Any],
+        tension: Callable[[Any, Any], Any],
+    ) -> Scene:
+        """The scene with a spring that pulls its ends together by a function of its length and rate [N]."""
+        return with_part(self, "springs", name, tension, {"between": [first, second]}, "tension")
+
+    def with_potential(self, name: str, energy: Callable[[State], Any]) -> Scene:
+        """The scene with a potential of angles and positions [J]; its gradient acts on the bodies."""
+        return with_part(self, "potentials", name, energy, {}, "energy")
 
     def run(
         self,
@@ -197,6 +245,7 @@ class Scene:
         to_flip: bool = False,
         shard: tuple[int, int] | None = None,
         progress: bool = False,
+        resume: bool = False,
         **options: Any,
     ) -> Sweep:
         """Run the scene over a grid or a list of points.
@@ -220,6 +269,9 @@ class Scene:
             End each point when a bar first turns over.
         shard : (int, int)
             Part I of N alone.
+        resume : bool
+            With ``to``: keep what is needed to go on after an interruption beside the file, and go on where it
+            is there.
         **options
             Those of :meth:`run`; ``trust`` is ``"off"`` by default.
         """
@@ -234,6 +286,7 @@ class Scene:
             to_flip=to_flip,
             shard=shard,
             progress=progress,
+            resume=resume,
             options=options,
         )
 

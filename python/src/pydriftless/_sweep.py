@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import csv
+import hashlib
 import json
-import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _core
+from ._files import written
 from ._progress import progress_bar
 
 if TYPE_CHECKING:
@@ -117,23 +117,34 @@ def swept(
     to_flip: bool,
     shard: tuple[int, int] | None,
     progress: bool,
+    resume: bool,
     options: dict[str, Any],
 ) -> Sweep:
     """See :meth:`Scene.sweep`."""
     axes, listed = _points(vary)
     total = len(listed[1]) if listed else int(np.prod([axis[3] for axis in axes], dtype=object))
     plan = {"axes": axes, "listed": listed, "to_flip": to_flip, "threads": threads, "options": options}
-    found: Iterable[Any]
-    if shard is not None:
-        found = [_part(scene, *_share(plan, shard))]
-    elif client is not None:
-        found = _submitted(scene, plan, client, parts or 4 * _workers(client), total, progress)
-    elif to is not None:
+    count = 1
+    if shard is None and client is not None:
+        count = max(1, min(parts or 4 * _workers(client), total))
+    elif shard is None and to is not None:
         count = -(-total // chunk)
-        found = (_part(scene, *_share(plan, (number, count))) for number in range(1, count + 1))
+
+    def found(after: int) -> Iterable[Any]:
+        """The parts that follow so many."""
+        if shard is not None:
+            return (_part(scene, *_share(plan, shard)) for _ in range(after, 1))
+        if client is not None:
+            return _submitted(scene, plan, client, range(after + 1, count + 1), count, total, progress)
+        if to is not None:
+            return (_part(scene, *_share(plan, (number, count))) for number in range(after + 1, count + 1))
+        return [_part(scene, plan, None, 0, progress_bar(progress, total, unit=" points"))]
+
+    if to is not None:
+        mark = _fingerprint(scene, plan, count, shard) if resume else None
+        sweep = written(found, to, mark)
     else:
-        found = [_part(scene, plan, None, 0, progress_bar(progress, total, unit=" points"))]
-    sweep = _written(found, to) if to is not None else _joined(list(found))
+        sweep = _joined(list(found(0)))
     if shard is None and not listed and to is None:
         sweep.grid = tuple(axis[3] for axis in axes)
     return sweep
@@ -179,20 +190,28 @@ def _part(scene: Scene, plan: dict[str, Any], shard: tuple[int, int] | None, fir
     return heads, rows, flips, status, [(first + index, cause) for index, cause in causes], report
 
 
-def _submitted(scene: Scene, plan: dict[str, Any], client: Any, parts: int, total: int, progress: bool) -> list[Any]:
-    """All parts by a client, in the order of the points."""
-    parts = max(1, min(parts, total))
+def _submitted(
+    scene: Scene, plan: dict[str, Any], client: Any, numbers: range, count: int, total: int, progress: bool
+) -> Iterator[Any]:
+    """Parts by a client, in the order of the points."""
     plan = {**plan, "threads": plan["threads"] or 1}
-    futures = [client.submit(_part, scene, *_share(plan, (number, parts))) for number in range(1, parts + 1)]
+    futures = [client.submit(_part, scene, *_share(plan, (number, count))) for number in numbers]
     bar = progress_bar(progress, total, unit=" points")
-    found = []
-    for number, future in enumerate(futures, start=1):
-        found.append(future.result())
+    for number, future in zip(numbers, futures):
+        yield future.result()
         if bar is not None:
-            bar.update(total * number // parts - bar.n)
+            bar.update(total * number // count - bar.n)
     if bar is not None:
         bar.close()
-    return found
+
+
+def _fingerprint(scene: Scene, plan: dict[str, Any], count: int, shard: Any) -> str:
+    """What a file must have been written by to be gone on with."""
+    listed = plan["listed"]
+    points = None if listed is None else (listed[0], hashlib.sha256(listed[1].tobytes()).hexdigest())
+    settings = {name: value for name, value in plan["options"].items() if value is not None}
+    text = repr((scene._core.parts(), plan["axes"], points, plan["to_flip"], settings, count, shard, _core.__version__))
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _workers(client: Any) -> int:
@@ -212,73 +231,3 @@ def _joined(found: list[Any]) -> Sweep:
     sweep.causes = {index: cause for part in found for index, cause in part[4]}
     sweep.report = json.loads(found[0][5])
     return sweep
-
-
-def _written(found: Iterable[Any], to: Any) -> Sweep:
-    """The parts as a file, one after the other; the numbers are not kept."""
-    path = os.fspath(to)
-    if not path.endswith((".csv", ".parquet")):
-        raise ValueError(f"{path}: the file ends in .csv or .parquet")
-    write = _Csv(path) if path.endswith(".csv") else _Parquet(path)
-    heads: list[str] = []
-    causes: dict[int, str] = {}
-    report = "{}"
-    with write:
-        for part in found:
-            if part is None:
-                continue
-            heads, report = part[0], part[5] if report == "{}" else report
-            causes.update(part[4])
-            write.part(part)
-    sweep = Sweep(heads, np.empty((0, len(heads))), np.empty(0, np.int32), np.empty(0, np.uint8))
-    sweep.causes, sweep.report = causes, json.loads(report)
-    return sweep
-
-
-class _Csv:
-    def __init__(self, path: str) -> None:
-        self._path = path
-
-    def __enter__(self) -> _Csv:
-        self._file = open(self._path, "w", newline="", encoding="utf-8")
-        self._writer = csv.writer(self._file, lineterminator="\n")
-        self._has_header = False
-        return self
-
-    def part(self, part: Any) -> None:
-        heads, rows, _, status, _, _ = part
-        if not self._has_header:
-            self._writer.writerow([*heads, "status"])
-            self._has_header = True
-        for row, state in zip(rows.tolist(), status):
-            numbers = ("" if math.isnan(number) else repr(number) for number in row)
-            self._writer.writerow([*numbers, STATUS[state]])
-
-    def __exit__(self, *_: object) -> None:
-        self._file.close()
-
-
-class _Parquet:
-    def __init__(self, path: str) -> None:
-        self._path = path
-        self._writer: Any = None
-
-    def __enter__(self) -> _Parquet:
-        return self
-
-    def part(self, part: Any) -> None:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        heads, rows, flips, status, _, _ = part
-        columns = {head: pa.array(np.ascontiguousarray(rows[:, k])) for k, head in enumerate(heads)}
-        columns["flip_bar"] = pa.array(flips)
-        columns["status"] = pa.array(status)
-        table = pa.table(columns)
-        if self._writer is None:
-            self._writer = pq.ParquetWriter(self._path, table.schema)
-        self._writer.write_table(table)
-
-    def __exit__(self, *_: object) -> None:
-        if self._writer is not None:
-            self._writer.close()

@@ -47,6 +47,11 @@ const CLEARLY: f64 = 1.25;
 const DISTINCT: f64 = 1e-4;
 /// What is left of a measured row, once those before it are taken off, counts as zero below this.
 const DEPENDENT: f64 = 1e-9;
+/// A search for other assemblies goes on where the squares of violations fall by this factor in a few
+/// iterations …
+const HOPEFUL: f64 = 4.0;
+/// … and is finished where what is left of them is below this \[rad, or levers\].
+const NEARLY: f64 = 1e-3;
 /// Up to so many coordinates redundant rows are told from singular ones, and rounding is spread over all that
 /// is given.
 const DENSE: usize = 100;
@@ -155,7 +160,8 @@ impl Mechanism {
         }];
         for k in 1..=guesses {
             let mut q = problem.other_guess(&start, &all, k);
-            if problem.closes(&mut q, &[]) {
+            if problem.descend(&mut q, &problem.active, &[], HOPEFUL) < NEARLY && problem.closes(&mut q, &[])
+            {
                 let other = Found { q, change: 0.0, distance: 0.0, held: Vec::new(), is_of_family: false };
                 if found.iter().all(|known| problem.differs(known, &other).is_some()) {
                     found.push(other);

@@ -20,6 +20,8 @@ use crate::dynamics::{Mechanism, Time};
 const NOISE: f64 = 1e-9;
 /// The longest step \[rad, or sizes of the mechanism\].
 const LONGEST: f64 = 0.5;
+/// So many iterations are given to make the violations smaller.
+const SLOW: usize = 4;
 /// A row that is left by this is kept \[rad, or levers\].
 pub const KEPT: f64 = 1e-13;
 
@@ -187,10 +189,21 @@ impl Problem<'_> {
 
     /// Brings the rows to zero as far as it goes, and returns what is left, measured.
     pub fn position(&self, q: &mut Vec<DoubleDouble>, rows: &[bool], held: &[bool]) -> f64 {
+        self.descend(q, rows, held, 0.0)
+    }
+
+    /// The same, given up where [`SLOW`] iterations do not make the sum of squares smaller by a factor: on the
+    /// way to a minimum that is not zero, where steps are many and lead nowhere.
+    pub fn descend(&self, q: &mut Vec<DoubleDouble>, rows: &[bool], held: &[bool], factor: f64) -> f64 {
         let columns = self.columns(held);
         let (mut left, mut matrix) = self.equations::<f64>(q, rows, held, &columns);
-        for _ in 0..100 {
+        let mut before = [f64::INFINITY; SLOW];
+        for iteration in 0..100 {
             if largest(&left) < 1e-15 || columns.is_empty() {
+                break;
+            }
+            let sum = squares(&left);
+            if std::mem::replace(&mut before[iteration % SLOW], sum) < factor * sum {
                 break;
             }
             let mut step = matrix.solver(NOISE).solve(&left);

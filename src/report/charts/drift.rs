@@ -26,13 +26,16 @@ pub fn drifts(outcomes: &[&Outcome]) -> bool {
 /// # Errors
 /// Drawing fails.
 pub fn overlay(scene: &Scene, mechanism: &Mechanism, outcomes: &[&Outcome]) -> Result<Picture, ChartError> {
+    let moving: Vec<usize> = (0..mechanism.constraints.len())
+        .filter(|&r| outcomes.iter().any(|outcome| is_off(outcome, r)))
+        .collect();
     let panel = |unit: &str, level: usize| ResidualPanel {
         name: defect_name(level, unit),
         series: (outcomes.iter())
             .flat_map(|outcome| {
                 let kind = outcome.plan.stabilization.to_string();
                 (outcome.drift.constraints.iter().enumerate())
-                    .filter(|(r, _)| mechanism.constraints[*r].unit() == unit)
+                    .filter(|(r, _)| moving.contains(r) && mechanism.constraints[*r].unit() == unit)
                     .map(move |(r, (constraint, _))| {
                         let several = outcome.drift.constraints.len() > 1;
                         let name =
@@ -47,11 +50,28 @@ pub fn overlay(scene: &Scene, mechanism: &Mechanism, outcomes: &[&Outcome]) -> R
     settings.dedup();
     let chart = ConstraintDrift {
         title: format!("Constraint drift under {} stabilizations", outcomes.len()),
-        caption: std::iter::once(format!("scene {}", plain(&scene.name))).chain(settings).collect(),
-        panels: units(mechanism).into_iter().flat_map(|unit| [panel(unit, 0), panel(unit, 1)]).collect(),
+        caption: std::iter::once(format!("scene {}", plain(&scene.name)))
+            .chain(settings)
+            .chain(exactly_kept(mechanism, &moving))
+            .collect(),
+        panels: (units(mechanism).into_iter().flat_map(|unit| [panel(unit, 0), panel(unit, 1)]))
+            .filter(|panel| !panel.series.is_empty())
+            .collect(),
         log_time: outcomes.iter().any(|outcome| is_long(&outcome.drift.energy)),
     };
     chart::constraint_drift(&chart, FILE_RESOLUTION)
+}
+
+/// Whether a constraint was off at all in a run.
+fn is_off(outcome: &Outcome, r: usize) -> bool {
+    outcome.drift.constraints.get(r).is_some_and(|(_, levels)| levels.iter().any(|level| level.max > 0.0))
+}
+
+/// Names the constraints that are not drawn, as they are not among those that were off.
+fn exactly_kept(mechanism: &Mechanism, off: &[usize]) -> Option<String> {
+    let kept = mechanism.constraints.iter().enumerate().filter(|(r, _)| !off.contains(r));
+    let names: Vec<String> = kept.map(|(_, row)| plain(row.name())).collect();
+    (!names.is_empty()).then(|| format!("kept exactly: {}", names.join(", ")))
 }
 
 /// The units of the constraints, each with a row of panels.
@@ -87,16 +107,18 @@ impl Finished<'_> {
         }
     }
 
+    /// The constraints that are off at all; those kept exactly are named in the caption.
     pub fn constraint_drift(&self) -> ConstraintDrift {
         let Outcome { plan, drift, .. } = self.outcome;
+        let off: Vec<usize> = (0..drift.constraints.len()).filter(|&r| is_off(self.outcome, r)).collect();
         let of = |unit: &'static str| {
-            (drift.constraints.iter().enumerate())
-                .filter(move |(r, _)| self.mechanism.constraints[*r].unit() == unit)
+            off.iter().copied().filter(move |&r| self.mechanism.constraints[r].unit() == unit)
         };
         let panel = |unit: &'static str, level: usize| ResidualPanel {
             name: defect_name(level, unit),
             series: of(unit)
-                .map(|(r, (constraint, _))| {
+                .map(|r| {
+                    let constraint = &drift.constraints[r].0;
                     let method = if drift.constraints.len() == 1 {
                         plan.stabilization.to_string()
                     } else {
@@ -106,24 +128,18 @@ impl Finished<'_> {
                 })
                 .collect(),
         };
-        let units = units(self.mechanism);
-        let most =
-            |unit: &'static str| of(unit).map(|(_, (_, [position, _]))| position.max).fold(0.0, f64::max);
-        let kept = if units.iter().all(|unit| most(unit) == 0.0) {
+        let mut units = units(self.mechanism);
+        units.retain(|unit| of(unit).next().is_some());
+        let most = |unit: &'static str| of(unit).map(|r| drift.constraints[r].1[0].max).fold(0.0, f64::max);
+        let kept: Vec<String> = units.iter().map(|unit| format!("{} {unit}", power(most(unit)))).collect();
+        let kept = if kept.is_empty() {
             "are kept exactly".to_owned()
         } else {
-            format!(
-                "keep to {}",
-                units
-                    .iter()
-                    .map(|unit| format!("{} {unit}", power(most(unit))))
-                    .collect::<Vec<_>>()
-                    .join(" and ")
-            )
+            format!("keep to {}", kept.join(" and "))
         };
         ConstraintDrift {
             title: format!("Constraints {kept} over {} s", figure(self.outcome.last.t)),
-            caption: self.caption(None),
+            caption: self.caption(exactly_kept(self.mechanism, &off)),
             panels: units.into_iter().flat_map(|unit| [panel(unit, 0), panel(unit, 1)]).collect(),
             log_time: is_long(&drift.energy),
         }

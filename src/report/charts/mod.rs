@@ -13,6 +13,7 @@ use crate::chart::{
 };
 use crate::dynamics::Mechanism;
 use crate::dynamics::constraint::ConstraintEquation;
+use crate::dynamics::forest::BodyOrigin;
 use crate::report::curves::{furthest, is_coarse, smoothed, span};
 use crate::report::drawing::Drawing;
 use crate::report::page::{figure, rough};
@@ -61,17 +62,31 @@ impl Chart {
     }
 }
 
-/// The charts a run has something to show in: none of constraints that are kept exactly, none of torques
-/// without motors.
+/// The charts a run has something to show in: none of angles and positions where nothing moves, none of
+/// constraints that are kept exactly, none of torques without motors.
 pub fn wanted(mechanism: &Mechanism, outcome: &Outcome) -> Vec<Chart> {
     let driven = mechanism.constraints.iter().any(ConstraintEquation::is_motor);
     let has = |chart: &Chart| match chart {
-        Chart::Mechanism | Chart::Angles | Chart::EnergyDrift => true,
+        Chart::Mechanism | Chart::EnergyDrift => true,
+        Chart::Angles => moves(mechanism, outcome),
         Chart::ConstraintDrift => drifts(&[outcome]),
         Chart::TorquePower => driven,
         Chart::Outputs => mechanism.outputs.is_some(),
     };
     Chart::ALL.into_iter().filter(has).collect()
+}
+
+/// Whether any coordinate of the scene's own bodies changes.
+fn moves(mechanism: &Mechanism, outcome: &Outcome) -> bool {
+    let trace = &outcome.trace;
+    let all = || trace.whole.iter().chain(&trace.head).chain(&trace.part);
+    let spread = |k: usize| {
+        let values = || all().map(|sample| sample.phi[k]);
+        values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+    };
+    let own = 0..mechanism.own_bodies().len();
+    // NaN moves as well: what it is a sign of is to be seen.
+    own.chain(mechanism.bodies.len()..mechanism.coordinates()).any(|k| !(spread(k) <= STILL))
 }
 
 /// Draws one chart.
@@ -279,17 +294,20 @@ impl Finished<'_> {
         let mut caption = self.caption(more);
         caption.extend(past);
         let travels: Vec<AngleSeries> = travels.collect();
+        let positions = if travels.is_empty() { self.positions(&smooth) } else { Vec::new() };
         // A body that keeps its angle is told in a line where others move.
-        let series = if moving.is_empty() && travels.is_empty() {
+        let series = if moving.is_empty() && travels.is_empty() && positions.is_empty() {
             still
         } else {
             let names: Vec<&str> = still.iter().map(|series| series.name.as_str()).collect();
             caption.extend((!names.is_empty()).then(|| format!("at a constant angle: {}", names.join(", "))));
             moving
         };
-        let title = match (series.is_empty(), travels.is_empty()) {
-            (true, false) => "Travel of the sliders",
-            (false, false) => "Angles of the bars, travel of the sliders",
+        let title = match (series.is_empty(), travels.is_empty(), positions.is_empty()) {
+            (true, false, _) => "Travel of the sliders",
+            (false, false, _) => "Angles of the bars, travel of the sliders",
+            (true, _, false) => "Positions of the bars",
+            (false, _, false) => "Angles and positions of the bars",
             _ => "Angles of the bars",
         };
         Angles {
@@ -298,7 +316,26 @@ impl Finished<'_> {
             time: smooth.iter().map(|(t, _)| *t).collect(),
             series,
             travels,
+            positions,
             horizon,
         }
+    }
+
+    /// The origins of bodies on floating bases, those that move.
+    fn positions(&self, smooth: &[(f64, Vec<f64>)]) -> Vec<AngleSeries> {
+        let own = 0..self.mechanism.own_bodies().len();
+        let floating = own.filter_map(|body| match self.mechanism.forest.hangs[body].origin_point {
+            BodyOrigin::Free(x) => Some((body, x)),
+            _ => None,
+        });
+        let both = floating.flat_map(|(body, x)| {
+            ["x", "y"].into_iter().zip([x, x + 1]).map(move |(axis, k)| (body, axis, k))
+        });
+        both.map(|(body, axis, k)| AngleSeries {
+            name: format!("{}.{axis}", plain(&self.mechanism.bodies[body].name)),
+            angle: smooth.iter().map(|(_, phi)| phi[k]).collect(),
+        })
+        .filter(|series| series.spread() > STILL)
+        .collect()
     }
 }

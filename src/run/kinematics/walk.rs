@@ -25,6 +25,18 @@ const NEARLY_IN_LINE: f64 = 1e-2;
 /// Up to so many coordinates the sign of det G is watched.
 const WATCHED: usize = 40;
 
+/// A position that was solved, from which others can be: nothing of the scratch space that solved it.
+#[derive(Clone)]
+pub(super) struct Solved {
+    state: State,
+    /// The largest rate there was up to it.
+    usual: f64,
+    /// See [`Walk::orientation`].
+    pub orientation: Option<f64>,
+    /// All there is to know of it.
+    pub position: Position,
+}
+
 /// A mechanism at a value of its drive.
 #[derive(Clone)]
 pub(super) struct Walk {
@@ -32,6 +44,9 @@ pub(super) struct Walk {
     kernel: Kernel<f64>,
     state: State,
     alpha: Vec<f64>,
+    /// State and accelerations before a step, and what it predicts.
+    before: (State, Vec<f64>),
+    predicted: Vec<f64>,
     row: usize,
     /// The drive's value at t = 0, and its rate.
     law: [f64; 2],
@@ -40,6 +55,21 @@ pub(super) struct Walk {
     lines: Vec<Transmission>,
     /// The largest rate there was.
     usual: f64,
+}
+
+impl Solved {
+    /// True where all of it is as at another position, whole turns apart.
+    pub fn is_as(&self, other: &Self, mechanism: &Mechanism) -> bool {
+        let (bodies, turn) = (mechanism.bodies.len(), std::f64::consts::TAU);
+        (self.position.phi.iter().zip(&other.position.phi)).enumerate().all(|(k, (a, b))| {
+            let apart = a - b;
+            if k < bodies {
+                (apart - turn * (apart / turn).round()).abs() < 1e-9
+            } else {
+                apart.abs() < 1e-9 * mechanism.units.length
+            }
+        })
+    }
 }
 
 impl Walk {
@@ -60,6 +90,8 @@ impl Walk {
         let mut walk = Self {
             mechanism: Arc::clone(mechanism),
             kernel: Kernel::new(mechanism),
+            before: (state.clone(), vec![0.0; n]),
+            predicted: vec![0.0; n],
             state,
             alpha: vec![0.0; n],
             row,
@@ -73,15 +105,21 @@ impl Walk {
         Ok(walk)
     }
 
-    /// Solves the rows at both levels, then accelerations and multipliers.
-    fn settle(&mut self) -> Result<(), (String, f64)> {
+    /// Accelerations and multipliers of the state.
+    fn accelerate(&mut self) {
         let (mechanism, n) = (&*self.mechanism, self.alpha.len());
-        project(mechanism, &mut self.kernel, &mut self.state, KEPT)?;
-        // Projected again, rates answer for the positions found.
         let (phi, omega) = (&self.state.y[..n], &self.state.y[n..2 * n]);
         self.kernel.accelerate::<0>(mechanism, self.state.time, phi, omega, Bias::default());
         mechanism.spread_multipliers(&mut self.kernel);
         self.alpha.copy_from_slice(&self.kernel.load);
+    }
+
+    /// Solves the rows at both levels, then accelerations and multipliers.
+    fn settle(&mut self) -> Result<(), (String, f64)> {
+        project(&self.mechanism, &mut self.kernel, &mut self.state, KEPT)?;
+        // Projected again, rates answer for the positions found.
+        self.accelerate();
+        let mechanism = &*self.mechanism;
         if let Some(r) = (0..mechanism.constraints.len()).find(|&r| self.kernel.is_left_out(r)) {
             let violation = self.kernel.rows[r].position.abs();
             if violation > 1e-9 * mechanism.units.length || self.alpha.iter().any(|a| !a.is_finite()) {
@@ -106,29 +144,55 @@ impl Walk {
 
     /// Coordinate `k` with its turns.
     fn coordinate(&self, k: usize) -> f64 {
-        let turns = self.state.turns.get(k).map_or(0.0, |&turns| turns as f64);
-        self.state.unknown(k).hi + std::f64::consts::TAU * turns
+        coordinate(&self.state, k)
     }
 
-    /// The step from here to another time, if the solution there is on this branch for certain.
-    fn stepped(&self, t: f64) -> Option<Self> {
+    /// What another walk can go on from.
+    pub fn solved(&self) -> Solved {
+        let (orientation, position) = (self.orientation(), self.position());
+        Solved { state: self.state.clone(), usual: self.usual, orientation, position }
+    }
+
+    /// Back to a position.
+    fn restore(&mut self, there: &Solved) {
+        self.state.clone_from(&there.state);
+        self.usual = there.usual;
+        self.accelerate();
+    }
+
+    /// Steps to another time; false, and still here, where the solution there is not on this branch for
+    /// certain.
+    fn step(&mut self, t: f64) -> bool {
         let (n, h) = (self.alpha.len(), t - self.state.time.hi);
-        let mut there = self.clone();
-        there.state.time = Time::of(t);
+        self.before.0.clone_from(&self.state);
+        self.before.1.copy_from_slice(&self.alpha);
+        self.state.time = Time::of(t);
         for k in 0..n {
             let (omega, alpha) = (self.state.y[n + k], self.alpha[k]);
-            there.state.y[k] += h * (omega + 0.5 * h * alpha);
-            there.state.y[n + k] += h * alpha;
+            self.state.y[k] += h * (omega + 0.5 * h * alpha);
+            self.state.y[n + k] += h * alpha;
         }
-        there.state.low.fill(0.0);
-        let predicted: Vec<f64> = (0..n).map(|k| there.coordinate(k)).collect();
-        there.settle().ok()?;
+        self.state.low.fill(0.0);
+        for k in 0..n {
+            self.predicted[k] = self.coordinate(k);
+        }
+        if self.settle().is_ok() && self.is_as_predicted() {
+            return true;
+        }
+        self.state.clone_from(&self.before.0);
+        self.accelerate();
+        false
+    }
+
+    /// True where the solution is near what was predicted.
+    fn is_as_predicted(&self) -> bool {
         let (mut apart, mut way) = (0.0_f64, 0.0_f64);
-        for (k, predicted) in predicted.iter().enumerate() {
-            apart = apart.max((there.coordinate(k) - predicted).abs() / self.size(k));
-            way = way.max((there.coordinate(k) - self.coordinate(k)).abs() / self.size(k));
+        for (k, predicted) in self.predicted.iter().enumerate() {
+            let (here, size) = (self.coordinate(k), self.size(k));
+            apart = apart.max((here - predicted).abs() / size);
+            way = way.max((here - coordinate(&self.before.0, k)).abs() / size);
         }
-        (apart <= APART[0] && apart <= APART[1] * way + 1e-12).then_some(there)
+        apart <= APART[0] && apart <= APART[1] * way + 1e-12
     }
 
     /// Goes to a time, in smaller steps where it must.
@@ -142,14 +206,14 @@ impl Walk {
         while self.state.time.hi != to {
             let left = to - self.state.time.hi;
             let next = if step.abs() >= left.abs() { to } else { self.state.time.hi + step };
-            match self.stepped(next) {
-                Some(there) => {
-                    ends.extend(self.end());
-                    *self = there;
-                    step *= 2.0;
-                }
-                None if step.abs() <= smallest => return Err(self.limit(&ends)),
-                None => step = 0.5 * (next - self.state.time.hi),
+            let end = self.end();
+            if self.step(next) {
+                ends.extend(end);
+                step *= 2.0;
+            } else if step.abs() <= smallest {
+                return Err(self.limit(&ends));
+            } else {
+                step = 0.5 * (next - self.state.time.hi);
             }
         }
         self.usual = self.usual.max(self.fastest());
@@ -184,12 +248,16 @@ impl Walk {
         Limit { drive: self.law[0] + self.law[1] * t, in_line: self.in_line(NEARLY_IN_LINE), is_fold }
     }
 
-    /// Where a function passes zero between here and another position.
-    pub fn root(&self, other: &Self, of: impl Fn(&Self) -> f64) -> Option<Self> {
-        let (mut below, mut above) = (self.clone(), other.clone());
-        let (mut low, mut high) = (of(&below), of(&above));
+    /// Where a function passes zero between two positions; this then stands there.
+    pub fn root(&mut self, [from, to]: [&Solved; 2], of: impl Fn(&Self) -> f64) -> Option<Position> {
+        let (mut below, mut above) = (from.clone(), to.clone());
+        let value = |walk: &mut Self, at: &Solved| {
+            walk.restore(at);
+            of(walk)
+        };
+        let (mut low, mut high) = (value(self, &below), value(self, &above));
         if high == 0.0 {
-            return Some(above);
+            return Some(above.position);
         }
         let mut side = 0;
         for _ in 0..120 {
@@ -204,12 +272,13 @@ impl Walk {
             } else {
                 share.clamp(1e-9, 1.0 - 1e-9)
             };
-            let mut middle = below.clone();
-            middle.go(a + share * (b - a)).ok()?;
-            let value = of(&middle);
+            self.restore(&below);
+            self.go(a + share * (b - a)).ok()?;
+            let value = of(self);
             if value == 0.0 {
-                return Some(middle);
+                return Some(self.position());
             }
+            let middle = self.solved();
             if value * low > 0.0 {
                 (below, low, high) = (middle, value, if side > 0 { 0.5 * high } else { high });
                 side = side.max(0) + 1;
@@ -218,7 +287,45 @@ impl Walk {
                 side = side.min(0) - 1;
             }
         }
-        Some(below)
+        self.restore(&below);
+        Some(below.position)
+    }
+
+    /// The least value of a column, times a sign, over positions and between them, and the drive's value
+    /// there; nothing where it has none.
+    pub fn least(&mut self, all: &[Solved], column: usize, sign: f64) -> Option<[f64; 2]> {
+        let value = |k: usize| sign * all[k].position.column(column);
+        let finite = (0..all.len()).filter(|&k| value(k).is_finite());
+        let best = finite.min_by(|&a, &b| value(a).total_cmp(&value(b)))?;
+        let mut found = [value(best), all[best].position.drive];
+        let (from, to) = (&all[best.saturating_sub(1)], &all[(best + 1).min(all.len() - 1)]);
+        let (mut a, mut b) = (from.state.time.hi, to.state.time.hi);
+        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+        let mut at = |t: f64| {
+            self.restore(from);
+            self.go(t).ok().map(|()| (sign * self.column(column), self.drive()))
+        };
+        let (mut left, mut right) = (b - golden * (b - a), a + golden * (b - a));
+        let (Some(mut low), Some(mut high)) = (at(left), at(right)) else { return Some(found) };
+        for _ in 0..40 {
+            if low.0 < high.0 {
+                (b, right, high) = (right, left, low);
+                left = b - golden * (b - a);
+                let Some(next) = at(left) else { break };
+                low = next;
+            } else {
+                (a, left, low) = (left, right, high);
+                right = a + golden * (b - a);
+                let Some(next) = at(right) else { break };
+                high = next;
+            }
+            for (value, drive) in [low, high] {
+                if value < found[0] {
+                    found = [value, drive];
+                }
+            }
+        }
+        Some(found)
     }
 
     /// The drive's value.
@@ -229,17 +336,6 @@ impl Walk {
     /// Rate of a coordinate \[rad/s or m/s\].
     pub fn omega(&self, k: usize) -> f64 {
         self.state.y[self.alpha.len() + k]
-    }
-
-    /// True where all of it is as at another position, whole turns apart.
-    pub fn is_as(&self, other: &Self) -> bool {
-        (0..self.alpha.len()).all(|k| {
-            let apart = self.coordinate(k) - other.coordinate(k);
-            let turns = std::f64::consts::TAU;
-            let apart =
-                if k < self.mechanism.bodies.len() { apart - turns * (apart / turns).round() } else { apart };
-            apart.abs() < 1e-9 * self.size(k)
-        })
     }
 
     /// The sign of det G, as a number; none where G is not square.
@@ -311,39 +407,8 @@ impl Walk {
     }
 }
 
-/// The least value of a function over positions and between them, and the drive's value there.
-pub(super) fn least(walks: &[Walk], of: &dyn Fn(&Walk) -> f64) -> Option<[f64; 2]> {
-    let values: Vec<f64> = walks.iter().map(of).collect();
-    let best = (0..values.len())
-        .filter(|&k| values[k].is_finite())
-        .min_by(|&a, &b| values[a].total_cmp(&values[b]))?;
-    let mut found = [values[best], walks[best].drive()];
-    let (from, to) = (&walks[best.saturating_sub(1)], &walks[(best + 1).min(walks.len() - 1)]);
-    let (mut a, mut b) = (from.state.time.hi, to.state.time.hi);
-    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-    let at = |t: f64| {
-        let mut walk = from.clone();
-        walk.go(t).ok().map(|()| (of(&walk), walk.drive()))
-    };
-    let (mut left, mut right) = (b - golden * (b - a), a + golden * (b - a));
-    let (Some(mut low), Some(mut high)) = (at(left), at(right)) else { return Some(found) };
-    for _ in 0..40 {
-        if low.0 < high.0 {
-            (b, right, high) = (right, left, low);
-            left = b - golden * (b - a);
-            let Some(next) = at(left) else { break };
-            low = next;
-        } else {
-            (a, left, low) = (left, right, high);
-            right = a + golden * (b - a);
-            let Some(next) = at(right) else { break };
-            high = next;
-        }
-        for (value, drive) in [low, high] {
-            if value < found[0] {
-                found = [value, drive];
-            }
-        }
-    }
-    Some(found)
+/// Coordinate `k` of a state with its turns.
+fn coordinate(state: &State, k: usize) -> f64 {
+    let turns = state.turns.get(k).map_or(0.0, |&turns| turns as f64);
+    state.unknown(k).hi + std::f64::consts::TAU * turns
 }

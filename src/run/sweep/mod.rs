@@ -73,6 +73,9 @@ pub struct Sweep {
     is_strict: bool,
     trust: Level,
     shard: Option<Shard>,
+    /// The points asked for, where these are not all of the grid or part.
+    within: Option<Range<u64>>,
+    stop: Option<Arc<AtomicBool>>,
     /// True where only starts are varied in which nothing else has a say: all points share one mechanism.
     shares: bool,
 }
@@ -235,6 +238,8 @@ impl Sweep {
             is_strict: false,
             trust: Level::Off,
             shard: None,
+            within: None,
+            stop: None,
             shares,
         })
     }
@@ -267,6 +272,21 @@ impl Sweep {
         Self { shard, ..self }
     }
 
+    /// The same for some of its points alone, which keep their numbers, values and results; those that are
+    /// not among them, or not of its part, are left out.
+    ///
+    /// Points are integrated several at a time where they can be, whatever the range: ranges of a few dozen
+    /// points and more lose nothing by it.
+    pub fn within(self, range: Range<u64>) -> Self {
+        Self { within: Some(range), ..self }
+    }
+
+    /// The same with a flag that ends it, and any other sweep that is given it, within a step of every point
+    /// under way: [`sweep`] then fails with [`Interrupted`](std::io::ErrorKind::Interrupted).
+    pub fn stopped_by(self, flag: Arc<AtomicBool>) -> Self {
+        Self { stop: Some(flag), ..self }
+    }
+
     /// The part of it that this is.
     pub fn shard(&self) -> Option<Shard> {
         self.shard
@@ -275,7 +295,20 @@ impl Sweep {
     /// The points to be run: all of the grid, or those of a part.
     pub fn range(&self) -> Range<u64> {
         let count = self.grid.count();
-        self.shard.map_or(0..count, |shard| shard.range(count))
+        let part = self.shard.map_or(0..count, |shard| shard.range(count));
+        let Some(within) = &self.within else { return part };
+        let start = within.start.clamp(part.start, part.end);
+        start..within.end.clamp(start, part.end)
+    }
+
+    /// # Errors
+    /// The flag is set.
+    fn check_stop(&self) -> std::io::Result<()> {
+        if self.is_stopped() { Err(std::io::ErrorKind::Interrupted.into()) } else { Ok(()) }
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.stop.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 
     /// How many points that are.
@@ -399,7 +432,8 @@ impl Shared<'_> {
         let finished = || {
             self.finished.fetch_add(1, Ordering::Relaxed);
         };
-        self.sweep.integrate(first..last, &finished, &|| self.is_over.load(Ordering::Relaxed))
+        let is_over = || self.is_over.load(Ordering::Relaxed) || self.sweep.is_stopped();
+        self.sweep.integrate(first..last, &finished, &is_over)
     }
 }
 
@@ -447,7 +481,9 @@ pub fn sweep_on(
     threads::integrate(&shared, threads, &mut sweep_observer)?;
     #[cfg(not(feature = "threads"))]
     for chunk in 0..shared.chunks() {
-        shared.integrate(chunk).iter().try_for_each(|point| sweep_observer.see(point))?;
+        let points = shared.integrate(chunk);
+        sweep.check_stop()?;
+        points.iter().try_for_each(|point| sweep_observer.see(point))?;
         sweep_observer.finished(shared.finished.load(Ordering::Relaxed))?;
     }
     sweep_observer.totals.wall = sweep_observer.before + begin.elapsed();

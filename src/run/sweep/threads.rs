@@ -60,6 +60,8 @@ pub(super) fn integrate(
                     Ok((chunk, Some(points))) => drop(waiting.insert(chunk, points)),
                     Err(RecvTimeoutError::Timeout) => {}
                 }
+                // What a chunk came to that was given up is not shown.
+                shared.sweep.check_stop()?;
                 while let Some(points) = waiting.remove(&seen) {
                     points.iter().try_for_each(|point| sweep_observer.see(point))?;
                     seen += 1;

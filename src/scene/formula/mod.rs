@@ -192,6 +192,9 @@ impl Formula {
     }
 
     fn run<S: Scalar>(&self, values: &[S], mut is_positive: impl FnMut(usize, S) -> bool) -> S {
+        if let [Node::Name(number)] = self.nodes[..] {
+            return values.get(number).copied().unwrap_or(S::ZERO);
+        }
         let mut results: Vec<S> = Vec::with_capacity(self.nodes.len());
         for &node in &self.nodes {
             let at = |node: usize| results[node];

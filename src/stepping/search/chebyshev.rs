@@ -2,13 +2,15 @@
 
 use super::{Curve, Part, ROUNDING};
 
+use std::sync::OnceLock;
+
 /// Interpolants of several functions on \[0, 1\], all of one degree.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Interpolants {
     /// Function by function.
     pub curves: Vec<Chebyshev>,
     /// Where their values were taken.
-    pub nodes: Nodes,
+    pub nodes: &'static Nodes,
     /// Their values there, function by function.
     pub values: Vec<Vec<f64>>,
     /// True where the last degree was enough.
@@ -20,50 +22,77 @@ pub struct Interpolants {
 pub struct Nodes {
     /// The places.
     pub places: Vec<f64>,
-    /// cos(π m / degree).
-    wave: Vec<f64>,
+    /// cos(π j k / degree), a row for each node j.
+    cosines: Vec<f64>,
+    /// What values at the places count in an integral from 0 to 1.
+    weights: Vec<f64>,
 }
+
+/// The largest degree of [`interpolated`].
+const LARGEST: usize = 64;
 
 impl Nodes {
     /// Those of a degree, at least 1.
-    pub fn new(degree: usize) -> Self {
+    pub(super) fn new(degree: usize) -> Self {
         let degree = degree.max(1);
         let cosine = |m: usize| libm::cos(std::f64::consts::PI * m as f64 / degree as f64);
         let wave: Vec<f64> = (0..2 * degree).map(cosine).collect();
-        Self { places: wave[..=degree].iter().map(|cosine| 0.5 + 0.5 * cosine).collect(), wave }
+        let all = || (0..=degree).flat_map(|j| (0..=degree).map(move |k| (j, k)));
+        let mut nodes = Self {
+            places: wave[..=degree].iter().map(|cosine| 0.5 + 0.5 * cosine).collect(),
+            cosines: all().map(|(j, k)| wave[(j * k) % (2 * degree)]).collect(),
+            weights: Vec::new(),
+        };
+        let unit = |j: usize| (0..=degree).map(|k| if j == k { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
+        nodes.weights = (0..=degree).map(|j| nodes.through(&unit(j)).integral()).collect();
+        nodes
+    }
+
+    /// Those of a degree up to [`LARGEST`], made when they are first asked for.
+    fn of(degree: usize) -> &'static Self {
+        static KNOWN: [OnceLock<Nodes>; LARGEST + 1] = [const { OnceLock::new() }; LARGEST + 1];
+        let degree = degree.clamp(1, LARGEST);
+        KNOWN[degree].get_or_init(|| Self::new(degree))
     }
 
     /// The interpolant of values at these places.
-    pub fn through(&self, values: &[f64]) -> Chebyshev {
+    fn through(&self, values: &[f64]) -> Chebyshev {
         let degree = self.places.len() - 1;
         let end = |k: usize| if k == 0 || k == degree { 0.5 } else { 1.0 };
-        let sum = |k: usize| {
-            values
-                .iter()
-                .enumerate()
-                .fold(0.0, |sum, (j, value)| sum + end(j) * value * self.wave[(j * k) % (2 * degree)])
-        };
-        let coefficients: Vec<f64> = (0..=degree).map(|k| 2.0 / degree as f64 * end(k) * sum(k)).collect();
+        let mut coefficients = vec![0.0; degree + 1];
+        for (j, (value, cosines)) in values.iter().zip(self.cosines.chunks_exact(degree + 1)).enumerate() {
+            let value = end(j) * value;
+            coefficients.iter_mut().zip(cosines).for_each(|(sum, cosine)| *sum += value * cosine);
+        }
+        coefficients.iter_mut().enumerate().for_each(|(k, sum)| *sum *= 2.0 / degree as f64 * end(k));
         let steep = |(k, c): (usize, &f64)| 4.0 * (k * k * (k * k - k.min(1))) as f64 / 3.0 * c.abs();
         let bend = coefficients.iter().enumerate().map(steep).sum();
         Chebyshev { coefficients, bend }
     }
+
+    /// The integral from 0 to 1 of the interpolant of values at these places.
+    pub fn integral(&self, values: impl Iterator<Item = f64>) -> f64 {
+        self.weights.iter().zip(values).fold(0.0, |sum, (weight, value)| sum + weight * value)
+    }
 }
 
-/// Interpolates functions by one of the `degrees` after the other, until a degree is enough for each of them.
+/// Interpolates functions by one of the `degrees`, at most [`LARGEST`], after the other, until a degree is
+/// enough for each of them, of which `is_enough` is given the number.
 ///
 /// `at` appends the value of each function at a place in \[0, 1\]; it is asked once about a place, of which each
 /// degree that is twice the one before has every other already.
 pub fn interpolated(
     degrees: &[usize],
     mut at: impl FnMut(f64, &mut Vec<f64>),
-    is_enough: impl Fn(&Chebyshev) -> bool,
+    is_enough: impl Fn(usize, &Chebyshev) -> bool,
 ) -> Interpolants {
-    let (mut found, mut row) = (Interpolants::default(), Vec::new());
+    let mut found =
+        Interpolants { curves: Vec::new(), nodes: Nodes::of(1), values: Vec::new(), is_resolved: false };
+    let mut row = Vec::new();
     for &degree in degrees {
         let before = std::mem::take(&mut found.values);
         let is_nested = before.first().is_some_and(|values| 2 * (values.len() - 1) == degree);
-        found.nodes = Nodes::new(degree);
+        found.nodes = Nodes::of(degree);
         for (j, &node) in found.nodes.places.iter().enumerate() {
             row.clear();
             if is_nested && j % 2 == 0 {
@@ -71,11 +100,11 @@ pub fn interpolated(
             } else {
                 at(node, &mut row);
             }
-            found.values.resize(row.len(), Vec::new());
+            found.values.resize_with(row.len(), || Vec::with_capacity(degree + 1));
             found.values.iter_mut().zip(&row).for_each(|(values, value)| values.push(*value));
         }
         found.curves = found.values.iter().map(|values| found.nodes.through(values)).collect();
-        found.is_resolved = found.curves.iter().all(&is_enough);
+        found.is_resolved = found.curves.iter().enumerate().all(|(k, curve)| is_enough(k, curve));
         if found.is_resolved {
             break;
         }
@@ -96,7 +125,10 @@ pub struct Chebyshev {
 impl Chebyshev {
     /// The interpolant of values at the nodes, two at least.
     pub fn through(values: &[f64]) -> Self {
-        Nodes::new(values.len().max(2) - 1).through(values)
+        match values.len().max(2) - 1 {
+            degree @ ..=LARGEST => Nodes::of(degree).through(values),
+            degree => Nodes::new(degree).through(values),
+        }
     }
 
     /// The least and the largest value it can have.

@@ -1,0 +1,20 @@
+//! Whether the process was asked to stop, for calls that cannot pause in between.
+//!
+//! Runs pause between steps where whoever runs them wants that.  The crate `ode_solvers` integrates a whole
+//! window in one call, which looks here instead; what it has done of the window is given up then, and done
+//! again where the run goes on.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, LazyLock};
+
+static FLAG: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
+
+/// The flag, to be set where the process is asked to stop, and taken down where it goes on.
+pub fn flag() -> &'static Arc<AtomicBool> {
+    &FLAG
+}
+
+/// True while it is set.
+pub fn is_asked() -> bool {
+    FLAG.load(Ordering::Relaxed)
+}
