@@ -286,7 +286,10 @@ fn kinematics_leaves_a_table_charts_and_a_record() {
     assert_eq!(record(&program, &format!("{folder}/kinematics.json"))["positions"], 37);
     program.run("kinematics crank_rocker.json --drive crank=-1..1 --chart-format svg --out s -q").exits(0);
     let chart = program.read("s/crank_rocker/kinematics-crank/kinematics.svg");
-    assert!(chart.contains("N·m") && chart.contains("from −1 to 1 rad"), "signs and units as in other charts");
+    assert!(
+        chart.contains("N·m") && chart.contains("from −1 to 1 rad"),
+        "signs and units as in other charts"
+    );
     // What is there is not overwritten unasked.
     program.run("kinematics crank_rocker.json").exits(6).says(&["--force"]);
     let swung = program.run("kinematics crank_rocker.json --drive rocker=0..3 --no-charts").exits(0);

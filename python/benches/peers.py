@@ -290,7 +290,7 @@ def heyoka_run(until, tolerance, system, start=(math.pi / 2, math.pi / 2, 0.0, 0
 
     make = lambda: hy.taylor_adaptive(system, list(start), tol=tolerance, **options)  # noqa: E731
     integrator, build = clocked(make)
-    _, took = clocked(lambda: integrator.propagate_until(until))
+    _, took = clocked(lambda: integrator.propagate_until(until, max_steps=10**7))
     return integrator, took, build
 
 
@@ -501,7 +501,7 @@ def pendulum_task(what, error, until, finest=16, every=None):
     return Task(
         what,
         error,
-        {"pydriftless": tenths(4, finest + 2), "SciPy": tenths(4, 13), "heyoka.py": tenths(4, finest), "exudyn": tenths(4, 13)},
+        {"pydriftless": tenths(6, finest + 2), "SciPy": tenths(6, 13), "heyoka.py": tenths(6, finest), "exudyn": tenths(6, 12)},
         {
             "pydriftless": own_ends("free", until),
             "SciPy": scipy_free(until),
@@ -524,7 +524,8 @@ def bound_task(what, error, ways, last=13):
         "pydriftless": [own],
         "exudyn": [exudyn_tree],
     }
-    return Task(what, error, {name: tenths(4, last if name != "SciPy" else 13) for name in ways}, ways, uses)
+    finest = {"SciPy": 13, "exudyn": 12}
+    return Task(what, error, {name: tenths(6, finest.get(name, last)) for name in ways}, ways, uses)
 
 
 TASKS = {

@@ -22,6 +22,10 @@ const RESOLVED: f64 = 1e-10;
 /// what the last coefficients may be there.
 const MARGIN: f64 = 1e-6;
 const PASSED: f64 = 1e-8;
+/// Swing up to which an output is constant, over its size.
+const CONSTANT: f64 = 1e-14;
+/// Steps until the next one is tried to be passed over, after one that was not.
+const WAITS: u8 = 3;
 /// Halvings of a step that no interpolant resolves: an output may have corners.
 const HALVINGS: u32 = 6;
 /// Halvings of the bracket of an extreme.
@@ -75,8 +79,11 @@ impl Found {
     /// True where a curve that is known well enough stays well between the extremes.
     fn holds(&self, curve: &Chebyshev) -> bool {
         let ([lowest, highest], size) = (curve.range(), curve.most());
-        let margin = MARGIN * size;
+        let is_constant = highest - lowest <= CONSTANT * size;
+        // The value of a constant is known to its last digits only.
+        let margin = if is_constant { -4.0 * CONSTANT } else { MARGIN } * size;
         curve.tail() <= PASSED * size && lowest - margin > self.min[0] && highest + margin < self.max[0]
+            || size == 0.0 && self.min[0] <= 0.0 && self.max[0] >= 0.0
     }
 
     /// Adds the integrals over a step of an interpolant and of its square.
@@ -102,6 +109,8 @@ pub(super) struct ExtremesMemory {
     /// Time looked at \[s\].
     span: DoubleDouble,
     found: Vec<Found>,
+    /// Steps that are not tried to be passed over, as one before them was not.
+    waits: u8,
 }
 
 /// Looks at the outputs of every step.
@@ -175,10 +184,15 @@ impl ExtremesDetector {
     /// True where no output comes near a new extreme, as the interpolants of a low degree tell, of which the
     /// means are taken then.
     fn passes(&mut self, inside: &mut dyn Inside, begin: Time, span: f64) -> bool {
+        if self.memory.waits > 0 {
+            self.memory.waits -= 1;
+            return false;
+        }
         let at = |share: f64, row: &mut Vec<f64>| self.values(inside.roughly_at(begin + share * span), row);
         let Interpolants { curves, nodes, values, .. } = interpolated(&DEGREES[..1], at, |_, _| true);
         let found = &mut self.memory.found;
         if !curves.iter().zip(&*found).all(|(curve, found)| found.holds(curve)) {
+            self.memory.waits = WAITS;
             return false;
         }
         self.memory.span += DoubleDouble::from(span);

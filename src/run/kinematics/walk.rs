@@ -44,8 +44,8 @@ pub(super) struct Walk {
     kernel: Kernel<f64>,
     state: State,
     alpha: Vec<f64>,
-    /// State and accelerations before a step, and what it predicts.
-    before: (State, Vec<f64>),
+    /// The state before a step, and what the step predicts.
+    before: State,
     predicted: Vec<f64>,
     row: usize,
     /// The drive's value at t = 0, and its rate.
@@ -90,7 +90,7 @@ impl Walk {
         let mut walk = Self {
             mechanism: Arc::clone(mechanism),
             kernel: Kernel::new(mechanism),
-            before: (state.clone(), vec![0.0; n]),
+            before: state.clone(),
             predicted: vec![0.0; n],
             state,
             alpha: vec![0.0; n],
@@ -164,8 +164,7 @@ impl Walk {
     /// certain.
     fn step(&mut self, t: f64) -> bool {
         let (n, h) = (self.alpha.len(), t - self.state.time.hi);
-        self.before.0.clone_from(&self.state);
-        self.before.1.copy_from_slice(&self.alpha);
+        self.before.clone_from(&self.state);
         self.state.time = Time::of(t);
         for k in 0..n {
             let (omega, alpha) = (self.state.y[n + k], self.alpha[k]);
@@ -179,7 +178,7 @@ impl Walk {
         if self.settle().is_ok() && self.is_as_predicted() {
             return true;
         }
-        self.state.clone_from(&self.before.0);
+        self.state.clone_from(&self.before);
         self.accelerate();
         false
     }
@@ -190,7 +189,7 @@ impl Walk {
         for (k, predicted) in self.predicted.iter().enumerate() {
             let (here, size) = (self.coordinate(k), self.size(k));
             apart = apart.max((here - predicted).abs() / size);
-            way = way.max((here - coordinate(&self.before.0, k)).abs() / size);
+            way = way.max((here - coordinate(&self.before, k)).abs() / size);
         }
         apart <= APART[0] && apart <= APART[1] * way + 1e-12
     }
