@@ -497,11 +497,16 @@ def tenths(first, last):
     return [10.0**-k for k in range(first, last + 1)]
 
 
-def pendulum_task(what, error, until, finest=16, every=None):
+def pendulum_task(what, error, until, finest=15, every=None):
     return Task(
         what,
         error,
-        {"pydriftless": tenths(6, finest + 2), "SciPy": tenths(6, 13), "heyoka.py": tenths(6, finest), "exudyn": tenths(6, 12)},
+        {
+            "pydriftless": tenths(6, finest + 2),
+            "SciPy": tenths(6, 13),
+            "heyoka.py": tenths(6, finest),
+            "exudyn": tenths(6, 12),
+        },
         {
             "pydriftless": own_ends("free", until),
             "SciPy": scipy_free(until),

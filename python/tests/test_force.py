@@ -50,7 +50,10 @@ def test_a_spring_is_the_built_in_one(scenes):
 
 
 def distance(at, first, second):
-    ends = [place["point"] if place["body"] == "ground" else at.position(place["body"], place["point"]) for place in (first, second)]
+    def end(place):
+        return place["point"] if place["body"] == "ground" else at.position(place["body"], place["point"])
+
+    ends = end(first), end(second)
     return np.hypot(ends[0][0] - ends[1][0], ends[0][1] - ends[1][1])
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ._trace import _NAME, State, named, written
@@ -43,4 +44,7 @@ def with_part(
         described["signals"] = {**described.get("signals", {}), **signals}
     if at.points:
         described["points"] = [*described.get("points", []), *at.points]
-    return type(scene)(json.dumps(described), source if source.startswith("<") else f"<{described['name']}>", before, outputs)
+    if not source.startswith("<"):
+        # Not the file any more, but beside it: files that a scene names count from its folder.
+        source = str(Path(source).with_name(f"{Path(source).stem} with {name}"))
+    return type(scene)(json.dumps(described), source, before, outputs)
