@@ -85,8 +85,9 @@ fn moves(mechanism: &Mechanism, outcome: &Outcome) -> bool {
         values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
     };
     let own = 0..mechanism.own_bodies().len();
-    // NaN moves as well: what it is a sign of is to be seen.
-    own.chain(mechanism.bodies.len()..mechanism.coordinates()).any(|k| !(spread(k) <= STILL))
+    // Of a run that stopped at once nothing is known.
+    trace.whole.len() < 2
+        || own.chain(mechanism.bodies.len()..mechanism.coordinates()).any(|k| spread(k) > STILL)
 }
 
 /// Draws one chart.
