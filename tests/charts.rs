@@ -137,6 +137,7 @@ fn gallery() -> Vec<(&'static str, Picture)> {
         time: time.clone(),
         series: (0..count).map(|k| AngleSeries { name: format!("bar {k}"), angle: wave(k) }).collect(),
         travels: Vec::new(),
+        positions: Vec::new(),
         horizon: None,
     };
     let energy = |log_time: bool| EnergyDrift {
