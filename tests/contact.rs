@@ -74,6 +74,8 @@ fn against(angle: f64, start: f64, restitution: f64) -> Scene {
         bar: 0,
         point: [1.0, 0.0],
         through: [0.0, 0.0],
+        on: None,
+        law: None,
         normal,
         restitution,
     });
@@ -89,6 +91,8 @@ fn on_a_floor(depth: f64, phi: [f64; 2], omega: [f64; 2]) -> Scene {
         bar: 1,
         point: [LENGTH, 0.0],
         through: [depth, 0.0],
+        on: None,
+        law: None,
         normal,
         restitution: 0.0,
     });

@@ -100,6 +100,8 @@ fn swinging(depth: f64) -> Scene {
         bar: 0,
         point: [1.0, 0.0],
         through: [0.0, 0.0],
+        on: None,
+        law: None,
         normal,
         restitution: 0.5,
     });

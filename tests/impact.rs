@@ -24,7 +24,16 @@ fn bouncing(angle: f64, start: f64, restitution: f64) -> Scene {
 
 fn wall(name: &str, angle: f64, restitution: f64) -> Wall {
     let normal = [-angle.sin(), angle.cos()];
-    Wall { name: name.into(), bar: 0, point: [1.0, 0.0], through: [0.0, 0.0], normal, restitution }
+    Wall {
+        name: name.into(),
+        bar: 0,
+        point: [1.0, 0.0],
+        on: None,
+        through: [0.0, 0.0],
+        normal,
+        law: None,
+        restitution,
+    }
 }
 
 /// The methods that locate impacts to all digits.

@@ -324,6 +324,8 @@ fn scenes_without_a_natural_form_are_refused_by_name() {
         bar: 1,
         point: [0.6, 0.0],
         through: [0.0, 0.0],
+        on: None,
+        law: None,
         normal: [1.0, 0.0],
         restitution: 0.5,
     };

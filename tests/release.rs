@@ -169,11 +169,14 @@ fn released_runs_end_in_the_same_bits_however_sampled_and_resumed() {
 }
 
 #[test]
-fn what_cannot_be_put_back_is_refused_with_its_place() {
+fn what_no_event_can_switch_is_refused_with_its_place() {
     let refused =
         |text: &str| driftless::scene::parse_scene(text, "test", &[]).expect_err("no scene").to_string();
-    let said = refused(&PENDULUM.replace(r#""off": ["A"]"#, r#""on": ["A"]"#));
-    assert!(said.contains("events[0].on[0]") && said.contains("spring"), "{said}");
-    let said = refused(&PENDULUM.replace(r#""off": ["A"]"#, r#""off": ["B"]"#));
-    assert!(said.contains("events[0].off[0]") && said.contains("hinge, motor"), "{said}");
+    for list in ["on", "off"] {
+        let said = refused(&PENDULUM.replace(r#""off": ["A"]"#, &format!(r#""{list}": ["B"]"#)));
+        assert!(
+            said.contains(&format!("events[0].{list}[0]")) && said.contains("hinge, motor, lock or wall"),
+            "{said}"
+        );
+    }
 }

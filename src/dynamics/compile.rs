@@ -7,7 +7,7 @@ use super::Motion;
 use super::assembly::{Assembly, Closest};
 use super::configuration::{Configuration, Values};
 use super::constraint::{self, ConstraintEquation, Measure, Site};
-use super::force::formula::Formulas;
+use super::force::formula::{Driven, Formulas};
 use super::force::{Action, Spring, Torsion, UserForce, Vibration};
 use super::forest::{BodyOrigin, Forest};
 use super::friction::{Friction, Mode, frictions};
@@ -22,8 +22,9 @@ use super::tree::Tree;
 use super::units::Units;
 use crate::arithmetic::Complex;
 use crate::scene::{Place, Scene};
+pub(super) use parts::along_wall;
 pub(super) use parts::travel_along;
-use parts::{actions, given_angles, joints, kept_angles, slide, travel};
+use parts::{actions, follows, give_aims, given_angles, joints, kept_angles, slide, travel};
 use std::sync::Arc;
 
 /// The largest number of coordinates for which the matrices of the tree are made; they hold n² numbers.
@@ -63,6 +64,8 @@ pub struct Mechanism {
     pub(crate) laws: Option<Laws>,
     /// What its runs write beside their own columns.
     pub(crate) outputs: Option<Arc<Outputs>>,
+    /// Parts that do not act at the start or that events switch.
+    pub(crate) switches: Switches,
     /// True where parts or branches that do not act at the moment do work: it is integrated all along.
     pub(crate) keeps_work: bool,
     /// The mechanism with the parts that do not act at the start, and their names; where there are any.
@@ -95,6 +98,15 @@ pub struct Mechanism {
     pub assembly: Assembly,
     /// The constants of the recursive form, where that is the one evaluated.
     pub recursion: Option<Arc<Recursion>>,
+}
+
+/// What does not act at the start, or is switched by events, by name.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Switches {
+    /// All of it.
+    pub parts: Vec<String>,
+    /// Motors, and locks without an angle: switched on, they go on from where they are.
+    pub clutches: Vec<String>,
 }
 
 /// Formulas of a scene with the parameters and on the branches they are recorded with.
@@ -268,7 +280,15 @@ impl Mechanism {
     /// # Errors
     /// Those of [`Mechanism::new`], and forces on bodies that are not there.
     pub fn with_forces(scene: &Scene, forces: Vec<UserForce>) -> Result<Self, CompileError> {
-        let mut mechanism = Self::unassembled(scene, forces)?.assembled(scene, &kept_angles(scene))?;
+        let unassembled = Self::unassembled(scene, forces)?;
+        let mut acting = unassembled.clone();
+        if acting.release(|name| scene.is_inactive(name)) {
+            acting.partition =
+                CoordinatePartition::new(acting.bodies.len(), acting.coordinates(), &acting.constraints)?;
+        }
+        let mut kept = kept_angles(scene);
+        kept.retain(|&row| acting.constraints[row].is_angle());
+        let mut mechanism = acting.assembled(scene, &kept)?;
         mechanism.vibrates(scene)?;
         mechanism.choose_form();
         if let Some(recursion) = mechanism
@@ -292,6 +312,7 @@ impl Mechanism {
         }
         let unknown =
             |part| CompileError::Unsound(format!("inactive: no part that can be switched is `{part}`"));
+        mechanism.put_back(&unassembled);
         let mut acting = mechanism.without(&scene.inactive).map_err(unknown)?;
         acting.whole = Some((Arc::new(mechanism), scene.inactive.clone()));
         Ok(acting)
@@ -335,6 +356,9 @@ impl Mechanism {
         for drive in &scene.drives {
             rows.push(travel(&forest, &drive.name, &scene.sliders[drive.slider], drive.law.clone()));
         }
+        for coupling in &scene.couplings {
+            rows.push(follows(&forest, coupling, scene));
+        }
         for spring in scene.springs.iter().filter(|spring| spring.rigid) {
             let [a, b] = spring.between.each_ref().map(|place| forest.site(place));
             rows.push(constraint::rod_equation(&spring.name, &a, &b, spring.free_length, bodies.len()));
@@ -359,33 +383,30 @@ impl Mechanism {
                 damping: torsion.damping,
             })
             .collect();
-        let contacts = (scene.walls.iter())
+        let contacts: Vec<Contact> = (scene.walls.iter())
             .map(|wall| {
                 let normal = Complex::new(wall.normal[0], wall.normal[1]);
-                let offset = normal.dot(Complex::new(wall.through[0], wall.through[1]));
-                let site = forest.site(&Place { bar: Some(wall.bar), point: wall.point });
-                let row = constraint::line_equation(&wall.name, &site, normal, offset, None, bodies.len());
-                Contact {
-                    row,
-                    point: site.point,
-                    normal,
-                    restitution: wall.restitution,
-                    length: 1.0,
-                    force: 1.0,
-                }
+                let (row, point) = along_wall(&forest, wall, normal, wall.law.clone());
+                Contact { point, on: wall.on, ..Contact::new(row, normal, wall.restitution) }
             })
             .collect();
         let roots = forest.roots();
         let ground_energy =
             bodies.iter().zip(&roots).fold(0.0, |sum, (body, &root)| sum - body.mass * gravity.dot(root));
+        if let Some(Laws { formulas, parameters, modes }) = &laws {
+            give_aims(&mut rows, formulas.aims(parameters, modes)?);
+        }
         Ok(Self {
             ground_energy,
             tree: constants(&bodies, &forest, gravity),
             actions: actions(scene, &forest),
             forces,
             laws,
+            switches: Switches::of(scene),
             outputs: Outputs::of(scene, &forest)?.map(Arc::new),
-            keeps_work: keeps_work || !frictions.is_empty(),
+            keeps_work: keeps_work
+                || !frictions.is_empty()
+                || contacts.iter().any(|contact| contact.row.law.is_some()),
             whole: None,
             integrals: scene.bars.len() - scene.own_bars(),
             bodies,
@@ -421,12 +442,18 @@ impl Mechanism {
         {
             let recorded = laws.formulas.record(&parameters, &modes)?;
             mechanism.forces.splice(..recorded.len(), recorded);
-            for (motor, profile) in laws.formulas.profiles(&parameters, &modes) {
-                let row = mechanism.constraints.iter_mut().find(|row| row.name == motor);
+            for (Driven { name, is_wall }, profile) in laws.formulas.profiles(&parameters, &modes) {
+                let row = match is_wall {
+                    true => {
+                        mechanism.contacts.iter_mut().map(|wall| &mut wall.row).find(|row| row.name == *name)
+                    }
+                    false => mechanism.constraints.iter_mut().find(|row| row.name == *name),
+                };
                 if let Some(law) = row.and_then(|row| row.law.as_mut()) {
                     law.profile = Some(profile);
                 }
             }
+            give_aims(&mut mechanism.constraints, laws.formulas.aims(&parameters, &modes)?);
             (laws.parameters, laws.modes) = (parameters, modes);
             if laws.formulas.drives() {
                 mechanism.partition = mechanism.partition.renewed(&mechanism.constraints)?;
@@ -496,7 +523,7 @@ impl Mechanism {
         let recursion = (!is_dense || self.coordinates() > UNROLLED && self.frictions.is_empty())
             .then(|| Recursion::new(&self.bodies, &self.forest, &self.constraints, self.gravity))
             .filter(|recursion| !is_dense || recursion.pays() && self.vibration.is_none())
-            .filter(|_| !self.has_released());
+            .filter(|_| !self.has_released() && !self.has_aims());
         self.recursion = recursion.map(Arc::new);
     }
 
@@ -559,8 +586,8 @@ impl Mechanism {
         }
     }
 
-    /// The mechanism without some of its springs, torsion springs, applied forces, torques and motors, and with
-    /// some of its hinges released, by name; these must be closed by rows.
+    /// The mechanism without some of its springs, torsion springs, applied forces, torques, motors, locks and
+    /// walls, and with some of its hinges released, by name; these must be closed by rows.
     ///
     /// # Errors
     /// A name that none of them has.
@@ -570,7 +597,8 @@ impl Mechanism {
             .chain(self.actions.iter().map(|part| &part.name))
             .chain(self.forces.iter().map(|part| &part.name))
             .chain(self.joints.iter().filter(|joint| joint.outer.is_none()).map(|joint| &joint.name))
-            .chain(self.switched_motors().map(|r| &self.constraints[r].name));
+            .chain(self.contacts.iter().map(|contact| &contact.row.name))
+            .chain(self.switched_angles().map(|r| &self.constraints[r].name));
         let names: Vec<&String> = names.collect();
         if let Some(unknown) = parts.iter().find(|part| !names.contains(part)) {
             return Err(unknown.clone());
@@ -581,6 +609,9 @@ impl Mechanism {
         mechanism.torsions.retain(|part| !parts.contains(&part.name));
         mechanism.actions.retain(|part| !parts.contains(&part.name));
         mechanism.forces.retain(|part| !parts.contains(&part.name));
+        for contact in &mut mechanism.contacts {
+            contact.is_off |= parts.contains(&contact.row.name);
+        }
         mechanism.release(|name| parts.contains(name));
         Ok(mechanism)
     }
@@ -590,35 +621,72 @@ impl Mechanism {
         self.constraints.iter().any(|row| row.coordinates().is_empty())
     }
 
-    /// Releases motors, and joints that are closed by rows: the rows stay in their places, and constrain
-    /// nothing any more.
-    fn release(&mut self, is_released: impl Fn(&String) -> bool) {
+    /// True where motors have aims that depend on the mechanism.
+    pub fn has_aims(&self) -> bool {
+        self.constraints.iter().any(|row| row.aim.is_some())
+    }
+
+    /// Releases motors, locks, and joints that are closed by rows: the rows stay in their places, and constrain
+    /// nothing any more.  False where there are none.
+    fn release(&mut self, is_released: impl Fn(&String) -> bool) -> bool {
         let motors: Vec<usize> =
-            self.switched_motors().filter(|&r| is_released(&self.constraints[r].name)).collect();
+            self.switched_angles().filter(|&r| is_released(&self.constraints[r].name)).collect();
         let joints = self.joints.iter_mut().filter(|joint| is_released(&joint.name));
         let pins = joints.filter_map(|joint| joint.row.take()).flat_map(|row| [row, row + 1]);
         let rows: Vec<usize> = motors.into_iter().chain(pins).collect();
-        for r in rows {
+        for &r in &rows {
             let angles = self.bodies.len();
             let row = &mut self.constraints[r];
             row.measure = Measure::Place(Quadratic { angles, ..Quadratic::default() });
-            (row.law, row.push) = (None, None);
+            (row.law, row.push, row.aim) = (None, None, None);
             // As those that depend on others, they say nothing of the position.
             self.assembly.redundant.push(row.name.clone());
             self.recursion = None;
         }
+        !rows.is_empty()
     }
 
-    /// The rows of motors that an event of the scene switches off; those of others may be eliminated.
-    fn switched_motors(&self) -> impl Iterator<Item = usize> {
-        let is_switched = |r: &usize| self.is_motor(*r) && self.may_be_off(&self.constraints[*r].name);
+    /// Puts back what was released, as `before` has it.
+    fn put_back(&mut self, before: &Self) {
+        for (row, before) in self.constraints.iter_mut().zip(&before.constraints) {
+            if row.coordinates().is_empty() && !before.coordinates().is_empty() {
+                self.assembly.redundant.retain(|name| *name != row.name);
+                row.clone_from(before);
+            }
+        }
+        for (joint, before) in self.joints.iter_mut().zip(&before.joints) {
+            joint.row = before.row;
+        }
+    }
+
+    /// The rows of motors and locks that events switch; those of others may be eliminated.
+    fn switched_angles(&self) -> impl Iterator<Item = usize> {
+        let is_switched = |r: &usize| {
+            (self.is_motor(*r) || self.constraints[*r].is_angle())
+                && self.may_be_off(&self.constraints[*r].name)
+        };
         (0..self.constraints.len()).filter(is_switched)
     }
 
-    /// True where an event of the scene switches the part of that name off.
+    /// True where the part of that name does not act at the start, or events switch it.
     pub fn may_be_off(&self, name: &str) -> bool {
-        let events = self.laws.as_ref().map_or(&[][..], |laws| &laws.formulas.events);
-        events.iter().any(|event| event.off.iter().any(|part| part == name))
+        self.switches.parts.iter().any(|part| part == name)
+    }
+
+    /// The mechanism with motors and locks, by row number, going on so much further than they said \[rad, m\].
+    pub(crate) fn shifted(&self, shifts: &[(usize, f64)]) -> Self {
+        let mut mechanism = self.clone();
+        for &(row, by) in shifts {
+            if let Some(law) = mechanism.constraints.get_mut(row).and_then(|row| row.law.as_mut()) {
+                law.start += by;
+            }
+        }
+        mechanism
+    }
+
+    /// The mechanism with all its parts, whatever acts at the start.
+    pub(crate) fn with_all_parts(&self) -> &Self {
+        self.whole.as_ref().map_or(self, |(whole, _)| whole)
     }
 
     /// Elements and translational coordinates of all bodies at these coordinates.
@@ -688,10 +756,10 @@ impl Mechanism {
         !self.frictions.is_empty() || self.laws.as_ref().is_some_and(|laws| laws.formulas.switches())
     }
 
-    /// True where the motion has a power series: the mean force of a vibration and dry friction have none, and
-    /// it takes the matrices of the tree.
+    /// True where the motion has a power series: the mean force of a vibration, dry friction and aims that depend
+    /// on the mechanism have none, and it takes the matrices of the tree.
     pub fn has_series(&self) -> bool {
-        self.vibration.is_none() && self.frictions.is_empty() && self.tree.is_dense()
+        self.vibration.is_none() && self.frictions.is_empty() && !self.has_aims() && self.tree.is_dense()
     }
 
     /// True where the scene has a damper, or a force from outside that depends on rates.
@@ -730,13 +798,17 @@ impl Mechanism {
 
     /// True where whole turns matter, so that angles are not wrapped.
     pub fn is_winding(&self) -> bool {
-        !self.torsions.is_empty() || self.forces.iter().any(UserForce::counts_turns)
+        let turns = |row: &ConstraintEquation| row.aim.as_ref().is_some_and(|aim| aim.counts_turns);
+        !self.torsions.is_empty()
+            || self.forces.iter().any(UserForce::counts_turns)
+            || self.constraints.iter().any(turns)
     }
 
     /// True where row number `row` is that of a motor, on an angle or on a slider; not where it locks an
     /// angle.
     pub fn is_motor(&self, row: usize) -> bool {
-        row < self.motors || self.constraints[row].law.is_some() && !self.constraints[row].is_angle()
+        let of = &self.constraints[row];
+        row < self.motors || (of.law.is_some() || of.aim.is_some()) && !of.is_angle()
     }
 
     /// The unit of what rows measure: `rad`, `m`, or `rad or m` where some measure angles and some lengths;
@@ -782,6 +854,19 @@ impl Mechanism {
             Some(k) => Err(CompileError::Massless(self.bodies[k].name.clone())),
             None => Ok(()),
         }
+    }
+}
+
+impl Switches {
+    fn of(scene: &Scene) -> Self {
+        let switched = scene.events.iter().flat_map(|event| event.off.iter().chain(&event.on));
+        let mut parts: Vec<String> = scene.inactive.iter().chain(switched).cloned().collect();
+        parts.sort_unstable();
+        parts.dedup();
+        let clutches = (scene.motors.iter().map(|motor| &motor.name))
+            .chain(scene.drives.iter().map(|drive| &drive.name))
+            .chain(scene.locks.iter().filter(|lock| lock.angle.is_none()).map(|lock| &lock.name));
+        Self { clutches: clutches.filter(|name| parts.contains(name)).cloned().collect(), parts }
     }
 }
 

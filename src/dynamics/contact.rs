@@ -146,7 +146,7 @@ impl<'a> Met<'a> {
         let parts = column.component_mul(acceleration);
         Self {
             contact,
-            speed: dot(&along, omega),
+            speed: dot(&along, omega) + row.drive,
             acceleration: parts.sum() + row.convective,
             size: parts.iter().map(|part| part.abs()).sum::<f64>() + row.convective.abs(),
             is_dead: contact.point.shifts.is_empty()

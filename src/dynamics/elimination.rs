@@ -200,7 +200,7 @@ impl<const N: usize> OdeSystem for Elimination<N> {
         }
         partition.translations(y, &mut kernel.z);
         for (gap, contact) in gaps.iter_mut().zip(&self.mechanism.contacts) {
-            *gap = contact.gap(&kernel.z);
+            *gap = contact.gap(t, &kernel.z);
         }
     }
 
@@ -211,7 +211,7 @@ impl<const N: usize> OdeSystem for Elimination<N> {
     fn gap(&self, event: usize, along: Along) -> Option<[f64; 3]> {
         let Along { time, step_size, y, slope } = along;
         let partition = &self.mechanism.partition;
-        self.mechanism.contacts[event].gap_along(|k| {
+        self.mechanism.contacts[event].gap_along(&along, |k| {
             let dependent_angle = &partition.bodies[k];
             if k < partition.angles {
                 let placed = dependent_angle.place(time, &y[..partition.count()]);
@@ -236,7 +236,7 @@ impl<const N: usize> OdeSystem for Elimination<N> {
                 [second + step_size * step_size * acceleration, first + step_size * rate]
             })
         };
-        self.mechanism.contacts[event].gap_bend(most)
+        self.mechanism.contacts[event].gap_bend(t, step_size, most)
     }
 }
 

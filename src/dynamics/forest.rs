@@ -2,7 +2,7 @@
 //!
 //! Breadth first from the ground, then from the first body of every group that is left: the depth is the
 //! least there is, and with it the number of couplings.  Nobody chooses the tree; a hinge between bodies that
-//! are connected already becomes a pin, and so does one that an event of the scene releases.
+//! are connected already becomes a pin, and so does one that an event of the scene closes or releases.
 
 use super::constraint::Site;
 use super::point::Point;
@@ -61,10 +61,10 @@ impl Forest {
             .collect();
         let slot = |bar: Option<usize>| bar.map_or(0, |bar| bar + 1);
         let mut at: Vec<Vec<usize>> = vec![Vec::new(); n + 1];
-        // What an event releases is kept by rows, which end with it.
-        let is_released =
-            |joint: usize| scene.hinges.get(joint).is_some_and(|hinge| scene.is_released(&hinge.name));
-        for (joint, between) in joints.iter().enumerate().filter(|(joint, _)| !is_released(*joint)) {
+        // What an event closes or releases is kept by rows, which begin or end with it.
+        let is_switched =
+            |joint: usize| scene.hinges.get(joint).is_some_and(|hinge| scene.is_switched(&hinge.name));
+        for (joint, between) in joints.iter().enumerate().filter(|(joint, _)| !is_switched(*joint)) {
             for place in *between {
                 at[slot(place.bar)].push(joint);
             }

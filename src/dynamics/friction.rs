@@ -29,7 +29,7 @@ use super::kernel::{Kernel, dot};
 use super::law::Law;
 use super::{Mechanism, Time, tree};
 use crate::arithmetic::{Complex, Real};
-use crate::scene::{FrictionPlace, Place, Scene};
+use crate::scene::{FrictionPlace, Scene, Wall};
 
 /// Newton steps at most; from a few on only rounding is left.
 const ROUNDS: usize = 40;
@@ -94,7 +94,6 @@ impl Mode {
 
 /// The friction of a scene; without those whose coefficients are zero.
 pub(super) fn frictions(scene: &Scene, forest: &Forest, joints: &[Joint]) -> Vec<Friction> {
-    let angles = scene.bars.len();
     let of = |friction: &crate::scene::Friction| {
         let (tangent, normal, lever, is_newton) = match friction.at {
             FrictionPlace::Hinge { hinge, radius } => {
@@ -112,8 +111,17 @@ pub(super) fn frictions(scene: &Scene, forest: &Forest, joints: &[Joint]) -> Vec
             FrictionPlace::Wall { wall: number, is_newton } => {
                 let wall = &scene.walls[number];
                 let along = -Complex::new(wall.normal[0], wall.normal[1]).left();
-                let site = forest.site(&Place { bar: Some(wall.bar), point: wall.point });
-                let tangent = constraint::line_equation(&wall.name, &site, along, 0.0, None, angles);
+                let tangent = match wall.on {
+                    // Counted from the origin.
+                    None => super::compile::along_wall(
+                        forest,
+                        &Wall { through: [0.0; 2], ..wall.clone() },
+                        along,
+                        None,
+                    ),
+                    Some(_) => super::compile::along_wall(forest, wall, along, None),
+                };
+                let tangent = tangent.0;
                 (tangent, Normal::Contact(number), 1.0, is_newton)
             }
         };

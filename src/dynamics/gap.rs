@@ -2,14 +2,17 @@
 //! derivative from bounds of the unknowns' own.
 //!
 //! ```text
-//! g = c + Σ Re(conj(g_k) e^(i phi_k)) + Σ Re(conj(g_f) zeta_f)
-//! |g''| <= Σ |g_k| (|phi_k''| + phi_k'²) + Σ |g_f| |zeta_f''|
+//! g = c + Σ Re(conj(g_k) e^(i phi_k)) + Σ Re(conj(g_f) zeta_f) - s(t)
+//! |g''| <= Σ |g_k| (|phi_k''| + phi_k'²) + Σ |g_f| |zeta_f''| + |s''|
 //! ```
+//!
+//! Walls of bodies have products of elements beside, of which value and slope are known, and no bound.
 //!
 //! Derivatives may be by time or by anything that grows in proportion with it.
 
+use super::Along;
 use super::constraint::Measure;
-use super::impact::Contact;
+use super::impact::{AWAY, Contact};
 use super::law::Law;
 use crate::arithmetic::Complex;
 
@@ -23,13 +26,13 @@ pub fn turning(unit: Complex<f64>, rate: f64) -> Moving {
 
 impl Contact {
     /// Gap, slope and the magnitude gaps are rounded to, where elements and their derivatives are
-    /// `element(k)`; `None` for what is no sum of elements.
-    pub fn gap_along(&self, mut element: impl FnMut(usize) -> Moving) -> Option<[f64; 3]> {
+    /// `element(k)`, and time goes by at `step_size` \[s\]; `None` for what is no sum of elements.
+    pub fn gap_along(&self, at: &Along, mut element: impl FnMut(usize) -> Moving) -> Option<[f64; 3]> {
         let Measure::Place(place) = &self.row.measure else { return None };
-        if !place.bilinear.is_empty() {
-            return None;
+        if self.is_off {
+            return Some([AWAY, 0.0, AWAY]);
         }
-        let found = place.linear.iter().fold(
+        let mut found = place.linear.iter().fold(
             [place.constant, 0.0, place.constant.abs()],
             |[gap, slope, size], &(k, g)| {
                 let [here, rate] = element(k);
@@ -40,13 +43,31 @@ impl Contact {
                 ]
             },
         );
+        for &(j, k, h) in &place.bilinear {
+            let ([one, one_rate], [other, other_rate]) = (element(j), element(k).map(|x| h * x));
+            found[0] += one.dot(other);
+            found[1] += one_rate.dot(other) + one.dot(other_rate);
+            found[2] += (one.re * other.re).abs() + (one.im * other.im).abs();
+        }
+        if let Some(law) = &self.row.law {
+            let moved = law.value::<f64>(at.time);
+            found[0] -= moved;
+            found[1] -= at.step_size * law.rates::<f64>(at.time).0;
+            found[2] += moved.abs();
+        }
         Some(found.map(|x| x / self.length))
     }
 
     /// A bound of the second derivative of the gap, where those of coordinate k and its square first
-    /// derivative are at most `most(k)`.
-    pub fn gap_bend(&self, mut most: impl FnMut(usize) -> [f64; 2]) -> f64 {
+    /// derivative are at most `most(k)`, up to the time `t` \[s\] that goes by at `step_size`.
+    pub fn gap_bend(&self, t: f64, step_size: f64, mut most: impl FnMut(usize) -> [f64; 2]) -> f64 {
         let Measure::Place(place) = &self.row.measure else { return f64::INFINITY };
+        if self.is_off {
+            return 0.0;
+        }
+        if !place.bilinear.is_empty() {
+            return f64::INFINITY;
+        }
         let bend = place.linear.iter().fold(0.0, |sum, &(k, g)| {
             let bend = if k < place.angles {
                 let [second, first] = most(k);
@@ -56,7 +77,10 @@ impl Contact {
             };
             sum + g.norm_squared().sqrt() * bend
         });
-        bend / self.length
+        match &self.row.law {
+            None => bend / self.length,
+            Some(law) => (bend + step_size * step_size * law.bounds(t)[1]) / self.length,
+        }
     }
 }
 
@@ -77,6 +101,7 @@ impl Law {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dynamics::Time;
     use crate::dynamics::constraint::ConstraintEquation;
     use crate::dynamics::point::Point;
     use crate::dynamics::quadratic::Quadratic;
@@ -87,8 +112,8 @@ mod tests {
         let normal = Complex::unit(0.7);
         let point = Point::floating(2).along(0, Complex::new(0.6, 0.1)).along(1, Complex::new(0.2, -0.4));
         let measure = Measure::Place(Quadratic::along(&point, normal, 2));
-        let row = ConstraintEquation { name: "wall".into(), measure, law: None, push: None };
-        let contact = Contact { row, point, normal, restitution: 1.0, length: 0.5, force: 1.0 };
+        let row = ConstraintEquation { name: "wall".into(), measure, law: None, push: None, aim: None };
+        let contact = Contact { point, length: 0.5, ..Contact::new(row, normal, 1.0) };
         // Two angles and an origin, each a parabola in t.
         let powers = [[0.3, 2.0, -1.5], [-1.0, -4.0, 0.4], [0.1, 0.5, 2.0], [0.7, -0.3, -1.0]];
         let at = |k: usize, t: f64| {
@@ -99,10 +124,11 @@ mod tests {
                 true => turning(Complex::unit(at(k, t)[0]), at(k, t)[1]),
                 false => [Complex::new(at(2, t)[0], at(3, t)[0]), Complex::new(at(2, t)[1], at(3, t)[1])],
             };
-            contact.gap_along(element).expect("a sum of elements")
+            let at = Along { time: Time::of(t), step_size: 1.0, y: &[], slope: &[] };
+            contact.gap_along(&at, element).expect("a sum of elements")
         };
         let most = |k: usize| [2.0 * powers[k][2].abs(), powers[k][1].abs() + 2.0 * powers[k][2].abs()];
-        let (bound, h) = (contact.gap_bend(most), 1e-5);
+        let (bound, h) = (contact.gap_bend(1.0, 1.0, most), 1e-5);
         let mut steepest = 0.0_f64;
         for share in 0..=50 {
             let t = f64::from(share) / 50.0;

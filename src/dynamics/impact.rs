@@ -1,7 +1,7 @@
 //! The jump of the rates when a point meets a wall.
 //!
 //! ```text
-//! M (w⁺ - w⁻) + Jᵀ rho + Gᵀ sigma = 0,    J w⁺ = -e J w⁻,    G w⁺ + C_t = 0
+//! M (w⁺ - w⁻) + Jᵀ rho + Gᵀ sigma = 0,    J w⁺ + g_t = -e (J w⁻ + g_t),    G w⁺ + C_t = 0
 //! ```
 //!
 //! In the coordinates of [`metric`](super::contact::metric): v⁺ = v + (c - Q Qᵀ c) f, v being the velocity
@@ -13,7 +13,7 @@
 //! changes by `-rho (1-e) J w⁻ / 2`. Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral
 //! Contacts* (1996), section 8.2 (Newton's law of impact).
 
-use super::constraint::{ConstraintEquation, Posture};
+use super::constraint::{ConstraintEquation, Measure, Posture};
 use super::contact::metric::{Gradient, Metric};
 use super::contact::scale::magnitudes;
 use super::friction::impact::Shock;
@@ -33,11 +33,13 @@ pub const TOUCH: f64 = 2e-12;
 /// A wall as the mechanism meets it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contact {
-    /// The gap and its Jacobian.
+    /// The gap and its Jacobian; its law is how far the wall has moved along its normal.
     pub row: ConstraintEquation,
-    /// The point.
+    /// The point, seen from a point of the wall where that is on a body.
     pub point: Point,
-    /// Unit normal of the wall.
+    /// The body that carries the wall; `None`: the ground.
+    pub on: Option<usize>,
+    /// Unit normal of the wall, in the frame of what carries it.
     pub normal: Complex<f64>,
     /// Restitution e.
     pub restitution: f64,
@@ -45,26 +47,61 @@ pub struct Contact {
     pub length: f64,
     /// What forces of the wall are divided by \[N\], a power of two.
     pub force: f64,
+    /// True where an event has switched it off: its point passes.
+    pub is_off: bool,
 }
 
+/// The gap of a wall that is switched off, over the length of its contact.
+pub const AWAY: f64 = 1.0;
+
 impl Contact {
+    /// A wall of the ground, before its point and its units are known.
+    pub fn new(row: ConstraintEquation, normal: Complex<f64>, restitution: f64) -> Self {
+        let point = Point::default();
+        Self { row, point, on: None, normal, restitution, length: 1.0, force: 1.0, is_off: false }
+    }
+
+    /// The gap \[m\].
+    pub fn distance(&self, t: Time, z: &[Complex<f64>]) -> f64 {
+        match &self.row.law {
+            None => self.row.gap(z),
+            Some(law) => self.row.gap(z) - law.value::<f64>(t),
+        }
+    }
+
     /// The gap over the length of the contact: the event function of a point that may meet its wall.
-    pub fn gap(&self, z: &[Complex<f64>]) -> f64 {
-        self.row.gap(z) / self.length
+    pub fn gap(&self, t: Time, z: &[Complex<f64>]) -> f64 {
+        if self.is_off { AWAY } else { self.distance(t, z) / self.length }
     }
 
     /// True where the point is on its wall, or behind it: by [`TOUCH`] of its length, or by the rounding of
     /// the gap at these elements.
-    pub fn touches(&self, z: &[Complex<f64>]) -> bool {
-        self.gap(z) <= TOUCH.max(4.0 * f64::EPSILON * magnitudes(&self.row, z) / self.length)
+    pub fn touches(&self, t: Time, z: &[Complex<f64>]) -> bool {
+        let moved = self.row.law.as_ref().map_or(0.0, |law| law.value::<f64>(t).abs());
+        let size = magnitudes(&self.row, z) + moved;
+        self.gap(t, z) <= TOUCH.max(4.0 * f64::EPSILON * size / self.length)
+    }
+
+    /// The rate of the gap \[m/s\].
+    pub fn gap_rate(&self, t: Time, z: &[Complex<f64>], omega: &[f64]) -> f64 {
+        let rate = match (&self.row.measure, self.on) {
+            (Measure::Place(place), Some(_)) => {
+                let mut rate = 0.0;
+                place.slopes(z, |k, slope| rate += slope * omega[k]);
+                rate
+            }
+            _ => self.normal.dot(self.point.velocity(z, omega)),
+        };
+        self.row.law.as_ref().map_or(rate, |law| rate - law.rates::<f64>(t).0)
     }
 
     /// The largest velocity the parts of the point have along the normal \[m/s\]: rounding of its normal
     /// velocity is a share of it.
     pub fn step_size(&self, omega: &[f64]) -> f64 {
         let turning = self.point.terms.iter().map(|&(k, gamma)| gamma.norm_squared().sqrt() * omega[k].abs());
-        let carried = self.point.shifts.iter().map(|&(x, share)| {
-            share.abs() * ((self.normal.re * omega[x]).abs() + (self.normal.im * omega[x + 1]).abs())
+        let carried = self.point.shifts.iter().map(|&(x, share)| match self.on {
+            None => share.abs() * ((self.normal.re * omega[x]).abs() + (self.normal.im * omega[x + 1]).abs()),
+            Some(_) => share.abs() * libm::hypot(omega[x], omega[x + 1]),
         });
         turning.chain(carried).fold(0.0, f64::max)
     }
@@ -91,7 +128,7 @@ pub struct Impact {
     pub row_impulses: Vec<f64>,
     /// Energy after less energy before \[J\].
     pub energy_change: f64,
-    /// Impulsive work of the motors, which hold their rates \[J\].
+    /// Impulsive work of the motors and of a wall that moves, which hold their rates \[J\].
     pub motor_work: f64,
 }
 
@@ -104,8 +141,8 @@ impl Mechanism {
         let Contact { row, restitution, .. } = &self.contacts[contact];
         let metric = Metric::at(self, t, phi, omega)?;
         let z = self.elements(phi);
-        let along = Gradient::of(row, t, Posture { phi, z: &z, omega }).along;
-        let approach = dot(&along, omega);
+        let Gradient { row: here, along } = Gradient::of(row, t, Posture { phi, z: &z, omega });
+        let approach = dot(&along, omega) + here.drive;
         if approach >= 0.0 {
             let row_impulses = vec![0.0; self.constraints.len()];
             return Some(Impact {
@@ -123,7 +160,7 @@ impl Mechanism {
         if free.norm() <= NO_FREEDOM * column.norm() {
             return None;
         }
-        let mut impulse = (-restitution * approach - column.dot(&kept)) / free.norm_squared();
+        let mut impulse = (-restitution * approach - (column.dot(&kept) + here.drive)) / free.norm_squared();
         let (mut push, mut change) = (&column * impulse, &kept - &before + &free * impulse);
         let mut tangential = 0.0;
         if let Some(friction) = self.friction_at(contact) {
@@ -132,7 +169,7 @@ impl Mechanism {
             let free_across = metric.free(&across);
             let shock = Shock {
                 response: [free.norm_squared(), free.dot(&free_across), free_across.norm_squared()],
-                velocity: [column.dot(&kept), across.dot(&kept)],
+                velocity: [column.dot(&kept) + here.drive, across.dot(&kept)],
                 restitution: *restitution,
                 coefficients: [friction.kinetic, friction.stiction],
                 is_newton: friction.is_newton,
@@ -142,8 +179,8 @@ impl Mechanism {
             change = &kept - &before + &free * impulse + &free_across * tangential;
         }
         let row_impulses = metric.multipliers(&(&push - &change));
-        let motor_work =
-            row_impulses.iter().zip(&metric.rows).map(|(impulse, row)| impulse * row.row.drive).sum();
+        let of_rows = row_impulses.iter().zip(&metric.rows).map(|(impulse, row)| impulse * row.row.drive);
+        let motor_work = of_rows.sum::<f64>() - impulse * here.drive;
         let is_finite = impulse.is_finite() && change.iter().chain(&row_impulses).all(|x| x.is_finite());
         is_finite.then(|| Impact {
             approach,

@@ -75,6 +75,7 @@ pub fn reduced(mechanism: &Mechanism) -> Option<Reduced> {
         || mechanism.vibration.is_some()
         || !mechanism.frictions.is_empty()
         || mechanism.has_released()
+        || mechanism.has_aims()
     {
         return None;
     }

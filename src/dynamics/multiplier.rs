@@ -132,7 +132,7 @@ impl<const N: usize, const WORK: bool> OdeSystem for Multiplier<N, WORK> {
         let n = size::<N>(mechanism.coordinates());
         self.kernel.unit_vectors::<N>(mechanism, &y[..n]);
         for (gap, contact) in gaps.iter_mut().zip(&mechanism.contacts) {
-            *gap = contact.gap(&self.kernel.z);
+            *gap = contact.gap(t, &self.kernel.z);
         }
         if !mechanism.held.is_empty() {
             self.kernel.accelerate::<N>(mechanism, t, &y[..n], &y[n..2 * n], Bias::default());
@@ -156,15 +156,18 @@ impl<const N: usize, const WORK: bool> OdeSystem for Multiplier<N, WORK> {
             true => turning(Complex::unit(y[k]), slope[k]),
             false => [Complex::new(y[k], y[k + 1]), Complex::new(slope[k], slope[k + 1])],
         };
-        if self.mechanism.held.contains(&event) { None } else { self.mechanism.contacts[event].gap_along(of) }
+        match self.mechanism.held.contains(&event) {
+            true => None,
+            false => self.mechanism.contacts[event].gap_along(&along, of),
+        }
     }
 
-    fn gap_bend(&self, event: usize, _t: f64, _pace: f64, first: &[f64], second: &[f64]) -> f64 {
+    fn gap_bend(&self, event: usize, t: f64, step_size: f64, first: &[f64], second: &[f64]) -> f64 {
         // Nothing bounds the force on a point that is held.
         if self.mechanism.held.contains(&event) {
             return f64::INFINITY;
         }
-        self.mechanism.contacts[event].gap_bend(|k| [second[k], first[k]])
+        self.mechanism.contacts[event].gap_bend(t, step_size, |k| [second[k], first[k]])
     }
 }
 

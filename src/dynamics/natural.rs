@@ -60,6 +60,9 @@ pub enum NaturalError {
     /// Impacts are not handled.
     #[error("wall `{0}`: the natural form has no impacts")]
     Wall(String),
+    /// Rows must be of elements.
+    #[error("motor `{0}` has an aim that depends on the mechanism: the natural form takes laws of time only")]
+    Aim(String),
     /// The constant mass matrix is singular.
     #[error("bar `{0}` has no inertia of its own: the constant mass matrix of the natural form is singular")]
     Singular(String),
@@ -120,6 +123,9 @@ impl Natural {
         }
         if let Some(contact) = mechanism.contacts.first() {
             return Err(NaturalError::Wall(contact.row.name.clone()));
+        }
+        if let Some(row) = mechanism.constraints.iter().find(|row| row.aim.is_some()) {
+            return Err(NaturalError::Aim(row.name.clone()));
         }
         if let Some(force) = mechanism.forces.iter().find(|force| !force.is_potential_of_place()) {
             return Err(NaturalError::Applied(force.name.clone()));

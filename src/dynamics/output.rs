@@ -86,11 +86,17 @@ impl Outputs {
             list.push(Output { name, unit, expression: place(bound) });
         }
         let is_state = |source: &Source<Site>| {
-            use Quantity::{Acceleration, AngularAcceleration, Gap, Tension, Torsion, Travel};
+            use Quantity::{Acceleration, AngularAcceleration, Gap, MovingGap, Tension, Torsion, Travel};
             let Source::Carried(quantity) = source else { return true };
             matches!(
                 quantity,
-                AngularAcceleration(_) | Acceleration(..) | Travel(..) | Gap(..) | Tension(..) | Torsion(_)
+                AngularAcceleration(_)
+                    | Acceleration(..)
+                    | Travel(..)
+                    | Gap(..)
+                    | MovingGap(_)
+                    | Tension(..)
+                    | Torsion(_)
             )
         };
         let needs_forces = !list.iter().flat_map(|output| &output.expression.sources).all(is_state);
@@ -199,6 +205,10 @@ impl Quantity<Site> {
             Self::Gap(point, through, normal) => {
                 let [x, y] = seen.position(point);
                 normal[0] * (x - through[0]) + normal[1] * (y - through[1])
+            }
+            Self::MovingGap(name) => {
+                let wall = mechanism.contacts.iter().find(|contact| contact.row.name == *name);
+                wall.map_or(f64::NAN, |contact| contact.distance(time, &kernel.z))
             }
             Self::Wall(name) => {
                 let wall = mechanism.contacts.iter().position(|contact| contact.row.name == *name);

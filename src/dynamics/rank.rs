@@ -170,7 +170,8 @@ impl ConstraintEquation {
             }
             Measure::Place(place) => place,
         };
-        let mut levers = Levers::new();
+        let mut levers: Levers =
+            self.aim.iter().flat_map(|aim| aim.coordinates()).map(|k| (k, 1.0)).collect();
         for &(k, g) in &place.linear {
             match k < place.angles {
                 true => levers.push((k, g.norm_squared())),

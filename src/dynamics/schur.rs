@@ -101,7 +101,8 @@ impl ConstraintEquation {
     /// What pivots of this row are measured against: its measure's scale with the diagonal of M \[1/kg,
     /// 1/(kg·m²)\].
     pub fn scale(&self, tree: &Tree) -> f64 {
-        self.measure.scale(|k| 1.0 / tree.diagonal[k])
+        let own = self.aim.iter().flat_map(|aim| &aim.angles).map(|&k| 1.0 / tree.diagonal[k]);
+        own.fold(self.measure.scale(|k| 1.0 / tree.diagonal[k]), |sum, angle| sum + angle)
     }
 }
 

@@ -37,12 +37,13 @@ mod work_integral;
 use self::action::ActionSeries;
 use self::bodywise::Bodywise;
 pub use self::coefficient::Coefficient;
+pub use self::drive::powers;
 use self::polynomial::{Fractions, UNROLLED, convolve, copy, copy_vectors, width, zeros};
 use self::rows::RowSeries;
 use self::spring::SpringSeries;
 use self::user::{At, UserSeries};
 use super::constraint::Measure;
-use super::impact::Contact;
+use super::impact::{AWAY, Contact};
 use super::partition::CoordinatePartition;
 use super::schur::{self, Weakest};
 use super::tree::{self, size};
@@ -197,14 +198,31 @@ impl<T: Coefficient> Series<T> {
 
     /// Powers 0, 1, … of the gap of a wall over the length of its contact \[1/s^m\], to that of the unit
     /// vectors.
-    pub fn gap(&self, contact: &Contact, powers: &mut Vec<f64>) {
+    pub fn gap(&self, contact: &Contact, t: Time, powers: &mut Vec<f64>) {
         powers.clear();
-        // Walls are of the ground, so that the gap is linear.
         let Measure::Place(place) = &contact.row.measure else { return };
+        if contact.is_off {
+            powers.extend([AWAY, 0.0]);
+            return;
+        }
+        let n = self.elements.max(1);
         let elements = self.z.chunks_exact(self.elements.max(1));
         powers.extend(elements.map(|z| {
             place.linear.iter().fold(T::ZERO, |sum, &(k, g)| sum + Complex::of(g).dot(z[k])).value()
         }));
+        // Lines of the ground are linear; those of bodies have products beside.
+        for &(j, k, h) in &place.bilinear {
+            for (m, power) in powers.iter_mut().enumerate() {
+                let term = |l: usize| self.z[l * n + j].dot(self.z[(m - l) * n + k].turn(h));
+                *power += (0..=m).fold(T::ZERO, |sum, l| sum + term(l)).value();
+            }
+        }
+        if let Some(law) = &contact.row.law {
+            let moved = drive::powers(law, t, powers.len());
+            for (power, moved) in powers.iter_mut().zip(moved) {
+                *power -= moved;
+            }
+        }
         if let Some(first) = powers.first_mut() {
             *first += place.constant;
         }

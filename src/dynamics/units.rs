@@ -88,6 +88,7 @@ fn laws(scene: &Scene, length: f64) -> impl Iterator<Item = f64> {
     motors
         .chain(scene.drives.iter().map(move |drive| of(&drive.law, length)))
         .chain(factors.map(move |law| of(law, 1.0)))
+        .chain(scene.walls.iter().filter_map(|wall| wall.law.as_ref()).map(move |law| of(law, length)))
 }
 
 #[cfg(test)]

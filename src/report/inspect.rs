@@ -165,7 +165,7 @@ pub fn inspect_at(mechanism: &Mechanism, start: &Motion) -> Inspection {
         found.reactions.push(Reaction {
             unit: row.unit(),
             unit_of_multiplier: row.unit_of_force(),
-            torque: row.is_angle().then_some(-multiplier),
+            torque: row.is_in_radians().then_some(-multiplier),
             force,
             on,
             from,
@@ -207,6 +207,10 @@ pub fn inspect_at(mechanism: &Mechanism, start: &Motion) -> Inspection {
 fn sides(row: &ConstraintEquation) -> [Option<usize>; 2] {
     match (&row.measure, &row.push) {
         (Measure::Angle { body, base }, _) => [Some(*body), *base],
+        (_, None) if row.is_in_radians() => {
+            let angles = row.aim.as_ref().map_or(&[][..], |aim| &aim.angles);
+            [angles.first().copied(), angles.get(1).copied()]
+        }
         (_, Some(push)) => [push.on, push.from],
         (_, None) => [None, None],
     }
@@ -222,12 +226,13 @@ fn contacts(
 ) -> Vec<Contact> {
     let mut contacts = Vec::new();
     for (number, contact) in mechanism.contacts.iter().enumerate() {
-        let gap = contact.row.gap(&kernel.z);
+        let gap = contact.distance(start.time, &kernel.z);
         let mut jacobian = vec![0.0; phi.len()];
-        contact.row.differentiate(start.time, Posture { phi, z: &kernel.z, omega: &omega }, &mut jacobian);
-        let approach = crate::dynamics::kernel::dot(&jacobian, &omega);
+        let at = Posture { phi, z: &kernel.z, omega: &omega };
+        let drive = contact.row.differentiate(start.time, at, &mut jacobian).drive;
+        let approach = crate::dynamics::kernel::dot(&jacobian, &omega) + drive;
         let is_held = mechanism.held.contains(&number);
-        let jump = if gap <= TOUCHING * contact.length && approach < 0.0 && !is_held {
+        let jump = if gap <= TOUCHING * contact.length && approach < 0.0 && !is_held && !contact.is_off {
             mechanism.impact_at(number, start.time, phi, &omega)
         } else {
             None

@@ -4,6 +4,7 @@
 use super::build::build;
 use super::contact::{ContactDriver, in_modes};
 use super::event::{Action, Change};
+use super::latch;
 use super::monitor::Monitor;
 use super::running::Outcome;
 use crate::dynamics::compile::Laws;
@@ -126,16 +127,22 @@ impl ContactDriver {
             }
         }
         self.changes += 1;
+        self.engage(&after);
         let free = match self.whole.without(&self.off) {
             Ok(free) => Arc::new(free),
             Err(part) => {
                 return Err(refused(
                     self,
                     format!("switches `{part}`"),
-                    "name a spring, a torsion spring, a force or a torque",
+                    "name a spring, torsion spring, force, torque, wall, or a hinge, motor or lock that the scene switches",
                 ));
             }
         };
+        let mut held = self.mechanism.held.clone();
+        held.retain(|&contact| !free.contacts[contact].is_off);
+        if let Err((what, hint)) = latch::close([&self.free, &free], &mut held, &mut after) {
+            return Err(refused(self, what, hint));
+        }
         if let Some(what) = broken(&free, &after) {
             let hint = match self.free.laws.as_ref().is_some_and(|laws| laws.formulas.drives()) {
                 true => "the law of a motor must keep its value and its rate through its corners",
@@ -143,7 +150,11 @@ impl ContactDriver {
             };
             return Err(refused(self, what, hint));
         }
-        self.mechanism = in_modes(&free, &self.mechanism.held, &self.mechanism.modes);
+        if held != self.mechanism.held {
+            self.record(&held, after.time.hi, outcome);
+        }
+        let modes = latch::modes(&free, &self.mechanism.modes, &held);
+        self.mechanism = in_modes(&free, &held, &modes);
         if let Some(events) = &mut self.events {
             events.watch_friction(&self.mechanism);
         }
@@ -175,7 +186,7 @@ fn broken(mechanism: &Mechanism, motion: &Motion) -> Option<String> {
     kernel.linearise_at::<0>(mechanism, motion.time, &phi, &omega);
     let (size, time) = (mechanism.size_of_parts(), mechanism.units.time);
     mechanism.constraints.iter().enumerate().find_map(|(r, row)| {
-        let unit = if row.is_angle() { 1.0 } else { size };
+        let unit = if row.is_in_radians() { 1.0 } else { size };
         let (position, rate) =
             (kernel.rows[r].position.abs() / unit, kernel.row_rate(r, &omega).abs() / unit * time);
         let step_size = omega.iter().fold(1.0, |most: f64, omega| most.max(omega.abs() * time));

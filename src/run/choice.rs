@@ -184,6 +184,9 @@ fn chosen(
     if let Some(vibration) = &mechanism.vibration {
         return (classic, format!("the vibration of rigid spring {} acts by its mean force", vibration.name));
     }
+    if mechanism.has_aims() && request.step.is_none() {
+        return (classic, "motors have aims that depend on the mechanism, which have no power series".into());
+    }
     if request.step.is_some() {
         let why = if mechanism.has_closed_loops() {
             "closed loops and sliders are kept by symmetric projection"

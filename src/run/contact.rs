@@ -103,6 +103,8 @@ pub(super) struct ContactDriverState {
     stabilizer: f64,
     /// Parts that do not act at the moment.
     off: Vec<String>,
+    /// How much further motors and locks go on than the scene says, by row \[rad, m\].
+    shifts: Vec<(usize, f64)>,
     /// Parameters of the scene's laws, and the branches they are on.
     laws: Option<(Vec<f64>, Vec<bool>)>,
     /// What the detector of events remembers, where there is one.
@@ -116,6 +118,8 @@ pub(super) struct ContactDriver {
     /// The mechanism with all its parts, and those that do not act at the moment.
     pub(super) whole: Arc<Mechanism>,
     pub(super) off: Vec<String>,
+    /// How much further its motors and locks go on than the scene says, by row \[rad, m\].
+    pub(super) shifts: Vec<(usize, f64)>,
     /// The mechanism without holds.
     pub(super) free: Arc<Mechanism>,
     /// The mechanism with the contacts held at the moment.
@@ -157,6 +161,7 @@ impl ContactDriver {
             events: EventDetector::of_scene(&whole),
             whole,
             off,
+            shifts: Vec::new(),
             free: Arc::clone(&mechanism),
             mechanism,
             driver,
@@ -183,7 +188,7 @@ impl ContactDriver {
     /// The mechanism with the parts that act and on the branches its laws are on, without holds; `compiled`
     /// where nothing was switched.
     pub(super) fn acting(&self, compiled: &Arc<Mechanism>) -> Arc<Mechanism> {
-        if self.whole.laws.is_none() && self.off.is_empty() {
+        if self.whole.laws.is_none() && self.off.is_empty() && self.shifts.is_empty() {
             return Arc::clone(compiled);
         }
         let mut acting = Mechanism::clone(&self.free);
@@ -233,6 +238,7 @@ impl ContactDriver {
             is_between: self.is_between,
             stabilizer: self.stabilizer,
             off: self.off.clone(),
+            shifts: self.shifts.clone(),
             laws: self.whole.laws.as_ref().map(|laws| (laws.parameters.clone(), laws.modes.clone())),
             events: self
                 .events
@@ -276,11 +282,15 @@ impl ContactDriver {
             is_between,
             stabilizer,
             off,
+            shifts,
             laws,
             events,
             extremes,
         } = contact_state;
         let mut whole = mechanism.whole.clone().map_or(mechanism, |(whole, _)| whole);
+        if !shifts.is_empty() {
+            whole = Arc::new(whole.shifted(&shifts));
+        }
         if let Some((parameters, modes)) = laws {
             let sizes = whole.laws.as_ref().map(|laws| (laws.parameters.len(), laws.modes.len()));
             if sizes != Some((parameters.len(), modes.len())) {
@@ -332,6 +342,7 @@ impl ContactDriver {
         Ok(Some(Self {
             whole,
             off,
+            shifts,
             extremes: looking,
             remembered: events,
             held,
@@ -369,6 +380,9 @@ impl ContactDriver {
             events.suit(outcome.plan.tolerance.map(|tolerance| tolerance.relative));
         }
         while self.events_in_row < EVENTS_MOST {
+            if let Some(events) = &mut self.events {
+                events.rest(&self.off);
+            }
             if let Some(monitor) = &mut monitor {
                 monitor.count_events(outcome.impact_count + outcome.persistent_contact_count);
             }

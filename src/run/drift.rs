@@ -196,9 +196,10 @@ impl Drift {
             limit: EnergyLimit::default(),
             scale: mechanism.energy_scale,
             units: mechanism
+                .with_all_parts()
                 .constraints
                 .iter()
-                .map(|row| if row.is_angle() { 1.0 } else { mechanism.size_of_parts() })
+                .map(|row| if row.is_in_radians() { 1.0 } else { mechanism.size_of_parts() })
                 .collect(),
         }
     }

@@ -26,6 +26,8 @@ const HALVINGS: u32 = 4;
 const ROUNDS: usize = 6;
 /// Share of a step within which the event that began it does not happen again.
 const SAME: f64 = 1e-9;
+/// Share of a step in which an event function leaves zero that was kept there by a joint.
+const LEAVES: f64 = 1e-5;
 /// Share of the largest value within a step up to which a condition is at its zero where the step begins.
 const NO_VALUE: f64 = 1e-12;
 /// Steps of this share of the time are rounding.
@@ -155,6 +157,10 @@ pub(super) struct Memory {
     pub pending: Option<(usize, Action)>,
     /// Conditions that changed sign last, and when.
     flipped: Vec<(usize, Time)>,
+    /// Events of the scene that close a joint which is closed: they rest, as their functions do at zero.
+    resting: Vec<usize>,
+    /// Those that rested until the last step.
+    woken: Vec<usize>,
     /// True where what is to be done cannot be: the motion is driven back onto that condition from both sides.
     pub slides: bool,
 }
@@ -169,6 +175,8 @@ pub(super) struct EventDetector {
     /// Where places stick and slide.
     pub friction: Option<FrictionWatch>,
     pub memory: Memory,
+    /// Events of the scene that close joints and locks, and these.
+    closers: Vec<(usize, Vec<String>)>,
     /// What the last coefficients of an interpolant may be over its largest value.
     resolved: f64,
     /// Events since somebody last took them.
@@ -197,8 +205,18 @@ impl EventDetector {
         let laws = mechanism.laws.clone();
         let friction = FrictionWatch::new(&mechanism);
         let (memory, found) = (Memory::default(), Vec::new());
-        let mut detector =
-            Self { events, laws, mechanism, friction, memory, resolved: RESOLVED, found, count: 0 };
+        let mut detector = Self {
+            events,
+            laws,
+            mechanism,
+            friction,
+            memory,
+            closers: Vec::new(),
+            resolved: RESOLVED,
+            found,
+            count: 0,
+        };
+        detector.closers = detector.closing();
         detector.memory.sides = vec![0; detector.functions()];
         detector
     }
@@ -207,6 +225,37 @@ impl EventDetector {
     pub fn of_scene(mechanism: &Arc<Mechanism>) -> Option<Self> {
         let detector = Self::new(Arc::clone(mechanism), Vec::new());
         (detector.functions() > 0).then_some(detector)
+    }
+
+    /// The events of the scene that close joints and locks, and these.
+    fn closing(&self) -> Vec<(usize, Vec<String>)> {
+        let mechanism = &self.mechanism;
+        let is_joint = |part: &String| {
+            let row = mechanism.constraints.iter().position(|row| row.name == *part);
+            mechanism.joints.iter().any(|joint| joint.name == *part)
+                || row.is_some_and(|row| !mechanism.is_motor(row))
+        };
+        let events = self.laws.iter().flat_map(|laws| laws.formulas.events.iter().enumerate());
+        events
+            .map(|(number, event)| (number, event.on.iter().filter(|part| is_joint(part)).cloned().collect()))
+            .filter(|(_, joints): &(usize, Vec<String>)| !joints.is_empty())
+            .collect()
+    }
+
+    /// Lets events rest whose joints are closed, where these parts do not act.
+    pub fn rest(&mut self, off: &[String]) {
+        let Self { closers, memory, .. } = self;
+        for (event, joints) in closers.iter() {
+            let (rests, rested) =
+                (joints.iter().any(|joint| !off.contains(joint)), memory.resting.contains(event));
+            if rests && !rested {
+                memory.resting.push(*event);
+                memory.sides[*event] = 0;
+            } else if rested && !rests {
+                memory.resting.retain(|resting| resting != event);
+                memory.woken.push(*event);
+            }
+        }
     }
 
     /// How many events are the scene's.
@@ -372,6 +421,10 @@ impl EventDetector {
             return self.passages(inside, begin + 0.5 * span, 0.5 * span, depth + 1, all);
         }
         for (event, curve) in curves.iter().enumerate() {
+            if self.memory.resting.contains(&event) {
+                continue;
+            }
+            let is_woken = self.memory.woken.contains(&event);
             let sign = |value: f64| if value > 0.0 { 1 } else { -i8::from(value < 0.0) };
             // From the last node to the first.
             let nodes = &values[event];
@@ -403,7 +456,11 @@ impl EventDetector {
             } else {
                 sign(first)
             };
-            let mut share = 0.0;
+            // What has just left zero is not sent back by rounding.
+            let mut share = if is_woken { LEAVES } else { 0.0 };
+            if is_woken {
+                *side = sign(curve.at(share)[0]);
+            }
             while let Some(zero) = root(curve, 0.0, share, 1.0) {
                 share = zero + SAME;
                 let after = sign(curve.at(share.min(1.0))[0]);
@@ -457,6 +514,7 @@ impl StepWatcher for EventDetector {
         }
         let mut passages = Vec::new();
         self.passages(inside, begin, span, 0, &mut passages);
+        self.memory.woken.clear();
         passages.sort_by(|a, b| (a.t - b.t).hi.total_cmp(&0.0).then(a.event.cmp(&b.event)));
         for Passage { t, event, rises } in passages {
             let is_friction = matches!(self.owner(event), Owner::Friction(..));

@@ -17,8 +17,8 @@ use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::dynamics::constraint::{Measure, Posture};
 use crate::dynamics::contact::scale::magnitudes;
 use crate::dynamics::forest::BodyOrigin;
-use crate::dynamics::impact::Contact;
-use crate::dynamics::{Mechanism, Motion};
+use crate::dynamics::impact::{AWAY, Contact};
+use crate::dynamics::{Mechanism, Motion, Time};
 
 /// Energies, velocities and rates that agree to this share of the magnitudes they are made of agree.
 const AGREES: f64 = 1e-9;
@@ -47,15 +47,24 @@ pub(super) fn closed(tolerance: f64) -> f64 {
 }
 
 /// The gap of a wall over the length of its contact, and its rounding, in doubles.
-pub(super) fn gap(contact: &Contact, angles: usize, phi: &[f64]) -> (f64, f64) {
+pub(super) fn gap(contact: &Contact, angles: usize, t: f64, phi: &[f64]) -> (f64, f64) {
+    if contact.is_off {
+        return (AWAY, 0.0);
+    }
     let z = elements(angles, phi);
-    let rounding = 16.0 * f64::EPSILON * magnitudes(&contact.row, &z) / contact.length;
-    ((contact.normal.dot(contact.point.position(&z)) - offset(contact)) / contact.length, rounding)
+    let moved = contact.row.law.as_ref().map_or(0.0, |law| law.value::<f64>(Time::of(t)));
+    let rounding = 16.0 * f64::EPSILON * (magnitudes(&contact.row, &z) + moved.abs()) / contact.length;
+    let reach = contact.facing(contact.normal, &z).dot(contact.point.position(&z));
+    let offset = if contact.on.is_some() { 0.0 } else { offset(contact) };
+    ((reach - offset - moved) / contact.length, rounding)
 }
 
 /// The rate of that gap \[1/s\].
-pub(super) fn gap_rate(contact: &Contact, angles: usize, phi: &[f64], omega: &[f64]) -> f64 {
-    contact.normal.dot(contact.point.velocity(&elements(angles, phi), omega)) / contact.length
+pub(super) fn gap_rate(contact: &Contact, angles: usize, t: f64, phi: &[f64], omega: &[f64]) -> f64 {
+    if contact.is_off {
+        return 0.0;
+    }
+    (contact.velocity(contact.normal, &elements(angles, phi), omega) - contact.law_rate(t)) / contact.length
 }
 
 /// Whether an impact is what Newton's law of impact makes of the motion before it; else what is wrong.
@@ -69,14 +78,15 @@ pub(super) fn check(
     unmoved(mechanism, UNMOVED, before, after)?;
     let contact = &mechanism.contacts[claim.contact];
     let phi: Vec<f64> = before.phi.iter().map(|phi| phi.hi).collect();
-    let (gap, rounding) = gap(contact, mechanism.bodies.len(), &phi);
+    let (gap, rounding) = gap(contact, mechanism.bodies.len(), before.time.hi, &phi);
     if beyond(gap.abs(), closed(tolerance) + rounding) {
         return Err(format!("the point is {:.2e} m from the wall at the impact", gap * contact.length));
     }
     let (here, slips) = (Sides::new(mechanism, before, after), slips(mechanism, before, after));
     let [approach, departure] =
-        [&before.omega, &after.omega].map(|omega| contact.normal_velocity(&here.z, omega));
-    let step_size = contact.step_size(&before.omega.iter().map(|omega| omega.hi).collect::<Vec<_>>());
+        [&before.omega, &after.omega].map(|omega| contact.normal_velocity(before.time.hi, &here.z, omega));
+    let step_size = contact.law_rate(before.time.hi).abs()
+        + contact.step_size(&before.omega.iter().map(|omega| omega.hi).collect::<Vec<_>>());
     let friction = mechanism.friction_at(claim.contact);
     let is_poisson = friction.is_some_and(|friction| !friction.is_newton);
     let speed_error = departure + contact.restitution * approach;
@@ -195,14 +205,31 @@ fn elements<T: Scalar>(angles: usize, phi: &[T]) -> Vec<Complex<T>> {
 }
 
 impl Contact {
-    /// Velocity of the point along the normal \[m/s\].
-    fn normal_velocity(&self, z: &[Complex<DoubleDouble>], omega: &[DoubleDouble]) -> f64 {
-        Complex::<DoubleDouble>::of(self.normal).dot(self.point.velocity(z, omega)).hi
+    /// Velocity of the point along the normal, seen from the wall \[m/s\].
+    fn normal_velocity(&self, t: f64, z: &[Complex<DoubleDouble>], omega: &[DoubleDouble]) -> f64 {
+        self.velocity(self.normal, z, omega).hi - self.law_rate(t)
     }
 
     /// The same along the wall, the normal turned clockwise.
     fn tangential_velocity(&self, z: &[Complex<DoubleDouble>], omega: &[DoubleDouble]) -> f64 {
-        Complex::<DoubleDouble>::of(-self.normal.left()).dot(self.point.velocity(z, omega)).hi
+        self.velocity(-self.normal.left(), z, omega).hi
+    }
+
+    /// Where a direction of the wall's frame points to.
+    fn facing<T: Scalar>(&self, direction: Complex<f64>, z: &[Complex<T>]) -> Complex<T> {
+        self.on.map_or(Complex::of(direction), |body| z[body].turn(direction))
+    }
+
+    /// Velocity of the point along a direction of the wall's frame, seen from what carries the wall \[m/s\].
+    fn velocity<T: Scalar>(&self, direction: Complex<f64>, z: &[Complex<T>], omega: &[T]) -> T {
+        let facing = self.facing(direction, z);
+        let own = facing.dot(self.point.velocity(z, omega));
+        self.on.map_or(own, |body| own + facing.left().dot(self.point.position(z)) * omega[body])
+    }
+
+    /// Velocity of the wall along its normal by its law \[m/s\].
+    fn law_rate(&self, t: f64) -> f64 {
+        self.row.law.as_ref().map_or(0.0, |law| law.rates::<f64>(Time::of(t)).0)
     }
 }
 

@@ -50,6 +50,7 @@ mod impact_monitor;
 pub mod inside;
 pub mod kinematics;
 #[doc(hidden)]
+mod latch;
 pub mod methods;
 pub mod modes;
 mod monitor;

@@ -553,6 +553,15 @@ fn pair(
         ));
     }
     check_friction(mechanism, method, request)?;
+    if let (MethodId::Taylor, Some(row)) =
+        (method, mechanism.constraints.iter().find(|row| row.aim.is_some()))
+    {
+        return Err(mismatch(
+            format!("taylor on a scene with motor {}", row.name),
+            "its aim depends on where the mechanism is, and its constraint has no power series",
+            "--method dp8, or radau9 where it is stiff",
+        ));
+    }
     if mechanism.is_switched() && !method.is_adaptive() {
         return Err(mismatch(
             format!("{method} on a scene whose laws or parts switch"),

@@ -92,7 +92,7 @@ pub(super) fn reference_while(
         return unsuited("a time lies behind the one before it", "ask for times in ascending order");
     }
     let horizon = times.last().copied().unwrap_or_default();
-    if mechanism.contacts.is_empty() && !mechanism.is_switched() {
+    if mechanism.contacts.is_empty() && !mechanism.is_switched() && !mechanism.has_aims() {
         let walks = EXACT.map(|(order, tolerance)| Walk::exact(mechanism, start, order, tolerance, horizon));
         return Ok(side_by_side(mechanism, walks, times, 0.0, pause));
     }

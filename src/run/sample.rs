@@ -220,7 +220,11 @@ impl Sampler {
             let rate = self.jacobian.iter().zip(&motion.omega).fold(here.drive, |sum, (&g, &w)| sum + g * w);
             sample.constraints[r] = [here.position.hi, rate.hi];
             let force = -self.plain.multiplier[r];
-            sample.motors[r] = if row.law.is_some() { [force, -force * here.drive.hi] } else { [0.0, 0.0] };
+            sample.motors[r] = if row.law.is_some() || row.aim.is_some() {
+                [force, -force * here.drive.hi]
+            } else {
+                [0.0, 0.0]
+            };
         }
         if let Some(outputs) = &mechanism.outputs {
             let moment = Moment {

@@ -40,9 +40,9 @@ impl Shown {
     /// Of the samples of a mechanism.
     pub fn new(mechanism: &Mechanism) -> Self {
         let count = |(r, row): (usize, &ConstraintEquation)| {
-            if mechanism.is_motor(r) { 2 } else { usize::from(row.law.is_some()) }
+            if mechanism.with_all_parts().is_motor(r) { 2 } else { usize::from(row.law.is_some()) }
         };
-        let forces = mechanism.constraints.iter().enumerate().map(count).collect();
+        let forces = mechanism.with_all_parts().constraints.iter().enumerate().map(count).collect();
         Self { bodies: mechanism.own_bodies().len(), friction: !mechanism.frictions.is_empty(), forces }
     }
 
@@ -80,10 +80,10 @@ pub fn header(mechanism: &Mechanism) -> Vec<String> {
         header.push(format!("{quantity} [{unit}]"));
     }
     let shown = Shown::new(mechanism);
-    for (row, &shown) in mechanism.constraints.iter().zip(shown.forces.iter()) {
+    for (row, &shown) in mechanism.with_all_parts().constraints.iter().zip(shown.forces.iter()) {
         let (unit, name) = (row.unit(), row.name());
         header.extend([format!("{name}.C [{unit}]"), format!("{name}.C' [{unit}/s]")]);
-        let force = if row.is_angle() { "torque" } else { "force" };
+        let force = if row.is_in_radians() { "torque" } else { "force" };
         header.extend(
             [format!("{name}.{force} [{}]", row.unit_of_force()), format!("{name}.power [W]")]
                 .into_iter()

@@ -34,7 +34,7 @@ impl WallGuard {
     /// Begins at a moment.
     pub fn begin(&mut self, mechanism: &Mechanism, t: f64, body_angles: &BodyAngles) {
         self.t = t;
-        self.gaps = gaps(mechanism, body_angles);
+        self.gaps = gaps(mechanism, t, body_angles);
     }
 
     /// Takes the end of a step, and tells a contact for which its inside is to be looked at.
@@ -48,7 +48,7 @@ impl WallGuard {
         body_angles: &BodyAngles,
     ) -> Result<Option<usize>, Box<Passed>> {
         self.look(mechanism, t, body_angles)?;
-        let (h, now) = (t - self.t, gaps(mechanism, body_angles));
+        let (h, now) = (t - self.t, gaps(mechanism, t, body_angles));
         let candidate =
             (0..now.len()).find(|&c| !mechanism.held.contains(&c) && dips(&self.gaps[c], &now[c], h));
         (self.t, self.gaps) = (t, now);
@@ -68,7 +68,7 @@ impl WallGuard {
         let mut gap_at = |share: f64| -> Result<f64, Box<Passed>> {
             let (t, body_angles) = at(share);
             self.look(mechanism, t, &body_angles)?;
-            Ok(gap(&mechanism.contacts[contact], mechanism.bodies.len(), &body_angles.phi).0)
+            Ok(gap(&mechanism.contacts[contact], mechanism.bodies.len(), t, &body_angles.phi).0)
         };
         let (mut least, mut place) = (f64::INFINITY, 1);
         for i in 1..PARTS {
@@ -101,7 +101,7 @@ impl WallGuard {
     /// A wall that has been passed, or that a held point has left.
     pub fn look(&self, mechanism: &Mechanism, t: f64, body_angles: &BodyAngles) -> Result<(), Box<Passed>> {
         for (c, contact) in mechanism.contacts.iter().enumerate() {
-            let (gap, rounding) = gap(contact, mechanism.bodies.len(), &body_angles.phi);
+            let (gap, rounding) = gap(contact, mechanism.bodies.len(), t, &body_angles.phi);
             let is_held = mechanism.held.contains(&c);
             let off = if is_held { gap.abs() } else { -gap };
             if off.is_nan() || off > self.closed + rounding {
@@ -117,13 +117,13 @@ impl WallGuard {
     }
 }
 
-fn gaps(mechanism: &Mechanism, body_angles: &BodyAngles) -> Vec<[f64; 2]> {
+fn gaps(mechanism: &Mechanism, t: f64, body_angles: &BodyAngles) -> Vec<[f64; 2]> {
     let angles = mechanism.bodies.len();
     (mechanism.contacts.iter())
         .map(|contact| {
             [
-                gap(contact, angles, &body_angles.phi).0,
-                gap_rate(contact, angles, &body_angles.phi, &body_angles.omega),
+                gap(contact, angles, t, &body_angles.phi).0,
+                gap_rate(contact, angles, t, &body_angles.phi, &body_angles.omega),
             ]
         })
         .collect()

@@ -191,6 +191,14 @@ pub enum Meaning<P = Place> {
 }
 
 impl Meaning {
+    /// True for rates and velocities.
+    fn is_rate(&self) -> bool {
+        matches!(
+            self,
+            Self::Rate(_) | Self::XRate(_) | Self::YRate(_) | Self::LengthRate(_) | Self::RelativeRate(..)
+        )
+    }
+
     /// Its unit, as the format writes units; `rad` for angles.
     pub(super) fn unit_in_words(self) -> &'static str {
         match self {
@@ -247,8 +255,8 @@ pub struct Names {
     known: HashMap<String, (Meaning, Option<Dimension>)>,
     /// Tables, as functions.
     tables: Vec<Interpolant>,
-    /// For every signal what of time and rates is in it.
-    changing: Vec<Option<String>>,
+    /// For every signal what of time and rates is in it, and what of rates alone.
+    changing: Vec<[Option<String>; 2]>,
     /// In the order in which messages list them.
     order: Vec<String>,
 }
@@ -336,21 +344,26 @@ impl Names {
     /// Adds the next signal.
     pub fn signal(&mut self, name: &str, bound: &Bound, dimension: Option<Dimension>) {
         let number = self.changing.len();
-        self.changing.push(self.changing(bound).map(|what| format!("{name}, which depends on {what}")));
+        let found = [self.changing(bound), self.rate_in(bound)];
+        self.changing.push(found.map(|what| what.map(|what| format!("{name}, which depends on {what}"))));
         self.insert(name.to_owned(), Meaning::Signal(number), dimension);
     }
 
     /// The name in a formula that depends on time or rates, if any.
     pub fn changing(&self, bound: &Bound) -> Option<String> {
+        self.first(bound, 0, |meaning| matches!(meaning, Meaning::Time) || meaning.is_rate())
+    }
+
+    /// The name in a formula that depends on rates, if any.
+    pub(super) fn rate_in(&self, bound: &Bound) -> Option<String> {
+        self.first(bound, 1, Meaning::is_rate)
+    }
+
+    /// The first name of that kind, `which` of what is known of signals.
+    fn first(&self, bound: &Bound, which: usize, is_kind: impl Fn(&Meaning) -> bool) -> Option<String> {
         bound.formula.names().zip(&bound.meanings).find_map(|(name, meaning)| match meaning {
-            Meaning::Signal(number) => self.changing[*number].clone(),
-            Meaning::Time
-            | Meaning::Rate(_)
-            | Meaning::XRate(_)
-            | Meaning::YRate(_)
-            | Meaning::LengthRate(_)
-            | Meaning::RelativeRate(..) => Some(name.to_owned()),
-            _ => None,
+            Meaning::Signal(number) => self.changing[*number][which].clone(),
+            meaning => is_kind(meaning).then(|| name.to_owned()),
         })
     }
 

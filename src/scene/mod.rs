@@ -89,6 +89,9 @@ pub struct Scene {
     pub motors: Vec<Motor>,
     /// Motors on sliders: prescribed travels.
     pub drives: Vec<Drive>,
+    /// Motors whose aims depend on where the mechanism is.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub couplings: Vec<Coupling>,
     /// Walls a point cannot pass.
     pub walls: Vec<Wall>,
     /// Dry friction of hinges, sliders and walls, each of them once at most.
@@ -149,9 +152,15 @@ impl Scene {
         self.laws.iter().filter(move |law| !matches!(law.load, Load::Torque { bar, .. } if bar >= own))
     }
 
-    /// True where an event releases the hinge of that name.
-    pub fn is_released(&self, hinge: &str) -> bool {
-        self.events.iter().any(|event| event.off.iter().any(|part| part == hinge))
+    /// True where the part of that name does not act at the start, or events switch it.
+    pub fn is_switched(&self, part: &str) -> bool {
+        let mut switched = self.events.iter().flat_map(|event| event.off.iter().chain(&event.on));
+        self.is_inactive(part) || switched.any(|name| name == part)
+    }
+
+    /// True where the part of that name does not act at the start.
+    pub fn is_inactive(&self, part: &str) -> bool {
+        self.inactive.iter().any(|name| name == part)
     }
 
     /// Adds the rotors of the integrals with their hinges, torques and starts.
@@ -324,6 +333,31 @@ pub struct Drive {
     pub law: Law,
 }
 
+/// An angle or a travel prescribed by where the mechanism is: a gear, a cam.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Coupling {
+    /// Name, unique among motors; it also names the constraint.
+    pub name: String,
+    /// What is prescribed.
+    pub coupled: Coupled,
+    /// What it is to be, a formula of time, angles and positions \[rad; m\].
+    pub aim: String,
+}
+
+/// What a [`Coupling`] prescribes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub enum Coupled {
+    /// The angle of a bar, from another's or from +x.
+    Angle {
+        /// The bar.
+        bar: usize,
+        /// The bar its angle is measured from; `None`: from +x.
+        relative_to: Option<usize>,
+    },
+    /// The travel of a slider, by its index.
+    Travel(usize),
+}
+
 /// A prescribed angle.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Motor {
@@ -349,7 +383,7 @@ pub struct Law {
     pub acceleration: f64,
     /// Sines on top.
     pub sines: Vec<Sine>,
-    /// Any other formula of time, of which the law is the sum with the rest; motors alone have one.
+    /// Any other formula of time, of which the law is the sum with the rest; motors and walls have one.
     pub profile: Option<Profile>,
 }
 
@@ -364,7 +398,7 @@ pub struct Sine {
     pub phase: f64,
 }
 
-/// A line of the ground that a point of a bar cannot pass.
+/// A line of the ground, or of another bar, that a point of a bar cannot pass.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Wall {
     /// Name, unique among walls.
@@ -373,10 +407,14 @@ pub struct Wall {
     pub bar: usize,
     /// The point of the bar, in its frame \[m\].
     pub point: [f64; 2],
-    /// A point of the line \[m\].
+    /// The bar that carries the line; `None`: the ground.
+    pub on: Option<usize>,
+    /// A point of the line, in the frame of what carries it \[m\].
     pub through: [f64; 2],
-    /// Unit normal, towards the side the point may be on.
+    /// Unit normal, towards the side the point may be on, likewise.
     pub normal: [f64; 2],
+    /// How far the line has moved along its normal, as a function of time \[m\]; `None`: it stays.
+    pub law: Option<Law>,
     /// Restitution e: the normal velocity after an impact is -e times the one before; 0 to 1.
     pub restitution: f64,
 }

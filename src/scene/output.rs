@@ -17,7 +17,7 @@
 
 use super::formula::unit::Dimension;
 use super::formula::{Formula, FormulaError};
-use super::{FrictionPlace, Load, Meaning, Names, Place, Rail, Scene};
+use super::{Coupled, Coupling, FrictionPlace, Load, Meaning, Names, Place, Rail, Scene};
 use serde::Serialize;
 use std::collections::HashMap;
 
@@ -85,6 +85,8 @@ pub enum Quantity<P = Place> {
     Travel([P; 2], Option<usize>, [f64; 2], bool),
     /// Gap of a wall \[m\]: the point, a point of the wall and its normal.
     Gap(P, [f64; 2], [f64; 2]),
+    /// Gap of a wall that moves \[m\], by its name.
+    MovingGap(String),
     /// Normal force of a wall \[N\].
     Wall(String),
     /// Friction force \[N\] or torque \[N·m\].
@@ -107,6 +109,7 @@ impl Quantity {
                 Quantity::Travel(points.map(point), body, direction, is_rate)
             }
             Self::Gap(at, through, normal) => Quantity::Gap(point(at), through, normal),
+            Self::MovingGap(name) => Quantity::MovingGap(name),
             Self::Wall(name) => Quantity::Wall(name),
             Self::Friction(name) => Quantity::Friction(name),
         }
@@ -239,6 +242,14 @@ impl OutputNames {
             self.add(name, quantity, unit, Quantity::Multiplier(named(name)));
             self.add(name, "power", "W", Quantity::Power(named(name)));
         }
+        for Coupling { name, coupled, .. } in &scene.couplings {
+            let (quantity, unit) = match coupled {
+                Coupled::Angle { .. } => ("torque", "N·m"),
+                Coupled::Travel(_) => ("force", "N"),
+            };
+            self.add(name, quantity, unit, Quantity::Multiplier(named(name)));
+            self.add(name, "power", "W", Quantity::Power(named(name)));
+        }
         for lock in &scene.locks {
             self.add(&lock.name, "torque", "N·m", Quantity::Multiplier(named(&lock.name)));
         }
@@ -261,7 +272,11 @@ impl OutputNames {
         }
         for wall in &scene.walls {
             let point = Place { bar: Some(wall.bar), point: wall.point };
-            self.add(&wall.name, "gap", "m", Quantity::Gap(point, wall.through, wall.normal));
+            let gap = match wall.on.is_some() || wall.law.is_some() {
+                true => Quantity::MovingGap(wall.name.clone()),
+                false => Quantity::Gap(point, wall.through, wall.normal),
+            };
+            self.add(&wall.name, "gap", "m", gap);
             self.add(&wall.name, "force", "N", Quantity::Wall(wall.name.clone()));
         }
         for friction in &scene.frictions {

@@ -3,7 +3,7 @@
 //! Scenes that were read are sound; this guards the equations against scenes whose fields were changed
 //! afterwards or filled in by a program.
 
-use super::{Friction, FrictionPlace, Law, Place, Scene};
+use super::{Coupled, Friction, FrictionPlace, Law, Place, Scene};
 
 impl Scene {
     /// The first thing that makes no sense, if any: the path of a field, and what is wrong with it.
@@ -44,7 +44,18 @@ impl Scene {
             ("forces", self.forces.iter().map(|part| vec![Some(part.bar)]).collect()),
             ("torques", self.torques.iter().map(|part| vec![Some(part.bar), part.relative_to]).collect()),
             ("motors", self.motors.iter().map(|part| vec![Some(part.bar), part.relative_to]).collect()),
-            ("walls", self.walls.iter().map(|part| vec![Some(part.bar)]).collect()),
+            (
+                "couplings",
+                (self.couplings.iter())
+                    .map(|part| match part.coupled {
+                        Coupled::Angle { bar, relative_to } => vec![Some(bar), relative_to],
+                        Coupled::Travel(slider) => {
+                            vec![self.sliders.get(slider).map_or(Some(usize::MAX), |_| None)]
+                        }
+                    })
+                    .collect(),
+            ),
+            ("walls", self.walls.iter().map(|part| vec![Some(part.bar), part.on]).collect()),
         ];
         let own = |(i, between): (usize, Vec<Option<usize>>)| (between[0] == between[1]).then_some(i);
         let joined = self
@@ -161,7 +172,8 @@ impl Scene {
         let laws = (self.motors.iter().map(|part| (&part.name, Some(&part.law))))
             .chain(self.drives.iter().map(|part| (&part.name, Some(&part.law))))
             .chain(self.forces.iter().map(|part| (&part.name, part.law.as_ref())))
-            .chain(self.torques.iter().map(|part| (&part.name, part.law.as_ref())));
+            .chain(self.torques.iter().map(|part| (&part.name, part.law.as_ref())))
+            .chain(self.walls.iter().map(|part| (&part.name, part.law.as_ref())));
         let mut laws = laws.filter_map(|(name, law)| Some((name, law?)));
         laws.find(|(_, law)| is_wrong(law)).map(|(name, _)| format!("law of {name}: a number is not finite"))
     }

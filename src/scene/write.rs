@@ -4,8 +4,8 @@ use super::fit::written_starts;
 use super::format::GROUND;
 use super::friction::Part;
 use super::{
-    Force, Friction, FrictionPlace, Given, Law, Load, LoadLaw, NamedPoint, Place, Scene, SceneEvent, Slider,
-    Torque,
+    Coupled, Coupling, Force, Friction, FrictionPlace, Given, Law, Load, LoadLaw, NamedPoint, Place, Scene,
+    SceneEvent, Slider, Torque,
 };
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 use serde_json::{Map, Value, json};
@@ -89,6 +89,10 @@ impl Scene {
         let motors: Vec<_> = (self.motors.iter())
             .map(|motor| json!({"name": motor.name, "body": body(Some(motor.bar)), "relative_to": body(motor.relative_to), "law": motor.law}))
             .chain(self.drives.iter().map(|drive| json!({"name": drive.name, "slider": self.sliders[drive.slider].name, "law": drive.law})))
+            .chain(self.couplings.iter().map(|Coupling { name, coupled, aim }| match coupled {
+                Coupled::Angle { bar, relative_to } => json!({"name": name, "body": body(Some(*bar)), "relative_to": body(*relative_to), "law": aim}),
+                Coupled::Travel(slider) => json!({"name": name, "slider": self.sliders[*slider].name, "law": aim}),
+            }))
             .collect();
         let walls: Vec<_> = (self.walls.iter().enumerate())
             .map(|(i, wall)| {
@@ -96,9 +100,14 @@ impl Scene {
                     "name": wall.name,
                     "body": body(Some(wall.bar)),
                     "point": wall.point,
-                    "line": {"through": wall.through, "normal": wall.normal},
+                    "line": with(
+                        json!({"through": wall.through, "normal": wall.normal}),
+                        "body",
+                        &wall.on.map(|bar| body(Some(bar))),
+                    ),
                     "restitution": wall.restitution,
                 });
+                let said = with(said, "law", &wall.law);
                 with(said, "friction", &self.friction((Part::Wall, i)))
             })
             .collect();

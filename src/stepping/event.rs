@@ -20,6 +20,8 @@ const ZERO: f64 = 1e-15;
 const ROUNDS: usize = 4;
 /// Degrees of interpolants of event functions that nothing bounds.
 const DEGREES: [usize; 4] = [8, 16, 32, 64];
+/// Halvings of a step in which they do not suffice.
+const HALVINGS: u32 = 6;
 /// Share of its largest value that such an interpolant may be off.
 const RESOLVED: f64 = 1e-10;
 /// Room for a dense output's powers.
@@ -278,7 +280,7 @@ impl Search {
         let Self { dense, room, gaps, opaque, .. } = self;
         gaps.resize(field.events(), 0.0);
         let [y, slope] = room.get_mut();
-        let at = |share: f64, row: &mut Vec<f64>| {
+        let mut at = |share: f64, row: &mut Vec<f64>| {
             dense.at(share, y, slope);
             field.gaps(state.time + share * h, y, gaps);
             row.extend(opaque.iter().map(|&event| gaps[event]));
@@ -287,9 +289,28 @@ impl Search {
         let is_enough = |_: usize, curve: &Chebyshev| {
             curve.tail() <= RESOLVED * curve.most() || curve.least() > 10.0 * curve.tail()
         };
-        let curves = interpolated(&DEGREES, at, is_enough).curves;
-        for (curve, &event) in curves.iter().zip(&*opaque) {
-            found = found.or_earlier(event, curve, 1.0);
+        let mut parts = vec![(0.0, 1.0, 0)];
+        while let Some((begin, span, depth)) = parts.pop() {
+            if begin >= found.end(1.0) {
+                break;
+            }
+            let looked_at = interpolated(&DEGREES, |share, row| at(begin + share * span, row), is_enough);
+            let curves = &looked_at.curves;
+            // A law of time may be faster than the motion.
+            let is_finite = curves.iter().all(|curve| curve.most().is_finite());
+            if depth < HALVINGS && is_finite && !looked_at.is_resolved {
+                let half = 0.5 * span;
+                parts.extend([(begin + half, half, depth + 1), (begin, half, depth + 1)]);
+                continue;
+            }
+            for (curve, &event) in curves.iter().zip(&*opaque) {
+                let end = ((found.end(1.0) - begin) / span).min(1.0);
+                match crossing(curve, end) {
+                    Crossing::At(share) => found = Found::At(event, begin + share * span),
+                    Crossing::Inside(share) => found = Found::Inside(begin + share * span),
+                    Crossing::Nothing => {}
+                }
+            }
         }
         found
     }

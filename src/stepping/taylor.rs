@@ -52,7 +52,8 @@ use super::search::{self, Powers};
 use super::{Cause, Integrator, Statistics, StepError, Tolerance};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics;
-use crate::dynamics::series::Coefficient;
+use crate::dynamics::impact::Contact;
+use crate::dynamics::series::{Coefficient, powers};
 use crate::dynamics::{Coordinates, Form, Mechanism, OdeSystem, State, Time};
 
 /// Powers the step is taken from.
@@ -298,6 +299,7 @@ impl<T: Coefficient> Taylor<T> {
         expansion.expand(problem.mechanism(), state);
         // What a wall sees of the motion are the unit vectors.
         let mut wanted = expansion.wanted(self.tolerance, problem.events() > 0);
+        wanted = wanted.min(walls_known(problem.mechanism(), state.time, expansion.series().order()));
         if !problem.mechanism().constraints.is_empty() && singular::is_near(problem, expansion) {
             let singular_passage = self.singular_passage.get_or_insert_with(|| {
                 SingularPassage::new(problem.mechanism(), problem.coordinates(), expansion)
@@ -325,7 +327,7 @@ impl<T: Coefficient> Taylor<T> {
         let Self { expansion: Some(expansion), powers, .. } = self else { return Ok((h, None)) };
         let mut found = Found::Nothing;
         for contact in 0..problem.events() {
-            trace(problem, expansion, contact, powers);
+            trace(problem, expansion, state.time, contact, powers);
             let curve = Powers { powers, end: found.end(h) };
             found = found.or_earlier(contact, &curve, h);
         }
@@ -348,7 +350,7 @@ impl<T: Coefficient> Taylor<T> {
         h: f64,
     ) -> f64 {
         let Self { expansion: Some(expansion), powers, gaps, inside, .. } = self else { return t };
-        trace(problem, expansion, event, powers);
+        trace(problem, expansion, state.time, event, powers);
         gaps.resize(problem.events(), 0.0);
         let mut best = t;
         for _ in 0..LANDINGS {
@@ -366,18 +368,31 @@ impl<T: Coefficient> Taylor<T> {
     }
 }
 
+/// How far ahead the series of the laws of walls are known to rounding \[s\].
+fn walls_known(mechanism: &Mechanism, t: Time, order: usize) -> f64 {
+    let known = |contact: &Contact| {
+        let law = contact.row.law.as_ref().filter(|_| !contact.is_off)?;
+        let powers = powers(law, t, order + 1);
+        let last = powers.iter().enumerate().skip(order.saturating_sub(3).max(3));
+        last.map(|(m, power)| (f64::EPSILON * contact.length / power.abs()).powf(1.0 / m as f64))
+            .reduce(f64::min)
+    };
+    mechanism.contacts.iter().filter_map(known).fold(f64::INFINITY, f64::min)
+}
+
 /// Powers of an event function along the series: the gap of a wall over its contact's length, or the force on
 /// a point held there over its contact's force.
 fn trace<T: Coefficient, P: Form + ?Sized>(
     problem: &P,
     expansion: &Expansion<T>,
+    t: Time,
     contact: usize,
     powers: &mut Vec<f64>,
 ) {
     let mechanism = problem.mechanism();
     let series = expansion.series();
     match mechanism.held.iter().position(|&held| held == contact) {
-        None => series.gap(&mechanism.contacts[contact], powers),
+        None => series.gap(&mechanism.contacts[contact], t, powers),
         Some(place) => {
             // The rows of the contacts that are held are the last ones.
             let from_end = mechanism.held.len() - place;

@@ -101,9 +101,9 @@ struct Found {
 impl Mechanism {
     /// The mechanism with its start; `kept` are the rows whose angles are those of the start.
     pub(super) fn assembled(mut self, scene: &Scene, kept: &[usize]) -> Result<Self, CompileError> {
-        // What an event releases is closed by rows, and hangs on nothing by itself.
-        let is_released = scene.hinges.iter().any(|hinge| scene.is_released(&hinge.name));
-        if scene.has_whole_start() && !is_released {
+        // What an event closes or releases is kept by rows, and hangs on nothing by itself.
+        let is_switched = scene.hinges.iter().any(|hinge| scene.is_switched(&hinge.name));
+        if scene.has_whole_start() && !is_switched {
             self.assembly = Assembly {
                 degrees_of_freedom: self.partition.count(),
                 conditioning: if self.constraints.is_empty() { 1.0 } else { f64::NAN },
@@ -189,8 +189,9 @@ impl Mechanism {
                 return Err(CompileError::SpringWithoutLength(spring.name.clone()));
             }
         }
-        for contact in &self.contacts {
-            let gap = contact.row.gap(&z).hi;
+        for contact in self.contacts.iter().filter(|contact| !scene.is_inactive(&contact.row.name)) {
+            let moved = contact.row.law.as_ref().map_or(DoubleDouble::ZERO, |law| law.angle(start.time));
+            let gap = (contact.row.gap(&z) - moved).hi;
             if gap < -SAME * size {
                 return Err(CompileError::BehindWall { wall: contact.row.name.clone(), gap: -gap });
             }

@@ -69,10 +69,12 @@ impl Problem<'_> {
     /// Elements at these coordinates.
     pub fn unit_vectors<T: Real>(&self, q: &[DoubleDouble]) -> (Vec<T>, Vec<Complex<T>>) {
         let angles = self.mechanism.bodies.len();
+        // A gear counts whole turns.
+        let is_whole = self.mechanism.has_aims();
         let phi: Vec<T> = q
             .iter()
             .enumerate()
-            .map(|(k, &q)| T::split(if k < angles { q.reduced().0 } else { q }).0)
+            .map(|(k, &q)| T::split(if k < angles && !is_whole { q.reduced().0 } else { q }).0)
             .collect();
         let mut z = vec![Complex::ZERO; self.coordinates()];
         self.mechanism.tree.unit_vectors::<T, 0>(&phi, &mut z);

@@ -2,12 +2,15 @@
 
 use super::Joint;
 use crate::arithmetic::Complex;
-use crate::dynamics::constraint::{self, ConstraintEquation};
+use crate::dynamics::constraint::{self, Aim, ConstraintEquation, Measure};
 use crate::dynamics::force::Action;
 use crate::dynamics::force::action::Kind;
 use crate::dynamics::forest::Forest;
 use crate::dynamics::law::Law;
-use crate::scene::{Place, Scene, Slider};
+use crate::dynamics::point::Point;
+use crate::dynamics::quadratic::Quadratic;
+use crate::scene::{Coupled, Coupling, Place, Scene, Slider, Wall};
+use std::sync::Arc;
 
 /// Motors, locks, and the angles that welds and locked sliders keep; those not given are what they are at the
 /// start.
@@ -79,6 +82,62 @@ pub(super) fn travel(forest: &Forest, name: &str, slider: &Slider, law: Law) -> 
 /// The row of the travel of a slider without a law.
 pub(in crate::dynamics) fn travel_along(forest: &Forest, slider: &Slider) -> ConstraintEquation {
     on_rail(forest, &slider.name, slider, rail(slider), None)
+}
+
+/// The row of a motor whose aim depends on the mechanism, without its aim.
+pub(super) fn follows(
+    forest: &Forest,
+    Coupling { name, coupled, .. }: &Coupling,
+    scene: &Scene,
+) -> ConstraintEquation {
+    match *coupled {
+        Coupled::Travel(slider) => {
+            on_rail(forest, name, &scene.sliders[slider], rail(&scene.sliders[slider]), None)
+        }
+        Coupled::Angle { .. } => {
+            let nothing = Quadratic { angles: forest.hangs.len(), ..Quadratic::default() };
+            ConstraintEquation {
+                name: name.clone(),
+                measure: Measure::Place(nothing),
+                law: None,
+                push: None,
+                aim: None,
+            }
+        }
+    }
+}
+
+/// Gives rows their aims, by name; rows that were released have none.
+pub(super) fn give_aims(rows: &mut [ConstraintEquation], aims: Vec<(&str, Arc<Aim>)>) {
+    for (name, aim) in aims {
+        if let Some(row) = rows.iter_mut().find(|row| row.name == name && !row.is_angle()) {
+            row.aim = Some(aim);
+        }
+    }
+}
+
+/// The row of how far a point is from the line of its wall along a direction in the frame of what carries it,
+/// and the point as seen from there.
+pub(in crate::dynamics) fn along_wall(
+    forest: &Forest,
+    wall: &Wall,
+    direction: Complex<f64>,
+    law: Option<Law>,
+) -> (ConstraintEquation, Point) {
+    let site = forest.site(&Place { bar: Some(wall.bar), point: wall.point });
+    let (name, angles) = (&wall.name, forest.hangs.len());
+    match wall.on {
+        None => {
+            let offset = direction.dot(Complex::new(wall.through[0], wall.through[1]));
+            let row = constraint::line_equation(name, &site, direction, offset, law, angles);
+            (row, site.point)
+        }
+        Some(bar) => {
+            let through = forest.site(&Place { bar: Some(bar), point: wall.through });
+            let row = constraint::slot_equation(name, &site, bar, &through, direction, law, angles);
+            (row, site.point.minus(&through.point))
+        }
+    }
 }
 
 fn rail(slider: &Slider) -> Complex<f64> {

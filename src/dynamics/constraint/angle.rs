@@ -17,6 +17,7 @@ pub fn angle_equation(name: &str, body: usize, base: Option<usize>, law: Law) ->
         measure: Measure::Angle { body, base },
         law: Some(law),
         push: None,
+        aim: None,
     }
 }
 

@@ -29,6 +29,7 @@ pub fn line_equation(
         measure: Measure::Place(place),
         law,
         push: Some(Push { on: site.body, from: None, way: Way::Ground(normal) }),
+        aim: None,
     }
 }
 

@@ -7,12 +7,14 @@
 //! translational coordinates, and keeps it at zero or at a law of time.  All that evaluates, projects or
 //! expands rows does so for these two measures, so that a new kind is a new function that makes one.
 
+pub mod aim;
 pub mod angle;
 pub mod line;
 pub mod pin;
 pub mod rod;
 pub mod slot;
 
+pub use aim::Aim;
 pub use angle::angle_equation;
 pub use line::line_equation;
 pub use pin::pin_equations;
@@ -25,6 +27,7 @@ use super::point::Point;
 use super::quadratic::Quadratic;
 use crate::arithmetic::angle::difference;
 use crate::arithmetic::{Complex, Real, Scalar};
+use std::sync::Arc;
 
 /// Coordinates, elements and rates at one moment.
 #[derive(Clone, Copy, Debug)]
@@ -111,7 +114,7 @@ impl Push {
     }
 }
 
-/// A row of the mechanism: its measure less a law of time is to be zero.
+/// A row of the mechanism: its measure less a law of time, or a formula of time and place, is to be zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConstraintEquation {
     /// Name in reports: that of the joint or motor, with an axis where there are two.
@@ -122,6 +125,8 @@ pub struct ConstraintEquation {
     pub law: Option<Law>,
     /// The force it exerts, where it is one.
     pub push: Option<Push>,
+    /// The formula of time and place that is taken off.
+    pub aim: Option<Arc<Aim>>,
 }
 
 impl ConstraintEquation {
@@ -132,12 +137,12 @@ impl ConstraintEquation {
 
     /// Unit of C: `rad` or `m`.
     pub fn unit(&self) -> &'static str {
-        if self.is_angle() { "rad" } else { "m" }
+        if self.is_in_radians() { "rad" } else { "m" }
     }
 
     /// Unit of its multiplier and of the torque or force it exerts: `N m` or `N`.
     pub fn unit_of_force(&self) -> &'static str {
-        if self.is_angle() { "N m" } else { "N" }
+        if self.is_in_radians() { "N m" } else { "N" }
     }
 
     /// True for rows that give an angle.
@@ -145,17 +150,25 @@ impl ConstraintEquation {
         matches!(self.measure, Measure::Angle { .. })
     }
 
-    /// True for rows that do work: motors, not locks.
+    /// True where C is an angle: also of a gear or a cam, which gives it by others.
+    pub fn is_in_radians(&self) -> bool {
+        self.is_angle() || self.aim.as_ref().is_some_and(|aim| !aim.angles.is_empty())
+    }
+
+    /// True for rows that do work: motors, not locks, nor gears.
     pub fn is_motor(&self) -> bool {
         self.law.as_ref().is_some_and(|law| !law.is_constant())
+            || self.aim.as_ref().is_some_and(|aim| aim.is_timed)
     }
 
     /// The coordinates it depends on; some may come up more than once.
     pub fn coordinates(&self) -> Vec<usize> {
-        match &self.measure {
+        let mut found: Vec<usize> = match &self.measure {
             Measure::Angle { body, base } => std::iter::once(*body).chain(*base).collect(),
             Measure::Place(place) => place.coordinates(),
-        }
+        };
+        found.extend(self.aim.iter().flat_map(|aim| aim.coordinates()));
+        found
     }
 
     /// C, for a row without a law \[m\]: the gap of a wall.
@@ -183,6 +196,9 @@ impl ConstraintEquation {
                     here.position -= law.value(t);
                     drive(law, t, &mut here);
                 }
+                if let Some(aim) = &self.aim {
+                    aim.subtract(t, at, jacobian, &mut here);
+                }
                 here
             }
         }
@@ -204,6 +220,10 @@ impl ConstraintEquation {
                 let mut here = place.differentiate(at, jacobian);
                 if let Some(law) = &self.law {
                     drive(law, t, &mut here);
+                }
+                if let Some(aim) = &self.aim {
+                    aim.subtract(t, at, jacobian, &mut here);
+                    here.position = T::ZERO;
                 }
                 here
             }

@@ -18,6 +18,7 @@ pub fn pin_equations(name: &str, a: &Site, b: &Site, angles: usize) -> [Constrai
         measure: Measure::Place(Quadratic::along(&span, axis, angles)),
         law: None,
         push: Some(Push { on: a.body, from: b.body, way: Way::Ground(axis) }),
+        aim: None,
     })
 }
 

@@ -20,6 +20,7 @@ pub fn rod_equation(name: &str, a: &Site, b: &Site, length: f64, angles: usize) 
         measure: Measure::Place(place),
         law: None,
         push: Some(Push { on: a.body, from: b.body, way: Way::Span(span, length) }),
+        aim: None,
     }
 }
 

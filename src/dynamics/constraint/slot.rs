@@ -36,6 +36,7 @@ pub fn slot_equation(
         )),
         law,
         push: Some(Push { on: site.body, from: Some(rail), way: Way::Body(rail, normal) }),
+        aim: None,
     }
 }
 

@@ -31,15 +31,18 @@ impl Mechanism {
         self.tree.unit_vectors::<DoubleDouble, 0>(&start.phi, &mut z);
         let z: Vec<Complex<f64>> = z.iter().map(|z| Complex::new(z.re.hi, z.im.hi)).collect();
         let omega: Vec<f64> = start.omega.iter().map(|omega| omega.hi).collect();
-        let own: Vec<f64> =
-            self.contacts.iter().map(|contact| levers(&contact.point) + contact.row.gap(&z).abs()).collect();
+        let own: Vec<f64> = self
+            .contacts
+            .iter()
+            .map(|contact| levers(&contact.point) + contact.distance(start.time, &z).abs())
+            .collect();
         let others = own.iter().copied().fold(0.0, f64::max);
         let gravity = self.gravity.norm_squared().sqrt();
         let energy = self.energy_of_start(start);
         let pushed = self.forces_at_start(start, size(&self.bodies));
         let mass: f64 = self.bodies.iter().map(|body| body.mass).sum();
         for (contact, own) in self.contacts.iter_mut().zip(own) {
-            let speed = contact.normal.dot(contact.point.velocity(&z, &omega));
+            let speed = contact.gap_rate(start.time, &z, &omega);
             let thrown = speed * speed / gravity;
             let length = [own, others, size(&self.bodies), thrown, 1.0]
                 .into_iter()
@@ -49,7 +52,7 @@ impl Mechanism {
             contact.length = power_of_two(length.max(rounding / ROUNDED));
             let force = energy / contact.length
                 + mass * gravity
-                + driven(&self.constraints, mass, contact.length)
+                + driven(self.constraints.iter().chain([&contact.row]), mass, contact.length)
                 + applied(&self.actions, contact.length)
                 + pushed / contact.length;
             contact.force = power_of_two(if force.is_finite() && force > 0.0 { force } else { 1.0 });
@@ -74,7 +77,11 @@ fn levers(point: &Point) -> f64 {
 pub fn magnitudes(row: &ConstraintEquation, z: &[Complex<f64>]) -> f64 {
     let Measure::Place(place) = &row.measure else { return 0.0 };
     let part = |&(k, g): &(usize, Complex<f64>)| (g.re * z[k].re).abs() + (g.im * z[k].im).abs();
-    place.constant.abs() + place.linear.iter().map(part).sum::<f64>()
+    let linear = place.constant.abs() + place.linear.iter().map(part).sum::<f64>();
+    place.bilinear.iter().fold(linear, |sum, &(j, k, h)| {
+        let other = h * z[k];
+        sum + (z[j].re * other.re).abs() + (z[j].im * other.im).abs()
+    })
 }
 
 /// The longest body \[m\], 0 where none has a length.
@@ -84,7 +91,7 @@ fn size(bodies: &[Body]) -> f64 {
 }
 
 /// What motors ask for at most, roughly \[N\].
-fn driven(rows: &[ConstraintEquation], mass: f64, length: f64) -> f64 {
+fn driven<'a>(rows: impl Iterator<Item = &'a ConstraintEquation>, mass: f64, length: f64) -> f64 {
     let force = |row: &ConstraintEquation| {
         let Some(law) = &row.law else { return 0.0 };
         let peaks = law.profile.as_ref().map_or([0.0; 2], Profile::peaks);
@@ -99,7 +106,7 @@ fn driven(rows: &[ConstraintEquation], mass: f64, length: f64) -> f64 {
             mass * (acceleration + rate * rate / length)
         }
     };
-    rows.iter().map(force).sum()
+    rows.map(force).sum()
 }
 
 /// The magnitudes of applied forces, and of torques over `length` \[N\].

@@ -6,11 +6,13 @@
 
 use super::{Force, Loads, UserForce};
 use crate::arithmetic::Scalar;
-use crate::dynamics::constraint::Site;
+use crate::arithmetic::tape::Symbol;
+use crate::dynamics::constraint::{Aim, Site};
 use crate::dynamics::forest::Forest;
 use crate::dynamics::{CompileError, Configuration};
 use crate::scene::formula::Formula;
-use crate::scene::{Bound, Direction, Load, Meaning, Names, Place, Profile, Scene, Scope};
+use crate::scene::{Bound, Coupled, Coupling, Direction, Load, Meaning, Names, Place, Profile, Scene, Scope};
+use std::sync::Arc;
 
 /// From the first point to the second: the vector and its length.
 fn span<S: Scalar>(at: &Configuration<S>, [a, b]: &[Site; 2]) -> ([S; 2], S) {
@@ -103,6 +105,15 @@ pub(crate) struct FormulaEvent {
     set: Vec<(usize, Expression)>,
 }
 
+/// A part that moves by a law of time.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Driven {
+    /// Its name.
+    pub name: String,
+    /// True for a wall, false for a motor.
+    pub is_wall: bool,
+}
+
 /// All formulas of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Formulas {
@@ -110,8 +121,10 @@ pub(crate) struct Formulas {
     pub parameters: Vec<f64>,
     signals: Vec<Expression>,
     laws: Vec<Law>,
-    /// Laws of motors that are formulas, by the names of these.
-    profiles: Vec<(String, Expression)>,
+    /// Laws of motors and walls that are formulas.
+    profiles: Vec<(Driven, Expression)>,
+    /// Aims of motors that depend on the mechanism, with the angles they are of.
+    aims: Vec<(String, Vec<usize>, Expression)>,
     /// Events.
     pub events: Vec<FormulaEvent>,
     /// What each condition is part of, for messages.
@@ -148,10 +161,16 @@ impl Binder<'_> {
 impl Formulas {
     /// Those of a scene; `None` where it has none.
     pub fn of(scene: &Scene, forest: &Forest) -> Result<Option<Self>, CompileError> {
-        let motors = (scene.motors.iter().map(|motor| (&motor.name, &motor.law)))
-            .chain(scene.drives.iter().map(|drive| (&drive.name, &drive.law)));
-        let motors: Vec<_> = motors.filter_map(|(name, law)| Some((name, law.profile.as_ref()?))).collect();
-        if scene.laws.is_empty() && scene.events.is_empty() && motors.is_empty() {
+        let motors = (scene.motors.iter().map(|motor| (&motor.name, Some(&motor.law), false)))
+            .chain(scene.drives.iter().map(|drive| (&drive.name, Some(&drive.law), false)))
+            .chain(scene.walls.iter().map(|wall| (&wall.name, wall.law.as_ref(), true)));
+        let driven: Vec<_> = motors
+            .filter_map(|(name, law, is_wall)| {
+                Some((Driven { name: name.clone(), is_wall }, law?.profile.as_ref()?))
+            })
+            .collect();
+        let is_plain = scene.laws.is_empty() && scene.couplings.is_empty();
+        if is_plain && scene.events.is_empty() && driven.is_empty() {
             return Ok(None);
         }
         let mut names = Names::of(scene);
@@ -202,8 +221,17 @@ impl Formulas {
             laws.push(Law { name: law.name.clone(), potential, place });
         }
         let mut profiles = Vec::new();
-        for (name, profile) in motors {
-            profiles.push((name.clone(), binder.expression(&names.alone(), profile.text(), name)?));
+        for (part, profile) in driven {
+            let expression = binder.expression(&names.alone(), profile.text(), &part.name)?;
+            profiles.push((part, expression));
+        }
+        let mut aims = Vec::new();
+        for Coupling { name, coupled, aim } in &scene.couplings {
+            let angles = match *coupled {
+                Coupled::Angle { bar, relative_to } => std::iter::once(bar).chain(relative_to).collect(),
+                Coupled::Travel(_) => Vec::new(),
+            };
+            aims.push((name.clone(), angles, binder.expression(&names.alone(), aim, name)?));
         }
         let conditions = std::mem::take(&mut binder.conditions);
         let parameter = |name: &String| scene.parameters.iter().position(|known| known.name == *name);
@@ -226,7 +254,7 @@ impl Formulas {
             });
         }
         let parameters = scene.parameters.iter().map(|parameter| parameter.value).collect();
-        Ok(Some(Self { parameters, signals, laws, profiles, events, conditions }))
+        Ok(Some(Self { parameters, signals, laws, profiles, aims, events, conditions }))
     }
 
     /// True where a law applies forces beside potentials, on whatever branch.
@@ -260,21 +288,39 @@ impl Formulas {
         self.laws.iter().map(record).collect()
     }
 
-    /// True where laws of motors are formulas.
+    /// True where laws of motors or walls are formulas.
     pub fn drives(&self) -> bool {
-        !self.profiles.is_empty()
+        !self.profiles.is_empty() || !self.aims.is_empty()
     }
 
-    /// The laws of motors on the same branches, with the names of these.
-    pub fn profiles(&self, parameters: &[f64], modes: &[bool]) -> impl Iterator<Item = (&str, Profile)> {
-        self.profiles.iter().map(move |(name, expression)| {
+    /// The laws of motors and walls on the same branches.
+    pub fn profiles(&self, parameters: &[f64], modes: &[bool]) -> impl Iterator<Item = (&Driven, Profile)> {
+        self.profiles.iter().map(move |(part, expression)| {
             let value = |meaning: &Meaning<Site>| match meaning {
                 Meaning::Parameter(number) => Some(parameters[*number]),
                 _ => None,
             };
             let values: Vec<Option<f64>> = expression.meanings.iter().map(value).collect();
-            (name.as_str(), Profile::on_branch(&expression.formula, &values, expression.modes(modes)))
+            (part, Profile::on_branch(&expression.formula, &values, expression.modes(modes)))
         })
+    }
+
+    /// The aims of motors that depend on the mechanism, by name, on the branches that `modes` say.
+    ///
+    /// # Errors
+    /// One that depends on rates.
+    pub fn aims(&self, parameters: &[f64], modes: &[bool]) -> Result<Vec<(&str, Arc<Aim>)>, CompileError> {
+        let aim = |(name, angles, expression): &'_ (String, Vec<usize>, Expression)| {
+            let formula = |at: &Configuration<Symbol>| {
+                let signals = self.signals(at, parameters, modes);
+                let values = expression.values(at, parameters, &signals);
+                expression.formula.evaluate(&values, expression.modes(modes))
+            };
+            Aim::record(angles, formula)
+                .map(Arc::new)
+                .ok_or_else(|| CompileError::Unsound(format!("motor {name}: its aim depends on rates")))
+        };
+        self.aims.iter().map(|of| Ok((of.0.as_str(), aim(of)?))).collect()
     }
 
     /// The values of all conditions, on the branches that `modes` say.
@@ -285,7 +331,8 @@ impl Formulas {
         }
         let signals = self.signals(at, parameters, modes);
         let laws = self.laws.iter().flat_map(Law::expressions);
-        let profiles = self.profiles.iter().map(|profile| &profile.1);
+        let profiles =
+            self.profiles.iter().map(|profile| &profile.1).chain(self.aims.iter().map(|aim| &aim.2));
         for expression in self.signals.iter().chain(laws).chain(profiles) {
             if expression.formula.conditions() > 0 {
                 let values = expression.values(at, parameters, &signals);

@@ -4,6 +4,14 @@ use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::Time;
 use crate::dynamics::law::Law;
 
+/// So many powers 0, 1, … of a law about time `t` \[u/s^m\].
+pub fn powers(law: &Law, t: Time, count: usize) -> Vec<f64> {
+    let mut rate = vec![0.0; count.max(2)];
+    add(law, 1.0, t, &mut rate, 0, 1);
+    let rest = rate.iter().zip(1..count).map(|(rate, m)| rate / m as f64);
+    std::iter::once(law.value::<f64>(t)).chain(rest).collect()
+}
+
 /// Adds `sign` times the powers 0, 1, … of a law's rate about time `t` to a series of stride `stride` from
 /// `first`.
 pub fn add<T: Real>(law: &Law, sign: f64, t: Time, series: &mut [T], first: usize, stride: usize) {

@@ -8,10 +8,10 @@ use super::super::running::Outcome;
 use super::{ContactDriver, HOLDS_MOST, Held, ImpactRecord, Jump, KEPT, NO_SPEED, PersistentContact, ROUNDS};
 use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::friction::{Friction, Mode, Normal, Transition};
-use crate::dynamics::impact::{Contact, Impact};
+use crate::dynamics::impact::Impact;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::multiplier::Multiplier;
-use crate::dynamics::{Form, Mechanism, Motion};
+use crate::dynamics::{Form, Mechanism, Motion, Time};
 use crate::stabilization::projection::project;
 use crate::stepping::{Cause, StepError};
 use std::sync::Arc;
@@ -34,8 +34,8 @@ impl ContactDriver {
             for number in 0..self.free.contacts.len() {
                 let posture = self.posture();
                 let contact = &self.free.contacts[number];
-                let approach = -contact.normal.dot(contact.point.velocity(&posture.z, &posture.omega));
-                let is_met = contact.touches(&posture.z)
+                let approach = -contact.gap_rate(posture.t, &posture.z, &posture.omega);
+                let is_met = contact.touches(posture.t, &posture.z)
                     && approach > NO_SPEED * contact.step_size(&posture.omega).max(hardest);
                 if is_met && !self.mechanism.held.contains(&number) {
                     hardest = hardest.max(self.impact_at(number, outcome)?);
@@ -184,11 +184,11 @@ impl ContactDriver {
         outcome: &mut Outcome,
     ) -> Result<(), StepError> {
         let motion = self.motion();
-        let Posture { z, phi, omega } = self.posture();
+        let Posture { z, phi, omega, .. } = self.posture();
         let touches = |contact: &usize| {
             Some(*contact) == struck
                 || self.mechanism.held.contains(contact)
-                || self.free.contacts[*contact].touches(&z)
+                || self.free.contacts[*contact].touches(motion.time, &z)
         };
         let touching: Vec<usize> = (0..self.free.contacts.len())
             .filter(|contact| Some(*contact) != released && touches(contact))
@@ -203,9 +203,9 @@ impl ContactDriver {
         };
         let still: Vec<usize> = (touching.iter().copied())
             .filter(|&contact| {
-                let Contact { normal, point, .. } = &self.free.contacts[contact];
-                let size = self.free.contacts[contact].step_size(&omega);
-                staying.contains(&contact) || normal.dot(point.velocity(&z, &omega)).abs() <= NO_SPEED * size
+                let touching = &self.free.contacts[contact];
+                let speed = touching.gap_rate(motion.time, &z, &omega);
+                staying.contains(&contact) || speed.abs() <= NO_SPEED * touching.step_size(&omega)
             })
             .collect();
         let (staying, modes) = self.friction_modes(staying, &still, transition, outcome)?;
@@ -281,7 +281,7 @@ impl ContactDriver {
     }
 
     /// Books the holds that end and those that begin.
-    pub(super) fn record(&mut self, contacts: &[usize], t: f64, outcome: &mut Outcome) {
+    pub(in crate::run) fn record(&mut self, contacts: &[usize], t: f64, outcome: &mut Outcome) {
         self.held.retain(|held| {
             let stays = contacts.contains(&held.contact);
             if !stays {
@@ -325,6 +325,7 @@ impl ContactDriver {
         let motion = self.motion();
         let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
         Posture {
+            t: motion.time,
             z: self.free.elements(&phi),
             omega: motion.omega.iter().map(|omega| omega.hi).collect(),
             phi,
@@ -340,8 +341,9 @@ pub(in crate::run) fn in_modes(free: &Arc<Mechanism>, contacts: &[usize], modes:
     Arc::new(free.moving(contacts, modes))
 }
 
-/// Elements, coordinates \[rad, m\] and rates \[rad/s, m/s\] as doubles.
+/// Time, elements, coordinates \[rad, m\] and rates \[rad/s, m/s\] as doubles.
 struct Posture {
+    t: Time,
     z: Vec<Complex<f64>>,
     phi: Vec<f64>,
     omega: Vec<f64>,

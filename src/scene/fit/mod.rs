@@ -54,7 +54,7 @@ pub(super) fn fitted(
     if whole {
         let posture = hanging.posture(&start);
         posture::springs(&posture, &scene.springs, places.springs)?;
-        posture::walls(&posture, &scene.walls, places.walls)?;
+        posture::walls(&posture, &scene, places.walls)?;
     }
     Ok(Scene { start, given: said, ..scene })
 }
@@ -93,6 +93,7 @@ impl Hanging {
         let joints: Vec<&[Place; 2]> = scene
             .hinges
             .iter()
+            .filter(|hinge| !scene.is_inactive(&hinge.name))
             .map(|hinge| &hinge.between)
             .chain(scene.welds.iter().map(|weld| &weld.between))
             .collect();
@@ -129,8 +130,13 @@ impl Hanging {
     fn has_whole_start(&self, scene: &Scene) -> bool {
         let only_angles = scene.sliders.is_empty() && scene.welds.is_empty() && scene.drives.is_empty();
         let only_angles = only_angles && !scene.springs.iter().any(|spring| spring.rigid);
-        let angles_known = scene.locks.iter().all(|lock| lock.angle.is_some());
-        only_angles && angles_known && !self.looped && self.order.len() == scene.bars.len()
+        let angles_known =
+            scene.locks.iter().all(|lock| lock.angle.is_some() || scene.is_inactive(&lock.name));
+        only_angles
+            && scene.couplings.is_empty()
+            && angles_known
+            && !self.looped
+            && self.order.len() == scene.bars.len()
     }
 
     /// A bar of a tree on the ground that moves no mass when it turns.

@@ -4,7 +4,7 @@ use super::{Hang, Hanging, SAME};
 use crate::scene::error::SceneError;
 use crate::scene::format::about;
 use crate::scene::read::At;
-use crate::scene::{Place, Spring, Start, Wall};
+use crate::scene::{Place, Scene, Spring, Start, Wall};
 
 /// Where everything is at t = 0.
 pub(super) struct Posture {
@@ -57,11 +57,19 @@ pub(super) fn springs(posture: &Posture, springs: &[Spring], places: &[At]) -> R
 }
 
 /// Refuses a wall whose point starts behind it.
-pub(super) fn walls(posture: &Posture, walls: &[Wall], places: &[At]) -> Result<(), SceneError> {
-    for (Wall { name, bar, point, through, normal, .. }, at) in walls.iter().zip(places) {
+pub(super) fn walls(posture: &Posture, scene: &Scene, places: &[At]) -> Result<(), SceneError> {
+    for (wall, at) in scene.walls.iter().zip(places) {
+        let Wall { name, bar, point, on, through, normal, law, .. } = wall;
+        if scene.is_inactive(name) {
+            continue;
+        }
         let (position, way) = posture.at(Place { bar: Some(*bar), point: *point });
-        let gap = (position[0] - through[0]) * normal[0] + (position[1] - through[1]) * normal[1];
-        if gap < -SAME * (way + through[0].abs() + through[1].abs()) {
+        let (origin, way_there) = posture.at(Place { bar: *on, point: *through });
+        let [c, s] = on.map_or([1.0, 0.0], |bar| posture.bars[bar].1);
+        let turned = [c * normal[0] - s * normal[1], s * normal[0] + c * normal[1]];
+        let travel = law.as_ref().map_or(0.0, |law| law.at_start().phi);
+        let gap = (position[0] - origin[0]) * turned[0] + (position[1] - origin[1]) * turned[1] - travel;
+        if gap < -SAME * (way + way_there + travel.abs()) {
             let problem = format!("(wall `{name}`) has its point {} m behind it at the start", about(-gap));
             let hint = format!(
                 "start elsewhere, move the wall, or turn its normal to [{}, {}]",

@@ -21,14 +21,16 @@ struct AngleConstraint<'a> {
 impl<'a> AngleConstraint<'a> {
     /// Those of a scene, motors first.
     fn all(scene: &'a Scene) -> Vec<Self> {
-        let motors = scene.motors.iter().map(|motor| Self {
+        let acting = scene.motors.iter().filter(|motor| !scene.is_inactive(&motor.name));
+        let motors = acting.map(|motor| Self {
             kind: "motor",
             name: &motor.name,
             base: body(motor.relative_to),
             bar: body(Some(motor.bar)),
             law: motor.law.at_start(),
         });
-        let locks = scene.locks.iter().filter_map(|lock| {
+        let acting = scene.locks.iter().filter(|lock| !scene.is_inactive(&lock.name));
+        let locks = acting.filter_map(|lock| {
             let law = Start { phi: lock.angle?, omega: 0.0 };
             Some(Self {
                 kind: "lock",
@@ -174,14 +176,11 @@ pub(super) fn starts(
     given: &[Option<GivenStart>],
     whole: bool,
 ) -> Result<(Vec<Start>, Vec<Given>), SceneError> {
-    let place = |number: usize| match number.checked_sub(scene.motors.len()) {
-        None => &places.motors[number],
-        Some(lock) => {
-            let with_angle =
-                scene.locks.iter().enumerate().filter(|(_, lock)| lock.angle.is_some()).nth(lock);
-            &places.locks[with_angle.map_or(0, |(number, _)| number)]
-        }
-    };
+    let motors = scene.motors.iter().zip(places.motors).filter(|(motor, _)| !scene.is_inactive(&motor.name));
+    let locks = (scene.locks.iter().zip(places.locks))
+        .filter(|(lock, _)| lock.angle.is_some() && !scene.is_inactive(&lock.name));
+    let of_rows: Vec<&At> = motors.map(|(_, at)| at).chain(locks.map(|(_, at)| at)).collect();
+    let place = |number: usize| of_rows[number];
     let angle_constraints = AngleConstraints::of(scene).map_err(|number| {
         let AngleConstraint { kind, name, .. } = AngleConstraint::all(scene).swap_remove(number);
         let does = if kind == "motor" { "drives" } else { "holds" };

@@ -591,6 +591,9 @@ pub(in crate::scene) static DRIVE: Table = Table {
     ],
 };
 
+/// The law of a wall.
+pub(in crate::scene) static WALL_LAW: Table =
+    Table { title: "a law of a wall", about: SUM, fields: &TRAVEL_TERMS };
 /// The law of a motor.
 pub(in crate::scene) static LAW: Table = Table { title: "a law", about: SUM, fields: &ANGLE_TERMS };
 /// The law of a motor on a slider.
@@ -653,7 +656,7 @@ const fn wave(amplitude: Quantity) -> [Field; 3] {
 /// A wall.
 pub(in crate::scene) static WALL: Table = Table {
     title: "a wall",
-    about: "A line of the ground that a point of a bar cannot pass.",
+    about: "A line of the ground, or of another bar, that a point of a bar cannot pass.",
     fields: &[
         required("name", Shape::Name, "\"wall\"", "Name, unique among walls."),
         required("body", Shape::Body { ground: false }, "\"bar2\"", "The bar."),
@@ -664,6 +667,12 @@ pub(in crate::scene) static WALL: Table = Table {
             Shape::Number(Quantity { least: 0.0, most: 1.0, unit: "" }),
             "0.5",
             "The normal velocity after an impact is -restitution times the one before: 0 plastic, 1 elastic.",
+        ),
+        optional(
+            "law",
+            Shape::Law(&WALL_LAW, signed("m")),
+            "\"5 mm*sin(30*t)\"",
+            "How far the line has moved along its normal, as a function of time; it stays if absent.",
         ),
         optional(
             "friction",
@@ -677,8 +686,14 @@ pub(in crate::scene) static WALL: Table = Table {
 /// The line of a wall.
 pub(in crate::scene) static LINE: Table = Table {
     title: "a line",
-    about: "A line of the ground.",
+    about: "A line of the ground, or of a bar.",
     fields: &[
+        optional(
+            "body",
+            Shape::Body { ground: true },
+            "\"table\"",
+            "The bar that carries the line, which is in its frame; the ground if absent.",
+        ),
         required("through", Shape::Pair(signed("m")), "[0, 0]", "A point of the line."),
         required(
             "normal",

@@ -1,7 +1,9 @@
 //! What joins bodies: hinges, sliders, welds and locks; and the walls that stop them.
 
 use super::at::Fields;
+use super::loads::law_if_any;
 use super::names::Bars;
+use super::resolve::Constants;
 use crate::scene::error::SceneError;
 use crate::scene::format::{LINE, RAIL};
 use crate::scene::{Hinge, Lock, Place, Rail, Slider, Wall, Weld};
@@ -35,12 +37,25 @@ pub(super) fn lock(fields: &Fields, name: String, known: &Bars) -> Result<Lock, 
 }
 
 /// A wall.
-pub(super) fn wall(fields: &Fields, name: String, known: &Bars) -> Result<Wall, SceneError> {
+pub(super) fn wall(
+    fields: &Fields,
+    name: String,
+    known: &Bars,
+    constants: &Constants,
+) -> Result<Wall, SceneError> {
     let bar = known.bar(fields, "a wall stops a point of a bar")?;
     let point = fields.pair("point")?;
     let line = fields.required("line")?.object(&LINE)?;
+    let on = line.optional("body").map_or(Ok(None), |at| match known.body(&at)? {
+        Some(carrier) if carrier == bar => Err(at.refuse_value(
+            "must be another bar than `body` of the wall",
+            "a bar cannot meet its own line; leave it out for a line of the ground",
+        )),
+        carrier => Ok(carrier),
+    })?;
     let through = line.pair("through")?;
     let normal =
         line.direction("normal", "[1, 0] for a wall the point must stay right of, [0, 1] for a floor")?;
-    Ok(Wall { name, bar, point, through, normal, restitution: fields.number("restitution")? })
+    let (restitution, law) = (fields.number("restitution")?, law_if_any(fields, constants)?);
+    Ok(Wall { name, bar, point, on, through, normal, law, restitution })
 }

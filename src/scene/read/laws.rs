@@ -12,7 +12,7 @@ use crate::scene::law::{
 };
 use crate::scene::locate::{Member, Node, Value};
 use crate::scene::set::hint;
-use crate::scene::{Force, Scene, Spring, Torque, TorsionSpring};
+use crate::scene::{Coupling, Force, Scene, Spring, Torque, TorsionSpring};
 
 /// Signals at most.
 const MOST: usize = 1000;
@@ -251,7 +251,7 @@ pub(super) fn integrals(
 /// Judges every formula of a scene where it stands: its names, its dimensions; and the parts that events name.
 pub(super) fn check<'a>(root: &At<'a>, scene: &Scene, parameters: &[Known]) -> Result<(), SceneError> {
     let is_plain = scene.laws.is_empty() && scene.signals.is_empty() && scene.integrals.is_empty();
-    if is_plain && scene.events.is_empty() && scene.inactive.is_empty() {
+    if is_plain && scene.events.is_empty() && scene.inactive.is_empty() && scene.couplings.is_empty() {
         return Ok(());
     }
     let mut names = Names::of(scene);
@@ -296,12 +296,23 @@ pub(super) fn check<'a>(root: &At<'a>, scene: &Scene, parameters: &[Known]) -> R
         let at = found(root.child("integrals").and_then(|at| at.child(&integral.name)));
         judge(&at, &integral.formula, &scope, None)?;
     }
+    for Coupling { name, aim, .. } in &scene.couplings {
+        let part = found(root.child("motors").and_then(|at| at.named(name)));
+        let at = found(part.child("law"));
+        let (bound, _) = judge(&at, aim, &scope, quantity_of("motors", "law", &part).as_ref())?;
+        if let Some(name) = names.rate_in(&bound) {
+            let problem = format!("depends on {name}");
+            let allowed = "the aim of a motor is a formula of time, angles and positions";
+            let hint = "what acts on rates is a torque, as \"kp*(aim - arm.phi) - kd*arm.omega\" in torques";
+            return Err(at.refuse(&problem, allowed, hint));
+        }
+    }
     let parts = Parts::of(scene);
     for event in &scene.events {
         let at = found(root.child("events").and_then(|at| at.named(&event.name)));
         judge(&found(at.child("when")), &event.when, &scope, None)?;
         at.child("on").map_or(Ok(()), |list| parts.check(&list))?;
-        at.child("off").map_or(Ok(()), |list| parts.with_joints(scene).check(&list))?;
+        at.child("off").map_or(Ok(()), |list| parts.check(&list))?;
         for (name, text) in &event.set {
             let value = found(at.child("set").and_then(|set| set.child(name)));
             let known: Vec<&str> = parameters.iter().map(|known| known.name.as_str()).collect();
@@ -320,9 +331,12 @@ fn quantity_of(list: &str, key: &str, part: &At) -> Option<Quantity> {
     let Some(Field { shape: Shape::List { of, .. }, .. }) = SCENE.field(list) else { return None };
     let table = crate::scene::format::kind(of, |key| part.has(key))?;
     match table.field(key).map(|field| &field.shape) {
-        Some(Shape::Formula(quantity) | Shape::LawNumber(quantity) | Shape::LawPair(quantity)) => {
-            Some(*quantity)
-        }
+        Some(
+            Shape::Formula(quantity)
+            | Shape::LawNumber(quantity)
+            | Shape::LawPair(quantity)
+            | Shape::Law(_, quantity),
+        ) => Some(*quantity),
         _ => None,
     }
 }
@@ -353,8 +367,8 @@ fn is_of_place(at: &At, names: &Names, bound: &Bound) -> Result<(), SceneError> 
     Err(at.refuse(&problem, allowed, hint))
 }
 
-/// What events can switch, and what that is in words.
-struct Parts<'a>(Vec<&'a str>, &'static str);
+/// What events can switch.
+struct Parts<'a>(Vec<&'a str>);
 
 impl<'a> Parts<'a> {
     fn of(scene: &'a Scene) -> Self {
@@ -362,18 +376,14 @@ impl<'a> Parts<'a> {
             .chain(scene.torsion_springs.iter().map(|part| &part.name))
             .chain(scene.forces.iter().map(|part| &part.name))
             .chain(scene.torques.iter().map(|part| &part.name))
-            .chain(scene.laws.iter().map(|part| &part.name));
-        Self(names.map(String::as_str).collect(), "a spring, torsion spring, force, torque or potential")
-    }
-
-    /// The same with hinges and motors, which events can release but not put back.
-    fn with_joints(&self, scene: &'a Scene) -> Self {
-        let joints = (scene.hinges.iter().map(|part| &part.name))
+            .chain(scene.laws.iter().map(|part| &part.name))
+            .chain(scene.hinges.iter().map(|part| &part.name))
             .chain(scene.motors.iter().map(|part| &part.name))
             .chain(scene.drives.iter().map(|part| &part.name))
-            .map(String::as_str);
-        let names = self.0.iter().copied().chain(joints).collect();
-        Self(names, "a hinge, motor, spring, torsion spring, force, torque or potential")
+            .chain(scene.couplings.iter().map(|part| &part.name))
+            .chain(scene.locks.iter().map(|part| &part.name))
+            .chain(scene.walls.iter().map(|part| &part.name));
+        Self(names.map(String::as_str).collect())
     }
 
     /// Refuses a list with a name that none has.
@@ -390,7 +400,8 @@ impl<'a> Parts<'a> {
                 None if self.0.is_empty() => "the scene has none".to_owned(),
                 None => format!("there are: {}", listed(&self.0)),
             };
-            return Err(at.refuse_value(&format!("must be the name of {}", self.1), &hint));
+            let allowed = "must be the name of a spring, torsion spring, force, torque, potential, hinge, motor, lock or wall";
+            return Err(at.refuse_value(allowed, &hint));
         }
         Ok(())
     }

@@ -6,7 +6,9 @@ use super::resolve::Constants;
 use crate::scene::error::SceneError;
 use crate::scene::format::{DRIVE, Field, Shape};
 use crate::scene::locate::Value;
-use crate::scene::{Drive, Force, Law, Motor, Sine, Slider, Spring, Torque, TorsionSpring};
+use crate::scene::{
+    Coupled, Coupling, Drive, Force, Law, Motor, Sine, Slider, Spring, Torque, TorsionSpring,
+};
 
 /// A spring.
 pub(super) fn spring(fields: &Fields, name: String, known: &Bars) -> Result<Spring, SceneError> {
@@ -92,6 +94,7 @@ pub(super) fn torque(fields: &Fields, name: String, known: &Bars) -> Result<Torq
 pub(super) enum AnyMotor<'a> {
     Angle(Motor, At<'a>),
     Travel(Drive),
+    Coupled(Coupling),
 }
 
 /// A motor, or a motor on a slider.
@@ -102,6 +105,19 @@ pub(super) fn motor<'a>(
     sliders: &[Slider],
     constants: &Constants,
 ) -> Result<AnyMotor<'a>, SceneError> {
+    if let Value::Text(text) = &fields.required("law")?.node.value
+        && constants.is_of_place(text)
+    {
+        let coupled = match std::ptr::eq(fields.table, &DRIVE) {
+            true => Coupled::Travel(slider(&fields.required("slider")?, sliders)?),
+            false => {
+                let bar = known.bar(fields, "a motor turns a bar")?;
+                let relative_to = known.relative_to(fields, bar, "leave it out for an angle from +x")?;
+                Coupled::Angle { bar, relative_to }
+            }
+        };
+        return Ok(AnyMotor::Coupled(Coupling { name, coupled, aim: text.clone() }));
+    }
     if std::ptr::eq(fields.table, &DRIVE) {
         return Ok(AnyMotor::Travel(Drive {
             name,
@@ -134,7 +150,12 @@ fn slider(at: &At, sliders: &[Slider]) -> Result<usize, SceneError> {
     })
 }
 
-/// The law of a motor: a sum, or a formula that is none.
+/// The law of a wall, if it has one.
+pub(super) fn law_if_any(fields: &Fields, constants: &Constants) -> Result<Option<Law>, SceneError> {
+    fields.optional("law").map(|_| motor_law(fields, constants)).transpose()
+}
+
+/// The law of a motor or wall: a sum, or a formula that is none.
 fn motor_law(fields: &Fields, constants: &Constants) -> Result<Law, SceneError> {
     let at = fields.required("law")?;
     let Value::Text(text) = &at.node.value else { return law(fields) };

@@ -24,7 +24,7 @@ use super::fit;
 use super::format::{LONGEST_FILE, SCENE, plain};
 use super::locate::{Node, Source, Text};
 use super::set::{Override, put};
-use super::{Drive, Motor, Scene};
+use super::{Coupling, Drive, Motor, Scene};
 use laws::Either;
 use loads::AnyMotor;
 use names::{Bars, named};
@@ -148,8 +148,9 @@ fn scene(root: &At, Resolved { parameters, tables }: Resolved) -> Result<Scene, 
     let constants = Constants::new(&parameters, &tables);
     let (any, _) =
         named(&fields, "motors", |fields, name| loads::motor(fields, name, &known, &sliders, &constants))?;
-    let (motors, motor_places, drives) = sorted(any);
-    let (walls, wall_places) = named(&fields, "walls", |fields, name| joints::wall(fields, name, &known))?;
+    let (motors, motor_places, drives, couplings) = sorted(any);
+    let (walls, wall_places) =
+        named(&fields, "walls", |fields, name| joints::wall(fields, name, &known, &constants))?;
     let given = start::starts(&fields, &known)?;
     let [until, every] = times(&fields)?;
     let scene = Scene {
@@ -166,6 +167,7 @@ fn scene(root: &At, Resolved { parameters, tables }: Resolved) -> Result<Scene, 
         torques,
         motors,
         drives,
+        couplings,
         walls,
         frictions: friction::all(&hinge_places, &slider_places, &wall_places)?,
         parameters: parameters.iter().map(Into::into).collect(),
@@ -195,9 +197,10 @@ fn scene(root: &At, Resolved { parameters, tables }: Resolved) -> Result<Scene, 
     fit::fitted(scene, &places, &given).map(Scene::with_rotors)
 }
 
-/// The motors on angles with their places, and those on sliders.
-fn sorted(any: Vec<AnyMotor>) -> (Vec<Motor>, Vec<At>, Vec<Drive>) {
-    let (mut motors, mut places, mut drives) = (Vec::new(), Vec::new(), Vec::new());
+/// The motors on angles with their places, those on sliders, and those whose aims depend on the mechanism.
+fn sorted(any: Vec<AnyMotor>) -> (Vec<Motor>, Vec<At>, Vec<Drive>, Vec<Coupling>) {
+    let (mut motors, mut places, mut drives, mut couplings) =
+        (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for one in any {
         match one {
             AnyMotor::Angle(motor, at) => {
@@ -205,9 +208,10 @@ fn sorted(any: Vec<AnyMotor>) -> (Vec<Motor>, Vec<At>, Vec<Drive>) {
                 places.push(at);
             }
             AnyMotor::Travel(drive) => drives.push(drive),
+            AnyMotor::Coupled(coupling) => couplings.push(coupling),
         }
     }
-    (motors, places, drives)
+    (motors, places, drives, couplings)
 }
 
 /// More outputs than this have no distinct times k·every in doubles.

@@ -6,7 +6,7 @@
 use super::at::At;
 use super::tables;
 use crate::scene::error::SceneError;
-use crate::scene::format::{FACTOR_LAW, Quantity, SCENE, Shape, Table, about, kind};
+use crate::scene::format::{FACTOR_LAW, LAW, Quantity, SCENE, Shape, TRAVEL_LAW, Table, about, kind};
 use crate::scene::formula::unit::Dimension;
 use crate::scene::formula::{DEEPEST, FUNCTIONS, Formula, FormulaError, Interpolant};
 use crate::scene::locate::{Member, Node, Source, Span, Value, push_index, push_key};
@@ -46,6 +46,11 @@ impl<'a> Constants<'a> {
     pub fn new(parameters: &'a [Known], tables: &[PointTable]) -> Self {
         let tables = tables.iter().map(|table| Interpolant::new(&table.name, &table.points)).collect();
         Self { parameters, tables }
+    }
+
+    /// True where a formula speaks of more than time, parameters and tables.
+    pub fn is_of_place(&self, text: &str) -> bool {
+        Formula::parse_with(text, &self.tables).is_ok_and(|formula| !is_of_time(&formula, self.parameters))
     }
 
     /// The law of a formula that was judged; `None` where it is none.
@@ -287,6 +292,10 @@ impl Resolver<'_> {
     ) -> Result<Option<Law>, SceneError> {
         let refused = |error: FormulaError| refused(self.source, span, path, &shape.allowed(), &error);
         let formula = Formula::parse_with(text, self.tables).map_err(refused)?;
+        let may_follow = matches!(shape, Shape::Law(table, _) if [&LAW, &TRAVEL_LAW].iter().any(|known| std::ptr::eq(*table, *known)));
+        if may_follow && !is_of_time(&formula, self.parameters) {
+            return Ok(None);
+        }
         let time = (None, Some(Dimension::of("s")));
         let (values, dimensions) = self.arguments(&formula, &[("t", time)]).map_err(refused)?;
         let dimension = formula.dimension(&dimensions).map_err(refused)?;
@@ -358,6 +367,11 @@ impl Resolver<'_> {
         node.value = Value::Number(value);
         Ok(())
     }
+}
+
+/// True where a formula has no names but t and those of parameters.
+fn is_of_time(formula: &Formula, parameters: &[Known]) -> bool {
+    formula.names().all(|name| name == "t" || parameters.iter().any(|known| known.name == name))
 }
 
 /// A law as the object that could stand in its formula's place.

@@ -245,7 +245,16 @@ impl Model {
             [at[0] + gap * towards[0] - along * towards[1], at[1] + gap * towards[1] + along * towards[0]];
         debug_assert!(dot(minus(at, through), normal) >= -1e-12 * size);
         let name = format!("wall{}", self.walls.len());
-        self.walls.push(Wall { name, bar, point: place.point, through, normal, restitution });
+        self.walls.push(Wall {
+            name,
+            bar,
+            point: place.point,
+            on: None,
+            through,
+            normal,
+            law: None,
+            restitution,
+        });
         self.kinds.insert(kind);
     }
 }

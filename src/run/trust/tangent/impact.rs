@@ -102,12 +102,12 @@ fn cross(mechanism: &Mechanism, jumps: &[Jump], columns: &mut [Vec<f64>]) -> Res
     let touched = &mechanism.contacts[contact];
     let mut gradient = vec![0.0; n];
     let z = mechanism.elements(&here.phi);
-    touched.row.linearise(
+    let at = touched.row.linearise(
         struck.before.time,
         Posture { phi: &here.phi, z: &z, omega: &here.omega },
         &mut gradient,
     );
-    let approach = dot(&gradient, &here.omega);
+    let approach = dot(&gradient, &here.omega) + at.drive;
     if approach >= -GRAZED * touched.step_size(&here.omega) {
         return Err("a point grazes a wall, which neighbouring motions may miss".into());
     }

@@ -1,0 +1,245 @@
+//! The aim of a motor that depends on where the mechanism is: gears, cams, followers.
+//!
+//! ```text
+//! C = Q - f(t, q),   dC/dq = dQ/dq - f_q,   C_t = -f_t
+//! C'' at zero acceleration = Q'' - (f' differentiated along q' = w, w' = 0),    f' = f_q w + f_t
+//! ```
+//!
+//! Q is a travel, or zero where f has the angle as well.  The formula is recorded once with its derivatives, by
+//! the reverse mode of the tape, so that the Jacobian and the quadratic terms are exact on every scalar.  As
+//! long as f does not depend on time the row does no work.
+
+use super::{Linearised, Posture, Site};
+use crate::arithmetic::tape::{Slot, Symbol, Tape};
+use crate::arithmetic::{Complex, Real, Scalar};
+use crate::dynamics::Time;
+use crate::dynamics::configuration::{Configuration, Source};
+use std::cell::RefCell;
+
+/// What a formula of time and place asks for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Input {
+    Time,
+    Angle(usize),
+    Cosine(usize),
+    Sine(usize),
+    /// A coordinate of an origin that moves freely.
+    Origin(usize),
+    /// The rate of a coordinate.
+    Rate(usize),
+}
+
+/// A formula of time and place with its derivatives.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Aim {
+    tape: Tape,
+    inputs: Vec<Input>,
+    /// f, f_t and f'' at zero acceleration.
+    value: Slot,
+    drive: Slot,
+    convective: Slot,
+    /// f_q by coordinate.
+    slopes: Vec<(usize, Slot)>,
+    /// The angles it is the aim of; none where that is a travel.
+    pub angles: Vec<usize>,
+    /// True where it depends on time.
+    pub is_timed: bool,
+    /// True where whole turns matter.
+    pub counts_turns: bool,
+}
+
+impl Aim {
+    /// Records a formula, from which the angle of `angles[0]`, less that of `angles[1]`, is taken; `None` where it
+    /// depends on rates.
+    pub(in crate::dynamics) fn record(
+        angles: &[usize],
+        formula: impl FnOnce(&Configuration<Symbol>) -> Symbol,
+    ) -> Option<Self> {
+        let recorder = Recorder::default();
+        let (mut coordinates, mut has_rates, mut is_timed) = (Vec::new(), false, false);
+        let [(tape, slots)] = Symbol::record(|| {
+            let signs = [1.0, -1.0];
+            let value =
+                angles.iter().zip(signs).fold(formula(&Configuration::new(&recorder)), |sum, (&k, sign)| {
+                    sum - recorder.angle(k).scale(sign)
+                });
+            let first = recorder.derivatives(value);
+            has_rates = !first.rates.is_empty();
+            is_timed = !first.time.is_zero();
+            let second = recorder.derivatives(recorder.along(&first));
+            let results = [value, first.time, recorder.along(&second)];
+            coordinates.extend(first.slopes.iter().map(|slope| slope.0));
+            [results.into_iter().chain(first.slopes.iter().map(|slope| slope.1)).collect()]
+        });
+        let inputs = recorder.inputs.into_inner();
+        (!has_rates).then(|| Self {
+            value: slots[0],
+            drive: slots[1],
+            convective: slots[2],
+            slopes: coordinates.into_iter().zip(slots[3..].iter().copied()).collect(),
+            angles: angles.to_vec(),
+            is_timed,
+            counts_turns: inputs.iter().any(|input| matches!(input, Input::Angle(_))),
+            tape,
+            inputs,
+        })
+    }
+
+    /// The coordinates it depends on.
+    pub fn coordinates(&self) -> impl Iterator<Item = usize> {
+        self.slopes.iter().map(|slope| slope.0)
+    }
+
+    /// Takes it off a row.
+    pub fn subtract<T: Real>(&self, t: Time, at: Posture<T>, jacobian: &mut [T], here: &mut Linearised<T>) {
+        let input = |number: u32| match self.inputs[number as usize] {
+            Input::Time => T::split(t).0,
+            Input::Angle(k) | Input::Origin(k) => at.phi[k],
+            Input::Cosine(k) => at.z[k].re,
+            Input::Sine(k) => at.z[k].im,
+            Input::Rate(k) => at.omega[k],
+        };
+        let mut slots = vec![T::ZERO; self.tape.len()];
+        self.tape.evaluate(input, &mut slots);
+        here.position -= slots[self.value as usize];
+        here.drive -= slots[self.drive as usize];
+        here.convective -= slots[self.convective as usize];
+        for &(k, slope) in &self.slopes {
+            jacobian[k] -= slots[slope as usize];
+        }
+    }
+}
+
+/// Hands out inputs while a formula is recorded.
+#[derive(Default)]
+struct Recorder {
+    inputs: RefCell<Vec<Input>>,
+}
+
+/// Derivatives of a result.
+struct Derivatives {
+    time: Symbol,
+    slopes: Vec<(usize, Symbol)>,
+    /// Those by rates.
+    rates: Vec<Symbol>,
+}
+
+impl Recorder {
+    fn input(&self, input: Input) -> Symbol {
+        let mut inputs = self.inputs.borrow_mut();
+        let number = inputs.iter().position(|known| *known == input).unwrap_or_else(|| {
+            inputs.push(input);
+            inputs.len() - 1
+        });
+        Symbol::input(number as u32)
+    }
+
+    /// Derivatives by time and coordinates.
+    fn derivatives(&self, of: Symbol) -> Derivatives {
+        let mut found = Derivatives { time: Symbol::ZERO, slopes: Vec::new(), rates: Vec::new() };
+        for (number, weight) in of.gradient() {
+            let input = self.inputs.borrow()[number as usize];
+            let (k, slope) = match input {
+                Input::Time => {
+                    found.time += weight;
+                    continue;
+                }
+                Input::Rate(_) => {
+                    found.rates.push(weight);
+                    continue;
+                }
+                Input::Angle(k) | Input::Origin(k) => (k, weight),
+                Input::Cosine(k) => (k, -(weight * self.input(Input::Sine(k)))),
+                Input::Sine(k) => (k, weight * self.input(Input::Cosine(k))),
+            };
+            match found.slopes.iter_mut().find(|known| known.0 == k) {
+                Some(known) => known.1 += slope,
+                None => found.slopes.push((k, slope)),
+            }
+        }
+        found
+    }
+
+    /// The derivative along the motion, at zero acceleration.
+    fn along(&self, of: &Derivatives) -> Symbol {
+        of.slopes.iter().fold(of.time, |sum, &(k, slope)| sum + slope * self.input(Input::Rate(k)))
+    }
+}
+
+impl Source<Symbol> for Recorder {
+    fn time(&self) -> Symbol {
+        self.input(Input::Time)
+    }
+
+    fn angle(&self, body: usize) -> Symbol {
+        self.input(Input::Angle(body))
+    }
+
+    fn rate(&self, body: usize) -> Symbol {
+        self.input(Input::Rate(body))
+    }
+
+    fn direction(&self, body: usize) -> Complex<Symbol> {
+        Complex::new(self.input(Input::Cosine(body)), self.input(Input::Sine(body)))
+    }
+
+    fn position(&self, site: &Site) -> Complex<Symbol> {
+        let turned = site
+            .point
+            .terms
+            .iter()
+            .fold(Complex::of(site.point.root), |sum, &(k, gamma)| sum + self.direction(k).turn(gamma));
+        site.point.shifts.iter().fold(turned, |sum, &(x, share)| {
+            let origin = Complex::new(self.input(Input::Origin(x)), self.input(Input::Origin(x + 1)));
+            sum + origin.times(Symbol::of(share))
+        })
+    }
+
+    fn velocity(&self, site: &Site) -> Complex<Symbol> {
+        // Whatever it comes to, it depends on rates.
+        let rates =
+            site.point.terms.iter().map(|term| term.0).chain(site.point.shifts.iter().map(|shift| shift.0));
+        rates.fold(Complex::ZERO, |sum, k| sum + Complex::new(self.rate(k), self.rate(k)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::constraint::tests::{assert_derivatives, free, posture, rod};
+    use crate::dynamics::constraint::{ConstraintEquation, Measure};
+    use crate::dynamics::quadratic::Quadratic;
+    use std::sync::Arc;
+
+    #[test]
+    fn its_derivatives_are_those_of_its_position() {
+        // An angle that follows another, a point, an origin and time.
+        let aim = Aim::record(&[0], |at| {
+            let ([x, y], [u, _]) = (at.position(&rod()), at.position(&free()));
+            (at.angle(1).scale(2.0) + at.time() * x).sin_cos().0
+                + (x * y + u * u).scale(0.3)
+                + at.direction(1)[0]
+        });
+        let row = ConstraintEquation {
+            name: "cam".into(),
+            measure: Measure::Place(Quadratic { angles: 2, ..Quadratic::default() }),
+            law: None,
+            push: None,
+            aim: Some(Arc::new(aim.expect("a formula of place"))),
+        };
+        assert_derivatives(&row);
+        let (phi, z, omega) = posture(0.0);
+        let mut jacobian = vec![Default::default(); 4];
+        row.linearise(Default::default(), Posture { phi: &phi, z: &z, omega: &omega }, &mut jacobian);
+        assert!(
+            jacobian.iter().all(|entry: &crate::arithmetic::DoubleDouble| entry.hi != 0.0),
+            "{jacobian:?}"
+        );
+    }
+
+    #[test]
+    fn a_formula_of_rates_is_none() {
+        assert!(Aim::record(&[0], |at| at.angle(1) + at.rate(1)).is_none());
+        assert!(Aim::record(&[0], |at| at.velocity(&rod())[0]).is_none());
+    }
+}

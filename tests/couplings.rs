@@ -1,0 +1,188 @@
+//! Motors whose aims depend on where the mechanism is, gears and cams: against closed forms and against equations
+//! of one coordinate integrated in the test.
+
+use super::formulas::{adaptive, run, scene};
+use driftless::Mechanism;
+use driftless::run::{MethodId, Outcome, Plan, Request};
+use driftless::scene::{Scene, parse_scene};
+
+const G: f64 = 9.81;
+
+fn methods() -> [Request; 5] {
+    [
+        adaptive(MethodId::Dp5, 1e-11),
+        adaptive(MethodId::Dp8, 1e-12),
+        adaptive(MethodId::Dop853, 1e-12),
+        adaptive(MethodId::Radau(3), 1e-10),
+        adaptive(MethodId::Radau(5), 1e-12),
+    ]
+}
+
+fn near(found: f64, expected: f64, what: &str) {
+    assert!((found - expected).abs() < 3e-8, "{what}: {found} and not {expected}");
+}
+
+fn finished(scene: &Scene, request: &Request) -> Outcome {
+    let outcome = run(scene, request);
+    assert!(outcome.stop.is_none(), "{:?}: {:?}", request.method, outcome.stop);
+    assert!(outcome.drift.energy.max < 1e-8, "{:?}: {:e}", request.method, outcome.drift.energy.max);
+    outcome
+}
+
+/// A Runge–Kutta method of order 4 for y'' = f(t, y, y'), in so many steps.
+fn integrated(
+    f: impl Fn(f64, f64, f64) -> f64,
+    [mut y, mut v]: [f64; 2],
+    until: f64,
+    steps: usize,
+) -> [f64; 2] {
+    let h = until / steps as f64;
+    for step in 0..steps {
+        let t = step as f64 * h;
+        let (k1, l1) = (v, f(t, y, v));
+        let (k2, l2) = (v + 0.5 * h * l1, f(t + 0.5 * h, y + 0.5 * h * k1, v + 0.5 * h * l1));
+        let (k3, l3) = (v + 0.5 * h * l2, f(t + 0.5 * h, y + 0.5 * h * k2, v + 0.5 * h * l2));
+        let (k4, l4) = (v + h * l3, f(t + h, y + h * k3, v + h * l3));
+        y += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+        v += h / 6.0 * (l1 + 2.0 * l2 + 2.0 * l3 + l4);
+    }
+    [y, v]
+}
+
+/// A pendulum that turns a flywheel by a gear of this law.
+fn geared(law: &str, start: &str, until: f64) -> Scene {
+    scene(&format!(
+        r#"{{"name": "geared", "gravity": [0, -{G}],
+        "bars": [{{"name": "bar", "mass": 2, "length": 1, "centre": [0.5, 0], "inertia": 0.2}},
+            {{"name": "wheel", "mass": 1, "centre": [0, 0], "inertia": 0.03}}],
+        "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "bar", "point": [0, 0]}}]}},
+            {{"name": "B", "between": [{{"body": "ground", "point": [1, 0]}}, {{"body": "wheel", "point": [0, 0]}}]}}],
+        "motors": [{{"name": "gear", "body": "wheel", "law": "{law}"}}],
+        "start": {{"bar": {start}}}, "until": {until}, "every": {until}}}"#
+    ))
+}
+
+#[test]
+fn a_pendulum_with_a_geared_flywheel_is_one_of_more_inertia() {
+    // (I + m c² + n² J) phi'' = -m g c cos phi, over several turns, at a ratio that is no whole number.
+    let ratio = 2.3;
+    let inertia = 0.2 + 2.0 * 0.25 + ratio * ratio * 0.03;
+    let f = |_: f64, phi: f64, _: f64| -2.0 * G * 0.5 * phi.cos() / inertia;
+    let [phi, omega] = integrated(f, [0.4, 9.0], 2.0, 20_000);
+    for request in methods() {
+        let outcome = finished(&geared("2.3*bar.phi - 0.5", r#"{"phi": 0.4, "omega": 9}"#, 2.0), &request);
+        near(outcome.last.phi[0], phi, "angle");
+        near(outcome.last.omega[0], omega, "rate");
+        near(outcome.last.phi[1], ratio * phi - 0.5, "angle of the wheel");
+        near(outcome.last.omega[1], ratio * omega, "rate of the wheel");
+        let torque = 0.03 * ratio * f(0.0, phi, 0.0);
+        near(outcome.last.motors[0][0], torque, "torque of the gear");
+        assert!(outcome.last.work.abs() < 1e-12, "a gear does no work");
+    }
+}
+
+#[test]
+fn a_cam_moves_its_follower_as_its_formula_says() {
+    // y = 0.1 (1 - cos 2 phi) of a follower of mass m on a spring; cam of inertia J, no gravity:
+    // (J + m y'²) phi'' = -(m y' y'' phi'² + k y y'), derivatives by phi.
+    let text = r#"{"name": "cam", "gravity": [0, 0],
+        "bars": [{"name": "cam", "mass": 1, "centre": [0, 0], "inertia": 0.4},
+            {"name": "follower", "mass": 1.5, "centre": [0, 0], "inertia": 0.1, "length": 0.1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "cam", "point": [0, 0]}]}],
+        "sliders": [{"name": "guide", "point": {"body": "follower", "point": [0, 0]},
+            "rail": {"body": "ground", "point": [0, 0.3], "direction": [0, 1]}, "angle": "locked"}],
+        "springs": [{"name": "k", "between": [{"body": "ground", "point": [0, 1.3]}, {"body": "follower", "point": [0, 0]}],
+            "stiffness": 80, "free_length": 0}],
+        "motors": [{"name": "profile", "slider": "guide", "law": "0.1*(1 - cos(2*cam.phi))"}],
+        "start": {"cam": {"phi": 0.2, "omega": 6}, "follower": {"phi": 0}}, "until": 1.5, "every": 1.5}"#;
+    let f = |_: f64, phi: f64, omega: f64| {
+        let (s, c) = (2.0 * phi).sin_cos();
+        let [y, slope, bend] = [0.1 * (1.0 - c), 0.2 * s, 0.4 * c];
+        -(1.5 * slope * bend * omega * omega + 80.0 * (y - 1.0) * slope) / (0.4 + 1.5 * slope * slope)
+    };
+    let [phi, omega] = integrated(f, [0.2, 6.0], 1.5, 40_000);
+    for request in methods() {
+        let outcome = finished(&scene(text), &request);
+        near(outcome.last.phi[0], phi, "angle of the cam");
+        near(outcome.last.omega[0], omega, "its rate");
+        near(outcome.last.centre[1][1], 0.3 + 0.1 * (1.0 - (2.0 * phi).cos()), "height of the follower");
+        near(outcome.last.velocity[1][1], 0.2 * (2.0 * phi).sin() * omega, "its velocity");
+    }
+}
+
+#[test]
+fn an_aim_of_time_and_place_does_work() {
+    // The wheel is to run ahead of the bar by 3 t + 0.2 sin(bar): psi = phi + 3 t + 0.2 sin phi.
+    let law = "bar.phi + 3*t + 0.2*bar.sin";
+    let f = |_: f64, phi: f64, omega: f64| {
+        let (s, c) = phi.sin_cos();
+        let slope = 1.0 + 0.2 * c;
+        (-2.0 * G * 0.5 * c + 0.03 * slope * 0.2 * s * omega * omega) / (0.7 + 0.03 * slope * slope)
+    };
+    let [phi, omega] = integrated(f, [-1.0, 0.5], 2.0, 20_000);
+    for request in methods() {
+        let outcome = finished(&geared(law, r#"{"phi": -1, "omega": 0.5}"#, 2.0), &request);
+        near(outcome.last.phi[0], phi, "angle");
+        near(outcome.last.omega[0], omega, "rate");
+        let psi = |phi: f64, omega: f64| omega * (1.0 + 0.2 * phi.cos()) + 3.0;
+        let energy = |phi: f64, omega: f64| {
+            0.35 * omega * omega + 0.015 * psi(phi, omega).powi(2) + 2.0 * G * 0.5 * phi.sin()
+        };
+        near(outcome.last.work, energy(phi, omega) - energy(-1.0, 0.5), "work of the motor");
+    }
+}
+
+#[test]
+fn corners_of_a_cam_are_switches() {
+    // Free-wheeling cam with a rise that begins smoothly at phi = 1: theta = max(phi - 1, 0)².
+    let f = |_: f64, phi: f64, omega: f64| {
+        let rise = (phi - 1.0).max(0.0);
+        let bend = if phi > 1.0 { 2.0 } else { 0.0 };
+        (-2.0 * G * 0.5 * phi.cos() - 0.03 * 2.0 * rise * bend * omega * omega)
+            / (0.7 + 0.03 * 4.0 * rise * rise)
+    };
+    // To the corner and on from it.
+    let until = 0.6;
+    let (mut low, mut high) = (0.0, until);
+    for _ in 0..50 {
+        let middle = 0.5 * (low + high);
+        if integrated(f, [0.0, 5.0], middle, 4000)[0] < 1.0 { low = middle } else { high = middle }
+    }
+    let there = integrated(f, [0.0, 5.0], high, 4000);
+    let [phi, omega] = integrated(f, [1.0, there[1]], until - high, 4000);
+    for request in methods() {
+        let outcome =
+            finished(&geared("max(bar.phi - 1, 0)^2", r#"{"phi": 0, "omega": 5}"#, until), &request);
+        near(outcome.last.phi[0], phi, "angle");
+        near(outcome.last.omega[0], omega, "rate");
+        near(outcome.last.phi[1], (phi - 1.0).powi(2), "angle of the wheel");
+    }
+}
+
+#[test]
+fn what_aims_cannot_be_is_refused_with_what_to_do() {
+    let refused = |law: &str| {
+        let text = serde_json::to_string(&geared("2*bar.phi", r#"{"phi": 0, "omega": 1}"#, 1.0).to_input())
+            .expect("JSON");
+        assert!(text.contains("2*bar.phi"), "{text}");
+        parse_scene(&text.replace("2*bar.phi", law), "test", &[]).expect_err("no scene").to_string()
+    };
+    let said = refused("bar.phi - 0.1*bar.omega");
+    assert!(
+        said.contains("motors[0].law") && said.contains("depends on bar.omega") && said.contains("torque"),
+        "{said}"
+    );
+    let said = refused("bar.fi");
+    assert!(said.contains("motors[0].law") && said.contains("bar.phi"), "{said}");
+    let said = refused("bar.phi*1 kg");
+    assert!(said.contains("motors[0].law") && said.contains("not rad"), "{said}");
+    let scene = geared("2*bar.phi", r#"{"phi": 0, "omega": 1}"#, 1.0);
+    let mechanism = Mechanism::new(&scene).expect("equations");
+    for method in ["taylor", "rattle4"].map(|name| name.parse::<MethodId>().expect("a method")) {
+        let request = Request { method: Some(method), ..Request::default() };
+        let refusal = Plan::new(&scene, &mechanism, &request).expect_err("no plan").to_string();
+        assert!(refusal.contains("gear") && refusal.contains("dp8"), "{refusal}");
+    }
+    let plan = Plan::new(&scene, &mechanism, &Request::default()).expect("a plan by default");
+    assert!(matches!(plan.method, MethodId::Dp8 | MethodId::Dop853 | MethodId::Radau(_)), "{}", plan.method);
+}
