@@ -295,7 +295,7 @@ fn what_an_event_must_not_do_is_refused_with_its_name() {
         Change::default().to(after)
     };
     let stop = stopped(Request { step: Some(0.01), ..by(MethodId::Gauss(4)) }, faster);
-    assert!(stop.what.contains("kick") && stop.hint.contains("taylor"), "{stop}");
+    assert!(stop.what.contains("kick") && stop.what.contains("leaves constraint motor"), "{stop}");
     let stop = stopped(by(MethodId::Dp8), faster);
     assert!(stop.what.contains("leaves constraint motor"), "{stop}");
     let stop = stopped(by(MethodId::Dp8), |_| Change::default().switch("motor", false));

@@ -220,11 +220,13 @@ fn a_switching_torque_moves_along_parabolas() {
         let trust = outcome.trust.expect("an estimate");
         assert!(trust.error_estimate.is_some_and(|estimate| estimate < 1e-8), "{:?}", request.method);
     }
-    let gauss = Request { method: Some(MethodId::Gauss(8)), step: Some(0.01), ..Request::default() };
-    let scene = scene(&text);
-    let mechanism = Mechanism::new(&scene).expect("equations");
-    let refusal = Plan::new(&scene, &mechanism, &gauss).expect_err("refused").to_string();
-    assert!(refusal.contains("laws or parts switch"), "{refusal}");
+    // A fixed step is cut short at a switch, and the next one ends on the grid again.
+    for method in [MethodId::Gauss(2), MethodId::Gauss(8)] {
+        let fixed = Request { method: Some(method), step: Some(1.0 / 64.0), ..Request::default() };
+        let outcome = run(&scene(&text), &fixed);
+        assert!(outcome.stop.is_none(), "{:?}", outcome.stop);
+        assert!((outcome.last.phi[0] - expected).abs() < 1e-9, "{method}: {}", outcome.last.phi[0]);
+    }
 }
 
 /// Dry friction as a formula sticks, and sticking slides along its corner: refused by name, at the time where it

@@ -65,6 +65,7 @@ mod scenes;
 mod singular;
 mod stabilization;
 mod stiff;
+mod switched_orders;
 mod taylor;
 mod walls;
 mod work;

@@ -80,13 +80,6 @@ impl ContactDriver {
             what: format!("event `{event}` {what}"),
             hint: hint.into(),
         };
-        if outcome.plan.step.is_some() {
-            return Err(refused(
-                self,
-                "changes the run, and steps of one length would no longer end on the output times".into(),
-                "--method taylor or dp8",
-            ));
-        }
         let before = self.motion();
         let balance = self.sampler.balance(&before);
         let mut after = before.clone();

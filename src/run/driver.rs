@@ -318,7 +318,9 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
         if time < self.state.time {
             let memory = std::mem::take(&mut self.state.memory);
             let Self { problem, method, from, inside, .. } = self;
-            method.interpolate(problem, from, time, inside);
+            if !method.land(problem, from, time, inside) {
+                method.interpolate(problem, from, time, inside);
+            }
             self.state.clone_from(&self.inside);
             self.state.time = time;
             self.state.memory = memory;
@@ -402,6 +404,15 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Inside for StepLoop<P, M>
 
     fn roughly_at(&mut self, time: Time) -> &Motion {
         self.observe(time, M::interpolate_roughly)
+    }
+
+    fn landed(&mut self, time: Time) -> Option<&Motion> {
+        let Self { problem, method, state, from, inside, observed, .. } = self;
+        if time >= state.time || time <= from.time || !method.land(problem, from, time, inside) {
+            return None;
+        }
+        problem.read(inside, observed);
+        Some(&self.observed)
     }
 }
 

@@ -24,6 +24,8 @@ const SHARE: f64 = 0.1;
 const HALVINGS: u32 = 4;
 /// Steps of the secant method at most.
 const ROUNDS: usize = 6;
+/// Share of a step over which the slope of an event function is taken, and which corrections of its zero keep to.
+const SLOPE: f64 = 1e-3;
 /// Share of a step within which the event that began it does not happen again.
 const SAME: f64 = 1e-9;
 /// Share of a step in which an event function leaves zero that was kept there by a joint.
@@ -97,8 +99,8 @@ pub enum Action {
     Record,
     /// The run ends here; its outcome is kept.
     Stop,
-    /// The motion goes on changed.  Fixed-step methods refuse that: their steps would no longer end on the
-    /// output times.
+    /// The motion goes on changed.  A fixed step that is cut short there is followed by one that ends on the next
+    /// output time.
     Change(Change),
 }
 
@@ -501,6 +503,35 @@ impl EventDetector {
                 break;
             }
         }
+        self.landed(inside, event, t)
+    }
+
+    /// The same of a method whose dense output is less accurate than its steps: by steps that end there, with
+    /// the slope of the dense output.
+    fn landed(&self, inside: &mut dyn Inside, event: usize, mut t: Time) -> Time {
+        let (begin, end) = inside.span();
+        let span = (end - begin).hi;
+        let beside = if (t - begin).hi > SLOPE * span { t + -SLOPE * span } else { t + SLOPE * span };
+        let mut slope = None;
+        for _ in 0..ROUNDS {
+            let Some(value) = inside.landed(t).map(|motion| self.values(motion)[event]) else { break };
+            let slope = *slope.get_or_insert_with(|| {
+                let [here, there] = [t, beside].map(|t| self.values(inside.at(t))[event]);
+                (there - here) / (beside - t).hi
+            });
+            let change = value / slope;
+            if !change.is_finite() || change.abs() > SLOPE * span {
+                break;
+            }
+            let next = t + -change;
+            if next <= begin || next >= end {
+                break;
+            }
+            t = next;
+            if change.abs() <= SAME * SAME.sqrt() * span {
+                break;
+            }
+        }
         t
     }
 }
@@ -527,7 +558,8 @@ impl StepWatcher for EventDetector {
                 continue;
             }
             let t = if t > begin { self.polished(inside, event, t) } else { t };
-            let motion = inside.at(t).clone();
+            let landed = inside.landed(t).cloned();
+            let motion = landed.unwrap_or_else(|| inside.at(t).clone());
             self.memory.last = Some((event, t));
             if is_condition {
                 self.memory.flipped.retain(|(_, before)| (t - *before).hi <= SAME * span);

@@ -17,6 +17,11 @@ pub(super) trait Inside {
 
     /// The same to nearly its accuracy, where that is cheaper.
     fn roughly_at(&mut self, time: Time) -> &Motion;
+
+    /// The same to the accuracy of the end of a step, where [`at`](Inside::at) is less accurate than that.
+    fn landed(&mut self, _time: Time) -> Option<&Motion> {
+        None
+    }
 }
 
 /// Shown every accepted step; may cut it short.

@@ -562,13 +562,6 @@ fn pair(
             "--method dp8, or radau9 where it is stiff",
         ));
     }
-    if mechanism.is_switched() && !method.is_adaptive() {
-        return Err(mismatch(
-            format!("{method} on a scene whose laws or parts switch"),
-            "a switch inside a fixed step cannot be located without changing the step",
-            "--method taylor, or dp8",
-        ));
-    }
     if matches!(method, MethodId::Rattle(_)) && mechanism.is_damped() {
         let reason = "RATTLE takes forces that depend on positions only, and a damper's does not";
         return Err(mismatch(

@@ -161,6 +161,14 @@ where
     fn interpolate_roughly(&mut self, problem: &mut P, from: &State, time: Time, inside: &mut State) {
         self.inner.interpolate_roughly(problem, from, time, inside);
     }
+
+    fn land(&mut self, problem: &mut P, from: &State, time: Time, inside: &mut State) -> bool {
+        let is_made = self.inner.land(problem, from, time, inside);
+        if let Some(projector) = self.projector.as_mut().filter(|_| is_made) {
+            let _ = projector.project(problem.mechanism(), inside, self.tolerance);
+        }
+        is_made
+    }
 }
 
 /// What to try where constraints cannot be met.

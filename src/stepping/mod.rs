@@ -235,6 +235,12 @@ pub trait Integrator<P: ?Sized> {
         self.interpolate(problem, from, time, inside);
     }
 
+    /// Writes the same to the accuracy of the *end* of a step, by a step that ends there; false, and nothing
+    /// written, where [`interpolate`](Integrator::interpolate) is as accurate, or no such step can be made.
+    fn land(&mut self, _problem: &mut P, _from: &State, _time: Time, _inside: &mut State) -> bool {
+        false
+    }
+
     /// Called where the state was changed from outside at once: an impact, or a contact that begins or ends.
     /// Forgets all that depends on the motion before it: predictors, Jacobians, rates, the history of errors.
     /// Of the state's memory only the step remains, as a proposal.

@@ -36,6 +36,9 @@ use crate::arithmetic::Scalar;
 use crate::dynamics::natural::Natural;
 use crate::dynamics::{State, Time};
 
+/// Part of a step that a remaining time may differ from whole steps.
+const WHOLE: f64 = 1e-9;
+
 /// The method: a composition and its step.
 #[derive(Clone, Debug)]
 pub struct Rattle {
@@ -114,22 +117,17 @@ impl Integrator<Natural> for Rattle {
         &mut self,
         problem: &mut Natural,
         state: &mut State,
-        _until: Time,
+        until: Time,
         statistics: &mut Statistics,
     ) -> Result<Option<usize>, StepError> {
-        statistics.check(Integrator::name(self), state.time.hi, self.step)?;
-        if std::mem::take(&mut self.is_stale) {
-            by_bodies!(problem, state, self.work.load(problem, state));
+        match self.rest(state, until) {
+            Some(rest) => self.shorter_step(problem, state, (until, rest), statistics),
+            None => self.whole_step(problem, state, statistics),
         }
-        by_bodies!(problem, state, self.substeps(problem, state, statistics))?;
-        state.time += Time::of(self.step);
-        self.work.store(state);
-        statistics.steps += 1;
-        Ok(None)
     }
 
     fn is_at(&self, state: &State, until: Time) -> bool {
-        ((until - state.time).hi / self.step).round() <= 0.0
+        self.left(state, until) <= self.least(until)
     }
 
     fn changed(&mut self, state: &mut State) {
@@ -147,6 +145,58 @@ impl Integrator<Natural> for Rattle {
 }
 
 impl Rattle {
+    /// How far it is to `until` in the direction of the steps \[s\].
+    fn left(&self, state: &State, until: Time) -> f64 {
+        (until - state.time).hi * self.step.signum()
+    }
+
+    /// What is no distance on the way to `until` \[s\].
+    fn least(&self, until: Time) -> f64 {
+        WHOLE * self.step.abs() + 4.0 * f64::EPSILON * until.hi.abs()
+    }
+
+    /// What is left of the way to `until` \[s\] where that is less than a step, as where an event has cut one
+    /// short.
+    fn rest(&self, state: &State, until: Time) -> Option<f64> {
+        let left = self.left(state, until);
+        (left < self.step.abs() - self.least(until)).then(|| left.copysign(self.step))
+    }
+
+    /// One step of what is left, which ends at `until`.
+    fn shorter_step(
+        &mut self,
+        problem: &mut Natural,
+        state: &mut State,
+        (until, rest): (Time, f64),
+        statistics: &mut Statistics,
+    ) -> Result<Option<usize>, StepError> {
+        let mut shorter = Self::new(self.composition, rest);
+        std::mem::swap(&mut shorter.work, &mut self.work);
+        shorter.is_stale = std::mem::take(&mut self.is_stale);
+        let made = shorter.whole_step(problem, state, statistics);
+        std::mem::swap(&mut shorter.work, &mut self.work);
+        self.is_stale = shorter.is_stale;
+        state.time = until;
+        made
+    }
+
+    fn whole_step(
+        &mut self,
+        problem: &mut Natural,
+        state: &mut State,
+        statistics: &mut Statistics,
+    ) -> Result<Option<usize>, StepError> {
+        statistics.check(Integrator::name(self), state.time.hi, self.step)?;
+        if std::mem::take(&mut self.is_stale) {
+            by_bodies!(problem, state, self.work.load(problem, state));
+        }
+        by_bodies!(problem, state, self.substeps(problem, state, statistics))?;
+        state.time += Time::of(self.step);
+        self.work.store(state);
+        statistics.steps += 1;
+        Ok(None)
+    }
+
     /// All substeps of a step, for `N` bodies (any number where `N` is 0), with guides or translational
     /// coordinates where `GUIDED`.
     fn substeps<const N: usize, const GUIDED: bool>(
