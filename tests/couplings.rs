@@ -79,6 +79,11 @@ fn a_pendulum_with_a_geared_flywheel_is_one_of_more_inertia() {
         near(outcome.last.motors[0][0], torque, "torque of the gear");
         assert!(outcome.last.work.abs() < 1e-12, "a gear does no work");
     }
+    // The symmetric projection of fixed steps keeps it as well.
+    let fixed = Request { method: Some(MethodId::Gauss(4)), step: Some(1.0 / 128.0), ..Request::default() };
+    let outcome = finished(&geared("2.3*bar.phi - 0.5", r#"{"phi": 0.4, "omega": 9}"#, 2.0), &fixed);
+    near(outcome.last.phi[0], phi, "angle by gauss8");
+    near(outcome.last.phi[1], ratio * phi - 0.5, "angle of the wheel by gauss8");
 }
 
 #[test]

@@ -621,6 +621,15 @@ impl Mechanism {
         self.constraints.iter().any(|row| row.coordinates().is_empty())
     }
 
+    /// Names of the rows in force that follow from others.
+    pub fn redundant(&self) -> Vec<&str> {
+        let in_force = self.constraints.iter().filter(|row| !row.coordinates().is_empty());
+        in_force
+            .map(|row| row.name.as_str())
+            .filter(|name| self.assembly.redundant.iter().any(|of| of == name))
+            .collect()
+    }
+
     /// True where motors have aims that depend on the mechanism.
     pub fn has_aims(&self) -> bool {
         self.constraints.iter().any(|row| row.aim.is_some())

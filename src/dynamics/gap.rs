@@ -124,7 +124,7 @@ mod tests {
                 true => turning(Complex::unit(at(k, t)[0]), at(k, t)[1]),
                 false => [Complex::new(at(2, t)[0], at(3, t)[0]), Complex::new(at(2, t)[1], at(3, t)[1])],
             };
-            let at = Along { time: Time::of(t), step_size: 1.0, y: &[], slope: &[] };
+            let at = Along { time: Time::from(t), step_size: 1.0, y: &[], slope: &[] };
             contact.gap_along(&at, element).expect("a sum of elements")
         };
         let most = |k: usize| [2.0 * powers[k][2].abs(), powers[k][1].abs() + 2.0 * powers[k][2].abs()];

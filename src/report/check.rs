@@ -76,6 +76,9 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Value {
         object["events"] = names(scene.events.iter().map(|event| event.name.as_str()).collect());
         object["switches"] = json!(mechanism.is_switched());
     }
+    if !scene.couplings.is_empty() {
+        object["couplings"] = names(scene.couplings.iter().map(|coupling| coupling.name.as_str()).collect());
+    }
     if !scene.frictions.is_empty() {
         object["friction"] = json!(super::friction::listed(scene));
     }
@@ -84,16 +87,17 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Value {
 
 /// How the start was found, as one JSON object.
 pub(super) fn assembly(mechanism: &Mechanism) -> Value {
-    let Assembly { changes, redundant, singular, conditioning, .. } = &mechanism.assembly;
-    json!({"changes": changes, "redundant": redundant, "singular": singular, "conditioning": conditioning})
+    let Assembly { changes, singular, conditioning, .. } = &mechanism.assembly;
+    json!({"changes": changes, "redundant": mechanism.redundant(), "singular": singular, "conditioning": conditioning})
 }
 
 /// Degrees of freedom, rows that say nothing new, and what of the start is not as given.
 fn freedom(page: &mut Page, mechanism: &Mechanism) {
-    let Assembly { changes, redundant, singular, degrees_of_freedom: free, .. } = &mechanism.assembly;
+    let Assembly { changes, singular, degrees_of_freedom: free, .. } = &mechanism.assembly;
+    let redundant = mechanism.redundant();
     let free = &(free - mechanism.integrals);
     let coordinates = mechanism.coordinates() - mechanism.integrals;
-    let rows = mechanism.constraints.len();
+    let rows = mechanism.constraints.iter().filter(|row| !row.coordinates().is_empty()).count();
     let less = match (rows, redundant.len()) {
         (0, _) => String::new(),
         (rows, 0) => format!(
@@ -126,6 +130,9 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> String {
     if !scene.motors.is_empty() {
         page.entry("motors", &list(&scene.motors, |motor| &motor.name));
     }
+    if !scene.couplings.is_empty() {
+        page.entry("gears, cams", &list(&scene.couplings, |coupling| &coupling.name));
+    }
     if !scene.springs.is_empty() {
         let kind = |spring: &Spring| match spring {
             Spring { rigid: true, .. } => " as a rod",
@@ -156,7 +163,11 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> String {
         let each: Vec<String> = scene
             .walls
             .iter()
-            .map(|wall| format!("{} (restitution {})", wall.name, wall.restitution))
+            .map(|wall| {
+                let on = wall.on.map_or(String::new(), |bar| format!(", on {}", scene.bars[bar].name));
+                let moves = if wall.law.is_some() { ", moves" } else { "" };
+                format!("{} (restitution {}{on}{moves})", wall.name, wall.restitution)
+            })
             .collect();
         page.entry("walls", &each.join(", "));
     }

@@ -119,7 +119,17 @@ impl<'a> Drawing<'a> {
                 .scene
                 .walls
                 .iter()
-                .map(|wall| WallSketch { through: wall.through, normal: wall.normal })
+                // Drawn once for all poses: where it is at the start.
+                .filter(|wall| wall.on.is_none())
+                .map(|wall| {
+                    let moved = wall.law.as_ref().map_or(0.0, |law| law.at_start().phi);
+                    let [x, y] = wall.through;
+                    let through = match moved == 0.0 {
+                        true => wall.through,
+                        false => [x + moved * wall.normal[0], y + moved * wall.normal[1]],
+                    };
+                    WallSketch { through, normal: wall.normal }
+                })
                 .collect(),
             points: self.points().map(|point| plain(&point.name)).collect(),
         }

@@ -50,7 +50,7 @@ pub fn object(found: &Kinematics) -> Value {
         "extremes": extremes.collect::<serde_json::Map<_, _>>(),
         "assemblies": 1 + found.branches.len(),
         "other_assemblies": found.branches.iter().map(branch).collect::<Vec<_>>(),
-        "least_norm": !found.mechanism.assembly.redundant.is_empty(),
+        "least_norm": !found.mechanism.redundant().is_empty(),
         "left_out": found.left_out,
     })
 }
@@ -112,7 +112,7 @@ pub fn text(found: &Kinematics) -> String {
     let at = format!("at [{unit}]");
     page.entry("extremes", "over the whole range, between positions as well");
     page.table(&["column", "least", &at, "largest", &at], &rows);
-    if !found.mechanism.assembly.redundant.is_empty() {
+    if !found.mechanism.redundant().is_empty() {
         page.entry(
             "",
             "constraints are redundant: forces that rigid bodies leave open are those of least norm",

@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 
 /// True where forces are those of least norm among what rigid bodies leave open.
 fn is_open(mechanism: &Mechanism) -> bool {
-    !mechanism.assembly.redundant.is_empty()
+    !mechanism.redundant().is_empty()
 }
 
 /// What the record of a run says; nothing for a scene without outputs.

@@ -517,7 +517,7 @@ fn check_friction(mechanism: &Mechanism, method: MethodId, request: &Request) ->
         let reason = "friction follows from the multipliers, which this one changes or leaves out";
         return Err(mismatch(format!("{} with it", place()), reason, "--stabilize projection"));
     }
-    if !mechanism.assembly.redundant.is_empty() {
+    if !mechanism.redundant().is_empty() {
         let reason = "constraints are redundant, so that the forces in the joints, and friction with them, are not determined";
         let alternative = "leave out a constraint that others imply already";
         return Err(mismatch(format!("{} here", place()), reason, alternative));

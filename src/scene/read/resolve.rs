@@ -240,10 +240,14 @@ impl Resolver<'_> {
             })
         };
         match (shape, &mut node.value) {
+            // A word of bars of another kind, of which the reader of bars speaks.
+            (Shape::Number(_), Value::Text(text)) if path.ends_with(".inertia") && is_of_shape(text) => {
+                Ok(())
+            }
             (Shape::Number(quantity) | Shape::LawNumber(quantity), Value::Text(_)) => {
                 self.number(node, quantity, shape, path)
             }
-            (Shape::Inertia(quantity), Value::Text(text)) if text != "full" && text != "slender" => {
+            (Shape::Inertia(quantity), Value::Text(text)) if !is_of_shape(text) => {
                 // A word that is nearly one of the two is left to the reader, who knows what was meant.
                 if Formula::parse_with(text, self.tables).is_ok_and(|formula| self.knows(&formula)) {
                     return self.number(node, quantity, shape, path);
@@ -374,6 +378,11 @@ fn is_of_time(formula: &Formula, parameters: &[Known]) -> bool {
     formula.names().all(|name| name == "t" || parameters.iter().any(|known| known.name == name))
 }
 
+/// The inertias that a bar by width and density may have by name.
+fn is_of_shape(word: &str) -> bool {
+    matches!(word, "full" | "slender")
+}
+
 /// A law as the object that could stand in its formula's place.
 fn law_object(span: Span, law: &Law) -> Value {
     let number = |value: f64| Node { span, value: Value::Number(value) };
@@ -405,12 +414,16 @@ pub(super) fn fits(
     match dimension {
         Some(found) if !found.is(wanted) => {
             let unit = if quantity.unit.is_empty() { "a pure number" } else { quantity.unit };
+            let hint = match found.is(Dimension::of("")) {
+                true => format!("numbers without a unit fit anything: 1*({})", formula.text().trim()),
+                false => "numbers without a unit fit anything".to_owned(),
+            };
             Err(FormulaError::new(
                 formula.text(),
                 0,
                 formula.text().len(),
                 format!("is {found}, not {unit}"),
-                "numbers without a unit fit anything".into(),
+                hint,
             ))
         }
         _ => Ok(()),
