@@ -77,9 +77,9 @@ pub use dynamics::{Configuration, Mechanism, Motion, OdeSystem, State, Time};
 pub use error::Error;
 pub use run::trust::Level;
 pub use run::{
-    Action, Change, Custom, Direction, Drift, Event, EventRecord, Limits, MethodId, Observer, Outcome, Plan,
-    Problem, Request, Run, Running, Sample, Snapshot, Stabilization, Step, Sweep, Trajectory, Trust, compare,
-    reference,
+    Action, Change, Custom, Direction, Drift, Event, EventRecord, Limits, Measure, MethodId, Observer,
+    Outcome, Plan, Problem, Regime, Request, Run, Running, Sample, Sensitivity, SensitivityRequest, Snapshot,
+    Spectrum, Stabilization, Step, Sweep, Trajectory, Trust, compare, lyapunov, reference, sensitivity,
 };
 pub use scene::{Scene, SceneBuilder, Template, ground, on, parse_scene, read_scene};
 pub use simulation::Simulation;

@@ -33,6 +33,8 @@ mod doors;
 mod drift;
 mod events;
 mod extremes;
+#[cfg(feature = "fit")]
+mod fit;
 mod forces;
 mod formulas;
 mod friction;
@@ -62,6 +64,7 @@ mod restart;
 mod rigid;
 mod scaling;
 mod scenes;
+mod sensitivity;
 mod singular;
 mod stabilization;
 mod stiff;

@@ -20,6 +20,8 @@
 //! | [`map()`] | [`Map`] | a value over two others, as colours |
 //! | [`multipliers()`] | [`Multipliers`] | Floquet multipliers and the unit circle |
 //! | [`matrix()`] | [`Matrix`] | outcomes by row and column, as colours and words |
+//! | [`bars()`] | [`Bars`] | signed values in groups, as bars |
+//! | [`bands()`] | [`Bands`] | curves with bands of uncertainty and measured dots |
 //! | [`profile()`] | [`Profile`] | a value over one other |
 //! | [`motion_gif()`], [`motion_apng()`] | [`MotionGif`] | the mechanism in motion |
 
@@ -27,6 +29,8 @@ mod angles;
 mod annotations;
 mod apng;
 mod axis;
+mod bands;
+mod bars;
 mod canvas;
 mod constraint_drift;
 mod energy_drift;
@@ -56,6 +60,8 @@ mod view;
 mod work_precision;
 
 pub use angles::{AngleSeries, Angles, angles};
+pub use bands::{Band, Bands, bands};
+pub use bars::{BarGroup, Bars, bars};
 pub use constraint_drift::{ConstraintDrift, ResidualPanel, constraint_drift};
 pub use energy_drift::{DriftSeries, EnergyDrift, energy_drift};
 pub use file::{Format, Picture};

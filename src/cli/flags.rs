@@ -1,5 +1,8 @@
 //! The command line: one table that is parser, help and completions.
 
+mod study;
+pub use study::{FitFlags, SensitivityFlags};
+
 #[cfg(feature = "charts")]
 use super::charts::{ChartFlags, MotionFlags};
 use super::failure::{Exit, Failure};
@@ -47,6 +50,10 @@ pub enum Command {
     Kinematics(KinematicsFlags),
     /// Find equilibria with modes, or periodic motions with Floquet multipliers, and their stability
     Modes(ModesFlags),
+    /// Derive outputs, extremes and times by numbers of the scene; bands of uncertainty; Lyapunov exponents
+    Sensitivity(SensitivityFlags),
+    /// Fit numbers of a scene to measured data, with their standard errors
+    Fit(FitFlags),
     /// Run a scene with every method at all its settings: error, drift and run time, and what to choose
     Compare(Box<CompareFlags>),
     /// Go on with an interrupted run or sweep: it ends as if nothing had been, byte for byte
@@ -497,6 +504,8 @@ impl Flags {
             Command::Inspect(flags) => flags.scene.tell.json,
             Command::Kinematics(flags) => flags.scene.tell.json,
             Command::Modes(flags) => flags.scene.tell.json,
+            Command::Sensitivity(flags) => flags.scene.tell.json,
+            Command::Fit(flags) => flags.scene.tell.json,
             Command::Run(flags) => flags.scene.tell.json,
             Command::Sweep(flags) => flags.scene.tell.json,
             Command::Compare(flags) => flags.scene.tell.json,

@@ -8,6 +8,7 @@ mod check;
 mod compare;
 #[doc(hidden)]
 pub mod failure;
+mod fit;
 #[doc(hidden)]
 pub mod flags;
 mod inspect;
@@ -18,6 +19,7 @@ mod modes;
 mod output;
 mod progress;
 mod resume;
+mod sensitivity;
 mod simulate;
 mod stress;
 mod sweep;
@@ -47,6 +49,8 @@ pub fn run(flags: &Flags) -> Result<(), Failure> {
         Command::Sweep(given) => sweep::run(given, &flags.arguments),
         Command::Kinematics(flags) => kinematics::run(flags),
         Command::Modes(flags) => modes::run(flags),
+        Command::Sensitivity(flags) => sensitivity::run(flags),
+        Command::Fit(flags) => fit::run(flags),
         Command::Compare(flags) => compare::run(flags),
         Command::Resume(flags) => resume::run(flags),
         Command::Merge(flags) => merge::run(flags),
@@ -60,6 +64,15 @@ pub fn run(flags: &Flags) -> Result<(), Failure> {
             print(&String::from_utf8_lossy(&script))
         }
     }
+}
+
+/// Reads the scene with its numbers left open, once it is known to have equations.
+fn load_template(flags: &SceneFlags) -> Result<Template, Failure> {
+    let text = scene::read_text(&flags.scene)?;
+    compile(flags, &text)?;
+    let template = Template::new(text, scene::source_name(&flags.scene), &flags.set);
+    let outputs = flags.output.iter().map(|text| scene::Output::parse(text)).collect();
+    Ok(template.with_outputs(outputs))
 }
 
 /// Reads and compiles the scene.

@@ -8,7 +8,7 @@ use super::force::action::Kind;
 use super::kernel::{Kernel, dot};
 use super::{Mechanism, Motion, Time, tree};
 use crate::arithmetic::lanes::{self, Code, Lanes};
-use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
+use crate::arithmetic::{Complex, DoubleDouble, Dual, Real, Scalar};
 use crate::scene::Scene;
 
 /// Energies at one moment \[J\].
@@ -217,6 +217,22 @@ impl Mechanism {
         for force in &self.forces {
             force.pull(moment(t), at, load);
         }
+    }
+
+    /// Derivatives of all applied forces by the rates, column by column \[N·m·s\].
+    pub(crate) fn drag(&self, t: Time, phi: &[f64], omega: &[f64]) -> Vec<Vec<f64>> {
+        let constant = |x: &[f64]| x.iter().map(|&x| Dual::<1>::constant(x)).collect::<Vec<_>>();
+        let (phi, mut moved) = (constant(phi), constant(omega));
+        let mut z = vec![Complex::ZERO; phi.len()];
+        self.tree.unit_vectors::<Dual<1>, 0>(&phi, &mut z);
+        let column = |k: usize| {
+            moved[k].slope = [1.0];
+            let mut load = vec![Dual::<1>::ZERO; phi.len()];
+            self.add_applied_forces(t, Posture { phi: &phi, z: &z, omega: &moved }, &[], &mut load);
+            moved[k].slope = [0.0];
+            load.iter().map(|load| load.slope[0]).collect()
+        };
+        (0..phi.len()).map(column).collect()
     }
 
     /// Power of dampers and applied forces on the bodies \[W\].

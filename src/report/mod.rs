@@ -14,6 +14,8 @@
 //! | [`modes`] | equilibria and modes | `modes.rs` |
 //! | [`periodic`] | periodic motions and their multipliers | `periodic.rs` |
 //! | `start` | the start of a scene, in a picture | `start.rs`, with the feature `charts` |
+//! | [`sensitivity`] | derivatives of a run, its Lyapunov spectrum | `sensitivity.rs` |
+//! | `fit` | a scene fitted to data | `fit.rs`, with the feature `fit` |
 //! | [`stress`] | stiff and extreme scenes by every method | `stress.rs` |
 //! | [`compare`] | methods compared, with charts | `compare.rs` |
 //! | [`trust`] | how far a run may be trusted | `trust.rs` |
@@ -32,6 +34,8 @@ mod curves;
 #[cfg(feature = "charts")]
 mod drawing;
 pub mod events;
+#[cfg(feature = "fit")]
+pub mod fit;
 mod friction;
 mod inputs;
 #[doc(hidden)]
@@ -46,6 +50,7 @@ pub mod page;
 pub mod periodic;
 #[doc(hidden)]
 pub mod result;
+pub mod sensitivity;
 #[doc(hidden)]
 #[cfg(feature = "charts")]
 pub mod start;

@@ -2,8 +2,8 @@
 //! to act.
 
 use super::build::build;
-use super::contact::{ContactDriver, in_modes};
-use super::event::{Action, Change};
+use super::contact::{ContactDriver, Jump, Switch, in_modes};
+use super::event::{Action, Change, SwitchFunction};
 use super::latch;
 use super::monitor::Monitor;
 use super::running::Outcome;
@@ -37,7 +37,7 @@ impl ContactDriver {
             return self.friction_event(function, outcome);
         }
         let name = events.name(event).to_owned();
-        let is_from_outside = events.is_from_outside(event);
+        let (is_from_outside, at) = (events.is_from_outside(event), events.switch_function(event));
         if std::mem::take(&mut events.memory.slides) {
             let hint = "sliding along such a surface is not integrated: let the law pass zero smoothly, as tanh(x/0.01) instead of sign(x)";
             return Err(StepError {
@@ -61,14 +61,14 @@ impl ContactDriver {
                 if let Some(monitor) = monitor.filter(|_| is_from_outside) {
                     monitor.end(&format!("event `{name}` changed the run, which nothing beside it follows"));
                 }
-                self.change(&name, change, outcome)
+                self.change((&name, at), change, outcome)
             }
         }
     }
 
     fn change(
         &mut self,
-        event: &str,
+        (event, at): (&str, SwitchFunction),
         Change { motion, switches, parameters, flips }: Change,
         outcome: &mut Outcome,
     ) -> Result<(), StepError> {
@@ -83,6 +83,7 @@ impl ContactDriver {
         let before = self.motion();
         let balance = self.sampler.balance(&before);
         let mut after = before.clone();
+        let mut keeps_values = motion.is_none();
         if let Some(motion) = motion {
             let n = before.phi.len();
             if (motion.phi.len(), motion.omega.len(), motion.turns.len()) != (n, n, before.turns.len()) {
@@ -104,6 +105,7 @@ impl ContactDriver {
             let mut modes = modes.clone();
             let moved = after.phi != before.phi || after.omega != before.omega;
             let next = parameters.unwrap_or_else(|| known.clone());
+            keeps_values &= next == *known;
             if moved || next != *known {
                 modes = self.whole.seen(&after, |at| formulas.modes(at, &next));
             } else if let Some(mode) = flips.and_then(|number| modes.get_mut(number)) {
@@ -164,6 +166,11 @@ impl ContactDriver {
         let change = self.sampler.balance(&after) - balance;
         self.sampler.shift(change);
         outcome.event_energy += change.hi;
+        if let Some(jumps) = &self.jumps {
+            let (mechanism, off) = (Arc::clone(&self.mechanism), self.off.clone());
+            let switch = Some(Switch { at, keeps_values, off });
+            jumps.push(Jump { contact: None, switch, before, after, mechanism });
+        }
         self.meet(outcome)
     }
 }

@@ -8,7 +8,7 @@
 mod impacts;
 use super::build::build;
 use super::driver::{Driver, DriverState, Halt, Pause, Watch};
-use super::event::{EventDetector, Memory};
+use super::event::{EventDetector, Memory, SwitchFunction};
 use super::extremes::{ExtremesDetector, ExtremesMemory};
 use super::flip::FlipDetector;
 use super::impact_monitor;
@@ -23,7 +23,7 @@ use crate::dynamics::friction::Mode;
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::stepping::{Cause, Statistics, StepError};
 pub(super) use impacts::in_modes;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// One impact of a run.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -74,16 +74,55 @@ struct Held {
     kept: Option<usize>,
 }
 
-/// What happened between two steps: an impact, or points held or released.
+/// What happened between two steps: an impact, points held or released, or a change by an event.
 #[derive(Clone, Debug)]
 pub(super) struct Jump {
     /// The contact of an impact.
     pub contact: Option<usize>,
+    /// The change by an event.
+    pub switch: Option<Switch>,
     /// The motion on both sides.
     pub before: Motion,
     pub after: Motion,
     /// The mechanism with the contacts held from then on.
     pub mechanism: Arc<Mechanism>,
+}
+
+/// A change by an event.
+#[derive(Clone, Debug)]
+pub(super) struct Switch {
+    /// The function whose zero it is at.
+    pub at: SwitchFunction,
+    /// True where neither the motion nor parameters are others: only parts and branches are.
+    pub keeps_values: bool,
+    /// Parts that do not act from then on.
+    pub off: Vec<String>,
+}
+
+/// Jumps since somebody last took them, where somebody asks.
+#[derive(Clone, Debug, Default)]
+pub(super) struct JumpLog {
+    list: Arc<Mutex<Vec<Jump>>>,
+    /// Whether changes by events are wanted.
+    has_switches: bool,
+}
+
+impl JumpLog {
+    /// One that takes changes by events too.
+    pub fn with_switches() -> Self {
+        Self { has_switches: true, ..Self::default() }
+    }
+
+    pub fn push(&self, jump: Jump) {
+        if jump.switch.is_none() || self.has_switches {
+            self.list.lock().unwrap_or_else(PoisonError::into_inner).push(jump);
+        }
+    }
+
+    /// Takes them out.
+    pub fn take(&self) -> Vec<Jump> {
+        std::mem::take(&mut *self.list.lock().unwrap_or_else(PoisonError::into_inner))
+    }
 }
 
 /// Where a course is: all that what follows depends on.
@@ -148,8 +187,8 @@ pub(super) struct ContactDriver {
     pub(super) ended_by: Option<String>,
     /// Energy stabilizers put in before the present driver \[J\].
     pub(super) stabilizer: f64,
-    /// Impacts, holds and releases since somebody last took them, where somebody asks.
-    pub(super) jumps: Option<Vec<Jump>>,
+    /// Impacts, holds, releases and changes by events, where somebody asks.
+    pub(super) jumps: Option<JumpLog>,
 }
 
 impl ContactDriver {

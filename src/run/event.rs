@@ -194,6 +194,17 @@ enum Owner<'a> {
     Friction(&'a FrictionWatch, usize),
 }
 
+/// The function at whose zero an event changed the run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum SwitchFunction {
+    /// That of an event of the scene, by its number.
+    Event(usize),
+    /// A condition of the scene's laws.
+    Condition(usize),
+    /// One that only the run itself knows.
+    Other,
+}
+
 /// A passage of an event function.
 struct Passage {
     t: Time,
@@ -301,6 +312,15 @@ impl EventDetector {
             Some(laws) if function < scene => Owner::Scene(laws, function),
             Some(laws) if function >= conditions => Owner::Condition(laws, function - conditions),
             _ => Owner::Outside(function - scene),
+        }
+    }
+
+    /// The function of an event.
+    pub fn switch_function(&self, event: usize) -> SwitchFunction {
+        match self.owner(event) {
+            Owner::Scene(_, number) => SwitchFunction::Event(number),
+            Owner::Condition(_, number) => SwitchFunction::Condition(number),
+            _ => SwitchFunction::Other,
         }
     }
 

@@ -41,6 +41,8 @@ pub mod fast;
 #[doc(hidden)]
 #[cfg(feature = "files")]
 pub mod files;
+#[cfg(feature = "fit")]
+pub mod fit;
 #[doc(hidden)]
 pub mod flip;
 #[doc(hidden)]
@@ -62,6 +64,8 @@ pub mod reference;
 pub mod running;
 #[doc(hidden)]
 pub mod sample;
+#[doc(hidden)]
+pub mod sensitivity;
 mod shrink;
 #[doc(hidden)]
 pub mod stress;
@@ -103,6 +107,9 @@ pub use plan::{Plan, Refusal, Request};
 pub use reference::{Reference, reference};
 pub use running::{Outcome, ResumeError, Run, RunError, Running, Snapshot, integrate, simulate};
 pub use sample::{Sample, Sampler};
+pub use sensitivity::{
+    Measure, Regime, Sensitivity, SensitivityError, SensitivityRequest, Spectrum, lyapunov, sensitivity,
+};
 #[cfg(feature = "files")]
 pub use sweep::table::SweepTable;
 pub use sweep::{

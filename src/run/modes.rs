@@ -16,7 +16,7 @@ mod search;
 
 pub use self::periodic::{PeriodicMotion, PeriodicMotions, periodic};
 
-use self::local::Local;
+pub(super) use self::local::Local;
 use self::search::Search;
 use super::kinematics::left_out;
 use crate::arithmetic::Scalar;

@@ -111,6 +111,18 @@ impl Template {
         self.parsed(&overrides)
     }
 
+    /// The same with these values of these variables.
+    #[must_use]
+    pub fn with_values(&self, variables: &[Variable], values: &[f64]) -> Self {
+        let filled = variables
+            .iter()
+            .zip(values)
+            .map(|(variable, &value)| Override { path: variable.path.clone(), value: value.into() });
+        let mut template = self.clone();
+        template.overrides.extend(filled);
+        template
+    }
+
     /// Its text, the name of its file, and its overrides.
     pub(super) fn parts(&self) -> (&str, &str, &[Override]) {
         (&self.text, &self.source, &self.overrides)
@@ -137,6 +149,28 @@ impl Template {
             Walk { tree: &tree }.unit(&path).map_err(|(problem, hint)| refused(problem, allowed, hint))?;
         let start = self.start_of(&path)?;
         Ok(Variable { path, unit, start })
+    }
+
+    /// The value of a number as it is written in the scene, or given by an override; `None` where it is left to
+    /// its default, or follows from a formula.
+    ///
+    /// # Errors
+    /// As [`parse_scene`] where the text is no JSON or an override does not fit it.
+    pub fn value(&self, variable: &Variable) -> Result<Option<f64>, SceneError> {
+        let (_, tree) = put_together(&self.text, &self.source, &self.overrides)?;
+        let mut node = Some(&tree);
+        for step in steps(&variable.path).unwrap_or_default() {
+            node = node.and_then(|node| match (&step, &node.value) {
+                (Step::Key(key), Value::Object(_)) => member(node, key),
+                (Step::Key(key), Value::List(nodes)) => nodes.iter().find(|node| name(node) == Some(key)),
+                (Step::Index(index), Value::List(nodes)) => nodes.get(*index),
+                _ => None,
+            });
+        }
+        Ok(node.and_then(|node| match &node.value {
+            Value::Number(value) => Some(*value),
+            _ => None,
+        }))
     }
 
     /// The bar and the number of its start that a path means, where nothing else has a say in it.

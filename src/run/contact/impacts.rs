@@ -113,9 +113,10 @@ impl ContactDriver {
                 ..self.stopped(&outcome.plan, what, "tighten the tolerance, or use --method taylor")
             });
         }
-        if let Some(jumps) = &mut self.jumps {
+        if let Some(jumps) = &self.jumps {
             jumps.push(Jump {
                 contact: Some(contact),
+                switch: None,
                 before: last,
                 after,
                 mechanism: Arc::clone(&self.mechanism),
@@ -238,9 +239,10 @@ impl ContactDriver {
         let last = std::mem::replace(&mut self.driver, next);
         self.driver.follow(&*last);
         self.sampler.hold(Arc::clone(&self.mechanism));
-        if let (Some(jumps), Some(before)) = (&mut self.jumps, before) {
+        if let (Some(jumps), Some(before)) = (&self.jumps, before) {
             jumps.push(Jump {
                 contact: None,
+                switch: None,
                 before,
                 after: motion.clone(),
                 mechanism: Arc::clone(&self.mechanism),

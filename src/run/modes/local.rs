@@ -9,18 +9,18 @@ use nalgebra::{DMatrix, DVector};
 use std::f64::consts::{PI, TAU};
 
 /// Scratch space for positions on the constraints.
-pub(super) struct Local<'a> {
+pub(in crate::run) struct Local<'a> {
     pub(super) mechanism: &'a Mechanism,
     pub(super) kernel: Kernel<f64>,
     /// Units of the coordinates \[rad, m\].
-    pub(super) unit: Vec<f64>,
+    pub(in crate::run) unit: Vec<f64>,
     /// The least singular value of the rows that is not zero over the largest, where the last tangent was
     /// taken.
     pub(super) conditioning: f64,
 }
 
 impl<'a> Local<'a> {
-    pub(super) fn new(mechanism: &'a Mechanism) -> Self {
+    pub(in crate::run) fn new(mechanism: &'a Mechanism) -> Self {
         let bodies = mechanism.bodies.len();
         let unit = |k: usize| if k < bodies { 1.0 } else { mechanism.units.length };
         Self {
@@ -32,13 +32,13 @@ impl<'a> Local<'a> {
     }
 
     /// Accelerations at rest at a time, measured in the coordinates' units.
-    pub(super) fn pull(&mut self, phi: &[f64], t: f64) -> DVector<f64> {
+    pub(in crate::run) fn pull(&mut self, phi: &[f64], t: f64) -> DVector<f64> {
         let still = vec![0.0; phi.len()];
         self.kernel.accelerate::<0>(self.mechanism, Time::of(t), phi, &still, Bias::default());
         DVector::from_iterator(phi.len(), self.kernel.load.iter().zip(&self.unit).map(|(a, unit)| a / unit))
     }
 
-    pub(super) fn depends_on_time(&mut self, phi: &[f64]) -> bool {
+    pub(in crate::run) fn depends_on_time(&mut self, phi: &[f64]) -> bool {
         let now = self.pull(phi, 0.0);
         [0.37, 1.9].iter().any(|&t| {
             let then = self.pull(phi, t);
@@ -47,7 +47,7 @@ impl<'a> Local<'a> {
     }
 
     /// Directions that the constraints leave, orthonormal, one a column.
-    pub(super) fn tangent(&mut self, phi: &[f64]) -> DMatrix<f64> {
+    pub(in crate::run) fn tangent(&mut self, phi: &[f64]) -> DMatrix<f64> {
         let n = phi.len();
         let rows = self.mechanism.constraints.len();
         self.pull(phi, 0.0);
@@ -68,13 +68,13 @@ impl<'a> Local<'a> {
     }
 
     /// Coordinates on the constraints next to these, at t = 0.
-    pub(super) fn projected(&mut self, phi: &[f64]) -> Option<Vec<f64>> {
+    pub(in crate::run) fn projected(&mut self, phi: &[f64]) -> Option<Vec<f64>> {
         let [phi, _] = self.projected_moving(&[phi.to_vec(), vec![0.0; phi.len()]])?;
         Some(phi)
     }
 
     /// Coordinates and rates on the constraints next to these, at t = 0.
-    pub(super) fn projected_moving(&mut self, [phi, omega]: &[Vec<f64>; 2]) -> Option<[Vec<f64>; 2]> {
+    pub(in crate::run) fn projected_moving(&mut self, [phi, omega]: &[Vec<f64>; 2]) -> Option<[Vec<f64>; 2]> {
         let n = phi.len();
         if self.mechanism.constraints.is_empty() {
             return Some([phi.clone(), omega.clone()]);
@@ -89,12 +89,12 @@ impl<'a> Local<'a> {
     }
 
     /// A position moved along the constraints.
-    pub(super) fn moved(&self, phi: &[f64], tangent: &DMatrix<f64>, y: &DVector<f64>) -> Vec<f64> {
+    pub(in crate::run) fn moved(&self, phi: &[f64], tangent: &DMatrix<f64>, y: &DVector<f64>) -> Vec<f64> {
         (tangent * y).iter().zip(phi).zip(&self.unit).map(|((y, phi), unit)| phi + y * unit).collect()
     }
 
     /// True where two positions are the same but for whole turns.
-    pub(super) fn is_same(&self, a: &[f64], b: &[f64]) -> bool {
+    pub(in crate::run) fn is_same(&self, a: &[f64], b: &[f64]) -> bool {
         let bodies = self.mechanism.bodies.len();
         a.iter().zip(b).zip(&self.unit).enumerate().all(|(k, ((a, b), unit))| {
             let apart = (a - b) / unit;
@@ -104,7 +104,7 @@ impl<'a> Local<'a> {
     }
 
     /// Coordinates with their angles in (-π, π].
-    pub(super) fn wrapped(&self, phi: &[f64]) -> Vec<f64> {
+    pub(in crate::run) fn wrapped(&self, phi: &[f64]) -> Vec<f64> {
         let wrapped = |(k, phi): (usize, &f64)| {
             if k >= self.mechanism.bodies.len() {
                 return *phi;

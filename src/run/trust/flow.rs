@@ -3,7 +3,7 @@
 use super::Tangent;
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::build::build;
-use crate::run::contact::ContactDriver;
+use crate::run::contact::{ContactDriver, JumpLog};
 use crate::run::plan::Plan;
 use crate::run::running::Outcome;
 use std::sync::Arc;
@@ -44,7 +44,8 @@ pub fn flow(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion, times: &[f6
     contact_driver.meet(&mut outcome).map_err(|stop| stop.what)?;
     let begin = contact_driver.motion();
     let mut tangent = Tangent::new(contact_driver.holding(), &begin, plan.until)?;
-    contact_driver.jumps = Some(Vec::new());
+    let jumps = JumpLog::default();
+    contact_driver.jumps = Some(jumps.clone());
     let moment = |motion: Motion, tangent: &Tangent| Moment {
         motion,
         columns: tangent.columns(),
@@ -58,7 +59,7 @@ pub fn flow(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion, times: &[f6
             contact_driver
                 .go(Time::from(next), &mut outcome, &mut || false)
                 .map_err(|stop| format!("at {} s: {}", stop.t, stop.what))?;
-            tangent.jump(&std::mem::take(contact_driver.jumps.get_or_insert_default()));
+            tangent.jump(&jumps.take());
             tangent.take(&contact_driver.motion(), 0);
             flow.steps += 1;
             if let Some(lost) = tangent.lost() {

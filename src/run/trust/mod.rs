@@ -41,6 +41,7 @@ pub use flow::{Flow, Moment, flow};
 pub use inputs::{Input, Inputs};
 pub(super) use measured::crossing;
 pub use tangent::Tangent;
+pub(super) use tangent::{Ground, eliminate};
 
 use serde::{Deserialize, Serialize};
 use std::fmt;

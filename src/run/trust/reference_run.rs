@@ -5,7 +5,7 @@ use super::finer::{is_rounded, own_error};
 use super::tangent::{Path, Tangent};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::build::build;
-use crate::run::contact::{ContactDriver, ContactDriverState};
+use crate::run::contact::{ContactDriver, ContactDriverState, JumpLog};
 use crate::run::methods::MethodId;
 use crate::run::plan::Plan;
 use crate::run::running::Outcome;
@@ -92,7 +92,7 @@ impl ReferenceRun {
             Ok(tangent) => (Some(tangent), None),
             Err(why) => (None, Some(why)),
         };
-        contact_driver.jumps = tangent.is_some().then(Vec::new);
+        contact_driver.jumps = tangent.is_some().then(JumpLog::default);
         let (is_rounded, begun) = (is_rounded(series), start.time.hi);
         Ok(Self {
             contact_driver,
@@ -114,7 +114,7 @@ impl ReferenceRun {
         let motion = self.motion.clone();
         let mechanism = &self.contact_driver.acting(mechanism);
         (self.contact_driver, self.outcome) = contact_driver(mechanism, &mut series, &motion)?;
-        self.contact_driver.jumps = self.tangent.is_some().then(Vec::new);
+        self.contact_driver.jumps = self.tangent.is_some().then(JumpLog::default);
         (self.is_rounded, self.begun, self.last) =
             (is_rounded(&series), motion.time.hi, Statistics::default());
         Ok(())
@@ -151,7 +151,7 @@ impl ReferenceRun {
                 tangent => tangent,
             },
         };
-        contact_driver.jumps = tangent.is_some().then(Vec::new);
+        contact_driver.jumps = tangent.is_some().then(JumpLog::default);
         let is_rounded = is_rounded(&outcome.plan);
         let motion = contact_driver.motion();
         Ok(Some(Self { contact_driver, outcome, motion, tangent, no_growth: None, is_rounded, begun, last }))
@@ -230,8 +230,8 @@ impl ReferenceRun {
             self.no_growth = Some("an event switched a law or a part, which is not followed".into());
             self.end_flow();
         }
-        if let (Some(tangent), Some(jumps)) = (&mut self.tangent, &mut self.contact_driver.jumps) {
-            tangent.jump(&std::mem::take(jumps));
+        if let (Some(tangent), Some(jumps)) = (&mut self.tangent, &self.contact_driver.jumps) {
+            tangent.jump(&jumps.take());
         }
         let statistics = self.contact_driver.statistics();
         *purse.spent += (statistics.evaluations - self.last.evaluations) as f64 * each + purse.prices.look;

@@ -26,7 +26,8 @@ mod start;
 
 use self::beside::Beside;
 use self::gauss::Gauss;
-use self::ground::Ground;
+pub(in crate::run) use self::gauss::eliminate;
+pub(in crate::run) use self::ground::Ground;
 use self::start::{Dice, unit};
 use super::DistanceMetric;
 use crate::dynamics::schur::NEAR;

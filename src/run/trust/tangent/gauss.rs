@@ -102,7 +102,7 @@ impl Gauss {
 
 /// Solves in place, with the largest pivots: rows below are eliminated first, then those above from the last
 /// one up.
-fn eliminate(size: usize, width: usize, system: &mut [f64]) -> bool {
+pub(in crate::run) fn eliminate(size: usize, width: usize, system: &mut [f64]) -> bool {
     for p in 0..size {
         let mut best = p;
         for row in p + 1..size {

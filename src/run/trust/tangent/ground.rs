@@ -52,16 +52,38 @@ impl Ground {
         state: &State,
         columns: impl Iterator<Item = &'a mut Vec<f64>>,
     ) {
-        let n = mechanism.coordinates();
         for column in columns {
-            for r in 0..mechanism.constraints.len() {
-                self.kernel.multiplier[r] =
-                    self.kernel.fold_gradient(r, 0.0, |sum, k, g| sum + g * column[k]);
-            }
-            self.shift(&mut column[..n]);
-            self.rates(mechanism, state, column);
-            self.shift(&mut column[n..2 * n]);
+            self.keep_moved(mechanism, state, column, [&[], &[]]);
         }
+    }
+
+    /// The same for one column beside which the constraints themselves are others: C and C' change by these,
+    /// none where they are left out.
+    pub fn keep_moved(
+        &mut self,
+        mechanism: &Mechanism,
+        state: &State,
+        column: &mut [f64],
+        [positions, rates]: [&[f64]; 2],
+    ) {
+        let n = mechanism.coordinates();
+        for r in 0..mechanism.constraints.len() {
+            let moved = positions.get(r).copied().unwrap_or(0.0);
+            self.kernel.multiplier[r] =
+                self.kernel.fold_gradient(r, 0.0, |sum, k, g| sum + g * column[k]) + moved;
+        }
+        self.shift(&mut column[..n]);
+        self.rates(mechanism, state, column);
+        self.kernel.multiplier.iter_mut().zip(rates).for_each(|(rate, moved)| *rate += moved);
+        self.shift(&mut column[n..2 * n]);
+    }
+
+    /// Takes off a half of a column what is not tangent to the constraints.
+    pub fn flatten(&mut self, mechanism: &Mechanism, half: &mut [f64]) {
+        for r in 0..mechanism.constraints.len() {
+            self.kernel.multiplier[r] = self.kernel.fold_gradient(r, 0.0, |sum, k, g| sum + g * half[k]);
+        }
+        self.shift(half);
     }
 
     /// How fast the rows part along a column, as multipliers.

@@ -1,0 +1,177 @@
+//! A fit as a page, a JSON object, a table and charts.
+
+use super::page::{Page, figure, magnitude, rough};
+#[cfg(feature = "charts")]
+use crate::chart::{self, Band, Bands, ChartError, FILE_RESOLUTION, Picture, plain};
+use crate::run::fit::{Fit, FittedColumn};
+use serde_json::{Value, json};
+use std::fmt::Write;
+
+/// The options that set a scene to the fitted numbers.
+pub fn options(found: &Fit) -> String {
+    let set = found.numbers.iter().map(|number| format!("--set {}={:?}", number.path, number.value));
+    set.collect::<Vec<_>>().join(" ")
+}
+
+/// One object: `numbers`, `covariance`, `columns`, `chi_square`, `degrees_of_freedom`, `set`.
+pub fn object(found: &Fit) -> Value {
+    json!({
+        "scene": found.scene.name,
+        "numbers": found.numbers.iter().map(|number| json!({
+            "path": number.path, "unit": number.unit, "guess": number.guess, "value": number.value,
+            "error": number.error,
+        })).collect::<Vec<_>>(),
+        "covariance": found.covariance.row_iter()
+            .map(|row| row.iter().copied().collect::<Vec<f64>>()).collect::<Vec<_>>(),
+        "columns": found.columns.iter().map(|column| json!({
+            "name": column.name, "unit": column.unit, "sigma": column.sigma, "is_given": column.is_given,
+            "rms": rms(column),
+        })).collect::<Vec<_>>(),
+        "ignored": found.ignored,
+        "chi_square": found.chi_square,
+        "degrees_of_freedom": found.degrees_of_freedom,
+        "segments": found.segments,
+        "gap": if found.segments > 1 { json!(found.gap) } else { Value::Null },
+        "runs": found.runs,
+        "ended": found.ended,
+        "set": options(found),
+    })
+}
+
+fn residuals(column: &FittedColumn) -> impl Iterator<Item = Option<f64>> {
+    column
+        .measured
+        .iter()
+        .zip(&column.model)
+        .map(|(measured, model)| measured.map(|measured| measured - model))
+}
+
+fn rms(column: &FittedColumn) -> f64 {
+    let squares: Vec<f64> = residuals(column).flatten().map(|residual| residual * residual).collect();
+    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+}
+
+/// The page.
+pub fn text(found: &Fit) -> String {
+    let mut page = Page::new(&found.scene.name, &found.scene.description);
+    let rows: Vec<Vec<String>> = (found.numbers.iter())
+        .map(|number| {
+            let name = if number.unit.is_empty() {
+                number.path.clone()
+            } else {
+                format!("{} [{}]", number.path, number.unit)
+            };
+            vec![name, figure(number.guess), format!("{:.9}", Significant(number.value)), rough(number.error)]
+        })
+        .collect();
+    page.entry("fitted", &found.ended);
+    page.table(&["number", "guess", "value", "std. error"], &rows);
+    let rows: Vec<Vec<String>> = (found.columns.iter())
+        .map(|column| {
+            let sigma = format!("{}{}", rough(column.sigma), if column.is_given { "" } else { " (found)" });
+            vec![format!("{} [{}]", column.name, column.unit), magnitude(rms(column)), sigma]
+        })
+        .collect();
+    page.entry("columns", "residuals and the noise they were weighted with");
+    page.table(&["column", "rms", "sigma"], &rows);
+    page.entry(
+        "chi square",
+        &format!("{} at {} degrees of freedom", rough(found.chi_square), found.degrees_of_freedom),
+    );
+    if found.segments > 1 {
+        let text = format!("{}, tied together within {}", found.segments, magnitude(found.gap));
+        page.entry("segments", &text);
+    }
+    if !found.ignored.is_empty() {
+        page.entry(
+            "left out",
+            &format!("columns that mean nothing in the scene: {}", found.ignored.join(", ")),
+        );
+    }
+    page.entry("correlations", "");
+    let names: Vec<&str> = found.numbers.iter().map(|number| number.path.as_str()).collect();
+    let rows: Vec<Vec<String>> = (0..names.len())
+        .map(|i| {
+            let entry = |j: usize| {
+                let share = found.covariance[(i, j)] / (found.numbers[i].error * found.numbers[j].error);
+                format!("{share:.3}")
+            };
+            std::iter::once(names[i].to_owned()).chain((0..names.len()).map(entry)).collect()
+        })
+        .collect();
+    page.table(&[&[""], &names[..]].concat(), &rows);
+    page.entry("options", "");
+    page.into_text() + &options(found) + "\n"
+}
+
+/// A number to so many significant digits.
+struct Significant(f64);
+
+impl std::fmt::Display for Significant {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let digits = f.precision().unwrap_or(6) as i32;
+        let size = self.0.abs();
+        if self.0 != 0.0 && !(1e-4..1e9).contains(&size) {
+            return write!(f, "{:.*e}", digits as usize - 1, self.0);
+        }
+        let whole = if size > 0.0 { libm::floor(libm::log10(size)) as i32 } else { 0 };
+        write!(f, "{:.*}", (digits - 1 - whole).max(0) as usize, self.0)
+    }
+}
+
+/// Data, fitted motion and residuals, row by row.
+pub fn table(found: &Fit) -> String {
+    let mut text = String::from("t [s]");
+    for FittedColumn { name, unit, .. } in &found.columns {
+        let _ = write!(text, ",{name} [{unit}],{name} fitted [{unit}],{name} residual [{unit}]");
+    }
+    text.push('\n');
+    for (k, t) in found.times.iter().enumerate() {
+        let _ = write!(text, "{t:?}");
+        for column in &found.columns {
+            let cell = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:?}"));
+            let (measured, model) = (column.measured[k], column.model[k]);
+            let residual = measured.map(|measured| measured - model);
+            let _ = write!(text, ",{},{model:?},{}", cell(measured), cell(residual));
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// The fitted motion through the data, and the residuals.
+///
+/// # Errors
+/// Drawing fails.
+#[cfg(feature = "charts")]
+pub fn charts(found: &Fit) -> Result<Vec<(&'static str, Picture)>, ChartError> {
+    let caption = vec![
+        format!("scene {}", plain(&found.scene.name)),
+        format!("chi square {} at {} degrees of freedom", rough(found.chi_square), found.degrees_of_freedom),
+    ];
+    let unit = |column: &FittedColumn| plain(&column.unit).replace(' ', "·");
+    let dots = |values: &mut dyn Iterator<Item = Option<f64>>| {
+        found.times.iter().zip(values).filter_map(|(&t, value)| Some([t, value?])).collect::<Vec<_>>()
+    };
+    let fitted = |column: &FittedColumn| Band {
+        name: format!("{} [{}]", plain(&column.name), unit(column)),
+        time: found.times.clone(),
+        value: column.model.clone(),
+        dots: dots(&mut column.measured.iter().copied()),
+        ..Band::default()
+    };
+    let left = |column: &FittedColumn| Band {
+        name: format!("{} [{}]", plain(&column.name), unit(column)),
+        dots: dots(&mut residuals(column)),
+        zero: true,
+        ..Band::default()
+    };
+    let chart =
+        |title: &str, bands: Vec<Band>| Bands { title: title.into(), caption: caption.clone(), bands };
+    let fits = chart("Fitted motion and data", found.columns.iter().map(fitted).collect());
+    let residuals = chart("Residuals: data less fitted motion", found.columns.iter().map(left).collect());
+    Ok(vec![
+        ("fit", chart::bands(&fits, FILE_RESOLUTION)?),
+        ("residuals", chart::bands(&residuals, FILE_RESOLUTION)?),
+    ])
+}

@@ -1,0 +1,98 @@
+//! Measured data: a table with a column of times and columns named as in `trajectory.csv`.
+
+use super::FitError;
+use std::path::Path;
+
+/// A table of measurements.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Data {
+    /// Its file, for messages.
+    pub source: String,
+    /// Times \[s\], rising, from 0 on.
+    pub times: Vec<f64>,
+    /// The other columns: names without units, and values, some of which may be missing.
+    pub columns: Vec<(String, Vec<Option<f64>>)>,
+}
+
+impl Data {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// It cannot be read, or is no such table.
+    pub fn read(path: &Path) -> Result<Self, FitError> {
+        let source = path.display().to_string();
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| FitError::Data(format!("{source}: cannot be read: {error}")))?;
+        Self::parse(&text, &source)
+    }
+
+    /// Reads a text: a header `t [s],bar1.phi [rad],…` and rows of numbers; an empty cell is no measurement.
+    ///
+    /// # Errors
+    /// It is no such table; the message names line, column and value.
+    pub fn parse(text: &str, source: &str) -> Result<Self, FitError> {
+        let mut reader =
+            csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
+        let fail = |what: String, hint: &str| FitError::Data(format!("{source}: {what}\nhint: {hint}"));
+        let header = reader.headers().map_err(|error| fail(error.to_string(), "a table of numbers"))?.clone();
+        let names: Vec<&str> =
+            header.iter().map(|head| head.split(" [").next().unwrap_or(head).trim()).collect();
+        let time = names.iter().position(|name| *name == "t").ok_or_else(|| {
+            fail("has no column of times".into(), "name one `t [s]`, and the others as in trajectory.csv")
+        })?;
+        let others = names.iter().enumerate().filter(|(column, _)| *column != time);
+        let mut data = Self { source: source.into(), ..Self::default() };
+        data.columns.extend(others.map(|(_, name)| ((*name).to_owned(), Vec::new())));
+        for record in reader.records() {
+            let record = record
+                .map_err(|error| fail(error.to_string(), "every row has as many cells as the header"))?;
+            let line = record.position().map_or(0, csv::Position::line);
+            let mut cells = Vec::new();
+            for (cell, name) in record.iter().zip(&names) {
+                let value = if cell.is_empty() { None } else { crate::scene::number(cell) };
+                if value.is_none() && !cell.is_empty() {
+                    let what = format!("line {line}, column {name}: `{cell}` is not a number");
+                    return Err(fail(what, "write 0.5, or leave the cell empty where nothing was measured"));
+                }
+                cells.push(value);
+            }
+            let last = data.times.last().copied();
+            match cells.remove(time) {
+                Some(t) if t >= 0.0 && last.is_none_or(|last| t > last) => data.times.push(t),
+                t => {
+                    let t = t.map_or("empty".to_owned(), |t| t.to_string());
+                    let what = format!("line {line}, column t: {t} does not come after the time before");
+                    return Err(fail(what, "times in seconds, from 0 on and rising"));
+                }
+            }
+            data.columns.iter_mut().zip(cells).for_each(|((_, values), cell)| values.push(cell));
+        }
+        match data.times.len() {
+            0 => Err(fail("has no rows".into(), "at least one row of measurements")),
+            _ => Ok(data),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_are_read_and_what_is_none_is_told_with_its_place() {
+        let data = Data::parse("t [s],bar1.phi [rad],x\n0,1.5,\n0.5,-1e-3,2\n", "data.csv").expect("a table");
+        assert_eq!(data.times, [0.0, 0.5]);
+        assert_eq!(data.columns[0], ("bar1.phi".into(), vec![Some(1.5), Some(-1e-3)]));
+        assert_eq!(data.columns[1], ("x".into(), vec![None, Some(2.0)]));
+        for (text, told) in [
+            ("bar1.phi\n1\n", "no column of times"),
+            ("t,a\n0,1\n0,2\n", "line 3, column t: 0"),
+            ("t,a\n0,one\n", "line 2, column a: `one`"),
+            ("t,a\n", "no rows"),
+            ("t,a\n0,1,2\n", "data.csv"),
+        ] {
+            let error = Data::parse(text, "data.csv").expect_err(text).to_string();
+            assert!(error.contains(told) && error.contains("data.csv"), "{error}");
+        }
+    }
+}

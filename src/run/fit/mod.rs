@@ -1,0 +1,323 @@
+//! Fitting numbers of a scene to measured data: weighted least squares with the derivatives of
+//! [`sensitivity`](super::sensitivity).
+//!
+//! ```text
+//! min Σ ((y_i - Y(t_i; p)) / σ_i)²                                     Levenberg and Marquardt
+//! several parts: unknown states s_k at their beginnings as well,  s_k+1 = x(t_k+1; s_k, p)  by growing weights
+//! covariance of p = (JᵀJ)⁻¹ at the minimum
+//! ```
+//!
+//! Where small differences grow fast the sum of squares over the whole time has many minima; over parts that
+//! are short against that growth, tied together by continuity, it has not (*multiple shooting*).
+//!
+//! Sources: J. J. Moré, *The Levenberg-Marquardt algorithm: implementation and theory*, Lecture Notes in
+//! Mathematics 630 (1978); H. G. Bock, *Recent advances in parameter identification techniques for O.D.E.*,
+//! Progress in Scientific Computing 2 (1983).
+
+mod data;
+mod problem;
+mod segment;
+
+pub use data::Data;
+
+use super::driver::Pause;
+use super::sensitivity::{Measure, SensitivityError, SensitivityRequest, Study};
+use crate::scene::{Output, OutputNames, Scene, SceneError, Template, Variable};
+use nalgebra::DMatrix;
+use problem::Problem;
+
+/// Share of a column's spread taken for its noise where nobody says, to begin with and at least.
+const SPREAD: [f64; 2] = [1e-2, 1e-10];
+/// How often noise is estimated anew.
+const ROUNDS: usize = 3;
+/// Weights of continuity, over the least noise, one after the other.
+const CONTINUITY: [f64; 3] = [0.1, 10.0, 1e3];
+
+/// What is asked for.
+#[derive(Clone, Debug)]
+pub struct FitRequest {
+    /// Numbers to be found: paths as of `--set`, whose values in the scene are where the search begins.
+    pub vary: Vec<String>,
+    /// Columns of the data that count; none: all whose names mean something in the scene.
+    pub columns: Vec<String>,
+    /// Standard deviations of columns, by name, where they are known.
+    pub sigmas: Vec<(String, f64)>,
+    /// Parts of the data for multiple shooting.
+    pub segments: usize,
+    /// Tolerance of the motion.
+    pub tolerance: Option<f64>,
+}
+
+impl Default for FitRequest {
+    fn default() -> Self {
+        let (vary, columns, sigmas) = (Vec::new(), Vec::new(), Vec::new());
+        Self { vary, columns, sigmas, segments: 1, tolerance: None }
+    }
+}
+
+/// Why there is no fit.
+#[derive(Debug, thiserror::Error)]
+pub enum FitError {
+    /// The data.
+    #[error("{0}")]
+    Data(String),
+    /// What is asked for.
+    #[error("{0}")]
+    Asked(String),
+    /// The scene, or its derivatives.
+    #[error("{0}")]
+    Sensitivity(#[from] SensitivityError),
+    /// The search found no minimum.
+    #[error("{0}")]
+    Failed(String),
+}
+
+impl From<SceneError> for FitError {
+    fn from(error: SceneError) -> Self {
+        Self::Sensitivity(error.into())
+    }
+}
+
+/// A number that was fitted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FittedNumber {
+    /// Its path.
+    pub path: String,
+    /// Its unit; empty for a pure number.
+    pub unit: String,
+    /// Where the search began.
+    pub guess: f64,
+    /// Its value.
+    pub value: f64,
+    /// Its standard error.
+    pub error: f64,
+}
+
+/// A column of the data beside the fitted motion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FittedColumn {
+    /// Its name.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Standard deviation of its noise.
+    pub sigma: f64,
+    /// Whether that was given.
+    pub is_given: bool,
+    /// The fitted motion at all times of the data.
+    pub model: Vec<f64>,
+    /// What was measured.
+    pub measured: Vec<Option<f64>>,
+}
+
+/// Numbers of a scene fitted to data.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The scene with the fitted numbers.
+    pub scene: Scene,
+    /// The numbers.
+    pub numbers: Vec<FittedNumber>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
+    /// Times of the data \[s\].
+    pub times: Vec<f64>,
+    /// The columns fitted to.
+    pub columns: Vec<FittedColumn>,
+    /// Columns of the data that mean nothing in the scene.
+    pub ignored: Vec<String>,
+    /// Sum of the squares of the residuals over their standard deviations.
+    pub chi_square: f64,
+    /// Measurements less numbers fitted.
+    pub degrees_of_freedom: usize,
+    /// Runs made.
+    pub runs: u64,
+    /// Parts of the data, and the largest step between them that is left \[rad, or lengths of the mechanism\].
+    pub segments: usize,
+    /// See [`Fit::segments`].
+    pub gap: f64,
+    /// How the search ended.
+    pub ended: String,
+}
+
+/// Fits numbers of a scene to data.
+///
+/// ```
+/// use driftless::run::fit::{Data, FitRequest, fit};
+/// use driftless::{Simulation, Template};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let template = Template::read("examples/scenes/spring.json".as_ref(), &[])?;
+/// let trajectory = Simulation::new(&template.scene()?)?.until(1.0).every(0.1).trajectory()?;
+/// let mut table = String::from("t [s],bar1.phi [rad]\n");
+/// for sample in trajectory.samples() {
+///     table += &format!("{},{}\n", sample.t, sample.phi[0]);
+/// }
+/// let guess = Template::read("examples/scenes/spring.json".as_ref(), &["spring.stiffness=7".parse()?])?;
+/// let request = FitRequest { vary: vec!["spring.stiffness".into()], ..FitRequest::default() };
+/// let found = fit(&guess, &Data::parse(&table, "table")?, &request, &mut || false)?;
+/// assert!((found.numbers[0].value - 7.3942875).abs() < 1e-6);
+/// # Ok(())
+/// # }
+/// ```
+///
+/// # Errors
+/// Data, scene or request make no sense together, or no minimum is found.
+pub fn fit(
+    template: &Template,
+    data: &Data,
+    request: &FitRequest,
+    pause: &mut Pause,
+) -> Result<Fit, FitError> {
+    let scene = template.scene()?;
+    let (outputs, ignored) = chosen(&scene, data, request)?;
+    let variables: Vec<Variable> =
+        request.vary.iter().map(|name| template.variable(name)).collect::<Result<_, _>>()?;
+    if variables.is_empty() {
+        return Err(FitError::Asked(
+            "nothing to fit\nhint: name numbers of the scene, as --vary spring.stiffness".into(),
+        ));
+    }
+    let mut columns = columns(data, &outputs, request)?;
+    let rows = data.times.len();
+    if request.segments == 0 || request.segments * 2 > rows.max(2) {
+        let text = format!("{} segments of {rows} rows\nhint: at least two rows a segment", request.segments);
+        return Err(FitError::Asked(text));
+    }
+    let study_request = SensitivityRequest {
+        of: outputs.into_iter().map(Measure::Output).collect(),
+        to: request.vary.clone(),
+        at: data.times.last().copied().filter(|last| *last > 0.0),
+        every: None,
+        tolerance: request.tolerance,
+    };
+    let first = Study::new(template, &study_request)?;
+    let guess: Vec<f64> = first.inputs.iter().map(|input| input.value).collect();
+    let count = columns.iter().flat_map(|column| &column.measured).flatten().count();
+    if count <= guess.len() {
+        let text = format!("{count} measurements do not tell {} numbers and their errors", guess.len());
+        return Err(FitError::Data(format!("{}: {text}\nhint: more rows or columns", data.source)));
+    }
+    let indices = indices(&first, &columns);
+    let mut problem = Problem::new(
+        template,
+        (variables, guess.clone()),
+        (data, indices, request.segments),
+        study_request,
+        pause,
+    );
+    problem.guess_states(&columns).map_err(FitError::Failed)?;
+    let rounds = if columns.iter().all(|column| column.is_given) { 1 } else { ROUNDS };
+    let mut ended = String::new();
+    for _ in 0..rounds {
+        let least = columns.iter().fold(f64::INFINITY, |least, column| least.min(column.sigma));
+        let weights = if request.segments > 1 { &CONTINUITY[..] } else { &CONTINUITY[..1] };
+        for weight in weights {
+            (problem, ended) = problem.minimize(&columns, weight / least).map_err(FitError::Failed)?;
+        }
+        problem.take_model(&mut columns).map_err(FitError::Failed)?;
+        let share = (count as f64 / (count - guess.len()) as f64).sqrt();
+        for column in columns.iter_mut().filter(|column| !column.is_given && rounds > 1) {
+            column.sigma = (share * rms(column)).max(SPREAD[1] * spread(&column.measured));
+        }
+    }
+    let covariance = problem.covariance(&columns).map_err(FitError::Failed)?;
+    let values = problem.values();
+    let scene = template.filled(problem.variables(), &values)?;
+    let numbers = first.inputs.iter().enumerate().map(|(k, input)| FittedNumber {
+        path: input.path.clone(),
+        unit: input.unit.clone(),
+        guess: guess[k],
+        value: values[k],
+        error: covariance[(k, k)].sqrt(),
+    });
+    let square = |column: &FittedColumn| (residuals(column).map(|r| (r / column.sigma).powi(2))).sum::<f64>();
+    Ok(Fit {
+        numbers: numbers.collect(),
+        chi_square: columns.iter().map(square).sum(),
+        degrees_of_freedom: count - guess.len(),
+        covariance,
+        times: data.times.clone(),
+        ignored,
+        runs: problem.runs(),
+        segments: request.segments,
+        gap: problem.gap(),
+        columns,
+        ended,
+        scene,
+    })
+}
+
+/// Numbers of the outputs of the columns.
+fn indices(study: &Study, columns: &[FittedColumn]) -> Vec<usize> {
+    let heads: Vec<&str> =
+        study.mechanism.outputs.iter().flat_map(|outputs| outputs.heads()).map(|(name, _)| name).collect();
+    columns.iter().filter_map(|column| heads.iter().position(|head| *head == column.name)).collect()
+}
+
+/// Outputs of the columns that count, and the names of those that mean nothing.
+fn chosen(scene: &Scene, data: &Data, request: &FitRequest) -> Result<(Vec<Output>, Vec<String>), FitError> {
+    let names = OutputNames::of(scene);
+    let (mut outputs, mut ignored): (Vec<Output>, Vec<String>) = (Vec::new(), Vec::new());
+    let known: Vec<&str> = data.columns.iter().map(|(name, _)| name.as_str()).collect();
+    if let Some(missing) = request.columns.iter().find(|name| !known.contains(&name.as_str())) {
+        let text = format!("{}: has no column {missing}\nhint: there are: {}", data.source, known.join(", "));
+        return Err(FitError::Data(text));
+    }
+    for (name, _) in &data.columns {
+        if !request.columns.is_empty() && !request.columns.contains(name) {
+            continue;
+        }
+        let own = scene.outputs.iter().find(|output| output.name == *name).cloned();
+        let output = own.unwrap_or_else(|| Output { name: name.clone(), formula: name.clone() });
+        match names.bind(&output) {
+            Ok(_) => outputs.push(output),
+            Err(error) if request.columns.contains(name) => {
+                let text = format!("{}: column {name}: {}\nhint: {}", data.source, error.problem, error.hint);
+                return Err(FitError::Data(text));
+            }
+            Err(_) => ignored.push(name.clone()),
+        }
+    }
+    match outputs.is_empty() {
+        true => Err(FitError::Data(format!(
+            "{}: no column is named after a quantity of the scene\nhint: name them as in trajectory.csv, as bar1.phi [rad]",
+            data.source
+        ))),
+        false => Ok((outputs, ignored)),
+    }
+}
+
+fn columns(data: &Data, outputs: &[Output], request: &FitRequest) -> Result<Vec<FittedColumn>, FitError> {
+    if let Some((name, _)) = request.sigmas.iter().find(|(name, _)| outputs.iter().all(|o| o.name != *name)) {
+        let names: Vec<&str> = outputs.iter().map(|output| output.name.as_str()).collect();
+        let text = format!("no column {name} is fitted to\nhint: there are: {}", names.join(", "));
+        return Err(FitError::Asked(text));
+    }
+    let column = |output: &Output| {
+        let measured = data.columns.iter().find(|(name, _)| *name == output.name);
+        let measured = measured.map(|(_, values)| values.clone()).unwrap_or_default();
+        let given = request.sigmas.iter().find(|(name, _)| *name == output.name).map(|(_, sigma)| *sigma);
+        let sigma = given.unwrap_or_else(|| SPREAD[0] * spread(&measured));
+        let (name, unit, model) = (output.name.clone(), String::new(), Vec::new());
+        FittedColumn { name, unit, sigma, is_given: given.is_some(), model, measured }
+    };
+    Ok(outputs.iter().map(column).collect())
+}
+
+/// Measured less fitted.
+fn residuals(column: &FittedColumn) -> impl Iterator<Item = f64> {
+    column.measured.iter().zip(&column.model).filter_map(|(measured, model)| Some((*measured)? - model))
+}
+
+fn rms(column: &FittedColumn) -> f64 {
+    let count = residuals(column).count().max(1) as f64;
+    (residuals(column).map(|residual| residual * residual).sum::<f64>() / count).sqrt()
+}
+
+/// Root mean square about the mean, or where that is nothing 1.
+fn spread(values: &[Option<f64>]) -> f64 {
+    let count = values.iter().flatten().count().max(1) as f64;
+    let mean = values.iter().flatten().sum::<f64>() / count;
+    let spread = (values.iter().flatten().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt();
+    if spread > 0.0 { spread } else { 1.0 }
+}

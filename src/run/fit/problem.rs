@@ -1,0 +1,428 @@
+//! The least-squares problem: residuals of all parts and the steps between them, with their Jacobian.
+//!
+//! ```text
+//! x = (p / scale, ξ_1 … ξ_m)        ξ_k  local coordinates of the state that part k begins with, m parts but the first
+//! r = ((Y - y) / σ,  w (x_k(t_k+1) - s_k+1))
+//! ```
+
+use super::super::modes::Local;
+use super::super::sensitivity::{SensitivityRequest, Study};
+use super::FittedColumn;
+use super::data::Data;
+use super::segment::{Passed, Place, pass};
+use crate::run::driver::Pause;
+use crate::scene::{Template, Variable};
+use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
+use nalgebra::storage::Owned;
+use nalgebra::{DMatrix, DVector, Dyn};
+use std::cell::RefCell;
+use std::ops::Range;
+
+/// Relative tolerance of the search, and evaluations for each unknown.
+const TOLERANCE: f64 = 1e-11;
+const PATIENCE: usize = 40;
+/// Residual in place of one that cannot be computed: the step is taken back.
+const FAR: f64 = 1e9;
+/// Weight of a state as guessed, where a part does not tell it.
+const GUESSED: f64 = 1e-3;
+
+/// A part of the data: its rows, when it begins and ends, and the state it begins with (none for the first,
+/// which begins as the scene does).
+struct Part {
+    rows: Range<usize>,
+    span: [f64; 2],
+    state: Option<Place>,
+    /// Directions that the constraints leave, orthonormal in the coordinates' units, one a column.
+    tangent: DMatrix<f64>,
+}
+
+/// Residuals and their Jacobian at some unknowns, with the outputs row by row and the largest step.
+#[derive(Clone)]
+struct Evaluated {
+    residuals: DVector<f64>,
+    jacobian: DMatrix<f64>,
+    model: Vec<Vec<f64>>,
+    gap: f64,
+}
+
+pub(super) struct Problem<'a> {
+    template: &'a Template,
+    variables: Vec<Variable>,
+    scale: Vec<f64>,
+    times: &'a [f64],
+    request: SensitivityRequest,
+    /// Which outputs the columns are.
+    outputs: Vec<usize>,
+    parts: Vec<Part>,
+    unit: Vec<f64>,
+    pause: RefCell<&'a mut dyn FnMut() -> bool>,
+    runs: u64,
+    measured: Vec<Vec<Option<f64>>>,
+    sigma: Vec<f64>,
+    weight: f64,
+    x: DVector<f64>,
+    found: Result<Evaluated, String>,
+}
+
+impl<'a> Problem<'a> {
+    pub fn new(
+        template: &'a Template,
+        (variables, guess): (Vec<Variable>, Vec<f64>),
+        (data, outputs, segments): (&'a Data, Vec<usize>, usize),
+        request: SensitivityRequest,
+        pause: &'a mut Pause,
+    ) -> Self {
+        let scale: Vec<f64> =
+            guess.iter().map(|value| if *value == 0.0 { 1.0 } else { value.abs() }).collect();
+        let rows = data.times.len();
+        let first = |segment: usize| segment * rows / segments;
+        let begin = |segment: usize| if segment == 0 { 0.0 } else { data.times[first(segment)] };
+        let parts = (0..segments).map(|k| Part {
+            rows: first(k)..first(k + 1),
+            span: [begin(k), if k + 1 < segments { begin(k + 1) } else { data.times[rows - 1] }],
+            state: None,
+            tangent: DMatrix::zeros(0, 0),
+        });
+        let x = guess.iter().zip(&scale).map(|(value, scale)| value / scale);
+        Self {
+            x: DVector::from_iterator(guess.len(), x),
+            parts: parts.collect(),
+            measured: Vec::new(),
+            sigma: Vec::new(),
+            unit: Vec::new(),
+            times: &data.times,
+            pause: RefCell::new(pause),
+            runs: 0,
+            weight: 1.0,
+            found: Err("not evaluated yet".into()),
+            template,
+            variables,
+            scale,
+            request,
+            outputs,
+        }
+    }
+
+    pub fn variables(&self) -> &[Variable] {
+        &self.variables
+    }
+
+    /// The numbers as they stand.
+    pub fn values(&self) -> Vec<f64> {
+        self.scale.iter().zip(self.x.iter()).map(|(scale, x)| scale * x).collect()
+    }
+
+    pub fn runs(&self) -> u64 {
+        self.runs
+    }
+
+    pub fn gap(&self) -> f64 {
+        self.found.as_ref().map_or(f64::NAN, |found| found.gap)
+    }
+
+    fn study(&self) -> Result<Study, String> {
+        let template = self.template.with_values(&self.variables, &self.values());
+        Study::new(&template, &self.request).map_err(|error| error.to_string())
+    }
+
+    /// Takes what is measured and how exactly.
+    fn take(&mut self, columns: &[FittedColumn]) {
+        self.measured = columns.iter().map(|column| column.measured.clone()).collect();
+        self.sigma = columns.iter().map(|column| column.sigma).collect();
+    }
+
+    /// States at the beginnings of all parts but the first: each from the end of the part before it, then
+    /// fitted to its own rows.
+    pub fn guess_states(&mut self, columns: &[FittedColumn]) -> Result<(), String> {
+        self.take(columns);
+        if self.parts.len() == 1 {
+            return Ok(());
+        }
+        let study = self.study()?;
+        let mut local = Local::new(&study.mechanism);
+        self.unit = local.unit.clone();
+        let mut at = self.pass(&study, 0, None)?.end;
+        for k in 1..self.parts.len() {
+            for _ in 0..PATIENCE {
+                at = local
+                    .projected_moving(&at)
+                    .ok_or("the state between two parts does not fit the constraints")?;
+                let tangent = local.tangent(&at[0]);
+                (self.parts[k].state, self.parts[k].tangent) = (Some(at.clone()), tangent);
+                let Some(step) = self.state_step(&study, k) else { break };
+                at = self.moved(k, step.as_slice());
+                if step.amax() < 1e-9 {
+                    break;
+                }
+            }
+            let state = self.parts[k].state.clone();
+            at = self.pass(&study, k, state.as_ref())?.end;
+        }
+        let freedom: usize = self.parts[1..].iter().map(|part| 2 * part.tangent.ncols()).sum();
+        let count = self.variables.len();
+        self.x = DVector::from_fn(count + freedom, |k, _| if k < count { self.x[k] } else { 0.0 });
+        Ok(())
+    }
+
+    /// A step of Gauss and Newton for the state of a part, from its own rows and what was guessed, halved until
+    /// it helps; none where it does not.
+    fn state_step(&mut self, study: &Study, k: usize) -> Option<DVector<f64>> {
+        let state = self.parts[k].state.clone()?;
+        let passed = self.pass(study, k, Some(&state)).ok()?;
+        let (count, f) = (self.variables.len(), self.parts[k].tangent.ncols());
+        let (residuals, slopes) = self.rows(k, &passed);
+        let jacobian = slopes.columns(count, 2 * f).into_owned();
+        let squares = jacobian.transpose() * &jacobian;
+        let prior =
+            DMatrix::identity(2 * f, 2 * f) * (GUESSED * GUESSED * squares.diagonal().amax().max(1e-300));
+        let step = (squares + prior).cholesky()?.solve(&-(jacobian.transpose() * &residuals));
+        let mut share = 1.0;
+        for _ in 0..8 {
+            let tried = &step * share;
+            let moved = self.moved(k, tried.as_slice());
+            if let Ok(passed) = self.pass(study, k, Some(&moved))
+                && self.rows(k, &passed).0.norm() < residuals.norm()
+            {
+                return Some(tried);
+            }
+            share *= 0.25;
+        }
+        None
+    }
+
+    /// The state of a part moved along its tangent.
+    fn moved(&self, k: usize, y: &[f64]) -> Place {
+        let Part { state: Some([phi, omega]), tangent, .. } = &self.parts[k] else { return Place::default() };
+        let f = tangent.ncols();
+        let shift = |from: &[f64], y: &[f64]| -> Vec<f64> {
+            let by = tangent * DVector::from_column_slice(y);
+            from.iter().zip(by.iter()).zip(&self.unit).map(|((x, by), unit)| x + by * unit).collect()
+        };
+        [shift(phi, &y[..f]), shift(omega, &y[f..2 * f])]
+    }
+
+    /// A part of the motion, from a state or as the scene starts.
+    fn pass(&mut self, study: &Study, k: usize, state: Option<&Place>) -> Result<Passed, String> {
+        self.runs += 1;
+        let part = &self.parts[k];
+        let n = study.mechanism.coordinates();
+        let f = if state.is_some() { part.tangent.ncols() } else { 0 };
+        let direction = |j: usize| {
+            let mut column = vec![0.0; 2 * n];
+            let from = if j < f { 0 } else { n };
+            (0..n).for_each(|i| column[from + i] = part.tangent[(i, j % f)] * self.unit[i]);
+            column
+        };
+        let directions: Vec<Vec<f64>> = (0..2 * f).map(direction).collect();
+        let from = state.map(|state| (part.span[0], state));
+        let times = &self.times[part.rows.clone()];
+        let mut pause = self.pause.borrow_mut();
+        pass(study, from, &directions, (times, part.span[1]), &mut **pause)
+    }
+
+    /// Residuals of the rows of a part, with their slopes by the numbers and by its state.
+    fn rows(&self, k: usize, passed: &Passed) -> (DVector<f64>, DMatrix<f64>) {
+        let (mut residuals, mut slopes) = (Vec::new(), Vec::new());
+        let width = passed.columns.len();
+        for (row, derived) in self.parts[k].rows.clone().zip(&passed.rows) {
+            for ((measured, &output), sigma) in self.measured.iter().zip(&self.outputs).zip(&self.sigma) {
+                let Some(measured) = measured[row] else { continue };
+                residuals.push((derived.values[output] - measured) / sigma);
+                slopes.extend(derived.slopes[output].iter().map(|slope| slope / sigma));
+            }
+        }
+        let rows = residuals.len();
+        (DVector::from_vec(residuals), DMatrix::from_row_slice(rows, width, &slopes))
+    }
+
+    /// Everything at the present unknowns.
+    fn evaluate(&mut self) -> Result<Evaluated, String> {
+        let study = self.study()?;
+        let count = self.variables.len();
+        let mut local = Local::new(&study.mechanism);
+        let (mut residuals, mut lines): (Vec<f64>, Vec<DVector<f64>>) = (Vec::new(), Vec::new());
+        let (mut model, mut gap) = (Vec::new(), 0.0_f64);
+        let mut before: Option<(Passed, usize)> = None;
+        let mut first = count;
+        for k in 0..self.parts.len() {
+            let f = if k == 0 { 0 } else { self.parts[k].tangent.ncols() };
+            let state = match k {
+                0 => None,
+                _ => {
+                    let y: Vec<f64> = self.x.rows(first, 2 * f).iter().copied().collect();
+                    let moved = self.moved(k, &y);
+                    Some(local.projected_moving(&moved).ok_or("a state does not fit the constraints")?)
+                }
+            };
+            if let (Some(state), Some((passed, at))) = (&state, &before) {
+                gap = self.tie(k, (passed, *at), (state, first), (&mut residuals, &mut lines)).max(gap);
+            }
+            let passed = self.pass(&study, k, state.as_ref())?;
+            let (own, slopes) = self.rows(k, &passed);
+            for (i, residual) in own.iter().enumerate() {
+                residuals.push(*residual);
+                lines.push(self.line(&slopes.row(i).iter().copied().collect::<Vec<f64>>(), first));
+            }
+            let outputs = &self.outputs;
+            model.extend(passed.rows.iter().map(|row| outputs.iter().map(|&o| row.values[o]).collect()));
+            before = Some((passed, first));
+            first += 2 * f;
+        }
+        let jacobian = DMatrix::from_fn(lines.len(), self.x.len(), |i, j| lines[i][j]);
+        let residuals = DVector::from_vec(residuals);
+        match residuals.iter().chain(jacobian.iter()).all(|x| x.is_finite()) {
+            true => Ok(Evaluated { residuals, jacobian, model, gap }),
+            false => Err("residuals are not finite".into()),
+        }
+    }
+
+    /// A line of the Jacobian from slopes by the numbers and by the state whose unknowns begin at `first`.
+    fn line(&self, slopes: &[f64], first: usize) -> DVector<f64> {
+        let count = self.variables.len();
+        let mut line = DVector::zeros(self.x.len());
+        for (j, slope) in slopes.iter().enumerate() {
+            match j < count {
+                true => line[j] = slope * self.scale[j],
+                false => line[first + j - count] = *slope,
+            }
+        }
+        line
+    }
+
+    /// The step from the end of the part before to the state of part `k`, in local coordinates; the largest is
+    /// returned.
+    fn tie(
+        &self,
+        k: usize,
+        (passed, at): (&Passed, usize),
+        (state, first): (&Place, usize),
+        (residuals, lines): (&mut Vec<f64>, &mut Vec<DVector<f64>>),
+    ) -> f64 {
+        let tangent = &self.parts[k].tangent;
+        let (n, f) = (tangent.nrows(), tangent.ncols());
+        let mut gap = 0.0_f64;
+        for j in 0..2 * f {
+            let (half, column) = if j < f { (0, j) } else { (1, j - f) };
+            let along = |x: &dyn Fn(usize) -> f64| {
+                (0..n).map(|i| tangent[(i, column)] * x(i) / self.unit[i]).sum::<f64>()
+            };
+            let step = along(&|i| passed.end[half][i] - state[half][i]);
+            let slopes: Vec<f64> =
+                passed.columns.iter().map(|one| self.weight * along(&|i| one[half * n + i])).collect();
+            let mut line = self.line(&slopes, at);
+            line[first + j] -= self.weight;
+            gap = gap.max(step.abs());
+            residuals.push(self.weight * step);
+            lines.push(line);
+        }
+        gap
+    }
+
+    /// Looks for the minimum with this weight of continuity, and tells how it ended.
+    pub fn minimize(mut self, columns: &[FittedColumn], weight: f64) -> Result<(Self, String), String> {
+        self.take(columns);
+        self.weight = weight;
+        self.found = self.evaluate();
+        if let Err(why) = &self.found {
+            return Err(format!("the motion from the guess has no derivatives: {why}"));
+        }
+        let search = LevenbergMarquardt::new().with_tol(TOLERANCE).with_patience(PATIENCE);
+        let (mut problem, report) = search.minimize(self);
+        let is_over = report.termination.was_successful();
+        let ended = match is_over {
+            true => format!("converged after {} evaluations", report.number_of_evaluations),
+            false => format!("not converged after {} evaluations", report.number_of_evaluations),
+        };
+        problem.rebase()?;
+        Ok((problem, ended))
+    }
+
+    /// Takes the states as they are for new bases.
+    fn rebase(&mut self) -> Result<(), String> {
+        let study = self.study()?;
+        let mut local = Local::new(&study.mechanism);
+        let mut first = self.variables.len();
+        for k in 1..self.parts.len() {
+            let f = self.parts[k].tangent.ncols();
+            let y: Vec<f64> = self.x.rows(first, 2 * f).iter().copied().collect();
+            let state =
+                local.projected_moving(&self.moved(k, &y)).ok_or("a state does not fit the constraints")?;
+            let tangent = local.tangent(&state[0]);
+            if tangent.ncols() != f {
+                return Err("a part begins at a singular position".into());
+            }
+            (self.parts[k].state, self.parts[k].tangent) = (Some(state), tangent);
+            self.x.rows_mut(first, 2 * f).fill(0.0);
+            first += 2 * f;
+        }
+        self.found = self.evaluate();
+        self.found.as_ref().map(|_| ()).map_err(Clone::clone)
+    }
+
+    /// Writes the fitted motion to the columns.
+    pub fn take_model(&self, columns: &mut [FittedColumn]) -> Result<(), String> {
+        let found = self.found.as_ref().map_err(Clone::clone)?;
+        for (k, column) in columns.iter_mut().enumerate() {
+            column.model = found.model.iter().map(|row| row[k]).collect();
+        }
+        let study = self.study()?;
+        let heads: Vec<(&str, &str)> =
+            study.mechanism.outputs.iter().flat_map(|outputs| outputs.heads()).collect();
+        for (column, &output) in columns.iter_mut().zip(&self.outputs) {
+            column.unit = heads.get(output).map(|(_, unit)| (*unit).to_owned()).unwrap_or_default();
+        }
+        Ok(())
+    }
+
+    /// The covariance of the numbers at the minimum.
+    pub fn covariance(&mut self, columns: &[FittedColumn]) -> Result<DMatrix<f64>, String> {
+        self.take(columns);
+        let jacobian = self.evaluate()?.jacobian;
+        let count = self.variables.len();
+        let svd = jacobian.svd(false, true);
+        let (values, right) = (svd.singular_values, svd.v_t.ok_or("the Jacobian has no singular values")?);
+        let least = f64::EPSILON * values.amax() * values.len() as f64;
+        if let Some(k) = values.iter().position(|value| *value <= least) {
+            let row = right.row(k);
+            let most = (0..count).max_by(|&a, &b| row[a].abs().total_cmp(&row[b].abs())).unwrap_or_default();
+            return Err(format!(
+                "the data do not tell {} apart from the other numbers, or do not depend on it",
+                self.variables[most].path
+            ));
+        }
+        Ok(DMatrix::from_fn(count, count, |i, j| {
+            let sum =
+                (0..values.len()).map(|k| right[(k, i)] * right[(k, j)] / values[k].powi(2)).sum::<f64>();
+            sum * self.scale[i] * self.scale[j]
+        }))
+    }
+}
+
+impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
+    type ResidualStorage = Owned<f64, Dyn>;
+    type JacobianStorage = Owned<f64, Dyn, Dyn>;
+    type ParameterStorage = Owned<f64, Dyn>;
+
+    fn set_params(&mut self, x: &DVector<f64>) {
+        self.x.copy_from(x);
+        let size = self.found.as_ref().map_or(0, |found| found.residuals.len());
+        let found = self.evaluate();
+        // What cannot be computed is far away: the step is taken back.
+        self.found = found.or_else(|_| {
+            let (residuals, gap) = (DVector::from_element(size, FAR), f64::NAN);
+            Ok(Evaluated { residuals, jacobian: DMatrix::zeros(size, x.len()), model: Vec::new(), gap })
+        });
+    }
+
+    fn params(&self) -> DVector<f64> {
+        self.x.clone()
+    }
+
+    fn residuals(&self) -> Option<DVector<f64>> {
+        self.found.as_ref().ok().map(|found| found.residuals.clone())
+    }
+
+    fn jacobian(&self) -> Option<DMatrix<f64>> {
+        self.found.as_ref().ok().map(|found| found.jacobian.clone())
+    }
+}

@@ -1,0 +1,172 @@
+//! A step of the variational equation along a known motion, by Gauss collocation.
+//!
+//! ```text
+//! K_i = B_i (dq + c_i h dw + h² Σ_j (a a)_ij K_j) + C_i (dw + h Σ_j a_ij K_j) + F_i        B, C = da/dq, da/dw on dual numbers; F = da/dp
+//! dq += h dw + h² Σ_i b_i (1 - c_i) K_i,   dw += h Σ_i b_i K_i
+//! ```
+//!
+//! Six stages, order 12: on a step of [`taylor`](crate::stepping::taylor), which is a seventh of the radius of
+//! convergence, the error is about 1e-15 of what is integrated.  How far it is from that, the last coefficient
+//! of K in Legendre polynomials tells: it falls with the power 5 of the step where the error falls with 12.
+//!
+//! Source: E. Hairer, C. Lubich, G. Wanner, *Geometric Numerical Integration*, 2nd ed. (2006), section II.1.3.
+
+use super::super::trust::eliminate;
+use crate::stepping::gauss::collocation;
+
+/// Stages.
+pub(super) const STAGES: usize = 6;
+
+/// The method with its scratch space.
+pub(super) struct Collocation {
+    /// Nodes in a step of length 1.
+    pub nodes: Vec<f64>,
+    pub weights: Vec<f64>,
+    /// a, and a a.
+    coupling: [Vec<f64>; 2],
+    /// What the last Legendre coefficient takes of every stage.
+    last: Vec<f64>,
+    system: Vec<f64>,
+}
+
+impl Collocation {
+    pub fn new() -> Self {
+        let [nodes, weights, coupling] = collocation(STAGES);
+        let entry = |k: usize| {
+            (0..STAGES).map(|j| coupling[k / STAGES * STAGES + j] * coupling[j * STAGES + k % STAGES]).sum()
+        };
+        let square = (0..STAGES * STAGES).map(entry).collect();
+        let degree = STAGES - 1;
+        let last = (nodes.iter().zip(&weights))
+            .map(|(node, weight)| (2 * degree + 1) as f64 * weight * legendre(degree, 2.0 * node - 1.0))
+            .collect();
+        Self { nodes, weights, coupling: [coupling, square], last, system: Vec::new() }
+    }
+
+    /// Takes columns (dq, dw) of n coordinates through a step; `pull` has B and C at the nodes, n × 2n row by
+    /// row, one node after the other, `forcing` F of every column, node by node, empty for columns without.
+    ///
+    /// Returns the last coefficient over the size of what is integrated, and leaves the columns alone where it
+    /// is above `limit`; NaN where there is no solution.
+    pub fn step(
+        &mut self,
+        h: f64,
+        pull: &[f64],
+        columns: &mut [Vec<f64>],
+        forcing: &[Vec<f64>],
+        limit: f64,
+    ) -> f64 {
+        let Some(n) = columns.first().map(|column| column.len() / 2) else { return 0.0 };
+        let (size, width) = (STAGES * n, STAGES * n + columns.len());
+        self.fill(n, h, pull, columns, forcing);
+        if !eliminate(size, width, &mut self.system) {
+            return f64::NAN;
+        }
+        let Self { nodes, weights, last, system, .. } = self;
+        let stage = |i: usize, row: usize, k: usize| system[(i * n + row) * width + size + k];
+        let mut tail = 0.0_f64;
+        for (k, column) in columns.iter().enumerate() {
+            let (mut left, mut whole) = (0.0_f64, 0.0_f64);
+            for row in 0..n {
+                left = left.max((0..STAGES).map(|i| last[i] * stage(i, row, k)).sum::<f64>().abs());
+                let most = (0..STAGES).fold(0.0, |most: f64, i| most.max(stage(i, row, k).abs()));
+                whole = whole.max(h * most).max(column[n + row].abs()).max(column[row].abs() / h);
+            }
+            if whole.is_nan() || left.is_nan() {
+                return f64::NAN;
+            }
+            if whole > 0.0 {
+                tail = tail.max(h * left / whole);
+            }
+        }
+        if tail > limit {
+            return tail;
+        }
+        for (k, column) in columns.iter_mut().enumerate() {
+            for row in 0..n {
+                let mut turn = 0.0;
+                let mut rate = 0.0;
+                for i in 0..STAGES {
+                    let slope = weights[i] * stage(i, row, k);
+                    turn += (1.0 - nodes[i]) * slope;
+                    rate += slope;
+                }
+                column[row] += h * (column[n + row] + h * turn);
+                column[n + row] += h * rate;
+            }
+        }
+        tail
+    }
+
+    /// The equations of the stages, with their right sides.
+    fn fill(&mut self, n: usize, h: f64, pull: &[f64], columns: &[Vec<f64>], forcing: &[Vec<f64>]) {
+        let Self { nodes, coupling: [a, aa], system, .. } = self;
+        let (size, width) = (STAGES * n, STAGES * n + columns.len());
+        system.clear();
+        system.resize(size * width, 0.0);
+        for i in 0..STAGES {
+            for row in 0..n {
+                let line = &mut system[(i * n + row) * width..][..width];
+                let (turn, drag) = pull[(i * n + row) * 2 * n..][..2 * n].split_at(n);
+                for k in 0..n {
+                    for j in 0..STAGES {
+                        line[j * n + k] =
+                            -h * (h * aa[i * STAGES + j] * turn[k] + a[i * STAGES + j] * drag[k]);
+                    }
+                }
+                line[i * n + row] += 1.0;
+                for ((right, column), forcing) in line[size..].iter_mut().zip(columns).zip(forcing) {
+                    *right = forcing.get(i * n + row).copied().unwrap_or(0.0);
+                    for k in 0..n {
+                        *right += turn[k] * (column[k] + nodes[i] * h * column[n + k]);
+                        *right += drag[k] * column[n + k];
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The Legendre polynomial of a degree at x.
+fn legendre(degree: usize, x: f64) -> f64 {
+    let (mut before, mut now) = (0.0, 1.0);
+    for k in 0..degree {
+        let k = k as f64;
+        (before, now) = (now, ((2.0 * k + 1.0) * x * now - k * before) / (k + 1.0));
+    }
+    now
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_forced_oscillation_is_met_to_its_order() {
+        // x'' = -4 x + cos t, x(0) = 0.3, x'(0) = 0.1: x = cos t / 3 + (0.3 - 1/3) cos 2t + 0.05 sin 2t.
+        let error = |steps: usize| {
+            let h = 2.0 / steps as f64;
+            let (mut method, mut columns) = (Collocation::new(), vec![vec![0.3, 0.1]]);
+            for k in 0..steps {
+                let forcing =
+                    method.nodes.iter().map(|node| libm::cos((k as f64 + node) * h)).collect::<Vec<_>>();
+                let pull = [-4.0, 0.0].repeat(STAGES);
+                assert!(method.step(h, &pull, &mut columns, &[forcing], 1.0) < 1.0);
+            }
+            let exact = libm::cos(2.0) / 3.0 + (0.3 - 1.0 / 3.0) * libm::cos(4.0) + 0.05 * libm::sin(4.0);
+            (columns[0][0] - exact).abs()
+        };
+        let [one, two] = [error(1), error(2)];
+        assert!(one < 1e-8 && two < one / 2000.0, "{one:e} {two:e}");
+    }
+
+    #[test]
+    fn the_last_coefficient_of_a_polynomial_of_lower_degree_is_zero() {
+        let method = Collocation::new();
+        let sum = |degree: i32| {
+            let powers = method.nodes.iter().map(|node| node.powi(degree));
+            powers.zip(&method.last).map(|(power, last)| power * last).sum::<f64>()
+        };
+        assert!((0..5).all(|degree| sum(degree).abs() < 1e-14) && sum(5).abs() > 1e-3);
+    }
+}

@@ -1,0 +1,315 @@
+//! The Lyapunov spectrum of a motion: how fast small differences grow, in every direction.
+//!
+//! ```text
+//! columns (dq, dw) tangent to the constraints, made orthonormal after every step (Benettin):   λ_k = lim (1/t) Σ log r_kk
+//! ⟨x, y⟩ = ν² dqᵀ M dq + (P dw)ᵀ M (P dw)         P  onto the directions that the constraints allow, ν = 1/unit of time
+//! ```
+//!
+//! In this product volumes are those of the phase space of positions and momenta of the constrained mechanism,
+//! which a motion without dissipation keeps (Liouville): the exponents then add up to zero, not in the limit
+//! but at every time.  With dampers their sum is the mean of tr(W dQ/dw), Q being the applied forces and W the
+//! inverse mass matrix that the constraints leave; an impact of restitution e adds log e².
+//!
+//! Sources: G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15 (1980), 9-30; V. I. Arnold,
+//! *Mathematical Methods of Classical Mechanics*, 2nd ed. (1989), section 16.
+
+use super::variation::{Look, Variation, plain};
+use super::{SensitivityError, SensitivityRequest, Study, stopped};
+use crate::dynamics::kernel::Kernel;
+use crate::dynamics::{Mechanism, Motion};
+use crate::run::driver::Pause;
+use crate::run::running::Outcome;
+use crate::scene::{Scene, Template};
+use serde::Serialize;
+
+/// Times at which exponents so far are kept.
+const KEPT: usize = 400;
+/// Parts of the run whose exponents tell the uncertainty of the mean.
+const BLOCKS: usize = 8;
+/// Growth within the second half of the run, as a logarithm, from which on it is exponential; and up to which
+/// it is no faster than a power of the time: log 2 for each power.
+const EXPONENTIAL: f64 = 10.0;
+const POWER: f64 = 3.0;
+
+/// What the spectrum tells of a motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Regime {
+    /// Small differences grow exponentially.
+    Chaotic,
+    /// They grow no faster than a power of the time.
+    Regular,
+    /// The run is too short to tell.
+    Undecided,
+}
+
+/// The Lyapunov exponents of a motion.
+#[derive(Clone, Debug)]
+pub struct Spectrum {
+    /// The scene.
+    pub scene: Scene,
+    /// The exponents, the largest first \[1/s\].
+    pub exponents: Vec<f64>,
+    /// Standard deviations of their means over the run, from eight parts of it \[1/s\].
+    pub errors: Vec<f64>,
+    /// Their sum \[1/s\].
+    pub sum: f64,
+    /// What the sum is by the dissipation of the scene \[1/s\]: zero without any.
+    pub expected_sum: f64,
+    /// What they tell.
+    pub regime: Regime,
+    /// Times \[s\] and the exponents up to then, for charts.
+    pub rows: Vec<(f64, Vec<f64>)>,
+    /// How far it was integrated \[s\].
+    pub until: f64,
+    /// Why it ended before its horizon.
+    pub lost: Option<String>,
+}
+
+impl Spectrum {
+    /// The sum of the exponents less what it is by the dissipation, over the largest of them.
+    pub fn defect(&self) -> f64 {
+        let most = self.exponents.iter().fold(0.0, |most: f64, exponent| most.max(exponent.abs()));
+        if most > 0.0 { (self.sum - self.expected_sum).abs() / most } else { 0.0 }
+    }
+}
+
+/// All Lyapunov exponents of a scene's motion up to `until` \[s\], or its horizon.
+///
+/// # Errors
+/// The scene has no such exponents, or its motion stops.
+pub fn lyapunov(
+    template: &Template,
+    until: Option<f64>,
+    tolerance: Option<f64>,
+    pause: &mut Pause,
+) -> Result<Spectrum, SensitivityError> {
+    let request = SensitivityRequest { at: until, tolerance, ..SensitivityRequest::default() };
+    let study = Study::new(template, &request)?;
+    let mut outcome = Outcome::begun(&study.mechanism, study.plan.clone());
+    let mut driver = study.driver(&mut outcome)?;
+    let (mechanism, motion) = (driver.holding().clone(), driver.motion());
+    let mut variation =
+        Variation::new(&mechanism, Vec::new(), Vec::new()).map_err(SensitivityError::Unsuited)?;
+    let freedom = variation.span(&motion);
+    if freedom == 0 {
+        let why = "the motors leave no freedom: neighbouring motions are the same";
+        return Err(SensitivityError::Unsuited(why.into()));
+    }
+    variation.dissipation = mechanism.is_damped().then(|| Dissipation::new(&mechanism));
+    let mut orthonormal = Orthonormal::new(&mechanism, study.plan.until, 2 * freedom);
+    orthonormal.renew(&mut variation, &motion);
+    orthonormal.logs.fill(0.0);
+    let until = study.plan.until;
+    let is_through =
+        variation.go(&mut driver, until, &mut outcome, &mut orthonormal, pause).map_err(stopped)?;
+    if !is_through {
+        return Err(SensitivityError::Stopped("interrupted".into()));
+    }
+    let impacts = variation.impacts.iter().map(|impact| {
+        let wall = mechanism.contacts.iter().find(|contact| contact.row.name == impact.wall);
+        wall.map_or(0.0, |wall| 2.0 * libm::log(wall.restitution))
+    });
+    let logs = impacts.sum::<f64>() + variation.dissipation.as_ref().map_or(0.0, |lost| lost.total);
+    let lost = variation.lost.clone().or(orthonormal.lost.take()).or_else(|| {
+        let ended = driver.ended_by.as_ref().filter(|name| *name != "observer");
+        ended.map(|name| format!("event `{name}` ended the run"))
+    });
+    Ok(orthonormal.spectrum(study.scene, logs, lost))
+}
+
+/// What dampers and other forces that depend on rates take off volumes in phase space.
+pub(in crate::run) struct Dissipation {
+    kernel: Kernel<f64>,
+    /// At the nodes of a step \[1/s\].
+    pub nodes: Vec<f64>,
+    /// Integrated so far.
+    pub total: f64,
+}
+
+impl Dissipation {
+    fn new(mechanism: &Mechanism) -> Self {
+        Self { kernel: Kernel::dense(mechanism), nodes: Vec::new(), total: 0.0 }
+    }
+
+    /// Adds tr(W dQ/dw) at a motion to the nodes.
+    pub fn look(&mut self, mechanism: &Mechanism, motion: &Motion) {
+        let (t, phi, omega) = plain(motion);
+        let n = phi.len();
+        self.kernel.linearise_at::<0>(mechanism, t, &phi, &omega);
+        let columns = mechanism.drag(t, &phi, &omega);
+        let mut trace = 0.0;
+        for (k, mut column) in columns.into_iter().enumerate() {
+            crate::dynamics::tree::solve::<f64, 0>(n, &self.kernel.mass, &self.kernel.pivot, &mut column);
+            let rows = mechanism.constraints.len();
+            for r in 0..rows {
+                self.kernel.multiplier[r] =
+                    self.kernel.fold_gradient(r, 0.0, |sum, k, g| sum + g * column[k]);
+            }
+            if rows > 0 {
+                self.kernel.solve_rows();
+                self.kernel.multiplier_accelerations();
+                column[k] -= self.kernel.load[k];
+            }
+            trace += column[k];
+        }
+        self.nodes.push(trace);
+    }
+}
+
+/// Keeps columns orthonormal, and adds up how they grow.
+struct Orthonormal {
+    kernel: Kernel<f64>,
+    /// ν² \[1/s²\].
+    rate: f64,
+    count: usize,
+    until: f64,
+    logs: Vec<f64>,
+    rows: Vec<(f64, Vec<f64>)>,
+    next: usize,
+    now: f64,
+    lost: Option<String>,
+}
+
+impl Orthonormal {
+    fn new(mechanism: &Mechanism, until: f64, count: usize) -> Self {
+        Self {
+            kernel: Kernel::dense_without_rows(mechanism),
+            rate: mechanism.units.time.powi(-2),
+            count,
+            until,
+            logs: vec![0.0; count],
+            rows: Vec::new(),
+            next: 1,
+            now: 0.0,
+            lost: None,
+        }
+    }
+
+    /// Makes the columns orthonormal at a motion.
+    fn renew(&mut self, variation: &mut Variation, motion: &Motion) {
+        let (_, phi, _) = plain(motion);
+        let n = phi.len();
+        let mechanism = variation.mechanism.clone();
+        self.kernel.unit_vectors::<0>(&mechanism, &phi);
+        self.kernel.mass_matrix::<0>(&mechanism);
+        let mass = &self.kernel.mass;
+        // What of a column counts: dq, and of dw what the constraints allow.
+        let mut flat: Vec<Vec<f64>> = variation.columns.clone();
+        if let Some(ground) = &mut variation.ground {
+            flat.iter_mut().for_each(|column| ground.flatten(&mechanism, &mut column[n..]));
+        }
+        let product = |a: &[f64], b: &[f64]| {
+            let half = |a: &[f64], b: &[f64]| {
+                let mut sum = 0.0;
+                for i in 0..n {
+                    sum += mass[i * n + i] * a[i] * b[i];
+                    for j in i + 1..n {
+                        sum += mass[i * n + j] * (a[i] * b[j] + a[j] * b[i]);
+                    }
+                }
+                sum
+            };
+            self.rate * half(&a[..n], &b[..n]) + half(&a[n..], &b[n..])
+        };
+        for j in 0..self.count {
+            let mut whole = 0.0;
+            // Twice is enough.
+            for _ in 0..2 {
+                for k in 0..j {
+                    let share = product(&flat[j], &flat[k]);
+                    subtract(&mut flat, j, k, share);
+                    subtract(&mut variation.columns, j, k, share);
+                }
+            }
+            let norm = product(&flat[j], &flat[j]).sqrt();
+            whole += libm::log(norm);
+            if !whole.is_finite() {
+                variation.lose("small differences vanish or are beyond all numbers");
+                return;
+            }
+            self.logs[j] += whole;
+            for column in [&mut flat[j], &mut variation.columns[j]] {
+                column.iter_mut().for_each(|entry| *entry /= norm);
+            }
+        }
+    }
+
+    fn spectrum(self, scene: Scene, lost_volume: f64, lost: Option<String>) -> Spectrum {
+        let t = self.now.max(f64::MIN_POSITIVE);
+        let mean: Vec<f64> = self.logs.iter().map(|log| log / t).collect();
+        let mut order: Vec<usize> = (0..mean.len()).collect();
+        order.sort_by(|&a, &b| mean[b].total_cmp(&mean[a]));
+        let errors = self.errors();
+        let rows = &self.rows;
+        let middle = rows.iter().find(|(time, _)| *time >= 0.5 * t);
+        let first = order.first().copied().unwrap_or_default();
+        let growth = middle.map(|(_, logs)| self.logs[first] - logs[first]);
+        let regime = match growth {
+            Some(growth) if growth >= EXPONENTIAL => Regime::Chaotic,
+            Some(growth) if growth <= POWER && rows.len() >= BLOCKS => Regime::Regular,
+            _ => Regime::Undecided,
+        };
+        let sorted = |values: &[f64]| order.iter().map(|&k| values[k]).collect::<Vec<f64>>();
+        Spectrum {
+            scene,
+            exponents: sorted(&mean),
+            errors: sorted(&errors),
+            sum: mean.iter().sum(),
+            expected_sum: lost_volume / t,
+            regime,
+            rows: (rows.iter())
+                .map(|(time, logs)| (*time, sorted(logs).iter().map(|log| log / time).collect()))
+                .collect(),
+            until: self.now,
+            lost,
+        }
+    }
+
+    /// Standard deviations of the mean exponents, from parts of the run.
+    fn errors(&self) -> Vec<f64> {
+        let at = |part: usize| self.rows.get((part * self.rows.len() / BLOCKS).wrapping_sub(1));
+        let none = (0.0, vec![0.0; self.count]);
+        let error = |k: usize| {
+            let rates: Vec<f64> = (0..BLOCKS)
+                .filter_map(|part| {
+                    let (from, to) = (at(part).unwrap_or(&none), at(part + 1)?);
+                    Some((to.1[k] - from.1[k]) / (to.0 - from.0))
+                })
+                .collect();
+            let count = rates.len() as f64;
+            let mean = rates.iter().sum::<f64>() / count;
+            let squares = rates.iter().map(|rate| (rate - mean).powi(2)).sum::<f64>();
+            (squares / (count * (count - 1.0))).sqrt()
+        };
+        (0..self.count).map(error).collect()
+    }
+}
+
+fn subtract(columns: &mut [Vec<f64>], from: usize, what: usize, share: f64) {
+    let (before, rest) = columns.split_at_mut(from);
+    rest[0].iter_mut().zip(&before[what]).for_each(|(entry, other)| *entry -= share * other);
+}
+
+impl Look for Orthonormal {
+    fn next(&self) -> Option<f64> {
+        (self.next <= KEPT).then(|| self.until * self.next as f64 / KEPT as f64)
+    }
+
+    fn at(&mut self, variation: &mut Variation, motion: &Motion, time: f64) {
+        self.next += 1;
+        self.stepped(variation, motion, time);
+        self.rows.push((time, self.logs.clone()));
+    }
+
+    fn stepped(&mut self, variation: &mut Variation, motion: &Motion, time: f64) {
+        if variation.lost.is_some() {
+            return;
+        }
+        if variation.mechanism.held.len() != 0 {
+            return variation.lose("a point stays on its wall, and directions are lost");
+        }
+        self.renew(variation, motion);
+        self.now = time;
+    }
+}

@@ -1,0 +1,156 @@
+//! What is derived: outputs at a time, extremes over the run, times of flips, events and impacts.
+
+use super::super::event::SwitchFunction;
+use super::saltation::{Side, event_value, moved};
+use super::variation::Variation;
+use crate::dynamics::kernel::{Bias, Kernel};
+use crate::dynamics::output::Moment;
+use crate::dynamics::{Mechanism, Motion, Time};
+use crate::scene::Output;
+use std::fmt;
+use std::str::FromStr;
+
+/// A quantity of a run that is derived by numbers of its scene.
+///
+/// ```
+/// use driftless::Measure;
+/// let measure: Measure = "max:motor.torque".parse().expect("an extreme of an output");
+/// assert_eq!((measure.to_string(), "flip".parse()), ("max:motor.torque".to_owned(), Ok(Measure::Flip)));
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub enum Measure {
+    /// An output at the time asked for: the name of one of the scene's, or a formula.
+    Output(Output),
+    /// The largest value of an output over the run.
+    Max(Output),
+    /// Its least value.
+    Min(Output),
+    /// The first time a bar turns over \[s\].
+    Flip,
+    /// The first time of an event of the scene \[s\].
+    Event(String),
+    /// The first impact at a wall \[s\].
+    Impact(String),
+}
+
+impl FromStr for Measure {
+    type Err = std::convert::Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let text = text.trim();
+        Ok(match text.split_once(':') {
+            Some(("max", rest)) => Self::Max(Output::parse(rest)),
+            Some(("min", rest)) => Self::Min(Output::parse(rest)),
+            Some(("event", rest)) => Self::Event(rest.trim().to_owned()),
+            Some(("impact", rest)) => Self::Impact(rest.trim().to_owned()),
+            _ if text == "flip" => Self::Flip,
+            _ => Self::Output(Output::parse(text)),
+        })
+    }
+}
+
+impl fmt::Display for Measure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Output(output) => f.write_str(&output.name),
+            Self::Max(output) => write!(f, "max:{}", output.name),
+            Self::Min(output) => write!(f, "min:{}", output.name),
+            Self::Flip => f.write_str("flip"),
+            Self::Event(name) => write!(f, "event:{name}"),
+            Self::Impact(name) => write!(f, "impact:{name}"),
+        }
+    }
+}
+
+impl Measure {
+    /// The output it is of.
+    pub fn output(&self) -> Option<&Output> {
+        match self {
+            Self::Output(output) | Self::Max(output) | Self::Min(output) => Some(output),
+            _ => None,
+        }
+    }
+}
+
+/// Values of all outputs at a moment with their derivatives along every column.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(in crate::run) struct Derived {
+    pub values: Vec<f64>,
+    /// Output by output, then column by column.
+    pub slopes: Vec<Vec<f64>>,
+    /// Rates of change along the motion itself.
+    pub rates: Vec<f64>,
+}
+
+/// Outputs of a mechanism at a state; whole turns of a motion are added to the angles.
+fn outputs_at(
+    mechanism: &Mechanism,
+    kernel: &mut Kernel<f64>,
+    motion: &Motion,
+    (t, phi, omega): (Time, &[f64], &[f64]),
+) -> Vec<f64> {
+    let mut values = Vec::new();
+    let Some(outputs) = &mechanism.outputs else { return values };
+    kernel.accelerate::<0>(mechanism, t, phi, omega, Bias::default());
+    mechanism.spread_multipliers(kernel);
+    let turned = |k: usize| motion.unwrapped(k) - motion.phi[k].hi;
+    let winding: Vec<f64> = (0..phi.len()).map(|k| phi[k] + turned(k)).collect();
+    outputs.evaluate(&Moment { mechanism, time: t, phi, winding: &winding, omega, kernel }, &mut values);
+    values
+}
+
+/// All outputs beside a variation at a motion.
+pub(in crate::run) fn outputs(variation: &mut Variation, motion: &Motion) -> Derived {
+    let mechanism = &variation.mechanism;
+    if mechanism.outputs.is_none() {
+        return Derived::default();
+    }
+    let side = Side::new(mechanism, motion);
+    let mut kernel = Kernel::new(mechanism);
+    let values = outputs_at(mechanism, &mut kernel, motion, (side.t, &side.phi, &side.omega));
+    let mut along = |column: &[f64], late: f64| {
+        let mut at = |t: Time, phi: &[f64], omega: &[f64]| {
+            Some(outputs_at(mechanism, &mut kernel, motion, (t, phi, omega)))
+        };
+        side.slope(column, late, f64::INFINITY, &mut at).unwrap_or_default()
+    };
+    let rates = along(&side.ahead(), 1.0);
+    let mut slopes = vec![Vec::new(); values.len()];
+    for (column, neighbours) in variation.columns.iter().zip(&mut variation.neighbours) {
+        let mut sums = along(column, 0.0);
+        for neighbour in neighbours.iter_mut().flat_map(|neighbours| &mut neighbours.list) {
+            let at = (side.t, &side.phi[..], &side.omega[..]);
+            let values = outputs_at(&neighbour.mechanism, &mut neighbour.kernel, motion, at);
+            sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += neighbour.weight * value);
+        }
+        slopes.iter_mut().zip(sums).for_each(|(slopes, sum)| slopes.push(sum));
+    }
+    Derived { values, slopes, rates }
+}
+
+/// How the time moves at which body `bar` turns over.
+pub(super) fn flip_slopes(variation: &Variation, motion: &Motion, bar: usize) -> Vec<f64> {
+    variation.columns.iter().map(|column| -column[bar] / motion.omega[bar].hi).collect()
+}
+
+/// How the time of an event of the scene moves.
+pub(super) fn event_slopes(variation: &Variation, motion: &Motion, event: usize) -> Option<Vec<f64>> {
+    let base = &*variation.mechanism;
+    let side = Side::new(base, motion);
+    let value = |mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64]| {
+        event_value(mechanism, SwitchFunction::Event(event), &moved(motion, t, phi, omega))
+    };
+    let along = |column: &[f64], late: f64| {
+        let mut at = |t: Time, phi: &[f64], omega: &[f64]| Some(vec![value(base, t, phi, omega)?]);
+        side.slope(column, late, f64::INFINITY, &mut at).map(|slope| slope[0])
+    };
+    let rate = along(&side.ahead(), 1.0).filter(|rate| *rate != 0.0)?;
+    let slope = |(column, neighbours): (&Vec<f64>, &Option<super::Neighbours>)| {
+        let mut change = along(column, 0.0)?;
+        for neighbour in neighbours.iter().flat_map(|neighbours| &neighbours.list) {
+            change += neighbour.weight * value(&neighbour.mechanism, side.t, &side.phi, &side.omega)?;
+        }
+        Some(-change / rate)
+    };
+    variation.columns.iter().zip(&variation.neighbours).map(slope).collect()
+}

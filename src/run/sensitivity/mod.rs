@@ -1,0 +1,516 @@
+//! Sensitivities: derivatives of outputs and measures of a run by any number of its scene.
+//!
+//! One run of [`taylor`](crate::stepping::taylor) carries a column for each number beside the motion (module
+//! `variation`), through impacts and events that switch something (module `saltation`); what the number does to
+//! the equations is told by neighbouring mechanisms at one and the same state (module `neighbours`).  Nothing
+//! is a difference of runs, so that the derivatives are as accurate as the motion, however fast neighbouring
+//! motions part.
+//!
+//! ```text
+//! dy/dp = Y_x δ + Y_p       of an output Y(t, x; p)       δ  the column of p
+//! dt/dp = -(g_x δ + g_p)/g'  of the time of g = 0          extremes: as of an output at their own time, which does not count there
+//! ```
+
+mod collocation;
+mod lyapunov;
+mod measure;
+mod neighbours;
+mod saltation;
+mod variation;
+
+pub use lyapunov::{Regime, Spectrum, lyapunov};
+pub use measure::Measure;
+pub(super) use measure::{Derived, outputs};
+use measure::{event_slopes, flip_slopes};
+use neighbours::Neighbours;
+pub(super) use variation::{Look, Variation};
+
+use super::build::build;
+use super::contact::ContactDriver;
+use super::driver::Pause;
+use super::extremes::ExtremesDetector;
+use super::flip::FlipDetector;
+use super::plan::Plan;
+use super::running::Outcome;
+use crate::dynamics::{CompileError, Mechanism, Motion, Time};
+use crate::scene::{Output, Scene, SceneError, Template};
+use crate::stepping::Tolerance;
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+/// Tolerance of the motion \[rad/s\].
+pub const TOLERANCE: f64 = 1e-14;
+/// Slope of an output over its size and the time at an extreme that is none of a smooth curve.
+const CORNER: f64 = 1e-4;
+/// Most rows over time.
+const MOST_ROWS: f64 = 1e6;
+
+/// What is asked for.
+#[derive(Clone, Debug, Default)]
+pub struct SensitivityRequest {
+    /// What is derived.
+    pub of: Vec<Measure>,
+    /// By which numbers: paths as of `--set`.
+    pub to: Vec<String>,
+    /// The time of outputs, and the end of the run \[s\]; `None`: that of the scene.
+    pub at: Option<f64>,
+    /// Interval of outputs over time \[s\]; `None`: only at the end.
+    pub every: Option<f64>,
+    /// Tolerance of the motion; `None`: [`TOLERANCE`].
+    pub tolerance: Option<f64>,
+}
+
+/// Why there are no sensitivities.
+#[derive(Debug, thiserror::Error)]
+pub enum SensitivityError {
+    /// The scene, or a name in it.
+    #[error("{0}")]
+    Scene(#[from] SceneError),
+    /// It has no equations.
+    #[error("{0}")]
+    Compile(#[from] CompileError),
+    /// What is asked for makes no sense.
+    #[error("{what}\nhint: {hint}")]
+    Asked {
+        /// What is wrong.
+        what: String,
+        /// What to ask for.
+        hint: String,
+    },
+    /// The scene has no such derivatives.
+    #[error("{0}")]
+    Unsuited(String),
+    /// The motion itself stops.
+    #[error("{0}")]
+    Stopped(String),
+}
+
+/// A number of the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InputNumber {
+    /// Its path.
+    pub path: String,
+    /// Its unit; empty for a pure number.
+    pub unit: String,
+    /// Its value.
+    pub value: f64,
+    /// Estimated relative error of the derivatives of the equations by it.
+    pub error: f64,
+}
+
+/// A measure with its derivatives.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measured {
+    /// Its name.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// When it is taken \[s\].
+    pub t: f64,
+    /// Its value.
+    pub value: f64,
+    /// Its derivatives by all numbers, in the unit of the measure over that of the number.
+    pub slopes: Vec<f64>,
+    /// Why there is none.
+    pub why: Option<String>,
+}
+
+/// Outputs at one time with their derivatives.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SensitivityRow {
+    /// Time \[s\].
+    pub t: f64,
+    /// Values of the outputs.
+    pub values: Vec<f64>,
+    /// Derivatives, output by output, then number by number.
+    pub slopes: Vec<Vec<f64>>,
+}
+
+/// Derivatives of measures by numbers of a scene.
+#[derive(Clone, Debug)]
+pub struct Sensitivity {
+    /// The scene.
+    pub scene: Scene,
+    /// The numbers.
+    pub inputs: Vec<InputNumber>,
+    /// The measures.
+    pub measures: Vec<Measured>,
+    /// Names and units of the outputs over time.
+    pub outputs: Vec<[String; 2]>,
+    /// The outputs over time, where that was asked for.
+    pub rows: Vec<SensitivityRow>,
+    /// Horizon \[s\].
+    pub until: f64,
+    /// Why the derivatives end before.
+    pub lost: Option<String>,
+    /// Steps of the motion and of the columns.
+    pub steps: [u64; 2],
+}
+
+impl Sensitivity {
+    /// Derivatives of the measures (rows) by the numbers (columns); NaN where there are none.
+    pub fn jacobian(&self) -> DMatrix<f64> {
+        let entry = |i: usize, j: usize| self.measures[i].slopes.get(j).copied().unwrap_or(f64::NAN);
+        DMatrix::from_fn(self.measures.len(), self.inputs.len(), entry)
+    }
+
+    /// Covariance of the measures where the numbers have this covariance, to first order.
+    pub fn covariance(&self, inputs: &DMatrix<f64>) -> DMatrix<f64> {
+        let jacobian = self.jacobian();
+        &jacobian * inputs * jacobian.transpose()
+    }
+
+    /// Standard deviations of the outputs, row by row, where the numbers are independent and have these
+    /// standard deviations, to first order.
+    pub fn bands(&self, deviations: &[f64]) -> Vec<Vec<f64>> {
+        let band = |slopes: &Vec<f64>| {
+            let squares = slopes.iter().zip(deviations).map(|(slope, sigma)| (slope * sigma).powi(2));
+            squares.sum::<f64>().sqrt()
+        };
+        self.rows.iter().map(|row| row.slopes.iter().map(band).collect()).collect()
+    }
+}
+
+/// A measure on its way.
+struct Asked {
+    measure: Measure,
+    /// Its output among all, where it has one.
+    output: Option<usize>,
+    /// When it is taken \[s\], where that is known, or why never.
+    t: Result<f64, String>,
+    /// The bar that turns over, or the event, by number.
+    number: usize,
+}
+
+/// Derivatives of measures of a scene's run by numbers of it.
+///
+/// ```
+/// use driftless::{SensitivityRequest, Template, sensitivity};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let template = Template::read("examples/scenes/spring.json".as_ref(), &[])?;
+/// let request = SensitivityRequest {
+///     of: vec!["bar2.phi".parse()?, "max:spring.force".parse()?],
+///     to: vec!["spring.stiffness".into(), "bar1.phi".into()],
+///     at: Some(2.0),
+///     ..SensitivityRequest::default()
+/// };
+/// let found = sensitivity(&template, &request, &mut || false)?;
+/// // A stiffness larger by 1 N/m turns the second bar so many rad further within 2 s.
+/// assert_eq!(found.jacobian().shape(), (2, 2));
+/// assert!((found.jacobian()[(0, 0)] - found.measures[0].slopes[0]).abs() < 1e-15);
+/// # Ok(())
+/// # }
+/// ```
+///
+/// # Errors
+/// The scene, or what is asked for, makes no sense, or the motion stops.
+pub fn sensitivity(
+    template: &Template,
+    request: &SensitivityRequest,
+    pause: &mut Pause,
+) -> Result<Sensitivity, SensitivityError> {
+    let study = Study::new(template, request)?;
+    let mut asked = study.asked(request)?;
+    study.find_times(&mut asked, pause)?;
+    study.derive(asked, pause)
+}
+
+/// A scene with its numbers.
+pub(super) struct Study {
+    pub scene: Scene,
+    pub mechanism: Arc<Mechanism>,
+    pub start: Motion,
+    pub plan: Plan,
+    pub inputs: Vec<InputNumber>,
+    neighbours: Vec<Neighbours>,
+    times: Vec<f64>,
+}
+
+impl Study {
+    pub fn new(template: &Template, request: &SensitivityRequest) -> Result<Self, SensitivityError> {
+        let known = template.scene()?;
+        let outputs: Vec<Output> = request
+            .of
+            .iter()
+            .filter_map(Measure::output)
+            .filter(|output| known.outputs.iter().all(|known| known.name != output.name))
+            .cloned()
+            .collect();
+        let template = template.clone().with_outputs(outputs);
+        let scene = template.scene()?;
+        let mechanism = Arc::new(Mechanism::new(&scene)?);
+        if !mechanism.has_series() {
+            let what = "small differences are followed beside `taylor`, which does not take this scene: dry friction and rigid springs that vibrate have no series, and very many bodies are too many";
+            return Err(SensitivityError::Unsuited(what.into()));
+        }
+        let until = request.at.unwrap_or(scene.until);
+        if !(until > 0.0 && until.is_finite()) {
+            return Err(refused(
+                format!("the time {until} s is not above zero"),
+                "a time in seconds, as --at 2",
+            ));
+        }
+        let tolerance = request.tolerance.unwrap_or(TOLERANCE);
+        let plan = Plan::of_series(&mechanism, Tolerance { relative: tolerance, absolute: tolerance }, until);
+        let times = times(until, request.every)?;
+        let start = mechanism.start(&scene);
+        let mut study =
+            Self { scene, mechanism, start, plan, inputs: Vec::new(), neighbours: Vec::new(), times };
+        for name in &request.to {
+            study.add_number(&template, name)?;
+        }
+        Ok(study)
+    }
+
+    fn add_number(&mut self, template: &Template, name: &str) -> Result<(), SensitivityError> {
+        let variable = template.variable(name)?;
+        let value = template.value(&variable)?.ok_or_else(|| {
+            let what = format!("{} is not a number written in the scene", variable.path);
+            refused(what, "add it to the scene or by --set, or name the parameter in its formula")
+        })?;
+        let base = (&self.mechanism, &self.start);
+        let neighbours =
+            Neighbours::new(template, (&variable, value), base, self.plan.until).map_err(|why| {
+                SensitivityError::Unsuited(format!("no derivative by {}: {why}", variable.path))
+            })?;
+        let error = neighbours.error;
+        self.inputs.push(InputNumber { path: variable.path, unit: variable.unit.into(), value, error });
+        self.neighbours.push(neighbours);
+        Ok(())
+    }
+
+    /// The measures, with the outputs they are of.
+    fn asked(&self, request: &SensitivityRequest) -> Result<Vec<Asked>, SensitivityError> {
+        let heads: Vec<String> = (self.mechanism.outputs.iter())
+            .flat_map(|outputs| outputs.heads().map(|(name, _)| name.to_owned()))
+            .collect();
+        let asked = |measure: &Measure| {
+            let output =
+                measure.output().and_then(|output| heads.iter().position(|name| *name == output.name));
+            let mut number = 0;
+            if let Measure::Event(name) = measure {
+                let events = self.scene.events.iter();
+                let known: Vec<&str> = events.map(|event| event.name.as_str()).collect();
+                number = position(&known, name, "event")?;
+            }
+            if let Measure::Impact(name) = measure {
+                let known: Vec<&str> = self.scene.walls.iter().map(|wall| wall.name.as_str()).collect();
+                position(&known, name, "wall")?;
+            }
+            Ok(Asked { measure: measure.clone(), output, t: Ok(self.plan.until), number })
+        };
+        request.of.iter().map(asked).collect()
+    }
+
+    /// A driver at the start, through what impacts there are at it.
+    fn driver(&self, outcome: &mut Outcome) -> Result<ContactDriver, SensitivityError> {
+        let mut plan = self.plan.clone();
+        let driver = build(&self.mechanism, &mut plan, &self.start).map_err(stopped)?;
+        let mut driver = ContactDriver::new(Arc::clone(&self.mechanism), driver);
+        driver.meet(outcome).map_err(stopped)?;
+        Ok(driver)
+    }
+
+    /// A run beforehand, where measures are taken at times that only it tells.
+    fn find_times(&self, asked: &mut [Asked], pause: &mut Pause) -> Result<(), SensitivityError> {
+        let is_known = |asked: &Asked| matches!(asked.measure, Measure::Output(_) | Measure::Impact(_));
+        if asked.iter().all(is_known) {
+            return Ok(());
+        }
+        let mut outcome = Outcome::begun(&self.mechanism, self.plan.clone());
+        let mut driver = self.driver(&mut outcome)?;
+        driver.flips = Some(FlipDetector::default());
+        driver.extremes = ExtremesDetector::new(&self.mechanism);
+        driver.go(Time::from(self.plan.until), &mut outcome, pause).map_err(stopped)?;
+        let extremes = driver.extremes.as_ref().map(ExtremesDetector::extremes).unwrap_or_default();
+        for asked in asked {
+            let extreme = asked.output.and_then(|output| extremes.get(output));
+            let nothing = |what: &str| format!("{what} up to {} s", self.plan.until);
+            asked.t = match &asked.measure {
+                Measure::Max(_) => extreme.map(|found| found.max[1]).ok_or_else(|| nothing("no extreme")),
+                Measure::Min(_) => extreme.map(|found| found.min[1]).ok_or_else(|| nothing("no extreme")),
+                Measure::Flip => match driver.flips.as_ref().and_then(|flips| flips.flip) {
+                    Some(flip) => {
+                        asked.number = flip.bar;
+                        Ok(flip.t)
+                    }
+                    None => Err(nothing("no bar turns over")),
+                },
+                Measure::Event(name) => {
+                    let found = outcome.events.iter().find(|event| event.name == *name);
+                    found.map(|event| event.t).ok_or_else(|| nothing("the event does not happen"))
+                }
+                Measure::Output(_) | Measure::Impact(_) => Ok(self.plan.until),
+            };
+        }
+        Ok(())
+    }
+
+    /// Columns of all numbers at the start, and what moves them.
+    pub fn variation(&self) -> Result<Variation, SensitivityError> {
+        let columns = self.neighbours.iter().map(|neighbours| neighbours.start.clone()).collect();
+        let neighbours = self.neighbours.iter().cloned().map(Some).collect();
+        Variation::new(&self.mechanism, columns, neighbours).map_err(SensitivityError::Unsuited)
+    }
+
+    /// The run with the columns beside it.
+    fn derive(self, asked: Vec<Asked>, pause: &mut Pause) -> Result<Sensitivity, SensitivityError> {
+        let mut times: Vec<f64> = self.times.clone();
+        times.extend(asked.iter().filter_map(|asked| asked.t.as_ref().ok()));
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        let mut outcome = Outcome::begun(&self.mechanism, self.plan.clone());
+        let mut driver = self.driver(&mut outcome)?;
+        let mut variation = self.variation()?;
+        let mut recorder = Recorder { times, next: 0, asked: &asked, seen: Vec::new() };
+        if recorder.next() == Some(0.0) {
+            let motion = driver.motion();
+            recorder.at(&mut variation, &motion, 0.0);
+        }
+        let until = self.plan.until;
+        let is_through =
+            variation.go(&mut driver, until, &mut outcome, &mut recorder, pause).map_err(stopped)?;
+        if !is_through {
+            return Err(SensitivityError::Stopped("interrupted".into()));
+        }
+        let seen = std::mem::take(&mut recorder.seen);
+        let lost = variation.lost.clone().or_else(|| {
+            let ended = driver.ended_by.as_ref().filter(|name| *name != "observer");
+            ended.map(|name| format!("event `{name}` ended the run"))
+        });
+        let steps = [driver.statistics().steps, variation.steps];
+        Ok(self.gathered(asked, &seen, (lost, steps), &variation))
+    }
+
+    fn gathered(
+        self,
+        asked: Vec<Asked>,
+        seen: &[Seen],
+        (lost, steps): (Option<String>, [u64; 2]),
+        variation: &Variation,
+    ) -> Sensitivity {
+        let heads = self.mechanism.outputs.iter().flat_map(|outputs| outputs.heads());
+        let outputs: Vec<[String; 2]> =
+            heads.map(|(name, unit)| [name.to_owned(), unit.to_owned()]).collect();
+        let measures = asked.iter().enumerate().map(|(k, asked)| {
+            let mut measured = Measured {
+                name: asked.measure.to_string(),
+                unit: asked.output.map_or("s", |output| &outputs[output][1]).to_owned(),
+                t: f64::NAN,
+                value: f64::NAN,
+                slopes: Vec::new(),
+                why: None,
+            };
+            match taken(k, asked, seen, variation) {
+                Ok((t, value, slopes)) => (measured.t, measured.value, measured.slopes) = (t, value, slopes),
+                Err(why) => measured.why = Some(lost.clone().filter(|_| why.is_empty()).unwrap_or(why)),
+            }
+            measured
+        });
+        let measures = measures.collect();
+        let wanted = |seen: &&Seen| self.times.contains(&seen.t);
+        let rows = seen.iter().filter(wanted).map(|seen| SensitivityRow {
+            t: seen.t,
+            values: seen.derived.values.clone(),
+            slopes: seen.derived.slopes.clone(),
+        });
+        let rows = rows.collect();
+        let Self { scene, inputs, plan, .. } = self;
+        Sensitivity { scene, inputs, measures, outputs, rows, until: plan.until, lost, steps }
+    }
+}
+
+/// When a measure was taken, its value and derivatives; or why not, empty where the run ended before.
+fn taken(
+    number: usize,
+    asked: &Asked,
+    seen: &[Seen],
+    variation: &Variation,
+) -> Result<(f64, f64, Vec<f64>), String> {
+    if let Measure::Impact(wall) = &asked.measure {
+        let first = variation.impacts.iter().find(|impact| impact.wall == *wall);
+        let first = first.ok_or("there is no impact")?;
+        return Ok((first.t, first.t, first.slopes.clone()));
+    }
+    let t = asked.t.clone()?;
+    let at = seen.iter().find(|seen| seen.t == t).ok_or("")?;
+    let Some(output) = asked.output else {
+        let slopes = at.times.iter().find(|(measure, _)| *measure == number);
+        let slopes = slopes.ok_or("the event function only touches zero")?.1.clone();
+        return Ok((t, t, slopes));
+    };
+    let Derived { values, slopes, rates } = &at.derived;
+    let is_extreme = matches!(asked.measure, Measure::Max(_) | Measure::Min(_));
+    let is_end = [0.0, seen.last().map_or(0.0, |last| last.t)].contains(&t);
+    let size = values[output].abs().max(f64::MIN_POSITIVE) / t.max(f64::MIN_POSITIVE);
+    if is_extreme && !is_end && rates[output].abs() > CORNER * size {
+        return Err(format!("the extreme at {t} s is a corner of the curve, at an impact or an event"));
+    }
+    Ok((t, values[output], slopes[output].clone()))
+}
+
+/// What was seen at one time.
+struct Seen {
+    t: f64,
+    derived: Derived,
+    /// Derivatives of times, by the number of their measure.
+    times: Vec<(usize, Vec<f64>)>,
+}
+
+struct Recorder<'a> {
+    times: Vec<f64>,
+    next: usize,
+    asked: &'a [Asked],
+    seen: Vec<Seen>,
+}
+
+impl Look for Recorder<'_> {
+    fn next(&self) -> Option<f64> {
+        self.times.get(self.next).copied()
+    }
+
+    fn at(&mut self, variation: &mut Variation, motion: &Motion, time: f64) {
+        self.next += 1;
+        let mut times = Vec::new();
+        for (k, asked) in self.asked.iter().enumerate().filter(|(_, asked)| asked.t == Ok(time)) {
+            match asked.measure {
+                Measure::Flip => times.push((k, flip_slopes(variation, motion, asked.number))),
+                Measure::Event(_) => {
+                    times.extend(event_slopes(variation, motion, asked.number).map(|slopes| (k, slopes)));
+                }
+                _ => {}
+            }
+        }
+        self.seen.push(Seen { t: time, derived: outputs(variation, motion), times });
+    }
+}
+
+fn position(known: &[&str], name: &str, what: &str) -> Result<usize, SensitivityError> {
+    known.iter().position(|known| *known == name).ok_or_else(|| {
+        let hint = match known {
+            [] => format!("the scene has no {what}"),
+            known => format!("there are: {}", known.join(", ")),
+        };
+        refused(format!("no {what} is called `{name}`"), &hint)
+    })
+}
+
+/// Times of rows from 0 on.
+fn times(until: f64, every: Option<f64>) -> Result<Vec<f64>, SensitivityError> {
+    let Some(every) = every else { return Ok(Vec::new()) };
+    let rows = (until / every).ceil();
+    if !(every > 0.0 && rows <= MOST_ROWS) {
+        let hint = format!("an interval above zero that makes at most {MOST_ROWS:e} rows");
+        return Err(refused(format!("the interval {every} s makes {rows} rows"), &hint));
+    }
+    Ok((0..=rows as u64).map(|k| (k as f64 * every).min(until)).collect())
+}
+
+fn refused(what: String, hint: &str) -> SensitivityError {
+    SensitivityError::Asked { what, hint: hint.into() }
+}
+
+fn stopped(stop: crate::stepping::StepError) -> SensitivityError {
+    SensitivityError::Stopped(stop.to_string())
+}

@@ -1,0 +1,285 @@
+//! What a number of the scene does to the equations: mechanisms at neighbouring values of it.
+//!
+//! ```text
+//! dF/dp = Σ_k c_k F(p + k e) / e        k = -2, -1, 1, 2: c = 1/12, -2/3, 2/3, -1/12;  or on one side k = 0…4: c = -25/12, 4, -3, 4/3, -1/4
+//! ```
+//!
+//! F stands for accelerations, constraints, gaps, impacts, outputs and the start, all at one and the same
+//! state.  They are smooth functions of p, so that the formula is right to 11 digits and more with an e that is
+//! found by trying: from one e to the next smaller one the error of truncation goes with e⁴, that of rounding
+//! with 1/e.  What a difference of *runs* suffers from, growth of rounding and of e itself with time, is not in
+//! it.
+
+use super::super::contact::in_modes;
+use crate::dynamics::constraint::Posture;
+use crate::dynamics::kernel::{Bias, Kernel, dot};
+use crate::dynamics::{Mechanism, Motion, Time};
+use crate::scene::{Template, Variable};
+use std::sync::Arc;
+
+/// Changes tried, over the number, or where that is zero in its unit.
+const LADDER: [f64; 8] = [0.25, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8];
+/// Where the search begins, and the estimated relative error that ends it.
+const FIRST: usize = 1;
+const ENOUGH: f64 = 1e-11;
+/// The estimated relative error that is too large for a derivative.
+const TOO_MUCH: f64 = 1e-4;
+/// Rounding of an evaluation, over its value.
+const ROUNDING: f64 = 4e-16;
+/// Offsets and weights: on both sides, and on one.
+const BOTH: [[f64; 2]; 4] = [[-2.0, 1.0 / 12.0], [-1.0, -2.0 / 3.0], [1.0, 2.0 / 3.0], [2.0, -1.0 / 12.0]];
+const ONE: [[f64; 2]; 5] = [[0.0, -25.0 / 12.0], [1.0, 4.0], [2.0, -3.0], [3.0, 4.0 / 3.0], [4.0, -0.25]];
+
+/// A mechanism at a neighbouring value, with its weight in derivatives.
+#[derive(Clone, Debug)]
+pub(in crate::run) struct Neighbour {
+    pub weight: f64,
+    /// As compiled, and with the contacts held and on the branches of the moment.
+    compiled: Arc<Mechanism>,
+    pub mechanism: Arc<Mechanism>,
+    pub kernel: Kernel<f64>,
+}
+
+/// The mechanisms for one number.
+#[derive(Clone, Debug)]
+pub(in crate::run) struct Neighbours {
+    /// Empty where the number does nothing but move the start.
+    pub list: Vec<Neighbour>,
+    /// Derivative of the start: all coordinates, then all rates.
+    pub start: Vec<f64>,
+    /// Estimated relative error of derivatives.
+    pub error: f64,
+}
+
+/// A scene at one value.
+struct Candidate {
+    mechanism: Arc<Mechanism>,
+    start: Motion,
+}
+
+/// All candidates of one change, with their weights, and what they make of F.
+struct Attempt {
+    change: f64,
+    list: Vec<(f64, Candidate)>,
+    slopes: Vec<Vec<f64>>,
+    sizes: Vec<f64>,
+}
+
+impl Neighbours {
+    /// Those of a number of a scene whose mechanism and start are these, for a run up to `until` \[s\].
+    ///
+    /// # Errors
+    /// Why the motion has no derivative by it.
+    pub fn new(
+        template: &Template,
+        number: (&Variable, f64),
+        base: (&Arc<Mechanism>, &Motion),
+        until: f64,
+    ) -> Result<Self, String> {
+        let search = Search { template, number, base, until };
+        let (mut tried, mut best, mut why): (Vec<Attempt>, Option<(f64, usize)>, _) =
+            (Vec::new(), None, String::new());
+        for share in &LADDER[FIRST..] {
+            match search.attempt(*share) {
+                Ok(attempt) => tried.push(attempt),
+                Err(reason) => why = reason,
+            }
+            if let [.., larger, smaller] = &tried[..] {
+                keep(&mut best, error(larger, smaller), tried.len() - 1);
+            }
+            if best.is_some_and(|(error, _)| error < ENOUGH) {
+                break;
+            }
+        }
+        // A larger change is of use where rounding is what limits.
+        if best.is_none_or(|(error, _)| error >= ENOUGH)
+            && let (Ok(larger), Some(first)) = (search.attempt(LADDER[0]), tried.first())
+        {
+            keep(&mut best, error(&larger, first), 0);
+        }
+        let Some((error, index)) = best.filter(|(error, _)| *error < TOO_MUCH) else {
+            let why = if why.is_empty() { "the equations do not depend on it smoothly".into() } else { why };
+            return Err(why);
+        };
+        Ok(Self::of(tried.swap_remove(index), error, base.0))
+    }
+
+    fn of(attempt: Attempt, error: f64, base: &Mechanism) -> Self {
+        let n = base.coordinates();
+        let mut start = vec![0.0; 2 * n];
+        for (weight, candidate) in &attempt.list {
+            for k in 0..n {
+                start[k] += weight * candidate.start.unwrapped(k);
+                start[n + k] += weight * candidate.start.omega[k].hi;
+            }
+        }
+        let is_alike = attempt.list.iter().all(|(_, candidate)| is_alike(&candidate.mechanism, base));
+        let neighbour = |(weight, candidate): (f64, Candidate)| Neighbour {
+            weight,
+            kernel: Kernel::new(&candidate.mechanism),
+            compiled: Arc::clone(&candidate.mechanism),
+            mechanism: candidate.mechanism,
+        };
+        let list = if is_alike { Vec::new() } else { attempt.list.into_iter().map(neighbour).collect() };
+        Self { list, start, error }
+    }
+
+    /// Goes on with the parts that act, the contacts held and the branches of a mechanism.
+    ///
+    /// # Errors
+    /// A neighbour cannot go on so.
+    pub fn follow(&mut self, mechanism: &Mechanism, off: &[String]) -> Result<(), String> {
+        for neighbour in &mut self.list {
+            let whole = neighbour.compiled.whole.as_ref().map_or(&neighbour.compiled, |(whole, _)| whole);
+            let mut acting = Mechanism::clone(whole);
+            if let (Some(own), Some(laws)) = (&whole.laws, &mechanism.laws) {
+                acting = whole
+                    .on_branch(own.parameters.clone(), laws.modes.clone())
+                    .map_err(|error| error.to_string())?;
+            }
+            let acting = if off.is_empty() { acting } else { acting.without(off)? };
+            neighbour.mechanism = in_modes(&Arc::new(acting), &mechanism.held, &mechanism.modes);
+            neighbour.kernel = Kernel::new(&neighbour.mechanism);
+        }
+        Ok(())
+    }
+}
+
+/// Keeps the better one, by its error and its number.
+fn keep(best: &mut Option<(f64, usize)>, error: f64, index: usize) {
+    if best.is_none_or(|(least, _)| error < least) {
+        *best = Some((error, index));
+    }
+}
+
+/// Estimated relative error of the second of two attempts, with the smaller change.
+fn error(larger: &Attempt, smaller: &Attempt) -> f64 {
+    let share = (smaller.change / larger.change).powi(4);
+    let (mut most, mut error) = (0.0_f64, 0.0_f64);
+    for ((before, now), size) in larger.slopes.iter().zip(&smaller.slopes).zip(&smaller.sizes) {
+        let size = size.max(f64::MIN_POSITIVE);
+        let apart = before.iter().zip(now).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+        most = now.iter().fold(most, |most, slope| most.max(slope.abs() / size));
+        error = error.max(apart / size * share);
+    }
+    // A number without any effect has a derivative too: zero.
+    if most == 0.0 { 0.0 } else { (error + ROUNDING / smaller.change) / most }
+}
+
+/// True where two mechanisms are the same but for how they start.
+fn is_alike(one: &Mechanism, other: &Mechanism) -> bool {
+    let plain = |mechanism: &Mechanism, from: &Mechanism| Mechanism {
+        assembly: from.assembly.clone(),
+        energy_scale: from.energy_scale,
+        rigid_rate: from.rigid_rate,
+        ..mechanism.clone()
+    };
+    plain(one, other) == *other
+}
+
+struct Search<'a> {
+    template: &'a Template,
+    number: (&'a Variable, f64),
+    base: (&'a Arc<Mechanism>, &'a Motion),
+    until: f64,
+}
+
+impl Search<'_> {
+    /// Scenes at a change over the number, on both sides of it or on one.
+    fn attempt(&self, share: f64) -> Result<Attempt, String> {
+        let (_, value) = self.number;
+        let change = share * if value == 0.0 { 1.0 } else { value.abs() };
+        self.list(change, &BOTH)
+            .or_else(|_| self.list(change, &ONE))
+            .or_else(|_| self.list(-change, &ONE))
+            .map(|list| {
+                let change = change.abs();
+                let (slopes, sizes) = self.slopes(&list);
+                Attempt { change, list, slopes, sizes }
+            })
+    }
+
+    fn list(&self, change: f64, offsets: &[[f64; 2]]) -> Result<Vec<(f64, Candidate)>, String> {
+        offsets.iter().map(|[k, weight]| Ok((weight / change, self.candidate(k * change)?))).collect()
+    }
+
+    fn candidate(&self, change: f64) -> Result<Candidate, String> {
+        let (variable, value) = self.number;
+        let (base, start) = self.base;
+        if change == 0.0 {
+            return Ok(Candidate { mechanism: Arc::clone(base), start: start.clone() });
+        }
+        let first_line = |text: String| text.lines().next().unwrap_or_default().to_owned();
+        let scene = self
+            .template
+            .filled(std::slice::from_ref(variable), &[value + change])
+            .map_err(|error| first_line(error.to_string()))?;
+        let mechanism = Mechanism::new(&scene).map_err(|error| first_line(error.to_string()))?;
+        let shape = |mechanism: &Mechanism| {
+            (mechanism.coordinates(), mechanism.constraints.len(), mechanism.contacts.len())
+        };
+        if shape(&mechanism) != shape(base) {
+            return Err("neighbouring values give a mechanism of another kind".into());
+        }
+        let start = mechanism.start(&scene);
+        Ok(Candidate { mechanism: Arc::new(mechanism), start })
+    }
+
+    /// Derivatives of the start and of all that acts at some states, group by group, and the sizes of what is
+    /// derived.
+    fn slopes(&self, list: &[(f64, Candidate)]) -> (Vec<Vec<f64>>, Vec<f64>) {
+        let (mut slopes, mut sizes): (Vec<Vec<f64>>, Vec<f64>) = (Vec::new(), Vec::new());
+        for (weight, candidate) in list {
+            for (group, values) in self.values(candidate).into_iter().enumerate() {
+                if slopes.len() == group {
+                    slopes.push(vec![0.0; values.len()]);
+                    sizes.push(0.0);
+                }
+                for (slope, value) in slopes[group].iter_mut().zip(&values) {
+                    *slope += weight * value;
+                    sizes[group] = sizes[group].max(value.abs());
+                }
+            }
+        }
+        (slopes, sizes)
+    }
+
+    fn values(&self, candidate: &Candidate) -> Vec<Vec<f64>> {
+        let n = self.base.0.coordinates();
+        let Candidate { mechanism, start } = candidate;
+        let mut groups = vec![
+            (0..n).map(|k| start.unwrapped(k)).collect::<Vec<f64>>(),
+            start.omega.iter().map(|omega| omega.hi).collect(),
+        ];
+        let mut kernel = Kernel::<f64>::new(mechanism);
+        for (share, turn) in [(0.0, 0.0), (0.5, 0.4), (1.0, -0.7)] {
+            let t = Time::from(share * self.until);
+            let phi: Vec<f64> = (0..n).map(|k| self.base.1.phi[k].hi + turn * unlike(k)).collect();
+            let omega: Vec<f64> = (0..n).map(|k| self.base.1.omega[k].hi + 3.0 * turn * unlike(k)).collect();
+            kernel.accelerate::<0>(mechanism, t, &phi, &omega, Bias::default());
+            groups.push(kernel.load.clone());
+            let (positions, rates) = residuals(mechanism, t, &phi, &omega);
+            groups.extend([positions, rates]);
+            let z = mechanism.elements(&phi);
+            groups.push(mechanism.contacts.iter().map(|contact| contact.row.gap(&z)).collect());
+        }
+        groups
+    }
+}
+
+/// Numbers of no particular kind.
+fn unlike(k: usize) -> f64 {
+    libm::sin(1.0 + 2.3 * k as f64)
+}
+
+/// C and C' of all constraints at a state.
+pub(super) fn residuals(mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let z = mechanism.elements(phi);
+    let mut gradient = vec![0.0; phi.len()];
+    let residual = |row: &crate::dynamics::constraint::ConstraintEquation| {
+        gradient.fill(0.0);
+        let here = row.linearise(t, Posture { phi, z: &z, omega }, &mut gradient);
+        (here.position, dot(&gradient, omega) + here.drive)
+    };
+    mechanism.constraints.iter().map(residual).unzip()
+}

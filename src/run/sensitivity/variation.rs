@@ -1,0 +1,319 @@
+//! Small differences beside a motion: of its start and of the numbers of its scene.
+//!
+//! ```text
+//! dq' = dw,    dw' = A_q dq + A_w dw + a_p dp          a(t, q, w; p) with the multipliers in it, all coordinates (index 1)
+//! G dq + C_p dp = 0,  (G w + C_t)' (dq, dw) + C'_p dp = 0        kept after every step
+//! ```
+//!
+//! The columns (dq, dw) are integrated on the steps of the motion itself, inside which its dense output is known
+//! (module `collocation`); A_q and A_w are evaluated on dual numbers, what a number p does at a state is told
+//! by its neighbours (module `neighbours`), what an impact or an event does by the saltation matrix (module
+//! `saltation`).  Driven angles are coordinates like all others here: their rows give them what the law's own
+//! numbers do.
+//!
+//! Source: M. Géradin, A. Cardona, *Flexible Multibody Dynamics* (2001), chapter 12; E. Hairer, S. P. Nørsett,
+//! G. Wanner, *Solving Ordinary Differential Equations I*, section I.14 (variational equation, parameters).
+
+use super::super::contact::{ContactDriver, JumpLog};
+use super::super::inside::{Observer, ObserverAdapter, Step};
+use super::super::trust::Ground;
+use super::collocation::{Collocation, STAGES};
+use super::lyapunov::Dissipation;
+use super::neighbours::{Neighbours, residuals};
+use crate::dynamics::jacobian::Jacobian;
+use crate::dynamics::kernel::Bias;
+use crate::dynamics::{Mechanism, Motion, State, Time};
+use crate::run::driver::Pause;
+use crate::run::running::Outcome;
+use crate::stepping::StepError;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// The last Legendre coefficient over what is integrated, at most: the error is about its power 12/5.
+const LIMIT: f64 = 3e-6;
+/// Steps of this share of that of the motion are too short to go on with.
+const SHORTEST: f64 = 1e-6;
+/// Coordinates up to which the equations of all stages are solved at once.
+pub(super) const MOST_COORDINATES: usize = 64;
+
+/// Columns beside a motion.
+pub(in crate::run) struct Variation {
+    /// The mechanism with the contacts held at the moment.
+    pub mechanism: Arc<Mechanism>,
+    /// All coordinates, then all rates, for every column.
+    pub columns: Vec<Vec<f64>>,
+    /// What moves each column beside the motion.
+    pub neighbours: Vec<Option<Neighbours>>,
+    /// Impacts so far.
+    pub impacts: Vec<Crossing>,
+    jacobian: Jacobian,
+    pub ground: Option<Ground>,
+    jumps: JumpLog,
+    method: Collocation,
+    pull: Vec<f64>,
+    forcing: Vec<Vec<f64>>,
+    now: f64,
+    /// The longest step \[s\].
+    reach: f64,
+    /// Parts that do not act at the moment.
+    pub off: Vec<String>,
+    /// Steps of the columns.
+    pub steps: u64,
+    /// Why they go no further.
+    pub lost: Option<String>,
+    /// What forces that depend on rates take off volumes, where somebody asks.
+    pub dissipation: Option<Dissipation>,
+}
+
+/// How the time of an impact moves with every column.
+#[derive(Clone, Debug)]
+pub(in crate::run) struct Crossing {
+    pub wall: String,
+    pub t: f64,
+    pub slopes: Vec<f64>,
+}
+
+/// Sees a variation and its motion.
+pub(in crate::run) trait Look {
+    /// Times \[s\] at which it wants to see them, rising; those at which it was are not named again.
+    fn next(&self) -> Option<f64>;
+
+    /// At such a time.
+    fn at(&mut self, variation: &mut Variation, motion: &Motion, time: f64);
+
+    /// At the end of every step.
+    fn stepped(&mut self, _variation: &mut Variation, _motion: &Motion, _time: f64) {}
+}
+
+impl Variation {
+    /// Columns beside the motion of a mechanism with the contacts held at the start.
+    ///
+    /// # Errors
+    /// Why there are none.
+    pub fn new(
+        mechanism: &Arc<Mechanism>,
+        columns: Vec<Vec<f64>>,
+        neighbours: Vec<Option<Neighbours>>,
+    ) -> Result<Self, String> {
+        if !mechanism.frictions.is_empty() {
+            return Err("small differences are not followed through the transitions of dry friction".into());
+        }
+        if mechanism.vibration.is_some() {
+            return Err("the mean force of a rigid spring's vibration is not followed".into());
+        }
+        let n = mechanism.coordinates();
+        if n > MOST_COORDINATES {
+            return Err(format!("there are {n} coordinates, and at most {MOST_COORDINATES} are followed"));
+        }
+        let forcing = vec![Vec::new(); columns.len()];
+        let mut variation = Self {
+            jacobian: Jacobian::new(mechanism),
+            ground: None,
+            mechanism: Arc::clone(mechanism),
+            columns,
+            neighbours,
+            impacts: Vec::new(),
+            jumps: JumpLog::with_switches(),
+            method: Collocation::new(),
+            pull: Vec::new(),
+            forcing,
+            now: 0.0,
+            reach: f64::INFINITY,
+            off: mechanism.whole.as_ref().map(|(_, off)| off.clone()).unwrap_or_default(),
+            steps: 0,
+            lost: None,
+            dissipation: None,
+        };
+        variation.hold(mechanism);
+        Ok(variation)
+    }
+
+    /// Takes columns that span all directions tangent to the constraints at a motion, without an order, and
+    /// returns the degrees of freedom.
+    pub fn span(&mut self, motion: &Motion) -> usize {
+        let n = self.mechanism.coordinates();
+        let rows = self.ground.as_mut().map_or(0, |ground| {
+            let (time, phi, omega) = plain(motion);
+            ground.stand(&self.mechanism, &State { time, y: [phi, omega].concat(), ..State::default() })
+        });
+        let freedom = n.saturating_sub(rows);
+        // Numbers of no particular kind: any others span the same.
+        let entry = |i: usize, j: usize| libm::sin(1.0 + 1.7 * i as f64 + 2.9 * j as f64 + (i * j) as f64);
+        self.columns = (0..2 * freedom).map(|j| (0..2 * n).map(|i| entry(i, j)).collect()).collect();
+        self.neighbours = vec![None; 2 * freedom];
+        self.forcing = vec![Vec::new(); 2 * freedom];
+        self.keep(motion);
+        freedom
+    }
+
+    /// Adds columns that nothing moves but the motion.
+    #[cfg(feature = "fit")]
+    pub fn add(&mut self, columns: &[Vec<f64>]) {
+        self.columns.extend_from_slice(columns);
+        self.neighbours.resize(self.columns.len(), None);
+        self.forcing.resize(self.columns.len(), Vec::new());
+    }
+
+    /// Goes on beside this mechanism.
+    pub fn hold(&mut self, mechanism: &Arc<Mechanism>) {
+        self.jacobian = Jacobian::new(mechanism);
+        self.ground = (!mechanism.constraints.is_empty()).then(|| Ground::new(mechanism));
+        self.mechanism = Arc::clone(mechanism);
+    }
+
+    /// Integrates beside a driver up to `until` \[s\], looked at on the way.
+    ///
+    /// # Errors
+    /// The motion itself stops.
+    pub fn go(
+        &mut self,
+        driver: &mut ContactDriver,
+        until: f64,
+        outcome: &mut Outcome,
+        look: &mut dyn Look,
+        pause: &mut Pause,
+    ) -> Result<bool, StepError> {
+        driver.jumps = Some(self.jumps.clone());
+        let mut beside = Beside { variation: self, look, until };
+        let mut adapter = ObserverAdapter { observer: &mut beside, has_enough: false };
+        let is_through = driver.go_watched(Time::from(until), outcome, None, Some(&mut adapter), pause)?;
+        Ok(is_through)
+    }
+
+    /// To a time inside a step; false where that is not possible.
+    fn advance(&mut self, step: &mut Step, to: f64) -> bool {
+        while self.now < to {
+            let left = to - self.now;
+            let pieces = (left / self.reach).ceil().max(1.0);
+            let h = left / pieces;
+            self.look_at_nodes(step, h);
+            let Self { method, pull, columns, forcing, .. } = self;
+            let tail = method.step(h, pull, columns, forcing, LIMIT);
+            let growth = 0.9 * libm::pow(LIMIT / tail.max(1e-12), 1.0 / (STAGES - 1) as f64);
+            if tail <= LIMIT {
+                self.steps += 1;
+                if let Some(dissipation) = &mut self.dissipation {
+                    let nodes = method.weights.iter().zip(&dissipation.nodes);
+                    dissipation.total += h * nodes.map(|(weight, trace)| weight * trace).sum::<f64>();
+                }
+                self.now = if pieces == 1.0 { to } else { self.now + h };
+                let next = h * growth.min(4.0);
+                self.reach = if pieces == 1.0 { next.max(self.reach) } else { next };
+                continue;
+            }
+            self.reach = h * if growth.is_finite() { growth.clamp(0.1, 0.8) } else { 0.1 };
+            if self.reach < SHORTEST * (step.end() - step.begin()) || !self.reach.is_finite() {
+                self.lose("small differences change too fast to be followed");
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Jacobians and forcing at the nodes of a step.
+    fn look_at_nodes(&mut self, step: &mut Step, h: f64) {
+        let n = self.mechanism.coordinates();
+        self.pull.clear();
+        if let Some(dissipation) = &mut self.dissipation {
+            dissipation.nodes.clear();
+        }
+        let forcing = self.forcing.iter_mut();
+        forcing.zip(&self.neighbours).for_each(|(forcing, neighbours)| {
+            let acts = neighbours.as_ref().is_some_and(|neighbours| !neighbours.list.is_empty());
+            forcing.clear();
+            forcing.resize(if acts { STAGES * n } else { 0 }, 0.0);
+        });
+        for (i, node) in self.method.nodes.iter().enumerate() {
+            let motion = step.at(self.now + node * h);
+            let (t, phi, omega) = plain(motion);
+            self.jacobian.evaluate(&self.mechanism, t, &phi, &omega, Bias::default());
+            self.pull.extend_from_slice(&self.jacobian.acceleration);
+            if let Some(dissipation) = &mut self.dissipation {
+                dissipation.look(&self.mechanism, motion);
+            }
+            for (forcing, neighbours) in self.forcing.iter_mut().zip(&mut self.neighbours) {
+                for neighbour in neighbours.iter_mut().flat_map(|neighbours| &mut neighbours.list) {
+                    let kernel = &mut neighbour.kernel;
+                    kernel.accelerate::<0>(&neighbour.mechanism, t, &phi, &omega, Bias::default());
+                    for (sum, load) in forcing[i * n..(i + 1) * n].iter_mut().zip(&kernel.load) {
+                        *sum += neighbour.weight * load;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Puts the columns onto the constraints, which the numbers move too.
+    pub fn keep(&mut self, motion: &Motion) {
+        let Self { mechanism, ground: Some(ground), columns, neighbours, .. } = self else { return };
+        let (t, phi, omega) = plain(motion);
+        let state = State { time: t, y: [&phi[..], &omega[..]].concat(), ..State::default() };
+        ground.stand(mechanism, &state);
+        let rows = mechanism.constraints.len();
+        for (column, neighbours) in columns.iter_mut().zip(neighbours) {
+            let mut moved = [vec![0.0; rows], vec![0.0; rows]];
+            for neighbour in neighbours.iter().flat_map(|neighbours| &neighbours.list) {
+                let (positions, rates) = residuals(&neighbour.mechanism, t, &phi, &omega);
+                for r in 0..rows {
+                    moved[0][r] += neighbour.weight * positions[r];
+                    moved[1][r] += neighbour.weight * rates[r];
+                }
+            }
+            ground.keep_moved(mechanism, &state, column, [&moved[0], &moved[1]]);
+        }
+    }
+
+    /// They go no further than the present time.
+    pub fn lose(&mut self, why: &str) {
+        self.lost.get_or_insert_with(|| format!("{why}, at t = {} s", self.now));
+    }
+
+    /// Takes what happened since the last step.
+    fn catch_up(&mut self) {
+        let jumps = self.jumps.take();
+        for jumps in jumps.chunk_by(|one, other| one.before.time == other.before.time) {
+            if self.lost.is_none()
+                && let Err(why) = self.cross(jumps)
+            {
+                self.lose(&why);
+            }
+        }
+    }
+}
+
+/// Time, coordinates and rates in plain doubles.
+pub(super) fn plain(motion: &Motion) -> (Time, Vec<f64>, Vec<f64>) {
+    let [phi, omega] = [&motion.phi, &motion.omega].map(|all| all.iter().map(|x| x.hi).collect::<Vec<f64>>());
+    (motion.time, phi, omega)
+}
+
+/// A variation as an observer of its motion.
+struct Beside<'a, 'b> {
+    variation: &'a mut Variation,
+    look: &'b mut dyn Look,
+    until: f64,
+}
+
+impl Observer for Beside<'_, '_> {
+    fn step(&mut self, step: &mut Step) -> ControlFlow<()> {
+        let Self { variation, look, until } = self;
+        variation.catch_up();
+        let (begin, end) = (step.begin(), step.end().min(*until));
+        variation.now = begin;
+        while let Some(time) = look.next().filter(|&time| time <= end) {
+            if variation.lost.is_some() || !variation.advance(step, time) {
+                return ControlFlow::Break(());
+            }
+            let motion = step.at(time).clone();
+            variation.keep(&motion);
+            look.at(variation, &motion, time);
+        }
+        if variation.lost.is_some() || !variation.advance(step, end) {
+            return ControlFlow::Break(());
+        }
+        let motion = step.at(end).clone();
+        variation.keep(&motion);
+        look.stepped(variation, &motion, end);
+        ControlFlow::Continue(())
+    }
+}

@@ -1,0 +1,110 @@
+//! Fits to synthetic data with noise: numbers found within their own standard errors, over many data sets as
+//! often as these say; a chaotic motion by multiple shooting.
+
+use driftless::run::fit::{Data, Fit, FitRequest, fit};
+use driftless::{MethodId, Simulation, Template};
+use std::fmt::Write;
+
+/// About normally distributed numbers, the same in every run.
+struct Noise(u64);
+
+impl Noise {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}
+
+fn template(name: &str, set: &[&str]) -> Template {
+    let set: Vec<_> = set.iter().map(|set| set.parse().expect("an override")).collect();
+    Template::read(format!("examples/scenes/{name}.json").as_ref(), &set).expect("a shipped scene")
+}
+
+/// Angles of both bars with noise.
+fn data(template: &Template, until: f64, every: f64, sigma: f64, seed: u64) -> Data {
+    let scene = template.scene().expect("a scene");
+    let mut noise = Noise(seed);
+    let mut text = String::from("t [s],bar1.phi [rad],bar2.phi [rad],other\n");
+    Simulation::new(&scene)
+        .expect("a simulation")
+        .method(MethodId::Taylor)
+        .tolerance(1e-14, 1e-14)
+        .until(until)
+        .every(every)
+        .run_with(|sample| {
+            let [one, two] = [0, 1].map(|bar| sample.phi[bar] + sigma * noise.normal());
+            writeln!(text, "{},{one},{two},1", sample.t).expect("a string");
+            Ok(())
+        })
+        .expect("a run");
+    Data::parse(&text, "data.csv").expect("a table")
+}
+
+fn fitted(guess: &Template, data: &Data, vary: &[&str], segments: usize) -> Fit {
+    let vary = vary.iter().map(|path| (*path).to_owned()).collect();
+    let request = FitRequest { vary, segments, ..FitRequest::default() };
+    fit(guess, data, &request, &mut || false).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn numbers_are_found_within_their_standard_errors() {
+    let truth = [7.394_287_5, 0.4, 0.03];
+    let vary = ["spring.stiffness", "spring.free_length", "spring.damping"];
+    let known = template("spring", &["spring.damping=0.03"]);
+    let guess =
+        template("spring", &["spring.damping=0.01", "spring.stiffness=6.5", "spring.free_length=0.45"]);
+    let mut sum = 0.0;
+    let sets = 8;
+    for seed in 0..sets {
+        let data = data(&known, 2.0, 0.04, 2e-3, 17 + seed);
+        let found = fitted(&guess, &data, &vary, 1);
+        assert_eq!(found.ignored, ["other"]);
+        // The noise is found with the numbers.
+        for column in &found.columns {
+            assert!((column.sigma / 2e-3 - 1.0).abs() < 0.35, "{}", column.sigma);
+        }
+        let off = nalgebra::DVector::from_fn(3, |k, _| found.numbers[k].value - truth[k]);
+        let inverse = found.covariance.clone().try_inverse().expect("a covariance");
+        sum += (off.transpose() * inverse * off)[(0, 0)];
+        for (number, truth) in found.numbers.iter().zip(truth) {
+            assert!((number.value - truth).abs() < 4.5 * number.error, "{number:?}");
+        }
+    }
+    // Chi square with 24 degrees of freedom: between 8 and 50 in 999 of 1000 cases.
+    println!("chi square {sum} of {}", 3 * sets);
+    assert!((8.0..50.0).contains(&sum), "{sum}");
+}
+
+#[test]
+fn a_chaotic_motion_is_fitted_by_multiple_shooting() {
+    let known = template("free", &[]);
+    let data = data(&known, 8.0, 0.02, 1e-3, 5);
+    let guess = template("free", &["gravity[0]=9.6"]);
+    let found = fitted(&guess, &data, &["gravity[0]"], 16);
+    let number = &found.numbers[0];
+    println!("{number:?}, gap {:e}, {}", found.gap, found.ended);
+    assert!((number.value - 9.81).abs() < 4.0 * number.error && number.error < 1e-3, "{number:?}");
+    assert!(found.gap < 1e-5, "{}", found.gap);
+}
+
+#[test]
+fn what_data_do_not_tell_is_refused() {
+    let known = template("free", &[]);
+    let data = data(&known, 1.0, 0.1, 1e-3, 3);
+    let request = |vary: &str| FitRequest { vary: vec![vary.into()], ..FitRequest::default() };
+    let told = |request: &FitRequest| {
+        fit(&known, &data, request, &mut || false).map(|_| ()).expect_err("no fit").to_string()
+    };
+    assert!(told(&request("bars.bar9.density")).contains("bar9"));
+    assert!(told(&FitRequest::default()).contains("--vary"));
+    let columns = FitRequest { columns: vec!["bar3.phi".into()], ..request("gravity[0]") };
+    assert!(told(&columns).contains("bar1.phi"), "{}", told(&columns));
+    let other = FitRequest { columns: vec!["other".into()], ..request("gravity[0]") };
+    assert!(told(&other).contains("other"), "{}", told(&other));
+    let many = FitRequest { segments: 50, ..request("gravity[0]") };
+    assert!(told(&many).contains("two rows"));
+}

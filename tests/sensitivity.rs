@@ -1,0 +1,329 @@
+//! Sensitivities against closed forms, against differences of reference motions in double-double, and the sums
+//! of Lyapunov spectra.
+
+use crate::mechanisms::{Dice, scene as random_scene};
+use driftless::dynamics::{Mechanism, Time};
+use driftless::run::reference;
+use driftless::{Measure, Regime, Sensitivity, SensitivityRequest, Template, lyapunov, sensitivity};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+fn template(text: &str) -> Template {
+    Template::new(text.into(), "scene.json".into(), &[])
+}
+
+fn example(name: &str) -> Template {
+    Template::read(format!("examples/scenes/{name}.json").as_ref(), &[]).expect("a shipped scene")
+}
+
+fn derived(template: &Template, of: &[&str], to: &[&str], at: f64) -> Sensitivity {
+    let request = SensitivityRequest {
+        of: of.iter().map(|text| text.parse::<Measure>().expect("a measure")).collect(),
+        to: to.iter().map(|path| (*path).to_owned()).collect(),
+        at: Some(at),
+        ..SensitivityRequest::default()
+    };
+    sensitivity(template, &request, &mut || false).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn assert_near(found: f64, expected: f64, tolerance: f64, what: &str) {
+    let size = expected.abs().max(1e-3);
+    assert!((found - expected).abs() <= tolerance * size, "{what}: {found:e} instead of {expected:e}");
+}
+
+/// K and E of modulus k, by the arithmetic-geometric mean.
+fn elliptic(k: f64) -> [f64; 2] {
+    let (mut a, mut b, mut sum, mut power) = (1.0_f64, (1.0 - k * k).sqrt(), 0.5 * k * k, 0.5);
+    for _ in 0..12 {
+        let c = 0.5 * (a - b);
+        (a, b) = (0.5 * (a + b), (a * b).sqrt());
+        power *= 2.0;
+        sum += power * c * c;
+    }
+    let complete = std::f64::consts::FRAC_PI_2 / a;
+    [complete, complete * (1.0 - sum)]
+}
+
+#[test]
+fn an_oscillation_is_derived_by_all_its_numbers() {
+    let scene = template(
+        r#"{"name": "oscillator", "gravity": [0, 0],
+            "bars": [{"name": "bar", "mass": 2, "centre": [0, 0], "inertia": 0.5, "length": 0.6}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+            "torsion_springs": [{"name": "s", "body": "bar", "stiffness": 3, "free_angle": 0.2}],
+            "start": {"bar": {"phi": 0.7, "omega": -0.4}}, "until": 5, "every": 0.1}"#,
+    );
+    let to = ["bar.phi", "bar.omega", "s.stiffness", "s.free_angle", "bars.bar.inertia", "bars.bar.mass"];
+    let t = 4.3;
+    let found = derived(&scene, &["bar.phi", "bar.omega", "bar.alpha"], &to, t);
+    let (k, inertia, x, v) = (3.0_f64, 0.5_f64, 0.5, -0.4);
+    let w = (k / inertia).sqrt();
+    let (s, c) = ((w * t).sin(), (w * t).cos());
+    let by_w = -x * t * s + v * t * c / w - v * s / (w * w);
+    let expected = [c, s / w, by_w * 0.5 * w / k, 1.0 - c, -by_w * 0.5 * w / inertia, 0.0];
+    for (j, expected) in expected.into_iter().enumerate() {
+        assert_near(found.measures[0].slopes[j], expected, 1e-10, to[j]);
+    }
+    assert_near(found.measures[1].slopes[0], -w * s, 1e-10, "rate by angle");
+    assert_near(found.measures[2].slopes[0], -w * w * c, 1e-10, "acceleration by angle");
+}
+
+#[test]
+fn the_quarter_period_of_a_pendulum_is_derived_by_amplitude_and_gravity() {
+    let scene = template(
+        r#"{"name": "pendulum", "gravity": [9.81, 0],
+            "bars": [{"name": "bar", "mass": 2, "centre": [0.5, 0], "inertia": 0, "length": 0.5}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+            "events": [{"name": "bottom", "when": "bar.phi"}],
+            "start": {"bar": {"phi": 1.9, "omega": 0}}, "until": 2, "every": 0.1}"#,
+    );
+    let found = derived(&scene, &["event:bottom", "min:bar.omega"], &["bar.phi", "gravity[0]"], 1.0);
+    let (k, rate) = ((0.95_f64).sin(), (9.81_f64 / 0.5).sqrt());
+    let [complete, second] = elliptic(k);
+    assert_near(found.measures[0].value, complete / rate, 1e-12, "quarter period");
+    let by_k = (second - (1.0 - k * k) * complete) / (k * (1.0 - k * k));
+    assert_near(found.measures[0].slopes[0], by_k * 0.5 * 0.95_f64.cos() / rate, 1e-10, "by amplitude");
+    assert_near(found.measures[0].slopes[1], -0.5 * complete / rate / 9.81, 1e-10, "by gravity");
+    // The fastest rate is that at the bottom: w² = 2 g (1 - cos a)/l.
+    let fastest = -(2.0 * 9.81 * (1.0 - 1.9_f64.cos()) / 0.5).sqrt();
+    assert_near(found.measures[1].value, fastest, 1e-10, "fastest");
+    assert_near(
+        found.measures[1].slopes[0],
+        9.81 * 1.9_f64.sin() / 0.5 / fastest,
+        1e-9,
+        "fastest by amplitude",
+    );
+}
+
+#[test]
+fn a_ball_is_derived_through_its_impact() {
+    let scene = template(
+        r#"{"name": "ball", "gravity": [0, -9.81],
+            "bars": [{"name": "ball", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 0.2}],
+            "walls": [{"name": "floor", "body": "ball", "point": [0, 0], "line": {"through": [0, 0.1], "normal": [0, 1]}, "restitution": 0.7}],
+            "start": {"ball": {"phi": 0, "omega": 0, "x": 0, "y": 1.3, "vx": 0, "vy": 0}}, "until": 1, "every": 0.1}"#,
+    );
+    let to = ["ball.y", "gravity[1]", "floor.restitution", "walls.floor.line.through[1]"];
+    let t = 0.8;
+    let found = derived(&scene, &["ball.y", "ball.vy", "impact:floor"], &to, t);
+    let (g, h, e) = (9.81_f64, 1.2_f64, 0.7);
+    let (fall, speed) = ((2.0 * h / g).sqrt(), (2.0 * g * h).sqrt());
+    let (after, rate) = (t - fall, e * speed - g * (t - fall));
+    let by_height = e * g / speed * after - rate / speed;
+    let by_gravity = e * h / speed * after - 0.5 * after * after + rate * 0.5 * fall / g;
+    let expected = [by_height, -by_gravity, speed * after, 1.0 - by_height];
+    for (j, expected) in expected.into_iter().enumerate() {
+        assert_near(found.measures[0].slopes[j], expected, 1e-9, to[j]);
+    }
+    assert_near(found.measures[1].slopes[0], e * g / speed + g / speed, 1e-9, "rate by height");
+    assert_near(found.measures[2].value, fall, 1e-12, "impact");
+    assert_near(found.measures[2].slopes[0], 1.0 / speed, 1e-9, "impact by height");
+    assert_near(found.measures[2].slopes[1], 0.5 * fall / g, 1e-9, "impact by gravity");
+}
+
+/// Angles and rates at a time of the reference motion with another value of a number.
+fn reference_at(template: &Template, path: &str, value: f64, at: f64) -> Option<Vec<f64>> {
+    let variable = template.variable(path).ok()?;
+    let scene = template.filled(&[variable], &[value]).ok()?;
+    let mechanism = Arc::new(Mechanism::new(&scene).ok()?);
+    let found = reference(&mechanism, &mechanism.start(&scene), &[Time::from(at)]).ok()?;
+    let bodies = scene.bars.len();
+    let motion = found.motions.first()?;
+    Some((0..bodies).map(|k| motion.unwrapped(k)).chain((0..bodies).map(|k| motion.omega[k].hi)).collect())
+}
+
+/// Differences of the sixth order of reference motions, with their own uncertainty: none where neighbours stop.
+fn differences(template: &Template, path: &str, value: f64, at: f64, share: f64) -> Option<Vec<f64>> {
+    let h = share * if value == 0.0 { 1.0 } else { value.abs() };
+    let mut sum: Vec<f64> = Vec::new();
+    for (k, weight) in [(1.0, 0.75), (2.0, -0.15), (3.0, 1.0 / 60.0)] {
+        let more = reference_at(template, path, value + k * h, at)?;
+        let less = reference_at(template, path, value - k * h, at)?;
+        sum.resize(more.len(), 0.0);
+        for (sum, (more, less)) in sum.iter_mut().zip(more.iter().zip(&less)) {
+            *sum += weight * (more - less) / h;
+        }
+    }
+    Some(sum)
+}
+
+/// The largest relative difference of derivatives of all angles and rates from differences of references, and
+/// how far these themselves are known; none where there are none.
+fn compared(template: &Template, paths: &[&str], at: f64) -> Result<Vec<(String, f64, f64)>, String> {
+    let scene = template.scene().map_err(|error| error.to_string())?;
+    let names: Vec<String> = ["phi", "omega"]
+        .iter()
+        .flat_map(|what| scene.bars.iter().map(move |bar| format!("{}.{what}", bar.name)))
+        .collect();
+    let request = SensitivityRequest {
+        of: names.iter().map(|name| name.parse().expect("a measure")).collect(),
+        to: paths.iter().map(|path| (*path).to_owned()).collect(),
+        at: Some(at),
+        ..SensitivityRequest::default()
+    };
+    let found = sensitivity(template, &request, &mut || false).map_err(|error| error.to_string())?;
+    if let Some(lost) = &found.lost {
+        return Err(lost.clone());
+    }
+    let mut all = Vec::new();
+    for (j, input) in found.inputs.iter().enumerate() {
+        let own: Vec<f64> = found.measures.iter().map(|measured| measured.slopes[j]).collect();
+        let size = own.iter().fold(0.0, |most: f64, slope| most.max(slope.abs()));
+        // Angles and rates of which none moves by more than rounding.
+        if size * input.value.abs().max(1e-3) < 1e-8 {
+            continue;
+        }
+        let by = |share: f64| differences(template, &input.path, input.value, at, share);
+        let apart = |a: &[f64], b: &[f64]| {
+            a.iter().zip(b).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs())) / size
+        };
+        let mut best: Option<(f64, f64)> = None;
+        let mut before: Option<Vec<f64>> = None;
+        for share in [3e-3, 5e-4, 1e-4, 2e-5, 4e-6] {
+            let now = by(share);
+            if let (Some(before), Some(now)) = (&before, &now) {
+                let doubt = apart(before, now);
+                if best.is_none_or(|(least, _)| doubt < least) {
+                    best = Some((doubt, apart(now, &own)));
+                }
+            }
+            before = now;
+        }
+        if let Some((doubt, off)) = best {
+            all.push((input.path.clone(), off, doubt));
+        }
+    }
+    Ok(all)
+}
+
+#[test]
+fn derivatives_of_every_kind_of_scene_agree_with_differences_of_references() {
+    for (name, at, paths) in [
+        ("spring", 2.0, &["spring.stiffness", "bar1.phi", "bars.bar2.density", "gravity[0]"][..]),
+        ("motor_sine", 2.0, &["motors.motor.law.sines[0].frequency", "bar2.omega", "B.between[0].point[0]"]),
+        ("four_bars", 0.8, &["gravity[1]"]),
+        ("parameters", 1.0, &["gravity[1]"]),
+        ("slider_crank_torque", 0.5, &["gravity[1]"]),
+        ("wall", 0.8, &["wall.restitution", "bar1.omega"]),
+    ] {
+        let template = example(name);
+        let paths: Vec<&str> = paths.iter().copied().filter(|path| template.variable(path).is_ok()).collect();
+        let found = compared(&template, &paths, at).unwrap_or_else(|why| panic!("{name}: {why}"));
+        for (path, off, doubt) in found {
+            println!("{name} {path}: {off:.1e}, known to {doubt:.1e}");
+            // Impacts of references are located in doubles.
+            let known: f64 = if name == "wall" { 1e-6 } else { 1e-8 };
+            assert!(off < known.max(3.0 * doubt) && doubt < 1e-5, "{name} {path}: {off:e} {doubt:e}");
+        }
+    }
+}
+
+/// Random scenes of every kind: `CASES` of them from seed `SEED` on.
+#[test]
+fn derivatives_of_random_scenes_agree_with_differences_of_references() {
+    let number =
+        |name: &str, usual: u64| std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(usual);
+    let (cases, seed) = (number("CASES", 3), number("SEED", 1));
+    let (mut table, mut refused) = (BTreeMap::new(), BTreeMap::<String, usize>::new());
+    let (mut worst, mut count, mut outside) = (0.0_f64, 0, 0);
+    for case in 0..cases {
+        let generated = random_scene(90_000 + seed * 1000 + case);
+        let template = template(&generated.text);
+        let numbers = template.written_numbers(&[]).expect("a scene");
+        let mut dice = Dice::new(seed * 7919 + case);
+        let paths: Vec<&str> = (0..3).map(|_| numbers[dice.pick(numbers.len())].path.as_str()).collect();
+        let found = match compared(&template, &paths, 3.0 * generated.scales.time) {
+            Ok(found) => found,
+            Err(why) => {
+                let why = why.split(", at t").next().unwrap_or_default().chars().take(90).collect();
+                *refused.entry(why).or_default() += 1;
+                continue;
+            }
+        };
+        for (path, off, doubt) in found {
+            let is_wall = generated.kinds.iter().any(|kind| kind.is_wall());
+            let known: f64 = if is_wall { 1e-6 } else { 1e-8 };
+            if doubt > 1e-3 * known.max(1e-7) && doubt > 1e-9 {
+                continue;
+            }
+            count += 1;
+            worst = worst.max(off);
+            outside += usize::from(off > known);
+            if off > known {
+                println!("seed {case} {path}: {off:.1e}, known to {doubt:.1e}; {:?}", generated.kinds);
+            }
+            for kind in &generated.kinds {
+                let row: &mut (usize, f64) = table.entry(kind.name()).or_default();
+                *row = (row.0 + 1, row.1.max(off));
+            }
+        }
+    }
+    for (kind, (count, worst)) in &table {
+        println!("{kind:28} {count:5} {worst:9.1e}");
+    }
+    println!("{count} derivatives, {outside} outside, worst {worst:.1e}; refused: {refused:?}");
+    assert!(outside * 100 <= count, "{outside} of {count} outside");
+}
+
+#[test]
+fn spectra_add_up_to_what_the_dissipation_says() {
+    for (name, until) in [("free", 40.0), ("motor", 20.0), ("four_bars", 5.0), ("gentle", 40.0)] {
+        let found = lyapunov(&example(name), Some(until), None, &mut || false)
+            .unwrap_or_else(|error| panic!("{name}: {error}"));
+        println!("{name}: {:?}, sum {:e}, {:?} {:?}", found.exponents, found.sum, found.regime, found.lost);
+        assert_eq!(found.expected_sum, 0.0);
+        assert!(found.lost.is_some() || found.defect() < 1e-8, "{name}: {:e}", found.defect());
+    }
+    let set = ["springs.spring.damping=0.02".parse().expect("an override")];
+    let damped = Template::read("examples/scenes/spring.json".as_ref(), &set).expect("a scene");
+    let found = lyapunov(&damped, Some(20.0), None, &mut || false).expect("a spectrum");
+    assert!(found.expected_sum < -1e-3 && found.defect() < 1e-8, "{} {}", found.sum, found.expected_sum);
+}
+
+#[test]
+fn chaos_is_told_from_regular_motion() {
+    let regime = |name: &str, until: f64| {
+        lyapunov(&example(name), Some(until), Some(1e-10), &mut || false).expect("a spectrum").regime
+    };
+    assert_eq!(regime("free", 60.0), Regime::Chaotic);
+    assert_eq!(regime("gentle", 60.0), Regime::Regular);
+}
+
+#[test]
+fn bands_and_covariances_follow_from_the_jacobian() {
+    let request = SensitivityRequest {
+        of: vec!["bar1.phi".parse().expect("a measure")],
+        to: vec!["bar1.phi".into(), "gravity[0]".into()],
+        at: Some(1.0),
+        every: Some(0.25),
+        ..SensitivityRequest::default()
+    };
+    let found = sensitivity(&example("spring"), &request, &mut || false).expect("sensitivities");
+    assert_eq!(found.rows.iter().map(|row| row.t).collect::<Vec<_>>(), [0.0, 0.25, 0.5, 0.75, 1.0]);
+    let bands = found.bands(&[0.01, 0.1]);
+    assert_near(bands[0][0], 0.01, 1e-12, "at the start the band is that of the angle");
+    let slopes = &found.measures[0].slopes;
+    let expected = (0.01 * slopes[0]).hypot(0.1 * slopes[1]);
+    assert_near(bands[4][0], expected, 1e-12, "at the end");
+    let covariance = found.covariance(&nalgebra::DMatrix::from_diagonal(&nalgebra::dvector![1e-4, 1e-2]));
+    assert_near(covariance[(0, 0)].sqrt(), expected, 1e-12, "covariance");
+}
+
+#[test]
+fn what_makes_no_sense_is_told() {
+    for (of, to, told) in [
+        ("event:none", "bar1.phi", "no event is called `none`"),
+        ("impact:none", "bar1.phi", "no wall is called `none`"),
+        ("bar1.phi", "bar3.phi", "bar3"),
+        ("bar1.fie", "bar1.phi", "bar1.phi"),
+        ("bar1.phi", "springs.spring.model", "not a number"),
+    ] {
+        let request = SensitivityRequest {
+            of: vec![of.parse().expect("a measure")],
+            to: vec![to.into()],
+            ..SensitivityRequest::default()
+        };
+        let error = sensitivity(&example("spring"), &request, &mut || false).expect_err(of).to_string();
+        assert!(error.contains(told), "{error}");
+    }
+}
