@@ -29,6 +29,7 @@
 //! | a run | [`Simulation`], [`Outcome`], [`Trajectory`]; step by step [`Run`], [`Running`], [`Snapshot`] |
 //! | something of your own | [`Force`], [`Event`], [`Observer`], [`Integrator`] |
 //! | many runs | [`Sweep`], [`compare`] |
+//! | derivatives of a run, chaos | [`sensitivity`](fn@sensitivity), [`lyapunov`], `run::fit` |
 //! | what went wrong | [`Error`] |
 //!
 //! # The rooms, in reading order
@@ -50,8 +51,8 @@
 //!
 //! # Features
 //!
-//! `cli`, `charts` and `threads` (sweeps on several of them) are on by default; `default-features = false`
-//! leaves the core.  [`source_problem`] has the problem everything began with, its published numbers and its
+//! `cli`, `charts`, `threads` (sweeps on several of them) and `fit` are on by default; `default-features =
+//! false` leaves the core.  [`source_problem`] has the problem everything began with, its published numbers and its
 //! errata.
 //!
 //! Units are SI throughout, angles in radians, absolute, from +x, counter-clockwise.

@@ -47,14 +47,15 @@ pub(super) fn pass(
     let mut outcome = Outcome::begun(&study.mechanism, plan.clone());
     let driver = build(&study.mechanism, &mut plan, &start).map_err(|stop| stop.what)?;
     let mut driver = ContactDriver::new(Arc::clone(&study.mechanism), driver);
-    driver.meet(&mut outcome).map_err(|stop| stop.what)?;
     let mut variation = study.variation().map_err(|error| error.to_string())?;
+    driver.jumps = Some(variation.jumps.clone());
+    driver.meet(&mut outcome).map_err(|stop| stop.what)?;
     if from.is_some() {
         variation.columns.iter_mut().for_each(|column| column.fill(0.0));
     }
     variation.add(directions);
     let begin = driver.motion();
-    variation.keep(&begin);
+    variation.begin(&begin);
     let mut sampler = Sampler { times, next: 0, until, rows: Vec::new(), end: None };
     if from.map_or(0.0, |(t, _)| t) == until {
         sampler.end = Some(begin.clone());

@@ -87,7 +87,7 @@ pub fn lyapunov(
     let request = SensitivityRequest { at: until, tolerance, ..SensitivityRequest::default() };
     let study = Study::new(template, &request)?;
     let mut outcome = Outcome::begun(&study.mechanism, study.plan.clone());
-    let mut driver = study.driver(&mut outcome)?;
+    let mut driver = study.driver(&mut outcome, None)?;
     let (mechanism, motion) = (driver.holding().clone(), driver.motion());
     let mut variation =
         Variation::new(&mechanism, Vec::new(), Vec::new()).map_err(SensitivityError::Unsuited)?;
@@ -306,7 +306,7 @@ impl Look for Orthonormal {
         if variation.lost.is_some() {
             return;
         }
-        if variation.mechanism.held.len() != 0 {
+        if !variation.mechanism.held.is_empty() {
             return variation.lose("a point stays on its wall, and directions are lost");
         }
         self.renew(variation, motion);

@@ -26,7 +26,7 @@ use neighbours::Neighbours;
 pub(super) use variation::{Look, Variation};
 
 use super::build::build;
-use super::contact::ContactDriver;
+use super::contact::{ContactDriver, JumpLog};
 use super::driver::Pause;
 use super::extremes::ExtremesDetector;
 use super::flip::FlipDetector;
@@ -303,11 +303,16 @@ impl Study {
         request.of.iter().map(asked).collect()
     }
 
-    /// A driver at the start, through what impacts there are at it.
-    fn driver(&self, outcome: &mut Outcome) -> Result<ContactDriver, SensitivityError> {
+    /// A driver at the start, through what impacts there are at it, which a log takes where there is one.
+    fn driver(
+        &self,
+        outcome: &mut Outcome,
+        jumps: Option<JumpLog>,
+    ) -> Result<ContactDriver, SensitivityError> {
         let mut plan = self.plan.clone();
         let driver = build(&self.mechanism, &mut plan, &self.start).map_err(stopped)?;
         let mut driver = ContactDriver::new(Arc::clone(&self.mechanism), driver);
+        driver.jumps = jumps;
         driver.meet(outcome).map_err(stopped)?;
         Ok(driver)
     }
@@ -319,7 +324,7 @@ impl Study {
             return Ok(());
         }
         let mut outcome = Outcome::begun(&self.mechanism, self.plan.clone());
-        let mut driver = self.driver(&mut outcome)?;
+        let mut driver = self.driver(&mut outcome, None)?;
         driver.flips = Some(FlipDetector::default());
         driver.extremes = ExtremesDetector::new(&self.mechanism);
         driver.go(Time::from(self.plan.until), &mut outcome, pause).map_err(stopped)?;
@@ -361,12 +366,13 @@ impl Study {
         times.sort_by(f64::total_cmp);
         times.dedup();
         let mut outcome = Outcome::begun(&self.mechanism, self.plan.clone());
-        let mut driver = self.driver(&mut outcome)?;
         let mut variation = self.variation()?;
+        let mut driver = self.driver(&mut outcome, Some(variation.jumps.clone()))?;
+        let begin = driver.motion();
+        variation.begin(&begin);
         let mut recorder = Recorder { times, next: 0, asked: &asked, seen: Vec::new() };
         if recorder.next() == Some(0.0) {
-            let motion = driver.motion();
-            recorder.at(&mut variation, &motion, 0.0);
+            recorder.at(&mut variation, &begin, 0.0);
         }
         let until = self.plan.until;
         let is_through =

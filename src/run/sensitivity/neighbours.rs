@@ -222,6 +222,14 @@ impl Search<'_> {
             return Err("neighbouring values give a mechanism of another kind".into());
         }
         let start = mechanism.start(&scene);
+        // On the branches of the scene itself: its formulas may have a corner at the start.
+        let own = mechanism.laws.as_ref().map(|laws| laws.parameters.clone());
+        let mechanism = match (own, &base.laws) {
+            (Some(own), Some(laws)) => {
+                mechanism.on_branch(own, laws.modes.clone()).map_err(|error| error.to_string())?
+            }
+            _ => mechanism,
+        };
         Ok(Candidate { mechanism: Arc::new(mechanism), start })
     }
 

@@ -28,6 +28,9 @@ const SHARE: f64 = 0.05;
 /// Offsets and weights of a derivative of the fourth order.
 const STENCIL: [[f64; 2]; 4] = [[-2.0, 1.0 / 12.0], [-1.0, -2.0 / 3.0], [1.0, 2.0 / 3.0], [2.0, -1.0 / 12.0]];
 
+/// A function of time, coordinates and rates.
+pub(super) type Function<'a> = &'a mut dyn FnMut(Time, &[f64], &[f64]) -> Option<Vec<f64>>;
+
 /// A state in plain doubles, with its accelerations.
 pub(super) struct Side {
     pub t: Time,
@@ -50,13 +53,7 @@ impl Side {
     }
 
     /// The derivative of a function of time, coordinates and rates along a column, and time with it.
-    pub fn slope(
-        &self,
-        column: &[f64],
-        late: f64,
-        share: f64,
-        value: &mut dyn FnMut(Time, &[f64], &[f64]) -> Option<Vec<f64>>,
-    ) -> Option<Vec<f64>> {
+    pub fn slope(&self, column: &[f64], late: f64, share: f64, value: Function) -> Option<Vec<f64>> {
         let n = self.phi.len();
         let size = |of: &[f64], from: &[f64]| {
             of.iter().zip(from).fold(0.0, |most: f64, (x, y)| most.max(x.abs() / (1.0 + y.abs())))

@@ -48,7 +48,7 @@ pub(in crate::run) struct Variation {
     pub impacts: Vec<Crossing>,
     jacobian: Jacobian,
     pub ground: Option<Ground>,
-    jumps: JumpLog,
+    pub jumps: JumpLog,
     method: Collocation,
     pull: Vec<f64>,
     forcing: Vec<Vec<f64>>,
@@ -93,7 +93,7 @@ impl Variation {
     pub fn new(
         mechanism: &Arc<Mechanism>,
         columns: Vec<Vec<f64>>,
-        neighbours: Vec<Option<Neighbours>>,
+        mut neighbours: Vec<Option<Neighbours>>,
     ) -> Result<Self, String> {
         if !mechanism.frictions.is_empty() {
             return Err("small differences are not followed through the transitions of dry friction".into());
@@ -106,6 +106,10 @@ impl Variation {
             return Err(format!("there are {n} coordinates, and at most {MOST_COORDINATES} are followed"));
         }
         let forcing = vec![Vec::new(); columns.len()];
+        let off = mechanism.whole.as_ref().map(|(_, off)| off.clone()).unwrap_or_default();
+        for neighbours in neighbours.iter_mut().flatten() {
+            neighbours.follow(mechanism, &off)?;
+        }
         let mut variation = Self {
             jacobian: Jacobian::new(mechanism),
             ground: None,
@@ -119,13 +123,20 @@ impl Variation {
             forcing,
             now: 0.0,
             reach: f64::INFINITY,
-            off: mechanism.whole.as_ref().map(|(_, off)| off.clone()).unwrap_or_default(),
+            off,
             steps: 0,
             lost: None,
             dissipation: None,
         };
         variation.hold(mechanism);
         Ok(variation)
+    }
+
+    /// Takes the columns through what happened at the start itself, and puts them onto the constraints there.
+    pub fn begin(&mut self, motion: &Motion) {
+        self.now = motion.time.hi;
+        self.catch_up();
+        self.keep(motion);
     }
 
     /// Takes columns that span all directions tangent to the constraints at a motion, without an order, and

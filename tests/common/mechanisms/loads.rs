@@ -51,7 +51,9 @@ impl Model {
     }
 
     fn spring(&mut self, ground: f64, zero: bool, damped: bool) {
-        let Some(between) = self.apart(ground) else { return };
+        let Some(between) = self.apart(ground) else {
+            return;
+        };
         let length = norm(minus(self.at(&between[0]), self.at(&between[1])));
         let free_length = if zero { 0.0 } else { length * self.dice.within(0.4, 1.3) };
         let stiffness = self.scales.force / self.scales.length * self.dice.size(1.0, 20.0);

@@ -206,14 +206,18 @@ impl Model {
 
     /// A point of a body in the world \[m\].
     fn at(&self, place: &Place) -> [f64; 2] {
-        let Some(bar) = place.bar else { return place.point };
+        let Some(bar) = place.bar else {
+            return place.point;
+        };
         let arm = self.turned(bar, place.point);
         [self.origin[bar][0] + arm[0], self.origin[bar][1] + arm[1]]
     }
 
     /// Its velocity \[m/s\].
     fn velocity_at(&self, place: &Place) -> [f64; 2] {
-        let Some(bar) = place.bar else { return [0.0; 2] };
+        let Some(bar) = place.bar else {
+            return [0.0; 2];
+        };
         let (arm, omega) = (self.turned(bar, place.point), self.start[bar].omega);
         [self.velocity[bar][0] - omega * arm[1], self.velocity[bar][1] + omega * arm[0]]
     }
@@ -226,7 +230,9 @@ impl Model {
 
     /// A point of the world as a place on a body, or on the ground.
     fn place(&self, bar: Option<usize>, [x, y]: [f64; 2]) -> Place {
-        let Some(k) = bar else { return Place { bar, point: [x, y] } };
+        let Some(k) = bar else {
+            return Place { bar, point: [x, y] };
+        };
         let (s, c) = self.start[k].phi.sin_cos();
         let (x, y) = (x - self.origin[k][0], y - self.origin[k][1]);
         Place { bar, point: [c * x + s * y, c * y - s * x] }
