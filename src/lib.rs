@@ -46,6 +46,7 @@
 //! | [`stabilization`] | Baumgarte and projection |
 //! | [`run`] | from a scene to a result: plan, loop, samples, drift |
 //! | `chart` | pictures of plain data (feature `charts`) |
+//! | `html` | pages of plain data (feature `charts`) |
 //! | [`report`] | results as text, JSON and pictures |
 //! | `cli` | the program's commands (feature `cli`) |
 //!
@@ -64,6 +65,8 @@ pub mod chart;
 pub mod cli;
 pub mod dynamics;
 mod error;
+#[cfg(feature = "charts")]
+pub mod html;
 pub mod report;
 pub mod run;
 pub mod scene;

@@ -38,5 +38,7 @@ mod resume;
 mod stress;
 mod sweep;
 mod trust;
+#[cfg(feature = "charts")]
+mod view;
 #[path = "program.rs"]
 mod whole_program;

@@ -86,6 +86,11 @@ fn keep(
             flags.charts.keep(folder, chart.name(), &picture, &flags.scene.tell)?;
         }
     }
+    #[cfg(feature = "charts")]
+    if flags.html {
+        let page = report::view::compared(scene, mechanism, comparison);
+        super::view::keep(folder, "compare.html", &page, &flags.scene.tell)?;
+    }
     let record = format!("{:#}\n", report::compare::object(scene, mechanism, comparison));
     Ok(folder.write(COMPARISON_RECORD, record.as_bytes())?)
 }
@@ -97,6 +102,7 @@ const FILES: &[&str] = &[
     "error_against_run_time.png",
     "energy_drift_against_run_time.png",
     "error_against_evaluations.png",
+    "compare.html",
 ];
 
 /// Prints the results.

@@ -60,6 +60,9 @@ pub enum Command {
     Resume(ResumeFlags),
     /// Join the parts of a sweep: the same table, chart and record as of one process, byte for byte
     Merge(MergeFlags),
+    /// Make a page of finished runs: the mechanism plays, charts beside it, several runs over one another
+    #[cfg(feature = "charts")]
+    View(ViewFlags),
     /// Run stiff and extreme scenes by every method: each ends right, refused or stopped, and none wrong
     Stress(StressFlags),
     /// List the methods
@@ -230,6 +233,11 @@ pub struct RunFlags {
     #[cfg(feature = "charts")]
     #[command(flatten)]
     pub motion: MotionFlags,
+    /// Write a page that plays the motion beside its charts, `run.html`; of several stabilizations one more of
+    /// all, `runs.html`
+    #[cfg(feature = "charts")]
+    #[arg(long, help_heading = "Files")]
+    pub html: bool,
     /// Draw these columns of the trajectory, joined by commas, as in bar1.x,bar2.omega; an output is drawn
     /// without
     #[cfg(feature = "charts")]
@@ -241,7 +249,7 @@ pub struct RunFlags {
         help_heading = "Files"
     )]
     pub chart: Vec<String>,
-    /// Show this part of the run in charts and animations, in seconds [default: of charts all of it or as
+    /// Show this part of the run in charts, animations and pages, in seconds [default: of charts all of it or as
     /// much as can be told apart, of animations the beginning]
     #[cfg(feature = "charts")]
     #[arg(long, value_name = "FROM..TO", value_parser = window, allow_hyphen_values = true, help_heading = "Files")]
@@ -302,6 +310,11 @@ pub struct SweepFlags {
     #[cfg(feature = "charts")]
     #[command(flatten)]
     pub charts: ChartFlags,
+    /// Write a page, `sweep.html`: a click on the chart shows the motion of that point, or of the nearest of
+    /// some that are kept
+    #[cfg(feature = "charts")]
+    #[arg(long, conflicts_with = "shard", help_heading = "Files")]
+    pub html: bool,
     /// Column of the table to draw over one or two varied values [default: flip_time]
     #[cfg(feature = "charts")]
     #[arg(long, value_name = "COLUMN", conflicts_with = "no_charts", help_heading = "Files")]
@@ -427,6 +440,10 @@ pub struct CompareFlags {
     #[cfg(feature = "charts")]
     #[command(flatten)]
     pub charts: ChartFlags,
+    /// Write a page, `compare.html`: points of the charts tell their settings
+    #[cfg(feature = "charts")]
+    #[arg(long, help_heading = "Files")]
+    pub html: bool,
 }
 
 /// How often checkpoints are written.
@@ -496,6 +513,31 @@ pub struct MergeFlags {
     pub tell: TellFlags,
 }
 
+/// `driftless view`.
+#[cfg(feature = "charts")]
+#[derive(Debug, Args)]
+pub struct ViewFlags {
+    /// Folders of runs, or folders that hold some; the first is shown in full, the others beside it
+    #[arg(value_name = "DIR", required = true)]
+    pub folders: Vec<PathBuf>,
+    /// Keep every row from this time on, in seconds, where a run is longer than a page can hold [default: the
+    /// start]
+    #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
+    pub from: Option<f64>,
+    /// Keep every row up to this time, in seconds
+    #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
+    pub to: Option<f64>,
+    /// Lay the reference solution of the first run beside it, integrated anew as exactly as can be
+    #[arg(long)]
+    pub reference: bool,
+    /// Folder of the page [default: the run's, or the one above several]
+    #[arg(long, value_name = "DIR", help_heading = "Files")]
+    pub out: Option<PathBuf>,
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub tell: TellFlags,
+}
+
 impl Flags {
     /// True where stdout is to hold one JSON object.
     pub fn is_json(&self) -> bool {
@@ -511,6 +553,8 @@ impl Flags {
             Command::Compare(flags) => flags.scene.tell.json,
             Command::Resume(flags) => flags.tell.json,
             Command::Merge(flags) => flags.tell.json,
+            #[cfg(feature = "charts")]
+            Command::View(flags) => flags.tell.json,
             Command::Stress(flags) => flags.tell.json,
             Command::Methods { json } => *json,
             Command::Schema | Command::Completions { .. } => false,

@@ -23,6 +23,8 @@ mod sensitivity;
 mod simulate;
 mod stress;
 mod sweep;
+#[cfg(feature = "charts")]
+mod view;
 
 pub use failure::Failure;
 pub use flags::{Flags, parse};
@@ -54,6 +56,8 @@ pub fn run(flags: &Flags) -> Result<(), Failure> {
         Command::Compare(flags) => compare::run(flags),
         Command::Resume(flags) => resume::run(flags),
         Command::Merge(flags) => merge::run(flags),
+        #[cfg(feature = "charts")]
+        Command::View(flags) => view::run(flags),
         Command::Stress(flags) => stress::run(flags),
         Command::Methods { json: true } => print_object(&report::methods::object()),
         Command::Methods { json: false } => print(&report::methods::text()),

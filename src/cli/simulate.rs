@@ -8,6 +8,8 @@ use super::progress::Progress;
 use super::resume::{Saved, Work};
 use crate::dynamics::Mechanism;
 use crate::report;
+#[cfg(feature = "charts")]
+use crate::report::view::{Gathering, Viewed};
 use crate::run::async_writer::AsyncWriter;
 use crate::run::files::{RECORD, TRAJECTORY};
 use crate::run::table::Table;
@@ -36,6 +38,7 @@ const FILES: &[&str] = &[
     "outputs.png",
     "columns.png",
     "mechanism.gif",
+    "run.html",
 ];
 
 /// A run that has ended.
@@ -68,6 +71,41 @@ struct Task<'a> {
     /// The scene's text and the command line, for checkpoints.
     text: &'a str,
     arguments: &'a [String],
+}
+
+/// The page of a run, where one is wanted; its rows are seen as they come, but for those of a run that goes
+/// on, which are read again at its end.
+#[derive(Default)]
+struct Pages {
+    #[cfg(feature = "charts")]
+    gathered: Option<Gathering>,
+}
+
+#[cfg(feature = "charts")]
+impl Pages {
+    fn see(&mut self, sample: &Sample) {
+        if let Some(gathered) = &mut self.gathered {
+            gathered.see(sample);
+        }
+    }
+
+    fn write(self, task: &Task<'_>, folder: &mut Folder) -> Result<(), Failure> {
+        let flags = task.flags;
+        if !flags.html {
+            return Ok(());
+        }
+        let run = Viewed::read(folder.path(), flags.window, self.gathered)?;
+        super::view::write(folder, &[run], &flags.scene.tell)
+    }
+}
+
+#[cfg(not(feature = "charts"))]
+impl Pages {
+    fn see(&mut self, _: &Sample) {}
+
+    fn write(self, _: &Task<'_>, _: &mut Folder) -> Result<(), Failure> {
+        Ok(())
+    }
 }
 
 /// Runs a scene, once for each stabilization given.
@@ -133,7 +171,7 @@ pub fn resume(
         Running::resume(Arc::clone(&mechanism), &mechanism.start(&scene), *snapshot)?.timed(wall_clock);
     let table = Table::going_on(&mechanism, folder.take_up(TRAJECTORY, &cursor)?);
     let task = Task { scene: &scene, mechanism: &mechanism, flags, text: &text, arguments: &arguments };
-    let done = vec![task.finish(running, AsyncWriter::new(table), folder, checkpoints)?];
+    let done = vec![task.finish(running, AsyncWriter::new(table), Pages::default(), folder, checkpoints)?];
     conclude(&scene, &mechanism, done, flags)
 }
 
@@ -179,6 +217,18 @@ impl Task<'_> {
         Ok(None)
     }
 
+    /// The page of a run that begins.
+    #[cfg(feature = "charts")]
+    fn page(&self, plan: &Plan) -> Pages {
+        let gathering = || Gathering::new(self.mechanism, plan.until, plan.every, self.flags.window);
+        Pages { gathered: self.flags.html.then(gathering) }
+    }
+
+    #[cfg(not(feature = "charts"))]
+    fn page(&self, _: &Plan) -> Pages {
+        Pages::default()
+    }
+
     /// Runs one plan in a folder of its own.
     fn run(&self, plan: Plan, folder: &str) -> Result<Done, Failure> {
         let Self { scene, mechanism, flags, .. } = *self;
@@ -196,11 +246,13 @@ impl Task<'_> {
         }
         let path = flags.out.join(&scene.name).join(folder);
         let folder = Folder::open(&path, flags.force)?;
+        let page = self.page(plan);
         let table = Table::new(mechanism, folder.begin(TRAJECTORY)?)
             .map_err(|error| folder.failed(TRAJECTORY, error.into()))?;
         self.finish(
             Running::new(run.timed(wall_clock)).windowed(window),
             AsyncWriter::new(table),
+            page,
             folder,
             Checkpoints::none(&path),
         )
@@ -211,12 +263,16 @@ impl Task<'_> {
         &self,
         mut running: Running,
         mut writer: AsyncWriter<Stream>,
+        mut page: Pages,
         mut folder: Folder,
         mut checkpoints: Checkpoints,
     ) -> Result<Done, Failure> {
-        let integrated = self.integrate(&mut running, &mut writer, &folder, &mut checkpoints);
-        let done =
-            integrated.and_then(|()| self.publish(self.with_inputs(running.finish())?, writer, &mut folder));
+        let integrated = self.integrate(&mut running, &mut writer, &mut page, &folder, &mut checkpoints);
+        let done = integrated.and_then(|()| {
+            let outcome = self.publish(self.with_inputs(running.finish())?, writer, &mut folder)?;
+            page.write(self, &mut folder)?;
+            Ok(outcome)
+        });
         let outcome = done.map_err(|failure| {
             let is_left = checkpoints.has_any() && failure.exit != Exit::Interrupted;
             if is_left { failure.with_checkpoint(folder.path()) } else { failure }
@@ -232,6 +288,7 @@ impl Task<'_> {
         &self,
         running: &mut Running,
         writer: &mut AsyncWriter<Stream>,
+        page: &mut Pages,
         folder: &Folder,
         checkpoints: &mut Checkpoints,
     ) -> Result<(), Failure> {
@@ -244,6 +301,7 @@ impl Task<'_> {
         loop {
             let mut observer = |sample: &Sample| {
                 writer.write(sample)?;
+                page.see(sample);
                 progress.see(sample.t);
                 Ok(())
             };
@@ -373,9 +431,15 @@ fn draw(
     Ok(())
 }
 
-/// Constraint drift of several runs in one chart, beside their folders.
+/// Several runs in one page, and their constraint drift in one chart, beside their folders.
 #[cfg(feature = "charts")]
 fn overlay(scene: &Scene, mechanism: &Mechanism, done: &[Done], flags: &RunFlags) -> Result<(), Failure> {
+    if flags.html && done.len() > 1 {
+        let read = |done: &Done| Viewed::read(done.folder.path(), flags.window, None);
+        let runs = done.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        let mut folder = Folder::shared(&flags.out.join(&scene.name))?;
+        super::view::write(&mut folder, &runs, &flags.scene.tell)?;
+    }
     let outcomes: Vec<&Outcome> = done.iter().map(|done| &done.outcome).collect();
     if done.len() < 2 || flags.charts.no_charts || !report::charts::drifts(&outcomes) {
         return Ok(());

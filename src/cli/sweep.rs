@@ -20,7 +20,7 @@ use crate::scene::{Template, points_that_stay, read_text, source_name};
 use serde::{Deserialize, Serialize};
 
 /// Every file a sweep may leave; those of an earlier one in the same folder go with it.
-pub const FILES: &[&str] = &[SWEEP, SWEEP_RECORD, PART, "map.png", "profile.png"];
+pub const FILES: &[&str] = &[SWEEP, SWEEP_RECORD, PART, "map.png", "profile.png", "sweep.html"];
 /// Longest name of a folder that is made of what is varied.
 const LONGEST: usize = 120;
 
@@ -197,7 +197,13 @@ impl Swept<'_> {
     ) -> Result<(), Failure> {
         #[cfg(feature = "charts")]
         if let (Some(curve), None) = (&self.curve, self.plan.shard()) {
-            draw(self.plan, curve, folder, _flags)?;
+            if !_flags.charts.no_charts {
+                draw(self.plan, curve, folder, _flags)?;
+            }
+            if _flags.html {
+                let page = report::view::swept(self.plan, curve, &self.totals);
+                super::view::keep(folder, "sweep.html", &page, &_flags.scene.tell)?;
+            }
         }
         let text = format!("{:#}\n", report::sweep::record(self.plan, &self.totals, table_sha256));
         Ok(folder.write(SWEEP_RECORD, text.as_bytes())?)
@@ -318,11 +324,15 @@ impl PointObserver for Writer<'_> {
 /// The chart, where there can be one; a column that was asked for must be there.
 #[cfg(feature = "charts")]
 fn curve(plan: &Sweep, flags: &SweepFlags) -> Result<Option<Curve>, Failure> {
-    if flags.charts.no_charts {
+    if flags.charts.no_charts && !flags.html {
         return Ok(None);
+    }
+    if flags.html {
+        report::view::holds(plan)?;
     }
     match Curve::new(plan, flags.map.as_deref()) {
         Ok(curve) => Ok(Some(curve)),
+        Err(reason) if flags.html => Err(Failure::new(Exit::Usage, format!("--html: {reason}"))),
         Err(reason) if flags.map.is_some() => Err(Failure::new(Exit::Usage, format!("--map: {reason}"))),
         Err(reason) => {
             flags.scene.remark(&format!("no chart: {reason}"));

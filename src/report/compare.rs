@@ -117,7 +117,7 @@ fn setting(plan: &Plan) -> String {
 }
 
 /// What to give to `run` for it.
-fn options(entry: &Entry) -> Option<String> {
+pub(super) fn options(entry: &Entry) -> Option<String> {
     let plan = entry.plan.as_ref()?;
     let value = match (plan.step, plan.tolerance) {
         (Some(step), _) => format!("--step {step}"),
@@ -245,13 +245,13 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, comparison: &Comparison) -> St
 }
 
 /// Whether a method appears with several stabilizations, which are then told by a letter.
-fn has_letters(comparison: &Comparison) -> bool {
+pub(super) fn has_letters(comparison: &Comparison) -> bool {
     let several = |a: &Entry, b: &Entry| a.method == b.method && a.stabilization != b.stabilization;
     comparison.entries.iter().any(|a| comparison.entries.iter().any(|b| several(a, b)))
 }
 
 /// `dp8 p 1e-9`, `gauss16 0.005`, `taylor+ 1e-20`.
-fn short(entry: &Entry, letters: bool) -> String {
+pub(super) fn short(entry: &Entry, letters: bool) -> String {
     let letter = match entry.stabilization.filter(|_| letters) {
         None => "",
         Some(Stabilization::None) => " n",
@@ -322,7 +322,7 @@ fn count(number: u64) -> String {
 }
 
 /// Settings of one method together, in the order of the table of methods.
-fn sorted(comparison: &Comparison) -> Vec<(usize, &Entry)> {
+pub(super) fn sorted(comparison: &Comparison) -> Vec<(usize, &Entry)> {
     let mut entries: Vec<(usize, &Entry)> = comparison.entries.iter().enumerate().collect();
     let place = |entry: &Entry| {
         let first = comparison.entries.iter().position(|other| other.name() == entry.name());

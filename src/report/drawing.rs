@@ -1,10 +1,14 @@
 //! A mechanism as charts draw it.
 
 use crate::arithmetic::Complex;
+#[cfg(feature = "charts")]
 use crate::chart::{HingeSketch, MotorPose, Pose, Sketch, SliderPose, SpringSketch, WallSketch, plain};
 use crate::dynamics::Mechanism;
+#[cfg(feature = "charts")]
 use crate::dynamics::compile::Joint;
-use crate::scene::{Load, NamedPoint, Place, Scene, Slider};
+#[cfg(feature = "charts")]
+use crate::scene::Slider;
+use crate::scene::{Load, NamedPoint, Place, Scene};
 
 /// A mechanism to draw.
 #[derive(Clone, Copy)]
@@ -15,7 +19,8 @@ pub(super) struct Drawing<'a> {
     pub mechanism: &'a Mechanism,
 }
 
-impl<'a> Drawing<'a> {
+#[cfg(feature = "charts")]
+impl Drawing<'_> {
     /// What the paths are of; none where there are none.
     pub fn title(&self) -> Option<String> {
         let names = self.names();
@@ -31,61 +36,7 @@ impl<'a> Drawing<'a> {
 
     /// Names of the points whose paths are drawn, or of the bodies whose ends they are, with markup.
     pub fn names(&self) -> Vec<String> {
-        let traced = self.traced().len();
-        if self.points().next().is_some() {
-            return self.points().take(traced).map(|point| plain(&point.name)).collect();
-        }
-        self.leaves().iter().take(traced).map(|&body| plain(&self.mechanism.bodies[body].name)).collect()
-    }
-
-    /// Up to four bodies that no other hangs on, of which the far ends move and are not that of another among
-    /// them.
-    pub fn leaves(&self) -> Vec<usize> {
-        let hangs = &self.mechanism.forest.hangs;
-        let mut leaves: Vec<usize> = Vec::new();
-        for k in 0..self.mechanism.own_bodies().len() {
-            let has_path =
-                !self.is_joined(k, None) && leaves.iter().all(|&leaf| !self.is_joined(k, Some(leaf)));
-            if has_path && hangs.iter().all(|hang| hang.origin_point.parent() != Some(k)) {
-                leaves.push(k);
-            }
-        }
-        leaves.truncate(4);
-        leaves
-    }
-
-    /// Whether a hinge joins the far end of a bar with the far end of another, or with the ground.
-    fn is_joined(&self, bar: usize, other: Option<usize>) -> bool {
-        let is_end = |place: &Place, bar: Option<usize>| {
-            let Some(bar) = bar else { return place.bar.is_none() };
-            let ([x, y], [end_x, end_y]) = (place.point, self.far_end(bar).point);
-            place.bar == Some(bar) && (x - end_x).hypot(y - end_y) < 1e-9 * end_x.hypot(end_y)
-        };
-        self.scene.hinges.iter().any(|hinge| {
-            let [a, b] = &hinge.between;
-            is_end(a, Some(bar)) && is_end(b, other) || is_end(b, Some(bar)) && is_end(a, other)
-        })
-    }
-
-    /// The far end of a bar.
-    fn far_end(&self, bar: usize) -> Place {
-        let [origin, end] = self.mechanism.bodies[bar].ends;
-        Place { bar: Some(bar), point: [(end - origin).re, (end - origin).im] }
-    }
-
-    /// The scene's points on bodies.
-    pub fn points(&self) -> impl Iterator<Item = &NamedPoint> {
-        self.scene.points.iter().filter(|point| point.place.bar.is_some())
-    }
-
-    /// Up to four places whose paths are drawn: the scene's points, and where it has none the far ends of
-    /// bars that no other hangs on.
-    pub fn traced(&self) -> Vec<Place> {
-        let points: Vec<Place> = self.points().map(|point| point.place).take(4).collect();
-        if !points.is_empty() {
-            return points;
-        }
-        self.leaves().into_iter().map(|bar| self.far_end(bar)).collect()
+        self.plain_names().into_iter().map(plain).collect()
     }
 
     /// Where a place is (x, y) \[m\].
@@ -163,9 +114,70 @@ impl<'a> Drawing<'a> {
             points: self.points().map(|point| place(&point.place)).collect(),
         }
     }
+}
+
+impl Drawing<'_> {
+    /// Names of the points whose paths are drawn, or of the bodies whose ends they are.
+    pub fn plain_names(&self) -> Vec<&str> {
+        let traced = self.traced().len();
+        if self.points().next().is_some() {
+            return self.points().take(traced).map(|point| point.name.as_str()).collect();
+        }
+        self.leaves().iter().take(traced).map(|&body| self.mechanism.bodies[body].name.as_str()).collect()
+    }
+
+    /// Up to four bodies that no other hangs on, of which the far ends move and are not that of another among
+    /// them.
+    pub fn leaves(&self) -> Vec<usize> {
+        let hangs = &self.mechanism.forest.hangs;
+        let mut leaves: Vec<usize> = Vec::new();
+        for k in 0..self.mechanism.own_bodies().len() {
+            let has_path =
+                !self.is_joined(k, None) && leaves.iter().all(|&leaf| !self.is_joined(k, Some(leaf)));
+            if has_path && hangs.iter().all(|hang| hang.origin_point.parent() != Some(k)) {
+                leaves.push(k);
+            }
+        }
+        leaves.truncate(4);
+        leaves
+    }
+
+    /// Whether a hinge joins the far end of a bar with the far end of another, or with the ground.
+    fn is_joined(&self, bar: usize, other: Option<usize>) -> bool {
+        let is_end = |place: &Place, bar: Option<usize>| {
+            let Some(bar) = bar else { return place.bar.is_none() };
+            let ([x, y], [end_x, end_y]) = (place.point, self.far_end(bar).point);
+            place.bar == Some(bar) && (x - end_x).hypot(y - end_y) < 1e-9 * end_x.hypot(end_y)
+        };
+        self.scene.hinges.iter().any(|hinge| {
+            let [a, b] = &hinge.between;
+            is_end(a, Some(bar)) && is_end(b, other) || is_end(b, Some(bar)) && is_end(a, other)
+        })
+    }
+
+    /// The far end of a bar.
+    fn far_end(&self, bar: usize) -> Place {
+        let [origin, end] = self.mechanism.bodies[bar].ends;
+        Place { bar: Some(bar), point: [(end - origin).re, (end - origin).im] }
+    }
+
+    /// The scene's points on bodies.
+    pub fn points(&self) -> impl Iterator<Item = &NamedPoint> {
+        self.scene.points.iter().filter(|point| point.place.bar.is_some())
+    }
+
+    /// Up to four places whose paths are drawn: the scene's points, and where it has none the far ends of
+    /// bars that no other hangs on.
+    pub fn traced(&self) -> Vec<Place> {
+        let points: Vec<Place> = self.points().map(|point| point.place).take(4).collect();
+        if !points.is_empty() {
+            return points;
+        }
+        self.leaves().into_iter().map(|bar| self.far_end(bar)).collect()
+    }
 
     /// The ends of all springs, those by formulas last.
-    fn springs(&self) -> impl Iterator<Item = [Place; 2]> {
+    pub fn springs(&self) -> impl Iterator<Item = [Place; 2]> {
         let laws = self.scene.laws.iter().filter_map(|law| match &law.load {
             Load::Spring { between, .. } => Some(*between),
             _ => None,
@@ -175,7 +187,7 @@ impl<'a> Drawing<'a> {
 
     /// What joins the origin of a bar with its hinges, spring ends and points that lie off it, counted from its
     /// origin \[m\].
-    fn arms(&self) -> impl Iterator<Item = (usize, [Complex<f64>; 2])> {
+    pub fn arms(&self) -> impl Iterator<Item = (usize, [Complex<f64>; 2])> {
         let hinges = self.scene.hinges.iter().flat_map(|hinge| hinge.between);
         let points = self.points().map(|point| point.place);
         hinges.chain(self.springs().flatten()).chain(points).filter_map(|place| {
@@ -189,12 +201,13 @@ impl<'a> Drawing<'a> {
 }
 
 /// The direction of a slider's rail, of any length.
+#[cfg(feature = "charts")]
 fn along(slider: &Slider, z: &[Complex<f64>]) -> Complex<f64> {
     let along = Complex::new(slider.rail.direction[0], slider.rail.direction[1]);
     slider.rail.place.bar.map_or(along, |bar| along * z[bar])
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "charts"))]
 mod tests {
     use super::*;
     use crate::scene::read_scene;

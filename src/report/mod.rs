@@ -20,6 +20,7 @@
 //! | [`compare`] | methods compared, with charts | `compare.rs` |
 //! | [`trust`] | how far a run may be trusted | `trust.rs` |
 //! | [`methods`] | the table of methods | `methods.rs` |
+//! | `view` | runs, as a page to look at | `view.rs`, with the feature `charts` |
 //! | `charts` | a run, in pictures | `charts.rs`, with the feature `charts` |
 
 #[doc(hidden)]
@@ -31,12 +32,13 @@ pub mod check;
 pub mod compare;
 #[cfg(feature = "charts")]
 mod curves;
-#[cfg(feature = "charts")]
 mod drawing;
 pub mod events;
 #[cfg(feature = "fit")]
 pub mod fit;
 mod friction;
+#[doc(hidden)]
+pub mod geometry;
 mod inputs;
 #[doc(hidden)]
 pub mod inspect;
@@ -61,6 +63,9 @@ pub mod stress;
 pub mod sweep;
 #[doc(hidden)]
 pub mod trust;
+#[doc(hidden)]
+#[cfg(feature = "charts")]
+pub mod view;
 
 use crate::run::Plan;
 use serde_json::{Value, json};

@@ -168,6 +168,21 @@ pub struct Curve {
     failed: Vec<bool>,
 }
 
+/// What the chart of a sweep says beside its points.
+#[cfg(feature = "charts")]
+#[derive(Debug)]
+pub(super) struct Labels {
+    pub title: String,
+    pub caption: Vec<String>,
+    /// What is shown, with its unit.
+    pub value: String,
+    pub axes: Vec<MapAxis>,
+    pub is_log: bool,
+    pub is_flip: bool,
+    /// What a point without a number means.
+    pub never: String,
+}
+
 /// Why there is no chart of a column.
 #[cfg(feature = "charts")]
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -250,16 +265,20 @@ impl Curve {
         self.failed.push(matches!(point.status, Status::Stopped(_) | Status::Refused(_)));
     }
 
-    /// Draws what was seen.
-    ///
-    /// # Errors
-    /// Drawing fails; `Ok` with the reason where there is nothing to show.
-    pub fn draw(&self, sweep: &Sweep) -> Result<Result<Picture, NoChart>, ChartError> {
+    /// The numbers of all points so far; NaN where there is none.
+    pub(super) fn values(&self) -> &[f64] {
+        &self.seen
+    }
+
+    /// Which points stopped or were refused.
+    pub(super) fn failed(&self) -> &[bool] {
+        &self.failed
+    }
+
+    /// What its chart says.
+    pub(super) fn labels(&self, sweep: &Sweep) -> Labels {
         let names = results(sweep);
         let is_flip = self.column.is_none_or(|column| column + 1 == names.len());
-        if is_flip && self.seen.iter().all(|time| time.is_nan()) {
-            return Ok(Err(NoChart::Nothing(listed(sweep))));
-        }
         let name = if is_flip {
             "flip time [s]".to_owned()
         } else {
@@ -292,7 +311,22 @@ impl Curve {
             if sweep.grid().count() == 1 { "point" } else { "points" },
             figure(plan.until)
         ));
-        let log = is_flip || names[self.column.unwrap_or_default()].contains("drift") || name == "steps";
+        let is_log = is_flip || names[self.column.unwrap_or_default()].contains("drift") || name == "steps";
+        let never =
+            if is_flip { format!("not within {} s", figure(plan.until)) } else { "no value".to_owned() };
+        Labels { title, caption, value: name, axes, is_log, is_flip, never }
+    }
+
+    /// Draws what was seen.
+    ///
+    /// # Errors
+    /// Drawing fails; `Ok` with the reason where there is nothing to show.
+    pub fn draw(&self, sweep: &Sweep) -> Result<Result<Picture, NoChart>, ChartError> {
+        let Labels { title, mut caption, value: name, axes, is_log: log, is_flip, never } =
+            self.labels(sweep);
+        if is_flip && self.seen.iter().all(|time| time.is_nan()) {
+            return Ok(Err(NoChart::Nothing(listed(sweep))));
+        }
         let picture = match &axes[..] {
             [x, y] => {
                 let cells = self.seen.iter().zip(&self.failed).map(|(&value, &failed)| {
@@ -302,11 +336,6 @@ impl Curve {
                         (true, false) => Cell::Never,
                     }
                 });
-                let never = if is_flip {
-                    format!("not within {} s", figure(plan.until))
-                } else {
-                    "no value".to_owned()
-                };
                 let words = [never, "left out".to_owned(), "stopped or refused".to_owned()];
                 let (x, y, cells) = (x.clone(), y.clone(), cells.collect());
                 chart::map(
@@ -327,12 +356,7 @@ impl Curve {
             }
             _ => {
                 if self.seen.iter().any(|value| value.is_nan()) {
-                    let without = if is_flip {
-                        format!("not within {} s", figure(plan.until))
-                    } else {
-                        "no value".to_owned()
-                    };
-                    caption.push(format!("dots on the upper edge: {without}"));
+                    caption.push(format!("dots on the upper edge: {never}"));
                 }
                 let values = (0..sweep.grid().count()).map(|index| sweep.grid().values(index)[0]).collect();
                 let x_name = axes.first().map(|axis| axis.name.clone()).unwrap_or_default();

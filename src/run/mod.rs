@@ -74,6 +74,8 @@ pub mod sweep;
 #[doc(hidden)]
 #[cfg(feature = "files")]
 pub mod table;
+#[cfg(feature = "files")]
+pub mod table_reader;
 #[doc(hidden)]
 pub mod trace;
 pub(crate) mod trajectory;

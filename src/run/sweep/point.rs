@@ -11,10 +11,10 @@ use crate::run::drift::larger;
 use crate::run::driver::MOST_TURNS;
 use crate::run::flip::{self, Flip};
 use crate::run::methods::MethodId;
-use crate::run::plan::Plan;
+use crate::run::plan::{Plan, Request};
 use crate::run::running::{Run, Running};
 use crate::run::trust::Level;
-use crate::scene::StartValue;
+use crate::scene::{Scene, StartValue};
 use crate::stepping::taylor::batch::{Batch, BatchMember, Going, Passage};
 use crate::stepping::{Cause, StepError};
 use std::f64::consts::PI;
@@ -82,6 +82,23 @@ impl Sweep {
         } else {
             None
         }
+    }
+
+    /// The scene, the equations and the plan of a point, with about so many `rows`; steps and tolerances are
+    /// those of the sweep.
+    ///
+    /// # Errors
+    /// With its values there is no scene, or no plan: the reason.
+    pub fn run_of(&self, index: u64, rows: f64) -> Result<(Scene, Arc<Mechanism>, Plan), String> {
+        let values = self.grid.values(index);
+        let scene = self.template.filled(&self.variables, &values).map_err(|error| error.to_string())?;
+        let mechanism = Arc::new(Mechanism::new(&scene).map_err(|error| error.to_string())?);
+        let planned =
+            |request: &Request| Plan::new(&scene, &mechanism, request).map_err(|refusal| refusal.to_string());
+        let plan = planned(&timed(&self.request, &scene))?;
+        let every = plan.until / rows;
+        let plan = planned(&Request { every: Some(every), step: plan.step, ..self.request.clone() })?;
+        Ok((scene, mechanism, plan))
     }
 
     /// Runs points; tells of each that is `finished`, and gives up where all `is_over`.

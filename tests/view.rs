@@ -1,0 +1,148 @@
+//! `driftless view` and `run --html`: which pages are written where, and what is refused.
+
+use crate::program::Program;
+
+fn with_run(arguments: &str) -> Program {
+    let program = Program::with_scenes(&["motor", "free"]);
+    let until = if arguments.contains("--until") { "" } else { "--until 1" };
+    program.run(&format!("run motor.json {until} --no-charts -q {arguments}")).exits(0);
+    program
+}
+
+#[test]
+fn a_page_stands_beside_its_run() {
+    let program = with_run("--html --method dp5 --stabilize projection,none");
+    let files = program.files();
+    for file in [
+        "output/motor/dp5-1e-9-none/run.html",
+        "output/motor/dp5-1e-9-projection/run.html",
+        "output/motor/runs.html",
+    ] {
+        assert!(files.contains(&file.to_owned()), "{files:?}");
+    }
+    let page = program.read("output/motor/dp5-1e-9-none/run.html");
+    assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>\n"));
+}
+
+#[test]
+fn the_page_of_a_run_is_that_of_its_folder() {
+    for more in ["", "--until 2000 --every 0.02 --trust off --window 7..8"] {
+        let program = with_run(&format!("--html --method dp8 --rtol 1e-8 {more}"));
+        let folder = "output/motor/dp8-1e-8-elimination";
+        let live = program.read(&format!("{folder}/run.html"));
+        let window = if more.is_empty() { "" } else { "--from 7 --to 8" };
+        program.run(&format!("view {folder} -q {window}")).exits(0);
+        let read = program.read(&format!("{folder}/run.html"));
+        assert!(live == read, "the rows seen and the rows read make different pages: {more}");
+    }
+}
+
+#[test]
+fn folders_that_hold_runs_are_shown_with_all_of_them() {
+    let program = with_run("--method dp5");
+    program.run("run motor.json --until 1 --no-charts -q --method dp8").exits(0);
+    let told = program.run("view output/motor --json").exits(0).object();
+    assert_eq!(told["runs"].as_array().map(Vec::len), Some(2));
+    assert!(program.files().contains(&"output/motor/runs.html".to_owned()));
+    program.run("run free.json --until 1 --no-charts -q --method dp5").exits(0);
+    let two = "output/motor/dp5-1e-9-elimination output/free/dp5-1e-9";
+    program.run(&format!("view {two}")).exits(2).says(&["several folders", "--out"]);
+    program.run(&format!("view {two} --out pages -q")).exits(0);
+    assert!(program.files().contains(&"pages/runs.html".to_owned()));
+}
+
+#[test]
+fn what_is_no_run_is_refused() {
+    let program = with_run("--method dp5");
+    let folder = "output/motor/dp5-1e-9-elimination";
+    program.run("view examples").exits(6).says(&["examples holds no run", "hint: `driftless run SCENE`"]);
+    program.run(&format!("view {folder} --from 2 --to 1")).exits(2).says(&["--from 2 --to 1", "hint"]);
+    program.run(&format!("view {folder} --from nan")).exits(2);
+    program.run("view").exits(2);
+    let table = program.read(&format!("{folder}/trajectory.csv"));
+    for (from, to, words) in [
+        ("bar1.phi", "bar9.phi", "column 2: `bar9.phi [rad]` stands where `bar1.phi [rad]` belongs"),
+        ("\n0.0,", "\nnought,", "trajectory.csv:2: t [s]: `nought` is no number"),
+        ("\n0.0,", "\n0.0,1,", "trajectory.csv:2: 22 fields, 21 columns"),
+    ] {
+        program.write(&format!("{folder}/trajectory.csv"), &table.replacen(from, to, 1));
+        program.run(&format!("view {folder}")).exits(6).says(&[words]);
+    }
+    program.write(&format!("{folder}/trajectory.csv"), &table);
+    let record = program.read(&format!("{folder}/run.json"));
+    for (from, to, words) in [
+        ("{", "", "run.json: "),
+        ("resolved_scene", "scene", "no entry `resolved_scene`"),
+        ("\"bar2\"", "\"bar1\"", "run.json"),
+    ] {
+        program.write(&format!("{folder}/run.json"), &record.replace(from, to));
+        program.run(&format!("view {folder}")).exits(6).says(&[words]);
+    }
+    assert!(!program.files().iter().any(|file| file.ends_with(".html")), "no page of a refused run");
+}
+
+#[test]
+fn a_run_that_went_on_has_the_page_of_one_that_was_not_interrupted() {
+    let program = Program::with_scenes(&["motor"]);
+    let run = "run motor.json --until 200 --every 0.01 --method gauss4 --step 1e-4 --no-charts -q --html --trust off --checkpoint-every 0.05";
+    let mut child = program.command(run).spawn().expect("the program");
+    let is_checkpoint = |file: &String| file.ends_with("/checkpoint.previous");
+    let folder = loop {
+        if let Some(file) = program.files().into_iter().find(is_checkpoint) {
+            break file.rsplit_once('/').expect("a folder").0.to_owned();
+        }
+        assert!(child.try_wait().expect("a child").is_none(), "it ended before its second checkpoint");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    };
+    child.kill().and_then(|()| child.wait()).expect("killed");
+    program.run(&format!("resume {folder} -q")).exits(0);
+    let resumed = program.read(&format!("{folder}/run.html"));
+    program.run(&format!("view {folder} -q")).exits(0);
+    assert!(resumed == program.read(&format!("{folder}/run.html")));
+}
+
+#[test]
+fn a_run_and_its_reference_share_a_page() {
+    let program = with_run("--method dp5 --rtol 1e-6");
+    let folder = "output/motor/dp5-1e-6-elimination";
+    program.run(&format!("view {folder} --reference -q")).exits(0);
+    assert!(program.files().contains(&format!("{folder}/runs.html")));
+    let again = program.read(&format!("{folder}/runs.html"));
+    program.run(&format!("view {folder} --reference -q")).exits(0);
+    assert!(again == program.read(&format!("{folder}/runs.html")), "the same bytes every time");
+}
+
+#[test]
+fn sweeps_and_comparisons_have_pages() {
+    let program = Program::with_scenes(&["free"]);
+    let folder = "output/free/sweep-start.bar1.phi-taylor-1e-9";
+    let sweep = "sweep free.json --until 1 --vary bar1.phi=0..2:5 -q --html";
+    program.run(&format!("{sweep} --no-charts")).exits(0);
+    let files = program.files();
+    assert!(files.contains(&format!("{folder}/sweep.html")), "{files:?}");
+    assert!(!files.iter().any(|file| file.ends_with(".png")), "{files:?}");
+    let page = program.read(&format!("{folder}/sweep.html"));
+    assert!(page.contains("\"cells\":[0,1,2,3,4]"), "all motions are kept where points are few");
+    program.run("compare free.json --until 0.5 --budget 1 --methods dp5 --no-charts -q --html").exits(0);
+    assert!(program.files().contains(&"output/free/compare/compare.html".to_owned()));
+}
+
+#[test]
+fn sweeps_that_no_page_can_show_are_refused() {
+    let program = Program::with_scenes(&["free"]);
+    let three = "--vary bar1.phi=0..1:2 --vary bar2.phi=0..1:2 --vary bar1.omega=0..1:2";
+    program
+        .run(&format!("sweep free.json --until 1 {three} --html"))
+        .exits(2)
+        .says(&["--html: 3 values are varied"]);
+    program
+        .run("sweep free.json --until 1 --vary bar1.phi=0..1:4 --shard 1/2 --html")
+        .exits(2)
+        .says(&["--shard"]);
+    let many = "--vary bar1.phi=0..1:2048 --vary bar2.phi=0..1:2048";
+    program
+        .run(&format!("sweep free.json --until 1 {many} --html"))
+        .exits(2)
+        .says(&["--html: 4194304 points are more than a page can hold (1048576)", "hint"]);
+    assert!(!program.files().iter().any(|file| file.starts_with("output/")), "{:?}", program.files());
+}
