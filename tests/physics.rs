@@ -47,6 +47,8 @@ mod laws;
 mod linkage_scenes;
 mod linkages;
 mod looped;
+#[cfg(feature = "digits")]
+mod many_digits;
 mod metamorphic;
 mod modes;
 mod moving_walls;

@@ -29,6 +29,8 @@ mod charts;
 mod choices;
 mod command_line;
 mod compare;
+#[cfg(feature = "digits")]
+mod digits_program;
 mod estimates;
 mod fuzz;
 mod growth;

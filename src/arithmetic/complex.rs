@@ -2,7 +2,7 @@
 //!
 //! Own, because it has to work over every [`Scalar`]; the few operations the equations use.
 
-use super::Scalar;
+use super::{Over, Scalar};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
 /// `re + i im`; as a vector of the plane `(x, y)`.
@@ -24,10 +24,13 @@ impl<T: Scalar> Complex<T> {
         Self { re, im }
     }
 
-    /// From plain components, exactly.
+    /// From constant components, exactly.
     #[inline(always)]
-    pub fn of(value: Complex<f64>) -> Self {
-        Self { re: T::of(value.re), im: T::of(value.im) }
+    pub fn of<C>(value: Complex<C>) -> Self
+    where
+        T: Over<C>,
+    {
+        Self { re: T::constant(value.re), im: T::constant(value.im) }
     }
 
     /// The unit vector at an angle \[rad\].
@@ -55,13 +58,13 @@ impl<T: Scalar> Complex<T> {
         Self { re: self.re * factor, im: self.im * factor }
     }
 
-    /// Product with a plain complex constant.
+    /// Product with a complex constant.
     #[inline(always)]
-    pub fn turn(self, by: Complex<f64>) -> Self {
-        Self {
-            re: self.re.scale(by.re) - self.im.scale(by.im),
-            im: self.re.scale(by.im) + self.im.scale(by.re),
-        }
+    pub fn turn<C: Copy>(self, by: Complex<C>) -> Self
+    where
+        T: Over<C>,
+    {
+        Self { re: self.re.by(by.re) - self.im.by(by.im), im: self.re.by(by.im) + self.im.by(by.re) }
     }
 
     /// Dot product of two vectors, `Re(conj(a) b)`.

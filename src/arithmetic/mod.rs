@@ -1,8 +1,9 @@
 //! Numbers: the scalar trait the physics is written over, and the exact building blocks of long sums.
 //!
 //! Every formula of [`dynamics`](crate::dynamics) is written once over [`Scalar`] and evaluated on `f64`
-//! (inner loops), on [`DoubleDouble`] (monitors, references), on [`Dual`] numbers (Jacobians), and on
-//! [`Eight`](eight::Eight) lanes and their [`Pairs`](pairs::Pairs) (stages of implicit methods).
+//! (inner loops), on [`DoubleDouble`] (monitors, references), on [`Dual`] numbers (Jacobians), on
+//! [`Eight`](eight::Eight) lanes and their [`Pairs`](pairs::Pairs) (stages of implicit methods), and on
+//! numbers of any number of digits (module `digits`), whose constants have as many: [`Over`].
 //!
 //! Two rules keep the bits the same on every machine: trigonometry comes from pure Rust (the `libm` crate, or
 //! our own series in lanes and in double-double), and a fused multiply-add is written as one wherever it is
@@ -13,6 +14,9 @@
 pub mod angle;
 #[doc(hidden)]
 pub mod complex;
+#[cfg(feature = "digits")]
+#[doc(hidden)]
+pub mod digits;
 #[doc(hidden)]
 pub mod double_double;
 #[doc(hidden)]
@@ -111,10 +115,36 @@ pub trait Scalar:
     }
 }
 
+/// A scalar that constants of the kind `C` go with: doubles with every scalar, numbers of many digits with
+/// their own.
+pub trait Over<C>: Scalar {
+    /// The constant itself.
+    fn constant(value: C) -> Self;
+
+    /// The product with a constant.
+    fn by(self, factor: C) -> Self;
+}
+
+impl<T: Scalar> Over<f64> for T {
+    #[inline(always)]
+    fn constant(value: f64) -> Self {
+        T::of(value)
+    }
+
+    #[inline(always)]
+    fn by(self, factor: f64) -> Self {
+        self.scale(factor)
+    }
+}
+
 /// A scalar with an order and a nearest `f64`.
 pub trait Real: Scalar + PartialOrd {
     /// True for `f64` itself, for which there are kernels of lanes.
     const IS_PLAIN: bool;
+    /// True for numbers of many digits, whose sums of products are rounded once.
+    const IS_LONG: bool = false;
+    /// Share of its scale below which the pivot of a constraint counts as zero.
+    const DROPPED: f64 = 1e-8;
 
     /// The nearest `f64`.
     fn value(self) -> f64;
@@ -124,6 +154,12 @@ pub trait Real: Scalar + PartialOrd {
 
     /// The number as a double-double, exactly.
     fn double_double(self) -> DoubleDouble;
+
+    /// Σ a b.
+    #[inline]
+    fn sum_of_products<'a>(terms: impl Iterator<Item = (&'a Self, &'a Self)> + Clone) -> Self {
+        terms.fold(Self::ZERO, |sum, (&a, &b)| sum + a * b)
+    }
 
     /// Magnitude.
     fn abs(self) -> Self {

@@ -1,6 +1,11 @@
 //! The command line: one table that is parser, help and completions.
 
+#[cfg(feature = "digits")]
+mod digits;
 mod study;
+
+#[cfg(feature = "digits")]
+pub use self::digits::DigitsFlags;
 pub use study::{FitFlags, SensitivityFlags};
 
 #[cfg(feature = "charts")]
@@ -203,6 +208,10 @@ pub struct RunFlags {
     /// than --effort)
     #[arg(long, value_name = "HOW", value_parser = levels(), default_value = Level::Auto.name(), help_heading = "Trust")]
     pub trust: Level,
+    #[allow(missing_docs)]
+    #[cfg(feature = "digits")]
+    #[command(flatten)]
+    pub digits: DigitsFlags,
     /// Tell what the last digit of every number comes to, as it is written in the scene or in --set (0.25 is
     /// uncertain by 0.005, 670 by 0.5; 0, pi/2 and defaults are exact), in a table: two to four runs for each
     /// number

@@ -6,6 +6,8 @@
 mod charts;
 mod check;
 mod compare;
+#[cfg(feature = "digits")]
+mod digits;
 #[doc(hidden)]
 pub mod failure;
 mod fit;

@@ -30,6 +30,9 @@ pub enum Work {
     Run(Box<Snapshot>),
     /// A sweep: what its points seen so far amount to, and its chart so far.
     Sweep(Totals, Option<Vec<u8>>),
+    /// A run in many digits, and the proof beside it.
+    #[cfg(feature = "digits")]
+    Digits(Box<super::digits::Snapshot>),
 }
 
 /// Levels of folders that are searched for interrupted runs.
@@ -69,6 +72,16 @@ pub fn run(flags: &ResumeFlags) -> Result<(), Failure> {
             run.scene.tell = flags.tell.clone();
             run.checkpoints = flags.checkpoints.clone();
             simulate::resume(&run, saved, flags.until, folder, checkpoints)
+        }
+        #[cfg(feature = "digits")]
+        (Command::Run(mut run), Work::Digits(_)) => {
+            if flags.until.is_some() || flags.max_evaluations.is_some() {
+                let text = "--until and --max-evaluations: a run in many digits goes on as it was begun\nhint: leave them out";
+                return Err(Failure::new(Exit::Usage, text));
+            }
+            run.scene.tell = flags.tell.clone();
+            run.checkpoints = flags.checkpoints.clone();
+            super::digits::resume(&run, saved, folder, checkpoints)
         }
         (Command::Sweep(_), Work::Sweep(..)) if flags.until.is_some() => Err(Failure::new(
             Exit::Usage,

@@ -49,7 +49,7 @@ struct Done {
 }
 
 /// The overrides as they were typed, with all their digits; none where the command line does not show them.
-fn typed(arguments: &[String], set: &[Override]) -> Vec<String> {
+pub(super) fn typed(arguments: &[String], set: &[Override]) -> Vec<String> {
     let mut found = Vec::new();
     let mut arguments = arguments.iter();
     while let Some(argument) = arguments.next() {
@@ -114,6 +114,10 @@ impl Pages {
 /// The scene, a plan, a folder, the method or a limit; files of what was reached are kept.
 pub fn run(flags: &RunFlags, arguments: &[String]) -> Result<(), Failure> {
     interrupt::listen()?;
+    #[cfg(feature = "digits")]
+    if flags.digits.is_asked() {
+        return super::digits::run(flags, arguments);
+    }
     if flags.inputs && flags.trust == Level::Off {
         let text = "--inputs with --trust off: effects are told up to the horizon, which is not estimated then\nhint: leave --trust out";
         return Err(Failure::new(Exit::Usage, text));

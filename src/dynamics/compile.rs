@@ -1,6 +1,8 @@
 //! Scene to mechanism: the hinge trees, their constant matrices, the rows, and what the scene does not need
 //! left out.
 
+#[cfg(feature = "digits")]
+pub mod exact;
 mod parts;
 
 use super::Motion;
@@ -20,11 +22,11 @@ use super::quadratic::Quadratic;
 use super::recursive::Recursion;
 use super::tree::Tree;
 use super::units::Units;
-use crate::arithmetic::Complex;
+use crate::arithmetic::{Complex, Real};
 use crate::scene::{Place, Scene};
 pub(super) use parts::along_wall;
 pub(super) use parts::travel_along;
-use parts::{actions, follows, give_aims, given_angles, joints, kept_angles, slide, travel};
+use parts::{actions, follows, give_aims, given_angles, joints, kept_angles};
 use std::sync::Arc;
 
 /// The largest number of coordinates for which the matrices of the tree are made; they hold n² numbers.
@@ -122,26 +124,26 @@ pub(crate) struct Laws {
 
 /// A body of the mechanism.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Body {
+pub struct Body<C = f64> {
     /// Name in the scene.
     pub name: String,
     /// Mass \[kg\].
-    pub mass: f64,
+    pub mass: C,
     /// Moment of inertia about the centre of mass \[kg·m²\].
-    pub inertia: f64,
+    pub inertia: C,
     /// Centre of mass, counted from the body's origin, in its frame \[m\].
-    pub centre: Complex<f64>,
+    pub centre: Complex<C>,
     /// Both ends of the bar, likewise, for drawings \[m\].
-    pub ends: [Complex<f64>; 2],
+    pub ends: [Complex<C>; 2],
 }
 
 /// A hinge or weld.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Joint {
+pub struct Joint<C = f64> {
     /// Name in the scene.
     pub name: String,
     /// Where it is: a body and a point counted from its origin, in its frame, or a point of the ground \[m\].
-    pub at: (Option<usize>, Complex<f64>),
+    pub at: (Option<usize>, Complex<C>),
     /// The body that hangs on it; `None` where it closes a loop.
     pub outer: Option<usize>,
     /// The first of the two rows that close the loop.
@@ -327,15 +329,7 @@ impl Mechanism {
         }
         let forest = Forest::new(scene);
         let n = forest.coordinates;
-        let bodies: Vec<Body> = (scene.bars.iter().zip(&forest.hangs))
-            .map(|(bar, hang)| Body {
-                name: bar.name.clone(),
-                mass: bar.mass,
-                inertia: bar.inertia,
-                centre: Complex::new(bar.centre[0], bar.centre[1]) - hang.own,
-                ends: [-hang.own, Complex::new(bar.length, 0.0) - hang.own],
-            })
-            .collect();
+        let bodies = parts::bodies(scene, &forest);
         let gravity = Complex::new(scene.gravity[0], scene.gravity[1]);
         let mut forces = forces;
         let laws = match Formulas::of(scene, &forest)? {
@@ -352,37 +346,11 @@ impl Mechanism {
         let partition = CoordinatePartition::new(bodies.len(), n, &rows)?;
         let joints = joints(scene, &forest, &mut rows);
         let frictions = frictions(scene, &forest, &joints);
-        scene.sliders.iter().for_each(|slider| rows.push(slide(&forest, slider)));
-        for drive in &scene.drives {
-            rows.push(travel(&forest, &drive.name, &scene.sliders[drive.slider], drive.law.clone()));
-        }
-        for coupling in &scene.couplings {
-            rows.push(follows(&forest, coupling, scene));
-        }
-        for spring in scene.springs.iter().filter(|spring| spring.rigid) {
-            let [a, b] = spring.between.each_ref().map(|place| forest.site(place));
-            rows.push(constraint::rod_equation(&spring.name, &a, &b, spring.free_length, bodies.len()));
-        }
-        let springs = (scene.springs.iter().filter(|spring| !spring.rigid))
-            .map(|spring| Spring {
-                name: spring.name.clone(),
-                bodies: [spring.between[0].bar, spring.between[1].bar],
-                span: forest.point(&spring.between[0]).minus(&forest.point(&spring.between[1])),
-                stiffness: spring.stiffness,
-                free_length: spring.free_length,
-                damping: spring.damping,
-            })
-            .collect();
-        let torsions = (scene.torsion_springs.iter())
-            .map(|torsion| Torsion {
-                name: torsion.name.clone(),
-                body: torsion.bar,
-                base: torsion.relative_to,
-                stiffness: torsion.stiffness,
-                free_angle: torsion.free_angle,
-                damping: torsion.damping,
-            })
-            .collect();
+        rows.extend(parts::guides(scene, &forest));
+        rows.extend(scene.couplings.iter().map(|coupling| follows(&forest, coupling, scene)));
+        rows.extend(parts::rods(scene, &forest));
+        let springs = parts::springs(scene, &forest);
+        let torsions = parts::torsions(scene);
         let contacts: Vec<Contact> = (scene.walls.iter())
             .map(|wall| {
                 let normal = Complex::new(wall.normal[0], wall.normal[1]);
@@ -881,17 +849,26 @@ impl Switches {
 
 /// H, d and the weights.
 fn constants(bodies: &[Body], forest: &Forest, gravity: Complex<f64>) -> Tree {
-    let n = forest.coordinates;
-    if n > DENSE_LIMIT {
+    if forest.coordinates > DENSE_LIMIT {
         return long_constants(bodies, forest, gravity);
     }
+    dense_constants(bodies, forest, gravity)
+}
+
+/// The same with H.
+pub(super) fn dense_constants<C: Real>(
+    bodies: &[Body<C>],
+    forest: &Forest<C>,
+    gravity: Complex<C>,
+) -> Tree<C> {
+    let n = forest.coordinates;
     let mut coupling = vec![Complex::ZERO; n * n];
-    let mut diagonal: Vec<f64> = bodies.iter().map(|body| body.inertia).collect();
-    diagonal.resize(n, 0.0);
+    let mut diagonal: Vec<C> = bodies.iter().map(|body| body.inertia).collect();
+    diagonal.resize(n, C::ZERO);
     let mut weight = vec![Complex::ZERO; n];
     for (k, body) in bodies.iter().enumerate() {
         let centre = forest.walk(k, body.centre);
-        let carried = centre.shifts.iter().map(|&(x, share)| (x, Complex::new(share, 0.0)));
+        let carried = centre.shifts.iter().map(|&(x, share)| (x, Complex::new(C::of(share), C::ZERO)));
         let terms: Vec<_> = centre.terms.iter().copied().chain(carried).collect();
         for (place, &(i, gamma)) in terms.iter().enumerate() {
             diagonal[i] += body.mass * gamma.norm_squared();
@@ -901,7 +878,7 @@ fn constants(bodies: &[Body], forest: &Forest, gravity: Complex<f64>) -> Tree {
             }
         }
     }
-    let off_axis = coupling.iter().any(|h| h.im != 0.0);
+    let off_axis = coupling.iter().any(|h| h.im != C::ZERO);
     Tree { coordinates: n, angles: bodies.len(), coupling, diagonal, weight, off_axis }
 }
 

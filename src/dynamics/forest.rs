@@ -6,21 +6,21 @@
 
 use super::constraint::Site;
 use super::point::Point;
-use crate::arithmetic::{Complex, Scalar};
+use crate::arithmetic::{Complex, Over, Real, Scalar};
 use crate::scene::{Place, Scene};
 
 /// Where the origin of a body is: the point it hangs on, from which its points are counted.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum BodyOrigin {
+pub enum BodyOrigin<C = f64> {
     /// A point of the ground \[m\].
-    Ground(Complex<f64>),
+    Ground(Complex<C>),
     /// A point of another body, counted from that body's origin \[m\].
-    On(usize, Complex<f64>),
+    On(usize, Complex<C>),
     /// A point that moves freely, with coordinates x and the one after it.
     Free(usize),
 }
 
-impl BodyOrigin {
+impl<C> BodyOrigin<C> {
     /// The body it is on.
     pub fn parent(&self) -> Option<usize> {
         if let Self::On(parent, _) = self { Some(*parent) } else { None }
@@ -29,18 +29,18 @@ impl BodyOrigin {
 
 /// How a body hangs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hang {
+pub struct Hang<C = f64> {
     /// Its origin.
-    pub origin_point: BodyOrigin,
+    pub origin_point: BodyOrigin<C>,
     /// The origin in the body's own frame \[m\].
-    pub own: Complex<f64>,
+    pub own: Complex<C>,
 }
 
 /// The forest of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Forest {
+pub struct Forest<C = f64> {
     /// How each body hangs.
-    pub hangs: Vec<Hang>,
+    pub hangs: Vec<Hang<C>>,
     /// The bodies, each after the one it hangs on.
     pub order: Vec<usize>,
     /// The body that hangs on each hinge, then on each weld; `None` where it closes a loop.
@@ -49,11 +49,11 @@ pub struct Forest {
     pub coordinates: usize,
 }
 
-impl Forest {
+impl<C: Real> Forest<C> {
     /// The forest of a scene's hinges and welds.
-    pub fn new(scene: &Scene) -> Self {
+    pub fn new(scene: &Scene<C>) -> Self {
         let n = scene.bars.len();
-        let joints: Vec<&[Place; 2]> = scene
+        let joints: Vec<&[Place<C>; 2]> = scene
             .hinges
             .iter()
             .map(|hinge| &hinge.between)
@@ -69,7 +69,7 @@ impl Forest {
                 at[slot(place.bar)].push(joint);
             }
         }
-        let mut hangs: Vec<Option<Hang>> = vec![None; n];
+        let mut hangs: Vec<Option<Hang<C>>> = vec![None; n];
         let mut outer = vec![None; joints.len()];
         let (mut order, mut coordinates) = (Vec::with_capacity(n), n);
         for root in std::iter::once(None).chain((0..n).map(Some)) {
@@ -103,7 +103,7 @@ impl Forest {
     }
 
     /// A place of the scene as a point, by walking up the tree.
-    pub fn point(&self, place: &Place) -> Point {
+    pub fn point(&self, place: &Place<C>) -> Point<C> {
         match place.bar {
             None => Point::ground(place.point),
             Some(bar) => self.walk(bar, Complex::new(place.point[0], place.point[1]) - self.hangs[bar].own),
@@ -111,7 +111,7 @@ impl Forest {
     }
 
     /// A point of a body, `offset` from its origin in its frame \[m\].
-    pub fn walk(&self, body: usize, offset: Complex<f64>) -> Point {
+    pub fn walk(&self, body: usize, offset: Complex<C>) -> Point<C> {
         let mut path = vec![(body, offset)];
         let mut origin_point = self.hangs[body].origin_point;
         while let BodyOrigin::On(parent, offset) = origin_point {
@@ -130,13 +130,13 @@ impl Forest {
     }
 
     /// A place with the body it is on.
-    pub fn site(&self, place: &Place) -> Site {
+    pub fn site(&self, place: &Place<C>) -> Site<C> {
         Site { body: place.bar, point: self.point(place) }
     }
 
     /// The ground point that each body hangs from, one body on another; the origin where an origin moves
     /// freely \[m\].
-    pub fn roots(&self) -> Vec<Complex<f64>> {
+    pub fn roots(&self) -> Vec<Complex<C>> {
         let mut roots = vec![Complex::ZERO; self.hangs.len()];
         for &body in &self.order {
             roots[body] = match self.hangs[body].origin_point {
@@ -150,7 +150,7 @@ impl Forest {
 
     /// Writes the translational coordinates of all bodies at the elements `z`, outwards \[m\].
     #[inline(always)]
-    pub fn translations<T: Scalar>(&self, z: &[Complex<T>], translations: &mut [Complex<T>]) {
+    pub fn translations<T: Over<C>>(&self, z: &[Complex<T>], translations: &mut [Complex<T>]) {
         for &body in &self.order {
             translations[body] = match self.hangs[body].origin_point {
                 BodyOrigin::Ground(at) => Complex::of(at),
@@ -162,7 +162,7 @@ impl Forest {
 
     /// Writes the velocities of the translational coordinates \[m/s\].
     #[inline(always)]
-    pub fn origin_velocities<T: Scalar>(
+    pub fn origin_velocities<T: Over<C>>(
         &self,
         z: &[Complex<T>],
         omega: &[T],
@@ -180,7 +180,7 @@ impl Forest {
     }
 
     /// Writes the accelerations of the translational coordinates \[m/s²\].
-    pub fn origin_accelerations<T: Scalar>(
+    pub fn origin_accelerations<T: Over<C>>(
         &self,
         z: &[Complex<T>],
         omega: &[T],

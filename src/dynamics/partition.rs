@@ -15,11 +15,11 @@ use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar, angle};
 
 /// How one body's angle follows from the coordinates.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct DependentAngle {
+pub struct DependentAngle<C = f64> {
     /// The coordinate it moves with; `None`: driven from the ground.
     pub base: Option<usize>,
     /// Laws to be added, with their sign.
-    pub laws: Vec<(f64, Law)>,
+    pub laws: Vec<(f64, Law<C>)>,
 }
 
 impl DependentAngle {
@@ -69,24 +69,24 @@ impl DependentAngle {
 
 /// All ties of a mechanism.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct CoordinatePartition {
+pub struct CoordinatePartition<C = f64> {
     /// Number of angles.
     pub angles: usize,
     /// One a body, then one a coordinate of an origin.
-    pub bodies: Vec<DependentAngle>,
+    pub bodies: Vec<DependentAngle<C>>,
     /// The body whose angle each independent coordinate is, or the coordinate of an origin.
     pub independent: Vec<usize>,
     /// How many rows it was made of, the first ones.
     given: usize,
 }
 
-impl CoordinatePartition {
+impl<C: Real> CoordinatePartition<C> {
     /// Walks the given angles outwards from the ground and from the first body of every group left;
     /// translational coordinates are coordinates of their own.
     pub(super) fn new(
         bodies: usize,
         coordinates: usize,
-        rows: &[ConstraintEquation],
+        rows: &[ConstraintEquation<C>],
     ) -> Result<Self, CompileError> {
         let given: Vec<_> = (rows.iter())
             .filter_map(|row| match (&row.measure, &row.law) {
@@ -100,7 +100,7 @@ impl CoordinatePartition {
             at[slot(base)].push(g);
             at[slot(Some(body))].push(g);
         }
-        let mut partition: Vec<Option<DependentAngle>> = vec![None; bodies];
+        let mut partition: Vec<Option<DependentAngle<C>>> = vec![None; bodies];
         let mut used = vec![false; given.len()];
         let mut independent = Vec::new();
         for root in std::iter::once(None).chain((0..bodies).map(Some)) {
@@ -130,7 +130,7 @@ impl CoordinatePartition {
                 }
             }
         }
-        let mut partition: Vec<DependentAngle> =
+        let mut partition: Vec<DependentAngle<C>> =
             partition.into_iter().map(Option::unwrap_or_default).collect();
         for origin_point in bodies..coordinates {
             partition.push(DependentAngle { base: Some(independent.len()), laws: Vec::new() });
@@ -147,7 +147,7 @@ impl CoordinatePartition {
     }
 
     /// The same with the laws that these rows have now.
-    pub(super) fn renewed(&self, rows: &[ConstraintEquation]) -> Result<Self, CompileError> {
+    pub(super) fn renewed(&self, rows: &[ConstraintEquation<C>]) -> Result<Self, CompileError> {
         Self::new(self.angles, self.bodies.len(), &rows[..self.given])
     }
 
@@ -174,11 +174,6 @@ impl CoordinatePartition {
     /// True where some angle is driven.
     pub fn driven(&self) -> bool {
         self.bodies.iter().any(|dependent_angle| !dependent_angle.laws.is_empty())
-    }
-
-    /// True where no driven angle accelerates.
-    pub fn is_steady(&self) -> bool {
-        self.bodies.iter().flat_map(|dependent_angle| &dependent_angle.laws).all(|(_, law)| law.is_steady())
     }
 
     /// Adds S u' to `rate`: the rates \[rad/s\] of all bodies.
@@ -226,6 +221,13 @@ impl CoordinatePartition {
     /// Rates u' \[rad/s\] of the coordinates in a motion.
     pub(super) fn coordinate_rates(&self, motion: &Motion) -> Vec<DoubleDouble> {
         self.independent.iter().map(|&body| motion.omega[body]).collect()
+    }
+}
+
+impl CoordinatePartition {
+    /// True where no driven angle accelerates.
+    pub fn is_steady(&self) -> bool {
+        self.bodies.iter().flat_map(|dependent_angle| &dependent_angle.laws).all(|(_, law)| law.is_steady())
     }
 
     /// A state whose first unknowns are the coordinates of a motion.

@@ -10,22 +10,22 @@
 //! a force F at P has the generalized force Im(conj(z_k) conj(gamma_k) F) on body k, and ± F on zeta_f
 //! ```
 
-use crate::arithmetic::{Complex, Scalar};
+use crate::arithmetic::{Complex, Over, Real};
 
 /// A point, or the difference of two points.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Point {
+pub struct Point<C = f64> {
     /// The constant part p0 \[m\].
-    pub root: Complex<f64>,
+    pub root: Complex<C>,
     /// Body and gamma_k \[m\], in rising order of the bodies.
-    pub terms: Vec<(usize, Complex<f64>)>,
+    pub terms: Vec<(usize, Complex<C>)>,
     /// First coordinate of an origin that moves freely, and how often it counts: 1, or -1.
     pub shifts: Vec<(usize, f64)>,
 }
 
-impl Point {
+impl<C: Real> Point<C> {
     /// A point of the ground.
-    pub fn ground(at: [f64; 2]) -> Self {
+    pub fn ground(at: [C; 2]) -> Self {
         Self { root: Complex::new(at[0], at[1]), ..Self::default() }
     }
 
@@ -35,7 +35,7 @@ impl Point {
     }
 
     /// The point `offset` \[m, in the body's directions\] away on body `body`.
-    pub fn along(&self, body: usize, offset: Complex<f64>) -> Self {
+    pub fn along(&self, body: usize, offset: Complex<C>) -> Self {
         let mut point = self.clone();
         match point.terms.binary_search_by_key(&body, |term| term.0) {
             Ok(i) => point.terms[i].1 += offset,
@@ -69,19 +69,19 @@ impl Point {
     }
 
     /// gamma of a body, zero where the point does not depend on it.
-    pub fn gamma(&self, body: usize) -> Complex<f64> {
+    pub fn gamma(&self, body: usize) -> Complex<C> {
         self.terms.binary_search_by_key(&body, |term| term.0).map_or(Complex::ZERO, |i| self.terms[i].1)
     }
 
     /// P \[m\] at the elements `z`.
     #[inline(always)]
-    pub fn position<T: Scalar>(&self, z: &[Complex<T>]) -> Complex<T> {
+    pub fn position<T: Over<C>>(&self, z: &[Complex<T>]) -> Complex<T> {
         self.sum(Complex::of(self.root), z)
     }
 
     /// P' \[m/s\].
     #[inline(always)]
-    pub fn velocity<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
+    pub fn velocity<T: Over<C>>(&self, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
         let turned = self
             .terms
             .iter()
@@ -93,20 +93,20 @@ impl Point {
 
     /// P'' at zero angular acceleration \[m/s²\].
     #[inline(always)]
-    pub fn convective<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
+    pub fn convective<T: Over<C>>(&self, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
         self.terms
             .iter()
             .fold(Complex::ZERO, |sum, &(k, gamma)| sum - z[k].turn(gamma).times(omega[k] * omega[k]))
     }
 
     /// P'' \[m/s²\].
-    pub fn acceleration<T: Scalar>(&self, z: &[Complex<T>], omega: &[T], alpha: &[T]) -> Complex<T> {
+    pub fn acceleration<T: Over<C>>(&self, z: &[Complex<T>], omega: &[T], alpha: &[T]) -> Complex<T> {
         self.velocity(z, alpha) + self.convective(z, omega)
     }
 
     /// The force \[N·m, N\] on each element, of a force \[N\] that acts here.
     #[inline(always)]
-    pub fn spread<T: Scalar>(&self, force: Complex<T>, mut each: impl FnMut(usize, Complex<T>)) {
+    pub fn spread<T: Over<C>>(&self, force: Complex<T>, mut each: impl FnMut(usize, Complex<T>)) {
         for &(k, gamma) in &self.terms {
             each(k, force.turn(gamma.conj()));
         }
@@ -117,19 +117,19 @@ impl Point {
 
     /// P without its constant part, of one power of a series of the elements.
     #[inline(always)]
-    pub fn turned<T: Scalar>(&self, z: &[Complex<T>]) -> Complex<T> {
+    pub fn turned<T: Over<C>>(&self, z: &[Complex<T>]) -> Complex<T> {
         self.sum(Complex::ZERO, z)
     }
 
     #[inline(always)]
-    fn sum<T: Scalar>(&self, start: Complex<T>, z: &[Complex<T>]) -> Complex<T> {
+    fn sum<T: Over<C>>(&self, start: Complex<T>, z: &[Complex<T>]) -> Complex<T> {
         let turned = self.terms.iter().fold(start, |sum, &(k, gamma)| sum + z[k].turn(gamma));
         self.shifts.iter().fold(turned, |sum, &(x, share)| sum + z[x].times(T::of(share)))
     }
 
     /// Adds the generalized forces \[N m\] of a force \[N\] that acts here.
     #[inline(always)]
-    pub fn pull<T: Scalar>(&self, force: Complex<T>, z: &[Complex<T>], load: &mut [T]) {
+    pub fn pull<T: Over<C>>(&self, force: Complex<T>, z: &[Complex<T>], load: &mut [T]) {
         for &(k, gamma) in &self.terms {
             load[k] += z[k].turn(gamma).cross(force);
         }

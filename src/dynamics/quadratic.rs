@@ -12,26 +12,26 @@
 
 use super::constraint::{Linearised, Posture};
 use super::point::Point;
-use crate::arithmetic::{Complex, Real, Scalar};
+use crate::arithmetic::{Complex, Over, Real};
 
 /// A quadratic function of unit vectors and translational coordinates \[m\].
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Quadratic {
+pub struct Quadratic<C = f64> {
     /// Number of angles: elements from this one on are translational coordinates.
     pub angles: usize,
     /// c \[m\].
-    pub constant: f64,
+    pub constant: C,
     /// Element and g_k \[m; 1 for an origin\].
-    pub linear: Vec<(usize, Complex<f64>)>,
+    pub linear: Vec<(usize, Complex<C>)>,
     /// Elements j and k, and h_jk.
-    pub bilinear: Vec<(usize, usize, Complex<f64>)>,
+    pub bilinear: Vec<(usize, usize, Complex<C>)>,
 }
 
-impl Quadratic {
+impl<C: Real> Quadratic<C> {
     /// Re(conj(n) P): how far a point is along a direction of the ground.
-    pub fn along(point: &Point, direction: Complex<f64>, angles: usize) -> Self {
+    pub fn along(point: &Point<C>, direction: Complex<C>, angles: usize) -> Self {
         let turning = point.terms.iter().map(|&(k, gamma)| (k, gamma.conj() * direction));
-        let carried = point.shifts.iter().map(|&(x, share)| (x, direction.times(share)));
+        let carried = point.shifts.iter().map(|&(x, share)| (x, direction.times(C::of(share))));
         Self {
             angles,
             constant: direction.dot(point.root),
@@ -41,7 +41,7 @@ impl Quadratic {
     }
 
     /// Re(conj(d z_b) D): how far a vector reaches along a direction d of body b.
-    pub fn along_body(span: &Point, body: usize, direction: Complex<f64>, angles: usize) -> Self {
+    pub fn along_body(span: &Point<C>, body: usize, direction: Complex<C>, angles: usize) -> Self {
         let turned = direction.conj();
         let mut found = Self { angles, linear: vec![(body, turned * span.root)], ..Self::default() };
         for &(k, gamma) in &span.terms {
@@ -51,27 +51,27 @@ impl Quadratic {
                 false => found.bilinear.push((body, k, turned * gamma)),
             }
         }
-        found.bilinear.extend(span.shifts.iter().map(|&(x, share)| (body, x, turned.times(share))));
+        found.bilinear.extend(span.shifts.iter().map(|&(x, share)| (body, x, turned.times(C::of(share)))));
         found.linear.retain(|term| term.1 != Complex::ZERO);
         found
     }
 
     /// share |D|² of a vector.
-    pub fn square(span: &Point, share: f64, angles: usize) -> Self {
-        let carried = span.shifts.iter().map(|&(x, times)| (x, Complex::new(times, 0.0)));
+    pub fn square(span: &Point<C>, share: C, angles: usize) -> Self {
+        let carried = span.shifts.iter().map(|&(x, times)| (x, Complex::new(C::of(times), C::ZERO)));
         let terms: Vec<_> = span.terms.iter().copied().chain(carried).collect();
         let mut found = Self { angles, constant: share * span.root.norm_squared(), ..Self::default() };
         for (place, &(j, gamma)) in terms.iter().enumerate() {
-            found.linear.push((j, (gamma.conj() * span.root).times(2.0 * share)));
+            found.linear.push((j, (gamma.conj() * span.root).times(C::of(2.0) * share)));
             // |z_j| = 1.
             match j < angles {
                 true => found.constant += share * gamma.norm_squared(),
-                false => found.bilinear.push((j, j, Complex::new(share * gamma.norm_squared(), 0.0))),
+                false => found.bilinear.push((j, j, Complex::new(share * gamma.norm_squared(), C::ZERO))),
             }
             let others = terms[place + 1..].iter();
             found
                 .bilinear
-                .extend(others.map(|&(k, other)| (j, k, (gamma.conj() * other).times(2.0 * share))));
+                .extend(others.map(|&(k, other)| (j, k, (gamma.conj() * other).times(C::of(2.0) * share))));
         }
         found.linear.retain(|term| term.1 != Complex::ZERO);
         found
@@ -86,15 +86,17 @@ impl Quadratic {
 
     /// Q at the elements `z`.
     #[inline]
-    pub fn value<T: Scalar>(&self, z: &[Complex<T>]) -> T {
-        let linear =
-            self.linear.iter().fold(T::of(self.constant), |sum, &(k, g)| sum + Complex::of(g).dot(z[k]));
+    pub fn value<T: Over<C>>(&self, z: &[Complex<T>]) -> T {
+        let linear = self
+            .linear
+            .iter()
+            .fold(T::constant(self.constant), |sum, &(k, g)| sum + Complex::of(g).dot(z[k]));
         self.bilinear.iter().fold(linear, |sum, &(j, k, h)| sum + z[j].dot(z[k].turn(h)))
     }
 
     /// Gradients, element by element; an element may come up more than once.
     #[inline]
-    pub fn gradients<T: Scalar>(&self, z: &[Complex<T>], mut each: impl FnMut(usize, Complex<T>)) {
+    pub fn gradients<T: Over<C>>(&self, z: &[Complex<T>], mut each: impl FnMut(usize, Complex<T>)) {
         for &(k, g) in &self.linear {
             each(k, Complex::of(g));
         }
@@ -106,7 +108,7 @@ impl Quadratic {
 
     /// Parts of dQ/dq, coordinate by coordinate; a coordinate may come up more than once.
     #[inline]
-    pub fn slopes<T: Scalar>(&self, z: &[Complex<T>], mut each: impl FnMut(usize, T)) {
+    pub fn slopes<T: Over<C>>(&self, z: &[Complex<T>], mut each: impl FnMut(usize, T)) {
         self.gradients(z, |k, gradient| {
             if k < self.angles {
                 each(k, gradient.dot(z[k].left()));
@@ -119,7 +121,7 @@ impl Quadratic {
 
     /// Q'' at zero acceleration.
     #[inline]
-    pub fn convective<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> T {
+    pub fn convective<T: Over<C>>(&self, z: &[Complex<T>], omega: &[T]) -> T {
         let mut sum = T::ZERO;
         self.gradients(z, |k, gradient| {
             if k < self.angles {
@@ -134,13 +136,13 @@ impl Quadratic {
 
     /// What a row with C = Q - s(t) is at this posture, without s; adds its Jacobian to `jacobian`.
     #[inline]
-    pub fn linearise<T: Real>(&self, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
+    pub fn linearise<T: Real + Over<C>>(&self, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
         Linearised { position: self.value(at.z), ..self.differentiate(at, jacobian) }
     }
 
     /// The same without Q itself.
     #[inline]
-    pub fn differentiate<T: Real>(&self, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
+    pub fn differentiate<T: Real + Over<C>>(&self, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
         self.slopes(at.z, |k, slope| jacobian[k] += slope);
         Linearised { position: T::ZERO, drive: T::ZERO, convective: self.convective(at.z, at.omega) }
     }

@@ -20,7 +20,7 @@ use super::tree::{self, Tree, size};
 use crate::arithmetic::Real;
 
 /// Share below which a row is left out.
-pub const DROPPED: f64 = 1e-8;
+pub const DROPPED: f64 = f64::DROPPED;
 /// Share below which a position counts as near a singular one.
 pub const NEAR: f64 = 1e-2;
 
@@ -48,7 +48,7 @@ impl Weakest {
         if share < self.share {
             *self = Self { share, row, is_delicate: false, is_near: false };
         }
-        if share < DROPPED || scale == 0.0 { T::ZERO } else { T::ONE / pivot }
+        if share < T::DROPPED || scale == 0.0 { T::ZERO } else { T::ONE / pivot }
     }
 
     /// The same where it is known whether the row is left out.

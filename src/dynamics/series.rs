@@ -27,7 +27,10 @@
 mod action;
 mod bodywise;
 mod coefficient;
+mod doubles;
 mod drive;
+#[cfg(feature = "digits")]
+mod long;
 pub mod polynomial;
 mod rows;
 mod spring;
@@ -36,30 +39,28 @@ mod work_integral;
 
 use self::action::ActionSeries;
 use self::bodywise::Bodywise;
-pub use self::coefficient::Coefficient;
+pub use self::coefficient::{Coefficient, Constants, SeriesNumber, Terms};
 pub use self::drive::powers;
-use self::polynomial::{Fractions, UNROLLED, convolve, copy, copy_vectors, width, zeros};
+use self::polynomial::{Fractions, UNROLLED, convolve, width, zeros};
 use self::rows::RowSeries;
 use self::spring::SpringSeries;
 use self::user::{At, UserSeries};
-use super::constraint::Measure;
-use super::impact::{AWAY, Contact};
+use super::Coordinates;
 use super::partition::CoordinatePartition;
 use super::schur::{self, Weakest};
-use super::tree::{self, size};
-use super::{Coordinates, Mechanism, Time};
-use crate::arithmetic::{Complex, DoubleDouble, Real};
+use super::tree::{self, Tree, size};
+use crate::arithmetic::Complex;
 
 /// Power series of a motion about one time; nothing is allocated after [`Series::new`].
 #[derive(Clone, Debug)]
-pub struct Series<T> {
+pub struct Series<T: SeriesNumber> {
     /// Highest power P of the rates.
     order: usize,
     /// Number of elements n, of which so many are unit vectors; the others are translational coordinates, at
     /// the places of their x.
     elements: usize,
     angles: usize,
-    partition: CoordinatePartition,
+    partition: CoordinatePartition<T::Constant>,
     /// False where the coordinates are the bodies' angles themselves.
     is_tied: bool,
     fractions: Fractions<T>,
@@ -98,19 +99,24 @@ pub struct Series<T> {
     /// What stands in place of the matrices where the mechanism is evaluated body by body; they are empty
     /// then.
     bodywise: Option<Box<Bodywise<T>>>,
+    /// Limbs that powers of the rates are kept to; none where numbers have none.
+    limbs: Vec<usize>,
 }
 
-impl<T: Coefficient> Series<T> {
-    /// Room for series of a mechanism in some coordinates up to this power of the rates, at least 2.
-    pub fn new(mechanism: &Mechanism, coordinates: Coordinates, order: usize) -> Self {
+impl<T: SeriesNumber> Series<T> {
+    /// Room for series of the terms of a mechanism in some coordinates up to this power of the rates, at least
+    /// 2.
+    pub fn of_terms(terms: &Terms<T::Constant>, coordinates: Coordinates, order: usize) -> Self {
+        let mechanism = terms.structure;
         let n = mechanism.coordinates();
         let partition = if coordinates == Coordinates::Independent {
-            mechanism.partition.clone()
+            terms.partition.clone()
         } else {
             CoordinatePartition::free(mechanism)
         };
         let f = partition.count();
-        let bodywise = Bodywise::new(mechanism, order).filter(|_| !partition.driven()).map(Box::new);
+        let is_bodywise = !T::IS_LONG && !partition.driven();
+        let bodywise = is_bodywise.then(|| Bodywise::new(mechanism, order)).flatten().map(Box::new);
         let matrix = |size: usize| zeros(if bodywise.is_some() { 0 } else { size });
         Self {
             order,
@@ -127,11 +133,11 @@ impl<T: Coefficient> Series<T> {
             torque: zeros(order * n),
             applied: zeros(order * n),
             phi: zeros(n),
-            actions: mechanism.actions.iter().map(|action| ActionSeries::new(action, order)).collect(),
-            forces: mechanism.forces.iter().map(|force| UserSeries::new(force, order)).collect(),
+            actions: terms.actions.iter().map(|action| ActionSeries::new(action, order)).collect(),
+            forces: terms.forces.iter().map(|force| UserSeries::new(force, order)).collect(),
             time: T::ZERO,
-            springs: mechanism.springs.iter().map(|spring| SpringSeries::new(spring, order)).collect(),
-            rows: RowSeries::new(mechanism, &partition, order, bodywise.is_none()),
+            springs: terms.springs.iter().map(|spring| SpringSeries::new(spring, order)).collect(),
+            rows: RowSeries::new(terms, &partition, order, bodywise.is_none()),
             turned: vec![Complex::ZERO; n],
             bend: vec![Complex::ZERO; n],
             load: zeros(n),
@@ -141,8 +147,14 @@ impl<T: Coefficient> Series<T> {
             pivot: matrix(f.max(n)),
             solution: zeros(f),
             bodywise,
+            limbs: Vec::new(),
             partition,
         }
+    }
+
+    /// Keeps coefficients of long numbers to so many limbs each, power by power of the rates.
+    pub fn keep(&mut self, limbs: Vec<usize>) {
+        self.limbs = limbs;
     }
 
     /// Highest power of the rates.
@@ -155,78 +167,19 @@ impl<T: Coefficient> Series<T> {
         self.partition.count()
     }
 
-    /// Expands the motion through coordinates `u` \[rad\] (leading part and rest) and rates `u_rate`
+    /// Expands the motion of terms through coordinates `u` \[rad\] (leading part and rest) and rates `u_rate`
     /// \[rad/s\] at time `t`.
-    pub fn expand(&mut self, mechanism: &Mechanism, t: Time, u: &[T], u_rest: &[T], u_rate: &[T]) {
-        self.law_series(mechanism, t);
-        T::begin(self, t, u, u_rest, u_rate);
-        T::orders(self, mechanism, 0);
-    }
-
-    /// Expands a motion whose first powers were found in more digits; they are rounded, and the later ones
-    /// follow from them.
-    pub fn carry_on(
+    pub fn expand_terms(
         &mut self,
-        mechanism: &Mechanism,
-        t: Time,
+        terms: &Terms<T::Constant>,
+        t: T::Time,
         u: &[T],
         u_rest: &[T],
         u_rate: &[T],
-        first: &Series<DoubleDouble>,
     ) {
-        self.law_series(mechanism, t);
+        self.law_series(terms, t);
         T::begin(self, t, u, u_rest, u_rate);
-        copy_vectors(&mut self.z, &first.z);
-        copy(&mut self.omega, &first.omega);
-        copy(&mut self.rate, &first.rate);
-        copy(&mut self.power, &first.power);
-        copy_vectors(&mut self.rest, &first.rest);
-        copy(&mut self.torque, &first.torque);
-        copy(&mut self.applied, &first.applied);
-        for (action, first) in self.actions.iter_mut().zip(&first.actions) {
-            action.take(first);
-        }
-        for (spring, first) in self.springs.iter_mut().zip(&first.springs) {
-            spring.take(first);
-        }
-        for (force, first) in self.forces.iter_mut().zip(&first.forces) {
-            force.take(first);
-        }
-        self.rows.take(&first.rows);
-        T::orders(self, mechanism, first.order.min(self.order));
-    }
-
-    /// Powers 0, 1, … of the gap of a wall over the length of its contact \[1/s^m\], to that of the unit
-    /// vectors.
-    pub fn gap(&self, contact: &Contact, t: Time, powers: &mut Vec<f64>) {
-        powers.clear();
-        let Measure::Place(place) = &contact.row.measure else { return };
-        if contact.is_off {
-            powers.extend([AWAY, 0.0]);
-            return;
-        }
-        let n = self.elements.max(1);
-        let elements = self.z.chunks_exact(self.elements.max(1));
-        powers.extend(elements.map(|z| {
-            place.linear.iter().fold(T::ZERO, |sum, &(k, g)| sum + Complex::of(g).dot(z[k])).value()
-        }));
-        // Lines of the ground are linear; those of bodies have products beside.
-        for &(j, k, h) in &place.bilinear {
-            for (m, power) in powers.iter_mut().enumerate() {
-                let term = |l: usize| self.z[l * n + j].dot(self.z[(m - l) * n + k].turn(h));
-                *power += (0..=m).fold(T::ZERO, |sum, l| sum + term(l)).value();
-            }
-        }
-        if let Some(law) = &contact.row.law {
-            let moved = drive::powers(law, t, powers.len());
-            for (power, moved) in powers.iter_mut().zip(moved) {
-                *power -= moved;
-            }
-        }
-        if let Some(first) = powers.first_mut() {
-            *first += place.constant;
-        }
-        powers.iter_mut().for_each(|power| *power /= contact.length);
+        T::orders(self, terms, 0);
     }
 
     /// The row in force nearest to being left out at the start.
@@ -235,11 +188,11 @@ impl<T: Coefficient> Series<T> {
     }
 
     /// The series of what forces are multiplied by.
-    fn law_series(&mut self, mechanism: &Mechanism, t: Time) {
-        for (series, action) in self.actions.iter_mut().zip(&mechanism.actions) {
+    fn law_series(&mut self, terms: &Terms<T::Constant>, t: T::Time) {
+        for (series, action) in self.actions.iter_mut().zip(terms.actions) {
             series.begin(action, t);
         }
-        self.time = T::split(t).0;
+        self.time = T::moment(t);
     }
 
     /// Power `m`, below the order, of the multipliers of the rows in force \[N, N·m over s^m\]: all rows, or
@@ -249,7 +202,7 @@ impl<T: Coefficient> Series<T> {
     }
 
     /// Power zero, and the laws' series.
-    fn begin(&mut self, t: Time, u: &[T], u_rest: &[T], u_rate: &[T]) {
+    fn begin(&mut self, t: T::Time, u: &[T], u_rest: &[T], u_rate: &[T]) {
         let (n, angles) = (self.elements, self.angles);
         self.rate[..u.len()].copy_from_slice(u_rate);
         if self.is_tied {
@@ -266,9 +219,9 @@ impl<T: Coefficient> Series<T> {
                 self.omega[i] = u_rate[base];
             }
             for (sign, law) in &dependent_angle.laws {
-                let phase = law.at::<T>(t);
+                let phase = T::phase(law, t);
                 z = z * if *sign > 0.0 { phase.unit } else { phase.unit.conj() };
-                drive::add(law, *sign, t, &mut self.drive, i, n);
+                T::add_law(law, *sign, t, &mut self.drive, i, n);
             }
             self.omega[i] += self.drive[i];
             self.z[i] = z;
@@ -282,27 +235,27 @@ impl<T: Coefficient> Series<T> {
 
     /// The powers from `first` on, by the code for this number of bodies where there is one: in double-double
     /// the arithmetic outweighs the loops.
-    fn sized_orders(&mut self, mechanism: &Mechanism, first: usize) {
+    fn sized_orders(&mut self, terms: &Terms<T::Constant>, first: usize) {
         if !T::IS_PLAIN {
-            return self.orders::<0>(mechanism, first);
+            return self.orders::<0>(terms, first);
         }
         match if self.angles == self.elements && self.bodywise.is_none() { self.angles } else { 0 } {
-            1 => self.orders::<1>(mechanism, first),
-            2 => self.orders::<2>(mechanism, first),
-            3 => self.orders::<3>(mechanism, first),
-            4 => self.orders::<4>(mechanism, first),
-            5 => self.orders::<5>(mechanism, first),
-            6 => self.orders::<6>(mechanism, first),
-            _ => self.orders::<0>(mechanism, first),
+            1 => self.orders::<1>(terms, first),
+            2 => self.orders::<2>(terms, first),
+            3 => self.orders::<3>(terms, first),
+            4 => self.orders::<4>(terms, first),
+            5 => self.orders::<5>(terms, first),
+            6 => self.orders::<6>(terms, first),
+            _ => self.orders::<0>(terms, first),
         }
     }
 
     /// The factors of M_0, and the powers from `first` on.
     #[inline(never)]
-    fn orders<const N: usize>(&mut self, mechanism: &Mechanism, first: usize) {
+    fn orders<const N: usize>(&mut self, terms: &Terms<T::Constant>, first: usize) {
         let n = size::<N>(self.elements);
         let angles = size::<N>(self.angles);
-        self.factor::<N>(mechanism);
+        self.factor::<N>(terms);
         if first == 0 {
             // The first power of z needs only rates.
             for i in 0..angles {
@@ -317,19 +270,19 @@ impl<T: Coefficient> Series<T> {
         }
         for m in first..self.order {
             if N == 0 && self.bodywise.is_some() {
-                self.advance_bodywise(mechanism, m);
+                self.advance_bodywise(terms, m);
             } else {
                 self.bend::<N>(m);
-                self.balance::<N>(mechanism, m);
-                self.solve::<N>(mechanism, m);
+                self.balance::<N>(terms, m);
+                self.solve::<N>(terms, m);
             }
-            self.work_integral(mechanism, m);
+            self.work_integral(terms, m);
         }
     }
 
     /// The factors of M_0, and those of the rows.
     #[inline(always)]
-    fn factor<const N: usize>(&mut self, mechanism: &Mechanism) {
+    fn factor<const N: usize>(&mut self, terms: &Terms<T::Constant>) {
         let (n, f) = (size::<N>(self.elements), self.partition.count());
         if N == 0
             && let Some(bodywise) = &mut self.bodywise
@@ -338,7 +291,7 @@ impl<T: Coefficient> Series<T> {
             self.rows.prepare_bodywise(&mut bodywise.evaluation, &self.z[..n]);
             return;
         }
-        mechanism.tree.mass_matrix::<T, N>(&self.z[..n], &mut self.mass, &mut self.twist);
+        terms.tree.mass_matrix::<T, N>(&self.z[..n], &mut self.mass, &mut self.twist);
         if self.is_tied {
             self.partition.reduce(&self.mass, &mut self.reduced);
             tree::factor::<T, 0>(f, &mut self.reduced, &mut self.pivot);
@@ -348,7 +301,8 @@ impl<T: Coefficient> Series<T> {
         }
         if !self.rows.is_empty() {
             self.rows.prepare(&self.partition, &self.z[..n], &self.reduced, &self.pivot);
-            let diagonal = self.partition.independent.iter().map(|&body| mechanism.tree.diagonal[body]);
+            let diagonal = &terms.structure.tree.diagonal;
+            let diagonal = self.partition.independent.iter().map(|&body| diagonal[body]);
             self.rows.mark(schur::is_deep(&self.pivot[..f], diagonal));
         }
     }
@@ -361,6 +315,17 @@ impl<T: Coefficient> Series<T> {
         let (turned, bend) = (&mut self.turned[..n], &mut self.bend[..n]);
         let factor = T::of((m + 1) as f64);
         bend[angles..].fill(Complex::ZERO);
+        if T::IS_LONG {
+            for i in 0..angles {
+                let pairs = || omega[i..].iter().step_by(n).zip(z[i..].iter().step_by(n).rev());
+                let sum = Complex::new(
+                    T::sum_of_products(pairs().map(|(w, z)| (w, &z.re))),
+                    T::sum_of_products(pairs().map(|(w, z)| (w, &z.im))),
+                );
+                (turned[i], bend[i]) = (sum, sum.left().times(factor));
+            }
+            return;
+        }
         let mut first = 0;
         while first < angles {
             let sums = convolve::<N, _, _, _>(n, first, omega, z, |w, z| z.times(w));
@@ -374,26 +339,36 @@ impl<T: Coefficient> Series<T> {
 
     /// R_m, and the load -Σ Im(conj(z) R) of this order into `load`.
     #[inline(always)]
-    fn balance<const N: usize>(&mut self, mechanism: &Mechanism, m: usize) {
+    fn balance<const N: usize>(&mut self, terms: &Terms<T::Constant>, m: usize) {
         let (n, angles) = (size::<N>(self.elements), size::<N>(self.angles));
         self.load[..n].fill(T::ZERO);
         if self.is_tied {
             // The known part of a_m: s'' of this order.
             for i in 0..angles {
                 let given = self.drive[(m + 1) * n + i] * T::of((m + 1) as f64);
-                self.load[i] = -given.scale(mechanism.tree.diagonal[i]);
+                self.load[i] = -given.by(terms.tree.diagonal[i]);
                 self.bend[i] += self.z[i].left().times(given);
             }
         }
-        self.gravity_forces(mechanism, m);
-        mass_terms::<T, N>(mechanism, &self.bend, &mut self.rest[m * n..(m + 1) * n]);
-        self.force(mechanism, m);
+        self.gravity_forces(terms, m);
+        mass_terms::<T, N>(terms.tree, &self.bend, &mut self.rest[m * n..(m + 1) * n]);
+        self.force(terms, m);
         let (before, rest) = self.rest.split_at_mut(m * n);
         let rest = &mut rest[..n];
         let (z, load) = (&self.z[..(m + 1) * n], &mut self.load[..n]);
         for x in (angles..n).step_by(2) {
             load[x] -= rest[x].re;
             load[x + 1] -= rest[x].im;
+        }
+        if T::IS_LONG {
+            for k in 0..angles {
+                let before =
+                    || before[k.min(before.len())..].iter().step_by(n).chain(std::iter::once(&rest[k]));
+                let pairs = || z[k..].iter().step_by(n).rev().zip(before());
+                load[k] -= T::sum_of_products(pairs().map(|(z, rest)| (&z.re, &rest.im)));
+                load[k] += T::sum_of_products(pairs().map(|(z, rest)| (&z.im, &rest.re)));
+            }
+            return;
         }
         let mut first = 0;
         while first < angles {
@@ -410,32 +385,32 @@ impl<T: Coefficient> Series<T> {
 
     /// Gravity in R_m, and nothing else.
     #[inline(always)]
-    fn gravity_forces(&mut self, mechanism: &Mechanism, m: usize) {
-        for (rest, &weight) in self.rest[m * self.elements..].iter_mut().zip(&mechanism.tree.weight) {
+    fn gravity_forces(&mut self, terms: &Terms<T::Constant>, m: usize) {
+        for (rest, &weight) in self.rest[m * self.elements..].iter_mut().zip(&terms.tree.weight) {
             *rest = if m == 0 { -Complex::of(weight) } else { Complex::ZERO };
         }
     }
 
     /// Adds what all other forces leave in R_m, and torques to the load.
     #[inline(always)]
-    fn force(&mut self, mechanism: &Mechanism, m: usize) {
+    fn force(&mut self, terms: &Terms<T::Constant>, m: usize) {
         let n = self.elements;
         let rest = &mut self.rest[m * n..(m + 1) * n];
-        for (spring, series) in mechanism.springs.iter().zip(&mut self.springs) {
+        for (spring, series) in terms.springs.iter().zip(&mut self.springs) {
             let force = series.force(spring, m, &self.z, n);
             spring.span.spread(force, |k, force| rest[k] -= force);
         }
-        if !mechanism.torsions.is_empty() || !self.actions.is_empty() || !self.forces.is_empty() {
+        if !terms.torsions.is_empty() || !self.actions.is_empty() || !self.forces.is_empty() {
             let applied = &mut self.applied[m * n..(m + 1) * n];
             applied.fill(T::ZERO);
-            for torsion in &mechanism.torsions {
+            for torsion in terms.torsions {
                 torsion.pull(action::twist(torsion, m, &self.phi, &self.omega, n), applied);
             }
-            for (action, series) in mechanism.actions.iter().zip(&mut self.actions) {
+            for (action, series) in terms.actions.iter().zip(&mut self.actions) {
                 series.act(action, m, &self.z, n, rest, applied);
             }
             let at = At { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
-            for (force, series) in mechanism.forces.iter().zip(&mut self.forces) {
+            for (force, series) in terms.forces.iter().zip(&mut self.forces) {
                 series.act(force, m, at, rest, applied);
             }
             for (load, &applied) in self.load.iter_mut().zip(applied.iter()) {
@@ -447,7 +422,7 @@ impl<T: Coefficient> Series<T> {
 
     /// a_m from the loads, the newest powers of w and z, and R_m completed.
     #[inline(always)]
-    fn solve<const N: usize>(&mut self, mechanism: &Mechanism, m: usize) {
+    fn solve<const N: usize>(&mut self, terms: &Terms<T::Constant>, m: usize) {
         let (n, f) = (size::<N>(self.elements), self.partition.count());
         let angles = size::<N>(self.angles);
         let rest = &mut self.rest[m * n..(m + 1) * n];
@@ -461,6 +436,10 @@ impl<T: Coefficient> Series<T> {
         if !self.rows.is_empty() {
             self.rows.solve(m, &self.z, &self.bend, &mut self.solution);
             self.rows.push(m, &self.z[..n], rest);
+        }
+        if let Some(&limbs) = self.limbs.get(m + 1) {
+            self.solution.iter_mut().for_each(|x| *x = x.kept(limbs));
+            self.turned.iter_mut().for_each(|x| *x = Complex::new(x.re.kept(limbs), x.im.kept(limbs)));
         }
         for c in 0..f {
             self.rate[(m + 1) * f + c] = self.fractions.over(self.solution[c], m + 1);
@@ -495,24 +474,28 @@ impl<T: Coefficient> Series<T> {
         for i in 0..angles {
             newest[i] = self.fractions.vector_over((self.turned[i] + z[i].times(omega[i])).left(), m + 2);
         }
-        mass_terms::<T, N>(mechanism, &self.bend, rest);
+        mass_terms::<T, N>(terms.tree, &self.bend, rest);
     }
 }
 
 /// Adds H x to `rest`, without the diagonal.
 #[inline(always)]
-fn mass_terms<T: Real, const N: usize>(mechanism: &Mechanism, x: &[Complex<T>], rest: &mut [Complex<T>]) {
-    let n = size::<N>(mechanism.tree.coordinates);
-    let (coupling, x, rest) = (&mechanism.tree.coupling[..n * n], &x[..n], &mut rest[..n]);
+fn mass_terms<T: SeriesNumber, const N: usize>(
+    tree: &Tree<T::Constant>,
+    x: &[Complex<T>],
+    rest: &mut [Complex<T>],
+) {
+    let n = size::<N>(tree.coordinates);
+    let (coupling, x, rest) = (&tree.coupling[..n * n], &x[..n], &mut rest[..n]);
     for i in 0..n {
         for j in i + 1..n {
             let h = coupling[i * n + j];
-            if mechanism.tree.off_axis {
+            if tree.off_axis {
                 rest[i] += x[j].turn(h);
                 rest[j] += x[i].turn(h.conj());
             } else {
-                rest[i] += Complex::new(x[j].re.scale(h.re), x[j].im.scale(h.re));
-                rest[j] += Complex::new(x[i].re.scale(h.re), x[i].im.scale(h.re));
+                rest[i] += Complex::new(x[j].re.by(h.re), x[j].im.by(h.re));
+                rest[j] += Complex::new(x[i].re.by(h.re), x[i].im.by(h.re));
             }
         }
     }
@@ -521,6 +504,8 @@ fn mass_terms<T: Real, const N: usize>(mechanism: &Mechanism, x: &[Complex<T>], 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::arithmetic::DoubleDouble;
+    use crate::dynamics::{Mechanism, Time};
     use crate::scene::read_scene;
 
     fn mechanism(name: &str) -> (Mechanism, Vec<f64>, Vec<f64>) {

@@ -11,7 +11,7 @@
 //! where `N = 0`.
 
 use super::force::Spring;
-use crate::arithmetic::{Complex, Scalar};
+use crate::arithmetic::{Complex, Over, Scalar};
 
 /// `N`, or the number at hand where `N` is 0.
 #[inline(always)]
@@ -21,29 +21,31 @@ pub fn size<const N: usize>(n: usize) -> usize {
 
 /// Constants of the tree, formed once per scene.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tree {
+pub struct Tree<C = f64> {
     /// Number of coordinates n: the bodies' angles, then two for every origin that moves freely.
     pub coordinates: usize,
     /// Number of bodies.
     pub angles: usize,
     /// H above the diagonal, row by row (n × n) \[kg·m²; kg·m for an origin, in the column of its x\]; empty
     /// for very large trees.
-    pub coupling: Vec<Complex<f64>>,
+    pub coupling: Vec<Complex<C>>,
     /// Diagonal d_i = H_ii + I_i \[kg·m²; kg for an origin\].
-    pub diagonal: Vec<f64>,
+    pub diagonal: Vec<C>,
     /// Force of gravity on z_i: conj(Σ_m m_m gamma_mi) g \[N·m; N for an origin, at its x\].
-    pub weight: Vec<Complex<f64>>,
+    pub weight: Vec<Complex<C>>,
     /// False where every hinge and centre of mass lies on its body's axis: B = 0, and its products are left
     /// out.
     pub off_axis: bool,
 }
 
-impl Tree {
+impl<C: Scalar> Tree<C> {
     /// True where H is there; very large trees go without it.
     pub fn is_dense(&self) -> bool {
         self.coupling.len() == self.coordinates * self.coordinates
     }
+}
 
+impl Tree {
     /// About the fastest rate of small oscillations under gravity and springs between hanging bodies
     /// \[rad/s\], for hinges on the bodies' axes.
     ///
@@ -80,23 +82,25 @@ impl Tree {
         let pulled: f64 = springs.iter().map(|spring| spring.stiffness * moved(spring).powi(2)).sum();
         (gravity + pulled).sqrt()
     }
+}
 
+impl<C: Scalar> Tree<C> {
     /// Writes M above and on the diagonal and Im p above it, both row by row (n × n) \[kg·m²\].
     #[inline(always)]
-    pub fn mass_matrix<T: Scalar, const N: usize>(&self, z: &[Complex<T>], mass: &mut [T], twist: &mut [T]) {
+    pub fn mass_matrix<T: Over<C>, const N: usize>(&self, z: &[Complex<T>], mass: &mut [T], twist: &mut [T]) {
         let (n, angles) = (size::<N>(self.coordinates), size::<N>(self.angles));
         let (z, coupling, diagonal) = (&z[..n], &self.coupling[..n * n], &self.diagonal[..n]);
         let (mass, twist) = (&mut mass[..n * n], &mut twist[..n * n]);
         for i in 0..angles {
-            mass[i * n + i] = T::of(diagonal[i]);
+            mass[i * n + i] = T::constant(diagonal[i]);
             for j in i + 1..angles {
                 let h = coupling[i * n + j];
                 let (cos, sin) = (z[i].dot(z[j]), z[i].cross(z[j]));
-                mass[i * n + j] = cos.scale(h.re);
-                twist[i * n + j] = sin.scale(h.re);
+                mass[i * n + j] = cos.by(h.re);
+                twist[i * n + j] = sin.by(h.re);
                 if self.off_axis {
-                    mass[i * n + j] -= sin.scale(h.im);
-                    twist[i * n + j] += cos.scale(h.im);
+                    mass[i * n + j] -= sin.by(h.im);
+                    twist[i * n + j] += cos.by(h.im);
                 }
             }
         }
@@ -106,7 +110,7 @@ impl Tree {
     }
 
     /// The entries of translational coordinates; the twist holds conj(p) in the columns of x and y.
-    fn translational_mass_terms<T: Scalar>(&self, z: &[Complex<T>], mass: &mut [T], twist: &mut [T]) {
+    fn translational_mass_terms<T: Over<C>>(&self, z: &[Complex<T>], mass: &mut [T], twist: &mut [T]) {
         let (n, angles) = (self.coordinates, self.angles);
         for x in (angles..n).step_by(2) {
             for i in 0..angles {
@@ -117,13 +121,14 @@ impl Tree {
             for i in angles..n {
                 (mass[i * n + x], mass[i * n + x + 1]) = (T::ZERO, T::ZERO);
             }
-            (mass[x * n + x], mass[(x + 1) * n + x + 1]) = (T::of(self.diagonal[x]), T::of(self.diagonal[x]));
+            (mass[x * n + x], mass[(x + 1) * n + x + 1]) =
+                (T::constant(self.diagonal[x]), T::constant(self.diagonal[x]));
         }
     }
 
     /// Writes the velocity terms and gravity \[N·m\].
     #[inline(always)]
-    pub fn velocity_and_gravity_forces<T: Scalar, const N: usize>(
+    pub fn velocity_and_gravity_forces<T: Over<C>, const N: usize>(
         &self,
         z: &[Complex<T>],
         omega: &[T],
@@ -146,7 +151,7 @@ impl Tree {
 
     /// Writes d(T - V)/dq \[N·m\] without springs, at fixed rates: the force of the canonical form.
     #[inline(always)]
-    pub fn lagrangian_forces<T: Scalar, const N: usize>(
+    pub fn lagrangian_forces<T: Over<C>, const N: usize>(
         &self,
         z: &[Complex<T>],
         omega: &[T],
@@ -159,7 +164,7 @@ impl Tree {
 
     /// Adds dT/dq \[N·m\] at fixed rates.
     #[inline(always)]
-    pub fn velocity_terms<T: Scalar, const N: usize>(&self, omega: &[T], twist: &[T], force: &mut [T]) {
+    pub fn velocity_terms<T: Over<C>, const N: usize>(&self, omega: &[T], twist: &[T], force: &mut [T]) {
         let (n, angles) = (size::<N>(self.coordinates), size::<N>(self.angles));
         let (omega, twist, force) = (&omega[..n], &twist[..n * n], &mut force[..n]);
         for i in 0..angles {
@@ -176,20 +181,20 @@ impl Tree {
 
     /// Writes the generalized forces of gravity \[N·m\].
     #[inline(always)]
-    fn gravity_forces<T: Scalar, const N: usize>(&self, z: &[Complex<T>], force: &mut [T]) {
+    fn gravity_forces<T: Over<C>, const N: usize>(&self, z: &[Complex<T>], force: &mut [T]) {
         let (n, angles) = (size::<N>(self.coordinates), size::<N>(self.angles));
         let (z, weight, force) = (&z[..n], &self.weight[..n], &mut force[..n]);
         for i in 0..angles {
             force[i] = z[i].cross(Complex::of(weight[i]));
         }
         for x in (angles..n).step_by(2) {
-            (force[x], force[x + 1]) = (T::of(weight[x].re), T::of(weight[x].im));
+            (force[x], force[x + 1]) = (T::constant(weight[x].re), T::constant(weight[x].im));
         }
     }
 
     /// Elements at these coordinates: unit vectors, and translational coordinates at the place of their x.
     #[inline(always)]
-    pub fn unit_vectors<T: Scalar, const N: usize>(&self, phi: &[T], z: &mut [Complex<T>]) {
+    pub fn unit_vectors<T: Over<C>, const N: usize>(&self, phi: &[T], z: &mut [Complex<T>]) {
         let (n, angles) = (size::<N>(self.coordinates), size::<N>(self.angles));
         let (z, phi) = (&mut z[..n], &phi[..n]);
         for k in 0..angles {
@@ -202,7 +207,7 @@ impl Tree {
 
     /// Potential energy of gravity \[J\], less the constant of the ground points.
     #[inline(always)]
-    pub fn gravity_energy<T: Scalar>(&self, z: &[Complex<T>]) -> T {
+    pub fn gravity_energy<T: Over<C>>(&self, z: &[Complex<T>]) -> T {
         z.iter().zip(&self.weight).fold(T::ZERO, |sum, (z, &weight)| sum - z.dot(Complex::of(weight)))
     }
 }

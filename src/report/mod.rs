@@ -19,6 +19,7 @@
 //! | [`stress`] | stiff and extreme scenes by every method | `stress.rs` |
 //! | [`compare`] | methods compared, with charts | `compare.rs` |
 //! | [`trust`] | how far a run may be trusted | `trust.rs` |
+//! | `digits` | a run in many digits, with its proof | `digits.rs`, with the features `digits` and `files` |
 //! | [`methods`] | the table of methods | `methods.rs` |
 //! | `view` | runs, as a page to look at | `view.rs`, with the feature `charts` |
 //! | `charts` | a run, in pictures | `charts.rs`, with the feature `charts` |
@@ -32,6 +33,9 @@ pub mod check;
 pub mod compare;
 #[cfg(feature = "charts")]
 mod curves;
+#[cfg(all(feature = "digits", feature = "files"))]
+#[doc(hidden)]
+pub mod digits;
 mod drawing;
 pub mod events;
 #[cfg(feature = "fit")]

@@ -28,6 +28,8 @@ pub mod compare;
 pub mod contact;
 #[doc(hidden)]
 pub mod custom;
+#[cfg(feature = "digits")]
+pub mod digits;
 #[doc(hidden)]
 pub mod drift;
 #[doc(hidden)]

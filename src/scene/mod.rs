@@ -7,6 +7,8 @@
 mod build;
 mod digits;
 mod error;
+#[cfg(feature = "digits")]
+pub(crate) mod exact;
 mod fit;
 mod format;
 pub mod formula;
@@ -59,41 +61,41 @@ pub fn is_start_rate(omega: f64) -> bool {
 
 /// A checked scene.  As [`Default`] makes it, it is empty.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Scene {
+pub struct Scene<C = f64> {
     /// Name, also of its output folder: letters, digits, `-`, `_`.
     pub name: String,
     /// One sentence for reports and charts; may be empty.
     pub description: String,
     /// Gravitational acceleration (x, y) \[m/s²\].
-    pub gravity: [f64; 2],
+    pub gravity: [C; 2],
     /// Bodies, at least one.
-    pub bars: Vec<Bar>,
+    pub bars: Vec<Bar<C>>,
     /// Hinges; those that close a loop and bars that hang on nothing are told apart when the scene is
     /// compiled.
-    pub hinges: Vec<Hinge>,
+    pub hinges: Vec<Hinge<C>>,
     /// Points that slide along lines.
-    pub sliders: Vec<Slider>,
+    pub sliders: Vec<Slider<C>>,
     /// Bodies that are one.
-    pub welds: Vec<Weld>,
+    pub welds: Vec<Weld<C>>,
     /// Angles that stay as they are.
-    pub locks: Vec<Lock>,
+    pub locks: Vec<Lock<C>>,
     /// Springs with dampers.
-    pub springs: Vec<Spring>,
+    pub springs: Vec<Spring<C>>,
     /// Springs and dampers between angles.
-    pub torsion_springs: Vec<TorsionSpring>,
+    pub torsion_springs: Vec<TorsionSpring<C>>,
     /// Forces that act at points.
-    pub forces: Vec<Force>,
+    pub forces: Vec<Force<C>>,
     /// Torques that act on bodies.
-    pub torques: Vec<Torque>,
+    pub torques: Vec<Torque<C>>,
     /// Motors: prescribed angles.
-    pub motors: Vec<Motor>,
+    pub motors: Vec<Motor<C>>,
     /// Motors on sliders: prescribed travels.
-    pub drives: Vec<Drive>,
+    pub drives: Vec<Drive<C>>,
     /// Motors whose aims depend on where the mechanism is.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub couplings: Vec<Coupling>,
     /// Walls a point cannot pass.
-    pub walls: Vec<Wall>,
+    pub walls: Vec<Wall<C>>,
     /// Dry friction of hinges, sliders and walls, each of them once at most.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub frictions: Vec<Friction>,
@@ -125,14 +127,27 @@ pub struct Scene {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub inactive: Vec<String>,
     /// Angle and rate of each bar at t = 0, in the order of `bars`; agrees with the motors.
-    pub start: Vec<Start>,
+    pub start: Vec<Start<C>>,
     /// What the scene says of it, the rest of which is found when the scene is compiled; of bars beyond the
     /// list's end, angle and rate.
-    pub given: Vec<Given>,
+    pub given: Vec<Given<C>>,
     /// Horizon \[s\], positive.
     pub until: f64,
     /// Output interval \[s\], positive, at most the horizon.
     pub every: f64,
+}
+
+impl<C> Scene<C> {
+    /// True where the part of that name does not act at the start, or events switch it.
+    pub fn is_switched(&self, part: &str) -> bool {
+        let mut switched = self.events.iter().flat_map(|event| event.off.iter().chain(&event.on));
+        self.is_inactive(part) || switched.any(|name| name == part)
+    }
+
+    /// True where the part of that name does not act at the start.
+    pub fn is_inactive(&self, part: &str) -> bool {
+        self.inactive.iter().any(|name| name == part)
+    }
 }
 
 impl Scene {
@@ -150,17 +165,6 @@ impl Scene {
     pub fn acting_laws(&self) -> impl Iterator<Item = &LoadLaw> {
         let own = self.own_bars();
         self.laws.iter().filter(move |law| !matches!(law.load, Load::Torque { bar, .. } if bar >= own))
-    }
-
-    /// True where the part of that name does not act at the start, or events switch it.
-    pub fn is_switched(&self, part: &str) -> bool {
-        let mut switched = self.events.iter().flat_map(|event| event.off.iter().chain(&event.on));
-        self.is_inactive(part) || switched.any(|name| name == part)
-    }
-
-    /// True where the part of that name does not act at the start.
-    pub fn is_inactive(&self, part: &str) -> bool {
-        self.inactive.iter().any(|name| name == part)
     }
 
     /// Adds the rotors of the integrals with their hinges, torques and starts.
@@ -181,71 +185,71 @@ impl Scene {
 
 /// A rigid body.  Its frame has the origin at one end and its x axis along the bar.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Bar {
+pub struct Bar<C = f64> {
     /// Name, unique among bars; never `ground`.
     pub name: String,
     /// Length for drawings \[m\]: the body is drawn from its origin to (length, 0).
-    pub length: f64,
+    pub length: C,
     /// Mass \[kg\], positive.
-    pub mass: f64,
+    pub mass: C,
     /// Centre of mass in the body's frame \[m\].
-    pub centre: [f64; 2],
+    pub centre: [C; 2],
     /// Moment of inertia about the centre of mass \[kg·m²\], not negative.
-    pub inertia: f64,
+    pub inertia: C,
 }
 
 /// A point of a bar or of the ground.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Place {
+pub struct Place<C = f64> {
     /// Index of the bar; `None` for the ground.
     pub bar: Option<usize>,
     /// Coordinates in the bar's frame, or in the world's for the ground \[m\].
-    pub point: [f64; 2],
+    pub point: [C; 2],
 }
 
 /// Two places that coincide for ever.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Hinge {
+pub struct Hinge<C = f64> {
     /// Name, unique among hinges.
     pub name: String,
     /// The two places; on different bodies.
-    pub between: [Place; 2],
+    pub between: [Place<C>; 2],
 }
 
 /// A point that slides along a line of the ground or of another body.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Slider {
+pub struct Slider<C = f64> {
     /// Name, unique among sliders; it also names the constraints.
     pub name: String,
     /// The point that slides; on another body than the rail.
-    pub point: Place,
+    pub point: Place<C>,
     /// The line.
-    pub rail: Rail,
+    pub rail: Rail<C>,
     /// True where the two bodies keep the angle between them that they have at the start.
     pub locked: bool,
 }
 
 /// A line of a bar or of the ground; travel along it is counted from its point.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Rail {
+pub struct Rail<C = f64> {
     /// A point of the line.
-    pub place: Place,
+    pub place: Place<C>,
     /// Unit vector along it, in the bar's frame, or in the world's for the ground.
-    pub direction: [f64; 2],
+    pub direction: [C; 2],
 }
 
 /// Two places that coincide, of bodies that keep the angle between them that they have at the start.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Weld {
+pub struct Weld<C = f64> {
     /// Name, unique among welds; it also names the constraints.
     pub name: String,
     /// The two places; on different bodies.
-    pub between: [Place; 2],
+    pub between: [Place<C>; 2],
 }
 
 /// An angle that stays as it is.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Lock {
+pub struct Lock<C = f64> {
     /// Name, unique among locks; it also names the constraint.
     pub name: String,
     /// The bar.
@@ -253,29 +257,29 @@ pub struct Lock {
     /// The bar its angle is measured from; `None`: from +x.
     pub relative_to: Option<usize>,
     /// The angle \[rad\]; `None`: that of the start.
-    pub angle: Option<f64>,
+    pub angle: Option<C>,
 }
 
 /// A linear spring with a damper beside it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Spring {
+pub struct Spring<C = f64> {
     /// Name, unique among springs.
     pub name: String,
     /// Its two ends.
-    pub between: [Place; 2],
+    pub between: [Place<C>; 2],
     /// Stiffness \[N/m\], not negative.
-    pub stiffness: f64,
+    pub stiffness: C,
     /// Length without force \[m\], not negative.
-    pub free_length: f64,
+    pub free_length: C,
     /// Damping along the spring \[N·s/m\], not negative.
-    pub damping: f64,
+    pub damping: C,
     /// True where it is taken for a rod of its free length, with what its fast vibration does on average.
     pub rigid: bool,
 }
 
 /// A spring and a damper between the angles of two bodies; whole turns count.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct TorsionSpring {
+pub struct TorsionSpring<C = f64> {
     /// Name, unique among torsion springs.
     pub name: String,
     /// The bar.
@@ -283,33 +287,33 @@ pub struct TorsionSpring {
     /// The bar its angle is measured from; `None`: from +x.
     pub relative_to: Option<usize>,
     /// Stiffness \[N·m/rad\], not negative.
-    pub stiffness: f64,
+    pub stiffness: C,
     /// Angle without torque \[rad\].
-    pub free_angle: f64,
+    pub free_angle: C,
     /// Damping \[N·m·s/rad\], not negative.
-    pub damping: f64,
+    pub damping: C,
 }
 
 /// A force that acts at a point of a bar.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Force {
+pub struct Force<C = f64> {
     /// Name, unique among forces.
     pub name: String,
     /// The bar.
     pub bar: usize,
     /// The point of the bar, in its frame \[m\].
-    pub point: [f64; 2],
+    pub point: [C; 2],
     /// The force \[N\].
-    pub force: [f64; 2],
+    pub force: [C; 2],
     /// True where it turns with the bar: `force` is in the bar's frame.
     pub follows: bool,
     /// What it is multiplied by \[1\]; `None`: it is constant.
-    pub law: Option<Law>,
+    pub law: Option<Law<C>>,
 }
 
 /// A torque that acts on a bar, and its opposite on another where it is between two.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Torque {
+pub struct Torque<C = f64> {
     /// Name, unique among torques.
     pub name: String,
     /// The bar.
@@ -317,20 +321,20 @@ pub struct Torque {
     /// The bar that takes the opposite torque; `None`: the ground.
     pub relative_to: Option<usize>,
     /// The torque \[N·m\].
-    pub torque: f64,
+    pub torque: C,
     /// What it is multiplied by \[1\]; `None`: it is constant.
-    pub law: Option<Law>,
+    pub law: Option<Law<C>>,
 }
 
 /// A prescribed travel of a slider.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Drive {
+pub struct Drive<C = f64> {
     /// Name, unique among motors; it also names the constraint.
     pub name: String,
     /// Index of the slider.
     pub slider: usize,
     /// The travel as a function of time \[m\].
-    pub law: Law,
+    pub law: Law<C>,
 }
 
 /// An angle or a travel prescribed by where the mechanism is: a gear, a cam.
@@ -360,7 +364,7 @@ pub enum Coupled {
 
 /// A prescribed angle.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Motor {
+pub struct Motor<C = f64> {
     /// Name, unique among motors; it also names the constraint.
     pub name: String,
     /// The driven bar.
@@ -368,77 +372,77 @@ pub struct Motor {
     /// The bar its angle is measured from; `None`: from +x.
     pub relative_to: Option<usize>,
     /// The angle as a function of time.
-    pub law: Law,
+    pub law: Law<C>,
 }
 
 /// `start + rate·t + acceleration·t²/2 + Σ amplitude·sin(frequency·t + phase)` in the unit u of what it
 /// gives: \[rad\] of a motor on an angle, \[m\] of one on a slider, \[1\] of a force or a torque.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Law {
+pub struct Law<C = f64> {
     /// Value at t = 0 without the sines \[u\].
-    pub start: f64,
+    pub start: C,
     /// Rate \[u/s\].
-    pub rate: f64,
+    pub rate: C,
     /// Acceleration \[u/s²\].
-    pub acceleration: f64,
+    pub acceleration: C,
     /// Sines on top.
-    pub sines: Vec<Sine>,
+    pub sines: Vec<Sine<C>>,
     /// Any other formula of time, of which the law is the sum with the rest; motors and walls have one.
     pub profile: Option<Profile>,
 }
 
 /// One sine of a [`Law`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Sine {
+pub struct Sine<C = f64> {
     /// Amplitude \[u\].
-    pub amplitude: f64,
+    pub amplitude: C,
     /// Angular frequency \[rad/s\].
-    pub frequency: f64,
+    pub frequency: C,
     /// Phase at t = 0 \[rad\].
-    pub phase: f64,
+    pub phase: C,
 }
 
 /// A line of the ground, or of another bar, that a point of a bar cannot pass.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Wall {
+pub struct Wall<C = f64> {
     /// Name, unique among walls.
     pub name: String,
     /// The bar.
     pub bar: usize,
     /// The point of the bar, in its frame \[m\].
-    pub point: [f64; 2],
+    pub point: [C; 2],
     /// The bar that carries the line; `None`: the ground.
     pub on: Option<usize>,
     /// A point of the line, in the frame of what carries it \[m\].
-    pub through: [f64; 2],
+    pub through: [C; 2],
     /// Unit normal, towards the side the point may be on, likewise.
-    pub normal: [f64; 2],
+    pub normal: [C; 2],
     /// How far the line has moved along its normal, as a function of time \[m\]; `None`: it stays.
-    pub law: Option<Law>,
+    pub law: Option<Law<C>>,
     /// Restitution e: the normal velocity after an impact is -e times the one before; 0 to 1.
-    pub restitution: f64,
+    pub restitution: C,
 }
 
 /// Angle and rate of a bar at t = 0.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Start {
+pub struct Start<C = f64> {
     /// Absolute angle \[rad\]; may be many turns.
-    pub phi: f64,
+    pub phi: C,
     /// Rate \[rad/s\].
-    pub omega: f64,
+    pub omega: C,
 }
 
 /// What a scene says of a bar at t = 0.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Given {
+pub struct Given<C = f64> {
     /// True where the angle is given; else the one in [`Start`] is a guess.
     pub phi: bool,
     /// True where the rate is given.
     pub omega: bool,
     /// Position of the bar's origin \[m\]; only for a bar, or one of a group of bars, that hangs on nothing.
-    pub origin: Option<[f64; 2]>,
+    pub origin: Option<[C; 2]>,
     /// Velocity of the bar's origin \[m/s\]; likewise.
-    pub velocity: Option<[f64; 2]>,
+    pub velocity: Option<[C; 2]>,
 }
 
 impl Given {

@@ -249,7 +249,7 @@ fn with(mut object: Value, key: &str, value: &Option<impl Serialize>) -> Value {
     object
 }
 
-impl Serialize for Law {
+impl<C: Serialize> Serialize for Law<C> {
     /// As a scene has it: the object of its terms, or the formula it is.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         if let Some(profile) = &self.profile {

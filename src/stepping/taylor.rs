@@ -77,7 +77,7 @@ pub enum Kernel {
 
 /// The method on numbers of type `T`: `f64`, or `DoubleDouble` for references.
 #[derive(Clone, Debug)]
-pub struct Taylor<T> {
+pub struct Taylor<T: Coefficient> {
     /// First term left out of a rate in a step, in the units of the mechanism (rad/s where it is of human
     /// size: see [`Units`](crate::dynamics::Units)); those of the angles are smaller by the step over the
     /// order.

@@ -1,10 +1,10 @@
 //! The parts of a scene that become rows, joints and applied forces.
 
-use super::Joint;
-use crate::arithmetic::Complex;
+use super::{Body, Joint};
+use crate::arithmetic::{Complex, Real};
 use crate::dynamics::constraint::{self, Aim, ConstraintEquation, Measure};
-use crate::dynamics::force::Action;
 use crate::dynamics::force::action::Kind;
+use crate::dynamics::force::{Action, Spring, Torsion};
 use crate::dynamics::forest::Forest;
 use crate::dynamics::law::Law;
 use crate::dynamics::point::Point;
@@ -12,17 +12,30 @@ use crate::dynamics::quadratic::Quadratic;
 use crate::scene::{Coupled, Coupling, Place, Scene, Slider, Wall};
 use std::sync::Arc;
 
+/// The bodies, counted from the points they hang on.
+pub(super) fn bodies<C: Real>(scene: &Scene<C>, forest: &Forest<C>) -> Vec<Body<C>> {
+    (scene.bars.iter().zip(&forest.hangs))
+        .map(|(bar, hang)| Body {
+            name: bar.name.clone(),
+            mass: bar.mass,
+            inertia: bar.inertia,
+            centre: Complex::new(bar.centre[0], bar.centre[1]) - hang.own,
+            ends: [-hang.own, Complex::new(bar.length, C::ZERO) - hang.own],
+        })
+        .collect()
+}
+
 /// Motors, locks, and the angles that welds and locked sliders keep; those not given are what they are at the
 /// start.
-pub(super) fn given_angles(scene: &Scene) -> Vec<ConstraintEquation> {
+pub(super) fn given_angles<C: Real>(scene: &Scene<C>) -> Vec<ConstraintEquation<C>> {
     let motors = scene.motors.iter().map(|motor| {
         constraint::angle_equation(&motor.name, motor.bar, motor.relative_to, motor.law.clone())
     });
-    let phi = |bar: Option<usize>| bar.map_or(0.0, |bar| scene.start[bar].phi);
-    let keep = |name: &str, a: Option<usize>, b: Option<usize>, angle: Option<f64>| {
+    let phi = |bar: Option<usize>| bar.map_or(C::ZERO, |bar| scene.start[bar].phi);
+    let keep = |name: &str, a: Option<usize>, b: Option<usize>, angle: Option<C>| {
         let (body, base) = if let Some(a) = a { (a, b) } else { (b?, None) };
         let angle = angle.unwrap_or_else(|| phi(Some(body)) - phi(base));
-        Some(constraint::angle_equation(name, body, base, Law::constant(angle)))
+        Some(constraint::angle_equation(name, body, base, Law { start: angle, ..Law::default() }))
     };
     let locks =
         scene.locks.iter().filter_map(|lock| keep(&lock.name, Some(lock.bar), lock.relative_to, lock.angle));
@@ -36,7 +49,7 @@ pub(super) fn given_angles(scene: &Scene) -> Vec<ConstraintEquation> {
 }
 
 /// The rows of [`given_angles`] whose angle is that of the start.
-pub(super) fn kept_angles(scene: &Scene) -> Vec<usize> {
+pub(super) fn kept_angles<C>(scene: &Scene<C>) -> Vec<usize> {
     let locks = scene.locks.iter().map(|lock| lock.angle.is_none());
     let others = scene.welds.len() + scene.sliders.iter().filter(|slider| slider.locked).count();
     let kept = locks.chain(std::iter::repeat_n(true, others));
@@ -44,7 +57,11 @@ pub(super) fn kept_angles(scene: &Scene) -> Vec<usize> {
 }
 
 /// Hinges and welds; those that close a loop add their rows.
-pub(super) fn joints(scene: &Scene, forest: &Forest, rows: &mut Vec<ConstraintEquation>) -> Vec<Joint> {
+pub(super) fn joints<C: Real>(
+    scene: &Scene<C>,
+    forest: &Forest<C>,
+    rows: &mut Vec<ConstraintEquation<C>>,
+) -> Vec<Joint<C>> {
     let named = scene.hinges.iter().map(|hinge| (&hinge.name, &hinge.between));
     let welded = scene.welds.iter().map(|weld| (&weld.name, &weld.between));
     let mut joints = Vec::with_capacity(forest.outer.len());
@@ -70,12 +87,17 @@ pub(super) fn joints(scene: &Scene, forest: &Forest, rows: &mut Vec<ConstraintEq
 }
 
 /// The row that keeps a slider on its rail.
-pub(super) fn slide(forest: &Forest, slider: &Slider) -> ConstraintEquation {
+pub(super) fn slide<C: Real>(forest: &Forest<C>, slider: &Slider<C>) -> ConstraintEquation<C> {
     on_rail(forest, &slider.name, slider, rail(slider).left(), None)
 }
 
 /// The row that gives a slider's travel.
-pub(super) fn travel(forest: &Forest, name: &str, slider: &Slider, law: Law) -> ConstraintEquation {
+pub(super) fn travel<C: Real>(
+    forest: &Forest<C>,
+    name: &str,
+    slider: &Slider<C>,
+    law: Law<C>,
+) -> ConstraintEquation<C> {
     on_rail(forest, name, slider, rail(slider), Some(law))
 }
 
@@ -118,12 +140,12 @@ pub(super) fn give_aims(rows: &mut [ConstraintEquation], aims: Vec<(&str, Arc<Ai
 
 /// The row of how far a point is from the line of its wall along a direction in the frame of what carries it,
 /// and the point as seen from there.
-pub(in crate::dynamics) fn along_wall(
-    forest: &Forest,
-    wall: &Wall,
-    direction: Complex<f64>,
-    law: Option<Law>,
-) -> (ConstraintEquation, Point) {
+pub(in crate::dynamics) fn along_wall<C: Real>(
+    forest: &Forest<C>,
+    wall: &Wall<C>,
+    direction: Complex<C>,
+    law: Option<Law<C>>,
+) -> (ConstraintEquation<C>, Point<C>) {
     let site = forest.site(&Place { bar: Some(wall.bar), point: wall.point });
     let (name, angles) = (&wall.name, forest.hangs.len());
     match wall.on {
@@ -140,17 +162,17 @@ pub(in crate::dynamics) fn along_wall(
     }
 }
 
-fn rail(slider: &Slider) -> Complex<f64> {
+fn rail<C: Real>(slider: &Slider<C>) -> Complex<C> {
     Complex::new(slider.rail.direction[0], slider.rail.direction[1])
 }
 
-fn on_rail(
-    forest: &Forest,
+fn on_rail<C: Real>(
+    forest: &Forest<C>,
     name: &str,
-    slider: &Slider,
-    direction: Complex<f64>,
-    law: Option<Law>,
-) -> ConstraintEquation {
+    slider: &Slider<C>,
+    direction: Complex<C>,
+    law: Option<Law<C>>,
+) -> ConstraintEquation<C> {
     let (site, origin_point, angles) =
         (forest.site(&slider.point), forest.site(&slider.rail.place), forest.hangs.len());
     match slider.rail.place.bar {
@@ -166,8 +188,54 @@ fn on_rail(
     }
 }
 
+/// The rows of sliders, then those of motors on sliders.
+pub(super) fn guides<C: Real>(scene: &Scene<C>, forest: &Forest<C>) -> Vec<ConstraintEquation<C>> {
+    let slides = scene.sliders.iter().map(|slider| slide(forest, slider));
+    let drives = scene.drives.iter();
+    let travels =
+        drives.map(|drive| travel(forest, &drive.name, &scene.sliders[drive.slider], drive.law.clone()));
+    slides.chain(travels).collect()
+}
+
+/// The rows of rigid springs.
+pub(super) fn rods<C: Real>(scene: &Scene<C>, forest: &Forest<C>) -> Vec<ConstraintEquation<C>> {
+    let rod = |spring: &crate::scene::Spring<C>| {
+        let [a, b] = spring.between.each_ref().map(|place| forest.site(place));
+        constraint::rod_equation(&spring.name, &a, &b, spring.free_length, scene.bars.len())
+    };
+    scene.springs.iter().filter(|spring| spring.rigid).map(rod).collect()
+}
+
+/// Springs that are elastic.
+pub(super) fn springs<C: Real>(scene: &Scene<C>, forest: &Forest<C>) -> Vec<Spring<C>> {
+    (scene.springs.iter().filter(|spring| !spring.rigid))
+        .map(|spring| Spring {
+            name: spring.name.clone(),
+            bodies: [spring.between[0].bar, spring.between[1].bar],
+            span: forest.point(&spring.between[0]).minus(&forest.point(&spring.between[1])),
+            stiffness: spring.stiffness,
+            free_length: spring.free_length,
+            damping: spring.damping,
+        })
+        .collect()
+}
+
+/// Torsion springs.
+pub(super) fn torsions<C: Real>(scene: &Scene<C>) -> Vec<Torsion<C>> {
+    (scene.torsion_springs.iter())
+        .map(|torsion| Torsion {
+            name: torsion.name.clone(),
+            body: torsion.bar,
+            base: torsion.relative_to,
+            stiffness: torsion.stiffness,
+            free_angle: torsion.free_angle,
+            damping: torsion.damping,
+        })
+        .collect()
+}
+
 /// Applied forces and torques.
-pub(super) fn actions(scene: &Scene, forest: &Forest) -> Vec<Action> {
+pub(super) fn actions<C: Real>(scene: &Scene<C>, forest: &Forest<C>) -> Vec<Action<C>> {
     let forces = scene.forces.iter().map(|force| Action {
         name: force.name.clone(),
         body: force.bar,

@@ -11,7 +11,7 @@ use super::{ConstraintEquation, Measure};
 use crate::dynamics::law::Law;
 
 /// Keeps the angle of `body`, measured from `base` or from +x, at a law of time.
-pub fn angle_equation(name: &str, body: usize, base: Option<usize>, law: Law) -> ConstraintEquation {
+pub fn angle_equation<C>(name: &str, body: usize, base: Option<usize>, law: Law<C>) -> ConstraintEquation<C> {
     ConstraintEquation {
         name: name.into(),
         measure: Measure::Angle { body, base },

@@ -8,20 +8,20 @@
 //! C is positive on the side the normal points to.  The force on the point is -lambda n.
 
 use super::{ConstraintEquation, Measure, Push, Site, Way};
-use crate::arithmetic::Complex;
+use crate::arithmetic::{Complex, Real};
 use crate::dynamics::law::Law;
 use crate::dynamics::quadratic::Quadratic;
 
 /// Keeps a point at the distance `offset` \[m\] from the origin along the unit vector `normal`, and the law's
 /// travel \[m\] further.
-pub fn line_equation(
+pub fn line_equation<C: Real>(
     name: &str,
-    site: &Site,
-    normal: Complex<f64>,
-    offset: f64,
-    law: Option<Law>,
+    site: &Site<C>,
+    normal: Complex<C>,
+    offset: C,
+    law: Option<Law<C>>,
     angles: usize,
-) -> ConstraintEquation {
+) -> ConstraintEquation<C> {
     let mut place = Quadratic::along(&site.point, normal, angles);
     place.constant -= offset;
     ConstraintEquation {

@@ -26,7 +26,7 @@ use super::law::Law;
 use super::point::Point;
 use super::quadratic::Quadratic;
 use crate::arithmetic::angle::difference;
-use crate::arithmetic::{Complex, Real, Scalar};
+use crate::arithmetic::{Complex, Over, Real, Scalar};
 use std::sync::Arc;
 
 /// Coordinates, elements and rates at one moment.
@@ -53,11 +53,11 @@ pub struct Linearised<T> {
 
 /// A point and the body it is on.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Site {
+pub struct Site<C = f64> {
     /// The body; `None` for the ground.
     pub body: Option<usize>,
     /// The point.
-    pub point: Point,
+    pub point: Point<C>,
 }
 
 impl Site {
@@ -69,7 +69,7 @@ impl Site {
 
 /// What a row measures.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Measure {
+pub enum Measure<C = f64> {
     /// The angle of a body, from +x where it has no base \[rad\].
     Angle {
         /// The body.
@@ -78,29 +78,29 @@ pub enum Measure {
         base: Option<usize>,
     },
     /// Where a point is \[m\].
-    Place(Quadratic),
+    Place(Quadratic<C>),
 }
 
 /// The force a row exerts: -lambda direction on one body, the opposite on another.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Push {
+pub struct Push<C = f64> {
     /// The body that takes -lambda direction.
     pub on: Option<usize>,
     /// The body that takes the opposite.
     pub from: Option<usize>,
     /// Where to.
-    pub way: Way,
+    pub way: Way<C>,
 }
 
 /// The direction of a force, a unit vector.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Way {
+pub enum Way<C = f64> {
     /// Fixed in the ground.
-    Ground(Complex<f64>),
+    Ground(Complex<C>),
     /// Fixed in the frame of a body.
-    Body(usize, Complex<f64>),
+    Body(usize, Complex<C>),
     /// Along a span of this length \[m\].
-    Span(Point, f64),
+    Span(Point<C>, C),
 }
 
 impl Push {
@@ -116,20 +116,20 @@ impl Push {
 
 /// A row of the mechanism: its measure less a law of time, or a formula of time and place, is to be zero.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ConstraintEquation {
+pub struct ConstraintEquation<C = f64> {
     /// Name in reports: that of the joint or motor, with an axis where there are two.
     pub name: String,
     /// What it measures.
-    pub measure: Measure,
+    pub measure: Measure<C>,
     /// What it is to be; `None`: zero.
-    pub law: Option<Law>,
+    pub law: Option<Law<C>>,
     /// The force it exerts, where it is one.
-    pub push: Option<Push>,
+    pub push: Option<Push<C>>,
     /// The formula of time and place that is taken off.
     pub aim: Option<Arc<Aim>>,
 }
 
-impl ConstraintEquation {
+impl<C: Real> ConstraintEquation<C> {
     /// Name in the scene.
     pub fn name(&self) -> &str {
         &self.name
@@ -155,12 +155,6 @@ impl ConstraintEquation {
         self.is_angle() || self.aim.as_ref().is_some_and(|aim| !aim.angles.is_empty())
     }
 
-    /// True for rows that do work: motors, not locks, nor gears.
-    pub fn is_motor(&self) -> bool {
-        self.law.as_ref().is_some_and(|law| !law.is_constant())
-            || self.aim.as_ref().is_some_and(|aim| aim.is_timed)
-    }
-
     /// The coordinates it depends on; some may come up more than once.
     pub fn coordinates(&self) -> Vec<usize> {
         let mut found: Vec<usize> = match &self.measure {
@@ -172,11 +166,19 @@ impl ConstraintEquation {
     }
 
     /// C, for a row without a law \[m\]: the gap of a wall.
-    pub fn gap<T: Real>(&self, z: &[Complex<T>]) -> T {
+    pub fn gap<T: Over<C>>(&self, z: &[Complex<T>]) -> T {
         match &self.measure {
             Measure::Angle { .. } => T::ZERO,
             Measure::Place(place) => place.value(z),
         }
+    }
+}
+
+impl ConstraintEquation {
+    /// True for rows that do work: motors, not locks, nor gears.
+    pub fn is_motor(&self) -> bool {
+        self.law.as_ref().is_some_and(|law| !law.is_constant())
+            || self.aim.as_ref().is_some_and(|aim| aim.is_timed)
     }
 
     /// Adds the row's Jacobian to `jacobian` (n, zero on entry) and returns the rest.

@@ -7,18 +7,25 @@
 //! The force on the first point is -lambda n, on the second lambda n.
 
 use super::{ConstraintEquation, Measure, Push, Site, Way};
-use crate::arithmetic::Complex;
+use crate::arithmetic::{Complex, Real};
 use crate::dynamics::quadratic::Quadratic;
 
 /// Both rows that keep `a` on `b`, in a mechanism of so many angles.
-pub fn pin_equations(name: &str, a: &Site, b: &Site, angles: usize) -> [ConstraintEquation; 2] {
+pub fn pin_equations<C: Real>(
+    name: &str,
+    a: &Site<C>,
+    b: &Site<C>,
+    angles: usize,
+) -> [ConstraintEquation<C>; 2] {
     let span = a.point.minus(&b.point);
-    [("x", Complex::new(1.0, 0.0)), ("y", Complex::new(0.0, 1.0))].map(|(letter, axis)| ConstraintEquation {
-        name: format!("{name}.{letter}"),
-        measure: Measure::Place(Quadratic::along(&span, axis, angles)),
-        law: None,
-        push: Some(Push { on: a.body, from: b.body, way: Way::Ground(axis) }),
-        aim: None,
+    [("x", Complex::new(C::ONE, C::ZERO)), ("y", Complex::new(C::ZERO, C::ONE))].map(|(letter, axis)| {
+        ConstraintEquation {
+            name: format!("{name}.{letter}"),
+            measure: Measure::Place(Quadratic::along(&span, axis, angles)),
+            law: None,
+            push: Some(Push { on: a.body, from: b.body, way: Way::Ground(axis) }),
+            aim: None,
+        }
     })
 }
 

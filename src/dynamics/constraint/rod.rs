@@ -8,13 +8,20 @@
 //! second lambda D/L.
 
 use super::{ConstraintEquation, Measure, Push, Site, Way};
+use crate::arithmetic::Real;
 use crate::dynamics::quadratic::Quadratic;
 
 /// Keeps `a` at the distance `length` \[m\] from `b`, in a mechanism of so many angles.
-pub fn rod_equation(name: &str, a: &Site, b: &Site, length: f64, angles: usize) -> ConstraintEquation {
+pub fn rod_equation<C: Real>(
+    name: &str,
+    a: &Site<C>,
+    b: &Site<C>,
+    length: C,
+    angles: usize,
+) -> ConstraintEquation<C> {
     let span = a.point.minus(&b.point);
-    let mut place = Quadratic::square(&span, 0.5 / length, angles);
-    place.constant -= 0.5 * length;
+    let mut place = Quadratic::square(&span, C::of(0.5) / length, angles);
+    place.constant -= C::of(0.5) * length;
     ConstraintEquation {
         name: name.into(),
         measure: Measure::Place(place),

@@ -11,21 +11,21 @@
 //! at the same place.
 
 use super::{ConstraintEquation, Measure, Push, Site, Way};
-use crate::arithmetic::Complex;
+use crate::arithmetic::{Complex, Real};
 use crate::dynamics::law::Law;
 use crate::dynamics::quadratic::Quadratic;
 
 /// Keeps a point at a distance, the law's or none, from the point `origin_point` of body `rail` along the
 /// unit vector `normal` of that body's frame.
-pub fn slot_equation(
+pub fn slot_equation<C: Real>(
     name: &str,
-    site: &Site,
+    site: &Site<C>,
     rail: usize,
-    origin_point: &Site,
-    normal: Complex<f64>,
-    law: Option<Law>,
+    origin_point: &Site<C>,
+    normal: Complex<C>,
+    law: Option<Law<C>>,
     angles: usize,
-) -> ConstraintEquation {
+) -> ConstraintEquation<C> {
     ConstraintEquation {
         name: name.into(),
         measure: Measure::Place(Quadratic::along_body(

@@ -7,40 +7,40 @@
 //!
 //! They are accounted for as work, constant ones as well.
 
-use crate::arithmetic::{Complex, Real, Scalar};
+use crate::arithmetic::{Complex, Over, Real};
 use crate::dynamics::Time;
 use crate::dynamics::law::Law;
 use crate::dynamics::point::Point;
 
 /// An applied force or torque of the compiled mechanism.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Action {
+pub struct Action<C = f64> {
     /// Name in the scene.
     pub name: String,
     /// The body it acts on.
     pub body: usize,
     /// Force or torque.
-    pub kind: Kind,
+    pub kind: Kind<C>,
     /// What it is multiplied by; `None`: one.
-    pub law: Option<Law>,
+    pub law: Option<Law<C>>,
 }
 
 /// What acts.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Kind {
+pub enum Kind<C = f64> {
     /// A force \[N\] at a point, in the frame of the body where it `follows`.
     Force {
         /// Where it acts.
-        point: Point,
+        point: Point<C>,
         /// The force \[N\].
-        force: Complex<f64>,
+        force: Complex<C>,
         /// True where it turns with the body.
         follows: bool,
     },
     /// A torque \[N·m\], the opposite of which acts on the base.
     Torque {
         /// The torque \[N·m\].
-        torque: f64,
+        torque: C,
         /// The body that takes the opposite; `None` for the ground.
         base: Option<usize>,
     },
@@ -52,10 +52,12 @@ impl Action {
     pub fn factor<T: Real>(&self, t: Time) -> T {
         self.law.as_ref().map_or(T::ONE, |law| law.value(t))
     }
+}
 
+impl<C: Real> Action<C> {
     /// The force \[N\]; zero for a torque.
     #[inline(always)]
-    pub fn force<T: Scalar>(&self, factor: T, z: &[Complex<T>]) -> Complex<T> {
+    pub fn force<T: Over<C>>(&self, factor: T, z: &[Complex<T>]) -> Complex<T> {
         match &self.kind {
             Kind::Force { force, follows: true, .. } => z[self.body].turn(*force).times(factor),
             Kind::Force { force, .. } => Complex::of(*force).times(factor),
@@ -65,13 +67,13 @@ impl Action {
 
     /// Adds its generalized forces \[N·m, N\].
     #[inline(always)]
-    pub fn pull<T: Scalar>(&self, factor: T, z: &[Complex<T>], load: &mut [T]) {
+    pub fn pull<T: Over<C>>(&self, factor: T, z: &[Complex<T>], load: &mut [T]) {
         match &self.kind {
             Kind::Force { point, .. } => point.pull(self.force(factor, z), z, load),
             Kind::Torque { torque, base } => {
-                load[self.body] += factor.scale(*torque);
+                load[self.body] += factor.by(*torque);
                 if let Some(base) = base {
-                    load[*base] -= factor.scale(*torque);
+                    load[*base] -= factor.by(*torque);
                 }
             }
         }
@@ -79,12 +81,12 @@ impl Action {
 
     /// Its power \[W\].
     #[inline(always)]
-    pub fn power<T: Scalar>(&self, factor: T, z: &[Complex<T>], omega: &[T]) -> T {
+    pub fn power<T: Over<C>>(&self, factor: T, z: &[Complex<T>], omega: &[T]) -> T {
         match &self.kind {
             Kind::Force { point, .. } => self.force(factor, z).dot(point.velocity(z, omega)),
             Kind::Torque { torque, base } => {
                 let rate = base.map_or(omega[self.body], |base| omega[self.body] - omega[base]);
-                (rate * factor).scale(*torque)
+                (rate * factor).by(*torque)
             }
         }
     }

@@ -7,85 +7,88 @@
 //! A spring of free length zero without damper needs no length: F = -k D.  A length of zero with L0 > 0 has
 //! no direction; its force comes out as not a number and the method stops with the time.
 
-use crate::arithmetic::{Complex, Scalar};
+use crate::arithmetic::{Complex, Over, Real};
 use crate::dynamics::point::Point;
 
 /// A spring of the compiled mechanism.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Spring {
+pub struct Spring<C = f64> {
     /// Name in the scene.
     pub name: String,
     /// The bodies its ends are on; `None` for the ground.
     pub bodies: [Option<usize>; 2],
     /// The span D = P_a - P_b.
-    pub span: Point,
+    pub span: Point<C>,
     /// k \[N/m\].
-    pub stiffness: f64,
+    pub stiffness: C,
     /// L0 \[m\].
-    pub free_length: f64,
+    pub free_length: C,
     /// c \[N·s/m\].
-    pub damping: f64,
+    pub damping: C,
 }
 
-impl Spring {
+impl<C: Real> Spring<C> {
     /// True where the force depends on the length, and not on the span alone.
     pub fn needs_length(&self) -> bool {
-        self.free_length != 0.0 || self.damping != 0.0
+        self.free_length != C::ZERO || self.damping != C::ZERO
     }
 
     /// Force \[N\] on the first end.
     #[inline(always)]
-    pub fn force<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
+    pub fn force<T: Over<C>>(&self, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
         let elastic = self.elastic(z);
-        if self.damping == 0.0 { elastic } else { elastic + self.drag(z, omega) }
+        if self.damping == C::ZERO { elastic } else { elastic + self.drag(z, omega) }
     }
 
     /// Force \[N\] of the spring alone on the first end.
     #[inline(always)]
-    pub fn elastic<T: Scalar>(&self, z: &[Complex<T>]) -> Complex<T> {
+    pub fn elastic<T: Over<C>>(&self, z: &[Complex<T>]) -> Complex<T> {
         let span = self.span.position(z);
-        if self.free_length == 0.0 {
-            return -span.times(T::of(self.stiffness));
+        if self.free_length == C::ZERO {
+            return -span.times(T::constant(self.stiffness));
         }
         let length = span.norm_squared().sqrt();
-        span.times(((T::of(self.free_length) - length) / length).scale(self.stiffness))
+        span.times(((T::constant(self.free_length) - length) / length).by(self.stiffness))
     }
 
     /// Force \[N\] on the first end of a spring whose stretch \[m\] is known better than its length.
     #[inline(always)]
-    pub fn stretched<T: Scalar>(&self, stretch: T, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
+    pub fn stretched<T: Over<C>>(&self, stretch: T, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
         let span = self.span.position(z);
-        let elastic = -span.times((stretch / span.norm_squared().sqrt()).scale(self.stiffness));
-        if self.damping == 0.0 { elastic } else { elastic + self.drag(z, omega) }
+        let elastic = -span.times((stretch / span.norm_squared().sqrt()).by(self.stiffness));
+        if self.damping == C::ZERO { elastic } else { elastic + self.drag(z, omega) }
     }
 
     /// L - L0 \[m\] of a span D, without a square root in the difference.
-    pub fn stretch<T: Scalar>(&self, span: Complex<T>) -> T {
+    pub fn stretch<T: Over<C>>(&self, span: Complex<T>) -> T {
         let square = span.norm_squared();
-        let free = T::of(self.free_length);
+        let free = T::constant(self.free_length);
         (square - free * free) / (square.sqrt() + free)
     }
 
     /// Force \[N\] of the damper alone on the first end.
     #[inline(always)]
-    pub fn drag<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
+    pub fn drag<T: Over<C>>(&self, z: &[Complex<T>], omega: &[T]) -> Complex<T> {
         let span = self.span.position(z);
         let rate = span.dot(self.span.velocity(z, omega));
-        -span.times((rate / span.norm_squared()).scale(self.damping))
+        -span.times((rate / span.norm_squared()).by(self.damping))
     }
 
     /// Stored energy \[J\].
     #[inline(always)]
-    pub fn energy<T: Scalar>(&self, z: &[Complex<T>]) -> T {
+    pub fn energy<T: Over<C>>(&self, z: &[Complex<T>]) -> T {
         let square = self.span.position(z).norm_squared();
-        let stretch =
-            if self.free_length == 0.0 { square.sqrt() } else { square.sqrt() - T::of(self.free_length) };
-        (stretch * stretch).scale(0.5 * self.stiffness)
+        let stretch = if self.free_length == C::ZERO {
+            square.sqrt()
+        } else {
+            square.sqrt() - T::constant(self.free_length)
+        };
+        (stretch * stretch).by(C::of(0.5) * self.stiffness)
     }
 
     /// Power \[W\] of the damper on the bodies, never positive.
     #[inline(always)]
-    pub fn drag_power<T: Scalar>(&self, z: &[Complex<T>], omega: &[T]) -> T {
+    pub fn drag_power<T: Over<C>>(&self, z: &[Complex<T>], omega: &[T]) -> T {
         self.drag(z, omega).dot(self.span.velocity(z, omega))
     }
 }

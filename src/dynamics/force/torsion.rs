@@ -6,11 +6,11 @@
 //!
 //! Whole turns count: a mechanism with a torsion spring is integrated in winding angles.
 
-use crate::arithmetic::Scalar;
+use crate::arithmetic::{Over, Real, Scalar};
 
 /// A torsion spring of the compiled mechanism.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Torsion {
+pub struct Torsion<C = f64> {
     /// Name in the scene.
     pub name: String,
     /// Body a.
@@ -18,14 +18,14 @@ pub struct Torsion {
     /// Body b; `None` for the ground.
     pub base: Option<usize>,
     /// k \[N·m/rad\].
-    pub stiffness: f64,
+    pub stiffness: C,
     /// theta0 \[rad\].
-    pub free_angle: f64,
+    pub free_angle: C,
     /// c \[N·m·s/rad\].
-    pub damping: f64,
+    pub damping: C,
 }
 
-impl Torsion {
+impl<C: Real> Torsion<C> {
     /// What the body has more than its base.
     #[inline(always)]
     pub fn between<T: Scalar>(&self, values: &[T]) -> T {
@@ -34,21 +34,21 @@ impl Torsion {
 
     /// Torque \[N·m\] on body a at winding angles `phi` \[rad\] and rates `omega` \[rad/s\].
     #[inline(always)]
-    pub fn torque<T: Scalar>(&self, phi: &[T], omega: &[T]) -> T {
+    pub fn torque<T: Over<C>>(&self, phi: &[T], omega: &[T]) -> T {
         let elastic = self.elastic(phi);
-        if self.damping == 0.0 { elastic } else { elastic + self.drag(omega) }
+        if self.damping == C::ZERO { elastic } else { elastic + self.drag(omega) }
     }
 
     /// Torque \[N·m\] of the spring alone on body a.
     #[inline(always)]
-    pub fn elastic<T: Scalar>(&self, phi: &[T]) -> T {
-        (T::of(self.free_angle) - self.between(phi)).scale(self.stiffness)
+    pub fn elastic<T: Over<C>>(&self, phi: &[T]) -> T {
+        (T::constant(self.free_angle) - self.between(phi)).by(self.stiffness)
     }
 
     /// Torque \[N·m\] of the damper alone on body a.
     #[inline(always)]
-    pub fn drag<T: Scalar>(&self, omega: &[T]) -> T {
-        -self.between(omega).scale(self.damping)
+    pub fn drag<T: Over<C>>(&self, omega: &[T]) -> T {
+        -self.between(omega).by(self.damping)
     }
 
     /// Adds the generalized forces \[N·m\] of a torque on body a.
@@ -62,9 +62,9 @@ impl Torsion {
 
     /// Stored energy \[J\].
     #[inline(always)]
-    pub fn energy<T: Scalar>(&self, phi: &[T]) -> T {
-        let twist = self.between(phi) - T::of(self.free_angle);
-        (twist * twist).scale(0.5 * self.stiffness)
+    pub fn energy<T: Over<C>>(&self, phi: &[T]) -> T {
+        let twist = self.between(phi) - T::constant(self.free_angle);
+        (twist * twist).by(C::of(0.5) * self.stiffness)
     }
 }
 

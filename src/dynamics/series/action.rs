@@ -5,10 +5,9 @@
 //! theta_0 = q_a - q_b,  theta_m = w_{m-1}/m:   torque_m = -k theta_m - c w_m
 //! ```
 
-use super::drive;
-use super::polynomial::{copy, copy_vectors, product, zeros};
+use super::coefficient::SeriesNumber;
+use super::polynomial::{copy, copy_vectors, product_of_numbers, product_of_vectors, zeros};
 use crate::arithmetic::{Complex, Real};
-use crate::dynamics::Time;
 use crate::dynamics::force::action::Kind;
 use crate::dynamics::force::{Action, Torsion};
 
@@ -24,9 +23,9 @@ pub struct ActionSeries<T> {
     rate: Vec<T>,
 }
 
-impl<T: Real> ActionSeries<T> {
+impl<T: SeriesNumber> ActionSeries<T> {
     /// Room for powers up to `order`.
-    pub fn new(action: &Action, order: usize) -> Self {
+    pub fn new(action: &Action<T::Constant>, order: usize) -> Self {
         let is_force = matches!(action.kind, Kind::Force { .. });
         let vectors = || vec![Complex::ZERO; if is_force { order + 1 } else { 0 }];
         Self {
@@ -38,22 +37,22 @@ impl<T: Real> ActionSeries<T> {
     }
 
     /// The law's series about time `t`.
-    pub fn begin(&mut self, action: &Action, t: Time) {
+    pub fn begin(&mut self, action: &Action<T::Constant>, t: T::Time) {
         self.factor.fill(T::ZERO);
         if let Some(law) = &action.law {
-            drive::add(law, 1.0, t, &mut self.factor, 0, 1);
+            T::add_law(law, 1.0, t, &mut self.factor, 0, 1);
             for m in (1..self.factor.len()).rev() {
                 self.factor[m] = self.factor[m - 1] / T::of(m as f64);
             }
         }
-        self.factor[0] = action.factor(t);
+        self.factor[0] = action.law.as_ref().map_or(T::ONE, |law| T::law_value(law, t));
     }
 
     /// Takes power m of the force off the elements' balance, and adds that of a torque to `load`.
     #[inline(always)]
     pub fn act(
         &mut self,
-        action: &Action,
+        action: &Action<T::Constant>,
         m: usize,
         z: &[Complex<T>],
         n: usize,
@@ -72,7 +71,7 @@ impl<T: Real> ActionSeries<T> {
                 point.spread(self.force[m], |k, force| rest[k] -= force);
             }
             Kind::Torque { torque, base } => {
-                let torque = self.factor[m].scale(*torque);
+                let torque = self.factor[m].by(*torque);
                 load[action.body] += torque;
                 if let Some(base) = base {
                     load[*base] -= torque;
@@ -82,14 +81,12 @@ impl<T: Real> ActionSeries<T> {
     }
 
     /// Power m of its power \[W/s^m\], from power m of all rates.
-    pub fn power(&mut self, action: &Action, m: usize, omega: &[T]) -> T {
+    pub fn power(&mut self, action: &Action<T::Constant>, m: usize, omega: &[T]) -> T {
         match &action.kind {
-            Kind::Force { .. } => {
-                product(&self.force[..=m], &self.velocity[..=m], |force, velocity| force.dot(velocity))
-            }
+            Kind::Force { .. } => product_of_vectors(&self.force[..=m], &self.velocity[..=m]),
             Kind::Torque { torque, base } => {
                 self.rate[m] = base.map_or(omega[action.body], |base| omega[action.body] - omega[base]);
-                product(&self.factor[..=m], &self.rate[..=m], |factor, rate| factor * rate).scale(*torque)
+                product_of_numbers(&self.factor[..=m], &self.rate[..=m]).by(*torque)
             }
         }
     }
@@ -105,15 +102,21 @@ impl<T: Real> ActionSeries<T> {
 /// Power m of the torque of a torsion spring on its body \[N·m/s^m\], from the angles at the start and the
 /// series of the rates.
 #[inline(always)]
-pub fn twist<T: Real>(torsion: &Torsion, m: usize, phi: &[T], omega: &[T], n: usize) -> T {
+pub fn twist<T: SeriesNumber>(
+    torsion: &Torsion<T::Constant>,
+    m: usize,
+    phi: &[T],
+    omega: &[T],
+    n: usize,
+) -> T {
     let rate = |m: usize| torsion.between(&omega[m * n..(m + 1) * n]);
     let elastic =
-        if m == 0 { torsion.elastic(phi) } else { -(rate(m - 1) / T::of(m as f64)).scale(torsion.stiffness) };
-    elastic - rate(m).scale(torsion.damping)
+        if m == 0 { torsion.elastic(phi) } else { -(rate(m - 1) / T::of(m as f64)).by(torsion.stiffness) };
+    elastic - rate(m).by(torsion.damping)
 }
 
 /// Power m of the power of its damper \[W/s^m\].
-pub fn loss<T: Real>(torsion: &Torsion, m: usize, omega: &[T], n: usize) -> T {
+pub fn loss<T: SeriesNumber>(torsion: &Torsion<T::Constant>, m: usize, omega: &[T], n: usize) -> T {
     let rate = |m: usize| torsion.between(&omega[m * n..(m + 1) * n]);
-    (0..=m).fold(T::ZERO, |sum, j| sum - (rate(j) * rate(m - j)).scale(torsion.damping))
+    (0..=m).fold(T::ZERO, |sum, j| sum - (rate(j) * rate(m - j)).by(torsion.damping))
 }

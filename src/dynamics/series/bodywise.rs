@@ -4,7 +4,7 @@
 //! z_l × R_{m-l} with R turned to the right, as (R_y, -R_x), whose two sums are added up at the end.  So
 //! neighbouring bodies are neighbouring lanes, whatever their number.
 
-use super::{Coefficient, Series};
+use super::{Series, SeriesNumber, Terms};
 use crate::arithmetic::lanes::{self, Code, Lanes};
 use crate::arithmetic::{Complex, Real};
 use crate::dynamics::Mechanism;
@@ -56,15 +56,15 @@ impl<T: Real> Bodywise<T> {
     }
 }
 
-impl<T: Coefficient> Series<T> {
+impl<T: SeriesNumber> Series<T> {
     /// One order: R_m, a_m, the newest powers of w and z.
     #[inline(always)]
-    pub(super) fn advance_bodywise(&mut self, mechanism: &Mechanism, m: usize) {
+    pub(super) fn advance_bodywise(&mut self, terms: &Terms<T::Constant>, m: usize) {
         let (n, angles) = (self.elements, self.angles);
         let factor = T::of((m + 1) as f64);
         self.load.fill(T::ZERO);
-        self.gravity_forces(mechanism, m);
-        self.force(mechanism, m);
+        self.gravity_forces(terms, m);
+        self.force(terms, m);
         let Some(bodywise) = &mut self.bodywise else { return };
         let Bodywise { evaluation, passes, spread, across, sums } = &mut **bodywise;
         let (turned, bend) = (&mut self.turned[..n], &mut self.bend[..n]);
@@ -121,7 +121,7 @@ fn turn<T: Real>(across: &mut [Complex<T>], rest: &[Complex<T>]) {
     }
 }
 
-/// [`Coefficient::products`](super::Coefficient::products) of any number.
+/// [`SeriesNumber::products`](super::SeriesNumber::products) of any number.
 #[inline]
 pub fn products<T: Real>(n: usize, a: &[Complex<T>], b: &[Complex<T>], sums: &mut [Complex<T>]) {
     for (k, sum) in sums.iter_mut().enumerate() {

@@ -1,31 +1,133 @@
-//! Numbers there are series of.
+//! Numbers there are series of, and what the equations of a mechanism are to them.
 
-use super::{Series, bodywise};
-use crate::arithmetic::{Complex, DoubleDouble, Dual, Real};
+use super::{Series, bodywise, drive};
+use crate::arithmetic::{Complex, DoubleDouble, Dual, Over, Real};
+use crate::dynamics::constraint::ConstraintEquation;
+use crate::dynamics::force::{Action, Spring, Torsion, UserForce};
+use crate::dynamics::law::{Law, Phase};
+use crate::dynamics::partition::CoordinatePartition;
+use crate::dynamics::tree::Tree;
 use crate::dynamics::{Mechanism, Time};
 
+/// The terms of the equations of motion, with constants of the kind `C`.
+#[derive(Clone, Copy, Debug)]
+pub struct Terms<'a, C> {
+    /// The mechanism they are of, for all that is not a constant of theirs.
+    pub structure: &'a Mechanism,
+    /// The hinge trees.
+    pub tree: &'a Tree<C>,
+    /// The driven angles.
+    pub partition: &'a CoordinatePartition<C>,
+    /// Springs and dampers.
+    pub springs: &'a [Spring<C>],
+    /// Torsion springs and dampers.
+    pub torsions: &'a [Torsion<C>],
+    /// Applied forces and torques.
+    pub actions: &'a [Action<C>],
+    /// Forces by formulas and from outside the crate.
+    pub forces: &'a [UserForce],
+    /// Constraint equations.
+    pub constraints: &'a [ConstraintEquation<C>],
+}
+
+impl Mechanism {
+    /// Its terms, with its own constants.
+    pub fn terms(&self) -> Terms<'_, f64> {
+        Terms {
+            structure: self,
+            tree: &self.tree,
+            partition: &self.partition,
+            springs: &self.springs,
+            torsions: &self.torsions,
+            actions: &self.actions,
+            forces: &self.forces,
+            constraints: &self.constraints,
+        }
+    }
+}
+
+/// The constants that go with a number, and its time.
+pub trait Constants: Sized {
+    /// Masses, lengths and all other numbers of a scene.
+    type Constant: Real;
+    /// Time \[s\].
+    type Time: Copy;
+
+    /// The time as such a number \[s\].
+    fn moment(t: Self::Time) -> Self;
+
+    /// A law at a time.
+    fn phase(law: &Law<Self::Constant>, t: Self::Time) -> Phase<Self>;
+
+    /// What a law comes to at a time, turns included.
+    fn law_value(law: &Law<Self::Constant>, t: Self::Time) -> Self;
+
+    /// Adds the series of a law's rate: see [`drive::add`].
+    fn add_law(
+        law: &Law<Self::Constant>,
+        sign: f64,
+        t: Self::Time,
+        series: &mut [Self],
+        first: usize,
+        stride: usize,
+    );
+}
+
 /// A number whose series are compiled with this crate, once, and not anew wherever they are used.
-pub trait Coefficient: Real {
+pub trait SeriesNumber: Real + Constants + Over<<Self as Constants>::Constant> {
     /// Power zero, and the laws' series.
-    fn begin(series: &mut Series<Self>, t: Time, u: &[Self], u_rest: &[Self], u_rate: &[Self]);
+    fn begin(series: &mut Series<Self>, t: Self::Time, u: &[Self], u_rest: &[Self], u_rate: &[Self]);
 
     /// The powers from `first` on.
-    fn orders(series: &mut Series<Self>, mechanism: &Mechanism, first: usize);
+    fn orders(series: &mut Series<Self>, terms: &Terms<Self::Constant>, first: usize);
+
+    /// The number kept to so many limbs, where it has limbs.
+    #[inline(always)]
+    fn kept(self, _limbs: usize) -> Self {
+        self
+    }
 
     /// Writes `Σ_j a_j b_{m-j}` component by component, over series of `n` elements with m+1 powers each, for
     /// as many elements as there are sums.
     fn products(n: usize, a: &[Complex<Self>], b: &[Complex<Self>], sums: &mut [Complex<Self>]);
 }
 
+/// One of those whose constants are doubles.
+pub trait Coefficient: SeriesNumber + Constants<Constant = f64, Time = Time> {}
+
+impl<T: SeriesNumber + Constants<Constant = f64, Time = Time>> Coefficient for T {}
+
 macro_rules! coefficient {
     ($number:ty, $products:path, $orders:expr $(, const $size:ident)?) => {
-        impl $(<const $size: usize>)? Coefficient for $number {
+        impl $(<const $size: usize>)? Constants for $number {
+            type Constant = f64;
+            type Time = Time;
+
+            fn moment(t: Time) -> Self {
+                Self::split(t).0
+            }
+
+            #[inline(always)]
+            fn phase(law: &Law, t: Time) -> Phase<Self> {
+                law.at(t)
+            }
+
+            fn law_value(law: &Law, t: Time) -> Self {
+                law.value(t)
+            }
+
+            fn add_law(law: &Law, sign: f64, t: Time, series: &mut [Self], first: usize, stride: usize) {
+                drive::add(law, sign, t, series, first, stride);
+            }
+        }
+
+        impl $(<const $size: usize>)? SeriesNumber for $number {
             fn begin(series: &mut Series<Self>, t: Time, u: &[Self], u_rest: &[Self], u_rate: &[Self]) {
                 series.begin(t, u, u_rest, u_rate);
             }
 
-            fn orders(series: &mut Series<Self>, mechanism: &Mechanism, first: usize) {
-                $orders(series, mechanism, first);
+            fn orders(series: &mut Series<Self>, terms: &Terms<f64>, first: usize) {
+                $orders(series, terms, first);
             }
 
             #[inline]

@@ -10,9 +10,9 @@
 //! S is factored once a step; where the mechanism is evaluated body by body, in its envelope.  The products
 //! of earlier multipliers with later powers of z enter through the loads like those of any force.
 
-use super::drive;
+use super::coefficient::{SeriesNumber, Terms};
 use super::polynomial::{copy, zeros};
-use crate::arithmetic::{Complex, Real};
+use crate::arithmetic::{Complex, Over, Real};
 use crate::dynamics::constraint::{ConstraintEquation, Measure};
 use crate::dynamics::kernel::dot;
 use crate::dynamics::law::Law;
@@ -21,11 +21,11 @@ use crate::dynamics::quadratic::Quadratic;
 use crate::dynamics::rank::{Levers, Metric};
 use crate::dynamics::recursive::Evaluation;
 use crate::dynamics::schur::{self, NEAR, Weakest};
-use crate::dynamics::{Mechanism, Time, tree};
+use crate::dynamics::tree;
 
 /// Rows in force and their multipliers.
 #[derive(Clone, Debug)]
-pub struct RowSeries<T> {
+pub struct RowSeries<T: SeriesNumber> {
     kinds: Vec<Kind<T>>,
     coordinates: usize,
     /// J by coordinates, and M_0⁻¹ Jᵀ (r × f).
@@ -45,14 +45,14 @@ pub struct RowSeries<T> {
 
 /// A row as the series sees it.
 #[derive(Clone, Debug)]
-enum Kind<T> {
+enum Kind<T: SeriesNumber> {
     /// The function, and the powers of s'.
-    Place { place: Quadratic, law: Option<Law>, drive: Vec<T> },
+    Place { place: Quadratic<T::Constant>, law: Option<Law<T::Constant>>, drive: Vec<T> },
     /// The bodies a and b, and the powers of theta' and of its own rate w_a - w_b.
-    Angle { body: usize, base: Option<usize>, law: Law, drive: Vec<T>, speed: Vec<T> },
+    Angle { body: usize, base: Option<usize>, law: Law<T::Constant>, drive: Vec<T>, speed: Vec<T> },
 }
 
-impl<T: Real> Kind<T> {
+impl<T: SeriesNumber> Kind<T> {
     /// Parts of dC/dq, coordinate by coordinate; a coordinate may come up more than once.
     fn slopes(&self, z: &[Complex<T>], mut each: impl FnMut(usize, T)) {
         match self {
@@ -76,14 +76,20 @@ impl<T: Real> Kind<T> {
     }
 }
 
-impl<T: Real> RowSeries<T> {
+impl<T: SeriesNumber> RowSeries<T> {
     /// Room for the rows that `partition` do not fulfil already: all but the motors' where these are
     /// eliminated. Without matrices where `is_dense` is false.
-    pub fn new(mechanism: &Mechanism, partition: &CoordinatePartition, order: usize, is_dense: bool) -> Self {
-        let kind = |row: &ConstraintEquation| match (&row.measure, &row.law) {
+    pub fn new(
+        terms: &Terms<T::Constant>,
+        partition: &CoordinatePartition<T::Constant>,
+        order: usize,
+        is_dense: bool,
+    ) -> Self {
+        let mechanism = terms.structure;
+        let kind = |row: &ConstraintEquation<T::Constant>| match (&row.measure, &row.law) {
             (Measure::Angle { .. }, _) if partition.driven() => None,
             (&Measure::Angle { body, base }, law) => {
-                let law = law.clone().unwrap_or_else(|| Law::constant(0.0));
+                let law = law.clone().unwrap_or_default();
                 Some(Kind::Angle { body, base, law, drive: zeros(order + 1), speed: zeros(order + 1) })
             }
             (Measure::Place(place), law) => Some(Kind::Place {
@@ -99,7 +105,7 @@ impl<T: Real> RowSeries<T> {
         let levers: Vec<Levers> =
             in_force().map(|row| row.levers(size).into_iter().filter_map(base).collect()).collect();
         let metric = Metric::new(&levers, partition.count(), mechanism.assembly.redundant.len());
-        let kinds: Vec<Kind<T>> = mechanism.constraints.iter().filter_map(kind).collect();
+        let kinds: Vec<Kind<T>> = terms.constraints.iter().filter_map(kind).collect();
         let (r, f) = (kinds.len(), partition.count());
         let matrix = |size: usize| zeros(if is_dense { size } else { 0 });
         Self {
@@ -139,17 +145,23 @@ impl<T: Real> RowSeries<T> {
     }
 
     /// The laws' series at time `t`.
-    pub fn begin(&mut self, t: Time) {
+    pub fn begin(&mut self, t: T::Time) {
         for kind in &mut self.kinds {
             if let Kind::Angle { law, drive, .. } | Kind::Place { law: Some(law), drive, .. } = kind {
                 drive.fill(T::ZERO);
-                drive::add(law, 1.0, t, drive, 0, 1);
+                T::add_law(law, 1.0, t, drive, 0, 1);
             }
         }
     }
 
     /// J and S, from the factors of the mass matrix of the coordinates.
-    pub fn prepare(&mut self, partition: &CoordinatePartition, z: &[Complex<T>], mass: &[T], pivot: &[T]) {
+    pub fn prepare(
+        &mut self,
+        partition: &CoordinatePartition<T::Constant>,
+        z: &[Complex<T>],
+        mass: &[T],
+        pivot: &[T],
+    ) {
         let (r, f) = (self.kinds.len(), self.coordinates);
         self.jacobian.fill(T::ZERO);
         for (kind, jacobian) in self.kinds.iter().zip(self.jacobian.chunks_exact_mut(f.max(1))) {
@@ -165,7 +177,7 @@ impl<T: Real> RowSeries<T> {
         }
         schur::product(r, &self.jacobian, &self.minv_jt, &mut self.schur);
         self.weakest = schur::factor::<T, 0>(r, &mut self.schur, &mut self.pivot, &self.scale);
-        if self.weakest.share < NEAR {
+        if self.weakest.share < NEAR && !T::IS_LONG {
             let rows = [&self.jacobian[..], &self.minv_jt[..]];
             self.weakest = schur::look_closer(
                 &self.metric,
@@ -248,17 +260,16 @@ impl<T: Real> RowSeries<T> {
         for (i, kind) in self.kinds.iter_mut().enumerate() {
             if let Kind::Angle { body, base, speed, .. } = kind {
                 speed[m] = base.map_or(omega[*body], |base| omega[*body] - omega[base]);
-                let sum = (0..=m).fold(T::ZERO, |sum, l| sum + self.multiplier[l * r + i] * speed[m - l]);
-                power -= sum;
+                power -= with_rates(&self.multiplier[i..], r, &speed[..=m]);
             } else if let Kind::Place { drive, law: Some(_), .. } = kind {
-                power -= (0..=m).fold(T::ZERO, |sum, l| sum + self.multiplier[l * r + i] * drive[m - l]);
+                power -= with_rates(&self.multiplier[i..], r, &drive[..=m]);
             }
         }
         power
     }
 
     /// The first powers from another series.
-    pub fn take<U: Real>(&mut self, other: &RowSeries<U>) {
+    pub fn take<U: SeriesNumber>(&mut self, other: &RowSeries<U>) {
         copy(&mut self.multiplier, &other.multiplier);
         for (kind, other) in self.kinds.iter_mut().zip(&other.kinds) {
             if let (Kind::Angle { speed, .. }, Kind::Angle { speed: other, .. }) = (kind, other) {
@@ -268,9 +279,20 @@ impl<T: Real> RowSeries<T> {
     }
 }
 
+/// Power m of the product of a row's multiplier, every `rows`-th number, and a series of m + 1 powers.
+fn with_rates<T: Real>(multiplier: &[T], rows: usize, rates: &[T]) -> T {
+    let pairs = multiplier.iter().step_by(rows).zip(rates.iter().rev());
+    if T::IS_LONG { T::sum_of_products(pairs) } else { pairs.fold(T::ZERO, |sum, (&a, &b)| sum + a * b) }
+}
+
 /// Power m of a row's second derivative without the accelerations of power m: `bend` is what e'' has without
 /// them.
-fn bent<T: Real>(place: &Quadratic, m: usize, z: &[Complex<T>], bend: &[Complex<T>]) -> T {
+fn bent<T: Real + Over<C>, C: Real>(
+    place: &Quadratic<C>,
+    m: usize,
+    z: &[Complex<T>],
+    bend: &[Complex<T>],
+) -> T {
     let n = bend.len();
     let mut sum = T::ZERO;
     place.gradients(&z[..n], |k, gradient| sum += gradient.dot(bend[k]));

@@ -5,8 +5,9 @@
 //! F on a = -k (D - L0 s D) - c (D·D'/q) D
 //! ```
 
-use super::polynomial::{copy, copy_vectors, product, zeros};
-use crate::arithmetic::{Complex, Real};
+use super::coefficient::SeriesNumber;
+use super::polynomial::{copy, copy_vectors, product_of_numbers, product_of_vectors, scaled_vectors, zeros};
+use crate::arithmetic::{Complex, Real, Scalar};
 use crate::dynamics::force::Spring;
 
 /// Series of one spring, powers 0 to P.
@@ -16,6 +17,8 @@ pub struct SpringSeries<T> {
     span: Vec<Complex<T>>,
     /// q, where there is a free length or a damper.
     square: Vec<T>,
+    /// j q_j, where the free length asks for it and numbers are long.
+    weighted_square: Vec<T>,
     /// s, where the free length asks for it.
     inverse_length: Vec<T>,
     /// 1/q, D·D' and their product, where there is a damper.
@@ -24,14 +27,16 @@ pub struct SpringSeries<T> {
     strain_rate: Vec<T>,
 }
 
-impl<T: Real> SpringSeries<T> {
+impl<T: SeriesNumber> SpringSeries<T> {
     /// Room for the series of a spring up to power `order`.
-    pub fn new(spring: &Spring, order: usize) -> Self {
+    pub fn new(spring: &Spring<T::Constant>, order: usize) -> Self {
         let room = |is_wanted: bool| zeros(if is_wanted { order + 1 } else { 0 });
-        let (is_long, is_damped) = (spring.free_length != 0.0, spring.damping != 0.0);
+        let (is_long, is_damped) =
+            (spring.free_length != T::Constant::ZERO, spring.damping != T::Constant::ZERO);
         Self {
             span: vec![Complex::ZERO; order + 1],
             square: room(spring.needs_length()),
+            weighted_square: room(is_long && T::IS_LONG),
             inverse_length: room(is_long),
             inverse_square: room(is_damped),
             closing: room(is_damped),
@@ -51,31 +56,46 @@ impl<T: Real> SpringSeries<T> {
 
     /// Force on the spring's first end at power m, from powers up to m+1 of z.
     #[inline(always)]
-    pub fn force(&mut self, spring: &Spring, m: usize, z: &[Complex<T>], n: usize) -> Complex<T> {
+    pub fn force(
+        &mut self,
+        spring: &Spring<T::Constant>,
+        m: usize,
+        z: &[Complex<T>],
+        n: usize,
+    ) -> Complex<T> {
         let at = |m: usize| spring.span.turned(&z[m * n..(m + 1) * n]);
         self.span[m] = if m == 0 { spring.span.position(z) } else { at(m) };
         let span = &self.span[..=m];
-        let mut force = -span[m].times(T::of(spring.stiffness));
+        let mut force = -span[m].times(T::constant(spring.stiffness));
         if !spring.needs_length() {
             return force;
         }
-        self.square[m] = product(span, span, |a, b| a.dot(b));
+        self.square[m] = product_of_vectors(span, span);
+        if !self.weighted_square.is_empty() {
+            self.weighted_square[m] = self.square[m].scale(m as f64);
+        }
         let square = &self.square[..=m];
-        if spring.free_length != 0.0 {
+        if spring.free_length != T::Constant::ZERO {
             self.inverse_length[m] = if m == 0 {
                 T::ONE / square[0].sqrt()
             } else {
                 let known = &self.inverse_length[..m];
                 let falling = known.iter().rev().zip(&square[1..]).enumerate();
-                let sum = falling
-                    .fold(T::ZERO, |sum, (j, (&s, &q))| sum + (q * s).scale(0.5 * (j + 1) as f64 - m as f64));
+                let sum = if T::IS_LONG {
+                    let weighted = product_of_numbers(known, &self.weighted_square[1..=m]);
+                    weighted.scale(0.5) - product_of_numbers(known, &square[1..]).scale(m as f64)
+                } else {
+                    falling.fold(T::ZERO, |sum, (j, (&s, &q))| {
+                        sum + (q * s).scale(0.5 * (j + 1) as f64 - m as f64)
+                    })
+                };
                 sum / square[0].scale(m as f64)
             };
-            let stretched = product(span, &self.inverse_length[..=m], |span, s| span.times(s));
+            let stretched = scaled_vectors(span, &self.inverse_length[..=m]);
             // In double-double the product must not be rounded: a constant error acts in every step.
-            force += stretched.times(T::of(spring.stiffness).scale(spring.free_length));
+            force += stretched.times(T::constant(spring.stiffness).by(spring.free_length));
         }
-        if spring.damping != 0.0 {
+        if spring.damping != T::Constant::ZERO {
             self.inverse_square[m] = if m == 0 {
                 T::ONE / square[0]
             } else {
@@ -85,20 +105,24 @@ impl<T: Real> SpringSeries<T> {
             // D' at power m is (m+1) D_{m+1}.
             let ahead = at(m + 1);
             let mut closing = span[0].dot(ahead).scale((m + 1) as f64);
-            for l in 1..=m {
-                closing += span[l].dot(span[m - l + 1]).scale((m - l + 1) as f64);
+            if T::IS_LONG {
+                // Σ_{l=1..m} (m-l+1) D_l·D_{m-l+1} has every product twice, with factors that add up to m + 1.
+                closing += product_of_vectors(&span[1..], &span[1..]).scale(0.5 * (m + 1) as f64);
+            } else {
+                for l in 1..=m {
+                    closing += span[l].dot(span[m - l + 1]).scale((m - l + 1) as f64);
+                }
             }
             self.closing[m] = closing;
-            self.strain_rate[m] = product(&self.closing[..=m], &self.inverse_square[..=m], |a, b| a * b);
-            force += product(span, &self.strain_rate[..=m], |span, rate| span.times(rate))
-                .times(T::of(-spring.damping));
+            self.strain_rate[m] = product_of_numbers(&self.closing[..=m], &self.inverse_square[..=m]);
+            force += scaled_vectors(span, &self.strain_rate[..=m]).times(-T::constant(spring.damping));
         }
         force
     }
 
     /// Power of the damper at power m \[W/s^m\].
     #[inline(always)]
-    pub fn loss(&self, spring: &Spring, m: usize) -> T {
-        product(&self.strain_rate[..=m], &self.closing[..=m], |a, b| a * b).scale(-spring.damping)
+    pub fn loss(&self, spring: &Spring<T::Constant>, m: usize) -> T {
+        -product_of_numbers(&self.strain_rate[..=m], &self.closing[..=m]).by(spring.damping)
     }
 }

@@ -1,13 +1,13 @@
 //! The account of work in the series.
 
-use super::coefficient::Coefficient;
+use super::coefficient::{SeriesNumber, Terms};
 use super::{Series, action};
-use crate::dynamics::Mechanism;
+use crate::arithmetic::Scalar;
 
-impl<T: Coefficient> Series<T> {
+impl<T: SeriesNumber> Series<T> {
     /// Torques of the driven bodies and the power of motors and dampers at this order.
     #[inline(always)]
-    pub(super) fn work_integral(&mut self, mechanism: &Mechanism, m: usize) {
+    pub(super) fn work_integral(&mut self, terms: &Terms<T::Constant>, m: usize) {
         let n = self.elements;
         let mut power = T::ZERO;
         if self.is_tied {
@@ -19,18 +19,25 @@ impl<T: Coefficient> Series<T> {
                 .filter(|(_, dependent_angle)| !dependent_angle.laws.is_empty())
             {
                 let mut torque =
-                    (self.omega[(m + 1) * n + i] * T::of((m + 1) as f64)).scale(mechanism.tree.diagonal[i]);
-                for (z, &rest) in
-                    self.z[i..].iter().step_by(n).zip(self.rest[..=m * n + i].iter().rev().step_by(n))
-                {
-                    torque += z.cross(rest);
+                    (self.omega[(m + 1) * n + i] * T::of((m + 1) as f64)).by(terms.tree.diagonal[i]);
+                let pairs = || {
+                    let rest = self.rest[..=m * n + i].iter().rev().step_by(n);
+                    self.z[i..].iter().step_by(n).zip(rest)
+                };
+                if T::IS_LONG {
+                    torque += T::sum_of_products(pairs().map(|(z, rest)| (&z.re, &rest.im)));
+                    torque -= T::sum_of_products(pairs().map(|(z, rest)| (&z.im, &rest.re)));
+                } else {
+                    pairs().for_each(|(z, &rest)| torque += z.cross(rest));
                 }
                 torque -= self.applied[m * n + i];
                 self.torque[m * n + i] = torque;
-                for (&torque, &drive) in
-                    self.torque[i..].iter().step_by(n).zip(self.drive[..=m * n + i].iter().rev().step_by(n))
-                {
-                    power += torque * drive;
+                let drive = self.drive[..=m * n + i].iter().rev().step_by(n);
+                let pairs = self.torque[i..].iter().step_by(n).zip(drive);
+                if T::IS_LONG {
+                    power += T::sum_of_products(pairs);
+                } else {
+                    pairs.for_each(|(&torque, &drive)| power += torque * drive);
                 }
             }
         }
@@ -38,17 +45,17 @@ impl<T: Coefficient> Series<T> {
             power += self.rows.power(m, &self.omega[m * n..(m + 1) * n]);
         }
         for (spring, series) in
-            mechanism.springs.iter().zip(&self.springs).filter(|(spring, _)| spring.damping != 0.0)
+            terms.springs.iter().zip(&self.springs).filter(|(spring, _)| spring.damping != T::Constant::ZERO)
         {
             power += series.loss(spring, m);
         }
-        for torsion in mechanism.torsions.iter().filter(|torsion| torsion.damping != 0.0) {
+        for torsion in terms.torsions.iter().filter(|torsion| torsion.damping != T::Constant::ZERO) {
             power += action::loss(torsion, m, &self.omega, n);
         }
-        for (action, series) in mechanism.actions.iter().zip(&mut self.actions) {
+        for (action, series) in terms.actions.iter().zip(&mut self.actions) {
             power += series.power(action, m, &self.omega[m * n..(m + 1) * n]);
         }
-        for (force, series) in mechanism.forces.iter().zip(&self.forces) {
+        for (force, series) in terms.forces.iter().zip(&self.forces) {
             power += series.power(force, m);
         }
         self.power[m] = power;

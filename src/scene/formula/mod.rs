@@ -19,7 +19,7 @@ pub(crate) use error::meant;
 pub use table::{Interpolant, POINTS};
 use unit::{Dimension, Mismatch};
 
-use crate::arithmetic::Scalar;
+use crate::arithmetic::{Real, Scalar};
 
 /// The longest formula \[bytes\].
 pub const LONGEST: usize = 4096;
@@ -168,6 +168,16 @@ impl Formula {
         self.run(values, |number, _| bits.get(number).copied().unwrap_or(false))
     }
 
+    /// Its value over a scalar with an order, where `number` gives the numbers in its text as such scalars.
+    pub(crate) fn exact_value<S: Real>(&self, values: &[S], number: impl Fn(f64) -> S) -> S {
+        self.run_over(values, &number, |_, condition| condition > S::ZERO)
+    }
+
+    /// True where a number in it is in degrees.
+    pub(crate) fn has_angle_units(&self) -> bool {
+        self.text.split(|letter: char| !letter.is_ascii_alphabetic()).any(|word| word == "deg")
+    }
+
     /// The branches that hold at these values, by the signs of the conditions there.
     pub fn modes(&self, values: &[f64]) -> Vec<bool> {
         let mut modes = vec![false; self.conditions.len()];
@@ -191,7 +201,16 @@ impl Formula {
         });
     }
 
-    fn run<S: Scalar>(&self, values: &[S], mut is_positive: impl FnMut(usize, S) -> bool) -> S {
+    fn run<S: Scalar>(&self, values: &[S], is_positive: impl FnMut(usize, S) -> bool) -> S {
+        self.run_over(values, &S::of, is_positive)
+    }
+
+    fn run_over<S: Scalar>(
+        &self,
+        values: &[S],
+        number: &impl Fn(f64) -> S,
+        mut is_positive: impl FnMut(usize, S) -> bool,
+    ) -> S {
         if let [Node::Name(number)] = self.nodes[..] {
             return values.get(number).copied().unwrap_or(S::ZERO);
         }
@@ -211,6 +230,7 @@ impl Formula {
                     Node::Select(condition, a, b) => {
                         if is_positive(condition, at(self.conditions[condition])) { at(a) } else { at(b) }
                     }
+                    Node::Number(value) => number(value),
                     node => self.smooth(node, at),
                 };
             results.push(result);

@@ -14,7 +14,7 @@ const LONGEST: f64 = 1e9;
 
 /// Series and what goes into them.
 #[derive(Clone, Debug)]
-pub struct Expansion<T> {
+pub struct Expansion<T: Coefficient> {
     mechanism: Mechanism,
     coordinates: Coordinates,
     series: Series<T>,

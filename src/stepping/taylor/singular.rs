@@ -41,7 +41,7 @@ pub const HINT: &str = "try another tolerance, --method dp8, or a start that doe
 
 /// What passages are looked for and confirmed with.
 #[derive(Clone, Debug)]
-pub struct SingularPassage<T> {
+pub struct SingularPassage<T: Coefficient> {
     kernel: Kernel<f64>,
     /// The series about a passage's end.
     back: Expansion<T>,

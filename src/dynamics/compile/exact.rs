@@ -1,0 +1,252 @@
+//! The mechanism of a scene whose numbers are known exactly: the same compilation, with constants of many
+//! digits.
+
+use super::parts;
+use super::{Body, Mechanism, dense_constants};
+use crate::arithmetic::{Complex, Real, Scalar};
+use crate::dynamics::constraint::{ConstraintEquation, Measure};
+use crate::dynamics::force::{Action, Spring, Torsion};
+use crate::dynamics::forest::Forest;
+use crate::dynamics::kernel::dot;
+use crate::dynamics::partition::CoordinatePartition;
+use crate::dynamics::series::{SeriesNumber, Terms};
+use crate::dynamics::tree::{self, Tree};
+use crate::scene::Scene;
+use std::sync::Arc;
+
+/// Constants of a mechanism in numbers of the kind `C`, and where it starts.
+#[derive(Clone, Debug)]
+pub struct ExactMechanism<C> {
+    /// The mechanism in doubles, for all that is not a constant.
+    pub structure: Arc<Mechanism>,
+    /// Bodies in the order of the scene's bars.
+    pub bodies: Vec<Body<C>>,
+    /// How they hang.
+    pub forest: Forest<C>,
+    /// The hinge trees' matrices.
+    pub tree: Tree<C>,
+    /// The driven angles.
+    pub partition: CoordinatePartition<C>,
+    /// Springs and dampers.
+    pub springs: Vec<Spring<C>>,
+    /// Torsion springs and dampers.
+    pub torsions: Vec<Torsion<C>>,
+    /// Applied forces and torques.
+    pub actions: Vec<Action<C>>,
+    /// Constraint equations.
+    pub constraints: Vec<ConstraintEquation<C>>,
+    /// The gap of each wall, and its restitution.
+    pub walls: Vec<(ConstraintEquation<C>, C)>,
+    /// Energy of gravity of the masses if they were at the ground points they hang from \[J\].
+    ground_energy: C,
+}
+
+/// Positions and rates of all coordinates at the start, and which of the angles and rates the scene gives.
+#[derive(Clone, Debug)]
+pub struct ExactStart<C> {
+    /// Angles \[rad\] of any number of turns, then positions of origins \[m\].
+    pub phi: Vec<C>,
+    /// Rates \[rad/s, m/s\].
+    pub omega: Vec<C>,
+    /// Angles, and rates, that are as the scene gives them.
+    pub given: [Vec<bool>; 2],
+}
+
+impl<C: Real> ExactMechanism<C> {
+    /// The mechanism of a scene, which is `structure` in doubles.
+    ///
+    /// # Errors
+    /// What of it is not carried in many digits.
+    pub fn new(scene: &Scene<C>, structure: &Arc<Mechanism>) -> Result<Self, String> {
+        if !structure.tree.is_dense() {
+            return Err("a mechanism of so many bodies is not carried in many digits".into());
+        }
+        let forest = Forest::new(scene);
+        let bodies = parts::bodies(scene, &forest);
+        let gravity = Complex::new(scene.gravity[0], scene.gravity[1]);
+        let mut constraints = parts::given_angles(scene);
+        if structure.has_closed_loops() {
+            // Angles kept from the start are those of the start that was found.
+            for row in parts::kept_angles(scene) {
+                let law = structure.constraints[row].law.as_ref();
+                if let (Some(law), Some(kept)) = (law, &mut constraints[row].law) {
+                    kept.start = C::of(law.start);
+                }
+            }
+        }
+        let partition = CoordinatePartition::new(bodies.len(), forest.coordinates, &constraints)
+            .map_err(|error| error.to_string())?;
+        parts::joints(scene, &forest, &mut constraints);
+        constraints.extend(parts::guides(scene, &forest));
+        let ground_energy = (bodies.iter().zip(&forest.roots()))
+            .fold(C::ZERO, |sum, (body, &root)| sum - body.mass * gravity.dot(root));
+        Ok(Self {
+            structure: Arc::clone(structure),
+            tree: dense_constants(&bodies, &forest, gravity),
+            partition,
+            springs: parts::springs(scene, &forest),
+            torsions: parts::torsions(scene),
+            actions: parts::actions(scene, &forest),
+            walls: (scene.walls.iter())
+                .map(|wall| {
+                    let normal = Complex::new(wall.normal[0], wall.normal[1]);
+                    (parts::along_wall(&forest, wall, normal, None).0, wall.restitution)
+                })
+                .collect(),
+            constraints,
+            ground_energy,
+            bodies,
+            forest,
+        })
+    }
+
+    /// The terms of its equations.
+    pub fn terms(&self) -> Terms<'_, C> {
+        Terms {
+            structure: &self.structure,
+            tree: &self.tree,
+            partition: &self.partition,
+            springs: &self.springs,
+            torsions: &self.torsions,
+            actions: &self.actions,
+            forces: &[],
+            constraints: &self.constraints,
+        }
+    }
+
+    /// Elements at these coordinates.
+    pub fn elements(&self, phi: &[C]) -> Vec<Complex<C>>
+    where
+        C: crate::arithmetic::Over<C>,
+    {
+        let mut z = vec![Complex::ZERO; phi.len()];
+        self.tree.unit_vectors::<C, 0>(phi, &mut z);
+        z
+    }
+
+    /// Kinetic and potential energy \[J\].
+    pub fn energy(&self, phi: &[C], omega: &[C], z: &[Complex<C>]) -> [C; 2]
+    where
+        C: crate::arithmetic::Over<C>,
+    {
+        let n = phi.len();
+        let (mut mass, mut twist) = (vec![C::ZERO; n * n], vec![C::ZERO; n * n]);
+        let mut momentum = vec![C::ZERO; n];
+        self.tree.mass_matrix::<C, 0>(z, &mut mass, &mut twist);
+        tree::multiply::<C, 0>(n, &mass, omega, &mut momentum);
+        let gravity = self.tree.gravity_energy(z) + self.ground_energy;
+        let springs = self.springs.iter().fold(gravity, |sum, spring| sum + spring.energy(z));
+        let potential = self.torsions.iter().fold(springs, |sum, torsion| sum + torsion.energy(phi));
+        [dot(omega, &momentum).scale(0.5), potential]
+    }
+
+    /// Centres of mass \[m\] and their velocities \[m/s\].
+    pub fn centres(&self, z: &[Complex<C>], omega: &[C]) -> Vec<[Complex<C>; 2]>
+    where
+        C: crate::arithmetic::Over<C>,
+    {
+        let zeros = || vec![Complex::ZERO; self.bodies.len()];
+        let (mut at, mut velocities) = (zeros(), zeros());
+        self.forest.translations(z, &mut at);
+        self.forest.origin_velocities(z, omega, &mut velocities);
+        let centre = |(k, body): (usize, &Body<C>)| {
+            let arm = z[k].turn(body.centre);
+            [at[k] + arm, velocities[k] + arm.left().times(omega[k])]
+        };
+        self.bodies.iter().enumerate().map(centre).collect()
+    }
+
+    /// The start as the scene gives it, with what was found in doubles for the rest.
+    pub fn start(&self, scene: &Scene<C>, plain: &Scene) -> ExactStart<C>
+    where
+        C: crate::arithmetic::Over<C>,
+    {
+        let (n, bars) = (self.structure.coordinates(), self.bodies.len());
+        let found = self.structure.start(plain);
+        let changed = |k: usize| {
+            (found.unwrapped(k) - plain.start[k].phi).abs() > 1e-12 * found.phi[k].hi.abs().max(1.0)
+        };
+        let whole = |k: usize| {
+            let turns = C::of(found.turns.get(k).copied().unwrap_or(0) as f64);
+            C::split(found.phi[k]).0 + C::ONE.atan2(C::ZERO).scale(4.0) * turns
+        };
+        let mut start = ExactStart {
+            phi: (0..n).map(whole).collect(),
+            omega: (0..n).map(|k| C::split(found.omega[k]).0).collect(),
+            given: [vec![false; n], vec![false; n]],
+        };
+        for k in 0..bars {
+            if scene.given[k].phi && !changed(k) {
+                (start.phi[k], start.given[0][k]) = (scene.start[k].phi, true);
+            }
+            let rate = (found.omega[k].hi - plain.start[k].omega).abs();
+            if scene.given[k].omega && rate <= 1e-12 * found.omega[k].hi.abs().max(1.0) {
+                (start.omega[k], start.given[1][k]) = (scene.start[k].omega, true);
+            }
+        }
+        self.put_origins(scene, &mut start);
+        start
+    }
+
+    /// Positions and velocities of origins that move freely, from those given for some bar of each group.
+    fn put_origins(&self, scene: &Scene<C>, start: &mut ExactStart<C>)
+    where
+        C: crate::arithmetic::Over<C>,
+    {
+        let (n, bars) = (start.phi.len(), self.bodies.len());
+        for x in (bars..n).step_by(2) {
+            let end = |k: usize| self.forest.walk(k, self.bodies[k].ends[0]);
+            let group: Vec<usize> =
+                (0..bars).filter(|&k| end(k).shifts.first().is_some_and(|shift| shift.0 == x)).collect();
+            if let Some((k, at)) = group.iter().find_map(|&k| Some((k, scene.given[k].origin?))) {
+                let mut z = self.elements(&start.phi);
+                z[x] = Complex::ZERO;
+                let reach = end(k).position(&z);
+                (start.phi[x], start.phi[x + 1]) = (at[0] - reach.re, at[1] - reach.im);
+                start.given[0][x..x + 2].fill(true);
+            }
+            if let Some((k, rate)) = group.iter().find_map(|&k| Some((k, scene.given[k].velocity?))) {
+                let z = self.elements(&start.phi);
+                start.omega[x..x + 2].fill(C::ZERO);
+                let swing = end(k).velocity(&z, &start.omega);
+                (start.omega[x], start.omega[x + 1]) = (rate[0] - swing.re, rate[1] - swing.im);
+                start.given[1][x..x + 2].fill(true);
+            }
+        }
+    }
+}
+
+impl<T: SeriesNumber<Constant = T>> ExactMechanism<T> {
+    /// What is left of every constraint equation, and its rate, at a time; adds its Jacobian to `jacobian`
+    /// (rows × n).
+    pub fn residuals(&self, t: T::Time, phi: &[T], omega: &[T], jacobian: &mut [T]) -> Vec<[T; 2]> {
+        let (z, n) = (self.elements(phi), phi.len());
+        let rows = self.constraints.iter().zip(jacobian.chunks_exact_mut(n.max(1)));
+        rows.map(|(row, jacobian)| {
+            let measured = match &row.measure {
+                Measure::Angle { body, base } => {
+                    jacobian[*body] += T::ONE;
+                    base.iter().for_each(|&base| jacobian[base] -= T::ONE);
+                    base.map_or(phi[*body], |base| phi[*body] - phi[base])
+                }
+                Measure::Place(place) => {
+                    place.slopes(&z, |k, slope| jacobian[k] += slope);
+                    place.value(&z)
+                }
+            };
+            let phase = row.law.as_ref().map(|law| (T::law_value(law, t), T::phase(law, t).rate));
+            let (wanted, rate) = phase.unwrap_or((T::ZERO, T::ZERO));
+            [whole_turns_off(measured - wanted, row.is_angle()), dot(jacobian, omega) - rate]
+        })
+        .collect()
+    }
+}
+
+/// An angle less the whole turns nearest to it.
+fn whole_turns_off<T: Scalar + Real>(residual: T, is_angle: bool) -> T {
+    let turns = (residual.value() / std::f64::consts::TAU).round();
+    if !is_angle || turns == 0.0 || !turns.is_finite() {
+        return residual;
+    }
+    residual - T::ONE.atan2(T::ZERO).scale(4.0 * turns)
+}

@@ -1,0 +1,69 @@
+//! Series of numbers of many digits: constants and time have as many, and laws are evaluated in them.
+
+use super::{Constants, Series, SeriesNumber, Terms, bodywise};
+use crate::arithmetic::digits::Digits;
+use crate::arithmetic::{Complex, Over, Scalar};
+use crate::dynamics::law::{Law, Phase, Sine};
+
+impl<const W: usize> Constants for Digits<W> {
+    type Constant = Self;
+    type Time = Self;
+
+    fn moment(t: Self) -> Self {
+        t
+    }
+
+    fn phase(law: &Law<Self>, t: Self) -> Phase<Self> {
+        let mut rate = law.rate + law.acceleration * t;
+        let mut acceleration = law.acceleration;
+        for sine in &law.sines {
+            let (sin, cos) = argument(sine, t).sin_cos();
+            rate += sine.amplitude * sine.frequency * cos;
+            acceleration -= sine.amplitude * sine.frequency * sine.frequency * sin;
+        }
+        let angle = Self::law_value(law, t);
+        Phase { angle, unit: Complex::unit(angle), rate, acceleration }
+    }
+
+    fn law_value(law: &Law<Self>, t: Self) -> Self {
+        let polynomial = law.start + law.rate * t + (law.acceleration * t * t).ldexp(-1);
+        law.sines.iter().fold(polynomial, |sum, sine| sum + sine.amplitude * argument(sine, t).sin_cos().0)
+    }
+
+    fn add_law(law: &Law<Self>, sign: f64, t: Self, series: &mut [Self], first: usize, stride: usize) {
+        series[first] += Self::phase(law, t).rate.scale(sign);
+        series[first + stride] += law.acceleration.scale(sign);
+        for sine in &law.sines {
+            let (sin, cos) = argument(sine, t).sin_cos();
+            // The m-th derivative of A f cos is A f^(m+1) cos, -sin, -cos, sin; power 0 is there already.
+            let turns = [cos, -sin, -cos, sin];
+            let mut factor = (sine.amplitude * sine.frequency).scale(sign);
+            for (m, power) in series[first..].iter_mut().step_by(stride).enumerate().skip(1) {
+                factor = factor.by(sine.frequency) / Self::whole(m as u64);
+                *power += turns[m % 4] * factor;
+            }
+        }
+    }
+}
+
+fn argument<const W: usize>(sine: &Sine<Digits<W>>, t: Digits<W>) -> Digits<W> {
+    sine.frequency * t + sine.phase
+}
+
+impl<const W: usize> SeriesNumber for Digits<W> {
+    fn begin(series: &mut Series<Self>, t: Self, u: &[Self], u_rest: &[Self], u_rate: &[Self]) {
+        series.begin(t, u, u_rest, u_rate);
+    }
+
+    fn orders(series: &mut Series<Self>, terms: &Terms<Self>, first: usize) {
+        series.orders::<0>(terms, first);
+    }
+
+    fn kept(self, limbs: usize) -> Self {
+        self.shortened(limbs.min(self.limbs()))
+    }
+
+    fn products(n: usize, a: &[Complex<Self>], b: &[Complex<Self>], sums: &mut [Complex<Self>]) {
+        bodywise::products(n, a, b, sums);
+    }
+}

@@ -1,0 +1,305 @@
+//! How a run in many digits went: its table, its record, its page.
+
+use super::page::{Page, counted, figure, magnitude};
+use crate::arithmetic::digits::Layout as Decimals;
+use crate::dynamics::Mechanism;
+use crate::run::digits::{Forecast, Pair, Row, Source, Wide};
+use crate::run::files::sha256;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
+use std::io::{self, BufWriter, Write};
+
+/// What a table shows of each body.
+const QUANTITIES: [(&str, &str); 6] =
+    [("phi", "rad"), ("omega", "rad/s"), ("x", "m"), ("y", "m"), ("vx", "m/s"), ("vy", "m/s")];
+/// Digits beyond those known that are shown.
+const BEYOND: usize = 3;
+
+/// How rows are laid out.
+#[derive(Clone, Debug)]
+pub struct Layout {
+    names: Vec<String>,
+    /// Digits shown, where they were asked for.
+    shown: Option<usize>,
+    /// Digits carried.
+    carried: usize,
+    is_proved: bool,
+}
+
+impl Layout {
+    /// Of a mechanism; `is_proved` where two runs are compared.
+    pub fn new(mechanism: &Mechanism, shown: Option<usize>, carried: usize, is_proved: bool) -> Self {
+        let names = mechanism.own_bodies().iter().map(|body| body.name.clone()).collect();
+        Self { names, shown, carried, is_proved }
+    }
+
+    /// Digits of the numbers of a row.
+    fn digits(&self, agreement: Option<f64>) -> usize {
+        let known = agreement.map_or(self.carried, |digits| digits.max(0.0) as usize + BEYOND);
+        self.shown.unwrap_or(known).max(1)
+    }
+
+    fn header(&self) -> String {
+        let mut columns = vec!["t [s]".to_owned()];
+        for name in &self.names {
+            columns.extend(QUANTITIES.map(|(quantity, unit)| format!("{name}.{quantity} [{unit}]")));
+        }
+        columns.extend(["kinetic [J]", "potential [J]", "work [J]", "imbalance [1]"].map(str::to_owned));
+        columns.extend(["residual [rad or m]", "residual' [rad/s or m/s]"].map(str::to_owned));
+        columns.extend(self.is_proved.then(|| "agreement [digits]".to_owned()));
+        columns.join(",")
+    }
+}
+
+/// Numbers as decimal text.
+fn decimal(number: &Wide, digits: usize) -> String {
+    number.to_decimal(digits, Decimals::Free)
+}
+
+/// The trajectory as CSV.
+pub struct Table<W: Write> {
+    layout: Layout,
+    writer: BufWriter<W>,
+}
+
+impl<W: Write> Table<W> {
+    /// With its header.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn new(layout: Layout, writer: W) -> io::Result<Self> {
+        let mut table = Self::going_on(layout, writer);
+        writeln!(table.writer, "{}", table.layout.header())?;
+        Ok(table)
+    }
+
+    /// One whose header is there.
+    pub fn going_on(layout: Layout, writer: W) -> Self {
+        Self { layout, writer: BufWriter::new(writer) }
+    }
+
+    /// Its layout.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// Writes a row.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn write(&mut self, row: &Row, agreement: Option<f64>) -> io::Result<()> {
+        let digits = self.layout.digits(agreement);
+        let bodies = row.bodies.iter().take(self.layout.names.len()).flatten();
+        let mut cells = vec![decimal(&row.t, self.layout.carried)];
+        cells.extend(bodies.chain(&row.energy).map(|number| decimal(number, digits)));
+        cells.extend([row.drift, row.residual[0], row.residual[1]].map(|number| format!("{number:.3e}")));
+        cells.extend(agreement.map(|agreement| format!("{agreement:.1}")));
+        writeln!(self.writer, "{}", cells.join(","))
+    }
+
+    /// Writes out what is buffered.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn written(&mut self) -> io::Result<&mut W> {
+        self.writer.flush()?;
+        Ok(self.writer.get_mut())
+    }
+
+    /// Hands the writer back.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn finish(self) -> io::Result<W> {
+        self.writer.into_inner().map_err(io::IntoInnerError::into_error)
+    }
+}
+
+/// What rows so far amount to.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Summary {
+    /// Time of the last row \[s\].
+    pub t: f64,
+    /// Rows.
+    pub rows: u64,
+    /// Largest imbalance of energy over its scale.
+    pub drift: f64,
+    /// Largest residuals of the constraints.
+    pub residual: [f64; 2],
+    /// Digits of agreement at the last row.
+    pub agreement: Option<f64>,
+    /// The least of all rows.
+    pub least: Option<f64>,
+    /// Where the runs part \[s\].
+    pub parted: Option<f64>,
+    /// Wall time \[s\].
+    #[serde(skip)]
+    pub wall_s: f64,
+    /// The numbers of the last row, body by body.
+    last: Vec<Vec<Vec<u64>>>,
+}
+
+impl Summary {
+    /// Takes a row.
+    pub fn take(&mut self, row: &Row, agreement: Option<f64>) {
+        (self.t, self.rows) = (row.time(), self.rows + 1);
+        self.drift = self.drift.max(row.drift.abs());
+        self.residual = std::array::from_fn(|level| self.residual[level].max(row.residual[level]));
+        self.agreement = agreement;
+        self.least = match (self.least, agreement) {
+            (Some(least), Some(agreement)) => Some(least.min(agreement)),
+            (least, agreement) => agreement.or(least),
+        };
+        self.last = row.bodies.iter().map(|body| body.iter().map(Wide::to_words).collect()).collect();
+    }
+
+    /// Takes the row at which runs part.
+    pub fn parts(&mut self, row: &Row, agreement: f64) {
+        (self.parted, self.agreement) = (Some(row.time()), Some(agreement));
+    }
+
+    fn last(&self) -> Vec<Vec<Wide>> {
+        let body = |words: &Vec<Vec<u64>>| words.iter().filter_map(|words| Wide::from_words(words)).collect();
+        self.last.iter().map(body).collect()
+    }
+}
+
+/// What is reported.
+pub struct Shown<'a> {
+    /// The scene.
+    pub source: &'a Source,
+    /// The runs.
+    pub pair: &'a Pair,
+    /// How numbers are laid out.
+    pub layout: &'a Layout,
+    /// What the rows amount to.
+    pub summary: &'a Summary,
+    /// How near runs must be \[rad\].
+    pub within: Option<f64>,
+}
+
+/// What a proof will take, before it begins.
+pub fn forecast(forecast: &Forecast, until: f64) -> String {
+    let Forecast { growth, run, companion, steps, seconds, .. } = forecast;
+    format!(
+        "errors grow by {growth:.1} digits up to t = {until} s: {} digits at order {} and, beside them, {} at order {}; about {steps} steps, {} s of computing",
+        run.digits,
+        run.order,
+        companion.digits,
+        companion.order,
+        super::page::rough(*seconds)
+    )
+}
+
+/// The report as one JSON object; numbers of many digits are texts.
+pub fn object(shown: &Shown) -> Value {
+    let Shown { source, pair, layout, summary, within } = shown;
+    let digits = layout.digits(summary.agreement);
+    let bodies: Map<String, Value> = (layout.names.iter().zip(summary.last()))
+        .map(|(name, numbers)| {
+            let member = |(&(key, _), number): (&(&str, &str), &Wide)| {
+                (key.to_owned(), json!(decimal(number, digits)))
+            };
+            (name.clone(), Value::Object(QUANTITIES.iter().zip(&numbers).map(member).collect()))
+        })
+        .collect();
+    let run = |run: &dyn crate::run::digits::LongRun| {
+        let ([steps, impacts], precision) = (run.counts(), run.precision());
+        json!({"digits": precision.digits, "order": precision.order, "steps": steps, "impacts": impacts})
+    };
+    let runs: Vec<Value> = pair.runs().iter().map(|one| run(&**one)).collect();
+    json!({
+        "scene": source.scene.name,
+        "method": "taylor",
+        "settings": runs.first(),
+        "until": summary.t,
+        "rows": summary.rows,
+        "steps": pair.runs().first().map(|run| run.counts()[0]),
+        "wall_s": summary.wall_s,
+        "final": {"t": summary.t, "bodies": bodies},
+        "energy": {
+            "kind": if source.mechanism.has_work_integral() { "energy minus work" } else { "energy" },
+            "max_relative": summary.drift,
+            "scale": source.mechanism.energy_scale,
+        },
+        "constraints": {"position_max": summary.residual[0], "velocity_max": summary.residual[1]},
+        "trust": within.map(|within| json!({
+            "within": within,
+            "until": summary.t,
+            "agreement_digits": summary.agreement,
+            "least_agreement_digits": summary.least,
+            "parted_at": summary.parted,
+            "runs": runs,
+            "how": "two runs with other digits and orders, compared at every row",
+        })),
+    })
+}
+
+/// The record of a run: the report, the scene, versions; what depends on the clock stands apart.
+pub fn record(shown: &Shown, trajectory: &str) -> Value {
+    let mut object = object(shown);
+    let wall = object.as_object_mut().and_then(|members| members.remove("wall_s"));
+    let scene = json!(shown.source.scene);
+    json!({
+        "driftless": env!("CARGO_PKG_VERSION"),
+        "scene_sha256": sha256(&scene.to_string()),
+        "trajectory_sha256": trajectory,
+        "scene": scene,
+        "result": object,
+        "timings": {"wall_s": wall},
+    })
+}
+
+/// The report as a page.
+pub fn text(shown: &Shown) -> String {
+    let Shown { source, pair, layout, summary, within } = shown;
+    let mut page = Page::new(&source.scene.name, &source.scene.description);
+    for run in pair.runs() {
+        let ([steps, impacts], precision) = (run.counts(), run.precision());
+        let mut words = format!(
+            "taylor of order {} on {} digits, {}",
+            precision.order,
+            precision.digits,
+            counted(steps, "step", "steps")
+        );
+        if !source.mechanism.contacts.is_empty() {
+            words += &format!(", {}", counted(impacts, "impact", "impacts"));
+        }
+        page.entry("method", &words);
+    }
+    page.entry("cost", &format!("{:.3} s", summary.wall_s));
+    if let Some(within) = within {
+        let digits = summary.agreement.unwrap_or(0.0);
+        page.entry(
+            "trusted until",
+            &match summary.parted {
+                None => format!("t = {} s: both runs agree to {digits:.1} digits there", figure(summary.t)),
+                Some(t) => format!(
+                    "t = {} s: the runs part by more than {within} at t = {} s",
+                    figure(summary.t),
+                    figure(t)
+                ),
+            },
+        );
+        if let Some(least) = summary.least {
+            page.entry(
+                "",
+                &format!("{least:.1} digits at the least of {}", counted(summary.rows, "row", "rows")),
+            );
+        }
+    }
+    page.entry("final state", &format!("t = {} s", figure(summary.t)));
+    let digits = layout.digits(summary.agreement);
+    for (name, numbers) in layout.names.iter().zip(summary.last()) {
+        for ((quantity, unit), number) in QUANTITIES.iter().zip(&numbers).take(2) {
+            page.entry(&format!("{name}.{quantity}"), &format!("{} {unit}", decimal(number, digits)));
+        }
+    }
+    let scale = figure(source.mechanism.energy_scale);
+    page.entry("energy drift", &format!("{} of {scale} J at most", magnitude(summary.drift)));
+    if !source.mechanism.constraints.is_empty() {
+        let [position, velocity] = summary.residual.map(magnitude);
+        page.entry("constraints", &format!("{position} rad or m and {velocity} rad/s or m/s at most"));
+    }
+    page.into_text()
+}

@@ -1,0 +1,294 @@
+//! Runs in many digits: positions to as many digits as asked for, and up to any horizon with proof.
+//!
+//! [`Precision`] says what a number of digits asks of numbers and series; a [`LongRun`] takes a scene whose
+//! numbers are read as written from row to row; [`Pair`] runs two side by side and tells to how many digits
+//! they agree; [`forecast`](growth::forecast) measures how fast errors grow and how many digits that takes.
+
+mod growth;
+mod keep;
+mod motion;
+mod pair;
+mod precision;
+mod wall;
+
+pub use self::growth::{Forecast, forecast, planned};
+pub use self::pair::{Pair, Progress};
+pub use self::precision::{DIGITS, Precision};
+
+use self::motion::{LongState, Motion};
+use super::plan::Refusal;
+use crate::arithmetic::digits::{Digits, MOST};
+use crate::arithmetic::{Real, Scalar};
+use crate::dynamics::Mechanism;
+use crate::dynamics::compile::exact::ExactMechanism;
+use crate::scene::exact::exact_number;
+use crate::scene::{Scene, SceneError, Template};
+use crate::stepping::StepError;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Numbers with room for all digits a run may have.
+pub type Wide = Digits<MOST>;
+
+/// What is run: the text of a scene, and what of it the command line says otherwise.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// The scene's text with its overrides.
+    pub template: Template,
+    /// The overrides as they were typed, `PATH=VALUE`.
+    pub typed: Vec<String>,
+    /// Horizon \[s\], as a decimal number or a fraction; `None`: the scene's.
+    pub until: Option<String>,
+    /// Output interval \[s\], likewise.
+    pub every: Option<String>,
+    /// The scene in doubles.
+    pub scene: Scene,
+    /// Its mechanism.
+    pub mechanism: Arc<Mechanism>,
+}
+
+/// Why a run in many digits does not begin.
+#[derive(Debug, thiserror::Error)]
+pub enum LongError {
+    /// The scene has numbers or parts that are not known exactly.
+    #[error("{0}")]
+    Scene(#[from] SceneError),
+    /// The scene, or a time, is not carried in many digits.
+    #[error("{0}")]
+    Refused(#[from] Refusal),
+    /// The run stopped.
+    #[error("{0}")]
+    Step(#[from] StepError),
+}
+
+/// What there is to know at an output time.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// Its number, from 0.
+    pub number: u64,
+    /// Time \[s\].
+    pub t: Wide,
+    /// Of every body: angle \[rad\], not wrapped, and rate \[rad/s\], position of the centre of mass \[m\] and
+    /// its velocity \[m/s\].
+    pub bodies: Vec<[Wide; 6]>,
+    /// Kinetic and potential energy, and the work of motors, dampers and applied forces \[J\].
+    pub energy: [Wide; 3],
+    /// Energy less work and what impacts took, less that at the start, over the energy scale.
+    pub drift: f64,
+    /// Largest residual of the constraints \[rad or m\] and of its rate.
+    pub residual: [f64; 2],
+}
+
+impl Row {
+    /// Time \[s\], as a double.
+    pub fn time(&self) -> f64 {
+        self.t.value()
+    }
+}
+
+/// Where a run in many digits is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Saved {
+    precision: Precision,
+    words: Vec<Vec<u64>>,
+    steps: u64,
+    impacts: u64,
+}
+
+impl Saved {
+    /// Digits and order of the run it is of.
+    pub fn precision(&self) -> Precision {
+        self.precision
+    }
+}
+
+/// A run in many digits, whatever their number.
+pub trait LongRun: Send {
+    /// Digits and order.
+    fn precision(&self) -> Precision;
+
+    /// The number of the last row.
+    fn last_row(&self) -> u64;
+
+    /// The row of this number; `None` where `pause` came true before it was reached.  Rows are asked for in
+    /// rising order.
+    ///
+    /// # Errors
+    /// The run stops.
+    fn row(&mut self, number: u64, pause: &mut dyn FnMut() -> bool) -> Result<Option<Row>, StepError>;
+
+    /// Everything it needs to go on, to the last bit.
+    fn save(&self) -> Saved;
+
+    /// Goes on from where another run of the same scene was; false where it cannot have been one.
+    fn resume(&mut self, saved: &Saved) -> bool;
+
+    /// Steps made and impacts passed.
+    fn counts(&self) -> [u64; 2];
+
+    /// Time at the end of the last step \[s\].
+    fn time(&self) -> f64;
+
+    /// The horizon \[s\].
+    fn last_time(&self) -> f64;
+}
+
+/// A run of a scene in so many digits.
+///
+/// # Errors
+/// The scene is not carried in many digits, or its start cannot be brought onto its constraints.
+pub fn long_run(source: &Source, precision: Precision) -> Result<Box<dyn LongRun>, LongError> {
+    match precision.room() {
+        4 => Ok(Box::new(Runner::<4>::new(source, precision)?)),
+        8 => Ok(Box::new(Runner::<8>::new(source, precision)?)),
+        16 => Ok(Box::new(Runner::<16>::new(source, precision)?)),
+        32 => Ok(Box::new(Runner::<32>::new(source, precision)?)),
+        _ => Ok(Box::new(Runner::<MOST>::new(source, precision)?)),
+    }
+}
+
+/// Output times, exactly.
+#[derive(Clone, Copy, Debug)]
+struct Rows<const W: usize> {
+    until: Digits<W>,
+    every: Digits<W>,
+    last: u64,
+}
+
+impl<const W: usize> Rows<W> {
+    fn new(until: Digits<W>, every: Digits<W>) -> Result<Self, Refusal> {
+        let whole = (until / every).value();
+        let is_sound = until > Digits::ZERO && every > Digits::ZERO && until >= every && whole < 1e15;
+        if !is_sound {
+            return Err(refusal(
+                "--until and --every",
+                "0 < every <= until, and fewer than 1e15 rows",
+                "check both",
+            ));
+        }
+        // The quotient of decimals may be a hair off a whole number.
+        let near = whole.round();
+        let is_near = (every.scale(near) - until).abs() < every.scale(1e-12);
+        Ok(Self { until, every, last: if is_near { near } else { whole.ceil() } as u64 })
+    }
+
+    fn time(&self, number: u64) -> Digits<W> {
+        if number >= self.last { self.until } else { self.every * Digits::whole(number) }
+    }
+}
+
+fn refusal(what: &str, reason: &str, alternative: &str) -> Refusal {
+    Refusal { what: what.into(), reason: reason.into(), alternative: alternative.into(), is_usage: true }
+}
+
+/// A run on numbers of `W` limbs.
+struct Runner<const W: usize> {
+    motion: Motion<W>,
+    rows: Rows<W>,
+    /// Energy at the start \[J\].
+    energy: Digits<W>,
+}
+
+impl<const W: usize> Runner<W> {
+    fn new(source: &Source, precision: Precision) -> Result<Self, LongError> {
+        let (scene, times) = source.template.exact::<Digits<W>>(&source.typed)?;
+        let time = |text: &Option<String>, other: Digits<W>| {
+            text.as_ref().map_or(Some(other), |text| exact_number(text))
+        };
+        let missing =
+            || refusal("--until or --every", "it is no decimal number or fraction", "write 0.01 or 1/64");
+        let (until, every) = (
+            time(&source.until, times.until).ok_or_else(missing)?,
+            time(&source.every, times.every).ok_or_else(missing)?,
+        );
+        let rows = Rows::new(until, if every > until { until } else { every })?;
+        let mechanism = ExactMechanism::new(&scene, &source.mechanism).map_err(|reason| {
+            let alternative = "run it without --digits".into();
+            Refusal { what: "--digits".into(), reason, alternative, is_usage: false }
+        })?;
+        let start = mechanism.start(&scene, &source.scene);
+        let motion = Motion::new(mechanism, start, precision, until.value())?;
+        let posture = motion.state_posture();
+        let z = motion.mechanism.elements(&posture.phi);
+        let [kinetic, potential] = motion.mechanism.energy(&posture.phi, &posture.omega, &z);
+        Ok(Self { motion, rows, energy: kinetic + potential })
+    }
+}
+
+impl<const W: usize> LongRun for Runner<W> {
+    fn precision(&self) -> Precision {
+        self.motion.precision
+    }
+
+    fn last_row(&self) -> u64 {
+        self.rows.last
+    }
+
+    fn row(&mut self, number: u64, pause: &mut dyn FnMut() -> bool) -> Result<Option<Row>, StepError> {
+        let t = self.rows.time(number);
+        if !self.motion.reach(t, pause)? {
+            return Ok(None);
+        }
+        let posture = self.motion.at(t);
+        let mechanism = &self.motion.mechanism;
+        let z = mechanism.elements(&posture.phi);
+        let [kinetic, potential] = mechanism.energy(&posture.phi, &posture.omega, &z);
+        let balance = kinetic + potential - posture.work[0] - posture.work[1] - self.energy;
+        let drift = balance.value() / mechanism.structure.energy_scale;
+        let centres = mechanism.centres(&z, &posture.omega);
+        let body = |(k, [at, rate]): (usize, [crate::arithmetic::Complex<Digits<W>>; 2])| {
+            [posture.phi[k], posture.omega[k], at.re, at.im, rate.re, rate.im].map(Digits::resized)
+        };
+        let bodies = centres.into_iter().enumerate().map(body).collect();
+        let energy = [kinetic, potential, posture.work[0]].map(Digits::resized);
+        let residual = if mechanism.constraints.is_empty() {
+            [0.0; 2]
+        } else {
+            self.motion.keeper.left(mechanism, t, &posture.phi, &posture.omega).map(libm::exp2)
+        };
+        Ok(Some(Row { number, t: t.resized(), bodies, energy, drift, residual }))
+    }
+
+    fn save(&self) -> Saved {
+        let LongState { t, u, rate, work, impact_energy, steps, impacts } = self.motion.state();
+        let numbers = [t, work, impact_energy].into_iter().chain(u).chain(rate);
+        let words = numbers.map(Digits::to_words).collect();
+        Saved { precision: self.precision(), words, steps: *steps, impacts: *impacts }
+    }
+
+    fn resume(&mut self, saved: &Saved) -> bool {
+        let Some(numbers) =
+            saved.words.iter().map(|words| Digits::from_words(words)).collect::<Option<Vec<_>>>()
+        else {
+            return false;
+        };
+        let f = self.motion.state().u.len();
+        let (&[t, work, impact_energy], rest) = match numbers.split_first_chunk::<3>() {
+            Some(split) if split.1.len() == 2 * f && saved.precision == self.precision() => split,
+            _ => return false,
+        };
+        let (u, rate) = rest.split_at(f);
+        self.motion.resume(LongState {
+            t,
+            u: u.to_vec(),
+            rate: rate.to_vec(),
+            work,
+            impact_energy,
+            steps: saved.steps,
+            impacts: saved.impacts,
+        });
+        true
+    }
+
+    fn counts(&self) -> [u64; 2] {
+        [self.motion.state().steps, self.motion.state().impacts]
+    }
+
+    fn time(&self) -> f64 {
+        self.motion.state().t.value()
+    }
+
+    fn last_time(&self) -> f64 {
+        self.rows.until.value()
+    }
+}

@@ -1,0 +1,365 @@
+//! The state of a run in many digits, and its steps by power series.
+//!
+//! ```text
+//! u(t+h) = u + Σ w_m h^(m+1)/(m+1),  w(t+h) = Σ w_m h^m,   h = (tolerance / |w_k|)^(1/k), least over the last five powers k
+//! ```
+//!
+//! The series is that of all methods ([`Series`]), over numbers of `W` limbs; the m-th power is kept to as many
+//! limbs as it weighs.  A step's length is a double, so that time is a sum of such and exact, and output times
+//! are read off the steps.  Angles are not wrapped: turns cost no digits worth the name.  Rows that are not
+//! eliminated are put back by Newton's iteration after every step (module `keep`), walls located by it (module
+//! `wall`).
+
+use super::keep::Keeper;
+use super::precision::Precision;
+use super::wall;
+use crate::arithmetic::digits::Digits;
+use crate::arithmetic::{Real, Scalar};
+use crate::dynamics::Coordinates;
+use crate::dynamics::compile::exact::{ExactMechanism, ExactStart};
+use crate::dynamics::series::{Constants, Series};
+use crate::stepping::{Cause, StepError};
+
+/// Powers the step is taken from: by symmetry some of them may vanish.
+const JUDGES: usize = 5;
+
+/// Where a run is, with all that its next step depends on.
+#[derive(Clone, Debug)]
+pub struct LongState<const W: usize> {
+    /// Time \[s\].
+    pub t: Digits<W>,
+    /// Independent coordinates \[rad, m\], not wrapped.
+    pub u: Vec<Digits<W>>,
+    /// Their rates \[rad/s, m/s\].
+    pub rate: Vec<Digits<W>>,
+    /// Work of motors, dampers and applied forces since t = 0 \[J\].
+    pub work: Digits<W>,
+    /// Energy impacts have put in since t = 0 \[J\], negative.
+    pub impact_energy: Digits<W>,
+    /// Steps made.
+    pub steps: u64,
+    /// Impacts passed.
+    pub impacts: u64,
+}
+
+/// All coordinates at a moment.
+#[derive(Clone, Debug)]
+pub struct Posture<const W: usize> {
+    /// Angles, then positions of origins \[rad, m\].
+    pub phi: Vec<Digits<W>>,
+    /// Their rates \[rad/s, m/s\].
+    pub omega: Vec<Digits<W>>,
+    /// Work, and energy of impacts \[J\].
+    pub work: [Digits<W>; 2],
+}
+
+/// A mechanism in motion.
+pub struct Motion<const W: usize> {
+    pub(super) mechanism: ExactMechanism<Digits<W>>,
+    pub(super) precision: Precision,
+    coordinates: Coordinates,
+    pub(super) series: Series<Digits<W>>,
+    pub(super) state: LongState<W>,
+    pub(super) keeper: Keeper<W>,
+    /// Length of the step the series is to make \[s\], where it is that of the state.
+    step: Option<f64>,
+    /// Limbs that each power is kept to.
+    kept: Vec<usize>,
+    /// Steps may be as long at most \[s\].
+    longest: f64,
+    zeros: Vec<Digits<W>>,
+}
+
+impl<const W: usize> Motion<W> {
+    /// At its start.
+    ///
+    /// # Errors
+    /// The start cannot be brought onto the constraints.
+    pub fn new(
+        mechanism: ExactMechanism<Digits<W>>,
+        start: ExactStart<Digits<W>>,
+        precision: Precision,
+        until: f64,
+    ) -> Result<Self, StepError> {
+        let structure = &mechanism.structure;
+        let coordinates =
+            if structure.has_multipliers() { Coordinates::All } else { Coordinates::Independent };
+        let mut series = Series::of_terms(&mechanism.terms(), coordinates, precision.order);
+        let kept = precision.kept();
+        series.keep(kept.clone());
+        let keeper = Keeper::new(&mechanism, precision);
+        let f = series.coordinates();
+        let cut = |x: Digits<W>| x.shortened(precision.limbs);
+        let mut motion = Self {
+            zeros: vec![Digits::ZERO; f],
+            coordinates,
+            series,
+            keeper,
+            step: None,
+            longest: until,
+            kept,
+            precision,
+            state: LongState {
+                t: Digits::ZERO.shortened(precision.limbs),
+                u: Vec::new(),
+                rate: Vec::new(),
+                work: Digits::ZERO,
+                impact_energy: Digits::ZERO,
+                steps: 0,
+                impacts: 0,
+            },
+            mechanism,
+        };
+        let (mut phi, mut omega): (Vec<_>, Vec<_>) =
+            start.phi.iter().map(|&x| cut(x)).zip(start.omega.iter().map(|&x| cut(x))).unzip();
+        if coordinates == Coordinates::All {
+            motion.keeper.assemble(&motion.mechanism, [&mut phi, &mut omega], &start.given)?;
+        }
+        let (u, rate) = motion.independent(&phi, &omega, &start.given);
+        (motion.state.u, motion.state.rate) = (u, rate);
+        Ok(motion)
+    }
+
+    /// Independent coordinates and rates of a posture at t = 0, from the first of the bodies they move whose
+    /// value is given.
+    fn independent(
+        &self,
+        phi: &[Digits<W>],
+        omega: &[Digits<W>],
+        given: &[Vec<bool>; 2],
+    ) -> (Vec<Digits<W>>, Vec<Digits<W>>) {
+        if self.coordinates == Coordinates::All {
+            return (phi.to_vec(), omega.to_vec());
+        }
+        let partition = &self.mechanism.partition;
+        let from = |coordinate: usize, given: &[bool], values: &[Digits<W>], is_rate: bool| {
+            let own = partition.independent[coordinate];
+            let moved = (0..values.len()).filter(|&i| partition.bodies[i].base == Some(coordinate));
+            let best = Some(own).filter(|&own| given[own]).or_else(|| moved.clone().find(|&i| given[i]));
+            let body = best.unwrap_or(own);
+            let t = self.state.t;
+            partition.bodies[body].laws.iter().fold(values[body], |sum, (sign, law)| {
+                let part = if is_rate { Digits::phase(law, t).rate } else { Digits::law_value(law, t) };
+                sum - part.scale(*sign)
+            })
+        };
+        let count = 0..partition.count();
+        (
+            count.clone().map(|c| from(c, &given[0], phi, false)).collect(),
+            count.map(|c| from(c, &given[1], omega, true)).collect(),
+        )
+    }
+
+    /// All coordinates at the last step's end.
+    pub(super) fn state_posture(&self) -> Posture<W> {
+        let LongState { t, u, rate, work, impact_energy, .. } = &self.state;
+        let (phi, omega) = self.bodies(*t, u, rate);
+        Posture { phi, omega, work: [*work, *impact_energy] }
+    }
+
+    /// The state at a time inside the step that is next.
+    pub(super) fn state_at(&self, t: Digits<W>) -> LongState<W> {
+        let (u, rate, work) = self.evaluate(t - self.state.t);
+        LongState { t, u, rate, work: self.state.work + work, ..self.state.clone() }
+    }
+
+    /// Another motion of the same mechanism at the same state.
+    pub(super) fn beside(&self) -> Self {
+        Self {
+            mechanism: self.mechanism.clone(),
+            series: self.series.clone(),
+            state: self.state.clone(),
+            keeper: self.keeper.clone(),
+            zeros: self.zeros.clone(),
+            kept: self.kept.clone(),
+            step: None,
+            ..*self
+        }
+    }
+
+    /// Puts the state onto the constraints.
+    pub(super) fn settle(&mut self) -> Result<(), StepError> {
+        if self.coordinates == Coordinates::All && !self.mechanism.constraints.is_empty() {
+            let LongState { t, u, rate, .. } = &mut self.state;
+            self.keeper.project(&self.mechanism, *t, u, rate)?;
+        }
+        Ok(())
+    }
+
+    /// Goes on from a state of this motion.
+    pub fn resume(&mut self, state: LongState<W>) {
+        self.state = state;
+        self.step = None;
+    }
+
+    /// The state at the last step's end.
+    pub fn state(&self) -> &LongState<W> {
+        &self.state
+    }
+
+    /// Makes steps until the one that holds `until` is the next; pauses after a step where `pause` is true.
+    /// True where it is there.
+    ///
+    /// # Errors
+    /// The series is not finite, steps become too small, or a point stays on its wall.
+    pub fn reach(&mut self, until: Digits<W>, pause: &mut dyn FnMut() -> bool) -> Result<bool, StepError> {
+        loop {
+            let step = self.ready()?;
+            if until <= self.state.t + Digits::of(step) {
+                return Ok(true);
+            }
+            self.go(step)?;
+            if pause() {
+                return Ok(false);
+            }
+        }
+    }
+
+    /// All coordinates at a time inside the step that is next.
+    pub fn at(&self, t: Digits<W>) -> Posture<W> {
+        let (u, rate, work) = self.evaluate(t - self.state.t);
+        let (phi, omega) = self.bodies(t, &u, &rate);
+        Posture { phi, omega, work: [self.state.work + work, self.state.impact_energy] }
+    }
+
+    /// Angles and rates of all bodies.
+    pub(super) fn bodies(
+        &self,
+        t: Digits<W>,
+        u: &[Digits<W>],
+        rate: &[Digits<W>],
+    ) -> (Vec<Digits<W>>, Vec<Digits<W>>) {
+        if self.coordinates == Coordinates::All {
+            return (u.to_vec(), rate.to_vec());
+        }
+        let body = |dependent: &crate::dynamics::partition::DependentAngle<Digits<W>>| {
+            let of = |values: &[Digits<W>]| dependent.base.map_or(Digits::ZERO, |base| values[base]);
+            dependent.laws.iter().fold((of(u), of(rate)), |(angle, speed), (sign, law)| {
+                let turned = Digits::law_value(law, t).scale(*sign);
+                (angle + turned, speed + Digits::phase(law, t).rate.scale(*sign))
+            })
+        };
+        self.mechanism.partition.bodies.iter().map(body).unzip()
+    }
+
+    /// The series of the state, and the length of the step it makes, which ends on a wall where one is met.
+    fn ready(&mut self) -> Result<f64, StepError> {
+        if let Some(step) = self.step {
+            return Ok(step);
+        }
+        let LongState { t, u, rate, .. } = &self.state;
+        self.series.expand_terms(&self.mechanism.terms(), *t, u, &self.zeros, rate);
+        let mut step = self.wanted();
+        if !self.is_enough(step) {
+            // Some power is larger than the last ones tell: once more with all limbs.
+            self.series.keep(Vec::new());
+            self.series.expand_terms(&self.mechanism.terms(), *t, u, &self.zeros, rate);
+            self.series.keep(self.kept.clone());
+            step = self.wanted();
+        }
+        let seconds = self.state.t.value();
+        if step.is_nan() {
+            let hint = "look for a spring of length zero or a position without inertia";
+            return Err(self.stop(Cause::NotFinite, 0.0, "the series is not finite", hint));
+        }
+        if step < 1e-13 * seconds.abs().max(1e-3 * self.mechanism.structure.units.time) {
+            let hint = "more digits carry nearer to a singular position";
+            return Err(self.stop(
+                Cause::StepTooSmall,
+                step,
+                "the series converges in ever smaller circles",
+                hint,
+            ));
+        }
+        self.step = Some(step);
+        Ok(step)
+    }
+
+    /// An error at the present state.
+    pub(super) fn stop(&self, cause: Cause, step: f64, what: &str, hint: &str) -> StepError {
+        let t = self.state.t.value();
+        StepError { cause, method: "taylor".into(), t, step, what: what.into(), hint: hint.into() }
+    }
+
+    /// log2 of the largest of power k of the rates.
+    fn size(&self, k: usize) -> f64 {
+        let f = self.state.u.len();
+        let sizes = self.series.rate[k * f..(k + 1) * f].iter().map(Digits::log2);
+        sizes.fold(f64::NEG_INFINITY, |most, size| if size.is_nan() || size > most { size } else { most })
+    }
+
+    /// The step at which the last powers fall below the tolerance, a double with few bits \[s\].
+    fn wanted(&self) -> f64 {
+        let (order, first) = (self.precision.order, self.size(0).max(0.0));
+        let mut least = f64::INFINITY;
+        for k in order + 1 - JUDGES..=order {
+            let size = self.size(k);
+            if size.is_nan() {
+                return f64::NAN;
+            }
+            least = least.min((self.precision.tolerance() + first - size) / k as f64);
+        }
+        let step = libm::exp2(least).min(self.longest);
+        // 2⁻²⁰ of its size is cut off, so that times have few bits.
+        f64::from_bits(step.to_bits() >> 32 << 32)
+    }
+
+    /// True where no power was kept to fewer limbs than it weighs in a step of this length.
+    fn is_enough(&self, step: f64) -> bool {
+        let (kept, first) = (&self.kept, self.size(0).max(0.0));
+        let log_step = libm::log2(step);
+        let far = |m: usize| {
+            let weight = self.size(m) - first + m as f64 * log_step;
+            weight - 64.0 * (kept[m] - 1) as f64 > self.precision.tolerance()
+        };
+        !(0..=self.precision.order).any(far)
+    }
+
+    /// Takes the step.
+    fn go(&mut self, step: f64) -> Result<(), StepError> {
+        let Some((wall, length)) = wall::first(self, step)? else {
+            return self.advance(Digits::of(step));
+        };
+        self.advance(length)?;
+        wall::impact(self, wall)
+    }
+
+    /// Moves the state along the series.
+    pub(super) fn advance(&mut self, length: Digits<W>) -> Result<(), StepError> {
+        let (u, rate, work) = self.evaluate(length);
+        self.state.t += length;
+        (self.state.u, self.state.rate) = (u, rate);
+        self.state.work += work;
+        self.state.steps += 1;
+        self.step = None;
+        self.settle()
+    }
+
+    /// Coordinates, rates and the work done since the state's time at a time after that.
+    fn evaluate(&self, h: Digits<W>) -> (Vec<Digits<W>>, Vec<Digits<W>>, Digits<W>) {
+        let f = self.state.u.len();
+        let rates: Vec<_> = (0..f).map(|c| self.sum(&self.series.rate[c..], f, h, false)).collect();
+        let moved = |(c, &u): (usize, &Digits<W>)| u + self.sum(&self.series.rate[c..], f, h, true) * h;
+        let u = self.state.u.iter().enumerate().map(moved).collect();
+        let work = if self.mechanism.structure.has_work_integral() {
+            self.sum(&self.series.power, 1, h, true) * h
+        } else {
+            Digits::ZERO
+        };
+        (u, rates, work)
+    }
+
+    /// Σ a_m h^m, or Σ a_m h^m/(m+1), of every `stride`-th number: with as many limbs as each power is kept to,
+    /// and all of them at the end.
+    fn sum(&self, series: &[Digits<W>], stride: usize, h: Digits<W>, is_integral: bool) -> Digits<W> {
+        let mut sum = Digits::ZERO;
+        let count = series.len().div_ceil(stride);
+        for (m, a) in series.iter().step_by(stride).enumerate().rev() {
+            let limbs = self.kept[m].min(self.precision.limbs);
+            let a = a.shortened(limbs);
+            let a = if is_integral { a.over_whole(m as u64 + 1) } else { a };
+            sum = if m + 1 == count { a } else { sum.shortened(limbs) * h + a };
+        }
+        sum.shortened(self.precision.limbs)
+    }
+}

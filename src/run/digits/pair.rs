@@ -1,0 +1,129 @@
+//! Runs side by side, from row to row: one, or two with other digits and orders that prove each other.
+
+use super::{LongError, LongRun, Row, Saved, Source, long_run};
+use crate::arithmetic::Real;
+use crate::stepping::StepError;
+use std::time::{Duration, Instant};
+
+/// Rows that are gathered before they are shown, at most.
+const MOST: u64 = 64;
+/// How long that may take.
+const LONGEST: Duration = Duration::from_millis(400);
+
+/// Runs that go from row to row together.
+pub struct Pair {
+    runs: Vec<Box<dyn LongRun>>,
+    next: u64,
+    /// Rows gathered at a time.
+    rows: u64,
+    /// The runs as they were before the rows that are next.
+    saved: Vec<Saved>,
+}
+
+/// How far runs have come.
+#[derive(Clone, Debug)]
+pub enum Progress {
+    /// Rows, each of the run with the most digits, with the digits to which all agree.
+    Rows(Vec<(Row, Option<f64>)>),
+    /// All rows are there.
+    Over,
+    /// A pause was asked for.
+    Paused,
+}
+
+impl Pair {
+    /// Of a scene, with these precisions.
+    ///
+    /// # Errors
+    /// As [`long_run`].
+    pub fn new(source: &Source, precisions: &[super::Precision]) -> Result<Self, LongError> {
+        let runs: Vec<_> =
+            precisions.iter().map(|&precision| long_run(source, precision)).collect::<Result<_, _>>()?;
+        let saved = runs.iter().map(|run| run.save()).collect();
+        Ok(Self { runs, next: 0, rows: 1, saved })
+    }
+
+    /// Goes on where others were, before the row `next`; false where they cannot have been runs of this scene.
+    pub fn resume(&mut self, saved: &[Saved], next: u64) -> bool {
+        let is_sound = saved.len() == self.runs.len() && next <= self.last_row() + 1;
+        if !is_sound || !self.runs.iter_mut().zip(saved).all(|(run, saved)| run.resume(saved)) {
+            return false;
+        }
+        (self.saved, self.next) = (saved.to_vec(), next);
+        true
+    }
+
+    /// The runs before the next row, and its number.
+    pub fn save(&self) -> (&[Saved], u64) {
+        (&self.saved, self.next)
+    }
+
+    /// The number of the last row.
+    pub fn last_row(&self) -> u64 {
+        self.runs.first().map_or(0, |run| run.last_row())
+    }
+
+    /// The runs.
+    pub fn runs(&self) -> &[Box<dyn LongRun>] {
+        &self.runs
+    }
+
+    /// The next rows, each run on a thread of its own.
+    ///
+    /// # Errors
+    /// A run stops.
+    pub fn go(&mut self, pause: &(dyn Fn() -> bool + Sync)) -> Result<Progress, StepError> {
+        let first = self.next;
+        if first > self.last_row() {
+            return Ok(Progress::Over);
+        }
+        let last = self.last_row().min(first + self.rows - 1);
+        let begin = Instant::now();
+        let gather = |run: &mut Box<dyn LongRun>| -> Result<Option<Vec<Row>>, StepError> {
+            (first..=last).map(|number| run.row(number, &mut || pause())).collect()
+        };
+        let found: Vec<_> = match &mut self.runs[..] {
+            [only] => vec![gather(only)],
+            runs => std::thread::scope(|scope| {
+                let threads: Vec<_> = runs.iter_mut().map(|run| scope.spawn(|| gather(run))).collect();
+                threads.into_iter().filter_map(|thread| thread.join().ok()).collect()
+            }),
+        };
+        let found: Vec<Option<Vec<Row>>> = found.into_iter().collect::<Result<_, _>>()?;
+        let Some(mut found) = found.into_iter().collect::<Option<Vec<Vec<Row>>>>() else {
+            // Where a pause comes between rows, they are done again.
+            let saved = std::mem::take(&mut self.saved);
+            self.resume(&saved, first);
+            return Ok(Progress::Paused);
+        };
+        self.saved = self.runs.iter().map(|run| run.save()).collect();
+        self.next = last + 1;
+        let spent = begin.elapsed();
+        self.rows = if spent < LONGEST / 4 {
+            2 * self.rows
+        } else if spent > LONGEST {
+            self.rows / 2
+        } else {
+            self.rows
+        };
+        self.rows = self.rows.clamp(1, MOST);
+        let best = found.pop().unwrap_or_default();
+        // Where all digits are the same, there are no more than the runs have.
+        let most = self.runs.iter().map(|run| run.precision().digits as f64).fold(f64::INFINITY, f64::min);
+        let with_agreement = |(i, row): (usize, Row)| {
+            let least = found.iter().map(|other| agreement(&other[i], &row).min(most)).reduce(f64::min);
+            (row, least)
+        };
+        Ok(Progress::Rows(best.into_iter().enumerate().map(with_agreement).collect()))
+    }
+}
+
+/// Decimal digits to which two rows agree, in angles, rates, positions and velocities: counted from the point
+/// where these are below one.
+fn agreement(a: &Row, b: &Row) -> f64 {
+    let numbers = a.bodies.iter().flatten().zip(b.bodies.iter().flatten());
+    let apart = numbers.map(|(&a, &b)| (a - b).log2() - b.abs().log2().max(0.0));
+    let most = apart
+        .fold(f64::NEG_INFINITY, |most, apart| if apart.is_nan() || apart > most { apart } else { most });
+    -most / std::f64::consts::LOG2_10
+}

@@ -1,0 +1,131 @@
+//! Walls met by a motion in many digits: the moment by Newton's iteration on the series of the gap, the jump
+//! by Newton's law of impact.
+//!
+//! ```text
+//! gap(t) = c + Σ_m t^m Σ_k Re(conj(g_k) z_k,m) = 0;      w⁺ = w⁻ - (1 + e) (g·w⁻) a / (g·a),   a = response to an impulse along g
+//! ```
+//!
+//! That there is a zero, and which is the first, is told in doubles ([`search`]): gaps shallower than 1e-12 of
+//! the length of a contact are not told from touching.
+
+use super::motion::Motion;
+use crate::arithmetic::digits::Digits;
+use crate::arithmetic::{Real, Scalar};
+use crate::dynamics::constraint::{ConstraintEquation, Measure};
+use crate::dynamics::kernel::dot;
+use crate::stepping::search::{Crossing, Powers, crossing};
+use crate::stepping::{Cause, StepError};
+
+/// Newton iterations at most; each doubles the digits.
+const MOST: usize = 16;
+
+/// The first wall within a step of so many seconds, and the exact time up to it.
+pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(usize, Digits<W>)>, StepError> {
+    let mut found: Option<(usize, Digits<W>)> = None;
+    for (wall, (row, _)) in motion.mechanism.walls.iter().enumerate() {
+        let powers = gap(motion, row);
+        let length = motion.mechanism.structure.contacts[wall].length;
+        let mut scale = Digits::of(1.0 / length);
+        let mut shares = Vec::with_capacity(powers.len());
+        for power in &powers {
+            shares.push((*power * scale).value());
+            scale = scale * Digits::of(step);
+        }
+        let from = match crossing(&Powers { powers: &shares, end: 1.0 }, 1.0) {
+            Crossing::Nothing => continue,
+            Crossing::At(share) => share * step,
+            Crossing::Inside(_) if shares.get(1).is_some_and(|&slope| slope < 0.0) => 0.0,
+            Crossing::Inside(_) => {
+                let name = &row.name;
+                let what = format!(
+                    "a point stays on wall `{name}`, and lasting contacts are not carried in many digits"
+                );
+                return Err(motion.stop(
+                    Cause::Unsuited,
+                    0.0,
+                    &what,
+                    "end the run before, or run it without --digits",
+                ));
+            }
+        };
+        let time = refined(motion, &powers, Digits::of(from));
+        if found.as_ref().is_none_or(|(_, first)| time < *first) {
+            found = Some((wall, time));
+        }
+    }
+    Ok(found)
+}
+
+/// Powers of the gap of a wall \[m/s^m\].
+fn gap<const W: usize>(motion: &Motion<W>, row: &ConstraintEquation<Digits<W>>) -> Vec<Digits<W>> {
+    let Measure::Place(place) = &row.measure else { return Vec::new() };
+    let n = motion.mechanism.structure.coordinates();
+    let elements = motion.series.z.chunks_exact(n);
+    let mut powers: Vec<_> =
+        elements.map(|z| place.linear.iter().fold(Digits::ZERO, |sum, &(k, g)| sum + g.dot(z[k]))).collect();
+    if let Some(first) = powers.first_mut() {
+        *first += place.constant;
+    }
+    powers
+}
+
+/// The zero of a polynomial near a time.
+fn refined<const W: usize>(motion: &Motion<W>, powers: &[Digits<W>], mut t: Digits<W>) -> Digits<W> {
+    let limbs = motion.precision.limbs;
+    t = t.shortened(limbs);
+    let mut moved = f64::INFINITY;
+    for _ in 0..MOST {
+        let (mut value, mut slope) = (Digits::ZERO, Digits::ZERO);
+        for power in powers.iter().rev() {
+            slope = (slope * t + value).shortened(limbs);
+            value = (value * t).shortened(limbs) + power.shortened(limbs);
+        }
+        let change = value / slope;
+        let size = change.log2();
+        if size.is_nan() || size >= moved {
+            break;
+        }
+        (t, moved) = (t - change, size);
+    }
+    t.shortened(limbs)
+}
+
+/// The jump of the rates at a wall.
+pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(), StepError> {
+    let state = motion.state.clone();
+    let (phi, omega) = motion.bodies(state.t, &state.u, &state.rate);
+    let n = phi.len();
+    let z = motion.mechanism.elements(&phi);
+    let (row, restitution) = &motion.mechanism.walls[wall];
+    let mut gradient = vec![Digits::ZERO; n];
+    if let Measure::Place(place) = &row.measure {
+        place.slopes(&z, |k, slope| gradient[k] += slope);
+    }
+    let (approach, restitution, name) = (dot(&gradient, &omega), *restitution, row.name.clone());
+    if approach >= Digits::ZERO {
+        return Ok(());
+    }
+    let response = motion.keeper.response(&motion.mechanism, state.t, [&phi, &omega], &gradient);
+    let freedom = dot(&gradient, &response);
+    let impulse = -(Digits::ONE + restitution) * approach / freedom;
+    if !impulse.is_finite() {
+        let what = format!("the constraints leave the point no freedom at wall `{name}`");
+        return Err(motion.stop(Cause::Unsuited, 0.0, &what, "move the wall"));
+    }
+    let limbs = motion.precision.limbs;
+    let after: Vec<_> =
+        omega.iter().zip(&response).map(|(&w, &a)| (w + a * impulse).shortened(limbs)).collect();
+    let energy = |omega: &[Digits<W>]| {
+        let [kinetic, potential] = motion.mechanism.energy(&phi, omega, &z);
+        kinetic + potential
+    };
+    motion.state.impact_energy += energy(&after) - energy(&omega);
+    let independent = motion.mechanism.partition.independent.clone();
+    let has_all = motion.state.rate.len() == n;
+    for (c, rate) in motion.state.rate.iter_mut().enumerate() {
+        let k = if has_all { c } else { independent[c] };
+        *rate += after[k] - omega[k];
+    }
+    motion.state.impacts += 1;
+    Ok(())
+}

@@ -1,0 +1,284 @@
+//! The numbers of a scene exactly as written: 0.6 is 3/5, not the double nearest to it.
+//!
+//! A scene that was read and judged in doubles is gone through once more, number by number, by the digits of
+//! its text: decimals, multiples and fractions of pi on a command line, formulas of parameters.  What a
+//! formula takes from a table, a unit of angle, or a law of time as a formula has no such digits and is
+//! refused by name.
+
+mod parts;
+
+use super::Scene;
+use super::error::SceneError;
+use super::formula::Formula;
+use super::locate::{Node, Source, Value, push_index, push_key};
+use super::read::put_together;
+use super::template::Template;
+use crate::arithmetic::Real;
+
+/// A number that decimal text can be read as.
+pub trait Decimal: Real {
+    /// The decimal number, to all digits there is room for; `None` where the text is none.
+    fn parse(text: &str) -> Option<Self>;
+
+    /// π.
+    fn pi() -> Self;
+}
+
+impl<const W: usize> Decimal for crate::arithmetic::digits::Digits<W> {
+    fn parse(text: &str) -> Option<Self> {
+        Self::from_decimal(text)
+    }
+
+    fn pi() -> Self {
+        crate::arithmetic::digits::pi()
+    }
+}
+
+/// The times of a scene.
+#[derive(Clone, Copy, Debug)]
+pub struct Times<C> {
+    /// Horizon \[s\].
+    pub until: C,
+    /// Output interval \[s\].
+    pub every: C,
+}
+
+impl Template {
+    /// The scene with its numbers as written.  `typed` are the texts `PATH=VALUE` of the overrides as they were
+    /// typed; where one is missing, the shortest digits of its value count.
+    ///
+    /// # Errors
+    /// As [`Template::scene`]; a number whose digits do not tell all of it, or a part that is not known
+    /// exactly.
+    pub fn exact<C: Decimal>(&self, typed: &[String]) -> Result<(Scene<C>, Times<C>), SceneError> {
+        let plain = self.scene()?;
+        let (text, source, overrides) = self.parts();
+        let (source, tree) = put_together(text, source, overrides)?;
+        let mut reader = Reader {
+            source: &source,
+            root: Cursor { node: &tree, path: String::new() },
+            typed,
+            parameters: Vec::new(),
+        };
+        reader.refuse_formulas(&plain)?;
+        reader.parameters = reader.known_parameters(&plain)?;
+        let times = Times {
+            until: reader.number(&reader.root, "until", plain.until)?,
+            every: reader.number(&reader.root, "every", plain.every)?,
+        };
+        Ok((reader.scene(&plain)?, times))
+    }
+}
+
+/// A number as people type them on a command line, exactly; see [`number`](super::number).
+pub fn exact_number<C: Decimal>(text: &str) -> Option<C> {
+    let factor = |part: &str| {
+        let part = part.trim();
+        match part.strip_suffix("pi").or_else(|| part.strip_suffix('π')) {
+            None => C::parse(part),
+            Some(sign @ ("" | "+" | "-")) => Some(if sign == "-" { -C::pi() } else { C::pi() }),
+            Some(multiple) => Some(C::parse(multiple.trim_end_matches('*').trim_end())? * C::pi()),
+        }
+    };
+    match text.split_once('/') {
+        Some((above, below)) => Some(factor(above)? / factor(below)?),
+        None => factor(text),
+    }
+}
+
+/// The shortest decimal of a double: what was written, where that has no more digits than a double holds.
+fn shortest<C: Decimal>(value: f64) -> C {
+    if value == std::f64::consts::PI {
+        return C::pi();
+    }
+    C::parse(&format!("{value:?}")).unwrap_or_else(|| C::of(value))
+}
+
+/// A value of the tree with its path.
+#[derive(Clone)]
+struct Cursor<'a> {
+    node: &'a Node,
+    path: String,
+}
+
+impl<'a> Cursor<'a> {
+    fn child(&self, key: &str) -> Option<Cursor<'a>> {
+        let Value::Object(members) = &self.node.value else { return None };
+        let member = members.iter().find(|member| member.key == key)?;
+        let mut path = self.path.clone();
+        push_key(&mut path, key);
+        Some(Cursor { node: &member.node, path })
+    }
+
+    fn items(&self, key: &str) -> Vec<Cursor<'a>> {
+        let Some(list) = self.child(key) else { return Vec::new() };
+        let Value::List(nodes) = &list.node.value else { return Vec::new() };
+        let item = |(number, node): (usize, &'a Node)| {
+            let mut path = list.path.clone();
+            match super::set::name(node) {
+                Some(name) => push_key(&mut path, name),
+                None => push_index(&mut path, number),
+            }
+            Cursor { node, path }
+        };
+        nodes.iter().enumerate().map(item).collect()
+    }
+}
+
+struct Reader<'a, C> {
+    source: &'a Source,
+    root: Cursor<'a>,
+    typed: &'a [String],
+    parameters: Vec<(String, C)>,
+}
+
+impl<'a, C: Decimal> Reader<'a, C> {
+    fn refuse(&self, at: &Cursor, problem: &str, hint: &str) -> SceneError {
+        let allowed = "must be known exactly for runs in many digits: decimals, and formulas of parameters";
+        self.source.refusal(at.node.span, &at.path, problem, allowed, hint)
+    }
+
+    /// An error about a part that has no series in many digits.
+    fn refuse_part(&self, at: &Cursor, why: &str) -> SceneError {
+        let problem = format!("cannot be carried in many digits: {why}");
+        let allowed = "parts are carried whose numbers are constant or sums of powers and sines of time";
+        let hint = "without --digits it runs in doubles, and --trust estimates the error";
+        self.source.refusal(at.node.span, &at.path, &problem, allowed, hint)
+    }
+
+    /// Parts that are not carried in many digits.
+    fn refuse_formulas(&self, scene: &Scene) -> Result<(), SceneError> {
+        let parts = [
+            ("integrals", !scene.integrals.is_empty(), "an integral is a formula of time and state"),
+            ("events", !scene.events.is_empty(), "events change what acts"),
+            ("inactive", !scene.inactive.is_empty(), "events change what acts"),
+            ("potentials", self.root.child("potentials").is_some(), "a potential is a formula of the state"),
+        ];
+        for (key, is_there, why) in parts {
+            if is_there && let Some(at) = self.root.child(key) {
+                return Err(self.refuse_part(&at, why));
+            }
+        }
+        if let Some(law) = scene.laws.first() {
+            let lists = ["springs", "torsion_springs", "forces", "torques"];
+            let mut items = lists.iter().flat_map(|list| self.root.items(list));
+            let at = items.find(|at| super::set::name(at.node) == Some(&law.name));
+            let at = at.unwrap_or_else(|| self.root.clone());
+            return Err(self.refuse_part(&at, "its law is a formula of time and state"));
+        }
+        if !scene.frictions.is_empty() {
+            let mut items = ["hinges", "sliders", "walls"].iter().flat_map(|list| self.root.items(list));
+            let at = items.find_map(|at| at.child("friction")).unwrap_or_else(|| self.root.clone());
+            return Err(self.refuse_part(&at, "dry friction has corners"));
+        }
+        if let Some(wall) = scene.walls.iter().position(|wall| wall.law.is_some() || wall.on.is_some()) {
+            let at = self.root.items("walls").into_iter().nth(wall).unwrap_or_else(|| self.root.clone());
+            return Err(self.refuse_part(&at, "the wall moves"));
+        }
+        if let Some(coupling) = scene.couplings.first() {
+            let mut items = self.root.items("motors").into_iter();
+            let at = items.find(|at| super::set::name(at.node) == Some(&coupling.name));
+            let at = at.unwrap_or_else(|| self.root.clone());
+            return Err(self.refuse_part(&at, "its aim is a formula of the state"));
+        }
+        if let Some(spring) = scene.springs.iter().find(|spring| spring.rigid) {
+            let items = self.root.items("springs");
+            let at = items.iter().find(|at| super::set::name(at.node) == Some(&spring.name));
+            return Err(self
+                .refuse_part(at.unwrap_or(&self.root), "a rigid spring has the mean force of a vibration"));
+        }
+        Ok(())
+    }
+
+    fn known_parameters(&self, scene: &Scene) -> Result<Vec<(String, C)>, SceneError> {
+        let Some(holder) = self.root.child("parameters") else { return Ok(Vec::new()) };
+        let mut known = Vec::new();
+        // In the order in which they depend on each other: of what is known, one more each time.
+        let mut open: Vec<&str> = scene.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
+        while !open.is_empty() {
+            let before = open.len();
+            let mut failed = None;
+            open.retain(|name| {
+                let Some(at) = holder.child(name) else { return false };
+                match self.evaluated(&at, &known) {
+                    Ok(Some(value)) => known.push(((*name).to_owned(), value)),
+                    Ok(None) => return true,
+                    Err(error) => failed = Some(error),
+                }
+                false
+            });
+            if let Some(error) = failed {
+                return Err(error);
+            }
+            if open.len() == before {
+                return Err(self.refuse(&holder, "are not known exactly", "give them as decimals"));
+            }
+        }
+        Ok(known)
+    }
+
+    /// The number at a place; `None` where a formula has a name that is not among those known.
+    fn evaluated(&self, at: &Cursor, known: &[(String, C)]) -> Result<Option<C>, SceneError> {
+        match &at.node.value {
+            Value::Number(value) => Ok(Some(self.literal(at.node, *value))),
+            Value::Text(text) => {
+                let formula = Formula::parse(text).map_err(|error| {
+                    self.refuse(at, &format!("has no exact value: {}", error.problem), "give the number")
+                })?;
+                if formula.has_angle_units() {
+                    return Err(self.refuse(
+                        at,
+                        "is in degrees, which are no decimals",
+                        "write it by pi, as in pi/6",
+                    ));
+                }
+                let value = |name: &str| known.iter().find(|one| one.0 == name).map(|one| one.1);
+                let Some(values) = formula.names().map(value).collect::<Option<Vec<C>>>() else {
+                    return Ok(None);
+                };
+                Ok(Some(formula.exact_value(&values, shortest)))
+            }
+            _ => Err(self.refuse(at, "is no number", "give the number")),
+        }
+    }
+
+    /// What a number was written as.
+    fn literal(&self, node: &Node, value: f64) -> C {
+        let (text, digits, is_all) = self.source.text(node.span);
+        let typed = text.checked_sub(1).and_then(|index| self.typed.get(index));
+        let typed = typed.and_then(|typed| typed.split_once('=')).filter(|_| is_all);
+        let exact = typed.map_or_else(|| C::parse(digits), |(_, value)| exact_number(value));
+        exact.unwrap_or_else(|| shortest(value))
+    }
+
+    fn number(&self, at: &Cursor, key: &str, absent: f64) -> Result<C, SceneError> {
+        let Some(at) = at.child(key) else { return Ok(shortest(absent)) };
+        match self.evaluated(&at, &self.parameters)? {
+            Some(value) => Ok(value),
+            None => Err(self.refuse(&at, "has a name whose value is not known exactly", "give the number")),
+        }
+    }
+
+    fn pair(&self, at: &Cursor, key: &str, absent: [f64; 2]) -> Result<[C; 2], SceneError> {
+        let Some(list) = at.child(key) else { return Ok(absent.map(shortest)) };
+        let Value::List(nodes) = &list.node.value else { return Ok(absent.map(shortest)) };
+        let mut pair = [C::ZERO; 2];
+        for (number, (place, node)) in pair.iter_mut().zip(nodes).enumerate() {
+            let mut path = list.path.clone();
+            push_index(&mut path, number);
+            let at = Cursor { node, path };
+            let value = self.evaluated(&at, &self.parameters)?;
+            *place = value.ok_or_else(|| {
+                self.refuse(&at, "has a name whose value is not known exactly", "give the number")
+            })?;
+        }
+        Ok(pair)
+    }
+
+    /// The same along a pair, of length one.
+    fn direction(&self, at: &Cursor, key: &str, absent: [f64; 2]) -> Result<[C; 2], SceneError> {
+        let [x, y] = self.pair(at, key, absent)?;
+        let length = (x * x + y * y).sqrt();
+        Ok([x / length, y / length])
+    }
+}

@@ -1,0 +1,57 @@
+//! `run --digits` and `run --trusted-until`.
+
+use crate::program::Program;
+
+#[test]
+fn a_run_in_many_digits_writes_them_all_or_as_many_as_asked_for() {
+    let program = Program::with_scenes(&["free"]);
+    let object = program.run("run free.json --digits 40 --until 0.5 --every 0.25 --json").exits(0).object();
+    let phi = object["final"]["bodies"]["bar1"]["phi"].as_str().expect("a text").to_owned();
+    assert!(phi.len() >= 40 && phi.starts_with("0.2096"), "{phi}");
+    assert_eq!(object["settings"]["digits"], 40);
+    let folder = "output/free/taylor-digits-40";
+    let table = program.read(&format!("{folder}/trajectory.csv"));
+    assert_eq!(table.lines().count(), 4, "{table}");
+    assert!(table.lines().nth(1).expect("a row").contains(",1.5707963267948966,0.0,"), "{table}");
+    program.run("run free.json --digits 40 --until 0.5 --every 0.25").exits(6).says(&["--force"]);
+    program.run("run free.json --digits 40 --until 0.5 --every 0.25 --force --show-digits 7").exits(0);
+    let short = program.read(&format!("{folder}/trajectory.csv"));
+    let number = short.lines().last().expect("a row").split(',').nth(1).expect("a cell").to_owned();
+    assert!(number.len() <= 9 && phi.starts_with(&number[..7]), "{number}");
+    assert!(program.read(&format!("{folder}/run.json")).contains("trajectory_sha256"));
+}
+
+#[test]
+fn a_horizon_is_proved_or_the_exit_code_says_so() {
+    let program = Program::with_scenes(&["free"]);
+    let ran = program.run("run free.json --trusted-until 1 --within 1e-6 --every 0.5").exits(0);
+    let ran = ran.says(&["errors grow by", "digits at order"]).shows(&["trusted until", "both runs agree"]);
+    assert!(ran.stdout.contains("bar2.phi"));
+    let table = program.read("output/free/taylor-trusted/trajectory.csv");
+    for line in table.lines().skip(1) {
+        let agreement: f64 = line.split(',').next_back().and_then(|cell| cell.parse().ok()).expect("digits");
+        assert!(agreement > 6.0, "{line}");
+    }
+    let other = program.run("run free.json --trusted-until 1 --digits 30").exits(2);
+    assert!(other.stderr.contains("cannot be used with"));
+}
+
+#[test]
+fn what_makes_no_sense_is_refused_and_leaves_no_files() {
+    let program = Program::with_scenes(&["free", "pid"]);
+    for (arguments, code, word) in [
+        ("free.json --digits 19", 2, "20 to 2000"),
+        ("free.json --digits 2001", 2, "20 to 2000"),
+        ("free.json --digits 30 --method dp8", 2, "--method"),
+        ("free.json --digits 30 --rtol 1e-9", 2, "--rtol"),
+        ("free.json --digits 30 --until -1", 2, "-1 s is no time"),
+        ("free.json --digits 30 --every 0", 2, "0 s is no time"),
+        ("free.json --trusted-until 0", 2, "is no time"),
+        ("free.json --trusted-until 1 --within 0", 2, "above 0"),
+        ("free.json --within 1e-3", 2, "--trusted-until"),
+        ("pid.json --digits 30", 3, "integrals"),
+    ] {
+        program.run(&format!("run {arguments}")).exits(code).says(&[word]);
+    }
+    assert!(program.files().iter().all(|file| !file.contains("trajectory") && !file.contains("unfinished")));
+}

@@ -1,0 +1,286 @@
+//! Runs in many digits against published digits, closed forms in integer arithmetic, and runs in doubles.
+
+use crate::common;
+use driftless::arithmetic::Scalar;
+use driftless::dynamics::Mechanism;
+use driftless::run::Request;
+use driftless::run::digits::{LongRun, Pair, Precision, Progress, Row, Source, Wide, forecast, long_run};
+use driftless::scene::{Override, Template};
+use num_bigint::BigInt;
+use std::sync::Arc;
+
+/// Decimals that fixed-point numbers of the checks carry.
+const PLACES: u32 = 90;
+
+fn source(text: &str, set: &[&str], until: &str, every: &str) -> Source {
+    let overrides: Vec<Override> = set.iter().map(|set| set.parse().expect("an override")).collect();
+    let template = Template::new(text.to_owned(), "test".to_owned(), &overrides);
+    let scene = template.scene().expect("a scene");
+    let mechanism = Arc::new(Mechanism::new(&scene).expect("a mechanism"));
+    Source {
+        template,
+        typed: set.iter().map(|&set| set.to_owned()).collect(),
+        until: Some(until.to_owned()),
+        every: Some(every.to_owned()),
+        scene,
+        mechanism,
+    }
+}
+
+fn shipped(name: &str) -> String {
+    let path = format!("{}/examples/scenes/{name}.json", env!("CARGO_MANIFEST_DIR"));
+    std::fs::read_to_string(path).expect("a shipped scene")
+}
+
+fn run(source: &Source, digits: usize) -> Box<dyn LongRun> {
+    let has_loops = source.mechanism.has_closed_loops();
+    long_run(source, Precision::new(digits, has_loops)).expect("a run")
+}
+
+fn rows(source: &Source, digits: usize) -> Vec<Row> {
+    let mut run = run(source, digits);
+    (0..=run.last_row()).map(|k| run.row(k, &mut || false).expect("a row").expect("no pause")).collect()
+}
+
+fn last(source: &Source, digits: usize) -> Row {
+    rows(source, digits).pop().expect("a row")
+}
+
+fn one() -> BigInt {
+    BigInt::from(10).pow(PLACES)
+}
+
+/// A decimal text in fixed point.
+fn fixed(text: &str) -> BigInt {
+    let (mantissa, power) =
+        text.split_once('e').map_or((text, 0), |(m, e)| (m, e.parse::<i32>().expect("a power")));
+    let (whole, decimals) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+    let digits: BigInt = format!("{whole}{decimals}").parse().expect("digits");
+    let shift = PLACES as i32 + power - decimals.len() as i32;
+    let ten = BigInt::from(10);
+    if shift >= 0 { digits * ten.pow(shift as u32) } else { digits / ten.pow(-shift as u32) }
+}
+
+fn number(wide: Wide) -> BigInt {
+    fixed(&format!("{wide:?}"))
+}
+
+fn text(fixed: &BigInt) -> String {
+    let digits = format!("{:0>1$}", fixed.magnitude(), PLACES as usize + 1);
+    let (whole, decimals) = digits.split_at(digits.len() - PLACES as usize);
+    format!("{}{whole}.{decimals}", if *fixed < BigInt::ZERO { "-" } else { "" })
+}
+
+fn times(a: &BigInt, b: &BigInt) -> BigInt {
+    a * b / one()
+}
+
+fn cosine(x: &BigInt) -> BigInt {
+    let (mut term, mut sum) = (one(), one());
+    for k in 1..400_u32 {
+        term = -times(&times(&term, x), x) / (2 * k * (2 * k - 1));
+        sum += &term;
+    }
+    sum
+}
+
+#[track_caller]
+fn near(found: &BigInt, expected: &BigInt, digits: u32) {
+    let off = found - expected;
+    let allowed = BigInt::from(10).pow(PLACES - digits);
+    assert!(off.magnitude() < allowed.magnitude(), "{} instead of {}", text(found), text(expected));
+}
+
+/// Public values: an integration with another program at 36 digits, the scene's numbers as written.
+#[test]
+fn the_free_double_pendulum_has_its_published_digits_at_ten_seconds() {
+    let source = source(&shipped("free"), &[], "10", "10");
+    let row = last(&source, 45);
+    near(&number(row.bodies[0][0]), &fixed("-0.413361718286129851525375037386713"), 32);
+    near(&number(row.bodies[1][0]), &fixed("-8.901595676581359612122081616128794"), 32);
+    assert!(row.drift.abs() < 1e-44, "{:e}", row.drift);
+}
+
+const ROTOR: &str = r#"{"name": "rotor", "gravity": [0, 0],
+ "bars": [{"name": "rotor", "mass": 0.3, "centre": [0, 0], "inertia": 0.7, "length": 1}],
+ "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "rotor", "point": [0, 0]}]}],
+ "torsion_springs": [{"name": "coil", "body": "rotor", "stiffness": 2.8, "free_angle": 0.1}],
+ "start": {"rotor": {"phi": 0.6, "omega": 0}}, "until": 3, "every": 3}"#;
+
+/// 0.1 + 0.5 cos(2 t): none of these numbers but 0.5 is a double.
+#[test]
+fn an_oscillator_follows_its_cosine_to_eighty_digits() {
+    let row = last(&source(ROTOR, &[], "3", "1"), 84);
+    let expected = fixed("0.1") + cosine(&fixed("6")) / 2;
+    near(&number(row.bodies[0][0]), &expected, 80);
+    // One number typed otherwise: 2.8 = 14/5 exactly, and 7/10.
+    let typed = ["rotor.phi=3/5", "coil.stiffness=14/5", "bars.rotor.inertia=7/10"];
+    let again = last(&source(ROTOR, &typed, "3", "1"), 84);
+    near(&number(again.bodies[0][0]), &expected, 80);
+}
+
+/// T = 2π sqrt(l/g) / agm(1, cos(phi0/2)) for a pendulum of length l: after it everything is as at the start.
+#[test]
+fn a_pendulum_returns_after_its_elliptic_period() {
+    let pendulum = r#"{"name": "pendulum", "gravity": [9.81, 0],
+     "bars": [{"name": "bar", "mass": 0.37, "centre": [0.7, 0], "inertia": 0, "length": 1}],
+     "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+     "start": {"bar": {"phi": 2.2, "omega": 0}}, "until": 3, "every": 3}"#;
+    let (mut a, mut b) = (one(), cosine(&fixed("1.1")));
+    for _ in 0..12 {
+        (a, b) = ((&a + &b) / 2, (&a * &b).sqrt());
+    }
+    // π by J. Machin.
+    let arctan = |k: u32| {
+        let (mut power, mut sum) = (one() / k, BigInt::ZERO);
+        for i in 0..160_u32 {
+            let term = &power / (2 * i + 1);
+            sum = if i % 2 == 0 { sum + term } else { sum - term };
+            power /= k * k;
+        }
+        sum
+    };
+    let pi = arctan(5) * 16 - arctan(239) * 4;
+    let root = (fixed("0.7") * one() * one() / fixed("9.81")).sqrt();
+    let period = times(&(pi * 2), &root) * one() / a;
+    let period = text(&period);
+    let row = last(&source(pendulum, &[], &period, &period), 70);
+    near(&number(row.bodies[0][0]), &fixed("2.2"), 66);
+    near(&number(row.bodies[0][1]), &BigInt::ZERO, 64);
+}
+
+/// A ball dropped from 1 m onto a floor with e = 1/2: t_1 = sqrt(2 h/g), and 2 e^k t_1 between impacts.
+#[test]
+fn a_ball_bounces_as_its_parabolas() {
+    let ball = r#"{"name": "ball", "gravity": [0, -9.81],
+     "bars": [{"name": "ball", "mass": 0.3, "centre": [0, 0], "inertia": 0.01, "length": 0.1}],
+     "walls": [{"name": "floor", "body": "ball", "point": [0, 0], "line": {"through": [0, 0.1], "normal": [0, 1]}, "restitution": 0.5}],
+     "start": {"ball": {"phi": 0.3, "omega": 1.1, "origin": [0.2, 1.1], "velocity": [0.3, 0]}}, "until": 1, "every": 1}"#;
+    let mut run = run(&source(ball, &[], "1.2", "0.3"), 60);
+    let rows: Vec<Row> =
+        (0..=run.last_row()).map(|k| run.row(k, &mut || false).expect("a row").expect("there")).collect();
+    // 0.4515… + 0.4515… + 0.2257…: between the third and the fourth impact.
+    assert_eq!(run.counts()[1], 3);
+    let g = fixed("9.81");
+    let first: BigInt = (one() * one() * 2 / &g * one()).sqrt();
+    let third: BigInt = &first + &first + &first / 2;
+    let speed = times(&g, &first) / 8;
+    let after = fixed("1.2") - third;
+    let height = times(&speed, &after) - times(&g, &times(&after, &after)) / 2;
+    let row = rows.last().expect("a row");
+    near(&number(row.bodies[0][3]), &(height + fixed("0.1")), 56);
+    near(&number(row.bodies[0][2]), &fixed("0.56"), 56);
+    near(&number(row.bodies[0][0]), &fixed("1.62"), 56);
+    assert!(row.drift.abs() < 1e-56, "{:e}", row.drift);
+}
+
+/// The parallelograms move as one pendulum, whose energy is (11/4 + 3 I) w²/2 + 7 g y, with I as written.
+#[test]
+fn four_bars_pass_their_singular_positions_on_the_right_branch() {
+    let rows = rows(&source(&shipped("four_bars"), &[], "3", "0.25"), 25);
+    let is_below = |row: &Row| row.bodies[0][3] < Wide::ZERO;
+    let crossed = rows.windows(2).filter(|pair| is_below(&pair[0]) != is_below(&pair[1])).count();
+    let mut energy: Option<BigInt> = None;
+    for row in &rows {
+        assert!(row.residual[0] < 1e-35 && row.drift.abs() < 1e-24, "{row:?}");
+        for k in [3, 4] {
+            near(&number(row.bodies[k][0]), &BigInt::ZERO, 22);
+        }
+        let (omega, [_, _, _, y, ..]) = (number(row.bodies[0][1]), row.bodies[0]);
+        let inertia = fixed("2.75") + fixed("0.08333333333333333") * 3;
+        let now = times(&inertia, &times(&omega, &omega)) / 2 + times(&fixed("9.81"), &(number(y) * 7));
+        near(&now, energy.get_or_insert_with(|| now.clone()), 22);
+    }
+    assert!(crossed >= 3, "{crossed}");
+}
+
+/// The same scenes in doubles, and with 15 digits more.
+#[test]
+fn every_kind_of_scene_agrees_with_doubles_and_with_more_digits() {
+    for name in [
+        "spring",
+        "motor",
+        "motor_sine",
+        "chain8",
+        "branch",
+        "wall",
+        "crank_rocker",
+        "slider_crank_driven",
+        "guided",
+        "parameters",
+        "four_bar_motor",
+        "kite",
+    ] {
+        let source = source(&shipped(name), &[], "0.2", "0.2");
+        let (few, many) = (last(&source, 25), last(&source, 40));
+        let request = Request { until: Some(0.2), every: Some(0.2), rtol: Some(1e-14), ..Request::default() };
+        let plain = common::run(&common::shipped(name, &[]), &request);
+        for (k, (few, many)) in few.bodies.iter().zip(&many.bodies).enumerate() {
+            for (&few, &many) in few.iter().zip(many) {
+                let size = number(many).magnitude().clone().max(one().magnitude().clone());
+                let off = (number(few) - number(many)) * one() / BigInt::from(size);
+                near(&off, &BigInt::ZERO, 22);
+            }
+            let plain = fixed(&format!("{:.15}", plain.last.phi[k]));
+            near(&number(many[0]), &plain, 9);
+        }
+    }
+}
+
+#[test]
+fn a_run_goes_on_to_the_last_bit() {
+    for name in ["spring", "wall"] {
+        let source = source(&shipped(name), &[], "0.6", "0.1");
+        let whole = rows(&source, 30);
+        let mut begun = run(&source, 30);
+        let mut steps = 0;
+        assert!(
+            begun
+                .row(3, &mut || {
+                    steps += 1;
+                    steps == 9
+                })
+                .expect("no stop")
+                .is_none()
+        );
+        let saved = begun.save();
+        let mut other = run(&source, 30);
+        assert!(other.resume(&saved) && !run(&source, 31).resume(&saved));
+        for expected in &whole[4..] {
+            let found = other.row(expected.number, &mut || false).expect("a row").expect("there");
+            assert_eq!(format!("{found:?}"), format!("{expected:?}"), "{name}");
+        }
+    }
+}
+
+/// The growth is about 10^4 in 10 s, and the proof holds whatever the threads do.
+#[test]
+fn the_digits_a_horizon_takes_are_forecast_and_proved() {
+    let source = source(&shipped("free"), &[], "10", "1");
+    let forecast = forecast(&source, 1e-20, false).expect("a forecast");
+    assert!((2.5..9.0).contains(&forecast.growth), "{forecast:?}");
+    assert!((24..40).contains(&forecast.run.digits) && forecast.companion.digits == forecast.run.digits + 10);
+    let mut pair = Pair::new(&source, &[forecast.run, forecast.companion]).expect("two runs");
+    let mut least = f64::INFINITY;
+    while let Progress::Rows(rows) = pair.go(&|| false).expect("no stop") {
+        for (_, agreement) in rows {
+            least = least.min(agreement.expect("two runs"));
+        }
+    }
+    assert!(least > 20.0, "{least}");
+}
+
+#[test]
+fn what_is_not_carried_is_refused_by_name() {
+    for (name, word) in [
+        ("bang_bang", "torques.motor"),
+        ("duffing", "torsion_springs.coil"),
+        ("pid", "integrals"),
+        ("friction_pendulum", "friction"),
+        ("latch", "events"),
+    ] {
+        let source = source(&shipped(name), &[], "1", "1");
+        let error = long_run(&source, Precision::new(30, false)).err().expect("refused").to_string();
+        assert!(error.contains(word) && error.contains("many digits"), "{name}: {error}");
+    }
+}
