@@ -101,9 +101,9 @@ fn a_ball_is_derived_through_its_impact() {
         r#"{"name": "ball", "gravity": [0, -9.81],
             "bars": [{"name": "ball", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 0.2}],
             "walls": [{"name": "floor", "body": "ball", "point": [0, 0], "line": {"through": [0, 0.1], "normal": [0, 1]}, "restitution": 0.7}],
-            "start": {"ball": {"phi": 0, "omega": 0, "x": 0, "y": 1.3, "vx": 0, "vy": 0}}, "until": 1, "every": 0.1}"#,
+            "start": {"ball": {"phi": 0, "omega": 0, "origin": [0, 1.3], "velocity": [0, 0]}}, "until": 1, "every": 0.1}"#,
     );
-    let to = ["ball.y", "gravity[1]", "floor.restitution", "walls.floor.line.through[1]"];
+    let to = ["start.ball.origin[1]", "gravity[1]", "floor.restitution", "walls.floor.line.through[1]"];
     let t = 0.8;
     let found = derived(&scene, &["ball.y", "ball.vy", "impact:floor"], &to, t);
     let (g, h, e) = (9.81_f64, 1.2_f64, 0.7);
@@ -315,7 +315,7 @@ fn what_makes_no_sense_is_told() {
         ("event:none", "bar1.phi", "no event is called `none`"),
         ("impact:none", "bar1.phi", "no wall is called `none`"),
         ("bar1.phi", "bar3.phi", "bar3"),
-        ("bar1.fie", "bar1.phi", "bar1.phi"),
+        ("bar1.fie", "bar1.phi", "unknown name bar1.fie"),
         ("bar1.phi", "springs.spring.model", "not a number"),
     ] {
         let request = SensitivityRequest {

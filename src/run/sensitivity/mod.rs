@@ -33,7 +33,7 @@ use super::flip::FlipDetector;
 use super::plan::Plan;
 use super::running::Outcome;
 use crate::dynamics::{CompileError, Mechanism, Motion, Time};
-use crate::scene::{Output, Scene, SceneError, Template};
+use crate::scene::{Output, OutputNames, Scene, SceneError, Template};
 use crate::stepping::Tolerance;
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -237,6 +237,12 @@ impl Study {
             .filter(|output| known.outputs.iter().all(|known| known.name != output.name))
             .cloned()
             .collect();
+        let names = OutputNames::of(&known);
+        for output in &outputs {
+            names
+                .bind(output)
+                .map_err(|error| refused(format!("{}: {}", output.name, error.problem), &error.hint))?;
+        }
         let template = template.clone().with_outputs(outputs);
         let scene = template.scene()?;
         let mechanism = Arc::new(Mechanism::new(&scene)?);

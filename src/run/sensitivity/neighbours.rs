@@ -24,6 +24,8 @@ const FIRST: usize = 1;
 const ENOUGH: f64 = 1e-11;
 /// The estimated relative error that is too large for a derivative.
 const TOO_MUCH: f64 = 1e-4;
+/// What a change of the number by its own size does, over the values, below which it does nothing.
+const NOTHING: f64 = 1e-11;
 /// Rounding of an evaluation, over its value.
 const ROUNDING: f64 = 4e-16;
 /// Offsets and weights: on both sides, and on one.
@@ -60,6 +62,8 @@ struct Candidate {
 /// All candidates of one change, with their weights, and what they make of F.
 struct Attempt {
     change: f64,
+    /// Size of the number.
+    scale: f64,
     list: Vec<(f64, Candidate)>,
     slopes: Vec<Vec<f64>>,
     sizes: Vec<f64>,
@@ -163,7 +167,7 @@ fn error(larger: &Attempt, smaller: &Attempt) -> f64 {
         error = error.max(apart / size * share);
     }
     // A number without any effect has a derivative too: zero.
-    if most == 0.0 { 0.0 } else { (error + ROUNDING / smaller.change) / most }
+    if most * smaller.scale < NOTHING { 0.0 } else { (error + ROUNDING / smaller.change) / most }
 }
 
 /// True where two mechanisms are the same but for how they start.
@@ -188,14 +192,15 @@ impl Search<'_> {
     /// Scenes at a change over the number, on both sides of it or on one.
     fn attempt(&self, share: f64) -> Result<Attempt, String> {
         let (_, value) = self.number;
-        let change = share * if value == 0.0 { 1.0 } else { value.abs() };
+        let scale = if value == 0.0 { 1.0 } else { value.abs() };
+        let change = share * scale;
         self.list(change, &BOTH)
             .or_else(|_| self.list(change, &ONE))
             .or_else(|_| self.list(-change, &ONE))
             .map(|list| {
                 let change = change.abs();
                 let (slopes, sizes) = self.slopes(&list);
-                Attempt { change, list, slopes, sizes }
+                Attempt { change, scale, list, slopes, sizes }
             })
     }
 
