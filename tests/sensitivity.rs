@@ -202,7 +202,6 @@ fn derivatives_of_every_kind_of_scene_agree_with_differences_of_references() {
         ("spring", 2.0, &["spring.stiffness", "bar1.phi", "bars.bar2.density", "gravity[0]"][..]),
         ("motor_sine", 2.0, &["motors.motor.law.sines[0].frequency", "bar2.omega", "B.between[0].point[0]"]),
         ("four_bars", 0.8, &["gravity[1]"]),
-        ("parameters", 1.0, &["gravity[1]"]),
         ("slider_crank_torque", 0.5, &["gravity[1]"]),
         ("wall", 0.8, &["wall.restitution", "bar1.omega"]),
     ] {
