@@ -315,7 +315,7 @@ fn what_makes_no_sense_is_told() {
         ("impact:none", "bar1.phi", "no wall is called `none`"),
         ("bar1.phi", "bar3.phi", "bar3"),
         ("bar1.fie", "bar1.phi", "unknown name bar1.fie"),
-        ("bar1.phi", "springs.spring.model", "not a number"),
+        ("bar1.phi", "springs.spring.model", "not a single number"),
     ] {
         let request = SensitivityRequest {
             of: vec![of.parse().expect("a measure")],
