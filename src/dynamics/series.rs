@@ -526,8 +526,8 @@ mod tests {
                 let from = 2 - f;
                 series.begin(Time::default(), &phi[from..], &[0.0; 2][from..], &omega[from..]);
                 let mut other = series.clone();
-                series.orders::<2>(&mechanism, 0);
-                other.orders::<0>(&mechanism, 0);
+                series.orders::<2>(&mechanism.terms(), 0);
+                other.orders::<0>(&mechanism.terms(), 0);
                 assert!(
                     series.z == other.z && series.omega == other.omega && series.power == other.power,
                     "{name}"
