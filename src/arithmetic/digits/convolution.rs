@@ -1,8 +1,8 @@
 //! Products, and sums of products rounded once.
 //!
-//! The sum is held in two's complement over the limbs from the largest product down; each product is formed in
-//! its upper columns and added at its place, negative ones as their complement, so that no branch depends on a
-//! sign.  The code is made for every number of limbs up to eight.
+//! Each product is formed in its upper columns and added, limb by limb, to the sum of positive or to that of
+//! negative ones; carries are left for the end, and no branch depends on a sign.  The code is made for every
+//! number of limbs up to eight.
 
 use super::{Digits, Kind, MOST, Scalar};
 
@@ -43,15 +43,15 @@ fn any_columns(limbs: usize, a: &[u64], b: &[u64], found: &mut [u64]) {
 
 /// By the code for this number of limbs.
 macro_rules! by_size {
-    ($limbs:expr, $sized:ident $(::$more:tt)?, $any:expr, ($($argument:expr),*)) => {
+    ($limbs:expr, $sized:ident $(::$more:ident)*, $any:expr, ($($argument:expr),*)) => {
         match $limbs {
-            2 => $sized::<2 $(, $more)?>($($argument),*),
-            3 => $sized::<3 $(, $more)?>($($argument),*),
-            4 => $sized::<4 $(, $more)?>($($argument),*),
-            5 => $sized::<5 $(, $more)?>($($argument),*),
-            6 => $sized::<6 $(, $more)?>($($argument),*),
-            7 => $sized::<7 $(, $more)?>($($argument),*),
-            8 => $sized::<8 $(, $more)?>($($argument),*),
+            2 => $sized::<2 $(, $more)*>($($argument),*),
+            3 => $sized::<3 $(, $more)*>($($argument),*),
+            4 => $sized::<4 $(, $more)*>($($argument),*),
+            5 => $sized::<5 $(, $more)*>($($argument),*),
+            6 => $sized::<6 $(, $more)*>($($argument),*),
+            7 => $sized::<7 $(, $more)*>($($argument),*),
+            8 => $sized::<8 $(, $more)*>($($argument),*),
             limbs => $any(limbs, $($argument),*),
         }
     };
@@ -117,47 +117,50 @@ pub fn sum_of_products<'a, const W: usize>(
         return Digits::ZERO;
     }
     match limbs {
-        ..=8 => sum_in::<11, W>(terms, top, limbs),
-        _ => sum_in::<{ MOST + 3 }, W>(terms, top, limbs),
+        ..=8 => sum_in::<10, 20, W>(terms, top, limbs),
+        _ => sum_in::<{ MOST + 2 }, { 2 * MOST + 4 }, W>(terms, top, limbs),
     }
 }
 
-/// The sum in room for three limbs more than it has; the second is the first of the largest product.
+/// The sum, whose first limb is the first of the largest product, in room for two products end to end.
 #[inline(always)]
-fn sum_in<'a, const ROOM: usize, const W: usize>(
+fn sum_in<'a, const ROOM: usize, const DOUBLE: usize, const W: usize>(
     terms: impl Iterator<Item = (&'a Digits<W>, &'a Digits<W>)>,
     top: i32,
     limbs: usize,
 ) -> Digits<W> {
-    let mut sum = [0; ROOM];
-    by_size!(limbs, accumulate::W, any_accumulate, (terms, top, &mut sum));
-    rounded(&mut sum[..limbs + 3], top + 1, limbs)
+    let mut sums = [[0; DOUBLE]; 2];
+    by_size!(limbs, accumulate::ROOM::DOUBLE::W, any_accumulate, (terms, top, &mut sums));
+    rounded::<DOUBLE, W>(&sums, top, limbs)
 }
 
 #[inline(always)]
-fn accumulate<'a, const N: usize, const W: usize>(
+fn accumulate<'a, const N: usize, const ROOM: usize, const DOUBLE: usize, const W: usize>(
     terms: impl Iterator<Item = (&'a Digits<W>, &'a Digits<W>)>,
     top: i32,
-    sum: &mut [u64],
+    sums: &mut [[u128; DOUBLE]; 2],
 ) {
-    add_all::<10, W>(N, terms, top, sum, columns::<N>);
+    add_all::<ROOM, DOUBLE, W>(N, terms, top, sums, columns::<N>);
 }
 
-fn any_accumulate<'a, const W: usize>(
+fn any_accumulate<'a, const DOUBLE: usize, const W: usize>(
     limbs: usize,
     terms: impl Iterator<Item = (&'a Digits<W>, &'a Digits<W>)>,
     top: i32,
-    sum: &mut [u64],
+    sums: &mut [[u128; DOUBLE]; 2],
 ) {
-    add_all::<{ MOST + 2 }, W>(limbs, terms, top, sum, |a, b, found| any_columns(limbs, a, b, found));
+    add_all::<{ MOST + 2 }, DOUBLE, W>(limbs, terms, top, sums, |a, b, found| {
+        any_columns(limbs, a, b, found)
+    });
 }
 
+/// Adds the limbs of every product to those of the positive or of the negative sum, carries left for the end.
 #[inline(always)]
-fn add_all<'a, const ROOM: usize, const W: usize>(
+fn add_all<'a, const ROOM: usize, const DOUBLE: usize, const W: usize>(
     limbs: usize,
     terms: impl Iterator<Item = (&'a Digits<W>, &'a Digits<W>)>,
     top: i32,
-    sum: &mut [u64],
+    sums: &mut [[u128; DOUBLE]; 2],
     columns: impl Fn(&[u64], &[u64], &mut [u64]),
 ) {
     let mut found = [0; ROOM];
@@ -167,31 +170,40 @@ fn add_all<'a, const ROOM: usize, const W: usize>(
             continue;
         }
         columns(&a.limb, &b.limb, &mut found);
-        // -x is the complement of x, plus one in the last limb that counts.
-        let mask = if a.is_negative() == b.is_negative() { 0 } else { u64::MAX };
-        let mut carry = mask & 1;
-        let (above, place) = sum[..limbs + 3].split_at_mut(1 + apart);
-        for (place, &limb) in place.iter_mut().zip(&found[..limbs + 2 - apart]).rev() {
-            let wide = u128::from(*place) + u128::from(limb ^ mask) + u128::from(carry);
-            *place = wide as u64;
-            carry = (wide >> 64) as u64;
-        }
-        for place in above.iter_mut().rev() {
-            let wide = u128::from(*place) + u128::from(mask) + u128::from(carry);
-            *place = wide as u64;
-            carry = (wide >> 64) as u64;
+        let sum = &mut sums[usize::from(a.is_negative() != b.is_negative())];
+        for (place, &limb) in sum[apart..apart + limbs + 2].iter_mut().zip(&found[..limbs + 2]) {
+            *place += u128::from(limb);
         }
     }
 }
 
-/// The number that a sum in two's complement stands for.
-fn rounded<const W: usize>(sum: &mut [u64], exponent: i32, limbs: usize) -> Digits<W> {
-    let is_negative = sum[0] >> 63 == 1;
-    if is_negative {
-        let mut carry = true;
-        for limb in sum.iter_mut().rev() {
-            (*limb, carry) = (!*limb).overflowing_add(u64::from(carry));
+/// The difference of the two sums.
+#[inline(always)]
+fn rounded<const DOUBLE: usize, const W: usize>(
+    sums: &[[u128; DOUBLE]; 2],
+    top: i32,
+    limbs: usize,
+) -> Digits<W> {
+    let count = 2 * (limbs + 2);
+    // Limbs with a first one for what is carried out.
+    let mut carried = [[0; DOUBLE], [0; DOUBLE]];
+    let mut over = [0; 2];
+    for ((limbs, sum), over) in carried.iter_mut().zip(sums).zip(&mut over) {
+        let mut carry = 0;
+        for (limb, &sum) in limbs[..count].iter_mut().zip(&sum[..count]).rev() {
+            let wide = sum + carry;
+            *limb = wide as u64;
+            carry = wide >> 64;
         }
+        *over = carry as u64;
     }
-    Digits::normalized(is_negative, exponent, limbs, sum)
+    let is_negative = (over[1], &carried[1][..count]) > (over[0], &carried[0][..count]);
+    let [positive, negative] = &mut carried;
+    let (large, small) = if is_negative { (negative, positive) } else { (positive, negative) };
+    let borrow = super::minus(&mut large[..count], &small[..count]);
+    let first = over[usize::from(is_negative)] - over[usize::from(!is_negative)] - u64::from(borrow);
+    let mut found = [0; DOUBLE];
+    found[0] = first;
+    found[1..].copy_from_slice(&large[..DOUBLE - 1]);
+    Digits::normalized(is_negative, top + 1, limbs, &found[..count])
 }

@@ -61,8 +61,8 @@ pub struct Motion<const W: usize> {
     pub(super) series: Series<Digits<W>>,
     pub(super) state: LongState<W>,
     pub(super) keeper: Keeper<W>,
-    /// Length of the step the series is to make \[s\], where it is that of the state.
-    step: Option<f64>,
+    /// The step the series is to make, where it is that of the state: its length \[s\], and the wall it ends on.
+    step: Option<(Digits<W>, Option<usize>)>,
     /// Limbs that each power is kept to.
     kept: Vec<usize>,
     /// Steps may be as long at most \[s\].
@@ -204,11 +204,12 @@ impl<const W: usize> Motion<W> {
     /// The series is not finite, steps become too small, or a point stays on its wall.
     pub fn reach(&mut self, until: Digits<W>, pause: &mut dyn FnMut() -> bool) -> Result<bool, StepError> {
         loop {
-            let step = self.ready()?;
-            if until <= self.state.t + Digits::of(step) {
+            let (step, wall) = self.ready()?;
+            if until <= self.state.t + step {
                 return Ok(true);
             }
-            self.go(step)?;
+            self.advance(step)?;
+            wall.map_or(Ok(()), |wall| wall::impact(self, wall))?;
             if pause() {
                 return Ok(false);
             }
@@ -243,7 +244,7 @@ impl<const W: usize> Motion<W> {
     }
 
     /// The series of the state, and the length of the step it makes, which ends on a wall where one is met.
-    fn ready(&mut self) -> Result<f64, StepError> {
+    fn ready(&mut self) -> Result<(Digits<W>, Option<usize>), StepError> {
         if let Some(step) = self.step {
             return Ok(step);
         }
@@ -271,6 +272,10 @@ impl<const W: usize> Motion<W> {
                 hint,
             ));
         }
+        let step = match wall::first(self, step)? {
+            Some((wall, length)) => (length, Some(wall)),
+            None => (Digits::of(step), None),
+        };
         self.step = Some(step);
         Ok(step)
     }
@@ -313,15 +318,6 @@ impl<const W: usize> Motion<W> {
             weight - 64.0 * (kept[m] - 1) as f64 > self.precision.tolerance()
         };
         !(0..=self.precision.order).any(far)
-    }
-
-    /// Takes the step.
-    fn go(&mut self, step: f64) -> Result<(), StepError> {
-        let Some((wall, length)) = wall::first(self, step)? else {
-            return self.advance(Digits::of(step));
-        };
-        self.advance(length)?;
-        wall::impact(self, wall)
     }
 
     /// Moves the state along the series.

@@ -7,7 +7,7 @@ pub const DIGITS: std::ops::RangeInclusive<usize> = 20..=2000;
 /// log2 of 10.
 pub(super) const BITS: f64 = std::f64::consts::LOG2_10;
 /// Bits beyond the digits, for rounding and for the size of what is computed.
-const SPARE: usize = 32;
+const SPARE: usize = 28;
 /// Highest power of the rates a digit: it makes the work least where an order costs its square.
 const ORDER: f64 = 1.15;
 
