@@ -46,14 +46,14 @@ impl Collocation {
     /// Takes columns (dq, dw) of n coordinates through a step; `pull` has B and C at the nodes, n × 2n row by
     /// row, one node after the other, `forcing` F of every column, node by node, empty for columns without.
     ///
-    /// Returns the last coefficient over the size of what is integrated, and leaves the columns alone where it
-    /// is above `limit`; NaN where there is no solution.
+    /// `floors` are sizes of columns that are rounding.  Returns the last coefficient over the size of what is
+    /// integrated, and leaves the columns alone where it is above `limit`; NaN where there is no solution.
     pub fn step(
         &mut self,
         h: f64,
         pull: &[f64],
         columns: &mut [Vec<f64>],
-        forcing: &[Vec<f64>],
+        (forcing, floors): (&[Vec<f64>], &[f64]),
         limit: f64,
     ) -> f64 {
         let Some(n) = columns.first().map(|column| column.len() / 2) else { return 0.0 };
@@ -65,7 +65,7 @@ impl Collocation {
         let Self { nodes, weights, last, system, .. } = self;
         let stage = |i: usize, row: usize, k: usize| system[(i * n + row) * width + size + k];
         let mut tail = 0.0_f64;
-        for (k, column) in columns.iter().enumerate() {
+        for (k, (column, floor)) in columns.iter().zip(floors).enumerate() {
             let (mut left, mut whole) = (0.0_f64, 0.0_f64);
             for row in 0..n {
                 left = left.max((0..STAGES).map(|i| last[i] * stage(i, row, k)).sum::<f64>().abs());
@@ -76,7 +76,7 @@ impl Collocation {
                 return f64::NAN;
             }
             if whole > 0.0 {
-                tail = tail.max(h * left / whole);
+                tail = tail.max(h * left / (whole + floor));
             }
         }
         if tail > limit {
@@ -151,7 +151,7 @@ mod tests {
                 let forcing =
                     method.nodes.iter().map(|node| libm::cos((k as f64 + node) * h)).collect::<Vec<_>>();
                 let pull = [-4.0, 0.0].repeat(STAGES);
-                assert!(method.step(h, &pull, &mut columns, &[forcing], 1.0) < 1.0);
+                assert!(method.step(h, &pull, &mut columns, (&[forcing], &[0.0]), 1.0) < 1.0);
             }
             let exact = libm::cos(2.0) / 3.0 + (0.3 - 1.0 / 3.0) * libm::cos(4.0) + 0.05 * libm::sin(4.0);
             (columns[0][0] - exact).abs()

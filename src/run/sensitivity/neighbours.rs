@@ -51,6 +51,8 @@ pub(in crate::run) struct Neighbours {
     pub start: Vec<f64>,
     /// Estimated relative error of derivatives.
     pub error: f64,
+    /// Size of a column that is rounding.
+    pub floor: f64,
 }
 
 /// A scene at one value.
@@ -109,7 +111,7 @@ impl Neighbours {
     }
 
     fn of(attempt: Attempt, error: f64, base: &Mechanism) -> Self {
-        let n = base.coordinates();
+        let (n, scale) = (base.coordinates(), attempt.scale);
         let mut start = vec![0.0; 2 * n];
         for (weight, candidate) in &attempt.list {
             for k in 0..n {
@@ -125,7 +127,7 @@ impl Neighbours {
             mechanism: candidate.mechanism,
         };
         let list = if is_alike { Vec::new() } else { attempt.list.into_iter().map(neighbour).collect() };
-        Self { list, start, error }
+        Self { list, start, error, floor: NOTHING / scale }
     }
 
     /// Goes on with the parts that act, the contacts held and the branches of a mechanism.

@@ -198,8 +198,10 @@ impl Variation {
             let pieces = (left / self.reach).ceil().max(1.0);
             let h = left / pieces;
             self.look_at_nodes(step, h);
-            let Self { method, pull, columns, forcing, .. } = self;
-            let tail = method.step(h, pull, columns, forcing, LIMIT);
+            let Self { method, pull, columns, forcing, neighbours, .. } = self;
+            let floor = |neighbours: &Option<Neighbours>| neighbours.as_ref().map_or(0.0, |some| some.floor);
+            let floors: Vec<f64> = neighbours.iter().map(floor).collect();
+            let tail = method.step(h, pull, columns, (forcing, &floors), LIMIT);
             let growth = 0.9 * libm::pow(LIMIT / tail.max(1e-12), 1.0 / (STAGES - 1) as f64);
             if tail <= LIMIT {
                 self.steps += 1;
