@@ -78,6 +78,9 @@ impl Variation {
     /// Takes the columns through what happens at one moment.
     pub(super) fn cross(&mut self, jumps: &[Jump]) -> Result<(), String> {
         let [.., last] = jumps else { return Ok(()) };
+        if !last.mechanism.held.is_empty() {
+            return Err("a point comes to rest on its wall, which small differences do not follow".into());
+        }
         let (mut off, mut is_other) = (None, false);
         for jump in jumps {
             off = jump.switch.as_ref().map(|switch| switch.off.clone()).or(off);
