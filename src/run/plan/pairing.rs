@@ -1,0 +1,248 @@
+//! Which methods go with which scenes and stabilizations, and why the others do not.
+
+use super::{MANY_COORDINATES, Refusal, Request, mismatch};
+use crate::dynamics::Mechanism;
+use crate::dynamics::compile::DENSE_LIMIT;
+use crate::dynamics::force::Vibration;
+use crate::dynamics::natural::Natural;
+use crate::run::methods::{MethodId, Stabilization};
+
+/// How much faster than all else a vibration must be to be taken for its mean force: a turn of it within a
+/// hundredth of theirs.
+const SEPARATE: f64 = 100.0;
+
+/// The stabilization of a pairing, or why there is none.
+pub(super) fn pair(
+    mechanism: &Mechanism,
+    method: MethodId,
+    request: &Request,
+    notes: &mut Vec<String>,
+) -> Result<Stabilization, Refusal> {
+    check_size(mechanism, method, request)?;
+    if !mechanism.contacts.is_empty()
+        && !matches!(method, MethodId::Dp5 | MethodId::Dp8 | MethodId::Taylor | MethodId::Radau(_))
+    {
+        let reason = match method {
+            MethodId::Dopri5 | MethodId::Dop853 => {
+                "ode_solvers does not let an impact be located inside its steps"
+            }
+            _ => "an impact inside a fixed step cannot be located without changing the step",
+        };
+        return Err(mismatch(
+            format!("{method} on a scene with walls"),
+            reason,
+            "--method dp8, taylor for more digits, or dp5 at loose tolerances",
+        ));
+    }
+    check_friction(mechanism, method, request)?;
+    if let (MethodId::Taylor, Some(row)) =
+        (method, mechanism.constraints.iter().find(|row| row.aim.is_some()))
+    {
+        return Err(mismatch(
+            format!("taylor on a scene with motor {}", row.name),
+            "its aim depends on where the mechanism is, and its constraint has no power series",
+            "--method dp8, or radau9 where it is stiff",
+        ));
+    }
+    if matches!(method, MethodId::Rattle(_)) && mechanism.is_damped() {
+        let reason = "RATTLE takes forces that depend on positions only, and a damper's does not";
+        return Err(mismatch(
+            format!("{method} on a scene with dampers"),
+            reason,
+            "--method dop853, or gauss16 for a fixed step",
+        ));
+    }
+    if matches!(method, MethodId::Rattle(_))
+        && let Err(error) = Natural::new(std::sync::Arc::new(mechanism.clone()))
+    {
+        return Err(mismatch(
+            format!("{method} on this scene"),
+            &error.to_string(),
+            "--method dp8, or gauss16 for a fixed step",
+        ));
+    }
+    if mechanism.constraints.is_empty() {
+        if request.stabilize.is_some_and(|kind| kind != Stabilization::None) {
+            notes.push("the scene has no constraint: nothing to stabilize".into());
+        }
+        return Ok(Stabilization::None);
+    }
+    let windowed = matches!(method, MethodId::Dopri5 | MethodId::Dop853);
+    let Some(asked) = request.stabilize else {
+        let usual =
+            if matches!(method, MethodId::Rattle(_)) { Stabilization::Projection } else { usual(mechanism) };
+        if windowed && usual == Stabilization::Projection {
+            let own = if method == MethodId::Dopri5 { "dp5" } else { "dp8" };
+            notes.push(format!(
+                "{method} takes no projection: constraints drift with its tolerance; {own} keeps them"
+            ));
+            return Ok(Stabilization::None);
+        }
+        return Ok(usual);
+    };
+    if asked == Stabilization::Elimination && mechanism.has_multipliers() {
+        let reason = if mechanism.has_closed_loops() {
+            "closed loops and sliders have no independent coordinates to be left with"
+        } else if mechanism.constraints.iter().any(|row| mechanism.may_be_off(&row.name)) {
+            "an event switches a motor off, whose angle is a coordinate from then on"
+        } else {
+            "a torsion spring counts the turns of an angle, which elimination takes modulo whole ones"
+        };
+        return Err(mismatch(format!("{method} with --stabilize {asked}"), reason, "--stabilize projection"));
+    }
+    match (method, asked) {
+        (MethodId::Rattle(_), Stabilization::Projection) => Ok(asked),
+        (MethodId::Rattle(_), _) => {
+            let reason = "RATTLE keeps every row at both levels by its own projection";
+            Err(mismatch(
+                format!("{method} with --stabilize {asked}"),
+                reason,
+                "leave --stabilize out, or --method dp8",
+            ))
+        }
+        (MethodId::Gauss(_), Stabilization::Projection) if usual(mechanism) == Stabilization::Projection => {
+            Ok(asked)
+        }
+        (MethodId::Gauss(_), Stabilization::None | Stabilization::Baumgarte)
+            if usual(mechanism) == Stabilization::Projection =>
+        {
+            let reason = "a Gauss method keeps loops and sliders by symmetric projection, and nothing else keeps its energy";
+            Err(mismatch(
+                format!("{method} with --stabilize {asked}"),
+                reason,
+                "--stabilize projection, or --method dp8",
+            ))
+        }
+        (MethodId::Gauss(_), Stabilization::None | Stabilization::Baumgarte | Stabilization::Projection) => {
+            let reason = "Gauss methods are symplectic in coordinates and momenta, where a motor's angle is eliminated";
+            Err(mismatch(
+                format!("{method} with --stabilize {asked}"),
+                reason,
+                "--stabilize elimination, or --method dp8",
+            ))
+        }
+        (MethodId::Taylor, Stabilization::Baumgarte) => {
+            let reason =
+                "the series is that of the constrained motion, which has nothing to be pulled back from";
+            Err(mismatch(
+                format!("{method} with --stabilize {asked}"),
+                reason,
+                "--stabilize projection or elimination, or --method dp8",
+            ))
+        }
+        (MethodId::Dopri5 | MethodId::Dop853, Stabilization::Projection) => {
+            let own = if method == MethodId::Dopri5 { "dp5" } else { "dp8" };
+            let reason = "projection acts after every accepted step, and ode_solvers owns its loop";
+            Err(mismatch(
+                format!("{method} with --stabilize projection"),
+                reason,
+                &format!("--method {own}, the same tableau in our own stepper"),
+            ))
+        }
+        _ => Ok(asked),
+    }
+}
+
+/// Very many coordinates are taken body by body or not at all.
+fn check_size(mechanism: &Mechanism, method: MethodId, request: &Request) -> Result<(), Refusal> {
+    if mechanism.tree.is_dense() {
+        return Ok(());
+    }
+    let n = mechanism.coordinates();
+    let reason =
+        format!("its matrices would hold {n} x {n} numbers, and at most {DENSE_LIMIT} coordinates have them");
+    let alternative = "--method dop853, or dp8 where constraints are to be kept";
+    if !matches!(method, MethodId::Dopri5 | MethodId::Dop853 | MethodId::Dp5 | MethodId::Dp8) {
+        return Err(mismatch(format!("{method} on {n} coordinates"), &reason, alternative));
+    }
+    if !mechanism.contacts.is_empty() {
+        return Err(mismatch(
+            format!("walls on {n} coordinates"),
+            &reason.replace("its", "an impact's"),
+            "fewer bodies",
+        ));
+    }
+    if !mechanism.constraints.is_empty() && request.stabilize == Some(Stabilization::Elimination) {
+        return Err(mismatch(format!("elimination on {n} coordinates"), &reason, "--stabilize projection"));
+    }
+    Ok(())
+}
+
+/// The mean force of a vibration is known to the explicit methods, and right where the vibration is much
+/// faster than all else.
+pub(super) fn check_vibration(
+    mechanism: &Mechanism,
+    method: MethodId,
+    rate: f64,
+    notes: &mut Vec<String>,
+) -> Result<(), Refusal> {
+    let Some(Vibration { name, energy, frequency, .. }) = &mechanism.vibration else { return Ok(()) };
+    if !matches!(
+        method,
+        MethodId::Dopri5 | MethodId::Dop853 | MethodId::Dp5 | MethodId::Dp8 | MethodId::Radau(_)
+    ) {
+        let reason = "the mean force of its vibration comes from the mass matrix, of which this method knows no derivative";
+        return Err(mismatch(
+            format!("{method} with the rigid spring `{name}`"),
+            reason,
+            "--method dp8, or dop853",
+        ));
+    }
+    if *frequency < SEPARATE * rate {
+        let reason = format!(
+            "it vibrates at {frequency:.3e} rad/s, not {SEPARATE} times as fast as all else, up to {rate:.3e} rad/s"
+        );
+        return Err(mismatch(
+            format!("the rigid spring `{name}`"),
+            &reason,
+            "leave its `model` out: it is soft enough to be resolved",
+        ));
+    }
+    let share = energy / mechanism.energy_scale;
+    notes.push(format!(
+        "rigid spring {name}: {energy:.3e} J of vibration ({share:.1e} of the scale) at {frequency:.3e} rad/s act on average; its force is a mean"
+    ));
+    Ok(())
+}
+
+/// Dry friction takes methods that end their steps at its transitions and keep by projection what sticks.
+fn check_friction(mechanism: &Mechanism, method: MethodId, request: &Request) -> Result<(), Refusal> {
+    let Some(friction) = mechanism.frictions.first() else { return Ok(()) };
+    let place = || format!("dry friction ({} {})", friction.kind(), friction.name);
+    if !matches!(method, MethodId::Dp5 | MethodId::Dp8 | MethodId::Radau(_) | MethodId::Custom) {
+        let reason = match method {
+            MethodId::Taylor => "its forces are found with the accelerations, and have no power series",
+            MethodId::Dopri5 | MethodId::Dop853 => {
+                "ode_solvers does not let what sticks be kept by projection"
+            }
+            _ => "a transition inside a fixed step cannot be located without changing the step",
+        };
+        let alternative = "--method dp8, dp5 at loose tolerances, or radau9 where it is stiff";
+        return Err(mismatch(format!("{method} on a scene with {}", place()), reason, alternative));
+    }
+    if matches!(request.stabilize, Some(Stabilization::Baumgarte | Stabilization::Elimination)) {
+        let reason = "friction follows from the multipliers, which this one changes or leaves out";
+        return Err(mismatch(format!("{} with it", place()), reason, "--stabilize projection"));
+    }
+    if !mechanism.redundant().is_empty() {
+        let reason = "constraints are redundant, so that the forces in the joints, and friction with them, are not determined";
+        let alternative = "leave out a constraint that others imply already";
+        return Err(mismatch(format!("{} here", place()), reason, alternative));
+    }
+    if !mechanism.tree.is_dense() {
+        let reason = format!("it takes matrices, and at most {DENSE_LIMIT} coordinates have them");
+        return Err(mismatch(format!("{} here", place()), &reason, "fewer bodies"));
+    }
+    Ok(())
+}
+
+/// How the rows of a mechanism are kept where nobody says: given angles are eliminated where they are all
+/// there is to keep.
+pub(in crate::run) fn usual(mechanism: &Mechanism) -> Stabilization {
+    let is_large = mechanism.coordinates() > MANY_COORDINATES;
+    if mechanism.has_multipliers() || is_large || !mechanism.frictions.is_empty() {
+        Stabilization::Projection
+    } else {
+        Stabilization::Elimination
+    }
+}

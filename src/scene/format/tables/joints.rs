@@ -1,0 +1,199 @@
+//! Joints, their friction, and walls.
+
+use super::*;
+
+/// A hinge.
+pub(in crate::scene) static HINGE: Table = Table {
+    title: "a hinge",
+    about: "Two places, on different bodies, that coincide for ever.",
+    fields: &[
+        required("name", Shape::Name, "\"A\"", "Name, unique among hinges."),
+        required("between", Shape::Between, PLACES, "The two places."),
+        optional(
+            "friction",
+            Shape::Object(&HINGE_FRICTION),
+            "{\"radius\": 0.01, \"kinetic\": 0.2}",
+            "Dry friction; none if absent.",
+        ),
+    ],
+};
+
+const KINETIC: Field = required(
+    "kinetic",
+    Shape::Number(not_negative("")),
+    "0.2",
+    "Coefficient of friction while the two slide on each other.",
+);
+
+const STATIC: Field = optional(
+    "static",
+    Shape::Number(not_negative("")),
+    "0.3",
+    "Coefficient of friction while they stick, at least the kinetic one; the same if absent.",
+);
+
+/// Dry friction of a hinge.
+pub(in crate::scene) static HINGE_FRICTION: Table = Table {
+    title: "friction of a hinge",
+    about: "Coulomb friction: a torque of the coefficient times the radius times the force that the hinge carries.",
+    fields: &[
+        required("radius", Shape::Number(positive("m")), "0.01", "Radius at which it acts."),
+        KINETIC,
+        STATIC,
+    ],
+};
+
+/// Dry friction of a slider.
+pub(in crate::scene) static SLIDER_FRICTION: Table = Table {
+    title: "friction of a slider",
+    about: "Coulomb friction: a force along the rail of the coefficient times the force across it.",
+    fields: &[KINETIC, STATIC],
+};
+
+/// Dry friction at a wall.
+pub(in crate::scene) static WALL_FRICTION: Table = Table {
+    title: "friction at a wall",
+    about: "Coulomb friction: a force along the wall of the coefficient times its pressure, in impacts too.",
+    fields: &[
+        KINETIC,
+        STATIC,
+        optional(
+            "impact",
+            Shape::Word(&["poisson", "newton"]),
+            "\"newton\"",
+            "What restitution multiplies in an impact: \"poisson\", the impulse of compression; \"newton\", the normal velocity; \"poisson\" if absent.",
+        ),
+    ],
+};
+
+/// A slider.
+pub(in crate::scene) static SLIDER: Table = Table {
+    title: "a slider",
+    about: "A point of a body that slides along a line of the ground or of another body.",
+    fields: &[
+        required(
+            "name",
+            Shape::Name,
+            "\"slider\"",
+            "Name, unique among sliders; it also names the constraints.",
+        ),
+        required(
+            "point",
+            Shape::Object(&PLACE),
+            "{\"body\": \"block\", \"point\": [0, 0]}",
+            "The point that slides; on another body than the rail.",
+        ),
+        required(
+            "rail",
+            Shape::Object(&RAIL),
+            "{\"body\": \"ground\", \"point\": [0, 0], \"direction\": [1, 0]}",
+            "The line; travel along it is counted from its point.",
+        ),
+        optional(
+            "angle",
+            Shape::Word(&["free", "locked"]),
+            "\"locked\"",
+            "Whether the two bodies may turn on each other, or keep the angle between them that they have at the start; \"free\" if absent.",
+        ),
+        optional(
+            "friction",
+            Shape::Object(&SLIDER_FRICTION),
+            "{\"kinetic\": 0.2}",
+            "Dry friction; none if absent.",
+        ),
+    ],
+};
+
+/// The line of a slider.
+pub(in crate::scene) static RAIL: Table = Table {
+    title: "a rail",
+    about: "A line of a bar or of the ground.",
+    fields: &[
+        required("body", Shape::Body { ground: true }, "\"ground\"", "Name of a bar, or \"ground\"."),
+        required(
+            "point",
+            Shape::Pair(signed("m")),
+            "[0, 0]",
+            "A point of the line, in the bar's frame, or in the world's for the ground.",
+        ),
+        required(
+            "direction",
+            Shape::Pair(signed("")),
+            "[1, 0]",
+            "Direction, of any length but zero, in the same frame; travel grows along it.",
+        ),
+    ],
+};
+
+/// A weld.
+pub(in crate::scene) static WELD: Table = Table {
+    title: "a weld",
+    about: "Two places that coincide, of bodies that keep the angle between them that they have at the start.",
+    fields: &[
+        required("name", Shape::Name, "\"W\"", "Name, unique among welds; it also names the constraints."),
+        required("between", Shape::Between, PLACES, "The two places, on different bodies."),
+    ],
+};
+
+/// A lock.
+pub(in crate::scene) static LOCK: Table = Table {
+    title: "a lock",
+    about: "An angle of a bar, absolute or relative to another bar, that stays as it is.",
+    fields: &[
+        required("name", Shape::Name, "\"lock\"", "Name, unique among locks; it also names the constraint."),
+        required("body", Shape::Body { ground: false }, "\"bar1\"", "The bar."),
+        optional("relative_to", Shape::Body { ground: true }, "\"bar2\"", MEASURED_FROM),
+        optional("angle", Shape::Number(ANGLE), "0.5", "The angle; that of the start if absent."),
+    ],
+};
+
+/// A wall.
+pub(in crate::scene) static WALL: Table = Table {
+    title: "a wall",
+    about: "A line of the ground, or of another bar, that a point of a bar cannot pass.",
+    fields: &[
+        required("name", Shape::Name, "\"wall\"", "Name, unique among walls."),
+        required("body", Shape::Body { ground: false }, "\"bar2\"", "The bar."),
+        required("point", Shape::Pair(signed("m")), "[0.6, 0]", "The point of the bar, in its frame."),
+        required("line", Shape::Object(&LINE), "{\"through\": [0, 0], \"normal\": [1, 0]}", "The line."),
+        required(
+            "restitution",
+            Shape::Number(Quantity { least: 0.0, most: 1.0, unit: "" }),
+            "0.5",
+            "The normal velocity after an impact is -restitution times the one before: 0 plastic, 1 elastic.",
+        ),
+        optional(
+            "law",
+            Shape::Law(&WALL_LAW, signed("m")),
+            "\"5 mm*sin(30*t)\"",
+            "How far the line has moved along its normal, as a function of time; it stays if absent.",
+        ),
+        optional(
+            "friction",
+            Shape::Object(&WALL_FRICTION),
+            "{\"kinetic\": 0.2}",
+            "Dry friction; none if absent.",
+        ),
+    ],
+};
+
+/// The line of a wall.
+pub(in crate::scene) static LINE: Table = Table {
+    title: "a line",
+    about: "A line of the ground, or of a bar.",
+    fields: &[
+        optional(
+            "body",
+            Shape::Body { ground: true },
+            "\"table\"",
+            "The bar that carries the line, which is in its frame; the ground if absent.",
+        ),
+        required("through", Shape::Pair(signed("m")), "[0, 0]", "A point of the line."),
+        required(
+            "normal",
+            Shape::Pair(signed("")),
+            "[1, 0]",
+            "Normal, of any length but zero, towards the side the point may be on.",
+        ),
+    ],
+};
