@@ -2,11 +2,17 @@
 
 #[cfg(feature = "digits")]
 mod digits;
+mod folders;
 mod study;
+mod values;
 
 #[cfg(feature = "digits")]
 pub use self::digits::DigitsFlags;
-pub use study::{FitFlags, SensitivityFlags};
+pub use folders::*;
+pub use study::*;
+#[cfg(feature = "charts")]
+use values::window;
+use values::{count, levels, limit, methods, number, positive, preferences, stabilizations, wait};
 
 #[cfg(feature = "charts")]
 use super::charts::{ChartFlags, MotionFlags};
@@ -15,9 +21,8 @@ use super::output::{message, print};
 use crate::run::kinematics::Drive;
 use crate::run::stress::MAX_EVALUATIONS;
 use crate::run::trust::Level;
-use crate::run::{Limits, METHODS, MethodId, Prefer, Request, Shard, Stabilization, Vary};
-use crate::scene::{self, Override};
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use crate::run::{Limits, MethodId, Prefer, Request, Shard, Stabilization, Vary};
+use crate::scene::Override;
 use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand};
 use std::ffi::OsString;
@@ -265,196 +270,6 @@ pub struct RunFlags {
     pub window: Option<[f64; 2]>,
 }
 
-/// `driftless sweep`.
-#[derive(Clone, Debug, Args)]
-pub struct SweepFlags {
-    #[allow(missing_docs)]
-    #[command(flatten)]
-    pub scene: SceneFlags,
-    /// Vary a value, as in bar1.phi=-pi..pi:64 or springs.spring.stiffness=1..10:4; several make a grid, of
-    /// which the first varies slowest
-    #[arg(
-        long,
-        value_name = "NAME=FROM..TO:COUNT",
-        required = true,
-        allow_hyphen_values = true,
-        help_heading = "Points"
-    )]
-    pub vary: Vec<Vary>,
-    /// End each point when a bar first turns over (its angle passes an odd multiple of pi)
-    #[arg(long, help_heading = "Points")]
-    pub to_flip: bool,
-    /// Threads [default: all processors]; the table is the same whatever their number
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Points")]
-    pub threads: Option<u16>,
-    /// Run part I of N alone, into a folder shard-I-of-N of the sweep's own; `driftless merge` joins them
-    #[arg(long, value_name = "I/N", value_parser = clap::value_parser!(Shard), help_heading = "Points")]
-    pub shard: Option<Shard>,
-    #[allow(missing_docs)]
-    #[command(flatten)]
-    pub plan: PlanFlags,
-    /// Estimate the error of every point and the time up to which it can be trusted, in two more columns:
-    /// off, auto (in lanes a second sweep at a hundredth of the tolerance: about 2.2 times the work), full
-    /// (as single runs)
-    #[arg(long, value_name = "HOW", value_parser = levels(), default_value = Level::Off.name(), help_heading = "Trust")]
-    pub trust: Level,
-    /// Stop a point where its energy is off by more than this share of its scale [default: what the tolerance
-    /// explains, 0.01 at most]
-    #[arg(long, value_name = "SHARE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
-    pub max_energy_drift: Option<f64>,
-    /// Stop a point where a constraint is off by more, in rad or m, or that per second [default: 0.01 rad, or
-    /// sizes of the mechanism, in position]
-    #[arg(long, value_name = "SIZE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
-    pub max_constraint_drift: Option<f64>,
-    /// Folder under which `SCENE/sweep-NAMES-METHOD-SETTING` is made
-    #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
-    pub out: PathBuf,
-    /// Overwrite the sweep that is in the folder
-    #[arg(long, help_heading = "Files")]
-    pub force: bool,
-    #[allow(missing_docs)]
-    #[command(flatten)]
-    pub checkpoints: CheckpointFlags,
-    #[allow(missing_docs)]
-    #[cfg(feature = "charts")]
-    #[command(flatten)]
-    pub charts: ChartFlags,
-    /// Write a page, `sweep.html`: a click on the chart shows the motion of that point, or of the nearest of
-    /// some that are kept
-    #[cfg(feature = "charts")]
-    #[arg(long, conflicts_with = "shard", help_heading = "Files")]
-    pub html: bool,
-    /// Column of the table to draw over one or two varied values [default: flip_time]
-    #[cfg(feature = "charts")]
-    #[arg(long, value_name = "COLUMN", conflicts_with = "no_charts", help_heading = "Files")]
-    pub map: Option<String>,
-}
-
-/// `driftless stress`.
-#[derive(Debug, Args)]
-pub struct StressFlags {
-    /// Scenes [default: the shipped set, whose ends are known]
-    #[arg(value_name = "SCENE")]
-    pub scenes: Vec<PathBuf>,
-    /// Methods, separated by commas [default: all]
-    #[arg(long, value_name = "NAMES", value_parser = methods(), value_delimiter = ',')]
-    pub methods: Vec<MethodId>,
-    /// Evaluations allowed for each scene and method
-    #[arg(long, alias = "effort", value_name = "N", default_value_t = MAX_EVALUATIONS, value_parser = clap::value_parser!(u64).range(1..))]
-    pub max_evaluations: u64,
-    /// What the end of a scene given may be off, in rad
-    #[arg(long, value_name = "RAD", default_value_t = 1e-4, value_parser = limit, allow_hyphen_values = true, requires = "scenes")]
-    pub tolerance: f64,
-    /// Threads [default: all processors]; the cells are the same whatever their number
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub threads: Option<u16>,
-    /// Folder under which `stress` is made
-    #[arg(long, value_name = "DIR", default_value = "output")]
-    pub out: PathBuf,
-    /// Overwrite what is in the folder
-    #[arg(long)]
-    pub force: bool,
-    #[allow(missing_docs)]
-    #[cfg(feature = "charts")]
-    #[command(flatten)]
-    pub charts: ChartFlags,
-    #[allow(missing_docs)]
-    #[command(flatten)]
-    pub tell: TellFlags,
-}
-
-/// `driftless kinematics`.
-#[derive(Debug, Args)]
-pub struct KinematicsFlags {
-    #[allow(missing_docs)]
-    #[command(flatten)]
-    pub scene: SceneFlags,
-    /// What is driven, and from where to where in rad or m: a motor, a body or a slider, as crank,
-    /// crank=0..2pi or slider=-0.1..0.1 [default: the first motor, one turn from the start]
-    #[arg(long, value_name = "NAME[=FROM..TO]", value_parser = clap::value_parser!(Drive), allow_hyphen_values = true)]
-    pub drive: Option<Drive>,
-    /// Rate of the drive in rad/s or m/s [default: that of the motor at the start, 1 elsewhere]
-    #[arg(long, value_name = "RATE", value_parser = number, allow_hyphen_values = true)]
-    pub rate: Option<f64>,
-    /// Positions at equal distances over the range; one more stands at its end
-    #[arg(long, value_name = "N", default_value_t = 360, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
-    pub positions: u32,
-    /// Folder under which `SCENE/kinematics-DRIVE` is made
-    #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
-    pub out: PathBuf,
-    /// Overwrite what is in the folder
-    #[arg(long, help_heading = "Files")]
-    pub force: bool,
-    #[allow(missing_docs)]
-    #[cfg(feature = "charts")]
-    #[command(flatten)]
-    pub charts: ChartFlags,
-}
-
-/// `driftless modes`.
-#[derive(Debug, Args)]
-pub struct ModesFlags {
-    #[allow(missing_docs)]
-    #[command(flatten)]
-    pub scene: SceneFlags,
-    /// Positions from which equilibria or periodic motions are looked for, beside the scene's start
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(0..=1_000_000))]
-    pub starts: u32,
-    /// Look for motions of this period in seconds; by default that of motors at a constant rate and of sines
-    #[arg(long, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
-    pub period: Option<f64>,
-    /// Folder under which `SCENE/modes` is made
-    #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
-    pub out: PathBuf,
-    /// Overwrite what is in the folder
-    #[arg(long, help_heading = "Files")]
-    pub force: bool,
-    #[allow(missing_docs)]
-    #[cfg(feature = "charts")]
-    #[command(flatten)]
-    pub charts: ChartFlags,
-    #[allow(missing_docs)]
-    #[cfg(feature = "charts")]
-    #[command(flatten)]
-    pub motion: MotionFlags,
-}
-
-/// `driftless compare`.
-#[derive(Debug, Args)]
-pub struct CompareFlags {
-    #[allow(missing_docs)]
-    #[command(flatten)]
-    pub scene: SceneFlags,
-    /// Methods, joined by commas [default: all]
-    #[arg(long, value_name = "METHODS", value_parser = methods(), value_delimiter = ',', help_heading = "Comparison")]
-    pub methods: Vec<MethodId>,
-    /// How constraints are kept; several, joined by commas, are compared with one another [default: each
-    /// method's usual way]
-    #[arg(long, value_name = "HOW", value_parser = stabilizations(), value_delimiter = ',', help_heading = "Comparison")]
-    pub stabilize: Vec<Stabilization>,
-    /// Horizon in seconds [default: the scene's, or what there is time for]
-    #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true, help_heading = "Comparison")]
-    pub until: Option<f64>,
-    /// Seconds to spend: for the reference, for one run of each setting, and for repetitions that make their
-    /// times sure
-    #[arg(long, value_name = "S", value_parser = wait, default_value = "90", allow_hyphen_values = true, help_heading = "Comparison")]
-    pub budget: f64,
-    /// Folder under which `SCENE/compare` is made
-    #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
-    pub out: PathBuf,
-    /// Overwrite the comparison that is in the folder
-    #[arg(long, help_heading = "Files")]
-    pub force: bool,
-    #[allow(missing_docs)]
-    #[cfg(feature = "charts")]
-    #[command(flatten)]
-    pub charts: ChartFlags,
-    /// Write a page, `compare.html`: points of the charts tell their settings
-    #[cfg(feature = "charts")]
-    #[arg(long, help_heading = "Files")]
-    pub html: bool,
-}
-
 /// How often checkpoints are written.
 #[derive(Clone, Debug, Args)]
 pub struct CheckpointFlags {
@@ -483,68 +298,6 @@ pub struct TellFlags {
     /// Say on stderr what is being done
     #[arg(short, long, conflicts_with = "quiet")]
     pub verbose: bool,
-}
-
-/// `driftless resume`.
-#[derive(Debug, Args)]
-pub struct ResumeFlags {
-    /// The folder of the run or sweep, or one above it that holds no other interrupted one
-    #[arg(value_name = "DIR")]
-    pub folder: PathBuf,
-    /// A later horizon in seconds, for a run
-    #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
-    pub until: Option<f64>,
-    /// Evaluations allowed in the whole run, those made so far counted in [default: as the run was begun]
-    #[arg(long, alias = "effort", value_name = "N", value_parser = count, allow_hyphen_values = true)]
-    pub max_evaluations: Option<u64>,
-    #[allow(missing_docs)]
-    #[command(flatten)]
-    pub checkpoints: CheckpointFlags,
-    #[allow(missing_docs)]
-    #[command(flatten)]
-    pub tell: TellFlags,
-}
-
-/// `driftless merge`.
-#[derive(Debug, Args)]
-pub struct MergeFlags {
-    /// Folders of parts, or one that holds them all
-    #[arg(value_name = "DIR", required = true)]
-    pub folders: Vec<PathBuf>,
-    /// Folder of the whole sweep [default: the one above the parts]
-    #[arg(long, value_name = "DIR", help_heading = "Files")]
-    pub out: Option<PathBuf>,
-    /// Overwrite the sweep that is in the folder
-    #[arg(long, help_heading = "Files")]
-    pub force: bool,
-    #[allow(missing_docs)]
-    #[command(flatten)]
-    pub tell: TellFlags,
-}
-
-/// `driftless view`.
-#[cfg(feature = "charts")]
-#[derive(Debug, Args)]
-pub struct ViewFlags {
-    /// Folders of runs, or folders that hold some; the first is shown in full, the others beside it
-    #[arg(value_name = "DIR", required = true)]
-    pub folders: Vec<PathBuf>,
-    /// Keep every row from this time on, in seconds, where a run is longer than a page can hold [default: the
-    /// start]
-    #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
-    pub from: Option<f64>,
-    /// Keep every row up to this time, in seconds
-    #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
-    pub to: Option<f64>,
-    /// Lay the reference solution of the first run beside it, integrated anew as exactly as can be
-    #[arg(long)]
-    pub reference: bool,
-    /// Folder of the page [default: the run's, or the one above several]
-    #[arg(long, value_name = "DIR", help_heading = "Files")]
-    pub out: Option<PathBuf>,
-    #[allow(missing_docs)]
-    #[command(flatten)]
-    pub tell: TellFlags,
 }
 
 impl Flags {
@@ -644,64 +397,6 @@ pub fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Flags, Exi
     })
 }
 
-#[cfg(feature = "charts")]
-fn window(text: &str) -> Result<[f64; 2], String> {
-    scene::range(text)
-        .filter(|[from, _]| *from >= 0.0)
-        .ok_or_else(|| "must be FROM..TO with 0 <= FROM < TO, as 10..12.5".to_owned())
-}
-
-fn methods() -> impl TypedValueParser<Value = MethodId> {
-    PossibleValuesParser::new(METHODS.iter().map(|info| info.name)).try_map(|name| name.parse::<MethodId>())
-}
-
-fn stabilizations() -> impl TypedValueParser<Value = Stabilization> {
-    PossibleValuesParser::new(Stabilization::ALL.map(Stabilization::name))
-        .try_map(|name| name.parse::<Stabilization>())
-}
-
-fn preferences() -> impl TypedValueParser<Value = Prefer> {
-    PossibleValuesParser::new(Prefer::ALL.map(Prefer::name)).try_map(|name| name.parse::<Prefer>())
-}
-
-fn levels() -> impl TypedValueParser<Value = Level> {
-    PossibleValuesParser::new(Level::ALL.map(Level::name)).try_map(|name| name.parse::<Level>())
-}
-
-/// A number as everywhere on the command line; infinities and NaN, which a plan refuses, are numbers too.
-fn number(text: &str) -> Result<f64, String> {
-    let read = scene::number(text).or_else(|| text.trim().parse().ok());
-    read.ok_or_else(|| "not a number; write 0.01, 1e-9, 1/64 or pi/2".to_owned())
-}
-
-/// A whole number from 1 to 1e18, as 50000 or 5e4.
-fn count(text: &str) -> Result<u64, String> {
-    let value = number(text)?;
-    if (1.0..=1e18).contains(&value) && value.fract() == 0.0 {
-        Ok(value as u64)
-    } else {
-        Err("a whole number from 1 to 1e18".to_owned())
-    }
-}
-
-/// A time to wait \[s\]: any number that is not negative.
-fn wait(text: &str) -> Result<f64, String> {
-    let value = number(text)?;
-    if (0.0..=1e9).contains(&value) { Ok(value) } else { Err("a number of seconds from 0 to 1e9".to_owned()) }
-}
-
-/// A limit: any number that is not negative.
-fn limit(text: &str) -> Result<f64, String> {
-    let value = number(text)?;
-    if value >= 0.0 { Ok(value) } else { Err("a limit is a number from 0 up".to_owned()) }
-}
-
-/// A number above zero.
-fn positive(text: &str) -> Result<f64, String> {
-    let value = number(text)?;
-    if value > 0.0 && value.is_finite() { Ok(value) } else { Err("a number above 0".to_owned()) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -710,18 +405,5 @@ mod tests {
     #[test]
     fn the_table_is_sound() {
         Flags::command().debug_assert();
-    }
-
-    #[test]
-    fn fractions_are_numbers() {
-        assert_eq!(number("1/64"), Ok(0.015625));
-        assert_eq!(number("-1e-3"), Ok(-0.001));
-        assert_eq!((count("5e4"), count("7")), (Ok(50_000), Ok(7)));
-        assert!(
-            count("0").is_err() && count("1.5").is_err() && count("1e19").is_err() && count("-1").is_err()
-        );
-        assert!(
-            number("1/").is_err() && number("ten").is_err() && limit("nan").is_err() && limit("-1").is_err()
-        );
     }
 }

@@ -1,11 +1,198 @@
-//! The flags of commands that derive and fit.
+//! The flags of commands that study a scene by more than a run.
 
-#[cfg(feature = "charts")]
-use super::ChartFlags;
-use super::{SceneFlags, positive};
+use super::values::{limit, methods, number, positive, stabilizations, wait};
+use super::*;
 use crate::run::Measure;
-use clap::Args;
-use std::path::PathBuf;
+
+/// `driftless sweep`.
+#[derive(Clone, Debug, Args)]
+pub struct SweepFlags {
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub scene: SceneFlags,
+    /// Vary a value, as in bar1.phi=-pi..pi:64 or springs.spring.stiffness=1..10:4; several make a grid, of
+    /// which the first varies slowest
+    #[arg(
+        long,
+        value_name = "NAME=FROM..TO:COUNT",
+        required = true,
+        allow_hyphen_values = true,
+        help_heading = "Points"
+    )]
+    pub vary: Vec<Vary>,
+    /// End each point when a bar first turns over (its angle passes an odd multiple of pi)
+    #[arg(long, help_heading = "Points")]
+    pub to_flip: bool,
+    /// Threads [default: all processors]; the table is the same whatever their number
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Points")]
+    pub threads: Option<u16>,
+    /// Run part I of N alone, into a folder shard-I-of-N of the sweep's own; `driftless merge` joins them
+    #[arg(long, value_name = "I/N", value_parser = clap::value_parser!(Shard), help_heading = "Points")]
+    pub shard: Option<Shard>,
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub plan: PlanFlags,
+    /// Estimate the error of every point and the time up to which it can be trusted, in two more columns:
+    /// off, auto (in lanes a second sweep at a hundredth of the tolerance: about 2.2 times the work), full
+    /// (as single runs)
+    #[arg(long, value_name = "HOW", value_parser = levels(), default_value = Level::Off.name(), help_heading = "Trust")]
+    pub trust: Level,
+    /// Stop a point where its energy is off by more than this share of its scale [default: what the tolerance
+    /// explains, 0.01 at most]
+    #[arg(long, value_name = "SHARE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
+    pub max_energy_drift: Option<f64>,
+    /// Stop a point where a constraint is off by more, in rad or m, or that per second [default: 0.01 rad, or
+    /// sizes of the mechanism, in position]
+    #[arg(long, value_name = "SIZE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
+    pub max_constraint_drift: Option<f64>,
+    /// Folder under which `SCENE/sweep-NAMES-METHOD-SETTING` is made
+    #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
+    pub out: PathBuf,
+    /// Overwrite the sweep that is in the folder
+    #[arg(long, help_heading = "Files")]
+    pub force: bool,
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub checkpoints: CheckpointFlags,
+    #[allow(missing_docs)]
+    #[cfg(feature = "charts")]
+    #[command(flatten)]
+    pub charts: ChartFlags,
+    /// Write a page, `sweep.html`: a click on the chart shows the motion of that point, or of the nearest of
+    /// some that are kept
+    #[cfg(feature = "charts")]
+    #[arg(long, conflicts_with = "shard", help_heading = "Files")]
+    pub html: bool,
+    /// Column of the table to draw over one or two varied values [default: flip_time]
+    #[cfg(feature = "charts")]
+    #[arg(long, value_name = "COLUMN", conflicts_with = "no_charts", help_heading = "Files")]
+    pub map: Option<String>,
+}
+
+/// `driftless stress`.
+#[derive(Debug, Args)]
+pub struct StressFlags {
+    /// Scenes [default: the shipped set, whose ends are known]
+    #[arg(value_name = "SCENE")]
+    pub scenes: Vec<PathBuf>,
+    /// Methods, separated by commas [default: all]
+    #[arg(long, value_name = "NAMES", value_parser = methods(), value_delimiter = ',')]
+    pub methods: Vec<MethodId>,
+    /// Evaluations allowed for each scene and method
+    #[arg(long, alias = "effort", value_name = "N", default_value_t = MAX_EVALUATIONS, value_parser = clap::value_parser!(u64).range(1..))]
+    pub max_evaluations: u64,
+    /// What the end of a scene given may be off, in rad
+    #[arg(long, value_name = "RAD", default_value_t = 1e-4, value_parser = limit, allow_hyphen_values = true, requires = "scenes")]
+    pub tolerance: f64,
+    /// Threads [default: all processors]; the cells are the same whatever their number
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Folder under which `stress` is made
+    #[arg(long, value_name = "DIR", default_value = "output")]
+    pub out: PathBuf,
+    /// Overwrite what is in the folder
+    #[arg(long)]
+    pub force: bool,
+    #[allow(missing_docs)]
+    #[cfg(feature = "charts")]
+    #[command(flatten)]
+    pub charts: ChartFlags,
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub tell: TellFlags,
+}
+
+/// `driftless kinematics`.
+#[derive(Debug, Args)]
+pub struct KinematicsFlags {
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub scene: SceneFlags,
+    /// What is driven, and from where to where in rad or m: a motor, a body or a slider, as crank,
+    /// crank=0..2pi or slider=-0.1..0.1 [default: the first motor, one turn from the start]
+    #[arg(long, value_name = "NAME[=FROM..TO]", value_parser = clap::value_parser!(Drive), allow_hyphen_values = true)]
+    pub drive: Option<Drive>,
+    /// Rate of the drive in rad/s or m/s [default: that of the motor at the start, 1 elsewhere]
+    #[arg(long, value_name = "RATE", value_parser = number, allow_hyphen_values = true)]
+    pub rate: Option<f64>,
+    /// Positions at equal distances over the range; one more stands at its end
+    #[arg(long, value_name = "N", default_value_t = 360, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    pub positions: u32,
+    /// Folder under which `SCENE/kinematics-DRIVE` is made
+    #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
+    pub out: PathBuf,
+    /// Overwrite what is in the folder
+    #[arg(long, help_heading = "Files")]
+    pub force: bool,
+    #[allow(missing_docs)]
+    #[cfg(feature = "charts")]
+    #[command(flatten)]
+    pub charts: ChartFlags,
+}
+
+/// `driftless modes`.
+#[derive(Debug, Args)]
+pub struct ModesFlags {
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub scene: SceneFlags,
+    /// Positions from which equilibria or periodic motions are looked for, beside the scene's start
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(0..=1_000_000))]
+    pub starts: u32,
+    /// Look for motions of this period in seconds; by default that of motors at a constant rate and of sines
+    #[arg(long, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
+    pub period: Option<f64>,
+    /// Folder under which `SCENE/modes` is made
+    #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
+    pub out: PathBuf,
+    /// Overwrite what is in the folder
+    #[arg(long, help_heading = "Files")]
+    pub force: bool,
+    #[allow(missing_docs)]
+    #[cfg(feature = "charts")]
+    #[command(flatten)]
+    pub charts: ChartFlags,
+    #[allow(missing_docs)]
+    #[cfg(feature = "charts")]
+    #[command(flatten)]
+    pub motion: MotionFlags,
+}
+
+/// `driftless compare`.
+#[derive(Debug, Args)]
+pub struct CompareFlags {
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub scene: SceneFlags,
+    /// Methods, joined by commas [default: all]
+    #[arg(long, value_name = "METHODS", value_parser = methods(), value_delimiter = ',', help_heading = "Comparison")]
+    pub methods: Vec<MethodId>,
+    /// How constraints are kept; several, joined by commas, are compared with one another [default: each
+    /// method's usual way]
+    #[arg(long, value_name = "HOW", value_parser = stabilizations(), value_delimiter = ',', help_heading = "Comparison")]
+    pub stabilize: Vec<Stabilization>,
+    /// Horizon in seconds [default: the scene's, or what there is time for]
+    #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true, help_heading = "Comparison")]
+    pub until: Option<f64>,
+    /// Seconds to spend: for the reference, for one run of each setting, and for repetitions that make their
+    /// times sure
+    #[arg(long, value_name = "S", value_parser = wait, default_value = "90", allow_hyphen_values = true, help_heading = "Comparison")]
+    pub budget: f64,
+    /// Folder under which `SCENE/compare` is made
+    #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
+    pub out: PathBuf,
+    /// Overwrite the comparison that is in the folder
+    #[arg(long, help_heading = "Files")]
+    pub force: bool,
+    #[allow(missing_docs)]
+    #[cfg(feature = "charts")]
+    #[command(flatten)]
+    pub charts: ChartFlags,
+    /// Write a page, `compare.html`: points of the charts tell their settings
+    #[cfg(feature = "charts")]
+    #[arg(long, help_heading = "Files")]
+    pub html: bool,
+}
 
 /// `driftless sensitivity`.
 #[derive(Debug, Args)]
