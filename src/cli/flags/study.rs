@@ -204,7 +204,7 @@ pub struct SensitivityFlags {
     /// time a bar turns over), event:NAME, impact:WALL (first times)
     #[arg(long, value_name = "MEASURES", value_delimiter = ',', allow_hyphen_values = true)]
     pub of: Vec<Measure>,
-    /// By which numbers of the scene, joined by commas, as gravity[0],bar1.phi,spring.stiffness
+    /// By which numbers of the scene, joined by commas, as bar1.phi,spring.stiffness
     #[arg(long, value_name = "PATHS", value_delimiter = ',')]
     pub to: Vec<String>,
     /// Time of the outputs and end of the run in seconds [default: the scene's]

@@ -62,7 +62,7 @@ pub trait Constants: Sized {
     /// What a law comes to at a time, turns included.
     fn law_value(law: &Law<Self::Constant>, t: Self::Time) -> Self;
 
-    /// Adds the series of a law's rate: see [`drive::add`].
+    /// Adds the series of a law's rate: see `drive.rs`.
     fn add_law(
         law: &Law<Self::Constant>,
         sign: f64,

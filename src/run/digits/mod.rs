@@ -2,7 +2,7 @@
 //!
 //! [`Precision`] says what a number of digits asks of numbers and series; a [`LongRun`] takes a scene whose
 //! numbers are read as written from row to row; [`Pair`] runs two side by side and tells to how many digits
-//! they agree; [`forecast`](growth::forecast) measures how fast errors grow and how many digits that takes.
+//! they agree; [`forecast`] measures how fast errors grow and how many digits that takes.
 
 mod growth;
 mod keep;

@@ -19,7 +19,9 @@ pub(crate) use error::meant;
 pub use table::{Interpolant, POINTS};
 use unit::{Dimension, Mismatch};
 
-use crate::arithmetic::{Real, Scalar};
+#[cfg(feature = "digits")]
+use crate::arithmetic::Real;
+use crate::arithmetic::Scalar;
 
 /// The longest formula \[bytes\].
 pub const LONGEST: usize = 4096;
@@ -169,11 +171,13 @@ impl Formula {
     }
 
     /// Its value over a scalar with an order, where `number` gives the numbers in its text as such scalars.
+    #[cfg(feature = "digits")]
     pub(crate) fn exact_value<S: Real>(&self, values: &[S], number: impl Fn(f64) -> S) -> S {
         self.run_over(values, &number, |_, condition| condition > S::ZERO)
     }
 
     /// True where a number in it is in degrees.
+    #[cfg(feature = "digits")]
     pub(crate) fn has_angle_units(&self) -> bool {
         self.text.split(|letter: char| !letter.is_ascii_alphabetic()).any(|word| word == "deg")
     }
