@@ -167,7 +167,7 @@ fn scenes_with_such_laws_are_written_as_they_were_read() {
         |law: &str| parse_scene(&carried(law, "", false), "test", &[]).expect_err("no scene").to_string();
     for (law, part) in [
         ("sqrt(t/(1 s))", "must have a finite value, rate and acceleration at t = 0"),
-        ("tanh(bar.phi)", "unknown name bar.phi"),
+        ("tanh(rod.phi)", "unknown name rod.phi"),
         ("tanh(t/(1 s))*2 m", "m, not rad"),
     ] {
         let refusal = refusal(law);

@@ -215,9 +215,9 @@ mod tests {
     fn its_derivatives_are_those_of_its_position() {
         // An angle that follows another, a point, an origin and time.
         let aim = Aim::record(&[0], |at| {
-            let ([x, y], [u, _]) = (at.position(&rod()), at.position(&free()));
+            let ([x, y], [u, w]) = (at.position(&rod()), at.position(&free()));
             (at.angle(1).scale(2.0) + at.time() * x).sin_cos().0
-                + (x * y + u * u).scale(0.3)
+                + (x * y + u * w).scale(0.3)
                 + at.direction(1)[0]
         });
         let row = ConstraintEquation {
