@@ -147,11 +147,11 @@ pub struct Fit {
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let template = Template::read("examples/scenes/spring.json".as_ref(), &[])?;
-/// let trajectory = Simulation::new(&template.scene()?)?.until(1.0).every(0.1).trajectory()?;
 /// let mut table = String::from("t [s],bar1.phi [rad]\n");
-/// for sample in trajectory.samples() {
+/// Simulation::new(&template.scene()?)?.until(1.0).every(0.1).run_with(|sample| {
 ///     table += &format!("{},{}\n", sample.t, sample.phi[0]);
-/// }
+///     Ok(())
+/// })?;
 /// let guess = Template::read("examples/scenes/spring.json".as_ref(), &["spring.stiffness=7".parse()?])?;
 /// let request = FitRequest { vary: vec!["spring.stiffness".into()], ..FitRequest::default() };
 /// let found = fit(&guess, &Data::parse(&table, "table")?, &request, &mut || false)?;
