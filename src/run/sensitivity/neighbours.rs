@@ -82,32 +82,17 @@ impl Neighbours {
         base: (&Arc<Mechanism>, &Motion),
         until: f64,
     ) -> Result<Self, String> {
-        let search = Search { template, number, base, until };
-        let (mut tried, mut best, mut why): (Vec<Attempt>, Option<(f64, usize)>, _) =
-            (Vec::new(), None, String::new());
-        for share in &LADDER[FIRST..] {
-            match search.attempt(*share) {
-                Ok(attempt) => tried.push(attempt),
-                Err(reason) => why = reason,
-            }
-            if let [.., larger, smaller] = &tried[..] {
-                keep(&mut best, error(larger, smaller), tried.len() - 1);
-            }
-            if best.is_some_and(|(error, _)| error < ENOUGH) {
-                break;
-            }
-        }
-        // A larger change is of use where rounding is what limits.
-        if best.is_none_or(|(error, _)| error >= ENOUGH)
-            && let (Ok(larger), Some(first)) = (search.attempt(LADDER[0]), tried.first())
+        let search = |in_units: bool| Search { template, number, base, until, in_units };
+        let (mut attempt, mut error) = search(number.1 == 0.0).best()?;
+        // A number near zero: what it does shows in changes of its unit, not in changes over itself.
+        if attempt.does_nothing()
+            && (f64::MIN_POSITIVE..1.0).contains(&number.1.abs())
+            && let Ok((other, other_error)) = search(true).best()
+            && !other.does_nothing()
         {
-            keep(&mut best, error(&larger, first), 0);
+            (attempt, error) = (other, other_error);
         }
-        let Some((error, index)) = best.filter(|(error, _)| *error < TOO_MUCH) else {
-            let why = if why.is_empty() { "the equations do not depend on it smoothly".into() } else { why };
-            return Err(why);
-        };
-        Ok(Self::of(tried.swap_remove(index), error, base.0))
+        Ok(Self::of(attempt, error, base.0))
     }
 
     fn of(attempt: Attempt, error: f64, base: &Mechanism) -> Self {
@@ -158,18 +143,33 @@ fn keep(best: &mut Option<(f64, usize)>, error: f64, index: usize) {
     }
 }
 
+impl Attempt {
+    /// The largest slope over the size of what is derived.
+    fn steepest(&self) -> f64 {
+        self.slopes.iter().zip(&self.sizes).fold(0.0, |most: f64, (slopes, size)| {
+            let size = size.max(f64::MIN_POSITIVE);
+            slopes.iter().fold(most, |most, slope| most.max(slope.abs() / size))
+        })
+    }
+
+    /// True where a change of the number by its scale does nothing: its derivative is zero.
+    fn does_nothing(&self) -> bool {
+        self.steepest() * self.scale < NOTHING
+    }
+}
+
 /// Estimated relative error of the second of two attempts, with the smaller change.
 fn error(larger: &Attempt, smaller: &Attempt) -> f64 {
-    let share = (smaller.change / larger.change).powi(4);
-    let (mut most, mut error) = (0.0_f64, 0.0_f64);
-    for ((before, now), size) in larger.slopes.iter().zip(&smaller.slopes).zip(&smaller.sizes) {
-        let size = size.max(f64::MIN_POSITIVE);
-        let apart = before.iter().zip(now).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
-        most = now.iter().fold(most, |most, slope| most.max(slope.abs() / size));
-        error = error.max(apart / size * share);
+    if smaller.does_nothing() {
+        return 0.0;
     }
-    // A number without any effect has a derivative too: zero.
-    if most * smaller.scale < NOTHING { 0.0 } else { (error + ROUNDING / smaller.change) / most }
+    let share = (smaller.change / larger.change).powi(4);
+    let mut error = 0.0_f64;
+    for ((before, now), size) in larger.slopes.iter().zip(&smaller.slopes).zip(&smaller.sizes) {
+        let apart = before.iter().zip(now).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+        error = error.max(apart / size.max(f64::MIN_POSITIVE) * share);
+    }
+    (error + ROUNDING / smaller.change) / smaller.steepest()
 }
 
 /// True where two mechanisms are the same but for how they start.
@@ -188,13 +188,44 @@ struct Search<'a> {
     number: (&'a Variable, f64),
     base: (&'a Arc<Mechanism>, &'a Motion),
     until: f64,
+    /// Changes are in units of the number, not over it.
+    in_units: bool,
 }
 
 impl Search<'_> {
+    /// The attempt with the least estimated relative error, and that.
+    fn best(&self) -> Result<(Attempt, f64), String> {
+        let (mut tried, mut best, mut why): (Vec<Attempt>, Option<(f64, usize)>, _) =
+            (Vec::new(), None, String::new());
+        for share in &LADDER[FIRST..] {
+            match self.attempt(*share) {
+                Ok(attempt) => tried.push(attempt),
+                Err(reason) => why = reason,
+            }
+            if let [.., larger, smaller] = &tried[..] {
+                keep(&mut best, error(larger, smaller), tried.len() - 1);
+            }
+            if best.is_some_and(|(error, _)| error < ENOUGH) {
+                break;
+            }
+        }
+        // A larger change is of use where rounding is what limits.
+        if best.is_none_or(|(error, _)| error >= ENOUGH)
+            && let (Ok(larger), Some(first)) = (self.attempt(LADDER[0]), tried.first())
+        {
+            keep(&mut best, error(&larger, first), 0);
+        }
+        match best.filter(|(error, _)| *error < TOO_MUCH) {
+            Some((error, index)) => Ok((tried.swap_remove(index), error)),
+            None if why.is_empty() => Err("the equations do not depend on it smoothly".into()),
+            None => Err(why),
+        }
+    }
+
     /// Scenes at a change over the number, on both sides of it or on one.
     fn attempt(&self, share: f64) -> Result<Attempt, String> {
         let (_, value) = self.number;
-        let scale = if value == 0.0 { 1.0 } else { value.abs() };
+        let scale = if self.in_units { 1.0 } else { value.abs() };
         let change = share * scale;
         self.list(change, &BOTH)
             .or_else(|_| self.list(change, &ONE))
