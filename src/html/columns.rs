@@ -8,7 +8,7 @@ use std::io::{self, Write};
 /// Most quanta a column may span, 2⁴⁸: differences of third order, their signs folded in, stay whole numbers
 /// in a browser's doubles.
 const SPAN: f64 = (1_u64 << 48) as f64;
-/// Effort of the compression: the default, 6, takes twice the time for 2 % less.
+/// Effort of the compression: the default, 6, takes a third more of its time for 1.6 % less.
 const LEVEL: u32 = 4;
 /// Highest order of differences tried.
 const ORDERS: usize = 4;
