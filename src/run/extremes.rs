@@ -22,7 +22,7 @@ const RESOLVED: f64 = 1e-10;
 /// what the last coefficients may be there.
 const MARGIN: f64 = 1e-6;
 const PASSED: f64 = 1e-8;
-/// Swing up to which an output is constant, over its size.
+/// Variation up to which an output is constant, over its size.
 const CONSTANT: f64 = 1e-14;
 /// Steps until the next one is tried to be passed over, after one that was not.
 const WAITS: u8 = 3;

@@ -15,9 +15,19 @@ pub use series::TapeSeries;
 pub use symbol::Symbol;
 
 use super::Scalar;
+use std::cell::RefCell;
 
 /// Number of an operation on its tape.
 pub type Slot = u32;
+
+/// The number of an input in a list of those handed out, to which it is added where it is new.
+pub fn number_of<T: Clone + PartialEq>(list: &RefCell<Vec<T>>, input: &T) -> usize {
+    let mut list = list.borrow_mut();
+    list.iter().position(|known| known == input).unwrap_or_else(|| {
+        list.push(input.clone());
+        list.len() - 1
+    })
+}
 
 /// One operation; its operands are the results of operations before it.
 #[derive(Clone, Copy, Debug, PartialEq)]

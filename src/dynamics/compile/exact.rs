@@ -208,8 +208,8 @@ impl<C: Real> ExactMechanism<C> {
             if let Some((k, rate)) = group.iter().find_map(|&k| Some((k, scene.given[k].velocity?))) {
                 let z = self.elements(&start.phi);
                 start.omega[x..x + 2].fill(C::ZERO);
-                let swing = end(k).velocity(&z, &start.omega);
-                (start.omega[x], start.omega[x + 1]) = (rate[0] - swing.re, rate[1] - swing.im);
+                let turning = end(k).velocity(&z, &start.omega);
+                (start.omega[x], start.omega[x + 1]) = (rate[0] - turning.re, rate[1] - turning.im);
                 start.given[1][x..x + 2].fill(true);
             }
         }

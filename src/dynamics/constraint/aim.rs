@@ -10,7 +10,7 @@
 //! long as f does not depend on time the row does no work.
 
 use super::{Linearised, Posture, Site};
-use crate::arithmetic::tape::{Slot, Symbol, Tape};
+use crate::arithmetic::tape::{Slot, Symbol, Tape, number_of};
 use crate::arithmetic::{Complex, Real, Scalar};
 use crate::dynamics::Time;
 use crate::dynamics::configuration::{Configuration, Source};
@@ -126,12 +126,7 @@ struct Derivatives {
 
 impl Recorder {
     fn input(&self, input: Input) -> Symbol {
-        let mut inputs = self.inputs.borrow_mut();
-        let number = inputs.iter().position(|known| *known == input).unwrap_or_else(|| {
-            inputs.push(input);
-            inputs.len() - 1
-        });
-        Symbol::input(number as u32)
+        Symbol::input(number_of(&self.inputs, &input) as u32)
     }
 
     /// Derivatives by time and coordinates.

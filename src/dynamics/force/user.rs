@@ -9,7 +9,7 @@
 //! power accounted as work = Σ F·P' + Σ torque w  of what is applied beside
 //! ```
 
-use crate::arithmetic::tape::{Slot, Symbol, Tape};
+use crate::arithmetic::tape::{Slot, Symbol, Tape, number_of};
 use crate::arithmetic::{Complex, Scalar};
 use crate::dynamics::CompileError;
 use crate::dynamics::configuration::{Configuration, Source};
@@ -138,20 +138,11 @@ struct Recorder {
 
 impl Recorder {
     fn input(&self, input: Input) -> Symbol {
-        let mut inputs = self.inputs.borrow_mut();
-        let number = inputs.iter().position(|known| *known == input).unwrap_or_else(|| {
-            inputs.push(input);
-            inputs.len() - 1
-        });
-        Symbol::input(number as u32)
+        Symbol::input(number_of(&self.inputs, &input) as u32)
     }
 
     fn site(&self, site: &Site) -> usize {
-        let mut sites = self.sites.borrow_mut();
-        sites.iter().position(|known| known == site).unwrap_or_else(|| {
-            sites.push(site.clone());
-            sites.len() - 1
-        })
+        number_of(&self.sites, site)
     }
 }
 
